@@ -1,0 +1,1 @@
+"""parakin: design, analyse and program parallel kinematic machine tools."""

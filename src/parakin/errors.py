@@ -1,0 +1,40 @@
+"""Errors a user can meet. Each carries its place, and prints as one line: ``place: what, and what was expected``."""
+
+
+class ParakinError(Exception):
+    """Anything parakin refuses; ``str()`` is one line fit for a terminal."""
+
+
+class InputError(ParakinError):
+    """Malformed input.
+
+    Parameters
+    ----------
+    message : what is wrong and what was expected, one line
+    source : file name as the user gave it, or the argument's name
+    line : 1-based line in that file, if there is one
+    """
+
+    def __init__(self, message: str, source: str | None = None, line: int | None = None):
+        self.message, self.source, self.line = message, source, line
+        place = source or ""
+        if line is not None:
+            place += f":{line}"
+        super().__init__(f"{place}: {message}" if place else message)
+
+
+class InputErrors(InputError):
+    """Several input errors found in one pass; ``str()`` is one line each."""
+
+    def __init__(self, errors: list[InputError]):
+        self.errors = errors
+        super().__init__(errors[0].message, errors[0].source, errors[0].line)
+        self.args = ("\n".join(str(e) for e in errors),)
+
+
+class PoseError(ParakinError):
+    """Poses or joints of the wrong shape, type or mode."""
+
+
+class NoMethodError(ParakinError):
+    """The machine's structure has no such closed form or complete method."""

@@ -1,1 +1,62 @@
 """parakin: design, analyse and program parallel kinematic machine tools."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from os import PathLike
+from typing import TYPE_CHECKING
+
+from .errors import InputError, InputErrors, NoMethodError, ParakinError, PoseError
+
+if TYPE_CHECKING:
+    from .direct import Solution
+    from .machine import Machine
+
+__version__ = "0.1.0"
+__all__ = [
+    "InputError",
+    "InputErrors",
+    "Machine",
+    "NoMethodError",
+    "ParakinError",
+    "PoseError",
+    "Solution",
+    "load",
+    "machines",
+]
+
+
+def machines() -> list[str]:
+    """Names of the shipped machines."""
+    from .description import shipped
+
+    return sorted(shipped())
+
+
+def load(name: str | PathLike[str], parameters: Mapping[str, float | str] | None = None) -> Machine:
+    """A machine by its shipped name or by the path of its file.
+
+    Parameters
+    ----------
+    name : one of :func:`machines`, or a YAML file
+    parameters : sizes to override, by the names in the file; numbers are mm or rad, text carries its unit
+
+    Raises :class:`InputError` with file and line for a file that is no machine, :class:`ParakinError` for a machine
+    that can't work.
+    """
+    from .description import machine_file, read_machine
+    from .machine import Machine
+
+    return Machine(read_machine(machine_file(name), parameters))
+
+
+def __getattr__(name: str) -> object:
+    if name == "Machine":
+        from .machine import Machine
+
+        return Machine
+    if name == "Solution":
+        from .direct import Solution
+
+        return Solution
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

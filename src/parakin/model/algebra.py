@@ -1,0 +1,303 @@
+"""Scalars and vectors in which the model is written once and read by several interpreters.
+
+A scalar is a number, a NumPy array (all poses at once) or a :class:`Term` (a trace, compiled by
+:mod:`parakin.kernels.tape` or differentiated by :func:`derivative`). Vectors are triples of scalars, matrices triples
+of rows.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, TypeAlias
+
+import numpy as np
+
+# The operations of a trace. LIN: k0 + Σ k·a; QUAD: Σ k·a·b, up to three summands each; FMA: k·a·b + k·c + k0.
+LIN, QUAD, FMA, DIV, SQRT, SIN, COS, ATAN2, MIN, MAX, ABS, COPYSIGN, INPUT = range(13)
+
+
+class Term:
+    """A node of a trace. Equal nodes are one object, sums and products are gathered as they are written."""
+
+    __slots__ = ("args", "index", "k", "op", "trace")
+    __array_ufunc__ = None  # NumPy's scalars leave arithmetic with a term to the term
+
+    def __init__(self, trace: Trace, op: int, args: tuple[Term, ...], k: tuple[float, ...], index: int):
+        self.trace, self.op, self.args, self.k, self.index = trace, op, args, k, index
+
+    def __add__(self, other: Scalar) -> Scalar:
+        return _sum(self, other, 1.0)
+
+    __radd__ = __add__
+
+    def __sub__(self, other: Scalar) -> Scalar:
+        return _sum(self, other, -1.0)
+
+    def __rsub__(self, other: float) -> Scalar:
+        return -self + other
+
+    def __neg__(self) -> Scalar:
+        return _scaled(self, -1.0)
+
+    def __mul__(self, other: Scalar) -> Scalar:
+        if not isinstance(other, Term):
+            return _scaled(self, float(other))
+        (ka, a), (kb, b) = _unscaled(self), _unscaled(other)
+        pair = (a, b) if a.index <= b.index else (b, a)
+        return self.trace.node(QUAD, pair, (ka * kb,))
+
+    __rmul__ = __mul__
+
+    def __truediv__(self, other: Scalar) -> Scalar:
+        if not isinstance(other, Term):
+            return _scaled(self, 1.0 / float(other))
+        return self.trace.node(DIV, (self, other), ())
+
+    def __rtruediv__(self, other: float) -> Scalar:
+        if other == 0.0:
+            return 0.0
+        return self.trace.node(DIV, (self.trace.constant(other), self), ())
+
+
+Scalar: TypeAlias = Any  # float | np.ndarray | Term: mypy can't follow arithmetic over the union
+Vec: TypeAlias = Sequence[Scalar]
+Mat: TypeAlias = Sequence[Sequence[Scalar]]
+
+
+class Trace:
+    """All nodes of one computation, in the order they were made: operands before results."""
+
+    def __init__(self) -> None:
+        self.nodes: list[Term] = []
+        self._known: dict[tuple[Any, ...], Term] = {}
+        self._derivatives: dict[tuple[int, int], Scalar] = {}
+
+    def input(self, number: int) -> Term:
+        """The ``number``-th input."""
+        return self.node(INPUT, (), (float(number),))
+
+    def inputs(self, count: int, start: int = 0) -> list[Term]:
+        return [self.input(start + i) for i in range(count)]
+
+    def constant(self, value: float) -> Term:
+        return self.node(LIN, (), (float(value),))
+
+    def node(self, op: int, args: tuple[Term, ...], k: tuple[float, ...]) -> Term:
+        key = (op, k, *[a.index for a in args])
+        term = self._known.get(key)
+        if term is None:
+            term = self._known[key] = Term(self, op, args, k, len(self.nodes))
+            self.nodes.append(term)
+        return term
+
+
+def _unscaled(term: Term) -> tuple[float, Term]:
+    """(k, a) with term = k·a."""
+    if term.op == LIN and len(term.args) == 1 and term.k[0] == 0.0:
+        return term.k[1], term.args[0]
+    return 1.0, term
+
+
+def _scaled(term: Term, k: float) -> Scalar:
+    if k == 0.0:
+        return 0.0
+    if k == 1.0:
+        return term
+    if term.op in (LIN, QUAD, FMA):
+        return term.trace.node(term.op, term.args, tuple(k * x for x in term.k))
+    return term.trace.node(LIN, (term,), (0.0, k))
+
+
+def _linear(term: Scalar) -> tuple[float, list[tuple[float, Term]]]:
+    if not isinstance(term, Term):
+        return float(term), []
+    if term.op == LIN:
+        return term.k[0], list(zip(term.k[1:], term.args, strict=True))
+    return 0.0, [(1.0, term)]
+
+
+def _sum(x: Term, y: Scalar, sign: float) -> Scalar:
+    if not isinstance(y, Term | float | int | np.floating):
+        return NotImplemented
+    kx, parts = _linear(x)
+    ky, more = _linear(y)
+    const, total = kx + sign * ky, {a.index: (k, a) for k, a in parts}
+    for k, a in more:
+        total[a.index] = (total.get(a.index, (0.0, a))[0] + sign * k, a)
+    terms = [(k, a) for k, a in total.values() if k != 0.0]
+    if not terms:
+        return const
+    trace = x.trace
+    if len(terms) > 3:  # too wide for one operation: keep both sides as they stand
+        return trace.node(LIN, (x, y), (0.0, 1.0, sign))
+    if const == 0.0 and len(terms) == 1 and terms[0][0] == 1.0:
+        return terms[0][1]
+    products = [a.op == QUAD for _, a in terms]
+    if const == 0.0 and all(products) and sum(len(a.k) for _, a in terms) <= 3:
+        args = tuple(arg for _, a in terms for arg in a.args)
+        return trace.node(QUAD, args, tuple(k * q for k, a in terms for q in a.k))
+    if len(terms) == 2 and any(p and len(a.k) == 1 for p, (_, a) in zip(products, terms, strict=True)):
+        (kp, p), (kc, c) = terms if products[0] and len(terms[0][1].k) == 1 else terms[::-1]
+        return trace.node(FMA, (*p.args, c), (kp * p.k[0], kc, const))
+    return trace.node(LIN, tuple(a for _, a in terms), (const, *[k for k, _ in terms]))
+
+
+# Functions of a scalar, whatever it is.
+
+
+def sqrt(x: Scalar) -> Scalar:
+    """Square root; NaN below zero."""
+    if isinstance(x, Term):
+        return x.trace.node(SQRT, (x,), ())
+    with np.errstate(invalid="ignore"):
+        return np.sqrt(x)
+
+
+def sincos(x: Scalar) -> tuple[Scalar, Scalar]:
+    """Sine and cosine."""
+    if isinstance(x, Term):
+        return x.trace.node(SIN, (x,), ()), x.trace.node(COS, (x,), ())
+    return np.sin(x), np.cos(x)
+
+
+def atan2(y: Scalar, x: Scalar) -> Scalar:
+    """The angle of (x, y) in (-π, π]; 0 for (0, 0), whatever the signs of the zeros."""
+    if isinstance(y, Term) or isinstance(x, Term):
+        trace = y.trace if isinstance(y, Term) else x.trace
+        args = tuple(a if isinstance(a, Term) else trace.constant(a) for a in (y, x))
+        return trace.node(ATAN2, args, ())
+    return np.arctan2(y + 0.0, x + 0.0)
+
+
+def smaller(x: Scalar, y: Scalar) -> Scalar:
+    """The lesser of two; NaN if either is."""
+    return _choice(MIN, np.minimum, x, y)
+
+
+def larger(x: Scalar, y: Scalar) -> Scalar:
+    """The greater of two; NaN if either is."""
+    return _choice(MAX, np.maximum, x, y)
+
+
+def copysign(x: Scalar, y: Scalar) -> Scalar:
+    """|x| with the sign of y; NaN if either is."""
+    return _choice(COPYSIGN, np.copysign, x, y)
+
+
+def _choice(op: int, function: Any, x: Scalar, y: Scalar) -> Scalar:
+    if isinstance(x, Term) or isinstance(y, Term):
+        trace = x.trace if isinstance(x, Term) else y.trace
+        return trace.node(op, tuple(a if isinstance(a, Term) else trace.constant(a) for a in (x, y)), ())
+    return function(x, y)
+
+
+def absolute(x: Scalar) -> Scalar:
+    if isinstance(x, Term):
+        return x.trace.node(ABS, (x,), ())
+    return np.abs(x)
+
+
+# Vectors.
+
+
+def dot(u: Vec, v: Vec) -> Scalar:
+    total: Scalar = 0.0
+    for a, b in zip(u, v, strict=True):
+        total = a * b + total
+    return total
+
+
+def norm(u: Vec) -> Scalar:
+    return sqrt(dot(u, u))
+
+
+def add(u: Vec, v: Vec) -> Vec:
+    return tuple(a + b for a, b in zip(u, v, strict=True))
+
+
+def sub(u: Vec, v: Vec) -> Vec:
+    return tuple(a - b for a, b in zip(u, v, strict=True))
+
+
+def scale(u: Vec, k: Scalar) -> Vec:
+    return tuple(a * k for a in u)
+
+
+def along(start: Vec, direction: Vec, distance: Scalar) -> Vec:
+    """start + distance·direction."""
+    return tuple(a + d * distance for a, d in zip(start, direction, strict=True))
+
+
+def cross(u: Vec, v: Vec) -> Vec:
+    return (u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0])
+
+
+def transposed(m: Mat) -> Mat:
+    return tuple(zip(*m, strict=True))
+
+
+def apply(m: Mat, v: Vec) -> Vec:
+    return tuple(dot(row, v) for row in m)
+
+
+def product(m: Mat, n: Mat) -> Mat:
+    columns = transposed(n)
+    return tuple(tuple(dot(row, column) for column in columns) for row in m)
+
+
+def turn(axis: str, s: Scalar, c: Scalar) -> Mat:
+    """Rotation about a coordinate axis (``rx``, ``ry`` or ``rz``) by the angle of sine s and cosine c."""
+    if axis == "rx":
+        return ((1.0, 0.0, 0.0), (0.0, c, -s), (0.0, s, c))
+    if axis == "ry":
+        return ((c, 0.0, s), (0.0, 1.0, 0.0), (-s, 0.0, c))
+    return ((c, -s, 0.0), (s, c, 0.0), (0.0, 0.0, 1.0))
+
+
+IDENTITY: Mat = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+ORIGIN: Vec = (0.0, 0.0, 0.0)
+
+
+def derivative(y: Scalar, x: Term) -> Scalar:
+    """∂y/∂x of a trace, as a trace. Not for the operations with corners, which closures never use."""
+    if not isinstance(y, Term):
+        return 0.0
+    known = y.trace._derivatives
+    # Operands precede results, so one pass over the nodes that y needs is enough and no recursion is.
+    needed, stack = set(), [y]
+    while stack:
+        term = stack.pop()
+        if term.index not in needed and (term.index, x.index) not in known:
+            needed.add(term.index)
+            stack.extend(term.args)
+    for index in sorted(needed):
+        known[index, x.index] = _derivative(y.trace.nodes[index], x, known)
+    return known[y.index, x.index]
+
+
+def _derivative(y: Term, x: Term, known: dict[tuple[int, int], Scalar]) -> Scalar:
+    if y is x:
+        return 1.0
+    a = y.args
+    d = [known[arg.index, x.index] for arg in a]
+    if not any(isinstance(part, Term) or part != 0.0 for part in d):
+        return 0.0
+    if y.op == LIN:
+        return sum((k * part for k, part in zip(y.k[1:], d, strict=True)), 0.0)
+    if y.op in (QUAD, FMA):
+        pairs = 1 if y.op == FMA else len(y.k)
+        total: Scalar = y.k[1] * d[2] if y.op == FMA else 0.0
+        for i in range(pairs):
+            total = total + y.k[i] * (a[2 * i] * d[2 * i + 1] + a[2 * i + 1] * d[2 * i])
+        return total
+    if y.op == DIV:
+        return (d[0] - y * d[1]) / a[1]
+    if y.op == SQRT:
+        return 0.5 * d[0] / y
+    if y.op == SIN:
+        return sincos(a[0])[1] * d[0]
+    if y.op == COS:
+        return -sincos(a[0])[0] * d[0]
+    if y.op == ATAN2:
+        return (a[1] * d[0] - a[0] * d[1]) / (a[0] * a[0] + a[1] * a[1])
+    raise TypeError(f"no derivative of operation {y.op}")

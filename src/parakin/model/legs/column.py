@@ -1,0 +1,41 @@
+"""``column``: a carriage on a circular rail with a vertical slide, and a link in the column's radial plane (Eclipse)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from ..algebra import Scalar, Vec, atan2, sincos, sqrt
+from ..parts import Signs, Size
+from .base import Inverse, Leg
+
+
+@dataclass(frozen=True)
+class Column(Leg):
+    """Joints: the carriage's angle on the rail, then the slide's height. The rail's axis is the base frame's Z."""
+
+    kind = "column"
+    units = ("rad", "mm")
+    branches = "-"
+
+    radius: Size  # of the circular rail
+    rod: Size
+    branch: Signs = Signs("-")  # "-": the slide is below the platform's joint
+
+    def closures(self, point: Vec, joints: list[Scalar]) -> list[Scalar]:
+        s, c = sincos(joints[0])
+        x, y, z = point
+        out = self.radius - (x * c + y * s)
+        up = z - joints[1]
+        # The link's revolute joint keeps the platform's joint in the radial plane.
+        return [self.radius * (y * c - x * s), 0.5 * (out * out + up * up - self.rod**2)]
+
+    def inverse(self, point: Vec, signs: str) -> Inverse:
+        x, y, z = point
+        out = self.radius - sqrt(x * x + y * y)
+        reach = self.rod**2 - out * out
+        root = sqrt(reach)
+        return Inverse([atan2(y, x), z - root if signs == "-" else z + root], (reach,))
+
+    def struts(self, point: Vec, joints: list[Scalar]) -> list[tuple[Vec, Vec]]:
+        s, c = sincos(joints[0])
+        return [((self.radius * c, self.radius * s, joints[1]), point)]

@@ -1,0 +1,48 @@
+"""``crank``: a rod of fixed length whose foot turns on an arm (rotary Delta, Hexa)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from ..algebra import Scalar, Vec, add, atan2, cross, dot, scale, sincos, sqrt, sub
+from ..parts import Direction, Point, Signs, Size
+from .base import Inverse, Leg
+
+
+@dataclass(frozen=True)
+class Crank(Leg):
+    kind = "crank"
+    units = ("rad",)
+    branches = "+"
+
+    pivot: Point
+    axis: Direction  # the arm turns about it, right-handed
+    zero: Direction  # where the arm points at q = 0, at right angles to the axis
+    arm: Size
+    rod: Size
+    branch: Signs = Signs("+")
+
+    def _foot(self, q: Scalar) -> Vec:
+        s, c = sincos(q)
+        side = cross(self.axis, self.zero)
+        return add(self.pivot, add(scale(self.zero, self.arm * c), scale(side, self.arm * s)))
+
+    def closures(self, point: Vec, joints: list[Scalar]) -> list[Scalar]:
+        u = sub(point, self._foot(joints[0]))
+        return [0.5 * (dot(u, u) - self.rod**2)]
+
+    def inverse(self, point: Vec, signs: str) -> Inverse:
+        # |w - arm·(zero c + side s)| = rod gives x c + y s = m, with (x, y) the point in the arm's plane.
+        w = sub(point, self.pivot)
+        x, y = dot(w, self.zero), dot(w, cross(self.axis, self.zero))
+        m = (dot(w, w) + (self.arm**2 - self.rod**2)) / (2.0 * self.arm)
+        reach = x * x + y * y - m * m
+        root = sqrt(reach) if signs == "+" else -sqrt(reach)
+        return Inverse([atan2(y * m - x * root, x * m + y * root)], (reach,))
+
+    def struts(self, point: Vec, joints: list[Scalar]) -> list[tuple[Vec, Vec]]:
+        foot = self._foot(joints[0])
+        return [(foot, point), (self.pivot, foot)]
+
+    def sphere(self, joints: list[Scalar]) -> tuple[Vec, Scalar]:
+        return self._foot(joints[0]), self.rod

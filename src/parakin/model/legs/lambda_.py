@@ -1,0 +1,67 @@
+"""``lambda``: two sliders on one shaft; the long rod goes to the platform, the short one is hinged to the long one."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from ..algebra import Scalar, Vec, along, dot, scale, sqrt, sub
+from ..parts import Direction, Point, Signs, Size
+from .base import Inverse, Leg
+
+
+@dataclass(frozen=True)
+class Lambda(Leg):
+    """Joints: the long rod's slider, then the short rod's (IJEEC 6, 2022, equations (6) to (11), rederived)."""
+
+    kind = "lambda"
+    units = ("mm", "mm")
+    branches = "-+"
+
+    foot: Point  # of both sliders at q = 0
+    rail: Direction
+    long: Size
+    short: Size
+    hinge: Size  # from the platform's joint to the hinge, along the long rod
+    branch: Signs = Signs("-+")  # long slider before ("-") or past the platform's joint; short one past ("+") the hinge
+
+    @property
+    def _lower(self) -> float:
+        return self.long - self.hinge
+
+    def closures(self, point: Vec, joints: list[Scalar]) -> list[Scalar]:
+        first, second = joints
+        u = sub(point, along(self.foot, self.rail, first))
+        gap = second - first
+        height = (self._lower / self.long) * dot(u, self.rail)  # of the hinge over the long rod's slider
+        return [
+            0.5 * (dot(u, u) - self.long**2),
+            0.5 * (gap * gap - self.short**2 + self._lower**2) - gap * height,
+        ]
+
+    def inverse(self, point: Vec, signs: str) -> Inverse:
+        w = sub(point, self.foot)
+        s = dot(w, self.rail)
+        off = along(w, self.rail, -s)
+        reach = self.long**2 - dot(off, off)
+        rise = sqrt(reach) if signs[0] == "-" else -sqrt(reach)
+        height = (self._lower / self.long) * rise
+        hinge_reach = height * height + (self.short**2 - self._lower**2)
+        root = sqrt(hinge_reach)
+        first = s - rise
+        return Inverse([first, first + height + (root if signs[1] == "+" else -root)], (reach, hinge_reach))
+
+    def struts(self, point: Vec, joints: list[Scalar]) -> list[tuple[Vec, Vec]]:
+        start = along(self.foot, self.rail, joints[0])
+        rod = scale(sub(point, start), self._lower / self.long)
+        hinge = (start[0] + rod[0], start[1] + rod[1], start[2] + rod[2])
+        return [(start, point), (along(self.foot, self.rail, joints[1]), hinge)]
+
+    def height_and_distance(self, joints: list[Scalar]) -> tuple[Scalar, Scalar]:
+        """Of the platform's joint: how far along the rail, and how far from it, mm; closed form, for the direct problem.
+
+        The short rod's triangle has the sides gap, lower part of the long rod and short rod.
+        """
+        first, second = joints
+        gap = second - first
+        cosine = (gap * gap + (self._lower**2 - self.short**2)) / (2.0 * self._lower * gap)
+        return first + self.long * cosine, self.long * sqrt(1.0 - cosine * cosine)

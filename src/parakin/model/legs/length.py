@@ -1,0 +1,30 @@
+"""``length``: a strut of variable length on a fixed foot (hexapods, Tricept)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from ..algebra import Scalar, Vec, dot, norm, sub
+from ..parts import Point
+from .base import Inverse, Leg
+
+
+@dataclass(frozen=True)
+class Length(Leg):
+    kind = "length"
+    units = ("mm",)
+
+    foot: Point
+
+    def closures(self, point: Vec, joints: list[Scalar]) -> list[Scalar]:
+        u = sub(point, self.foot)
+        return [0.5 * (dot(u, u) - joints[0] * joints[0])]
+
+    def inverse(self, point: Vec, signs: str) -> Inverse:
+        return Inverse([norm(sub(point, self.foot))])
+
+    def struts(self, point: Vec, joints: list[Scalar]) -> list[tuple[Vec, Vec]]:
+        return [(self.foot, point)]
+
+    def sphere(self, joints: list[Scalar]) -> tuple[Vec, Scalar]:
+        return self.foot, joints[0]

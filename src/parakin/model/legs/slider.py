@@ -1,0 +1,45 @@
+"""``slider``: a rod of fixed length whose foot runs on a straight rail (Orthoglide, linear Delta, Hexaglide).
+
+A pair of equal rods on a platform that only translates (a parallelogram) is one such rod, the mean one.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from ..algebra import Scalar, Vec, along, dot, sqrt, sub
+from ..parts import Direction, Point, Signs, Size
+from .base import Inverse, Leg
+
+
+@dataclass(frozen=True)
+class Slider(Leg):
+    kind = "slider"
+    units = ("mm",)
+    branches = "-"
+
+    foot: Point  # at q = 0
+    rail: Direction  # q counts along it
+    rod: Size
+    branch: Signs = Signs("-")  # "+": the foot is farther along the rail than the platform's joint
+
+    def _foot(self, q: Scalar) -> Vec:
+        return along(self.foot, self.rail, q)
+
+    def closures(self, point: Vec, joints: list[Scalar]) -> list[Scalar]:
+        u = sub(point, self._foot(joints[0]))
+        return [0.5 * (dot(u, u) - self.rod**2)]
+
+    def inverse(self, point: Vec, signs: str) -> Inverse:
+        w = sub(point, self.foot)
+        s = dot(w, self.rail)
+        off = along(w, self.rail, -s)  # from the rail, at right angles
+        reach = self.rod**2 - dot(off, off)
+        root = sqrt(reach)
+        return Inverse([s - root if signs == "-" else s + root], (reach,))
+
+    def struts(self, point: Vec, joints: list[Scalar]) -> list[tuple[Vec, Vec]]:
+        return [(self._foot(joints[0]), point)]
+
+    def sphere(self, joints: list[Scalar]) -> tuple[Vec, Scalar]:
+        return self._foot(joints[0]), self.rod

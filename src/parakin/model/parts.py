@@ -1,0 +1,87 @@
+"""The parts a machine is made of, as plain frozen data: drives, elementary transforms, limits.
+
+Lengths are mm, angles rad, speeds mm/s or rad/s, accelerations mm/s² or rad/s². Machine files are read into these
+by :mod:`parakin.description`; nothing here knows a file.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import inf
+from typing import Literal, NewType
+
+Unit = Literal["mm", "rad"]
+Vector = tuple[float, float, float]
+
+# What a field of a leg kind holds; the reader of machine files goes by these.
+Point = NewType("Point", Vector)  # mm
+Direction = NewType("Direction", Vector)  # unit vector
+Size = NewType("Size", float)  # a length > 0, mm
+Signs = NewType("Signs", str)  # a working mode: one of "+" and "-" for each choice the inverse has
+
+TRANSLATIONS = ("tx", "ty", "tz")
+ROTATIONS = ("rx", "ry", "rz")
+
+
+@dataclass(frozen=True)
+class Drive:
+    """One actuated joint: its name, its unit and what it can do."""
+
+    name: str
+    unit: Unit
+    low: float = -inf
+    high: float = inf
+    speed: float = inf
+    acceleration: float = inf
+
+
+@dataclass(frozen=True)
+class Step:
+    """One elementary transform of a head, a table or a mounting: ``axis`` by ``value`` + ``sign``·q of its drive."""
+
+    axis: str  # one of TRANSLATIONS and ROTATIONS
+    value: float = 0.0  # mm or rad
+    drive: Drive | None = None
+    sign: float = 1.0
+
+
+@dataclass(frozen=True)
+class Range:
+    """low ≤ value ≤ high of a named quantity: a passive coordinate of the motion, or a difference of two joints."""
+
+    name: str
+    low: float = -inf
+    high: float = inf
+
+
+@dataclass(frozen=True)
+class Gap:
+    """low ≤ q[second] - q[first] ≤ high, mm: two sliders that share a shaft."""
+
+    first: str
+    second: str
+    low: float = -inf
+    high: float = inf
+
+
+@dataclass(frozen=True)
+class Cone:
+    """The rods of all legs stay within ``angle`` of ``axis`` at the joint ``at`` the foot or the platform.
+
+    ``axis`` is in the base frame for the foot, in the platform frame for the platform; it points along the rod's
+    direction from foot to platform when the joint is centred. None: each rod's own direction at home.
+    """
+
+    at: Literal["foot", "platform"]
+    angle: float
+    axis: Direction | None = None
+
+
+@dataclass(frozen=True)
+class Limits:
+    """All that bounds a machine besides its drives' ranges."""
+
+    passive: tuple[Range, ...] = ()  # of the motion's coordinates, by their names (rx, ry, tz, ...)
+    gaps: tuple[Gap, ...] = ()
+    cones: tuple[Cone, ...] = ()
+    clearance: float | None = None  # least distance of the centre lines of two struts, mm

@@ -1,0 +1,39 @@
+"""The whole of what a machine is: a platform with a known motion, held by legs; a head, a table, limits."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from .legs import Leg
+from .parts import Drive, Limits, Step
+
+
+@dataclass(frozen=True)
+class Spec:
+    """A machine's description with every size resolved (mm, rad).
+
+    ``motion`` lists the platform's elementary transforms in order (``tx ty tz rx ry rz``); ``mounting`` places the
+    base frame in the machine frame; ``head`` leads from the platform to the tool's tip, whose +z points from the tip
+    into the holder; ``table`` leads from the machine frame to the workpiece. ``home`` maps axis names to a pose.
+    """
+
+    name: str
+    title: str
+    source: str
+    motion: tuple[str, ...]
+    legs: tuple[Leg, ...]
+    home: Mapping[str, float]
+    sizes: Mapping[str, float] = field(default_factory=dict)
+    mounting: tuple[Step, ...] = ()
+    head: tuple[Step, ...] = ()
+    table: tuple[Step, ...] = ()
+    limits: Limits = field(default_factory=Limits)
+
+    @property
+    def drives(self) -> tuple[Drive, ...]:
+        """Every drive in the order of the joint vector: the legs' first ones, their second ones, head, table."""
+        most = max((len(leg.drives) for leg in self.legs), default=0)
+        legs = [leg.drives[i] for i in range(most) for leg in self.legs if i < len(leg.drives)]
+        serial = [step.drive for step in (*self.head, *self.table) if step.drive is not None]
+        return (*legs, *serial)

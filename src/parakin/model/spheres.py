@@ -1,0 +1,52 @@
+"""The common point of three spheres, or of two circles in a coordinate plane: the direct problem of machines that only
+translate, in closed form."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from .algebra import Scalar, Vec, add, copysign, cross, dot, scale, sqrt, sub
+
+CENTRES_NEEDED = (2, 3)
+
+
+def common_point(
+    centres: Sequence[Vec], radii: Sequence[Scalar], plane: Sequence[int], side: float | None, near: Vec | None
+) -> Vec:
+    """The point at ``radii`` from ``centres``; NaN where there is none.
+
+    ``plane`` names the coordinates in which the circles lie, all three for spheres. Of the two points the one on
+    ``side`` (±1) of the plane (line) through the centres, or, with None, the one on the side of ``near``.
+    """
+    first = centres[0]
+    if len(centres) == 2:
+        i, j = plane
+        out = 3 - i - j
+        across: Vec = tuple(1.0 if c == out else 0.0 for c in range(3))
+        u = tuple(0.0 if c == out else x for c, x in enumerate(sub(centres[1], first)))
+        normal = cross(across, u)
+        size = dot(normal, normal)
+        a = 0.5 * (radii[0] * radii[0] - radii[1] * radii[1] + size)
+        foot = scale(u, a / size)
+    else:
+        u, v = sub(centres[1], first), sub(centres[2], first)
+        normal = cross(u, v)
+        size = dot(normal, normal)
+        a = 0.5 * (radii[0] * radii[0] - radii[1] * radii[1] + dot(u, u))
+        b = 0.5 * (radii[0] * radii[0] - radii[2] * radii[2] + dot(v, v))
+        foot = add(scale(cross(v, normal), a / size), scale(cross(normal, u), b / size))
+    height = sqrt((radii[0] * radii[0] - dot(foot, foot)) / size)  # in units of the normal
+    height = copysign(height, dot(sub(near, first), normal)) if side is None and near is not None else height * side
+    return add(first, add(foot, scale(normal, height)))
+
+
+def side_of(centres: Sequence[Vec], plane: Sequence[int], point: Vec) -> float:
+    """+1 or -1: the side of the centres' plane (line) on which a point lies, as :func:`common_point` counts it."""
+    first = centres[0]
+    if len(centres) == 2:
+        out = 3 - sum(plane)
+        across = tuple(1.0 if c == out else 0.0 for c in range(3))
+        normal = cross(across, sub(centres[1], first))
+    else:
+        normal = cross(sub(centres[1], first), sub(centres[2], first))
+    return 1.0 if dot(sub(point, first), normal) >= 0.0 else -1.0

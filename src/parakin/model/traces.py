@@ -1,0 +1,272 @@
+"""The machine's computations as traces, compiled to tapes on first use: inverse, closures, Jacobians, margins, poses.
+
+Inputs are numbered: first the pose (or the motion's coordinates), then the joint vector.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from functools import cached_property
+
+from ..kernels.tape import Tape, compile_tape
+from .algebra import Scalar, Trace, Vec, apply, derivative, norm, scale, sub, transposed
+from .legs import Inverse
+from .limits import Home, Limit, leg_joints, limits_of, platform_points
+from .spec import Spec
+from .spheres import CENTRES_NEEDED, common_point, side_of
+from .structure import Placement, Structure, structure_of
+
+
+class Model:
+    """A machine's mathematics in :mod:`parakin.model.algebra`, for numbers, arrays and traces."""
+
+    def __init__(self, spec: Spec):
+        self.spec = spec
+        self.structure: Structure = structure_of(spec)
+        self.axes = self.structure.axes
+        self.drives = spec.drives
+        self.serial = len(self.drives) - sum(len(leg.drives) for leg in spec.legs)
+        self._tapes: dict[tuple[object, ...], Tape] = {}
+
+    # Working modes: the signs of every leg's choices, then head and table's.
+
+    @property
+    def mode(self) -> str:
+        """The working mode that the file names."""
+        return "".join(getattr(leg, "branch", "") for leg in self.spec.legs) + self.structure.branches
+
+    def split_mode(self, mode: str) -> tuple[list[str], str]:
+        signs, rest = [], mode
+        for leg in self.spec.legs:
+            count = len(leg.branches)
+            signs.append(rest[:count])
+            rest = rest[count:]
+        return signs, rest
+
+    # The problems, on scalars of any kind.
+
+    def invert(self, pose: Sequence[Scalar], mode: str, first: Scalar | None = None
+    ) -> tuple[list[Scalar], Placement, list[Inverse]]:
+        """Joint vector, placement and each leg's inverse for a pose."""
+        signs, branch = self.split_mode(mode)
+        placed = self.structure.place(pose, branch, first)
+        points = platform_points(self.spec, placed.rotation, placed.origin)
+        legs = [leg.inverse(point, s) for leg, point, s in zip(self.spec.legs, points, signs, strict=True)]
+        by_name = {
+            drive.name: q
+            for leg, found in zip(self.spec.legs, legs, strict=True)
+            for drive, q in zip(leg.drives, found.joints, strict=True)
+        }
+        by_name.update(zip((d.name for d in self.drives[len(by_name) :]), placed.serial, strict=True))
+        return [by_name[drive.name] for drive in self.drives], placed, legs
+
+    def margins(self, pose: Sequence[Scalar], joints: Sequence[Scalar], mode: str) -> list[tuple[Limit, Scalar]]:
+        """Every limit with its margin, for a pose and its joints."""
+        signs, branch = self.split_mode(mode)
+        placed = self.structure.place(pose, branch)
+        points = platform_points(self.spec, placed.rotation, placed.origin)
+        reaches = [leg.inverse(p, s).reach for leg, p, s in zip(self.spec.legs, points, signs, strict=True)]
+        return limits_of(self.spec, placed, joints, reaches, self.rods_at_home if self._centred_cones else None)
+
+    def closures(self, rotation: Sequence[Vec], origin: Vec, joints: Sequence[Scalar]) -> list[Scalar]:
+        """Every leg's closure, mm²."""
+        points = platform_points(self.spec, rotation, origin)
+        given = leg_joints(self.spec, joints)
+        return [f for leg, p, q in zip(self.spec.legs, points, given, strict=True) for f in leg.closures(p, q)]
+
+    @property
+    def _centred_cones(self) -> bool:
+        return any(cone.axis is None for cone in self.spec.limits.cones)
+
+    @cached_property
+    def home(self) -> list[float]:
+        return [float(self.spec.home.get(letter, 0.0)) for letter in self.axes]
+
+    @cached_property
+    def rods_at_home(self) -> Home:
+        joints, placed, _ = self.invert(self.home, self.mode)
+        points = platform_points(self.spec, placed.rotation, placed.origin)
+        given = leg_joints(self.spec, joints)
+        rods = [leg.struts(p, q)[0] for leg, p, q in zip(self.spec.legs, points, given, strict=True)]
+        units = [scale(sub(point, foot), 1.0 / norm(sub(point, foot))) for foot, point in rods]
+        back = transposed(placed.rotation)
+        return Home(tuple(units), tuple(apply(back, u) for u in units))
+
+    @cached_property
+    def sizes(self) -> list[float]:
+        """A length a closure, mm: dividing by it makes a closure the distance by which the leg fails to close."""
+        joints, placed, _ = self.invert(self.home, self.mode)
+        points = platform_points(self.spec, placed.rotation, placed.origin)
+        given = leg_joints(self.spec, joints)
+        sizes = []
+        for leg, point, q in zip(self.spec.legs, points, given, strict=True):
+            foot, end = leg.struts(point, q)[0]
+            sizes += [float(norm(sub(end, foot)))] * len(leg.drives)
+        return sizes
+
+    @cached_property
+    def limits(self) -> tuple[Limit, ...]:
+        joints, _, _ = self.invert(self.home, self.mode)
+        return tuple(limit for limit, _ in self.margins(self.home, joints, self.mode))
+
+    @cached_property
+    def by_spheres(self) -> bool:
+        """True where the direct problem is the common point of spheres or circles: no turns, one rod a leg."""
+        turns = any(word.startswith("r") for word in self.spec.motion)
+        held = [leg.sphere([0.0] * len(leg.drives)) is not None for leg in self.spec.legs]
+        return not turns and all(held) and len(held) in CENTRES_NEEDED
+
+    @cached_property
+    def home_side(self) -> float:
+        """The side of the spheres' centres on which the platform is at home."""
+        joints, placed, _ = self.invert(self.home, self.mode)
+        centres, _, plane = self._spheres(joints)
+        return side_of(centres, plane, placed.origin)
+
+    @cached_property
+    def first_serial(self) -> int | None:
+        """Index in the joint vector of the first turning axis of head and table; None where there is none."""
+        pointing_order = getattr(self.structure, "order", [0])
+        return len(self.drives) - self.serial + pointing_order[0] if self.serial == 2 else None
+
+    # Tapes.
+
+    def _tape(self, key: tuple[object, ...], outputs: Callable[[Trace], list[Scalar]]) -> Tape:
+        tape = self._tapes.get(key)
+        if tape is None:
+            trace = Trace()
+            tape = self._tapes[key] = compile_tape(trace, outputs(trace))
+        return tape
+
+    def _pose_and_joints(self, trace: Trace) -> tuple[list[Scalar], list[Scalar]]:
+        n = len(self.axes)
+        return list(trace.inputs(n)), list(trace.inputs(len(self.drives), n))
+
+    def _coordinates_and_joints(self, trace: Trace) -> tuple[list[Scalar], list[Scalar]]:
+        m = len(self.structure.coordinates)
+        return list(trace.inputs(m)), list(trace.inputs(len(self.drives), m))
+
+    def _serial(self, joints: Sequence[Scalar]) -> list[Scalar]:
+        return list(joints[len(self.drives) - self.serial :])
+
+    def inverse_tape(self, mode: str) -> Tape:
+        """pose -> joints."""
+        return self._tape(("inverse", mode), lambda t: self.invert(t.inputs(len(self.axes)), mode)[0])
+
+    def held_tape(self, mode: str) -> Tape:
+        """pose, first serial joint -> joints, for poses where that joint is free."""
+        n = len(self.axes)
+        return self._tape(("held", mode), lambda t: self.invert(t.inputs(n), mode, t.input(n))[0])
+
+    def freedom_tape(self) -> Tape:
+        """pose -> sin² of the tool axis against the first turning axis of head and table; 1 where there is none."""
+
+        def outputs(trace: Trace) -> list[Scalar]:
+            placed = self.structure.place(trace.inputs(len(self.axes)), self.structure.branches)
+            return [1.0 if placed.freedom is None else placed.freedom]
+
+        return self._tape(("freedom",), outputs)
+
+    def start_tape(self) -> Tape:
+        """pose -> the motion's coordinates."""
+
+        def outputs(trace: Trace) -> list[Scalar]:
+            return self.structure.place(trace.inputs(len(self.axes)), self.structure.branches).coordinates
+
+        return self._tape(("start",), outputs)
+
+    def pose_tape(self) -> Tape:
+        """coordinates, joints -> pose."""
+
+        def outputs(trace: Trace) -> list[Scalar]:
+            coordinates, joints = self._coordinates_and_joints(trace)
+            return self.structure.pose(coordinates, self._serial(joints))
+
+        return self._tape(("pose",), outputs)
+
+    def newton_tape(self) -> Tape:
+        """coordinates, joints -> closures in mm, then their derivatives by the coordinates."""
+
+        def outputs(trace: Trace) -> list[Scalar]:
+            coordinates, joints = self._coordinates_and_joints(trace)
+            closures = self.closures(*self.structure.frame(coordinates), joints)
+            f = [c / size for c, size in zip(closures, self.sizes, strict=True)]
+            return f + [derivative(row, y) for row in f for y in coordinates]
+
+        return self._tape(("newton",), outputs)
+
+    def legs_tape(self, mode: str) -> Tape:
+        """coordinates -> the legs' joints, in the joint vector's order, and their derivatives by the coordinates."""
+
+        def outputs(trace: Trace) -> list[Scalar]:
+            coordinates = list(trace.inputs(len(self.structure.coordinates)))
+            points = platform_points(self.spec, *self.structure.frame(coordinates))
+            signs, _ = self.split_mode(mode)
+            found = {
+                drive.name: q
+                for leg, point, s in zip(self.spec.legs, points, signs, strict=True)
+                for drive, q in zip(leg.drives, leg.inverse(point, s).joints, strict=True)
+            }
+            legs = [found[drive.name] for drive in self.drives[: len(self.drives) - self.serial]]
+            return legs + [derivative(q, y) for q in legs for y in coordinates]
+
+        return self._tape(("legs", mode), outputs)
+
+    def margins_tape(self, mode: str) -> Tape:
+        """pose, joints -> every margin, in the order of :attr:`limits`."""
+
+        def outputs(trace: Trace) -> list[Scalar]:
+            pose, joints = self._pose_and_joints(trace)
+            return [margin for _, margin in self.margins(pose, joints, mode)]
+
+        return self._tape(("margins", mode), outputs)
+
+    def check_tape(self, mode: str) -> Tape:
+        """pose -> every margin, with the inverse in between."""
+
+        def outputs(trace: Trace) -> list[Scalar]:
+            pose = trace.inputs(len(self.axes))
+            joints, _, _ = self.invert(pose, mode)
+            return [margin for _, margin in self.margins(pose, joints, mode)]
+
+        return self._tape(("check", mode), outputs)
+
+    def jacobian_tape(self) -> Tape:
+        """pose, joints -> A (n·n) and B (n·n) with A x' = B q'."""
+
+        def outputs(trace: Trace) -> list[Scalar]:
+            pose, joints = self._pose_and_joints(trace)
+            rotation, origin, rows = self.structure.closure(pose, self._serial(joints))
+            f = [*self.closures(rotation, origin, joints), *rows]
+            a = [derivative(row, x) for row in f for x in pose]
+            return a + [-derivative(row, q) for row in f for q in joints]
+
+        return self._tape(("jacobian",), outputs)
+
+    def spheres_tape(self, side: float | None) -> Tape:
+        """joints -> coordinates, on the given side of the centres' plane; with None: joints, near pose -> coordinates."""
+
+        def outputs(trace: Trace) -> list[Scalar]:
+            joints = list(trace.inputs(len(self.drives)))
+            near = None
+            if side is None:
+                pose = trace.inputs(len(self.axes), len(joints))
+                near = self.structure.place(pose, self.structure.branches).origin
+            return self.spheres(joints, side, near)
+
+        return self._tape(("spheres", side), outputs)
+
+    def spheres(self, joints: Sequence[Scalar], side: float | None, near: Vec | None = None) -> list[Scalar]:
+        """The motion's coordinates by the common point of the legs' spheres; ``near`` picks the nearer of two."""
+        centres, radii, plane = self._spheres(joints)
+        return self.structure.coordinates_at(common_point(centres, radii, plane, side, near))
+
+    def _spheres(self, joints: Sequence[Scalar]) -> tuple[list[Vec], list[Scalar], list[int]]:
+        """Centres and radii of the spheres on which the platform's origin lies, and the coordinates it moves in."""
+        centres, radii = [], []
+        for leg, q in zip(self.spec.legs, leg_joints(self.spec, joints), strict=True):
+            sphere = leg.sphere(q)
+            assert sphere is not None
+            centres.append(sub(sphere[0], leg.platform))
+            radii.append(sphere[1])
+        return centres, radii, [i for i, word in enumerate(("tx", "ty", "tz")) if word in self.spec.motion]

@@ -173,8 +173,8 @@ class Machine:
         return forward(self, joints, near, method)
 
     def assemblies(self, joints: ArrayLike) -> Array:
-        """Every real pose of one joint vector, (k, axes); see :func:`parakin.assemblies.assemblies`."""
-        from .assemblies import assemblies
+        """Every real pose of one joint vector, (k, axes); see :func:`parakin.kinematics.assemblies.assemblies`."""
+        from .kinematics.assemblies import assemblies
 
         return assemblies(self, joints)
 

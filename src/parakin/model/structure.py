@@ -124,6 +124,13 @@ class Free(Structure):
         origin = sub(tip, apply(rotation, self.tip))
         return rotation, tuple(o if letter in given else 0.0 for o, letter in zip(origin, "XYZ", strict=True))
 
+    def coordinates_of(self, rotation: Mat, origin: Vec) -> list[Scalar]:
+        """The pose X Y Z A B C of a platform's frame; B in [-90°, 90°]."""
+        r = product(product(self.mount, rotation), self.tool)
+        tip = add(apply(self.mount, add(origin, apply(rotation, self.tip))), self.base)
+        b = atan2(-r[2][0], sqrt(r[0][0] * r[0][0] + r[1][0] * r[1][0]))
+        return [*tip, atan2(r[2][1], r[2][2]), b, atan2(r[1][0], r[0][0])]
+
     def coordinates_at(self, origin: Vec) -> list[Scalar]:
         tip = add(apply(self.mount, add(origin, self.tip)), self.base)
         return [tip["XYZ".index(letter)] for letter in self.axes]

@@ -1,0 +1,1 @@
+"""The direct problem in all its forms, and joints along a path."""

@@ -1,0 +1,196 @@
+"""Every real assembly mode of one joint vector."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..errors import NoMethodError, PoseError
+from ..kernels.batch import run, solve
+from ..kernels.intervals import IntervalProgram
+from ..model.algebra import Trace, derivative
+from ..model.legs.lambda_ import Lambda
+from ..model.structure import CentralLeg, Free
+from .boxes import roots
+from ..direct import MOST_STEPS, closing, poses_of, tolerance
+from .planar import planar_poses
+
+if TYPE_CHECKING:
+    from ..machine import Array, Machine
+
+
+def assemblies(machine: Machine, joints: ArrayLike) -> Array:
+    """Every real pose for one joint vector (joints,), as rows (k, axes); k may be 0.
+
+    Two for machines that only translate on three (two) rods: the common points of spheres (circles). Up to six for
+    three rods in a plane. For three Lambda legs on parallel shafts the heights give the platform's tilt, face up or
+    face down, and each leaves the planar problem: up to twelve, face up first. With a passive central leg all those
+    within the limits of its passive joints, by bisection. For other machines there is no complete method here, and
+    :class:`NoMethodError` says so.
+    """
+    rows, lead = machine.rows(joints, machine.joints, "joints")
+    if lead != ():
+        raise PoseError(f"joints: one joint vector ({len(machine.joints)},) expected, not {(*lead, len(machine.joints))}")
+    if not np.isfinite(rows).all():
+        return np.empty((0, len(machine.axes)))
+    model = machine.model
+    if model.by_spheres:
+        coordinates = _spheres(machine, rows)
+    elif isinstance(model.structure, CentralLeg) and not model.structure.roll:
+        coordinates = _central_leg(machine, rows)
+    elif isinstance(model.structure, Free) and _planar(machine):
+        coordinates = _planar_free(machine, rows)
+    elif isinstance(model.structure, Free) and _parallel_lambdas(machine):
+        coordinates = _lambdas(machine, rows)
+    else:
+        raise NoMethodError(f"{machine.name}: no complete method for all its assemblies; forward(near=...) finds single ones")
+    given = np.ascontiguousarray(np.broadcast_to(rows, (len(coordinates), rows.shape[1])))
+    residual, _ = closing(machine, np.ascontiguousarray(coordinates), given)
+    coordinates, given = coordinates[residual <= tolerance(machine)], given[residual <= tolerance(machine)]
+    return poses_of(machine, np.ascontiguousarray(coordinates), given)
+
+
+def _spheres(machine: Machine, rows: Array) -> Array:
+    model = machine.model
+    sides = [model.home_side, -model.home_side]
+    m = len(model.structure.coordinates)
+    both = np.concatenate([run(model.spheres_tape(side), rows, np.empty((1, m))) for side in sides])
+    both = both[np.isfinite(both).all(1)]
+    return both[:1] if len(both) == 2 and np.array_equal(both[0], both[1]) else both
+
+
+def _legs(machine: Machine, rows: Array) -> list[list[float]]:
+    by_name = dict(zip(machine.joints, rows[0].tolist(), strict=True))
+    return [[by_name[drive.name] for drive in leg.drives] for leg in machine.spec.legs]
+
+
+def _central_leg(machine: Machine, rows: Array) -> Array:
+    model = machine.model
+    words = model.structure.coordinates
+    bounds = {bound.name: (bound.low, bound.high) for bound in machine.spec.limits.passive}
+    far = 0.0
+    for leg, q in zip(machine.spec.legs, _legs(machine, rows), strict=True):
+        sphere = leg.sphere(q)
+        if sphere is None:
+            raise NoMethodError(f"{machine.name}: no complete method for all assemblies of legs of kind {leg.kind}")
+        far = max(far, float(np.linalg.norm(np.array(sphere[0])) + abs(sphere[1]) + np.linalg.norm(leg.platform)))
+    sign = model.structure.sign if isinstance(model.structure, CentralLeg) else 1.0
+    slide = (0.0, far) if sign > 0 else (-far, 0.0)
+    box = [bounds.get(word, slide if word == "tz" else (-np.pi / 2, np.pi / 2)) for word in words]
+    low, high = (np.array([side[i] for side in box]) for i in (0, 1))
+    low = np.where(np.isfinite(low), low, [-np.pi / 2, -np.pi / 2, slide[0]])
+    high = np.where(np.isfinite(high), high, [np.pi / 2, np.pi / 2, slide[1]])
+    trace = Trace()
+    inputs = trace.inputs(len(words))
+    f = model.closures(*model.structure.frame(inputs), rows[0].tolist())
+    f = [row / size for row, size in zip(f, model.sizes, strict=True)]
+    starts = roots(IntervalProgram(trace, f + [derivative(row, y) for row in f for y in inputs]), low, high)
+    return _polished(machine, rows, starts, low, high)
+
+
+def _polished(machine: Machine, rows: Array, starts: Array, low: Array, high: Array) -> Array:
+    """The distinct roots that Newton's method reaches from ``starts``, within the box."""
+    given = np.ascontiguousarray(np.broadcast_to(rows, (len(starts), rows.shape[1])))
+    y, residual, _, _ = solve(machine.model.newton_tape(), starts, given, high - low, MOST_STEPS)
+    slack = 1e-9 * (high - low)
+    good = (residual <= tolerance(machine)) & (y >= low - slack).all(1) & (y <= high + slack).all(1)
+    kept: list[Array] = []
+    for root in y[good]:
+        if not any((np.abs(root - other) <= 1e-6 * (high - low)).all() for other in kept):
+            kept.append(root)
+    return np.array(kept).reshape(-1, y.shape[1])
+
+
+def _planar(machine: Machine) -> bool:
+    words = machine.model.structure.coordinates
+    turns = [word for word in words if word.startswith("r")]
+    in_plane = len(words) == 3 and len(turns) == 1 and f"t{turns[0][1]}" not in words
+    return in_plane and all(leg.sphere([0.0] * len(leg.drives)) is not None for leg in machine.spec.legs)
+
+
+def _planar_free(machine: Machine, rows: Array) -> Array:
+    words = machine.model.structure.coordinates
+    # The plane's two directions, so ordered that the turn is right-handed: x y for rz, z x for ry, y z for rx.
+    plane = {"rz": [0, 1], "ry": [2, 0], "rx": [1, 2]}[words[2]]
+    out = 3 - sum(plane)
+    centres, radii = [], []
+    for leg, q in zip(machine.spec.legs, _legs(machine, rows), strict=True):
+        sphere = leg.sphere(q)
+        assert sphere is not None
+        height = sphere[0][out] - leg.platform[out]
+        centres.append([sphere[0][i] for i in plane])
+        radii.append(np.sqrt(max(float(sphere[1]) ** 2 - float(height) ** 2, 0.0)))
+    structure = machine.model.structure
+    assert isinstance(structure, Free)
+    # The pose is of the tip; a fixed tool only shifts the corners.
+    corners = np.array([[leg.platform[i] - structure.tip[i] for i in plane] for leg in machine.spec.legs])
+    found = planar_poses(np.array(centres, float), np.array(radii), corners)
+    letters = ["tx", "ty", "tz"]
+    order = [[letters[i] for i in plane].index(word) for word in words[:2]]
+    return found[:, [*order, 2]]
+
+
+def _parallel_lambdas(machine: Machine) -> bool:
+    rails = [np.array(leg.rail) for leg in machine.spec.legs if isinstance(leg, Lambda)]
+    return len(rails) == len(machine.spec.legs) == 3 and all(np.allclose(r, rails[0], atol=1e-12) for r in rails)
+
+
+def _lambdas(machine: Machine, rows: Array) -> Array:
+    structure = machine.model.structure
+    assert isinstance(structure, Free)
+    legs = [leg for leg in machine.spec.legs if isinstance(leg, Lambda)]
+    axis = np.array(legs[0].rail)
+    side = np.linalg.svd(axis[None, :])[2][1:]
+    if np.dot(np.cross(side[0], side[1]), axis) < 0.0:
+        side = side[::-1]
+    feet = np.array([leg.foot for leg in legs])
+    corners = np.array([leg.platform for leg in legs])
+    with np.errstate(invalid="ignore", divide="ignore"):
+        held = np.array([leg.height_and_distance(q) for leg, q in zip(legs, _legs(machine, rows), strict=True)])
+    if not np.isfinite(held).all():
+        return np.empty((0, 6))
+    heights, distances = held[:, 0] + feet @ axis, held[:, 1]
+    edges = corners[1:] - corners[0]
+    normal = np.cross(edges[0], edges[1])
+    normal = normal / np.linalg.norm(normal)
+    # The shafts' direction seen from the platform: its part in the platform's plane from the heights, the rest ±.
+    inside = np.linalg.lstsq(edges, heights[1:] - heights[0], rcond=None)[0]
+    rest = 1.0 - inside @ inside
+    if rest < 0.0:
+        return np.empty((0, 6))
+    up = 1.0 if normal @ _home_axis(machine, axis) >= 0.0 else -1.0
+    found: list[Array] = []
+    for sign in (up, -up) if rest > 0.0 else (up,):
+        seen = inside + sign * np.sqrt(rest) * normal
+        tilt = _rotation_between(seen, axis)
+        flat = corners @ tilt.T @ side.T
+        height = heights[0] - axis @ (tilt @ corners[0])
+        for x, y, turn in planar_poses(feet @ side.T, distances, flat):
+            spin = _about(axis, turn)
+            origin = side.T @ np.array([x, y]) + height * axis
+            found.append(np.array(structure.coordinates_of(spin @ tilt, origin)))
+    return np.array(found).reshape(-1, 6)
+
+
+def _home_axis(machine: Machine, axis: Array) -> Array:
+    rotation, _ = machine.model.structure.frame(machine.model.home)
+    return np.array(rotation, float).T @ axis
+
+
+def _about(axis: Array, angle: float) -> Array:
+    x, y, z = axis
+    skew = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    return np.eye(3) + np.sin(angle) * skew + (1.0 - np.cos(angle)) * (skew @ skew)
+
+
+def _rotation_between(start: Array, end: Array) -> Array:
+    """A rotation that takes the unit vector ``start`` to ``end``."""
+    middle = start + end
+    size = middle @ middle
+    if size < 1e-12:  # opposite: half a turn about anything at right angles
+        across = np.linalg.svd(start[None, :])[2][1]
+        return 2.0 * np.outer(across, across) - np.eye(3)
+    half = middle / np.sqrt(size)  # half a turn about it takes start to end
+    return 2.0 * np.outer(half, half) - np.eye(3)

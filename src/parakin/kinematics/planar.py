@@ -1,0 +1,96 @@
+"""The planar 3-RPR problem in closed form: a triangle whose corners lie at given distances from three points.
+
+Eliminating the place leaves a trigonometric polynomial in the turn, a sextic in its half angle's tangent, so there are
+at most six solutions (Gosselin, Sefrioui and Richard, 1992).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+_SAMPLES = 16  # the polynomial has harmonics up to the fourth (which cancels), so nine would do
+_STEPS = 12
+
+
+def planar_poses(centres: Array, radii: Array, corners: Array) -> Array:
+    """All (x, y, φ), (k, 3), with |(x, y) + R(φ)·corner - centre| = radius for three centres, radii and corners.
+
+    centres, corners : (3, 2), mm; radii : (3,), mm. Turns are in (-π, π].
+    """
+    size = float(np.abs(centres - centres[0]).max() + np.abs(corners).max() + np.abs(radii).max())
+    turns = 2.0 * np.pi * np.arange(_SAMPLES) / _SAMPLES
+    values = _eliminant(turns, centres / size, radii / size, corners / size)
+    harmonics = np.fft.fft(values) / _SAMPLES
+    top = 4
+    scale = np.abs(harmonics).max()
+    while top > 0 and abs(harmonics[top]) < 1e-13 * scale:
+        top -= 1
+    coefficients = [harmonics[h] for h in range(top, -top - 1, -1)]  # of z^(h + top), z = exp(iφ)
+    z = np.roots(coefficients)
+    # A double root leaves the unit circle by the root of the rounding; the polishing below decides.
+    angles = np.angle(z[np.abs(np.abs(z) - 1.0) < 1e-2])
+    starts = [start for angle in angles for start in _places(angle, centres, radii, corners)]
+    found: list[Array] = []
+    for start in starts:
+        pose = _polished(start, centres, radii, corners, size)
+        if pose is not None and not any(_same(pose, other, size) for other in found):
+            found.append(pose)
+    return np.array(sorted(found, key=lambda p: (p[2], p[0], p[1]))).reshape(-1, 3)
+
+
+def _turned(angle: Array, points: Array) -> Array:
+    s, c = np.sin(angle)[..., None], np.cos(angle)[..., None]
+    x, y = points[:, 0], points[:, 1]
+    return np.stack([c * x - s * y, s * x + c * y], -1)
+
+
+def _eliminant(angle: Array, centres: Array, radii: Array, corners: Array) -> Array:
+    """What is 0 where the three circles about centre - R·corner share a point, as a polynomial in sine and cosine."""
+    m = centres - _turned(angle, corners)  # circles' centres, (..., 3, 2)
+    k = (m * m).sum(-1) - radii**2
+    u, v = m[..., 1, :] - m[..., 0, :], m[..., 2, :] - m[..., 0, :]
+    a, b = k[..., 1] - k[..., 0], k[..., 2] - k[..., 0]  # 2·u·p = a, 2·v·p = b
+    det = 2.0 * (u[..., 0] * v[..., 1] - u[..., 1] * v[..., 0])
+    x = a * v[..., 1] - b * u[..., 1]  # p·det
+    y = b * u[..., 0] - a * v[..., 0]
+    first = m[..., 0, :]
+    return x * x + y * y - 2.0 * det * (x * first[..., 0] + y * first[..., 1]) + det * det * k[..., 0]
+
+
+def _places(angle: float, centres: Array, radii: Array, corners: Array) -> list[Array]:
+    """Starting poses for a turn: the common points of every two of its circles."""
+    m = centres - _turned(np.array(angle), corners)
+    starts = []
+    for i, j in ((0, 1), (0, 2), (1, 2)):
+        u = m[j] - m[i]
+        d2 = float(u @ u)
+        if d2 == 0.0:
+            continue
+        t = 0.5 * (1.0 + (radii[i] ** 2 - radii[j] ** 2) / d2)
+        height = np.sqrt(max(radii[i] ** 2 / d2 - t * t, 0.0))
+        for side in (height, -height):
+            x, y = m[i] + t * u + side * np.array([-u[1], u[0]])
+            starts.append(np.array([x, y, angle]))
+    return starts
+
+
+def _polished(pose: Array, centres: Array, radii: Array, corners: Array, size: float) -> Array | None:
+    for _ in range(_STEPS):
+        arms = _turned(pose[2], corners)
+        rods = pose[:2] + arms - centres
+        f = 0.5 * ((rods * rods).sum(1) - radii**2)
+        jacobian = np.column_stack([rods, rods[:, 1] * arms[:, 0] - rods[:, 0] * arms[:, 1]])
+        step = np.linalg.lstsq(jacobian, f, rcond=1e-13)[0]
+        pose = pose - step
+    error = np.abs(np.linalg.norm(pose[:2] + _turned(pose[2], corners) - centres, axis=1) - np.abs(radii)).max()
+    if not error < 1e-11 * size:
+        return None
+    return np.array([pose[0], pose[1], np.pi - (np.pi - pose[2]) % (2.0 * np.pi)])
+
+
+def _same(a: Array, b: Array, size: float) -> bool:
+    turn = abs((a[2] - b[2] + np.pi) % (2.0 * np.pi) - np.pi)
+    return bool(np.hypot(a[0] - b[0], a[1] - b[1]) < 1e-6 * size and turn < 1e-6)

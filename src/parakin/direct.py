@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .errors import NoMethodError, PoseError
-from .kernels.batch import run, solve
+from .kernels.batch import Roots, run, run_checked, solve
 
 if TYPE_CHECKING:
     from .machine import Array, Machine
@@ -72,13 +72,14 @@ def forward(machine: Machine, joints: ArrayLike, near: ArrayLike | None = None, 
     else:
         raise PoseError(f'method {method!r}: "closed", "newton" or "constant" expected')
     poses, residual, converged, steps = found
-    poses[~converged] = np.nan
+    if not converged.all():
+        poses[~converged] = np.nan
     return Solution(
         poses.reshape(*lead, -1), residual.reshape(lead)[()], converged.reshape(lead)[()], steps.reshape(lead)[()]
     )
 
 
-_Found = tuple["Array", "Array", NDArray[np.bool_], NDArray[np.int64]]
+_Found = tuple["Array", "Array", NDArray[np.bool_], NDArray[np.int32]]
 
 
 def tolerance(machine: Machine) -> float:
@@ -88,63 +89,64 @@ def tolerance(machine: Machine) -> float:
 
 def poses_of(machine: Machine, coordinates: Array, joints: Array) -> Array:
     """Poses for the motion's coordinates and the joints of head and table."""
-    return run(machine.model.pose_tape(), coordinates, np.empty((len(joints), len(machine.axes))), joints)
+    return run(machine.model.end_tape(), coordinates, np.empty((len(joints), len(machine.axes))), joints)
 
 
-def closing(machine: Machine, coordinates: Array, joints: Array) -> tuple[Array, Array]:
-    """Greatest closure error, mm, and the determinant of the closures' derivatives."""
-    _, residual, _, det = solve(machine.model.newton_tape(), coordinates, joints, np.ones(coordinates.shape[1]), 0)
-    return residual, det
+def roots(machine: Machine, near: Array, joints: Array, *, most: int = MOST_STEPS, poses: bool = True) -> Roots:
+    """Newton on the closures from ``near`` (1 or N rows), poses or else the motion's coordinates, to the same kind.
+
+    ``most`` = 0 only looks at the start.
+    """
+    model = machine.model
+    size = max(model.sizes)
+    # A step goes a third of the legs' size or half a radian at most.
+    caps = np.array([size / 3.0 if word.startswith("t") else 0.5 for word in model.structure.coordinates])
+    tapes = model.begin_tape(poses), model.newton_tape(True), model.newton_tape(False), model.end_tape(poses)
+    return solve(tapes, np.ascontiguousarray(near), joints, caps, min(model.sizes), most)
 
 
 def _closed(machine: Machine, joints: Array, starts: Array | None) -> _Found:
     model = machine.model
     if not model.by_spheres:
         raise NoMethodError(f"{machine.name}: no closed form of the direct problem; use method='newton'")
-    out = np.empty((len(joints), len(model.structure.coordinates)))
+    poses = np.empty((len(joints), len(machine.axes)))
     if starts is None:
-        coordinates = run(model.spheres_tape(model.home_side), joints, out)
+        residual = run_checked(model.spheres_tape(model.home_side), joints, poses, np.empty((len(joints), 0)))
     else:
-        coordinates = run(model.spheres_tape(None), joints, out, starts)
-    residual, _ = closing(machine, coordinates, joints)
-    poses = poses_of(machine, coordinates, joints)
-    return poses, residual, residual <= tolerance(machine), np.zeros(len(joints), np.int64)
-
-
-def _start(machine: Machine, starts: Array | None) -> Array:
-    model = machine.model
-    given = machine.home[None, :] if starts is None else starts
-    return run(model.start_tape(), np.ascontiguousarray(given), np.empty((len(given), len(model.structure.coordinates))))
-
-
-def _caps(machine: Machine) -> Array:
-    """Greatest change of each coordinate in a step: a third of the legs' size, half a radian."""
-    size = max(machine.model.sizes)
-    return np.array([size / 3.0 if word.startswith("t") else 0.5 for word in machine.model.structure.coordinates])
+        residual = run_checked(model.spheres_tape(None), joints, poses, starts)
+    return poses, residual, residual <= tolerance(machine), np.zeros(len(joints), np.int32)
 
 
 def _newton(machine: Machine, joints: Array, starts: Array | None) -> _Found:
-    tape, caps, limit = machine.model.newton_tape(), _caps(machine), tolerance(machine)
-    y0 = _start(machine, starts)
-    y, residual, steps, det = solve(tape, y0, joints, caps, MOST_STEPS)
-    from_joints = machine.inverse(machine.home[None, :] if starts is None else starts)
-    with np.errstate(invalid="ignore"):
-        _, sign = closing(machine, y0, from_joints)
-        good = (residual <= limit) & (det * sign > 0.0)
-        for parts in CONTINUATIONS:
-            lost = np.flatnonzero(~good & np.isfinite(joints).all(1) & np.isfinite(np.broadcast_to(sign, good.shape)))
-            if not len(lost):
-                break
-            begin = from_joints if len(from_joints) == 1 else from_joints[lost]
-            walk = np.ascontiguousarray(np.broadcast_to(y0 if len(y0) == 1 else y0[lost], (len(lost), y0.shape[1])))
+    near = machine.home[None, :] if starts is None else starts
+    result = roots(machine, near, joints)
+    side = result.sides[:, 0]
+    if starts is None:
+        side = roots(machine, near, machine.inverse(near), most=0).sides[:, 1]
+    good = (result.residual <= tolerance(machine)) & (result.sides[:, 1] * side > 0.0)
+    if not good.all():
+        _continue(machine, near, joints, result, good)
+    return result.found, result.residual, good, result.steps
+
+
+def _continue(machine: Machine, near: Array, joints: Array, result: Roots, good: NDArray[np.bool_]) -> None:
+    """Seek what Newton in one go did not find along the joints' line from the start; mends ``result`` and ``good``."""
+    whole = np.isfinite(joints).all(1) & np.isfinite(near).all(1)
+    for parts in CONTINUATIONS:
+        lost = np.flatnonzero(~good & whole)
+        if not len(lost):
+            return
+        walk = np.broadcast_to(near if len(near) == 1 else near[lost], (len(lost), near.shape[1]))
+        begin = machine.inverse(walk)
+        side = roots(machine, walk, begin, most=0).sides[:, 1]
+        with np.errstate(invalid="ignore", over="ignore"):
             for part in range(1, parts + 1):
-                target = begin + (part / parts) * (joints[lost] - begin)
-                walk, error, more, turn = solve(tape, walk, target, caps, MOST_STEPS)
-                steps[lost] += more
-            fine = (error <= limit) & (turn * (sign if len(sign) == 1 else sign[lost]) > 0.0)
-            y[lost[fine]], residual[lost[fine]] = walk[fine], error[fine]
-            good[lost[fine]] = True
-    return poses_of(machine, y, joints), residual, good, steps
+                step = roots(machine, walk, begin + (part / parts) * (joints[lost] - begin))
+                walk = step.found
+                result.steps[lost] += step.steps
+            fine = (step.residual <= tolerance(machine)) & (step.sides[:, 1] * side > 0.0)
+        result.found[lost[fine]], result.residual[lost[fine]] = walk[fine], step.residual[fine]
+        good[lost[fine]] = True
 
 
 def _constant(machine: Machine, joints: Array, starts: Array | None) -> _Found:
@@ -153,13 +155,15 @@ def _constant(machine: Machine, joints: Array, starts: Array | None) -> _Found:
     legs = len(model.drives) - model.serial
     m = len(model.structure.coordinates)
     tape = model.legs_tape(machine.mode)
-    y = np.ascontiguousarray(np.broadcast_to(_start(machine, starts), (len(joints), m))).copy()
+    given = machine.home[None, :] if starts is None else starts
+    start = run(model.begin_tape(), np.ascontiguousarray(given), np.empty((len(given), m)))
+    y = np.broadcast_to(start, (len(joints), m)).copy()
     both = run(tape, y, np.empty((len(y), legs + legs * m)))
     singular = ~np.isfinite(both).all(1)
     matrices = both[:, legs:].reshape(-1, legs, m).copy()
     matrices[singular] = np.eye(m)
     inverse = np.linalg.pinv(matrices)
-    steps = np.zeros(len(y), np.int64)
+    steps = np.zeros(len(y), np.int32)
     with np.errstate(invalid="ignore", over="ignore"):
         for _ in range(200):
             off = joints[:, :legs] - both[:, :legs]
@@ -172,5 +176,5 @@ def _constant(machine: Machine, joints: Array, starts: Array | None) -> _Found:
         for _ in range(40):  # on to rounding, uncounted: the verdict is the same for every method
             y += np.einsum("nij,nj->ni", inverse, joints[:, :legs] - both[:, :legs])
             both = run(tape, y, np.empty((len(y), legs + legs * m)))
-    residual, _ = closing(machine, y, joints)
+    residual = roots(machine, y, joints, most=0, poses=False).residual
     return poses_of(machine, y, joints), residual, residual <= tolerance(machine), steps

@@ -205,9 +205,7 @@ class Machine:
             raise PoseError(f"joints: {len(rows)} rows expected, as many as poses, not {len(q)}")
         names = self.limits
         out = np.empty((len(rows), len(names)))
-        from .kernels.batch import run_loose
-
-        run_loose(self.model.margins_tape(self._mode(mode)), rows, out, q)
+        run(self.model.margins_tape(self._mode(mode)), rows, out, q, whole=False)
         return out.reshape(*lead, len(names))
 
     def check(self, poses: ArrayLike, joints: ArrayLike | None = None, mode: str | None = None) -> Any:

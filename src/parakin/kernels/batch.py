@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
@@ -14,7 +15,6 @@ from .tape import Tape
 
 Rows = NDArray[np.float64]
 SMALL = 4096  # rows below which a second thread costs more than it brings
-NOTHING = np.empty((0, 0))
 
 
 def cores() -> int:
@@ -38,26 +38,52 @@ def split(count: int, work: Callable[[int, int], None]) -> None:
         future.result()
 
 
-def run(tape: Tape, x: Rows, out: Rows, z: Rows | None = None) -> Rows:
-    """Rows of ``x`` (N, i), followed by those of ``z``, through a tape into ``out`` (N, o)."""
+def run(tape: Tape, x: Rows, out: Rows, z: Rows | None = None, whole: bool = True) -> Rows:
+    """Rows of ``x`` (N, i), followed by those of ``z``, through a tape into ``out`` (N, o).
+
+    With ``whole`` a row of the answer is NaN as soon as one number of it, or of its inputs, is not finite.
+    """
     from .blocks import evaluate
 
     given = np.empty((len(x), 0)) if z is None else z
-    args = (tape.code, tape.imm, tape.inputs, tape.outputs, tape.registers, x, given, out)
+    args = (*tape.parts, whole, x, given, out)
     split(len(x), lambda start, stop: evaluate(*args, start, stop))
     return out
 
 
-def solve(tape: Tape, y0: Rows, q: Rows, caps: Rows, most: int) -> tuple[Rows, Rows, NDArray[np.int64], Rows]:
-    """Newton from ``y0`` (1 or N, m) for every row of ``q``: coordinates, residuals (mm), steps, determinants."""
+@dataclass(frozen=True, eq=False)
+class Roots:
+    """What Newton's method ended with, a row a problem."""
+
+    found: Rows  # what the last tape makes of the root
+    residual: Rows  # the greatest closure left, mm
+    steps: NDArray[np.int32]
+    sides: Rows  # (N, 2): determinants of the closures' derivatives at the start and at the end
+
+
+def solve(tapes: tuple[Tape, Tape, Tape, Tape], near: Rows, q: Rows, caps: Rows, size: float, most: int) -> Roots:
+    """Newton from ``near`` (1 or N rows) for every row of ``q``; see :func:`parakin.kernels.newton.newton`."""
     from .newton import newton
 
-    count, m = len(q), y0.shape[1]
-    y, residual, sign = np.empty((count, m)), np.empty(count), np.empty(count)
-    steps = np.empty(count, np.int64)
-    args = (tape.code, tape.imm, tape.inputs, tape.outputs, tape.registers, y0, q, caps, most, y, residual, steps, sign)
-    split(count, lambda start, stop: newton(*args, start, stop))
-    return y, residual, steps, sign
+    count = len(q)
+    result = Roots(
+        np.empty((count, tapes[3].outputs)), np.empty(count), np.empty(count, np.int32), np.empty((count, 2))
+    )
+    programs = [(tape.code, tape.imm) for tape in tapes]
+    args = (*programs, max(tape.registers for tape in tapes), near, q, caps, size, most)
+    into = (result.found, result.residual, result.steps, result.sides)
+    split(count, lambda start, stop: newton(*args, *into, start, stop))
+    return result
+
+
+def run_checked(tape: Tape, x: Rows, out: Rows, z: Rows) -> Rows:
+    """As :func:`run` for a tape that gives ``out``'s columns and then closures: the greatest of these, (N,) mm."""
+    from .blocks import evaluate_checked
+
+    worst = np.empty(len(x))
+    args = (*tape.parts, x, z, out, worst)
+    split(len(x), lambda start, stop: evaluate_checked(*args, start, stop))
+    return worst
 
 
 def first_negative(tape: Tape, x: Rows, z: Rows) -> NDArray[np.int64]:
@@ -65,15 +91,7 @@ def first_negative(tape: Tape, x: Rows, z: Rows) -> NDArray[np.int64]:
     from .blocks import first_broken
 
     out = np.empty(len(x), np.int64)
-    args = (tape.code, tape.imm, tape.inputs, tape.outputs, tape.registers, x, z, out)
+    args = (*tape.parts, x, z, out)
     split(len(x), lambda start, stop: first_broken(*args, start, stop))
     return out
 
-
-def run_loose(tape: Tape, x: Rows, out: Rows, z: Rows) -> Rows:
-    """As :func:`run`, but a number that is not finite spoils only itself, not its row."""
-    from .blocks import evaluate_loose
-
-    args = (tape.code, tape.imm, tape.inputs, tape.outputs, tape.registers, x, z, out)
-    split(len(x), lambda start, stop: evaluate_loose(*args, start, stop))
-    return out

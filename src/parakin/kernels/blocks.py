@@ -9,16 +9,25 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from .elementary import FAST, atan2, sincos
+from .elementary import FAST, atan2, sincos, sqrt, widest_vectors
 from .tape import ABS, ATAN2, CONST, COPYSIGN, DIV, FMA, LIN1, LIN2, LIN3, MAX, MIN, QUAD1, QUAD2, QUAD3, SINCOS, SQRT
 
 LANES = 128
 _MASK = (1 << 40) - 1  # tells the compiler that a register's number is not negative
 
 
+@njit(nogil=True, cache=True)
+def lanes(rows):
+    """Rows of LANES numbers that start on a cache line: vectors that cross lines take twice as long."""
+    room = np.empty(rows * LANES + 8)
+    skip = (-(room.ctypes.data // 8)) % 8
+    return room[skip : skip + rows * LANES]
+
+
 @njit(nogil=True, cache=True, fastmath=FAST, error_model="numpy")
 def interpret(code, imm, r):
     """Run a tape once over the registers ``r``, (registers · LANES,)."""
+    widest_vectors()
     for i in range(code.shape[0]):
         op = code[i, 0]
         d = (code[i, 1] & _MASK) * LANES
@@ -58,7 +67,7 @@ def interpret(code, imm, r):
                 r[d + j] = k0 + k1 * r[a + j] + k2 * r[b + j] + k3 * r[c + j]
         elif op == SQRT:
             for j in range(LANES):
-                r[d + j] = np.sqrt(r[a + j])
+                r[d + j] = sqrt(r[a + j])
         elif op == DIV:
             for j in range(LANES):
                 r[d + j] = r[a + j] / r[b + j]
@@ -88,93 +97,145 @@ def interpret(code, imm, r):
                 r[d + j] = k0
 
 
-@njit(nogil=True, cache=True, fastmath=FAST, error_model="numpy")
-def load(x, row, n, inputs, first, r, bad):
-    """Columns of ``x`` from ``row`` on into their registers, padded with zeros; inputs are numbered from ``first``.
+def _transposing(width):
+    """Load and store of a whole block of rows of ``width`` numbers: with both known when compiled, the compiler
+    transposes with shuffles."""
 
-    ``bad`` (LANES,) turns NaN where a number is not finite, in columns that the tape does not read too.
+    @njit(nogil=True, cache=True, fastmath=FAST, error_model="numpy")
+    def load_rows(flat, base, first, r, bad):
+        for j in range(LANES):
+            total = 0.0
+            for c in range(width):
+                v = flat[base + j * width + c]
+                r[first + c * LANES + j] = v
+                total += v
+            bad[j] += 0.0 * total
+
+    @njit(nogil=True, cache=True, fastmath=FAST, error_model="numpy")
+    def store_rows(flat, base, first, r, bad):
+        for j in range(LANES):
+            for c in range(width):
+                flat[base + j * width + c] = r[first + c * LANES + j] + bad[j]
+
+    return load_rows, store_rows
+
+
+_load3, _store3 = _transposing(3)
+_load5, _store5 = _transposing(5)
+_load6, _store6 = _transposing(6)
+
+
+@njit(nogil=True, cache=True, fastmath=FAST, error_model="numpy")
+def load(x, row, n, register, r, bad):
+    """Rows of ``x`` from ``row`` on into registers from ``register`` on, a column each, padded with zeros.
+
+    ``bad`` (LANES,) turns NaN where a number is not finite.
     """
     width = x.shape[1]
     flat = x.reshape(-1)
     base = (row * width) & _MASK
-    for column in range(width):
-        d = -1
-        for i in range(inputs.shape[0]):
-            if inputs[i, 0] == first + column:
-                d = inputs[i, 1] * LANES
-        if d >= 0:
+    first = (register & _MASK) * LANES
+    if (n == LANES) & (width == 3):
+        _load3(flat, base, first, r, bad)
+    elif (n == LANES) & (width == 5):
+        _load5(flat, base, first, r, bad)
+    elif (n == LANES) & (width == 6):
+        _load6(flat, base, first, r, bad)
+    else:
+        for c in range(width):
             for j in range(n):
-                v = flat[base + column + j * width]
-                r[d + j] = v
+                v = flat[base + j * width + c]
+                r[first + c * LANES + j] = v
                 bad[j] += 0.0 * v
             for j in range(n, LANES):
-                r[d + j] = 0.0
-        else:
-            for j in range(n):
-                bad[j] += 0.0 * flat[base + column + j * width]
+                r[first + c * LANES + j] = 0.0
 
 
 @njit(nogil=True, cache=True, fastmath=FAST, error_model="numpy")
-def store(y, row, n, outputs, r, bad):
-    """Registers ``outputs`` to the columns of ``y``; the whole row is NaN where an output is not finite."""
+def store(y, row, n, register, r, bad):
+    """Registers from ``register`` on, plus ``bad``, to the rows of ``y`` from ``row`` on."""
     width = y.shape[1]
     flat = y.reshape(-1)
     base = (row * width) & _MASK
-    for o in range(outputs.shape[0]):
-        d = (outputs[o] & _MASK) * LANES
-        for j in range(LANES):
-            bad[j] += 0.0 * r[d + j]
-    for j in range(n):
-        for o in range(width):
-            flat[base + j * width + o] = r[(outputs[o] & _MASK) * LANES + j] + bad[j]
+    first = (register & _MASK) * LANES
+    if (n == LANES) & (width == 3):
+        _store3(flat, base, first, r, bad)
+    elif (n == LANES) & (width == 5):
+        _store5(flat, base, first, r, bad)
+    elif (n == LANES) & (width == 6):
+        _store6(flat, base, first, r, bad)
+    else:
+        for c in range(width):
+            for j in range(n):
+                flat[base + j * width + c] = r[first + c * LANES + j] + bad[j]
 
 
 @njit(nogil=True, cache=True, fastmath=FAST, error_model="numpy")
-def evaluate(code, imm, inputs, outputs, registers, x, z, y, start, stop):
-    """y[i] = tape(x[i], z[i]) for rows start ≤ i < stop; the row is NaN where an input or output is not finite."""
-    r = np.empty(registers * LANES)
-    bad = np.empty(LANES)
+def evaluate(code, imm, inputs, outputs, registers, whole, x, z, y, start, stop):
+    """y[i] = tape(x[i], z[i]) for rows start ≤ i < stop.
+
+    With ``whole`` a row is NaN where an input or output is not finite, else that spoils only what follows from it.
+    """
+    r = lanes(registers)
+    bad = lanes(1)
     for row in range(start, stop, LANES):
         n = min(LANES, stop - row)
         bad[:] = 0.0
-        load(x, row, n, inputs, 0, r, bad)
-        load(z, row, n, inputs, x.shape[1], r, bad)
+        load(x, row, n, 0, r, bad)
+        load(z, row, n, x.shape[1], r, bad)
         interpret(code, imm, r)
-        store(y, row, n, outputs, r, bad)
+        if whole:
+            for o in range(inputs, inputs + outputs):
+                d = (o & _MASK) * LANES
+                for j in range(LANES):
+                    bad[j] += 0.0 * r[d + j]
+        else:
+            bad[:] = 0.0
+        store(y, row, n, inputs, r, bad)
 
 
 @njit(nogil=True, cache=True, fastmath=FAST, error_model="numpy")
-def evaluate_loose(code, imm, inputs, outputs, registers, x, z, y, start, stop):
-    """As :func:`evaluate`, but what is not finite spoils only what follows from it."""
-    r = np.empty(registers * LANES)
-    bad = np.empty(LANES)
+def evaluate_checked(code, imm, inputs, outputs, registers, x, z, y, worst, start, stop):
+    """The tape's first outputs to the rows of ``y``, the greatest size of the others to ``worst`` (N,); NaN for both
+    where an input or output is not finite."""
+    r = lanes(registers)
+    bad = lanes(1)
+    most = lanes(1)
     for row in range(start, stop, LANES):
         n = min(LANES, stop - row)
-        load(x, row, n, inputs, 0, r, bad)
-        load(z, row, n, inputs, x.shape[1], r, bad)
+        bad[:] = 0.0
+        load(x, row, n, 0, r, bad)
+        load(z, row, n, x.shape[1], r, bad)
         interpret(code, imm, r)
-        for o in range(outputs.shape[0]):
-            d = (outputs[o] & _MASK) * LANES
-            for j in range(n):
-                y[row + j, o] = r[d + j]
+        most[:] = 0.0
+        for o in range(inputs, inputs + outputs):
+            d = (o & _MASK) * LANES
+            closure = o >= inputs + y.shape[1]
+            for j in range(LANES):
+                v = r[d + j]
+                bad[j] += 0.0 * v
+                most[j] = abs(v) if closure & (abs(v) > most[j]) else most[j]
+        store(y, row, n, inputs, r, bad)
+        for j in range(n):
+            worst[row + j] = most[j] + bad[j]
 
 
 @njit(nogil=True, cache=True, fastmath=FAST, error_model="numpy")
 def first_broken(code, imm, inputs, outputs, registers, x, z, y, start, stop):
     """y[i] = 0 where all outputs are ≥ 0, else 1 + the first that is not; NaN is not."""
-    r = np.empty(registers * LANES)
-    bad = np.empty(LANES)
+    r = lanes(registers)
+    bad = lanes(1)
     found = np.empty(LANES, np.int64)
     for row in range(start, stop, LANES):
         n = min(LANES, stop - row)
         bad[:] = 0.0
-        load(x, row, n, inputs, 0, r, bad)
-        load(z, row, n, inputs, x.shape[1], r, bad)
+        load(x, row, n, 0, r, bad)
+        load(z, row, n, x.shape[1], r, bad)
         interpret(code, imm, r)
         found[:] = 0
-        for o in range(outputs.shape[0] - 1, -1, -1):
-            d = (outputs[o] & _MASK) * LANES
+        for o in range(outputs - 1, -1, -1):
+            d = ((inputs + o) & _MASK) * LANES
             for j in range(LANES):
                 found[j] = found[j] if r[d + j] >= 0.0 else o + 1
         for j in range(n):
-            y[row + j] = found[j] if bad[j] == 0.0 or found[j] > 0 else 1
+            y[row + j] = found[j] if (bad[j] == 0.0) | (found[j] > 0) else 1

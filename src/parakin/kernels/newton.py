@@ -1,7 +1,8 @@
 """Newton's method on the legs' closures, many poses side by side: the general direct problem.
 
-Every lane takes the same steps, so a block ends when its slowest lane has converged; the linear systems are solved by
-elimination with row exchanges chosen lane by lane.
+Every lane takes the same steps, so a block ends when its slowest lane has converged. The matrix is factored only while
+it still matters; the last steps keep it (a chord step costs a tenth). Row exchanges are chosen lane by lane, and passed
+over where no lane wants one.
 """
 
 from __future__ import annotations
@@ -9,124 +10,183 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from .blocks import _MASK, LANES, interpret, load
-from .elementary import FAST
+from .blocks import _MASK, LANES, interpret, lanes, load, store
+from .elementary import FAST, widest_vectors
 
-CLOSE = 1e-6  # mm: from a closure this good one more quadratic step ends below rounding
+CLOSE = 1e-6  # mm: from a closure this good one more step ends below rounding
+WORTH = 1e-4  # mm: where a step will end no worse than this, the matrix at hand serves on
+SLOW = 0.05  # a kept matrix that gains less than this a step is made anew
+FINE = 1e-12  # mm: where the next step is foreseen to end, it is the last
+PIVOT = 4.0  # how many times greater an entry must be to become the pivot
 
 
 @njit(nogil=True, cache=True, fastmath=FAST, error_model="numpy")
-def eliminate(a, f, m, det):
-    """Solve a·x = f lane by lane; ``a`` (m·m·LANES,) row by row, ``f`` (m·LANES,) becomes x, ``det`` the determinant."""
+def factor(a, m, swaps, wanted, det):
+    """Factor ``a`` (m·m·LANES,), row by row, in place: multipliers below, reciprocal pivots on the diagonal.
+
+    ``swaps`` (m·m·LANES,) is 1 where a lane exchanged rows k and i at k·m + i, ``wanted`` (m·m,) where any did; ``det``
+    (LANES,) is the determinant.
+    """
+    widest_vectors()
     det[:] = 1.0
     for k in range(m):
         p = ((k * m + k) & _MASK) * LANES
         for i in range(k + 1, m):
             q = ((i * m + k) & _MASK) * LANES
-            fk, fi = (k & _MASK) * LANES, (i & _MASK) * LANES
+            w = ((k * m + i) & _MASK) * LANES
+            count = 0.0
             for j in range(LANES):
-                swap = abs(a[q + j]) > abs(a[p + j])
-                x, y = f[fk + j], f[fi + j]
-                f[fk + j] = y if swap else x
-                f[fi + j] = x if swap else y
-                det[j] = -det[j] if swap else det[j]
-            for c in range(m - 1, k - 1, -1):  # the pivot's column last: the choice hangs on it
-                s, t = ((k * m + c) & _MASK) * LANES, ((i * m + c) & _MASK) * LANES
+                swap = 1.0 if abs(a[q + j]) > PIVOT * abs(a[p + j]) else 0.0
+                swaps[w + j] = swap
+                count = max(count, swap)
+            wanted[k * m + i] = count > 0.0
+            if count > 0.0:
                 for j in range(LANES):
-                    swap = abs(a[q + j]) > abs(a[p + j])
-                    x, y = a[s + j], a[t + j]
-                    a[s + j] = y if swap else x
-                    a[t + j] = x if swap else y
+                    det[j] = -det[j] if swaps[w + j] > 0.0 else det[j]
+                for c in range(k, m):
+                    s, t = ((k * m + c) & _MASK) * LANES, ((i * m + c) & _MASK) * LANES
+                    for j in range(LANES):
+                        x, y = a[s + j], a[t + j]
+                        a[s + j] = y if swaps[w + j] > 0.0 else x
+                        a[t + j] = x if swaps[w + j] > 0.0 else y
         for j in range(LANES):
             det[j] *= a[p + j]
+            a[p + j] = 1.0 / a[p + j]
         for i in range(k + 1, m):
             q = ((i * m + k) & _MASK) * LANES
             for j in range(LANES):
-                a[q + j] /= a[p + j]
-            fk, fi = (k & _MASK) * LANES, (i & _MASK) * LANES
-            for j in range(LANES):
-                f[fi + j] -= a[q + j] * f[fk + j]
+                a[q + j] *= a[p + j]
             for c in range(k + 1, m):
                 s, t = ((k * m + c) & _MASK) * LANES, ((i * m + c) & _MASK) * LANES
                 for j in range(LANES):
                     a[t + j] -= a[q + j] * a[s + j]
-    for k in range(m - 1, -1, -1):
+
+
+@njit(nogil=True, cache=True, fastmath=FAST, error_model="numpy")
+def substitute(a, m, swaps, wanted, f):
+    """Solve with what :func:`factor` left: ``f`` (m·LANES,) becomes the solution."""
+    widest_vectors()
+    for k in range(m):
         fk = (k & _MASK) * LANES
+        for i in range(k + 1, m):
+            if wanted[k * m + i]:
+                fi, w = (i & _MASK) * LANES, ((k * m + i) & _MASK) * LANES
+                for j in range(LANES):
+                    x, y = f[fk + j], f[fi + j]
+                    f[fk + j] = y if swaps[w + j] > 0.0 else x
+                    f[fi + j] = x if swaps[w + j] > 0.0 else y
+        for i in range(k + 1, m):
+            fi, q = (i & _MASK) * LANES, ((i * m + k) & _MASK) * LANES
+            for j in range(LANES):
+                f[fi + j] -= a[q + j] * f[fk + j]
+    for k in range(m - 1, -1, -1):
+        fk, p = (k & _MASK) * LANES, ((k * m + k) & _MASK) * LANES
         for c in range(k + 1, m):
             s, fc = ((k * m + c) & _MASK) * LANES, (c & _MASK) * LANES
             for j in range(LANES):
                 f[fk + j] -= a[s + j] * f[fc + j]
-        p = ((k * m + k) & _MASK) * LANES
         for j in range(LANES):
-            f[fk + j] /= a[p + j]
+            f[fk + j] *= a[p + j]
 
 
 @njit(nogil=True, cache=True, fastmath=FAST, error_model="numpy")
-def newton(code, imm, inputs, outputs, registers, y0, q, caps, most, y, residual, steps, sign, start, stop):
-    """Solve f(y, q) = 0 for rows start ≤ i < stop of ``y`` (N, m) from ``y0`` (N, m) or (1, m).
+def closures(code, imm, inputs, m, held, r, f, worst, n):
+    """Run a tape that gives m closures first; ``f`` and the greatest of each lane, and of the block's first n lanes."""
+    r[: inputs * LANES] = held
+    interpret(code, imm, r)
+    worst[:] = 0.0
+    for i in range(m):
+        s, t = ((inputs + i) & _MASK) * LANES, (i & _MASK) * LANES
+        for j in range(LANES):
+            v = r[s + j]
+            f[t + j] = v
+            worst[j] = abs(v) if (abs(v) > worst[j]) | (v != v) else worst[j]
+    greatest = 0.0
+    for j in range(n):
+        greatest = worst[j] if worst[j] > greatest else greatest  # false for NaN: such a lane is done
+    return greatest
 
-    The tape gives f (m), in mm, then ∂f/∂y (m·m). ``caps`` (m,) bounds a step's coordinates. ``residual`` (N,) is the
-    greatest |f| left, mm; ``sign`` (N,) that of the determinant at the solution.
+
+@njit(nogil=True, cache=True, fastmath=FAST, error_model="numpy")
+def descend(full, light, m, q, caps, size, most, held, r, a, swaps, wanted, f, turn, turn0, worst, shrink, n):
+    """Newton on one block: ``held`` (m + joints rows) has the start and ends with the root; the number of steps.
+
+    ``worst`` is each lane's greatest closure left, ``turn0`` and ``turn`` the determinants at the start and at the last
+    factoring.
     """
-    m = y.shape[1]
-    r = np.empty(registers * LANES)
-    held = np.empty((m + q.shape[1]) * LANES)
-    a = np.empty(m * m * LANES)
-    f = np.empty(m * LANES)
-    det, worst, shrink, bad = np.empty(LANES), np.empty(LANES), np.empty(LANES), np.empty(LANES)
-    columns = np.empty((m + q.shape[1], 2), np.int64)
-    for i in range(m + q.shape[1]):
-        columns[i, 0], columns[i, 1] = i, i
-    common = y0.shape[0] == 1
+    inputs = m + q
+    refactor, last = True, False
+    before = np.inf
+    for step in range(most + 1):
+        if refactor:
+            greatest = closures(full[0], full[1], inputs, m, held, r, f, worst, n)
+            first = ((inputs + m) & _MASK) * LANES
+            a[:] = r[first : first + m * m * LANES]
+            factor(a, m, swaps, wanted, turn)
+            if step == 0:
+                turn0[:] = turn
+            refactor = greatest * greatest > WORTH * size
+            enough = greatest < CLOSE
+        else:
+            greatest = closures(light[0], light[1], inputs, m, held, r, f, worst, n)
+            ratio = greatest / before
+            refactor = ratio > SLOW
+            enough = (ratio <= SLOW) & (greatest * ratio < FINE)
+        if last or step == most:
+            return step
+        last = enough
+        before = greatest
+        substitute(a, m, swaps, wanted, f)
+        shrink[:] = 1.0
+        for i in range(m):
+            s = (i & _MASK) * LANES
+            for j in range(LANES):
+                over = abs(f[s + j]) * shrink[j]
+                shrink[j] = shrink[j] * (caps[i] / over) if over > caps[i] else shrink[j]
+        for i in range(m):
+            s = (i & _MASK) * LANES
+            for j in range(LANES):
+                held[s + j] -= shrink[j] * f[s + j]
+    return most
+
+
+@njit(nogil=True, cache=True, fastmath=FAST, error_model="numpy")
+def newton(begin, full, light, end, registers, near, q, caps, size, most, out, residual, steps, sides, start, stop):
+    """Solve f(y, q) = 0 for rows start ≤ i < stop of ``q``.
+
+    Tapes, as (code, imm): ``begin`` takes a row of ``near`` (N or 1, k) to the coordinates y (m), ``full`` takes y and
+    q to f, mm, then ∂f/∂y, ``light`` to f only, ``end`` takes y and q to a row of ``out``. ``caps`` (m,) bounds a
+    step's coordinates; ``size`` is the legs' length, mm. ``residual`` (N,) is the greatest |f| left, mm; ``sides``
+    (N, 2) the determinants at the start and at the last factoring.
+    """
+    m = caps.shape[0]
+    given, joints = near.shape[1], q.shape[1]
+    r, held = lanes(registers), lanes(m + joints)
+    a, swaps, f = lanes(m * m), lanes(m * m), lanes(m)
+    wanted = np.zeros(m * m, np.bool_)
+    turn, turn0, worst, shrink, bad = lanes(1), lanes(1), lanes(1), lanes(1), lanes(1)
+    common = near.shape[0] == 1
     for row in range(start, stop, LANES):
         n = min(LANES, stop - row)
         bad[:] = 0.0
         if common:
-            for i in range(m):
-                for j in range(LANES):
-                    held[i * LANES + j] = y0[0, i]
+            for i in range(given):
+                r[i * LANES : (i + 1) * LANES] = near[0, i]
         else:
-            load(y0, row, n, columns, 0, held, bad)
-        load(q, row, n, columns, m, held, bad)
-        last = False
-        for step in range(most + 1):
-            for i in range(inputs.shape[0]):
-                s, t = (inputs[i, 0] & _MASK) * LANES, (inputs[i, 1] & _MASK) * LANES
-                for j in range(LANES):
-                    r[t + j] = held[s + j]
-            interpret(code, imm, r)
-            worst[:] = 0.0
-            for i in range(m):
-                s, t = (outputs[i] & _MASK) * LANES, (i & _MASK) * LANES
-                for j in range(LANES):
-                    v = r[s + j]
-                    f[t + j] = v
-                    worst[j] = abs(v) if (abs(v) > worst[j]) | (v != v) else worst[j]
-            for i in range(m * m):
-                s, t = (outputs[m + i] & _MASK) * LANES, (i & _MASK) * LANES
-                for j in range(LANES):
-                    a[t + j] = r[s + j]
-            greatest = 0.0
-            for j in range(n):
-                greatest = worst[j] if worst[j] > greatest else greatest  # false for NaN: such a lane is done
-            eliminate(a, f, m, det)
-            if last or step == most:
-                break
-            last = greatest < CLOSE
-            shrink[:] = 1.0
-            for i in range(m):
-                s = (i & _MASK) * LANES
-                for j in range(LANES):
-                    over = abs(f[s + j]) * shrink[j]
-                    shrink[j] = shrink[j] * (caps[i] / over) if over > caps[i] else shrink[j]
-            for i in range(m):
-                s = (i & _MASK) * LANES
-                for j in range(LANES):
-                    held[s + j] -= shrink[j] * f[s + j]
+            load(near, row, n, 0, r, bad)
+        interpret(begin[0], begin[1], r)
+        held[: m * LANES] = r[given * LANES : (given + m) * LANES]
+        load(q, row, n, m, held, bad)
+        step = descend(full, light, m, joints, caps, size, most, held, r, a, swaps, wanted, f, turn, turn0, worst, shrink, n)
         for j in range(n):
             steps[row + j] = step
             residual[row + j] = worst[j] + bad[j]
-            sign[row + j] = det[j]
-        for j in range(n):
-            for i in range(m):
-                y[row + j, i] = held[i * LANES + j] + bad[j]
+            sides[row + j, 0] = turn0[j]
+            sides[row + j, 1] = turn[j]
+        r[: (m + joints) * LANES] = held
+        interpret(end[0], end[1], r)
+        for i in range(out.shape[1]):
+            s = ((m + joints + i) & _MASK) * LANES
+            for j in range(LANES):
+                bad[j] += 0.0 * r[s + j]
+        store(out, row, n, m + joints, r, bad)

@@ -34,14 +34,19 @@ class Tape:
     """A compiled trace.
 
     ``code`` (n, 8) int64: opcode, destination, up to six operand registers (SINCOS: sine, cosine, argument);
-    ``imm`` (n, 4): constants; ``inputs`` (i, 2): number of the input and its register; ``outputs`` (o,): registers.
+    ``imm`` (n, 4): constants. Inputs stand in the first registers, in their order, and outputs in the next.
     """
 
     code: NDArray[np.int64]
     imm: NDArray[np.float64]
-    inputs: NDArray[np.int64]
-    outputs: NDArray[np.int64]
+    inputs: int
+    outputs: int
     registers: int
+
+    @property
+    def parts(self) -> tuple[NDArray[np.int64], NDArray[np.float64], int, int, int]:
+        """As the kernels take them."""
+        return self.code, self.imm, self.inputs, self.outputs, self.registers
 
 
 def _opcode(term: Term) -> int:
@@ -52,67 +57,74 @@ def _opcode(term: Term) -> int:
     return _SAME[term.op]
 
 
-def compile_tape(trace: Trace, outputs: Sequence[Scalar]) -> Tape:
-    """The tape that computes ``outputs`` (terms of ``trace``, or numbers) from the trace's inputs."""
-    results = [y if isinstance(y, Term) else trace.constant(y) for y in outputs]
-    needed: set[int] = set()
-    stack = list(results)
-    while stack:
-        term = stack.pop()
-        if term.index not in needed:
-            needed.add(term.index)
-            stack.extend(term.args)
-    order = [trace.nodes[i] for i in sorted(needed)]
+def compile_tape(trace: Trace, outputs: Sequence[Scalar], inputs: int) -> Tape:
+    """The tape that computes ``outputs`` (terms of ``trace``, or numbers) from the trace's first ``inputs`` inputs."""
+    results: list[Term] = []
+    for y in outputs:
+        term = y if isinstance(y, Term) else trace.constant(y)
+        if term.op == alg.INPUT or any(term is other for other in results):
+            # An output has a register of its own: a copy, outside the trace.
+            term = Term(trace, alg.LIN, (term,), (0.0, 1.0), -1 - len(results))
+        results.append(term)
+    order = [trace.nodes[i] for i in sorted(_needed(results))] + [term for term in results if term.index < 0]
     last: dict[int, int] = {}
     for position, term in enumerate(order):
         for arg in term.args:
             last[arg.index] = position
-    for term in results:
-        last[term.index] = len(order)
-
+    own = {term.index: inputs + number for number, term in enumerate(results)}
     register: dict[int, int] = {}
     free: list[int] = []
-    count = 0
+    count = inputs + len(results)
 
     def take(term: Term) -> int:
         nonlocal count
-        if free:
+        if term.index in own:
+            register[term.index] = own[term.index]
+        elif free:
             register[term.index] = free.pop()
         else:
             register[term.index] = count
             count += 1
         return register[term.index]
 
-    inputs = [(int(term.k[0]), take(term)) for term in order if term.op == alg.INPUT]
     code: list[list[int]] = []
     imm: list[list[float]] = []
-    angle_done: set[int] = set()
     for position, term in enumerate(order):
         if term.op == alg.INPUT:
-            continue
-        if term.op in (alg.SIN, alg.COS):
-            arg = term.args[0]
-            if term.index not in angle_done:
-                pair = [trace.node(op, (arg,), ()) for op in (alg.SIN, alg.COS)]
-                angle_done.update(t.index for t in pair)
-                sine, cosine = (take(t) for t in pair)
-                code.append([SINCOS, sine, cosine, register[arg.index], 0, 0, 0, 0])
-                imm.append([0.0] * 4)
-                for t in pair:  # one of the two may not be wanted
-                    if t.index not in last:
-                        free.append(register[t.index])
+            register[term.index] = int(term.k[0])
+        elif term.index in register:  # the cosine to a sine, or the reverse
+            pass
+        elif term.op in (alg.SIN, alg.COS):
+            argument = term.args[0]
+            pair = [trace.node(op, (argument,), ()) for op in (alg.SIN, alg.COS)]
+            sine, cosine = (take(part) for part in pair)
+            code.append([SINCOS, sine, cosine, register[argument.index], 0, 0, 0, 0])
+            imm.append([0.0] * 4)
+            # One of the two may not be wanted.
+            free += [register[part.index] for part in pair if part.index not in last and part.index not in own]
         else:  # the destination is never an operand's register: rows that don't overlap vectorise
-            target = take(term)
-            row = [_opcode(term), target, *[register[arg.index] for arg in term.args]]
+            row = [_opcode(term), take(term), *[register[arg.index] for arg in term.args]]
             code.append(row + [0] * (8 - len(row)))
             imm.append([*term.k, *[0.0] * (4 - len(term.k))])
         for arg in {a.index for a in term.args}:
-            if last[arg] == position:
+            if last[arg] == position and arg not in own:
                 free.append(register[arg])
     return Tape(
         np.array(code, np.int64).reshape(-1, 8),
         np.array(imm, np.float64).reshape(-1, 4),
-        np.array(inputs, np.int64).reshape(-1, 2),
-        np.array([register[term.index] for term in results], np.int64),
+        inputs,
+        len(results),
         max(count, 1),
     )
+
+
+def _needed(results: Sequence[Term]) -> set[int]:
+    """Indices of the trace's nodes that the results hang on."""
+    needed: set[int] = set()
+    stack = [arg for term in results if term.index < 0 for arg in term.args] + [t for t in results if t.index >= 0]
+    while stack:
+        term = stack.pop()
+        if term.index not in needed:
+            needed.add(term.index)
+            stack.extend(term.args)
+    return needed

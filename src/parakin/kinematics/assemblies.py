@@ -8,13 +8,13 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..errors import NoMethodError, PoseError
-from ..kernels.batch import run, solve
+from ..kernels.batch import run_checked
 from ..kernels.intervals import IntervalProgram
 from ..model.algebra import Trace, derivative
 from ..model.legs.lambda_ import Lambda
 from ..model.structure import CentralLeg, Free
-from .boxes import roots
-from ..direct import MOST_STEPS, closing, poses_of, tolerance
+from .boxes import isolated
+from ..direct import poses_of, roots, tolerance
 from .planar import planar_poses
 
 if TYPE_CHECKING:
@@ -37,8 +37,8 @@ def assemblies(machine: Machine, joints: ArrayLike) -> Array:
         return np.empty((0, len(machine.axes)))
     model = machine.model
     if model.by_spheres:
-        coordinates = _spheres(machine, rows)
-    elif isinstance(model.structure, CentralLeg) and not model.structure.roll:
+        return _spheres(machine, rows)
+    if isinstance(model.structure, CentralLeg) and not model.structure.roll:
         coordinates = _central_leg(machine, rows)
     elif isinstance(model.structure, Free) and _planar(machine):
         coordinates = _planar_free(machine, rows)
@@ -47,18 +47,18 @@ def assemblies(machine: Machine, joints: ArrayLike) -> Array:
     else:
         raise NoMethodError(f"{machine.name}: no complete method for all its assemblies; forward(near=...) finds single ones")
     given = np.ascontiguousarray(np.broadcast_to(rows, (len(coordinates), rows.shape[1])))
-    residual, _ = closing(machine, np.ascontiguousarray(coordinates), given)
-    coordinates, given = coordinates[residual <= tolerance(machine)], given[residual <= tolerance(machine)]
+    good = roots(machine, coordinates, given, most=0, poses=False).residual <= tolerance(machine)
+    coordinates, given = coordinates[good], given[good]
     return poses_of(machine, np.ascontiguousarray(coordinates), given)
 
 
 def _spheres(machine: Machine, rows: Array) -> Array:
     model = machine.model
-    sides = [model.home_side, -model.home_side]
-    m = len(model.structure.coordinates)
-    both = np.concatenate([run(model.spheres_tape(side), rows, np.empty((1, m))) for side in sides])
-    both = both[np.isfinite(both).all(1)]
-    return both[:1] if len(both) == 2 and np.array_equal(both[0], both[1]) else both
+    poses, residual = np.empty((2, len(machine.axes))), np.empty(2)
+    for i, side in enumerate((model.home_side, -model.home_side)):
+        residual[i] = run_checked(model.spheres_tape(side), rows, poses[i : i + 1], np.empty((1, 0)))[0]
+    poses = poses[residual <= tolerance(machine)]
+    return poses[:1] if len(poses) == 2 and np.array_equal(poses[0], poses[1]) else poses
 
 
 def _legs(machine: Machine, rows: Array) -> list[list[float]]:
@@ -84,18 +84,17 @@ def _central_leg(machine: Machine, rows: Array) -> Array:
     high = np.where(np.isfinite(high), high, [np.pi / 2, np.pi / 2, slide[1]])
     trace = Trace()
     inputs = trace.inputs(len(words))
-    f = model.closures(*model.structure.frame(inputs), rows[0].tolist())
-    f = [row / size for row, size in zip(f, model.sizes, strict=True)]
-    starts = roots(IntervalProgram(trace, f + [derivative(row, y) for row in f for y in inputs]), low, high)
+    f = model.scaled_closures(inputs, rows[0].tolist())
+    starts = isolated(IntervalProgram(trace, f + [derivative(row, y) for row in f for y in inputs]), low, high)
     return _polished(machine, rows, starts, low, high)
 
 
 def _polished(machine: Machine, rows: Array, starts: Array, low: Array, high: Array) -> Array:
     """The distinct roots that Newton's method reaches from ``starts``, within the box."""
     given = np.ascontiguousarray(np.broadcast_to(rows, (len(starts), rows.shape[1])))
-    y, residual, _, _ = solve(machine.model.newton_tape(), starts, given, high - low, MOST_STEPS)
-    slack = 1e-9 * (high - low)
-    good = (residual <= tolerance(machine)) & (y >= low - slack).all(1) & (y <= high + slack).all(1)
+    found = roots(machine, starts, given, poses=False)
+    y, slack = found.found, 1e-9 * (high - low)
+    good = (found.residual <= tolerance(machine)) & (y >= low - slack).all(1) & (y <= high + slack).all(1)
     kept: list[Array] = []
     for root in y[good]:
         if not any((np.abs(root - other) <= 1e-6 * (high - low)).all() for other in kept):

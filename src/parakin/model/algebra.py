@@ -103,8 +103,8 @@ def _scaled(term: Term, k: float) -> Scalar:
         return 0.0
     if k == 1.0:
         return term
-    if term.op in (LIN, QUAD, FMA):
-        return term.trace.node(term.op, term.args, tuple(k * x for x in term.k))
+    if term.op == LIN:
+        return term.trace.node(LIN, term.args, tuple(k * x for x in term.k))
     return term.trace.node(LIN, (term,), (0.0, k))
 
 
@@ -130,8 +130,8 @@ def _sum(x: Term, y: Scalar, sign: float) -> Scalar:
     trace = x.trace
     if len(terms) > 3:  # too wide for one operation: keep both sides as they stand
         return trace.node(LIN, (x, y), (0.0, 1.0, sign))
-    if const == 0.0 and len(terms) == 1 and terms[0][0] == 1.0:
-        return terms[0][1]
+    if const == 0.0 and len(terms) == 1:  # a bare multiple, so that it cancels against others and products absorb it
+        return _scaled(terms[0][1], terms[0][0])
     products = [a.op == QUAD for _, a in terms]
     if const == 0.0 and all(products) and sum(len(a.k) for _, a in terms) <= 3:
         args = tuple(arg for _, a in terms for arg in a.args)
@@ -301,3 +301,35 @@ def _derivative(y: Term, x: Term, known: dict[tuple[int, int], Scalar]) -> Scala
     if y.op == ATAN2:
         return (a[1] * d[0] - a[0] * d[1]) / (a[0] * a[0] + a[1] * a[1])
     raise TypeError(f"no derivative of operation {y.op}")
+
+
+def values(trace: Trace, outputs: Sequence[Scalar], inputs: Sequence[Scalar]) -> list[Scalar]:
+    """The outputs of a trace for given inputs, numbers or arrays: the plain interpreter."""
+    known: dict[int, Scalar] = {}
+    for term in trace.nodes:
+        a = [known[arg.index] for arg in term.args]
+        k = term.k
+        if term.op == INPUT:
+            known[term.index] = inputs[int(k[0])] if int(k[0]) < len(inputs) else np.nan
+        elif term.op == LIN:
+            known[term.index] = k[0] + sum(x * y for x, y in zip(k[1:], a, strict=True))
+        elif term.op == QUAD:
+            known[term.index] = sum(x * a[2 * i] * a[2 * i + 1] for i, x in enumerate(k))
+        elif term.op == FMA:
+            known[term.index] = k[0] * a[0] * a[1] + k[1] * a[2] + k[2]
+        else:
+            known[term.index] = _FUNCTIONS[term.op](*a)
+    return [known[y.index] if isinstance(y, Term) else y for y in outputs]
+
+
+_FUNCTIONS: dict[int, Any] = {
+    DIV: lambda x, y: x / y,
+    SQRT: sqrt,
+    SIN: np.sin,
+    COS: np.cos,
+    ATAN2: atan2,
+    MIN: smaller,
+    MAX: larger,
+    ABS: absolute,
+    COPYSIGN: copysign,
+}

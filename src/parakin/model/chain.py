@@ -67,7 +67,8 @@ class Angles:
     joints: tuple[Scalar, Scalar]
     freedom: Scalar  # 0 where the first angle is free
     reach: tuple[Scalar, ...]  # negative where the axes can't point there
-    turns: tuple[tuple[Scalar, Scalar], tuple[Scalar, Scalar]]  # (sine, cosine) times a positive factor, of both turns
+    turns: tuple[tuple[Scalar, Scalar], tuple[Scalar, Scalar]]  # sine and cosine: times freedom, times ``second_size``
+    second_size: float
 
 
 @dataclass(frozen=True)
@@ -137,7 +138,8 @@ class Pointing:
             (dot(middle, cross(a2, w)), dot(middle, w) - beta * beta),
         )
         angles = [sign * atan2(s, c) for sign, (s, c) in zip(self.signs, turns, strict=True)]
-        return Angles((angles[0] if first is None else first, angles[1]), freedom, reach, turns)
+        joints = (angles[0] if first is None else first, angles[1])
+        return Angles(joints, freedom, reach, turns, 1.0 - beta * beta)
 
 
 def rotation_about(axis: Vec, s: Scalar, c: Scalar) -> Mat:

@@ -258,11 +258,11 @@ class CentralLeg(FiveAxis):
         """Rotation of the central leg's two turns, tz, and both turns' angles."""
         centre = self._centre(pose)
         distance = norm(centre)
-        found = self.swing.solve(tuple(c / distance for c in centre), "+")
+        found = self.swing.solve(scale(centre, 1.0 / distance), "+")
         rotation = IDENTITY
-        for axis, (s, c) in zip((self.swing.first, self.swing.second), found.turns, strict=True):
-            size = norm((s, c))
-            rotation = product(rotation, rotation_about(axis, s / size, c / size))
+        scales = 1.0 / found.freedom, 1.0 / found.second_size
+        for axis, (s, c), size in zip((self.swing.first, self.swing.second), found.turns, scales, strict=True):
+            rotation = product(rotation, rotation_about(axis, s * size, c * size))
         return rotation, self.sign * distance - self.above, list(found.joints)
 
     def _platform(self, pose: Sequence[Scalar], branch: str, first: Scalar | None) -> Placement:

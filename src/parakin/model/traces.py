@@ -8,8 +8,10 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from functools import cached_property
 
+import numpy as np
+
 from ..kernels.tape import Tape, compile_tape
-from .algebra import Scalar, Trace, Vec, apply, derivative, norm, scale, sub, transposed
+from .algebra import Scalar, Trace, Vec, apply, derivative, norm, scale, sub, transposed, values
 from .legs import Inverse
 from .limits import Home, Limit, leg_joints, limits_of, platform_points
 from .spec import Spec
@@ -131,75 +133,109 @@ class Model:
 
     # Tapes.
 
-    def _tape(self, key: tuple[object, ...], outputs: Callable[[Trace], list[Scalar]]) -> Tape:
+    def _tape(self, key: tuple[object, ...], inputs: int, outputs: Callable[[Trace], list[Scalar]]) -> Tape:
         tape = self._tapes.get(key)
         if tape is None:
             trace = Trace()
-            tape = self._tapes[key] = compile_tape(trace, outputs(trace))
+            tape = self._tapes[key] = compile_tape(trace, outputs(trace), inputs)
         return tape
 
+    @property
+    def _poses(self) -> int:
+        return len(self.axes)
+
+    @property
+    def _motions(self) -> int:
+        return len(self.structure.coordinates)
+
     def _pose_and_joints(self, trace: Trace) -> tuple[list[Scalar], list[Scalar]]:
-        n = len(self.axes)
-        return list(trace.inputs(n)), list(trace.inputs(len(self.drives), n))
+        return list(trace.inputs(self._poses)), list(trace.inputs(len(self.drives), self._poses))
 
     def _coordinates_and_joints(self, trace: Trace) -> tuple[list[Scalar], list[Scalar]]:
-        m = len(self.structure.coordinates)
-        return list(trace.inputs(m)), list(trace.inputs(len(self.drives), m))
+        return list(trace.inputs(self._motions)), list(trace.inputs(len(self.drives), self._motions))
 
     def _serial(self, joints: Sequence[Scalar]) -> list[Scalar]:
         return list(joints[len(self.drives) - self.serial :])
 
     def inverse_tape(self, mode: str) -> Tape:
         """pose -> joints."""
-        return self._tape(("inverse", mode), lambda t: self.invert(t.inputs(len(self.axes)), mode)[0])
+        return self._tape(("inverse", mode), self._poses, lambda t: self.invert(t.inputs(self._poses), mode)[0])
 
     def held_tape(self, mode: str) -> Tape:
         """pose, first serial joint -> joints, for poses where that joint is free."""
-        n = len(self.axes)
-        return self._tape(("held", mode), lambda t: self.invert(t.inputs(n), mode, t.input(n))[0])
+        n = self._poses
+        return self._tape(("held", mode), n + 1, lambda t: self.invert(t.inputs(n), mode, t.input(n))[0])
 
     def freedom_tape(self) -> Tape:
         """pose -> sin² of the tool axis against the first turning axis of head and table; 1 where there is none."""
 
         def outputs(trace: Trace) -> list[Scalar]:
-            placed = self.structure.place(trace.inputs(len(self.axes)), self.structure.branches)
+            placed = self.structure.place(trace.inputs(self._poses), self.structure.branches)
             return [1.0 if placed.freedom is None else placed.freedom]
 
-        return self._tape(("freedom",), outputs)
+        return self._tape(("freedom",), self._poses, outputs)
 
-    def start_tape(self) -> Tape:
-        """pose -> the motion's coordinates."""
-
-        def outputs(trace: Trace) -> list[Scalar]:
-            return self.structure.place(trace.inputs(len(self.axes)), self.structure.branches).coordinates
-
-        return self._tape(("start",), outputs)
-
-    def pose_tape(self) -> Tape:
-        """coordinates, joints -> pose."""
+    def begin_tape(self, from_poses: bool = True) -> Tape:
+        """pose (or coordinates as they are) -> the motion's coordinates."""
 
         def outputs(trace: Trace) -> list[Scalar]:
-            coordinates, joints = self._coordinates_and_joints(trace)
-            return self.structure.pose(coordinates, self._serial(joints))
+            if not from_poses:
+                return list(trace.inputs(self._motions))
+            return self.structure.place(trace.inputs(self._poses), self.structure.branches).coordinates
 
-        return self._tape(("pose",), outputs)
+        return self._tape(("begin", from_poses), self._poses if from_poses else self._motions, outputs)
 
-    def newton_tape(self) -> Tape:
-        """coordinates, joints -> closures in mm, then their derivatives by the coordinates."""
+    def end_tape(self, to_poses: bool = True) -> Tape:
+        """coordinates, joints -> pose (or coordinates as they are)."""
 
         def outputs(trace: Trace) -> list[Scalar]:
             coordinates, joints = self._coordinates_and_joints(trace)
-            closures = self.closures(*self.structure.frame(coordinates), joints)
-            f = [c / size for c, size in zip(closures, self.sizes, strict=True)]
-            return f + [derivative(row, y) for row in f for y in coordinates]
+            return self.structure.pose(coordinates, self._serial(joints)) if to_poses else coordinates
 
-        return self._tape(("newton",), outputs)
+        return self._tape(("end", to_poses), self._motions + len(self.drives), outputs)
+
+    def newton_tape(self, derivatives: bool) -> Tape:
+        """coordinates, joints -> closures in mm, and then, if wanted, their derivatives by the coordinates.
+
+        The closures come in the order in which elimination at home needs no exchange.
+        """
+
+        def outputs(trace: Trace) -> list[Scalar]:
+            coordinates, joints = self._coordinates_and_joints(trace)
+            f = self.scaled_closures(coordinates, joints)
+            f = [f[i] for i in self.closure_order]
+            return f + [derivative(row, y) for row in f for y in coordinates] if derivatives else f
+
+        return self._tape(("newton", derivatives), self._motions + len(self.drives), outputs)
+
+    def scaled_closures(self, coordinates: Sequence[Scalar], joints: Sequence[Scalar]) -> list[Scalar]:
+        """Every leg's closure in mm, from the motion's coordinates."""
+        closures = self.closures(*self.structure.frame(coordinates), joints)
+        return [c * (1.0 / size) for c, size in zip(closures, self.sizes, strict=True)]
+
+    @cached_property
+    def closure_order(self) -> list[int]:
+        trace = Trace()
+        coordinates, joints = self._coordinates_and_joints(trace)
+        f = self.scaled_closures(coordinates, joints)
+        entries = [derivative(row, y) for row in f for y in coordinates]
+        home, placed, _ = self.invert(self.home, self.mode)
+        at_home = values(trace, entries, [*placed.coordinates, *home])
+        matrix = np.array(at_home, float).reshape(len(f), len(coordinates))
+        order = list(range(len(f)))
+        for k in range(len(order) - 1):
+            best = k + int(np.abs(matrix[k:, k]).argmax())
+            order[k], order[best] = order[best], order[k]
+            matrix[[k, best]] = matrix[[best, k]]
+            if matrix[k, k] != 0.0:
+                matrix[k + 1 :] -= np.outer(matrix[k + 1 :, k] / matrix[k, k], matrix[k])
+        return order
 
     def legs_tape(self, mode: str) -> Tape:
         """coordinates -> the legs' joints, in the joint vector's order, and their derivatives by the coordinates."""
 
         def outputs(trace: Trace) -> list[Scalar]:
-            coordinates = list(trace.inputs(len(self.structure.coordinates)))
+            coordinates = list(trace.inputs(self._motions))
             points = platform_points(self.spec, *self.structure.frame(coordinates))
             signs, _ = self.split_mode(mode)
             found = {
@@ -210,7 +246,7 @@ class Model:
             legs = [found[drive.name] for drive in self.drives[: len(self.drives) - self.serial]]
             return legs + [derivative(q, y) for q in legs for y in coordinates]
 
-        return self._tape(("legs", mode), outputs)
+        return self._tape(("legs", mode), self._motions, outputs)
 
     def margins_tape(self, mode: str) -> Tape:
         """pose, joints -> every margin, in the order of :attr:`limits`."""
@@ -219,17 +255,17 @@ class Model:
             pose, joints = self._pose_and_joints(trace)
             return [margin for _, margin in self.margins(pose, joints, mode)]
 
-        return self._tape(("margins", mode), outputs)
+        return self._tape(("margins", mode), self._poses + len(self.drives), outputs)
 
     def check_tape(self, mode: str) -> Tape:
         """pose -> every margin, with the inverse in between."""
 
         def outputs(trace: Trace) -> list[Scalar]:
-            pose = trace.inputs(len(self.axes))
+            pose = trace.inputs(self._poses)
             joints, _, _ = self.invert(pose, mode)
             return [margin for _, margin in self.margins(pose, joints, mode)]
 
-        return self._tape(("check", mode), outputs)
+        return self._tape(("check", mode), self._poses, outputs)
 
     def jacobian_tape(self) -> Tape:
         """pose, joints -> A (n·n) and B (n·n) with A x' = B q'."""
@@ -241,20 +277,24 @@ class Model:
             a = [derivative(row, x) for row in f for x in pose]
             return a + [-derivative(row, q) for row in f for q in joints]
 
-        return self._tape(("jacobian",), outputs)
+        return self._tape(("jacobian",), self._poses + len(self.drives), outputs)
 
     def spheres_tape(self, side: float | None) -> Tape:
-        """joints -> coordinates, on the given side of the centres' plane; with None: joints, near pose -> coordinates."""
+        """joints -> pose, on the given side of the centres' plane, then the closures there, mm.
+
+        With None: joints, near pose -> the same, on the pose's side.
+        """
 
         def outputs(trace: Trace) -> list[Scalar]:
             joints = list(trace.inputs(len(self.drives)))
             near = None
             if side is None:
-                pose = trace.inputs(len(self.axes), len(joints))
+                pose = trace.inputs(self._poses, len(joints))
                 near = self.structure.place(pose, self.structure.branches).origin
-            return self.spheres(joints, side, near)
+            coordinates = self.spheres(joints, side, near)
+            return self.structure.pose(coordinates, self._serial(joints)) + self.scaled_closures(coordinates, joints)
 
-        return self._tape(("spheres", side), outputs)
+        return self._tape(("spheres", side), len(self.drives) + (self._poses if side is None else 0), outputs)
 
     def spheres(self, joints: Sequence[Scalar], side: float | None, near: Vec | None = None) -> list[Scalar]:
         """The motion's coordinates by the common point of the legs' spheres; ``near`` picks the nearer of two."""

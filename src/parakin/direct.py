@@ -72,6 +72,7 @@ def forward(machine: Machine, joints: ArrayLike, near: ArrayLike | None = None, 
     else:
         raise PoseError(f'method {method!r}: "closed", "newton" or "constant" expected')
     poses, residual, converged, steps = found
+    converged &= (rows >= machine.model.least_joints).all(1)
     if not converged.all():
         poses[~converged] = np.nan
     return Solution(
@@ -156,8 +157,8 @@ def _constant(machine: Machine, joints: Array, starts: Array | None) -> _Found:
     m = len(model.structure.coordinates)
     tape = model.legs_tape(machine.mode)
     given = machine.home[None, :] if starts is None else starts
-    start = run(model.begin_tape(), np.ascontiguousarray(given), np.empty((len(given), m)))
-    y = np.broadcast_to(start, (len(joints), m)).copy()
+    wide = np.ascontiguousarray(np.broadcast_to(given, (len(joints), given.shape[1])))
+    y = run(model.begin_tape(), wide, np.empty((len(joints), m)), joints)
     both = run(tape, y, np.empty((len(y), legs + legs * m)))
     singular = ~np.isfinite(both).all(1)
     matrices = both[:, legs:].reshape(-1, legs, m).copy()

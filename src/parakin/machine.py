@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from functools import cached_property
 from itertools import product
+from numbers import Real
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -104,12 +105,12 @@ class Machine:
         """``values`` as C-ordered float64 rows (N, names), and their leading shape."""
         try:
             array = np.asarray(values)
-            if array.dtype.kind not in "biuf":
-                array = np.asarray(values, dtype=np.float64) if array.dtype.kind == "O" else array
+            if array.dtype.kind == "O" and all(isinstance(v, Real) for v in array.flat):
+                array = array.astype(np.float64)
             if array.dtype.kind not in "biuf":
                 raise PoseError(f"{what}: numbers expected, not {array.dtype}")
             array = array.astype(np.float64, copy=False)
-        except (ValueError, TypeError) as error:
+        except (ValueError, TypeError, OverflowError) as error:
             raise PoseError(f"{what}: rows of numbers expected ({error})") from None
         if array.ndim == 0 or array.shape[-1] != len(names):
             raise PoseError(f"{what}: shape (..., {len(names)}) for {' '.join(names)} expected, not {array.shape}")
@@ -193,6 +194,12 @@ class Machine:
 
     # Limits.
 
+    def _joints_of(self, joints: ArrayLike, count: int) -> Array:
+        rows = self.rows(joints, self.joints, "joints")[0]
+        if len(rows) != count:
+            raise PoseError(f"joints: {count} rows expected, as many as poses, not {len(rows)}")
+        return rows
+
     def margins(self, poses: ArrayLike, joints: ArrayLike | None = None, mode: str | None = None) -> Array:
         """Every limit's margin, (..., limits), ≥ 0 where it holds; units as in :attr:`limit_parts`.
 
@@ -200,9 +207,7 @@ class Machine:
         that do not exist where a leg can't close are NaN.
         """
         rows, lead = self.rows(poses, self.axes, "poses")
-        q = self.inverse(rows, mode) if joints is None else self.rows(joints, self.joints, "joints")[0]
-        if len(q) != len(rows):
-            raise PoseError(f"joints: {len(rows)} rows expected, as many as poses, not {len(q)}")
+        q = self.inverse(rows, mode) if joints is None else self._joints_of(joints, len(rows))
         names = self.limits
         out = np.empty((len(rows), len(names)))
         run(self.model.margins_tape(self._mode(mode)), rows, out, q, whole=False)
@@ -218,7 +223,7 @@ class Machine:
             q = np.empty((len(rows), 0))
             tape = self.model.check_tape(self._mode(mode))
         else:
-            q = self.rows(joints, self.joints, "joints")[0]
+            q = self._joints_of(joints, len(rows))
             tape = self.model.margins_tape(self._mode(mode))
         if not self.limits:
             return np.zeros(lead, np.int64)[()]

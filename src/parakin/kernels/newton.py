@@ -137,7 +137,8 @@ def descend(full, light, m, q, caps, size, most, held, r, a, swaps, wanted, f, t
         last = enough
         before = greatest
         substitute(a, m, swaps, wanted, f)
-        shrink[:] = 1.0
+        for j in range(LANES):  # a lane that is done stays: beside a slow one it would take steps of pure rounding
+            shrink[j] = 0.0 if worst[j] < FINE else 1.0
         for i in range(m):
             s = (i & _MASK) * LANES
             for j in range(LANES):
@@ -146,7 +147,7 @@ def descend(full, light, m, q, caps, size, most, held, r, a, swaps, wanted, f, t
         for i in range(m):
             s = (i & _MASK) * LANES
             for j in range(LANES):
-                held[s + j] -= shrink[j] * f[s + j]
+                held[s + j] -= shrink[j] * f[s + j] if shrink[j] > 0.0 else 0.0
     return most
 
 
@@ -154,7 +155,7 @@ def descend(full, light, m, q, caps, size, most, held, r, a, swaps, wanted, f, t
 def newton(begin, full, light, end, registers, near, q, caps, size, most, out, residual, steps, sides, start, stop):
     """Solve f(y, q) = 0 for rows start ≤ i < stop of ``q``.
 
-    Tapes, as (code, imm): ``begin`` takes a row of ``near`` (N or 1, k) to the coordinates y (m), ``full`` takes y and
+    Tapes, as (code, imm): ``begin`` takes a row of ``near`` (N or 1, k) and q to the coordinates y (m), ``full`` takes y and
     q to f, mm, then ∂f/∂y, ``light`` to f only, ``end`` takes y and q to a row of ``out``. ``caps`` (m,) bounds a
     step's coordinates; ``size`` is the legs' length, mm. ``residual`` (N,) is the greatest |f| left, mm; ``sides``
     (N, 2) the determinants at the start and at the last factoring.
@@ -174,9 +175,10 @@ def newton(begin, full, light, end, registers, near, q, caps, size, most, out, r
                 r[i * LANES : (i + 1) * LANES] = near[0, i]
         else:
             load(near, row, n, 0, r, bad)
-        interpret(begin[0], begin[1], r)
-        held[: m * LANES] = r[given * LANES : (given + m) * LANES]
         load(q, row, n, m, held, bad)
+        r[given * LANES : (given + joints) * LANES] = held[m * LANES :]
+        interpret(begin[0], begin[1], r)
+        held[: m * LANES] = r[(given + joints) * LANES : (given + joints + m) * LANES]
         step = descend(full, light, m, joints, caps, size, most, held, r, a, swaps, wanted, f, turn, turn0, worst, shrink, n)
         for j in range(n):
             steps[row + j] = step

@@ -33,7 +33,7 @@ def assemblies(machine: Machine, joints: ArrayLike) -> Array:
     rows, lead = machine.rows(joints, machine.joints, "joints")
     if lead != ():
         raise PoseError(f"joints: one joint vector ({len(machine.joints)},) expected, not {(*lead, len(machine.joints))}")
-    if not np.isfinite(rows).all():
+    if not (np.isfinite(rows).all() and (rows >= machine.model.least_joints).all()):
         return np.empty((0, len(machine.axes)))
     model = machine.model
     if model.by_spheres:

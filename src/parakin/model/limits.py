@@ -5,7 +5,7 @@ The Boolean workspace, the refusal of a tool path and the pictures all come from
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations
 from math import inf, isfinite
@@ -33,16 +33,25 @@ class Limit:
         return self.bound - margin if self.side == "max" else self.bound + margin
 
 
-def limits_of(spec: Spec, pose: Placement, joints: Sequence[Scalar], reaches: Sequence[tuple[Scalar, ...]], home: Home | None
+def limits_of(
+    spec: Spec,
+    pose: Placement,
+    coordinates: Sequence[tuple[str, Scalar]],
+    joints: Sequence[Scalar],
+    reaches: Sequence[tuple[Scalar, ...]],
+    home: Home | None,
 ) -> list[tuple[Limit, Scalar]]:
-    """All limits with their margins. ``reaches`` are each leg's own; ``home`` is needed by cones without an axis.
+    """All limits with their margins.
+
+    ``coordinates`` are the motion's, with their names; ``reaches`` each leg's own margins; ``home`` is needed by cones
+    without an axis.
 
     Reach comes first, so that a pose where a leg can't close is never blamed on something that follows from it.
     """
     return [
         *_reach(spec, pose, reaches),
         *_drives(spec, joints),
-        *_passive(spec, pose),
+        *_passive(spec, dict(coordinates)),
         *_gaps(spec, joints),
         *_cones(spec, pose, joints, home),
         *_clearance(spec, pose, joints),
@@ -91,8 +100,7 @@ def _drives(spec: Spec, joints: Sequence[Scalar]) -> Iterator[tuple[Limit, Scala
         yield from _between(drive.name, subject, drive.unit, q, drive.low, drive.high)
 
 
-def _passive(spec: Spec, pose: Placement) -> Iterator[tuple[Limit, Scalar]]:
-    given = dict(zip(spec.motion, pose.coordinates, strict=True))
+def _passive(spec: Spec, given: Mapping[str, Scalar]) -> Iterator[tuple[Limit, Scalar]]:
     for bound in spec.limits.passive:
         unit: Literal["mm", "rad"] = "mm" if bound.name.startswith("t") else "rad"
         yield from _between(bound.name, f"passive {bound.name}", unit, given[bound.name], bound.low, bound.high)

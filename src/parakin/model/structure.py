@@ -72,6 +72,10 @@ class Structure(ABC):
     def frame(self, coordinates: Sequence[Scalar]) -> tuple[Mat, Vec]:
         """The platform's frame in the base for the motion's coordinates."""
 
+    def start(self, pose: Sequence[Scalar], serial: Sequence[Scalar]) -> list[Scalar]:
+        """The motion's coordinates to start from for a pose near by, whatever the working mode of ``serial``."""
+        return self.place(pose, self.branches).coordinates
+
     def coordinates_at(self, origin: Vec) -> list[Scalar]:
         """The motion's coordinates for the platform's origin in the base, of a motion without turns."""
         return list(origin)
@@ -170,6 +174,7 @@ class Carried(FiveAxis):
 
     def __init__(self, spec: Spec):
         super().__init__(spec)
+        self.coordinates = TRANSLATIONS
         chain = [*inverse_rotations(spec.table), *spec.mounting, *spec.head]
         self.pointing = Pointing.of(chain, "head and table")
         # The turning axes as they follow on each other: the table's, inverted, then the head's.
@@ -192,6 +197,9 @@ class Carried(FiveAxis):
         serial = [found.joints[self.order.index(i)] for i in range(2)]
         origin = self._origin(pose, serial)
         return Placement(IDENTITY, origin, list(origin), serial, found.reach, found.freedom)
+
+    def start(self, pose: Sequence[Scalar], serial: Sequence[Scalar]) -> list[Scalar]:
+        return list(self._origin(pose, serial))
 
     def frame(self, coordinates: Sequence[Scalar]) -> tuple[Mat, Vec]:
         return IDENTITY, tuple(coordinates)
@@ -307,6 +315,9 @@ class CentralLeg(FiveAxis):
 
 def structure_of(spec: Spec) -> Structure:
     """The structure of a machine, or a :class:`ParakinError` that says why it is none."""
+    twice = [bound.name for bound in spec.limits.passive if spec.motion.count(bound.name) > 1]
+    if twice:
+        raise ParakinError(f"limits: passive {twice[0]} is not one coordinate, for {twice[0]} stands twice in the motion")
     driven = sum(step.drive is not None for step in (*spec.head, *spec.table))
     if spec.motion[0] in ROTATIONS:
         return CentralLeg(spec)

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from functools import cached_property
+from math import inf
 
 import numpy as np
 
@@ -68,7 +69,9 @@ class Model:
         placed = self.structure.place(pose, branch)
         points = platform_points(self.spec, placed.rotation, placed.origin)
         reaches = [leg.inverse(p, s).reach for leg, p, s in zip(self.spec.legs, points, signs, strict=True)]
-        return limits_of(self.spec, placed, joints, reaches, self.rods_at_home if self._centred_cones else None)
+        home = self.rods_at_home if self._centred_cones else None
+        coordinates = list(zip(self.structure.coordinates, placed.coordinates, strict=True))
+        return limits_of(self.spec, placed, coordinates, joints, reaches, home)
 
     def closures(self, rotation: Sequence[Vec], origin: Vec, joints: Sequence[Scalar]) -> list[Scalar]:
         """Every leg's closure, mm²."""
@@ -110,6 +113,12 @@ class Model:
     def limits(self) -> tuple[Limit, ...]:
         joints, _, _ = self.invert(self.home, self.mode)
         return tuple(limit for limit, _ in self.margins(self.home, joints, self.mode))
+
+    @cached_property
+    def least_joints(self) -> list[float]:
+        """What no joint can be below, whatever its drive: a strut's length is not negative."""
+        least = {drive.name: leg.least for leg in self.spec.legs for drive in leg.drives}
+        return [least.get(drive.name, -inf) for drive in self.drives]
 
     @cached_property
     def by_spheres(self) -> bool:
@@ -176,14 +185,14 @@ class Model:
         return self._tape(("freedom",), self._poses, outputs)
 
     def begin_tape(self, from_poses: bool = True) -> Tape:
-        """pose (or coordinates as they are) -> the motion's coordinates."""
+        """pose (or coordinates as they are), joints -> the motion's coordinates to start from."""
+        width = self._poses if from_poses else self._motions
 
         def outputs(trace: Trace) -> list[Scalar]:
-            if not from_poses:
-                return list(trace.inputs(self._motions))
-            return self.structure.place(trace.inputs(self._poses), self.structure.branches).coordinates
+            given, joints = trace.inputs(width), trace.inputs(len(self.drives), width)
+            return self.structure.start(given, self._serial(joints)) if from_poses else list(given)
 
-        return self._tape(("begin", from_poses), self._poses if from_poses else self._motions, outputs)
+        return self._tape(("begin", from_poses), width + len(self.drives), outputs)
 
     def end_tape(self, to_poses: bool = True) -> Tape:
         """coordinates, joints -> pose (or coordinates as they are)."""
@@ -290,7 +299,7 @@ class Model:
             near = None
             if side is None:
                 pose = trace.inputs(self._poses, len(joints))
-                near = self.structure.place(pose, self.structure.branches).origin
+                near = self.structure.closure(pose, self._serial(joints))[1]
             coordinates = self.spheres(joints, side, near)
             return self.structure.pose(coordinates, self._serial(joints)) + self.scaled_closures(coordinates, joints)
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
+from math import inf
 from typing import ClassVar
 
 from ..algebra import Scalar, Vec
@@ -28,6 +29,7 @@ class Leg(ABC):
 
     kind: ClassVar[str]
     units: ClassVar[tuple[Unit, ...]]  # of the joints, in order
+    least: ClassVar[float] = -inf  # no joint of this kind can be below
     branches: ClassVar[str] = ""  # the working mode if the file names none: a sign for each choice of the inverse
 
     drives: tuple[Drive, ...]

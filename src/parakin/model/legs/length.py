@@ -13,6 +13,7 @@ from .base import Inverse, Leg
 class Length(Leg):
     kind = "length"
     units = ("mm",)
+    least = 0.0
 
     foot: Point
 

@@ -1,0 +1,133 @@
+"""YAML files as plain text, lists and mappings that remember their lines.
+
+Nothing is interpreted here: every scalar stays the text that the user wrote, so ``no``, ``1e400`` and ``12:30`` hold no
+surprises, and whoever reads a value decides what it is.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, TypeAlias
+
+from ruamel.yaml import YAML
+from ruamel.yaml.error import MarkedYAMLError, YAMLError
+from ruamel.yaml.nodes import MappingNode, ScalarNode, SequenceNode
+from ruamel.yaml.reader import ReaderError
+
+from ..errors import InputError
+from ..quantities import shown
+
+_LONGEST = 100_000  # bytes
+_DEEPEST = 16  # levels; aliases can make a cycle
+_MOST = 20_000  # values; aliases of aliases grow exponentially
+_TAGS = {f"tag:yaml.org,2002:{t}" for t in ("map", "seq", "str", "int", "float", "bool", "null", "timestamp", "merge")}
+
+
+class Text(str):
+    """A scalar as written."""
+
+    line: int
+
+    def __new__(cls, text: str, line: int) -> Text:
+        self = super().__new__(cls, text)
+        self.line = line
+        return self
+
+
+class Seq(list[Any]):
+    """A list; its items are :class:`Text`, :class:`Seq` and :class:`Map`."""
+
+    def __init__(self, items: list[Any], line: int):
+        super().__init__(items)
+        self.line = line
+
+
+class Map(dict[Any, Any]):
+    """A mapping with keys of :class:`Text`; a value's line is that of its key, where a reader looks for it."""
+
+    def __init__(self, items: Mapping[Text, Any], line: int):
+        super().__init__(items)
+        self.line = line
+
+
+Value: TypeAlias = Text | Seq | Map
+
+
+def read_document(path: Path, source: str) -> tuple[Value, list[InputError]]:
+    """A YAML file's only document, and errors that don't keep the rest from being read (keys written twice).
+
+    Raises :class:`InputError` if there is no such document.
+    """
+    try:
+        with path.open("rb") as file:
+            content = file.read(_LONGEST + 1)
+    except (OSError, ValueError) as error:  # ValueError: a zero character in the path
+        reason = getattr(error, "strerror", None) or str(error)
+        raise InputError(f"can't read this file: {reason}", source) from None
+    if len(content) > _LONGEST:
+        raise InputError(f"longer than {_LONGEST} bytes, expected a YAML file of some twenty lines", source)
+    try:
+        text = content.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        line = content.count(b"\n", 0, error.start) + 1
+        raise InputError("not a text file in UTF-8, expected YAML", source, line) from None
+    return parse_document(text, source)
+
+
+def parse_document(text: str, source: str) -> tuple[Value, list[InputError]]:
+    """As :func:`read_document`, from the file's text."""
+    try:
+        node = YAML(typ="safe", pure=True).compose(text)
+    except ReaderError as error:
+        line = text.count("\n", 0, error.position) + 1
+        raise InputError("holds a character that YAML does not allow, expected text", source, line) from None
+    except MarkedYAMLError as error:
+        mark = error.problem_mark or error.context_mark
+        problem = " ".join(str(error.problem or error.context or "syntax error").split())
+        raise InputError(f"not valid YAML: {problem}", source, mark.line + 1 if mark else None) from None
+    except RecursionError:
+        raise InputError("nested too deeply", source) from None
+    # ruamel meets some malformed directives and escapes with whatever its own slip raises.
+    except (YAMLError, ValueError, LookupError, TypeError, AttributeError, AssertionError, OverflowError):
+        raise InputError("not valid YAML", source) from None
+    if node is None:
+        raise InputError("empty, expected a machine's description", source, 1)
+    builder = _Builder(source)
+    return builder.value(node, node.start_mark.line + 1, 0), builder.errors
+
+
+class _Builder:
+    def __init__(self, source: str):
+        self.source, self.errors, self.count = source, list[InputError](), 0
+
+    def value(self, node: Any, line: int, depth: int) -> Value:
+        self.count += 1
+        if depth > _DEEPEST:
+            raise InputError("nested too deeply (does an alias hold itself?)", self.source, line)
+        if self.count > _MOST:
+            raise InputError(f"more than {_MOST} values, aliases included", self.source, line)
+        if str(node.tag) not in _TAGS:
+            self.errors.append(InputError(f"tag {shown(node.tag)} is not known here, expected none", self.source, line))
+        if isinstance(node, MappingNode):
+            return self._map(node, line, depth)
+        if isinstance(node, SequenceNode):
+            items = [self.value(item, item.start_mark.line + 1, depth + 1) for item in node.value]
+            return Seq(items, line)
+        return Text(node.value, line)
+
+    def _map(self, node: MappingNode, line: int, depth: int) -> Map:
+        items: dict[Text, Any] = {}
+        for key, value in node.value:
+            at = key.start_mark.line + 1
+            if not isinstance(key, ScalarNode):
+                self.errors.append(InputError("a key is a list or a mapping, expected a word", self.source, at))
+                continue
+            name = Text(key.value, at)
+            if name in items:
+                first = next(k.line for k in items if k == name)
+                message = f"key {shown(name)} is written twice, first in line {first}"
+                self.errors.append(InputError(message, self.source, at))
+                continue
+            items[name] = self.value(value, at, depth + 1)
+        return Map(items, line)

@@ -1,0 +1,255 @@
+"""The sections of a machine file as pydantic models; legs are in :mod:`.groups`."""
+
+from __future__ import annotations
+
+from math import cos, inf, sin
+from typing import Annotated, Any, ClassVar
+
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    PlainValidator,
+    ValidationInfo,
+    create_model,
+    model_validator,
+)
+
+from ..model.parts import ROTATIONS, TRANSLATIONS, Cone, Direction, Drive, Gap, Limits, Range, Step, Unit, Vector
+from ..quantities import ANGLE, LENGTH, nearest, shown
+from .document import Map, Seq, Text
+from .values import (
+    DRIVE_TYPES,
+    Angle,
+    AnglePair,
+    DirectionValue,
+    Extent,
+    Flag,
+    Length,
+    LengthPair,
+    Opening,
+    PlacedError,
+    Word,
+    context_of,
+    described,
+    one_of,
+    read_quantity,
+)
+
+TRANSFORMS = (*TRANSLATIONS, *ROTATIONS)
+
+
+class Section(BaseModel):
+    """A mapping of known keys. An unknown one is reported, and the others are still read."""
+
+    model_config = ConfigDict(arbitrary_types_allowed=True)
+    place: ClassVar[str] = ""  # " in legs", for messages
+
+    @model_validator(mode="before")
+    @classmethod
+    def _known(cls, value: object, info: ValidationInfo) -> object:
+        keys = list(cls.model_fields)
+        if not isinstance(value, Map):
+            raise ValueError(f"expected a mapping with the keys {', '.join(keys)}, got {described(value)}")
+        for key in value:
+            if key not in keys:
+                context_of(info).report(f"unknown key {shown(key)}{cls.place}{nearest(key, keys)}", key.line)
+        return Map({k: v for k, v in value.items() if k in keys}, value.line)
+
+
+def _list(value: object) -> object:
+    if not isinstance(value, Seq):
+        raise ValueError(f"expected a list, got {described(value)}")
+    return value
+
+
+ListOf = BeforeValidator(_list)  # pydantic's own message would speak of Python
+
+
+class Circle(Section):
+    """Points on a circle about the frame's Z: ``{circle: R, at: [0 deg, 120 deg, 240 deg], z: 0 mm}``."""
+
+    place: ClassVar[str] = " in a circle of points"
+
+    circle: Extent
+    at: Annotated[list[Angle], ListOf]
+    z: Length = 0.0
+
+    def points(self) -> list[Vector]:
+        # The cosine of 90 deg is 6e-17 here; a foot that is meant to stand on an axis shall.
+        turns = [tuple(0.0 if abs(t) < 1e-15 else t for t in (cos(a), sin(a))) for a in self.at]
+        return [(self.circle * c, self.circle * s, self.z) for c, s in turns]
+
+
+# Heads, tables, mountings.
+
+
+class _Driven(Section):
+    place: ClassVar[str] = " in a driven transform"
+
+    joint: Word
+    range: tuple[float, float]
+    reverse: Flag = False
+    offset: float = 0.0
+    speed: float = inf
+    acceleration: float = inf
+
+    def step(self, axis: str, unit: Unit) -> Step:
+        drive = Drive(str(self.joint), unit, self.range[0], self.range[1], self.speed, self.acceleration)
+        return Step(axis, self.offset, drive, -1.0 if self.reverse else 1.0)
+
+
+def _driven(unit: Unit) -> type[_Driven]:
+    types = DRIVE_TYPES[unit]
+    return create_model(
+        f"Driven_{unit}",
+        __base__=_Driven,
+        range=types.range,
+        offset=(types.value, 0.0),
+        speed=(types.speed, inf),
+        acceleration=(types.acceleration, inf),
+    )
+
+
+_DRIVEN: dict[Unit, type[_Driven]] = {"mm": _driven("mm"), "rad": _driven("rad")}
+
+
+def _step(value: object, info: ValidationInfo) -> Step:
+    if not isinstance(value, Map) or len(value) != 1:
+        raise ValueError(f"expected one transform such as tz: 100 mm, got {described(value)}")
+    ((axis, content),) = value.items()
+    if axis not in TRANSFORMS:
+        raise PlacedError(f"unknown transform {shown(axis)}{nearest(axis, TRANSFORMS)}", axis.line)
+    unit: Unit = "mm" if axis in TRANSLATIONS else "rad"
+    if not isinstance(content, Map):
+        return Step(str(axis), read_quantity(content, LENGTH if unit == "mm" else ANGLE, info))
+    joint = content.get("joint")
+    if isinstance(joint, Text):
+        context_of(info).add_joint(joint, unit)
+    return _DRIVEN[unit].model_validate(content, context=info.context).step(str(axis), unit)
+
+
+StepValue = Annotated[Step, PlainValidator(_step)]
+Steps = Annotated[tuple[StepValue, ...], ListOf]
+
+
+def _mounting(value: object, info: ValidationInfo) -> object:
+    """A word for the usual ways stands for a turn about X, so that a hanging tool comes to point along +Y."""
+    if not isinstance(value, Text):
+        return value
+    way, _, angle = value.strip().partition(" ")
+    if value.strip() == "vertical":
+        return Seq([], value.line)
+    if value.strip() == "horizontal":
+        angle = "90 deg"
+    elif way != "inclined":
+        known = ("vertical", "horizontal", "inclined")
+        others = "vertical, horizontal, inclined by an angle (inclined 45 deg) or a list of transforms"
+        raise ValueError(f"unknown mounting {shown(value)}{nearest(way, known, others)}")
+    return Seq([Map({Text("rx", value.line): Text(angle, value.line)}, value.line)], value.line)
+
+
+def _constant(steps: tuple[Step, ...]) -> tuple[Step, ...]:
+    for step in steps:
+        if step.drive is not None:
+            raise ValueError(f"joint {shown(step.drive.name)} can't be in the mounting, expected head or table")
+    return steps
+
+
+Mounting = Annotated[tuple[StepValue, ...], ListOf, BeforeValidator(_mounting), AfterValidator(_constant)]
+
+
+# Limits.
+
+
+class _Passive(Section):
+    place: ClassVar[str] = " in passive"
+
+    tx: LengthPair | None = None
+    ty: LengthPair | None = None
+    tz: LengthPair | None = None
+    rx: AnglePair | None = None
+    ry: AnglePair | None = None
+    rz: AnglePair | None = None
+
+    @model_validator(mode="before")
+    @classmethod
+    def _moving(cls, value: object, info: ValidationInfo) -> object:
+        context = context_of(info)
+        motion = context.motion or TRANSFORMS
+        for key in value if isinstance(value, Map) else ():
+            if key in TRANSFORMS and key not in motion:
+                context.report(f"passive limit of {key}, which is not in the motion {' '.join(motion)}", key.line)
+        return value
+
+    def ranges(self) -> tuple[Range, ...]:
+        return tuple(Range(name, *getattr(self, name)) for name in TRANSFORMS if getattr(self, name) is not None)
+
+
+def _slider(value: object, info: ValidationInfo) -> str:
+    context = context_of(info)
+    if not isinstance(value, Text):
+        raise ValueError(f"expected a joint's name, got {described(value)}")
+    if context.legs_read and value not in context.joints:
+        raise ValueError(f"unknown joint {shown(value)}{nearest(value, context.joints)}")
+    if value in context.joints and context.joints[value][1] != "mm":
+        raise ValueError(f"joint {shown(value)} turns, expected one that slides")
+    return str(value)
+
+
+def _two(value: object) -> object:
+    if not isinstance(value, Seq) or len(value) != 2:
+        raise ValueError(f"expected the names of two joints, got {described(value)}")
+    return value
+
+
+_SliderName = Annotated[str, PlainValidator(_slider)]
+
+
+class _Gap(Section):
+    place: ClassVar[str] = " in gaps"
+
+    between: Annotated[tuple[_SliderName, _SliderName], BeforeValidator(_two)]
+    range: LengthPair
+
+
+class _Cone(Section):
+    place: ClassVar[str] = " in cones"
+
+    at: Annotated[Any, one_of("end of a leg", "foot", "platform")]
+    angle: Opening
+    axis: DirectionValue | None = None
+
+
+class LimitsSection(Section):
+    place: ClassVar[str] = " in limits"
+
+    passive: _Passive | None = None
+    gaps: Annotated[list[_Gap], ListOf] = []
+    cones: Annotated[list[_Cone], ListOf] = []
+    clearance: Extent | None = None
+
+    def limits(self) -> Limits:
+        return Limits(
+            self.passive.ranges() if self.passive else (),
+            tuple(Gap(*gap.between, *gap.range) for gap in self.gaps),
+            tuple(Cone(c.at, c.angle, Direction(c.axis) if c.axis else None) for c in self.cones),
+            self.clearance,
+        )
+
+
+class Home(Section):
+    """A pose by the names of its axes."""
+
+    place: ClassVar[str] = " in home"
+
+    X: Length | None = None
+    Y: Length | None = None
+    Z: Length | None = None
+    A: Angle | None = None
+    B: Angle | None = None
+    C: Angle | None = None
+
+    def pose(self) -> dict[str, float]:
+        return {name: value for name, value in self if value is not None}

@@ -1,4 +1,4 @@
-"""A trace as straight-line C over libm, for comparison with what an integrator writes by hand and compiles with gcc -O2."""
+"""A trace as straight-line C over libm: what an integrator writes by hand and compiles with gcc -O2."""
 
 from __future__ import annotations
 
@@ -50,9 +50,9 @@ def source(trace: Trace, outputs: list[Scalar], inputs: int) -> str:
             stack.extend(term.args)
     body = [f"    const double t{i} = {_expression(trace.nodes[i])};" for i in sorted(needed)]
     body += [f"    y[{i}] = {f't{y.index}' if isinstance(y, Term) else repr(y)};" for i, y in enumerate(outputs)]
-    step = f"x += {inputs}, y += {len(outputs)}"
-    lines = ["#include <math.h>", "void batch(long n, const double *x, double *y)", "{"]
-    return "\n".join([*lines, f"  for (long i = 0; i < n; i++, {step}) {{", *body, "  }", "}", ""])
+    head = ["#include <math.h>", "void batch(long n, const double *x, double *y)", "{"]
+    loop = f"  for (long i = 0; i < n; i++, x += {inputs}, y += {len(outputs)}) {{"
+    return "\n".join([*head, loop, *body, "  }", "}", ""])
 
 
 def compiled(text: str, flags: tuple[str, ...] = ("-O2",)) -> Callable[[np.ndarray, np.ndarray], None]:

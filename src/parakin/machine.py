@@ -97,7 +97,9 @@ class Machine:
         for limit, margin in margins:
             if not margin >= 0.0:
                 value = limit.value(float(margin))
-                raise ParakinError(f"home: {limit.name} does not hold there ({value:.6g} {limit.unit}, limit {limit.bound:.6g})")
+                raise ParakinError(
+                    f"home: {limit.name} does not hold there ({value:.6g} {limit.unit}, limit {limit.bound:.6g})"
+                )
 
     # Input at the boundary.
 
@@ -155,7 +157,7 @@ class Machine:
         return result
 
     def follow(self, poses: ArrayLike, mode: str | None = None) -> Array:
-        """Joints along a path, (N, axes) -> (N, joints), continuous: angles are unwound, free ones keep the neighbour's.
+        """Joints along a path, (N, axes) -> (N, joints), continuous: angles unwound, free ones as the neighbour's.
 
         A turning joint that is free (the tool's axis along it) takes its value from the last pose where it was not, at
         the path's start from the first one to come; turns are counted on over ±180°.

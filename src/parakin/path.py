@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from .kernels.batch import run
 
@@ -37,7 +38,7 @@ def follow(machine: Machine, poses: Array, mode: str) -> Array:
     return joints
 
 
-def neighbours(values: Array, free: Array) -> Array:
+def neighbours(values: Array, free: NDArray[np.bool_]) -> Array:
     """``values`` with the free ones replaced by the last that is not free, at the start by the first to come."""
     index = np.where(free | ~np.isfinite(values), -1, np.arange(len(values)))
     last = np.maximum.accumulate(index)

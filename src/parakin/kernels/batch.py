@@ -7,6 +7,7 @@ from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import cache
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,7 +35,7 @@ def split(count: int, work: Callable[[int, int], None]) -> None:
         work(0, count)
         return
     edges = [count * i // parts for i in range(parts + 1)]
-    for future in [_pool().submit(work, a, b) for a, b in zip(edges, edges[1:], strict=False)]:
+    for future in [_pool().submit(work, a, b) for a, b in pairwise(edges)]:
         future.result()
 
 

@@ -108,12 +108,13 @@ def closures(code, imm, inputs, m, held, r, f, worst, n):
 
 
 @njit(nogil=True, cache=True, fastmath=FAST, error_model="numpy")
-def descend(full, light, m, q, caps, size, most, held, r, a, swaps, wanted, f, turn, turn0, worst, shrink, n):
-    """Newton on one block: ``held`` (m + joints rows) has the start and ends with the root; the number of steps.
+def descend(full, light, m, q, caps, size, most, room, n):
+    """Newton on one block, in its working arrays ``room``; the number of steps.
 
-    ``worst`` is each lane's greatest closure left, ``turn0`` and ``turn`` the determinants at the start and at the last
+    ``held`` (m + joints rows) has the start and ends with the root, ``worst`` is each lane's greatest closure left, ``turn0`` and ``turn`` the determinants at the start and at the last
     factoring.
     """
+    held, r, a, swaps, wanted, f, turn, turn0, worst, shrink = room
     inputs = m + q
     refactor, last = True, False
     before = np.inf
@@ -179,7 +180,8 @@ def newton(begin, full, light, end, registers, near, q, caps, size, most, out, r
         r[given * LANES : (given + joints) * LANES] = held[m * LANES :]
         interpret(begin[0], begin[1], r)
         held[: m * LANES] = r[(given + joints) * LANES : (given + joints + m) * LANES]
-        step = descend(full, light, m, joints, caps, size, most, held, r, a, swaps, wanted, f, turn, turn0, worst, shrink, n)
+        room = (held, r, a, swaps, wanted, f, turn, turn0, worst, shrink)
+        step = descend(full, light, m, joints, caps, size, most, room, n)
         for j in range(n):
             steps[row + j] = step
             residual[row + j] = worst[j] + bad[j]

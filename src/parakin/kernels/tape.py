@@ -106,9 +106,9 @@ def compile_tape(trace: Trace, outputs: Sequence[Scalar], inputs: int) -> Tape:
             row = [_opcode(term), take(term), *[register[arg.index] for arg in term.args]]
             code.append(row + [0] * (8 - len(row)))
             imm.append([*term.k, *[0.0] * (4 - len(term.k))])
-        for arg in {a.index for a in term.args}:
-            if last[arg] == position and arg not in own:
-                free.append(register[arg])
+        for index in {arg.index for arg in term.args}:
+            if last[index] == position and index not in own:
+                free.append(register[index])
     return Tape(
         np.array(code, np.int64).reshape(-1, 8),
         np.array(imm, np.float64).reshape(-1, 4),

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..direct import poses_of, roots, tolerance
 from ..errors import NoMethodError, PoseError
 from ..kernels.batch import run_checked
 from ..kernels.intervals import IntervalProgram
@@ -14,7 +15,6 @@ from ..model.algebra import Trace, derivative
 from ..model.legs.lambda_ import Lambda
 from ..model.structure import CentralLeg, Free
 from .boxes import isolated
-from ..direct import poses_of, roots, tolerance
 from .planar import planar_poses
 
 if TYPE_CHECKING:
@@ -32,7 +32,7 @@ def assemblies(machine: Machine, joints: ArrayLike) -> Array:
     """
     rows, lead = machine.rows(joints, machine.joints, "joints")
     if lead != ():
-        raise PoseError(f"joints: one joint vector ({len(machine.joints)},) expected, not {(*lead, len(machine.joints))}")
+        raise PoseError(f"joints: one vector ({len(machine.joints)},) expected, not {(*lead, len(machine.joints))}")
     if not (np.isfinite(rows).all() and (rows >= machine.model.least_joints).all()):
         return np.empty((0, len(machine.axes)))
     model = machine.model
@@ -45,7 +45,9 @@ def assemblies(machine: Machine, joints: ArrayLike) -> Array:
     elif isinstance(model.structure, Free) and _parallel_lambdas(machine):
         coordinates = _lambdas(machine, rows)
     else:
-        raise NoMethodError(f"{machine.name}: no complete method for all its assemblies; forward(near=...) finds single ones")
+        raise NoMethodError(
+            f"{machine.name}: no complete method for all its assemblies; forward(near=...) finds single ones"
+        )
     given = np.ascontiguousarray(np.broadcast_to(rows, (len(coordinates), rows.shape[1])))
     good = roots(machine, coordinates, given, most=0, poses=False).residual <= tolerance(machine)
     coordinates, given = coordinates[good], given[good]
@@ -169,13 +171,14 @@ def _lambdas(machine: Machine, rows: Array) -> Array:
         for x, y, turn in planar_poses(feet @ side.T, distances, flat):
             spin = _about(axis, turn)
             origin = side.T @ np.array([x, y]) + height * axis
-            found.append(np.array(structure.coordinates_of(spin @ tilt, origin)))
+            found.append(np.array(structure.coordinates_of((spin @ tilt).tolist(), origin.tolist())))
     return np.array(found).reshape(-1, 6)
 
 
 def _home_axis(machine: Machine, axis: Array) -> Array:
     rotation, _ = machine.model.structure.frame(machine.model.home)
-    return np.array(rotation, float).T @ axis
+    seen: Array = np.array(rotation, float).T @ axis
+    return seen
 
 
 def _about(axis: Array, angle: float) -> Array:

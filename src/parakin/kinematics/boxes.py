@@ -61,7 +61,8 @@ def _krawczyk(
     """Boxes cut down by c - Y·f(c) + (1 - Y·F'(X))·(X - c), and where that proves exactly one root."""
     n = low.shape[1]
     centre = 0.5 * (j_low + j_high)
-    regular = np.isfinite(centre).all((1, 2)) & (np.abs(np.linalg.det(np.where(np.isfinite(centre), centre, 0.0))) > 0.0)
+    finite = np.isfinite(centre).all((1, 2))
+    regular = finite & (np.linalg.det(np.where(finite[:, None, None], centre, 0.0)) != 0.0)
     y = np.zeros_like(centre)
     y[regular] = np.linalg.inv(centre[regular])
     radius = 0.5 * (j_high - j_low)

@@ -57,7 +57,8 @@ def _eliminant(angle: Array, centres: Array, radii: Array, corners: Array) -> Ar
     x = a * v[..., 1] - b * u[..., 1]  # p·det
     y = b * u[..., 0] - a * v[..., 0]
     first = m[..., 0, :]
-    return x * x + y * y - 2.0 * det * (x * first[..., 0] + y * first[..., 1]) + det * det * k[..., 0]
+    value: Array = x * x + y * y - 2.0 * det * (x * first[..., 0] + y * first[..., 1]) + det * det * k[..., 0]
+    return value
 
 
 def _places(angle: float, centres: Array, radii: Array, corners: Array) -> list[Array]:

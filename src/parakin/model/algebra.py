@@ -128,7 +128,7 @@ def _sum(x: Term, y: Scalar, sign: float) -> Scalar:
     if not terms:
         return const
     trace = x.trace
-    if len(terms) > 3:  # too wide for one operation: keep both sides as they stand
+    if len(terms) > 3 and isinstance(y, Term):  # too wide for one operation: keep both sides as they stand
         return trace.node(LIN, (x, y), (0.0, 1.0, sign))
     if const == 0.0 and len(terms) == 1:  # a bare multiple, so that it cancels against others and products absorb it
         return _scaled(terms[0][1], terms[0][0])

@@ -23,7 +23,7 @@ def common_point(
         i, j = plane
         out = 3 - i - j
         across: Vec = tuple(1.0 if c == out else 0.0 for c in range(3))
-        u = tuple(0.0 if c == out else x for c, x in enumerate(sub(centres[1], first)))
+        u: Vec = tuple(0.0 if c == out else x for c, x in enumerate(sub(centres[1], first)))
         normal = cross(across, u)
         size = dot(normal, normal)
         a = 0.5 * (radii[0] * radii[0] - radii[1] * radii[1] + size)

@@ -14,7 +14,6 @@ from dataclasses import dataclass
 from ..errors import ParakinError
 from .algebra import (
     IDENTITY,
-    ORIGIN,
     Mat,
     Scalar,
     Vec,
@@ -254,9 +253,10 @@ class CentralLeg(FiveAxis):
         change = sub(axes[1], axes[0])
         length = -float(dot(sub(tips[1], tips[0]), change) / dot(change, change))
         centres = [along(tip, k, length) for tip, k in zip(tips, axes, strict=True)]
-        if max(norm(sub(c, (0.0, 0.0, centres[0][2]))) for c in centres) > 1e-9 * (1.0 + abs(length) + abs(centres[0][2])):
+        height = centres[0][2]
+        if max(norm(sub(c, (0.0, 0.0, height))) for c in centres) > 1e-9 * (1.0 + abs(length) + abs(height)):
             raise ParakinError("head: its axes must meet in one point of the central leg, on the tool's axis")
-        return float(centres[0][2]), length
+        return float(height), length
 
     def _centre(self, pose: Sequence[Scalar]) -> Vec:
         k, _, _ = tool_axis(pose[3], pose[4])
@@ -317,7 +317,7 @@ def structure_of(spec: Spec) -> Structure:
     """The structure of a machine, or a :class:`ParakinError` that says why it is none."""
     twice = [bound.name for bound in spec.limits.passive if spec.motion.count(bound.name) > 1]
     if twice:
-        raise ParakinError(f"limits: passive {twice[0]} is not one coordinate, for {twice[0]} stands twice in the motion")
+        raise ParakinError(f"limits: passive {twice[0]} stands twice in the motion, so it is not one coordinate")
     driven = sum(step.drive is not None for step in (*spec.head, *spec.table))
     if spec.motion[0] in ROTATIONS:
         return CentralLeg(spec)

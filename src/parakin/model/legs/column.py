@@ -1,4 +1,4 @@
-"""``column``: a carriage on a circular rail with a vertical slide, and a link in the column's radial plane (Eclipse)."""
+"""``column``: a carriage on a circular rail, a vertical slide on it, and a link in its radial plane (Eclipse)."""
 
 from __future__ import annotations
 

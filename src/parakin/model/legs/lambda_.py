@@ -57,7 +57,7 @@ class Lambda(Leg):
         return [(start, point), (along(self.foot, self.rail, joints[1]), hinge)]
 
     def height_and_distance(self, joints: list[Scalar]) -> tuple[Scalar, Scalar]:
-        """Of the platform's joint: how far along the rail, and how far from it, mm; closed form, for the direct problem.
+        """Of the platform's joint: how far along the rail, and how far from it, mm: the direct problem's closed form.
 
         The short rod's triangle has the sides gap, lower part of the long rod and short rod.
         """

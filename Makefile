@@ -1,0 +1,38 @@
+# make demo: set up and run the example part. make test: set up and pass the tests.
+PYTHON ?= python3
+BIN := .venv/bin
+
+.PHONY: demo test lint bench pictures clean
+
+demo: .venv/installed
+	$(BIN)/python examples/turbine_blade.py -o out
+	$(BIN)/parakin post out/turbine_blade.aptsource --machine tricept -o out
+
+test: .venv/developing lint
+	$(BIN)/python -m pytest -n 2
+
+lint: .venv/developing
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy
+
+bench: .venv/developing
+	$(BIN)/python benchmarks/run.py
+
+pictures: .venv/installed
+	$(BIN)/python examples/pictures.py -o docs/pictures
+
+.venv/installed: pyproject.toml
+	$(PYTHON) -c "import sys; sys.exit('parakin needs Python 3.11 to 3.13, not ' + sys.version.split()[0]) if not (3, 11) <= sys.version_info[:2] <= (3, 13) else None"
+	$(PYTHON) -m venv .venv
+	$(BIN)/python -m pip install --quiet --upgrade pip
+	$(BIN)/python -m pip install --quiet --editable .
+	touch $@
+
+.venv/developing: .venv/installed
+	$(BIN)/python -m pip install --quiet --editable ".[dev]"
+	touch $@
+
+clean:
+	rm -rf .venv out .mypy_cache .pytest_cache .ruff_cache .hypothesis
+	find . -name __pycache__ -type d -prune -exec rm -rf {} +

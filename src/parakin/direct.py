@@ -16,6 +16,7 @@ if TYPE_CHECKING:
 
 GOOD = 1e-9  # greatest closure error of an answer, mm in a machine of a metre
 MOST_STEPS = 24
+FREE = 1e-9  # rad: a tool that leans less has no C of its own, only rounding's
 CONTINUATIONS = (8, 64)  # parts of the way from a known pose, where Newton's method in one go fails
 
 
@@ -23,7 +24,7 @@ CONTINUATIONS = (8, 64)  # parts of the way from a known pose, where Newton's me
 class Solution:
     """Poses with what is known of them; all have the joints' leading shape.
 
-    poses : (..., axes), NaN where not converged
+    poses : (..., axes), NaN where not converged; C of an upright tool is the near pose's, else 0
     residual : (...,) the greatest distance by which a leg fails to close there, mm
     converged : (...,) True where the legs close and the pose is of the same assembly mode as the start
     steps : (...,) Newton's steps; 0 in closed form
@@ -57,7 +58,7 @@ def forward(machine: Machine, joints: ArrayLike, near: ArrayLike | None = None, 
             starts = start_rows
         else:
             try:
-                wide = np.broadcast_to(start_rows.reshape(*start_lead, -1), (*lead, len(machine.axes)))
+                wide = np.broadcast_to(start_rows.reshape(*start_lead, len(machine.axes)), (*lead, len(machine.axes)))
             except ValueError:
                 raise PoseError(f"near: shape {(*lead, len(machine.axes))} expected, not {np.shape(near)}") from None
             starts = np.ascontiguousarray(wide.reshape(-1, len(machine.axes)))
@@ -75,8 +76,11 @@ def forward(machine: Machine, joints: ArrayLike, near: ArrayLike | None = None, 
     converged &= (rows >= machine.model.least_joints).all(1)
     if not converged.all():
         poses[~converged] = np.nan
+    if machine.axes[3:] == ("B", "C"):
+        upright = poses[:, 3] < FREE
+        poses[upright, 4] = 0.0 if starts is None else starts[upright, 4]
     return Solution(
-        poses.reshape(*lead, -1), residual.reshape(lead)[()], converged.reshape(lead)[()], steps.reshape(lead)[()]
+        poses.reshape(*lead, len(machine.axes)), residual.reshape(lead)[()], converged.reshape(lead)[()], steps.reshape(lead)[()]
     )
 
 

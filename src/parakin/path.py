@@ -48,6 +48,9 @@ def neighbours(values: Array, free: NDArray[np.bool_]) -> Array:
 
 def unwound(angles: Array) -> Array:
     """Angles without jumps over ±180°; NaN stays where it is and does not spread."""
+    with np.errstate(invalid="ignore"):
+        if not (np.abs(np.diff(angles)) > np.pi).any() and not np.isnan(angles).any():
+            return angles
     result = angles.copy()
     finite = np.isfinite(angles)
     result[finite] = np.unwrap(angles[finite])

@@ -27,7 +27,9 @@ def scaled(a: Bounds, k: float) -> Bounds:
 
 
 def times(a: Bounds, b: Bounds) -> Bounds:
-    corners = (a[0] * b[0], a[0] * b[1], a[1] * b[0], a[1] * b[1])
+    with np.errstate(invalid="ignore", over="ignore"):
+        products = (a[0] * b[0], a[0] * b[1], a[1] * b[0], a[1] * b[1])
+    corners = [np.where(np.isnan(corner), 0.0, corner) for corner in products]  # 0·∞: an end is never reached
     return _out(np.minimum.reduce(corners), np.maximum.reduce(corners))
 
 

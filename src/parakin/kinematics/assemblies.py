@@ -20,6 +20,8 @@ from .planar import planar_poses
 if TYPE_CHECKING:
     from ..machine import Array, Machine
 
+NONE_SO_LONG = 1e8  # mm; machine files take lengths up to 1e6
+
 
 def assemblies(machine: Machine, joints: ArrayLike) -> Array:
     """Every real pose for one joint vector (joints,), as rows (k, axes); k may be 0.
@@ -33,7 +35,7 @@ def assemblies(machine: Machine, joints: ArrayLike) -> Array:
     rows, lead = machine.rows(joints, machine.joints, "joints")
     if lead != ():
         raise PoseError(f"joints: one vector ({len(machine.joints)},) expected, not {(*lead, len(machine.joints))}")
-    if not (np.isfinite(rows).all() and (rows >= machine.model.least_joints).all()):
+    if not ((np.abs(rows) < NONE_SO_LONG).all() and (rows >= machine.model.least_joints).all()):
         return np.empty((0, len(machine.axes)))
     model = machine.model
     if model.by_spheres:

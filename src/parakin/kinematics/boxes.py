@@ -32,7 +32,7 @@ def isolated(program: IntervalProgram, low: Array, high: Array) -> Array:
         if len(lows) > MOST:
             raise NoMethodError("the assemblies can't be told apart here: the legs leave the platform free to move")
         f_low, f_high = program(lows, highs)
-        alive = ((f_low[:, :n] <= 0.0) & (f_high[:, :n] >= 0.0)).all(1)
+        alive = ~((f_low[:, :n] > 0.0) | (f_high[:, :n] < 0.0)).any(1)
         lows, highs = lows[alive], highs[alive]
         j_low, j_high = (b[alive][:, n:].reshape(-1, n, n) for b in (f_low, f_high))
         middle = 0.5 * (lows + highs)
@@ -61,7 +61,7 @@ def _krawczyk(
     """Boxes cut down by c - Y·f(c) + (1 - Y·F'(X))·(X - c), and where that proves exactly one root."""
     n = low.shape[1]
     centre = 0.5 * (j_low + j_high)
-    finite = np.isfinite(centre).all((1, 2))
+    finite: NDArray[np.bool_] = np.asarray(np.isfinite(centre).all((1, 2)))
     regular = finite & (np.linalg.det(np.where(finite[:, None, None], centre, 0.0)) != 0.0)
     y = np.zeros_like(centre)
     y[regular] = np.linalg.inv(centre[regular])

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 _SAMPLES = 16  # the polynomial has harmonics up to the fourth (which cancels), so nine would do
-_STEPS = 12
+_STEPS, _IDLE = 50, 4
 
 
 def planar_poses(centres: Array, radii: Array, corners: Array) -> Array:
@@ -33,10 +33,10 @@ def planar_poses(centres: Array, radii: Array, corners: Array) -> Array:
     # A double root leaves the unit circle by the root of the rounding; the polishing below decides.
     angles = np.angle(z[np.abs(np.abs(z) - 1.0) < 1e-2])
     starts = [start for angle in angles for start in _places(angle, centres, radii, corners)]
+    polished = [_polished(start, centres, radii, corners) for start in starts]
     found: list[Array] = []
-    for start in starts:
-        pose = _polished(start, centres, radii, corners, size)
-        if pose is not None and not any(_same(pose, other, size) for other in found):
+    for error, pose in sorted(polished, key=lambda item: item[0]):  # of equal ones the best closed
+        if error < 1e-11 * size and not any(_same(pose, other, size) for other in found):
             found.append(pose)
     return np.array(sorted(found, key=lambda p: (p[2], p[0], p[1]))).reshape(-1, 3)
 
@@ -78,18 +78,22 @@ def _places(angle: float, centres: Array, radii: Array, corners: Array) -> list[
     return starts
 
 
-def _polished(pose: Array, centres: Array, radii: Array, corners: Array, size: float) -> Array | None:
+def _polished(pose: Array, centres: Array, radii: Array, corners: Array) -> tuple[float, Array]:
+    """Greatest error of a radius, mm, and the pose, by Newton's method until it gains no more; the best pose met."""
+    best, least, idle = pose, np.inf, 0
     for _ in range(_STEPS):
         arms = _turned(pose[2], corners)
         rods = pose[:2] + arms - centres
         f = 0.5 * ((rods * rods).sum(1) - radii**2)
+        error = float(np.abs(np.linalg.norm(rods, axis=1) - np.abs(radii)).max())
+        idle = 0 if error < 0.5 * least else idle + 1
+        if error < least:
+            best, least = pose, error
+        if idle > _IDLE:
+            break
         jacobian = np.column_stack([rods, rods[:, 1] * arms[:, 0] - rods[:, 0] * arms[:, 1]])
-        step = np.linalg.lstsq(jacobian, f, rcond=1e-13)[0]
-        pose = pose - step
-    error = np.abs(np.linalg.norm(pose[:2] + _turned(pose[2], corners) - centres, axis=1) - np.abs(radii)).max()
-    if not error < 1e-11 * size:
-        return None
-    return np.array([pose[0], pose[1], np.pi - (np.pi - pose[2]) % (2.0 * np.pi)])
+        pose = pose - np.linalg.lstsq(jacobian, f, rcond=1e-13)[0]
+    return least, np.array([best[0], best[1], np.pi - (np.pi - best[2]) % (2.0 * np.pi)])
 
 
 def _same(a: Array, b: Array, size: float) -> bool:

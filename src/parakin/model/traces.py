@@ -99,14 +99,14 @@ class Model:
 
     @cached_property
     def sizes(self) -> list[float]:
-        """A length a closure, mm: dividing by it makes a closure the distance by which the leg fails to close."""
+        """A length a closure, mm: dividing by it makes a closure no less than the distance by which the leg stays open."""
         joints, placed, _ = self.invert(self.home, self.mode)
         points = platform_points(self.spec, placed.rotation, placed.origin)
         given = leg_joints(self.spec, joints)
         sizes = []
         for leg, point, q in zip(self.spec.legs, points, given, strict=True):
             foot, end = leg.struts(point, q)[0]
-            sizes += [float(norm(sub(end, foot)))] * len(leg.drives)
+            sizes += [leg.size(float(norm(sub(end, foot))))] * len(leg.drives)
         return sizes
 
     @cached_property

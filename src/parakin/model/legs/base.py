@@ -47,6 +47,10 @@ class Leg(ABC):
     def struts(self, point: Vec, joints: list[Scalar]) -> list[tuple[Vec, Vec]]:
         """Both ends of each strut, base frame, the foot's end first; the strut to the platform comes first."""
 
+    def size(self, at_home: float) -> float:
+        """A length, mm, that the leg (``at_home`` at home) seldom falls below: it turns closures into distances."""
+        return at_home
+
     def sphere(self, joints: list[Scalar]) -> tuple[Vec, Scalar] | None:
         """Centre and radius of the sphere on which the platform's joint lies; None if the leg holds it otherwise."""
         return None

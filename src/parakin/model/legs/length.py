@@ -27,5 +27,8 @@ class Length(Leg):
     def struts(self, point: Vec, joints: list[Scalar]) -> list[tuple[Vec, Vec]]:
         return [(self.foot, point)]
 
+    def size(self, at_home: float) -> float:
+        return max(0.25 * at_home, min(self.drives[0].low, at_home))
+
     def sphere(self, joints: list[Scalar]) -> tuple[Vec, Scalar]:
         return self.foot, joints[0]

@@ -1,0 +1,119 @@
+"""Rows of numbers from a CSV file: a header is optional, its names are matched."""
+
+from __future__ import annotations
+
+import csv
+import math
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import TextIO
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import InputError
+from ..quantities import ANGLE, LENGTH, UNITS, nearest, shown
+from ..toolpath.cl_words import LARGEST
+
+
+def read_rows(path: Path, names: Sequence[str], units: Sequence[str]) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    """Values (n, names) in mm and rad, and each row's line.
+
+    Without a header there is a column for each name, in mm and degrees. A header's cells are names, in any order and
+    case, with an optional unit: ``X [mm]``; columns by other names are left alone.
+
+    Raises :class:`InputError` with file and line.
+    """
+    source = str(path)
+    try:
+        with path.open(encoding="utf-8-sig", newline="") as file:
+            return _read(file, source, names, units)
+    except OSError as error:
+        raise InputError(f"cannot be read: {error.strerror}", source) from error
+    except UnicodeDecodeError:
+        raise InputError("not a text file in UTF-8", source) from None
+
+
+def _read(
+    file: TextIO, source: str, names: Sequence[str], units: Sequence[str]
+) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    columns: list[tuple[str, int, float]] = []
+    values: list[list[float]] = []
+    lines: list[int] = []
+    width = 0
+    for line, cells in _filled(file, source):
+        if not columns:
+            header = not any(_is_number(cell) for cell in cells)
+            columns = _matched(cells, names, units, source, line) if header else _plain(names, units)
+            width = len(cells) if header else len(names)
+            if header:
+                continue
+        if len(cells) != width:
+            raise InputError(f"{len(cells)} value{'s' * (len(cells) != 1)}, expected {width}", source, line)
+        values.append([_value(cells[index], factor, name, source, line) for name, index, factor in columns])
+        lines.append(line)
+    if not values:
+        raise InputError(f"no rows, expected {', '.join(names)}", source)
+    return np.array(values), np.array(lines)
+
+
+def _filled(file: TextIO, source: str) -> Iterator[tuple[int, list[str]]]:
+    reader = csv.reader(file)
+    try:
+        for cells in reader:
+            if any(cell.strip() for cell in cells):
+                yield reader.line_num, cells
+    except csv.Error as error:
+        raise InputError(f"not a CSV file ({error})", source, reader.line_num) from None
+
+
+def _plain(names: Sequence[str], units: Sequence[str]) -> list[tuple[str, int, float]]:
+    return [(name, i, _factor(unit)) for i, (name, unit) in enumerate(zip(names, units, strict=True))]
+
+
+def _factor(unit: str) -> float:
+    return math.radians(1.0) if unit == "rad" else 1.0
+
+
+def _matched(
+    cells: Sequence[str], names: Sequence[str], units: Sequence[str], source: str, line: int
+) -> list[tuple[str, int, float]]:
+    places: dict[str, tuple[int, str]] = {}
+    for index, cell in enumerate(cells):
+        word, _, unit = cell.strip().removesuffix("]").partition("[")
+        key = word.strip().lower()
+        if key in places and key in (name.lower() for name in names):
+            raise InputError(f"column {shown(word.strip())} is there twice", source, line)
+        places[key] = index, unit.strip()
+    columns = []
+    for name, unit in zip(names, units, strict=True):
+        if name.lower() not in places:
+            raise InputError(f"no column {name}{nearest(name, [])}, expected {', '.join(names)}", source, line)
+        index, given = places[name.lower()]
+        kind = ANGLE if unit == "rad" else LENGTH
+        factor = _factor(unit)
+        if given:
+            factor, dimension = UNITS.get(given, (0.0, ()))
+            if dimension != kind.dimension:
+                raise InputError(f"column {name}: unit {shown(given)}, expected one of {kind.units}", source, line)
+        columns.append((name, index, factor))
+    return columns
+
+
+def _is_number(cell: str) -> bool:
+    try:
+        float(cell)
+    except ValueError:
+        return False
+    return True
+
+
+def _value(cell: str, factor: float, name: str, source: str, line: int) -> float:
+    try:
+        value = float(cell)
+    except ValueError:
+        what = shown(cell.strip()) if cell.strip() else "nothing"
+        raise InputError(f"{name}: {what}, expected a number", source, line) from None
+    if not abs(value) <= LARGEST:
+        raise InputError(f"{name}: {shown(cell.strip())} is out of range", source, line)
+    return value * factor

@@ -1,0 +1,124 @@
+"""Interactive figures for HTML pages that need no network: plotly's own JSON, written without its Python classes.
+
+The classes take a second to import and check what is constant here; the browser's library is all that is needed.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable
+from html import escape
+from importlib.resources import files
+from string import Template
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from .scene import Points, Scene
+from .solids import LOOKS, Solid, solids
+
+Figure = dict[str, Any]  # plotly's {"data": [traces], "layout": {...}}
+Trace = dict[str, Any]
+
+FONT = {"family": "system-ui, -apple-system, 'Segoe UI', Roboto, 'Helvetica Neue', Arial, sans-serif", "size": 13}
+INK, FAINT = "#263238", "#e3e8ec"
+_LIGHT = {"ambient": 0.62, "diffuse": 0.75, "specular": 0.15, "roughness": 0.6}
+
+
+def numbers(values: ArrayLike, digits: int = 3) -> list[float | None]:
+    """Rounded numbers for JSON, with None for NaN and infinity: plotly leaves a gap there."""
+    array = np.round(np.asarray(values, float).ravel(), digits) + 0.0
+    return [v if ok else None for v, ok in zip(array.tolist(), np.isfinite(array).tolist(), strict=True)]
+
+
+def page(title: str, body: str) -> str:
+    """A whole HTML page around a body that may hold :func:`placed` figures; ``body`` is HTML, ``title`` is text."""
+    template = Template(files(__package__).joinpath("report.html").read_text("utf-8"))
+    script = files("plotly").joinpath("package_data", "plotly.min.js").read_text("utf-8")
+    return template.substitute(title=escape(title), body=body, plotly=script)
+
+
+def placed(name: str, figure: Figure, height: str) -> str:
+    """HTML of a figure; ``height`` is a CSS length."""
+    # Within a script element only "<" could end or open anything.
+    data = json.dumps(figure, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c")
+    return (
+        f'<div id="{name}" class="figure" style="height:{height}"></div>\n'
+        f'<script type="application/json" data-figure="{name}">{data}</script>\n'
+    )
+
+
+def machine_traces(scene: Scene, name: str, scale: float, colour: str | None = None) -> list[Trace]:
+    """A machine as meshes, one a colour; one entry of the legend, ``name``, shows and hides them all.
+
+    ``colour`` draws it as a shadow of itself in that one colour.
+    """
+    by_kind: dict[str, list[Solid]] = {}
+    for solid in solids(scene, scale):
+        by_kind.setdefault(solid.kind if colour is None else "shadow", []).append(solid)
+    traces = []
+    for number, (kind, group) in enumerate(by_kind.items()):
+        first = np.cumsum([0, *[len(solid.vertices) for solid in group[:-1]]])
+        x, y, z = np.vstack([solid.vertices for solid in group]).T
+        i, j, k = np.vstack([solid.triangles + start for solid, start in zip(group, first, strict=True)]).T
+        trace = {"type": "mesh3d", "x": numbers(x, 1), "y": numbers(y, 1), "z": numbers(z, 1)}
+        trace |= {"i": i.tolist(), "j": j.tolist(), "k": k.tolist(), "hoverinfo": "skip", "lighting": _LIGHT}
+        trace["lightposition"] = {"x": 4e4, "y": -8e4, "z": 9e4}
+        trace |= {"color": colour or LOOKS[kind].colour, "opacity": 1.0 if colour is None else 0.22}
+        trace |= {"name": name, "legendgroup": name, "showlegend": number == 0, "flatshading": False}
+        traces.append(trace)
+    return traces
+
+
+def label_trace(scene: Scene, name: str) -> Trace:
+    """The drives' names at their places."""
+    x, y, z = np.array([place for _, place in scene.labels]).T
+    trace = {"type": "scatter3d", "mode": "text", "x": numbers(x, 1), "y": numbers(y, 1), "z": numbers(z, 1)}
+    trace |= {"text": [escape(text) for text, _ in scene.labels], "textfont": {"size": 13, "color": INK}}
+    return trace | {"textposition": "top right", "hoverinfo": "skip", "legendgroup": name, "showlegend": False}
+
+
+def frame_traces(frame: Points, size: float, text: str, group: str) -> list[Trace]:
+    """The axes of a frame: X red, Y green, Z blue, with their letters; ``text`` names the frame at its origin."""
+    traces = []
+    for letter, axis, colour in zip("XYZ", frame[:, :3].T, ("#c62828", "#2e7d32", "#1565c0"), strict=True):
+        x, y, z = np.array([frame[:, 3], frame[:, 3] + size * axis]).T
+        trace = {"type": "scatter3d", "mode": "lines+text", "x": numbers(x, 1), "y": numbers(y, 1), "z": numbers(z, 1)}
+        trace |= {"text": [text if letter == "X" else "", letter], "textfont": {"size": 12, "color": colour}}
+        trace |= {"line": {"color": colour, "width": 4}, "hoverinfo": "skip", "showlegend": False, "legendgroup": group}
+        traces.append(trace)
+    return traces
+
+
+def scene_layout(boxes: Iterable[Points], normal: Points | None) -> Figure:
+    """Layout of a 3D figure around (2, 3) boxes, with equal scales; a planar machine is seen straight on."""
+    corners = np.vstack(list(boxes))
+    low, high = corners.min(0), corners.max(0)
+    pad = 0.09 * float(np.linalg.norm(high - low)) + 1.0
+    spans = high - low + 2.0 * pad
+    axes = {}
+    for number, letter in enumerate("XYZ"):
+        axis: Figure = {"title": {"text": f"{letter} [mm]", "font": {"size": 12}}, "gridcolor": FAINT, "zerolinecolor": "#c3ccd3"}
+        axis |= {"showbackground": False, "showspikes": False, "tickfont": {"size": 11, "color": "#607d8b"}}
+        axis |= {"range": [float(low[number] - pad), float(high[number] + pad)], "tickformat": ",.0f", "nticks": 7}
+        if normal is not None and abs(normal[number]) > 0.999:
+            axis["visible"] = False
+        axes[f"{letter.lower()}axis"] = axis
+    camera: Figure = {"eye": {"x": 0.95, "y": -1.35, "z": 0.45}}
+    if normal is not None:
+        eye = np.sign(normal.sum()) * normal * (1.0 if abs(normal[1]) < 0.5 else -1.0)  # XZ is seen from -Y
+        camera = {"eye": dict(zip("xyz", (1.6 * eye).tolist(), strict=True)), "projection": {"type": "orthographic"}}
+        camera["up"] = {"x": 0, "y": 1, "z": 0} if abs(normal[2]) > 0.5 else {"x": 0, "y": 0, "z": 1}
+    # Equal scales, as aspectmode "data" gives, but of a size that fills the view and no more.
+    ratio = dict(zip("xyz", (spans * (_filling(spans) if normal is None else 1.25 / spans.max())).tolist(), strict=True))
+    scene = {"aspectmode": "manual", "aspectratio": ratio, "camera": camera, "dragmode": "orbit", **axes}
+    legend = {"orientation": "h", "x": 0.0, "y": 1.0, "yanchor": "bottom", "itemsizing": "constant"}
+    layout = {"scene": scene, "margin": {"l": 0, "r": 0, "t": 0, "b": 0}, "legend": legend, "paper_bgcolor": "#fff"}
+    return layout | {"font": {**FONT, "color": INK}, "modebar": {"orientation": "v"}}
+
+
+def _filling(spans: Points) -> float:
+    """The scale at which a box of these sides fills the view from the front right."""
+    across, up = 0.82 * spans[0] + 0.58 * spans[1], spans[2] + 0.2 * (spans[0] + spans[1])
+    return float(1.6 / max(across, up))

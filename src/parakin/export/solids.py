@@ -1,0 +1,147 @@
+"""The solids that stand for a machine's parts in its pictures: bars, plates and balls as triangle meshes."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from math import ceil, inf
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .scene import Kind, Part, Points, Scene
+
+_SIDES = 14
+
+
+class Solid(NamedTuple):
+    """A mesh of one colour: vertices (v, 3) in mm, triangles (t, 3) of their indices."""
+
+    kind: str
+    name: str
+    vertices: Points
+    triangles: NDArray[np.int64]
+
+
+class Look(NamedTuple):
+    """How a kind of part is drawn: colour, and thickness (a bar's radius, a plate's half) over the scene's size."""
+
+    colour: str
+    radius: float
+
+
+LOOKS: dict[str, Look] = {
+    "base": Look("#5b6670", 0.0055),
+    "rail": Look("#aab4bd", 0.0045),
+    "telescope": Look("#2f6fb3", 0.0105),
+    "piston": Look("#c9d3dc", 0.0060),
+    "rod": Look("#2f6fb3", 0.0060),
+    "arm": Look("#4c9a8b", 0.0060),
+    "carriage": Look("#37474f", 0.0125),
+    "joint": Look("#37474f", 0.0085),
+    "platform": Look("#e0912f", 0.0070),
+    "central": Look("#8b98a4", 0.0075),
+    "head": Look("#e0912f", 0.0110),
+    "tool": Look("#b3372f", 0.0050),
+    "table": Look("#c3ad84", 0.0060),
+    "axis": Look("#8a7a5c", 0.0075),
+}
+
+
+def solids(scene: Scene, scale: float | None = None, piece: float = inf) -> Iterator[Solid]:
+    """All meshes of a scene.
+
+    Parameters
+    ----------
+    scale : the size that thicknesses go by, mm; the scene's own by default
+    piece : bars are cut into lengths of at most this, mm, for a renderer that sorts faces by their middles
+    """
+    size = scene.size if scale is None else scale
+    for part in scene.parts:
+        yield from _part(part, size, piece)
+
+
+def _part(part: Part, size: float, piece: float) -> Iterator[Solid]:
+    radius = LOOKS[part.kind].radius * size
+    points = part.points
+    if part.kind in ("platform", "table") and part.closed:
+        yield _plate(part.kind, part.name, points, radius)
+    elif len(points) == 1:
+        yield _ball(part.kind, part.name, points[0], 2.0 * radius)
+    else:
+        ends = np.vstack([points, points[:1]]) if part.closed else points
+        bars = list(zip(ends, ends[1:], strict=False))
+        for a, b in bars:
+            yield from _link(part.kind, part.name, a, b, size, piece)
+        if len(bars) > 1 and part.kind != "rail":
+            for corner in points:
+                yield _ball(part.kind, part.name, corner, radius)
+    if part.kind in ("telescope", "rod", "arm"):
+        foot: Kind | str = "carriage" if part.kind != "telescope" else "joint"
+        yield _ball(foot, part.name, points[0], LOOKS[foot].radius * size)
+        yield _ball("joint", part.name, points[1], LOOKS["joint"].radius * size)
+
+
+def _link(kind: str, name: str, a: Points, b: Points, size: float, piece: float) -> Iterator[Solid]:
+    radius = LOOKS[kind].radius * size
+    if kind == "tool":
+        yield _bar(kind, name, a, b, radius, piece, 0.25 * radius)
+    elif kind == "telescope":
+        middle = a + 0.58 * (b - a)
+        yield _bar(kind, name, a, middle, radius, piece)
+        yield _bar("piston", name, middle, b, LOOKS["piston"].radius * size, piece)
+    else:
+        yield _bar(kind, name, a, b, radius, piece)
+
+
+def _bar(kind: str, name: str, a: Points, b: Points, radius: float, piece: float, end: float | None = None) -> Solid:
+    """A round bar from a to b, of another radius at its end if given, closed at both ends."""
+    along = b - a
+    length = float(np.linalg.norm(along))
+    if length == 0.0:
+        return _ball(kind, name, a, radius)
+    pieces = max(1, ceil(length / piece))
+    across = np.cross(along, np.eye(3)[np.abs(along).argmin()])
+    across /= np.linalg.norm(across)
+    other = np.cross(along / length, across)
+    turn = np.linspace(0.0, 2.0 * np.pi, _SIDES, endpoint=False)
+    circle = np.outer(np.cos(turn), across) + np.outer(np.sin(turn), other)
+    radii = np.linspace(radius, radius if end is None else end, pieces + 1)
+    rings = [a + t * along + r * circle for t, r in zip(np.linspace(0.0, 1.0, pieces + 1), radii, strict=True)]
+    return Solid(kind, name, np.vstack([*rings, a[None], b[None]]), _skin(pieces + 1, _SIDES))
+
+
+def _skin(rings: int, sides: int) -> NDArray[np.int64]:
+    """Triangles over rings of vertices, and over the fans to the two poles that follow them, outward."""
+    i = np.arange(sides)
+    j = (i + 1) % sides
+    faces = []
+    for ring in range(rings - 1):
+        low, high = ring * sides, (ring + 1) * sides
+        faces += [np.column_stack([low + i, low + j, high + j]), np.column_stack([low + i, high + j, high + i])]
+    first, last = rings * sides, rings * sides + 1
+    top = (rings - 1) * sides
+    faces += [np.column_stack([0 * i + first, j, i]), np.column_stack([0 * i + last, top + i, top + j])]
+    return np.vstack(faces)
+
+
+def _plate(kind: str, name: str, ring: Points, half: float) -> Solid:
+    """A plate over a ring of corners; its middle is the fan's pole, so the corners need not lie in one plane."""
+    off = ring - ring.mean(axis=0)
+    normal = np.linalg.svd(off)[2][2]
+    if np.cross(off[0], off[1]) @ normal < 0.0:
+        normal = -normal
+    up = half * normal
+    middle = ring.mean(axis=0)
+    return Solid(kind, name, np.vstack([ring - up, ring + up, middle - up, middle + up]), _skin(2, len(ring)))
+
+
+def _ball(kind: str, name: str, centre: Points, radius: float) -> Solid:
+    sides, rings = 12, 6
+    around = np.linspace(0.0, 2.0 * np.pi, sides, endpoint=False)
+    layers = []
+    for tilt in np.linspace(-np.pi / 2, np.pi / 2, rings + 2)[1:-1]:
+        flat = np.column_stack([np.cos(around), np.sin(around), 0.0 * around]) * np.cos(tilt)
+        layers.append(flat + [0.0, 0.0, np.sin(tilt)])
+    unit = np.vstack([*layers, [[0.0, 0.0, -1.0], [0.0, 0.0, 1.0]]])
+    return Solid(kind, name, centre + radius * unit, _skin(rings, sides))

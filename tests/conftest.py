@@ -1,0 +1,12 @@
+"""What all tests share: Hypothesis draws the same examples in every run, and takes the time it needs."""
+
+from hypothesis import HealthCheck, settings
+
+settings.register_profile(
+    "parakin",
+    deadline=None,
+    derandomize=True,
+    max_examples=40,
+    suppress_health_check=[HealthCheck.too_slow, HealthCheck.function_scoped_fixture],
+)
+settings.load_profile("parakin")

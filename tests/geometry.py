@@ -1,0 +1,158 @@
+"""The geometry of any machine by explicit 4 × 4 matrices, poses and joints to rods: nothing of the library's."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from independent import orientation, tool_axis, transform
+
+LETTERS = dict(zip(("tx", "ty", "tz", "rx", "ry", "rz"), "XYZABC", strict=True))
+
+
+@dataclass
+class Description:
+    """A machine in plain numbers. Steps are (word, value, joint or None, sign); legs are dictionaries."""
+
+    motion: tuple[str, ...]
+    legs: list[dict]
+    head: list[tuple] = field(default_factory=list)
+    table: list[tuple] = field(default_factory=list)
+    mounting: list[tuple] = field(default_factory=list)
+    limits: str = ""
+    home: np.ndarray | None = None  # pose, in the order of axes
+
+    @classmethod
+    def of(cls, spec):
+        """From a machine's specification, a plain record of its file."""
+        legs = [
+            {"kind": leg.kind, "joints": [d.name for d in leg.drives]}
+            | {k: v for k, v in vars(leg).items() if k != "drives"}
+            for leg in spec.legs
+        ]
+        steps = [[(s.axis, s.value, s.drive and s.drive.name, s.sign) for s in part]
+                 for part in (spec.head, spec.table, spec.mounting)]
+        return cls(tuple(spec.motion), legs, *steps)
+
+    @property
+    def serial(self):
+        return [step[2] for step in (*self.head, *self.table) if step[2]]
+
+    @property
+    def joints(self):
+        """Names: the legs' first joints, their second ones, head's and table's."""
+        firsts = [leg["joints"][0] for leg in self.legs]
+        return tuple(firsts + [leg["joints"][1] for leg in self.legs if len(leg["joints"]) > 1] + self.serial)
+
+    @property
+    def turns(self):
+        return [word for word in self.motion if word[0] == "r"]
+
+    @property
+    def axes(self):
+        if self.serial or self.motion[0][0] == "r":
+            return tuple("XYZBC")
+        return tuple(LETTERS[word] for word in LETTERS if word in self.motion)
+
+    def chain(self, steps, joints):
+        """Transform (N, 4, 4) along steps, for joints (N, joints)."""
+        result = np.broadcast_to(np.eye(4), (len(joints), 4, 4))
+        for word, value, name, sign in steps:
+            q = joints[:, self.joints.index(name)] * sign if name else np.zeros(len(joints))
+            result = result @ transform(word, value + q)
+        return result
+
+    def pose(self, platform, joints):
+        """Tool's poses (N, axes) in the workpiece for the platform's frames (N, 4, 4) in the base."""
+        table, mount, head = (self.chain(steps, joints) for steps in (self.table, self.mounting, self.head))
+        w = np.linalg.inv(table) @ mount @ platform @ head
+        if self.serial or self.motion[0][0] == "r":
+            k = w[:, :3, 2]
+            angles = {"B": np.arctan2(np.hypot(k[:, 0], k[:, 1]), k[:, 2]), "C": np.arctan2(k[:, 1], k[:, 0])}
+        elif len(self.turns) == 3:
+            r = w[:, :3, :3]
+            b = np.arctan2(-r[:, 2, 0], np.hypot(r[:, 0, 0], r[:, 1, 0]))
+            angles = {"A": np.arctan2(r[:, 2, 1], r[:, 2, 2]), "B": b, "C": np.arctan2(r[:, 1, 0], r[:, 0, 0])}
+        else:
+            i = ["rx", "ry", "rz"].index(self.turns[0]) if self.turns else 0
+            j, k = (i + 1) % 3, (i + 2) % 3
+            angles = {"ABC"[i]: np.arctan2(platform[:, k, j], platform[:, j, j])}
+        values = dict(zip("XYZ", w[:, :3, 3].T, strict=True)) | angles
+        return np.stack([values[axis] for axis in self.axes], -1)
+
+    def platform(self, poses, joints):
+        """The platform's frames (N, 4, 4) for poses and joints, and by how much the tool's axis misses (N,)."""
+        given = dict(zip(self.axes, poses.T, strict=True))
+        zero = np.zeros(len(poses))
+        table, mount, head = (self.chain(steps, joints) for steps in (self.table, self.mounting, self.head))
+        tip = np.stack([*(given.get(x, zero) for x in "XYZ"), zero + 1.0], -1)[..., None]
+        tip = (np.linalg.inv(mount) @ table @ tip)[:, :3, 0]
+        frame = np.broadcast_to(np.eye(4), (len(poses), 4, 4)).copy()
+        missed = zero
+        rotation = orientation(*(given.get(x, zero) for x in "ABC"))
+        if len(self.turns) == 3 and not self.serial:
+            rotation = mount[:, :3, :3].transpose(0, 2, 1) @ rotation @ head[:, :3, :3].transpose(0, 2, 1)
+        elif self.serial:
+            k = np.einsum("nji,njk,nk->ni", mount[:, :3, :3], table[:, :3, :3], tool_axis(given["B"], given["C"]))
+            rotation, missed = self._led(tip, k, head)
+        frame[:, :3, :3] = rotation
+        frame[:, :3, 3] = tip - np.einsum("nij,nj->ni", rotation, head[:, :3, 3])
+        planar = [i for i, word in enumerate(("tx", "ty", "tz")) if word not in self.motion]
+        if self.motion[0][0] == "t":
+            frame[:, planar, 3] = 0.0
+        return frame, missed
+
+    def _led(self, tip, k, head):
+        """Platform's rotation under a driven head: none, or that of the central leg through the wrist's centre."""
+        along = head[:, :3, 2]
+        if self.motion[0][0] == "t":
+            return np.broadcast_to(np.eye(3), (len(k), 3, 3)), np.linalg.norm(along - k, axis=1)
+        # The wrist's centre is the point of the tool's axis that the platform's axis x = y = 0 passes through.
+        probe = self.chain(self.head, np.full((1, len(self.joints)), 0.7))[0, :2]
+        centre = tip - (probe[:, 3] @ probe[:, 2]) / (probe[:, 2] @ probe[:, 2]) * k
+        sign = np.sign(centre[:, 2:])
+        x, y, z = (sign * centre / np.linalg.norm(centre, axis=1, keepdims=True)).T
+        first, second = {
+            ("rx", "ry"): (np.arctan2(-y, z), np.arctan2(x, np.hypot(y, z))),
+            ("ry", "rx"): (np.arctan2(x, z), np.arctan2(-y, np.hypot(x, z))),
+            ("rz", "ry"): (np.arctan2(y, x), np.arctan2(np.hypot(x, y), z)),
+        }[self.motion[:2]]
+        r = (transform(self.motion[0], first) @ transform(self.motion[1], second))[:, :3, :3]
+        seen = np.einsum("nji,nj->ni", r, k)
+        if len(self.turns) == 3:
+            roll = np.arctan2(seen[:, 1], seen[:, 0]) - np.arctan2(along[:, 1], along[:, 0])
+            return r @ transform("rz", roll)[:, :3, :3], np.abs(seen[:, 2] - along[:, 2])
+        return r, np.linalg.norm(seen - along, axis=1)
+
+    def misses(self, poses, joints):
+        """The greatest distance, mm, by which a rod or a hinge misses its place, and the axis' error, both (N,)."""
+        frame, missed = self.platform(poses, joints)
+        tube = np.cross(frame[:, :3, 3], frame[:, :3, 2])  # a central leg's slides along the platform's z
+        worst = [np.linalg.norm(tube, axis=1) * (self.motion[0][0] == "r")]
+        for leg in self.legs:
+            end = frame[:, :3, 3] + frame[:, :3, :3] @ np.array(leg["platform"])
+            worst += leg_misses(leg, end, [joints[:, self.joints.index(name)] for name in leg["joints"]])
+        return np.max(worst, 0), missed
+
+
+def leg_misses(leg, end, q):
+    """By how much a leg's rods miss, mm, with its platform joint at ``end`` (N, 3)."""
+    def far(point):
+        return np.linalg.norm(end - point, axis=1)
+
+    kind = leg["kind"]
+    if kind == "length":
+        return [np.abs(far(np.array(leg["foot"])) - q[0])]
+    if kind == "column":
+        foot = np.stack([leg["radius"] * np.cos(q[0]), leg["radius"] * np.sin(q[0]), q[1]], -1)
+        return [np.abs(far(foot) - leg["rod"]), np.abs(np.sin(q[0]) * end[:, 0] - np.cos(q[0]) * end[:, 1])]
+    if kind == "crank":
+        zero, axis = np.array(leg["zero"]), np.array(leg["axis"])
+        arm = np.outer(np.cos(q[0]), zero) + np.outer(np.sin(q[0]), np.cross(axis, zero))
+        return [np.abs(far(np.array(leg["pivot"]) + leg["arm"] * arm) - leg["rod"])]
+    start = np.array(leg["foot"]) + np.outer(q[0], leg["rail"])
+    if kind == "slider":
+        return [np.abs(far(start) - leg["rod"])]
+    hinge = end + (start - end) * (leg["hinge"] / leg["long"])
+    short = np.linalg.norm(hinge - np.array(leg["foot"]) - np.outer(q[1], leg["rail"]), axis=1)
+    return [np.abs(far(start) - leg["long"]), np.abs(short - leg["short"])]

@@ -1,0 +1,359 @@
+"""The command line: exit codes, one line an error, JSON that parses, nothing heavy at import."""
+
+import csv
+import json
+import os
+import subprocess
+import sys
+
+import pytest
+
+import parakin as pk
+from parakin.cli import main
+
+PART = "UNITS/MM\nFEDRAT/1000,MMPM\nGOTO/0,0,-1650,0,0,1\nGOTO/10,0,-1650\nGOTO/10,20,-1660\n"
+LONG = "GOTO/0,0,-1650,0,0,1\nGOTO/0,0,-2050\n"
+
+
+@pytest.fixture
+def part(tmp_path):
+    path = tmp_path / "part.cls"
+    path.write_text(PART)
+    return path
+
+
+@pytest.fixture
+def out(tmp_path):
+    return tmp_path / "out"
+
+
+def refused(capsys, *arguments):
+    """The one line a command refuses its input with."""
+    assert main([str(a) for a in arguments]) == 2
+    said = capsys.readouterr()
+    assert said.out == ""
+    assert said.err.endswith("\n")
+    assert said.err.count("\n") == 1, said.err
+    return said.err.strip()
+
+
+# post
+
+
+def test_post(part, out, capsys):
+    assert main(["post", str(part), "--machine", "tricept", "-o", str(out)]) == 0
+    said = capsys.readouterr().out
+    assert sorted(path.name for path in out.iterdir()) == ["part.joints.csv", "part.report.html"]
+    assert "3 records, all within the limits" in said
+    assert said.splitlines()[-1].endswith(str(out / "part.report.html"))
+    with (out / "part.joints.csv").open() as file:
+        rows = list(csv.DictReader(file))
+    assert [row["line"] for row in rows] == ["3", "4", "5"]
+    assert float(rows[0]["d1 [mm]"]) == pytest.approx((250**2 + 1200**2) ** 0.5, abs=1e-6)
+
+
+def test_post_off_limits(part, out, capsys):
+    part.write_text(LONG)
+    assert main(["post", str(part), "-m", "tricept", "-o", str(out)]) == 3
+    assert f"{part}:2: leg d2 would be 1,619.4 mm, limit 1,520" in capsys.readouterr().out
+    with (out / "part.joints.csv").open() as file:
+        assert [row["broken"] for row in csv.DictReader(file)] == ["", "d1.max"]
+
+
+def test_post_json(part, out, capsys):
+    part.write_text(LONG)
+    assert main(["post", str(part), "-m", "tricept", "-o", str(out), "--json", "--parquet"]) == 3
+    said = json.loads(capsys.readouterr().out)
+    assert said["schema"] == "parakin.post/1"
+    assert (said["verdict"], said["records"], said["off_limits"]) == ("off limits", 2, 1)
+    assert said["first"]["line"] == 2
+    assert said["worst"]["excess"] == pytest.approx((250**2 + 1600**2) ** 0.5 - 1520)
+    assert [joint["joint"] for joint in said["joints"]] == ["d1", "d2", "d3", "theta1", "theta2"]
+    assert said["joints"][3]["high"] == pytest.approx(360)
+    assert set(said["files"]) == {"table", "parquet", "report"}
+    assert all(os.path.getsize(path) for path in said["files"].values())  # noqa: PTH202
+
+
+def test_post_unreachable_json_has_no_nan(part, out, capsys):
+    part.write_text("GOTO/2000,0,280,0,0,1\n")
+    assert main(["post", str(part), "-m", "linear_delta", "-o", str(out), "--json"]) == 3
+    said = json.loads(capsys.readouterr().out, parse_constant=pytest.fail)
+    assert said["joints"][0]["min"] is None
+    assert "can't close" in said["first"]["text"]
+
+
+def test_post_workpiece_and_sizes(part, out):
+    arguments = ["post", str(part), "-m", "tricept", "-o", str(out)]
+    assert main([*arguments, "--workpiece", "0,0,-400"]) == 3
+    assert main([*arguments, "--workpiece", "Z=-400mm", "--set", "l1=700mm"]) == 0
+    assert main([*arguments, "--workpiece=-10,0,0,0,0,90", "--mode", "-"]) == 0
+
+
+@pytest.mark.parametrize("name", pk.machines())
+def test_post_on_every_machine(name, part, out, capsys):
+    code = main(["post", str(part), "-m", name, "-o", str(out)])
+    assert code in (0, 3)
+    said = capsys.readouterr()
+    assert said.err == "" or said.err.startswith("compiling")
+    assert ("all within" in said.out) == (code == 0)
+
+
+@pytest.mark.parametrize(
+    ("text", "line"),
+    [
+        ("GOTO/0,0\n", 1),
+        ("GOTO/0,0,-1650,0,0,1\nGOTO/1,2,x\n", 2),
+        ("GOTO/0,0,-1650,0,0,0\n", 1),
+        ("GOTO/0,0,0,0,0,1\nGOTO/1e99,0,0\n", 2),
+    ],
+)
+def test_bad_part(part, out, capsys, text, line):
+    part.write_text(text)
+    assert refused(capsys, "post", part, "-m", "tricept", "-o", out).startswith(f"{part}:{line}: ")
+    assert not out.exists()
+
+
+def test_bad_files(part, out, tmp_path, capsys):
+    assert "No such file" in refused(capsys, "post", tmp_path / "none.cls", "-m", "tricept", "-o", out)
+    assert "directory" in refused(capsys, "post", tmp_path, "-m", "tricept", "-o", out)
+    part.write_bytes(b"\0\1\2")
+    refused(capsys, "post", part, "-m", "tricept", "-o", out)
+    part.write_text("")
+    refused(capsys, "post", part, "-m", "tricept", "-o", out)
+
+
+def test_bad_machines(part, out, tmp_path, capsys):
+    assert 'did you mean "tricept"?' in refused(capsys, "post", part, "-m", "tricpt", "-o", out)
+    assert "none.yaml" in refused(capsys, "post", part, "-m", tmp_path / "none.yaml", "-o", out)
+    refused(capsys, "post", part, "-m", tmp_path, "-o", out)
+    machine = tmp_path / "bad.yaml"
+    machine.write_text("name: [\n")
+    assert refused(capsys, "show", machine).startswith(f"{machine}:")
+    machine.write_text("name: a\nsource: x\nmotion: tx tq\n")
+    assert main(["show", str(machine)]) == 2
+    lines = capsys.readouterr().err.splitlines()
+    assert all(line.startswith(f"{machine}:") for line in lines)
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        (["--workpiece", "1,2"], "--workpiece: "),
+        (["--workpiece", "-1,2"], "--workpiece: "),
+        (["--mode", "++"], "mode '++'"),
+        (["--arc-tolerance", "0"], "--arc-tolerance: "),
+        (["--arc-tolerance", "nan"], "--arc-tolerance: "),
+        (["--arc-tolerance", "x"], "--arc-tolerance"),
+        (["--set", "R"], "--set: "),
+        (["--set", "R=3"], "--set: "),
+        (["--set", "R=3deg"], "--set: "),
+        (["--set", "RR=3mm"], "--set: "),
+        (["--set", "R=3mm", "--set", "R=4mm"], "--set: "),
+        (["--parket"], "--parquet"),
+        (["extra"], "extra"),
+    ],
+)
+def test_bad_options(part, out, capsys, options, said):
+    assert said in refused(capsys, "post", part, "-m", "tricept", "-o", out, *options)
+    assert not out.exists()
+
+
+def test_folder_that_cant_be_written(part, tmp_path, capsys):
+    (tmp_path / "file").write_text("")
+    assert "can't be written" in refused(capsys, "post", part, "-m", "tricept", "-o", tmp_path / "file" / "below")
+    (tmp_path / "part.joints.csv").mkdir()
+    refused(capsys, "post", part, "-m", "tricept", "-o", tmp_path)
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["file", "part.cls", "part.joints.csv"]
+
+
+@pytest.mark.skipif(not hasattr(os, "geteuid") or os.geteuid() == 0, reason="root may write everywhere")
+def test_folder_without_permission(part, tmp_path, capsys):
+    (tmp_path / "locked").mkdir(mode=0o500)
+    assert "Permission denied" in refused(capsys, "post", part, "-m", "tricept", "-o", tmp_path / "locked")
+
+
+def test_unknown_command(capsys):
+    assert 'Did you mean "post"?' in refused(capsys, "pots")
+
+
+# machines, show
+
+
+def test_machines(capsys):
+    assert main(["machines"]) == 0
+    said = capsys.readouterr().out
+    assert all(name in said for name in pk.machines())
+    assert main(["machines", "--json"]) == 0
+    assert [machine["name"] for machine in json.loads(capsys.readouterr().out)["machines"]] == pk.machines()
+
+
+@pytest.mark.parametrize("name", pk.machines())
+def test_show(name, capsys):
+    assert main(["show", name]) == 0
+    said = capsys.readouterr().out
+    assert all(joint in said for joint in pk.load(name).joints)
+    assert "-o" in said.splitlines()[-1]
+    assert main(["show", name, "--json"]) == 0
+    assert json.loads(capsys.readouterr().out, parse_constant=pytest.fail)["name"] == name
+
+
+def test_show_picture(tmp_path, capsys):
+    for suffix, start in (("html", b"<!doctype html"), ("png", b"\x89PNG")):
+        target = tmp_path / f"picture.{suffix}"
+        assert main(["show", "tricept", "-o", str(target)]) == 0
+        assert capsys.readouterr().out.splitlines()[-1].endswith(str(target))
+        assert target.read_bytes()[:14].lower().startswith(start.lower())
+    assert ".html or .png" in refused(capsys, "show", "tricept", "-o", tmp_path / "picture.jpg")
+
+
+# inverse, forward
+
+
+def test_inverse_and_forward(capsys):
+    assert main(["inverse", "tricept", "-10", "20", "-1600", "10", "30", "--json"]) == 0
+    (row,) = json.loads(capsys.readouterr().out)["rows"]
+    assert row["pose"] == pytest.approx({"X": -10, "Y": 20, "Z": -1600, "B": 10, "C": 30})
+    joints = [f"{name}={value:.12f}" for name, value in row["joints"].items()]
+    assert main(["forward", "tricept", *joints, "--json"]) == 0
+    (back,) = json.loads(capsys.readouterr().out)["rows"]
+    assert back["pose"] == pytest.approx(row["pose"], abs=1e-6)
+    assert main(["forward", "tricept", *joints, "--near", "-10,20,-1600,10,30"]) == 0
+
+
+def test_inverse_by_name_and_in_text(capsys):
+    assert main(["inverse", "tricept", "z=-1650"]) == 0
+    said = capsys.readouterr().out
+    assert f"{(250**2 + 1200**2) ** 0.5:,.6f}" in said
+    assert "-0.0000" not in said
+
+
+def test_inverse_off_limits_and_out_of_reach(capsys):
+    assert main(["inverse", "tricept", "Z=-2050"]) == 3
+    assert "pose: leg d1 would be 1,619.4 mm, limit 1,520" in capsys.readouterr().err
+    assert main(["inverse", "linear_delta", "X=1000", "--json"]) == 3
+    said = capsys.readouterr()
+    (row,) = json.loads(said.out)["rows"]
+    assert row["broken"].endswith(".reach")
+    assert row["joints"]["tower_a"] is None
+    assert "can't close" in said.err
+
+
+def test_forward_without_a_pose(capsys):
+    assert main(["forward", "hexapod", "strut0=100"]) == 3
+    assert "no pose found" in capsys.readouterr().err
+
+
+def test_forward_of_several_rows(tmp_path, capsys):
+    rows = tmp_path / "rows.csv"
+    rows.write_text("d1,d2,d3,theta1,theta2\n1,2000,2000,0,0\n1300,1300,1300,0,0\n1600,1600,1600,0,0\n")
+    assert main(["forward", "tricept", "--csv", str(rows), "--json"]) == 3
+    said = capsys.readouterr()
+    result = json.loads(said.out, parse_constant=pytest.fail)
+    assert [row["broken"] for row in result["rows"]] == ["not converged", None, "d1.max"]
+    assert result["rows"][0]["pose"]["X"] is None
+    assert [(offence["record"], offence["line"]) for offence in result["offences"]] == [(2, 4)] * 3
+    assert f"{rows}:2: no pose found" in said.err
+
+
+def test_csv_both_ways(tmp_path, capsys):
+    poses, joints, back = (tmp_path / name for name in ("poses.csv", "joints.csv", "back.csv"))
+    poses.write_text("note,c,B,Z [mm],Y,X [in]\na,30,10,-1600,20,1\n\nb,0,0,-1650,0,0\n")
+    assert main(["inverse", "tricept", "--csv", str(poses), "-o", str(joints)]) == 0
+    assert main(["forward", "tricept", "--csv", str(joints), "-o", str(back)]) == 0
+    capsys.readouterr()
+    with back.open() as file:
+        first, second = csv.DictReader(file)
+    assert [float(first[n]) for n in ("X [mm]", "Y [mm]", "Z [mm]")] == pytest.approx([25.4, 20, -1600], abs=1e-4)
+    assert float(first["C [deg]"]) == pytest.approx(30, abs=1e-5)
+    assert float(second["Z [mm]"]) == pytest.approx(-1650, abs=1e-5)
+    poses.write_text("0,0,-1650,0,0\n0,0,-2050,0,0\n")
+    assert main(["inverse", "tricept", "--csv", str(poses)]) == 3
+    said = capsys.readouterr()
+    assert [row["broken"] for row in csv.DictReader(said.out.splitlines())] == ["", "d1.max"]
+    assert f"{poses}:2: leg d1" in said.err
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("X,Y,Z,B,C\n0,0,-1650,0,0\n0,0,x,0,0\n", ':3: Z: "x", expected a number'),
+        ("0,0,-1650,0,0\n0,0,,0,0\n", ":2: Z: nothing"),
+        ("0,0,-1650,0\n", ":1: 4 values, expected 5"),
+        ("0,0,-1650,0,0\n1,2\n", ":2: 2 values"),
+        ("X,Y,Z,B\n0,0,-1650,0\n", ":1: no column C"),
+        ("X,Y,Z,B,C,X\n", ":1: column"),
+        ("X [deg],Y,Z,B,C\n0,0,0,0,0\n", ":1: column X: unit"),
+        ("0,0,nan,0,0\n", ":1: Z: "),
+        ("0,0,inf,0,0\n", ":1: Z: "),
+        ("", ": no rows"),
+        ("\ufeffX,Y,Z,B,C\n", ": no rows"),
+        ("\0\n", ":1: "),
+    ],
+)
+def test_bad_csv(tmp_path, capsys, text, said):
+    rows = tmp_path / "rows.csv"
+    rows.write_text(text)
+    assert refused(capsys, "inverse", "tricept", "--csv", rows).startswith(f"{rows}{said}")
+
+
+@pytest.mark.parametrize("values", ["", "1 2", "X=1 2", "Q=1", "X=1 x=2", "X=a", "X=1deg", "1 2 3 4 nan", "--csb x"])
+def test_bad_values(capsys, values):
+    refused(capsys, "inverse", "tricept", *values.split())
+
+
+def test_unreadable_csv(tmp_path, capsys):
+    assert "cannot be read" in refused(capsys, "inverse", "tricept", "--csv", tmp_path)
+    (tmp_path / "latin").write_bytes("X,Y,Z,B,C\n\xe9".encode("latin-1"))
+    assert "UTF-8" in refused(capsys, "inverse", "tricept", "--csv", tmp_path / "latin")
+    assert "expected one of them" in refused(capsys, "inverse", "tricept", "1", "--csv", tmp_path)
+
+
+# The process
+
+
+def run(*command, **options):
+    return subprocess.run(command, capture_output=True, text=True, timeout=120, check=False, **options)
+
+
+def test_help_imports_nothing_heavy():
+    code = (
+        "import sys; from parakin.cli import main; assert main(['--help']) == 0; "
+        "heavy = {'numpy', 'numba', 'pydantic', 'pyarrow', 'plotly', 'matplotlib', 'ruamel'}; "
+        "print(heavy & set(sys.modules), file=sys.stderr)"
+    )
+    done = run(sys.executable, "-c", code)
+    assert done.returncode == 0
+    assert done.stderr.strip() == "set()"
+    assert "post" in done.stdout
+
+
+def test_process_exit_codes(part, out):
+    module = [sys.executable, "-m", "parakin.cli"]
+    assert run(*module, "--version").stdout.strip() == pk.__version__
+    done = run(*module, "show", "tricpt")
+    assert (done.returncode, done.stdout) == (2, "")
+    assert "Traceback" not in done.stderr
+
+
+@pytest.mark.skipif(os.name != "posix", reason="needs a POSIX shell")
+def test_broken_pipe_is_quiet():
+    done = run("sh", "-c", f"'{sys.executable}' -m parakin.cli machines | true")
+    assert done.stderr == ""
+
+
+def test_interruption(monkeypatch, part, out, capsys):
+    def interrupted(*arguments, **options):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("parakin.toolpath.post.judge", interrupted)
+    assert main(["post", str(part), "-m", "tricept", "-o", str(out)]) == 130
+    assert "Traceback" not in capsys.readouterr().err
+    assert not out.exists()
+
+
+def test_machine_names_are_completed():
+    from cyclopts.completion._engine import compute_completions
+
+    from parakin.cli import app
+
+    assert [found.value for found in compute_completions(app, ["show", "tri"])] == ["tricept"]

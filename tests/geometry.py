@@ -107,11 +107,10 @@ class Description:
         along = head[:, :3, 2]
         if self.motion[0][0] == "t":
             return np.broadcast_to(np.eye(3), (len(k), 3, 3)), np.linalg.norm(along - k, axis=1)
-        # The wrist's centre is the point of the tool's axis that the platform's axis x = y = 0 passes through.
+        # The leg hangs, from the base towards -z. The wrist's centre is the point of the tool's axis that the platform's axis x = y = 0 passes through.
         probe = self.chain(self.head, np.full((1, len(self.joints)), 0.7))[0, :2]
         centre = tip - (probe[:, 3] @ probe[:, 2]) / (probe[:, 2] @ probe[:, 2]) * k
-        sign = np.sign(centre[:, 2:])
-        x, y, z = (sign * centre / np.linalg.norm(centre, axis=1, keepdims=True)).T
+        x, y, z = (-centre / np.linalg.norm(centre, axis=1, keepdims=True)).T
         first, second = {
             ("rx", "ry"): (np.arctan2(-y, z), np.arctan2(x, np.hypot(y, z))),
             ("ry", "rx"): (np.arctan2(x, z), np.arctan2(-y, np.hypot(x, z))),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from drawn import FAMILIES, draw, machine_of
+from drawn import FAMILIES, draw, machine_of, text_of
 from geometry import Description
 from hypothesis import event, given
 from hypothesis import strategies as st
@@ -192,3 +192,14 @@ def test_a_passive_limit_bounds_the_coordinate_it_names(words, tmp_path):
     assert m.margins(m.home)[m.limits.index("rz.max")] == pytest.approx(0.1)
     turned = m.home - 0.4 * np.eye(6)[5]
     assert m.margins(turned)[m.limits.index("rz.min")] == pytest.approx(-0.1)
+
+
+def test_a_head_that_slides_is_refused(tmp_path):
+    d, _ = draw("carried", 1)
+    d.home = np.zeros(5)
+    text = text_of(d).replace("table:", "head:") if not d.head else text_of(d)
+    text = text.replace("head:\n", "head:\n  - tz: {joint: quill, range: [-1 mm, 50 mm]}\n")
+    (tmp_path / "quill.yaml").write_text(text, encoding="utf-8")
+    with pytest.raises(pk.ParakinError) as caught:
+        pk.load(tmp_path / "quill.yaml")
+    assert "\n" not in str(caught.value)

@@ -185,6 +185,16 @@ def test_what_is_no_length_never_converges_and_harms_no_neighbour(m, bad, method
     assert np.abs(two.poses[rest] - one.poses[rest]).max() < 1e-9
 
 
+def test_a_central_leg_does_not_fold_over():
+    m = pk.load("tricept")
+    joints = np.random.default_rng(7).uniform([500, 500, 500, -3, 0], [2000, 2000, 2000, 3, 2], (50_000, 5))
+    found = m.forward(joints)
+    done = found.converged
+    assert done.mean() > 0.25
+    miss, _ = Description.of(m.spec).misses(found.poses[done], joints[done])
+    assert miss.max() < CLOSE
+
+
 @everyone
 def test_joints_that_cannot_assemble_do_not(m):
     joints = m.inverse(m.home)[None, :].copy()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from html import escape
 from math import ceil, degrees, inf, isfinite
 from typing import TYPE_CHECKING
 
@@ -9,8 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .figures import FAINT, FONT, INK, Figure, Trace, numbers
-from ..toolpath.offences import bound
-from .ranges import Use
+from .ranges import Use, edge
 
 if TYPE_CHECKING:
     from ..toolpath.result import Posted
@@ -19,7 +19,7 @@ Floats = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
 POINTS = 4000  # a curve
-_ALL_POINTS = 60_000  # of all curves together, for machines with many joints
+_ALL_POINTS = 36_000  # of all curves together, for machines with many joints
 _ROW, _GAP = 118, 34  # px: a curve's height, and what parts it from the next
 
 
@@ -32,9 +32,9 @@ def extremes(values: Floats, most: int) -> Indices:
     if n <= most:
         return np.arange(n)
     size = ceil(n / max(1, most // 3))
-    grid = np.full(ceil(n / size) * size, np.nan)
-    grid[:n] = values
-    grid = grid.reshape(-1, size)
+    padded = np.full(ceil(n / size) * size, np.nan)
+    padded[:n] = values
+    grid = padded.reshape(-1, size)
     start = np.arange(len(grid)) * size
     gone = np.isnan(grid)
     low = start + np.where(gone, inf, grid).argmin(axis=1)
@@ -59,13 +59,23 @@ def joint_curves(posted: Posted, uses: list[Use]) -> tuple[Figure, int]:
         scale = degrees(1.0) if use.unit == "rad" else 1.0
         top = 1.0 - row * (_ROW + _GAP) / inner
         traces += _curve(posted, use, values, scale, most, number)
-        axis: Figure = {"domain": [max(0.0, top - _ROW / inner), top], "gridcolor": FAINT, "zeroline": False, "nticks": 5}
+        axis: Figure = {
+            "domain": [max(0.0, top - _ROW / inner), top],
+            "gridcolor": FAINT,
+            "zeroline": False,
+            "nticks": 5,
+        }
         axis |= {"range": _range(use, scale), "tickformat": ",", "linecolor": "#cfd8dc", "showline": True}
         layout[f"yaxis{number}"] = axis
         layout["shapes"] += _bounds(use, scale, number)
         layout["annotations"].append(_heading(use, top))
     last = "" if count == 1 else str(count)
-    axis = {"title": {"text": "record, counted from 0", "font": {"size": 12}}, "gridcolor": FAINT, "zeroline": False, "tickformat": ","}
+    axis = {
+        "title": {"text": "record, counted from 0", "font": {"size": 12}},
+        "gridcolor": FAINT,
+        "zeroline": False,
+        "tickformat": ",",
+    }
     layout["xaxis"] = axis | {"anchor": f"y{last}", "rangemode": "nonnegative"}
     return {"data": traces, "layout": layout}, height
 
@@ -76,8 +86,16 @@ def _curve(posted: Posted, use: Use, values: Floats, scale: float, most: int, nu
     y, lines = values[kept], posted.path.line[kept].tolist()
     unit = "°" if use.unit == "rad" else f" {use.unit}"
     digits = 4 if use.unit == "rad" else 3
-    base: Trace = {"type": "scatter", "x": kept.tolist(), "customdata": lines, "yaxis": f"y{number}", "name": use.name}
-    base["hovertemplate"] = f"line %{{customdata}}, record %{{x:,}}<br>%{{y:,.3f}}{unit}<extra>%{{fullData.name}}</extra>"
+    base: Trace = {
+        "type": "scatter",
+        "x": kept.tolist(),
+        "customdata": lines,
+        "yaxis": f"y{number}",
+        "name": escape(use.name),
+    }
+    base["hovertemplate"] = (
+        f"line %{{customdata}}, record %{{x:,}}<br>%{{y:,.3f}}{unit}<extra>%{{fullData.name}}</extra>"
+    )
     few = len(kept) < 60
     traces = [base | {"y": numbers(y * scale, digits), "mode": "lines+markers" if few else "lines",
                       "line": {"color": "#2f6fb3", "width": 1.4}, "marker": {"size": 4}}]  # fmt: skip
@@ -97,7 +115,10 @@ def _range(use: Use, scale: float) -> list[float]:
         low, high = use.least, use.most
         wide = max(high - low, 0.04 * use.span if isfinite(use.low) or isfinite(use.high) else 0.0, 1e-3)
         low, high = (low + high - wide) / 2.0, (low + high + wide) / 2.0
-        low, high = (use.low if low - wide < use.low < low else low), (use.high if high < use.high < high + wide else high)
+        low, high = (
+            (use.low if low - wide < use.low < low else low),
+            (use.high if high < use.high < high + wide else high),
+        )
     pad = 0.08 * (high - low)
     return [(low - pad) * scale, (high + pad) * scale]
 
@@ -113,8 +134,8 @@ def _bounds(use: Use, scale: float, number: str) -> list[Figure]:
 def _heading(use: Use, top: float) -> Figure:
     limits = "no limits"
     if isfinite(use.low) or isfinite(use.high):
-        low, high = (bound(v, use.unit) if isfinite(v) else "–" for v in (use.low, use.high))
+        low, high = (edge(v, use.unit) if isfinite(v) else "–" for v in (use.low, use.high))
         limits = f"limits {low} to {high}"
-    text = f"<b>{use.name}</b>  <span style='color:#607d8b'>[{'°' if use.unit == 'rad' else use.unit}]  {limits}</span>"
+    text = f"<b>{escape(use.name)}</b>  <span style='color:#607d8b'>[{'°' if use.unit == 'rad' else use.unit}]  {limits}</span>"
     return {"text": text, "x": 0, "xref": "paper", "y": top, "yref": "paper", "xanchor": "left", "yanchor": "bottom",
             "showarrow": False, "font": {"size": 13}}  # fmt: skip

@@ -62,7 +62,7 @@ def machine_traces(scene: Scene, name: str, scale: float, colour: str | None = N
         first = np.cumsum([0, *[len(solid.vertices) for solid in group[:-1]]])
         x, y, z = np.vstack([solid.vertices for solid in group]).T
         i, j, k = np.vstack([solid.triangles + start for solid, start in zip(group, first, strict=True)]).T
-        trace = {"type": "mesh3d", "x": numbers(x, 1), "y": numbers(y, 1), "z": numbers(z, 1)}
+        trace: Trace = {"type": "mesh3d", "x": numbers(x, 1), "y": numbers(y, 1), "z": numbers(z, 1)}
         trace |= {"i": i.tolist(), "j": j.tolist(), "k": k.tolist(), "hoverinfo": "skip", "lighting": _LIGHT}
         trace["lightposition"] = {"x": 4e4, "y": -8e4, "z": 9e4}
         trace |= {"color": colour or LOOKS[kind].colour, "opacity": 1.0 if colour is None else 0.22}
@@ -74,7 +74,7 @@ def machine_traces(scene: Scene, name: str, scale: float, colour: str | None = N
 def label_trace(scene: Scene, name: str) -> Trace:
     """The drives' names at their places."""
     x, y, z = np.array([place for _, place in scene.labels]).T
-    trace = {"type": "scatter3d", "mode": "text", "x": numbers(x, 1), "y": numbers(y, 1), "z": numbers(z, 1)}
+    trace: Trace = {"type": "scatter3d", "mode": "text", "x": numbers(x, 1), "y": numbers(y, 1), "z": numbers(z, 1)}
     trace |= {"text": [escape(text) for text, _ in scene.labels], "textfont": {"size": 13, "color": INK}}
     return trace | {"textposition": "top right", "hoverinfo": "skip", "legendgroup": name, "showlegend": False}
 
@@ -84,7 +84,13 @@ def frame_traces(frame: Points, size: float, text: str, group: str) -> list[Trac
     traces = []
     for letter, axis, colour in zip("XYZ", frame[:, :3].T, ("#c62828", "#2e7d32", "#1565c0"), strict=True):
         x, y, z = np.array([frame[:, 3], frame[:, 3] + size * axis]).T
-        trace = {"type": "scatter3d", "mode": "lines+text", "x": numbers(x, 1), "y": numbers(y, 1), "z": numbers(z, 1)}
+        trace: Trace = {
+            "type": "scatter3d",
+            "mode": "lines+text",
+            "x": numbers(x, 1),
+            "y": numbers(y, 1),
+            "z": numbers(z, 1),
+        }
         trace |= {"text": [text if letter == "X" else "", letter], "textfont": {"size": 12, "color": colour}}
         trace |= {"line": {"color": colour, "width": 4}, "hoverinfo": "skip", "showlegend": False, "legendgroup": group}
         traces.append(trace)
@@ -99,19 +105,25 @@ def scene_layout(boxes: Iterable[Points], normal: Points | None) -> Figure:
     spans = high - low + 2.0 * pad
     axes = {}
     for number, letter in enumerate("XYZ"):
-        axis: Figure = {"title": {"text": f"{letter} [mm]", "font": {"size": 12}}, "gridcolor": FAINT, "zerolinecolor": "#c3ccd3"}
+        axis: Figure = {
+            "title": {"text": f"{letter} [mm]", "font": {"size": 12}},
+            "gridcolor": FAINT,
+            "zerolinecolor": "#c3ccd3",
+        }
         axis |= {"showbackground": False, "showspikes": False, "tickfont": {"size": 11, "color": "#607d8b"}}
         axis |= {"range": [float(low[number] - pad), float(high[number] + pad)], "tickformat": ",.0f", "nticks": 7}
         if normal is not None and abs(normal[number]) > 0.999:
             axis["visible"] = False
         axes[f"{letter.lower()}axis"] = axis
-    camera: Figure = {"eye": {"x": 0.95, "y": -1.35, "z": 0.45}}
+    camera: Figure = {"eye": {"x": 0.95, "y": -1.35, "z": 0.45}, "center": {"x": 0, "y": 0, "z": -0.07}}
     if normal is not None:
         eye = np.sign(normal.sum()) * normal * (1.0 if abs(normal[1]) < 0.5 else -1.0)  # XZ is seen from -Y
         camera = {"eye": dict(zip("xyz", (1.6 * eye).tolist(), strict=True)), "projection": {"type": "orthographic"}}
         camera["up"] = {"x": 0, "y": 1, "z": 0} if abs(normal[2]) > 0.5 else {"x": 0, "y": 0, "z": 1}
     # Equal scales, as aspectmode "data" gives, but of a size that fills the view and no more.
-    ratio = dict(zip("xyz", (spans * (_filling(spans) if normal is None else 1.25 / spans.max())).tolist(), strict=True))
+    ratio = dict(
+        zip("xyz", (spans * (_filling(spans) if normal is None else 1.25 / spans.max())).tolist(), strict=True)
+    )
     scene = {"aspectmode": "manual", "aspectratio": ratio, "camera": camera, "dragmode": "orbit", **axes}
     legend = {"orientation": "h", "x": 0.0, "y": 1.0, "yanchor": "bottom", "itemsizing": "constant"}
     layout = {"scene": scene, "margin": {"l": 0, "r": 0, "t": 0, "b": 0}, "legend": legend, "paper_bgcolor": "#fff"}
@@ -121,4 +133,4 @@ def scene_layout(boxes: Iterable[Points], normal: Points | None) -> Figure:
 def _filling(spans: Points) -> float:
     """The scale at which a box of these sides fills the view from the front right."""
     across, up = 0.82 * spans[0] + 0.58 * spans[1], spans[2] + 0.2 * (spans[0] + spans[1])
-    return float(1.6 / max(across, up))
+    return float(1.5 / max(across, up))

@@ -117,7 +117,13 @@ def _red(posted: Posted, tips: Points) -> list[Trace]:
     x, y, z = tips[at].T
     limits = [posted.limits[i - 1] if i else "" for i in posted.broken[at].tolist()]
     text = [f"line {line}: {escape(name)}" for line, name in zip(posted.path.line[at].tolist(), limits, strict=True)]
-    trace: Trace = {"type": "scatter3d", "mode": "markers", "name": "off limits", "hovertext": text, "hoverinfo": "text"}
+    trace: Trace = {
+        "type": "scatter3d",
+        "mode": "markers",
+        "name": "off limits",
+        "hovertext": text,
+        "hoverinfo": "text",
+    }
     trace |= {"x": numbers(x, 2), "y": numbers(y, 2), "z": numbers(z, 2), "marker": {"size": 3, "color": "#d50000"}}
     return [trace]
 
@@ -129,34 +135,31 @@ def _workspace(posted: Posted, place: Points, tips: Points, size: float) -> tupl
     """A translucent surface where the least margin is 0, on a coarse grid of tips at the path's mean orientation."""
     machine = posted.machine
     pose = _mean_pose(machine, posted.poses)
-    middle = tip_points(machine, pose[None])[0]
+    middle = place[:, :3] @ tip_points(machine, pose[None])[0] + place[:, 3]
     used = [i for i, letter in enumerate("XYZ") if letter in machine.axes]
     low, high = middle - 0.8 * size, middle + 0.8 * size
     for _ in range(2):  # find it, then look closer
         sides = [np.linspace(low[i], high[i], _CELLS if len(used) == 3 else 4 * _CELLS) for i in used]
-        grid = np.stack(np.meshgrid(*sides, indexing="ij"), axis=-1)
-        poses = np.broadcast_to(pose, (*grid.shape[:-1], len(pose))).copy()
-        for column, i in enumerate(used):
-            poses[..., machine.axes.index("XYZ"[i])] = grid[..., column]
-        flat = poses.reshape(-1, len(pose))
-        value = relative_margin(machine, machine.margins(flat, mode=posted.mode))
+        points = np.tile(middle, (len(sides[0]) ** len(used), 1))
+        points[:, used] = np.stack(np.meshgrid(*sides, indexing="ij"), axis=-1).reshape(-1, len(used))
+        poses = np.tile(pose, (len(points), 1))
+        tip = (points - place[:, 3]) @ place[:, :3]  # the grid stands in M, poses are the workpiece's
+        for i in used:
+            poses[:, machine.axes.index("XYZ"[i])] = tip[:, i]
+        value = relative_margin(machine, machine.margins(poses, mode=posted.mode))
         inside = value >= 0.0
         if not inside.any():
             return [], []
-        found = grid.reshape(-1, len(used))[inside]
-        for column, i in enumerate(used):
-            step = sides[column][1] - sides[column][0]
-            low[i], high[i] = found[:, column].min() - step, found[:, column].max() + step
-    points = tip_points(machine, flat)
+        step = (high - low) / (len(sides[0]) - 1)
+        low, high = points[inside].min(axis=0) - step, points[inside].max(axis=0) + step
     value = np.clip(np.where(np.isnan(value), -0.1, value), -0.1, 0.1)
-    points = points @ place[:, :3].T + place[:, 3]
     reach = np.array([points[inside].min(0), points[inside].max(0)])
     name = "workspace (coarse sample)"
     base: Trace = {"name": name, "showlegend": True, "showscale": False, "hoverinfo": "skip", "opacity": 0.16}
     base["colorscale"] = [[0, "#26a69a"], [1, "#26a69a"]]
     if len(used) == 2:
         points = np.where(inside[:, None], points, np.nan)
-        x, y, z = (_rows(column, grid.shape[:2]) for column in points.T)
+        x, y, z = (_rows(column, len(sides[1])) for column in points.T)
         return [base | {"type": "surface", "x": x, "y": y, "z": z}], [reach]
     x, y, z = points.T
     surface: Trace = {"type": "isosurface", "x": numbers(x, 1), "y": numbers(y, 1), "z": numbers(z, 1)}
@@ -164,8 +167,8 @@ def _workspace(posted: Posted, place: Points, tips: Points, size: float) -> tupl
     return [base | surface | {"caps": {c: {"show": False} for c in "xyz"}, "flatshading": False}], [reach]
 
 
-def _rows(column: Floats, shape: tuple[int, ...]) -> list[list[float | None]]:
-    flat, width = numbers(column, 1), shape[1]
+def _rows(column: Floats, width: int) -> list[list[float | None]]:
+    flat = numbers(column, 1)
     return [flat[i : i + width] for i in range(0, len(flat), width)]
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from html import escape
 from io import BytesIO
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -52,13 +53,12 @@ def machine_png(machine: Machine, pose: ArrayLike | None = None) -> bytes:
     """A PNG of the machine at a pose, (axes,) mm and rad, home by default; a planar machine in its plane."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
-    from mpl_toolkits.mplot3d import Axes3D
+    from mpl_toolkits import mplot3d  # noqa: F401  it brings the projection
 
     drawn = scene(machine, pose)
     figure = Figure(figsize=(7.2, 7.2), dpi=160, facecolor="white")
     canvas = FigureCanvasAgg(figure)
-    axes = figure.add_axes((0.0, 0.0, 1.0, 1.0), projection="3d")
-    assert isinstance(axes, Axes3D)
+    axes: Any = figure.add_axes((0.0, 0.0, 1.0, 1.0), projection="3d")
     _view(axes, drawn)
     _solids(axes, drawn)
     _frames(axes, drawn)
@@ -67,11 +67,11 @@ def machine_png(machine: Machine, pose: ArrayLike | None = None) -> bytes:
     title = machine.spec.title or machine.name
     figure.text(0.5, 0.955, title, ha="center", color=INK, fontsize=14, weight="bold", parse_math=False)
     data = BytesIO()
-    canvas.print_png(data)
+    canvas.print_png(data)  # type: ignore[no-untyped-call]
     return data.getvalue()
 
 
-def _view(axes: object, drawn: Scene) -> None:
+def _view(axes: Any, drawn: Scene) -> None:
     """Equal scales, a calm background, and the view: a planar machine straight on, others from the front right."""
     low, high = drawn.box
     middle, half = (low + high) / 2.0, 0.5 * (high - low) + (0.06 if drawn.normal is None else 0.1) * drawn.size
@@ -83,23 +83,25 @@ def _view(axes: object, drawn: Scene) -> None:
         axis.line.set_color("#b0bec5")
         getattr(axes, f"set_{name}label")(f"{name.upper()} [mm]", color="#607d8b", fontsize=9)
     # The box is drawn with a diagonal of one length; zoom so that what the view shows of it fills the picture.
-    seen = half.max() if drawn.normal is not None else max(0.79 * half[0] + 0.62 * half[1], half[2] + 0.2 * half[:2].sum())
-    axes.set_box_aspect(half, zoom=float(0.82 * np.linalg.norm(half) / seen))  # type: ignore[attr-defined]
-    axes.tick_params(labelsize=8, colors="#607d8b")  # type: ignore[attr-defined]
-    axes.locator_params(nbins=5)  # type: ignore[attr-defined]
+    seen = max(0.79 * half[0] + 0.62 * half[1], half[2] + 0.2 * half[:2].sum())
+    if drawn.normal is not None:
+        seen = half.max()
+    axes.set_box_aspect(half, zoom=float(0.82 * np.linalg.norm(half) / seen))
+    axes.tick_params(labelsize=8, colors="#607d8b")
+    axes.locator_params(nbins=5)
     if drawn.normal is None:
-        axes.set_proj_type("persp", focal_length=1.4)  # type: ignore[attr-defined]
-        axes.view_init(elev=17, azim=-52)  # type: ignore[attr-defined]
+        axes.set_proj_type("persp", focal_length=1.4)
+        axes.view_init(elev=17, azim=-52)
         return
-    axes.set_proj_type("ortho")  # type: ignore[attr-defined]
+    axes.set_proj_type("ortho")
     across = int(np.abs(drawn.normal).argmax())
-    axes.view_init(elev=90 if across == 2 else 0, azim=0 if across == 0 else -90)  # type: ignore[attr-defined]
+    axes.view_init(elev=90 if across == 2 else 0, azim=0 if across == 0 else -90)
     out = getattr(axes, f"{'xyz'[across]}axis")
     out.set_ticks([])
     out.set_label_text("")
 
 
-def _solids(axes: object, drawn: Scene) -> None:
+def _solids(axes: Any, drawn: Scene) -> None:
     """All faces in one collection, for only within one are they drawn from the back to the front."""
     from matplotlib.colors import to_rgb
     from mpl_toolkits.mplot3d.art3d import Poly3DCollection
@@ -110,21 +112,20 @@ def _solids(axes: object, drawn: Scene) -> None:
         normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
         lengths = np.linalg.norm(normals, axis=1, keepdims=True)
         light = (normals / np.where(lengths > 0.0, lengths, 1.0)) @ _LIGHT
-        shade = 0.70 + 0.30 * light[:, None]
         faces.append(corners)
-        colours.append(np.clip(np.array(to_rgb(LOOKS[solid.kind].colour)) * shade + 0.06 * (light[:, None] > 0.8), 0.0, 1.0))
+        colours.append(np.array(to_rgb(LOOKS[solid.kind].colour)) * (0.70 + 0.30 * light[:, None]))
     colour = np.vstack(colours)
     # Edges of the faces' own colour hide the seams that antialiasing leaves.
-    axes.add_collection3d(Poly3DCollection(np.vstack(faces), facecolors=colour, edgecolors=colour, linewidths=0.4))  # type: ignore[attr-defined]
+    axes.add_collection3d(Poly3DCollection(np.vstack(faces), facecolors=colour, edgecolors=colour, linewidths=0.4))
 
 
-def _frames(axes: object, drawn: Scene) -> None:
+def _frames(axes: Any, drawn: Scene) -> None:
     length = 0.085 * drawn.size
     for frame in drawn.frames.values():
         for letter, axis, colour in zip("XYZ", frame[:, :3].T, ("#c62828", "#2e7d32", "#1565c0"), strict=True):
             if drawn.normal is not None and abs(float(axis @ drawn.normal)) > 0.999:
                 continue
             ends: Points = np.array([frame[:, 3], frame[:, 3] + length * axis])
-            axes.plot(*ends.T, color=colour, linewidth=1.6, zorder=900)  # type: ignore[attr-defined]
-            axes.text(*(frame[:, 3] + 1.25 * length * axis), letter, color=colour, fontsize=8.5, zorder=900,  # type: ignore[attr-defined]
-                      ha="center", va="center")
+            axes.plot(*ends.T, color=colour, linewidth=1.6, zorder=900)
+            at = frame[:, 3] + 1.25 * length * axis
+            axes.text(*at, letter, color=colour, fontsize=8.5, zorder=900, ha="center", va="center")

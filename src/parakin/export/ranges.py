@@ -53,8 +53,13 @@ def shown(value: float, unit: str) -> str:
     number, digits, mark = (degrees(value), 2, "°") if unit == "rad" else (value, 1, "" if unit == "1" else f" {unit}")
     while 1e-9 < abs(number) < 10.0**-digits and digits < 9:
         digits += 1
-    number = round(number, digits) + 0.0
-    return f"{'−' if number < 0.0 else ''}{abs(number):,.{digits}f}{mark}"
+    return f"{round(number, digits) + 0.0:,.{digits}f}{mark}"
+
+
+def edge(value: float, unit: str) -> str:
+    """A limit's bound, without a unit of length and without idle zeros: ``1,520``, ``-60°``."""
+    number = f"{degrees(value) if unit == 'rad' else value:,.3f}".rstrip("0").rstrip(".")
+    return f"{number}°" if unit == "rad" else number
 
 
 def bounded(machine: Machine) -> tuple[list[Use], NDArray[np.int64]]:

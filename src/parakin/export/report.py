@@ -12,11 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .. import __version__
-from ..toolpath.offences import bound
 from .curves import joint_curves
 from .figures import page, placed
 from .pathview import path_figures
-from .ranges import Use, shown, used
+from .ranges import Use, edge, shown, used
 
 if TYPE_CHECKING:
     from ..toolpath.program import ToolPath
@@ -112,15 +111,16 @@ def _bar(posted: Posted, use: Use) -> str:
     if isfinite(use.margin):
         line = int(posted.path.line[use.record])
         slack = f"{shown(use.margin, use.unit)} left" if use.margin >= 0.0 else f"{shown(-use.margin, use.unit)} beyond"
-        slack += f" <small>line {line}</small>"
+        slack += f"<br><small>line {line}</small>"
     else:
         slack = "<small>no limit</small>" if isfinite(use.least) else "<small>never reached</small>"
     lost = f"<br><small>{use.lost:,} can’t be told</small>" if use.lost else ""
+    name = escape(use.name).replace(".", ".<wbr>").replace("-", "-<wbr>")
     bad = " bad" if use.margin < 0.0 else ""
     span = f"{shown(use.least, use.unit).removesuffix(' mm')} … {shown(use.most, use.unit)}"
-    low, high = (bound(v, use.unit) if isfinite(v) else "" for v in (use.low, use.high))
+    low, high = (edge(v, use.unit) if isfinite(v) else "" for v in (use.low, use.high))
     return (
-        f"<div class='bar{bad}'><div><b>{escape(use.name)}</b></div><div><div class=scale>{''.join(pieces)}</div>"
+        f"<div class='bar{bad}'><div><b>{name}</b></div><div><div class=scale>{''.join(pieces)}</div>"
         f"<div class=ends><span>{low}</span><span>used {span}</span><span>{high}</span></div></div>"
         f"<div class=slack>{slack}{lost}</div></div>\n"
     )
@@ -182,7 +182,9 @@ def _offences(posted: Posted) -> str:
     text = source_lines(posted.path, {o.line for o in (*posted.offences, posted.first)})
     first = f"<tr><th colspan=5>First</th></tr>{_offence(posted.first, text, False)}"
     worst = "".join(_offence(offence, text, True) for offence in posted.offences)
-    head = "<tr><th>Line</th><th>What</th><th class=n>Beyond by</th><th class=n>Records</th><th>The line reads</th></tr>"
+    head = (
+        "<tr><th>Line</th><th>What</th><th class=n>Beyond by</th><th class=n>Records</th><th>The line reads</th></tr>"
+    )
     table = f"<div class=wide><table>{head}{first}<tr><th colspan=5>Every broken limit at its worst</th></tr>{worst}</table></div>"
     return _card("Offences", table)
 
@@ -190,7 +192,7 @@ def _offences(posted: Posted) -> str:
 def _offence(offence: Offence, text: dict[int, str], count: bool) -> str:
     beyond = shown(offence.excess, offence.unit)
     return (
-        f"<tr><td class=n>{offence.line}</td><td>{escape(offence.text)}</td><td class=n>{beyond}</td>"
+        f"<tr><td>{offence.line}</td><td>{escape(offence.text)}</td><td class=n>{beyond}</td>"
         f"<td class=n>{f'{offence.count:,}' if count else ''}</td><td><code>{escape(text.get(offence.line, ''))}</code></td></tr>\n"
     )
 

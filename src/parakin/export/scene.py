@@ -123,7 +123,8 @@ class _Drawing:
 
     def _m(self, points: ArrayLike) -> Points:
         """Points of the base frame in M."""
-        return np.asarray(points, float) @ self.mount.T + self.base
+        placed: Points = np.asarray(points, float) @ self.mount.T + self.base
+        return placed
 
     def _add(self, kind: Kind, name: str, points: ArrayLike, closed: bool = False) -> None:
         self.parts.append(Part(kind, name, self._m(points).reshape(-1, 3), closed))
@@ -131,7 +132,7 @@ class _Drawing:
     def _legs(self) -> None:
         spec, anchors = self.spec, []
         points = platform_points(spec, self.placed.rotation, self.placed.origin)
-        for leg, point, q in zip(spec.legs, points, leg_joints(spec, self.joints), strict=True):
+        for leg, point, q in zip(spec.legs, points, leg_joints(spec, self.joints.tolist()), strict=True):
             struts = [np.array(ends, float) for ends in leg.struts(point, q)]
             moved: dict[int, list[str]] = {}
             for number, (drive, feet) in enumerate(zip(leg.drives, _feet(leg, point, q, struts[0]), strict=True)):
@@ -224,7 +225,7 @@ def _chain(steps: Sequence[Step], joints: Sequence[float]) -> Iterator[tuple[Poi
 
 
 def _feet(leg: Leg, point: Sequence[float], joints: list[float], strut: Points) -> Iterator[Points]:
-    """For each drive the feet of all struts over its range, (samples, struts, 3), the drives after it at their low end."""
+    """The feet of all struts over each drive's range, (samples, struts, 3); the drives after it are at their low end."""
     length = float(np.linalg.norm(strut[1] - strut[0]))
     spans = [_span(d.low, d.high, q, unit, length) for d, q, unit in zip(leg.drives, joints, leg.units, strict=True)]
     for number, (low, high) in enumerate(spans):
@@ -241,7 +242,7 @@ def _span(low: float, high: float, q: float, unit: str, length: float) -> tuple[
 
 
 def around(points: Points) -> Points:
-    """The distinct points in the order of a polygon: round their middle, in their own plane; the ends if on one line."""
+    """The distinct points as a polygon: in order round their middle, in their own plane; of those on a line the ends."""
     points = np.array(_distinct(list(points)))
     if len(points) < 3:
         return points
@@ -263,5 +264,3 @@ def _distinct(points: list[Points]) -> list[Points]:
 
 def _same(a: Points, b: Points) -> bool:
     return bool(np.linalg.norm(a - b) < _NEAR)
-
-

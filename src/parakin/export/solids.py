@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from itertools import pairwise
 from math import ceil, inf
 from typing import NamedTuple
 
@@ -70,7 +71,7 @@ def _part(part: Part, size: float, piece: float) -> Iterator[Solid]:
         yield _ball(part.kind, part.name, points[0], 2.0 * radius)
     else:
         ends = np.vstack([points, points[:1]]) if part.closed else points
-        bars = list(zip(ends, ends[1:], strict=False))
+        bars = list(pairwise(ends))
         for a, b in bars:
             yield from _link(part.kind, part.name, a, b, size, piece)
         if len(bars) > 1 and part.kind != "rail":
@@ -142,6 +143,6 @@ def _ball(kind: str, name: str, centre: Points, radius: float) -> Solid:
     layers = []
     for tilt in np.linspace(-np.pi / 2, np.pi / 2, rings + 2)[1:-1]:
         flat = np.column_stack([np.cos(around), np.sin(around), 0.0 * around]) * np.cos(tilt)
-        layers.append(flat + [0.0, 0.0, np.sin(tilt)])
+        layers.append(flat + np.array([0.0, 0.0, np.sin(tilt)]))
     unit = np.vstack([*layers, [[0.0, 0.0, -1.0], [0.0, 0.0, 1.0]]])
     return Solid(kind, name, centre + radius * unit, _skin(rings, sides))

@@ -1,0 +1,11 @@
+"""All benchmarks, one after the other, as tables of ratios."""
+
+from __future__ import annotations
+
+import kinematics
+import post
+import startup
+
+if __name__ == "__main__":
+    for benchmark in (kinematics, post, startup):
+        print(benchmark.main(), flush=True)

@@ -107,7 +107,8 @@ class Description:
         along = head[:, :3, 2]
         if self.motion[0][0] == "t":
             return np.broadcast_to(np.eye(3), (len(k), 3, 3)), np.linalg.norm(along - k, axis=1)
-        # The leg hangs, from the base towards -z. The wrist's centre is the point of the tool's axis that the platform's axis x = y = 0 passes through.
+        # The central leg hangs, from the base towards -z. The wrist's centre is the point of the tool's axis that the
+        # platform's axis x = y = 0 passes through.
         probe = self.chain(self.head, np.full((1, len(self.joints)), 0.7))[0, :2]
         centre = tip - (probe[:, 3] @ probe[:, 2]) / (probe[:, 2] @ probe[:, 2]) * k
         x, y, z = (-centre / np.linalg.norm(centre, axis=1, keepdims=True)).T

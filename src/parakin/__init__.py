@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from .errors import InputError, InputErrors, NoMethodError, ParakinError, PoseError
 
 if TYPE_CHECKING:
-    from .direct import Solution
+    from .kinematics.direct import Solution
     from .machine import Machine
 
 __version__ = "0.1.0"
@@ -56,7 +56,7 @@ def __getattr__(name: str) -> object:
 
         return Machine
     if name == "Solution":
-        from .direct import Solution
+        from .kinematics.direct import Solution
 
         return Solution
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -17,7 +17,7 @@ from .model.spec import Spec
 from .model.traces import Model
 
 if TYPE_CHECKING:
-    from .direct import Solution
+    from .kinematics.direct import Solution
 
 Array = NDArray[np.float64]
 
@@ -94,7 +94,7 @@ class Machine:
         with np.errstate(invalid="ignore", divide="ignore"):
             joints, _, _ = self.model.invert(self.model.home, self.mode)
             margins = self.model.margins(self.model.home, joints, self.mode)
-        for limit, margin in margins:
+        for limit, (_, margin) in zip(self.limit_parts, margins, strict=True):
             if not margin >= 0.0:
                 value = limit.value(float(margin))
                 raise ParakinError(
@@ -162,7 +162,7 @@ class Machine:
         A turning joint that is free (the tool's axis along it) takes its value from the last pose where it was not, at
         the path's start from the first one to come; turns are counted on over ±180°.
         """
-        from .path import follow
+        from .kinematics.path import follow
 
         rows, lead = self.rows(poses, self.axes, "poses")
         if len(lead) != 1:
@@ -170,8 +170,8 @@ class Machine:
         return follow(self, rows, self._mode(mode))
 
     def forward(self, joints: ArrayLike, near: ArrayLike | None = None, method: str | None = None) -> Solution:
-        """Poses for joints, with residual and verdict; see :func:`parakin.direct.forward`."""
-        from .direct import forward
+        """Poses for joints, with residual and verdict; see :func:`parakin.kinematics.direct.forward`."""
+        from .kinematics.direct import forward
 
         return forward(self, joints, near, method)
 

@@ -136,6 +136,7 @@ def _heading(use: Use, top: float) -> Figure:
     if isfinite(use.low) or isfinite(use.high):
         low, high = (edge(v, use.unit) if isfinite(v) else "–" for v in (use.low, use.high))
         limits = f"limits {low} to {high}"
-    text = f"<b>{escape(use.name)}</b>  <span style='color:#607d8b'>[{'°' if use.unit == 'rad' else use.unit}]  {limits}</span>"
+    unit = "°" if use.unit == "rad" else use.unit
+    text = f"<b>{escape(use.name)}</b>  <span style='color:#607d8b'>[{unit}]  {limits}</span>"
     return {"text": text, "x": 0, "xref": "paper", "y": top, "yref": "paper", "xanchor": "left", "yanchor": "bottom",
             "showarrow": False, "font": {"size": 13}}  # fmt: skip

@@ -58,7 +58,8 @@ def machine_traces(scene: Scene, name: str, scale: float, colour: str | None = N
     for solid in solids(scene, scale):
         by_kind.setdefault(solid.kind if colour is None else "shadow", []).append(solid)
     traces = []
-    for number, (kind, group) in enumerate(by_kind.items()):
+    shown = next((kind for kind in ("telescope", "rod") if kind in by_kind), next(iter(by_kind), ""))
+    for kind, group in by_kind.items():
         first = np.cumsum([0, *[len(solid.vertices) for solid in group[:-1]]])
         x, y, z = np.vstack([solid.vertices for solid in group]).T
         i, j, k = np.vstack([solid.triangles + start for solid, start in zip(group, first, strict=True)]).T
@@ -66,7 +67,7 @@ def machine_traces(scene: Scene, name: str, scale: float, colour: str | None = N
         trace |= {"i": i.tolist(), "j": j.tolist(), "k": k.tolist(), "hoverinfo": "skip", "lighting": _LIGHT}
         trace["lightposition"] = {"x": 4e4, "y": -8e4, "z": 9e4}
         trace |= {"color": colour or LOOKS[kind].colour, "opacity": 1.0 if colour is None else 0.22}
-        trace |= {"name": name, "legendgroup": name, "showlegend": number == 0, "flatshading": False}
+        trace |= {"name": name, "legendgroup": name, "showlegend": kind == shown, "flatshading": False}
         traces.append(trace)
     return traces
 

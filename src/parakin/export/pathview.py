@@ -76,7 +76,7 @@ def _close_up(posted: Posted, relative: Floats, tips: Points, drawn: Scene) -> F
 
 
 def _kept(posted: Posted, tips: Points, relative: Floats, most: int) -> Indices:
-    """Records to draw: the extremes of every coordinate and of the margin, and the ends of the rapids if not too many."""
+    """Records to draw: the extremes of every coordinate and of the margin, and the rapids' ends unless too many."""
     if len(tips) <= most:
         return np.arange(len(tips))
     parts = [extremes(values, most // 4) for values in (*tips.T, relative)]

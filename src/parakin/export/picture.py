@@ -38,12 +38,13 @@ def machine_html(machine: Machine, pose: ArrayLike | None = None) -> str:
         )
         for name, unit, value in zip(names, units, values, strict=True)
     )
+    what = "Home" if pose is None else "Pose"
     body = (
         f"<header><h1>{escape(machine.spec.title or machine.name)}</h1>"
         f"<p class=sub>{escape(machine.name)}: axes {escape(' '.join(machine.axes))}, "
         f"joints {escape(' '.join(machine.joints))}</p></header>\n"
         f"<section class=card>{placed('machine', {'data': traces, 'layout': layout}, '720px')}</section>\n"
-        f"<section class=card><h2>{'Home' if pose is None else 'Pose'} and joints</h2><table class=narrow>{rows}</table>"
+        f"<section class=card><h2>{what} and joints</h2><table class=narrow>{rows}</table>"
         f"<p class=sub>{escape(machine.spec.source)}</p></section>\n"
     )
     return page(machine.spec.title or machine.name, body)
@@ -63,7 +64,7 @@ def machine_png(machine: Machine, pose: ArrayLike | None = None) -> bytes:
     _solids(axes, drawn)
     _frames(axes, drawn)
     for name, place in drawn.labels:
-        axes.text(*(place + 0.022 * drawn.size), name, color=INK, fontsize=10.5, zorder=1000)
+        axes.text(*(place + 0.022 * drawn.size), name, color=INK, fontsize=10.5, zorder=1000, parse_math=False)
     title = machine.spec.title or machine.name
     figure.text(0.5, 0.955, title, ha="center", color=INK, fontsize=14, weight="bold", parse_math=False)
     data = BytesIO()
@@ -88,6 +89,7 @@ def _view(axes: Any, drawn: Scene) -> None:
         seen = half.max()
     axes.set_box_aspect(half, zoom=float(0.82 * np.linalg.norm(half) / seen))
     axes.tick_params(labelsize=8, colors="#607d8b")
+    axes.zaxis.set_tick_params(pad=7)  # clear of the ticks, which stand slanted
     axes.locator_params(nbins=5)
     if drawn.normal is None:
         axes.set_proj_type("persp", focal_length=1.4)

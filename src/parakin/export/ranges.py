@@ -84,7 +84,7 @@ def bounded(machine: Machine) -> tuple[list[Use], NDArray[np.int64]]:
 
 
 def relative_margin(machine: Machine, margins: Floats) -> Floats:
-    """(n,): the least of all margins, each over half its range: 1 in the middle, 0 at a limit, NaN where a leg can't close."""
+    """(n,): the least of all margins, each over half its range; 0 is at a limit, NaN where a leg can't close."""
     uses, of = bounded(machine)
     kept = of >= 0
     if not kept.any():

@@ -54,7 +54,8 @@ def _of(count: int, one: str) -> str:
 def _verdict(posted: Posted) -> str:
     path, first = posted.path, posted.first
     if not len(path):
-        return "<section class='card verdict bad'><strong>Nothing to run</strong><p>The file has no motion.</p></section>\n"
+        text = "<strong>Nothing to run</strong><p>The file has no motion.</p>"
+        return f"<section class='card verdict bad'>{text}</section>\n"
     if first is None:
         text = f"All {_of(len(path), 'record')} stay within every limit of {escape(posted.machine.name)}."
         return f"<section class='card verdict'><strong>Runs</strong><p>{text}</p></section>\n"
@@ -132,14 +133,15 @@ def _bar(posted: Posted, use: Use) -> str:
 def _space(posted: Posted, relative: NDArray[np.float64]) -> str:
     far, near, record = path_figures(posted, relative)
     at = f"line {int(posted.path.line[record])}, record {record:,}"
+    if posted.worst is not None and posted.worst.record == record:
+        at += ", the worst offence"
     left = (
-        f"<div>{placed('machine', far, '620px')}<p class=sub>The machine at {at}"
-        f"{', the worst offence' if posted.worst is not None and posted.worst.record == record else ''}; its shadow is at home."
+        f"<div>{placed('machine', far, '620px')}<p class=sub>The machine at {at}; its shadow is at home."
         " The surface is a coarse sample of where the tip can be at the path’s mean orientation.</p></div>"
     )
     right = (
-        f"<div>{placed('path', near, '620px')}<p class=sub>The tool tip’s path, coloured by the least margin of all limits"
-        " as a share of half the limit’s range: 0 % is a limit. Rapid motions are dashed.</p></div>"
+        f"<div>{placed('path', near, '620px')}<p class=sub>The tool tip’s path, coloured by the least margin of"
+        " all limits as a share of half the limit’s range: 0 % is a limit. Rapid motions are dashed.</p></div>"
     )
     return _card("Path in the workspace", f"<div class=two>{left}{right}</div>")
 
@@ -185,15 +187,15 @@ def _offences(posted: Posted) -> str:
     head = (
         "<tr><th>Line</th><th>What</th><th class=n>Beyond by</th><th class=n>Records</th><th>The line reads</th></tr>"
     )
-    table = f"<div class=wide><table>{head}{first}<tr><th colspan=5>Every broken limit at its worst</th></tr>{worst}</table></div>"
-    return _card("Offences", table)
+    rows = f"{head}{first}<tr><th colspan=5>Every broken limit at its worst</th></tr>{worst}"
+    return _card("Offences", f"<div class=wide><table>{rows}</table></div>")
 
 
 def _offence(offence: Offence, text: dict[int, str], count: bool) -> str:
-    beyond = shown(offence.excess, offence.unit)
+    beyond, reads = shown(offence.excess, offence.unit), escape(text.get(offence.line, ""))
     return (
         f"<tr><td>{offence.line}</td><td>{escape(offence.text)}</td><td class=n>{beyond}</td>"
-        f"<td class=n>{f'{offence.count:,}' if count else ''}</td><td><code>{escape(text.get(offence.line, ''))}</code></td></tr>\n"
+        f"<td class=n>{f'{offence.count:,}' if count else ''}</td><td><code>{reads}</code></td></tr>\n"
     )
 
 

@@ -225,7 +225,7 @@ def _chain(steps: Sequence[Step], joints: Sequence[float]) -> Iterator[tuple[Poi
 
 
 def _feet(leg: Leg, point: Sequence[float], joints: list[float], strut: Points) -> Iterator[Points]:
-    """The feet of all struts over each drive's range, (samples, struts, 3); the drives after it are at their low end."""
+    """The feet of all struts over each drive's range, (samples, struts, 3); the drives after it at their low end."""
     length = float(np.linalg.norm(strut[1] - strut[0]))
     spans = [_span(d.low, d.high, q, unit, length) for d, q, unit in zip(leg.drives, joints, leg.units, strict=True)]
     for number, (low, high) in enumerate(spans):
@@ -242,7 +242,7 @@ def _span(low: float, high: float, q: float, unit: str, length: float) -> tuple[
 
 
 def around(points: Points) -> Points:
-    """The distinct points as a polygon: in order round their middle, in their own plane; of those on a line the ends."""
+    """The distinct points as a polygon: in order round their middle in their own plane; of a line the ends."""
     points = np.array(_distinct(list(points)))
     if len(points) < 3:
         return points

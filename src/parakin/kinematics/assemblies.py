@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..direct import poses_of, roots, tolerance
+from .direct import poses_of, roots, tolerance
 from ..errors import NoMethodError, PoseError
 from ..kernels.batch import run_checked
 from ..kernels.intervals import IntervalProgram
@@ -53,7 +53,8 @@ def assemblies(machine: Machine, joints: ArrayLike) -> Array:
     given = np.ascontiguousarray(np.broadcast_to(rows, (len(coordinates), rows.shape[1])))
     good = roots(machine, coordinates, given, most=0, poses=False).residual <= tolerance(machine)
     coordinates, given = coordinates[good], given[good]
-    return poses_of(machine, np.ascontiguousarray(coordinates), given)
+    poses = poses_of(machine, np.ascontiguousarray(coordinates), given)
+    return poses[np.isfinite(poses).all(1)]
 
 
 def _spheres(machine: Machine, rows: Array) -> Array:

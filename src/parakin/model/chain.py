@@ -104,6 +104,12 @@ class Pointing:
             raise ParakinError(f"{what}: its second axis lies along the tool and can't point it")
         return pointing
 
+    @property
+    def level(self) -> bool:
+        """Both solutions turn the second axis as far: the direction at rest is at right angles to both axes."""
+        normal = cross(self.first, self.second)
+        return bool(abs(dot(self.second, cross(self.start, normal))) < 1e-12)
+
     def solve(self, v: Vec, branch: str, first: Scalar | None = None) -> Angles:
         """Joints that point to the unit vector ``v``.
 
@@ -126,9 +132,7 @@ class Pointing:
             square = (1.0 - lam * lam - mu * mu - 2.0 * a * (lam * mu)) / n2
             reach = (square,)
             nu = sqrt(square)
-        greater = float(dot(a2, cross(w, normal))) * self.signs[1]
-        if abs(greater) < 1e-12:
-            greater = float(dot(w, normal))
+        greater = float(dot(w, normal) if self.level else dot(a2, cross(w, normal)) * self.signs[1])
         if (greater < 0.0) == (branch == "+"):
             nu = -nu
         middle = add(add(scale(a1, lam), scale(a2, mu)), scale(normal, nu))  # v before the first turn

@@ -8,7 +8,7 @@ the base frame.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from ..errors import ParakinError
@@ -26,6 +26,7 @@ from .algebra import (
     product,
     scale,
     sincos,
+    smaller,
     sqrt,
     sub,
     transposed,
@@ -299,7 +300,27 @@ class CentralLeg(FiveAxis):
         turned, tip = frame(self.spec.head, serial)
         world = add(apply(self.mount, add(origin, apply(rotation, tip))), self.base)
         k = apply(self.mount, apply(rotation, apply(turned, UNIT["tz"])))
-        return [*world, *axis_angles(k)]
+        b, c = axis_angles(k)
+        # Beyond these the leg points there the other way round, with its platform turned: no pose says that.
+        for margin in self._inside(coordinates):
+            b = smaller(b, 100.0 + sqrt(margin))
+        return [*world, b, c]
+
+    def _inside(self, coordinates: Sequence[Scalar]) -> Iterator[Scalar]:
+        """What is ≥ 0 where :meth:`place` would give these coordinates back."""
+        yield self.sign * (coordinates[-1] + self.above)
+        if not self.roll:
+            s, c = sincos(coordinates[1])
+            yield c if self.swing.level else s
+
+    def start(self, pose: Sequence[Scalar], serial: Sequence[Scalar]) -> list[Scalar]:
+        if not self.roll:
+            return super().start(pose, serial)
+        rotation, tz, angles = self._swing(pose)
+        k = apply(transposed(self.mount), tool_axis(pose[3], pose[4])[0])
+        v = apply(transposed(rotation), k)
+        w = apply(frame(self.spec.head, serial)[0], UNIT["tz"])  # turned onto v by the platform's own turn
+        return [*angles, atan2(w[0] * v[1] - w[1] * v[0], w[0] * v[0] + w[1] * v[1]), tz]
 
     def closure(self, pose: Sequence[Scalar], serial: Sequence[Scalar]) -> tuple[Mat, Vec, list[Scalar]]:
         turned, _ = frame(self.spec.head, serial)
@@ -318,7 +339,11 @@ def structure_of(spec: Spec) -> Structure:
     twice = [bound.name for bound in spec.limits.passive if spec.motion.count(bound.name) > 1]
     if twice:
         raise ParakinError(f"limits: passive {twice[0]} stands twice in the motion, so it is not one coordinate")
-    driven = sum(step.drive is not None for step in (*spec.head, *spec.table))
+    drives = [step for step in (*spec.head, *spec.table) if step.drive is not None]
+    for step in drives:
+        if step.axis in TRANSLATIONS:
+            raise ParakinError(f"joint {step.drive.name if step.drive else ''}: drives of head and table turn; {step.axis} can't be one")
+    driven = len(drives)
     if spec.motion[0] in ROTATIONS:
         return CentralLeg(spec)
     if driven == 0:

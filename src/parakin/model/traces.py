@@ -11,6 +11,7 @@ from math import inf
 
 import numpy as np
 
+from ..errors import ParakinError
 from ..kernels.tape import Tape, compile_tape
 from .algebra import Scalar, Trace, Vec, apply, derivative, norm, scale, sub, transposed, values
 from .legs import Inverse
@@ -112,7 +113,12 @@ class Model:
     @cached_property
     def limits(self) -> tuple[Limit, ...]:
         joints, _, _ = self.invert(self.home, self.mode)
-        return tuple(limit for limit, _ in self.margins(self.home, joints, self.mode))
+        limits = tuple(limit for limit, _ in self.margins(self.home, joints, self.mode))
+        names = [limit.name for limit in limits]
+        for name in names:
+            if names.count(name) > 1:
+                raise ParakinError(f"limits: two limits are called {name}; rename the joint or join the limits")
+        return limits
 
     @cached_property
     def least_joints(self) -> list[float]:

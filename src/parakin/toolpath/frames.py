@@ -14,7 +14,7 @@ from ..errors import InputError
 from ..machine import Machine
 from ..model.algebra import apply
 from ..model.structure import Free
-from ..path import FREE, neighbours, unwound
+from ..kinematics.path import FREE, neighbours, unwound
 from ..quantities import ANGLE, LENGTH, QuantityError, nearest, quantity, shown
 from .cl_words import LARGEST, is_number, number
 from .program import Floats

@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from .kernels.batch import run
+from ..kernels.batch import run
 
 if TYPE_CHECKING:
-    from .machine import Array, Machine
+    from ..machine import Array, Machine
 
 FREE = 1e-18  # sin² of the tool's axis against a turning axis: below 1e-9 rad its angle is rounding
 

@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .errors import NoMethodError, PoseError
-from .kernels.batch import Roots, run, run_checked, solve
+from ..errors import NoMethodError, PoseError
+from ..kernels.batch import Roots, run, run_checked, solve
 
 if TYPE_CHECKING:
-    from .machine import Array, Machine
+    from ..machine import Array, Machine
 
 GOOD = 1e-9  # greatest closure error of an answer, mm in a machine of a metre
 MOST_STEPS = 24
@@ -73,7 +73,7 @@ def forward(machine: Machine, joints: ArrayLike, near: ArrayLike | None = None, 
     else:
         raise PoseError(f'method {method!r}: "closed", "newton" or "constant" expected')
     poses, residual, converged, steps = found
-    converged &= (rows >= machine.model.least_joints).all(1)
+    converged &= (rows >= machine.model.least_joints).all(1) & ~np.isnan(poses[:, 0])
     if not converged.all():
         poses[~converged] = np.nan
     if machine.axes[3:] == ("B", "C"):

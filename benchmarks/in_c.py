@@ -59,7 +59,9 @@ def compiled(text: str, flags: tuple[str, ...] = ("-O2",)) -> Callable[[np.ndarr
     """The batch function of C source, built by gcc."""
     folder = Path(tempfile.mkdtemp())
     (folder / "batch.c").write_text(text)
-    subprocess.run(["gcc", *flags, "-shared", "-fPIC", "-o", folder / "batch.so", folder / "batch.c", "-lm"], check=True)
+    subprocess.run(
+        ["gcc", *flags, "-shared", "-fPIC", "-o", folder / "batch.so", folder / "batch.c", "-lm"], check=True
+    )
     batch = ctypes.CDLL(str(folder / "batch.so")).batch
     batch.restype = None
 

@@ -1,4 +1,4 @@
-"""A CL file of a million records, from file to CSV, against what numpy.loadtxt needs to read the same numbers as CSV."""
+"""A CL file of a million records, from file to CSV, against numpy.loadtxt of the same numbers as CSV."""
 
 from __future__ import annotations
 

@@ -31,10 +31,18 @@ def main() -> str:
     rows = [
         ["bare interpreter", f"{best(lambda: run(['-c', 'pass']), 5):.2f}", ""],
         ["parakin --help", f"{best(lambda: run([*command, '--help']), 5):.2f}", "≤ 0.3"],
-        ["parakin inverse, kernels compiled", f"{best(lambda: run([*command, 'inverse', 'tricept', 'Z=-1600']), 3):.2f}", "≤ 1.5"],
+        [
+            "parakin inverse, kernels compiled",
+            f"{best(lambda: run([*command, 'inverse', 'tricept', 'Z=-1600']), 3):.2f}",
+            "≤ 1.5",
+        ],
         ["import parakin; one inverse", f"{best(lambda: run(['-c', INVERSE]), 3):.2f}", "≤ 1.5"],
         ["parakin inverse, first after an install", f"{once([*command, 'inverse', 'tricept', 'Z=-1600']):.2f}", "≤ 10"],
-        ["parakin forward, first after an install", f"{once([*command, 'forward', 'hexapod', *['990'] * 6]):.2f}", "≤ 10"],
+        [
+            "parakin forward, first after an install",
+            f"{once([*command, 'forward', 'hexapod', *['990'] * 6]):.2f}",
+            "≤ 10",
+        ],
     ]
     return table("Starting up", ["what", "s", "bound"], rows)
 

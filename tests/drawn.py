@@ -104,6 +104,7 @@ def _leg(rng, kind, number, end, plane):
 
 def _two_turns(rng, family):
     """Head and table with the driven turns that the family wants, between fixed tilts and offsets."""
+
     def fixed(word):
         return (word, round(rng.uniform(-0.4, 0.4) if word[0] == "r" else rng.uniform(-80, 80), 2), None, 1.0)
 
@@ -168,8 +169,6 @@ def draw(family, seed, count=40):
     poses = d.pose(frame, joints)
     d.home = poses[0]
     return d, poses
-
-
 
 
 def machine_of(d, folder):

@@ -30,8 +30,10 @@ class Description:
             | {k: v for k, v in vars(leg).items() if k != "drives"}
             for leg in spec.legs
         ]
-        steps = [[(s.axis, s.value, s.drive and s.drive.name, s.sign) for s in part]
-                 for part in (spec.head, spec.table, spec.mounting)]
+        steps = [
+            [(s.axis, s.value, s.drive and s.drive.name, s.sign) for s in part]
+            for part in (spec.head, spec.table, spec.mounting)
+        ]
         return cls(tuple(spec.motion), legs, *steps)
 
     @property
@@ -137,6 +139,7 @@ class Description:
 
 def leg_misses(leg, end, q):
     """By how much a leg's rods miss, mm, with its platform joint at ``end`` (N, 3)."""
+
     def far(point):
         return np.linalg.norm(end - point, axis=1)
 

@@ -59,8 +59,10 @@ def closes(m, d, poses, joints):
     miss, tilt = d.misses(poses, rows)
     assert miss.max(initial=0.0) < 1e-9
     assert tilt.max(initial=0.0) < 1e-9
-    off = np.min([np.nan_to_num(np.abs(signed(m, m.inverse(poses, mode=mode), rows)).max(1), nan=9e9)
-                  for mode in m.modes], axis=0)
+    off = np.min(
+        [np.nan_to_num(np.abs(signed(m, m.inverse(poses, mode=mode), rows)).max(1), nan=9e9) for mode in m.modes],
+        axis=0,
+    )
     assert off.max(initial=0.0) < 1e-6  # near a serial singularity the joints follow the closure's root
 
 
@@ -117,6 +119,7 @@ def test_the_tricept_has_no_others_within_its_passive_limits():
     poses = poses[m.check(poses) == 0][:4]
     vectors = [*m.inverse(poses), [500.0, 520.0, 480.0, 0.2, 0.3], [400.0, 310.0, 330.0, 0.2, 0.3]]
     for joints in vectors:
+
         def legs(x, d=joints):
             (sp, st_), (cp, ct), p = np.sin(x[:, :2]).T, np.cos(x[:, :2]).T, x[:, 2]
             common, half = p**2 + small**2 + big**2, small * big / 2.0

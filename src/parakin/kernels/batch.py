@@ -95,4 +95,3 @@ def first_negative(tape: Tape, x: Rows, z: Rows) -> NDArray[np.int64]:
     args = (*tape.parts, x, z, out)
     split(len(x), lambda start, stop: first_broken(*args, start, stop))
     return out
-

@@ -111,8 +111,8 @@ def closures(code, imm, inputs, m, held, r, f, worst, n):
 def descend(full, light, m, q, caps, size, most, room, n):
     """Newton on one block, in its working arrays ``room``; the number of steps.
 
-    ``held`` (m + joints rows) has the start and ends with the root, ``worst`` is each lane's greatest closure left, ``turn0`` and ``turn`` the determinants at the start and at the last
-    factoring.
+    ``held`` (m + joints rows) has the start and ends with the root, ``worst`` is each lane's greatest closure left,
+    ``turn0`` and ``turn`` are the determinants at the start and at the last factoring.
     """
     held, r, a, swaps, wanted, f, turn, turn0, worst, shrink = room
     inputs = m + q
@@ -156,8 +156,8 @@ def descend(full, light, m, q, caps, size, most, room, n):
 def newton(begin, full, light, end, registers, near, q, caps, size, most, out, residual, steps, sides, start, stop):
     """Solve f(y, q) = 0 for rows start ≤ i < stop of ``q``.
 
-    Tapes, as (code, imm): ``begin`` takes a row of ``near`` (N or 1, k) and q to the coordinates y (m), ``full`` takes y and
-    q to f, mm, then ∂f/∂y, ``light`` to f only, ``end`` takes y and q to a row of ``out``. ``caps`` (m,) bounds a
+    Tapes, as (code, imm): ``begin`` takes a row of ``near`` (N or 1, k) and q to the coordinates y (m), ``full`` takes
+    y and q to f, mm, then ∂f/∂y, ``light`` to f only, ``end`` takes y and q to a row of ``out``. ``caps`` (m,) bounds a
     step's coordinates; ``size`` is the legs' length, mm. ``residual`` (N,) is the greatest |f| left, mm; ``sides``
     (N, 2) the determinants at the start and at the last factoring.
     """

@@ -7,14 +7,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .direct import poses_of, roots, tolerance
 from ..errors import NoMethodError, PoseError
 from ..kernels.batch import run_checked
 from ..kernels.intervals import IntervalProgram
 from ..model.algebra import Trace, derivative
+from ..model.chain import rotation_about
 from ..model.legs.lambda_ import Lambda
 from ..model.structure import CentralLeg, Free
 from .boxes import isolated
+from .direct import poses_of, roots, tolerance
 from .planar import planar_poses
 
 if TYPE_CHECKING:
@@ -172,7 +173,7 @@ def _lambdas(machine: Machine, rows: Array) -> Array:
         flat = corners @ tilt.T @ side.T
         height = heights[0] - axis @ (tilt @ corners[0])
         for x, y, turn in planar_poses(feet @ side.T, distances, flat):
-            spin = _about(axis, turn)
+            spin = np.array(rotation_about(axis.tolist(), np.sin(turn), np.cos(turn)))
             origin = side.T @ np.array([x, y]) + height * axis
             found.append(np.array(structure.coordinates_of((spin @ tilt).tolist(), origin.tolist())))
     return np.array(found).reshape(-1, 6)
@@ -184,18 +185,13 @@ def _home_axis(machine: Machine, axis: Array) -> Array:
     return seen
 
 
-def _about(axis: Array, angle: float) -> Array:
-    x, y, z = axis
-    skew = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    return np.eye(3) + np.sin(angle) * skew + (1.0 - np.cos(angle)) * (skew @ skew)
-
-
 def _rotation_between(start: Array, end: Array) -> Array:
     """A rotation that takes the unit vector ``start`` to ``end``."""
     middle = start + end
     size = middle @ middle
     if size < 1e-12:  # opposite: half a turn about anything at right angles
-        across = np.linalg.svd(start[None, :])[2][1]
-        return 2.0 * np.outer(across, across) - np.eye(3)
-    half = middle / np.sqrt(size)  # half a turn about it takes start to end
-    return 2.0 * np.outer(half, half) - np.eye(3)
+        axis: Array = np.linalg.svd(start[None, :])[2][1]
+    else:
+        axis = middle / np.sqrt(size)
+    turned: Array = 2.0 * np.outer(axis, axis) - np.eye(3)  # half a turn about it takes start to end
+    return turned

@@ -80,7 +80,10 @@ def forward(machine: Machine, joints: ArrayLike, near: ArrayLike | None = None, 
         upright = poses[:, 3] < FREE
         poses[upright, 4] = 0.0 if starts is None else starts[upright, 4]
     return Solution(
-        poses.reshape(*lead, len(machine.axes)), residual.reshape(lead)[()], converged.reshape(lead)[()], steps.reshape(lead)[()]
+        poses.reshape(*lead, len(machine.axes)),
+        residual.reshape(lead)[()],
+        converged.reshape(lead)[()],
+        steps.reshape(lead)[()],
     )
 
 

@@ -77,7 +77,8 @@ def platform_points(spec: Spec, rotation: Mat, origin: Vec) -> list[Vec]:
     return [add(origin, apply(rotation, leg.platform)) for leg in spec.legs]
 
 
-def _between(name: str, subject: str, unit: Literal["mm", "rad"], value: Scalar, low: float, high: float
+def _between(
+    name: str, subject: str, unit: Literal["mm", "rad"], value: Scalar, low: float, high: float
 ) -> Iterator[tuple[Limit, Scalar]]:
     if isfinite(low):
         yield Limit(f"{name}.min", subject, unit, "min", low), value - low
@@ -172,4 +173,3 @@ def distance(a: tuple[Vec, Vec], b: tuple[Vec, Vec]) -> Scalar:
 
 def _clamped(x: Scalar) -> Scalar:
     return larger(smaller(x, 1.0), 0.0)
-

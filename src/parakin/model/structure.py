@@ -342,7 +342,9 @@ def structure_of(spec: Spec) -> Structure:
     drives = [step for step in (*spec.head, *spec.table) if step.drive is not None]
     for step in drives:
         if step.axis in TRANSLATIONS:
-            raise ParakinError(f"joint {step.drive.name if step.drive else ''}: drives of head and table turn; {step.axis} can't be one")
+            raise ParakinError(
+                f"joint {step.drive.name if step.drive else ''}: drives of head and table turn; {step.axis} can't be one"
+            )
     driven = len(drives)
     if spec.motion[0] in ROTATIONS:
         return CentralLeg(spec)

@@ -49,7 +49,8 @@ class Model:
 
     # The problems, on scalars of any kind.
 
-    def invert(self, pose: Sequence[Scalar], mode: str, first: Scalar | None = None
+    def invert(
+        self, pose: Sequence[Scalar], mode: str, first: Scalar | None = None
     ) -> tuple[list[Scalar], Placement, list[Inverse]]:
         """Joint vector, placement and each leg's inverse for a pose."""
         signs, branch = self.split_mode(mode)
@@ -100,7 +101,7 @@ class Model:
 
     @cached_property
     def sizes(self) -> list[float]:
-        """A length a closure, mm: dividing by it makes a closure no less than the distance by which the leg stays open."""
+        """A length a closure, mm: divided by it a closure is (no less than) the distance by which its leg is open."""
         joints, placed, _ = self.invert(self.home, self.mode)
         points = platform_points(self.spec, placed.rotation, placed.origin)
         given = leg_joints(self.spec, joints)

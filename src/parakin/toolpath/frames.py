@@ -11,10 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
+from ..kinematics.path import FREE, neighbours, unwound
 from ..machine import Machine
 from ..model.algebra import apply
 from ..model.structure import Free
-from ..kinematics.path import FREE, neighbours, unwound
 from ..quantities import ANGLE, LENGTH, QuantityError, nearest, quantity, shown
 from .cl_words import LARGEST, is_number, number
 from .program import Floats

@@ -173,7 +173,7 @@ def _lambdas(machine: Machine, rows: Array) -> Array:
         flat = corners @ tilt.T @ side.T
         height = heights[0] - axis @ (tilt @ corners[0])
         for x, y, turn in planar_poses(feet @ side.T, distances, flat):
-            spin = np.array(rotation_about(axis.tolist(), np.sin(turn), np.cos(turn)))
+            spin: Array = np.array(rotation_about(axis.tolist(), np.sin(turn), np.cos(turn)))
             origin = side.T @ np.array([x, y]) + height * axis
             found.append(np.array(structure.coordinates_of((spin @ tilt).tolist(), origin.tolist())))
     return np.array(found).reshape(-1, 6)

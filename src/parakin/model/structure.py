@@ -339,12 +339,10 @@ def structure_of(spec: Spec) -> Structure:
     twice = [bound.name for bound in spec.limits.passive if spec.motion.count(bound.name) > 1]
     if twice:
         raise ParakinError(f"limits: passive {twice[0]} stands twice in the motion, so it is not one coordinate")
-    drives = [step for step in (*spec.head, *spec.table) if step.drive is not None]
-    for step in drives:
-        if step.axis in TRANSLATIONS:
-            raise ParakinError(
-                f"joint {step.drive.name if step.drive else ''}: drives of head and table turn; {step.axis} can't be one"
-            )
+    drives = [(step.axis, step.drive.name) for step in (*spec.head, *spec.table) if step.drive is not None]
+    for axis, name in drives:
+        if axis in TRANSLATIONS:
+            raise ParakinError(f"joint {name}: the drives of head and table turn; {axis} can't be one")
     driven = len(drives)
     if spec.motion[0] in ROTATIONS:
         return CentralLeg(spec)

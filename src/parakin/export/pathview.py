@@ -30,14 +30,22 @@ def path_figures(posted: Posted, relative: Floats) -> tuple[Figure, Figure, int]
     """
     record = _telling(posted, relative)
     machine = posted.machine
-    drawn = scene(machine, posted.poses[record], posted.joints[record], posted.mode)
     home = scene(machine)
+    joints = posted.joints[record]
+    if np.isfinite(joints).all():
+        drawn, where = (
+            scene(machine, posted.poses[record], joints, posted.mode),
+            f"line {int(posted.path.line[record])}",
+        )
+    else:  # no record is within reach
+        drawn, where = home, "home"
     place = drawn.workpiece
     tips = tip_points(machine, posted.poses) @ place[:, :3].T + place[:, 3]
     kept = _kept(posted, tips, relative, _FAR)
     size = home.size
-    far = machine_traces(drawn, f"machine at line {int(posted.path.line[record])}", size)
-    far += machine_traces(home, "machine at home", size, "#78909c")
+    far = machine_traces(drawn, f"machine at {where}", size)
+    if drawn is not home:
+        far += machine_traces(home, "machine at home", size, "#78909c")
     cloud, reach = _workspace(posted, place, tips, size)
     far += cloud
     far += [_motion(posted, tips, kept, False, {"color": "#00695c", "width": 3}, "tool path")]

@@ -135,8 +135,11 @@ def _space(posted: Posted, relative: NDArray[np.float64]) -> str:
     at = f"line {int(posted.path.line[record])}, record {record:,}"
     if posted.worst is not None and posted.worst.record == record:
         at += ", the worst offence"
+    at += "; its shadow is at home"
+    if not np.isfinite(posted.joints[record]).all():
+        at = "home, for it can take no record"
     left = (
-        f"<div>{placed('machine', far, '620px')}<p class=sub>The machine at {at}; its shadow is at home."
+        f"<div>{placed('machine', far, '620px')}<p class=sub>The machine at {at}."
         " The surface is a coarse sample of where the tip can be at the path’s mean orientation.</p></div>"
     )
     right = (

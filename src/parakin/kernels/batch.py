@@ -28,6 +28,17 @@ def _pool() -> ThreadPoolExecutor:
     return ThreadPoolExecutor(cores(), thread_name_prefix="parakin")
 
 
+if hasattr(os, "register_at_fork"):  # a forked child has the pool but none of its threads
+    os.register_at_fork(after_in_child=_pool.cache_clear)
+
+
+def _still(rows: Rows) -> Rows:
+    """A read-only view: to Numba that is a type of its own, and the kernels are compiled for it alone."""
+    view = rows.view()
+    view.flags.writeable = False
+    return view
+
+
 def split(count: int, work: Callable[[int, int], None]) -> None:
     """Run ``work(start, stop)`` over all rows; the kernels release the interpreter's lock."""
     parts = min(cores(), count // SMALL)
@@ -47,7 +58,7 @@ def run(tape: Tape, x: Rows, out: Rows, z: Rows | None = None, whole: bool = Tru
     from .blocks import evaluate
 
     given = np.empty((len(x), 0)) if z is None else z
-    args = (*tape.parts, whole, x, given, out)
+    args = (*tape.parts, whole, _still(x), _still(given), out)
     split(len(x), lambda start, stop: evaluate(*args, start, stop))
     return out
 
@@ -59,20 +70,20 @@ class Roots:
     found: Rows  # what the last tape makes of the root
     residual: Rows  # the greatest closure left, mm
     steps: NDArray[np.int32]
-    sides: Rows  # (N, 2): determinants of the closures' derivatives at the start and at the end
+    turned: Rows  # below 0 where the root is on the other side of a singularity; see :func:`solve`
 
 
-def solve(tapes: tuple[Tape, Tape, Tape, Tape], near: Rows, q: Rows, caps: Rows, size: float, most: int) -> Roots:
+def solve(
+    tapes: tuple[Tape, Tape, Tape, Tape], near: Rows, q: Rows, caps: Rows, size: float, most: int, side: Rows
+) -> Roots:
     """Newton from ``near`` (1 or N rows) for every row of ``q``; see :func:`parakin.kernels.newton.newton`."""
     from .newton import newton
 
     count = len(q)
-    result = Roots(
-        np.empty((count, tapes[3].outputs)), np.empty(count), np.empty(count, np.int32), np.empty((count, 2))
-    )
+    result = Roots(np.empty((count, tapes[3].outputs)), np.empty(count), np.empty(count, np.int32), np.empty(count))
     programs = [(tape.code, tape.imm) for tape in tapes]
-    args = (*programs, max(tape.registers for tape in tapes), near, q, caps, size, most)
-    into = (result.found, result.residual, result.steps, result.sides)
+    args = (*programs, max(tape.registers for tape in tapes), _still(near), _still(q), caps, size, most, side)
+    into = (result.found, result.residual, result.steps, result.turned)
     split(count, lambda start, stop: newton(*args, *into, start, stop))
     return result
 
@@ -82,7 +93,7 @@ def run_checked(tape: Tape, x: Rows, out: Rows, z: Rows) -> Rows:
     from .blocks import evaluate_checked
 
     worst = np.empty(len(x))
-    args = (*tape.parts, x, z, out, worst)
+    args = (*tape.parts, _still(x), _still(z), out, worst)
     split(len(x), lambda start, stop: evaluate_checked(*args, start, stop))
     return worst
 
@@ -92,6 +103,6 @@ def first_negative(tape: Tape, x: Rows, z: Rows) -> NDArray[np.int64]:
     from .blocks import first_broken
 
     out = np.empty(len(x), np.int64)
-    args = (*tape.parts, x, z, out)
+    args = (*tape.parts, _still(x), _still(z), out)
     split(len(x), lambda start, stop: first_broken(*args, start, stop))
     return out

@@ -153,13 +153,17 @@ def descend(full, light, m, q, caps, size, most, room, n):
 
 
 @njit(nogil=True, cache=True, fastmath=FAST, error_model="numpy")
-def newton(begin, full, light, end, registers, near, q, caps, size, most, out, residual, steps, sides, start, stop):
+def newton(
+    begin, full, light, end, registers, near, q, caps, size, most, side, out, residual, steps, turned, start, stop
+):
     """Solve f(y, q) = 0 for rows start ≤ i < stop of ``q``.
 
     Tapes, as (code, imm): ``begin`` takes a row of ``near`` (N or 1, k) and q to the coordinates y (m), ``full`` takes
     y and q to f, mm, then ∂f/∂y, ``light`` to f only, ``end`` takes y and q to a row of ``out``. ``caps`` (m,) bounds a
-    step's coordinates; ``size`` is the legs' length, mm. ``residual`` (N,) is the greatest |f| left, mm; ``sides``
-    (N, 2) the determinants at the start and at the last factoring.
+    step's coordinates; ``size`` is the legs' length, mm. ``residual`` (N,) is the greatest |f| left, mm,
+    NaN where the row of ``out`` is; ``turned``
+    (N,) the determinant at the last factoring times ``side``: a row's own or a common one, or, where there is none, the
+    determinant at the start. Below 0 the root is on the other side of a singularity.
     """
     m = caps.shape[0]
     given, joints = near.shape[1], q.shape[1]
@@ -184,9 +188,10 @@ def newton(begin, full, light, end, registers, near, q, caps, size, most, out, r
         step = descend(full, light, m, joints, caps, size, most, room, n)
         for j in range(n):
             steps[row + j] = step
-            residual[row + j] = worst[j] + bad[j]
-            sides[row + j, 0] = turn0[j]
-            sides[row + j, 1] = turn[j]
+            if side.shape[0] == 0:
+                turned[row + j] = turn[j] * turn0[j]
+            else:
+                turned[row + j] = turn[j] * side[0 if side.shape[0] == 1 else row + j]
         r[: (m + joints) * LANES] = held
         interpret(end[0], end[1], r)
         for i in range(out.shape[1]):
@@ -194,3 +199,5 @@ def newton(begin, full, light, end, registers, near, q, caps, size, most, out, r
             for j in range(LANES):
                 bad[j] += 0.0 * r[s + j]
         store(out, row, n, m + joints, r, bad)
+        for j in range(n):
+            residual[row + j] = worst[j] + bad[j]

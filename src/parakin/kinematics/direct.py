@@ -73,7 +73,6 @@ def forward(machine: Machine, joints: ArrayLike, near: ArrayLike | None = None, 
     else:
         raise PoseError(f'method {method!r}: "closed", "newton" or "constant" expected')
     poses, residual, converged, steps = found
-    converged &= (rows >= machine.model.least_joints).all(1) & ~np.isnan(poses[:, 0])
     if not converged.all():
         poses[~converged] = np.nan
     if machine.axes[3:] == ("B", "C"):
@@ -100,17 +99,28 @@ def poses_of(machine: Machine, coordinates: Array, joints: Array) -> Array:
     return run(machine.model.end_tape(), coordinates, np.empty((len(joints), len(machine.axes))), joints)
 
 
-def roots(machine: Machine, near: Array, joints: Array, *, most: int = MOST_STEPS, poses: bool = True) -> Roots:
+def roots(
+    machine: Machine,
+    near: Array,
+    joints: Array,
+    *,
+    most: int = MOST_STEPS,
+    poses: bool = True,
+    side: Array | None = None,
+) -> Roots:
     """Newton on the closures from ``near`` (1 or N rows), poses or else the motion's coordinates, to the same kind.
 
-    ``most`` = 0 only looks at the start.
+    ``most`` = 0 only looks at the start. ``side`` tells the side of the singularities to end on, as
+    :func:`side_of` gives it; by default that of the start.
     """
     model = machine.model
     size = max(model.sizes)
     # A step goes a third of the legs' size or half a radian at most.
     caps = np.array([size / 3.0 if word.startswith("t") else 0.5 for word in model.structure.coordinates])
     tapes = model.begin_tape(poses), model.newton_tape(True), model.newton_tape(False), model.end_tape(poses)
-    return solve(tapes, np.ascontiguousarray(near), joints, caps, min(model.sizes), most)
+    return solve(
+        tapes, np.ascontiguousarray(near), joints, caps, min(model.sizes), most, np.empty(0) if side is None else side
+    )
 
 
 def _closed(machine: Machine, joints: Array, starts: Array | None) -> _Found:
@@ -125,13 +135,15 @@ def _closed(machine: Machine, joints: Array, starts: Array | None) -> _Found:
     return poses, residual, residual <= tolerance(machine), np.zeros(len(joints), np.int32)
 
 
+def side_of(machine: Machine, poses: Array) -> Array:
+    """The determinant of the closures' derivatives at poses, (N,): its sign tells the assembly mode."""
+    return roots(machine, poses, machine.inverse(poses), most=0, side=np.ones(1)).turned
+
+
 def _newton(machine: Machine, joints: Array, starts: Array | None) -> _Found:
     near = machine.home[None, :] if starts is None else starts
-    result = roots(machine, near, joints)
-    side = result.sides[:, 0]
-    if starts is None:
-        side = roots(machine, near, machine.inverse(near), most=0).sides[:, 1]
-    good = (result.residual <= tolerance(machine)) & (result.sides[:, 1] * side > 0.0)
+    result = roots(machine, near, joints, side=side_of(machine, near) if starts is None else None)
+    good = (result.residual <= tolerance(machine)) & (result.turned > 0.0)
     if not good.all():
         _continue(machine, near, joints, result, good)
     return result.found, result.residual, good, result.steps
@@ -146,13 +158,13 @@ def _continue(machine: Machine, near: Array, joints: Array, result: Roots, good:
             return
         walk = np.broadcast_to(near if len(near) == 1 else near[lost], (len(lost), near.shape[1]))
         begin = machine.inverse(walk)
-        side = roots(machine, walk, begin, most=0).sides[:, 1]
+        side = side_of(machine, np.ascontiguousarray(walk))
         with np.errstate(invalid="ignore", over="ignore"):
             for part in range(1, parts + 1):
-                step = roots(machine, walk, begin + (part / parts) * (joints[lost] - begin))
+                step = roots(machine, walk, begin + (part / parts) * (joints[lost] - begin), side=side)
                 walk = step.found
                 result.steps[lost] += step.steps
-            fine = (step.residual <= tolerance(machine)) & (step.sides[:, 1] * side > 0.0)
+            fine = (step.residual <= tolerance(machine)) & (step.turned > 0.0)
         result.found[lost[fine]], result.residual[lost[fine]] = walk[fine], step.residual[fine]
         good[lost[fine]] = True
 

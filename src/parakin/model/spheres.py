@@ -15,7 +15,8 @@ def common_point(
 ) -> Vec:
     """The point at ``radii`` from ``centres``; NaN where there is none.
 
-    ``plane`` names the coordinates in which the circles lie, all three for spheres. Of the two points the one on
+    ``plane`` names the coordinates in which the point moves, two for circles (cut from the spheres by the plane where
+    the third coordinate is 0), all three for spheres. Of the two points the one on
     ``side`` (±1) of the plane (line) through the centres, or, with None, the one on the side of ``near``.
     """
     first = centres[0]
@@ -26,16 +27,18 @@ def common_point(
         u: Vec = tuple(0.0 if c == out else x for c, x in enumerate(sub(centres[1], first)))
         normal = cross(across, u)
         size = dot(normal, normal)
-        a = 0.5 * (radii[0] * radii[0] - radii[1] * radii[1] + size)
-        foot = scale(u, a / size)
+        first = tuple(0.0 if c == out else x for c, x in enumerate(first))
+        squares = [r * r - c[out] * c[out] for r, c in zip(radii, centres, strict=True)]
+        foot = scale(u, 0.5 * (squares[0] - squares[1] + size) / size)
     else:
         u, v = sub(centres[1], first), sub(centres[2], first)
         normal = cross(u, v)
         size = dot(normal, normal)
-        a = 0.5 * (radii[0] * radii[0] - radii[1] * radii[1] + dot(u, u))
-        b = 0.5 * (radii[0] * radii[0] - radii[2] * radii[2] + dot(v, v))
+        squares = [r * r for r in radii]
+        a = 0.5 * (squares[0] - squares[1] + dot(u, u))
+        b = 0.5 * (squares[0] - squares[2] + dot(v, v))
         foot = add(scale(cross(v, normal), a / size), scale(cross(normal, u), b / size))
-    height = sqrt((radii[0] * radii[0] - dot(foot, foot)) / size)  # in units of the normal
+    height = sqrt((squares[0] - dot(foot, foot)) / size)  # in units of the normal
     height = copysign(height, dot(sub(near, first), normal)) if side is None and near is not None else height * side
     return add(first, add(foot, scale(normal, height)))
 

@@ -10,6 +10,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from math import pi
 
 from ..errors import ParakinError
 from .algebra import (
@@ -303,7 +304,7 @@ class CentralLeg(FiveAxis):
         b, c = axis_angles(k)
         # Beyond these the leg points there the other way round, with its platform turned: no pose says that.
         for margin in self._inside(coordinates):
-            b = smaller(b, 100.0 + sqrt(margin))
+            b = smaller(b, 2.0 * pi + sqrt(margin))
         return [*world, b, c]
 
     def _inside(self, coordinates: Sequence[Scalar]) -> Iterator[Scalar]:

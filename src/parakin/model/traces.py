@@ -7,18 +7,20 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from functools import cached_property
-from math import inf
+from math import inf, isfinite
 
 import numpy as np
 
 from ..errors import ParakinError
 from ..kernels.tape import Tape, compile_tape
-from .algebra import Scalar, Trace, Vec, apply, derivative, norm, scale, sub, transposed, values
+from .algebra import Scalar, Trace, Vec, apply, derivative, norm, scale, smaller, sqrt, sub, transposed, values
 from .legs import Inverse
 from .limits import Home, Limit, leg_joints, limits_of, platform_points
 from .spec import Spec
 from .spheres import CENTRES_NEEDED, common_point, side_of
 from .structure import Placement, Structure, structure_of
+
+FAR = 1e12  # mm; more than any pose's coordinate
 
 
 class Model:
@@ -68,7 +70,9 @@ class Model:
     def margins(self, pose: Sequence[Scalar], joints: Sequence[Scalar], mode: str) -> list[tuple[Limit, Scalar]]:
         """Every limit with its margin, for a pose and its joints."""
         signs, branch = self.split_mode(mode)
-        placed = self.structure.place(pose, branch)
+        # Where the first turning axis is free, the joints given say how it stands, and so where the platform is.
+        first = None if self.first_serial is None else joints[self.first_serial]
+        placed = self.structure.place(pose, branch, first)
         points = platform_points(self.spec, placed.rotation, placed.origin)
         reaches = [leg.inverse(p, s).reach for leg, p, s in zip(self.spec.legs, points, signs, strict=True)]
         home = self.rods_at_home if self._centred_cones else None
@@ -206,9 +210,17 @@ class Model:
 
         def outputs(trace: Trace) -> list[Scalar]:
             coordinates, joints = self._coordinates_and_joints(trace)
-            return self.structure.pose(coordinates, self._serial(joints)) if to_poses else coordinates
+            return self._posed(coordinates, joints) if to_poses else coordinates
 
         return self._tape(("end", to_poses), self._motions + len(self.drives), outputs)
+
+    def _posed(self, coordinates: Sequence[Scalar], joints: Sequence[Scalar]) -> list[Scalar]:
+        """The pose; NaN where a joint is below what there is of it (a strut of negative length closes too)."""
+        first, *others = self.structure.pose(coordinates, self._serial(joints))
+        for q, least in zip(joints, self.least_joints, strict=True):
+            if isfinite(least):
+                first = smaller(first, FAR + sqrt(q - least))
+        return [first, *others]
 
     def newton_tape(self, derivatives: bool) -> Tape:
         """coordinates, joints -> closures in mm, and then, if wanted, their derivatives by the coordinates.
@@ -308,7 +320,7 @@ class Model:
                 pose = trace.inputs(self._poses, len(joints))
                 near = self.structure.closure(pose, self._serial(joints))[1]
             coordinates = self.spheres(joints, side, near)
-            return self.structure.pose(coordinates, self._serial(joints)) + self.scaled_closures(coordinates, joints)
+            return self._posed(coordinates, joints) + self.scaled_closures(coordinates, joints)
 
         return self._tape(("spheres", side), len(self.drives) + (self._poses if side is None else 0), outputs)
 

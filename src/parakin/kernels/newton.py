@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from .blocks import _MASK, LANES, interpret, lanes, load, store
+from .blocks import _MASK, LANES, fetch_to_read, fetch_to_write, interpret, lanes, load, store
 from .elementary import FAST, widest_vectors
 
 CLOSE = 1e-6  # mm: from a closure this good one more step ends below rounding
@@ -182,6 +182,10 @@ def newton(
             load(near, row, n, 0, r, bad)
         load(q, row, n, m, held, bad)
         r[given * LANES : (given + joints) * LANES] = held[m * LANES :]
+        fetch_to_read(q, row + LANES, stop)
+        if not common:
+            fetch_to_read(near, row + LANES, stop)
+        fetch_to_write(out, row, stop)
         interpret(begin[0], begin[1], r)
         held[: m * LANES] = r[(given + joints) * LANES : (given + joints + m) * LANES]
         room = (held, r, a, swaps, wanted, f, turn, turn0, worst, shrink)

@@ -205,15 +205,21 @@ class Machine:
     def margins(self, poses: ArrayLike, joints: ArrayLike | None = None, mode: str | None = None) -> Array:
         """Every limit's margin, (..., limits), ≥ 0 where it holds; units as in :attr:`limit_parts`.
 
-        ``joints`` may give the joints that a path really takes (turns counted), else they are the inverse's. Margins
-        that do not exist where a leg can't close are NaN.
+        ``joints`` may give those that a path really takes (turns counted, free angles held), else they are the
+        inverse's. Margins that do not exist where a leg can't close are NaN.
         """
         rows, lead = self.rows(poses, self.axes, "poses")
-        q = self.inverse(rows, mode) if joints is None else self._joints_of(joints, len(rows))
-        names = self.limits
-        out = np.empty((len(rows), len(names)))
-        run(self.model.margins_tape(self._mode(mode)), rows, out, q, whole=False)
-        return out.reshape(*lead, len(names))
+        own, count = self.model.check_tape(self._mode(mode)), len(self.limits)
+        if joints is None:
+            out = run(own, rows, np.empty((len(rows), count)), whole=False)
+        else:
+            q = self._joints_of(joints, len(rows))
+            out = run(self.model.margins_tape(self._mode(mode)), rows, np.empty((len(rows), count)), q, whole=False)
+            lost = ~np.isfinite(q).all(1)
+            if lost.any():  # joints that are none tell nothing of the leg that can't close: the pose does
+                out[lost] = run(own, np.ascontiguousarray(rows[lost]), np.empty((int(lost.sum()), count)), whole=False)
+                out[lost & (out >= 0.0).all(1), :1] = np.nan
+        return out.reshape(*lead, count)
 
     def check(self, poses: ArrayLike, joints: ArrayLike | None = None, mode: str | None = None) -> Any:
         """0 where a pose is allowed, else 1 + the index in :attr:`limits` of the first margin broken, (...,) int.
@@ -221,12 +227,15 @@ class Machine:
         A pose that is not a number breaks the first limit. ``joints`` as in :meth:`margins`.
         """
         rows, lead = self.rows(poses, self.axes, "poses")
-        if joints is None:
-            q = np.empty((len(rows), 0))
-            tape = self.model.check_tape(self._mode(mode))
-        else:
-            q = self._joints_of(joints, len(rows))
-            tape = self.model.margins_tape(self._mode(mode))
         if not self.limits:
             return np.zeros(lead, np.int64)[()]
-        return first_negative(tape, rows, q).reshape(lead)[()]
+        own, nothing = self.model.check_tape(self._mode(mode)), np.empty((len(rows), 0))
+        if joints is None:
+            return first_negative(own, rows, nothing).reshape(lead)[()]
+        q = self._joints_of(joints, len(rows))
+        broken = first_negative(self.model.margins_tape(self._mode(mode)), rows, q)
+        lost = ~np.isfinite(q).all(1)
+        if lost.any():
+            found = first_negative(own, np.ascontiguousarray(rows[lost]), nothing[lost])
+            broken[lost] = np.where(found == 0, 1, found)
+        return broken.reshape(lead)[()]

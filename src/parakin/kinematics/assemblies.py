@@ -36,7 +36,7 @@ def assemblies(machine: Machine, joints: ArrayLike) -> Array:
     rows, lead = machine.rows(joints, machine.joints, "joints")
     if lead != ():
         raise PoseError(f"joints: one vector ({len(machine.joints)},) expected, not {(*lead, len(machine.joints))}")
-    if not ((np.abs(rows) < NONE_SO_LONG).all() and (rows >= machine.model.least_joints).all()):
+    if not (np.abs(rows) < NONE_SO_LONG).all():
         return np.empty((0, len(machine.axes)))
     model = machine.model
     if model.by_spheres:

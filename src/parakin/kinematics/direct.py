@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 GOOD = 1e-9  # greatest closure error of an answer, mm in a machine of a metre
 MOST_STEPS = 24
 FREE = 1e-9  # rad: a tool that leans less has no C of its own, only rounding's
+WITHIN_A_TURN = 6  # steps of half a radian at most, which can't leave the start's turn
 CONTINUATIONS = (8, 64)  # parts of the way from a known pose, where Newton's method in one go fails
 
 
@@ -76,14 +77,31 @@ def forward(machine: Machine, joints: ArrayLike, near: ArrayLike | None = None, 
     if not converged.all():
         poses[~converged] = np.nan
     if machine.axes[3:] == ("B", "C"):
-        upright = poses[:, 3] < FREE
-        poses[upright, 4] = 0.0 if starts is None else starts[upright, 4]
+        along_z = np.abs(poses[:, 3] - 0.5 * np.pi) > 0.5 * np.pi - FREE
+        poses[along_z, 4] = 0.0 if starts is None else starts[along_z, 4]
+    elif steps.max(initial=0) > WITHIN_A_TURN:
+        _count_turns(machine, poses, machine.home if starts is None else starts)
     return Solution(
         poses.reshape(*lead, len(machine.axes)),
         residual.reshape(lead)[()],
         converged.reshape(lead)[()],
         steps.reshape(lead)[()],
     )
+
+
+def _count_turns(machine: Machine, poses: Array, near: Array) -> None:
+    """Bring the angles of a free platform to B within ±90° and within half a turn of those near by; in place."""
+    angles = {axis: poses[:, i] for i, axis in enumerate(machine.axes) if axis in "ABC"}
+    if len(angles) == 3:
+        b = angles["B"]
+        b -= 2.0 * np.pi * np.round(b / (2.0 * np.pi))
+        over = np.abs(b) > 0.5 * np.pi
+        b[over] = np.copysign(np.pi, b[over]) - b[over]
+        angles["A"][over] += np.pi
+        angles["C"][over] += np.pi
+        del angles["B"]
+    for axis, angle in angles.items():
+        angle -= 2.0 * np.pi * np.round((angle - near[..., machine.axes.index(axis)]) / (2.0 * np.pi))
 
 
 _Found = tuple["Array", "Array", NDArray[np.bool_], NDArray[np.int32]]

@@ -270,9 +270,14 @@ class CentralLeg(FiveAxis):
         distance = norm(centre)
         found = self.swing.solve(scale(centre, 1.0 / distance), "+")
         rotation = IDENTITY
-        scales = 1.0 / found.freedom, 1.0 / found.second_size
-        for axis, (s, c), size in zip((self.swing.first, self.swing.second), found.turns, scales, strict=True):
-            rotation = product(rotation, rotation_about(axis, s * size, c * size))
+        axes = self.swing.first, self.swing.second
+        if self.roll:  # hanging along the first axis its turn is free, and 0 then: no quotient may stand in the way
+            for axis, angle in zip(axes, found.joints, strict=True):
+                rotation = product(rotation, rotation_about(axis, *sincos(angle)))
+        else:
+            scales = 1.0 / found.freedom, 1.0 / found.second_size
+            for axis, (s, c), size in zip(axes, found.turns, scales, strict=True):
+                rotation = product(rotation, rotation_about(axis, s * size, c * size))
         return rotation, self.sign * distance - self.above, list(found.joints)
 
     def _platform(self, pose: Sequence[Scalar], branch: str, first: Scalar | None) -> Placement:

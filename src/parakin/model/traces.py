@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from functools import cached_property
-from math import inf, isfinite
 
 import numpy as np
 
@@ -126,12 +125,6 @@ class Model:
         return limits
 
     @cached_property
-    def least_joints(self) -> list[float]:
-        """What no joint can be below, whatever its drive: a strut's length is not negative."""
-        least = {drive.name: leg.least for leg in self.spec.legs for drive in leg.drives}
-        return [least.get(drive.name, -inf) for drive in self.drives]
-
-    @cached_property
     def by_spheres(self) -> bool:
         """True where the direct problem is the common point of spheres or circles: no turns, one rod a leg."""
         turns = any(word.startswith("r") for word in self.spec.motion)
@@ -215,11 +208,12 @@ class Model:
         return self._tape(("end", to_poses), self._motions + len(self.drives), outputs)
 
     def _posed(self, coordinates: Sequence[Scalar], joints: Sequence[Scalar]) -> list[Scalar]:
-        """The pose; NaN where a joint is below what there is of it (a strut of negative length closes too)."""
+        """The pose; NaN where a leg closes otherwise than it is built (a strut of negative length closes too)."""
         first, *others = self.structure.pose(coordinates, self._serial(joints))
-        for q, least in zip(joints, self.least_joints, strict=True):
-            if isfinite(least):
-                first = smaller(first, FAR + sqrt(q - least))
+        points = platform_points(self.spec, *self.structure.frame(coordinates))
+        for leg, point, q in zip(self.spec.legs, points, leg_joints(self.spec, joints), strict=True):
+            for margin in leg.inside(point, q):
+                first = smaller(first, FAR + sqrt(margin))
         return [first, *others]
 
     def newton_tape(self, derivatives: bool) -> Tape:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from math import inf
 from typing import ClassVar
 
 from ..algebra import Scalar, Vec
@@ -29,7 +28,6 @@ class Leg(ABC):
 
     kind: ClassVar[str]
     units: ClassVar[tuple[Unit, ...]]  # of the joints, in order
-    least: ClassVar[float] = -inf  # no joint of this kind can be below
     branches: ClassVar[str] = ""  # the working mode if the file names none: a sign for each choice of the inverse
 
     drives: tuple[Drive, ...]
@@ -46,6 +44,10 @@ class Leg(ABC):
     @abstractmethod
     def struts(self, point: Vec, joints: list[Scalar]) -> list[tuple[Vec, Vec]]:
         """Both ends of each strut, base frame, the foot's end first; the strut to the platform comes first."""
+
+    def inside(self, point: Vec, joints: list[Scalar]) -> tuple[Scalar, ...]:
+        """What is ≥ 0 where a leg that closes does so as it is built: its closures may hold elsewhere too."""
+        return ()
 
     def size(self, at_home: float) -> float:
         """A length, mm, that the leg (``at_home`` at home) seldom falls below: it turns closures into distances."""

@@ -13,7 +13,6 @@ from .base import Inverse, Leg
 class Length(Leg):
     kind = "length"
     units = ("mm",)
-    least = 0.0
 
     foot: Point
 
@@ -26,6 +25,9 @@ class Length(Leg):
 
     def struts(self, point: Vec, joints: list[Scalar]) -> list[tuple[Vec, Vec]]:
         return [(self.foot, point)]
+
+    def inside(self, point: Vec, joints: list[Scalar]) -> tuple[Scalar, ...]:
+        return (joints[0],)
 
     def size(self, at_home: float) -> float:
         return max(0.25 * at_home, min(self.drives[0].low, at_home))

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from os import PathLike
+from os import PathLike, fspath
 from typing import TYPE_CHECKING
 
-from .errors import InputError, InputErrors, NoMethodError, ParakinError, PoseError
+from .errors import DescriptionError, InputError, InputErrors, NoMethodError, ParakinError, PoseError
 
 if TYPE_CHECKING:
     from .kinematics.direct import Solution
@@ -14,6 +14,7 @@ if TYPE_CHECKING:
 
 __version__ = "0.1.0"
 __all__ = [
+    "DescriptionError",
     "InputError",
     "InputErrors",
     "Machine",
@@ -41,13 +42,17 @@ def load(name: str | PathLike[str], parameters: Mapping[str, float | str] | None
     name : one of :func:`machines`, or a YAML file
     parameters : sizes to override, by the names in the file; numbers are mm or rad, text carries its unit
 
-    Raises :class:`InputError` with file and line for a file that is no machine, :class:`ParakinError` for a machine
-    that can't work.
+    Raises :class:`InputError` with file and line for a file that is no machine, or none that works.
     """
-    from .description import machine_file, read_machine
+    from .description import line_of, machine_file, read_machine
     from .machine import Machine
 
-    return Machine(read_machine(machine_file(name), parameters))
+    path = machine_file(name)
+    spec = read_machine(path, parameters)
+    try:
+        return Machine(spec)
+    except DescriptionError as error:
+        raise InputError(str(error), fspath(path), line_of(path, error.part)) from None
 
 
 def __getattr__(name: str) -> object:

@@ -32,6 +32,14 @@ class InputErrors(InputError):
         self.args = ("\n".join(str(e) for e in errors),)
 
 
+class DescriptionError(ParakinError):
+    """A description that is well-formed but is no machine that works; ``part`` is the key at fault."""
+
+    def __init__(self, part: str, message: str):
+        self.part = part
+        super().__init__(f"{part}: {message}")
+
+
 class PoseError(ParakinError):
     """Poses or joints of the wrong shape, type or mode."""
 

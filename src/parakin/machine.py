@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .errors import ParakinError, PoseError
+from .errors import DescriptionError, PoseError
 from .kernels.batch import first_negative, run
 from .model.limits import Limit
 from .model.spec import Spec
@@ -91,15 +91,20 @@ class Machine:
         return (self.mode, *[mode for mode in every if mode != self.mode])
 
     def _refuse_bad_home(self) -> None:
-        with np.errstate(invalid="ignore", divide="ignore"):
-            joints, _, _ = self.model.invert(self.model.home, self.mode)
-            margins = self.model.margins(self.model.home, joints, self.mode)
-        for limit, (_, margin) in zip(self.limit_parts, margins, strict=True):
+        for letter in self.spec.home:
+            if letter not in self.axes:
+                raise DescriptionError("home", f"unknown axis {letter}, this machine has {' '.join(self.axes)}")
+        with np.errstate(invalid="ignore", divide="ignore"):  # a home out of reach is told below
+            margins = self.model.own_margins(self.model.home, self.mode)
+            self.model.limits  # noqa: B018  refuses names that stand twice
+        for limit, margin in margins:
             if not margin >= 0.0:
-                value = limit.value(float(margin))
-                raise ParakinError(
-                    f"home: {limit.name} does not hold there ({value:.6g} {limit.unit}, limit {limit.bound:.6g})"
-                )
+                scale, unit = (180.0 / np.pi, "deg") if limit.unit == "rad" else (1.0, limit.unit)
+                value, bound = scale * limit.value(float(margin)), scale * limit.bound
+                what = f"{limit.subject} would be {value:,.6g} {unit}, limit {bound:,.6g}"
+                if limit.side == "reach":
+                    what = f"{limit.subject} does not reach it"
+                raise DescriptionError("home", f"{what}; home is a pose of the tool in the machine frame")
 
     # Input at the boundary.
 

@@ -76,7 +76,7 @@ def announce_compiling() -> None:
         def on_start(self, event: object) -> None:
             if not self.said:
                 self.said = True
-                say("compiling the kernels, once; this may take a minute ...")
+                say("compiling the kernels, once for each kind of work; some seconds ...")
 
         def on_end(self, event: object) -> None:
             pass

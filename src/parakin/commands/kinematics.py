@@ -15,6 +15,7 @@ from .options import OFF_LIMITS, Json, Mode, Name, Sizes, machine_of, row
 from .post import offence_json, offence_line
 
 if TYPE_CHECKING:
+    from ..kinematics.direct import Solution
     from ..machine import Array, Machine
     from ..toolpath.offences import Judgement
     from ..toolpath.result import Offence
@@ -89,6 +90,7 @@ def forward(
     if near is not None:
         parts = [part.strip() for part in near.split(",")]
         start = row(parts, machine.axes, machine.axis_units, machine.home, "--near")
+    from ..kinematics.direct import tolerance
     from ..toolpath.offences import judge
 
     solution = machine.forward(joints, start)
@@ -98,11 +100,13 @@ def forward(
     verdicts = ["not converged"] * len(joints)
     for i, index in enumerate(good.tolist()):
         verdicts[index] = _name(found, i)
-    result = _Result(machine, solution.poses, joints, verdicts)
+    result = _Result(machine, solution.poses, joints, verdicts, solution)
     result.tell("forward", "pose", csv, output, json, offences)
     for index in np.flatnonzero(~solution.converged).tolist()[:10]:
         place = f"{csv}:{lines[index]}" if csv else "joints"
-        say(f"{place}: no pose found (the legs fail to close by {solution.residual[index]:.3g} mm)")
+        open_by = solution.residual[index]
+        closes = np.isnan(open_by) or open_by <= tolerance(machine)
+        say(f"{place}: no pose found" + ("" if closes else f" (the legs fail to close by {open_by:.3g} mm)"))
     lost = len(joints) - len(good)
     if lost > 10:
         say(f"{csv}: no pose found for {lost - 10:,} more rows")
@@ -140,8 +144,11 @@ def _given(
 class _Result:
     """Poses and joints side by side, and what to say of each."""
 
-    def __init__(self, machine: Machine, poses: Array, joints: Array, verdicts: list[str]):
+    def __init__(
+        self, machine: Machine, poses: Array, joints: Array, verdicts: list[str], solution: Solution | None = None
+    ):
         self.machine, self.poses, self.joints, self.verdicts = machine, poses, joints, verdicts
+        self.solution = solution  # of the direct problem
 
     def tell(
         self, command: str, what: str, csv: Path | None, output: Path | None, json: bool, offences: Sequence[Offence]
@@ -175,12 +182,19 @@ class _Result:
                 for name, unit, value in zip(names, units, values[0].tolist(), strict=True)
             ]
             print(table(cells, (what, "", ""), " r"))
+            if self.solution is not None and self.solution.converged[0]:
+                print(f"\nconverged in {self.solution.steps[0]} steps, residual {self.solution.residual[0]:.1e} mm")
 
     def _rows(self) -> list[dict[str, Any]]:
-        return [
+        rows: list[dict[str, Any]] = [
             {"pose": pose, "joints": joints, "broken": verdict or None}
             for pose, joints, verdict in zip(self._named("pose"), self._named("joints"), self.verdicts, strict=True)
         ]
+        if self.solution is not None:
+            verdicts = zip(self.solution.residual.tolist(), self.solution.converged.tolist(), strict=True)
+            for row, (residual, converged) in zip(rows, verdicts, strict=True):
+                row |= {"residual": residual, "converged": converged}
+        return rows
 
     def _columns(self, what: str) -> tuple[tuple[str, ...], tuple[str, ...], Array]:
         machine = self.machine

@@ -22,7 +22,9 @@ def machine_names(context: Any) -> list[str]:
 
 
 Name = Annotated[str, Parameter(completer=machine_names)]
-Sizes = Annotated[list[str] | None, Parameter(name="--set", help="A size of the machine, with its unit: R=360mm.")]
+Sizes = Annotated[
+    list[str] | None, Parameter(name="--set", help="A size of the machine, with its unit: R=360mm. May be given again.")
+]
 Mode = Annotated[
     str | None, Parameter(allow_leading_hyphen=True, help="Working mode: a sign for each choice of the inverse.")
 ]

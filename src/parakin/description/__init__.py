@@ -22,7 +22,7 @@ from .groups import Legs
 from .sections import TRANSFORMS, Home, LimitsSection, Mounting, Section, Steps
 from .values import Context, Prose, Word, context_of, described, is_word
 
-__all__ = ["machine_file", "read_machine", "shipped"]
+__all__ = ["line_of", "machine_file", "read_machine", "shipped"]
 
 _MACHINES = Path(__file__).parent.parent / "machines"
 
@@ -43,6 +43,13 @@ def machine_file(name: str | PathLike[str]) -> Path:
     if isinstance(name, str) and is_word(name) and not Path(name).exists():
         raise InputError(f"unknown machine {shown(name)}{nearest(name, known)}")
     return Path(name)
+
+
+def line_of(path: str | PathLike[str], key: str) -> int:
+    """The line of a top-level key of a machine file; 1 if it has none."""
+    document, _ = read_document(Path(path), fspath(path))
+    keys = document if isinstance(document, Map) else {}
+    return next((found.line for found in keys if isinstance(found, Text) and found == key), 1)
 
 
 def read_machine(path: str | PathLike[str], parameters: Mapping[str, float | str] | None = None) -> Spec:

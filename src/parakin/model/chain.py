@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..errors import ParakinError
+from ..errors import DescriptionError
 from .algebra import (
     IDENTITY,
     ORIGIN,
@@ -85,7 +85,7 @@ class Pointing:
     signs: tuple[float, float] = (1.0, 1.0)
 
     @classmethod
-    def of(cls, steps: Iterable[Step], what: str) -> Pointing:
+    def of(cls, steps: Iterable[Step], part: str) -> Pointing:
         """From the rotations of a chain with two driven ones, acting on +z of its last frame."""
         rotation, axes, signs = IDENTITY, [], []
         for step in steps:
@@ -96,12 +96,12 @@ class Pointing:
                 signs.append(step.sign)
             rotation = product(rotation, turn(step.axis, *fixed_sincos(step.value)))
         if len(axes) != 2:
-            raise ParakinError(f"{what}: {len(axes)} driven turns point the tool, two are needed")
+            raise DescriptionError(part, f"{len(axes)} driven turns point the tool, two are needed")
         pointing = cls(axes[0], axes[1], apply(rotation, UNIT["tz"]), (signs[0], signs[1]))
         if norm(cross(axes[0], axes[1])) < 1e-6:
-            raise ParakinError(f"{what}: its two axes are parallel and can't point the tool")
+            raise DescriptionError(part, "its two axes are parallel and can't point the tool")
         if norm(cross(pointing.second, pointing.start)) < 1e-6:
-            raise ParakinError(f"{what}: its second axis lies along the tool and can't point it")
+            raise DescriptionError(part, "its second axis lies along the tool and can't point it")
         return pointing
 
     @property

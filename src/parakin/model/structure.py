@@ -12,7 +12,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from math import pi
 
-from ..errors import ParakinError
+from ..errors import DescriptionError
 from .algebra import (
     IDENTITY,
     Mat,
@@ -99,16 +99,21 @@ class Free(Structure):
         words = set(spec.motion)
         turns = [w for w in spec.motion if w in ROTATIONS]
         if len(turns) == 2 or any(w in TRANSLATIONS for w in spec.motion[len(spec.motion) - len(turns) :]):
-            raise ParakinError(
-                f"motion {' '.join(spec.motion)}: a free motion has its translations first, then no, one or three turns"
+            raise DescriptionError(
+                "motion",
+                f"{' '.join(spec.motion)}: a free motion has its translations first, then no, one or three turns",
             )
         if len(turns) == 3 and len(words) != 6:
-            raise ParakinError(f"motion {' '.join(spec.motion)}: with three turns a free motion has three translations")
+            raise DescriptionError(
+                "motion", f"{' '.join(spec.motion)}: with three turns a free motion has three translations"
+            )
         if len(turns) < 3 and spec.mounting:
             if not words >= set(TRANSLATIONS):
-                raise ParakinError("mounting: a planar machine is mounted by the words of its motion (tx tz: upright)")
+                raise DescriptionError(
+                    "mounting", "a planar machine is mounted by the words of its motion (tx tz: upright)"
+                )
             if turns and any(step.axis in ROTATIONS and step.value for step in spec.mounting):
-                raise ParakinError("mounting: a machine that turns about one axis only can't be inclined")
+                raise DescriptionError("mounting", "a machine that turns about one axis only can't be inclined")
         self.coordinates = tuple(word for word in (*TRANSLATIONS, *ROTATIONS) if word in words)
         self.axes = tuple(LETTERS[word] for word in self.coordinates)
         self.tool, self.tip = frame(spec.head, ())
@@ -177,7 +182,7 @@ class Carried(FiveAxis):
         super().__init__(spec)
         self.coordinates = TRANSLATIONS
         chain = [*inverse_rotations(spec.table), *spec.mounting, *spec.head]
-        self.pointing = Pointing.of(chain, "head and table")
+        self.pointing = Pointing.of(chain, "head" if self.head_joints else "table")
         # The turning axes as they follow on each other: the table's, inverted, then the head's.
         drives = [step.drive for step in spec.head if step.drive] + [step.drive for step in spec.table if step.drive]
         self.order = [drives.index(step.drive) for step in chain if step.drive is not None]
@@ -230,11 +235,13 @@ class CentralLeg(FiveAxis):
         super().__init__(spec)
         turns = tuple(word for word in spec.motion if word in ROTATIONS)
         if spec.motion[-1] != "tz" or len(turns) != len(spec.motion) - 1 or len(turns) not in (2, 3):
-            raise ParakinError(f"motion {' '.join(spec.motion)}: a central leg is two or three turns, then tz")
+            raise DescriptionError("motion", f"{' '.join(spec.motion)}: a central leg is two or three turns, then tz")
         if len(turns) == 3 and turns[2] != "rz":
-            raise ParakinError(f"motion {' '.join(spec.motion)}: the third turn of a central leg is about itself, rz")
+            raise DescriptionError(
+                "motion", f"{' '.join(spec.motion)}: the third turn of a central leg is about itself, rz"
+            )
         if spec.table:
-            raise ParakinError("table: a machine with a central leg has its turning axes in the head")
+            raise DescriptionError("table", "a machine with a central leg has its turning axes in the head")
         self.roll = len(turns) == 3
         spin = [Step("rz", drive=spec.legs[0].drives[0])] if self.roll else []
         self.wrist = Pointing.of([*spin, *spec.head], "head")
@@ -257,7 +264,7 @@ class CentralLeg(FiveAxis):
         centres = [along(tip, k, length) for tip, k in zip(tips, axes, strict=True)]
         height = centres[0][2]
         if max(norm(sub(c, (0.0, 0.0, height))) for c in centres) > 1e-9 * (1.0 + abs(length) + abs(height)):
-            raise ParakinError("head: its axes must meet in one point of the central leg, on the tool's axis")
+            raise DescriptionError("head", "its axes must meet in one point of the central leg, on the tool's axis")
         return float(height), length
 
     def _centre(self, pose: Sequence[Scalar]) -> Vec:
@@ -341,23 +348,24 @@ class CentralLeg(FiveAxis):
 
 
 def structure_of(spec: Spec) -> Structure:
-    """The structure of a machine, or a :class:`ParakinError` that says why it is none."""
+    """The structure of a machine, or a :class:`DescriptionError` that says why it is none."""
     twice = [bound.name for bound in spec.limits.passive if spec.motion.count(bound.name) > 1]
     if twice:
-        raise ParakinError(f"limits: passive {twice[0]} stands twice in the motion, so it is not one coordinate")
+        raise DescriptionError("limits", f"passive {twice[0]} stands twice in the motion, so it is not one coordinate")
     drives = [(step.axis, step.drive.name) for step in (*spec.head, *spec.table) if step.drive is not None]
     for axis, name in drives:
         if axis in TRANSLATIONS:
-            raise ParakinError(f"joint {name}: the drives of head and table turn; {axis} can't be one")
+            raise DescriptionError("head", f"joint {name}: the drives of head and table turn; {axis} can't be one")
     driven = len(drives)
     if spec.motion[0] in ROTATIONS:
         return CentralLeg(spec)
     if driven == 0:
         if spec.table:
-            raise ParakinError("table: a table without a driven turn does nothing; leave it out")
+            raise DescriptionError("table", "a table without a driven turn does nothing; leave it out")
         return Free(spec)
     if set(spec.motion) != set(TRANSLATIONS) or len(spec.motion) != 3:
-        raise ParakinError(
-            f"motion {' '.join(spec.motion)}: with a driven head or table it is tx ty tz, or a central leg (rx ry tz)"
+        raise DescriptionError(
+            "motion",
+            f"{' '.join(spec.motion)}: with a driven head or table it is tx ty tz, or a central leg (rx ry tz)",
         )
     return Carried(spec)

@@ -10,7 +10,7 @@ from functools import cached_property
 
 import numpy as np
 
-from ..errors import ParakinError
+from ..errors import DescriptionError
 from ..kernels.tape import Tape, compile_tape
 from .algebra import Scalar, Trace, Vec, apply, derivative, norm, scale, smaller, sqrt, sub, transposed, values
 from .legs import Inverse
@@ -67,26 +67,32 @@ class Model:
         return [by_name[drive.name] for drive in self.drives], placed, legs
 
     def margins(self, pose: Sequence[Scalar], joints: Sequence[Scalar], mode: str) -> list[tuple[Limit, Scalar]]:
-        """Every limit with its margin, for a pose and its joints."""
+        """Every limit with its margin, for a pose and the joints that a path takes there."""
         signs, branch = self.split_mode(mode)
         # Where the first turning axis is free, the joints given say how it stands, and so where the platform is.
         first = None if self.first_serial is None else joints[self.first_serial]
         placed = self.structure.place(pose, branch, first)
         points = platform_points(self.spec, placed.rotation, placed.origin)
-        reaches = [leg.inverse(p, s).reach for leg, p, s in zip(self.spec.legs, points, signs, strict=True)]
-        home = self.rods_at_home if self._centred_cones else None
+        legs = [leg.inverse(point, s) for leg, point, s in zip(self.spec.legs, points, signs, strict=True)]
+        return self._margins(placed, joints, legs)
+
+    def own_margins(self, pose: Sequence[Scalar], mode: str) -> list[tuple[Limit, Scalar]]:
+        """Every limit with its margin, for a pose and its inverse."""
+        joints, placed, legs = self.invert(pose, mode)
+        return self._margins(placed, joints, legs)
+
+    def _margins(
+        self, placed: Placement, joints: Sequence[Scalar], legs: Sequence[Inverse]
+    ) -> list[tuple[Limit, Scalar]]:
+        home = self.rods_at_home if any(cone.axis is None for cone in self.spec.limits.cones) else None
         coordinates = list(zip(self.structure.coordinates, placed.coordinates, strict=True))
-        return limits_of(self.spec, placed, coordinates, joints, reaches, home)
+        return limits_of(self.spec, placed, coordinates, joints, [leg.reach for leg in legs], home)
 
     def closures(self, rotation: Sequence[Vec], origin: Vec, joints: Sequence[Scalar]) -> list[Scalar]:
         """Every leg's closure, mm²."""
         points = platform_points(self.spec, rotation, origin)
         given = leg_joints(self.spec, joints)
         return [f for leg, p, q in zip(self.spec.legs, points, given, strict=True) for f in leg.closures(p, q)]
-
-    @property
-    def _centred_cones(self) -> bool:
-        return any(cone.axis is None for cone in self.spec.limits.cones)
 
     @cached_property
     def home(self) -> list[float]:
@@ -116,12 +122,11 @@ class Model:
 
     @cached_property
     def limits(self) -> tuple[Limit, ...]:
-        joints, _, _ = self.invert(self.home, self.mode)
-        limits = tuple(limit for limit, _ in self.margins(self.home, joints, self.mode))
+        limits = tuple(limit for limit, _ in self.own_margins(self.home, self.mode))
         names = [limit.name for limit in limits]
         for name in names:
             if names.count(name) > 1:
-                raise ParakinError(f"limits: two limits are called {name}; rename the joint or join the limits")
+                raise DescriptionError("limits", f"two are called {name}; rename the joint or join the limits")
         return limits
 
     @cached_property
@@ -283,9 +288,7 @@ class Model:
         """pose -> every margin, with the inverse in between."""
 
         def outputs(trace: Trace) -> list[Scalar]:
-            pose = trace.inputs(self._poses)
-            joints, _, _ = self.invert(pose, mode)
-            return [margin for _, margin in self.margins(pose, joints, mode)]
+            return [margin for _, margin in self.own_margins(trace.inputs(self._poses), mode)]
 
         return self._tape(("check", mode), self._poses, outputs)
 

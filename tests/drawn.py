@@ -178,5 +178,5 @@ def machine_of(d, folder):
     try:
         return pk.load(path)
     except pk.ParakinError as error:
-        assume(".reach" not in str(error))
+        assume("does not reach" not in str(error))
         raise

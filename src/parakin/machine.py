@@ -161,18 +161,19 @@ class Machine:
             result[...] = run(tape, rows, np.empty((len(rows), len(self.joints)))).reshape(shape)
         return result
 
-    def follow(self, poses: ArrayLike, mode: str | None = None) -> Array:
+    def follow(self, poses: ArrayLike, mode: str | None = None, free_below: float = 1e-9) -> Array:
         """Joints along a path, (N, axes) -> (N, joints), continuous: angles unwound, free ones as the neighbour's.
 
-        A turning joint that is free (the tool's axis along it) takes its value from the last pose where it was not, at
-        the path's start from the first one to come; turns are counted on over ±180°.
+        A turning joint that is free (the tool's axis within ``free_below`` rad of it) takes its value from the last
+        pose where it was not, at the path's start from the first one to come; turns are counted on over ±180°. Where
+        the path passes over such a pole, head and table go on in their other working mode if that spares a swing.
         """
         from .kinematics.path import follow
 
         rows, lead = self.rows(poses, self.axes, "poses")
         if len(lead) != 1:
             raise PoseError(f"poses: a path of shape (N, {len(self.axes)}) expected")
-        return follow(self, rows, self._mode(mode))
+        return follow(self, rows, self._mode(mode), free_below)
 
     def forward(self, joints: ArrayLike, near: ArrayLike | None = None, method: str | None = None) -> Solution:
         """Poses for joints, with residual and verdict; see :func:`parakin.kinematics.direct.forward`."""

@@ -153,7 +153,8 @@ def _lambdas(machine: Machine, rows: Array) -> Array:
     feet = np.array([leg.foot for leg in legs])
     corners = np.array([leg.platform for leg in legs])
     with np.errstate(invalid="ignore", divide="ignore"):
-        held = np.array([leg.height_and_distance(q) for leg, q in zip(legs, _legs(machine, rows), strict=True)])
+        given = np.array(_legs(machine, rows))  # NumPy's numbers: where both sliders meet, a gap of 0 gives NaN
+        held = np.array([leg.height_and_distance(list(q)) for leg, q in zip(legs, given, strict=True)])
     if not np.isfinite(held).all():
         return np.empty((0, 6))
     heights, distances = held[:, 0] + feet @ axis, held[:, 1]

@@ -44,7 +44,7 @@ def forward(machine: Machine, joints: ArrayLike, near: ArrayLike | None = None, 
     ----------
     joints : mm and rad
     near : poses (axes,) or (..., axes) to start from and to stay near; without them the machine's home, and its
-        assembly mode
+        assembly mode (in closed form: its working mode first)
     method : ``"closed"`` (three spheres, two circles), ``"newton"``, or ``"constant"`` (the Jacobian of the start kept
         throughout: FME Transactions 41, (31)); by default the closed form where there is one, else Newton
 
@@ -147,10 +147,34 @@ def _closed(machine: Machine, joints: Array, starts: Array | None) -> _Found:
         raise NoMethodError(f"{machine.name}: no closed form of the direct problem; use method='newton'")
     poses = np.empty((len(joints), len(machine.axes)))
     if starts is None:
-        residual = run_checked(model.spheres_tape(model.home_side), joints, poses, np.empty((len(joints), 0)))
+        residual = _in_the_working_mode(machine, joints, poses)
     else:
         residual = run_checked(model.spheres_tape(None), joints, poses, starts)
     return poses, residual, residual <= tolerance(machine), np.zeros(len(joints), np.int32)
+
+
+def _in_the_working_mode(machine: Machine, joints: Array, poses: Array) -> Array:
+    """Residuals; into ``poses`` of the two common points that on home's side, or, where only the other one has these
+    joints in the machine's own working mode, that one."""
+    model, nothing = machine.model, np.empty((len(joints), 0))
+    residual = run_checked(model.spheres_tape(model.home_side), joints, poses, nothing)
+    if not model.has_modes:
+        return residual
+    legs = len(model.drives) - model.serial
+
+    def out_of_mode(found: Array, given: Array) -> NDArray[np.bool_]:
+        off = np.abs(machine.inverse(found) - given)[:, :legs].max(1)
+        fits: NDArray[np.bool_] = off <= 1e3 * tolerance(machine)
+        return ~fits
+
+    lost = np.flatnonzero(out_of_mode(poses, joints) & np.isfinite(residual))
+    if len(lost):
+        given = joints[lost]
+        other = np.empty((len(lost), poses.shape[1]))
+        found = run_checked(model.spheres_tape(-model.home_side), given, other, nothing[lost])
+        fit = ~out_of_mode(other, given)
+        poses[lost[fit]], residual[lost[fit]] = other[fit], found[fit]
+    return residual
 
 
 def side_of(machine: Machine, poses: Array) -> Array:

@@ -106,15 +106,15 @@ class Pointing:
 
     @property
     def level(self) -> bool:
-        """Both solutions turn the second axis as far: the direction at rest is at right angles to both axes."""
+        """The direction at rest stands (more than not) on both axes: one solution is near rest, one far beyond."""
         normal = cross(self.first, self.second)
-        return bool(abs(dot(self.second, cross(self.start, normal))) < 1e-12)
+        return bool(abs(dot(self.start, normal)) > abs(dot(self.second, cross(self.start, normal))))
 
     def solve(self, v: Vec, branch: str, first: Scalar | None = None) -> Angles:
         """Joints that point to the unit vector ``v``.
 
-        Branch "+" is the solution with the greater second joint, or, where both have the same size (a first axis at
-        right angles to the direction at rest), the one whose second turn stays under 90°.
+        Branch "+" is the solution with the greater second joint, or, where the direction at rest stands on both axes
+        (a fork that turns about X, then Y), the one whose second turn is nearer to rest.
         ``first`` gives the first joint where it is free.
         """
         a1, a2, w = self.first, self.second, self.start

@@ -73,9 +73,9 @@ class Structure(ABC):
     def frame(self, coordinates: Sequence[Scalar]) -> tuple[Mat, Vec]:
         """The platform's frame in the base for the motion's coordinates."""
 
-    def start(self, pose: Sequence[Scalar], serial: Sequence[Scalar]) -> list[Scalar]:
-        """The motion's coordinates to start from for a pose near by, whatever the working mode of ``serial``."""
-        return self.place(pose, self.branches).coordinates
+    def held(self, pose: Sequence[Scalar], serial: Sequence[Scalar]) -> Placement:
+        """As :meth:`place`, for the serial joints that a path takes there, whatever their working mode."""
+        return self.place(pose, self.branches)
 
     def coordinates_at(self, origin: Vec) -> list[Scalar]:
         """The motion's coordinates for the platform's origin in the base, of a motion without turns."""
@@ -204,8 +204,10 @@ class Carried(FiveAxis):
         origin = self._origin(pose, serial)
         return Placement(IDENTITY, origin, list(origin), serial, found.reach, found.freedom)
 
-    def start(self, pose: Sequence[Scalar], serial: Sequence[Scalar]) -> list[Scalar]:
-        return list(self._origin(pose, serial))
+    def held(self, pose: Sequence[Scalar], serial: Sequence[Scalar]) -> Placement:
+        origin = self._origin(pose, serial)
+        reach = self.place(pose, self.branches).reach
+        return Placement(IDENTITY, origin, list(origin), list(serial), reach)
 
     def frame(self, coordinates: Sequence[Scalar]) -> tuple[Mat, Vec]:
         return IDENTITY, tuple(coordinates)
@@ -326,14 +328,16 @@ class CentralLeg(FiveAxis):
             s, c = sincos(coordinates[1])
             yield c if self.swing.level else s
 
-    def start(self, pose: Sequence[Scalar], serial: Sequence[Scalar]) -> list[Scalar]:
+    def held(self, pose: Sequence[Scalar], serial: Sequence[Scalar]) -> Placement:
         if not self.roll:
-            return super().start(pose, serial)
+            return super().held(pose, serial)
         rotation, tz, angles = self._swing(pose)
         k = apply(transposed(self.mount), tool_axis(pose[3], pose[4])[0])
         v = apply(transposed(rotation), k)
         w = apply(frame(self.spec.head, serial)[0], UNIT["tz"])  # turned onto v by the platform's own turn
-        return [*angles, atan2(w[0] * v[1] - w[1] * v[0], w[0] * v[0] + w[1] * v[1]), tz]
+        spin = atan2(w[0] * v[1] - w[1] * v[0], w[0] * v[0] + w[1] * v[1])
+        rotation = product(rotation, turn("rz", *sincos(spin)))
+        return Placement(rotation, scale([row[2] for row in rotation], tz), [*angles, spin, tz], list(serial))
 
     def closure(self, pose: Sequence[Scalar], serial: Sequence[Scalar]) -> tuple[Mat, Vec, list[Scalar]]:
         turned, _ = frame(self.spec.head, serial)

@@ -68,10 +68,8 @@ class Model:
 
     def margins(self, pose: Sequence[Scalar], joints: Sequence[Scalar], mode: str) -> list[tuple[Limit, Scalar]]:
         """Every limit with its margin, for a pose and the joints that a path takes there."""
-        signs, branch = self.split_mode(mode)
-        # Where the first turning axis is free, the joints given say how it stands, and so where the platform is.
-        first = None if self.first_serial is None else joints[self.first_serial]
-        placed = self.structure.place(pose, branch, first)
+        signs, _ = self.split_mode(mode)
+        placed = self.structure.held(pose, self._serial(joints))
         points = platform_points(self.spec, placed.rotation, placed.origin)
         legs = [leg.inverse(point, s) for leg, point, s in zip(self.spec.legs, points, signs, strict=True)]
         return self._margins(placed, joints, legs)
@@ -136,6 +134,11 @@ class Model:
         held = [leg.sphere([0.0] * len(leg.drives)) is not None for leg in self.spec.legs]
         return not turns and all(held) and len(held) in CENTRES_NEEDED
 
+    @property
+    def has_modes(self) -> bool:
+        """The legs' inverse has choices."""
+        return any(leg.branches for leg in self.spec.legs)
+
     @cached_property
     def home_side(self) -> float:
         """The side of the spheres' centres on which the platform is at home."""
@@ -199,7 +202,7 @@ class Model:
 
         def outputs(trace: Trace) -> list[Scalar]:
             given, joints = trace.inputs(width), trace.inputs(len(self.drives), width)
-            return self.structure.start(given, self._serial(joints)) if from_poses else list(given)
+            return self.structure.held(given, self._serial(joints)).coordinates if from_poses else list(given)
 
         return self._tape(("begin", from_poses), width + len(self.drives), outputs)
 
@@ -315,7 +318,7 @@ class Model:
             near = None
             if side is None:
                 pose = trace.inputs(self._poses, len(joints))
-                near = self.structure.closure(pose, self._serial(joints))[1]
+                near = self.structure.held(pose, self._serial(joints)).origin
             coordinates = self.spheres(joints, side, near)
             return self._posed(coordinates, joints) + self.scaled_closures(coordinates, joints)
 

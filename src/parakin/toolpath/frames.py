@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
-from ..kinematics.path import FREE, neighbours, unwound
+from ..kinematics.path import neighbours, unwound
 from ..machine import Machine
 from ..model.algebra import apply
 from ..model.structure import Free
@@ -25,6 +25,7 @@ _BLOCK = 1 << 13  # records
 _FORM = 'expected x,y,z or x,y,z,a,b,c (mm, degrees), or names as in "X=10,Z=-1400,C=30"'
 
 LEAN = 1e-4  # rad a tool axis may lean where the machine can't tilt it: rounding in the file
+ROUNDED = 2e-6  # rad from a turning axis: a CL file with six decimals can't tell the angle about it
 OFF_PLANE = 1e-6  # mm, the same across the plane of a machine that works in one
 
 
@@ -195,7 +196,7 @@ def _turning(machine: Machine, turns: list[str]) -> _Turning:
     upright = abs(fixed[2] - 1.0) < 1e-12
     about = np.eye(3)["ABC".index(turns[0])] if turns else fixed
     share = float(about @ fixed)
-    if 1.0 - share * share < FREE:  # no turn, or one about the tool's own axis: it changes nothing
+    if 1.0 - share * share < 1e-18:  # no turn, or one about the tool's own axis: it changes nothing
         lean = "keeps it upright" if upright else "keeps its direction"
         return _Turning(lambda k: ([np.zeros(len(k))] * len(turns), False, _angle(k, fixed)), None, lean)
     return _Turning(lambda k: _one_turn(k, about, fixed, share), turns[0], "can't follow")
@@ -204,14 +205,14 @@ def _turning(machine: Machine, turns: list[str]) -> _Turning:
 def _two_turns(k: Floats) -> tuple[Sequence[Floats], Any, Any]:
     kx, ky, kz = k.T
     square = kx * kx + ky * ky
-    return [np.arctan2(np.sqrt(square), kz), np.arctan2(ky, kx)], square < FREE, None
+    return [np.arctan2(np.sqrt(square), kz), np.arctan2(ky, kx)], square < ROUNDED * ROUNDED, None
 
 
 def _three_turns(k: Floats) -> tuple[Sequence[Floats], Any, Any]:
     """C = 0: k = Ry(B)·Rx(A)·z = (sin B cos A, -sin A, cos B cos A)."""
     kx, ky, kz = k.T
     square = kx * kx + kz * kz
-    return [np.arctan2(-ky, np.sqrt(square)), np.arctan2(kx, kz), np.zeros(len(k))], square < FREE, None
+    return [np.arctan2(-ky, np.sqrt(square)), np.arctan2(kx, kz), np.zeros(len(k))], square < ROUNDED * ROUNDED, None
 
 
 def _one_turn(k: Floats, about: Floats, fixed: Floats, share: float) -> tuple[Sequence[Floats], Any, Any]:
@@ -219,7 +220,7 @@ def _one_turn(k: Floats, about: Floats, fixed: Floats, share: float) -> tuple[Se
     along = k @ about
     across = np.sqrt(np.maximum(0.0, 1.0 - along * along))
     angle = np.arctan2(k @ np.cross(about, fixed), k @ fixed - share * along)
-    return [angle], across * across < FREE, np.abs(np.arctan2(along, across) - math.asin(share))
+    return [angle], across * across < ROUNDED * ROUNDED, np.abs(np.arctan2(along, across) - math.asin(share))
 
 
 def _angle(k: Floats, fixed: Floats) -> Floats:

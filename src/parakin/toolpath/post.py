@@ -9,7 +9,7 @@ import numpy as np
 
 from ..errors import PoseError
 from ..machine import Machine
-from .frames import composed, parse_workpiece, tool_poses
+from .frames import ROUNDED, composed, parse_workpiece, tool_poses
 from .offences import judge
 from .program import Floats, ToolPath
 from .result import Posted
@@ -46,7 +46,7 @@ def post(
     frame = composed(outer, path.frame)
     poses, own = tool_poses(machine, path.tip, path.axis, frame)
     say(0.3)
-    joints = machine.follow(poses, mode)
+    joints = machine.follow(poses, mode, ROUNDED)
     _count_turns(machine, joints)
     say(0.7)
     chosen = machine.mode if mode is None else mode
@@ -60,7 +60,7 @@ def post(
 
 def _count_turns(machine: Machine, joints: Floats) -> None:
     """Shift turning joints, each as a whole, by the turns that bring them into their ranges, or nearest to."""
-    for column, drive in enumerate(machine.model.drives):
+    for column, drive in enumerate(machine.model.drives if len(joints) else ()):
         values = joints[:, column]
         low, high = float(np.fmin.reduce(values)), float(np.fmax.reduce(values))
         if drive.unit == "rad" and (low < drive.low or high > drive.high):

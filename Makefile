@@ -9,6 +9,7 @@ demo: .venv/installed
 	$(BIN)/parakin post out/turbine_blade.aptsource --machine tricept -o out
 
 test: .venv/developing lint
+	find src -name "*.nb[ci]" -delete  # Numba's cache does not see a change in a file that a kernel calls
 	$(BIN)/python -m pytest -n 2
 
 lint: .venv/developing

@@ -10,8 +10,8 @@ from pathlib import Path
 
 import numpy as np
 
-from parakin.model import algebra as alg
-from parakin.model.algebra import Scalar, Term, Trace
+from parakin import algebra as alg
+from parakin.algebra import Scalar, Term, Trace
 
 _CALLS = {
     alg.DIV: "{0} / {1}",

@@ -9,8 +9,8 @@ from in_c import compiled, source
 from measure import best, table
 
 import parakin as pk
+from parakin.algebra import Trace
 from parakin.kernels.batch import cores
-from parakin.model.algebra import Trace
 
 COUNT = 1_000_000
 # What each has to keep to: inverse and direct, times the copy.

@@ -11,7 +11,8 @@ import parakin
 
 ROOT = Path(parakin.__file__).parent
 CORE = [*(ROOT / "model").rglob("*.py"), *(ROOT / "kernels").rglob("*.py"), *(ROOT / "kinematics").rglob("*.py")]
-CORE.append(ROOT / "machine.py")
+CORE += [ROOT / "machine.py", ROOT / "algebra.py"]
+LAYERS = {"kernels": {"model", "kinematics", "machine"}, "model": {"kinematics", "machine"}}  # none looks up
 RIM = {"description", "quantities", "toolpath", "export", "commands", "cli"}
 FORBIDDEN = {"pathlib", "json", "io", "tempfile", "shutil", "plotly", "matplotlib", "pyarrow", "rich", "cyclopts"}
 FORBIDDEN |= {"pydantic", "ruamel", "http", "socket", "subprocess"}
@@ -40,9 +41,17 @@ def test_the_core_knows_nothing_of_the_rim(path):
     assert not imports(path) & (RIM | FORBIDDEN)
 
 
+@pytest.mark.parametrize("path", CORE, ids=lambda p: str(p.relative_to(ROOT)))
+def test_no_layer_looks_up(path):
+    tree = ast.parse(path.read_text(encoding="utf-8"))
+    for_types = [n for n in ast.walk(tree) if isinstance(n, ast.If) and "TYPE_CHECKING" in ast.unparse(n.test)]
+    if not for_types:
+        assert not imports(path) & LAYERS.get(path.relative_to(ROOT).parts[0], set())
+
+
 def test_there_is_a_core_to_look_at():
     assert len(CORE) > 20
-    assert "model" in imports(ROOT / "kernels" / "tape.py")
+    assert "algebra" in imports(ROOT / "kernels" / "tape.py")
 
 
 @pytest.mark.parametrize("module", ["parakin", "parakin.cli"])

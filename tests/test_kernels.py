@@ -10,11 +10,11 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from numba import njit
 
+from parakin import algebra as alg
 from parakin.kernels import elementary
 from parakin.kernels.batch import first_negative, run
 from parakin.kernels.intervals import IntervalProgram
 from parakin.kernels.tape import compile_tape
-from parakin.model import algebra as alg
 
 
 @njit

@@ -53,6 +53,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except CycloptsError as error:
         print(f"parakin: {' '.join(str(error).split())}", file=sys.stderr)
         return _MALFORMED
+    except RuntimeError as error:
+        if "no locator available" not in str(error):
+            raise
+        print(
+            "parakin: nowhere to keep the compiled kernels; set NUMBA_CACHE_DIR to a folder of yours", file=sys.stderr
+        )
+        return _MALFORMED
     except MemoryError:
         print("parakin: not enough memory", file=sys.stderr)
         return _MALFORMED

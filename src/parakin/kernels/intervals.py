@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..model import algebra as alg
-from ..model.algebra import Scalar, Term, Trace
+from .. import algebra as alg
+from ..algebra import Scalar, Term, Trace
 
 Bounds = tuple[NDArray[np.float64], NDArray[np.float64]]
 
@@ -81,26 +81,14 @@ class IntervalProgram:
     def __call__(self, low: NDArray[np.float64], high: NDArray[np.float64]) -> Bounds:
         """Bounds (boxes, outputs) of every output over boxes (boxes, inputs)."""
         known: dict[int, Bounds] = {}
-        needed = _needed([y for y in self.outputs if isinstance(y, Term)])
         count = len(low)
-        for index in sorted(needed):
+        for index in alg.needed([y for y in self.outputs if isinstance(y, Term)]):
             known[index] = _operation(self.trace.nodes[index], known, low, high)
         results = [
             known[y.index] if isinstance(y, Term) else (np.full(count, float(y)), np.full(count, float(y)))
             for y in self.outputs
         ]
         return np.stack([r[0] for r in results], -1), np.stack([r[1] for r in results], -1)
-
-
-def _needed(outputs: Sequence[Term]) -> set[int]:
-    needed: set[int] = set()
-    stack = list(outputs)
-    while stack:
-        term = stack.pop()
-        if term.index not in needed:
-            needed.add(term.index)
-            stack.extend(term.args)
-    return needed
 
 
 def _operation(y: Term, known: dict[int, Bounds], low: NDArray[np.float64], high: NDArray[np.float64]) -> Bounds:

@@ -12,8 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..model import algebra as alg
-from ..model.algebra import Scalar, Term, Trace
+from .. import algebra as alg
+from ..algebra import Scalar, Term, Trace
 
 # Opcodes. The number of summands is part of the code, so that the interpreter's loops have no inner ones.
 CONST, LIN1, LIN2, LIN3, QUAD1, QUAD2, QUAD3, FMA, DIV, SQRT, SINCOS, ATAN2, MIN, MAX, ABS, COPYSIGN = range(16)
@@ -66,7 +66,9 @@ def compile_tape(trace: Trace, outputs: Sequence[Scalar], inputs: int) -> Tape:
             # An output has a register of its own: a copy, outside the trace.
             term = Term(trace, alg.LIN, (term,), (0.0, 1.0), -1 - len(results))
         results.append(term)
-    order = [trace.nodes[i] for i in sorted(_needed(results))] + [term for term in results if term.index < 0]
+    copies = [term for term in results if term.index < 0]
+    within = [term for term in results if term.index >= 0] + [arg for term in copies for arg in term.args]
+    order = [trace.nodes[i] for i in alg.needed(within)] + copies
     last: dict[int, int] = {}
     for position, term in enumerate(order):
         for arg in term.args:
@@ -116,15 +118,3 @@ def compile_tape(trace: Trace, outputs: Sequence[Scalar], inputs: int) -> Tape:
         len(results),
         max(count, 1),
     )
-
-
-def _needed(results: Sequence[Term]) -> set[int]:
-    """Indices of the trace's nodes that the results hang on."""
-    needed: set[int] = set()
-    stack = [arg for term in results if term.index < 0 for arg in term.args] + [t for t in results if t.index >= 0]
-    while stack:
-        term = stack.pop()
-        if term.index not in needed:
-            needed.add(term.index)
-            stack.extend(term.args)
-    return needed

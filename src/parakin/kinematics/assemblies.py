@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..algebra import Trace, derivative
 from ..errors import NoMethodError, PoseError
 from ..kernels.batch import run_checked
 from ..kernels.intervals import IntervalProgram
-from ..model.algebra import Trace, derivative
 from ..model.chain import rotation_about
 from ..model.legs.lambda_ import Lambda
 from ..model.structure import CentralLeg, Free

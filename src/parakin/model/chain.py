@@ -7,8 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..errors import DescriptionError
-from .algebra import (
+from ..algebra import (
     IDENTITY,
     ORIGIN,
     Mat,
@@ -28,6 +27,7 @@ from .algebra import (
     transposed,
     turn,
 )
+from ..errors import DescriptionError
 from .parts import ROTATIONS, TRANSLATIONS, Step
 
 UNIT: dict[str, Vec] = {

@@ -11,7 +11,7 @@ from itertools import combinations
 from math import inf, isfinite
 from typing import Literal
 
-from .algebra import Mat, Scalar, Vec, add, apply, atan2, cross, dot, larger, norm, scale, smaller, sub
+from ..algebra import Mat, Scalar, Vec, add, apply, atan2, cross, dot, larger, norm, scale, smaller, sub
 from .legs import Leg
 from .parts import Cone
 from .spec import Spec

@@ -84,4 +84,4 @@ class Limits:
     passive: tuple[Range, ...] = ()  # of the motion's coordinates, by their names (rx, ry, tz, ...)
     gaps: tuple[Gap, ...] = ()
     cones: tuple[Cone, ...] = ()
-    clearance: float | None = None  # least distance of the centre lines of two struts, mm
+    clearance: float | None = None  # least distance of the centre lines of two struts that hold the platform, mm

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from .algebra import Scalar, Vec, add, copysign, cross, dot, scale, sqrt, sub
+from ..algebra import Scalar, Vec, add, copysign, cross, dot, scale, sqrt, sub
 
 CENTRES_NEEDED = (2, 3)
 

@@ -1,6 +1,6 @@
 """From the tool's pose to the platform's and back: the three ways a platform, a head and a table make a machine.
 
-All are written in :mod:`parakin.model.algebra`. Poses are of the tool in the workpiece's frame (the machine frame M
+All are written in :mod:`parakin.algebra`. Poses are of the tool in the workpiece's frame (the machine frame M
 where there is no table), joints of head and table together are the serial ones, and the platform's frame is given in
 the base frame.
 """
@@ -12,8 +12,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from math import pi
 
-from ..errors import DescriptionError
-from .algebra import (
+from ..algebra import (
     IDENTITY,
     Mat,
     Scalar,
@@ -33,6 +32,7 @@ from .algebra import (
     transposed,
     turn,
 )
+from ..errors import DescriptionError
 from .chain import UNIT, Pointing, back, frame, inverse_rotations, rotation_about
 from .parts import ROTATIONS, TRANSLATIONS, Step
 from .spec import Spec

@@ -10,9 +10,9 @@ from functools import cached_property
 
 import numpy as np
 
+from ..algebra import Scalar, Trace, Vec, apply, derivative, norm, scale, smaller, sqrt, sub, transposed, values
 from ..errors import DescriptionError
 from ..kernels.tape import Tape, compile_tape
-from .algebra import Scalar, Trace, Vec, apply, derivative, norm, scale, smaller, sqrt, sub, transposed, values
 from .legs import Inverse
 from .limits import Home, Limit, leg_joints, limits_of, platform_points
 from .spec import Spec
@@ -23,7 +23,7 @@ FAR = 1e12  # mm; more than any pose's coordinate
 
 
 class Model:
-    """A machine's mathematics in :mod:`parakin.model.algebra`, for numbers, arrays and traces."""
+    """A machine's mathematics in :mod:`parakin.algebra`, for numbers, arrays and traces."""
 
     def __init__(self, spec: Spec):
         self.spec = spec

@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..algebra import apply
 from ..errors import InputError
 from ..kinematics.path import neighbours, unwound
 from ..machine import Machine
-from ..model.algebra import apply
 from ..model.structure import Free
 from ..quantities import ANGLE, LENGTH, QuantityError, nearest, quantity, shown
 from .cl_words import LARGEST, is_number, number

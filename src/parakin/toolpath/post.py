@@ -75,4 +75,7 @@ def _turns(low: float, high: float, least: float, most: float) -> int:
     def outside(turns: int) -> tuple[float, int]:
         return max(least - low - turns * _TURN, high + turns * _TURN - most, 0.0), abs(turns)
 
-    return min((turns for turns in (0, up, down) if turns is not None), key=outside)
+    tried = [0, *[turns for turns in (up, down) if turns is not None]]
+    if up is not None and down is not None:
+        tried.append(round((least + most - low - high) / (2.0 * _TURN)))
+    return min(tried, key=outside)

@@ -6,7 +6,7 @@ from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from typing import ClassVar
 
-from ..algebra import Scalar, Vec
+from ...algebra import Scalar, Vec
 from ..parts import Drive, Point, Unit
 
 
@@ -22,7 +22,7 @@ class Inverse:
 class Leg(ABC):
     """A leg from the base to ``platform``, the point of the platform's joint in the platform's frame.
 
-    All its methods are written in :mod:`parakin.model.algebra`, so they serve numbers, NumPy arrays and traces alike.
+    All its methods are written in :mod:`parakin.algebra`, so they serve numbers, NumPy arrays and traces alike.
     ``point`` is the platform's joint in the base frame, mm.
     """
 

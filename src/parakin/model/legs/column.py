@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from ..algebra import Scalar, Vec, atan2, sincos, sqrt
+from ...algebra import Scalar, Vec, atan2, sincos, sqrt
 from ..parts import Signs, Size
 from .base import Inverse, Leg
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from ..algebra import Scalar, Vec, along, dot, scale, sqrt, sub
+from ...algebra import Scalar, Vec, along, dot, scale, sqrt, sub
 from ..parts import Direction, Point, Signs, Size
 from .base import Inverse, Leg
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from ..algebra import Scalar, Vec, dot, norm, sub
+from ...algebra import Scalar, Vec, dot, norm, sub
 from ..parts import Point
 from .base import Inverse, Leg
 

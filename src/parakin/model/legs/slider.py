@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from ..algebra import Scalar, Vec, along, dot, sqrt, sub
+from ...algebra import Scalar, Vec, along, dot, sqrt, sub
 from ..parts import Direction, Point, Signs, Size
 from .base import Inverse, Leg
 

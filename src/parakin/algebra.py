@@ -7,7 +7,7 @@ of rows.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Container, Sequence
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -70,7 +70,7 @@ class Trace:
     def __init__(self) -> None:
         self.nodes: list[Term] = []
         self._known: dict[tuple[Any, ...], Term] = {}
-        self._derivatives: dict[tuple[int, int], Scalar] = {}
+        self._derivatives: dict[int, dict[int, Scalar]] = {}
 
     def input(self, number: int) -> Term:
         """The ``number``-th input."""
@@ -258,28 +258,33 @@ IDENTITY: Mat = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 ORIGIN: Vec = (0.0, 0.0, 0.0)
 
 
+def needed(outputs: Sequence[Term], known: Container[int] = ()) -> list[int]:
+    """Indices of all nodes that the outputs hang on, operands first; not those ``known``, nor behind them."""
+    found: set[int] = set()
+    stack = list(outputs)
+    while stack:
+        term = stack.pop()
+        if term.index not in found and term.index not in known:
+            found.add(term.index)
+            stack.extend(term.args)
+    return sorted(found)
+
+
 def derivative(y: Scalar, x: Term) -> Scalar:
     """∂y/∂x of a trace, as a trace. Not for the operations with corners, which closures never use."""
     if not isinstance(y, Term):
         return 0.0
-    known = y.trace._derivatives
-    # Operands precede results, so one pass over the nodes that y needs is enough and no recursion is.
-    needed, stack = set(), [y]
-    while stack:
-        term = stack.pop()
-        if term.index not in needed and (term.index, x.index) not in known:
-            needed.add(term.index)
-            stack.extend(term.args)
-    for index in sorted(needed):
-        known[index, x.index] = _derivative(y.trace.nodes[index], x, known)
-    return known[y.index, x.index]
+    known = y.trace._derivatives.setdefault(x.index, {})
+    for index in needed([y], known):
+        known[index] = _derivative(y.trace.nodes[index], x, known)
+    return known[y.index]
 
 
-def _derivative(y: Term, x: Term, known: dict[tuple[int, int], Scalar]) -> Scalar:
+def _derivative(y: Term, x: Term, known: dict[int, Scalar]) -> Scalar:
     if y is x:
         return 1.0
     a = y.args
-    d = [known[arg.index, x.index] for arg in a]
+    d = [known[arg.index] for arg in a]
     if not any(isinstance(part, Term) or part != 0.0 for part in d):
         return 0.0
     if y.op == LIN:

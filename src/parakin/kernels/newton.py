@@ -20,6 +20,14 @@ FINE = 1e-12  # mm: where the next step is foreseen to end, it is the last
 PIVOT = 4.0  # how many times greater an entry must be to become the pivot
 
 
+@njit(nogil=True, cache=True)
+def copy(a, i, b, j, rows):
+    """Rows from the i-th of ``a`` to the j-th on of ``b``. (Slices take seconds to compile, for their error messages.)"""
+    s, t = (i & _MASK) * LANES, (j & _MASK) * LANES
+    for c in range(rows * LANES):
+        b[t + c] = a[s + c]
+
+
 @njit(nogil=True, cache=True, fastmath=FAST, error_model="numpy")
 def factor(a, m, swaps, wanted, det):
     """Factor ``a`` (m·m·LANES,), row by row, in place: multipliers below, reciprocal pivots on the diagonal.
@@ -92,7 +100,7 @@ def substitute(a, m, swaps, wanted, f):
 @njit(nogil=True, cache=True, fastmath=FAST, error_model="numpy")
 def closures(code, imm, inputs, m, held, r, f, worst, n):
     """Run a tape that gives m closures first; ``f`` and the greatest of each lane, and of the block's first n lanes."""
-    r[: inputs * LANES] = held
+    copy(held, 0, r, 0, inputs)
     interpret(code, imm, r)
     worst[:] = 0.0
     for i in range(m):
@@ -121,11 +129,10 @@ def descend(full, light, m, q, caps, size, most, room, n):
     for step in range(most + 1):
         if refactor:
             greatest = closures(full[0], full[1], inputs, m, held, r, f, worst, n)
-            first = ((inputs + m) & _MASK) * LANES
-            a[:] = r[first : first + m * m * LANES]
+            copy(r, inputs + m, a, 0, m * m)
             factor(a, m, swaps, wanted, turn)
             if step == 0:
-                turn0[:] = turn
+                copy(turn, 0, turn0, 0, 1)
             refactor = greatest * greatest > WORTH * size
             enough = greatest < CLOSE
         else:
@@ -181,13 +188,13 @@ def newton(
         else:
             load(near, row, n, 0, r, bad)
         load(q, row, n, m, held, bad)
-        r[given * LANES : (given + joints) * LANES] = held[m * LANES :]
+        copy(held, m, r, given, joints)
         fetch_to_read(q, row + LANES, stop)
         if not common:
             fetch_to_read(near, row + LANES, stop)
         fetch_to_write(out, row, stop)
         interpret(begin[0], begin[1], r)
-        held[: m * LANES] = r[(given + joints) * LANES : (given + joints + m) * LANES]
+        copy(r, given + joints, held, 0, m)
         room = (held, r, a, swaps, wanted, f, turn, turn0, worst, shrink)
         step = descend(full, light, m, joints, caps, size, most, room, n)
         for j in range(n):
@@ -196,7 +203,7 @@ def newton(
                 turned[row + j] = turn[j] * turn0[j]
             else:
                 turned[row + j] = turn[j] * side[0 if side.shape[0] == 1 else row + j]
-        r[: (m + joints) * LANES] = held
+        copy(held, 0, r, 0, m + joints)
         interpret(end[0], end[1], r)
         for i in range(out.shape[1]):
             s = ((m + joints + i) & _MASK) * LANES

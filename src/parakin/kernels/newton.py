@@ -22,7 +22,7 @@ PIVOT = 4.0  # how many times greater an entry must be to become the pivot
 
 @njit(nogil=True, cache=True)
 def copy(a, i, b, j, rows):
-    """Rows from the i-th of ``a`` to the j-th on of ``b``. (Slices take seconds to compile, for their error messages.)"""
+    """Rows from the i-th of ``a`` to the j-th on of ``b``; a slice would take seconds to compile, for its messages."""
     s, t = (i & _MASK) * LANES, (j & _MASK) * LANES
     for c in range(rows * LANES):
         b[t + c] = a[s + c]

@@ -188,12 +188,15 @@ def test_machines(capsys):
 
 
 @pytest.mark.parametrize("name", pk.machines())
-def test_show(name, capsys):
+def test_show(name, capsys, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
     assert main(["show", name]) == 0
     said = capsys.readouterr().out
     assert all(joint in said for joint in pk.load(name).joints)
-    assert "-o" in said.splitlines()[-1]
+    assert said.splitlines()[-1] == f"picture {name}.html"
+    (tmp_path / f"{name}.html").unlink()
     assert main(["show", name, "--json"]) == 0
+    assert not list(tmp_path.iterdir())
     assert json.loads(capsys.readouterr().out, parse_constant=pytest.fail)["name"] == name
 
 

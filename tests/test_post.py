@@ -411,3 +411,21 @@ def test_a_folder_that_cant_be_made(tmp_path):
         with pytest.raises(pk.InputError):
             write_all(folder, {name: b""})
     assert sorted(path.name for path in tmp_path.iterdir()) == ["file", "pipe", "taken"]
+
+
+@pytest.mark.parametrize("name", ["orthoglide5_head", "tricept"])
+def test_c_and_the_wrist_stay_continuous_over_the_pole(name):
+    m = pk.load(name)
+    lean = np.linspace(-0.21, 0.2, 12)
+    axis = np.column_stack([np.sin(lean), np.zeros(12), np.cos(lean)])
+    tip = np.tile(m.home[:3], (12, 1))
+    zero = np.zeros(12)
+    path = ToolPath("swing.apt", tip, axis, np.arange(1, 13), zero > 1, zero + 1e3, zero, None, "apt", "mm", {}, (), ())
+    posted = post(m, path)
+    b, c = posted.poses[:, 3], posted.poses[:, 4]
+    assert np.abs(np.diff(c)).max() < 1e-9
+    assert np.abs(np.diff(b)).max() < 0.04
+    assert np.abs(np.diff(posted.joints[:, 3:], axis=0)).max() < 0.06
+    k = np.column_stack([np.sin(b) * np.cos(c), np.sin(b) * np.sin(c), np.cos(b)])
+    assert np.abs(k - axis).max() < 1e-12
+    assert not posted.offences

@@ -53,16 +53,19 @@ def show(
     json: Json = False,
     sizes: Sizes = None,
 ) -> int:
-    """A machine's sizes, drives, limits and home; with -o its picture in 3D.
+    """A machine's sizes, drives, limits and home, and its picture in 3D.
 
     Parameters
     ----------
     name
         A shipped machine's name or a YAML file.
     output
-        Picture of the machine at home: an .html to turn and look at, or a .png.
+        Where to put the picture of the machine at home: an .html to turn and look at, or a .png. By default NAME.html
+        in this folder; with --json none.
     """
     machine = machine_of(name, sizes)
+    if output is None and not json:
+        output = Path(f"{machine.name}.html")
     if output is not None:
         _picture(machine, output)
     if json:
@@ -71,7 +74,7 @@ def show(
         return 0
     print(_described(machine))
     print()
-    print(f"picture {output}" if output else f"a picture: parakin show {name} -o {machine.name}.html (or .png)")
+    print(f"picture {output}")
     return 0
 
 

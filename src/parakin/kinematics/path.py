@@ -37,26 +37,39 @@ def follow(machine: Machine, poses: Array, mode: str, free_below: float = FREE) 
 
 
 def _go_on_over_the_pole(machine: Machine, poses: Array, mode: str, joints: Array, regular: NDArray[np.bool_]) -> None:
-    """Where the tool's axis passes its turning axis between two records, half a turn of the first joint is spared by
-    going on in head and table's other working mode, in which the second joint changes sign instead; in place."""
+    """Where half a turn of the first joint is spared by it, go on in head and table's other working mode; in place."""
     first, last = machine.model.first_serial, joints.shape[1] - machine.model.serial
-    second = last + 1 if first == last else last
+    columns = [first, last + 1 if first == last else last]
     at = np.flatnonzero(regular & np.isfinite(joints[:, first]))
-    a = joints[at][:, [first, second]]
-    stay = _wrapped(np.diff(a, axis=0))
-    if not (np.abs(stay[:, 0]) > _SWING).any():
+    here = joints[at][:, columns]
+    if not swings(here):
         return
     other = machine.inverse(poses[at], mode[:-1] + ("-" if mode[-1] == "+" else "+"))
-    cross = _wrapped(other[1:][:, [first, second]] - a[:-1])
-    with np.errstate(invalid="ignore"):
-        spared = (np.abs(stay[:, 0]) > _SWING) & ((cross**2).sum(1) < 0.25 * (stay**2).sum(1))
-    across = np.concatenate([[False], np.cumsum(spared) % 2 == 1])
+    across = over_the_pole(here, other[:, columns])
     joints[at[across]] = other[across]
 
 
-def _wrapped(angle: Array) -> Array:
-    wrapped: Array = angle - 2.0 * np.pi * np.round(angle / (2.0 * np.pi))
-    return wrapped
+def swings(angles: Array) -> bool:
+    """Some of the first angles (n, 2) of neighbours lie more than a quarter turn apart."""
+    return bool((np.abs(wrapped(np.diff(angles[:, 0]))) > _SWING).any())
+
+
+def over_the_pole(here: Array, there: Array) -> NDArray[np.bool_]:
+    """Which rows of a path (n,) go on in the other of two pairs of angles (n, 2) that point a tool the same way.
+
+    A path that passes over its pole between two records, the first angle half a turn on and the second small, is
+    continuous in the other pair, in which the second angle changes its sign instead.
+    """
+    stay, cross = wrapped(np.diff(here, axis=0)), wrapped(there[1:] - here[:-1])
+    with np.errstate(invalid="ignore"):
+        spared = (np.abs(stay[:, 0]) > _SWING) & ((cross**2).sum(1) < 0.25 * (stay**2).sum(1))
+    return np.concatenate([np.zeros(min(len(here), 1), bool), np.cumsum(spared) % 2 == 1])
+
+
+def wrapped(angle: Array) -> Array:
+    """The angle within half a turn of 0."""
+    result: Array = angle - 2.0 * np.pi * np.round(angle / (2.0 * np.pi))
+    return result
 
 
 def neighbours(values: Array, free: NDArray[np.bool_]) -> Array:

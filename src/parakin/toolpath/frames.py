@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from ..algebra import apply
 from ..errors import InputError
-from ..kinematics.path import neighbours, unwound
+from ..kinematics.path import neighbours, over_the_pole, swings, unwound
 from ..machine import Machine
 from ..model.structure import Free
 from ..quantities import ANGLE, LENGTH, QuantityError, nearest, quantity, shown
@@ -125,7 +125,8 @@ def tool_poses(machine: Machine, tip: Floats, axis: Floats, frame: Floats) -> tu
     """Poses for tool tips and axes, (n, 3) each, and what the machine's axes can't follow; ``frame`` leads into M.
 
     A turn about the tool's axis is free: C is 0 where the machine turns three ways, and B and C tell the axis's
-    direction where it turns two (B from 0 to 180°; at B = 0 C keeps the neighbour's value).
+    direction where it turns two (B from 0 to 180°, but below 0 where a path has passed over B = 0, so that C does not
+    jump by half a turn; at B = 0 C keeps the neighbour's value).
     """
     count = len(tip)
     turns = [letter for letter in machine.axes if letter in "ABC"]
@@ -147,6 +148,8 @@ def tool_poses(machine: Machine, tip: Floats, axis: Floats, frame: Floats) -> tu
             poses[part, machine.axes.index(letter)] = values
         if lean is not None:
             lean[part] = leaning
+    if turns == ["B", "C"]:
+        _go_on_over_the_pole(poses, machine.axes.index("B"), machine.axes.index("C"), np.flatnonzero(~free))
     if turning.wound is not None:
         column = machine.axes.index(turning.wound)
         poses[:, column] = _continuous(poses[:, column], free)
@@ -160,6 +163,15 @@ def tool_poses(machine: Machine, tip: Floats, axis: Floats, frame: Floats) -> tu
 
 def _off_plane(letter: str) -> Callable[[str], str]:
     return f"{letter} would be {{}}, the machine works in {letter} = 0".format
+
+
+def _go_on_over_the_pole(poses: Floats, b: int, c: int, at: Any) -> None:
+    """B and C that point the same way, with B of the other sign where that keeps C continuous; in place."""
+    here = poses[at][:, [c, b]]
+    if swings(here):
+        there = np.column_stack([here[:, 0] + math.pi, -here[:, 1]])
+        across = over_the_pole(here, there)
+        poses[at[across], c], poses[at[across], b] = there[across].T
 
 
 def _continuous(angle: Floats, free: Any) -> Floats:

@@ -4,8 +4,6 @@ The kernel takes only what it reads exactly as the line reader would, and stops 
 else: other words, exponents, continuations, long mantissas, errors. The line reader then decides about that line.
 """
 
-# mypy: disable-error-code="untyped-decorator"
-
 import math
 from typing import Any
 

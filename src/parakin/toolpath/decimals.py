@@ -1,7 +1,5 @@
 """Tables of numbers as decimal text, fast: fixed digits, trailing zeros left away."""
 
-# mypy: disable-error-code="untyped-decorator"
-
 from typing import Any
 
 import numba as nb

@@ -8,11 +8,11 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations
-from math import inf, isfinite
+from math import isfinite
 from typing import Literal
 
 from ..algebra import Mat, Scalar, Vec, add, apply, atan2, cross, dot, larger, norm, scale, smaller, sub
-from .legs import Leg
+from .legs import Leg, Reach
 from .parts import Cone
 from .spec import Spec
 from .structure import Placement
@@ -20,7 +20,10 @@ from .structure import Placement
 
 @dataclass(frozen=True)
 class Limit:
-    """One margin: what it is of, its bound, and how to read it (value = bound ± margin)."""
+    """One margin: what it is of, its bound, and how to read it (value = bound ± margin).
+
+    The bound of a reach is the rod's length, 0 where it is no matter of one rod.
+    """
 
     name: str
     subject: str
@@ -30,6 +33,8 @@ class Limit:
 
     def value(self, margin: float) -> float:
         """The bounded quantity for a margin; for a reach the margin itself."""
+        if self.side == "reach":
+            return margin
         return self.bound - margin if self.side == "max" else self.bound + margin
 
 
@@ -38,7 +43,7 @@ def limits_of(
     pose: Placement,
     coordinates: Sequence[tuple[str, Scalar]],
     joints: Sequence[Scalar],
-    reaches: Sequence[tuple[Scalar, ...]],
+    reaches: Sequence[tuple[Reach, ...]],
     home: Home | None,
 ) -> list[tuple[Limit, Scalar]]:
     """All limits with their margins.
@@ -86,12 +91,12 @@ def _between(
         yield Limit(f"{name}.max", subject, unit, "max", high), high - value
 
 
-def _reach(spec: Spec, pose: Placement, reaches: Sequence[tuple[Scalar, ...]]) -> Iterator[tuple[Limit, Scalar]]:
+def _reach(spec: Spec, pose: Placement, reaches: Sequence[tuple[Reach, ...]]) -> Iterator[tuple[Limit, Scalar]]:
     for margin in pose.reach:
         yield Limit("tool.reach", "the tool's axis", "1", "reach"), margin
     for leg, margins in zip(spec.legs, reaches, strict=True):
-        for drive, margin in zip(leg.drives, margins, strict=False):
-            yield Limit(f"{drive.name}.reach", f"leg {drive.name}", "mm²", "reach"), margin
+        for drive, reach in zip(leg.drives, margins, strict=False):
+            yield Limit(f"{drive.name}.reach", f"leg {drive.name}", "mm²", "reach", reach.rod), reach.margin
 
 
 def _drives(spec: Spec, joints: Sequence[Scalar]) -> Iterator[tuple[Limit, Scalar]]:
@@ -156,8 +161,7 @@ def _clearance(spec: Spec, pose: Placement, joints: Sequence[Scalar]) -> Iterato
 
 
 def _share_a_joint(one: Leg, two: Leg) -> bool:
-    same_foot = getattr(one, "foot", None) == getattr(two, "foot", inf) and one.kind == "length"
-    return one.platform == two.platform or same_foot
+    return one.platform == two.platform or (one.held_at() is not None and one.held_at() == two.held_at())
 
 
 def distance(a: tuple[Vec, Vec], b: tuple[Vec, Vec]) -> Scalar:

@@ -18,9 +18,6 @@ from .result import Offence
 _BLOCK = 1 << 16  # records whose margins are held at once
 _NO_JOINTS = "reach"  # the path's own limit for what no margin tells
 
-# The rod whose length a reach margin is about (margin = rod² - distance²), by leg kind; for a leg's first joint only.
-_RODS = {"slider": "rod", "column": "rod", "lambda": "long"}
-
 
 @dataclass(frozen=True, eq=False)
 class Judgement:
@@ -144,13 +141,11 @@ def _reach(machine: Machine, limit: Limit, excess: float) -> _Said:
     text = f"{limit.subject} can't close"
     if not math.isfinite(excess):
         return _Said(text, (math.nan, 0.0, "mm", math.inf))
-    joint = limit.name.removesuffix(".reach")
-    for leg in machine.spec.legs:
-        if leg.drives[0].name == joint and leg.kind in _RODS:
-            rod = float(getattr(leg, _RODS[leg.kind]))
-            needed = math.sqrt(rod * rod + excess)
-            shown = measure(needed - rod, "mm", 0.0)
-            return _Said(f"{text}: its rod would have to be {shown} longer", (needed, rod, "mm", needed - rod))
+    if limit.bound > 0.0:
+        rod = limit.bound
+        needed = math.sqrt(rod * rod + excess)
+        shown = measure(needed - rod, "mm", 0.0)
+        return _Said(f"{text}: its rod would have to be {shown} longer", (needed, rod, "mm", needed - rod))
     return _Said(f"{text} there", (-math.sqrt(excess), 0.0, "mm", math.sqrt(excess)))
 
 

@@ -3,9 +3,9 @@
 from importlib import import_module
 from pkgutil import iter_modules
 
-from .base import Inverse, Leg
+from .base import Inverse, Leg, Reach
 
-__all__ = ["KINDS", "Inverse", "Leg"]
+__all__ = ["KINDS", "Inverse", "Leg", "Reach"]
 
 
 def _kinds() -> dict[str, type[Leg]]:

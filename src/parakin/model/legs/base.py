@@ -11,11 +11,19 @@ from ..parts import Drive, Point, Unit
 
 
 @dataclass(frozen=True)
+class Reach:
+    """What must be ≥ 0 for a leg to reach a point, mm²; of a rod its length less the distance to span, both squared."""
+
+    margin: Scalar
+    rod: float = 0.0  # mm; 0 where it is no matter of one rod's length
+
+
+@dataclass(frozen=True)
 class Inverse:
-    """A leg's joints for one platform point, and what must be ≥ 0 for it to reach there."""
+    """A leg's joints for one platform point, and their reach, joint by joint."""
 
     joints: list[Scalar]
-    reach: tuple[Scalar, ...] = ()  # mm²; the leg can't close where one is negative
+    reach: tuple[Reach, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -48,6 +56,10 @@ class Leg(ABC):
     def inside(self, point: Vec, joints: list[Scalar]) -> tuple[Scalar, ...]:
         """What is ≥ 0 where a leg that closes does so as it is built: its closures may hold elsewhere too."""
         return ()
+
+    def held_at(self) -> Vec | None:
+        """The foot of a leg whose foot does not move; legs that share it can't be kept clear of each other."""
+        return None
 
     def size(self, at_home: float) -> float:
         """A length, mm, that the leg (``at_home`` at home) seldom falls below: it turns closures into distances."""

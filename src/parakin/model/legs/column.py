@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from ...algebra import Scalar, Vec, atan2, sincos, sqrt
 from ..parts import Signs, Size
-from .base import Inverse, Leg
+from .base import Inverse, Leg, Reach
 
 
 @dataclass(frozen=True)
@@ -38,7 +38,7 @@ class Column(Leg):
         out = self.radius - sqrt(x * x + y * y)
         reach = self.rod**2 - out * out
         root = sqrt(reach)
-        return Inverse([atan2(y, x), z - root if signs == "-" else z + root], (reach,))
+        return Inverse([atan2(y, x), z - root if signs == "-" else z + root], (Reach(reach, self.rod),))
 
     def struts(self, point: Vec, joints: list[Scalar]) -> list[tuple[Vec, Vec]]:
         s, c = sincos(joints[0])

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from ...algebra import Scalar, Vec, add, atan2, cross, dot, scale, sincos, sqrt, sub
 from ..parts import Direction, Point, Signs, Size
-from .base import Inverse, Leg
+from .base import Inverse, Leg, Reach
 
 
 @dataclass(frozen=True)
@@ -38,7 +38,7 @@ class Crank(Leg):
         m = (dot(w, w) + (self.arm**2 - self.rod**2)) / (2.0 * self.arm)
         reach = x * x + y * y - m * m
         root = sqrt(reach) if signs == "+" else -sqrt(reach)
-        return Inverse([atan2(y * m - x * root, x * m + y * root)], (reach,))
+        return Inverse([atan2(y * m - x * root, x * m + y * root)], (Reach(reach),))
 
     def struts(self, point: Vec, joints: list[Scalar]) -> list[tuple[Vec, Vec]]:
         foot = self._foot(joints[0])

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from ...algebra import Scalar, Vec, along, dot, scale, sqrt, sub
 from ..parts import Direction, Point, Signs, Size
-from .base import Inverse, Leg
+from .base import Inverse, Leg, Reach
 
 
 @dataclass(frozen=True)
@@ -48,7 +48,10 @@ class Lambda(Leg):
         hinge_reach = height * height + (self.short**2 - self._lower**2)
         root = sqrt(hinge_reach)
         first = s - rise
-        return Inverse([first, first + height + (root if signs[1] == "+" else -root)], (reach, hinge_reach))
+        return Inverse(
+            [first, first + height + (root if signs[1] == "+" else -root)],
+            (Reach(reach, self.long), Reach(hinge_reach)),
+        )
 
     def struts(self, point: Vec, joints: list[Scalar]) -> list[tuple[Vec, Vec]]:
         start = along(self.foot, self.rail, joints[0])

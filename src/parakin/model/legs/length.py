@@ -29,6 +29,9 @@ class Length(Leg):
     def inside(self, point: Vec, joints: list[Scalar]) -> tuple[Scalar, ...]:
         return (joints[0],)
 
+    def held_at(self) -> Vec:
+        return self.foot
+
     def size(self, at_home: float) -> float:
         return max(0.25 * at_home, min(self.drives[0].low, at_home))
 

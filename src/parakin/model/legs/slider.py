@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 from ...algebra import Scalar, Vec, along, dot, sqrt, sub
 from ..parts import Direction, Point, Signs, Size
-from .base import Inverse, Leg
+from .base import Inverse, Leg, Reach
 
 
 @dataclass(frozen=True)
@@ -36,7 +36,7 @@ class Slider(Leg):
         off = along(w, self.rail, -s)  # from the rail, at right angles
         reach = self.rod**2 - dot(off, off)
         root = sqrt(reach)
-        return Inverse([s - root if signs == "-" else s + root], (reach,))
+        return Inverse([s - root if signs == "-" else s + root], (Reach(reach, self.rod),))
 
     def struts(self, point: Vec, joints: list[Scalar]) -> list[tuple[Vec, Vec]]:
         return [(self._foot(joints[0]), point)]

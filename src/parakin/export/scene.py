@@ -19,7 +19,7 @@ from ..model.chain import UNIT, frame
 from ..model.legs import Leg
 from ..model.limits import leg_joints, platform_points
 from ..model.parts import Step
-from ..model.structure import CentralLeg, Placement
+from ..model.structures import CentralLeg, Placement
 
 Points = NDArray[np.float64]
 Kind = Literal["base", "rail", "telescope", "rod", "arm", "platform", "central", "head", "tool", "table", "axis"]
@@ -89,9 +89,11 @@ def scene(
     given = machine.rows(machine.home if pose is None else pose, machine.axes, "pose")[0][0]
     mode = mode or machine.mode
     q = machine.inverse(given, mode) if joints is None else machine.rows(joints, machine.joints, "joints")[0][0]
-    free = model.first_serial if joints is not None else None
     with np.errstate(invalid="ignore", divide="ignore"):
-        placed = model.structure.place(list(given), model.split_mode(mode)[1], None if free is None else q[free])
+        if joints is None:
+            placed = model.structure.place(list(given), model.split_mode(mode)[1])
+        else:
+            placed = model.structure.held(list(given), list(q[len(q) - model.serial :]))
         drawn = _Drawing(machine, placed, q).drawing()
     parts = tuple(part for part in drawn.parts if np.isfinite(part.points).all())
     labels = _joined([label for label in drawn.labels if np.isfinite(label[1]).all()])

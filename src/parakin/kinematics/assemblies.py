@@ -13,7 +13,7 @@ from ..kernels.batch import run_checked
 from ..kernels.intervals import IntervalProgram
 from ..model.chain import rotation_about
 from ..model.legs.lambda_ import Lambda
-from ..model.structure import CentralLeg, Free
+from ..model.structures import CentralLeg, Free
 from .boxes import isolated
 from .direct import poses_of, roots, tolerance
 from .planar import planar_poses

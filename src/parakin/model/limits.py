@@ -15,7 +15,7 @@ from ..algebra import Mat, Scalar, Vec, add, apply, atan2, cross, dot, larger, n
 from .legs import Leg, Reach
 from .parts import Cone
 from .spec import Spec
-from .structure import Placement
+from .structures import Placement
 
 
 @dataclass(frozen=True)

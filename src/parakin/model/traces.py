@@ -17,7 +17,7 @@ from .legs import Inverse
 from .limits import Home, Limit, leg_joints, limits_of, platform_points
 from .spec import Spec
 from .spheres import CENTRES_NEEDED, common_point, side_of
-from .structure import Placement, Structure, structure_of
+from .structures import Placement, Structure, structure_of
 
 FAR = 1e12  # mm; more than any pose's coordinate
 

@@ -14,7 +14,7 @@ from ..algebra import apply
 from ..errors import InputError
 from ..kinematics.path import neighbours, over_the_pole, swings, unwound
 from ..machine import Machine
-from ..model.structure import Free
+from ..model.structures import Free
 from ..quantities import ANGLE, LENGTH, QuantityError, nearest, quantity, shown
 from .cl_words import LARGEST, is_number, number
 from .program import Floats

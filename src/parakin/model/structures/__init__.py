@@ -1,0 +1,37 @@
+"""The three ways in which a platform, a head and a table make a machine."""
+
+from __future__ import annotations
+
+from ...errors import DescriptionError
+from ..parts import ROTATIONS, TRANSLATIONS
+from ..spec import Spec
+from .base import Placement, Structure
+from .carried import Carried
+from .central_leg import CentralLeg
+from .free import Free
+
+__all__ = ["Carried", "CentralLeg", "Free", "Placement", "Structure", "structure_of"]
+
+
+def structure_of(spec: Spec) -> Structure:
+    """The structure of a machine, or a :class:`DescriptionError` that says why it is none."""
+    twice = [bound.name for bound in spec.limits.passive if spec.motion.count(bound.name) > 1]
+    if twice:
+        raise DescriptionError("limits", f"passive {twice[0]} stands twice in the motion, so it is not one coordinate")
+    drives = [(step.axis, step.drive.name) for step in (*spec.head, *spec.table) if step.drive is not None]
+    for axis, name in drives:
+        if axis in TRANSLATIONS:
+            raise DescriptionError("head", f"joint {name}: the drives of head and table turn; {axis} can't be one")
+    driven = len(drives)
+    if spec.motion[0] in ROTATIONS:
+        return CentralLeg(spec)
+    if driven == 0:
+        if spec.table:
+            raise DescriptionError("table", "a table without a driven turn does nothing; leave it out")
+        return Free(spec)
+    if set(spec.motion) != set(TRANSLATIONS) or len(spec.motion) != 3:
+        raise DescriptionError(
+            "motion",
+            f"{' '.join(spec.motion)}: with a driven head or table it is tx ty tz, or a central leg (rx ry tz)",
+        )
+    return Carried(spec)

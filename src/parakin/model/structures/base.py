@@ -1,0 +1,69 @@
+"""What a motion, a mounting, a head and a table make together: from the tool's pose to the platform's and back.
+
+All is written in :mod:`parakin.algebra`. Poses are of the tool in the workpiece's frame (the machine frame M where
+there is no table), joints of head and table together are the serial ones, and the platform's frame is given in the base
+frame.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+from ...algebra import Mat, Scalar, Vec
+from ..chain import frame
+from ..spec import Spec
+
+# Axis letters of a pose, ISO 841, by the elementary transforms that move along and about them.
+LETTERS = {"tx": "X", "ty": "Y", "tz": "Z", "rx": "A", "ry": "B", "rz": "C"}
+
+
+@dataclass(frozen=True)
+class Placement:
+    """Where a pose puts the platform, with the joints and coordinates that follow from it."""
+
+    rotation: Mat
+    origin: Vec
+    coordinates: list[Scalar]  # of the motion
+    serial: list[Scalar]  # joints of head and table
+    reach: tuple[Scalar, ...] = ()  # negative where head or table can't point the tool there
+    freedom: Scalar | None = None  # 0 where the first joint of head or table is free
+
+
+class Structure(ABC):
+    """What a motion, a mounting, a head and a table make together."""
+
+    axes: tuple[str, ...]
+    branches: str = ""  # default working mode of head and table
+
+    def __init__(self, spec: Spec):
+        self.spec = spec
+        self.mount, self.base = frame(spec.mounting, ())
+        self.coordinates = spec.motion
+        self.head_joints = sum(step.drive is not None for step in spec.head)
+
+    @abstractmethod
+    def place(self, pose: Sequence[Scalar], branch: str, first: Scalar | None = None) -> Placement:
+        """The platform for a pose; ``first`` gives the first serial joint where it is free."""
+
+    @abstractmethod
+    def frame(self, coordinates: Sequence[Scalar]) -> tuple[Mat, Vec]:
+        """The platform's frame in the base for the motion's coordinates."""
+
+    def held(self, pose: Sequence[Scalar], serial: Sequence[Scalar]) -> Placement:
+        """As :meth:`place`, for the serial joints that a path takes there, whatever their working mode."""
+        return replace(self.place(pose, self.branches), serial=list(serial))
+
+    def coordinates_at(self, origin: Vec) -> list[Scalar]:
+        """The motion's coordinates for the platform's origin in the base, of a motion without turns."""
+        return list(origin)
+
+    @abstractmethod
+    def pose(self, coordinates: Sequence[Scalar], serial: Sequence[Scalar]) -> list[Scalar]:
+        """The tool's pose; at a vertical tool axis C is 0."""
+
+    @abstractmethod
+    def closure(self, pose: Sequence[Scalar], serial: Sequence[Scalar]) -> tuple[Mat, Vec, list[Scalar]]:
+        """The platform's frame from pose and serial joints without any quotient that a singular head would spoil,
+        and what is 0 where head and table point the tool along the pose's axis."""

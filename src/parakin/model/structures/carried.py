@@ -1,0 +1,64 @@
+"""A platform that only translates, with two turning axes in head and table."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from ...algebra import IDENTITY, Mat, Scalar, Vec, add, apply, sub, transposed
+from ..chain import UNIT, Pointing, back, frame, inverse_rotations
+from ..parts import TRANSLATIONS
+from ..spec import Spec
+from .base import Placement
+from .five_axis import FiveAxis, axis_angles, tool_axis
+
+
+class Carried(FiveAxis):
+    """A platform that only translates; head and table together turn twice."""
+
+    def __init__(self, spec: Spec):
+        super().__init__(spec)
+        self.coordinates = TRANSLATIONS
+        chain = [*inverse_rotations(spec.table), *spec.mounting, *spec.head]
+        self.pointing = Pointing.of(chain, "head" if self.head_joints else "table")
+        # The turning axes as they follow on each other: the table's, inverted, then the head's.
+        drives = [step.drive for step in spec.head if step.drive] + [step.drive for step in spec.table if step.drive]
+        self.order = [drives.index(step.drive) for step in chain if step.drive is not None]
+
+    def _split(self, serial: Sequence[Scalar]) -> tuple[Sequence[Scalar], Sequence[Scalar]]:
+        return serial[: self.head_joints], serial[self.head_joints :]
+
+    def _origin(self, pose: Sequence[Scalar], serial: Sequence[Scalar]) -> Vec:
+        head, table = self._split(serial)
+        top, place = frame(self.spec.table, table)
+        world = add(place, apply(top, pose[:3]))
+        _, tip = frame(self.spec.head, head)
+        return sub(back(self.mount, self.base, world), tip)
+
+    def place(self, pose: Sequence[Scalar], branch: str, first: Scalar | None = None) -> Placement:
+        k, _, _ = tool_axis(pose[3], pose[4])
+        found = self.pointing.solve(k, branch, first)
+        serial = [found.joints[self.order.index(i)] for i in range(2)]
+        origin = self._origin(pose, serial)
+        return Placement(IDENTITY, origin, list(origin), serial, found.reach, found.freedom)
+
+    def held(self, pose: Sequence[Scalar], serial: Sequence[Scalar]) -> Placement:
+        origin = self._origin(pose, serial)
+        reach = self.place(pose, self.branches).reach
+        return Placement(IDENTITY, origin, list(origin), list(serial), reach)
+
+    def frame(self, coordinates: Sequence[Scalar]) -> tuple[Mat, Vec]:
+        return IDENTITY, tuple(coordinates)
+
+    def _axis(self, serial: Sequence[Scalar]) -> Vec:
+        head, table = self._split(serial)
+        k = apply(self.mount, apply(frame(self.spec.head, head)[0], UNIT["tz"]))
+        return apply(transposed(frame(self.spec.table, table)[0]), k)
+
+    def pose(self, coordinates: Sequence[Scalar], serial: Sequence[Scalar]) -> list[Scalar]:
+        head, table = self._split(serial)
+        tip = add(tuple(coordinates), frame(self.spec.head, head)[1])
+        top, place = frame(self.spec.table, table)
+        return [*back(top, place, add(apply(self.mount, tip), self.base)), *axis_angles(self._axis(serial))]
+
+    def closure(self, pose: Sequence[Scalar], serial: Sequence[Scalar]) -> tuple[Mat, Vec, list[Scalar]]:
+        return IDENTITY, self._origin(pose, serial), self._tilt_rows(pose, self._axis(serial))

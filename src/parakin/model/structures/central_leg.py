@@ -1,0 +1,157 @@
+"""A passive central leg and a wrist."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from math import pi
+
+from ...algebra import (
+    IDENTITY,
+    Mat,
+    Scalar,
+    Vec,
+    add,
+    along,
+    apply,
+    atan2,
+    dot,
+    norm,
+    product,
+    scale,
+    sincos,
+    smaller,
+    sqrt,
+    sub,
+    transposed,
+    turn,
+)
+from ...errors import DescriptionError
+from ..chain import UNIT, Pointing, back, frame, rotation_about
+from ..parts import ROTATIONS, Step
+from ..spec import Spec
+from .base import Placement
+from .five_axis import FiveAxis, axis_angles, tool_axis
+
+
+class CentralLeg(FiveAxis):
+    """A passive central leg: two turns, a sliding tube, the platform at its end, and a wrist whose axes meet on it.
+
+    With a third turn (``rz ry rz tz``) the platform turns about the central leg and takes the wrist's first axis.
+    """
+
+    def __init__(self, spec: Spec):
+        super().__init__(spec)
+        turns = tuple(word for word in spec.motion if word in ROTATIONS)
+        if spec.motion[-1] != "tz" or len(turns) != len(spec.motion) - 1 or len(turns) not in (2, 3):
+            raise DescriptionError("motion", f"{' '.join(spec.motion)}: a central leg is two or three turns, then tz")
+        if len(turns) == 3 and turns[2] != "rz":
+            raise DescriptionError(
+                "motion", f"{' '.join(spec.motion)}: the third turn of a central leg is about itself, rz"
+            )
+        if spec.table:
+            raise DescriptionError("table", "a machine with a central leg has its turning axes in the head")
+        self.roll = len(turns) == 3
+        spin = [Step("rz", drive=spec.legs[0].drives[0])] if self.roll else []
+        self.wrist = Pointing.of([*spin, *spec.head], "head")
+        self.above, self.reach = self._wrist_centre()
+        self.sign = 1.0
+        home = tuple(float(spec.home.get(letter, 0.0)) for letter in self.axes)
+        self.sign = 1.0 if self._centre(home)[2] > 0.0 else -1.0
+        swing = [Step(turns[0], drive=spec.legs[0].drives[0]), Step(turns[1], drive=spec.legs[0].drives[0])]
+        self.swing = Pointing.of(swing, "motion")
+        self.swing = Pointing(self.swing.first, self.swing.second, (0.0, 0.0, self.sign))
+
+    def _wrist_centre(self) -> tuple[float, float]:
+        """(h, l): the point (0, 0, h) of the platform lies at the tip + l·k in every position of the head."""
+        poses = [(0.0, 0.0), (0.7, 0.4), (-1.1, 0.9), (0.3, -1.3)]
+        frames = [frame(self.spec.head, angles[2 - self.head_joints :]) for angles in poses]
+        tips = [tip for _, tip in frames]
+        axes = [apply(rotation, UNIT["tz"]) for rotation, _ in frames]
+        change = sub(axes[1], axes[0])
+        length = -float(dot(sub(tips[1], tips[0]), change) / dot(change, change))
+        centres = [along(tip, k, length) for tip, k in zip(tips, axes, strict=True)]
+        height = centres[0][2]
+        if max(norm(sub(c, (0.0, 0.0, height))) for c in centres) > 1e-9 * (1.0 + abs(length) + abs(height)):
+            raise DescriptionError("head", "its axes must meet in one point of the central leg, on the tool's axis")
+        return float(height), length
+
+    def _centre(self, pose: Sequence[Scalar]) -> Vec:
+        k, _, _ = tool_axis(pose[3], pose[4])
+        return back(self.mount, self.base, along(tuple(pose[:3]), k, self.reach))
+
+    def _swing(self, pose: Sequence[Scalar]) -> tuple[Mat, Scalar, list[Scalar]]:
+        """Rotation of the central leg's two turns, tz, and both turns' angles."""
+        centre = self._centre(pose)
+        distance = norm(centre)
+        found = self.swing.solve(scale(centre, 1.0 / distance), "+")
+        rotation = IDENTITY
+        axes = self.swing.first, self.swing.second
+        if self.roll:  # hanging along the first axis its turn is free, and 0 then: no quotient may stand in the way
+            for axis, angle in zip(axes, found.joints, strict=True):
+                rotation = product(rotation, rotation_about(axis, *sincos(angle)))
+        else:
+            scales = 1.0 / found.freedom, 1.0 / found.second_size
+            for axis, (s, c), size in zip(axes, found.turns, scales, strict=True):
+                rotation = product(rotation, rotation_about(axis, s * size, c * size))
+        return rotation, self.sign * distance - self.above, list(found.joints)
+
+    def _platform(self, pose: Sequence[Scalar], branch: str, first: Scalar | None) -> Placement:
+        rotation, tz, angles = self._swing(pose)
+        k = apply(transposed(self.mount), tool_axis(pose[3], pose[4])[0])
+        found = self.wrist.solve(apply(transposed(rotation), k), branch, first)
+        serial = list(found.joints)
+        if self.roll:
+            spin = serial.pop(0)
+            rotation = product(rotation, turn("rz", *sincos(spin)))
+            angles.append(spin)
+        origin = scale([row[2] for row in rotation], tz)
+        return Placement(rotation, origin, [*angles, tz], serial, found.reach, found.freedom)
+
+    def place(self, pose: Sequence[Scalar], branch: str, first: Scalar | None = None) -> Placement:
+        return self._platform(pose, branch, first)
+
+    def frame(self, coordinates: Sequence[Scalar]) -> tuple[Mat, Vec]:
+        rotation = IDENTITY
+        for word, angle in zip(self.coordinates, coordinates[:-1], strict=False):
+            rotation = product(rotation, turn(word, *sincos(angle)))
+        return rotation, scale([row[2] for row in rotation], coordinates[-1])
+
+    def pose(self, coordinates: Sequence[Scalar], serial: Sequence[Scalar]) -> list[Scalar]:
+        rotation, origin = self.frame(coordinates)
+        turned, tip = frame(self.spec.head, serial)
+        world = add(apply(self.mount, add(origin, apply(rotation, tip))), self.base)
+        k = apply(self.mount, apply(rotation, apply(turned, UNIT["tz"])))
+        b, c = axis_angles(k)
+        # Beyond these the leg points there the other way round, with its platform turned: no pose says that.
+        for margin in self._inside(coordinates):
+            b = smaller(b, 2.0 * pi + sqrt(margin))
+        return [*world, b, c]
+
+    def _inside(self, coordinates: Sequence[Scalar]) -> Iterator[Scalar]:
+        """What is ≥ 0 where :meth:`place` would give these coordinates back."""
+        yield self.sign * (coordinates[-1] + self.above)
+        if not self.roll:
+            s, c = sincos(coordinates[1])
+            yield c if self.swing.level else s
+
+    def held(self, pose: Sequence[Scalar], serial: Sequence[Scalar]) -> Placement:
+        if not self.roll:
+            return super().held(pose, serial)
+        rotation, tz, angles = self._swing(pose)
+        k = apply(transposed(self.mount), tool_axis(pose[3], pose[4])[0])
+        v = apply(transposed(rotation), k)
+        w = apply(frame(self.spec.head, serial)[0], UNIT["tz"])  # turned onto v by the platform's own turn
+        spin = atan2(w[0] * v[1] - w[1] * v[0], w[0] * v[0] + w[1] * v[1])
+        rotation = product(rotation, turn("rz", *sincos(spin)))
+        return Placement(rotation, scale([row[2] for row in rotation], tz), [*angles, spin, tz], list(serial))
+
+    def closure(self, pose: Sequence[Scalar], serial: Sequence[Scalar]) -> tuple[Mat, Vec, list[Scalar]]:
+        turned, _ = frame(self.spec.head, serial)
+        if self.roll:  # the platform's own turn takes one of the two conditions
+            placed = self._platform(pose, self.branches, None)
+            k = apply(transposed(self.mount), tool_axis(pose[3], pose[4])[0])
+            along_leg = dot([row[2] for row in placed.rotation], k)
+            return placed.rotation, placed.origin, [apply(turned, UNIT["tz"])[2] - along_leg]
+        rotation, tz, _ = self._swing(pose)
+        k = apply(self.mount, apply(rotation, apply(turned, UNIT["tz"])))
+        return rotation, scale([row[2] for row in rotation], tz), self._tilt_rows(pose, k)

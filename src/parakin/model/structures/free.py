@@ -1,0 +1,73 @@
+"""The motion is the pose."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from ...algebra import IDENTITY, Mat, Scalar, Vec, add, apply, atan2, product, sincos, sqrt, sub, transposed, turn
+from ...errors import DescriptionError
+from ..chain import back, frame
+from ..parts import ROTATIONS, TRANSLATIONS
+from ..spec import Spec
+from .base import LETTERS, Placement, Structure
+
+
+class Free(Structure):
+    """The motion is the pose: translations, and no, one or three turns. Tool and mounting are fixed frames."""
+
+    def __init__(self, spec: Spec):
+        super().__init__(spec)
+        words = set(spec.motion)
+        turns = [w for w in spec.motion if w in ROTATIONS]
+        if len(turns) == 2 or any(w in TRANSLATIONS for w in spec.motion[len(spec.motion) - len(turns) :]):
+            raise DescriptionError(
+                "motion",
+                f"{' '.join(spec.motion)}: a free motion has its translations first, then no, one or three turns",
+            )
+        if len(turns) == 3 and len(words) != 6:
+            raise DescriptionError(
+                "motion", f"{' '.join(spec.motion)}: with three turns a free motion has three translations"
+            )
+        if len(turns) < 3 and spec.mounting:
+            if not words >= set(TRANSLATIONS):
+                raise DescriptionError(
+                    "mounting", "a planar machine is mounted by the words of its motion (tx tz: upright)"
+                )
+            if turns and any(step.axis in ROTATIONS and step.value for step in spec.mounting):
+                raise DescriptionError("mounting", "a machine that turns about one axis only can't be inclined")
+        self.coordinates = tuple(word for word in (*TRANSLATIONS, *ROTATIONS) if word in words)
+        self.axes = tuple(LETTERS[word] for word in self.coordinates)
+        self.tool, self.tip = frame(spec.head, ())
+
+    def place(self, pose: Sequence[Scalar], branch: str, first: Scalar | None = None) -> Placement:
+        rotation, origin = self.frame(pose)
+        return Placement(rotation, origin, list(pose), [])
+
+    def frame(self, coordinates: Sequence[Scalar]) -> tuple[Mat, Vec]:
+        given = dict(zip(self.axes, coordinates, strict=True))
+        rotation = IDENTITY
+        for letter, word in (("C", "rz"), ("B", "ry"), ("A", "rx")):
+            if letter in given:
+                rotation = product(rotation, turn(word, *sincos(given[letter])))
+        if len(self.axes) == 6:  # the tool's frame is posed; the platform's follows
+            rotation = product(product(transposed(self.mount), rotation), transposed(self.tool))
+        tip = back(self.mount, self.base, tuple(given.get(letter, 0.0) for letter in "XYZ"))
+        origin = sub(tip, apply(rotation, self.tip))
+        return rotation, tuple(o if letter in given else 0.0 for o, letter in zip(origin, "XYZ", strict=True))
+
+    def coordinates_of(self, rotation: Mat, origin: Vec) -> list[Scalar]:
+        """The pose X Y Z A B C of a platform's frame; B in [-90°, 90°]."""
+        r = product(product(self.mount, rotation), self.tool)
+        tip = add(apply(self.mount, add(origin, apply(rotation, self.tip))), self.base)
+        b = atan2(-r[2][0], sqrt(r[0][0] * r[0][0] + r[1][0] * r[1][0]))
+        return [*tip, atan2(r[2][1], r[2][2]), b, atan2(r[1][0], r[0][0])]
+
+    def coordinates_at(self, origin: Vec) -> list[Scalar]:
+        tip = add(apply(self.mount, add(origin, self.tip)), self.base)
+        return [tip["XYZ".index(letter)] for letter in self.axes]
+
+    def pose(self, coordinates: Sequence[Scalar], serial: Sequence[Scalar]) -> list[Scalar]:
+        return list(coordinates)
+
+    def closure(self, pose: Sequence[Scalar], serial: Sequence[Scalar]) -> tuple[Mat, Vec, list[Scalar]]:
+        return (*self.frame(pose), [])

@@ -1,5 +1,7 @@
 """Margins against distances and angles worked out anew, and paths through singular tool axes."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from geometry import Description
@@ -114,6 +116,21 @@ def test_over_the_pole_the_first_joint_does_not_swing(name):
     assert np.abs(back.poses - poses)[:, :4].max() < 1e-9
     alone = m.inverse(poses)
     assert np.abs(np.diff(alone[:, first])).max() > 3.0  # what was spared
+
+
+def test_a_range_can_forbid_to_go_on_over_the_pole(tmp_path):
+    shipped = next(p for p in (Path(pk.__file__).parent / "machines").iterdir() if p.stem == "tricept")
+    text = shipped.read_text(encoding="utf-8")
+    assert text.count("[-120 deg, 120 deg]") == 1
+    path = tmp_path / "tricept.yaml"
+    path.write_text(text.replace("[-120 deg, 120 deg]", "[-5 deg, 120 deg]"), encoding="utf-8")
+    m = pk.load(path)
+    lean = np.radians([-12.0, -7.0, -2.0, 2.0, 7.0, 12.0])
+    poses = np.tile(m.home, (len(lean), 1))
+    poses[:, 3], poses[:, 4] = np.abs(lean), np.where(lean < 0, np.pi, 0.0)
+    assert (m.check(poses, m.follow(poses)) == 0).all()
+    assert m.follow(poses)[:, 4].min() > 0.0
+    assert pk.load("tricept").follow(poses)[:, 4].min() < -0.2
 
 
 def test_the_scissors_take_the_point_farther_from_the_origin():

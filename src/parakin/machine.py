@@ -166,8 +166,8 @@ class Machine:
 
         A turning joint that is free (the tool's axis within ``free_below`` rad of it) takes its value from the last
         pose where it was not, at the path's start from the first one to come; turns are counted on over ±180°. Where
-        the path passes over such a pole, head and table go on in their other working mode if that spares a swing and
-        keeps the second of their joints in its range.
+        the path passes over such a pole, head and table go on in their other working mode if that spares a swing, keeps
+        the second of their joints in its range and every leg within reach.
         """
         from .kinematics.path import follow
 

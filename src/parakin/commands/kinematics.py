@@ -215,9 +215,14 @@ class _Result:
         units = (*pose_units, *joint_units)
         head = [f"{n} [{rim_unit(u)}]" for n, u in zip((*axes, *names), units, strict=True)]
         form = [(rim(1.0, unit), 8 if unit == "rad" else 6) for unit in units]
+        residuals: list[float] = []
+        if self.solution is not None:
+            residuals = self.solution.residual.tolist()
+            head.append("residual [mm]")
         lines = [",".join([*head, "broken"])]
-        for pose, joint, verdict in zip(poses.tolist(), joints.tolist(), self.verdicts, strict=True):
+        for i, (pose, joint, verdict) in enumerate(zip(poses.tolist(), joints.tolist(), self.verdicts, strict=True)):
             cells = zip((*pose, *joint), form, strict=True)
             texts = ["" if value != value else fixed(value * factor, digits, "") for value, (factor, digits) in cells]
+            texts += [f"{residual:.1e}" for residual in residuals[i : i + 1]]
             lines.append(",".join([*texts, verdict]))
         return "\n".join(lines) + "\n"

@@ -39,7 +39,7 @@ def follow(machine: Machine, poses: Array, mode: str, free_below: float = FREE) 
 def _go_on_over_the_pole(machine: Machine, poses: Array, mode: str, joints: Array, regular: NDArray[np.bool_]) -> None:
     """Where half a turn of the first joint is spared by it, go on in head and table's other working mode; in place.
 
-    Not for a stretch in which that takes the second joint out of its range.
+    Not for a stretch in which that takes the second joint out of its range, or a leg out of reach.
     """
     first, last = machine.model.first_serial, joints.shape[1] - machine.model.serial
     columns = [first, last + 1 if first == last else last]
@@ -50,7 +50,7 @@ def _go_on_over_the_pole(machine: Machine, poses: Array, mode: str, joints: Arra
     other = machine.inverse(poses[at], mode[:-1] + ("-" if mode[-1] == "+" else "+"))
     across = over_the_pole(here, other[:, columns])
     drive = machine.model.drives[columns[1]]
-    out = (other[:, columns[1]] < drive.low) | (other[:, columns[1]] > drive.high)
+    out = (other[:, columns[1]] < drive.low) | (other[:, columns[1]] > drive.high) | ~np.isfinite(other).all(1)
     stretch = np.cumsum(np.diff(across, prepend=False))  # numbered; the odd ones are across
     across &= ~np.isin(stretch, stretch[across & out])
     joints[at[across]] = other[across]

@@ -12,8 +12,9 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
-# The operations of a trace. LIN: k0 + Σ k·a; QUAD: Σ k·a·b, up to three summands each; FMA: k·a·b + k·c + k0.
-LIN, QUAD, FMA, DIV, SQRT, SIN, COS, ATAN2, MIN, MAX, ABS, COPYSIGN, INPUT = range(13)
+# The operations of a trace. LIN: k0 + Σ k·a; QUAD: Σ k·a·b, up to three summands each; FMA: k·a·b + k·c + k0;
+# SELECT: c where a < b, else d (the derivatives of MIN and MAX); HELD: a, whose derivative is 0.
+LIN, QUAD, FMA, DIV, SQRT, SIN, COS, ATAN2, MIN, MAX, ABS, COPYSIGN, SELECT, HELD, INPUT = range(15)
 
 
 class Term:
@@ -191,6 +192,24 @@ def _choice(op: int, function: Any, x: Scalar, y: Scalar) -> Scalar:
     return function(x, y)
 
 
+def select(x: Scalar, y: Scalar, below: Scalar, otherwise: Scalar) -> Scalar:
+    """``below`` where x < y, else ``otherwise``."""
+    args = (x, y, below, otherwise)
+    traces = [a.trace for a in args if isinstance(a, Term)]
+    if traces:
+        if below is otherwise or (
+            not isinstance(below, Term) and not isinstance(otherwise, Term) and below == otherwise
+        ):
+            return below
+        return traces[0].node(SELECT, tuple(a if isinstance(a, Term) else traces[0].constant(a) for a in args), ())
+    return np.where(x < y, below, otherwise)
+
+
+def held(x: Scalar) -> Scalar:
+    """x, to be taken as constant by :func:`derivative`: where a minimum stands does not change it (Danskin)."""
+    return x.trace.node(HELD, (x,), ()) if isinstance(x, Term) else x
+
+
 def absolute(x: Scalar) -> Scalar:
     if isinstance(x, Term):
         return x.trace.node(ABS, (x,), ())
@@ -271,7 +290,7 @@ def needed(outputs: Sequence[Term], known: Container[int] = ()) -> list[int]:
 
 
 def derivative(y: Scalar, x: Term) -> Scalar:
-    """∂y/∂x of a trace, as a trace. Not for the operations with corners, which closures never use."""
+    """∂y/∂x of a trace, as a trace; at a corner of MIN, MAX or ABS that of one side."""
     if not isinstance(y, Term):
         return 0.0
     known = y.trace._derivatives.setdefault(x.index, {})
@@ -305,13 +324,27 @@ def _derivative(y: Term, x: Term, known: dict[int, Scalar]) -> Scalar:
         return -sincos(a[0])[0] * d[0]
     if y.op == ATAN2:
         return (a[1] * d[0] - a[0] * d[1]) / (a[0] * a[0] + a[1] * a[1])
+    if y.op == MIN:
+        return select(a[0], a[1], d[0], d[1])
+    if y.op == MAX:
+        return select(a[1], a[0], d[0], d[1])
+    if y.op == ABS:
+        return select(a[0], 0.0, -d[0], d[0])
+    if y.op == HELD:
+        return 0.0
+    if y.op == SELECT:
+        return select(a[0], a[1], d[2], d[3])
     raise TypeError(f"no derivative of operation {y.op}")
 
 
 def values(trace: Trace, outputs: Sequence[Scalar], inputs: Sequence[Scalar]) -> list[Scalar]:
-    """The outputs of a trace for given inputs, numbers or arrays: the plain interpreter."""
+    """The outputs of a trace for given inputs, numbers or arrays: the plain interpreter.
+
+    Inputs may be terms of another trace, too, beside numbers: what hangs on numbers alone is folded there.
+    """
     known: dict[int, Scalar] = {}
-    for term in trace.nodes:
+    for index in needed([y for y in outputs if isinstance(y, Term)]):
+        term = trace.nodes[index]
         a = [known[arg.index] for arg in term.args]
         k = term.k
         if term.op == INPUT:
@@ -330,11 +363,13 @@ def values(trace: Trace, outputs: Sequence[Scalar], inputs: Sequence[Scalar]) ->
 _FUNCTIONS: dict[int, Any] = {
     DIV: lambda x, y: x / y,
     SQRT: sqrt,
-    SIN: np.sin,
-    COS: np.cos,
+    SIN: lambda x: sincos(x)[0],
+    COS: lambda x: sincos(x)[1],
     ATAN2: atan2,
     MIN: smaller,
     MAX: larger,
     ABS: absolute,
     COPYSIGN: copysign,
+    SELECT: select,
+    HELD: held,
 }

@@ -32,7 +32,7 @@ if hasattr(os, "register_at_fork"):  # a forked child has the pool but none of i
     os.register_at_fork(after_in_child=_pool.cache_clear)
 
 
-def _still(rows: Rows) -> Rows:
+def still(rows: Rows) -> Rows:
     """A read-only view: to Numba that is a type of its own, and the kernels are compiled for it alone."""
     view = rows.view()
     view.flags.writeable = False
@@ -58,7 +58,7 @@ def run(tape: Tape, x: Rows, out: Rows, z: Rows | None = None, whole: bool = Tru
     from .blocks import evaluate
 
     given = np.empty((len(x), 0)) if z is None else z
-    args = (*tape.parts, whole, _still(x), _still(given), out)
+    args = (*tape.parts, whole, still(x), still(given), out)
     split(len(x), lambda start, stop: evaluate(*args, start, stop))
     return out
 
@@ -82,7 +82,7 @@ def solve(
     count = len(q)
     result = Roots(np.empty((count, tapes[3].outputs)), np.empty(count), np.empty(count, np.int32), np.empty(count))
     programs = [(tape.code, tape.imm) for tape in tapes]
-    args = (*programs, max(tape.registers for tape in tapes), _still(near), _still(q), caps, size, most, side)
+    args = (*programs, max(tape.registers for tape in tapes), still(near), still(q), caps, size, most, side)
     into = (result.found, result.residual, result.steps, result.turned)
     split(count, lambda start, stop: newton(*args, *into, start, stop))
     return result
@@ -93,7 +93,7 @@ def run_checked(tape: Tape, x: Rows, out: Rows, z: Rows) -> Rows:
     from .blocks import evaluate_checked
 
     worst = np.empty(len(x))
-    args = (*tape.parts, _still(x), _still(z), out, worst)
+    args = (*tape.parts, still(x), still(z), out, worst)
     split(len(x), lambda start, stop: evaluate_checked(*args, start, stop))
     return worst
 
@@ -103,6 +103,6 @@ def first_negative(tape: Tape, x: Rows, z: Rows) -> NDArray[np.int64]:
     from .blocks import first_broken
 
     out = np.empty(len(x), np.int64)
-    args = (*tape.parts, _still(x), _still(z), out)
+    args = (*tape.parts, still(x), still(z), out)
     split(len(x), lambda start, stop: first_broken(*args, start, stop))
     return out

@@ -13,7 +13,25 @@ from numba.core import cgutils
 from numba.extending import intrinsic
 
 from .elementary import FAST, atan2, sincos, sqrt, widest_vectors
-from .tape import ABS, ATAN2, CONST, COPYSIGN, DIV, FMA, LIN1, LIN2, LIN3, MAX, MIN, QUAD1, QUAD2, QUAD3, SINCOS, SQRT
+from .tape import (
+    ABS,
+    ATAN2,
+    CONST,
+    COPYSIGN,
+    DIV,
+    FMA,
+    LIN1,
+    LIN2,
+    LIN3,
+    MAX,
+    MIN,
+    QUAD1,
+    QUAD2,
+    QUAD3,
+    SELECT,
+    SINCOS,
+    SQRT,
+)
 
 LANES = 128
 _MASK = (1 << 40) - 1  # tells the compiler that a register's number is not negative
@@ -95,6 +113,10 @@ def interpret(code, imm, r):
             for j in range(LANES):
                 x, y = r[a + j], r[b + j]
                 r[d + j] = (-abs(x) if y < 0.0 else abs(x)) + 0.0 * y
+        elif op == SELECT:
+            e = (code[i, 5] & _MASK) * LANES
+            for j in range(LANES):
+                r[d + j] = r[c + j] if r[a + j] < r[b + j] else r[e + j]
         elif op == CONST:
             for j in range(LANES):
                 r[d + j] = k0

@@ -16,7 +16,7 @@ from .. import algebra as alg
 from ..algebra import Scalar, Term, Trace
 
 # Opcodes. The number of summands is part of the code, so that the interpreter's loops have no inner ones.
-CONST, LIN1, LIN2, LIN3, QUAD1, QUAD2, QUAD3, FMA, DIV, SQRT, SINCOS, ATAN2, MIN, MAX, ABS, COPYSIGN = range(16)
+CONST, LIN1, LIN2, LIN3, QUAD1, QUAD2, QUAD3, FMA, DIV, SQRT, SINCOS, ATAN2, MIN, MAX, ABS, COPYSIGN, SELECT = range(17)
 _SAME = {
     alg.FMA: FMA,
     alg.DIV: DIV,
@@ -26,6 +26,7 @@ _SAME = {
     alg.MAX: MAX,
     alg.ABS: ABS,
     alg.COPYSIGN: COPYSIGN,
+    alg.SELECT: SELECT,
 }
 
 
@@ -52,6 +53,8 @@ class Tape:
 def _opcode(term: Term) -> int:
     if term.op == alg.LIN:
         return CONST + len(term.args)
+    if term.op == alg.HELD:
+        return LIN1
     if term.op == alg.QUAD:
         return QUAD1 + len(term.k) - 1
     return _SAME[term.op]
@@ -107,7 +110,8 @@ def compile_tape(trace: Trace, outputs: Sequence[Scalar], inputs: int) -> Tape:
         else:  # the destination is never an operand's register: rows that don't overlap vectorise
             row = [_opcode(term), take(term), *[register[arg.index] for arg in term.args]]
             code.append(row + [0] * (8 - len(row)))
-            imm.append([*term.k, *[0.0] * (4 - len(term.k))])
+            k = (0.0, 1.0) if term.op == alg.HELD else term.k
+            imm.append([*k, *[0.0] * (4 - len(k))])
         for index in {arg.index for arg in term.args}:
             if last[index] == position and index not in own:
                 free.append(register[index])

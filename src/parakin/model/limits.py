@@ -11,7 +11,7 @@ from itertools import combinations
 from math import isfinite
 from typing import Literal
 
-from ..algebra import Mat, Scalar, Vec, add, apply, atan2, cross, dot, larger, norm, scale, smaller, sub
+from ..algebra import Mat, Scalar, Vec, add, apply, atan2, cross, dot, held, larger, norm, scale, smaller, sub
 from .legs import Leg, Reach
 from .parts import Cone
 from .spec import Spec
@@ -152,7 +152,8 @@ def _clearance(spec: Spec, pose: Placement, joints: Sequence[Scalar]) -> Iterato
     least = spec.limits.clearance
     if least is None:
         return
-    struts = [struts[0] for struts in _rods(spec, pose, joints)]
+    # From the platform's end, where neighbours are closest: there the platform's place drops out of their difference.
+    struts = [struts[0][::-1] for struts in _rods(spec, pose, joints)]
     for (one, a), (two, b) in combinations(zip(spec.legs, struts, strict=True), 2):
         if _share_a_joint(one, two):
             continue
@@ -172,7 +173,7 @@ def distance(a: tuple[Vec, Vec], b: tuple[Vec, Vec]) -> Scalar:
     s = _clamped((uv * vw - uw * vv) / larger(uu * vv - uv * uv, 1e-14 * (uu * vv)))
     t = _clamped((uv * s + vw) / vv)
     s = _clamped((uv * t - uw) / uu)
-    return norm(sub(add(w, scale(u, s)), scale(v, t)))
+    return norm(sub(add(w, scale(u, held(s))), scale(v, held(t))))
 
 
 def _clamped(x: Scalar) -> Scalar:

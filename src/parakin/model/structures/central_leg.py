@@ -79,11 +79,13 @@ class CentralLeg(FiveAxis):
         k, _, _ = tool_axis(pose[3], pose[4])
         return back(self.mount, self.base, along(tuple(pose[:3]), k, self.reach))
 
-    def _swing(self, pose: Sequence[Scalar]) -> tuple[Mat, Scalar, list[Scalar]]:
-        """Rotation of the central leg's two turns, tz, and both turns' angles."""
+    def _swing(self, pose: Sequence[Scalar]) -> tuple[Mat, Vec, Scalar, list[Scalar]]:
+        """Rotation of the central leg's two turns, the platform's origin, tz, and both turns' angles."""
         centre = self._centre(pose)
         distance = norm(centre)
-        found = self.swing.solve(scale(centre, 1.0 / distance), "+")
+        direction = scale(centre, 1.0 / distance)
+        origin = along(centre, direction, -self.sign * self.above)  # not by the rotation: bounds stay narrow
+        found = self.swing.solve(direction, "+")
         rotation = IDENTITY
         axes = self.swing.first, self.swing.second
         if self.roll:  # hanging along the first axis its turn is free, and 0 then: no quotient may stand in the way
@@ -93,10 +95,10 @@ class CentralLeg(FiveAxis):
             scales = 1.0 / found.freedom, 1.0 / found.second_size
             for axis, (s, c), size in zip(axes, found.turns, scales, strict=True):
                 rotation = product(rotation, rotation_about(axis, s * size, c * size))
-        return rotation, self.sign * distance - self.above, list(found.joints)
+        return rotation, origin, self.sign * distance - self.above, list(found.joints)
 
     def _platform(self, pose: Sequence[Scalar], branch: str, first: Scalar | None) -> Placement:
-        rotation, tz, angles = self._swing(pose)
+        rotation, origin, tz, angles = self._swing(pose)
         k = apply(transposed(self.mount), tool_axis(pose[3], pose[4])[0])
         found = self.wrist.solve(apply(transposed(rotation), k), branch, first)
         serial = list(found.joints)
@@ -104,7 +106,6 @@ class CentralLeg(FiveAxis):
             spin = serial.pop(0)
             rotation = product(rotation, turn("rz", *sincos(spin)))
             angles.append(spin)
-        origin = scale([row[2] for row in rotation], tz)
         return Placement(rotation, origin, [*angles, tz], serial, found.reach, found.freedom)
 
     def place(self, pose: Sequence[Scalar], branch: str, first: Scalar | None = None) -> Placement:
@@ -137,13 +138,13 @@ class CentralLeg(FiveAxis):
     def held(self, pose: Sequence[Scalar], serial: Sequence[Scalar]) -> Placement:
         if not self.roll:
             return super().held(pose, serial)
-        rotation, tz, angles = self._swing(pose)
+        rotation, origin, tz, angles = self._swing(pose)
         k = apply(transposed(self.mount), tool_axis(pose[3], pose[4])[0])
         v = apply(transposed(rotation), k)
         w = apply(frame(self.spec.head, serial)[0], UNIT["tz"])  # turned onto v by the platform's own turn
         spin = atan2(w[0] * v[1] - w[1] * v[0], w[0] * v[0] + w[1] * v[1])
         rotation = product(rotation, turn("rz", *sincos(spin)))
-        return Placement(rotation, scale([row[2] for row in rotation], tz), [*angles, spin, tz], list(serial))
+        return Placement(rotation, origin, [*angles, spin, tz], list(serial))
 
     def closure(self, pose: Sequence[Scalar], serial: Sequence[Scalar]) -> tuple[Mat, Vec, list[Scalar]]:
         turned, _ = frame(self.spec.head, serial)
@@ -152,6 +153,6 @@ class CentralLeg(FiveAxis):
             k = apply(transposed(self.mount), tool_axis(pose[3], pose[4])[0])
             along_leg = dot([row[2] for row in placed.rotation], k)
             return placed.rotation, placed.origin, [apply(turned, UNIT["tz"])[2] - along_leg]
-        rotation, tz, _ = self._swing(pose)
+        rotation, origin, _, _ = self._swing(pose)
         k = apply(self.mount, apply(rotation, apply(turned, UNIT["tz"])))
-        return rotation, scale([row[2] for row in rotation], tz), self._tilt_rows(pose, k)
+        return rotation, origin, self._tilt_rows(pose, k)

@@ -1,0 +1,1 @@
+"""What follows from a machine: workspaces, performance, singularities, proofs."""

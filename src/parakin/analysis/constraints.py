@@ -1,0 +1,95 @@
+"""What must be ≥ 0 for a pose to be allowed, as functions of the place x and of the turns θ that are swept."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from .. import algebra as alg
+from ..algebra import Scalar, Term, Trace, absolute, derivative, larger, needed, smaller
+from ..kernels.intervals import IntervalProgram
+from ..machine import Machine
+
+
+@dataclass(frozen=True, eq=False)
+class Constraint:
+    """One margin, ≥ 0 where it holds, of ``places`` x and ``turns`` θ.
+
+    Two programs bound it over boxes of x, then θ, by Taylor's formula about the middle: ``at`` gives the margin and, of
+    a smooth one, its gradient by x; ``over`` gives the margin, the guard, the gradient by θ and the second derivatives
+    by x (d(d + 1)/2 of them), or of one with corners the gradient by x instead.
+    """
+
+    name: str
+    margin: Scalar
+    places: Sequence[Term]
+    turns: Sequence[Term] = ()
+
+    @cached_property
+    def _trace(self) -> Trace:
+        return self.places[0].trace
+
+    @cached_property
+    def _nodes(self) -> list[Term]:
+        margin = self.margin
+        return [self._trace.nodes[i] for i in needed([margin])] if isinstance(margin, Term) else []
+
+    @cached_property
+    def smooth(self) -> bool:
+        """No corners: Taylor's formula holds to the second order."""
+        return not any(node.op in (alg.MIN, alg.MAX, alg.ABS, alg.COPYSIGN, alg.SELECT) for node in self._nodes)
+
+    @cached_property
+    def guard(self) -> Scalar:
+        """> 0 where no angle jumps by a turn, so that derivatives tell how the margin changes."""
+        guard: Scalar = 1.0
+        for node in self._nodes:
+            if node.op == alg.ATAN2:
+                y, x = node.args
+                guard = smaller(guard, larger(x, absolute(y)))
+        return guard
+
+    @cached_property
+    def at(self) -> IntervalProgram:
+        gradient = [derivative(self.margin, x) for x in self.places] if self.smooth else []
+        return IntervalProgram(self._trace, [self.margin, *gradient])
+
+    @cached_property
+    def over(self) -> IntervalProgram:
+        first = [derivative(self.margin, x) for x in self.places]
+        if self.smooth:
+            first = [derivative(g, y) for i, g in enumerate(first) for y in self.places[i:]]
+        by_turns = [derivative(self.margin, x) for x in self.turns]
+        return IntervalProgram(self._trace, [self.margin, self.guard, *by_turns, *first])
+
+
+@dataclass(frozen=True, eq=False)
+class Slice:
+    """Poses of a machine in which some axes are places or turns that vary, and the others are held."""
+
+    machine: Machine
+    places: tuple[str, ...]
+    turns: tuple[str, ...]
+    held: Mapping[str, float]
+    mode: str
+
+    @cached_property
+    def inputs(self) -> list[Term]:
+        return Trace().inputs(len(self.places) + len(self.turns))
+
+    @cached_property
+    def pose(self) -> list[Scalar]:
+        """The whole pose: terms for what varies, numbers for what is held, so that the trace folds them away."""
+        free = dict(zip((*self.places, *self.turns), self.inputs, strict=True))
+        return [free[axis] if axis in free else np.float64(self.held[axis]) for axis in self.machine.axes]
+
+    def constraints(self, without: Sequence[str] = ()) -> list[Constraint]:
+        """The machine's limits, but for those named in ``without``."""
+        with np.errstate(all="ignore"):  # what a pose held out of reach makes of numbers is a margin that is broken
+            margins = self.machine.model.own_margins(self.pose, self.mode)
+        d = len(self.places)
+        x, turns = self.inputs[:d], self.inputs[d:]
+        return [Constraint(limit.name, g, x, turns) for limit, g in margins if limit.name not in without]

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 from .errors import DescriptionError, InputError, InputErrors, NoMethodError, ParakinError, PoseError
 
 if TYPE_CHECKING:
+    from .analysis.workspace import Workspace, workspace
     from .kinematics.direct import Solution
     from .machine import Machine
 
@@ -22,8 +23,10 @@ __all__ = [
     "ParakinError",
     "PoseError",
     "Solution",
+    "Workspace",
     "load",
     "machines",
+    "workspace",
 ]
 
 
@@ -55,13 +58,17 @@ def load(name: str | PathLike[str], parameters: Mapping[str, float | str] | None
         raise InputError(str(error), fspath(path), line_of(path, error.part)) from None
 
 
+_LAZY = {
+    "Machine": "machine",
+    "Solution": "kinematics.direct",
+    "Workspace": "analysis.workspace",
+    "workspace": "analysis.workspace",
+}
+
+
 def __getattr__(name: str) -> object:
-    if name == "Machine":
-        from .machine import Machine
+    from importlib import import_module
 
-        return Machine
-    if name == "Solution":
-        from .kinematics.direct import Solution
-
-        return Solution
+    if name in _LAZY:
+        return getattr(import_module(f"{__name__}.{_LAZY[name]}"), name)
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -123,7 +123,8 @@ class Machine:
             raise PoseError(f"{what}: shape (..., {len(names)}) for {' '.join(names)} expected, not {array.shape}")
         return np.ascontiguousarray(array.reshape(-1, len(names))), array.shape[:-1]
 
-    def _mode(self, mode: str | None) -> str:
+    def checked_mode(self, mode: str | None) -> str:
+        """A working mode, the default one for None; raises :class:`PoseError` for what is none."""
         if mode is None:
             return self.mode
         if mode not in self.modes:
@@ -154,7 +155,7 @@ class Machine:
         rows, lead = self.rows(poses, self.axes, "poses")
         shape = (*lead, len(self.joints))
         result = self._out(out, shape)
-        tape = self.model.inverse_tape(self._mode(mode))
+        tape = self.model.inverse_tape(self.checked_mode(mode))
         if result.flags.c_contiguous and not np.may_share_memory(result, rows):
             run(tape, rows, result.reshape(-1, len(self.joints)))
         else:
@@ -174,7 +175,7 @@ class Machine:
         rows, lead = self.rows(poses, self.axes, "poses")
         if len(lead) != 1:
             raise PoseError(f"poses: a path of shape (N, {len(self.axes)}) expected")
-        return follow(self, rows, self._mode(mode), free_below)
+        return follow(self, rows, self.checked_mode(mode), free_below)
 
     def forward(self, joints: ArrayLike, near: ArrayLike | None = None, method: str | None = None) -> Solution:
         """Poses for joints, with residual and verdict; see :func:`parakin.kinematics.direct.forward`."""
@@ -216,12 +217,14 @@ class Machine:
         inverse's. Margins that do not exist where a leg can't close are NaN.
         """
         rows, lead = self.rows(poses, self.axes, "poses")
-        own, count = self.model.check_tape(self._mode(mode)), len(self.limits)
+        own, count = self.model.check_tape(self.checked_mode(mode)), len(self.limits)
         if joints is None:
             out = run(own, rows, np.empty((len(rows), count)), whole=False)
         else:
             q = self._joints_of(joints, len(rows))
-            out = run(self.model.margins_tape(self._mode(mode)), rows, np.empty((len(rows), count)), q, whole=False)
+            out = run(
+                self.model.margins_tape(self.checked_mode(mode)), rows, np.empty((len(rows), count)), q, whole=False
+            )
             lost = ~np.isfinite(q).all(1)
             if lost.any():  # joints that are none tell nothing of the leg that can't close: the pose does
                 out[lost] = run(own, np.ascontiguousarray(rows[lost]), np.empty((int(lost.sum()), count)), whole=False)
@@ -236,11 +239,11 @@ class Machine:
         rows, lead = self.rows(poses, self.axes, "poses")
         if not self.limits:
             return np.zeros(lead, np.int64)[()]
-        own, nothing = self.model.check_tape(self._mode(mode)), np.empty((len(rows), 0))
+        own, nothing = self.model.check_tape(self.checked_mode(mode)), np.empty((len(rows), 0))
         if joints is None:
             return first_negative(own, rows, nothing).reshape(lead)[()]
         q = self._joints_of(joints, len(rows))
-        broken = first_negative(self.model.margins_tape(self._mode(mode)), rows, q)
+        broken = first_negative(self.model.margins_tape(self.checked_mode(mode)), rows, q)
         lost = ~np.isfinite(q).all(1)
         if lost.any():
             found = first_negative(own, np.ascontiguousarray(rows[lost]), nothing[lost])

@@ -27,6 +27,7 @@ class Constraint:
     margin: Scalar
     places: Sequence[Term]
     turns: Sequence[Term] = ()
+    implied: bool = False  # by others, and of use only to show that they can't hold
 
     @cached_property
     def _trace(self) -> Trace:
@@ -92,4 +93,23 @@ class Slice:
             margins = self.machine.model.own_margins(self.pose, self.mode)
         d = len(self.places)
         x, turns = self.inputs[:d], self.inputs[d:]
-        return [Constraint(limit.name, g, x, turns) for limit, g in margins if limit.name not in without]
+        kept = [(limit.name, g) for limit, g in margins if limit.name not in without]
+        found = [Constraint(name, g, x, turns) for name, g in kept]
+        return found + [Constraint(name, g, x, turns, implied=True) for name, g in _across_the_jump(kept)]
+
+
+def _across_the_jump(margins: Sequence[tuple[str, Scalar]]) -> list[tuple[str, Scalar]]:
+    """What limits on both sides of an angle say of its size, which does not jump at ±180° as the angle does."""
+    found: dict[int, dict[bool, tuple[float, Term, str]]] = {}
+    for name, g in margins:
+        if isinstance(g, Term) and g.op == alg.LIN and len(g.args) == 1 and g.args[0].op == alg.ATAN2:
+            angle = g.args[0]
+            found.setdefault(angle.index, {})[g.k[1] < 0.0] = abs(g.k[0] / g.k[1]), angle, name
+    sizes = []
+    for sides in found.values():
+        most = max(bound for bound, _, _ in sides.values())
+        _, angle, name = next(iter(sides.values()))
+        if len(sides) == 2 and most < np.pi:
+            y, x = angle.args
+            sizes.append((name, most - alg.atan2(absolute(y), x)))
+    return sizes

@@ -27,7 +27,8 @@ class EveryTurn(Subdivision):
         kept: list[Items] = []
         for number, (constraint, items) in enumerate(zip(self.constraints, left, strict=True)):
             items, found = self._settled(constraint, low, size, items, gone)
-            cuts.add(number, items.cell, 0.5 * size, found)
+            if not constraint.implied:
+                cuts.add(number, items.cell, 0.5 * size, found)
             kept.append(items)
             gone |= cuts.outer <= 0.0
         cuts.outer[gone] = 0.0
@@ -43,6 +44,10 @@ class EveryTurn(Subdivision):
             items = items.take(~gone[items.cell])
             found = bounds(constraint, low, size, items, every=True)
             gone[items.cell[found.state == EXCLUDED]] = True
+            vague = items.take(~np.isfinite(found.spread).all(1))  # too wide to tell of its middle; look there alone
+            middle = 0.5 * (vague.low + vague.high)
+            there = bounds(constraint, low, size, replace(vague, low=middle, high=middle), every=True)
+            gone[vague.cell[there.state == EXCLUDED]] = True
             kept = found.state == KEPT
             again = np.zeros(len(kept), np.bool_)
             if attempt < LOOKS and items.low.shape[1]:

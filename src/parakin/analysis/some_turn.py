@@ -54,6 +54,8 @@ class SomeTurn(Subdivision):
             found = bounds(constraint, low, size, leaves.take(which), every=False)
             needs[which[found.state == CLEARED], number] = False
             alive[which[found.state == EXCLUDED]] = False
+            if constraint.implied:
+                continue
             kept = which[found.state == KEPT]
             found = found.take(found.state == KEPT)
             cuts.add(number, kept, half, found)

@@ -41,13 +41,14 @@ FAST = {"contract"}
 
 @njit(inline="always", fastmath=FAST)
 def _down(x, size):
-    x = x - (size * _WIDER + _TINY)
+    # A sum of noughts is nought.
+    x = x - (size * _WIDER + (_TINY if size > 0.0 else 0.0))
     return x if x == x else -np.inf
 
 
 @njit(inline="always", fastmath=FAST)
 def _up(x, size):
-    x = x + (size * _WIDER + _TINY)
+    x = x + (size * _WIDER + (_TINY if size > 0.0 else 0.0))
     return x if x == x else np.inf
 
 
@@ -196,7 +197,7 @@ def interpret(code, imm, r):
             for j in range(LANES):
                 yl, yh, xl, xh = r[a + j], r[a + LANES + j], r[b + j], r[b + LANES + j]
                 p, q, s, t = atan2(yl, xl), atan2(yl, xh), atan2(yh, xl), atan2(yh, xh)
-                cut = (yl <= 0.0) & (yh >= 0.0) & (xl <= 0.0)  # the angle jumps there, and at the origin it is any
+                cut = (yl < 0.0) & (yh >= 0.0) & (xl <= 0.0)  # the angle jumps there, and at the origin it is any
                 low = _least(_least(p, q), _least(s, t)) - _OFF
                 high = _most(_most(p, q), _most(s, t)) + _OFF
                 known = (low == low) & (high == high) & (p + q + s + t == p + q + s + t)

@@ -49,12 +49,13 @@ def read_cl(path: str | os.PathLike[str], *, arc_tolerance: float = 0.01, progre
     if not 0.0 < arc_tolerance < float("inf"):
         raise InputError("expected a length above zero, in mm", "arc_tolerance")
     source = os.fsdecode(path)
-    with _open(path, source) as file, np.errstate(all="ignore"):
+    with opened(path, source) as file, np.errstate(all="ignore"):
         size = os.fstat(file.fileno()).st_size
         return _Reader(source, size, arc_tolerance).read(file, progress or (lambda fraction: None))
 
 
-def _open(path: str | os.PathLike[str], source: str) -> io.FileIO:
+def opened(path: str | os.PathLike[str], source: str) -> io.FileIO:
+    """The file, unbuffered; an InputError if it cannot be opened."""
     try:
         return Path(path).open("rb", buffering=0)
     except OSError as error:

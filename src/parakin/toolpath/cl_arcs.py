@@ -8,7 +8,7 @@ from .cl_words import refuse
 from .program import Floats
 
 ON_CIRCLE = 0.01  # mm: further off its circle an arc's start or end is an error; covers coordinates of 3 decimals
-_CLOSED = 1e-6  # mm: an end this near the start is a full circle
+CLOSED = 1e-6  # mm: an end this near the start is a full circle
 _MOST_POINTS = 1_000_000
 
 
@@ -59,16 +59,39 @@ def arc(
     u = a / np.linalg.norm(a)
     v = np.cross(normal, u)
     turn = math.atan2(float(b @ v), float(b @ u))
-    turn = 2.0 * math.pi if abs(turn) * radius <= _CLOSED else turn % (2.0 * math.pi)
+    turn = 2.0 * math.pi if abs(turn) * radius <= CLOSED else turn % (2.0 * math.pi)
+    return swept(centre, (u, v, normal), (radius, radius), (height_a, height_b), turn, tolerance, end)
+
+
+def swept(
+    centre: Floats,
+    basis: tuple[Floats, Floats, Floats],
+    radii: tuple[float, float],
+    heights: tuple[float, float],
+    turn: float,
+    tolerance: float,
+    end: Floats,
+) -> tuple[Floats, Floats]:
+    """Points of a circle, helix or slight spiral after its start, the last one ``end`` itself, and the fraction of the
+    turn at each: (k, 3) and (k,).
+
+    basis : unit vectors (3,) at right angles: towards the start, along the motion there, along the axis of the turn
+    radii, heights : at start and end; both grow with the turn
+    turn : rad, above zero; more than one turn too
+    tolerance : largest distance of a chord from the arc
+    """
+    u, v, normal = basis
+    (radius, radius_end), (height, height_end) = radii, heights
     # a chord over the angle t is off by r (1 - cos(t/2)) = 2 r sin(t/4)^2; the sine keeps its digits for small t
-    step = 4.0 * math.asin(min(math.sqrt(tolerance / (2.0 * radius)), math.sin(math.pi / 16)))
+    step = 4.0 * math.asin(min(math.sqrt(tolerance / (2.0 * max(radii))), math.sin(math.pi / 16)))
+    if turn > step * _MOST_POINTS:
+        refuse(f"an arc of more than {_MOST_POINTS} points at a tolerance of {tolerance:g} mm; expected a coarser one")
     count = max(1, math.ceil(turn / step))
-    if count > _MOST_POINTS:
-        refuse(f"an arc of {count} points at a tolerance of {tolerance:g} mm; expected at most {_MOST_POINTS}")
     fraction = np.arange(1, count + 1) / count
     angle = (turn * fraction)[:, None]
-    points = centre + radius * (np.cos(angle) * u + np.sin(angle) * v)
-    points += (height_a + (height_b - height_a) * fraction)[:, None] * normal
+    out = (radius + (radius_end - radius) * fraction)[:, None]
+    points = centre + out * (np.cos(angle) * u + np.sin(angle) * v)
+    points += (height + (height_end - height) * fraction)[:, None] * normal
     points[-1] = end
     return points, fraction
 

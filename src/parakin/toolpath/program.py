@@ -39,11 +39,14 @@ class ToolPath:
     feed : (n,) mm/min, the programmed feed in force, also on rapid records; NaN if none or unknown
     spindle : (n,) rev/min, NaN if unknown, 0 if switched off
     frame : (3, 4) rotation and origin (mm) of W in the machine frame M as the file gives it, or None
-    dialect : "apt" (APT and CATIA) or "nx" (Siemens NX)
+    dialect : "apt" (APT and CATIA), "nx" (Siemens NX) or "gcode" (RS274/NGC)
     units : the file's own length unit; everything here is in mm all the same
     tool : what is known of the first tool; lengths in mm: diameter, corner_radius, length; name, number, type ...
     events : statements that are no motion, in file order
     notes : remarks for the user, by line
+    turns : (n, 3) rad, A, B, C as programmed, R = Rz(C)·Ry(B)·Rx(A) and axis = R·z; None where the file programs none
+    seconds : (n,) s, the time the motion to this record takes where the file tells it and no feed does: by inverse time
+        (G93), or by degrees per minute where only A, B and C move; NaN elsewhere, None where there is no such record
     """
 
     source: str
@@ -54,11 +57,13 @@ class ToolPath:
     feed: Floats
     spindle: Floats
     frame: Floats | None = None
-    dialect: Literal["apt", "nx"] = "apt"
+    dialect: Literal["apt", "nx", "gcode"] = "apt"
     units: Literal["mm", "inch"] = "mm"
     tool: dict[str, float | str] = field(default_factory=dict)
     events: tuple[Event, ...] = ()
     notes: tuple[Note, ...] = ()
+    turns: Floats | None = None
+    seconds: Floats | None = None
 
     def __len__(self) -> int:
         return len(self.line)

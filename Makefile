@@ -22,6 +22,7 @@ bench: .venv/developing
 
 pictures: .venv/installed
 	$(BIN)/python examples/pictures.py -o docs/pictures
+	$(BIN)/python examples/gallery.py -o docs
 
 .venv/installed: pyproject.toml
 	$(PYTHON) -c "import sys; sys.exit('parakin needs Python 3.11 to 3.13, not ' + sys.version.split()[0]) if not (3, 11) <= sys.version_info[:2] <= (3, 13) else None"

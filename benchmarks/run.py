@@ -5,7 +5,8 @@ from __future__ import annotations
 import kinematics
 import post
 import startup
+import workspace
 
 if __name__ == "__main__":
-    for benchmark in (kinematics, post, startup):
+    for benchmark in (kinematics, post, startup, workspace):
         print(benchmark.main(), flush=True)

@@ -9,12 +9,14 @@ from typing import TYPE_CHECKING
 from .errors import DescriptionError, InputError, InputErrors, NoMethodError, ParakinError, PoseError
 
 if TYPE_CHECKING:
+    from .analysis.atlas import Atlas, atlas
     from .analysis.workspace import Workspace, workspace
     from .kinematics.direct import Solution
     from .machine import Machine
 
 __version__ = "0.1.0"
 __all__ = [
+    "Atlas",
     "DescriptionError",
     "InputError",
     "InputErrors",
@@ -24,6 +26,7 @@ __all__ = [
     "PoseError",
     "Solution",
     "Workspace",
+    "atlas",
     "load",
     "machines",
     "workspace",
@@ -59,9 +62,11 @@ def load(name: str | PathLike[str], parameters: Mapping[str, float | str] | None
 
 
 _LAZY = {
+    "Atlas": "analysis.atlas",
     "Machine": "machine",
     "Solution": "kinematics.direct",
     "Workspace": "analysis.workspace",
+    "atlas": "analysis.atlas",
     "workspace": "analysis.workspace",
 }
 

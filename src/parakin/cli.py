@@ -12,9 +12,13 @@ from collections.abc import Sequence
 from cyclopts import App, CycloptsError, Parameter
 
 from . import __version__
+from .commands.atlas import atlas
+from .commands.design import design
 from .commands.kinematics import forward, inverse
+from .commands.linuxcnc import linuxcnc
 from .commands.machines import machines, show
 from .commands.post import post
+from .commands.workspace import workspace
 from .errors import ParakinError
 
 _MALFORMED = 2
@@ -28,7 +32,7 @@ app = App(
     default_parameter=Parameter(negative=""),
     suppress_keyboard_interrupt=False,  # main says so in one line
 )
-for command in (post, inverse, forward, machines, show):
+for command in (post, inverse, forward, linuxcnc, machines, show, workspace, atlas, design):
     app.command(command)
 app.register_install_completion_command()
 

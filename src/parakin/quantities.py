@@ -36,7 +36,11 @@ SPEED = Kind((1, 0, -1), "a speed", "mm/s, m/s, mm/min, m/min, in/min")
 TURNING = Kind((0, 1, -1), "an angular speed", "deg/s, rad/s, rpm")
 ACCELERATION = Kind((1, 0, -2), "an acceleration", "mm/s2, m/s2, in/s2")
 SPINNING = Kind((0, 1, -2), "an angular acceleration", "deg/s2, rad/s2")
-_KINDS = {k.dimension: k for k in (NUMBER, LENGTH, ANGLE, SPEED, TURNING, ACCELERATION, SPINNING)}
+JERK = Kind((1, 0, -3), "a jerk", "mm/s3, m/s3, in/s3")
+ANGULAR_JERK = Kind((0, 1, -3), "an angular jerk", "deg/s3, rad/s3")
+_KINDS = {
+    k.dimension: k for k in (NUMBER, LENGTH, ANGLE, SPEED, TURNING, ACCELERATION, SPINNING, JERK, ANGULAR_JERK)
+}
 
 
 @dataclass(frozen=True)
@@ -74,6 +78,8 @@ def _units() -> dict[str, tuple[float, Dimension]]:
             units[f"{name}/min"] = (factor / 60.0, (*powers, -1))
             for square in ("/s2", "/s^2", "/s²"):
                 units[name + square] = (factor, (*powers, -2))
+            for cube in ("/s3", "/s^3", "/s³"):
+                units[name + cube] = (factor, (*powers, -3))
     return units
 
 

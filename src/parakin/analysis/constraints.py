@@ -40,8 +40,9 @@ class Constraint:
 
     @cached_property
     def smooth(self) -> bool:
-        """No corners: Taylor's formula holds to the second order."""
-        return not any(node.op in (alg.MIN, alg.MAX, alg.ABS, alg.COPYSIGN, alg.SELECT) for node in self._nodes)
+        """No corners: Taylor's formula holds to the second order. What is held moves, so it has a first order only."""
+        corners = (alg.MIN, alg.MAX, alg.ABS, alg.COPYSIGN, alg.SELECT, alg.HELD)
+        return not any(node.op in corners for node in self._nodes)
 
     @cached_property
     def guard(self) -> Scalar:

@@ -12,6 +12,7 @@ from typing import Literal
 import numpy as np
 
 from ..errors import PoseError
+from ..kernels.elementary import GREATEST_ANGLE
 from ..machine import Array, Machine
 from .constraints import Constraint, Slice
 from .every_turn import EveryTurn
@@ -23,6 +24,8 @@ Span = tuple[float, float]
 
 FAR = 1e6  # mm: no machine reaches farther
 _MANY = 20_000  # cells by which a bounded region has left the farthest ones
+_TINY = 1e-3  # mm
+_SHRINKING = 0.6  # of an edge from round to round, while the cells are much larger than the region
 _EVERY_WAY: dict[str, Span] = {"A": (-pi, pi), "B": (-pi / 2, pi / 2), "C": (-pi, pi)}
 
 
@@ -74,18 +77,24 @@ class Region:
         """
         far = np.full(len(self.places), FAR)
         work = self.subdivision(-far, far)
+        before = 2.0 * far
         while True:
             cells = work.cells("gap")
             if not len(cells.low):
                 return None
             low, high = cells.low.min(0), (cells.low + cells.size).max(0)
             far_out = (low <= -FAR) | (high >= FAR)
-            fine = ((high - low) >= 6.0 * cells.size.min(0)).any() or cells.size.max() < 1e-3
-            if far_out.any() and len(work.open.low) > _MANY:
-                axis = self.places[int(far_out.argmax())]
+            inside = cells.take(cells.inside)
+            for_good = ((inside.low <= -FAR) | (inside.low + inside.size >= FAR)).any(0)
+            done = not len(work.open.low) or len(work.open.low) > _MANY or work.open.size.max() < _TINY
+            if for_good.any() or (far_out.any() and done):
+                axis = self.places[int((for_good if for_good.any() else far_out).argmax())]
                 raise PoseError(f"the limits that count do not bound the workspace in {axis}")
-            if not len(work.open.low) or (fine and not far_out.any()):
+            fine = ((high - low) >= 6.0 * cells.size.min(0)).any() or cells.size.max() < _TINY
+            still = ((high - low) > _SHRINKING * before).all() or len(work.open.low) > _MANY
+            if not len(work.open.low) or (fine and still and not far_out.any()):
                 return low, high
+            before = high - low
             work.refine(np.arange(len(work.open.low)))
 
     def poses(self, places: Array, turns: Array | None = None) -> Array:
@@ -143,9 +152,13 @@ def region(
             raise PoseError(f"{axis} is held and swept")
         if not all(map(isfinite, span)) or span[0] > span[1]:
             raise PoseError(f"the range of {axis} is empty: {span[0]:g} to {span[1]:g}")
+        if max(map(abs, span)) > GREATEST_ANGLE:
+            raise PoseError(f"the range of {axis} is beyond what can be computed: {span[0]:g} to {span[1]:g}")
     for axis, value in held.items():
         if not isfinite(value):
             raise PoseError(f"{axis}: {value} is no place to hold it")
+        if abs(value) > (GREATEST_ANGLE if axis in turning else FAR):
+            raise PoseError(f"{axis}: {value:g} is beyond what can be computed")
     home = dict(zip(machine.axes, machine.home.tolist(), strict=True))
     held |= {axis: home[axis] for axis in turning if axis not in held and axis not in swept}
     places = tuple(axis for axis in machine.axes if axis not in turning and axis not in held)

@@ -28,7 +28,9 @@ Indices = NDArray[np.int64]
 FIRST = 8  # cells along the longest side of the first box
 MOST = 3_000_000  # cells open at a time
 AT_ONCE = 8192  # cells refined together
+_FEW = 64  # where the time is short
 _FINEST = 2.0**-24  # of the first cells: below this the numbers have no digits left
+_DIGITS = 26  # binary, of the first cells' corners; the others are for their parts
 
 
 @dataclass(frozen=True, eq=False)
@@ -183,13 +185,15 @@ class Subdivision(ABC):
         edge = float((high - low).max()) / FIRST
         self.finest = edge * _FINEST
         counts = np.maximum(1, np.ceil((high - low) / edge - 1e-9)).astype(int)
-        size = (high - low) / counts
+        low, size = _on_a_grid(low, high, counts)
         index = np.array(list(product(*[range(n) for n in counts])), float).reshape(-1, len(low))
         self.done: list[Cells] = []
         self.rounds = 0
+        began = time.monotonic()
         bottom, top = (np.broadcast_to(end, (len(index), len(end))) for end in turns)
         left = self._first(np.arange(len(index)), bottom, top)
         self.open, self.left = self._examined(low + index * size, np.tile(size, (len(index), 1)), left)
+        self._pace = (time.monotonic() - began + 1e-9) / len(index)  # seconds a cell, of late
 
     @abstractmethod
     def _first(self, cell: Indices, low: Array, high: Array) -> list[Items]:
@@ -219,10 +223,14 @@ class Subdivision(ABC):
         corners = np.array(list(product((0.0, 1.0), repeat=d)))
         which = np.zeros(len(self.open.low), np.bool_)
         found: list[tuple[Cells, list[Items]]] = []
-        for start in range(0, len(parents), AT_ONCE):
-            if start and time.monotonic() > deadline:
+        start = 0
+        while start < len(parents):
+            began = time.monotonic()
+            if start and began > deadline:
                 break
-            now = np.sort(parents[start : start + AT_ONCE])
+            count = AT_ONCE if deadline == inf else int(min(AT_ONCE, 0.5 * (deadline - began) / self._pace))
+            now = np.sort(parents[start : start + max(_FEW, count)])
+            start += len(now)
             which[now] = True
             half = 0.5 * self.open.size[now]
             low = (self.open.low[now][:, None] + corners * half[:, None]).reshape(-1, d)
@@ -230,6 +238,7 @@ class Subdivision(ABC):
             place[now] = np.arange(len(now))
             children = [part.moved(place).in_parts(len(corners)) for part in self.left]
             found.append(self._examined(low, np.repeat(half, len(corners), 0), children))
+            self._pace = (time.monotonic() - began + 1e-9) / len(now)
         place = np.cumsum(~which) - 1
         place[which] = -1
         cells = [self.open.take(~which), *[part for part, _ in found]]
@@ -254,9 +263,10 @@ class Subdivision(ABC):
     ) -> Cells:
         """Refine until the relative gap, the cells' size or the time is reached; interrupted, it gives what it has."""
         deadline = inf if seconds is None else time.monotonic() + seconds
+        now = self.cells("interrupted")
         try:
             while True:
-                now = self.cells("gap")
+                now = self.cells("interrupted")
                 stopped, parents = self._next(now, gap, cell)
                 if not stopped and time.monotonic() > deadline:
                     stopped = "time"
@@ -266,7 +276,7 @@ class Subdivision(ABC):
                     progress(min(1.0, gap / now.gap) if now.gap > 0 else 1.0)
                 self.refine(parents, deadline)
         except KeyboardInterrupt:
-            return self.cells("interrupted")
+            return now  # as it was before the round that is half done
 
     def _next(self, now: Cells, gap: float, cell: float | None) -> tuple[str, Indices]:
         """Why to stop, or "" and which cells to refine, the worst first."""
@@ -284,6 +294,17 @@ class Subdivision(ABC):
             return "", order
         rest = float(undecided[large].sum()) - np.cumsum(undecided[order])  # if all up to here vanished
         return "", order[: int(np.searchsorted(-rest, -0.5 * gap * now.total(now.estimate))) + 1]
+
+
+def _on_a_grid(low: Array, high: Array, counts: NDArray[np.int64]) -> tuple[Array, Array]:
+    """Lower corner and size of ``counts`` cells that hold a box.
+
+    Both have so few digits that the corners of all parts of parts are exact: no sliver is left between neighbours.
+    """
+    _, exponent = np.frexp(np.maximum(np.abs(low), np.abs(high)))
+    unit = np.ldexp(1.0, exponent - _DIGITS)
+    low, high = np.floor(low / unit), np.ceil(high / unit)
+    return low * unit, np.ceil((high - low) / counts) * unit
 
 
 def both(parts: Sequence[Items]) -> Items:

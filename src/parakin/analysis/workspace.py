@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -145,10 +146,12 @@ def workspace(
     if seconds is not None and not seconds > 0.0:
         raise PoseError(f"seconds: a time above 0 s expected, not {seconds:g}")
     parameters = {**question(asked), "method": "certified", "gap": gap, "cell": cell, "seconds": seconds}
+    began = time.monotonic()
     extent = asked.extent
     if extent is None:
         return Workspace(asked, nothing(len(asked.places)), "gap", parameters)
-    cells = asked.subdivision(*extent).run(gap, cell, seconds, progress)
+    rest = None if seconds is None else seconds - (time.monotonic() - began)
+    cells = asked.subdivision(*extent).run(gap, cell, rest, progress)
     return Workspace(asked, cells, cells.stopped, parameters)
 
 

@@ -38,7 +38,12 @@ def say(text: str) -> None:
 
 
 def print_json(content: Mapping[str, Any]) -> None:
-    print(json.dumps(_finite(content), indent=2, allow_nan=False))
+    print(json_text(content))
+
+
+def json_text(content: Mapping[str, Any]) -> str:
+    """Numbers that are not finite become null."""
+    return json.dumps(_finite(content), indent=2, allow_nan=False)
 
 
 def _finite(content: Any) -> Any:

@@ -35,6 +35,7 @@ class Group(Section):
     range: Any
     speed: Any = None
     acceleration: Any = None
+    jerk: Any = None
 
     def legs(self) -> list[Leg]:
         result = []
@@ -42,7 +43,7 @@ class Group(Section):
             drives = []
             for j, unit in enumerate(self.leg.units):
                 drive = Drive(str(names[j]), unit, *self.range[i][j])
-                for what in ("speed", "acceleration"):
+                for what in ("speed", "acceleration", "jerk"):
                     rows = getattr(self, what)
                     drive = drive if rows is None else replace(drive, **{what: rows[i][j]})
                 drives.append(drive)
@@ -169,6 +170,7 @@ def _model(kind: str) -> type[Group]:
         range=(_rows(tuple(d.range for d in drives), 1), ...),
         speed=(_rows(tuple(d.speed for d in drives), 0), None),
         acceleration=(_rows(tuple(d.acceleration for d in drives), 0), None),
+        jerk=(_rows(tuple(d.jerk for d in drives), 0), None),
         **own,
     )
     model.leg = leg

@@ -94,9 +94,10 @@ class _Driven(Section):
     offset: float = 0.0
     speed: float = inf
     acceleration: float = inf
+    jerk: float = inf
 
     def step(self, axis: str, unit: Unit) -> Step:
-        drive = Drive(str(self.joint), unit, self.range[0], self.range[1], self.speed, self.acceleration)
+        drive = Drive(str(self.joint), unit, *self.range, self.speed, self.acceleration, self.jerk)
         return Step(axis, self.offset, drive, -1.0 if self.reverse else 1.0)
 
 
@@ -109,6 +110,7 @@ def _driven(unit: Unit) -> type[_Driven]:
         offset=(types.value, 0.0),
         speed=(types.speed, inf),
         acceleration=(types.acceleration, inf),
+        jerk=(types.jerk, inf),
     )
 
 

@@ -22,6 +22,8 @@ from ..model.parts import Unit, Vector
 from ..quantities import (
     ACCELERATION,
     ANGLE,
+    ANGULAR_JERK,
+    JERK,
     LENGTH,
     NUMBER,
     SPEED,
@@ -132,6 +134,7 @@ _USUAL: dict[Kind, Bounds] = {
     LENGTH: (-1e6, 1e6, "-1 km to 1 km"),
     ANGLE: (-1e4, 1e4, "-10000 rad to 10000 rad"),
     **{kind: (0.0, 1e9, f"more than 0 ({kind.units})") for kind in (SPEED, TURNING, ACCELERATION, SPINNING)},
+    **{kind: (0.0, 1e12, f"more than 0 ({kind.units})") for kind in (JERK, ANGULAR_JERK)},
 }
 
 
@@ -207,9 +210,10 @@ class DriveTypes:
     range: Any
     speed: Any
     acceleration: Any
+    jerk: Any
 
 
 DRIVE_TYPES: dict[Unit, DriveTypes] = {
-    "mm": DriveTypes(Length, LengthPair, Annotated[float, of(SPEED)], Annotated[float, of(ACCELERATION)]),
-    "rad": DriveTypes(Angle, AnglePair, Annotated[float, of(TURNING)], Annotated[float, of(SPINNING)]),
+    "mm": DriveTypes(Length, LengthPair, *(Annotated[float, of(kind)] for kind in (SPEED, ACCELERATION, JERK))),
+    "rad": DriveTypes(Angle, AnglePair, *(Annotated[float, of(kind)] for kind in (TURNING, SPINNING, ANGULAR_JERK))),
 }

@@ -48,23 +48,26 @@ def share(b, slopes, room):
 
     ``room`` (3,) is overwritten.
     """
-    steepest = 0.0
+    steepest, total = 0.0, 0.0
     for slope in slopes:
         steepest = max(steepest, abs(slope))
+        total += abs(slope)
+    if b >= total:
+        return 1.0, 1.0
+    if b < -total:
+        return 0.0, 0.0
+    if not b == b:
+        return 0.0, 1.0
     n, flat = 0, 0.0
     for slope in slopes:
         if abs(slope) > _FLAT * steepest:
-            room[n] = abs(slope)
+            room[n] = abs(slope) / steepest
             n += 1
         else:
-            flat += abs(slope)
-    if n == 0:
-        return (1.0, 1.0) if b >= 0.0 else (0.0, 0.0)
-    least, most = _above(b - flat, room, n), _above(b + flat, room, n)
-    if least < 1.0:
-        least = max(0.0, least - _ROUNDING)
-    if most > 0.0:
-        most = min(1.0, most + _ROUNDING)
+            flat += abs(slope) / steepest
+    # A part that rounds to all or to nothing is neither: what is cut off at a corner can be smaller than a rounding.
+    least = max(0.0, _above(b / steepest - flat, room, n) - _ROUNDING)
+    most = min(1.0, _above(b / steepest + flat, room, n) + _ROUNDING)
     return least, most
 
 
@@ -192,3 +195,62 @@ def gather(cell, half, low, high, slopes, number, bad, outer, lost, near, limit,
                 more, less = share(middle + step, merged, room)[0], share(middle - step, merged, room)[0]
                 area[c] = (more - less) / (2.0 * step) * np.sqrt(gradient)
         i = end
+
+
+@njit(nogil=True, cache=True)
+def narrowest(box, high, slopes, outer, line, start, stop):
+    """Of every box the upper bound that leaves it least: that share to ``outer``, slopes and height to ``line``.
+
+    box : (N,) of each bound, none twice; line : (boxes, d + 1)
+    """
+    room = np.empty(3)
+    for i in range(start, stop):
+        most = share(high[i], slopes[i], room)[1]
+        c = box[i]
+        if most < outer[c]:
+            outer[c] = most
+            line[c, :-1] = slopes[i]
+            line[c, -1] = high[i]
+
+
+@njit(nogil=True, cache=True)
+def united(cell, first, line, outer, result):
+    """Of every cell no more than what some leaf's bound leaves, of leaves whose bounds lie much the same way.
+
+    cell : (N,) of each leaf; first : (cells,) its leaf that leaves most; line, outer : of the leaves, as from
+    :func:`narrowest`, a line of length 1; result : (cells,) shares. What is above one line is above the first cell's,
+    moved by as much as the two differ within the box.
+    """
+    d = line.shape[1] - 1
+    room = np.empty(3)
+    height = np.full(len(first), -np.inf)
+    total = np.zeros(len(first))
+    for i in range(len(cell)):
+        reference = line[first[cell[i]]]
+        moved = line[i, d]
+        for k in range(d):
+            moved += abs(line[i, k] - reference[k])
+        height[cell[i]] = max(height[cell[i]], moved)
+        total[cell[i]] += outer[i]
+    for c in range(len(first)):
+        result[c] = 0.0
+        if first[c] >= 0:
+            result[c] = min(1.0, total[c], share(height[c], line[first[c], :d], room)[1])
+
+
+@njit(nogil=True, cache=True)
+def surpassed(cell, witness, sure, line, result):
+    """Whether a leaf adds nothing to what its cell's witness is proved to hold.
+
+    witness : (cells,) a leaf, or -1; sure : (N,) height of the line above which a leaf is proved to hold, in the
+    direction of its ``line`` (N, d + 1), as in :func:`united`
+    """
+    d = line.shape[1] - 1
+    for i in range(len(cell)):
+        w = witness[cell[i]]
+        result[i] = False
+        if w >= 0 and w != i:
+            moved = line[i, d]
+            for k in range(d):
+                moved += abs(line[i, k] - line[w, k])
+            result[i] = sure[w] >= moved

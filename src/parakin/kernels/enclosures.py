@@ -33,7 +33,8 @@ from .tape import (
 )
 
 _WIDER = 2.0**-50  # eight units of roundoff
-_TINY = 1e-300  # where numbers vanish
+_TINY = 1e-300  # where numbers vanish: bounds hold to within it
+_HUGE = 1e300  # where sums of sizes may overflow
 _OFF = 2e-15  # sincos and atan2 are within 4e-16 of libm's, which is within 2e-16
 _MASK = (1 << 40) - 1
 FAST = {"contract"}
@@ -200,7 +201,7 @@ def interpret(code, imm, r):
                 cut = (yl < 0.0) & (yh >= 0.0) & (xl <= 0.0)  # the angle jumps there, and at the origin it is any
                 low = _least(_least(p, q), _least(s, t)) - _OFF
                 high = _most(_most(p, q), _most(s, t)) + _OFF
-                known = (low == low) & (high == high) & (p + q + s + t == p + q + s + t)
+                known = _size(yl, yh) + _size(xl, xh) < _HUGE  # what is greater, or infinite, gives any angle
                 r[d + j] = low if known & (not cut) else -3.1415926535897936
                 r[d + LANES + j] = high if known & (not cut) else 3.1415926535897936
         elif op == MIN:

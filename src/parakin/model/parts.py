@@ -1,7 +1,7 @@
 """The parts a machine is made of, as plain frozen data: drives, elementary transforms, limits.
 
-Lengths are mm, angles rad, speeds mm/s or rad/s, accelerations mm/s² or rad/s². Machine files are read into these
-by :mod:`parakin.description`; nothing here knows a file.
+Lengths are mm, angles rad, speeds mm/s or rad/s, accelerations mm/s² or rad/s², jerks mm/s³ or rad/s³. Machine files
+are read into these by :mod:`parakin.description`; nothing here knows a file.
 """
 
 from __future__ import annotations
@@ -33,6 +33,7 @@ class Drive:
     high: float = inf
     speed: float = inf
     acceleration: float = inf
+    jerk: float = inf
 
 
 @dataclass(frozen=True)

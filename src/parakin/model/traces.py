@@ -15,6 +15,7 @@ from ..errors import DescriptionError
 from ..kernels.tape import Tape, compile_tape
 from .legs import Inverse
 from .limits import Home, Limit, leg_joints, limits_of, platform_points
+from .rates import rates
 from .spec import Spec
 from .spheres import CENTRES_NEEDED, common_point, side_of
 from .structures import Placement, Structure, structure_of
@@ -306,6 +307,15 @@ class Model:
             return a + [-derivative(row, q) for row in f for q in joints]
 
         return self._tape(("jacobian",), self._poses + len(self.drives), outputs)
+
+    def rates_tape(self) -> Tape:
+        """pose, joints -> A (n·n), B (n·n) and the legs' spans: see :mod:`parakin.model.rates`."""
+
+        def outputs(trace: Trace) -> list[Scalar]:
+            found = rates(self.spec, self.structure, *self._pose_and_joints(trace))
+            return [scalar for row in (*found.a, *found.b, found.spans) for scalar in row]
+
+        return self._tape(("rates",), self._poses + len(self.drives), outputs)
 
     def spheres_tape(self, side: float | None) -> Tape:
         """joints -> pose, on the given side of the centres' plane, then the closures there, mm.

@@ -35,6 +35,7 @@ class Structure(ABC):
     """What a motion, a mounting, a head and a table make together."""
 
     axes: tuple[str, ...]
+    turns: tuple[str, ...] = ()  # names of the small turns that :meth:`closure` takes
     branches: str = ""  # default working mode of head and table
 
     def __init__(self, spec: Spec):
@@ -64,6 +65,12 @@ class Structure(ABC):
         """The tool's pose; at a vertical tool axis C is 0."""
 
     @abstractmethod
-    def closure(self, pose: Sequence[Scalar], serial: Sequence[Scalar]) -> tuple[Mat, Vec, list[Scalar]]:
+    def closure(
+        self, pose: Sequence[Scalar], serial: Sequence[Scalar], turn: Sequence[Scalar] = ()
+    ) -> tuple[Mat, Vec, list[Scalar]]:
         """The platform's frame from pose and serial joints without any quotient that a singular head would spoil,
-        and what is 0 where head and table point the tool along the pose's axis."""
+        and what is 0 where head and table point the tool along the pose's axis.
+
+        ``turn`` turns the tool on about its tip, to the first order, by small angles named in :attr:`turns`: they have
+        rates where the pose's own angles have none.
+        """

@@ -60,5 +60,7 @@ class Carried(FiveAxis):
         top, place = frame(self.spec.table, table)
         return [*back(top, place, add(apply(self.mount, tip), self.base)), *axis_angles(self._axis(serial))]
 
-    def closure(self, pose: Sequence[Scalar], serial: Sequence[Scalar]) -> tuple[Mat, Vec, list[Scalar]]:
-        return IDENTITY, self._origin(pose, serial), self._tilt_rows(pose, self._axis(serial))
+    def closure(
+        self, pose: Sequence[Scalar], serial: Sequence[Scalar], turn: Sequence[Scalar] = ()
+    ) -> tuple[Mat, Vec, list[Scalar]]:
+        return IDENTITY, self._origin(pose, serial), self._tilt_rows(pose, turn, self._axis(serial))

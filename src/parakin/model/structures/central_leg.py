@@ -14,6 +14,7 @@ from ...algebra import (
     along,
     apply,
     atan2,
+    cross,
     dot,
     norm,
     product,
@@ -30,7 +31,7 @@ from ..chain import UNIT, Pointing, back, frame, rotation_about
 from ..parts import ROTATIONS, Step
 from ..spec import Spec
 from .base import Placement
-from .five_axis import FiveAxis, axis_angles, tool_axis
+from .five_axis import FiveAxis, axis_angles, tool_axis, turned_axis
 
 
 class CentralLeg(FiveAxis):
@@ -56,7 +57,7 @@ class CentralLeg(FiveAxis):
         self.above, self.reach = self._wrist_centre()
         self.sign = 1.0
         home = tuple(float(spec.home.get(letter, 0.0)) for letter in self.axes)
-        self.sign = 1.0 if self._centre(home)[2] > 0.0 else -1.0
+        self.sign = 1.0 if self._centre(home[:3], tool_axis(*home[3:])[0])[2] > 0.0 else -1.0
         swing = [Step(turns[0], drive=spec.legs[0].drives[0]), Step(turns[1], drive=spec.legs[0].drives[0])]
         self.swing = Pointing.of(swing, "motion")
         self.swing = Pointing(self.swing.first, self.swing.second, (0.0, 0.0, self.sign))
@@ -75,16 +76,20 @@ class CentralLeg(FiveAxis):
             raise DescriptionError("head", "its axes must meet in one point of the central leg, on the tool's axis")
         return float(height), length
 
-    def _centre(self, pose: Sequence[Scalar]) -> Vec:
-        k, _, _ = tool_axis(pose[3], pose[4])
-        return back(self.mount, self.base, along(tuple(pose[:3]), k, self.reach))
+    def _centre(self, tip: Sequence[Scalar], k: Vec) -> Vec:
+        return back(self.mount, self.base, along(tuple(tip), k, self.reach))
 
-    def _swing(self, pose: Sequence[Scalar]) -> tuple[Mat, Vec, Scalar, list[Scalar]]:
-        """Rotation of the central leg's two turns, the platform's origin, tz, and both turns' angles."""
-        centre = self._centre(pose)
+    def _hung(self, tip: Sequence[Scalar], k: Vec) -> tuple[Vec, Vec, Scalar]:
+        """The central leg's direction, the platform's origin, and tz, for a tip and a tool axis."""
+        centre = self._centre(tip, k)
         distance = norm(centre)
         direction = scale(centre, 1.0 / distance)
         origin = along(centre, direction, -self.sign * self.above)  # not by the rotation: bounds stay narrow
+        return direction, origin, self.sign * distance - self.above
+
+    def _swing(self, tip: Sequence[Scalar], k: Vec) -> tuple[Mat, Vec, Scalar, list[Scalar]]:
+        """Rotation of the central leg's two turns, the platform's origin, tz, and both turns' angles."""
+        direction, origin, tz = self._hung(tip, k)
         found = self.swing.solve(direction, "+")
         rotation = IDENTITY
         axes = self.swing.first, self.swing.second
@@ -95,21 +100,18 @@ class CentralLeg(FiveAxis):
             scales = 1.0 / found.freedom, 1.0 / found.second_size
             for axis, (s, c), size in zip(axes, found.turns, scales, strict=True):
                 rotation = product(rotation, rotation_about(axis, s * size, c * size))
-        return rotation, origin, self.sign * distance - self.above, list(found.joints)
+        return rotation, origin, tz, list(found.joints)
 
-    def _platform(self, pose: Sequence[Scalar], branch: str, first: Scalar | None) -> Placement:
-        rotation, origin, tz, angles = self._swing(pose)
-        k = apply(transposed(self.mount), tool_axis(pose[3], pose[4])[0])
-        found = self.wrist.solve(apply(transposed(rotation), k), branch, first)
+    def place(self, pose: Sequence[Scalar], branch: str, first: Scalar | None = None) -> Placement:
+        k, _, _ = tool_axis(pose[3], pose[4])
+        rotation, origin, tz, angles = self._swing(pose[:3], k)
+        found = self.wrist.solve(apply(transposed(rotation), apply(transposed(self.mount), k)), branch, first)
         serial = list(found.joints)
         if self.roll:
             spin = serial.pop(0)
             rotation = product(rotation, turn("rz", *sincos(spin)))
             angles.append(spin)
         return Placement(rotation, origin, [*angles, tz], serial, found.reach, found.freedom)
-
-    def place(self, pose: Sequence[Scalar], branch: str, first: Scalar | None = None) -> Placement:
-        return self._platform(pose, branch, first)
 
     def frame(self, coordinates: Sequence[Scalar]) -> tuple[Mat, Vec]:
         rotation = IDENTITY
@@ -138,21 +140,33 @@ class CentralLeg(FiveAxis):
     def held(self, pose: Sequence[Scalar], serial: Sequence[Scalar]) -> Placement:
         if not self.roll:
             return super().held(pose, serial)
-        rotation, origin, tz, angles = self._swing(pose)
-        k = apply(transposed(self.mount), tool_axis(pose[3], pose[4])[0])
-        v = apply(transposed(rotation), k)
+        k, _, _ = tool_axis(pose[3], pose[4])
+        rotation, origin, tz, angles = self._swing(pose[:3], k)
+        v = apply(transposed(rotation), apply(transposed(self.mount), k))
         w = apply(frame(self.spec.head, serial)[0], UNIT["tz"])  # turned onto v by the platform's own turn
         spin = atan2(w[0] * v[1] - w[1] * v[0], w[0] * v[0] + w[1] * v[1])
         rotation = product(rotation, turn("rz", *sincos(spin)))
         return Placement(rotation, origin, [*angles, spin, tz], list(serial))
 
-    def closure(self, pose: Sequence[Scalar], serial: Sequence[Scalar]) -> tuple[Mat, Vec, list[Scalar]]:
+    def closure(
+        self, pose: Sequence[Scalar], serial: Sequence[Scalar], turn: Sequence[Scalar] = ()
+    ) -> tuple[Mat, Vec, list[Scalar]]:
         turned, _ = frame(self.spec.head, serial)
-        if self.roll:  # the platform's own turn takes one of the two conditions
-            placed = self._platform(pose, self.branches, None)
-            k = apply(transposed(self.mount), tool_axis(pose[3], pose[4])[0])
-            along_leg = dot([row[2] for row in placed.rotation], k)
-            return placed.rotation, placed.origin, [apply(turned, UNIT["tz"])[2] - along_leg]
-        rotation, origin, _, _ = self._swing(pose)
-        k = apply(self.mount, apply(rotation, apply(turned, UNIT["tz"])))
-        return rotation, origin, self._tilt_rows(pose, k)
+        k, _, _ = turned_axis(pose, turn)
+        if self.roll:
+            return self._rolled(pose[:3], k, apply(turned, UNIT["tz"]))
+        rotation, origin, _, _ = self._swing(pose[:3], k)
+        pointed = apply(self.mount, apply(rotation, apply(turned, UNIT["tz"])))
+        return rotation, origin, self._tilt_rows(pose, turn, pointed)
+
+    def _rolled(self, tip: Sequence[Scalar], k: Vec, w: Vec) -> tuple[Mat, Vec, list[Scalar]]:
+        """The platform turned about the central leg so that ``w``, the tool's axis in it, stands over k; its own turn
+        takes one of the two conditions. No angle of the central leg is needed, which would be free where it hangs."""
+        direction, origin, _ = self._hung(tip, k)
+        z, k = scale(direction, self.sign), apply(transposed(self.mount), k)
+        across = cross(z, k)
+        ahead = cross(across, z)
+        size = 1.0 / (norm(across) * sqrt(w[0] * w[0] + w[1] * w[1]))
+        x = scale(sub(scale(ahead, w[0]), scale(across, w[1])), size)
+        y = scale(add(scale(ahead, w[1]), scale(across, w[0])), size)
+        return transposed((x, y, z)), origin, [w[2] - dot(z, k)]

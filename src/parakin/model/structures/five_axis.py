@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from ...algebra import Scalar, Vec, atan2, dot, sincos, sqrt
+from ...algebra import Scalar, Vec, along, atan2, dot, sincos, sqrt
 from .base import Structure
 
 
@@ -20,12 +20,25 @@ def axis_angles(k: Vec) -> list[Scalar]:
     return [atan2(sqrt(k[0] * k[0] + k[1] * k[1]), k[2]), atan2(k[1], k[0])]
 
 
+def turned_axis(pose: Sequence[Scalar], turn: Sequence[Scalar]) -> tuple[Vec, Vec, Vec]:
+    """A pose's tool axis k and its two directions, all turned on by small angles towards these."""
+    k, e1, e2 = tool_axis(pose[3], pose[4])
+    if not turn:
+        return k, e1, e2
+    first, second = turn
+    return along(along(k, e1, first), e2, second), along(e1, k, -first), along(e2, k, -second)
+
+
 class FiveAxis(Structure):
-    """A tool of which only tip and axis count: axes X Y Z B C."""
+    """A tool of which only tip and axis count: axes X Y Z B C.
+
+    Its small turns move the axis k as a growing B does (``w1``), and as a growing C does (``w2``).
+    """
 
     axes = ("X", "Y", "Z", "B", "C")
+    turns = ("w1", "w2")
     branches = "+"
 
-    def _tilt_rows(self, pose: Sequence[Scalar], k: Vec) -> list[Scalar]:
-        _, e1, e2 = tool_axis(pose[3], pose[4])
+    def _tilt_rows(self, pose: Sequence[Scalar], turn: Sequence[Scalar], k: Vec) -> list[Scalar]:
+        _, e1, e2 = turned_axis(pose, turn)
         return [dot(e1, k), dot(e2, k)]

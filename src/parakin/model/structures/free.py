@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from ...algebra import IDENTITY, Mat, Scalar, Vec, add, apply, atan2, product, sincos, sqrt, sub, transposed, turn
+from ...algebra import IDENTITY, Mat, Scalar, Vec, add, apply, atan2, product, sincos, sqrt, sub, transposed
+from ...algebra import turn as turned
 from ...errors import DescriptionError
 from ..chain import back, frame
 from ..parts import ROTATIONS, TRANSLATIONS
@@ -13,7 +14,10 @@ from .base import LETTERS, Placement, Structure
 
 
 class Free(Structure):
-    """The motion is the pose: translations, and no, one or three turns. Tool and mounting are fixed frames."""
+    """The motion is the pose: translations, and no, one or three turns. Tool and mounting are fixed frames.
+
+    Its small turns are about the machine frame's axes: ``wx``, ``wy``, ``wz``, as many as it has.
+    """
 
     def __init__(self, spec: Spec):
         super().__init__(spec)
@@ -37,6 +41,7 @@ class Free(Structure):
                 raise DescriptionError("mounting", "a machine that turns about one axis only can't be inclined")
         self.coordinates = tuple(word for word in (*TRANSLATIONS, *ROTATIONS) if word in words)
         self.axes = tuple(LETTERS[word] for word in self.coordinates)
+        self.turns = tuple(f"w{word[1]}" for word in self.coordinates if word in ROTATIONS)
         self.tool, self.tip = frame(spec.head, ())
 
     def place(self, pose: Sequence[Scalar], branch: str, first: Scalar | None = None) -> Placement:
@@ -44,11 +49,16 @@ class Free(Structure):
         return Placement(rotation, origin, list(pose), [])
 
     def frame(self, coordinates: Sequence[Scalar]) -> tuple[Mat, Vec]:
+        return self._frame(coordinates, ())
+
+    def _frame(self, coordinates: Sequence[Scalar], turn: Sequence[Scalar]) -> tuple[Mat, Vec]:
         given = dict(zip(self.axes, coordinates, strict=True))
         rotation = IDENTITY
         for letter, word in (("C", "rz"), ("B", "ry"), ("A", "rx")):
             if letter in given:
-                rotation = product(rotation, turn(word, *sincos(given[letter])))
+                rotation = product(rotation, turned(word, *sincos(given[letter])))
+        if turn:
+            rotation = product(self._small(turn), rotation)
         if len(self.axes) == 6:  # the tool's frame is posed; the platform's follows
             rotation = product(product(transposed(self.mount), rotation), transposed(self.tool))
         tip = back(self.mount, self.base, tuple(given.get(letter, 0.0) for letter in "XYZ"))
@@ -69,5 +79,13 @@ class Free(Structure):
     def pose(self, coordinates: Sequence[Scalar], serial: Sequence[Scalar]) -> list[Scalar]:
         return list(coordinates)
 
-    def closure(self, pose: Sequence[Scalar], serial: Sequence[Scalar]) -> tuple[Mat, Vec, list[Scalar]]:
-        return (*self.frame(pose), [])
+    def _small(self, turn: Sequence[Scalar]) -> Mat:
+        """Rotation by small angles about the axes that the platform turns about."""
+        given = dict(zip(self.turns, turn, strict=True))
+        x, y, z = (given.get(name, 0.0) for name in ("wx", "wy", "wz"))
+        return ((1.0, -z, y), (z, 1.0, -x), (-y, x, 1.0))
+
+    def closure(
+        self, pose: Sequence[Scalar], serial: Sequence[Scalar], turn: Sequence[Scalar] = ()
+    ) -> tuple[Mat, Vec, list[Scalar]]:
+        return (*self._frame(pose, turn), [])

@@ -1,0 +1,299 @@
+"""The figures of the papers on which parakin stands, remade from its own calculations, and the page that shows them.
+
+python examples/gallery.py [-o FOLDER]
+"""
+
+from __future__ import annotations
+
+import argparse
+from io import BytesIO
+from itertools import product
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from mpl_toolkits.mplot3d.art3d import Line3DCollection, Poly3DCollection
+
+import parakin as pk
+from parakin.analysis.drives import drive_sweep
+from parakin.analysis.field import field
+from parakin.analysis.inscribed import Box, largest_box
+from parakin.analysis.polar import PolarWorkspace, polar_sweep
+from parakin.analysis.region import region
+from parakin.analysis.slices import sections
+from parakin.analysis.subdivide import Cells
+from parakin.analysis.workspace import Workspace
+from parakin.export.files import write_all
+from parakin.export.meshes import Shell, shell
+
+BLUE, ORANGE, GREEN, GREY = "#1565c0", "#ef6c00", "#2e7d32", "#90a4ae"
+TILT = np.deg2rad(15.0)
+TOTAL = dict.fromkeys("ABC", (-TILT, TILT))
+
+
+class Page:
+    """Figures with their numbers, in the order they are added."""
+
+    def __init__(self) -> None:
+        self.files: dict[str, bytes | str] = {}
+        self.text = [
+            "# Gallery",
+            "",
+            "The papers' figures, remade by `python examples/gallery.py`. Lengths are mm.",
+            "",
+        ]
+
+    def paper(self, title: str) -> None:
+        self.text += [f"## {title}", ""]
+
+    def add(self, name: str, title: str, figure: Figure, numbers: str) -> None:
+        canvas, data = FigureCanvasAgg(figure), BytesIO()
+        canvas.print_png(data)
+        self.files[f"{name}.png"] = data.getvalue()
+        self.text += [f"### {title}", "", f"![{title}](gallery/{name}.png)", "", numbers, ""]
+
+
+def plane(width: float = 6.4, height: float = 6.0, count: int = 1) -> tuple[Figure, list[Any]]:
+    figure = Figure(figsize=(width, height), dpi=110, layout="constrained")
+    axes = [figure.add_subplot(1, count, i + 1) for i in range(count)]
+    for ax in axes:
+        ax.set_aspect("equal")
+        ax.grid(color="#e3e8ec", linewidth=0.7)
+        ax.set_axisbelow(True)
+    return figure, axes
+
+
+def space(count: int = 1, width: float = 7.0, height: float = 6.4) -> tuple[Figure, list[Any]]:
+    figure = Figure(figsize=(width, height), dpi=110, layout="constrained")
+    return figure, [figure.add_subplot(1, count, i + 1, projection="3d") for i in range(count)]
+
+
+def frame(ax: Any, low: np.ndarray, high: np.ndarray, names: tuple[str, ...]) -> None:
+    for letter, name, a, b in zip("xyz", names, low, high, strict=True):
+        getattr(ax, f"set_{letter}lim")(a, b)
+        getattr(ax, f"set_{letter}label")(f"{name} [mm]", fontsize=8)
+    ax.set_box_aspect(high - low)
+    ax.tick_params(labelsize=7)
+    ax.locator_params(nbins=5)
+
+
+def solid(ax: Any, shape: Shell, colour: str, alpha: float) -> None:
+    corners = shape.vertices[shape.faces]
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-12)
+    light = 0.65 + 0.35 * (normals @ np.array([0.3, -0.55, 0.78]))
+    rgb = np.array([int(colour[i : i + 2], 16) / 255.0 for i in (1, 3, 5)])
+    ax.add_collection3d(
+        Poly3DCollection(corners, facecolors=np.column_stack([np.outer(light, rgb), np.full(len(light), alpha)]))
+    )
+
+
+def edges(low: np.ndarray, high: np.ndarray) -> list[list[np.ndarray]]:
+    corners = [np.array(corner) for corner in product(*zip(low, high, strict=True))]
+    return [[a, b] for i, a in enumerate(corners) for b in corners[i + 1 :] if np.count_nonzero(a != b) == 1]
+
+
+def meshed(found: Workspace, step: float) -> Shell:
+    assert found.box is not None
+    return shell(field(found.region, found.box, step))
+
+
+def proved(found: Workspace) -> str:
+    v, scale, unit = found.volume, (1e9, "m³") if len(found.axes) == 3 else (1e6, "m²"), found.unit
+    factor, big = scale
+    return f"certified {v.estimate / factor:.4f} {big}, proved between {v.inner:,.0f} and {v.outer:,.0f} {unit}"
+
+
+def tricept(page: Page) -> None:
+    page.paper("Tricept: FME Transactions 41 (2013)")
+    found = pk.workspace(pk.load("tricept"), at={"B": 0.0, "C": 0.0})
+    boxes: list[tuple[str, Box, str]] = [
+        ("a", largest_box(found.region), ORANGE),
+        ("b", largest_box(found.region, shape=(3.0, 3.0, 1.0)), GREEN),
+        ("c", largest_box(found.region, shape=(1.0, 1.0, 1.0)), "#6a1b9a"),
+    ]
+    figure, (ax,) = space()
+    shape = meshed(found, 40.0)
+    solid(ax, shape, BLUE, 0.16)
+    for name, box, colour in boxes:
+        ax.add_collection3d(Line3DCollection(edges(box.low, box.high), colors=colour, linewidths=1.6, label=name))
+    frame(ax, shape.vertices.min(0), shape.vertices.max(0), found.axes)
+    ax.legend(loc="upper left")
+    sizes = "; ".join(f"{name} {' × '.join(f'{e:,.0f}' for e in box.edges)}" for name, box, _ in boxes)
+    page.add(
+        "tricept_4",
+        "Figure 4: workspace in three-axis machining, B = C = 0, with parallelepipeds inside",
+        figure,
+        f"{proved(found)}. Boxes proved inside (a the largest found, b of 3:3:1, c a cube): {sizes}. Bounded by "
+        + ", ".join(f"{bound.limit} ({bound.share:.0%})" for bound in found.bounded_by[:6])
+        + ".",
+    )
+
+
+def hbg80(page: Page) -> None:
+    page.paper("HBG80: Parallel kinematic machines (about 2000)")
+    two, three = (drive_sweep(pk.load(f"hbg80_{n}d"), cells=cells) for n, cells in ((2, 48), (3, 24)))
+    figure, (ax,) = plane()
+    for image in two.contours:
+        for number, piece in enumerate(image.pieces):
+            label = image.strategy.name if image.side == "home" and not number else None
+            style = "-" if image.side == "home" else ":"
+            ax.plot(*piece.T, style, linewidth=1.5, label=label, color=None if label else GREY)
+    ax.legend(fontsize=7)
+    page.add(
+        "hbg80_3_1",
+        "Figure 3.1: contour of the two-axis machine's workspace, drives at their limits",
+        figure,
+        f"Each line is one drive that runs while the other stands; dotted, the other assembly. Area from the drives' "
+        f"side {two.estimate:,.0f} mm²; {proved(pk.workspace(pk.load('hbg80_2d')))}.",
+    )
+    figure, (ax,) = plane()
+    for net in two.nets:
+        for lines in (net.places, net.places.swapaxes(0, 1)):
+            for line in lines[::3]:
+                ax.plot(*line.T, color=BLUE if net.side == "home" else GREY, linewidth=0.6)
+    page.add("hbg80_3_2", "Figure 3.2: workspace of the two-axis machine as a net", figure, "Both drives run.")
+    whole = pk.workspace(pk.load("hbg80_3d"))
+    assert whole.box is not None
+    figure, (ax,) = space()
+    for image in three.contours:
+        colour = BLUE if image.side == "home" else GREY
+        ax.add_collection3d(Line3DCollection(image.pieces, colors=colour, linewidths=1.3))
+    frame(ax, *whole.box, whole.axes)
+    page.add(
+        "hbg80_3_3",
+        "Figure 3.3: contours of the three-axis machine's workspace",
+        figure,
+        "One drive runs, two stand at their limits.",
+    )
+    figure, (ax,) = space()
+    for net in three.nets:
+        colour = BLUE if net.side == "home" else GREY
+        for lines in (net.places, net.places.swapaxes(0, 1)):
+            ax.add_collection3d(Line3DCollection(list(lines[::2]), colors=colour, linewidths=0.5))
+    frame(ax, *whole.box, whole.axes)
+    page.add(
+        "hbg80_3_4",
+        "Figure 3.4: shell of the three-axis machine's workspace",
+        figure,
+        f"Two drives run, one stands. Volume from the drives' side {three.estimate:,.0f} mm³; {proved(whole)}.",
+    )
+
+
+def lambda6(page: Page) -> None:
+    page.paper("Lambda: IJEEC 6 (2022)")
+    machine = pk.load("lambda6")
+    level = {"A": 0.0, "B": 0.0, "C": 0.0}
+    one = polar_sweep(region(machine, at={**level, "Z": 1400.0}), step=10.0, rays=72)
+    figure, (ax,) = plane()
+    for angle, radius in zip(one.angles, one.radii[0], strict=True):
+        ax.plot(*np.outer([np.cos(angle), np.sin(angle)], [0.0, radius]), color=GREY, linewidth=0.5)
+    ax.plot(*one.outlines[0].T, "o-", color=BLUE, markersize=2.5, linewidth=1.2)
+    page.add(
+        "lambda_9",
+        "Figure 9: one plane of the workspace, Z = 1400",
+        figure,
+        f"72 rays, ρ by 10 mm until the first place that is not allowed: {one.estimate:,.0f} mm².",
+    )
+    swept = polar_sweep(region(machine, at=level), step=10.0, planes=50.0)
+    figure, (ax,) = space()
+    stacked(ax, swept, BLUE)
+    page.add(
+        "lambda_10",
+        "Figure 10: the achievable workspace",
+        figure,
+        f"Planes 50 mm apart: {swept.estimate:,.0f} mm³. "
+        f"Certified, it need not be star-shaped: {proved(pk.workspace(machine, at=level))}.",
+    )
+    cases = [("a) strokes", ("gap *",)), ("b) and least gaps", ("gap *.max",)), ("c) and greatest gaps", ())]
+    figure, axes = space(3, 12.0, 5.2)
+    numbers = []
+    for ax, (title, without) in zip(axes, cases, strict=True):
+        found = pk.workspace(machine, at=level, without=without)
+        shape = meshed(found, 25.0)
+        solid(ax, shape, BLUE, 0.75)
+        frame(ax, np.array([-500.0, -500.0, 800.0]), np.array([500.0, 500.0, 2100.0]), found.axes)
+        ax.set_title(title, fontsize=10)
+        numbers.append(f"{title}: {proved(found)}")
+    page.add("lambda_11", "Figure 11: the limits, one after the other", figure, "; ".join(numbers) + ".")
+    total = pk.workspace(machine, every=TOTAL, gap=0.05)
+    achievable = pk.workspace(machine, at=level)
+    figure, (ax,) = space()
+    solid(ax, meshed(achievable, 25.0), BLUE, 0.13)
+    solid(ax, meshed(total, 25.0), ORANGE, 0.9)
+    assert achievable.box is not None
+    frame(ax, *achievable.box, achievable.axes)
+    page.add(
+        "lambda_13",
+        "Figure 13: the total orientation workspace inside the achievable one",
+        figure,
+        f"A, B and C anywhere in ±15° (the paper's Figure 12 is the flow chart of this): {proved(total)}, that is "
+        f"{total.volume.estimate / achievable.volume.estimate:.0%} of the achievable workspace.",
+    )
+
+
+def blocks(cells: Cells) -> Poly3DCollection:
+    """The faces of boxes that look at the viewer: +x, -y, +z."""
+    faces, colours = [], []
+    for axis, end, shade in ((0, 1.0, "#64b5f6"), (1, 0.0, "#42a5f5"), (2, 1.0, "#bbdefb")):
+        square = np.insert(np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]]), axis, end, axis=1)
+        faces.append(cells.low[:, None] + square * cells.size[:, None])
+        colours += [shade] * len(cells.low)
+    return Poly3DCollection(np.concatenate(faces), facecolors=colours, edgecolors="#37474f", linewidths=0.15)
+
+
+def stacked(ax: Any, swept: PolarWorkspace, colour: str) -> None:
+    lines = swept.outlines
+    ax.add_collection3d(Line3DCollection(lines, colors=colour, linewidths=1.0))
+    points = np.concatenate(lines)
+    frame(ax, points.min(0), points.max(0), swept.axes)
+
+
+def orthoglide(page: Page) -> None:
+    page.paper("Orthoglide: Chablat and Wenger, Chemnitz (2000)")
+    found = pk.workspace(pk.load("orthoglide"), cell=14.0)
+    cells = found.cells
+    assert found.box is not None
+    figure, (ax,) = space()
+    ax.add_collection3d(blocks(cells.take(cells.estimate > 0.5)))
+    frame(ax, *found.box, found.axes)
+    page.add(
+        "orthoglide_3",
+        "Figure 3: Cartesian workspace as an octree",
+        figure,
+        f"{int(cells.inside.sum()):,} cells proved inside, {int((~cells.inside).sum()):,} at the boundary, the "
+        f"smallest {cells.size.min():.1f} mm. {proved(found)}. The thin end is in the other assembly mode.",
+    )
+    figure, (ax,) = plane()
+    cut = sections(field(found.region, found.box, 4.0), "Z", [0.0])[0]
+    for outline in cut.outlines:
+        ax.fill(*outline.T, facecolor="#bbdefb", edgecolor=BLUE, linewidth=1.5)
+    cube = np.array([[-123.336, -123.336], [76.664, 76.664]])
+    ax.plot(
+        *np.array([cube[0], [cube[1, 0], cube[0, 1]], cube[1], [cube[0, 0], cube[1, 1]], cube[0]]).T, "--", color=ORANGE
+    )
+    page.add(
+        "orthoglide_4",
+        "Figure 4: cross-section at Z = 0",
+        figure,
+        f"{cut.area:,.0f} mm²; dashed, the cube of 200 mm for which it was designed.",
+    )
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("-o", "--output", type=Path, default=Path("docs"))
+    folder = parser.parse_args().output
+    page = Page()
+    for paper in (tricept, hbg80, lambda6, orthoglide):
+        paper(page)
+        print(f"{paper.__name__} done", flush=True)
+    write_all(folder / "gallery", page.files)
+    (written,) = write_all(folder, {"gallery.md": "\n".join(page.text).rstrip() + "\n"})
+    print(written)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,98 @@
+"""The characteristic length by which angles become millimetres, so that numbers of mixed units can be compared."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import isfinite
+
+import numpy as np
+
+from ..algebra import Trace, derivative, norm, values
+from ..errors import PoseError
+from ..kernels.batch import run
+from ..machine import Array, Machine
+from ..model.chain import frame
+from ..model.limits import leg_joints
+
+_NONE = 1e-9  # mm; a length no greater is none
+
+
+@dataclass(frozen=True)
+class Length:
+    """The characteristic length, mm, and where it comes from; ``value`` is None for a machine without angles."""
+
+    value: float | None
+    rule: str
+
+    @property
+    def factor(self) -> float:
+        """What radians are multiplied by, mm; 1 where there are none."""
+        return 1.0 if self.value is None else self.value
+
+
+def characteristic_length(machine: Machine, length: float | None = None) -> Length:
+    """``length`` (mm) if it is given, else by the first of these rules that gives one.
+
+    - axes X Y Z B C: the tool's reach, from the head's last turn (without one from the platform) to the tip;
+    - a platform that turns: the radius of its joints about their middle, root mean square;
+    - drives that turn and a platform that does not: the arms' length, root mean square;
+    - else the rods' length at home, root mean square.
+
+    Raises :class:`PoseError` for a length that is none.
+    """
+    if length is not None:
+        if not (isfinite(length) and length > 0.0):
+            raise PoseError(f"length: a length above 0 mm expected, not {length:g}")
+        return Length(float(length), "given")
+    turns = machine.model.structure.turns
+    if not turns and "rad" not in machine.joint_units:
+        return Length(None, "no angles")
+    five = machine.axes == ("X", "Y", "Z", "B", "C")
+    rules = {
+        "the tool's reach": _reach(machine) if five else 0.0,
+        "the radius of the platform's joints": _radius(machine) if turns else 0.0,
+        "the length of the arms": 0.0 if turns else _arms(machine),
+        "the length of the rods at home": _mean(_spans_at_home(machine)),
+    }
+    rule = next(name for name, value in rules.items() if value > _NONE)
+    return Length(rules[rule], rule)
+
+
+def _mean(lengths: Sequence[float] | Array) -> float:
+    return float(np.sqrt(np.mean(np.square(lengths)))) if len(lengths) else 0.0
+
+
+def _reach(machine: Machine) -> float:
+    head = machine.spec.head
+    last = max((i for i, step in enumerate(head) if step.drive is not None), default=-1)
+    return float(norm(frame(head[last + 1 :], ())[1]))
+
+
+def _radius(machine: Machine) -> float:
+    turns = machine.model.structure.turns
+    joints = np.array([leg.platform for leg in machine.spec.legs])
+    if len(turns) == 1:  # along the axis of its only turn nothing moves
+        joints[:, "xyz".index(turns[0][1])] = 0.0
+    return _mean(np.linalg.norm(joints - joints.mean(0), axis=1))
+
+
+def _arms(machine: Machine) -> float:
+    """How fast the feet of turning drives move, mm/rad."""
+    at_home = leg_joints(machine.spec, machine.inverse(machine.home).tolist())
+    found = []
+    for leg, given in zip(machine.spec.legs, at_home, strict=True):
+        trace = Trace()
+        q = trace.inputs(len(given))
+        foot, _ = leg.struts(leg.platform, list(q))[0]
+        for i, drive in enumerate(leg.drives):
+            if drive.unit == "rad":
+                found.append(float(norm(values(trace, [derivative(c, q[i]) for c in foot], given))))
+    return _mean(found)
+
+
+def _spans_at_home(machine: Machine) -> Array:
+    tape = machine.model.rates_tape()
+    home = machine.home[None]
+    rows = run(tape, home, np.empty((1, tape.outputs)), machine.inverse(home), whole=False)
+    return rows[0, 2 * len(machine.axes) ** 2 :]

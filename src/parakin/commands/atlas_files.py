@@ -1,0 +1,54 @@
+"""The files of ``parakin atlas``: a picture for each map, one table of them all."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from ..errors import InputError
+
+if TYPE_CHECKING:
+    from ..analysis.atlas import Atlas, Map
+    from ..analysis.region import Region
+
+
+@dataclass(frozen=True)
+class Files:
+    """The files to write: of a folder all, else the one of its ending."""
+
+    name: str
+    path: Path
+    maps: int
+
+    def __post_init__(self) -> None:
+        if self.path.suffix.lower() == ".png" and self.maps > 1:
+            raise InputError(f'"{self.path}": several slices are several pictures, name a folder', "--output")
+        if self.path.suffix and self.path.suffix.lower() not in (".png", ".csv") and not self.path.is_dir():
+            raise InputError(f'"{self.path}": expected a folder, or a file that ends in .png or .csv', "--output")
+
+    def write(self, found: Atlas, maps: Sequence[Map]) -> dict[str, str]:
+        """Write the maps' pictures and their table; returns the paths."""
+        from ..export.files import Content, write_all
+        from ..export.maps import maps_csv, maps_png
+
+        kind = "" if self.path.is_dir() else self.path.suffix.lower()
+        contents: dict[str, Content] = {}
+        names: dict[str, str] = {}
+        if kind != ".csv":
+            for number, drawn in enumerate(maps):
+                key = "map" if self.maps == 1 else f"map {number + 1}"
+                names[key] = self.path.name if kind else f"{self.name}.atlas{_place(drawn, found.map.region)}.png"
+                contents[names[key]] = maps_png(drawn, found.isotropic_on(drawn))
+        if kind != ".png":
+            names["table"] = self.path.name if kind else f"{self.name}.atlas.csv"
+            contents[names["table"]] = maps_csv(maps)
+        folder = self.path.parent if kind else self.path
+        write_all(folder, contents)
+        return {key: str(folder / name) for key, name in names.items()}
+
+
+def _place(drawn: Map, asked: Region) -> str:
+    """Of a slice where it is, for its file's name."""
+    return "".join(f".{axis}{drawn.region.held[axis]:g}" for axis in asked.places if axis in drawn.region.held)

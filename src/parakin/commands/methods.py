@@ -1,0 +1,92 @@
+"""The methods by which ``parakin workspace`` finds one, with what each takes of the options."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from math import ceil
+from typing import TYPE_CHECKING, Literal
+
+from ..errors import InputError
+
+if TYPE_CHECKING:
+    from ..analysis.region import Region
+    from ..analysis.sweep import Swept
+    from ..analysis.workspace import Workspace
+
+Method = Literal["certified", "grid", "polar", "drives"]
+
+GAP, SECONDS = 0.01, 60.0
+_STEPS = {"grid": {1: 10_000, 2: 1000, 3: 200}, "polar": {2: 1000, 3: 400}}  # along the longest edge, by dimension
+_PLANES = 50  # of a polar sweep along that edge
+_CELLS = {2: 512, 3: 64}  # of each drive
+
+
+@dataclass(frozen=True)
+class Effort:
+    """How hard to try: the options that are no part of the question, mm and s; None where one is not given."""
+
+    gap: float | None
+    cell: float | None
+    time: float | None
+    step: float | None
+
+
+def found_by(method: Method, asked: Region, effort: Effort, progress: Callable[[float], None]) -> Workspace | Swept:
+    """The workspace; options that the method does not take are refused."""
+    if method == "certified":
+        return _certified(asked, effort, progress)
+    for option in ("gap", "cell", "time"):
+        if getattr(effort, option) is not None:
+            raise InputError(f"--method {method} has none, only certified has", f"--{option}")
+    return _drives(asked, effort.step, progress) if method == "drives" else _swept(method, asked, effort.step, progress)
+
+
+def _certified(asked: Region, effort: Effort, progress: Callable[[float], None]) -> Workspace:
+    from ..analysis.workspace import workspace
+
+    gap, seconds = GAP if effort.gap is None else effort.gap, SECONDS if effort.time is None else effort.time
+    if not 0.0 < gap < float("inf"):
+        raise InputError("expected a number above 0", "--gap")
+    if not seconds > 0.0:
+        raise InputError("expected a time above 0, in s", "--time")
+    swept = dict(asked.turns)
+    return workspace(
+        asked.machine,
+        at=asked.held,
+        every=swept if asked.kind == "total" else None,
+        some=swept if asked.kind == "inclusive" else None,
+        dexterous=asked.kind == "dexterous",
+        without=asked.without,
+        mode=asked.mode,
+        gap=gap,
+        cell=effort.cell,
+        seconds=seconds,
+        progress=progress,
+    )
+
+
+def _swept(method: Method, asked: Region, step: float | None, progress: Callable[[float], None]) -> Swept:
+    from ..analysis.grid import dense_grid
+    from ..analysis.polar import polar_sweep
+    from ..analysis.sweep import surroundings
+
+    box = surroundings(asked)
+    edge = 1.0 if box is None else float((box[1] - box[0]).max())
+    size = edge / _STEPS[method].get(len(asked.places), 1) if step is None else step
+    if method == "grid":
+        return dense_grid(asked, size, progress=progress)
+    return polar_sweep(asked, size, planes=max(size, edge / _PLANES), progress=progress)
+
+
+def _drives(asked: Region, step: float | None, progress: Callable[[float], None]) -> Swept:
+    from ..analysis.drives import drive_sweep
+
+    machine = asked.machine
+    if asked.kind != "constant" or asked.without or any(axis in asked.held for axis in "XYZ"):
+        raise InputError("drives sweeps the whole workspace: no --at, --every, --some or --without", "--method")
+    if step is None:
+        cells = _CELLS.get(len(machine.joints), 1)
+    else:
+        cells = max(1, *(ceil((drive.high - drive.low) / step) for drive in machine.model.drives))
+    return drive_sweep(machine, cells, asked.mode, progress)

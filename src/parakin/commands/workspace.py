@@ -1,0 +1,158 @@
+"""``parakin workspace``: where a machine is allowed, with its volume proved, and the shape's files."""
+
+from __future__ import annotations
+
+import time as clock
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+from cyclopts import Parameter
+
+from ..errors import InputError, PoseError
+from .console import Progress, announce_compiling, json_text, print_json, say
+from .methods import Effort, Method, found_by
+from .options import OFF_LIMITS, Json, Mode, Name, Sizes, machine_of
+from .regions import At, Every, Some, Without, length, region_of
+from .within import Within, looked_within, within_summary, within_told
+from .workspace_summary import summary
+
+if TYPE_CHECKING:
+    from ..export.files import Content
+    from ..export.workspace_files import Drawing
+
+_INTERRUPTED = 130  # exit code
+
+
+def workspace(
+    name: Name,
+    /,
+    *,
+    at: At = None,
+    every: Every = None,
+    some: Some = None,
+    dexterous: bool = False,
+    without: Without = None,
+    method: Method = "certified",
+    gap: float | None = None,
+    cell: str | None = None,
+    time: float | None = None,
+    step: str | None = None,
+    box: bool = False,
+    shape: str | None = None,
+    around: Annotated[str | None, Parameter(allow_leading_hyphen=True)] = None,
+    parts: bool = False,
+    start: Annotated[str | None, Parameter(allow_leading_hyphen=True)] = None,
+    mode: Mode = None,
+    output: Annotated[list[Path] | None, Parameter(name=["--output", "-o"])] = None,
+    json: Json = False,
+    sizes: Sizes = None,
+) -> int:
+    """Where a machine is allowed: the volume, proved to lie between two numbers, what bounds it, and its shape.
+
+    The exit code is 3 if a file has nothing to be filled with, for the workspace is empty.
+
+    Parameters
+    ----------
+    name
+        A shipped machine's name or a YAML file.
+    dexterous
+        Every value of every turning axis must be allowed.
+    method
+        certified proves; grid looks at a lattice of places, polar along rays from an axis, drives maps the drives.
+    gap
+        How far apart the two numbers may be, relative to the volume; 0.01 by default.
+    cell
+        Refine the whole boundary to cells of this size instead, mm.
+    time
+        Stop after this time with what there is, s; 60 by default.
+    step
+        Of the sampling methods, and of the grids for meshes and cross-sections, mm.
+    box
+        Look for the largest box inside, proved too, its edges along the axes.
+    shape
+        Proportions of that box: 3:3:1.
+    around
+        The place that box is centred at: X=0,Y=0,Z=-1400.
+    parts
+        Count the parts that a path can't leave without crossing a singularity or changing the working mode.
+    start
+        A pose, X=0,Y=0,Z=-1400, to tell in which of these parts it lies; axes that are not named stand as at home.
+    output
+        A file, by its ending: .stl .ply .glb (mesh, mm), .vtu .csv (cells), .png, .json. May be given again.
+    """
+    machine = machine_of(name, sizes)
+    asked = region_of(machine, at, every, some, dexterous, without, mode)
+    effort = Effort(gap, length(cell, "--cell"), time, length(step, "--step"))
+    files = _files(output or (), method, len(asked.places))
+    announce_compiling()
+    from ..analysis.workspace import Workspace
+    from ..export.workspace import account
+    from ..export.workspace_files import Drawing, drawing
+
+    began = clock.monotonic()
+    with Progress() as progress:
+        sketched = json or bool(set(files) - {".vtu", ".csv"})
+        found = found_by(method, asked, effort, progress.part("looking for it", 0.0, 0.6 if sketched else 1.0))
+        seconds = clock.monotonic() - began
+        drawn = Drawing(found, None, ())
+        if sketched:
+            drawn = drawing(found, effort.step, progress.part("drawing", 0.6, 1.0))
+        told = account(found, drawn.slices)
+        within = looked_within(asked, Within(box, shape, around, parts, start))
+        told.update(within_told(within))
+        told["parameters"] = {"step": effort.step, **told["parameters"], "set": list(sizes or ())}
+        written, refused = _written(files, drawn, told)
+    if json:
+        print_json({**told, "files": written})
+    else:
+        print(summary(found, seconds) + within_summary(within))
+        if written:
+            print("\n" + "\n".join(f"{kind:<5} {path}" for kind, path in written.items()))
+    for path, reason in refused.items():
+        say(f"{path}: not written, {reason}")
+    if isinstance(found, Workspace) and found.stopped == "interrupted":
+        return _INTERRUPTED
+    return OFF_LIMITS if refused else 0
+
+
+def _files(paths: Sequence[Path], method: str, dimension: int) -> dict[str, Path]:
+    """The files by their endings."""
+    from ..export.workspace_files import SUFFIXES, unfit
+
+    found: dict[str, Path] = {}
+    for path in paths:
+        suffix = path.suffix.lower()
+        if suffix not in SUFFIXES:
+            raise InputError(f'"{path}": expected a file name that ends in {", ".join(SUFFIXES)}', "--output")
+        if suffix in found:
+            raise InputError(f'"{path}": a second {suffix}', "--output")
+        reason = unfit(suffix, method, dimension)
+        if reason:
+            raise InputError(f'"{path}": {reason}', "--output")
+        found[suffix] = path
+    return found
+
+
+def _written(
+    files: Mapping[str, Path], drawn: Drawing, told: Mapping[str, Any]
+) -> tuple[dict[str, str], dict[Path, str]]:
+    """The files written, by their endings without the dot, and those that were not, with the reason."""
+    from ..export.files import write_all
+
+    contents: dict[str, Content] = {}
+    refused: dict[Path, str] = {}
+    for suffix, path in files.items():
+        try:
+            contents[suffix] = b"" if suffix == ".json" else drawn.content(suffix)
+        except PoseError as error:
+            refused[path] = str(error)
+    written = {suffix.removeprefix("."): str(files[suffix]) for suffix in contents}
+    if ".json" in contents:
+        contents[".json"] = json_text({**told, "files": written})
+    folders: dict[Path, dict[str, Content]] = {}
+    for suffix, content in contents.items():
+        folders.setdefault(files[suffix].parent, {})[files[suffix].name] = content
+    for folder, group in folders.items():
+        write_all(folder, group)
+    return written, refused

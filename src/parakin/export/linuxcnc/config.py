@@ -1,0 +1,185 @@
+"""The files that tell LinuxCNC of a machine: ini, HAL for a simulation, tool table."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from math import degrees, isfinite, pi
+
+from ...machine import Machine
+from ...model.parts import Drive
+from .extent import extent
+from .module import kinematics_name
+
+# Speed and acceleration where a machine's description leaves them open, by the drive's unit; mm, rad and s.
+SPEED = {"mm": 200.0, "rad": pi / 3.0}
+ACCELERATION = {"mm": 2000.0, "rad": 10.0 * pi / 3.0}
+_LAG = 0.01  # s: following error allowed, as time at full speed; the simulation lags by 0.001 s or two
+
+_INI = """\
+# {title}, for LinuxCNC 2.9. Made by parakin from the machine's description.
+# It runs as a simulation; for a machine of your own change {name}.hal and the homing of the joints.
+
+[EMC]
+VERSION = 1.1
+MACHINE = {name}
+
+[DISPLAY]
+DISPLAY = axis
+CYCLE_TIME = 0.1
+POSITION_OFFSET = RELATIVE
+POSITION_FEEDBACK = ACTUAL
+PROGRAM_PREFIX = .
+GEOMETRY = {letters}
+DEFAULT_LINEAR_VELOCITY = {jog}
+MAX_LINEAR_VELOCITY = {fast}
+
+[TASK]
+TASK = milltask
+CYCLE_TIME = 0.010
+
+[RS274NGC]
+PARAMETER_FILE = {name}.var
+
+[EMCMOT]
+EMCMOT = motmod
+COMM_TIMEOUT = 1.0
+SERVO_PERIOD = 1000000
+
+[EMCIO]
+EMCIO = io
+CYCLE_TIME = 0.100
+TOOL_TABLE = {name}.tbl
+
+[HAL]
+HALFILE = {name}.hal
+
+[KINS]
+KINEMATICS = {kinematics}
+JOINTS = {joints}
+
+[TRAJ]
+COORDINATES = {axes}
+LINEAR_UNITS = mm
+ANGULAR_UNITS = degree
+DEFAULT_LINEAR_VELOCITY = {jog}
+MAX_LINEAR_VELOCITY = {fast}
+MAX_LINEAR_ACCELERATION = {acceleration}
+# X Y Z of the pose that belongs to the joints' HOME; LinuxCNC reads no more, the kinematics knows its turns.
+HOME = {home}
+
+# The axes bound the end points of moves. Their ranges hold all poses that the machine can take; whether it can take a
+# certain one the kinematics decides, and the joints' limits.
+"""
+
+
+_HAL = """\
+# {name} as a simulation: every joint is at once where it is sent.
+# For a machine of your own put its drives in the place of these loops.
+
+loadrt [KINS]KINEMATICS
+loadrt [EMCMOT]EMCMOT servo_period_nsec=[EMCMOT]SERVO_PERIOD num_joints=[KINS]JOINTS
+addf motion-command-handler servo-thread
+addf motion-controller servo-thread
+
+{loops}
+
+net estop iocontrol.0.user-enable-out => iocontrol.0.emc-enable-in
+net tool-prepare iocontrol.0.tool-prepare => iocontrol.0.tool-prepared
+net tool-change iocontrol.0.tool-change => iocontrol.0.tool-changed
+"""
+
+
+def ini(machine: Machine) -> str:
+    """The ini file."""
+    fast, acceleration = _slowest(machine, "mm")
+    home = dict(zip(machine.axes, machine.home.tolist(), strict=True))
+    head = _INI.format(
+        title=" ".join(machine.spec.title.split()),
+        name=machine.name,
+        axes=" ".join(machine.axes),
+        letters="".join(machine.axes),
+        joints=len(machine.joints),
+        kinematics=kinematics_name(machine),
+        home=" ".join(number(home.get(axis, 0.0)) for axis in "XYZ"),
+        jog=number(0.25 * fast),
+        fast=number(fast),
+        acceleration=number(acceleration),
+    )
+    low, high = (ends.tolist() for ends in extent(machine))
+    axes = [
+        _section(f"AXIS_{axis}", [*_range(a, b, unit), *_rates(*_slowest(machine, unit), unit)])
+        for axis, unit, a, b in zip(machine.axes, machine.axis_units, low, high, strict=True)
+    ]
+    at_home = machine.inverse(machine.home).tolist()
+    joints = [_joint(i, drive, q) for i, (drive, q) in enumerate(zip(machine.model.drives, at_home, strict=True))]
+    return "\n".join([head, *axes, *joints])
+
+
+def rim(value: float, unit: str) -> float:
+    """mm stay, rad become degrees."""
+    return degrees(value) if unit == "rad" else value
+
+
+def number(value: float) -> str:
+    """Nine digits after the point at most: a nanometre's thousandth."""
+    text = f"{value:.9f}".rstrip("0").rstrip(".")
+    return "0" if text == "-0" else text
+
+
+def _section(name: str, lines: Iterable[str]) -> str:
+    return "\n".join([f"[{name}]", *lines, ""])
+
+
+def _slowest(machine: Machine, unit: str) -> tuple[float, float]:
+    """Speed and acceleration for the axes of a unit: those of its slowest drive."""
+    drives = [drive for drive in machine.model.drives if drive.unit == unit]
+    speeds = [drive.speed for drive in drives if isfinite(drive.speed)] or [SPEED[unit]]
+    accelerations = [drive.acceleration for drive in drives if isfinite(drive.acceleration)] or [ACCELERATION[unit]]
+    return min(speeds), min(accelerations)
+
+
+def _range(low: float, high: float, unit: str) -> Iterator[str]:
+    yield f"MIN_LIMIT = {number(rim(low, unit))}"
+    yield f"MAX_LIMIT = {number(rim(high, unit))}"
+
+
+def _rates(speed: float, acceleration: float, unit: str) -> Iterator[str]:
+    yield f"MAX_VELOCITY = {number(rim(speed, unit))}"
+    yield f"MAX_ACCELERATION = {number(rim(acceleration, unit))}"
+
+
+def _joint(index: int, drive: Drive, home: float) -> str:
+    unit = drive.unit
+    missing = [what for what in ("speed", "acceleration") if not isfinite(getattr(drive, what))]
+    speed = drive.speed if isfinite(drive.speed) else SPEED[unit]
+    acceleration = drive.acceleration if isfinite(drive.acceleration) else ACCELERATION[unit]
+    lag = rim(_LAG * speed, unit)
+    lines = [
+        f"# {drive.name}",
+        f"TYPE = {'ANGULAR' if unit == 'rad' else 'LINEAR'}",
+        *_range(drive.low, drive.high, unit),
+        *([f"# chosen, for the machine's description does not say it: {' and '.join(missing)}"] if missing else []),
+        *_rates(speed, acceleration, unit),
+        f"FERROR = {number(lag)}",
+        f"MIN_FERROR = {number(0.1 * lag)}",
+        f"HOME = {number(rim(home, unit))}",
+        f"HOME_OFFSET = {number(rim(home, unit))}",
+        "HOME_SEARCH_VEL = 0",
+        "HOME_LATCH_VEL = 0",
+        "HOME_SEQUENCE = 0",
+    ]
+    return _section(f"JOINT_{index}", lines)
+
+
+def hal(machine: Machine) -> str:
+    """The HAL file of a simulation: every joint is at once where it is sent."""
+    loops = [
+        f"net joint-{i} joint.{i}.motor-pos-cmd => joint.{i}.motor-pos-fb  # {name}"
+        for i, name in enumerate(machine.joints)
+    ]
+    return _HAL.format(name=machine.name, loops="\n".join(loops))
+
+
+def tool_table(machine: Machine) -> str:
+    """One tool, whose length the machine's description has already."""
+    return f"T1 P1 Z0 D0 ;the tool of {machine.name}, whose length the kinematics knows\n"

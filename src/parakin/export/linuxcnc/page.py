@@ -1,0 +1,71 @@
+"""The page that says how to use a configuration."""
+
+from __future__ import annotations
+
+from ...machine import Machine
+from .config import number, rim
+from .module import kinematics_name
+
+_PAGE = """\
+# {title} under LinuxCNC
+
+For LinuxCNC 2.9, as a simulation without hardware.
+
+| file | what it is |
+|---|---|
+| `{kinematics}.c` | the kinematics: {joints} from {axes} and back |
+| `{name}.ini` | ranges, speeds and home |
+| `{name}.hal` | loops in the place of drives |
+| `{name}.tbl` | the tool |
+
+Install the kinematics once and start:
+
+```
+sudo apt-get install linuxcnc-uspace linuxcnc-uspace-dev
+sudo halcompile --install {kinematics}.c
+linuxcnc {name}.ini
+```
+
+Switch the machine on and home it: it then stands at {home}.
+Programs are in millimetres and degrees; {frame}.
+
+## What to know
+
+- A pose that a leg can't reach, or that a limit of the machine's description forbids, is refused by the kinematics
+  ("fails kinematicsInverse"); the drives' ranges LinuxCNC watches itself.
+- Before a move LinuxCNC looks at its end point only; in between it stops where a limit is met.
+- In coordinated moves LinuxCNC bounds the speeds of the axes, not those of the joints. Near a singularity joints run
+  faster than the tool: the program has to carry feeds that keep them within their speeds.
+{pole}- The tool's length is part of the machine's description. Leave tool length offsets (G43) at 0: LinuxCNC adds them
+  along Z, wherever the tool points.
+- Speeds and accelerations that the description does not say were chosen, and are marked so in the ini file.
+
+The kinematics is compiled against LinuxCNC's headers and loaded into its programs, which are under the GNU General
+Public License; therefore `{kinematics}.c` is, too.
+"""
+
+_POLE = """\
+- Where the tool lies along the wrist's first axis, that axis is free and stays where it is. From there a tilt in
+  another direction makes it turn at once: begin a program with the tool tilted the way it goes on.
+"""
+
+_FRAMES = {
+    ("B", "C"): "the tool's axis is Rz(C)·Ry(B)·z, from the tip into the holder",
+    ("A", "B", "C"): "the tool's frame is Rz(C)·Ry(B)·Rx(A)",
+}
+
+
+def page(machine: Machine) -> str:
+    """The page, Markdown."""
+    home = zip(machine.axes, machine.home.tolist(), machine.axis_units, strict=True)
+    stands = [f"{axis} {number(rim(value, unit))}" for axis, value, unit in home]
+    return _PAGE.format(
+        title=" ".join(machine.spec.title.split()),
+        name=machine.name,
+        kinematics=kinematics_name(machine),
+        joints=" ".join(machine.joints),
+        axes=" ".join(machine.axes),
+        home=", ".join(stands),
+        frame=_FRAMES.get(machine.axes[3:], "the axes are those of the machine's frame"),
+        pole=_POLE if machine.model.first_serial is not None else "",
+    )

@@ -1,0 +1,248 @@
+/* What every machine shares. Above stand its numbers and its mathematics; here is how LinuxCNC asks for them.
+
+   Both functions keep nothing from one call to the next: LinuxCNC hands the last joints to the inverse and the last pose
+   to the forward, and that is what they stay near to. It also calls them for the end points of moves to come, which
+   would spoil a memory. Nothing allocates, and every loop has an end. */
+
+static double within_half_a_turn(double angle, double near)
+{
+    return angle + TURN * rint((near - angle) / TURN);
+}
+
+static int finite_all(const double *x, int count)
+{
+    for (int i = 0; i < count; i++)
+        if (!isfinite(x[i]))
+            return 0;
+    return 1;
+}
+
+/* The inverse: joints for a pose, the wrist's and all turning ones near the last. */
+
+#if WRIST
+/* Over the wrist's pole its other solution spares a swing: as parakin's Machine.follow goes on there. */
+static void go_over_the_pole(const double *x, const double *last, double *q)
+{
+    double other[JOINTS];
+    const double stay[2] = {within_half_a_turn(q[FIRST] - last[FIRST], 0.0),
+                            within_half_a_turn(q[SECOND] - last[SECOND], 0.0)};
+    if (!(fabs(stay[0]) > 0.25 * TURN))
+        return;
+    inverse_over(x, other);
+    const double cross[2] = {within_half_a_turn(other[FIRST] - last[FIRST], 0.0),
+                             within_half_a_turn(other[SECOND] - last[SECOND], 0.0)};
+    if (cross[0] * cross[0] + cross[1] * cross[1] < 0.25 * (stay[0] * stay[0] + stay[1] * stay[1])
+        && other[SECOND] >= SECOND_LOW && other[SECOND] <= SECOND_HIGH && finite_all(other, JOINTS))
+        for (int i = 0; i < JOINTS; i++)
+            q[i] = other[i];
+}
+#endif
+
+int kinematicsInverse(const EmcPose *world, double *joints,
+                      const KINEMATICS_INVERSE_FLAGS *iflags, KINEMATICS_FORWARD_FLAGS *fflags)
+{
+    double x[AXES], q[JOINTS], last[JOINTS];
+    (void)iflags;
+    (void)fflags;
+    read_pose(world, x);
+    read_joints(joints, last);
+    if (!finite_all(x, AXES) || !finite_all(last, JOINTS))
+        return -1;
+    inverse(x, q);
+    if (!finite_all(q, JOINTS))
+        return -1;
+#if WRIST
+    double lean[1];
+    freedom(x, lean);
+    if (lean[0] < FREE * FREE)
+        inverse_held(x, &last[FIRST], q);
+    else
+        go_over_the_pole(x, last, q);
+#endif
+    for (int i = 0; i < JOINTS; i++)
+        if (turning[i])
+            q[i] = within_half_a_turn(q[i], last[i]);
+    if (!finite_all(q, JOINTS) || !allowed(x, q))
+        return -1;
+    write_joints(q, joints);
+    return 0;
+}
+
+/* The forward: a pose for joints, near a given one. What does not close, or is another assembly, is none. */
+
+#if SPHERES
+static int pose_near(const double *near, const double *q, double *x)
+{
+    double f[CLOSURES];
+    common_point(q, near, x, f);
+    for (int i = 0; i < CLOSURES; i++)
+        if (!(fabs(f[i]) <= TOLERANCE))
+            return 0;
+    return finite_all(x, AXES);
+}
+#else
+/* LU with row exchanges, in place; the determinant. */
+static double factor(double a[CLOSURES][CLOSURES], int order[CLOSURES])
+{
+    double det = 1.0;
+    for (int k = 0; k < CLOSURES; k++) {
+        int best = k;
+        for (int i = k + 1; i < CLOSURES; i++)
+            if (fabs(a[i][k]) > fabs(a[best][k]))
+                best = i;
+        order[k] = best;
+        if (best != k) {
+            det = -det;
+            for (int j = 0; j < CLOSURES; j++) {
+                const double swap = a[k][j];
+                a[k][j] = a[best][j];
+                a[best][j] = swap;
+            }
+        }
+        det *= a[k][k];
+        const double pivot = 1.0 / a[k][k];
+        a[k][k] = pivot;
+        for (int i = k + 1; i < CLOSURES; i++) {
+            const double share = a[i][k] *= pivot;
+            for (int j = k + 1; j < CLOSURES; j++)
+                a[i][j] -= share * a[k][j];
+        }
+    }
+    return det;
+}
+
+static void substitute(double a[CLOSURES][CLOSURES], const int order[CLOSURES], double f[CLOSURES])
+{
+    for (int k = 0; k < CLOSURES; k++) {
+        const double swap = f[order[k]];
+        f[order[k]] = f[k];
+        f[k] = swap;
+    }
+    for (int k = 1; k < CLOSURES; k++)
+        for (int j = 0; j < k; j++)
+            f[k] -= a[k][j] * f[j];
+    for (int k = CLOSURES - 1; k >= 0; k--) {
+        for (int j = k + 1; j < CLOSURES; j++)
+            f[k] -= a[k][j] * f[j];
+        f[k] *= a[k][k];
+    }
+}
+
+/* Newton's method on the legs' closures in bounded steps. The matrix serves on while it gains enough. */
+static int pose_near(const double *near, const double *q, double *x)
+{
+    double y[CLOSURES], f[CLOSURES], a[CLOSURES][CLOSURES], det = 0.0, before = 0.0;
+    int order[CLOSURES], anew = 1, last = 0;
+    begin(near, q, y);
+    for (int step = 0;; step++) {
+        if (anew) {
+            closures_and_slopes(y, q, f, a[0]);
+            det = factor(a, order);
+        } else {
+            closures(y, q, f);
+        }
+        double worst = 0.0, shrink = 1.0;
+        for (int i = 0; i < CLOSURES; i++)
+            if (!(fabs(f[i]) <= worst))
+                worst = fabs(f[i]);
+        if (!isfinite(worst))
+            return 0;
+        if (worst < FINE || (last && worst <= TOLERANCE) || step == MOST_STEPS) {
+            if (worst > TOLERANCE || !(det * HOME_SIDE > 0.0))
+                return 0;
+            break;
+        }
+        const double ratio = anew ? worst / SIZE : worst / before; /* what the next step will leave of it */
+        last = ratio * worst < FINE;
+        anew = anew ? worst * worst > WORTH * SIZE : ratio > SLOW;
+        before = worst;
+        substitute(a, order, f);
+        for (int i = 0; i < CLOSURES; i++)
+            if (fabs(f[i]) * shrink > caps[i])
+                shrink = caps[i] / fabs(f[i]);
+        for (int i = 0; i < CLOSURES; i++)
+            y[i] -= shrink * f[i];
+    }
+    end(y, q, x);
+    return finite_all(x, AXES);
+}
+#endif
+
+/* Of the ways to write an orientation the one nearest to the last. */
+static void settle(double *x, const double *near)
+{
+#if TOOL_AXIS
+    double *b = &x[AXES - 2], *c = &x[AXES - 1];
+    const double last_b = near[AXES - 2], last_c = near[AXES - 1];
+    if (*b < FREE || *b > 0.5 * TURN - FREE) { /* upright: C is free */
+        *c = last_c;
+    } else {
+        const double over = within_half_a_turn(*c + 0.5 * TURN, last_c);
+        *c = within_half_a_turn(*c, last_c);
+        if (fabs(-*b - last_b) + fabs(over - last_c) < fabs(*b - last_b) + fabs(*c - last_c)) {
+            *b = -*b;
+            *c = over;
+        }
+    }
+#else
+    for (int i = 0; i < AXES; i++)
+        if (turning_axis[i])
+            x[i] = within_half_a_turn(x[i], near[i]);
+#endif
+}
+
+/* LinuxCNC's first guess is the home of its ini file, which has no turns. */
+static int is_bare_home(const double *x)
+{
+    for (int i = 0; i < AXES; i++)
+        if (!(fabs(x[i] - (turning_axis[i] ? 0.0 : home[i])) < 1e-6))
+            return 0;
+    return 1;
+}
+
+int kinematicsForward(const double *joints, EmcPose *world,
+                      const KINEMATICS_FORWARD_FLAGS *fflags, KINEMATICS_INVERSE_FLAGS *iflags)
+{
+    double q[JOINTS], near[AXES], x[AXES];
+    (void)fflags;
+    (void)iflags;
+    read_joints(joints, q);
+    read_pose(world, near);
+    if (!finite_all(q, JOINTS))
+        return -1;
+    if (!finite_all(near, AXES) || is_bare_home(near) || !pose_near(near, q, x)) {
+        for (int i = 0; i < AXES; i++)
+            near[i] = home[i];
+        if (!pose_near(near, q, x))
+            return -1;
+    }
+    settle(x, near);
+    write_pose(x, world);
+    return 0;
+}
+
+/* LinuxCNC's side. */
+
+KINEMATICS_TYPE kinematicsType(void) { return KINEMATICS_BOTH; }
+int kinematicsSwitchable(void) { return 0; }
+int kinematicsSwitch(int type) { (void)type; return 0; }
+
+EXPORT_SYMBOL(kinematicsInverse);
+EXPORT_SYMBOL(kinematicsForward);
+EXPORT_SYMBOL(kinematicsType);
+EXPORT_SYMBOL(kinematicsSwitchable);
+EXPORT_SYMBOL(kinematicsSwitch);
+MODULE_LICENSE("GPL");
+
+static int component;
+
+int rtapi_app_main(void)
+{
+    component = hal_init(MODULE);
+    if (component < 0)
+        return component;
+    hal_ready(component);
+    return 0;
+}
+
+void rtapi_app_exit(void) { hal_exit(component); }

@@ -1,0 +1,114 @@
+"""Kinematics modules without LinuxCNC: built by gcc against a stub of the HAL, called through ctypes."""
+
+from __future__ import annotations
+
+import ctypes
+import subprocess
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+
+from parakin.export.linuxcnc.module import kinematics_name, module
+
+HERE = Path(__file__).parent
+HEADERS = ("rtapi.h", "rtapi_app.h", "rtapi_math.h", "hal.h", "kinematics.h")
+# As LinuxCNC's Makefile.modinc compiles a module.
+FLAGS = ["-Os", "-fno-fast-math", "-mieee-fp", "-fno-unsafe-math-optimizations", "-fno-builtin-sincos"]
+FLAGS += ["-fno-builtin-sin", "-fno-builtin-cos", "-D_GNU_SOURCE", "-DRTAPI", "-fPIC"]
+FIELDS = "XYZABCUVW"
+
+
+def _pointer(array):
+    return array.ctypes.data_as(ctypes.c_void_p)
+
+
+class Kinematics:
+    """The functions of a kinematics module; mm and degrees, as LinuxCNC has them."""
+
+    def __init__(self, stub, path, width):
+        self.stub, self.width = stub, width
+        self.library = ctypes.CDLL(str(path))
+        assert self.library.rtapi_app_main() == 0
+        assert ctypes.c_int.in_dll(stub, "stub_ready").value == 1
+
+    def _call(self, name, function, count, *arrays):
+        codes = np.full(count, 99, np.int32)
+        address = ctypes.cast(getattr(self.library, function), ctypes.c_void_p)
+        getattr(self.stub, name)(
+            address, ctypes.c_long(count), ctypes.c_long(self.width), *map(_pointer, arrays), _pointer(codes)
+        )
+        return codes
+
+    def forward(self, joints, starts):
+        """Poses (n, 9) and codes (n,) for joints (n, width), each from its start (n, 9)."""
+        poses = starts.copy()
+        return poses, self._call("stub_forward", "kinematicsForward", len(joints), np.ascontiguousarray(joints), poses)
+
+    def forward_path(self, joints, start):
+        """As :meth:`forward`, each from the pose before, the first from ``start`` (9,)."""
+        poses, pose = np.empty((len(joints), 9)), start.copy()
+        given = np.ascontiguousarray(joints)
+        return poses, self._call("stub_forward_path", "kinematicsForward", len(joints), given, pose, poses)
+
+    def inverse(self, poses, last):
+        """Joints (n, width) and codes (n,) for poses (n, 9), each near its last joints (n, width)."""
+        joints = np.ascontiguousarray(last).copy()
+        return joints, self._call("stub_inverse", "kinematicsInverse", len(poses), np.ascontiguousarray(poses), joints)
+
+    def inverse_path(self, poses, last):
+        """As :meth:`inverse`, each near the joints before, the first near ``last`` (width,)."""
+        joints, joint = np.empty((len(poses), self.width)), last.copy()
+        given = np.ascontiguousarray(poses)
+        return joints, self._call("stub_inverse_path", "kinematicsInverse", len(poses), given, joint, joints)
+
+
+class Stub:
+    """The stub HAL and the modules built against it, in a folder of their own."""
+
+    def __init__(self, folder):
+        self.folder = Path(folder)
+        for name in HEADERS:
+            (self.folder / name).write_text('#include "stub_hal.h"\n')
+
+    @cached_property
+    def library(self):
+        self._gcc([HERE / "stub_hal.c"], self.folder / "stub_hal.so")
+        return ctypes.CDLL(str(self.folder / "stub_hal.so"), mode=ctypes.RTLD_GLOBAL)
+
+    def _gcc(self, sources, target):
+        warnings = ["-Wall", "-Werror", "-Wframe-larger-than=2560"]
+        command = ["gcc", *FLAGS, *warnings, f"-I{HERE}", f"-I{self.folder}", "-shared", "-o", target, *sources, "-lm"]
+        subprocess.run(command, check=True)
+
+    def built(self, machine):
+        """A machine's module."""
+        stub, name = self.library, kinematics_name(machine)
+        source = self.folder / f"{name}.c"
+        source.write_text(module(machine))
+        self._gcc([source], self.folder / f"{name}.so")
+        return Kinematics(stub, self.folder / f"{name}.so", len(machine.joints))
+
+
+def world(machine, poses):
+    """Poses as LinuxCNC has them, (n, 9): X Y Z A B C U V W in mm and degrees."""
+    rows = np.zeros((len(poses), 9))
+    for i, (axis, unit) in enumerate(zip(machine.axes, machine.axis_units, strict=True)):
+        rows[:, FIELDS.index(axis)] = np.degrees(poses[:, i]) if unit == "rad" else poses[:, i]
+    return rows
+
+
+def pose(machine, rows):
+    """The other way round."""
+    values = rows[:, [FIELDS.index(axis) for axis in machine.axes]]
+    return np.where(np.array(machine.axis_units) == "rad", np.radians(values), values)
+
+
+def outward(machine, joints):
+    """Joints as LinuxCNC has them, in mm and degrees."""
+    return np.where(np.array(machine.joint_units) == "rad", np.degrees(joints), joints)
+
+
+def inward(machine, joints):
+    """The other way round."""
+    return np.where(np.array(machine.joint_units) == "rad", np.radians(joints), joints)

@@ -1,0 +1,31 @@
+/* What a kinematics module needs of LinuxCNC's headers. The tests call every header of theirs by this. */
+#ifndef STUB_HAL_H
+#define STUB_HAL_H
+
+#include <math.h>
+#include <stdint.h>
+#include <stdlib.h>
+
+typedef struct { double x, y, z; } PmCartesian;
+typedef struct EmcPose { PmCartesian tran; double a, b, c, u, v, w; } EmcPose;
+typedef enum { KINEMATICS_IDENTITY = 1, KINEMATICS_FORWARD_ONLY, KINEMATICS_INVERSE_ONLY, KINEMATICS_BOTH } KINEMATICS_TYPE;
+typedef unsigned long KINEMATICS_FORWARD_FLAGS, KINEMATICS_INVERSE_FLAGS;
+
+#define EXPORT_SYMBOL(name) extern int stub_exported_##name
+#define MODULE_LICENSE(text) const char *const stub_license = text
+
+int kinematicsForward(const double *joints, EmcPose *world,
+                      const KINEMATICS_FORWARD_FLAGS *fflags, KINEMATICS_INVERSE_FLAGS *iflags);
+int kinematicsInverse(const EmcPose *world, double *joints,
+                      const KINEMATICS_INVERSE_FLAGS *iflags, KINEMATICS_FORWARD_FLAGS *fflags);
+KINEMATICS_TYPE kinematicsType(void);
+int kinematicsSwitchable(void);
+int kinematicsSwitch(int type);
+
+int rtapi_app_main(void);
+void rtapi_app_exit(void);
+int hal_init(const char *name);
+int hal_ready(int component);
+int hal_exit(int component);
+
+#endif

@@ -1,0 +1,110 @@
+#!/usr/bin/python3
+"""LinuxCNC's user interface in a test: switch on, home, move by hand, run a program, ask for what must be refused.
+
+LinuxCNC starts this in the folder of its ini file, with its own Python. task.json says what to do, seen.json what came
+of it, and samples.txt has every cycle's axes and joints.
+"""
+
+import json
+import subprocess
+import time
+from pathlib import Path
+
+import linuxcnc
+
+MOST = 20.0  # s for a step
+DRAINING = 0.3  # s for the sampler's last rows
+
+
+class ToldError(Exception):
+    """What LinuxCNC told its user."""
+
+
+class Machine:
+    def __init__(self):
+        self.command, self.status, self.errors = linuxcnc.command(), linuxcnc.stat(), linuxcnc.error_channel()
+
+    def wait(self, ready):
+        """Until ``ready(status)``."""
+        end = time.monotonic() + MOST
+        while time.monotonic() < end:
+            self.status.poll()
+            told = self.errors.poll()
+            if told:
+                raise ToldError(told[1].strip())
+            if ready(self.status):
+                return
+            time.sleep(0.005)
+        raise ToldError(f"not within {MOST:g} s")
+
+    def tell(self, word, *arguments):
+        getattr(self.command, word)(*arguments)
+        self.command.wait_complete()
+
+    def position(self):
+        """Where it has come to rest."""
+        self.wait(lambda s: s.interp_state == linuxcnc.INTERP_IDLE and s.inpos and not s.queue)
+        return list(self.status.position)
+
+    def switch_on(self, joints):
+        self.wait(lambda s: s.joints == joints)  # the first answers are nought
+        self.tell("state", linuxcnc.STATE_ESTOP_RESET)
+        self.tell("state", linuxcnc.STATE_ON)
+        self.wait(lambda s: s.task_state == linuxcnc.STATE_ON)
+
+    def home(self, joints):
+        self.tell("mode", linuxcnc.MODE_MANUAL)
+        self.tell("teleop_enable", 0)
+        self.tell("home", -1)
+        self.wait(lambda s: all(s.homed[:joints]))
+        return self.by_hand("G21 G90 G49 G54 G94 G61")
+
+    def by_hand(self, block):
+        self.tell("mode", linuxcnc.MODE_MDI)
+        self.tell("mdi", block)
+        return self.position()
+
+    def program(self, name):
+        self.tell("mode", linuxcnc.MODE_AUTO)
+        self.tell("program_open", str(Path(name).resolve()))
+        self.command.auto(linuxcnc.AUTO_RUN, 0)
+        self.wait(lambda s: s.interp_state != linuxcnc.INTERP_IDLE)
+        return self.position()
+
+    def refusal(self, block):
+        """What LinuxCNC says to a move that must not begin."""
+        try:
+            self.by_hand(block)
+        except ToldError as told:
+            text = str(told)
+        else:
+            text = "went there"
+        time.sleep(0.1)
+        while self.errors.poll():  # there may be more than one
+            pass
+        return text
+
+
+def work(task, seen):
+    machine, joints = Machine(), task["joints"]
+    machine.switch_on(joints)
+    seen["home"] = machine.home(joints)
+    seen["by hand"] = machine.by_hand(task["by hand"])
+    seen["program"] = machine.program(task["program"])
+    seen["refused"] = {block: machine.refusal(block) for block in task["refused"]}
+    seen["at last"] = machine.position()
+
+
+def main():
+    task, seen = json.loads(Path("task.json").read_text()), {}
+    with Path("samples.txt").open("w") as file, subprocess.Popen(["halsampler"], stdout=file) as sampler:
+        try:
+            work(task, seen)
+        except ToldError as told:
+            seen["told"] = str(told)
+        time.sleep(DRAINING)
+        sampler.terminate()
+    Path("seen.json").write_text(json.dumps(seen))
+
+
+main()

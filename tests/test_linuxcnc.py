@@ -1,0 +1,352 @@
+"""LinuxCNC's kinematics of every machine, against the library and the geometry; and the files around it."""
+
+from __future__ import annotations
+
+import configparser
+import json
+import re
+import shutil
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from drawn import FAMILIES, draw, machine_of
+from geometry import Description
+from test_conformance import NAMES, SPREAD, everyone, poses_about
+from test_direct import CLOSE, allowed, garbage, legs_regularity, nudged
+
+import parakin as pk
+from parakin.cli import main
+from parakin.export.linuxcnc import configuration
+from parakin.kinematics.direct import roots, side_of
+
+sys.path.insert(0, str(Path(__file__).parent / "linuxcnc"))
+from stub import Stub, inward, outward, pose, world
+
+COUNT = 100_000
+
+
+@pytest.fixture(scope="module")
+def modules(tmp_path_factory):
+    """The kinematics module of every machine, built when asked for."""
+    if not shutil.which("gcc"):
+        pytest.skip("there is no gcc to build a kinematics module with")
+    stub, known = Stub(tmp_path_factory.mktemp("kins")), {}
+
+    def module_of(machine):
+        if machine.name not in known:
+            known[machine.name] = stub.built(machine)
+        return known[machine.name]
+
+    return module_of
+
+
+def beyond_the_drives(m, poses, joints):
+    """The least margin of all limits but the drives' own ranges, (n,); NaN where a leg can't close."""
+    drives = {f"{name}.{side}" for name in m.joints for side in ("min", "max")}
+    kept = [i for i, name in enumerate(m.limits) if name not in drives]
+    return m.margins(poses, joints)[:, kept].min(1, initial=np.inf)
+
+
+def same_pose(m, found, expected):
+    """Greatest error of places, mm, and of directions, (n,) each, whatever way an orientation is written."""
+    mm = np.array(m.axis_units) == "mm"
+    one, two = (directions(m, rows) for rows in (found, expected))
+    return np.abs(found - expected)[:, mm].max(1), np.abs(one - two).max((1, 2))
+
+
+def directions(m, poses):
+    """The tool's frame Rz(C)·Ry(B)·Rx(A), (n, 3, 3); of five axes only the tool's axis, (n, 3, 1)."""
+    turned = np.broadcast_to(np.eye(3), (len(poses), 3, 3))
+    for axis in "CBA":
+        if axis in m.axes:
+            turned = turned @ rotation(axis, poses[:, m.axes.index(axis)])
+    return turned[..., 2:] if m.axes[3:] == ("B", "C") else turned
+
+
+def rotation(axis, angle):
+    """Rotation about an axis, (n, 3, 3)."""
+    i, j = {"A": (1, 2), "B": (2, 0), "C": (0, 1)}[axis]
+    result = np.zeros((len(angle), 3, 3))
+    result[:, range(3), range(3)] = 1.0
+    result[:, i, i] = result[:, j, j] = np.cos(angle)
+    result[:, j, i], result[:, i, j] = np.sin(angle), -np.sin(angle)
+    return result
+
+
+# The inverse
+
+
+@everyone
+def test_the_inverse_is_the_librarys(m, modules):
+    poses = poses_about(m, COUNT)
+    expected = m.inverse(poses)
+    closing = np.isfinite(expected).all(1)
+    least = beyond_the_drives(m, poses, expected)
+    with np.errstate(invalid="ignore"):
+        good, sure = closing & (least >= 0.0), ~closing | (np.abs(least) > 1e-9)
+    last = np.where(closing[:, None], outward(m, expected), 0.0)
+    found, codes = modules(m).inverse(world(m, poses), last)
+    assert sure.mean() > 0.99
+    assert np.array_equal((codes == 0)[sure], good[sure])
+    assert (codes[~closing] == -1).all()
+    assert good.sum() > 5000
+    assert np.abs(found - outward(m, expected))[codes == 0].max() < 1e-9
+    assert np.array_equal(found[codes != 0], last[codes != 0])  # refused, it leaves the joints as they were
+
+
+def winding_path(m, count=20_000):
+    """Poses about home that turn on and on and swing through the pole of head and table."""
+    t = np.linspace(0.0, 1.0, count)[:, None]
+    some = np.array(SPREAD[m.name]) * 0.25
+    poses = m.home + some * np.sin(2.0 * np.pi * t * np.arange(3, 3 + len(some)) + np.arange(len(some)))
+    if m.axes[3:] == ("B", "C"):
+        poses[:, 3] = 0.3 * np.sin(9.0 * t[:, 0] + 0.3)
+        poses[:, 4] = 15.0 * t[:, 0]
+    return poses
+
+
+@everyone
+def test_a_path_is_followed_cycle_by_cycle(m, modules):
+    poses = winding_path(m)
+    free = slice(4000, 4100)
+    poses[free] = m.home  # where the first joint of a wrist is free
+    expected = m.follow(poses)
+    found, codes = modules(m).inverse_path(world(m, poses), outward(m, expected[0]))
+    assert (codes == 0).mean() > 0.9
+    if (codes == 0).all():
+        assert np.abs(found - outward(m, expected)).max() < 1e-7
+    if "B" in m.axes and len(m.axes) == 5:
+        assert (codes == 0).all()
+        assert np.abs(expected[:, -2:]).max() > np.pi  # it has counted turns
+        assert (expected[:, -2:] < -0.05).any() and (expected[:, -2:] > 0.05).any()
+
+
+@everyone
+def test_end_points_to_come_are_asked_with_joints_at_nought(m, modules):
+    poses = poses_about(m, 20_000, seed=3)
+    found, codes = modules(m).inverse(world(m, poses), np.zeros((len(poses), len(m.joints))))
+    good = codes == 0
+    assert good.mean() > 0.05
+    miss, tilt = Description.of(m.spec).misses(poses[good], inward(m, found[good]))
+    assert miss.max() < CLOSE
+    assert tilt.max() < 1e-11
+
+
+# The forward
+
+
+def placed(m, rows):
+    """Allowed poses in home's assembly mode, away from its singularities, with starts nearby that are in it too."""
+    poses = np.tile(allowed(m.name), (rows // len(allowed(m.name)) + 1, 1))[:rows]
+    starts = nudged(m, poses)
+    det, least = legs_regularity(m, np.vstack([poses, m.home + 1e-3]))
+    return poses, starts, (det[:-1] * det[-1] > 0.0) & (least[:-1] > 0.02)
+
+
+@everyone
+def test_the_forward_undoes_the_inverse_and_is_the_librarys(m, modules):
+    poses, starts, regular = placed(m, COUNT)
+    joints = m.inverse(poses)
+    rows, codes = modules(m).forward(outward(m, joints), world(m, starts))
+    found, done = pose(m, rows), codes == 0
+    assert regular.mean() > 0.5
+    assert done[regular].all()
+    place, turned = same_pose(m, found[regular], poses[regular])
+    assert place.max() < 1e-9
+    assert turned.max() < 1e-11
+    library = m.forward(joints, near=starts)
+    both = done & library.converged & regular
+    place, turned = same_pose(m, found[both], library.poses[both])
+    assert place.max() < 1e-9
+    assert turned.max() < 1e-11
+    assert (rows[~done] == world(m, starts)[~done]).all()  # refused, it leaves the pose as it was
+
+
+@everyone
+def test_a_forward_is_never_silently_wrong(m, modules):
+    mad = 10_000
+    joints = np.vstack([garbage(m, mad), m.inverse(allowed(m.name))])
+    home = np.tile(world(m, m.home[None]), (len(joints), 1))
+    with np.errstate(all="ignore"):
+        library = m.forward(joints, near=m.home)
+    rows, codes = modules(m).forward(outward(m, joints), home)
+    found, done = pose(m, rows), codes == 0
+    assert set(codes.tolist()) <= {0, -1}
+    assert not (done & ~library.converged)[mad:].any()
+    assert (done == library.converged).mean() > 0.999  # of joints that are none rounding decides now and then
+    miss, tilt = Description.of(m.spec).misses(found[done], joints[done])
+    size = 1.0 + np.abs(joints[done]).max(1) / 1e3
+    assert (miss / size).max() < CLOSE
+    assert tilt.max() < 1e-9
+    if not m.model.by_spheres:
+        sides = roots(m, found[done], joints[done], most=0, side=np.ones(1)).turned
+        assert (sides * side_of(m, m.home[None]) > 0.0).all()
+
+
+@everyone
+def test_joints_and_poses_of_nothing_do_no_harm(m, modules):
+    kinematics = modules(m)
+    at_home, home = outward(m, m.inverse(m.home)), world(m, m.home[None])[0]
+    nothing = [0.0, np.nan, np.inf, -np.inf, 1e300, -1e300, 5e-324]
+    joints = np.vstack([np.full(len(at_home), value) for value in nothing])
+    starts = np.vstack([np.full(9, value) for value in nothing])
+    for given in (home[None], np.zeros((1, 9)), starts[1:2], starts[4:5]):
+        rows, codes = kinematics.forward(joints, np.repeat(given, len(joints), 0))
+        found = codes == 0
+        assert not found[1:6].any()  # of zeros one or the other machine has a pose
+        miss, _ = Description.of(m.spec).misses(pose(m, rows[found]), inward(m, joints[found]))
+        assert miss.max(initial=0.0) < CLOSE
+    rows, codes = kinematics.forward(np.repeat(at_home[None], len(starts), 0), starts)
+    found = codes == 0
+    assert found[[1, 2, 3]].all()  # a start that is none: home's
+    assert np.abs(rows[1:4] - home).max() < 1e-7
+    _, codes = kinematics.inverse(starts[1:6], np.repeat(at_home[None], 5, 0))
+    assert (codes == -1).all()
+    _, codes = kinematics.inverse(np.repeat(home[None], 5, 0), joints[1:6])
+    assert set(codes.tolist()) <= {0, -1}
+
+
+@everyone
+def test_linuxcncs_own_home_has_no_turns(m, modules):
+    guess = world(m, m.home[None])
+    guess[:, 3:6] = 0.0
+    rows, codes = modules(m).forward(outward(m, m.inverse(m.home))[None], guess)
+    assert codes[0] == 0
+    assert np.abs(rows - world(m, m.home[None])).max() < 1e-7
+
+
+@everyone
+def test_a_path_of_poses_comes_back_as_it_was_written(m, modules):
+    poses = winding_path(m)
+    joints = m.follow(poses)
+    rows, codes = modules(m).forward_path(outward(m, joints), world(m, poses[:1])[0])
+    assert (codes == 0).all()
+    error = np.abs(rows - world(m, poses))
+    assert error[:, :3].max() < 1e-8
+    upright = np.abs(np.sin(poses[:, 3])) < 1e-4 if m.axes[3:] == ("B", "C") else np.zeros(len(poses), bool)
+    assert error[~upright].max() < 1e-6  # C's turns and B's sign are kept
+
+
+@pytest.mark.parametrize("family", sorted(FAMILIES))
+def test_drawn_machines(family, modules, tmp_path):
+    """A machine of every structure and leg kind, as a file of one's own."""
+    d, drawn = draw(family, 12, 2000)
+    m = machine_of(d, tmp_path)
+    m.spec.__dict__["name"] = f"drawn_{family.replace(' ', '_')}"
+    joints = m.inverse(drawn)
+    least = beyond_the_drives(m, drawn, joints)
+    with np.errstate(invalid="ignore"):
+        good = np.isfinite(joints).all(1) & (least > 1e-9)
+    assert good.sum() > 100
+    kinematics = modules(m)
+    found, codes = kinematics.inverse(world(m, drawn[good]), outward(m, joints[good]))
+    assert (codes == 0).all()
+    assert np.abs(found - outward(m, joints[good])).max() < 1e-8
+    back, codes = kinematics.forward(outward(m, joints[good]), world(m, nudged(m, drawn[good])))
+    done = codes == 0
+    assert done.mean() > 0.9
+    miss, tilt = d.misses(pose(m, back[done]), joints[good][done])
+    assert miss.max() < CLOSE
+    assert tilt.max() < 1e-9
+
+
+# The configuration
+
+
+def sections(text):
+    found = configparser.ConfigParser(strict=True, interpolation=None)
+    found.optionxform = str
+    found.read_string(text)
+    return found
+
+
+def numbers(text):
+    return np.array([float(word) for word in text.split()])
+
+
+@everyone
+def test_the_ini_says_what_the_machine_says(m):
+    files = configuration(m)
+    assert sorted(files) == sorted(f"{m.name}{end}" for end in ("_kins.c", ".ini", ".hal", ".tbl", ".md"))
+    ini = sections(files[f"{m.name}.ini"])
+    assert ini["KINS"]["KINEMATICS"] == f"{m.name}_kins"
+    assert int(ini["KINS"]["JOINTS"]) == len(m.joints)
+    assert ini["TRAJ"]["COORDINATES"].split() == list(m.axes)
+    assert np.abs(numbers(ini["TRAJ"]["HOME"]) - world(m, m.home[None])[0, :3]).max() < 1e-9
+    joints = [ini[f"JOINT_{i}"] for i in range(len(m.joints))]
+    at_home = np.array([float(joint["HOME"]) for joint in joints])
+    assert np.abs(at_home - outward(m, m.inverse(m.home))).max() < 1e-9
+    assert f"JOINT_{len(m.joints)}" not in ini
+    for joint, drive in zip(joints, m.model.drives, strict=True):
+        factor = np.degrees(1.0) if drive.unit == "rad" else 1.0
+        assert joint["TYPE"] == ("ANGULAR" if drive.unit == "rad" else "LINEAR")
+        assert joint["HOME_OFFSET"] == joint["HOME"]
+        ends = [float(joint["MIN_LIMIT"]), float(joint["MAX_LIMIT"])]
+        assert np.abs(np.array(ends) / factor - [drive.low, drive.high]).max() < 1e-9
+        for key, value in (("MAX_VELOCITY", drive.speed), ("MAX_ACCELERATION", drive.acceleration)):
+            assert float(joint[key]) > 0.0
+            assert not np.isfinite(value) or float(joint[key]) == pytest.approx(value * factor)
+
+
+@everyone
+def test_the_axes_hold_the_poses_that_the_machine_can_take(m):
+    ini = sections(configuration(m)[f"{m.name}.ini"])
+    ends = [[float(ini[f"AXIS_{axis}"][f"{end}_LIMIT"]) for axis in m.axes] for end in ("MIN", "MAX")]
+    scale = np.where(np.array(m.axis_units) == "rad", np.degrees(1.0), 1.0)
+    low, high = np.array(ends) / scale
+    poses = poses_about(m, 200_000, seed=9)
+    poses = poses[m.check(poses) == 0]
+    inside = ((poses >= low) & (poses <= high)).all(1)
+    assert inside.mean() > 0.999
+    assert (low < m.home).all() and (m.home < high).all()
+    assert (m.check(np.random.default_rng(4).uniform(low, high, (200_000, len(low)))) == 0).any()
+
+
+def test_what_a_description_leaves_open_is_chosen_and_said():
+    text = configuration(pk.load("hexapod"))["hexapod.ini"]
+    joint = text[text.index("[JOINT_0]") : text.index("[JOINT_1]")]
+    assert "does not say it: acceleration\n" in joint
+    assert "MAX_VELOCITY = 500\n" in joint
+    text = configuration(pk.load("linear_delta"))["linear_delta.ini"]
+    assert "does not say it" not in text
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_the_module_is_under_the_gpl_and_names_itself(name):
+    text = configuration(pk.load(name))[f"{name}_kins.c"]
+    assert "GNU General Public" in text.split("*/")[0]
+    assert 'MODULE_LICENSE("GPL")' in text
+    assert f'#define MODULE "{name}_kins"' in text
+    assert not re.search(r"\b(inf|nan)\b", text)
+    assert text.count("{") == text.count("}")
+
+
+# The command
+
+
+def test_the_command_writes_the_files(tmp_path, capsys):
+    assert main(["linuxcnc", "tricept", "-o", str(tmp_path / "out")]) == 0
+    files = configuration(pk.load("tricept"))
+    assert sorted(path.name for path in (tmp_path / "out").iterdir()) == sorted(files)
+    for name, text in files.items():
+        assert (tmp_path / "out" / name).read_text(encoding="utf-8") == text
+    assert capsys.readouterr().out.splitlines() == [str(tmp_path / "out" / name) for name in files]
+
+
+def test_the_commands_folder_json_and_sizes(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    assert main(["linuxcnc", "hbg80_2d", "--json", "--set", "l1=410mm"]) == 0
+    said = json.loads(capsys.readouterr().out)
+    assert said["schema"] == "parakin.linuxcnc/1"
+    assert all(Path(path).parent == Path("hbg80_2d") and Path(path).is_file() for path in said["files"])
+    assert repr(410.0**2) in Path("hbg80_2d/hbg80_2d_kins.c").read_text()
+
+
+@pytest.mark.parametrize("arguments", [["nothing"], ["hexapod", "--set", "tool=1"], ["hexapod", "-o", "/dev/null/x"]])
+def test_what_the_command_refuses(arguments, capsys):
+    assert main(["linuxcnc", *arguments]) == 2
+    said = capsys.readouterr()
+    assert said.out == ""
+    assert said.err.count("\n") == 1

@@ -108,7 +108,7 @@ every_case = pytest.mark.parametrize("case", CASES)
 def program(case):
     trace = alg.Trace()
     inputs = trace.inputs(COUNT)
-    op, args, _ = CASES[case]
+    op, args, k = CASES[case]
     node = trace.node(op, tuple(inputs[i] for i in args), k)
     return IntervalProgram(trace, [node]), node
 

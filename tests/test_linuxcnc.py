@@ -7,6 +7,7 @@ import json
 import re
 import shutil
 import sys
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -269,7 +270,7 @@ def numbers(text):
 @everyone
 def test_the_ini_says_what_the_machine_says(m):
     files = configuration(m)
-    assert sorted(files) == sorted(f"{m.name}{end}" for end in ("_kins.c", ".ini", ".hal", ".tbl", ".md"))
+    assert sorted(files) == sorted(f"{m.name}{end}" for end in ("_kins.c", ".ini", ".hal", ".tbl", ".ngc", ".md"))
     ini = sections(files[f"{m.name}.ini"])
     assert ini["KINS"]["KINEMATICS"] == f"{m.name}_kins"
     assert int(ini["KINS"]["JOINTS"]) == len(m.joints)
@@ -302,6 +303,27 @@ def test_the_axes_hold_the_poses_that_the_machine_can_take(m):
     assert inside.mean() > 0.999
     assert (low < m.home).all() and (m.home < high).all()
     assert (m.check(np.random.default_rng(4).uniform(low, high, (200_000, len(low)))) == 0).any()
+
+
+@everyone
+def test_the_first_program_stays_inside(m):
+    text = configuration(m)[f"{m.name}.ngc"]
+    blocks = [re.findall(r"([XYZABC])(\S+)", line) for line in text.splitlines() if line.startswith("G1")]
+    assert all([letter for letter, _ in block] == list(m.axes) for block in blocks)
+    scale = np.where(np.array(m.axis_units) == "rad", np.degrees(1.0), 1.0)
+    poses = np.array([[float(value) for _, value in block] for block in blocks]) / scale
+    assert np.abs(poses[[0, -1]] - m.home).max() < 1e-9
+    assert np.ptp(poses, axis=0)[:2].min() > 10.0
+    way = np.concatenate([a + np.linspace(0.0, 1.0, 200)[:, None] * (b - a) for a, b in pairwise(poses)])
+    assert (m.check(way) == 0).all()
+
+
+def test_a_program_for_a_home_in_a_corner(tmp_path):
+    text = (Path(pk.__file__).parent / "machines" / "hbg80_2d.yaml").read_text(encoding="utf-8")
+    path = tmp_path / "corner.yaml"
+    path.write_text(text.replace("-400 mm, 200 mm", "-97.3 mm, 200 mm").replace("hbg80_2d", "corner"), encoding="utf-8")
+    m = pk.load(path)
+    assert 0 < len(re.findall("^G1", configuration(m)["corner.ngc"], re.M)) <= 7
 
 
 def test_what_a_description_leaves_open_is_chosen_and_said():

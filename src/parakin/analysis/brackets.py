@@ -108,7 +108,9 @@ class _Search:
         upper, toward = _of_quotient(self.divisor(low, high), self.dividend(low, high), axis)
         middle = 0.5 * (low + high)
         leader = int(upper.argmax())
-        tried = middle[leader] + 0.5 * toward[leader] * (high - low)[leader]
+        tried = np.where(
+            toward[leader] < 0.0, low[leader], np.where(toward[leader] > 0.0, high[leader], middle[leader])
+        )
         self.tried(np.concatenate([tried[None], middle[leader][None], middle[:: max(1, len(middle) // 8)]]))
         return upper, axis
 

@@ -9,9 +9,12 @@ from functools import cached_property
 import numpy as np
 
 from .. import algebra as alg
-from ..algebra import Scalar, Term, Trace, absolute, derivative, larger, needed, smaller
+from ..algebra import Scalar, Term, Trace, absolute, derivative, larger, needed, norm, smaller, sub
 from ..kernels.intervals import IntervalProgram
 from ..machine import Machine
+from ..model.parts import ROTATIONS
+
+_ROUNDING = 1e-12  # relative, of what limits are found to imply
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,7 +99,37 @@ class Slice:
         x, turns = self.inputs[:d], self.inputs[d:]
         kept = [(limit.name, g) for limit, g in margins if limit.name not in without]
         found = [Constraint(name, g, x, turns) for name, g in kept]
-        return found + [Constraint(name, g, x, turns, implied=True) for name, g in _across_the_jump(kept)]
+        implied = [*_across_the_jump(kept), *self._about_the_feet(without)]
+        return found + [Constraint(name, g, x, turns, implied=True) for name, g in implied]
+
+    def _about_the_feet(self, without: Sequence[str]) -> list[tuple[str, Scalar]]:
+        """How near the legs hold the platform's origin, however it is turned.
+
+        With a central leg the rotation follows from the place, and near the axis of its first turn nothing is known of
+        it: there this still tells how far the machine can reach.
+        """
+        spec = self.machine.spec
+        if spec.motion[0] not in ROTATIONS:
+            return []
+        with np.errstate(all="ignore"):
+            _, placed, _ = self.machine.model.invert(self.pose, self.mode)
+        found = []
+        for leg in spec.legs:
+            low = [-np.inf if f"{drive.name}.min" in without else drive.low for drive in leg.drives]
+            high = [np.inf if f"{drive.name}.max" in without else drive.high for drive in leg.drives]
+            trace = Trace()
+            sphere = leg.sphere(list(trace.inputs(len(low))))
+            if sphere is None:
+                continue
+            centre, radius = sphere
+            down, up = (
+                ends[0] for ends in IntervalProgram(trace, [*centre, radius])(np.array([low]), np.array([high]))
+            )
+            if np.isfinite(down[:3]).all() and np.isfinite(up).all():
+                middle, half = 0.5 * (down + up)[:3], 0.5 * (up - down)[:3]
+                most = (up[3] + np.linalg.norm(half) + np.linalg.norm(leg.platform)) * (1.0 + _ROUNDING)
+                found.append((leg.drives[0].name, most - norm(sub(placed.origin, middle.tolist()))))
+        return found
 
 
 def _across_the_jump(margins: Sequence[tuple[str, Scalar]]) -> list[tuple[str, Scalar]]:

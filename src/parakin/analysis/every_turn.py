@@ -44,7 +44,7 @@ class EveryTurn(Subdivision):
             items = items.take(~gone[items.cell])
             found = bounds(constraint, low, size, items, every=True)
             gone[items.cell[found.state == EXCLUDED]] = True
-            vague = items.take(~np.all(np.isfinite(found.spread), axis=1))  # too wide to tell of its middle; look there alone
+            vague = items.take(~np.all(np.isfinite(found.spread), axis=1))  # too wide to tell of its middle: look there
             middle = 0.5 * (vague.low + vague.high)
             there = bounds(constraint, low, size, replace(vague, low=middle, high=middle), every=True)
             gone[vague.cell[there.state == EXCLUDED]] = True

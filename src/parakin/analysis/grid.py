@@ -25,7 +25,7 @@ class GridWorkspace(Swept):
 
     coordinates : each axis's, mm, of the cells' middles
     broken : as many numbers as coordinates, 0 where the place is allowed, else 1 + the index in ``region.limits`` of
-        the first limit broken: with every turn, in the first turn sample that breaks one; with some, in their middle
+        the first limit broken: with every turn, in the first turn sample that breaks one; with some, near the middle
     """
 
     coordinates: tuple[Array, ...]

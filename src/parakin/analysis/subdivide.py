@@ -28,6 +28,7 @@ Indices = NDArray[np.int64]
 FIRST = 8  # cells along the longest side of the first box
 MOST = 3_000_000  # cells open at a time
 AT_ONCE = 8192  # cells refined together
+OUTERMOST = 20_000  # cells refined for a closer box about all of them
 _FEW = 64  # where the time is short
 _FINEST = 2.0**-24  # of the first cells: below this the numbers have no digits left
 _DIGITS = 26  # binary, of the first cells' corners; the others are for their parts
@@ -253,6 +254,23 @@ class Subdivision(ABC):
 
     def cells(self, stopped: str) -> Cells:
         return replace(joined([*self.done, self.open]), stopped=stopped, rounds=self.rounds)
+
+    def tighten(self, share: float, deadline: float = inf) -> tuple[Array, Array] | None:
+        """Refine the outermost cells until none is larger than a share of the box about all cells: that box, or None.
+
+        Faces along which very many cells lie are left as they are.
+        """
+        while True:
+            cells, left = self.cells("gap"), self.open
+            if not len(cells.low):
+                return None
+            low, high = cells.low.min(0), (cells.low + cells.size).max(0)
+            slack = 1e-9 * (high - low)
+            outermost = (left.low <= low + slack) | (left.low + left.size >= high - slack)
+            coarse = np.flatnonzero(outermost.any(1) & (left.size.max(1) > (high - low).max() * share))
+            if not len(coarse) or len(coarse) > OUTERMOST or time.monotonic() > deadline:
+                return low, high
+            self.refine(coarse)
 
     def run(
         self,

@@ -90,18 +90,7 @@ def surroundings(asked: Region) -> tuple[Array, Array] | None:
     box = asked.extent
     if box is None:
         return None
-    work = asked.subdivision(*box)
-    while True:
-        cells, left = work.cells("gap"), work.open
-        if not len(cells.low):
-            return None
-        low, high = cells.low.min(0), (cells.low + cells.size).max(0)
-        slack = 1e-9 * (high - low)
-        outermost = (left.low <= low + slack) | (left.low + left.size >= high - slack)
-        coarse = np.flatnonzero(outermost.any(1) & (left.size.max(1) > (high - low).max() / _FINE))
-        if not len(coarse):
-            return low, high
-        work.refine(coarse)
+    return asked.subdivision(*box).tighten(1.0 / _FINE)
 
 
 def centres(low: float, high: float, step: float) -> Array:
@@ -111,10 +100,10 @@ def centres(low: float, high: float, step: float) -> Array:
 
 
 class FirstBroken:
-    """The first limit broken at many places, by name of ``asked.limits``: 0 where none is, else 1 + its index.
+    """The first limit broken at many places: 0 where none is, else 1 + its index in ``asked.limits``.
 
-    With every turn it is the first one broken in the first turn sample that breaks one, with some turn (where all
-    samples break one) the one of the range's middle.
+    With every turn it is the first one broken in the first turn sample that breaks one; with some turn, where all
+    samples break one, it is that of the sample nearest the middle.
     """
 
     def __init__(self, asked: Region, turns_step: float | None = None):

@@ -6,7 +6,7 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from math import isfinite
+from math import inf, isfinite
 from typing import Any
 
 import numpy as np
@@ -16,6 +16,7 @@ from ..machine import Array, Machine
 from .region import Region, Span, region
 from .subdivide import Cells
 
+CLOSE = 1.0 / 128.0  # of the box: the cells against which it rests
 ROUNDING = 1e-9  # relative, of the sums of volumes
 
 
@@ -151,8 +152,11 @@ def workspace(
     if extent is None:
         return Workspace(asked, nothing(len(asked.places)), "gap", parameters)
     rest = None if seconds is None else seconds - (time.monotonic() - began)
-    cells = asked.subdivision(*extent).run(gap, cell, rest, progress)
-    return Workspace(asked, cells, cells.stopped, parameters)
+    work = asked.subdivision(*extent)
+    stopped = work.run(gap, cell, rest, progress).stopped
+    if stopped == "gap":
+        work.tighten(CLOSE, began + (inf if seconds is None else seconds))
+    return Workspace(asked, work.cells(stopped), stopped, parameters)
 
 
 def question(asked: Region) -> dict[str, Any]:

@@ -133,6 +133,8 @@ def _cuts(
         if axis not in asked.places or len(asked.places) < 2:
             raise InputError(f"{axis} is no place to cut at, {' '.join(asked.places)} are left", "--slice")
         held.append((axis, parse_value(axis, value, "--slice")))
+        if held[-1] in held[:-1]:
+            raise InputError(f"{shown(text)} is given twice", "--slice")
     if not slices and len(asked.places) < 3:
         return [asked]
     if not slices:

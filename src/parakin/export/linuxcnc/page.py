@@ -17,6 +17,7 @@ For LinuxCNC 2.9, as a simulation without hardware.
 | `{name}.ini` | ranges, speeds and home |
 | `{name}.hal` | loops in the place of drives |
 | `{name}.tbl` | the tool |
+| `{name}.ngc` | a first program: a square about home |
 
 Install the kinematics once and start:
 

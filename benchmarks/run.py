@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import feed
 import kinematics
 import post
 import startup
 import workspace
 
 if __name__ == "__main__":
-    for benchmark in (kinematics, post, startup, workspace):
+    for benchmark in (kinematics, post, startup, workspace, feed):
         print(benchmark.main(), flush=True)

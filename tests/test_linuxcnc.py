@@ -230,6 +230,16 @@ def test_a_path_of_poses_comes_back_as_it_was_written(m, modules):
     assert error[~upright].max() < 1e-6  # C's turns and B's sign are kept
 
 
+@pytest.mark.parametrize("name", ["tricept", "orthoglide5_head", "orthoglide5_table"])
+def test_an_upright_tool_keeps_its_last_c(name, modules):
+    m = pk.load(name)
+    start = world(m, m.home[None])
+    start[:, 5] = 250.0
+    rows, codes = modules(m).forward(outward(m, m.inverse(m.home))[None], start)
+    assert codes[0] == 0
+    assert np.abs(rows - start).max() < 1e-7
+
+
 @pytest.mark.parametrize("family", sorted(FAMILIES))
 def test_drawn_machines(family, modules, tmp_path):
     """A machine of every structure and leg kind, as a file of one's own."""

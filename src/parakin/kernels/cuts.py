@@ -56,7 +56,7 @@ def share(b, slopes, room):
         return 1.0, 1.0
     if b < -total:
         return 0.0, 0.0
-    if not b == b:
+    if b != b:
         return 0.0, 1.0
     n, flat = 0, 0.0
     for slope in slopes:

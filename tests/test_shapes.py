@@ -225,7 +225,7 @@ def test_cross_sections_of_a_lens(lens):
     heights = [-290.0, -100.0, 0.0, 250.0, 310.0]
     for section, z in zip(sections(whole, "Z", heights), heights, strict=True):
         assert (section.axis, section.value, section.places) == ("Z", z, ("X", "Y"))
-        assert section.area == pytest.approx(overlap(sqrt(500**2 - z**2), 800), rel=1e-3)
+        assert section.area == pytest.approx(overlap(sqrt(500**2 - z**2), 800), rel=1e-3, abs=30.0)  # mm², at the tips
         for outline in section.outlines:
             assert (outline[0] == outline[-1]).all()
     across = sections(whole, "X", [60.0])[0]

@@ -2,23 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-from math import asin, cos, inf, nan, pi, radians, sin, sqrt
-from pathlib import Path
-
 from itertools import product
+from math import cos, inf, pi, radians, sin, sqrt
+from pathlib import Path
 
 import numpy as np
 import pytest
-from drawn import FAMILIES, draw, machine_of
 
 import parakin as pk
-from parakin.analysis import subdivide
 from parakin.analysis.region import region
 from parakin.analysis.workspace import workspace
-from parakin.errors import PoseError
-from parakin.kernels.intervals import IntervalProgram
-from parakin.machine import Machine
 
 MACHINES = Path(__file__).parent / "machines"
 SHIPPED = {name: pk.load(name) for name in pk.machines()}
@@ -141,8 +134,11 @@ class Raster:
             size = 2.0 * size
         corner = cells.low[(cells.size >= 0.99 * size).all(1).argmax()]  # of a cell no finer: it lies on the lattice
         low = corner - np.ceil((corner - low) / size - 1e-6) * size
-        self.size, self.low = size, low - 3.0 * size
-        shape = np.round((high - low) / size).astype(int) + 7
+        anchor = cells.size[:, 0].argmax()
+        assert (size <= cells.size[anchor]).all()  # else cells may lie across voxels
+        self.size = size
+        self.low = cells.low[anchor] - size * (np.ceil((cells.low[anchor] - low) / size - 1e-6) + 3.0)
+        shape = np.ceil((high - self.low) / size - 1e-6).astype(int) + 3
         self.state = np.zeros(shape, np.int8)
         self.cell = np.full(shape, -1)
         first = np.floor((cells.low - self.low) / size + 1e-6).astype(int)

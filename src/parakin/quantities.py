@@ -38,9 +38,7 @@ ACCELERATION = Kind((1, 0, -2), "an acceleration", "mm/s2, m/s2, in/s2")
 SPINNING = Kind((0, 1, -2), "an angular acceleration", "deg/s2, rad/s2")
 JERK = Kind((1, 0, -3), "a jerk", "mm/s3, m/s3, in/s3")
 ANGULAR_JERK = Kind((0, 1, -3), "an angular jerk", "deg/s3, rad/s3")
-_KINDS = {
-    k.dimension: k for k in (NUMBER, LENGTH, ANGLE, SPEED, TURNING, ACCELERATION, SPINNING, JERK, ANGULAR_JERK)
-}
+_KINDS = {k.dimension: k for k in (NUMBER, LENGTH, ANGLE, SPEED, TURNING, ACCELERATION, SPINNING, JERK, ANGULAR_JERK)}
 
 
 @dataclass(frozen=True)

@@ -17,7 +17,11 @@ def _shares(c, place, step, q, bend, limits, most, which, along, across):
         it, and where ṡ has
     """
     h = step[c]
-    most[:], which[:], along[:], across[:] = 0.0, 0, 0.0, 0.0
+    for n in range(3):
+        for k in range(len(place)):
+            most[k, n], which[k, n] = 0.0, 0
+    for n in range(2):
+        along[n] = across[n] = 0.0
     speed, acceleration, jerk = limits
     for j in range(q.shape[1]):
         bend0, third = bend[c, j], (bend[c + 1, j] - bend[c, j]) / h
@@ -68,7 +72,8 @@ def judged(step, q, bend, feed, limits, pieces, first, last, slower, gentler, bi
     place, along, across = np.empty((_PLACES, 4)), np.empty(2), np.empty(2)
     most, which = np.empty((_PLACES, 3)), np.empty((_PLACES, 3), np.int64)
     joints, worst, before = q.shape[1], 0.0, 0.0
-    slower[cell[first] : cell[last - 1] + 1] = 0.0
+    for c in range(cell[first], cell[last - 1] + 1):
+        slower[c] = 0.0
     for p in range(first, last):
         c, dt, v, a, e = cell[p], time[p + 1] - time[p], speed[p], rise[p], jerk[p]
         per_feed, fastest, fed = 1.0 / np.sqrt(feed[c]), 0.0, 0.0
@@ -85,7 +90,9 @@ def judged(step, q, bend, feed, limits, pieces, first, last, slower, gentler, bi
         before, name = _greatest(_PLACES - 1, fed, most, which, joints)
         if p == last - 1 or cell[p + 1] != c:
             binding[c + 1] = name
-        swift = max(fastest, most[:, 0].max(), np.sqrt(across[0]), np.cbrt(across[1]))
+        swift = max(fastest, np.sqrt(across[0]), np.cbrt(across[1]))
+        for k in range(_PLACES):
+            swift = max(swift, most[k, 0])
         slower[c] = max(slower[c], swift)
         gentler[p] = max(np.sqrt(along[0]), np.cbrt(along[1]))
         worst = max(worst, swift, gentler[p])

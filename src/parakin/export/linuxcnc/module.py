@@ -79,8 +79,9 @@ def _numbers(machine: Machine, name: str) -> str:
         *_newton(machine),
         _array("double", "home", [number(value) for value in machine.home]),
         _array("int", "turning", [str(int(unit == "rad")) for unit in machine.joint_units]),
-        _array("int", "turning_axis", [str(int(unit == "rad")) for unit in machine.axis_units]),
     ]
+    if not tool_axis:
+        lines.append(_array("int", "turning_axis", [str(int(unit == "rad")) for unit in machine.axis_units]))
     return "\n".join(lines) + "\n"
 
 

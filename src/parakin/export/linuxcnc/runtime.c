@@ -1,8 +1,8 @@
 /* What every machine shares. Above stand its numbers and its mathematics; here is how LinuxCNC asks for them.
 
-   Both functions keep nothing from one call to the next: LinuxCNC hands the last joints to the inverse and the last pose
-   to the forward, and that is what they stay near to. It also calls them for the end points of moves to come, which
-   would spoil a memory. Nothing allocates, and every loop has an end. */
+   Both functions keep nothing from one call to the next: LinuxCNC hands the last joints to the inverse and the last
+   pose to the forward, and that is what they stay near to. It asks the inverse for the end points of moves to come as
+   well, with joints of nought, which would spoil a memory. Nothing allocates, and every loop has an end. */
 
 static double within_half_a_turn(double angle, double near)
 {
@@ -191,15 +191,6 @@ static void settle(double *x, const double *near)
 #endif
 }
 
-/* LinuxCNC's first guess is the home of its ini file, which has no turns. */
-static int is_bare_home(const double *x)
-{
-    for (int i = 0; i < AXES; i++)
-        if (!(fabs(x[i] - (turning_axis[i] ? 0.0 : home[i])) < 1e-6))
-            return 0;
-    return 1;
-}
-
 int kinematicsForward(const double *joints, EmcPose *world,
                       const KINEMATICS_FORWARD_FLAGS *fflags, KINEMATICS_INVERSE_FLAGS *iflags)
 {
@@ -210,7 +201,7 @@ int kinematicsForward(const double *joints, EmcPose *world,
     read_pose(world, near);
     if (!finite_all(q, JOINTS))
         return -1;
-    if (!finite_all(near, AXES) || is_bare_home(near) || !pose_near(near, q, x)) {
+    if (!finite_all(near, AXES) || !pose_near(near, q, x)) { /* or from home, whose turns LinuxCNC's guess has not */
         for (int i = 0; i < AXES; i++)
             near[i] = home[i];
         if (!pose_near(near, q, x))

@@ -1,0 +1,95 @@
+"""The feed planner: a million records on the Tricept, and 100,000 rows of smooth paths against toppra."""
+
+from __future__ import annotations
+
+import logging
+from dataclasses import replace
+from importlib.util import find_spec
+
+import numpy as np
+from measure import best, table
+from post import numbers
+
+import parakin as pk
+from parakin.kernels.splines import bends
+from parakin.kernels.timing import backward, ceilings, forward
+from parakin.machine import Machine
+from parakin.toolpath.feed import plan
+from parakin.toolpath.post import post
+from parakin.toolpath.program import ToolPath
+from parakin.toolpath.result import Posted
+
+ROWS, JOINTS = 100_000, 6
+
+
+def million() -> Posted:
+    """The path of the benchmark of ``post``, on a Tricept with limits."""
+    spec = pk.load("tricept").spec
+    legs = tuple(
+        replace(leg, drives=tuple(replace(d, speed=1000.0, acceleration=5000.0) for d in leg.drives))
+        for leg in spec.legs
+    )
+    head = tuple(
+        s if s.drive is None else replace(s, drive=replace(s.drive, speed=3.0, acceleration=30.0)) for s in spec.head
+    )
+    values = numbers()
+    n = len(values)
+    lines, rapid = np.arange(n), np.zeros(n, bool)
+    path = ToolPath("", values[:, :3], values[:, 3:], lines, rapid, np.full(n, 2000.0), np.full(n, np.nan))
+    return post(Machine(replace(spec, legs=legs, head=head)), path)
+
+
+def quickest(s: np.ndarray, q: np.ndarray, speed: np.ndarray, acceleration: np.ndarray) -> float:
+    """The cycle time of the quickest law through rows of joints."""
+    step = np.diff(s)
+    n, bend = len(step), np.empty_like(q)
+    bends(step, q, bend, np.empty(n + 1))
+    left, right, u, reachable, x = (np.empty(k) for k in (n, n, n, n + 1, n + 1))
+    ceilings(step, q, bend, speed, np.full(n, np.inf), np.inf, left, right, 0, n)
+    top = np.minimum(np.append(left, 0.0), np.append(0.0, right))
+    backward(step, q, bend, acceleration, np.ones(n), top, reachable, 0, n)
+    forward(step, q, bend, acceleration, np.ones(n), reachable, x, u, 0, n)
+    speeds = np.sqrt(x)
+    return float((2.0 * step / (speeds[1:] + speeds[:-1])).sum())
+
+
+def against_toppra() -> list[list[str]]:
+    """Rows of the table: planning only, the path being evaluated for both beforehand."""
+    import toppra
+    from scipy.interpolate import CubicSpline
+
+    logging.getLogger("toppra").setLevel(logging.ERROR)
+    rng, rows = np.random.default_rng(1), []
+    for waypoints in (10, 1000):
+        points = rng.uniform(-1.0, 1.0, (waypoints, JOINTS))
+        ends, s = np.linspace(0.0, 1.0, waypoints), np.linspace(0.0, 1.0, ROWS + 1)
+        speed, acceleration = rng.uniform(1.0, 3.0, JOINTS), rng.uniform(2.0, 20.0, JOINTS)
+        limits = [
+            toppra.constraint.JointVelocityConstraint(np.stack([-speed, speed], 1)),
+            toppra.constraint.JointAccelerationConstraint(np.stack([-acceleration, acceleration], 1)),
+        ]
+        limits[1].set_discretization_type(toppra.constraint.DiscretizationType.Interpolation)
+        path = toppra.SplineInterpolator(ends, points)
+        planner = toppra.algorithm.TOPPRA(limits, path, gridpoints=s, solver_wrapper="seidel")
+        theirs = best(lambda: planner.compute_parameterization(0.0, 0.0), 3)  # noqa: B023
+        v = planner.compute_parameterization(0.0, 0.0)[1]
+        their_time = float((2.0 * np.diff(s) / (v[1:] + v[:-1])).sum())
+        q = CubicSpline(ends, points)(s)
+        ours = best(lambda: quickest(s, q, speed, acceleration), 5)  # noqa: B023
+        longer = quickest(s, q, speed, acceleration) / their_time
+        what = f"{ROWS:,} rows, {waypoints} waypoints: "
+        rows.append([what + "toppra", f"{theirs:.3f}", "1.0", "", "1.0000", ""])
+        rows.append([what + "parakin", f"{ours:.4f}", f"{theirs / ours:.1f}", "≥ 20", f"{longer:.4f}", "≤ 1.02"])
+    return rows
+
+
+def main() -> str:
+    posted = million()
+    seconds = best(lambda: plan(posted), 1)
+    rows = [[f"{len(posted.path):,} records on the Tricept (≤ 10 s)", f"{seconds:.2f}", "", "", "", ""]]
+    rows += against_toppra() if find_spec("toppra") else [["toppra is not installed", "", "", "", "", ""]]
+    return table("Feed planning", ["what", "s", "times as fast", "bound", "cycle time", "bound"], rows)
+
+
+if __name__ == "__main__":
+    print(main())

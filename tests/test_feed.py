@@ -1,0 +1,409 @@
+"""The feed planner: every law sampled at 1 kHz against every limit, closed forms, and toppra."""
+
+import logging
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import parakin as pk
+from parakin.errors import InputError, PoseError
+from parakin.kernels.splines import bends
+from parakin.kernels.timing import backward, ceilings, forward
+from parakin.machine import Machine
+from parakin.toolpath.feed import plan
+from parakin.toolpath.feed.course import Drives
+from parakin.toolpath.post import post
+from parakin.toolpath.program import ToolPath
+
+INF = np.inf
+BEYOND = 1.001  # times a limit
+TOLERANCE, AXIS_TOLERANCE = 0.01, 1e-3
+MIDDLE = {
+    "hbg80_2d": (230, 230, 0), "hbg80_3d": (80, 80, -120), "hexapod": (0, 0, -950), "lambda6": (0, 0, 1400),
+    "linear_delta": (0, 0, 280), "orthoglide": (0, 0, 0), "orthoglide5_head": (0, 0, -100),
+    "orthoglide5_table": (0, 0, 0), "tricept": (0, 0, -1650),
+}  # fmt: skip
+everyone = pytest.mark.parametrize("name", sorted(MIDDLE))
+
+
+def limited(machine, *, mm=(INF, INF, INF), rad=(INF, INF, INF), only=None):
+    """The machine with these speeds, accelerations and jerks, of the joints ``only``; the others have none."""
+
+    def drive(old):
+        if old is None:
+            return None
+        values = (mm if old.unit == "mm" else rad) if only is None or old.name in only else (INF, INF, INF)
+        return replace(old, speed=values[0], acceleration=values[1], jerk=values[2])
+
+    spec = machine.spec
+    legs = tuple(replace(leg, drives=tuple(drive(d) for d in leg.drives)) for leg in spec.legs)
+    head, table = (tuple(replace(s, drive=drive(s.drive)) for s in steps) for steps in (spec.head, spec.table))
+    return Machine(replace(spec, legs=legs, head=head, table=table))
+
+
+def posted(machine, tip, axis=(0.0, 0.0, 1.0), feed=6000.0, rapid=False, seconds=None):
+    n = len(tip)
+    axis = np.broadcast_to(np.asarray(axis, float), (n, 3))
+    feeds, rapids = np.broadcast_to(np.asarray(feed, float), n), np.broadcast_to(rapid, n)
+    lines, spindle = np.arange(1, n + 1), np.full(n, np.nan)
+    tip = np.asarray(tip, float)
+    return post(machine, ToolPath("part.apt", tip, axis, lines, rapids, feeds, spindle, seconds=seconds))
+
+
+def axis_of(b, c):
+    return np.stack(np.broadcast_arrays(np.sin(b) * np.cos(c), np.sin(b) * np.sin(c), np.cos(b)), axis=-1)
+
+
+def drawn(name, seed, jerk=False):
+    """A random path and random limits: long and short motions, sharp and blunt corners, records that repeat."""
+    rng = np.random.default_rng([seed, sorted(MIDDLE).index(name)])
+    acceleration = 10.0 ** rng.uniform(2.3, 4.0)
+    ramp = 10.0 ** rng.uniform(-2.5, -1.0) if jerk else 0.0
+    limits = []
+    for low, high, share in ((1.3, 2.7, 1.0), (-0.5, 0.7, 1.0 / 70.0)):
+        a = acceleration * share
+        limits.append((10.0 ** rng.uniform(low, high), a, a / ramp if ramp else INF))
+    machine = limited(pk.load(name), mm=limits[0], rad=limits[1])
+    n = int(rng.integers(2, 14))
+    strides = rng.normal(0.0, 10.0 ** rng.uniform(-1.0, 1.3), (n, 3))
+    strides *= rng.choice([1.0, 0.01, 0.0], (n, 1), p=[0.8, 0.15, 0.05])
+    tip = np.array(MIDDLE[name], float) + 25.0 * np.sin(np.cumsum(strides, axis=0) / 25.0)
+    if "Z" not in machine.axes:
+        tip[:, 2] = 0.0
+    axis = (0.0, 0.0, 1.0)
+    if "B" in machine.axes:
+        b = 0.25 + 0.15 * np.sin(np.cumsum(rng.normal(0.0, 0.3, n)))
+        axis = axis_of(b, np.cumsum(rng.normal(0.0, 0.2, n)))
+    result = posted(machine, tip, axis, 10.0 ** rng.uniform(2.0, 4.3, n))
+    assert not result.off
+    return result
+
+
+def tips(machine, poses):
+    return poses[:, [i for i, axis in enumerate(machine.axes) if axis in "XYZ"]]
+
+
+def axes_of(machine, poses):
+    """The tool's axis at each pose, Rz(C)·Ry(B)·Rx(A)·z."""
+    a, b, c = (poses[:, machine.axes.index(k)] if k in machine.axes else np.zeros(len(poses)) for k in "ABC")
+    x, y, z = np.sin(b) * np.cos(a), -np.sin(a), np.cos(b) * np.cos(a)
+    return np.stack([np.cos(c) * x - np.sin(c) * y, np.sin(c) * x + np.cos(c) * y, z], 1)
+
+
+def distance(points, line):
+    """How far points are at most from a polyline."""
+    start, way = line[:-1], np.diff(line, axis=0)
+    square = np.maximum((way * way).sum(1), 1e-300)
+    off = points[:, None] - start
+    share = np.clip((off * way).sum(2) / square, 0.0, 1.0)
+    return np.sqrt(((off - share[..., None] * way) ** 2).sum(2).min(1).max())
+
+
+def strayed(machine, points):
+    """How far joints are from those of the poses, in shares of the tolerances; head and table in either mode."""
+    modes = [machine.mode]
+    if machine.model.first_serial is not None:
+        modes = [machine.mode[:-1] + sign for sign in "+-"]
+    turning = np.array(machine.joint_units) == "rad"
+    off = [machine.inverse(points.poses, mode) - points.joints for mode in modes]
+    turned = [np.where(turning, (d + np.pi) % (2.0 * np.pi) - np.pi, d) for d in off]
+    shares = [np.abs(d) / np.where(turning, AXIS_TOLERANCE, TOLERANCE) for d in turned]
+    return np.min([d.max(1) for d in shares], axis=0).max()
+
+
+def hold(law, rate=1000.0):
+    """Every limit holds for the setpoints' differences, and the path is kept."""
+    points, machine, path = law.sampled(rate), law.posted.machine, law.posted.path
+    drives = Drives.of(machine)
+    for order, limit in ((1, drives.speed), (2, drives.acceleration), (3, drives.jerk)):
+        differences = np.abs(np.diff(points.joints, order, axis=0)) * rate**order
+        assert (differences <= BEYOND * limit).all()
+    assert (np.abs(points.speeds) <= BEYOND * drives.speed).all()
+    assert (np.abs(points.accelerations) <= BEYOND * drives.acceleration).all()
+    feed = np.linalg.norm(np.diff(tips(machine, points.poses), axis=0), axis=1) * rate * 60.0
+    first = np.searchsorted(law.times, points.times[:-1], "right")  # the records around each span
+    last = np.searchsorted(law.times, points.times[1:], "left")
+    most = [path.feed[a : b + 1].max() for a, b in zip(first, np.maximum(first, last), strict=True) if a < len(path)]
+    assert (feed[: len(most)] <= BEYOND * np.array(most)).all()
+
+    few = points.poses[:: max(1, len(points.poses) // 60)]
+    assert distance(tips(machine, few), tips(machine, law.posted.poses)) <= TOLERANCE
+    if "B" in machine.axes:
+        share = np.linspace(0.0, 1.0, 300)[:, None]
+        straight = [p + share * (q - p) for p, q in zip(law.posted.poses[:-1], law.posted.poses[1:], strict=True)]
+        assert distance(axes_of(machine, few), axes_of(machine, np.concatenate(straight))) <= AXIS_TOLERANCE
+    assert strayed(machine, points) < 2e-3
+
+    for speeds in (points.speeds[0], law.at(law.seconds).speeds[0]):
+        assert np.abs(speeds).max() < 1e-6
+    assert np.abs(points.joints[-1] - law.at(law.seconds).joints[0]).max() < 1e-9
+    assert sum(law.shares.values()) == pytest.approx(1.0 if law.seconds else 0.0)
+
+
+@everyone
+def test_every_limit_holds(name):
+    for seed in range(26):
+        result = drawn(name, seed)
+        hold(plan(result, corners=("round", "stop")[seed % 2], tolerance=TOLERANCE, axis_tolerance=AXIS_TOLERANCE))
+
+
+@everyone
+def test_every_limit_holds_with_jerks(name):
+    for seed in range(6):
+        result = drawn(name, 100 + seed, jerk=True)
+        law = plan(result, corners=("round", "stop")[seed % 2])
+        hold(law)
+        drives = Drives.of(result.machine)
+        free = limited(result.machine, mm=(*drive_of(drives, result.machine, "mm"), INF),
+                       rad=(*drive_of(drives, result.machine, "rad"), INF))  # fmt: skip
+        assert law.seconds > plan(replace(result, machine=free), corners=("round", "stop")[seed % 2]).seconds
+
+
+def drive_of(drives, machine, unit):
+    """Speed and acceleration of the first joint in this unit."""
+    if unit not in machine.joint_units:
+        return INF, INF
+    index = machine.joint_units.index(unit)
+    return drives.speed[index], drives.acceleration[index]
+
+
+# Closed forms. The linear delta's carriages all move as its tool does along Z.
+
+
+@pytest.mark.parametrize(("way", "feed"), [(100.0, 6000.0), (100.0, 600.0), (0.5, 6000.0), (100.0, 1e6)])
+def test_a_straight_motion_takes_the_time_of_its_trapezoid(way, feed):
+    machine = limited(pk.load("linear_delta"), mm=(1000.0, 2000.0, INF))
+    law = plan(posted(machine, [[0, 0, 280], [0, 0, 280 + way]], feed=feed))
+    a, v = 2000.0, min(feed / 60.0, 1000.0)
+    expected = way / v + v / a if way > v * v / a else 2.0 * np.sqrt(way / a)
+    assert law.seconds == pytest.approx(expected, rel=2e-4)
+    assert law.seconds > expected * (1.0 - 1e-9)
+    assert law.times.tolist() == [0.0, law.seconds]
+    cruising = law.at([law.seconds / 2]).speeds[0]
+    assert cruising == pytest.approx([min(v, np.sqrt(way * a))] * 3, rel=5e-3)
+
+
+@pytest.mark.parametrize(("way", "feed"), [(100.0, 6000.0), (2.0, 6000.0), (0.01, 6000.0)])
+def test_with_jerks_a_straight_motion_is_no_quicker_than_can_be_and_not_much_slower(way, feed):
+    v, a, j = feed / 60.0, 2000.0, 50_000.0
+    machine = limited(pk.load("linear_delta"), mm=(INF, a, j))
+    law = plan(posted(machine, [[0, 0, 280], [0, 0, 280 + way]], feed=feed))
+    if way >= v * (v / a + a / j):
+        least = way / v + v / a + a / j
+    elif way >= 2.0 * a**3 / j**2:
+        least = a / j + np.sqrt((a / j) ** 2 + 4.0 * way / a)
+    else:
+        least = 4.0 * np.cbrt(way / (2.0 * j))
+    assert least < law.seconds < 1.25 * least
+
+
+def cartesian(**limits):
+    """A machine whose joints are X, Y and Z but for a millionth: the Orthoglide with rods of half a kilometre."""
+    return limited(pk.load("orthoglide", parameters={"cube": "400 m"}), **limits)
+
+
+def circle(radius, count=721):
+    angle = np.linspace(0.0, 2.0 * np.pi, count)
+    return radius * np.stack([np.cos(angle), np.sin(angle), 0.0 * angle], 1)
+
+
+def test_a_circle_at_the_feed_that_its_centripetal_acceleration_allows():
+    radius, a = 50.0, 1000.0
+    slow = plan(posted(cartesian(mm=(INF, a, INF)), circle(radius), feed=60.0 * 0.8 * np.sqrt(a * radius)))
+    middle = np.linspace(0.2, 0.8, 100) * slow.seconds
+    speed = np.linalg.norm(slow.at(middle).speeds, axis=1)
+    assert speed == pytest.approx(0.8 * np.sqrt(a * radius), rel=1e-3)
+    assert slow.shares["feed"] > 0.8
+    fast = plan(posted(cartesian(mm=(INF, a, INF)), circle(radius), feed=1e6))
+    crossing = fast.times[[180, 360, 540]]  # where the path runs along one of the axes, the other one only turns it
+    speed = np.linalg.norm(fast.at(crossing).speeds, axis=1)
+    assert speed == pytest.approx(np.sqrt(a * radius), rel=1e-2)
+    assert fast.shares.get("feed", 0.0) < 0.01
+    hold(slow), hold(fast)
+
+
+def test_without_accelerations_only_the_feed_counts():
+    tip = np.array([[0, 0, 0], [30, 0, 0], [30, 40, 0], [30, 40, 0], [0, 0, 0]], float)
+    feed = np.array([100.0, 600.0, 1200.0, 1.0, 3000.0])
+    law = plan(posted(limited(pk.load("orthoglide")), tip, feed=feed))
+    assert np.diff(law.times) == pytest.approx([3.0, 2.0, 0.0, 1.0], abs=1e-9)
+    assert law.shares == {"feed": pytest.approx(1.0)}
+    assert law.at([1.5, 4.0]).poses == pytest.approx(np.array([[15.0, 0.0, 0.0], [30.0, 20.0, 0.0]]), abs=1e-9)
+    with pytest.raises(PoseError, match=r"between records 0 and 1 \(line 2\) nothing limits the motion: no feed"):
+        plan(posted(limited(pk.load("orthoglide")), tip, feed=np.nan))
+
+
+def test_rapid_and_seconds():
+    machine = limited(pk.load("linear_delta"), mm=(500.0, INF, INF))
+    tip = np.array([[0, 0, 280], [0, 0, 380], [0, 0, 280], [0, 0, 270]], float)
+    seconds = np.array([np.nan, np.nan, 4.0, np.nan])
+    law = plan(posted(machine, tip, feed=[600, 600, np.nan, 600], rapid=[False, True, False, False], seconds=seconds))
+    assert np.diff(law.times) == pytest.approx([0.2, 4.0, 1.0])
+    assert set(law.shares) == {"feed", "tower_a.speed"}
+
+
+# Corners.
+
+
+def square(machine, **how):
+    tip = np.array([[0, 0, 0], [20, 0, 0], [20, 20, 0], [0.1, 20, 0.0], [0, 0, 0]], float)
+    return plan(posted(machine, tip), **how)
+
+
+def test_corners_are_stopped_at():
+    machine = limited(pk.load("orthoglide"), mm=(INF, 2000.0, INF))
+    law = square(machine, corners="stop")
+    at = law.at(law.times)
+    assert np.abs(at.speeds).max() < 1e-6
+    assert at.joints == pytest.approx(law.posted.joints, abs=1e-9)
+    assert [law.names[law.binding[i]] for i in (0, -1)] == ["start/stop"] * 2
+    rounded = square(machine)
+    assert np.linalg.norm(rounded.at(rounded.times[1:-1]).speeds, axis=1).min() > 1.0
+    assert rounded.seconds < law.seconds
+    one = square(machine, stops=[2])
+    assert np.abs(one.at(one.times[2]).speeds).max() < 1e-6 < np.abs(one.at(one.times[1]).speeds).max()
+    assert rounded.seconds < one.seconds < law.seconds
+
+
+def test_a_corner_is_as_far_off_as_it_may_be():
+    machine = limited(pk.load("orthoglide"), mm=(INF, 2000.0, INF))
+    for tolerance in (0.1, 0.01, 0.001):
+        law = square(machine, tolerance=tolerance)
+        off = np.linalg.norm(law.at(law.times[1:-1]).poses - law.posted.poses[1:-1], axis=1)
+        assert (off <= tolerance).all() and (off > 0.98 * tolerance).all()
+
+
+def test_a_straight_line_of_many_records_is_one_line():
+    machine = limited(pk.load("linear_delta"), mm=(INF, 2000.0, INF))
+    z = np.linspace(280.0, 380.0, 1000)
+    tip = np.stack([0 * z, 0 * z, z], 1)
+    for corners in ("round", "stop"):
+        many, one = (plan(posted(machine, rows), corners=corners).seconds for rows in (tip, tip[[0, -1]]))
+        assert many == pytest.approx(one, rel=1e-3)
+
+
+def test_the_path_may_lead_over_a_pole_or_beside_it():
+    machine = limited(pk.load("tricept"), mm=(500.0, 5000.0, INF), rad=(3.0, 30.0, INF))
+    x = np.linspace(-30.0, 30.0, 21)
+    tip = np.stack([x, 0 * x, 0 * x - 1650.0], 1)
+    for lean in (0.0, 1e-5, 1e-3, 1e-2):
+        axis = np.stack([np.sin(x / 100.0), 0 * x + lean, np.cos(x / 100.0)], 1)
+        hold(plan(posted(machine, tip, axis / np.linalg.norm(axis, axis=1)[:, None])))
+
+
+# Against another planner, and against itself.
+
+
+def quickest(s, q, speed, acceleration):
+    step = np.diff(s)
+    n, bend = len(step), np.empty_like(q)
+    bends(step, q, bend, np.empty(n + 1))
+    left, right, u, reachable, x = (np.empty(k) for k in (n, n, n, n + 1, n + 1))
+    ceilings(step, q, bend, speed, np.full(n, INF), INF, left, right, 0, n)
+    top = np.minimum(np.append(left, 0.0), np.append(0.0, right))
+    backward(step, q, bend, acceleration, np.ones(n), top, reachable, 0, n)
+    forward(step, q, bend, acceleration, np.ones(n), reachable, x, u, 0, n)
+    v = np.sqrt(x)
+    return (2.0 * step / (v[1:] + v[:-1])).sum()
+
+
+def test_as_quick_as_toppra():
+    toppra = pytest.importorskip("toppra", reason="toppra is not installed")
+    from scipy.interpolate import CubicSpline
+
+    logging.getLogger("toppra").setLevel(logging.ERROR)
+    rng = np.random.default_rng(5)
+    for _ in range(12):
+        points = rng.uniform(-1.0, 1.0, (8, 6))
+        ends, s = np.linspace(0.0, 1.0, 8), np.linspace(0.0, 1.0, 701)
+        v, a = rng.uniform(0.5, 3.0, 6), rng.uniform(2.0, 20.0, 6)
+        path = toppra.SplineInterpolator(ends, points)
+        acceleration = toppra.constraint.JointAccelerationConstraint(np.stack([-a, a], 1))
+        acceleration.set_discretization_type(toppra.constraint.DiscretizationType.Interpolation)
+        limits = [toppra.constraint.JointVelocityConstraint(np.stack([-v, v], 1)), acceleration]
+        planner = toppra.algorithm.TOPPRA(limits, path, gridpoints=s, solver_wrapper="seidel")
+        speed = planner.compute_parameterization(0.0, 0.0)[1]
+        theirs = (2.0 * np.diff(s) / (speed[1:] + speed[:-1])).sum()
+        ours = quickest(s, CubicSpline(ends, points)(s), v, a)
+        assert theirs * 0.995 < ours < theirs * 1.02
+
+
+@everyone
+def test_more_is_quicker(name):
+    result = drawn(name, 7)
+    drives = Drives.of(result.machine)
+    before = plan(result).seconds
+    for factors in ((1.5, 1.0), (1.5, 1.5), (3.0, 3.0)):
+        limits = {unit: (*np.array(drive_of(drives, result.machine, unit)) * factors, INF) for unit in ("mm", "rad")}
+        seconds = plan(replace(result, machine=limited(result.machine, **limits))).seconds
+        assert seconds <= before * (1.0 + 1e-3)
+        before = seconds
+    assert before < plan(result).seconds
+
+
+# Results and refusals.
+
+
+def test_setpoints_are_a_table():
+    law = square(limited(pk.load("orthoglide"), mm=(INF, 2000.0, INF)))
+    points = law.sampled(500.0)
+    assert points.columns[:5] == ("time", "rho_x", "rho_y", "rho_z", "rho_x.speed")
+    assert points.columns[-4:] == ("rho_z.acceleration", "X", "Y", "Z")
+    assert points.table.shape == (len(points.times), len(points.columns))
+    assert law.seconds <= points.times[-1] < law.seconds + 1.0 / 500.0
+    outside = law.at([-1.0, law.seconds + 1.0])
+    assert outside.joints == pytest.approx(law.posted.joints[[0, -1]], abs=1e-9)
+    assert not outside.speeds.any() and not outside.accelerations.any()
+
+
+def test_one_place_takes_no_time():
+    law = plan(posted(pk.load("linear_delta"), [[0, 0, 280]] * 3))
+    assert law.seconds == 0.0 and law.times.tolist() == [0.0] * 3 and law.shares == {}
+    assert law.sampled(1000.0).joints == pytest.approx(law.posted.joints[:1])
+
+
+@pytest.mark.parametrize(
+    ("how", "message"),
+    [
+        ({"corners": "cut"}, "corners: 'round' or 'stop' expected, not 'cut'"),
+        ({"tolerance": 0.0}, "tolerance: more than 0 expected, not 0.0"),
+        ({"axis_tolerance": float("nan")}, "axis_tolerance: more than 0 expected, not nan"),
+        ({"stops": [5]}, "stops: records from 0 to 4 expected, not 5"),
+    ],
+)
+def test_what_is_refused(how, message):
+    with pytest.raises(PoseError) as caught:
+        square(pk.load("orthoglide"), **how)
+    assert str(caught.value) == message
+
+
+def test_a_path_that_the_machine_cannot_follow_is_refused_with_its_place():
+    machine = limited(pk.load("orthoglide"), mm=(INF, 2000.0, INF))
+    tip = np.array([[0, 0, 0], [0, 400, 0], [0, 0, 0]], float)
+    with pytest.raises(PoseError, match=r"record 1 \(line 2\): the machine can't take this pose"):
+        plan(posted(machine, tip))
+    with pytest.raises(PoseError, match=r"record 1 \(line 2\): more than 0 expected for the feed"):
+        plan(posted(machine, tip / 10.0, feed=[100.0, 0.0, 100.0]))
+    with pytest.raises(PoseError, match="rate: more than 0 expected, not 0"):
+        plan(posted(machine, tip / 10.0)).sampled(0)
+
+
+def test_jerks_of_a_machine_file(tmp_path):
+    file = tmp_path / "rpr3.yaml"
+    text = """source: drawn up for this test
+motion: tx ty rz
+legs:
+  kind: length
+  joints: [d1, d2, d3]
+  foot: {circle: 500 mm, at: [90 deg, 210 deg, 330 deg]}
+  platform: {circle: 120 mm, at: [60 deg, 180 deg, 300 deg]}
+  range: [250 mm, 650 mm]
+  jerk: [100 m/s3, 5e4 mm/s^3, 2 m/s³]
+home: {X: 0 mm, Y: 0 mm, C: 0 deg}
+"""
+    file.write_text(text, encoding="utf-8")
+    assert [drive.jerk for drive in pk.load(file).spec.drives] == [1e5, 5e4, 2e3]
+    file.write_text(text.replace("2 m/s³", "2 m/s2"), encoding="utf-8")
+    with pytest.raises(InputError, match=r':9: jerk: "2 m/s2" is an acceleration, expected a jerk'):
+        pk.load(file)

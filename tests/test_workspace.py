@@ -1,4 +1,4 @@
-"""Certified workspaces: volumes known in closed form, poses at random inside and outside, questions that make no sense."""
+"""Certified workspaces: volumes in closed form, poses at random inside and outside, questions that make no sense."""
 
 from __future__ import annotations
 
@@ -49,10 +49,16 @@ ANSWERS = {
     "a ball": ("balls", {}, {"without": ["d2.*"]}, ball(400) - ball(1)),
     "the other ball": ("balls", {}, {"without": ["d1.*", "d3.max"]}, ball(350) - ball(1)),
     "a shell": ("balls", {"least": "150 mm"}, {"without": ["d2.*"]}, ball(400) - ball(150)),
-    "a slice of two balls": ("balls", {}, {"at": {"Z": 120.0}}, two_discs(sqrt(400**2 - 120**2), sqrt(350**2 - 120**2), 300)),
+    "a slice of two balls": (
+        "balls", {}, {"at": {"Z": 120.0}}, two_discs(sqrt(400**2 - 120**2), sqrt(350**2 - 120**2), 300)
+    ),  # fmt: skip
     "another slice": ("balls", {}, {"at": {"X": 250.0}}, pi * (400**2 - 250**2)),
-    "a line through two balls": ("balls", {}, {"at": {"Y": 50.0, "Z": -90.0}}, sqrt(400**2 - 10600) + sqrt(350**2 - 10600) - 300),
-    "a line through a shell": ("balls", {"least": "150 mm"}, {"at": {"Y": 0.0, "Z": 0.0}, "without": ["d2.*"]}, 2 * (400 - 150)),
+    "a line through two balls": (
+        "balls", {}, {"at": {"Y": 50.0, "Z": -90.0}}, sqrt(400**2 - 10600) + sqrt(350**2 - 10600) - 300
+    ),  # fmt: skip
+    "a line through a shell": (
+        "balls", {"least": "150 mm"}, {"at": {"Y": 0.0, "Z": 0.0}, "without": ["d2.*"]}, 2 * (400 - 150)
+    ),  # fmt: skip
     "an oblique box": ("box", {}, {}, 6e6),
     "an oblique box, tilted tool": ("box", {}, {"at": {"B": 0.4, "C": -2.8}}, 6e6),
     "a thin box": ("box", {"c": "4 mm"}, {}, 24e4),
@@ -65,9 +71,13 @@ ANSWERS = {
     "a ball's sector": ("cone", {}, {}, 2 / 3 * pi * (500**3 - 200**3) * (1 - cos(radians(40)))),
     "a wide sector": ("cone", {"angle": "130 deg"}, {}, 2 / 3 * pi * (500**3 - 200**3) * (1 - cos(radians(130)))),
     "a polar box": ("swing", {}, {}, (800**3 - 600**3) / 3 * radians(80) * 2 * sin(radians(30))),
-    "a polar box without an end": ("swing", {}, {"without": ["tz.max"]}, (800**3 - 0) / 3 * radians(80) * 2 * sin(radians(30))),
+    "a polar box without an end": (
+        "swing", {}, {"without": ["tz.max"]}, (800**3 - 0) / 3 * radians(80) * 2 * sin(radians(30))
+    ),  # fmt: skip
     "a disc": ("arm", {}, {}, pi * (100**2 - 1e-6)),
-    "a disc for every turn": ("arm", {}, {"every": {"C": (0.5 - TURN, 0.5 + TURN)}}, two_discs(100, 100, 800 * sin(TURN))),
+    "a disc for every turn": (
+        "arm", {}, {"every": {"C": (0.5 - TURN, 0.5 + TURN)}}, two_discs(100, 100, 800 * sin(TURN))
+    ),  # fmt: skip
     "a disc for some turn": ("arm", {}, {"some": {"C": (0.5 - TURN, 0.5 + TURN)}}, pi * 100**2 + 4 * 400 * 100 * TURN),
     "a disc for every way": ("arm", {"arm": "40 mm"}, {"dexterous": True}, pi * (60**2 - 40.001**2) + pi * 39.999**2),
     "a disc some way": ("arm", {"arm": "40 mm"}, {"some": {"C": (-pi, pi)}}, pi * 140**2),
@@ -241,7 +251,7 @@ def least_margin(m, poses):
 
 
 def best_margin(m, asked, places, rng, sign, rounds=12, each=48):
-    """Of every place the least margin for the turn where it is greatest (sign 1) or least (-1), by a narrowing search."""
+    """Of every place the least margin for the turn where it is greatest (sign 1) or least (-1), by a search."""
     low, high = (np.array([span[i] for span in asked.turns.values()]) for i in (0, 1))
     n, s = len(places), len(low)
     best, turn = np.full(n, -inf), np.tile(0.5 * (low + high), (n, 1))

@@ -50,15 +50,24 @@ ANSWERS = {
     "the other ball": ("balls", {}, {"without": ["d1.*", "d3.max"]}, ball(350) - ball(1)),
     "a shell": ("balls", {"least": "150 mm"}, {"without": ["d2.*"]}, ball(400) - ball(150)),
     "a slice of two balls": (
-        "balls", {}, {"at": {"Z": 120.0}}, two_discs(sqrt(400**2 - 120**2), sqrt(350**2 - 120**2), 300)
-    ),  # fmt: skip
+        "balls",
+        {},
+        {"at": {"Z": 120.0}},
+        two_discs(sqrt(400**2 - 120**2), sqrt(350**2 - 120**2), 300),
+    ),
     "another slice": ("balls", {}, {"at": {"X": 250.0}}, pi * (400**2 - 250**2)),
     "a line through two balls": (
-        "balls", {}, {"at": {"Y": 50.0, "Z": -90.0}}, sqrt(400**2 - 10600) + sqrt(350**2 - 10600) - 300
-    ),  # fmt: skip
+        "balls",
+        {},
+        {"at": {"Y": 50.0, "Z": -90.0}},
+        sqrt(400**2 - 10600) + sqrt(350**2 - 10600) - 300,
+    ),
     "a line through a shell": (
-        "balls", {"least": "150 mm"}, {"at": {"Y": 0.0, "Z": 0.0}, "without": ["d2.*"]}, 2 * (400 - 150)
-    ),  # fmt: skip
+        "balls",
+        {"least": "150 mm"},
+        {"at": {"Y": 0.0, "Z": 0.0}, "without": ["d2.*"]},
+        2 * (400 - 150),
+    ),
     "an oblique box": ("box", {}, {}, 6e6),
     "an oblique box, tilted tool": ("box", {}, {"at": {"B": 0.4, "C": -2.8}}, 6e6),
     "a thin box": ("box", {"c": "4 mm"}, {}, 24e4),
@@ -72,16 +81,22 @@ ANSWERS = {
     "a wide sector": ("cone", {"angle": "130 deg"}, {}, 2 / 3 * pi * (500**3 - 200**3) * (1 - cos(radians(130)))),
     "a polar box": ("swing", {}, {}, (800**3 - 600**3) / 3 * radians(80) * 2 * sin(radians(30))),
     "a polar box without an end": (
-        "swing", {}, {"without": ["tz.max"]}, (800**3 - 0) / 3 * radians(80) * 2 * sin(radians(30))
-    ),  # fmt: skip
+        "swing",
+        {},
+        {"without": ["tz.max"]},
+        (800**3 - 0) / 3 * radians(80) * 2 * sin(radians(30)),
+    ),
     "a disc": ("arm", {}, {}, pi * (100**2 - 1e-6)),
     "a disc for every turn": (
-        "arm", {}, {"every": {"C": (0.5 - TURN, 0.5 + TURN)}}, two_discs(100, 100, 800 * sin(TURN))
-    ),  # fmt: skip
+        "arm",
+        {},
+        {"every": {"C": (0.5 - TURN, 0.5 + TURN)}},
+        two_discs(100, 100, 800 * sin(TURN)),
+    ),
     "a disc for some turn": ("arm", {}, {"some": {"C": (0.5 - TURN, 0.5 + TURN)}}, pi * 100**2 + 4 * 400 * 100 * TURN),
     "a disc for every way": ("arm", {"arm": "40 mm"}, {"dexterous": True}, pi * (60**2 - 40.001**2) + pi * 39.999**2),
     "a disc some way": ("arm", {"arm": "40 mm"}, {"some": {"C": (-pi, pi)}}, pi * 140**2),
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize("what", ANSWERS)

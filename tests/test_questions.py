@@ -1,0 +1,100 @@
+"""Questions of workspaces that make no sense, that nothing answers, or that are cut short."""
+
+import math
+
+import pytest
+
+import parakin as pk
+from parakin.analysis.region import region
+
+
+@pytest.mark.parametrize(
+    ("question", "said"),
+    [
+        ({"every": {"B": (1.0, 0.0)}}, "the range of B is empty"),
+        ({"every": {"B": (0.0, math.nan)}}, "the range of B"),
+        ({"every": {"X": (0.0, 1.0)}}, "X is no turning axis"),
+        ({"every": {"B": (0.0, 1.0)}, "some": {"C": (0.0, 1.0)}}, "one of every, some and dexterous"),
+        ({"at": {"B": 0.0}, "every": {"B": (0.0, 1.0)}}, "B is held and swept"),
+        ({"at": {"Q": 1.0}}, "unknown axis Q"),
+        ({"at": {"X": math.inf}}, "X: inf is no place"),
+        ({"at": {"X": 0.0, "Y": 0.0, "Z": -1650.0}}, "every axis is held"),
+        ({"without": ["nothing*"]}, "no limit nothing"),
+        ({"mode": "++++"}, "mode"),
+        ({"gap": 0.0}, "gap"),
+        ({"cell": -1.0}, "cell"),
+        ({"seconds": 0.0}, "seconds"),
+    ],
+)
+def test_what_makes_no_sense_is_refused(question, said):
+    with pytest.raises(pk.PoseError, match=said.replace("*", r"\*")):
+        pk.workspace(pk.load("tricept"), **question)
+
+
+def test_reach_can_not_be_switched_off():
+    with pytest.raises(pk.PoseError, match="the legs don't close"):
+        region(pk.load("orthoglide"), without=["*.reach"])
+
+
+def test_what_nothing_bounds_is_said():
+    with pytest.raises(pk.PoseError, match="do not bound the workspace in"):
+        pk.workspace(pk.load("tricept"), without=["d*", "r*"])
+
+
+def test_nothing_is_allowed_every_way_and_that_is_proved():
+    found = pk.workspace(pk.load("lambda6"), dexterous=True)
+    assert found.empty
+    assert found.volume.outer == 0.0
+    assert found.box is None
+    assert found.centroid is None
+    assert found.bounded_by == ()
+
+
+def test_held_out_of_reach_it_is_empty():
+    assert pk.workspace(pk.load("orthoglide"), at={"X": 5000.0}).empty
+
+
+def test_an_interruption_gives_what_there_is():
+    machine, calls = pk.load("orthoglide"), []
+
+    def stop(fraction):
+        calls.append(fraction)
+        if len(calls) == 3:
+            raise KeyboardInterrupt
+
+    found = pk.workspace(machine, gap=1e-6, progress=stop)
+    assert found.stopped == "interrupted"
+    exact = pk.workspace(machine, gap=0.003)
+    assert found.volume.inner <= exact.volume.outer
+    assert exact.volume.inner <= found.volume.outer < math.inf
+    assert all(0.0 <= fraction <= 1.0 for fraction in calls)
+
+
+def test_time_runs_out_with_a_bracket_that_holds():
+    machine = pk.load("tricept")
+    found = pk.workspace(machine, gap=1e-9, seconds=0.3)
+    assert found.stopped == "time"
+    exact = pk.workspace(machine, gap=0.01)
+    assert found.volume.inner <= exact.volume.outer
+    assert exact.volume.inner <= found.volume.outer
+
+
+def test_it_says_what_it_reached():
+    machine = pk.load("orthoglide")
+    assert pk.workspace(machine).stopped == "gap"
+    by_cells = pk.workspace(machine, cell=30.0)
+    assert by_cells.stopped == "cell"
+    edge = by_cells.cells.take(~by_cells.cells.inside)
+    assert edge.size.max() <= 30.0
+
+
+def test_it_can_be_run_again_from_its_parameters():
+    machine = pk.load("lambda6")
+    first = pk.workspace(machine, every={"C": (0.4, 0.6)}, without=["gap *"], gap=0.05)
+    given = dict(first.parameters)
+    assert given.pop("machine") == machine.name
+    for name in ("kind", "places", "method"):
+        given.pop(name)
+    given["every"] = {axis: tuple(span) for axis, span in given["every"].items()}
+    again = pk.workspace(machine, **given)
+    assert again.volume == first.volume

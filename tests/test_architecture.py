@@ -11,8 +11,12 @@ import parakin
 
 ROOT = Path(parakin.__file__).parent
 CORE = [*(ROOT / "model").rglob("*.py"), *(ROOT / "kernels").rglob("*.py"), *(ROOT / "kinematics").rglob("*.py")]
-CORE += [ROOT / "machine.py", ROOT / "algebra.py"]
-LAYERS = {"kernels": {"model", "kinematics", "machine"}, "model": {"kinematics", "machine"}}  # none looks up
+CORE += [*(ROOT / "analysis").rglob("*.py"), ROOT / "machine.py", ROOT / "algebra.py"]
+LAYERS = {  # none looks up
+    "kernels": {"model", "kinematics", "machine", "analysis"},
+    "model": {"kinematics", "machine", "analysis"},
+    "kinematics": {"analysis"},
+}
 RIM = {"description", "quantities", "toolpath", "export", "commands", "cli"}
 FORBIDDEN = {"pathlib", "json", "io", "tempfile", "shutil", "plotly", "matplotlib", "pyarrow", "rich", "cyclopts"}
 FORBIDDEN |= {"pydantic", "ruamel", "http", "socket", "subprocess"}
@@ -59,5 +63,5 @@ def test_starting_imports_nothing_heavy(module):
     code = f"import sys, {module}; print(*sys.modules)"
     loaded = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.split()
     assert module in loaded
-    heavy = {"numpy", "numba", "pydantic", "plotly", "matplotlib", "pyarrow", "scipy", "ruamel.yaml"}
+    heavy = {"numpy", "numba", "pydantic", "plotly", "matplotlib", "pyarrow", "scipy", "ruamel.yaml", "trimesh", "skimage"}
     assert not heavy & set(loaded)

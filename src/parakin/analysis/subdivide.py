@@ -188,12 +188,13 @@ class Subdivision(ABC):
         counts = np.maximum(1, np.ceil((high - low) / edge - 1e-9)).astype(int)
         low, size = _on_a_grid(low, high, counts)
         index = np.array(list(product(*[range(n) for n in counts])), float).reshape(-1, len(low))
-        self.done: list[Cells] = []
+        self._decided: list[Cells] = []  # in the round that runs
         self.rounds = 0
         began = time.monotonic()
         bottom, top = (np.broadcast_to(end, (len(index), len(end))) for end in turns)
         left = self._first(np.arange(len(index)), bottom, top)
         self.open, self.left = self._examined(low + index * size, np.tile(size, (len(index), 1)), left)
+        self.done = self._decided
         self._pace = (time.monotonic() - began + 1e-9) / len(index)  # seconds a cell, of late
 
     @abstractmethod
@@ -202,7 +203,7 @@ class Subdivision(ABC):
 
     @abstractmethod
     def _examined(self, low: Array, size: Array, left: list[Items]) -> tuple[Cells, list[Items]]:
-        """Cells with what is found of them; those decided go to ``done``, those outside are dropped.
+        """Cells with what is found of them; those decided are laid aside, those outside are dropped.
 
         ``left`` is what was not shown of the cells they were cut from.
         """
@@ -212,14 +213,18 @@ class Subdivision(ABC):
         limit = np.where(found.inner >= 1.0, -1, found.limit)
         cells = Cells(low, size, found.inner, found.outer, estimate, limit, found.area * size.prod(1))
         gone = found.outer <= 0.0
-        self.done.append(cells.take(~gone & (limit < 0)))
+        self._decided.append(cells.take(~gone & (limit < 0)))
         undecided = np.flatnonzero(~gone & (limit >= 0))
         place = np.full(len(low), -1)
         place[undecided] = np.arange(len(undecided))
         return cells.take(undecided), [part.moved(place) for part in left]
 
     def refine(self, parents: Indices, deadline: float = inf) -> None:
-        """Cut these open cells into 2^d parts each, the first ones first, as many as the time allows."""
+        """Cut these open cells into 2^d parts each, the first ones first, as many as the time allows.
+
+        Interrupted, it leaves the cells as they were.
+        """
+        self._decided = []
         d = self.open.low.shape[1]
         corners = np.array(list(product((0.0, 1.0), repeat=d)))
         which = np.zeros(len(self.open.low), np.bool_)
@@ -246,8 +251,8 @@ class Subdivision(ABC):
         offsets = np.cumsum([len(part.low) for part in cells])
         lists = [[part.moved(place) for part in self.left]]
         lists += [[part.shifted(n) for part in left] for n, (_, left) in zip(offsets, found, strict=False)]
-        self.left = [both(parts) for parts in zip(*lists, strict=True)]
-        self.open = joined(cells)
+        left, undecided = [both(parts) for parts in zip(*lists, strict=True)], joined(cells)
+        self.open, self.left, self.done = undecided, left, [*self.done, *self._decided]
         self.rounds += 1
 
     # The whole.
@@ -281,10 +286,9 @@ class Subdivision(ABC):
     ) -> Cells:
         """Refine until the relative gap, the cells' size or the time is reached; interrupted, it gives what it has."""
         deadline = inf if seconds is None else time.monotonic() + seconds
-        now = self.cells("interrupted")
         try:
             while True:
-                now = self.cells("interrupted")
+                now = self.cells("gap")
                 stopped, parents = self._next(now, gap, cell)
                 if not stopped and time.monotonic() > deadline:
                     stopped = "time"
@@ -294,7 +298,7 @@ class Subdivision(ABC):
                     progress(min(1.0, gap / now.gap) if now.gap > 0 else 1.0)
                 self.refine(parents, deadline)
         except KeyboardInterrupt:
-            return now  # as it was before the round that is half done
+            return self.cells("interrupted")
 
     def _next(self, now: Cells, gap: float, cell: float | None) -> tuple[str, Indices]:
         """Why to stop, or "" and which cells to refine, the worst first."""

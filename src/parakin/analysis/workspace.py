@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property
 from math import inf, isfinite
@@ -155,7 +156,8 @@ def workspace(
     work = asked.subdivision(*extent)
     stopped = work.run(gap, cell, rest, progress).stopped
     if stopped == "gap":
-        work.tighten(CLOSE, began + (inf if seconds is None else seconds))
+        with suppress(KeyboardInterrupt):  # the answer is there; only its box could be closer
+            work.tighten(CLOSE, began + (inf if seconds is None else seconds))
     return Workspace(asked, work.cells(stopped), stopped, parameters)
 
 

@@ -14,6 +14,8 @@ from .options import Json, Name, Sizes, machine_of
 if TYPE_CHECKING:
     from ..machine import Machine
 
+_RATES = {"speed": "speed /s", "acceleration": "acceleration /s2", "jerk": "jerk /s3"}
+
 
 def machines(*, json: Json = False) -> int:
     """The machines that come with parakin."""
@@ -93,7 +95,7 @@ def _details(machine: Machine) -> dict[str, Any]:
         {
             "joint": drive.name,
             "unit": rim_unit(drive.unit),
-            **{key: rim(getattr(drive, key), drive.unit) for key in ("low", "high", "speed", "acceleration")},
+            **{key: rim(getattr(drive, key), drive.unit) for key in ("low", "high", *_RATES)},
         }
         for drive in machine.model.drives
     ]
@@ -130,9 +132,10 @@ def _bound(value: float | None, unit: str) -> tuple[str, str]:
 
 def _described(machine: Machine) -> str:
     details = _details(machine)
+    rates = [key for key in _RATES if any(d[key] < float("inf") for d in details["drives"])]
     drives = [
         (d["joint"], *(_number(d[key]) for key in ("low", "high")), d["unit"],
-         *(_number(d[key]) for key in ("speed", "acceleration")))
+         *(_number(d[key]) for key in rates))
         for d in details["drives"]
     ]  # fmt: skip
     signs = {"min": "at least", "max": "at most", "reach": "must close"}
@@ -147,7 +150,7 @@ def _described(machine: Machine) -> str:
         table([(name, _number(value)) for name, value in details["sizes"].items()], ("size", "mm, rad"), " r")
         if details["sizes"]
         else "",
-        table(drives, ("drive", "from", "to", "", "speed /s", "acceleration /s2"), " rr rr"),
+        table(drives, ("drive", "from", "to", "", *(_RATES[key] for key in rates)), " rr " + "r" * len(rates)),
         table(limits, ("limit", "of", "", "bound", ""), "   r"),
         table(
             [

@@ -8,7 +8,7 @@ if ! command -v apt-get >/dev/null || [ "$(id -u)" -ne 0 ]; then
     echo "LinuxCNC is not installed: that takes apt-get and root. Its tests will be skipped." >&2
     exit 0
 fi
-if ! { apt-get update -qq && DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends \
+if ! { timeout 120 apt-get update -qq && DEBIAN_FRONTEND=noninteractive timeout 600 apt-get install -y -qq --no-install-recommends \
     linuxcnc-uspace linuxcnc-uspace-dev; } >/dev/null; then
     echo "Debian's packages of LinuxCNC can't be installed here. Its tests will be skipped." >&2
 fi

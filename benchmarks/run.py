@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import feed
 import kinematics
+import linuxcnc
 import post
 import startup
 import workspace
 
 if __name__ == "__main__":
-    for benchmark in (kinematics, post, startup, workspace, feed):
+    for benchmark in (kinematics, post, startup, workspace, feed, linuxcnc):
         print(benchmark.main(), flush=True)

@@ -6,7 +6,7 @@ BIN := .venv/bin
 
 demo: .venv/installed
 	$(BIN)/python examples/turbine_blade.py -o out
-	$(BIN)/parakin post out/turbine_blade.aptsource --machine tricept -o out
+	$(BIN)/parakin post out/turbine_blade.aptsource --machine tricept --target linuxcnc -o out
 
 test: .venv/developing lint
 	find src -name "*.nb[ci]" -delete  # Numba's cache does not see a change in a file that a kernel calls

@@ -12,10 +12,11 @@ leads the surface by 7 degrees in the feed (on the fillet it follows but a part 
 sideways, back toward the vertical where the surface is steep: it stays 9 to 27 degrees off Z and turns smoothly.
 The frame in the files puts the blade under a Tricept-like machine, some 1660 mm below its base.
 
-    python turbine_blade.py [-o FOLDER] [--records N]
+    python turbine_blade.py [-o FOLDER] [--records N] [--feed F] [--upright]
 
 writes turbine_blade.aptsource and turbine_blade.cls: one tool path, two dialects. Lengths are in millimetres. A CL
-point is the tool's tip; its i, j, k point from the tip into the holder.
+point is the tool's tip; its i, j, k point from the tip into the holder. With --upright the tool stays along Z, as a
+machine of three axes has it, and --feed is the feed in the cut.
 """
 
 import argparse
@@ -136,15 +137,15 @@ def traverse(start, end, axis0, axis1):
     """Even points from `start` (excluded) to `end`, with the axis turning evenly from axis0 to axis1."""
     share = np.linspace(0.0, 1.0, TRAVERSE_POINTS + 1)[1:, None]
     angle = np.arctan2(np.linalg.norm(np.cross(axis0, axis1)), axis0 @ axis1)
-    turned = np.sin((1 - share) * angle) * axis0 + np.sin(share * angle) * axis1
+    turned = np.sin((1 - share) * angle) * axis0 + np.sin(share * angle) * axis1 if angle else axis0 + 0 * share
     return start + share * (end - start), unit(turned)
 
 
-def tool_path(records):
+def tool_path(records, upright=False):
     """The whole path: every pass with its approach and retract, and the rapids from each to the next."""
     u, v = pass_grid(records)
     feed, normal = tangent_and_normal(u, v)
-    axis = posture(u, v)
+    axis = np.broadcast_to([0.0, 0.0, 1.0], normal.shape) if upright else posture(u, v)
     tip = surface(u, v) + BALL * (normal - axis)
     tips, axes, kinds = [], [], []
 
@@ -172,25 +173,26 @@ def tool_path(records):
     return ToolPath(np.concatenate(tips), np.concatenate(axes), kinds)
 
 
-def motions(path, rapid, feed, point):
+def motions(path, feeds, rapid, feed, point):
     """The lines of the motions, in the words of a dialect; a feed is written when it changes."""
     lines, current = [], None
     for kind, tip, axis in zip(path.kind, path.tip.tolist(), path.axis.tolist(), strict=True):
         if kind == "rapid":
             lines.append(rapid)
         elif kind != current:
-            lines.append(feed.format(FEEDS[kind]))
+            lines.append(feed.format(feeds[kind]))
         current = kind
         lines.append(point(tip, axis))
     return lines
 
 
-def apt_lines(path):
+def apt_lines(path, feeds=FEEDS):
     """CATIA's APT: the frame as a 3x4 matrix after $$*CATIA0, the axis with every point."""
+    axes = "three" if (path.axis[:, 2] == 1.0).all() else "five"
     matrix = np.column_stack([FRAME_AXES, FRAME_ORIGIN])
     head = [
         "$$ -----------------------------------------------------------------",
-        "$$     Turbine blade, suction side, five-axis finishing",
+        f"$$     Turbine blade, suction side, {axes}-axis finishing",
         "$$     W in the machine frame: turned by 16.26 deg about Z, origin at",
         "$$     X {:.3f}, Y {:.3f}, Z {:.3f}".format(*FRAME_ORIGIN),
         "$$ -----------------------------------------------------------------",
@@ -213,10 +215,10 @@ def apt_lines(path):
         return "GOTO  /{:z11.5f},{:z11.5f},{:z11.5f},{:z9.6f},{:z9.6f},{:z9.6f}".format(*tip, *axis)
 
     tail = ["COOLNT/OFF", "MULTAX/OFF", "SPINDL/OFF", "FINI"]
-    return head + motions(path, "RAPID", "FEDRAT/{:.4f},MMPM", point) + tail
+    return head + motions(path, feeds, "RAPID", "FEDRAT/{:.4f},MMPM", point) + tail
 
 
-def nx_lines(path):
+def nx_lines(path, feeds=FEEDS):
     """Siemens NX: the frame as MSYS/ (origin, X, Y), the axis only where it changes."""
     msys = [f"{value:.4f}" for value in FRAME_ORIGIN] + [f"{value:.7f}" for value in FRAME_AXES[:, :2].T.ravel()]
     head = [
@@ -240,7 +242,7 @@ def nx_lines(path):
         return "GOTO/{:z.4f},{:z.4f},{:z.4f}".format(*tip) + shown
 
     tail = ["PAINT/SPEED,10", "PAINT/TOOL,NOMORE", "END-OF-PATH"]
-    return head + motions(path, "RAPID", "FEDRAT/MMPM,{:.4f}", point) + tail
+    return head + motions(path, feeds, "RAPID", "FEDRAT/MMPM,{:.4f}", point) + tail
 
 
 def main():
@@ -248,10 +250,14 @@ def main():
     here = Path(__file__).resolve().parent
     parser.add_argument("-o", "--output", type=Path, default=here, metavar="FOLDER", help="default: beside the script")
     parser.add_argument("--records", type=int, default=36000, metavar="N", help="about so many GOTO (default: 36000)")
+    parser.add_argument("--feed", type=float, default=FEEDS["cut"], metavar="F", help="mm/min (default: 2500)")
+    parser.add_argument("--upright", action="store_true", help="keep the tool along Z, for a machine of three axes")
     options = parser.parse_args()
     options.output.mkdir(parents=True, exist_ok=True)
-    path = tool_path(options.records)
-    for lines, name in (apt_lines(path), "turbine_blade.aptsource"), (nx_lines(path), "turbine_blade.cls"):
+    path = tool_path(options.records, options.upright)
+    feeds = FEEDS | {"cut": options.feed}
+    files = {"turbine_blade.aptsource": apt_lines(path, feeds), "turbine_blade.cls": nx_lines(path, feeds)}
+    for name, lines in files.items():
         file = options.output / name
         file.write_text("\n".join(lines) + "\n", encoding="ascii", newline="\n")
         print(f"{file}: {len(path.kind)} GOTO, {path.kind.count('rapid')} of them rapid")

@@ -121,7 +121,7 @@ class Program:
         """A line that changes modes and moves nothing."""
         rng, words = self.rng, []
         if rng.random() < 0.3:
-            self.inverse, self.feed = not self.inverse, None
+            self.inverse, self.feed = rng.random() < 0.4, None
             words.append("G93" if self.inverse else "G94")
         if rng.random() < 0.4:
             self.plane = rng.choice(list(PLANES))

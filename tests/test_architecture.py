@@ -53,6 +53,14 @@ def test_no_layer_looks_up(path):
         assert not imports(path) & LAYERS.get(path.relative_to(ROOT).parts[0], set())
 
 
+PATHS = sorted((ROOT / "toolpath").rglob("*.py"))
+
+
+@pytest.mark.parametrize("path", PATHS, ids=lambda p: str(p.relative_to(ROOT)))
+def test_tool_paths_know_no_exports_and_no_commands(path):
+    assert not imports(path) & {"export", "commands", "cli", "plotly", "matplotlib", "rich", "cyclopts"}
+
+
 def test_there_is_a_core_to_look_at():
     assert len(CORE) > 20
     assert "algebra" in imports(ROOT / "kernels" / "tape.py")

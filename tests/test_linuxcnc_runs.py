@@ -1,13 +1,11 @@
-"""The real LinuxCNC, headless: every configuration starts, homes and moves, and its joints are the library's."""
+"""The real LinuxCNC, headless: it starts, homes and moves, its joints are the library's, and it runs what is posted."""
 
 from __future__ import annotations
 
-import json
-import os
+import io
 import shutil
-import subprocess
 import sys
-import tempfile
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -15,19 +13,18 @@ import pytest
 from geometry import Description
 
 import parakin as pk
-from parakin.export.linuxcnc import configuration
+from parakin.export.programs import linuxcnc_program, program_seconds
+from parakin.toolpath.feed import plan
+from parakin.toolpath.post import post
+from parakin.toolpath.reading import read_path
 
 HERE = Path(__file__).parent / "linuxcnc"
-MODULES = Path("/usr/lib/linuxcnc/modules")
-NOBODY = 65534
-# LinuxCNC refuses root, wants fixed keys of shared memory and a lock in /tmp for itself, and ends processes by name.
-ALONE = ["unshare", "--ipc", "--pid", "--mount", "--net", "--fork", "--mount-proc", "--kill-child"]
-ALONE += ["sh", "-c", 'mount -t tmpfs -o mode=1777 none /tmp && exec "$@"', "sh"]
-AS_NOBODY = ["setpriv", f"--reuid={NOBODY}", f"--regid={NOBODY}", "--clear-groups", "env", "-i", "PATH=/usr/bin:/bin"]
-
 DIGIT = 5e-7  # half a unit of the last digit that is sampled
 
 sys.path.insert(0, str(HERE))
+sys.path.insert(0, str(Path(__file__).parents[1] / "examples"))
+import turbine_blade  # noqa: E402
+from simulation import CYCLE, as_programmed, first_line, simulated, trial, why_not  # noqa: E402
 from stub import FIELDS, inward, outward, pose, world  # noqa: E402
 
 # A move by hand, and moves that must be refused with a word: off a drive's range, off another limit of the machine's.
@@ -37,19 +34,9 @@ TASKS = {
     "hexapod": ("G1 X30 Y20 Z-900 A5 B-5 C8 F9000", {"G0 X350 Z-1200": "joint", "G0 Z-1000 A60": "kinematicsInverse"}),
     "tricept": ("G1 X50 Y60 Z-1630 B15 C20 F9000", {"G0 Z-2090": "joint", "G0 X1500 Z-400": "kinematicsInverse"}),
 }
-
-
-def why_not():
-    """Why LinuxCNC can't run here, in a few words; nothing if it can."""
-    for tool in ("linuxcnc", "halcompile", "gcc", "unshare", "setpriv"):
-        if not shutil.which(tool):
-            return f"there is no {tool} (Debian's packages: linuxcnc-uspace, linuxcnc-uspace-dev)"
-    if os.geteuid():
-        return "only root can install a kinematics module"
-    if subprocess.run([*ALONE, "true"], capture_output=True).returncode:
-        return "there are no namespaces here, which keep LinuxCNC's runs apart"
-    return ""
-
+# Where the example part lies, on top of its own frame, and whether its tool stays upright.
+PLACES = {"tricept": (None, False), "hexapod": ("-60,20,710", False), "linear_delta": ("-60,45,1920", True)}
+FEED = 10_000.0  # mm/min, in the cut: ball mill of 10 mm, four teeth, aluminium
 
 WHY_NOT = why_not()
 pytestmark = pytest.mark.skipif(bool(WHY_NOT), reason=WHY_NOT)
@@ -57,54 +44,14 @@ pytestmark = pytest.mark.skipif(bool(WHY_NOT), reason=WHY_NOT)
 
 @pytest.fixture
 def machine(request, tmp_path):
-    """A shipped machine under another name, so that no module of the user's is replaced."""
-    text = (Path(pk.__file__).parent / "machines" / f"{request.param}.yaml").read_text(encoding="utf-8")
-    path = tmp_path / "trial.yaml"
-    path.write_text(text.replace(f"name: {request.param}\n", f"name: trial_{request.param}\n"), encoding="utf-8")
-    return pk.load(path)
+    """A shipped machine under another name."""
+    return trial(request.param, tmp_path)
 
 
 @pytest.fixture
-def folder(machine):
-    """The configuration as it is written, with a script for its user interface and a sampler."""
-    with tempfile.TemporaryDirectory(dir="/var/tmp") as name:  # pytest's own folders are closed to others
-        folder, files = Path(name), configuration(machine)
-        ini = files[f"{machine.name}.ini"].replace("DISPLAY = axis", "DISPLAY = ./ui.py")
-        files[f"{machine.name}.ini"] = ini.replace("[KINS]", "HALFILE = sampler.hal\n\n[KINS]")
-        for file, text in (files | {"sampler.hal": sampler(machine)}).items():
-            (folder / file).write_text(text, encoding="utf-8")
-        shutil.copy(HERE / "ui.py", folder)
-        kinematics = f"{machine.name}_kins"
-        try:
-            subprocess.run(["halcompile", "--install", f"{kinematics}.c"], cwd=folder, check=True, capture_output=True)
-            for path in (folder, *folder.iterdir()):
-                os.chown(path, NOBODY, NOBODY)
-            yield folder
-        finally:
-            (MODULES / f"{kinematics}.so").unlink(missing_ok=True)
-
-
-def sampler(machine):
-    """HAL that writes down, every cycle, whether the move is coordinated, the axes, and the joints."""
-    pins = [f"axis.{axis.lower()}.pos-cmd" for axis in machine.axes]
-    pins += [f"joint.{i}.coarse-pos-cmd" for i in range(len(machine.joints))]
-    lines = [f"loadrt sampler depth=16000 cfg=b{'f' * len(pins)}", "addf sampler.0 servo-thread"]
-    lines += [f"net sample-{i} {pin} => sampler.0.pin.{i}" for i, pin in enumerate(["motion.coord-mode", *pins])]
-    return "\n".join([*lines, ""])
-
-
-def run(machine, folder, task):
-    """What the user interface saw, and the samples of coordinated moves: poses and joints, mm and degrees."""
-    (folder / "task.json").write_text(json.dumps(task | {"joints": len(machine.joints)}))
-    command = [*ALONE, *AS_NOBODY, f"HOME={folder}", "linuxcnc", "-r", str(folder / f"{machine.name}.ini")]
-    done = subprocess.run(command, cwd=folder, stdin=subprocess.DEVNULL, capture_output=True, text=True, timeout=60)
-    assert (folder / "seen.json").exists(), done.stdout + done.stderr
-    seen = json.loads((folder / "seen.json").read_text())
-    rows = np.loadtxt(folder / "samples.txt", comments="overrun")
-    rows = rows[rows[:, 0] != 0][:, 1:]
-    poses = np.zeros((len(rows), 9))
-    poses[:, [FIELDS.index(axis) for axis in machine.axes]] = rows[:, : len(machine.axes)]
-    return done, seen, poses, rows[:, len(machine.axes) :]
+def linuxcnc(machine):
+    with simulated(machine) as simulation:
+        yield simulation
 
 
 def expected(machine, poses, last):
@@ -136,6 +83,18 @@ def near_the_pole(machine, joints):
     return np.abs(joints[:, last - 1 if first == last else last]) < 0.01
 
 
+def check_joints(machine, poses, joints):
+    """Every cycle's joints are the library's; where a wrist's first is not free, to the digits that are sampled."""
+    turning = np.array(machine.joint_units) == "rad"
+    off, read = np.abs(joints[1:] - expected(machine, poses[1:], joints[:-1])), read_to(machine, poses[1:], joints[:-1])
+    free = near_the_pole(machine, joints)
+    assert (off < read)[~free[1:]].all()
+    assert off[~free[1:]][:, ~turning].max() < 8e-6
+    miss, tilt = Description.of(machine.spec).misses(pose(machine, poses), inward(machine, joints))
+    assert miss.max() < 1e-5
+    assert tilt.max() < 1e-7
+
+
 def words(block):
     return {word[0]: float(word[1:]) for word in block.split() if word[0] in FIELDS}
 
@@ -148,15 +107,15 @@ def away(machine):
 
 
 @pytest.mark.parametrize("machine", pk.machines(), indirect=True)
-def test_it_starts_homes_and_moves(machine, folder):
+def test_it_starts_homes_and_moves(machine, linuxcnc):
     name = machine.name.removeprefix("trial_")
     by_hand, refused = TASKS.get(name, (away(machine), {}))
     if name in TASKS:
-        shutil.copy(HERE / f"{name}.ngc", folder / f"{machine.name}.ngc")
-    task = {"by hand": by_hand, "program": f"{machine.name}.ngc", "refused": list(refused)}
-    done, seen, poses, joints = run(machine, folder, task)
+        shutil.copy(HERE / f"{name}.ngc", linuxcnc.folder / f"{machine.name}.ngc")
+    run = linuxcnc.run({"by hand": by_hand, "program": f"{machine.name}.ngc", "refused": list(refused)})
+    seen, poses, joints = run.seen, run.poses, run.joints
     assert "told" not in seen, seen
-    assert done.returncode == 0
+    assert run.done.returncode == 0
     home = world(machine, machine.home[None])[0]
     assert np.abs(np.array(seen["home"]) - home).max() < 1e-6
     for letter, value in words(by_hand).items():
@@ -169,12 +128,99 @@ def test_it_starts_homes_and_moves(machine, folder):
     assert len(poses) > 300
     moved = np.ptp(pose(machine, poses), axis=0)
     assert (moved >= np.where(np.array(machine.axis_units) == "mm", 20.0, np.radians(10.0)) - 1e-6).all()
-    turning = np.array(machine.joint_units) == "rad"
-    off, read = np.abs(joints[1:] - expected(machine, poses[1:], joints[:-1])), read_to(machine, poses[1:], joints[:-1])
+    check_joints(machine, poses, joints)
     free = near_the_pole(machine, joints)
-    assert (off < read)[~free[1:]].all()
-    assert off[~free[1:]][:, ~turning].max() < 8e-6
-    miss, tilt = Description.of(machine.spec).misses(pose(machine, poses), inward(machine, joints))
-    assert miss.max() < 1e-5
-    assert tilt.max() < 1e-7
     assert np.abs(np.diff(joints, axis=0))[~free[:-1]].max() < 3.0  # nothing swings round
+
+
+# Programs
+
+
+def first_passes(machine, folder, feed=FEED, count=130):
+    """The first passes of the example part on a machine."""
+    place, upright = PLACES[machine.name.removeprefix("trial_")]
+    path = turbine_blade.tool_path(2000, upright)
+    file = folder / "turbine_blade.cls"
+    feeds = turbine_blade.FEEDS | {"cut": feed}
+    file.write_text("\n".join(turbine_blade.nx_lines(path, feeds)) + "\n", encoding="ascii")
+    read, part = read_path(file), slice(count)
+    events = tuple(event for event in read.events if event.record < count)
+    arrays = {name: getattr(read, name)[part] for name in ("tip", "axis", "line", "rapid", "feed", "spindle")}
+    return post(machine, replace(read, events=events, **arrays), workpiece=place)
+
+
+def written(law, **options):
+    file = io.BytesIO()
+    linuxcnc_program(law, **options)(file)
+    return file.getvalue().decode("ascii")
+
+
+def shares(machine, joints):
+    """Speeds of the joints as shares of their limits, every cycle."""
+    limits = outward(machine, np.array([[drive.speed for drive in machine.model.drives]]))
+    return np.abs(np.diff(joints, axis=0)) / CYCLE / limits
+
+
+def noise(machine):
+    """What the sampler's digits make of a speed, as a share of its limit."""
+    limits = outward(machine, np.array([[drive.speed for drive in machine.model.drives]]))
+    return 2.0 * DIGIT / CYCLE / limits.min()
+
+
+@pytest.mark.parametrize("machine", PLACES, indirect=True)
+def test_a_posted_program_keeps_the_joints_speeds_and_its_time(machine, linuxcnc, tmp_path):
+    posted = first_passes(machine, tmp_path)
+    assert not posted.off
+    law = plan(posted)
+    text = written(law)
+    run = linuxcnc.run({"program": "part.ngc", "override": 1.5}, {"part.ngc": text})
+    assert "told" not in run.seen, run.seen
+    check_joints(machine, run.poses, run.joints)
+    assert shares(machine, run.joints).max() <= 1.0 + noise(machine)  # from home on
+    part = run.from_line(first_line(text))
+    assert shares(machine, run.joints[part]).max() > 0.7  # it is not just slow
+    assert (part.stop - part.start - 1) * CYCLE == pytest.approx(law.seconds, rel=0.05)
+    assert (part.stop - part.start - 1) * CYCLE == pytest.approx(program_seconds(law), rel=0.02)
+    ends = world(machine, posted.poses[[0, -1]])
+    assert np.abs(run.poses[[part.start, -1]] - ends).max() < 2e-6
+    off = np.array([nearest(run.poses[part], row) for row in world(machine, posted.poses)])
+    assert off.max() < 0.006  # corners are cut by no more than what was asked for
+
+
+def nearest(poses, row):
+    """How near poses come to one, mm and degrees: to the straight lines between neighbours."""
+    step, away = np.diff(poses, axis=0), row - poses[:-1]
+    length = (step**2).sum(1)
+    share = np.clip(np.divide((away * step).sum(1), length, out=np.zeros(len(step)), where=length > 0.0), 0.0, 1.0)
+    return np.sqrt(((away - share[:, None] * step) ** 2).sum(1).min())
+
+
+@pytest.mark.parametrize("machine", ["tricept"], indirect=True)
+def test_with_the_programmed_feed_a_joint_passes_its_speed(machine, linuxcnc, tmp_path):
+    posted = first_passes(machine, tmp_path)
+    text = as_programmed(posted)
+    run = linuxcnc.run({"program": "part.ngc"}, {"part.ngc": text})
+    assert "told" not in run.seen, run.seen
+    part = run.from_line(first_line(text))
+    over = shares(machine, run.joints[part]).max(1) > 1.1
+    record = run.line[part][1:] - first_line(text) + 1
+    cutting = ~posted.path.rapid[np.clip(record, 0, len(posted.path) - 1)]
+    assert (over & cutting).any()
+    check_joints(machine, run.poses[part], run.joints[part])
+
+
+@pytest.mark.parametrize("machine", ["tricept"], indirect=True)
+def test_a_wrist_goes_on_in_its_other_mode_and_stops_are_kept(machine, linuxcnc, tmp_path):
+    posted = first_passes(machine, tmp_path, feed=2500.0, count=25)
+    posted = post(machine, posted.path, mode="-")
+    law = plan(posted, corners="stop")
+    text = written(law)
+    run = linuxcnc.run({"program": "part.ngc"}, {"part.ngc": text})
+    assert "told" not in run.seen, run.seen
+    assert shares(machine, run.joints).max() <= 1.0 + noise(machine)
+    part = run.from_line(first_line(text))
+    assert np.abs(run.joints[part][-1] - outward(machine, posted.joints[-1:])[0]).max() < 2e-6
+    halts = law.curve.corner[1:-1][law.curve.parted[1:-1]]
+    assert len(halts) > 2
+    for row in world(machine, halts):
+        assert np.abs(run.poses - row).max(1).min() < 2e-6

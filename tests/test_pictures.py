@@ -10,7 +10,7 @@ import pytest
 import parakin as pk
 from parakin.export.curves import extremes
 from parakin.export.picture import machine_html, machine_png
-from parakin.export.ranges import shown, used
+from parakin.export.ranges import shown
 from parakin.export.report import report_html
 from parakin.export.scene import around, scene
 from parakin.export.solids import solids
@@ -18,6 +18,7 @@ from parakin.toolpath.cl import read_cl
 from parakin.toolpath.post import post
 from parakin.toolpath.program import Note, ToolPath
 from parakin.toolpath.result import Posted
+from parakin.toolpath.uses import used
 
 OWN = Path(__file__).parent / "machines" / "rpr3.yaml"
 MACHINES = [*pk.machines(), str(OWN)]

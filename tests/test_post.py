@@ -3,7 +3,9 @@
 import csv
 import errno
 import io
+import itertools
 import math
+from dataclasses import replace
 from decimal import ROUND_HALF_EVEN, Decimal
 
 import numpy as np
@@ -15,6 +17,7 @@ from parakin.export.files import write_all
 from parakin.toolpath import table
 from parakin.toolpath.cl import read_cl
 from parakin.toolpath.frames import parse_workpiece, tool_poses, transform
+from parakin.toolpath.gcode import read_gcode
 from parakin.toolpath.post import post
 from parakin.toolpath.program import ToolPath
 
@@ -105,19 +108,17 @@ def test_bad_workpiece(text):
     assert "\n" not in str(caught.value)
 
 
-def test_three_turns_give_the_axis_with_c_zero():
-    machine = pk.load("hexapod")
+@pytest.mark.parametrize("name", ["hexapod", "lambda6"])
+def test_three_turns_give_the_axis_with_c_as_at_home(name):
+    machine = pk.load(name)
     rng = np.random.default_rng(7)
     axis = rng.normal(size=(200, 3))
     axis /= np.linalg.norm(axis, axis=1)[:, None]
     poses, own = tool_poses(machine, np.zeros((200, 3)), axis, transform(0, 0, 0, 0, 0, 0))
-    a, b, c = poses[:, 3:].T
     assert not own
-    assert np.all(c == 0.0)
-    np.testing.assert_allclose(
-        np.stack([np.sin(b) * np.cos(a), -np.sin(a), np.cos(b) * np.cos(a)], axis=1), axis, atol=1e-12
-    )
-    assert np.max(np.abs(np.diff(b))) <= math.pi + 1e-12
+    assert np.all(poses[:, 5] == machine.home[5])
+    np.testing.assert_allclose([rotation(*pose[3:])[:, 2] for pose in poses], axis, atol=1e-12)
+    assert np.max(np.abs(np.diff(poses[:, 4]))) <= math.pi + 1e-12
 
 
 # Continuity.
@@ -429,3 +430,106 @@ def test_c_and_the_wrist_stay_continuous_over_the_pole(name):
     k = np.column_stack([np.sin(b) * np.cos(c), np.sin(b) * np.sin(c), np.cos(b)])
     assert np.abs(k - axis).max() < 1e-12
     assert not posted.offences
+
+
+# Turns as a G-code program gives them.
+
+
+def rotation(a, b, c):
+    return transform(0.0, 0.0, 0.0, a, b, c)[:, :3]
+
+
+def turned_path(machine, turns, tip=None):
+    turns = np.radians(np.atleast_2d(np.asarray(turns, dtype=float)))
+    axis = np.array([rotation(*row)[:, 2] for row in turns])
+    tip = home_of(machine)[0] if tip is None else np.asarray(tip, dtype=float)
+    return replace(path_of(np.tile(tip, (len(turns), 1)), axis), turns=turns)
+
+
+@pytest.mark.parametrize("name", ["hexapod", "lambda6"])
+def test_three_turns_as_programmed(name):
+    machine = pk.load(name)
+    way = np.linspace(0.0, 1.0, 60)[:, None]
+    path = turned_path(machine, [3.0, -2.0, -200.0] + way * [5.0, 4.0, 900.0])
+    for text, angle in (("0,0,0", 0.0), ("X=3,C=40", 40.0 * DEGREE), ("C=180", math.pi)):
+        posted = post(machine, path, workpiece=text)
+        assert (posted.poses[:, 3:] == path.turns + [0.0, 0.0, angle]).all()  # to the last digit, turn for turn
+
+
+def test_three_turns_in_a_tilted_frame():
+    machine, rng = pk.load("hexapod"), np.random.default_rng(8)
+    ends = np.cumsum(rng.uniform(-150, 150, (30, 3)), axis=0)
+    share = np.linspace(0.0, 1.0, 41)[:-1, None]
+    fine = np.vstack([a + share * (b - a) for a, b in itertools.pairwise(ends)] + [ends[-1:]])
+    few, many = (post(machine, turned_path(machine, t), workpiece="C=25,A=35,B=-50") for t in (ends, fine))
+    frame = few.frame[:, :3]
+    for posted in (few, many):
+        for pose, turns in zip(posted.poses, posted.path.turns, strict=True):
+            np.testing.assert_allclose(rotation(*pose[3:]), frame @ rotation(*turns), atol=4e-15)
+    # A motion of many degrees ends where the same motion in small steps does, turns counted.
+    np.testing.assert_allclose(few.poses[:, 3:], many.poses[::40, 3:], atol=1e-9)
+    assert np.abs(np.diff(many.poses[:, 3:], axis=0)).max() < 1.6  # beside B of 90 deg
+
+
+def test_a_frame_tilted_by_a_rounding_changes_no_turn_count():
+    machine = pk.load("hexapod")
+    path = turned_path(machine, [[1.0, 100.0, 700.0], [2.0, 100.0, -1000.0], [400.0, 95.0, -1000.0]])
+    plain, tilted = (post(machine, path, workpiece=f"A={a},C=30").poses[:, 3:] for a in (0, 1e-7))
+    np.testing.assert_allclose(tilted, plain, atol=1e-7)
+    assert (tilted != plain).any()
+
+
+def test_turns_through_b_of_90_degrees():
+    machine = pk.load("hexapod")
+    b = np.array([80.0, 88.0, 90.0 - 1e-9, 90.0, 91.0, 100.0, 90.0, 89.0])
+    path = turned_path(machine, np.column_stack([np.full(8, 10.0), b, np.full(8, 20.0)]))
+    posted = post(machine, path, workpiece="A=1e-8")
+    np.testing.assert_allclose(posted.poses[:, 3:], path.turns, atol=1e-7)
+    for pose, turns in zip(posted.poses, path.turns, strict=True):
+        np.testing.assert_allclose(rotation(*pose[3:]), posted.frame[:, :3] @ rotation(*turns), atol=1e-9)
+
+
+@pytest.mark.parametrize("name", ["tricept", "orthoglide5_head", "orthoglide5_table"])
+def test_b_and_c_as_programmed(name):
+    machine = pk.load(name)
+    path = turned_path(machine, [[0, 10, 400], [0, 5, 420], [0, 0, 500], [0, -8, 500], [0, -12, 480]])
+    posted = post(machine, path, workpiece="C=-15")
+    assert (posted.poses[:, 3:] == path.turns[:, 1:] + [0.0, -15.0 * DEGREE]).all()
+    tilted = post(machine, path, workpiece="C=-15,A=2")  # from the axis
+    b, c = tilted.poses[:, 3:].T
+    k = np.column_stack([np.sin(b) * np.cos(c), np.sin(b) * np.sin(c), np.cos(b)])
+    np.testing.assert_allclose(k, path.axis @ tilted.frame[:, :3].T, atol=1e-12)
+    with_a = turned_path(machine, [[8, 0, 10], [9, 0, 300], [10, 0, 720]])
+    posted = post(machine, with_a)
+    b, c = posted.poses[:, 3:].T
+    k = np.column_stack([np.sin(b) * np.cos(c), np.sin(b) * np.sin(c), np.cos(b)])
+    np.testing.assert_allclose(k, with_a.axis, atol=1e-12)
+    np.testing.assert_allclose(c - c[0], np.radians([0, 290, 710]), atol=1e-9)  # evenly about Z, so the turns count
+
+
+def test_a_tool_may_spin_where_it_is_round():
+    machine = pk.load("linear_delta")
+    assert post(machine, turned_path(machine, [[0, 0, 0], [0, 0, 200], [0, 0, 900]])).off == 0
+    posted = post(machine, turned_path(machine, [[0, 0, 0], [0, 3, 200], [1, 0, 0]]))
+    assert [posted.limits[b - 1] if b else "" for b in posted.broken] == ["", "tilt", "tilt"]
+
+
+def test_planar_machines_turn_as_programmed(tmp_path):
+    machine = planar(tmp_path, "Z")
+    path = turned_path(machine, [[0, 0, 5], [0, 0, -20], [0, 0, 12]], [10, 300, 0])
+    np.testing.assert_array_equal(post(machine, path, workpiece="C=3").poses[:, 2], path.turns[:, 2] + 3 * DEGREE)
+    origin = replace(path, tip=np.zeros((3, 3)))
+    nearly = post(machine, origin, workpiece="X=10,Y=300,A=0.001,C=3")  # within what may lean
+    assert nearly.off == 0
+    np.testing.assert_allclose(nearly.poses[:, 2], path.turns[:, 2] + 3 * DEGREE, atol=1e-8)
+    machine = planar(tmp_path, "Y")
+    path = turned_path(machine, [[0, 5, 0], [0, -20, 0], [0, 12, 0], [0, 12, 50], [3, 12, 0]], [10, 0, 300])
+    posted = post(machine, path)
+    np.testing.assert_allclose(posted.poses[:3, 2], path.turns[:3, 1], atol=1e-15)
+    assert [posted.limits[b - 1] if b else "" for b in posted.broken] == ["", "", "", "tilt", "tilt"]
+
+
+def test_gcode_from_its_file_to_the_hexapod(tmp_path):
+    (part := tmp_path / "part.ngc").write_text("G21 G90\nG0 X0 Y0 Z-950\nG1 A5 B-3 C12.5 F500\nG1 X10 C372.5\nM2\n")
+    posted = post(pk.load("hexapod"), read_gcode(part))
+    np.testing.assert_allclose(np.degrees(posted.poses[:, 3:]), [[0, 0, 0], [5, -3, 12.5], [5, -3, 372.5]], atol=1e-12)

@@ -13,6 +13,11 @@ if TYPE_CHECKING:
     from .analysis.workspace import Workspace, workspace
     from .kinematics.direct import Solution
     from .machine import Machine
+    from .toolpath.feed.law import Law
+    from .toolpath.job import Job, prepare
+    from .toolpath.place import Placement, placed
+    from .toolpath.program import ToolPath
+    from .toolpath.reading import read_path
 
 __version__ = "0.1.0"
 __all__ = [
@@ -20,15 +25,22 @@ __all__ = [
     "DescriptionError",
     "InputError",
     "InputErrors",
+    "Job",
+    "Law",
     "Machine",
     "NoMethodError",
     "ParakinError",
+    "Placement",
     "PoseError",
     "Solution",
+    "ToolPath",
     "Workspace",
     "atlas",
     "load",
     "machines",
+    "placed",
+    "prepare",
+    "read_path",
     "workspace",
 ]
 
@@ -63,10 +75,17 @@ def load(name: str | PathLike[str], parameters: Mapping[str, float | str] | None
 
 _LAZY = {
     "Atlas": "analysis.atlas",
+    "Job": "toolpath.job",
+    "Law": "toolpath.feed.law",
     "Machine": "machine",
+    "Placement": "toolpath.place",
     "Solution": "kinematics.direct",
+    "ToolPath": "toolpath.program",
     "Workspace": "analysis.workspace",
     "atlas": "analysis.atlas",
+    "placed": "toolpath.place",
+    "prepare": "toolpath.job",
+    "read_path": "toolpath.reading",
     "workspace": "analysis.workspace",
 }
 

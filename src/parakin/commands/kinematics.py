@@ -11,8 +11,8 @@ from cyclopts import Parameter
 
 from ..errors import InputError
 from .console import announce_compiling, fixed, print_json, rim, rim_unit, say, table
+from .offences import offence_json, offence_line
 from .options import OFF_LIMITS, Json, Mode, Name, Sizes, machine_of, row
-from .post import offence_json, offence_line
 
 if TYPE_CHECKING:
     from ..kinematics.direct import Solution
@@ -155,7 +155,7 @@ class _Result:
     ) -> None:
         """Print or write the result; ``what`` was asked for, ``joints`` or ``pose``."""
         for offence in offences:
-            say(offence_line(str(csv), offence, "row") if csv else f"pose: {offence.text}")
+            say(offence_line(f"{csv}:{offence.line}", offence, "row") if csv else f"pose: {offence.text}")
         if output is not None:
             from ..export.files import write_all
 

@@ -3,19 +3,20 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Literal
 
 from cyclopts import Parameter
 
-from ..errors import InputError
-from .console import Progress, announce_compiling, fixed, print_json, rim, rim_unit, table
+from ..errors import InputError, PoseError
+from .console import Progress, announce_compiling, print_json
 from .options import OFF_LIMITS, Json, Mode, Sizes, machine_names, machine_of
 
 if TYPE_CHECKING:
     from ..export.files import Content
-    from ..toolpath.result import Offence, Posted
-
-_NOTES = 5  # remarks on the file that are printed
+    from ..machine import Machine
+    from ..toolpath.job import Job
+    from ..toolpath.place import Placement
+    from ..toolpath.program import ToolPath
 
 
 def post(
@@ -24,149 +25,144 @@ def post(
     *,
     machine: Annotated[str, Parameter(name=["--machine", "-m"], completer=machine_names)],
     workpiece: Annotated[str | None, Parameter(allow_leading_hyphen=True)] = None,
+    place: Annotated[str | None, Parameter(allow_leading_hyphen=True)] = None,
     mode: Mode = None,
+    target: Literal["linuxcnc", "joints"] | None = None,
+    force: Annotated[bool, Parameter(negative=())] = False,
+    tolerance: float = 0.01,
+    angle_tolerance: float = 0.05,
     arc_tolerance: float = 0.01,
+    corners: Literal["round", "stop"] = "round",
+    rate: float | None = None,
     output: Annotated[Path, Parameter(name=["--output", "-o"])] = Path(),
     parquet: bool = False,
     json: Json = False,
     sizes: Sizes = None,
 ) -> int:
-    """Joints, limits and a report for a tool path.
+    """A tool path checked everywhere and timed; joints, a report, and programs for the controller.
 
-    Writes PART.joints.csv and PART.report.html. The exit code is 0 if every record is within the machine's limits,
-    3 if one is not (the files are written all the same), 2 for input that can't be read.
+    Writes PART.joints.csv and PART.report.html. The exit code is 0 if the machine can run the path, 3 if it can't
+    (table and report are written all the same, a program only with --force), 2 for input that can't be read.
 
     Parameters
     ----------
     part
-        The CL file, of CATIA (APT) or Siemens NX.
+        The CL file, of CATIA (APT) or Siemens NX, or a G-code program.
     machine
         A shipped machine's name (see parakin machines) or a YAML file.
     workpiece
         Where the part lies, on top of the file's own frame: x,y,z[,a,b,c] in mm and degrees, or X=10,Z=-1400,C=30.
+    place
+        Find where the part lies best instead, within bounds: X=-100:100,Y=-100:100,C=-180:180.
+    target
+        Write a program too: linuxcnc, which moves the tool straight (PART.linuxcnc.ngc), or joints, for controllers
+        that know no kinematics (PART.joints.ngc).
+    force
+        Write the program even if the path is off limits; its header says so.
+    tolerance
+        How far the tool's tip may be off the programmed path, in mm.
+    angle_tolerance
+        How far the tool's axis may lean off the programmed one, in degrees.
     arc_tolerance
         How far the lines that replace an arc may lie off it, in mm.
+    corners
+        Round them within the tolerance, or stop at them.
+    rate
+        Write setpoints too, so many a second: PART.setpoints.csv.
     output
         Folder for the files.
     parquet
-        Write PART.joints.parquet too.
+        Write the tables as .parquet too.
     """
-    from ..toolpath.frames import parse_workpiece
+    from math import isfinite, radians
+
+    from ..toolpath.frames import composed, parse_workpiece
 
     chosen = machine_of(machine, sizes)
+    if place is not None and workpiece is not None:
+        raise InputError("--place finds the workpiece's pose; expected it or --workpiece", "--place")
     frame = None if workpiece is None else parse_workpiece(workpiece)
-    if not 0.0 < arc_tolerance < float("inf"):
-        raise InputError("expected a length above zero, in mm", "--arc-tolerance")
+    lengths = {"--tolerance": tolerance, "--angle-tolerance": angle_tolerance, "--arc-tolerance": arc_tolerance}
+    for option, value in lengths.items():
+        if not (value > 0.0 and isfinite(value)):
+            unit = "an angle above zero, in degrees" if "angle" in option else "a length above zero, in mm"
+            raise InputError(f"expected {unit}", option)
     announce_compiling()
     from ..export.files import write_all
-    from ..export.report import report_html
-    from ..toolpath import table as joint_table
-    from ..toolpath.cl import read_cl
-    from ..toolpath.post import post as post_path
+    from ..toolpath.job import prepare
+    from ..toolpath.reading import read_path
+    from .post_summary import as_json, summary
 
     with Progress() as progress:
-        path = read_cl(part, arc_tolerance=arc_tolerance, progress=progress.part("reading", 0.0, 0.2))
-        posted = post_path(
-            chosen, path, workpiece=frame, mode=mode, progress=progress.part("computing the joints", 0.2, 0.6)
-        )
-        saying = progress.part("writing the table", 0.7, 0.9 if parquet else 1.0)
-        files: dict[str, tuple[str, Content]] = {
-            "table": (f"{part.stem}.joints.csv", joint_table.csv_writer(posted, saying))
-        }
-        if parquet:
-            saying = progress.part("writing the table", 0.9, 1.0)
-            files["parquet"] = (f"{part.stem}.joints.parquet", joint_table.parquet_writer(posted, saying))
-        files["report"] = (f"{part.stem}.report.html", report_html(posted))
+        path = read_path(
+            part, arc_tolerance=arc_tolerance, workpiece=None if place else composed(frame, None),
+            progress=progress.part("reading", 0.0, 0.1),
+        )  # fmt: skip
+        placement = None
+        if place is not None:
+            placement = _placement(chosen, path, place, mode, progress)
+            frame, mode = placement.workpiece, placement.mode
+        job = prepare(
+            chosen, path, workpiece=frame, mode=mode, target=target or "linuxcnc", tolerance=tolerance,
+            axis_tolerance=radians(angle_tolerance), corners=corners,
+            progress=progress.part("checking and timing", 0.3, 0.7),
+        )  # fmt: skip
+        files, missing = _contents(part.stem, job, target, force, rate, parquet, progress)
         paths = write_all(output, dict(files.values()))
-    written = {kind: str(path) for kind, path in zip(files, paths, strict=True)}
+    written = {kind: str(name) for kind, name in zip(files, paths, strict=True)}
     if json:
-        print_json(as_json(posted, written))
+        print_json(as_json(job, written, placement, missing))
     else:
-        print(summary(posted, written))
-    return OFF_LIMITS if posted.off else 0
+        print(summary(job, written, placement, missing))
+    return 0 if job.runs and not missing else OFF_LIMITS
 
 
-def summary(posted: Posted, written: dict[str, str]) -> str:
-    """The account for people; its last line names the report."""
-    path, machine = posted.path, posted.machine
-    verdict = "all within the limits"
-    if posted.first is not None:
-        verdict = f"{posted.off:,} off limits, the first in line {posted.first.line}"
-    lines = [f"{path.source} on {machine.name}: {len(path):,} records, {verdict}", ""]
-    header = ("joint", "from", "to", "", "limits")
-    lines.append(table([_range_row(joint) for joint in _ranges(posted)], header, " rr"))
-    lines += ["", *(offence_line(path.source, offence, "record") for offence in posted.offences)]
-    lines += [f"{path.source}:{note.line}: note: {note.text}" for note in path.notes[:_NOTES]]
-    if len(path.notes) > _NOTES:
-        lines.append(f"{len(path.notes) - _NOTES} more notes in the report")
-    if lines[-1]:
-        lines.append("")
-    return "\n".join([*lines, *(f"{kind:<8}{name}" for kind, name in written.items())])
+def _placement(machine: Machine, path: ToolPath, place: str, mode: str | None, progress: Progress) -> Placement:
+    from ..toolpath.place import parse_bounds, placed
+
+    return placed(machine, path, parse_bounds(place), mode=mode, progress=progress.part("placing the part", 0.1, 0.3))
 
 
-def _range_row(joint: dict[str, Any]) -> tuple[str, ...]:
-    def number(value: float | None) -> str:
-        return "-" if value is None or value != value else fixed(value, 3)
+def _contents(
+    stem: str, job: Job, target: str | None, force: bool, rate: float | None, parquet: bool, progress: Progress
+) -> tuple[dict[str, tuple[str, Content]], list[str]]:
+    """The files by their kinds, with their names; and why some that were asked for are not among them."""
+    from ..export.report import report_html
+    from ..toolpath import setpoint_table
+    from ..toolpath import table as joint_table
 
-    def end(value: float) -> str:
-        return f"{value:,.3f}".rstrip("0").rstrip(".") if abs(value) < float("inf") else "-"
-
-    limits = f"{end(joint['low'])} to {end(joint['high'])}"
-    return joint["joint"], number(joint["min"]), number(joint["max"]), joint["unit"], limits
-
-
-def _ranges(posted: Posted) -> list[dict[str, Any]]:
-    import numpy as np
-
-    rows = []
-    for drive, values in zip(posted.machine.model.drives, posted.joints.T, strict=True):
-        low, high, least, most = (
-            rim(float(v), drive.unit) for v in (drive.low, drive.high, np.fmin.reduce(values), np.fmax.reduce(values))
-        )
-        rows.append(
-            {"joint": drive.name, "unit": rim_unit(drive.unit), "min": least, "max": most, "low": low, "high": high}
-        )
-    return rows
-
-
-def offence_line(source: str, offence: Offence, what: str) -> str:
-    """``part.cls:214: leg d2 would be 1,533.2 mm, limit 1,520 (12 records)``."""
-    several = f" (the worst of {offence.count:,} {what}s)" if offence.count > 1 else ""
-    return f"{source}:{offence.line}: {offence.text}{several}"
-
-
-def offence_json(offence: Offence | None) -> dict[str, Any] | None:
-    if offence is None:
-        return None
-    return {
-        "limit": offence.limit,
-        "text": offence.text,
-        "record": offence.record,
-        "line": offence.line,
-        "value": rim(offence.value, offence.unit),
-        "bound": rim(offence.bound, offence.unit),
-        "excess": rim(offence.excess, offence.unit),
-        "unit": rim_unit(offence.unit),
-        "count": offence.count,
-    }
+    posted, law, missing = job.posted, job.law, list[str]()
+    saying = progress.part("writing the tables", 0.7, 0.9)
+    files: dict[str, tuple[str, Content]] = {"table": (f"{stem}.joints.csv", joint_table.csv_writer(posted, saying))}
+    if parquet:
+        files["parquet"] = (f"{stem}.joints.parquet", joint_table.parquet_writer(posted, saying))
+    if rate is not None:
+        if law is None:
+            missing.append(f"no setpoints: {job.unplanned}")
+        else:
+            saying = progress.part("writing the setpoints", 0.9, 1.0)
+            files["setpoints"] = (f"{stem}.setpoints.csv", setpoint_table.setpoints_csv(law, rate, saying))
+            if parquet:
+                writer = setpoint_table.setpoints_parquet(law, rate, saying)
+                files["setpoints-parquet"] = (f"{stem}.setpoints.parquet", writer)
+    if target is not None:
+        try:
+            files["program"] = (f"{stem}.{target}.ngc", _program(job, target, force))
+        except PoseError as error:
+            missing.append(f"no program: {error}")
+    files["report"] = (f"{stem}.report.html", report_html(posted, law, job.unplanned, job.waits))
+    return files, missing
 
 
-def as_json(posted: Posted, written: dict[str, str]) -> dict[str, Any]:
-    """The account for programs: mm and degrees, null where a value does not exist or there is no bound."""
-    path = posted.path
-    return {
-        "schema": "parakin.post/1",
-        "part": path.source,
-        "machine": posted.machine.name,
-        "mode": posted.mode,
-        "verdict": "off limits" if posted.off else "ok",
-        "records": len(path),
-        "off_limits": posted.off,
-        "frame": posted.frame.tolist(),
-        "joints": _ranges(posted),
-        "offences": [offence_json(offence) for offence in posted.offences],
-        "first": offence_json(posted.first),
-        "worst": offence_json(posted.worst),
-        "notes": [{"line": note.line, "text": note.text} for note in path.notes],
-        "files": written,
-    }
+def _program(job: Job, target: str, force: bool) -> Content:
+    from ..export.programs import joint_program, linuxcnc_program
+    from ..toolpath.offences import place
+
+    posted = job.posted
+    if posted.first is not None and not force:
+        raise PoseError("the path is off limits; --force writes it all the same")
+    if job.law is None:
+        raise PoseError(job.unplanned)
+    broken = "\n".join(f"{place(posted, offence)}: {offence.text}" for offence in posted.offences)
+    write = linuxcnc_program if target == "linuxcnc" else joint_program
+    return write(job.law, forced=broken or None)

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from html import escape
-from math import ceil, degrees, inf, isfinite
+from math import ceil, degrees, isfinite
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .figures import FAINT, FONT, INK, Figure, Trace, numbers
-from .ranges import Use, edge
+from ..toolpath.uses import Use
+from .figures import Figure, Trace, numbers
+from .panels import Panel, stacked
+from .ranges import edge
 
 if TYPE_CHECKING:
     from ..toolpath.result import Posted
@@ -20,7 +22,6 @@ Indices = NDArray[np.int64]
 
 POINTS = 4000  # a curve
 _ALL_POINTS = 36_000  # of all curves together, for machines with many joints
-_ROW, _GAP = 118, 34  # px: a curve's height, and what parts it from the next
 
 
 def extremes(values: Floats, most: int) -> Indices:
@@ -31,56 +32,37 @@ def extremes(values: Floats, most: int) -> Indices:
     n = len(values)
     if n <= most:
         return np.arange(n)
-    size = ceil(n / max(1, most // 3))
-    padded = np.full(ceil(n / size) * size, np.nan)
-    padded[:n] = values
-    grid = padded.reshape(-1, size)
-    start = np.arange(len(grid)) * size
-    gone = np.isnan(grid)
-    low = start + np.where(gone, inf, grid).argmin(axis=1)
-    high = start + np.where(gone, -inf, grid).argmax(axis=1)
-    lost = (start + gone.argmax(axis=1))[gone.any(axis=1)]
-    kept = np.unique(np.concatenate([[0, n - 1], low, high, lost]))
-    return kept[kept < n]
+    return extremes_within(values, np.arange(0, n, ceil(n / max(1, most // 3))))
+
+
+def extremes_within(values: Floats, starts: Indices) -> Indices:
+    """As :func:`extremes`, in stretches that begin at ``starts``, ascending from 0."""
+    stretch = np.repeat(np.arange(len(starts)), np.diff(starts, append=len(values)))
+    kept = [np.array([0, len(values) - 1])]
+    least, most = np.fmin.reduceat(values, starts), np.fmax.reduceat(values, starts)
+    for told in (values == least[stretch], values == most[stretch], np.isnan(values)):
+        at = np.flatnonzero(told)
+        kept.append(at[np.diff(stretch[at], prepend=-1) > 0])  # the first in its stretch
+    return np.unique(np.concatenate(kept))
 
 
 def joint_curves(posted: Posted, uses: list[Use]) -> tuple[Figure, int]:
     """One curve a joint over the records, and the figure's height in px; ``uses`` are the joints'."""
-    count = len(uses)
-    height = count * (_ROW + _GAP) + 46
-    most = min(POINTS, _ALL_POINTS // count)
-    traces: list[Trace] = []
-    layout: Figure = {"height": height, "showlegend": False, "hovermode": "closest", "font": {**FONT, "color": INK}}
-    layout |= {"margin": {"l": 62, "r": 16, "t": 26, "b": 44}, "plot_bgcolor": "#fff", "paper_bgcolor": "#fff"}
-    layout |= {"shapes": [], "annotations": []}
-    inner = height - 70
-    for row, (use, values) in enumerate(zip(uses, posted.joints.T, strict=True)):
-        number = "" if row == 0 else str(row + 1)
-        scale = degrees(1.0) if use.unit == "rad" else 1.0
-        top = 1.0 - row * (_ROW + _GAP) / inner
-        traces += _curve(posted, use, values, scale, most, number)
-        axis: Figure = {
-            "domain": [max(0.0, top - _ROW / inner), top],
-            "gridcolor": FAINT,
-            "zeroline": False,
-            "nticks": 5,
-        }
-        axis |= {"range": _range(use, scale), "tickformat": ",", "linecolor": "#cfd8dc", "showline": True}
-        layout[f"yaxis{number}"] = axis
-        layout["shapes"] += _bounds(use, scale, number)
-        layout["annotations"].append(_heading(use, top))
-    last = "" if count == 1 else str(count)
-    axis = {
-        "title": {"text": "record, counted from 0", "font": {"size": 12}},
-        "gridcolor": FAINT,
-        "zeroline": False,
-        "tickformat": ",",
-    }
-    layout["xaxis"] = axis | {"anchor": f"y{last}", "rangemode": "nonnegative"}
-    return {"data": traces, "layout": layout}, height
+    most = min(POINTS, _ALL_POINTS // len(uses))
+    rows = []
+    for use, values in zip(uses, posted.joints.T, strict=True):
+        traces = _curve(posted, use, values, degrees(1.0) if use.unit == "rad" else 1.0, most)
+        rows.append([panel_of(use, _heading(use), traces)])
+    return stacked(rows, "record, counted from 0")
 
 
-def _curve(posted: Posted, use: Use, values: Floats, scale: float, most: int, number: str) -> list[Trace]:
+def panel_of(use: Use, heading: str, traces: list[Trace], ticks: str = ",") -> Panel:
+    """A panel for a bounded quantity, in mm or degrees, that shows what is used of it and the limits near by."""
+    scale = degrees(1.0) if use.unit == "rad" else 1.0
+    return Panel(heading, traces, _range(use, scale), [b * scale for b in (use.low, use.high)], ticks)
+
+
+def _curve(posted: Posted, use: Use, values: Floats, scale: float, most: int) -> list[Trace]:
     """The curve, and over it in red what lies beyond a limit."""
     kept = extremes(values, most)
     y, lines = values[kept], posted.path.line[kept].tolist()
@@ -90,7 +72,6 @@ def _curve(posted: Posted, use: Use, values: Floats, scale: float, most: int, nu
         "type": "scatter",
         "x": kept.tolist(),
         "customdata": lines,
-        "yaxis": f"y{number}",
         "name": escape(use.name),
     }
     base["hovertemplate"] = (
@@ -123,20 +104,14 @@ def _range(use: Use, scale: float) -> list[float]:
     return [(low - pad) * scale, (high + pad) * scale]
 
 
-def _bounds(use: Use, scale: float, number: str) -> list[Figure]:
-    shape: Figure = {"type": "line", "xref": "paper", "x0": 0, "x1": 1, "yref": f"y{number}"}
-    shape["line"] = {"color": "#c62828", "width": 1.2, "dash": "dash"}
-    shown_from, shown_to = _range(use, scale)
-    bounds = [b * scale for b in (use.low, use.high)]
-    return [shape | {"y0": b, "y1": b} for b in bounds if shown_from <= b <= shown_to]
-
-
-def _heading(use: Use, top: float) -> Figure:
+def _heading(use: Use) -> str:
     limits = "no limits"
     if isfinite(use.low) or isfinite(use.high):
         low, high = (edge(v, use.unit) if isfinite(v) else "–" for v in (use.low, use.high))
         limits = f"limits {low} to {high}"
-    unit = "°" if use.unit == "rad" else use.unit
-    text = f"<b>{escape(use.name)}</b>  <span style='color:#607d8b'>[{unit}]  {limits}</span>"
-    return {"text": text, "x": 0, "xref": "paper", "y": top, "yref": "paper", "xanchor": "left", "yanchor": "bottom",
-            "showarrow": False, "font": {"size": 13}}  # fmt: skip
+    return heading(use.name, "°" if use.unit == "rad" else use.unit, limits)
+
+
+def heading(name: str, unit: str, limits: str) -> str:
+    """A panel's heading, in HTML."""
+    return f"<b>{escape(name)}</b>  <span style='color:#607d8b'>[{unit}]  {limits}</span>"

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import dataclass
 from html import escape
 from typing import TYPE_CHECKING
 
@@ -9,9 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..machine import Machine
+from ..toolpath.uses import relative_margin
 from .curves import Indices, extremes
 from .figures import Figure, Trace, machine_traces, numbers, scene_layout
-from .ranges import relative_margin
 from .scene import Points, Scene, scene
 
 if TYPE_CHECKING:
@@ -23,11 +25,25 @@ _CELLS = 27  # of the workspace's sample along each side
 _SCALE = [[0.0, "#c62828"], [0.12, "#ef8a3c"], [0.35, "#e8c547"], [0.65, "#4aa58c"], [1.0, "#1f5f99"]]
 
 
-def path_figures(posted: Posted, relative: Floats) -> tuple[Figure, Figure, int]:
-    """The machine with the path, the path close up, and the record at which the machine stands.
+@dataclass(frozen=True, eq=False)
+class PathView:
+    """A path in space.
 
-    ``relative`` (n,) is the least relative margin of every record.
+    machine, path : the machine with it, and the path close up
+    record : at which the machine stands
+    place : (3, 4) the frame in which poses are drawn there
+    normal : of the plane of a planar machine, else None
     """
+
+    machine: Figure
+    path: Figure
+    record: int
+    place: Points
+    normal: Points | None
+
+
+def path_view(posted: Posted, relative: Floats) -> PathView:
+    """The figures of a path; ``relative`` (n,) is the least relative margin of every record."""
     record = _telling(posted, relative)
     machine = posted.machine
     home = scene(machine)
@@ -48,11 +64,11 @@ def path_figures(posted: Posted, relative: Floats) -> tuple[Figure, Figure, int]
         far += machine_traces(home, "machine at home", size, "#78909c")
     cloud, reach = _workspace(posted, place, tips, size)
     far += cloud
-    far += [_motion(posted, tips, kept, False, {"color": "#00695c", "width": 3}, "tool path")]
+    far += [_motion(posted, tips, kept, False, {"color": "#00695c", "width": 3}, "tool path")[0]]
     far += _red(posted, tips)
     boxes = [drawn.box, home.box, np.array([tips[kept].min(0), tips[kept].max(0)]), *reach]
     machine_figure = {"data": far, "layout": scene_layout(boxes, drawn.normal)}
-    return machine_figure, _close_up(posted, relative, tips, drawn), record
+    return PathView(machine_figure, _close_up(posted, relative, tips, drawn), record, place, drawn.normal)
 
 
 def tip_points(machine: Machine, poses: Floats) -> Points:
@@ -76,64 +92,83 @@ def _close_up(posted: Posted, relative: Floats, tips: Points, drawn: Scene) -> F
     bar = {"title": {"text": "least margin", "font": {"size": 12}}, "thickness": 12, "len": 0.6, "x": 1.0}
     bar |= {"tickformat": ".0%", "tickfont": {"size": 11}}
     line = {"width": 4, "colorscale": _SCALE, "cmin": 0.0, "cmax": top, "showscale": True, "colorbar": bar}
-    cut = _motion(posted, tips, kept, False, line, "feed", relative)
-    rapid = _motion(posted, tips, kept, True, {"color": "#90a4ae", "width": 2, "dash": "dash"}, "rapid")
+    cut, at = _motion(posted, tips, kept, False, line, "feed")
+    cut["showlegend"] = False  # the colour bar stands for it
+    cut["line"]["color"] = numbers(np.nan_to_num(relative[at], nan=0.0), 3)
+    rapid, _ = _motion(posted, tips, kept, True, {"color": "#90a4ae", "width": 2, "dash": "dash"}, "rapid")
     traces = [trace for trace in (cut, rapid, *_red(posted, tips)) if trace["x"]]
     points = tips[kept]
     return {"data": traces, "layout": scene_layout([np.array([points.min(0), points.max(0)])], drawn.normal)}
 
 
 def _kept(posted: Posted, tips: Points, relative: Floats, most: int) -> Indices:
-    """Records to draw: the extremes of every coordinate and of the margin, and the rapids' ends unless too many."""
-    if len(tips) <= most:
-        return np.arange(len(tips))
-    parts = [extremes(values, most // 4) for values in (*tips.T, relative)]
-    turns = np.flatnonzero(np.diff(posted.path.rapid))
+    return telling((*tips.T, relative), np.flatnonzero(np.diff(posted.path.rapid)), most)
+
+
+def telling(values: Sequence[Floats], turns: Indices, most: int) -> Indices:
+    """Points to draw of a path: every value's extremes, and those before and after ``turns`` unless too many."""
+    if len(values[0]) <= most:
+        return np.arange(len(values[0]))
+    parts = [extremes(column, most // len(values)) for column in values]
     if 2 * len(turns) <= most:
         parts += [turns, turns + 1]
     return np.unique(np.concatenate(parts))
 
 
-def _motion(
-    posted: Posted, tips: Points, kept: Indices, rapid: bool, line: Figure, name: str, colour: Floats | None = None
-) -> Trace:
-    """The motions in feed or in rapid as one line with gaps; a motion ends at its record."""
-    wanted = posted.path.rapid[kept[1:]] == rapid
+def _motion(posted: Posted, tips: Points, kept: Indices, rapid: bool, line: Figure, name: str) -> tuple[Trace, Indices]:
+    """The motions in feed or in rapid, and the record of each point; a motion ends at its record."""
+    trace, at = stroke(tips, kept, posted.path.rapid[kept[1:]] == rapid, line, name)
+    trace["customdata"] = posted.path.line[at].tolist()
+    trace["hovertemplate"] = "line %{customdata}<br>%{x:,.2f}, %{y:,.2f}, %{z:,.2f}<extra>%{fullData.name}</extra>"
+    return trace, at
+
+
+def stroke(points: Points, kept: Indices, wanted: NDArray[np.bool_], line: Figure, name: str) -> tuple[Trace, Indices]:
+    """The ``wanted`` (k - 1,) of the motions between kept points (k,) as one line with gaps, and its points."""
     begins = wanted & ~np.concatenate([[False], wanted[:-1]])
     ends = np.arange(1, len(kept))
     # For each motion its end, and where a run begins first a gap and the run's first point.
     triples = np.column_stack([np.full(len(ends), -1), ends - 1, ends])
     order = triples[np.column_stack([begins, begins, wanted])]
     at = kept[np.maximum(order, 0)]
-    x, y, z = np.where(order[:, None] < 0, np.nan, tips[at]).T
+    x, y, z = np.where(order[:, None] < 0, np.nan, points[at]).T
     trace: Trace = {"type": "scatter3d", "mode": "lines", "name": name, "line": dict(line)}
-    trace |= {"x": numbers(x, 2), "y": numbers(y, 2), "z": numbers(z, 2), "customdata": posted.path.line[at].tolist()}
-    trace["hovertemplate"] = "line %{customdata}<br>%{x:,.2f}, %{y:,.2f}, %{z:,.2f}<extra>%{fullData.name}</extra>"
-    if colour is not None:
-        trace["showlegend"] = False  # the colour bar stands for it
-        trace["line"]["color"] = numbers(np.nan_to_num(colour[at], nan=0.0), 3)
-    return trace
+    return trace | {"x": numbers(x, 2), "y": numbers(y, 2), "z": numbers(z, 2)}, at
 
 
 def _red(posted: Posted, tips: Points) -> list[Trace]:
-    """Records off limits; a sample of them if there are many, with the first and every limit's worst."""
+    """Places off limits; a sample of them if there are many, with the first and every limit's worst."""
     off = np.flatnonzero(posted.broken)
-    if not len(off):
+    told = [offence for offence in (*posted.offences, posted.first) if offence is not None]
+    if not told:
         return []
-    told = [offence.record for offence in (*posted.offences, posted.first) if offence is not None]
-    at = np.unique(np.concatenate([off[:: max(1, len(off) // _MARKED)], told]).astype(np.int64))
-    x, y, z = tips[at].T
+    records = [offence.record for offence in told if offence.share == 1.0]
+    at = np.unique(np.concatenate([off[:: max(1, len(off) // _MARKED)], records]).astype(np.int64))
     limits = [posted.limits[i - 1] if i else "" for i in posted.broken[at].tolist()]
     text = [f"line {line}: {escape(name)}" for line, name in zip(posted.path.line[at].tolist(), limits, strict=True)]
-    trace: Trace = {
-        "type": "scatter3d",
-        "mode": "markers",
-        "name": "off limits",
-        "hovertext": text,
-        "hoverinfo": "text",
-    }
-    trace |= {"x": numbers(x, 2), "y": numbers(y, 2), "z": numbers(z, 2), "marker": {"size": 3, "color": "#d50000"}}
-    return [trace]
+    points = tips[at]
+    between = [offence for offence in told if offence.share < 1.0]
+    if between:
+        to, share = np.array([o.record for o in between]), np.array([o.share for o in between])[:, None]
+        points = np.vstack([points, (1.0 - share) * tips[to - 1] + share * tips[to]])
+        text += [f"line {o.line}, on the way: {escape(o.limit)}" for o in between]
+    x, y, z = points.T
+    trace: Trace = {"type": "scatter3d", "mode": "markers", "name": "off limits", "hovertext": text}
+    trace |= {"hoverinfo": "text", "marker": {"size": 3, "color": "#d50000"}}
+    return [trace | {"x": numbers(x, 2), "y": numbers(y, 2), "z": numbers(z, 2)}, *_strays(posted, tips)]
+
+
+def _strays(posted: Posted, tips: Points) -> list[Trace]:
+    """Motions that break a limit which both their records keep; a sample of them if there are many."""
+    if posted.strays is None or not posted.motions_off:
+        return []
+    to = np.flatnonzero(posted.strays)
+    to = to[:: max(1, len(to) // _MARKED)]
+    kept = np.unique(np.concatenate([to - 1, to]))
+    wanted = np.isin(kept[1:], to) & (np.diff(kept) == 1)
+    trace, at = stroke(tips, kept, wanted, {"color": "#d50000", "width": 5}, "motions off limits")
+    trace["hovertext"] = [f"to line {line}" for line in posted.path.line[at].tolist()]
+    return [trace | {"hoverinfo": "text"}]
 
 
 # The workspace around the path.

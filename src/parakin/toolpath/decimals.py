@@ -122,3 +122,18 @@ def rows(
         out[at] = _LF
         at += 1
     return at
+
+
+@nb.njit(cache=True, nogil=True)
+def cells(
+    values: NDArray[np.float64], scales: NDArray[np.float64], digits: NDArray[np.int64], out: NDArray[np.uint8]
+) -> int:
+    """A table of numbers (rows, columns) as CSV into ``out``; returns how many bytes. Scales and digits as above."""
+    at = 0
+    last = values.shape[1] - 1
+    for n in range(len(values)):
+        for c in range(last + 1):
+            at = _decimal(values[n, c], scales[c], digits[c], out, at)
+            out[at] = _COMMA if c < last else _LF
+            at += 1
+    return at

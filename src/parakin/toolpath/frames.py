@@ -3,29 +3,28 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..algebra import apply
 from ..errors import InputError
-from ..kinematics.path import neighbours, over_the_pole, swings, unwound
 from ..machine import Machine
-from ..model.structures import Free
 from ..quantities import ANGLE, LENGTH, QuantityError, nearest, quantity, shown
 from .cl_words import LARGEST, is_number, number
 from .program import Floats
+from .programmed import programmed, rotations
+from .turning import BLOCK, ROUNDED, turning_of
+from .windings import thickened
+
+__all__ = ["ROUNDED", "OwnLimit", "composed", "parse_value", "parse_workpiece", "tool_poses", "transform"]
 
 _SOURCE = "--workpiece"
 _AXES = "XYZABC"
-_BLOCK = 1 << 13  # records
 _FORM = 'expected x,y,z or x,y,z,a,b,c (mm, degrees), or names as in "X=10,Z=-1400,C=30"'
 
 LEAN = 1e-4  # rad a tool axis may lean where the machine can't tilt it: rounding in the file
-ROUNDED = 2e-6  # rad from a turning axis: a CL file with six decimals can't tell the angle about it
 OFF_PLANE = 1e-6  # mm, the same across the plane of a machine that works in one
 
 
@@ -121,120 +120,47 @@ class OwnLimit:
         return ~(np.abs(self.values) <= self.tolerance)
 
 
-def tool_poses(machine: Machine, tip: Floats, axis: Floats, frame: Floats) -> tuple[Floats, tuple[OwnLimit, ...]]:
+def tool_poses(
+    machine: Machine, tip: Floats, axis: Floats, frame: Floats, turns: Floats | None = None
+) -> tuple[Floats, tuple[OwnLimit, ...]]:
     """Poses for tool tips and axes, (n, 3) each, and what the machine's axes can't follow; ``frame`` leads into M.
 
-    A turn about the tool's axis is free: C is 0 where the machine turns three ways, and B and C tell the axis's
-    direction where it turns two (B from 0 to 180°, but below 0 where a path has passed over B = 0, so that C does not
-    jump by half a turn; at B = 0 C keeps the neighbour's value).
+    ``turns`` (n, 3), rad, are A, B, C as a program gives them, with the axes that follow from them. A machine that
+    turns three ways, or turns its tool about the tool's own axis, takes the whole orientation; one with B and C takes
+    these as programmed where A is 0 and the frame turns about Z alone: see :func:`~.programmed.programmed`.
+
+    Else a turn about the tool's axis is free: C is as at home where the machine turns three ways, and B and C tell the
+    axis's direction where it turns two (B from 0 to 180°, but below 0 where a path has passed over B = 0, so that C
+    does not jump by half a turn; at B = 0 C keeps the neighbour's value).
+
+    Raises :class:`PoseError` for a motion of thousands of turns, where they have to be followed.
     """
-    count = len(tip)
-    turns = [letter for letter in machine.axes if letter in "ABC"]
-    turning = _turning(machine, turns)
-    poses = np.empty((count, len(machine.axes)))
-    free: Any = np.zeros(count, bool)
-    lean = np.zeros(count) if turning.lean else None
-    off = {letter: np.empty(count) for letter in "XYZ" if letter not in machine.axes}
-    rotation, origin = np.ascontiguousarray(frame[:, :3].T), frame[:, 3]
-    # In blocks the many intermediate arrays stay in the cache.
-    for start in range(0, count, _BLOCK):
-        part = slice(start, start + _BLOCK)
-        point, k = tip[part] @ rotation + origin, axis[part] @ rotation
-        for column, letter in enumerate("XYZ"):
-            into = off[letter][part] if letter in off else poses[part, machine.axes.index(letter)]
-            into[...] = point[:, column]
-        angles, free[part], leaning = turning.angles(k)
-        for letter, values in zip(turns, angles, strict=True):
-            poses[part, machine.axes.index(letter)] = values
-        if lean is not None:
-            lean[part] = leaning
-    if turns == ["B", "C"]:
-        _go_on_over_the_pole(poses, machine.axes.index("B"), machine.axes.index("C"), np.flatnonzero(~free))
-    if turning.wound is not None:
-        column = machine.axes.index(turning.wound)
-        poses[:, column] = _continuous(poses[:, column], free)
+    turning = turning_of(machine)
+    rotation = frame[:, :3]
+    poses = np.empty((len(tip), len(machine.axes)))
+    off = {letter: np.empty(len(tip)) for letter in "XYZ" if letter not in machine.axes}
+    into = [off[letter] if letter in off else poses[:, machine.axes.index(letter)] for letter in "XYZ"]
+    across = np.ascontiguousarray(rotation.T)
+    for start in range(0, len(tip), BLOCK):
+        part = slice(start, start + BLOCK)
+        for place, values in zip(into, (tip[part] @ across + frame[:, 3]).T, strict=True):
+            place[part] = values
+    angles = None if turns is None else programmed(turning, turns, frame)
+    if angles is None or turning.lean:
+        pointed, lean = turning.along(axis, rotation)
+        if angles is None and turns is not None and turning.letters:
+            thick, at = thickened(turns, range(3))
+            if len(thick) > len(turns):
+                pointed = turning.along(rotations(thick)[:, :, 2], rotation)[0][at]
+        angles = pointed if angles is None else angles
+    for column, letter in enumerate(turning.letters):
+        poses[:, machine.axes.index(letter)] = angles[:, column]
     own = [OwnLimit(letter, "mm", values, OFF_PLANE, _off_plane(letter)) for letter, values in off.items()]
-    if lean is not None:
-        own.insert(
-            0, OwnLimit("tilt", "rad", lean, LEAN, f"tool axis would lean {{}}, the machine {turning.lean}".format)
-        )
+    if turning.lean:
+        text = f"tool axis would lean {{}}, the machine {turning.lean}".format
+        own.insert(0, OwnLimit("tilt", "rad", lean, LEAN, text))
     return poses, tuple(own)
 
 
 def _off_plane(letter: str) -> Callable[[str], str]:
     return f"{letter} would be {{}}, the machine works in {letter} = 0".format
-
-
-def _go_on_over_the_pole(poses: Floats, b: int, c: int, at: Any) -> None:
-    """B and C that point the same way, with B of the other sign where that keeps C continuous; in place."""
-    here = poses[at][:, [c, b]]
-    if swings(here):
-        there = np.column_stack([here[:, 0] + math.pi, -here[:, 1]])
-        across = over_the_pole(here, there)
-        poses[at[across], c], poses[at[across], b] = there[across].T
-
-
-def _continuous(angle: Floats, free: Any) -> Floats:
-    """The angle without jumps; where it is free, it keeps the neighbour's value."""
-    if free.any():
-        angle = np.zeros_like(angle) if free.all() else neighbours(angle, free)
-    jumps = bool(np.any(np.abs(np.diff(angle)) > math.pi))
-    return unwound(angle) if jumps else angle
-
-
-@dataclass(frozen=True)
-class _Turning:
-    """How a machine points its tool.
-
-    angles : from axes k (n, 3) in M: an angle for each of its turns, where the one that is wound is free, and how far
-        the tool then still leans off k
-    wound : the letter that is made continuous
-    lean : what the machine does where k asks for another tilt; empty where it can have every one
-    """
-
-    angles: Callable[[Floats], tuple[Sequence[Floats], Any, Any]]
-    wound: str | None
-    lean: str = ""
-
-
-def _turning(machine: Machine, turns: list[str]) -> _Turning:
-    if len(turns) == 3:
-        return _Turning(_three_turns, "B")
-    if turns == ["B", "C"]:
-        return _Turning(_two_turns, "C")
-    structure = machine.model.structure
-    assert isinstance(structure, Free)
-    fixed = np.array(apply(structure.mount, apply(structure.tool, (0.0, 0.0, 1.0))), dtype=np.float64)
-    upright = abs(fixed[2] - 1.0) < 1e-12
-    about = np.eye(3)["ABC".index(turns[0])] if turns else fixed
-    share = float(about @ fixed)
-    if 1.0 - share * share < 1e-18:  # no turn, or one about the tool's own axis: it changes nothing
-        lean = "keeps it upright" if upright else "keeps its direction"
-        return _Turning(lambda k: ([np.zeros(len(k))] * len(turns), False, _angle(k, fixed)), None, lean)
-    return _Turning(lambda k: _one_turn(k, about, fixed, share), turns[0], "can't follow")
-
-
-def _two_turns(k: Floats) -> tuple[Sequence[Floats], Any, Any]:
-    kx, ky, kz = k.T
-    square = kx * kx + ky * ky
-    return [np.arctan2(np.sqrt(square), kz), np.arctan2(ky, kx)], square < ROUNDED * ROUNDED, None
-
-
-def _three_turns(k: Floats) -> tuple[Sequence[Floats], Any, Any]:
-    """C = 0: k = Ry(B)·Rx(A)·z = (sin B cos A, -sin A, cos B cos A)."""
-    kx, ky, kz = k.T
-    square = kx * kx + kz * kz
-    return [np.arctan2(-ky, np.sqrt(square)), np.arctan2(kx, kz), np.zeros(len(k))], square < ROUNDED * ROUNDED, None
-
-
-def _one_turn(k: Floats, about: Floats, fixed: Floats, share: float) -> tuple[Sequence[Floats], Any, Any]:
-    """The angle about ``about`` that brings ``fixed`` nearest to k; ``share`` is the fixed axis's part along it."""
-    along = k @ about
-    across = np.sqrt(np.maximum(0.0, 1.0 - along * along))
-    angle = np.arctan2(k @ np.cross(about, fixed), k @ fixed - share * along)
-    return [angle], across * across < ROUNDED * ROUNDED, np.abs(np.arctan2(along, across) - math.asin(share))
-
-
-def _angle(k: Floats, fixed: Floats) -> Floats:
-    angle: Floats = np.arctan2(np.linalg.norm(np.cross(k, fixed), axis=1), k @ fixed)
-    return angle

@@ -22,7 +22,11 @@ _BLOCK = 1 << 20  # bytes read at a time
 
 
 def read_gcode(
-    path: str | os.PathLike[str], *, arc_tolerance: float = 0.01, progress: Progress | None = None
+    path: str | os.PathLike[str],
+    *,
+    arc_tolerance: float = 0.01,
+    workpiece: Floats | None = None,
+    progress: Progress | None = None,
 ) -> ToolPath:
     """Read a G-code program.
 
@@ -33,6 +37,8 @@ def read_gcode(
     ----------
     path : the file
     arc_tolerance : mm, the largest distance of the straight lines that replace an arc from it
+    workpiece : (3, 4) rotation and origin (mm) of the work in the machine's coordinates, as the path will be placed on
+        the machine; G53 needs it and is refused without
     progress : called now and then with the fraction read, 0 to 1
 
     Returns
@@ -45,19 +51,21 @@ def read_gcode(
     """
     if not 0.0 < arc_tolerance < float("inf"):
         raise InputError("expected a length above zero, in mm", "arc_tolerance")
+    if workpiece is not None and (np.shape(workpiece) != (3, 4) or not np.isfinite(workpiece).all()):
+        raise InputError("expected a transform of shape (3, 4)", "workpiece")
     source = os.fsdecode(path)
     with opened(path, source) as file, np.errstate(all="ignore"):
         size = os.fstat(file.fileno()).st_size
-        return _Reader(source, size, arc_tolerance).read(file, progress or (lambda fraction: None))
+        return _Reader(source, size, arc_tolerance, workpiece).read(file, progress or (lambda fraction: None))
 
 
 class _Reader:
     """Lines from a file, blocks from lines."""
 
-    def __init__(self, source: str, size: int, arc_tolerance: float):
+    def __init__(self, source: str, size: int, arc_tolerance: float, workpiece: Floats | None = None):
         self.source = source
         self.size = size
-        self.motion = GcodeMotion(arc_tolerance)
+        self.motion = GcodeMotion(arc_tolerance, workpiece)
         self.state = GcodeState(self.motion)
         self.line = 0  # lines completed
         self.started = False

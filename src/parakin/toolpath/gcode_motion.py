@@ -10,10 +10,12 @@ from .gcode_arcs import PLANES, arc_points, centre_from_radius
 from .gcode_codes import g_name
 from .gcode_records import FEED, LINE, RAPID, SECONDS, SPINDLE, WIDTH, Rows
 from .gcode_words import whole
+from .program import Floats
 
 AXES = "XYZABC"
 STILL = 1e-7  # mm: where X, Y and Z move less, RS274/NGC as LinuxCNC has it takes F for degrees per minute
 CENTRES = "IJK"
+_MOST_POINTS = 20_000_000  # of all arcs: some GB of memory
 
 
 class GcodeMotion:
@@ -22,12 +24,15 @@ class GcodeMotion:
     here : X, Y, Z, A, B, C; X, Y, Z are NaN until they are given, A, B, C 0
     mode : the motion code in force in tenths, None if there is none
     rate, feed : F as written, and in mm/min; NaN until given
+    workpiece : (3, 4) rotation and origin (mm) of the work in the machine's coordinates; None if not known
     """
 
-    def __init__(self, arc_tolerance: float):
+    def __init__(self, arc_tolerance: float, workpiece: Floats | None):
         self.rows = Rows()
         self.notes = NoteBook()
         self.arc_tolerance = arc_tolerance
+        self.workpiece = workpiece
+        self._points = 0  # of arcs
         self.here = [math.nan, math.nan, math.nan, 0.0, 0.0, 0.0]
         self.turned = [False, False, False]  # whether A, B, C were given
         self.mode: int | None = None
@@ -40,12 +45,12 @@ class GcodeMotion:
         self.rpm = math.nan
 
     def set_feed(self, rate: float) -> None:
-        if rate < 0.0:
-            refuse("a feed below zero")
         self.rate, self.feed = rate, rate * self.scale
 
     def end(self, values: dict[str, float], line: int, machine: bool) -> list[float]:
-        """Where a block's axis words lead, taken out of it; ``machine`` where G53 makes them absolute."""
+        """Where a block's axis words lead, taken out of it; ``machine`` where G53 tells them in the machine's own
+        coordinates, in which the work is shifted by the workpiece's origin.
+        """
         end = list(self.here)
         for k, letter in enumerate(AXES):
             value = values.pop(letter, None)
@@ -53,6 +58,8 @@ class GcodeMotion:
                 continue
             if k < 3:
                 value *= self.scale
+                if machine and self.workpiece is not None:
+                    value -= float(self.workpiece[k, 3])
             elif not self.turned[k - 3]:
                 self.turned[k - 3] = True
                 if self.rows.count and value != 0.0:
@@ -100,6 +107,12 @@ class GcodeMotion:
         points, fraction = arc_points(
             self.here[:3], end[:3], centre, plane, clockwise, turns, self.scale != 1.0, self.arc_tolerance
         )
+        self._points += len(points)
+        if self._points > _MOST_POINTS:
+            refuse(
+                f"arcs of more than {_MOST_POINTS} points in all at a tolerance of {self.arc_tolerance:g} mm; "
+                "expected a coarser one"
+            )
         rows = np.empty((len(points), WIDTH))
         rows[:, :3] = points
         first, last = np.array(self.here[3:]), np.array(end[3:])
@@ -145,7 +158,7 @@ class GcodeMotion:
             if "F" not in values:
                 refuse(f"{name} in G93 without F; expected F, the inverse of its minutes, in every such block")
         elif not self.rate > 0.0:
-            refuse(f"{name} without a feed; expected F above zero before it or with it")
+            refuse(f"{name} without a feed; expected F above zero with it or before it, behind any G94")
 
     def _seconds(self, values: dict[str, float]) -> float:
         """The time that G93 gives a block, NaN in G94."""

@@ -3,15 +3,16 @@
 import math
 from typing import Literal
 
+import numpy as np
+
 from .cl_words import INCH, refuse
 from .gcode_codes import TIP_CONTROL, g_name
 from .gcode_motion import AXES, GcodeMotion
-from .gcode_words import Block, whole
+from .gcode_words import NO_PROGRAM, Block, whole
 from .program import Event
 
 _DWELL, _MACHINE, _BLEND = 40, 530, 640
 _NO_OFFSETS = (921, 922)
-_MACHINE_NOTE = "G53: machine coordinates, read as ones of the work system, whose offset this file does not tell"
 _TIP_NOTE = "tool centre point control (G43.4 or TRAORI): every point is read as the tool's tip, with it and without"
 _DELETED_NOTE = "a block that a slash lets the operator leave out: it is read"
 _SPACED_NOTE = "blanks within a number: it is read without them, as RS274/NGC has it"
@@ -28,6 +29,7 @@ class GcodeState:
         self.units_given = False
         self.tool: dict[str, float | str] = {}
         self.finished = False
+        self._begun = False  # whether there was a block with words
         self._selected = math.nan
         self._speed = math.nan
         self._spindle: int | None = None
@@ -43,6 +45,7 @@ class GcodeState:
             self.motion.notes.add(line, _SPACED_NOTE)
         for message in block.messages:
             self._event(line, "(" + "".join(c if c.isprintable() else "?" for c in message) + ")")
+        self._name(block, line)
         named = {letter for letter in AXES if letter in block.values}
         moves = self._moves(block, named)
         self._feed(block, line, moves)
@@ -67,6 +70,13 @@ class GcodeState:
     def _event(self, line: int, text: str) -> None:
         self.events.append(Event(self.motion.rows.count, line, " ".join(text.split())))
 
+    def _name(self, block: Block, line: int) -> None:
+        if block.program is not None:
+            if self._begun or self.motion.rows.count:
+                refuse(NO_PROGRAM)
+            self._event(line, f"O{block.program}")
+        self._begun = self._begun or bool(block.values or block.g or block.m or block.program)
+
     # motion
 
     def _moves(self, block: Block, named: set[str]) -> bool:
@@ -87,7 +97,6 @@ class GcodeState:
         machine = block.g.get("once") == _MACHINE
         if machine:
             self._check_machine(moves)
-            motion.notes.add(line, _MACHINE_NOTE)
         if not moves:
             return
         before = motion.rows.count
@@ -104,6 +113,15 @@ class GcodeState:
             refuse("G53 expected axis words with G0 or G1")
         if self.motion.incremental:
             refuse("G53 in G91; expected G90")
+        motion = self.motion
+        if motion.workpiece is None:
+            refuse(
+                "G53: where the work lies in the machine's coordinates this file does not tell; expected a workpiece"
+            )
+        if not np.array_equal(motion.workpiece[:, :3], np.eye(3)):
+            refuse(
+                "G53 while the work is turned in the machine's coordinates; expected a workpiece that is only shifted"
+            )
         if self._offset is not None:
             refuse(
                 f"G53 while a tool length offset ({self._offset}) is in force: "
@@ -115,12 +133,13 @@ class GcodeState:
     def _feed(self, block: Block, line: int, moves: bool) -> None:
         motion, values = self.motion, block.values
         if "feed" in block.g:
-            inverse = block.g["feed"] == 930
-            if motion.inverse_time and not inverse:
-                motion.rate = motion.feed = math.nan  # what F said in G93 was no feed
-            motion.inverse_time = inverse
+            motion.inverse_time = block.g["feed"] == 930
+            if not motion.inverse_time:
+                motion.rate = motion.feed = math.nan  # G94 forgets F even where it is in force, as LinuxCNC has it
         if "F" not in values:
             return
+        if values["F"] < 0.0:
+            refuse("a feed below zero")
         if not motion.inverse_time:
             unit = block.g.get("units")
             if unit is not None and (unit == 200) != (motion.scale != 1.0):

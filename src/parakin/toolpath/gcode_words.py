@@ -9,6 +9,10 @@ from .gcode_codes import TIP_CONTROL, g_group, g_name, m_group
 
 LONGEST = 4000  # characters in one line; RS274/NGC allows 256, longer comments are met all the same
 VALUES = "ABCFHIJKPQRSTXYZ"  # letters of words that carry a value
+NO_PROGRAM = (
+    "O words (subroutines, branches) are not read; expected plain blocks, "
+    "or O and a program number alone in the first block"
+)
 
 _BLANKS = " \t"
 _CONTROL = re.compile(r"[\x00-\x08\x0a-\x1f\x7f]")
@@ -21,11 +25,18 @@ _TOKEN = re.compile(
 )
 _MOST_M = 4  # M codes in a block, as RS274/NGC has it
 _WHOLE = 1e-3  # of a word whose value is a whole number
+_MESSAGE = re.compile(r"\s*msg\s*,", re.IGNORECASE)
+_PYTHON = re.compile(r"\s*py\s*,", re.IGNORECASE)
+_CONTROLS = {
+    "\0": "a NUL byte: a binary or UTF-16 file; expected plain text",
+    "\r": "a carriage return within a line; expected lines that end in LF or CR LF",
+}
 _WORDY = {
     "#": "parameters (#) are not read; expected plain numbers",
     "[": "expressions ([...]) are not read; expected plain numbers",
-    "O": "O words (subroutines, branches, program numbers) are not read; expected plain blocks",
+    "O": NO_PROGRAM,
     "%": "a % within the program; expected it alone on its line, both at the beginning and at the end, or not at all",
+    ":": "a colon (program and main block numbers) is not read; expected O and a number, or N and a number",
     "/": "a slash within a block; expected it only at the block's beginning",
     ")": "a closing bracket without a comment to close",
 }
@@ -38,6 +49,7 @@ class Block:
     values : by letter, the numbers as written; whoever acts on a word takes it out
     g, m : the code of each modal group, G codes in tenths
     messages : the comments that are messages, without their brackets
+    program : the digits of a program number, which leaves no room for other words
     deleted : whether the line begins with a slash
     spaced : whether a number has blanks within
     """
@@ -46,17 +58,18 @@ class Block:
     g: dict[str, int] = field(default_factory=dict)
     m: dict[str, int] = field(default_factory=dict)
     messages: list[str] = field(default_factory=list)
+    program: str | None = None
     deleted: bool = False
     spaced: bool = False
 
 
-def parse(text: str) -> Block:
-    """The words of a line, without blanks around it."""
+def parse(text: str, letters: str = VALUES) -> Block:
+    """The words of a line, without blanks around it; ``letters`` are those of words that carry a value."""
     if len(text) > LONGEST:
         refuse(f"a line of more than {LONGEST} characters; expected a block of G-code")
     control = _CONTROL.search(text)
     if control is not None:
-        refuse(f"a control character ({ord(control[0])}); expected plain text")
+        refuse(_CONTROLS.get(control[0], f"a control character ({ord(control[0])}); expected plain text"))
     block = Block()
     at = 0
     if text.startswith("/"):
@@ -65,15 +78,19 @@ def parse(text: str) -> Block:
     while at < len(text):
         found = _TOKEN.match(text, at)
         if found is None:
+            if block.program is not None and text[at].isalpha():
+                refuse(NO_PROGRAM)
             _refuse_at(text, at)
         letter = found["letter"]
         if letter is not None:
-            _word(block, letter.upper(), found["number"].rstrip(_BLANKS), first)
+            _word(block, letter.upper(), found["number"].rstrip(_BLANKS), first, letters)
             first = False
         elif found["name"] is not None:
             _code(block, TIP_CONTROL)
-        elif found["comment"] is not None and re.match(r"\s*msg\s*,", found["comment"], re.IGNORECASE):
+        elif found["comment"] is not None and _MESSAGE.match(found["comment"]):
             block.messages.append(found["comment"])
+        elif _PYTHON.match(found["comment"] or found["rest"] or ""):
+            refuse("a comment that LinuxCNC runs as Python; expected plain blocks")
         at = found.end()
     return block
 
@@ -85,13 +102,15 @@ def whole(letter: str, value: float) -> int:
     return round(value)
 
 
-def _word(block: Block, letter: str, digits: str, first: bool) -> None:
+def _word(block: Block, letter: str, digits: str, first: bool, letters: str) -> None:
     plain = "".join(digits.split())
+    if block.program is not None:
+        refuse(NO_PROGRAM)
     block.spaced = block.spaced or plain != digits
     value = float(plain)
     if not abs(value) <= LARGEST:
         refuse(f"{letter}: {quoted(plain)} is out of range")
-    if letter in VALUES:
+    if letter in letters:
         if letter in block.values:
             refuse(f"two {letter} words in a block; expected one")
         block.values[letter] = value
@@ -114,9 +133,11 @@ def _word(block: Block, letter: str, digits: str, first: bool) -> None:
         if value < 0.0:
             refuse("a line number below zero")
     elif letter == "O":
-        refuse(_WORDY["O"])
+        if not first or block.deleted or not plain.isdigit():
+            refuse(NO_PROGRAM)
+        block.program = plain
     else:
-        refuse(f"{letter}{plain}: not a word this reader knows; expected words of {' '.join('GMN' + VALUES)}")
+        refuse(f"{letter}{plain}: not a word this reader knows; expected words of {' '.join('GMN' + letters)}")
 
 
 def _code(block: Block, tenths: int) -> None:

@@ -13,10 +13,11 @@ from ..machine import Machine
 from ..model.limits import Limit
 from .frames import OwnLimit
 from .program import Floats
-from .result import Offence
+from .result import Offence, Posted
 
 _BLOCK = 1 << 16  # records whose margins are held at once
 _NO_JOINTS = "reach"  # the path's own limit for what no margin tells
+TURNS, SINGULARITY, UNTOLD = "turns", "singularity", "untold"  # what only motions break
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,7 +95,7 @@ def judge(
         tallies[-1].add(lost, np.full(len(lost), np.inf))
 
     def offence(index: int, record: int, excess: float) -> Offence:
-        said = _said(machine, parts[index], excess) if index < len(parts) else _own(own, index - len(parts), record)
+        said = said_of(parts[index], excess) if index < len(parts) else _own(own, index - len(parts), record)
         count = tallies[index].count
         return Offence(limits[index], said.text, record, int(lines[record]), *said.numbers, count)
 
@@ -105,54 +106,61 @@ def judge(
     start_record = min(tallies[i].first for i in seen)
     start_index = int(broken[start_record]) - 1
     first = offence(start_index, start_record, tallies[start_index].first_excess)
-    worst = max(offences, key=lambda o: _gravity(machine, o))
-    return Judgement(broken, limits, tuple(offences), first, worst)
+    return Judgement(broken, limits, tuple(offences), first, gravest(machine, offences))
 
 
 @dataclass(frozen=True)
-class _Said:
+class Said:
     """An offence's text and its value, bound, unit and excess."""
 
     text: str
     numbers: tuple[float, float, str, float]
 
 
-def _own(own: Sequence[OwnLimit], index: int, record: int) -> _Said:
+def _own(own: Sequence[OwnLimit], index: int, record: int) -> Said:
     if index == len(own):
-        return _Said("the machine can't take this pose", (math.nan, math.nan, "1", math.inf))
+        return Said("the machine can't take this pose", (math.nan, math.nan, "1", math.inf))
     limit = own[index]
     value = float(limit.values[record])
-    return _Said(limit.text(measure(value, limit.unit, 0.0)), (value, 0.0, limit.unit, abs(value)))
+    return Said(limit.text(measure(value, limit.unit, 0.0)), (value, 0.0, limit.unit, abs(value)))
 
 
-def _said(machine: Machine, limit: Limit, excess: float) -> _Said:
+def said_of(limit: Limit, excess: float) -> Said:
+    """What to say of a limit of the machine that is broken by ``excess``, its margin below 0."""
     if limit.side == "reach":
-        return _reach(machine, limit, excess)
+        return _reach(limit, excess)
     if not math.isfinite(excess):
-        return _Said(f"{limit.subject} can't be told at this pose", (math.nan, limit.bound, limit.unit, math.inf))
+        return Said(f"{limit.subject} can't be told at this pose", (math.nan, limit.bound, limit.unit, math.inf))
     value = limit.value(-excess)
     text = f"{limit.subject} would be {measure(value, limit.unit, limit.bound)}, limit {bound(limit.bound, limit.unit)}"
-    return _Said(text, (value, limit.bound, limit.unit, excess))
+    return Said(text, (value, limit.bound, limit.unit, excess))
 
 
-def _reach(machine: Machine, limit: Limit, excess: float) -> _Said:
+def _reach(limit: Limit, excess: float) -> Said:
     if limit.unit == "1":
-        return _Said("the head can't point the tool that way", (-excess, 0.0, "1", excess))
+        return Said("the head can't point the tool that way", (-excess, 0.0, "1", excess))
     text = f"{limit.subject} can't close"
     if not math.isfinite(excess):
-        return _Said(text, (math.nan, 0.0, "mm", math.inf))
+        return Said(text, (math.nan, 0.0, "mm", math.inf))
     if limit.bound > 0.0:
         rod = limit.bound
         needed = math.sqrt(rod * rod + excess)
         shown = measure(needed - rod, "mm", 0.0)
-        return _Said(f"{text}: its rod would have to be {shown} longer", (needed, rod, "mm", needed - rod))
-    return _Said(f"{text} there", (-math.sqrt(excess), 0.0, "mm", math.sqrt(excess)))
+        return Said(f"{text}: its rod would have to be {shown} longer", (needed, rod, "mm", needed - rod))
+    return Said(f"{text} there", (-math.sqrt(excess), 0.0, "mm", math.sqrt(excess)))
+
+
+def gravest(machine: Machine, offences: Sequence[Offence]) -> Offence:
+    """The one farthest off."""
+    return max(offences, key=lambda offence: _gravity(machine, offence))
 
 
 def _gravity(machine: Machine, offence: Offence) -> tuple[bool, float]:
     """What can't be reached at all is worse than what only lies out of range."""
     parts = {limit.name: limit for limit in machine.limit_parts}
     limit = parts.get(offence.limit)
+    if offence.limit == TURNS:
+        return False, offence.excess
     if limit is None or limit.side == "reach":
         return True, offence.excess
     ends = [parts[name].bound for name in _both_ends(limit.name) if name in parts]
@@ -163,6 +171,24 @@ def _gravity(machine: Machine, offence: Offence) -> tuple[bool, float]:
 def _both_ends(name: str) -> tuple[str, str]:
     stem = name.removesuffix(".min").removesuffix(".max")
     return f"{stem}.min", f"{stem}.max"
+
+
+def place(posted: Posted, offence: Offence) -> str:
+    """Where an offence is: ``part.cls:214`` at a record, on a motion ``part.cls:214: 37 % on the way there, X 12.3 Y
+    -40.1 Z -1650.2``; ``from 37 %`` where it begins there and its value is that of a later place."""
+    where = f"{posted.path.source}:{offence.line}"
+    if offence.share >= 1.0:
+        return where
+    start, end = posted.poses[offence.record - 1], posted.poses[offence.record]
+    named = zip(posted.machine.axes, start + offence.begins * (end - start), strict=True)
+    tip = " ".join(f"{letter} {value:.1f}" for letter, value in named if letter in "XYZ")
+    since = "from " if offence.begins < offence.share else ""
+    return f"{where}: {since}{_percent(offence.begins)} % on the way there, {tip}"
+
+
+def _percent(share: float) -> str:
+    percent = 100.0 * share
+    return f"{percent:.0f}" if 1.0 <= percent <= 99.0 else f"{percent:.2f}"
 
 
 def measure(value: float, unit: str, against: float) -> str:

@@ -8,7 +8,7 @@ from typing import Literal
 from ..errors import InputError
 from .cl import Progress, opened, read_cl
 from .gcode import read_gcode
-from .program import ToolPath
+from .program import Floats, ToolPath
 
 _GCODE_SUFFIXES = frozenset((".ngc", ".nc", ".gcode", ".tap", ".cnc"))
 _LOOKED_AT = 1 << 16  # bytes
@@ -22,11 +22,19 @@ _GCODE = re.compile(rb"\s*(?:[%(;]|/?\s*[A-Z]\s*[-+]?\s*\.?\d)", re.IGNORECASE)
 
 
 def read_path(
-    path: str | os.PathLike[str], *, arc_tolerance: float = 0.01, progress: Progress | None = None
+    path: str | os.PathLike[str],
+    *,
+    arc_tolerance: float = 0.01,
+    workpiece: Floats | None = None,
+    progress: Progress | None = None,
 ) -> ToolPath:
-    """Read a CL file or a G-code program, whichever it is; see :func:`read_cl` and :func:`read_gcode`."""
-    reader = read_gcode if sniff(path) == "gcode" else read_cl
-    return reader(path, arc_tolerance=arc_tolerance, progress=progress)
+    """Read a CL file or a G-code program, whichever it is; see :func:`read_cl` and :func:`read_gcode`.
+
+    ``workpiece`` is for G53 in G-code; it does not place the path.
+    """
+    if sniff(path) == "gcode":
+        return read_gcode(path, arc_tolerance=arc_tolerance, workpiece=workpiece, progress=progress)
+    return read_cl(path, arc_tolerance=arc_tolerance, progress=progress)
 
 
 def sniff(path: str | os.PathLike[str]) -> Literal["cl", "gcode"]:

@@ -15,11 +15,12 @@ from .result import Posted
 
 Progress = Callable[[float], None]
 Writer = Callable[[BinaryIO], None]
+Fill = Callable[[int, int, NDArray[np.uint8]], int]  # rows from, to, as text into a buffer; how many bytes
 
 _BATCH = 1 << 14  # rows formatted at a time; a batch's text stays in the cache
 _GROUP = 1 << 18  # rows in one of Parquet's row groups
-_LENGTH_DIGITS, _ANGLE_DIGITS, _FEED_DIGITS = 6, 8, 4
-_DEGREES = 180.0 / math.pi
+LENGTH_DIGITS, ANGLE_DIGITS, _FEED_DIGITS = 6, 8, 4
+DEGREES = 180.0 / math.pi
 
 
 def columns(posted: Posted) -> list[str]:
@@ -51,8 +52,8 @@ def _write_rows(posted: Posted, file: BinaryIO, say: Progress) -> None:
     from .decimals import WIDEST, rows
 
     units = _units(posted)
-    digits = [_ANGLE_DIGITS if unit == "rad" else _LENGTH_DIGITS for unit in units]
-    scales = [10.0**d * (_DEGREES if unit == "rad" else 1.0) for d, unit in zip(digits, units, strict=True)]
+    digits = [ANGLE_DIGITS if unit == "rad" else LENGTH_DIGITS for unit in units]
+    scales = [10.0**d * (DEGREES if unit == "rad" else 1.0) for d, unit in zip(digits, units, strict=True)]
     names = [name.encode() for name in posted.limits]
     path = posted.path
     table = (
@@ -62,11 +63,16 @@ def _write_rows(posted: Posted, file: BinaryIO, say: Progress) -> None:
     )  # fmt: skip
     count = len(path)
     widest = WIDEST * (len(units) + 4) + max(map(len, names), default=0)
+    in_batches(file, count, widest, lambda start, stop, buffer: rows(start, stop, *table, buffer), say)
+
+
+def in_batches(file: BinaryIO, count: int, widest: int, fill: Fill, say: Progress) -> None:
+    """Write ``count`` rows of text, each at most ``widest`` bytes, some at a time."""
     workers = cores() if count > _BATCH else 1
     buffers = [np.empty(widest * min(_BATCH, count), np.uint8) for _ in range(workers + 1)]
 
     def text(start: int, buffer: NDArray[np.uint8]) -> memoryview:
-        return buffer.data[: rows(start, min(start + _BATCH, count), *table, buffer)]
+        return buffer.data[: fill(start, min(start + _BATCH, count), buffer)]
 
     # Each batch is formatted while those before it are written; a buffer is taken up again once its text is out.
     with ThreadPoolExecutor(workers) as pool:
@@ -93,7 +99,7 @@ def parquet_writer(posted: Posted, progress: Progress | None = None) -> Writer:
         kinds = [*types, pa.dictionary(pa.int32(), pa.string())]
         schema = pa.schema(list(zip(names, kinds, strict=True)))
         limits = pa.array(posted.limits, pa.string())
-        path, factors = posted.path, [_DEGREES if unit == "rad" else 1.0 for unit in units]
+        path, factors = posted.path, [DEGREES if unit == "rad" else 1.0 for unit in units]
         axes = len(posted.machine.axes)
         with pq.ParquetWriter(file, schema) as writer:
             for start in range(0, len(path), _GROUP):

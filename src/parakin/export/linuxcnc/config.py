@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from math import degrees, isfinite, pi
+from math import degrees, isfinite
 
 from ...machine import Machine
 from ...model.parts import Drive
 from .extent import extent
 from .module import kinematics_name
+from .rates import ACCELERATION, SPEED, of_axes, slowest
 
-# Speed and acceleration where a machine's description leaves them open, by the drive's unit; mm, rad and s.
-SPEED = {"mm": 200.0, "rad": pi / 3.0}
-ACCELERATION = {"mm": 2000.0, "rad": 10.0 * pi / 3.0}
 _LAG = 0.01  # s: following error allowed, as time at full speed; the simulation lags by 0.001 s or two
 
 _INI = """\
@@ -33,6 +31,10 @@ OPEN_FILE = ./{name}.ngc
 GEOMETRY = {letters}
 DEFAULT_LINEAR_VELOCITY = {jog}
 MAX_LINEAR_VELOCITY = {fast}
+DEFAULT_ANGULAR_VELOCITY = {turn_jog}
+MAX_ANGULAR_VELOCITY = {turn_fast}
+# Faster than programmed the joints would pass their speeds.
+MAX_FEED_OVERRIDE = 1.0
 
 [TASK]
 TASK = milltask
@@ -69,7 +71,10 @@ MAX_LINEAR_ACCELERATION = {acceleration}
 HOME = {home}
 
 # The axes bound the end points of moves. Their ranges hold all poses that the machine can take; whether it can take a
-# certain one the kinematics decides, and the joints' limits.
+# certain one the kinematics decides, and the joints' limits. Their accelerations are more than the drives' own, and so
+# are the speeds of turning axes: LinuxCNC begins and ends every motion that turns the tool as if it stood still there,
+# and could not keep up with a program of short motions otherwise. Programs of parakin post bring speeds that the joints
+# can take; those by hand should go slowly.
 """
 
 
@@ -92,7 +97,7 @@ net tool-change iocontrol.0.tool-change => iocontrol.0.tool-changed
 
 def ini(machine: Machine) -> str:
     """The ini file."""
-    fast, acceleration = _slowest(machine, "mm")
+    (fast, acceleration), turning = of_axes(machine, "mm"), slowest(machine, "rad")[0]
     home = dict(zip(machine.axes, machine.home.tolist(), strict=True))
     head = _INI.format(
         title=" ".join(machine.spec.title.split()),
@@ -104,11 +109,13 @@ def ini(machine: Machine) -> str:
         home=" ".join(number(home.get(axis, 0.0)) for axis in "XYZ"),
         jog=number(0.25 * fast),
         fast=number(fast),
+        turn_jog=number(rim(0.25 * turning, "rad")),
+        turn_fast=number(rim(turning, "rad")),
         acceleration=number(acceleration),
     )
     low, high = (ends.tolist() for ends in extent(machine))
     axes = [
-        _section(f"AXIS_{axis}", [*_range(a, b, unit), *_rates(*_slowest(machine, unit), unit)])
+        _section(f"AXIS_{axis}", [*_range(a, b, unit), *_rates(*of_axes(machine, unit), unit)])
         for axis, unit, a, b in zip(machine.axes, machine.axis_units, low, high, strict=True)
     ]
     at_home = machine.inverse(machine.home).tolist()
@@ -129,14 +136,6 @@ def number(value: float) -> str:
 
 def _section(name: str, lines: Iterable[str]) -> str:
     return "\n".join([f"[{name}]", *lines, ""])
-
-
-def _slowest(machine: Machine, unit: str) -> tuple[float, float]:
-    """Speed and acceleration for the axes of a unit: those of its slowest drive."""
-    drives = [drive for drive in machine.model.drives if drive.unit == unit]
-    speeds = [drive.speed for drive in drives if isfinite(drive.speed)] or [SPEED[unit]]
-    accelerations = [drive.acceleration for drive in drives if isfinite(drive.acceleration)] or [ACCELERATION[unit]]
-    return min(speeds), min(accelerations)
 
 
 def _range(low: float, high: float, unit: str) -> Iterator[str]:

@@ -12,6 +12,7 @@ _ROUNDS, _DRAWS = 40, 16384
 _BEYOND = 0.25  # of the box found so far, on both sides: how far a round looks
 _WIDER = 0.1  # likewise, added at the end for what the draws miss
 _GREATEST = {"A": pi, "B": pi, "C": pi}
+TURNS = 100  # that C may go on turning either way where of the orientation only the tool's axis counts
 
 
 def extent(machine: Machine) -> tuple[Array, Array]:
@@ -34,5 +35,5 @@ def extent(machine: Machine) -> tuple[Array, Array]:
     low, high = np.maximum(low - wider, -most), np.minimum(high + wider, most)
     if machine.axes[3:] == ("B", "C"):  # B may have either sign, and C go on turning
         high[3] = max(-low[3], high[3])
-        low[3:], high[3:] = [-high[3], -2.0 * pi], [high[3], 2.0 * pi]
+        low[3:], high[3:] = [-high[3], -2.0 * pi * TURNS], [high[3], 2.0 * pi * TURNS]
     return np.floor(low / units) * units, np.ceil(high / units) * units

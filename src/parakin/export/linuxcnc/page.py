@@ -36,7 +36,11 @@ Programs are in millimetres and degrees; {frame}.
   ("fails kinematicsInverse"); the drives' ranges LinuxCNC watches itself.
 - Before a move LinuxCNC looks at its end point only; in between it stops where a limit is met.
 - In coordinated moves LinuxCNC bounds the speeds of the axes, not those of the joints. Near a singularity joints run
-  faster than the tool: the program has to carry feeds that keep them within their speeds.
+  faster than the tool: the program has to carry feeds that keep them within their speeds. `parakin post PART --machine
+  {name} --target linuxcnc` writes such programs; run them from home.
+- The axes' accelerations in `{name}.ini` are more than the drives' own, or LinuxCNC could not keep up with short
+  motions that turn the tool. These programs need them; moves by hand should be slow. The feed can't be overridden to
+  more than 100 %.
 {pole}- The tool's length is part of the machine's description. Leave tool length offsets (G43) at 0: LinuxCNC adds them
   along Z, wherever the tool points.
 - Speeds and accelerations that the description does not say were chosen, and are marked so in the ini file.

@@ -1,0 +1,114 @@
+"""From a tool path to all that a controller needs: linearised, checked everywhere, timed."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from math import isfinite
+from typing import Literal, TypeAlias
+
+from ..errors import PoseError
+from ..machine import Machine
+from .between import between
+from .feed import Corners, Law, plan
+from .halts import stops, waiting
+from .linearise import linearised
+from .post import post
+from .program import Floats, ToolPath
+from .result import Posted
+
+Progress = Callable[[float], None]
+Target: TypeAlias = Literal["linuxcnc", "joints"]  # moves the tool straight; moves every joint evenly
+
+TOLERANCE = 0.01  # mm
+AXIS_TOLERANCE = 1e-3  # rad
+
+
+@dataclass(frozen=True, eq=False)
+class Job:
+    """A tool path made ready for a machine and its controller.
+
+    programmed : as it came, on the machine
+    posted : with the records that the controller's interpolation needs, checked between all of them
+    law : the law of time, None where there is none
+    unplanned : why there is none
+    waits : s, that the program waits by its own words, besides the law's
+    """
+
+    programmed: Posted
+    posted: Posted
+    law: Law | None
+    unplanned: str
+    waits: float
+
+    @property
+    def inserted(self) -> int:
+        """How many records were added."""
+        return len(self.posted.path) - len(self.programmed.path)
+
+    @property
+    def runs(self) -> bool:
+        """Whether the machine can run it: nothing is off limits, and nothing but unknown rates of its drives keeps it
+        from having a law."""
+        rated = all(isfinite(drive.speed) or isfinite(drive.acceleration) for drive in self.posted.machine.model.drives)
+        return self.posted.first is None and (self.law is not None or not rated)
+
+    @property
+    def seconds(self) -> float | None:
+        """The cycle time, None where there is no law."""
+        return None if self.law is None else self.law.seconds + self.waits
+
+
+def prepare(
+    machine: Machine,
+    path: ToolPath,
+    *,
+    workpiece: str | Floats | None = None,
+    mode: str | None = None,
+    target: Target = "linuxcnc",
+    tolerance: float = TOLERANCE,
+    axis_tolerance: float = AXIS_TOLERANCE,
+    corners: Corners = "round",
+    progress: Progress | None = None,
+) -> Job:
+    """Post a tool path, insert the points its target needs, check it everywhere, and plan its law of time.
+
+    Parameters
+    ----------
+    machine, path, workpiece, mode : as for :func:`~.post.post`
+    target : what the controller interpolates: ``linuxcnc`` the tool's pose, ``joints`` the joints
+    tolerance, axis_tolerance : mm and rad that tip and axis may be off the programmed path in all: half of each is for
+        the controller's interpolation, half for rounding corners
+    corners : ``round`` or ``stop``, as for :func:`~.feed.plan`
+    progress : called now and then with the fraction done, 0 to 1
+
+    Raises :class:`PoseError` or :class:`InputError` for what can't be asked. What the machine can't do raises nothing:
+    it is an offence of :attr:`Job.posted` or the reason in :attr:`Job.unplanned`.
+    """
+    say = progress or (lambda fraction: None)
+
+    def part(begin: float, end: float) -> Progress:
+        return lambda fraction: say(begin + (end - begin) * fraction)
+
+    programmed = post(machine, path, workpiece=workpiece, mode=mode, progress=part(0.0, 0.1))
+    # The pose's angles go straight in either case, for the law is planned so; the tip then is on its line already.
+    steps = 1 if target == "linuxcnc" else 2
+    lean = 0.5 * axis_tolerance / steps
+    posted, law, why = programmed, None, ""
+    try:
+        posted = linearised(posted, "pose", chord=0.5 * tolerance, angle=lean, progress=part(0.1, 0.2))
+        if target == "joints":
+            posted = linearised(posted, "joints", chord=0.5 * tolerance, angle=lean, progress=part(0.2, 0.4))
+    except PoseError as error:
+        why = str(error)
+    posted = between(posted, progress=part(0.4, 0.6))
+    if not why:
+        try:
+            law = plan(
+                posted, corners=corners, tolerance=0.5 * tolerance, axis_tolerance=0.5 * axis_tolerance,
+                stops=stops(posted.path),
+            )  # fmt: skip
+        except PoseError as error:
+            why = str(error)
+    say(1.0)
+    return Job(programmed, posted, law, why, waiting(path))

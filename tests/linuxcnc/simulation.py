@@ -1,0 +1,152 @@
+"""A machine under the real LinuxCNC: headless, apart from everything else here, every servo cycle written down."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import subprocess
+import tempfile
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+import parakin as pk
+from parakin.export.linuxcnc import configuration
+
+HERE = Path(__file__).parent
+MODULES = Path("/usr/lib/linuxcnc/modules")
+NOBODY = 65534
+CYCLE = 1e-3  # s
+# LinuxCNC refuses root, wants fixed keys of shared memory and a lock in /tmp for itself, and ends processes by name.
+ALONE = ["unshare", "--ipc", "--pid", "--mount", "--net", "--fork", "--mount-proc", "--kill-child"]
+ALONE += ["sh", "-c", 'mount -t tmpfs -o mode=1777 none /tmp && exec "$@"', "sh"]
+AS_NOBODY = ["setpriv", f"--reuid={NOBODY}", f"--regid={NOBODY}", "--clear-groups", "env", "-i", "PATH=/usr/bin:/bin"]
+FIELDS = "XYZABCUVW"
+
+
+def why_not():
+    """Why LinuxCNC can't run here, in a few words; nothing if it can."""
+    for tool in ("linuxcnc", "halcompile", "gcc", "unshare", "setpriv"):
+        if not shutil.which(tool):
+            return f"there is no {tool} (Debian's packages: linuxcnc-uspace, linuxcnc-uspace-dev)"
+    if os.geteuid():
+        return "only root can install a kinematics module"
+    if subprocess.run([*ALONE, "true"], capture_output=True).returncode:
+        return "there are no namespaces here, which keep LinuxCNC's runs apart"
+    return ""
+
+
+def trial(name, folder):
+    """A shipped machine under another name, so that no module of the user's is replaced."""
+    text = (Path(pk.__file__).parent / "machines" / f"{name}.yaml").read_text(encoding="utf-8")
+    path = Path(folder) / "trial.yaml"
+    path.write_text(text.replace(f"name: {name}\n", f"name: trial_{name}\n"), encoding="utf-8")
+    return pk.load(path)
+
+
+@dataclass
+class Run:
+    """What came of a run.
+
+    done : the process
+    seen : what the user interface saw
+    line : (n,) of the program, 0 where none runs
+    poses : (n, 9) X Y Z A B C U V W and joints (n, joints), every cycle of coordinated motion, mm and degrees
+    """
+
+    done: subprocess.CompletedProcess
+    seen: dict
+    line: np.ndarray
+    poses: np.ndarray
+    joints: np.ndarray
+
+    def from_line(self, first):
+        """Cycles from a program's line on, while anything moves: a slice."""
+        begin = int(np.argmax(self.line >= first))
+        moving = np.flatnonzero((np.diff(self.poses, axis=0) != 0.0).any(1)[begin:])
+        return slice(begin + int(moving[0]), begin + int(moving[-1]) + 2)
+
+
+def as_programmed(posted):
+    """A posted path as G-code, as a plain post writes it: its own feeds, and rapids at the axes' speeds."""
+    machine = posted.machine
+    rows = np.where(np.array(machine.axis_units) == "rad", np.degrees(posted.poses), posted.poses).tolist()
+    lines = ["G21 G90 G17 G40 G49 G94"]
+    for row, rapid, feed in zip(rows, posted.path.rapid.tolist(), posted.path.feed.tolist(), strict=True):
+        words = " ".join(f"{axis}{value:.6f}" for axis, value in zip(machine.axes, row, strict=True))
+        lines.append(f"G53 G0 {words}" if rapid else f"G53 G1 {words} F{feed:g}")
+    return "\n".join([lines[0], *approached(lines[1]), "G64 P0.005 Q0", *lines[2:], "M2", ""])
+
+
+def approached(first):
+    """To a program's first point in four seconds, and a halt there."""
+    words = " ".join(word for word in first.split() if word[0] in FIELDS)
+    return ["G93 G61", f"G53 G1 {words} F15", "G94"]
+
+
+def first_line(text):
+    """The line (1-based) of a program with which the motion behind its first record begins."""
+    return next(i for i, line in enumerate(text.split("\n"), 1) if line.startswith("G64")) + 1
+
+
+class Simulation:
+    """A configuration as it is written, with a script for its user interface and a sampler."""
+
+    def __init__(self, machine, folder):
+        self.machine, self.folder = machine, Path(folder)
+
+    def run(self, task, programs=None, seconds=60):
+        """Do a task (see ui.py), with G-code programs by their names."""
+        for name, text in (programs or {}).items():
+            path = self.folder / name
+            path.write_bytes(text) if isinstance(text, bytes) else path.write_text(text, encoding="utf-8")
+            os.chown(path, NOBODY, NOBODY)
+        (self.folder / "task.json").write_text(json.dumps(task | {"joints": len(self.machine.joints)}))
+        (self.folder / "seen.json").unlink(missing_ok=True)
+        command = [*ALONE, *AS_NOBODY, f"HOME={self.folder}", "linuxcnc", "-r"]
+        command.append(str(self.folder / f"{self.machine.name}.ini"))
+        done = subprocess.run(
+            command, cwd=self.folder, stdin=subprocess.DEVNULL, capture_output=True, text=True, timeout=seconds
+        )
+        assert (self.folder / "seen.json").exists(), done.stdout + done.stderr
+        seen = json.loads((self.folder / "seen.json").read_text())
+        assert "overrun" not in (self.folder / "samples.txt").read_text(), "cycles are missing"
+        rows = np.loadtxt(self.folder / "samples.txt")
+        rows = rows[rows[:, 0] != 0][:, 1:]
+        axes = len(self.machine.axes)
+        poses = np.zeros((len(rows), 9))
+        poses[:, [FIELDS.index(axis) for axis in self.machine.axes]] = rows[:, 1 : 1 + axes]
+        return Run(done, seen, rows[:, 0].astype(int), poses, rows[:, 1 + axes :])
+
+
+@contextmanager
+def simulated(machine):
+    """A :class:`Simulation`; the kinematics is built and installed, and removed at the end."""
+    with tempfile.TemporaryDirectory(dir="/var/tmp") as name:  # pytest's own folders are closed to others
+        folder, files = Path(name), configuration(machine)
+        ini = files[f"{machine.name}.ini"].replace("DISPLAY = axis", "DISPLAY = ./ui.py")
+        files[f"{machine.name}.ini"] = ini.replace("[KINS]", "HALFILE = sampler.hal\n\n[KINS]")
+        for file, text in (files | {"sampler.hal": sampler(machine)}).items():
+            (folder / file).write_text(text, encoding="utf-8")
+        shutil.copy(HERE / "ui.py", folder)
+        kinematics = f"{machine.name}_kins"
+        try:
+            subprocess.run(["halcompile", "--install", f"{kinematics}.c"], cwd=folder, check=True, capture_output=True)
+            for path in (folder, *folder.iterdir()):
+                os.chown(path, NOBODY, NOBODY)
+            yield Simulation(machine, folder)
+        finally:
+            (MODULES / f"{kinematics}.so").unlink(missing_ok=True)
+
+
+def sampler(machine):
+    """HAL that writes down, every cycle, whether the move is coordinated, the program's line, the axes, the joints."""
+    pins = ["motion.coord-mode", "motion.program-line"]
+    pins += [f"axis.{axis.lower()}.pos-cmd" for axis in machine.axes]
+    pins += [f"joint.{i}.coarse-pos-cmd" for i in range(len(machine.joints))]
+    lines = [f"loadrt sampler depth=16000 cfg=bs{'f' * (len(pins) - 2)}", "addf sampler.0 servo-thread"]
+    lines += [f"net sample-{i} {pin} => sampler.0.pin.{i}" for i, pin in enumerate(pins)]
+    return "\n".join([*lines, ""])

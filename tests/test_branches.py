@@ -1,0 +1,266 @@
+"""Turns and working modes along a path: against every count of turns there is, and against motions cut up finely."""
+
+import itertools
+import math
+from dataclasses import replace
+from importlib.resources import files
+
+import numpy as np
+import pytest
+
+import parakin as pk
+from parakin.toolpath.gcode import axes_of
+from parakin.toolpath.post import post
+from parakin.toolpath.program import ToolPath
+
+DEGREE = math.pi / 180.0
+TURN = 360.0 * DEGREE
+
+
+def path_of(tip, axis, rapid=None, turns=None, lines=None):
+    n = len(axis)
+    tip = np.broadcast_to(np.asarray(tip, float), (n, 3)).copy()
+    rapid = np.zeros(n, bool) if rapid is None else np.asarray(rapid, bool)
+    lines = np.arange(1, n + 1) if lines is None else np.asarray(lines)
+    return ToolPath("part", tip, axis, lines, rapid, np.full(n, 1000.0), np.full(n, np.nan), turns=turns)
+
+
+def axis_of(b, c):
+    b, c = np.radians(b), np.radians(c)
+    return np.stack(np.broadcast_arrays(np.sin(b) * np.cos(c), np.sin(b) * np.sin(c), np.cos(b)), axis=-1)
+
+
+def joint(machine, name):
+    return list(machine.joints).index(name)
+
+
+def changed(tmp_path, name, old, new):
+    """A shipped machine with other words in its file."""
+    text = (files("parakin") / "machines" / f"{name}.yaml").read_text(encoding="utf-8")
+    assert old in text
+    (file := tmp_path / f"{name}.yaml").write_text(text.replace(old, new), encoding="utf-8")
+    return pk.load(file)
+
+
+def even(machine, posted, record, parts=2000):
+    """The joints' way from a record to the next where the pose goes evenly, each unwound."""
+    share = np.linspace(0.0, 1.0, parts)[:, None]
+    begin, end = posted.poses[record - 1], posted.poses[record]
+    joints = machine.inverse(begin + share * (end - begin), posted.mode)
+    turning = [i for i, unit in enumerate(machine.joint_units) if unit == "rad"]
+    joints[:, turning] = np.unwrap(joints[:, turning], axis=0)
+    return joints[-1] - joints[0]
+
+
+def leads_to(posted, path):
+    """Poses have the path's tips and axes, and the joints are the machine's for these poses, but for whole turns."""
+    machine, (b, c) = posted.machine, posted.poses[:, 3:].T
+    k = np.stack([np.sin(b) * np.cos(c), np.sin(b) * np.sin(c), np.cos(b)], axis=1)
+    np.testing.assert_allclose(k, path.axis, atol=1e-12)
+    np.testing.assert_allclose(posted.poses[:, :3], path.tip, atol=1e-12)
+    off = posted.joints - machine.inverse(posted.poses, posted.mode)
+    for column, unit in enumerate(machine.joint_units):
+        if unit == "rad":
+            off[:, column] -= TURN * np.round(off[:, column] / TURN)
+    np.testing.assert_allclose(off, 0.0, atol=1e-9)
+
+
+def spirals(starts, stops, b=20.0, tip=(0.0, 0.0, 0.0), step=5.0, aside=20.0):
+    """Stretches of feed, each at a height and in a rapid above it, with C from start to stop in degrees."""
+    c, z, rapid, lines = [], [], [], []
+    for start, stop in zip(starts, stops, strict=True):
+        count = max(2, round(abs(stop - start) / step))
+        way = np.linspace(start, stop, count)
+        c += [start, *way, stop]  # over the part, down in rapid, feed, up in rapid; then on to the next
+        z += [30.0, *np.zeros(count), 30.0]
+        rapid += [True, True, *[False] * (count - 1), True]
+    lines = np.arange(1, len(c) + 1)
+    tips = np.zeros((len(c), 3)) + tip
+    tips[:, 2] += z
+    tips[:, 0] += (
+        np.where(np.arange(len(c)) % 2, 1.0, -1.0) * (np.array(z) > 0) * aside
+    )  # the way between is the longest
+    return path_of(tips, axis_of(b, np.array(c)), rapid, lines=lines)
+
+
+# Turns.
+
+
+@pytest.mark.parametrize("name", ["orthoglide5_table", "orthoglide5_head"])
+def test_turns_are_taken_back_between_stretches_of_feed(name):
+    machine = pk.load(name)
+    path = spirals([0, 300, 600, 900], [300, 600, 900, 1200], tip=machine.home[:3] - [0, 0, 15])
+    posted = post(machine, path)
+    assert posted.off == 0
+    assert posted.mode == machine.mode
+    first = machine.model.first_serial
+    assert 1 <= len(posted.rewinds) <= 3  # 1200 deg in a range of 720
+    jumps = np.abs(np.diff(posted.poses[:, 4])) > 180 * DEGREE
+    assert (1 + np.flatnonzero(jumps)).tolist() == list(posted.rewinds)
+    leads_to(posted, path)
+    for record in posted.rewinds:
+        assert path.rapid[record]
+        assert path.tip[record, 2] == path.tip[record - 1, 2] == path.tip[:, 2].max()  # on the way between
+        made = posted.joints[record] - posted.joints[record - 1]
+        np.testing.assert_allclose(made, even(machine, posted, record), atol=1e-9)
+        assert abs(made[first]) > 180 * DEGREE
+    feed = np.flatnonzero(~path.rapid[1:])
+    assert np.abs(np.diff(posted.joints[:, first])[feed]).max() < 6 * DEGREE
+
+
+def test_no_turn_is_taken_back_where_one_count_serves():
+    machine = pk.load("orthoglide5_table")
+    path = spirals([-245, 50], [50, 445])  # the plate stands at 90 deg - C
+    posted = post(machine, path)
+    assert posted.off == 0
+    assert posted.rewinds == ()
+    assert np.abs(np.diff(posted.poses[:, 4])).max() < 6 * DEGREE
+
+
+def test_a_path_without_rapids_breaks_as_few_records_as_can_be():
+    machine = pk.load("orthoglide5_table")
+    c = np.concatenate([np.linspace(0, 900, 181), np.full(100, 900.0)])
+    path = path_of(machine.home[:3], axis_of(10.0, c))
+    posted = post(machine, path)
+    assert posted.rewinds == ()
+    fewest = {}
+    for mode in ("++++", "+++-"):
+        angle = np.unwrap(machine.inverse(posted.poses, mode)[:, joint(machine, "c")])
+        fewest[mode] = min(int((np.abs(angle + n * TURN) > TURN + 1e-12).sum()) for n in range(-5, 6))
+    assert posted.off == min(fewest.values()) > 0
+    assert post(machine, path, mode="++++").off == fewest["++++"] > posted.off
+
+
+def test_turns_against_every_choice_there_is():
+    machine = pk.load("orthoglide5_table")
+    column, rng = joint(machine, "c"), np.random.default_rng(4)
+    rewound = 0
+    for _ in range(12):
+        ends = np.cumsum(rng.uniform(-400, 500, 5))
+        path = spirals(ends[:-1], ends[1:], step=29.0)
+        posted = post(machine, path)
+        cuts = [0, *(1 + np.flatnonzero(path.tip[1:, 2] + path.tip[:-1, 2] == 60.0)), len(path)]  # the ways between
+        best = {}
+        for mode in ("++++", "+++-"):
+            angle = np.unwrap(machine.inverse(posted.poses, mode)[:, column])
+            choices = []
+            for turns in itertools.product(range(-4, 5), repeat=4):
+                way = angle + TURN * np.repeat(turns, np.diff(cuts))
+                choices.append((int((np.abs(way) > TURN + 1e-12).sum()), float(np.abs(np.diff(way)).sum())))
+            best[mode] = min(choices)
+        assert posted.mode == min(best, key=lambda mode: best[mode][0])
+        taken = posted.joints[:, column]
+        assert (np.abs(taken) > TURN + 1e-12).sum() == posted.off == best[posted.mode][0]
+        assert np.abs(np.diff(taken)).sum() == pytest.approx(best[posted.mode][1], abs=1e-4)
+        rewound += len(posted.rewinds)
+    assert rewound > 5
+
+
+def test_the_count_nearest_to_home():
+    machine = pk.load("orthoglide5_table")
+    column = joint(machine, "c")
+    path = path_of(machine.home[:3], axis_of(10.0, np.linspace(-170, -350, 40)))
+    angle = np.unwrap(machine.inverse(post(machine, path).poses)[:, column])
+    spans = [(float(np.abs(angle + n * TURN).max()), n) for n in range(-2, 3)]
+    np.testing.assert_allclose(post(machine, path).joints[:, column], angle + min(spans)[1] * TURN, atol=1e-12)
+    assert min(spans)[0] < 352 * DEGREE
+
+
+def test_upright_in_all_rapids_leaves_nothing_to_turn_back_with():
+    machine = pk.load("orthoglide5_table")  # the tool stands along the plate's axis there: C turns nothing
+    path = spirals([0, 300, 600, 900], [300, 600, 900, 1200])
+    path = replace(path, axis=np.where(path.rapid[:, None], [0.0, 0.0, 1.0], path.axis))
+    posted = post(machine, path)
+    assert posted.rewinds == ()
+    assert posted.off > 0
+
+
+def test_turning_back_breaks_no_limit_on_the_way():
+    # With the tool aside of the plate's axis C sweeps the tip about, here so far out that the legs' ranges may end.
+    machine = pk.load("orthoglide5_table")
+    path = spirals([0, 340, 680, 1020], [340, 680, 1020, 1360], aside=0.0)
+    above = path.tip[:, 2] > 0.0
+    path.tip[above] += np.column_stack([np.tile([[-31.6, -146.6]], (8, 1)), np.tile([0.0, 10.0], 4)])
+    posted = post(machine, path)
+    assert posted.off == 0
+    legs = [i for i, name in enumerate(machine.limits) if name.startswith("rho")]
+
+    def swept(record):
+        share = np.linspace(0.0, 1.0, 400)[:, None]
+        begin, end = posted.poses[record - 1].copy(), posted.poses[record].copy()
+        end[4] = begin[4] - TURN  # the other way round than the path goes
+        return machine.margins(begin + share * (end - begin), mode=posted.mode)[:, legs].min()
+
+    assert len(posted.rewinds) == 3
+    assert all(swept(record) >= 0.0 for record in posted.rewinds)
+    between = {70, 140, 210} - set(posted.rewinds)  # the ways between would be better
+    assert between
+    assert all(swept(record) < 0.0 for record in between)
+
+
+# Turns as a program gives them.
+
+
+@pytest.mark.parametrize("name", ["orthoglide5_table", "orthoglide5_head", "tricept"])
+@pytest.mark.parametrize("c", [300.0, -350.0, 170.0])
+def test_a_turn_programmed_in_one_motion_is_made(name, c):
+    machine = pk.load(name)
+    few = np.radians([[0.0, 20.0, 0.0], [0.0, 25.0, c], [0.0, 25.0, c + 10.0]])
+    share = np.linspace(0.0, 1.0, 1001)[:, None]
+    many = np.vstack([few[0] + share * (few[1] - few[0]), few[2:]])
+    posted, fine = (post(machine, path_of(machine.home[:3], axes_of(t), turns=t)) for t in (few, many))
+    assert posted.poses[:, 3:].tolist() == few[:, 1:].tolist()
+    way, finely = posted.joints - posted.joints[0], fine.joints - fine.joints[0]
+    np.testing.assert_allclose(way, finely[[0, 1000, 1001]], atol=1e-9)
+    assert posted.off == 0
+
+
+def test_too_many_turns_are_refused():
+    turns = np.array([[0.0, 0.3, 0.0], [0.0, 0.3, 1e6]])
+    machine = pk.load("tricept")
+    with pytest.raises(pk.PoseError, match="record 1 makes 159,155 turns"):
+        post(machine, path_of(machine.home[:3], axes_of(turns), turns=turns))
+
+
+# Working modes.
+
+
+def test_the_other_mode_where_the_default_breaks_a_limit(tmp_path):
+    machine = changed(tmp_path, "orthoglide5_head", "range: [-100 deg, 100 deg]", "range: [-100 deg, 10 deg]")
+    path = path_of(machine.home[:3], axis_of(30.0, np.linspace(0, 200, 30)))
+    posted = post(machine, path)
+    assert posted.mode == machine.mode[:-1] + "-"
+    assert posted.off == 0
+    leads_to(posted, path)
+    given = post(machine, path, mode=machine.mode)
+    assert given.mode == machine.mode
+    assert given.off == 30
+
+
+def test_the_default_mode_where_both_serve():
+    machine = pk.load("orthoglide5_head")
+    path = path_of(machine.home[:3], axis_of(30.0, np.linspace(0, 200, 30)))
+    assert post(machine, path).mode == machine.mode
+    assert post(machine, path, mode=machine.mode[:-1] + "-").off == 0
+
+
+def test_the_other_mode_where_it_spares_a_flip(tmp_path):
+    # From a lean of -5 to 20 deg over the upright: with theta2 above 0 first it would have to go to -20 then.
+    machine = changed(tmp_path, "orthoglide5_head", "range: [-100 deg, 100 deg]", "range: [-10 deg, 100 deg]")
+    path = path_of(machine.home[:3], axis_of(np.linspace(-5, 20, 12), 0.0))
+    default = post(machine, path, mode=machine.mode)
+    assert default.off == 0
+    column = joint(machine, "theta1")
+    assert np.abs(np.diff(default.joints[:, column])).max() > 170 * DEGREE
+    posted = post(machine, path)
+    assert posted.mode == machine.mode[:-1] + "-"
+    assert posted.off == 0
+    assert np.abs(np.diff(posted.joints[:, column])).max() < 1e-6
+
+
+def test_legs_keep_their_modes():
+    machine = pk.load("hbg80_2d")
+    path = path_of([900.0, 230.0, 0.0], np.tile([0.0, 0.0, 1.0], (3, 1)))
+    posted = post(machine, path)
+    assert posted.mode == machine.mode
+    assert posted.off == 3

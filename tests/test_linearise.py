@@ -1,0 +1,510 @@
+"""Linearised paths held against the programmed ones by dense sampling, written anew with SciPy's rotations."""
+
+import math
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+import parakin as pk
+from parakin.toolpath.interpolate import Programmed, denser
+from parakin.toolpath.linearise import linearised
+from parakin.toolpath.post import post
+from parakin.toolpath.program import Event, ToolPath
+
+DEGREE = math.pi / 180.0
+DENSE = 60  # shares of each motion that are looked at
+
+
+def path_of(tip, axis=None, **others):
+    tip = np.atleast_2d(np.asarray(tip, dtype=float))
+    n = len(tip)
+    axis = np.tile([0.0, 0.0, 1.0], (n, 1)) if axis is None else np.asarray(axis, dtype=float)
+    lines = np.arange(10, 10 + n)
+    return ToolPath("part.cls", tip, axis, lines, np.zeros(n, bool), np.full(n, 1000.0), np.full(n, np.nan), **others)
+
+
+def axis_of(b, c):
+    b, c = np.broadcast_arrays(b, c)
+    return Rotation.from_euler("yz", np.stack([b, c], axis=-1), degrees=True).apply([0.0, 0.0, 1.0])
+
+
+def programmed(path, record, share):
+    """Tips and axes in W at shares (m,) of the motion to a record."""
+    s = np.asarray(share)[:, None]
+    tip = path.tip[record - 1] * (1.0 - s) + path.tip[record] * s
+    if path.turns is not None:
+        turns = path.turns[record - 1] * (1.0 - s) + path.turns[record] * s
+        return tip, Rotation.from_euler("xyz", turns).apply([0.0, 0.0, 1.0])
+    a, b = path.axis[record - 1], path.axis[record]
+    normal = np.cross(a, b)
+    size = np.linalg.norm(normal)
+    vector = normal / size * math.atan2(size, a @ b) if size > 0.0 else normal
+    return tip, Rotation.from_rotvec(s * vector).apply(a)
+
+
+def swept(path, record):
+    """How far a motion turns the tool, rad."""
+    if path.turns is not None:
+        return float(np.abs(path.turns[record] - path.turns[record - 1]).sum())
+    return math.atan2(
+        np.linalg.norm(np.cross(path.axis[record - 1], path.axis[record])), path.axis[record - 1] @ path.axis[record]
+    )
+
+
+def tools(machine, poses):
+    """Tips and axes of poses."""
+    columns = {letter: poses[:, i] for i, letter in enumerate(machine.axes)}
+    nothing = np.zeros(len(poses))
+    tip = np.column_stack([columns[letter] for letter in "XYZ"])
+    turns = np.column_stack([columns.get(letter, nothing) for letter in "ABC"])
+    return tip, Rotation.from_euler("xyz", turns).apply([0.0, 0.0, 1.0])
+
+
+def deviations(posted, result, under, chord, angle):
+    """Of a result from what was posted, mm and rad, for every motion of the result: the tool against the point of its
+    line nearest to the tip; where the tip hardly moves, at the same share."""
+    machine, path = posted.machine, posted.path
+    rotation, origin = posted.frame[:, :3], posted.frame[:, 3]
+    share = np.linspace(0.0, 1.0, DENSE)
+    worst = []
+    record = result.path.line - path.line[0]  # every record has a line of its own
+    for j in range(1, len(record)):
+        r = record[j]
+        poses = result.poses[j - 1] + share[:, None] * (result.poses[j] - result.poses[j - 1])
+        if under == "joints":
+            joints = result.joints[j - 1] + share[:, None] * (result.joints[j] - result.joints[j - 1])
+            found = machine.forward(joints, near=poses)
+            assert np.all(found.converged)
+            poses = found.poses
+        tip, axis = tools(machine, poses)
+        length, turn = np.linalg.norm(path.tip[r] - path.tip[r - 1]), swept(path, r)
+        begin, end = (rotation @ path.tip[i] + origin for i in (r - 1, r))
+        if length * angle > turn * chord:
+            at = np.clip((tip - begin) @ (end - begin) / length**2, 0.0, 1.0)
+        else:
+            ends = shares(path, result.path, j - 1 if record[j - 1] == r else None, r), shares(path, result.path, j, r)
+            at = ends[0] + share * (ends[1] - ends[0])
+        p, k = programmed(path, r, at)
+        p, k = p @ rotation.T + origin, k @ rotation.T
+        worst.append(
+            [
+                np.linalg.norm(tip - p, axis=1).max(),
+                np.arctan2(np.linalg.norm(np.cross(axis, k), axis=1), (axis * k).sum(1)).max(),
+            ]
+        )
+    return np.array(worst).reshape(-1, 2).T
+
+
+def shares(path, denser_path, j, r):
+    """Where on the motion to record r the record j of the denser path stands, by its axis."""
+    if j is None:
+        return 0.0
+    if denser_path.line[j] != (denser_path.line[j + 1] if j + 1 < len(denser_path) else -1):
+        return 1.0
+    way = path.tip[r] - path.tip[r - 1]
+    if way @ way > 1e-12:
+        return float((denser_path.tip[j] - path.tip[r - 1]) @ way / (way @ way))
+    if path.turns is not None:
+        way = path.turns[r] - path.turns[r - 1]
+        return float((denser_path.turns[j] - path.turns[r - 1]) @ way / (way @ way))
+    a, k = path.axis[r - 1], denser_path.axis[j]
+    return math.atan2(np.linalg.norm(np.cross(a, k)), a @ k) / swept(path, r)
+
+
+def a_path(name):
+    """A few long motions for a machine."""
+    machine = pk.load(name)
+    if name == "linear_delta":
+        return machine, path_of([[-100, 0, 280], [100, 0, 280], [20, 90, 350], [20, 90.5, 350], [0, -100, 250]])
+    tip = {
+        "tricept": [0, 0, -1650],
+        "hexapod": [0, 0, -950],
+        "lambda6": [0, 0, 1400],
+        "orthoglide5_head": [0, 0, -100],
+        "orthoglide5_table": [0, 0, 0],
+    }[name]
+    shift = np.array([[-30, 20, 0], [40, 30, 10], [40.2, 30, 10], [10, -30, -5], [10, -30, -5], [-20, -10, 5]], float)
+    most = 1.0 if machine.axes[3:] == ("B", "C") else 0.4
+    axis = axis_of(most * np.array([20, 35, 34, 25, 30, 15]), np.array([10, 50, 52, 100, 60, 130]))
+    return machine, path_of(tip + shift, axis)
+
+
+NAMES = ["tricept", "orthoglide5_head", "orthoglide5_table", "hexapod", "linear_delta", "lambda6"]
+
+
+UNDER = pytest.mark.parametrize("under", ["pose", "joints"])
+# Not lambda6: with C = 0, as a tool axis alone has it, its platform is at a singularity.
+NAMES = ["tricept", "orthoglide5_head", "orthoglide5_table", "hexapod", "linear_delta"]
+
+
+def within(posted, result, under, chord, angle):
+    tip, axis = deviations(posted, result, under, chord, angle)
+    return max(tip.max(initial=0.0) / chord, axis.max(initial=0.0) / angle)
+
+
+def without(posted, result, j):
+    """A result with one record left out, posted anew."""
+    path = result.path
+    fields = ("tip", "axis", "line", "rapid", "feed", "spindle")
+    less = replace(path, frame=None, **{name: np.delete(getattr(path, name), j, axis=0) for name in fields})
+    return post(posted.machine, less, workpiece=posted.frame, mode=posted.mode)
+
+
+# Within both tolerances, with the fewest points.
+
+
+@UNDER
+@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize(("chord", "angle"), [(0.05, 1e-3), (0.005, 1e-2), (0.02, 1e-4)])
+def test_the_tool_stays_within_both_tolerances(name, under, chord, angle):
+    machine, path = a_path(name)
+    posted = post(machine, path)
+    assert np.isfinite(posted.joints).all()
+    result = linearised(posted, under, chord=chord, angle=angle)
+    assert within(posted, result, under, chord, angle) <= 1.0
+    assert (within(posted, posted, under, chord, angle) > 1.0) == (len(result.path) > len(path))
+
+
+@UNDER
+def test_lambda6_as_a_program_turns_it(under):
+    machine = pk.load("lambda6")
+    turns = np.radians([[5, -5, 30], [-8, 6, 45], [10, 10, 20]])
+    posted = post(machine, turned([[0, 0, 1400], [60, -40, 1420], [-50, 30, 1390]], turns))
+    result = linearised(posted, under, chord=0.02)
+    assert within(posted, result, under, 0.02, 1e-3) <= 1.0
+    assert (len(result.path) > 3) == (under == "joints")
+
+
+@pytest.mark.parametrize(
+    ("name", "under"),
+    [(name, under) for name in ("tricept", "orthoglide5_table") for under in ("pose", "joints")]
+    + [("hexapod", "joints")],
+)
+def test_no_point_can_be_spared(name, under):
+    chord, angle = 0.05, 1e-4 if under == "pose" else 1e-3
+    machine, path = a_path(name)
+    posted = post(
+        machine, replace(path, **{f: getattr(path, f)[:2] for f in ("tip", "axis", "line", "rapid", "feed", "spindle")})
+    )
+    result = linearised(posted, under, chord=chord, angle=angle)
+    count = len(result.path) - 2
+    assert count > 1
+    for j in range(1, count + 1):
+        assert within(posted, without(posted, result, j), under, chord, angle) > 1.0
+    even = denser(posted.path, np.ones(count - 1, int), np.arange(1, count) / count)
+    assert within(posted, post(machine, even), under, chord, angle) > 1.0
+
+
+def test_a_long_line_of_a_linear_delta():
+    machine = pk.load("linear_delta")
+    posted = post(machine, path_of([[-100, 0, 280], [100, 0, 280]]))
+    assert linearised(posted, "pose") is posted
+    counts = []
+    for chord in (0.1, 0.01, 0.001):
+        result = linearised(posted, "joints", chord=chord)
+        assert within(posted, result, "joints", chord, 1e-3) <= 1.0
+        counts.append(len(result.path) - 1)
+    # a tolerance a hundredth as wide takes ten times as many parts
+    assert counts[2] == pytest.approx(10 * counts[0], rel=0.1)
+
+
+@UNDER
+def test_a_dense_path_needs_nothing(under):
+    machine = pk.load("tricept")
+    t = np.linspace(0.0, 2.0, 400)
+    path = path_of(np.column_stack([40 * np.cos(t), 40 * np.sin(t), -1650 + t]), axis_of(20 + t, 50 * t))
+    posted = post(machine, path)
+    assert linearised(posted, under, chord=0.01, angle=1e-3) is posted
+
+
+# Programs that turn the tool themselves.
+
+
+def turned(tip, turns, **others):
+    turns = np.asarray(turns, float)
+    return path_of(tip, Rotation.from_euler("xyz", turns).apply([0.0, 0.0, 1.0]), turns=turns, **others)
+
+
+@UNDER
+@pytest.mark.parametrize("workpiece", [None, "0,0,-1650,12,-7,20"])
+def test_turns_of_a_program(under, workpiece):
+    machine = pk.load("tricept")
+    z = 0.0 if workpiece else -1650.0
+    turns = np.radians([[0, 20, 10], [0, 25, 200], [0, 25, 200], [0, -15, 230], [0, -15, 0]])
+    posted = post(
+        machine, turned([[20, 0, z], [-20, 30, z], [20, 30, z], [0, 10, z], [0, 10, z]], turns), workpiece=workpiece
+    )
+    assert np.isfinite(posted.joints).all()
+    result = linearised(posted, under, chord=0.03, angle=2e-3)
+    assert within(posted, result, under, 0.03, 2e-3) <= 1.0
+    if workpiece is None and under == "pose":
+        assert len(result.path) == 5  # B and C are the pose's own
+
+
+def test_whole_turns_in_one_motion_hide_nothing():
+    machine = pk.load("orthoglide5_table")
+    start = np.radians([[0, 10, 0]])
+    for whole in (1, 2, 3):
+        turns = np.vstack([start, start + [0, 0, whole * 2 * math.pi]])
+        posted = post(machine, turned([[0, 0, 0], [5, 0, 0]], turns), workpiece="0,0,0,0,20,0")  # poses are not turns
+        result = linearised(posted, "pose", angle=5e-3)
+        assert within(posted, result, "pose", 0.01, 5e-3) <= 1.0
+        assert len(result.path) > 10 * whole
+
+
+# Poles.
+
+
+def across(name, miss, count, span=20.0):
+    """Tips and axes over the pole of a head or table, missing it by ``miss`` rad."""
+    x = np.tan(np.radians(np.linspace(-span, span, count)))
+    axis = Rotation.from_euler("z", 30, degrees=True).apply(
+        np.column_stack([x, np.full(count, math.tan(miss)), np.ones(count)])
+    )
+    tip = np.array(
+        {"orthoglide5_head": [0, 0, -100.0], "orthoglide5_table": [0, 0, 0.0], "tricept": [0, 0, -1650.0]}[name]
+    )
+    return path_of(
+        tip + np.linspace(-5, 5, count)[:, None] * [1.0, 0.0, 0.0], axis / np.linalg.norm(axis, axis=1)[:, None]
+    )
+
+
+def swing(posted):
+    return np.degrees(np.ptp(posted.joints[:, posted.machine.model.first_serial]))
+
+
+@UNDER
+@pytest.mark.parametrize("count", [2, 5, 201])
+@pytest.mark.parametrize("miss", [0.0, 5e-5, 4e-4, 9e-4])
+@pytest.mark.parametrize("name", ["orthoglide5_head", "orthoglide5_table"])
+def test_a_pass_within_the_tolerance_is_led_through_the_pole(name, under, count, miss):
+    posted = post(pk.load(name), across(name, miss, count))
+    result = linearised(posted, under, chord=0.05)
+    assert within(posted, result, under, 0.05, 1e-3) <= 1.0
+    assert swing(result) < 8.0
+    assert not result.path.notes
+    assert result.off == 0
+
+
+@UNDER
+@pytest.mark.parametrize("count", [2, 201])
+@pytest.mark.parametrize("miss", [2e-3, 0.014])
+def test_a_pass_beside_the_pole_is_told(under, count, miss):
+    posted = post(pk.load("orthoglide5_head"), across("orthoglide5_head", miss, count))
+    result = linearised(posted, under, chord=0.05)
+    assert within(posted, result, under, 0.05, 1e-3) <= 1.0
+    assert swing(result) > 170.0
+    (note,) = result.path.notes
+    assert note.line == posted.path.line[1 if count == 2 else 101] or note.line == posted.path.line[100]
+    around = 2.0 * math.degrees(math.atan(math.tan(0.05) / miss))  # while the axis turns by 0.05 rad to either side
+    off = f"{math.degrees(miss):.2g}"
+    head, _, told = note.text.partition(": theta1 swings ")
+    assert head == f"the tool axis passes {off}° beside the head's pole"
+    assert float(told.removesuffix("°")) == pytest.approx(around, abs=4.0)
+    assert linearised(result, under, chord=0.05).path.notes == (note,)  # once
+
+
+@UNDER
+def test_the_wrist_of_a_tricept(under):
+    """Its pole is the platform's normal, and stands apart from B = 0."""
+    machine = pk.load("tricept")
+    joints = machine.inverse([60.0, -50.0, -1620.0, 0.3, 0.7])
+    ends = np.array([joints, joints])
+    ends[0, 3:], ends[1, 3:] = np.radians([25.0, -18.0]), np.radians([25.0, 18.0])
+    poses = machine.forward(ends, near=[60.0, -50.0, -1620.0, 0.3, 0.7]).poses
+    tip, axis = tools(machine, poses)
+    tip[:] = tip.mean(0)
+    for count, most in ((2, 4.0), (300, 4.0)):
+        k = programmed(path_of(tip, axis), 1, np.linspace(0, 1, count))[1]
+        posted = post(machine, path_of(np.tile(tip[0], (count, 1)), k))
+        result = linearised(posted, under, chord=0.02, angle=3e-3)
+        assert within(posted, result, under, 0.02, 3e-3) <= 1.0
+        assert swing(result) < most
+        assert not [note for note in result.path.notes if "theta1" in note.text]
+
+
+def test_jitter_about_the_pole_is_stilled():
+    machine = pk.load("orthoglide5_head")
+    rng = np.random.default_rng(5)
+    axis = np.column_stack([rng.uniform(-4e-4, 4e-4, (80, 2)), np.ones(80)])
+    path = path_of(
+        np.column_stack([np.linspace(-20, 20, 80), np.zeros(80), np.full(80, -100.0)]),
+        axis / np.linalg.norm(axis, axis=1)[:, None],
+    )
+    posted = post(machine, path)
+    assert swing(posted) > 90.0
+    result = linearised(posted, "joints")
+    assert within(posted, result, "joints", 0.01, 1e-3) <= 1.0
+    assert swing(result) < 8.0
+    assert not result.path.notes
+
+
+def test_a_corner_on_the_pole_is_told():
+    path = across("orthoglide5_head", 0.0, 3)
+    path.axis[2] = axis_of(20.0, 120.0)  # came along 210 deg, goes on along 120
+    posted = post(pk.load("orthoglide5_head"), path)
+    result = linearised(posted, "joints", chord=0.05)
+    assert within(posted, result, "joints", 0.05, 1e-3) <= 1.0
+    assert [note.text for note in result.path.notes] == [
+        "the tool axis passes 0° beside the head's pole: theta1 swings 90°"
+    ]
+
+
+# What is carried over.
+
+
+def test_lines_feeds_events_and_times():
+    machine = pk.load("linear_delta")
+    path = path_of(
+        [[-100, 0, 280], [100, 0, 280], [100, 0.1, 280], [0, 60, 300]],
+        events=(Event(0, 9, "M3"), Event(1, 10, "M8"), Event(2, 11, "M0"), Event(4, 20, "M2")),
+        seconds=np.array([math.nan, 4.0, math.nan, 2.0]),
+    )
+    path = replace(
+        path,
+        rapid=np.array([True, False, True, False]),
+        feed=np.array([math.nan, 500.0, 600.0, 700.0]),
+        spindle=np.arange(4.0),
+    )
+    path = replace(path, line=np.array([10, 11, 12, 15]), tool={"number": 3.0})
+    posted = post(machine, path, workpiece="1,2,3")
+    result = linearised(posted, "joints")
+    new = result.path
+    assert np.array_equal(result.frame, posted.frame)
+    assert (new.source, new.tool, new.units, new.frame) == (path.source, path.tool, path.units, None)
+    counts = np.bincount(new.line, minlength=16)
+    assert counts[10] == 1 and counts[11] > 20 and counts[12] == 1 and counts[15] > 5
+    for line, record in ((11, 1), (15, 3)):
+        assert np.all(new.feed[new.line == line] == path.feed[record])
+        assert np.all(new.spindle[new.line == line] == record)
+        assert not new.rapid[new.line == line].any()
+        taken = new.seconds[new.line == line]
+        assert taken.sum() == pytest.approx(path.seconds[record])
+        ends = np.flatnonzero(new.line == line)
+        steps = np.linalg.norm(new.tip[ends] - new.tip[ends - 1], axis=1)
+        np.testing.assert_allclose(taken / steps, taken.sum() / steps.sum(), rtol=1e-6)
+    places = [event.record for event in new.events]
+    assert places == [0, 1, counts[10] + counts[11], len(new)]  # before the motion, and behind the last record
+    kept = np.isin(np.arange(len(new)), [0, counts[11], counts[11] + 1, len(new) - 1])
+    np.testing.assert_array_equal(new.tip[kept], path.tip)
+
+
+def test_the_file_s_own_frame_stays():
+    frame = np.column_stack([Rotation.from_euler("z", 40, degrees=True).as_matrix(), [10.0, -5.0, 280.0]])
+    posted = post(pk.load("linear_delta"), path_of([[-80, 0, 0], [80, 0, 0]], frame=frame), workpiece="1,1,0")
+    result = linearised(posted, "joints")
+    assert within(posted, result, "joints", 0.01, 1e-3) <= 1.0
+
+
+def test_rapid_motions_are_kept_to_their_lines():
+    posted = post(pk.load("linear_delta"), replace(path_of([[-100, 0, 280], [100, 0, 280]]), rapid=np.ones(2, bool)))
+    assert len(linearised(posted, "joints").path) > 20
+
+
+@UNDER
+def test_a_rapid_that_turns_back(under):
+    machine = pk.load("orthoglide5_table")
+    turn = np.linspace(0, 1500, 500)
+    around = np.column_stack([10 * np.cos(np.radians(turn)), 10 * np.sin(np.radians(turn)), 0 * turn])
+    path = replace(path_of(around, axis_of(np.full(500, 12.0), turn)), rapid=np.arange(500) % 90 == 89)
+    posted = post(machine, path)
+    assert posted.rewinds and posted.off == 0
+    result = linearised(posted, under)
+    assert result.off == 0
+    if under == "pose":
+        assert result.rewinds == posted.rewinds
+        return
+    assert not result.rewinds and not result.path.notes
+    straight = []
+    for j in range(1, len(result.path)):
+        share = np.linspace(0, 1, 9)[:, None]
+        joints = result.joints[j - 1] + share * (result.joints[j] - result.joints[j - 1])
+        tip = machine.forward(joints, near=result.poses[j]).poses[:, :3]
+        begin, end = (around[result.path.line[j] - 10 - back] for back in (1, 0))
+        at = (tip - begin) @ (end - begin) / ((end - begin) @ (end - begin))
+        straight.append(np.linalg.norm(tip - begin - np.clip(at, 0, 1)[:, None] * (end - begin), axis=1).max())
+    assert max(straight) <= 0.01
+
+
+# What can't be done.
+
+
+def test_paths_with_nothing_to_do():
+    machine = pk.load("tricept")
+    for tip in (np.empty((0, 3)), [[0, 0, -1650]]):
+        posted = post(machine, path_of(np.reshape(tip, (-1, 3))))
+        for under in ("pose", "joints"):
+            assert linearised(posted, under) is posted
+
+
+@UNDER
+@pytest.mark.parametrize("name", ["orthoglide5_head", "orthoglide5_table", "tricept"])
+def test_an_upright_tool_stays_on_the_pole(name, under):
+    machine = pk.load(name)
+    posted = post(machine, path_of(machine.home[:3] + np.array([[0, 0, 0], [0.5, 0, 0], [0.5, 0.5, 0]])))
+    result = linearised(posted, under)
+    assert within(posted, result, under, 0.01, 1e-3) <= 1.0
+    assert len(result.path) == 3 and not result.path.notes
+
+
+@UNDER
+def test_records_out_of_reach_are_left_alone(under):
+    posted = post(
+        pk.load("linear_delta"), path_of([[-100, 0, 280], [0, 0, 280], [2000, 0, 280], [0, 0, 280], [0, 100, 280]])
+    )
+    result = linearised(posted, under)
+    counts = np.bincount(result.path.line)
+    assert counts[12] == counts[13] == 1  # there and back
+    if under == "joints":
+        assert counts[11] > 1 and counts[14] > 1
+    assert [offence.limit for offence in result.offences] == [offence.limit for offence in posted.offences]
+
+
+def test_a_motion_out_of_reach_in_between_is_an_offence():
+    machine = pk.load(str(Path(__file__).parent / "machines" / "sector.yaml"))
+    posted = post(machine, path_of([[234, -112, 0], [254, 170, 0]]))
+    assert np.isfinite(posted.joints).all()
+    assert not np.isfinite(machine.inverse(0.5 * (posted.poses[0] + posted.poses[1]))).all()
+    result = linearised(posted, "joints")
+    assert result.off > posted.off
+    lost = np.flatnonzero(~np.isfinite(result.joints).all(axis=1))
+    assert len(lost) == 1 and result.path.line[lost[0]] == 11
+    assert result.offences[0].line == 11
+    assert len(linearised(posted, "pose").path) == 2
+
+
+def test_opposite_axes_are_refused_with_their_line():
+    path = path_of([[0, 0, -950], [10, 0, -950]], [[0.0, 0.0, 1.0], [0.0, 0.0, -1.0]])
+    posted = post(pk.load("hexapod"), path)
+    if np.isfinite(posted.joints).all():
+        with pytest.raises(pk.PoseError, match=r"part\.cls:11: the tool axis turns to its opposite"):
+            linearised(posted, "pose")
+    with pytest.raises(pk.PoseError, match=r"part\.cls:11: the tool axis turns to its opposite"):
+        Programmed(path).at(np.array([1]), np.array([0.5]))
+
+
+@pytest.mark.parametrize("bad", [{"chord": 0.0}, {"chord": math.nan}, {"angle": -1.0}, {"angle": math.inf}])
+def test_bad_tolerances(bad):
+    posted = post(pk.load("tricept"), path_of([[0, 0, -1650]]))
+    with pytest.raises(pk.PoseError, match=next(iter(bad))):
+        linearised(posted, "pose", **bad)
+    with pytest.raises(pk.PoseError, match="under"):
+        linearised(posted, "both")
+
+
+# The programmed path.
+
+
+@pytest.mark.parametrize("size", [1e-13, 1e-9, 1e-5, 0.1, 3.0])
+def test_great_circles_great_and_small(size):
+    a = np.array([0.36, -0.48, 0.8])
+    side = np.cross(a, [1.0, 0.0, 0.0])
+    side /= np.linalg.norm(side)
+    b = math.cos(size) * a + math.sin(size) * side
+    share = np.linspace(0.0, 1.0, 11)
+    axis = Programmed(path_of(np.zeros((2, 3)), [a, b])).at(np.ones(11, int), share)[1]
+    np.testing.assert_allclose(np.linalg.norm(axis, axis=1), 1.0, atol=1e-15)
+    np.testing.assert_allclose((axis - a) @ side, np.sin(share * size), rtol=1e-2 if size < 1e-12 else 1e-6, atol=1e-17)

@@ -1,0 +1,162 @@
+"""Setpoints as CSV and Parquet: what the law says at every tick, in degrees, the last when the motion is over."""
+
+import csv
+import io
+import math
+import tracemalloc
+
+import numpy as np
+import pyarrow.parquet as pq
+import pytest
+
+import parakin as pk
+from parakin.toolpath.feed import plan
+from parakin.toolpath.post import post
+from parakin.toolpath.program import ToolPath
+from parakin.toolpath.setpoint_table import MOST_ROWS, row_count, setpoint_columns, setpoints_csv, setpoints_parquet
+
+RATE = 7000.0  # more rows than are formatted at a time
+
+
+def law_of(name, tip, axis=(0.0, 0.0, 1.0), feed=6000.0):
+    tip = np.asarray(tip, float)
+    n = len(tip)
+    axis = np.broadcast_to(np.asarray(axis, float), (n, 3))
+    path = ToolPath("part.apt", tip, axis, np.arange(n) + 1, np.zeros(n, bool), np.full(n, feed), np.full(n, np.nan))
+    return plan(post(pk.load(name), path))
+
+
+@pytest.fixture(scope="module")
+def law():
+    turn = np.linspace(0.0, 5.0, 40)
+    tip = np.stack([120 * np.cos(turn), 120 * np.sin(turn), -1650 + 10 * np.sin(3 * turn)], axis=1)
+    lean = 0.3 + 0.1 * np.sin(2 * turn)
+    return law_of("tricept", tip, np.stack([np.sin(lean), 0 * lean, np.cos(lean)], axis=1))
+
+
+@pytest.fixture(scope="module")
+def table(law):
+    file = io.BytesIO()
+    setpoints_csv(law, RATE)(file)
+    return file.getvalue().decode()
+
+
+def test_columns_have_units(law, table):
+    head = next(csv.reader(io.StringIO(table)))
+    assert head == setpoint_columns(law)
+    assert head[:6] == ["time [s]", "d1 [mm]", "d2 [mm]", "d3 [mm]", "theta1 [deg]", "theta2 [deg]"]
+    assert head[9:11] == ["theta1 speed [deg/s]", "theta2 speed [deg/s]"]
+    assert head[11:15:3] == ["d1 acceleration [mm/s2]", "theta1 acceleration [deg/s2]"]
+    assert head[16:] == ["X [mm]", "Y [mm]", "Z [mm]", "B [deg]", "C [deg]"]
+
+
+def in_degrees(law, points):
+    """The law's own table, its angles in degrees by the names of its columns."""
+    turning = {"theta1", "theta2", "B", "C"}
+    factors = [180.0 / math.pi if name.split(".")[0] in turning else 1.0 for name in points.columns]
+    return points.table * factors
+
+
+def test_csv_is_the_law_sampled(law, table):
+    read = np.loadtxt(io.StringIO(table), delimiter=",", skiprows=1)
+    expected = in_degrees(law, law.sampled(RATE))
+    assert read.shape == expected.shape
+    assert len(read) > 20_000
+    digits = np.array([6 if "mm" in name else 8 for name in setpoint_columns(law)])
+    off = np.abs(read - expected) - 4e-16 * np.abs(expected)
+    assert (off <= 0.5001 * 10.0**-digits).all()
+
+
+def test_parquet_is_the_law_sampled(law):
+    file = io.BytesIO()
+    setpoints_parquet(law, RATE)(file)
+    read = pq.read_table(io.BytesIO(file.getvalue()))
+    assert read.column_names == setpoint_columns(law)
+    expected = in_degrees(law, law.sampled(RATE))
+    values = np.column_stack([column.to_numpy() for column in read.columns])
+    np.testing.assert_allclose(values, expected, rtol=1e-15, atol=0)
+
+
+def test_parquet_in_several_groups(law, monkeypatch):
+    monkeypatch.setattr("parakin.toolpath.setpoint_table._GROUP", 1000)
+    file, said = io.BytesIO(), []
+    setpoints_parquet(law, 1000.0, said.append)(file)
+    read = pq.ParquetFile(io.BytesIO(file.getvalue()))
+    assert read.num_row_groups == math.ceil(row_count(law, 1000.0) / 1000) > 2
+    np.testing.assert_array_equal(read.read()["time [s]"].to_numpy(), law.sampled(1000.0).times)
+    assert said == sorted(said)
+    assert said[-1] == 1.0
+
+
+@pytest.mark.parametrize("rate", [3.0, 250.0, 999.9])
+def test_the_last_row_is_the_first_at_rest(law, rate):
+    count = row_count(law, rate)
+    assert (count - 2) / rate < law.seconds <= (count - 1) / rate
+    file = io.BytesIO()
+    setpoints_csv(law, rate)(file)
+    rows = list(csv.DictReader(io.StringIO(file.getvalue().decode())))
+    assert len(rows) == count
+    assert {rows[-1][name] for name in rows[-1] if "speed" in name or "acceleration" in name} == {"0"}
+    assert float(rows[-1]["X [mm]"]) == pytest.approx(law.posted.poses[-1, 0], abs=1e-6)
+
+
+def test_a_cycle_of_whole_ticks_ends_on_one(law):
+    assert row_count(law, 1.0 / law.seconds) == 2
+    assert row_count(law, 1000.0 / law.seconds) == 1001
+
+
+def test_a_machine_without_turns():
+    law = law_of("linear_delta", [[0, 0, 280], [40, 0, 280]])
+    file = io.BytesIO()
+    setpoints_csv(law, 100.0)(file)
+    head = file.getvalue().decode().partition("\n")[0]
+    assert "deg" not in head
+    assert head.count(",") == 3 * 3 + 3
+
+
+def test_a_single_record_stands_still():
+    law = law_of("linear_delta", [[1, 2, 280]])
+    for writer in (setpoints_csv, setpoints_parquet):
+        file = io.BytesIO()
+        writer(law, 1000.0)(file)
+    assert pq.read_table(io.BytesIO(file.getvalue()))["Y [mm]"].to_pylist() == [2.0]
+
+
+@pytest.mark.parametrize("writer", [setpoints_csv, setpoints_parquet])
+@pytest.mark.parametrize("rate", [0.0, -1.0, math.nan, math.inf, 1e12, 1e300])
+def test_senseless_rates_are_refused_at_once(law, writer, rate):
+    with pytest.raises(pk.InputError) as caught:
+        writer(law, rate)
+    assert str(caught.value).startswith("--rate: ")
+    assert "expected" in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_rows_are_refused_by_their_count(law):
+    assert row_count(law, 0.999 * MOST_ROWS / law.seconds) <= MOST_ROWS
+    with pytest.raises(pk.InputError, match="at most 100,000,000"):
+        row_count(law, 1.001 * MOST_ROWS / law.seconds)
+
+
+class Sink:
+    """A file that counts what it takes."""
+
+    size = 0
+
+    def write(self, data):
+        self.size += len(data)
+
+
+def test_long_tables_do_not_fill_the_memory(law):
+    rate = 1_000_000.0 / law.seconds
+    file = Sink()
+    setpoints_csv(law, 1000.0)(Sink())  # compiled
+    tracemalloc.start()
+    try:
+        setpoints_csv(law, rate)(file)
+        peak = tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+    whole = 1_000_000 * 21 * 8
+    assert file.size > whole
+    assert peak < 0.4 * whole

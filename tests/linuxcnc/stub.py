@@ -77,7 +77,7 @@ class Stub:
         return ctypes.CDLL(str(self.folder / "stub_hal.so"), mode=ctypes.RTLD_GLOBAL)
 
     def _gcc(self, sources, target):
-        warnings = ["-Wall", "-Werror", "-Wframe-larger-than=2560"]
+        warnings = ["-Wall", "-Wextra", "-Werror", "-Wframe-larger-than=2560"]
         command = ["gcc", *FLAGS, *warnings, f"-I{HERE}", f"-I{self.folder}", "-shared", "-o", target, *sources, "-lm"]
         subprocess.run(command, check=True)
 

@@ -8,13 +8,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..toolpath.offences import place
 from ..toolpath.uses import Use, used
 from .cards import card, counted, duration
 from .curves import joint_curves
 from .figures import page, placed
 from .pathview import PathView, path_view
 from .range_card import range_card
-from .report_tables import fact_card, note_card, offence_card, on_the_way
+from .report_tables import fact_card, note_card, offence_card
 from .timing_card import cycle_text, timing_card
 
 if TYPE_CHECKING:
@@ -60,7 +61,6 @@ def _verdict(posted: Posted, law: Law | None, unplanned: str, waits: float) -> s
         verdict = "Stays within the limits" if unplanned else "Runs"
         said = f"<strong>{verdict}</strong><p>{text}{_unchecked(posted)}</p>{time}"
         return f"<section class='card verdict'>{said}</section>\n"
-    place = f"{path.source}:{first.line}: {first.text}" + (f" ({on_the_way(first)})" if first.share < 1.0 else "")
     counts = f"{posted.off:,} of {counted(len(path), 'record')} off limits ({posted.off / len(path):.2%})"
     if posted.motions_off:
         breaks = "breaks" if posted.motions_off == 1 else "break"
@@ -68,7 +68,8 @@ def _verdict(posted: Posted, law: Law | None, unplanned: str, waits: float) -> s
     counts += f"; {counted(len(posted.offences), 'limit')} broken."
     return (
         "<section class='card verdict bad'><strong>Does not run</strong>"
-        f"<p class=first>{escape(place)}</p><p>{counts}{_unchecked(posted)}</p>{time}</section>\n"
+        f"<p class=first>{escape(place(posted, first))}: {escape(first.text)}</p>"
+        f"<p>{counts}{_unchecked(posted)}</p>{time}</section>\n"
     )
 
 

@@ -15,6 +15,7 @@ from ...machine import Machine
 from ...model.limits import Limit
 from .straight import Vector, function, number, test
 
+_SAME = 0.01
 _FIELDS = {"X": "tran.x", "Y": "tran.y", "Z": "tran.z", "A": "a", "B": "b", "C": "c"}
 
 _HEADER = """\
@@ -71,6 +72,8 @@ def _numbers(machine: Machine, name: str) -> str:
         f"#define SPHERES {int(model.by_spheres)} /* the forward in closed form: the common point of spheres */",
         f"#define WRIST {int(model.first_serial is not None)} /* two turning joints point the tool */",
         f"#define TOOL_AXIS {int(tool_axis)} /* of the orientation only the tool's axis counts */",
+        f"#define LEG_MODES {_leg_modes(machine)} /* choices of the legs' inverse */",
+        f"#define SAME {number(_SAME)} /* mm or rad: joints nearer to each other stand in one working mode */",
         f"#define TURN {number(2.0 * np.pi)}",
         f"#define DEGREE {number(np.pi / 180.0)}",
         f"#define FREE {number(FREE)} /* rad: nearer to a turning axis the tool's tells its angle by rounding only */",
@@ -83,6 +86,10 @@ def _numbers(machine: Machine, name: str) -> str:
     if not tool_axis:
         lines.append(_array("int", "turning_axis", [str(int(unit == "rad")) for unit in machine.axis_units]))
     return "\n".join(lines) + "\n"
+
+
+def _leg_modes(machine: Machine) -> int:
+    return len(machine.mode) - (machine.model.first_serial is not None)
 
 
 def _array(kind: str, name: str, values: Sequence[str]) -> str:

@@ -168,6 +168,40 @@ static int pose_near(const double *near, const double *q, double *x)
 }
 #endif
 
+#if LEG_MODES
+static int same_legs(const double *p, const double *q)
+{
+    for (int i = 0; i < CLOSURES; i++)
+        if (!(fabs(turning[i] ? within_half_a_turn(p[i] - q[i], 0.0) : p[i] - q[i]) <= SAME))
+            return 0;
+    return 1;
+}
+
+/* Whether the legs stand in the working mode: in another one the inverse would make them jump. A table's turns move the
+   legs, so each of its solutions counts. */
+static int in_mode(const double *x, const double *q)
+{
+    double again[JOINTS];
+    inverse(x, again);
+    int same = same_legs(again, q);
+#if WRIST
+    if (!same) {
+        inverse_over(x, again);
+        same = same_legs(again, q);
+    }
+    double lean[1];
+    freedom(x, lean);
+    if (!same && lean[0] < FREE * FREE) {
+        inverse_held(x, &q[FIRST], again);
+        same = same_legs(again, q);
+    }
+#endif
+    return same;
+}
+#else
+#define in_mode(x, q) 1
+#endif
+
 /* Of the ways to write an orientation the one nearest to the last. */
 static void settle(double *x, const double *near)
 {
@@ -207,6 +241,8 @@ int kinematicsForward(const double *joints, EmcPose *world,
         if (!pose_near(near, q, x))
             return -1;
     }
+    if (!in_mode(x, q))
+        return -1;
     settle(x, near);
     write_pose(x, world);
     return 0;

@@ -39,7 +39,7 @@ def function(name: str, tape: Tape, inputs: Sequence[Vector], outputs: Sequence[
     into = [f"{vector.name}[{i}]" for vector in outputs for i in range(vector.length)]
     lines += [f"    {place} = {value};" for place, value in zip(into, results, strict=True)]
     arguments = [f"const double *{vector.name}" for vector in inputs] + [f"double *{vector.name}" for vector in outputs]
-    return _definition(f"static void {name}({', '.join(arguments)})", lines)
+    return _definition(f"static void {name}({', '.join(arguments)})", lines, inputs)
 
 
 def test(name: str, tape: Tape, inputs: Sequence[Vector]) -> str:
@@ -47,7 +47,7 @@ def test(name: str, tape: Tape, inputs: Sequence[Vector]) -> str:
     lines, results = _statements(tape, inputs)
     conditions = [f"{value} >= 0.0" for value in results] or ["1"]
     lines.append("    return " + "\n        && ".join(conditions) + ";")
-    return _definition(f"static int {name}({', '.join(f'const double *{v.name}' for v in inputs)})", lines)
+    return _definition(f"static int {name}({', '.join(f'const double *{v.name}' for v in inputs)})", lines, inputs)
 
 
 def number(value: float) -> str:
@@ -57,8 +57,10 @@ def number(value: float) -> str:
     return repr(float(value))
 
 
-def _definition(head: str, lines: Sequence[str]) -> str:
-    return "\n".join([head, "{", *lines, "}", ""])
+def _definition(head: str, lines: Sequence[str], inputs: Sequence[Vector]) -> str:
+    body = "\n".join(lines)
+    unused = [f"    (void){vector.name};" for vector in inputs if f"{vector.name}[" not in body]
+    return "\n".join([head, "{", *unused, *lines, "}", ""])
 
 
 def _statements(tape: Tape, inputs: Sequence[Vector]) -> tuple[list[str], list[str]]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import configparser
+import ctypes
 import json
 import re
 import shutil
@@ -20,6 +21,7 @@ from test_direct import CLOSE, allowed, garbage, legs_regularity, nudged
 import parakin as pk
 from parakin.cli import main
 from parakin.export.linuxcnc import configuration
+from parakin.export.linuxcnc.module import module
 from parakin.kinematics.direct import roots, side_of
 
 sys.path.insert(0, str(Path(__file__).parent / "linuxcnc"))
@@ -360,6 +362,21 @@ def test_the_module_is_under_the_gpl_and_names_itself(name):
     assert f'#define MODULE "{name}_kins"' in text
     assert not re.search(r"\b(inf|nan)\b", text)
     assert text.count("{") == text.count("}")
+
+
+def test_a_module_of_another_making_is_not_loaded(modules):
+    m = pk.load("tricept")
+    mark = re.search('#define MADE "(.*)"', module(m))[1]
+    assert f"KINEMATICS made={mark}\n" in configuration(m)["tricept.hal"]
+    other = pk.load("tricept", parameters={"R": "351 mm"})
+    assert f"made={mark}" not in configuration(other)["tricept.hal"]
+    library = modules(m).library
+    given = ctypes.POINTER(ctypes.c_char_p).in_dll(library, "stub_string_made")
+    codes = []
+    for said in (b"another", mark.encode(), b""):
+        given[0] = said
+        codes.append(library.rtapi_app_main())
+    assert codes == [-1, 0, 0]
 
 
 # The command

@@ -12,7 +12,7 @@ import numpy as np
 from parakin.export.linuxcnc.module import kinematics_name, module
 
 HERE = Path(__file__).parent
-HEADERS = ("rtapi.h", "rtapi_app.h", "rtapi_math.h", "hal.h", "kinematics.h")
+HEADERS = ("rtapi.h", "rtapi_app.h", "rtapi_math.h", "rtapi_string.h", "hal.h", "kinematics.h")
 # As LinuxCNC's Makefile.modinc compiles a module.
 FLAGS = ["-Os", "-fno-fast-math", "-mieee-fp", "-fno-unsafe-math-optimizations", "-fno-builtin-sincos"]
 FLAGS += ["-fno-builtin-sin", "-fno-builtin-cos", "-D_GNU_SOURCE", "-DRTAPI", "-fPIC"]

@@ -5,6 +5,7 @@
 #include <math.h>
 #include <stdint.h>
 #include <stdlib.h>
+#include <string.h>
 
 typedef struct { double x, y, z; } PmCartesian;
 typedef struct EmcPose { PmCartesian tran; double a, b, c, u, v, w; } EmcPose;
@@ -12,6 +13,8 @@ typedef enum { KINEMATICS_IDENTITY = 1, KINEMATICS_FORWARD_ONLY, KINEMATICS_INVE
 typedef unsigned long KINEMATICS_FORWARD_FLAGS, KINEMATICS_INVERSE_FLAGS;
 
 #define EXPORT_SYMBOL(name) extern int stub_exported_##name
+#define RTAPI_MSG_ERR 1
+#define RTAPI_MP_STRING(name, text) char **stub_string_##name = &name
 #define MODULE_LICENSE(text) const char *const stub_license = text
 
 int kinematicsForward(const double *joints, EmcPose *world,
@@ -25,6 +28,7 @@ int kinematicsSwitch(int type);
 int rtapi_app_main(void);
 void rtapi_app_exit(void);
 int hal_init(const char *name);
+void rtapi_print_msg(int level, const char *format, ...);
 int hal_ready(int component);
 int hal_exit(int component);
 

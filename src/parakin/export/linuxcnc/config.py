@@ -8,7 +8,7 @@ from math import degrees, isfinite
 from ...machine import Machine
 from ...model.parts import Drive
 from .extent import extent
-from .module import kinematics_name
+from .module import kinematics_name, made
 from .rates import ACCELERATION, SPEED, of_axes, slowest
 
 _LAG = 0.01  # s: following error allowed, as time at full speed; the simulation lags by 0.001 s or two
@@ -82,7 +82,7 @@ _HAL = """\
 # {name} as a simulation: every joint is at once where it is sent.
 # For a machine of your own put its drives in the place of these loops.
 
-loadrt [KINS]KINEMATICS
+loadrt [KINS]KINEMATICS made={made}
 loadrt [EMCMOT]EMCMOT servo_period_nsec=[EMCMOT]SERVO_PERIOD num_joints=[KINS]JOINTS
 addf motion-command-handler servo-thread
 addf motion-controller servo-thread
@@ -177,7 +177,7 @@ def hal(machine: Machine) -> str:
         f"net joint-{i} joint.{i}.motor-pos-cmd => joint.{i}.motor-pos-fb  # {name}"
         for i, name in enumerate(machine.joints)
     ]
-    return _HAL.format(name=machine.name, loops="\n".join(loops))
+    return _HAL.format(name=machine.name, made=made(machine), loops="\n".join(loops))
 
 
 def tool_table(machine: Machine) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from hashlib import sha256
 from importlib.resources import files
 
 import numpy as np
@@ -33,6 +34,7 @@ _HEADER = """\
 #include "rtapi.h"
 #include "rtapi_app.h"
 #include "rtapi_math.h"
+#include "rtapi_string.h"
 #include "hal.h"
 #include "kinematics.h"
 """
@@ -47,7 +49,7 @@ static inline double angle_of(double y, double x) { return atan2(y + 0.0, x + 0.
 
 
 def kinematics_name(machine: Machine) -> str:
-    """The module's name, which none of LinuxCNC's own kinematics has."""
+    """The module's name; of LinuxCNC's own only ``xyzab_tdr_kins`` is built likewise."""
     return f"{machine.name}_kins"
 
 
@@ -56,9 +58,20 @@ def module(machine: Machine) -> str:
     name = kinematics_name(machine)
     title = " ".join(machine.spec.title.split()).replace("*/", "* /")
     head = _HEADER.format(name=name, machine=machine.name, title=title)
+    return "\n".join(
+        [head, f'#define MADE "{made(machine)}" /* what the configuration of the same making names */', *_body(machine)]
+    )
+
+
+def made(machine: Machine) -> str:
+    """A mark of a machine's kinematics, by which a module of an older description is known."""
+    return sha256("\n".join(_body(machine)).encode()).hexdigest()[:16]
+
+
+def _body(machine: Machine) -> list[str]:
     runtime = files(__package__).joinpath("runtime.c").read_text(encoding="utf-8")
-    parts = [head, _numbers(machine, name), _transfer(machine), _ELEMENTARY, *_mathematics(machine), runtime]
-    return "\n".join(parts)
+    numbers = _numbers(machine, kinematics_name(machine))
+    return [numbers, _transfer(machine), _ELEMENTARY, *_mathematics(machine), runtime]
 
 
 def _numbers(machine: Machine, name: str) -> str:

@@ -17,7 +17,7 @@ For LinuxCNC 2.9, as a simulation without hardware.
 | `{name}.ini` | ranges, speeds and home |
 | `{name}.hal` | loops in the place of drives |
 | `{name}.tbl` | the tool |
-| `{name}.ngc` | a first program: a square about home |
+| `{name}.ngc` | a first program: a square at home |
 
 Install the kinematics once and start:
 
@@ -26,6 +26,9 @@ sudo apt-get install linuxcnc-uspace linuxcnc-uspace-dev
 sudo halcompile --install {kinematics}.c
 linuxcnc {name}.ini
 ```
+
+`halcompile` needs a folder whose path has no blanks. Once the description has changed, install the kinematics anew: with
+one of an older making LinuxCNC does not start, and says so.
 
 Switch the machine on and home it: it then stands at {home}.
 Programs are in millimetres and degrees; {frame}.

@@ -262,9 +262,16 @@ EXPORT_SYMBOL(kinematicsSwitch);
 MODULE_LICENSE("GPL");
 
 static int component;
+static char *made = "";
+RTAPI_MP_STRING(made, "the making of the configuration that loads this");
 
 int rtapi_app_main(void)
 {
+    if (*made && strcmp(made, MADE) != 0) {
+        rtapi_print_msg(RTAPI_MSG_ERR, MODULE " was made from another description than the configuration: install its "
+                        "file with sudo halcompile --install " MODULE ".c\n");
+        return -1;
+    }
     component = hal_init(MODULE);
     if (component < 0)
         return component;

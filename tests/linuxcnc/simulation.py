@@ -63,11 +63,11 @@ class Run:
     poses: np.ndarray
     joints: np.ndarray
 
-    def from_line(self, first):
-        """Cycles from a program's line on, while anything moves: a slice."""
-        begin = int(np.argmax(self.line >= first))
-        moving = np.flatnonzero((np.diff(self.poses, axis=0) != 0.0).any(1)[begin:])
-        return slice(begin + int(moving[0]), begin + int(moving[-1]) + 2)
+    def part(self, first, start):
+        """The cycles from those on in which it stands at ``start`` (9,), before a program's line ``first``: a slice."""
+        told = int(np.argmax(self.line >= first))  # some cycles late
+        moving = np.flatnonzero((np.diff(self.poses, axis=0) != 0.0).any(1))
+        return slice(int(np.abs(self.poses[:told] - start).max(1).argmin()), int(moving[-1]) + 2)
 
 
 def as_programmed(posted):

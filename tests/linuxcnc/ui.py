@@ -35,7 +35,9 @@ class Machine:
             if ready(self.status):
                 return
             time.sleep(0.005)
-        raise ToldError(f"not within {MOST:g} s")
+        s = self.status
+        state = f"task {s.task_mode} {s.task_state} {s.exec_state}, interpreter {s.interp_state}, file {s.file}, line {s.motion_line}"
+        raise ToldError(f"not within {MOST:g} s: {state}, in position {s.inpos}, queue {s.queue}, {s.echo_serial_number} {self.command.serial}")
 
     def tell(self, word, *arguments):
         getattr(self.command, word)(*arguments)
@@ -65,8 +67,11 @@ class Machine:
         return self.position()
 
     def program(self, name):
+        path = str(Path(name).resolve())
         self.tell("mode", linuxcnc.MODE_AUTO)
-        self.tell("program_open", str(Path(name).resolve()))
+        self.wait(lambda s: s.task_mode == linuxcnc.MODE_AUTO)
+        self.tell("program_open", path)
+        self.wait(lambda s: s.file == path)  # on a busy computer wait_complete may give up before
         self.command.auto(linuxcnc.AUTO_RUN, 0)
         self.wait(lambda s: s.interp_state != linuxcnc.INTERP_IDLE)
         return self.position()

@@ -27,8 +27,8 @@ sudo halcompile --install {kinematics}.c
 linuxcnc {name}.ini
 ```
 
-`halcompile` needs a folder whose path has no blanks. Once the description has changed, install the kinematics anew: with
-one of an older making LinuxCNC does not start, and says so.
+`halcompile` needs a folder whose path has no blanks. Once the description has changed, install the kinematics anew:
+with one of an older making LinuxCNC does not start, and says so.
 
 Switch the machine on and home it: it then stands at {home}.
 Programs are in millimetres and degrees; {frame}.

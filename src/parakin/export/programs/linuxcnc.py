@@ -24,6 +24,7 @@ Writer = Callable[[BinaryIO], None]
 _CHUNK = 1 << 16  # motions written at a time
 _SLOWEST = 0.11 / 60.0  # mm/s: what is slower LinuxCNC runs at 0.1 mm/min in inverse time
 _INSTANT = 0.002  # s
+_TURNING = 0.4  # of the tolerance: two motions that turn the tool LinuxCNC blends less well than it reckons
 
 
 def linuxcnc_program(law: Law, *, forced: str | None = None, tolerance: float = 0.005) -> Writer:
@@ -48,10 +49,11 @@ def linuxcnc_program(law: Law, *, forced: str | None = None, tolerance: float = 
         raise PoseError(f"mode {posted.mode!r}: LinuxCNC's kinematics of {machine.name} has {machine.mode!r} only")
     _refuse_turns(machine, posted.poses)
     found = motions(law, *axis_rates(machine))
+    blend = tolerance * (_TURNING if set(machine.axes) & set("ABC") else 1.0)
     way = approach(machine, law.curve.corner[0], law.course.joints[0], posted.mode)
 
     def write(file: BinaryIO) -> None:
-        for text in _program(law, found, way, forced, f"G64 P{tolerance:g} Q0"):
+        for text in _program(law, found, way, forced, f"G64 P{blend:g} Q0"):
             file.write(text.encode("ascii"))
 
     return write

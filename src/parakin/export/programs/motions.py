@@ -15,7 +15,6 @@ from .strain import strain
 
 CYCLE = 1e-3  # s: of the controller. Motions that take whole cycles it blends evenly, others with a bump of speed
 _KEPT = 0.997  # of the joints' speeds; the rest is for what lies between the looks and for the controller's rounding
-_ROUNDS = 60
 _EVEN = 0.1  # mm/mm: corners sharper than this turn the joints elsewhere
 _ROUNDING = 1e-6  # of a cycle
 
@@ -78,7 +77,7 @@ def _calm(cycles: Floats, need: Floats, ramp: Floats, blended: NDArray[np.bool_]
         before that one is over. Each at its own rate, so that they may be faster together than each of them alone.
     """
     cycles = np.maximum(cycles, np.ceil(np.maximum(need.max(1), np.sqrt(ramp)) - _ROUNDING))
-    for _ in range(_ROUNDS):
+    while True:  # ends, for speeds only fall, and slow motions have room
         ramps = ramp / cycles
         both = need[:-1, 1] / cycles[:-1] * np.maximum(1.0 - ramps[1:] / ramps[:-1], 0.0) + need[1:, 0] / cycles[1:]
         over = np.maximum(both * blended, 1.0)
@@ -86,6 +85,5 @@ def _calm(cycles: Floats, need: Floats, ramp: Floats, blended: NDArray[np.bool_]
         least = np.maximum(least, np.append(0.0, ramps[:-1] * blended))
         slower = np.ceil(least - _ROUNDING)
         if not (slower > cycles).any():
-            break
+            return cycles
         cycles = np.maximum(cycles, slower)
-    return cycles

@@ -1,0 +1,401 @@
+"""Programs for controllers: what is written is read back, keeps the joints' speeds, and hides nothing."""
+
+from __future__ import annotations
+
+import io
+import re
+import sys
+from dataclasses import replace
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import parakin as pk
+from parakin.errors import InputError, PoseError
+from parakin.export.files import write_all
+from parakin.export.linuxcnc.rates import axis_rates
+from parakin.export.programs import joint_program, linuxcnc_program, program_seconds, read_joint_program
+from parakin.export.programs.approach import approach
+from parakin.export.programs.joints import joint_letters
+from parakin.export.programs.linuxcnc import _timed
+from parakin.export.programs.motions import CYCLE, motions
+from parakin.toolpath.feed import plan
+from parakin.toolpath.gcode import read_gcode
+from parakin.toolpath.post import post
+from parakin.toolpath.program import Event, ToolPath
+from parakin.toolpath.reading import read_path
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "examples"))
+import turbine_blade
+
+PLACES = {"tricept": (None, False), "hexapod": ("-60,20,710", False), "linear_delta": ("-60,45,1920", True)}
+AS_IT_IS = np.hstack([np.eye(3), np.zeros((3, 1))])
+HALF = 0.51e-6  # of the last digit, mm and degrees
+every_place = pytest.mark.parametrize("name", PLACES)
+
+
+@pytest.fixture(scope="module")
+def laws(tmp_path_factory):
+    """The law of the example part on a machine, made when asked for."""
+    folder, known = tmp_path_factory.mktemp("part"), {}
+
+    def law_of(name):
+        if name not in known:
+            place, upright = PLACES[name]
+            lines = turbine_blade.nx_lines(turbine_blade.tool_path(400, upright), turbine_blade.FEEDS | {"cut": 1e4})
+            (folder / "part.cls").write_text("\n".join(lines) + "\n", encoding="ascii")
+            known[name] = plan(post(pk.load(name), read_path(folder / "part.cls"), workpiece=place))
+        return known[name]
+
+    return law_of
+
+
+def text_of(writer):
+    file = io.BytesIO()
+    writer(file)
+    return file.getvalue().decode("ascii")
+
+
+def rim(values, units):
+    return np.where(np.array(units) == "rad", np.degrees(values), values)
+
+
+def path_of(tip, axis=None, **fields):
+    count = len(tip)
+    values = {"line": np.arange(1, count + 1), "rapid": np.zeros(count, bool), "feed": np.full(count, 3000.0)}
+    values |= {"spindle": np.full(count, 12000.0)} | fields
+    axis = np.tile([0.0, 0.0, 1.0], (count, 1)) if axis is None else axis
+    return ToolPath("part.cls", np.asarray(tip, float), axis, **values)
+
+
+def motion_lines(text):
+    return [line for line in text.splitlines() if re.match(r"(G53 )?G1 ", line)]
+
+
+# LinuxCNC
+
+
+@every_place
+def test_what_is_written_for_linuxcnc_is_read_back(laws, name, tmp_path):
+    law = laws(name)
+    machine, posted = law.posted.machine, law.posted
+    (file,) = write_all(tmp_path, {"part.ngc": linuxcnc_program(law)})
+    read = read_gcode(file, workpiece=AS_IT_IS)
+    turns = np.zeros((len(read), 3)) if read.turns is None else read.turns
+    columns = [("XYZ".index(a), read.tip) if a in "XYZ" else ("ABC".index(a), turns) for a in machine.axes]
+    rows = rim(np.column_stack([table[:, i] for i, table in columns]), machine.axis_units)
+    wanted = rim(posted.poses, machine.axis_units)
+    at, found = 0, []
+    for pose in wanted:  # in their order, points between them left out
+        at += int(np.argmax(np.abs(rows[at:] - pose).max(1) < HALF))
+        found.append(at)
+    assert np.abs(rows[found] - wanted).max() < HALF
+    assert len(set(found)) == len(law.curve.corner)
+    assert found[-1] == len(rows) - 1
+    assert read.seconds[found[0] + 1 :].sum() == pytest.approx(program_seconds(law), abs=1e-6)
+    assert program_seconds(law) == pytest.approx(law.seconds, rel=0.05)
+    for begin, end in pairwise(found):  # what was added lies on the straight way
+        if end > begin + 1:
+            way = rows[end] - rows[begin]
+            share = (rows[begin + 1 : end] - rows[begin]) @ way / (way @ way)
+            assert (np.diff(share) > 0.0).all()
+            assert np.abs(rows[begin] + share[:, None] * way - rows[begin + 1 : end]).max() < 3e-6
+
+
+@every_place
+def test_every_motion_is_in_machine_coordinates_and_inverse_time(laws, name):
+    text = text_of(linuxcnc_program(laws(name)))
+    lines = motion_lines(text)
+    letters = " ".join(rf"{axis}-?\d+\.\d{{6}}" for axis in laws(name).posted.machine.axes)
+    assert all(re.fullmatch(rf"G53 G1 {letters} F\d+\.\d{{6}}", line) for line in lines)
+    assert len(lines) > 300
+    assert max(map(len, text.splitlines())) < 250
+    modes = text.index("G21 G90 G17 G40 G49\n"), text.index("G93"), text.index("G53")
+    assert sorted(modes) == list(modes)
+    assert "G94" not in text
+    assert text.endswith("M2\n")
+    head = text.splitlines()[:3]
+    assert "turbine_blade" in head[0] or "part.cls" in head[0]
+    assert f"{name}, mode {laws(name).posted.mode}" in head[0]
+    assert f"{program_seconds(laws(name)):.3f} s" in head[1]
+    assert "OFF LIMITS" not in text
+
+
+@every_place
+def test_no_joint_passes_its_speed(laws, name):
+    """By differences of the inverse along the written lines, ten to a line, each at its own speed."""
+    machine = laws(name).posted.machine
+    numbers = np.array(
+        [[float(word[1:]) for word in line.split()[2:]] for line in motion_lines(text_of_law(laws(name)))]
+    )
+    poses = np.where(np.array(machine.axis_units) == "rad", np.radians(numbers[:, :-1]), numbers[:, :-1])
+    seconds, share = 60.0 / numbers[1:, -1], np.linspace(0.0, 1.0, 11)[:, None]
+    speeds = np.array([drive.speed for drive in machine.model.drives])
+    start = 3 if machine.axes[3:] == ("B", "C") else 1  # from home on: upright there, a turn moves no joint
+    worst = 0.0
+    for begin, end, taken in zip(poses[start - 1 : -1], poses[start:], seconds[start - 1 :], strict=True):
+        joints = machine.follow(begin + share * (end - begin))
+        worst = max(worst, float((np.abs(np.diff(joints, axis=0)) * 10.0 / taken / speeds).max()))
+    assert 0.6 < worst <= 1.0
+
+
+def text_of_law(law):
+    return text_of(linuxcnc_program(law))
+
+
+@every_place
+def test_motions_take_whole_cycles_and_blend_within_the_speeds(laws, name):
+    law = laws(name)
+    speeds, accelerations = axis_rates(law.posted.machine)
+    found = motions(law, speeds, accelerations)
+    cycles = found.seconds / CYCLE
+    assert np.abs(cycles - np.rint(cycles)).max() < 1e-6
+    steps = np.abs(np.diff(found.ends, axis=0, prepend=law.curve.corner[:1]))
+    assert (steps <= speeds * found.seconds[:, None] * (1.0 + 1e-9)).all()
+    ramps = 2.0 * (steps / accelerations).max(1) / found.seconds
+    assert (ramps <= found.seconds * (1.0 + 1e-6)).all()  # it comes to its speed
+    assert (ramps[:-1] <= found.seconds[1:] * (1.0 + 1e-6))[~found.halt[:-1]].all()  # and is done before the next ends
+    assert np.abs(found.ends[-1] - law.posted.poses[-1]).max() < 1e-9
+
+
+def test_a_tip_that_all_but_stands_is_turned_first_and_moved_then():
+    machine = pk.load("tricept")
+    before = np.array([[10.0, 0.0, -1600.0, 20.0, 0.0]])
+    ends = np.array([[10.000001, 0.0, -1600.0, 25.0, 0.0], [11.0, 0.0, -1600.0, 25.0, 0.0]])
+    rows, seconds = _timed(machine, before, ends, np.array([1.0, 0.5]))
+    assert rows.tolist() == [[10.0, 0.0, -1600.0, 25.0, 0.0], *ends.tolist()]
+    assert seconds[[0, 2]].tolist() == [1.0, 0.5]
+    assert 0.0 < seconds[1] < 0.01
+    same = _timed(machine, before, ends[1:], np.array([1.5]))
+    assert same[0].tolist() == ends[1:].tolist()
+
+
+def test_where_the_law_stands_still_linuxcnc_does_too():
+    machine = pk.load("linear_delta")
+    path = path_of([[0.0, 0.0, 280.0], [40.0, 0.0, 280.0], [40.0, 40.0, 280.0], [80.0, 40.0, 280.0]])
+    stopping, rounding = (text_of(linuxcnc_program(plan(post(machine, path), corners=c))) for c in ("stop", "round"))
+    assert rounding.count("G61\n") == 1  # at the first record
+    assert stopping.count("G61\n") == 3
+    lines = stopping.splitlines()
+    for corner in ("X40.000000 Y0.000000", "X40.000000 Y40.000000"):
+        at = next(i for i, line in enumerate(lines) if corner in line)
+        assert lines[at - 1] == "G61"
+        assert lines[at + 1].startswith("G64 P0.005")
+
+
+@pytest.mark.parametrize("name", ["tricept", "orthoglide5_head", "orthoglide5_table"])
+@pytest.mark.parametrize("mode", ["+", "-"])
+def test_from_home_the_wrist_does_not_jump(name, mode):
+    machine = pk.load(name)
+    mode = machine.mode[:-1] + mode
+    first = machine.home + np.array([15.0, 10.0, -5.0, 0.4, 2.0])
+    joints = machine.inverse(first, mode)
+    poses, seconds = approach(machine, first, joints, mode)
+    assert np.abs(poses[-1] - first).max() == 0.0
+    assert seconds[0] >= 4.0
+    assert np.abs(poses[0][:3] - machine.home[:3]).max() < 1e-12
+    assert poses[0][3] == 0.0  # upright, where a turn moves no joint
+    way = np.concatenate([a + np.linspace(1e-6, 1.0, 4000)[:, None] * (b - a) for a, b in pairwise(poses)])
+    rows = machine.follow(way, mode)
+    wrist = machine.model.first_serial
+    at_home = machine.inverse(machine.home)[wrist]
+    rows[:, wrist] += 2.0 * np.pi * np.round((at_home - rows[0, wrist]) / (2.0 * np.pi))
+    assert rows[0, wrist] == pytest.approx(at_home, abs=1e-5)
+    assert np.abs(np.diff(rows, axis=0))[:, wrist].max() < 0.01
+    assert np.abs(rows[-1] - joints).max() < 1e-6  # on the turn that is planned, too
+    other = joints + 2.0 * np.pi * (np.arange(len(joints)) == wrist)
+    turned = approach(machine, first, other, mode)[0]
+    assert abs(turned[1][4] - poses[1][4]) == pytest.approx(2.0 * np.pi)
+
+
+def test_what_linuxcnc_cant_follow_is_refused(laws):
+    machine = pk.load("linear_delta")
+    law = plan(post(machine, path_of([[0.0, 0.0, 280.0], [1.0, 0.0, 280.0]])))
+    other = next(mode for mode in machine.modes if mode != machine.mode)
+    with pytest.raises(PoseError, match="mode"):
+        linuxcnc_program(replace(law, posted=replace(law.posted, mode=other)))
+    posted = laws("tricept").posted
+    poses = posted.poses.copy()
+    poses[:, 4] += 700.0
+    with pytest.raises(PoseError, match="C would turn"):
+        linuxcnc_program(replace(laws("tricept"), posted=replace(posted, poses=poses)))
+    for tolerance in (0.0, -1.0, float("inf"), float("nan")):
+        with pytest.raises(PoseError, match="tolerance"):
+            linuxcnc_program(laws("tricept"), tolerance=tolerance)
+
+
+def test_a_path_of_one_record(tmp_path):
+    machine = pk.load("hexapod")
+    law = plan(post(machine, path_of([[0.0, 0.0, -940.0]] * 2)))
+    lines = motion_lines(text_of(linuxcnc_program(law)))
+    assert len(lines) == 1
+    assert "Z-940.000000" in lines[0]
+    assert program_seconds(law) == 0.0
+    (file,) = write_all(tmp_path, {"one.ngc": joint_program(law)})
+    assert len(read_joint_program(file).joints) == 1
+
+
+# Joints
+
+
+@pytest.mark.parametrize("name", PLACES)
+def test_what_is_written_in_joints_is_read_back(laws, name, tmp_path):
+    law = laws(name)
+    machine = law.posted.machine
+    (file,) = write_all(tmp_path, {"part.ngc": joint_program(law)})
+    read = read_joint_program(file)
+    assert read.letters == joint_letters(machine)
+    kept = np.append(True, np.diff(law.curve.place) > 0)
+    assert np.abs(read.joints - rim(law.posted.joints[kept], machine.joint_units)).max() < HALF
+    spans = np.diff(law.times[kept])
+    assert (read.seconds[1:] > spans - 1e-6).all()  # never less, and more only where a corner is not rounded here
+    assert np.abs(read.seconds[1:] - spans).sum() < 1e-3
+    limits = rim(np.array([drive.speed for drive in machine.model.drives]), machine.joint_units)
+    assert (np.abs(np.diff(read.joints, axis=0)) / read.seconds[1:, None] <= limits * (1.0 + 1e-6)).all()
+    lines = file.read_text().splitlines()
+    assert all(re.match("[(]|G1 |G|S|M", lines[i - 1]) for i in read.line)
+    for letter, joint in zip(read.letters, machine.joints, strict=True):
+        assert f"{letter} is {joint} in" in lines[1]
+
+
+def test_linear_joints_are_xyzuvw_and_turning_ones_abc():
+    assert joint_letters(pk.load("hexapod")) == tuple("XYZUVW")
+    assert joint_letters(pk.load("tricept")) == tuple("XYZAB")
+
+
+def test_more_joints_than_letters(monkeypatch):
+    machine = pk.load("hexapod")
+    monkeypatch.setitem(machine.__dict__, "joint_units", ("mm",) * 7)
+    with pytest.raises(PoseError, match="hexapod has 7 linear and 0 turning joints; G-code has letters for 6 and 3"):
+        joint_letters(machine)
+    monkeypatch.setitem(machine.__dict__, "joint_units", ("rad",) * 4 + ("mm",))
+    with pytest.raises(PoseError, match="1 linear and 4 turning"):
+        joint_letters(machine)
+
+
+HEAD = "G21 G90\nG93\n"
+
+
+@pytest.mark.parametrize(
+    ("text", "line", "word"),
+    [
+        ("", None, "no motion"),
+        ("( only a remark )\n", None, "no motion"),
+        ("G21\nG1 X1 F1\n", 2, "before G90"),
+        ("G21 G90\nG1 X1 F1\n", 2, "before G93"),
+        ("G20 G90 G93\n", 1, "G20"),
+        (HEAD + "G0 X1\n", 3, "G0"),
+        (HEAD + "G91\n", 3, "G91"),
+        (HEAD + "X1 F1\n", 3, "motion code"),
+        (HEAD + "G1 X1\n", 3, "F above zero"),
+        (HEAD + "G1 X1 F0\n", 3, "F above zero"),
+        (HEAD + "G1 X1 Y2 F1\nX2 F1\n", 4, "same joints"),
+        (HEAD + "G1 X1 F1\nX2 Y1 F1\n", 4, "same joints"),
+        (HEAD + "G1 X1 F1 R2\n", 3, "R2"),
+        (HEAD + "G1 X1 F1\nM2\nX2 F1\n", 5, "program's end"),
+        (HEAD + "G1 X1 X2 F1\n", 3, "two X words"),
+        (HEAD + "G1 U1 F1 (\n", 3, "comment"),
+        (HEAD + "G1 XY F1\n", 3, ""),
+    ],
+)
+def test_what_is_no_program_in_joints(tmp_path, text, line, word):
+    file = tmp_path / "joints.ngc"
+    file.write_text(text)
+    with pytest.raises(InputError) as caught:
+        read_joint_program(file)
+    assert caught.value.line == line
+    assert caught.value.source == str(file)
+    assert word in caught.value.message
+    assert "\n" not in str(caught.value)
+
+
+def test_files_that_cant_be_read(tmp_path):
+    with pytest.raises(InputError, match="cannot be read"):
+        read_joint_program(tmp_path / "nothing.ngc")
+    (tmp_path / "binary.ngc").write_bytes(b"\xff\xfe\x00")
+    with pytest.raises(InputError, match="plain text"):
+        read_joint_program(tmp_path / "binary.ngc")
+
+
+# What is not motion
+
+
+def told(events, dialect="nx", writer=linuxcnc_program, **fields):
+    """The lines of a program of three records that are no motion and no mode, and where its motions are among them."""
+    path = path_of([[0.0, 0.0, 280.0], [5.0, 0.0, 280.0], [5.0, 5.0, 280.0]], dialect=dialect, **fields)
+    path = replace(path, events=tuple(Event(record, 10 * record + i, text) for i, (record, text) in enumerate(events)))
+    text = text_of(writer(plan(post(pk.load("linear_delta"), path))))
+    return text.splitlines()
+
+
+@pytest.mark.parametrize("writer", [linuxcnc_program, joint_program])
+@pytest.mark.parametrize(
+    ("dialect", "text", "expected"),
+    [
+        ("nx", "SPINDL/RPM,12000,CLW", "S12000 M3"),
+        ("nx", "SPINDL/RPM,12000,CCLW", "S12000 M4"),
+        ("apt", "SPINDL/12000.0000,RPM,CLW", "S12000 M3"),
+        ("apt", "SPINDL/ON", "S12000 M3"),
+        ("apt", "SPINDL/OFF", "M5"),
+        ("apt", "COOLNT/ON", "M8"),
+        ("apt", "COOLNT/MIST", "M7"),
+        ("apt", "COOLNT/OFF", "M9"),
+        ("apt", "COOLNT/THRU", "( line 10: COOLNT/THRU )"),
+        ("apt", "STOP", "M0"),
+        ("apt", "OPSTOP", "M1"),
+        ("apt", "DELAY/2.5", "G4 P2.5"),
+        ("apt", "DELAY/3,REV", "( line 10: DELAY/3,REV )"),
+        ("apt", "PPRINT (abort, now) ; 100%", "( line 10: PPRINT [abort, now] , 100? )"),
+        ("apt", "abort, now", "( line 10: abort, now )"),
+        ("apt", "PPRINT Stück", "( line 10: PPRINT St?ck )"),
+        ("gcode", "M3", "M3"),
+        ("gcode", "S800", "S800"),
+        ("gcode", "M8", "M8"),
+        ("gcode", "M1", "M1"),
+        ("gcode", "G4 P1.5", "G4 P1.5"),
+        ("gcode", "G54", "( line 10: G54 )"),
+        ("gcode", "(msg, mind the (clamp)", "(MSG,mind the [clamp)"),
+    ],
+)
+def test_events_in_words(writer, dialect, text, expected):
+    lines = told([(1, text)], dialect, writer)
+    assert lines.count(expected) == 1
+    at = lines.index(expected)
+    reached = [i for i, line in enumerate(lines) if re.search(r"^(G53 )?G1 ", line)]
+    assert reached[0] < at < reached[-1]
+    if writer is linuxcnc_program:
+        assert [i for i in reached if i < at] == reached[:1]
+
+
+def test_where_events_go():
+    lines = told([(0, "COOLNT/ON"), (2, "STOP"), (3, "COOLNT/OFF"), (3, "FINI")])
+    at = [lines.index(line) for line in ("M8", "M0", "M9", "( line 33: FINI )", "M2")]
+    motion = [i for i, line in enumerate(lines) if line.startswith("G53")]
+    corner = next(i for i in motion if "X5.000000 Y0.000000" in lines[i])
+    assert at[0] < motion[0] < corner < at[1] < motion[-1] < at[2] < at[3] < at[4]
+    assert "M30" not in told([(3, "M30")], "gcode")
+
+
+def test_a_spindle_goes_on_the_way_it_turned():
+    lines = told([(0, "SPINDL/RPM,12000,CCLW"), (1, "SPINDL/OFF"), (2, "SPINDL/ON")])
+    assert lines.count("S12000 M4") == 2
+    lines = told([(1, "SPINDL/SFM,300,CLW")], spindle=np.full(3, np.nan))
+    assert "( line 10: SPINDL/SFM,300,CLW )" in lines
+
+
+def test_another_tool_stops_the_program():
+    lines = told([(0, "LOAD/TOOL,1"), (2, "LOAD/TOOL,2")])
+    assert lines.count("M0") == 1
+    assert lines[lines.index("M0") - 1] == "( line 21: LOAD/TOOL,2 )"
+
+
+@pytest.mark.parametrize("writer", [linuxcnc_program, joint_program])
+def test_forced_it_says_so(laws, writer):
+    offences = "part.cls:214: leg d2 would be 1,533.2 mm, limit 1,520\npart.cls:9: " + 60 * "very long "
+    text = text_of(writer(laws("tricept"), forced=offences))
+    head = text[: text.index("G21")].splitlines()
+    assert "( OFF LIMITS: written with --force: part.cls:214: leg d2 would be 1,533.2 mm, limit 1,520 )" in head
+    assert all(line.startswith("( ") and line.endswith(" )") and len(line) < 250 for line in head)
+    assert "".join(line[2:-2] for line in head).count("very long") == 60

@@ -9,10 +9,10 @@ import pytest
 import parakin as pk
 from parakin.analysis.singularities import singularity_margins
 from parakin.machine import Machine
-from parakin.toolpath.between import between
-from parakin.toolpath.between_search import Search
-from parakin.toolpath.frames import ROUNDED
+from parakin.toolpath.between.checking import between
+from parakin.toolpath.between.search import Search
 from parakin.toolpath.offences import judge, place
+from parakin.toolpath.posing.frames import ROUNDED
 from parakin.toolpath.program import ToolPath
 from parakin.toolpath.result import Posted
 
@@ -537,7 +537,7 @@ def test_what_takes_too_long_is_told(monkeypatch):
     rows = poses[0] + np.linspace(0.0, 1.0, 10_001)[:, None] * (poses[1] - poses[0])
     machine = ranged(machine, {"tower_a": (700.0, machine.inverse(rows)[:, 0].max() + 1e-4)})
     assert between(posted_on(machine, poses)).first is None
-    monkeypatch.setattr("parakin.toolpath.between_search.MOST_CUTS", 0)
+    monkeypatch.setattr("parakin.toolpath.between.search.MOST_CUTS", 0)
     checked = between(posted_on(machine, poses))
     assert [offence.limit for offence in checked.offences] == ["untold"]
     assert checked.first.text == "whether this motion keeps all limits can't be told"

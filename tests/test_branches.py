@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import parakin as pk
-from parakin.toolpath.gcode import axes_of
+from parakin.toolpath.gcode.reader import axes_of
 from parakin.toolpath.post import post
 from parakin.toolpath.program import ToolPath
 

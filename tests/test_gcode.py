@@ -12,8 +12,9 @@ import pytest
 from gcode_model import Program
 
 from parakin.errors import InputError
-from parakin.toolpath import gcode, gcode_motion
-from parakin.toolpath.gcode import read_gcode
+from parakin.toolpath.gcode import motion as gcode_motion
+from parakin.toolpath.gcode import reader as gcode
+from parakin.toolpath.gcode.reader import read_gcode
 from parakin.toolpath.reading import read_path, sniff
 
 COLUMNS = ("tip", "axis", "line", "rapid", "feed", "spindle", "turns", "seconds")

@@ -9,8 +9,8 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import parakin as pk
-from parakin.toolpath.interpolate import Programmed, denser
-from parakin.toolpath.linearise import linearised
+from parakin.toolpath.linearise.densening import linearised
+from parakin.toolpath.linearise.interpolate import Programmed, denser
 from parakin.toolpath.post import post
 from parakin.toolpath.program import Event, ToolPath
 

@@ -14,7 +14,7 @@ from parakin.export.ranges import shown
 from parakin.export.report import report_html
 from parakin.export.scene import around, scene
 from parakin.export.solids import solids
-from parakin.toolpath.cl import read_cl
+from parakin.toolpath.cl.reader import read_cl
 from parakin.toolpath.post import post
 from parakin.toolpath.program import Note, ToolPath
 from parakin.toolpath.result import Posted

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 import parakin as pk
-from parakin.toolpath.frames import transform
-from parakin.toolpath.place import parse_bounds, placed
+from parakin.toolpath.placing.searching import parse_bounds, placed
+from parakin.toolpath.posing.frames import transform
 from parakin.toolpath.post import post
 from parakin.toolpath.program import ToolPath
 

@@ -22,7 +22,7 @@ from parakin.export.programs.joints import joint_letters
 from parakin.export.programs.linuxcnc import _timed
 from parakin.export.programs.motions import CYCLE, motions
 from parakin.toolpath.feed import plan
-from parakin.toolpath.gcode import read_gcode
+from parakin.toolpath.gcode.reader import read_gcode
 from parakin.toolpath.post import post
 from parakin.toolpath.program import Event, ToolPath
 from parakin.toolpath.reading import read_path

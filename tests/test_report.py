@@ -10,7 +10,7 @@ import pytest
 import parakin as pk
 from parakin.export.report import report_html
 from parakin.machine import Machine
-from parakin.toolpath.between import between
+from parakin.toolpath.between.checking import between
 from parakin.toolpath.feed import plan
 from parakin.toolpath.post import post
 from parakin.toolpath.program import Note, ToolPath

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from .machine import Machine
     from .toolpath.feed.law import Law
     from .toolpath.job import Job, prepare
-    from .toolpath.place import Placement, placed
+    from .toolpath.placing.searching import Placement, placed
     from .toolpath.program import ToolPath
     from .toolpath.reading import read_path
 
@@ -78,12 +78,12 @@ _LAZY = {
     "Job": "toolpath.job",
     "Law": "toolpath.feed.law",
     "Machine": "machine",
-    "Placement": "toolpath.place",
+    "Placement": "toolpath.placing.searching",
     "Solution": "kinematics.direct",
     "ToolPath": "toolpath.program",
     "Workspace": "analysis.workspace",
     "atlas": "analysis.atlas",
-    "placed": "toolpath.place",
+    "placed": "toolpath.placing.searching",
     "prepare": "toolpath.job",
     "read_path": "toolpath.reading",
     "workspace": "analysis.workspace",

@@ -122,7 +122,7 @@ def _cuts(
 ) -> list[Region]:
     """The regions to draw: those that --slice names, else one through home, or all of one that is flat already."""
     from ..analysis.region import region
-    from ..toolpath.frames import parse_value
+    from ..toolpath.posing.frames import parse_value
 
     held = []
     for text in slices:

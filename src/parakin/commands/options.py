@@ -63,7 +63,7 @@ def row(values: Sequence[str], names: Sequence[str], units: Sequence[str], defau
     import numpy as np
 
     from ..quantities import nearest, shown
-    from ..toolpath.frames import parse_value
+    from ..toolpath.posing.frames import parse_value
 
     named = ["=" in value for value in values]
     wanted = " ".join(names)

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from ..export.files import Content
     from ..machine import Machine
     from ..toolpath.job import Job
-    from ..toolpath.place import Placement
+    from ..toolpath.placing.searching import Placement
     from ..toolpath.program import ToolPath
 
 
@@ -76,7 +76,7 @@ def post(
     """
     from math import isfinite, radians
 
-    from ..toolpath.frames import composed, parse_workpiece
+    from ..toolpath.posing.frames import composed, parse_workpiece
 
     chosen = machine_of(machine, sizes)
     if place is not None and workpiece is not None:
@@ -118,7 +118,7 @@ def post(
 
 
 def _placement(machine: Machine, path: ToolPath, place: str, mode: str | None, progress: Progress) -> Placement:
-    from ..toolpath.place import parse_bounds, placed
+    from ..toolpath.placing.searching import parse_bounds, placed
 
     return placed(machine, path, parse_bounds(place), mode=mode, progress=progress.part("placing the part", 0.1, 0.3))
 
@@ -128,8 +128,8 @@ def _contents(
 ) -> tuple[dict[str, tuple[str, Content]], list[str]]:
     """The files by their kinds, with their names; and why some that were asked for are not among them."""
     from ..export.report import report_html
-    from ..toolpath import setpoint_table
-    from ..toolpath import table as joint_table
+    from ..toolpath.tables import joints as joint_table
+    from ..toolpath.tables import setpoints as setpoint_table
 
     posted, law, missing = job.posted, job.law, list[str]()
     saying = progress.part("writing the tables", 0.7, 0.9)

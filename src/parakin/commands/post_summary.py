@@ -9,7 +9,7 @@ from .offences import offence_json, offence_line
 
 if TYPE_CHECKING:
     from ..toolpath.job import Job
-    from ..toolpath.place import Placement
+    from ..toolpath.placing.searching import Placement
     from ..toolpath.result import Posted
 
 _NOTES = 5  # remarks on the file that are printed

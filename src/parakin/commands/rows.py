@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from ..errors import InputError
 from ..quantities import ANGLE, LENGTH, UNITS, nearest, shown
-from ..toolpath.cl_words import LARGEST
+from ..toolpath.cl.words import LARGEST
 
 
 def read_rows(path: Path, names: Sequence[str], units: Sequence[str]) -> tuple[NDArray[np.float64], NDArray[np.int64]]:

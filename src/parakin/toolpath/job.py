@@ -9,10 +9,10 @@ from typing import Literal, TypeAlias
 
 from ..errors import PoseError
 from ..machine import Machine
-from .between import between
+from .between.checking import between
 from .feed import Corners, Law, plan
 from .halts import stops, waiting
-from .linearise import linearised
+from .linearise.densening import linearised
 from .post import post
 from .program import Floats, ToolPath
 from .result import Posted

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from ..machine import Machine
 from ..model.limits import Limit
-from .frames import OwnLimit
+from .posing.frames import OwnLimit
 from .program import Floats
 from .result import Offence, Posted
 

@@ -8,9 +8,9 @@ import numpy as np
 
 from ..errors import PoseError
 from ..machine import Machine
-from .branches import branch, modes_to_try
-from .frames import composed, parse_workpiece, tool_poses
 from .offences import judge
+from .posing.branches import branch, modes_to_try
+from .posing.frames import composed, parse_workpiece, tool_poses
 from .program import Floats, ToolPath
 from .result import Posted
 
@@ -37,7 +37,7 @@ def post(
     progress : called now and then with the fraction done, 0 to 1
 
     Turns of joints are counted, and taken back in rapid motions where they have to be: see
-    :func:`~.branches.branch`.
+    :func:`~.posing.branches.branch`.
 
     Raises :class:`InputError` for a workpiece that can't be read, :class:`PoseError` for an unknown mode, or a motion
     of thousands of turns. A record that can't be reached raises nothing: it is an offence of the result.

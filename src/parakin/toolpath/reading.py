@@ -6,8 +6,8 @@ from pathlib import PurePath
 from typing import Literal
 
 from ..errors import InputError
-from .cl import Progress, opened, read_cl
-from .gcode import read_gcode
+from .cl.reader import Progress, opened, read_cl
+from .gcode.reader import read_gcode
 from .program import Floats, ToolPath
 
 _GCODE_SUFFIXES = frozenset((".ngc", ".nc", ".gcode", ".tap", ".cnc"))

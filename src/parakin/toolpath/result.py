@@ -58,7 +58,7 @@ class Posted:
     first : where the path first breaks any limit; on a motion with the motion's worst value
     worst : of ``offences``, the one farthest off: a pose that can't be reached at all, else the greatest excess as a
         share of the limit's range
-    checked : the motions between the records are checked, too: see :func:`parakin.toolpath.between.between`
+    checked : the motions between the records are checked, too: see :func:`parakin.toolpath.between.checking.between`
     strays : (n,) 0 where the motion to a record breaks nothing but what its ends break, else 1 + the index in
         ``limits`` of a limit that it does; None where ``checked`` is not
     rewinds : records to which a rapid motion leads that turns C, and a joint with it, back by whole turns

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import InputError
-from ...toolpath.gcode_codes import g_name
-from ...toolpath.gcode_words import VALUES, Block, parse
+from ...toolpath.gcode.codes import g_name
+from ...toolpath.gcode.words import VALUES, Block, parse
 from ...toolpath.program import Floats
 from .joints import LINEAR, TURNING
 

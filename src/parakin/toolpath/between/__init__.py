@@ -1,0 +1,1 @@
+"""What a posted path breaks between its records."""

@@ -1,0 +1,1 @@
+"""CL files, in the APT dialect CATIA writes and the one of Siemens NX."""

@@ -1,0 +1,1 @@
+"""Tables of a posted path and of a law, as CSV and Parquet."""

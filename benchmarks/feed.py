@@ -47,8 +47,8 @@ def quickest(s: np.ndarray, q: np.ndarray, speed: np.ndarray, acceleration: np.n
     left, right, u, reachable, x = (np.empty(k) for k in (n, n, n, n + 1, n + 1))
     ceilings(step, q, bend, speed, np.full(n, np.inf), np.inf, left, right, 0, n)
     top = np.minimum(np.append(left, 0.0), np.append(0.0, right))
-    backward(step, q, bend, acceleration, np.ones(n), top, reachable, 0, n)
-    forward(step, q, bend, acceleration, np.ones(n), reachable, x, u, 0, n)
+    backward(step, q, bend, acceleration, np.full(n, np.inf), top, reachable, 0, n)
+    forward(step, q, bend, acceleration, np.full(n, np.inf), reachable, x, u, 0, n)
     speeds = np.sqrt(x)
     return float((2.0 * step / (speeds[1:] + speeds[:-1])).sum())
 

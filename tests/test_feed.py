@@ -302,8 +302,8 @@ def quickest(s, q, speed, acceleration):
     left, right, u, reachable, x = (np.empty(k) for k in (n, n, n, n + 1, n + 1))
     ceilings(step, q, bend, speed, np.full(n, INF), INF, left, right, 0, n)
     top = np.minimum(np.append(left, 0.0), np.append(0.0, right))
-    backward(step, q, bend, acceleration, np.ones(n), top, reachable, 0, n)
-    forward(step, q, bend, acceleration, np.ones(n), reachable, x, u, 0, n)
+    backward(step, q, bend, acceleration, np.full(n, INF), top, reachable, 0, n)
+    forward(step, q, bend, acceleration, np.full(n, INF), reachable, x, u, 0, n)
     v = np.sqrt(x)
     return (2.0 * step / (v[1:] + v[:-1])).sum()
 

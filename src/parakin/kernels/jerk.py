@@ -1,9 +1,14 @@
-"""A law whose joints keep a limit of jerk too: the quickest one without, averaged over a moving window of time.
+"""A law whose joints keep a limit of jerk too, near the quickest: passes over one stretch of a path.
 
-Averaged over τ a law's s⃛ is what s̈ changes over the window, divided by τ. The path is not left, for s is averaged and
-not the joints; but what is within the limits on one part of a window may not be on the next. So the law is checked and
-slowed where it was too fast, and averaged again, until no more is missing than that it be stretched in time by a
-trifle as a whole: that divides speeds by the stretching, accelerations by its square and jerks by its cube.
+With x = ṡ² over the path, u = ½·x' is s̈ and u'·ṡ is s⃛: a limit of jerk bounds how fast u may change. Where x bends
+upward, behind a slow place and before one, two passes see to that. Forward u rises no faster than it may, from 0 or
+from what it is, and backward the same is done for braking; so the slowest places are passed level. Where x bends down,
+the greatest x below that bends less is a convex hull: that of x and what it may bend, summed up twice.
+
+What a pass found is kept, and where nothing has changed it is not done again: a row is gone through if it is
+``touched`` or the one before it in the pass came out otherwise.
+
+low, cap, calm : (steps,) bounds of x, u and s⃛
 """
 
 from __future__ import annotations
@@ -11,188 +16,127 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from .shares import judged
-from .timing import backward, forward
+from .timing import braked, driven
 
-_CLOSE = 1.005  # a law that has to be stretched by no more is good
-_SLOWER, _GENTLER = 2.2, 2.2  # powers of the stretching a place asks for, by which its ṡ² or s̈ is bounded
-_TRIES, _MOST = 6, 40  # rounds for a window on trial, and for the one taken
-_SHORTER = 0.7  # a window's next size on trial
-_TRIAL = 5_000  # rows of a stretch that windows are tried on
-_SURE = 1.0001  # what the limits may be exceeded between the places where they are checked
-_IDLE = 1e-3  # s: a window where no joint moves that it would be for
-_NEWTON = 30
+_LEAST = 0.1  # share of a jerk that is left for s⃛ in any case
 
 
 @njit(nogil=True, cache=True, error_model="numpy")
-def _crossing(way, dt, v, a, e):
-    """When way = v·t + a·t²/2 + e·t³/6, t in (0, dt), for a motion that never goes back."""
-    low, high = 0.0, dt
-    t = 0.5 * dt
-    for _ in range(_NEWTON):
-        off = t * (v + t * (0.5 * a + t * e / 6.0)) - way
-        if off > 0.0:
-            high = t
+def _room(i, start, stop, step, q, bend, jerk, v, a, sign, calm):
+    """How far s⃛ may go up or down (``sign``) at row i, where ṡ and s̈ are v and a."""
+    most = min(calm[i - 1] if i > start else np.inf, calm[i] if i < stop else np.inf)
+    for j in range(len(jerk)):
+        if jerk[j] == np.inf:
+            continue
+        slope, third = 0.0, 0.0
+        if i > start:
+            h = step[i - 1]
+            slope = (q[i, j] - q[i - 1, j]) / h + h * (bend[i - 1, j] + 2.0 * bend[i, j]) / 6.0
+            third = abs(bend[i, j] - bend[i - 1, j]) / h
+        if i < stop:
+            h = step[i]
+            slope = (q[i + 1, j] - q[i, j]) / h - h * (2.0 * bend[i, j] + bend[i + 1, j]) / 6.0
+            third = max(third, abs(bend[i + 1, j] - bend[i, j]) / h)
+        if slope != 0.0:
+            rest = jerk[j] - third * v**3 - sign * np.sign(slope) * 3.0 * bend[i, j] * v * a
+            most = min(most, max(rest, _LEAST * jerk[j]) / abs(slope))
+    return most
+
+
+@njit(nogil=True, cache=True, error_model="numpy")
+def _from_rest(h, jerk):
+    """ṡ² behind a way h that a motion with this s⃛ begins with."""
+    return 0.25 * (6.0 * h) ** (4.0 / 3.0) * jerk ** (2.0 / 3.0)
+
+
+@njit(nogil=True, cache=True, error_model="numpy")
+def reached(start, stop, step, q, bend, limits, low, cap, touched, reachable, moved):
+    """Backward: the greatest x from which the path can be gone on with. ``moved`` (rows,) becomes where it changed."""
+    room = np.empty(8 + 6 * len(limits[1]))
+    moved[stop], reachable[stop] = False, 0.0
+    for i in range(stop - 1, start - 1, -1):
+        moved[i] = False
+        if touched[i] or moved[i + 1]:
+            top = min(low[i - 1], low[i]) if i > start else 0.0
+            found = braked(i, step[i], top, reachable[i + 1], q, bend, limits[1], cap, room)
+            moved[i] = found != reachable[i]
+            reachable[i] = found
+
+
+@njit(nogil=True, cache=True, error_model="numpy")
+def rising(start, stop, step, q, bend, limits, cap, calm, touched, reachable, moved, x, u):
+    """Forward: the quickest law below ``reachable`` in which u rises no faster than it may.
+
+    moved : (rows,) where ``reachable`` changed; becomes where x did
+    """
+    room = np.empty(8 + 6 * len(limits[1]))
+    x[start], before, anew = 0.0, 0.0, moved[start]
+    for i in range(start, stop):
+        if touched[i] or anew or moved[i + 1]:
+            h, v = step[i], np.sqrt(x[i])
+            softly = _room(i, start, stop, step, q, bend, limits[2], v, before, 1.0, calm)
+            if i == start:
+                most = 0.5 * _from_rest(h, softly) / h
+            else:
+                part = 0.5 if u[i - 1] > 0.0 else 0.25  # a lowest place has two sides
+                most = before + part * (step[i - 1] + h) * softly / v
+            rise = driven(i, h, x[i], reachable[i + 1], most, q, bend, limits[1], cap, room)
+            after = min(max(x[i] + 2.0 * h * rise, 0.0), reachable[i + 1])
+            moved[i + 1], anew = after != x[i + 1], after != x[i + 1] or rise != u[i]
+            x[i + 1], u[i] = after, rise
         else:
-            low = t
-        slope = v + t * (a + 0.5 * t * e)
-        after = t - off / slope if slope > 0.0 else low
-        if abs(after - t) <= 1e-15 * dt:
-            return after
-        t = after if low < after < high else 0.5 * (low + high)
-    return t
+            moved[i + 1] = anew = False
+        before = max(u[i], 0.0)
+    moved[start] = False
 
 
 @njit(nogil=True, cache=True, error_model="numpy")
-def averaged(step, x, u, tau, start, stop, pieces, window, first, times, passed):
-    """The law of rows start to stop averaged over ``tau``; its pieces from ``first`` on. Returns their end.
+def falling(start, stop, step, q, bend, limits, cap, calm, touched, ceiling, moved, x, u):
+    """Backward: the law below ``ceiling`` (rows,) in which braking does not set in too late to end softly.
 
-    pieces : see :func:`~.shares.judged`; none reaches over a row
-    window : (pieces, 2) becomes the steps in which the window begins and ends
-    times : (rows,) room; passed : (rows,) becomes when the rows are passed
+    moved : (rows,) where ``ceiling`` changed
     """
-    time, cell, shift, speed, rise, jerk = pieces
-    times[start] = 0.0
-    for i in range(start, stop):
-        times[i + 1] = times[i] + 2.0 * step[i] / (np.sqrt(x[i]) + np.sqrt(x[i + 1]))
-    end = times[stop] + tau
-    passed[start], passed[stop] = 0.0, end
-    new, old = start, start - 1  # the steps that the window's ends are in; before and after all the law stands still
-    n, t, c, o = first, 0.0, start, 0.0
-    wide = 0.0  # mm between the starts of these steps
-    while t < end:
-        after = times[new + 1] if new < stop else end
-        if old < stop:
-            after = min(after, times[old + 1] + tau)
-        after = min(after, end)
-        span, va, ua, vb, ub = wide, 0.0, 0.0, 0.0, 0.0
-        if new < stop:
-            d, ua, va = t - times[new], u[new], np.sqrt(x[new])
-            span += d * (va + 0.5 * ua * d)
-            va += ua * d
-        if start <= old < stop:
-            d, ub, vb = t - tau - times[old], u[old], np.sqrt(x[old])
-            span -= d * (vb + 0.5 * ub * d)
-            vb += ub * d
-        v, a, e = max(0.0, span / tau), (va - vb) / tau, (ua - ub) / tau
-        while t < after:
-            dt = after - t
-            way = dt * (v + dt * (0.5 * a + dt * e / 6.0))
-            over = o + way > step[c] and c < stop - 1
-            if over:
-                dt = _crossing(step[c] - o, dt, v, a, e)
-            time[n], cell[n], shift[n], speed[n], rise[n], jerk[n] = t, c, o, v, a, e
-            window[n, 0], window[n, 1] = max(old, start), min(new, stop - 1)
-            n += 1
-            if not over:
-                o += way
-                break
-            t += dt
-            v, a = max(0.0, v + dt * (a + 0.5 * dt * e)), a + dt * e
-            o, c = 0.0, c + 1
-            passed[c] = t
-        if new < stop and after >= times[new + 1]:
-            wide += step[new]
-            new += 1
-        if old < stop and after >= times[old + 1] + tau:
-            wide -= step[old] if old >= start else 0.0
-            old += 1
-        t = after
-    for i in range(c + 1, stop):
-        passed[i] = end
-    time[n] = end
-    return n
+    room = np.empty(8 + 6 * len(limits[1]))
+    x[stop], after, anew = 0.0, 0.0, False
+    for i in range(stop - 1, start - 1, -1):
+        if touched[i] or touched[i + 1] or anew or moved[i]:
+            h, v = step[i], np.sqrt(x[i + 1])
+            softly = _room(i + 1, start, stop, step, q, bend, limits[2], v, -after, 1.0, calm)
+            if i == stop - 1:
+                most = _from_rest(h, softly)
+            else:
+                part = 0.5 if u[i + 1] < 0.0 else 0.25
+                most = x[i + 1] + 2.0 * h * (after + part * (h + step[i + 1]) * softly / v)
+            found = braked(i, h, min(ceiling[i], most), x[i + 1], q, bend, limits[1], cap, room)
+            rise = 0.5 * (x[i + 1] - found) / h
+            anew = found != x[i] or rise != u[i]
+            x[i], u[i] = found, rise
+        else:
+            anew = False
+        after = max(-u[i], 0.0)
 
 
 @njit(nogil=True, cache=True, error_model="numpy")
-def _tempered(tau, rounds, start, stop, step, q, bend, feed, ceiling, limits, pieces, first, passed, binding, room):
-    """The law of one stretch averaged over ``tau``, and slowed where it has to be.
-
-    Returns the end of its pieces, and by how much it has still to be stretched.
-    """
-    (low, ease, eased, top, reachable, x, u, times, slower), gentler, window = room
-    limit = np.empty(q.shape[1])
-    for j in range(len(limit)):
-        limit[j] = min(limits[1][j], 0.5 * tau * limits[2][j])
+def pooled(start, stop, step, q, bend, limits, calm, x, u, bent, sums, widths, heads):
+    """x is lowered on top where u falls faster than it may: neighbours that fall too fast share their mean."""
+    blocks, bent[start] = 0, 0.0
     for i in range(start, stop):
-        low[i], ease[i] = ceiling[i], 1.0
-        for j in range(q.shape[1]):
-            third = abs(bend[i + 1, j] - bend[i, j]) / step[i]
-            low[i] = min(low[i], (0.5 * limits[2][j] / third) ** (2.0 / 3.0))  # leaves half for the rest
-    last, worst = first, 1.0
-    for again in range(rounds):
-        top[start] = top[stop] = 0.0
-        for i in range(start + 1, stop):
-            top[i] = min(low[i - 1], low[i])
-        backward(step, q, bend, limit, ease, top, reachable, start, stop)
-        forward(step, q, bend, limit, ease, reachable, x, u, start, stop)
-        last = averaged(step, x, u, tau, start, stop, pieces, window, first, times, passed)
-        worst = judged(step, q, bend, feed, limits, pieces, first, last, slower, gentler, binding)
-        if worst <= _CLOSE or again == rounds - 1:
-            break
-        for i in range(start, stop):
-            if slower[i] > 1.0:
-                low[i] = min(low[i], max(x[i], x[i + 1])) / slower[i] ** _SLOWER
-            eased[i] = ease[i]
-        for p in range(first, last):
-            if gentler[p] > 1.0:
-                for k in range(2):
-                    i = window[p, k]
-                    ease[i] = min(ease[i], eased[i] / gentler[p] ** _GENTLER)
-    return last, worst
-
-
-@njit(nogil=True, cache=True, error_model="numpy")
-def _longest(start, stop, step, q, limits):
-    """The longest window worth a trial: over it s̈ can go from one limit to the other, or the whole stretch is done."""
-    length, by_way, by_rise = 0.0, np.inf, 0.0
-    for i in range(start, stop):
-        length += step[i]
-    for j in range(q.shape[1]):
-        if limits[2][j] < np.inf:
-            by_rise = max(by_rise, 2.0 * limits[1][j] / limits[2][j])
-            for i in range(start, stop):
-                if q[i + 1, j] != q[i, j]:
-                    by_way = min(by_way, limits[2][j] * step[i] / abs(q[i + 1, j] - q[i, j]))
-    if by_way == np.inf:
-        return _IDLE
-    return min(by_rise, 2.0 * np.cbrt(2.0 * length / by_way))
-
-
-@njit(nogil=True, cache=True, error_model="numpy")
-def smoothed(step, q, bend, feed, ceiling, limits, pieces, passed, binding, room):
-    """Laws of all stretches, one after another, that keep speeds, accelerations and jerks. Returns the pieces' end.
-
-    ceiling : (steps,) of x; the rest as in :func:`~.shares.judged`
-    passed : (rows,) becomes when each row is passed
-    room : arrays that are overwritten: nine (rows,), one (pieces,), one (pieces, 2)
-    """
-    n, start, count, now = 0, 0, len(step) + 1, 0.0
-    time, speed, rise, jerk = pieces[0], pieces[3], pieces[4], pieces[5]
-    while start < count - 1:
-        stop = start
-        while stop < count - 1 and step[stop] > 0.0:
-            stop += 1
-        args = (step, q, bend, feed, ceiling, limits, pieces, n, passed, binding, room)
-        begin = start + max(0, (stop - start - _TRIAL) // 2)
-        trial, end, rounds = True, min(stop, begin + _TRIAL), _TRIES
-        tau, best, last, worst = _longest(start, stop, step, q, limits), np.inf, n, 1.0
-        while True:
-            last, worst = _tempered(tau, rounds, begin, end, *args)
-            if not trial:
-                break
-            seconds = time[last] * max(1.0, worst)
-            if seconds < best:
-                best, tau = seconds, tau * _SHORTER
-            else:  # the one before it was the best
-                trial, tau, begin, end, rounds = False, tau / _SHORTER, start, stop, _MOST
-        wider = max(1.0, _SURE * worst)
-        for p in range(n, last):
-            time[p] = now + wider * time[p]
-            speed[p], rise[p], jerk[p] = speed[p] / wider, rise[p] / wider**2, jerk[p] / wider**3
-        for i in range(start, stop + 1):
-            passed[i] = now + wider * passed[i]
-        now += wider * time[last]
-        time[last] = now
-        n, start = last, stop + 1
-    return n
+        if i > start:
+            bent[i] = bent[i - 1]
+            v, a = np.sqrt(x[i]), 0.5 * (u[i - 1] + u[i])
+            softly = _room(i, start, stop, step, q, bend, limits[2], v, a, -1.0, calm)
+            bent[i] += 0.5 * (step[i - 1] + step[i]) * softly / v
+        total, width, begin = step[i] * (u[i] + bent[i]), step[i], i
+        while blocks > 0 and sums[blocks - 1] * width > total * widths[blocks - 1]:
+            blocks -= 1
+            total, width, begin = total + sums[blocks], width + widths[blocks], heads[blocks]
+        sums[blocks], widths[blocks], heads[blocks] = total, width, begin
+        blocks += 1
+    for k in range(blocks):
+        end = heads[k + 1] if k + 1 < blocks else stop
+        if end - heads[k] > 1:
+            for i in range(heads[k], end):
+                u[i] = sums[k] / widths[k] - bent[i]
+            for i in range(heads[k], end - 1):
+                x[i + 1] = max(x[i] + 2.0 * step[i] * u[i], 0.0)
+            u[end - 1] = 0.5 * (x[end] - x[end - 1]) / step[end - 1]

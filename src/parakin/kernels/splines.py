@@ -14,7 +14,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-SLIVER = 1e-4  # of a piece: knots nearer than this are one
+SLIVER = 2e-3  # of a piece: knots nearer than this are one
 
 
 @njit(nogil=True, cache=True)
@@ -192,11 +192,11 @@ def nearest(here, there, guess, turning, scale, start, stop):
 
 
 @njit(nogil=True, cache=True, error_model="numpy")
-def astray(cell, step, bend, feed, middle, guess, near, limit, close, rounding, out, start, stop):
+def astray(cell, step, bend, feed, middle, guess, near, limit, close, grain, out, start, stop):
     """Mark the steps ``cell`` over which splines are not the joints, by what both are in the middle (cells, joints).
 
     feed, limit : (steps,) of ṡ², (joints,) of the accelerations; no acceleration may be off by ``close`` of its limit
-    near : (joints,) what a joint may be off; rounding : of its size, what it may be off by nothing but rounding
+    near : (joints,) what a joint may be off; grain : (cells, joints) of its size, what it may be off by rounding
     """
     for r in range(start, stop):
         i = cell[r]
@@ -206,7 +206,7 @@ def astray(cell, step, bend, feed, middle, guess, near, limit, close, rounding, 
         out[r] = False
         for j in range(len(limit)):
             off = abs(middle[r, j] - guess[r, j])
-            if off > rounding * max(1.0, abs(guess[r, j])):
+            if off > grain[r, j] * max(1.0, abs(guess[r, j])):
                 # a spline off in the middle is off 32/h² times as much in its second derivative
                 out[r] |= off > near[j] or (limit[j] < np.inf and 32.0 * off / step[i] ** 2 * fast > close * limit[j])
             elif off != off:

@@ -32,15 +32,18 @@ def _bernstein(i, j, h, q, bend, pairs):
 
 
 @njit(nogil=True, cache=True, error_model="numpy")
-def _lines(i, h, q, bend, limit, ease, pairs, reach, tilt):
+def _lines(i, h, q, bend, limit, cap, pairs, reach, tilt):
     """Bounds of u over step i: ±reach - tilt·x. Returns how many, and a bound of x alone.
 
-    limit : (joints,) of the acceleration, infinite for none; ease : (steps,) the share of it to use
+    limit : (joints,) of the acceleration, infinite for none; cap : (steps,) of u itself
     """
     n, most = 0, np.inf
+    if cap[i] < np.inf:
+        reach[0], tilt[0] = cap[i], 0.0
+        n = 1
     for j in range(len(limit)):
         if limit[j] < np.inf:
-            w = 1.0 / (limit[j] * ease[i])
+            w = 1.0 / limit[j]
             _bernstein(i, j, h, q, bend, pairs)
             for k in range(0, 6, 2):
                 a, b = pairs[k] * w, pairs[k + 1] * w
@@ -53,58 +56,73 @@ def _lines(i, h, q, bend, limit, ease, pairs, reach, tilt):
 
 
 @njit(nogil=True, cache=True, error_model="numpy")
-def backward(step, q, bend, limit, ease, ceiling, reachable, start, stop):
+def braked(i, h, x, after, q, bend, limit, cap, room):
+    """The greatest ṡ² at row i, ``x`` at most, from which ``after`` is not exceeded at the next row.
+
+    room : (8 + 6·joints,) is overwritten
+    """
+    lines = (len(room) - 6) // 2
+    pairs, reach, tilt = room[:6], room[6 : 6 + lines], room[6 + lines :]
+    n, most = _lines(i, h, q, bend, limit, cap, pairs, reach, tilt)
+    x, half = min(x, most), 0.5 / h
+    for _ in range(_TURNS):
+        high, low = (after - x) * half, -x * half
+        falls, rises = -half, -half
+        for k in range(n):
+            b = tilt[k] * x
+            if reach[k] - b < high:
+                high, falls = reach[k] - b, -tilt[k]
+            if -reach[k] - b > low:
+                low, rises = -reach[k] - b, -tilt[k]
+        if low <= high:
+            break
+        less = (low - high) / (rises - falls)
+        if not less > 1e-15 * x:
+            break
+        x = max(0.0, x - less)
+    return x * _SAFE
+
+
+@njit(nogil=True, cache=True, error_model="numpy")
+def driven(i, h, x, after, most, q, bend, limit, cap, room):
+    """The greatest s̈ over step i, ``most`` at most, with which ṡ² goes from ``x`` to no more than ``after``."""
+    lines = (len(room) - 6) // 2
+    pairs, reach, tilt = room[:6], room[6 : 6 + lines], room[6 + lines :]
+    n, _ = _lines(i, h, q, bend, limit, cap, pairs, reach, tilt)
+    half = 0.5 / h
+    high, low = min(most, (after - x) * half), -x * half
+    for k in range(n):
+        b = tilt[k] * x
+        high = min(high, reach[k] - b)
+        low = max(low, -reach[k] - b)
+    return max(high, low)
+
+
+@njit(nogil=True, cache=True, error_model="numpy")
+def backward(step, q, bend, limit, cap, ceiling, reachable, start, stop):
     """``reachable`` (rows,): the greatest x from which every limit can be kept up to row ``stop``, where x ends as 0.
 
     ceiling : (rows,) of x; 0 where the motion stops
     """
-    pairs, reach, tilt = np.empty(6), np.empty(3 * len(limit)), np.empty(3 * len(limit))
+    room = np.empty(8 + 6 * len(limit))
     reachable[stop] = 0.0
     for i in range(stop - 1, start - 1, -1):
-        h = step[i]
-        if h == 0.0:
-            reachable[i] = 0.0
-            continue
-        n, most = _lines(i, h, q, bend, limit, ease, pairs, reach, tilt)
-        x, after = min(ceiling[i], most), reachable[i + 1]
-        half = 0.5 / h
-        for _ in range(_TURNS):
-            high, low = (after - x) * half, -x * half
-            falls, rises = -half, -half
-            for k in range(n):
-                b = tilt[k] * x
-                if reach[k] - b < high:
-                    high, falls = reach[k] - b, -tilt[k]
-                if -reach[k] - b > low:
-                    low, rises = -reach[k] - b, -tilt[k]
-            if low <= high:
-                break
-            less = (low - high) / (rises - falls)
-            if not less > 1e-15 * x:
-                break
-            x = max(0.0, x - less)
-        reachable[i] = x * _SAFE
+        reachable[i] = 0.0
+        if step[i] > 0.0:
+            reachable[i] = braked(i, step[i], ceiling[i], reachable[i + 1], q, bend, limit, cap, room)
 
 
 @njit(nogil=True, cache=True, error_model="numpy")
-def forward(step, q, bend, limit, ease, reachable, x, u, start, stop):
+def forward(step, q, bend, limit, cap, reachable, x, u, start, stop):
     """The quickest law: x (rows,) from 0 at row ``start`` on, and u (steps,)."""
-    pairs, reach, tilt = np.empty(6), np.empty(3 * len(limit)), np.empty(3 * len(limit))
+    room = np.empty(8 + 6 * len(limit))
     x[start] = 0.0
     for i in range(start, stop):
         h = step[i]
-        if h == 0.0:
-            u[i], x[i + 1] = 0.0, 0.0
-            continue
-        n, _ = _lines(i, h, q, bend, limit, ease, pairs, reach, tilt)
-        here, half = x[i], 0.5 / h
-        high, low = (reachable[i + 1] - here) * half, -here * half
-        for k in range(n):
-            b = tilt[k] * here
-            high = min(high, reach[k] - b)
-            low = max(low, -reach[k] - b)
-        u[i] = max(high, low)
-        x[i + 1] = min(max(here + 2.0 * h * u[i], 0.0), reachable[i + 1])
+        u[i], x[i + 1] = 0.0, 0.0
+        if h > 0.0:
+            u[i] = driven(i, h, x[i], reachable[i + 1], np.inf, q, bend, limit, cap, room)
+            x[i + 1] = min(max(x[i] + 2.0 * h * u[i], 0.0), reachable[i + 1])
 
 
 @njit(nogil=True, cache=True, error_model="numpy")
@@ -137,21 +155,21 @@ def ceilings(step, q, bend, speed, feed, most, left, right, start, stop):
 
 
 @njit(nogil=True, cache=True, error_model="numpy")
-def slack(step, q, bend, limit, ease, left, right, x, u, first, second, start, stop):
+def slack(step, q, bend, limit, cap, left, right, x, u, first, second, start, stop):
     """What steps give away because u is one for all of each, s.
 
     left, right : (steps,) bounds of x, see :func:`ceilings`
     first, second : (steps,) become the fractions of a step at which a row is missing, 0 where none is: where the law
         could stop rising, and where it could begin to fall
     """
-    pairs, reach, tilt = np.empty(6), np.empty(3 * len(limit)), np.empty(3 * len(limit))
+    pairs, reach, tilt = np.empty(6), np.empty(3 * len(limit) + 1), np.empty(3 * len(limit) + 1)
     total = 0.0
     for i in range(start, stop):
         first[i] = second[i] = 0.0
         h, here, after = step[i], x[i], x[i + 1]
         if h == 0.0:
             continue
-        n, _ = _lines(i, h, q, bend, limit, ease, pairs, reach, tilt)
+        n, _ = _lines(i, h, q, bend, limit, cap, pairs, reach, tilt)
         high, low = np.inf, -np.inf
         for k in range(n):
             high = min(high, reach[k] - tilt[k] * here)

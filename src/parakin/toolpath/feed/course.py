@@ -8,13 +8,13 @@ from functools import cached_property
 import numpy as np
 
 from ...errors import PoseError
-from ...kernels.batch import run, split
-from ...kernels.splines import along, astray, bends, blended, nearest, rows_of, swiftness
-from ...kinematics.path import FREE
+from ...kernels.batch import split
+from ...kernels.splines import along, astray, bends, blended, rows_of, swiftness
 from ...machine import Machine
 from ..program import Floats
 from ..result import Posted
-from .smooth import LEVER, Curve, Flags, Indices
+from .following import close_to, followed
+from .smooth import Curve, Flags, Indices
 
 LONGEST = 2.0  # mm of the path's length: no step is longer
 PARTS = 12.0  # into which half a corner is cut, for each rad (mm/mm) by which the path turns there
@@ -83,24 +83,15 @@ class Course:
         split(len(cell), lambda start, stop: along(*args, start, stop))
         return out[0], out[1], out[2]
 
-    def joints_at(self, cell: Indices, shift: Floats) -> tuple[Floats, Floats]:
-        """The machine's joints ``shift`` mm after the rows ``cell``, the nearest to the splines, and the splines."""
-        machine, mode = self.posted.machine, self.posted.mode
+    def joints_at(self, cell: Indices, shift: Floats) -> tuple[Floats, Floats, Floats]:
+        """The machine's joints ``shift`` mm after the rows ``cell``, the nearest to the splines, and the splines.
+
+        And how much less exact the first turning joint is; see :func:`~.following.close_to`.
+        """
         nothing = np.zeros(len(cell))
         guess = self.splines(cell, shift, nothing, nothing)[0]
-        poses = self.poses(cell, shift)
-        here = machine.inverse(poses, mode)
-        there, units, first = here, np.array(machine.joint_units), machine.model.first_serial
-        if first is not None:
-            there = machine.inverse(poses, mode[:-1] + ("-" if mode[-1] == "+" else "+"))
-            freedom = run(machine.model.freedom_tape(), poses, np.empty((len(poses), 1)))[:, 0]
-            free = np.flatnonzero(freedom < np.sin(FREE) ** 2)
-            if len(free):
-                held, into = np.ascontiguousarray(guess[free][:, [first]]), np.empty((len(free), here.shape[1]))
-                there[free] = here[free] = run(machine.model.held_tape(mode), poses[free], into, held)
-        args = (here, there, guess, units == "rad", np.where(units == "mm", LEVER, 1.0))
-        split(len(cell), lambda start, stop: nearest(*args, start, stop))
-        return here, guess
+        joints, blur = close_to(self.posted.machine, self.posted.mode, self.poses(cell, shift), guess)
+        return joints, guess, blur
 
 
 def course_of(posted: Posted, curve: Curve, drives: Drives, tolerance: float, axis_tolerance: float) -> Course:
@@ -117,11 +108,11 @@ def course_of(posted: Posted, curve: Curve, drives: Drives, tolerance: float, ax
     size = rows_of(*args, np.empty(0, np.int64), np.empty(0))
     segment, offset = np.empty(size, np.int64), np.empty(size)
     rows_of(*args, segment, offset)
-    near = 1e-3 * np.where(np.array(posted.machine.joint_units) == "mm", tolerance, axis_tolerance)
+    fine = 1e-3 * np.where(np.array(posted.machine.joint_units) == "mm", tolerance, axis_tolerance)
     course = laid(posted, curve, segment, offset)
     doubtful = np.ones(size - 1, bool)
     for attempt in range(1, _ROUNDS):
-        long = _too_long(course, drives, near, np.flatnonzero(doubtful & (course.step > 0.0)))
+        long = _too_long(course, drives, fine, np.flatnonzero(doubtful & (course.step > 0.0)))
         if not len(long):
             return course
         if course.step[long].min() < _FINEST:
@@ -129,8 +120,9 @@ def course_of(posted: Posted, curve: Curve, drives: Drives, tolerance: float, ax
         where, parts = _cuts(long, course.step)
         # The joints between are those nearest to the splines, but where a path passes beside a pole: there rows too
         # far apart may have led over it, which only all of them together tell.
-        course = refined(course, where, parts, anew=attempt % _ANEW == 0)
-        doubtful[:] = False
+        anew = attempt % _ANEW == 0
+        course = refined(course, where, parts, anew)
+        doubtful[:] = anew
         doubtful[where] = True
         doubtful = _widened(np.insert(doubtful, where + 1, True))
     raise PoseError(f"{course.between(int(long[0]))} a joint would have to jump: the tool passes a singular pose")
@@ -155,14 +147,16 @@ def _widened(flags: Flags) -> Flags:
     return result
 
 
-def _too_long(course: Course, drives: Drives, near: Floats, cells: Indices) -> Indices:
-    """Those of some steps over which the splines are off by more than ``near`` (joints,), or a limit would be."""
-    found = []
+def _too_long(course: Course, drives: Drives, fine: Floats, cells: Indices) -> Indices:
+    """Those of some steps over which the splines are off by more than ``fine`` (joints,), or a limit would be."""
+    found, first = [], course.posted.machine.model.first_serial
     for start in range(0, len(cells), _BLOCK):
         cell = cells[start : start + _BLOCK]
-        middle, guess = course.joints_at(cell, 0.5 * course.step[cell])
-        off = np.empty(len(cell), bool)
-        args = (course.step, course.bend, course.feed, middle, guess, near, drives.acceleration, CLOSE, _NOISE, off)
+        middle, guess, blur = course.joints_at(cell, 0.5 * course.step[cell])
+        off, grain = np.empty(len(cell), bool), np.full(middle.shape, _NOISE)
+        if first is not None:
+            grain[:, first] *= blur
+        args = (course.step, course.bend, course.feed, middle, guess, fine, drives.acceleration, CLOSE, grain, off)
         split(len(cell), lambda start, stop: astray(cell, *args, start, stop))  # noqa: B023
         found.append(cell[off])
     return np.concatenate(found)
@@ -184,7 +178,8 @@ def refined(course: Course, where: Indices, parts: Floats, anew: bool = False) -
 
 def laid(posted: Posted, curve: Curve, segment: Indices, offset: Floats) -> Course:
     """The joints at given rows, followed from the start."""
-    joints = posted.machine.follow(poses_on(curve, segment, offset), posted.mode, FREE)
+    way = np.append(0.0, np.cumsum(curve.length))[segment] + offset
+    joints = followed(posted.machine, posted.mode, poses_on(curve, segment, offset), way)
     turns = np.round((posted.joints[0] - joints[0]) / (2.0 * np.pi))
     turns[np.array(posted.machine.joint_units) == "mm"] = 0.0
     if (turns != 0.0).any():

@@ -8,12 +8,12 @@ import numpy as np
 
 from ...errors import PoseError
 from ...kernels.batch import split
-from ...kernels.jerk import smoothed
 from ...kernels.shares import judged
 from ...kernels.timing import backward, ceilings, forward, slack
 from ..program import Floats
 from ..result import Posted
 from .course import Course, Drives, course_of, refined
+from .gentle import gentle
 from .law import Law, Pace, names_of
 from .smooth import Corners, Flags, Indices, checked, curve_of
 
@@ -22,6 +22,7 @@ WORTH = 5e-4  # of the cycle time: what more rows must save
 _ROUNDS = 4
 _RAMP = 0.1  # s in which a drive is thought to reach its acceleration where only a jerk is given
 _ROUNDING = 1e-8
+_PLACES = 5  # of each step at which limits are looked at
 
 
 def plan(
@@ -62,7 +63,10 @@ def plan(
     if not drives.soft:
         return Law(posted, curve, course, *_at_once(course, drives), names)
     course, x, u = _quickest(course, drives)
-    pace, binding = _smooth(course, drives) if np.isfinite(drives.jerk).any() else _steady(course, drives, x, u)
+    if np.isfinite(drives.jerk).any():
+        course, pace, binding = gentle(course, drives, x, np.minimum(*_ceilings(course, drives)))
+    else:
+        pace, binding = _steady(course, drives, x, u)
     binding[_ends(course)] = len(names) - 1
     return Law(posted, curve, course, pace, binding, names)
 
@@ -114,15 +118,15 @@ def _quickest(course: Course, drives: Drives) -> tuple[Course, Floats, Floats]:
     """ṡ² (rows,) and s̈ (steps,) of the quickest law without jerks, on a course with rows where it switches."""
     limit = np.minimum(drives.acceleration, _RAMP * drives.jerk)
     for attempt in range(_ROUNDS):
-        step, count, ease = course.step, len(course.step), np.ones(len(course.step))
+        step, count, cap = course.step, len(course.step), np.full(len(course.step), np.inf)
         left, right = _ceilings(course, drives)
         top = np.minimum(np.append(left, 0.0), np.append(0.0, right))
         top[_ends(course)] = 0.0
         x, u, reachable = np.empty(count + 1), np.empty(count), np.empty(count + 1)
-        backward(step, course.joints, course.bend, limit, ease, top, reachable, 0, count)
-        forward(step, course.joints, course.bend, limit, ease, reachable, x, u, 0, count)
+        backward(step, course.joints, course.bend, limit, cap, top, reachable, 0, count)
+        forward(step, course.joints, course.bend, limit, cap, reachable, x, u, 0, count)
         first, second, lost = np.empty(count), np.empty(count), list[float]()
-        args = (step, course.joints, course.bend, limit, ease, left, right, x, u, first, second)
+        args = (step, course.joints, course.bend, limit, cap, left, right, x, u, first, second)
         split(count, lambda start, stop: lost.append(slack(*args, start, stop)))  # noqa: B023
         _refuse_unbound(course, np.maximum(x[:-1], x[1:]))
         rows = np.concatenate([np.flatnonzero(first), np.flatnonzero(second)])
@@ -169,28 +173,13 @@ def _by_steps(course: Course, drives: Drives, speed: Floats, rise: Floats, spans
     cell = np.flatnonzero(course.step > 0.0)
     nothing = np.zeros(len(cell))
     time, speed, rise = np.append(passed[cell], passed[-1]), speed[cell], rise[cell]
-    binding, room = np.zeros(len(course.segment), np.int64), np.empty((2, len(course.step)))
+    binding, parts = np.zeros(len(course.segment), np.int64), np.empty((len(cell), 4))
     pieces = (time, cell, nothing, speed, rise, nothing)
     limits = (drives.speed, drives.acceleration, np.full_like(drives.jerk, np.inf))
-    worst = judged(course.step, course.joints, course.bend, course.feed, limits, pieces, 0, len(cell), *room, binding)
+    args = (course.step, course.joints, course.bend, course.feed, limits, pieces)
+    found, fresh = list[float](), np.ones(len(course.step), bool)
+    split(len(cell), lambda a, b: found.append(judged(*args, a, b, parts, binding, fresh, _PLACES)))
+    worst = max(found)
     wider = worst if worst > 1.0 + _ROUNDING else 1.0  # which the planning leaves nothing to do for, but rounding
     pace = Pace(wider * time, cell, nothing, speed / wider, rise / wider**2, nothing, wider * passed)
-    return pace, binding
-
-
-def _smooth(course: Course, drives: Drives) -> tuple[Pace, Indices]:
-    """A law that keeps jerks, and what binds it at each row."""
-    rows, parts = len(course.segment), int(np.count_nonzero(course.step == 0.0)) + 1
-    most = 3 * rows + parts  # a piece begins at each row, and where either end of the window comes upon one
-    time, passed, binding = np.empty(most + 1), np.zeros(rows), np.zeros(rows, np.int64)
-    cell = np.empty(most, np.int64)
-    shift, speed, rise, jerk = (np.empty(most) for _ in range(4))
-    room = (tuple(np.empty(rows) for _ in range(9)), np.empty(most), np.empty((most, 2), np.int64))
-    limits, ceiling = (drives.speed, drives.acceleration, drives.jerk), np.minimum(*_ceilings(course, drives))
-    count = smoothed(
-        course.step, course.joints, course.bend, course.feed, ceiling, limits,
-        (time, cell, shift, speed, rise, jerk), passed, binding, room,
-    )  # fmt: skip
-    kept = slice(count)
-    pace = Pace(time[: count + 1], cell[kept], shift[kept], speed[kept], rise[kept], jerk[kept], passed)
     return pace, binding

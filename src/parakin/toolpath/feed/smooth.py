@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import PoseError
+from ...kernels.splines import SLIVER
 from ..program import Floats
 from ..result import Posted
 
@@ -19,6 +20,8 @@ Flags = NDArray[np.bool_]
 LEVER = 100.0  # mm/rad: what a turn counts beside a motion of the tip in the path's length
 CORNER = np.deg2rad(1.0)  # a path that turns by no more is not stopped at
 _SAME = 1e-6  # mm: records no farther apart are one place
+_TIGHT = 1e-5  # mm of reach for each rad (mm/mm) of turn: a corner passed so slowly is as well stopped at
+_BESIDE = 0.05  # of a piece
 _KEPT = 0.995  # of the tolerances; the rest is for what splines of the joints are off
 
 
@@ -78,20 +81,28 @@ def curve_of(
     parted = np.zeros(len(corner), bool)
     parted[place[stops]] = True
     parted[[0, -1]] = True
+    sharp = _norms(turn * scale)
     if not smooth:
         parted[:] = True
     elif corners == "stop":
-        parted |= _norms(turn * scale) > 2.0 * np.sin(0.5 * CORNER)
-    turn[parted] = 0.0
-    sharp = _norms(turn * scale)
-    reach = np.zeros(len(corner))
-    reach[1:-1] = np.minimum(length[:-1], length[1:])
+        parted |= sharp > 2.0 * np.sin(0.5 * CORNER)
     tip = _norms(turn * ~angles)
     leaning = _leaning(posted.machine.axes, corner, turn)
     with np.errstate(divide="ignore"):
-        reach = np.minimum(reach, _KEPT * np.minimum(6.0 * tolerance / tip, 6.0 * axis_tolerance / leaning))
-    reach[parted] = 0.0
+        reach = _KEPT * np.minimum(6.0 * tolerance / tip, 6.0 * axis_tolerance / leaning)
+    reach[1:-1] = _clear(np.minimum(reach[1:-1], np.minimum(length[:-1], length[1:])), length)
+    parted |= reach < _TIGHT * sharp
+    turn[parted] = sharp[parted] = reach[parted] = 0.0
     return Curve(corner, length, slope, turn, sharp, reach, parted, place, record)
+
+
+def _clear(reach: Floats, length: Floats) -> Floats:
+    """Reaches that go all over a piece or end well within it, for rows close together tell second derivatives badly."""
+    less = (1.0 - _BESIDE) * np.minimum(length[:-1], length[1:])
+    for side in (length[:-1], length[1:]):
+        beside = (reach > (1.0 - _BESIDE) * side) & (reach < (1.0 - SLIVER) * side)
+        reach = np.where(beside, less, reach)
+    return reach
 
 
 def _norms(rows: Floats) -> Floats:

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import linuxcnc
 
-MOST = 90.0  # s for a step
+MOST = 45.0  # s for a step
 DRAINING = 0.3  # s for the sampler's last rows
 
 

@@ -430,6 +430,27 @@ def test_upright_throughout():
     assert search.prover.boxes < 3 * 300
 
 
+@pytest.mark.parametrize("c", [0.0, 40.0, -115.0])
+def test_three_axis_work_on_a_table_at_its_pole(c):
+    table = ranged(pk.load("orthoglide5_table"), dict.fromkeys(("rho_x", "rho_y", "rho_z"), (150.0, 290.0)))
+    rng = np.random.default_rng(8)
+    ends = np.column_stack([rng.uniform(-90.0, 90.0, (200, 3)), np.zeros((200, 2))])
+    joints = table.follow(np.vstack([pose(table, X=0.0, B=1e-3, C=c), ends]))[1:]
+    posted = replace(posted_on(table, ends), joints=joints)
+    posted = replace(posted, broken=np.atleast_1d(table.check(ends, joints)))
+    checked = between(posted)
+    share = np.linspace(0.0, 1.0, 501)[:, None, None]
+    dense = (ends[:-1] + share * np.diff(ends, axis=0)).reshape(-1, 5)
+    held = table.follow(np.vstack([pose(table, X=0.0, B=1e-3, C=c), dense]))[1:]
+    margins = table.margins(dense, held).reshape(501, 199, -1)
+    least, at_ends = margins.min(0), margins[[0, -1]].min(0)
+    stray = ((at_ends >= 0.0) & (least < -1e-6)).any(1)
+    unsure = ((at_ends >= 0.0) & (np.abs(least) <= 1e-3)).any(1)
+    assert stray.any() and not stray.all()
+    assert checked.strays is not None and "untold" not in {offence.limit for offence in checked.offences}
+    assert ((checked.strays[1:] > 0) == stray)[~unsure & np.isfinite(margins).all((0, 2))].all()
+
+
 def test_joints_that_are_whole_turns_off():
     machine = pk.load("orthoglide5_head")
     poses = [pose(machine, B=30.0, C=angle) for angle in (0.0, 20.0, 150.0, 160.0)]

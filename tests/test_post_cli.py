@@ -159,3 +159,17 @@ home: {X: 230 mm, Y: 230 mm}
     assert said["verdict"] == "ok" and said["seconds"] is None
     assert "no cycle time: " in ran(capsys, part, "-m", machine, "-o", out)
     assert "no program: " in ran(capsys, part, "-m", machine, "-o", out, "--target", "linuxcnc", code=3)
+
+
+def test_joint_programs_are_not_taken_for_paths(part, out, capsys):
+    said = told(capsys, part, "-m", "linear_delta", "-o", out, "--target", "joints")
+    assert main(["post", said["files"]["program"], "-m", "linear_delta", "-o", str(out)]) == 2
+    assert "a program of joint positions" in capsys.readouterr().err
+
+
+def test_a_turn_that_the_machine_has_not_is_noted(part, out, capsys):
+    part.write_text("G0 X0 Y0 Z300 C0\nG1 X10 C90 F600\n")
+    assert any(
+        "can't" in note["text"] and note["line"] == 2
+        for note in told(capsys, part, "-m", "linear_delta", "-o", out)["notes"]
+    )

@@ -107,13 +107,13 @@ def post(
             axis_tolerance=radians(angle_tolerance), corners=corners,
             progress=progress.part("checking and timing", 0.3, 0.7),
         )  # fmt: skip
-        files, missing = _contents(part.stem, job, target, force, rate, parquet, progress)
+        files, missing = _contents(part.stem, job, target, force, tolerance, rate, parquet, progress)
         paths = write_all(output, dict(files.values()))
     written = {kind: str(name) for kind, name in zip(files, paths, strict=True)}
     if json:
         print_json(as_json(job, written, placement, missing))
     else:
-        print(summary(job, written, placement, missing))
+        print(summary(job, target, written, placement, missing))
     return 0 if job.runs and not missing else OFF_LIMITS
 
 
@@ -124,7 +124,14 @@ def _placement(machine: Machine, path: ToolPath, place: str, mode: str | None, p
 
 
 def _contents(
-    stem: str, job: Job, target: str | None, force: bool, rate: float | None, parquet: bool, progress: Progress
+    stem: str,
+    job: Job,
+    target: str | None,
+    force: bool,
+    tolerance: float,
+    rate: float | None,
+    parquet: bool,
+    progress: Progress,
 ) -> tuple[dict[str, tuple[str, Content]], list[str]]:
     """The files by their kinds, with their names; and why some that were asked for are not among them."""
     from ..export.report import report_html
@@ -147,14 +154,14 @@ def _contents(
                 files["setpoints-parquet"] = (f"{stem}.setpoints.parquet", writer)
     if target is not None:
         try:
-            files["program"] = (f"{stem}.{target}.ngc", _program(job, target, force))
+            files["program"] = (f"{stem}.{target}.ngc", _program(job, target, force, tolerance))
         except PoseError as error:
             missing.append(f"no program: {error}")
     files["report"] = (f"{stem}.report.html", report_html(posted, law, job.unplanned, job.waits))
     return files, missing
 
 
-def _program(job: Job, target: str, force: bool) -> Content:
+def _program(job: Job, target: str, force: bool, tolerance: float) -> Content:
     from ..export.programs import joint_program, linuxcnc_program
     from ..toolpath.offences import place
 
@@ -164,5 +171,6 @@ def _program(job: Job, target: str, force: bool) -> Content:
     if job.law is None:
         raise PoseError(job.unplanned)
     broken = "\n".join(f"{place(posted, offence)}: {offence.text}" for offence in posted.offences)
-    write = linuxcnc_program if target == "linuxcnc" else joint_program
-    return write(job.law, forced=broken or None)
+    if target == "joints":
+        return joint_program(job.law, forced=broken or None)
+    return linuxcnc_program(job.law, forced=broken or None, tolerance=0.5 * tolerance)  # the law's corners have half

@@ -17,7 +17,9 @@ _BINDING = 4  # limits that are named of those that bind
 _SHARE = 0.005  # of the time: what binds for less is not named
 
 
-def summary(job: Job, written: dict[str, str], placement: Placement | None, missing: list[str]) -> str:
+def summary(
+    job: Job, target: str | None, written: dict[str, str], placement: Placement | None, missing: list[str]
+) -> str:
     """The account for people; its last lines name the files."""
     from ..toolpath.offences import place
 
@@ -30,7 +32,12 @@ def summary(job: Job, written: dict[str, str], placement: Placement | None, miss
     if placement is not None:
         lines += [_placed(placement), ""]
     header = ("joint", "from", "to", "", "limits")
-    lines += [table([_range_row(joint) for joint in _ranges(posted)], header, " rr"), "", *_timed(job), ""]
+    lines += [
+        table([_range_row(joint) for joint in _ranges(posted)], header, " rr"),
+        "",
+        *_timed(job, target if "program" in written else None),
+        "",
+    ]
     lines += [offence_line(place(posted, offence), offence, "record") for offence in posted.offences]
     if posted.rewinds:
         places = ", ".join(str(int(path.line[record])) for record in posted.rewinds[:_NOTES])
@@ -72,7 +79,7 @@ def _unit(axis: str) -> str:
     return "mm" if axis in "XYZ" else "rad"
 
 
-def _timed(job: Job) -> list[str]:
+def _timed(job: Job, target: str | None) -> list[str]:
     from ..export.cards import duration
 
     if job.law is None or job.seconds is None:
@@ -81,7 +88,12 @@ def _timed(job: Job) -> list[str]:
     if job.waits:
         text += f", of which the program waits {job.waits:g} s"
     bound = [f"{name} {share:.0%}" for name, share in job.law.shares.items() if share >= _SHARE][:_BINDING]
-    return [text + (f"; bound by {', '.join(bound)}" if bound else "")]
+    text += f"; bound by {', '.join(bound)}" if bound else ""
+    if target != "linuxcnc":
+        return [text]
+    from ..export.programs import program_seconds
+
+    return [text, f"about {duration(program_seconds(job.law) + job.waits)} under LinuxCNC, from the first record on"]
 
 
 def _range_row(joint: dict[str, Any]) -> tuple[str, ...]:

@@ -145,6 +145,7 @@ def _tempered(start, stop, step, q, bend, feed, ceiling, limits, pieces, first, 
     judged(step, q, bend, feed, limits, pieces, first, last, parts, binding, fresh, _PLACES)
     return last, worst
 
+
 @njit(nogil=True, cache=True, error_model="numpy")
 def smoothed(step, q, bend, feed, ceiling, limits, pieces, passed, binding, rough, room, rounds):
     """Laws of all stretches, one after another, that keep speeds, accelerations and jerks. Returns the pieces' end.

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 
@@ -11,7 +12,7 @@ from ..machine import Machine
 from .offences import judge
 from .posing.branches import branch, modes_to_try
 from .posing.frames import composed, parse_workpiece, tool_poses
-from .program import Floats, ToolPath
+from .program import Floats, Note, ToolPath
 from .result import Posted
 
 Progress = Callable[[float], None]
@@ -62,7 +63,19 @@ def post(
     assert best is not None
     taken, found = best
     say(1.0)
+    path = _noted(machine, path)
     return Posted(
         machine, path, taken.mode, frame, taken.poses, taken.joints,
         found.broken, found.limits, found.offences, found.first, found.worst, rewinds=taken.rewinds,
     )  # fmt: skip
+
+
+def _noted(machine: Machine, path: ToolPath) -> ToolPath:
+    """The path with a note if it turns the tool about its own axis, and the machine has no turn to do so."""
+    if path.turns is None or {"A", "B", "C"} & set(machine.axes):
+        return path
+    turned = np.flatnonzero(np.abs(np.diff(path.turns, axis=0)).max(1, initial=0.0) > 0.0)
+    note = f"A, B or C turns the tool, and {machine.name} can't: left out where it turns about the tool's own axis"
+    if not len(turned) or any(known.text == note for known in path.notes):
+        return path
+    return replace(path, notes=(*path.notes, Note(int(path.line[turned[0] + 1]), note)))

@@ -12,6 +12,7 @@ from .program import Floats, ToolPath
 
 _GCODE_SUFFIXES = frozenset((".ngc", ".nc", ".gcode", ".tap", ".cnc"))
 _LOOKED_AT = 1 << 16  # bytes
+_JOINTS = b"joints, made by parakin )"  # of the head of such a program
 # how lines begin that only one of the two can have
 _CL = re.compile(
     rb"\s*(?:\$\$|(?:PARTNO|PPRINT|GOTO|GODLTA|FROM|UNITS|TOOL\s+PATH|TLDATA|MSYS|CUTTER|LOADTL|LOAD|SELECT|FEDRAT|SPINDL|"
@@ -33,6 +34,10 @@ def read_path(
     ``workpiece`` is for G53 in G-code; it does not place the path.
     """
     if sniff(path) == "gcode":
+        source = os.fsdecode(path)
+        with opened(path, source) as file:
+            if _JOINTS in (file.read(_LOOKED_AT) or b""):
+                raise InputError("a program of joint positions; expected the tool path that it was made from", source)
         return read_gcode(path, arc_tolerance=arc_tolerance, workpiece=workpiece, progress=progress)
     return read_cl(path, arc_tolerance=arc_tolerance, progress=progress)
 

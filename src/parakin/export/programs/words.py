@@ -51,7 +51,8 @@ def comments(text: str) -> Iterator[str]:
 
 
 def _safe(text: str) -> str:
-    plain = "".join(c if " " <= c <= "~" else "?" for c in " ".join(text.split()))
+    words = " ".join(text.replace("°", " deg").split())
+    plain = "".join(c if " " <= c <= "~" else "?" for c in words)
     return plain.translate(str.maketrans("();%", "[],?")).strip()
 
 

@@ -18,6 +18,7 @@ RELATIVE = 1e-9  # of a limit's size: a margin no farther below 0 counts as kept
 _FINEST = 2.0**-30  # of a motion: no part is shorter
 _SHORT, _NARROW = 1e-7, 1e-9  # mm and rad: a part shorter than both is not cut
 _FREE = np.sin(2.0 * ROUNDED) ** 2
+_ASIDE = 8e-6  # rad off a pole, where the first turn is told again
 _TILT = 8.0 * ROUNDED  # rad by which the second turn may change where the first one is free
 _HALF, _TURN = np.pi, 2.0 * np.pi
 _CLOSE = 1e-6  # rad, of joints and what is known of them
@@ -100,6 +101,8 @@ class Prover:
             self._by_value[columns] = False
         size = machine_size(machine)
         sizes = {"mm": size, "rad": 1.0, "1": 1.0, "mm²": size * size}
+        self._size = size
+        self._aside = 2.0 * _ASIDE * np.array([sizes[limit.unit] for limit in machine.limit_parts])
         self.tolerance = RELATIVE * np.array([sizes[limit.unit] for limit in machine.limit_parts])
         self.boxes = 0  # bounded, so that the work can be told
 
@@ -117,7 +120,7 @@ class Prover:
         change = (parts.end.joints - parts.start.joints)[:, self.motions.turning]
         least, count = np.full(m0.shape, -np.inf), m0.shape[1]
         counted = np.zeros(len(parts), bool)
-        sign = together(parts.start.sign, parts.end.sign)
+        low, high, sign, aside = self._beside(parts, low, high)
         self.boxes += len(parts)
         for variation, rows in self._split(sign):
             down, up = variation.rates(low[rows], high[rows])
@@ -125,7 +128,8 @@ class Prover:
             down, up = np.minimum(down * d, up * d).sum(2), np.maximum(down * d, up * d).sum(2)
             least[rows] = from_ends(m0[rows], m1[rows], down[:, :count], up[:, :count])
             counted[rows] = within(change[rows], change[rows], down[:, count:], up[:, count:], _TURN)
-        free = self._by_values(low, high, sign, least)
+        least[aside] -= self._aside * (np.linalg.norm(step[aside], axis=1) / self._size)[:, None]
+        free = self._by_values(low, high, sign, least, aside)
         between = np.minimum(m0, m1)
         self._where_free(free, between, np.abs(change), least, counted)
         return Bounds(least, counted)
@@ -139,6 +143,8 @@ class Prover:
         below, above = (low - at.poses)[:, None, :], (high - at.poses)[:, None, :]
         q_low, q_high = (end[:, turning] - at.joints[:, turning] for end in q)
         least, counted = np.full(at.margins.shape, -np.inf), np.zeros(len(low), bool)
+        still = (at.sign == EITHER) & self._still(q[1] - q[0])
+        low, high, sign, aside = self._beside_the_pole(at, still, low, high, sign)
         self.boxes += len(low)
         for variation, rows in self._split(sign):
             down, up = variation.rates(low[rows], high[rows])
@@ -146,7 +152,8 @@ class Prover:
             down, up = np.minimum(down * a, up * b).sum(2), np.maximum(up * a, down * b).sum(2)
             least[rows] = at.margins[rows] + down[:, :count]
             counted[rows] = within(q_low[rows], q_high[rows], down[:, count:], up[:, count:], _HALF)
-        free = self._by_values(low, high, sign, least)
+        least[aside] -= self._aside
+        free = self._by_values(low, high, sign, least, aside)
         drives, between = self.motions.machine.model.drives, np.full(least.shape, -np.inf)
         for i, columns in self._ends.items():
             for column in columns:
@@ -155,13 +162,43 @@ class Prover:
         self._where_free(free, between, q_high - q_low, least, counted)
         return Bounds(least, counted)
 
-    def _by_values(self, low: Floats, high: Floats, sign: NDArray[np.int8], least: Floats) -> Flags:
+    def _still(self, change: Floats) -> Flags:
+        """(n,) where head and table don't turn."""
+        return np.asarray((np.abs(change[:, self.motions.serial]) <= _CLOSE).all(1))
+
+    def _beside(self, parts: Parts, low: Floats, high: Floats) -> tuple[Floats, Floats, NDArray[np.int8], Indices]:
+        start, end = parts.start, parts.end
+        still = (start.sign == EITHER) & (end.sign == EITHER) & self._still(end.joints - start.joints)
+        return self._beside_the_pole(start, still, low, high, together(start.sign, end.sign))
+
+    def _beside_the_pole(
+        self, at: Places, still: Flags, low: Floats, high: Floats, sign: NDArray[np.int8]
+    ) -> tuple[Floats, Floats, NDArray[np.int8], Indices]:
+        """Boxes and working modes with those taken a little off the pole, whose rows come with them, in which head and
+        table stand ``still`` on it: there the pose does not tell the first turn, which all else hangs on with a table.
+        """
+        turns = [i for i, unit in enumerate(self.motions.machine.axis_units) if unit == "rad"]
+        rows = np.flatnonzero(still & (low[:, turns] == high[:, turns]).all(1))
+        if self.motions.pole is None or not len(rows):
+            return low, high, sign, rows[:0]
+        joints = at.joints[rows].copy()
+        joints[:, self.motions.pole[1]] += _ASIDE
+        found = self.motions.machine.forward(joints, near=at.poses[rows])
+        good = np.flatnonzero(found.converged)
+        rows, poses = rows[good], found.poses[good]
+        low, high, sign = low.copy(), high.copy(), sign.copy()
+        low[np.ix_(rows, np.array(turns))] = high[np.ix_(rows, np.array(turns))] = poses[:, turns]
+        sign[rows] = self.motions.signs(poses, joints[good])
+        return low, high, sign, rows
+
+    def _by_values(self, low: Floats, high: Floats, sign: NDArray[np.int8], least: Floats, aside: Indices) -> Flags:
         """Raise ``least`` by the margins' own bounds; returns where the first turn of head and table is free."""
         worst, freedom = np.full(least.shape, np.inf), np.zeros(len(low))
         for number, variation in enumerate(self.variations):
             rows = np.flatnonzero((sign == number) | (sign == EITHER))
             down, up = variation.least(low[rows], high[rows])
             worst[rows], freedom[rows] = np.minimum(worst[rows], down), np.maximum(freedom[rows], up)
+        worst[aside] -= self._aside
         np.maximum(least, worst, out=least, where=self._by_value & ~np.isnan(worst))
         return freedom <= _FREE if self.motions.first is not None else np.zeros(len(low), bool)
 
@@ -175,9 +212,9 @@ class Prover:
 
     def regular(self, parts: Parts) -> Flags:
         """(n,) where no parallel singularity can be on a part."""
-        sign = together(parts.start.sign, parts.end.sign)
         p0, p1 = parts.start.poses, parts.end.poses
-        return self.regular_in(np.minimum(p0, p1), np.maximum(p0, p1), sign)
+        low, high, sign, _ = self._beside(parts, np.minimum(p0, p1), np.maximum(p0, p1))
+        return self.regular_in(low, high, sign)
 
     def regular_in(self, low: Floats, high: Floats, sign: NDArray[np.int8]) -> Flags:
         regular = np.ones(len(low), bool)

@@ -11,13 +11,13 @@ from measure import best, table
 from post import numbers
 
 import parakin as pk
-from parakin.kernels.splines import bends
-from parakin.kernels.timing import backward, ceilings, forward
 from parakin.machine import Machine
-from parakin.toolpath.feed import plan
-from parakin.toolpath.post import post
-from parakin.toolpath.program import ToolPath
-from parakin.toolpath.result import Posted
+from parakin.toolpath.path import ToolPath
+from parakin.toolpath.posting.post import post
+from parakin.toolpath.posting.posted import Posted
+from parakin.toolpath.timing import plan
+from parakin.toolpath.timing.kernels.reachability import backward, ceilings, forward
+from parakin.toolpath.timing.kernels.splines import bends
 
 ROWS, JOINTS = 100_000, 6
 

@@ -10,9 +10,9 @@ from measure import best, table
 
 import parakin as pk
 from parakin.export.files import write_all
-from parakin.toolpath.cl.reader import read_cl
-from parakin.toolpath.post import post
-from parakin.toolpath.tables.joints import csv_writer
+from parakin.export.tables.joints import csv_writer
+from parakin.toolpath.posting.post import post
+from parakin.toolpath.reading.cl.reader import read_cl
 
 COUNT = 1_000_000
 

@@ -9,10 +9,10 @@ import numpy as np
 from measure import best, table
 
 import parakin as pk
-from parakin.analysis.grid import GridWorkspace, dense_grid
-from parakin.analysis.region import region
-from parakin.analysis.sweep import FirstBroken, surroundings
 from parakin.kernels.batch import cores
+from parakin.workspace.certified.region import region
+from parakin.workspace.sampled.grid import GridWorkspace, dense_grid
+from parakin.workspace.sampled.sampling import FirstBroken, surroundings
 
 OWN_ERROR = 0.05  # of the NumPy grid: half the volume of the cells that its boundary cuts, relative to its volume
 UPRIGHT = {"B": 0.0, "C": 0.0}

@@ -17,16 +17,16 @@ from matplotlib.figure import Figure
 from mpl_toolkits.mplot3d.art3d import Line3DCollection, Poly3DCollection
 
 import parakin as pk
-from parakin.analysis.drives import drive_sweep
-from parakin.analysis.field import field
-from parakin.analysis.inscribed import Box, largest_box
-from parakin.analysis.polar import PolarWorkspace, polar_sweep
-from parakin.analysis.region import region
-from parakin.analysis.slices import sections
-from parakin.analysis.subdivide import Cells
-from parakin.analysis.workspace import Workspace
 from parakin.export.files import write_all
-from parakin.export.meshes import Shell, shell
+from parakin.export.workspace.meshes import Shell, shell
+from parakin.workspace.certified.region import region
+from parakin.workspace.certified.subdivision import Cells
+from parakin.workspace.certified.workspace import Workspace
+from parakin.workspace.inscribed.largest_box import Box, largest_box
+from parakin.workspace.sampled.drives import drive_sweep
+from parakin.workspace.sampled.field import field
+from parakin.workspace.sampled.polar import PolarWorkspace, polar_sweep
+from parakin.workspace.sampled.slices import sections
 
 BLUE, ORANGE, GREEN, GREY = "#1565c0", "#ef6c00", "#2e7d32", "#90a4ae"
 TILT = np.deg2rad(15.0)

@@ -20,9 +20,9 @@ from pathlib import Path
 import numpy as np
 import turbine_blade
 
-from parakin.export.programs import linuxcnc_program, program_seconds
+from parakin.controllers import linuxcnc_program, program_seconds
 from parakin.toolpath.job import prepare
-from parakin.toolpath.reading import read_path
+from parakin.toolpath.reading.detect import read_path
 
 HERE = Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE.parent / "tests" / "linuxcnc"))

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import parakin as pk
 from parakin.export.files import write_all
-from parakin.export.picture import machine_png
+from parakin.export.machine.picture import machine_png
 
 
 def main() -> None:

@@ -9,15 +9,15 @@ from drawn import draw, machine_of
 from scipy.spatial.transform import Rotation
 
 import parakin as pk
-from parakin.analysis.atlas import atlas
-from parakin.analysis.extremes import MEASURES
-from parakin.analysis.lengths import characteristic_length
-from parakin.analysis.matrices import Over
-from parakin.analysis.performance import performance
-from parakin.analysis.proofs import amplification, amplification_brackets, box_of, no_singularity
-from parakin.analysis.rates import twist_jacobians, twist_names
-from parakin.analysis.singularities import margin_names, singularity_margins
 from parakin.cli import main
+from parakin.performance.atlas import atlas
+from parakin.performance.certified.interval_matrices import Over
+from parakin.performance.certified.proofs import amplification, amplification_brackets, box_of, no_singularity
+from parakin.performance.characteristic_length import characteristic_length
+from parakin.performance.extremes import MEASURES
+from parakin.performance.indices import performance
+from parakin.performance.jacobians import twist_jacobians, twist_names
+from parakin.performance.singularities import margin_names, singularity_margins
 
 NAMES = pk.machines()
 everyone = pytest.mark.parametrize("m", [pk.load(name) for name in NAMES], ids=NAMES)

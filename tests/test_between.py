@@ -7,14 +7,14 @@ import numpy as np
 import pytest
 
 import parakin as pk
-from parakin.analysis.singularities import singularity_margins
 from parakin.machine import Machine
-from parakin.toolpath.between.checking import between
-from parakin.toolpath.between.search import Search
-from parakin.toolpath.offences import judge, place
-from parakin.toolpath.posing.frames import ROUNDED
-from parakin.toolpath.program import ToolPath
-from parakin.toolpath.result import Posted
+from parakin.performance.singularities import singularity_margins
+from parakin.toolpath.checking.check import between
+from parakin.toolpath.checking.search import Search
+from parakin.toolpath.path import ToolPath
+from parakin.toolpath.posting.frames import ROUNDED
+from parakin.toolpath.posting.offences import judge, place
+from parakin.toolpath.posting.posted import Posted
 
 TURN = 2.0 * math.pi
 SEEN = 1e-5  # a margin this far below 0 in a dense sample is an offence
@@ -558,7 +558,7 @@ def test_what_takes_too_long_is_told(monkeypatch):
     rows = poses[0] + np.linspace(0.0, 1.0, 10_001)[:, None] * (poses[1] - poses[0])
     machine = ranged(machine, {"tower_a": (700.0, machine.inverse(rows)[:, 0].max() + 1e-4)})
     assert between(posted_on(machine, poses)).first is None
-    monkeypatch.setattr("parakin.toolpath.between.search.MOST_CUTS", 0)
+    monkeypatch.setattr("parakin.toolpath.checking.search.MOST_CUTS", 0)
     checked = between(posted_on(machine, poses))
     assert [offence.limit for offence in checked.offences] == ["untold"]
     assert checked.first.text == "whether this motion keeps all limits can't be told"

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 import parakin as pk
-from parakin.toolpath.gcode.reader import axes_of
-from parakin.toolpath.post import post
-from parakin.toolpath.program import ToolPath
+from parakin.toolpath.path import ToolPath
+from parakin.toolpath.posting.post import post
+from parakin.toolpath.reading.gcode.reader import axes_of
 
 DEGREE = math.pi / 180.0
 TURN = 360.0 * DEGREE

@@ -13,8 +13,8 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from parakin.errors import InputError
-from parakin.toolpath.cl import reader as cl
-from parakin.toolpath.cl.reader import read_cl
+from parakin.toolpath.reading.cl import reader as cl
+from parakin.toolpath.reading.cl.reader import read_cl
 
 COLUMNS = ("tip", "axis", "line", "rapid", "feed", "spindle")
 FAST = settings(deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])

@@ -10,12 +10,12 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 import parakin as pk
-from parakin.analysis.assembly import determinant
-from parakin.analysis.connected import connected_parts
-from parakin.analysis.inscribed import largest_box
-from parakin.analysis.neighbours import labelled, touching
-from parakin.analysis.region import region
-from parakin.analysis.subdivide import Subdivision
+from parakin.workspace.certified.region import region
+from parakin.workspace.certified.subdivision import Subdivision
+from parakin.workspace.connected.adjacency import labelled, touching
+from parakin.workspace.connected.assembly_mode import determinant
+from parakin.workspace.connected.connected import connected_parts
+from parakin.workspace.inscribed.largest_box import largest_box
 
 # Two struts in line with the machine's y axis: singular where x = 0, and nowhere else.
 RING = """

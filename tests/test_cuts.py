@@ -14,12 +14,12 @@ from scipy.optimize import lsq_linear
 from test_kernels import CORNERS, MEANING, SMOOTH, number
 
 from parakin import algebra as alg
-from parakin.analysis.constraints import Constraint
-from parakin.analysis.subdivide import Cuts, Items, Lines, bounds
 from parakin.kernels.batch import run
-from parakin.kernels.cuts import CLEARED, EXCLUDED, KEPT, narrowest, share, united
 from parakin.kernels.tape import compile_tape
 from parakin.model.limits import distance
+from parakin.workspace.certified.constraints import Constraint
+from parakin.workspace.certified.plane_cuts import CLEARED, EXCLUDED, KEPT, narrowest, share, united
+from parakin.workspace.certified.subdivision import Cuts, Items, Lines, bounds
 
 ROOM = np.empty(3)
 

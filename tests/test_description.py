@@ -19,7 +19,7 @@ from parakin.description import machine_file, read_machine, shipped
 from parakin.errors import InputError, InputErrors
 from parakin.model.legs import KINDS
 from parakin.model.parts import Cone, Drive, Gap, Range, Step
-from parakin.quantities import ANGLE, LENGTH, NUMBER, SPEED, UNITS, Quantity, QuantityError, evaluate, quantity
+from parakin.units import ANGLE, LENGTH, NUMBER, SPEED, UNITS, Quantity, QuantityError, evaluate, quantity
 
 RPR3 = Path(__file__).parent / "machines" / "rpr3.yaml"
 GOOD = """\

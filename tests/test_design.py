@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 import parakin as pk
-from parakin.analysis.design import DESIGNS, orthoglide
-from parakin.analysis.performance import performance
 from parakin.cli import main
+from parakin.performance.design import DESIGNS, orthoglide
+from parakin.performance.indices import performance
 
 
 def test_the_shipped_orthoglide_is_the_design_for_200_mm_and_3():

@@ -8,13 +8,13 @@ import pytest
 
 import parakin as pk
 from parakin.errors import InputError, PoseError
-from parakin.kernels.splines import bends
-from parakin.kernels.timing import backward, ceilings, forward
 from parakin.machine import Machine
-from parakin.toolpath.feed import plan
-from parakin.toolpath.feed.course import Drives
-from parakin.toolpath.post import post
-from parakin.toolpath.program import ToolPath
+from parakin.toolpath.path import ToolPath
+from parakin.toolpath.posting.post import post
+from parakin.toolpath.timing import plan
+from parakin.toolpath.timing.joint_path import Drives
+from parakin.toolpath.timing.kernels.reachability import backward, ceilings, forward
+from parakin.toolpath.timing.kernels.splines import bends
 
 INF = np.inf
 BEYOND = 1.001  # times a limit

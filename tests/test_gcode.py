@@ -12,10 +12,10 @@ import pytest
 from gcode_model import Program
 
 from parakin.errors import InputError
-from parakin.toolpath.gcode import motion as gcode_motion
-from parakin.toolpath.gcode import reader as gcode
-from parakin.toolpath.gcode.reader import read_gcode
-from parakin.toolpath.reading import read_path, sniff
+from parakin.toolpath.reading.detect import read_path, sniff
+from parakin.toolpath.reading.gcode import motion as gcode_motion
+from parakin.toolpath.reading.gcode import reader as gcode
+from parakin.toolpath.reading.gcode.reader import read_gcode
 
 COLUMNS = ("tip", "axis", "line", "rapid", "feed", "spindle", "turns", "seconds")
 

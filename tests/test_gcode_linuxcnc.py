@@ -13,7 +13,7 @@ import pytest
 from gcode_model import Program
 
 from parakin.errors import InputError
-from parakin.toolpath.gcode.reader import read_gcode
+from parakin.toolpath.reading.gcode.reader import read_gcode
 
 pytestmark = pytest.mark.skipif(shutil.which("rs274") is None, reason="LinuxCNC's interpreter is not here")
 

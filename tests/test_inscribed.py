@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 import parakin as pk
-from parakin.analysis.holds import holds, verdicts
-from parakin.analysis.inscribed import largest_box
-from parakin.analysis.region import region
-from parakin.kernels.cuboids import blocks_in_mask, largest_in_mask
+from parakin.workspace.certified.containment import holds, verdicts
+from parakin.workspace.certified.region import region
+from parakin.workspace.inscribed.largest_box import largest_box
+from parakin.workspace.inscribed.mask_boxes import blocks_in_mask, largest_in_mask
 
 # A disc (a ball) of 100 mm about the first foot: the other legs reach anywhere.
 DISC = """

@@ -9,10 +9,10 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import parakin as pk
-from parakin.toolpath.linearise.densening import linearised
-from parakin.toolpath.linearise.interpolate import Programmed, denser
-from parakin.toolpath.post import post
-from parakin.toolpath.program import Event, ToolPath
+from parakin.toolpath.linearise.interpolation import Programmed, denser
+from parakin.toolpath.linearise.linearise import linearised
+from parakin.toolpath.path import Event, ToolPath
+from parakin.toolpath.posting.post import post
 
 DEGREE = math.pi / 180.0
 DENSE = 60  # shares of each motion that are looked at

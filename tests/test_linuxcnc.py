@@ -20,9 +20,9 @@ from test_direct import CLOSE, allowed, garbage, legs_regularity, nudged
 
 import parakin as pk
 from parakin.cli import main
-from parakin.export.linuxcnc import configuration
-from parakin.export.linuxcnc.module import module
-from parakin.kinematics.direct import roots, side_of
+from parakin.controllers.linuxcnc import configuration
+from parakin.controllers.linuxcnc.module import module
+from parakin.kinematics.forward import roots, side_of
 
 sys.path.insert(0, str(Path(__file__).parent / "linuxcnc"))
 from stub import Stub, inward, outward, pose, world

@@ -13,11 +13,11 @@ import pytest
 from geometry import Description
 
 import parakin as pk
-from parakin.export.programs import linuxcnc_program, program_seconds
-from parakin.toolpath.feed import plan
+from parakin.controllers import linuxcnc_program, program_seconds
 from parakin.toolpath.job import prepare
-from parakin.toolpath.post import post
-from parakin.toolpath.reading import read_path
+from parakin.toolpath.posting.post import post
+from parakin.toolpath.reading.detect import read_path
+from parakin.toolpath.timing import plan
 
 HERE = Path(__file__).parent / "linuxcnc"
 DIGIT = 5e-7  # half a unit of the last digit that is sampled

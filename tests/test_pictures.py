@@ -8,17 +8,17 @@ import numpy as np
 import pytest
 
 import parakin as pk
-from parakin.export.curves import extremes
-from parakin.export.picture import machine_html, machine_png
+from parakin.export.machine.picture import machine_html, machine_png
+from parakin.export.machine.scene import around, scene
+from parakin.export.machine.solids import solids
 from parakin.export.ranges import shown
-from parakin.export.report import report_html
-from parakin.export.scene import around, scene
-from parakin.export.solids import solids
-from parakin.toolpath.cl.reader import read_cl
-from parakin.toolpath.post import post
-from parakin.toolpath.program import Note, ToolPath
-from parakin.toolpath.result import Posted
-from parakin.toolpath.uses import used
+from parakin.export.report.curves import extremes
+from parakin.export.report.report import report_html
+from parakin.toolpath.path import Note, ToolPath
+from parakin.toolpath.posting.post import post
+from parakin.toolpath.posting.posted import Posted
+from parakin.toolpath.posting.range_use import used
+from parakin.toolpath.reading.cl.reader import read_cl
 
 OWN = Path(__file__).parent / "machines" / "rpr3.yaml"
 MACHINES = [*pk.machines(), str(OWN)]

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 import parakin as pk
-from parakin.toolpath.placing.searching import parse_bounds, placed
-from parakin.toolpath.posing.frames import transform
-from parakin.toolpath.post import post
-from parakin.toolpath.program import ToolPath
+from parakin.toolpath.path import ToolPath
+from parakin.toolpath.placing.placement import parse_bounds, placed
+from parakin.toolpath.posting.frames import transform
+from parakin.toolpath.posting.post import post
 
 DEGREE = math.pi / 180.0
 

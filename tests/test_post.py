@@ -14,12 +14,12 @@ import pytest
 
 import parakin as pk
 from parakin.export.files import write_all
-from parakin.toolpath.cl.reader import read_cl
-from parakin.toolpath.gcode.reader import read_gcode
-from parakin.toolpath.posing.frames import parse_workpiece, tool_poses, transform
-from parakin.toolpath.post import post
-from parakin.toolpath.program import ToolPath
-from parakin.toolpath.tables import joints as table
+from parakin.export.tables import joints as table
+from parakin.toolpath.path import ToolPath
+from parakin.toolpath.posting.frames import parse_workpiece, tool_poses, transform
+from parakin.toolpath.posting.post import post
+from parakin.toolpath.reading.cl.reader import read_cl
+from parakin.toolpath.reading.gcode.reader import read_gcode
 
 DEGREE = math.pi / 180.0
 

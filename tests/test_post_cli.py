@@ -9,7 +9,7 @@ import pytest
 
 import parakin as pk
 from parakin.cli import main
-from parakin.toolpath.reading import read_path
+from parakin.toolpath.reading.detect import read_path
 
 SQUARE = "G21 G90 G94\nG0 X-40 Y-40 Z300\nG1 X40 F6000\nY40\nX-40\nY-40\nM2\n"
 

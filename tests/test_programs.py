@@ -13,19 +13,19 @@ import numpy as np
 import pytest
 
 import parakin as pk
+from parakin.controllers import joint_program, linuxcnc_program, program_seconds, read_joint_program
+from parakin.controllers.joints.program import joint_letters
+from parakin.controllers.linuxcnc.approach import approach
+from parakin.controllers.linuxcnc.program import _timed
+from parakin.controllers.linuxcnc.rates import axis_rates
+from parakin.controllers.linuxcnc.straight_motions import CYCLE, motions
 from parakin.errors import InputError, PoseError
 from parakin.export.files import write_all
-from parakin.export.linuxcnc.rates import axis_rates
-from parakin.export.programs import joint_program, linuxcnc_program, program_seconds, read_joint_program
-from parakin.export.programs.approach import approach
-from parakin.export.programs.joints import joint_letters
-from parakin.export.programs.linuxcnc import _timed
-from parakin.export.programs.motions import CYCLE, motions
-from parakin.toolpath.feed import plan
-from parakin.toolpath.gcode.reader import read_gcode
-from parakin.toolpath.post import post
-from parakin.toolpath.program import Event, ToolPath
-from parakin.toolpath.reading import read_path
+from parakin.toolpath.path import Event, ToolPath
+from parakin.toolpath.posting.post import post
+from parakin.toolpath.reading.detect import read_path
+from parakin.toolpath.reading.gcode.reader import read_gcode
+from parakin.toolpath.timing import plan
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "examples"))
 import turbine_blade

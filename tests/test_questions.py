@@ -5,7 +5,7 @@ import math
 import pytest
 
 import parakin as pk
-from parakin.analysis.region import region
+from parakin.workspace.certified.region import region
 
 
 @pytest.mark.parametrize(

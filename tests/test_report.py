@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 import parakin as pk
-from parakin.export.report import report_html
+from parakin.export.report.report import report_html
 from parakin.machine import Machine
-from parakin.toolpath.between.checking import between
-from parakin.toolpath.feed import plan
-from parakin.toolpath.post import post
-from parakin.toolpath.program import Note, ToolPath
+from parakin.toolpath.checking.check import between
+from parakin.toolpath.path import Note, ToolPath
+from parakin.toolpath.posting.post import post
+from parakin.toolpath.timing import plan
 
 SLOW, FAST = 2400.0, 9000.0  # mm/min
 

@@ -10,10 +10,10 @@ import pyarrow.parquet as pq
 import pytest
 
 import parakin as pk
-from parakin.toolpath.feed import plan
-from parakin.toolpath.post import post
-from parakin.toolpath.program import ToolPath
-from parakin.toolpath.tables.setpoints import MOST_ROWS, row_count, setpoint_columns, setpoints_csv, setpoints_parquet
+from parakin.export.tables.setpoints import MOST_ROWS, row_count, setpoint_columns, setpoints_csv, setpoints_parquet
+from parakin.toolpath.path import ToolPath
+from parakin.toolpath.posting.post import post
+from parakin.toolpath.timing import plan
 
 RATE = 7000.0  # more rows than are formatted at a time
 
@@ -78,7 +78,7 @@ def test_parquet_is_the_law_sampled(law):
 
 
 def test_parquet_in_several_groups(law, monkeypatch):
-    monkeypatch.setattr("parakin.toolpath.tables.setpoints._GROUP", 1000)
+    monkeypatch.setattr("parakin.export.tables.setpoints._GROUP", 1000)
     file, said = io.BytesIO(), []
     setpoints_parquet(law, 1000.0, said.append)(file)
     read = pq.ParquetFile(io.BytesIO(file.getvalue()))

@@ -10,13 +10,13 @@ import pytest
 import trimesh
 
 import parakin as pk
-from parakin.analysis.field import Distance, field
-from parakin.analysis.performance import performance
-from parakin.analysis.region import region
-from parakin.analysis.slices import enclosed, sections
-from parakin.export.cells import cells_csv, cells_vtu
-from parakin.export.meshes import mesh_file, shell
-from parakin.export.workspace import amount, asked, between
+from parakin.export.workspace.cells import cells_csv, cells_vtu
+from parakin.export.workspace.meshes import mesh_file, shell
+from parakin.export.workspace.summary import amount, asked, between
+from parakin.performance.indices import performance
+from parakin.workspace.certified.region import region
+from parakin.workspace.sampled.field import Distance, field
+from parakin.workspace.sampled.slices import enclosed, sections
 
 SPACE = [name for name in pk.machines() if "Z" in pk.load(name).axes]
 

@@ -12,14 +12,14 @@ from drawn import FAMILIES, draw, machine_of
 from test_workspace import INSIDE, OUTSIDE, SHIPPED, Raster, known, turns_of
 
 from parakin import algebra as alg
-from parakin.analysis import subdivide
-from parakin.analysis.constraints import Constraint
-from parakin.analysis.every_turn import EveryTurn
-from parakin.analysis.region import region
-from parakin.analysis.workspace import Volume, workspace
 from parakin.errors import PoseError
 from parakin.kernels.intervals import IntervalProgram
 from parakin.machine import Machine
+from parakin.workspace.certified import subdivision as subdivide
+from parakin.workspace.certified.constraints import Constraint
+from parakin.workspace.certified.region import region
+from parakin.workspace.certified.total import EveryTurn
+from parakin.workspace.certified.workspace import Volume, workspace
 
 
 @pytest.mark.parametrize("name", SHIPPED)
@@ -215,7 +215,7 @@ def test_an_interrupt_in_the_middle_of_a_round_counts_no_cell_twice(monkeypatch)
     monkeypatch.setattr(subdivide, "AT_ONCE", 100)
     asked = region(m)
     asked.extent  # noqa: B018  not to be interrupted
-    monkeypatch.setattr("parakin.analysis.workspace.region", lambda *question: asked)
+    monkeypatch.setattr("parakin.workspace.certified.workspace.region", lambda *question: asked)
     for after in (60, 150, 300, 700, 1100):
         left[0] = after
         found = workspace(m, gap=1e-4)

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 import parakin as pk
-from parakin.analysis.drives import drive_sweep
-from parakin.analysis.grid import dense_grid
-from parakin.analysis.polar import polar_sweep
-from parakin.analysis.region import region
-from parakin.analysis.workspace import workspace
 from parakin.errors import NoMethodError, PoseError
+from parakin.workspace.certified.region import region
+from parakin.workspace.certified.workspace import workspace
+from parakin.workspace.sampled.drives import drive_sweep
+from parakin.workspace.sampled.grid import dense_grid
+from parakin.workspace.sampled.polar import polar_sweep
 
 # A sweep may be off by this share of a layer as thick as its step all over the boundary.
 WITHIN = 0.25

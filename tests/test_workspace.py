@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 import parakin as pk
-from parakin.analysis.region import region
-from parakin.analysis.workspace import workspace
+from parakin.workspace.certified.region import region
+from parakin.workspace.certified.workspace import workspace
 
 MACHINES = Path(__file__).parent / "machines"
 SHIPPED = {name: pk.load(name) for name in pk.machines()}

@@ -14,8 +14,8 @@ import pytest
 import trimesh
 
 import parakin as pk
-from parakin.analysis.subdivide import Subdivision
 from parakin.cli import main
+from parakin.workspace.certified.subdivision import Subdivision
 
 BALL = """
 title: A hollow ball

@@ -9,15 +9,15 @@ from typing import TYPE_CHECKING
 from .errors import DescriptionError, InputError, InputErrors, NoMethodError, ParakinError, PoseError
 
 if TYPE_CHECKING:
-    from .analysis.atlas import Atlas, atlas
-    from .analysis.workspace import Workspace, workspace
-    from .kinematics.direct import Solution
+    from .kinematics.forward import Solution
     from .machine import Machine
-    from .toolpath.feed.law import Law
+    from .performance.atlas import Atlas, atlas
     from .toolpath.job import Job, prepare
-    from .toolpath.placing.searching import Placement, placed
-    from .toolpath.program import ToolPath
-    from .toolpath.reading import read_path
+    from .toolpath.path import ToolPath
+    from .toolpath.placing.placement import Placement, placed
+    from .toolpath.reading.detect import read_path
+    from .toolpath.timing.trajectory import Law
+    from .workspace.certified.workspace import Workspace, workspace
 
 __version__ = "0.1.0"
 __all__ = [
@@ -74,19 +74,19 @@ def load(name: str | PathLike[str], parameters: Mapping[str, float | str] | None
 
 
 _LAZY = {
-    "Atlas": "analysis.atlas",
+    "Atlas": "performance.atlas",
     "Job": "toolpath.job",
-    "Law": "toolpath.feed.law",
+    "Law": "toolpath.timing.trajectory",
     "Machine": "machine",
-    "Placement": "toolpath.placing.searching",
-    "Solution": "kinematics.direct",
-    "ToolPath": "toolpath.program",
-    "Workspace": "analysis.workspace",
-    "atlas": "analysis.atlas",
-    "placed": "toolpath.placing.searching",
+    "Placement": "toolpath.placing.placement",
+    "Solution": "kinematics.forward",
+    "ToolPath": "toolpath.path",
+    "Workspace": "workspace.certified.workspace",
+    "atlas": "performance.atlas",
+    "placed": "toolpath.placing.placement",
     "prepare": "toolpath.job",
-    "read_path": "toolpath.reading",
-    "workspace": "analysis.workspace",
+    "read_path": "toolpath.reading.detect",
+    "workspace": "workspace.certified.workspace",
 }
 
 

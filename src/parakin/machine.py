@@ -17,7 +17,7 @@ from .model.spec import Spec
 from .model.traces import Model
 
 if TYPE_CHECKING:
-    from .kinematics.direct import Solution
+    from .kinematics.forward import Solution
 
 Array = NDArray[np.float64]
 
@@ -170,7 +170,7 @@ class Machine:
         the path passes over such a pole, head and table go on in their other working mode if that spares a swing, keeps
         the second of their joints in its range and every leg within reach.
         """
-        from .kinematics.path import follow
+        from .kinematics.follow import follow
 
         rows, lead = self.rows(poses, self.axes, "poses")
         if len(lead) != 1:
@@ -178,8 +178,8 @@ class Machine:
         return follow(self, rows, self.checked_mode(mode), free_below)
 
     def forward(self, joints: ArrayLike, near: ArrayLike | None = None, method: str | None = None) -> Solution:
-        """Poses for joints, with residual and verdict; see :func:`parakin.kinematics.direct.forward`."""
-        from .kinematics.direct import forward
+        """Poses for joints, with residual and verdict; see :func:`parakin.kinematics.forward.forward`."""
+        from .kinematics.forward import forward
 
         return forward(self, joints, near, method)
 

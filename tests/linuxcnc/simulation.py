@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 
 import parakin as pk
-from parakin.export.linuxcnc import configuration
+from parakin.controllers.linuxcnc import configuration
 
 HERE = Path(__file__).parent
 MODULES = Path("/usr/lib/linuxcnc/modules")

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from parakin.export.linuxcnc.module import kinematics_name, module
+from parakin.controllers.linuxcnc.module import kinematics_name, module
 
 HERE = Path(__file__).parent
 HEADERS = ("rtapi.h", "rtapi_app.h", "rtapi_math.h", "rtapi_string.h", "hal.h", "kinematics.h")

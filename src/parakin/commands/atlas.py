@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 from cyclopts import Parameter
 
 from ..errors import InputError, PoseError
-from ..quantities import NUMBER, QuantityError, quantity, shown
+from ..units import NUMBER, QuantityError, quantity, shown
 from .atlas_files import Files
 from .atlas_summary import atlas_json, atlas_text, performance_json, performance_text, proofs_json, proofs_text
 from .console import Progress, announce_compiling, print_json, rim
@@ -17,11 +17,11 @@ from .options import OFF_LIMITS, Json, Mode, Name, Sizes, machine_of, row
 from .regions import At, Without, length, parts_of, ranges_of, region_of, values_of
 
 if TYPE_CHECKING:
-    from ..analysis.atlas import Atlas, Map
-    from ..analysis.performance import Performance
-    from ..analysis.proofs import Brackets, Proof
-    from ..analysis.region import Region
     from ..machine import Array, Machine
+    from ..performance.atlas import Atlas, Map
+    from ..performance.certified.proofs import Brackets, Proof
+    from ..performance.indices import Performance
+    from ..workspace.certified.region import Region
 
 Spans = dict[str, tuple[float, float]]
 
@@ -121,8 +121,8 @@ def _cuts(
     mode: str | None,
 ) -> list[Region]:
     """The regions to draw: those that --slice names, else one through home, or all of one that is flat already."""
-    from ..analysis.region import region
-    from ..toolpath.posing.frames import parse_value
+    from ..toolpath.posting.frames import parse_value
+    from ..workspace.certified.region import region
 
     held = []
     for text in slices:
@@ -157,7 +157,7 @@ class _Found:
         self.atlas: Atlas | None = None
 
     def look(self, pose: Array, length: float | None) -> None:
-        from ..analysis.performance import performance
+        from ..performance.indices import performance
 
         self.pose = performance(self.machine, pose, length, self.asked.mode)
         broken = int(self.machine.check(pose, mode=self.asked.mode))
@@ -171,7 +171,7 @@ class _Found:
         length: float | None,
         progress: Progress,
     ) -> None:
-        from ..analysis.proofs import amplification, amplification_brackets, box_of, no_singularity
+        from ..performance.certified.proofs import amplification, amplification_brackets, box_of, no_singularity
 
         self.spans = spans
         box = box_of(self.machine, spans, at, length, self.asked.mode)
@@ -183,12 +183,12 @@ class _Found:
             self.brackets = amplification_brackets(box, progress=told)
 
     def draw(self, step: float | None, length: float | None, progress: Progress) -> None:
-        from ..analysis.atlas import atlas_of
+        from ..performance.atlas import atlas_of
 
         self.atlas = atlas_of(self.asked, step, length, progress.part("looking at the workspace", 0.0, 1.0))
 
     def mapped(self, cut: Region, step: float | None, length: float | None) -> Map:
-        from ..analysis.atlas import map_of
+        from ..performance.atlas import map_of
 
         assert self.atlas is not None
         if cut is self.asked:

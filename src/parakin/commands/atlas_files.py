@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING
 from ..errors import InputError
 
 if TYPE_CHECKING:
-    from ..analysis.atlas import Atlas, Map
-    from ..analysis.region import Region
+    from ..performance.atlas import Atlas, Map
+    from ..workspace.certified.region import Region
 
 
 @dataclass(frozen=True)
@@ -30,8 +30,8 @@ class Files:
 
     def write(self, found: Atlas, maps: Sequence[Map]) -> dict[str, str]:
         """Write the maps' pictures and their table; returns the paths."""
+        from ..export.atlas_maps import maps_csv, maps_png
         from ..export.files import Content, write_all
-        from ..export.maps import maps_csv, maps_png
 
         kind = "" if self.path.is_dir() else self.path.suffix.lower()
         contents: dict[str, Content] = {}

@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING, Any
 from .console import fixed, rim, rim_unit, table
 
 if TYPE_CHECKING:
-    from ..analysis.atlas import Atlas
-    from ..analysis.brackets import Bracket
-    from ..analysis.lengths import Length
-    from ..analysis.performance import Performance
-    from ..analysis.proofs import Brackets, Proof
     from ..machine import Array, Machine
+    from ..performance.atlas import Atlas
+    from ..performance.certified.amplification import Bracket
+    from ..performance.certified.proofs import Brackets, Proof
+    from ..performance.characteristic_length import Length
+    from ..performance.indices import Performance
 
 _TITLES = {"condition": "condition number", "greatest": "greatest psi", "least": "least psi"}
 
@@ -112,7 +112,7 @@ def atlas_json(found: Atlas) -> dict[str, Any]:
 
 def _parallel(found: Atlas) -> list[float]:
     """The parallel margin at the isotropic poses: below 0 they lie beyond a singularity, seen from home."""
-    from ..analysis.singularities import singularity_margins
+    from ..performance.singularities import singularity_margins
 
     told = found.map.performance
     margins = singularity_margins(found.machine, found.isotropic, told.length.value, found.map.region.mode)

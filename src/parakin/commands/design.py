@@ -8,7 +8,7 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from ..errors import InputError
-from ..quantities import nearest, shown
+from ..units import nearest, shown
 from .console import announce_compiling, fixed, print_json
 from .options import Json
 from .regions import length
@@ -17,7 +17,7 @@ _DIGITS = 4  # of lengths
 
 
 def _families(context: object) -> list[str]:
-    from ..analysis.design import DESIGNS
+    from ..performance.design import DESIGNS
 
     return list(DESIGNS)
 
@@ -49,7 +49,7 @@ def design(
     if output is not None and output.suffix.lower() not in (".yaml", ".yml"):
         raise InputError(f'"{output}": expected a file name that ends in .yaml', "--output")
     announce_compiling()
-    from ..analysis.design import DESIGNS
+    from ..performance.design import DESIGNS
 
     if family not in DESIGNS:
         raise InputError(f"unknown family {shown(family)}{nearest(family, DESIGNS)}", "design")

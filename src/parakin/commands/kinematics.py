@@ -15,10 +15,10 @@ from .offences import offence_json, offence_line
 from .options import OFF_LIMITS, Json, Mode, Name, Sizes, machine_of, row
 
 if TYPE_CHECKING:
-    from ..kinematics.direct import Solution
+    from ..kinematics.forward import Solution
     from ..machine import Array, Machine
-    from ..toolpath.offences import Judgement
-    from ..toolpath.result import Offence
+    from ..toolpath.posting.offences import Judgement
+    from ..toolpath.posting.posted import Offence
 
 Csv = Annotated[Path | None, Parameter(help="Rows of values instead, mm and degrees; with a header in any order.")]
 Output = Annotated[Path | None, Parameter(name=["--output", "-o"], help="Write the result there, as CSV.")]
@@ -48,7 +48,7 @@ def inverse(
     machine = machine_of(name, sizes)
     poses, lines = _given(machine, values, csv, machine.axes, machine.axis_units, machine.home, "pose")
     announce_compiling()
-    from ..toolpath.offences import judge
+    from ..toolpath.posting.offences import judge
 
     joints = machine.inverse(poses, mode)
     found = judge(machine, poses, joints, lines, mode)
@@ -90,8 +90,8 @@ def forward(
     if near is not None:
         parts = [part.strip() for part in near.split(",")]
         start = row(parts, machine.axes, machine.axis_units, machine.home, "--near")
-    from ..kinematics.direct import tolerance
-    from ..toolpath.offences import judge
+    from ..kinematics.forward import tolerance
+    from ..toolpath.posting.offences import judge
 
     solution = machine.forward(joints, start)
     good = np.flatnonzero(solution.converged)

@@ -32,8 +32,8 @@ def linuxcnc(
     """
     machine = machine_of(name, sizes)
     announce_compiling()
+    from ..controllers.linuxcnc import configuration
     from ..export.files import write_all
-    from ..export.linuxcnc import configuration
 
     files = configuration(machine)
     paths = [str(path) for path in write_all(Path(machine.name) if output is None else output, files)]

@@ -85,7 +85,7 @@ def _picture(machine: Machine, output: Path) -> None:
     if kind not in (".html", ".png"):
         raise InputError(f'"{output}": expected a file name that ends in .html or .png', "--output")
     from ..export.files import write_all
-    from ..export.picture import machine_html, machine_png
+    from ..export.machine.picture import machine_html, machine_png
 
     write_all(output.parent, {output.name: machine_html(machine) if kind == ".html" else machine_png(machine)})
 

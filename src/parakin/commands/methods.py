@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Literal
 from ..errors import InputError
 
 if TYPE_CHECKING:
-    from ..analysis.region import Region
-    from ..analysis.sweep import Swept
-    from ..analysis.workspace import Workspace
+    from ..workspace.certified.region import Region
+    from ..workspace.certified.workspace import Workspace
+    from ..workspace.sampled.sampling import Swept
 
 Method = Literal["certified", "grid", "polar", "drives"]
 
@@ -43,7 +43,7 @@ def found_by(method: Method, asked: Region, effort: Effort, progress: Callable[[
 
 
 def _certified(asked: Region, effort: Effort, progress: Callable[[float], None]) -> Workspace:
-    from ..analysis.workspace import workspace
+    from ..workspace.certified.workspace import workspace
 
     gap, seconds = GAP if effort.gap is None else effort.gap, SECONDS if effort.time is None else effort.time
     if not 0.0 < gap < float("inf"):
@@ -67,9 +67,9 @@ def _certified(asked: Region, effort: Effort, progress: Callable[[float], None])
 
 
 def _swept(method: Method, asked: Region, step: float | None, progress: Callable[[float], None]) -> Swept:
-    from ..analysis.grid import dense_grid
-    from ..analysis.polar import polar_sweep
-    from ..analysis.sweep import surroundings
+    from ..workspace.sampled.grid import dense_grid
+    from ..workspace.sampled.polar import polar_sweep
+    from ..workspace.sampled.sampling import surroundings
 
     box = surroundings(asked)
     edge = 1.0 if box is None else float((box[1] - box[0]).max())
@@ -80,7 +80,7 @@ def _swept(method: Method, asked: Region, step: float | None, progress: Callable
 
 
 def _drives(asked: Region, step: float | None, progress: Callable[[float], None]) -> Swept:
-    from ..analysis.drives import drive_sweep
+    from ..workspace.sampled.drives import drive_sweep
 
     machine = asked.machine
     if asked.kind != "constant" or asked.without or any(axis in asked.held for axis in "XYZ"):

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 from .console import rim, rim_unit
 
 if TYPE_CHECKING:
-    from ..toolpath.result import Offence
+    from ..toolpath.posting.posted import Offence
 
 
 def offence_line(place: str, offence: Offence, what: str) -> str:

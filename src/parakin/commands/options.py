@@ -62,8 +62,8 @@ def row(values: Sequence[str], names: Sequence[str], units: Sequence[str], defau
     """
     import numpy as np
 
-    from ..quantities import nearest, shown
-    from ..toolpath.posing.frames import parse_value
+    from ..toolpath.posting.frames import parse_value
+    from ..units import nearest, shown
 
     named = ["=" in value for value in values]
     wanted = " ".join(names)

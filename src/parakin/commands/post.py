@@ -15,8 +15,8 @@ if TYPE_CHECKING:
     from ..export.files import Content
     from ..machine import Machine
     from ..toolpath.job import Job
-    from ..toolpath.placing.searching import Placement
-    from ..toolpath.program import ToolPath
+    from ..toolpath.path import ToolPath
+    from ..toolpath.placing.placement import Placement
 
 
 def post(
@@ -76,7 +76,7 @@ def post(
     """
     from math import isfinite, radians
 
-    from ..toolpath.posing.frames import composed, parse_workpiece
+    from ..toolpath.posting.frames import composed, parse_workpiece
 
     chosen = machine_of(machine, sizes)
     if place is not None and workpiece is not None:
@@ -90,7 +90,7 @@ def post(
     announce_compiling()
     from ..export.files import write_all
     from ..toolpath.job import prepare
-    from ..toolpath.reading import read_path
+    from ..toolpath.reading.detect import read_path
     from .post_summary import as_json, summary
 
     with Progress() as progress:
@@ -118,7 +118,7 @@ def post(
 
 
 def _placement(machine: Machine, path: ToolPath, place: str, mode: str | None, progress: Progress) -> Placement:
-    from ..toolpath.placing.searching import parse_bounds, placed
+    from ..toolpath.placing.placement import parse_bounds, placed
 
     return placed(machine, path, parse_bounds(place), mode=mode, progress=progress.part("placing the part", 0.1, 0.3))
 
@@ -134,9 +134,9 @@ def _contents(
     progress: Progress,
 ) -> tuple[dict[str, tuple[str, Content]], list[str]]:
     """The files by their kinds, with their names; and why some that were asked for are not among them."""
-    from ..export.report import report_html
-    from ..toolpath.tables import joints as joint_table
-    from ..toolpath.tables import setpoints as setpoint_table
+    from ..export.report.report import report_html
+    from ..export.tables import joints as joint_table
+    from ..export.tables import setpoints as setpoint_table
 
     posted, law, missing = job.posted, job.law, list[str]()
     saying = progress.part("writing the tables", 0.7, 0.9)
@@ -162,8 +162,8 @@ def _contents(
 
 
 def _program(job: Job, target: str, force: bool, tolerance: float) -> Content:
-    from ..export.programs import joint_program, linuxcnc_program
-    from ..toolpath.offences import place
+    from ..controllers import joint_program, linuxcnc_program
+    from ..toolpath.posting.offences import place
 
     posted = job.posted
     if posted.first is not None and not force:

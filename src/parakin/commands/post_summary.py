@@ -9,8 +9,8 @@ from .offences import offence_json, offence_line
 
 if TYPE_CHECKING:
     from ..toolpath.job import Job
-    from ..toolpath.placing.searching import Placement
-    from ..toolpath.result import Posted
+    from ..toolpath.placing.placement import Placement
+    from ..toolpath.posting.posted import Posted
 
 _NOTES = 5  # remarks on the file that are printed
 _BINDING = 4  # limits that are named of those that bind
@@ -21,7 +21,7 @@ def summary(
     job: Job, target: str | None, written: dict[str, str], placement: Placement | None, missing: list[str]
 ) -> str:
     """The account for people; its last lines name the files."""
-    from ..toolpath.offences import place
+    from ..toolpath.posting.offences import place
 
     posted = job.posted
     path = posted.path
@@ -80,7 +80,7 @@ def _unit(axis: str) -> str:
 
 
 def _timed(job: Job, target: str | None) -> list[str]:
-    from ..export.cards import duration
+    from ..export.report.cards import duration
 
     if job.law is None or job.seconds is None:
         return [f"no cycle time: {job.unplanned}"]
@@ -91,7 +91,7 @@ def _timed(job: Job, target: str | None) -> list[str]:
     text += f"; bound by {', '.join(bound)}" if bound else ""
     if target != "linuxcnc":
         return [text]
-    from ..export.programs import program_seconds
+    from ..controllers import program_seconds
 
     return [text, f"about {duration(program_seconds(job.law) + job.waits)} under LinuxCNC, from the first record on"]
 

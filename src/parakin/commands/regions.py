@@ -10,8 +10,8 @@ from cyclopts import Parameter
 from ..errors import InputError, PoseError
 
 if TYPE_CHECKING:
-    from ..analysis.region import Region
     from ..machine import Machine
+    from ..workspace.certified.region import Region
 
 At = Annotated[
     str | None,
@@ -44,7 +44,7 @@ def region_of(
     mode: str | None = None,
 ) -> Region:
     """The region that the options ask for; what is wrong with one of them is told with its name."""
-    from ..analysis.region import region
+    from ..workspace.certified.region import region
 
     given: dict[str, Any] = {
         "at": values_of(machine, at, "--at"),
@@ -63,14 +63,14 @@ def region_of(
 
 def values_of(machine: Machine, text: str | None, source: str) -> dict[str, float]:
     """Axes with a value each, mm and rad: ``B=0,C=0``."""
-    from ..toolpath.posing.frames import parse_value
+    from ..toolpath.posting.frames import parse_value
 
     return {axis: parse_value(axis, value, source) for axis, value in parts_of(machine, text, source, "X=10,Z=-1400")}
 
 
 def ranges_of(machine: Machine, text: str | None, source: str) -> dict[str, tuple[float, float]]:
-    from ..quantities import shown
-    from ..toolpath.posing.frames import parse_value
+    from ..toolpath.posting.frames import parse_value
+    from ..units import shown
 
     ranges = {}
     for axis, value in parts_of(machine, text, source, "A=-15:15,B=-15:15"):
@@ -85,7 +85,7 @@ def ranges_of(machine: Machine, text: str | None, source: str) -> dict[str, tupl
 
 def parts_of(machine: Machine, text: str | None, source: str, example: str) -> list[tuple[str, str]]:
     """Axes and what is said of each."""
-    from ..quantities import nearest, shown
+    from ..units import nearest, shown
 
     found: dict[str, str] = {}
     for part in text.split(",") if text is not None else ():
@@ -103,8 +103,8 @@ def parts_of(machine: Machine, text: str | None, source: str, example: str) -> l
 
 def length(text: str | None, source: str) -> float | None:
     """A length above 0, mm, with or without a unit."""
-    from ..quantities import shown
-    from ..toolpath.posing.frames import parse_value
+    from ..toolpath.posting.frames import parse_value
+    from ..units import shown
 
     if text is None:
         return None

@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
-from ..quantities import ANGLE, LENGTH, UNITS, nearest, shown
-from ..toolpath.cl.words import LARGEST
+from ..toolpath.reading.cl.tokens import LARGEST
+from ..units import ANGLE, LENGTH, UNITS, nearest, shown
 
 
 def read_rows(path: Path, names: Sequence[str], units: Sequence[str]) -> tuple[NDArray[np.float64], NDArray[np.int64]]:

@@ -11,9 +11,9 @@ from .console import fixed, rim
 from .regions import values_of
 
 if TYPE_CHECKING:
-    from ..analysis.connected import Parts
-    from ..analysis.inscribed import Box
-    from ..analysis.region import Region
+    from ..workspace.certified.region import Region
+    from ..workspace.connected.connected import Parts
+    from ..workspace.inscribed.largest_box import Box
 
 
 @dataclass(frozen=True)
@@ -39,7 +39,7 @@ def looked_within(asked: Region, wanted: Within) -> Found:
     """The box and the parts that are wanted."""
     box, parts = None, None
     if wanted.box or wanted.shape is not None or wanted.around is not None:
-        from ..analysis.inscribed import largest_box
+        from ..workspace.inscribed.largest_box import largest_box
 
         shape = None if wanted.shape is None else _shape(wanted.shape)
         around = None if wanted.around is None else _place(asked, wanted.around)
@@ -49,7 +49,7 @@ def looked_within(asked: Region, wanted: Within) -> Found:
             source = "--around" if around is not None else "--shape" if shape is not None else "--box"
             raise InputError(_plain(error), source) from None
     if wanted.parts or wanted.start is not None:
-        from ..analysis.connected import connected_parts
+        from ..workspace.connected.connected import connected_parts
 
         start = None
         if wanted.start is not None:
@@ -70,7 +70,7 @@ def _plain(error: PoseError) -> str:
 
 
 def _shape(text: str) -> list[float]:
-    from ..quantities import shown
+    from ..units import shown
 
     try:
         return [float(part) for part in text.split(":")]
@@ -131,7 +131,7 @@ def within_told(found: Found) -> Mapping[str, Any]:
 
 def within_summary(found: Found) -> str:
     """For people."""
-    from ..export.workspace import amount, between
+    from ..export.workspace.summary import amount, between
 
     lines: list[str] = []
     if found.box is not None:

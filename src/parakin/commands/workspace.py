@@ -19,7 +19,7 @@ from .workspace_summary import summary
 
 if TYPE_CHECKING:
     from ..export.files import Content
-    from ..export.workspace_files import Drawing
+    from ..export.workspace.files import Drawing
 
 _INTERRUPTED = 130  # exit code
 
@@ -86,9 +86,9 @@ def workspace(
     effort = Effort(gap, length(cell, "--cell"), time, length(step, "--step"))
     files = _files(output or (), method, len(asked.places))
     announce_compiling()
-    from ..analysis.workspace import Workspace
-    from ..export.workspace import account
-    from ..export.workspace_files import Drawing, drawing
+    from ..export.workspace.files import Drawing, drawing
+    from ..export.workspace.summary import account
+    from ..workspace.certified.workspace import Workspace
 
     began = clock.monotonic()
     with Progress() as progress:
@@ -118,7 +118,7 @@ def workspace(
 
 def _files(paths: Sequence[Path], method: str, dimension: int) -> dict[str, Path]:
     """The files by their endings."""
-    from ..export.workspace_files import SUFFIXES, unfit
+    from ..export.workspace.files import SUFFIXES, unfit
 
     found: dict[str, Path] = {}
     for path in paths:

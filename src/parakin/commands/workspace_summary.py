@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 from .console import fixed, table
 
 if TYPE_CHECKING:
-    from ..analysis.sweep import Swept
-    from ..analysis.workspace import Workspace
+    from ..workspace.certified.workspace import Workspace
+    from ..workspace.sampled.sampling import Swept
 
 _STOPPED = {
     "gap": "as asked for",
@@ -23,9 +23,9 @@ _STOPPED = {
 
 def summary(found: Workspace | Swept, seconds: float) -> str:
     """The account for people."""
-    from ..analysis.grid import GridWorkspace
-    from ..analysis.workspace import Workspace
-    from ..export.workspace import heading
+    from ..export.workspace.summary import heading
+    from ..workspace.certified.workspace import Workspace
+    from ..workspace.sampled.grid import GridWorkspace
 
     head = heading(found)
     if isinstance(found, Workspace) and found.empty:
@@ -50,7 +50,7 @@ def summary(found: Workspace | Swept, seconds: float) -> str:
 
 
 def _proved(found: Workspace) -> list[tuple[str, str]]:
-    from ..export.workspace import amount, between
+    from ..export.workspace.summary import amount, between
 
     volume, d, cells = found.volume, len(found.axes), found.cells
     inside = int(cells.inside.sum())
@@ -63,7 +63,7 @@ def _proved(found: Workspace) -> list[tuple[str, str]]:
 
 
 def _estimated(found: Swept) -> list[tuple[str, str]]:
-    from ..export.workspace import amount, note
+    from ..export.workspace.summary import amount, note
 
     d = len(found.axes)
     rows = [

@@ -16,7 +16,7 @@ from pydantic import PlainValidator, ValidationError, ValidationInfo
 from ..errors import InputError, InputErrors
 from ..model.parts import Limits
 from ..model.spec import Spec
-from ..quantities import Quantity, QuantityError, UnreadSizeError, evaluate, is_reserved, nearest, shown
+from ..units import Quantity, QuantityError, UnreadSizeError, evaluate, is_reserved, nearest, shown
 from .document import Map, Text, Value, read_document
 from .groups import Legs
 from .sections import TRANSFORMS, Home, LimitsSection, Mounting, Section, Steps

@@ -16,7 +16,7 @@ from ruamel.yaml.nodes import MappingNode, ScalarNode, SequenceNode
 from ruamel.yaml.reader import ReaderError
 
 from ..errors import InputError
-from ..quantities import shown
+from ..units import shown
 
 _LONGEST = 100_000  # bytes
 _DEEPEST = 16  # levels; aliases can make a cycle

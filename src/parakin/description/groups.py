@@ -18,7 +18,7 @@ from pydantic import (
 
 from ..model.legs import KINDS, Leg
 from ..model.parts import Direction, Drive, Point, Signs, Size
-from ..quantities import nearest
+from ..units import nearest
 from .document import Map, Seq, Text
 from .sections import Circle, Section
 from .values import DRIVE_TYPES, DirectionValue, Extent, PlacedError, PointValue, Word, context_of, described

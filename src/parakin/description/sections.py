@@ -17,7 +17,7 @@ from pydantic import (
 )
 
 from ..model.parts import ROTATIONS, TRANSLATIONS, Cone, Direction, Drive, Gap, Limits, Range, Step, Unit, Vector
-from ..quantities import ANGLE, LENGTH, nearest, shown
+from ..units import ANGLE, LENGTH, nearest, shown
 from .document import Map, Seq, Text
 from .values import (
     DRIVE_TYPES,

@@ -19,7 +19,7 @@ from pydantic import (
 
 from ..errors import InputError
 from ..model.parts import Unit, Vector
-from ..quantities import (
+from ..units import (
     ACCELERATION,
     ANGLE,
     ANGULAR_JERK,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ..analysis.design import Design
+from ..performance.design import Design
 
 
 def design_yaml(design: Design) -> str:

@@ -14,9 +14,9 @@ from ..kernels.intervals import IntervalProgram
 from ..model.chain import rotation_about
 from ..model.legs.lambda_ import Lambda
 from ..model.structures import CentralLeg, Free
-from .boxes import isolated
-from .direct import poses_of, roots, tolerance
-from .planar import planar_poses
+from .forward import poses_of, roots, tolerance
+from .planar_rpr import planar_poses
+from .root_isolation import isolated
 
 if TYPE_CHECKING:
     from ..machine import Array, Machine

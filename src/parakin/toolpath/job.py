@@ -9,13 +9,13 @@ from typing import Literal, TypeAlias
 
 from ..errors import PoseError
 from ..machine import Machine
-from .between.checking import between
-from .feed import Corners, Law, plan
-from .halts import stops, waiting
-from .linearise.densening import linearised
-from .post import post
-from .program import Floats, ToolPath
-from .result import Posted
+from .checking.check import between
+from .linearise.linearise import linearised
+from .path import Floats, ToolPath
+from .posting.post import post
+from .posting.posted import Posted
+from .timing import Corners, Law, plan
+from .timing.stops import stops, waiting
 
 Progress = Callable[[float], None]
 Target: TypeAlias = Literal["linuxcnc", "joints"]  # moves the tool straight; moves every joint evenly

@@ -9,9 +9,9 @@ import numpy as np
 from ...algebra import product
 from ...machine import Machine
 from ...model.structures import Carried, CentralLeg
-from ..program import Floats
-from ..result import Posted
-from .tube import Under
+from ..path import Floats
+from ..posting.posted import Posted
+from .deviation import Under
 
 _STEPS = 60
 _EXACT = 1e-15

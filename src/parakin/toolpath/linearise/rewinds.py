@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..posing.windings import STEP
-from ..result import Posted
-from .interpolate import axis_of_turns, denser, pointed
-from .through import posted_again
+from ..posting.posted import Posted
+from ..posting.turn_steps import STEP
+from .interpolation import axis_of_turns, denser, pointed
+from .pole_passes import posted_again
 
 
 def spelled_out(posted: Posted) -> Posted:

@@ -10,13 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...machine import Machine
-from ..posing.branches import branch
-from ..posing.frames import OwnLimit, composed, tool_poses, transform
-from ..posing.turning import ROUNDED
-from ..posing.windings import TURN
-from ..program import Floats, ToolPath
-from ..uses import bounded
-from .uphill import value_of
+from ..path import Floats, ToolPath
+from ..posting.frames import OwnLimit, composed, tool_poses, transform
+from ..posting.range_use import bounded
+from ..posting.tool_axis import ROUNDED
+from ..posting.turn_steps import TURN
+from ..posting.working_mode import branch
+from .maximin import value_of
 
 Indices = NDArray[np.int64]
 AXES = "XYZABC"

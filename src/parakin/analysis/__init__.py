@@ -1,1 +1,0 @@
-"""What follows from a machine: workspaces, performance, singularities, proofs."""

@@ -1,0 +1,1 @@
+"""Programs for controllers without kinematics: every block moves the joints."""

@@ -1,0 +1,27 @@
+"""A machine as a LinuxCNC configuration: its kinematics in C, and the files that LinuxCNC starts with."""
+
+from __future__ import annotations
+
+from ...machine import Machine
+from .config import hal, ini, tool_table
+from .first_program import program
+from .module import kinematics_name, module
+from .page import page
+
+__all__ = ["configuration"]
+
+
+def configuration(machine: Machine) -> dict[str, str]:
+    """{file: text} of a configuration for LinuxCNC 2.9 that runs as a simulation.
+
+    The kinematics module (C, built by LinuxCNC's ``halcompile --install``), the ini and HAL files, the tool table, a
+    first program and a page that tells how to start, all named after the machine.
+    """
+    return {
+        f"{kinematics_name(machine)}.c": module(machine),
+        f"{machine.name}.ini": ini(machine),
+        f"{machine.name}.hal": hal(machine),
+        f"{machine.name}.tbl": tool_table(machine),
+        f"{machine.name}.ngc": program(machine),
+        f"{machine.name}.md": page(machine),
+    }

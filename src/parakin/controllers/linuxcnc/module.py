@@ -1,0 +1,205 @@
+"""The kinematics module: a machine's mathematics as C, with the runtime that LinuxCNC calls."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from hashlib import sha256
+from importlib.resources import files
+
+import numpy as np
+
+from ...algebra import Trace
+from ...kernels.newton import SLOW, WORTH
+from ...kernels.tape import Tape, compile_tape
+from ...kinematics.forward import FREE, MOST_STEPS, side_of, tolerance
+from ...machine import Machine
+from ...model.limits import Limit
+from .tape_to_c import Vector, function, number, test
+
+_SAME = 0.01
+_FIELDS = {"X": "tran.x", "Y": "tran.y", "Z": "tran.z", "A": "a", "B": "b", "C": "c"}
+
+_HEADER = """\
+/* {name}.c: LinuxCNC's kinematics of {machine}, {title}.
+
+   Made by parakin from the machine's description; make it anew rather than edit it.
+   It is compiled against LinuxCNC's headers and loaded into its programs. These are under the GNU General Public
+   License, and so is this file: you may redistribute and modify it under that licence, version 2 or, at your option,
+   any later one. It comes WITHOUT ANY WARRANTY.
+
+   Build and install:  sudo halcompile --install {name}.c */
+
+#pragma GCC optimize ("O3")
+
+#include "rtapi.h"
+#include "rtapi_app.h"
+#include "rtapi_math.h"
+#include "rtapi_string.h"
+#include "hal.h"
+#include "kinematics.h"
+"""
+
+_ELEMENTARY = """\
+/* As in parakin: NaN goes through, and no direction has the angle 0. */
+static inline double lesser(double x, double y) { return x < y || x != x ? x : y; }
+static inline double greater(double x, double y) { return x > y || x != x ? x : y; }
+static inline double with_sign(double x, double y) { return (y < 0.0 ? -fabs(x) : fabs(x)) + 0.0 * y; }
+static inline double angle_of(double y, double x) { return atan2(y + 0.0, x + 0.0); }
+"""
+
+
+def kinematics_name(machine: Machine) -> str:
+    """The module's name; of LinuxCNC's own only ``xyzab_tdr_kins`` is built likewise."""
+    return f"{machine.name}_kins"
+
+
+def module(machine: Machine) -> str:
+    """The C source of a machine's kinematics module, complete in one file."""
+    name = kinematics_name(machine)
+    title = " ".join(machine.spec.title.split()).replace("*/", "* /")
+    head = _HEADER.format(name=name, machine=machine.name, title=title)
+    return "\n".join(
+        [head, f'#define MADE "{made(machine)}" /* what the configuration of the same making names */', *_body(machine)]
+    )
+
+
+def made(machine: Machine) -> str:
+    """A mark of a machine's kinematics, by which a module of an older description is known."""
+    return sha256("\n".join(_body(machine)).encode()).hexdigest()[:16]
+
+
+def _body(machine: Machine) -> list[str]:
+    runtime = files(__package__).joinpath("runtime.c").read_text(encoding="utf-8")
+    numbers = _numbers(machine, kinematics_name(machine))
+    return [numbers, _transfer(machine), _ELEMENTARY, *_mathematics(machine), runtime]
+
+
+def _numbers(machine: Machine, name: str) -> str:
+    """The sizes of everything, and the constants of the method; mm and rad."""
+    model, tool_axis = machine.model, machine.axes[3:] == ("B", "C")
+    lines = [
+        f'#define MODULE "{name}"',
+        f"#define AXES {len(machine.axes)}",
+        f"#define JOINTS {len(machine.joints)}",
+        f"#define CLOSURES {len(machine.joints) - model.serial}",
+        f"#define SPHERES {int(model.by_spheres)} /* the forward in closed form: the common point of spheres */",
+        f"#define WRIST {int(model.first_serial is not None)} /* two turning joints point the tool */",
+        f"#define TOOL_AXIS {int(tool_axis)} /* of the orientation only the tool's axis counts */",
+        f"#define LEG_MODES {_leg_modes(machine)} /* choices of the legs' inverse */",
+        f"#define SAME {number(_SAME)} /* mm or rad: joints nearer to each other stand in one working mode */",
+        f"#define TURN {number(2.0 * np.pi)}",
+        f"#define DEGREE {number(np.pi / 180.0)}",
+        f"#define FREE {number(FREE)} /* rad: nearer to a turning axis the tool's tells its angle by rounding only */",
+        f"#define TOLERANCE {number(tolerance(machine))} /* mm by which the legs of an answer may fail to close */",
+        *_wrist(machine),
+        *_newton(machine),
+        _array("double", "home", [number(value) for value in machine.home]),
+        _array("int", "turning", [str(int(unit == "rad")) for unit in machine.joint_units]),
+    ]
+    if not tool_axis:
+        lines.append(_array("int", "turning_axis", [str(int(unit == "rad")) for unit in machine.axis_units]))
+    return "\n".join(lines) + "\n"
+
+
+def _leg_modes(machine: Machine) -> int:
+    return len(machine.mode) - (machine.model.first_serial is not None)
+
+
+def _array(kind: str, name: str, values: Sequence[str]) -> str:
+    return f"static const {kind} {name}[] = {{{', '.join(values)}}};"
+
+
+def _wrist(machine: Machine) -> Iterator[str]:
+    first = machine.model.first_serial
+    if first is not None:
+        legs = len(machine.joints) - machine.model.serial
+        second = legs + 1 if first == legs else legs
+        drive = machine.model.drives[second]
+        yield f"#define FIRST {first} /* the wrist's joints, as its axes follow on each other */"
+        yield f"#define SECOND {second}"
+        yield f"#define SECOND_LOW {number(drive.low)}"
+        yield f"#define SECOND_HIGH {number(drive.high)}"
+
+
+def _newton(machine: Machine) -> Iterator[str]:
+    model = machine.model
+    if not model.by_spheres:
+        least, most = min(model.sizes), max(model.sizes)
+        side = float(np.sign(side_of(machine, machine.home[None, :])[0]))
+        yield f"#define FINE {number(0.01 * tolerance(machine))} /* mm: where Newton's method has arrived */"
+        yield f"#define SIZE {number(least)} /* of the legs, mm */"
+        yield f"#define WORTH {number(WORTH)} /* mm: where a step will end no worse than this, the matrix serves on */"
+        yield f"#define SLOW {number(SLOW)} /* a kept matrix that gains less than this a step is made anew */"
+        yield f"#define MOST_STEPS {MOST_STEPS}"
+        yield f"#define HOME_SIDE {number(side)} /* of the singularities; on the other one is another assembly */"
+        caps = [most / 3.0 if word.startswith("t") else 0.5 for word in model.structure.coordinates]
+        yield _array("double", "caps", [number(cap) for cap in caps]) + " /* greatest step */"
+
+
+def _transfer(machine: Machine) -> str:
+    """Poses and joints between LinuxCNC's millimetres and degrees and the mathematics' millimetres and radians."""
+    axes = list(zip((_FIELDS[axis] for axis in machine.axes), machine.axis_units, strict=True))
+    joints = list(enumerate(machine.joint_units))
+    idle = [field for field in _FIELDS.values() if field not in dict(axes)]
+    bodies = {
+        "read_pose(const EmcPose *world, double *x)": [
+            f"x[{i}] = world->{field}{_inward(unit)};" for i, (field, unit) in enumerate(axes)
+        ],
+        "write_pose(const double *x, EmcPose *world)": [
+            *(f"world->{field} = x[{i}]{_outward(unit)};" for i, (field, unit) in enumerate(axes)),
+            *(f"world->{field} = 0.0;" for field in [*idle, "u", "v", "w"]),
+        ],
+        "read_joints(const double *joints, double *q)": [f"q[{i}] = joints[{i}]{_inward(u)};" for i, u in joints],
+        "write_joints(const double *q, double *joints)": [f"joints[{i}] = q[{i}]{_outward(u)};" for i, u in joints],
+    }
+    return "\n".join(
+        "\n".join([f"static void {head}", "{", *(f"    {line}" for line in lines), "}", ""])
+        for head, lines in bodies.items()
+    )
+
+
+def _inward(unit: str) -> str:
+    return " * DEGREE" if unit == "rad" else ""
+
+
+def _outward(unit: str) -> str:
+    return " / DEGREE" if unit == "rad" else ""
+
+
+def _mathematics(machine: Machine) -> Iterator[str]:
+    """The machine's tapes as functions, in the order of their use."""
+    model = machine.model
+    x, q = Vector("x", len(machine.axes)), Vector("q", len(machine.joints))
+    near, first = Vector("near", len(machine.axes)), Vector("first", 1)
+    f = Vector("f", len(machine.joints) - model.serial)
+    yield function("inverse", model.inverse_tape(machine.mode), [x], [q])
+    if model.first_serial is not None:
+        other = machine.mode[:-1] + ("-" if machine.mode[-1] == "+" else "+")
+        yield function("freedom", model.freedom_tape(), [x], [Vector("lean", 1)])
+        yield function("inverse_held", model.held_tape(machine.mode), [x, first], [q])
+        yield function("inverse_over", model.inverse_tape(other), [x], [q])
+    yield test("allowed", _limits_tape(machine), [x, q])
+    if model.by_spheres:
+        yield function("common_point", model.spheres_tape(None), [q, near], [x, f])
+    else:
+        y = Vector("y", len(model.structure.coordinates))
+        yield function("begin", model.begin_tape(), [near, q], [y])
+        yield function("closures", model.newton_tape(False), [y, q], [f])
+        yield function("closures_and_slopes", model.newton_tape(True), [y, q], [f, Vector("a", f.length * y.length)])
+        yield function("end", model.end_tape(), [y, q], [x])
+
+
+def _limits_tape(machine: Machine) -> Tape:
+    """pose, joints -> every margin but those of the drives' ranges, which LinuxCNC has in its ini file and watches."""
+    model, trace = machine.model, Trace()
+    pose = trace.inputs(len(machine.axes))
+    joints = trace.inputs(len(machine.joints), len(machine.axes))
+    margins = [m for limit, m in model.margins(pose, joints, machine.mode) if not is_of_a_drive(machine, limit)]
+    return compile_tape(trace, margins, len(pose) + len(joints))
+
+
+def is_of_a_drive(machine: Machine, limit: Limit) -> bool:
+    """Whether a limit is one end of a drive's range."""
+    return limit.side != "reach" and limit.subject in {
+        f"{what} {name}" for name in machine.joints for what in ("leg", "joint")
+    }

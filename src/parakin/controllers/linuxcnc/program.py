@@ -1,0 +1,130 @@
+"""A law as G-code for LinuxCNC with the kinematics that parakin makes for it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator
+from itertools import pairwise
+from typing import BinaryIO
+
+import numpy as np
+
+from ...errors import PoseError
+from ...machine import Array, Machine
+from ...toolpath.timing.corners import checked
+from ...toolpath.timing.trajectory import Law
+from ..events import comments, spoken
+from ..gcode_blocks import at_the_rim, blocks
+from .approach import approach
+from .extent import TURNS
+from .rates import axis_rates
+from .straight_motions import Motions, motions
+
+Writer = Callable[[BinaryIO], None]
+
+_CHUNK = 1 << 16  # motions written at a time
+_SLOWEST = 0.11 / 60.0  # mm/s: what is slower LinuxCNC runs at 0.1 mm/min in inverse time
+_INSTANT = 0.002  # s
+_TURNING = 0.4  # of the tolerance: two motions that turn the tool LinuxCNC blends less well than it reckons
+
+
+def linuxcnc_program(law: Law, *, forced: str | None = None, tolerance: float = 0.005) -> Writer:
+    """What writes a law as a program for LinuxCNC 2.9 and the configuration of :func:`..linuxcnc.configuration`.
+
+    Parameters
+    ----------
+    law : of a path whose poses go straight from record to record
+    forced : what is off limits, a line each, where the program is written all the same; its header says so
+    tolerance : mm that LinuxCNC may cut corners by
+
+    Every motion is in the machine's own coordinates (G53), whatever offsets are in force, and in inverse time (G93).
+    Records at one place are written once; where the law's speed changes points are added on the straight line. The
+    program begins with a slow motion to the first record and takes :func:`program_seconds` from there.
+
+    Raises :class:`PoseError` where LinuxCNC's kinematics can't follow: another working mode, or too many turns of C.
+    """
+    machine, posted = law.posted.machine, law.posted
+    checked(tolerance, "tolerance")
+    legs = posted.mode if machine.model.first_serial is None else posted.mode[:-1]  # a wrist goes on in either mode
+    if not machine.mode.startswith(legs):
+        raise PoseError(f"mode {posted.mode!r}: LinuxCNC's kinematics of {machine.name} has {machine.mode!r} only")
+    _refuse_turns(machine, posted.poses)
+    found = motions(law, *axis_rates(machine))
+    blend = tolerance * (_TURNING if set(machine.axes) & set("ABC") else 1.0)
+    way = approach(machine, law.curve.corner[0], law.course.joints[0], posted.mode)
+
+    def write(file: BinaryIO) -> None:
+        for text in _program(law, found, way, forced, f"G64 P{blend:g} Q0"):
+            file.write(text.encode("ascii"))
+
+    return write
+
+
+def program_seconds(law: Law) -> float:
+    """What LinuxCNC takes for a program, s, from the first record on: the law's time and what its axes add to it."""
+    return float(motions(law, *axis_rates(law.posted.machine)).seconds.sum())
+
+
+def _refuse_turns(machine: Machine, poses: Array) -> None:
+    most = TURNS if machine.axes[3:] == ("B", "C") else 0.5
+    for axis, values in zip(machine.axes, poses.T, strict=True):
+        turns = np.abs(values).max(initial=0.0) / (2.0 * np.pi)
+        if axis in "ABC" and turns > most + 1e-9:
+            raise PoseError(
+                f"{axis} would turn {turns:.1f} times, in LinuxCNC's configuration it has {most:g} either way"
+            )
+
+
+def _program(law: Law, found: Motions, to_first: tuple[Array, Array], forced: str | None, blend: str) -> Iterator[str]:
+    posted, path = law.posted, law.posted.path
+    machine = posted.machine
+    ends = at_the_rim(found.ends, machine.axis_units)
+    way, times = at_the_rim(to_first[0], machine.axis_units), to_first[1]
+    head = [
+        f"{path.source} on {machine.name}, mode {posted.mode}; made by parakin for LinuxCNC",
+        f"{found.seconds.sum():.3f} s from the first record on; {times.sum():.1f} s to it, from wherever the tool is",
+        f"machine coordinates, {' '.join(machine.axes)} in mm and degrees; F is the inverse of minutes",
+        *(f"OFF LIMITS: written with --force: {line}" for line in (forced or "").splitlines()),
+    ]
+    yield _lines(line for remark in head for line in comments(remark))
+    yield "G21 G90 G17 G40 G49\n"
+    reached = np.searchsorted(found.piece, law.curve.place)  # how many motions lead to each record
+    said = spoken(path, [int(reached[event.record - 1]) if event.record else -1 for event in path.events])
+    yield _lines(said.pop(-1, []))
+    yield "G93 G61\n" + blocks("G53 G1 ", machine.axes, way, times) + blend + "\n"
+    stops = np.flatnonzero(found.halt[:-1]).tolist()
+    halting = set(stops)
+    breaks = sorted({0, len(ends), *said, *stops, *(at + 1 for at in stops)})
+    for begin, end in pairwise([*breaks, len(ends)]):
+        yield _lines(said.get(begin, []))
+        exact = begin in halting
+        if exact:
+            yield "G61\n"
+        for start in range(begin, end, _CHUNK):
+            part = slice(start, min(start + _CHUNK, end))
+            before = ends[start - 1 : start] if start else way[-1:]
+            yield blocks("G53 G1 ", machine.axes, *_timed(machine, before, ends[part], found.seconds[part]))
+        if exact:
+            yield blend + "\n"
+    yield "M2\n"
+
+
+def _lines(lines: Iterable[str]) -> str:
+    return "".join(line + "\n" for line in lines)
+
+
+def _timed(machine: Machine, before: Array, ends: Array, seconds: Array) -> tuple[Array, Array]:
+    """Rows in mm and degrees with their times; where the tool's tip all but stands while the tool turns, in two steps.
+
+    LinuxCNC goes by the tip's speed, and no slower than 0.1 mm/min; a turn by itself goes by its own.
+    """
+    linear = np.array([unit == "mm" for unit in machine.axis_units])
+    steps = np.abs(np.diff(ends, axis=0, prepend=before))
+    way = np.sqrt((steps[:, linear] ** 2).sum(1))
+    slow = np.flatnonzero((way > 0.0) & (way < _SLOWEST * seconds) & steps[:, ~linear].any(1))
+    if not len(slow):
+        return ends, seconds
+    turned = ends[slow].copy()
+    turned[:, linear] = np.concatenate([before, ends])[slow][:, linear]
+    rows, times = np.insert(ends, slow, turned, axis=0), np.insert(seconds, slow, seconds[slow])
+    times[slow + np.arange(1, len(slow) + 1)] = _INSTANT
+    return rows, times

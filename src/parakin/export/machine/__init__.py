@@ -1,0 +1,1 @@
+"""A machine as figures, scenes and pictures."""

@@ -1,0 +1,133 @@
+"""A machine's picture: an interactive page of its own, or a PNG."""
+
+from __future__ import annotations
+
+from html import escape
+from io import BytesIO
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ...machine import Machine
+from ..ranges import shown
+from .figures import INK, frame_traces, label_trace, machine_traces, page, placed, scene_layout
+from .scene import Points, Scene, scene
+from .solids import LOOKS, solids
+
+_LIGHT = np.array([0.35, -0.65, 0.70]) / np.linalg.norm([0.35, -0.65, 0.70])
+
+
+def machine_html(machine: Machine, pose: ArrayLike | None = None) -> str:
+    """A self-contained HTML page with the machine at a pose, (axes,) mm and rad, home by default."""
+    drawn = scene(machine, pose)
+    size = drawn.size
+    traces = machine_traces(drawn, "machine", size)
+    if drawn.labels:
+        traces.append(label_trace(drawn, "machine"))
+    for name, frame in drawn.frames.items():
+        traces += frame_traces(frame, 0.09 * size, "", name)
+    layout = scene_layout([drawn.box], drawn.normal)
+    layout["showlegend"] = False
+    at = machine.home if pose is None else machine.rows(pose, machine.axes, "pose")[0][0]
+    rows = "".join(
+        f"<tr><td>{escape(name)}</td><td class=n>{shown(value, unit)}</td></tr>"
+        for names, units, values in (
+            (machine.axes, machine.axis_units, at),
+            (machine.joints, machine.joint_units, machine.inverse(at)),
+        )
+        for name, unit, value in zip(names, units, values, strict=True)
+    )
+    what = "Home" if pose is None else "Pose"
+    body = (
+        f"<header><h1>{escape(machine.spec.title or machine.name)}</h1>"
+        f"<p class=sub>{escape(machine.name)}: axes {escape(' '.join(machine.axes))}, "
+        f"joints {escape(' '.join(machine.joints))}</p></header>\n"
+        f"<section class=card>{placed('machine', {'data': traces, 'layout': layout}, '720px')}</section>\n"
+        f"<section class=card><h2>{what} and joints</h2><table class=narrow>{rows}</table>"
+        f"<p class=sub>{escape(machine.spec.source)}</p></section>\n"
+    )
+    return page(machine.spec.title or machine.name, body)
+
+
+def machine_png(machine: Machine, pose: ArrayLike | None = None) -> bytes:
+    """A PNG of the machine at a pose, (axes,) mm and rad, home by default; a planar machine in its plane."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+    from mpl_toolkits import mplot3d  # noqa: F401  it brings the projection
+
+    drawn = scene(machine, pose)
+    figure = Figure(figsize=(7.2, 7.2), dpi=160, facecolor="white")
+    canvas = FigureCanvasAgg(figure)
+    axes: Any = figure.add_axes((0.0, 0.0, 1.0, 1.0), projection="3d")
+    _view(axes, drawn)
+    _solids(axes, drawn)
+    _frames(axes, drawn)
+    for name, place in drawn.labels:
+        axes.text(*(place + 0.022 * drawn.size), name, color=INK, fontsize=10.5, zorder=1000, parse_math=False)
+    title = machine.spec.title or machine.name
+    figure.text(0.5, 0.955, title, ha="center", color=INK, fontsize=14, weight="bold", parse_math=False)
+    data = BytesIO()
+    canvas.print_png(data)  # type: ignore[no-untyped-call]
+    return data.getvalue()
+
+
+def _view(axes: Any, drawn: Scene) -> None:
+    """Equal scales, a calm background, and the view: a planar machine straight on, others from the front right."""
+    low, high = drawn.box
+    middle, half = (low + high) / 2.0, 0.5 * (high - low) + (0.06 if drawn.normal is None else 0.1) * drawn.size
+    for name, m, h in zip("xyz", middle, half, strict=True):
+        getattr(axes, f"set_{name}lim")(m - h, m + h)
+        axis = getattr(axes, f"{name}axis")
+        axis.set_pane_color((0.975, 0.98, 0.985, 1.0))
+        axis._axinfo["grid"].update(color="#dfe5ea", linewidth=0.6)
+        axis.line.set_color("#b0bec5")
+        getattr(axes, f"set_{name}label")(f"{name.upper()} [mm]", color="#607d8b", fontsize=9)
+    # The box is drawn with a diagonal of one length; zoom so that what the view shows of it fills the picture.
+    seen = max(0.79 * half[0] + 0.62 * half[1], half[2] + 0.2 * half[:2].sum())
+    if drawn.normal is not None:
+        seen = half.max()
+    axes.set_box_aspect(half, zoom=float(0.82 * np.linalg.norm(half) / seen))
+    axes.tick_params(labelsize=8, colors="#607d8b")
+    axes.zaxis.set_tick_params(pad=7)  # clear of the ticks, which stand slanted
+    axes.locator_params(nbins=5)
+    if drawn.normal is None:
+        axes.set_proj_type("persp", focal_length=1.4)
+        axes.view_init(elev=17, azim=-52)
+        return
+    axes.set_proj_type("ortho")
+    across = int(np.abs(drawn.normal).argmax())
+    axes.view_init(elev=90 if across == 2 else 0, azim=0 if across == 0 else -90)
+    out = getattr(axes, f"{'xyz'[across]}axis")
+    out.set_ticks([])
+    out.set_label_text("")
+
+
+def _solids(axes: Any, drawn: Scene) -> None:
+    """All faces in one collection, for only within one are they drawn from the back to the front."""
+    from matplotlib.colors import to_rgb
+    from mpl_toolkits.mplot3d.art3d import Poly3DCollection
+
+    faces, colours = [], []
+    for solid in solids(drawn, piece=drawn.size / 150.0):
+        corners = solid.vertices[solid.triangles]
+        normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        lengths = np.linalg.norm(normals, axis=1, keepdims=True)
+        light = (normals / np.where(lengths > 0.0, lengths, 1.0)) @ _LIGHT
+        faces.append(corners)
+        colours.append(np.array(to_rgb(LOOKS[solid.kind].colour)) * (0.70 + 0.30 * light[:, None]))
+    colour = np.vstack(colours)
+    # Edges of the faces' own colour hide the seams that antialiasing leaves.
+    axes.add_collection3d(Poly3DCollection(np.vstack(faces), facecolors=colour, edgecolors=colour, linewidths=0.4))
+
+
+def _frames(axes: Any, drawn: Scene) -> None:
+    length = 0.085 * drawn.size
+    for frame in drawn.frames.values():
+        for letter, axis, colour in zip("XYZ", frame[:, :3].T, ("#c62828", "#2e7d32", "#1565c0"), strict=True):
+            if drawn.normal is not None and abs(float(axis @ drawn.normal)) > 0.999:
+                continue
+            ends: Points = np.array([frame[:, 3], frame[:, 3] + length * axis])
+            axes.plot(*ends.T, color=colour, linewidth=1.6, zorder=900)
+            at = frame[:, 3] + 1.25 * length * axis
+            axes.text(*at, letter, color=colour, fontsize=8.5, zorder=900, ha="center", va="center")

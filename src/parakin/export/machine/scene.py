@@ -1,0 +1,268 @@
+"""What of a machine is to be drawn at a pose: named points, lines and polygons in mm, in the machine frame M.
+
+All of it follows from the description: a rail is where a drive's range takes a strut's foot, a strut on a foot that
+no drive moves is a telescope, and so on; nothing here knows a machine or a leg kind.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from math import isfinite, pi
+from typing import Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ...machine import Machine
+from ...model.chain import UNIT, frame
+from ...model.legs import Leg
+from ...model.limits import leg_joints, platform_points
+from ...model.parts import Step
+from ...model.structures import CentralLeg, Placement
+
+Points = NDArray[np.float64]
+Kind = Literal["base", "rail", "telescope", "rod", "arm", "platform", "central", "head", "tool", "table", "axis"]
+
+_NEAR = 1e-6  # mm; points nearer than this are one
+_DISC = np.linspace(0.0, 2.0 * pi, 33)[:-1]
+
+
+@dataclass(frozen=True, eq=False)
+class Part:
+    """One thing to draw. ``points`` (k, 3) in order; a polygon if ``closed``; a single point is a joint."""
+
+    kind: Kind
+    name: str
+    points: Points
+    closed: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class Scene:
+    """A machine at a pose.
+
+    parts : what to draw; what a pose out of reach has no place for is left out
+    labels : names of the drives and where to write them
+    frames : (3, 4) of the machine (its origin), the tool and, on a machine with a table, the workpiece
+    normal : of the plane of a planar machine, else None
+    """
+
+    parts: tuple[Part, ...]
+    labels: tuple[tuple[str, Points], ...]
+    frames: dict[str, Points]
+    normal: Points | None
+
+    def of(self, *kinds: Kind) -> tuple[Part, ...]:
+        """The parts of these kinds."""
+        return tuple(part for part in self.parts if part.kind in kinds)
+
+    @property
+    def box(self) -> Points:
+        """(2, 3): least and greatest coordinates of all parts."""
+        points = np.vstack([part.points for part in self.parts])
+        return np.array([points.min(0), points.max(0)])
+
+    @property
+    def size(self) -> float:
+        """A length to scale thicknesses by, mm: the diagonal of the box."""
+        return float(np.linalg.norm(np.ptp(self.box, axis=0)))
+
+    @property
+    def workpiece(self) -> Points:
+        """(3, 4): the frame in which poses are given, in M."""
+        return self.frames.get("workpiece", self.frames["machine"])
+
+
+def scene(
+    machine: Machine, pose: ArrayLike | None = None, joints: ArrayLike | None = None, mode: str | None = None
+) -> Scene:
+    """A machine at a pose, home by default.
+
+    Parameters
+    ----------
+    pose : (axes,) mm, rad
+    joints : (joints,) those that a path really takes there, if they are known; they settle an angle that is free
+    mode : working mode
+    """
+    spec, model = machine.spec, machine.model
+    given = machine.rows(machine.home if pose is None else pose, machine.axes, "pose")[0][0]
+    mode = mode or machine.mode
+    q = machine.inverse(given, mode) if joints is None else machine.rows(joints, machine.joints, "joints")[0][0]
+    with np.errstate(invalid="ignore", divide="ignore"):
+        if joints is None:
+            placed = model.structure.place(list(given), model.split_mode(mode)[1])
+        else:
+            placed = model.structure.held(list(given), list(q[len(q) - model.serial :]))
+        drawn = _Drawing(machine, placed, q).drawing()
+    parts = tuple(part for part in drawn.parts if np.isfinite(part.points).all())
+    labels = _joined([label for label in drawn.labels if np.isfinite(label[1]).all()])
+    missing = [letter for letter in "XYZ" if letter not in machine.axes]
+    normal = drawn.mount[:, "XYZ".index(missing[0])] if missing and not spec.table else None
+    return Scene(parts, labels, drawn.frames, normal)
+
+
+class _Drawing:
+    """The parts of one scene, gathered in the base frame and put into M."""
+
+    def __init__(self, machine: Machine, placed: Placement, joints: Points):
+        self.spec, self.structure = machine.spec, machine.model.structure
+        self.placed, self.joints = placed, joints
+        self.mount = np.array(self.structure.mount, float)
+        self.base = np.array(self.structure.base, float)
+        self.turned, self.origin = np.array(placed.rotation, float), np.array(placed.origin, float)
+        self.parts: list[Part] = []
+        self.labels: list[tuple[str, Points]] = []
+        self.frames = {"machine": np.eye(3, 4)}
+
+    def drawing(self) -> _Drawing:
+        self._legs()
+        self._platform()
+        self._head()
+        if self.spec.table:
+            self._table()
+        return self
+
+    def _m(self, points: ArrayLike) -> Points:
+        """Points of the base frame in M."""
+        placed: Points = np.asarray(points, float) @ self.mount.T + self.base
+        return placed
+
+    def _add(self, kind: Kind, name: str, points: ArrayLike, closed: bool = False) -> None:
+        self.parts.append(Part(kind, name, self._m(points).reshape(-1, 3), closed))
+
+    def _legs(self) -> None:
+        spec, anchors = self.spec, []
+        points = platform_points(spec, self.placed.rotation, self.placed.origin)
+        for leg, point, q in zip(spec.legs, points, leg_joints(spec, self.joints.tolist()), strict=True):
+            struts = [np.array(ends, float) for ends in leg.struts(point, q)]
+            moved: dict[int, list[str]] = {}
+            for number, (drive, feet) in enumerate(zip(leg.drives, _feet(leg, point, q, struts[0]), strict=True)):
+                for strut in np.flatnonzero(np.ptp(feet, axis=0).max(axis=-1) > _NEAR):
+                    moved.setdefault(int(strut), []).append(drive.name)
+                    # An arm that ends at the foot is what moves it; there is no rail then.
+                    if not any(_same(other[1], struts[strut][0]) for other in struts):
+                        rail = feet[[0, -1], strut] if leg.units[number] == "mm" else feet[:, strut]
+                        self._add("rail", drive.name, rail)
+            for number, ends in enumerate(struts):
+                first: Kind = "rod" if moved.get(0) else "telescope"
+                self._add(first if number == 0 else "arm", leg.drives[min(number, len(leg.drives) - 1)].name, ends)
+                if number not in moved:
+                    anchors.append(ends[0])
+            for number, names in moved.items():
+                self.labels.append((", ".join(names), self._m(struts[number][0])))
+            if not moved:
+                self.labels.append((leg.drives[0].name, self._m(struts[0].mean(axis=0))))
+        if isinstance(self.structure, CentralLeg):
+            self._add("central", "central leg", [np.zeros(3), self.origin])
+        if anchors:
+            ring = around(np.array(anchors))
+            self._add("base", "base", ring, len(ring) > 2)
+
+    def _platform(self) -> None:
+        ring = around(np.array([leg.platform for leg in self.spec.legs], float))
+        self._add("platform", "platform", ring @ self.turned.T + self.origin, len(ring) > 2)
+        middle = ring.mean(axis=0) @ self.turned.T + self.origin
+        if not _same(middle, self.origin) and not isinstance(self.structure, CentralLeg):
+            self._add("head", "platform", [middle, self.origin])
+
+    def _head(self) -> None:
+        head = self.spec.head
+        serial = list(self.placed.serial)[: self.structure.head_joints]
+        chain = list(_chain(head, serial))
+        links = _distinct([np.zeros(3), *[origin for _, origin in chain]])
+        rotation, tip = chain[-1] if chain else (np.eye(3), np.zeros(3))
+        at = np.array(links) @ self.turned.T + self.origin
+        if len(at) > 2:
+            self._add("head", "head", at[:-1])
+        if len(at) > 1:
+            self._add("tool", "tool", at[-2:])
+        for step, (_, origin) in zip(head, chain, strict=True):
+            if step.drive is not None:
+                self.labels.append((step.drive.name, self._m(self.turned @ origin + self.origin)))
+        place = self._m(self.turned @ tip + self.origin)
+        self.frames["tool"] = np.column_stack([self.mount @ self.turned @ rotation, place])
+
+    def _table(self) -> None:
+        """A disc at the workpiece's frame, and the axes that turn it; these are in M, whatever the mounting."""
+        table = self.spec.table
+        serial = list(self.placed.serial)[self.structure.head_joints :]
+        chain = list(_chain(table, serial))
+        rotation, origin = chain[-1]
+        self.frames["workpiece"] = np.column_stack([rotation, origin])
+        radius = 0.12 * float(np.linalg.norm(np.ptp(np.vstack([part.points for part in self.parts]), axis=0)))
+        disc = np.column_stack([np.cos(_DISC), np.sin(_DISC), 0.0 * _DISC]) * radius
+        self.parts.append(Part("table", "table", disc @ rotation.T + origin, True))
+        for step, (turned, pivot) in zip(table, chain, strict=True):
+            if step.drive is None:
+                continue
+            axis = turned @ np.array(UNIT[step.axis])
+            # An axis at right angles to the disc carries it from below; another one passes by on both sides.
+            upright = abs(float(axis @ rotation[:, 2])) > 0.999
+            reach = 1.3 * radius * axis
+            ends = [origin, origin - 0.5 * radius * rotation[:, 2]] if upright else [pivot - reach, pivot + reach]
+            self.parts.append(Part("axis", step.drive.name, np.array(ends)))
+            self.labels.append((step.drive.name, ends[1]))
+
+
+def _joined(labels: list[tuple[str, Points]]) -> tuple[tuple[str, Points], ...]:
+    """Labels with those of one place in one."""
+    joined: list[tuple[str, Points]] = []
+    for name, place in labels:
+        same = next((i for i, (_, other) in enumerate(joined) if _same(place, other)), None)
+        if same is None:
+            joined.append((name, place))
+        else:
+            joined[same] = (f"{joined[same][0]}, {name}", place)
+    return tuple(joined)
+
+
+def _chain(steps: Sequence[Step], joints: Sequence[float]) -> Iterator[tuple[Points, Points]]:
+    """Rotation and origin after every step of a serial chain."""
+    driven = 0
+    for count, step in enumerate(steps, start=1):
+        driven += step.drive is not None
+        rotation, origin = frame(steps[:count], joints[:driven])
+        yield np.array(rotation, float), np.array(origin, float)
+
+
+def _feet(leg: Leg, point: Sequence[float], joints: list[float], strut: Points) -> Iterator[Points]:
+    """The feet of all struts over each drive's range, (samples, struts, 3); the drives after it at their low end."""
+    length = float(np.linalg.norm(strut[1] - strut[0]))
+    spans = [_span(d.low, d.high, q, unit, length) for d, q, unit in zip(leg.drives, joints, leg.units, strict=True)]
+    for number, (low, high) in enumerate(spans):
+        held = [low for low, _ in spans[number + 1 :]]
+        sweep = np.linspace(low, high, 49)
+        yield np.array([[ends[0] for ends in leg.struts(point, [*joints[:number], q, *held])] for q in sweep], float)
+
+
+def _span(low: float, high: float, q: float, unit: str, length: float) -> tuple[float, float]:
+    """A drive's range to draw, cut where it is endless: a full turn, or half a strut's length to both sides."""
+    reach = pi if unit == "rad" else 0.5 * length
+    low, high = (low if isfinite(low) else q - reach), (high if isfinite(high) else q + reach)
+    return (q - pi, q + pi) if unit == "rad" and high - low > 2.0 * pi else (low, high)
+
+
+def around(points: Points) -> Points:
+    """The distinct points as a polygon: in order round their middle in their own plane; of a line the ends."""
+    points = np.array(_distinct(list(points)))
+    if len(points) < 3:
+        return points
+    off = points - points.mean(axis=0)
+    _, sizes, axes = np.linalg.svd(off)
+    if sizes[1] < 1e-9 * sizes[0]:
+        along = off @ axes[0]
+        return points[[along.argmin(), along.argmax()]]
+    return points[np.argsort(np.arctan2(off @ axes[1], off @ axes[0]))]
+
+
+def _distinct(points: list[Points]) -> list[Points]:
+    kept: list[Points] = []
+    for point in points:
+        if not any(_same(point, other) for other in kept):
+            kept.append(point)
+    return kept
+
+
+def _same(a: Points, b: Points) -> bool:
+    return bool(np.linalg.norm(a - b) < _NEAR)

@@ -1,7 +1,0 @@
-"""Programs for controllers: a law of time as G-code."""
-
-from .joint_reader import JointProgram, read_joint_program
-from .joints import joint_program
-from .linuxcnc import linuxcnc_program, program_seconds
-
-__all__ = ["JointProgram", "joint_program", "linuxcnc_program", "program_seconds", "read_joint_program"]

@@ -1,0 +1,1 @@
+"""The report of a tool path, one page of HTML."""

@@ -1,0 +1,133 @@
+"""The report's tables: offences with their source lines, the reader's notes, facts."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from html import escape
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ... import __version__
+from ..ranges import shown
+from .cards import card, duration, facts
+
+if TYPE_CHECKING:
+    from ...toolpath.path import ToolPath
+    from ...toolpath.posting.posted import Offence, Posted
+
+_NOTES = 200  # of the reader that are listed
+_LONGEST = 240  # characters of a source line that are quoted
+_READ = 1 << 16  # bytes of one line that are looked at
+_DIALECTS = {"apt": "APT", "nx": "Siemens NX", "gcode": "G-code"}
+
+
+def source_lines(path: ToolPath, wanted: Iterable[int]) -> dict[int, str]:
+    """The text of some lines of the source file, as far as it is still there; cut where it is long."""
+    left, found = set(wanted), {}
+    try:
+        source = Path(path.source)
+        if not left or not source.is_file():
+            return {}
+        with source.open("rb") as file:
+            number, fresh = 1, True
+            while left and (piece := file.readline(_READ)):
+                if fresh and number in left:
+                    text = piece.decode("utf-8", "replace").rstrip("\r\n")
+                    found[number] = text[:_LONGEST] + ("…" if len(text) > _LONGEST else "")
+                    left.discard(number)
+                fresh = piece.endswith(b"\n")
+                number += fresh
+    except (OSError, ValueError):  # a name that no file can have
+        pass
+    return found
+
+
+def offence_card(posted: Posted) -> str:
+    if posted.first is None:
+        return ""
+    text = source_lines(posted.path, {o.line for o in (*posted.offences, posted.first)})
+    first = f"<tr><th colspan=5>First</th></tr>{_offence(posted.first, text, False)}"
+    worst = "".join(_offence(offence, text, True) for offence in posted.offences)
+    head = (
+        "<tr><th>Line</th><th>What</th><th class=n>Beyond by</th>"
+        f"<th class=n>Records{' and motions' if posted.checked else ''}</th><th>The line reads</th></tr>"
+    )
+    rows = f"{head}{first}<tr><th colspan=5>Every broken limit at its worst</th></tr>{worst}"
+    return card("Offences", f"<div class=wide><table>{rows}</table></div>")
+
+
+def _offence(offence: Offence, text: dict[int, str], count: bool) -> str:
+    beyond, reads = shown(offence.excess, offence.unit), escape(text.get(offence.line, ""))
+    place = f"{offence.line}<br><small>{on_the_way(offence)}</small>" if offence.share < 1.0 else str(offence.line)
+    return (
+        f"<tr><td>{place}</td><td>{escape(offence.text)}</td><td class=n>{beyond}</td>"
+        f"<td class=n>{f'{offence.count:,}' if count else ''}</td><td><code>{reads}</code></td></tr>\n"
+    )
+
+
+def on_the_way(offence: Offence) -> str:
+    """Where between two records an offence is."""
+    return f"on the way, {100.0 * offence.share:.0f} %"
+
+
+def note_card(path: ToolPath) -> str:
+    if not path.notes:
+        return ""
+    rows = "".join(
+        f"<tr><td class=k>{f'line {note.line}' if note.line else 'file'}</td><td>{escape(note.text)}</td></tr>\n"
+        for note in path.notes[:_NOTES]
+    )
+    more = len(path.notes) - _NOTES
+    tail = f"<p class=sub>{more:,} more notes are not listed.</p>" if more > 0 else ""
+    return card("Notes of the reader", f"<table>{rows}</table>{tail}")
+
+
+def fact_card(posted: Posted) -> str:
+    path, machine = posted.path, posted.machine
+    steps, rapid = _steps(path), path.rapid[1:]
+    seconds, unknown = programmed(path)
+    time = duration(seconds) + " in feed motions, at the programmed feeds"
+    if unknown > 0.0:
+        time += f"; {shown(unknown, 'mm')} without a feed not counted"
+    tool = ", ".join(f"{key.replace('_', ' ')} {value:g}" if isinstance(value, float) else f"{key} {value}"
+                     for key, value in path.tool.items())  # fmt: skip
+    rows = [
+        ("Records", f"{len(path):,}, of them {int(path.rapid.sum()):,} in rapid"),
+        ("Path in feed", shown(float(steps[~rapid].sum()), "mm")),
+        ("Path in rapid", shown(float(steps[rapid].sum()), "mm")),
+        ("Programmed time", time),
+        ("Workpiece in the machine", _placement(posted.frame)),
+        ("Machine", f"{machine.spec.title} ({machine.name}): axes {' '.join(machine.axes)}"),
+        ("Working mode", posted.mode or "the only one"),
+        ("File", f"{_DIALECTS[path.dialect]}, in {path.units}"),
+        ("Tool", tool or "not named"),
+        ("Written by", f"parakin {__version__}"),
+    ]
+    return card("Facts", facts(rows))
+
+
+def programmed(path: ToolPath) -> tuple[float, float]:
+    """How long the feed motions take at the programmed feeds, s, and how many mm have none."""
+    steps, feed = _steps(path), path.feed[1:]
+    seconds = np.full(len(steps), np.nan) if path.seconds is None else path.seconds[1:]
+    cut = ~path.rapid[1:]
+    fed, timed = cut & (feed > 0.0), cut & (seconds >= 0.0)
+    unknown = float(steps[cut & ~fed & ~timed].sum())
+    return float((steps[fed] / feed[fed]).sum()) * 60.0 + float(seconds[timed & ~fed].sum()), unknown
+
+
+def _steps(path: ToolPath) -> NDArray[np.float64]:
+    steps: NDArray[np.float64] = np.linalg.norm(np.diff(path.tip, axis=0), axis=1)
+    return steps
+
+
+def _placement(frame: NDArray[np.float64]) -> str:
+    r, origin = frame[:, :3], frame[:, 3]
+    b = np.arctan2(-r[2, 0], np.hypot(r[0, 0], r[1, 0]))
+    a, c = np.arctan2(r[2, 1], r[2, 2]), np.arctan2(r[1, 0], r[0, 0])
+    parts = [f"{letter} {shown(float(v), 'mm')}" for letter, v in zip("XYZ", origin, strict=True)]
+    parts += [f"{letter} {shown(float(v), 'rad')}" for letter, v in zip("ABC", (a, b, c), strict=True)]
+    return ", ".join(parts)

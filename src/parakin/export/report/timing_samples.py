@@ -1,0 +1,127 @@
+"""A law of time as curves of few points that hide no extreme, whatever its length."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .curves import extremes_within
+
+if TYPE_CHECKING:
+    from ...toolpath.timing import Law
+
+Floats = NDArray[np.float64]
+Indices = NDArray[np.int64]
+
+_BLOCK = 1 << 15  # pieces of a law at a time
+_SHORTEST = 1e-7  # s: what a piece as short adds is rounding
+
+
+@dataclass(frozen=True, eq=False)
+class Thinned:
+    """A curve over time, k points.
+
+    times, values : (k,) s; mm or rad, s, and mm/min for feeds; NaN where there is no value
+    binding : (k,) what limits the speed there, an index into the law's names
+    record : (k,) that the motion leads to
+    """
+
+    times: Floats
+    values: Floats
+    binding: Indices
+    record: Indices
+
+
+def thinned(law: Law, most: int) -> dict[str, Thinned]:
+    """The law's curves of some ``most`` points each: the tip's ``feed.any``, ``feed.reached`` in feed motions and
+    ``feed.programmed``; for each joint ``d1``, ``d1.speed``, ``d1.acceleration``, and ``d1.jerk`` where it is limited.
+
+    Looked at are the start, the middle and the end of every piece of the law; of these each curve keeps the least and
+    the greatest in every stretch. Stretches are short where pieces are, yet none is much longer than the others.
+    """
+    parts: dict[str, list[Thinned]] = defaultdict(list)
+    total, done = 3 * len(law.pace.cell), 0
+    stretches = most // 3 if total > most else total
+    for times, binding, record, curves in _blocks(law):
+        along = 0.5 * (times / law.seconds + np.arange(done, done + len(times)) / total)
+        done += len(times)
+        for name, values in curves.items():
+            kept = np.arange(len(values))
+            if total > most:
+                kept = _without_short_gaps(times, values, law.seconds / stretches)
+                starts = np.flatnonzero(np.diff(np.floor(along[kept] * stretches), prepend=-1.0))
+                kept = kept[extremes_within(values[kept], starts)]
+            parts[name].append(Thinned(times[kept], values[kept], binding[kept], record[kept]))
+    return {name: _joined(blocks) for name, blocks in parts.items()}
+
+
+def _joined(blocks: list[Thinned]) -> Thinned:
+    names = ("times", "values", "binding", "record")
+    return Thinned(*(np.concatenate([getattr(block, name) for block in blocks]) for name in names))
+
+
+def _without_short_gaps(times: Floats, values: Floats, shortest: float) -> Indices:
+    """Points of a curve without those NaN that last no longer: else these part every two points that are left."""
+    gone = np.isnan(values)
+    if not gone.any():
+        return np.arange(len(values))
+    begins = np.flatnonzero(np.diff(gone, prepend=~gone[:1]))
+    lasts = np.append(begins[1:], len(values)) - 1
+    short = gone[begins] & (times[lasts] - times[begins] <= shortest)
+    return np.flatnonzero(~np.repeat(short, lasts - begins + 1))
+
+
+def _blocks(law: Law) -> Iterator[tuple[Floats, Indices, Indices, dict[str, Floats]]]:
+    """Times, what binds, records, and curves by their names, for some pieces at a time."""
+    pace, course, machine = law.pace, law.course, law.posted.machine
+    edges = switches(law)
+    tip = [i for i, axis in enumerate(machine.axes) if axis in "XYZ"]
+    jerky = [i for i, drive in enumerate(machine.model.drives) if drive.jerk < np.inf]
+    pieces = np.flatnonzero(np.diff(pace.time) > _SHORTEST)
+    for first in range(0, len(pieces), _BLOCK):
+        piece = pieces[first : first + _BLOCK]
+        begin, end = pace.time[piece], np.nextafter(pace.time[piece + 1], 0.0)  # before the next piece takes over
+        times = np.column_stack([begin, 0.5 * (begin + end), end])
+        at = law.at(times.ravel())
+        record = np.repeat(law.curve.record[course.segment[pace.cell[piece]]], 3)
+        feed = np.linalg.norm(_rates(at.poses[:, tip], times), axis=1)
+        curves = {"feed.any": 60.0 * feed, "feed.programmed": _programmed(law, record)}
+        curves["feed.reached"] = np.where(law.posted.path.rapid[record], np.nan, 60.0 * feed)
+        jerks = _rates(at.accelerations[:, jerky], times)
+        for j, name in enumerate(machine.joints):
+            curves |= {name: at.joints[:, j], f"{name}.speed": at.speeds[:, j]}
+            curves[f"{name}.acceleration"] = at.accelerations[:, j]
+            if j in jerky:
+                curves[f"{name}.jerk"] = jerks[:, jerky.index(j)]
+        binding = law.binding[np.searchsorted(edges, at.times, "right")]
+        yield at.times, binding, record, curves
+
+
+def switches(law: Law) -> Floats:
+    """(rows - 1,) s, when what binds at one row of the law's course gives way to what binds at the next."""
+    passed = law.pace.passed
+    return 0.5 * (passed[1:] + passed[:-1])
+
+
+def _rates(values: Floats, times: Floats) -> Floats:
+    """Rates of change (3 k, columns) at start, middle and end of k pieces (k, 3), of the parabolas through these."""
+    first, middle, last = np.moveaxis(values.reshape(len(times), 3, -1), 1, 0)
+    rates = np.stack([4.0 * middle - 3.0 * first - last, last - first, first - 4.0 * middle + 3.0 * last], axis=1)
+    result: Floats = (rates / (times[:, 2] - times[:, 0])[:, None, None]).reshape(values.shape)
+    return result
+
+
+def _programmed(law: Law, record: Indices) -> Floats:
+    """The programmed feed on motions to records, mm/min; NaN in rapid and where there is none."""
+    path = law.posted.path
+    feed = path.feed.copy()
+    if path.seconds is not None:
+        steps = np.linalg.norm(np.diff(path.tip, axis=0, prepend=path.tip[:1]), axis=1)
+        told = path.seconds > 0.0
+        feed[told] = 60.0 * steps[told] / path.seconds[told]
+    return np.where(path.rapid, np.nan, feed)[record]

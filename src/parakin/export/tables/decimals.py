@@ -1,0 +1,139 @@
+"""Tables of numbers as decimal text, fast: fixed digits, trailing zeros left away."""
+
+from typing import Any
+
+import numba as nb
+import numpy as np
+from numpy.typing import NDArray
+
+WIDEST = 26  # bytes a number takes at most, its separator included
+_COMMA, _MINUS, _POINT, _LF, _ZERO = (ord(c) for c in ",-.\n0")
+_LARGEST = 9.0e18  # what is as large once scaled doesn't fit into an integer
+_HUNDRED, _E4, _E6, _E8 = (np.uint64(10**n) for n in (2, 4, 6, 8))
+_PAIRS = np.frombuffer("".join(f"{i:02}" for i in range(100)).encode(), np.uint8)
+
+
+@nb.njit(cache=True, nogil=True, inline="always")
+def _integer(value: Any, out: NDArray[np.uint8], at: Any) -> Any:
+    """A natural number from ``at`` on; returns its end."""
+    length = 1
+    bound = np.uint64(10)
+    while length < 19 and value >= bound:
+        length += 1
+        bound *= np.uint64(10)
+    p = at + length
+    while p - at >= 2:
+        rest = value // _HUNDRED
+        pair = np.int64(value - rest * _HUNDRED)
+        out[p - 1] = _PAIRS[2 * pair + 1]
+        out[p - 2] = _PAIRS[2 * pair]
+        value = rest
+        p -= 2
+    if p > at:
+        out[at] = np.uint8(_ZERO + np.int64(value))
+    return at + length
+
+
+@nb.njit(cache=True, nogil=True, inline="always")
+def _decimal(value: Any, scale: Any, digits: Any, out: NDArray[np.uint8], at: Any) -> Any:
+    """``value·scale`` is the integer to print, with a point before its last 4, 6 or 8 ``digits``; nothing for what is
+    no number."""
+    scaled = np.rint(value * scale)
+    size = abs(scaled)
+    if not size < _LARGEST:
+        return at
+    whole = np.uint64(size)
+    if digits == 6:  # divisors the compiler knows: multiplications instead of divisions
+        natural = whole // _E6
+        rest = whole - natural * _E6
+    elif digits == 8:
+        natural = whole // _E8
+        rest = whole - natural * _E8
+    else:
+        natural = whole // _E4
+        rest = whole - natural * _E4
+    out[at] = _MINUS
+    at = _integer(natural, out, at + np.int64(scaled < 0.0))
+    if rest == 0:
+        return at
+    out[at] = _POINT
+    p = at + 1 + digits
+    while p > at + 1:
+        above = rest // _HUNDRED
+        pair = np.int64(rest - above * _HUNDRED)
+        out[p - 1] = _PAIRS[2 * pair + 1]
+        out[p - 2] = _PAIRS[2 * pair]
+        rest = above
+        p -= 2
+    p = at + digits
+    while out[p] == _ZERO:
+        p -= 1
+    return p + 1
+
+
+@nb.njit(cache=True, nogil=True)
+def rows(
+    first: int,
+    last: int,
+    lines: NDArray[np.int64],
+    poses: NDArray[np.float64],
+    joints: NDArray[np.float64],
+    feed: NDArray[np.float64],
+    rapid: NDArray[np.bool_],
+    broken: NDArray[np.int64],
+    scales: NDArray[np.float64],
+    digits: NDArray[np.int64],
+    names: NDArray[np.uint8],
+    starts: NDArray[np.int64],
+    out: NDArray[np.uint8],
+) -> int:
+    """Rows ``first`` to ``last`` of a joint table as CSV into ``out``; returns how many bytes.
+
+    lines ... broken : the table's columns, as in :class:`~parakin.toolpath.posting.posted.Posted`
+    scales, digits : for poses, joints and feed, what makes the printed integer, and how many of its digits are decimals
+    names, starts : the limits' names one after another, and where each begins and the last ends
+    """
+    at = 0
+    axes = poses.shape[1]
+    moving = axes + joints.shape[1]
+    for n in range(first, last):
+        at = _integer(np.uint64(n), out, at)
+        out[at] = _COMMA
+        at = _integer(np.uint64(lines[n]), out, at + 1)
+        out[at] = _COMMA
+        at += 1
+        for c in range(axes):
+            at = _decimal(poses[n, c], scales[c], digits[c], out, at)
+            out[at] = _COMMA
+            at += 1
+        for c in range(axes, moving):
+            at = _decimal(joints[n, c - axes], scales[c], digits[c], out, at)
+            out[at] = _COMMA
+            at += 1
+        at = _decimal(feed[n], scales[moving], digits[moving], out, at)
+        out[at] = _COMMA
+        out[at + 1] = _ZERO + rapid[n]
+        out[at + 2] = _COMMA
+        at += 3
+        if broken[n] > 0:
+            for c in range(starts[broken[n] - 1], starts[broken[n]]):
+                out[at] = names[c]
+                at += 1
+        out[at] = _LF
+        at += 1
+    return at
+
+
+@nb.njit(cache=True, nogil=True)
+def cells(
+    values: NDArray[np.float64], scales: NDArray[np.float64], digits: NDArray[np.int64], out: NDArray[np.uint8]
+) -> int:
+    """A table of numbers (rows, columns) as CSV into ``out``; returns how many bytes. Scales and digits as above."""
+    at = 0
+    last = values.shape[1] - 1
+    for n in range(len(values)):
+        for c in range(last + 1):
+            at = _decimal(values[n, c], scales[c], digits[c], out, at)
+            out[at] = _COMMA if c < last else _LF
+            at += 1
+    return at

@@ -1,0 +1,224 @@
+"""A workspace's picture, a PNG: its shaded shell and cross-sections, in the plane its area by what binds."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from io import BytesIO
+from textwrap import fill
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...workspace.certified.workspace import Workspace
+from ...workspace.sampled.field import Field
+from ...workspace.sampled.sampling import Swept
+from ..machine.figures import FAINT, INK
+from .curves import Curves
+from .meshes import Shell
+from .summary import amount, heading, size
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from ...workspace.sampled.slices import Section
+
+Floats = NDArray[np.float64]
+
+_GREY = "#607d8b"
+_VIEW = {"elev": 22.0, "azim": -56.0}  # from the front right, degrees
+_LIGHT = np.array([0.30, -0.55, 0.78]) / np.linalg.norm([0.30, -0.55, 0.78])
+_LEGEND = {"frameon": False, "fontsize": 9, "labelcolor": INK, "alignment": "left"}
+_WIDE = 96  # letters of a heading's line
+_PIXELS = 2  # along a step of a planar field
+
+
+def space_png(found: Workspace | Swept, shape: Shell, slices: Sequence[Section]) -> bytes:
+    """A PNG of a workspace in space: its shaded shell, coloured by height, and beside it its cross-sections."""
+    return _png(found, (12.0, 6.6), lambda figure: _space(figure, found, shape, slices))
+
+
+def plane_png(found: Workspace | Swept, whole: Field, slices: Sequence[Section]) -> bytes:
+    """A PNG of a workspace in a plane: its area, a colour for each limit where that is nearest."""
+    return _png(found, (9.6, 7.2), lambda figure: _plane(figure, found, whole, slices))
+
+
+def curves_png(found: Swept, whole: Field, groups: Sequence[Curves], slices: Sequence[Section]) -> bytes:
+    """A PNG of what a sweep found as curves; of a workspace in space with its cross-sections beside them."""
+    if len(found.axes) == 3:
+        return _png(found, (12.0, 6.6), lambda figure: _net(figure, found, whole, groups, slices))
+    return _png(found, (9.6, 7.2), lambda figure: _flat_net(figure, found, groups))
+
+
+def _png(found: Workspace | Swept, inches: tuple[float, float], draw: Callable[[Figure], None]) -> bytes:
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=inches, dpi=150, facecolor="white")
+    canvas = FigureCanvasAgg(figure)
+    draw(figure)
+    _title(figure, found)
+    data = BytesIO()
+    canvas.print_png(data)  # type: ignore[no-untyped-call]
+    return data.getvalue()
+
+
+def _title(figure: Figure, found: Workspace | Swept) -> None:
+    name = found.machine.spec.title or found.machine.name
+    figure.text(0.025, 0.945, name, color=INK, fontsize=15, weight="bold", parse_math=False)
+    what = f"{fill(heading(found), _WIDE)}\n{size(found)}"
+    figure.text(0.025, 0.905, what, color=_GREY, fontsize=10.5, va="top", linespacing=1.5, parse_math=False)
+
+
+# In space.
+
+
+def _space(figure: Figure, found: Workspace | Swept, shape: Shell, slices: Sequence[Section]) -> None:
+    from matplotlib import colormaps
+    from matplotlib.colors import Normalize
+    from mpl_toolkits import mplot3d  # noqa: F401  it brings the projection
+
+    axis = slices[0].axis if slices else found.axes[-1]
+    along = found.axes.index(str(axis))
+    scale = Normalize(shape.vertices[:, along].min(), shape.vertices[:, along].max())
+    colours: Any = colormaps["viridis"]
+    axes: Any = figure.add_axes((0.0, 0.0, 0.58, 0.88), projection="3d")
+    _frame(axes, shape.vertices.min(0), shape.vertices.max(0), found.axes)
+    _faces(axes, shape, colours(0.12 + 0.8 * scale(shape.vertices[shape.faces][:, :, along].mean(1)))[:, :3])
+    if slices:
+        _sections(figure, slices, lambda value: colours(0.12 + 0.8 * scale(value)))
+
+
+def _frame(axes: Any, low: Floats, high: Floats, names: Sequence[str]) -> None:
+    half = 0.54 * (high - low)
+    for name, letter, middle, h in zip("xyz", names, 0.5 * (low + high), half, strict=True):
+        getattr(axes, f"set_{name}lim")(middle - h, middle + h)
+        axis = getattr(axes, f"{name}axis")
+        axis.set_pane_color((0.975, 0.98, 0.985, 1.0))
+        axis._axinfo["grid"].update(color="#dfe5ea", linewidth=0.6)
+        axis.line.set_color("#b0bec5")
+        getattr(axes, f"set_{name}label")(f"{letter} [mm]", color=_GREY, fontsize=9, labelpad=7)
+    seen = max(0.8 * half[0] + 0.6 * half[1], half[2] + 0.25 * half[:2].sum())
+    axes.set_box_aspect(half, zoom=float(0.74 * np.linalg.norm(half) / seen))
+    axes.set_proj_type("persp", focal_length=1.6)
+    axes.view_init(**_VIEW)
+    axes.tick_params(labelsize=8, colors=_GREY)
+    axes.zaxis.set_tick_params(pad=5)
+    axes.locator_params(nbins=5)
+
+
+def _faces(axes: Any, shape: Shell, colours: Floats) -> None:
+    """The faces that look at the viewer, lit from above."""
+    from mpl_toolkits.mplot3d.art3d import Poly3DCollection
+
+    corners = shape.vertices[shape.faces]
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    lengths = np.linalg.norm(normals, axis=1, keepdims=True)
+    normals = normals / np.where(lengths > 0.0, lengths, 1.0)
+    up, round_ = np.radians(_VIEW["elev"]), np.radians(_VIEW["azim"])
+    eye = np.array([np.cos(up) * np.cos(round_), np.cos(up) * np.sin(round_), np.sin(up)])
+    front = normals @ eye > -0.35  # the view is in perspective, so a little more than half
+    light = 0.62 + 0.38 * (normals[front] @ _LIGHT)
+    lit = np.clip(colours[front] * light[:, None] + 0.10, 0.0, 1.0)
+    # Edges of the faces' own colour hide the seams that antialiasing leaves.
+    axes.add_collection3d(Poly3DCollection(corners[front], facecolors=lit, edgecolors=lit, linewidths=0.4))
+
+
+def _sections(figure: Figure, slices: Sequence[Section], colour: Any) -> None:
+    axes: Any = figure.add_axes((0.645, 0.12, 0.325, 0.60))
+    for section in slices:
+        label = f"{section.axis} = {section.value:,.1f} mm   {amount(section.area, 2)}"
+        for number, outline in enumerate(section.outlines):
+            axes.plot(*outline.T, color=colour(section.value), linewidth=1.6, label="" if number else label)
+        if not section.outlines:
+            axes.plot([], [], color=colour(section.value), linewidth=1.6, label=label)
+    _flat(axes, slices[0].places)
+    axes.legend(
+        loc="lower left", bbox_to_anchor=(-0.02, 1.02), **_LEGEND, title="cross-sections"
+    ).get_title().set_color(INK)
+
+
+def _flat(axes: Any, names: Sequence[str]) -> None:
+    axes.set_aspect("equal", adjustable="datalim")
+    axes.set_xlabel(f"{names[0]} [mm]", color=_GREY, fontsize=9)
+    axes.set_ylabel(f"{names[1]} [mm]", color=_GREY, fontsize=9)
+    axes.grid(color=FAINT, linewidth=0.7)
+    axes.set_axisbelow(True)
+    axes.tick_params(labelsize=8, colors=_GREY, length=0)
+    for side in axes.spines.values():
+        side.set_color("#cfd8dc")
+
+
+# In a plane.
+
+
+def _plane(figure: Figure, found: Workspace | Swept, whole: Field, slices: Sequence[Section]) -> None:
+    from matplotlib import colormaps
+    from matplotlib.patches import Patch, PathPatch
+    from matplotlib.path import Path
+
+    outlines = [outline for section in slices for outline in section.outlines]
+    fine = np.array(whole.values.shape) * _PIXELS
+    step = whole.step / _PIXELS
+    near = np.repeat(np.repeat(whole.values > -whole.step.min(), _PIXELS, 0), _PIXELS, 1)
+    low = whole.low - 0.5 * whole.step
+    nearest = whole.distance.nearest(low + (np.argwhere(near) + 0.5) * step)
+    limit = np.full(tuple(fine), -1)
+    limit[near] = nearest
+    count = np.bincount(nearest, minlength=len(found.region.limits))
+    palette: Any = colormaps["tab20"]
+    image = np.zeros((*limit.shape, 4))
+    patches = []
+    for place, number in enumerate(np.argsort(-count, kind="stable")[: int((count > 0).sum())].tolist()):
+        colour = palette((2 * place + 1 + place // 10) % 20)
+        image[limit == number] = colour
+        label = f"{found.region.limits[number]}   {count[number] / len(nearest):.1%}"
+        patches.append(Patch(facecolor=colour, label=label))
+    axes: Any = figure.add_axes((0.08, 0.08, 0.60, 0.72))
+    high = low + fine * step
+    picture = axes.imshow(image.swapaxes(0, 1), origin="lower", extent=(low[0], high[0], low[1], high[1]), zorder=2)
+    edge = Path.make_compound_path(*(Path(outline, closed=True) for outline in outlines))
+    picture.set_clip_path(PathPatch(edge, transform=axes.transData))
+    axes.add_patch(PathPatch(edge, facecolor="none", edgecolor=INK, linewidth=1.4, zorder=3))
+    _flat(axes, found.axes)
+    axes.legend(handles=patches, loc="upper left", bbox_to_anchor=(1.02, 1.0), **_LEGEND,
+                title="nearest limit, share of the area").get_title().set_color(INK)  # fmt: skip
+
+
+# Curves of a sweep.
+
+
+def _net(figure: Figure, found: Swept, whole: Field, groups: Sequence[Curves], slices: Sequence[Section]) -> None:
+    from matplotlib import colormaps
+    from matplotlib.colors import Normalize
+    from mpl_toolkits import mplot3d  # noqa: F401  it brings the projection
+    from mpl_toolkits.mplot3d.art3d import Line3DCollection
+
+    low, high = whole.span
+    scale = Normalize(low[2], high[2])
+    colours: Any = colormaps["viridis"]
+    axes: Any = figure.add_axes((0.0, 0.0, 0.58, 0.88), projection="3d")
+    _frame(axes, low, high, found.axes)
+    for group in groups:
+        width = 0.6 if group.fine else 1.3
+        tint = [colours(0.12 + 0.8 * scale(line[:, 2].mean())) for line in group.lines]
+        axes.add_collection3d(
+            Line3DCollection(group.lines, colors=tint, linewidths=width, alpha=0.6 if group.fine else 1.0)
+        )
+    if slices:
+        _sections(figure, slices, lambda value: colours(0.12 + 0.8 * scale(value)))
+
+
+def _flat_net(figure: Figure, found: Swept, groups: Sequence[Curves]) -> None:
+    from matplotlib import colormaps
+
+    palette: Any = colormaps["tab10"]
+    axes: Any = figure.add_axes((0.08, 0.08, 0.60, 0.72))
+    for number, group in enumerate(groups):
+        for i, line in enumerate(group.lines):
+            colour, width = ("#b0bec5", 0.6) if group.fine else (palette(number % 10), 1.7)
+            axes.plot(
+                *line.T, color=colour, linewidth=width, zorder=2 if group.fine else 3, label="" if i else group.name
+            )
+    _flat(axes, found.axes)
+    axes.legend(loc="upper left", bbox_to_anchor=(1.02, 1.0), **_LEGEND)

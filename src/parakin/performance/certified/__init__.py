@@ -1,0 +1,1 @@
+"""Performance proved over boxes of poses, by interval arithmetic."""

@@ -1,0 +1,125 @@
+"""How well a machine moves and holds its tool at a pose: amplification of velocity and force, conditioning."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..machine import Array, Machine
+from .characteristic_length import Length, characteristic_length
+from .jacobians import Scaled, scaled_rates, twist_names
+from .singularities import home_signs, margin_names, margins_of
+
+SINGULAR = 1e-13  # of the greatest singular value; a lesser one is nought
+
+
+@dataclass(frozen=True, eq=False)
+class Performance:
+    """Numbers at poses (..., axes), in one unit: angles are multiplied by the characteristic length.
+
+    J maps joints' rates to the tool's twist, t' = J q'. NaN where the machine is out of reach; infinity and 0 tell a
+    singularity.
+
+    psi : (..., n) singular values of J, the greatest first: how much faster than the drives the tool moves
+    directions : (..., n, n), a row for each of ``psi``: the direction, a unit twist in the order of ``twist``, of the
+        velocity ellipsoid's semi-axis of that length (tool velocities for drive rates of size 1). The force ellipsoid
+        (J⁻ᵀ: wrenches that drive forces of size 1 hold) has the same directions with the lengths 1/psi.
+    margins : (..., margins) of singularities, named in ``margin_names``
+    """
+
+    machine: Machine
+    length: Length
+    twist: tuple[str, ...]
+    margin_names: tuple[str, ...]
+    poses: Array
+    psi: Array
+    directions: Array
+    margins: Array
+
+    @property
+    def greatest(self) -> Array:
+        """Greatest velocity amplification, (...,)."""
+        return self.psi[..., 0]
+
+    @property
+    def least(self) -> Array:
+        """Least velocity amplification, (...,); its reciprocal is the greatest amplification of force."""
+        return self.psi[..., -1]
+
+    @property
+    def condition(self) -> Array:
+        """Condition number of J, σmax/σmin, (...,): 1 at an isotropic pose, infinite at a singular one."""
+        return _quotient(self.greatest, self.least)
+
+    @property
+    def manipulability(self) -> Array:
+        """|det J|, the product of psi (Yoshikawa), (...,); NaN where J has both an infinite psi and a psi of 0."""
+        with np.errstate(invalid="ignore", over="ignore"):
+            return np.asarray(self.psi.prod(-1))
+
+    @property
+    def force(self) -> Array:
+        """Force amplification along ``directions``: 1/psi, (..., n)."""
+        return _quotient(np.ones_like(self.psi), self.psi)
+
+
+def _quotient(x: Array, y: Array) -> Array:
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return x / y
+
+
+def performance(
+    machine: Machine, poses: ArrayLike, length: float | None = None, mode: str | None = None
+) -> Performance:
+    """Amplification, conditioning and singularity margins at poses.
+
+    Parameters
+    ----------
+    poses : (..., axes), mm and rad; any leading shape
+    length : characteristic length by which angles become mm, mm; by default by the rule of
+        :func:`parakin.performance.characteristic_length.characteristic_length`
+    mode : working mode
+
+    Limits are not looked at. Raises :class:`PoseError` for poses, a length or a mode that are none.
+    """
+    rows, lead = machine.rows(poses, machine.axes, "poses")
+    mode, scale = machine.checked_mode(mode), characteristic_length(machine, length)
+    rates = scaled_rates(machine, rows, scale, mode)
+    margins = margins_of(machine, rates, home_signs(machine, scale, mode))
+    psi, directions = amplifications(rates)
+    n = rows.shape[1]
+    return Performance(
+        machine,
+        scale,
+        twist_names(machine),
+        margin_names(machine),
+        rows.reshape(*lead, n),
+        psi.reshape(*lead, n),
+        directions.reshape(*lead, n, n),
+        margins.reshape(*lead, margins.shape[1]),
+    )
+
+
+def amplifications(rates: Scaled) -> tuple[Array, Array]:
+    """psi (N, n), the greatest first, and their directions (N, n, n)."""
+    n = rates.a.shape[1]
+    a, b = rates.a, rates.b
+    known = np.asarray(np.isfinite(a).all((1, 2)) & np.isfinite(b).all((1, 2)))
+    a, b = (np.where(known[:, None, None], m, np.eye(n)) for m in (a, b))
+    size_a, size_b = np.abs(np.linalg.det(a)), np.abs(np.linalg.det(b))
+    backward = size_b >= size_a  # by the matrix that is farther from singular
+    divisor, dividend = np.where(backward[:, None, None], b, a), np.where(backward[:, None, None], a, b)
+    solvable = np.maximum(size_a, size_b) > 0.0
+    u, s, v = np.linalg.svd(np.linalg.solve(np.where(solvable[:, None, None], divisor, np.eye(n)), dividend))
+    both = ~solvable | (s[:, 0] * SINGULAR > 1.0)  # legs and drives are singular together: J has no value at all
+    s = np.where(s <= SINGULAR * s[:, :1], 0.0, s)
+    with np.errstate(divide="ignore"):
+        psi = np.where(backward[:, None], 1.0 / s[:, ::-1], s)
+    directions = np.where(backward[:, None, None], v[:, ::-1], u.swapaxes(1, 2))
+    if both.any():
+        psi[both], directions[both] = np.nan, np.nan
+        psi[both, 0], psi[both, -1] = np.inf, 0.0
+    psi[~known], directions[~known] = np.nan, np.nan
+    return psi, directions

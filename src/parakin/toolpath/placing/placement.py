@@ -1,0 +1,231 @@
+"""Where to put the part: the workpiece's placement that leaves the greatest least margin over a whole tool path."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...errors import InputError, PoseError
+from ...machine import Machine
+from ...performance.search import spread
+from ...units import nearest, shown
+from ..path import Floats, ToolPath
+from ..posting.frames import parse_value
+from ..posting.working_mode import modes_to_try
+from .margins import AXES, Found, Indices, Placing
+from .maximin import Rows, Top, raised, value_of
+
+Progress = Callable[[float], None]
+Bounds = Mapping[str, tuple[float, float]]
+
+_SOURCE = "--place"
+_EXAMPLE = "X=-100:100,Z=-1500,C=-90:90"
+_LOOKED_AT, _STARTS = 384, 10  # placements spread over the bounds, and those of them to climb from
+_APART = 0.1  # of the bounds
+_STEPS = 20  # of a climb
+_ROUNDS = 80  # of looking at the whole path
+_AGREED = 1e-6  # of half a range: the whole path against the records looked at
+_EVEN, _FEW = 24, 60  # records to begin with; a path of no more is looked at as a whole
+_TRACK = 2000  # records along which joints are followed
+_LEVER = 200.0  # mm along the tool's axis: as far as orientations are told by
+_BESIDE = 0.02  # of half a range: limits as near to the tightest get their worst records looked at, too
+
+
+@dataclass(frozen=True, eq=False)
+class Placement:
+    """The best placement found.
+
+    workpiece : (3, 4), the transform to post with: M ← workpiece ← path.frame ← W
+    values : mm and rad, by axis, of those that the bounds name
+    mode : the working mode it was found in, to post with
+    margin : the least of all margins over the path, over half its limit's range (a broken reach: over the rod's length
+        squared); below 0 no placement was found that is allowed
+    limit, record : the limit it is of, or one of the path's own: ``tilt``, ``X``, ``Y``, ``Z``; and where (0-based)
+    tried : how many placements were looked at
+    """
+
+    workpiece: Floats
+    values: dict[str, float]
+    mode: str
+    margin: float
+    limit: str
+    record: int
+    tried: int
+
+    @property
+    def allowed(self) -> bool:
+        return self.margin >= 0.0
+
+
+def parse_bounds(text: str) -> dict[str, tuple[float, float]]:
+    """The bounds of a ``--place`` option, mm and rad: ``X=-100:100,Z=-1500,C=-90:90``.
+
+    A single value holds its axis; axes not named are 0, as of ``--workpiece``. Plain numbers are mm and degrees; a unit
+    may follow.
+
+    Raises :class:`InputError`.
+    """
+    found: dict[str, tuple[float, float]] = {}
+    for part in text.split(","):
+        axis, equals, value = (word.strip() for word in part.partition("="))
+        if not (axis and equals and value):
+            raise InputError(
+                f"{shown(part.strip())}: expected AXIS=LOW:HIGH or AXIS=VALUE, such as {_EXAMPLE}", _SOURCE
+            )
+        axis = axis.upper()
+        if axis not in AXES:
+            raise InputError(f"unknown axis {shown(axis)}{nearest(axis, AXES)}", _SOURCE)
+        if axis in found:
+            raise InputError(f"{axis} is given twice", _SOURCE)
+        low, colon, high = (word.strip() for word in value.partition(":"))
+        if colon and not (low and high):
+            raise InputError(f"{axis}: expected a range LOW:HIGH, such as -100:100", _SOURCE)
+        ends = parse_value(axis, low, _SOURCE), parse_value(axis, high if colon else low, _SOURCE)
+        if ends[0] > ends[1]:
+            raise InputError(f"{axis}: {shown(value)} is empty, the lesser end comes first", _SOURCE)
+        found[axis] = ends
+    return found
+
+
+def placed(
+    machine: Machine, path: ToolPath, bounds: Bounds, *, mode: str | None = None, progress: Progress | None = None
+) -> Placement:
+    """The placement within bounds with the greatest least margin over all records of a path; see :class:`Placement`.
+
+    Parameters
+    ----------
+    machine, path : as :func:`~..post.post` takes them
+    bounds : by axis (X Y Z mm, A B C rad) the least and the greatest value, as from :func:`parse_bounds`
+    mode : working mode; None: the default one, and head and table's other sign where that allows no placement
+    progress : called now and then with the fraction done, 0 to 1
+
+    The same arguments give the same placement. Placements spread over the bounds are looked at, and the best of them
+    climbed from, at a few records; those of the whole path that turn out worse are then looked at, too, until the least
+    over these is that over all. The greatest is found so, not proved.
+
+    Raises :class:`PoseError` for bounds that are none, an unknown mode and a path without records.
+    """
+    for axis, (low, high) in bounds.items():
+        if axis not in AXES or not -math.inf < low <= high < math.inf:
+            raise PoseError(f"bounds: {axis} from {low} to {high}; an axis of X Y Z A B C and low <= high expected")
+    if not len(path):
+        raise PoseError("path: no records to place")
+    say = progress or (lambda fraction: None)
+    axes = tuple(axis for axis in AXES if axis in bounds and bounds[axis][0] < bounds[axis][1])
+    held = {axis: ends[0] for axis, ends in bounds.items() if axis not in axes}
+    ends = np.array([bounds[axis] for axis in axes]).reshape(-1, 2)
+    results, tried = [], 0
+    for each in modes_to_try(machine, mode):
+        search = _Search(Placing(machine, path, each, axes, ends[:, 0], ends[:, 1], held), say)
+        results.append((*search.run(), search.placing))
+        tried += search.tried
+        if results[-1][1].margin >= 0.0:
+            break
+    point, found, placing = max(results, key=lambda result: result[1].worth)
+    say(1.0)
+    values = placing.values(point)
+    values = {axis: values[axis] for axis in AXES if axis in values}
+    return Placement(placing.workpiece(point), values, placing.mode, found.margin, found.limit, found.record, tried)
+
+
+class _Search:
+    """One search, in one working mode.
+
+    records : those looked at, ascending
+    track : those along which their joints go on, None at first: see :meth:`Placing.rows`
+    """
+
+    def __init__(self, placing: Placing, say: Progress):
+        self.placing, self.say = placing, say
+        self.records = _telling(placing.path)
+        self.track: Indices | None = None
+        self.tried = 0
+
+    @property
+    def rows(self) -> Rows:
+        def rows(points: Floats) -> tuple[Floats, Floats]:
+            self.tried += len(points)
+            return self.placing.rows(points, self.records, self.track)
+
+        return rows
+
+    def run(self) -> tuple[Floats, Found]:
+        """The best point, and what it is over the whole path."""
+        return self._settled(self._climbed(0.0, 0.5))
+
+    def _climbed(self, begin: float, end: float) -> list[Top]:
+        """Local maxima over the records looked at; ``begin`` and ``end`` are of the progress."""
+        d = len(self.placing.axes)
+        points = _spread_out(_LOOKED_AT, d) if d else np.empty((1, 0))
+        parts = np.array_split(points, range(32, len(points), 32))
+        worths = np.concatenate([value_of(*self.rows(part)) for part in parts])
+        starts = spread(points, worths, _STARTS, np.full(d, _APART)) if d else np.zeros(1, np.int64)
+        tops = []
+        for number, start in enumerate(starts.tolist(), 1):
+            tops.append(raised(self.rows, points[start], _STEPS))
+            self.say(begin + (end - begin) * (0.3 + 0.7 * number / len(starts)))
+        return tops
+
+    def _settled(self, tops: list[Top]) -> tuple[Floats, Found]:
+        """The best of some local maxima, over the whole path: the most promising one is looked at until it holds."""
+        best: tuple[Floats, Found] | None = None
+        for attempt in range(_ROUNDS):
+            tops.sort(key=lambda top: (-round(top.worth, 9), -top.rest))
+            point, worth, rest = tops[0]
+            found = self.placing.found(point)
+            self.tried += 1
+            if best is None or found.worth > best[1].worth + _AGREED:
+                best = point, found
+            self.say((0.5 if self.track is None else 0.8) + 0.2 * (1.0 - 0.9**attempt))
+            if best[1].worth >= worth - _AGREED:
+                break
+            more = np.setdiff1d(found.worst[found.shares < max(worth, 0.0) + _BESIDE], self.records)
+            if len(more):
+                self.records = np.union1d(self.records, more)
+                if self.track is not None:
+                    self.track = np.union1d(self.track, more)
+            elif self.track is None:
+                self.track = np.union1d(_evenly(len(self.placing.path), _TRACK), self.records)
+                tops = [raised(self.rows, point, _STEPS), *self._climbed(0.5, 0.8)]
+                continue
+            else:
+                tops[0] = Top(point, found.worth, rest)  # no more is to be learnt of it
+                continue
+            tops = [raised(self.rows, top.point, 0) for top in tops]
+            index = max(range(len(tops)), key=lambda i: tops[i].worth)
+            tops[index] = raised(self.rows, tops[index].point, 40, 0.05)
+        assert best is not None
+        return best
+
+
+def _spread_out(count: int, d: int) -> Floats:
+    """Points (count, d) evenly spread over the unit box, the first in its middle: an additive recurrence, whose steps
+    are powers of the number g > 1 with g**(d + 1) = g + 1 (Roberts, The unreasonable effectiveness of quasirandom
+    sequences, 2018)."""
+    g = 2.0
+    for _ in range(60):
+        g = (1.0 + g) ** (1.0 / (d + 1))
+    steps = g ** -np.arange(1.0, d + 1.0)
+    points: Floats = (0.5 + np.arange(count)[:, None] * steps) % 1.0
+    return points
+
+
+def _telling(path: ToolPath) -> Indices:
+    """Records to begin with: those farthest out in many directions, by tip and by holder, and some in between."""
+    count = len(path)
+    if count <= _FEW:
+        return np.arange(count)
+    ways = np.array([w for w in np.ndindex(3, 3, 3) if w != (1, 1, 1)]) - 1.0
+    parts = [_evenly(count, _EVEN)]
+    for points in (path.tip, path.tip + _LEVER * path.axis):
+        parts.append((points @ ways.T).argmax(axis=0))
+    if path.turns is not None:
+        parts += [path.turns.argmin(axis=0), path.turns.argmax(axis=0)]
+    return np.unique(np.concatenate(parts))
+
+
+def _evenly(count: int, wanted: int) -> Indices:
+    return np.unique(np.linspace(0, count - 1, wanted).astype(np.int64))

@@ -1,0 +1,1 @@
+"""Readers of CL files and G-code."""

@@ -1,0 +1,112 @@
+"""Arcs to points. Everything here is in mm and radians; errors are raised without a place, the reader adds it."""
+
+import math
+
+import numpy as np
+
+from ..path import Floats
+from .cl.tokens import refuse
+
+ON_CIRCLE = 0.01  # mm: further off its circle an arc's start or end is an error; covers coordinates of 3 decimals
+CLOSED = 1e-6  # mm: an end this near the start is a full circle
+_MOST_POINTS = 1_000_000
+
+
+def plane_of(start: Floats, end: Floats, centre: Floats, tangent: Floats) -> Floats:
+    """Unit normal of the circle through start and end about centre, turning so that the motion starts along tangent.
+
+    start, end, centre, tangent : (3,). Motion is right-handed about the normal.
+    """
+    out = start - centre
+    radius, length = float(np.linalg.norm(out)), float(np.linalg.norm(tangent))
+    if radius == 0.0 or length == 0.0:
+        refuse("a circle of radius zero, or INDIRV of length zero")
+    out, along = out / radius, tangent / length
+    normal = np.cross(out, (end - centre) / radius)
+    # two rounded points fix the plane better than a rounded tangent, unless they lie on one diameter
+    if np.linalg.norm(normal) < 1e-3:
+        normal = np.cross(out, along)
+    norm = float(np.linalg.norm(normal))
+    forward = np.cross(normal, out) / norm if norm > 1e-3 else np.zeros(3)
+    agreement = float(forward @ along)
+    if not abs(agreement) >= 0.1:
+        refuse("INDIRV does not point along the circle at the arc's start")
+    return np.asarray(normal / norm * math.copysign(1.0, agreement))
+
+
+def arc(
+    start: Floats, end: Floats, centre: Floats, radius: float, normal: Floats, tolerance: float, helix: bool
+) -> tuple[Floats, Floats]:
+    """Points of an arc after its start, the last one ``end`` itself, and the fraction of the turn at each.
+
+    start, end, centre : (3,); normal : (3,) unit, the motion is right-handed about it.
+    tolerance : largest distance of a chord from the arc.
+    helix : whether start and end may lie at different heights along the normal; the height then grows with the turn.
+
+    Returns (k, 3) and (k,). The points between lie on the circle of the given centre and radius exactly.
+    """
+    if not radius > 0.0:
+        refuse(f"a circle of radius {radius:g}; expected a radius above zero")
+    a, b = start - centre, end - centre
+    height_a, height_b = float(a @ normal), float(b @ normal)
+    a, b = a - height_a * normal, b - height_b * normal
+    for name, flat, height in (("start", a, height_a), ("end", b, height_b)):
+        off = math.hypot(float(np.linalg.norm(flat)) - radius, 0.0 if helix else height)
+        if not off <= ON_CIRCLE:
+            refuse(f"the arc's {name} lies {off:.4g} mm off its circle of radius {radius:.6g} mm")
+    if not helix:
+        height_a = height_b = 0.0
+    u = a / np.linalg.norm(a)
+    v = np.cross(normal, u)
+    turn = math.atan2(float(b @ v), float(b @ u))
+    turn = 2.0 * math.pi if abs(turn) * radius <= CLOSED else turn % (2.0 * math.pi)
+    return swept(centre, (u, v, normal), (radius, radius), (height_a, height_b), turn, tolerance, end)
+
+
+def swept(
+    centre: Floats,
+    basis: tuple[Floats, Floats, Floats],
+    radii: tuple[float, float],
+    heights: tuple[float, float],
+    turn: float,
+    tolerance: float,
+    end: Floats,
+) -> tuple[Floats, Floats]:
+    """Points of a circle, helix or slight spiral after its start, the last one ``end`` itself, and the fraction of the
+    turn at each: (k, 3) and (k,).
+
+    basis : unit vectors (3,) at right angles: towards the start, along the motion there, along the axis of the turn
+    radii, heights : at start and end; both grow with the turn
+    turn : rad, above zero; more than one turn too
+    tolerance : largest distance of a chord from the arc
+    """
+    u, v, normal = basis
+    (radius, radius_end), (height, height_end) = radii, heights
+    # a chord over the angle t is off by r (1 - cos(t/2)) = 2 r sin(t/4)^2; the sine keeps its digits for small t
+    step = 4.0 * math.asin(min(math.sqrt(tolerance / (2.0 * max(radii))), math.sin(math.pi / 16)))
+    if turn > step * _MOST_POINTS:
+        refuse(f"an arc of more than {_MOST_POINTS} points at a tolerance of {tolerance:g} mm; expected a coarser one")
+    count = max(1, math.ceil(turn / step))
+    fraction = np.arange(1, count + 1) / count
+    angle = (turn * fraction)[:, None]
+    out = (radius + (radius_end - radius) * fraction)[:, None]
+    points = centre + out * (np.cos(angle) * u + np.sin(angle) * v)
+    points += (height + (height_end - height) * fraction)[:, None] * normal
+    points[-1] = end
+    return points, fraction
+
+
+def turn_axis(first: Floats, last: Floats, fraction: Floats) -> Floats:
+    """Unit vectors on the great circle from first to last, (3,) each, at the fractions (k,): (k, 3)."""
+    across = last - (first @ last) * first
+    sine = float(np.linalg.norm(np.cross(first, last)))
+    angle = math.atan2(sine, float(first @ last))
+    if angle > math.pi - 1e-6:
+        refuse("the tool axis turns round by 180 degrees on an arc; expected a definite way to turn it")
+    if sine == 0.0:
+        return np.repeat(last[None], len(fraction), axis=0)
+    across /= np.linalg.norm(across)
+    t = (angle * fraction)[:, None]
+    axes = np.cos(t) * first + np.sin(t) * across
+    axes[-1] = last
+    return np.asarray(axes)

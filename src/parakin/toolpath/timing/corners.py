@@ -1,0 +1,132 @@
+"""A posted tool path as a curve: straight motions between the records, corners rounded or stopped at."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...errors import PoseError
+from ..path import Floats
+from ..posting.posted import Posted
+from .kernels.splines import SLIVER
+
+Corners: TypeAlias = Literal["round", "stop"]
+Indices = NDArray[np.int64]
+Flags = NDArray[np.bool_]
+
+LEVER = 100.0  # mm/rad: what a turn counts beside a motion of the tip in the path's length
+CORNER = np.deg2rad(1.0)  # a path that turns by no more is not stopped at
+_SAME = 1e-6  # mm: records no farther apart are one place
+_TIGHT = 1e-5  # mm of reach for each rad (mm/mm) of turn: a corner passed so slowly is as well stopped at
+_BESIDE = 0.05  # of a piece
+_KEPT = 0.995  # of the tolerances; the rest is for what splines of the joints are off
+
+
+@dataclass(frozen=True, eq=False)
+class Curve:
+    """A tool path as a curve over its length s, c corners.
+
+    s counts mm of the tip and, for turns of the pose's angles, LEVER mm a rad (root of the sum of squares). Between
+    corners the pose is straight in s. Where two straight pieces meet, the pose's derivative by s turns from one slope
+    to the next within ``reach`` on either side, its second derivative rising and falling straight: so two derivatives
+    are continuous. The pose is then nowhere farther from the polyline than at the corners, |turn|·reach/6.
+
+    corner : (c, axes) poses, mm and rad
+    length : (c - 1,) of the pieces
+    slope : (c - 1, axes) the pose's derivative by s on the pieces
+    turn : (c, axes) how much the slope turns at each corner; 0 where it does not turn smoothly
+    sharp : (c,) its size, angles counted as in s
+    reach : (c,) mm of s on either side; no more than the pieces there
+    parted : (c,) where the derivatives are not continuous: start, end, and corners that are not rounded
+    place : (n,) the corner of each record
+    record : (c - 1,) the record that each piece leads to
+    """
+
+    corner: Floats
+    length: Floats
+    slope: Floats
+    turn: Floats
+    sharp: Floats
+    reach: Floats
+    parted: Flags
+    place: Indices
+    record: Indices
+
+
+def curve_of(
+    posted: Posted, corners: Corners, tolerance: float, axis_tolerance: float, stops: Flags, smooth: bool
+) -> Curve:
+    """The curve of a posted path.
+
+    tolerance, axis_tolerance : mm and rad that a rounded corner may take tip and axis off the straight pieces
+    stops : (n,) records where the path is parted in any case
+    smooth : whether corners matter at all; if not, each is kept as it is
+    """
+    poses = posted.poses
+    angles = np.array([axis in "ABC" for axis in posted.machine.axes])
+    scale = np.where(angles, LEVER, 1.0)
+    lengths = _norms(np.diff(poses, axis=0) * scale)
+    moved = np.concatenate([[True], lengths > _SAME])
+    place = np.cumsum(moved) - 1
+    record = np.flatnonzero(moved)[1:]
+    corner = np.ascontiguousarray(poses[moved])
+    motion = np.diff(corner, axis=0)
+    length = _norms(motion * scale)
+    slope = motion / length[:, None]
+    turn = np.zeros_like(corner)
+    turn[1:-1] = np.diff(slope, axis=0)
+    parted = np.zeros(len(corner), bool)
+    parted[place[stops]] = True
+    parted[[0, -1]] = True
+    sharp = _norms(turn * scale)
+    if not smooth:
+        parted[:] = True
+    elif corners == "stop":
+        parted |= sharp > 2.0 * np.sin(0.5 * CORNER)
+    tip = _norms(turn * ~angles)
+    leaning = _leaning(posted.machine.axes, corner, turn)
+    with np.errstate(divide="ignore"):
+        reach = _KEPT * np.minimum(6.0 * tolerance / tip, 6.0 * axis_tolerance / leaning)
+    reach[1:-1] = _clear(np.minimum(reach[1:-1], np.minimum(length[:-1], length[1:])), length)
+    parted |= reach < _TIGHT * sharp
+    turn[parted] = sharp[parted] = reach[parted] = 0.0
+    return Curve(corner, length, slope, turn, sharp, reach, parted, place, record)
+
+
+def _clear(reach: Floats, length: Floats) -> Floats:
+    """Reaches that go all over a piece or end well within it, for rows close together tell second derivatives badly."""
+    less = (1.0 - _BESIDE) * np.minimum(length[:-1], length[1:])
+    for side in (length[:-1], length[1:]):
+        beside = (reach > (1.0 - _BESIDE) * side) & (reach < (1.0 - SLIVER) * side)
+        reach = np.where(beside, less, reach)
+    return reach
+
+
+def _norms(rows: Floats) -> Floats:
+    norms: Floats = np.sqrt(np.einsum("ij,ij->i", rows, rows))
+    return norms
+
+
+def _leaning(axes: tuple[str, ...], corner: Floats, turn: Floats) -> Floats:
+    """How fast the tool's axis leans at most, rad, where the pose's angles change by ``turn`` (c, axes).
+
+    The axis turns no faster than all angles together; a turn of C moves it by sin B only, where A does not turn it.
+    """
+    letters = [axis for axis in axes if axis in "ABC"]
+    rates = {letter: np.abs(turn[:, axes.index(letter)]) for letter in letters}
+    if letters == ["B", "C"]:
+        lean = np.abs(corner[:, axes.index("B")])
+        near = np.pad(lean, 2, mode="edge")  # over a piece the pose lies amid the two corners before and behind
+        most = np.max([near[i : i + len(lean)] for i in range(5)], axis=0)
+        rates["C"] = rates["C"] * np.minimum(most, 1.0)
+    return np.sum(list(rates.values()), axis=0) if letters else np.zeros(len(corner))
+
+
+def checked(tolerance: float, what: str) -> float:
+    """A tolerance above zero; raises :class:`PoseError` for others."""
+    if not 0.0 < tolerance < np.inf:
+        raise PoseError(f"{what}: more than 0 expected, not {tolerance!r}")
+    return float(tolerance)

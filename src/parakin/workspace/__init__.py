@@ -1,0 +1,1 @@
+"""Where a machine is allowed: certified, sampled, inscribed and connected workspaces."""

@@ -1,0 +1,1 @@
+"""Workspaces proved by subdivision with interval arithmetic."""

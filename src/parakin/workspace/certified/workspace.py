@@ -1,0 +1,182 @@
+"""The certified workspace: what is inside and what is outside, proved, with what follows from its cells."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+from functools import cached_property
+from math import inf, isfinite
+from typing import Any
+
+import numpy as np
+
+from ...errors import PoseError
+from ...machine import Array, Machine
+from .region import Region, Span, region
+from .subdivision import Cells
+
+CLOSE = 1.0 / 128.0  # of the box: the cells against which it rests
+ROUNDING = 1e-9  # relative, of the sums of volumes
+
+
+@dataclass(frozen=True)
+class Volume:
+    """A volume, mm³ (in the plane an area, mm²): at least ``inner``, at most ``outer``, likely ``estimate``."""
+
+    inner: float
+    estimate: float
+    outer: float
+
+    @property
+    def gap(self) -> float:
+        """(outer - inner)/estimate; 0 for nothing at all."""
+        return (
+            (self.outer - self.inner) / self.estimate if self.estimate > 0.0 else (np.inf if self.outer > 0.0 else 0.0)
+        )
+
+
+@dataclass(frozen=True)
+class Bound:
+    """A limit with its share of the region's boundary, and the middle of its part."""
+
+    limit: str
+    share: float
+    middle: tuple[float, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Workspace:
+    """A region with its proved volume, and the cells that prove it.
+
+    ``stopped`` says why the work ended: ``gap`` reached, ``cell`` size reached, ``time``, ``interrupted``,
+    ``resolution`` (of the numbers) or ``memory``. ``parameters`` are enough to run it again.
+    """
+
+    region: Region
+    cells: Cells
+    stopped: str
+    parameters: Mapping[str, Any]
+
+    @property
+    def machine(self) -> Machine:
+        return self.region.machine
+
+    @property
+    def axes(self) -> tuple[str, ...]:
+        """The axes of a place."""
+        return self.region.places
+
+    @property
+    def unit(self) -> str:
+        return ("mm", "mm²", "mm³")[len(self.axes) - 1]
+
+    @cached_property
+    def volume(self) -> Volume:
+        total = [self.cells.total(part) for part in (self.cells.inner, self.cells.estimate, self.cells.outer)]
+        return Volume(total[0] * (1.0 - ROUNDING), total[1], total[2] * (1.0 + ROUNDING))
+
+    @property
+    def empty(self) -> bool:
+        """Proved to hold no place at all."""
+        return not len(self.cells.low)
+
+    @cached_property
+    def box(self) -> tuple[Array, Array] | None:
+        """Lower and upper corner of a box proved to hold the region; None if it is empty."""
+        if self.empty:
+            return None
+        return self.cells.low.min(0), (self.cells.low + self.cells.size).max(0)
+
+    @cached_property
+    def centroid(self) -> Array | None:
+        weights = self.cells.estimate * self.cells.volumes
+        if not weights.sum() > 0.0:
+            return None
+        return np.asarray(weights @ (self.cells.low + 0.5 * self.cells.size) / weights.sum())
+
+    @cached_property
+    def bounded_by(self) -> tuple[Bound, ...]:
+        """The limits that bound the region, the one with most of its boundary first."""
+        edge = ~self.cells.inside & (self.cells.area > 0.0)
+        limit, area = self.cells.limit[edge], self.cells.area[edge]
+        middles = (self.cells.low + 0.5 * self.cells.size)[edge]
+        found = []
+        for number in np.unique(limit):
+            own = area[limit == number]
+            middle = own @ middles[limit == number] / own.sum()
+            found.append(Bound(self.region.limits[number], float(own.sum() / area.sum()), tuple(middle.tolist())))
+        return tuple(sorted(found, key=lambda bound: -bound.share))
+
+    @property
+    def surface(self) -> float:
+        """The boundary's area, mm² (in the plane its length, mm), as estimated."""
+        return float(self.cells.area[~self.cells.inside].sum())
+
+
+def workspace(
+    machine: Machine,
+    at: Mapping[str, float] | None = None,
+    every: Mapping[str, Span] | None = None,
+    some: Mapping[str, Span] | None = None,
+    dexterous: bool = False,
+    without: Sequence[str] = (),
+    mode: str | None = None,
+    gap: float = 0.01,
+    cell: float | None = None,
+    seconds: float | None = 60.0,
+    progress: Callable[[float], None] | None = None,
+) -> Workspace:
+    """The places where a machine is allowed, with its volume proved to lie between two numbers.
+
+    Parameters
+    ----------
+    at, every, some, dexterous, without, mode : what is asked; see :func:`parakin.workspace.certified.region.region`
+    gap : stop as soon as (outer - inner)/estimate of the volume is no greater
+    cell : refine all cells of the boundary to this size, mm, instead
+    seconds : stop after this time with what there is; None for no end
+    progress : called with the fraction done
+
+    Raises :class:`PoseError` for a question that makes no sense or a workspace that nothing bounds.
+    """
+    asked = region(machine, at, every, some, dexterous, without, mode)
+    if not (isfinite(gap) and gap > 0.0):
+        raise PoseError(f"gap: a number above 0 expected, not {gap:g}")
+    if cell is not None and not (isfinite(cell) and cell > 0.0):
+        raise PoseError(f"cell: a size above 0 mm expected, not {cell:g}")
+    if seconds is not None and not seconds > 0.0:
+        raise PoseError(f"seconds: a time above 0 s expected, not {seconds:g}")
+    parameters = {**question(asked), "method": "certified", "gap": gap, "cell": cell, "seconds": seconds}
+    began = time.monotonic()
+    extent = asked.extent
+    if extent is None:
+        return Workspace(asked, nothing(len(asked.places)), "gap", parameters)
+    rest = None if seconds is None else seconds - (time.monotonic() - began)
+    work = asked.subdivision(*extent)
+    stopped = work.run(gap, cell, rest, progress).stopped
+    if stopped == "gap":
+        with suppress(KeyboardInterrupt):  # the answer is there; only its box could be closer
+            work.tighten(CLOSE, began + (inf if seconds is None else seconds))
+    return Workspace(asked, work.cells(stopped), stopped, parameters)
+
+
+def question(asked: Region) -> dict[str, Any]:
+    """What :func:`workspace` must be given to ask the same of the same machine; mm and rad."""
+    swept = {axis: list(span) for axis, span in asked.turns.items()}
+    return {
+        "machine": asked.machine.name,
+        "kind": asked.kind,
+        "places": list(asked.places),
+        "at": dict(asked.held),
+        "every": swept if asked.every and asked.kind != "dexterous" else {},
+        "some": {} if asked.every else swept,
+        "without": list(asked.without),
+        "mode": asked.mode,
+    }
+
+
+def nothing(places: int) -> Cells:
+    """No cells at all."""
+    none = np.zeros(0)
+    return Cells(np.zeros((0, places)), np.zeros((0, places)), none, none, none, np.zeros(0, np.int64), none)

@@ -1,0 +1,1 @@
+"""The connected components of a workspace."""

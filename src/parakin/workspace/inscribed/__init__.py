@@ -1,0 +1,1 @@
+"""The largest box inside a workspace."""

@@ -1,0 +1,1 @@
+"""Workspaces sampled on a grid, along rays, and over the drives' ranges."""

@@ -1,0 +1,178 @@
+"""The sweep of the drives, after the HBG80 paper (section 3): some run while the others stand at a limit, and direct
+kinematics maps them to contours, to the net of the shell, and to the volume."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from itertools import combinations, product
+from math import isfinite
+
+import numpy as np
+
+from ...errors import NoMethodError, PoseError
+from ...kernels.batch import run_checked
+from ...kinematics.forward import tolerance
+from ...machine import Array, Machine
+from ..certified.region import region
+from ..certified.workspace import question
+from .sampling import Swept
+
+NOTE = (
+    "contours and nets show what the drives' limits bound; where another limit does (reach, cones, clearance) they "
+    "end, and that part of the shell is missing"
+)
+MOST_CELLS = 1_000_000_000
+_AT_ONCE = 1 << 18
+_SAME = 1e-6  # mm or rad: the drives come back
+
+
+@dataclass(frozen=True)
+class Strategy:
+    """Which drives run, and at which limit, ``min`` or ``max``, each other one stands."""
+
+    runs: tuple[str, ...]
+    stands: tuple[tuple[str, str], ...]
+
+    @property
+    def name(self) -> str:
+        """Like ``Xhbg runs, Yhbg at max``."""
+        running = f"{' and '.join(self.runs)} {'runs' if len(self.runs) == 1 else 'run'}"
+        return ", ".join([running, *[f"{drive} at {end}" for drive, end in self.stands]])
+
+
+@dataclass(frozen=True, eq=False)
+class Image:
+    """Where a strategy takes the tool, with the platform on one side of the legs' centres.
+
+    side : ``home`` where the platform is on the side it has at home, else ``other``
+    joints, places : (n, d) for one drive that runs, (n, n, d) for two; places are NaN where they are not allowed
+    """
+
+    strategy: Strategy
+    side: str
+    joints: Array
+    places: Array
+
+    @property
+    def pieces(self) -> list[Array]:
+        """A contour's parts without gaps, each (k, d)."""
+        there = ~np.isnan(self.places).any(-1)
+        edges = np.flatnonzero(np.diff(there.astype(np.int8), prepend=0, append=0))
+        return [self.places[a:b] for a, b in zip(edges[::2], edges[1::2], strict=True)]
+
+
+@dataclass(frozen=True, eq=False)
+class DriveWorkspace(Swept):
+    """A workspace as the drives reach it: ``estimate`` is |det J| summed over the drives' box, J = A⁻¹B.
+
+    ``step`` is the greatest step of a drive. Images that are not allowed anywhere are left out.
+    """
+
+    contours: tuple[Image, ...]
+    nets: tuple[Image, ...]
+    note: str = NOTE
+
+
+def strategies(machine: Machine, running: int) -> list[Strategy]:
+    """All ways to let so many drives run while each other one stands at a limit."""
+    found = []
+    for runs in combinations(machine.joints, running):
+        others = [name for name in machine.joints if name not in runs]
+        for ends in product(("min", "max"), repeat=len(others)):
+            found.append(Strategy(runs, tuple(zip(others, ends, strict=True))))
+    return found
+
+
+def drive_sweep(
+    machine: Machine, cells: int = 64, mode: str | None = None, progress: Callable[[float], None] | None = None
+) -> DriveWorkspace:
+    """A workspace from the drives' side.
+
+    A pose counts where its own inverse in the working mode gives the same drives back and every limit holds. Both
+    common points of the legs' spheres (circles) are looked at.
+
+    Parameters
+    ----------
+    machine : one whose platform does not turn, with as many drives as it has axes
+    cells : into so many equal parts each drive's range is cut; the volume is summed over their middles
+    mode : working mode
+    progress : called with the fraction done
+
+    Raises :class:`NoMethodError` for other machines and drives without limits, :class:`PoseError` for bad numbers.
+    """
+    _refuse_others(machine)
+    asked = region(machine, mode=mode)
+    d = len(machine.joints)
+    if cells < 1 or cells**d > MOST_CELLS:
+        raise PoseError(f"cells: 1 to {int(MOST_CELLS ** (1.0 / d) + 1e-9)} parts of each drive expected, not {cells}")
+    drives = machine.model.drives
+    step = max((drive.high - drive.low) / cells for drive in drives)
+    parameters = {**question(asked), "method": "drives", "cells": cells}
+    volume = _volume(machine, cells, asked.mode, progress)
+    contours, nets = (_images(machine, strategies(machine, running), cells, asked.mode) for running in (1, 2))
+    return DriveWorkspace(asked, "drives", volume, step, parameters, contours, nets)
+
+
+def _refuse_others(machine: Machine) -> None:
+    model, why = machine.model, ""
+    if any(unit == "rad" for unit in machine.axis_units):
+        why = "its tool turns"
+    elif not model.by_spheres or len(machine.joints) != len(machine.axes):
+        why = "it has not one rod for each axis"
+    elif free := [drive.name for drive in model.drives if not isfinite(drive.high - drive.low)]:
+        why = f"{free[0]} has no limit to stand at"
+    if why:
+        raise NoMethodError(f"{machine.name}: no sweep of the drives, {why}")
+
+
+def _placed(machine: Machine, joints: Array, side: float, mode: str) -> Array:
+    """Poses on one side for joints, (N, d) each; NaN where one does not count."""
+    poses = np.empty((len(joints), len(machine.axes)))
+    residual = run_checked(machine.model.spheres_tape(side), joints, poses, np.empty((len(joints), 0)))
+    with np.errstate(invalid="ignore"):
+        counts = (residual <= tolerance(machine)) & (abs(machine.inverse(poses, mode) - joints) <= _SAME).all(1)
+    # The joints as they stand: those of the inverse lie a rounding beyond the limits.
+    counts &= machine.check(poses, joints, mode) == 0
+    poses[~counts] = np.nan
+    return poses
+
+
+def _sides(machine: Machine) -> list[tuple[str, float]]:
+    return [("home", machine.model.home_side), ("other", -machine.model.home_side)]
+
+
+def _images(machine: Machine, ways: Sequence[Strategy], cells: int, mode: str) -> tuple[Image, ...]:
+    found = []
+    for way in ways:
+        stands = dict(way.stands)
+        columns = []
+        for drive in machine.model.drives:
+            if drive.name in way.runs:
+                columns.append(np.linspace(drive.low, drive.high, cells + 1))
+            else:
+                columns.append(np.array([drive.low if stands[drive.name] == "min" else drive.high]))
+        joints = np.stack(np.meshgrid(*columns, indexing="ij"), -1)
+        shape = (*[cells + 1] * len(way.runs), len(columns))
+        for name, side in _sides(machine):
+            places = _placed(machine, np.ascontiguousarray(joints.reshape(-1, len(columns))), side, mode)
+            if not np.isnan(places).all():
+                found.append(Image(way, name, joints.reshape(shape), places.reshape(shape)))
+    return tuple(found)
+
+
+def _volume(machine: Machine, cells: int, mode: str, progress: Callable[[float], None] | None) -> float:
+    low, high = (np.array([getattr(drive, end) for drive in machine.model.drives]) for end in ("low", "high"))
+    size, d = (high - low) / cells, len(low)
+    total = 0.0
+    for start in range(0, cells**d, _AT_ONCE):
+        stop = min(start + _AT_ONCE, cells**d)
+        index = np.stack(np.unravel_index(np.arange(start, stop), (cells,) * d), 1)
+        joints = low + (index + 0.5) * size
+        for _, side in _sides(machine):
+            poses = _placed(machine, joints, side, mode)
+            a, b = machine.jacobians(poses[~np.isnan(poses).any(1)], mode)
+            total += float(abs(np.linalg.det(b) / np.linalg.det(a)).sum())
+        if progress:
+            progress(stop / cells**d)
+    return total * float(size.prod())

@@ -1,0 +1,14 @@
+"""Names of the types that every room shares."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array: TypeAlias = NDArray[np.float64]  # lengths in mm, angles in rad, unless a docstring says otherwise
+Indices: TypeAlias = NDArray[np.int64]  # zero-based numbers of rows or columns
+Flags: TypeAlias = NDArray[np.bool_]  # one truth a row
+Progress: TypeAlias = Callable[[float], None]  # called now and then with the fraction done, 0 to 1

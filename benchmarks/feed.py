@@ -15,7 +15,7 @@ from parakin.machine import Machine
 from parakin.toolpath.path import ToolPath
 from parakin.toolpath.posting.post import post
 from parakin.toolpath.posting.posted import Posted
-from parakin.toolpath.timing import plan
+from parakin.toolpath.timing import plan_trajectory
 from parakin.toolpath.timing.kernels.reachability import backward, ceilings, forward
 from parakin.toolpath.timing.kernels.splines import bends
 
@@ -40,7 +40,7 @@ def million() -> Posted:
 
 
 def quickest(s: np.ndarray, q: np.ndarray, speed: np.ndarray, acceleration: np.ndarray) -> float:
-    """The cycle time of the quickest law through rows of joints."""
+    """The cycle time of the quickest trajectory through rows of joints."""
     step = np.diff(s)
     n, bend = len(step), np.empty_like(q)
     bends(step, q, bend, np.empty(n + 1))
@@ -85,7 +85,7 @@ def against_toppra() -> list[list[str]]:
 
 def main() -> str:
     posted = million()
-    seconds = best(lambda: plan(posted), 1)
+    seconds = best(lambda: plan_trajectory(posted), 1)
     rows = [[f"{len(posted.path):,} records on the Tricept (≤ 10 s)", f"{seconds:.2f}", "", "", "", ""]]
     rows += against_toppra() if find_spec("toppra") else [["toppra is not installed", "", "", "", "", ""]]
     return table("Feed planning", ["what", "s", "times as fast", "bound", "cycle time", "bound"], rows)

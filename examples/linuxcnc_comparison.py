@@ -104,17 +104,18 @@ def programs(machine, folder, place, upright):
     """The job, and its programs: as programmed and as posted."""
     job = prepare(machine, part(folder, upright), workpiece=place)
     file = io.BytesIO()
-    linuxcnc_program(job.law)(file)
+    linuxcnc_program(job.trajectory)(file)
     return job, as_programmed(job.posted), file.getvalue().decode("ascii")
 
 
 def told(job, text, ours):
     """A line about a posted program that has run."""
-    took, law = len(ours) * CYCLE, job.law.seconds
+    took, planned = len(ours) * CYCLE, job.trajectory.seconds
     worst = job.posted.machine.joints[int(ours.max(0).argmax())]
     return (
         f"posted: {len(job.posted.path)} records ({job.inserted} inserted), {text.count('G53 G1')} motions; "
-        f"{took:.3f} s, law {law:.3f} s ({took / law - 1.0:+.1%}), program {program_seconds(job.law):.3f} s; "
+        f"{took:.3f} s, trajectory {planned:.3f} s ({took / planned - 1.0:+.1%}), "
+        f"program {program_seconds(job.trajectory):.3f} s; "
         f"{worst} at {ours.max():.3f} of its speed"
     )
 
@@ -136,7 +137,7 @@ def compare(folder, target):
         print(f"  accelerations {way}: up to {most:.1f} times the limit, beyond it in {often:.0%} of the cycles")
     titles = (
         f"Feed as programmed: {NAMES[worst]} at {plain.max():.0%} of its limit",
-        f"Posted by parakin: no joint beyond {ours.max():.1%}; predicted {job.law.seconds:.2f} s",
+        f"Posted by parakin: no joint beyond {ours.max():.1%}; predicted {job.trajectory.seconds:.2f} s",
     )
     picture(target, machine, list(zip(titles, (plain, ours), strict=True)))
 

@@ -1,4 +1,4 @@
-"""The feed planner: every law sampled at 1 kHz against every limit, closed forms, and toppra."""
+"""The feed planner: every trajectory sampled at 1 kHz against every limit, closed forms, and toppra."""
 
 import logging
 from dataclasses import replace
@@ -11,8 +11,8 @@ from parakin.errors import InputError, PoseError
 from parakin.machine import Machine
 from parakin.toolpath.path import ToolPath
 from parakin.toolpath.posting.post import post
-from parakin.toolpath.timing import plan
-from parakin.toolpath.timing.joint_path import Drives
+from parakin.toolpath.timing import plan_trajectory
+from parakin.toolpath.timing.joint_path import DriveLimits
 from parakin.toolpath.timing.kernels.reachability import backward, ceilings, forward
 from parakin.toolpath.timing.kernels.splines import bends
 
@@ -112,52 +112,61 @@ def strayed(machine, points):
     return np.min([d.max(1) for d in shares], axis=0).max()
 
 
-def hold(law, rate=1000.0):
+def hold(trajectory, rate=1000.0):
     """Every limit holds for the setpoints' differences, and the path is kept."""
-    points, machine, path = law.sampled(rate), law.posted.machine, law.posted.path
-    drives = Drives.of(machine)
+    points, machine, path = trajectory.sample(rate), trajectory.posted.machine, trajectory.posted.path
+    drives = DriveLimits.of(machine)
     for order, limit in ((1, drives.speed), (2, drives.acceleration), (3, drives.jerk)):
         differences = np.abs(np.diff(points.joints, order, axis=0)) * rate**order
         assert (differences <= BEYOND * limit).all()
     assert (np.abs(points.speeds) <= BEYOND * drives.speed).all()
     assert (np.abs(points.accelerations) <= BEYOND * drives.acceleration).all()
     feed = np.linalg.norm(np.diff(tips(machine, points.poses), axis=0), axis=1) * rate * 60.0
-    first = np.searchsorted(law.times, points.times[:-1], "right")  # the records around each span
-    last = np.searchsorted(law.times, points.times[1:], "left")
+    first = np.searchsorted(trajectory.times, points.times[:-1], "right")  # the records around each span
+    last = np.searchsorted(trajectory.times, points.times[1:], "left")
     most = [path.feed[a : b + 1].max() for a, b in zip(first, np.maximum(first, last), strict=True) if a < len(path)]
     assert (feed[: len(most)] <= BEYOND * np.array(most)).all()
 
     few = points.poses[:: max(1, len(points.poses) // 60)]
-    assert distance(tips(machine, few), tips(machine, law.posted.poses)) <= TOLERANCE
+    assert distance(tips(machine, few), tips(machine, trajectory.posted.poses)) <= TOLERANCE
     if "B" in machine.axes:
         share = np.linspace(0.0, 1.0, 300)[:, None]
-        straight = [p + share * (q - p) for p, q in zip(law.posted.poses[:-1], law.posted.poses[1:], strict=True)]
+        straight = [
+            p + share * (q - p) for p, q in zip(trajectory.posted.poses[:-1], trajectory.posted.poses[1:], strict=True)
+        ]
         assert distance(axes_of(machine, few), axes_of(machine, np.concatenate(straight))) <= AXIS_TOLERANCE
     assert strayed(machine, points) < 2e-3
 
-    for speeds in (points.speeds[0], law.at(law.seconds).speeds[0]):
+    for speeds in (points.speeds[0], trajectory.at(trajectory.seconds).speeds[0]):
         assert np.abs(speeds).max() < 1e-6
-    assert np.abs(points.joints[-1] - law.at(law.seconds).joints[0]).max() < 1e-9
-    assert sum(law.shares.values()) == pytest.approx(1.0 if law.seconds else 0.0)
+    assert np.abs(points.joints[-1] - trajectory.at(trajectory.seconds).joints[0]).max() < 1e-9
+    assert sum(trajectory.shares.values()) == pytest.approx(1.0 if trajectory.seconds else 0.0)
 
 
 @everyone
 def test_every_limit_holds(name):
     for seed in range(26):
         result = drawn(name, seed)
-        hold(plan(result, corners=("round", "stop")[seed % 2], tolerance=TOLERANCE, axis_tolerance=AXIS_TOLERANCE))
+        hold(
+            plan_trajectory(
+                result, corners=("round", "stop")[seed % 2], tolerance=TOLERANCE, axis_tolerance=AXIS_TOLERANCE
+            )
+        )
 
 
 @everyone
 def test_every_limit_holds_with_jerks(name):
     for seed in range(6):
         result = drawn(name, 100 + seed, jerk=True)
-        law = plan(result, corners=("round", "stop")[seed % 2])
-        hold(law)
-        drives = Drives.of(result.machine)
+        trajectory = plan_trajectory(result, corners=("round", "stop")[seed % 2])
+        hold(trajectory)
+        drives = DriveLimits.of(result.machine)
         free = limited(result.machine, mm=(*drive_of(drives, result.machine, "mm"), INF),
                        rad=(*drive_of(drives, result.machine, "rad"), INF))  # fmt: skip
-        assert law.seconds > plan(replace(result, machine=free), corners=("round", "stop")[seed % 2]).seconds
+        assert (
+            trajectory.seconds
+            > plan_trajectory(replace(result, machine=free), corners=("round", "stop")[seed % 2]).seconds
+        )
 
 
 def drive_of(drives, machine, unit):
@@ -174,13 +183,13 @@ def drive_of(drives, machine, unit):
 @pytest.mark.parametrize(("way", "feed"), [(100.0, 6000.0), (100.0, 600.0), (0.5, 6000.0), (100.0, 1e6)])
 def test_a_straight_motion_takes_the_time_of_its_trapezoid(way, feed):
     machine = limited(pk.load("linear_delta"), mm=(1000.0, 2000.0, INF))
-    law = plan(posted(machine, [[0, 0, 280], [0, 0, 280 + way]], feed=feed))
+    trajectory = plan_trajectory(posted(machine, [[0, 0, 280], [0, 0, 280 + way]], feed=feed))
     a, v = 2000.0, min(feed / 60.0, 1000.0)
     expected = way / v + v / a if way > v * v / a else 2.0 * np.sqrt(way / a)
-    assert law.seconds == pytest.approx(expected, rel=2e-4)
-    assert law.seconds > expected * (1.0 - 1e-9)
-    assert law.times.tolist() == [0.0, law.seconds]
-    cruising = law.at([law.seconds / 2]).speeds[0]
+    assert trajectory.seconds == pytest.approx(expected, rel=2e-4)
+    assert trajectory.seconds > expected * (1.0 - 1e-9)
+    assert trajectory.times.tolist() == [0.0, trajectory.seconds]
+    cruising = trajectory.at([trajectory.seconds / 2]).speeds[0]
     assert cruising == pytest.approx([min(v, np.sqrt(way * a))] * 3, rel=5e-3)
 
 
@@ -188,14 +197,14 @@ def test_a_straight_motion_takes_the_time_of_its_trapezoid(way, feed):
 def test_with_jerks_a_straight_motion_is_no_quicker_than_can_be_and_not_much_slower(way, feed):
     v, a, j = feed / 60.0, 2000.0, 50_000.0
     machine = limited(pk.load("linear_delta"), mm=(INF, a, j))
-    law = plan(posted(machine, [[0, 0, 280], [0, 0, 280 + way]], feed=feed))
+    trajectory = plan_trajectory(posted(machine, [[0, 0, 280], [0, 0, 280 + way]], feed=feed))
     if way >= v * (v / a + a / j):
         least = way / v + v / a + a / j
     elif way >= 2.0 * a**3 / j**2:
         least = a / j + np.sqrt((a / j) ** 2 + 4.0 * way / a)
     else:
         least = 4.0 * np.cbrt(way / (2.0 * j))
-    assert least < law.seconds < 1.25 * least
+    assert least < trajectory.seconds < 1.25 * least
 
 
 def cartesian(**limits):
@@ -210,12 +219,12 @@ def circle(radius, count=721):
 
 def test_a_circle_at_the_feed_that_its_centripetal_acceleration_allows():
     radius, a = 50.0, 1000.0
-    slow = plan(posted(cartesian(mm=(INF, a, INF)), circle(radius), feed=60.0 * 0.8 * np.sqrt(a * radius)))
+    slow = plan_trajectory(posted(cartesian(mm=(INF, a, INF)), circle(radius), feed=60.0 * 0.8 * np.sqrt(a * radius)))
     middle = np.linspace(0.2, 0.8, 100) * slow.seconds
     speed = np.linalg.norm(slow.at(middle).speeds, axis=1)
     assert speed == pytest.approx(0.8 * np.sqrt(a * radius), rel=1e-3)
     assert slow.shares["feed"] > 0.8
-    fast = plan(posted(cartesian(mm=(INF, a, INF)), circle(radius), feed=1e6))
+    fast = plan_trajectory(posted(cartesian(mm=(INF, a, INF)), circle(radius), feed=1e6))
     crossing = fast.times[[180, 360, 540]]  # where the path runs along one of the axes, the other one only turns it
     speed = np.linalg.norm(fast.at(crossing).speeds, axis=1)
     assert speed == pytest.approx(np.sqrt(a * radius), rel=1e-2)
@@ -226,21 +235,23 @@ def test_a_circle_at_the_feed_that_its_centripetal_acceleration_allows():
 def test_without_accelerations_only_the_feed_counts():
     tip = np.array([[0, 0, 0], [30, 0, 0], [30, 40, 0], [30, 40, 0], [0, 0, 0]], float)
     feed = np.array([100.0, 600.0, 1200.0, 1.0, 3000.0])
-    law = plan(posted(limited(pk.load("orthoglide")), tip, feed=feed))
-    assert np.diff(law.times) == pytest.approx([3.0, 2.0, 0.0, 1.0], abs=1e-9)
-    assert law.shares == {"feed": pytest.approx(1.0)}
-    assert law.at([1.5, 4.0]).poses == pytest.approx(np.array([[15.0, 0.0, 0.0], [30.0, 20.0, 0.0]]), abs=1e-9)
+    trajectory = plan_trajectory(posted(limited(pk.load("orthoglide")), tip, feed=feed))
+    assert np.diff(trajectory.times) == pytest.approx([3.0, 2.0, 0.0, 1.0], abs=1e-9)
+    assert trajectory.shares == {"feed": pytest.approx(1.0)}
+    assert trajectory.at([1.5, 4.0]).poses == pytest.approx(np.array([[15.0, 0.0, 0.0], [30.0, 20.0, 0.0]]), abs=1e-9)
     with pytest.raises(PoseError, match=r"between records 0 and 1 \(line 2\) nothing limits the motion: no feed"):
-        plan(posted(limited(pk.load("orthoglide")), tip, feed=np.nan))
+        plan_trajectory(posted(limited(pk.load("orthoglide")), tip, feed=np.nan))
 
 
 def test_rapid_and_seconds():
     machine = limited(pk.load("linear_delta"), mm=(500.0, INF, INF))
     tip = np.array([[0, 0, 280], [0, 0, 380], [0, 0, 280], [0, 0, 270]], float)
     seconds = np.array([np.nan, np.nan, 4.0, np.nan])
-    law = plan(posted(machine, tip, feed=[600, 600, np.nan, 600], rapid=[False, True, False, False], seconds=seconds))
-    assert np.diff(law.times) == pytest.approx([0.2, 4.0, 1.0])
-    assert set(law.shares) == {"feed", "tower_a.speed"}
+    trajectory = plan_trajectory(
+        posted(machine, tip, feed=[600, 600, np.nan, 600], rapid=[False, True, False, False], seconds=seconds)
+    )
+    assert np.diff(trajectory.times) == pytest.approx([0.2, 4.0, 1.0])
+    assert set(trajectory.shares) == {"feed", "tower_a.speed"}
 
 
 # Corners.
@@ -248,29 +259,29 @@ def test_rapid_and_seconds():
 
 def square(machine, **how):
     tip = np.array([[0, 0, 0], [20, 0, 0], [20, 20, 0], [0.1, 20, 0.0], [0, 0, 0]], float)
-    return plan(posted(machine, tip), **how)
+    return plan_trajectory(posted(machine, tip), **how)
 
 
 def test_corners_are_stopped_at():
     machine = limited(pk.load("orthoglide"), mm=(INF, 2000.0, INF))
-    law = square(machine, corners="stop")
-    at = law.at(law.times)
+    trajectory = square(machine, corners="stop")
+    at = trajectory.at(trajectory.times)
     assert np.abs(at.speeds).max() < 1e-6
-    assert at.joints == pytest.approx(law.posted.joints, abs=1e-9)
-    assert [law.names[law.binding[i]] for i in (0, -1)] == ["start/stop"] * 2
+    assert at.joints == pytest.approx(trajectory.posted.joints, abs=1e-9)
+    assert [trajectory.names[trajectory.binding[i]] for i in (0, -1)] == ["start/stop"] * 2
     rounded = square(machine)
     assert np.linalg.norm(rounded.at(rounded.times[1:-1]).speeds, axis=1).min() > 1.0
-    assert rounded.seconds < law.seconds
+    assert rounded.seconds < trajectory.seconds
     one = square(machine, stops=[2])
     assert np.abs(one.at(one.times[2]).speeds).max() < 1e-6 < np.abs(one.at(one.times[1]).speeds).max()
-    assert rounded.seconds < one.seconds < law.seconds
+    assert rounded.seconds < one.seconds < trajectory.seconds
 
 
 def test_a_corner_is_as_far_off_as_it_may_be():
     machine = limited(pk.load("orthoglide"), mm=(INF, 2000.0, INF))
     for tolerance in (0.1, 0.01, 0.001):
-        law = square(machine, tolerance=tolerance)
-        off = np.linalg.norm(law.at(law.times[1:-1]).poses - law.posted.poses[1:-1], axis=1)
+        trajectory = square(machine, tolerance=tolerance)
+        off = np.linalg.norm(trajectory.at(trajectory.times[1:-1]).poses - trajectory.posted.poses[1:-1], axis=1)
         assert (off <= tolerance).all() and (off > 0.98 * tolerance).all()
 
 
@@ -279,7 +290,7 @@ def test_a_straight_line_of_many_records_is_one_line():
     z = np.linspace(280.0, 380.0, 1000)
     tip = np.stack([0 * z, 0 * z, z], 1)
     for corners in ("round", "stop"):
-        many, one = (plan(posted(machine, rows), corners=corners).seconds for rows in (tip, tip[[0, -1]]))
+        many, one = (plan_trajectory(posted(machine, rows), corners=corners).seconds for rows in (tip, tip[[0, -1]]))
         assert many == pytest.approx(one, rel=1e-3)
 
 
@@ -289,7 +300,7 @@ def test_the_path_may_lead_over_a_pole_or_beside_it():
     tip = np.stack([x, 0 * x, 0 * x - 1650.0], 1)
     for lean in (0.0, 1e-5, 1e-3, 1e-2):
         axis = np.stack([np.sin(x / 100.0), 0 * x + lean, np.cos(x / 100.0)], 1)
-        hold(plan(posted(machine, tip, axis / np.linalg.norm(axis, axis=1)[:, None])))
+        hold(plan_trajectory(posted(machine, tip, axis / np.linalg.norm(axis, axis=1)[:, None])))
 
 
 # Against another planner, and against itself.
@@ -332,35 +343,35 @@ def test_as_quick_as_toppra():
 @everyone
 def test_more_is_quicker(name):
     result = drawn(name, 7)
-    drives = Drives.of(result.machine)
-    before = plan(result).seconds
+    drives = DriveLimits.of(result.machine)
+    before = plan_trajectory(result).seconds
     for factors in ((1.5, 1.0), (1.5, 1.5), (3.0, 3.0)):
         limits = {unit: (*np.array(drive_of(drives, result.machine, unit)) * factors, INF) for unit in ("mm", "rad")}
-        seconds = plan(replace(result, machine=limited(result.machine, **limits))).seconds
+        seconds = plan_trajectory(replace(result, machine=limited(result.machine, **limits))).seconds
         assert seconds <= before * (1.0 + 1e-3)
         before = seconds
-    assert before < plan(result).seconds
+    assert before < plan_trajectory(result).seconds
 
 
 # Results and refusals.
 
 
 def test_setpoints_are_a_table():
-    law = square(limited(pk.load("orthoglide"), mm=(INF, 2000.0, INF)))
-    points = law.sampled(500.0)
+    trajectory = square(limited(pk.load("orthoglide"), mm=(INF, 2000.0, INF)))
+    points = trajectory.sample(500.0)
     assert points.columns[:5] == ("time", "rho_x", "rho_y", "rho_z", "rho_x.speed")
     assert points.columns[-4:] == ("rho_z.acceleration", "X", "Y", "Z")
     assert points.table.shape == (len(points.times), len(points.columns))
-    assert law.seconds <= points.times[-1] < law.seconds + 1.0 / 500.0
-    outside = law.at([-1.0, law.seconds + 1.0])
-    assert outside.joints == pytest.approx(law.posted.joints[[0, -1]], abs=1e-9)
+    assert trajectory.seconds <= points.times[-1] < trajectory.seconds + 1.0 / 500.0
+    outside = trajectory.at([-1.0, trajectory.seconds + 1.0])
+    assert outside.joints == pytest.approx(trajectory.posted.joints[[0, -1]], abs=1e-9)
     assert not outside.speeds.any() and not outside.accelerations.any()
 
 
 def test_one_place_takes_no_time():
-    law = plan(posted(pk.load("linear_delta"), [[0, 0, 280]] * 3))
-    assert law.seconds == 0.0 and law.times.tolist() == [0.0] * 3 and law.shares == {}
-    assert law.sampled(1000.0).joints == pytest.approx(law.posted.joints[:1])
+    trajectory = plan_trajectory(posted(pk.load("linear_delta"), [[0, 0, 280]] * 3))
+    assert trajectory.seconds == 0.0 and trajectory.times.tolist() == [0.0] * 3 and trajectory.shares == {}
+    assert trajectory.sample(1000.0).joints == pytest.approx(trajectory.posted.joints[:1])
 
 
 @pytest.mark.parametrize(
@@ -382,11 +393,11 @@ def test_a_path_that_the_machine_cannot_follow_is_refused_with_its_place():
     machine = limited(pk.load("orthoglide"), mm=(INF, 2000.0, INF))
     tip = np.array([[0, 0, 0], [0, 400, 0], [0, 0, 0]], float)
     with pytest.raises(PoseError, match=r"record 1 \(line 2\): the machine can't take this pose"):
-        plan(posted(machine, tip))
+        plan_trajectory(posted(machine, tip))
     with pytest.raises(PoseError, match=r"record 1 \(line 2\): more than 0 expected for the feed"):
-        plan(posted(machine, tip / 10.0, feed=[100.0, 0.0, 100.0]))
+        plan_trajectory(posted(machine, tip / 10.0, feed=[100.0, 0.0, 100.0]))
     with pytest.raises(PoseError, match="rate: more than 0 expected, not 0"):
-        plan(posted(machine, tip / 10.0)).sampled(0)
+        plan_trajectory(posted(machine, tip / 10.0)).sample(0)
 
 
 def test_jerks_of_a_machine_file(tmp_path):

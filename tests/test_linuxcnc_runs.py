@@ -17,7 +17,7 @@ from parakin.controllers import linuxcnc_program, program_seconds
 from parakin.toolpath.job import prepare
 from parakin.toolpath.posting.post import post
 from parakin.toolpath.reading.detect import read_path
-from parakin.toolpath.timing import plan
+from parakin.toolpath.timing import plan_trajectory
 
 HERE = Path(__file__).parent / "linuxcnc"
 DIGIT = 5e-7  # half a unit of the last digit that is sampled
@@ -150,9 +150,9 @@ def first_passes(machine, folder, feed=FEED, count=130):
     return prepare(machine, replace(read, events=events, **arrays), workpiece=place)
 
 
-def written(law, **options):
+def written(trajectory, **options):
     file = io.BytesIO()
-    linuxcnc_program(law, **options)(file)
+    linuxcnc_program(trajectory, **options)(file)
     return file.getvalue().decode("ascii")
 
 
@@ -172,16 +172,16 @@ def noise(machine):
 def test_a_posted_program_keeps_the_joints_speeds_and_its_time(machine, linuxcnc, tmp_path):
     job = first_passes(machine, tmp_path)
     assert job.runs
-    posted, law = job.posted, job.law
-    text = written(law)
+    posted, trajectory = job.posted, job.trajectory
+    text = written(trajectory)
     run = linuxcnc.run({"program": "part.ngc", "override": 1.5}, {"part.ngc": text})
     assert "told" not in run.seen, run.seen
     check_joints(machine, run.poses, run.joints)
     assert shares(machine, run.joints).max() <= 1.0 + noise(machine)  # from home on
     part = run.part(first_line(text), world(machine, posted.poses[:1])[0])
     assert shares(machine, run.joints[part]).max() > 0.6  # it is not just slow
-    assert (part.stop - part.start - 1) * CYCLE == pytest.approx(law.seconds, rel=0.05)
-    assert (part.stop - part.start - 1) * CYCLE == pytest.approx(program_seconds(law), rel=0.02)
+    assert (part.stop - part.start - 1) * CYCLE == pytest.approx(trajectory.seconds, rel=0.05)
+    assert (part.stop - part.start - 1) * CYCLE == pytest.approx(program_seconds(trajectory), rel=0.02)
     ends = world(machine, posted.poses[[0, -1]])
     assert np.abs(run.poses[[part.start, -1]] - ends).max() < 2e-6
     assert aside(run.poses[part][:, :3], world(machine, posted.poses)[:, :3]).max() < 0.005 + 2e-6  # as asked for
@@ -213,14 +213,14 @@ def test_with_the_programmed_feed_a_joint_passes_its_speed(machine, linuxcnc, tm
 @pytest.mark.parametrize("machine", ["tricept"], indirect=True)
 def test_a_wrist_goes_on_in_its_other_mode_and_stops_are_kept(machine, linuxcnc, tmp_path):
     posted = post(machine, first_passes(machine, tmp_path, feed=2500.0, count=25).programmed.path, mode="-")
-    law = plan(posted, corners="stop")
-    text = written(law)
+    trajectory = plan_trajectory(posted, corners="stop")
+    text = written(trajectory)
     run = linuxcnc.run({"program": "part.ngc"}, {"part.ngc": text})
     assert "told" not in run.seen, run.seen
     assert shares(machine, run.joints).max() <= 1.0 + noise(machine)
     part = run.part(first_line(text), world(machine, posted.poses[:1])[0])
     assert np.abs(run.joints[part][-1] - outward(machine, posted.joints[-1:])[0]).max() < 2e-6
-    halts = law.curve.corner[1:-1][law.curve.parted[1:-1]]
+    halts = trajectory.curve.corner[1:-1][trajectory.curve.parted[1:-1]]
     assert len(halts) > 2
     for row in world(machine, halts):
         assert np.abs(run.poses - row).max(1).min() < 2e-6

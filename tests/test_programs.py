@@ -25,7 +25,7 @@ from parakin.toolpath.path import Event, ToolPath
 from parakin.toolpath.posting.post import post
 from parakin.toolpath.reading.detect import read_path
 from parakin.toolpath.reading.gcode.reader import read_gcode
-from parakin.toolpath.timing import plan
+from parakin.toolpath.timing import plan_trajectory
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "examples"))
 import turbine_blade
@@ -37,19 +37,19 @@ every_place = pytest.mark.parametrize("name", PLACES)
 
 
 @pytest.fixture(scope="module")
-def laws(tmp_path_factory):
-    """The law of the example part on a machine, made when asked for."""
+def trajectories(tmp_path_factory):
+    """The trajectory of the example part on a machine, made when asked for."""
     folder, known = tmp_path_factory.mktemp("part"), {}
 
-    def law_of(name):
+    def trajectory_of(name):
         if name not in known:
             place, upright = PLACES[name]
             lines = turbine_blade.nx_lines(turbine_blade.tool_path(400, upright), turbine_blade.FEEDS | {"cut": 1e4})
             (folder / "part.cls").write_text("\n".join(lines) + "\n", encoding="ascii")
-            known[name] = plan(post(pk.load(name), read_path(folder / "part.cls"), workpiece=place))
+            known[name] = plan_trajectory(post(pk.load(name), read_path(folder / "part.cls"), workpiece=place))
         return known[name]
 
-    return law_of
+    return trajectory_of
 
 
 def text_of(writer):
@@ -78,10 +78,10 @@ def motion_lines(text):
 
 
 @every_place
-def test_what_is_written_for_linuxcnc_is_read_back(laws, name, tmp_path):
-    law = laws(name)
-    machine, posted = law.posted.machine, law.posted
-    (file,) = write_all(tmp_path, {"part.ngc": linuxcnc_program(law)})
+def test_what_is_written_for_linuxcnc_is_read_back(trajectories, name, tmp_path):
+    trajectory = trajectories(name)
+    machine, posted = trajectory.posted.machine, trajectory.posted
+    (file,) = write_all(tmp_path, {"part.ngc": linuxcnc_program(trajectory)})
     read = read_gcode(file, workpiece=AS_IT_IS)
     turns = np.zeros((len(read), 3)) if read.turns is None else read.turns
     columns = [("XYZ".index(a), read.tip) if a in "XYZ" else ("ABC".index(a), turns) for a in machine.axes]
@@ -92,10 +92,10 @@ def test_what_is_written_for_linuxcnc_is_read_back(laws, name, tmp_path):
         at += int(np.argmax(np.abs(rows[at:] - pose).max(1) < HALF))
         found.append(at)
     assert np.abs(rows[found] - wanted).max() < HALF
-    assert len(set(found)) == len(law.curve.corner)
+    assert len(set(found)) == len(trajectory.curve.corner)
     assert found[-1] == len(rows) - 1
-    assert read.seconds[found[0] + 1 :].sum() == pytest.approx(program_seconds(law), abs=1e-6)
-    assert program_seconds(law) == pytest.approx(law.seconds, rel=0.05)
+    assert read.seconds[found[0] + 1 :].sum() == pytest.approx(program_seconds(trajectory), abs=1e-6)
+    assert program_seconds(trajectory) == pytest.approx(trajectory.seconds, rel=0.05)
     for begin, end in pairwise(found):  # what was added lies on the straight way
         if end > begin + 1:
             way = rows[end] - rows[begin]
@@ -105,10 +105,10 @@ def test_what_is_written_for_linuxcnc_is_read_back(laws, name, tmp_path):
 
 
 @every_place
-def test_every_motion_is_in_machine_coordinates_and_inverse_time(laws, name):
-    text = text_of(linuxcnc_program(laws(name)))
+def test_every_motion_is_in_machine_coordinates_and_inverse_time(trajectories, name):
+    text = text_of(linuxcnc_program(trajectories(name)))
     lines = motion_lines(text)
-    letters = " ".join(rf"{axis}-?\d+\.\d{{6}}" for axis in laws(name).posted.machine.axes)
+    letters = " ".join(rf"{axis}-?\d+\.\d{{6}}" for axis in trajectories(name).posted.machine.axes)
     assert all(re.fullmatch(rf"G53 G1 {letters} F\d+\.\d{{6}}", line) for line in lines)
     assert len(lines) > 300
     assert max(map(len, text.splitlines())) < 250
@@ -118,17 +118,20 @@ def test_every_motion_is_in_machine_coordinates_and_inverse_time(laws, name):
     assert text.endswith("M2\n")
     head = text.splitlines()[:3]
     assert "turbine_blade" in head[0] or "part.cls" in head[0]
-    assert f"{name}, mode {laws(name).posted.mode}" in head[0]
-    assert f"{program_seconds(laws(name)):.3f} s" in head[1]
+    assert f"{name}, mode {trajectories(name).posted.mode}" in head[0]
+    assert f"{program_seconds(trajectories(name)):.3f} s" in head[1]
     assert "OFF LIMITS" not in text
 
 
 @every_place
-def test_no_joint_passes_its_speed(laws, name):
+def test_no_joint_passes_its_speed(trajectories, name):
     """By differences of the inverse along the written lines, ten to a line, each at its own speed."""
-    machine = laws(name).posted.machine
+    machine = trajectories(name).posted.machine
     numbers = np.array(
-        [[float(word[1:]) for word in line.split()[2:]] for line in motion_lines(text_of_law(laws(name)))]
+        [
+            [float(word[1:]) for word in line.split()[2:]]
+            for line in motion_lines(text_of_trajectory(trajectories(name)))
+        ]
     )
     poses = np.where(np.array(machine.axis_units) == "rad", np.radians(numbers[:, :-1]), numbers[:, :-1])
     seconds, share = 60.0 / numbers[1:, -1], np.linspace(0.0, 1.0, 11)[:, None]
@@ -141,23 +144,23 @@ def test_no_joint_passes_its_speed(laws, name):
     assert 0.6 < worst <= 1.0
 
 
-def text_of_law(law):
-    return text_of(linuxcnc_program(law))
+def text_of_trajectory(trajectory):
+    return text_of(linuxcnc_program(trajectory))
 
 
 @every_place
-def test_motions_take_whole_cycles_and_blend_within_the_speeds(laws, name):
-    law = laws(name)
-    speeds, accelerations = axis_rates(law.posted.machine)
-    found = motions(law, speeds, accelerations)
+def test_motions_take_whole_cycles_and_blend_within_the_speeds(trajectories, name):
+    trajectory = trajectories(name)
+    speeds, accelerations = axis_rates(trajectory.posted.machine)
+    found = motions(trajectory, speeds, accelerations)
     cycles = found.seconds / CYCLE
     assert np.abs(cycles - np.rint(cycles)).max() < 1e-6
-    steps = np.abs(np.diff(found.ends, axis=0, prepend=law.curve.corner[:1]))
+    steps = np.abs(np.diff(found.ends, axis=0, prepend=trajectory.curve.corner[:1]))
     assert (steps <= speeds * found.seconds[:, None] * (1.0 + 1e-9)).all()
     ramps = 2.0 * (steps / accelerations).max(1) / found.seconds
     assert (ramps <= found.seconds * (1.0 + 1e-6)).all()  # it comes to its speed
     assert (ramps[:-1] <= found.seconds[1:] * (1.0 + 1e-6))[~found.halt[:-1]].all()  # and is done before the next ends
-    assert np.abs(found.ends[-1] - law.posted.poses[-1]).max() < 1e-9
+    assert np.abs(found.ends[-1] - trajectory.posted.poses[-1]).max() < 1e-9
 
 
 def test_a_tip_that_all_but_stands_is_turned_first_and_moved_then():
@@ -172,10 +175,12 @@ def test_a_tip_that_all_but_stands_is_turned_first_and_moved_then():
     assert same[0].tolist() == ends[1:].tolist()
 
 
-def test_where_the_law_stands_still_linuxcnc_does_too():
+def test_where_the_trajectory_stands_still_linuxcnc_does_too():
     machine = pk.load("linear_delta")
     path = path_of([[0.0, 0.0, 280.0], [40.0, 0.0, 280.0], [40.0, 40.0, 280.0], [80.0, 40.0, 280.0]])
-    stopping, rounding = (text_of(linuxcnc_program(plan(post(machine, path), corners=c))) for c in ("stop", "round"))
+    stopping, rounding = (
+        text_of(linuxcnc_program(plan_trajectory(post(machine, path), corners=c))) for c in ("stop", "round")
+    )
     assert rounding.count("G61\n") == 1  # at the first record
     assert stopping.count("G61\n") == 3
     lines = stopping.splitlines()
@@ -210,30 +215,30 @@ def test_from_home_the_wrist_does_not_jump(name, mode):
     assert abs(turned[1][4] - poses[1][4]) == pytest.approx(2.0 * np.pi)
 
 
-def test_what_linuxcnc_cant_follow_is_refused(laws):
+def test_what_linuxcnc_cant_follow_is_refused(trajectories):
     machine = pk.load("linear_delta")
-    law = plan(post(machine, path_of([[0.0, 0.0, 280.0], [1.0, 0.0, 280.0]])))
+    trajectory = plan_trajectory(post(machine, path_of([[0.0, 0.0, 280.0], [1.0, 0.0, 280.0]])))
     other = next(mode for mode in machine.modes if mode != machine.mode)
     with pytest.raises(PoseError, match="mode"):
-        linuxcnc_program(replace(law, posted=replace(law.posted, mode=other)))
-    posted = laws("tricept").posted
+        linuxcnc_program(replace(trajectory, posted=replace(trajectory.posted, mode=other)))
+    posted = trajectories("tricept").posted
     poses = posted.poses.copy()
     poses[:, 4] += 700.0
     with pytest.raises(PoseError, match="C would turn"):
-        linuxcnc_program(replace(laws("tricept"), posted=replace(posted, poses=poses)))
+        linuxcnc_program(replace(trajectories("tricept"), posted=replace(posted, poses=poses)))
     for tolerance in (0.0, -1.0, float("inf"), float("nan")):
         with pytest.raises(PoseError, match="tolerance"):
-            linuxcnc_program(laws("tricept"), tolerance=tolerance)
+            linuxcnc_program(trajectories("tricept"), tolerance=tolerance)
 
 
 def test_a_path_of_one_record(tmp_path):
     machine = pk.load("hexapod")
-    law = plan(post(machine, path_of([[0.0, 0.0, -940.0]] * 2)))
-    lines = motion_lines(text_of(linuxcnc_program(law)))
+    trajectory = plan_trajectory(post(machine, path_of([[0.0, 0.0, -940.0]] * 2)))
+    lines = motion_lines(text_of(linuxcnc_program(trajectory)))
     assert len(lines) == 1
     assert "Z-940.000000" in lines[0]
-    assert program_seconds(law) == 0.0
-    (file,) = write_all(tmp_path, {"one.ngc": joint_program(law)})
+    assert program_seconds(trajectory) == 0.0
+    (file,) = write_all(tmp_path, {"one.ngc": joint_program(trajectory)})
     assert len(read_joint_program(file).joints) == 1
 
 
@@ -241,15 +246,15 @@ def test_a_path_of_one_record(tmp_path):
 
 
 @pytest.mark.parametrize("name", PLACES)
-def test_what_is_written_in_joints_is_read_back(laws, name, tmp_path):
-    law = laws(name)
-    machine = law.posted.machine
-    (file,) = write_all(tmp_path, {"part.ngc": joint_program(law)})
+def test_what_is_written_in_joints_is_read_back(trajectories, name, tmp_path):
+    trajectory = trajectories(name)
+    machine = trajectory.posted.machine
+    (file,) = write_all(tmp_path, {"part.ngc": joint_program(trajectory)})
     read = read_joint_program(file)
     assert read.letters == joint_letters(machine)
-    kept = np.append(True, np.diff(law.curve.place) > 0)
-    assert np.abs(read.joints - rim(law.posted.joints[kept], machine.joint_units)).max() < HALF
-    spans = np.diff(law.times[kept])
+    kept = np.append(True, np.diff(trajectory.curve.corner_of_record) > 0)
+    assert np.abs(read.joints - rim(trajectory.posted.joints[kept], machine.joint_units)).max() < HALF
+    spans = np.diff(trajectory.times[kept])
     assert (read.seconds[1:] > spans - 1e-6).all()  # never less, and more only where a corner is not rounded here
     assert np.abs(read.seconds[1:] - spans).sum() < 1e-3
     limits = rim(np.array([drive.speed for drive in machine.model.drives]), machine.joint_units)
@@ -326,7 +331,7 @@ def told(events, dialect="nx", writer=linuxcnc_program, **fields):
     """The lines of a program of three records that are no motion and no mode, and where its motions are among them."""
     path = path_of([[0.0, 0.0, 280.0], [5.0, 0.0, 280.0], [5.0, 5.0, 280.0]], dialect=dialect, **fields)
     path = replace(path, events=tuple(Event(record, 10 * record + i, text) for i, (record, text) in enumerate(events)))
-    text = text_of(writer(plan(post(pk.load("linear_delta"), path))))
+    text = text_of(writer(plan_trajectory(post(pk.load("linear_delta"), path))))
     return text.splitlines()
 
 
@@ -392,9 +397,9 @@ def test_another_tool_stops_the_program():
 
 
 @pytest.mark.parametrize("writer", [linuxcnc_program, joint_program])
-def test_forced_it_says_so(laws, writer):
+def test_forced_it_says_so(trajectories, writer):
     offences = "part.cls:214: leg d2 would be 1,533.2 mm, limit 1,520\npart.cls:9: " + 60 * "very long "
-    text = text_of(writer(laws("tricept"), forced=offences))
+    text = text_of(writer(trajectories("tricept"), forced=offences))
     head = text[: text.index("G21")].splitlines()
     assert "( OFF LIMITS: written with --force: part.cls:214: leg d2 would be 1,533.2 mm, limit 1,520 )" in head
     assert all(line.startswith("( ") and line.endswith(" )") and len(line) < 250 for line in head)

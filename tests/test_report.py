@@ -1,4 +1,4 @@
-"""The report on a law of time: its numbers in the page and in the figures, against the law sampled densely."""
+"""The report on a trajectory: its numbers in the page and in the figures, against the trajectory sampled densely."""
 
 import json
 import re
@@ -13,7 +13,7 @@ from parakin.machine import Machine
 from parakin.toolpath.checking.check import between
 from parakin.toolpath.path import Note, ToolPath
 from parakin.toolpath.posting.post import post
-from parakin.toolpath.timing import plan
+from parakin.toolpath.timing import plan_trajectory
 
 SLOW, FAST = 2400.0, 9000.0  # mm/min
 
@@ -38,13 +38,13 @@ def spiral(n):
 
 
 @pytest.fixture(scope="module")
-def law():
-    return plan(post(pk.load("tricept"), spiral(600)))
+def trajectory():
+    return plan_trajectory(post(pk.load("tricept"), spiral(600)))
 
 
 @pytest.fixture(scope="module")
-def html(law):
-    return report_html(law.posted, law)
+def html(trajectory):
+    return report_html(trajectory.posted, trajectory)
 
 
 @pytest.fixture(scope="module")
@@ -53,8 +53,8 @@ def figures(html):
 
 
 @pytest.fixture(scope="module")
-def dense(law):
-    return law.at(np.linspace(0.0, law.seconds, 200_000))
+def dense(trajectory):
+    return trajectory.at(np.linspace(0.0, trajectory.seconds, 200_000))
 
 
 def figures_of(html):
@@ -75,32 +75,32 @@ def xy(trace):
     return np.array([trace["x"], trace["y"]], float)
 
 
-def test_verdict_names_the_cycle_time(law, html):
+def test_verdict_names_the_cycle_time(trajectory, html):
     verdict = text_of(html[html.index("<section class='card verdict'") :].partition("</section>")[0])
-    path = law.posted.path
+    path = trajectory.posted.path
     steps = np.linalg.norm(np.diff(path.tip, axis=0), axis=1)
     cut = ~path.rapid[1:]
     programmed = (steps / path.feed[1:])[cut].sum() * 60.0
     # The last record in feed is passed when the rapid begins.
-    feed = law.times[np.flatnonzero(~path.rapid)[-1]]
-    assert feed < law.seconds
-    assert f"Cycle time {law.seconds:.1f} s" in verdict.replace(" :", ":")
+    feed = trajectory.times[np.flatnonzero(~path.rapid)[-1]]
+    assert feed < trajectory.seconds
+    assert f"Cycle time {trajectory.seconds:.1f} s" in verdict.replace(" :", ":")
     assert f"{feed:.1f} s in feed motions ( {programmed:.1f} s at the programmed feeds)".replace("( ", "(") in verdict
-    assert f"{law.seconds - feed:.1f} s in rapid" in verdict
+    assert f"{trajectory.seconds - feed:.1f} s in rapid" in verdict
     assert "The motions between them were not checked." in verdict
 
 
-def test_shares_are_those_of_dense_samples(law, html, figures):
-    assert len(law.shares) > 4
-    times, passed = (np.arange(100_000) + 0.5) * law.seconds / 100_000, law.pace.passed
+def test_shares_are_those_of_dense_samples(trajectory, html, figures):
+    assert len(trajectory.shares) > 4
+    times, passed = (np.arange(100_000) + 0.5) * trajectory.seconds / 100_000, trajectory.profile.row_times
     behind = np.searchsorted(passed, times)
     nearest = behind - (times - passed[behind - 1] < passed[behind] - times)
-    counts = np.bincount(law.binding[nearest], minlength=len(law.names)) / 100_000
-    for name, share in law.shares.items():
+    counts = np.bincount(trajectory.binding[nearest], minlength=len(trajectory.names)) / 100_000
+    for name, share in trajectory.shares.items():
         trace = next(t for t in figures["time"]["data"] if t["type"] == "bar" and t["name"] == name)
-        shown = sum(trace["y"]) * trace["width"] / law.seconds
+        shown = sum(trace["y"]) * trace["width"] / trajectory.seconds
         assert shown == pytest.approx(share, abs=1e-4)
-        assert shown == pytest.approx(counts[law.names.index(name)], abs=1e-3)
+        assert shown == pytest.approx(counts[trajectory.names.index(name)], abs=1e-3)
         if share >= 0.001:
             label = name.replace(".", ".<wbr>")
             assert re.search(rf"<b>{re.escape(label)}</b>.*?{100 * share:.1f} %", html)
@@ -113,8 +113,8 @@ def test_shares_are_those_of_dense_samples(law, html, figures):
 
 
 @pytest.mark.parametrize("kind", ["", " speed", " acceleration"])
-def test_curves_keep_the_extremes_and_lie_on_the_law(law, figures, dense, kind):
-    machine = law.posted.machine
+def test_curves_keep_the_extremes_and_lie_on_the_trajectory(trajectory, figures, dense, kind):
+    machine = trajectory.posted.machine
     rounding = 1e-4 * {"": 500.0, " speed": 5000.0}.get(kind, 0.0)  # of times, mm or deg and their rates
     for j, name in enumerate(machine.joints):
         scale = 180.0 / np.pi if machine.joint_units[j] == "rad" else 1.0
@@ -125,19 +125,19 @@ def test_curves_keep_the_extremes_and_lie_on_the_law(law, figures, dense, kind):
         assert y.min() <= exact.min() + 1e-4 * size
         assert len(x) <= 3200
         if kind != " acceleration":
-            assert np.abs(y - of(law.at(x))[:, j] * scale).max() <= rounding + 1e-4 * size
+            assert np.abs(y - of(trajectory.at(x))[:, j] * scale).max() <= rounding + 1e-4 * size
         else:
             assert np.abs(y).max() <= machine.model.drives[j].acceleration * scale * (1.0 + 1e-3)
 
 
-def test_what_binds_is_coloured(law, figures):
-    drive = law.posted.machine.model.drives
+def test_what_binds_is_coloured(trajectory, figures):
+    drive = trajectory.posted.machine.model.drives
     seen = 0
-    for j, name in enumerate(law.posted.machine.joints):
+    for j, name in enumerate(trajectory.posted.machine.joints):
         scale = 180.0 / np.pi if drive[j].unit == "rad" else 1.0
         for kind in ("speed", "acceleration"):
             traces = traces_of(figures["time"], f"{name} {kind}")
-            assert (len(traces) == 2) == (f"{name}.{kind}" in law.shares)
+            assert (len(traces) == 2) == (f"{name}.{kind}" in trajectory.shares)
             for trace in traces[1:]:
                 _, y = xy(trace)
                 assert trace["line"]["color"] != traces[0]["line"]["color"]
@@ -146,43 +146,43 @@ def test_what_binds_is_coloured(law, figures):
     assert seen > 2
 
 
-def test_every_point_knows_its_record_and_line(law, figures):
+def test_every_point_knows_its_record_and_line(trajectory, figures):
     trace = traces_of(figures["time"], "d1")[0]
     record, line = np.array(trace["customdata"]).T
     assert (line == 3 * record + 7).all()
     x = np.array(trace["x"])
-    assert (x <= law.times[record] + 1e-3).all()
-    assert (x >= law.times[record - 1] - 1e-3).all()
+    assert (x <= trajectory.times[record] + 1e-3).all()
+    assert (x >= trajectory.times[record - 1] - 1e-3).all()
     at = traces_of(figures["binding"], "feed")[0]["customdata"]
     times, record, line = (np.array(column) for column in zip(*at, strict=True))
     assert (line == 3 * record + 7).all()
-    assert (times <= law.times[record] + 1e-2).all()
+    assert (times <= trajectory.times[record] + 1e-2).all()
 
 
-def test_feed_reached_beside_the_programmed(law, figures, dense):
+def test_feed_reached_beside_the_programmed(trajectory, figures, dense):
     programmed = np.array(traces_of(figures["time"], "programmed feed")[0]["y"], float)
     assert set(programmed[~np.isnan(programmed)]) == {SLOW, FAST}
     assert np.isnan(programmed).any()  # in rapid
     x, y = xy(traces_of(figures["time"], "feed reached")[0])
-    cut = x < law.times[np.flatnonzero(~law.posted.path.rapid)[-1]]
+    cut = x < trajectory.times[np.flatnonzero(~trajectory.posted.path.rapid)[-1]]
     assert SLOW < y[cut].max() <= FAST * 1.001
     steps = np.linalg.norm(np.diff(dense.poses[:, :3], axis=0), axis=1)
     exact = 60.0 * steps / (dense.times[1] - dense.times[0])
     middle = 0.5 * (dense.times[1:] + dense.times[:-1])
     assert y.max() == pytest.approx(exact.max(), rel=1e-3)
     assert np.median(np.abs(y[cut] - np.interp(x[cut], middle, exact))) < 1e-3 * SLOW
-    assert (y[cut & (x < law.times[150])] <= SLOW * 1.001).all()
+    assert (y[cut & (x < trajectory.times[150])] <= SLOW * 1.001).all()
     x, y = xy(traces_of(figures["time"], "set by the feed")[0])
     assert np.nanmax(y) == pytest.approx(FAST, rel=1e-3)
-    assert x.max() < law.times[np.flatnonzero(~law.posted.path.rapid)[-1]] + 0.1
+    assert x.max() < trajectory.times[np.flatnonzero(~trajectory.posted.path.rapid)[-1]] + 0.1
 
 
 def test_feed_is_seen_among_many_short_rapids():
     turn = np.linspace(0.0, 200.0, 4000)
     tip = np.stack([80 * np.cos(turn), 80 * np.sin(turn), 280 + 0 * turn], axis=1)
-    law = plan(post(pk.load("linear_delta"), path_of(tip, rapid=np.arange(4000) % 10 < 2)))
-    figure = figures_of(report_html(law.posted, law))["time"]
-    assert 3 * len(law.pace.cell) > 9000
+    trajectory = plan_trajectory(post(pk.load("linear_delta"), path_of(tip, rapid=np.arange(4000) % 10 < 2)))
+    figure = figures_of(report_html(trajectory.posted, trajectory))["time"]
+    assert 3 * len(trajectory.profile.row) > 9000
     for name in ("programmed feed", "set by the feed"):
         y = np.array(traces_of(figure, name)[0]["y"], float)
         drawn = ~np.isnan(y)
@@ -190,9 +190,9 @@ def test_feed_is_seen_among_many_short_rapids():
         assert y[drawn].max() <= SLOW * 1.001
 
 
-def test_path_is_coloured_by_what_binds(law, figures):
+def test_path_is_coloured_by_what_binds(trajectory, figures):
     names = [trace["name"] for trace in figures["binding"]["data"]]
-    assert set(names) == set(law.shares)
+    assert set(names) == set(trajectory.shares)
     colours = {trace["name"]: trace["line"]["color"] for trace in figures["binding"]["data"]}
     assert len(set(colours.values())) == len(colours)
     assert {t["name"]: t["marker"]["color"] for t in figures["time"]["data"] if t["type"] == "bar"} == colours
@@ -202,11 +202,11 @@ def test_path_is_coloured_by_what_binds(law, figures):
     assert sum(trace["showlegend"] for trace in figures["binding"]["data"]) == len(colours)
 
 
-def test_panels_share_their_time(figures, law):
+def test_panels_share_their_time(figures, trajectory):
     layout = figures["time"]["layout"]
-    joints = len(law.posted.machine.joints)
+    joints = len(trajectory.posted.machine.joints)
     assert sum(key.startswith("yaxis") for key in layout) == 2 + 3 * joints
-    assert layout["xaxis"]["range"] == [0.0, law.seconds]
+    assert layout["xaxis"]["range"] == [0.0, trajectory.seconds]
     assert [layout[f"xaxis{i}"]["matches"] for i in (2, 3, 4)] == ["x"] * 3
     used = {(t.get("xaxis", "x"), t["yaxis"]) for t in figures["time"]["data"]}
     assert len(used) == 2 + 3 * joints
@@ -214,8 +214,8 @@ def test_panels_share_their_time(figures, law):
     assert ends == sorted(set(ends))
 
 
-def test_long_laws_stay_small(law, html):
-    assert 3 * len(law.pace.cell) > 9000  # so curves are thinned here
+def test_long_trajectories_stay_small(trajectory, html):
+    assert 3 * len(trajectory.profile.row) > 9000  # so curves are thinned here
     assert len(html) < 8_000_000
 
 
@@ -224,26 +224,28 @@ def test_jerks_are_drawn_where_they_are_limited():
     legs = tuple(
         replace(leg, drives=tuple(d and replace(d, jerk=2e5) for d in leg.drives)) for leg in machine.spec.legs
     )
-    law = plan(post(Machine(replace(machine.spec, legs=legs)), path_of([[0, 0, 280], [30, 10, 285], [0, 40, 280]])))
-    figure = figures_of(report_html(law.posted, law))["time"]
+    trajectory = plan_trajectory(
+        post(Machine(replace(machine.spec, legs=legs)), path_of([[0, 0, 280], [30, 10, 285], [0, 40, 280]]))
+    )
+    figure = figures_of(report_html(trajectory.posted, trajectory))["time"]
     for name in machine.joints:
         _, y = xy(traces_of(figure, f"{name} jerk")[0])
         assert 1e4 < np.abs(y).max() <= 2e5 * 1.01
     assert not traces_of(figure, "tower_a speed")[1:]
-    points = law.at(np.linspace(0.0, law.seconds, 100_000))
+    points = trajectory.at(np.linspace(0.0, trajectory.seconds, 100_000))
     jerk = np.diff(points.accelerations[:, 0]) / (points.times[1] - points.times[0])
     assert np.abs(xy(traces_of(figure, "tower_a jerk")[0])[1]).max() >= 0.999 * np.abs(jerk).max() - 1.0
 
 
-def test_a_law_that_stands_still():
-    law = plan(post(pk.load("linear_delta"), path_of([[0, 0, 280]])))
-    html = report_html(law.posted, law)
+def test_a_trajectory_that_stands_still():
+    trajectory = plan_trajectory(post(pk.load("linear_delta"), path_of([[0, 0, 280]])))
+    html = report_html(trajectory.posted, trajectory)
     assert set(figures_of(html)) == {"machine", "path", "curves"}
     assert "Cycle time 0 s" in text_of(html)
 
 
-def test_without_a_law_nothing_is_said_of_it(law):
-    html = report_html(law.posted)
+def test_without_a_trajectory_nothing_is_said_of_it(trajectory):
+    html = report_html(trajectory.posted)
     assert set(figures_of(html)) == {"machine", "path", "curves"}
     assert "Cycle time" not in html
     assert "<h2>Time</h2>" not in html
@@ -252,8 +254,8 @@ def test_without_a_law_nothing_is_said_of_it(law):
 def test_inverse_time_counts_as_programmed():
     path = path_of([[0, 0, 280], [30, 0, 280], [60, 0, 280]], feed=np.array([np.nan, np.nan, 1200.0]))
     path = replace(path, seconds=np.array([np.nan, 4.0, np.nan]), dialect="gcode", notes=(Note(0, "of all"),))
-    law = plan(post(pk.load("linear_delta"), path))
-    html = report_html(law.posted, law)
+    trajectory = plan_trajectory(post(pk.load("linear_delta"), path))
+    html = report_html(trajectory.posted, trajectory)
     assert "5.5 s in feed motions, at the programmed feeds<" in html  # 4 s, and 30 mm at 20 mm/s
     programmed = np.array(traces_of(figures_of(html)["time"], "programmed feed")[0]["y"], float)
     np.testing.assert_allclose(np.unique(programmed), [450.0, 1200.0])

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from .toolpath.path import ToolPath
     from .toolpath.placing.placement import Placement, placed
     from .toolpath.reading.detect import read_path
-    from .toolpath.timing.trajectory import Law
+    from .toolpath.timing.trajectory import Trajectory
     from .workspace.certified.workspace import Workspace, workspace
 
 __version__ = "0.1.0"
@@ -26,7 +26,6 @@ __all__ = [
     "InputError",
     "InputErrors",
     "Job",
-    "Law",
     "Machine",
     "NoMethodError",
     "ParakinError",
@@ -34,6 +33,7 @@ __all__ = [
     "PoseError",
     "Solution",
     "ToolPath",
+    "Trajectory",
     "Workspace",
     "atlas",
     "load",
@@ -76,7 +76,7 @@ def load(name: str | PathLike[str], parameters: Mapping[str, float | str] | None
 _LAZY = {
     "Atlas": "performance.atlas",
     "Job": "toolpath.job",
-    "Law": "toolpath.timing.trajectory",
+    "Trajectory": "toolpath.timing.trajectory",
     "Machine": "machine",
     "Placement": "toolpath.placing.placement",
     "Solution": "kinematics.forward",

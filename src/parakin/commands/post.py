@@ -138,26 +138,26 @@ def _contents(
     from ..export.tables import joints as joint_table
     from ..export.tables import setpoints as setpoint_table
 
-    posted, law, missing = job.posted, job.law, list[str]()
+    posted, trajectory, missing = job.posted, job.trajectory, list[str]()
     saying = progress.part("writing the tables", 0.7, 0.9)
     files: dict[str, tuple[str, Content]] = {"table": (f"{stem}.joints.csv", joint_table.csv_writer(posted, saying))}
     if parquet:
         files["parquet"] = (f"{stem}.joints.parquet", joint_table.parquet_writer(posted, saying))
     if rate is not None:
-        if law is None:
+        if trajectory is None:
             missing.append(f"no setpoints: {job.unplanned}")
         else:
             saying = progress.part("writing the setpoints", 0.9, 1.0)
-            files["setpoints"] = (f"{stem}.setpoints.csv", setpoint_table.setpoints_csv(law, rate, saying))
+            files["setpoints"] = (f"{stem}.setpoints.csv", setpoint_table.setpoints_csv(trajectory, rate, saying))
             if parquet:
-                writer = setpoint_table.setpoints_parquet(law, rate, saying)
+                writer = setpoint_table.setpoints_parquet(trajectory, rate, saying)
                 files["setpoints-parquet"] = (f"{stem}.setpoints.parquet", writer)
     if target is not None:
         try:
             files["program"] = (f"{stem}.{target}.ngc", _program(job, target, force, tolerance))
         except PoseError as error:
             missing.append(f"no program: {error}")
-    files["report"] = (f"{stem}.report.html", report_html(posted, law, job.unplanned, job.waits))
+    files["report"] = (f"{stem}.report.html", report_html(posted, trajectory, job.unplanned, job.waits))
     return files, missing
 
 
@@ -168,9 +168,11 @@ def _program(job: Job, target: str, force: bool, tolerance: float) -> Content:
     posted = job.posted
     if posted.first is not None and not force:
         raise PoseError("the path is off limits; --force writes it all the same")
-    if job.law is None:
+    if job.trajectory is None:
         raise PoseError(job.unplanned)
     broken = "\n".join(f"{place(posted, offence)}: {offence.text}" for offence in posted.offences)
     if target == "joints":
-        return joint_program(job.law, forced=broken or None)
-    return linuxcnc_program(job.law, forced=broken or None, tolerance=0.5 * tolerance)  # the law's corners have half
+        return joint_program(job.trajectory, forced=broken or None)
+    return linuxcnc_program(
+        job.trajectory, forced=broken or None, tolerance=0.5 * tolerance
+    )  # the trajectory's corners have half

@@ -82,18 +82,21 @@ def _unit(axis: str) -> str:
 def _timed(job: Job, target: str | None) -> list[str]:
     from ..export.report.cards import duration
 
-    if job.law is None or job.seconds is None:
+    if job.trajectory is None or job.seconds is None:
         return [f"no cycle time: {job.unplanned}"]
     text = f"cycle time {duration(job.seconds)}"
     if job.waits:
         text += f", of which the program waits {job.waits:g} s"
-    bound = [f"{name} {share:.0%}" for name, share in job.law.shares.items() if share >= _SHARE][:_BINDING]
+    bound = [f"{name} {share:.0%}" for name, share in job.trajectory.shares.items() if share >= _SHARE][:_BINDING]
     text += f"; bound by {', '.join(bound)}" if bound else ""
     if target != "linuxcnc":
         return [text]
     from ..controllers import program_seconds
 
-    return [text, f"about {duration(program_seconds(job.law) + job.waits)} under LinuxCNC, from the first record on"]
+    return [
+        text,
+        f"about {duration(program_seconds(job.trajectory) + job.waits)} under LinuxCNC, from the first record on",
+    ]
 
 
 def _range_row(joint: dict[str, Any]) -> tuple[str, ...]:
@@ -123,7 +126,7 @@ def _ranges(posted: Posted) -> list[dict[str, Any]]:
 
 def as_json(job: Job, written: dict[str, str], placement: Placement | None, missing: list[str]) -> dict[str, Any]:
     """The account for programs: mm, degrees and s, null where a value does not exist or there is no bound."""
-    posted, law = job.posted, job.law
+    posted, trajectory = job.posted, job.trajectory
     path = posted.path
     return {
         "schema": "parakin.post/1",
@@ -140,7 +143,7 @@ def as_json(job: Job, written: dict[str, str], placement: Placement | None, miss
         "joints": _ranges(posted),
         "seconds": job.seconds,
         "waits": job.waits,
-        "bound_by": {} if law is None else law.shares,
+        "bound_by": {} if trajectory is None else trajectory.shares,
         "rewinds": list(posted.rewinds),
         "offences": [offence_json(offence) for offence in posted.offences],
         "first": offence_json(posted.first),

@@ -1,4 +1,4 @@
-"""Programs for controllers: a law of time as G-code."""
+"""Programs for controllers: a trajectory as G-code."""
 
 from .joints.program import joint_program
 from .joints.reader import JointProgram, read_joint_program

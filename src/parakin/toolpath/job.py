@@ -14,8 +14,8 @@ from .linearise.linearise import linearised
 from .path import Floats, ToolPath
 from .posting.post import post
 from .posting.posted import Posted
-from .timing import Corners, Law, plan
-from .timing.stops import stops, waiting
+from .timing import Corners, Trajectory, plan_trajectory
+from .timing.stops import find_stops, sum_dwells
 
 Progress = Callable[[float], None]
 Target: TypeAlias = Literal["linuxcnc", "joints"]  # moves the tool straight; moves every joint evenly
@@ -30,14 +30,14 @@ class Job:
 
     programmed : as it came, on the machine
     posted : with the records that the controller's interpolation needs, checked between all of them
-    law : the law of time, None where there is none
+    trajectory : None where there is none
     unplanned : why there is none
-    waits : s, that the program waits by its own words, besides the law's
+    waits : s, that the program waits by its own words, besides the trajectory's
     """
 
     programmed: Posted
     posted: Posted
-    law: Law | None
+    trajectory: Trajectory | None
     unplanned: str
     waits: float
 
@@ -49,14 +49,14 @@ class Job:
     @property
     def runs(self) -> bool:
         """Whether the machine can run it: nothing is off limits, and nothing but unknown rates of its drives keeps it
-        from having a law."""
+        from having a trajectory."""
         rated = all(isfinite(drive.speed) or isfinite(drive.acceleration) for drive in self.posted.machine.model.drives)
-        return self.posted.first is None and (self.law is not None or not rated)
+        return self.posted.first is None and (self.trajectory is not None or not rated)
 
     @property
     def seconds(self) -> float | None:
-        """The cycle time, None where there is no law."""
-        return None if self.law is None else self.law.seconds + self.waits
+        """The cycle time, None where there is no trajectory."""
+        return None if self.trajectory is None else self.trajectory.seconds + self.waits
 
 
 def prepare(
@@ -71,7 +71,7 @@ def prepare(
     corners: Corners = "round",
     progress: Progress | None = None,
 ) -> Job:
-    """Post a tool path, insert the points its target needs, check it everywhere, and plan its law of time.
+    """Post a tool path, insert the points its target needs, check it everywhere, and plan its trajectory.
 
     Parameters
     ----------
@@ -79,7 +79,7 @@ def prepare(
     target : what the controller interpolates: ``linuxcnc`` the tool's pose, ``joints`` the joints
     tolerance, axis_tolerance : mm and rad that tip and axis may be off the programmed path in all: half of each is for
         the controller's interpolation, half for rounding corners
-    corners : ``round`` or ``stop``, as for :func:`~.feed.plan`
+    corners : ``round`` or ``stop``, as for :func:`~.timing.plan.plan_trajectory`
     progress : called now and then with the fraction done, 0 to 1
 
     Raises :class:`PoseError` or :class:`InputError` for what can't be asked. What the machine can't do raises nothing:
@@ -91,10 +91,10 @@ def prepare(
         return lambda fraction: say(begin + (end - begin) * fraction)
 
     programmed = post(machine, path, workpiece=workpiece, mode=mode, progress=part(0.0, 0.1))
-    # The pose's angles go straight in either case, for the law is planned so; the tip then is on its line already.
+    # The angles of the pose change evenly in either case, as the trajectory has them; the tip is on its line by then.
     steps = 1 if target == "linuxcnc" else 2
     lean = 0.5 * axis_tolerance / steps
-    posted, law, why = programmed, None, ""
+    posted, trajectory, why = programmed, None, ""
     try:
         posted = linearised(posted, "pose", chord=0.5 * tolerance, angle=lean, progress=part(0.1, 0.2))
         if target == "joints":
@@ -104,11 +104,11 @@ def prepare(
     posted = between(posted, progress=part(0.4, 0.6))
     if not why:
         try:
-            law = plan(
+            trajectory = plan_trajectory(
                 posted, corners=corners, tolerance=0.5 * tolerance, axis_tolerance=0.5 * axis_tolerance,
-                stops=stops(posted.path),
+                stops=find_stops(posted.path),
             )  # fmt: skip
         except PoseError as error:
             why = str(error)
     say(1.0)
-    return Job(programmed, posted, law, why, waiting(path))
+    return Job(programmed, posted, trajectory, why, sum_dwells(path))

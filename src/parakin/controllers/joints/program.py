@@ -1,4 +1,4 @@
-"""A law as G-code for controllers that know no kinematics: every joint is an axis."""
+"""A trajectory as G-code for controllers that know no kinematics: every joint is an axis."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ import numpy as np
 
 from ...errors import PoseError
 from ...machine import Machine
-from ...toolpath.timing.joint_path import Drives
-from ...toolpath.timing.trajectory import Law
+from ...toolpath.timing.joint_path import DriveLimits
+from ...toolpath.timing.trajectory import Trajectory
 from ..events import comments, spoken
 from ..gcode_blocks import at_the_rim, blocks
 
@@ -39,12 +39,12 @@ def joint_letters(machine: Machine) -> tuple[str, ...]:
     return tuple(letters)
 
 
-def joint_program(law: Law, *, forced: str | None = None) -> Writer:
-    """What writes a law as a program in joint space, in mm, degrees and inverse time (G93).
+def joint_program(trajectory: Trajectory, *, forced: str | None = None) -> Writer:
+    """What writes a trajectory as a program in joint space, in mm, degrees and inverse time (G93).
 
     Parameters
     ----------
-    law : of a path that is dense enough for joints which move evenly from record to record
+    trajectory : of a path that is dense enough for joints which move evenly from record to record
     forced : what is off limits, a line each, where the program is written all the same; its header says so
 
     Records at one place are written once. The joints are those of the posted path, their zeros the machine's: work and
@@ -52,23 +52,23 @@ def joint_program(law: Law, *, forced: str | None = None) -> Writer:
 
     Raises :class:`PoseError` where there are more joints than letters.
     """
-    letters = joint_letters(law.posted.machine)
+    letters = joint_letters(trajectory.posted.machine)
 
     def write(file: BinaryIO) -> None:
-        for text in _program(law, letters, forced):
+        for text in _program(trajectory, letters, forced):
             file.write(text.encode("ascii"))
 
     return write
 
 
-def _program(law: Law, letters: tuple[str, ...], forced: str | None) -> Iterator[str]:
-    posted, path, machine = law.posted, law.posted.path, law.posted.machine
-    place = law.curve.place
+def _program(trajectory: Trajectory, letters: tuple[str, ...], forced: str | None) -> Iterator[str]:
+    posted, path, machine = trajectory.posted, trajectory.posted.path, trajectory.posted.machine
+    place = trajectory.curve.corner_of_record
     kept = np.flatnonzero(np.diff(place, prepend=-1))
-    speeds = Drives.of(machine).speed
+    speeds = DriveLimits.of(machine).speed
     joints = posted.joints[kept]
     moved = (np.abs(np.diff(joints, axis=0)) / speeds).max(1, initial=0.0)
-    seconds = np.maximum(np.diff(law.times[kept]), np.maximum(moved, _SHORTEST))
+    seconds = np.maximum(np.diff(trajectory.times[kept]), np.maximum(moved, _SHORTEST))
     begin = max(_LEAST, float((np.abs(joints[0] - machine.inverse(machine.home)) / speeds).max()) / _CALM)
     rows = at_the_rim(joints, machine.joint_units)
     names = zip(letters, machine.joints, machine.joint_units, strict=True)

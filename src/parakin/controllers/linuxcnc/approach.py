@@ -8,7 +8,7 @@ from ...errors import PoseError
 from ...kernels.batch import run
 from ...kinematics.follow import FREE
 from ...machine import Array, Machine
-from ...toolpath.timing.joint_path import Drives
+from ...toolpath.timing.joint_path import DriveLimits
 
 _CALM = 0.25  # of the joints' speeds
 _UNKNOWN = 4.0  # s: for the motion whose start is not known
@@ -73,5 +73,5 @@ def _line(start: Array, end: Array) -> Array:
 def _seconds(machine: Machine, start: Array, end: Array, mode: str) -> float:
     """s in which the joints have a part of their speeds."""
     joints = machine.follow(_line(start, end), mode, FREE)
-    rates = np.abs(np.diff(joints, axis=0)) * (_LOOKS - 1) / Drives.of(machine).speed
+    rates = np.abs(np.diff(joints, axis=0)) * (_LOOKS - 1) / DriveLimits.of(machine).speed
     return max(_LEAST, float(np.nanmax(rates, initial=0.0)) / _CALM)

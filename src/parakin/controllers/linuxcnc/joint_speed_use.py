@@ -7,34 +7,34 @@ from numpy.typing import NDArray
 
 from ...kinematics.follow import FREE
 from ...toolpath.path import Floats
-from ...toolpath.timing.joint_path import Drives
-from ...toolpath.timing.trajectory import Law
+from ...toolpath.timing.joint_path import DriveLimits
+from ...toolpath.timing.trajectory import Trajectory
 
 _BLOCK = 1 << 17  # motions looked at together
-_NEAR = 1e-9  # mm: a row of the law no farther from another look tells nothing more
+_NEAR = 1e-9  # mm: a row of the trajectory no farther from another look tells nothing more
 
 
-def strain(law: Law, piece: NDArray[np.int64], start: Floats, end: Floats) -> Floats:
+def strain(trajectory: Trajectory, piece: NDArray[np.int64], start: Floats, end: Floats) -> Floats:
     """The greatest share of its speed that a joint needs per mm/s of path speed, in both halves of k motions, (k, 2).
 
-    piece, start, end : (k,) the piece of the law's curve that a motion is on, and mm of it where it begins and ends
+    piece, start, end : (k,) the curve's piece that a motion is on, and mm of it where it begins and ends
 
-    The joints are looked at at the ends, in the middle and at the law's rows between, for these are dense where joints
-    run fast; between two looks their speeds are taken to go on changing as they did before and will behind.
+    The joints are looked at at the ends, in the middle and at the trajectory's rows between, for these are dense where
+    joints run fast; between two looks their speeds are taken to go on changing as they did before and will behind.
     """
     out = np.empty((len(piece), 2))
     for begin in range(0, len(piece), _BLOCK):
         part = slice(begin, begin + _BLOCK)
-        out[part] = _of_block(law, piece[part], start[part], end[part])
+        out[part] = _of_block(trajectory, piece[part], start[part], end[part])
     return out
 
 
-def _of_block(law: Law, piece: NDArray[np.int64], start: Floats, end: Floats) -> Floats:
-    segment, offset, half = _looks(law, piece, start, end)
-    curve, machine = law.curve, law.posted.machine
+def _of_block(trajectory: Trajectory, piece: NDArray[np.int64], start: Floats, end: Floats) -> Floats:
+    segment, offset, half = _looks(trajectory, piece, start, end)
+    curve, machine = trajectory.curve, trajectory.posted.machine
     poses = curve.corner[segment] + curve.slope[segment] * offset[:, None]
-    joints = machine.follow(poses, law.posted.mode, FREE)
-    slope = np.diff(joints, axis=0) / _gaps(law, segment, offset)[:, None] / Drives.of(machine).speed
+    joints = machine.follow(poses, trajectory.posted.mode, FREE)
+    slope = np.diff(joints, axis=0) / _gaps(trajectory, segment, offset)[:, None] / DriveLimits.of(machine).speed
     turn = np.abs(np.diff(slope, axis=0)) * (segment[1:-1] == segment[:-2])[:, None]
     nothing = np.zeros((1, slope.shape[1]))
     before, behind = np.concatenate([nothing, turn]), np.concatenate([turn, nothing])
@@ -43,12 +43,12 @@ def _of_block(law: Law, piece: NDArray[np.int64], start: Floats, end: Floats) ->
 
 
 def _looks(
-    law: Law, piece: NDArray[np.int64], start: Floats, end: Floats
+    trajectory: Trajectory, piece: NDArray[np.int64], start: Floats, end: Floats
 ) -> tuple[NDArray[np.int64], Floats, NDArray[np.bool_]]:
     """Pieces and mm on them, ascending; and whether a half of a motion begins there, or the last one ends."""
-    course, first, last = law.course, int(piece[0]), int(piece[-1])
-    rows = slice(*np.searchsorted(course.segment, [first, last + 1]))
-    own, at = course.segment[rows], course.offset[rows]
+    joint_path, first, last = trajectory.joint_path, int(piece[0]), int(piece[-1])
+    rows = slice(*np.searchsorted(joint_path.segment, [first, last + 1]))
+    own, at = joint_path.segment[rows], joint_path.offset[rows]
     inside = ((own > first) | (at > start[0])) & ((own < last) | (at < end[-1]))
     own, at = own[inside], at[inside]
     segment = np.concatenate([piece, piece, piece[-1:], own])
@@ -56,12 +56,12 @@ def _looks(
     half = np.arange(len(segment)) < len(segment) - len(own)
     order = np.lexsort((offset, segment))
     segment, offset, half = segment[order], offset[order], half[order]
-    apart = _gaps(law, segment, offset) > _NEAR
+    apart = _gaps(trajectory, segment, offset) > _NEAR
     kept = half | (np.append(True, apart) & np.append(apart, True))
     return segment[kept], offset[kept], half[kept]
 
 
-def _gaps(law: Law, segment: NDArray[np.int64], offset: Floats) -> Floats:
+def _gaps(trajectory: Trajectory, segment: NDArray[np.int64], offset: Floats) -> Floats:
     """mm of path from each look to the next."""
-    gaps: Floats = np.diff(offset) + np.where(segment[1:] == segment[:-1], 0.0, law.curve.length[segment[:-1]])
+    gaps: Floats = np.diff(offset) + np.where(segment[1:] == segment[:-1], 0.0, trajectory.curve.length[segment[:-1]])
     return gaps

@@ -1,4 +1,4 @@
-"""A law as G-code for LinuxCNC with the kinematics that parakin makes for it."""
+"""A trajectory as G-code for LinuxCNC with the kinematics that parakin makes for it."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ import numpy as np
 
 from ...errors import PoseError
 from ...machine import Array, Machine
-from ...toolpath.timing.corners import checked
-from ...toolpath.timing.trajectory import Law
+from ...toolpath.timing.corners import check_tolerance
+from ...toolpath.timing.trajectory import Trajectory
 from ..events import comments, spoken
 from ..gcode_blocks import at_the_rim, blocks
 from .approach import approach
@@ -27,41 +27,41 @@ _INSTANT = 0.002  # s
 _TURNING = 0.4  # of the tolerance: two motions that turn the tool LinuxCNC blends less well than it reckons
 
 
-def linuxcnc_program(law: Law, *, forced: str | None = None, tolerance: float = 0.005) -> Writer:
-    """What writes a law as a program for LinuxCNC 2.9 and the configuration of :func:`..linuxcnc.configuration`.
+def linuxcnc_program(trajectory: Trajectory, *, forced: str | None = None, tolerance: float = 0.005) -> Writer:
+    """What writes a trajectory as a program for LinuxCNC 2.9 and the configuration of :func:`..linuxcnc.configuration`.
 
     Parameters
     ----------
-    law : of a path whose poses go straight from record to record
+    trajectory : of a path whose poses go straight from record to record
     forced : what is off limits, a line each, where the program is written all the same; its header says so
     tolerance : mm that LinuxCNC may cut corners by
 
     Every motion is in the machine's own coordinates (G53), whatever offsets are in force, and in inverse time (G93).
-    Records at one place are written once; where the law's speed changes points are added on the straight line. The
-    program begins with a slow motion to the first record and takes :func:`program_seconds` from there.
+    Records at one place are written once; where the trajectory's speed changes points are added on the straight line.
+    The program begins with a slow motion to the first record and takes :func:`program_seconds` from there.
 
     Raises :class:`PoseError` where LinuxCNC's kinematics can't follow: another working mode, or too many turns of C.
     """
-    machine, posted = law.posted.machine, law.posted
-    checked(tolerance, "tolerance")
+    machine, posted = trajectory.posted.machine, trajectory.posted
+    check_tolerance(tolerance, "tolerance")
     legs = posted.mode if machine.model.first_serial is None else posted.mode[:-1]  # a wrist goes on in either mode
     if not machine.mode.startswith(legs):
         raise PoseError(f"mode {posted.mode!r}: LinuxCNC's kinematics of {machine.name} has {machine.mode!r} only")
     _refuse_turns(machine, posted.poses)
-    found = motions(law, *axis_rates(machine))
+    found = motions(trajectory, *axis_rates(machine))
     blend = tolerance * (_TURNING if set(machine.axes) & set("ABC") else 1.0)
-    way = approach(machine, law.curve.corner[0], law.course.joints[0], posted.mode)
+    way = approach(machine, trajectory.curve.corner[0], trajectory.joint_path.joints[0], posted.mode)
 
     def write(file: BinaryIO) -> None:
-        for text in _program(law, found, way, forced, f"G64 P{blend:g} Q0"):
+        for text in _program(trajectory, found, way, forced, f"G64 P{blend:g} Q0"):
             file.write(text.encode("ascii"))
 
     return write
 
 
-def program_seconds(law: Law) -> float:
-    """What LinuxCNC takes for a program, s, from the first record on: the law's time and what its axes add to it."""
-    return float(motions(law, *axis_rates(law.posted.machine)).seconds.sum())
+def program_seconds(trajectory: Trajectory) -> float:
+    """What LinuxCNC takes for a program, s, from the first record on: the trajectory's time and what its axes add."""
+    return float(motions(trajectory, *axis_rates(trajectory.posted.machine)).seconds.sum())
 
 
 def _refuse_turns(machine: Machine, poses: Array) -> None:
@@ -74,8 +74,10 @@ def _refuse_turns(machine: Machine, poses: Array) -> None:
             )
 
 
-def _program(law: Law, found: Motions, to_first: tuple[Array, Array], forced: str | None, blend: str) -> Iterator[str]:
-    posted, path = law.posted, law.posted.path
+def _program(
+    trajectory: Trajectory, found: Motions, to_first: tuple[Array, Array], forced: str | None, blend: str
+) -> Iterator[str]:
+    posted, path = trajectory.posted, trajectory.posted.path
     machine = posted.machine
     ends = at_the_rim(found.ends, machine.axis_units)
     way, times = at_the_rim(to_first[0], machine.axis_units), to_first[1]
@@ -87,7 +89,7 @@ def _program(law: Law, found: Motions, to_first: tuple[Array, Array], forced: st
     ]
     yield _lines(line for remark in head for line in comments(remark))
     yield "G21 G90 G17 G40 G49\n"
-    reached = np.searchsorted(found.piece, law.curve.place)  # how many motions lead to each record
+    reached = np.searchsorted(found.piece, trajectory.curve.corner_of_record)  # how many motions lead to each record
     said = spoken(path, [int(reached[event.record - 1]) if event.record else -1 for event in path.events])
     yield _lines(said.pop(-1, []))
     yield "G93 G61\n" + blocks("G53 G1 ", machine.axes, way, times) + blend + "\n"

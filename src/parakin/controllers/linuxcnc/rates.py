@@ -1,4 +1,4 @@
-"""How fast LinuxCNC's axes may be, so that it can follow a law along a path."""
+"""How fast LinuxCNC's axes may be, so that it can follow a trajectory along a path."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Where a law's motions are cut because the speed changes along them."""
+"""Where a trajectory's motions are cut because the speed changes along them."""
 
 from __future__ import annotations
 
@@ -6,42 +6,42 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...toolpath.path import Floats
-from ...toolpath.timing.trajectory import Law
+from ...toolpath.timing.trajectory import Trajectory
 
-_STEP = 0.05  # of a motion's greatest speed: by so much the law's speed changes within a part of it
+_STEP = 0.05  # of a motion's greatest speed: by so much the trajectory's speed changes within a part of it
 _SHORTEST = 0.008  # s: no part takes less
-_LOOK = 0.001  # s, between the places where the law's speed is looked at
+_LOOK = 0.001  # s, between the places where the trajectory's speed is looked at
 
 
-def cuts(law: Law, accelerations: Floats) -> tuple[NDArray[np.int64], Floats, Floats]:
-    """The pieces of a law's curve that are cut, (c,), and where: mm from the piece's start, and s, (c,) each.
+def cuts(trajectory: Trajectory, accelerations: Floats) -> tuple[NDArray[np.int64], Floats, Floats]:
+    """The pieces of a trajectory's curve that are cut, (c,), and where: mm from the piece's start, and s, (c,) each.
 
     accelerations : (axes,) mm, rad and s; no part is so short that the controller could not stand still at both ends
     """
-    course, pace, pieces = law.course, law.pace, len(law.curve.length)
-    first = np.searchsorted(course.segment, np.arange(pieces))
-    times = np.append(pace.passed[first], pace.passed[-1])
-    slow, fast = _speeds(law, first)
-    rise = 2.0 * (np.abs(law.curve.slope) / accelerations).max(1)
+    joint_path, profile, pieces = trajectory.joint_path, trajectory.profile, len(trajectory.curve.length)
+    first = np.searchsorted(joint_path.segment, np.arange(pieces))
+    times = np.append(profile.row_times[first], profile.row_times[-1])
+    slow, fast = _speeds(trajectory, first)
+    rise = 2.0 * (np.abs(trajectory.curve.slope) / accelerations).max(1)
     varied = (np.diff(times) >= 2.0 * np.maximum(_SHORTEST, rise * fast)) & (slow < (1.0 - _STEP) * fast)
     found = list[tuple[int, float, float]]()
     for piece in np.flatnonzero(varied).tolist():
         begin, end = times[piece], times[piece + 1]
         looks = np.linspace(begin, end, int((end - begin) / _LOOK) + 2)[1:-1]
-        where = np.clip(np.searchsorted(pace.time, looks, "right") - 1, 0, len(pace.cell) - 1)
-        t = looks - pace.time[where]
-        speed = pace.speed[where] + t * (pace.rise[where] + 0.5 * t * pace.jerk[where])
-        shift = t * (pace.speed[where] + t * (0.5 * pace.rise[where] + t * pace.jerk[where] / 6.0))
-        offset = course.offset[pace.cell[where]] + shift
+        where = np.clip(np.searchsorted(profile.time, looks, "right") - 1, 0, len(profile.row) - 1)
+        t = looks - profile.time[where]
+        speed = profile.speed[where] + t * (profile.acceleration[where] + 0.5 * t * profile.jerk[where])
+        shift = t * (profile.speed[where] + t * (0.5 * profile.acceleration[where] + t * profile.jerk[where] / 6.0))
+        offset = joint_path.offset[profile.row[where]] + shift
         parts = _parts(looks - begin, speed, end - begin, _STEP * fast[piece], rise[piece])
         found += [(piece, offset[i], looks[i]) for i in parts]
     table = np.array(found).reshape(-1, 3)
     return table[:, 0].astype(np.int64), table[:, 1], table[:, 2]
 
 
-def _speeds(law: Law, first: NDArray[np.int64]) -> tuple[Floats, Floats]:
+def _speeds(trajectory: Trajectory, first: NDArray[np.int64]) -> tuple[Floats, Floats]:
     """The least and the greatest speed on each piece, told by its steps."""
-    step, spans = law.course.step, np.diff(law.pace.passed)
+    step, spans = trajectory.joint_path.step, np.diff(trajectory.profile.row_times)
     speed = np.divide(step, spans, out=np.zeros(len(step)), where=spans > 0.0)
     moving = step > 0.0
     least = np.minimum.reduceat(np.where(moving, speed, np.inf), first)

@@ -1,4 +1,4 @@
-"""A law as straight motions of the tool at one speed each: what a G-code program can say of it."""
+"""A trajectory as straight motions of the tool at one speed each: what a G-code program can say of it."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...toolpath.path import Floats
-from ...toolpath.timing.joint_path import Drives
-from ...toolpath.timing.trajectory import Law
+from ...toolpath.timing.joint_path import DriveLimits
+from ...toolpath.timing.trajectory import Trajectory
 from .joint_speed_use import strain
 from .speed_cuts import cuts
 
@@ -26,7 +26,7 @@ class Motions:
     ends : (k, axes) the pose that each leads to
     seconds : (k,) what each takes, whole cycles
     halt : (k,) whether the tool stands still at its end
-    piece : (k,) the piece of the law's curve that it is on, or a part of
+    piece : (k,) the piece of the trajectory's curve that it is on, or a part of
     """
 
     ends: Floats
@@ -35,31 +35,31 @@ class Motions:
     piece: NDArray[np.int64]
 
 
-def motions(law: Law, speeds: Floats, accelerations: Floats) -> Motions:
-    """The motions that a law makes, divided where its speed changes, and slow enough that no joint passes its speed.
+def motions(trajectory: Trajectory, speeds: Floats, accelerations: Floats) -> Motions:
+    """The motions of a trajectory, divided where its speed changes, and slow enough that no joint passes its speed.
 
     speeds, accelerations : (axes,) what the controller gives each axis; mm, rad and s
     """
-    curve, pieces = law.curve, len(law.curve.length)
+    curve, pieces = trajectory.curve, len(trajectory.curve.length)
     if not pieces:
         nothing = np.empty(0)
         return Motions(np.empty((0, curve.corner.shape[1])), nothing, nothing > 0.0, nothing.astype(np.int64))
-    after, offset, passed = cuts(law, accelerations)
-    first = np.searchsorted(law.course.segment, np.arange(1, pieces))
+    after, offset, passed = cuts(trajectory, accelerations)
+    first = np.searchsorted(trajectory.joint_path.segment, np.arange(1, pieces))
     piece = np.concatenate([np.arange(pieces), after])
     end = np.concatenate([curve.length, offset])
-    passed = np.concatenate([law.pace.passed[first], law.pace.passed[-1:], passed])
+    passed = np.concatenate([trajectory.profile.row_times[first], trajectory.profile.row_times[-1:], passed])
     order = np.lexsort((end, piece))
     piece, end, passed = piece[order], end[order], passed[order]
     last = np.append(piece[1:] != piece[:-1], True)
     start = np.where(np.append(True, last[:-1]), 0.0, np.append(0.0, end[:-1]))
     halt = np.zeros(len(piece), bool)
-    if Drives.of(law.posted.machine).soft:
+    if DriveLimits.of(trajectory.posted.machine).bounds_acceleration:
         halt[last] = curve.parted[1:]
     slope, length = np.abs(curve.slope[piece]), end - start
     cycles = np.maximum(np.diff(np.rint(passed / CYCLE), prepend=0.0), 1.0)
     cycles = np.maximum(cycles, np.ceil((slope / speeds).max(1) * length / CYCLE - _ROUNDING))
-    share = strain(law, piece, start, end) / (_KEPT * CYCLE)
+    share = strain(trajectory, piece, start, end) / (_KEPT * CYCLE)
     even = ~last[:-1] | (curve.sharp[piece[1:]] < _EVEN) & ~halt[:-1]
     meet = np.where(even, np.maximum(share[:-1, 1], share[1:, 0]), 0.0)
     share[:-1, 1], share[1:, 0] = np.maximum(share[:-1, 1], meet), np.maximum(share[1:, 0], meet)

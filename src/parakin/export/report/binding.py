@@ -1,4 +1,4 @@
-"""Which limit sets the pace of a law of time: for how long, when, and where on the path."""
+"""Which limit sets the pace of a trajectory: for how long, when, and where on the path."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from .path_view import PathView, stroke, telling, tip_points
 from .timing_samples import switches
 
 if TYPE_CHECKING:
-    from ...toolpath.timing import Law
+    from ...toolpath.timing import Trajectory
 
 _POINTS = 12_000  # of the path
 _BINS = 300  # of the cycle
@@ -26,19 +26,19 @@ _COLOURS = (
 )  # fmt: skip
 
 
-def colours(law: Law) -> dict[str, str]:
+def colours(trajectory: Trajectory) -> dict[str, str]:
     """A colour for each limit that ever sets the pace, in the order of their shares."""
     free = chain(_COLOURS, repeat(_REST))
-    return {name: _FEED if name == "feed" else next(free) for name in law.shares}
+    return {name: _FEED if name == "feed" else next(free) for name in trajectory.shares}
 
 
-def share_bars(law: Law, shades: dict[str, str]) -> str:
+def share_bars(trajectory: Trajectory, shades: dict[str, str]) -> str:
     """How long each limit sets the pace, as HTML bars."""
     return "".join(
         f"<div class='bar pace'><div><b>{_breakable(name)}</b></div><div class=scale>"
         f"<i style='left:0;width:{100.0 * share:.2f}%;background:{shades[name]}'></i></div>"
-        f"<div class=slack>{percent(share)} <small>{_brief(share * law.seconds)}</small></div></div>\n"
-        for name, share in law.shares.items()
+        f"<div class=slack>{percent(share)} <small>{_brief(share * trajectory.seconds)}</small></div></div>\n"
+        for name, share in trajectory.shares.items()
     )
 
 
@@ -54,40 +54,42 @@ def _breakable(name: str) -> str:
     return escape(name).replace(".", ".<wbr>")
 
 
-def bars_over_time(law: Law, shades: dict[str, str]) -> list[Trace]:
+def bars_over_time(trajectory: Trajectory, shades: dict[str, str]) -> list[Trace]:
     """For each limit the share of short spans of the cycle in which it sets the pace; they add up to 1."""
-    ends = np.linspace(0.0, law.seconds, _BINS + 1)
-    bounds = np.concatenate([[0.0], switches(law), [law.seconds]])
+    ends = np.linspace(0.0, trajectory.seconds, _BINS + 1)
+    bounds = np.concatenate([[0.0], switches(trajectory), [trajectory.seconds]])
     spans = np.diff(bounds)
     traces = []
     for name, shade in shades.items():
-        so_far = np.append(0.0, np.cumsum(np.where(law.binding == law.names.index(name), spans, 0.0)))
-        share = np.diff(np.interp(ends, bounds, so_far)) * (_BINS / law.seconds)
+        so_far = np.append(0.0, np.cumsum(np.where(trajectory.binding == trajectory.names.index(name), spans, 0.0)))
+        share = np.diff(np.interp(ends, bounds, so_far)) * (_BINS / trajectory.seconds)
         some = np.flatnonzero(share > 1e-6)
         trace: Trace = {"type": "bar", "name": escape(name), "marker": {"color": shade, "line": {"width": 0}}}
         trace |= {"x": numbers(0.5 * (ends[some] + ends[some + 1]), 6), "y": numbers(share[some], 4)}
         trace |= {
-            "width": law.seconds / _BINS,
+            "width": trajectory.seconds / _BINS,
             "hovertemplate": "%{x:,.3f} s<br>%{y:.1%} %{fullData.name}<extra></extra>",
         }
         traces.append(trace)
     return traces
 
 
-def bound_path(law: Law, view: PathView, shades: dict[str, str]) -> Figure:
+def bound_path(trajectory: Trajectory, view: PathView, shades: dict[str, str]) -> Figure:
     """The tool tip's path, coloured by the limit that sets the pace; rapid motions are thin."""
-    posted, course = law.posted, law.course
-    rows = len(course.segment)
-    tips = tip_points(posted.machine, course.poses(np.arange(rows), np.zeros(rows)))
+    posted, joint_path = trajectory.posted, trajectory.joint_path
+    rows = len(joint_path.segment)
+    tips = tip_points(posted.machine, joint_path.poses(np.arange(rows), np.zeros(rows)))
     tips = tips @ view.place[:, :3].T + view.place[:, 3]
-    record = law.curve.record[course.segment[np.maximum(np.arange(rows) - 1, 0)]]  # that the step to a row leads to
+    record = trajectory.curve.record_of_piece[
+        joint_path.segment[np.maximum(np.arange(rows) - 1, 0)]
+    ]  # that the step to a row leads to
     rapid = posted.path.rapid[record]
-    limited = (law.binding != 0).astype(float)  # so that thinning drops no stretch where a drive binds
-    turns = np.flatnonzero((np.diff(law.binding) != 0) | (np.diff(rapid) != 0))
+    limited = (trajectory.binding != 0).astype(float)  # so that thinning drops no stretch where a drive binds
+    turns = np.flatnonzero((np.diff(trajectory.binding) != 0) | (np.diff(rapid) != 0))
     kept = telling((*tips.T, limited), turns, _POINTS)
     traces: list[Trace] = []
     for name, shade in shades.items():
-        here = law.binding[kept[1:]] == law.names.index(name)
+        here = trajectory.binding[kept[1:]] == trajectory.names.index(name)
         for fast in (False, True):
             wanted = here & (rapid[kept[1:]] == fast)
             if not wanted.any():
@@ -98,7 +100,7 @@ def bound_path(law: Law, view: PathView, shades: dict[str, str]) -> Figure:
                 "legendgroup": name,
                 "showlegend": not any(t["legendgroup"] == name for t in traces),
             }
-            trace["customdata"] = _places(law, at, record)
+            trace["customdata"] = _places(trajectory, at, record)
             trace["hovertemplate"] = (
                 "%{customdata[0]:,.3f} s, record %{customdata[1]:,}, line %{customdata[2]}"
                 f"<br>%{{x:,.2f}}, %{{y:,.2f}}, %{{z:,.2f}}<extra>{escape(name)}</extra>"
@@ -110,6 +112,8 @@ def bound_path(law: Law, view: PathView, shades: dict[str, str]) -> Figure:
     return {"data": traces, "layout": layout}
 
 
-def _places(law: Law, rows: NDArray[np.int64], record: NDArray[np.int64]) -> list[list[float | int | None]]:
-    times, of = numbers(law.pace.passed[rows], 3), record[rows]
-    return [[*place] for place in zip(times, of.tolist(), law.posted.path.line[of].tolist(), strict=True)]
+def _places(
+    trajectory: Trajectory, rows: NDArray[np.int64], record: NDArray[np.int64]
+) -> list[list[float | int | None]]:
+    times, of = numbers(trajectory.profile.row_times[rows], 3), record[rows]
+    return [[*place] for place in zip(times, of.tolist(), trajectory.posted.path.line[of].tolist(), strict=True)]

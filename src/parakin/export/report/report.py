@@ -20,13 +20,13 @@ from .timing import cycle_text, timing_card
 
 if TYPE_CHECKING:
     from ...toolpath.posting.posted import Posted
-    from ...toolpath.timing import Law
+    from ...toolpath.timing import Trajectory
 
 
-def report_html(posted: Posted, law: Law | None = None, unplanned: str = "", waits: float = 0.0) -> str:
-    """The report as one HTML document: verdict, ranges, path, curves, time by a ``law``, offences, notes, facts.
+def report_html(posted: Posted, trajectory: Trajectory | None = None, unplanned: str = "", waits: float = 0.0) -> str:
+    """The report as one HTML document: verdict, ranges, path, curves, time by a ``trajectory``, offences, notes, facts.
 
-    ``unplanned`` tells why there is no law, ``waits`` how long (s) the program waits besides it.
+    ``unplanned`` tells why there is no trajectory, ``waits`` how long (s) the program waits besides it.
     Whatever the length of the path it stays below some 8 MB: what is drawn are the extremes of every stretch.
     """
     path, machine = posted.path, posted.machine
@@ -34,23 +34,23 @@ def report_html(posted: Posted, law: Law | None = None, unplanned: str = "", wai
     title = f"{name} on {machine.spec.title or machine.name}"
     parts = [
         f"<header><h1>{escape(title)}</h1><p class=sub>{escape(path.source)}</p></header>\n",
-        _verdict(posted, law, unplanned, waits),
+        _verdict(posted, trajectory, unplanned, waits),
     ]
     if len(path):
         uses, relative = used(posted)
         view = path_view(posted, relative)
         parts += [range_card(posted, uses), _space(posted, view), _curves(posted, uses)]
-        parts += [] if law is None else [timing_card(law, view)]
+        parts += [] if trajectory is None else [timing_card(trajectory, view)]
     parts += [offence_card(posted), note_card(path), fact_card(posted)]
     return page(title, "".join(parts))
 
 
-def _verdict(posted: Posted, law: Law | None, unplanned: str, waits: float) -> str:
+def _verdict(posted: Posted, trajectory: Trajectory | None, unplanned: str, waits: float) -> str:
     path, first = posted.path, posted.first
     if not len(path):
         text = "<strong>Nothing to run</strong><p>The file has no motion.</p>"
         return f"<section class='card verdict bad'>{text}</section>\n"
-    time = "" if law is None else f"<p>{cycle_text(law)}</p>"
+    time = "" if trajectory is None else f"<p>{cycle_text(trajectory)}</p>"
     if waits:
         time += f"<p>Besides, the program waits {duration(waits)} by its own words.</p>"
     if unplanned:

@@ -12,41 +12,41 @@ from .binding import bound_path, colours, share_bars
 from .cards import card, duration
 from .path_view import PathView
 from .tables import programmed
-from .timing_curves import law_curves
+from .timing_curves import draw_timing_curves
 
 if TYPE_CHECKING:
-    from ...toolpath.timing import Law
+    from ...toolpath.timing import Trajectory
 
 
 _STILL = 1e-3  # s: a cycle as short has nothing to draw
 
 
-def cycle_text(law: Law) -> str:
+def cycle_text(trajectory: Trajectory) -> str:
     """The cycle time beside that at the programmed feeds, one line of HTML."""
-    path = law.posted.path
-    spans = np.diff(law.times, prepend=0.0)
+    path = trajectory.posted.path
+    spans = np.diff(trajectory.times, prepend=0.0)
     cut, rapid = (float(spans[path.rapid == fast].sum()) for fast in (False, True))
     asked, unknown = programmed(path)
     beside = f"{duration(asked)} at the programmed feeds"
     if unknown > 0.0:
         beside += f", {shown(unknown, 'mm')} without a feed not counted"
     tail = f", {duration(rapid)} in rapid" if rapid > 0.0 else ""
-    return f"Cycle time <b>{duration(law.seconds)}</b>: {duration(cut)} in feed motions ({beside}){tail}."
+    return f"Cycle time <b>{duration(trajectory.seconds)}</b>: {duration(cut)} in feed motions ({beside}){tail}."
 
 
-def timing_card(law: Law, view: PathView) -> str:
-    """The card; of a law that stands still nothing but its cycle time."""
-    if law.seconds < _STILL:
-        return card("Time", "", cycle_text(law))
-    shades = colours(law)
-    figure, height = law_curves(law, shades)
+def timing_card(trajectory: Trajectory, view: PathView) -> str:
+    """The card; of a trajectory that stands still nothing but its cycle time."""
+    if trajectory.seconds < _STILL:
+        return card("Time", "", cycle_text(trajectory))
+    shades = colours(trajectory)
+    figure, height = draw_timing_curves(trajectory, shades)
     body = (
-        f"<div class=two><div><h3>What sets the pace</h3>{share_bars(law, shades)}</div>"
-        f"<div>{placed('binding', bound_path(law, view, shades), '560px')}<p class=sub>The tool tip’s path, coloured by"
-        " the limit that sets the pace. Rapid motions are thin.</p></div></div>"
+        f"<div class=two><div><h3>What sets the pace</h3>{share_bars(trajectory, shades)}</div>"
+        f"<div>{placed('binding', bound_path(trajectory, view, shades), '560px')}<p class=sub>The tool tip’s path, "
+        "coloured by the limit that sets the pace. Rapid motions are thin.</p></div></div>"
         f"<h3>Over the cycle</h3><div class=wide>{placed('time', figure, f'{height}px')}</div>"
         "<p class=sub>Limits are dashed where they are near. Orange, red and violet: here this joint’s speed,"
         " acceleration or jerk sets the pace. Of every stretch the least and the greatest value is drawn, so no extreme"
         " is left out.</p>"
     )
-    return card("Time", body, cycle_text(law))
+    return card("Time", body, cycle_text(trajectory))

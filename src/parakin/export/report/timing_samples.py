@@ -1,4 +1,4 @@
-"""A law of time as curves of few points that hide no extreme, whatever its length."""
+"""A trajectory as curves of few points that hide no extreme, whatever its length."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from numpy.typing import NDArray
 from .curves import extremes_within
 
 if TYPE_CHECKING:
-    from ...toolpath.timing import Law
+    from ...toolpath.timing import Trajectory
 
 Floats = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
-_BLOCK = 1 << 15  # pieces of a law at a time
+_BLOCK = 1 << 15  # pieces of a trajectory at a time
 _SHORTEST = 1e-7  # s: what a piece as short adds is rounding
 
 
@@ -27,7 +27,7 @@ class Thinned:
     """A curve over time, k points.
 
     times, values : (k,) s; mm or rad, s, and mm/min for feeds; NaN where there is no value
-    binding : (k,) what limits the speed there, an index into the law's names
+    binding : (k,) what limits the speed there, an index into the trajectory's names
     record : (k,) that the motion leads to
     """
 
@@ -37,23 +37,23 @@ class Thinned:
     record: Indices
 
 
-def thinned(law: Law, most: int) -> dict[str, Thinned]:
-    """The law's curves of some ``most`` points each: the tip's ``feed.any``, ``feed.reached`` in feed motions and
-    ``feed.programmed``; for each joint ``d1``, ``d1.speed``, ``d1.acceleration``, and ``d1.jerk`` where it is limited.
+def thinned(trajectory: Trajectory, most: int) -> dict[str, Thinned]:
+    """The trajectory's curves of some ``most`` points each: the tip's ``feed.any``, ``feed.reached`` in feed motions
+    and ``feed.programmed``; for each joint ``d1``, ``d1.speed``, ``d1.acceleration``, and ``d1.jerk`` if it is limited.
 
-    Looked at are the start, the middle and the end of every piece of the law; of these each curve keeps the least and
-    the greatest in every stretch. Stretches are short where pieces are, yet none is much longer than the others.
+    Looked at are the start, the middle and the end of every piece of the speed profile; of these each curve keeps the
+    least and the greatest in every stretch. Stretches are short where pieces are, yet none much longer than the others.
     """
     parts: dict[str, list[Thinned]] = defaultdict(list)
-    total, done = 3 * len(law.pace.cell), 0
+    total, done = 3 * len(trajectory.profile.row), 0
     stretches = most // 3 if total > most else total
-    for times, binding, record, curves in _blocks(law):
-        along = 0.5 * (times / law.seconds + np.arange(done, done + len(times)) / total)
+    for times, binding, record, curves in _blocks(trajectory):
+        along = 0.5 * (times / trajectory.seconds + np.arange(done, done + len(times)) / total)
         done += len(times)
         for name, values in curves.items():
             kept = np.arange(len(values))
             if total > most:
-                kept = _without_short_gaps(times, values, law.seconds / stretches)
+                kept = _without_short_gaps(times, values, trajectory.seconds / stretches)
                 starts = np.flatnonzero(np.diff(np.floor(along[kept] * stretches), prepend=-1.0))
                 kept = kept[extremes_within(values[kept], starts)]
             parts[name].append(Thinned(times[kept], values[kept], binding[kept], record[kept]))
@@ -76,35 +76,35 @@ def _without_short_gaps(times: Floats, values: Floats, shortest: float) -> Indic
     return np.flatnonzero(~np.repeat(short, lasts - begins + 1))
 
 
-def _blocks(law: Law) -> Iterator[tuple[Floats, Indices, Indices, dict[str, Floats]]]:
+def _blocks(trajectory: Trajectory) -> Iterator[tuple[Floats, Indices, Indices, dict[str, Floats]]]:
     """Times, what binds, records, and curves by their names, for some pieces at a time."""
-    pace, course, machine = law.pace, law.course, law.posted.machine
-    edges = switches(law)
+    profile, joint_path, machine = trajectory.profile, trajectory.joint_path, trajectory.posted.machine
+    edges = switches(trajectory)
     tip = [i for i, axis in enumerate(machine.axes) if axis in "XYZ"]
     jerky = [i for i, drive in enumerate(machine.model.drives) if drive.jerk < np.inf]
-    pieces = np.flatnonzero(np.diff(pace.time) > _SHORTEST)
+    pieces = np.flatnonzero(np.diff(profile.time) > _SHORTEST)
     for first in range(0, len(pieces), _BLOCK):
         piece = pieces[first : first + _BLOCK]
-        begin, end = pace.time[piece], np.nextafter(pace.time[piece + 1], 0.0)  # before the next piece takes over
+        begin, end = profile.time[piece], np.nextafter(profile.time[piece + 1], 0.0)  # before the next piece takes over
         times = np.column_stack([begin, 0.5 * (begin + end), end])
-        at = law.at(times.ravel())
-        record = np.repeat(law.curve.record[course.segment[pace.cell[piece]]], 3)
+        at = trajectory.at(times.ravel())
+        record = np.repeat(trajectory.curve.record_of_piece[joint_path.segment[profile.row[piece]]], 3)
         feed = np.linalg.norm(_rates(at.poses[:, tip], times), axis=1)
-        curves = {"feed.any": 60.0 * feed, "feed.programmed": _programmed(law, record)}
-        curves["feed.reached"] = np.where(law.posted.path.rapid[record], np.nan, 60.0 * feed)
+        curves = {"feed.any": 60.0 * feed, "feed.programmed": _programmed(trajectory, record)}
+        curves["feed.reached"] = np.where(trajectory.posted.path.rapid[record], np.nan, 60.0 * feed)
         jerks = _rates(at.accelerations[:, jerky], times)
         for j, name in enumerate(machine.joints):
             curves |= {name: at.joints[:, j], f"{name}.speed": at.speeds[:, j]}
             curves[f"{name}.acceleration"] = at.accelerations[:, j]
             if j in jerky:
                 curves[f"{name}.jerk"] = jerks[:, jerky.index(j)]
-        binding = law.binding[np.searchsorted(edges, at.times, "right")]
+        binding = trajectory.binding[np.searchsorted(edges, at.times, "right")]
         yield at.times, binding, record, curves
 
 
-def switches(law: Law) -> Floats:
-    """(rows - 1,) s, when what binds at one row of the law's course gives way to what binds at the next."""
-    passed = law.pace.passed
+def switches(trajectory: Trajectory) -> Floats:
+    """(rows - 1,) s, when what binds at one row of the trajectory's joint path gives way to what binds at the next."""
+    passed = trajectory.profile.row_times
     return 0.5 * (passed[1:] + passed[:-1])
 
 
@@ -116,9 +116,9 @@ def _rates(values: Floats, times: Floats) -> Floats:
     return result
 
 
-def _programmed(law: Law, record: Indices) -> Floats:
+def _programmed(trajectory: Trajectory, record: Indices) -> Floats:
     """The programmed feed on motions to records, mm/min; NaN in rapid and where there is none."""
-    path = law.posted.path
+    path = trajectory.posted.path
     feed = path.feed.copy()
     if path.seconds is not None:
         steps = np.linalg.norm(np.diff(path.tip, axis=0, prepend=path.tip[:1]), axis=1)

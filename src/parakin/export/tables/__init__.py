@@ -1,1 +1,1 @@
-"""Tables of a posted path and of a law, as CSV and Parquet."""
+"""Tables of a posted path and of a trajectory, as CSV and Parquet."""

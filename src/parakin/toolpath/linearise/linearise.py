@@ -10,7 +10,7 @@ import numpy as np
 from ...errors import PoseError
 from ..path import Floats, Note, ToolPath
 from ..posting.posted import Posted
-from ..timing.corners import checked
+from ..timing.corners import check_tolerance
 from .cuts import Cuts, Places, cuts, parts_of
 from .deviation import FOUND, SHARES, Tube, Under
 from .interpolation import Flags, Indices, Programmed, denser
@@ -50,8 +50,8 @@ def linearised(
     Raises :class:`PoseError` for a tolerance that is none, for a motion between opposite tool axes, and for one that
     can't be kept however many records are added; both with their line.
     """
-    checked(chord, "chord")
-    checked(angle, "angle")
+    check_tolerance(chord, "chord")
+    check_tolerance(angle, "angle")
     if under not in ("pose", "joints"):
         raise PoseError(f"under: 'pose' or 'joints' expected, not {under!r}")
     say = progress or (lambda fraction: None)

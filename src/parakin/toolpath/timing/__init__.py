@@ -1,8 +1,7 @@
-"""Feed planning: a law of time along a posted tool path."""
+"""Timing: a trajectory along a posted tool path that keeps the feed and every joint's limits."""
 
 from .corners import Corners
-from .plan import plan
-from .setpoints import Setpoints
-from .trajectory import Law
+from .plan import plan_trajectory
+from .trajectory import Setpoints, Trajectory
 
-__all__ = ["Corners", "Law", "Setpoints", "plan"]
+__all__ = ["Corners", "Setpoints", "Trajectory", "plan_trajectory"]

@@ -41,8 +41,8 @@ class Curve:
     sharp : (c,) its size, angles counted as in s
     reach : (c,) mm of s on either side; no more than the pieces there
     parted : (c,) where the derivatives are not continuous: start, end, and corners that are not rounded
-    place : (n,) the corner of each record
-    record : (c - 1,) the record that each piece leads to
+    corner_of_record : (n,) the corner at which each record lies
+    record_of_piece : (c - 1,) the record that each piece leads to
     """
 
     corner: Floats
@@ -52,11 +52,11 @@ class Curve:
     sharp: Floats
     reach: Floats
     parted: Flags
-    place: Indices
-    record: Indices
+    corner_of_record: Indices
+    record_of_piece: Indices
 
 
-def curve_of(
+def round_corners(
     posted: Posted, corners: Corners, tolerance: float, axis_tolerance: float, stops: Flags, smooth: bool
 ) -> Curve:
     """The curve of a posted path.
@@ -70,8 +70,8 @@ def curve_of(
     scale = np.where(angles, LEVER, 1.0)
     lengths = _norms(np.diff(poses, axis=0) * scale)
     moved = np.concatenate([[True], lengths > _SAME])
-    place = np.cumsum(moved) - 1
-    record = np.flatnonzero(moved)[1:]
+    corner_of_record = np.cumsum(moved) - 1
+    record_of_piece = np.flatnonzero(moved)[1:]
     corner = np.ascontiguousarray(poses[moved])
     motion = np.diff(corner, axis=0)
     length = _norms(motion * scale)
@@ -79,7 +79,7 @@ def curve_of(
     turn = np.zeros_like(corner)
     turn[1:-1] = np.diff(slope, axis=0)
     parted = np.zeros(len(corner), bool)
-    parted[place[stops]] = True
+    parted[corner_of_record[stops]] = True
     parted[[0, -1]] = True
     sharp = _norms(turn * scale)
     if not smooth:
@@ -93,7 +93,7 @@ def curve_of(
     reach[1:-1] = _clear(np.minimum(reach[1:-1], np.minimum(length[:-1], length[1:])), length)
     parted |= reach < _TIGHT * sharp
     turn[parted] = sharp[parted] = reach[parted] = 0.0
-    return Curve(corner, length, slope, turn, sharp, reach, parted, place, record)
+    return Curve(corner, length, slope, turn, sharp, reach, parted, corner_of_record, record_of_piece)
 
 
 def _clear(reach: Floats, length: Floats) -> Floats:
@@ -125,7 +125,7 @@ def _leaning(axes: tuple[str, ...], corner: Floats, turn: Floats) -> Floats:
     return np.sum(list(rates.values()), axis=0) if letters else np.zeros(len(corner))
 
 
-def checked(tolerance: float, what: str) -> float:
+def check_tolerance(tolerance: float, what: str) -> float:
     """A tolerance above zero; raises :class:`PoseError` for others."""
     if not 0.0 < tolerance < np.inf:
         raise PoseError(f"{what}: more than 0 expected, not {tolerance!r}")

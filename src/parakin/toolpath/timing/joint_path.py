@@ -29,7 +29,7 @@ _NOISE = 1e-11  # of a joint's size: what its rounding may be
 
 
 @dataclass(frozen=True)
-class Drives:
+class DriveLimits:
     """What each joint can do, (joints,) each, infinite where nothing is said; mm or rad, and s."""
 
     speed: Floats
@@ -37,18 +37,18 @@ class Drives:
     jerk: Floats
 
     @staticmethod
-    def of(machine: Machine) -> Drives:
+    def of(machine: Machine) -> DriveLimits:
         drives = machine.model.drives
-        return Drives(*(np.array([getattr(d, k) for d in drives]) for k in ("speed", "acceleration", "jerk")))
+        return DriveLimits(*(np.array([getattr(d, k) for d in drives]) for k in ("speed", "acceleration", "jerk")))
 
     @cached_property
-    def soft(self) -> bool:
+    def bounds_acceleration(self) -> bool:
         """Some joint can't change its speed at once."""
         return bool(np.isfinite(self.acceleration).any() or np.isfinite(self.jerk).any())
 
 
 @dataclass(frozen=True, eq=False)
-class Course:
+class JointPath:
     """Joints over the length of a curve: cubic splines through n rows, with two continuous derivatives by s.
 
     posted, curve : whose joints they are
@@ -69,7 +69,7 @@ class Course:
 
     def between(self, row: int) -> str:
         """Where a row is, by the records before and behind it."""
-        record = int(self.curve.record[self.segment[row]])
+        record = int(self.curve.record_of_piece[self.segment[row]])
         return f"between records {record - 1} and {record} (line {int(self.posted.path.line[record])})"
 
     def poses(self, cell: Indices, shift: Floats) -> Floats:
@@ -94,14 +94,18 @@ class Course:
         return joints, guess, blur
 
 
-def course_of(posted: Posted, curve: Curve, drives: Drives, tolerance: float, axis_tolerance: float) -> Course:
+def build_joint_path(
+    posted: Posted, curve: Curve, drives: DriveLimits, tolerance: float, axis_tolerance: float
+) -> JointPath:
     """The joints along a curve, in steps as short as they have to be.
 
     Raises :class:`PoseError` where a leg can't close between two records, or a joint would have to jump.
     """
     if not len(curve.length):
         nothing = np.empty(0)
-        return Course(posted, curve, np.zeros(1, np.int64), np.zeros(1), nothing, posted.joints[:1], nothing, nothing)
+        return JointPath(
+            posted, curve, np.zeros(1, np.int64), np.zeros(1), nothing, posted.joints[:1], nothing, nothing
+        )
     most = min(MOST_PARTS, ENOUGH // len(curve.length))
     steps = np.ceil(np.minimum(PARTS * curve.sharp, most)).astype(np.int64)
     args = (curve.length, curve.reach, curve.parted, steps, LONGEST)
@@ -109,23 +113,23 @@ def course_of(posted: Posted, curve: Curve, drives: Drives, tolerance: float, ax
     segment, offset = np.empty(size, np.int64), np.empty(size)
     rows_of(*args, segment, offset)
     fine = 1e-3 * np.where(np.array(posted.machine.joint_units) == "mm", tolerance, axis_tolerance)
-    course = laid(posted, curve, segment, offset)
+    joint_path = laid(posted, curve, segment, offset)
     doubtful = np.ones(size - 1, bool)
     for attempt in range(1, _ROUNDS):
-        long = _too_long(course, drives, fine, np.flatnonzero(doubtful & (course.step > 0.0)))
+        long = _too_long(joint_path, drives, fine, np.flatnonzero(doubtful & (joint_path.step > 0.0)))
         if not len(long):
-            return course
-        if course.step[long].min() < _FINEST:
+            return joint_path
+        if joint_path.step[long].min() < _FINEST:
             break
-        where, parts = _cuts(long, course.step)
+        where, parts = _cuts(long, joint_path.step)
         # The joints between are those nearest to the splines, but where a path passes beside a pole: there rows too
         # far apart may have led over it, which only all of them together tell.
         anew = attempt % _ANEW == 0
-        course = refined(course, where, parts, anew)
+        joint_path = refined(joint_path, where, parts, anew)
         doubtful[:] = anew
         doubtful[where] = True
         doubtful = _widened(np.insert(doubtful, where + 1, True))
-    raise PoseError(f"{course.between(int(long[0]))} a joint would have to jump: the tool passes a singular pose")
+    raise PoseError(f"{joint_path.between(int(long[0]))} a joint would have to jump: the tool passes a singular pose")
 
 
 def _cuts(long: Indices, step: Floats) -> tuple[Indices, Floats]:
@@ -147,36 +151,47 @@ def _widened(flags: Flags) -> Flags:
     return result
 
 
-def _too_long(course: Course, drives: Drives, fine: Floats, cells: Indices) -> Indices:
+def _too_long(joint_path: JointPath, drives: DriveLimits, fine: Floats, cells: Indices) -> Indices:
     """Those of some steps over which the splines are off by more than ``fine`` (joints,), or a limit would be."""
-    found, first = [], course.posted.machine.model.first_serial
+    found, first = [], joint_path.posted.machine.model.first_serial
     for start in range(0, len(cells), _BLOCK):
         cell = cells[start : start + _BLOCK]
-        middle, guess, blur = course.joints_at(cell, 0.5 * course.step[cell])
+        middle, guess, blur = joint_path.joints_at(cell, 0.5 * joint_path.step[cell])
         off, grain = np.empty(len(cell), bool), np.full(middle.shape, _NOISE)
         if first is not None:
             grain[:, first] *= blur
-        args = (course.step, course.bend, course.feed, middle, guess, fine, drives.acceleration, CLOSE, grain, off)
+        args = (
+            joint_path.step,
+            joint_path.bend,
+            joint_path.feed,
+            middle,
+            guess,
+            fine,
+            drives.acceleration,
+            CLOSE,
+            grain,
+            off,
+        )
         split(len(cell), lambda start, stop: astray(cell, *args, start, stop))  # noqa: B023
         found.append(cell[off])
     return np.concatenate(found)
 
 
-def refined(course: Course, where: Indices, parts: Floats, anew: bool = False) -> Course:
-    """A course with rows added in steps ``where``, ascending, after ``parts`` of them.
+def refined(joint_path: JointPath, where: Indices, parts: Floats, anew: bool = False) -> JointPath:
+    """A joint_path with rows added in steps ``where``, ascending, after ``parts`` of them.
 
     The joints at the new rows are those nearest to the old splines; with ``anew`` all are followed from the start.
     """
-    shift = parts * course.step[where]
-    segment = np.insert(course.segment, where + 1, course.segment[where])
-    offset = np.insert(course.offset, where + 1, course.offset[where] + shift)
+    shift = parts * joint_path.step[where]
+    segment = np.insert(joint_path.segment, where + 1, joint_path.segment[where])
+    offset = np.insert(joint_path.offset, where + 1, joint_path.offset[where] + shift)
     if anew:
-        return laid(course.posted, course.curve, segment, offset)
-    joints = np.insert(course.joints, where + 1, course.joints_at(where, shift)[0], axis=0)
-    return _through(course.posted, course.curve, segment, offset, joints)
+        return laid(joint_path.posted, joint_path.curve, segment, offset)
+    joints = np.insert(joint_path.joints, where + 1, joint_path.joints_at(where, shift)[0], axis=0)
+    return _through(joint_path.posted, joint_path.curve, segment, offset, joints)
 
 
-def laid(posted: Posted, curve: Curve, segment: Indices, offset: Floats) -> Course:
+def laid(posted: Posted, curve: Curve, segment: Indices, offset: Floats) -> JointPath:
     """The joints at given rows, followed from the start."""
     way = np.append(0.0, np.cumsum(curve.length))[segment] + offset
     joints = followed(posted.machine, posted.mode, poses_on(curve, segment, offset), way)
@@ -187,18 +202,20 @@ def laid(posted: Posted, curve: Curve, segment: Indices, offset: Floats) -> Cour
     return _through(posted, curve, segment, offset, joints)
 
 
-def _through(posted: Posted, curve: Curve, segment: Indices, offset: Floats, joints: Floats) -> Course:
+def _through(posted: Posted, curve: Curve, segment: Indices, offset: Floats, joints: Floats) -> JointPath:
     step = np.diff(offset)
     over = np.flatnonzero(segment[1:] != segment[:-1])
     ends = curve.length[segment[over]]
     step[over] = np.where(offset[over] < ends, ends - offset[over], 0.0)
     bend = np.empty_like(joints)
     bends(step, joints, bend, np.empty(len(segment)))
-    course = Course(posted, curve, segment, offset, step, joints, bend, _feeds(posted, curve, segment, offset, step))
+    joint_path = JointPath(
+        posted, curve, segment, offset, step, joints, bend, _feeds(posted, curve, segment, offset, step)
+    )
     if not np.isfinite(joints.sum()):
         lost = int((~np.isfinite(joints)).any(1).argmax())
-        raise PoseError(f"{course.between(lost)} the legs can't close")
-    return course
+        raise PoseError(f"{joint_path.between(lost)} the legs can't close")
+    return joint_path
 
 
 def poses_on(curve: Curve, segment: Indices, offset: Floats) -> Floats:
@@ -211,7 +228,7 @@ def poses_on(curve: Curve, segment: Indices, offset: Floats) -> Floats:
 
 def _feeds(posted: Posted, curve: Curve, segment: Indices, offset: Floats, step: Floats) -> Floats:
     """(steps,) of ṡ², where the tip has the programmed feed or a piece takes the programmed time."""
-    path, record = posted.path, curve.record
+    path, record = posted.path, curve.record_of_piece
     tip = np.array([i for i, axis in enumerate(posted.machine.axes) if axis in "XYZ"], np.int64)
     free = path.rapid[record]
     feed = np.where(free | np.isnan(path.feed[record]), np.inf, path.feed[record] / 60.0)

@@ -1,94 +1,107 @@
-"""A time law along a tool path: as fast as feed and drives allow, and never faster."""
+"""A trajectory: a posted tool path with the time at which the machine passes each place."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from ..path import Floats
+from ...arrays import Array, Indices
 from ..posting.posted import Posted
-from .corners import Curve, Indices, checked
-from .joint_path import Course
-
-if TYPE_CHECKING:
-    from .setpoints import Setpoints
+from .corners import Curve, check_tolerance
+from .joint_path import JointPath
+from .speed_profile import SpeedProfile
 
 
 @dataclass(frozen=True, eq=False)
-class Pace:
-    """ṡ and what is with it along a course, in p pieces of constant s⃛; none reaches over a row.
+class Setpoints:
+    """Where a machine is at k times, and how it moves there. Lengths are mm, angles rad.
 
-    time : (p + 1,) s, at which pieces begin and the last one ends
-    cell, shift : (p,) the row before a piece's start, and mm from it
-    speed, rise, jerk : (p,) ṡ, s̈ and s⃛ at a piece's start
-    passed : (rows,) s, when each row is passed
+    columns : names of :attr:`table`'s columns
+    times : (k,) s
+    joints, speeds, accelerations : (k, joints)
+    poses : (k, axes) of the tool, as in :attr:`Posted.poses`
     """
 
-    time: Floats
-    cell: Indices
-    shift: Floats
-    speed: Floats
-    rise: Floats
-    jerk: Floats
-    passed: Floats
+    columns: tuple[str, ...]
+    times: Array
+    joints: Array
+    speeds: Array
+    accelerations: Array
+    poses: Array
+
+    @property
+    def table(self) -> Array:
+        """All columns as one table: ``time``, ``d1`` ..., ``d1.speed`` ..., ``d1.acceleration`` ..., ``X`` ..."""
+        return np.column_stack([self.times, self.joints, self.speeds, self.accelerations, self.poses])
 
 
 @dataclass(frozen=True, eq=False)
-class Law:
-    """When a machine is where on a tool path of n records. Lengths are mm, angles rad, times s.
+class Trajectory:
+    """The motion of a machine over time on a tool path of n records. Lengths are mm, angles rad, times s.
 
-    posted : what was planned
+    posted : the path that was planned
     curve : the tool's path with its corners, rounded or not
-    course : the joints along it, by rows
-    pace : the speed along it
-    binding : (rows,) what limits the speed at each row, an index into ``names``
+    joint_path : the joints along the curve, by rows
+    profile : the speed along the curve
+    binding : (rows,) the limit that bounds the speed at each row, an index into ``names``
     names : ``feed``, then for each joint ``d1.speed``, ``d1.acceleration``, ``d1.jerk``, and ``start/stop``
     """
 
     posted: Posted
     curve: Curve
-    course: Course
-    pace: Pace
-    binding: NDArray[np.int64]
+    joint_path: JointPath
+    profile: SpeedProfile
+    binding: Indices
     names: tuple[str, ...]
 
     @property
     def seconds(self) -> float:
         """The cycle time."""
-        return float(self.pace.time[-1])
+        return float(self.profile.time[-1])
 
     @cached_property
-    def times(self) -> Floats:
-        """(n,) when each record is passed; at a rounded corner where the tool is nearest to it."""
-        first = np.searchsorted(self.course.segment, np.arange(len(self.curve.length)))
-        return np.append(self.pace.passed[first], self.pace.passed[-1])[self.curve.place]
+    def times(self) -> Array:
+        """(n,) when each record is passed; at a rounded corner when the tool is nearest to it."""
+        first = np.searchsorted(self.joint_path.segment, np.arange(len(self.curve.length)))
+        corner_times = np.append(self.profile.row_times[first], self.profile.row_times[-1])
+        return corner_times[self.curve.corner_of_record]
 
     @cached_property
     def shares(self) -> dict[str, float]:
-        """The share of the cycle time in which each limit binds, the greatest first; without those that never do."""
-        spans = np.diff(self.pace.passed)
+        """The share of the cycle time in which each limit binds, the greatest first; without limits that never bind."""
+        spans = np.diff(self.profile.row_times)
         near = 0.5 * (np.append(spans, 0.0) + np.append(0.0, spans))
         sums = np.bincount(self.binding, near, len(self.names)) / (self.seconds or 1.0)
         return {self.names[i]: float(sums[i]) for i in np.argsort(-sums, kind="stable") if sums[i] > 0.0}
 
     def at(self, times: ArrayLike) -> Setpoints:
-        """Setpoints at times (k,); before the start and after the end the machine stands still."""
-        from .setpoints import setpoints
+        """Compute the setpoints at times (k,); before the start and after the end the machine stands still."""
+        times = np.atleast_1d(np.asarray(times, np.float64))
+        profile, machine = self.profile, self.posted.machine
+        kinds = ("", ".speed", ".acceleration")
+        columns = ("time", *(joint + kind for kind in kinds for joint in machine.joints), *machine.axes)
+        if not len(profile.row):
+            still = np.zeros((len(times), len(machine.joints)))
+            joints, poses = still + self.posted.joints[0], np.tile(self.posted.poses[0], (len(times), 1))
+            return Setpoints(columns, times, joints, still, still, poses)
+        row, shift, speed, acceleration = profile.at(times)
+        shift = np.clip(shift, 0.0, self.joint_path.step[row])
+        moving = (times >= 0.0) & (times <= self.seconds)
+        speed, acceleration = speed * moving, acceleration * moving
+        joints, speeds, accelerations = self.joint_path.splines(row, shift, np.maximum(speed, 0.0), acceleration)
+        return Setpoints(columns, times, joints, speeds, accelerations, self.joint_path.poses(row, shift))
 
-        return setpoints(self, np.atleast_1d(np.asarray(times, np.float64)))
-
-    def sampled(self, rate: float) -> Setpoints:
-        """Setpoints at ``rate`` Hz, from the start to the first one at which the motion is over."""
-        count = int(np.ceil(self.seconds * checked(rate, "rate") - 1e-9)) + 1
+    def sample(self, rate: float) -> Setpoints:
+        """Compute setpoints at ``rate`` Hz, from the start to the first one at which the motion is over."""
+        count = int(np.ceil(self.seconds * check_tolerance(rate, "rate") - 1e-9)) + 1
         return self.at(np.arange(count) / rate)
 
 
-def names_of(joints: Sequence[str]) -> tuple[str, ...]:
-    """The names of all that can bind."""
+def name_limits(joints: Sequence[str]) -> tuple[str, ...]:
+    """Name all limits that can bind, in the order of :attr:`Trajectory.binding`."""
     kinds = ("speed", "acceleration", "jerk")
     return ("feed", *(f"{joint}.{kind}" for kind in kinds for joint in joints), "start/stop")

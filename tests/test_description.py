@@ -19,7 +19,17 @@ from parakin.description import machine_file, read_machine, shipped
 from parakin.errors import InputError, InputErrors
 from parakin.model.legs import KINDS
 from parakin.model.parts import Cone, Drive, Gap, Range, Step
-from parakin.units import ANGLE, LENGTH, NUMBER, SPEED, UNITS, Quantity, QuantityError, evaluate, quantity
+from parakin.units import (
+    ANGLE,
+    LENGTH,
+    NUMBER,
+    SPEED,
+    UNITS,
+    Quantity,
+    QuantityError,
+    evaluate_expression,
+    parse_quantity,
+)
 
 RPR3 = Path(__file__).parent / "machines" / "rpr3.yaml"
 GOOD = """\
@@ -425,7 +435,7 @@ def test_bad_parameters(tmp_path, parameters, message):
 )
 def test_quantities(text, kind, value):
     names = {"a": Quantity(3.0, (1, 0, 0)), "b": Quantity(2.0, (1, 0, 0)), "w": Quantity(pi / 3, (0, 1, 0))}
-    assert quantity(text, kind, names) == pytest.approx(value, rel=1e-12, abs=1e-15)
+    assert parse_quantity(text, kind, names) == pytest.approx(value, rel=1e-12, abs=1e-15)
 
 
 @pytest.mark.parametrize(
@@ -434,14 +444,14 @@ def test_quantities(text, kind, value):
      ("180 deg/s2", pi), ("254 in/min", 254 * 25.4 / 60), ("3 rad/min", 0.05)],
 )  # fmt: skip
 def test_rates(text, value):
-    assert evaluate(text).value == pytest.approx(value, rel=1e-12)
+    assert evaluate_expression(text).value == pytest.approx(value, rel=1e-12)
 
 
 @pytest.mark.parametrize("unit", UNITS)
 def test_unit(unit):
     factor, dimension = UNITS[unit]
-    assert evaluate(f"2 {unit}") == Quantity(2 * factor, dimension)
-    assert evaluate(f"(2{unit}) * 3").dimension == dimension
+    assert evaluate_expression(f"2 {unit}") == Quantity(2 * factor, dimension)
+    assert evaluate_expression(f"(2{unit}) * 3").dimension == dimension
 
 
 @pytest.mark.parametrize(
@@ -471,7 +481,7 @@ def test_unit(unit):
 )  # fmt: skip
 def test_bad_quantities(text, message):
     with pytest.raises(QuantityError) as caught:
-        quantity(text, LENGTH)
+        parse_quantity(text, LENGTH)
     assert str(caught.value) == message
 
 
@@ -538,7 +548,7 @@ def test_binary(tmp_path, content):
 @given(text=st.text(alphabet="0123456789.eE+-*/() abmdegin\tsqrt/^²°,'\n", max_size=30))
 def test_any_expression(text):
     try:
-        assert isfinite(evaluate(text, {"a": Quantity(2.0, (1, 0, 0))}).value)
+        assert isfinite(evaluate_expression(text, {"a": Quantity(2.0, (1, 0, 0))}).value)
     except QuantityError as error:
         assert str(error).isprintable()
 

@@ -1,4 +1,10 @@
-"""Errors a user can meet. Each carries its place, and prints as one line: ``place: what, and what was expected``."""
+"""Errors a user can meet, and the phrases their messages share.
+
+Each error carries its place and prints as one line: ``place: what is wrong, and what was expected``.
+"""
+
+from collections.abc import Iterable
+from difflib import get_close_matches
 
 
 class ParakinError(Exception):
@@ -46,3 +52,24 @@ class PoseError(ParakinError):
 
 class NoMethodError(ParakinError):
     """The machine's structure has no such closed form or complete method."""
+
+
+def quote(text: object) -> str:
+    """Put a user's text in quotes, on one line, cut to 60 characters."""
+    line = " ".join(str(text).split())
+    line = "".join(c if c.isprintable() else "?" for c in line)
+    return f'"{line}"' if len(line) <= 60 else f'"{line[:57]}..."'
+
+
+def suggest(word: str, known: Iterable[str], others: str = "") -> str:
+    """End a message on an unknown word: ``, did you mean "x"?`` if a known one is close, else ``, expected ...``.
+
+    ``others`` says what is expected; the default names all known words.
+    """
+    words = list(known)
+    # Long words are cut: difflib's time grows with the square, and nobody misspells forty letters.
+    close = [w for w in words if w.lower() == word.lower()] or get_close_matches(word[:40], words, 1)
+    if close:
+        return f', did you mean "{close[0]}"?'
+    others = others or (words[0] if len(words) == 1 else "one of " + ", ".join(words) if words else "")
+    return f", expected {others}" if others else ""

@@ -1,24 +1,25 @@
 """Numbers with units, and expressions of them: ``350 mm``, ``-(l1 + l2 + 800 mm)``, ``R * cos(30 deg)``.
 
-Values are kept in mm, rad and s; a dimension is the powers of length, angle and time. Machine files and command lines
-are the only places where other units live.
+Values are in mm, rad and s; a dimension is the powers of length, angle and time. Only machine files and command lines
+use other units.
 """
 
 from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from difflib import get_close_matches
 from typing import TypeAlias
+
+from .errors import quote, suggest
 
 Dimension: TypeAlias = tuple[int, int, int]  # powers of length, angle and time
 
 
 @dataclass(frozen=True)
 class Kind:
-    """What a quantity is expected to be: its dimension, its name, units to propose."""
+    """An expected kind of quantity: its dimension, its name for messages, and units to propose."""
 
     dimension: Dimension
     name: str
@@ -33,12 +34,14 @@ NUMBER = Kind((0, 0, 0), "a number", "")
 LENGTH = Kind((1, 0, 0), "a length", "mm, cm, m, in")
 ANGLE = Kind((0, 1, 0), "an angle", "deg, rad")
 SPEED = Kind((1, 0, -1), "a speed", "mm/s, m/s, mm/min, m/min, in/min")
-TURNING = Kind((0, 1, -1), "an angular speed", "deg/s, rad/s, rpm")
+ANGULAR_SPEED = Kind((0, 1, -1), "an angular speed", "deg/s, rad/s, rpm")
 ACCELERATION = Kind((1, 0, -2), "an acceleration", "mm/s2, m/s2, in/s2")
-SPINNING = Kind((0, 1, -2), "an angular acceleration", "deg/s2, rad/s2")
+ANGULAR_ACCELERATION = Kind((0, 1, -2), "an angular acceleration", "deg/s2, rad/s2")
 JERK = Kind((1, 0, -3), "a jerk", "mm/s3, m/s3, in/s3")
 ANGULAR_JERK = Kind((0, 1, -3), "an angular jerk", "deg/s3, rad/s3")
-_KINDS = {k.dimension: k for k in (NUMBER, LENGTH, ANGLE, SPEED, TURNING, ACCELERATION, SPINNING, JERK, ANGULAR_JERK)}
+_STRAIGHT = (LENGTH, SPEED, ACCELERATION, JERK)
+_ANGULAR = (ANGLE, ANGULAR_SPEED, ANGULAR_ACCELERATION, ANGULAR_JERK)
+_KINDS = {kind.dimension: kind for kind in (NUMBER, *_STRAIGHT, *_ANGULAR)}
 
 
 @dataclass(frozen=True)
@@ -50,7 +53,7 @@ class Quantity:
 
     @property
     def what(self) -> str:
-        """``a length``, ``an angle``, ..., fit for a message."""
+        """The kind's name for a message: ``a length``, ``an angle``, ..."""
         if self.dimension in _KINDS:
             return _KINDS[self.dimension].name
         names = zip(("length", "angle", "time"), self.dimension, strict=True)
@@ -58,17 +61,17 @@ class Quantity:
 
 
 class QuantityError(ValueError):
-    """A quantity that can't be read; one line, without its place."""
+    """A quantity that can't be read; one line, without file and line."""
 
 
 class UnreadSizeError(QuantityError):
-    """The expression is good, but it needs a size that could not be read: one report of that is enough."""
+    """A valid expression uses a size that could not be read, which has been reported already."""
 
 
-def _units() -> dict[str, tuple[float, Dimension]]:
+def _build_units() -> dict[str, tuple[float, Dimension]]:
     lengths = {"mm": 1.0, "cm": 10.0, "m": 1000.0, "in": 25.4, "um": 1e-3, "µm": 1e-3}
     angles = {"deg": math.pi / 180.0, "°": math.pi / 180.0, "rad": 1.0}
-    units = {"rpm": (2.0 * math.pi / 60.0, TURNING.dimension)}
+    units = {"rpm": (2.0 * math.pi / 60.0, ANGULAR_SPEED.dimension)}
     for base, powers in ((lengths, (1, 0)), (angles, (0, 1))):
         for name, factor in base.items():
             units[name] = (factor, (*powers, 0))
@@ -81,52 +84,34 @@ def _units() -> dict[str, tuple[float, Dimension]]:
     return units
 
 
-UNITS = _units()
+UNITS = _build_units()  # factor to mm, rad and s, and dimension, by name
 
 
-def nearest(word: str, known: Iterable[str], others: str = "") -> str:
-    """How a message on an unknown word ends: ``, did you mean "x"?``, else what is expected (``others``: all known)."""
-    words = list(known)
-    # Long words are cut: difflib's time grows with the square, and nobody misspells forty letters.
-    close = [w for w in words if w.lower() == word.lower()] or get_close_matches(word[:40], words, 1)
-    if close:
-        return f', did you mean "{close[0]}"?'
-    others = others or (words[0] if len(words) == 1 else "one of " + ", ".join(words) if words else "")
-    return f", expected {others}" if others else ""
-
-
-def shown(text: object) -> str:
-    """A user's text in quotes, on one line, cut if it is long."""
-    line = " ".join(str(text).split())
-    line = "".join(c if c.isprintable() else "?" for c in line)
-    return f'"{line}"' if len(line) <= 60 else f'"{line[:57]}..."'
-
-
-def quantity(text: str, kind: Kind, names: Mapping[str, Quantity | None] | None = None) -> float:
-    """The value of an expression in mm, rad and s; it must be of the kind.
+def parse_quantity(text: str, kind: Kind, names: Mapping[str, Quantity | None] | None = None) -> float:
+    """Evaluate an expression that must be of a kind; return its value in mm, rad and s. A bare 0 needs no unit.
 
     Raises :class:`QuantityError` if it can't be read, is of another kind or has no unit.
     """
-    result = evaluate(text, names)
+    result = evaluate_expression(text, names)
     if result.dimension == NUMBER.dimension and result.value == 0.0:
-        return 0.0  # nought is nought in every unit
+        return 0.0  # zero in every unit
     if result.dimension != kind.dimension:
         if result.dimension == NUMBER.dimension and not re.search(r"[^\W\d]", text):
-            raise QuantityError(f"{shown(text)} needs a unit: {kind.units}")
-        raise QuantityError(f"{shown(text)} is {result.what}, expected {kind.wanted}")
+            raise QuantityError(f"{quote(text)} needs a unit: {kind.units}")
+        raise QuantityError(f"{quote(text)} is {result.what}, expected {kind.wanted}")
     return result.value
 
 
-def evaluate(text: str, names: Mapping[str, Quantity | None] | None = None) -> Quantity:
-    """The quantity an expression stands for; ``names`` are the sizes it may use (None: one that could not be read).
+def evaluate_expression(text: str, names: Mapping[str, Quantity | None] | None = None) -> Quantity:
+    """Evaluate an expression of numbers, units and named sizes; a size of None could not be read.
 
     Raises :class:`QuantityError`.
     """
-    return _Parser(text, names or {}).result()
+    return _ExpressionParser(text, names or {}).parse()
 
 
 def is_reserved(name: str) -> bool:
-    """Whether a size can't have this name: units and functions have it."""
+    """Whether a unit or a function has this name, so that a size can't have it."""
     return name in _FUNCTIONS or name in _UNIT_WORDS
 
 
@@ -152,7 +137,9 @@ def _sqrt(x: Quantity) -> Quantity:
     return Quantity(math.sqrt(x.value), (length // 2, angle // 2, time // 2))
 
 
-def _of_angle(function: Callable[[float], float]) -> Callable[[Quantity], Quantity]:
+def _accept_angle(function: Callable[[float], float]) -> Callable[[Quantity], Quantity]:
+    """Make a function of a quantity from a function of an angle; it takes a bare 0 too."""
+
     def call(x: Quantity) -> Quantity:
         if x.dimension != ANGLE.dimension and x != Quantity(0.0):
             raise QuantityError(f"{function.__name__} of {x.what}, expected {ANGLE.wanted}")
@@ -163,127 +150,128 @@ def _of_angle(function: Callable[[float], float]) -> Callable[[Quantity], Quanti
 
 _FUNCTIONS: dict[str, Callable[[Quantity], Quantity]] = {
     "sqrt": _sqrt,
-    "sin": _of_angle(math.sin),
-    "cos": _of_angle(math.cos),
-    "tan": _of_angle(math.tan),
+    "sin": _accept_angle(math.sin),
+    "cos": _accept_angle(math.cos),
+    "tan": _accept_angle(math.tan),
 }
-_DEEPEST = 40  # of brackets: far more than a person writes, far less than Python's stack holds
+_DEEPEST = 40  # nested factors: far more than a person writes, far fewer than Python's stack holds
 
 
-class _Parser:
-    """Recursive descent: sum of products of factors."""
+class _ExpressionParser:
+    """Parse by recursive descent: a sum of products of factors, with signs, brackets and functions."""
 
     def __init__(self, text: str, names: Mapping[str, Quantity | None]):
         self.text, self.names, self.at, self.depth = text.rstrip(), names, 0, 0
         if not self.text:
             raise QuantityError("nothing here, expected a number with its unit or an expression")
         if len(text) > 1000:
-            raise QuantityError(f"{shown(text)} is too long for an expression")
-        self._next()
+            raise QuantityError(f"{quote(text)} is too long for an expression")
+        self._advance()
 
-    def result(self) -> Quantity:
-        value = self._sum()
+    def parse(self) -> Quantity:
+        value = self._parse_sum()
         if self.kind:
-            raise self._unexpected()
+            raise self._unexpected_token()
         return value
 
-    def _next(self) -> None:
-        """Take the next token into ``kind``, ``word`` and ``unit``; at the end, ``kind`` is empty."""
+    def _advance(self) -> None:
+        """Read the next token into ``kind``, ``word`` and ``unit``; at the end ``kind`` is empty."""
         self.kind, self.word, self.unit = "", "", None
         if self.at >= len(self.text):
             return
         match = _TOKEN.match(self.text, self.at)
         if match is None:
-            raise QuantityError(f"{shown(self.text)}: can't read {shown(self.text[self.at :].lstrip()[:1])}")
+            raise QuantityError(f"{quote(self.text)}: can't read {quote(self.text[self.at :].lstrip()[:1])}")
         self.kind = "number" if match["number"] else "name" if match["name"] else "sign"
         self.word, self.unit, self.at = match[self.kind], match["unit"], match.end()
 
-    def _unexpected(self) -> QuantityError:
-        found = shown(self.word) if self.kind else "the end"
-        return QuantityError(f"{shown(self.text)}: {found} is not expected here")
+    def _unexpected_token(self) -> QuantityError:
+        token = quote(self.word) if self.kind else "the end"
+        return QuantityError(f"{quote(self.text)}: {token} is not expected here")
 
-    def _sum(self) -> Quantity:
-        total = self._product()
+    def _parse_sum(self) -> Quantity:
+        total = self._parse_product()
         while self.kind == "sign" and self.word in "+-":
-            sign = self._taken()
-            term = self._product()
+            sign = self._take_word()
+            term = self._parse_product()
             if term.dimension != total.dimension:
-                deed = "add" if sign == "+" else "subtract"
-                raise QuantityError(f"{shown(self.text)}: can't {deed} {total.what} and {term.what}")
-            total = self._finite(total.value + (term.value if sign == "+" else -term.value), total.dimension)
+                verb = "add" if sign == "+" else "subtract"
+                raise QuantityError(f"{quote(self.text)}: can't {verb} {total.what} and {term.what}")
+            total = self._make_finite(total.value + (term.value if sign == "+" else -term.value), total.dimension)
         return total
 
-    def _product(self) -> Quantity:
-        total = self._factor()
+    def _parse_product(self) -> Quantity:
+        total = self._parse_factor()
         while self.kind == "sign" and self.word in "*/":
-            sign = 1 if self._taken() == "*" else -1
-            term = self._factor()
+            sign = 1 if self._take_word() == "*" else -1
+            term = self._parse_factor()
             a, b, c = (p + sign * q for p, q in zip(total.dimension, term.dimension, strict=True))
             if sign < 0 and term.value == 0.0:
-                raise QuantityError(f"{shown(self.text)}: division by zero")
+                raise QuantityError(f"{quote(self.text)}: division by zero")
             value = total.value * term.value if sign > 0 else total.value / term.value
-            total = self._finite(value, (a, b, c))
+            total = self._make_finite(value, (a, b, c))
         return total
 
-    def _factor(self) -> Quantity:
+    def _parse_factor(self) -> Quantity:
         self.depth += 1
         if self.depth > _DEEPEST:
-            raise QuantityError(f"{shown(self.text)} is nested too deeply")
-        value = self._unguarded_factor()
+            raise QuantityError(f"{quote(self.text)} is nested too deeply")
+        value = self._parse_signed_factor()
         self.depth -= 1
         return value
 
-    def _unguarded_factor(self) -> Quantity:
+    def _parse_signed_factor(self) -> Quantity:
         if self.kind == "number":
-            return self._number()
+            return self._parse_number()
         if self.kind == "name":
-            return self._name()
-        sign = self._taken() if self.kind == "sign" and self.word in "+-(" else ""
+            return self._parse_name()
+        sign = self._take_word() if self.kind == "sign" and self.word in "+-(" else ""
         if sign == "(":
-            return self._closed()
+            return self._parse_closed()
         if sign == "":
-            raise self._unexpected()
-        value = self._factor()
+            raise self._unexpected_token()
+        value = self._parse_factor()
         return value if sign == "+" else Quantity(-value.value, value.dimension)
 
-    def _number(self) -> Quantity:
+    def _parse_number(self) -> Quantity:
         factor, dimension = UNITS[self.unit] if self.unit else (1.0, NUMBER.dimension)
         value, bare = float(self.word) * factor, self.unit is None
-        self._next()
+        self._advance()
         if bare and self.kind == "name":
-            end = nearest(self.word, UNITS, "a unit such as mm, in or deg")
-            raise QuantityError(f"{shown(self.text)}: unknown unit {shown(self.word)}{end}")
-        return self._finite(value, dimension)
+            end = suggest(self.word, UNITS, "a unit such as mm, in or deg")
+            raise QuantityError(f"{quote(self.text)}: unknown unit {quote(self.word)}{end}")
+        return self._make_finite(value, dimension)
 
-    def _name(self) -> Quantity:
-        name = self._taken()
+    def _parse_name(self) -> Quantity:
+        name = self._take_word()
         if name in _FUNCTIONS:
-            if self._taken() != "(":
-                raise QuantityError(f"{shown(self.text)}: {name} needs its argument in brackets")
-            argument = self._closed()
+            if self._take_word() != "(":
+                raise QuantityError(f"{quote(self.text)}: {name} needs its argument in brackets")
+            argument = self._parse_closed()
             try:
                 return _FUNCTIONS[name](argument)
             except QuantityError as error:
-                raise QuantityError(f"{shown(self.text)}: {error}") from None
+                raise QuantityError(f"{quote(self.text)}: {error}") from None
         if name in self.names:
             size = self.names[name]
             if size is None:
                 raise UnreadSizeError(name)
             return size
-        raise QuantityError(f"{shown(self.text)}: undefined size {shown(name)}{nearest(name, self.names)}")
+        raise QuantityError(f"{quote(self.text)}: undefined size {quote(name)}{suggest(name, self.names)}")
 
-    def _closed(self) -> Quantity:
-        value = self._sum()
-        if self._taken() != ")":
-            raise QuantityError(f"{shown(self.text)}: a bracket is not closed")
+    def _parse_closed(self) -> Quantity:
+        """Parse a sum up to its closing bracket."""
+        value = self._parse_sum()
+        if self._take_word() != ")":
+            raise QuantityError(f"{quote(self.text)}: a bracket is not closed")
         return value
 
-    def _taken(self) -> str:
+    def _take_word(self) -> str:
         word = self.word
-        self._next()
+        self._advance()
         return word
 
-    def _finite(self, value: float, dimension: Dimension) -> Quantity:
+    def _make_finite(self, value: float, dimension: Dimension) -> Quantity:
         if not math.isfinite(value):
-            raise QuantityError(f"{shown(self.text)} is not a finite value")
+            raise QuantityError(f"{quote(self.text)} is not a finite value")
         return Quantity(value, dimension)

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
 
-from ..errors import InputError, PoseError
-from ..units import NUMBER, QuantityError, quantity, shown
+from ..errors import InputError, PoseError, quote
+from ..units import NUMBER, QuantityError, parse_quantity
 from .atlas_files import Files
 from .atlas_summary import atlas_json, atlas_text, performance_json, performance_text, proofs_json, proofs_text
 from .console import Progress, announce_compiling, print_json, rim
@@ -104,11 +104,11 @@ def _bounds(text: str | None, has_box: bool) -> tuple[float, float] | None:
         raise InputError("a claim needs poses to hold for: --box X=-50:50,Y=-50:50,Z=-50:50", "--amplification")
     low, colon, high = text.partition(":")
     try:
-        ends = (quantity(low, NUMBER), quantity(high, NUMBER)) if colon else (1.0, 0.0)
+        ends = (parse_quantity(low, NUMBER), parse_quantity(high, NUMBER)) if colon else (1.0, 0.0)
     except QuantityError as error:
         raise InputError(str(error), "--amplification") from None
     if not 0.0 <= ends[0] <= ends[1]:
-        raise InputError(f"{shown(text)}: expected LOW:HIGH, such as 1/3:3", "--amplification")
+        raise InputError(f"{quote(text)}: expected LOW:HIGH, such as 1/3:3", "--amplification")
     return ends
 
 
@@ -128,13 +128,13 @@ def _cuts(
     for text in slices:
         parts = parts_of(machine, text, "--slice", "Z=-100")
         if len(parts) != 1:
-            raise InputError(f"{shown(text)}: one axis and its value expected", "--slice")
+            raise InputError(f"{quote(text)}: one axis and its value expected", "--slice")
         axis, value = parts[0]
         if axis not in asked.places or len(asked.places) < 2:
             raise InputError(f"{axis} is no place to cut at, {' '.join(asked.places)} are left", "--slice")
         held.append((axis, parse_value(axis, value, "--slice")))
         if held[-1] in held[:-1]:
-            raise InputError(f"{shown(text)} is given twice", "--slice")
+            raise InputError(f"{quote(text)} is given twice", "--slice")
     if not slices and len(asked.places) < 3:
         return [asked]
     if not slices:

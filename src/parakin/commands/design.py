@@ -7,8 +7,7 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from ..errors import InputError
-from ..units import nearest, shown
+from ..errors import InputError, quote, suggest
 from .console import announce_compiling, fixed, print_json
 from .options import Json
 from .regions import length
@@ -52,7 +51,7 @@ def design(
     from ..performance.design import DESIGNS
 
     if family not in DESIGNS:
-        raise InputError(f"unknown family {shown(family)}{nearest(family, DESIGNS)}", "design")
+        raise InputError(f"unknown family {quote(family)}{suggest(family, DESIGNS)}", "design")
     found = DESIGNS[family](edge, amplification)
     files: dict[str, str] = {}
     if output is not None:

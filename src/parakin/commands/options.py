@@ -62,8 +62,8 @@ def row(values: Sequence[str], names: Sequence[str], units: Sequence[str], defau
     """
     import numpy as np
 
+    from ..errors import quote, suggest
     from ..toolpath.posting.frames import parse_value
-    from ..units import nearest, shown
 
     named = ["=" in value for value in values]
     wanted = " ".join(names)
@@ -79,7 +79,7 @@ def row(values: Sequence[str], names: Sequence[str], units: Sequence[str], defau
     for word, text in given:
         name = spelled.get(word.strip().lower())
         if name is None:
-            raise InputError(f"unknown {shown(word.strip())}{nearest(word.strip(), names)}", source)
+            raise InputError(f"unknown {quote(word.strip())}{suggest(word.strip(), names)}", source)
         if name in seen:
             raise InputError(f"{name} is given twice", source)
         seen.add(name)

@@ -69,8 +69,8 @@ def values_of(machine: Machine, text: str | None, source: str) -> dict[str, floa
 
 
 def ranges_of(machine: Machine, text: str | None, source: str) -> dict[str, tuple[float, float]]:
+    from ..errors import quote
     from ..toolpath.posting.frames import parse_value
-    from ..units import shown
 
     ranges = {}
     for axis, value in parts_of(machine, text, source, "A=-15:15,B=-15:15"):
@@ -79,22 +79,22 @@ def ranges_of(machine: Machine, text: str | None, source: str) -> dict[str, tupl
             raise InputError(f"{axis}: expected a range LOW:HIGH, such as -15:15", source)
         ranges[axis] = (parse_value(axis, low, source), parse_value(axis, high, source))
         if ranges[axis][0] > ranges[axis][1]:
-            raise InputError(f"{axis}: {shown(value)} is empty, the lesser end comes first", source)
+            raise InputError(f"{axis}: {quote(value)} is empty, the lesser end comes first", source)
     return ranges
 
 
 def parts_of(machine: Machine, text: str | None, source: str, example: str) -> list[tuple[str, str]]:
     """Axes and what is said of each."""
-    from ..units import nearest, shown
+    from ..errors import quote, suggest
 
     found: dict[str, str] = {}
     for part in text.split(",") if text is not None else ():
         axis, equals, value = (word.strip() for word in part.partition("="))
         if not (axis and equals and value):
-            raise InputError(f"{shown(part.strip())}: expected AXIS=VALUE, such as {example}", source)
+            raise InputError(f"{quote(part.strip())}: expected AXIS=VALUE, such as {example}", source)
         axis = axis.upper()
         if axis not in machine.axes:
-            raise InputError(f"unknown axis {shown(axis)}{nearest(axis, machine.axes)}", source)
+            raise InputError(f"unknown axis {quote(axis)}{suggest(axis, machine.axes)}", source)
         if axis in found:
             raise InputError(f"{axis} is given twice", source)
         found[axis] = value
@@ -103,12 +103,12 @@ def parts_of(machine: Machine, text: str | None, source: str, example: str) -> l
 
 def length(text: str | None, source: str) -> float | None:
     """A length above 0, mm, with or without a unit."""
+    from ..errors import quote
     from ..toolpath.posting.frames import parse_value
-    from ..units import shown
 
     if text is None:
         return None
     value = parse_value("length", text, source, "mm")
     if not value > 0.0:
-        raise InputError(f"{shown(text)}: expected a length above 0 mm", source)
+        raise InputError(f"{quote(text)}: expected a length above 0 mm", source)
     return value

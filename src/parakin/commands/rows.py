@@ -11,9 +11,9 @@ from typing import TextIO
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import InputError
+from ..errors import InputError, quote, suggest
 from ..toolpath.reading.cl.tokens import LARGEST
-from ..units import ANGLE, LENGTH, UNITS, nearest, shown
+from ..units import ANGLE, LENGTH, UNITS
 
 
 def read_rows(path: Path, names: Sequence[str], units: Sequence[str]) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
@@ -83,19 +83,19 @@ def _matched(
         word, _, unit = cell.strip().removesuffix("]").partition("[")
         key = word.strip().lower()
         if key in places and key in (name.lower() for name in names):
-            raise InputError(f"column {shown(word.strip())} is there twice", source, line)
+            raise InputError(f"column {quote(word.strip())} is there twice", source, line)
         places[key] = index, unit.strip()
     columns = []
     for name, unit in zip(names, units, strict=True):
         if name.lower() not in places:
-            raise InputError(f"no column {name}{nearest(name, [])}, expected {', '.join(names)}", source, line)
+            raise InputError(f"no column {name}{suggest(name, [])}, expected {', '.join(names)}", source, line)
         index, given = places[name.lower()]
         kind = ANGLE if unit == "rad" else LENGTH
         factor = _factor(unit)
         if given:
             factor, dimension = UNITS.get(given, (0.0, ()))
             if dimension != kind.dimension:
-                raise InputError(f"column {name}: unit {shown(given)}, expected one of {kind.units}", source, line)
+                raise InputError(f"column {name}: unit {quote(given)}, expected one of {kind.units}", source, line)
         columns.append((name, index, factor))
     return columns
 
@@ -112,8 +112,8 @@ def _value(cell: str, factor: float, name: str, source: str, line: int) -> float
     try:
         value = float(cell)
     except ValueError:
-        what = shown(cell.strip()) if cell.strip() else "nothing"
+        what = quote(cell.strip()) if cell.strip() else "nothing"
         raise InputError(f"{name}: {what}, expected a number", source, line) from None
     if not abs(value) <= LARGEST:
-        raise InputError(f"{name}: {shown(cell.strip())} is out of range", source, line)
+        raise InputError(f"{name}: {quote(cell.strip())} is out of range", source, line)
     return value * factor

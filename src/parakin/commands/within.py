@@ -70,12 +70,12 @@ def _plain(error: PoseError) -> str:
 
 
 def _shape(text: str) -> list[float]:
-    from ..units import shown
+    from ..errors import quote
 
     try:
         return [float(part) for part in text.split(":")]
     except ValueError:
-        raise InputError(f"{shown(text)}: expected proportions such as 3:3:1", "--shape") from None
+        raise InputError(f"{quote(text)}: expected proportions such as 3:3:1", "--shape") from None
 
 
 def _place(asked: Region, text: str) -> list[float]:

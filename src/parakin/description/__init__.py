@@ -13,14 +13,14 @@ from typing import Annotated, Any, SupportsFloat
 
 from pydantic import PlainValidator, ValidationError, ValidationInfo
 
-from ..errors import InputError, InputErrors
+from ..errors import InputError, InputErrors, quote, suggest
 from ..model.parts import Limits
 from ..model.spec import Spec
-from ..units import Quantity, QuantityError, UnreadSizeError, evaluate, is_reserved, nearest, shown
-from .document import Map, Text, Value, read_document
+from ..units import Quantity, QuantityError, UnreadSizeError, evaluate_expression, is_reserved
+from .document import Value, YamlMap, YamlText, read_document
 from .groups import Legs
-from .sections import TRANSFORMS, Home, LimitsSection, Mounting, Section, Steps
-from .values import Context, Prose, Word, context_of, described, is_word
+from .sections import TRANSFORMS, HomeSection, LimitsSection, Mounting, Section, Steps
+from .values import Context, Prose, Word, describe, get_context, is_word
 
 __all__ = ["line_of", "machine_file", "read_machine", "shipped"]
 
@@ -41,15 +41,15 @@ def machine_file(name: str | PathLike[str]) -> Path:
     if str(name) in known:
         return known[str(name)]
     if isinstance(name, str) and is_word(name) and not Path(name).exists():
-        raise InputError(f"unknown machine {shown(name)}{nearest(name, known)}")
+        raise InputError(f"unknown machine {quote(name)}{suggest(name, known)}")
     return Path(name)
 
 
 def line_of(path: str | PathLike[str], key: str) -> int:
     """The line of a top-level key of a machine file; 1 if it has none."""
     document, _ = read_document(Path(path), fspath(path))
-    keys = document if isinstance(document, Map) else {}
-    return next((found.line for found in keys if isinstance(found, Text) and found == key), 1)
+    keys = document if isinstance(document, YamlMap) else {}
+    return next((found.line for found in keys if isinstance(found, YamlText) and found == key), 1)
 
 
 def read_machine(path: str | PathLike[str], parameters: Mapping[str, float | str] | None = None) -> Spec:
@@ -70,8 +70,8 @@ def read_machine(path: str | PathLike[str], parameters: Mapping[str, float | str
     """
     source = fspath(path)
     document, errors = read_document(Path(path), source)
-    if not isinstance(document, Map):
-        raise InputError(f"expected keys such as name, motion and legs, got {described(document)}", source, 1)
+    if not isinstance(document, YamlMap):
+        raise InputError(f"expected keys such as name, motion and legs, got {describe(document)}", source, 1)
     context = Context(source, {}, errors)
     context.sizes = _sizes(document.get("sizes"), parameters or {}, context)
     try:
@@ -81,7 +81,7 @@ def read_machine(path: str | PathLike[str], parameters: Mapping[str, float | str
     else:
         name = machine.name or Path(path).stem
         if not is_word(name):
-            context.report(f'file name {shown(name)} is not a plain word, expected a key "name" with one', 1)
+            context.report(f'file name {quote(name)} is not a plain word, expected a key "name" with one', 1)
     if context.errors:
         unique = {str(e): e for e in context.errors}.values()  # a value for all joints of a leg is read once for each
         raise InputErrors(sorted(unique, key=lambda e: e.line or 0))
@@ -101,13 +101,13 @@ def read_machine(path: str | PathLike[str], parameters: Mapping[str, float | str
 
 
 def _motion(value: object, info: ValidationInfo) -> tuple[str, ...]:
-    words = value.split() if isinstance(value, Text) else []
+    words = value.split() if isinstance(value, YamlText) else []
     if not words:
-        raise ValueError(f"expected words such as tx ty rz, got {described(value)}")
+        raise ValueError(f"expected words such as tx ty rz, got {describe(value)}")
     for word in words:
         if word not in TRANSFORMS:
-            raise ValueError(f"unknown word {shown(word)}{nearest(word, TRANSFORMS)}")
-    context_of(info).motion = tuple(words)
+            raise ValueError(f"unknown word {quote(word)}{suggest(word, TRANSFORMS)}")
+    get_context(info).motion = tuple(words)
     return tuple(words)
 
 
@@ -124,7 +124,7 @@ class _Machine(Section):
     head: Steps = ()
     table: Steps = ()
     limits: LimitsSection | None = None
-    home: Home
+    home: HomeSection
 
 
 def _placed(details: Any, source: str) -> InputError:
@@ -133,7 +133,7 @@ def _placed(details: Any, source: str) -> InputError:
     line = getattr(details["input"], "line", 1)
     if details["type"] == "missing":
         where = f" in {names[-2]}" if len(names) > 1 else ""
-        return InputError(f"missing key {shown(names[-1])}{where}", source, line)
+        return InputError(f"missing key {quote(names[-1])}{where}", source, line)
     error = details.get("ctx", {}).get("error")
     message = str(error) if error else details["msg"]
     return InputError(f"{names[-1]}: {message}" if names else message, source, getattr(error, "line", line))
@@ -142,13 +142,13 @@ def _placed(details: Any, source: str) -> InputError:
 def _sizes(value: Value | None, parameters: Mapping[str, float | str], context: Context) -> dict[str, Quantity | None]:
     """The file's sizes with the parameters in their places; None for one that could not be read."""
     sizes: dict[str, Quantity | None] = {}
-    if value is not None and not isinstance(value, Map):
-        context.report(f"sizes: expected a mapping of names and quantities, got {described(value)}", value.line)
+    if value is not None and not isinstance(value, YamlMap):
+        context.report(f"sizes: expected a mapping of names and quantities, got {describe(value)}", value.line)
     elif value is not None:
         for name, content in value.items():
             if not is_word(name):
                 context.report(
-                    f"size {shown(name)} is no name, expected a plain word (letters, digits, _; at most 40)", name.line
+                    f"size {quote(name)} is no name, expected a plain word (letters, digits, _; at most 40)", name.line
                 )
                 continue
             sizes[str(name)] = None
@@ -163,29 +163,29 @@ def _sizes(value: Value | None, parameters: Mapping[str, float | str], context: 
                 context.errors.append(error)
     for name in parameters:
         if name not in sizes:
-            end = nearest(name, sizes, "none: this file has no sizes" if not sizes else "")
-            context.errors.append(InputError(f"unknown size {shown(name)}{end}", "parameters"))
+            end = suggest(name, sizes, "none: this file has no sizes" if not sizes else "")
+            context.errors.append(InputError(f"unknown size {quote(name)}{end}", "parameters"))
     return sizes
 
 
-def _size(name: Text, content: Value, sizes: Mapping[str, Quantity | None]) -> Quantity:
+def _size(name: YamlText, content: Value, sizes: Mapping[str, Quantity | None]) -> Quantity:
     if is_reserved(name):
         raise QuantityError("a unit or a function has this name, expected another for a size")
-    if not isinstance(content, Text):
-        raise QuantityError(f"expected a quantity such as 350 mm, got {described(content)}")
-    return evaluate(content, {k: v for k, v in sizes.items() if k != name})
+    if not isinstance(content, YamlText):
+        raise QuantityError(f"expected a quantity such as 350 mm, got {describe(content)}")
+    return evaluate_expression(content, {k: v for k, v in sizes.items() if k != name})
 
 
 def _parameter(name: str, value: float | str, own: Quantity, sizes: Mapping[str, Quantity | None]) -> Quantity:
     """A value given from outside for a size, of the same kind as the file's ``own``."""
     if isinstance(value, str):
         try:
-            given = evaluate(value, {k: v for k, v in sizes.items() if k != name})
+            given = evaluate_expression(value, {k: v for k, v in sizes.items() if k != name})
         except QuantityError as error:
             raise InputError(f"{name}: {error}", "parameters") from None
         if given.dimension != own.dimension:
-            raise InputError(f"{name}: {shown(value)} is {given.what}, expected {own.what}", "parameters")
+            raise InputError(f"{name}: {quote(value)} is {given.what}, expected {own.what}", "parameters")
         return given
     if isinstance(value, bool) or not isinstance(value, SupportsFloat) or not math.isfinite(float(value)):
-        raise InputError(f"{name}: expected a finite number or text with a unit, got {shown(value)}", "parameters")
+        raise InputError(f"{name}: expected a finite number or text with a unit, got {quote(value)}", "parameters")
     return Quantity(float(value), own.dimension)

@@ -15,8 +15,7 @@ from ruamel.yaml.error import MarkedYAMLError, YAMLError
 from ruamel.yaml.nodes import MappingNode, ScalarNode, SequenceNode
 from ruamel.yaml.reader import ReaderError
 
-from ..errors import InputError
-from ..units import shown
+from ..errors import InputError, quote
 
 _LONGEST = 100_000  # bytes
 _DEEPEST = 16  # levels; aliases can make a cycle
@@ -24,34 +23,34 @@ _MOST = 20_000  # values; aliases of aliases grow exponentially
 _TAGS = {f"tag:yaml.org,2002:{t}" for t in ("map", "seq", "str", "int", "float", "bool", "null", "timestamp", "merge")}
 
 
-class Text(str):
+class YamlText(str):
     """A scalar as written."""
 
     line: int
 
-    def __new__(cls, text: str, line: int) -> Text:
+    def __new__(cls, text: str, line: int) -> YamlText:
         self = super().__new__(cls, text)
         self.line = line
         return self
 
 
-class Seq(list[Any]):
-    """A list; its items are :class:`Text`, :class:`Seq` and :class:`Map`."""
+class YamlList(list[Any]):
+    """A list; its items are :class:`YamlText`, :class:`YamlList` and :class:`YamlMap`."""
 
     def __init__(self, items: list[Any], line: int):
         super().__init__(items)
         self.line = line
 
 
-class Map(dict[Any, Any]):
-    """A mapping with keys of :class:`Text`; a value's line is that of its key, where a reader looks for it."""
+class YamlMap(dict[Any, Any]):
+    """A mapping with keys of :class:`YamlText`; a value's line is that of its key, where a reader looks for it."""
 
-    def __init__(self, items: Mapping[Text, Any], line: int):
+    def __init__(self, items: Mapping[YamlText, Any], line: int):
         super().__init__(items)
         self.line = line
 
 
-Value: TypeAlias = Text | Seq | Map
+Value: TypeAlias = YamlText | YamlList | YamlMap
 
 
 def read_document(path: Path, source: str) -> tuple[Value, list[InputError]]:
@@ -108,26 +107,26 @@ class _Builder:
         if self.count > _MOST:
             raise InputError(f"more than {_MOST} values, aliases included", self.source, line)
         if str(node.tag) not in _TAGS:
-            self.errors.append(InputError(f"tag {shown(node.tag)} is not known here, expected none", self.source, line))
+            self.errors.append(InputError(f"tag {quote(node.tag)} is not known here, expected none", self.source, line))
         if isinstance(node, MappingNode):
             return self._map(node, line, depth)
         if isinstance(node, SequenceNode):
             items = [self.value(item, item.start_mark.line + 1, depth + 1) for item in node.value]
-            return Seq(items, line)
-        return Text(node.value, line)
+            return YamlList(items, line)
+        return YamlText(node.value, line)
 
-    def _map(self, node: MappingNode, line: int, depth: int) -> Map:
-        items: dict[Text, Any] = {}
+    def _map(self, node: MappingNode, line: int, depth: int) -> YamlMap:
+        items: dict[YamlText, Any] = {}
         for key, value in node.value:
             at = key.start_mark.line + 1
             if not isinstance(key, ScalarNode):
                 self.errors.append(InputError("a key is a list or a mapping, expected a word", self.source, at))
                 continue
-            name = Text(key.value, at)
+            name = YamlText(key.value, at)
             if name in items:
                 first = next(k.line for k in items if k == name)
-                message = f"key {shown(name)} is written twice, first in line {first}"
+                message = f"key {quote(name)} is written twice, first in line {first}"
                 self.errors.append(InputError(message, self.source, at))
                 continue
             items[name] = self.value(value, at, depth + 1)
-        return Map(items, line)
+        return YamlMap(items, line)

@@ -16,12 +16,12 @@ from pydantic import (
     create_model,
 )
 
+from ..errors import suggest
 from ..model.legs import KINDS, Leg
 from ..model.parts import Direction, Drive, Point, Signs, Size
-from ..units import nearest
-from .document import Map, Seq, Text
+from .document import YamlList, YamlMap, YamlText
 from .sections import Circle, Section
-from .values import DRIVE_TYPES, DirectionValue, Extent, PlacedError, PointValue, Word, context_of, described
+from .values import DRIVE_TYPES, DirectionValue, Extent, PlacedError, PointValue, Word, describe, get_context
 
 
 class Group(Section):
@@ -60,7 +60,7 @@ def _own_fields(leg: type[Leg]) -> list[Field[Any]]:
 def _levels(value: object) -> int:
     """How deep lists are nested, along the first items."""
     levels = 0
-    while isinstance(value, Seq):
+    while isinstance(value, YamlList):
         levels += 1
         value = value[0] if value else None
     return levels
@@ -81,7 +81,7 @@ def _rows(items: tuple[Any, ...], levels: int) -> Any:
     def read(value: Any, handler: ValidatorFunctionWrapHandler, info: ValidationInfo) -> Any:
         joints = info.data.get("joints")
         per_leg = False
-        if isinstance(value, Map) and items == (PointValue,):
+        if isinstance(value, YamlMap) and items == (PointValue,):
             points = Circle.model_validate(value, context=info.context).points()
             rows, per_leg = [(point,) for point in points], True
         else:
@@ -95,7 +95,7 @@ def _rows(items: tuple[Any, ...], levels: int) -> Any:
                 per_leg = True
             for row in table:
                 if not isinstance(row, list) or len(row) != slots:
-                    raise ValueError(f"expected {slots} values, one a joint of the leg, got {described(row)}")
+                    raise ValueError(f"expected {slots} values, one a joint of the leg, got {describe(row)}")
             rows = handler(table)
         if joints is None:
             return rows
@@ -113,15 +113,15 @@ def _joints(leg: type[Leg]) -> Any:
     expected = "a list of names, one a leg" if count == 1 else f"a list of {count} names a leg"
 
     def read(value: Any, handler: ValidatorFunctionWrapHandler, info: ValidationInfo) -> Any:
-        if not isinstance(value, Seq) or not value:
-            raise ValueError(f"expected {expected}, got {described(value)}")
+        if not isinstance(value, YamlList) or not value:
+            raise ValueError(f"expected {expected}, got {describe(value)}")
         rows = [[name] for name in value] if count == 1 else value
         for row in rows:
             if not isinstance(row, list) or len(row) != count:
-                raise ValueError(f"expected {expected}, got {described(row)} for one leg")
+                raise ValueError(f"expected {expected}, got {describe(row)} for one leg")
             for name, unit in zip(row, leg.units, strict=True):
-                if isinstance(name, Text):
-                    context_of(info).add_joint(name, unit)
+                if isinstance(name, YamlText):
+                    get_context(info).add_joint(name, unit)
         return handler(rows)
 
     return _list_of((Word,) * count, read)
@@ -131,8 +131,8 @@ def _signs(leg: type[Leg]) -> Any:
     count = len(leg.branches)
 
     def read(value: object) -> Signs:
-        if not isinstance(value, Text) or len(value) != count or set(value) - set("+-"):
-            raise ValueError(f"expected {count} of the signs + and -, in quotes, got {described(value)}")
+        if not isinstance(value, YamlText) or len(value) != count or set(value) - set("+-"):
+            raise ValueError(f"expected {count} of the signs + and -, in quotes, got {describe(value)}")
         return Signs(str(value))
 
     return Annotated[Any, PlainValidator(read)]
@@ -178,27 +178,27 @@ def _model(kind: str) -> type[Group]:
 
 
 def _group(value: object, info: ValidationInfo) -> Group:
-    if not isinstance(value, Map):
-        raise ValueError(f"expected a mapping with kind, joints, range, ..., got {described(value)}")
+    if not isinstance(value, YamlMap):
+        raise ValueError(f"expected a mapping with kind, joints, range, ..., got {describe(value)}")
     kind = value.get("kind")
     if kind is None:
         raise ValueError(f'missing key "kind", expected one of {", ".join(KINDS)}')
-    if not isinstance(kind, Text) or kind not in KINDS:
-        line = kind.line if isinstance(kind, Text) else value.line
-        raise PlacedError(f"unknown leg kind {described(kind)}{nearest(str(kind), KINDS)}", line)
+    if not isinstance(kind, YamlText) or kind not in KINDS:
+        line = kind.line if isinstance(kind, YamlText) else value.line
+        raise PlacedError(f"unknown leg kind {describe(kind)}{suggest(str(kind), KINDS)}", line)
     return _model(str(kind)).model_validate(value, context=info.context)
 
 
 def _groups(value: object) -> object:
-    if isinstance(value, Map):
-        return Seq([value], value.line)
-    if not isinstance(value, Seq) or not value:
-        raise ValueError(f"expected a group of legs or a list of groups, got {described(value)}")
+    if isinstance(value, YamlMap):
+        return YamlList([value], value.line)
+    if not isinstance(value, YamlList) or not value:
+        raise ValueError(f"expected a group of legs or a list of groups, got {describe(value)}")
     return value
 
 
 def _as_many(groups: list[Group], info: ValidationInfo) -> list[Group]:
-    context = context_of(info)
+    context = get_context(info)
     context.legs_read = True
     names = [str(name) for group in groups for leg in group.joints for name in leg]
     motion = context.motion

@@ -16,9 +16,10 @@ from pydantic import (
     model_validator,
 )
 
+from ..errors import quote, suggest
 from ..model.parts import ROTATIONS, TRANSLATIONS, Cone, Direction, Drive, Gap, Limits, Range, Step, Unit, Vector
-from ..units import ANGLE, LENGTH, nearest, shown
-from .document import Map, Seq, Text
+from ..units import ANGLE, LENGTH
+from .document import YamlList, YamlMap, YamlText
 from .values import (
     DRIVE_TYPES,
     Angle,
@@ -31,8 +32,8 @@ from .values import (
     Opening,
     PlacedError,
     Word,
-    context_of,
-    described,
+    describe,
+    get_context,
     one_of,
     read_quantity,
 )
@@ -50,17 +51,17 @@ class Section(BaseModel):
     @classmethod
     def _known(cls, value: object, info: ValidationInfo) -> object:
         keys = list(cls.model_fields)
-        if not isinstance(value, Map):
-            raise ValueError(f"expected a mapping with the keys {', '.join(keys)}, got {described(value)}")
+        if not isinstance(value, YamlMap):
+            raise ValueError(f"expected a mapping with the keys {', '.join(keys)}, got {describe(value)}")
         for key in value:
             if key not in keys:
-                context_of(info).report(f"unknown key {shown(key)}{cls.place}{nearest(key, keys)}", key.line)
-        return Map({k: v for k, v in value.items() if k in keys}, value.line)
+                get_context(info).report(f"unknown key {quote(key)}{cls.place}{suggest(key, keys)}", key.line)
+        return YamlMap({k: v for k, v in value.items() if k in keys}, value.line)
 
 
 def _list(value: object) -> object:
-    if not isinstance(value, Seq):
-        raise ValueError(f"expected a list, got {described(value)}")
+    if not isinstance(value, YamlList):
+        raise ValueError(f"expected a list, got {describe(value)}")
     return value
 
 
@@ -118,17 +119,17 @@ _DRIVEN: dict[Unit, type[_Driven]] = {"mm": _driven("mm"), "rad": _driven("rad")
 
 
 def _step(value: object, info: ValidationInfo) -> Step:
-    if not isinstance(value, Map) or len(value) != 1:
-        raise ValueError(f"expected one transform such as tz: 100 mm, got {described(value)}")
+    if not isinstance(value, YamlMap) or len(value) != 1:
+        raise ValueError(f"expected one transform such as tz: 100 mm, got {describe(value)}")
     ((axis, content),) = value.items()
     if axis not in TRANSFORMS:
-        raise PlacedError(f"unknown transform {shown(axis)}{nearest(axis, TRANSFORMS)}", axis.line)
+        raise PlacedError(f"unknown transform {quote(axis)}{suggest(axis, TRANSFORMS)}", axis.line)
     unit: Unit = "mm" if axis in TRANSLATIONS else "rad"
-    if not isinstance(content, Map):
+    if not isinstance(content, YamlMap):
         return Step(str(axis), read_quantity(content, LENGTH if unit == "mm" else ANGLE, info))
     joint = content.get("joint")
-    if isinstance(joint, Text):
-        context_of(info).add_joint(joint, unit)
+    if isinstance(joint, YamlText):
+        get_context(info).add_joint(joint, unit)
     return _DRIVEN[unit].model_validate(content, context=info.context).step(str(axis), unit)
 
 
@@ -138,24 +139,24 @@ Steps = Annotated[tuple[StepValue, ...], ListOf]
 
 def _mounting(value: object, info: ValidationInfo) -> object:
     """A word for the usual ways stands for a turn about X, so that a hanging tool comes to point along +Y."""
-    if not isinstance(value, Text):
+    if not isinstance(value, YamlText):
         return value
     way, _, angle = value.strip().partition(" ")
     if value.strip() == "vertical":
-        return Seq([], value.line)
+        return YamlList([], value.line)
     if value.strip() == "horizontal":
         angle = "90 deg"
     elif way != "inclined":
         known = ("vertical", "horizontal", "inclined")
         others = "vertical, horizontal, inclined by an angle (inclined 45 deg) or a list of transforms"
-        raise ValueError(f"unknown mounting {shown(value)}{nearest(way, known, others)}")
-    return Seq([Map({Text("rx", value.line): Text(angle, value.line)}, value.line)], value.line)
+        raise ValueError(f"unknown mounting {quote(value)}{suggest(way, known, others)}")
+    return YamlList([YamlMap({YamlText("rx", value.line): YamlText(angle, value.line)}, value.line)], value.line)
 
 
 def _constant(steps: tuple[Step, ...]) -> tuple[Step, ...]:
     for step in steps:
         if step.drive is not None:
-            raise ValueError(f"joint {shown(step.drive.name)} can't be in the mounting, expected head or table")
+            raise ValueError(f"joint {quote(step.drive.name)} can't be in the mounting, expected head or table")
     return steps
 
 
@@ -178,9 +179,9 @@ class _Passive(Section):
     @model_validator(mode="before")
     @classmethod
     def _moving(cls, value: object, info: ValidationInfo) -> object:
-        context = context_of(info)
+        context = get_context(info)
         motion = context.motion or TRANSFORMS
-        for key in value if isinstance(value, Map) else ():
+        for key in value if isinstance(value, YamlMap) else ():
             if key in TRANSFORMS and key not in motion:
                 context.report(f"passive limit of {key}, which is not in the motion {' '.join(motion)}", key.line)
         return value
@@ -190,19 +191,19 @@ class _Passive(Section):
 
 
 def _slider(value: object, info: ValidationInfo) -> str:
-    context = context_of(info)
-    if not isinstance(value, Text):
-        raise ValueError(f"expected a joint's name, got {described(value)}")
+    context = get_context(info)
+    if not isinstance(value, YamlText):
+        raise ValueError(f"expected a joint's name, got {describe(value)}")
     if context.legs_read and value not in context.joints:
-        raise ValueError(f"unknown joint {shown(value)}{nearest(value, context.joints)}")
+        raise ValueError(f"unknown joint {quote(value)}{suggest(value, context.joints)}")
     if value in context.joints and context.joints[value][1] != "mm":
-        raise ValueError(f"joint {shown(value)} turns, expected one that slides")
+        raise ValueError(f"joint {quote(value)} turns, expected one that slides")
     return str(value)
 
 
 def _two(value: object) -> object:
-    if not isinstance(value, Seq) or len(value) != 2:
-        raise ValueError(f"expected the names of two joints, got {described(value)}")
+    if not isinstance(value, YamlList) or len(value) != 2:
+        raise ValueError(f"expected the names of two joints, got {describe(value)}")
     return value
 
 
@@ -241,7 +242,7 @@ class LimitsSection(Section):
         )
 
 
-class Home(Section):
+class HomeSection(Section):
     """A pose by the names of its axes."""
 
     place: ClassVar[str] = " in home"

@@ -17,27 +17,25 @@ from pydantic import (
     WrapValidator,
 )
 
-from ..errors import InputError
+from ..errors import InputError, quote, suggest
 from ..model.parts import Unit, Vector
 from ..units import (
     ACCELERATION,
     ANGLE,
+    ANGULAR_ACCELERATION,
     ANGULAR_JERK,
+    ANGULAR_SPEED,
     JERK,
     LENGTH,
     NUMBER,
     SPEED,
-    SPINNING,
-    TURNING,
     Kind,
     Quantity,
     QuantityError,
     UnreadSizeError,
-    nearest,
-    quantity,
-    shown,
+    parse_quantity,
 )
-from .document import Map, Seq, Text
+from .document import YamlList, YamlMap, YamlText
 
 
 @dataclass
@@ -54,16 +52,16 @@ class Context:
     def report(self, message: str, line: int) -> None:
         self.errors.append(InputError(message, self.source, line))
 
-    def add_joint(self, name: Text, unit: Unit) -> None:
+    def add_joint(self, name: YamlText, unit: Unit) -> None:
         if not is_word(name):
             return  # which is reported where the word is read
         if name in self.joints:
-            self.report(f"joint {shown(name)} is used twice, first in line {self.joints[name][0]}", name.line)
+            self.report(f"joint {quote(name)} is used twice, first in line {self.joints[name][0]}", name.line)
         else:
             self.joints[str(name)] = (name.line, unit)
 
 
-def context_of(info: ValidationInfo) -> Context:
+def get_context(info: ValidationInfo) -> Context:
     """The context, which pydantic hands on untyped."""
     return cast(Context, info.context)
 
@@ -76,17 +74,17 @@ class PlacedError(ValueError):
         super().__init__(message)
 
 
-def described(value: object) -> str:
+def describe(value: object) -> str:
     """What was found, fit for a message."""
-    return "a list" if isinstance(value, Seq) else "a mapping" if isinstance(value, Map) else shown(value)
+    return "a list" if isinstance(value, YamlList) else "a mapping" if isinstance(value, YamlMap) else quote(value)
 
 
 # Words.
 
 
 def _prose(value: object) -> str:
-    if not isinstance(value, Text) or not value.strip():
-        raise ValueError(f"expected some words, got {described(value)}")
+    if not isinstance(value, YamlText) or not value.strip():
+        raise ValueError(f"expected some words, got {describe(value)}")
     return value.strip()
 
 
@@ -95,15 +93,15 @@ def is_word(value: str) -> bool:
     return re.fullmatch(r"[A-Za-z][A-Za-z0-9_]{0,39}", value) is not None
 
 
-def _word(value: object) -> Text:
-    if not isinstance(value, Text) or not is_word(value):
-        raise ValueError(f"expected a plain word (letters, digits, _; at most 40), got {described(value)}")
+def _word(value: object) -> YamlText:
+    if not isinstance(value, YamlText) or not is_word(value):
+        raise ValueError(f"expected a plain word (letters, digits, _; at most 40), got {describe(value)}")
     return value
 
 
 def _flag(value: object) -> bool:
     if value not in ("true", "false"):
-        raise ValueError(f"expected true or false, got {described(value)}")
+        raise ValueError(f"expected true or false, got {describe(value)}")
     return value == "true"
 
 
@@ -111,15 +109,15 @@ def one_of(what: str, *known: str) -> PlainValidator:
     """One of the ``known`` words."""
 
     def read(value: object) -> str:
-        if not isinstance(value, Text) or value not in known:
-            raise ValueError(f"unknown {what} {described(value)}{nearest(str(value), known)}")
+        if not isinstance(value, YamlText) or value not in known:
+            raise ValueError(f"unknown {what} {describe(value)}{suggest(str(value), known)}")
         return str(value)
 
     return PlainValidator(read)
 
 
 Prose = Annotated[str, PlainValidator(_prose)]
-Word = Annotated[Text, PlainValidator(_word)]
+Word = Annotated[YamlText, PlainValidator(_word)]
 Flag = Annotated[bool, PlainValidator(_flag)]
 
 
@@ -128,29 +126,31 @@ Flag = Annotated[bool, PlainValidator(_flag)]
 
 Bounds: TypeAlias = tuple[float, float, str]  # low < value ≤ high, and that in words
 
+_SPEEDS = (SPEED, ANGULAR_SPEED, ACCELERATION, ANGULAR_ACCELERATION)
+_JERKS = (JERK, ANGULAR_JERK)
 # Far beyond any machine, and small enough that nothing computed from them overflows.
 _USUAL: dict[Kind, Bounds] = {
     NUMBER: (-1e6, 1e6, "-1e6 to 1e6"),
     LENGTH: (-1e6, 1e6, "-1 km to 1 km"),
     ANGLE: (-1e4, 1e4, "-10000 rad to 10000 rad"),
-    **{kind: (0.0, 1e9, f"more than 0 ({kind.units})") for kind in (SPEED, TURNING, ACCELERATION, SPINNING)},
-    **{kind: (0.0, 1e12, f"more than 0 ({kind.units})") for kind in (JERK, ANGULAR_JERK)},
+    **{kind: (0.0, 1e9, f"more than 0 ({kind.units})") for kind in _SPEEDS},
+    **{kind: (0.0, 1e12, f"more than 0 ({kind.units})") for kind in _JERKS},
 }
 
 
 def read_quantity(value: object, kind: Kind, info: ValidationInfo, bounds: Bounds | None = None) -> float:
     """A value in mm, rad and s; NaN if a size in it is itself in error."""
-    if not isinstance(value, Text):
-        raise ValueError(f"expected {kind.wanted}, got {described(value)}")
+    if not isinstance(value, YamlText):
+        raise ValueError(f"expected {kind.wanted}, got {describe(value)}")
     try:
-        result = quantity(value, kind, context_of(info).sizes)
+        result = parse_quantity(value, kind, get_context(info).sizes)
     except UnreadSizeError:
         return nan  # the size has been reported; once is enough
     except QuantityError as error:
         raise ValueError(str(error)) from None
     low, high, words = bounds or _USUAL[kind]
     if result <= low or result > high:
-        raise ValueError(f"{shown(value)} is out of range, expected {words}")
+        raise ValueError(f"{quote(value)} is out of range, expected {words}")
     return result
 
 
@@ -165,8 +165,8 @@ def of(kind: Kind, bounds: Bounds | None = None) -> PlainValidator:
 
 def _several(count: int, what: str) -> BeforeValidator:
     def check(value: object) -> object:
-        if not isinstance(value, Seq):
-            raise ValueError(f"expected {what}, got {described(value)}")
+        if not isinstance(value, YamlList):
+            raise ValueError(f"expected {what}, got {describe(value)}")
         if len(value) != count:
             raise ValueError(f"expected {what}, got {len(value)} value{'s' * (len(value) != 1)}")
         return value
@@ -215,5 +215,7 @@ class DriveTypes:
 
 DRIVE_TYPES: dict[Unit, DriveTypes] = {
     "mm": DriveTypes(Length, LengthPair, *(Annotated[float, of(kind)] for kind in (SPEED, ACCELERATION, JERK))),
-    "rad": DriveTypes(Angle, AnglePair, *(Annotated[float, of(kind)] for kind in (TURNING, SPINNING, ANGULAR_JERK))),
+    "rad": DriveTypes(
+        Angle, AnglePair, *(Annotated[float, of(kind)] for kind in (ANGULAR_SPEED, ANGULAR_ACCELERATION, ANGULAR_JERK))
+    ),
 }

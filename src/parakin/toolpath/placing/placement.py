@@ -8,10 +8,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...errors import InputError, PoseError
+from ...errors import InputError, PoseError, quote, suggest
 from ...machine import Machine
 from ...performance.search import spread
-from ...units import nearest, shown
 from ..path import Floats, ToolPath
 from ..posting.frames import parse_value
 from ..posting.working_mode import modes_to_try
@@ -73,11 +72,11 @@ def parse_bounds(text: str) -> dict[str, tuple[float, float]]:
         axis, equals, value = (word.strip() for word in part.partition("="))
         if not (axis and equals and value):
             raise InputError(
-                f"{shown(part.strip())}: expected AXIS=LOW:HIGH or AXIS=VALUE, such as {_EXAMPLE}", _SOURCE
+                f"{quote(part.strip())}: expected AXIS=LOW:HIGH or AXIS=VALUE, such as {_EXAMPLE}", _SOURCE
             )
         axis = axis.upper()
         if axis not in AXES:
-            raise InputError(f"unknown axis {shown(axis)}{nearest(axis, AXES)}", _SOURCE)
+            raise InputError(f"unknown axis {quote(axis)}{suggest(axis, AXES)}", _SOURCE)
         if axis in found:
             raise InputError(f"{axis} is given twice", _SOURCE)
         low, colon, high = (word.strip() for word in value.partition(":"))
@@ -85,7 +84,7 @@ def parse_bounds(text: str) -> dict[str, tuple[float, float]]:
             raise InputError(f"{axis}: expected a range LOW:HIGH, such as -100:100", _SOURCE)
         ends = parse_value(axis, low, _SOURCE), parse_value(axis, high if colon else low, _SOURCE)
         if ends[0] > ends[1]:
-            raise InputError(f"{axis}: {shown(value)} is empty, the lesser end comes first", _SOURCE)
+            raise InputError(f"{axis}: {quote(value)} is empty, the lesser end comes first", _SOURCE)
         found[axis] = ends
     return found
 

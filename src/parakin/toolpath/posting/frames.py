@@ -9,9 +9,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ...errors import InputError
+from ...errors import InputError, quote, suggest
 from ...machine import Machine
-from ...units import ANGLE, LENGTH, QuantityError, nearest, quantity, shown
+from ...units import ANGLE, LENGTH, QuantityError, parse_quantity
 from ..path import Floats
 from ..reading.cl.tokens import LARGEST, is_number, number
 from .programmed_angles import programmed, rotations
@@ -40,9 +40,9 @@ def parse_workpiece(text: str) -> Floats:
     named = ["=" in part for part in parts]
     values = dict.fromkeys(_AXES, 0.0)
     if any(named) and not all(named):
-        raise InputError(f"{shown(text)} has values with a name and without one; {_FORM}", _SOURCE)
+        raise InputError(f"{quote(text)} has values with a name and without one; {_FORM}", _SOURCE)
     if not all(named) and len(parts) not in (3, 6):
-        raise InputError(f"{shown(text)} has {len(parts)} value{'s' * (len(parts) != 1)}; {_FORM}", _SOURCE)
+        raise InputError(f"{quote(text)} has {len(parts)} value{'s' * (len(parts) != 1)}; {_FORM}", _SOURCE)
     if all(named):
         pairs = [(name.strip().upper(), value.strip()) for name, _, value in (part.partition("=") for part in parts)]
     else:
@@ -50,7 +50,7 @@ def parse_workpiece(text: str) -> Floats:
     seen = set()
     for name, value in pairs:
         if name not in values:
-            raise InputError(f"unknown axis {shown(name)}{nearest(name, _AXES)}", _SOURCE)
+            raise InputError(f"unknown axis {quote(name)}{suggest(name, _AXES)}", _SOURCE)
         if name in seen:
             raise InputError(f"{name} is given twice", _SOURCE)
         seen.add(name)
@@ -68,12 +68,12 @@ def parse_value(name: str, text: str, source: str, unit: str | None = None) -> f
         if is_number(text):
             value = number(text)
             return math.radians(value) if angular else value
-        value = quantity(text, ANGLE if angular else LENGTH)
+        value = parse_quantity(text, ANGLE if angular else LENGTH)
     except (QuantityError, InputError) as error:
         message = error.message if isinstance(error, InputError) else str(error)
         raise InputError(f"{name}: {message}", source) from None
     if abs(value) > LARGEST:
-        raise InputError(f"{name}: {shown(text)} is out of range", source)
+        raise InputError(f"{name}: {quote(text)} is out of range", source)
     return value
 
 

@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 
 import parakin as pk
+from parakin.kinematics.wrist import PRINTED
 from parakin.machine import Machine
 from parakin.performance.singularities import singularity_margins
 from parakin.toolpath.checking.check import between
 from parakin.toolpath.checking.search import Search
 from parakin.toolpath.path import ToolPath
-from parakin.toolpath.posting.frames import ROUNDED
 from parakin.toolpath.posting.offences import judge, place
 from parakin.toolpath.posting.posted import Posted
 
@@ -29,7 +29,7 @@ def posted_on(machine, poses, mode=None, turns=None):
     path = ToolPath(
         "part.cls", np.zeros((n, 3)), axis, lines, np.zeros(n, bool), np.full(n, 1000.0), np.full(n, np.nan)
     )
-    joints = machine.follow(poses, mode, ROUNDED) + (0.0 if turns is None else TURN * np.asarray(turns))
+    joints = machine.follow(poses, mode, PRINTED) + (0.0 if turns is None else TURN * np.asarray(turns))
     found = judge(machine, poses, joints, lines, mode)
     frame = np.eye(3, 4)
     return Posted(
@@ -151,7 +151,7 @@ def drawn(name, count, seed=0):
         poses[:, 3] = rng.uniform(0.02, 0.6, count)
         poses[:, 4] = np.cumsum(rng.uniform(-1.0, 1.0, count))
     thick = poses[:-1, None] + np.linspace(0.0, 1.0, 9)[:, None] * np.diff(poses, axis=0)[:, None]
-    joints = machine.follow(thick.reshape(-1, len(half)), None, ROUNDED).reshape(count - 1, 9, -1)
+    joints = machine.follow(thick.reshape(-1, len(half)), None, PRINTED).reshape(count - 1, 9, -1)
     home = machine.inverse(machine.home)
     ranges = {}
     for i, joint in enumerate(machine.joints):

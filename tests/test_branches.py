@@ -93,7 +93,7 @@ def test_turns_are_taken_back_between_stretches_of_feed(name):
     posted = post(machine, path)
     assert posted.off == 0
     assert posted.mode == machine.mode
-    first = machine.model.first_serial
+    first = machine.wrist.first
     assert 1 <= len(posted.rewinds) <= 3  # 1200 deg in a range of 720
     jumps = np.abs(np.diff(posted.poses[:, 4])) > 180 * DEGREE
     assert (1 + np.flatnonzero(jumps)).tolist() == list(posted.rewinds)

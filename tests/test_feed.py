@@ -103,7 +103,7 @@ def distance(points, line):
 def strayed(machine, points):
     """How far joints are from those of the poses, in shares of the tolerances; head and table in either mode."""
     modes = [machine.mode]
-    if machine.model.first_serial is not None:
+    if machine.wrist is not None:
         modes = [machine.mode[:-1] + sign for sign in "+-"]
     turning = np.array(machine.joint_units) == "rad"
     off = [machine.inverse(points.poses, mode) - points.joints for mode in modes]

@@ -93,7 +93,7 @@ def test_a_path_with_upright_poses_closes_everywhere(name, start):
     miss, tilt = Description.of(m.spec).misses(poses, q)
     assert miss.max() < 1e-9
     assert tilt.max() < 1e-9
-    jumps = np.abs(np.diff(q[:, m.model.first_serial]))
+    jumps = np.abs(np.diff(q[:, m.wrist.first]))
     assert jumps.max() < 1.2  # of the wrist between neighbours some 30 mm apart; half a turn would be 3.1
     assert (m.check(poses, q) == 0).all()
     assert np.abs(m.margins(poses, q) - m.margins(poses + [0, 0, 0, 1e-7, 0], q)).max() < 1e-1
@@ -106,7 +106,7 @@ def test_over_the_pole_the_first_joint_does_not_swing(name):
     poses = np.tile(m.home, (len(lean), 1))
     poses[:, 3], poses[:, 4] = np.abs(lean), np.where(lean < 0, np.pi, 0.0)
     q = m.follow(poses)
-    first, serial = m.model.first_serial, [3, 4]
+    first, serial = m.wrist.first, [3, 4]
     assert np.abs(np.diff(q[:, first])).max() < 1e-9
     second = next(i for i in serial if i != first)
     assert np.abs(np.diff(q[:, second])).max() < np.radians(6.5)

@@ -273,7 +273,7 @@ def across(name, miss, count, span=20.0):
 
 
 def swing(posted):
-    return np.degrees(np.ptp(posted.joints[:, posted.machine.model.first_serial]))
+    return np.degrees(np.ptp(posted.joints[:, posted.machine.wrist.first]))
 
 
 @UNDER

@@ -21,8 +21,8 @@ from test_direct import CLOSE, allowed, garbage, legs_regularity, nudged
 import parakin as pk
 from parakin.cli import main
 from parakin.controllers.linuxcnc import configuration
-from parakin.controllers.linuxcnc.module import module
-from parakin.kinematics.forward import roots, side_of
+from parakin.controllers.linuxcnc.module import write_module
+from parakin.kinematics.forward import find_roots
 
 sys.path.insert(0, str(Path(__file__).parent / "linuxcnc"))
 from stub import Stub, inward, outward, pose, world
@@ -188,8 +188,8 @@ def test_a_forward_is_never_silently_wrong(m, modules):
     assert (miss / size).max() < CLOSE
     assert tilt.max() < 1e-9
     if not m.model.by_spheres:
-        sides = roots(m, found[done], joints[done], most=0, side=np.ones(1)).turned
-        assert (sides * side_of(m, m.home[None]) > 0.0).all()
+        sides = find_roots(m.model, found[done], joints[done], most=0, side=np.ones(1)).turned
+        assert (sides * m.sides(m.home[None]) > 0.0).all()
 
 
 @everyone
@@ -366,7 +366,7 @@ def test_the_module_is_under_the_gpl_and_names_itself(name):
 
 def test_a_module_of_another_making_is_not_loaded(modules):
     m = pk.load("tricept")
-    mark = re.search('#define MADE "(.*)"', module(m))[1]
+    mark = re.search('#define MADE "(.*)"', write_module(m))[1]
     assert f"KINEMATICS made={mark}\n" in configuration(m)["tricept.hal"]
     other = pk.load("tricept", parameters={"R": "351 mm"})
     assert f"made={mark}" not in configuration(other)["tricept.hal"]

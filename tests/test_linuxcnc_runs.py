@@ -78,7 +78,7 @@ def read_to(machine, poses, joints):
 
 def near_the_pole(machine, joints):
     """Where the first joint of a wrist is free or nearly so, (n,)."""
-    first, last = machine.model.first_serial, len(machine.joints) - 1
+    first, last = machine.wrist.first, len(machine.joints) - 1
     if first is None:
         return np.zeros(len(joints), bool)
     return np.abs(joints[:, last - 1 if first == last else last]) < 0.01

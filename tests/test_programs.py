@@ -204,7 +204,7 @@ def test_from_home_the_wrist_does_not_jump(name, mode):
     assert poses[0][3] == 0.0  # upright, where a turn moves no joint
     way = np.concatenate([a + np.linspace(1e-6, 1.0, 4000)[:, None] * (b - a) for a, b in pairwise(poses)])
     rows = machine.follow(way, mode)
-    wrist = machine.model.first_serial
+    wrist = machine.wrist.first
     at_home = machine.inverse(machine.home)[wrist]
     rows[:, wrist] += 2.0 * np.pi * np.round((at_home - rows[0, wrist]) / (2.0 * np.pi))
     assert rows[0, wrist] == pytest.approx(at_home, abs=1e-5)

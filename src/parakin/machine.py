@@ -2,24 +2,32 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import cached_property
 from itertools import product
 from numbers import Real
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from .errors import DescriptionError, PoseError
-from .kernels.batch import first_negative, run
+from .algebra import Scalar
+from .arrays import Array
+from .errors import DescriptionError, NoMethodError, PoseError
+from .kernels.batch import first_negative, run, run_checked
+from .kinematics.assemblies import find_assemblies
+from .kinematics.follow import follow_path
+from .kinematics.forward import Solution, closure_tolerance, find_sides, solve_forward
+from .kinematics.inverse import solve_inverse
+from .kinematics.tapes import KinematicTapes, collect_tapes
+from .kinematics.wrist import EXACT, Wrist, find_wrist, flip_mode
+from .model.legs import Inverse
 from .model.limits import Limit
+from .model.parts import Drive
+from .model.rates import Rates, rates
 from .model.spec import Spec
+from .model.structures import PlatformPlacement, Structure
 from .model.traces import Model
-
-if TYPE_CHECKING:
-    from .kinematics.forward import Solution
-
-Array = NDArray[np.float64]
 
 
 class Machine:
@@ -46,6 +54,36 @@ class Machine:
     def axes(self) -> tuple[str, ...]:
         """Names of a pose's coordinates, ISO 841."""
         return self.model.axes
+
+    @property
+    def structure(self) -> Structure:
+        """What motion, head and table make together."""
+        return self.model.structure
+
+    @property
+    def has_direction(self) -> bool:
+        """Whether B and C of a pose tell the tool's axis, and a turn about it does not count."""
+        return self.structure.has_direction
+
+    @property
+    def drives(self) -> tuple[Drive, ...]:
+        """What can be driven, one for each joint."""
+        return self.model.drives
+
+    @property
+    def leg_count(self) -> int:
+        """How many of the joints are the legs'; those of head and table follow."""
+        return self.model.leg_count
+
+    @property
+    def leg_sizes(self) -> list[float]:
+        """The length of the leg of each closure at home, mm."""
+        return self.model.sizes
+
+    @cached_property
+    def wrist(self) -> Wrist | None:
+        """The two turning joints of head and table that point the tool; None where there are no two."""
+        return find_wrist(self.model)
 
     @cached_property
     def joints(self) -> tuple[str, ...]:
@@ -90,6 +128,10 @@ class Machine:
         every = ["".join(signs) for signs in product("+-", repeat=len(self.mode))]
         return (self.mode, *[mode for mode in every if mode != self.mode])
 
+    def head_modes(self, mode: str) -> list[str]:
+        """A working mode, and the one with the other sign of head and table, if these have a choice."""
+        return [mode, flip_mode(mode)] if self.structure.branches else [mode]
+
     def _refuse_bad_home(self) -> None:
         for letter in self.spec.home:
             if letter not in self.axes:
@@ -124,7 +166,7 @@ class Machine:
         return np.ascontiguousarray(array.reshape(-1, len(names))), array.shape[:-1]
 
     def checked_mode(self, mode: str | None) -> str:
-        """A working mode, the default one for None; raises :class:`PoseError` for what is none."""
+        """A working mode, the default one for None; raises :class:`PoseError` for an invalid one."""
         if mode is None:
             return self.mode
         if mode not in self.modes:
@@ -155,14 +197,14 @@ class Machine:
         rows, lead = self.rows(poses, self.axes, "poses")
         shape = (*lead, len(self.joints))
         result = self._out(out, shape)
-        tape = self.model.inverse_tape(self.checked_mode(mode))
+        mode = self.checked_mode(mode)
         if result.flags.c_contiguous and not np.may_share_memory(result, rows):
-            run(tape, rows, result.reshape(-1, len(self.joints)))
+            solve_inverse(self.model, rows, mode, result.reshape(-1, len(self.joints)))
         else:
-            result[...] = run(tape, rows, np.empty((len(rows), len(self.joints)))).reshape(shape)
+            result[...] = solve_inverse(self.model, rows, mode).reshape(shape)
         return result
 
-    def follow(self, poses: ArrayLike, mode: str | None = None, free_below: float = 1e-9) -> Array:
+    def follow(self, poses: ArrayLike, mode: str | None = None, free_below: float = EXACT) -> Array:
         """Joints along a path, (N, axes) -> (N, joints), continuous: angles unwound, free ones as the neighbour's.
 
         A turning joint that is free (the tool's axis within ``free_below`` rad of it) takes its value from the last
@@ -170,24 +212,83 @@ class Machine:
         the path passes over such a pole, head and table go on in their other working mode if that spares a swing, keeps
         the second of their joints in its range and every leg within reach.
         """
-        from .kinematics.follow import follow
-
         rows, lead = self.rows(poses, self.axes, "poses")
         if len(lead) != 1:
             raise PoseError(f"poses: a path of shape (N, {len(self.axes)}) expected")
-        return follow(self, rows, self.checked_mode(mode), free_below)
+        return follow_path(self.model, rows, self.checked_mode(mode), free_below)
 
     def forward(self, joints: ArrayLike, near: ArrayLike | None = None, method: str | None = None) -> Solution:
-        """Poses for joints, with residual and verdict; see :func:`parakin.kinematics.forward.forward`."""
-        from .kinematics.forward import forward
+        """Poses for joints, (..., joints) -> :class:`~.kinematics.forward.Solution`, with residual and verdict.
 
-        return forward(self, joints, near, method)
+        Parameters
+        ----------
+        joints : mm and rad
+        near : poses (axes,) or (..., axes) to start from and to stay near; without them the machine's home, and its
+            assembly mode (in closed form: its working mode first)
+        method : ``"closed"`` (three spheres, two circles), ``"newton"``, or ``"constant"`` (the Jacobian of the start
+            kept throughout: FME Transactions 41, (31)); by default the closed form where there is one, else Newton
+        """
+        rows, lead = self.rows(joints, self.joints, "joints")
+        starts = None if near is None else self._starts(near, lead)
+        solution = solve_forward(self.model, rows, starts, method)
+        return Solution(
+            solution.poses.reshape(*lead, len(self.axes)),
+            solution.residual.reshape(lead)[()],
+            solution.converged.reshape(lead)[()],
+            solution.steps.reshape(lead)[()],
+        )
+
+    def _starts(self, near: ArrayLike, lead: tuple[int, ...]) -> Array:
+        """Poses to start from as rows, as many as there are joint vectors."""
+        rows, own_lead = self.rows(near, self.axes, "near")
+        if own_lead == lead:
+            return rows
+        try:
+            wide = np.broadcast_to(rows.reshape(*own_lead, len(self.axes)), (*lead, len(self.axes)))
+        except ValueError:
+            raise PoseError(f"near: shape {(*lead, len(self.axes))} expected, not {np.shape(near)}") from None
+        return np.ascontiguousarray(wide.reshape(-1, len(self.axes)))
 
     def assemblies(self, joints: ArrayLike) -> Array:
-        """Every real pose of one joint vector, (k, axes); see :func:`parakin.kinematics.assemblies.assemblies`."""
-        from .kinematics.assemblies import assemblies
+        """Every real pose of one joint vector, (k, axes); see :func:`~.kinematics.assemblies.find_assemblies`."""
+        rows, lead = self.rows(joints, self.joints, "joints")
+        if lead != ():
+            raise PoseError(f"joints: one vector ({len(self.joints)},) expected, not {(*lead, len(self.joints))}")
+        return find_assemblies(self.model, rows)
 
-        return assemblies(self, joints)
+    @property
+    def closure_tolerance(self) -> float:
+        """The greatest distance by which a leg may fail to close in an answer of :meth:`forward`, mm."""
+        return closure_tolerance(self.model)
+
+    def sides(self, poses: Array) -> Array:
+        """The determinant whose sign tells the assembly mode, at rows of poses (n, axes): (n,)."""
+        return find_sides(self.model, poses)
+
+    @property
+    def has_closed_forward(self) -> bool:
+        """Whether the direct problem is the common point of spheres or circles."""
+        return self.model.by_spheres
+
+    @property
+    def home_side(self) -> float:
+        """The side of the spheres' centres on which the platform is at home, 1 or -1."""
+        return self.model.home_side
+
+    def common_points(self, joints: Array, side: float) -> tuple[Array, Array]:
+        """Poses (n, axes) for rows of joints on one side of the spheres' centres, and what the legs fail to close, mm.
+
+        Raises :class:`NoMethodError` where :attr:`has_closed_forward` is false.
+        """
+        if not self.has_closed_forward:
+            raise NoMethodError(f"{self.name}: no closed form of the direct problem")
+        poses = np.empty((len(joints), len(self.axes)))
+        residual = run_checked(self.model.spheres_tape(side), joints, poses, np.empty((len(joints), 0)))
+        return poses, residual
+
+    def tapes(self, mode: str) -> KinematicTapes:
+        """The kinematics in a working mode as programs, for interpreters of them such as the C of a controller."""
+        return collect_tapes(self.model, mode)
 
     def jacobians(self, poses: ArrayLike, mode: str | None = None) -> tuple[Array, Array]:
         """A and B, each (..., n, n), with A x' = B q' for the rates of pose and joints.
@@ -201,6 +302,33 @@ class Machine:
         joints = self.inverse(rows, mode)
         both = run(self.model.jacobian_tape(), rows, np.empty((len(rows), n * n + n * m)), joints)
         return both[:, : n * n].reshape(*lead, n, n), both[:, n * n :].reshape(*lead, n, m)
+
+    def twist_rates(self, poses: Array, joints: Array, whole: bool = True) -> tuple[Array, Array, Array]:
+        """A and B (n, m, m) with A t' = B q' for the tool's twist t', and the legs' spans (n, legs), mm.
+
+        Poses and joints are rows; see :class:`parakin.model.rates.Rates`. With ``whole`` a row is NaN if a number of it
+        is not finite.
+        """
+        m = len(self.axes)
+        tape = self.model.rates_tape()
+        both = run(tape, poses, np.empty((len(poses), tape.outputs)), joints, whole)
+        a, b = (both[:, i * m * m : (i + 1) * m * m].reshape(-1, m, m) for i in (0, 1))
+        return a, b, both[:, 2 * m * m :]
+
+    # The same on scalars of any kind (:mod:`parakin.algebra`), for interpreters such as intervals.
+
+    def trace_inverse(self, pose: Sequence[Scalar], mode: str) -> tuple[list[Scalar], PlatformPlacement, list[Inverse]]:
+        """Joints, the platform's placement, and each leg's inverse for a pose."""
+        return self.model.invert(pose, mode)
+
+    def trace_margins(self, pose: Sequence[Scalar], mode: str, joints: Sequence[Scalar] | None = None) -> list[Scalar]:
+        """Every limit's margin, in the order of :attr:`limits`, for a pose and the given joints or its inverse."""
+        own = self.model.own_margins(pose, mode) if joints is None else self.model.margins(pose, joints, mode)
+        return [margin for _, margin in own]
+
+    def trace_rates(self, pose: Sequence[Scalar], joints: Sequence[Scalar]) -> Rates:
+        """A and B of the tool's twist, and the legs' spans."""
+        return rates(self.spec, self.structure, pose, joints)
 
     # Limits.
 

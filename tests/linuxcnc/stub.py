@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from parakin.controllers.linuxcnc.module import kinematics_name, module
+from parakin.controllers.linuxcnc.module import kinematics_name, write_module
 
 HERE = Path(__file__).parent
 HEADERS = ("rtapi.h", "rtapi_app.h", "rtapi_math.h", "rtapi_string.h", "hal.h", "kinematics.h")
@@ -85,7 +85,7 @@ class Stub:
         """A machine's module."""
         stub, name = self.library, kinematics_name(machine)
         source = self.folder / f"{name}.c"
-        source.write_text(module(machine))
+        source.write_text(write_module(machine))
         self._gcc([source], self.folder / f"{name}.so")
         return Kinematics(stub, self.folder / f"{name}.so", len(machine.joints))
 

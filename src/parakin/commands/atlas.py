@@ -17,7 +17,8 @@ from .options import OFF_LIMITS, Json, Mode, Name, Sizes, machine_of, row
 from .regions import At, Without, length, parts_of, ranges_of, region_of, values_of
 
 if TYPE_CHECKING:
-    from ..machine import Array, Machine
+    from ..arrays import Array
+    from ..machine import Machine
     from ..performance.atlas import Atlas, Map
     from ..performance.certified.proofs import Brackets, Proof
     from ..performance.indices import Performance

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Any
 from .console import fixed, rim, rim_unit, table
 
 if TYPE_CHECKING:
-    from ..machine import Array, Machine
+    from ..arrays import Array
+    from ..machine import Machine
     from ..performance.atlas import Atlas
     from ..performance.certified.amplification import Bracket
     from ..performance.certified.proofs import Brackets, Proof

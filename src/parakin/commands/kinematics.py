@@ -15,8 +15,9 @@ from .offences import offence_json, offence_line
 from .options import OFF_LIMITS, Json, Mode, Name, Sizes, machine_of, row
 
 if TYPE_CHECKING:
+    from ..arrays import Array
     from ..kinematics.forward import Solution
-    from ..machine import Array, Machine
+    from ..machine import Machine
     from ..toolpath.posting.offences import Judgement
     from ..toolpath.posting.posted import Offence
 
@@ -90,7 +91,6 @@ def forward(
     if near is not None:
         parts = [part.strip() for part in near.split(",")]
         start = row(parts, machine.axes, machine.axis_units, machine.home, "--near")
-    from ..kinematics.forward import tolerance
     from ..toolpath.posting.offences import judge
 
     solution = machine.forward(joints, start)
@@ -105,7 +105,7 @@ def forward(
     for index in np.flatnonzero(~solution.converged).tolist()[:10]:
         place = f"{csv}:{lines[index]}" if csv else "joints"
         open_by = solution.residual[index]
-        closes = np.isnan(open_by) or open_by <= tolerance(machine)
+        closes = np.isnan(open_by) or open_by <= machine.closure_tolerance
         say(f"{place}: no pose found" + ("" if closes else f" (the legs fail to close by {open_by:.3g} mm)"))
     lost = len(joints) - len(good)
     if lost > 10:

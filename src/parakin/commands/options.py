@@ -10,7 +10,8 @@ from cyclopts import Parameter
 from ..errors import InputError, InputErrors
 
 if TYPE_CHECKING:
-    from ..machine import Array, Machine
+    from ..arrays import Array
+    from ..machine import Machine
 
 OFF_LIMITS = 3  # exit code
 

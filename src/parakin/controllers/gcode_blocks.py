@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ..machine import Array
+from ..arrays import Array
 
 DIGITS = 6  # behind the point: of mm, of degrees, and of the inverse of minutes
 _ROWS = 1 << 14  # formatted at a time

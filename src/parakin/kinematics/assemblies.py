@@ -2,105 +2,90 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
-from numpy.typing import ArrayLike
 
 from ..algebra import Trace, derivative
-from ..errors import NoMethodError, PoseError
+from ..arrays import Array
+from ..errors import NoMethodError
 from ..kernels.batch import run_checked
 from ..kernels.intervals import IntervalProgram
 from ..model.chain import rotation_about
 from ..model.legs.lambda_ import Lambda
-from ..model.structures import CentralLeg, Free
-from .forward import poses_of, roots, tolerance
-from .planar_rpr import planar_poses
-from .root_isolation import isolated
+from ..model.traces import Model
+from .forward import closure_tolerance, compute_poses, find_roots
+from .planar_rpr import solve_planar_rpr
+from .root_isolation import isolate_roots
 
-if TYPE_CHECKING:
-    from ..machine import Array, Machine
-
-NONE_SO_LONG = 1e8  # mm; machine files take lengths up to 1e6
+LONGEST = 1e8  # mm; machine files take lengths up to 1e6
 
 
-def assemblies(machine: Machine, joints: ArrayLike) -> Array:
-    """Every real pose for one joint vector (joints,), as rows (k, axes); k may be 0.
+def find_assemblies(model: Model, joints: Array) -> Array:
+    """Find every real pose of one row of joints (1, joints), as rows (k, axes); k may be zero.
 
-    Two for machines that only translate on three (two) rods: the common points of spheres (circles). Up to six for
-    three rods in a plane. For three Lambda legs on parallel shafts the heights give the platform's tilt, face up or
-    face down, and each leaves the planar problem: up to twelve, face up first. With a passive central leg all those
-    within the limits of its passive joints, by bisection. For other machines there is no complete method here, and
-    :class:`NoMethodError` says so.
+    Machines that only translate on three (two) rods have two: the common points of spheres (circles). Three rods in a
+    plane have up to six. With three Lambda legs on parallel shafts the heights give the platform's tilt, face up or
+    face down, and each leaves the planar problem: up to twelve, face up first. A passive central leg is solved by
+    bisection within the limits of its passive joints.
+
+    Raises :class:`NoMethodError` for other machines: they have no complete method here.
     """
-    rows, lead = machine.rows(joints, machine.joints, "joints")
-    if lead != ():
-        raise PoseError(f"joints: one vector ({len(machine.joints)},) expected, not {(*lead, len(machine.joints))}")
-    if not (np.abs(rows) < NONE_SO_LONG).all():
-        return np.empty((0, len(machine.axes)))
-    model = machine.model
+    if not (np.abs(joints) < LONGEST).all():
+        return np.empty((0, len(model.axes)))
     if model.by_spheres:
-        return _spheres(machine, rows)
-    if isinstance(model.structure, CentralLeg) and not model.structure.roll:
-        coordinates = _central_leg(machine, rows)
-    elif isinstance(model.structure, Free) and _planar(machine):
-        coordinates = _planar_free(machine, rows)
-    elif isinstance(model.structure, Free) and _parallel_lambdas(machine):
-        coordinates = _lambdas(machine, rows)
-    else:
+        return _find_common_points(model, joints)
+    methods = {"central leg": _solve_central_leg, "planar": _solve_planar, "lambda": _solve_lambdas}
+    if model.structure.assembly_method is None:
         raise NoMethodError(
-            f"{machine.name}: no complete method for all its assemblies; forward(near=...) finds single ones"
+            f"{model.spec.name}: no complete method for all its assemblies; forward(near=...) finds single ones"
         )
-    given = np.ascontiguousarray(np.broadcast_to(rows, (len(coordinates), rows.shape[1])))
-    good = roots(machine, coordinates, given, most=0, poses=False).residual <= tolerance(machine)
+    coordinates = methods[model.structure.assembly_method](model, joints)
+    given = np.ascontiguousarray(np.broadcast_to(joints, (len(coordinates), joints.shape[1])))
+    good = find_roots(model, coordinates, given, most=0, poses=False).residual <= closure_tolerance(model)
     coordinates, given = coordinates[good], given[good]
-    poses = poses_of(machine, np.ascontiguousarray(coordinates), given)
+    poses = compute_poses(model, np.ascontiguousarray(coordinates), given)
     return poses[np.isfinite(poses).all(1)]
 
 
-def _spheres(machine: Machine, rows: Array) -> Array:
-    model = machine.model
-    poses, residual = np.empty((2, len(machine.axes))), np.empty(2)
+def _find_common_points(model: Model, joints: Array) -> Array:
+    poses, residual = np.empty((2, len(model.axes))), np.empty(2)
     for i, side in enumerate((model.home_side, -model.home_side)):
-        residual[i] = run_checked(model.spheres_tape(side), rows, poses[i : i + 1], np.empty((1, 0)))[0]
-    poses = poses[residual <= tolerance(machine)]
+        residual[i] = run_checked(model.spheres_tape(side), joints, poses[i : i + 1], np.empty((1, 0)))[0]
+    poses = poses[residual <= closure_tolerance(model)]
     return poses[:1] if len(poses) == 2 and np.array_equal(poses[0], poses[1]) else poses
 
 
-def _legs(machine: Machine, rows: Array) -> list[list[float]]:
-    by_name = dict(zip(machine.joints, rows[0].tolist(), strict=True))
-    return [[by_name[drive.name] for drive in leg.drives] for leg in machine.spec.legs]
+def _split_by_leg(model: Model, joints: Array) -> list[list[float]]:
+    by_name = dict(zip([drive.name for drive in model.drives], joints[0].tolist(), strict=True))
+    return [[by_name[drive.name] for drive in leg.drives] for leg in model.spec.legs]
 
 
-def _central_leg(machine: Machine, rows: Array) -> Array:
-    model = machine.model
+def _solve_central_leg(model: Model, joints: Array) -> Array:
     words = model.structure.coordinates
-    bounds = {bound.name: (bound.low, bound.high) for bound in machine.spec.limits.passive}
+    bounds = {bound.name: (bound.low, bound.high) for bound in model.spec.limits.passive}
     far = 0.0
-    for leg, q in zip(machine.spec.legs, _legs(machine, rows), strict=True):
+    for leg, q in zip(model.spec.legs, _split_by_leg(model, joints), strict=True):
         sphere = leg.sphere(q)
         if sphere is None:
-            raise NoMethodError(f"{machine.name}: no complete method for all assemblies of legs of kind {leg.kind}")
+            raise NoMethodError(f"{model.spec.name}: no complete method for all assemblies of legs of kind {leg.kind}")
         far = max(far, float(np.linalg.norm(np.array(sphere[0])) + abs(sphere[1]) + np.linalg.norm(leg.platform)))
-    sign = model.structure.sign if isinstance(model.structure, CentralLeg) else 1.0
-    slide = (0.0, far) if sign > 0 else (-far, 0.0)
+    slide = (0.0, far) if model.structure.sign > 0 else (-far, 0.0)
     box = [bounds.get(word, slide if word == "tz" else (-np.pi / 2, np.pi / 2)) for word in words]
     low, high = (np.array([side[i] for side in box]) for i in (0, 1))
     low = np.where(np.isfinite(low), low, [-np.pi / 2, -np.pi / 2, slide[0]])
     high = np.where(np.isfinite(high), high, [np.pi / 2, np.pi / 2, slide[1]])
     trace = Trace()
     inputs = trace.inputs(len(words))
-    f = model.scaled_closures(inputs, rows[0].tolist())
-    starts = isolated(IntervalProgram(trace, f + [derivative(row, y) for row in f for y in inputs]), low, high)
-    return _polished(machine, rows, starts, low, high)
+    f = model.scaled_closures(inputs, joints[0].tolist())
+    starts = isolate_roots(IntervalProgram(trace, f + [derivative(row, y) for row in f for y in inputs]), low, high)
+    return _polish_roots(model, joints, starts, low, high)
 
 
-def _polished(machine: Machine, rows: Array, starts: Array, low: Array, high: Array) -> Array:
+def _polish_roots(model: Model, joints: Array, starts: Array, low: Array, high: Array) -> Array:
     """The distinct roots that Newton's method reaches from ``starts``, within the box."""
-    given = np.ascontiguousarray(np.broadcast_to(rows, (len(starts), rows.shape[1])))
-    found = roots(machine, starts, given, poses=False)
+    given = np.ascontiguousarray(np.broadcast_to(joints, (len(starts), joints.shape[1])))
+    found = find_roots(model, starts, given, poses=False)
     y, slack = found.found, 1e-9 * (high - low)
-    good = (found.residual <= tolerance(machine)) & (y >= low - slack).all(1) & (y <= high + slack).all(1)
+    good = (found.residual <= closure_tolerance(model)) & (y >= low - slack).all(1) & (y <= high + slack).all(1)
     kept: list[Array] = []
     for root in y[good]:
         if not any((np.abs(root - other) <= 1e-6 * (high - low)).all() for other in kept):
@@ -108,44 +93,30 @@ def _polished(machine: Machine, rows: Array, starts: Array, low: Array, high: Ar
     return np.array(kept).reshape(-1, y.shape[1])
 
 
-def _planar(machine: Machine) -> bool:
-    words = machine.model.structure.coordinates
-    turns = [word for word in words if word.startswith("r")]
-    in_plane = len(words) == 3 and len(turns) == 1 and f"t{turns[0][1]}" not in words
-    return in_plane and all(leg.sphere([0.0] * len(leg.drives)) is not None for leg in machine.spec.legs)
-
-
-def _planar_free(machine: Machine, rows: Array) -> Array:
-    words = machine.model.structure.coordinates
+def _solve_planar(model: Model, joints: Array) -> Array:
+    words = model.structure.coordinates
     # The plane's two directions, so ordered that the turn is right-handed: x y for rz, z x for ry, y z for rx.
     plane = {"rz": [0, 1], "ry": [2, 0], "rx": [1, 2]}[words[2]]
     out = 3 - sum(plane)
     centres, radii = [], []
-    for leg, q in zip(machine.spec.legs, _legs(machine, rows), strict=True):
+    for leg, q in zip(model.spec.legs, _split_by_leg(model, joints), strict=True):
         sphere = leg.sphere(q)
         assert sphere is not None
         height = sphere[0][out] - leg.platform[out]
         centres.append([sphere[0][i] for i in plane])
         radii.append(np.sqrt(max(float(sphere[1]) ** 2 - float(height) ** 2, 0.0)))
-    structure = machine.model.structure
-    assert isinstance(structure, Free)
+    structure = model.structure
     # The pose is of the tip; a fixed tool only shifts the corners.
-    corners = np.array([[leg.platform[i] - structure.tip[i] for i in plane] for leg in machine.spec.legs])
-    found = planar_poses(np.array(centres, float), np.array(radii), corners)
+    corners = np.array([[leg.platform[i] - structure.tip[i] for i in plane] for leg in model.spec.legs])
+    found = solve_planar_rpr(np.array(centres, float), np.array(radii), corners)
     letters = ["tx", "ty", "tz"]
     order = [[letters[i] for i in plane].index(word) for word in words[:2]]
     return found[:, [*order, 2]]
 
 
-def _parallel_lambdas(machine: Machine) -> bool:
-    rails = [np.array(leg.rail) for leg in machine.spec.legs if isinstance(leg, Lambda)]
-    return len(rails) == len(machine.spec.legs) == 3 and all(np.allclose(r, rails[0], atol=1e-12) for r in rails)
-
-
-def _lambdas(machine: Machine, rows: Array) -> Array:
-    structure = machine.model.structure
-    assert isinstance(structure, Free)
-    legs = [leg for leg in machine.spec.legs if isinstance(leg, Lambda)]
+def _solve_lambdas(model: Model, joints: Array) -> Array:
+    structure = model.structure
+    legs = [leg for leg in model.spec.legs if isinstance(leg, Lambda)]
     axis = np.array(legs[0].rail)
     side = np.linalg.svd(axis[None, :])[2][1:]
     if np.dot(np.cross(side[0], side[1]), axis) < 0.0:
@@ -153,7 +124,7 @@ def _lambdas(machine: Machine, rows: Array) -> Array:
     feet = np.array([leg.foot for leg in legs])
     corners = np.array([leg.platform for leg in legs])
     with np.errstate(invalid="ignore", divide="ignore"):
-        given = np.array(_legs(machine, rows))  # NumPy's numbers: where both sliders meet, a gap of 0 gives NaN
+        given = np.array(_split_by_leg(model, joints))  # NumPy's numbers: where both sliders meet, a gap of 0 gives NaN
         held = np.array([leg.height_and_distance(list(q)) for leg, q in zip(legs, given, strict=True)])
     if not np.isfinite(held).all():
         return np.empty((0, 6))
@@ -166,22 +137,22 @@ def _lambdas(machine: Machine, rows: Array) -> Array:
     rest = 1.0 - inside @ inside
     if rest < 0.0:
         return np.empty((0, 6))
-    up = 1.0 if normal @ _home_axis(machine, axis) >= 0.0 else -1.0
+    up = 1.0 if normal @ _home_axis(model, axis) >= 0.0 else -1.0
     found: list[Array] = []
     for sign in (up, -up) if rest > 0.0 else (up,):
         seen = inside + sign * np.sqrt(rest) * normal
         tilt = _rotation_between(seen, axis)
         flat = corners @ tilt.T @ side.T
         height = heights[0] - axis @ (tilt @ corners[0])
-        for x, y, turn in planar_poses(feet @ side.T, distances, flat):
+        for x, y, turn in solve_planar_rpr(feet @ side.T, distances, flat):
             spin: Array = np.array(rotation_about(axis.tolist(), np.sin(turn), np.cos(turn)))
             origin = side.T @ np.array([x, y]) + height * axis
             found.append(np.array(structure.coordinates_of((spin @ tilt).tolist(), origin.tolist())))
     return np.array(found).reshape(-1, 6)
 
 
-def _home_axis(machine: Machine, axis: Array) -> Array:
-    rotation, _ = machine.model.structure.frame(machine.model.home)
+def _home_axis(model: Model, axis: Array) -> Array:
+    rotation, _ = model.structure.frame(model.home)
     seen: Array = np.array(rotation, float).T @ axis
     return seen
 

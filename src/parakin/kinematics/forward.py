@@ -3,20 +3,19 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
 
+from ..arrays import Array, Flags
 from ..errors import NoMethodError, PoseError
 from ..kernels.batch import Roots, run, run_checked, solve
+from ..model.traces import Model
+from .inverse import solve_inverse
+from .wrist import is_upright
 
-if TYPE_CHECKING:
-    from ..machine import Array, Machine
-
-GOOD = 1e-9  # greatest closure error of an answer, mm in a machine of a metre
+CLOSED = 1e-9  # greatest closure error of an answer, mm in a machine of a metre
 MOST_STEPS = 24
-FREE = 1e-9  # rad: a tool that leans less has no C of its own, only rounding's
 WITHIN_A_TURN = 6  # steps of half a radian at most, which can't leave the start's turn
 CONTINUATIONS = (8, 64)  # parts of the way from a known pose, where Newton's method in one go fails
 
@@ -37,61 +36,38 @@ class Solution:
     steps: Any
 
 
-def forward(machine: Machine, joints: ArrayLike, near: ArrayLike | None = None, method: str | None = None) -> Solution:
-    """Poses for joints, (..., joints) -> :class:`Solution`.
+def solve_forward(model: Model, joints: Array, starts: Array | None, method: str | None = None) -> Solution:
+    """Solve the direct problem of rows of joints (N, joints), from rows of poses (N, axes) or from home.
 
-    Parameters
-    ----------
-    joints : mm and rad
-    near : poses (axes,) or (..., axes) to start from and to stay near; without them the machine's home, and its
-        assembly mode (in closed form: its working mode first)
-    method : ``"closed"`` (three spheres, two circles), ``"newton"``, or ``"constant"`` (the Jacobian of the start kept
-        throughout: FME Transactions 41, (31)); by default the closed form where there is one, else Newton
+    Parameters and errors as of :meth:`parakin.Machine.forward`; every field of the solution has N rows.
 
     Newton's answer counts only if it lies in the start's assembly mode: where the determinant of A changes sign on the
     way the answer is sought once more along the joints' straight line from the start, and refused if that fails too.
     """
-    rows, lead = machine.rows(joints, machine.joints, "joints")
-    starts = None
-    if near is not None:
-        start_rows, start_lead = machine.rows(near, machine.axes, "near")
-        if start_lead == lead:
-            starts = start_rows
-        else:
-            try:
-                wide = np.broadcast_to(start_rows.reshape(*start_lead, len(machine.axes)), (*lead, len(machine.axes)))
-            except ValueError:
-                raise PoseError(f"near: shape {(*lead, len(machine.axes))} expected, not {np.shape(near)}") from None
-            starts = np.ascontiguousarray(wide.reshape(-1, len(machine.axes)))
     if method is None:
-        method = "closed" if machine.model.by_spheres else "newton"
+        method = "closed" if model.by_spheres else "newton"
     if method == "closed":
-        found = _closed(machine, rows, starts)
+        solution = _solve_by_spheres(model, joints, starts)
     elif method == "newton":
-        found = _newton(machine, rows, starts)
+        solution = _solve_by_newton(model, joints, starts)
     elif method == "constant":
-        found = _constant(machine, rows, starts)
+        solution = _solve_by_constant_jacobian(model, joints, starts)
     else:
         raise PoseError(f'method {method!r}: "closed", "newton" or "constant" expected')
-    poses, residual, converged, steps = found
+    poses, converged, steps = solution.poses, solution.converged, solution.steps
     if not converged.all():
         poses[~converged] = np.nan
-    if machine.axes[3:] == ("B", "C"):
-        along_z = np.abs(poses[:, 3] - 0.5 * np.pi) > 0.5 * np.pi - FREE
+    if model.structure.has_direction:
+        along_z = is_upright(poses[:, 3])
         poses[along_z, 4] = 0.0 if starts is None else starts[along_z, 4]
     elif steps.max(initial=0) > WITHIN_A_TURN:
-        _count_turns(machine, poses, machine.home if starts is None else starts)
-    return Solution(
-        poses.reshape(*lead, len(machine.axes)),
-        residual.reshape(lead)[()],
-        converged.reshape(lead)[()],
-        steps.reshape(lead)[()],
-    )
+        _count_turns(model, poses, np.array(model.home) if starts is None else starts)
+    return solution
 
 
-def _count_turns(machine: Machine, poses: Array, near: Array) -> None:
+def _count_turns(model: Model, poses: Array, near: Array) -> None:
     """Bring the angles of a free platform to B within ±90° and within half a turn of those near by; in place."""
-    angles = {axis: poses[:, i] for i, axis in enumerate(machine.axes) if axis in "ABC"}
+    angles = {axis: poses[:, i] for i, axis in enumerate(model.axes) if axis in "ABC"}
     if len(angles) == 3:
         b = angles["B"]
         b -= 2.0 * np.pi * np.round(b / (2.0 * np.pi))
@@ -101,24 +77,21 @@ def _count_turns(machine: Machine, poses: Array, near: Array) -> None:
         angles["C"][over] += np.pi
         del angles["B"]
     for axis, angle in angles.items():
-        angle -= 2.0 * np.pi * np.round((angle - near[..., machine.axes.index(axis)]) / (2.0 * np.pi))
+        angle -= 2.0 * np.pi * np.round((angle - near[..., model.axes.index(axis)]) / (2.0 * np.pi))
 
 
-_Found = tuple["Array", "Array", NDArray[np.bool_], NDArray[np.int32]]
+def closure_tolerance(model: Model) -> float:
+    """Return the greatest closure error of an answer, mm: rounding grows with the machine."""
+    return CLOSED * max(1.0, max(model.sizes) / 1000.0)
 
 
-def tolerance(machine: Machine) -> float:
-    """Greatest closure error of an answer, mm: rounding grows with the machine."""
-    return GOOD * max(1.0, max(machine.model.sizes) / 1000.0)
+def compute_poses(model: Model, coordinates: Array, joints: Array) -> Array:
+    """Compute poses from the motion's coordinates and the joints of head and table."""
+    return run(model.end_tape(), coordinates, np.empty((len(joints), len(model.axes))), joints)
 
 
-def poses_of(machine: Machine, coordinates: Array, joints: Array) -> Array:
-    """Poses for the motion's coordinates and the joints of head and table."""
-    return run(machine.model.end_tape(), coordinates, np.empty((len(joints), len(machine.axes))), joints)
-
-
-def roots(
-    machine: Machine,
+def find_roots(
+    model: Model,
     near: Array,
     joints: Array,
     *,
@@ -126,14 +99,14 @@ def roots(
     poses: bool = True,
     side: Array | None = None,
 ) -> Roots:
-    """Newton on the closures from ``near`` (1 or N rows), poses or else the motion's coordinates, to the same kind.
+    """Solve the closures by Newton's method from ``near`` (1 or N rows), and return what kind of rows it was given.
 
-    ``most`` = 0 only looks at the start. ``side`` tells the side of the singularities to end on, as
-    :func:`side_of` gives it; by default that of the start.
+    poses : ``near`` and the roots are poses, else the motion's coordinates
+    most : steps; zero only evaluates the start
+    side : of the singularities to end on, as :func:`find_sides` gives it; by default that of the start
     """
-    model = machine.model
     size = max(model.sizes)
-    # A step goes a third of the legs' size or half a radian at most.
+    # A step goes at most a third of the legs' size or half a radian.
     caps = np.array([size / 3.0 if word.startswith("t") else 0.5 for word in model.structure.coordinates])
     tapes = model.begin_tape(poses), model.newton_tape(True), model.newton_tape(False), model.end_tape(poses)
     return solve(
@@ -141,83 +114,80 @@ def roots(
     )
 
 
-def _closed(machine: Machine, joints: Array, starts: Array | None) -> _Found:
-    model = machine.model
+def _solve_by_spheres(model: Model, joints: Array, starts: Array | None) -> Solution:
     if not model.by_spheres:
-        raise NoMethodError(f"{machine.name}: no closed form of the direct problem; use method='newton'")
-    poses = np.empty((len(joints), len(machine.axes)))
+        raise NoMethodError(f"{model.spec.name}: no closed form of the direct problem; use method='newton'")
+    poses = np.empty((len(joints), len(model.axes)))
     if starts is None:
-        residual = _in_the_working_mode(machine, joints, poses)
+        residual = _choose_by_working_mode(model, joints, poses)
     else:
         residual = run_checked(model.spheres_tape(None), joints, poses, starts)
-    return poses, residual, residual <= tolerance(machine), np.zeros(len(joints), np.int32)
+    return Solution(poses, residual, residual <= closure_tolerance(model), np.zeros(len(joints), np.int32))
 
 
-def _in_the_working_mode(machine: Machine, joints: Array, poses: Array) -> Array:
-    """Residuals; into ``poses`` of the two common points that on home's side, or, where only the other one has these
-    joints in the machine's own working mode, that one."""
-    model, nothing = machine.model, np.empty((len(joints), 0))
+def _choose_by_working_mode(model: Model, joints: Array, poses: Array) -> Array:
+    """Fill ``poses`` with the common point on home's side, and return the residuals, mm.
+
+    Where only the other common point has these joints in the machine's own working mode, that one is taken.
+    """
+    nothing = np.empty((len(joints), 0))
     residual = run_checked(model.spheres_tape(model.home_side), joints, poses, nothing)
     if not model.has_modes:
         return residual
-    legs = len(model.drives) - model.serial
 
-    def out_of_mode(found: Array, given: Array) -> NDArray[np.bool_]:
-        off = np.abs(machine.inverse(found) - given)[:, :legs].max(1)
-        fits: NDArray[np.bool_] = off <= 1e3 * tolerance(machine)
+    def is_out_of_mode(poses: Array, joints: Array) -> Flags:
+        off = np.abs(solve_inverse(model, poses, model.mode) - joints)[:, : model.leg_count].max(1)
+        fits: Flags = off <= 1e3 * closure_tolerance(model)
         return ~fits
 
-    lost = np.flatnonzero(out_of_mode(poses, joints) & np.isfinite(residual))
+    lost = np.flatnonzero(is_out_of_mode(poses, joints) & np.isfinite(residual))
     if len(lost):
-        given = joints[lost]
-        other = np.empty((len(lost), poses.shape[1]))
-        found = run_checked(model.spheres_tape(-model.home_side), given, other, nothing[lost])
-        fit = ~out_of_mode(other, given)
-        poses[lost[fit]], residual[lost[fit]] = other[fit], found[fit]
+        others, their_joints = np.empty((len(lost), poses.shape[1])), joints[lost]
+        their_residual = run_checked(model.spheres_tape(-model.home_side), their_joints, others, nothing[lost])
+        fit = ~is_out_of_mode(others, their_joints)
+        poses[lost[fit]], residual[lost[fit]] = others[fit], their_residual[fit]
     return residual
 
 
-def side_of(machine: Machine, poses: Array) -> Array:
-    """The determinant of the closures' derivatives at poses, (N,): its sign tells the assembly mode."""
-    return roots(machine, poses, machine.inverse(poses), most=0, side=np.ones(1)).turned
+def find_sides(model: Model, poses: Array) -> Array:
+    """Compute the determinant of the closures' derivatives at poses, (N,); its sign tells the assembly mode."""
+    return find_roots(model, poses, solve_inverse(model, poses, model.mode), most=0, side=np.ones(1)).turned
 
 
-def _newton(machine: Machine, joints: Array, starts: Array | None) -> _Found:
-    near = machine.home[None, :] if starts is None else starts
-    result = roots(machine, near, joints, side=side_of(machine, near) if starts is None else None)
-    good = (result.residual <= tolerance(machine)) & (result.turned > 0.0)
+def _solve_by_newton(model: Model, joints: Array, starts: Array | None) -> Solution:
+    near = np.array(model.home)[None, :] if starts is None else starts
+    result = find_roots(model, near, joints, side=find_sides(model, near) if starts is None else None)
+    good = (result.residual <= closure_tolerance(model)) & (result.turned > 0.0)
     if not good.all():
-        _continue(machine, near, joints, result, good)
-    return result.found, result.residual, good, result.steps
+        _continue_from_starts(model, near, joints, result, good)
+    return Solution(result.found, result.residual, good, result.steps)
 
 
-def _continue(machine: Machine, near: Array, joints: Array, result: Roots, good: NDArray[np.bool_]) -> None:
-    """Seek what Newton in one go did not find along the joints' line from the start; mends ``result`` and ``good``."""
+def _continue_from_starts(model: Model, near: Array, joints: Array, result: Roots, good: Flags) -> None:
+    """Continue along the joints' straight line from the start where Newton's method in one go failed; in place."""
     whole = np.isfinite(joints).all(1) & np.isfinite(near).all(1)
     for parts in CONTINUATIONS:
         lost = np.flatnonzero(~good & whole)
         if not len(lost):
             return
         walk = np.broadcast_to(near if len(near) == 1 else near[lost], (len(lost), near.shape[1]))
-        begin = machine.inverse(walk)
-        side = side_of(machine, np.ascontiguousarray(walk))
+        begin = solve_inverse(model, walk, model.mode)
+        side = find_sides(model, np.ascontiguousarray(walk))
         with np.errstate(invalid="ignore", over="ignore"):
             for part in range(1, parts + 1):
-                step = roots(machine, walk, begin + (part / parts) * (joints[lost] - begin), side=side)
+                step = find_roots(model, walk, begin + (part / parts) * (joints[lost] - begin), side=side)
                 walk = step.found
                 result.steps[lost] += step.steps
-            fine = (step.residual <= tolerance(machine)) & (step.turned > 0.0)
+            fine = (step.residual <= closure_tolerance(model)) & (step.turned > 0.0)
         result.found[lost[fine]], result.residual[lost[fine]] = walk[fine], step.residual[fine]
         good[lost[fine]] = True
 
 
-def _constant(machine: Machine, joints: Array, starts: Array | None) -> _Found:
-    """x ← x + J⁻¹·(d - d(x)) with the Jacobian of the start, FME Transactions 41, (31); steps to 1 µm in every leg."""
-    model = machine.model
-    legs = len(model.drives) - model.serial
-    m = len(model.structure.coordinates)
-    tape = model.legs_tape(machine.mode)
-    given = machine.home[None, :] if starts is None else starts
+def _solve_by_constant_jacobian(model: Model, joints: Array, starts: Array | None) -> Solution:
+    """Iterate x ← x + J⁻¹·(d - d(x)) with the start's Jacobian, to 1 µm in every leg; FME Transactions 41, (31)."""
+    legs, m = model.leg_count, len(model.structure.coordinates)
+    tape = model.legs_tape(model.mode)
+    given = np.array(model.home)[None, :] if starts is None else starts
     wide = np.ascontiguousarray(np.broadcast_to(given, (len(joints), given.shape[1])))
     y = run(model.begin_tape(), wide, np.empty((len(joints), m)), joints)
     both = run(tape, y, np.empty((len(y), legs + legs * m)))
@@ -238,5 +208,5 @@ def _constant(machine: Machine, joints: Array, starts: Array | None) -> _Found:
         for _ in range(40):  # on to rounding, uncounted: the verdict is the same for every method
             y += np.einsum("nij,nj->ni", inverse, joints[:, :legs] - both[:, :legs])
             both = run(tape, y, np.empty((len(y), legs + legs * m)))
-    residual = roots(machine, y, joints, most=0, poses=False).residual
-    return poses_of(machine, y, joints), residual, residual <= tolerance(machine), steps
+    residual = find_roots(model, y, joints, most=0, poses=False).residual
+    return Solution(compute_poses(model, y, joints), residual, residual <= closure_tolerance(model), steps)

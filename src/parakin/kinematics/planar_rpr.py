@@ -15,7 +15,7 @@ _SAMPLES = 16  # the polynomial has harmonics up to the fourth (which cancels), 
 _STEPS, _IDLE = 50, 4
 
 
-def planar_poses(centres: Array, radii: Array, corners: Array) -> Array:
+def solve_planar_rpr(centres: Array, radii: Array, corners: Array) -> Array:
     """All (x, y, φ), (k, 3), with |(x, y) + R(φ)·corner - centre| = radius for three centres, radii and corners.
 
     centres, corners : (3, 2), mm; radii : (3,), mm. Turns are in (-π, π].

@@ -18,7 +18,7 @@ SMALL = 1e-7  # of the box's width: what is still undecided there holds a (nearl
 MOST = 400_000  # boxes at a time
 
 
-def isolated(program: IntervalProgram, low: Array, high: Array) -> Array:
+def isolate_roots(program: IntervalProgram, low: Array, high: Array) -> Array:
     """Starting points (k, n) near every root of the program's first n outputs in the box [low, high].
 
     The program gives n functions of n inputs, then their n·n derivatives. Raises :class:`NoMethodError` where the

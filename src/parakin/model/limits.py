@@ -15,7 +15,7 @@ from ..algebra import Mat, Scalar, Vec, add, apply, atan2, cross, dot, held, lar
 from .legs import Leg, Reach
 from .parts import Cone
 from .spec import Spec
-from .structures import Placement
+from .structures import PlatformPlacement
 
 
 @dataclass(frozen=True)
@@ -40,7 +40,7 @@ class Limit:
 
 def limits_of(
     spec: Spec,
-    pose: Placement,
+    pose: PlatformPlacement,
     coordinates: Sequence[tuple[str, Scalar]],
     joints: Sequence[Scalar],
     reaches: Sequence[tuple[Reach, ...]],
@@ -91,7 +91,7 @@ def _between(
         yield Limit(f"{name}.max", subject, unit, "max", high), high - value
 
 
-def _reach(spec: Spec, pose: Placement, reaches: Sequence[tuple[Reach, ...]]) -> Iterator[tuple[Limit, Scalar]]:
+def _reach(spec: Spec, pose: PlatformPlacement, reaches: Sequence[tuple[Reach, ...]]) -> Iterator[tuple[Limit, Scalar]]:
     for margin in pose.reach:
         yield Limit("tool.reach", "the tool's axis", "1", "reach"), margin
     for leg, margins in zip(spec.legs, reaches, strict=True):
@@ -119,7 +119,7 @@ def _gaps(spec: Spec, joints: Sequence[Scalar]) -> Iterator[tuple[Limit, Scalar]
         yield from _between(name, name, "mm", given[gap.second] - given[gap.first], gap.low, gap.high)
 
 
-def _rods(spec: Spec, pose: Placement, joints: Sequence[Scalar]) -> list[list[tuple[Vec, Vec]]]:
+def _rods(spec: Spec, pose: PlatformPlacement, joints: Sequence[Scalar]) -> list[list[tuple[Vec, Vec]]]:
     points = platform_points(spec, pose.rotation, pose.origin)
     given = leg_joints(spec, joints)
     return [leg.struts(point, q) for leg, point, q in zip(spec.legs, points, given, strict=True)]
@@ -132,7 +132,9 @@ def _cone_axis(cone: Cone, number: int, home: Home | None) -> Vec:
     return (home.foot if cone.at == "foot" else home.platform)[number]
 
 
-def _cones(spec: Spec, pose: Placement, joints: Sequence[Scalar], home: Home | None) -> Iterator[tuple[Limit, Scalar]]:
+def _cones(
+    spec: Spec, pose: PlatformPlacement, joints: Sequence[Scalar], home: Home | None
+) -> Iterator[tuple[Limit, Scalar]]:
     if not spec.limits.cones:
         return
     rods = [struts[0] for struts in _rods(spec, pose, joints)]
@@ -148,7 +150,7 @@ def _cones(spec: Spec, pose: Placement, joints: Sequence[Scalar], home: Home | N
             yield limit, cone.angle - angle
 
 
-def _clearance(spec: Spec, pose: Placement, joints: Sequence[Scalar]) -> Iterator[tuple[Limit, Scalar]]:
+def _clearance(spec: Spec, pose: PlatformPlacement, joints: Sequence[Scalar]) -> Iterator[tuple[Limit, Scalar]]:
     least = spec.limits.clearance
     if least is None:
         return

@@ -18,7 +18,7 @@ from .limits import Home, Limit, leg_joints, limits_of, platform_points
 from .rates import rates
 from .spec import Spec
 from .spheres import CENTRES_NEEDED, common_point, side_of
-from .structures import Placement, Structure, structure_of
+from .structures import PlatformPlacement, Structure, structure_of
 
 FAR = 1e12  # mm; more than any pose's coordinate
 
@@ -53,7 +53,7 @@ class Model:
 
     def invert(
         self, pose: Sequence[Scalar], mode: str, first: Scalar | None = None
-    ) -> tuple[list[Scalar], Placement, list[Inverse]]:
+    ) -> tuple[list[Scalar], PlatformPlacement, list[Inverse]]:
         """Joint vector, placement and each leg's inverse for a pose."""
         signs, branch = self.split_mode(mode)
         placed = self.structure.place(pose, branch, first)
@@ -70,7 +70,7 @@ class Model:
     def margins(self, pose: Sequence[Scalar], joints: Sequence[Scalar], mode: str) -> list[tuple[Limit, Scalar]]:
         """Every limit with its margin, for a pose and the joints that a path takes there."""
         signs, _ = self.split_mode(mode)
-        placed = self.structure.held(pose, self._serial(joints))
+        placed = self.structure.place_with_joints(pose, self._serial(joints))
         points = platform_points(self.spec, placed.rotation, placed.origin)
         legs = [leg.inverse(point, s) for leg, point, s in zip(self.spec.legs, points, signs, strict=True)]
         return self._margins(placed, joints, legs)
@@ -81,7 +81,7 @@ class Model:
         return self._margins(placed, joints, legs)
 
     def _margins(
-        self, placed: Placement, joints: Sequence[Scalar], legs: Sequence[Inverse]
+        self, placed: PlatformPlacement, joints: Sequence[Scalar], legs: Sequence[Inverse]
     ) -> list[tuple[Limit, Scalar]]:
         home = self.rods_at_home if any(cone.axis is None for cone in self.spec.limits.cones) else None
         coordinates = list(zip(self.structure.coordinates, placed.coordinates, strict=True))
@@ -147,11 +147,16 @@ class Model:
         centres, _, plane = self._spheres(joints)
         return side_of(centres, plane, placed.origin)
 
-    @cached_property
-    def first_serial(self) -> int | None:
-        """Index in the joint vector of the first turning axis of head and table; None where there is none."""
-        pointing_order = getattr(self.structure, "order", [0])
-        return len(self.drives) - self.serial + pointing_order[0] if self.serial == 2 else None
+    @property
+    def leg_count(self) -> int:
+        """How many of the joints are the legs'; head and table's follow them."""
+        return len(self.drives) - self.serial
+
+    @property
+    def wrist_joints(self) -> tuple[int, int] | None:
+        """The two turning joints that point the tool, as indices in the joint vector, in the order of their axes."""
+        order = self.structure.serial_order
+        return (self.leg_count + order[0], self.leg_count + order[1]) if order else None
 
     # Tapes.
 
@@ -183,10 +188,10 @@ class Model:
         """pose -> joints."""
         return self._tape(("inverse", mode), self._poses, lambda t: self.invert(t.inputs(self._poses), mode)[0])
 
-    def held_tape(self, mode: str) -> Tape:
-        """pose, first serial joint -> joints, for poses where that joint is free."""
+    def inverse_with_first_tape(self, mode: str) -> Tape:
+        """pose, first joint of the wrist -> joints, for poses where that joint is free."""
         n = self._poses
-        return self._tape(("held", mode), n + 1, lambda t: self.invert(t.inputs(n), mode, t.input(n))[0])
+        return self._tape(("inverse with first", mode), n + 1, lambda t: self.invert(t.inputs(n), mode, t.input(n))[0])
 
     def freedom_tape(self) -> Tape:
         """pose -> sin² of the tool axis against the first turning axis of head and table; 1 where there is none."""
@@ -203,7 +208,9 @@ class Model:
 
         def outputs(trace: Trace) -> list[Scalar]:
             given, joints = trace.inputs(width), trace.inputs(len(self.drives), width)
-            return self.structure.held(given, self._serial(joints)).coordinates if from_poses else list(given)
+            return (
+                self.structure.place_with_joints(given, self._serial(joints)).coordinates if from_poses else list(given)
+            )
 
         return self._tape(("begin", from_poses), width + len(self.drives), outputs)
 
@@ -328,7 +335,7 @@ class Model:
             near = None
             if side is None:
                 pose = trace.inputs(self._poses, len(joints))
-                near = self.structure.held(pose, self._serial(joints)).origin
+                near = self.structure.place_with_joints(pose, self._serial(joints)).origin
             coordinates = self.spheres(joints, side, near)
             return self._posed(coordinates, joints) + self.scaled_closures(coordinates, joints)
 

@@ -11,8 +11,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arrays import Array
 from ..errors import PoseError
-from ..machine import Array, Machine
+from ..machine import Machine
 from ..workspace.certified.region import Region, region
 from .certified.counterexamples import NOUGHT
 from .characteristic_length import Length, characteristic_length

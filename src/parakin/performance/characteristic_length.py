@@ -9,9 +9,10 @@ from math import isfinite
 import numpy as np
 
 from ..algebra import Trace, derivative, norm, values
+from ..arrays import Array
 from ..errors import PoseError
 from ..kernels.batch import run
-from ..machine import Array, Machine
+from ..machine import Machine
 from ..model.chain import frame
 from ..model.limits import leg_joints
 

@@ -7,7 +7,7 @@ from typing import Literal
 
 import numpy as np
 
-from ..machine import Array
+from ..arrays import Array
 from ..workspace.certified.region import Region
 from .indices import Performance, performance
 from .jacobians import scaled_rates

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..machine import Array, Machine
+from ..arrays import Array
+from ..machine import Machine
 from .characteristic_length import Length, characteristic_length
 from .jacobians import Scaled, scaled_rates, twist_names
 from .singularities import home_signs, margin_names, margins_of

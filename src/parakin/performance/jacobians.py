@@ -7,8 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..arrays import Array
 from ..kernels.batch import run
-from ..machine import Array, Machine
+from ..machine import Machine
 from ..model.rates import drives_of_rows
 from .characteristic_length import Length
 

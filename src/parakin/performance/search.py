@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from ..machine import Array
+from ..arrays import Array
 
 Indices = NDArray[np.int64]
 Values = Callable[[Array, Indices], Array]  # points (N, d), the search each belongs to (N,) -> (N,); NaN: not allowed

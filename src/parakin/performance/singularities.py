@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..machine import Array, Machine
+from ..arrays import Array
+from ..machine import Machine
 from .characteristic_length import Length, characteristic_length
 from .jacobians import Scaled, drives_of_legs, scaled_rates
 

@@ -50,7 +50,7 @@ class Job:
     def runs(self) -> bool:
         """Whether the machine can run it: nothing is off limits, and nothing but unknown rates of its drives keeps it
         from having a trajectory."""
-        rated = all(isfinite(drive.speed) or isfinite(drive.acceleration) for drive in self.posted.machine.model.drives)
+        rated = all(isfinite(drive.speed) or isfinite(drive.acceleration) for drive in self.posted.machine.drives)
         return self.posted.first is None and (self.trajectory is not None or not rated)
 
     @property

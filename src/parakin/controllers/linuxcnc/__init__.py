@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from ...machine import Machine
 from .config import hal, ini, tool_table
-from .first_program import program
-from .module import kinematics_name, module
-from .page import page
+from .first_program import write_first_program
+from .module import kinematics_name, write_module
+from .page import write_page
 
 __all__ = ["configuration"]
 
@@ -18,10 +18,10 @@ def configuration(machine: Machine) -> dict[str, str]:
     first program and a page that tells how to start, all named after the machine.
     """
     return {
-        f"{kinematics_name(machine)}.c": module(machine),
+        f"{kinematics_name(machine)}.c": write_module(machine),
         f"{machine.name}.ini": ini(machine),
         f"{machine.name}.hal": hal(machine),
         f"{machine.name}.tbl": tool_table(machine),
-        f"{machine.name}.ngc": program(machine),
-        f"{machine.name}.md": page(machine),
+        f"{machine.name}.ngc": write_first_program(machine),
+        f"{machine.name}.md": write_page(machine),
     }

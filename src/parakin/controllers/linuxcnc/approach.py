@@ -4,17 +4,16 @@ from __future__ import annotations
 
 import numpy as np
 
+from ...arrays import Array
 from ...errors import PoseError
-from ...kernels.batch import run
-from ...kinematics.follow import FREE
-from ...machine import Array, Machine
+from ...kinematics.wrist import EXACT, TILTED, TURN, Wrist
+from ...machine import Machine
 from ...toolpath.timing.joint_path import DriveLimits
 
 _CALM = 0.25  # of the joints' speeds
 _UNKNOWN = 4.0  # s: for the motion whose start is not known
 _LEAST = 0.5  # s
 _LOOKS = 500  # on a motion
-_TILT = 0.2  # rad
 _TURNS = (0, 1, -1, 2, -2)
 
 
@@ -28,8 +27,9 @@ def approach(machine: Machine, first: Array, joints: Array, mode: str) -> tuple[
     no joint there, tilted the way the axis stands for, and brought to the record on the turn that it is planned on.
     """
     way = [first]
-    if machine.model.first_serial is not None and _is_free(machine):
-        way = _over_the_pole(machine, first, joints, mode) or way
+    wrist = machine.wrist
+    if wrist is not None and wrist.find_free(machine.home[None], EXACT)[0]:
+        way = _over_the_pole(machine, wrist, first, joints, mode) or way
     if len(way) == 1 and mode != machine.mode:
         raise PoseError(f"mode {mode!r}: no way from home, which is in {machine.mode!r}, to the first record")
     poses = np.array(way)
@@ -39,27 +39,19 @@ def approach(machine: Machine, first: Array, joints: Array, mode: str) -> tuple[
     return poses, np.array(seconds)
 
 
-def _is_free(machine: Machine) -> bool:
-    freedom = run(machine.model.freedom_tape(), machine.home[None].copy(), np.empty((1, 1)))
-    return bool(freedom[0, 0] < np.sin(FREE) ** 2)
-
-
-def _over_the_pole(machine: Machine, first: Array, joints: Array, mode: str) -> list[Array] | None:
+def _over_the_pole(machine: Machine, wrist: Wrist, first: Array, joints: Array, mode: str) -> list[Array] | None:
     """Upright at home, tilted there, and the first record; None where there is no such way."""
-    legs, wrist = len(machine.joints) - machine.model.serial, machine.model.first_serial
-    tilted = machine.inverse(machine.home)
-    tilted[legs + 1 if wrist == legs else legs] += _TILT if mode[-1] == "+" else -_TILT
-    found = machine.forward(tilted, near=machine.home)
+    found = machine.forward(wrist.tilt(machine.inverse(machine.home), mode, TILTED), near=machine.home)
     if not np.all(found.converged):
         return None
     for turns in _TURNS:
         via = np.array(machine.home)
         via[3:] = np.asarray(found.poses).reshape(-1)[3:]
-        via[4] += 2.0 * np.pi * turns
+        via[4] += TURN * turns
         line = _line(via, first)
-        way = machine.follow(line, mode, FREE)
+        way = machine.follow(line, mode, EXACT)
         arrives = way[-1] - way[0] + machine.inverse(via, mode)
-        if abs(float((arrives - joints)[wrist])) < 1e-6 and not machine.check(line, mode=mode).any():
+        if abs(float((arrives - joints)[wrist.first])) < 1e-6 and not machine.check(line, mode=mode).any():
             upright = np.array(machine.home)
             upright[4] = via[4]
             return [upright, via, first]
@@ -72,6 +64,6 @@ def _line(start: Array, end: Array) -> Array:
 
 def _seconds(machine: Machine, start: Array, end: Array, mode: str) -> float:
     """s in which the joints have a part of their speeds."""
-    joints = machine.follow(_line(start, end), mode, FREE)
+    joints = machine.follow(_line(start, end), mode, EXACT)
     rates = np.abs(np.diff(joints, axis=0)) * (_LOOKS - 1) / DriveLimits.of(machine).speed
     return max(_LEAST, float(np.nanmax(rates, initial=0.0)) / _CALM)

@@ -119,7 +119,7 @@ def ini(machine: Machine) -> str:
         for axis, unit, a, b in zip(machine.axes, machine.axis_units, low, high, strict=True)
     ]
     at_home = machine.inverse(machine.home).tolist()
-    joints = [_joint(i, drive, q) for i, (drive, q) in enumerate(zip(machine.model.drives, at_home, strict=True))]
+    joints = [_joint(i, drive, q) for i, (drive, q) in enumerate(zip(machine.drives, at_home, strict=True))]
     return "\n".join([head, *axes, *joints])
 
 

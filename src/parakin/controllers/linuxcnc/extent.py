@@ -6,7 +6,8 @@ from math import pi
 
 import numpy as np
 
-from ...machine import Array, Machine
+from ...arrays import Array
+from ...machine import Machine
 
 _ROUNDS, _DRAWS = 40, 16384
 _BEYOND = 0.25  # of the box found so far, on both sides: how far a round looks
@@ -33,7 +34,7 @@ def extent(machine: Machine) -> tuple[Array, Array]:
         high = np.maximum(high, allowed.max(0, initial=-np.inf))
     wider = _WIDER * (high - low)
     low, high = np.maximum(low - wider, -most), np.minimum(high + wider, most)
-    if machine.axes[3:] == ("B", "C"):  # B may have either sign, and C go on turning
+    if machine.has_direction:  # B may have either sign, and C go on turning
         high[3] = max(-low[3], high[3])
         low[3:], high[3:] = [-high[3], -2.0 * pi * TURNS], [high[3], 2.0 * pi * TURNS]
     return np.floor(low / units) * units, np.ceil(high / units) * units

@@ -7,7 +7,8 @@ from math import pi
 
 import numpy as np
 
-from ...machine import Array, Machine
+from ...arrays import Array
+from ...machine import Machine
 from .config import number, rim
 
 _SIDE = 40.0  # mm: the square's side, halved until the machine can go round it
@@ -18,7 +19,7 @@ _POINTS = 50  # of a side that are looked at
 _FEED = 3000.0  # mm/min
 
 
-def program(machine: Machine) -> str:
+def write_first_program(machine: Machine) -> str:
     """G-code that the machine can run as soon as it is homed; what LinuxCNC opens by itself lies out of its reach."""
     square = _square(machine)
     lines = [
@@ -38,7 +39,7 @@ def _square(machine: Machine) -> Array:
         for quadrant in product((1.0, -1.0), repeat=2):
             corners = np.tile(machine.home, (len(_CORNERS), 1))
             corners[:, :2] += side * np.array(quadrant) * _CORNERS
-            if machine.model.first_serial is not None:
+            if machine.wrist is not None:
                 corners[:, machine.axes.index("B")] += _TILT
             way = np.concatenate([machine.home[None], corners, machine.home[None]])
             if _goes(machine, way):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ...kinematics.follow import FREE
+from ...kinematics.wrist import EXACT
 from ...toolpath.path import Floats
 from ...toolpath.timing.joint_path import DriveLimits
 from ...toolpath.timing.trajectory import Trajectory
@@ -33,7 +33,7 @@ def _of_block(trajectory: Trajectory, piece: NDArray[np.int64], start: Floats, e
     segment, offset, half = _looks(trajectory, piece, start, end)
     curve, machine = trajectory.curve, trajectory.posted.machine
     poses = curve.corner[segment] + curve.slope[segment] * offset[:, None]
-    joints = machine.follow(poses, trajectory.posted.mode, FREE)
+    joints = machine.follow(poses, trajectory.posted.mode, EXACT)
     slope = np.diff(joints, axis=0) / _gaps(trajectory, segment, offset)[:, None] / DriveLimits.of(machine).speed
     turn = np.abs(np.diff(slope, axis=0)) * (segment[1:-1] == segment[:-2])[:, None]
     nothing = np.zeros((1, slope.shape[1]))

@@ -11,7 +11,8 @@ import numpy as np
 from ...algebra import Trace
 from ...kernels.newton import SLOW, WORTH
 from ...kernels.tape import Tape, compile_tape
-from ...kinematics.forward import FREE, MOST_STEPS, side_of, tolerance
+from ...kinematics.forward import MOST_STEPS
+from ...kinematics.wrist import EXACT, GAIN, SWING, TURN
 from ...machine import Machine
 from ...model.limits import Limit
 from .tape_to_c import Vector, function, number, test
@@ -53,7 +54,7 @@ def kinematics_name(machine: Machine) -> str:
     return f"{machine.name}_kins"
 
 
-def module(machine: Machine) -> str:
+def write_module(machine: Machine) -> str:
     """The C source of a machine's kinematics module, complete in one file."""
     name = kinematics_name(machine)
     title = " ".join(machine.spec.title.split()).replace("*/", "* /")
@@ -70,39 +71,41 @@ def made(machine: Machine) -> str:
 
 def _body(machine: Machine) -> list[str]:
     runtime = files(__package__).joinpath("runtime.c").read_text(encoding="utf-8")
+    for name, value in {"SWING": SWING / TURN, "GAIN": GAIN}.items():
+        runtime = runtime.replace(f"@{name}@", number(value))
     numbers = _numbers(machine, kinematics_name(machine))
     return [numbers, _transfer(machine), _ELEMENTARY, *_mathematics(machine), runtime]
 
 
 def _numbers(machine: Machine, name: str) -> str:
     """The sizes of everything, and the constants of the method; mm and rad."""
-    model, tool_axis = machine.model, machine.axes[3:] == ("B", "C")
+    by_spheres, open_by = int(machine.has_closed_forward), number(machine.closure_tolerance)
     lines = [
         f'#define MODULE "{name}"',
         f"#define AXES {len(machine.axes)}",
         f"#define JOINTS {len(machine.joints)}",
-        f"#define CLOSURES {len(machine.joints) - model.serial}",
-        f"#define SPHERES {int(model.by_spheres)} /* the forward in closed form: the common point of spheres */",
-        f"#define WRIST {int(model.first_serial is not None)} /* two turning joints point the tool */",
-        f"#define TOOL_AXIS {int(tool_axis)} /* of the orientation only the tool's axis counts */",
+        f"#define CLOSURES {machine.leg_count}",
+        f"#define SPHERES {by_spheres} /* the forward in closed form: the common point of spheres */",
+        f"#define WRIST {int(machine.wrist is not None)} /* two turning joints point the tool */",
+        f"#define TOOL_AXIS {int(machine.has_direction)} /* of the orientation only the tool's axis counts */",
         f"#define LEG_MODES {_leg_modes(machine)} /* choices of the legs' inverse */",
         f"#define SAME {number(_SAME)} /* mm or rad: joints nearer to each other stand in one working mode */",
-        f"#define TURN {number(2.0 * np.pi)}",
+        f"#define TURN {number(TURN)}",
         f"#define DEGREE {number(np.pi / 180.0)}",
-        f"#define FREE {number(FREE)} /* rad: nearer to a turning axis the tool's tells its angle by rounding only */",
-        f"#define TOLERANCE {number(tolerance(machine))} /* mm by which the legs of an answer may fail to close */",
+        f"#define FREE {number(EXACT)} /* rad: nearer to a turning axis the tool's tells its angle by rounding only */",
+        f"#define TOLERANCE {open_by} /* mm by which the legs of an answer may fail to close */",
         *_wrist(machine),
         *_newton(machine),
         _array("double", "home", [number(value) for value in machine.home]),
         _array("int", "turning", [str(int(unit == "rad")) for unit in machine.joint_units]),
     ]
-    if not tool_axis:
+    if not machine.has_direction:
         lines.append(_array("int", "turning_axis", [str(int(unit == "rad")) for unit in machine.axis_units]))
     return "\n".join(lines) + "\n"
 
 
 def _leg_modes(machine: Machine) -> int:
-    return len(machine.mode) - (machine.model.first_serial is not None)
+    return len(machine.mode) - (machine.wrist is not None)
 
 
 def _array(kind: str, name: str, values: Sequence[str]) -> str:
@@ -110,29 +113,26 @@ def _array(kind: str, name: str, values: Sequence[str]) -> str:
 
 
 def _wrist(machine: Machine) -> Iterator[str]:
-    first = machine.model.first_serial
-    if first is not None:
-        legs = len(machine.joints) - machine.model.serial
-        second = legs + 1 if first == legs else legs
-        drive = machine.model.drives[second]
-        yield f"#define FIRST {first} /* the wrist's joints, as its axes follow on each other */"
-        yield f"#define SECOND {second}"
-        yield f"#define SECOND_LOW {number(drive.low)}"
-        yield f"#define SECOND_HIGH {number(drive.high)}"
+    wrist = machine.wrist
+    if wrist is not None:
+        yield f"#define FIRST {wrist.first} /* the wrist's joints, as its axes follow on each other */"
+        yield f"#define SECOND {wrist.second}"
+        yield f"#define SECOND_LOW {number(wrist.drive.low)}"
+        yield f"#define SECOND_HIGH {number(wrist.drive.high)}"
 
 
 def _newton(machine: Machine) -> Iterator[str]:
-    model = machine.model
-    if not model.by_spheres:
-        least, most = min(model.sizes), max(model.sizes)
-        side = float(np.sign(side_of(machine, machine.home[None, :])[0]))
-        yield f"#define FINE {number(0.01 * tolerance(machine))} /* mm: where Newton's method has arrived */"
+    newton = machine.tapes(machine.mode).newton
+    if newton is not None:
+        least, most = min(machine.leg_sizes), max(machine.leg_sizes)
+        side = float(np.sign(machine.sides(machine.home[None, :])[0]))
+        yield f"#define FINE {number(0.01 * machine.closure_tolerance)} /* mm: where Newton's method has arrived */"
         yield f"#define SIZE {number(least)} /* of the legs, mm */"
         yield f"#define WORTH {number(WORTH)} /* mm: where a step will end no worse than this, the matrix serves on */"
         yield f"#define SLOW {number(SLOW)} /* a kept matrix that gains less than this a step is made anew */"
         yield f"#define MOST_STEPS {MOST_STEPS}"
         yield f"#define HOME_SIDE {number(side)} /* of the singularities; on the other one is another assembly */"
-        caps = [most / 3.0 if word.startswith("t") else 0.5 for word in model.structure.coordinates]
+        caps = [most / 3.0 if word.startswith("t") else 0.5 for word in newton.coordinates]
         yield _array("double", "caps", [number(cap) for cap in caps]) + " /* greatest step */"
 
 
@@ -168,34 +168,34 @@ def _outward(unit: str) -> str:
 
 def _mathematics(machine: Machine) -> Iterator[str]:
     """The machine's tapes as functions, in the order of their use."""
-    model = machine.model
+    tapes, wrist = machine.tapes(machine.mode), machine.wrist
     x, q = Vector("x", len(machine.axes)), Vector("q", len(machine.joints))
     near, first = Vector("near", len(machine.axes)), Vector("first", 1)
-    f = Vector("f", len(machine.joints) - model.serial)
-    yield function("inverse", model.inverse_tape(machine.mode), [x], [q])
-    if model.first_serial is not None:
-        other = machine.mode[:-1] + ("-" if machine.mode[-1] == "+" else "+")
-        yield function("freedom", model.freedom_tape(), [x], [Vector("lean", 1)])
-        yield function("inverse_held", model.held_tape(machine.mode), [x, first], [q])
-        yield function("inverse_over", model.inverse_tape(other), [x], [q])
+    f = Vector("f", machine.leg_count)
+    yield function("inverse", tapes.inverse, [x], [q])
+    if wrist is not None:
+        yield function("freedom", wrist.freedom_tape(), [x], [Vector("lean", 1)])
+        yield function("inverse_held", wrist.first_given_tape(machine.mode), [x, first], [q])
+        yield function("inverse_over", machine.tapes(wrist.other_mode(machine.mode)).inverse, [x], [q])
     yield test("allowed", _limits_tape(machine), [x, q])
-    if model.by_spheres:
-        yield function("common_point", model.spheres_tape(None), [q, near], [x, f])
-    else:
-        y = Vector("y", len(model.structure.coordinates))
-        yield function("begin", model.begin_tape(), [near, q], [y])
-        yield function("closures", model.newton_tape(False), [y, q], [f])
-        yield function("closures_and_slopes", model.newton_tape(True), [y, q], [f, Vector("a", f.length * y.length)])
-        yield function("end", model.end_tape(), [y, q], [x])
+    if tapes.common_point is not None:
+        yield function("common_point", tapes.common_point, [q, near], [x, f])
+    if tapes.newton is not None:
+        y, newton = Vector("y", len(tapes.newton.coordinates)), tapes.newton
+        yield function("begin", newton.begin, [near, q], [y])
+        yield function("closures", newton.closures, [y, q], [f])
+        yield function("closures_and_slopes", newton.closures_and_slopes, [y, q], [f, Vector("a", f.length * y.length)])
+        yield function("end", newton.end, [y, q], [x])
 
 
 def _limits_tape(machine: Machine) -> Tape:
     """pose, joints -> every margin but those of the drives' ranges, which LinuxCNC has in its ini file and watches."""
-    model, trace = machine.model, Trace()
+    trace = Trace()
     pose = trace.inputs(len(machine.axes))
     joints = trace.inputs(len(machine.joints), len(machine.axes))
-    margins = [m for limit, m in model.margins(pose, joints, machine.mode) if not is_of_a_drive(machine, limit)]
-    return compile_tape(trace, margins, len(pose) + len(joints))
+    margins = zip(machine.limit_parts, machine.trace_margins(pose, machine.mode, joints), strict=True)
+    watched = [margin for limit, margin in margins if not is_of_a_drive(machine, limit)]
+    return compile_tape(trace, watched, len(pose) + len(joints))
 
 
 def is_of_a_drive(machine: Machine, limit: Limit) -> bool:

@@ -63,7 +63,7 @@ _FRAMES = {
 }
 
 
-def page(machine: Machine) -> str:
+def write_page(machine: Machine) -> str:
     """The page, Markdown."""
     home = zip(machine.axes, machine.home.tolist(), machine.axis_units, strict=True)
     stands = [f"{axis} {number(rim(value, unit))}" for axis, value, unit in home]
@@ -75,5 +75,5 @@ def page(machine: Machine) -> str:
         axes=" ".join(machine.axes),
         home=", ".join(stands),
         frame=_FRAMES.get(machine.axes[3:], "the axes are those of the machine's frame"),
-        pole=_POLE if machine.model.first_serial is not None else "",
+        pole=_POLE if machine.wrist is not None else "",
     )

@@ -8,8 +8,9 @@ from typing import BinaryIO
 
 import numpy as np
 
+from ...arrays import Array
 from ...errors import PoseError
-from ...machine import Array, Machine
+from ...machine import Machine
 from ...toolpath.timing.corners import check_tolerance
 from ...toolpath.timing.trajectory import Trajectory
 from ..events import comments, spoken
@@ -44,7 +45,7 @@ def linuxcnc_program(trajectory: Trajectory, *, forced: str | None = None, toler
     """
     machine, posted = trajectory.posted.machine, trajectory.posted
     check_tolerance(tolerance, "tolerance")
-    legs = posted.mode if machine.model.first_serial is None else posted.mode[:-1]  # a wrist goes on in either mode
+    legs = posted.mode if machine.wrist is None else posted.mode[:-1]  # a wrist goes on in either mode
     if not machine.mode.startswith(legs):
         raise PoseError(f"mode {posted.mode!r}: LinuxCNC's kinematics of {machine.name} has {machine.mode!r} only")
     _refuse_turns(machine, posted.poses)
@@ -65,7 +66,7 @@ def program_seconds(trajectory: Trajectory) -> float:
 
 
 def _refuse_turns(machine: Machine, poses: Array) -> None:
-    most = TURNS if machine.axes[3:] == ("B", "C") else 0.5
+    most = TURNS if machine.has_direction else 0.5
     for axis, values in zip(machine.axes, poses.T, strict=True):
         turns = np.abs(values).max(initial=0.0) / (2.0 * np.pi)
         if axis in "ABC" and turns > most + 1e-9:

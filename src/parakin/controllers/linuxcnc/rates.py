@@ -6,7 +6,8 @@ from math import isfinite, pi
 
 import numpy as np
 
-from ...machine import Array, Machine
+from ...arrays import Array
+from ...machine import Machine
 
 # Speed and acceleration where a machine's description leaves them open, by the drive's unit; mm, rad and s.
 SPEED = {"mm": 200.0, "rad": pi / 3.0}
@@ -21,7 +22,7 @@ _BRISKER = {"mm": 6.0, "rad": 12.0}
 
 def slowest(machine: Machine, unit: str) -> tuple[float, float]:
     """Speed and acceleration of the slowest drive of a unit."""
-    drives = [drive for drive in machine.model.drives if drive.unit == unit]
+    drives = [drive for drive in machine.drives if drive.unit == unit]
     speeds = [drive.speed for drive in drives if isfinite(drive.speed)] or [SPEED[unit]]
     accelerations = [drive.acceleration for drive in drives if isfinite(drive.acceleration)] or [ACCELERATION[unit]]
     return min(speeds), min(accelerations)

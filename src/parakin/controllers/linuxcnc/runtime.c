@@ -26,12 +26,12 @@ static void go_over_the_pole(const double *x, const double *last, double *q)
     double other[JOINTS];
     const double stay[2] = {within_half_a_turn(q[FIRST] - last[FIRST], 0.0),
                             within_half_a_turn(q[SECOND] - last[SECOND], 0.0)};
-    if (!(fabs(stay[0]) > 0.25 * TURN))
+    if (!(fabs(stay[0]) > @SWING@ * TURN))
         return;
     inverse_over(x, other);
     const double cross[2] = {within_half_a_turn(other[FIRST] - last[FIRST], 0.0),
                              within_half_a_turn(other[SECOND] - last[SECOND], 0.0)};
-    if (cross[0] * cross[0] + cross[1] * cross[1] < 0.25 * (stay[0] * stay[0] + stay[1] * stay[1])
+    if (cross[0] * cross[0] + cross[1] * cross[1] < @GAIN@ * (stay[0] * stay[0] + stay[1] * stay[1])
         && other[SECOND] >= SECOND_LOW && other[SECOND] <= SECOND_HIGH && finite_all(other, JOINTS))
         for (int i = 0; i < JOINTS; i++)
             q[i] = other[i];

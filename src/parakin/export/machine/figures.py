@@ -34,7 +34,7 @@ def numbers(values: ArrayLike, digits: int = 3) -> list[float | None]:
 
 def page(title: str, body: str) -> str:
     """A whole HTML page around a body that may hold :func:`placed` figures; ``body`` is HTML, ``title`` is text."""
-    template = Template(files(__package__).joinpath("report.html").read_text("utf-8"))
+    template = Template(files(__package__).joinpath("page.html").read_text("utf-8"))
     script = files("plotly").joinpath("package_data", "plotly.min.js").read_text("utf-8")
     return template.substitute(title=escape(title), body=body, plotly=script)
 

@@ -19,7 +19,7 @@ from ...model.chain import UNIT, frame
 from ...model.legs import Leg
 from ...model.limits import leg_joints, platform_points
 from ...model.parts import Step
-from ...model.structures import CentralLeg, Placement
+from ...model.structures import PlatformPlacement
 
 Points = NDArray[np.float64]
 Kind = Literal["base", "rail", "telescope", "rod", "arm", "platform", "central", "head", "tool", "table", "axis"]
@@ -93,7 +93,7 @@ def scene(
         if joints is None:
             placed = model.structure.place(list(given), model.split_mode(mode)[1])
         else:
-            placed = model.structure.held(list(given), list(q[len(q) - model.serial :]))
+            placed = model.structure.place_with_joints(list(given), list(q[len(q) - model.serial :]))
         drawn = _Drawing(machine, placed, q).drawing()
     parts = tuple(part for part in drawn.parts if np.isfinite(part.points).all())
     labels = _joined([label for label in drawn.labels if np.isfinite(label[1]).all()])
@@ -105,7 +105,7 @@ def scene(
 class _Drawing:
     """The parts of one scene, gathered in the base frame and put into M."""
 
-    def __init__(self, machine: Machine, placed: Placement, joints: Points):
+    def __init__(self, machine: Machine, placed: PlatformPlacement, joints: Points):
         self.spec, self.structure = machine.spec, machine.model.structure
         self.placed, self.joints = placed, joints
         self.mount = np.array(self.structure.mount, float)
@@ -153,7 +153,7 @@ class _Drawing:
                 self.labels.append((", ".join(names), self._m(struts[number][0])))
             if not moved:
                 self.labels.append((leg.drives[0].name, self._m(struts[0].mean(axis=0))))
-        if isinstance(self.structure, CentralLeg):
+        if self.structure.has_central_leg:
             self._add("central", "central leg", [np.zeros(3), self.origin])
         if anchors:
             ring = around(np.array(anchors))
@@ -163,7 +163,7 @@ class _Drawing:
         ring = around(np.array([leg.platform for leg in self.spec.legs], float))
         self._add("platform", "platform", ring @ self.turned.T + self.origin, len(ring) > 2)
         middle = ring.mean(axis=0) @ self.turned.T + self.origin
-        if not _same(middle, self.origin) and not isinstance(self.structure, CentralLeg):
+        if not _same(middle, self.origin) and not self.structure.has_central_leg:
             self._add("head", "platform", [middle, self.origin])
 
     def _head(self) -> None:

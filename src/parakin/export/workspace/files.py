@@ -8,8 +8,8 @@ from functools import cached_property
 
 import numpy as np
 
+from ...arrays import Array
 from ...errors import PoseError
-from ...machine import Array
 from ...workspace.certified.workspace import Workspace
 from ...workspace.sampled.drives import DriveWorkspace
 from ...workspace.sampled.field import Field, field

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ...machine import Array
+from ...arrays import Array
 from ...workspace.certified.region import Region
 from ...workspace.certified.workspace import Volume, Workspace
 from ...workspace.sampled.drives import DriveWorkspace

@@ -10,9 +10,10 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Literal
 
-from ...algebra import Mat, Scalar, Vec
-from ..chain import frame
+from ...algebra import IDENTITY, ORIGIN, Mat, Scalar, Vec
+from ..chain import UNIT, Pointing, frame
 from ..spec import Spec
 
 # Axis letters of a pose, ISO 841, by the elementary transforms that move along and about them.
@@ -20,7 +21,7 @@ LETTERS = {"tx": "X", "ty": "Y", "tz": "Z", "rx": "A", "ry": "B", "rz": "C"}
 
 
 @dataclass(frozen=True)
-class Placement:
+class PlatformPlacement:
     """Where a pose puts the platform, with the joints and coordinates that follow from it."""
 
     rotation: Mat
@@ -37,6 +38,13 @@ class Structure(ABC):
     axes: tuple[str, ...]
     turns: tuple[str, ...] = ()  # names of the small turns that :meth:`closure` takes
     branches: str = ""  # default working mode of head and table
+    pointing: Pointing | None = None  # the two turning axes of head and table, in the order in which they follow
+    serial_order: tuple[int, ...] = ()  # the serial joints that turn them, in that order
+    has_direction: bool = False  # of the orientation the tool's axis counts only, and B and C tell it
+    has_central_leg: bool = False
+    sign: float = 1.0  # of the central leg's length
+    tip: Vec = ORIGIN  # of a fixed tool, in the platform's frame
+    assembly_method: Literal["planar", "lambda", "central leg"] | None = None  # of the complete direct problem
 
     def __init__(self, spec: Spec):
         self.spec = spec
@@ -45,20 +53,38 @@ class Structure(ABC):
         self.head_joints = sum(step.drive is not None for step in spec.head)
 
     @abstractmethod
-    def place(self, pose: Sequence[Scalar], branch: str, first: Scalar | None = None) -> Placement:
+    def place(self, pose: Sequence[Scalar], branch: str, first: Scalar | None = None) -> PlatformPlacement:
         """The platform for a pose; ``first`` gives the first serial joint where it is free."""
+
+    @property
+    def tool_rotation(self) -> Mat:
+        """The tool's rotation in the machine frame where all turns of the pose are zero."""
+        return IDENTITY
+
+    @property
+    def tool_axis(self) -> Vec:
+        """The tool's axis in the machine frame where all turns of the pose are zero."""
+        return UNIT["tz"]
+
+    def turn_first_axis(self, pose: Sequence[Scalar]) -> Mat:
+        """The rotation in M of the frame that carries the first axis of :attr:`pointing`."""
+        return IDENTITY
 
     @abstractmethod
     def frame(self, coordinates: Sequence[Scalar]) -> tuple[Mat, Vec]:
         """The platform's frame in the base for the motion's coordinates."""
 
-    def held(self, pose: Sequence[Scalar], serial: Sequence[Scalar]) -> Placement:
+    def place_with_joints(self, pose: Sequence[Scalar], serial: Sequence[Scalar]) -> PlatformPlacement:
         """As :meth:`place`, for the serial joints that a path takes there, whatever their working mode."""
         return replace(self.place(pose, self.branches), serial=list(serial))
 
     def coordinates_at(self, origin: Vec) -> list[Scalar]:
         """The motion's coordinates for the platform's origin in the base, of a motion without turns."""
         return list(origin)
+
+    def coordinates_of(self, rotation: Mat, origin: Vec) -> list[Scalar]:
+        """The motion's coordinates for the platform's frame in the base."""
+        return self.coordinates_at(origin)
 
     @abstractmethod
     def pose(self, coordinates: Sequence[Scalar], serial: Sequence[Scalar]) -> list[Scalar]:

@@ -8,12 +8,14 @@ from ...algebra import IDENTITY, Mat, Scalar, Vec, add, apply, sub, transposed
 from ..chain import UNIT, Pointing, back, frame, inverse_rotations
 from ..parts import TRANSLATIONS
 from ..spec import Spec
-from .base import Placement
+from .base import PlatformPlacement
 from .five_axis import FiveAxis, axis_angles, tool_axis
 
 
 class Carried(FiveAxis):
     """A platform that only translates; head and table together turn twice."""
+
+    pointing: Pointing
 
     def __init__(self, spec: Spec):
         super().__init__(spec)
@@ -22,7 +24,7 @@ class Carried(FiveAxis):
         self.pointing = Pointing.of(chain, "head" if self.head_joints else "table")
         # The turning axes as they follow on each other: the table's, inverted, then the head's.
         drives = [step.drive for step in spec.head if step.drive] + [step.drive for step in spec.table if step.drive]
-        self.order = [drives.index(step.drive) for step in chain if step.drive is not None]
+        self.serial_order = tuple(drives.index(step.drive) for step in chain if step.drive is not None)
 
     def _split(self, serial: Sequence[Scalar]) -> tuple[Sequence[Scalar], Sequence[Scalar]]:
         return serial[: self.head_joints], serial[self.head_joints :]
@@ -34,17 +36,17 @@ class Carried(FiveAxis):
         _, tip = frame(self.spec.head, head)
         return sub(back(self.mount, self.base, world), tip)
 
-    def place(self, pose: Sequence[Scalar], branch: str, first: Scalar | None = None) -> Placement:
+    def place(self, pose: Sequence[Scalar], branch: str, first: Scalar | None = None) -> PlatformPlacement:
         k, _, _ = tool_axis(pose[3], pose[4])
         found = self.pointing.solve(k, branch, first)
-        serial = [found.joints[self.order.index(i)] for i in range(2)]
+        serial = [found.joints[self.serial_order.index(i)] for i in range(2)]
         origin = self._origin(pose, serial)
-        return Placement(IDENTITY, origin, list(origin), serial, found.reach, found.freedom)
+        return PlatformPlacement(IDENTITY, origin, list(origin), serial, found.reach, found.freedom)
 
-    def held(self, pose: Sequence[Scalar], serial: Sequence[Scalar]) -> Placement:
+    def place_with_joints(self, pose: Sequence[Scalar], serial: Sequence[Scalar]) -> PlatformPlacement:
         origin = self._origin(pose, serial)
         reach = self.place(pose, self.branches).reach
-        return Placement(IDENTITY, origin, list(origin), list(serial), reach)
+        return PlatformPlacement(IDENTITY, origin, list(origin), list(serial), reach)
 
     def frame(self, coordinates: Sequence[Scalar]) -> tuple[Mat, Vec]:
         return IDENTITY, tuple(coordinates)

@@ -30,7 +30,7 @@ from ...errors import DescriptionError
 from ..chain import UNIT, Pointing, back, frame, rotation_about
 from ..parts import ROTATIONS, Step
 from ..spec import Spec
-from .base import Placement
+from .base import PlatformPlacement
 from .five_axis import FiveAxis, axis_angles, tool_axis, turned_axis
 
 
@@ -39,6 +39,9 @@ class CentralLeg(FiveAxis):
 
     With a third turn (``rz ry rz tz``) the platform turns about the central leg and takes the wrist's first axis.
     """
+
+    pointing: Pointing
+    has_central_leg = True
 
     def __init__(self, spec: Spec):
         super().__init__(spec)
@@ -53,7 +56,9 @@ class CentralLeg(FiveAxis):
             raise DescriptionError("table", "a machine with a central leg has its turning axes in the head")
         self.roll = len(turns) == 3
         spin = [Step("rz", drive=spec.legs[0].drives[0])] if self.roll else []
-        self.wrist = Pointing.of([*spin, *spec.head], "head")
+        self.pointing = Pointing.of([*spin, *spec.head], "head")
+        self.serial_order = () if self.roll else (0, 1)
+        self.assembly_method = None if self.roll else "central leg"
         self.above, self.reach = self._wrist_centre()
         self.sign = 1.0
         home = tuple(float(spec.home.get(letter, 0.0)) for letter in self.axes)
@@ -102,16 +107,19 @@ class CentralLeg(FiveAxis):
                 rotation = product(rotation, rotation_about(axis, s * size, c * size))
         return rotation, origin, tz, list(found.joints)
 
-    def place(self, pose: Sequence[Scalar], branch: str, first: Scalar | None = None) -> Placement:
+    def place(self, pose: Sequence[Scalar], branch: str, first: Scalar | None = None) -> PlatformPlacement:
         k, _, _ = tool_axis(pose[3], pose[4])
         rotation, origin, tz, angles = self._swing(pose[:3], k)
-        found = self.wrist.solve(apply(transposed(rotation), apply(transposed(self.mount), k)), branch, first)
+        found = self.pointing.solve(apply(transposed(rotation), apply(transposed(self.mount), k)), branch, first)
         serial = list(found.joints)
         if self.roll:
             spin = serial.pop(0)
             rotation = product(rotation, turn("rz", *sincos(spin)))
             angles.append(spin)
-        return Placement(rotation, origin, [*angles, tz], serial, found.reach, found.freedom)
+        return PlatformPlacement(rotation, origin, [*angles, tz], serial, found.reach, found.freedom)
+
+    def turn_first_axis(self, pose: Sequence[Scalar]) -> Mat:
+        return product(self.mount, self.place(pose, self.branches).rotation)
 
     def frame(self, coordinates: Sequence[Scalar]) -> tuple[Mat, Vec]:
         rotation = IDENTITY
@@ -137,16 +145,16 @@ class CentralLeg(FiveAxis):
             s, c = sincos(coordinates[1])
             yield c if self.swing.level else s
 
-    def held(self, pose: Sequence[Scalar], serial: Sequence[Scalar]) -> Placement:
+    def place_with_joints(self, pose: Sequence[Scalar], serial: Sequence[Scalar]) -> PlatformPlacement:
         if not self.roll:
-            return super().held(pose, serial)
+            return super().place_with_joints(pose, serial)
         k, _, _ = tool_axis(pose[3], pose[4])
         rotation, origin, tz, angles = self._swing(pose[:3], k)
         v = apply(transposed(rotation), apply(transposed(self.mount), k))
         w = apply(frame(self.spec.head, serial)[0], UNIT["tz"])  # turned onto v by the platform's own turn
         spin = atan2(w[0] * v[1] - w[1] * v[0], w[0] * v[0] + w[1] * v[1])
         rotation = product(rotation, turn("rz", *sincos(spin)))
-        return Placement(rotation, origin, [*angles, spin, tz], list(serial))
+        return PlatformPlacement(rotation, origin, [*angles, spin, tz], list(serial))
 
     def closure(
         self, pose: Sequence[Scalar], serial: Sequence[Scalar], turn: Sequence[Scalar] = ()

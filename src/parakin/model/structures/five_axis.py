@@ -38,6 +38,7 @@ class FiveAxis(Structure):
     axes = ("X", "Y", "Z", "B", "C")
     turns = ("w1", "w2")
     branches = "+"
+    has_direction = True
 
     def _tilt_rows(self, pose: Sequence[Scalar], turn: Sequence[Scalar], k: Vec) -> list[Scalar]:
         _, e1, e2 = turned_axis(pose, turn)

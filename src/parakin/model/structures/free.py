@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Literal
+
+import numpy as np
 
 from ...algebra import IDENTITY, Mat, Scalar, Vec, add, apply, atan2, product, sincos, sqrt, sub, transposed
 from ...algebra import turn as turned
 from ...errors import DescriptionError
-from ..chain import back, frame
+from ..chain import UNIT, back, frame
+from ..legs.lambda_ import Lambda
 from ..parts import ROTATIONS, TRANSLATIONS
 from ..spec import Spec
-from .base import LETTERS, Placement, Structure
+from .base import LETTERS, PlatformPlacement, Structure
 
 
 class Free(Structure):
@@ -43,10 +47,28 @@ class Free(Structure):
         self.axes = tuple(LETTERS[word] for word in self.coordinates)
         self.turns = tuple(f"w{word[1]}" for word in self.coordinates if word in ROTATIONS)
         self.tool, self.tip = frame(spec.head, ())
+        self.assembly_method = self._assembly_method()
 
-    def place(self, pose: Sequence[Scalar], branch: str, first: Scalar | None = None) -> Placement:
+    def place(self, pose: Sequence[Scalar], branch: str, first: Scalar | None = None) -> PlatformPlacement:
         rotation, origin = self.frame(pose)
-        return Placement(rotation, origin, list(pose), [])
+        return PlatformPlacement(rotation, origin, list(pose), [])
+
+    def _assembly_method(self) -> Literal["planar", "lambda"] | None:
+        legs, turns = self.spec.legs, [word for word in self.coordinates if word in ROTATIONS]
+        in_plane = len(self.coordinates) == 3 and len(turns) == 1 and f"t{turns[0][1]}" not in self.coordinates
+        if in_plane and all(leg.sphere([0.0] * len(leg.drives)) is not None for leg in legs):
+            return "planar"
+        rails = [np.array(leg.rail) for leg in legs if isinstance(leg, Lambda)]
+        parallel = len(rails) == len(legs) == 3 and all(np.allclose(rail, rails[0], atol=1e-12) for rail in rails)
+        return "lambda" if parallel else None
+
+    @property
+    def tool_rotation(self) -> Mat:
+        return product(self.mount, self.tool)
+
+    @property
+    def tool_axis(self) -> Vec:
+        return apply(self.mount, apply(self.tool, UNIT["tz"]))
 
     def frame(self, coordinates: Sequence[Scalar]) -> tuple[Mat, Vec]:
         return self._frame(coordinates, ())

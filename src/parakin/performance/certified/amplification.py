@@ -9,7 +9,7 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
-from ...machine import Array
+from ...arrays import Array
 from ..extremes import Side
 from ..indices import performance
 from ..search import best_of_blocks, climb_within

@@ -10,7 +10,7 @@ from math import inf
 import numpy as np
 from numpy.typing import NDArray
 
-from ...machine import Array
+from ...arrays import Array
 from .interval_matrices import Linear, Over
 
 AT_ONCE = 512

@@ -7,7 +7,7 @@ from typing import Literal
 
 import numpy as np
 
-from ...machine import Array
+from ...arrays import Array
 from ..search import climb_within
 from ..singularities import PARALLEL, margin_names, singularity_margins
 from .interval_matrices import Box

@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 
 from ... import algebra as alg
 from ...algebra import Scalar, Term, Trace, derivative, norm
+from ...arrays import Array
 from ...kernels.intervals import IntervalProgram
-from ...machine import Array, Machine
+from ...machine import Machine
 from ...model.rates import Rates, rates
 from ..characteristic_length import Length
 from ..jacobians import column_scales, drives_of_legs

@@ -10,8 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...algebra import Scalar, Term, Trace, derivative
+from ...arrays import Array
 from ...kernels.intervals import IntervalProgram
-from ...machine import Array, Machine
+from ...machine import Machine
 from ..characteristic_length import characteristic_length
 from .bisection import Decided, regular
 from .interval_matrices import Box, Linear, Over, Turns
@@ -66,7 +67,7 @@ class Variation:
         Those of an angle know no jump at ±180°. What has no bound is ±1e300.
         """
         down, up = self._rates(low, high)
-        if self.machine.model.first_serial is not None:
+        if self.machine.wrist is not None:
             rows = np.flatnonzero(~(np.isfinite(down) & np.isfinite(up)).all(1))
             lower, upper = self._rates_where_free(low[rows], high[rows])
             down[rows], up[rows] = np.maximum(down[rows], lower), np.minimum(up[rows], upper)
@@ -82,7 +83,7 @@ class Variation:
     def regular(self, low: Array, high: Array) -> NDArray[np.bool_]:
         """(N,) where it is proved that no parallel singularity is in the box."""
         decided: NDArray[np.bool_] = self._regular(low, high)[0]
-        if self.machine.model.first_serial is not None:
+        if self.machine.wrist is not None:
             rows = np.flatnonzero(~decided)
             decided[rows] = self._regular_where_free(low[rows], high[rows])[0]
         return decided

@@ -14,8 +14,9 @@ from typing import Literal
 
 import numpy as np
 
+from ...arrays import Array
 from ...errors import PoseError
-from ...machine import Array, Machine
+from ...machine import Machine
 from ..characteristic_length import characteristic_length
 from ..extremes import SIDES
 from .amplification import UNBOUNDED, Bracket, bracket

@@ -9,13 +9,11 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from ...kernels.batch import run
-from ...kinematics.follow import wrapped
+from ...kinematics.wrist import PRINTED, find_nearest_turn
 from ...machine import Machine
 from ...performance.characteristic_length import characteristic_length
 from ...performance.jacobians import column_scales
 from ..path import Floats
-from ..posting.frames import ROUNDED
 from ..posting.posted import Posted
 
 Indices = NDArray[np.int64]
@@ -23,9 +21,7 @@ Signs = NDArray[np.int8]
 
 ONE, OTHER, EITHER = 0, 1, 2  # working modes of head and table: the path's own, the other one, free
 NEAR = 1e-4  # of det A at home, next to a parallel singularity
-NOUGHT = 1e-12  # a determinant of unit wrenches no greater has no sign
-_SAME = 1e-6  # rad
-_TURN = 2.0 * np.pi
+SIGNLESS = 1e-12  # a determinant of unit wrenches no greater has no sign
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,17 +47,10 @@ class Motions:
 
     def __init__(self, posted: Posted):
         self.posted, self.machine = posted, posted.machine
-        model, mode = self.machine.model, posted.mode
-        self.first = model.first_serial
-        self.pole: tuple[int, int] | None = None  # the joint that is free there, and the other of head and table
-        if self.first is not None:
-            count = len(model.drives)
-            self.pole = self.first, 2 * count - 3 - self.first
-        self.serial = sorted(self.pole or ())
-        self.turning = [i for i, drive in enumerate(model.drives) if drive.unit == "rad"]
-        self.modes: tuple[str, ...] = (mode,)
-        if self.first is not None:
-            self.modes = mode, mode[:-1] + ("-" if mode[-1] == "+" else "+")
+        self.wrist = self.machine.wrist
+        self.serial = [] if self.wrist is None else sorted(self.wrist.pair)
+        self.turning = [i for i, unit in enumerate(self.machine.joint_units) if unit == "rad"]
+        self.modes = [posted.mode] if self.wrist is None else [posted.mode, self.wrist.other_mode(posted.mode)]
         names, ends = (
             self.machine.limits,
             [f"{self.machine.joints[i]}.{k}" for i in self.serial for k in ("min", "max")],
@@ -92,37 +81,32 @@ class Motions:
     def signs(self, poses: Floats, joints: Floats) -> Signs:
         """The working mode of head and table that joints are of."""
         signs = np.zeros(len(poses), np.int8)
-        if self.first is None:
+        if self.wrist is None:
             return signs
-        odd = np.flatnonzero(~self._like(poses, joints, self.modes[0]))
-        signs[odd] = np.where(self._like(poses[odd], joints[odd], self.modes[1]), OTHER, EITHER)
+        odd = np.flatnonzero(~self.wrist.has_mode(poses, joints, self.modes[0]))
+        signs[odd] = np.where(self.wrist.has_mode(poses[odd], joints[odd], self.modes[1]), OTHER, EITHER)
         return signs
-
-    def _like(self, poses: Floats, joints: Floats, mode: str) -> NDArray[np.bool_]:
-        off = wrapped((self.machine.inverse(poses, mode) - joints)[:, self.serial])
-        return np.asarray((np.abs(off) < _SAME).all(1))
 
     def _taken(self, poses: Floats, guess: Floats, sign: Signs) -> tuple[Floats, Signs]:
         joints = self._counted(self.machine.inverse(poses, self.modes[0]), guess)
-        if self.first is None:
+        if self.wrist is None:
             return joints, np.zeros(len(poses), np.int8)
         other = self._counted(self.machine.inverse(poses, self.modes[1]), guess)
         far, near = (((q - guess)[:, self.serial] ** 2).sum(1) for q in (joints, other))
         found = np.where(sign == EITHER, np.where(near < far, OTHER, ONE), sign).astype(np.int8)
         joints[found == OTHER] = other[found == OTHER]
-        freedom = run(self.machine.model.freedom_tape(), poses, np.empty((len(poses), 1)))[:, 0]
-        free = np.flatnonzero((freedom < np.sin(ROUNDED) ** 2) & np.isfinite(guess[:, self.first]))
+        first = guess[:, self.wrist.first]
+        free = np.flatnonzero(self.wrist.find_free(poses, PRINTED) & np.isfinite(first))
         if len(free):
-            held, into = np.ascontiguousarray(guess[free][:, [self.first]]), np.empty((len(free), joints.shape[1]))
-            tape = self.machine.model.held_tape(self.modes[0])
-            joints[free] = self._counted(run(tape, np.ascontiguousarray(poses[free]), into, held), guess[free])
+            solved = self.wrist.solve_with_first(poses[free], self.modes[0], first[free])
+            joints[free] = self._counted(solved, guess[free])
             found[free] = EITHER
         return joints, found
 
     def _counted(self, joints: Floats, guess: Floats) -> Floats:
         for i in self.turning:
-            turns = np.round((guess[:, i] - joints[:, i]) / _TURN)
-            joints[:, i] += _TURN * np.where(np.isfinite(turns), turns, 0.0)
+            counted = find_nearest_turn(joints[:, i], guess[:, i])
+            joints[:, i] = np.where(np.isfinite(counted), counted, joints[:, i])
         return joints
 
     @staticmethod
@@ -136,10 +120,8 @@ class Motions:
     def sides(self, places: Places) -> Floats:
         """det A of unit wrenches, (n,): its sign changes where a parallel singularity is passed."""
         a_scale, _, n = self._scales
-        tape = self.machine.model.rates_tape()
-        found = run(tape, places.poses, np.empty((len(places.poses), tape.outputs)), places.joints)
-        a, spans = found[:, : n * n].reshape(-1, n, n) * a_scale, found[:, 2 * n * n :]
-        legs = spans.shape[1]
+        a, _, spans = self.machine.twist_rates(places.poses, places.joints)
+        a, legs = a * a_scale, spans.shape[1]
         size = legs if n - legs == 2 else n  # five axes: head and table never matter
         with np.errstate(all="ignore"):
             determinant: Floats = np.linalg.det(a[:, :size, :size]) / spans.prod(1)
@@ -151,7 +133,7 @@ class Motions:
         home = self.machine.home[None]
         joints = self.machine.inverse(home, self.posted.mode)
         at_home = abs(float(self.sides(Places(home, joints, np.empty((1, 0)), np.zeros(1, np.int8)))[0]))
-        return NEAR * at_home if at_home > NOUGHT else NOUGHT
+        return NEAR * at_home if at_home > SIGNLESS else SIGNLESS
 
     @cached_property
     def _scales(self) -> tuple[Floats, Floats, int]:

@@ -6,6 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
+from ...kinematics.wrist import FLIP
 from ..path import Floats
 from ..posting.posted import Posted
 from .ledger import Jump, Ledger, Tally
@@ -15,7 +16,6 @@ from .sections import Flags, Parts, Prover
 
 AT_ONCE = 1 << 13  # motions, or parts, cut together
 MOST_CUTS = 1 << 16  # of one motion
-BESIDE = 0.01  # rad: farther from a pole no path changes its working mode
 _MOST = 1.5 * np.pi  # rad: farther from one end of a part to the other no joint goes but by a miscounted turn
 
 
@@ -118,12 +118,12 @@ class Search:
         for i in self.motions.turning:
             for row in np.flatnonzero(np.abs(change[:, i]) > _MOST).tolist():
                 self._found_jump(parts, row, i, float(change[row, i]), None, ledger)
-        if self.motions.pole is None:
+        if self.motions.wrist is None:
             return
-        first, second = self.motions.pole
+        first, second = self.motions.wrist.pair
         for row in np.flatnonzero(Motions.over_the_pole(parts.start, parts.end)).tolist():
             beside = 0.5 * abs(float(change[row, second]))
-            if beside > BESIDE:
+            if beside > FLIP:
                 self._found_jump(parts, row, first, float(change[row, first]), beside, ledger)
 
     def _found_jump(self, parts: Parts, row: int, joint: int, by: float, beside: float | None, ledger: Ledger) -> None:

@@ -7,9 +7,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from ...kinematics.wrist import ASIDE, LEEWAY, PROVED
 from ...performance.certified.margin_rates import Variation
 from ..path import Floats
-from ..posting.frames import ROUNDED
 from .motions import EITHER, ONE, OTHER, Indices, Motions, Places, machine_size
 
 Flags = NDArray[np.bool_]
@@ -17,9 +17,7 @@ Flags = NDArray[np.bool_]
 RELATIVE = 1e-9  # of a limit's size: a margin no farther below 0 counts as kept
 _FINEST = 2.0**-30  # of a motion: no part is shorter
 _SHORT, _NARROW = 1e-7, 1e-9  # mm and rad: a part shorter than both is not cut
-_FREE = np.sin(2.0 * ROUNDED) ** 2
-_ASIDE = 8e-6  # rad off a pole, where the first turn is told again
-_TILT = 8.0 * ROUNDED  # rad by which the second turn may change where the first one is free
+_FREE = np.sin(PROVED) ** 2
 _HALF, _TURN = np.pi, 2.0 * np.pi
 _CLOSE = 1e-6  # rad, of joints and what is known of them
 _AT_ONCE = 4096  # boxes
@@ -87,7 +85,7 @@ class Prover:
         machine = motions.machine
         self.variations = [Variation(machine, mode) for mode in motions.modes]
         names = list(machine.limits)
-        drives = machine.model.drives
+        drives = machine.drives
         self._ends = {  # of each turning joint: the columns of its limits
             i: [
                 names.index(f"{drives[i].name}.{side}")
@@ -102,7 +100,7 @@ class Prover:
         size = machine_size(machine)
         sizes = {"mm": size, "rad": 1.0, "1": 1.0, "mm²": size * size}
         self._size = size
-        self._aside = 2.0 * _ASIDE * np.array([sizes[limit.unit] for limit in machine.limit_parts])
+        self._aside = 2.0 * ASIDE * np.array([sizes[limit.unit] for limit in machine.limit_parts])
         self.tolerance = RELATIVE * np.array([sizes[limit.unit] for limit in machine.limit_parts])
         self.boxes = 0  # bounded, so that the work can be told
 
@@ -154,7 +152,7 @@ class Prover:
             counted[rows] = within(q_low[rows], q_high[rows], down[:, count:], up[:, count:], _HALF)
         least[aside] -= self._aside
         free = self._by_values(low, high, sign, least, aside)
-        drives, between = self.motions.machine.model.drives, np.full(least.shape, -np.inf)
+        drives, between = self.motions.machine.drives, np.full(least.shape, -np.inf)
         for i, columns in self._ends.items():
             for column in columns:
                 is_min = self.motions.machine.limits[column].endswith(".min")
@@ -179,10 +177,10 @@ class Prover:
         """
         turns = [i for i, unit in enumerate(self.motions.machine.axis_units) if unit == "rad"]
         rows = np.flatnonzero(still & (low[:, turns] == high[:, turns]).all(1))
-        if self.motions.pole is None or not len(rows):
+        if self.motions.wrist is None or not len(rows):
             return low, high, sign, rows[:0]
         joints = at.joints[rows].copy()
-        joints[:, self.motions.pole[1]] += _ASIDE
+        joints[:, self.motions.wrist.second] += ASIDE
         found = self.motions.machine.forward(joints, near=at.poses[rows])
         good = np.flatnonzero(found.converged)
         rows, poses = rows[good], found.poses[good]
@@ -200,14 +198,14 @@ class Prover:
             worst[rows], freedom[rows] = np.minimum(worst[rows], down), np.maximum(freedom[rows], up)
         worst[aside] -= self._aside
         np.maximum(least, worst, out=least, where=self._by_value & ~np.isnan(worst))
-        return freedom <= _FREE if self.motions.first is not None else np.zeros(len(low), bool)
+        return freedom <= _FREE if self.motions.wrist is not None else np.zeros(len(low), bool)
 
     def _where_free(self, free: Flags, between: Floats, change: Floats, least: Floats, counted: Flags) -> None:
         """Where the tool stands along the first turn, both turns go straight from value to value."""
         rows = np.flatnonzero(free)
         for i in self.motions.serial:
             for column in self._ends[i]:
-                least[rows, column] = np.fmax(least[rows, column], between[rows, column] - _TILT)
+                least[rows, column] = np.fmax(least[rows, column], between[rows, column] - LEEWAY)
         counted[rows] |= (change[rows] < 1.5 * _HALF).all(1)
 
     def regular(self, parts: Parts) -> Flags:

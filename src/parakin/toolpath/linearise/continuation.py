@@ -6,18 +6,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...kernels.batch import run
-from ...kinematics.follow import wrapped
+from ...kinematics.wrist import continue_direction, find_nearest_turn, flip_rotation
 from ...machine import Machine
 from ..path import Floats
 from ..posting.frames import tool_poses, transform
 from ..posting.programmed_angles import rotations
-from ..posting.tool_axis import ROUNDED
 from .interpolation import Flags, Indices
 
-_QUARTER = 0.5 * np.pi
 _HERE = transform(0, 0, 0, 0, 0, 0)
-_SAME = 1e-6  # rad
 _EVEN = 1e-9  # of a rotation
 
 
@@ -70,12 +66,12 @@ def _turning_columns(machine: Machine) -> list[int]:
 
 def _pointing(machine: Machine, tip: Floats, axis: Floats, before: Rows) -> Floats:
     poses = tool_poses(machine, tip, axis, _HERE)[0]
-    if machine.axes[3:] == ("B", "C"):
-        _settle_direction(poses, before.poses)
+    if machine.has_direction:
+        continue_direction(poses[:, 3:], before.poses[:, 3:])
     else:
         for column, letter in enumerate(machine.axes):
             if letter in "ABC":
-                poses[:, column] = _unwound(poses[:, column], before.poses[:, column])
+                poses[:, column] = find_nearest_turn(poses[:, column], before.poses[:, column])
     return poses
 
 
@@ -84,63 +80,19 @@ def _decomposed(rotation: Floats, before: Floats) -> Floats:
     r = np.moveaxis(rotation, 0, 2)
     level = np.hypot(r[2, 1], r[2, 2])
     a, b, c = np.arctan2(r[2, 1], r[2, 2]), np.arctan2(-r[2, 0], level), np.arctan2(r[1, 0], r[0, 0])
-    ways = np.stack([np.column_stack([a, b, c]), np.column_stack([a + np.pi, np.pi - b, c + np.pi])])
-    ways = _unwound(ways, before)
+    here = np.column_stack([a, b, c])
+    ways = find_nearest_turn(np.stack([here, flip_rotation(here)]), before)
     nearer = ((ways - before) ** 2).sum(2).argmin(0)
     angles: Floats = ways[nearer, np.arange(len(before))]
     return angles
 
 
-def _settle_direction(poses: Floats, before: Floats) -> None:
-    b, c = np.abs(poses[:, 3]), np.where(poses[:, 3] < 0.0, poses[:, 4] + np.pi, poses[:, 4])
-    over, was_free = before[:, 3] < 0.0, np.abs(np.sin(before[:, 3])) < ROUNDED
-    b0, c0 = np.abs(before[:, 3]), np.where(over, before[:, 4] + np.pi, before[:, 4])
-    over = over ^ _spared(np.column_stack([c0, b0]), np.column_stack([c, b]), np.column_stack([c + np.pi, -b]))
-    over = np.where(was_free, np.abs(wrapped(c - before[:, 4])) > _QUARTER, over)
-    free = np.sin(b) < ROUNDED
-    poses[:, 3] = np.where(over & ~free, -b, b)
-    poses[:, 4] = _unwound(np.where(free, before[:, 4], np.where(over, c + np.pi, c)), before[:, 4])
-
-
 def _joints(machine: Machine, mode: str, poses: Floats, before: Rows) -> Floats:
-    model = machine.model
-    joints = machine.inverse(poses, mode)
-    first, last = model.first_serial, joints.shape[1] - model.serial
-    if first is not None:
-        columns = [first, last + 1 if first == last else last]
-        other = mode[:-1] + ("-" if mode[-1] == "+" else "+")
-        begin, there = machine.inverse(before.poses, mode), machine.inverse(poses, other)
-        was_free = _free(machine, before.poses)
-        over = (np.abs(wrapped(before.joints - begin))[:, columns] > _SAME).any(1)
-        drive = model.drives[columns[1]]
-        able = np.isfinite(there).all(1) & (there[:, columns[1]] >= drive.low) & (there[:, columns[1]] <= drive.high)
-        over = over ^ _spared(begin[:, columns], joints[:, columns], there[:, columns])
-        over = np.where(was_free, np.abs(wrapped(joints[:, first] - before.joints[:, first])) > _QUARTER, over) & able
-        joints[over] = there[over]
-        free = _free(machine, poses)
-        if free.any():
-            held = np.ascontiguousarray(before.joints[free][:, [first]])
-            into = np.empty((len(held), joints.shape[1]))
-            joints[free] = run(model.held_tape(mode), np.ascontiguousarray(poses[free]), into, held)
+    if machine.wrist is None:
+        joints = machine.inverse(poses, mode)
+    else:
+        joints = machine.wrist.continue_joints(poses, mode, (before.poses, before.joints))
     for column, unit in enumerate(machine.joint_units):
         if unit == "rad":
-            joints[:, column] = _unwound(joints[:, column], before.joints[:, column])
+            joints[:, column] = find_nearest_turn(joints[:, column], before.joints[:, column])
     return joints
-
-
-def _free(machine: Machine, poses: Floats) -> Flags:
-    found = run(machine.model.freedom_tape(), np.ascontiguousarray(poses), np.empty((len(poses), 1)))[:, 0]
-    free: Flags = found < np.sin(ROUNDED) ** 2
-    return free
-
-
-def _spared(before: Floats, here: Floats, there: Floats) -> Flags:
-    """Where going on from ``before`` in the other pair of angles (m, 2) spares a swing, as ``over_the_pole`` has it."""
-    stay, cross = wrapped(here - before), wrapped(there - before)
-    with np.errstate(invalid="ignore"):
-        spared: Flags = (np.abs(stay[:, 0]) > _QUARTER) & ((cross**2).sum(1) < 0.25 * (stay**2).sum(1))
-    return spared
-
-
-def _unwound(angle: Floats, near: Floats) -> Floats:
-    return near + wrapped(angle - near)

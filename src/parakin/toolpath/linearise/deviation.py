@@ -8,9 +8,7 @@ from typing import Literal, TypeAlias
 
 import numpy as np
 
-from ...algebra import apply
 from ...machine import Machine
-from ...model.structures import Free
 from ..path import Floats
 from ..posting.frames import tool_poses, transform
 from .continuation import Rows
@@ -109,10 +107,7 @@ class Tube:
     @cached_property
     def _upright(self) -> Floats:
         """The tool's axis at A, B, C = 0."""
-        structure = self.machine.model.structure
-        if self._turns >= 2 or not isinstance(structure, Free):
-            return np.array([0.0, 0.0, 1.0])
-        return np.array(apply(structure.mount, apply(structure.tool, (0.0, 0.0, 1.0))), dtype=np.float64)
+        return np.array(self.machine.structure.tool_axis, dtype=np.float64)
 
     def _axes(self, poses: Floats) -> Floats:
         """Tool axes (m, 3) of poses."""

@@ -8,12 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import PoseError
-from ...kinematics.follow import wrapped
+from ...kinematics.wrist import find_nearest_direction
 from ..path import Floats, ToolPath
 
 Indices = NDArray[np.int64]
 Flags = NDArray[np.bool_]
-_UPRIGHT = 1e-9  # rad: C is free there
 _OPPOSITE = 1e-6  # rad: axes as near to opposite as this don't tell the great circle between them
 
 
@@ -130,19 +129,8 @@ def pointed(path: ToolPath, record: Indices, axis: Floats) -> ToolPath:
     axes[record] = axis
     if turns is not None:
         turns = turns.copy()
-        turns[record] = pointing_turns(axis, turns[record])
+        turns[record] = find_nearest_direction(axis, turns[record])
     return replace(path, axis=axes, turns=turns)
-
-
-def pointing_turns(axis: Floats, near: Floats) -> Floats:
-    """A = 0, B and C (m, 3) that point the tool along ``axis`` (m, 3), of all that do the nearest to others (m, 3)."""
-    lean, round_ = np.arctan2(np.hypot(axis[:, 0], axis[:, 1]), axis[:, 2]), np.arctan2(axis[:, 1], axis[:, 0])
-    round_ = np.where(np.sin(lean) < _UPRIGHT, near[:, 2], round_)
-    found = [
-        near + wrapped(np.column_stack([0.0 * b, b, c]) - near) for b, c in ((lean, round_), (-lean, round_ + np.pi))
-    ]
-    off = [((turns - near) ** 2).sum(1) for turns in found]
-    return np.where((off[1] < off[0])[:, None], found[1], found[0])
 
 
 def _filled(rows: Floats, source: Indices, added: Flags, new: Floats) -> Floats:

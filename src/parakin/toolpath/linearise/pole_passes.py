@@ -6,19 +6,16 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from ...kinematics.follow import wrapped
+from ...kinematics.wrist import PRINTED, REPORTED, TRAVEL, VICINITY, wrap_angle
 from ..path import Floats, Note, ToolPath
-from ..posting.frames import ROUNDED
 from ..posting.post import post
 from ..posting.posted import Posted
 from .cuts import Places, parts_of
 from .deviation import FOUND, SHARES, Tube
 from .interpolation import Indices, Programmed, denser, pointed
-from .pole_steps import NEAR, Pass, Steps, passes, steps_near
+from .pole_steps import Pass, Steps, passes, steps_near
 from .poles import Pole, poles_of
 
-TRAVEL = 0.05  # rad that the axis turns before and behind the nearest point while a swing is measured
-SWING = np.radians(45.0)  # what is reported
 _MOVED = 0.99  # of the angle tolerance: what leading through poles may take between records
 _TRIES = 8
 _OFTEN = 0.25  # of the angle tolerance: for less the way to the pole begins with the motion
@@ -106,7 +103,7 @@ def _led_through(tube: Tube, posted: Posted, motion: Indices, refused: set[tuple
             if (axis[found.record] != tube.programmed.axis[found.record]).any():
                 continue  # led through another pole already
             led = _led(pole, posted.path, steps, found)
-            if led.name in refused or (inclined and (len(found.record) or found.miss > ROUNDED)):
+            if led.name in refused or (inclined and (len(found.record) or found.miss > PRINTED)):
                 continue
             axis[found.record] = found.axis
             kept.append(found)
@@ -138,7 +135,7 @@ def _cross(tube: Tube, result: Through, crossings: list[tuple[Pole, Steps, Pass]
         motion = steps.record[found.crossing : found.crossing + 1]
         tip, axis = between.at(motion, np.array([found.share]))
         miss = float(np.hypot(*pole.beside(tip, axis)[0]))
-        if miss <= ROUNDED or _passes(tube, result, pole, motion):
+        if miss <= PRINTED or _passes(tube, result, pole, motion):
             continue
         added.append((int(motion[0]), found.share, pole.pointing(tip, axis, np.zeros((1, 2)))[0]))
         if miss > _OFTEN * tube.angle:
@@ -159,7 +156,7 @@ def _passes(tube: Tube, result: Through, pole: Pole, motion: Indices) -> bool:
         return False
     angle = pole.angles(result.posted)
     swing = abs(float(angle[motion[0]] - angle[motion[0] - 1]))
-    return swing < SWING and bool(tube.worst(parts_of(result.posted, result.places, motion), SHARES)[0] <= FOUND)
+    return swing < REPORTED and bool(tube.worst(parts_of(result.posted, result.places, motion), SHARES)[0] <= FOUND)
 
 
 def _swings(pole: Pole, path: ToolPath, steps: Steps, led: list[Pass]) -> list[Note]:
@@ -181,14 +178,14 @@ def _swings(pole: Pole, path: ToolPath, steps: Steps, led: list[Pass]) -> list[N
         np.abs(np.interp(middle + TRAVEL, at, total) - np.interp(middle - TRAVEL, at, total))
         for total in (angle, to_and_fro)
     )
-    swinging = np.flatnonzero((turned > SWING) & (steps.nearest < NEAR))
+    swinging = np.flatnonzero((turned > REPORTED) & (steps.nearest < VICINITY))
     notes = []
     for group in np.split(swinging, np.flatnonzero((np.diff(swinging) > 1) | ~steps.joined[swinging[1:]]) + 1):
         if len(group):
             nearest = group[steps.nearest[group].argmin()]
             window = slice(*np.searchsorted(at, [middle[nearest] - TRAVEL, middle[nearest] + TRAVEL]))
             most = max(float(swing[group].max()), float(np.ptp(angle[window])))
-            if most > SWING:
+            if most > REPORTED:
                 line = int(path.line[steps.record[nearest]])
                 notes.append(_note(pole, line, float(steps.nearest[nearest]), most))
     return notes
@@ -197,13 +194,13 @@ def _swings(pole: Pole, path: ToolPath, steps: Steps, led: list[Pass]) -> list[N
 def _turns(steps: Steps) -> Floats:
     """By how much the free angle turns on each step; what a path turns on the pole itself is the next step's."""
     begin, end = (np.arctan2(x[:, 1], x[:, 0]) for x in (steps.x0, steps.x1))
-    on = [np.hypot(*x.T) < ROUNDED for x in (steps.x0, steps.x1)]
+    on = [np.hypot(*x.T) < PRINTED for x in (steps.x0, steps.x1)]
     number, stretch = np.arange(len(begin)), np.cumsum(~steps.joined)
     last = np.maximum.accumulate(np.where(on[1], 0, number))  # the last step to end off the pole
     last = np.concatenate([[0], last[:-1]])
     known = ~on[0] | ((stretch[last] == stretch) & (last < number) & ~on[1][last])
     begin = np.where(on[0], end[last], begin)
-    turns: Floats = np.where(known & ~on[1], wrapped(end - begin), 0.0)
+    turns: Floats = np.where(known & ~on[1], wrap_angle(end - begin), 0.0)
     return turns
 
 
@@ -217,11 +214,11 @@ def notes_of(through: Through, posted: Posted, places: Places) -> list[Note]:
             rows = np.arange(max(first - 1, 0), min(last + 1, len(gone)))
         angle = led.pole.angles(posted)[rows]
         swing = float(np.fmax.reduce(angle, initial=-np.inf) - np.fmin.reduce(angle, initial=np.inf))
-        if swing > SWING:
+        if swing > REPORTED:
             notes.append(_note(led.pole, led.line, led.miss, swing))
     return notes
 
 
 def _note(pole: Pole, line: int, miss: float, swing: float) -> Note:
-    off = f"{np.degrees(miss):.2g}°" if miss > ROUNDED else "0°"
+    off = f"{np.degrees(miss):.2g}°" if miss > PRINTED else "0°"
     return Note(line, f"the tool axis passes {off} beside {pole.text}: {pole.angle} swings {np.degrees(swing):.0f}°")

@@ -7,14 +7,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...kernels.batch import run
+from ...kinematics.wrist import PRINTED, VICINITY
 from ..path import Floats
-from ..posting.frames import ROUNDED
 from ..posting.posted import Posted
 from .interpolation import Flags, Indices, Programmed
 from .poles import Pole
 
-NEAR = 0.12  # rad from a pole: what stays farther off does not come near it
 WITHIN = 0.98  # of the angle tolerance: what an axis may be moved
 _STEP = 0.02  # rad: motions that turn the axis farther are looked at in steps
 _MOST_STEPS = 2000
@@ -64,14 +62,15 @@ class Pass:
 def steps_near(pole: Pole, programmed: Programmed, posted: Posted, motion: Indices) -> Steps:
     """Steps of those of some motions that may come near to a pole."""
     machine = posted.machine
-    freedom = run(machine.model.freedom_tape(), posted.poses, np.empty((len(posted.poses), 1)))[:, 0]
-    if pole.joint is None:
+    if pole.joint is None or machine.wrist is None:
         freedom = 1.0 - programmed.axis[:, 2] ** 2
+    else:
+        freedom = machine.wrist.measure_freedom(posted.poses)
     off = np.arcsin(np.sqrt(np.clip(freedom, 0.0, 1.0)))
     length, turn = programmed.extent(motion)
-    if pole.carrier is not None:
-        turn = 1.2 * turn + 2.0 * length / min(machine.model.sizes)
-    close = 0.5 * (off[motion] + off[motion - 1] - turn) < NEAR
+    if pole.moves:
+        turn = 1.2 * turn + 2.0 * length / min(machine.leg_sizes)
+    close = 0.5 * (off[motion] + off[motion - 1] - turn) < VICINITY
     motion, parts = motion[close], np.ceil(np.clip(turn[close] / _STEP, 1.0, _MOST_STEPS)).astype(np.int64)
     record = np.repeat(motion, parts)
     number = np.arange(len(record)) - np.repeat(np.cumsum(parts) - parts, parts)
@@ -144,7 +143,7 @@ def _led(
     whole = np.concatenate([[steps.begin[first] == 0.0], steps.end[some] == 1.0])
     share, step = 0.0, -1
     inner: tuple[float, ...] = ()
-    moved = whole & (np.abs(weight * b) > ROUNDED)
+    moved = whole & (np.abs(weight * b) > PRINTED)
     if len(crossing):
         step = first + int(crossing[0])
         share = float(steps.begin[step] + part[0] * (steps.end[step] - steps.begin[step]))

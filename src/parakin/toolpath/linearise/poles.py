@@ -6,9 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...algebra import product
 from ...machine import Machine
-from ...model.structures import Carried, CentralLeg
 from ..path import Floats
 from ..posting.posted import Posted
 from .deviation import Under
@@ -35,15 +33,14 @@ class Pole:
     first: Floats
 
     @property
-    def carrier(self) -> CentralLeg | None:
-        """What turns the pole with the pose; None where it stands still."""
-        structure = self.machine.model.structure
-        return structure if self.joint is not None and isinstance(structure, CentralLeg) else None
+    def moves(self) -> bool:
+        """Whether the pose turns the pole: a central leg carries it."""
+        return self.joint is not None and self.machine.structure.has_central_leg
 
     @property
     def upright(self) -> bool:
         """B = 0, or the same axis."""
-        return self.carrier is None and bool(np.abs(np.cross(self.first, [0.0, 0.0, 1.0])).max() < 1e-12)
+        return not self.moves and bool(np.abs(np.cross(self.first, [0.0, 0.0, 1.0])).max() < 1e-12)
 
     def angles(self, posted: Posted) -> Floats:
         """The angle that the pole frees along a posted path, (n,) rad."""
@@ -86,13 +83,12 @@ class Pole:
 
     def _rotation(self, tip: Floats, axis: Floats) -> Floats:
         """Of the frame that carries the pole, (m, 3, 3) in M."""
-        leg = self.carrier
-        if leg is None:
+        if not self.moves:
             return np.broadcast_to(np.eye(3), (len(tip), 3, 3))
         kx, ky, kz = axis.T
         pose = [*tip.T, np.arctan2(np.hypot(kx, ky), kz), np.arctan2(ky, kx)]
         with np.errstate(divide="ignore", invalid="ignore"):
-            rotation = product(leg.mount, leg.place(pose, leg.branches).rotation)
+            rotation = self.machine.structure.turn_first_axis(pose)
         return np.stack([np.stack(np.broadcast_arrays(*row, kx)[:3], axis=-1) for row in rotation], axis=-2)
 
 
@@ -101,14 +97,10 @@ def poles_of(machine: Machine, under: Under, turned: bool) -> list[Pole]:
 
     ``turned`` where the program gives C itself: then nothing is free at B = 0.
     """
-    structure, first = machine.model.structure, machine.model.first_serial
-    found = []
-    if first is not None and isinstance(structure, Carried | CentralLeg):
-        pointing = structure.pointing if isinstance(structure, Carried) else structure.wrist
-        of_head = first - (len(machine.joints) - machine.model.serial) < structure.head_joints
-        about = np.array(pointing.first, dtype=np.float64)
-        text = f"the {'head' if of_head else 'table'}'s pole"
-        found.append(Pole(machine, text, machine.joints[first], first, about))
-    if under == "pose" and machine.axes[3:] == ("B", "C") and not any(pole.upright for pole in found):
+    wrist, found = machine.wrist, []
+    if wrist is not None:
+        text = f"the {'head' if wrist.is_in_head else 'table'}'s pole"
+        found.append(Pole(machine, text, machine.joints[wrist.first], wrist.first, wrist.first_axis))
+    if under == "pose" and machine.has_direction and not any(pole.upright for pole in found):
         found.append(Pole(machine, "Z, where C is free", "C", None, np.array([0.0, 0.0, 1.0])))
     return [pole for pole in found if not (turned and pole.upright)]

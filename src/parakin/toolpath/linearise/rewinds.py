@@ -15,7 +15,7 @@ def spelled_out(posted: Posted) -> Posted:
 
     A path whose program gives the turns is left as it is: they can't be told otherwise.
     """
-    if not posted.rewinds or posted.path.turns is not None or posted.machine.axes[3:] != ("B", "C"):
+    if not posted.rewinds or posted.path.turns is not None or not posted.machine.has_direction:
         return posted
     record = np.array(posted.rewinds, np.int64)
     begin, way = posted.poses[record - 1, 3:], posted.poses[record, 3:] - posted.poses[record - 1, 3:]

@@ -9,12 +9,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ...kinematics.wrist import PRINTED, TURN
 from ...machine import Machine
 from ..path import Floats, ToolPath
 from ..posting.frames import OwnLimit, composed, tool_poses, transform
 from ..posting.range_use import bounded
-from ..posting.tool_axis import ROUNDED
-from ..posting.turn_steps import TURN
 from ..posting.working_mode import branch
 from .maximin import value_of
 
@@ -73,7 +72,7 @@ class Placing:
         for point in points:
             x, limits = self._posed(point, path)
             if track is None:
-                q = self.machine.follow(x, self.mode, ROUNDED)
+                q = self.machine.follow(x, self.mode, PRINTED)
             else:
                 taken = branch(self.machine, path, x, self.mode)
                 x, q = taken.poses[at], taken.joints[at]
@@ -136,7 +135,7 @@ class Placing:
     def _turn_freely(self, margins: Floats) -> None:
         """Turn every turning joint by the whole turns that bring it nearest to the middle of its range, in place."""
         names = self.machine.limits
-        for drive in self.machine.model.drives:
+        for drive in self.machine.drives:
             ends = f"{drive.name}.min", f"{drive.name}.max"
             if drive.unit == "rad" and ends[0] in names and ends[1] in names:
                 low, high = (names.index(end) for end in ends)

@@ -15,10 +15,10 @@ from ...units import ANGLE, LENGTH, QuantityError, parse_quantity
 from ..path import Floats
 from ..reading.cl.tokens import LARGEST, is_number, number
 from .programmed_angles import programmed, rotations
-from .tool_axis import BLOCK, ROUNDED, turning_of
+from .tool_axis import BLOCK, turning_of
 from .turn_steps import thickened
 
-__all__ = ["ROUNDED", "OwnLimit", "composed", "parse_value", "parse_workpiece", "tool_poses", "transform"]
+__all__ = ["OwnLimit", "composed", "parse_value", "parse_workpiece", "tool_poses", "transform"]
 
 _SOURCE = "--workpiece"
 _AXES = "XYZABC"

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ...kinematics.follow import FREE, neighbours, over_the_pole, swings, unwound, wrapped
+from ...kinematics.wrist import EXACT, fill_free, find_crossings, flip_rotation, has_swing, unwind_angles, wrap_angle
 from ..path import Floats
 from .tool_axis import BLOCK, Turning
 from .turn_steps import thickened
@@ -82,7 +82,7 @@ def _spun(turns: Floats, frame: Floats, tool: Floats, letter: str) -> Floats:
     """(n, 1) turns of a tool about its own axis."""
     parts = np.array_split(turns, range(BLOCK, len(turns), BLOCK))
     angles = [_twist(frame[:, :3] @ rotations(part) @ tool.T, letter) for part in parts]
-    return unwound(np.concatenate(angles))[:, None]
+    return unwind_angles(np.concatenate(angles))[:, None]
 
 
 def _decomposed(turns: Floats, frame: Floats, near: Floats) -> Floats:
@@ -98,24 +98,24 @@ def _decomposed(turns: Floats, frame: Floats, near: Floats) -> Floats:
         here[part, 1] = np.arctan2(-r[:, 2, 0], size[part])
         here[part, 2] = np.arctan2(r[:, 1, 0], r[:, 0, 0])
         columns[part] = r.reshape(-1, 9)[:, [1, 4, 7, 2, 5, 8, 6]]
-    there = np.column_stack([here[:, 0] + math.pi, math.pi - here[:, 1], here[:, 2] + math.pi])
-    free = size < FREE
+    there = flip_rotation(here)
+    free = size < EXACT
     regular = np.flatnonzero(~free)
     across = np.zeros(count, bool)
-    if swings(here[regular]):
-        across[regular] = over_the_pole(here[regular], there[regular])
+    if has_swing(here[regular]):
+        across[regular] = find_crossings(here[regular], there[regular])
     if len(regular):
         first = regular[0]
-        if (wrapped(there[first] - near) ** 2).sum() < (wrapped(here[first] - near) ** 2).sum():
+        if (wrap_angle(there[first] - near) ** 2).sum() < (wrap_angle(here[first] - near) ** 2).sum():
             across[regular] ^= True
     a = np.where(across, there[:, 0], here[:, 0])
-    a = unwound(neighbours(a, free) if len(regular) else np.full(count, near[0]))
+    a = unwind_angles(fill_free(a, free) if len(regular) else np.full(count, near[0]))
     # With A given the others are well told everywhere, where B is 90° too: R·Rx(-A) = Rz(C)·Ry(B).
     s, c = np.sin(a), np.cos(a)
     y, z, back = columns[:, :3], columns[:, 3:6], columns[:, 6]
     b = np.arctan2(-back, y[:, 2] * s + z[:, 2] * c)
     turn = np.arctan2(z[:, 0] * s - y[:, 0] * c, y[:, 1] * c - z[:, 1] * s)
-    return np.column_stack([a, unwound(b), unwound(turn)])
+    return np.column_stack([a, unwind_angles(b), unwind_angles(turn)])
 
 
 def _started(angles: Floats, near: Floats) -> Floats:

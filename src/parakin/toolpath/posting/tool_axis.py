@@ -9,13 +9,10 @@ from typing import Any
 
 import numpy as np
 
-from ...algebra import apply, product
-from ...kinematics.follow import neighbours, over_the_pole, swings, unwound
+from ...kinematics.wrist import PRINTED, cross_direction_pole, fill_free, unwind_angles
 from ...machine import Machine
-from ...model.structures import Free
 from ..path import Floats
 
-ROUNDED = 2e-6  # rad from a turning axis: a CL file with six decimals can't tell the angle about it
 BLOCK = 1 << 13  # records of which the many intermediate arrays stay in the cache
 
 
@@ -28,6 +25,7 @@ class Turning:
         the tool then still leans off k
     wound : the letter that is made continuous
     lean : what the machine does where k asks for another tilt; empty where it can have every one
+    has_direction : the turns are B and C of the tool's axis
     spins : it turns the tool about the tool's own axis, and no other way
     tool : the tool's rotation in M where the machine's turns are 0
     """
@@ -36,6 +34,7 @@ class Turning:
     angles: Callable[[Floats], tuple[Sequence[Floats], Any, Any]]
     wound: str | None
     lean: str = ""
+    has_direction: bool = False
     spins: bool = False
     tool: Floats | None = None
 
@@ -52,8 +51,8 @@ class Turning:
                 turns[part, column] = values
             if self.lean:
                 lean[part] = leaning
-        if self.letters == "BC":
-            _go_on_over_the_pole(turns, np.flatnonzero(~free))
+        if self.has_direction:
+            cross_direction_pole(turns, np.flatnonzero(~free))
         if self.wound is not None:
             column = self.letters.index(self.wound)
             turns[:, column] = _continuous(turns[:, column], free)
@@ -66,12 +65,10 @@ def turning_of(machine: Machine) -> Turning:
     if len(turns) == 3:
         held = float(machine.home[-1])  # what C is free to be, for which the machine is made
         return Turning(turns, lambda k: _three_turns(k, held), "B")
-    if turns == "BC":
-        return Turning(turns, _two_turns, "C")
-    structure = machine.model.structure
-    assert isinstance(structure, Free)
-    tool = np.array(product(structure.mount, structure.tool), dtype=np.float64)
-    fixed = np.array(apply(structure.mount, apply(structure.tool, (0.0, 0.0, 1.0))), dtype=np.float64)
+    if machine.has_direction:
+        return Turning(turns, _two_turns, "C", has_direction=True)
+    tool = np.array(machine.structure.tool_rotation, dtype=np.float64)
+    fixed = np.array(machine.structure.tool_axis, dtype=np.float64)
     upright = abs(fixed[2] - 1.0) < 1e-12
     about = np.eye(3)["ABC".index(turns[0])] if turns else fixed
     share = float(about @ fixed)
@@ -81,14 +78,14 @@ def turning_of(machine: Machine) -> Turning:
         def none(k: Floats) -> tuple[Sequence[Floats], Any, Any]:
             return [np.zeros(len(k))] * len(turns), False, _angle(k, fixed)
 
-        return Turning(turns, none, None, lean, bool(turns), tool)
-    return Turning(turns, lambda k: _one_turn(k, about, fixed, share), turns, "can't follow", False, tool)
+        return Turning(turns, none, None, lean, spins=bool(turns), tool=tool)
+    return Turning(turns, lambda k: _one_turn(k, about, fixed, share), turns, "can't follow", tool=tool)
 
 
 def _two_turns(k: Floats) -> tuple[Sequence[Floats], Any, Any]:
     kx, ky, kz = k.T
     square = kx * kx + ky * ky
-    return [np.arctan2(np.sqrt(square), kz), np.arctan2(ky, kx)], square < ROUNDED * ROUNDED, None
+    return [np.arctan2(np.sqrt(square), kz), np.arctan2(ky, kx)], square < PRINTED * PRINTED, None
 
 
 def _three_turns(k: Floats, c: float) -> tuple[Sequence[Floats], Any, Any]:
@@ -96,7 +93,7 @@ def _three_turns(k: Floats, c: float) -> tuple[Sequence[Floats], Any, Any]:
     cos, sin = math.cos(c), math.sin(c)
     kx, ky, kz = cos * k[:, 0] + sin * k[:, 1], cos * k[:, 1] - sin * k[:, 0], k[:, 2]
     square = kx * kx + kz * kz
-    return [np.arctan2(-ky, np.sqrt(square)), np.arctan2(kx, kz), np.full(len(k), c)], square < ROUNDED * ROUNDED, None
+    return [np.arctan2(-ky, np.sqrt(square)), np.arctan2(kx, kz), np.full(len(k), c)], square < PRINTED * PRINTED, None
 
 
 def _one_turn(k: Floats, about: Floats, fixed: Floats, share: float) -> tuple[Sequence[Floats], Any, Any]:
@@ -104,7 +101,7 @@ def _one_turn(k: Floats, about: Floats, fixed: Floats, share: float) -> tuple[Se
     along = k @ about
     across = np.sqrt(np.maximum(0.0, 1.0 - along * along))
     angle = np.arctan2(k @ np.cross(about, fixed), k @ fixed - share * along)
-    return [angle], across * across < ROUNDED * ROUNDED, np.abs(np.arctan2(along, across) - math.asin(share))
+    return [angle], across * across < PRINTED * PRINTED, np.abs(np.arctan2(along, across) - math.asin(share))
 
 
 def _angle(k: Floats, fixed: Floats) -> Floats:
@@ -112,18 +109,9 @@ def _angle(k: Floats, fixed: Floats) -> Floats:
     return angle
 
 
-def _go_on_over_the_pole(turns: Floats, at: Any) -> None:
-    """B and C that point the same way, with B of the other sign where that keeps C continuous; in place."""
-    here = turns[at][:, ::-1]
-    if swings(here):
-        there = np.column_stack([here[:, 0] + math.pi, -here[:, 1]])
-        across = over_the_pole(here, there)
-        turns[at[across]] = there[across][:, ::-1]
-
-
 def _continuous(angle: Floats, free: Any) -> Floats:
     """The angle without jumps; where it is free, it keeps the neighbour's value."""
     if free.any():
-        angle = np.zeros_like(angle) if free.all() else neighbours(angle, free)
+        angle = np.zeros_like(angle) if free.all() else fill_free(angle, free)
     jumps = bool(np.any(np.abs(np.diff(angle)) > math.pi))
-    return unwound(angle) if jumps else angle
+    return unwind_angles(angle) if jumps else angle

@@ -10,10 +10,11 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from ...kinematics.wrist import TURN
 from ...machine import Machine
 from ...model.parts import Drive
 from ..path import Floats, ToolPath
-from .turn_steps import TURN, passage
+from .turn_steps import passage
 
 _BLOCK = 1 << 16  # records whose margins are held at once
 _AT_START, _OFF = 41, 9  # counts of turns that are tried: of a path's first stretch, and where none fits
@@ -66,7 +67,7 @@ class _Joint:
 
     @classmethod
     def of(cls, machine: Machine, poses: Floats, joints: Floats, mode: str, column: int, home: float) -> _Joint:
-        drive, count = machine.model.drives[column], len(joints)
+        drive, count = machine.drives[column], len(joints)
         low, high, fine = np.full(count, np.inf), np.full(count, np.inf), np.empty(count, bool)
         own = {f"{drive.name}.min": low, f"{drive.name}.max": high}
         others = np.array([name not in own for name in machine.limits])
@@ -171,8 +172,8 @@ def rewound(
     A motion will do if an even turn of C, with what else of the pose it changes, takes the joint along by as many
     turns, breaks no limit on the way and ends where the joints are to be.
     """
-    column = machine.model.first_serial
-    assert column is not None
+    assert machine.wrist is not None
+    column = machine.wrist.first
     joint = _Joint.of(machine, poses, joints, mode, column, home)
     runs = _runs(path)
     known: dict[tuple[int, int, int], int] = {}  # by motion and the turns before and behind it: the turns of C, 0: none

@@ -10,12 +10,10 @@ from typing import Any
 import numpy as np
 
 from ...errors import PoseError
-from ...kinematics.follow import wrapped
+from ...kinematics.wrist import PRINTED, TURN, wrap_angle
 from ...machine import Machine
 from ..path import Floats
-from .tool_axis import ROUNDED
 
-TURN = 2.0 * math.pi
 STEP = math.pi / 36.0  # rad: turns that go evenly are looked at in steps no longer
 MOST_STEPS = 1 << 16  # in a motion
 _WIDE = math.pi / 3.0  # rad a joint may turn from step to step
@@ -81,14 +79,11 @@ def passage(machine: Machine, mode: str, begin: Floats, end: Floats, joints: Flo
 def _going_on(machine: Machine, mode: str, poses: Floats, joints: Floats) -> Floats:
     """Joints along poses from given ones on, in the working mode of head and table that these are in."""
     turning = np.array(machine.joint_units) == "rad"
-    modes = [mode]
-    if machine.model.structure.branches:
-        modes.append(mode[:-1] + ("-" if mode[-1] == "+" else "+"))
     best, least = np.empty(0), math.inf
-    for tried in modes:
-        followed = machine.follow(poses, tried, ROUNDED)
+    for tried in machine.head_modes(mode):
+        followed = machine.follow(poses, tried, PRINTED)
         off = followed[0] - joints
-        off[turning] = wrapped(off[turning])
+        off[turning] = wrap_angle(off[turning])
         size = float(np.abs(off).max())
         if not len(best) or size < least:
             best, least = followed, size

@@ -2,19 +2,16 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ...kinematics.wrist import PRINTED, SWING, TURN
 from ...machine import Machine
 from ..path import Floats, ToolPath
-from .tool_axis import ROUNDED
 from .turn_counts import nearest_turns, rewound, whole_turns
-from .turn_steps import TURN, thickened
-
-_SWING = 0.5 * math.pi  # rad between neighbours
+from .turn_steps import thickened
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,9 +37,7 @@ def modes_to_try(machine: Machine, mode: str | None) -> list[str]:
     The legs' signs are the machine's: it can't change them without passing a serial singularity.
     """
     default = machine.checked_mode(mode)
-    if mode is not None or not machine.model.structure.branches:
-        return [default]
-    return [default, default[:-1] + ("-" if default[-1] == "+" else "+")]
+    return machine.head_modes(default) if mode is None else [default]
 
 
 def branch(machine: Machine, path: ToolPath, poses: Floats, mode: str) -> Branch:
@@ -57,11 +52,11 @@ def branch(machine: Machine, path: ToolPath, poses: Floats, mode: str) -> Branch
     rewinds: tuple[int, ...] = ()
     if not turning or not len(joints):
         return Branch(mode, poses, joints, rewinds, 0)
-    first = machine.model.first_serial
+    first = None if machine.wrist is None else machine.wrist.first
     home = np.nan_to_num(machine.inverse(machine.home, mode))
     back = None
     for column in turning:
-        turns = nearest_turns(machine.model.drives[column], joints[:, column], float(home[column]))
+        turns = nearest_turns(machine.drives[column], joints[:, column], float(home[column]))
         if turns is not None:
             joints[:, column] += TURN * turns
         elif column == first:
@@ -75,14 +70,14 @@ def branch(machine: Machine, path: ToolPath, poses: Floats, mode: str) -> Branch
 
 def _followed(machine: Machine, path: ToolPath, poses: Floats, mode: str) -> Floats:
     """Joints along poses; where a program turns the tool they go evenly from record to record, however far apart."""
-    if path.turns is None or machine.model.first_serial is None:
-        return machine.follow(poses, mode, ROUNDED)
+    if path.turns is None or machine.wrist is None:
+        return machine.follow(poses, mode, PRINTED)
     thick, at = thickened(poses, [i for i, letter in enumerate(machine.axes) if letter in "ABC"])
-    joints: Floats = machine.follow(thick, mode, ROUNDED)[at]
+    joints: Floats = machine.follow(thick, mode, PRINTED)[at]
     return joints
 
 
 def _flips(angles: Floats, rapid: NDArray[np.bool_]) -> int:
     with np.errstate(invalid="ignore"):
-        wide = (np.abs(np.diff(angles, axis=0)) > _SWING).any(axis=1)
+        wide = (np.abs(np.diff(angles, axis=0)) > SWING).any(axis=1)
     return int(np.count_nonzero(wide & ~rapid[1:]))

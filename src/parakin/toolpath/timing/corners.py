@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import PoseError
+from ...machine import Machine
 from ..path import Floats
 from ..posting.posted import Posted
 from .kernels.splines import SLIVER
@@ -87,7 +88,7 @@ def round_corners(
     elif corners == "stop":
         parted |= sharp > 2.0 * np.sin(0.5 * CORNER)
     tip = _norms(turn * ~angles)
-    leaning = _leaning(posted.machine.axes, corner, turn)
+    leaning = _leaning(posted.machine, corner, turn)
     with np.errstate(divide="ignore"):
         reach = _KEPT * np.minimum(6.0 * tolerance / tip, 6.0 * axis_tolerance / leaning)
     reach[1:-1] = _clear(np.minimum(reach[1:-1], np.minimum(length[:-1], length[1:])), length)
@@ -110,14 +111,15 @@ def _norms(rows: Floats) -> Floats:
     return norms
 
 
-def _leaning(axes: tuple[str, ...], corner: Floats, turn: Floats) -> Floats:
+def _leaning(machine: Machine, corner: Floats, turn: Floats) -> Floats:
     """How fast the tool's axis leans at most, rad, where the pose's angles change by ``turn`` (c, axes).
 
     The axis turns no faster than all angles together; a turn of C moves it by sin B only, where A does not turn it.
     """
+    axes = machine.axes
     letters = [axis for axis in axes if axis in "ABC"]
     rates = {letter: np.abs(turn[:, axes.index(letter)]) for letter in letters}
-    if letters == ["B", "C"]:
+    if machine.has_direction:
         lean = np.abs(corner[:, axes.index("B")])
         near = np.pad(lean, 2, mode="edge")  # over a piece the pose lies amid the two corners before and behind
         most = np.max([near[i : i + len(lean)] for i in range(5)], axis=0)

@@ -9,52 +9,42 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...kernels.batch import run, split
-from ...kinematics.follow import FREE
+from ...kernels.batch import split
+from ...kinematics.wrist import DISTINCT, EXACT
 from ...machine import Machine
 from ..path import Floats
 from .corners import LEVER
 from .kernels.splines import nearest
 
-_CLEAR = 1e-2  # rad from a pole: from here on the first joint counts as exact as the others
-_ON = np.sin(FREE) ** 2
-
 
 def followed(machine: Machine, mode: str, poses: Floats, way: Floats) -> Floats:
     """Joints along poses (rows, axes), continuous; ``way`` (rows,) tells how far along the curve each is."""
-    joints = machine.follow(poses, mode, FREE)
-    first = machine.model.first_serial
-    if first is not None:
-        free = _freedom(machine, poses) < _ON
+    joints, wrist = machine.follow(poses, mode, EXACT), machine.wrist
+    if wrist is not None:
+        free = wrist.find_free(poses, EXACT)
         if free.any() and not free.all():
             guess = np.stack([np.interp(way[free], way[~free], column) for column in joints[~free].T], axis=1)
-            guess[:, first] = _eased(way[free], way[~free], joints[~free, first])
+            guess[:, wrist.first] = _eased(way[free], way[~free], joints[~free, wrist.first])
             joints[free] = close_to(machine, mode, np.ascontiguousarray(poses[free]), guess)[0]
     return joints
 
 
 def close_to(machine: Machine, mode: str, poses: Floats, guess: Floats) -> tuple[Floats, Floats]:
     """The joints at poses nearest to a guess (rows, joints), and how much less exact the first turning one is, ≥ 1."""
-    first, modes = machine.model.first_serial, [mode]
-    if first is not None:
-        modes.append(mode[:-1] + ("-" if mode[-1] == "+" else "+"))
-    both, blur = [machine.inverse(poses, mode) for mode in modes], np.ones(len(poses))
-    if first is not None:
-        freedom = _freedom(machine, poses)
-        free = freedom < _ON
+    wrist, blur = machine.wrist, np.ones(len(poses))
+    modes = [mode] if wrist is None else [mode, wrist.other_mode(mode)]
+    both = [machine.inverse(poses, mode) for mode in modes]
+    if wrist is not None:
+        freedom, on = wrist.measure_freedom(poses), np.sin(EXACT) ** 2
+        free = freedom < on
         if free.any():
-            held, some = np.ascontiguousarray(guess[free][:, [first]]), np.ascontiguousarray(poses[free])
             for mode, joints in zip(modes, both, strict=True):
-                joints[free] = run(machine.model.held_tape(mode), some, np.empty((len(some), guess.shape[1])), held)
-        blur = np.maximum(1.0, _CLEAR / np.sqrt(np.maximum(freedom, _ON)))
+                joints[free] = wrist.solve_with_first(poses[free], mode, guess[free, wrist.first])
+        blur = np.maximum(1.0, DISTINCT / np.sqrt(np.maximum(freedom, on)))
     units = np.array(machine.joint_units)
     args = (both[0], both[-1], guess, units == "rad", np.where(units == "mm", LEVER, 1.0))
     split(len(poses), lambda start, stop: nearest(*args, start, stop))
     return both[0], blur
-
-
-def _freedom(machine: Machine, poses: Floats) -> Floats:
-    return run(machine.model.freedom_tape(), poses, np.empty((len(poses), 1)))[:, 0]
 
 
 def _eased(at: Floats, known: Floats, angles: Floats) -> Floats:

@@ -38,7 +38,7 @@ class DriveLimits:
 
     @staticmethod
     def of(machine: Machine) -> DriveLimits:
-        drives = machine.model.drives
+        drives = machine.drives
         return DriveLimits(*(np.array([getattr(d, k) for d in drives]) for k in ("speed", "acceleration", "jerk")))
 
     @cached_property
@@ -153,13 +153,13 @@ def _widened(flags: Flags) -> Flags:
 
 def _too_long(joint_path: JointPath, drives: DriveLimits, fine: Floats, cells: Indices) -> Indices:
     """Those of some steps over which the splines are off by more than ``fine`` (joints,), or a limit would be."""
-    found, first = [], joint_path.posted.machine.model.first_serial
+    found, wrist = [], joint_path.posted.machine.wrist
     for start in range(0, len(cells), _BLOCK):
         cell = cells[start : start + _BLOCK]
         middle, guess, blur = joint_path.joints_at(cell, 0.5 * joint_path.step[cell])
         off, grain = np.empty(len(cell), bool), np.full(middle.shape, _NOISE)
-        if first is not None:
-            grain[:, first] *= blur
+        if wrist is not None:
+            grain[:, wrist.first] *= blur
         args = (
             joint_path.step,
             joint_path.bend,

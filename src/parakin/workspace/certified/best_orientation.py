@@ -7,7 +7,7 @@ from itertools import product
 
 import numpy as np
 
-from ...machine import Array
+from ...arrays import Array
 from .constraints import Constraint
 from .region import Region
 

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ...arrays import Array
 from ...errors import PoseError
-from ...machine import Array
 from .best_orientation import best_turns
 from .constraints import Constraint
 from .plane_cuts import CLEARED, EXCLUDED

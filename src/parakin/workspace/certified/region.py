@@ -11,9 +11,10 @@ from typing import Literal
 
 import numpy as np
 
+from ...arrays import Array
 from ...errors import PoseError
 from ...kernels.elementary import GREATEST_ANGLE
-from ...machine import Array, Machine
+from ...machine import Machine
 from .constraints import Constraint, Slice
 from .inclusive import SomeTurn
 from .subdivision import Subdivision

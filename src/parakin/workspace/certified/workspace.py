@@ -12,8 +12,9 @@ from typing import Any
 
 import numpy as np
 
+from ...arrays import Array
 from ...errors import PoseError
-from ...machine import Array, Machine
+from ...machine import Machine
 from .region import Region, Span, region
 from .subdivision import Cells
 

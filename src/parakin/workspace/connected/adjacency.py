@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ...arrays import Array
 from ...errors import PoseError
-from ...machine import Array
 
 Indices = NDArray[np.int64]
 

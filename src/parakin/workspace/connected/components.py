@@ -8,7 +8,7 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
-from ...machine import Array
+from ...arrays import Array
 from ..certified.constraints import Constraint
 from ..certified.containment import verdicts
 from ..certified.region import Region

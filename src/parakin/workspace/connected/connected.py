@@ -14,8 +14,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ...arrays import Array
 from ...errors import PoseError
-from ...machine import Array
 from ..certified.constraints import Constraint
 from ..certified.containment import verdicts
 from ..certified.region import Region

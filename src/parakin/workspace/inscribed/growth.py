@@ -8,7 +8,7 @@ from itertools import product
 
 import numpy as np
 
-from ...machine import Array
+from ...arrays import Array
 from ..certified.best_orientation import best_turns, margins_at
 from ..certified.containment import verdicts
 from ..certified.region import Region

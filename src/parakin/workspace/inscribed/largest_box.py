@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ...arrays import Array
 from ...errors import PoseError
-from ...machine import Array
 from ..certified.containment import verdicts
 from ..certified.region import Region
 from ..certified.workspace import question

@@ -6,8 +6,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from ...arrays import Array
 from ...errors import PoseError
-from ...machine import Array
 from ..certified.containment import verdicts
 from ..certified.region import Region
 from ..certified.subdivision import Cells

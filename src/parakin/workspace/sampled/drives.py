@@ -10,10 +10,10 @@ from math import isfinite
 
 import numpy as np
 
+from ...arrays import Array
 from ...errors import NoMethodError, PoseError
 from ...kernels.batch import run_checked
-from ...kinematics.forward import tolerance
-from ...machine import Array, Machine
+from ...machine import Machine
 from ..certified.region import region
 from ..certified.workspace import question
 from .sampling import Swept
@@ -131,7 +131,7 @@ def _placed(machine: Machine, joints: Array, side: float, mode: str) -> Array:
     poses = np.empty((len(joints), len(machine.axes)))
     residual = run_checked(machine.model.spheres_tape(side), joints, poses, np.empty((len(joints), 0)))
     with np.errstate(invalid="ignore"):
-        counts = (residual <= tolerance(machine)) & (abs(machine.inverse(poses, mode) - joints) <= _SAME).all(1)
+        counts = (residual <= machine.closure_tolerance) & (abs(machine.inverse(poses, mode) - joints) <= _SAME).all(1)
     # The joints as they stand: those of the inverse lie a rounding beyond the limits.
     counts &= machine.check(poses, joints, mode) == 0
     poses[~counts] = np.nan

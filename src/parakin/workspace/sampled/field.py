@@ -15,10 +15,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ... import algebra as alg
+from ...arrays import Array
 from ...errors import PoseError
 from ...kernels.batch import run
 from ...kernels.tape import Tape, compile_tape
-from ...machine import Array
 from ..certified.constraints import Constraint
 from ..certified.region import Region
 from .sampling import TURNS_STEP, turn_samples

@@ -10,8 +10,8 @@ from math import floor, prod
 import numpy as np
 from numpy.typing import NDArray
 
+from ...arrays import Array
 from ...errors import PoseError
-from ...machine import Array
 from ..certified.region import Region
 from ..certified.workspace import Bound, question
 from .sampling import TURNS_STEP, Codes, FirstBroken, Swept, centres, positive, surroundings

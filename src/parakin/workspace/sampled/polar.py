@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ...arrays import Array
 from ...errors import PoseError
-from ...machine import Array
 from ..certified.region import Region
 from ..certified.workspace import question
 from .sampling import TURNS_STEP, Codes, FirstBroken, Swept, centres, positive, surroundings

@@ -14,10 +14,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ...arrays import Array
 from ...errors import PoseError
 from ...kernels.batch import run, split, still
 from ...kernels.staged import in_parts
-from ...machine import Array, Machine
+from ...machine import Machine
 from ..certified.region import Region
 
 Codes = NDArray[Any]  # unsigned: 0 allowed, else 1 + the index in Region.limits of the first limit broken

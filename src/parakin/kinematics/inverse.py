@@ -1,0 +1,15 @@
+"""The inverse problem in batches."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..arrays import Array
+from ..kernels.batch import run
+from ..model.traces import Model
+
+
+def solve_inverse(model: Model, poses: Array, mode: str, out: Array | None = None) -> Array:
+    """Compute the joints (N, joints) of poses (N, axes), mm and rad, in a working mode; NaN where a leg can't close."""
+    out = np.empty((len(poses), len(model.drives))) if out is None else out
+    return run(model.inverse_tape(mode), np.ascontiguousarray(poses), out)

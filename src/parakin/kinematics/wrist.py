@@ -1,0 +1,291 @@
+"""The wrist: two turning axes that point the tool, their two working modes, and the pole between these.
+
+Two pairs of angles point a tool: the turning joints of head and table (:class:`Wrist`), and B and C of a pose whose
+orientation is the tool's axis only (:class:`Direction`). Of each pair the *first* axis carries the *second*. Two
+values of the pair, its two modes, point the tool the same way. They meet on the *pole*, where the tool's axis lies
+along the first axis: there the first angle is free, and close by it swings. A path that passes over the pole goes on in
+the other mode, so that the first angle need not turn by half a turn; the second changes its sign instead.
+
+All thresholds at poles stand here. Angles are rad; those "off the pole" are between the tool's axis and the first axis.
+
+========== ============ ==============================================================================================
+name       value, rad   reason
+========== ============ ==============================================================================================
+EXACT      1e-9         off the pole: nearer, float64 tells the first angle by rounding only
+PRINTED    2e-6         off the pole: nearer, the six decimals of a CL file tell no first angle
+PROVED     4e-6         off the pole: a box of poses proved to be nearer counts as on it
+ASIDE      8e-6         second angle by which a pose is moved off the pole to have its rates bounded
+LEEWAY     1.6e-5       second angle that may change while the first one is free
+SAME_MODE  1e-6         joints no farther from those of a mode are in that mode
+SWING      90°          first angles of neighbours farther apart than this swing: the other mode is tried
+FLIP       0.01         off the pole: farther away no path changes its mode
+DISTINCT   0.01         off the pole: from here on the first joint is as exact as the others
+VICINITY   0.12         off the pole: a motion that stays farther away does not pass it
+TRAVEL     0.05         tool axis: its travel before and behind a pass over which a swing is measured
+REPORTED   45°          first angle: a swing that is reported
+TILTED     0.2          second angle at which a tool that starts on the pole is tilted to choose its mode
+========== ============ ==============================================================================================
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..arrays import Array, Flags, Indices
+from ..kernels.batch import run
+from ..kernels.tape import Tape
+from ..model.parts import Drive
+from ..model.traces import Model
+from .inverse import solve_inverse
+
+EXACT = 1e-9
+PRINTED = 2e-6
+PROVED = 2.0 * PRINTED
+ASIDE = 8e-6
+LEEWAY = 8.0 * PRINTED
+SAME_MODE = 1e-6
+SWING = 0.5 * np.pi
+FLIP = 0.01
+DISTINCT = 0.01
+VICINITY = 0.12
+TRAVEL = 0.05
+REPORTED = np.radians(45.0)
+TILTED = 0.2
+
+GAIN = 0.25  # of the squared way in the same mode: what the way in the other mode may be, for the path to change
+TURN = 2.0 * np.pi
+
+
+def wrap_angle(angle: Array) -> Array:
+    """Bring angles within half a turn of zero."""
+    wrapped: Array = angle - 2.0 * np.pi * np.round(angle / (2.0 * np.pi))
+    return wrapped
+
+
+def find_nearest_turn(angle: Array, near: Array) -> Array:
+    """Bring angles within half a turn of others by adding the way from these, which is exact where it is short."""
+    nearest: Array = near + wrap_angle(angle - near)
+    return nearest
+
+
+def unwind_angles(angles: Array) -> Array:
+    """Count the turns of angles along a path (n,), without jumps over ±180°; NaN stays and does not spread."""
+    with np.errstate(invalid="ignore"):
+        if not (np.abs(np.diff(angles)) > np.pi).any() and not np.isnan(angles).any():
+            return angles
+    unwound = angles.copy()
+    finite = np.isfinite(angles)
+    unwound[finite] = np.unwrap(angles[finite])
+    return unwound
+
+
+def fill_free(angles: Array, free: Flags) -> Array:
+    """Replace free angles of a path (n,) by the last that is not free, at the start by the first to come."""
+    index = np.where(free | ~np.isfinite(angles), -1, np.arange(len(angles)))
+    last = np.maximum.accumulate(index)
+    fixed = np.flatnonzero(index >= 0)
+    return angles[np.where(last < 0, fixed[0], last)] if len(fixed) else angles
+
+
+def has_swing(pairs: Array) -> bool:
+    """Tell whether first angles of neighbours on a path (n, 2 or more; first, second) swing."""
+    return bool((np.abs(wrap_angle(np.diff(pairs[:, 0]))) > SWING).any())
+
+
+def spares_swing(before: Array, here: Array, there: Array) -> Flags:
+    """Tell where going on from ``before`` in the other mode spares a swing; angles (n, 2 or more; first, second).
+
+    here, there : the angles in the same mode and in the other one
+    """
+    stay, cross = wrap_angle(here - before), wrap_angle(there - before)
+    with np.errstate(invalid="ignore"):
+        spared: Flags = (np.abs(stay[:, 0]) > SWING) & ((cross**2).sum(1) < GAIN * (stay**2).sum(1))
+    return spared
+
+
+def find_crossings(here: Array, there: Array) -> Flags:
+    """Find the rows of a path (n,) that go on in the other mode, whose angles are ``there`` (n, 2 or more).
+
+    Every step that spares a swing changes the mode of all that follows, back and forth.
+    """
+    spared = spares_swing(here[:-1], here[1:], there[1:])
+    return np.concatenate([np.zeros(min(len(here), 1), bool), np.cumsum(spared) % 2 == 1])
+
+
+def flip_mode(mode: str) -> str:
+    """Return a working mode with the other sign of head and table."""
+    return mode[:-1] + ("-" if mode[-1] == "+" else "+")
+
+
+# A direction: C is the first angle, B the second.
+
+
+def is_upright(b: Array, within: float = EXACT) -> Flags:
+    """Tell where a tool at B stands on the pole of B and C, up or down."""
+    upright: Flags = np.abs(b - 0.5 * np.pi) > 0.5 * np.pi - within
+    return upright
+
+
+def flip_direction(c: Array, b: Array) -> Array:
+    """Return the other C and B, (n, 2), that point the tool the same way."""
+    return np.column_stack([c + np.pi, -b])
+
+
+def cross_direction_pole(turns: Array, at: Indices) -> None:
+    """Let B and C along a path (n, 2) go on over their pole at the regular rows ``at``; in place."""
+    here = turns[at][:, ::-1]
+    if has_swing(here):
+        there = flip_direction(here[:, 0], here[:, 1])
+        across = find_crossings(here, there)
+        turns[at[across]] = there[across][:, ::-1]
+
+
+def continue_direction(turns: Array, before: Array) -> None:
+    """Let B and C (n, 2) each go on from those of a row of ``before`` (n, 2), over the pole too; in place."""
+    b, c = np.abs(turns[:, 0]), np.where(turns[:, 0] < 0.0, turns[:, 1] + np.pi, turns[:, 1])
+    flipped, was_free = before[:, 0] < 0.0, np.abs(np.sin(before[:, 0])) < PRINTED
+    b0, c0 = np.abs(before[:, 0]), np.where(flipped, before[:, 1] + np.pi, before[:, 1])
+    flipped = flipped ^ spares_swing(np.column_stack([c0, b0]), np.column_stack([c, b]), flip_direction(c, b))
+    flipped = np.where(was_free, np.abs(wrap_angle(c - before[:, 1])) > SWING, flipped)
+    free = np.sin(b) < PRINTED
+    turns[:, 0] = np.where(flipped & ~free, -b, b)
+    turns[:, 1] = find_nearest_turn(np.where(free, before[:, 1], np.where(flipped, c + np.pi, c)), before[:, 1])
+
+
+def find_nearest_direction(axis: Array, near: Array) -> Array:
+    """Find A = 0, B and C (m, 3) that point a tool along ``axis`` (m, 3), of both modes those nearest to others."""
+    b, c = np.arctan2(np.hypot(axis[:, 0], axis[:, 1]), axis[:, 2]), np.arctan2(axis[:, 1], axis[:, 0])
+    c = np.where(np.sin(b) < EXACT, near[:, 2], c)
+    other = flip_direction(c, b)
+    modes = [
+        find_nearest_turn(np.column_stack([0.0 * b, *pair]), near) for pair in ((b, c), (other[:, 1], other[:, 0]))
+    ]
+    off = [((turns - near) ** 2).sum(1) for turns in modes]
+    return np.where((off[1] < off[0])[:, None], modes[1], modes[0])
+
+
+def flip_rotation(turns: Array) -> Array:
+    """Return the other A, B, C (n, 3) of the same rotation Rz(C)·Ry(B)·Rx(A); their pole is B = ±90°."""
+    return np.column_stack([turns[:, 0] + np.pi, np.pi - turns[:, 1], turns[:, 2] + np.pi])
+
+
+@dataclass(frozen=True, eq=False)
+class Wrist:
+    """The two turning joints of head and table that point the tool; see the module.
+
+    first, second : their indices in the joint vector
+    """
+
+    model: Model
+    first: int
+    second: int
+
+    @property
+    def pair(self) -> list[int]:
+        """Both indices, the first axis first."""
+        return [self.first, self.second]
+
+    @property
+    def drive(self) -> Drive:
+        """The second joint's drive."""
+        return self.model.drives[self.second]
+
+    @property
+    def is_in_head(self) -> bool:
+        """Whether the first axis is the head's, and not the table's."""
+        return self.first - self.model.leg_count < self.model.structure.head_joints
+
+    @property
+    def first_axis(self) -> Array:
+        """The first axis, a unit vector (3,) in the frame that carries it."""
+        assert self.model.structure.pointing is not None
+        return np.array(self.model.structure.pointing.first, dtype=np.float64)
+
+    def other_mode(self, mode: str) -> str:
+        """Return the working mode with the wrist's other solution."""
+        return flip_mode(mode)
+
+    def measure_freedom(self, poses: Array) -> Array:
+        """Compute sin² of the angle off the pole at poses (n, axes): (n,)."""
+        return run(self.freedom_tape(), np.ascontiguousarray(poses), np.empty((len(poses), 1)))[:, 0]
+
+    def find_free(self, poses: Array, within: float) -> Flags:
+        """Find poses (n, axes) no farther than ``within`` rad off the pole: the first joint is free there."""
+        free: Flags = self.measure_freedom(poses) < np.sin(within) ** 2
+        return free
+
+    def solve_with_first(self, poses: Array, mode: str, first: Array) -> Array:
+        """Solve the inverse problem of poses (n, axes) with the first joint given (n,): joints (n, joints)."""
+        given = np.ascontiguousarray(first.reshape(-1, 1))
+        into = np.empty((len(poses), len(self.model.drives)))
+        return run(self.first_given_tape(mode), np.ascontiguousarray(poses), into, given)
+
+    def find_reachable(self, joints: Array) -> Flags:
+        """Find rows of joints (n, joints) that exist and whose second joint is within its range."""
+        second = joints[:, self.second]
+        reachable: Flags = np.isfinite(joints).all(1) & (second >= self.drive.low) & (second <= self.drive.high)
+        return reachable
+
+    def cross_pole(self, poses: Array, mode: str, joints: Array, regular: Flags) -> None:
+        """Let joints along a path (n, joints) go on over the pole in the other mode if that spares a swing; in place.
+
+        A stretch stays as it is if the other mode takes the second joint out of its range there, or a leg out of reach.
+
+        regular : (n,) rows off the pole
+        """
+        at = np.flatnonzero(regular & np.isfinite(joints[:, self.first]))
+        here = joints[at][:, self.pair]
+        if not has_swing(here):
+            return
+        other = solve_inverse(self.model, poses[at], self.other_mode(mode))
+        across = find_crossings(here, other[:, self.pair])
+        stretch = np.cumsum(np.diff(across, prepend=False))  # numbered; the odd ones are across
+        across &= ~np.isin(stretch, stretch[across & ~self.find_reachable(other)])
+        joints[at[across]] = other[across]
+
+    def continue_joints(self, poses: Array, mode: str, before: tuple[Array, Array]) -> Array:
+        """Solve the inverse problem of poses (n, axes), each going on from the poses and joints of a row before.
+
+        Turns are left as the inverse gives them.
+        """
+        before_poses, before_joints = before
+        joints, there = solve_inverse(self.model, poses, mode), solve_inverse(self.model, poses, self.other_mode(mode))
+        begin = solve_inverse(self.model, before_poses, mode)
+        was_free = self.find_free(before_poses, PRINTED)
+        over = (np.abs(wrap_angle(before_joints - begin))[:, self.pair] > SAME_MODE).any(1)
+        over = over ^ spares_swing(begin[:, self.pair], joints[:, self.pair], there[:, self.pair])
+        turned = np.abs(wrap_angle(joints[:, self.first] - before_joints[:, self.first]))
+        over = np.where(was_free, turned > SWING, over) & self.find_reachable(there)
+        joints[over] = there[over]
+        free = self.find_free(poses, PRINTED)
+        if free.any():
+            joints[free] = self.solve_with_first(poses[free], mode, before_joints[free, self.first])
+        return joints
+
+    def has_mode(self, poses: Array, joints: Array, mode: str) -> Flags:
+        """Tell which joints (n, joints), turns apart, are those of poses (n, axes) in a mode, by both joints."""
+        off = wrap_angle((solve_inverse(self.model, poses, mode) - joints)[:, sorted(self.pair)])
+        return np.asarray((np.abs(off) < SAME_MODE).all(1))
+
+    def tilt(self, joints: Array, mode: str, angle: float) -> Array:
+        """Return joints (joints,) on the pole with the second one turned by ``angle`` the way a mode stands for."""
+        tilted = joints.copy()
+        tilted[self.second] += angle if mode[-1] == "+" else -angle
+        return tilted
+
+    # The tapes, for other interpreters of them.
+
+    def freedom_tape(self) -> Tape:
+        """Pose -> sin² of the angle off the pole."""
+        return self.model.freedom_tape()
+
+    def first_given_tape(self, mode: str) -> Tape:
+        """Pose, first joint -> joints."""
+        return self.model.inverse_with_first_tape(mode)
+
+
+def find_wrist(model: Model) -> Wrist | None:
+    """Find the wrist of a machine; None where head and table have no two turning joints."""
+    return None if model.wrist_joints is None else Wrist(model, *model.wrist_joints)

@@ -1,4 +1,4 @@
-"""What a user holds: a machine, its kinematics both ways, its Jacobians and its limits."""
+"""The machine: what a user asks for kinematics both ways, Jacobians and limits. Input is checked here, once."""
 
 from __future__ import annotations
 
@@ -34,8 +34,8 @@ class Machine:
     """A parallel kinematic machine. Made by :func:`parakin.load`; nothing of it changes after that.
 
     Poses are rows of ``axes`` (mm, rad) of the tool in the workpiece's frame, orientation R = Rz(C)·Ry(B)·Rx(A);
-    joints are rows of ``joints``. Any leading shape goes, ``()`` included, and is kept. What is not a number or out of
-    reach gives rows of NaN and leaves its neighbours alone.
+    joints are rows of ``joints``. Any leading shape goes, ``()`` included, and is kept. A pose that is not a number or
+    out of reach gives a row of NaN and leaves its neighbours alone.
     """
 
     def __init__(self, spec: Spec):
@@ -107,7 +107,7 @@ class Machine:
 
     @property
     def limit_parts(self) -> tuple[Limit, ...]:
-        """All limits: name, subject, unit, side and bound."""
+        """All limits, with name, subject, unit, side and bound."""
         return self.model.limits
 
     @cached_property
@@ -151,7 +151,7 @@ class Machine:
     # Input at the boundary.
 
     def rows(self, values: ArrayLike, names: tuple[str, ...], what: str) -> tuple[Array, tuple[int, ...]]:
-        """``values`` as C-ordered float64 rows (N, names), and their leading shape."""
+        """Check ``values`` and return them as C-ordered float64 rows (N, names), with their leading shape."""
         try:
             array = np.asarray(values)
             if array.dtype.kind == "O" and all(isinstance(v, Real) for v in array.flat):
@@ -166,7 +166,7 @@ class Machine:
         return np.ascontiguousarray(array.reshape(-1, len(names))), array.shape[:-1]
 
     def checked_mode(self, mode: str | None) -> str:
-        """A working mode, the default one for None; raises :class:`PoseError` for an invalid one."""
+        """Check a working mode and return it, the default one for None; an invalid one raises :class:`PoseError`."""
         if mode is None:
             return self.mode
         if mode not in self.modes:
@@ -354,7 +354,7 @@ class Machine:
                 self.model.margins_tape(self.checked_mode(mode)), rows, np.empty((len(rows), count)), q, whole=False
             )
             lost = ~np.isfinite(q).all(1)
-            if lost.any():  # joints that are none tell nothing of the leg that can't close: the pose does
+            if lost.any():  # where joints do not exist, the pose tells which leg can't close
                 out[lost] = run(own, np.ascontiguousarray(rows[lost]), np.empty((int(lost.sum()), count)), whole=False)
                 out[lost & (out >= 0.0).all(1), :1] = np.nan
         return out.reshape(*lead, count)
@@ -374,6 +374,6 @@ class Machine:
         broken = first_negative(self.model.margins_tape(self.checked_mode(mode)), rows, q)
         lost = ~np.isfinite(q).all(1)
         if lost.any():
-            found = first_negative(own, np.ascontiguousarray(rows[lost]), nothing[lost])
-            broken[lost] = np.where(found == 0, 1, found)
+            of_pose = first_negative(own, np.ascontiguousarray(rows[lost]), nothing[lost])
+            broken[lost] = np.where(of_pose == 0, 1, of_pose)
         return broken.reshape(lead)[()]

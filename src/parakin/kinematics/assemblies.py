@@ -1,4 +1,4 @@
-"""Every real assembly mode of one joint vector."""
+"""All assembly modes of one joint vector, by complete methods."""
 
 from __future__ import annotations
 
@@ -47,6 +47,7 @@ def find_assemblies(model: Model, joints: Array) -> Array:
 
 
 def _find_common_points(model: Model, joints: Array) -> Array:
+    """Find both common points of the legs' spheres, as poses."""
     poses, residual = np.empty((2, len(model.axes))), np.empty(2)
     for i, side in enumerate((model.home_side, -model.home_side)):
         residual[i] = run_checked(model.spheres_tape(side), joints, poses[i : i + 1], np.empty((1, 0)))[0]
@@ -55,11 +56,13 @@ def _find_common_points(model: Model, joints: Array) -> Array:
 
 
 def _split_by_leg(model: Model, joints: Array) -> list[list[float]]:
+    """Split one row of joints into each leg's own."""
     by_name = dict(zip([drive.name for drive in model.drives], joints[0].tolist(), strict=True))
     return [[by_name[drive.name] for drive in leg.drives] for leg in model.spec.legs]
 
 
 def _solve_central_leg(model: Model, joints: Array) -> Array:
+    """Isolate all roots within the passive joints' limits by bisection, and polish them."""
     words = model.structure.coordinates
     bounds = {bound.name: (bound.low, bound.high) for bound in model.spec.limits.passive}
     far = 0.0
@@ -81,11 +84,11 @@ def _solve_central_leg(model: Model, joints: Array) -> Array:
 
 
 def _polish_roots(model: Model, joints: Array, starts: Array, low: Array, high: Array) -> Array:
-    """The distinct roots that Newton's method reaches from ``starts``, within the box."""
+    """Polish starts by Newton's method, and keep the distinct roots within the box."""
     given = np.ascontiguousarray(np.broadcast_to(joints, (len(starts), joints.shape[1])))
-    found = find_roots(model, starts, given, poses=False)
-    y, slack = found.found, 1e-9 * (high - low)
-    good = (found.residual <= closure_tolerance(model)) & (y >= low - slack).all(1) & (y <= high + slack).all(1)
+    roots = find_roots(model, starts, given, poses=False)
+    y, slack = roots.found, 1e-9 * (high - low)
+    good = (roots.residual <= closure_tolerance(model)) & (y >= low - slack).all(1) & (y <= high + slack).all(1)
     kept: list[Array] = []
     for root in y[good]:
         if not any((np.abs(root - other) <= 1e-6 * (high - low)).all() for other in kept):
@@ -94,6 +97,7 @@ def _polish_roots(model: Model, joints: Array, starts: Array, low: Array, high: 
 
 
 def _solve_planar(model: Model, joints: Array) -> Array:
+    """Solve a platform on three rods that moves in a plane as a planar 3-RPR."""
     words = model.structure.coordinates
     # The plane's two directions, so ordered that the turn is right-handed: x y for rz, z x for ry, y z for rx.
     plane = {"rz": [0, 1], "ry": [2, 0], "rx": [1, 2]}[words[2]]
@@ -108,13 +112,14 @@ def _solve_planar(model: Model, joints: Array) -> Array:
     structure = model.structure
     # The pose is of the tip; a fixed tool only shifts the corners.
     corners = np.array([[leg.platform[i] - structure.tip[i] for i in plane] for leg in model.spec.legs])
-    found = solve_planar_rpr(np.array(centres, float), np.array(radii), corners)
+    solutions = solve_planar_rpr(np.array(centres, float), np.array(radii), corners)
     letters = ["tx", "ty", "tz"]
     order = [[letters[i] for i in plane].index(word) for word in words[:2]]
-    return found[:, [*order, 2]]
+    return solutions[:, [*order, 2]]
 
 
 def _solve_lambdas(model: Model, joints: Array) -> Array:
+    """Solve three Lambda legs on parallel shafts: the heights give the tilt, the distances a planar 3-RPR."""
     structure = model.structure
     legs = [leg for leg in model.spec.legs if isinstance(leg, Lambda)]
     axis = np.array(legs[0].rail)
@@ -125,40 +130,41 @@ def _solve_lambdas(model: Model, joints: Array) -> Array:
     corners = np.array([leg.platform for leg in legs])
     with np.errstate(invalid="ignore", divide="ignore"):
         given = np.array(_split_by_leg(model, joints))  # NumPy's numbers: where both sliders meet, a gap of 0 gives NaN
-        held = np.array([leg.height_and_distance(list(q)) for leg, q in zip(legs, given, strict=True)])
-    if not np.isfinite(held).all():
+        measures = np.array([leg.height_and_distance(list(q)) for leg, q in zip(legs, given, strict=True)])
+    if not np.isfinite(measures).all():
         return np.empty((0, 6))
-    heights, distances = held[:, 0] + feet @ axis, held[:, 1]
+    heights, distances = measures[:, 0] + feet @ axis, measures[:, 1]
     edges = corners[1:] - corners[0]
     normal = np.cross(edges[0], edges[1])
     normal = normal / np.linalg.norm(normal)
-    # The shafts' direction seen from the platform: its part in the platform's plane from the heights, the rest ±.
+    # The heights give the part of the shafts' direction in the platform's plane; the rest has either sign.
     inside = np.linalg.lstsq(edges, heights[1:] - heights[0], rcond=None)[0]
     rest = 1.0 - inside @ inside
     if rest < 0.0:
         return np.empty((0, 6))
-    up = 1.0 if normal @ _home_axis(model, axis) >= 0.0 else -1.0
-    found: list[Array] = []
+    up = 1.0 if normal @ _turn_into_platform(model, axis) >= 0.0 else -1.0
+    poses: list[Array] = []
     for sign in (up, -up) if rest > 0.0 else (up,):
         seen = inside + sign * np.sqrt(rest) * normal
-        tilt = _rotation_between(seen, axis)
+        tilt = _find_rotation_between(seen, axis)
         flat = corners @ tilt.T @ side.T
         height = heights[0] - axis @ (tilt @ corners[0])
         for x, y, turn in solve_planar_rpr(feet @ side.T, distances, flat):
             spin: Array = np.array(rotation_about(axis.tolist(), np.sin(turn), np.cos(turn)))
             origin = side.T @ np.array([x, y]) + height * axis
-            found.append(np.array(structure.coordinates_of((spin @ tilt).tolist(), origin.tolist())))
-    return np.array(found).reshape(-1, 6)
+            poses.append(np.array(structure.coordinates_of((spin @ tilt).tolist(), origin.tolist())))
+    return np.array(poses).reshape(-1, 6)
 
 
-def _home_axis(model: Model, axis: Array) -> Array:
+def _turn_into_platform(model: Model, axis: Array) -> Array:
+    """Turn a direction of the base into the platform's frame at home."""
     rotation, _ = model.structure.frame(model.home)
     seen: Array = np.array(rotation, float).T @ axis
     return seen
 
 
-def _rotation_between(start: Array, end: Array) -> Array:
-    """A rotation that takes the unit vector ``start`` to ``end``."""
+def _find_rotation_between(start: Array, end: Array) -> Array:
+    """Find a rotation that takes the unit vector ``start`` to ``end``."""
     middle = start + end
     size = middle @ middle
     if size < 1e-12:  # opposite: half a turn about anything at right angles

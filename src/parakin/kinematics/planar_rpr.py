@@ -7,22 +7,21 @@ at most six solutions (Gosselin, Sefrioui and Richard, 1992).
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from ..arrays import Array
 
 _SAMPLES = 16  # the polynomial has harmonics up to the fourth (which cancels), so nine would do
 _STEPS, _IDLE = 50, 4
 
 
 def solve_planar_rpr(centres: Array, radii: Array, corners: Array) -> Array:
-    """All (x, y, φ), (k, 3), with |(x, y) + R(φ)·corner - centre| = radius for three centres, radii and corners.
+    """Find all (x, y, φ), (k, 3), with |(x, y) + R(φ)·corner - centre| = radius for three centres, radii and corners.
 
     centres, corners : (3, 2), mm; radii : (3,), mm. Turns are in (-π, π].
     """
     size = float(np.abs(centres - centres[0]).max() + np.abs(corners).max() + np.abs(radii).max())
     turns = 2.0 * np.pi * np.arange(_SAMPLES) / _SAMPLES
-    values = _eliminant(turns, centres / size, radii / size, corners / size)
+    values = _compute_eliminant(turns, centres / size, radii / size, corners / size)
     harmonics = np.fft.fft(values) / _SAMPLES
     top = 4
     scale = np.abs(harmonics).max()
@@ -32,24 +31,24 @@ def solve_planar_rpr(centres: Array, radii: Array, corners: Array) -> Array:
     z = np.roots(coefficients)
     # A double root leaves the unit circle by the root of the rounding; the polishing below decides.
     angles = np.angle(z[np.abs(np.abs(z) - 1.0) < 1e-2])
-    starts = [start for angle in angles for start in _places(angle, centres, radii, corners)]
-    polished = [_polished(start, centres, radii, corners) for start in starts]
-    found: list[Array] = []
+    starts = [start for angle in angles for start in _find_starts(angle, centres, radii, corners)]
+    polished = [_polish_pose(start, centres, radii, corners) for start in starts]
+    poses: list[Array] = []
     for error, pose in sorted(polished, key=lambda item: item[0]):  # of equal ones the best closed
-        if error < 1e-11 * size and not any(_same(pose, other, size) for other in found):
-            found.append(pose)
-    return np.array(sorted(found, key=lambda p: (p[2], p[0], p[1]))).reshape(-1, 3)
+        if error < 1e-11 * size and not any(_is_same(pose, other, size) for other in poses):
+            poses.append(pose)
+    return np.array(sorted(poses, key=lambda p: (p[2], p[0], p[1]))).reshape(-1, 3)
 
 
-def _turned(angle: Array, points: Array) -> Array:
+def _turn_points(angle: Array, points: Array) -> Array:
     s, c = np.sin(angle)[..., None], np.cos(angle)[..., None]
     x, y = points[:, 0], points[:, 1]
     return np.stack([c * x - s * y, s * x + c * y], -1)
 
 
-def _eliminant(angle: Array, centres: Array, radii: Array, corners: Array) -> Array:
-    """What is 0 where the three circles about centre - R·corner share a point, as a polynomial in sine and cosine."""
-    m = centres - _turned(angle, corners)  # circles' centres, (..., 3, 2)
+def _compute_eliminant(angle: Array, centres: Array, radii: Array, corners: Array) -> Array:
+    """Compute the trigonometric polynomial that is zero where the circles about centre - R·corner share a point."""
+    m = centres - _turn_points(angle, corners)  # circles' centres, (..., 3, 2)
     k = (m * m).sum(-1) - radii**2
     u, v = m[..., 1, :] - m[..., 0, :], m[..., 2, :] - m[..., 0, :]
     a, b = k[..., 1] - k[..., 0], k[..., 2] - k[..., 0]  # 2·u·p = a, 2·v·p = b
@@ -61,9 +60,9 @@ def _eliminant(angle: Array, centres: Array, radii: Array, corners: Array) -> Ar
     return value
 
 
-def _places(angle: float, centres: Array, radii: Array, corners: Array) -> list[Array]:
-    """Starting poses for a turn: the common points of every two of its circles."""
-    m = centres - _turned(np.array(angle), corners)
+def _find_starts(angle: float, centres: Array, radii: Array, corners: Array) -> list[Array]:
+    """Find starting poses for a turn: the common points of every two of its circles."""
+    m = centres - _turn_points(np.array(angle), corners)
     starts = []
     for i, j in ((0, 1), (0, 2), (1, 2)):
         u = m[j] - m[i]
@@ -78,11 +77,11 @@ def _places(angle: float, centres: Array, radii: Array, corners: Array) -> list[
     return starts
 
 
-def _polished(pose: Array, centres: Array, radii: Array, corners: Array) -> tuple[float, Array]:
-    """Greatest error of a radius, mm, and the pose, by Newton's method until it gains no more; the best pose met."""
+def _polish_pose(pose: Array, centres: Array, radii: Array, corners: Array) -> tuple[float, Array]:
+    """Polish a pose by Newton's method until it gains no more; return the best and its greatest error of a radius."""
     best, least, idle = pose, np.inf, 0
     for _ in range(_STEPS):
-        arms = _turned(pose[2], corners)
+        arms = _turn_points(pose[2], corners)
         rods = pose[:2] + arms - centres
         f = 0.5 * ((rods * rods).sum(1) - radii**2)
         error = float(np.abs(np.linalg.norm(rods, axis=1) - np.abs(radii)).max())
@@ -96,6 +95,6 @@ def _polished(pose: Array, centres: Array, radii: Array, corners: Array) -> tupl
     return least, np.array([best[0], best[1], np.pi - (np.pi - best[2]) % (2.0 * np.pi)])
 
 
-def _same(a: Array, b: Array, size: float) -> bool:
+def _is_same(a: Array, b: Array, size: float) -> bool:
     turn = abs((a[2] - b[2] + np.pi) % (2.0 * np.pi) - np.pi)
     return bool(np.hypot(a[0] - b[0], a[1] - b[1]) < 1e-6 * size and turn < 1e-6)

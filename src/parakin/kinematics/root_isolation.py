@@ -7,19 +7,17 @@ matter; so no assembly mode is missed.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..arrays import Array, Flags
 from ..errors import NoMethodError
 from ..kernels.intervals import IntervalProgram
 
-Array = NDArray[np.float64]
-
-SMALL = 1e-7  # of the box's width: what is still undecided there holds a (nearly) double root
+SMALL = 1e-7  # of the box's width: a box still undecided at this size holds a (nearly) double root
 MOST = 400_000  # boxes at a time
 
 
 def isolate_roots(program: IntervalProgram, low: Array, high: Array) -> Array:
-    """Starting points (k, n) near every root of the program's first n outputs in the box [low, high].
+    """Isolate all roots of the program's first n outputs in the box [low, high]; return a point (k, n) near each.
 
     The program gives n functions of n inputs, then their n·n derivatives. Raises :class:`NoMethodError` where the
     search would not end (a continuum of roots).
@@ -27,7 +25,7 @@ def isolate_roots(program: IntervalProgram, low: Array, high: Array) -> Array:
     n = len(low)
     width = high - low
     lows, highs = low[None, :].copy(), high[None, :].copy()
-    found: list[Array] = []
+    points: list[Array] = []
     while len(lows):
         if len(lows) > MOST:
             raise NoMethodError("the assemblies can't be told apart here: the legs leave the platform free to move")
@@ -37,14 +35,14 @@ def isolate_roots(program: IntervalProgram, low: Array, high: Array) -> Array:
         j_low, j_high = (b[alive][:, n:].reshape(-1, n, n) for b in (f_low, f_high))
         middle = 0.5 * (lows + highs)
         m_low, m_high = program(middle, middle)
-        lows, highs, single = _krawczyk(lows, highs, middle, m_low[:, :n], m_high[:, :n], j_low, j_high)
-        found.append(0.5 * (lows + highs)[single])
+        lows, highs, single = _apply_krawczyk(lows, highs, middle, m_low[:, :n], m_high[:, :n], j_low, j_high)
+        points.append(0.5 * (lows + highs)[single])
         empty = (lows > highs).any(1)
         rest = ~single & ~empty
         lows, highs = lows[rest], highs[rest]
         relative = (highs - lows) / width
         tiny = relative.max(1, initial=0.0) < SMALL
-        found.append(0.5 * (lows + highs)[tiny])
+        points.append(0.5 * (lows + highs)[tiny])
         lows, highs, relative = lows[~tiny], highs[~tiny], relative[~tiny]
         axis = relative.argmax(1) if len(lows) else np.zeros(0, np.int64)
         row = np.arange(len(lows))
@@ -52,22 +50,22 @@ def isolate_roots(program: IntervalProgram, low: Array, high: Array) -> Array:
         left, right = highs.copy(), lows.copy()
         left[row, axis], right[row, axis] = cut, cut
         lows, highs = np.concatenate([lows, right]), np.concatenate([left, highs])
-    return np.concatenate(found) if found else np.empty((0, n))
+    return np.concatenate(points) if points else np.empty((0, n))
 
 
-def _krawczyk(
+def _apply_krawczyk(
     low: Array, high: Array, middle: Array, f_low: Array, f_high: Array, j_low: Array, j_high: Array
-) -> tuple[Array, Array, NDArray[np.bool_]]:
-    """Boxes cut down by c - Y·f(c) + (1 - Y·F'(X))·(X - c), and where that proves exactly one root."""
+) -> tuple[Array, Array, Flags]:
+    """Cut boxes down by Krawczyk's operator c - Y·f(c) + (1 - Y·F'(X))·(X - c), and tell where it proves one root."""
     n = low.shape[1]
     centre = 0.5 * (j_low + j_high)
-    finite: NDArray[np.bool_] = np.asarray(np.isfinite(centre).all((1, 2)))
+    finite: Flags = np.asarray(np.isfinite(centre).all((1, 2)))
     regular = finite & (np.linalg.det(np.where(finite[:, None, None], centre, 0.0)) != 0.0)
     y = np.zeros_like(centre)
     y[regular] = np.linalg.inv(centre[regular])
     radius = 0.5 * (j_high - j_low)
     half = 0.5 * (high - low)
-    # |Y|·radius bounds 1 - Y·F'(X) (its middle is 0 up to rounding, which the factor covers).
+    # |Y|·radius bounds 1 - Y·F'(X); its middle is zero up to rounding, which the factor covers.
     spread = np.einsum("bij,bjk->bik", np.abs(y), radius) * (1.0 + 1e-9) + 1e-12
     f_middle, f_radius = 0.5 * (f_low + f_high), 0.5 * (f_high - f_low)
     shift = np.einsum("bij,bj->bi", y, f_middle)

@@ -61,8 +61,8 @@ class Model:
         legs = [leg.inverse(point, s) for leg, point, s in zip(self.spec.legs, points, signs, strict=True)]
         by_name = {
             drive.name: q
-            for leg, found in zip(self.spec.legs, legs, strict=True)
-            for drive, q in zip(leg.drives, found.joints, strict=True)
+            for leg, inverse in zip(self.spec.legs, legs, strict=True)
+            for drive, q in zip(leg.drives, inverse.joints, strict=True)
         }
         by_name.update(zip((d.name for d in self.drives[len(by_name) :]), placed.serial, strict=True))
         return [by_name[drive.name] for drive in self.drives], placed, legs
@@ -219,12 +219,12 @@ class Model:
 
         def outputs(trace: Trace) -> list[Scalar]:
             coordinates, joints = self._coordinates_and_joints(trace)
-            return self._posed(coordinates, joints) if to_poses else coordinates
+            return self._compute_pose(coordinates, joints) if to_poses else coordinates
 
         return self._tape(("end", to_poses), self._motions + len(self.drives), outputs)
 
-    def _posed(self, coordinates: Sequence[Scalar], joints: Sequence[Scalar]) -> list[Scalar]:
-        """The pose; NaN where a leg closes otherwise than it is built (a strut of negative length closes too)."""
+    def _compute_pose(self, coordinates: Sequence[Scalar], joints: Sequence[Scalar]) -> list[Scalar]:
+        """Compute the pose; NaN where a leg closes otherwise than it is built, as a strut of negative length does."""
         first, *others = self.structure.pose(coordinates, self._serial(joints))
         points = platform_points(self.spec, *self.structure.frame(coordinates))
         for leg, point, q in zip(self.spec.legs, points, leg_joints(self.spec, joints), strict=True):
@@ -276,12 +276,12 @@ class Model:
             coordinates = list(trace.inputs(self._motions))
             points = platform_points(self.spec, *self.structure.frame(coordinates))
             signs, _ = self.split_mode(mode)
-            found = {
+            joints = {
                 drive.name: q
                 for leg, point, s in zip(self.spec.legs, points, signs, strict=True)
                 for drive, q in zip(leg.drives, leg.inverse(point, s).joints, strict=True)
             }
-            legs = [found[drive.name] for drive in self.drives[: len(self.drives) - self.serial]]
+            legs = [joints[drive.name] for drive in self.drives[: len(self.drives) - self.serial]]
             return legs + [derivative(q, y) for q in legs for y in coordinates]
 
         return self._tape(("legs", mode), self._motions, outputs)
@@ -319,8 +319,8 @@ class Model:
         """pose, joints -> A (n·n), B (n·n) and the legs' spans: see :mod:`parakin.model.rates`."""
 
         def outputs(trace: Trace) -> list[Scalar]:
-            found = rates(self.spec, self.structure, *self._pose_and_joints(trace))
-            return [scalar for row in (*found.a, *found.b, found.spans) for scalar in row]
+            twist = rates(self.spec, self.structure, *self._pose_and_joints(trace))
+            return [scalar for row in (*twist.a, *twist.b, twist.spans) for scalar in row]
 
         return self._tape(("rates",), self._poses + len(self.drives), outputs)
 
@@ -337,7 +337,7 @@ class Model:
                 pose = trace.inputs(self._poses, len(joints))
                 near = self.structure.place_with_joints(pose, self._serial(joints)).origin
             coordinates = self.spheres(joints, side, near)
-            return self._posed(coordinates, joints) + self.scaled_closures(coordinates, joints)
+            return self._compute_pose(coordinates, joints) + self.scaled_closures(coordinates, joints)
 
         return self._tape(("spheres", side), len(self.drives) + (self._poses if side is None else 0), outputs)
 

@@ -16,7 +16,7 @@ import pytest
 from drawn import FAMILIES, draw, machine_of
 from geometry import Description
 from test_conformance import NAMES, SPREAD, everyone, poses_about
-from test_direct import CLOSE, allowed, garbage, legs_regularity, nudged
+from test_forward import CLOSE, allowed, garbage, legs_regularity, nudged
 
 import parakin as pk
 from parakin.cli import main

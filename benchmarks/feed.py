@@ -16,8 +16,9 @@ from parakin.toolpath.path import ToolPath
 from parakin.toolpath.posting.post import post
 from parakin.toolpath.posting.posted import Posted
 from parakin.toolpath.timing import plan_trajectory
-from parakin.toolpath.timing.kernels.reachability import backward, ceilings, forward
-from parakin.toolpath.timing.kernels.splines import bends
+from parakin.toolpath.timing.kernels.reachability import AccelerationLimits, compute_controllable, compute_reachable
+from parakin.toolpath.timing.kernels.speed_ceilings import StepCeilings, compute_speed_ceilings
+from parakin.toolpath.timing.kernels.splines import JointRows, fit_splines
 
 ROWS, JOINTS = 100_000, 6
 
@@ -42,13 +43,16 @@ def million() -> Posted:
 def quickest(s: np.ndarray, q: np.ndarray, speed: np.ndarray, acceleration: np.ndarray) -> float:
     """The cycle time of the quickest trajectory through rows of joints."""
     step = np.diff(s)
-    n, bend = len(step), np.empty_like(q)
-    bends(step, q, bend, np.empty(n + 1))
-    left, right, u, reachable, x = (np.empty(k) for k in (n, n, n, n + 1, n + 1))
-    ceilings(step, q, bend, speed, np.full(n, np.inf), np.inf, left, right, 0, n)
-    top = np.minimum(np.append(left, 0.0), np.append(0.0, right))
-    backward(step, q, bend, acceleration, np.full(n, np.inf), top, reachable, 0, n)
-    forward(step, q, bend, acceleration, np.full(n, np.inf), reachable, x, u, 0, n)
+    n, curvature = len(step), np.empty_like(q)
+    fit_splines(step, q, curvature, np.empty(n + 1))
+    rows = JointRows(step, q, curvature, np.full(n, np.inf))
+    ceilings = StepCeilings(np.empty(n), np.empty(n))
+    compute_speed_ceilings(rows, speed, np.inf, ceilings, 0, n)
+    ceiling = np.minimum(np.append(ceilings.start, 0.0), np.append(0.0, ceilings.end))
+    limits = AccelerationLimits(acceleration, np.full(n, np.inf))
+    controllable, x, u = np.empty(n + 1), np.empty(n + 1), np.empty(n)
+    compute_controllable(rows, limits, ceiling, controllable, 0, n)
+    compute_reachable(rows, limits, controllable, x, u, 0, n)
     speeds = np.sqrt(x)
     return float((2.0 * step / (speeds[1:] + speeds[:-1])).sum())
 

@@ -12,9 +12,10 @@ from parakin.machine import Machine
 from parakin.toolpath.path import ToolPath
 from parakin.toolpath.posting.post import post
 from parakin.toolpath.timing import plan_trajectory
-from parakin.toolpath.timing.joint_path import DriveLimits
-from parakin.toolpath.timing.kernels.reachability import backward, ceilings, forward
-from parakin.toolpath.timing.kernels.splines import bends
+from parakin.toolpath.timing.drive_limits import DriveLimits
+from parakin.toolpath.timing.kernels.reachability import AccelerationLimits, compute_controllable, compute_reachable
+from parakin.toolpath.timing.kernels.speed_ceilings import StepCeilings, compute_speed_ceilings
+from parakin.toolpath.timing.kernels.splines import JointRows, fit_splines
 
 INF = np.inf
 BEYOND = 1.001  # times a limit
@@ -308,13 +309,16 @@ def test_the_path_may_lead_over_a_pole_or_beside_it():
 
 def quickest(s, q, speed, acceleration):
     step = np.diff(s)
-    n, bend = len(step), np.empty_like(q)
-    bends(step, q, bend, np.empty(n + 1))
-    left, right, u, reachable, x = (np.empty(k) for k in (n, n, n, n + 1, n + 1))
-    ceilings(step, q, bend, speed, np.full(n, INF), INF, left, right, 0, n)
-    top = np.minimum(np.append(left, 0.0), np.append(0.0, right))
-    backward(step, q, bend, acceleration, np.full(n, INF), top, reachable, 0, n)
-    forward(step, q, bend, acceleration, np.full(n, INF), reachable, x, u, 0, n)
+    n, curvature = len(step), np.empty_like(q)
+    fit_splines(step, q, curvature, np.empty(n + 1))
+    rows = JointRows(step, q, curvature, np.full(n, INF))
+    ceilings = StepCeilings(np.empty(n), np.empty(n))
+    compute_speed_ceilings(rows, speed, INF, ceilings, 0, n)
+    ceiling = np.minimum(np.append(ceilings.start, 0.0), np.append(0.0, ceilings.end))
+    limits = AccelerationLimits(acceleration, np.full(n, INF))
+    controllable, x, u = np.empty(n + 1), np.empty(n + 1), np.empty(n)
+    compute_controllable(rows, limits, ceiling, controllable, 0, n)
+    compute_reachable(rows, limits, controllable, x, u, 0, n)
     v = np.sqrt(x)
     return (2.0 * step / (v[1:] + v[:-1])).sum()
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from ...errors import PoseError
 from ...machine import Machine
-from ...toolpath.timing.joint_path import DriveLimits
+from ...toolpath.timing.drive_limits import DriveLimits
 from ...toolpath.timing.trajectory import Trajectory
 from ..events import comments, spoken
 from ..gcode_blocks import at_the_rim, blocks

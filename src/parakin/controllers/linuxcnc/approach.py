@@ -8,7 +8,7 @@ from ...arrays import Array
 from ...errors import PoseError
 from ...kinematics.wrist import EXACT, TILTED, TURN, Wrist
 from ...machine import Machine
-from ...toolpath.timing.joint_path import DriveLimits
+from ...toolpath.timing.drive_limits import DriveLimits
 
 _CALM = 0.25  # of the joints' speeds
 _UNKNOWN = 4.0  # s: for the motion whose start is not known

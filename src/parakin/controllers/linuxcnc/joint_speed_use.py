@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from ...kinematics.wrist import EXACT
 from ...toolpath.path import Floats
-from ...toolpath.timing.joint_path import DriveLimits
+from ...toolpath.timing.drive_limits import DriveLimits
 from ...toolpath.timing.trajectory import Trajectory
 
 _BLOCK = 1 << 17  # motions looked at together

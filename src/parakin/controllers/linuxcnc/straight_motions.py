@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...toolpath.path import Floats
-from ...toolpath.timing.joint_path import DriveLimits
+from ...toolpath.timing.drive_limits import DriveLimits
 from ...toolpath.timing.trajectory import Trajectory
 from .joint_speed_use import strain
 from .speed_cuts import cuts
@@ -60,7 +60,7 @@ def motions(trajectory: Trajectory, speeds: Floats, accelerations: Floats) -> Mo
     cycles = np.maximum(np.diff(np.rint(passed / CYCLE), prepend=0.0), 1.0)
     cycles = np.maximum(cycles, np.ceil((slope / speeds).max(1) * length / CYCLE - _ROUNDING))
     share = strain(trajectory, piece, start, end) / (_KEPT * CYCLE)
-    even = ~last[:-1] | (curve.sharp[piece[1:]] < _EVEN) & ~halt[:-1]
+    even = ~last[:-1] | (curve.sharpness[piece[1:]] < _EVEN) & ~halt[:-1]
     meet = np.where(even, np.maximum(share[:-1, 1], share[1:, 0]), 0.0)
     share[:-1, 1], share[1:, 0] = np.maximum(share[:-1, 1], meet), np.maximum(share[1:, 0], meet)
     ramp = 2.0 * (slope / accelerations).max(1) * length / CYCLE**2

@@ -1,120 +1,122 @@
-"""A posted tool path as a curve: straight motions between the records, corners rounded or stopped at."""
+"""The tool's path as a curve: straight motions between the records, with corners rounded or stopped at."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Literal, TypeAlias
+from typing import Literal, NamedTuple, TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...arrays import Array, Flags, Indices
 from ...errors import PoseError
+from ...kernels.batch import split
 from ...machine import Machine
-from ..path import Floats
 from ..posting.posted import Posted
-from .kernels.splines import SLIVER
+from .kernels.rounded_corners import SLIVER, blend_poses
 
 Corners: TypeAlias = Literal["round", "stop"]
-Indices = NDArray[np.int64]
-Flags = NDArray[np.bool_]
 
-LEVER = 100.0  # mm/rad: what a turn counts beside a motion of the tip in the path's length
+LEVER = 100.0  # mm/rad: the weight of a turn beside a motion of the tip in the path's length
 CORNER = np.deg2rad(1.0)  # a path that turns by no more is not stopped at
-_SAME = 1e-6  # mm: records no farther apart are one place
+_SAME = 1e-6  # mm: records no farther apart are one corner
 _TIGHT = 1e-5  # mm of reach for each rad (mm/mm) of turn: a corner passed so slowly is as well stopped at
-_BESIDE = 0.05  # of a piece
-_KEPT = 0.995  # of the tolerances; the rest is for what splines of the joints are off
+_BESIDE = 0.05  # of a piece: a rounding ends no nearer to the piece's end than that, or at it
+_KEPT = 0.995  # of the tolerances; the rest is for the error of the joints' splines
 
 
-@dataclass(frozen=True, eq=False)
-class Curve:
+class Curve(NamedTuple):
     """A tool path as a curve over its length s, c corners.
 
     s counts mm of the tip and, for turns of the pose's angles, LEVER mm a rad (root of the sum of squares). Between
-    corners the pose is straight in s. Where two straight pieces meet, the pose's derivative by s turns from one slope
-    to the next within ``reach`` on either side, its second derivative rising and falling straight: so two derivatives
-    are continuous. The pose is then nowhere farther from the polyline than at the corners, |turn|·reach/6.
+    corners the pose is linear in s. Where two straight pieces meet, the pose's derivative by s turns from one slope to
+    the next within ``reach`` on either side; its second derivative rises and falls linearly, so two derivatives are
+    continuous. The pose is then nowhere farther from the polyline than at the corners, |turn|·reach/6.
 
     corner : (c, axes) poses, mm and rad
     length : (c - 1,) of the pieces
     slope : (c - 1, axes) the pose's derivative by s on the pieces
-    turn : (c, axes) how much the slope turns at each corner; 0 where it does not turn smoothly
-    sharp : (c,) its size, angles counted as in s
+    turn : (c, axes) the change of slope at each corner; 0 where the corner is not rounded
+    sharpness : (c,) its size, angles counted as in s
     reach : (c,) mm of s on either side; no more than the pieces there
     parted : (c,) where the derivatives are not continuous: start, end, and corners that are not rounded
     corner_of_record : (n,) the corner at which each record lies
     record_of_piece : (c - 1,) the record that each piece leads to
     """
 
-    corner: Floats
-    length: Floats
-    slope: Floats
-    turn: Floats
-    sharp: Floats
-    reach: Floats
+    corner: Array
+    length: Array
+    slope: Array
+    turn: Array
+    sharpness: Array
+    reach: Array
     parted: Flags
     corner_of_record: Indices
     record_of_piece: Indices
+
+    def poses(self, segment: Indices, offset: Array) -> Array:
+        """Compute the poses (k, axes) on pieces ``segment``, ``offset`` mm from their start."""
+        poses = np.empty((len(segment), self.corner.shape[1]))
+        split(len(segment), lambda start, stop: blend_poses(self, segment, offset, poses, start, stop))
+        return poses
 
 
 def round_corners(
     posted: Posted, corners: Corners, tolerance: float, axis_tolerance: float, stops: Flags, smooth: bool
 ) -> Curve:
-    """The curve of a posted path.
+    """Round the corners of a posted path, each as far as the tolerances and its pieces allow.
 
     tolerance, axis_tolerance : mm and rad that a rounded corner may take tip and axis off the straight pieces
-    stops : (n,) records where the path is parted in any case
-    smooth : whether corners matter at all; if not, each is kept as it is
+    stops : (n,) records where the curve is parted in any case
+    smooth : whether corners are rounded at all; if not, the curve is parted at every corner
     """
     poses = posted.poses
     angles = np.array([axis in "ABC" for axis in posted.machine.axes])
     scale = np.where(angles, LEVER, 1.0)
-    lengths = _norms(np.diff(poses, axis=0) * scale)
+    lengths = _compute_norms(np.diff(poses, axis=0) * scale)
     moved = np.concatenate([[True], lengths > _SAME])
     corner_of_record = np.cumsum(moved) - 1
     record_of_piece = np.flatnonzero(moved)[1:]
     corner = np.ascontiguousarray(poses[moved])
     motion = np.diff(corner, axis=0)
-    length = _norms(motion * scale)
+    length = _compute_norms(motion * scale)
     slope = motion / length[:, None]
     turn = np.zeros_like(corner)
     turn[1:-1] = np.diff(slope, axis=0)
     parted = np.zeros(len(corner), bool)
     parted[corner_of_record[stops]] = True
     parted[[0, -1]] = True
-    sharp = _norms(turn * scale)
+    sharpness = _compute_norms(turn * scale)
     if not smooth:
         parted[:] = True
     elif corners == "stop":
-        parted |= sharp > 2.0 * np.sin(0.5 * CORNER)
-    tip = _norms(turn * ~angles)
-    leaning = _leaning(posted.machine, corner, turn)
+        parted |= sharpness > 2.0 * np.sin(0.5 * CORNER)
+    tip_turn = _compute_norms(turn * ~angles)
+    axis_turn = _bound_axis_turn(posted.machine, corner, turn)
     with np.errstate(divide="ignore"):
-        reach = _KEPT * np.minimum(6.0 * tolerance / tip, 6.0 * axis_tolerance / leaning)
-    reach[1:-1] = _clear(np.minimum(reach[1:-1], np.minimum(length[:-1], length[1:])), length)
-    parted |= reach < _TIGHT * sharp
-    turn[parted] = sharp[parted] = reach[parted] = 0.0
-    return Curve(corner, length, slope, turn, sharp, reach, parted, corner_of_record, record_of_piece)
+        reach = _KEPT * np.minimum(6.0 * tolerance / tip_turn, 6.0 * axis_tolerance / axis_turn)
+    reach[1:-1] = _clear_short_rests(np.minimum(reach[1:-1], np.minimum(length[:-1], length[1:])), length)
+    parted |= reach < _TIGHT * sharpness
+    turn[parted] = sharpness[parted] = reach[parted] = 0.0
+    return Curve(corner, length, slope, turn, sharpness, reach, parted, corner_of_record, record_of_piece)
 
 
-def _clear(reach: Floats, length: Floats) -> Floats:
-    """Reaches that go all over a piece or end well within it, for rows close together tell second derivatives badly."""
-    less = (1.0 - _BESIDE) * np.minimum(length[:-1], length[1:])
+def _clear_short_rests(reach: Array, length: Array) -> Array:
+    """Shorten reaches that end just before a piece's end: rows close together make second derivatives inexact."""
+    shortened = (1.0 - _BESIDE) * np.minimum(length[:-1], length[1:])
     for side in (length[:-1], length[1:]):
         beside = (reach > (1.0 - _BESIDE) * side) & (reach < (1.0 - SLIVER) * side)
-        reach = np.where(beside, less, reach)
+        reach = np.where(beside, shortened, reach)
     return reach
 
 
-def _norms(rows: Floats) -> Floats:
-    norms: Floats = np.sqrt(np.einsum("ij,ij->i", rows, rows))
+def _compute_norms(rows: Array) -> Array:
+    norms: Array = np.sqrt(np.einsum("ij,ij->i", rows, rows))
     return norms
 
 
-def _leaning(machine: Machine, corner: Floats, turn: Floats) -> Floats:
-    """How fast the tool's axis leans at most, rad, where the pose's angles change by ``turn`` (c, axes).
+def _bound_axis_turn(machine: Machine, corner: Array, turn: Array) -> Array:
+    """Bound the change of the tool axis's slope, (c,) rad/mm, where the pose's slope changes by ``turn`` (c, axes).
 
-    The axis turns no faster than all angles together; a turn of C moves it by sin B only, where A does not turn it.
+    The axis turns no faster than all angles together. A turn of C moves it by sin B only, where A does not turn it.
     """
     axes = machine.axes
     letters = [axis for axis in axes if axis in "ABC"]
@@ -128,7 +130,7 @@ def _leaning(machine: Machine, corner: Floats, turn: Floats) -> Floats:
 
 
 def check_tolerance(tolerance: float, what: str) -> float:
-    """A tolerance above zero; raises :class:`PoseError` for others."""
+    """Return a tolerance above zero; raises :class:`PoseError` for others."""
     if not 0.0 < tolerance < np.inf:
         raise PoseError(f"{what}: more than 0 expected, not {tolerance!r}")
     return float(tolerance)

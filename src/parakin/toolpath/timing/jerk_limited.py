@@ -1,93 +1,98 @@
-"""A trajectory that keeps jerks, on a joint path with the rows that it needs."""
+"""A speed profile with limited jerk, on a joint path with the rows that it needs."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from ..path import Floats
-from .corners import Indices
-from .joint_path import DriveLimits, JointPath, refined
-from .kernels.jerk_limiting import smoothed
+from ...arrays import Array, Indices
+from .drive_limits import DriveLimits
+from .joint_path import JointPath, refine_joint_path
+from .kernels.jerk_limiting import JerkScratch, plan_jerk_limited
+from .kernels.jerk_passes import Pools, StepBounds
+from .kernels.utilisation import Utilisation
 from .speed_profile import SpeedProfile
 
 _FIRST, _LEAST = 1.0 / 32.0, 1e-4  # of the way in which s̈ is built up, and mm: the first row behind a stop
 _LAST = 0.6  # of a step: no new row beyond
-_TRIES = 2  # of the trajectory, to find the steps in which s⃛ would have to change
-_ROUGH, _SHORT = 0.6, 2e-3  # the part left of s⃛ that tells one, and mm: one that is not cut
+_TRIES = 2  # of planning, to find the steps over which s⃛ would have to change
+_ROUGH, _SHORT = 0.6, 2e-3  # the kept fraction of s⃛ below which a step is cut, and mm: one that is not
 
 
 def limit_jerk(
-    joint_path: JointPath, drives: DriveLimits, x: Floats, ceiling: Floats
+    joint_path: JointPath, limits: DriveLimits, x: Array, ceiling: Array
 ) -> tuple[JointPath, SpeedProfile, Indices]:
-    """Limit the jerk of the quickest profile ṡ² ``x`` (rows,): the joint path, its profile, and what binds at each row.
+    """Limit the jerk of the quickest profile: the joint path, its profile, and what binds it at each row.
 
-    ceiling : (steps,) of ṡ²
+    x : (rows,) ṡ² of the quickest profile; ceiling : (steps,) of ṡ²
     """
-    where, parts = _behind_stops(joint_path, drives)
-    joint_path, x, ceiling = _cut(joint_path, where, parts, x, ceiling)
+    steps, parts = _grade_stops(joint_path, limits)
+    joint_path, x, ceiling = _add_rows(joint_path, steps, parts, x, ceiling)
     for _ in range(_TRIES):
-        rough = _planned(joint_path, drives, x, ceiling, 1)[2] < _ROUGH
+        rough = _plan(joint_path, limits, x, ceiling, 1)[2] < _ROUGH
         rough[1:-1] |= rough[2:] | rough[:-2]
-        where = np.flatnonzero(rough & (joint_path.step > _SHORT))
-        joint_path, x, ceiling = _cut(joint_path, where, np.full(len(where), 0.5), x, ceiling)
-    return joint_path, *_planned(joint_path, drives, x, ceiling)[:2]
+        steps = np.flatnonzero(rough & (joint_path.step > _SHORT))
+        joint_path, x, ceiling = _add_rows(joint_path, steps, np.full(len(steps), 0.5), x, ceiling)
+    return joint_path, *_plan(joint_path, limits, x, ceiling)[:2]
 
 
-def _behind_stops(joint_path: JointPath, drives: DriveLimits) -> tuple[Indices, Floats]:
-    """Steps at stops, ascending, and the parts of them after which rows are missing: each twice as far as the last."""
+def _grade_stops(joint_path: JointPath, limits: DriveLimits) -> tuple[Indices, Array]:
+    """Find the steps at stops, ascending, and the parts after which rows are missing: each twice as far as the last."""
     gaps = np.flatnonzero(joint_path.step == 0.0)
-    found: list[tuple[Indices, Floats]] = []
-    for cell, row, back in (
+    cuts: list[tuple[Indices, Array]] = []
+    for steps, row, back in (
         (np.append(0, gaps + 1), np.append(0, gaps + 1), False),
         (np.append(gaps - 1, len(joint_path.step) - 1), np.append(gaps, len(joint_path.step)), True),
     ):
-        step, other = joint_path.step[cell][:, None], row + (-1 if back else 1)
-        slope = np.abs(joint_path.joints[row] - joint_path.joints[other]) / step
+        length, other = joint_path.step[steps][:, None], row + (-1 if back else 1)
+        slope = np.abs(joint_path.joints[row] - joint_path.joints[other]) / length
         with np.errstate(divide="ignore"):
-            jerk, rise = np.min(drives.jerk / slope, axis=1), np.min(drives.acceleration / slope, axis=1)
+            jerk = np.min(limits.jerk / slope, axis=1)
+            acceleration = np.min(limits.acceleration / slope, axis=1)
         with np.errstate(invalid="ignore", over="ignore"):
-            way = np.fmin(rise**3 / (6.0 * jerk**2), step[:, 0])
-        part = np.maximum(_FIRST * way, _LEAST) / step[:, 0]
+            way = np.fmin(acceleration**3 / (6.0 * jerk**2), length[:, 0])
+        part = np.maximum(_FIRST * way, _LEAST) / length[:, 0]
         while (part < _LAST).any():
             near = part < _LAST
-            found.append((cell[near], 1.0 - part[near] if back else part[near]))
+            cuts.append((steps[near], 1.0 - part[near] if back else part[near]))
             part = 2.0 * part
-    where, parts = (np.concatenate(column) for column in zip(*found, strict=True)) if found else (gaps[:0], np.empty(0))
-    order = np.lexsort((parts, where))
-    return where[order], parts[order]
+    if not cuts:
+        return gaps[:0], np.empty(0)
+    steps, parts = (np.concatenate(column) for column in zip(*cuts, strict=True))
+    order = np.lexsort((parts, steps))
+    return steps[order], parts[order]
 
 
-def _cut(
-    joint_path: JointPath, where: Indices, parts: Floats, x: Floats, ceiling: Floats
-) -> tuple[JointPath, Floats, Floats]:
-    """A joint_path with rows added as by :func:`~.joint_path.refined`, and ṡ² and its ceiling there."""
-    if not len(where):
+def _add_rows(
+    joint_path: JointPath, steps: Indices, parts: Array, x: Array, ceiling: Array
+) -> tuple[JointPath, Array, Array]:
+    """Add rows as :func:`~.joint_path.refine_joint_path` does, and interpolate ṡ² and its ceiling there."""
+    if not len(steps):
         return joint_path, x, ceiling
-    between = x[where] + parts * (x[where + 1] - x[where])
-    return (
-        refined(joint_path, where, parts),
-        np.insert(x, where + 1, between),
-        np.insert(ceiling, where, ceiling[where]),
-    )
+    between = x[steps] + parts * (x[steps + 1] - x[steps])
+    x, ceiling = np.insert(x, steps + 1, between), np.insert(ceiling, steps, ceiling[steps])
+    return refine_joint_path(joint_path, steps, parts), x, ceiling
 
 
-def _planned(
-    joint_path: JointPath, drives: DriveLimits, x: Floats, ceiling: Floats, rounds: int = 0
-) -> tuple[SpeedProfile, Indices, Floats]:
-    """A trajectory, what binds it at each row, and the part of s⃛ that is left on each step."""
+def _plan(
+    joint_path: JointPath, limits: DriveLimits, x: Array, ceiling: Array, rounds: int = 0
+) -> tuple[SpeedProfile, Indices, Array]:
+    """Plan a profile: with what binds it at each row, and the least kept fraction of s⃛ on each step."""
     rows = len(joint_path.segment)
-    time, passed, binding = np.empty(2 * rows + 1), np.zeros(rows), np.zeros(rows, np.int64)
-    cell = np.empty(2 * rows, np.int64)
-    shift, speed, rise, jerk = (np.empty(2 * rows) for _ in range(4))
-    arrays, rough = [np.empty(rows) for _ in range(14)], np.ones(rows - 1)
-    arrays[4][:] = x
-    flags = tuple(np.empty(rows, bool) for _ in range(3))
-    room = (tuple(arrays[:10]), tuple(arrays[10:]), np.empty((2 * rows, 4)), np.empty(rows, np.int64), flags)
-    count = smoothed(
-        joint_path.step, joint_path.joints, joint_path.bend, joint_path.feed, ceiling,
-        (drives.speed, drives.acceleration, drives.jerk), (time, cell, shift, speed, rise, jerk), passed, binding,
-        rough, room, rounds,
+    profile, scratch = SpeedProfile.allocate(2 * rows, rows), _allocate_scratch(rows)
+    scratch.x[:] = x
+    count = plan_jerk_limited(joint_path.rows, limits, ceiling, profile, scratch, rounds)
+    return profile.cut(count), scratch.use.binding, scratch.least_kept
+
+
+def _allocate_scratch(rows: int) -> JerkScratch:
+    """Allocate the arrays for planning so many rows, in two pieces a step."""
+    bounds = StepBounds(*(np.empty(rows) for _ in range(3)))
+    x, u, controllable, rising_x, rising_u, braking_x, braking_u, acceleration = (np.empty(rows) for _ in range(8))
+    allowance, totals, widths = (np.empty(rows) for _ in range(3))
+    pools = Pools(allowance, totals, widths, np.empty(rows, np.int64))
+    touched, moved, changed = (np.empty(rows, bool) for _ in range(3))
+    use = Utilisation(np.empty((2 * rows, 4)), np.zeros(rows, np.int64), changed)
+    return JerkScratch(
+        bounds, x, u, controllable, rising_x, rising_u, braking_x, braking_u, acceleration, pools, use,
+        touched, moved, np.ones(rows - 1),
     )  # fmt: skip
-    kept = slice(count)
-    profile = SpeedProfile(time[: count + 1], cell[kept], shift[kept], speed[kept], rise[kept], jerk[kept], passed)
-    return profile, binding, rough

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
 from ...arrays import Array, Indices
 
 
-@dataclass(frozen=True, eq=False)
-class SpeedProfile:
+class SpeedProfile(NamedTuple):
     """The motion s(t) along a joint path, in p pieces of constant s⃛; no piece reaches over a row.
 
     time : (p + 1,) s, when each piece begins, and when the last one ends
@@ -26,6 +25,28 @@ class SpeedProfile:
     acceleration: Array
     jerk: Array
     row_times: Array
+
+    @staticmethod
+    def allocate(pieces: int, rows: int) -> SpeedProfile:
+        """Allocate a profile of so many pieces; its times are zero."""
+        shift, speed, acceleration, jerk = (np.empty(pieces) for _ in range(4))
+        return SpeedProfile(
+            np.zeros(pieces + 1), np.empty(pieces, np.int64), shift, speed, acceleration, jerk, np.zeros(rows)
+        )
+
+    def cut(self, pieces: int) -> SpeedProfile:
+        """Keep the first pieces only."""
+        motion = (self.shift, self.speed, self.acceleration, self.jerk)
+        shift, speed, acceleration, jerk = (column[:pieces] for column in motion)
+        time, row = self.time[: pieces + 1], self.row[:pieces]
+        return SpeedProfile(time, row, shift, speed, acceleration, jerk, self.row_times)
+
+    def stretch(self, factor: float) -> SpeedProfile:
+        """Stretch the profile in time: speeds are divided by the factor, accelerations by its square; for s⃛ = 0."""
+        speed, acceleration = self.speed / factor, self.acceleration / factor**2
+        return self._replace(
+            time=factor * self.time, speed=speed, acceleration=acceleration, row_times=factor * self.row_times
+        )
 
     def at(self, times: Array) -> tuple[Indices, Array, Array, Array]:
         """Evaluate row, mm of s after the row, ṡ and s̈ at times (k,); outside the profile's time, at its ends."""

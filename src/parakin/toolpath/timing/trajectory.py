@@ -13,6 +13,7 @@ from ...arrays import Array, Indices
 from ..posting.posted import Posted
 from .corners import Curve, check_tolerance
 from .joint_path import JointPath
+from .kernels.splines import PathMotion
 from .speed_profile import SpeedProfile
 
 
@@ -92,8 +93,9 @@ class Trajectory:
         shift = np.clip(shift, 0.0, self.joint_path.step[row])
         moving = (times >= 0.0) & (times <= self.seconds)
         speed, acceleration = speed * moving, acceleration * moving
-        joints, speeds, accelerations = self.joint_path.splines(row, shift, np.maximum(speed, 0.0), acceleration)
-        return Setpoints(columns, times, joints, speeds, accelerations, self.joint_path.poses(row, shift))
+        motion = self.joint_path.evaluate(PathMotion(row, shift, np.maximum(speed, 0.0), acceleration))
+        poses = self.joint_path.poses(row, shift)
+        return Setpoints(columns, times, motion.joints, motion.speeds, motion.accelerations, poses)
 
     def sample(self, rate: float) -> Setpoints:
         """Compute setpoints at ``rate`` Hz, from the start to the first one at which the motion is over."""

@@ -1,39 +1,75 @@
-"""A law whose joints keep a limit of jerk too, near the quickest: passes over one stretch of a path.
+"""Kernels for passes over one stretch of a joint path, after which its joints keep limits of jerk too.
 
 With x = ṡ² over the path, u = ½·x' is s̈ and u'·ṡ is s⃛: a limit of jerk bounds how fast u may change. Where x bends
-upward, behind a slow place and before one, two passes see to that. Forward u rises no faster than it may, from 0 or
-from what it is, and backward the same is done for braking; so the slowest places are passed level. Where x bends down,
-the greatest x below that bends less is a convex hull: that of x and what it may bend, summed up twice.
+upward, behind a slow place and before one, two passes bound that. The forward pass lets u rise no faster than it may,
+from 0 or from its present value; the backward pass does the same for braking, so the slowest places are passed level.
+Where x bends downward, the greatest x below that bends less is a convex hull: that of x and what it may bend, summed up
+twice.
 
-What a pass found is kept, and where nothing has changed it is not done again: a row is gone through if it is
-``touched`` or the one before it in the pass came out otherwise.
-
-low, cap, calm : (steps,) bounds of x, u and s⃛
+What a pass computed is kept; where nothing has changed it is not computed again. A row is computed if it is ``touched``
+or if the row before it in the pass came out differently.
 """
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numba import njit
 
-from .reachability import braked, driven
+from ....arrays import Array, Indices
+from ..drive_limits import DriveLimits
+from .reachability import AccelerationLimits, allocate_lines, find_acceleration, find_controllable
+from .splines import JointRows
 
-_LEAST = 0.1  # share of a jerk that is left for s⃛ in any case
+_LEAST = 0.1  # of a jerk limit that is left for s⃛ in any case
+
+
+class Stretch(NamedTuple):
+    """A stretch of a joint path from row ``start`` to row ``stop``, with the rows and limits of the whole path."""
+
+    start: int
+    stop: int
+    rows: JointRows
+    limits: DriveLimits
+
+
+class StepBounds(NamedTuple):
+    """Upper bounds of x, |u| and |s⃛| on each step, (steps,) each; they are lowered from round to round."""
+
+    x: Array
+    u: Array
+    jerk: Array
+
+
+class Pools(NamedTuple):
+    """Scratch of :func:`flatten_peaks`, (rows,) each: pools of neighbouring steps that share one mean.
+
+    allowance : the change of u that is allowed from the start to each step
+    totals, widths, heads : each pool's sum of step·(u + allowance), its length, and its first step
+    """
+
+    allowance: Array
+    totals: Array
+    widths: Array
+    heads: Indices
 
 
 @njit(nogil=True, cache=True, error_model="numpy")
-def _room(i, start, stop, step, q, bend, jerk, v, a, sign, calm):
-    """How far s⃛ may go up or down (``sign``) at row i, where ṡ and s̈ are v and a."""
-    most = min(calm[i - 1] if i > start else np.inf, calm[i] if i < stop else np.inf)
+def _find_free_jerk(i, stretch, bounds, v, a, sign):
+    """Find how far s⃛ may go up or down (``sign``) at row i, where ṡ and s̈ are v and a."""
+    step, q, bend, jerk = stretch.rows.step, stretch.rows.joints, stretch.rows.curvature, stretch.limits.jerk
+    before, after = i > stretch.start, i < stretch.stop
+    most = min(bounds.jerk[i - 1] if before else np.inf, bounds.jerk[i] if after else np.inf)
     for j in range(len(jerk)):
         if jerk[j] == np.inf:
             continue
         slope, third = 0.0, 0.0
-        if i > start:
+        if before:
             h = step[i - 1]
             slope = (q[i, j] - q[i - 1, j]) / h + h * (bend[i - 1, j] + 2.0 * bend[i, j]) / 6.0
             third = abs(bend[i, j] - bend[i - 1, j]) / h
-        if i < stop:
+        if after:
             h = step[i]
             slope = (q[i + 1, j] - q[i, j]) / h - h * (2.0 * bend[i, j] + bend[i + 1, j]) / 6.0
             third = max(third, abs(bend[i + 1, j] - bend[i, j]) / h)
@@ -44,99 +80,114 @@ def _room(i, start, stop, step, q, bend, jerk, v, a, sign, calm):
 
 
 @njit(nogil=True, cache=True, error_model="numpy")
-def _from_rest(h, jerk):
-    """ṡ² behind a way h that a motion with this s⃛ begins with."""
+def _start_from_rest(h, jerk):
+    """ṡ² at the end of a step h that a motion from rest begins with, at this constant s⃛."""
     return 0.25 * (6.0 * h) ** (4.0 / 3.0) * jerk ** (2.0 / 3.0)
 
 
 @njit(nogil=True, cache=True, error_model="numpy")
-def reached(start, stop, step, q, bend, limits, low, cap, touched, reachable, moved):
-    """Backward: the greatest x from which the path can be gone on with. ``moved`` (rows,) becomes where it changed."""
-    room = np.empty(8 + 6 * len(limits[1]))
-    moved[stop], reachable[stop] = False, 0.0
+def update_controllable(stretch, bounds, touched, controllable, moved):
+    """Backward pass: the greatest x from which the path can be completed, into ``controllable`` (rows,).
+
+    moved : (rows,) becomes where it changed
+    """
+    start, stop = stretch.start, stretch.stop
+    limits = AccelerationLimits(stretch.limits.acceleration, bounds.u)
+    lines = allocate_lines(limits)
+    moved[stop], controllable[stop] = False, 0.0
     for i in range(stop - 1, start - 1, -1):
         moved[i] = False
         if touched[i] or moved[i + 1]:
-            top = min(low[i - 1], low[i]) if i > start else 0.0
-            found = braked(i, step[i], top, reachable[i + 1], q, bend, limits[1], cap, room)
-            moved[i] = found != reachable[i]
-            reachable[i] = found
+            top = min(bounds.x[i - 1], bounds.x[i]) if i > start else 0.0
+            greatest = find_controllable(i, top, controllable[i + 1], stretch.rows, limits, lines)
+            moved[i] = greatest != controllable[i]
+            controllable[i] = greatest
 
 
 @njit(nogil=True, cache=True, error_model="numpy")
-def rising(start, stop, step, q, bend, limits, cap, calm, touched, reachable, moved, x, u):
-    """Forward: the quickest law below ``reachable`` in which u rises no faster than it may.
+def limit_rise(stretch, bounds, touched, controllable, moved, x, u):
+    """Forward pass: the quickest profile below ``controllable`` whose u rises no faster than it may, into x and u.
 
-    moved : (rows,) where ``reachable`` changed; becomes where x did
+    x : (rows,); u : (steps,)
+    moved : (rows,) where ``controllable`` changed; becomes where x did
     """
-    room = np.empty(8 + 6 * len(limits[1]))
-    x[start], before, anew = 0.0, 0.0, moved[start]
+    start, stop, step = stretch.start, stretch.stop, stretch.rows.step
+    limits = AccelerationLimits(stretch.limits.acceleration, bounds.u)
+    lines = allocate_lines(limits)
+    x[start], before, changed = 0.0, 0.0, moved[start]
     for i in range(start, stop):
-        if touched[i] or anew or moved[i + 1]:
+        if touched[i] or changed or moved[i + 1]:
             h, v = step[i], np.sqrt(x[i])
-            softly = _room(i, start, stop, step, q, bend, limits[2], v, before, 1.0, calm)
+            jerk = _find_free_jerk(i, stretch, bounds, v, before, 1.0)
             if i == start:
-                most = 0.5 * _from_rest(h, softly) / h
+                most = 0.5 * _start_from_rest(h, jerk) / h
             else:
                 part = 0.5 if u[i - 1] > 0.0 else 0.25  # a lowest place has two sides
-                most = before + part * (step[i - 1] + h) * softly / v
-            rise = driven(i, h, x[i], reachable[i + 1], most, q, bend, limits[1], cap, room)
-            after = min(max(x[i] + 2.0 * h * rise, 0.0), reachable[i + 1])
-            moved[i + 1], anew = after != x[i + 1], after != x[i + 1] or rise != u[i]
+                most = before + part * (step[i - 1] + h) * jerk / v
+            rise = find_acceleration(i, x[i], controllable[i + 1], most, stretch.rows, limits, lines)
+            after = min(max(x[i] + 2.0 * h * rise, 0.0), controllable[i + 1])
+            moved[i + 1], changed = after != x[i + 1], after != x[i + 1] or rise != u[i]
             x[i + 1], u[i] = after, rise
         else:
-            moved[i + 1] = anew = False
+            moved[i + 1] = changed = False
         before = max(u[i], 0.0)
     moved[start] = False
 
 
 @njit(nogil=True, cache=True, error_model="numpy")
-def falling(start, stop, step, q, bend, limits, cap, calm, touched, ceiling, moved, x, u):
-    """Backward: the law below ``ceiling`` (rows,) in which braking does not set in too late to end softly.
+def limit_braking(stretch, bounds, touched, ceiling, moved, x, u):
+    """Backward pass: the profile x, u below ``ceiling`` (rows,) whose braking does not begin too late to end softly.
 
     moved : (rows,) where ``ceiling`` changed
     """
-    room = np.empty(8 + 6 * len(limits[1]))
-    x[stop], after, anew = 0.0, 0.0, False
+    start, stop, step = stretch.start, stretch.stop, stretch.rows.step
+    limits = AccelerationLimits(stretch.limits.acceleration, bounds.u)
+    lines = allocate_lines(limits)
+    x[stop], after, changed = 0.0, 0.0, False
     for i in range(stop - 1, start - 1, -1):
-        if touched[i] or touched[i + 1] or anew or moved[i]:
+        if touched[i] or touched[i + 1] or changed or moved[i]:
             h, v = step[i], np.sqrt(x[i + 1])
-            softly = _room(i + 1, start, stop, step, q, bend, limits[2], v, -after, 1.0, calm)
+            jerk = _find_free_jerk(i + 1, stretch, bounds, v, -after, 1.0)
             if i == stop - 1:
-                most = _from_rest(h, softly)
+                most = _start_from_rest(h, jerk)
             else:
                 part = 0.5 if u[i + 1] < 0.0 else 0.25
-                most = x[i + 1] + 2.0 * h * (after + part * (h + step[i + 1]) * softly / v)
-            found = braked(i, h, min(ceiling[i], most), x[i + 1], q, bend, limits[1], cap, room)
-            rise = 0.5 * (x[i + 1] - found) / h
-            anew = found != x[i] or rise != u[i]
-            x[i], u[i] = found, rise
+                most = x[i + 1] + 2.0 * h * (after + part * (h + step[i + 1]) * jerk / v)
+            greatest = find_controllable(i, min(ceiling[i], most), x[i + 1], stretch.rows, limits, lines)
+            rise = 0.5 * (x[i + 1] - greatest) / h
+            changed = greatest != x[i] or rise != u[i]
+            x[i], u[i] = greatest, rise
         else:
-            anew = False
+            changed = False
         after = max(-u[i], 0.0)
 
 
 @njit(nogil=True, cache=True, error_model="numpy")
-def pooled(start, stop, step, q, bend, limits, calm, x, u, bent, sums, widths, heads):
-    """x is lowered on top where u falls faster than it may: neighbours that fall too fast share their mean."""
-    blocks, bent[start] = 0, 0.0
+def flatten_peaks(stretch, bounds, x, u, pools):
+    """Lower x where u falls faster than it may: pool adjacent violators, so that neighbours share their mean.
+
+    pools : :class:`Pools`, overwritten
+    """
+    start, stop, step = stretch.start, stretch.stop, stretch.rows.step
+    allowance, totals, widths, heads = pools.allowance, pools.totals, pools.widths, pools.heads
+    count, allowance[start] = 0, 0.0
     for i in range(start, stop):
         if i > start:
-            bent[i] = bent[i - 1]
+            allowance[i] = allowance[i - 1]
             v, a = np.sqrt(x[i]), 0.5 * (u[i - 1] + u[i])
-            softly = _room(i, start, stop, step, q, bend, limits[2], v, a, -1.0, calm)
-            bent[i] += 0.5 * (step[i - 1] + step[i]) * softly / v
-        total, width, begin = step[i] * (u[i] + bent[i]), step[i], i
-        while blocks > 0 and sums[blocks - 1] * width > total * widths[blocks - 1]:
-            blocks -= 1
-            total, width, begin = total + sums[blocks], width + widths[blocks], heads[blocks]
-        sums[blocks], widths[blocks], heads[blocks] = total, width, begin
-        blocks += 1
-    for k in range(blocks):
-        end = heads[k + 1] if k + 1 < blocks else stop
+            jerk = _find_free_jerk(i, stretch, bounds, v, a, -1.0)
+            allowance[i] += 0.5 * (step[i - 1] + step[i]) * jerk / v
+        total, width, head = step[i] * (u[i] + allowance[i]), step[i], i
+        while count > 0 and totals[count - 1] * width > total * widths[count - 1]:
+            count -= 1
+            total, width, head = total + totals[count], width + widths[count], heads[count]
+        totals[count], widths[count], heads[count] = total, width, head
+        count += 1
+    for k in range(count):
+        end = heads[k + 1] if k + 1 < count else stop
         if end - heads[k] > 1:
             for i in range(heads[k], end):
-                u[i] = sums[k] / widths[k] - bent[i]
+                u[i] = totals[k] / widths[k] - allowance[i]
             for i in range(heads[k], end - 1):
                 x[i + 1] = max(x[i] + 2.0 * step[i] * u[i], 0.0)
             u[end - 1] = 0.5 * (x[end] - x[end - 1]) / step[end - 1]

@@ -1,0 +1,79 @@
+"""Kernels for a path of straight pieces with rounded corners: where its rows lie, and the poses there.
+
+Over ``reach`` on either side of a corner the slope turns from that of one piece to that of the next; its rate of
+turning, the pose's second derivative, rises linearly to its greatest value at the corner and falls again. That adds
+turn·reach/6·(1 - d/reach)³ to the straight pieces at the distance d from the corner. The roundings of neighbours may
+overlap up to each other's corners; there they add up.
+
+A row lies on a piece (``segment``) at a distance from the piece's start (``offset``). ``curve`` is a
+:class:`~parakin.toolpath.timing.corners.Curve`.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+SLIVER = 2e-3  # of a piece: knots nearer than this are one
+
+
+@njit(nogil=True, cache=True)
+def _find_knots(curve, piece, knots):
+    """Write the knots of a piece, where its roundings end, to ``knots`` (4,); returns how many there are."""
+    whole = curve.length[piece]
+    a, b = min(curve.reach[piece], whole), max(whole - curve.reach[piece + 1], 0.0)
+    a, b = min(a, b), max(a, b)
+    near = SLIVER * whole
+    knots[0] = 0.0
+    count = 1
+    if near < a < whole - near:
+        knots[count] = a
+        count += 1
+    if max(near, knots[count - 1] + near) < b < whole - near:
+        knots[count] = b
+        count += 1
+    knots[count] = whole
+    return count + 1
+
+
+@njit(nogil=True, cache=True)
+def place_rows(curve, corner_steps, longest, segment, offset):
+    """Place the rows of a path: fill ``segment`` and ``offset``, as far as they reach; returns how many rows there are.
+
+    corner_steps : (corners,) the least number of steps between two knots where a corner is rounded
+    longest : no step is longer
+    """
+    knots = np.empty(4)
+    row = 0
+    for piece in range(len(curve.length)):
+        count = _find_knots(curve, piece, knots)
+        for i in range(count - 1):
+            span = knots[i + 1] - knots[i]
+            steps = max(2, int(np.ceil(span / longest)))
+            if knots[i] + 0.5 * span < curve.reach[piece]:
+                steps = max(steps, corner_steps[piece])
+            if knots[i + 1] - 0.5 * span > curve.length[piece] - curve.reach[piece + 1]:
+                steps = max(steps, corner_steps[piece + 1])
+            for step in range(steps):
+                if row < len(segment):
+                    segment[row], offset[row] = piece, knots[i] + span * step / steps
+                row += 1
+        if curve.parted[piece + 1] or piece == len(curve.length) - 1:
+            if row < len(segment):
+                segment[row], offset[row] = piece, curve.length[piece]
+            row += 1
+    return row
+
+
+@njit(nogil=True, cache=True)
+def blend_poses(curve, segment, offset, poses, start, stop):
+    """Compute the poses of rows into ``poses`` (rows, axes): the straight piece and the roundings at its ends."""
+    corner, slope, turn, reach = curve.corner, curve.slope, curve.turn, curve.reach
+    for row in range(start, stop):
+        k, o = segment[row], offset[row]
+        rest = curve.length[k] - o
+        a = max(0.0, 1.0 - o / reach[k]) if reach[k] > 0.0 else 0.0
+        b = max(0.0, 1.0 - rest / reach[k + 1]) if reach[k + 1] > 0.0 else 0.0
+        a, b = reach[k] * a * a * a / 6.0, reach[k + 1] * b * b * b / 6.0
+        for c in range(poses.shape[1]):
+            poses[row, c] = corner[k, c] + slope[k, c] * o + turn[k, c] * a + turn[k + 1, c] * b

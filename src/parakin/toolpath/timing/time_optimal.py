@@ -1,0 +1,106 @@
+"""The quickest speed profile along a joint path: time-optimal path parameterization by reachability, without jerks."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...arrays import Array, Indices
+from ...errors import PoseError
+from ...kernels.batch import split
+from .drive_limits import DriveLimits
+from .joint_path import JointPath, refine_joint_path
+from .kernels.reachability import AccelerationLimits, Switches, compute_controllable, compute_reachable, find_switches
+from .kernels.speed_ceilings import StepCeilings, compute_speed_ceilings
+from .kernels.utilisation import Utilisation, measure_utilisation
+from .speed_profile import SpeedProfile
+
+UNBOUND = 1e12  # mm²/s², of ṡ²: nothing is as fast
+WORTH = 5e-4  # of the cycle time: what more rows must save
+_ROUNDS = 4
+_RAMP = 0.1  # s in which a drive is assumed to reach its acceleration where only a jerk is given
+_ROUNDING = 1e-8
+_PLACES = 5  # of each step at which utilisation is measured
+
+
+def compute_ceilings(joint_path: JointPath, limits: DriveLimits) -> StepCeilings:
+    """Compute what feed and the joints' speeds allow for ṡ² at both ends of each step."""
+    steps = len(joint_path.step)
+    ceilings = StepCeilings(np.empty(steps), np.empty(steps))
+    args = (joint_path.rows, limits.speed, UNBOUND, ceilings)
+    split(steps, lambda start, stop: compute_speed_ceilings(*args, start, stop))
+    return ceilings
+
+
+def find_quickest(joint_path: JointPath, limits: DriveLimits) -> tuple[JointPath, Array, Array]:
+    """Find ṡ² (rows,) and s̈ (steps,) of the quickest profile without jerks, with rows where it switches."""
+    for attempt in range(_ROUNDS):
+        rows, count = joint_path.rows, len(joint_path.step)
+        ceilings = compute_ceilings(joint_path, limits)
+        ceiling = np.minimum(np.append(ceilings.start, 0.0), np.append(0.0, ceilings.end))
+        ceiling[joint_path.find_ends()] = 0.0
+        acceleration = np.minimum(limits.acceleration, _RAMP * limits.jerk)
+        bounds = AccelerationLimits(acceleration, np.full(count, np.inf))
+        x, u, controllable = np.empty(count + 1), np.empty(count), np.empty(count + 1)
+        compute_controllable(rows, bounds, ceiling, controllable, 0, count)
+        compute_reachable(rows, bounds, controllable, x, u, 0, count)
+        switches, lost = Switches(np.empty(count), np.empty(count)), list[float]()
+        args = (rows, bounds, ceilings, x, switches)
+        split(count, lambda start, stop: lost.append(find_switches(*args, start, stop)))  # noqa: B023
+        refuse_unbound(joint_path, np.maximum(x[:-1], x[1:]))
+        steps = np.concatenate([np.flatnonzero(fractions) for fractions in switches])
+        if attempt == _ROUNDS - 1 or sum(lost) <= WORTH * _compute_spans(joint_path, x).sum() or not len(steps):
+            break
+        parts = np.concatenate([fractions[fractions > 0.0] for fractions in switches])
+        order = np.lexsort((parts, steps))
+        joint_path = refine_joint_path(joint_path, steps[order], parts[order])
+    return joint_path, x, u
+
+
+def refuse_unbound(joint_path: JointPath, x: Array) -> None:
+    """Raise for a step (of ṡ² ``x``) on which joints move and nothing limits them."""
+    for step in np.flatnonzero((x >= 0.5 * UNBOUND) & (joint_path.step > 0.0)):
+        moving = np.abs(joint_path.joints[step + 1] - joint_path.joints[step]) > 1e-12
+        if moving.any():
+            names = [name for name, moves in zip(joint_path.posted.machine.joints, moving, strict=True) if moves]
+            text = f"no feed, and no speed or acceleration of {', '.join(names)}"
+            raise PoseError(f"{joint_path.between(int(step))} nothing limits the motion: {text}")
+
+
+def _compute_spans(joint_path: JointPath, x: Array) -> Array:
+    """Compute the time of each step, s, from ṡ² at the rows."""
+    speed, moving = np.sqrt(x), joint_path.step > 0.0
+    time, total = np.zeros(len(moving)), speed[:-1] + speed[1:]
+    spans: Array = np.divide(2.0 * joint_path.step, total, out=time, where=moving)
+    return spans
+
+
+def profile_with_constant_acceleration(
+    joint_path: JointPath, limits: DriveLimits, x: Array, u: Array
+) -> tuple[SpeedProfile, Indices]:
+    """Write a profile of constant s̈ over each step, and what binds it at each row."""
+    return _write_steps(joint_path, limits, np.sqrt(x)[:-1], u, _compute_spans(joint_path, x))
+
+
+def profile_with_constant_speed(joint_path: JointPath, limits: DriveLimits) -> tuple[SpeedProfile, Indices]:
+    """Write the profile of the greatest constant speed over each step, and what binds it at each row."""
+    ceiling = np.minimum(*compute_ceilings(joint_path, limits))
+    refuse_unbound(joint_path, ceiling)
+    speed = np.sqrt(ceiling)
+    return _write_steps(joint_path, limits, speed, np.zeros(len(speed)), joint_path.step / speed)
+
+
+def _write_steps(
+    joint_path: JointPath, limits: DriveLimits, speed: Array, acceleration: Array, spans: Array
+) -> tuple[SpeedProfile, Indices]:
+    """Write a profile of one piece for each step, stretched in time by what a limit is exceeded, and what binds it."""
+    row_times = np.append(0.0, np.cumsum(spans))
+    row = np.flatnonzero(joint_path.step > 0.0)
+    time, still = np.append(row_times[row], row_times[-1]), np.zeros(len(row))
+    profile = SpeedProfile(time, row, still, speed[row], acceleration[row], still, row_times)
+    without_jerk = limits._replace(jerk=np.full_like(limits.jerk, np.inf))
+    binding, changed = np.zeros(len(row_times), np.int64), np.ones(len(joint_path.step), bool)
+    args = (joint_path.rows, without_jerk, profile, Utilisation(np.empty((len(row), 4)), binding, changed), _PLACES)
+    factors = list[float]()
+    split(len(row), lambda first, last: factors.append(measure_utilisation(*args, first, last)))
+    worst = max(factors)
+    return profile.stretch(worst if worst > 1.0 + _ROUNDING else 1.0), binding

@@ -1,0 +1,137 @@
+"""The wrist: two turning joints, their other mode, their pole, and turns counted to the nearest."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+import parakin as pk
+from parakin.kinematics import wrist as w
+
+WRISTS = ["tricept", "orthoglide5_head", "orthoglide5_table"]
+angles = st.floats(-50.0, 50.0)
+
+
+@pytest.fixture(params=WRISTS)
+def machine(request):
+    return pk.load(request.param)
+
+
+def upright(machine, count=1):
+    """Poses at home with the tool along the wrist's first axis."""
+    poses = np.tile(machine.home, (count, 1))
+    poses[:, 3] = 0.0
+    if machine.name == "tricept":  # the central leg carries the axis: below the base's middle it hangs upright
+        poses[:, :2] = 0.0
+    return poses
+
+
+def tilted(machine, by):
+    poses = upright(machine, len(by))
+    poses[:, 3], poses[:, 4] = by, 0.3
+    return poses
+
+
+@pytest.mark.parametrize("name", sorted(set(pk.machines()) - set(WRISTS)))
+def test_other_machines_have_none(name):
+    assert pk.load(name).wrist is None
+
+
+def test_both_modes_point_the_tool_the_same_way(machine):
+    poses = tilted(machine, np.linspace(0.05, 0.5, 20))
+    mode = machine.mode
+    other = machine.inverse(poses, machine.wrist.other_mode(mode))
+    assert np.abs(other - machine.inverse(poses, mode))[:, machine.wrist.pair].max(1).min() > 0.05
+    back = machine.forward(other, near=poses)
+    assert back.converged.all()
+    turned = back.poses.copy()
+    turned[:, 4] = w.find_nearest_turn(turned[:, 4], poses[:, 4])
+    np.testing.assert_allclose(turned, poses, atol=1e-6)
+    assert machine.wrist.other_mode(machine.wrist.other_mode(mode)) == mode
+
+
+def test_freedom_is_the_sine_squared_of_the_angle_off_the_pole(machine):
+    if machine.name == "tricept":
+        pytest.skip("its pole turns with the pose")
+    by = np.array([0.0, 1e-9, 1e-3, 0.4])
+    np.testing.assert_allclose(machine.wrist.measure_freedom(tilted(machine, by)), np.sin(by) ** 2, rtol=1e-9)
+
+
+def test_the_pole_is_where_both_modes_meet(machine):
+    wrist, on = machine.wrist, upright(machine)
+    assert wrist.find_free(on, w.EXACT).all()
+    assert not wrist.find_free(tilted(machine, np.array([0.01])), w.PRINTED).any()
+    second = [machine.inverse(on, mode)[0, wrist.second] for mode in machine.head_modes(machine.mode)]
+    assert second[0] == pytest.approx(second[1], abs=1e-9)
+
+
+def test_the_first_joint_can_be_given_on_the_pole(machine):
+    poses = upright(machine, 5)
+    first = np.linspace(-1.0, 1.0, 5)
+    joints = machine.wrist.solve_with_first(poses, machine.mode, first)
+    np.testing.assert_array_equal(joints[:, machine.wrist.first], first)
+    back = machine.forward(joints, near=poses)
+    assert back.converged.all()
+    np.testing.assert_allclose(back.poses[:, :4], poses[:, :4], atol=1e-6)
+
+
+def test_a_path_over_the_pole_goes_on_in_the_other_mode(machine):
+    poses = tilted(machine, np.linspace(-0.2, 0.2, 41) + 1e-4)
+    joints = machine.follow(poses)
+    assert np.abs(np.diff(joints[:, machine.wrist.pair], axis=0)).max() < 0.1  # half a turn, were it not for that
+    modes = [machine.wrist.has_mode(poses[[row]], joints[[row]], machine.mode)[0] for row in (0, -1)]
+    assert modes[0] != modes[1]
+
+
+@given(angles, angles)
+def test_the_nearest_turn(angle, near):
+    nearest = w.find_nearest_turn(np.array([angle]), np.array([near]))[0]
+    assert abs(nearest - near) <= np.pi + 1e-9
+    assert (nearest - angle) / (2.0 * np.pi) == pytest.approx(round((nearest - angle) / (2.0 * np.pi)), abs=1e-9)
+
+
+def test_unwound_angles_keep_what_does_not_exist():
+    walk = np.linspace(0.0, 20.0, 50)
+    wound = w.wrap_angle(walk)
+    wound[7] = np.nan
+    unwound = w.unwind_angles(wound)
+    assert np.isnan(unwound[7])
+    np.testing.assert_allclose(np.delete(unwound, 7), np.delete(walk, 7), atol=1e-12)
+
+
+def test_free_angles_are_their_neighbours():
+    free = np.array([True, False, True, True, False, True])
+    np.testing.assert_array_equal(w.fill_free(np.array([9.0, 1.0, 9.0, 9.0, 2.0, 9.0]), free), [1, 1, 1, 1, 2, 2])
+
+
+def rotation(turns):
+    (sa, sb, sc), (ca, cb, cc) = np.sin(turns), np.cos(turns)
+    a = np.array([[1, 0, 0], [0, ca, -sa], [0, sa, ca]])
+    b = np.array([[cb, 0, sb], [0, 1, 0], [-sb, 0, cb]])
+    c = np.array([[cc, -sc, 0], [sc, cc, 0], [0, 0, 1]])
+    return c @ b @ a
+
+
+@given(angles, angles, angles)
+def test_the_other_turns_are_of_the_same_rotation(a, b, c):
+    other = w.flip_rotation(np.array([[a, b, c]]))[0]
+    np.testing.assert_allclose(rotation(other), rotation(np.array([a, b, c])), atol=1e-12)
+
+
+@given(angles, angles)
+def test_the_other_direction_is_the_same(b, c):
+    other_c, other_b = w.flip_direction(np.array([c]), np.array([b]))[0]
+    np.testing.assert_allclose(
+        rotation(np.array([0.0, other_b, other_c]))[:, 2], rotation(np.array([0.0, b, c]))[:, 2], atol=1e-12
+    )
+
+
+def test_the_nearest_direction_points_along_the_axis():
+    rng = np.random.default_rng(5)
+    axis = rng.normal(size=(200, 3))
+    axis /= np.linalg.norm(axis, axis=1)[:, None]
+    near = rng.uniform(-6.0, 6.0, (200, 3)) * [0, 1, 1]
+    turns = w.find_nearest_direction(axis, near)
+    np.testing.assert_allclose([rotation(row)[:, 2] for row in turns], axis, atol=1e-12)
+    assert (turns[:, 0] == 0.0).all()
+    assert np.abs(turns[:, 2] - near[:, 2]).max() <= np.pi + 1e-9

@@ -20,9 +20,8 @@ from pathlib import Path
 import numpy as np
 import turbine_blade
 
+import parakin as pk
 from parakin.controllers import linuxcnc_program, program_seconds
-from parakin.toolpath.job import prepare
-from parakin.toolpath.reading.detect import read_path
 
 HERE = Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE.parent / "tests" / "linuxcnc"))
@@ -30,7 +29,10 @@ from simulation import CYCLE, as_programmed, first_line, simulated, trial, why_n
 from stub import outward, world  # noqa: E402
 
 RECORDS, SHOWN, FEED = 2000, 130, 10_000.0  # of the whole operation, of it here, and mm/min in the cut
-OTHERS = (("hexapod", "-60,20,710", False), ("linear_delta", "-60,45,1920", True))  # where the part lies there
+OTHERS = (  # where the part lies there
+    ("hexapod", pk.workpiece(X=-60, Y=20, Z=710), False),
+    ("linear_delta", pk.workpiece(X=-60, Y=45, Z=1920), True),
+)
 NAMES = {"d1": "strut d1", "d2": "strut d2", "d3": "strut d3", "theta1": "wrist θ1", "theta2": "wrist θ2"}
 COLOURS = ("#9db4c9", "#6c8fb0", "#3f6d99", "#c8442f", "#d9a441")
 
@@ -41,7 +43,7 @@ def part(folder, upright=False):
     file = Path(folder) / "turbine_blade.cls"
     lines = turbine_blade.nx_lines(path, turbine_blade.FEEDS | {"cut": FEED})
     file.write_text("\n".join(lines) + "\n", encoding="ascii")
-    whole, shown = read_path(file), slice(SHOWN)
+    whole, shown = pk.read_path(file), slice(SHOWN)
     arrays = {name: getattr(whole, name)[shown] for name in ("tip", "axis", "line", "rapid", "feed", "spindle")}
     return replace(whole, events=tuple(e for e in whole.events if e.record < SHOWN), **arrays)
 
@@ -102,7 +104,7 @@ def picture(target, machine, runs):
 
 def programs(machine, folder, place, upright):
     """The job, and its programs: as programmed and as posted."""
-    job = prepare(machine, part(folder, upright), workpiece=place)
+    job = pk.prepare(machine, part(folder, upright), workpiece=place)
     file = io.BytesIO()
     linuxcnc_program(job.trajectory)(file)
     return job, as_programmed(job.posted), file.getvalue().decode("ascii")

@@ -229,10 +229,11 @@ def turned(tip, turns, **others):
 
 
 @UNDER
-@pytest.mark.parametrize("workpiece", [None, "0,0,-1650,12,-7,20"])
-def test_turns_of_a_program(under, workpiece):
+@pytest.mark.parametrize("angles", [None, {"A": 12 * DEGREE, "B": -7 * DEGREE, "C": 20 * DEGREE}])
+def test_turns_of_a_program(under, angles):
     machine = pk.load("tricept")
-    z = 0.0 if workpiece else -1650.0
+    z = 0.0 if angles else -1650.0
+    workpiece = pk.workpiece(Z=-1650, **angles) if angles else None
     turns = np.radians([[0, 20, 10], [0, 25, 200], [0, 25, 200], [0, -15, 230], [0, -15, 0]])
     posted = post(
         machine, turned([[20, 0, z], [-20, 30, z], [20, 30, z], [0, 10, z], [0, 10, z]], turns), workpiece=workpiece
@@ -249,7 +250,8 @@ def test_whole_turns_in_one_motion_hide_nothing():
     start = np.radians([[0, 10, 0]])
     for whole in (1, 2, 3):
         turns = np.vstack([start, start + [0, 0, whole * 2 * math.pi]])
-        posted = post(machine, turned([[0, 0, 0], [5, 0, 0]], turns), workpiece="0,0,0,0,20,0")  # poses are not turns
+        # The poses are not the turns.
+        posted = post(machine, turned([[0, 0, 0], [5, 0, 0]], turns), workpiece=pk.workpiece(B=20 * DEGREE))
         result = linearised(posted, "pose", angle=5e-3)
         assert within(posted, result, "pose", 0.01, 5e-3) <= 1.0
         assert len(result.path) > 10 * whole
@@ -370,7 +372,7 @@ def test_lines_feeds_events_and_times():
         spindle=np.arange(4.0),
     )
     path = replace(path, line=np.array([10, 11, 12, 15]), tool={"number": 3.0})
-    posted = post(machine, path, workpiece="1,2,3")
+    posted = post(machine, path, workpiece=pk.workpiece(X=1, Y=2, Z=3))
     result = linearised(posted, "joints")
     new = result.path
     assert np.array_equal(result.frame, posted.frame)
@@ -394,7 +396,9 @@ def test_lines_feeds_events_and_times():
 
 def test_the_file_s_own_frame_stays():
     frame = np.column_stack([Rotation.from_euler("z", 40, degrees=True).as_matrix(), [10.0, -5.0, 280.0]])
-    posted = post(pk.load("linear_delta"), path_of([[-80, 0, 0], [80, 0, 0]], frame=frame), workpiece="1,1,0")
+    posted = post(
+        pk.load("linear_delta"), path_of([[-80, 0, 0], [80, 0, 0]], frame=frame), workpiece=pk.workpiece(X=1, Y=1)
+    )
     result = linearised(posted, "joints")
     assert within(posted, result, "joints", 0.01, 1e-3) <= 1.0
 

@@ -36,7 +36,11 @@ TASKS = {
     "tricept": ("G1 X50 Y60 Z-1630 B15 C20 F9000", {"G0 Z-2090": "joint", "G0 X1500 Z-400": "kinematicsInverse"}),
 }
 # Where the example part lies, on top of its own frame, and whether its tool stays upright.
-PLACES = {"tricept": (None, False), "hexapod": ("-60,20,710", False), "linear_delta": ("-60,45,1920", True)}
+PLACES = {
+    "tricept": (None, False),
+    "hexapod": (pk.workpiece(X=-60, Y=20, Z=710), False),
+    "linear_delta": (pk.workpiece(X=-60, Y=45, Z=1920), True),
+}
 FEED = 10_000.0  # mm/min, in the cut: ball mill of 10 mm, four teeth, aluminium
 
 WHY_NOT = why_not()

@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 
 import parakin as pk
+from parakin.commands.workpiece import parse_bounds
 from parakin.toolpath.path import ToolPath
-from parakin.toolpath.placing.placement import parse_bounds, placed
+from parakin.toolpath.placing.placement import placed
 from parakin.toolpath.posting.frames import transform
 from parakin.toolpath.posting.post import post
 
@@ -207,44 +208,6 @@ def test_progress():
     placed(pk.load("linear_delta"), scattered(3, 40, [80, 80, 20]), parse_bounds("X=-9:9,Z=280"), progress=said.append)
     assert said == sorted(said)
     assert said[-1] == 1.0
-
-
-# What a user writes.
-
-
-def test_bounds():
-    found = parse_bounds("x=-100:100, Y=2in ,Z=-1.7m:-1500mm,C=-90:0.5rad")
-    assert list(found) == ["X", "Y", "Z", "C"]
-    assert found["X"] == (-100.0, 100.0)
-    assert found["Y"] == (50.8, 50.8)
-    assert found["Z"] == pytest.approx((-1700.0, -1500.0))
-    assert found["C"] == pytest.approx((-math.pi / 2, 0.5))
-
-
-@pytest.mark.parametrize(
-    "text",
-    [
-        "",
-        "X",
-        "X=",
-        "=3",
-        "X=1:",
-        "X=:1",
-        "X=1:2:3",
-        "X=5:4",
-        "X=1,X=2:3",
-        "Q=1",
-        "X=1,,Y=2",
-        "X=1deg",
-        "C=1mm",
-        "X=nan:1",
-    ],
-)
-def test_bad_bounds(text):
-    with pytest.raises(pk.InputError) as caught:
-        parse_bounds(text)
-    assert str(caught.value).startswith("--place: ")
-    assert "\n" not in str(caught.value)
 
 
 def test_questions_that_make_no_sense():

@@ -16,7 +16,7 @@ import parakin as pk
 from parakin.export.files import write_all
 from parakin.export.tables import joints as table
 from parakin.toolpath.path import ToolPath
-from parakin.toolpath.posting.frames import parse_workpiece, tool_poses, transform
+from parakin.toolpath.posting.frames import tool_poses, transform
 from parakin.toolpath.posting.post import post
 from parakin.toolpath.reading.cl.reader import read_cl
 from parakin.toolpath.reading.gcode.reader import read_gcode
@@ -59,53 +59,12 @@ def test_option_goes_on_top_of_the_files_frame(tmp_path):
     # File: 90 deg about Z, origin (1, 2, 3): (1, 0, 0) -> (1, 3, 3). Option: 90 deg about Z, then (10, 20, 30).
     part = tmp_path / "part.aptsource"
     part.write_text("$$*CATIA0\n$$ 0 -1 0 1\n$$ 1 0 0 2\n$$ 0 0 1 3\nGOTO/1,0,0,0.6,0,0.8\n")
-    posted = post(pk.load("tricept"), read_cl(part), workpiece="10,20,30,0,0,90")
+    posted = post(pk.load("tricept"), read_cl(part), workpiece=pk.workpiece(X=10, Y=20, Z=30, C=90 * DEGREE))
     np.testing.assert_allclose(posted.poses[0, :3], [-3 + 10, 1 + 20, 3 + 30], atol=1e-12)
     # The axis (0.6, 0, 0.8) turns with both frames, by 180 deg.
     np.testing.assert_allclose(posted.poses[0, 3:], [math.atan2(0.6, 0.8), math.pi], atol=1e-12)
     alone = post(pk.load("tricept"), read_cl(part))
     np.testing.assert_allclose(alone.poses[0, :3], [1, 3, 3], atol=1e-12)
-
-
-@pytest.mark.parametrize(
-    ("text", "point", "image"),
-    [
-        ("1,2,3", (1, 1, 1), (2, 3, 4)),
-        ("X=1in, C=90", (1, 0, 0), (25.4, 1, 0)),
-        ("a=90", (0, 1, 0), (0, 0, 1)),
-        ("b=90", (0, 0, 1), (1, 0, 0)),
-        ("C=0.5rad", (1, 0, 0), (math.cos(0.5), math.sin(0.5), 0)),
-        ("0,0,0,90,0,90", (0, 1, 0), (0, 0, 1)),  # A first, then C
-        ("-1,-2,-3", (0, 0, 0), (-1, -2, -3)),
-    ],
-)
-def test_workpiece(text, point, image):
-    frame = parse_workpiece(text)
-    np.testing.assert_allclose(frame[:, :3] @ point + frame[:, 3], image, atol=1e-12)
-
-
-@pytest.mark.parametrize(
-    "text",
-    [
-        "",
-        "1,2",
-        "1,2,3,4",
-        "1,2,3,4,5,6,7",
-        "1,2,x",
-        "nan,0,0",
-        "1e99,0,0",
-        "X=1,2,3",
-        "X=1,X=2",
-        "Q=3",
-        "X=1deg",
-        "1_0,0,0",
-    ],
-)
-def test_bad_workpiece(text):
-    with pytest.raises(pk.InputError) as caught:
-        parse_workpiece(text)
-    assert str(caught.value).startswith("--workpiece: ")
-    assert "\n" not in str(caught.value)
 
 
 @pytest.mark.parametrize("name", ["hexapod", "lambda6"])
@@ -451,8 +410,8 @@ def test_three_turns_as_programmed(name):
     machine = pk.load(name)
     way = np.linspace(0.0, 1.0, 60)[:, None]
     path = turned_path(machine, [3.0, -2.0, -200.0] + way * [5.0, 4.0, 900.0])
-    for text, angle in (("0,0,0", 0.0), ("X=3,C=40", 40.0 * DEGREE), ("C=180", math.pi)):
-        posted = post(machine, path, workpiece=text)
+    for x, angle in ((0.0, 0.0), (3.0, 40.0 * DEGREE), (0.0, math.pi)):
+        posted = post(machine, path, workpiece=pk.workpiece(X=x, C=angle))
         assert (posted.poses[:, 3:] == path.turns + [0.0, 0.0, angle]).all()  # to the last digit, turn for turn
 
 
@@ -461,7 +420,8 @@ def test_three_turns_in_a_tilted_frame():
     ends = np.cumsum(rng.uniform(-150, 150, (30, 3)), axis=0)
     share = np.linspace(0.0, 1.0, 41)[:-1, None]
     fine = np.vstack([a + share * (b - a) for a, b in itertools.pairwise(ends)] + [ends[-1:]])
-    few, many = (post(machine, turned_path(machine, t), workpiece="C=25,A=35,B=-50") for t in (ends, fine))
+    workpiece = pk.workpiece(A=35 * DEGREE, B=-50 * DEGREE, C=25 * DEGREE)
+    few, many = (post(machine, turned_path(machine, t), workpiece=workpiece) for t in (ends, fine))
     frame = few.frame[:, :3]
     for posted in (few, many):
         for pose, turns in zip(posted.poses, posted.path.turns, strict=True):
@@ -474,7 +434,8 @@ def test_three_turns_in_a_tilted_frame():
 def test_a_frame_tilted_by_a_rounding_changes_no_turn_count():
     machine = pk.load("hexapod")
     path = turned_path(machine, [[1.0, 100.0, 700.0], [2.0, 100.0, -1000.0], [400.0, 95.0, -1000.0]])
-    plain, tilted = (post(machine, path, workpiece=f"A={a},C=30").poses[:, 3:] for a in (0, 1e-7))
+    workpieces = [pk.workpiece(A=a * DEGREE, C=30 * DEGREE) for a in (0, 1e-7)]
+    plain, tilted = (post(machine, path, workpiece=workpiece).poses[:, 3:] for workpiece in workpieces)
     np.testing.assert_allclose(tilted, plain, atol=1e-7)
     assert (tilted != plain).any()
 
@@ -483,7 +444,7 @@ def test_turns_through_b_of_90_degrees():
     machine = pk.load("hexapod")
     b = np.array([80.0, 88.0, 90.0 - 1e-9, 90.0, 91.0, 100.0, 90.0, 89.0])
     path = turned_path(machine, np.column_stack([np.full(8, 10.0), b, np.full(8, 20.0)]))
-    posted = post(machine, path, workpiece="A=1e-8")
+    posted = post(machine, path, workpiece=pk.workpiece(A=1e-8 * DEGREE))
     np.testing.assert_allclose(posted.poses[:, 3:], path.turns, atol=1e-7)
     for pose, turns in zip(posted.poses, path.turns, strict=True):
         np.testing.assert_allclose(rotation(*pose[3:]), posted.frame[:, :3] @ rotation(*turns), atol=1e-9)
@@ -493,9 +454,9 @@ def test_turns_through_b_of_90_degrees():
 def test_b_and_c_as_programmed(name):
     machine = pk.load(name)
     path = turned_path(machine, [[0, 10, 400], [0, 5, 420], [0, 0, 500], [0, -8, 500], [0, -12, 480]])
-    posted = post(machine, path, workpiece="C=-15")
+    posted = post(machine, path, workpiece=pk.workpiece(C=-15 * DEGREE))
     assert (posted.poses[:, 3:] == path.turns[:, 1:] + [0.0, -15.0 * DEGREE]).all()
-    tilted = post(machine, path, workpiece="C=-15,A=2")  # from the axis
+    tilted = post(machine, path, workpiece=pk.workpiece(C=-15 * DEGREE, A=2 * DEGREE))  # from the axis
     b, c = tilted.poses[:, 3:].T
     k = np.column_stack([np.sin(b) * np.cos(c), np.sin(b) * np.sin(c), np.cos(b)])
     np.testing.assert_allclose(k, path.axis @ tilted.frame[:, :3].T, atol=1e-12)
@@ -517,9 +478,11 @@ def test_a_tool_may_spin_where_it_is_round():
 def test_planar_machines_turn_as_programmed(tmp_path):
     machine = planar(tmp_path, "Z")
     path = turned_path(machine, [[0, 0, 5], [0, 0, -20], [0, 0, 12]], [10, 300, 0])
-    np.testing.assert_array_equal(post(machine, path, workpiece="C=3").poses[:, 2], path.turns[:, 2] + 3 * DEGREE)
+    posted = post(machine, path, workpiece=pk.workpiece(C=3 * DEGREE))
+    np.testing.assert_array_equal(posted.poses[:, 2], path.turns[:, 2] + 3 * DEGREE)
     origin = replace(path, tip=np.zeros((3, 3)))
-    nearly = post(machine, origin, workpiece="X=10,Y=300,A=0.001,C=3")  # within what may lean
+    little = pk.workpiece(X=10, Y=300, A=0.001 * DEGREE, C=3 * DEGREE)  # A is within what may lean
+    nearly = post(machine, origin, workpiece=little)
     assert nearly.off == 0
     np.testing.assert_allclose(nearly.poses[:, 2], path.turns[:, 2] + 3 * DEGREE, atol=1e-8)
     machine = planar(tmp_path, "Y")

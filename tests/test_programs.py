@@ -30,7 +30,11 @@ from parakin.toolpath.timing import plan_trajectory
 sys.path.insert(0, str(Path(__file__).parents[1] / "examples"))
 import turbine_blade
 
-PLACES = {"tricept": (None, False), "hexapod": ("-60,20,710", False), "linear_delta": ("-60,45,1920", True)}
+PLACES = {
+    "tricept": (None, False),
+    "hexapod": (pk.workpiece(X=-60, Y=20, Z=710), False),
+    "linear_delta": (pk.workpiece(X=-60, Y=45, Z=1920), True),
+}
 AS_IT_IS = np.hstack([np.eye(3), np.zeros((3, 1))])
 HALF = 0.51e-6  # of the last digit, mm and degrees
 every_place = pytest.mark.parametrize("name", PLACES)

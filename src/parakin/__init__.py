@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from .toolpath.job import Job, prepare
     from .toolpath.path import ToolPath
     from .toolpath.placing.placement import Placement, placed
+    from .toolpath.posting.frames import workpiece
     from .toolpath.reading.detect import read_path
     from .toolpath.timing.trajectory import Trajectory
     from .workspace.certified.workspace import Workspace, workspace
@@ -41,6 +42,7 @@ __all__ = [
     "placed",
     "prepare",
     "read_path",
+    "workpiece",
     "workspace",
 ]
 
@@ -86,6 +88,7 @@ _LAZY = {
     "placed": "toolpath.placing.placement",
     "prepare": "toolpath.job",
     "read_path": "toolpath.reading.detect",
+    "workpiece": "toolpath.posting.frames",
     "workspace": "workspace.certified.workspace",
 }
 

@@ -13,8 +13,9 @@ from ..units import NUMBER, QuantityError, parse_quantity
 from .atlas_files import Files
 from .atlas_summary import atlas_json, atlas_text, performance_json, performance_text, proofs_json, proofs_text
 from .console import Progress, announce_compiling, print_json, rim
-from .options import OFF_LIMITS, Json, Mode, Name, Sizes, machine_of, row
+from .options import OFF_LIMITS, Json, Mode, Name, Sizes, machine_of
 from .regions import At, Without, length, parts_of, ranges_of, region_of, values_of
+from .values import parse_row, parse_value
 
 if TYPE_CHECKING:
     from ..arrays import Array
@@ -80,7 +81,9 @@ def atlas(
     rows = None
     if pose is not None:
         default = asked.poses(machine.home[[machine.axes.index(axis) for axis in asked.places]][None])[0]
-        rows = row([part.strip() for part in pose.split(",")], machine.axes, machine.axis_units, default, "--pose")
+        rows = parse_row(
+            [part.strip() for part in pose.split(",")], machine.axes, machine.axis_units, default, "--pose"
+        )
     announce_compiling()
     found = _Found(machine, asked)
     with Progress() as progress:
@@ -122,7 +125,6 @@ def _cuts(
     mode: str | None,
 ) -> list[Region]:
     """The regions to draw: those that --slice names, else one through home, or all of one that is flat already."""
-    from ..toolpath.posting.frames import parse_value
     from ..workspace.certified.region import region
 
     held = []

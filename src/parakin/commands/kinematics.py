@@ -12,7 +12,8 @@ from cyclopts import Parameter
 from ..errors import InputError
 from .console import announce_compiling, fixed, print_json, rim, rim_unit, say, table
 from .offences import offence_json, offence_line
-from .options import OFF_LIMITS, Json, Mode, Name, Sizes, machine_of, row
+from .options import OFF_LIMITS, Json, Mode, Name, Sizes, machine_of
+from .values import parse_row
 
 if TYPE_CHECKING:
     from ..arrays import Array
@@ -90,7 +91,7 @@ def forward(
     start = None
     if near is not None:
         parts = [part.strip() for part in near.split(",")]
-        start = row(parts, machine.axes, machine.axis_units, machine.home, "--near")
+        start = parse_row(parts, machine.axes, machine.axis_units, machine.home, "--near")
     from ..toolpath.posting.offences import judge
 
     solution = machine.forward(joints, start)
@@ -138,7 +139,7 @@ def _given(
         return read_rows(csv, names, units)
     if not values:
         raise InputError(f"no values, expected {' '.join(names)} (or --csv FILE)", what)
-    return row(values, names, units, default, what)[None, :], np.zeros(1, np.int64)
+    return parse_row(values, names, units, default, what)[None, :], np.zeros(1, np.int64)
 
 
 class _Result:

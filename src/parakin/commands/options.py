@@ -1,4 +1,4 @@
-"""What commands have in common: options, and values as a user writes them."""
+"""The options that commands share, and the machine they name."""
 
 from __future__ import annotations
 
@@ -10,7 +10,6 @@ from cyclopts import Parameter
 from ..errors import InputError, InputErrors
 
 if TYPE_CHECKING:
-    from ..arrays import Array
     from ..machine import Machine
 
 OFF_LIMITS = 3  # exit code
@@ -54,38 +53,3 @@ def machine_of(name: str, sizes: Sequence[str] | None = None) -> Machine:
 
 def _at_option(error: InputError) -> InputError:
     return InputError(error.message, "--set") if error.source == "parameters" else error
-
-
-def row(values: Sequence[str], names: Sequence[str], units: Sequence[str], default: Array | None, source: str) -> Array:
-    """One row of values in mm and rad, from ``10 -20`` in the names' order or from ``X=10 Z=-20``.
-
-    What isn't named comes from ``default``. Plain numbers are mm and degrees.
-    """
-    import numpy as np
-
-    from ..errors import quote, suggest
-    from ..toolpath.posting.frames import parse_value
-
-    named = ["=" in value for value in values]
-    wanted = " ".join(names)
-    if any(named) and not all(named):
-        raise InputError(f"values with a name and without one are mixed, expected either {wanted} or names", source)
-    if not all(named) and len(values) != len(names):
-        raise InputError(f"{len(values)} value{'s' * (len(values) != 1)}, expected {len(names)}: {wanted}", source)
-    by_name = dict(zip(names, units, strict=True))
-    spelled = {name.lower(): name for name in names}
-    result = np.full(len(names), np.nan) if default is None else np.array(default, dtype=np.float64)
-    given = [v.partition("=")[::2] for v in values] if all(named) else list(zip(names, values, strict=True))
-    seen: set[str] = set()
-    for word, text in given:
-        name = spelled.get(word.strip().lower())
-        if name is None:
-            raise InputError(f"unknown {quote(word.strip())}{suggest(word.strip(), names)}", source)
-        if name in seen:
-            raise InputError(f"{name} is given twice", source)
-        seen.add(name)
-        result[list(names).index(name)] = parse_value(name, text.strip(), source, by_name[name])
-    missing = [name for name, value in zip(names, result.tolist(), strict=True) if value != value]
-    if missing:
-        raise InputError(f"no value for {', '.join(missing)}, expected {wanted}", source)
-    return result

@@ -10,6 +10,7 @@ from cyclopts import Parameter
 from ..errors import InputError, PoseError
 from .console import Progress, announce_compiling, print_json
 from .options import OFF_LIMITS, Json, Mode, Sizes, machine_names, machine_of
+from .workpiece import parse_bounds, parse_workpiece
 
 if TYPE_CHECKING:
     from ..export.files import Content
@@ -76,7 +77,7 @@ def post(
     """
     from math import isfinite, radians
 
-    from ..toolpath.posting.frames import composed, parse_workpiece
+    from ..toolpath.posting.frames import composed
 
     chosen = machine_of(machine, sizes)
     if place is not None and workpiece is not None:
@@ -118,7 +119,7 @@ def post(
 
 
 def _placement(machine: Machine, path: ToolPath, place: str, mode: str | None, progress: Progress) -> Placement:
-    from ..toolpath.placing.placement import parse_bounds, placed
+    from ..toolpath.placing.placement import placed
 
     return placed(machine, path, parse_bounds(place), mode=mode, progress=progress.part("placing the part", 0.1, 0.3))
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 from cyclopts import Parameter
 
 from ..errors import InputError, PoseError
+from .values import parse_value
 
 if TYPE_CHECKING:
     from ..machine import Machine
@@ -63,14 +64,11 @@ def region_of(
 
 def values_of(machine: Machine, text: str | None, source: str) -> dict[str, float]:
     """Axes with a value each, mm and rad: ``B=0,C=0``."""
-    from ..toolpath.posting.frames import parse_value
-
     return {axis: parse_value(axis, value, source) for axis, value in parts_of(machine, text, source, "X=10,Z=-1400")}
 
 
 def ranges_of(machine: Machine, text: str | None, source: str) -> dict[str, tuple[float, float]]:
     from ..errors import quote
-    from ..toolpath.posting.frames import parse_value
 
     ranges = {}
     for axis, value in parts_of(machine, text, source, "A=-15:15,B=-15:15"):
@@ -104,7 +102,6 @@ def parts_of(machine: Machine, text: str | None, source: str, example: str) -> l
 def length(text: str | None, source: str) -> float | None:
     """A length above 0, mm, with or without a unit."""
     from ..errors import quote
-    from ..toolpath.posting.frames import parse_value
 
     if text is None:
         return None

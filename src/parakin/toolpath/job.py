@@ -63,7 +63,7 @@ def prepare(
     machine: Machine,
     path: ToolPath,
     *,
-    workpiece: str | Floats | None = None,
+    workpiece: Floats | None = None,
     mode: str | None = None,
     target: Target = "linuxcnc",
     tolerance: float = TOLERANCE,

@@ -8,11 +8,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...errors import InputError, PoseError, quote, suggest
+from ...errors import PoseError
 from ...machine import Machine
 from ...performance.search import spread
 from ..path import Floats, ToolPath
-from ..posting.frames import parse_value
 from ..posting.working_mode import modes_to_try
 from .margins import AXES, Found, Indices, Placing
 from .maximin import Rows, Top, raised, value_of
@@ -20,8 +19,6 @@ from .maximin import Rows, Top, raised, value_of
 Progress = Callable[[float], None]
 Bounds = Mapping[str, tuple[float, float]]
 
-_SOURCE = "--place"
-_EXAMPLE = "X=-100:100,Z=-1500,C=-90:90"
 _LOOKED_AT, _STARTS = 384, 10  # placements spread over the bounds, and those of them to climb from
 _APART = 0.1  # of the bounds
 _STEPS = 20  # of a climb
@@ -59,36 +56,6 @@ class Placement:
         return self.margin >= 0.0
 
 
-def parse_bounds(text: str) -> dict[str, tuple[float, float]]:
-    """The bounds of a ``--place`` option, mm and rad: ``X=-100:100,Z=-1500,C=-90:90``.
-
-    A single value holds its axis; axes not named are 0, as of ``--workpiece``. Plain numbers are mm and degrees; a unit
-    may follow.
-
-    Raises :class:`InputError`.
-    """
-    found: dict[str, tuple[float, float]] = {}
-    for part in text.split(","):
-        axis, equals, value = (word.strip() for word in part.partition("="))
-        if not (axis and equals and value):
-            raise InputError(
-                f"{quote(part.strip())}: expected AXIS=LOW:HIGH or AXIS=VALUE, such as {_EXAMPLE}", _SOURCE
-            )
-        axis = axis.upper()
-        if axis not in AXES:
-            raise InputError(f"unknown axis {quote(axis)}{suggest(axis, AXES)}", _SOURCE)
-        if axis in found:
-            raise InputError(f"{axis} is given twice", _SOURCE)
-        low, colon, high = (word.strip() for word in value.partition(":"))
-        if colon and not (low and high):
-            raise InputError(f"{axis}: expected a range LOW:HIGH, such as -100:100", _SOURCE)
-        ends = parse_value(axis, low, _SOURCE), parse_value(axis, high if colon else low, _SOURCE)
-        if ends[0] > ends[1]:
-            raise InputError(f"{axis}: {quote(value)} is empty, the lesser end comes first", _SOURCE)
-        found[axis] = ends
-    return found
-
-
 def placed(
     machine: Machine, path: ToolPath, bounds: Bounds, *, mode: str | None = None, progress: Progress | None = None
 ) -> Placement:
@@ -97,7 +64,7 @@ def placed(
     Parameters
     ----------
     machine, path : as :func:`~..post.post` takes them
-    bounds : by axis (X Y Z mm, A B C rad) the least and the greatest value, as from :func:`parse_bounds`
+    bounds : by axis (X Y Z mm, A B C rad) the least and the greatest value
     mode : working mode; None: the default one, and head and table's other sign where that allows no placement
     progress : called now and then with the fraction done, 0 to 1
 

@@ -9,72 +9,28 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ...errors import InputError, quote, suggest
 from ...machine import Machine
-from ...units import ANGLE, LENGTH, QuantityError, parse_quantity
 from ..path import Floats
-from ..reading.cl.tokens import LARGEST, is_number, number
 from .programmed_angles import programmed, rotations
 from .tool_axis import BLOCK, turning_of
 from .turn_steps import thickened
 
-__all__ = ["OwnLimit", "composed", "parse_value", "parse_workpiece", "tool_poses", "transform"]
-
-_SOURCE = "--workpiece"
-_AXES = "XYZABC"
-_FORM = 'expected x,y,z or x,y,z,a,b,c (mm, degrees), or names as in "X=10,Z=-1400,C=30"'
+__all__ = ["OwnLimit", "composed", "tool_poses", "transform", "workpiece"]
 
 LEAN = 1e-4  # rad a tool axis may lean where the machine can't tilt it: rounding in the file
 OFF_PLANE = 1e-6  # mm, the same across the plane of a machine that works in one
 
 
-def parse_workpiece(text: str) -> Floats:
-    """The transform of a ``--workpiece`` option, (3, 4): R = Rz(C)·Ry(B)·Rx(A) and the origin, mm.
-
-    ``x,y,z`` or ``x,y,z,a,b,c``, or any of them by name: ``X=10,Z=-1400,C=30``. Plain numbers are mm and degrees; a
-    unit may follow (``X=2in``, ``C=0.5rad``).
-
-    Raises :class:`InputError`.
-    """
-    parts = [part.strip() for part in text.split(",")]
-    named = ["=" in part for part in parts]
-    values = dict.fromkeys(_AXES, 0.0)
-    if any(named) and not all(named):
-        raise InputError(f"{quote(text)} has values with a name and without one; {_FORM}", _SOURCE)
-    if not all(named) and len(parts) not in (3, 6):
-        raise InputError(f"{quote(text)} has {len(parts)} value{'s' * (len(parts) != 1)}; {_FORM}", _SOURCE)
-    if all(named):
-        pairs = [(name.strip().upper(), value.strip()) for name, _, value in (part.partition("=") for part in parts)]
-    else:
-        pairs = list(zip(_AXES, parts, strict=False))
-    seen = set()
-    for name, value in pairs:
-        if name not in values:
-            raise InputError(f"unknown axis {quote(name)}{suggest(name, _AXES)}", _SOURCE)
-        if name in seen:
-            raise InputError(f"{name} is given twice", _SOURCE)
-        seen.add(name)
-        values[name] = parse_value(name, value, _SOURCE)
-    return transform(*values.values())
-
-
-def parse_value(name: str, text: str, source: str, unit: str | None = None) -> float:
-    """A value in mm or degrees as a user writes it, with or without a unit; returns mm or rad.
-
-    ``unit`` is the value's own, ``mm`` or ``rad``; without it the axis letter says.
-    """
-    angular = name in "ABC" if unit is None else unit == "rad"
-    try:
-        if is_number(text):
-            value = number(text)
-            return math.radians(value) if angular else value
-        value = parse_quantity(text, ANGLE if angular else LENGTH)
-    except (QuantityError, InputError) as error:
-        message = error.message if isinstance(error, InputError) else str(error)
-        raise InputError(f"{name}: {message}", source) from None
-    if abs(value) > LARGEST:
-        raise InputError(f"{name}: {quote(text)} is out of range", source)
-    return value
+def workpiece(
+    X: float = 0.0,
+    Y: float = 0.0,
+    Z: float = 0.0,
+    A: float = 0.0,
+    B: float = 0.0,
+    C: float = 0.0,
+) -> Floats:
+    """Build the transform that places a workpiece, (3, 4): R = Rz(C)·Ry(B)·Rx(A) and the origin; mm, rad."""
+    return transform(X, Y, Z, A, B, C)
 
 
 def transform(x: float, y: float, z: float, a: float, b: float, c: float) -> Floats:

@@ -10,7 +10,7 @@ import numpy as np
 from ...errors import PoseError
 from ...machine import Machine
 from ..path import Floats, Note, ToolPath
-from .frames import composed, parse_workpiece, tool_poses
+from .frames import composed, tool_poses
 from .offences import judge
 from .posted import Posted
 from .working_mode import branch, modes_to_try
@@ -22,7 +22,7 @@ def post(
     machine: Machine,
     path: ToolPath,
     *,
-    workpiece: str | Floats | None = None,
+    workpiece: Floats | None = None,
     mode: str | None = None,
     progress: Progress | None = None,
 ) -> Posted:
@@ -31,8 +31,8 @@ def post(
     Parameters
     ----------
     machine, path : as from :func:`parakin.load` and a reader of tool paths
-    workpiece : transform (3, 4), mm, or text as of the option ``--workpiece``; it is applied after the frame that the
-        path itself brings: M ← workpiece ← path.frame ← W
+    workpiece : transform (3, 4), mm, as from :func:`parakin.workpiece`; it is applied after the frame that the path
+        itself brings: M ← workpiece ← path.frame ← W
     mode : working mode, one of ``machine.modes``; None: the default one, or that with head and table's other sign if
         fewer records break a limit in it, or as many and fewer motions in feed turn a joint by more than 90°
     progress : called now and then with the fraction done, 0 to 1
@@ -40,14 +40,13 @@ def post(
     Turns of joints are counted, and taken back in rapid motions where they have to be: see
     :func:`~.posing.branches.branch`.
 
-    Raises :class:`InputError` for a workpiece that can't be read, :class:`PoseError` for an unknown mode, or a motion
-    of thousands of turns. A record that can't be reached raises nothing: it is an offence of the result.
+    Raises :class:`PoseError` for a workpiece that is no transform, an unknown mode, or a motion of thousands of turns.
+    A record that can't be reached raises nothing: it is an offence of the result.
     """
     say = progress or (lambda fraction: None)
-    outer = parse_workpiece(workpiece) if isinstance(workpiece, str) else workpiece
-    if outer is not None and (np.shape(outer) != (3, 4) or not np.isfinite(outer).all()):
+    if workpiece is not None and (np.shape(workpiece) != (3, 4) or not np.isfinite(workpiece).all()):
         raise PoseError("workpiece: a transform of shape (3, 4) expected")
-    frame = composed(outer, path.frame)
+    frame = composed(workpiece, path.frame)
     poses, own = tool_poses(machine, path.tip, path.axis, frame, path.turns)
     say(0.3)
     best, fewest = None, (0, 0)

@@ -10,7 +10,7 @@ from measure import best, table
 
 import parakin as pk
 from parakin.algebra import Trace
-from parakin.kernels.batch import cores
+from parakin.kernels.batch import count_cores
 
 COUNT = 1_000_000
 # What each has to keep to: inverse and direct, times the copy.
@@ -58,7 +58,7 @@ def main() -> str:
         for problem, tool, seconds, bound in lines:
             limit = "" if bound is None else f"≤ {bound:g}"
             rows.append([name, f"{problem}, {tool}", f"{1e9 * seconds / COUNT:.1f}", f"{seconds / copy:.2f}", limit])
-    title = f"{COUNT:,} poses, {cores()} cores (NumPy and gcc: one), C-ordered float64"
+    title = f"{COUNT:,} poses, {count_cores()} cores (NumPy and gcc: one), C-ordered float64"
     return table(title, ["machine", "what", "ns a pose", "times the copy", "bound"], rows)
 
 

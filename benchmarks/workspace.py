@@ -9,7 +9,7 @@ import numpy as np
 from measure import best, table
 
 import parakin as pk
-from parakin.kernels.batch import cores
+from parakin.kernels.batch import count_cores
 from parakin.workspace.certified.region import region
 from parakin.workspace.sampled.grid import GridWorkspace, dense_grid
 from parakin.workspace.sampled.sampling import FirstBroken, surroundings
@@ -118,7 +118,7 @@ def main() -> str:
     codes = look.on_grid(ruled.coordinates)
     copied = codes.copy()
     dense, copy = best(lambda: look.on_grid(ruled.coordinates), 5), best(lambda: np.copyto(copied, codes), 5)
-    title = f"Tricept upright, {cores()} cores (NumPy: one); the NumPy grid of {OWN_ERROR:.0%} has steps of "
+    title = f"Tricept upright, {count_cores()} cores (NumPy: one); the NumPy grid of {OWN_ERROR:.0%} has steps of "
     title += f"{ruled.step:.1f} mm, {ruled.broken.size:,} places, {differ} of them otherwise than the mask"
     rows = [
         ["certified, 1 %", f"{one:.3f}", f"{one / plain:.2f}", "of the NumPy grid of 5 %", "< 1"],

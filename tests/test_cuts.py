@@ -14,7 +14,7 @@ from scipy.optimize import lsq_linear
 from test_kernels import CORNERS, MEANING, SMOOTH, number
 
 from parakin import algebra as alg
-from parakin.kernels.batch import run
+from parakin.kernels.batch import evaluate_tape
 from parakin.kernels.tape import compile_tape
 from parakin.model.limits import distance
 from parakin.workspace.certified.constraints import Constraint
@@ -109,7 +109,7 @@ def margin_of(program, count):
     for name, i, j, k in program:
         values.append(ALL[name](values[-1 - i % min(len(values), 4)], values[j % len(values)], k))
     tape = compile_tape(trace, [values[-1]], count)
-    return trace, values[-1], lambda points: run(tape, points, np.empty((len(points), 1)), whole=False)[:, 0]
+    return trace, values[-1], lambda points: evaluate_tape(tape, points, np.empty((len(points), 1)), whole=False)[:, 0]
 
 
 def assert_bounds_hold(constraint, value, low, size, bottom, top, every, rng, off=1e-9):
@@ -192,7 +192,7 @@ def test_the_jump_of_an_angle_is_not_missed(smooth, every, monkeypatch):
 
     def straight(constraint):
         def value(rows):
-            return run(tape, rows, np.empty((len(rows), 1)))[:, 0]
+            return evaluate_tape(tape, rows, np.empty((len(rows), 1)))[:, 0]
 
         return assert_bounds_hold(constraint, value, low, size, bottom, top, every, rng)
 
@@ -293,7 +293,7 @@ def test_the_work_is_the_same_however_it_is_divided(monkeypatch):
     )
     found = []
     for threads in (1, 2, 7):
-        monkeypatch.setattr("parakin.kernels.batch.cores", lambda threads=threads: threads)
+        monkeypatch.setattr("parakin.kernels.batch.count_cores", lambda threads=threads: threads)
         monkeypatch.setattr("parakin.kernels.batch.SMALL", 100)
         cuts = Cuts(cells)
         cuts.add(0, cell, np.ones((cells, 2)), lines)

@@ -12,7 +12,7 @@ from numba import njit
 
 from parakin import algebra as alg
 from parakin.kernels import elementary
-from parakin.kernels.batch import first_negative, run
+from parakin.kernels.batch import evaluate_tape, find_first_negative
 from parakin.kernels.intervals import IntervalProgram
 from parakin.kernels.tape import compile_tape
 
@@ -141,7 +141,7 @@ def test_arrays_numbers_and_tapes_agree(program, rows):
     flips = np.zeros_like(expected, bool)
     if any(name == "copysign" for name, *_ in program):  # a sign may hang on a rounding's
         flips = np.broadcast_to((np.abs(expected) < 1e-9).any(1, keepdims=True), expected.shape)
-    found = run(compile_tape(trace, outputs, 3), rows, np.empty(expected.shape))
+    found = evaluate_tape(compile_tape(trace, outputs, 3), rows, np.empty(expected.shape))
     assert np.allclose(found[~flips], expected[~flips], rtol=1e-10, atol=1e-10)
 
 
@@ -150,7 +150,7 @@ def test_arrays_numbers_and_tapes_agree(program, rows):
 def test_derivatives_are_those_of_central_differences(program, rows):
     trace, inputs, outputs = traced(program)
     exact = compile_tape(trace, [alg.derivative(outputs[-1], x) for x in inputs], 3)
-    found = run(exact, rows, np.empty((len(rows), 3)))
+    found = evaluate_tape(exact, rows, np.empty((len(rows), 3)))
 
     def value(at):
         return np.broadcast_to(expression(at.T, program)[-1], len(at))
@@ -233,15 +233,15 @@ def test_blocks_of_any_length_and_rows_that_are_not_numbers():
     tape = compile_tape(trace, [alg.sqrt(x), x * y], 2)
     for count in (0, 1, 127, 128, 129, 1000, 9000):
         rows = np.random.default_rng(34).uniform(0.1, 2, (count, 2))
-        clean = run(tape, rows, np.empty((count, 2)))
+        clean = evaluate_tape(tape, rows, np.empty((count, 2)))
         assert np.allclose(clean, np.column_stack([np.sqrt(rows[:, 0]), rows[:, 0] * rows[:, 1]]), rtol=1e-15)
         if count > 100:
             rows[50, 1], rows[60, 0], rows[70, 0] = np.nan, np.inf, -1.0
-            dirty = run(tape, rows, np.empty((count, 2)))
+            dirty = evaluate_tape(tape, rows, np.empty((count, 2)))
             assert np.isnan(dirty[[50, 60, 70]]).all()
             rest = np.setdiff1d(np.arange(count), [50, 60, 70])
             assert np.array_equal(dirty[rest], clean[rest])
-            first = first_negative(tape, rows, np.empty((count, 0)))
+            first = find_first_negative(tape, rows, np.empty((count, 0)))
             assert (first[[50, 60, 70]] > 0).all()
             assert first[70] == 1
             assert not first[rest].any()

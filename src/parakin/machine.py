@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 from .algebra import Scalar
 from .arrays import Array
 from .errors import DescriptionError, NoMethodError, PoseError
-from .kernels.batch import first_negative, run, run_checked
+from .kernels.batch import evaluate_tape, evaluate_tape_with_residual, find_first_negative
 from .kinematics.assemblies import find_assemblies
 from .kinematics.follow import follow_path
 from .kinematics.forward import Solution, closure_tolerance, find_sides, solve_forward
@@ -283,7 +283,7 @@ class Machine:
         if not self.has_closed_forward:
             raise NoMethodError(f"{self.name}: no closed form of the direct problem")
         poses = np.empty((len(joints), len(self.axes)))
-        residual = run_checked(self.model.spheres_tape(side), joints, poses, np.empty((len(joints), 0)))
+        residual = evaluate_tape_with_residual(self.model.spheres_tape(side), joints, poses, np.empty((len(joints), 0)))
         return poses, residual
 
     def tapes(self, mode: str) -> KinematicTapes:
@@ -300,7 +300,7 @@ class Machine:
         rows, lead = self.rows(poses, self.axes, "poses")
         n, m = len(self.axes), len(self.joints)
         joints = self.inverse(rows, mode)
-        both = run(self.model.jacobian_tape(), rows, np.empty((len(rows), n * n + n * m)), joints)
+        both = evaluate_tape(self.model.jacobian_tape(), rows, np.empty((len(rows), n * n + n * m)), joints)
         return both[:, : n * n].reshape(*lead, n, n), both[:, n * n :].reshape(*lead, n, m)
 
     def twist_rates(self, poses: Array, joints: Array, whole: bool = True) -> tuple[Array, Array, Array]:
@@ -311,7 +311,7 @@ class Machine:
         """
         m = len(self.axes)
         tape = self.model.rates_tape()
-        both = run(tape, poses, np.empty((len(poses), tape.outputs)), joints, whole)
+        both = evaluate_tape(tape, poses, np.empty((len(poses), tape.outputs)), joints, whole)
         a, b = (both[:, i * m * m : (i + 1) * m * m].reshape(-1, m, m) for i in (0, 1))
         return a, b, both[:, 2 * m * m :]
 
@@ -347,15 +347,16 @@ class Machine:
         rows, lead = self.rows(poses, self.axes, "poses")
         own, count = self.model.check_tape(self.checked_mode(mode)), len(self.limits)
         if joints is None:
-            out = run(own, rows, np.empty((len(rows), count)), whole=False)
+            out = evaluate_tape(own, rows, np.empty((len(rows), count)), whole=False)
         else:
             q = self._joints_of(joints, len(rows))
-            out = run(
+            out = evaluate_tape(
                 self.model.margins_tape(self.checked_mode(mode)), rows, np.empty((len(rows), count)), q, whole=False
             )
             lost = ~np.isfinite(q).all(1)
             if lost.any():  # where joints do not exist, the pose tells which leg can't close
-                out[lost] = run(own, np.ascontiguousarray(rows[lost]), np.empty((int(lost.sum()), count)), whole=False)
+                at_lost = np.ascontiguousarray(rows[lost])
+                out[lost] = evaluate_tape(own, at_lost, np.empty((len(at_lost), count)), whole=False)
                 out[lost & (out >= 0.0).all(1), :1] = np.nan
         return out.reshape(*lead, count)
 
@@ -369,11 +370,11 @@ class Machine:
             return np.zeros(lead, np.int64)[()]
         own, nothing = self.model.check_tape(self.checked_mode(mode)), np.empty((len(rows), 0))
         if joints is None:
-            return first_negative(own, rows, nothing).reshape(lead)[()]
+            return find_first_negative(own, rows, nothing).reshape(lead)[()]
         q = self._joints_of(joints, len(rows))
-        broken = first_negative(self.model.margins_tape(self.checked_mode(mode)), rows, q)
+        broken = find_first_negative(self.model.margins_tape(self.checked_mode(mode)), rows, q)
         lost = ~np.isfinite(q).all(1)
         if lost.any():
-            of_pose = first_negative(own, np.ascontiguousarray(rows[lost]), nothing[lost])
+            of_pose = find_first_negative(own, np.ascontiguousarray(rows[lost]), nothing[lost])
             broken[lost] = np.where(of_pose == 0, 1, of_pose)
         return broken.reshape(lead)[()]

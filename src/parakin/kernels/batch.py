@@ -5,43 +5,43 @@ from __future__ import annotations
 import os
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
 from functools import cache
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .tape import Tape
+from ..arrays import Array, Indices
+from .tape import NewtonTapes, Tape
 
-Rows = NDArray[np.float64]
 SMALL = 4096  # rows below which a second thread costs more than it brings
 
 
-def cores() -> int:
-    """Cores this process may use."""
+def count_cores() -> int:
+    """Count the cores that this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 @cache
 def _pool() -> ThreadPoolExecutor:
-    return ThreadPoolExecutor(cores(), thread_name_prefix="parakin")
+    return ThreadPoolExecutor(count_cores(), thread_name_prefix="parakin")
 
 
 if hasattr(os, "register_at_fork"):  # a forked child has the pool but none of its threads
     os.register_at_fork(after_in_child=_pool.cache_clear)
 
 
-def still(rows: Rows) -> Rows:
-    """A read-only view: to Numba that is a type of its own, and the kernels are compiled for it alone."""
+def freeze(rows: Array) -> Array:
+    """Return a read-only view: to Numba that is a type of its own, and the kernels are compiled for it alone."""
     view = rows.view()
     view.flags.writeable = False
     return view
 
 
-def split(count: int, work: Callable[[int, int], None]) -> None:
-    """Run ``work(start, stop)`` over all rows; the kernels release the interpreter's lock."""
-    parts = min(cores(), count // SMALL)
+def run_in_threads(count: int, work: Callable[[int, int], None]) -> None:
+    """Run ``work(start, stop)`` over all rows, a part in each thread; the kernels release the interpreter's lock."""
+    parts = min(count_cores(), count // SMALL)
     if parts < 2:
         work(0, count)
         return
@@ -50,59 +50,78 @@ def split(count: int, work: Callable[[int, int], None]) -> None:
         future.result()
 
 
-def run(tape: Tape, x: Rows, out: Rows, z: Rows | None = None, whole: bool = True) -> Rows:
-    """Rows of ``x`` (N, i), followed by those of ``z``, through a tape into ``out`` (N, o).
+def evaluate_tape(tape: Tape, x: Array, out: Array, z: Array | None = None, whole: bool = True) -> Array:
+    """Evaluate a tape for rows of ``x`` (N, i), each followed by its row of ``z``, into ``out`` (N, o).
 
     With ``whole`` a row of the answer is NaN as soon as one number of it, or of its inputs, is not finite.
     """
     from .blocks import evaluate
 
-    given = np.empty((len(x), 0)) if z is None else z
-    args = (*tape.parts, whole, still(x), still(given), out)
-    split(len(x), lambda start, stop: evaluate(*args, start, stop))
+    rest = np.empty((len(x), 0)) if z is None else z
+    args = (tape, whole, freeze(x), freeze(rest), out)
+    run_in_threads(len(x), lambda start, stop: evaluate(*args, start, stop))
     return out
 
 
-@dataclass(frozen=True, eq=False)
-class Roots:
-    """What Newton's method ended with, a row a problem."""
+def evaluate_tape_with_residual(tape: Tape, x: Array, out: Array, z: Array) -> Array:
+    """Evaluate a tape that ends with closures, all else into ``out``; returns the greatest closure, (N,) mm."""
+    from .blocks import evaluate_with_residual
 
-    found: Rows  # what the last tape makes of the root
-    residual: Rows  # the greatest closure left, mm
-    steps: NDArray[np.int32]
-    turned: Rows  # below 0 where the root is on the other side of a singularity; see :func:`solve`
-
-
-def solve(
-    tapes: tuple[Tape, Tape, Tape, Tape], near: Rows, q: Rows, caps: Rows, size: float, most: int, side: Rows
-) -> Roots:
-    """Newton from ``near`` (1 or N rows) for every row of ``q``; see :func:`parakin.kernels.newton.newton`."""
-    from .newton import newton
-
-    count = len(q)
-    result = Roots(np.empty((count, tapes[3].outputs)), np.empty(count), np.empty(count, np.int32), np.empty(count))
-    programs = [(tape.code, tape.imm) for tape in tapes]
-    args = (*programs, max(tape.registers for tape in tapes), still(near), still(q), caps, size, most, side)
-    into = (result.found, result.residual, result.steps, result.turned)
-    split(count, lambda start, stop: newton(*args, *into, start, stop))
-    return result
+    residual = np.empty(len(x))
+    args = (tape, freeze(x), freeze(z), out, residual)
+    run_in_threads(len(x), lambda start, stop: evaluate_with_residual(*args, start, stop))
+    return residual
 
 
-def run_checked(tape: Tape, x: Rows, out: Rows, z: Rows) -> Rows:
-    """As :func:`run` for a tape that gives ``out``'s columns and then closures: the greatest of these, (N,) mm."""
-    from .blocks import evaluate_checked
-
-    worst = np.empty(len(x))
-    args = (*tape.parts, still(x), still(z), out, worst)
-    split(len(x), lambda start, stop: evaluate_checked(*args, start, stop))
-    return worst
-
-
-def first_negative(tape: Tape, x: Rows, z: Rows) -> NDArray[np.int64]:
-    """0 where every output of the tape is ≥ 0, else 1 + the index of the first that is negative or NaN."""
-    from .blocks import first_broken
+def find_first_negative(tape: Tape, x: Array, z: Array) -> Indices:
+    """Find the first output that is negative or NaN, (N,): 1 + its index, 0 where every output is ≥ 0."""
+    from .blocks import find_negative
 
     out = np.empty(len(x), np.int64)
-    args = (*tape.parts, still(x), still(z), out)
-    split(len(x), lambda start, stop: first_broken(*args, start, stop))
+    args = (tape, freeze(x), freeze(z), out)
+    run_in_threads(len(x), lambda start, stop: find_negative(*args, start, stop))
     return out
+
+
+class NewtonSteps(NamedTuple):
+    """What bounds Newton's steps.
+
+    caps : (m,) the greatest change of each coordinate in one step
+    size : the legs' length, mm
+    most : steps; zero only evaluates the start
+    """
+
+    caps: Array
+    size: float
+    most: int
+
+
+class Roots(NamedTuple):
+    """What Newton's method ended with, a row for each problem.
+
+    rows : what the last tape makes of the root
+    residual : (N,) the greatest closure left, mm; NaN where the row is
+    steps : (N,)
+    turned : (N,) the determinant of the last factored matrix times that of the start, or times the side that was
+        asked for; negative where the root is on the other side of a singularity
+    """
+
+    rows: Array
+    residual: Array
+    steps: NDArray[np.int32]
+    turned: Array
+
+
+def solve_by_newton(tapes: NewtonTapes, limits: NewtonSteps, near: Array, joints: Array, side: Array) -> Roots:
+    """Solve the closures by Newton's method from ``near`` (1 or N rows) for every row of joints.
+
+    side : the sign of the determinant to end with, one a row or one for all; none for that of the start
+    """
+    from .newton import solve_newton
+
+    count = len(joints)
+    rows = np.empty((count, tapes.end.outputs))
+    roots = Roots(rows, np.empty(count), np.empty(count, np.int32), np.empty(count))
+    args = (tapes, limits, freeze(near), freeze(joints), side, roots)
+    run_in_threads(count, lambda start, stop: solve_newton(*args, start, stop))
+    return roots

@@ -12,7 +12,7 @@ from numba import njit, types
 from numba.core import cgutils
 from numba.extending import intrinsic
 
-from .elementary import FAST, atan2, sincos, sqrt, widest_vectors
+from .elementary import FAST, atan2, sincos, sqrt, use_widest_vectors
 from .tape import (
     ABS,
     ATAN2,
@@ -38,24 +38,24 @@ _MASK = (1 << 40) - 1  # tells the compiler that a register's number is not nega
 
 
 @njit(nogil=True, cache=True)
-def lanes(rows):
-    """Rows of LANES numbers that start on a cache line: vectors that cross lines take twice as long."""
+def allocate_lanes(rows):
+    """Allocate rows of LANES numbers that start on a cache line: vectors that cross lines take twice as long."""
     room = np.empty(rows * LANES + 8)
     skip = (-(room.ctypes.data // 8)) % 8
     return room[skip : skip + rows * LANES]
 
 
 @njit(nogil=True, cache=True, fastmath=FAST, error_model="numpy")
-def interpret(code, imm, r):
+def interpret(code, constants, r):
     """Run a tape once over the registers ``r``, (registers · LANES,)."""
-    widest_vectors()
+    use_widest_vectors()
     for i in range(code.shape[0]):
         op = code[i, 0]
         d = (code[i, 1] & _MASK) * LANES
         a = (code[i, 2] & _MASK) * LANES
         b = (code[i, 3] & _MASK) * LANES
         c = (code[i, 4] & _MASK) * LANES
-        k0, k1 = imm[i, 0], imm[i, 1]
+        k0, k1 = constants[i, 0], constants[i, 1]
         if op == QUAD1:
             for j in range(LANES):
                 r[d + j] = k0 * r[a + j] * r[b + j]
@@ -67,23 +67,23 @@ def interpret(code, imm, r):
             e = (code[i, 5] & _MASK) * LANES
             f = (code[i, 6] & _MASK) * LANES
             g = (code[i, 7] & _MASK) * LANES
-            k2 = imm[i, 2]
+            k2 = constants[i, 2]
             for j in range(LANES):
                 r[d + j] = k0 * r[a + j] * r[b + j] + k1 * r[c + j] * r[e + j] + k2 * r[f + j] * r[g + j]
         elif op == FMA:
-            k2 = imm[i, 2]
+            k2 = constants[i, 2]
             for j in range(LANES):
                 r[d + j] = k0 * r[a + j] * r[b + j] + (k1 * r[c + j] + k2)
         elif op == LIN1:
             for j in range(LANES):
                 r[d + j] = k0 + k1 * r[a + j]
         elif op == LIN2:
-            k2 = imm[i, 2]
+            k2 = constants[i, 2]
             for j in range(LANES):
                 r[d + j] = k0 + k1 * r[a + j] + k2 * r[b + j]
         elif op == LIN3:
-            k2 = imm[i, 2]
-            k3 = imm[i, 3]
+            k2 = constants[i, 2]
+            k3 = constants[i, 3]
             for j in range(LANES):
                 r[d + j] = k0 + k1 * r[a + j] + k2 * r[b + j] + k3 * r[c + j]
         elif op == SQRT:
@@ -122,11 +122,11 @@ def interpret(code, imm, r):
                 r[d + j] = k0
 
 
-def _fetching(write):
-    """A function that asks for a block's memory, to read or to write it, while another is computed.
+def _make_prefetch(write):
+    """Make a function that asks for a block's memory, to read or to write it, while another block is computed.
 
-    The kernel's bursts of reading and writing are too short for the processor to foresee; a fifth of the time was
-    waiting.
+    The kernel's bursts of reading and writing are too short for the processor's own prefetching; a fifth of the time
+    was waiting.
     """
 
     @intrinsic
@@ -152,15 +152,17 @@ def _fetching(write):
     return fetch
 
 
-fetch_to_read, fetch_to_write = _fetching(0), _fetching(1)
+fetch_to_read, fetch_to_write = _make_prefetch(0), _make_prefetch(1)
 
 
-def _transposing(width):
-    """Load and store of a whole block of rows of ``width`` numbers: with both known when compiled, the compiler
-    transposes with shuffles."""
+def _make_transposers(width):
+    """Make load and store of a whole block of rows of ``width`` numbers.
+
+    With both sizes known when compiled, the compiler transposes with shuffles.
+    """
 
     @njit(nogil=True, cache=True, fastmath=FAST, error_model="numpy")
-    def load_rows(flat, base, first, r, bad):
+    def load_whole(flat, base, first, r, bad):
         for j in range(LANES):
             total = 0.0
             for c in range(width):
@@ -170,22 +172,22 @@ def _transposing(width):
             bad[j] += 0.0 * total
 
     @njit(nogil=True, cache=True, fastmath=FAST, error_model="numpy")
-    def store_rows(flat, base, first, r, bad):
+    def store_whole(flat, base, first, r, bad):
         for j in range(LANES):
             for c in range(width):
                 flat[base + j * width + c] = r[first + c * LANES + j] + bad[j]
 
-    return load_rows, store_rows
+    return load_whole, store_whole
 
 
-_load3, _store3 = _transposing(3)
-_load5, _store5 = _transposing(5)
-_load6, _store6 = _transposing(6)
+_load3, _store3 = _make_transposers(3)
+_load5, _store5 = _make_transposers(5)
+_load6, _store6 = _make_transposers(6)
 
 
 @njit(nogil=True, cache=True, fastmath=FAST, error_model="numpy")
-def load(x, row, n, register, r, bad):
-    """Rows of ``x`` from ``row`` on into registers from ``register`` on, a column each, padded with zeros.
+def load_rows(x, row, n, register, r, bad):
+    """Load n rows of ``x`` from ``row`` on into registers from ``register`` on, a column each, padded with zeros.
 
     ``bad`` (LANES,) turns NaN where a number is not finite.
     """
@@ -210,8 +212,8 @@ def load(x, row, n, register, r, bad):
 
 
 @njit(nogil=True, cache=True, fastmath=FAST, error_model="numpy")
-def store(y, row, n, register, r, bad):
-    """Registers from ``register`` on, plus ``bad``, to the rows of ``y`` from ``row`` on."""
+def store_rows(y, row, n, register, r, bad):
+    """Store registers from ``register`` on, plus ``bad``, to n rows of ``y`` from ``row`` on."""
     width = y.shape[1]
     flat = y.reshape(-1)
     base = (row * width) & _MASK
@@ -229,79 +231,78 @@ def store(y, row, n, register, r, bad):
 
 
 @njit(nogil=True, cache=True, fastmath=FAST, error_model="numpy")
-def evaluate(code, imm, inputs, outputs, registers, whole, x, z, y, start, stop):
-    """y[i] = tape(x[i], z[i]) for rows start ≤ i < stop.
+def _load_inputs(x, z, row, stop, r, bad):
+    """Load rows of ``x`` and ``z`` as the inputs of a block, and ask for those of the next; returns how many."""
+    n = min(LANES, stop - row)
+    bad[:] = 0.0
+    load_rows(x, row, n, 0, r, bad)
+    load_rows(z, row, n, x.shape[1], r, bad)
+    fetch_to_read(x, row + LANES, stop)
+    fetch_to_read(z, row + LANES, stop)
+    return n
 
-    With ``whole`` a row is NaN where an input or output is not finite, else that spoils only what follows from it.
+
+@njit(nogil=True, cache=True, fastmath=FAST, error_model="numpy")
+def evaluate(tape, whole, x, z, y, start, stop):
+    """Evaluate y[i] = tape(x[i], z[i]) for rows start ≤ i < stop.
+
+    With ``whole`` a row is NaN where an input or output is not finite; else that spoils only what follows from it.
     """
-    r = lanes(registers)
-    bad = lanes(1)
+    r = allocate_lanes(tape.registers)
+    bad = allocate_lanes(1)
     for row in range(start, stop, LANES):
-        n = min(LANES, stop - row)
-        bad[:] = 0.0
-        load(x, row, n, 0, r, bad)
-        load(z, row, n, x.shape[1], r, bad)
-        fetch_to_read(x, row + LANES, stop)
-        fetch_to_read(z, row + LANES, stop)
+        n = _load_inputs(x, z, row, stop, r, bad)
         fetch_to_write(y, row, stop)
-        interpret(code, imm, r)
+        interpret(tape.code, tape.constants, r)
         if whole:
-            for o in range(inputs, inputs + outputs):
+            for o in range(tape.inputs, tape.inputs + tape.outputs):
                 d = (o & _MASK) * LANES
                 for j in range(LANES):
                     bad[j] += 0.0 * r[d + j]
         else:
             bad[:] = 0.0
-        store(y, row, n, inputs, r, bad)
+        store_rows(y, row, n, tape.inputs, r, bad)
 
 
 @njit(nogil=True, cache=True, fastmath=FAST, error_model="numpy")
-def evaluate_checked(code, imm, inputs, outputs, registers, x, z, y, worst, start, stop):
-    """The tape's first outputs to the rows of ``y``, the greatest size of the others to ``worst`` (N,); NaN for both
-    where an input or output is not finite."""
-    r = lanes(registers)
-    bad = lanes(1)
-    most = lanes(1)
+def evaluate_with_residual(tape, x, z, y, residual, start, stop):
+    """Evaluate a tape: its first outputs to the rows of ``y``, the greatest size of the others to ``residual`` (N,).
+
+    Both are NaN where an input or output is not finite.
+    """
+    r = allocate_lanes(tape.registers)
+    bad = allocate_lanes(1)
+    most = allocate_lanes(1)
     for row in range(start, stop, LANES):
-        n = min(LANES, stop - row)
-        bad[:] = 0.0
-        load(x, row, n, 0, r, bad)
-        load(z, row, n, x.shape[1], r, bad)
-        fetch_to_read(x, row + LANES, stop)
-        fetch_to_read(z, row + LANES, stop)
+        n = _load_inputs(x, z, row, stop, r, bad)
         fetch_to_write(y, row, stop)
-        interpret(code, imm, r)
+        interpret(tape.code, tape.constants, r)
         most[:] = 0.0
-        for o in range(inputs, inputs + outputs):
+        for o in range(tape.inputs, tape.inputs + tape.outputs):
             d = (o & _MASK) * LANES
-            closure = o >= inputs + y.shape[1]
+            closure = o >= tape.inputs + y.shape[1]
             for j in range(LANES):
                 v = r[d + j]
                 bad[j] += 0.0 * v
                 most[j] = abs(v) if closure & (abs(v) > most[j]) else most[j]
-        store(y, row, n, inputs, r, bad)
+        store_rows(y, row, n, tape.inputs, r, bad)
         for j in range(n):
-            worst[row + j] = most[j] + bad[j]
+            residual[row + j] = most[j] + bad[j]
 
 
 @njit(nogil=True, cache=True, fastmath=FAST, error_model="numpy")
-def first_broken(code, imm, inputs, outputs, registers, x, z, y, start, stop):
-    """y[i] = 0 where all outputs are ≥ 0, else 1 + the first that is not; NaN is not."""
-    r = lanes(registers)
-    bad = lanes(1)
-    found = np.empty(LANES, np.int64)
+def find_negative(tape, x, z, y, start, stop):
+    """Find y[i] = 0 where all outputs are ≥ 0, else 1 + the first that is not; NaN is not."""
+    r = allocate_lanes(tape.registers)
+    bad = allocate_lanes(1)
+    first = np.empty(LANES, np.int64)
     for row in range(start, stop, LANES):
-        n = min(LANES, stop - row)
-        bad[:] = 0.0
-        load(x, row, n, 0, r, bad)
-        load(z, row, n, x.shape[1], r, bad)
-        fetch_to_read(x, row + LANES, stop)
-        fetch_to_read(z, row + LANES, stop)
-        interpret(code, imm, r)
-        found[:] = 0
-        for o in range(outputs - 1, -1, -1):
-            d = ((inputs + o) & _MASK) * LANES
+        n = _load_inputs(x, z, row, stop, r, bad)
+        interpret(tape.code, tape.constants, r)
+        first[:] = 0
+        for o in range(tape.outputs - 1, -1, -1):
+            d = ((tape.inputs + o) & _MASK) * LANES
             for j in range(LANES):
-                found[j] = found[j] if r[d + j] >= 0.0 else o + 1
+                first[j] = first[j] if r[d + j] >= 0.0 else o + 1
         for j in range(n):
-            y[row + j] = found[j] if (bad[j] == 0.0) | (found[j] > 0) else 1
+            y[row + j] = first[j] if (bad[j] == 0.0) | (first[j] > 0) else 1

@@ -19,7 +19,7 @@ GREATEST_ANGLE = 1e5  # rad; beyond it the reduction loses digits, and the answe
 
 
 @intrinsic
-def widest_vectors(typing):
+def use_widest_vectors(typing):
     """Let the function that calls this use the machine's widest vectors; LLVM's default halves them on many x86."""
 
     def generate(context, builder, signature, args):
@@ -32,7 +32,7 @@ def widest_vectors(typing):
 
 
 @intrinsic
-def _bits(typing, x):
+def _to_bits(typing, x):
     """The bits of a float64."""
 
     def generate(context, builder, signature, args):
@@ -42,7 +42,7 @@ def _bits(typing, x):
 
 
 @intrinsic
-def _float(typing, bits):
+def _from_bits(typing, bits):
     """The float64 of these bits."""
 
     def generate(context, builder, signature, args):
@@ -54,7 +54,7 @@ def _float(typing, bits):
 @njit(inline="always", fastmath=FAST)
 def sqrt(x):
     """Square root; NaN below zero and at infinity. The processor's own takes as long as twenty products."""
-    y = _float(0x5FE6EB50C7B537A9 - (_bits(x) >> 1))  # 1/√x within 4 %
+    y = _from_bits(0x5FE6EB50C7B537A9 - (_to_bits(x) >> 1))  # 1/√x within 4 %
     e = 1.0 - x * y * y
     y = y + y * e * (0.5 + e * (0.375 + e * 0.3125))
     e = 1.0 - x * y * y
@@ -68,7 +68,7 @@ def sqrt(x):
 def sincos(x):
     """(sin x, cos x); NaN beyond GREATEST_ANGLE."""
     shifted = x * 0.63661977236758134308 + 6755399441055744.0  # 1.5·2^52: the quadrant is in the lowest bits
-    quadrant = _bits(shifted)
+    quadrant = _to_bits(shifted)
     q = shifted - 6755399441055744.0
     r = ((x - q * _PI_2[0]) - q * _PI_2[1]) - q * _PI_2[2]
     r = r if abs(x) <= 1e5 else np.nan
@@ -105,9 +105,9 @@ def sincos(x):
         )
     )
     odd = (quadrant & 1) == 1
-    sine = _bits(c if odd else s) ^ ((quadrant & 2) << 62)
-    cosine = _bits(s if odd else c) ^ (((quadrant + 1) & 2) << 62)
-    return _float(sine), _float(cosine)
+    sine = _to_bits(c if odd else s) ^ ((quadrant & 2) << 62)
+    cosine = _to_bits(s if odd else c) ^ (((quadrant + 1) & 2) << 62)
+    return _from_bits(sine), _from_bits(cosine)
 
 
 @njit(inline="always", fastmath=FAST)

@@ -2,7 +2,7 @@
 
 A register is a row of LANES lower bounds, then one of upper bounds. Every operation widens its result by eight
 roundings of the sum of sizes that went into it, which covers its own and those of the tape's constants: no rounding
-mode is touched, and the loops vectorise. What is not a number becomes the whole line.
+mode is set, and the loops vectorise. NaN becomes the whole line.
 """
 
 from __future__ import annotations
@@ -10,8 +10,8 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from .blocks import LANES, lanes
-from .elementary import GREATEST_ANGLE, atan2, sincos, widest_vectors
+from .blocks import LANES, allocate_lanes
+from .elementary import GREATEST_ANGLE, atan2, sincos, use_widest_vectors
 from .tape import (
     ABS,
     ATAN2,
@@ -41,49 +41,50 @@ FAST = {"contract"}
 
 
 @njit(inline="always", fastmath=FAST)
-def _down(x, size):
-    # A sum of noughts is nought.
+def _round_down(x, size):
+    """Round a lower bound down; a sum of zeros stays zero."""
     x = x - (size * _WIDER + (_TINY if size > 0.0 else 0.0))
     return x if x == x else -np.inf
 
 
 @njit(inline="always", fastmath=FAST)
-def _up(x, size):
+def _round_up(x, size):
+    """Round an upper bound up; a sum of zeros stays zero."""
     x = x + (size * _WIDER + (_TINY if size > 0.0 else 0.0))
     return x if x == x else np.inf
 
 
 @njit(inline="always", fastmath=FAST)
-def _least(x, y):
+def _smaller(x, y):
     return x if x < y else y
 
 
 @njit(inline="always", fastmath=FAST)
-def _most(x, y):
+def _larger(x, y):
     return x if x > y else y
 
 
 @njit(inline="always", fastmath=FAST)
-def _times(al, ah, bl, bh):
-    """The product's bounds, not yet widened; 0·∞ is 0, for an end is never reached."""
+def _multiply(al, ah, bl, bh):
+    """Bound the product of two intervals, not yet widened; 0·∞ is 0, for an infinite end is never reached."""
     p, q, s, t = al * bl, al * bh, ah * bl, ah * bh
     p = p if p == p else 0.0
     q = q if q == q else 0.0
     s = s if s == s else 0.0
     t = t if t == t else 0.0
-    return _least(_least(p, q), _least(s, t)), _most(_most(p, q), _most(s, t))
+    return _smaller(_smaller(p, q), _smaller(s, t)), _larger(_larger(p, q), _larger(s, t))
 
 
 @njit(inline="always", fastmath=FAST)
-def _size(low, high):
-    return _most(abs(low), abs(high))
+def _magnitude(low, high):
+    return _larger(abs(low), abs(high))
 
 
 @njit(inline="always", fastmath=FAST)
-def _wave(at_low, at_high, low, high, phase):
-    """Bounds of sin(x + phase) over [low, high] from its values at the ends."""
-    down, up = _least(at_low, at_high) - _OFF, _most(at_low, at_high) + _OFF
-    slack = 1e-15 * (1.0 + _size(low, high))
+def _bound_sine(at_low, at_high, low, high, phase):
+    """Bound sin(x + phase) over [low, high] from its values at the ends."""
+    down, up = _smaller(at_low, at_high) - _OFF, _larger(at_low, at_high) + _OFF
+    slack = 1e-15 * (1.0 + _magnitude(low, high))
     a = (low + phase - slack) * 0.15915494309189535
     b = (high + phase + slack) * 0.15915494309189535
     down = -1.0 if (np.floor(b + 0.25) >= np.ceil(a + 0.25)) | (down < -1.0) else down
@@ -93,24 +94,24 @@ def _wave(at_low, at_high, low, high, phase):
 
 
 @njit(inline="always", fastmath=FAST)
-def _pair(k, al, ah, bl, bh, same):
-    """k·a·b, not yet widened; ``same`` tells that a is b."""
-    low, high = _times(al, ah, bl, bh)
+def _bound_product(k, al, ah, bl, bh, same):
+    """Bound k·a·b, not yet widened; ``same`` is true if a is b."""
+    low, high = _multiply(al, ah, bl, bh)
     low = 0.0 if same & (low < 0.0) else low
     low, high = k * low, k * high
-    return _least(low, high), _most(low, high)
+    return _smaller(low, high), _larger(low, high)
 
 
 @njit(inline="always", fastmath=FAST)
-def _scaled(k, low, high):
+def _scale(k, low, high):
     low, high = k * low, k * high
-    return _least(low, high), _most(low, high)
+    return _smaller(low, high), _larger(low, high)
 
 
 @njit(nogil=True, cache=True, fastmath=FAST, error_model="numpy")
-def interpret(code, imm, r):
+def interpret(code, constants, r):
     """Run a tape once over the registers ``r``, (registers · 2 · LANES,)."""
-    widest_vectors()
+    use_widest_vectors()
     for i in range(code.shape[0]):
         op = code[i, 0]
         d = (code[i, 1] & _MASK) * (2 * LANES)
@@ -120,110 +121,110 @@ def interpret(code, imm, r):
         e = (code[i, 5] & _MASK) * (2 * LANES)
         f = (code[i, 6] & _MASK) * (2 * LANES)
         g = (code[i, 7] & _MASK) * (2 * LANES)
-        k0, k1, k2, k3 = imm[i, 0], imm[i, 1], imm[i, 2], imm[i, 3]
+        k0, k1, k2, k3 = constants[i, 0], constants[i, 1], constants[i, 2], constants[i, 3]
         ab, ce, fg = a == b, c == e, f == g
         if op == QUAD1:
             for j in range(LANES):
-                low, high = _pair(k0, r[a + j], r[a + LANES + j], r[b + j], r[b + LANES + j], ab)
-                r[d + j] = _down(low, abs(low))
-                r[d + LANES + j] = _up(high, abs(high))
+                low, high = _bound_product(k0, r[a + j], r[a + LANES + j], r[b + j], r[b + LANES + j], ab)
+                r[d + j] = _round_down(low, abs(low))
+                r[d + LANES + j] = _round_up(high, abs(high))
         elif op == QUAD2:
             for j in range(LANES):
-                low, high = _pair(k0, r[a + j], r[a + LANES + j], r[b + j], r[b + LANES + j], ab)
-                l2, h2 = _pair(k1, r[c + j], r[c + LANES + j], r[e + j], r[e + LANES + j], ce)
-                size = _size(low, high) + _size(l2, h2)
-                r[d + j] = _down(low + l2, size)
-                r[d + LANES + j] = _up(high + h2, size)
+                low, high = _bound_product(k0, r[a + j], r[a + LANES + j], r[b + j], r[b + LANES + j], ab)
+                l2, h2 = _bound_product(k1, r[c + j], r[c + LANES + j], r[e + j], r[e + LANES + j], ce)
+                size = _magnitude(low, high) + _magnitude(l2, h2)
+                r[d + j] = _round_down(low + l2, size)
+                r[d + LANES + j] = _round_up(high + h2, size)
         elif op == QUAD3:
             for j in range(LANES):
-                low, high = _pair(k0, r[a + j], r[a + LANES + j], r[b + j], r[b + LANES + j], ab)
-                l2, h2 = _pair(k1, r[c + j], r[c + LANES + j], r[e + j], r[e + LANES + j], ce)
-                l3, h3 = _pair(k2, r[f + j], r[f + LANES + j], r[g + j], r[g + LANES + j], fg)
-                size = _size(low, high) + _size(l2, h2) + _size(l3, h3)
-                r[d + j] = _down(low + l2 + l3, size)
-                r[d + LANES + j] = _up(high + h2 + h3, size)
+                low, high = _bound_product(k0, r[a + j], r[a + LANES + j], r[b + j], r[b + LANES + j], ab)
+                l2, h2 = _bound_product(k1, r[c + j], r[c + LANES + j], r[e + j], r[e + LANES + j], ce)
+                l3, h3 = _bound_product(k2, r[f + j], r[f + LANES + j], r[g + j], r[g + LANES + j], fg)
+                size = _magnitude(low, high) + _magnitude(l2, h2) + _magnitude(l3, h3)
+                r[d + j] = _round_down(low + l2 + l3, size)
+                r[d + LANES + j] = _round_up(high + h2 + h3, size)
         elif op == FMA:
             for j in range(LANES):
-                low, high = _pair(k0, r[a + j], r[a + LANES + j], r[b + j], r[b + LANES + j], ab)
-                l2, h2 = _scaled(k1, r[c + j], r[c + LANES + j])
-                size = _size(low, high) + _size(l2, h2) + abs(k2)
-                r[d + j] = _down(low + l2 + k2, size)
-                r[d + LANES + j] = _up(high + h2 + k2, size)
+                low, high = _bound_product(k0, r[a + j], r[a + LANES + j], r[b + j], r[b + LANES + j], ab)
+                l2, h2 = _scale(k1, r[c + j], r[c + LANES + j])
+                size = _magnitude(low, high) + _magnitude(l2, h2) + abs(k2)
+                r[d + j] = _round_down(low + l2 + k2, size)
+                r[d + LANES + j] = _round_up(high + h2 + k2, size)
         elif op == LIN1:
             for j in range(LANES):
-                low, high = _scaled(k1, r[a + j], r[a + LANES + j])
-                size = abs(k0) + _size(low, high)
-                r[d + j] = _down(k0 + low, size)
-                r[d + LANES + j] = _up(k0 + high, size)
+                low, high = _scale(k1, r[a + j], r[a + LANES + j])
+                size = abs(k0) + _magnitude(low, high)
+                r[d + j] = _round_down(k0 + low, size)
+                r[d + LANES + j] = _round_up(k0 + high, size)
         elif op == LIN2:
             for j in range(LANES):
-                low, high = _scaled(k1, r[a + j], r[a + LANES + j])
-                l2, h2 = _scaled(k2, r[b + j], r[b + LANES + j])
-                size = abs(k0) + _size(low, high) + _size(l2, h2)
-                r[d + j] = _down(k0 + low + l2, size)
-                r[d + LANES + j] = _up(k0 + high + h2, size)
+                low, high = _scale(k1, r[a + j], r[a + LANES + j])
+                l2, h2 = _scale(k2, r[b + j], r[b + LANES + j])
+                size = abs(k0) + _magnitude(low, high) + _magnitude(l2, h2)
+                r[d + j] = _round_down(k0 + low + l2, size)
+                r[d + LANES + j] = _round_up(k0 + high + h2, size)
         elif op == LIN3:
             for j in range(LANES):
-                low, high = _scaled(k1, r[a + j], r[a + LANES + j])
-                l2, h2 = _scaled(k2, r[b + j], r[b + LANES + j])
-                l3, h3 = _scaled(k3, r[c + j], r[c + LANES + j])
-                size = abs(k0) + _size(low, high) + _size(l2, h2) + _size(l3, h3)
-                r[d + j] = _down(k0 + low + l2 + l3, size)
-                r[d + LANES + j] = _up(k0 + high + h2 + h3, size)
-        elif op == CONST:  # what is exactly nought stays it: no rounding made it
+                low, high = _scale(k1, r[a + j], r[a + LANES + j])
+                l2, h2 = _scale(k2, r[b + j], r[b + LANES + j])
+                l3, h3 = _scale(k3, r[c + j], r[c + LANES + j])
+                size = abs(k0) + _magnitude(low, high) + _magnitude(l2, h2) + _magnitude(l3, h3)
+                r[d + j] = _round_down(k0 + low + l2 + l3, size)
+                r[d + LANES + j] = _round_up(k0 + high + h2 + h3, size)
+        elif op == CONST:  # what is exactly zero stays zero: no rounding made it
             for j in range(LANES):
-                r[d + j] = _down(k0, abs(k0)) if k0 != 0.0 else 0.0
-                r[d + LANES + j] = _up(k0, abs(k0)) if k0 != 0.0 else 0.0
+                r[d + j] = _round_down(k0, abs(k0)) if k0 != 0.0 else 0.0
+                r[d + LANES + j] = _round_up(k0, abs(k0)) if k0 != 0.0 else 0.0
         elif op == DIV:
             for j in range(LANES):
                 low, high = r[b + j], r[b + LANES + j]
                 through = (low <= 0.0) & (high >= 0.0)
                 il, ih = 1.0 / (1.0 if through else high), 1.0 / (1.0 if through else low)
-                low, high = _times(r[a + j], r[a + LANES + j], il, ih)
-                low, high = _down(low, 4.0 * abs(low)), _up(high, 4.0 * abs(high))
+                low, high = _multiply(r[a + j], r[a + LANES + j], il, ih)
+                low, high = _round_down(low, 4.0 * abs(low)), _round_up(high, 4.0 * abs(high))
                 r[d + j] = -np.inf if through else low
                 r[d + LANES + j] = np.inf if through else high
         elif op == SQRT:
             for j in range(LANES):
-                low, high = np.sqrt(_most(r[a + j], 0.0)), np.sqrt(_most(r[a + LANES + j], 0.0))
-                r[d + j] = _most(_down(low, low), 0.0)
-                r[d + LANES + j] = _up(high, high)
+                low, high = np.sqrt(_larger(r[a + j], 0.0)), np.sqrt(_larger(r[a + LANES + j], 0.0))
+                r[d + j] = _larger(_round_down(low, low), 0.0)
+                r[d + LANES + j] = _round_up(high, high)
         elif op == SINCOS:  # into d and a, of b
             for j in range(LANES):
                 low, high = r[b + j], r[b + LANES + j]
                 (sl, cl), (sh, ch) = sincos(low), sincos(high)
-                r[d + j], r[d + LANES + j] = _wave(sl, sh, low, high, 0.0)
-                r[a + j], r[a + LANES + j] = _wave(cl, ch, low, high, 1.5707963267948966)
+                r[d + j], r[d + LANES + j] = _bound_sine(sl, sh, low, high, 0.0)
+                r[a + j], r[a + LANES + j] = _bound_sine(cl, ch, low, high, 1.5707963267948966)
         elif op == ATAN2:
             for j in range(LANES):
                 yl, yh, xl, xh = r[a + j], r[a + LANES + j], r[b + j], r[b + LANES + j]
                 p, q, s, t = atan2(yl, xl), atan2(yl, xh), atan2(yh, xl), atan2(yh, xh)
                 cut = (yl < 0.0) & (yh >= 0.0) & (xl <= 0.0)  # the angle jumps there, and at the origin it is any
-                low = _least(_least(p, q), _least(s, t)) - _OFF
-                high = _most(_most(p, q), _most(s, t)) + _OFF
-                known = _size(yl, yh) + _size(xl, xh) < _HUGE  # what is greater, or infinite, gives any angle
+                low = _smaller(_smaller(p, q), _smaller(s, t)) - _OFF
+                high = _larger(_larger(p, q), _larger(s, t)) + _OFF
+                known = _magnitude(yl, yh) + _magnitude(xl, xh) < _HUGE  # what is greater, or infinite, gives any angle
                 r[d + j] = low if known & (not cut) else -3.1415926535897936
                 r[d + LANES + j] = high if known & (not cut) else 3.1415926535897936
         elif op == MIN:
             for j in range(LANES):
-                r[d + j] = _least(r[a + j], r[b + j])
-                r[d + LANES + j] = _least(r[a + LANES + j], r[b + LANES + j])
+                r[d + j] = _smaller(r[a + j], r[b + j])
+                r[d + LANES + j] = _smaller(r[a + LANES + j], r[b + LANES + j])
         elif op == MAX:
             for j in range(LANES):
-                r[d + j] = _most(r[a + j], r[b + j])
-                r[d + LANES + j] = _most(r[a + LANES + j], r[b + LANES + j])
+                r[d + j] = _larger(r[a + j], r[b + j])
+                r[d + LANES + j] = _larger(r[a + LANES + j], r[b + LANES + j])
         elif op == ABS:
             for j in range(LANES):
                 low, high = r[a + j], r[a + LANES + j]
-                least = _least(abs(low), abs(high))
+                least = _smaller(abs(low), abs(high))
                 r[d + j] = 0.0 if (low <= 0.0) & (high >= 0.0) else least
-                r[d + LANES + j] = _size(low, high)
+                r[d + LANES + j] = _magnitude(low, high)
         elif op == COPYSIGN:
             for j in range(LANES):
                 low, high = r[a + j], r[a + LANES + j]
-                least = _least(abs(low), abs(high))
+                least = _smaller(abs(low), abs(high))
                 least = 0.0 if (low <= 0.0) & (high >= 0.0) else least
-                most = _size(low, high)
+                most = _magnitude(low, high)
                 up, below = r[b + j] >= 0.0, r[b + LANES + j] < 0.0
                 r[d + j] = least if up else -most
                 r[d + LANES + j] = -least if below else most
@@ -232,26 +233,26 @@ def interpret(code, imm, r):
                 below = r[a + LANES + j] < r[b + j]
                 above = r[a + j] >= r[b + LANES + j]
                 cl, ch, el, eh = r[c + j], r[c + LANES + j], r[e + j], r[e + LANES + j]
-                low, high = _least(cl, el), _most(ch, eh)
+                low, high = _smaller(cl, el), _larger(ch, eh)
                 r[d + j] = cl if below else (el if above else low)
                 r[d + LANES + j] = ch if below else (eh if above else high)
 
 
 @njit(nogil=True, cache=True, fastmath=FAST, error_model="numpy")
-def enclose(code, imm, inputs, outputs, registers, low, high, down, up, start, stop):
-    """Bounds (down, up), (N, outputs), of a tape's outputs over the boxes [low, high], for rows start ≤ i < stop."""
-    r = lanes(2 * registers)
+def enclose(tape, low, high, down, up, start, stop):
+    """Enclose a tape's outputs over the boxes [low, high] in (down, up), (N, outputs), for rows start ≤ i < stop."""
+    r = allocate_lanes(2 * tape.registers)
     r[:] = 0.0
     for row in range(start, stop, LANES):
         n = min(LANES, stop - row)
-        for c in range(inputs):
+        for c in range(tape.inputs):
             d = c * 2 * LANES
             for j in range(n):
                 r[d + j] = low[row + j, c]
                 r[d + LANES + j] = high[row + j, c]
-        interpret(code, imm, r)
-        for o in range(outputs):
-            d = (inputs + o) * 2 * LANES
+        interpret(tape.code, tape.constants, r)
+        for o in range(tape.outputs):
+            d = (tape.inputs + o) * 2 * LANES
             for j in range(n):
                 down[row + j, o] = r[d + j]
                 up[row + j, o] = r[d + LANES + j]

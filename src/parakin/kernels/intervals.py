@@ -7,14 +7,13 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from .. import algebra as alg
 from ..algebra import Scalar, Term, Trace
-from .batch import split, still
+from ..arrays import Array
+from .batch import freeze, run_in_threads
 from .tape import Tape, compile_tape
 
-Array = NDArray[np.float64]
 Bounds = tuple[Array, Array]
 
 
@@ -36,14 +35,14 @@ class IntervalProgram:
         return compile_tape(self.trace, self.outputs, self.inputs)
 
     def __call__(self, low: Array, high: Array) -> Bounds:
-        """Bounds (boxes, outputs) of every output over boxes (boxes, inputs or more).
+        """Bound every output, (boxes, outputs), over boxes (boxes, inputs or more).
 
-        Roots are taken of the part of an interval that is not negative, and a quotient by an interval that holds 0 is
-        the whole line. So bounds hold wherever the output exists.
+        Roots are taken of the part of an interval that is not negative; a quotient by an interval that holds 0 is the
+        whole line. So bounds hold wherever the output exists.
         """
         from .enclosures import enclose
 
         down, up = np.empty((len(low), len(self.outputs))), np.empty((len(low), len(self.outputs)))
-        args = (*self.tape.parts, still(np.ascontiguousarray(low)), still(np.ascontiguousarray(high)), down, up)
-        split(len(low), lambda start, stop: enclose(*args, start, stop))
+        args = (self.tape, freeze(np.ascontiguousarray(low)), freeze(np.ascontiguousarray(high)), down, up)
+        run_in_threads(len(low), lambda start, stop: enclose(*args, start, stop))
         return down, up

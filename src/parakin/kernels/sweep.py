@@ -1,8 +1,7 @@
-"""Many places through the limits' tape: a number a place, 0 where it is allowed, else 1 + the first limit broken.
+"""Kernels that test the limits at many places: 0 where a place is allowed, else 1 + the first limit broken.
 
-A program is ``code``, ``imm`` and ``registers`` of a tape, cut into ``parts`` (P, 4): where in the code each begins and
-ends, and which tests follow it. A test is a register r and two limits' indices (``tests``, (T, 3)) with their lines
-k0 + k1·r that must be ≥ 0 (``lines``, (T, 4)); one limit alone stands twice. A block ends as soon as no lane is left.
+``program`` is a :class:`~.staged.StagedProgram`: a tape in stages, with tests after each. A block ends as soon as no
+lane is left.
 """
 
 from __future__ import annotations
@@ -10,19 +9,21 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from .blocks import LANES, interpret, lanes
-from .elementary import FAST, widest_vectors
+from .blocks import LANES, allocate_lanes, interpret
+from .elementary import FAST, use_widest_vectors
 
 _MASK = (1 << 40) - 1  # tells the compiler that a register's number is not negative
 
 
 @njit(nogil=True, cache=True, fastmath=FAST, error_model="numpy")
-def _tested(code, imm, parts, tests, lines, r, found):
-    """Lanes of ``found`` (LANES,) that are 0 become 1 + the first limit broken; NaN breaks one."""
-    widest_vectors()
-    for p in range(len(parts)):
-        interpret(code[parts[p, 0] : parts[p, 1]], imm[parts[p, 0] : parts[p, 1]], r)
-        for t in range(parts[p, 2], parts[p, 3]):
+def _test_block(program, r, broken):
+    """Test a block: lanes of ``broken`` (LANES,) that are 0 become 1 + the first limit broken; NaN breaks one."""
+    use_widest_vectors()
+    stages, tests, lines = program.stages, program.tests, program.lines
+    code, constants = program.tape.code, program.tape.constants
+    for p in range(len(stages)):
+        interpret(code[stages[p, 0] : stages[p, 1]], constants[stages[p, 0] : stages[p, 1]], r)
+        for t in range(stages[p, 2], stages[p, 3]):
             a = (tests[t, 0] & _MASK) * LANES
             first, second = tests[t, 1] + 1.0, tests[t, 2] + 1.0
             k0, k1, l0, l1 = lines[t, 0], lines[t, 1], lines[t, 2], lines[t, 3]
@@ -30,18 +31,18 @@ def _tested(code, imm, parts, tests, lines, r, found):
                 v = r[a + j]
                 now = 0.0 if l0 + l1 * v >= 0.0 else second
                 now = now if k0 + k1 * v >= 0.0 else first
-                found[j] = found[j] if found[j] > 0.0 else now
+                broken[j] = broken[j] if broken[j] > 0.0 else now
         left = 0
         for j in range(LANES):
-            left += 1 if found[j] == 0.0 else 0
+            left += 1 if broken[j] == 0.0 else 0
         if left == 0:
             break
 
 
 @njit(nogil=True, cache=True, fastmath=FAST, error_model="numpy")
-def _filled(axes, counts, row, n, r):
-    """The places ``row`` to ``row + n`` of a grid into the first registers, the last axis running fastest."""
-    widest_vectors()
+def _fill_places(axes, counts, row, n, r):
+    """Fill the first registers with the places ``row`` to ``row + n`` of a grid, the last axis running fastest."""
+    use_widest_vectors()
     d = len(counts)
     length = counts[d - 1]
     line, k = row // length, row % length
@@ -68,35 +69,35 @@ def _filled(axes, counts, row, n, r):
 
 
 @njit(nogil=True, cache=True, fastmath=FAST, error_model="numpy")
-def on_grid(code, imm, registers, parts, tests, lines, axes, counts, out, start, stop):
-    """The places ``start`` to ``stop`` of a grid, C-ordered, into ``out``.
+def sweep_grid(program, axes, counts, out, start, stop):
+    """Test the places ``start`` to ``stop`` of a grid, C-ordered, into ``out``.
 
     axes : coordinates of all axes, one axis after the other; counts : (d,) how many each has
     """
-    r = lanes(registers)
-    found = lanes(1)
+    r = allocate_lanes(program.tape.registers)
+    broken = allocate_lanes(1)
     for row in range(start, stop, LANES):
         n = min(LANES, stop - row)
-        _filled(axes, counts, row, n, r)
-        found[:n] = 0.0
-        found[n:] = 1.0
-        _tested(code, imm, parts, tests, lines, r, found)
+        _fill_places(axes, counts, row, n, r)
+        broken[:n] = 0.0
+        broken[n:] = 1.0
+        _test_block(program, r, broken)
         for j in range(n):
-            out[row + j] = np.int32(found[j])
+            out[row + j] = np.int32(broken[j])
 
 
 @njit(nogil=True, cache=True, fastmath=FAST, error_model="numpy")
-def in_turns(code, imm, registers, parts, tests, lines, places, fixed, every, out, start, stop):
-    """Places (N, d) in all rows of ``fixed``, (S, u): what the tape is given besides, once for each turn.
+def sweep_turns(program, places, fixed, every, out, start, stop):
+    """Test places (N, d) with all rows of ``fixed``, (S, u): the rest of the tape's inputs, one row for each turn.
 
     With ``every``, places of ``out`` that are 0 get the first limit broken in the first turn that breaks one; else
     those that are not become 0 where a turn breaks none.
     """
-    r = lanes(registers)
+    r = allocate_lanes(program.tape.registers)
     d = places.shape[1]
-    x = lanes(d)
-    now = lanes(1)
-    found = lanes(1)
+    x = allocate_lanes(d)
+    verdict = allocate_lanes(1)
+    broken = allocate_lanes(1)
     for row in range(start, stop, LANES):
         n = min(LANES, stop - row)
         for a in range(d):
@@ -104,13 +105,13 @@ def in_turns(code, imm, registers, parts, tests, lines, places, fixed, every, ou
                 x[a * LANES + j] = places[row + j, a]
             x[a * LANES + n : (a + 1) * LANES] = 0.0
         for j in range(n):
-            now[j] = out[row + j]
-        now[n:] = 1.0 if every else 0.0
+            verdict[j] = out[row + j]
+        verdict[n:] = 1.0 if every else 0.0
         for s in range(len(fixed)):
             left = 0
             for j in range(LANES):
-                found[j] = now[j] if every else (0.0 if now[j] > 0.0 else 1.0)
-                left += 1 if found[j] == 0.0 else 0
+                broken[j] = verdict[j] if every else (0.0 if verdict[j] > 0.0 else 1.0)
+                left += 1 if broken[j] == 0.0 else 0
             if left == 0:
                 break
             for i in range(d * LANES):
@@ -119,8 +120,8 @@ def in_turns(code, imm, registers, parts, tests, lines, places, fixed, every, ou
                 first = ((d + u) & _MASK) * LANES
                 for j in range(LANES):
                     r[first + j] = fixed[s, u]
-            _tested(code, imm, parts, tests, lines, r, found)
+            _test_block(program, r, broken)
             for j in range(LANES):
-                now[j] = found[j] if every else (0.0 if found[j] == 0.0 else now[j])
+                verdict[j] = broken[j] if every else (0.0 if broken[j] == 0.0 else verdict[j])
         for j in range(n):
-            out[row + j] = np.int32(now[j])
+            out[row + j] = np.int32(verdict[j])

@@ -7,13 +7,13 @@ in the first-level cache.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from .. import algebra as alg
 from ..algebra import Scalar, Term, Trace
+from ..arrays import Array, Indices
 
 # Opcodes. The number of summands is part of the code, so that the interpreter's loops have no inner ones.
 CONST, LIN1, LIN2, LIN3, QUAD1, QUAD2, QUAD3, FMA, DIV, SQRT, SINCOS, ATAN2, MIN, MAX, ABS, COPYSIGN, SELECT = range(17)
@@ -30,27 +30,39 @@ _SAME = {
 }
 
 
-@dataclass(frozen=True, eq=False)
-class Tape:
+class Tape(NamedTuple):
     """A compiled trace.
 
-    ``code`` (n, 8) int64: opcode, destination, up to six operand registers (SINCOS: sine, cosine, argument);
-    ``imm`` (n, 4): constants. Inputs stand in the first registers, in their order, and outputs in the next.
+    code : (n, 8) opcode, destination, up to six operand registers (SINCOS: sine, cosine, argument)
+    constants : (n, 4) of each operation
+    inputs, outputs : how many there are; the inputs stand in the first registers, in their order, the outputs in the
+        next
+    registers : how many there are in all
     """
 
-    code: NDArray[np.int64]
-    imm: NDArray[np.float64]
+    code: Indices
+    constants: Array
     inputs: int
     outputs: int
     registers: int
 
-    @property
-    def parts(self) -> tuple[NDArray[np.int64], NDArray[np.float64], int, int, int]:
-        """As the kernels take them."""
-        return self.code, self.imm, self.inputs, self.outputs, self.registers
+
+class NewtonTapes(NamedTuple):
+    """Newton's method on the closures f(y, q), in mm, of the motion's m coordinates y and the joints q.
+
+    begin : takes a start and q to y
+    closures : takes y and q to f
+    closures_and_slopes : takes y and q to f and then ∂f/∂y, row by row
+    end : takes y and q to a row of the answer
+    """
+
+    begin: Tape
+    closures: Tape
+    closures_and_slopes: Tape
+    end: Tape
 
 
-def _opcode(term: Term) -> int:
+def _find_opcode(term: Term) -> int:
     if term.op == alg.LIN:
         return CONST + len(term.args)
     if term.op == alg.HELD:
@@ -60,65 +72,83 @@ def _opcode(term: Term) -> int:
     return _SAME[term.op]
 
 
-def compile_tape(trace: Trace, outputs: Sequence[Scalar], inputs: int) -> Tape:
-    """The tape that computes ``outputs`` (terms of ``trace``, or numbers) from the trace's first ``inputs`` inputs."""
+class _Registers:
+    """The registers of a tape under compilation: outputs own theirs, the others are used again once they are free."""
+
+    def __init__(self, inputs: int, results: Sequence[Term]):
+        self._own = {term.index: inputs + number for number, term in enumerate(results)}
+        self._of = dict[int, int]()
+        self._free = list[int]()
+        self.count = inputs + len(results)
+
+    def __contains__(self, term: Term) -> bool:
+        return term.index in self._of
+
+    def __getitem__(self, term: Term) -> int:
+        return self._of[term.index]
+
+    def set(self, term: Term, register: int) -> None:
+        self._of[term.index] = register
+
+    def take(self, term: Term) -> int:
+        """Take a register for a term: its own, else a free one, else a new one."""
+        if term.index in self._own:
+            self.set(term, self._own[term.index])
+        elif self._free:
+            self.set(term, self._free.pop())
+        else:
+            self.set(term, self.count)
+            self.count += 1
+        return self[term]
+
+    def release(self, index: int) -> None:
+        """Release the register of a term that is used no more, unless it is an output's."""
+        if index not in self._own:
+            self._free.append(self._of[index])
+
+
+def _separate_outputs(trace: Trace, outputs: Sequence[Scalar]) -> list[Term]:
+    """Make a term for each output; one that is an input, or an output already, gets a copy outside the trace."""
     results: list[Term] = []
     for y in outputs:
         term = y if isinstance(y, Term) else trace.constant(y)
         if term.op == alg.INPUT or any(term is other for other in results):
-            # An output has a register of its own: a copy, outside the trace.
             term = Term(trace, alg.LIN, (term,), (0.0, 1.0), -1 - len(results))
         results.append(term)
+    return results
+
+
+def compile_tape(trace: Trace, outputs: Sequence[Scalar], inputs: int) -> Tape:
+    """Compile the tape of ``outputs`` (terms of ``trace``, or numbers) from the trace's first ``inputs`` inputs."""
+    results = _separate_outputs(trace, outputs)
     copies = [term for term in results if term.index < 0]
     within = [term for term in results if term.index >= 0] + [arg for term in copies for arg in term.args]
     order = [trace.nodes[i] for i in alg.needed(within)] + copies
-    last: dict[int, int] = {}
-    for position, term in enumerate(order):
-        for arg in term.args:
-            last[arg.index] = position
-    own = {term.index: inputs + number for number, term in enumerate(results)}
-    register: dict[int, int] = {}
-    free: list[int] = []
-    count = inputs + len(results)
-
-    def take(term: Term) -> int:
-        nonlocal count
-        if term.index in own:
-            register[term.index] = own[term.index]
-        elif free:
-            register[term.index] = free.pop()
-        else:
-            register[term.index] = count
-            count += 1
-        return register[term.index]
-
+    last_use = {arg.index: position for position, term in enumerate(order) for arg in term.args}
+    registers = _Registers(inputs, results)
     code: list[list[int]] = []
-    imm: list[list[float]] = []
+    constants: list[list[float]] = []
     for position, term in enumerate(order):
         if term.op == alg.INPUT:
-            register[term.index] = int(term.k[0])
-        elif term.index in register:  # the cosine to a sine, or the reverse
+            registers.set(term, int(term.k[0]))
+        elif term in registers:  # the cosine to a sine, or the reverse
             pass
         elif term.op in (alg.SIN, alg.COS):
             argument = term.args[0]
             pair = [trace.node(op, (argument,), ()) for op in (alg.SIN, alg.COS)]
-            sine, cosine = (take(part) for part in pair)
-            code.append([SINCOS, sine, cosine, register[argument.index], 0, 0, 0, 0])
-            imm.append([0.0] * 4)
-            # One of the two may not be wanted.
-            free += [register[part.index] for part in pair if part.index not in last and part.index not in own]
+            sine, cosine = (registers.take(part) for part in pair)
+            code.append([SINCOS, sine, cosine, registers[argument], 0, 0, 0, 0])
+            constants.append([0.0] * 4)
+            for part in pair:
+                if part.index not in last_use:  # one of the two may not be wanted
+                    registers.release(part.index)
         else:  # the destination is never an operand's register: rows that don't overlap vectorise
-            row = [_opcode(term), take(term), *[register[arg.index] for arg in term.args]]
+            row = [_find_opcode(term), registers.take(term), *[registers[arg] for arg in term.args]]
             code.append(row + [0] * (8 - len(row)))
             k = (0.0, 1.0) if term.op == alg.HELD else term.k
-            imm.append([*k, *[0.0] * (4 - len(k))])
+            constants.append([*k, *[0.0] * (4 - len(k))])
         for index in {arg.index for arg in term.args}:
-            if last[index] == position and index not in own:
-                free.append(register[index])
-    return Tape(
-        np.array(code, np.int64).reshape(-1, 8),
-        np.array(imm, np.float64).reshape(-1, 4),
-        inputs,
-        len(results),
-        max(count, 1),
-    )
+            if last_use[index] == position:
+                registers.release(index)
+    table = np.array(constants, np.float64).reshape(-1, 4)
+    return Tape(np.array(code, np.int64).reshape(-1, 8), table, inputs, len(results), max(registers.count, 1))

@@ -7,7 +7,7 @@ import numpy as np
 from ..algebra import Trace, derivative
 from ..arrays import Array
 from ..errors import NoMethodError
-from ..kernels.batch import run_checked
+from ..kernels.batch import evaluate_tape_with_residual
 from ..kernels.intervals import IntervalProgram
 from ..model.chain import rotation_about
 from ..model.legs.lambda_ import Lambda
@@ -50,7 +50,8 @@ def _find_common_points(model: Model, joints: Array) -> Array:
     """Find both common points of the legs' spheres, as poses."""
     poses, residual = np.empty((2, len(model.axes))), np.empty(2)
     for i, side in enumerate((model.home_side, -model.home_side)):
-        residual[i] = run_checked(model.spheres_tape(side), joints, poses[i : i + 1], np.empty((1, 0)))[0]
+        tape, pose = model.spheres_tape(side), poses[i : i + 1]
+        residual[i] = evaluate_tape_with_residual(tape, joints, pose, np.empty((1, 0)))[0]
     poses = poses[residual <= closure_tolerance(model)]
     return poses[:1] if len(poses) == 2 and np.array_equal(poses[0], poses[1]) else poses
 
@@ -87,7 +88,7 @@ def _polish_roots(model: Model, joints: Array, starts: Array, low: Array, high: 
     """Polish starts by Newton's method, and keep the distinct roots within the box."""
     given = np.ascontiguousarray(np.broadcast_to(joints, (len(starts), joints.shape[1])))
     roots = find_roots(model, starts, given, poses=False)
-    y, slack = roots.found, 1e-9 * (high - low)
+    y, slack = roots.rows, 1e-9 * (high - low)
     good = (roots.residual <= closure_tolerance(model)) & (y >= low - slack).all(1) & (y <= high + slack).all(1)
     kept: list[Array] = []
     for root in y[good]:

@@ -9,9 +9,10 @@ import numpy as np
 
 from ..arrays import Array, Flags
 from ..errors import NoMethodError, PoseError
-from ..kernels.batch import Roots, run, run_checked, solve
+from ..kernels.batch import NewtonSteps, Roots, evaluate_tape, evaluate_tape_with_residual, solve_by_newton
 from ..model.traces import Model
 from .inverse import solve_inverse
+from .tapes import collect_newton_tapes
 from .wrist import is_upright
 
 CLOSED = 1e-9  # greatest closure error of an answer, mm in a machine of a metre
@@ -87,7 +88,7 @@ def closure_tolerance(model: Model) -> float:
 
 def compute_poses(model: Model, coordinates: Array, joints: Array) -> Array:
     """Compute poses from the motion's coordinates and the joints of head and table."""
-    return run(model.end_tape(), coordinates, np.empty((len(joints), len(model.axes))), joints)
+    return evaluate_tape(model.end_tape(), coordinates, np.empty((len(joints), len(model.axes))), joints)
 
 
 def find_roots(
@@ -108,10 +109,9 @@ def find_roots(
     size = max(model.sizes)
     # A step goes at most a third of the legs' size or half a radian.
     caps = np.array([size / 3.0 if word.startswith("t") else 0.5 for word in model.structure.coordinates])
-    tapes = model.begin_tape(poses), model.newton_tape(True), model.newton_tape(False), model.end_tape(poses)
-    return solve(
-        tapes, np.ascontiguousarray(near), joints, caps, min(model.sizes), most, np.empty(0) if side is None else side
-    )
+    tapes = collect_newton_tapes(model, poses)
+    steps = NewtonSteps(caps, min(model.sizes), most)
+    return solve_by_newton(tapes, steps, np.ascontiguousarray(near), joints, np.empty(0) if side is None else side)
 
 
 def _solve_by_spheres(model: Model, joints: Array, starts: Array | None) -> Solution:
@@ -121,7 +121,7 @@ def _solve_by_spheres(model: Model, joints: Array, starts: Array | None) -> Solu
     if starts is None:
         residual = _choose_by_working_mode(model, joints, poses)
     else:
-        residual = run_checked(model.spheres_tape(None), joints, poses, starts)
+        residual = evaluate_tape_with_residual(model.spheres_tape(None), joints, poses, starts)
     return Solution(poses, residual, residual <= closure_tolerance(model), np.zeros(len(joints), np.int32))
 
 
@@ -131,7 +131,7 @@ def _choose_by_working_mode(model: Model, joints: Array, poses: Array) -> Array:
     Where only the other common point has these joints in the machine's own working mode, that one is taken.
     """
     nothing = np.empty((len(joints), 0))
-    residual = run_checked(model.spheres_tape(model.home_side), joints, poses, nothing)
+    residual = evaluate_tape_with_residual(model.spheres_tape(model.home_side), joints, poses, nothing)
     if not model.has_modes:
         return residual
 
@@ -143,7 +143,8 @@ def _choose_by_working_mode(model: Model, joints: Array, poses: Array) -> Array:
     lost = np.flatnonzero(is_out_of_mode(poses, joints) & np.isfinite(residual))
     if len(lost):
         others, their_joints = np.empty((len(lost), poses.shape[1])), joints[lost]
-        their_residual = run_checked(model.spheres_tape(-model.home_side), their_joints, others, nothing[lost])
+        other_tape = model.spheres_tape(-model.home_side)
+        their_residual = evaluate_tape_with_residual(other_tape, their_joints, others, nothing[lost])
         fit = ~is_out_of_mode(others, their_joints)
         poses[lost[fit]], residual[lost[fit]] = others[fit], their_residual[fit]
     return residual
@@ -160,7 +161,7 @@ def _solve_by_newton(model: Model, joints: Array, starts: Array | None) -> Solut
     good = (result.residual <= closure_tolerance(model)) & (result.turned > 0.0)
     if not good.all():
         _continue_from_starts(model, near, joints, result, good)
-    return Solution(result.found, result.residual, good, result.steps)
+    return Solution(result.rows, result.residual, good, result.steps)
 
 
 def _continue_from_starts(model: Model, near: Array, joints: Array, result: Roots, good: Flags) -> None:
@@ -176,10 +177,10 @@ def _continue_from_starts(model: Model, near: Array, joints: Array, result: Root
         with np.errstate(invalid="ignore", over="ignore"):
             for part in range(1, parts + 1):
                 step = find_roots(model, walk, begin + (part / parts) * (joints[lost] - begin), side=side)
-                walk = step.found
+                walk = step.rows
                 result.steps[lost] += step.steps
             fine = (step.residual <= closure_tolerance(model)) & (step.turned > 0.0)
-        result.found[lost[fine]], result.residual[lost[fine]] = walk[fine], step.residual[fine]
+        result.rows[lost[fine]], result.residual[lost[fine]] = walk[fine], step.residual[fine]
         good[lost[fine]] = True
 
 
@@ -189,8 +190,8 @@ def _solve_by_constant_jacobian(model: Model, joints: Array, starts: Array | Non
     tape = model.legs_tape(model.mode)
     given = np.array(model.home)[None, :] if starts is None else starts
     wide = np.ascontiguousarray(np.broadcast_to(given, (len(joints), given.shape[1])))
-    y = run(model.begin_tape(), wide, np.empty((len(joints), m)), joints)
-    both = run(tape, y, np.empty((len(y), legs + legs * m)))
+    y = evaluate_tape(model.begin_tape(), wide, np.empty((len(joints), m)), joints)
+    both = evaluate_tape(tape, y, np.empty((len(y), legs + legs * m)))
     singular = ~np.isfinite(both).all(1)
     matrices = both[:, legs:].reshape(-1, legs, m).copy()
     matrices[singular] = np.eye(m)
@@ -204,9 +205,9 @@ def _solve_by_constant_jacobian(model: Model, joints: Array, starts: Array | Non
                 break
             y[going] += np.einsum("nij,nj->ni", inverse[going], off[going])
             steps[going] += 1
-            both = run(tape, y, np.empty((len(y), legs + legs * m)))
+            both = evaluate_tape(tape, y, np.empty((len(y), legs + legs * m)))
         for _ in range(40):  # on to rounding, uncounted: the verdict is the same for every method
             y += np.einsum("nij,nj->ni", inverse, joints[:, :legs] - both[:, :legs])
-            both = run(tape, y, np.empty((len(y), legs + legs * m)))
+            both = evaluate_tape(tape, y, np.empty((len(y), legs + legs * m)))
     residual = find_roots(model, y, joints, most=0, poses=False).residual
     return Solution(compute_poses(model, y, joints), residual, residual <= closure_tolerance(model), steps)

@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from ..arrays import Array
-from ..kernels.batch import run
+from ..kernels.batch import evaluate_tape
 from ..model.traces import Model
 
 
 def solve_inverse(model: Model, poses: Array, mode: str, out: Array | None = None) -> Array:
     """Compute the joints (N, joints) of poses (N, axes), mm and rad, in a working mode; NaN where a leg can't close."""
     out = np.empty((len(poses), len(model.drives))) if out is None else out
-    return run(model.inverse_tape(mode), np.ascontiguousarray(poses), out)
+    return evaluate_tape(model.inverse_tape(mode), np.ascontiguousarray(poses), out)

@@ -34,7 +34,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..arrays import Array, Flags, Indices
-from ..kernels.batch import run
+from ..kernels.batch import evaluate_tape
 from ..kernels.tape import Tape
 from ..model.parts import Drive
 from ..model.traces import Model
@@ -209,7 +209,7 @@ class Wrist:
 
     def measure_freedom(self, poses: Array) -> Array:
         """Compute sin² of the angle off the pole at poses (n, axes): (n,)."""
-        return run(self.freedom_tape(), np.ascontiguousarray(poses), np.empty((len(poses), 1)))[:, 0]
+        return evaluate_tape(self.freedom_tape(), np.ascontiguousarray(poses), np.empty((len(poses), 1)))[:, 0]
 
     def find_free(self, poses: Array, within: float) -> Flags:
         """Find poses (n, axes) no farther than ``within`` rad off the pole: the first joint is free there."""
@@ -220,7 +220,7 @@ class Wrist:
         """Solve the inverse problem of poses (n, axes) with the first joint given (n,): joints (n, joints)."""
         given = np.ascontiguousarray(first.reshape(-1, 1))
         into = np.empty((len(poses), len(self.model.drives)))
-        return run(self.first_given_tape(mode), np.ascontiguousarray(poses), into, given)
+        return evaluate_tape(self.first_given_tape(mode), np.ascontiguousarray(poses), into, given)
 
     def find_reachable(self, joints: Array) -> Flags:
         """Find rows of joints (n, joints) that exist and whose second joint is within its range."""

@@ -11,7 +11,7 @@ import numpy as np
 from ..algebra import Trace, derivative, norm, values
 from ..arrays import Array
 from ..errors import PoseError
-from ..kernels.batch import run
+from ..kernels.batch import evaluate_tape
 from ..machine import Machine
 from ..model.chain import frame
 from ..model.limits import leg_joints
@@ -95,5 +95,5 @@ def _arms(machine: Machine) -> float:
 def _spans_at_home(machine: Machine) -> Array:
     tape = machine.model.rates_tape()
     home = machine.home[None]
-    rows = run(tape, home, np.empty((1, tape.outputs)), machine.inverse(home), whole=False)
+    rows = evaluate_tape(tape, home, np.empty((1, tape.outputs)), machine.inverse(home), whole=False)
     return rows[0, 2 * len(machine.axes) ** 2 :]

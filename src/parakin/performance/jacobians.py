@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arrays import Array
-from ..kernels.batch import run
+from ..kernels.batch import evaluate_tape
 from ..machine import Machine
 from ..model.rates import drives_of_rows
 from .characteristic_length import Length
@@ -39,7 +39,7 @@ def twist_jacobians(machine: Machine, poses: ArrayLike, mode: str | None = None)
 def _computed(machine: Machine, rows: Array, mode: str | None) -> tuple[Array, Array, Array]:
     n = len(machine.axes)
     tape = machine.model.rates_tape()
-    found = run(tape, rows, np.empty((len(rows), tape.outputs)), machine.inverse(rows, mode))
+    found = evaluate_tape(tape, rows, np.empty((len(rows), tape.outputs)), machine.inverse(rows, mode))
     a, b = (found[:, i * n * n : (i + 1) * n * n].reshape(-1, n, n) for i in (0, 1))
     return a, b, found[:, 2 * n * n :]
 

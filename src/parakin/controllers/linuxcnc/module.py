@@ -122,8 +122,8 @@ def _wrist(machine: Machine) -> Iterator[str]:
 
 
 def _newton(machine: Machine) -> Iterator[str]:
-    newton = machine.tapes(machine.mode).newton
-    if newton is not None:
+    tapes = machine.tapes(machine.mode)
+    if tapes.newton is not None:
         least, most = min(machine.leg_sizes), max(machine.leg_sizes)
         side = float(np.sign(machine.sides(machine.home[None, :])[0]))
         yield f"#define FINE {number(0.01 * machine.closure_tolerance)} /* mm: where Newton's method has arrived */"
@@ -132,7 +132,7 @@ def _newton(machine: Machine) -> Iterator[str]:
         yield f"#define SLOW {number(SLOW)} /* a kept matrix that gains less than this a step is made anew */"
         yield f"#define MOST_STEPS {MOST_STEPS}"
         yield f"#define HOME_SIDE {number(side)} /* of the singularities; on the other one is another assembly */"
-        caps = [most / 3.0 if word.startswith("t") else 0.5 for word in newton.coordinates]
+        caps = [most / 3.0 if word.startswith("t") else 0.5 for word in tapes.coordinates]
         yield _array("double", "caps", [number(cap) for cap in caps]) + " /* greatest step */"
 
 
@@ -181,7 +181,7 @@ def _mathematics(machine: Machine) -> Iterator[str]:
     if tapes.common_point is not None:
         yield function("common_point", tapes.common_point, [q, near], [x, f])
     if tapes.newton is not None:
-        y, newton = Vector("y", len(tapes.newton.coordinates)), tapes.newton
+        y, newton = Vector("y", len(tapes.coordinates)), tapes.newton
         yield function("begin", newton.begin, [near, q], [y])
         yield function("closures", newton.closures, [y, q], [f])
         yield function("closures_and_slopes", newton.closures_and_slopes, [y, q], [f, Vector("a", f.length * y.length)])

@@ -75,7 +75,7 @@ def _statements(tape: Tape, inputs: Sequence[Vector]) -> tuple[list[str], list[s
         names[register] = f"t{len(values)}"
         values[names[register]] = expression
 
-    for row, constants in zip(tape.code.tolist(), tape.imm.tolist(), strict=True):
+    for row, constants in zip(tape.code.tolist(), tape.constants.tolist(), strict=True):
         operation, target, *operands = row
         if operation == t.SINCOS:
             argument = names[operands[1]]

@@ -10,7 +10,7 @@ from typing import BinaryIO
 import numpy as np
 from numpy.typing import NDArray
 
-from ...kernels.batch import cores
+from ...kernels.batch import count_cores
 from ...toolpath.posting.posted import Posted
 
 Progress = Callable[[float], None]
@@ -68,7 +68,7 @@ def _write_rows(posted: Posted, file: BinaryIO, say: Progress) -> None:
 
 def in_batches(file: BinaryIO, count: int, widest: int, fill: Fill, say: Progress) -> None:
     """Write ``count`` rows of text, each at most ``widest`` bytes, some at a time."""
-    workers = cores() if count > _BATCH else 1
+    workers = count_cores() if count > _BATCH else 1
     buffers = [np.empty(widest * min(_BATCH, count), np.uint8) for _ in range(workers + 1)]
 
     def text(start: int, buffer: NDArray[np.uint8]) -> memoryview:

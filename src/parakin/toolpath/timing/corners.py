@@ -8,7 +8,7 @@ import numpy as np
 
 from ...arrays import Array, Flags, Indices
 from ...errors import PoseError
-from ...kernels.batch import split
+from ...kernels.batch import run_in_threads
 from ...machine import Machine
 from ..posting.posted import Posted
 from .kernels.rounded_corners import SLIVER, blend_poses
@@ -55,7 +55,7 @@ class Curve(NamedTuple):
     def poses(self, segment: Indices, offset: Array) -> Array:
         """Compute the poses (k, axes) on pieces ``segment``, ``offset`` mm from their start."""
         poses = np.empty((len(segment), self.corner.shape[1]))
-        split(len(segment), lambda start, stop: blend_poses(self, segment, offset, poses, start, stop))
+        run_in_threads(len(segment), lambda start, stop: blend_poses(self, segment, offset, poses, start, stop))
         return poses
 
 

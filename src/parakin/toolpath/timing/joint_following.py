@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...kernels.batch import split
+from ...kernels.batch import run_in_threads
 from ...kinematics.wrist import DISTINCT, EXACT
 from ...machine import Machine
 from ..path import Floats
@@ -43,7 +43,7 @@ def close_to(machine: Machine, mode: str, poses: Floats, guess: Floats) -> tuple
         blur = np.maximum(1.0, DISTINCT / np.sqrt(np.maximum(freedom, on)))
     units = np.array(machine.joint_units)
     args = (both[0], both[-1], guess, units == "rad", np.where(units == "mm", LEVER, 1.0))
-    split(len(poses), lambda start, stop: choose_nearest(*args, start, stop))
+    run_in_threads(len(poses), lambda start, stop: choose_nearest(*args, start, stop))
     return both[0], blur
 
 

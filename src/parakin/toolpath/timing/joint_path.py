@@ -8,7 +8,7 @@ import numpy as np
 
 from ...arrays import Array, Flags, Indices
 from ...errors import PoseError
-from ...kernels.batch import split
+from ...kernels.batch import run_in_threads
 from ..posting.posted import Posted
 from .corners import Curve
 from .drive_limits import DriveLimits
@@ -81,7 +81,7 @@ class JointPath:
     def evaluate(self, motion: PathMotion) -> JointMotion:
         """Evaluate the splines: joints, speeds and accelerations for k motions along the path."""
         out = JointMotion(*(np.empty((len(motion.row), self.joints.shape[1])) for _ in range(3)))
-        split(len(motion.row), lambda start, stop: evaluate_splines(self.rows, motion, out, start, stop))
+        run_in_threads(len(motion.row), lambda start, stop: evaluate_splines(self.rows, motion, out, start, stop))
         return out
 
     def joints_at(self, row: Indices, shift: Array) -> tuple[Array, Array, Array]:
@@ -167,7 +167,7 @@ def _find_coarse_steps(joint_path: JointPath, tolerances: SplineTolerances, cand
         if wrist is not None:
             rounding[:, wrist.first] *= blur
         args = (joint_path.rows, steps, Midpoints(joints, splined, rounding), tolerances, np.empty(len(steps), bool))
-        split(len(steps), lambda start, stop: mark_coarse_steps(*args, start, stop))  # noqa: B023
+        run_in_threads(len(steps), lambda start, stop: mark_coarse_steps(*args, start, stop))  # noqa: B023
         blocks.append(steps[args[-1]])
     return np.concatenate(blocks)
 
@@ -223,5 +223,5 @@ def _compute_feed_ceiling(posted: Posted, curve: Curve, rows: CurveRows) -> Arra
     if path.seconds is not None:
         path_speed = np.where(free | np.isnan(path.seconds[record]), np.inf, curve.length / path.seconds[record])
     ceiling, limits = np.empty(len(rows.step)), FeedLimits(tip_columns, tip_speed, path_speed)
-    split(len(ceiling), lambda start, stop: compute_feed_ceilings(rows, curve, limits, ceiling, start, stop))
+    run_in_threads(len(ceiling), lambda start, stop: compute_feed_ceilings(rows, curve, limits, ceiling, start, stop))
     return ceiling

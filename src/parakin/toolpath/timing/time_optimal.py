@@ -6,7 +6,7 @@ import numpy as np
 
 from ...arrays import Array, Indices
 from ...errors import PoseError
-from ...kernels.batch import split
+from ...kernels.batch import run_in_threads
 from .drive_limits import DriveLimits
 from .joint_path import JointPath, refine_joint_path
 from .kernels.reachability import AccelerationLimits, Switches, compute_controllable, compute_reachable, find_switches
@@ -27,7 +27,7 @@ def compute_ceilings(joint_path: JointPath, limits: DriveLimits) -> StepCeilings
     steps = len(joint_path.step)
     ceilings = StepCeilings(np.empty(steps), np.empty(steps))
     args = (joint_path.rows, limits.speed, UNBOUND, ceilings)
-    split(steps, lambda start, stop: compute_speed_ceilings(*args, start, stop))
+    run_in_threads(steps, lambda start, stop: compute_speed_ceilings(*args, start, stop))
     return ceilings
 
 
@@ -45,7 +45,7 @@ def find_quickest(joint_path: JointPath, limits: DriveLimits) -> tuple[JointPath
         compute_reachable(rows, bounds, controllable, x, u, 0, count)
         switches, lost = Switches(np.empty(count), np.empty(count)), list[float]()
         args = (rows, bounds, ceilings, x, switches)
-        split(count, lambda start, stop: lost.append(find_switches(*args, start, stop)))  # noqa: B023
+        run_in_threads(count, lambda start, stop: lost.append(find_switches(*args, start, stop)))  # noqa: B023
         refuse_unbound(joint_path, np.maximum(x[:-1], x[1:]))
         steps = np.concatenate([np.flatnonzero(fractions) for fractions in switches])
         if attempt == _ROUNDS - 1 or sum(lost) <= WORTH * _compute_spans(joint_path, x).sum() or not len(steps):
@@ -101,6 +101,6 @@ def _write_steps(
     binding, changed = np.zeros(len(row_times), np.int64), np.ones(len(joint_path.step), bool)
     args = (joint_path.rows, without_jerk, profile, Utilisation(np.empty((len(row), 4)), binding, changed), _PLACES)
     factors = list[float]()
-    split(len(row), lambda first, last: factors.append(measure_utilisation(*args, first, last)))
+    run_in_threads(len(row), lambda first, last: factors.append(measure_utilisation(*args, first, last)))
     worst = max(factors)
     return profile.stretch(worst if worst > 1.0 + _ROUNDING else 1.0), binding

@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...kernels.batch import split
+from ...kernels.batch import run_in_threads
 from .constraints import Constraint
 from .plane_cuts import gather, lines
 
@@ -143,7 +143,7 @@ def bounds(constraint: Constraint, low: Array, size: Array, items: Items, every:
         np.empty(n, np.int8), np.empty((n, s), np.int8), np.empty(n), np.empty(n), np.empty((n, d)), np.empty((n, s))
     )
     into = (result.state, result.turn, result.low, result.high, result.slopes, result.spread)
-    split(n, lambda start, stop: lines(constraint.smooth, *over, *at, half, d, every, *into, start, stop))
+    run_in_threads(n, lambda start, stop: lines(constraint.smooth, *over, *at, half, d, every, *into, start, stop))
     return result
 
 
@@ -169,7 +169,7 @@ class Cuts:
         """The cuts of one constraint; ``box`` is sorted, several lines of one box must all hold."""
         given = (box, half, found.low, found.high, found.slopes, number)
         into = (self.bad, self.outer, self.lost, self.near, self.limit, self.area)
-        split(len(box), lambda start, stop: gather(*given, *into, start, stop))
+        run_in_threads(len(box), lambda start, stop: gather(*given, *into, start, stop))
 
     @property
     def shares(self) -> Shares:

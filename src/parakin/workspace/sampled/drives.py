@@ -12,7 +12,7 @@ import numpy as np
 
 from ...arrays import Array
 from ...errors import NoMethodError, PoseError
-from ...kernels.batch import run_checked
+from ...kernels.batch import evaluate_tape_with_residual
 from ...machine import Machine
 from ..certified.region import region
 from ..certified.workspace import question
@@ -129,7 +129,7 @@ def _refuse_others(machine: Machine) -> None:
 def _placed(machine: Machine, joints: Array, side: float, mode: str) -> Array:
     """Poses on one side for joints, (N, d) each; NaN where one does not count."""
     poses = np.empty((len(joints), len(machine.axes)))
-    residual = run_checked(machine.model.spheres_tape(side), joints, poses, np.empty((len(joints), 0)))
+    residual = evaluate_tape_with_residual(machine.model.spheres_tape(side), joints, poses, np.empty((len(joints), 0)))
     with np.errstate(invalid="ignore"):
         counts = (residual <= machine.closure_tolerance) & (abs(machine.inverse(poses, mode) - joints) <= _SAME).all(1)
     # The joints as they stand: those of the inverse lie a rounding beyond the limits.

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from ... import algebra as alg
 from ...arrays import Array
 from ...errors import PoseError
-from ...kernels.batch import run
+from ...kernels.batch import evaluate_tape
 from ...kernels.tape import Tape, compile_tape
 from ..certified.constraints import Constraint
 from ..certified.region import Region
@@ -100,7 +100,7 @@ class Distance:
         rows[:, :d] = places
         for turn in self.turns:
             rows[:, d:] = turn
-            each = run(self._each, rows, np.empty((len(rows), self._each.outputs)), whole=False)
+            each = evaluate_tape(self._each, rows, np.empty((len(rows), self._each.outputs)), whole=False)
             each = np.where(np.isnan(each), np.inf, each)
             least = each.min(1)
             better = sign * least < found
@@ -109,10 +109,10 @@ class Distance:
 
     def _one(self, rows: Array) -> Array:
         """For one turn each; where a leg can't close, what its reach alone tells."""
-        f = run(self._least, rows, np.empty((len(rows), 1)), whole=False)[:, 0]
+        f = evaluate_tape(self._least, rows, np.empty((len(rows), 1)), whole=False)[:, 0]
         lost = np.flatnonzero(np.isnan(f))
         if len(lost):
-            reach = run(self._reach, rows[lost], np.empty((len(lost), self._reach.outputs)), whole=False)
+            reach = evaluate_tape(self._reach, rows[lost], np.empty((len(lost), self._reach.outputs)), whole=False)
             least = np.fmin.reduce(reach, axis=1, initial=np.inf)
             f[lost] = np.where(least < 0.0, least, -np.inf)
         return f

@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 
 from ...arrays import Array
 from ...errors import PoseError
-from ...kernels.batch import run, split, still
-from ...kernels.staged import in_parts
+from ...kernels.batch import evaluate_tape, freeze, run_in_threads
+from ...kernels.staged import stage_margins
 from ...machine import Machine
 from ..certified.region import Region
 
@@ -112,22 +112,24 @@ class FirstBroken:
         self.turns = turn_samples(asked, turns_step)
         margins = [constraint.margin for constraint in asked.constraints if not constraint.implied]
         inputs = asked.slice.inputs
-        self._program = in_parts(inputs[0].trace, margins, len(asked.places), len(asked.turns))
+        staged = stage_margins(inputs[0].trace, margins, len(asked.places), len(asked.turns))
+        self._program = staged.program
         rows = np.hstack([np.zeros((len(self.turns), len(asked.places))), self.turns])
-        self._fixed = run(self._program.fixed, rows, np.empty((len(rows), self._program.fixed.outputs)), whole=False)
+        fixed = np.empty((len(rows), staged.fixed.outputs))
+        self._fixed = evaluate_tape(staged.fixed, rows, fixed, whole=False)
         self._type = np.uint8 if len(asked.limits) < 255 else np.uint16
 
     def at(self, places: Array) -> Codes:
         """At places (N, d) -> (N,)."""
-        from ...kernels.sweep import in_turns
+        from ...kernels.sweep import sweep_turns
 
         codes, every = np.zeros(len(places), self._type), True
         undecided, start = np.arange(len(places)), 0
         while start < len(self.turns) and len(undecided):
             stop = 4 * start or 1
             now, some = np.ascontiguousarray(places[undecided]), codes[undecided]
-            args = (*self._program.given, still(now), still(self._fixed[start:stop]), every, some)
-            split(len(now), lambda a, b: in_turns(*args, a, b))  # noqa: B023  done within the loop's turn
+            args = (self._program, freeze(now), freeze(self._fixed[start:stop]), every, some)
+            run_in_threads(len(now), lambda a, b: sweep_turns(*args, a, b))  # noqa: B023  done within the loop's turn
             codes[undecided] = some
             every, start = self.asked.every, stop
             undecided = np.flatnonzero((codes == 0) == every)
@@ -135,7 +137,7 @@ class FirstBroken:
 
     def on_grid(self, coordinates: Sequence[Array], progress: Callable[[float], None] | None = None) -> Codes:
         """At every place of a grid, given each axis's coordinates -> (n, ...) as many as axes."""
-        from ...kernels.sweep import on_grid
+        from ...kernels.sweep import sweep_grid
 
         shape = tuple(len(column) for column in coordinates)
         codes = np.empty(shape, self._type)
@@ -147,8 +149,8 @@ class FirstBroken:
                 index = np.unravel_index(np.arange(start, stop), shape)
                 flat[start:stop] = self.at(np.stack([x[i] for x, i in zip(coordinates, index, strict=True)], 1))
             else:
-                args = (*self._program.given, *grid, flat)
-                split(stop - start, lambda a, b: on_grid(*args, start + a, start + b))  # noqa: B023
+                args = (self._program, *grid, flat)
+                run_in_threads(stop - start, lambda a, b: sweep_grid(*args, start + a, start + b))  # noqa: B023
             if progress:
                 progress(stop / len(flat))
         return codes

@@ -16,7 +16,8 @@ from parakin.toolpath.path import ToolPath
 from parakin.toolpath.posting.post import post
 from parakin.toolpath.posting.posted import Posted
 from parakin.toolpath.timing import plan_trajectory
-from parakin.toolpath.timing.kernels.reachability import AccelerationLimits, compute_controllable, compute_reachable
+from parakin.toolpath.timing.kernels.acceleration_limits import AccelerationLimits
+from parakin.toolpath.timing.kernels.reachability import compute_controllable, compute_reachable
 from parakin.toolpath.timing.kernels.speed_ceilings import StepCeilings, compute_speed_ceilings
 from parakin.toolpath.timing.kernels.splines import JointRows, fit_splines
 

@@ -12,7 +12,7 @@ from ...kernels.batch import run_in_threads
 from ..posting.posted import Posted
 from .corners import Curve
 from .drive_limits import DriveLimits
-from .joint_following import close_to, followed
+from .joint_following import find_nearest_joints, follow_curve
 from .kernels.rounded_corners import place_rows
 from .kernels.speed_ceilings import CurveRows, FeedLimits, compute_feed_ceilings
 from .kernels.splines import (
@@ -64,8 +64,8 @@ class JointPath:
         """(n, joints) mm and rad."""
         return self.rows.joints
 
-    def between(self, row: int) -> str:
-        """Where a row is, by the records before and behind it."""
+    def describe_step(self, row: int) -> str:
+        """Describe where the step after a row is, by the records before and behind it."""
         record = int(self.curve.record_of_piece[self.segment[row]])
         return f"between records {record - 1} and {record} (line {int(self.posted.path.line[record])})"
 
@@ -87,11 +87,11 @@ class JointPath:
     def joints_at(self, row: Indices, shift: Array) -> tuple[Array, Array, Array]:
         """Compute the machine's joints ``shift`` mm after rows (k,), the nearest to the splines, and the splines.
 
-        The third is how much less exact the first turning joint is; see :func:`~.joint_following.close_to`.
+        The third is how much less exact the first turning joint is; see :func:`~.joint_following.find_nearest_joints`.
         """
         still = np.zeros(len(row))
         splined = self.evaluate(PathMotion(row, shift, still, still)).joints
-        joints, blur = close_to(self.posted.machine, self.posted.mode, self.poses(row, shift), splined)
+        joints, blur = find_nearest_joints(self.posted.machine, self.posted.mode, self.poses(row, shift), splined)
         return joints, splined, blur
 
 
@@ -127,7 +127,7 @@ def build_joint_path(
         doubtful[:] = anew
         doubtful[steps] = True
         doubtful = _widen_flags(np.insert(doubtful, steps + 1, True))
-    where = joint_path.between(int(coarse[0]))
+    where = joint_path.describe_step(int(coarse[0]))
     raise PoseError(f"{where} a joint would have to jump: the tool passes a singular pose")
 
 
@@ -188,8 +188,8 @@ def refine_joint_path(joint_path: JointPath, steps: Indices, parts: Array, anew:
 
 def _follow_rows(posted: Posted, curve: Curve, segment: Indices, offset: Array) -> JointPath:
     """Follow the joints from the first row to the last, and fit splines through them."""
-    way = np.append(0.0, np.cumsum(curve.length))[segment] + offset
-    joints = followed(posted.machine, posted.mode, curve.poses(segment, offset), way)
+    length = np.append(0.0, np.cumsum(curve.length))[segment] + offset
+    joints = follow_curve(posted.machine, posted.mode, curve.poses(segment, offset), length)
     turns = np.round((posted.joints[0] - joints[0]) / (2.0 * np.pi))
     turns[np.array(posted.machine.joint_units) == "mm"] = 0.0
     if (turns != 0.0).any():
@@ -209,7 +209,7 @@ def _fit_rows(posted: Posted, curve: Curve, segment: Indices, offset: Array, joi
     joint_path = JointPath(posted, curve, segment, offset, JointRows(step, joints, curvature, feed_ceiling))
     if not np.isfinite(joints.sum()):
         lost = int((~np.isfinite(joints)).any(1).argmax())
-        raise PoseError(f"{joint_path.between(lost)} the legs can't close")
+        raise PoseError(f"{joint_path.describe_step(lost)} the legs can't close")
     return joint_path
 
 

@@ -9,7 +9,8 @@ from ...errors import PoseError
 from ...kernels.batch import run_in_threads
 from .drive_limits import DriveLimits
 from .joint_path import JointPath, refine_joint_path
-from .kernels.reachability import AccelerationLimits, Switches, compute_controllable, compute_reachable, find_switches
+from .kernels.acceleration_limits import AccelerationLimits
+from .kernels.reachability import Switches, compute_controllable, compute_reachable, find_switches
 from .kernels.speed_ceilings import StepCeilings, compute_speed_ceilings
 from .kernels.utilisation import Utilisation, measure_utilisation
 from .speed_profile import SpeedProfile
@@ -63,7 +64,7 @@ def refuse_unbound(joint_path: JointPath, x: Array) -> None:
         if moving.any():
             names = [name for name, moves in zip(joint_path.posted.machine.joints, moving, strict=True) if moves]
             text = f"no feed, and no speed or acceleration of {', '.join(names)}"
-            raise PoseError(f"{joint_path.between(int(step))} nothing limits the motion: {text}")
+            raise PoseError(f"{joint_path.describe_step(int(step))} nothing limits the motion: {text}")
 
 
 def _compute_spans(joint_path: JointPath, x: Array) -> Array:

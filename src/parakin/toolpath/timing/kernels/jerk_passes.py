@@ -19,7 +19,8 @@ from numba import njit
 
 from ....arrays import Array, Indices
 from ..drive_limits import DriveLimits
-from .reachability import AccelerationLimits, allocate_lines, find_acceleration, find_controllable
+from .acceleration_limits import AccelerationLimits, allocate_lines
+from .reachability import find_acceleration, find_controllable
 from .splines import JointRows
 
 _LEAST = 0.1  # of a jerk limit that is left for s⃛ in any case

@@ -1,9 +1,7 @@
 """Kernels for the quickest trajectory along a joint path: reachability analysis with the joints' acceleration limits.
 
-The joints are cubic splines of the path's parameter s: over a step h their second derivative is linear and the first a
-parabola. With s̈ = u constant over a step, x = ṡ² is linear too, and a joint's acceleration q'·u + q''·x is a parabola.
-Its three Bernstein coefficients are linear in u and the step's first x, and the parabola lies between the least and the
-greatest of them. So a trajectory that keeps these within the limit keeps it everywhere, between the rows as well.
+With x = ṡ² and u = s̈ constant over a step, the limits bound u by lines in the step's first x; see
+:mod:`.acceleration_limits`.
 
 The controllable x at a row, those from which the path can be completed, lie below a greatest one. The backward pass
 finds it, from the end (Pham and Pham, A new approach to time-optimal path parameterization based on reachability
@@ -19,25 +17,11 @@ import numpy as np
 from numba import njit
 
 from ....arrays import Array
+from .acceleration_limits import allocate_lines, bound_acceleration
 
 _TURNS = 60  # Newton's method on a convex, piecewise linear function ends after a few steps
 _SAFE = 1.0 - 1e-11  # of what is controllable; the rest is for rounding
 _CLEAR, _BESIDE = 0.02, 1e-5  # of a step: how near a new row may be to an existing one, and to a stop
-
-
-class AccelerationLimits(NamedTuple):
-    """Bounds of acceleration, infinite for none: of the joints, (joints,), and of u = s̈ itself, ``path`` (steps,)."""
-
-    joints: Array
-    path: Array
-
-
-class AccelerationLines(NamedTuple):
-    """Bounds of u over one step, ±``reach`` - ``tilt``·x, one a line; ``coefficients`` (6,) is scratch."""
-
-    coefficients: Array
-    reach: Array
-    tilt: Array
 
 
 class Switches(NamedTuple):
@@ -50,52 +34,13 @@ class Switches(NamedTuple):
     fall_start: Array
 
 
-@njit(nogil=True, cache=True)
-def allocate_lines(limits):
-    """Allocate the lines of one step: three for each joint and one for the path's own bound."""
-    joints = len(limits.joints)
-    return AccelerationLines(np.empty(6), np.empty(3 * joints + 1), np.empty(3 * joints + 1))
-
-
-@njit(nogil=True, cache=True, error_model="numpy")
-def _expand_acceleration(i, j, rows, coefficients):
-    """Write the Bernstein coefficients of joint j's acceleration α·u + β·x over step i: three pairs of α and β."""
-    h, q, bend = rows.step[i], rows.joints, rows.curvature
-    m0, m1 = bend[i, j], bend[i + 1, j]
-    d = (q[i + 1, j] - q[i, j]) / h - h * (2.0 * m0 + m1) / 6.0
-    coefficients[0], coefficients[1] = d, m0
-    coefficients[2], coefficients[3] = d + 1.5 * h * m0, 0.5 * (m0 + m1)
-    coefficients[4], coefficients[5] = d + h * (0.5 * m0 + 2.5 * m1), m1
-
-
-@njit(nogil=True, cache=True, error_model="numpy")
-def _bound_acceleration(i, rows, limits, lines):
-    """Write the bounds of u over step i to ``lines``; returns how many there are, and a bound of x alone."""
-    count, highest = 0, np.inf
-    if limits.path[i] < np.inf:
-        lines.reach[0], lines.tilt[0] = limits.path[i], 0.0
-        count = 1
-    for j in range(len(limits.joints)):
-        if limits.joints[j] < np.inf:
-            w = 1.0 / limits.joints[j]
-            _expand_acceleration(i, j, rows, lines.coefficients)
-            for k in range(0, 6, 2):
-                a, b = lines.coefficients[k] * w, lines.coefficients[k + 1] * w
-                if a != 0.0:
-                    lines.reach[count], lines.tilt[count] = 1.0 / abs(a), b / a
-                    count += 1
-                elif b != 0.0:
-                    highest = min(highest, 1.0 / abs(b))
-    return count, highest
-
-
 @njit(nogil=True, cache=True, error_model="numpy")
 def find_controllable(i, x, after, rows, limits, lines):
     """Find the greatest ṡ² at row i, ``x`` at most, from which ``after`` is not exceeded at the next row.
 
     Newton's method on the gap between the greatest and the least u, a convex, piecewise linear function of x.
     """
-    count, highest = _bound_acceleration(i, rows, limits, lines)
+    count, highest = bound_acceleration(i, rows, limits, lines)
     x, half = min(x, highest), 0.5 / rows.step[i]
     for _ in range(_TURNS):
         high, low = (after - x) * half, -x * half
@@ -118,7 +63,7 @@ def find_controllable(i, x, after, rows, limits, lines):
 @njit(nogil=True, cache=True, error_model="numpy")
 def find_acceleration(i, x, after, most, rows, limits, lines):
     """Find the greatest u over step i, ``most`` at most, with which ṡ² goes from ``x`` to no more than ``after``."""
-    count, _ = _bound_acceleration(i, rows, limits, lines)
+    count, _ = bound_acceleration(i, rows, limits, lines)
     half = 0.5 / rows.step[i]
     high, low = min(most, (after - x) * half), -x * half
     for k in range(count):
@@ -169,7 +114,7 @@ def find_switches(rows, limits, ceilings, x, switches, start, stop):
         h, here, after = rows.step[i], x[i], x[i + 1]
         if h == 0.0:
             continue
-        count, _ = _bound_acceleration(i, rows, limits, lines)
+        count, _ = bound_acceleration(i, rows, limits, lines)
         high, low = np.inf, -np.inf
         for k in range(count):
             high = min(high, lines.reach[k] - lines.tilt[k] * here)

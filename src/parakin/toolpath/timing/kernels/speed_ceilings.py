@@ -1,4 +1,7 @@
-"""Kernels for ceilings of the path speed: the greatest ṡ² that the programmed feed and the joints' speeds allow."""
+"""Kernels for ceilings of the path speed: the feed ceiling, of the programmed feed, and that of the joints' speeds too.
+
+A ceiling bounds ṡ², the square of the path speed.
+"""
 
 from __future__ import annotations
 

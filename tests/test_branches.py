@@ -11,7 +11,7 @@ import pytest
 import parakin as pk
 from parakin.toolpath.path import ToolPath
 from parakin.toolpath.posting.post import post
-from parakin.toolpath.reading.gcode.reader import axes_of
+from parakin.toolpath.reading.gcode.reader import compute_tool_axes
 
 DEGREE = math.pi / 180.0
 TURN = 360.0 * DEGREE
@@ -208,7 +208,7 @@ def test_a_turn_programmed_in_one_motion_is_made(name, c):
     few = np.radians([[0.0, 20.0, 0.0], [0.0, 25.0, c], [0.0, 25.0, c + 10.0]])
     share = np.linspace(0.0, 1.0, 1001)[:, None]
     many = np.vstack([few[0] + share * (few[1] - few[0]), few[2:]])
-    posted, fine = (post(machine, path_of(machine.home[:3], axes_of(t), turns=t)) for t in (few, many))
+    posted, fine = (post(machine, path_of(machine.home[:3], compute_tool_axes(t), turns=t)) for t in (few, many))
     assert posted.poses[:, 3:].tolist() == few[:, 1:].tolist()
     way, finely = posted.joints - posted.joints[0], fine.joints - fine.joints[0]
     np.testing.assert_allclose(way, finely[[0, 1000, 1001]], atol=1e-9)
@@ -219,7 +219,7 @@ def test_too_many_turns_are_refused():
     turns = np.array([[0.0, 0.3, 0.0], [0.0, 0.3, 1e6]])
     machine = pk.load("tricept")
     with pytest.raises(pk.PoseError, match="record 1 makes 159,155 turns"):
-        post(machine, path_of(machine.home[:3], axes_of(turns), turns=turns))
+        post(machine, path_of(machine.home[:3], compute_tool_axes(turns), turns=turns))
 
 
 # Working modes.

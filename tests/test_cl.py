@@ -828,7 +828,7 @@ def taken(monkeypatch, data):
         monkeypatch.setattr(cl, "_BLOCK", size)
         try:
             with np.errstate(all="ignore"):
-                results.append(cl._Reader("f", len(data), 0.5).read(io.BytesIO(data), lambda fraction: None))
+                results.append(cl.ClReader("f", len(data), 0.5).read(io.BytesIO(data), lambda fraction: None))
         except InputError as error:
             results.append(str(error))
     fast, slow = results

@@ -12,7 +12,7 @@ import pytest
 from gcode_model import Program
 
 from parakin.errors import InputError
-from parakin.toolpath.reading.detect import read_path, sniff
+from parakin.toolpath.reading.detect import detect_format, read_path
 from parakin.toolpath.reading.gcode import motion as gcode_motion
 from parakin.toolpath.reading.gcode import reader as gcode
 from parakin.toolpath.reading.gcode.reader import read_gcode
@@ -55,12 +55,12 @@ def read(tmp_path):
 @pytest.fixture
 def both(read, monkeypatch):
     """With and without the fast reader; the same path or the same error, or it fails."""
-    plain = gcode.plain_run
+    plain = gcode.read_plain_lines
 
     def reads(text, **options):
         results = []
         for run in (plain, lambda lines, at, first, motion: at):
-            monkeypatch.setattr(gcode, "plain_run", run)
+            monkeypatch.setattr(gcode, "read_plain_lines", run)
             try:
                 results.append(read(text, **options))
             except InputError as error:
@@ -825,13 +825,13 @@ def test_random_programs_against_their_model(both):
 
 
 def test_progress_and_many_blocks(tmp_path, monkeypatch):
-    monkeypatch.setattr(gcode, "_BLOCK", 1000)
+    monkeypatch.setattr(gcode, "READ_SIZE", 1000)
     path = tmp_path / "a.ngc"
     path.write_text("G0 X0 Y0 Z0\nF5\nG1\n" + "".join(f"X{k} Y-.5\nG2 X{k} I1\nG1\n" for k in range(1, 300)) + "M2\n")
     seen = []
     p = read_gcode(path, progress=seen.append, arc_tolerance=1.0)
     assert seen == sorted(seen) and seen[-1] == 1.0 and len(seen) > 5 and seen[0] < 0.5
-    monkeypatch.setattr(gcode, "_BLOCK", 1 << 20)
+    monkeypatch.setattr(gcode, "READ_SIZE", 1 << 20)
     same(p, read_gcode(path, arc_tolerance=1.0))
     assert p.line[-1] == 3 + 298 * 3 + 2 and len(p) == 1 + 299 * 9
 
@@ -899,7 +899,7 @@ def test_long_lines_end_soon(both, text):
 def test_which_reader(tmp_path, name, text, kind):
     path = tmp_path / name
     path.write_text(text)
-    assert sniff(path) == kind
+    assert detect_format(path) == kind
 
 
 def test_any_file(tmp_path):
@@ -926,11 +926,11 @@ def taken(data, tolerance=1.0):
     """Read bytes, both ways; anything but a path or one line of an error is a failure."""
     results = []
     for run in (PLAIN, lambda lines, at, first, motion: at):
-        gcode.plain_run = run
+        gcode.read_plain_lines = run
         try:
             with np.errstate(all="ignore"):
                 results.append(
-                    gcode._Reader("f", len(data), tolerance, SHIFTED).read(io.BytesIO(data), lambda fraction: None)
+                    gcode.GcodeReader("f", len(data), tolerance, SHIFTED).read(io.BytesIO(data), lambda fraction: None)
                 )
         except InputError as error:
             results.append(str(error))
@@ -945,7 +945,7 @@ def taken(data, tolerance=1.0):
     return slow
 
 
-PLAIN = gcode.plain_run
+PLAIN = gcode.read_plain_lines
 
 
 def mutated(data, rng):
@@ -977,7 +977,7 @@ SEEDS = [
 
 @pytest.mark.parametrize("seed", range(4))
 def test_mutated_bytes(monkeypatch, seed):
-    monkeypatch.setattr(gcode, "plain_run", PLAIN)
+    monkeypatch.setattr(gcode, "read_plain_lines", PLAIN)
     rng, read_ones = random.Random(seed), 0
     for _ in range(15_000):
         path = taken(mutated(rng.choice(SEEDS), rng))
@@ -986,7 +986,7 @@ def test_mutated_bytes(monkeypatch, seed):
 
 
 def test_random_pieces(monkeypatch):
-    monkeypatch.setattr(gcode, "plain_run", PLAIN)
+    monkeypatch.setattr(gcode, "read_plain_lines", PLAIN)
     rng, read_ones = random.Random(0), 0
     for _ in range(15_000):
         data = b"G0 X1 Y2 Z3 F9\n" + b" ".join(rng.choices(PIECES, k=rng.randint(1, 9)))
@@ -995,7 +995,7 @@ def test_random_pieces(monkeypatch):
 
 
 def test_random_bytes(monkeypatch):
-    monkeypatch.setattr(gcode, "plain_run", PLAIN)
+    monkeypatch.setattr(gcode, "read_plain_lines", PLAIN)
     rng = random.Random(0)
     for _ in range(13_000):
         taken(rng.randbytes(rng.randint(0, 40)))

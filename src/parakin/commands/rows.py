@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError, quote, suggest
-from ..toolpath.reading.cl.tokens import LARGEST
+from ..toolpath.reading.text import LARGEST
 from ..units import ANGLE, LENGTH, UNITS
 
 

@@ -24,12 +24,12 @@ def parse_value(name: str, text: str, source: str, unit: str | None = None) -> f
 
     Raises :class:`InputError`.
     """
-    from ..toolpath.reading.cl.tokens import LARGEST, is_number, number
+    from ..toolpath.reading.text import LARGEST, is_number, parse_number
 
     angular = name in "ABC" if unit is None else unit == "rad"
     try:
         if is_number(text):
-            value = number(text)
+            value = parse_number(text)
             return math.radians(value) if angular else value
         value = parse_quantity(text, ANGLE if angular else LENGTH)
     except (QuantityError, InputError) as error:

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from ...errors import InputError
 from ...toolpath.path import Floats
-from ...toolpath.reading.gcode.codes import g_name
-from ...toolpath.reading.gcode.words import VALUES, Block, parse
+from ...toolpath.reading.gcode.block import VALUES, Block, parse_block
+from ...toolpath.reading.gcode.codes import format_g_code
 from .program import LINEAR, TURNING
 
 _LETTERS = LINEAR + TURNING
@@ -52,7 +52,7 @@ def read_joint_program(path: str | os.PathLike[str]) -> JointProgram:
     reader = _Reader()
     for number, line in enumerate(text.split("\n"), 1):
         try:
-            reader.take(parse(line.strip(" \t\r"), VALUES + "UVW"), number)
+            reader.take(parse_block(line.strip(" \t\r"), VALUES + "UVW"), number)
         except InputError as error:
             raise InputError(error.message, source, number) from error
     if not reader.rows:
@@ -91,7 +91,7 @@ class _Reader:
     def _mode(self, group: str, code: int) -> None:
         self.stated.add(group)
         if code not in (_MODES.get(group), _DWELL if group == "once" else _STRAIGHT if group == "motion" else None):
-            raise InputError(f"{g_name(code)}: not of a program in joint space; expected G1 in G21, G90 and G93")
+            raise InputError(f"{format_g_code(code)}: not of a program in joint space; expected G1 in G21, G90 and G93")
 
     def _move(self, row: dict[str, float], block: Block, line: int) -> None:
         for group, name in _STATED.items():

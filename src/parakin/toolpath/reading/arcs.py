@@ -1,21 +1,29 @@
-"""Arcs to points. Everything here is in mm and radians; errors are raised without a place, the reader adds it."""
+"""Arcs to points: circular, helical and slightly spiral interpolation, mm and radians.
+
+Errors name no file and no line; the reader adds both.
+"""
 
 import math
 
 import numpy as np
 
-from ..path import Floats
-from .cl.tokens import refuse
+from ...arrays import Array
+from .text import refuse
 
 ON_CIRCLE = 0.01  # mm: further off its circle an arc's start or end is an error; covers coordinates of 3 decimals
 CLOSED = 1e-6  # mm: an end this near the start is a full circle
 _MOST_POINTS = 1_000_000
+_WIDEST_STEP = math.pi / 4  # rad between two points, however coarse the tolerance
+_ONE_DIAMETER = 1e-3  # sine of the angle between two radii; below this they lie on one diameter
+_ALONG = 0.1  # cosine of the angle between tangent and circle; below this the tangent does not tell the way round
+_OPPOSITE = 1e-6  # rad: axes this close to opposite have no definite plane
 
 
-def plane_of(start: Floats, end: Floats, centre: Floats, tangent: Floats) -> Floats:
-    """Unit normal of the circle through start and end about centre, turning so that the motion starts along tangent.
+def find_arc_normal(start: Array, end: Array, centre: Array, tangent: Array) -> Array:
+    """Find the unit normal (3,) of the circle through start and end about centre, turned so that the motion, which is
+    right-handed about it, starts along the tangent.
 
-    start, end, centre, tangent : (3,). Motion is right-handed about the normal.
+    start, end, centre, tangent : (3,)
     """
     out = start - centre
     radius, length = float(np.linalg.norm(out)), float(np.linalg.norm(tangent))
@@ -24,26 +32,25 @@ def plane_of(start: Floats, end: Floats, centre: Floats, tangent: Floats) -> Flo
     out, along = out / radius, tangent / length
     normal = np.cross(out, (end - centre) / radius)
     # two rounded points fix the plane better than a rounded tangent, unless they lie on one diameter
-    if np.linalg.norm(normal) < 1e-3:
+    if np.linalg.norm(normal) < _ONE_DIAMETER:
         normal = np.cross(out, along)
     norm = float(np.linalg.norm(normal))
-    forward = np.cross(normal, out) / norm if norm > 1e-3 else np.zeros(3)
+    forward = np.cross(normal, out) / norm if norm > _ONE_DIAMETER else np.zeros(3)
     agreement = float(forward @ along)
-    if not abs(agreement) >= 0.1:
+    if not abs(agreement) >= _ALONG:
         refuse("INDIRV does not point along the circle at the arc's start")
     return np.asarray(normal / norm * math.copysign(1.0, agreement))
 
 
-def arc(
-    start: Floats, end: Floats, centre: Floats, radius: float, normal: Floats, tolerance: float, helix: bool
-) -> tuple[Floats, Floats]:
-    """Points of an arc after its start, the last one ``end`` itself, and the fraction of the turn at each.
+def interpolate_arc(
+    start: Array, end: Array, centre: Array, radius: float, normal: Array, tolerance: float, *, helix: bool
+) -> tuple[Array, Array]:
+    """Divide an arc into points (k, 3) after its start, the last one ``end`` itself; with the fraction of the turn at
+    each (k,). The points between lie on the circle of the given centre and radius exactly.
 
-    start, end, centre : (3,); normal : (3,) unit, the motion is right-handed about it.
-    tolerance : largest distance of a chord from the arc.
-    helix : whether start and end may lie at different heights along the normal; the height then grows with the turn.
-
-    Returns (k, 3) and (k,). The points between lie on the circle of the given centre and radius exactly.
+    start, end, centre : (3,); normal : (3,) unit, the motion is right-handed about it
+    tolerance : largest distance of a chord from the arc
+    helix : whether start and end may lie at different heights along the normal; the height then grows with the turn
     """
     if not radius > 0.0:
         refuse(f"a circle of radius {radius:g}; expected a radius above zero")
@@ -60,20 +67,20 @@ def arc(
     v = np.cross(normal, u)
     turn = math.atan2(float(b @ v), float(b @ u))
     turn = 2.0 * math.pi if abs(turn) * radius <= CLOSED else turn % (2.0 * math.pi)
-    return swept(centre, (u, v, normal), (radius, radius), (height_a, height_b), turn, tolerance, end)
+    return interpolate_spiral(centre, (u, v, normal), (radius, radius), (height_a, height_b), turn, tolerance, end)
 
 
-def swept(
-    centre: Floats,
-    basis: tuple[Floats, Floats, Floats],
+def interpolate_spiral(
+    centre: Array,
+    basis: tuple[Array, Array, Array],
     radii: tuple[float, float],
     heights: tuple[float, float],
     turn: float,
     tolerance: float,
-    end: Floats,
-) -> tuple[Floats, Floats]:
-    """Points of a circle, helix or slight spiral after its start, the last one ``end`` itself, and the fraction of the
-    turn at each: (k, 3) and (k,).
+    end: Array,
+) -> tuple[Array, Array]:
+    """Divide a circle, helix or slight spiral into points (k, 3) after its start, the last one ``end`` itself; with the
+    fraction of the turn at each (k,).
 
     basis : unit vectors (3,) at right angles: towards the start, along the motion there, along the axis of the turn
     radii, heights : at start and end; both grow with the turn
@@ -83,7 +90,7 @@ def swept(
     u, v, normal = basis
     (radius, radius_end), (height, height_end) = radii, heights
     # a chord over the angle t is off by r (1 - cos(t/2)) = 2 r sin(t/4)^2; the sine keeps its digits for small t
-    step = 4.0 * math.asin(min(math.sqrt(tolerance / (2.0 * max(radii))), math.sin(math.pi / 16)))
+    step = 4.0 * math.asin(min(math.sqrt(tolerance / (2.0 * max(radii))), math.sin(_WIDEST_STEP / 4)))
     if turn > step * _MOST_POINTS:
         refuse(f"an arc of more than {_MOST_POINTS} points at a tolerance of {tolerance:g} mm; expected a coarser one")
     count = max(1, math.ceil(turn / step))
@@ -96,12 +103,12 @@ def swept(
     return points, fraction
 
 
-def turn_axis(first: Floats, last: Floats, fraction: Floats) -> Floats:
-    """Unit vectors on the great circle from first to last, (3,) each, at the fractions (k,): (k, 3)."""
+def interpolate_axis(first: Array, last: Array, fraction: Array) -> Array:
+    """Turn a tool axis on the great circle from first to last, (3,) each: unit vectors (k, 3) at the fractions (k,)."""
     across = last - (first @ last) * first
     sine = float(np.linalg.norm(np.cross(first, last)))
     angle = math.atan2(sine, float(first @ last))
-    if angle > math.pi - 1e-6:
+    if angle > math.pi - _OPPOSITE:
         refuse("the tool axis turns round by 180 degrees on an arc; expected a definite way to turn it")
     if sine == 0.0:
         return np.repeat(last[None], len(fraction), axis=0)

@@ -1,16 +1,16 @@
-"""Where a G-code program has led the tool, how fast, and the records made from it."""
+"""The modal state of a G-code program's motion and the records that follow from it: lines, arcs, feeds."""
 
 import math
 
 import numpy as np
 
-from ...path import Floats
-from ..cl.tokens import refuse
-from ..columns import NoteBook
-from .arcs import PLANES, arc_points, centre_from_radius
-from .codes import g_name
-from .records import FEED, LINE, RAPID, SECONDS, SPINDLE, WIDTH, Rows
-from .words import whole
+from ....arrays import Array
+from ..notes import NoteBook
+from ..text import refuse
+from .arcs import PLANES, ArcMotion, Flat, centre_from_radius, interpolate_g_arc
+from .block import round_whole
+from .codes import G0, G2, G17, format_g_code
+from .records import FEED, LINE, RAPID, SECONDS, SPINDLE, WIDTH, GcodeRecords
 
 AXES = "XYZABC"
 STILL = 1e-7  # mm: where X, Y and Z move less, RS274/NGC as LinuxCNC has it takes F for degrees per minute
@@ -22,21 +22,26 @@ class GcodeMotion:
     """Modal state of the motion. Lengths are mm, turns degrees as programmed.
 
     here : X, Y, Z, A, B, C; X, Y, Z are NaN until they are given, A, B, C 0
+    turned : whether A, B, C were given
     mode : the motion code in force in tenths, None if there is none
+    plane : the code of the arcs' plane in tenths
+    scale : mm in the programmed unit
+    incremental, absolute_centres, inverse_time : G91, G90.1, G93
     rate, feed : F as written, and in mm/min; NaN until given
+    rpm : spindle speed in rev/min, NaN if not known
     workpiece : (3, 4) rotation and origin (mm) of the work in the machine's coordinates; None if not known
     """
 
-    def __init__(self, arc_tolerance: float, workpiece: Floats | None):
-        self.rows = Rows()
+    def __init__(self, arc_tolerance: float, workpiece: Array | None):
+        self.records = GcodeRecords()
         self.notes = NoteBook()
         self.arc_tolerance = arc_tolerance
         self.workpiece = workpiece
-        self._points = 0  # of arcs
+        self._arc_points = 0
         self.here = [math.nan, math.nan, math.nan, 0.0, 0.0, 0.0]
-        self.turned = [False, False, False]  # whether A, B, C were given
+        self.turned = [False, False, False]
         self.mode: int | None = None
-        self.plane = 170
+        self.plane = G17
         self.scale = 1.0
         self.incremental = False
         self.absolute_centres = False
@@ -45,11 +50,13 @@ class GcodeMotion:
         self.rpm = math.nan
 
     def set_feed(self, rate: float) -> None:
+        """Set the feed in the programmed unit per minute."""
         self.rate, self.feed = rate, rate * self.scale
 
-    def end(self, values: dict[str, float], line: int, machine: bool) -> list[float]:
-        """Where a block's axis words lead, taken out of it; ``machine`` where G53 tells them in the machine's own
-        coordinates, in which the work is shifted by the workpiece's origin.
+    def take_end(self, values: dict[str, float], line: int, *, machine: bool) -> list[float]:
+        """Take a block's axis words out of its values and return where they lead, six coordinates.
+
+        machine : G53, the words are in the machine's own coordinates, where the workpiece's origin shifts the work
         """
         end = list(self.here)
         for k, letter in enumerate(AXES):
@@ -62,7 +69,7 @@ class GcodeMotion:
                     value -= float(self.workpiece[k, 3])
             elif not self.turned[k - 3]:
                 self.turned[k - 3] = True
-                if self.rows.count and value != 0.0:
+                if self.records.count and value != 0.0:
                     self.notes.add(line, f"{letter} is first given here: it is 0 before")
             if self.incremental and not machine:
                 if end[k] != end[k]:
@@ -71,44 +78,44 @@ class GcodeMotion:
             end[k] = value
         return end
 
-    def straight(self, end: list[float], line: int, values: dict[str, float]) -> None:
-        """G0 and G1."""
-        rapid = self.mode == 0
+    # lines
+
+    def add_line(self, end: list[float], line: int, values: dict[str, float]) -> None:
+        """Add the record of a straight motion (G0 and G1)."""
+        rapid = self.mode == G0
         seconds = math.nan
         if not rapid:
-            self._need_feed("G1", values)
-            seconds = self._seconds(values)
+            self._check_feed("G1", values)
+            seconds = self._take_seconds(values)
             degrees = math.dist(self.here[3:], end[3:])
-            if not self.inverse_time and degrees > 0.0 and self.still(end):
+            if not self.inverse_time and degrees > 0.0 and self._tip_stays(end):
                 seconds = 60.0 * degrees / self.rate
         feed = math.nan if self.inverse_time else self.feed
-        self.rows.fresh.extend((*end, feed, seconds, self.rpm, rapid, line))
+        self.records.fresh.extend((*end, feed, seconds, self.rpm, rapid, line))
         self.here = end
 
-    def still(self, end: list[float]) -> bool:
-        """Whether X, Y and Z stay; one that isn't known does."""
+    def _tip_stays(self, end: list[float]) -> bool:
+        """Whether X, Y and Z stay; one that is not known does."""
         return not any(abs(p - q) > STILL for p, q in zip(self.here[:3], end[:3], strict=True))
 
-    def arc(self, end: list[float], line: int, values: dict[str, float], named: set[str]) -> None:
-        """G2 and G3; ``named`` are the axis words of the block."""
-        name, clockwise = g_name(self.mode or 0), self.mode == 20
+    # arcs
+
+    def add_arc(self, end: list[float], line: int, values: dict[str, float], named: set[str]) -> None:
+        """Add the records of an arc (G2 and G3); ``named`` are the axis words of the block."""
+        name, clockwise = format_g_code(self.mode or 0), self.mode == G2
         plane = PLANES[self.plane]
-        self._need_feed(name, values)
-        seconds = self._seconds(values)
-        for k in plane[:2]:
-            if self.here[k] != self.here[k]:
-                refuse(f"{name} while {AXES[k]} is not known; expected {AXES[k]} before it")
-        if AXES[plane[2]] in named and math.isnan(self.here[plane[2]]):
-            refuse(f"{name} while {AXES[plane[2]]} is not known; expected {AXES[plane[2]]} before it")
-        turns = whole("P", values.pop("P", 1.0))
+        self._check_feed(name, values)
+        seconds = self._take_seconds(values)
+        self._check_known(name, plane, named)
+        turns = round_whole("P", values.pop("P", 1.0))
         if turns < 1:
             refuse(f"{name} P0; expected P of 1 or more turns")
-        centre = self._centre(end, name, clockwise, plane, values, named)
-        points, fraction = arc_points(
-            self.here[:3], end[:3], centre, plane, clockwise, turns, self.scale != 1.0, self.arc_tolerance
+        arc = ArcMotion(self._take_centre(end, name, values, named), plane, clockwise, turns)
+        points, fraction = interpolate_g_arc(
+            self.here[:3], end[:3], arc, inches=self.scale != 1.0, tolerance=self.arc_tolerance
         )
-        self._points += len(points)
-        if self._points > _MOST_POINTS:
+        self._arc_points += len(points)
+        if self._arc_points > _MOST_POINTS:
             refuse(
                 f"arcs of more than {_MOST_POINTS} points in all at a tolerance of {self.arc_tolerance:g} mm; "
                 "expected a coarser one"
@@ -121,22 +128,22 @@ class GcodeMotion:
         rows[:, FEED] = math.nan if self.inverse_time else self.feed
         rows[:, SECONDS] = seconds / len(points)
         rows[:, SPINDLE], rows[:, RAPID], rows[:, LINE] = self.rpm, 0.0, line
-        self.rows.add(rows)
+        self.records.add(rows)
         self.here = end
 
-    def _centre(
-        self,
-        end: list[float],
-        name: str,
-        clockwise: bool,
-        plane: tuple[int, int, int],
-        values: dict[str, float],
-        named: set[str],
-    ) -> tuple[float, float]:
-        first, second, along = plane
+    def _check_known(self, name: str, plane: tuple[int, int, int], named: set[str]) -> None:
+        """Refuse an arc that starts at unknown coordinates: the plane's two, and the third where the block names it."""
+        for k in plane[:2] if AXES[plane[2]] not in named else plane:
+            if self.here[k] != self.here[k]:
+                refuse(f"{name} while {AXES[k]} is not known; expected {AXES[k]} before it")
+
+    def _take_centre(self, end: list[float], name: str, values: dict[str, float], named: set[str]) -> Flat:
+        """Take R, or I, J and K, out of a block's values and return the arc's centre in its plane, mm."""
+        first, second, along = PLANES[self.plane]
         letters = CENTRES[first], CENTRES[second]
         if CENTRES[along] in values:
-            refuse(f"{CENTRES[along]} for an arc in {g_name(self.plane)}; expected {letters[0]} and {letters[1]}, or R")
+            plane = format_g_code(self.plane)
+            refuse(f"{CENTRES[along]} for an arc in {plane}; expected {letters[0]} and {letters[1]}, or R")
         given = [letter for letter in letters if letter in values]
         radius = values.pop("R", None)
         if (radius is None) != bool(given):
@@ -145,7 +152,7 @@ class GcodeMotion:
         if radius is not None:
             if not named & {AXES[first], AXES[second]}:
                 refuse(f"a full circle by R has no definite centre; expected {letters[0]} or {letters[1]}")
-            return centre_from_radius(start, last, radius * self.scale, clockwise)
+            return centre_from_radius(start, last, radius * self.scale, self.mode == G2)
         if self.absolute_centres and len(given) != 2:
             refuse(f"{name} in G90.1; expected both {letters[0]} and {letters[1]}")
         out = [values.pop(letter, 0.0) * self.scale for letter in letters]
@@ -153,15 +160,18 @@ class GcodeMotion:
             return out[0], out[1]
         return start[0] + out[0], start[1] + out[1]
 
-    def _need_feed(self, name: str, values: dict[str, float]) -> None:
+    # feeds
+
+    def _check_feed(self, name: str, values: dict[str, float]) -> None:
+        """Refuse a motion in feed without a feed in force."""
         if self.inverse_time:
             if "F" not in values:
                 refuse(f"{name} in G93 without F; expected F, the inverse of its minutes, in every such block")
         elif not self.rate > 0.0:
             refuse(f"{name} without a feed; expected F above zero with it or before it, behind any G94")
 
-    def _seconds(self, values: dict[str, float]) -> float:
-        """The time that G93 gives a block, NaN in G94."""
+    def _take_seconds(self, values: dict[str, float]) -> float:
+        """Take F out of the values in G93 and return the time it gives the block, s; NaN in G94."""
         if not self.inverse_time:
             return math.nan
         rate = values.pop("F")

@@ -6,7 +6,7 @@ from array import array
 
 import numpy as np
 
-from ...path import Floats
+from ....arrays import Array
 
 # columns of a row: six coordinates (mm, degrees), then
 FEED, SECONDS, SPINDLE, RAPID, LINE = range(6, 11)
@@ -14,36 +14,36 @@ WIDTH = 11
 _CHUNK = 1 << 16  # rows kept as they are made, before they go into columns
 
 
-class Rows:
-    """Rows of numbers. ``fresh`` takes them one after another; ``count`` of them are in columns already."""
+class GcodeRecords:
+    """Rows of numbers. ``fresh`` takes them one after another; ``count`` is the number of all rows."""
 
     def __init__(self) -> None:
         self.fresh = array("d")
-        self._kept: list[Floats] = []
-        self._settled = 0
+        self._columns: list[Array] = []
+        self._moved = 0  # rows in columns already
 
     @property
     def count(self) -> int:
-        return self._settled + len(self.fresh) // WIDTH
+        return self._moved + len(self.fresh) // WIDTH
 
-    def add(self, rows: Floats) -> None:
-        """Rows (k, WIDTH)."""
+    def add(self, rows: Array) -> None:
+        """Add rows (k, WIDTH)."""
         self.fresh.frombytes(np.ascontiguousarray(rows, np.float64).tobytes())
 
-    def settle(self) -> None:
-        """Give the rows made so far their final place, once there are many."""
+    def compact(self) -> None:
+        """Move the fresh rows into columns, once there are many."""
         if len(self.fresh) >= _CHUNK * WIDTH:
-            self._settle()
+            self._move_to_columns()
 
-    def _settle(self) -> None:
+    def _move_to_columns(self) -> None:
         rows = np.frombuffer(self.fresh).reshape(-1, WIDTH)
-        self._kept.append(rows.T.copy())
-        self._settled += len(rows)
+        self._columns.append(rows.T.copy())
+        self._moved += len(rows)
         del rows
         self.fresh = array("d")
 
-    def columns(self) -> Floats:
-        """All rows, (WIDTH, n); they are no longer kept here."""
-        self._settle()
-        kept, self._kept = self._kept, []
-        return np.concatenate(kept, axis=1)
+    def take_columns(self) -> Array:
+        """All rows as columns (WIDTH, n); they are no longer kept here."""
+        self._move_to_columns()
+        columns, self._columns = self._columns, []
+        return np.concatenate(columns, axis=1)

@@ -1,14 +1,14 @@
-"""A line of G-code into words. Pure functions of the text; errors carry no place, the reader adds file and line."""
+"""Parse a line of G-code into its words. Pure functions of the text; errors name no file and no line."""
 
 import re
 from dataclasses import dataclass, field
 from typing import NoReturn
 
-from ..cl.tokens import LARGEST, quoted, refuse
-from .codes import TIP_CONTROL, g_group, g_name, m_group
+from ..text import LARGEST, quote_short, refuse
+from .codes import G43_4, find_g_group, find_m_group, format_g_code
 
-LONGEST = 4000  # characters in one line; RS274/NGC allows 256, longer comments are met all the same
-VALUES = "ABCFHIJKPQRSTXYZ"  # letters of words that carry a value
+LONGEST = 4000  # characters in one line; RS274/NGC allows 256, but files have longer comments
+VALUES = "ABCFHIJKPQRSTXYZ"  # letters of words with a value
 NO_PROGRAM = (
     "O words (subroutines, branches) are not read; expected plain blocks, "
     "or O and a program number alone in the first block"
@@ -24,14 +24,15 @@ _TOKEN = re.compile(
     re.ASCII,
 )
 _MOST_M = 4  # M codes in a block, as RS274/NGC has it
-_WHOLE = 1e-3  # of a word whose value is a whole number
+_WHOLE = 1e-3  # so far off a whole number may be
+_TENTH = 1e-6  # so far off a tenth may a G code be, in tenths
 _MESSAGE = re.compile(r"\s*msg\s*,", re.IGNORECASE)
 _PYTHON = re.compile(r"\s*py\s*,", re.IGNORECASE)
 _CONTROLS = {
     "\0": "a NUL byte: a binary or UTF-16 file; expected plain text",
     "\r": "a carriage return within a line; expected lines that end in LF or CR LF",
 }
-_WORDY = {
+_REFUSED_SIGNS = {
     "#": "parameters (#) are not read; expected plain numbers",
     "[": "expressions ([...]) are not read; expected plain numbers",
     "O": NO_PROGRAM,
@@ -63,8 +64,8 @@ class Block:
     spaced: bool = False
 
 
-def parse(text: str, letters: str = VALUES) -> Block:
-    """The words of a line, without blanks around it; ``letters`` are those of words that carry a value."""
+def parse_block(text: str, letters: str = VALUES) -> Block:
+    """Parse a line, without blanks around it, into words; ``letters`` are those of words with a value."""
     if len(text) > LONGEST:
         refuse(f"a line of more than {LONGEST} characters; expected a block of G-code")
     control = _CONTROL.search(text)
@@ -76,57 +77,51 @@ def parse(text: str, letters: str = VALUES) -> Block:
         block.deleted, at = True, 1
     first = True
     while at < len(text):
-        found = _TOKEN.match(text, at)
-        if found is None:
+        token = _TOKEN.match(text, at)
+        if token is None:
             if block.program is not None and text[at].isalpha():
                 refuse(NO_PROGRAM)
-            _refuse_at(text, at)
-        letter = found["letter"]
+            _refuse_text(text, at)
+        letter = token["letter"]
         if letter is not None:
-            _word(block, letter.upper(), found["number"].rstrip(_BLANKS), first, letters)
+            _add_word(block, letter.upper(), token["number"].rstrip(_BLANKS), first, letters)
             first = False
-        elif found["name"] is not None:
-            _code(block, TIP_CONTROL)
-        elif found["comment"] is not None and _MESSAGE.match(found["comment"]):
-            block.messages.append(found["comment"])
-        elif _PYTHON.match(found["comment"] or found["rest"] or ""):
+        elif token["name"] is not None:
+            _add_g_code(block, G43_4)
+        elif token["comment"] is not None and _MESSAGE.match(token["comment"]):
+            block.messages.append(token["comment"])
+        elif _PYTHON.match(token["comment"] or token["rest"] or ""):
             refuse("a comment that LinuxCNC runs as Python; expected plain blocks")
-        at = found.end()
+        at = token.end()
     return block
 
 
-def whole(letter: str, value: float) -> int:
-    """The value of a word that counts or numbers something."""
+def round_whole(letter: str, value: float) -> int:
+    """Round the value of a word that counts or numbers something; refuse one that is not whole or below zero."""
     if not (value >= 0.0 and abs(value - round(value)) <= _WHOLE):
         refuse(f"{letter}{value:g}; expected a whole number, not below zero")
     return round(value)
 
 
-def _word(block: Block, letter: str, digits: str, first: bool, letters: str) -> None:
+def _add_word(block: Block, letter: str, digits: str, first: bool, letters: str) -> None:
     plain = "".join(digits.split())
     if block.program is not None:
         refuse(NO_PROGRAM)
     block.spaced = block.spaced or plain != digits
     value = float(plain)
     if not abs(value) <= LARGEST:
-        refuse(f"{letter}: {quoted(plain)} is out of range")
+        refuse(f"{letter}: {quote_short(plain)} is out of range")
     if letter in letters:
         if letter in block.values:
             refuse(f"two {letter} words in a block; expected one")
         block.values[letter] = value
     elif letter == "G":
         tenths = round(value * 10.0)
-        if value < 0.0 or abs(tenths - value * 10.0) > 1e-6:
+        if value < 0.0 or abs(tenths - value * 10.0) > _TENTH:
             refuse(f"G{plain} is no G code")
-        _code(block, tenths)
+        _add_g_code(block, tenths)
     elif letter == "M":
-        code = whole("M", value)
-        group = m_group(code)
-        if group in block.m:
-            refuse(f"M{block.m[group]} and M{code} in a block: two codes of one modal group; expected one")
-        block.m[group] = code
-        if len(block.m) > _MOST_M:
-            refuse(f"more than {_MOST_M} M codes in a block")
+        _add_m_code(block, round_whole("M", value))
     elif letter == "N":
         if not first:
             refuse("N within a block; expected the line's number at its beginning")
@@ -140,29 +135,39 @@ def _word(block: Block, letter: str, digits: str, first: bool, letters: str) -> 
         refuse(f"{letter}{plain}: not a word this reader knows; expected words of {' '.join('GMN' + letters)}")
 
 
-def _code(block: Block, tenths: int) -> None:
-    group = g_group(tenths)
+def _add_g_code(block: Block, code: int) -> None:
+    group = find_g_group(code)
     if group in block.g:
-        refuse(f"{g_name(block.g[group])} and {g_name(tenths)} in a block: two codes of one modal group; expected one")
-    block.g[group] = tenths
+        names = f"{format_g_code(block.g[group])} and {format_g_code(code)}"
+        refuse(f"{names} in a block: two codes of one modal group; expected one")
+    block.g[group] = code
 
 
-def _refuse_at(text: str, at: int) -> NoReturn:
+def _add_m_code(block: Block, code: int) -> None:
+    group = find_m_group(code)
+    if group in block.m:
+        refuse(f"M{block.m[group]} and M{code} in a block: two codes of one modal group; expected one")
+    block.m[group] = code
+    if len(block.m) > _MOST_M:
+        refuse(f"more than {_MOST_M} M codes in a block")
+
+
+def _refuse_text(text: str, at: int) -> NoReturn:
     """Say what is wrong with the text that starts no word and no comment."""
     sign = text[at].upper()
-    if sign in _WORDY:
-        refuse(_WORDY[sign])
+    if sign in _REFUSED_SIGNS:
+        refuse(_REFUSED_SIGNS[sign])
     if sign == "(":
         nested = "(" in text[at + 1 :].partition(")")[0]
         refuse("a comment within a comment" if nested else "a comment without an end; expected a closing bracket")
     rest = text[at + 1 :].lstrip(_BLANKS)
     if sign.isascii() and sign.isalpha():
         if rest[:1] in ("#", "["):
-            refuse(_WORDY[rest[0]])
-        found = re.match(r"[A-Za-z]{2,}", text[at:])
-        if found is not None and rest[:1].isalpha() and len(found[0]) > 2:
-            refuse(f"{quoted(found[0])}: names and functions are not read; expected a letter and a number")
-        refuse(f"{sign} without a number: {quoted(text[at:])}")
+            refuse(_REFUSED_SIGNS[rest[0]])
+        letters = re.match(r"[A-Za-z]{2,}", text[at:])
+        if letters is not None and rest[:1].isalpha() and len(letters[0]) > 2:
+            refuse(f"{quote_short(letters[0])}: names and functions are not read; expected a letter and a number")
+        refuse(f"{sign} without a number: {quote_short(text[at:])}")
     if sign in "+-.0123456789":
-        refuse(f"{quoted(text[at:])}: a number without a letter")
-    refuse(f"{quoted(text[at:])} is no word; expected a letter and a number")
+        refuse(f"{quote_short(text[at:])}: a number without a letter")
+    refuse(f"{quote_short(text[at:])} is no word; expected a letter and a number")

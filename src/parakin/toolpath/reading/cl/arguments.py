@@ -1,0 +1,139 @@
+"""The arguments of CL words: numbers, feeds and speeds, drill cycles, tool data.
+
+Pure functions of the text. Errors name no file and no line; the reader adds both.
+"""
+
+import re
+from collections.abc import Iterable, Sequence
+from typing import NamedTuple
+
+from ....errors import InputError
+from ..text import INCH, is_number, parse_number, quote_short, refuse
+
+# name: (length unit in mm or None for the file's own, per revolution)
+FEED_UNITS: dict[str, tuple[float | None, bool]] = {
+    "MMPM": (1.0, False),
+    "IPM": (INCH, False),
+    "PERMIN": (None, False),
+    "MMPR": (1.0, True),
+    "IPR": (INCH, True),
+    "PERREV": (None, True),
+}
+LENGTH_UNITS = {"MM": 1.0, "INCHES": INCH, "INCH": INCH, "IN": INCH}  # mm
+_BLANKS = re.compile(r"(?<![\d.])\s+|\s+(?![\d.])", re.ASCII)
+
+
+def remove_blanks(text: str) -> str:
+    """Turn to capitals and remove blanks, but for those between digits: a comma is missing there, and 1 2 is not 12."""
+    return _BLANKS.sub("", text).strip().upper()
+
+
+def parse_numbers(args: Sequence[str], counts: Iterable[int], form: str) -> list[float]:
+    """Parse all arguments as numbers; ``counts`` says how many are allowed, ``form`` what the error expects."""
+    if len(args) not in counts:
+        refuse(f"expected {form}, got {len(args)} value{'' if len(args) == 1 else 's'}")
+    try:
+        return [parse_number(a) for a in args]
+    except InputError as error:
+        refuse(f"{error.message}; expected {form}")
+
+
+def parse_feed(args: Sequence[str]) -> tuple[float, str | None]:
+    """Parse FEDRAT: value and unit word, in either order; None where the unit stays as it was."""
+    form = "FEDRAT/value,unit with a unit of " + " ".join(FEED_UNITS)
+    units = [a for a in args if a in FEED_UNITS]
+    rest = [a for a in args if a not in FEED_UNITS]
+    if len(units) > 1:
+        refuse(f"more than one unit; expected {form}")
+    (value,) = parse_numbers(rest, (1,), form)
+    if value < 0:
+        refuse(f"a feed below zero; expected {form}")
+    return value, units[0] if units else None
+
+
+class SpindleSpeed(NamedTuple):
+    """The arguments of SPINDL: the value or None, whether it is a surface speed, whether the spindle is off."""
+
+    value: float | None
+    surface: bool
+    off: bool
+
+
+def parse_spindle(args: Sequence[str]) -> SpindleSpeed:
+    """Parse SPINDL: value and words in any order."""
+    form = "SPINDL/value,RPM|SFM|SMM,CLW|CCLW in any order, or SPINDL/ON|OFF"
+    words = {"RPM", "SFM", "SMM", "CLW", "CCLW", "ON", "OFF"}
+    values = [a for a in args if a not in words]
+    if len(values) > 1 or not args:
+        refuse(f"expected {form}")
+    value = parse_number(values[0]) if values and is_number(values[0]) else None
+    if values and (value is None or value < 0):
+        refuse(f"{quote_short(values[0])} is no spindle speed; expected {form}")
+    return SpindleSpeed(value, "SFM" in args or "SMM" in args, "OFF" in args)
+
+
+class DrillCycle(NamedTuple):
+    """CYCLE/DRILL as NX writes it. Distances along the tool axis from the hole's point, in the file's unit.
+
+    clear : where rapid ends above the hole
+    depth : where the feed ends, below it
+    retract : where the tool withdraws to, or None for the height it came from (RTRCTO,AUTO)
+    feed : value and unit word, or None for the feed in force
+    """
+
+    clear: float
+    depth: float
+    retract: float | None
+    feed: tuple[float, str] | None
+
+
+def parse_drill_cycle(args: Sequence[str]) -> DrillCycle:
+    """Parse CYCLE/DRILL, refusing a cycle whose motion the statement alone does not settle."""
+    form = "CYCLE/DRILL,RAPTO,r,FEDTO,d[,RTRCTO,r|AUTO][,MMPM|IPM|MMPR|IPR,feed]; write other cycles as plain motion"
+    if not args or args[0] != "DRILL":
+        refuse(f"a cycle that cannot be turned into motion: {quote_short('/'.join(args[:1]))}; expected {form}")
+    rest = list(args[1:])
+    values: dict[str, float] = {}
+    auto = False
+    feed: tuple[float, str] | None = None
+    while rest:
+        word = rest.pop(0)
+        if word == "MANUAL" and "RTRCTO" in values:
+            continue
+        if word == "RTRCTO" and rest and rest[0] == "AUTO":
+            rest.pop(0)
+            auto = True
+            continue
+        name = {"CLEAR": "RAPTO"}.get(word, word)
+        if name not in ("RAPTO", "FEDTO", "RTRCTO", *FEED_UNITS) or not rest:
+            refuse(f"{quote_short(word)} in a cycle that cannot be turned into motion; expected {form}")
+        (value,) = parse_numbers([rest.pop(0)], (1,), form)
+        if name in FEED_UNITS:
+            feed = (value, name)
+        else:
+            values[name] = value
+    if "RAPTO" not in values or "FEDTO" not in values:
+        refuse(f"a cycle without RAPTO and FEDTO; expected {form}")
+    clear, depth = values["RAPTO"], values["FEDTO"]
+    retract = None if auto else values.get("RTRCTO", clear)
+    if not depth < clear or (retract is not None and retract < clear) or (feed is not None and feed[0] < 0):
+        refuse(f"expected FEDTO below RAPTO, RTRCTO not below it and a feed of zero or more in {form}")
+    return DrillCycle(clear, depth, retract, feed)
+
+
+def parse_tool_data(args: Sequence[str], scale: float) -> dict[str, float | str]:
+    """Parse TLDATA: words for the kind, then for a mill diameter, lower radius, length, taper and tip; lengths to mm.
+
+    scale : mm in the file's unit
+    """
+    words = [a for a in args if not is_number(a)]
+    form = "TLDATA/MILL,diameter,lower radius,length,taper,tip"
+    values = (
+        [parse_number(a) for a in args[len(words) :]] if args[: len(words)] == words else refuse(f"expected {form}")
+    )
+    if not words or not values or (words == ["MILL"] and len(values) < 5):
+        refuse(f"expected {form}, got {len(values)} number{'' if len(values) == 1 else 's'}")
+    tool: dict[str, float | str] = {"type": ",".join(words), "diameter": values[0] * scale}
+    if words == ["MILL"]:
+        tool |= {"corner_radius": values[1] * scale, "length": values[2] * scale, "taper": values[3], "tip": values[4]}
+    return tool

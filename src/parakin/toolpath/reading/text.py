@@ -1,0 +1,72 @@
+"""Read what tool path files are made of: lines, numbers, and the limits that the CL and G-code readers share.
+
+Errors name no file and no line; the reader that calls adds both.
+"""
+
+import io
+import os
+import re
+from pathlib import Path
+from typing import NoReturn
+
+from ...errors import InputError
+
+LARGEST = 1e9  # the largest number in a file: a thousand kilometres in mm
+INCH = 25.4  # mm
+READ_SIZE = 1 << 20  # bytes read from a file at a time
+BYTE_ORDER_MARK = b"\xef\xbb\xbf"
+_NUMBER = re.compile(r"([+-]?)\s*(\d+\.?\d*|\.\d+)(?:[EeDd]([+-]?\d+))?", re.ASCII)
+_LONGEST_EXPONENT = 6  # characters; keeps float() fast on hostile input
+
+
+def open_file(path: str | os.PathLike[str], source: str) -> io.FileIO:
+    """Open a file for reading without a buffer; ``source`` is its name in the InputError if that fails."""
+    try:
+        return Path(path).open("rb", buffering=0)
+    except OSError as error:
+        raise InputError(f"cannot be read: {error.strerror}", source) from error
+    except ValueError as error:
+        raise InputError("cannot be read: a null character in the name", quote_short(source)) from error
+
+
+def check_arc_tolerance(tolerance: float) -> None:
+    """Refuse a chord tolerance (mm) that is not above zero and finite."""
+    if not 0.0 < tolerance < float("inf"):
+        raise InputError("expected a length above zero, in mm", "arc_tolerance")
+
+
+def decode_line(raw: bytes | bytearray) -> str:
+    """Decode a line as UTF-8, or as Latin-1 where it is not UTF-8."""
+    try:
+        return raw.decode()
+    except UnicodeDecodeError:
+        return raw.decode("latin-1")
+
+
+def quote_short(text: str, longest: int = 24) -> str:
+    """Quote a text for a message: printable ASCII, in one line, cut to ``longest`` characters."""
+    return ascii(text if len(text) <= longest else text[: longest - 3] + "...")
+
+
+def refuse(message: str) -> NoReturn:
+    """Raise an InputError without file and line."""
+    raise InputError(message)
+
+
+def parse_number(token: str) -> float:
+    """Parse a decimal number, refusing NaN, infinities, underscores and blanks between digits."""
+    match = _NUMBER.fullmatch(token.strip())
+    if match is None:
+        refuse(f"{quote_short(token.strip())} is not a number")
+    sign, digits, exponent = match.groups()
+    if exponent is not None and len(exponent) > _LONGEST_EXPONENT:
+        refuse(f"{quote_short(token.strip())} is out of range")
+    value = float(f"{sign}{digits}e{exponent or 0}")  # rounds correctly, whatever the number of digits
+    if not abs(value) <= LARGEST:
+        refuse(f"{quote_short(token.strip())} is out of range")
+    return value
+
+
+def is_number(token: str) -> bool:
+    """Whether :func:`parse_number` can read a token, its size aside."""
+    return _NUMBER.fullmatch(token.strip()) is not None

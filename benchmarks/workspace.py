@@ -10,9 +10,8 @@ from measure import best, table
 
 import parakin as pk
 from parakin.kernels.batch import count_cores
-from parakin.workspace.certified.region import region
-from parakin.workspace.sampled.grid import GridWorkspace, dense_grid
-from parakin.workspace.sampled.sampling import FirstBroken, surroundings
+from parakin.workspaces.sampled.grid import GridWorkspace, dense_grid
+from parakin.workspaces.sampled.sampling import FirstBroken, surroundings
 
 OWN_ERROR = 0.05  # of the NumPy grid: half the volume of the cells that its boundary cuts, relative to its volume
 UPRIGHT = {"B": 0.0, "C": 0.0}
@@ -104,10 +103,10 @@ def by_rule(grid: Callable[[float], GridWorkspace]) -> GridWorkspace:
 
 def main() -> str:
     machine = pk.load("tricept")
-    upright = region(machine, UPRIGHT)
+    upright = pk.region(machine, UPRIGHT)
 
     def certified(**how: float) -> Callable[[], object]:
-        return lambda: pk.workspace(machine, at=UPRIGHT, seconds=None, **how)
+        return lambda: pk.workspace(pk.region(machine, at=UPRIGHT), seconds=None, **how)
 
     one, third = best(certified(gap=0.01), 5), best(certified(gap=0.003), 3)
     cells = [best(certified(cell=cell), 3) for cell in (40.0, 20.0, 10.0)]
@@ -136,7 +135,7 @@ def main() -> str:
 
 def total_orientation() -> str:
     """The Lambda machine in every A, B, C within 15°, 5° apart, places 20 mm apart."""
-    asked = region(pk.load("lambda6"), every=TOTAL)
+    asked = pk.region(pk.load("lambda6"), every=TOTAL)
     grid = dense_grid(asked, 20.0)
     turns = [tuple(turn) for turn in FirstBroken(asked).turns]
     box = surroundings(asked)

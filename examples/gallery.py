@@ -19,14 +19,12 @@ from mpl_toolkits.mplot3d.art3d import Line3DCollection, Poly3DCollection
 import parakin as pk
 from parakin.export.files import write_all
 from parakin.export.workspace.meshes import Shell, shell
-from parakin.workspace.certified.region import region
-from parakin.workspace.certified.subdivision import Cells
-from parakin.workspace.certified.workspace import Workspace
-from parakin.workspace.inscribed.largest_box import Box, largest_box
-from parakin.workspace.sampled.drives import drive_sweep
-from parakin.workspace.sampled.field import field
-from parakin.workspace.sampled.polar import PolarWorkspace, polar_sweep
-from parakin.workspace.sampled.slices import sections
+from parakin.workspaces.certified.subdivision import Cells
+from parakin.workspaces.certified.workspace import Workspace
+from parakin.workspaces.inscribed.largest_box import Box, largest_box
+from parakin.workspaces.sampled.field import field
+from parakin.workspaces.sampled.polar import PolarWorkspace, polar_sweep
+from parakin.workspaces.sampled.slices import sections
 
 BLUE, ORANGE, GREEN, GREY = "#1565c0", "#ef6c00", "#2e7d32", "#90a4ae"
 TILT = np.deg2rad(15.0)
@@ -108,7 +106,7 @@ def proved(found: Workspace) -> str:
 
 def tricept(page: Page) -> None:
     page.paper("Tricept: FME Transactions 41 (2013)")
-    found = pk.workspace(pk.load("tricept"), at={"B": 0.0, "C": 0.0})
+    found = pk.workspace(pk.region(pk.load("tricept"), at={"B": 0.0, "C": 0.0}))
     boxes: list[tuple[str, Box, str]] = [
         ("a", largest_box(found.region), ORANGE),
         ("b", largest_box(found.region, shape=(3.0, 3.0, 1.0)), GREEN),
@@ -134,7 +132,7 @@ def tricept(page: Page) -> None:
 
 def hbg80(page: Page) -> None:
     page.paper("HBG80: Parallel kinematic machines (about 2000)")
-    two, three = (drive_sweep(pk.load(f"hbg80_{n}d"), cells=cells) for n, cells in ((2, 48), (3, 24)))
+    two, three = (pk.sweep_drives(pk.region(pk.load(f"hbg80_{n}d")), cells=cells) for n, cells in ((2, 48), (3, 24)))
     figure, (ax,) = plane()
     for image in two.contours:
         for number, piece in enumerate(image.pieces):
@@ -147,7 +145,7 @@ def hbg80(page: Page) -> None:
         "Figure 3.1: contour of the two-axis machine's workspace, drives at their limits",
         figure,
         f"Each line is one drive that runs while the other stands; dotted, the other assembly. Area from the drives' "
-        f"side {two.estimate:,.0f} mm²; {proved(pk.workspace(pk.load('hbg80_2d')))}.",
+        f"side {two.estimate:,.0f} mm²; {proved(pk.workspace(pk.region(pk.load('hbg80_2d'))))}.",
     )
     figure, (ax,) = plane()
     for net in two.nets:
@@ -155,7 +153,7 @@ def hbg80(page: Page) -> None:
             for line in lines[::3]:
                 ax.plot(*line.T, color=BLUE if net.side == "home" else GREY, linewidth=0.6)
     page.add("hbg80_3_2", "Figure 3.2: workspace of the two-axis machine as a net", figure, "Both drives run.")
-    whole = pk.workspace(pk.load("hbg80_3d"))
+    whole = pk.workspace(pk.region(pk.load("hbg80_3d")))
     assert whole.box is not None
     figure, (ax,) = space()
     for image in three.contours:
@@ -186,7 +184,7 @@ def lambda6(page: Page) -> None:
     page.paper("Lambda: IJEEC 6 (2022)")
     machine = pk.load("lambda6")
     level = {"A": 0.0, "B": 0.0, "C": 0.0}
-    one = polar_sweep(region(machine, at={**level, "Z": 1400.0}), step=10.0, rays=72)
+    one = polar_sweep(pk.region(machine, at={**level, "Z": 1400.0}), step=10.0, rays=72)
     figure, (ax,) = plane()
     for angle, radius in zip(one.angles, one.radii[0], strict=True):
         ax.plot(*np.outer([np.cos(angle), np.sin(angle)], [0.0, radius]), color=GREY, linewidth=0.5)
@@ -197,7 +195,7 @@ def lambda6(page: Page) -> None:
         figure,
         f"72 rays, ρ by 10 mm until the first place that is not allowed: {one.estimate:,.0f} mm².",
     )
-    swept = polar_sweep(region(machine, at=level), step=10.0, planes=50.0)
+    swept = polar_sweep(pk.region(machine, at=level), step=10.0, planes=50.0)
     figure, (ax,) = space()
     stacked(ax, swept, BLUE)
     page.add(
@@ -205,21 +203,21 @@ def lambda6(page: Page) -> None:
         "Figure 10: the achievable workspace",
         figure,
         f"Planes 50 mm apart: {swept.estimate:,.0f} mm³. "
-        f"Certified, it need not be star-shaped: {proved(pk.workspace(machine, at=level))}.",
+        f"Certified, it need not be star-shaped: {proved(pk.workspace(pk.region(machine, at=level)))}.",
     )
     cases = [("a) strokes", ("gap *",)), ("b) and least gaps", ("gap *.max",)), ("c) and greatest gaps", ())]
     figure, axes = space(3, 12.0, 5.2)
     numbers = []
     for ax, (title, without) in zip(axes, cases, strict=True):
-        found = pk.workspace(machine, at=level, without=without)
+        found = pk.workspace(pk.region(machine, at=level, without=without))
         shape = meshed(found, 25.0)
         solid(ax, shape, BLUE, 0.75)
         frame(ax, np.array([-500.0, -500.0, 800.0]), np.array([500.0, 500.0, 2100.0]), found.axes)
         ax.set_title(title, fontsize=10)
         numbers.append(f"{title}: {proved(found)}")
     page.add("lambda_11", "Figure 11: the limits, one after the other", figure, "; ".join(numbers) + ".")
-    total = pk.workspace(machine, every=TOTAL, gap=0.05)
-    achievable = pk.workspace(machine, at=level)
+    total = pk.workspace(pk.region(machine, every=TOTAL), gap=0.05)
+    achievable = pk.workspace(pk.region(machine, at=level))
     figure, (ax,) = space()
     solid(ax, meshed(achievable, 25.0), BLUE, 0.13)
     solid(ax, meshed(total, 25.0), ORANGE, 0.9)
@@ -253,7 +251,7 @@ def stacked(ax: Any, swept: PolarWorkspace, colour: str) -> None:
 
 def orthoglide(page: Page) -> None:
     page.paper("Orthoglide: Chablat and Wenger, Chemnitz (2000)")
-    found = pk.workspace(pk.load("orthoglide"), cell=14.0)
+    found = pk.workspace(pk.region(pk.load("orthoglide")), cell=14.0)
     cells = found.cells
     assert found.box is not None
     figure, (ax,) = space()

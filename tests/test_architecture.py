@@ -20,7 +20,7 @@ FLOORS = [
     ["model"],
     ["kinematics", "description"],
     ["machine"],
-    ["workspace"],
+    ["workspaces"],
     ["performance"],
     ["toolpath.path"],
     ["toolpath.reading"],
@@ -33,7 +33,7 @@ FLOORS = [
     ["__init__", "cli"],
 ]
 HEIGHT = {room: height for height, floor in enumerate(FLOORS) for room in floor}
-CORE = ["arrays", "algebra", "kernels", "model", "kinematics", "machine", "workspace", "performance"]
+CORE = ["arrays", "algebra", "kernels", "model", "kinematics", "machine", "workspaces", "performance"]
 RIM = {"pathlib", "json", "io", "tempfile", "shutil", "plotly", "matplotlib", "pyarrow", "rich", "cyclopts"}
 RIM |= {"pydantic", "ruamel", "http", "socket", "subprocess"}
 NO_PATH_NEEDS = {"plotly", "matplotlib", "rich", "cyclopts"}

@@ -10,7 +10,6 @@ from scipy.spatial.transform import Rotation
 
 import parakin as pk
 from parakin.cli import main
-from parakin.performance.atlas import atlas
 from parakin.performance.certified.interval_matrices import Over
 from parakin.performance.certified.proofs import amplification, amplification_brackets, box_of, no_singularity
 from parakin.performance.characteristic_length import characteristic_length
@@ -244,7 +243,7 @@ def test_the_length_makes_angles_millimetres():
 @pytest.mark.parametrize(("name", "count"), [("orthoglide", 2), ("hbg80_3d", 2)])
 def test_isotropic_poses_of_the_workspace(name, count):
     m = pk.load(name)
-    found = atlas(m)
+    found = pk.atlas(pk.region(m))
     assert found.isolated
     assert len(found.isotropic) == count  # home, and its image beyond a parallel singularity
     assert np.abs(found.isotropic - m.home).max(1).min() < 1e-6
@@ -259,7 +258,7 @@ def test_isotropic_poses_of_the_workspace(name, count):
 @pytest.mark.parametrize("name", ["linear_delta", "hexapod"])
 def test_no_sample_of_the_workspace_is_beyond_its_extremes(name):
     m = pk.load(name)
-    found = atlas(m)
+    found = pk.atlas(pk.region(m))
     assert np.array_equal(found.map.allowed, m.check(found.map.performance.poses) == 0)
     assert not found.singular
     assert len(found.isotropic) == 0
@@ -288,15 +287,20 @@ def test_no_sample_of_the_workspace_is_beyond_its_extremes(name):
 
 def test_an_atlas_of_a_slice_and_questions_that_make_no_sense():
     m = pk.load("orthoglide")
-    flat = atlas(m, at={"Z": -50.0}, step=25.0)
+    flat = pk.atlas(pk.region(m, at={"Z": -50.0}), step=25.0)
     assert flat.map.axes == ("X", "Y")
     assert flat.map.performance.psi.shape == (*flat.map.allowed.shape, 3)
     assert (flat.map.inside.poses[:, 2] == -50.0).all()
-    wide = atlas(m, at={"Z": -50.0}, step=25.0, without=["*.max"])
+    wide = pk.atlas(pk.region(m, at={"Z": -50.0}, without=["*.max"]), step=25.0)
     assert wide.map.allowed.sum() > flat.map.allowed.sum()
-    for wrong in ({"step": 0.0}, {"step": 1e-3}, {"length": -1.0}, {"at": {"X": 900.0}}, {"mode": "?"}):
+    for wrong in ({"step": 0.0}, {"step": 1e-3}, {"length": -1.0}):
         with pytest.raises(pk.PoseError):
-            atlas(m, **wrong)
+            pk.atlas(pk.region(m), **wrong)
+    for wrong in ({"at": {"X": 900.0}}, {"mode": "?"}):
+        with pytest.raises(pk.PoseError):
+            pk.atlas(pk.region(m, **wrong))
+    with pytest.raises(pk.PoseError, match="region: an atlas is of one orientation, B must not be swept"):
+        pk.atlas(pk.region(pk.load("orthoglide5_head"), every={"B": (0.0, 0.1)}))
 
 
 # Proofs.

@@ -10,12 +10,11 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 import parakin as pk
-from parakin.workspace.certified.region import region
-from parakin.workspace.certified.subdivision import Subdivision
-from parakin.workspace.connected.adjacency import labelled, touching
-from parakin.workspace.connected.assembly_mode import determinant
-from parakin.workspace.connected.connected import connected_parts
-from parakin.workspace.inscribed.largest_box import largest_box
+from parakin.workspaces.certified.subdivision import Subdivision
+from parakin.workspaces.connected.adjacency import labelled, touching
+from parakin.workspaces.connected.assembly_mode import determinant
+from parakin.workspaces.connected.connected import connected_parts
+from parakin.workspaces.inscribed.largest_box import largest_box
 
 # Two struts in line with the machine's y axis: singular where x = 0, and nowhere else.
 RING = """
@@ -33,7 +32,7 @@ home: {X: 60 mm, Y: 0 mm}
 def ring(tmp_path, least, at=None):
     path = tmp_path / "ring.yaml"
     path.write_text(RING.replace("LEAST", str(least)), encoding="utf-8")
-    return region(pk.load(path), at)
+    return pk.region(pk.load(path), at)
 
 
 @pytest.mark.parametrize("least", [0, 50])
@@ -103,7 +102,7 @@ FLOODED = [("hbg80_2d", 900, 2), ("hbg80_3d", 100, 2), ("orthoglide", 100, 2), (
 
 @pytest.mark.parametrize(("name", "n", "parts"), FLOODED)
 def test_parts_are_those_of_a_flood_fill(name, n, parts):
-    asked = region(pk.load(name), **ASKED[name])
+    asked = pk.region(pk.load(name), **ASKED[name])
     found = connected_parts(asked, start=asked.machine.home)
     expected = flooded(asked, n)
     assert len(found) == found.at_least == len(expected) == parts
@@ -119,7 +118,7 @@ def test_parts_are_those_of_a_flood_fill(name, n, parts):
 
 @pytest.mark.parametrize("name", ["hbg80_2d", "orthoglide"])
 def test_a_part_holds_the_place_it_names(name):
-    asked = region(pk.load(name), **ASKED[name])
+    asked = pk.region(pk.load(name), **ASKED[name])
     first = connected_parts(asked)
     assert first.start is None
     for number, part in enumerate(first.parts):
@@ -130,7 +129,7 @@ def test_a_part_holds_the_place_it_names(name):
 
 
 def test_coarse_cells_never_prove_too_many_parts():
-    asked = region(pk.load("hbg80_3d"))
+    asked = pk.region(pk.load("hbg80_3d"))
     truth = connected_parts(asked).parts
     for cell in (120.0, 60.0, 30.0, 15.0):
         found = connected_parts(asked, cell=cell)
@@ -143,16 +142,16 @@ def test_coarse_cells_never_prove_too_many_parts():
 
 def test_every_turn_counts_and_the_parts_shrink():
     m = pk.load("hexapod")
-    fixed = connected_parts(region(m), cell=40.0)
-    swept = connected_parts(region(m, every={"A": (-0.2, 0.2), "B": (-0.2, 0.2)}), start=m.home, cell=40.0)
+    fixed = connected_parts(pk.region(m), cell=40.0)
+    swept = connected_parts(pk.region(m, every={"A": (-0.2, 0.2), "B": (-0.2, 0.2)}), start=m.home, cell=40.0)
     assert (fixed.at_least, swept.at_least, swept.start) == (1, 1, 0)
     assert swept.parts[0].volume.outer < fixed.parts[0].volume.inner
 
 
 def test_the_volumes_of_all_parts_are_the_workspace():
     m = pk.load("orthoglide")
-    whole = pk.workspace(m, gap=0.005).volume
-    parts = connected_parts(region(m)).parts
+    whole = pk.workspace(pk.region(m), gap=0.005).volume
+    parts = connected_parts(pk.region(m)).parts
     assert sum(part.volume.inner for part in parts) <= whole.outer
     assert sum(part.volume.outer for part in parts) >= whole.inner
     assert sum(part.volume.estimate for part in parts) == pytest.approx(whole.estimate, rel=5e-3)
@@ -163,7 +162,9 @@ def test_it_tells_enough_to_run_it_again(tmp_path):
     found = connected_parts(asked, start=(60.0, 0.0), cell=2.0)
     told = found.parameters
     kind = {key: told[key] for key in ("at", "every", "some", "without", "mode")}
-    again = connected_parts(region(asked.machine, **kind), **{key: told[key] for key in ("start", "cell", "seconds")})
+    again = connected_parts(
+        pk.region(asked.machine, **kind), **{key: told[key] for key in ("start", "cell", "seconds")}
+    )
     assert again.start == found.start
     assert [part.volume for part in again.parts] == [part.volume for part in found.parts]
 
@@ -186,17 +187,17 @@ def test_a_start_that_is_none_is_refused(tmp_path, start, said):
 def test_what_makes_no_sense_is_refused(tmp_path):
     m = pk.load("hexapod")
     with pytest.raises(pk.PoseError, match="some"):
-        connected_parts(region(m, some={"A": (-0.1, 0.1)}))
+        connected_parts(pk.region(m, some={"A": (-0.1, 0.1)}))
     with pytest.raises(pk.PoseError, match=r"A is 0\.2, but held at 0 here"):
-        connected_parts(region(m), start=[0, 0, m.home[2], 0.2, 0, 0])
+        connected_parts(pk.region(m), start=[0, 0, m.home[2], 0.2, 0, 0])
     with pytest.raises(pk.PoseError, match="beyond its range"):
-        connected_parts(region(m, every={"A": (-0.1, 0.1)}), start=[0, 0, m.home[2], 0.2, 0, 0])
+        connected_parts(pk.region(m, every={"A": (-0.1, 0.1)}), start=[0, 0, m.home[2], 0.2, 0, 0])
     with pytest.raises(pk.PoseError, match="cell"):
         connected_parts(ring(tmp_path, 0), cell=-1.0)
     with pytest.raises(pk.PoseError, match="too fine"):
         connected_parts(ring(tmp_path, 0), cell=0.01)
     with pytest.raises(pk.PoseError, match="empty"):
-        connected_parts(region(pk.load("tricept"), {"Z": 500.0}))
+        connected_parts(pk.region(pk.load("tricept"), {"Z": 500.0}))
 
 
 def test_the_determinant_is_numpys():
@@ -237,7 +238,7 @@ def test_cells_that_touch(d):
 def test_a_machine_that_is_singular_everywhere_has_no_parts(tmp_path):
     path = tmp_path / "ring.yaml"
     path.write_text(RING.replace("[0, -900 mm, 0]", "[0, 0, 0]").replace("LEAST", "50"), encoding="utf-8")
-    asked = region(pk.load(path))
+    asked = pk.region(pk.load(path))
     found = connected_parts(asked, cell=2.0)
     assert (len(found), found.at_least, found.undecided) == (0, 0, 0.0)
     with pytest.raises(pk.PoseError, match="singularity"):

@@ -17,9 +17,9 @@ from parakin import algebra as alg
 from parakin.kernels.batch import evaluate_tape
 from parakin.kernels.tape import compile_tape
 from parakin.model.limits import distance
-from parakin.workspace.certified.constraints import Constraint
-from parakin.workspace.certified.plane_cuts import CLEARED, EXCLUDED, KEPT, narrowest, share, united
-from parakin.workspace.certified.subdivision import Cuts, Items, Lines, bounds
+from parakin.workspaces.certified.constraints import Constraint
+from parakin.workspaces.certified.plane_cuts import CLEARED, EXCLUDED, KEPT, narrowest, share, united
+from parakin.workspaces.certified.subdivision import Cuts, Items, Lines, bounds
 
 ROOM = np.empty(3)
 

@@ -5,7 +5,16 @@ import math
 import pytest
 
 import parakin as pk
-from parakin.workspace.certified.region import region
+
+WORK = ("gap", "cell", "seconds")
+
+
+def of_region(question):
+    return {name: value for name, value in question.items() if name not in WORK}
+
+
+def of_work(question):
+    return {name: value for name, value in question.items() if name in WORK}
 
 
 @pytest.mark.parametrize(
@@ -36,22 +45,22 @@ from parakin.workspace.certified.region import region
 )
 def test_what_makes_no_sense_is_refused(question, said):
     with pytest.raises(pk.PoseError, match=said) as error:
-        pk.workspace(pk.load("tricept"), **question)
+        pk.workspace(pk.region(pk.load("tricept"), **of_region(question)), **of_work(question))
     assert "\n" not in str(error.value)
 
 
 def test_reach_can_not_be_switched_off():
     with pytest.raises(pk.PoseError, match="the legs don't close"):
-        region(pk.load("orthoglide"), without=["*.reach"])
+        pk.region(pk.load("orthoglide"), without=["*.reach"])
 
 
 def test_what_nothing_bounds_is_said():
     with pytest.raises(pk.PoseError, match="do not bound the workspace in"):
-        pk.workspace(pk.load("tricept"), without=["d*", "r*"])
+        pk.workspace(pk.region(pk.load("tricept"), without=["d*", "r*"]))
 
 
 def test_nothing_is_allowed_every_way_and_that_is_proved():
-    found = pk.workspace(pk.load("lambda6"), dexterous=True)
+    found = pk.workspace(pk.region(pk.load("lambda6"), dexterous=True))
     assert found.empty
     assert found.volume.outer == 0.0
     assert found.box is None
@@ -60,7 +69,7 @@ def test_nothing_is_allowed_every_way_and_that_is_proved():
 
 
 def test_held_out_of_reach_it_is_empty():
-    assert pk.workspace(pk.load("orthoglide"), at={"X": 5000.0}).empty
+    assert pk.workspace(pk.region(pk.load("orthoglide"), at={"X": 5000.0})).empty
 
 
 def test_an_interruption_gives_what_there_is():
@@ -71,9 +80,9 @@ def test_an_interruption_gives_what_there_is():
         if len(calls) == 3:
             raise KeyboardInterrupt
 
-    found = pk.workspace(machine, gap=1e-6, progress=stop)
+    found = pk.workspace(pk.region(machine), gap=1e-6, progress=stop)
     assert found.stopped == "interrupted"
-    exact = pk.workspace(machine, gap=0.003)
+    exact = pk.workspace(pk.region(machine), gap=0.003)
     assert found.volume.inner <= exact.volume.outer
     assert exact.volume.inner <= found.volume.outer < math.inf
     assert all(0.0 <= fraction <= 1.0 for fraction in calls)
@@ -81,17 +90,17 @@ def test_an_interruption_gives_what_there_is():
 
 def test_time_runs_out_with_a_bracket_that_holds():
     machine = pk.load("tricept")
-    found = pk.workspace(machine, gap=1e-9, seconds=0.3)
+    found = pk.workspace(pk.region(machine), gap=1e-9, seconds=0.3)
     assert found.stopped == "time"
-    exact = pk.workspace(machine, gap=0.01)
+    exact = pk.workspace(pk.region(machine), gap=0.01)
     assert found.volume.inner <= exact.volume.outer
     assert exact.volume.inner <= found.volume.outer
 
 
 def test_it_says_what_it_reached():
     machine = pk.load("orthoglide")
-    assert pk.workspace(machine).stopped == "gap"
-    by_cells = pk.workspace(machine, cell=30.0)
+    assert pk.workspace(pk.region(machine)).stopped == "gap"
+    by_cells = pk.workspace(pk.region(machine), cell=30.0)
     assert by_cells.stopped == "cell"
     edge = by_cells.cells.take(~by_cells.cells.inside)
     assert edge.size.max() <= 30.0
@@ -99,11 +108,11 @@ def test_it_says_what_it_reached():
 
 def test_it_can_be_run_again_from_its_parameters():
     machine = pk.load("lambda6")
-    first = pk.workspace(machine, every={"C": (0.4, 0.6)}, without=["gap *"], gap=0.05)
+    first = pk.workspace(pk.region(machine, every={"C": (0.4, 0.6)}, without=["gap *"]), gap=0.05)
     given = dict(first.parameters)
     assert given.pop("machine") == machine.name
     for name in ("kind", "places", "method"):
         given.pop(name)
     given["every"] = {axis: tuple(span) for axis, span in given["every"].items()}
-    again = pk.workspace(machine, **given)
+    again = pk.workspace(pk.region(machine, **of_region(given)), **of_work(given))
     assert again.volume == first.volume

@@ -14,9 +14,8 @@ from parakin.export.workspace.cells import cells_csv, cells_vtu
 from parakin.export.workspace.meshes import mesh_file, shell
 from parakin.export.workspace.summary import amount, asked, between
 from parakin.performance.indices import performance
-from parakin.workspace.certified.region import region
-from parakin.workspace.sampled.field import Distance, field
-from parakin.workspace.sampled.slices import enclosed, sections
+from parakin.workspaces.sampled.field import Distance, field
+from parakin.workspaces.sampled.slices import enclosed, sections
 
 SPACE = [name for name in pk.machines() if "Z" in pk.load(name).axes]
 
@@ -67,7 +66,7 @@ def overlap(radius, distance):
 
 
 def around(machine, **asked_):
-    found = pk.workspace(machine, **asked_)
+    found = pk.workspace(pk.region(machine, **asked_))
     return found, field(found.region, found.box)
 
 
@@ -86,7 +85,7 @@ def test_the_field_of_struts_is_the_distance(lens):
     rng = np.random.default_rng(1)
     places = rng.uniform([-200, -400, -400], [200, 400, 400], (5000, 3))
     gaps = [500.0 - np.linalg.norm(places - [x, 0, 0], axis=1) for x in (-400, 400)]
-    distance = Distance(region(lens))
+    distance = Distance(pk.region(lens))
     assert np.abs(distance.at(places) - np.minimum(*gaps)).max() < 1e-9
     limits = np.array(distance.region.limits)[distance.nearest(places)]
     assert (limits == np.where(gaps[0] < gaps[1], "q0.max", "q1.max")).all()
@@ -95,9 +94,9 @@ def test_the_field_of_struts_is_the_distance(lens):
 @pytest.mark.parametrize("name", pk.machines())
 def test_the_field_is_positive_where_the_machine_is_allowed(name):
     machine = pk.load(name)
-    here = region(machine)
+    here = pk.region(machine)
     rng = np.random.default_rng(2)
-    low, high = pk.workspace(machine, gap=0.1).box
+    low, high = pk.workspace(pk.region(machine), gap=0.1).box
     places = rng.uniform(low - 200, high + 200, (20_000, len(low)))
     allowed = machine.check(here.poses(places)) == 0
     assert 0.01 < allowed.mean() < 0.9
@@ -108,12 +107,12 @@ def test_the_field_is_positive_where_the_machine_is_allowed(name):
 def test_the_field_over_turns_asks_all_of_them(kind):
     machine = pk.load("hexapod")
     spans = {"A": (-0.1, 0.1), "B": (-0.05, 0.2)}
-    here = region(machine, **{kind: spans})
+    here = pk.region(machine, **{kind: spans})
     distance = Distance(here)
     assert len(distance.turns) == 4 * 4  # 5 deg steps or less, at least three, both ends
     for i, span in enumerate(spans.values()):
         assert (distance.turns[:, i].min(), distance.turns[:, i].max()) == pytest.approx(span)
-    low, high = pk.workspace(machine).box
+    low, high = pk.workspace(pk.region(machine)).box
     places = np.random.default_rng(3).uniform(low, high, (3000, 3))
     verdicts = [machine.check(here.poses(places, np.tile(turn, (len(places), 1)))) == 0 for turn in distance.turns]
     allowed = np.all(verdicts, 0) if kind == "every" else np.any(verdicts, 0)
@@ -124,15 +123,15 @@ def test_the_field_over_turns_asks_all_of_them(kind):
 
 def test_a_narrow_range_has_three_turns_and_a_wide_one_is_thinned():
     machine = pk.load("hexapod")
-    assert len(Distance(region(machine, every={"A": (0.0, 0.01)})).turns) == 3
-    assert len(Distance(region(machine, some={"A": (0.2, 0.2)})).turns) == 1
-    assert len(Distance(region(machine, dexterous=True)).turns) <= 4096
+    assert len(Distance(pk.region(machine, every={"A": (0.0, 0.01)})).turns) == 3
+    assert len(Distance(pk.region(machine, some={"A": (0.2, 0.2)})).turns) == 1
+    assert len(Distance(pk.region(machine, dexterous=True)).turns) <= 4096
 
 
 def test_the_grid_covers_a_thin_region(tmp_path):
     legs = [((0, 0, -5000), NOWHERE, 5000, 5002), (NOWHERE, NOWHERE, 1, 200), LOOSE]  # a bowl, 2 thick
     machine = struts(tmp_path / "bowl.yaml", "tx ty tz", legs, {"X": "50 mm", "Y": "0 mm", "Z": "1 mm"})
-    whole = field(region(machine), (np.array([-205.0, -205.0, -5.0]), np.array([205.0, 205.0, 3.0])))
+    whole = field(pk.region(machine), (np.array([-205.0, -205.0, -5.0]), np.array([205.0, 205.0, 3.0])))
     assert whole.step == pytest.approx([410 / 60, 410 / 60, 8 / 16])
     assert solid(shell(whole)).volume == pytest.approx(pi * 200**2 * 2, rel=0.03)
 
@@ -173,7 +172,7 @@ def test_a_region_in_parts_gives_a_body_each(tmp_path):
     feet = [(round(300 * cos(a), 3), round(300 * sin(a), 3), 0) for a in np.radians([90, 210, 330])]
     legs = [(foot, NOWHERE, 450, 520) for foot in feet]  # above the feet and below them
     home = {"X": "0 mm", "Y": "0 mm", "Z": "380 mm"}
-    found = pk.workspace(struts(tmp_path / "parts.yaml", "tx ty tz", legs, home))
+    found = pk.workspace(pk.region(struts(tmp_path / "parts.yaml", "tx ty tz", legs, home)))
     bodies = solid(shell(field(found.region, found.box, step=5.0))).split()
     assert sorted(np.sign(body.centroid[2]) for body in bodies) == [-1, 1]
     assert bodies[0].volume == pytest.approx(bodies[1].volume, rel=0.01)
@@ -258,7 +257,7 @@ def test_cross_sections_lie_in_the_certified_bracket(name):
     machine = pk.load(name)
     _, whole = around(machine)
     for section in sections(whole, values=3):
-        volume = pk.workspace(machine, at={"Z": section.value}, gap=0.005).volume
+        volume = pk.workspace(pk.region(machine, at={"Z": section.value}), gap=0.005).volume
         assert volume.inner * 0.998 < section.area < volume.outer * 1.002
 
 
@@ -296,7 +295,7 @@ def test_sections_that_make_no_sense(lens):
 
 @pytest.mark.parametrize("at, kind", [({}, "hexahedron"), ({"Z": 50.0}, "quad"), ({"X": 0.0, "Y": 0.0}, "line")])
 def test_vtu(lens, tmp_path, at, kind):
-    found = pk.workspace(lens, at=at)
+    found = pk.workspace(pk.region(lens, at=at))
     (tmp_path / "cells.vtu").write_bytes(cells_vtu(found))
     mesh = meshio.read(tmp_path / "cells.vtu")
     (block,) = mesh.cells
@@ -320,7 +319,7 @@ def test_vtu(lens, tmp_path, at, kind):
 
 
 def test_vtu_tells_the_performance_at_the_cells(tmp_path):
-    found = pk.workspace(pk.load("orthoglide"), gap=0.1)
+    found = pk.workspace(pk.region(pk.load("orthoglide")), gap=0.1)
     (tmp_path / "cells.vtu").write_bytes(cells_vtu(found))
     data = {name: values[0] for name, values in meshio.read(tmp_path / "cells.vtu").cell_data.items()}
     middles = found.cells.low + 0.5 * found.cells.size
@@ -335,7 +334,7 @@ def test_vtu_tells_the_performance_at_the_cells(tmp_path):
 
 
 def test_csv(lens):
-    found = pk.workspace(lens)
+    found = pk.workspace(pk.region(lens))
     rows = list(csv.DictReader(StringIO(cells_csv(found).decode())))
     assert len(rows) == len(found.cells.low)
     volume = {"inner": 0.0, "outer": 0.0}
@@ -361,7 +360,7 @@ def test_amounts_are_readable():
 
 
 def test_the_bracket_is_rounded_outward(lens):
-    volume = pk.workspace(lens).volume
+    volume = pk.workspace(pk.region(lens)).volume
     low, high = (float(word) for word in between(volume, 3).split() if word[0].isdigit())
     assert between(volume, 3).endswith(" litres")
     assert low * 1e6 <= volume.inner < volume.outer <= high * 1e6
@@ -370,8 +369,8 @@ def test_the_bracket_is_rounded_outward(lens):
 
 def test_what_was_asked_is_said():
     machine = pk.load("hexapod")
-    here = region(machine, at={"C": pi / 6, "Z": -900.0}, every={"A": (-0.1, 0.1)}, without=["strut0.*"])
+    here = pk.region(machine, at={"C": pi / 6, "Z": -900.0}, every={"A": (-0.1, 0.1)}, without=["strut0.*"])
     words = asked(here)
     assert words.startswith("total orientation, A -5.73° to 5.73°, Z = -900 mm, B = 0°, C = 30°")
     assert "without strut0.min strut0.max" in words
-    assert asked(region(machine, without=["*.max"])).endswith("without 6 of the limits")
+    assert asked(pk.region(machine, without=["*.max"])).endswith("without 6 of the limits")

@@ -7,11 +7,8 @@ import pytest
 
 import parakin as pk
 from parakin.errors import NoMethodError, PoseError
-from parakin.workspace.certified.region import region
-from parakin.workspace.certified.workspace import workspace
-from parakin.workspace.sampled.drives import drive_sweep
-from parakin.workspace.sampled.grid import dense_grid
-from parakin.workspace.sampled.polar import polar_sweep
+from parakin.workspaces.sampled.grid import dense_grid
+from parakin.workspaces.sampled.polar import polar_sweep
 
 # A sweep may be off by this share of a layer as thick as its step all over the boundary.
 WITHIN = 0.25
@@ -68,10 +65,10 @@ def test_a_grid_says_what_check_says(name, rng):
         if unit == "rad"
     }
     for at in ({}, turned):
-        asked = region(machine, at)
+        asked = pk.region(machine, at)
         half = np.where(np.array(machine.axis_units) == "mm", 700.0, 0.0)
-        ends = [(machine.home + s * half)[: len(asked.places)] for s in (-1.0, 1.0)]
-        grid = dense_grid(asked, 11.0 if len(asked.places) == 3 else 1.0, ends)
+        ends = [(machine.home + s * half)[: len(asked.free_axes)] for s in (-1.0, 1.0)]
+        grid = dense_grid(asked, 11.0 if len(asked.free_axes) == 3 else 1.0, ends)
         places, broken = places_of(grid, rng, 20_000)
         assert np.array_equal(broken, machine.check(asked.poses(places)))
         assert len(np.unique(broken)) > 4
@@ -90,12 +87,12 @@ TURNS = [
 @pytest.mark.parametrize(("name", "step", "asked"), TURNS, ids=lambda value: value if isinstance(value, str) else "")
 def test_with_turns_a_grid_looks_at_every_combination(name, step, asked, rng):
     machine = pk.load(name)
-    question = region(machine, **asked)
+    question = pk.region(machine, **asked)
     ends = [machine.home[:3] - 12.0 * step, machine.home[:3] + 12.0 * step]
     grid = dense_grid(question, step, ends, turns_step=8.0 * DEG)
     places, broken = places_of(grid, rng, 4000)
     samples = []
-    for low, high in question.turns.values():
+    for low, high in question.swept_axes.values():
         parts = int(np.ceil((high - low) / (8.0 * DEG)))
         samples.append([low + (high - low) * i / max(parts, 1) for i in range(parts + 1)])
     counted = [machine.limits.index(limit) for limit in question.limits]
@@ -112,23 +109,25 @@ def test_with_turns_a_grid_looks_at_every_combination(name, step, asked, rng):
 @pytest.mark.parametrize(("name", "asked", "step"), CONSTANT, ids=[case[0] for case in CONSTANT])
 def test_a_grid_finds_the_certified_volume(name, asked, step):
     machine = pk.load(name)
-    agrees(lambda h: dense_grid(region(machine, **asked), h), workspace(machine, **asked, gap=0.004), step)
+    agrees(
+        lambda h: dense_grid(pk.region(machine, **asked), h), pk.workspace(pk.region(machine, **asked), gap=0.004), step
+    )
 
 
 @pytest.fixture(scope="module")
 def total():
-    return workspace(pk.load("lambda6"), **SMALL, gap=0.03)
+    return pk.workspace(pk.region(pk.load("lambda6"), **SMALL), gap=0.03)
 
 
 def test_a_grid_finds_the_certified_total_orientation_workspace(total):
-    asked = region(pk.load("lambda6"), **SMALL)
+    asked = pk.region(pk.load("lambda6"), **SMALL)
     agrees(lambda h: dense_grid(asked, h), total, 80.0)
 
 
 def test_what_follows_from_a_grid_is_what_follows_from_the_proof():
     machine = pk.load("tricept")
-    certified = workspace(machine, **UPRIGHT, gap=0.01)
-    grid = dense_grid(region(machine, **UPRIGHT), 20.0)
+    certified = pk.workspace(pk.region(machine, **UPRIGHT), gap=0.01)
+    grid = dense_grid(pk.region(machine, **UPRIGHT), 20.0)
     low, high = grid.box
     assert (low + 0.5 * grid.step >= certified.box[0]).all() and (high - 0.5 * grid.step <= certified.box[1]).all()
     assert np.abs(grid.centroid - certified.centroid).max() < 2.0
@@ -144,7 +143,7 @@ def test_what_follows_from_a_grid_is_what_follows_from_the_proof():
 
 
 def test_a_box_cuts_a_part_out_of_the_same_lattice():
-    asked = region(pk.load("orthoglide"))
+    asked = pk.region(pk.load("orthoglide"))
     low, high = (-103.0, 0.0, -50.0), (200.0, 52.4, 400.0)
     whole, part = dense_grid(asked, 5.0), dense_grid(asked, 5.0, (low, high))
     kept = [(x >= a) & (x <= b) for x, a, b in zip(whole.coordinates, low, high, strict=True)]
@@ -159,22 +158,22 @@ def test_a_box_cuts_a_part_out_of_the_same_lattice():
 
 def test_a_line_and_single_cells_are_grids_too():
     machine = pk.load("orthoglide")
-    line = dense_grid(region(machine, {"X": 0.0, "Y": 0.0}), 0.01)
-    certified = workspace(machine, {"X": 0.0, "Y": 0.0}, gap=1e-4).volume
+    line = dense_grid(pk.region(machine, {"X": 0.0, "Y": 0.0}), 0.01)
+    certified = pk.workspace(pk.region(machine, {"X": 0.0, "Y": 0.0}), gap=1e-4).volume
     assert line.unit == "mm" and certified.inner - 0.02 <= line.estimate <= certified.outer + 0.02
-    thin = dense_grid(region(machine), 5.0, ([0.0, 0.0, -250.0], [5.0, 5.0, 250.0]))
+    thin = dense_grid(pk.region(machine), 5.0, ([0.0, 0.0, -250.0], [5.0, 5.0, 250.0]))
     assert thin.broken.shape == (1, 1, 100)
-    flat = dense_grid(region(machine), 5.0, ([-250.0, 0.0, 0.0], [250.0, 5.0, 5.0]))
+    flat = dense_grid(pk.region(machine), 5.0, ([-250.0, 0.0, 0.0], [250.0, 5.0, 5.0]))
     assert flat.broken.shape == (100, 1, 1)
     assert thin.estimate == flat.estimate > 0.0
 
 
 def test_a_sweep_can_be_run_again_from_its_parameters():
     machine = pk.load("lambda6")
-    asked = region(machine, some={"C": (0.2, 0.7)}, without=["gap*"])
+    asked = pk.region(machine, some={"C": (0.2, 0.7)}, without=["gap*"])
     grid = dense_grid(asked, 60.0, turns_step=0.1)
     p = grid.parameters
-    same = region(machine, p["at"], p["every"], p["some"], without=p["without"], mode=p["mode"])
+    same = pk.region(machine, p["at"], p["every"], p["some"], without=p["without"], mode=p["mode"])
     again = dense_grid(same, p["step"], p["box"], p["turns_step"])
     assert p["method"] == "grid" and again.estimate == grid.estimate > 0.0
     assert np.array_equal(again.broken, grid.broken)
@@ -182,13 +181,13 @@ def test_a_sweep_can_be_run_again_from_its_parameters():
 
 def test_progress_comes_to_its_end():
     seen = []
-    dense_grid(region(pk.load("lambda6"), every={"C": (0.4, 0.5)}), 8.0, progress=seen.append)
+    dense_grid(pk.region(pk.load("lambda6"), every={"C": (0.4, 0.5)}), 8.0, progress=seen.append)
     assert len(seen) > 1 and seen == sorted(seen) and seen[-1] == 1.0
 
 
 def test_an_empty_region_is_an_empty_grid():
     for at in ({"Z": 5000.0, "B": 0.0, "C": 0.0}, {"Z": -1650.0, "B": 3.0, "C": 0.0}):
-        grid = dense_grid(region(pk.load("tricept"), at), 10.0)
+        grid = dense_grid(pk.region(pk.load("tricept"), at), 10.0)
         assert grid.empty and grid.estimate == 0.0 and grid.box is None and grid.centroid is None
         assert grid.bounded_by == ()
 
@@ -199,25 +198,25 @@ def test_an_empty_region_is_an_empty_grid():
 @pytest.mark.parametrize(("name", "asked", "step"), FLAT, ids=[case[0] for case in FLAT])
 def test_rays_find_the_certified_area(name, asked, step):
     machine = pk.load(name)
-    certified = workspace(machine, **asked, gap=0.002)
-    agrees(lambda h: polar_sweep(region(machine, **asked), h, rays=720), certified, step)
+    certified = pk.workspace(pk.region(machine, **asked), gap=0.002)
+    agrees(lambda h: polar_sweep(pk.region(machine, **asked), h, rays=720), certified, step)
 
 
 def test_rays_find_the_certified_volume_of_what_is_star_shaped():
     machine = pk.load("lambda6")
-    certified = workspace(machine, gap=0.004)
-    agrees(lambda h: polar_sweep(region(machine), h, rays=180), certified, 80.0)
+    certified = pk.workspace(pk.region(machine), gap=0.004)
+    agrees(lambda h: polar_sweep(pk.region(machine), h, rays=180), certified, 80.0)
 
 
 def test_rays_find_the_certified_total_orientation_workspace(total):
-    asked = region(pk.load("lambda6"), **SMALL)
+    asked = pk.region(pk.load("lambda6"), **SMALL)
     agrees(lambda h: polar_sweep(asked, h, rays=120), total, 80.0)
 
 
 @pytest.mark.parametrize(("name", "asked"), [("tricept", UPRIGHT), ("orthoglide", {}), ("hbg80_3d", {})])
 def test_a_ray_ends_at_the_first_place_not_allowed(name, asked, rng):
     machine = pk.load(name)
-    question = region(machine, **asked)
+    question = pk.region(machine, **asked)
     found = polar_sweep(question, 7.0, planes=31.0, rays=40)
     assert 0.0 < np.isnan(found.radii).mean() < 1.0
     for plane, ray in zip(rng.integers(0, len(found.heights), 60), rng.integers(0, len(found.angles), 60), strict=True):
@@ -233,13 +232,13 @@ def test_a_ray_ends_at_the_first_place_not_allowed(name, asked, rng):
         broken = machine.check(question.poses(places))
         assert not broken[:-1].any() and broken[-1] == found.broken[plane, ray] > 0
     # It sees no more than there is, and says what it can't see.
-    assert found.estimate < workspace(machine, **asked, gap=0.05).volume.outer
+    assert found.estimate < pk.workspace(pk.region(machine, **asked), gap=0.05).volume.outer
     assert "not seen" in found.note
 
 
 def test_outlines_are_closed_and_of_the_planes_that_hold_the_axis():
     machine = pk.load("orthoglide")
-    found = polar_sweep(region(machine), 5.0, planes=40.0, rays=36, axis=(-20.0, 10.0))
+    found = polar_sweep(pk.region(machine), 5.0, planes=40.0, rays=36, axis=(-20.0, 10.0))
     held = ~np.isnan(found.radii).any(1)
     assert len(found.outlines) == held.sum() > 2
     for line, height, radii in zip(found.outlines, found.heights[held], found.radii[held], strict=True):
@@ -254,10 +253,10 @@ def test_outlines_are_closed_and_of_the_planes_that_hold_the_axis():
 
 
 def test_a_polar_sweep_is_of_two_or_three_places():
-    flat = polar_sweep(region(pk.load("hbg80_2d")), 10.0)
+    flat = polar_sweep(pk.region(pk.load("hbg80_2d")), 10.0)
     assert flat.heights is None and flat.radii.shape == (1, 72) and flat.outlines[0].shape == (73, 2)
     with pytest.raises(PoseError, match="needs a plane"):
-        polar_sweep(region(pk.load("hbg80_2d"), {"X": 200.0}), 10.0)
+        polar_sweep(pk.region(pk.load("hbg80_2d"), {"X": 200.0}), 10.0)
 
 
 # The sweep of the drives.
@@ -266,14 +265,14 @@ def test_a_polar_sweep_is_of_two_or_three_places():
 @pytest.mark.parametrize("name", TRANSLATING)
 def test_drives_find_the_certified_volume(name):
     machine = pk.load(name)
-    certified = workspace(machine, gap=0.004)
+    certified = pk.workspace(pk.region(machine), gap=0.004)
     widest = max(drive.high - drive.low for drive in machine.model.drives)
-    agrees(lambda h: drive_sweep(machine, round(widest / h)), certified, widest / 12)
+    agrees(lambda h: pk.sweep_drives(pk.region(machine), round(widest / h)), certified, widest / 12)
 
 
 def test_a_contour_of_the_planar_machine_is_the_circle_it_must_be():
     machine = pk.load("hbg80_2d")
-    found = drive_sweep(machine, 50)
+    found = pk.sweep_drives(pk.region(machine), 50)
     names = {image.strategy.name for image in found.contours}
     assert names == {
         f"{run} runs, {stand} at {end}" for run, stand in (("Xhbg", "Yhbg"), ("Yhbg", "Xhbg")) for end in ("min", "max")
@@ -299,7 +298,7 @@ def test_a_contour_of_the_planar_machine_is_the_circle_it_must_be():
 
 def test_the_net_of_the_shell_lies_on_spheres_and_is_the_boundary():
     machine = pk.load("hbg80_3d")
-    found = drive_sweep(machine, 24)
+    found = pk.sweep_drives(pk.region(machine), 24)
     assert len({image.strategy.name for image in found.contours}) == 12
     assert len({image.strategy.name for image in found.nets}) == 6
     assert {image.side for image in found.nets} == {"home", "other"}
@@ -324,7 +323,9 @@ def test_the_net_of_the_shell_lies_on_spheres_and_is_the_boundary():
 
 def test_a_drive_stands_at_its_limit_though_rounding_says_otherwise():
     machine = pk.load("orthoglide")
-    image = next(i for i in drive_sweep(machine, 8).nets if i.strategy.name == "rho_x and rho_y run, rho_z at max")
+    image = next(
+        i for i in pk.sweep_drives(pk.region(machine), 8).nets if i.strategy.name == "rho_x and rho_y run, rho_z at max"
+    )
     assert np.isfinite(image.places).any()
     assert (machine.check(image.places[np.isfinite(image.places).all(-1)]) > 0).any()
 
@@ -334,14 +335,14 @@ def test_a_drive_stands_at_its_limit_though_rounding_says_otherwise():
 )
 def test_other_machines_have_no_sweep_of_the_drives(name, why):
     with pytest.raises(NoMethodError, match=f"{name}.*{why}"):
-        drive_sweep(pk.load(name))
+        pk.sweep_drives(pk.region(pk.load(name)))
 
 
 # Bad input.
 
 
 def test_bad_numbers_are_refused_in_one_line():
-    tricept, lambda6 = region(pk.load("tricept")), region(pk.load("lambda6"), every={"C": (0.4, 0.5)})
+    tricept, lambda6 = pk.region(pk.load("tricept")), pk.region(pk.load("lambda6"), every={"C": (0.4, 0.5)})
     flat = pk.load("hbg80_2d")
     for step in (0.0, -1.0, np.nan, np.inf):
         for sweep in (dense_grid, polar_sweep):
@@ -369,7 +370,10 @@ def test_bad_numbers_are_refused_in_one_line():
             dense_grid(tricept, 1.0, box)
     for cells in (0, -3, 40_000):
         with pytest.raises(PoseError, match=r"^cells: 1 to 31622 parts of each drive expected"):
-            drive_sweep(flat, cells)
+            pk.sweep_drives(pk.region(flat), cells)
+    for question in ({"at": {"X": 200.0}}, {"without": ["*.max"]}):
+        with pytest.raises(PoseError, match=r"^region: a sweep of the drives takes the whole workspace"):
+            pk.sweep_drives(pk.region(flat, **question))
 
 
 @pytest.fixture

@@ -15,7 +15,7 @@ import trimesh
 
 import parakin as pk
 from parakin.cli import main
-from parakin.workspace.certified.subdivision import Subdivision
+from parakin.workspaces.certified.subdivision import Subdivision
 
 BALL = """
 title: A hollow ball
@@ -105,11 +105,13 @@ def test_parameters_are_enough_to_run_it_again(capsys):
     assert given["every"]["A"] == pytest.approx([-10, np.degrees(0.1)])
     assert given["without"] == ["strut0.min", "strut0.max"]
     again = pk.workspace(
-        pk.load("hexapod"),
-        at={axis: np.radians(v) if axis in "ABC" else v for axis, v in given["at"].items()},
-        every={axis: tuple(np.radians(span)) for axis, span in given["every"].items()},
-        without=given["without"],
-        mode=given["mode"],
+        pk.region(
+            pk.load("hexapod"),
+            at={axis: np.radians(v) if axis in "ABC" else v for axis, v in given["at"].items()},
+            every={axis: tuple(np.radians(span)) for axis, span in given["every"].items()},
+            without=given["without"],
+            mode=given["mode"],
+        ),
         gap=given["gap"],
     )
     assert again.volume.inner == pytest.approx(first["volume"]["inner"])
@@ -212,7 +214,7 @@ def test_the_time_is_kept(capsys):
 
 @pytest.mark.parametrize("method", ["grid", "polar", "drives"])
 def test_other_methods(method, tmp_path, capsys):
-    proved = pk.workspace(pk.load("hbg80_3d")).volume.estimate
+    proved = pk.workspace(pk.region(pk.load("hbg80_3d"))).volume.estimate
     said = told(capsys, "hbg80_3d", "--method", method, "-o", tmp_path / "a.png", "-o", tmp_path / "a.stl")
     assert said["volume"]["inner"] is said["volume"]["outer"] is said["gap"] is None
     assert said["volume"]["estimate"] == pytest.approx(proved, rel=0.1 if method == "polar" else 0.01)

@@ -18,7 +18,10 @@ if TYPE_CHECKING:
     from .toolpath.posting.frames import workpiece
     from .toolpath.reading.detect import read_path
     from .toolpath.timing.trajectory import Trajectory
-    from .workspace.certified.workspace import Workspace, workspace
+    from .workspaces.certified.region import Region
+    from .workspaces.certified.region import make_region as region
+    from .workspaces.certified.workspace import Workspace, workspace
+    from .workspaces.sampled.drives import sweep_drives
 
 __version__ = "0.1.0"
 __all__ = [
@@ -32,6 +35,7 @@ __all__ = [
     "ParakinError",
     "Placement",
     "PoseError",
+    "Region",
     "Solution",
     "ToolPath",
     "Trajectory",
@@ -42,6 +46,8 @@ __all__ = [
     "placed",
     "prepare",
     "read_path",
+    "region",
+    "sweep_drives",
     "workpiece",
     "workspace",
 ]
@@ -75,21 +81,25 @@ def load(name: str | PathLike[str], parameters: Mapping[str, float | str] | None
         raise InputError(str(error), fspath(path), line_of(path, error.part)) from None
 
 
+# The public names that are loaded when they are first used: the module, and the name there if it is another.
 _LAZY = {
     "Atlas": "performance.atlas",
     "Job": "toolpath.job",
-    "Trajectory": "toolpath.timing.trajectory",
     "Machine": "machine",
     "Placement": "toolpath.placing.placement",
+    "Region": "workspaces.certified.region",
     "Solution": "kinematics.forward",
     "ToolPath": "toolpath.path",
-    "Workspace": "workspace.certified.workspace",
+    "Trajectory": "toolpath.timing.trajectory",
+    "Workspace": "workspaces.certified.workspace",
     "atlas": "performance.atlas",
     "placed": "toolpath.placing.placement",
     "prepare": "toolpath.job",
     "read_path": "toolpath.reading.detect",
+    "region": "workspaces.certified.region:make_region",
+    "sweep_drives": "workspaces.sampled.drives",
     "workpiece": "toolpath.posting.frames",
-    "workspace": "workspace.certified.workspace",
+    "workspace": "workspaces.certified.workspace",
 }
 
 
@@ -97,5 +107,6 @@ def __getattr__(name: str) -> object:
     from importlib import import_module
 
     if name in _LAZY:
-        return getattr(import_module(f"{__name__}.{_LAZY[name]}"), name)
+        module, _, own_name = _LAZY[name].partition(":")
+        return getattr(import_module(f"{__name__}.{module}"), own_name or name)
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

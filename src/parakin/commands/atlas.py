@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from ..performance.atlas import Atlas, Map
     from ..performance.certified.proofs import Brackets, Proof
     from ..performance.indices import Performance
-    from ..workspace.certified.region import Region
+    from ..workspaces.certified.region import Region
 
 Spans = dict[str, tuple[float, float]]
 
@@ -74,13 +74,13 @@ def atlas(
     scale, apart = length(size, "--length"), length(step, "--step")
     spans = ranges_of(machine, box, "--box")
     bounds = _bounds(amplification, bool(spans))
-    cuts = _cuts(machine, asked, at, slices or (), without, mode)
+    cuts = _cuts(machine, asked, slices or ())
     if slices and output is None:
         raise InputError("a map is a file, name it or its folder with -o", "--slice")
     files = Files(machine.name, output, len(cuts)) if output is not None else None
     rows = None
     if pose is not None:
-        default = asked.poses(machine.home[[machine.axes.index(axis) for axis in asked.places]][None])[0]
+        default = asked.poses(machine.home[[machine.axes.index(axis) for axis in asked.free_axes]][None])[0]
         rows = parse_row(
             [part.strip() for part in pose.split(",")], machine.axes, machine.axis_units, default, "--pose"
         )
@@ -116,35 +116,25 @@ def _bounds(text: str | None, has_box: bool) -> tuple[float, float] | None:
     return ends
 
 
-def _cuts(
-    machine: Machine,
-    asked: Region,
-    at: str | None,
-    slices: Sequence[str],
-    without: Sequence[str] | None,
-    mode: str | None,
-) -> list[Region]:
+def _cuts(machine: Machine, asked: Region, slices: Sequence[str]) -> list[Region]:
     """The regions to draw: those that --slice names, else one through home, or all of one that is flat already."""
-    from ..workspace.certified.region import region
-
     held = []
     for text in slices:
         parts = parts_of(machine, text, "--slice", "Z=-100")
         if len(parts) != 1:
             raise InputError(f"{quote(text)}: one axis and its value expected", "--slice")
         axis, value = parts[0]
-        if axis not in asked.places or len(asked.places) < 2:
-            raise InputError(f"{axis} is no place to cut at, {' '.join(asked.places)} are left", "--slice")
+        if axis not in asked.free_axes or len(asked.free_axes) < 2:
+            raise InputError(f"{axis} is no place to cut at, {' '.join(asked.free_axes)} are left", "--slice")
         held.append((axis, parse_value(axis, value, "--slice")))
         if held[-1] in held[:-1]:
             raise InputError(f"{quote(text)} is given twice", "--slice")
-    if not slices and len(asked.places) < 3:
+    if not slices and len(asked.free_axes) < 3:
         return [asked]
     if not slices:
-        axis = asked.places[-1]
+        axis = asked.free_axes[-1]
         held = [(axis, float(machine.home[machine.axes.index(axis)]))]
-    fixed = values_of(machine, at, "--at")
-    return [region(machine, fixed | {axis: value}, without=without or (), mode=mode) for axis, value in held]
+    return [asked.fix({axis: value}) for axis, value in held]
 
 
 class _Found:
@@ -186,9 +176,9 @@ class _Found:
             self.brackets = amplification_brackets(box, progress=told)
 
     def draw(self, step: float | None, length: float | None, progress: Progress) -> None:
-        from ..performance.atlas import atlas_of
+        from ..performance.atlas import atlas
 
-        self.atlas = atlas_of(self.asked, step, length, progress.part("looking at the workspace", 0.0, 1.0))
+        self.atlas = atlas(self.asked, step, length, progress.part("looking at the workspace", 0.0, 1.0))
 
     def mapped(self, cut: Region, step: float | None, length: float | None) -> Map:
         from ..performance.atlas import map_of
@@ -199,8 +189,8 @@ class _Found:
         try:
             return map_of(cut, step, length)
         except PoseError as error:
-            axis = next(axis for axis in self.asked.places if axis in cut.held)
-            raise InputError(f"{axis}={cut.held[axis]:g}: {error}", "--slice") from None
+            axis = next(axis for axis in self.asked.free_axes if axis in cut.fixed_axes)
+            raise InputError(f"{axis}={cut.fixed_axes[axis]:g}: {error}", "--slice") from None
 
     @property
     def verdict(self) -> str:
@@ -223,7 +213,7 @@ class _Found:
                 "at": {
                     axis: rim(value, unit)
                     for axis, unit in zip(machine.axes, machine.axis_units, strict=True)
-                    if (value := self.asked.held.get(axis)) is not None
+                    if (value := self.asked.fixed_axes.get(axis)) is not None
                 },
                 "verdict": self.verdict,
                 "pose": None if self.pose is None else performance_json(self.pose, self.broken),

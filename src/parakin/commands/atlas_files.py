@@ -11,7 +11,7 @@ from ..errors import InputError
 
 if TYPE_CHECKING:
     from ..performance.atlas import Atlas, Map
-    from ..workspace.certified.region import Region
+    from ..workspaces.certified.region import Region
 
 
 @dataclass(frozen=True)
@@ -51,4 +51,6 @@ class Files:
 
 def _place(drawn: Map, asked: Region) -> str:
     """Of a slice where it is, for its file's name."""
-    return "".join(f".{axis}{drawn.region.held[axis]:g}" for axis in asked.places if axis in drawn.region.held)
+    return "".join(
+        f".{axis}{drawn.region.fixed_axes[axis]:g}" for axis in asked.free_axes if axis in drawn.region.fixed_axes
+    )

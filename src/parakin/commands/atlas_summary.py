@@ -123,7 +123,7 @@ def _parallel(found: Atlas) -> list[float]:
 def atlas_text(found: Atlas) -> str:
     told, machine, axes = found.map.inside, found.machine, found.map.axes
     turning = [axis for axis, unit in zip(machine.axes, machine.axis_units, strict=True) if unit == "rad"]
-    held = found.map.region.held
+    held = found.map.region.fixed_axes
     head = f"{machine.name} over the workspace"
     if held:
         head += " at " + ", ".join(

@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Literal
 from ..errors import InputError
 
 if TYPE_CHECKING:
-    from ..workspace.certified.region import Region
-    from ..workspace.certified.workspace import Workspace
-    from ..workspace.sampled.sampling import Swept
+    from ..workspaces.certified.region import Region
+    from ..workspaces.certified.workspace import Workspace
+    from ..workspaces.sampled.sampling import Swept
 
 Method = Literal["certified", "grid", "polar", "drives"]
 
@@ -43,50 +43,37 @@ def found_by(method: Method, asked: Region, effort: Effort, progress: Callable[[
 
 
 def _certified(asked: Region, effort: Effort, progress: Callable[[float], None]) -> Workspace:
-    from ..workspace.certified.workspace import workspace
+    from ..workspaces.certified.workspace import workspace
 
     gap, seconds = GAP if effort.gap is None else effort.gap, SECONDS if effort.time is None else effort.time
     if not 0.0 < gap < float("inf"):
         raise InputError("expected a number above 0", "--gap")
     if not seconds > 0.0:
         raise InputError("expected a time above 0, in s", "--time")
-    swept = dict(asked.turns)
-    return workspace(
-        asked.machine,
-        at=asked.held,
-        every=swept if asked.kind == "total" else None,
-        some=swept if asked.kind == "inclusive" else None,
-        dexterous=asked.kind == "dexterous",
-        without=asked.without,
-        mode=asked.mode,
-        gap=gap,
-        cell=effort.cell,
-        seconds=seconds,
-        progress=progress,
-    )
+    return workspace(asked, gap, effort.cell, seconds, progress)
 
 
 def _swept(method: Method, asked: Region, step: float | None, progress: Callable[[float], None]) -> Swept:
-    from ..workspace.sampled.grid import dense_grid
-    from ..workspace.sampled.polar import polar_sweep
-    from ..workspace.sampled.sampling import surroundings
+    from ..workspaces.sampled.grid import dense_grid
+    from ..workspaces.sampled.polar import polar_sweep
+    from ..workspaces.sampled.sampling import surroundings
 
     box = surroundings(asked)
     edge = 1.0 if box is None else float((box[1] - box[0]).max())
-    size = edge / _STEPS[method].get(len(asked.places), 1) if step is None else step
+    size = edge / _STEPS[method].get(len(asked.free_axes), 1) if step is None else step
     if method == "grid":
         return dense_grid(asked, size, progress=progress)
     return polar_sweep(asked, size, planes=max(size, edge / _PLANES), progress=progress)
 
 
 def _drives(asked: Region, step: float | None, progress: Callable[[float], None]) -> Swept:
-    from ..workspace.sampled.drives import drive_sweep
+    from ..workspaces.sampled.drives import sweep_drives
 
     machine = asked.machine
-    if asked.kind != "constant" or asked.without or any(axis in asked.held for axis in "XYZ"):
+    if asked.kind != "constant" or asked.without or any(axis in asked.fixed_axes for axis in "XYZ"):
         raise InputError("drives sweeps the whole workspace: no --at, --every, --some or --without", "--method")
     if step is None:
         cells = _CELLS.get(len(machine.joints), 1)
     else:
-        cells = max(1, *(ceil((drive.high - drive.low) / step) for drive in machine.model.drives))
-    return drive_sweep(machine, cells, asked.mode, progress)
+        cells = max(1, *(ceil((drive.high - drive.low) / step) for drive in machine.drives))
+    return sweep_drives(asked, cells, progress)

@@ -12,7 +12,7 @@ from .values import parse_value
 
 if TYPE_CHECKING:
     from ..machine import Machine
-    from ..workspace.certified.region import Region
+    from ..workspaces.certified.region import Region
 
 At = Annotated[
     str | None,
@@ -45,7 +45,7 @@ def region_of(
     mode: str | None = None,
 ) -> Region:
     """The region that the options ask for; what is wrong with one of them is told with its name."""
-    from ..workspace.certified.region import region
+    from ..workspaces.certified.region import make_region
 
     given: dict[str, Any] = {
         "at": values_of(machine, at, "--at"),
@@ -54,12 +54,15 @@ def region_of(
         "without": without or (),
         "mode": mode,
     }
-    for option, value in given.items():
-        try:
-            region(machine, **{option: value})
-        except PoseError as error:
-            raise InputError(str(error), f"--{option}") from None
-    return region(machine, dexterous=dexterous, **given)
+    try:
+        return make_region(machine, dexterous=dexterous, **given)
+    except PoseError:
+        for option, value in given.items():  # which of them is invalid by itself
+            try:
+                make_region(machine, **{option: value})
+            except PoseError as error:
+                raise InputError(str(error), f"--{option}") from None
+        raise
 
 
 def values_of(machine: Machine, text: str | None, source: str) -> dict[str, float]:

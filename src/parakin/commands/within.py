@@ -11,9 +11,9 @@ from .console import fixed, rim
 from .regions import values_of
 
 if TYPE_CHECKING:
-    from ..workspace.certified.region import Region
-    from ..workspace.connected.connected import Parts
-    from ..workspace.inscribed.largest_box import Box
+    from ..workspaces.certified.region import Region
+    from ..workspaces.connected.connected import Parts
+    from ..workspaces.inscribed.largest_box import Box
 
 
 @dataclass(frozen=True)
@@ -39,7 +39,7 @@ def looked_within(asked: Region, wanted: Within) -> Found:
     """The box and the parts that are wanted."""
     box, parts = None, None
     if wanted.box or wanted.shape is not None or wanted.around is not None:
-        from ..workspace.inscribed.largest_box import largest_box
+        from ..workspaces.inscribed.largest_box import largest_box
 
         shape = None if wanted.shape is None else _shape(wanted.shape)
         around = None if wanted.around is None else _place(asked, wanted.around)
@@ -49,13 +49,13 @@ def looked_within(asked: Region, wanted: Within) -> Found:
             source = "--around" if around is not None else "--shape" if shape is not None else "--box"
             raise InputError(_plain(error), source) from None
     if wanted.parts or wanted.start is not None:
-        from ..workspace.connected.connected import connected_parts
+        from ..workspaces.connected.connected import connected_parts
 
         start = None
         if wanted.start is not None:
             given = values_of(asked.machine, wanted.start, "--start")
             home = zip(asked.machine.axes, asked.machine.home.tolist(), strict=True)
-            start = list(({**dict(home), **asked.held, **given}).values())
+            start = list(({**dict(home), **asked.fixed_axes, **given}).values())
         try:
             parts = connected_parts(asked, start)
         except PoseError as error:
@@ -80,9 +80,9 @@ def _shape(text: str) -> list[float]:
 
 def _place(asked: Region, text: str) -> list[float]:
     given = values_of(asked.machine, text, "--around")
-    if set(given) != set(asked.places):
-        raise InputError(f"expected {', '.join(asked.places)}, no more and no less", "--around")
-    return [given[axis] for axis in asked.places]
+    if set(given) != set(asked.free_axes):
+        raise InputError(f"expected {', '.join(asked.free_axes)}, no more and no less", "--around")
+    return [given[axis] for axis in asked.free_axes]
 
 
 def within_told(found: Found) -> Mapping[str, Any]:
@@ -145,7 +145,7 @@ def within_summary(found: Found) -> str:
             lines.append(f"            {axis} {fixed(low, 1)} to {fixed(high, 1)} mm, {stops}")
     if found.parts is not None:
         parts = found.parts
-        d = len(parts.region.places)
+        d = len(parts.region.free_axes)
         lines += ["", f"parts that a path can't leave  {len(parts)}, at least {parts.at_least} proved to be different"]
         for number, part in enumerate(parts.parts):
             sign = "as at home" if part.sign > 0 else "the other assembly"

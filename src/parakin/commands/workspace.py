@@ -84,11 +84,11 @@ def workspace(
     machine = machine_of(name, sizes)
     asked = region_of(machine, at, every, some, dexterous, without, mode)
     effort = Effort(gap, length(cell, "--cell"), time, length(step, "--step"))
-    files = _files(output or (), method, len(asked.places))
+    files = _files(output or (), method, len(asked.free_axes))
     announce_compiling()
     from ..export.workspace.files import Drawing, drawing
     from ..export.workspace.summary import account
-    from ..workspace.certified.workspace import Workspace
+    from ..workspaces.certified.workspace import Workspace
 
     began = clock.monotonic()
     with Progress() as progress:

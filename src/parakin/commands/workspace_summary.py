@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 from .console import fixed, table
 
 if TYPE_CHECKING:
-    from ..workspace.certified.workspace import Workspace
-    from ..workspace.sampled.sampling import Swept
+    from ..workspaces.certified.workspace import Workspace
+    from ..workspaces.sampled.sampling import Swept
 
 _STOPPED = {
     "gap": "as asked for",
@@ -24,8 +24,8 @@ _STOPPED = {
 def summary(found: Workspace | Swept, seconds: float) -> str:
     """The account for people."""
     from ..export.workspace.summary import heading
-    from ..workspace.certified.workspace import Workspace
-    from ..workspace.sampled.grid import GridWorkspace
+    from ..workspaces.certified.workspace import Workspace
+    from ..workspaces.sampled.grid import GridWorkspace
 
     head = heading(found)
     if isinstance(found, Workspace) and found.empty:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
 from math import floor, isfinite, log10, prod
@@ -11,10 +11,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import Array
+from ..arrays import Array, Progress
 from ..errors import PoseError
 from ..machine import Machine
-from ..workspace.certified.region import Region, region
+from ..workspaces.certified.region import Region
 from .certified.counterexamples import NOUGHT
 from .characteristic_length import Length, characteristic_length
 from .extremes import Extreme, Side, extremes, isotropic, room
@@ -47,7 +47,7 @@ class Map:
     @property
     def axes(self) -> tuple[str, ...]:
         """The axes of a place."""
-        return self.region.places
+        return self.region.free_axes
 
     @cached_property
     def inside(self) -> Performance:
@@ -86,47 +86,35 @@ class Atlas:
     def isotropic_on(self, drawn: Map) -> Array:
         """Those of the isotropic poses that lie on a slice, (k, axes)."""
         off = np.zeros(len(self.isotropic))
-        for axis, value in drawn.region.held.items():
+        for axis, value in drawn.region.fixed_axes.items():
             off = np.maximum(off, np.abs(self.isotropic[:, self.machine.axes.index(axis)] - value))
         return self.isotropic[off < _ON * drawn.step]
 
 
 def atlas(
-    machine: Machine,
-    at: Mapping[str, float] | None = None,
-    without: Sequence[str] = (),
-    mode: str | None = None,
+    region: Region,
     step: float | None = None,
     length: float | None = None,
-    progress: Callable[[float], None] | None = None,
+    progress: Progress | None = None,
 ) -> Atlas:
-    """Performance over the places where a machine is allowed, at one orientation.
+    """Compute the performance over a region at one orientation: on a grid, and its extremes by search between.
 
     Parameters
     ----------
-    at, without, mode : what is asked; see ``region``; a place that is held makes the
-        region a slice
-    step : between places of the grid, mm; the grid stands on its multiples
+    region : made by :func:`parakin.region`, without swept axes; a fixed X, Y or Z makes it a slice
+    step : between positions of the grid, mm; the grid stands on its multiples
     length : characteristic length, mm; see :func:`parakin.performance.characteristic_length.characteristic_length`
     progress : called with the fraction done
 
-    Raises :class:`PoseError` for a question that makes no sense, or a region that is unbounded or empty.
+    Raises :class:`PoseError` for invalid numbers, and for a region that is swept, unbounded or empty.
     """
-    return atlas_of(region(machine, at, without=without, mode=mode), step, length, progress)
-
-
-def atlas_of(
-    asked: Region,
-    step: float | None = None,
-    length: float | None = None,
-    progress: Callable[[float], None] | None = None,
-) -> Atlas:
-    """As :func:`atlas`, over a region without swept turns."""
-    told = progress or (lambda fraction: None)
-    drawn = map_of(asked, step, length, lambda fraction: told(0.4 * fraction))
-    found = extremes(asked, drawn.inside, drawn.step)
-    told(0.9)
-    poses, isolated = isotropic(asked, drawn.inside, drawn.step)
+    if region.swept_axes:
+        raise PoseError(f"region: an atlas is of one orientation, {' '.join(region.swept_axes)} must not be swept")
+    report = progress or (lambda fraction: None)
+    drawn = map_of(region, step, length, lambda fraction: report(0.4 * fraction))
+    found = extremes(region, drawn.inside, drawn.step)
+    report(0.9)
+    poses, isolated = isotropic(region, drawn.inside, drawn.step)
     return Atlas(drawn, found, poses, isolated)
 
 
@@ -134,14 +122,14 @@ def map_of(
     asked: Region,
     step: float | None = None,
     length: float | None = None,
-    progress: Callable[[float], None] | None = None,
+    progress: Progress | None = None,
 ) -> Map:
     """The map alone, over a region without swept turns; parameters and errors as of :func:`atlas`."""
     scale = characteristic_length(asked.machine, length)
     if step is not None and not (isfinite(step) and step > 0.0):
         raise PoseError(f"step: a length above 0 mm expected, not {step:g}")
     low, high = _extent(asked)
-    step = _round(float((high - low).max()) / _ALONG[len(asked.places)]) if step is None else float(step)
+    step = _round(float((high - low).max()) / _ALONG[len(asked.free_axes)]) if step is None else float(step)
     counts = [(b - a) / step + 1.0 for a, b in zip(low, high, strict=True)]
     if prod(counts) > MOST:
         size = " x ".join(f"{count:,.0f}" for count in counts)
@@ -161,7 +149,7 @@ def _extent(asked: Region) -> tuple[Array, Array]:
     """A box that holds the region, tight enough for a grid to be worth its places."""
     around = asked.extent
     if around is not None:
-        cells = asked.subdivision(*around).run(_ROUGH, seconds=_SECONDS)
+        cells = asked.subdivide(*around).run(_ROUGH, seconds=_SECONDS)
         if len(cells.low):
             return cells.low.min(0), (cells.low + cells.size).max(0)
     raise PoseError("the machine is allowed nowhere there")
@@ -187,7 +175,7 @@ def _each(found: Performance, change: Callable[[Array], Array]) -> Performance:
     return replace(found, **columns)
 
 
-def _computed(asked: Region, places: Array, length: Length, progress: Callable[[float], None] | None) -> Performance:
+def _computed(asked: Region, places: Array, length: Length, progress: Progress | None) -> Performance:
     parts = []
     for start in range(0, len(places), _AT_ONCE):
         poses = asked.poses(places[start : start + _AT_ONCE])

@@ -13,7 +13,7 @@ from ..machine import Machine
 from ..model.legs.slider import Slider
 from ..model.parts import Direction, Drive, Point, Signs, Size
 from ..model.spec import Spec
-from ..workspace.certified.region import FAR
+from ..workspaces.certified.region import FAR
 from .certified.proofs import Proof, box_of
 from .certified.proofs import amplification as amplified
 

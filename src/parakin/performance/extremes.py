@@ -8,7 +8,7 @@ from typing import Literal
 import numpy as np
 
 from ..arrays import Array
-from ..workspace.certified.region import Region
+from ..workspaces.certified.region import Region
 from .indices import Performance, performance
 from .jacobians import scaled_rates
 from .search import Indices, best_of_blocks, climb, roots, spread
@@ -60,7 +60,7 @@ def extremes(asked: Region, inside: Performance, apart: float) -> tuple[Extreme,
     names = (*MEASURES, *inside.margin_names)
     wanted: list[tuple[int, float]] = [(i, sign) for i in range(len(MEASURES)) for sign in (-1.0, 1.0)]
     wanted += [(i, -1.0) for i in range(len(MEASURES), len(names))]  # margins are of interest where they are least
-    places = inside.poses[:, [asked.machine.axes.index(axis) for axis in asked.places]]
+    places = inside.poses[:, [asked.machine.axes.index(axis) for axis in asked.free_axes]]
     values = _table(inside)
     step = np.full(places.shape[1], apart)
     columns, signs = np.array(wanted).T
@@ -100,7 +100,7 @@ def isotropic(asked: Region, inside: Performance, apart: float) -> tuple[Array, 
     """
     n = inside.psi.shape[1]
     upper = np.triu_indices(n)
-    places = inside.poses[:, [asked.machine.axes.index(axis) for axis in asked.places]]
+    places = inside.poses[:, [asked.machine.axes.index(axis) for axis in asked.free_axes]]
 
     def residuals(points: Array) -> Array:
         rates = scaled_rates(asked.machine, asked.poses(points), inside.length, asked.mode)

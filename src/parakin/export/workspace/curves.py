@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ...workspace.sampled.drives import DriveWorkspace, Image
-from ...workspace.sampled.polar import PolarWorkspace
+from ...workspaces.sampled.drives import DriveWorkspace, Image
+from ...workspaces.sampled.polar import PolarWorkspace
 
 Floats = NDArray[np.float64]
 

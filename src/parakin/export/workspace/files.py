@@ -10,12 +10,12 @@ import numpy as np
 
 from ...arrays import Array
 from ...errors import PoseError
-from ...workspace.certified.workspace import Workspace
-from ...workspace.sampled.drives import DriveWorkspace
-from ...workspace.sampled.field import Field, field
-from ...workspace.sampled.polar import PolarWorkspace
-from ...workspace.sampled.sampling import Swept, surroundings
-from ...workspace.sampled.slices import Section, sections
+from ...workspaces.certified.workspace import Workspace
+from ...workspaces.sampled.drives import DriveWorkspace
+from ...workspaces.sampled.field import Field, field
+from ...workspaces.sampled.polar import PolarWorkspace
+from ...workspaces.sampled.sampling import Swept, surroundings
+from ...workspaces.sampled.slices import Section, sections
 from .cells import cells_csv, cells_vtu
 from .curves import curves
 from .meshes import Shell, mesh_file, shell
@@ -89,7 +89,7 @@ def _box(found: Workspace | Swept) -> tuple[Array, Array] | None:
     """A box proved to hold the region; None if it is empty."""
     if isinstance(found, Swept):
         return surroundings(found.region)
-    if found.box is None or found.stopped != "gap" or not found.region.every:
+    if found.box is None or found.stopped != "gap" or not found.region.every_orientation:
         return found.box  # nothing more that takes long
     box = surroundings(found.region)
     if box is None:

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import PoseError
-from ...workspace.sampled.field import Field
+from ...workspaces.sampled.field import Field
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...workspace.certified.workspace import Workspace
-from ...workspace.sampled.field import Field
-from ...workspace.sampled.sampling import Swept
+from ...workspaces.certified.workspace import Workspace
+from ...workspaces.sampled.field import Field
+from ...workspaces.sampled.sampling import Swept
 from ..machine.figures import FAINT, INK
 from .curves import Curves
 from .meshes import Shell
@@ -21,7 +21,7 @@ from .summary import amount, heading, size
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from ...workspace.sampled.slices import Section
+    from ...workspaces.sampled.slices import Section
 
 Floats = NDArray[np.float64]
 

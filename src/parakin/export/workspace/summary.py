@@ -9,17 +9,17 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ...arrays import Array
-from ...workspace.certified.region import Region
-from ...workspace.certified.workspace import Volume, Workspace
-from ...workspace.sampled.drives import DriveWorkspace
-from ...workspace.sampled.grid import GridWorkspace
-from ...workspace.sampled.polar import PolarWorkspace
-from ...workspace.sampled.sampling import Swept
+from ...workspaces.certified.region import Region
+from ...workspaces.certified.workspace import Volume, Workspace
+from ...workspaces.sampled.drives import DriveWorkspace
+from ...workspaces.sampled.grid import GridWorkspace
+from ...workspaces.sampled.polar import PolarWorkspace
+from ...workspaces.sampled.sampling import Swept
 from ..ranges import edge
 from .curves import curves
 
 if TYPE_CHECKING:
-    from ...workspace.sampled.slices import Section
+    from ...workspaces.sampled.slices import Section
 
 KINDS = {
     "constant": "constant orientation",
@@ -62,9 +62,11 @@ def asked(region: Region) -> str:
     """What was asked: ``total orientation, A -15° to 15°, C = 30°``; without what does not count."""
     parts = [KINDS[region.kind]]
     if region.kind != "dexterous":
-        parts += [f"{axis} {edge(low, 'rad')} to {edge(high, 'rad')}" for axis, (low, high) in region.turns.items()]
+        parts += [
+            f"{axis} {edge(low, 'rad')} to {edge(high, 'rad')}" for axis, (low, high) in region.swept_axes.items()
+        ]
     units = dict(zip(region.machine.axes, region.machine.axis_units, strict=True))
-    for axis, value in region.held.items():
+    for axis, value in region.fixed_axes.items():
         parts.append(f"{axis} = {edge(value, units[axis])}{' mm' * (units[axis] == 'mm')}")
     if region.without:
         few = len(region.without) <= FEW

@@ -1,12 +1,12 @@
 """What the sweeping methods share: the first limit broken at very many places, and the frame of their results.
 
-They look at single places and prove nothing; beside them :mod:`parakin.workspace.certified.workspace` does.
+They look at single places and prove nothing; beside them :mod:`parakin.workspaces.certified.workspace` does.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import pairwise, product
 from math import ceil, floor, isfinite, prod
 from typing import Any
@@ -49,7 +49,7 @@ class Swept:
     @property
     def axes(self) -> tuple[str, ...]:
         """The axes of a place."""
-        return self.region.places
+        return self.region.free_axes
 
     @property
     def unit(self) -> str:
@@ -69,7 +69,7 @@ def turn_samples(asked: Region, step: float | None) -> Array:
     Those that tell most come first: for every turn the corners of the ranges, for some turn their middle.
     """
     step = TURNS_STEP if step is None else positive("turns_step", step, "rad")
-    spans = list(asked.turns.values())
+    spans = list(asked.swept_axes.values())
     counts = [ceil((high - low) / step - 1e-9) + 1 for low, high in spans]
     if prod(counts) > MOST_TURNS:
         raise PoseError(f"turns_step: {prod(counts):,} turns, at most {MOST_TURNS:,} go")
@@ -77,7 +77,7 @@ def turn_samples(asked: Region, step: float | None) -> Array:
     rows = np.array(list(product(*samples)), float).reshape(prod(counts), len(spans))
     low, high = (np.array([span[i] for span in spans], float) for i in (0, 1))
     off = (((rows - 0.5 * (low + high)) / np.where(high > low, high - low, 1.0)) ** 2).sum(1).round(9)
-    return np.asarray(rows[np.argsort(-off if asked.every else off, kind="stable")])
+    return np.asarray(rows[np.argsort(-off if asked.every_orientation else off, kind="stable")])
 
 
 def surroundings(asked: Region) -> tuple[Array, Array] | None:
@@ -85,13 +85,13 @@ def surroundings(asked: Region) -> tuple[Array, Array] | None:
 
     Raises :class:`PoseError` if the limits leave it unbounded.
     """
-    if asked.turns and asked.every:  # what every turn allows, the middle one does
-        middle = {axis: 0.5 * (low + high) for axis, (low, high) in asked.turns.items()}
-        asked = replace(asked, kind="constant", held={**asked.held, **middle}, turns={})
+    if asked.swept_axes and asked.every_orientation:  # what every turn allows, the middle one does
+        middle = {axis: 0.5 * (low + high) for axis, (low, high) in asked.swept_axes.items()}
+        asked = asked.fix(middle)
     box = asked.extent
     if box is None:
         return None
-    return asked.subdivision(*box).tighten(1.0 / _FINE)
+    return asked.subdivide(*box).tighten(1.0 / _FINE)
 
 
 def centres(low: float, high: float, step: float) -> Array:
@@ -112,9 +112,9 @@ class FirstBroken:
         self.turns = turn_samples(asked, turns_step)
         margins = [constraint.margin for constraint in asked.constraints if not constraint.implied]
         inputs = asked.slice.inputs
-        staged = stage_margins(inputs[0].trace, margins, len(asked.places), len(asked.turns))
+        staged = stage_margins(inputs[0].trace, margins, len(asked.free_axes), len(asked.swept_axes))
         self._program = staged.program
-        rows = np.hstack([np.zeros((len(self.turns), len(asked.places))), self.turns])
+        rows = np.hstack([np.zeros((len(self.turns), len(asked.free_axes))), self.turns])
         fixed = np.empty((len(rows), staged.fixed.outputs))
         self._fixed = evaluate_tape(staged.fixed, rows, fixed, whole=False)
         self._type = np.uint8 if len(asked.limits) < 255 else np.uint16
@@ -131,7 +131,7 @@ class FirstBroken:
             args = (self._program, freeze(now), freeze(self._fixed[start:stop]), every, some)
             run_in_threads(len(now), lambda a, b: sweep_turns(*args, a, b))  # noqa: B023  done within the loop's turn
             codes[undecided] = some
-            every, start = self.asked.every, stop
+            every, start = self.asked.every_orientation, stop
             undecided = np.flatnonzero((codes == 0) == every)
         return codes
 
@@ -143,9 +143,9 @@ class FirstBroken:
         codes = np.empty(shape, self._type)
         flat = codes.reshape(-1)
         grid = (np.concatenate(coordinates), np.array(shape))
-        at_once = _AT_ONCE if not self.asked.turns else _AT_ONCE_IN_TURNS
+        at_once = _AT_ONCE if not self.asked.swept_axes else _AT_ONCE_IN_TURNS
         for start, stop in pairwise([*range(0, len(flat), at_once), len(flat)]):
-            if self.asked.turns:
+            if self.asked.swept_axes:
                 index = np.unravel_index(np.arange(start, stop), shape)
                 flat[start:stop] = self.at(np.stack([x[i] for x, i in zip(coordinates, index, strict=True)], 1))
             else:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -60,26 +60,25 @@ def sections(
     Raises :class:`PoseError` for a region along a line, an axis that is not the region's, or no such step.
     """
     region = whole.region
-    if len(region.places) == 1:
-        raise PoseError(f"a workspace along {region.places[0]} alone has no cross-sections")
-    if len(region.places) == 2:
-        return (Section(None, None, region.places, outlines(whole)),)
-    axis = region.places[-1] if axis is None else axis
-    if axis not in region.places:
-        raise PoseError(f"cross-sections of {axis}: the workspace's axes are {' '.join(region.places)}")
-    across = region.places.index(axis)
+    if len(region.free_axes) == 1:
+        raise PoseError(f"a workspace along {region.free_axes[0]} alone has no cross-sections")
+    if len(region.free_axes) == 2:
+        return (Section(None, None, region.free_axes, outlines(whole)),)
+    axis = region.free_axes[-1] if axis is None else axis
+    if axis not in region.free_axes:
+        raise PoseError(f"cross-sections of {axis}: the workspace's axes are {' '.join(region.free_axes)}")
+    across = region.free_axes.index(axis)
     if isinstance(values, int):
         first, last = (end[across] for end in whole.span)
         heights = (first + (last - first) * (np.arange(values) + 0.5) / values).tolist()
     else:
         heights = [float(value) for value in values]
-    rest = tuple(place for place in region.places if place != axis)
     low, high = (np.delete(end, across) for end in whole.box)
     found = []
     for number, value in enumerate(heights):
-        cut = replace(region, places=rest, held={**region.held, axis: value})
+        cut = region.fix({axis: value})
         plane = field(cut, (low, high), step, whole.distance.turn_step)
-        found.append(Section(axis, value, rest, outlines(plane)))
+        found.append(Section(axis, value, cut.free_axes, outlines(plane)))
         if progress:
             progress((number + 1) / len(heights))
     return tuple(found)

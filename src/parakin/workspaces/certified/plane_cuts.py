@@ -78,7 +78,7 @@ def lines(
     """Straight bounds of one margin over boxes (x, θ), and what they decide.
 
     over_down, over_up, at_down, at_up : (N, .) bounds that the programs of a constraint give over the box and in its
-        middle; see :class:`parakin.workspace.certified.constraints.Constraint`
+        middle; see :class:`parakin.workspaces.certified.constraints.Constraint`
     half : (N, d + s) half widths
     every : the margin must hold for all θ (else for one)
     state : (N,) KEPT, CLEARED where it holds over the whole box, EXCLUDED where it is broken for all x

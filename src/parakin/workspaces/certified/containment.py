@@ -73,7 +73,7 @@ def holds(
     seen = int(found.boxes.sum())
     if found.proved.all() or found.limit[0] < 0:
         return Verdict(bool(found.proved.all()), None, None, seen)
-    if not region.every and not _nowhere(region, found.places[0], 1e-6 * float((top - bottom).max()), more):
+    if not region.every_orientation and not _nowhere(region, found.places[0], 1e-6 * float((top - bottom).max()), more):
         return Verdict(False, None, None, seen)
     pose = region.poses(found.places, found.turns)[0]
     return Verdict(False, tuple(pose.tolist()), found.names[int(found.limit[0])], seen)
@@ -84,12 +84,12 @@ def verdicts(
 ) -> Verdicts:
     """The same of many boxes [low, high] at once, (N, d) mm: they cost little more than one."""
     bottom, top = np.asarray(low, float), np.asarray(high, float)
-    if bottom.ndim != 2 or bottom.shape != top.shape or bottom.shape[1] != len(region.places):
-        raise PoseError(f"two corners of {' '.join(region.places)} expected of a box")
+    if bottom.ndim != 2 or bottom.shape != top.shape or bottom.shape[1] != len(region.free_axes):
+        raise PoseError(f"two corners of {' '.join(region.free_axes)} expected of a box")
     if not (np.isfinite(bottom).all() and np.isfinite(top).all() and (bottom <= top).all()):
         raise PoseError("two finite corners expected of a box, the lower one first")
     work = _Work(region, bottom, top, more, most)
-    if region.every or not work.constraints:
+    if region.every_orientation or not work.constraints:
         for number, constraint in enumerate(work.constraints):
             work.clear(number, constraint)
         work.proved[:] = work.open
@@ -102,7 +102,7 @@ def verdicts(
 def _nowhere(region: Region, place: Array, half: float, more: Sequence[Constraint]) -> bool:
     """Proved that no turn is allowed about a place."""
     half = max(half, 1e-9 * float(np.abs(place).max()), 1e-9)
-    work = region.subdivision(place - half, place + half, more)
+    work = region.subdivide(place - half, place + half, more)
     for _ in range(4):
         if not len(work.open.low) or any(len(part.low) for part in work.done):
             break
@@ -117,7 +117,7 @@ class _Work:
         self.region, self.low, self.high, self.more, self.most = region, low, high, more, most
         self.constraints = [*(c for c in region.constraints if not c.implied), *more]
         n, self.d = low.shape
-        self.first, self.last = (np.array([span[i] for span in region.turns.values()], float) for i in (0, 1))
+        self.first, self.last = (np.array([span[i] for span in region.swept_axes.values()], float) for i in (0, 1))
         self.proved, self.limit = np.zeros(n, np.bool_), np.full(n, -1, np.int64)
         self.places, self.turns = np.full(low.shape, np.nan), np.full((n, len(self.first)), np.nan)
         self.boxes, self.open = np.zeros(n, np.int64), np.ones(n, np.bool_)

@@ -30,7 +30,7 @@ def best_turns(region: Region, places: Array, more: Sequence[Constraint] = ()) -
 
     Margins count as shares of the greatest of their kind.
     """
-    low, high = (np.array([span[i] for span in region.turns.values()], float) for i in (0, 1))
+    low, high = (np.array([span[i] for span in region.swept_axes.values()], float) for i in (0, 1))
     s = len(low)
     along = TRIED[s - 1]
     tries = [(np.array(list(product(np.linspace(-0.5, 0.5, along), repeat=s))), 1.0)]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property
@@ -12,10 +12,10 @@ from typing import Any
 
 import numpy as np
 
-from ...arrays import Array
+from ...arrays import Array, Progress
 from ...errors import PoseError
 from ...machine import Machine
-from .region import Region, Span, region
+from .region import Region
 from .subdivision import Cells
 
 CLOSE = 1.0 / 128.0  # of the box: the cells against which it rests
@@ -67,7 +67,7 @@ class Workspace:
     @property
     def axes(self) -> tuple[str, ...]:
         """The axes of a place."""
-        return self.region.places
+        return self.region.free_axes
 
     @property
     def unit(self) -> str:
@@ -117,64 +117,42 @@ class Workspace:
 
 
 def workspace(
-    machine: Machine,
-    at: Mapping[str, float] | None = None,
-    every: Mapping[str, Span] | None = None,
-    some: Mapping[str, Span] | None = None,
-    dexterous: bool = False,
-    without: Sequence[str] = (),
-    mode: str | None = None,
+    region: Region,
     gap: float = 0.01,
     cell: float | None = None,
     seconds: float | None = 60.0,
-    progress: Callable[[float], None] | None = None,
+    progress: Progress | None = None,
 ) -> Workspace:
-    """The places where a machine is allowed, with its volume proved to lie between two numbers.
+    """Find the workspace of a region by adaptive subdivision, its volume proved to lie between two numbers.
 
     Parameters
     ----------
-    at, every, some, dexterous, without, mode : what is asked; see :func:`parakin.workspace.certified.region.region`
+    region : made by :func:`parakin.region`
     gap : stop as soon as (outer - inner)/estimate of the volume is no greater
     cell : refine all cells of the boundary to this size, mm, instead
     seconds : stop after this time with what there is; None for no end
     progress : called with the fraction done
 
-    Raises :class:`PoseError` for a question that makes no sense or a workspace that nothing bounds.
+    Raises :class:`PoseError` for invalid numbers, or a region that no limit bounds.
     """
-    asked = region(machine, at, every, some, dexterous, without, mode)
     if not (isfinite(gap) and gap > 0.0):
         raise PoseError(f"gap: a number above 0 expected, not {gap:g}")
     if cell is not None and not (isfinite(cell) and cell > 0.0):
         raise PoseError(f"cell: a size above 0 mm expected, not {cell:g}")
     if seconds is not None and not seconds > 0.0:
         raise PoseError(f"seconds: a time above 0 s expected, not {seconds:g}")
-    parameters = {**question(asked), "method": "certified", "gap": gap, "cell": cell, "seconds": seconds}
+    parameters = {**region.parameters, "method": "certified", "gap": gap, "cell": cell, "seconds": seconds}
     began = time.monotonic()
-    extent = asked.extent
+    extent = region.extent
     if extent is None:
-        return Workspace(asked, nothing(len(asked.places)), "gap", parameters)
+        return Workspace(region, nothing(len(region.free_axes)), "gap", parameters)
     rest = None if seconds is None else seconds - (time.monotonic() - began)
-    work = asked.subdivision(*extent)
-    stopped = work.run(gap, cell, rest, progress).stopped
+    subdivision = region.subdivide(*extent)
+    stopped = subdivision.run(gap, cell, rest, progress).stopped
     if stopped == "gap":
-        with suppress(KeyboardInterrupt):  # the answer is there; only its box could be closer
-            work.tighten(CLOSE, began + (inf if seconds is None else seconds))
-    return Workspace(asked, work.cells(stopped), stopped, parameters)
-
-
-def question(asked: Region) -> dict[str, Any]:
-    """What :func:`workspace` must be given to ask the same of the same machine; mm and rad."""
-    swept = {axis: list(span) for axis, span in asked.turns.items()}
-    return {
-        "machine": asked.machine.name,
-        "kind": asked.kind,
-        "places": list(asked.places),
-        "at": dict(asked.held),
-        "every": swept if asked.every and asked.kind != "dexterous" else {},
-        "some": {} if asked.every else swept,
-        "without": list(asked.without),
-        "mode": asked.mode,
-    }
+        with suppress(KeyboardInterrupt):  # the volume is known; only its box could be closer
+            subdivision.tighten(CLOSE, began + (inf if seconds is None else seconds))
+    return Workspace(region, subdivision.cells(stopped), stopped, parameters)
 
 
 def nothing(places: int) -> Cells:

@@ -3,19 +3,18 @@ kinematics maps them to contours, to the net of the shell, and to the volume."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import combinations, product
 from math import isfinite
 
 import numpy as np
 
-from ...arrays import Array
+from ...arrays import Array, Progress
 from ...errors import NoMethodError, PoseError
 from ...kernels.batch import evaluate_tape_with_residual
 from ...machine import Machine
-from ..certified.region import region
-from ..certified.workspace import question
+from ..certified.region import Region
 from .sampling import Swept
 
 NOTE = (
@@ -84,34 +83,37 @@ def strategies(machine: Machine, running: int) -> list[Strategy]:
     return found
 
 
-def drive_sweep(
-    machine: Machine, cells: int = 64, mode: str | None = None, progress: Callable[[float], None] | None = None
-) -> DriveWorkspace:
-    """A workspace from the drives' side.
+def sweep_drives(region: Region, cells: int = 64, progress: Progress | None = None) -> DriveWorkspace:
+    """Find the whole workspace of a machine from its drives: cut their ranges into cells and map these forward.
 
     A pose counts where its own inverse in the working mode gives the same drives back and every limit holds. Both
     common points of the legs' spheres (circles) are looked at.
 
     Parameters
     ----------
-    machine : one whose platform does not turn, with as many drives as it has axes
+    region : everything that a machine reaches whose platform does not turn and that has as many drives as axes:
+        no axis is fixed, all limits count
     cells : into so many equal parts each drive's range is cut; the volume is summed over their middles
-    mode : working mode
     progress : called with the fraction done
 
-    Raises :class:`NoMethodError` for other machines and drives without limits, :class:`PoseError` for bad numbers.
+    Raises :class:`NoMethodError` for other machines and drives without limits, :class:`PoseError` for other regions
+    and invalid numbers.
     """
+    machine = region.machine
     _refuse_others(machine)
-    asked = region(machine, mode=mode)
+    if region.fixed_axes or region.without:
+        raise PoseError(
+            "region: a sweep of the drives takes the whole workspace, without fixed axes and with all limits"
+        )
     d = len(machine.joints)
     if cells < 1 or cells**d > MOST_CELLS:
         raise PoseError(f"cells: 1 to {int(MOST_CELLS ** (1.0 / d) + 1e-9)} parts of each drive expected, not {cells}")
     drives = machine.model.drives
     step = max((drive.high - drive.low) / cells for drive in drives)
-    parameters = {**question(asked), "method": "drives", "cells": cells}
-    volume = _volume(machine, cells, asked.mode, progress)
-    contours, nets = (_images(machine, strategies(machine, running), cells, asked.mode) for running in (1, 2))
-    return DriveWorkspace(asked, "drives", volume, step, parameters, contours, nets)
+    parameters = {**region.parameters, "method": "drives", "cells": cells}
+    volume = _volume(machine, cells, region.mode, progress)
+    contours, nets = (_images(machine, strategies(machine, running), cells, region.mode) for running in (1, 2))
+    return DriveWorkspace(region, "drives", volume, step, parameters, contours, nets)
 
 
 def _refuse_others(machine: Machine) -> None:
@@ -161,7 +163,7 @@ def _images(machine: Machine, ways: Sequence[Strategy], cells: int, mode: str) -
     return tuple(found)
 
 
-def _volume(machine: Machine, cells: int, mode: str, progress: Callable[[float], None] | None) -> float:
+def _volume(machine: Machine, cells: int, mode: str, progress: Progress | None) -> float:
     low, high = (np.array([getattr(drive, end) for drive in machine.model.drives]) for end in ("low", "high"))
     size, d = (high - low) / cells, len(low)
     total = 0.0

@@ -115,7 +115,7 @@ class Items:
 
 @dataclass(frozen=True, eq=False)
 class Lines:
-    """Straight bounds of one constraint over items; see :func:`parakin.workspace.certified.plane_cuts.lines`."""
+    """Straight bounds of one constraint over items; see :func:`parakin.workspaces.certified.plane_cuts.lines`."""
 
     state: NDArray[np.int8]
     turn: NDArray[np.int8]

@@ -28,7 +28,7 @@ def outline(region: Region) -> Cells:
     Raises :class:`PoseError` for an empty one.
     """
     extent = region.extent
-    cells = None if extent is None else whole(region.subdivision(*extent).run(_GAP, seconds=_SECONDS))
+    cells = None if extent is None else whole(region.subdivide(*extent).run(_GAP, seconds=_SECONDS))
     if cells is None or not len(cells.low):
         raise PoseError("the region is empty")
     return cells
@@ -62,13 +62,13 @@ def starts(region: Region, rough: Cells, shape: Array | None, centre: Array | No
             best = half[proved.argmax()]
             yield middle[which] - best, middle[which] + best
             count += 1
-        if count == (COUNT if region.every else COUNT // 2):
+        if count == (COUNT if region.every_orientation else COUNT // 2):
             return
 
 
 def _grid(region: Region, low: Array, high: Array) -> tuple[Mask, Array]:
     """Which cells of a grid over [low, high] are proved inside, and the cells' edges."""
-    cells = whole(region.subdivision(low, high).run(_GAP, float((high - low).max()) / GRID, _SECONDS))
+    cells = whole(region.subdivide(low, high).run(_GAP, float((high - low).max()) / GRID, _SECONDS))
     if not len(cells.low):
         return np.zeros((1,) * len(low), np.bool_), high - low
     size = cells.size.min(0)

@@ -19,7 +19,7 @@ from ...errors import PoseError
 from ..certified.constraints import Constraint
 from ..certified.containment import verdicts
 from ..certified.region import Region
-from ..certified.workspace import ROUNDING, Volume, question
+from ..certified.workspace import ROUNDING, Volume
 from ..inscribed.seeds import outline
 from .adjacency import not_too_many
 from .assembly_mode import sides
@@ -92,7 +92,7 @@ def connected_parts(
 
     Raises :class:`PoseError` for an inclusive region, a start outside it, or one that is too near to the boundary.
     """
-    if not region.every:
+    if not region.every_orientation:
         raise PoseError("some: of one turn for each place nothing is known of the turns between; hold or sweep them")
     if cell is not None and not (isfinite(cell) and cell > 0.0):
         raise PoseError(f"cell: a size above 0 mm expected, not {cell:g}")
@@ -112,7 +112,7 @@ def connected_parts(
         stopped = found.stopped if stopped == "cell" else stopped
     named.sort(key=lambda each: -each[0].volume.estimate)
     parameters = {
-        **question(region),
+        **region.parameters,
         "start": None if start is None else np.asarray(start, float).tolist(),
         "cell": edge,
         "seconds": seconds,
@@ -136,13 +136,13 @@ def _place(region: Region, start: ArrayLike, both: Mapping[int, Constraint]) -> 
     if lead:
         raise PoseError(f"start: one pose of {' '.join(machine.axes)} expected")
     pose = dict(zip(machine.axes, rows[0].tolist(), strict=True))
-    for axis, value in region.held.items():
+    for axis, value in region.fixed_axes.items():
         if not abs(pose[axis] - value) <= 1e-9 * max(1.0, abs(value)):
             raise PoseError(f"start: {axis} is {pose[axis]:g}, but held at {value:g} here")
-    for axis, (first, last) in region.turns.items():
+    for axis, (first, last) in region.swept_axes.items():
         if not first <= pose[axis] <= last:
             raise PoseError(f"start: {axis} is {pose[axis]:g}, beyond its range {first:g} to {last:g}")
-    place = np.array([pose[axis] for axis in region.places])
+    place = np.array([pose[axis] for axis in region.free_axes])
     if not np.isfinite(place).all():
         raise PoseError("start: a pose of finite numbers expected")
     found = verdicts(region, place[None], place[None])

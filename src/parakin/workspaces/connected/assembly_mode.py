@@ -22,7 +22,7 @@ def sides(region: Region) -> tuple[Constraint, Constraint]:
     the translations, for head and table never matter here.
     """
     asked = region.slice
-    d = len(region.places)
+    d = len(region.free_axes)
     margin = determinant(_block(region, asked.pose)) / _size(region)
     x, turns = asked.inputs[:d], asked.inputs[d:]
     return Constraint(NAME, margin - NOUGHT, x, turns), Constraint(NAME, -margin - NOUGHT, x, turns)

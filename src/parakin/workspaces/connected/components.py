@@ -64,7 +64,7 @@ def islands(
     deeper: int = _DEEPER,
 ) -> Islands:
     """The islands of a region within a box, where the constraint holds too, by cells of the given size."""
-    cells = whole(region.subdivision(low, high, [constraint]).run(_GAP, cell, seconds))
+    cells = whole(region.subdivide(low, high, [constraint]).run(_GAP, cell, seconds))
     if not len(cells.low):
         return Islands([], 0, 0.0, cells.stopped)
     faces, points = touching(cells.low, cells.size)

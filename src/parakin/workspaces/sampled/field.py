@@ -50,7 +50,7 @@ class Distance:
 
     def _tape(self, outputs: list[alg.Scalar]) -> Tape:
         region = self.region
-        return compile_tape(region.slice.inputs[0].trace, outputs, len(region.places) + len(region.turns))
+        return compile_tape(region.slice.inputs[0].trace, outputs, len(region.free_axes) + len(region.swept_axes))
 
     @cached_property
     def _least(self) -> Tape:
@@ -71,7 +71,7 @@ class Distance:
     @cached_property
     def turns(self) -> Array:
         """(K, s): the samples, at least three of a turn, those that decide most often first."""
-        widths = [high - low for low, high in self.region.turns.values() if high > low]
+        widths = [high - low for low, high in self.region.swept_axes.values() if high > low]
         step = min([self.turn_step, *(0.5 * width for width in widths)])
         while np.prod([ceil(width / step) + 1.0 for width in widths]) > _TURNS:
             step *= 1.25
@@ -79,10 +79,10 @@ class Distance:
 
     def at(self, places: Array, enough: float = np.inf) -> Array:
         """(N,) mm at places (N, d); a sign that is settled by more than ``enough`` is not looked at any more."""
-        d, sign = places.shape[1], 1.0 if self.region.every else -1.0
+        d, sign = places.shape[1], 1.0 if self.region.every_orientation else -1.0
         found = np.full(len(places), np.inf)
         live: Indices = np.arange(len(places))
-        rows = np.empty((len(places), d + len(self.region.turns)))
+        rows = np.empty((len(places), d + len(self.region.swept_axes)))
         rows[:, :d] = places
         for turn in self.turns:
             rows[:, d:] = turn
@@ -94,9 +94,9 @@ class Distance:
 
     def nearest(self, places: Array) -> Indices:
         """(N,): the index in the region's limits of the one that is least, at the turn that decides."""
-        d, sign = places.shape[1], 1.0 if self.region.every else -1.0
+        d, sign = places.shape[1], 1.0 if self.region.every_orientation else -1.0
         found, limit = np.full(len(places), np.inf), np.zeros(len(places), np.int64)
-        rows = np.empty((len(places), d + len(self.region.turns)))
+        rows = np.empty((len(places), d + len(self.region.swept_axes)))
         rows[:, :d] = places
         for turn in self.turns:
             rows[:, d:] = turn

@@ -85,7 +85,7 @@ class Family:
 def climbed(region: Region, family: Family, z: Array, tolerance: float) -> Array:
     """A box of the family from which no step leads to a greater one, starting from a proved one."""
     volume = float((family.box(z)[1] - family.box(z)[0]).prod())
-    nodes, met = _nodes(region), np.zeros((0, len(region.places) + len(region.turns)))
+    nodes, met = _nodes(region), np.zeros((0, len(region.free_axes) + len(region.swept_axes)))
     share = _FIRST
     for _ in range(_STEPS):
         low, high = family.box(z)
@@ -122,7 +122,7 @@ def grown(region: Region, family: Family, z: Array, tolerance: float) -> Array:
     """
     extent = region.extent
     assert extent is not None
-    most = 8 * MOST if region.every else 2 * MOST
+    most = 8 * MOST if region.every_orientation else 2 * MOST
     for direction in family.outward:
         low, high = 0.0, float((extent[1] - extent[0]).max())
         lengths = 0.25 * tolerance * (4.0 * high / tolerance) ** np.linspace(0.0, 1.0, _LENGTHS)
@@ -139,16 +139,16 @@ def grown(region: Region, family: Family, z: Array, tolerance: float) -> Array:
 
 def _ranges(region: Region) -> tuple[Array, Array]:
     """Lower ends of the turns' ranges, and their widths (1 for none)."""
-    low, high = (np.array([span[i] for span in region.turns.values()], float) for i in (0, 1))
+    low, high = (np.array([span[i] for span in region.swept_axes.values()], float) for i in (0, 1))
     return low, np.where(high > low, high - low, 1.0)
 
 
 def _nodes(region: Region) -> Array:
     """Points of a box's surface, and of the turns' ranges, as shares (n, d + s)."""
-    along: Sequence[float] = (0.0, 0.5, 1.0) if region.turns else tuple(np.linspace(0.0, 1.0, _NODES))
-    d, s = len(region.places), len(region.turns) if region.every else 0
+    along: Sequence[float] = (0.0, 0.5, 1.0) if region.swept_axes else tuple(np.linspace(0.0, 1.0, _NODES))
+    d, s = len(region.free_axes), len(region.swept_axes) if region.every_orientation else 0
     surface = [u for u in product(along, repeat=d) if 0.0 in u or 1.0 in u]
-    rest = (0.5,) * (len(region.turns) - s)
+    rest = (0.5,) * (len(region.swept_axes) - s)
     return np.array([(*u, *v, *rest) for u in surface for v in product((0.0, 0.5, 1.0), repeat=s)])
 
 
@@ -158,7 +158,7 @@ def _slopes(region: Region, family: Family, low: Array, high: Array, nodes: Arra
     share, (first, wide) = nodes[:, :d], _ranges(region)
     places = low + share * (high - low)
     turns = first + nodes[:, d:] * wide
-    if not region.every:
+    if not region.every_orientation:
         turns, _ = best_turns(region, places)
     h = np.where(share < 0.5, 1e-5, -1e-5) * (high - low)  # inward: what is out of reach has no margins
     moved = places[:, None] + np.concatenate([np.zeros((1, d)), np.eye(d)]) * h[:, None]

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from ...arrays import Array
 from ...errors import PoseError
 from ..certified.region import Region
-from ..certified.workspace import Bound, question
+from ..certified.workspace import Bound
 from .sampling import TURNS_STEP, Codes, FirstBroken, Swept, centres, positive, surroundings
 
 MOST_CELLS = 500_000_000  # a byte each
@@ -100,7 +100,7 @@ def dense_grid(
 
     Parameters
     ----------
-    asked : made by :func:`parakin.workspace.certified.region.region`
+    asked : made by :func:`parakin.workspaces.certified.region.region`
     step : edge of the cells, mm; their middles are odd multiples of half of it
     box : lower and upper corner, mm; only cells with their middle in it are looked at. Else all that may be allowed
     turns_step : of swept turns samples at most so far apart, rad, are looked at, both ends included; 5° by default
@@ -111,21 +111,21 @@ def dense_grid(
     """
     positive("step", step, "mm")
     look = FirstBroken(asked, turns_step)
-    where = surroundings(asked) if box is None else _checked(box, asked.places)
+    where = surroundings(asked) if box is None else _checked(box, asked.free_axes)
     parameters = {
-        **question(asked),
+        **asked.parameters,
         "method": "grid",
         "step": step,
         "box": None if box is None else [list(map(float, corner)) for corner in box],
         "turns_step": TURNS_STEP if turns_step is None else turns_step,
     }
     if where is None:
-        nothing = tuple(np.zeros(0) for _ in asked.places)
+        nothing = tuple(np.zeros(0) for _ in asked.free_axes)
         return GridWorkspace(asked, "grid", 0.0, step, parameters, nothing, look.on_grid(nothing))
     cells = prod(floor((b - a) / step) + 1 for a, b in zip(*where, strict=True))
     if cells > MOST_CELLS:
         room = float(np.prod([b - a for a, b in zip(*where, strict=True)]))
-        least = (room / MOST_CELLS) ** (1.0 / len(asked.places))
+        least = (room / MOST_CELLS) ** (1.0 / len(asked.free_axes))
         raise PoseError(f"step: {step:g} mm makes {cells:.2g} cells, at most {MOST_CELLS:,} go; from {least:.2g} mm on")
     coordinates = tuple(centres(a, b, step) for a, b in zip(*where, strict=True))
     broken = look.on_grid(coordinates, progress)

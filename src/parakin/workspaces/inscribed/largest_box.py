@@ -14,7 +14,6 @@ from ...arrays import Array
 from ...errors import PoseError
 from ..certified.containment import verdicts
 from ..certified.region import Region
-from ..certified.workspace import question
 from .growth import Family, climbed, grown
 from .seeds import outline, starts
 
@@ -56,7 +55,7 @@ class Box:
 
     @property
     def axes(self) -> tuple[str, ...]:
-        return self.region.places
+        return self.region.free_axes
 
     @property
     def unit(self) -> str:
@@ -118,7 +117,7 @@ def largest_box(
         raise PoseError(f"no box {what} could be proved to be inside")
     first, last = proved
     parameters = {
-        **question(region),
+        **region.parameters,
         "shape": None if shape is None else [float(part) for part in shape],
         "around": None if centre is None else centre.tolist(),
         "tolerance": smallest,
@@ -136,18 +135,18 @@ def _proved(region: Region, box: Array) -> Array | None:
 
 def _shape(region: Region, shape: Sequence[float]) -> Array:
     given = np.asarray(shape, float)
-    if given.shape != (len(region.places),) or not (np.isfinite(given).all() and (given > 0.0).all()):
-        raise PoseError(f"shape: {len(region.places)} numbers above 0 expected, for {' '.join(region.places)}")
+    if given.shape != (len(region.free_axes),) or not (np.isfinite(given).all() and (given > 0.0).all()):
+        raise PoseError(f"shape: {len(region.free_axes)} numbers above 0 expected, for {' '.join(region.free_axes)}")
     return np.asarray(given / given.max())
 
 
 def _centre(region: Region, around: ArrayLike) -> Array:
     place = np.asarray(around, float)
-    if place.shape != (len(region.places),) or not np.isfinite(place).all():
-        raise PoseError(f"around: {len(region.places)} numbers expected, for {' '.join(region.places)}")
+    if place.shape != (len(region.free_axes),) or not np.isfinite(place).all():
+        raise PoseError(f"around: {len(region.free_axes)} numbers expected, for {' '.join(region.free_axes)}")
     found = verdicts(region, place[None], place[None])
     if found.limit[0] >= 0:
-        where = ", ".join(f"{axis} {value:g}" for axis, value in zip(region.places, place, strict=True))
+        where = ", ".join(f"{axis} {value:g}" for axis, value in zip(region.free_axes, place, strict=True))
         raise PoseError(f"around: {where} is outside the region, it breaks {found.names[int(found.limit[0])]}")
     return place
 
@@ -155,7 +154,7 @@ def _centre(region: Region, around: ArrayLike) -> Array:
 def _stops(region: Region, low: Array, high: Array, tolerance: float) -> tuple[Stop, ...]:
     """What is met just outside each face, by layers ever thicker."""
     stops = []
-    for axis, name in enumerate(region.places):
+    for axis, name in enumerate(region.free_axes):
         for side, sign in enumerate("-+"):
             layers = np.tile(np.array([low, high]), (len(_OUTSIDE), 1, 1))
             layers[:, 1 - side, axis] = (low, high)[side][axis]

@@ -10,7 +10,6 @@ import numpy as np
 from ...arrays import Array
 from ...errors import PoseError
 from ..certified.region import Region
-from ..certified.workspace import question
 from .sampling import TURNS_STEP, Codes, FirstBroken, Swept, centres, positive, surroundings
 
 NOTE = "a ray ends at the first place that is not allowed: what lies behind, or off an axis not allowed, is not seen"
@@ -72,12 +71,12 @@ def polar_sweep(
 
     Parameters
     ----------
-    asked : made by :func:`parakin.workspace.certified.region.region`
+    asked : made by :func:`parakin.workspaces.certified.region.region`
     step : of ρ, mm
     planes : distance of the planes, mm; ``step`` by default. They stand at odd multiples of half of it
     rays : how many in a plane
     axis : the two coordinates of the axis, mm; home's by default
-    turns_step : as in :func:`parakin.workspace.sampled.grid.dense_grid`
+    turns_step : as in :func:`parakin.workspaces.sampled.grid.dense_grid`
     progress : called with the fraction done
 
     Raises :class:`PoseError` for numbers that make no sense, too many rays or steps, or a region that nothing bounds.
@@ -86,23 +85,23 @@ def polar_sweep(
     distance = step if planes is None else positive("planes", planes, "mm")
     if rays < 3:
         raise PoseError(f"rays: at least 3 expected, not {rays}")
-    if len(asked.places) < 2:
-        raise PoseError(f"a polar sweep needs a plane, only {' '.join(asked.places)} is left free")
+    if len(asked.free_axes) < 2:
+        raise PoseError(f"a polar sweep needs a plane, only {' '.join(asked.free_axes)} is left free")
     home = dict(zip(asked.machine.axes, asked.machine.home.tolist(), strict=True))
-    middle = np.array([home[name] for name in asked.places[:2]] if axis is None else axis, float)
+    middle = np.array([home[name] for name in asked.free_axes[:2]] if axis is None else axis, float)
     if middle.shape != (2,) or not np.isfinite(middle).all():
-        raise PoseError(f"axis: two numbers expected, {' and '.join(asked.places[:2])} in mm")
+        raise PoseError(f"axis: two numbers expected, {' and '.join(asked.free_axes[:2])} in mm")
     look = FirstBroken(asked, turns_step)
     box = surroundings(asked)
     heights = None
-    if len(asked.places) == 3:
+    if len(asked.free_axes) == 3:
         heights = np.zeros(0) if box is None else _heights(*box, distance, rays)
     if box is not None and (steps := float(np.linalg.norm(box[1] - box[0])) / step) > MOST_STEPS:
         raise PoseError(f"step: {step:g} mm makes {steps:.2g} steps of a ray, at most {MOST_STEPS:,} go")
     angles = 2.0 * np.pi * np.arange(rays) / rays
     radii, broken = _marched(look, step, middle, heights, angles, progress)
     parameters = {
-        **question(asked),
+        **asked.parameters,
         "method": "polar",
         "step": step,
         "planes": distance,

@@ -1,0 +1,252 @@
+"""Regions: which axes of a machine are free, fixed or swept, and which of its limits count."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from fnmatch import fnmatchcase
+from functools import cached_property
+from math import isfinite, pi
+from typing import Any, Literal
+
+import numpy as np
+
+from ...arrays import Array
+from ...errors import PoseError
+from ...kernels.elementary import GREATEST_ANGLE
+from ...machine import Machine
+from .constraints import Constraint, Slice
+from .inclusive import SomeTurn
+from .subdivision import Subdivision
+from .total import EveryTurn
+
+Kind = Literal["constant", "total", "inclusive", "dexterous"]
+Span = tuple[float, float]
+
+FAR = 1e6  # mm: no machine reaches farther
+_MANY = 20_000  # cells after which a bounded region has left the farthest ones
+_TINY = 1e-3  # mm: cells so small end the search for the extent
+_SHRINKING = 0.6  # of an edge from round to round, while the cells are much larger than the region
+_EVERY_WAY: dict[str, Span] = {"A": (-pi, pi), "B": (-pi / 2, pi / 2), "C": (-pi, pi)}
+
+
+@dataclass(frozen=True, eq=False)
+class Region:
+    """A set of tool positions: those where the machine is allowed at every or at one orientation of given ranges.
+
+    Made by :func:`make_region`.
+
+    kind : constant (one orientation), total (every one of the ranges), inclusive (at least one), dexterous (every one)
+    free_axes : the axes that make up a position
+    fixed_axes : the axes with one value, mm and rad
+    swept_axes : the turning axes with a range, (low, high) rad
+    without : names of the limits that do not count
+    """
+
+    machine: Machine
+    kind: Kind
+    free_axes: tuple[str, ...]
+    fixed_axes: Mapping[str, float]
+    swept_axes: Mapping[str, Span]
+    without: tuple[str, ...]
+    mode: str
+
+    @cached_property
+    def slice(self) -> Slice:
+        return Slice(self.machine, self.free_axes, tuple(self.swept_axes), self.fixed_axes, self.mode)
+
+    @cached_property
+    def constraints(self) -> list[Constraint]:
+        """What must be ≥ 0 for a pose to be allowed, as functions of position and orientation."""
+        return self.slice.constraints(self.without)
+
+    @property
+    def limits(self) -> tuple[str, ...]:
+        """Names of the limits that count, in the order of the constraints."""
+        return tuple(constraint.name for constraint in self.constraints if not constraint.implied)
+
+    @property
+    def every_orientation(self) -> bool:
+        """Whether all orientations of the swept ranges must be allowed, not only one."""
+        return self.kind != "inclusive"
+
+    @cached_property
+    def swept_bounds(self) -> tuple[Array, Array]:
+        """Lower and upper ends of the swept ranges, (s,) rad each."""
+        low, high = (np.array([span[i] for span in self.swept_axes.values()], float) for i in (0, 1))
+        return low, high
+
+    @property
+    def parameters(self) -> dict[str, Any]:
+        """What :func:`make_region` needs to make the same region of the same machine, and what follows; mm and rad."""
+        swept = {axis: list(span) for axis, span in self.swept_axes.items()}
+        return {
+            "machine": self.machine.name,
+            "kind": self.kind,
+            "places": list(self.free_axes),
+            "at": dict(self.fixed_axes),
+            "every": swept if self.every_orientation and self.kind != "dexterous" else {},
+            "some": {} if self.every_orientation else swept,
+            "without": list(self.without),
+            "mode": self.mode,
+        }
+
+    def fix(self, values: Mapping[str, float]) -> Region:
+        """Fix free or swept axes at values, mm and rad.
+
+        Raises :class:`PoseError` for values that are not finite or beyond what can be computed.
+        """
+        turning = _list_turning_axes(self.machine)
+        for axis, value in values.items():
+            _refuse_bad_value(axis, value, turning)
+        fixed = {**self.fixed_axes, **values}
+        swept = {axis: span for axis, span in self.swept_axes.items() if axis not in values}
+        return replace(
+            self,
+            kind=self.kind if swept else "constant",
+            free_axes=tuple(axis for axis in self.free_axes if axis not in values),
+            fixed_axes={axis: float(fixed[axis]) for axis in self.machine.axes if axis in fixed},
+            swept_axes=swept,
+        )
+
+    def subdivide(self, low: Array, high: Array, more: Sequence[Constraint] = ()) -> Subdivision:
+        """Begin the subdivision of a box of positions, (d,) mm, under ``more`` constraints besides."""
+        kind = EveryTurn if self.every_orientation else SomeTurn
+        return kind([*self.constraints, *more], low, high, self.swept_bounds)
+
+    @cached_property
+    def extent(self) -> tuple[Array, Array] | None:
+        """A box proved to hold the whole region, not much larger than it; None for a region proved empty.
+
+        Raises :class:`PoseError` if the limits leave it unbounded.
+        """
+        far = np.full(len(self.free_axes), FAR)
+        subdivision = self.subdivide(-far, far)
+        before = 2.0 * far
+        while True:
+            cells = subdivision.cells("gap")
+            if not len(cells.low):
+                return None
+            low, high = cells.low.min(0), (cells.low + cells.size).max(0)
+            far_out = (low <= -FAR) | (high >= FAR)
+            inside = cells.take(cells.inside)
+            for_good = ((inside.low <= -FAR) | (inside.low + inside.size >= FAR)).any(0)
+            count = len(subdivision.open.low)
+            done = not count or count > _MANY or subdivision.open.size.max() < _TINY
+            if for_good.any() or (far_out.any() and done):
+                axis = self.free_axes[int((for_good if for_good.any() else far_out).argmax())]
+                raise PoseError(f"the limits that count do not bound the workspace in {axis}")
+            fine = ((high - low) >= 6.0 * cells.size.min(0)).any() or cells.size.max() < _TINY
+            still = ((high - low) > _SHRINKING * before).all() or count > _MANY
+            if not count or (fine and still and not far_out.any()):
+                return low, high
+            before = high - low
+            subdivision.refine(np.arange(count))
+
+    def poses(self, positions: Array, orientations: Array | None = None) -> Array:
+        """Whole poses (N, axes) at positions (N, d) with values of the swept axes (N, s), in their order."""
+        rows = np.empty((len(positions), len(self.machine.axes)))
+        for axis, value in self.fixed_axes.items():
+            rows[:, self.machine.axes.index(axis)] = value
+        for i, axis in enumerate(self.free_axes):
+            rows[:, self.machine.axes.index(axis)] = positions[:, i]
+        for i, axis in enumerate(self.swept_axes):
+            assert orientations is not None
+            rows[:, self.machine.axes.index(axis)] = orientations[:, i]
+        return rows
+
+
+def make_region(
+    machine: Machine,
+    at: Mapping[str, float] | None = None,
+    every: Mapping[str, Span] | None = None,
+    some: Mapping[str, Span] | None = None,
+    dexterous: bool = False,
+    without: Sequence[str] = (),
+    mode: str | None = None,
+) -> Region:
+    """Make the region of a workspace or an atlas: check which axes are fixed and swept and which limits count.
+
+    Parameters
+    ----------
+    at : axes to fix, mm and rad; turning axes that are not named keep their value at home
+    every : turning axes with a range (low, high), rad, at every value of which the machine must be allowed: total
+        orientation workspace
+    some : turning axes with a range at one value of which it must be: inclusive orientation workspace
+    dexterous : the machine must be allowed at every value of every turning axis
+    without : names of limits that do not count, with ``*`` for any letters; legs must reach in any case
+    mode : working mode
+
+    Raises :class:`PoseError`.
+    """
+    fixed = dict(at or {})
+    swept = {axis: (float(low), float(high)) for axis, (low, high) in {**(every or {}), **(some or {})}.items()}
+    turning = _list_turning_axes(machine)
+    if sum((bool(every), bool(some), dexterous)) > 1:
+        raise PoseError("one of every, some and dexterous can be asked at a time")
+    if dexterous:
+        swept = {axis: _EVERY_WAY[axis] for axis in turning}
+        if turning == ["B", "C"]:
+            swept["B"] = (0.0, pi)
+    kind: Kind = "dexterous" if dexterous else "total" if every else "inclusive" if some else "constant"
+    _refuse_unknown_axes(machine, (*fixed, *swept))
+    for axis, span in swept.items():
+        _refuse_bad_span(axis, span, turning, fixed)
+    for axis, value in fixed.items():
+        _refuse_bad_value(axis, value, turning)
+    home = dict(zip(machine.axes, machine.home.tolist(), strict=True))
+    fixed |= {axis: home[axis] for axis in turning if axis not in fixed and axis not in swept}
+    free = tuple(axis for axis in machine.axes if axis not in turning and axis not in fixed)
+    if not free:
+        raise PoseError(f"every axis is held; leave at least one of {' '.join('XYZ')} free")
+    return Region(
+        machine,
+        kind,
+        free,
+        {axis: float(fixed[axis]) for axis in machine.axes if axis in fixed},
+        {axis: swept[axis] for axis in machine.axes if axis in swept},
+        _find_ignored_limits(machine, without),
+        machine.checked_mode(mode),
+    )
+
+
+def _list_turning_axes(machine: Machine) -> list[str]:
+    return [axis for axis, unit in zip(machine.axes, machine.axis_units, strict=True) if unit == "rad"]
+
+
+def _refuse_unknown_axes(machine: Machine, axes: Iterable[str]) -> None:
+    for axis in axes:
+        if axis not in machine.axes:
+            raise PoseError(f"unknown axis {axis}, {machine.name} has {' '.join(machine.axes)}")
+
+
+def _refuse_bad_span(axis: str, span: Span, turning: Sequence[str], fixed: Mapping[str, float]) -> None:
+    if axis not in turning:
+        raise PoseError(f"{axis} is no turning axis, only {' '.join(turning) or 'none here'} can be swept")
+    if axis in fixed:
+        raise PoseError(f"{axis} is held and swept")
+    if not all(map(isfinite, span)) or span[0] > span[1]:
+        raise PoseError(f"the range of {axis} is empty: {span[0]:g} to {span[1]:g}")
+    if max(map(abs, span)) > GREATEST_ANGLE:
+        raise PoseError(f"the range of {axis} is beyond what can be computed: {span[0]:g} to {span[1]:g}")
+
+
+def _refuse_bad_value(axis: str, value: float, turning: Sequence[str]) -> None:
+    if not isfinite(value):
+        raise PoseError(f"{axis}: {value} is no place to hold it")
+    if abs(value) > (GREATEST_ANGLE if axis in turning else FAR):
+        raise PoseError(f"{axis}: {value:g} is beyond what can be computed")
+
+
+def _find_ignored_limits(machine: Machine, patterns: Sequence[str]) -> tuple[str, ...]:
+    """Names of the limits that match, but for the legs' reach; a pattern that matches nothing else is refused."""
+    ignored: list[str] = []
+    for pattern in patterns:
+        matching = [name for name in machine.limits if fnmatchcase(name, pattern)]
+        if not matching:
+            raise PoseError(f"no limit {pattern}, {machine.name} has {', '.join(machine.limits)}")
+        reach = [limit.name for limit in machine.limit_parts if limit.side == "reach" and limit.name in matching]
+        if reach and reach == matching:
+            raise PoseError(f"{pattern} can't be switched off: where it fails, the legs don't close")
+        ignored += [name for name in matching if name not in reach and name not in ignored]
+    return tuple(ignored)

@@ -15,7 +15,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from parakin.description import machine_file, read_machine, shipped
+from parakin.description import find_machine_file, list_shipped_machines, read_machine
 from parakin.errors import InputError, InputErrors
 from parakin.model.legs import KINDS
 from parakin.model.parts import Cone, Drive, Gap, Range, Step
@@ -371,10 +371,10 @@ def test_no_file(tmp_path):
 
 
 def test_machine_file(tmp_path):
-    assert machine_file("tricept") == shipped()["tricept"]
-    assert machine_file(tmp_path / "x.yaml") == tmp_path / "x.yaml"
+    assert find_machine_file("tricept") == list_shipped_machines()["tricept"]
+    assert find_machine_file(tmp_path / "x.yaml") == tmp_path / "x.yaml"
     with pytest.raises(InputError, match=r'unknown machine "tricpt", did you mean "tricept"\?'):
-        machine_file("tricpt")
+        find_machine_file("tricpt")
 
 
 # Sizes from outside.
@@ -487,7 +487,7 @@ def test_bad_quantities(text, message):
 
 # Fuzz: whatever a file holds, it is read or refused with a place.
 
-SOURCES = [GOOD, *(p.read_text(encoding="utf-8") for p in shipped().values())]
+SOURCES = [GOOD, *(p.read_text(encoding="utf-8") for p in list_shipped_machines().values())]
 JUNK = st.one_of(
     st.text(max_size=12),
     st.sampled_from(list("{}[],:-&*!|>'\"%@`#\t\n?~0/")),
@@ -556,10 +556,10 @@ def test_any_expression(text):
 # The shipped machines.
 
 
-@pytest.mark.parametrize("name", shipped())
+@pytest.mark.parametrize("name", list_shipped_machines())
 def test_shipped(name):
-    text = shipped()[name].read_text(encoding="utf-8")
-    spec = read_machine(shipped()[name])
+    text = list_shipped_machines()[name].read_text(encoding="utf-8")
+    spec = read_machine(list_shipped_machines()[name])
     assert spec.name == name
     assert text.startswith("#"), "says what the machine is"
     assert len(spec.source) > 60
@@ -568,7 +568,7 @@ def test_shipped(name):
 
 
 def test_shipped_names():
-    assert sorted(shipped()) == [
+    assert sorted(list_shipped_machines()) == [
         "hbg80_2d", "hbg80_3d", "hexapod", "lambda6", "linear_delta", "orthoglide", "orthoglide5_head",
         "orthoglide5_table", "tricept",
     ]  # fmt: skip
@@ -584,21 +584,21 @@ def test_shipped_names():
     ],
 )
 def test_published_sizes(name, sizes):
-    assert read_machine(shipped()[name]).sizes == sizes
+    assert read_machine(list_shipped_machines()[name]).sizes == sizes
 
 
 def ranges(name):
-    return {d.name: (d.low, d.high) for d in read_machine(shipped()[name]).drives}
+    return {d.name: (d.low, d.high) for d in read_machine(list_shipped_machines()[name]).drives}
 
 
 def assert_inside(name, joints):
-    for drive, q in zip(read_machine(shipped()[name]).drives, joints, strict=True):
+    for drive, q in zip(read_machine(list_shipped_machines()[name]).drives, joints, strict=True):
         assert drive.low < q < drive.high, drive
 
 
 def test_tricept():
     assert ranges("tricept")["d1"] == (934, 1520)
-    spec = read_machine(shipped()["tricept"])
+    spec = read_machine(list_shipped_machines()["tricept"])
     assert [(s.axis, s.value, s.sign) for s in spec.head] == [
         ("tz", -300, 1), ("rz", 0, 1), ("ry", 0, -1), ("tz", -150, 1)
     ]  # fmt: skip
@@ -624,11 +624,11 @@ def test_tricept():
 
 def test_hbg80():
     assert set(ranges("hbg80_2d").values()) == {(-400, 200)}
-    home = read_machine(shipped()["hbg80_2d"]).home
+    home = read_machine(list_shipped_machines()["hbg80_2d"]).home
     x, y = home["X"], home["Y"]
     assert_inside("hbg80_2d", [x - sqrt(400**2 - y * y), y - sqrt(400**2 - x * x)])
     assert ranges("hbg80_3d") == dict.fromkeys(("Xhbg", "Yhbg", "Zhbg"), (-750, -350))
-    spec = read_machine(shipped()["hbg80_3d"])
+    spec = read_machine(list_shipped_machines()["hbg80_3d"])
     assert spec.home == {"X": 80, "Y": 80, "Z": -120}
     assert {leg.platform for leg in spec.legs} == {(-80, -80, 120)}
     assert [leg.rail for leg in spec.legs] == [(1, 0, 0), (0, 1, 0), (0, 0, -1)]
@@ -636,7 +636,7 @@ def test_hbg80():
 
 
 def test_lambda6():
-    spec = read_machine(shipped()["lambda6"])
+    spec = read_machine(list_shipped_machines()["lambda6"])
     assert [d.name for d in spec.drives] == ["l1", "l2", "l3", "l4", "l5", "l6"]
     assert [leg.foot[:2] for leg in spec.legs] == [
         pytest.approx((900 * cos(radians(a)), 900 * sin(radians(a))), abs=1e-9) for a in (180, 60, -60)
@@ -659,7 +659,7 @@ def test_lambda6():
 
 def test_orthoglide_is_designed_for_its_cube():
     """1/3 ≤ ψ ≤ 3 all over the cube and exactly 3 at two opposite corners; the strokes just cover the cube."""
-    spec = read_machine(shipped()["orthoglide"])
+    spec = read_machine(list_shipped_machines()["orthoglide"])
     length = spec.sizes["L"]
     assert length == pytest.approx(254.26446168553)
     a, b = -2 * length / sqrt(17), length / sqrt(11)
@@ -688,13 +688,13 @@ def test_orthoglide_is_designed_for_its_cube():
     assert_inside("orthoglide", [length] * 3)
     assert_inside("orthoglide5_head", [length] * 3 + [0, 0])
     m = (a + b) / 2
-    table = read_machine(shipped()["orthoglide5_table"])
+    table = read_machine(list_shipped_machines()["orthoglide5_table"])
     assert [s.value for s in table.table[:3]] == pytest.approx([m, m, m - 100])
     assert_inside("orthoglide5_table", [m + sqrt(length**2 - 2 * m * m)] * 3 + [0, 0])
 
 
 def test_hexapod():
-    spec = read_machine(shipped()["hexapod"])
+    spec = read_machine(list_shipped_machines()["hexapod"])
     base = [(-22.95, 13.25), (22.95, 13.25), (22.95, 13.25), (0, -26.5), (0, -26.5), (-22.95, 13.25)]
     top = [(-1, 11.5), (1, 11.5), (10.459, -4.884), (9.459, -6.616), (-9.459, -6.616), (-10.459, -4.884)]
     assert np.allclose([leg.foot for leg in spec.legs], [(25.4 * x, 25.4 * y, 0) for x, y in base])
@@ -707,7 +707,7 @@ def test_hexapod():
 
 
 def test_linear_delta():
-    spec = read_machine(shipped()["linear_delta"])
+    spec = read_machine(list_shipped_machines()["linear_delta"])
     rise = sqrt(spec.sizes["rod"] ** 2 - (spec.sizes["tower"] - spec.sizes["plate"]) ** 2)
     assert_inside("linear_delta", [spec.home["Z"] + spec.sizes["tool"] + rise] * 3)
     for x, y in [(200 * cos(w), 200 * sin(w)) for w in np.linspace(0, 2 * pi, 37)]:
@@ -720,8 +720,8 @@ def test_quick():
     """Import and one file within a quarter of a second; the bound here is loose for a busy machine."""
     code = (
         "import time; t = time.perf_counter()\n"
-        "from parakin.description import read_machine, shipped\n"
-        "read_machine(shipped()['tricept']); print(time.perf_counter() - t)"
+        "from parakin.description import list_shipped_machines, read_machine\n"
+        "read_machine(list_shipped_machines()['tricept']); print(time.perf_counter() - t)"
     )
     times = [float(subprocess.check_output([sys.executable, "-c", code])) for _ in range(3)]
     assert min(times) < 0.6

@@ -55,9 +55,9 @@ __all__ = [
 
 def machines() -> list[str]:
     """Names of the shipped machines."""
-    from .description import shipped
+    from .description import list_shipped_machines
 
-    return sorted(shipped())
+    return sorted(list_shipped_machines())
 
 
 def load(name: str | PathLike[str], parameters: Mapping[str, float | str] | None = None) -> Machine:
@@ -70,15 +70,15 @@ def load(name: str | PathLike[str], parameters: Mapping[str, float | str] | None
 
     Raises :class:`InputError` with file and line for a file that is no machine, or none that works.
     """
-    from .description import line_of, machine_file, read_machine
+    from .description import find_key_line, find_machine_file, read_machine
     from .machine import Machine
 
-    path = machine_file(name)
+    path = find_machine_file(name)
     spec = read_machine(path, parameters)
     try:
         return Machine(spec)
     except DescriptionError as error:
-        raise InputError(str(error), fspath(path), line_of(path, error.part)) from None
+        raise InputError(str(error), fspath(path), find_key_line(path, error.part)) from None
 
 
 # The public names that are loaded when they are first used: the module, and the name there if it is another.

@@ -1,7 +1,7 @@
-"""YAML files as plain text, lists and mappings that remember their lines.
+"""Read YAML files as plain text, lists and mappings that remember their lines.
 
 Nothing is interpreted here: every scalar stays the text that the user wrote, so ``no``, ``1e400`` and ``12:30`` hold no
-surprises, and whoever reads a value decides what it is.
+surprises. The reader of a value decides what it is.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ _TAGS = {f"tag:yaml.org,2002:{t}" for t in ("map", "seq", "str", "int", "float",
 
 
 class YamlText(str):
-    """A scalar as written."""
+    """A scalar as written, with its line."""
 
     line: int
 
@@ -54,7 +54,7 @@ Value: TypeAlias = YamlText | YamlList | YamlMap
 
 
 def read_document(path: Path, source: str) -> tuple[Value, list[InputError]]:
-    """A YAML file's only document, and errors that don't keep the rest from being read (keys written twice).
+    """Read a YAML file's only document; return it with the errors that leave the rest readable (keys written twice).
 
     Raises :class:`InputError` if there is no such document.
     """
@@ -75,7 +75,7 @@ def read_document(path: Path, source: str) -> tuple[Value, list[InputError]]:
 
 
 def parse_document(text: str, source: str) -> tuple[Value, list[InputError]]:
-    """As :func:`read_document`, from the file's text."""
+    """Parse the text of a YAML file; as :func:`read_document`."""
     try:
         node = YAML(typ="safe", pure=True).compose(text)
     except ReaderError as error:
@@ -87,20 +87,22 @@ def parse_document(text: str, source: str) -> tuple[Value, list[InputError]]:
         raise InputError(f"not valid YAML: {problem}", source, mark.line + 1 if mark else None) from None
     except RecursionError:
         raise InputError("nested too deeply", source) from None
-    # ruamel meets some malformed directives and escapes with whatever its own slip raises.
+    # ruamel raises errors of its own code on some malformed directives and escapes.
     except (YAMLError, ValueError, LookupError, TypeError, AttributeError, AssertionError, OverflowError):
         raise InputError("not valid YAML", source) from None
     if node is None:
         raise InputError("empty, expected a machine's description", source, 1)
-    builder = _Builder(source)
-    return builder.value(node, node.start_mark.line + 1, 0), builder.errors
+    builder = _DocumentBuilder(source)
+    return builder.build(node, node.start_mark.line + 1, 0), builder.errors
 
 
-class _Builder:
+class _DocumentBuilder:
+    """Build the document from ruamel's nodes, within bounds for depth and number of values."""
+
     def __init__(self, source: str):
         self.source, self.errors, self.count = source, list[InputError](), 0
 
-    def value(self, node: Any, line: int, depth: int) -> Value:
+    def build(self, node: Any, line: int, depth: int) -> Value:
         self.count += 1
         if depth > _DEEPEST:
             raise InputError("nested too deeply (does an alias hold itself?)", self.source, line)
@@ -109,13 +111,13 @@ class _Builder:
         if str(node.tag) not in _TAGS:
             self.errors.append(InputError(f"tag {quote(node.tag)} is not known here, expected none", self.source, line))
         if isinstance(node, MappingNode):
-            return self._map(node, line, depth)
+            return self._build_map(node, line, depth)
         if isinstance(node, SequenceNode):
-            items = [self.value(item, item.start_mark.line + 1, depth + 1) for item in node.value]
+            items = [self.build(item, item.start_mark.line + 1, depth + 1) for item in node.value]
             return YamlList(items, line)
         return YamlText(node.value, line)
 
-    def _map(self, node: MappingNode, line: int, depth: int) -> YamlMap:
+    def _build_map(self, node: MappingNode, line: int, depth: int) -> YamlMap:
         items: dict[YamlText, Any] = {}
         for key, value in node.value:
             at = key.start_mark.line + 1
@@ -128,5 +130,5 @@ class _Builder:
                 message = f"key {quote(name)} is written twice, first in line {first}"
                 self.errors.append(InputError(message, self.source, at))
                 continue
-            items[name] = self.value(value, at, depth + 1)
+            items[name] = self.build(value, at, depth + 1)
         return YamlMap(items, line)

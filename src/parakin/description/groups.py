@@ -1,4 +1,4 @@
-"""Groups of legs. A group's model is made from the type hints of its leg kind, so a new kind needs nothing here."""
+"""Groups of legs as pydantic models, built from the type hints of their leg kind: a new kind needs nothing here."""
 
 from __future__ import annotations
 
@@ -20,14 +20,14 @@ from ..errors import suggest
 from ..model.legs import KINDS, Leg
 from ..model.parts import Direction, Drive, Point, Signs, Size
 from .document import YamlList, YamlMap, YamlText
-from .sections import Circle, Section
+from .sections import CirclePoints, FileSection
 from .values import DRIVE_TYPES, DirectionValue, Extent, PlacedError, PointValue, Word, describe, get_context
 
 
-class Group(Section):
-    """Several legs of one kind. Each value has a row a leg; a row has one item, or one a joint of the leg."""
+class LegGroup(FileSection):
+    """Several legs of one kind. A value has a row for each leg; a row has one item, or one for each of its joints."""
 
-    place: ClassVar[str] = " in legs"
+    where: ClassVar[str] = " in legs"
     leg: ClassVar[type[Leg]]
 
     kind: Any
@@ -37,7 +37,8 @@ class Group(Section):
     acceleration: Any = None
     jerk: Any = None
 
-    def legs(self) -> list[Leg]:
+    def build_legs(self) -> list[Leg]:
+        """Build the legs with their drives."""
         result = []
         for i, names in enumerate(self.joints):
             drives = []
@@ -47,18 +48,19 @@ class Group(Section):
                     rows = getattr(self, what)
                     drive = drive if rows is None else replace(drive, **{what: rows[i][j]})
                 drives.append(drive)
-            own = {spot.name: getattr(self, spot.name) for spot in _own_fields(self.leg)}
+            own = {spec.name: getattr(self, spec.name) for spec in _list_own_fields(self.leg)}
             given = {name: rows[i][0] for name, rows in own.items() if rows is not None}
             result.append(self.leg(drives=tuple(drives), **given))
         return result
 
 
-def _own_fields(leg: type[Leg]) -> list[Field[Any]]:
+def _list_own_fields(leg: type[Leg]) -> list[Field[Any]]:
+    """The fields of a leg kind beside its drives."""
     return [f for f in fields(leg) if f.name != "drives"]
 
 
-def _levels(value: object) -> int:
-    """How deep lists are nested, along the first items."""
+def _count_levels(value: object) -> int:
+    """Count how deep lists are nested, along the first items."""
     levels = 0
     while isinstance(value, YamlList):
         levels += 1
@@ -66,15 +68,16 @@ def _levels(value: object) -> int:
     return levels
 
 
-def _list_of(items: tuple[Any, ...], read: Any) -> Any:
+def _make_list_type(items: tuple[Any, ...], read: Any) -> Any:
     row: Any = tuple.__class_getitem__(items)  # tuple[*items], made at run time
     return Annotated[list[row], WrapValidator(read)]
 
 
-def _rows(items: tuple[Any, ...], levels: int) -> Any:
-    """The type of a value given once for all legs, once for each joint of a leg, or once for each leg.
+def _make_rows_type(items: tuple[Any, ...], levels: int) -> Any:
+    """Make the type of a value given once for all legs, once for each joint of a leg, or once for each leg.
 
-    ``items`` are the types of a leg's values, one or one a joint; each is itself lists nested ``levels`` deep.
+    items : the types of a leg's values, one or one for each joint
+    levels : how deep lists are nested in each
     """
     slots = len(items)
 
@@ -82,10 +85,10 @@ def _rows(items: tuple[Any, ...], levels: int) -> Any:
         joints = info.data.get("joints")
         per_leg = False
         if isinstance(value, YamlMap) and items == (PointValue,):
-            points = Circle.model_validate(value, context=info.context).points()
+            points = CirclePoints.model_validate(value, context=info.context).compute_points()
             rows, per_leg = [(point,) for point in points], True
         else:
-            extra = _levels(value) - levels
+            extra = _count_levels(value) - levels
             if extra <= 0:
                 table = [[value] * slots]
             elif extra == 1 and slots > 1:
@@ -105,10 +108,10 @@ def _rows(items: tuple[Any, ...], levels: int) -> Any:
             raise ValueError(f"{len(rows)} values for {len(joints)} legs, expected one for all or one a leg")
         return rows
 
-    return _list_of(items, read)
+    return _make_list_type(items, read)
 
 
-def _joints(leg: type[Leg]) -> Any:
+def _make_joints_type(leg: type[Leg]) -> Any:
     count = len(leg.units)
     expected = "a list of names, one a leg" if count == 1 else f"a list of {count} names a leg"
 
@@ -124,10 +127,10 @@ def _joints(leg: type[Leg]) -> Any:
                     get_context(info).add_joint(name, unit)
         return handler(rows)
 
-    return _list_of((Word,) * count, read)
+    return _make_list_type((Word,) * count, read)
 
 
-def _signs(leg: type[Leg]) -> Any:
+def _make_signs_type(leg: type[Leg]) -> Any:
     count = len(leg.branches)
 
     def read(value: object) -> Signs:
@@ -138,8 +141,8 @@ def _signs(leg: type[Leg]) -> Any:
     return Annotated[Any, PlainValidator(read)]
 
 
-def _upright(rows: Any, info: ValidationInfo) -> Any:
-    """``zero`` is where a leg's arm points at q = 0: at right angles to the ``axis`` it turns about."""
+def _check_right_angle(rows: Any, info: ValidationInfo) -> Any:
+    """Refuse a ``zero``, the arm's direction at q = 0, that is not at right angles to the ``axis`` it turns about."""
     for (zero,), (axis,) in zip(rows, info.data.get("axis", ()), strict=False):
         if abs(sum(a * b for a, b in zip(zero, axis, strict=True))) > 1e-9:
             raise ValueError("this direction is not at right angles to axis, expected a right angle")
@@ -147,37 +150,37 @@ def _upright(rows: Any, info: ValidationInfo) -> Any:
 
 
 @cache
-def _model(kind: str) -> type[Group]:
+def _build_group_model(kind: str) -> type[LegGroup]:
     leg = KINDS[kind]
     hints = get_type_hints(leg)
     types: dict[Any, Any] = {
-        Point: _rows((PointValue,), 1),
-        Direction: _rows((DirectionValue,), 1),
-        Size: _rows((Extent,), 0),
-        Signs: _rows((_signs(leg),), 0),
+        Point: _make_rows_type((PointValue,), 1),
+        Direction: _make_rows_type((DirectionValue,), 1),
+        Size: _make_rows_type((Extent,), 0),
+        Signs: _make_rows_type((_make_signs_type(leg),), 0),
     }
     own: dict[str, Any] = {}
-    for spot in _own_fields(leg):
-        type_ = types[hints[spot.name]]
-        if spot.name == "zero":
-            type_ = Annotated[type_, AfterValidator(_upright)]
-        own[spot.name] = (type_, ... if spot.default is MISSING else None)
+    for spec in _list_own_fields(leg):
+        type_ = types[hints[spec.name]]
+        if spec.name == "zero":
+            type_ = Annotated[type_, AfterValidator(_check_right_angle)]
+        own[spec.name] = (type_, ... if spec.default is MISSING else None)
     drives = [DRIVE_TYPES[unit] for unit in leg.units]
     model = create_model(
         f"Group_{kind}",
-        __base__=Group,
-        joints=(_joints(leg), ...),
-        range=(_rows(tuple(d.range for d in drives), 1), ...),
-        speed=(_rows(tuple(d.speed for d in drives), 0), None),
-        acceleration=(_rows(tuple(d.acceleration for d in drives), 0), None),
-        jerk=(_rows(tuple(d.jerk for d in drives), 0), None),
+        __base__=LegGroup,
+        joints=(_make_joints_type(leg), ...),
+        range=(_make_rows_type(tuple(d.range for d in drives), 1), ...),
+        speed=(_make_rows_type(tuple(d.speed for d in drives), 0), None),
+        acceleration=(_make_rows_type(tuple(d.acceleration for d in drives), 0), None),
+        jerk=(_make_rows_type(tuple(d.jerk for d in drives), 0), None),
         **own,
     )
     model.leg = leg
     return model
 
 
-def _group(value: object, info: ValidationInfo) -> Group:
+def _read_group(value: object, info: ValidationInfo) -> LegGroup:
     if not isinstance(value, YamlMap):
         raise ValueError(f"expected a mapping with kind, joints, range, ..., got {describe(value)}")
     kind = value.get("kind")
@@ -186,10 +189,10 @@ def _group(value: object, info: ValidationInfo) -> Group:
     if not isinstance(kind, YamlText) or kind not in KINDS:
         line = kind.line if isinstance(kind, YamlText) else value.line
         raise PlacedError(f"unknown leg kind {describe(kind)}{suggest(str(kind), KINDS)}", line)
-    return _model(str(kind)).model_validate(value, context=info.context)
+    return _build_group_model(str(kind)).model_validate(value, context=info.context)
 
 
-def _groups(value: object) -> object:
+def _wrap_single_group(value: object) -> object:
     if isinstance(value, YamlMap):
         return YamlList([value], value.line)
     if not isinstance(value, YamlList) or not value:
@@ -197,21 +200,25 @@ def _groups(value: object) -> object:
     return value
 
 
-def _as_many(groups: list[Group], info: ValidationInfo) -> list[Group]:
+def _check_joint_count(groups: list[LegGroup], info: ValidationInfo) -> list[LegGroup]:
     context = get_context(info)
     context.legs_read = True
     names = [str(name) for group in groups for leg in group.joints for name in leg]
     motion = context.motion
     if motion is not None and len(names) != len(motion):
         raise ValueError(
-            f"{_counted(len(names), 'joint')} ({', '.join(names)}) for {_counted(len(motion), 'word')} of motion"
-            f" ({' '.join(motion)}), expected as many joints as words"
+            f"{_format_count(len(names), 'joint')} ({', '.join(names)}) for "
+            f"{_format_count(len(motion), 'word')} of motion ({' '.join(motion)}), expected as many joints as words"
         )
     return groups
 
 
-def _counted(count: int, what: str) -> str:
+def _format_count(count: int, what: str) -> str:
     return f"{count} {what}{'s' * (count != 1)}"
 
 
-Legs = Annotated[list[Annotated[Group, PlainValidator(_group)]], BeforeValidator(_groups), AfterValidator(_as_many)]
+Legs = Annotated[
+    list[Annotated[LegGroup, PlainValidator(_read_group)]],
+    BeforeValidator(_wrap_single_group),
+    AfterValidator(_check_joint_count),
+]

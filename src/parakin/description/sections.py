@@ -32,53 +32,53 @@ from .values import (
     Opening,
     PlacedError,
     Word,
+    accept_words,
     describe,
     get_context,
-    one_of,
     read_quantity,
 )
 
 TRANSFORMS = (*TRANSLATIONS, *ROTATIONS)
 
 
-class Section(BaseModel):
-    """A mapping of known keys. An unknown one is reported, and the others are still read."""
+class FileSection(BaseModel):
+    """A mapping of known keys. An unknown key is reported, and the others are still read."""
 
     model_config = ConfigDict(arbitrary_types_allowed=True)
-    place: ClassVar[str] = ""  # " in legs", for messages
+    where: ClassVar[str] = ""  # for messages: " in legs"
 
     @model_validator(mode="before")
     @classmethod
-    def _known(cls, value: object, info: ValidationInfo) -> object:
+    def _report_unknown_keys(cls, value: object, info: ValidationInfo) -> object:
         keys = list(cls.model_fields)
         if not isinstance(value, YamlMap):
             raise ValueError(f"expected a mapping with the keys {', '.join(keys)}, got {describe(value)}")
         for key in value:
             if key not in keys:
-                get_context(info).report(f"unknown key {quote(key)}{cls.place}{suggest(key, keys)}", key.line)
+                get_context(info).report(f"unknown key {quote(key)}{cls.where}{suggest(key, keys)}", key.line)
         return YamlMap({k: v for k, v in value.items() if k in keys}, value.line)
 
 
-def _list(value: object) -> object:
+def _check_list(value: object) -> object:
     if not isinstance(value, YamlList):
         raise ValueError(f"expected a list, got {describe(value)}")
     return value
 
 
-ListOf = BeforeValidator(_list)  # pydantic's own message would speak of Python
+ListOf = BeforeValidator(_check_list)  # pydantic's own message would name Python types
 
 
-class Circle(Section):
+class CirclePoints(FileSection):
     """Points on a circle about the frame's Z: ``{circle: R, at: [0 deg, 120 deg, 240 deg], z: 0 mm}``."""
 
-    place: ClassVar[str] = " in a circle of points"
+    where: ClassVar[str] = " in a circle of points"
 
     circle: Extent
     at: Annotated[list[Angle], ListOf]
     z: Length = 0.0
 
-    def points(self) -> list[Vector]:
-        # The cosine of 90 deg is 6e-17 here; a foot that is meant to stand on an axis shall.
+    def compute_points(self) -> list[Vector]:
+        """Compute the points, mm; a cosine of 6e-17 (90 deg) is exactly zero."""
         turns = [tuple(0.0 if abs(t) < 1e-15 else t for t in (cos(a), sin(a))) for a in self.at]
         return [(self.circle * c, self.circle * s, self.z) for c, s in turns]
 
@@ -86,8 +86,8 @@ class Circle(Section):
 # Heads, tables, mountings.
 
 
-class _Driven(Section):
-    place: ClassVar[str] = " in a driven transform"
+class _DrivenStep(FileSection):
+    where: ClassVar[str] = " in a driven transform"
 
     joint: Word
     range: tuple[float, float]
@@ -97,16 +97,16 @@ class _Driven(Section):
     acceleration: float = inf
     jerk: float = inf
 
-    def step(self, axis: str, unit: Unit) -> Step:
+    def build_step(self, axis: str, unit: Unit) -> Step:
         drive = Drive(str(self.joint), unit, *self.range, self.speed, self.acceleration, self.jerk)
         return Step(axis, self.offset, drive, -1.0 if self.reverse else 1.0)
 
 
-def _driven(unit: Unit) -> type[_Driven]:
+def _build_driven_model(unit: Unit) -> type[_DrivenStep]:
     types = DRIVE_TYPES[unit]
     return create_model(
         f"Driven_{unit}",
-        __base__=_Driven,
+        __base__=_DrivenStep,
         range=types.range,
         offset=(types.value, 0.0),
         speed=(types.speed, inf),
@@ -115,10 +115,10 @@ def _driven(unit: Unit) -> type[_Driven]:
     )
 
 
-_DRIVEN: dict[Unit, type[_Driven]] = {"mm": _driven("mm"), "rad": _driven("rad")}
+_DRIVEN: dict[Unit, type[_DrivenStep]] = {"mm": _build_driven_model("mm"), "rad": _build_driven_model("rad")}
 
 
-def _step(value: object, info: ValidationInfo) -> Step:
+def _read_step(value: object, info: ValidationInfo) -> Step:
     if not isinstance(value, YamlMap) or len(value) != 1:
         raise ValueError(f"expected one transform such as tz: 100 mm, got {describe(value)}")
     ((axis, content),) = value.items()
@@ -130,15 +130,15 @@ def _step(value: object, info: ValidationInfo) -> Step:
     joint = content.get("joint")
     if isinstance(joint, YamlText):
         get_context(info).add_joint(joint, unit)
-    return _DRIVEN[unit].model_validate(content, context=info.context).step(str(axis), unit)
+    return _DRIVEN[unit].model_validate(content, context=info.context).build_step(str(axis), unit)
 
 
-StepValue = Annotated[Step, PlainValidator(_step)]
+StepValue = Annotated[Step, PlainValidator(_read_step)]
 Steps = Annotated[tuple[StepValue, ...], ListOf]
 
 
-def _mounting(value: object, info: ValidationInfo) -> object:
-    """A word for the usual ways stands for a turn about X, so that a hanging tool comes to point along +Y."""
+def _expand_mounting(value: object, info: ValidationInfo) -> object:
+    """Expand a word such as horizontal to its turn about X, which makes a hanging tool point along +Y."""
     if not isinstance(value, YamlText):
         return value
     way, _, angle = value.strip().partition(" ")
@@ -153,21 +153,23 @@ def _mounting(value: object, info: ValidationInfo) -> object:
     return YamlList([YamlMap({YamlText("rx", value.line): YamlText(angle, value.line)}, value.line)], value.line)
 
 
-def _constant(steps: tuple[Step, ...]) -> tuple[Step, ...]:
+def _refuse_driven_steps(steps: tuple[Step, ...]) -> tuple[Step, ...]:
     for step in steps:
         if step.drive is not None:
             raise ValueError(f"joint {quote(step.drive.name)} can't be in the mounting, expected head or table")
     return steps
 
 
-Mounting = Annotated[tuple[StepValue, ...], ListOf, BeforeValidator(_mounting), AfterValidator(_constant)]
+Mounting = Annotated[
+    tuple[StepValue, ...], ListOf, BeforeValidator(_expand_mounting), AfterValidator(_refuse_driven_steps)
+]
 
 
 # Limits.
 
 
-class _Passive(Section):
-    place: ClassVar[str] = " in passive"
+class _PassiveSection(FileSection):
+    where: ClassVar[str] = " in passive"
 
     tx: LengthPair | None = None
     ty: LengthPair | None = None
@@ -178,7 +180,7 @@ class _Passive(Section):
 
     @model_validator(mode="before")
     @classmethod
-    def _moving(cls, value: object, info: ValidationInfo) -> object:
+    def _report_fixed_coordinates(cls, value: object, info: ValidationInfo) -> object:
         context = get_context(info)
         motion = context.motion or TRANSFORMS
         for key in value if isinstance(value, YamlMap) else ():
@@ -186,11 +188,11 @@ class _Passive(Section):
                 context.report(f"passive limit of {key}, which is not in the motion {' '.join(motion)}", key.line)
         return value
 
-    def ranges(self) -> tuple[Range, ...]:
+    def build_ranges(self) -> tuple[Range, ...]:
         return tuple(Range(name, *getattr(self, name)) for name in TRANSFORMS if getattr(self, name) is not None)
 
 
-def _slider(value: object, info: ValidationInfo) -> str:
+def _read_slider_name(value: object, info: ValidationInfo) -> str:
     context = get_context(info)
     if not isinstance(value, YamlText):
         raise ValueError(f"expected a joint's name, got {describe(value)}")
@@ -201,51 +203,51 @@ def _slider(value: object, info: ValidationInfo) -> str:
     return str(value)
 
 
-def _two(value: object) -> object:
+def _check_pair(value: object) -> object:
     if not isinstance(value, YamlList) or len(value) != 2:
         raise ValueError(f"expected the names of two joints, got {describe(value)}")
     return value
 
 
-_SliderName = Annotated[str, PlainValidator(_slider)]
+_SliderName = Annotated[str, PlainValidator(_read_slider_name)]
 
 
-class _Gap(Section):
-    place: ClassVar[str] = " in gaps"
+class _GapSection(FileSection):
+    where: ClassVar[str] = " in gaps"
 
-    between: Annotated[tuple[_SliderName, _SliderName], BeforeValidator(_two)]
+    between: Annotated[tuple[_SliderName, _SliderName], BeforeValidator(_check_pair)]
     range: LengthPair
 
 
-class _Cone(Section):
-    place: ClassVar[str] = " in cones"
+class _ConeSection(FileSection):
+    where: ClassVar[str] = " in cones"
 
-    at: Annotated[Any, one_of("end of a leg", "foot", "platform")]
+    at: Annotated[Any, accept_words("end of a leg", "foot", "platform")]
     angle: Opening
     axis: DirectionValue | None = None
 
 
-class LimitsSection(Section):
-    place: ClassVar[str] = " in limits"
+class LimitsSection(FileSection):
+    where: ClassVar[str] = " in limits"
 
-    passive: _Passive | None = None
-    gaps: Annotated[list[_Gap], ListOf] = []
-    cones: Annotated[list[_Cone], ListOf] = []
+    passive: _PassiveSection | None = None
+    gaps: Annotated[list[_GapSection], ListOf] = []
+    cones: Annotated[list[_ConeSection], ListOf] = []
     clearance: Extent | None = None
 
-    def limits(self) -> Limits:
+    def build_limits(self) -> Limits:
         return Limits(
-            self.passive.ranges() if self.passive else (),
+            self.passive.build_ranges() if self.passive else (),
             tuple(Gap(*gap.between, *gap.range) for gap in self.gaps),
             tuple(Cone(c.at, c.angle, Direction(c.axis) if c.axis else None) for c in self.cones),
             self.clearance,
         )
 
 
-class HomeSection(Section):
-    """A pose by the names of its axes."""
+class HomeSection(FileSection):
+    """The home pose by the names of its axes."""
 
-    place: ClassVar[str] = " in home"
+    where: ClassVar[str] = " in home"
 
     X: Length | None = None
     Y: Length | None = None
@@ -254,5 +256,6 @@ class HomeSection(Section):
     B: Angle | None = None
     C: Angle | None = None
 
-    def pose(self) -> dict[str, float]:
+    def get_pose(self) -> dict[str, float]:
+        """The given coordinates by axis name, mm and rad."""
         return {name: value for name, value in self if value is not None}

@@ -39,14 +39,22 @@ from .document import YamlList, YamlMap, YamlText
 
 
 @dataclass
-class Context:
-    """What the values of one file share while they are read."""
+class ReadingContext:
+    """What the values of one file share while they are read.
+
+    source : the file's name as the user gave it
+    sizes : the file's sizes; None for one that could not be read
+    errors : those that leave the rest of a section readable
+    joints : line and unit of each joint, by name
+    motion : the words of the motion; None: not read, or not readable
+    legs_read : whether all joints of legs are known
+    """
 
     source: str
     sizes: Mapping[str, Quantity | None]
-    errors: list[InputError] = field(default_factory=list)  # those that don't keep a section from being read
-    joints: dict[str, tuple[int, Unit]] = field(default_factory=dict)  # name: line, unit
-    motion: tuple[str, ...] | None = None  # None: not read, or not readable
+    errors: list[InputError] = field(default_factory=list)
+    joints: dict[str, tuple[int, Unit]] = field(default_factory=dict)
+    motion: tuple[str, ...] | None = None
     legs_read: bool = False
 
     def report(self, message: str, line: int) -> None:
@@ -54,20 +62,20 @@ class Context:
 
     def add_joint(self, name: YamlText, unit: Unit) -> None:
         if not is_word(name):
-            return  # which is reported where the word is read
+            return  # reported where the word is read
         if name in self.joints:
             self.report(f"joint {quote(name)} is used twice, first in line {self.joints[name][0]}", name.line)
         else:
             self.joints[str(name)] = (name.line, unit)
 
 
-def get_context(info: ValidationInfo) -> Context:
-    """The context, which pydantic hands on untyped."""
-    return cast(Context, info.context)
+def get_context(info: ValidationInfo) -> ReadingContext:
+    """Return the context, which pydantic passes on untyped."""
+    return cast(ReadingContext, info.context)
 
 
 class PlacedError(ValueError):
-    """An error that knows its line better than the value under validation does."""
+    """An error with a line of its own, more exact than that of the value under validation."""
 
     def __init__(self, message: str, line: int):
         self.line = line
@@ -75,38 +83,38 @@ class PlacedError(ValueError):
 
 
 def describe(value: object) -> str:
-    """What was found, fit for a message."""
+    """Describe a value for a message."""
     return "a list" if isinstance(value, YamlList) else "a mapping" if isinstance(value, YamlMap) else quote(value)
 
 
 # Words.
 
 
-def _prose(value: object) -> str:
+def _read_prose(value: object) -> str:
     if not isinstance(value, YamlText) or not value.strip():
         raise ValueError(f"expected some words, got {describe(value)}")
     return value.strip()
 
 
 def is_word(value: str) -> bool:
-    """Whether this may name a machine, a size or a joint: it has to pass for a name in C and in G-code comments too."""
+    """Whether a text may name a machine, a size or a joint: a valid name in C and in G-code comments too."""
     return re.fullmatch(r"[A-Za-z][A-Za-z0-9_]{0,39}", value) is not None
 
 
-def _word(value: object) -> YamlText:
+def _read_word(value: object) -> YamlText:
     if not isinstance(value, YamlText) or not is_word(value):
         raise ValueError(f"expected a plain word (letters, digits, _; at most 40), got {describe(value)}")
     return value
 
 
-def _flag(value: object) -> bool:
+def _read_flag(value: object) -> bool:
     if value not in ("true", "false"):
         raise ValueError(f"expected true or false, got {describe(value)}")
     return value == "true"
 
 
-def one_of(what: str, *known: str) -> PlainValidator:
-    """One of the ``known`` words."""
+def accept_words(what: str, *known: str) -> PlainValidator:
+    """Make a validator that accepts one of the ``known`` words; ``what`` they are is for messages."""
 
     def read(value: object) -> str:
         if not isinstance(value, YamlText) or value not in known:
@@ -116,20 +124,20 @@ def one_of(what: str, *known: str) -> PlainValidator:
     return PlainValidator(read)
 
 
-Prose = Annotated[str, PlainValidator(_prose)]
-Word = Annotated[YamlText, PlainValidator(_word)]
-Flag = Annotated[bool, PlainValidator(_flag)]
+Prose = Annotated[str, PlainValidator(_read_prose)]
+Word = Annotated[YamlText, PlainValidator(_read_word)]
+Flag = Annotated[bool, PlainValidator(_read_flag)]
 
 
 # Quantities.
 
 
-Bounds: TypeAlias = tuple[float, float, str]  # low < value ≤ high, and that in words
+Bounds: TypeAlias = tuple[float, float, str]  # low < value ≤ high, and both in words
 
 _SPEEDS = (SPEED, ANGULAR_SPEED, ACCELERATION, ANGULAR_ACCELERATION)
 _JERKS = (JERK, ANGULAR_JERK)
-# Far beyond any machine, and small enough that nothing computed from them overflows.
-_USUAL: dict[Kind, Bounds] = {
+# Far beyond any machine, and small enough that no result overflows.
+_USUAL_BOUNDS: dict[Kind, Bounds] = {
     NUMBER: (-1e6, 1e6, "-1e6 to 1e6"),
     LENGTH: (-1e6, 1e6, "-1 km to 1 km"),
     ANGLE: (-1e4, 1e4, "-10000 rad to 10000 rad"),
@@ -139,23 +147,23 @@ _USUAL: dict[Kind, Bounds] = {
 
 
 def read_quantity(value: object, kind: Kind, info: ValidationInfo, bounds: Bounds | None = None) -> float:
-    """A value in mm, rad and s; NaN if a size in it is itself in error."""
+    """Read a value in mm, rad and s; NaN if a size in it is itself in error."""
     if not isinstance(value, YamlText):
         raise ValueError(f"expected {kind.wanted}, got {describe(value)}")
     try:
         result = parse_quantity(value, kind, get_context(info).sizes)
     except UnreadSizeError:
-        return nan  # the size has been reported; once is enough
+        return nan  # the size has been reported
     except QuantityError as error:
         raise ValueError(str(error)) from None
-    low, high, words = bounds or _USUAL[kind]
+    low, high, words = bounds or _USUAL_BOUNDS[kind]
     if result <= low or result > high:
         raise ValueError(f"{quote(value)} is out of range, expected {words}")
     return result
 
 
-def of(kind: Kind, bounds: Bounds | None = None) -> PlainValidator:
-    """Quantities of a kind."""
+def accept_quantity(kind: Kind, bounds: Bounds | None = None) -> PlainValidator:
+    """Make a validator that accepts quantities of a kind within bounds, by default the usual ones."""
 
     def read(value: object, info: ValidationInfo) -> float:
         return read_quantity(value, kind, info, bounds)
@@ -163,7 +171,7 @@ def of(kind: Kind, bounds: Bounds | None = None) -> PlainValidator:
     return PlainValidator(read)
 
 
-def _several(count: int, what: str) -> BeforeValidator:
+def _require_count(count: int, what: str) -> BeforeValidator:
     def check(value: object) -> object:
         if not isinstance(value, YamlList):
             raise ValueError(f"expected {what}, got {describe(value)}")
@@ -174,37 +182,37 @@ def _several(count: int, what: str) -> BeforeValidator:
     return BeforeValidator(check)
 
 
-def _rising(value: Any, handler: ValidatorFunctionWrapHandler) -> tuple[float, float]:
+def _check_rising(value: Any, handler: ValidatorFunctionWrapHandler) -> tuple[float, float]:
     low, high = handler(value)
     if low >= high:
         raise ValueError(f"[{value[0]}, {value[1]}] is empty, expected [low, high] with low < high")
     return low, high
 
 
-def _unit_vector(value: Vector) -> Vector:
+def _normalize(value: Vector) -> Vector:
     length = hypot(*value)
     if length < 1e-9:
         raise ValueError("the zero vector, expected a direction")
     return (value[0] / length, value[1] / length, value[2] / length)
 
 
-Length = Annotated[float, of(LENGTH)]
-Angle = Annotated[float, of(ANGLE)]
-Number = Annotated[float, of(NUMBER)]
-Extent = Annotated[float, of(LENGTH, (0.0, 1e6, "more than 0 mm, at most 1 km"))]
-Opening = Annotated[float, of(ANGLE, (0.0, pi, "more than 0 deg, at most 180 deg"))]
-_PAIR = _several(2, "a pair [low, high]")
-LengthPair = Annotated[tuple[Length, Length], _PAIR, WrapValidator(_rising)]
-AnglePair = Annotated[tuple[Angle, Angle], _PAIR, WrapValidator(_rising)]
-PointValue = Annotated[tuple[Length, Length, Length], _several(3, "a point [x, y, z]")]
+Length = Annotated[float, accept_quantity(LENGTH)]
+Angle = Annotated[float, accept_quantity(ANGLE)]
+Number = Annotated[float, accept_quantity(NUMBER)]
+Extent = Annotated[float, accept_quantity(LENGTH, (0.0, 1e6, "more than 0 mm, at most 1 km"))]
+Opening = Annotated[float, accept_quantity(ANGLE, (0.0, pi, "more than 0 deg, at most 180 deg"))]
+_PAIR = _require_count(2, "a pair [low, high]")
+LengthPair = Annotated[tuple[Length, Length], _PAIR, WrapValidator(_check_rising)]
+AnglePair = Annotated[tuple[Angle, Angle], _PAIR, WrapValidator(_check_rising)]
+PointValue = Annotated[tuple[Length, Length, Length], _require_count(3, "a point [x, y, z]")]
 DirectionValue = Annotated[
-    tuple[Number, Number, Number], _several(3, "a direction [x, y, z]"), AfterValidator(_unit_vector)
+    tuple[Number, Number, Number], _require_count(3, "a direction [x, y, z]"), AfterValidator(_normalize)
 ]
 
 
 @dataclass(frozen=True)
 class DriveTypes:
-    """The types of a drive's values."""
+    """The pydantic types of a drive's values."""
 
     value: Any
     range: Any
@@ -214,8 +222,12 @@ class DriveTypes:
 
 
 DRIVE_TYPES: dict[Unit, DriveTypes] = {
-    "mm": DriveTypes(Length, LengthPair, *(Annotated[float, of(kind)] for kind in (SPEED, ACCELERATION, JERK))),
+    "mm": DriveTypes(
+        Length, LengthPair, *(Annotated[float, accept_quantity(kind)] for kind in (SPEED, ACCELERATION, JERK))
+    ),
     "rad": DriveTypes(
-        Angle, AnglePair, *(Annotated[float, of(kind)] for kind in (ANGULAR_SPEED, ANGULAR_ACCELERATION, ANGULAR_JERK))
+        Angle,
+        AnglePair,
+        *(Annotated[float, accept_quantity(kind)] for kind in (ANGULAR_SPEED, ANGULAR_ACCELERATION, ANGULAR_JERK)),
     ),
 }

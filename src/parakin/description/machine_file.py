@@ -1,0 +1,136 @@
+"""Find and read machine files: YAML of some twenty lines that becomes a :class:`~parakin.model.spec.Spec`.
+
+All errors of a file are found in one pass and reported as ``file:line: what is wrong, and what was expected``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from os import PathLike, fspath
+from pathlib import Path
+from typing import Annotated, Any
+
+from pydantic import PlainValidator, ValidationError, ValidationInfo
+
+from ..errors import InputError, InputErrors, quote, suggest
+from ..model.parts import Limits
+from ..model.spec import Spec
+from .document import YamlMap, YamlText, read_document
+from .groups import Legs
+from .sections import TRANSFORMS, FileSection, HomeSection, LimitsSection, Mounting, Steps
+from .sizes import read_sizes
+from .values import Prose, ReadingContext, Word, describe, get_context, is_word
+
+_MACHINES = Path(__file__).parent.parent / "machines"
+
+
+def list_shipped_machines() -> dict[str, Path]:
+    """List the machine files that come with the package, by name."""
+    return {path.stem: path for path in sorted(_MACHINES.glob("*.yaml"))}
+
+
+def find_machine_file(name: str | PathLike[str]) -> Path:
+    """Find the file of a machine, by its shipped name or by the path of the user's own file.
+
+    Raises :class:`InputError` for a plain word that is no shipped name and no file.
+    """
+    known = list_shipped_machines()
+    if str(name) in known:
+        return known[str(name)]
+    if isinstance(name, str) and is_word(name) and not Path(name).exists():
+        raise InputError(f"unknown machine {quote(name)}{suggest(name, known)}")
+    return Path(name)
+
+
+def find_key_line(path: str | PathLike[str], key: str) -> int:
+    """Find the line of a top-level key of a machine file; 1 if it has none."""
+    document, _ = read_document(Path(path), fspath(path))
+    keys = document if isinstance(document, YamlMap) else {}
+    return next((name.line for name in keys if isinstance(name, YamlText) and name == key), 1)
+
+
+def read_machine(path: str | PathLike[str], parameters: Mapping[str, float | str] | None = None) -> Spec:
+    """Read a machine's description from its file.
+
+    Parameters
+    ----------
+    path : the YAML file
+    parameters : values that replace entries of the file's ``sizes``: a number in mm or rad, whichever the size is, or
+        text with a unit (``"13.78 in"``)
+
+    Raises
+    ------
+    InputError
+        The file can't be read, or ``parameters`` don't fit it.
+    InputErrors
+        The file is not valid; every error with its line, in the order of the lines.
+    """
+    source = fspath(path)
+    document, errors = read_document(Path(path), source)
+    if not isinstance(document, YamlMap):
+        raise InputError(f"expected keys such as name, motion and legs, got {describe(document)}", source, 1)
+    context = ReadingContext(source, {}, errors)
+    context.sizes = read_sizes(document.get("sizes"), parameters or {}, context)
+    try:
+        machine = _MachineSection.model_validate(document, context=context)
+    except ValidationError as error:
+        context.errors += [_convert_error(details, source) for details in error.errors(include_url=False)]
+    else:
+        name = machine.name or Path(path).stem
+        if not is_word(name):
+            context.report(f'file name {quote(name)} is not a plain word, expected a key "name" with one', 1)
+    if context.errors:
+        unique = {str(e): e for e in context.errors}.values()  # a value for all joints of a leg is read once for each
+        raise InputErrors(sorted(unique, key=lambda e: e.line or 0))
+    return Spec(
+        name=str(name),
+        title=machine.title or str(name),
+        source=machine.source,
+        motion=machine.motion,
+        legs=tuple(leg for group in machine.legs for leg in group.build_legs()),
+        home=machine.home.get_pose(),
+        sizes={name: size.value for name, size in context.sizes.items() if size is not None},
+        mounting=machine.mounting,
+        head=machine.head,
+        table=machine.table,
+        limits=machine.limits.build_limits() if machine.limits else Limits(),
+    )
+
+
+def _read_motion(value: object, info: ValidationInfo) -> tuple[str, ...]:
+    words = value.split() if isinstance(value, YamlText) else []
+    if not words:
+        raise ValueError(f"expected words such as tx ty rz, got {describe(value)}")
+    for word in words:
+        if word not in TRANSFORMS:
+            raise ValueError(f"unknown word {quote(word)}{suggest(word, TRANSFORMS)}")
+    get_context(info).motion = tuple(words)
+    return tuple(words)
+
+
+class _MachineSection(FileSection):
+    """The whole file, in the order in which its keys are read: later ones may name what earlier ones define."""
+
+    name: Word | None = None
+    title: Prose | None = None
+    source: Prose
+    sizes: Any = None  # read beforehand: all other values may use them
+    mounting: Mounting = ()
+    motion: Annotated[tuple[str, ...], PlainValidator(_read_motion)]
+    legs: Legs
+    head: Steps = ()
+    table: Steps = ()
+    limits: LimitsSection | None = None
+    home: HomeSection
+
+
+def _convert_error(details: Any, source: str) -> InputError:
+    """Convert pydantic's account of one error, with the line of the value it was found in."""
+    names = [part for part in details["loc"] if isinstance(part, str)]
+    line = getattr(details["input"], "line", 1)
+    if details["type"] == "missing":
+        where = f" in {names[-2]}" if len(names) > 1 else ""
+        return InputError(f"missing key {quote(names[-1])}{where}", source, line)
+    error = details.get("ctx", {}).get("error")
+    message = str(error) if error else details["msg"]
+    return InputError(f"{names[-1]}: {message}" if names else message, source, getattr(error, "line", line))

@@ -33,7 +33,7 @@ def use_widest_vectors(typing):
 
 @intrinsic
 def _to_bits(typing, x):
-    """The bits of a float64."""
+    """Return the bits of a float64 as an integer."""
 
     def generate(context, builder, signature, args):
         return builder.bitcast(args[0], ir.IntType(64))
@@ -43,7 +43,7 @@ def _to_bits(typing, x):
 
 @intrinsic
 def _from_bits(typing, bits):
-    """The float64 of these bits."""
+    """Return the float64 that has these bits."""
 
     def generate(context, builder, signature, args):
         return builder.bitcast(args[0], ir.DoubleType())
@@ -53,7 +53,10 @@ def _from_bits(typing, bits):
 
 @njit(inline="always", fastmath=FAST)
 def sqrt(x):
-    """Square root; NaN below zero and at infinity. The processor's own takes as long as twenty products."""
+    """Compute the square root by Newton steps; NaN below zero and at infinity.
+
+    The processor's own takes as long as twenty products.
+    """
     y = _from_bits(0x5FE6EB50C7B537A9 - (_to_bits(x) >> 1))  # 1/√x within 4 %
     e = 1.0 - x * y * y
     y = y + y * e * (0.5 + e * (0.375 + e * 0.3125))
@@ -66,7 +69,7 @@ def sqrt(x):
 
 @njit(inline="always", fastmath=FAST)
 def sincos(x):
-    """(sin x, cos x); NaN beyond GREATEST_ANGLE."""
+    """Compute (sin x, cos x) by polynomials; NaN beyond GREATEST_ANGLE."""
     shifted = x * 0.63661977236758134308 + 6755399441055744.0  # 1.5·2^52: the quadrant is in the lowest bits
     quadrant = _to_bits(shifted)
     q = shifted - 6755399441055744.0
@@ -112,7 +115,7 @@ def sincos(x):
 
 @njit(inline="always", fastmath=FAST)
 def atan2(y, x):
-    """The angle of (x, y) in (-π, π]; 0 for (0, 0)."""
+    """Compute the angle of (x, y) in (-π, π] by a polynomial; 0 for (0, 0)."""
     ax, ay = abs(x), abs(y)
     big = ax if ax > ay else ay
     small = ay if ax > ay else ax

@@ -26,12 +26,13 @@ class IntervalProgram:
 
     @cached_property
     def inputs(self) -> int:
-        """Columns of a box: one more than the greatest number of an input."""
+        """The number of columns of a box: one more than the greatest number of an input."""
         nodes = [self.trace.nodes[i] for i in alg.needed([y for y in self.outputs if isinstance(y, Term)])]
         return max((int(node.k[0]) + 1 for node in nodes if node.op == alg.INPUT), default=0)
 
     @cached_property
     def tape(self) -> Tape:
+        """The tape of all outputs."""
         return compile_tape(self.trace, self.outputs, self.inputs)
 
     def __call__(self, low: Array, high: Array) -> Bounds:

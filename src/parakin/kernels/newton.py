@@ -23,7 +23,7 @@ FINE = 1e-12  # mm: where the next step is predicted to end, it is the last
 PIVOT = 4.0  # how many times greater an entry must be to become the pivot
 
 
-class Block(NamedTuple):
+class NewtonBlock(NamedTuple):
     """The working arrays of one block, rows of LANES numbers, for m coordinates.
 
     registers : of the tapes
@@ -59,7 +59,7 @@ def _allocate_block(tapes, m, joints):
     matrix, exchanges, closures = allocate_lanes(m * m), allocate_lanes(m * m), allocate_lanes(m)
     exchanged = np.zeros(m * m, np.bool_)
     determinant, first, worst, shrink = allocate_lanes(1), allocate_lanes(1), allocate_lanes(1), allocate_lanes(1)
-    return Block(r, point, closures, matrix, exchanges, exchanged, determinant, first, worst, shrink)
+    return NewtonBlock(r, point, closures, matrix, exchanges, exchanged, determinant, first, worst, shrink)
 
 
 @njit(nogil=True, cache=True)

@@ -108,7 +108,7 @@ def _separate_fixed(trace: Trace, values: Sequence[Scalar], places: int) -> tupl
     new, known, moving = Trace(), dict[int, Term](), set[int]()
     fixed: list[int] = []
 
-    def find_copy(term: Term) -> Term:
+    def copy_term(term: Term) -> Term:
         if term.index in known:
             return known[term.index]
         fixed.append(term.index)
@@ -126,7 +126,7 @@ def _separate_fixed(trace: Trace, values: Sequence[Scalar], places: int) -> tupl
                 known[i] = new.node(node.op, (), node.k)
             elif (node.op == alg.INPUT and node.k[0] < places) or any(arg.index in moving for arg in node.args):
                 moving.add(i)
-                known[i] = new.node(node.op, tuple(find_copy(arg) for arg in node.args), node.k)
-        term = find_copy(value)
+                known[i] = new.node(node.op, tuple(copy_term(arg) for arg in node.args), node.k)
+        term = copy_term(value)
         copies.append(new.node(alg.LIN, (term,), (0.0, 1.0)) if term.op == alg.INPUT else term)
     return copies, fixed

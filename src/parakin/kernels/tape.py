@@ -63,6 +63,7 @@ class NewtonTapes(NamedTuple):
 
 
 def _find_opcode(term: Term) -> int:
+    """Find the opcode of a term; the number of summands counts."""
     if term.op == alg.LIN:
         return CONST + len(term.args)
     if term.op == alg.HELD:

@@ -109,6 +109,7 @@ def _clear_short_rests(reach: Array, length: Array) -> Array:
 
 
 def _compute_norms(rows: Array) -> Array:
+    """Compute the Euclidean norm of each row."""
     norms: Array = np.sqrt(np.einsum("ij,ij->i", rows, rows))
     return norms
 

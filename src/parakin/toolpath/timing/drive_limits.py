@@ -19,6 +19,7 @@ class DriveLimits(NamedTuple):
 
     @staticmethod
     def of(machine: Machine) -> DriveLimits:
+        """Collect the limits of a machine's drives."""
         drives = machine.drives
         return DriveLimits(*(np.array([getattr(d, k) for d in drives]) for k in ("speed", "acceleration", "jerk")))
 

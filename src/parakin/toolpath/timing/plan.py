@@ -15,10 +15,10 @@ from .jerk_limited import limit_jerk
 from .joint_path import build_joint_path
 from .speed_profile import SpeedProfile
 from .time_optimal import (
+    build_accelerated_profile,
+    build_uniform_profile,
     compute_ceilings,
     find_quickest,
-    profile_with_constant_acceleration,
-    profile_with_constant_speed,
 )
 from .trajectory import Trajectory, name_limits
 
@@ -64,14 +64,14 @@ def plan_trajectory(
     if not len(joint_path.step):
         return Trajectory(posted, curve, joint_path, SpeedProfile.allocate(0, 1), np.full(1, len(names) - 1), names)
     if not limits.bounds_acceleration:
-        profile, binding = profile_with_constant_speed(joint_path, limits)
+        profile, binding = build_uniform_profile(joint_path, limits)
         return Trajectory(posted, curve, joint_path, profile, binding, names)
     joint_path, x, u = find_quickest(joint_path, limits)
     if np.isfinite(limits.jerk).any():
         ceiling = np.minimum(*compute_ceilings(joint_path, limits))
         joint_path, profile, binding = limit_jerk(joint_path, limits, x, ceiling)
     else:
-        profile, binding = profile_with_constant_acceleration(joint_path, limits, x, u)
+        profile, binding = build_accelerated_profile(joint_path, limits, x, u)
     binding[joint_path.find_ends()] = len(names) - 1
     return Trajectory(posted, curve, joint_path, profile, binding, names)
 
@@ -83,10 +83,10 @@ def _flag_stops(posted: Posted, stops: Sequence[int]) -> Flags:
         raise PoseError("the path has no records")
     lost = ~np.isfinite(posted.joints.sum(axis=1))
     if lost.any():
-        raise PoseError(f"{_place(posted, lost)}: the machine can't take this pose")
+        raise PoseError(f"{_name_record(posted, lost)}: the machine can't take this pose")
     idle = ~posted.path.rapid & (posted.path.feed <= 0.0)
     if idle.any():
-        raise PoseError(f"{_place(posted, idle)}: more than 0 expected for the feed")
+        raise PoseError(f"{_name_record(posted, idle)}: more than 0 expected for the feed")
     flags = np.zeros(count, bool)
     for stop in stops:
         if not 0 <= stop < count:
@@ -95,7 +95,7 @@ def _flag_stops(posted: Posted, stops: Sequence[int]) -> Flags:
     return flags
 
 
-def _place(posted: Posted, flags: Flags) -> str:
+def _name_record(posted: Posted, flags: Flags) -> str:
     """Name the first flagged record and its line."""
     record = int(flags.argmax())
     return f"record {record} (line {int(posted.path.line[record])})"

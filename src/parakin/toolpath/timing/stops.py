@@ -25,6 +25,7 @@ def sum_dwells(path: ToolPath) -> float:
 
 
 def _parse_dwell(event: Event) -> float:
+    """Parse the seconds that an event waits; 0 if it does not, or waits for something else."""
     match = _DWELL.match(event.text)
     try:
         seconds = float(match[1]) if match else 0.0

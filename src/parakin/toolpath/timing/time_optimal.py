@@ -75,15 +75,15 @@ def _compute_spans(joint_path: JointPath, x: Array) -> Array:
     return spans
 
 
-def profile_with_constant_acceleration(
+def build_accelerated_profile(
     joint_path: JointPath, limits: DriveLimits, x: Array, u: Array
 ) -> tuple[SpeedProfile, Indices]:
-    """Write a profile of constant s̈ over each step, and what binds it at each row."""
+    """Build the profile of constant s̈ over each step, and what binds it at each row."""
     return _write_steps(joint_path, limits, np.sqrt(x)[:-1], u, _compute_spans(joint_path, x))
 
 
-def profile_with_constant_speed(joint_path: JointPath, limits: DriveLimits) -> tuple[SpeedProfile, Indices]:
-    """Write the profile of the greatest constant speed over each step, and what binds it at each row."""
+def build_uniform_profile(joint_path: JointPath, limits: DriveLimits) -> tuple[SpeedProfile, Indices]:
+    """Build the profile of the greatest constant speed over each step, and what binds it at each row."""
     ceiling = np.minimum(*compute_ceilings(joint_path, limits))
     refuse_unbound(joint_path, ceiling)
     speed = np.sqrt(ceiling)

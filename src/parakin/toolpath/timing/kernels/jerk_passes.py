@@ -82,7 +82,7 @@ def _find_free_jerk(i, stretch, bounds, v, a, sign):
 
 @njit(nogil=True, cache=True, error_model="numpy")
 def _start_from_rest(h, jerk):
-    """ṡ² at the end of a step h that a motion from rest begins with, at this constant s⃛."""
+    """Compute ṡ² at the end of a first step h from rest, at this constant s⃛."""
     return 0.25 * (6.0 * h) ** (4.0 / 3.0) * jerk ** (2.0 / 3.0)
 
 

@@ -25,9 +25,10 @@ _CLEAR, _BESIDE = 0.02, 1e-5  # of a step: how near a new row may be to an exist
 
 
 class Switches(NamedTuple):
-    """Fractions of each step at which rows are missing, (steps,), 0 for none: where u can stop and begin braking.
+    """Where rows are missing within steps, as fractions of each step, (steps,), 0 for none.
 
-    ``rise_end``, where the trajectory could stop accelerating; ``fall_start``, where it could begin to brake
+    rise_end : where the trajectory could stop accelerating
+    fall_start : where it could begin to brake
     """
 
     rise_end: Array

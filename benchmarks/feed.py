@@ -13,7 +13,7 @@ from post import numbers
 import parakin as pk
 from parakin.machine import Machine
 from parakin.toolpath.path import ToolPath
-from parakin.toolpath.posting.post import post
+from parakin.toolpath.posting.post import post_path
 from parakin.toolpath.posting.posted import Posted
 from parakin.toolpath.timing import plan_trajectory
 from parakin.toolpath.timing.kernels.acceleration_limits import AccelerationLimits
@@ -38,7 +38,7 @@ def million() -> Posted:
     n = len(values)
     lines, rapid = np.arange(n), np.zeros(n, bool)
     path = ToolPath("", values[:, :3], values[:, 3:], lines, rapid, np.full(n, 2000.0), np.full(n, np.nan))
-    return post(Machine(replace(spec, legs=legs, head=head)), path)
+    return post_path(Machine(replace(spec, legs=legs, head=head)), path)
 
 
 def quickest(s: np.ndarray, q: np.ndarray, speed: np.ndarray, acceleration: np.ndarray) -> float:

@@ -13,7 +13,7 @@ from parakin.performance.singularities import singularity_margins
 from parakin.toolpath.checking.check import between
 from parakin.toolpath.checking.search import Search
 from parakin.toolpath.path import ToolPath
-from parakin.toolpath.posting.offences import judge, place
+from parakin.toolpath.posting.offences import describe_place, judge_path
 from parakin.toolpath.posting.posted import Posted
 
 TURN = 2.0 * math.pi
@@ -30,7 +30,7 @@ def posted_on(machine, poses, mode=None, turns=None):
         "part.cls", np.zeros((n, 3)), axis, lines, np.zeros(n, bool), np.full(n, 1000.0), np.full(n, np.nan)
     )
     joints = machine.follow(poses, mode, PRINTED) + (0.0 if turns is None else TURN * np.asarray(turns))
-    found = judge(machine, poses, joints, lines, mode)
+    found = judge_path(machine, poses, joints, lines, mode)
     frame = np.eye(3, 4)
     return Posted(
         machine, path, mode or machine.mode, frame, poses, joints,
@@ -253,10 +253,10 @@ def delta_chord(y=150.0, half=80.0, high=None):
 def test_a_chord_bulges_over_a_carriages_end():
     machine, poses, peak = delta_chord(high=-1.0)
     posted = posted_on(machine, poses)
-    assert posted.off == 0
+    assert posted.broken_record_count == 0
     checked = between(posted)
-    assert checked.off == 0
-    assert checked.motions_off == 1
+    assert checked.broken_record_count == 0
+    assert checked.broken_motion_count == 1
     assert [offence.limit for offence in checked.offences] == ["tower_a.max"]
     worst = checked.worst
     assert worst.value == pytest.approx(peak, abs=1e-6)
@@ -269,10 +269,11 @@ def test_a_chord_bulges_over_a_carriages_end():
     assert first.begins == pytest.approx(begins, abs=1e-6)
     at = f"{160.0 * begins - 80.0:.1f}"
     assert (
-        place(checked, first) == f"part.cls:102: from {100.0 * begins:.0f} % on the way there, X {at} Y 150.0 Z 280.0"
+        describe_place(checked, first)
+        == f"part.cls:102: from {100.0 * begins:.0f} % on the way there, X {at} Y 150.0 Z 280.0"
     )
-    assert place(checked, worst) == "part.cls:102: 50 % on the way there, X 0.0 Y 150.0 Z 280.0"
-    assert place(checked, replace(worst, share=1.0, begins=1.0)) == "part.cls:102"
+    assert describe_place(checked, worst) == "part.cls:102: 50 % on the way there, X 0.0 Y 150.0 Z 280.0"
+    assert describe_place(checked, replace(worst, share=1.0, begins=1.0)) == "part.cls:102"
     assert first.text == f"leg tower_a would be {peak:,.1f} mm, limit {peak - 1.0:,.6f}".rstrip("0")
 
 
@@ -280,7 +281,7 @@ def test_a_chord_bulges_over_a_carriages_end():
 def test_a_limit_just_touched_is_told(slack, off):
     machine, poses, _ = delta_chord(high=slack)
     checked = between(posted_on(machine, poses))
-    assert (checked.motions_off, checked.off) == (off, 0)
+    assert (checked.broken_motion_count, checked.broken_record_count) == (off, 0)
     if off:
         assert checked.first.excess == pytest.approx(-slack, rel=0.05)
 
@@ -288,7 +289,7 @@ def test_a_limit_just_touched_is_told(slack, off):
 def test_a_limit_touched_to_the_last_digit_counts_as_kept():
     machine, poses, _ = delta_chord(high=0.0)
     checked = between(posted_on(machine, poses))
-    assert checked.motions_off == 0
+    assert checked.broken_motion_count == 0
     assert checked.first is None
 
 
@@ -345,13 +346,13 @@ def test_a_leg_that_cannot_close_between_two_records():
     wide = ranged(wide, dict.fromkeys(machine.joints, (-9e3, 9e3)))
     ends = [pose(wide, X=75.0, C=160.0), pose(wide, X=75.0, C=200.0)]
     posted = posted_on(wide, ends)
-    assert posted.off == 0
+    assert posted.broken_record_count == 0
     checked = between(posted)
     found = {offence.limit: offence for offence in checked.offences}["l1.reach"]
     assert found.share == pytest.approx(0.5, abs=1e-3)
     assert "can't close" in found.text
     assert found.value == pytest.approx(900.0 + 75.0 + 230.0, rel=1e-9)  # what its rod would have to be
-    assert (checked.first.record, checked.off, checked.motions_off) == (1, 0, 1)
+    assert (checked.first.record, checked.broken_record_count, checked.broken_motion_count) == (1, 0, 1)
 
 
 def test_records_out_of_reach_are_left_to_their_own_offence():
@@ -360,8 +361,8 @@ def test_records_out_of_reach_are_left_to_their_own_offence():
     posted = posted_on(machine, poses)
     checked = between(posted)
     assert np.isnan(posted.joints[2]).any()
-    assert checked.off == posted.off == 1
-    assert checked.motions_off == 0
+    assert checked.broken_record_count == posted.broken_record_count == 1
+    assert checked.broken_motion_count == 0
     assert checked.first.record == 2
     assert checked.first.limit in machine.limits
     # It begins where its leg can't close any more.
@@ -459,7 +460,7 @@ def test_joints_that_are_whole_turns_off():
     turns[2:, 3] = -1.0
     checked = between(posted_on(machine, poses, turns=turns))
     assert [offence.limit for offence in checked.offences] == ["turns"]
-    assert (checked.first.record, checked.motions_off, checked.limits[-1]) == (2, 1, "turns")
+    assert (checked.first.record, checked.broken_motion_count, checked.limits[-1]) == (2, 1, "turns")
     assert checked.limits[checked.strays[2] - 1] == "turns"
     assert checked.first.value == pytest.approx(math.radians(130.0), abs=1e-9)
     text = "joint theta1 would turn by 130.0° from the record before, not by -230.0°"
@@ -484,7 +485,7 @@ def test_records_that_change_the_working_mode_far_from_the_pole():
     ends = np.array([pose(machine, X=300.0, Z=-1600.0, B=21.0, C=c) for c in (95.0, 265.0)])
     checked = between(posted_on(machine, ends))
     assert [offence.limit for offence in checked.offences] == ["turns"]
-    assert checked.motions_off == 1
+    assert checked.broken_motion_count == 1
     assert "at once" in checked.first.text
     dense = posted_on(machine, ends[0] + np.linspace(0.0, 1.0, 400)[:, None] * (ends[1] - ends[0]))
     assert between(dense).first is None
@@ -499,11 +500,11 @@ def test_a_parallel_singularity_is_found_where_the_rods_are_parallel():
     wide = ranged(machine, dict.fromkeys(machine.joints, (-9e3, 9e3)))
     rod = 400.0
     posted = posted_on(wide, [[200.0, 200.0], [300.0, 300.0], [310.0, 300.0], [250.0, 200.0]])
-    assert posted.off == 0
+    assert posted.broken_record_count == 0
     checked = between(posted)
     assert [offence.limit for offence in checked.offences] == ["singularity"]
     first = checked.first
-    assert (first.record, first.count, checked.motions_off) == (1, 2, 2)
+    assert (first.record, first.count, checked.broken_motion_count) == (1, 2, 2)
     assert 200.0 + 100.0 * first.begins == pytest.approx(rod / math.sqrt(2.0), abs=0.05)
     assert first.text == "the machine would pass a parallel singularity"
     assert between(posted_on(wide, [[200.0, 200.0], [282.0, 282.0], [200.0, 200.0]])).first is None
@@ -562,7 +563,7 @@ def test_what_takes_too_long_is_told(monkeypatch):
     checked = between(posted_on(machine, poses))
     assert [offence.limit for offence in checked.offences] == ["untold"]
     assert checked.first.text == "whether this motion keeps all limits can't be told"
-    assert (checked.first.record, checked.motions_off) == (1, 1)
+    assert (checked.first.record, checked.broken_motion_count) == (1, 1)
 
 
 @pytest.mark.parametrize("count", [0, 1])
@@ -580,7 +581,7 @@ def test_a_single_record_off_limits_keeps_its_offence():
     posted = posted_on(machine, [[0.0, 0.0, 700.0]])
     checked = between(posted)
     assert checked.first.text == posted.first.text
-    assert place(checked, checked.first) == "part.cls:101"
+    assert describe_place(checked, checked.first) == "part.cls:101"
     assert between(checked) is checked
 
 

@@ -10,7 +10,7 @@ import pytest
 
 import parakin as pk
 from parakin.toolpath.path import ToolPath
-from parakin.toolpath.posting.post import post
+from parakin.toolpath.posting.post import post_path
 from parakin.toolpath.reading.gcode.reader import compute_tool_axes
 
 DEGREE = math.pi / 180.0
@@ -90,8 +90,8 @@ def spirals(starts, stops, b=20.0, tip=(0.0, 0.0, 0.0), step=5.0, aside=20.0):
 def test_turns_are_taken_back_between_stretches_of_feed(name):
     machine = pk.load(name)
     path = spirals([0, 300, 600, 900], [300, 600, 900, 1200], tip=machine.home[:3] - [0, 0, 15])
-    posted = post(machine, path)
-    assert posted.off == 0
+    posted = post_path(machine, path)
+    assert posted.broken_record_count == 0
     assert posted.mode == machine.mode
     first = machine.wrist.first
     assert 1 <= len(posted.rewinds) <= 3  # 1200 deg in a range of 720
@@ -111,8 +111,8 @@ def test_turns_are_taken_back_between_stretches_of_feed(name):
 def test_no_turn_is_taken_back_where_one_count_serves():
     machine = pk.load("orthoglide5_table")
     path = spirals([-245, 50], [50, 445])  # the plate stands at 90 deg - C
-    posted = post(machine, path)
-    assert posted.off == 0
+    posted = post_path(machine, path)
+    assert posted.broken_record_count == 0
     assert posted.rewinds == ()
     assert np.abs(np.diff(posted.poses[:, 4])).max() < 6 * DEGREE
 
@@ -121,14 +121,14 @@ def test_a_path_without_rapids_breaks_as_few_records_as_can_be():
     machine = pk.load("orthoglide5_table")
     c = np.concatenate([np.linspace(0, 900, 181), np.full(100, 900.0)])
     path = path_of(machine.home[:3], axis_of(10.0, c))
-    posted = post(machine, path)
+    posted = post_path(machine, path)
     assert posted.rewinds == ()
     fewest = {}
     for mode in ("++++", "+++-"):
         angle = np.unwrap(machine.inverse(posted.poses, mode)[:, joint(machine, "c")])
         fewest[mode] = min(int((np.abs(angle + n * TURN) > TURN + 1e-12).sum()) for n in range(-5, 6))
-    assert posted.off == min(fewest.values()) > 0
-    assert post(machine, path, mode="++++").off == fewest["++++"] > posted.off
+    assert posted.broken_record_count == min(fewest.values()) > 0
+    assert post_path(machine, path, mode="++++").broken_record_count == fewest["++++"] > posted.broken_record_count
 
 
 def test_turns_against_every_choice_there_is():
@@ -138,7 +138,7 @@ def test_turns_against_every_choice_there_is():
     for _ in range(12):
         ends = np.cumsum(rng.uniform(-400, 500, 5))
         path = spirals(ends[:-1], ends[1:], step=29.0)
-        posted = post(machine, path)
+        posted = post_path(machine, path)
         cuts = [0, *(1 + np.flatnonzero(path.tip[1:, 2] + path.tip[:-1, 2] == 60.0)), len(path)]  # the ways between
         best = {}
         for mode in ("++++", "+++-"):
@@ -150,7 +150,7 @@ def test_turns_against_every_choice_there_is():
             best[mode] = min(choices)
         assert posted.mode == min(best, key=lambda mode: best[mode][0])
         taken = posted.joints[:, column]
-        assert (np.abs(taken) > TURN + 1e-12).sum() == posted.off == best[posted.mode][0]
+        assert (np.abs(taken) > TURN + 1e-12).sum() == posted.broken_record_count == best[posted.mode][0]
         assert np.abs(np.diff(taken)).sum() == pytest.approx(best[posted.mode][1], abs=1e-4)
         rewound += len(posted.rewinds)
     assert rewound > 5
@@ -160,9 +160,9 @@ def test_the_count_nearest_to_home():
     machine = pk.load("orthoglide5_table")
     column = joint(machine, "c")
     path = path_of(machine.home[:3], axis_of(10.0, np.linspace(-170, -350, 40)))
-    angle = np.unwrap(machine.inverse(post(machine, path).poses)[:, column])
+    angle = np.unwrap(machine.inverse(post_path(machine, path).poses)[:, column])
     spans = [(float(np.abs(angle + n * TURN).max()), n) for n in range(-2, 3)]
-    np.testing.assert_allclose(post(machine, path).joints[:, column], angle + min(spans)[1] * TURN, atol=1e-12)
+    np.testing.assert_allclose(post_path(machine, path).joints[:, column], angle + min(spans)[1] * TURN, atol=1e-12)
     assert min(spans)[0] < 352 * DEGREE
 
 
@@ -170,9 +170,9 @@ def test_upright_in_all_rapids_leaves_nothing_to_turn_back_with():
     machine = pk.load("orthoglide5_table")  # the tool stands along the plate's axis there: C turns nothing
     path = spirals([0, 300, 600, 900], [300, 600, 900, 1200])
     path = replace(path, axis=np.where(path.rapid[:, None], [0.0, 0.0, 1.0], path.axis))
-    posted = post(machine, path)
+    posted = post_path(machine, path)
     assert posted.rewinds == ()
-    assert posted.off > 0
+    assert posted.broken_record_count > 0
 
 
 def test_turning_back_breaks_no_limit_on_the_way():
@@ -181,8 +181,8 @@ def test_turning_back_breaks_no_limit_on_the_way():
     path = spirals([0, 340, 680, 1020], [340, 680, 1020, 1360], aside=0.0)
     above = path.tip[:, 2] > 0.0
     path.tip[above] += np.column_stack([np.tile([[-31.6, -146.6]], (8, 1)), np.tile([0.0, 10.0], 4)])
-    posted = post(machine, path)
-    assert posted.off == 0
+    posted = post_path(machine, path)
+    assert posted.broken_record_count == 0
     legs = [i for i, name in enumerate(machine.limits) if name.startswith("rho")]
 
     def swept(record):
@@ -208,18 +208,18 @@ def test_a_turn_programmed_in_one_motion_is_made(name, c):
     few = np.radians([[0.0, 20.0, 0.0], [0.0, 25.0, c], [0.0, 25.0, c + 10.0]])
     share = np.linspace(0.0, 1.0, 1001)[:, None]
     many = np.vstack([few[0] + share * (few[1] - few[0]), few[2:]])
-    posted, fine = (post(machine, path_of(machine.home[:3], compute_tool_axes(t), turns=t)) for t in (few, many))
+    posted, fine = (post_path(machine, path_of(machine.home[:3], compute_tool_axes(t), turns=t)) for t in (few, many))
     assert posted.poses[:, 3:].tolist() == few[:, 1:].tolist()
     way, finely = posted.joints - posted.joints[0], fine.joints - fine.joints[0]
     np.testing.assert_allclose(way, finely[[0, 1000, 1001]], atol=1e-9)
-    assert posted.off == 0
+    assert posted.broken_record_count == 0
 
 
 def test_too_many_turns_are_refused():
     turns = np.array([[0.0, 0.3, 0.0], [0.0, 0.3, 1e6]])
     machine = pk.load("tricept")
     with pytest.raises(pk.PoseError, match="record 1 makes 159,155 turns"):
-        post(machine, path_of(machine.home[:3], compute_tool_axes(turns), turns=turns))
+        post_path(machine, path_of(machine.home[:3], compute_tool_axes(turns), turns=turns))
 
 
 # Working modes.
@@ -228,39 +228,39 @@ def test_too_many_turns_are_refused():
 def test_the_other_mode_where_the_default_breaks_a_limit(tmp_path):
     machine = changed(tmp_path, "orthoglide5_head", "range: [-100 deg, 100 deg]", "range: [-100 deg, 10 deg]")
     path = path_of(machine.home[:3], axis_of(30.0, np.linspace(0, 200, 30)))
-    posted = post(machine, path)
+    posted = post_path(machine, path)
     assert posted.mode == machine.mode[:-1] + "-"
-    assert posted.off == 0
+    assert posted.broken_record_count == 0
     leads_to(posted, path)
-    given = post(machine, path, mode=machine.mode)
+    given = post_path(machine, path, mode=machine.mode)
     assert given.mode == machine.mode
-    assert given.off == 30
+    assert given.broken_record_count == 30
 
 
 def test_the_default_mode_where_both_serve():
     machine = pk.load("orthoglide5_head")
     path = path_of(machine.home[:3], axis_of(30.0, np.linspace(0, 200, 30)))
-    assert post(machine, path).mode == machine.mode
-    assert post(machine, path, mode=machine.mode[:-1] + "-").off == 0
+    assert post_path(machine, path).mode == machine.mode
+    assert post_path(machine, path, mode=machine.mode[:-1] + "-").broken_record_count == 0
 
 
 def test_the_other_mode_where_it_spares_a_flip(tmp_path):
     # From a lean of -5 to 20 deg over the upright: with theta2 above 0 first it would have to go to -20 then.
     machine = changed(tmp_path, "orthoglide5_head", "range: [-100 deg, 100 deg]", "range: [-10 deg, 100 deg]")
     path = path_of(machine.home[:3], axis_of(np.linspace(-5, 20, 12), 0.0))
-    default = post(machine, path, mode=machine.mode)
-    assert default.off == 0
+    default = post_path(machine, path, mode=machine.mode)
+    assert default.broken_record_count == 0
     column = joint(machine, "theta1")
     assert np.abs(np.diff(default.joints[:, column])).max() > 170 * DEGREE
-    posted = post(machine, path)
+    posted = post_path(machine, path)
     assert posted.mode == machine.mode[:-1] + "-"
-    assert posted.off == 0
+    assert posted.broken_record_count == 0
     assert np.abs(np.diff(posted.joints[:, column])).max() < 1e-6
 
 
 def test_legs_keep_their_modes():
     machine = pk.load("hbg80_2d")
     path = path_of([900.0, 230.0, 0.0], np.tile([0.0, 0.0, 1.0], (3, 1)))
-    posted = post(machine, path)
+    posted = post_path(machine, path)
     assert posted.mode == machine.mode
-    assert posted.off == 3
+    assert posted.broken_record_count == 3

@@ -348,7 +348,7 @@ def test_interruption(monkeypatch, part, out, capsys):
     def interrupted(*arguments, **options):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("parakin.toolpath.posting.post.judge", interrupted)
+    monkeypatch.setattr("parakin.toolpath.posting.post.judge_path", interrupted)
     assert main(["post", str(part), "-m", "tricept", "-o", str(out)]) == 130
     assert "Traceback" not in capsys.readouterr().err
     assert not out.exists()

@@ -12,7 +12,7 @@ import parakin as pk
 from parakin.toolpath.linearise.interpolation import Programmed, denser
 from parakin.toolpath.linearise.linearise import linearised
 from parakin.toolpath.path import Event, ToolPath
-from parakin.toolpath.posting.post import post
+from parakin.toolpath.posting.post import post_path
 
 DEGREE = math.pi / 180.0
 DENSE = 60  # shares of each motion that are looked at
@@ -150,7 +150,7 @@ def without(posted, result, j):
     path = result.path
     fields = ("tip", "axis", "line", "rapid", "feed", "spindle")
     less = replace(path, frame=None, **{name: np.delete(getattr(path, name), j, axis=0) for name in fields})
-    return post(posted.machine, less, workpiece=posted.frame, mode=posted.mode)
+    return post_path(posted.machine, less, workpiece=posted.frame, mode=posted.mode)
 
 
 # Within both tolerances, with the fewest points.
@@ -161,7 +161,7 @@ def without(posted, result, j):
 @pytest.mark.parametrize(("chord", "angle"), [(0.05, 1e-3), (0.005, 1e-2), (0.02, 1e-4)])
 def test_the_tool_stays_within_both_tolerances(name, under, chord, angle):
     machine, path = a_path(name)
-    posted = post(machine, path)
+    posted = post_path(machine, path)
     assert np.isfinite(posted.joints).all()
     result = linearised(posted, under, chord=chord, angle=angle)
     assert within(posted, result, under, chord, angle) <= 1.0
@@ -172,7 +172,7 @@ def test_the_tool_stays_within_both_tolerances(name, under, chord, angle):
 def test_lambda6_as_a_program_turns_it(under):
     machine = pk.load("lambda6")
     turns = np.radians([[5, -5, 30], [-8, 6, 45], [10, 10, 20]])
-    posted = post(machine, turned([[0, 0, 1400], [60, -40, 1420], [-50, 30, 1390]], turns))
+    posted = post_path(machine, turned([[0, 0, 1400], [60, -40, 1420], [-50, 30, 1390]], turns))
     result = linearised(posted, under, chord=0.02)
     assert within(posted, result, under, 0.02, 1e-3) <= 1.0
     assert (len(result.path) > 3) == (under == "joints")
@@ -186,7 +186,7 @@ def test_lambda6_as_a_program_turns_it(under):
 def test_no_point_can_be_spared(name, under):
     chord, angle = 0.05, 1e-4 if under == "pose" else 1e-3
     machine, path = a_path(name)
-    posted = post(
+    posted = post_path(
         machine, replace(path, **{f: getattr(path, f)[:2] for f in ("tip", "axis", "line", "rapid", "feed", "spindle")})
     )
     result = linearised(posted, under, chord=chord, angle=angle)
@@ -195,12 +195,12 @@ def test_no_point_can_be_spared(name, under):
     for j in range(1, count + 1):
         assert within(posted, without(posted, result, j), under, chord, angle) > 1.0
     even = denser(posted.path, np.ones(count - 1, int), np.arange(1, count) / count)
-    assert within(posted, post(machine, even), under, chord, angle) > 1.0
+    assert within(posted, post_path(machine, even), under, chord, angle) > 1.0
 
 
 def test_a_long_line_of_a_linear_delta():
     machine = pk.load("linear_delta")
-    posted = post(machine, path_of([[-100, 0, 280], [100, 0, 280]]))
+    posted = post_path(machine, path_of([[-100, 0, 280], [100, 0, 280]]))
     assert linearised(posted, "pose") is posted
     counts = []
     for chord in (0.1, 0.01, 0.001):
@@ -216,7 +216,7 @@ def test_a_dense_path_needs_nothing(under):
     machine = pk.load("tricept")
     t = np.linspace(0.0, 2.0, 400)
     path = path_of(np.column_stack([40 * np.cos(t), 40 * np.sin(t), -1650 + t]), axis_of(20 + t, 50 * t))
-    posted = post(machine, path)
+    posted = post_path(machine, path)
     assert linearised(posted, under, chord=0.01, angle=1e-3) is posted
 
 
@@ -235,7 +235,7 @@ def test_turns_of_a_program(under, angles):
     z = 0.0 if angles else -1650.0
     workpiece = pk.workpiece(Z=-1650, **angles) if angles else None
     turns = np.radians([[0, 20, 10], [0, 25, 200], [0, 25, 200], [0, -15, 230], [0, -15, 0]])
-    posted = post(
+    posted = post_path(
         machine, turned([[20, 0, z], [-20, 30, z], [20, 30, z], [0, 10, z], [0, 10, z]], turns), workpiece=workpiece
     )
     assert np.isfinite(posted.joints).all()
@@ -251,7 +251,7 @@ def test_whole_turns_in_one_motion_hide_nothing():
     for whole in (1, 2, 3):
         turns = np.vstack([start, start + [0, 0, whole * 2 * math.pi]])
         # The poses are not the turns.
-        posted = post(machine, turned([[0, 0, 0], [5, 0, 0]], turns), workpiece=pk.workpiece(B=20 * DEGREE))
+        posted = post_path(machine, turned([[0, 0, 0], [5, 0, 0]], turns), workpiece=pk.workpiece(B=20 * DEGREE))
         result = linearised(posted, "pose", angle=5e-3)
         assert within(posted, result, "pose", 0.01, 5e-3) <= 1.0
         assert len(result.path) > 10 * whole
@@ -283,19 +283,19 @@ def swing(posted):
 @pytest.mark.parametrize("miss", [0.0, 5e-5, 4e-4, 9e-4])
 @pytest.mark.parametrize("name", ["orthoglide5_head", "orthoglide5_table"])
 def test_a_pass_within_the_tolerance_is_led_through_the_pole(name, under, count, miss):
-    posted = post(pk.load(name), across(name, miss, count))
+    posted = post_path(pk.load(name), across(name, miss, count))
     result = linearised(posted, under, chord=0.05)
     assert within(posted, result, under, 0.05, 1e-3) <= 1.0
     assert swing(result) < 8.0
     assert not result.path.notes
-    assert result.off == 0
+    assert result.broken_record_count == 0
 
 
 @UNDER
 @pytest.mark.parametrize("count", [2, 201])
 @pytest.mark.parametrize("miss", [2e-3, 0.014])
 def test_a_pass_beside_the_pole_is_told(under, count, miss):
-    posted = post(pk.load("orthoglide5_head"), across("orthoglide5_head", miss, count))
+    posted = post_path(pk.load("orthoglide5_head"), across("orthoglide5_head", miss, count))
     result = linearised(posted, under, chord=0.05)
     assert within(posted, result, under, 0.05, 1e-3) <= 1.0
     assert swing(result) > 170.0
@@ -321,7 +321,7 @@ def test_the_wrist_of_a_tricept(under):
     tip[:] = tip.mean(0)
     for count, most in ((2, 4.0), (300, 4.0)):
         k = programmed(path_of(tip, axis), 1, np.linspace(0, 1, count))[1]
-        posted = post(machine, path_of(np.tile(tip[0], (count, 1)), k))
+        posted = post_path(machine, path_of(np.tile(tip[0], (count, 1)), k))
         result = linearised(posted, under, chord=0.02, angle=3e-3)
         assert within(posted, result, under, 0.02, 3e-3) <= 1.0
         assert swing(result) < most
@@ -336,7 +336,7 @@ def test_jitter_about_the_pole_is_stilled():
         np.column_stack([np.linspace(-20, 20, 80), np.zeros(80), np.full(80, -100.0)]),
         axis / np.linalg.norm(axis, axis=1)[:, None],
     )
-    posted = post(machine, path)
+    posted = post_path(machine, path)
     assert swing(posted) > 90.0
     result = linearised(posted, "joints")
     assert within(posted, result, "joints", 0.01, 1e-3) <= 1.0
@@ -347,7 +347,7 @@ def test_jitter_about_the_pole_is_stilled():
 def test_a_corner_on_the_pole_is_told():
     path = across("orthoglide5_head", 0.0, 3)
     path.axis[2] = axis_of(20.0, 120.0)  # came along 210 deg, goes on along 120
-    posted = post(pk.load("orthoglide5_head"), path)
+    posted = post_path(pk.load("orthoglide5_head"), path)
     result = linearised(posted, "joints", chord=0.05)
     assert within(posted, result, "joints", 0.05, 1e-3) <= 1.0
     assert [note.text for note in result.path.notes] == [
@@ -372,7 +372,7 @@ def test_lines_feeds_events_and_times():
         spindle=np.arange(4.0),
     )
     path = replace(path, line=np.array([10, 11, 12, 15]), tool={"number": 3.0})
-    posted = post(machine, path, workpiece=pk.workpiece(X=1, Y=2, Z=3))
+    posted = post_path(machine, path, workpiece=pk.workpiece(X=1, Y=2, Z=3))
     result = linearised(posted, "joints")
     new = result.path
     assert np.array_equal(result.frame, posted.frame)
@@ -396,7 +396,7 @@ def test_lines_feeds_events_and_times():
 
 def test_the_file_s_own_frame_stays():
     frame = np.column_stack([Rotation.from_euler("z", 40, degrees=True).as_matrix(), [10.0, -5.0, 280.0]])
-    posted = post(
+    posted = post_path(
         pk.load("linear_delta"), path_of([[-80, 0, 0], [80, 0, 0]], frame=frame), workpiece=pk.workpiece(X=1, Y=1)
     )
     result = linearised(posted, "joints")
@@ -404,7 +404,9 @@ def test_the_file_s_own_frame_stays():
 
 
 def test_rapid_motions_are_kept_to_their_lines():
-    posted = post(pk.load("linear_delta"), replace(path_of([[-100, 0, 280], [100, 0, 280]]), rapid=np.ones(2, bool)))
+    posted = post_path(
+        pk.load("linear_delta"), replace(path_of([[-100, 0, 280], [100, 0, 280]]), rapid=np.ones(2, bool))
+    )
     assert len(linearised(posted, "joints").path) > 20
 
 
@@ -414,10 +416,10 @@ def test_a_rapid_that_turns_back(under):
     turn = np.linspace(0, 1500, 500)
     around = np.column_stack([10 * np.cos(np.radians(turn)), 10 * np.sin(np.radians(turn)), 0 * turn])
     path = replace(path_of(around, axis_of(np.full(500, 12.0), turn)), rapid=np.arange(500) % 90 == 89)
-    posted = post(machine, path)
-    assert posted.rewinds and posted.off == 0
+    posted = post_path(machine, path)
+    assert posted.rewinds and posted.broken_record_count == 0
     result = linearised(posted, under)
-    assert result.off == 0
+    assert result.broken_record_count == 0
     if under == "pose":
         assert result.rewinds == posted.rewinds
         return
@@ -439,7 +441,7 @@ def test_a_rapid_that_turns_back(under):
 def test_paths_with_nothing_to_do():
     machine = pk.load("tricept")
     for tip in (np.empty((0, 3)), [[0, 0, -1650]]):
-        posted = post(machine, path_of(np.reshape(tip, (-1, 3))))
+        posted = post_path(machine, path_of(np.reshape(tip, (-1, 3))))
         for under in ("pose", "joints"):
             assert linearised(posted, under) is posted
 
@@ -448,7 +450,7 @@ def test_paths_with_nothing_to_do():
 @pytest.mark.parametrize("name", ["orthoglide5_head", "orthoglide5_table", "tricept"])
 def test_an_upright_tool_stays_on_the_pole(name, under):
     machine = pk.load(name)
-    posted = post(machine, path_of(machine.home[:3] + np.array([[0, 0, 0], [0.5, 0, 0], [0.5, 0.5, 0]])))
+    posted = post_path(machine, path_of(machine.home[:3] + np.array([[0, 0, 0], [0.5, 0, 0], [0.5, 0.5, 0]])))
     result = linearised(posted, under)
     assert within(posted, result, under, 0.01, 1e-3) <= 1.0
     assert len(result.path) == 3 and not result.path.notes
@@ -456,7 +458,7 @@ def test_an_upright_tool_stays_on_the_pole(name, under):
 
 @UNDER
 def test_records_out_of_reach_are_left_alone(under):
-    posted = post(
+    posted = post_path(
         pk.load("linear_delta"), path_of([[-100, 0, 280], [0, 0, 280], [2000, 0, 280], [0, 0, 280], [0, 100, 280]])
     )
     result = linearised(posted, under)
@@ -469,11 +471,11 @@ def test_records_out_of_reach_are_left_alone(under):
 
 def test_a_motion_out_of_reach_in_between_is_an_offence():
     machine = pk.load(str(Path(__file__).parent / "machines" / "sector.yaml"))
-    posted = post(machine, path_of([[234, -112, 0], [254, 170, 0]]))
+    posted = post_path(machine, path_of([[234, -112, 0], [254, 170, 0]]))
     assert np.isfinite(posted.joints).all()
     assert not np.isfinite(machine.inverse(0.5 * (posted.poses[0] + posted.poses[1]))).all()
     result = linearised(posted, "joints")
-    assert result.off > posted.off
+    assert result.broken_record_count > posted.broken_record_count
     lost = np.flatnonzero(~np.isfinite(result.joints).all(axis=1))
     assert len(lost) == 1 and result.path.line[lost[0]] == 11
     assert result.offences[0].line == 11
@@ -482,7 +484,7 @@ def test_a_motion_out_of_reach_in_between_is_an_offence():
 
 def test_opposite_axes_are_refused_with_their_line():
     path = path_of([[0, 0, -950], [10, 0, -950]], [[0.0, 0.0, 1.0], [0.0, 0.0, -1.0]])
-    posted = post(pk.load("hexapod"), path)
+    posted = post_path(pk.load("hexapod"), path)
     if np.isfinite(posted.joints).all():
         with pytest.raises(pk.PoseError, match=r"part\.cls:11: the tool axis turns to its opposite"):
             linearised(posted, "pose")
@@ -492,7 +494,7 @@ def test_opposite_axes_are_refused_with_their_line():
 
 @pytest.mark.parametrize("bad", [{"chord": 0.0}, {"chord": math.nan}, {"angle": -1.0}, {"angle": math.inf}])
 def test_bad_tolerances(bad):
-    posted = post(pk.load("tricept"), path_of([[0, 0, -1650]]))
+    posted = post_path(pk.load("tricept"), path_of([[0, 0, -1650]]))
     with pytest.raises(pk.PoseError, match=next(iter(bad))):
         linearised(posted, "pose", **bad)
     with pytest.raises(pk.PoseError, match="under"):

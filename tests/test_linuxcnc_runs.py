@@ -15,7 +15,7 @@ from geometry import Description
 import parakin as pk
 from parakin.controllers import linuxcnc_program, program_seconds
 from parakin.toolpath.job import prepare
-from parakin.toolpath.posting.post import post
+from parakin.toolpath.posting.post import post_path
 from parakin.toolpath.reading.detect import read_path
 from parakin.toolpath.timing import plan_trajectory
 
@@ -216,7 +216,7 @@ def test_with_the_programmed_feed_a_joint_passes_its_speed(machine, linuxcnc, tm
 
 @pytest.mark.parametrize("machine", ["tricept"], indirect=True)
 def test_a_wrist_goes_on_in_its_other_mode_and_stops_are_kept(machine, linuxcnc, tmp_path):
-    posted = post(machine, first_passes(machine, tmp_path, feed=2500.0, count=25).programmed.path, mode="-")
+    posted = post_path(machine, first_passes(machine, tmp_path, feed=2500.0, count=25).programmed.path, mode="-")
     trajectory = plan_trajectory(posted, corners="stop")
     text = written(trajectory)
     run = linuxcnc.run({"program": "part.ngc"}, {"part.ngc": text})

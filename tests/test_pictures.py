@@ -15,9 +15,9 @@ from parakin.export.ranges import shown
 from parakin.export.report.curves import extremes
 from parakin.export.report.report import report_html
 from parakin.toolpath.path import Note, ToolPath
-from parakin.toolpath.posting.post import post
+from parakin.toolpath.posting.post import post_path
 from parakin.toolpath.posting.posted import Posted
-from parakin.toolpath.posting.range_use import used
+from parakin.toolpath.posting.range_use import measure_range_use
 from parakin.toolpath.reading.cl.reader import read_cl
 
 OWN = Path(__file__).parent / "machines" / "rpr3.yaml"
@@ -202,7 +202,7 @@ def check_nothing_is_loaded(html):
 
 @machines
 def test_clean_path_runs(machine):
-    html = report_html(post(machine, path_of(*clean(machine))))
+    html = report_html(post_path(machine, path_of(*clean(machine))))
     check_nothing_is_loaded(html)
     assert "<strong>Runs</strong>" in html
     assert "<h2>Offences</h2>" not in html
@@ -224,7 +224,7 @@ def test_off_limits_says_where_and_how_much(tmp_path):
     part = tmp_path / "part.cls"
     lines = [f"GOTO/{x},0,-1650,0,0,1" for x in (0, 10, 20, 900, 30, 950)]
     part.write_text("\n".join(["TOOL PATH/A", *lines]) + "\n")
-    posted = post(machine, read_cl(part))
+    posted = post_path(machine, read_cl(part))
     html = report_html(posted)
     assert posted.first is not None
     assert "<strong>Does not run</strong>" in html
@@ -251,13 +251,13 @@ def test_nothing_to_run():
 @pytest.mark.parametrize("n", [1, 2])
 def test_very_short_paths(n):
     machine = LOADED["tricept"]
-    html = report_html(post(machine, path_of(np.tile(tip_of(machine, machine.home), (n, 1)))))
+    html = report_html(post_path(machine, path_of(np.tile(tip_of(machine, machine.home), (n, 1)))))
     assert "<strong>Runs</strong>" in html
 
 
 def test_everything_out_of_reach():
     machine = LOADED["linear_delta"]
-    html = report_html(post(machine, path_of(circles(machine, 30, 5.0) + np.array([9000.0, 0.0, 0.0]))))
+    html = report_html(post_path(machine, path_of(circles(machine, 30, 5.0) + np.array([9000.0, 0.0, 0.0]))))
     assert "<strong>Does not run</strong>" in html
     assert "never reached" in html
 
@@ -268,7 +268,7 @@ def test_untrusted_text_is_escaped(tmp_path):
     part = tmp_path / evil.replace("/", "_")
     part.write_text(f"GOTO/0,0,-1650 $$ {evil}\n" * 30)
     notes = (Note(1, f"unknown word {evil}"), Note(0, evil))
-    posted = post(machine, path_of(np.array([[900.0, 0, -1650], [0, 0, -1650]]), str(part), notes=notes))
+    posted = post_path(machine, path_of(np.array([[900.0, 0, -1650], [0, 0, -1650]]), str(part), notes=notes))
     text = own_text(report_html(posted))
     assert "<img" not in text
     assert "alert(1)</script>" not in text
@@ -282,9 +282,9 @@ def test_long_paths_stay_small_and_keep_extremes():
     tip = circles(machine, n, 700.0)
     tip[77_777, 2] += 40.0
     rapid = np.arange(n) % 50 < 5
-    posted = post(machine, path_of(tip, rapid=rapid))
+    posted = post_path(machine, path_of(tip, rapid=rapid))
     html = report_html(posted)
-    assert posted.off > 10_000
+    assert posted.broken_record_count > 10_000
     assert len(html) < 8_000_000
     for curve, values in zip(figures_of(html)["curves"]["data"][::2], posted.joints.T, strict=True):
         y = [v for v in curve["y"] if v is not None]
@@ -296,8 +296,8 @@ def test_long_paths_stay_small_and_keep_extremes():
 
 def test_use_agrees_with_the_joints():
     machine = LOADED["lambda6"]
-    posted = post(machine, path_of(circles(machine, 500, 300.0)))
-    uses, relative = used(posted)
+    posted = post_path(machine, path_of(circles(machine, 500, 300.0)))
+    uses, relative = measure_range_use(posted)
     for use, drive, values in zip(uses, machine.model.drives, posted.joints.T, strict=False):
         assert (use.low, use.high) == (drive.low, drive.high)
         assert (use.least, use.most) == pytest.approx((values.min(), values.max()))

@@ -11,9 +11,9 @@ import pytest
 import parakin as pk
 from parakin.commands.workpiece import parse_bounds
 from parakin.toolpath.path import ToolPath
-from parakin.toolpath.placing.placement import placed
-from parakin.toolpath.posting.frames import transform
-from parakin.toolpath.posting.post import post
+from parakin.toolpath.placing.placement import find_placement
+from parakin.toolpath.posting.frames import frame_from_angles
+from parakin.toolpath.posting.post import post_path
 
 DEGREE = math.pi / 180.0
 
@@ -38,7 +38,7 @@ def scattered(seed, count, size, tilt=0.0):
 
 def least(machine, path, workpiece, mode=None):
     """The least margin over half its range, reckoned from the drives and limits one by one; NaN where a leg fails."""
-    posted = post(machine, path, workpiece=workpiece, mode=mode)
+    posted = post_path(machine, path, workpiece=workpiece, mode=mode)
     if any(offence.limit in ("tilt", "X", "Y", "Z") for offence in posted.offences):
         return math.nan
     margins = machine.margins(posted.poses, posted.joints, posted.mode).min(axis=0)
@@ -61,7 +61,7 @@ def on_grid(machine, path, bounds, each):
     best = -math.inf
     for values in itertools.product(*axes):
         named = dict(zip(bounds, values, strict=True))
-        worth = least(machine, path, transform(*(named.get(letter, 0.0) for letter in "XYZABC")))
+        worth = least(machine, path, frame_from_angles(*(named.get(letter, 0.0) for letter in "XYZABC")))
         best = max(best, -math.inf if math.isnan(worth) else worth)
     return best
 
@@ -79,7 +79,7 @@ CASES = [
 @pytest.mark.parametrize(("name", "path", "text", "each", "near"), CASES)
 def test_no_placement_of_a_grid_is_better(name, path, text, each, near):
     machine, bounds = pk.load(name), parse_bounds(text)
-    found = placed(machine, path, bounds)
+    found = find_placement(machine, path, bounds)
     best = on_grid(machine, path, bounds, each)
     assert best > 0.2
     assert best - 1e-9 <= found.margin <= best + near  # and not more than the grid is coarse
@@ -88,8 +88,8 @@ def test_no_placement_of_a_grid_is_better(name, path, text, each, near):
     assert list(found.values) == list(bounds)
     assert all(low <= found.values[axis] <= high for axis, (low, high) in bounds.items())
     values = [found.values.get(letter, 0.0) for letter in "XYZABC"]
-    np.testing.assert_array_equal(found.workpiece, transform(*values))
-    posted = post(machine, path, workpiece=found.workpiece, mode=found.mode)
+    np.testing.assert_array_equal(found.workpiece, frame_from_angles(*values))
+    posted = post_path(machine, path, workpiece=found.workpiece, mode=found.mode)
     margin = machine.margins(posted.poses, posted.joints, posted.mode)[:, machine.limits.index(found.limit)]
     assert margin.argmin() == found.record
 
@@ -97,7 +97,7 @@ def test_no_placement_of_a_grid_is_better(name, path, text, each, near):
 def test_a_round_part_belongs_in_the_middle():
     angle = np.arange(24) * 15 * DEGREE
     path = path_of(150.0 * np.column_stack([np.cos(angle), np.sin(angle), 0.0 * angle]))
-    found = placed(pk.load("linear_delta"), path, parse_bounds("X=-90:120,Y=-110:80,Z=280"))
+    found = find_placement(pk.load("linear_delta"), path, parse_bounds("X=-90:120,Y=-110:80,Z=280"))
     assert abs(found.values["X"]) < 1e-3
     assert abs(found.values["Y"]) < 1e-3
     assert found.values["Z"] == 280.0
@@ -105,13 +105,13 @@ def test_a_round_part_belongs_in_the_middle():
 
 def test_a_square_part_belongs_on_the_diagonal_of_two_equal_drives():
     path = path_of([[x, y, 0.0] for x in (-90, 90) for y in (-90, 90)])
-    found = placed(pk.load("hbg80_2d"), path, parse_bounds("X=0:400,Y=50:390"))
+    found = find_placement(pk.load("hbg80_2d"), path, parse_bounds("X=0:400,Y=50:390"))
     assert found.values["X"] == pytest.approx(found.values["Y"], abs=1e-4)
 
 
 def test_the_same_again():
     machine, path, bounds = pk.load("tricept"), scattered(7, 80, [50, 50, 20], 10), parse_bounds(CASES[4][2])
-    one, two = (placed(machine, path, bounds) for _ in range(2))
+    one, two = (find_placement(machine, path, bounds) for _ in range(2))
     assert one.values == two.values
     assert (one.margin, one.limit, one.record, one.tried) == (two.margin, two.limit, two.record, two.tried)
 
@@ -119,10 +119,10 @@ def test_the_same_again():
 def test_on_top_of_the_files_own_frame():
     machine, path = pk.load("linear_delta"), scattered(8, 40, [100, 90, 40])
     bounds = parse_bounds("X=-100:100,Y=-100:100,Z=150:450")
-    shifted = replace(path, frame=transform(30.0, -20.0, 10.0, 0.0, 0.0, 0.0))
-    one, two = (placed(machine, each, bounds) for each in (path, shifted))
+    shifted = replace(path, frame=frame_from_angles(30.0, -20.0, 10.0, 0.0, 0.0, 0.0))
+    one, two = (find_placement(machine, each, bounds) for each in (path, shifted))
     assert one.margin == pytest.approx(two.margin, abs=1e-6)
-    assert post(machine, shifted, workpiece=two.workpiece).off == 0
+    assert post_path(machine, shifted, workpiece=two.workpiece).broken_record_count == 0
     assert two.values["X"] + 30.0 == pytest.approx(one.values["X"], abs=0.1)
 
 
@@ -134,9 +134,9 @@ def test_a_record_that_is_not_on_the_outside():
     lean[2345] = 70.0
     path = path_of(tip, axis_of(lean, 20.0 + lean))
     machine, bounds = pk.load("tricept"), parse_bounds("X=-200:200,Y=-200:200,Z=-2000:-1400")
-    found = placed(machine, path, bounds)
+    found = find_placement(machine, path, bounds)
     assert found.record == 2345
-    assert found.margin < placed(machine, spread, bounds).margin - 0.05
+    assert found.margin < find_placement(machine, spread, bounds).margin - 0.05
     assert least(machine, path, found.workpiece, found.mode) == pytest.approx(found.margin, abs=1e-12)
     for way in itertools.product((-3.0, 0.0, 3.0), repeat=3):
         near = found.workpiece.copy()
@@ -151,7 +151,7 @@ def test_turns_of_the_path_as_a_whole_count():
     c = np.linspace(0.0, 640.0, 300)
     path = path_of(np.zeros((300, 3)), axis_of(np.full(300, 10.0), c))
     bounds = parse_bounds("C=-180:180")
-    found = placed(machine, path, bounds, mode=machine.mode)
+    found = find_placement(machine, path, bounds, mode=machine.mode)
     assert found.margin == pytest.approx(40.0 / 360.0, abs=1e-4)
     assert found.limit in ("c.min", "c.max")
 
@@ -159,37 +159,37 @@ def test_turns_of_the_path_as_a_whole_count():
 def test_none_where_the_part_is_too_large():
     machine = pk.load("linear_delta")
     path = path_of([[x, y, 0.0] for x in (-400, 400) for y in (-400, 400)])
-    found = placed(machine, path, parse_bounds("X=-100:100,Y=-100:100,Z=0:500"))
+    found = find_placement(machine, path, parse_bounds("X=-100:100,Y=-100:100,Z=0:500"))
     assert not found.allowed
     assert found.margin < 0.0
-    posted = post(machine, path, workpiece=found.workpiece, mode=found.mode)
+    posted = post_path(machine, path, workpiece=found.workpiece, mode=found.mode)
     assert posted.broken[found.record]
     assert found.limit in {offence.limit for offence in posted.offences}
 
 
 def test_none_where_the_tool_would_have_to_lean():
     path = path_of([[0, 0, 0], [20, 0, 0]], axis_of([0.0, 10.0], [0.0, 0.0]))
-    found = placed(pk.load("linear_delta"), path, parse_bounds("X=-50:50,Z=250:300"))
+    found = find_placement(pk.load("linear_delta"), path, parse_bounds("X=-50:50,Z=250:300"))
     assert (found.limit, found.record) == ("tilt", 1)
     assert found.margin == pytest.approx(1e-4 - 10 * DEGREE, abs=1e-9)
 
 
 def test_found_from_far_off():
     machine, path = pk.load("linear_delta"), scattered(3, 40, [80, 80, 20])
-    found = placed(machine, path, parse_bounds("X=-4m:4m,Y=-4m:4m,Z=-3m:3m"))
+    found = find_placement(machine, path, parse_bounds("X=-4m:4m,Y=-4m:4m,Z=-3m:3m"))
     assert found.margin == pytest.approx(
-        placed(machine, path, parse_bounds("X=-99:99,Y=-99:99,Z=99:499")).margin, abs=1e-6
+        find_placement(machine, path, parse_bounds("X=-99:99,Y=-99:99,Z=99:499")).margin, abs=1e-6
     )
-    tilted = placed(machine, path, parse_bounds("X=-1m:1m,Y=-1m:1m,Z=-1m:1m,A=-9:7"))  # upright to 1e-4 rad
+    tilted = find_placement(machine, path, parse_bounds("X=-1m:1m,Y=-1m:1m,Z=-1m:1m,A=-9:7"))  # upright to 1e-4 rad
     assert tilted.allowed
     assert abs(tilted.values["A"]) <= 1.01e-4
 
 
 def test_a_single_placement():
     machine, path = pk.load("tricept"), scattered(10, 50, [100, 100, 30], 20)
-    found = placed(machine, path, parse_bounds("X=10,Z=-1650"))
+    found = find_placement(machine, path, parse_bounds("X=10,Z=-1650"))
     assert found.values == {"X": 10.0, "Z": -1650.0}
-    assert found.margin == pytest.approx(least(machine, path, "10,0,-1650"), abs=1e-12)
+    assert found.margin == pytest.approx(least(machine, path, pk.workpiece(X=10, Z=-1650)), abs=1e-12)
 
 
 def test_the_other_mode_where_the_default_allows_none(tmp_path):
@@ -197,15 +197,17 @@ def test_the_other_mode_where_the_default_allows_none(tmp_path):
     (file := tmp_path / "head.yaml").write_text(text.replace("[-100 deg, 100 deg]", "[-100 deg, 5 deg]"))
     machine, path = pk.load(file), scattered(11, 30, [30, 30, 30], 30)
     bounds = parse_bounds("X=-50:50,Y=-50:50,Z=-150:-50")
-    found = placed(machine, path, bounds)
+    found = find_placement(machine, path, bounds)
     assert found.allowed
     assert found.mode == machine.mode[:-1] + "-"
-    assert not placed(machine, path, bounds, mode=machine.mode).allowed
+    assert not find_placement(machine, path, bounds, mode=machine.mode).allowed
 
 
 def test_progress():
     said = []
-    placed(pk.load("linear_delta"), scattered(3, 40, [80, 80, 20]), parse_bounds("X=-9:9,Z=280"), progress=said.append)
+    find_placement(
+        pk.load("linear_delta"), scattered(3, 40, [80, 80, 20]), parse_bounds("X=-9:9,Z=280"), progress=said.append
+    )
     assert said == sorted(said)
     assert said[-1] == 1.0
 
@@ -214,8 +216,8 @@ def test_questions_that_make_no_sense():
     machine, path = pk.load("linear_delta"), path_of([0, 0, 0])
     for bounds in ({"Q": (0.0, 1.0)}, {"X": (1.0, 0.0)}, {"X": (0.0, math.inf)}, {"X": (math.nan, 1.0)}):
         with pytest.raises(pk.PoseError, match="bounds: "):
-            placed(machine, path, bounds)
+            find_placement(machine, path, bounds)
     with pytest.raises(pk.PoseError, match="no records"):
-        placed(machine, path_of(np.empty((0, 3))), {"X": (0.0, 1.0)})
+        find_placement(machine, path_of(np.empty((0, 3))), {"X": (0.0, 1.0)})
     with pytest.raises(pk.PoseError, match="mode"):
-        placed(machine, path, {"X": (0.0, 1.0)}, mode="?")
+        find_placement(machine, path, {"X": (0.0, 1.0)}, mode="?")

@@ -16,8 +16,8 @@ import parakin as pk
 from parakin.export.files import write_all
 from parakin.export.tables import joints as table
 from parakin.toolpath.path import ToolPath
-from parakin.toolpath.posting.frames import tool_poses, transform
-from parakin.toolpath.posting.post import post
+from parakin.toolpath.posting.frames import compute_poses, frame_from_angles
+from parakin.toolpath.posting.post import post_path
 from parakin.toolpath.reading.cl.reader import read_cl
 from parakin.toolpath.reading.gcode.reader import read_gcode
 
@@ -41,7 +41,7 @@ def home_of(machine):
     """Tool tip and axis at home."""
     home = dict(zip(machine.axes, machine.home.tolist(), strict=True))
     a, b, c = (home.get(letter, 0.0) for letter in "ABC")
-    return np.array([home.get(letter, 0.0) for letter in "XYZ"]), transform(0, 0, 0, a, b, c)[:, 2]
+    return np.array([home.get(letter, 0.0) for letter in "XYZ"]), frame_from_angles(0, 0, 0, a, b, c)[:, 2]
 
 
 def small_part(machine):
@@ -59,11 +59,11 @@ def test_option_goes_on_top_of_the_files_frame(tmp_path):
     # File: 90 deg about Z, origin (1, 2, 3): (1, 0, 0) -> (1, 3, 3). Option: 90 deg about Z, then (10, 20, 30).
     part = tmp_path / "part.aptsource"
     part.write_text("$$*CATIA0\n$$ 0 -1 0 1\n$$ 1 0 0 2\n$$ 0 0 1 3\nGOTO/1,0,0,0.6,0,0.8\n")
-    posted = post(pk.load("tricept"), read_cl(part), workpiece=pk.workpiece(X=10, Y=20, Z=30, C=90 * DEGREE))
+    posted = post_path(pk.load("tricept"), read_cl(part), workpiece=pk.workpiece(X=10, Y=20, Z=30, C=90 * DEGREE))
     np.testing.assert_allclose(posted.poses[0, :3], [-3 + 10, 1 + 20, 3 + 30], atol=1e-12)
     # The axis (0.6, 0, 0.8) turns with both frames, by 180 deg.
     np.testing.assert_allclose(posted.poses[0, 3:], [math.atan2(0.6, 0.8), math.pi], atol=1e-12)
-    alone = post(pk.load("tricept"), read_cl(part))
+    alone = post_path(pk.load("tricept"), read_cl(part))
     np.testing.assert_allclose(alone.poses[0, :3], [1, 3, 3], atol=1e-12)
 
 
@@ -73,7 +73,7 @@ def test_three_turns_give_the_axis_with_c_as_at_home(name):
     rng = np.random.default_rng(7)
     axis = rng.normal(size=(200, 3))
     axis /= np.linalg.norm(axis, axis=1)[:, None]
-    poses, own = tool_poses(machine, np.zeros((200, 3)), axis, transform(0, 0, 0, 0, 0, 0))
+    poses, own = compute_poses(machine, np.zeros((200, 3)), axis, frame_from_angles(0, 0, 0, 0, 0, 0))
     assert not own
     assert np.all(poses[:, 5] == machine.home[5])
     np.testing.assert_allclose([rotation(*pose[3:])[:, 2] for pose in poses], axis, atol=1e-12)
@@ -87,17 +87,17 @@ def test_c_and_theta1_are_continuous_through_upright():
     machine = pk.load("tricept")
     lean = np.concatenate([np.linspace(10, 0, 41), np.zeros(9), np.linspace(0, 10, 41)])
     turn = np.where(np.arange(len(lean)) < 45, 170.0, -175.0)  # 15 deg apart, over the seam of atan2
-    posted = post(machine, path_of(np.tile([0.0, 0.0, -1650.0], (len(lean), 1)), axis_of(lean, turn)))
+    posted = post_path(machine, path_of(np.tile([0.0, 0.0, -1650.0], (len(lean), 1)), axis_of(lean, turn)))
     c = posted.poses[:, 4]
     np.testing.assert_allclose(c[:50], 170 * DEGREE, atol=1e-9)
     np.testing.assert_allclose(c[-40:], 185 * DEGREE, atol=1e-9)
     theta1 = posted.joints[:, list(machine.joints).index("theta1")]
     assert np.max(np.abs(np.diff(theta1))) < 16 * DEGREE
-    assert posted.off == 0
+    assert posted.broken_record_count == 0
 
 
 def test_upright_throughout_leaves_c_at_zero():
-    posted = post(pk.load("tricept"), path_of(np.tile([0.0, 0.0, -1650.0], (5, 1))))
+    posted = post_path(pk.load("tricept"), path_of(np.tile([0.0, 0.0, -1650.0], (5, 1))))
     assert np.all(posted.poses[:, 3:] == 0.0)
 
 
@@ -106,7 +106,7 @@ def test_turns_are_counted_into_the_drives_range(start, end):
     machine = pk.load("orthoglide5_table")
     tip, _ = home_of(machine)
     turn = np.linspace(start, end, 1401)
-    posted = post(machine, path_of(np.tile(tip, (len(turn), 1)), axis_of(5.0, turn)))
+    posted = post_path(machine, path_of(np.tile(tip, (len(turn), 1)), axis_of(5.0, turn)))
     c = posted.joints[:, list(machine.joints).index("c")]
     assert np.ptp(c) == pytest.approx(680 * DEGREE, abs=1e-6)
     assert np.max(np.abs(np.diff(c))) < 1 * DEGREE
@@ -122,9 +122,9 @@ def test_leg_too_long_is_told_with_its_line(tmp_path):
     # On the axis the struts are sqrt((R - r)² + p²) long with p = -Z - l1 - l2.
     part = tmp_path / "part.cls"
     part.write_text("GOTO/0,0,-1650,0,0,1\nGOTO/0,0,-2050\n$$ aside\nGOTO/0,0,-2060\nGOTO/0,0,-1650\n")
-    posted = post(pk.load("tricept"), read_cl(part))
+    posted = post_path(pk.load("tricept"), read_cl(part))
     assert posted.broken.tolist() == [0, 1 + posted.limits.index("d1.max"), 1 + posted.limits.index("d1.max"), 0]
-    assert posted.off == 2
+    assert posted.broken_record_count == 2
     length = math.hypot(250, 1610)
     worst = {offence.limit: offence for offence in posted.offences}["d2.max"]
     assert (worst.line, worst.record, worst.count, worst.unit) == (4, 2, 2, "mm")
@@ -138,13 +138,13 @@ def test_leg_too_long_is_told_with_its_line(tmp_path):
 
 def test_slight_excess_shows_enough_digits():
     z = -450 - math.sqrt(1520.0003**2 - 250**2)
-    posted = post(pk.load("tricept"), path_of([0, 0, z]))
+    posted = post_path(pk.load("tricept"), path_of([0, 0, z]))
     assert "would be 1,520.0003 mm, limit 1,520" in posted.offences[0].text
 
 
 def test_out_of_reach_is_an_offence():
     machine = pk.load("linear_delta")
-    posted = post(machine, path_of([[0, 0, 280], [1000, 0, 280]]))
+    posted = post_path(machine, path_of([[0, 0, 280], [1000, 0, 280]]))
     assert np.isnan(posted.joints[1]).any()
     by_name = {offence.limit: offence for offence in posted.offences}
     off = math.hypot(1000, 350 - 60) - 700
@@ -155,14 +155,14 @@ def test_out_of_reach_is_an_offence():
 
 
 def test_tilt_of_a_machine_without_turns():
-    posted = post(pk.load("linear_delta"), path_of([[0, 0, 280]] * 3, axis_of([0, 12.3, 5e-4 * DEGREE], 40.0)))
+    posted = post_path(pk.load("linear_delta"), path_of([[0, 0, 280]] * 3, axis_of([0, 12.3, 5e-4 * DEGREE], 40.0)))
     assert [posted.limits[b - 1] if b else "" for b in posted.broken] == ["", "tilt", ""]
     assert posted.first.text == "tool axis would lean 12.3°, the machine keeps it upright"
     assert posted.first.value == pytest.approx(12.3 * DEGREE)
 
 
 def test_out_of_the_plane_of_a_planar_machine():
-    posted = post(pk.load("hbg80_2d"), path_of([[230, 230, 0], [230, 230, 5], [230, 230, 1e-7]]))
+    posted = post_path(pk.load("hbg80_2d"), path_of([[230, 230, 0], [230, 230, 5], [230, 230, 1e-7]]))
     assert [posted.limits[b - 1] if b else "" for b in posted.broken] == ["", "Z", ""]
     assert posted.first.text == "Z would be 5.0 mm, the machine works in Z = 0"
 
@@ -191,7 +191,7 @@ def planar(folder, across):
 
 def test_planar_machine_that_turns_about_its_tool(tmp_path):
     machine = planar(tmp_path, "Z")
-    posted = post(machine, path_of([[10, 300, 0]] * 3, axis_of([0, 20, 0], 70.0)))
+    posted = post_path(machine, path_of([[10, 300, 0]] * 3, axis_of([0, 20, 0], 70.0)))
     np.testing.assert_allclose(posted.poses, [[10, 300, 0]] * 3, atol=1e-12)
     assert [offence.limit for offence in posted.offences] == ["tilt"]
     assert posted.offences[0].value == pytest.approx(20 * DEGREE)
@@ -199,7 +199,7 @@ def test_planar_machine_that_turns_about_its_tool(tmp_path):
 
 def test_upright_planar_machine_tilts_in_its_plane(tmp_path):
     machine = planar(tmp_path, "Y")
-    posted = post(machine, path_of([[10, 0, 300]] * 3, axis_of([10, 15, 15], [0, 180, 90])))
+    posted = post_path(machine, path_of([[10, 0, 300]] * 3, axis_of([10, 15, 15], [0, 180, 90])))
     np.testing.assert_allclose(posted.poses[:2], [[10, 300, 10 * DEGREE], [10, 300, -15 * DEGREE]], atol=1e-12)
     assert [posted.limits[b - 1] if b else "" for b in posted.broken] == ["", "", "tilt"]
     assert posted.first.value == pytest.approx(15 * DEGREE)
@@ -209,8 +209,8 @@ def test_upright_planar_machine_tilts_in_its_plane(tmp_path):
 def test_every_machine_takes_a_small_part(name):
     machine = pk.load(name)
     path = small_part(machine)
-    posted = post(machine, path)
-    assert posted.off == 0, [offence.text for offence in posted.offences]
+    posted = post_path(machine, path)
+    assert posted.broken_record_count == 0, [offence.text for offence in posted.offences]
     assert not machine.check(posted.poses, posted.joints).any()
     assert np.isfinite(posted.joints).all()
     assert np.max(np.abs(np.diff(posted.joints, axis=0))) < 60  # mm, for steps of 5
@@ -222,7 +222,7 @@ def test_every_machine_takes_a_small_part(name):
 @pytest.mark.parametrize("name", pk.machines())
 def test_no_machine_is_silent_about_what_it_cant_do(name):
     machine = pk.load(name)
-    posted = post(machine, path_of([[5000, 5000, 9000]] * 3, axis_of(150.0, [0, 50, 100])))
+    posted = post_path(machine, path_of([[5000, 5000, 9000]] * 3, axis_of(150.0, [0, 50, 100])))
     assert posted.broken.all()
     assert posted.offences
     assert all("nan" not in offence.text for offence in posted.offences)
@@ -233,7 +233,7 @@ def test_counts_agree_with_the_margins():
     rng = np.random.default_rng(3)
     tip, axis = home_of(machine)
     n = 70_000  # more than the block in which margins are held
-    posted = post(machine, path_of(tip + rng.normal(size=(n, 3)) * 250, np.tile(axis, (n, 1))))
+    posted = post_path(machine, path_of(tip + rng.normal(size=(n, 3)) * 250, np.tile(axis, (n, 1))))
     margins = machine.margins(posted.poses, posted.joints)
     counts = {name: int(c) for name, c in zip(machine.limits, (margins < 0).sum(0), strict=True) if c}
     assert {offence.limit: offence.count for offence in posted.offences} == counts
@@ -246,7 +246,7 @@ def test_counts_agree_with_the_margins():
 
 def test_unknown_mode():
     with pytest.raises(pk.PoseError, match="mode 'x'"):
-        post(pk.load("tricept"), path_of([0, 0, -1650]), mode="x")
+        post_path(pk.load("tricept"), path_of([0, 0, -1650]), mode="x")
 
 
 # The table.
@@ -263,7 +263,7 @@ def test_csv_reads_back_within_its_digits():
     rng = np.random.default_rng(5)
     n = 40_000  # several batches
     tip = rng.uniform([-300, -300, -2300], [300, 300, -1500], (n, 3))
-    posted = post(machine, path_of(tip, axis_of(rng.uniform(0, 40, n), rng.uniform(-180, 180, n)), first_line=17))
+    posted = post_path(machine, path_of(tip, axis_of(rng.uniform(0, 40, n), rng.uniform(-180, 180, n)), first_line=17))
     rows = table_of(posted)
     assert len(rows) == n
     for names, units, values in (
@@ -277,7 +277,7 @@ def test_csv_reads_back_within_its_digits():
     assert [int(row["record"]) for row in rows] == list(range(n))
     assert [int(row["line"]) for row in rows] == list(range(17, 17 + n))
     assert [row["broken"] for row in rows] == [posted.limits[b - 1] if b else "" for b in posted.broken]
-    assert 0 < posted.off < n
+    assert 0 < posted.broken_record_count < n
 
 
 def test_numbers_print_as_decimals():
@@ -301,7 +301,7 @@ def test_numbers_print_as_decimals():
     ]
     rng = np.random.default_rng(11)
     values += (rng.normal(size=3000) * 10.0 ** rng.integers(-7, 9, 3000)).tolist()
-    posted = post(machine, path_of([[value, 0.0, 0.0] for value in values]))
+    posted = post_path(machine, path_of([[value, 0.0, 0.0] for value in values]))
     for row, value in zip(table_of(posted), values, strict=True):
         text = row["X [mm]"]
         exact = Decimal(value * 1e6).quantize(Decimal(1), ROUND_HALF_EVEN).scaleb(-6)
@@ -310,7 +310,7 @@ def test_numbers_print_as_decimals():
 
 
 def test_unreachable_records_have_empty_fields():
-    posted = post(pk.load("linear_delta"), path_of([[0, 0, 280], [1000, 0, 280]]))
+    posted = post_path(pk.load("linear_delta"), path_of([[0, 0, 280], [1000, 0, 280]]))
     good, lost = table_of(posted)
     assert good["broken"] == ""
     assert float(good["tower_a [mm]"]) > 0
@@ -320,7 +320,7 @@ def test_unreachable_records_have_empty_fields():
 
 def test_parquet_holds_the_same():
     machine = pk.load("linear_delta")
-    posted = post(machine, path_of([[0, 0, 280], [1000, 0, 280], [5, 0, 280]], first_line=4))
+    posted = post_path(machine, path_of([[0, 0, 280], [1000, 0, 280], [5, 0, 280]], first_line=4))
     file = io.BytesIO()
     table.parquet_writer(posted)(file)
     read = pq.read_table(io.BytesIO(file.getvalue()))
@@ -381,7 +381,7 @@ def test_c_and_the_wrist_stay_continuous_over_the_pole(name):
     tip = np.tile(m.home[:3], (12, 1))
     zero = np.zeros(12)
     path = ToolPath("swing.apt", tip, axis, np.arange(1, 13), zero > 1, zero + 1e3, zero, None, "apt", "mm", {}, (), ())
-    posted = post(m, path)
+    posted = post_path(m, path)
     b, c = posted.poses[:, 3], posted.poses[:, 4]
     assert np.abs(np.diff(c)).max() < 1e-9
     assert np.abs(np.diff(b)).max() < 0.04
@@ -395,7 +395,7 @@ def test_c_and_the_wrist_stay_continuous_over_the_pole(name):
 
 
 def rotation(a, b, c):
-    return transform(0.0, 0.0, 0.0, a, b, c)[:, :3]
+    return frame_from_angles(0.0, 0.0, 0.0, a, b, c)[:, :3]
 
 
 def turned_path(machine, turns, tip=None):
@@ -411,7 +411,7 @@ def test_three_turns_as_programmed(name):
     way = np.linspace(0.0, 1.0, 60)[:, None]
     path = turned_path(machine, [3.0, -2.0, -200.0] + way * [5.0, 4.0, 900.0])
     for x, angle in ((0.0, 0.0), (3.0, 40.0 * DEGREE), (0.0, math.pi)):
-        posted = post(machine, path, workpiece=pk.workpiece(X=x, C=angle))
+        posted = post_path(machine, path, workpiece=pk.workpiece(X=x, C=angle))
         assert (posted.poses[:, 3:] == path.turns + [0.0, 0.0, angle]).all()  # to the last digit, turn for turn
 
 
@@ -421,7 +421,7 @@ def test_three_turns_in_a_tilted_frame():
     share = np.linspace(0.0, 1.0, 41)[:-1, None]
     fine = np.vstack([a + share * (b - a) for a, b in itertools.pairwise(ends)] + [ends[-1:]])
     workpiece = pk.workpiece(A=35 * DEGREE, B=-50 * DEGREE, C=25 * DEGREE)
-    few, many = (post(machine, turned_path(machine, t), workpiece=workpiece) for t in (ends, fine))
+    few, many = (post_path(machine, turned_path(machine, t), workpiece=workpiece) for t in (ends, fine))
     frame = few.frame[:, :3]
     for posted in (few, many):
         for pose, turns in zip(posted.poses, posted.path.turns, strict=True):
@@ -435,7 +435,7 @@ def test_a_frame_tilted_by_a_rounding_changes_no_turn_count():
     machine = pk.load("hexapod")
     path = turned_path(machine, [[1.0, 100.0, 700.0], [2.0, 100.0, -1000.0], [400.0, 95.0, -1000.0]])
     workpieces = [pk.workpiece(A=a * DEGREE, C=30 * DEGREE) for a in (0, 1e-7)]
-    plain, tilted = (post(machine, path, workpiece=workpiece).poses[:, 3:] for workpiece in workpieces)
+    plain, tilted = (post_path(machine, path, workpiece=workpiece).poses[:, 3:] for workpiece in workpieces)
     np.testing.assert_allclose(tilted, plain, atol=1e-7)
     assert (tilted != plain).any()
 
@@ -444,7 +444,7 @@ def test_turns_through_b_of_90_degrees():
     machine = pk.load("hexapod")
     b = np.array([80.0, 88.0, 90.0 - 1e-9, 90.0, 91.0, 100.0, 90.0, 89.0])
     path = turned_path(machine, np.column_stack([np.full(8, 10.0), b, np.full(8, 20.0)]))
-    posted = post(machine, path, workpiece=pk.workpiece(A=1e-8 * DEGREE))
+    posted = post_path(machine, path, workpiece=pk.workpiece(A=1e-8 * DEGREE))
     np.testing.assert_allclose(posted.poses[:, 3:], path.turns, atol=1e-7)
     for pose, turns in zip(posted.poses, path.turns, strict=True):
         np.testing.assert_allclose(rotation(*pose[3:]), posted.frame[:, :3] @ rotation(*turns), atol=1e-9)
@@ -454,14 +454,14 @@ def test_turns_through_b_of_90_degrees():
 def test_b_and_c_as_programmed(name):
     machine = pk.load(name)
     path = turned_path(machine, [[0, 10, 400], [0, 5, 420], [0, 0, 500], [0, -8, 500], [0, -12, 480]])
-    posted = post(machine, path, workpiece=pk.workpiece(C=-15 * DEGREE))
+    posted = post_path(machine, path, workpiece=pk.workpiece(C=-15 * DEGREE))
     assert (posted.poses[:, 3:] == path.turns[:, 1:] + [0.0, -15.0 * DEGREE]).all()
-    tilted = post(machine, path, workpiece=pk.workpiece(C=-15 * DEGREE, A=2 * DEGREE))  # from the axis
+    tilted = post_path(machine, path, workpiece=pk.workpiece(C=-15 * DEGREE, A=2 * DEGREE))  # from the axis
     b, c = tilted.poses[:, 3:].T
     k = np.column_stack([np.sin(b) * np.cos(c), np.sin(b) * np.sin(c), np.cos(b)])
     np.testing.assert_allclose(k, path.axis @ tilted.frame[:, :3].T, atol=1e-12)
     with_a = turned_path(machine, [[8, 0, 10], [9, 0, 300], [10, 0, 720]])
-    posted = post(machine, with_a)
+    posted = post_path(machine, with_a)
     b, c = posted.poses[:, 3:].T
     k = np.column_stack([np.sin(b) * np.cos(c), np.sin(b) * np.sin(c), np.cos(b)])
     np.testing.assert_allclose(k, with_a.axis, atol=1e-12)
@@ -470,29 +470,29 @@ def test_b_and_c_as_programmed(name):
 
 def test_a_tool_may_spin_where_it_is_round():
     machine = pk.load("linear_delta")
-    assert post(machine, turned_path(machine, [[0, 0, 0], [0, 0, 200], [0, 0, 900]])).off == 0
-    posted = post(machine, turned_path(machine, [[0, 0, 0], [0, 3, 200], [1, 0, 0]]))
+    assert post_path(machine, turned_path(machine, [[0, 0, 0], [0, 0, 200], [0, 0, 900]])).broken_record_count == 0
+    posted = post_path(machine, turned_path(machine, [[0, 0, 0], [0, 3, 200], [1, 0, 0]]))
     assert [posted.limits[b - 1] if b else "" for b in posted.broken] == ["", "tilt", "tilt"]
 
 
 def test_planar_machines_turn_as_programmed(tmp_path):
     machine = planar(tmp_path, "Z")
     path = turned_path(machine, [[0, 0, 5], [0, 0, -20], [0, 0, 12]], [10, 300, 0])
-    posted = post(machine, path, workpiece=pk.workpiece(C=3 * DEGREE))
+    posted = post_path(machine, path, workpiece=pk.workpiece(C=3 * DEGREE))
     np.testing.assert_array_equal(posted.poses[:, 2], path.turns[:, 2] + 3 * DEGREE)
     origin = replace(path, tip=np.zeros((3, 3)))
     little = pk.workpiece(X=10, Y=300, A=0.001 * DEGREE, C=3 * DEGREE)  # A is within what may lean
-    nearly = post(machine, origin, workpiece=little)
-    assert nearly.off == 0
+    nearly = post_path(machine, origin, workpiece=little)
+    assert nearly.broken_record_count == 0
     np.testing.assert_allclose(nearly.poses[:, 2], path.turns[:, 2] + 3 * DEGREE, atol=1e-8)
     machine = planar(tmp_path, "Y")
     path = turned_path(machine, [[0, 5, 0], [0, -20, 0], [0, 12, 0], [0, 12, 50], [3, 12, 0]], [10, 0, 300])
-    posted = post(machine, path)
+    posted = post_path(machine, path)
     np.testing.assert_allclose(posted.poses[:3, 2], path.turns[:3, 1], atol=1e-15)
     assert [posted.limits[b - 1] if b else "" for b in posted.broken] == ["", "", "", "tilt", "tilt"]
 
 
 def test_gcode_from_its_file_to_the_hexapod(tmp_path):
     (part := tmp_path / "part.ngc").write_text("G21 G90\nG0 X0 Y0 Z-950\nG1 A5 B-3 C12.5 F500\nG1 X10 C372.5\nM2\n")
-    posted = post(pk.load("hexapod"), read_gcode(part))
+    posted = post_path(pk.load("hexapod"), read_gcode(part))
     np.testing.assert_allclose(np.degrees(posted.poses[:, 3:]), [[0, 0, 0], [5, -3, 12.5], [5, -3, 372.5]], atol=1e-12)

@@ -22,7 +22,7 @@ from parakin.controllers.linuxcnc.straight_motions import CYCLE, motions
 from parakin.errors import InputError, PoseError
 from parakin.export.files import write_all
 from parakin.toolpath.path import Event, ToolPath
-from parakin.toolpath.posting.post import post
+from parakin.toolpath.posting.post import post_path
 from parakin.toolpath.reading.detect import read_path
 from parakin.toolpath.reading.gcode.reader import read_gcode
 from parakin.toolpath.timing import plan_trajectory
@@ -50,7 +50,7 @@ def trajectories(tmp_path_factory):
             place, upright = PLACES[name]
             lines = turbine_blade.nx_lines(turbine_blade.tool_path(400, upright), turbine_blade.FEEDS | {"cut": 1e4})
             (folder / "part.cls").write_text("\n".join(lines) + "\n", encoding="ascii")
-            known[name] = plan_trajectory(post(pk.load(name), read_path(folder / "part.cls"), workpiece=place))
+            known[name] = plan_trajectory(post_path(pk.load(name), read_path(folder / "part.cls"), workpiece=place))
         return known[name]
 
     return trajectory_of
@@ -183,7 +183,7 @@ def test_where_the_trajectory_stands_still_linuxcnc_does_too():
     machine = pk.load("linear_delta")
     path = path_of([[0.0, 0.0, 280.0], [40.0, 0.0, 280.0], [40.0, 40.0, 280.0], [80.0, 40.0, 280.0]])
     stopping, rounding = (
-        text_of(linuxcnc_program(plan_trajectory(post(machine, path), corners=c))) for c in ("stop", "round")
+        text_of(linuxcnc_program(plan_trajectory(post_path(machine, path), corners=c))) for c in ("stop", "round")
     )
     assert rounding.count("G61\n") == 1  # at the first record
     assert stopping.count("G61\n") == 3
@@ -221,7 +221,7 @@ def test_from_home_the_wrist_does_not_jump(name, mode):
 
 def test_what_linuxcnc_cant_follow_is_refused(trajectories):
     machine = pk.load("linear_delta")
-    trajectory = plan_trajectory(post(machine, path_of([[0.0, 0.0, 280.0], [1.0, 0.0, 280.0]])))
+    trajectory = plan_trajectory(post_path(machine, path_of([[0.0, 0.0, 280.0], [1.0, 0.0, 280.0]])))
     other = next(mode for mode in machine.modes if mode != machine.mode)
     with pytest.raises(PoseError, match="mode"):
         linuxcnc_program(replace(trajectory, posted=replace(trajectory.posted, mode=other)))
@@ -237,7 +237,7 @@ def test_what_linuxcnc_cant_follow_is_refused(trajectories):
 
 def test_a_path_of_one_record(tmp_path):
     machine = pk.load("hexapod")
-    trajectory = plan_trajectory(post(machine, path_of([[0.0, 0.0, -940.0]] * 2)))
+    trajectory = plan_trajectory(post_path(machine, path_of([[0.0, 0.0, -940.0]] * 2)))
     lines = motion_lines(text_of(linuxcnc_program(trajectory)))
     assert len(lines) == 1
     assert "Z-940.000000" in lines[0]
@@ -335,7 +335,7 @@ def told(events, dialect="nx", writer=linuxcnc_program, **fields):
     """The lines of a program of three records that are no motion and no mode, and where its motions are among them."""
     path = path_of([[0.0, 0.0, 280.0], [5.0, 0.0, 280.0], [5.0, 5.0, 280.0]], dialect=dialect, **fields)
     path = replace(path, events=tuple(Event(record, 10 * record + i, text) for i, (record, text) in enumerate(events)))
-    text = text_of(writer(plan_trajectory(post(pk.load("linear_delta"), path))))
+    text = text_of(writer(plan_trajectory(post_path(pk.load("linear_delta"), path))))
     return text.splitlines()
 
 

@@ -12,7 +12,7 @@ from parakin.export.report.report import report_html
 from parakin.machine import Machine
 from parakin.toolpath.checking.check import between
 from parakin.toolpath.path import Note, ToolPath
-from parakin.toolpath.posting.post import post
+from parakin.toolpath.posting.post import post_path
 from parakin.toolpath.timing import plan_trajectory
 
 SLOW, FAST = 2400.0, 9000.0  # mm/min
@@ -39,7 +39,7 @@ def spiral(n):
 
 @pytest.fixture(scope="module")
 def trajectory():
-    return plan_trajectory(post(pk.load("tricept"), spiral(600)))
+    return plan_trajectory(post_path(pk.load("tricept"), spiral(600)))
 
 
 @pytest.fixture(scope="module")
@@ -180,7 +180,7 @@ def test_feed_reached_beside_the_programmed(trajectory, figures, dense):
 def test_feed_is_seen_among_many_short_rapids():
     turn = np.linspace(0.0, 200.0, 4000)
     tip = np.stack([80 * np.cos(turn), 80 * np.sin(turn), 280 + 0 * turn], axis=1)
-    trajectory = plan_trajectory(post(pk.load("linear_delta"), path_of(tip, rapid=np.arange(4000) % 10 < 2)))
+    trajectory = plan_trajectory(post_path(pk.load("linear_delta"), path_of(tip, rapid=np.arange(4000) % 10 < 2)))
     figure = figures_of(report_html(trajectory.posted, trajectory))["time"]
     assert 3 * len(trajectory.profile.row) > 9000
     for name in ("programmed feed", "set by the feed"):
@@ -225,7 +225,7 @@ def test_jerks_are_drawn_where_they_are_limited():
         replace(leg, drives=tuple(d and replace(d, jerk=2e5) for d in leg.drives)) for leg in machine.spec.legs
     )
     trajectory = plan_trajectory(
-        post(Machine(replace(machine.spec, legs=legs)), path_of([[0, 0, 280], [30, 10, 285], [0, 40, 280]]))
+        post_path(Machine(replace(machine.spec, legs=legs)), path_of([[0, 0, 280], [30, 10, 285], [0, 40, 280]]))
     )
     figure = figures_of(report_html(trajectory.posted, trajectory))["time"]
     for name in machine.joints:
@@ -238,7 +238,7 @@ def test_jerks_are_drawn_where_they_are_limited():
 
 
 def test_a_trajectory_that_stands_still():
-    trajectory = plan_trajectory(post(pk.load("linear_delta"), path_of([[0, 0, 280]])))
+    trajectory = plan_trajectory(post_path(pk.load("linear_delta"), path_of([[0, 0, 280]])))
     html = report_html(trajectory.posted, trajectory)
     assert set(figures_of(html)) == {"machine", "path", "curves"}
     assert "Cycle time 0 s" in text_of(html)
@@ -254,7 +254,7 @@ def test_without_a_trajectory_nothing_is_said_of_it(trajectory):
 def test_inverse_time_counts_as_programmed():
     path = path_of([[0, 0, 280], [30, 0, 280], [60, 0, 280]], feed=np.array([np.nan, np.nan, 1200.0]))
     path = replace(path, seconds=np.array([np.nan, 4.0, np.nan]), dialect="gcode", notes=(Note(0, "of all"),))
-    trajectory = plan_trajectory(post(pk.load("linear_delta"), path))
+    trajectory = plan_trajectory(post_path(pk.load("linear_delta"), path))
     html = report_html(trajectory.posted, trajectory)
     assert "5.5 s in feed motions, at the programmed feeds<" in html  # 4 s, and 30 mm at 20 mm/s
     programmed = np.array(traces_of(figures_of(html)["time"], "programmed feed")[0]["y"], float)
@@ -265,8 +265,8 @@ def test_inverse_time_counts_as_programmed():
 
 def test_offences_on_the_way_say_where():
     # Both ends are 934 mm or more from each foot's joint, the middle is not.
-    posted = between(post(pk.load("tricept"), path_of([[-300, 0, -1450], [0, 0, -1340], [300, 0, -1450]])))
-    halfway = between(post(pk.load("tricept"), path_of([[-200, 0, -1345], [200, 0, -1345]])))
+    posted = between(post_path(pk.load("tricept"), path_of([[-300, 0, -1450], [0, 0, -1340], [300, 0, -1450]])))
+    halfway = between(post_path(pk.load("tricept"), path_of([[-200, 0, -1345], [200, 0, -1345]])))
     for checked in (posted, halfway):
         html = report_html(checked)
         assert "were not checked" not in html
@@ -274,8 +274,8 @@ def test_offences_on_the_way_say_where():
         between_records = [offence for offence in checked.offences if offence.share < 1.0]
         for offence in between_records:
             assert f"<small>on the way, {100 * offence.share:.0f} %</small>" in html
-        if checked.motions_off:
+        if checked.broken_motion_count:
             assert traces_of(figures_of(html)["path"], "motions off limits")
     assert any(offence.share < 1.0 for offence in (*posted.offences, *halfway.offences))
-    runs = between(post(pk.load("tricept"), path_of([[0, 0, -1650], [50, 0, -1650]])))
+    runs = between(post_path(pk.load("tricept"), path_of([[0, 0, -1650], [50, 0, -1650]])))
     assert "All 2 records and the motions between them stay within every limit of tricept.<" in report_html(runs)

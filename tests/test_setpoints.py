@@ -12,7 +12,7 @@ import pytest
 import parakin as pk
 from parakin.export.tables.setpoints import MOST_ROWS, row_count, setpoint_columns, setpoints_csv, setpoints_parquet
 from parakin.toolpath.path import ToolPath
-from parakin.toolpath.posting.post import post
+from parakin.toolpath.posting.post import post_path
 from parakin.toolpath.timing import plan_trajectory
 
 RATE = 7000.0  # more rows than are formatted at a time
@@ -23,7 +23,7 @@ def trajectory_of(name, tip, axis=(0.0, 0.0, 1.0), feed=6000.0):
     n = len(tip)
     axis = np.broadcast_to(np.asarray(axis, float), (n, 3))
     path = ToolPath("part.apt", tip, axis, np.arange(n) + 1, np.zeros(n, bool), np.full(n, feed), np.full(n, np.nan))
-    return plan_trajectory(post(pk.load(name), path))
+    return plan_trajectory(post_path(pk.load(name), path))
 
 
 @pytest.fixture(scope="module")

@@ -10,7 +10,7 @@ import parakin as pk
 from parakin.errors import InputError, PoseError
 from parakin.machine import Machine
 from parakin.toolpath.path import ToolPath
-from parakin.toolpath.posting.post import post
+from parakin.toolpath.posting.post import post_path
 from parakin.toolpath.timing import plan_trajectory
 from parakin.toolpath.timing.drive_limits import DriveLimits
 from parakin.toolpath.timing.kernels.acceleration_limits import AccelerationLimits
@@ -50,7 +50,7 @@ def posted(machine, tip, axis=(0.0, 0.0, 1.0), feed=6000.0, rapid=False, seconds
     feeds, rapids = np.broadcast_to(np.asarray(feed, float), n), np.broadcast_to(rapid, n)
     lines, spindle = np.arange(1, n + 1), np.full(n, np.nan)
     tip = np.asarray(tip, float)
-    return post(machine, ToolPath("part.apt", tip, axis, lines, rapids, feeds, spindle, seconds=seconds))
+    return post_path(machine, ToolPath("part.apt", tip, axis, lines, rapids, feeds, spindle, seconds=seconds))
 
 
 def axis_of(b, c):
@@ -78,7 +78,7 @@ def drawn(name, seed, jerk=False):
         b = 0.25 + 0.15 * np.sin(np.cumsum(rng.normal(0.0, 0.3, n)))
         axis = axis_of(b, np.cumsum(rng.normal(0.0, 0.2, n)))
     result = posted(machine, tip, axis, 10.0 ** rng.uniform(2.0, 4.3, n))
-    assert not result.off
+    assert not result.broken_record_count
     return result
 
 

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from .performance.atlas import Atlas, atlas
     from .toolpath.job import Job, prepare
     from .toolpath.path import ToolPath
-    from .toolpath.placing.placement import Placement, placed
+    from .toolpath.placing.placement import Placement, find_placement
     from .toolpath.posting.frames import workpiece
     from .toolpath.reading.detect import read_path
     from .toolpath.timing.trajectory import Trajectory
@@ -41,9 +41,9 @@ __all__ = [
     "Trajectory",
     "Workspace",
     "atlas",
+    "find_placement",
     "load",
     "machines",
-    "placed",
     "prepare",
     "read_path",
     "region",
@@ -93,7 +93,7 @@ _LAZY = {
     "Trajectory": "toolpath.timing.trajectory",
     "Workspace": "workspaces.certified.workspace",
     "atlas": "performance.atlas",
-    "placed": "toolpath.placing.placement",
+    "find_placement": "toolpath.placing.placement",
     "prepare": "toolpath.job",
     "read_path": "toolpath.reading.detect",
     "region": "workspaces.certified.region:make_region",

@@ -50,10 +50,10 @@ def inverse(
     machine = machine_of(name, sizes)
     poses, lines = _given(machine, values, csv, machine.axes, machine.axis_units, machine.home, "pose")
     announce_compiling()
-    from ..toolpath.posting.offences import judge
+    from ..toolpath.posting.offences import judge_path
 
     joints = machine.inverse(poses, mode)
-    found = judge(machine, poses, joints, lines, mode)
+    found = judge_path(machine, poses, joints, lines, mode)
     result = _Result(machine, poses, joints, [_name(found, i) for i in range(len(poses))])
     result.tell("inverse", "joints", csv, output, json, found.offences)
     return OFF_LIMITS if found.offences else 0
@@ -92,11 +92,11 @@ def forward(
     if near is not None:
         parts = [part.strip() for part in near.split(",")]
         start = parse_row(parts, machine.axes, machine.axis_units, machine.home, "--near")
-    from ..toolpath.posting.offences import judge
+    from ..toolpath.posting.offences import judge_path
 
     solution = machine.forward(joints, start)
     good = np.flatnonzero(solution.converged)
-    found = judge(machine, solution.poses[good], joints[good], lines[good])
+    found = judge_path(machine, solution.poses[good], joints[good], lines[good])
     offences = tuple(replace(offence, record=int(good[offence.record])) for offence in found.offences)
     verdicts = ["not converged"] * len(joints)
     for i, index in enumerate(good.tolist()):

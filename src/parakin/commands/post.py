@@ -77,7 +77,7 @@ def post(
     """
     from math import isfinite, radians
 
-    from ..toolpath.posting.frames import composed
+    from ..toolpath.posting.frames import compose_frames
 
     chosen = machine_of(machine, sizes)
     if place is not None and workpiece is not None:
@@ -96,7 +96,7 @@ def post(
 
     with Progress() as progress:
         path = read_path(
-            part, arc_tolerance=arc_tolerance, workpiece=None if place else composed(frame, None),
+            part, arc_tolerance=arc_tolerance, workpiece=None if place else compose_frames(frame, None),
             progress=progress.part("reading", 0.0, 0.1),
         )  # fmt: skip
         placement = None
@@ -119,9 +119,11 @@ def post(
 
 
 def _placement(machine: Machine, path: ToolPath, place: str, mode: str | None, progress: Progress) -> Placement:
-    from ..toolpath.placing.placement import placed
+    from ..toolpath.placing.placement import find_placement
 
-    return placed(machine, path, parse_bounds(place), mode=mode, progress=progress.part("placing the part", 0.1, 0.3))
+    return find_placement(
+        machine, path, parse_bounds(place), mode=mode, progress=progress.part("placing the part", 0.1, 0.3)
+    )
 
 
 def _contents(
@@ -164,14 +166,14 @@ def _contents(
 
 def _program(job: Job, target: str, force: bool, tolerance: float) -> Content:
     from ..controllers import joint_program, linuxcnc_program
-    from ..toolpath.posting.offences import place
+    from ..toolpath.posting.offences import describe_place
 
     posted = job.posted
     if posted.first is not None and not force:
         raise PoseError("the path is off limits; --force writes it all the same")
     if job.trajectory is None:
         raise PoseError(job.unplanned)
-    broken = "\n".join(f"{place(posted, offence)}: {offence.text}" for offence in posted.offences)
+    broken = "\n".join(f"{describe_place(posted, offence)}: {offence.text}" for offence in posted.offences)
     if target == "joints":
         return joint_program(job.trajectory, forced=broken or None)
     return linuxcnc_program(

@@ -21,7 +21,7 @@ def summary(
     job: Job, target: str | None, written: dict[str, str], placement: Placement | None, missing: list[str]
 ) -> str:
     """The account for people; its last lines name the files."""
-    from ..toolpath.posting.offences import place
+    from ..toolpath.posting.offences import describe_place
 
     posted = job.posted
     path = posted.path
@@ -38,7 +38,7 @@ def summary(
         *_timed(job, target if "program" in written else None),
         "",
     ]
-    lines += [offence_line(place(posted, offence), offence, "record") for offence in posted.offences]
+    lines += [offence_line(describe_place(posted, offence), offence, "record") for offence in posted.offences]
     if posted.rewinds:
         places = ", ".join(str(int(path.line[record])) for record in posted.rewinds[:_NOTES])
         more = " ..." if len(posted.rewinds) > _NOTES else ""
@@ -60,7 +60,7 @@ def _at(source: str, line: int) -> str:
 def _verdict(posted: Posted) -> str:
     if posted.first is None:
         return "all within the limits, and between them"
-    counts = [(posted.off, "off limits"), (posted.motions_off, "off limits on the way there")]
+    counts = [(posted.broken_record_count, "off limits"), (posted.broken_motion_count, "off limits on the way there")]
     said = " and ".join(f"{count:,} {what}" for count, what in counts if count)
     return f"{said}, the first in line {posted.first.line}"
 
@@ -136,8 +136,8 @@ def as_json(job: Job, written: dict[str, str], placement: Placement | None, miss
         "verdict": "ok" if job.runs else "off limits" if posted.first is not None else "no law",
         "records": len(path),
         "inserted": job.inserted,
-        "off_limits": posted.off,
-        "motions_off_limits": posted.motions_off,
+        "off_limits": posted.broken_record_count,
+        "motions_off_limits": posted.broken_motion_count,
         "frame": posted.frame.tolist(),
         "placement": None if placement is None else _placement_json(placement),
         "joints": _ranges(posted),

@@ -12,7 +12,7 @@ from ..machine import Machine
 from .checking.check import between
 from .linearise.linearise import linearised
 from .path import Floats, ToolPath
-from .posting.post import post
+from .posting.post import post_path
 from .posting.posted import Posted
 from .timing import Corners, Trajectory, plan_trajectory
 from .timing.stops import find_stops, sum_dwells
@@ -75,7 +75,7 @@ def prepare(
 
     Parameters
     ----------
-    machine, path, workpiece, mode : as for :func:`~.post.post`
+    machine, path, workpiece, mode : as for :func:`~.posting.post.post_path`
     target : what the controller interpolates: ``linuxcnc`` the tool's pose, ``joints`` the joints
     tolerance, axis_tolerance : mm and rad that tip and axis may be off the programmed path in all: half of each is for
         the controller's interpolation, half for rounding corners
@@ -90,7 +90,7 @@ def prepare(
     def part(begin: float, end: float) -> Progress:
         return lambda fraction: say(begin + (end - begin) * fraction)
 
-    programmed = post(machine, path, workpiece=workpiece, mode=mode, progress=part(0.0, 0.1))
+    programmed = post_path(machine, path, workpiece=workpiece, mode=mode, progress=part(0.0, 0.1))
     # The angles of the pose change evenly in either case, as the trajectory has them; the tip is on its line by then.
     steps = 1 if target == "linuxcnc" else 2
     lean = 0.5 * axis_tolerance / steps

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from ...toolpath.posting.range_use import Use
+from ...toolpath.posting.range_use import RangeUse
 from ..machine.figures import Figure, Trace, numbers
 from ..ranges import edge
 from .panels import Panel, stacked
@@ -46,7 +46,7 @@ def extremes_within(values: Floats, starts: Indices) -> Indices:
     return np.unique(np.concatenate(kept))
 
 
-def joint_curves(posted: Posted, uses: list[Use]) -> tuple[Figure, int]:
+def joint_curves(posted: Posted, uses: list[RangeUse]) -> tuple[Figure, int]:
     """One curve a joint over the records, and the figure's height in px; ``uses`` are the joints'."""
     most = min(POINTS, _ALL_POINTS // len(uses))
     rows = []
@@ -56,13 +56,13 @@ def joint_curves(posted: Posted, uses: list[Use]) -> tuple[Figure, int]:
     return stacked(rows, "record, counted from 0")
 
 
-def panel_of(use: Use, heading: str, traces: list[Trace], ticks: str = ",") -> Panel:
+def panel_of(use: RangeUse, heading: str, traces: list[Trace], ticks: str = ",") -> Panel:
     """A panel for a bounded quantity, in mm or degrees, that shows what is used of it and the limits near by."""
     scale = degrees(1.0) if use.unit == "rad" else 1.0
     return Panel(heading, traces, _range(use, scale), [b * scale for b in (use.low, use.high)], ticks)
 
 
-def _curve(posted: Posted, use: Use, values: Floats, scale: float, most: int) -> list[Trace]:
+def _curve(posted: Posted, use: RangeUse, values: Floats, scale: float, most: int) -> list[Trace]:
     """The curve, and over it in red what lies beyond a limit."""
     kept = extremes(values, most)
     y, lines = values[kept], posted.path.line[kept].tolist()
@@ -88,7 +88,7 @@ def _curve(posted: Posted, use: Use, values: Floats, scale: float, most: int) ->
     return traces
 
 
-def _range(use: Use, scale: float) -> list[float]:
+def _range(use: RangeUse, scale: float) -> list[float]:
     """What the curve's axis shows: the range used, and those limits that lie no farther off than its own width."""
     if not isfinite(use.least):
         low, high = (use.low, use.high) if isfinite(use.low) and isfinite(use.high) else (-1.0, 1.0)
@@ -104,7 +104,7 @@ def _range(use: Use, scale: float) -> list[float]:
     return [(low - pad) * scale, (high + pad) * scale]
 
 
-def _heading(use: Use) -> str:
+def _heading(use: RangeUse) -> str:
     limits = "no limits"
     if isfinite(use.low) or isfinite(use.high):
         low, high = (edge(v, use.unit) if isfinite(v) else "–" for v in (use.low, use.high))

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...machine import Machine
-from ...toolpath.posting.range_use import relative_margin
+from ...toolpath.posting.range_use import compute_relative_margin
 from ..machine.figures import Figure, Trace, machine_traces, numbers, scene_layout
 from ..machine.scene import Points, Scene, scene
 from .curves import Indices, extremes
@@ -160,7 +160,7 @@ def _red(posted: Posted, tips: Points) -> list[Trace]:
 
 def _strays(posted: Posted, tips: Points) -> list[Trace]:
     """Motions that break a limit which both their records keep; a sample of them if there are many."""
-    if posted.strays is None or not posted.motions_off:
+    if posted.strays is None or not posted.broken_motion_count:
         return []
     to = np.flatnonzero(posted.strays)
     to = to[:: max(1, len(to) // _MARKED)]
@@ -189,7 +189,7 @@ def _workspace(posted: Posted, place: Points, tips: Points, size: float) -> tupl
         tip = (points - place[:, 3]) @ place[:, :3]  # the grid stands in M, poses are the workpiece's
         for i in used:
             poses[:, machine.axes.index("XYZ"[i])] = tip[:, i]
-        value = relative_margin(machine, machine.margins(poses, mode=posted.mode))
+        value = compute_relative_margin(machine, machine.margins(poses, mode=posted.mode))
         inside = value >= 0.0
         if not inside.any():
             return [], []

@@ -6,7 +6,7 @@ from html import escape
 from math import isfinite
 from typing import TYPE_CHECKING
 
-from ...toolpath.posting.range_use import Use
+from ...toolpath.posting.range_use import RangeUse
 from ..ranges import edge, shown
 from .cards import card
 
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from ...toolpath.posting.posted import Posted
 
 
-def range_card(posted: Posted, uses: list[Use]) -> str:
+def range_card(posted: Posted, uses: list[RangeUse]) -> str:
     joints, rest = uses[: len(posted.machine.joints)], uses[len(posted.machine.joints) :]
     body = f"<h3>Joints</h3><div class=two>{''.join(_bar(posted, use) for use in joints)}</div>"
     if rest:
@@ -29,7 +29,7 @@ def range_card(posted: Posted, uses: list[Use]) -> str:
     return card("Ranges", body, key)
 
 
-def _bar(posted: Posted, use: Use) -> str:
+def _bar(posted: Posted, use: RangeUse) -> str:
     """The range used inside the range allowed, in per cent of what both cover."""
     ends = [v for v in (use.low, use.high, use.least, use.most) if isfinite(v)]
     if not isfinite(use.low) and use.unit in ("mm", "rad") and isfinite(use.high) and use.high > 0.0:

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ...toolpath.posting.offences import place
-from ...toolpath.posting.range_use import Use, used
+from ...toolpath.posting.offences import describe_place
+from ...toolpath.posting.range_use import RangeUse, measure_range_use
 from ..machine.figures import page, placed
 from .cards import card, counted, duration
 from .curves import joint_curves
@@ -37,7 +37,7 @@ def report_html(posted: Posted, trajectory: Trajectory | None = None, unplanned:
         _verdict(posted, trajectory, unplanned, waits),
     ]
     if len(path):
-        uses, relative = used(posted)
+        uses, relative = measure_range_use(posted)
         view = path_view(posted, relative)
         parts += [range_card(posted, uses), _space(posted, view), _curves(posted, uses)]
         parts += [] if trajectory is None else [timing_card(trajectory, view)]
@@ -61,14 +61,17 @@ def _verdict(posted: Posted, trajectory: Trajectory | None, unplanned: str, wait
         verdict = "Stays within the limits" if unplanned else "Runs"
         said = f"<strong>{verdict}</strong><p>{text}{_unchecked(posted)}</p>{time}"
         return f"<section class='card verdict'>{said}</section>\n"
-    counts = f"{posted.off:,} of {counted(len(path), 'record')} off limits ({posted.off / len(path):.2%})"
-    if posted.motions_off:
-        breaks = "breaks" if posted.motions_off == 1 else "break"
-        counts += f"; {counted(posted.motions_off, 'motion')} {breaks} a limit that the records at both ends keep"
+    broken = posted.broken_record_count
+    counts = f"{broken:,} of {counted(len(path), 'record')} off limits ({broken / len(path):.2%})"
+    if posted.broken_motion_count:
+        breaks = "breaks" if posted.broken_motion_count == 1 else "break"
+        counts += (
+            f"; {counted(posted.broken_motion_count, 'motion')} {breaks} a limit that the records at both ends keep"
+        )
     counts += f"; {counted(len(posted.offences), 'limit')} broken."
     return (
         "<section class='card verdict bad'><strong>Does not run</strong>"
-        f"<p class=first>{escape(place(posted, first))}: {escape(first.text)}</p>"
+        f"<p class=first>{escape(describe_place(posted, first))}: {escape(first.text)}</p>"
         f"<p>{counts}{_unchecked(posted)}</p>{time}</section>\n"
     )
 
@@ -98,7 +101,7 @@ def _space(posted: Posted, view: PathView) -> str:
     return card("Path in the workspace", f"<div class=two>{left}{right}</div>")
 
 
-def _curves(posted: Posted, uses: list[Use]) -> str:
+def _curves(posted: Posted, uses: list[RangeUse]) -> str:
     figure, height = joint_curves(posted, uses[: len(posted.machine.joints)])
     sub = "Limits are dashed; red lies beyond one. "
     if len(posted.path) > 4000:

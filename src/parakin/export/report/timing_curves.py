@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from ...toolpath.posting.range_use import Use
+from ...toolpath.posting.range_use import RangeUse
 from ..machine.figures import Figure, Trace, numbers
 from ..ranges import edge
 from .binding import bars_over_time
@@ -107,7 +107,7 @@ def _feed(trajectory: Trajectory, curves: dict[str, Thinned]) -> Panel:
 
 def _position(trajectory: Trajectory, curves: dict[str, Thinned], number: int) -> Panel:
     drive, curve = trajectory.posted.machine.model.drives[number], curves[trajectory.posted.machine.joints[number]]
-    use = Use(drive.name, drive.name, drive.unit, drive.low, drive.high, *_ends(curve))
+    use = RangeUse(drive.name, drive.name, drive.unit, drive.low, drive.high, *_ends(curve))
     unit, scale = _rim(trajectory.posted.machine, number)
     trace = _line(trajectory, curve, None, {"color": _BLUE, "width": 1.3}, escape(drive.name), unit, scale)
     return panel_of(use, heading(drive.name, unit, ""), [trace])
@@ -128,7 +128,7 @@ def _motion(trajectory: Trajectory, curves: dict[str, Thinned], number: int, kin
     bound_here = curve.binding == trajectory.names.index(name)
     if bound_here.any():
         traces.append(_line(trajectory, curve, bound_here, {"color": colour, "width": 1.8}, label, unit + per, scale))
-    return panel_of(Use(name, name, drive.unit, -bound, bound, *_ends(curve)), title, traces, ticks)
+    return panel_of(RangeUse(name, name, drive.unit, -bound, bound, *_ends(curve)), title, traces, ticks)
 
 
 def _ends(curve: Thinned) -> tuple[float, float]:

@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..posting.offences import SINGULARITY, TURNS, UNTOLD, gravest, measure, said_of
+from ..posting.offences import SINGULARITY, TURNS, UNDECIDED, describe_broken_limit, find_gravest, format_measure
 from ..posting.posted import Offence, Posted
 from .search import Search
 from .worst import Worst, first_place, worst, worst_anywhere
@@ -44,7 +44,7 @@ def between(posted: Posted, progress: Callable[[float], None] | None = None) -> 
     say = progress or (lambda fraction: None)
     search = Search(posted)
     search.run(lambda fraction: say(0.9 * fraction))
-    names = {search.turns: TURNS, search.singular: SINGULARITY, search.untold: UNTOLD}
+    names = {search.turns: TURNS, search.singular: SINGULARITY, search.untold: UNDECIDED}
     extra = [column for column in names if search.tallies[column].count]
     limits = (*posted.limits, *(names[column] for column in extra))
     strays = search.strays.copy()
@@ -52,7 +52,7 @@ def between(posted: Posted, progress: Callable[[float], None] | None = None) -> 
         strays[search.strays == 1 + column] = 1 + number
     offences = _Merged(posted, search).offences()
     first = _first(posted, search, offences)
-    grave = gravest(posted.machine, offences) if offences else None
+    grave = find_gravest(posted.machine, offences) if offences else None
     say(1.0)
     return replace(
         posted, limits=limits, offences=tuple(offences), first=first, worst=grave, checked=True, strays=strays
@@ -139,7 +139,7 @@ def offence_on(
 ) -> Offence:
     """A limit of the machine broken on a motion."""
     limit = posted.machine.limit_parts[column]
-    said = said_of(limit, -margin)
+    said = describe_broken_limit(limit, -margin)
     line = int(posted.path.line[motion])
     return Offence(limit.name, said.text, motion, line, *said.numbers, count, share, begins)
 
@@ -152,10 +152,10 @@ def turned(posted: Posted, search: Search) -> Offence:
     told, count = jump.told, search.tallies[search.turns].count
     if jump.beside is None:
         swing = told - TURN * round(jump.by / TURN)
-        by, counted = (measure(value, "rad", 0.0) for value in (swing, told))
+        by, counted = (format_measure(value, "rad", 0.0) for value in (swing, told))
         text = f"joint {name} would turn by {by} from the record before, not by {counted}"
         return Offence(TURNS, text, jump.motion, line, swing, told, "rad", abs(swing - told), count)
-    by, beside = (measure(abs(value), "rad", 0.0) for value in (jump.by, jump.beside))
+    by, beside = (format_measure(abs(value), "rad", 0.0) for value in (jump.by, jump.beside))
     text = f"joint {name} would have to turn by {by} at once, where the tool passes {beside} beside its axis"
     share, by_how_much = jump.share, abs(jump.by)
     return Offence(TURNS, text, jump.motion, line, by_how_much, 0.0, "rad", by_how_much, count, share, share)
@@ -173,7 +173,7 @@ def untold(posted: Posted, search: Search) -> Offence:
     tally = search.tallies[search.untold]
     text = "whether this motion keeps all limits can't be told"
     line = int(posted.path.line[tally.motion])
-    return Offence(UNTOLD, text, tally.motion, line, math.nan, 0.0, "1", math.inf, tally.count)
+    return Offence(UNDECIDED, text, tally.motion, line, math.nan, 0.0, "1", math.inf, tally.count)
 
 
 def _first(posted: Posted, search: Search, offences: Sequence[Offence]) -> Offence | None:

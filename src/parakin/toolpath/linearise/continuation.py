@@ -9,11 +9,11 @@ import numpy as np
 from ...kinematics.wrist import continue_direction, find_nearest_turn, flip_rotation
 from ...machine import Machine
 from ..path import Floats
-from ..posting.frames import tool_poses, transform
-from ..posting.programmed_angles import rotations
+from ..posting.frames import compute_poses, frame_from_angles
+from ..posting.programmed_angles import compute_rotations
 from .interpolation import Flags, Indices
 
-_HERE = transform(0, 0, 0, 0, 0, 0)
+_HERE = frame_from_angles(0, 0, 0, 0, 0, 0)
 _EVEN = 1e-9  # of a rotation
 
 
@@ -55,7 +55,7 @@ def has_turns(machine: Machine, poses: Floats, rotation: Floats) -> Flags:
     columns = _turning_columns(machine)
     turns = np.zeros((len(poses), 3))
     turns[:, ["ABC".index(machine.axes[column]) for column in columns]] = poses[:, columns]
-    off = rotation - rotations(turns)
+    off = rotation - compute_rotations(turns)
     has: Flags = np.abs(off if len(columns) == 3 else off[:, :, 2:]).max(axis=(1, 2)) < _EVEN
     return has
 
@@ -65,7 +65,7 @@ def _turning_columns(machine: Machine) -> list[int]:
 
 
 def _pointing(machine: Machine, tip: Floats, axis: Floats, before: Rows) -> Floats:
-    poses = tool_poses(machine, tip, axis, _HERE)[0]
+    poses = compute_poses(machine, tip, axis, _HERE)[0]
     if machine.has_direction:
         continue_direction(poses[:, 3:], before.poses[:, 3:])
     else:

@@ -9,7 +9,7 @@ import numpy as np
 
 from ..path import Floats
 from ..posting.posted import Posted
-from ..posting.programmed_angles import rotations
+from ..posting.programmed_angles import compute_rotations
 from .continuation import Rows, continued, has_turns, turned
 from .deviation import Parts, Tube
 from .interpolation import Flags, Indices, Programmed
@@ -119,7 +119,7 @@ class _Search:
         tip, axis = self.path.at(motion, share)
         if turns is None:
             return continued(machine, mode, tip, axis, first)
-        rotation = self.path.rotation @ rotations(turns)
+        rotation = self.path.rotation @ compute_rotations(turns)
         even = np.where(self.even[motion][:, None], self._between(motion, share), np.nan)
         return turned(machine, mode, tip, rotation, even, first)
 
@@ -131,7 +131,7 @@ class _Search:
         turns = self.path.turns(motion, share)
         if turns is None:
             return np.zeros(len(self.posted.path), np.bool_)
-        poses, rotation = self._between(motion, share), self.path.rotation @ rotations(turns)
+        poses, rotation = self._between(motion, share), self.path.rotation @ compute_rotations(turns)
         return np.append(False, has_turns(self.posted.machine, poses, rotation))
 
     def _between(self, motion: Indices, share: Floats) -> Floats:

@@ -10,7 +10,7 @@ import numpy as np
 
 from ...machine import Machine
 from ..path import Floats
-from ..posting.frames import tool_poses, transform
+from ..posting.frames import compute_poses, frame_from_angles
 from .continuation import Rows
 from .interpolation import Indices, Programmed, axis_of_turns
 
@@ -18,7 +18,7 @@ Under: TypeAlias = Literal["pose", "joints"]
 SHARES: Floats = (np.arange(32, dtype=np.float64) + 0.58) / 32.0  # where a part is looked at thoroughly
 FOUND = 0.997  # of the tolerance: what may be found there, for the worst point may lie between
 _BLOCK = 1 << 14  # points looked at together
-_HERE = transform(0, 0, 0, 0, 0, 0)
+_HERE = frame_from_angles(0, 0, 0, 0, 0, 0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,7 +88,7 @@ class Tube:
                 moved = np.clip(share[nearest] + np.where(np.isfinite(ahead), ahead, 0.0), 0.0, 1.0)
                 point[nearest], k[nearest] = self.programmed.at(to, moved)
         if self._turns < 2:  # it points the tool as it can
-            k = self._axes(tool_poses(self.machine, point, k, _HERE)[0])
+            k = self._axes(compute_poses(self.machine, point, k, _HERE)[0])
         off, lean = _norm(tip - point), 2.0 * np.arcsin(np.minimum(1.0, 0.5 * _norm(self._axes(poses) - k)))
         return off, lean, np.maximum(off / self.chord, lean / self.angle)
 

@@ -31,7 +31,7 @@ def linearised(
 
     Parameters
     ----------
-    posted : as from :func:`~..post.post`
+    posted : as from :func:`~..posting.post.post_path`
     under : what the controller moves evenly from record to record: ``pose``, every coordinate of the pose, or
         ``joints``, every joint
     chord, angle : mm and rad that the tool's tip and axis may be off: see :class:`~.tube.Tube`

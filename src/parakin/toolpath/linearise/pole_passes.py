@@ -8,7 +8,7 @@ import numpy as np
 
 from ...kinematics.wrist import PRINTED, REPORTED, TRAVEL, VICINITY, wrap_angle
 from ..path import Floats, Note, ToolPath
-from ..posting.post import post
+from ..posting.post import post_path
 from ..posting.posted import Posted
 from .cuts import Places, parts_of
 from .deviation import FOUND, SHARES, Tube
@@ -53,7 +53,7 @@ class Through:
 
 def posted_again(posted: Posted, path: ToolPath) -> Posted:
     """Another path in the same frame and mode."""
-    return post(posted.machine, replace(path, frame=None), workpiece=posted.frame, mode=posted.mode)
+    return post_path(posted.machine, replace(path, frame=None), workpiece=posted.frame, mode=posted.mode)
 
 
 def through_the_poles(tube: Tube, posted: Posted, motion: Indices) -> Through:

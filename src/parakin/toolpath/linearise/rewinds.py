@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..posting.posted import Posted
-from ..posting.turn_steps import STEP
+from ..posting.turn_steps import TURN_STEP
 from .interpolation import axis_of_turns, denser, pointed
 from .pole_passes import posted_again
 
@@ -19,7 +19,7 @@ def spelled_out(posted: Posted) -> Posted:
         return posted
     record = np.array(posted.rewinds, np.int64)
     begin, way = posted.poses[record - 1, 3:], posted.poses[record, 3:] - posted.poses[record - 1, 3:]
-    parts = np.maximum(1, np.ceil(np.abs(way[:, 1]) / STEP)).astype(np.int64)
+    parts = np.maximum(1, np.ceil(np.abs(way[:, 1]) / TURN_STEP)).astype(np.int64)
     motion, of = np.repeat(record, parts - 1), np.repeat(np.arange(len(record)), parts - 1)
     number = np.arange(len(of)) - np.repeat(np.cumsum(parts - 1) - (parts - 1), parts - 1) + 1
     share = number / parts[of]

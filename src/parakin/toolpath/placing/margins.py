@@ -12,10 +12,10 @@ from numpy.typing import NDArray
 from ...kinematics.wrist import PRINTED, TURN
 from ...machine import Machine
 from ..path import Floats, ToolPath
-from ..posting.frames import OwnLimit, composed, tool_poses, transform
-from ..posting.range_use import bounded
-from ..posting.working_mode import branch
-from .maximin import value_of
+from ..posting.frames import PathLimit, compose_frames, compute_poses, frame_from_angles
+from ..posting.range_use import list_ranges
+from ..posting.working_mode import choose_branch
+from .maximin import score_rows
 
 Indices = NDArray[np.int64]
 AXES = "XYZABC"
@@ -23,7 +23,7 @@ _BLOCK = 1 << 15  # records whose margins are held at once
 _OFF = {"mm": 100.0, "rad": 1.0}  # what a limit of the path's own is relative to
 
 
-class Found(NamedTuple):
+class PlacementScore(NamedTuple):
     """A placement over the whole path: what it is worth, its tightest limit and record, and every limit's record."""
 
     worth: float
@@ -35,7 +35,7 @@ class Found(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class Placing:
+class PlacementMargins:
     """Placements are points (d,) of the unit box, between the bounds of ``axes``; what isn't named is held.
 
     Rows are margins over half their limit's range. Hard ones must not be below 0 and count no further: the legs'
@@ -58,7 +58,7 @@ class Placing:
     def workpiece(self, point: Floats) -> Floats:
         """(3, 4)"""
         values = self.values(point)
-        return transform(*(values.get(letter, 0.0) for letter in AXES))
+        return frame_from_angles(*(values.get(letter, 0.0) for letter in AXES))
 
     def rows(self, points: Floats, records: Indices, track: Indices | None) -> tuple[Floats, Floats]:
         """Hard and soft rows (m, ...) of points (m, d) at some records, ascending.
@@ -74,7 +74,7 @@ class Placing:
             if track is None:
                 q = self.machine.follow(x, self.mode, PRINTED)
             else:
-                taken = branch(self.machine, path, x, self.mode)
+                taken = choose_branch(self.machine, path, x, self.mode)
                 x, q = taken.poses[at], taken.joints[at]
             poses.append(x)
             joints.append(q)
@@ -87,10 +87,10 @@ class Placing:
         outer = np.concatenate([margins[:, :, hard].reshape(len(points), -1), np.array(own)], axis=1)
         return outer, margins[:, :, ~hard].reshape(len(points), -1)
 
-    def found(self, point: Floats) -> Found:
+    def found(self, point: Floats) -> PlacementScore:
         """The whole path's."""
         x, own = self._posed(point, self.path)
-        taken = branch(self.machine, self.path, x, self.mode)
+        taken = choose_branch(self.machine, self.path, x, self.mode)
         x, q = taken.poses, taken.joints
         hard, spans = self.relative
         count = len(self.machine.limits)
@@ -109,28 +109,28 @@ class Placing:
             names.append(limit.name)
             least = np.append(least, (limit.tolerance - size.max()) / _OFF[limit.unit])
             worst, hard = np.append(worst, int(size.argmax())), np.append(hard, True)
-        worth = float(value_of(least[None, hard], least[None, ~hard])[0])
+        worth = float(score_rows(least[None, hard], least[None, ~hard])[0])
         counted = np.where(hard & (least >= 0.0), np.inf, least)
         if (counted[hard] < 0.0).any():
             counted[~hard] = np.inf
         index = int(counted.argmin()) if len(counted) else -1
         if index < 0 or counted[index] == np.inf:
-            return Found(worth, 1.0, "", 0, worst, least)
-        return Found(worth, float(counted[index]), names[index], int(worst[index]), worst, least)
+            return PlacementScore(worth, 1.0, "", 0, worst, least)
+        return PlacementScore(worth, float(counted[index]), names[index], int(worst[index]), worst, least)
 
     @cached_property
     def relative(self) -> tuple[NDArray[np.bool_], Floats]:
         """Which limits are a mere reach, and what each limit's margin is relative to, (limits,)."""
-        uses, of = bounded(self.machine)
+        uses, of = list_ranges(self.machine)
         spans = [
             uses[i].span if i >= 0 else max(limit.bound, 1.0) ** (2 if limit.unit == "mm²" else 1)
             for i, limit in zip(of.tolist(), self.machine.limit_parts, strict=True)
         ]
         return of < 0, np.array(spans)
 
-    def _posed(self, point: Floats, path: ToolPath) -> tuple[Floats, tuple[OwnLimit, ...]]:
-        frame = composed(self.workpiece(point), path.frame)
-        return tool_poses(self.machine, path.tip, path.axis, frame, path.turns)
+    def _posed(self, point: Floats, path: ToolPath) -> tuple[Floats, tuple[PathLimit, ...]]:
+        frame = compose_frames(self.workpiece(point), path.frame)
+        return compute_poses(self.machine, path.tip, path.axis, frame, path.turns)
 
     def _turn_freely(self, margins: Floats) -> None:
         """Turn every turning joint by the whole turns that bring it nearest to the middle of its range, in place."""
@@ -150,7 +150,7 @@ def _some(path: ToolPath, records: Indices) -> ToolPath:
     return replace(path, **parts, turns=turns, seconds=None, events=(), notes=())
 
 
-def _own_rows(limits: tuple[OwnLimit, ...], at: Indices | slice) -> Floats:
+def _own_rows(limits: tuple[PathLimit, ...], at: Indices | slice) -> Floats:
     """Signed values from both sides, so that rows have no corner at 0."""
     signed = [(limit, sign * limit.values[at]) for limit in limits for sign in (1.0, -1.0)]
     rows = [(limit.tolerance + values) / _OFF[limit.unit] for limit, values in signed]

@@ -30,7 +30,7 @@ class Top(NamedTuple):
     rest: float
 
 
-def value_of(hard: Floats, soft: Floats) -> Floats:
+def score_rows(hard: Floats, soft: Floats) -> Floats:
     """What each point is worth (m,), from its rows; 1 where nothing limits it."""
     low = np.where(np.isnan(hard), -1.0, hard).min(axis=1, initial=np.inf)
     least = np.where(np.isnan(soft), -np.inf, soft).min(axis=1, initial=1.0 if not soft.shape[1] else np.inf)
@@ -38,7 +38,7 @@ def value_of(hard: Floats, soft: Floats) -> Floats:
     return worth
 
 
-def raised(rows: Rows, start: Floats, rounds: int = 60, trust: float = _FIRST) -> Top:
+def maximise_least(rows: Rows, start: Floats, rounds: int = 60, trust: float = _FIRST) -> Top:
     """A local maximum of the least soft row in the unit box, from ``start`` (d,).
 
     Where the least row is one that nothing changes, the least of the others is raised.
@@ -74,7 +74,7 @@ class _Worth(NamedTuple):
 
 def _worth(hard: Floats, soft: Floats, flat: NDArray[np.bool_]) -> _Worth:
     """What all rows make a point worth, and what those that aren't flat do."""
-    return _Worth(float(value_of(hard[None], soft[None])[0]), float(value_of(hard[None], soft[None, ~flat])[0]))
+    return _Worth(float(score_rows(hard[None], soft[None])[0]), float(score_rows(hard[None], soft[None, ~flat])[0]))
 
 
 def _way(

@@ -12,9 +12,9 @@ from ...errors import PoseError
 from ...machine import Machine
 from ...performance.search import spread
 from ..path import Floats, ToolPath
-from ..posting.working_mode import modes_to_try
-from .margins import AXES, Found, Indices, Placing
-from .maximin import Rows, Top, raised, value_of
+from ..posting.working_mode import list_candidate_modes
+from .margins import AXES, Indices, PlacementMargins, PlacementScore
+from .maximin import Rows, Top, maximise_least, score_rows
 
 Progress = Callable[[float], None]
 Bounds = Mapping[str, tuple[float, float]]
@@ -56,14 +56,14 @@ class Placement:
         return self.margin >= 0.0
 
 
-def placed(
+def find_placement(
     machine: Machine, path: ToolPath, bounds: Bounds, *, mode: str | None = None, progress: Progress | None = None
 ) -> Placement:
     """The placement within bounds with the greatest least margin over all records of a path; see :class:`Placement`.
 
     Parameters
     ----------
-    machine, path : as :func:`~..post.post` takes them
+    machine, path : as :func:`~..posting.post.post_path` takes them
     bounds : by axis (X Y Z mm, A B C rad) the least and the greatest value
     mode : working mode; None: the default one, and head and table's other sign where that allows no placement
     progress : called now and then with the fraction done, 0 to 1
@@ -84,8 +84,8 @@ def placed(
     held = {axis: ends[0] for axis, ends in bounds.items() if axis not in axes}
     ends = np.array([bounds[axis] for axis in axes]).reshape(-1, 2)
     results, tried = [], 0
-    for each in modes_to_try(machine, mode):
-        search = _Search(Placing(machine, path, each, axes, ends[:, 0], ends[:, 1], held), say)
+    for each in list_candidate_modes(machine, mode):
+        search = _Search(PlacementMargins(machine, path, each, axes, ends[:, 0], ends[:, 1], held), say)
         results.append((*search.run(), search.placing))
         tried += search.tried
         if results[-1][1].margin >= 0.0:
@@ -104,7 +104,7 @@ class _Search:
     track : those along which their joints go on, None at first: see :meth:`Placing.rows`
     """
 
-    def __init__(self, placing: Placing, say: Progress):
+    def __init__(self, placing: PlacementMargins, say: Progress):
         self.placing, self.say = placing, say
         self.records = _telling(placing.path)
         self.track: Indices | None = None
@@ -118,7 +118,7 @@ class _Search:
 
         return rows
 
-    def run(self) -> tuple[Floats, Found]:
+    def run(self) -> tuple[Floats, PlacementScore]:
         """The best point, and what it is over the whole path."""
         return self._settled(self._climbed(0.0, 0.5))
 
@@ -127,17 +127,17 @@ class _Search:
         d = len(self.placing.axes)
         points = _spread_out(_LOOKED_AT, d) if d else np.empty((1, 0))
         parts = np.array_split(points, range(32, len(points), 32))
-        worths = np.concatenate([value_of(*self.rows(part)) for part in parts])
+        worths = np.concatenate([score_rows(*self.rows(part)) for part in parts])
         starts = spread(points, worths, _STARTS, np.full(d, _APART)) if d else np.zeros(1, np.int64)
         tops = []
         for number, start in enumerate(starts.tolist(), 1):
-            tops.append(raised(self.rows, points[start], _STEPS))
+            tops.append(maximise_least(self.rows, points[start], _STEPS))
             self.say(begin + (end - begin) * (0.3 + 0.7 * number / len(starts)))
         return tops
 
-    def _settled(self, tops: list[Top]) -> tuple[Floats, Found]:
+    def _settled(self, tops: list[Top]) -> tuple[Floats, PlacementScore]:
         """The best of some local maxima, over the whole path: the most promising one is looked at until it holds."""
-        best: tuple[Floats, Found] | None = None
+        best: tuple[Floats, PlacementScore] | None = None
         for attempt in range(_ROUNDS):
             tops.sort(key=lambda top: (-round(top.worth, 9), -top.rest))
             point, worth, rest = tops[0]
@@ -155,14 +155,14 @@ class _Search:
                     self.track = np.union1d(self.track, more)
             elif self.track is None:
                 self.track = np.union1d(_evenly(len(self.placing.path), _TRACK), self.records)
-                tops = [raised(self.rows, point, _STEPS), *self._climbed(0.5, 0.8)]
+                tops = [maximise_least(self.rows, point, _STEPS), *self._climbed(0.5, 0.8)]
                 continue
             else:
                 tops[0] = Top(point, found.worth, rest)  # no more is to be learnt of it
                 continue
-            tops = [raised(self.rows, top.point, 0) for top in tops]
+            tops = [maximise_least(self.rows, top.point, 0) for top in tops]
             index = max(range(len(tops)), key=lambda i: tops[i].worth)
-            tops[index] = raised(self.rows, tops[index].point, 40, 0.05)
+            tops[index] = maximise_least(self.rows, tops[index].point, 40, 0.05)
         assert best is not None
         return best
 

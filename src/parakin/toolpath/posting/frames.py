@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 
 from ...machine import Machine
 from ..path import Floats
-from .programmed_angles import programmed, rotations
-from .tool_axis import BLOCK, turning_of
-from .turn_steps import thickened
+from .programmed_angles import compute_rotations, find_programmed_angles
+from .tool_orientation import BLOCK, find_tool_orientation
+from .turn_steps import add_turn_steps
 
-__all__ = ["OwnLimit", "composed", "tool_poses", "transform", "workpiece"]
+__all__ = ["PathLimit", "compose_frames", "compute_poses", "frame_from_angles", "workpiece"]
 
 LEAN = 1e-4  # rad a tool axis may lean where the machine can't tilt it: rounding in the file
 OFF_PLANE = 1e-6  # mm, the same across the plane of a machine that works in one
@@ -30,10 +30,10 @@ def workpiece(
     C: float = 0.0,
 ) -> Floats:
     """Build the transform that places a workpiece, (3, 4): R = Rz(C)·Ry(B)·Rx(A) and the origin; mm, rad."""
-    return transform(X, Y, Z, A, B, C)
+    return frame_from_angles(X, Y, Z, A, B, C)
 
 
-def transform(x: float, y: float, z: float, a: float, b: float, c: float) -> Floats:
+def frame_from_angles(x: float, y: float, z: float, a: float, b: float, c: float) -> Floats:
     """(3, 4): Rz(c)·Ry(b)·Rx(a) and the origin; mm, rad."""
     (sa, ca), (sb, cb), (sc, cc) = ((math.sin(t), math.cos(t)) for t in (a, b, c))
     return np.array(
@@ -45,9 +45,9 @@ def transform(x: float, y: float, z: float, a: float, b: float, c: float) -> Flo
     )
 
 
-def composed(outer: Floats | None, inner: Floats | None) -> Floats:
+def compose_frames(outer: Floats | None, inner: Floats | None) -> Floats:
     """``outer`` after ``inner``, (3, 4); None stands for no change."""
-    outer = transform(0, 0, 0, 0, 0, 0) if outer is None else outer
+    outer = frame_from_angles(0, 0, 0, 0, 0, 0) if outer is None else outer
     if inner is None:
         return outer
     rotation = outer[:, :3] @ inner[:, :3]
@@ -55,7 +55,7 @@ def composed(outer: Floats | None, inner: Floats | None) -> Floats:
 
 
 @dataclass(frozen=True, eq=False)
-class OwnLimit:
+class PathLimit:
     """What a machine with fewer axes than a path may ask for can't do: a limit of the path, not of the machine.
 
     name : ``tilt``, ``X``, ``Y`` or ``Z``
@@ -76,14 +76,15 @@ class OwnLimit:
         return ~(np.abs(self.values) <= self.tolerance)
 
 
-def tool_poses(
+def compute_poses(
     machine: Machine, tip: Floats, axis: Floats, frame: Floats, turns: Floats | None = None
-) -> tuple[Floats, tuple[OwnLimit, ...]]:
+) -> tuple[Floats, tuple[PathLimit, ...]]:
     """Poses for tool tips and axes, (n, 3) each, and what the machine's axes can't follow; ``frame`` leads into M.
 
     ``turns`` (n, 3), rad, are A, B, C as a program gives them, with the axes that follow from them. A machine that
     turns three ways, or turns its tool about the tool's own axis, takes the whole orientation; one with B and C takes
-    these as programmed where A is 0 and the frame turns about Z alone: see :func:`~.programmed.programmed`.
+    these as programmed where A is 0 and the frame turns about Z alone: see
+    :func:`~.programmed_angles.find_programmed_angles`.
 
     Else a turn about the tool's axis is free: C is as at home where the machine turns three ways, and B and C tell the
     axis's direction where it turns two (B from 0 to 180°, but below 0 where a path has passed over B = 0, so that C
@@ -91,7 +92,7 @@ def tool_poses(
 
     Raises :class:`PoseError` for a motion of thousands of turns, where they have to be followed.
     """
-    turning = turning_of(machine)
+    turning = find_tool_orientation(machine)
     rotation = frame[:, :3]
     poses = np.empty((len(tip), len(machine.axes)))
     off = {letter: np.empty(len(tip)) for letter in "XYZ" if letter not in machine.axes}
@@ -101,20 +102,20 @@ def tool_poses(
         part = slice(start, start + BLOCK)
         for place, values in zip(into, (tip[part] @ across + frame[:, 3]).T, strict=True):
             place[part] = values
-    angles = None if turns is None else programmed(turning, turns, frame)
+    angles = None if turns is None else find_programmed_angles(turning, turns, frame)
     if angles is None or turning.lean:
         pointed, lean = turning.along(axis, rotation)
         if angles is None and turns is not None and turning.letters:
-            thick, at = thickened(turns, range(3))
+            thick, at = add_turn_steps(turns, range(3))
             if len(thick) > len(turns):
-                pointed = turning.along(rotations(thick)[:, :, 2], rotation)[0][at]
+                pointed = turning.along(compute_rotations(thick)[:, :, 2], rotation)[0][at]
         angles = pointed if angles is None else angles
     for column, letter in enumerate(turning.letters):
         poses[:, machine.axes.index(letter)] = angles[:, column]
-    own = [OwnLimit(letter, "mm", values, OFF_PLANE, _off_plane(letter)) for letter, values in off.items()]
+    own = [PathLimit(letter, "mm", values, OFF_PLANE, _off_plane(letter)) for letter, values in off.items()]
     if turning.lean:
         text = f"tool axis would lean {{}}, the machine {turning.lean}".format
-        own.insert(0, OwnLimit("tilt", "rad", lean, LEAN, text))
+        own.insert(0, PathLimit("tilt", "rad", lean, LEAN, text))
     return poses, tuple(own)
 
 

@@ -12,12 +12,12 @@ from numpy.typing import NDArray
 from ...machine import Machine
 from ...model.limits import Limit
 from ..path import Floats
-from .frames import OwnLimit
+from .frames import PathLimit
 from .posted import Offence, Posted
 
 _BLOCK = 1 << 16  # records whose margins are held at once
 _NO_JOINTS = "reach"  # the path's own limit for what no margin tells
-TURNS, SINGULARITY, UNTOLD = "turns", "singularity", "untold"  # what only motions break
+TURNS, SINGULARITY, UNDECIDED = "turns", "singularity", "untold"  # what only motions break
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,13 +53,13 @@ class _Tally:
         self.count += len(records)
 
 
-def judge(
+def judge_path(
     machine: Machine,
     poses: Floats,
     joints: Floats,
     lines: NDArray[np.int64],
     mode: str | None = None,
-    own: Sequence[OwnLimit] = (),
+    own: Sequence[PathLimit] = (),
 ) -> Judgement:
     """Every limit that poses and the joints taken there break.
 
@@ -95,7 +95,9 @@ def judge(
         tallies[-1].add(lost, np.full(len(lost), np.inf))
 
     def offence(index: int, record: int, excess: float) -> Offence:
-        said = said_of(parts[index], excess) if index < len(parts) else _own(own, index - len(parts), record)
+        said = (
+            describe_broken_limit(parts[index], excess) if index < len(parts) else _own(own, index - len(parts), record)
+        )
         count = tallies[index].count
         return Offence(limits[index], said.text, record, int(lines[record]), *said.numbers, count)
 
@@ -106,51 +108,52 @@ def judge(
     start_record = min(tallies[i].first for i in seen)
     start_index = int(broken[start_record]) - 1
     first = offence(start_index, start_record, tallies[start_index].first_excess)
-    return Judgement(broken, limits, tuple(offences), first, gravest(machine, offences))
+    return Judgement(broken, limits, tuple(offences), first, find_gravest(machine, offences))
 
 
 @dataclass(frozen=True)
-class Said:
+class OffenceText:
     """An offence's text and its value, bound, unit and excess."""
 
     text: str
     numbers: tuple[float, float, str, float]
 
 
-def _own(own: Sequence[OwnLimit], index: int, record: int) -> Said:
+def _own(own: Sequence[PathLimit], index: int, record: int) -> OffenceText:
     if index == len(own):
-        return Said("the machine can't take this pose", (math.nan, math.nan, "1", math.inf))
+        return OffenceText("the machine can't take this pose", (math.nan, math.nan, "1", math.inf))
     limit = own[index]
     value = float(limit.values[record])
-    return Said(limit.text(measure(value, limit.unit, 0.0)), (value, 0.0, limit.unit, abs(value)))
+    return OffenceText(limit.text(format_measure(value, limit.unit, 0.0)), (value, 0.0, limit.unit, abs(value)))
 
 
-def said_of(limit: Limit, excess: float) -> Said:
+def describe_broken_limit(limit: Limit, excess: float) -> OffenceText:
     """What to say of a limit of the machine that is broken by ``excess``, its margin below 0."""
     if limit.side == "reach":
         return _reach(limit, excess)
     if not math.isfinite(excess):
-        return Said(f"{limit.subject} can't be told at this pose", (math.nan, limit.bound, limit.unit, math.inf))
+        return OffenceText(f"{limit.subject} can't be told at this pose", (math.nan, limit.bound, limit.unit, math.inf))
     value = limit.value(-excess)
-    text = f"{limit.subject} would be {measure(value, limit.unit, limit.bound)}, limit {bound(limit.bound, limit.unit)}"
-    return Said(text, (value, limit.bound, limit.unit, excess))
+    would_be, bound = format_measure(value, limit.unit, limit.bound), format_bound(limit.bound, limit.unit)
+    text = f"{limit.subject} would be {would_be}, limit {bound}"
+    return OffenceText(text, (value, limit.bound, limit.unit, excess))
 
 
-def _reach(limit: Limit, excess: float) -> Said:
+def _reach(limit: Limit, excess: float) -> OffenceText:
     if limit.unit == "1":
-        return Said("the head can't point the tool that way", (-excess, 0.0, "1", excess))
+        return OffenceText("the head can't point the tool that way", (-excess, 0.0, "1", excess))
     text = f"{limit.subject} can't close"
     if not math.isfinite(excess):
-        return Said(text, (math.nan, 0.0, "mm", math.inf))
+        return OffenceText(text, (math.nan, 0.0, "mm", math.inf))
     if limit.bound > 0.0:
         rod = limit.bound
         needed = math.sqrt(rod * rod + excess)
-        shown = measure(needed - rod, "mm", 0.0)
-        return Said(f"{text}: its rod would have to be {shown} longer", (needed, rod, "mm", needed - rod))
-    return Said(f"{text} there", (-math.sqrt(excess), 0.0, "mm", math.sqrt(excess)))
+        shown = format_measure(needed - rod, "mm", 0.0)
+        return OffenceText(f"{text}: its rod would have to be {shown} longer", (needed, rod, "mm", needed - rod))
+    return OffenceText(f"{text} there", (-math.sqrt(excess), 0.0, "mm", math.sqrt(excess)))
 
 
-def gravest(machine: Machine, offences: Sequence[Offence]) -> Offence:
+def find_gravest(machine: Machine, offences: Sequence[Offence]) -> Offence:
     """The one farthest off."""
     return max(offences, key=lambda offence: _gravity(machine, offence))
 
@@ -173,7 +176,7 @@ def _both_ends(name: str) -> tuple[str, str]:
     return f"{stem}.min", f"{stem}.max"
 
 
-def place(posted: Posted, offence: Offence) -> str:
+def describe_place(posted: Posted, offence: Offence) -> str:
     """Where an offence is: ``part.cls:214`` at a record, on a motion ``part.cls:214: 37 % on the way there, X 12.3 Y
     -40.1 Z -1650.2``; ``from 37 %`` where it begins there and its value is that of a later place."""
     where = f"{posted.path.source}:{offence.line}"
@@ -191,7 +194,7 @@ def _percent(share: float) -> str:
     return f"{percent:.0f}" if 1.0 <= percent <= 99.0 else f"{percent:.2f}"
 
 
-def measure(value: float, unit: str, against: float) -> str:
+def format_measure(value: float, unit: str, against: float) -> str:
     """A value with its unit, in as many digits as it takes to see that it isn't the value it is held against.
 
     rad are shown as degrees; ``1,533.2 mm``, ``12.34°``.
@@ -203,7 +206,7 @@ def measure(value: float, unit: str, against: float) -> str:
     return _with_unit(f"{shown:,.{digits}f}", unit)
 
 
-def bound(value: float, unit: str) -> str:
+def format_bound(value: float, unit: str) -> str:
     """A limit's bound: a round number as such, ``1,520``; angles with their sign, ``60°``."""
     shown = math.degrees(value) if unit == "rad" else value
     text = f"{shown:,.6f}".rstrip("0").rstrip(".")

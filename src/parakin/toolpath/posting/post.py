@@ -10,15 +10,15 @@ import numpy as np
 from ...errors import PoseError
 from ...machine import Machine
 from ..path import Floats, Note, ToolPath
-from .frames import composed, tool_poses
-from .offences import judge
+from .frames import compose_frames, compute_poses
+from .offences import judge_path
 from .posted import Posted
-from .working_mode import branch, modes_to_try
+from .working_mode import choose_branch, list_candidate_modes
 
 Progress = Callable[[float], None]
 
 
-def post(
+def post_path(
     machine: Machine,
     path: ToolPath,
     *,
@@ -38,7 +38,7 @@ def post(
     progress : called now and then with the fraction done, 0 to 1
 
     Turns of joints are counted, and taken back in rapid motions where they have to be: see
-    :func:`~.posing.branches.branch`.
+    :func:`~.working_mode.choose_branch`.
 
     Raises :class:`PoseError` for a workpiece that is no transform, an unknown mode, or a motion of thousands of turns.
     A record that can't be reached raises nothing: it is an offence of the result.
@@ -46,14 +46,14 @@ def post(
     say = progress or (lambda fraction: None)
     if workpiece is not None and (np.shape(workpiece) != (3, 4) or not np.isfinite(workpiece).all()):
         raise PoseError("workpiece: a transform of shape (3, 4) expected")
-    frame = composed(workpiece, path.frame)
-    poses, own = tool_poses(machine, path.tip, path.axis, frame, path.turns)
+    frame = compose_frames(workpiece, path.frame)
+    poses, own = compute_poses(machine, path.tip, path.axis, frame, path.turns)
     say(0.3)
     best, fewest = None, (0, 0)
-    for tried in modes_to_try(machine, mode):
-        taken = branch(machine, path, poses, tried)
+    for tried in list_candidate_modes(machine, mode):
+        taken = choose_branch(machine, path, poses, tried)
         say(0.7)
-        found = judge(machine, taken.poses, taken.joints, path.line, tried, own)
+        found = judge_path(machine, taken.poses, taken.joints, path.line, tried, own)
         wrong = (int(np.count_nonzero(found.broken)), taken.flips)
         if best is None or wrong < fewest:
             best, fewest = (taken, found), wrong

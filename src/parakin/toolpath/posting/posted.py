@@ -80,11 +80,11 @@ class Posted:
     rewinds: tuple[int, ...] = ()
 
     @property
-    def off(self) -> int:
+    def broken_record_count(self) -> int:
         """How many records break a limit."""
         return int(np.count_nonzero(self.broken))
 
     @property
-    def motions_off(self) -> int:
+    def broken_motion_count(self) -> int:
         """How many motions break a limit that the records at both their ends keep."""
         return 0 if self.strays is None else int(np.count_nonzero(self.strays))

@@ -9,13 +9,13 @@ import numpy as np
 
 from ...kinematics.wrist import EXACT, fill_free, find_crossings, flip_rotation, has_swing, unwind_angles, wrap_angle
 from ..path import Floats
-from .tool_axis import BLOCK, Turning
-from .turn_steps import thickened
+from .tool_orientation import BLOCK, ToolOrientation
+from .turn_steps import add_turn_steps
 
 _LEVEL = 1e-12  # of a frame's rotation: what is rounding
 
 
-def programmed(turning: Turning, turns: Floats, frame: Floats) -> Floats | None:
+def find_programmed_angles(turning: ToolOrientation, turns: Floats, frame: Floats) -> Floats | None:
     """Angles (n, turns) of the machine for turns (n, 3) in W; None where only the tool's axis tells them.
 
     Where the frame turns about one of the machine's own turns alone (C, where there are several), the angles are those
@@ -34,7 +34,7 @@ def programmed(turning: Turning, turns: Floats, frame: Floats) -> Floats | None:
         return angles
     if len(letters) < 3 and not turning.spins:
         return None
-    thick, at = thickened(turns, range(3))
+    thick, at = add_turn_steps(turns, range(3))
     near = turns[0, own] + np.append(np.zeros(len(letters) - 1), yaw or _twist(frame[:, :3], last))
     if turning.spins:
         assert turning.tool is not None
@@ -45,7 +45,7 @@ def programmed(turning: Turning, turns: Floats, frame: Floats) -> Floats | None:
     return taken
 
 
-def rotations(turns: Floats) -> Floats:
+def compute_rotations(turns: Floats) -> Floats:
     """Rz(C)·Ry(B)·Rx(A) for turns A, B, C (n, 3): (n, 3, 3)."""
     (sa, sb, sc), (ca, cb, cc) = np.sin(turns.T), np.cos(turns.T)
     rows = [
@@ -81,7 +81,7 @@ def _twist(rotation: Floats, letter: str) -> Any:
 def _spun(turns: Floats, frame: Floats, tool: Floats, letter: str) -> Floats:
     """(n, 1) turns of a tool about its own axis."""
     parts = np.array_split(turns, range(BLOCK, len(turns), BLOCK))
-    angles = [_twist(frame[:, :3] @ rotations(part) @ tool.T, letter) for part in parts]
+    angles = [_twist(frame[:, :3] @ compute_rotations(part) @ tool.T, letter) for part in parts]
     return unwind_angles(np.concatenate(angles))[:, None]
 
 
@@ -92,7 +92,7 @@ def _decomposed(turns: Floats, frame: Floats, near: Floats) -> Floats:
     columns = np.empty((count, 7))
     for start in range(0, count, BLOCK):
         part = slice(start, start + BLOCK)
-        r = frame[:, :3] @ rotations(turns[part])
+        r = frame[:, :3] @ compute_rotations(turns[part])
         size[part] = np.hypot(r[:, 2, 1], r[:, 2, 2])
         here[part, 0] = np.arctan2(r[:, 2, 1], r[:, 2, 2])
         here[part, 1] = np.arctan2(-r[:, 2, 0], size[part])

@@ -16,7 +16,7 @@ _BLOCK = 1 << 16  # records at a time: all margins of a long path would not fit
 
 
 @dataclass
-class Use:
+class RangeUse:
     """One bounded quantity, or a joint without bounds: its range allowed and the range used, mm or rad.
 
     ``margin`` is the least over the path, negative where a bound is broken, at ``record``; ``lost`` counts the
@@ -43,9 +43,9 @@ class Use:
         return abs(bound) or 1.0
 
 
-def bounded(machine: Machine) -> tuple[list[Use], NDArray[np.int64]]:
+def list_ranges(machine: Machine) -> tuple[list[RangeUse], NDArray[np.int64]]:
     """The machine's quantities, joints first, and for every limit the index of its quantity; -1 for a mere reach."""
-    uses = [Use(name, name, unit) for name, unit in zip(machine.joints, machine.joint_units, strict=True)]
+    uses = [RangeUse(name, name, unit) for name, unit in zip(machine.joints, machine.joint_units, strict=True)]
     index = {use.name: i for i, use in enumerate(uses)}
     of = np.full(len(machine.limits), -1)
     for number, limit in enumerate(machine.limit_parts):
@@ -54,7 +54,7 @@ def bounded(machine: Machine) -> tuple[list[Use], NDArray[np.int64]]:
         name = limit.name.removesuffix(f".{limit.side}")
         if name not in index:
             index[name] = len(uses)
-            uses.append(Use(name, limit.subject, limit.unit))
+            uses.append(RangeUse(name, limit.subject, limit.unit))
         use = uses[index[name]]
         of[number] = index[name]
         if limit.side == "min":
@@ -64,9 +64,9 @@ def bounded(machine: Machine) -> tuple[list[Use], NDArray[np.int64]]:
     return uses, of
 
 
-def relative_margin(machine: Machine, margins: Floats) -> Floats:
+def compute_relative_margin(machine: Machine, margins: Floats) -> Floats:
     """(n,): the least of all margins, each over half its range; 0 is at a limit, NaN where a leg can't close."""
-    uses, of = bounded(machine)
+    uses, of = list_ranges(machine)
     kept = of >= 0
     if not kept.any():
         return np.where((margins >= 0.0).all(axis=1), 1.0, np.nan)
@@ -75,16 +75,16 @@ def relative_margin(machine: Machine, margins: Floats) -> Floats:
     return np.where((margins[:, ~kept] >= 0.0).all(axis=1), least, np.nan)
 
 
-def used(posted: Posted) -> tuple[list[Use], Floats]:
+def measure_range_use(posted: Posted) -> tuple[list[RangeUse], Floats]:
     """Every quantity with its use over the path, and the least relative margin of every record, (n,)."""
     machine = posted.machine
-    uses, of = bounded(machine)
+    uses, of = list_ranges(machine)
     relative = np.empty(len(posted.poses))
     for start in range(0, len(relative), _BLOCK):
         rows = slice(start, start + _BLOCK)
         joints = posted.joints[rows]
         margins = machine.margins(posted.poses[rows], joints, posted.mode)
-        relative[rows] = relative_margin(machine, margins)
+        relative[rows] = compute_relative_margin(machine, margins)
         for use, q in zip(uses, joints.T, strict=False):
             _widen(use, q)
         for number, limit in enumerate(machine.limit_parts):
@@ -93,13 +93,13 @@ def used(posted: Posted) -> tuple[list[Use], Floats]:
     return uses, relative
 
 
-def _widen(use: Use, values: Floats) -> None:
+def _widen(use: RangeUse, values: Floats) -> None:
     real = values[~np.isnan(values)]
     if len(real):
         use.least, use.most = min(use.least, float(real.min())), max(use.most, float(real.max()))
 
 
-def _take(use: Use, side: str, bound: float, margins: Floats, start: int) -> None:
+def _take(use: RangeUse, side: str, bound: float, margins: Floats, start: int) -> None:
     gone = np.isnan(margins)
     if side == "max" or not isfinite(use.high):
         use.lost += int(gone.sum())

@@ -14,7 +14,7 @@ from ...kinematics.wrist import TURN
 from ...machine import Machine
 from ...model.parts import Drive
 from ..path import Floats, ToolPath
-from .turn_steps import passage
+from .turn_steps import trace_passage
 
 _BLOCK = 1 << 16  # records whose margins are held at once
 _AT_START, _OFF = 41, 9  # counts of turns that are tried: of a path's first stretch, and where none fits
@@ -25,7 +25,7 @@ _NEARER = 1e-6  # rad: what is no matter of rounding
 Cost = tuple[int, float, float]  # records off limits, rad turned between the stretches, rad from home
 
 
-def nearest_turns(drive: Drive, angles: Floats, home: float) -> int | None:
+def find_turns_in_range(drive: Drive, angles: Floats, home: float) -> int | None:
     """How many turns on angles (n,) are all in the drive's range, and nearest to home; None if that can't be."""
     low, high = float(np.fmin.reduce(angles)), float(np.fmax.reduce(angles))
     if math.isnan(low) or not (math.isfinite(drive.low) or math.isfinite(drive.high)):
@@ -159,12 +159,12 @@ def _best(joint: _Joint, cuts: Sequence[int]) -> list[int]:
     return found[::-1]
 
 
-def whole_turns(machine: Machine, poses: Floats, joints: Floats, mode: str, column: int, home: float) -> int:
+def choose_turns(machine: Machine, poses: Floats, joints: Floats, mode: str, column: int, home: float) -> int:
     """The turns by which a joint as a whole breaks its range in the fewest records."""
     return _best(_Joint.of(machine, poses, joints, mode, column, home), ())[0]
 
 
-def rewound(
+def rewind_in_rapids(
     machine: Machine, path: ToolPath, poses: Floats, joints: Floats, mode: str, home: float
 ) -> tuple[Floats, Floats, tuple[int, ...]]:
     """Poses and joints, the first joint of head and table turned back in rapid motions, and the records these lead to.
@@ -238,7 +238,7 @@ def _turns_of_c(
     for turns in (behind - before, before - behind):
         end = poses[record].copy()
         end[machine.axes.index("C")] += TURN * turns
-        along = passage(machine, mode, poses[record - 1], end, start, record)
+        along = trace_passage(machine, mode, poses[record - 1], end, start, record)
         off = max(np.abs(along.joints[0] - start).max(), np.abs(along.joints[-1] - goal).max())
         if along.smooth and off < _SAME:
             return turns if not ends_fine or not machine.check(along.poses, along.joints, mode).any() else 0

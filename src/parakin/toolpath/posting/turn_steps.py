@@ -14,7 +14,7 @@ from ...kinematics.wrist import PRINTED, TURN, wrap_angle
 from ...machine import Machine
 from ..path import Floats
 
-STEP = math.pi / 36.0  # rad: turns that go evenly are looked at in steps no longer
+TURN_STEP = math.pi / 36.0  # rad: turns that go evenly are looked at in steps no longer
 MOST_STEPS = 1 << 16  # in a motion
 _WIDE = math.pi / 3.0  # rad a joint may turn from step to step
 _HALVINGS = 6
@@ -32,12 +32,12 @@ class Passage:
     smooth: bool
 
 
-def steps_of(turned: Floats, first: int = 1) -> Floats:
+def count_steps(turned: Floats, first: int = 1) -> Floats:
     """In how many steps (n,) to look at motions that turn by (n,) rad, to the records from ``first`` on.
 
     Raises :class:`PoseError` for thousands of turns in one motion.
     """
-    steps = np.maximum(1.0, np.ceil(turned / STEP))
+    steps = np.maximum(1.0, np.ceil(turned / TURN_STEP))
     if steps.max(initial=0.0) > MOST_STEPS:
         turns = turned.max() / TURN
         raise PoseError(
@@ -46,12 +46,12 @@ def steps_of(turned: Floats, first: int = 1) -> Floats:
     return steps
 
 
-def thickened(rows: Floats, columns: Sequence[int]) -> tuple[Floats, Any]:
+def add_turn_steps(rows: Floats, columns: Sequence[int]) -> tuple[Floats, Any]:
     """Rows (m, ...) that go evenly, angles in ``columns`` in small steps, and where the given rows (n, ...) stand."""
     turned = np.abs(np.diff(rows[:, columns], axis=0)).max(axis=1, initial=0.0)
-    if not (turned > STEP).any():
+    if not (turned > TURN_STEP).any():
         return rows, slice(None)
-    parts = steps_of(turned).astype(np.int64)
+    parts = count_steps(turned).astype(np.int64)
     at = np.concatenate([[0], np.cumsum(parts)])
     of = np.repeat(np.arange(len(parts)), parts)
     share = (np.arange(len(of)) - at[of]) / parts[of]
@@ -59,10 +59,10 @@ def thickened(rows: Floats, columns: Sequence[int]) -> tuple[Floats, Any]:
     return np.vstack([between, rows[-1:]]), at
 
 
-def passage(machine: Machine, mode: str, begin: Floats, end: Floats, joints: Floats, record: int) -> Passage:
+def trace_passage(machine: Machine, mode: str, begin: Floats, end: Floats, joints: Floats, record: int) -> Passage:
     """From pose to pose, (axes,) each, joints going on from ``joints``; ``record`` is the one that is led to."""
     turned = [abs(float(end[i] - begin[i])) for i, letter in enumerate(machine.axes) if letter in "ABC"]
-    parts = int(steps_of(np.array([max(turned, default=0.0)]), record)[0])
+    parts = int(count_steps(np.array([max(turned, default=0.0)]), record)[0])
     for _ in range(_HALVINGS):
         share = np.linspace(0.0, 1.0, parts + 1)[:, None]
         poses = begin + share * (end - begin)

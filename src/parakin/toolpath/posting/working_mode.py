@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from ...kinematics.wrist import PRINTED, SWING, TURN
 from ...machine import Machine
 from ..path import Floats, ToolPath
-from .turn_counts import nearest_turns, rewound, whole_turns
-from .turn_steps import thickened
+from .turn_counts import choose_turns, find_turns_in_range, rewind_in_rapids
+from .turn_steps import add_turn_steps
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,7 +31,7 @@ class Branch:
     flips: int
 
 
-def modes_to_try(machine: Machine, mode: str | None) -> list[str]:
+def list_candidate_modes(machine: Machine, mode: str | None) -> list[str]:
     """The working modes that a path may take: the given one, or the default with either sign of head and table.
 
     The legs' signs are the machine's: it can't change them without passing a serial singularity.
@@ -40,7 +40,7 @@ def modes_to_try(machine: Machine, mode: str | None) -> list[str]:
     return machine.head_modes(default) if mode is None else [default]
 
 
-def branch(machine: Machine, path: ToolPath, poses: Floats, mode: str) -> Branch:
+def choose_branch(machine: Machine, path: ToolPath, poses: Floats, mode: str) -> Branch:
     """The joints that follow from poses in a working mode, their turns counted.
 
     The turns are those with which the fewest records break a limit, then those by which the joints turn least, then
@@ -56,15 +56,15 @@ def branch(machine: Machine, path: ToolPath, poses: Floats, mode: str) -> Branch
     home = np.nan_to_num(machine.inverse(machine.home, mode))
     back = None
     for column in turning:
-        turns = nearest_turns(machine.drives[column], joints[:, column], float(home[column]))
+        turns = find_turns_in_range(machine.drives[column], joints[:, column], float(home[column]))
         if turns is not None:
             joints[:, column] += TURN * turns
         elif column == first:
             back = column
         else:
-            joints[:, column] += TURN * whole_turns(machine, poses, joints, mode, column, float(home[column]))
+            joints[:, column] += TURN * choose_turns(machine, poses, joints, mode, column, float(home[column]))
     if back is not None:
-        poses, joints, rewinds = rewound(machine, path, poses, joints, mode, float(home[back]))
+        poses, joints, rewinds = rewind_in_rapids(machine, path, poses, joints, mode, float(home[back]))
     return Branch(mode, poses, joints, rewinds, _flips(joints[:, turning], path.rapid))
 
 
@@ -72,7 +72,7 @@ def _followed(machine: Machine, path: ToolPath, poses: Floats, mode: str) -> Flo
     """Joints along poses; where a program turns the tool they go evenly from record to record, however far apart."""
     if path.turns is None or machine.wrist is None:
         return machine.follow(poses, mode, PRINTED)
-    thick, at = thickened(poses, [i for i, letter in enumerate(machine.axes) if letter in "ABC"])
+    thick, at = add_turn_steps(poses, [i for i, letter in enumerate(machine.axes) if letter in "ABC"])
     joints: Floats = machine.follow(thick, mode, PRINTED)[at]
     return joints
 

@@ -17,7 +17,7 @@ BLOCK = 1 << 13  # records of which the many intermediate arrays stay in the cac
 
 
 @dataclass(frozen=True)
-class Turning:
+class ToolOrientation:
     """How a machine points its tool.
 
     letters : of its turns
@@ -59,14 +59,14 @@ class Turning:
         return turns, lean
 
 
-def turning_of(machine: Machine) -> Turning:
+def find_tool_orientation(machine: Machine) -> ToolOrientation:
     """How a machine points its tool."""
     turns = "".join(letter for letter in machine.axes if letter in "ABC")
     if len(turns) == 3:
         held = float(machine.home[-1])  # what C is free to be, for which the machine is made
-        return Turning(turns, lambda k: _three_turns(k, held), "B")
+        return ToolOrientation(turns, lambda k: _three_turns(k, held), "B")
     if machine.has_direction:
-        return Turning(turns, _two_turns, "C", has_direction=True)
+        return ToolOrientation(turns, _two_turns, "C", has_direction=True)
     tool = np.array(machine.structure.tool_rotation, dtype=np.float64)
     fixed = np.array(machine.structure.tool_axis, dtype=np.float64)
     upright = abs(fixed[2] - 1.0) < 1e-12
@@ -78,8 +78,8 @@ def turning_of(machine: Machine) -> Turning:
         def none(k: Floats) -> tuple[Sequence[Floats], Any, Any]:
             return [np.zeros(len(k))] * len(turns), False, _angle(k, fixed)
 
-        return Turning(turns, none, None, lean, spins=bool(turns), tool=tool)
-    return Turning(turns, lambda k: _one_turn(k, about, fixed, share), turns, "can't follow", tool=tool)
+        return ToolOrientation(turns, none, None, lean, spins=bool(turns), tool=tool)
+    return ToolOrientation(turns, lambda k: _one_turn(k, about, fixed, share), turns, "can't follow", tool=tool)
 
 
 def _two_turns(k: Floats) -> tuple[Sequence[Floats], Any, Any]:

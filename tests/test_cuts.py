@@ -16,7 +16,7 @@ from test_kernels import CORNERS, MEANING, SMOOTH, number
 from parakin import algebra as alg
 from parakin.kernels.batch import evaluate_tape
 from parakin.kernels.tape import compile_tape
-from parakin.model.limits import distance
+from parakin.model.limits import segment_distance
 from parakin.workspaces.certified.constraints import Constraint
 from parakin.workspaces.certified.plane_cuts import CLEARED, EXCLUDED, KEPT, narrowest, share, united
 from parakin.workspaces.certified.subdivision import Cuts, Items, Lines, bounds
@@ -183,7 +183,7 @@ def test_the_jump_of_an_angle_is_not_missed(smooth, every, monkeypatch):
     x, y, turn = trace.inputs(3)
     margin = 2.9 - alg.atan2(y + turn, x)
     if not smooth:
-        margin = alg.smaller(margin, 5.0 + x)
+        margin = alg.minimum(margin, 5.0 + x)
     tape = compile_tape(trace, [margin], 3)
     rng = np.random.default_rng(52)
     low = np.column_stack([rng.uniform(-3, -2, 300), rng.uniform(-0.3, 0.1, 300)])
@@ -224,7 +224,7 @@ def test_straight_bounds_of_a_clearance_hold_for_the_least_distance():
             )
             for end, move in zip(ends, moves, strict=True)
         ]
-        margin = distance((points[0], points[1]), (points[2], points[3])) - 0.5
+        margin = segment_distance((points[0], points[1]), (points[2], points[3])) - 0.5
 
         def value(rows, ends=ends, moves=moves):
             a, b, c, d = np.moveaxis(ends + np.einsum("pck,nk->npc", moves, rows), 1, 0)

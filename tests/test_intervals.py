@@ -54,7 +54,7 @@ OPERATIONS = {
     alg.ABS: lambda x: x if x >= 0 else -x,
     alg.COPYSIGN: lambda x, y: -abs(x) if y < 0 else abs(x),
     alg.SELECT: lambda x, y, below, otherwise: below if x < y else otherwise,
-    alg.HELD: lambda x: x,
+    alg.STOP_GRADIENT: lambda x: x,
 }
 
 
@@ -99,7 +99,7 @@ CASES = {
     "size": (alg.ABS, (0,), ()),
     "signed": (alg.COPYSIGN, (0, 1), ()),
     "choice": (alg.SELECT, (0, 1, 2, 3), ()),
-    "held": (alg.HELD, (0,), ()),
+    "held": (alg.STOP_GRADIENT, (0,), ()),
 }
 COUNT = 4
 every_case = pytest.mark.parametrize("case", CASES)

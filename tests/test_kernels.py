@@ -105,8 +105,8 @@ MEANING = {
     "sin": lambda a, b, k: alg.sincos(a)[0],
     "cos": lambda a, b, k: alg.sincos(a)[1],
     "atan2": lambda a, b, k: alg.atan2(a, b * b + 0.5),
-    "min": lambda a, b, k: alg.smaller(a, b),
-    "max": lambda a, b, k: alg.larger(a, b),
+    "min": lambda a, b, k: alg.minimum(a, b),
+    "max": lambda a, b, k: alg.maximum(a, b),
     "abs": lambda a, b, k: alg.absolute(a),
     "copysign": lambda a, b, k: alg.copysign(a, b),
 }

@@ -1,4 +1,4 @@
-"""Scalars and vectors in which the model is written once and read by several interpreters.
+"""Scalars and vectors in which the model is written once, for several interpreters.
 
 A scalar is a number, a NumPy array (all poses at once) or a :class:`Term` (a trace, compiled by
 :mod:`parakin.kernels.tape` or differentiated by :func:`derivative`). Vectors are triples of scalars, matrices triples
@@ -13,37 +13,37 @@ from typing import Any, TypeAlias
 import numpy as np
 
 # The operations of a trace. LIN: k0 + Σ k·a; QUAD: Σ k·a·b, up to three summands each; FMA: k·a·b + k·c + k0;
-# SELECT: c where a < b, else d (the derivatives of MIN and MAX); HELD: a, whose derivative is 0.
-LIN, QUAD, FMA, DIV, SQRT, SIN, COS, ATAN2, MIN, MAX, ABS, COPYSIGN, SELECT, HELD, INPUT = range(15)
+# SELECT: c where a < b, else d (the derivatives of MIN and MAX); STOP_GRADIENT: a, whose derivative is 0.
+LIN, QUAD, FMA, DIV, SQRT, SIN, COS, ATAN2, MIN, MAX, ABS, COPYSIGN, SELECT, STOP_GRADIENT, INPUT = range(15)
 
 
 class Term:
-    """A node of a trace. Equal nodes are one object, sums and products are gathered as they are written."""
+    """A node of a trace. Equal nodes are one object; sums and products are combined as they are written."""
 
     __slots__ = ("args", "index", "k", "op", "trace")
-    __array_ufunc__ = None  # NumPy's scalars leave arithmetic with a term to the term
+    __array_ufunc__ = None  # so that NumPy's scalars leave arithmetic with a term to the term
 
     def __init__(self, trace: Trace, op: int, args: tuple[Term, ...], k: tuple[float, ...], index: int):
         self.trace, self.op, self.args, self.k, self.index = trace, op, args, k, index
 
     def __add__(self, other: Scalar) -> Scalar:
-        return _sum(self, other, 1.0)
+        return _add_multiple(self, other, 1.0)
 
     __radd__ = __add__
 
     def __sub__(self, other: Scalar) -> Scalar:
-        return _sum(self, other, -1.0)
+        return _add_multiple(self, other, -1.0)
 
     def __rsub__(self, other: float) -> Scalar:
         return -self + other
 
     def __neg__(self) -> Scalar:
-        return _scaled(self, -1.0)
+        return _multiply_constant(self, -1.0)
 
     def __mul__(self, other: Scalar) -> Scalar:
         if not isinstance(other, Term):
-            return _scaled(self, float(other))
-        (ka, a), (kb, b) = _unscaled(self), _unscaled(other)
+            return _multiply_constant(self, float(other))
+        (ka, a), (kb, b) = _split_factor(self), _split_factor(other)
         pair = (a, b) if a.index <= b.index else (b, a)
         return self.trace.node(QUAD, pair, (ka * kb,))
 
@@ -51,7 +51,7 @@ class Term:
 
     def __truediv__(self, other: Scalar) -> Scalar:
         if not isinstance(other, Term):
-            return _scaled(self, 1.0 / float(other))
+            return _multiply_constant(self, 1.0 / float(other))
         return self.trace.node(DIV, (self, other), ())
 
     def __rtruediv__(self, other: float) -> Scalar:
@@ -66,7 +66,7 @@ Mat: TypeAlias = Sequence[Sequence[Scalar]]
 
 
 class Trace:
-    """All nodes of one computation, in the order they were made: operands before results."""
+    """All nodes of one computation in the order of their making: operands before results."""
 
     def __init__(self) -> None:
         self.nodes: list[Term] = []
@@ -92,14 +92,14 @@ class Trace:
         return term
 
 
-def _unscaled(term: Term) -> tuple[float, Term]:
-    """(k, a) with term = k·a."""
+def _split_factor(term: Term) -> tuple[float, Term]:
+    """Split a term into (k, a) with term = k·a."""
     if term.op == LIN and len(term.args) == 1 and term.k[0] == 0.0:
         return term.k[1], term.args[0]
     return 1.0, term
 
 
-def _scaled(term: Term, k: float) -> Scalar:
+def _multiply_constant(term: Term, k: float) -> Scalar:
     if k == 0.0:
         return 0.0
     if k == 1.0:
@@ -109,7 +109,7 @@ def _scaled(term: Term, k: float) -> Scalar:
     return term.trace.node(LIN, (term,), (0.0, k))
 
 
-def _linear(term: Scalar) -> tuple[float, list[tuple[float, Term]]]:
+def _split_linear(term: Scalar) -> tuple[float, list[tuple[float, Term]]]:
     if not isinstance(term, Term):
         return float(term), []
     if term.op == LIN:
@@ -117,11 +117,11 @@ def _linear(term: Scalar) -> tuple[float, list[tuple[float, Term]]]:
     return 0.0, [(1.0, term)]
 
 
-def _sum(x: Term, y: Scalar, sign: float) -> Scalar:
+def _add_multiple(x: Term, y: Scalar, sign: float) -> Scalar:
     if not isinstance(y, Term | float | int | np.floating):
         return NotImplemented
-    kx, parts = _linear(x)
-    ky, more = _linear(y)
+    kx, parts = _split_linear(x)
+    ky, more = _split_linear(y)
     const, total = kx + sign * ky, {a.index: (k, a) for k, a in parts}
     for k, a in more:
         total[a.index] = (total.get(a.index, (0.0, a))[0] + sign * k, a)
@@ -129,10 +129,10 @@ def _sum(x: Term, y: Scalar, sign: float) -> Scalar:
     if not terms:
         return const
     trace = x.trace
-    if len(terms) > 3 and isinstance(y, Term):  # too wide for one operation: keep both sides as they stand
+    if len(terms) > 3 and isinstance(y, Term):  # too wide for one operation: keep both sides as they are
         return trace.node(LIN, (x, y), (0.0, 1.0, sign))
     if const == 0.0 and len(terms) == 1:  # a bare multiple, so that it cancels against others and products absorb it
-        return _scaled(terms[0][1], terms[0][0])
+        return _multiply_constant(terms[0][1], terms[0][0])
     products = [a.op == QUAD for _, a in terms]
     if const == 0.0 and all(products) and sum(len(a.k) for _, a in terms) <= 3:
         args = tuple(arg for _, a in terms for arg in a.args)
@@ -143,7 +143,7 @@ def _sum(x: Term, y: Scalar, sign: float) -> Scalar:
     return trace.node(LIN, tuple(a for _, a in terms), (const, *[k for k, _ in terms]))
 
 
-# Functions of a scalar, whatever it is.
+# Functions of a scalar of any kind.
 
 
 def sqrt(x: Scalar) -> Scalar:
@@ -170,22 +170,22 @@ def atan2(y: Scalar, x: Scalar) -> Scalar:
     return np.arctan2(y + 0.0, x + 0.0)
 
 
-def smaller(x: Scalar, y: Scalar) -> Scalar:
+def minimum(x: Scalar, y: Scalar) -> Scalar:
     """The lesser of two; NaN if either is."""
-    return _choice(MIN, np.minimum, x, y)
+    return _apply_binary(MIN, np.minimum, x, y)
 
 
-def larger(x: Scalar, y: Scalar) -> Scalar:
+def maximum(x: Scalar, y: Scalar) -> Scalar:
     """The greater of two; NaN if either is."""
-    return _choice(MAX, np.maximum, x, y)
+    return _apply_binary(MAX, np.maximum, x, y)
 
 
 def copysign(x: Scalar, y: Scalar) -> Scalar:
     """|x| with the sign of y; NaN if either is."""
-    return _choice(COPYSIGN, np.copysign, x, y)
+    return _apply_binary(COPYSIGN, np.copysign, x, y)
 
 
-def _choice(op: int, function: Any, x: Scalar, y: Scalar) -> Scalar:
+def _apply_binary(op: int, function: Any, x: Scalar, y: Scalar) -> Scalar:
     if isinstance(x, Term) or isinstance(y, Term):
         trace = x.trace if isinstance(x, Term) else y.trace
         return trace.node(op, tuple(a if isinstance(a, Term) else trace.constant(a) for a in (x, y)), ())
@@ -205,9 +205,9 @@ def select(x: Scalar, y: Scalar, below: Scalar, otherwise: Scalar) -> Scalar:
     return np.where(x < y, below, otherwise)
 
 
-def held(x: Scalar) -> Scalar:
-    """x, to be taken as constant by :func:`derivative`: where a minimum stands does not change it (Danskin)."""
-    return x.trace.node(HELD, (x,), ()) if isinstance(x, Term) else x
+def stop_gradient(x: Scalar) -> Scalar:
+    """x as a constant for :func:`derivative`: the position of a minimum has no first-order effect on it (Danskin)."""
+    return x.trace.node(STOP_GRADIENT, (x,), ()) if isinstance(x, Term) else x
 
 
 def absolute(x: Scalar) -> Scalar:
@@ -242,7 +242,7 @@ def scale(u: Vec, k: Scalar) -> Vec:
     return tuple(a * k for a in u)
 
 
-def along(start: Vec, direction: Vec, distance: Scalar) -> Vec:
+def move_along(start: Vec, direction: Vec, distance: Scalar) -> Vec:
     """start + distance·direction."""
     return tuple(a + d * distance for a, d in zip(start, direction, strict=True))
 
@@ -251,7 +251,7 @@ def cross(u: Vec, v: Vec) -> Vec:
     return (u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0])
 
 
-def transposed(m: Mat) -> Mat:
+def transpose(m: Mat) -> Mat:
     return tuple(zip(*m, strict=True))
 
 
@@ -260,11 +260,11 @@ def apply(m: Mat, v: Vec) -> Vec:
 
 
 def product(m: Mat, n: Mat) -> Mat:
-    columns = transposed(n)
+    columns = transpose(n)
     return tuple(tuple(dot(row, column) for column in columns) for row in m)
 
 
-def turn(axis: str, s: Scalar, c: Scalar) -> Mat:
+def axis_rotation(axis: str, s: Scalar, c: Scalar) -> Mat:
     """Rotation about a coordinate axis (``rx``, ``ry`` or ``rz``) by the angle of sine s and cosine c."""
     if axis == "rx":
         return ((1.0, 0.0, 0.0), (0.0, c, -s), (0.0, s, c))
@@ -277,29 +277,29 @@ IDENTITY: Mat = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 ORIGIN: Vec = (0.0, 0.0, 0.0)
 
 
-def needed(outputs: Sequence[Term], known: Container[int] = ()) -> list[int]:
-    """Indices of all nodes that the outputs hang on, operands first; not those ``known``, nor behind them."""
-    found: set[int] = set()
+def find_dependencies(outputs: Sequence[Term], known: Container[int] = ()) -> list[int]:
+    """Find the indices of all nodes that outputs depend on, operands first; none ``known``, nor their operands."""
+    indices: set[int] = set()
     stack = list(outputs)
     while stack:
         term = stack.pop()
-        if term.index not in found and term.index not in known:
-            found.add(term.index)
+        if term.index not in indices and term.index not in known:
+            indices.add(term.index)
             stack.extend(term.args)
-    return sorted(found)
+    return sorted(indices)
 
 
 def derivative(y: Scalar, x: Term) -> Scalar:
-    """∂y/∂x of a trace, as a trace; at a corner of MIN, MAX or ABS that of one side."""
+    """Differentiate a trace: ∂y/∂x as a trace; at a corner of MIN, MAX or ABS the derivative of one side."""
     if not isinstance(y, Term):
         return 0.0
     known = y.trace._derivatives.setdefault(x.index, {})
-    for index in needed([y], known):
-        known[index] = _derivative(y.trace.nodes[index], x, known)
+    for index in find_dependencies([y], known):
+        known[index] = _differentiate_node(y.trace.nodes[index], x, known)
     return known[y.index]
 
 
-def _derivative(y: Term, x: Term, known: dict[int, Scalar]) -> Scalar:
+def _differentiate_node(y: Term, x: Term, known: dict[int, Scalar]) -> Scalar:
     if y is x:
         return 1.0
     a = y.args
@@ -330,20 +330,20 @@ def _derivative(y: Term, x: Term, known: dict[int, Scalar]) -> Scalar:
         return select(a[1], a[0], d[0], d[1])
     if y.op == ABS:
         return select(a[0], 0.0, -d[0], d[0])
-    if y.op == HELD:
+    if y.op == STOP_GRADIENT:
         return 0.0
     if y.op == SELECT:
         return select(a[0], a[1], d[2], d[3])
     raise TypeError(f"no derivative of operation {y.op}")
 
 
-def values(trace: Trace, outputs: Sequence[Scalar], inputs: Sequence[Scalar]) -> list[Scalar]:
-    """The outputs of a trace for given inputs, numbers or arrays: the plain interpreter.
+def evaluate(trace: Trace, outputs: Sequence[Scalar], inputs: Sequence[Scalar]) -> list[Scalar]:
+    """Evaluate outputs of a trace for given inputs, numbers or arrays: the plain interpreter.
 
-    Inputs may be terms of another trace, too, beside numbers: what hangs on numbers alone is folded there.
+    Inputs may also be terms of another trace; what depends on numbers alone is folded there.
     """
     known: dict[int, Scalar] = {}
-    for index in needed([y for y in outputs if isinstance(y, Term)]):
+    for index in find_dependencies([y for y in outputs if isinstance(y, Term)]):
         term = trace.nodes[index]
         a = [known[arg.index] for arg in term.args]
         k = term.k
@@ -366,10 +366,10 @@ _FUNCTIONS: dict[int, Any] = {
     SIN: lambda x: sincos(x)[0],
     COS: lambda x: sincos(x)[1],
     ATAN2: atan2,
-    MIN: smaller,
-    MAX: larger,
+    MIN: minimum,
+    MAX: maximum,
     ABS: absolute,
     COPYSIGN: copysign,
     SELECT: select,
-    HELD: held,
+    STOP_GRADIENT: stop_gradient,
 }

@@ -24,7 +24,7 @@ from .kinematics.wrist import EXACT, Wrist, find_wrist, flip_mode
 from .model.legs import Inverse
 from .model.limits import Limit
 from .model.parts import Drive
-from .model.rates import Rates, rates
+from .model.rates import TwistRates, compute_twist_rates
 from .model.spec import Spec
 from .model.structures import PlatformPlacement, Structure
 from .model.traces import Model
@@ -306,8 +306,8 @@ class Machine:
     def twist_rates(self, poses: Array, joints: Array, whole: bool = True) -> tuple[Array, Array, Array]:
         """A and B (n, m, m) with A t' = B q' for the tool's twist t', and the legs' spans (n, legs), mm.
 
-        Poses and joints are rows; see :class:`parakin.model.rates.Rates`. With ``whole`` a row is NaN if a number of it
-        is not finite.
+        Poses and joints are rows; see :class:`parakin.model.rates.TwistRates`. With ``whole`` a row is NaN if a number
+        of it is not finite.
         """
         m = len(self.axes)
         tape = self.model.rates_tape()
@@ -326,9 +326,9 @@ class Machine:
         own = self.model.own_margins(pose, mode) if joints is None else self.model.margins(pose, joints, mode)
         return [margin for _, margin in own]
 
-    def trace_rates(self, pose: Sequence[Scalar], joints: Sequence[Scalar]) -> Rates:
+    def trace_rates(self, pose: Sequence[Scalar], joints: Sequence[Scalar]) -> TwistRates:
         """A and B of the tool's twist, and the legs' spans."""
-        return rates(self.spec, self.structure, pose, joints)
+        return compute_twist_rates(self.spec, self.structure, pose, joints)
 
     # Limits.
 

@@ -27,7 +27,7 @@ class IntervalProgram:
     @cached_property
     def inputs(self) -> int:
         """The number of columns of a box: one more than the greatest number of an input."""
-        nodes = [self.trace.nodes[i] for i in alg.needed([y for y in self.outputs if isinstance(y, Term)])]
+        nodes = [self.trace.nodes[i] for i in alg.find_dependencies([y for y in self.outputs if isinstance(y, Term)])]
         return max((int(node.k[0]) + 1 for node in nodes if node.op == alg.INPUT), default=0)
 
     @cached_property

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from .. import algebra as alg
-from ..algebra import Scalar, Term, Trace, needed
+from ..algebra import Scalar, Term, Trace, find_dependencies
 from ..arrays import Array, Indices
 from .tape import SINCOS, Tape, compile_tape
 
@@ -120,7 +120,7 @@ def _separate_fixed(trace: Trace, values: Sequence[Scalar], places: int) -> tupl
         if not isinstance(value, Term):
             copies.append(new.constant(value))
             continue
-        for i in needed([value], moving):
+        for i in find_dependencies([value], moving):
             node = trace.nodes[i]
             if node.op == alg.LIN and not node.args:
                 known[i] = new.node(node.op, (), node.k)

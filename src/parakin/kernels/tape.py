@@ -66,7 +66,7 @@ def _find_opcode(term: Term) -> int:
     """Find the opcode of a term; the number of summands counts."""
     if term.op == alg.LIN:
         return CONST + len(term.args)
-    if term.op == alg.HELD:
+    if term.op == alg.STOP_GRADIENT:
         return LIN1
     if term.op == alg.QUAD:
         return QUAD1 + len(term.k) - 1
@@ -124,7 +124,7 @@ def compile_tape(trace: Trace, outputs: Sequence[Scalar], inputs: int) -> Tape:
     results = _separate_outputs(trace, outputs)
     copies = [term for term in results if term.index < 0]
     within = [term for term in results if term.index >= 0] + [arg for term in copies for arg in term.args]
-    order = [trace.nodes[i] for i in alg.needed(within)] + copies
+    order = [trace.nodes[i] for i in alg.find_dependencies(within)] + copies
     last_use = {arg.index: position for position, term in enumerate(order) for arg in term.args}
     registers = _Registers(inputs, results)
     code: list[list[int]] = []
@@ -146,7 +146,7 @@ def compile_tape(trace: Trace, outputs: Sequence[Scalar], inputs: int) -> Tape:
         else:  # the destination is never an operand's register: rows that don't overlap vectorise
             row = [_find_opcode(term), registers.take(term), *[registers[arg] for arg in term.args]]
             code.append(row + [0] * (8 - len(row)))
-            k = (0.0, 1.0) if term.op == alg.HELD else term.k
+            k = (0.0, 1.0) if term.op == alg.STOP_GRADIENT else term.k
             constants.append([*k, *[0.0] * (4 - len(k))])
         for index in {arg.index for arg in term.args}:
             if last_use[index] == position:

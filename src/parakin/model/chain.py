@@ -1,4 +1,4 @@
-"""Serial chains of elementary transforms, and the closed-form inverse of two turning axes for the tool's axis."""
+"""Serial chains of elementary transforms, and the closed-form inverse of two turning axes that point the tool."""
 
 from __future__ import annotations
 
@@ -14,18 +14,18 @@ from ..algebra import (
     Scalar,
     Vec,
     add,
-    along,
     apply,
     atan2,
+    axis_rotation,
     cross,
     dot,
+    move_along,
     norm,
     product,
     scale,
     sincos,
     sqrt,
-    transposed,
-    turn,
+    transpose,
 )
 from ..errors import DescriptionError
 from .parts import ROTATIONS, TRANSLATIONS, Step
@@ -35,38 +35,38 @@ UNIT: dict[str, Vec] = {
 }
 
 
-def fixed_sincos(angle: float) -> tuple[float, float]:
-    """Sine and cosine of a machine's own angle, exact at multiples of 30° and 90° where they are 0, ±1/2 or ±1."""
+def exact_sincos(angle: float) -> tuple[float, float]:
+    """Compute sine and cosine of a fixed angle, exact where they are 0, ±1/2 or ±1 (multiples of 30° and 90°)."""
     s, c = float(np.sin(angle)), float(np.cos(angle))
     return tuple(round(2.0 * v) / 2.0 if abs(2.0 * v - round(2.0 * v)) < 1e-15 else v for v in (s, c))  # type: ignore[return-value]
 
 
-def frame(steps: Iterable[Step], joints: Sequence[Scalar]) -> tuple[Mat, Vec]:
-    """Rotation and origin of the last frame in the first; ``joints`` are those of the driven steps, in order."""
+def compose_chain(steps: Iterable[Step], joints: Sequence[Scalar]) -> tuple[Mat, Vec]:
+    """Compose a chain: rotation and origin of the last frame in the first. ``joints`` are those of driven steps."""
     rotation, origin = IDENTITY, ORIGIN
-    given = iter(joints)
+    driven = iter(joints)
     for step in steps:
-        value: Scalar = step.value if step.drive is None else step.value + step.sign * next(given)
+        value: Scalar = step.value if step.drive is None else step.value + step.sign * next(driven)
         if step.axis in TRANSLATIONS:
-            origin = along(origin, apply(rotation, UNIT[step.axis]), value)
+            origin = move_along(origin, apply(rotation, UNIT[step.axis]), value)
         else:
-            s, c = fixed_sincos(value) if step.drive is None else sincos(value)
-            rotation = product(rotation, turn(step.axis, s, c))
+            s, c = exact_sincos(value) if step.drive is None else sincos(value)
+            rotation = product(rotation, axis_rotation(step.axis, s, c))
     return rotation, origin
 
 
-def inverse_rotations(steps: Sequence[Step]) -> list[Step]:
-    """The rotations of the inverted chain."""
+def invert_rotations(steps: Sequence[Step]) -> list[Step]:
+    """List the rotations of the inverted chain."""
     return [Step(s.axis, -s.value, s.drive, -s.sign) for s in reversed(steps) if s.axis in ROTATIONS]
 
 
 @dataclass(frozen=True)
-class Angles:
-    """What :meth:`Pointing.solve` found: both joint values, and sin² of the tool axis against the first axis."""
+class PointingAngles:
+    """The solution of :meth:`Pointing.solve`: both joint values, and sin² of the tool axis against the first axis."""
 
     joints: tuple[Scalar, Scalar]
     freedom: Scalar  # 0 where the first angle is free
-    reach: tuple[Scalar, ...]  # negative where the axes can't point there
+    reach: tuple[Scalar, ...]  # negative where the axes can't point so
     turns: tuple[tuple[Scalar, Scalar], tuple[Scalar, Scalar]]  # sine and cosine: times freedom, times ``second_size``
     second_size: float
 
@@ -75,8 +75,8 @@ class Angles:
 class Pointing:
     """Two turning axes that point a direction: turn(first)·turn(second)·``start`` = v.
 
-    The general two-axis problem (Paden and Kahan's second), so tilted and nutating heads and tables are no special
-    case. ``signs`` are those of the joints in the turns.
+    This is the general two-axis problem (Paden and Kahan's second); tilted and nutating heads and tables are no
+    special case. ``signs`` are those of the joints in the turns.
     """
 
     first: Vec
@@ -85,8 +85,11 @@ class Pointing:
     signs: tuple[float, float] = (1.0, 1.0)
 
     @classmethod
-    def of(cls, steps: Iterable[Step], part: str) -> Pointing:
-        """From the rotations of a chain with two driven ones, acting on +z of its last frame."""
+    def from_steps(cls, steps: Iterable[Step], part: str) -> Pointing:
+        """Build it from the rotations of a chain, two of them driven, which act on +z of its last frame.
+
+        ``part`` is the chain's name in errors.
+        """
         rotation, axes, signs = IDENTITY, [], []
         for step in steps:
             if step.axis in TRANSLATIONS:
@@ -94,7 +97,7 @@ class Pointing:
             if step.drive is not None:
                 axes.append(apply(rotation, UNIT[step.axis]))
                 signs.append(step.sign)
-            rotation = product(rotation, turn(step.axis, *fixed_sincos(step.value)))
+            rotation = product(rotation, axis_rotation(step.axis, *exact_sincos(step.value)))
         if len(axes) != 2:
             raise DescriptionError(part, f"{len(axes)} driven turns point the tool, two are needed")
         pointing = cls(axes[0], axes[1], apply(rotation, UNIT["tz"]), (signs[0], signs[1]))
@@ -106,16 +109,17 @@ class Pointing:
 
     @property
     def level(self) -> bool:
-        """The direction at rest stands (more than not) on both axes: one solution is near rest, one far beyond."""
+        """Whether the direction at rest is closer to the normal of both axes than to their plane: then one of the two
+        solutions is near rest, the other far from it."""
         normal = cross(self.first, self.second)
         return bool(abs(dot(self.start, normal)) > abs(dot(self.second, cross(self.start, normal))))
 
-    def solve(self, v: Vec, branch: str, first: Scalar | None = None) -> Angles:
-        """Joints that point to the unit vector ``v``.
+    def solve(self, v: Vec, branch: str, first: Scalar | None = None) -> PointingAngles:
+        """Solve for the joints that point to the unit vector ``v``.
 
-        Branch "+" is the solution with the greater second joint, or, where the direction at rest stands on both axes
-        (a fork that turns about X, then Y), the one whose second turn is nearer to rest.
-        ``first`` gives the first joint where it is free.
+        branch : "+" is the solution with the greater second joint, or, where :attr:`level` (a fork that turns about X,
+            then Y), the one whose second turn is nearer to rest
+        first : the first joint where it is free
         """
         a1, a2, w = self.first, self.second, self.start
         a, beta, alpha = float(dot(a1, a2)), float(dot(w, a2)), dot(v, a1)
@@ -143,11 +147,11 @@ class Pointing:
         )
         angles = [sign * atan2(s, c) for sign, (s, c) in zip(self.signs, turns, strict=True)]
         joints = (angles[0] if first is None else first, angles[1])
-        return Angles(joints, freedom, reach, turns, 1.0 - beta * beta)
+        return PointingAngles(joints, freedom, reach, turns, 1.0 - beta * beta)
 
 
 def rotation_about(axis: Vec, s: Scalar, c: Scalar) -> Mat:
-    """Rotation about a fixed unit axis by the angle of sine s and cosine c (Rodrigues)."""
+    """Compute the rotation about a unit axis by the angle of sine s and cosine c (Rodrigues)."""
     x, y, z = axis
     skew = ((0.0, -z, y), (z, 0.0, -x), (-y, x, 0.0))
     return tuple(
@@ -156,6 +160,6 @@ def rotation_about(axis: Vec, s: Scalar, c: Scalar) -> Mat:
     )
 
 
-def back(rotation: Mat, origin: Vec, point: Vec) -> Vec:
-    """A point of the outer frame in the frame (rotation, origin)."""
-    return apply(transposed(rotation), tuple(p - o for p, o in zip(point, origin, strict=True)))
+def to_local(rotation: Mat, origin: Vec, point: Vec) -> Vec:
+    """Transform a point of the outer frame into the frame (rotation, origin)."""
+    return apply(transpose(rotation), tuple(p - o for p, o in zip(point, origin, strict=True)))

@@ -1,6 +1,6 @@
-"""Every limit of a machine as a named margin g ≥ 0: the one place that says what is allowed.
+"""Every limit of a machine as a named margin g ≥ 0. This module alone says what is allowed.
 
-The Boolean workspace, the refusal of a tool path and the pictures all come from these margins.
+The workspaces, the refusal of a tool path and the pictures all use these margins.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from itertools import combinations
 from math import isfinite
 from typing import Literal
 
-from ..algebra import Mat, Scalar, Vec, add, apply, atan2, cross, dot, held, larger, norm, scale, smaller, sub
+from ..algebra import Mat, Scalar, Vec, add, apply, atan2, cross, dot, maximum, minimum, norm, scale, stop_gradient, sub
 from .legs import Leg, Reach
 from .parts import Cone
 from .spec import Spec
@@ -20,9 +20,9 @@ from .structures import PlatformPlacement
 
 @dataclass(frozen=True)
 class Limit:
-    """One margin: what it is of, its bound, and how to read it (value = bound ± margin).
+    """One limit: its name and subject, its bound, and how to read its margin (value = bound ± margin).
 
-    The bound of a reach is the rod's length, 0 where it is no matter of one rod.
+    The bound of a reach is the rod's length, 0 where the reach does not depend on one rod alone.
     """
 
     name: str
@@ -38,33 +38,35 @@ class Limit:
         return self.bound - margin if self.side == "max" else self.bound + margin
 
 
-def limits_of(
+def list_limits(
     spec: Spec,
     pose: PlatformPlacement,
     coordinates: Sequence[tuple[str, Scalar]],
     joints: Sequence[Scalar],
     reaches: Sequence[tuple[Reach, ...]],
-    home: Home | None,
+    home: HomeRods | None,
 ) -> list[tuple[Limit, Scalar]]:
-    """All limits with their margins.
+    """List all limits with their margins.
 
-    ``coordinates`` are the motion's, with their names; ``reaches`` each leg's own margins; ``home`` is needed by cones
-    without an axis.
+    coordinates : the motion's, with their names
+    joints : the joint vector
+    reaches : each leg's own margins
+    home : the rods at home; cones without an axis need them
 
-    Reach comes first, so that a pose where a leg can't close is never blamed on something that follows from it.
+    Reach comes first, so that no other limit is named where a leg can't close.
     """
     return [
-        *_reach(spec, pose, reaches),
-        *_drives(spec, joints),
-        *_passive(spec, dict(coordinates)),
-        *_gaps(spec, joints),
-        *_cones(spec, pose, joints, home),
-        *_clearance(spec, pose, joints),
+        *_list_reach(spec, pose, reaches),
+        *_list_drive_limits(spec, joints),
+        *_list_passive_limits(spec, dict(coordinates)),
+        *_list_gaps(spec, joints),
+        *_list_cones(spec, pose, joints, home),
+        *_list_clearances(spec, pose, joints),
     ]
 
 
 @dataclass(frozen=True)
-class Home:
+class HomeRods:
     """Unit rod directions of every leg at home: in the base frame, and in the platform's."""
 
     foot: tuple[Vec, ...]
@@ -72,17 +74,17 @@ class Home:
 
 
 def leg_joints(spec: Spec, joints: Sequence[Scalar]) -> list[list[Scalar]]:
-    """The joint vector, leg by leg (``joints`` may go on with those of head and table)."""
+    """Group the joint vector by leg; ``joints`` may go on with those of head and table."""
     index = {drive.name: i for i, drive in enumerate(spec.drives)}
     return [[joints[index[drive.name]] for drive in leg.drives] for leg in spec.legs]
 
 
 def platform_points(spec: Spec, rotation: Mat, origin: Vec) -> list[Vec]:
-    """The platform's joint of every leg in the base frame."""
+    """Compute the platform's joint of every leg in the base frame, mm."""
     return [add(origin, apply(rotation, leg.platform)) for leg in spec.legs]
 
 
-def _between(
+def _bound_value(
     name: str, subject: str, unit: Literal["mm", "rad"], value: Scalar, low: float, high: float
 ) -> Iterator[tuple[Limit, Scalar]]:
     if isfinite(low):
@@ -91,7 +93,9 @@ def _between(
         yield Limit(f"{name}.max", subject, unit, "max", high), high - value
 
 
-def _reach(spec: Spec, pose: PlatformPlacement, reaches: Sequence[tuple[Reach, ...]]) -> Iterator[tuple[Limit, Scalar]]:
+def _list_reach(
+    spec: Spec, pose: PlatformPlacement, reaches: Sequence[tuple[Reach, ...]]
+) -> Iterator[tuple[Limit, Scalar]]:
     for margin in pose.reach:
         yield Limit("tool.reach", "the tool's axis", "1", "reach"), margin
     for leg, margins in zip(spec.legs, reaches, strict=True):
@@ -99,48 +103,48 @@ def _reach(spec: Spec, pose: PlatformPlacement, reaches: Sequence[tuple[Reach, .
             yield Limit(f"{drive.name}.reach", f"leg {drive.name}", "mm²", "reach", reach.rod), reach.margin
 
 
-def _drives(spec: Spec, joints: Sequence[Scalar]) -> Iterator[tuple[Limit, Scalar]]:
+def _list_drive_limits(spec: Spec, joints: Sequence[Scalar]) -> Iterator[tuple[Limit, Scalar]]:
     legs = {drive.name for leg in spec.legs for drive in leg.drives}
     for drive, q in zip(spec.drives, joints, strict=True):
         subject = f"{'leg' if drive.name in legs else 'joint'} {drive.name}"
-        yield from _between(drive.name, subject, drive.unit, q, drive.low, drive.high)
+        yield from _bound_value(drive.name, subject, drive.unit, q, drive.low, drive.high)
 
 
-def _passive(spec: Spec, given: Mapping[str, Scalar]) -> Iterator[tuple[Limit, Scalar]]:
+def _list_passive_limits(spec: Spec, given: Mapping[str, Scalar]) -> Iterator[tuple[Limit, Scalar]]:
     for bound in spec.limits.passive:
         unit: Literal["mm", "rad"] = "mm" if bound.name.startswith("t") else "rad"
-        yield from _between(bound.name, f"passive {bound.name}", unit, given[bound.name], bound.low, bound.high)
+        yield from _bound_value(bound.name, f"passive {bound.name}", unit, given[bound.name], bound.low, bound.high)
 
 
-def _gaps(spec: Spec, joints: Sequence[Scalar]) -> Iterator[tuple[Limit, Scalar]]:
+def _list_gaps(spec: Spec, joints: Sequence[Scalar]) -> Iterator[tuple[Limit, Scalar]]:
     given = {drive.name: q for drive, q in zip(spec.drives, joints, strict=True)}
     for gap in spec.limits.gaps:
         name = f"gap {gap.first}-{gap.second}"
-        yield from _between(name, name, "mm", given[gap.second] - given[gap.first], gap.low, gap.high)
+        yield from _bound_value(name, name, "mm", given[gap.second] - given[gap.first], gap.low, gap.high)
 
 
-def _rods(spec: Spec, pose: PlatformPlacement, joints: Sequence[Scalar]) -> list[list[tuple[Vec, Vec]]]:
+def _compute_rods(spec: Spec, pose: PlatformPlacement, joints: Sequence[Scalar]) -> list[list[tuple[Vec, Vec]]]:
     points = platform_points(spec, pose.rotation, pose.origin)
     given = leg_joints(spec, joints)
     return [leg.struts(point, q) for leg, point, q in zip(spec.legs, points, given, strict=True)]
 
 
-def _cone_axis(cone: Cone, number: int, home: Home | None) -> Vec:
+def _find_cone_axis(cone: Cone, number: int, home: HomeRods | None) -> Vec:
     if cone.axis is not None:
         return cone.axis
     assert home is not None
     return (home.foot if cone.at == "foot" else home.platform)[number]
 
 
-def _cones(
-    spec: Spec, pose: PlatformPlacement, joints: Sequence[Scalar], home: Home | None
+def _list_cones(
+    spec: Spec, pose: PlatformPlacement, joints: Sequence[Scalar], home: HomeRods | None
 ) -> Iterator[tuple[Limit, Scalar]]:
     if not spec.limits.cones:
         return
-    rods = [struts[0] for struts in _rods(spec, pose, joints)]
+    rods = [struts[0] for struts in _compute_rods(spec, pose, joints)]
     for cone in spec.limits.cones:
         for number, (leg, (foot, point)) in enumerate(zip(spec.legs, rods, strict=True)):
-            axis = _cone_axis(cone, number, home)
+            axis = _find_cone_axis(cone, number, home)
             if cone.at == "platform":
                 axis = apply(pose.rotation, axis)
             rod = sub(point, foot)
@@ -150,33 +154,33 @@ def _cones(
             yield limit, cone.angle - angle
 
 
-def _clearance(spec: Spec, pose: PlatformPlacement, joints: Sequence[Scalar]) -> Iterator[tuple[Limit, Scalar]]:
+def _list_clearances(spec: Spec, pose: PlatformPlacement, joints: Sequence[Scalar]) -> Iterator[tuple[Limit, Scalar]]:
     least = spec.limits.clearance
     if least is None:
         return
-    # From the platform's end, where neighbours are closest: there the platform's place drops out of their difference.
-    struts = [struts[0][::-1] for struts in _rods(spec, pose, joints)]
+    # Measured from the platform's end, where neighbours are closest: the platform's position cancels in the difference.
+    struts = [struts[0][::-1] for struts in _compute_rods(spec, pose, joints)]
     for (one, a), (two, b) in combinations(zip(spec.legs, struts, strict=True), 2):
-        if _share_a_joint(one, two):
+        if _share_joint(one, two):
             continue
         names = f"{one.drives[0].name}-{two.drives[0].name}"
-        yield Limit(f"clearance {names}", f"clearance of {names}", "mm", "min", least), distance(a, b) - least
+        yield Limit(f"clearance {names}", f"clearance of {names}", "mm", "min", least), segment_distance(a, b) - least
 
 
-def _share_a_joint(one: Leg, two: Leg) -> bool:
-    return one.platform == two.platform or (one.held_at() is not None and one.held_at() == two.held_at())
+def _share_joint(one: Leg, two: Leg) -> bool:
+    return one.platform == two.platform or (one.fixed_foot() is not None and one.fixed_foot() == two.fixed_foot())
 
 
-def distance(a: tuple[Vec, Vec], b: tuple[Vec, Vec]) -> Scalar:
-    """Least distance of two segments (Ericson, Real-Time Collision Detection, 5.1.9), branch-free."""
+def segment_distance(a: tuple[Vec, Vec], b: tuple[Vec, Vec]) -> Scalar:
+    """Compute the least distance of two segments (Ericson, Real-Time Collision Detection, 5.1.9), branch-free."""
     u, v, w = sub(a[1], a[0]), sub(b[1], b[0]), sub(a[0], b[0])
     uu, vv, uv, uw, vw = dot(u, u), dot(v, v), dot(u, v), dot(u, w), dot(v, w)
-    # A tiny share of |u|²|v|² keeps parallel segments from 0/0; any point serves for those.
-    s = _clamped((uv * vw - uw * vv) / larger(uu * vv - uv * uv, 1e-14 * (uu * vv)))
-    t = _clamped((uv * s + vw) / vv)
-    s = _clamped((uv * t - uw) / uu)
-    return norm(sub(add(w, scale(u, held(s))), scale(v, held(t))))
+    # A tiny part of |u|²|v|² avoids 0/0 for parallel segments, where any point is right.
+    s = _clamp((uv * vw - uw * vv) / maximum(uu * vv - uv * uv, 1e-14 * (uu * vv)))
+    t = _clamp((uv * s + vw) / vv)
+    s = _clamp((uv * t - uw) / uu)
+    return norm(sub(add(w, scale(u, stop_gradient(s))), scale(v, stop_gradient(t))))
 
 
-def _clamped(x: Scalar) -> Scalar:
-    return larger(smaller(x, 1.0), 0.0)
+def _clamp(x: Scalar) -> Scalar:
+    return maximum(minimum(x, 1.0), 0.0)

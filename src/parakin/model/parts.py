@@ -13,7 +13,7 @@ from typing import Literal, NewType
 Unit = Literal["mm", "rad"]
 Vector = tuple[float, float, float]
 
-# What a field of a leg kind holds; the reader of machine files goes by these.
+# The type of a leg kind's field; the reader of machine files chooses its parser by it.
 Point = NewType("Point", Vector)  # mm
 Direction = NewType("Direction", Vector)  # unit vector
 Size = NewType("Size", float)  # a length > 0, mm
@@ -25,7 +25,7 @@ ROTATIONS = ("rx", "ry", "rz")
 
 @dataclass(frozen=True)
 class Drive:
-    """One actuated joint: its name, its unit and what it can do."""
+    """One actuated joint: its name, its unit, its range and its greatest rates."""
 
     name: str
     unit: Unit
@@ -80,7 +80,7 @@ class Cone:
 
 @dataclass(frozen=True)
 class Limits:
-    """All that bounds a machine besides its drives' ranges."""
+    """The limits of a machine besides its drives' ranges."""
 
     passive: tuple[Range, ...] = ()  # of the motion's coordinates, by their names (rx, ry, tz, ...)
     gaps: tuple[Gap, ...] = ()

@@ -1,4 +1,4 @@
-"""Rates of the twist: A t' = B q', where t' are the tool's velocity and small turns instead of the pose's angles.
+"""The Jacobians of the twist: A t' = B q', where t' are the tool's velocity and small turns, not the pose's angles.
 
 The angles of a pose have no rates where they are free (B = 0 of a five-axis machine); small turns have them everywhere.
 """
@@ -8,19 +8,19 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from ..algebra import Scalar, Trace, derivative, norm, values
+from ..algebra import Scalar, Trace, derivative, evaluate, norm
 from .limits import platform_points
 from .spec import Spec
 from .structures import Structure
 
 
 @dataclass(frozen=True)
-class Rates:
-    """A and B, a row a closure: the legs' in their order, then those of head and table.
+class TwistRates:
+    """A and B, a row for each closure: the legs' in their order, then those of head and table.
 
-    Columns of A are the tool tip's velocity along the machine's translations, then the structure's small turns;
-    those of B are the joints. ``spans`` (mm) are by how much each leg's closure changes as the platform's joint moves
-    by a unit length: the length of a rod.
+    a : (n, n) columns are the tool tip's velocity along the machine's translations, then the structure's small turns
+    b : (n, m) columns are the joints
+    spans : mm, how much each leg's closure changes as the platform's joint moves by a unit length: a rod's length
     """
 
     a: list[list[Scalar]]
@@ -28,19 +28,21 @@ class Rates:
     spans: list[Scalar]
 
 
-def drives_of_rows(spec: Spec) -> list[int]:
-    """The joint that each leg's closure is of, as an index in the joint vector."""
+def list_closure_joints(spec: Spec) -> list[int]:
+    """List the joint of each leg's closure, as an index in the joint vector."""
     index = {drive.name: i for i, drive in enumerate(spec.drives)}
     return [index[drive.name] for leg in spec.legs for drive in leg.drives]
 
 
-def rates(spec: Spec, structure: Structure, pose: Sequence[Scalar], joints: Sequence[Scalar]) -> Rates:
+def compute_twist_rates(
+    spec: Spec, structure: Structure, pose: Sequence[Scalar], joints: Sequence[Scalar]
+) -> TwistRates:
     """A and B at a pose and its joints, scalars of any kind."""
     trace = Trace()
     n, m, legs = len(pose), len(joints), len(spec.legs)
     x, q = trace.inputs(n), trace.inputs(m, n)
     turn = trace.inputs(len(structure.turns), n + m)
-    free = [trace.inputs(3, n + m + len(turn) + 3 * i) for i in range(legs)]  # the platform's joints, on their own
+    free = [trace.inputs(3, n + m + len(turn) + 3 * i) for i in range(legs)]  # the platform's joints as variables
     serial = q[m - sum(step.drive is not None for step in (*spec.head, *spec.table)) :]
     rotation, origin, tilts = structure.closure(x, serial, turn)
     index = {drive.name: i for i, drive in enumerate(spec.drives)}
@@ -51,14 +53,14 @@ def rates(spec: Spec, structure: Structure, pose: Sequence[Scalar], joints: Sequ
 
     points = platform_points(spec, rotation, origin)
     rows = [*(f for group in closures(points) for f in group), *tilts]
-    by = [term for term, axis in zip(x, structure.axes, strict=True) if axis in "XYZ"] + turn
+    twist = [term for term, axis in zip(x, structure.axes, strict=True) if axis in "XYZ"] + turn
     at_rest = [*pose, *joints, *[0.0] * len(turn)]
-    a = values(trace, [derivative(f, term) for f in rows for term in by], at_rest)
-    b = values(trace, [-derivative(f, term) for f in rows for term in q], at_rest)
-    places = values(trace, [c for point in points for c in point], at_rest)
+    a = evaluate(trace, [derivative(f, term) for f in rows for term in twist], at_rest)
+    b = evaluate(trace, [-derivative(f, term) for f in rows for term in q], at_rest)
+    positions = evaluate(trace, [c for point in points for c in point], at_rest)
     spans = [
-        norm(values(trace, [derivative(f, c) for c in point], [*at_rest, *places]))
+        norm(evaluate(trace, [derivative(f, c) for c in point], [*at_rest, *positions]))
         for group, point in zip(closures(free), free, strict=True)
         for f in group
     ]
-    return Rates([a[i : i + n] for i in range(0, n * n, n)], [b[i : i + m] for i in range(0, n * m, m)], spans)
+    return TwistRates([a[i : i + n] for i in range(0, n * n, n)], [b[i : i + m] for i in range(0, n * m, m)], spans)

@@ -1,4 +1,4 @@
-"""The whole of what a machine is: a platform with a known motion, held by legs; a head, a table, limits."""
+"""The description of a machine: a platform with a known motion, held by legs; a head, a table, limits."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
-"""The common point of three spheres, or of two circles in a coordinate plane: the direct problem of machines that only
-translate, in closed form."""
+"""Intersect three spheres, or two circles in a coordinate plane: the direct problem, in closed form, of machines that
+only translate."""
 
 from __future__ import annotations
 
@@ -10,14 +10,15 @@ from ..algebra import Scalar, Vec, add, copysign, cross, dot, scale, sqrt, sub
 CENTRES_NEEDED = (2, 3)
 
 
-def common_point(
+def find_common_point(
     centres: Sequence[Vec], radii: Sequence[Scalar], plane: Sequence[int], side: float | None, near: Vec | None
 ) -> Vec:
-    """The point at ``radii`` from ``centres``; NaN where there is none.
+    """Find the point at ``radii`` from ``centres`` (mm); NaN where there is none.
 
-    ``plane`` names the coordinates in which the point moves, two for circles (cut from the spheres by the plane where
-    the third coordinate is 0), all three for spheres. Of the two points the one on
-    ``side`` (±1) of the plane (line) through the centres, or, with None, the one on the side of ``near``.
+    plane : the coordinates in which the point moves: two for circles, which the plane where the third coordinate is 0
+        cuts from the spheres; all three for spheres
+    side : of the two points, the one on this side (±1) of the plane (line) through the centres
+    near : with ``side`` None, the one on the side of this point
     """
     first = centres[0]
     if len(centres) == 2:
@@ -43,8 +44,8 @@ def common_point(
     return add(first, add(foot, scale(normal, height)))
 
 
-def side_of(centres: Sequence[Vec], plane: Sequence[int], point: Vec) -> float:
-    """+1 or -1: the side of the centres' plane (line) on which a point lies, as :func:`common_point` counts it."""
+def find_side(centres: Sequence[Vec], plane: Sequence[int], point: Vec) -> float:
+    """Find on which side of the centres' plane (line) a point lies: +1 or -1 as :func:`find_common_point` counts."""
     first = centres[0]
     if len(centres) == 2:
         out = 3 - sum(plane)

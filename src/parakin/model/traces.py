@@ -10,14 +10,14 @@ from functools import cached_property
 
 import numpy as np
 
-from ..algebra import Scalar, Trace, Vec, apply, derivative, norm, scale, smaller, sqrt, sub, transposed, values
+from ..algebra import Scalar, Trace, Vec, apply, derivative, evaluate, minimum, norm, scale, sqrt, sub, transpose
 from ..errors import DescriptionError
 from ..kernels.tape import Tape, compile_tape
 from .legs import Inverse
-from .limits import Home, Limit, leg_joints, limits_of, platform_points
-from .rates import rates
+from .limits import HomeRods, Limit, leg_joints, list_limits, platform_points
+from .rates import compute_twist_rates
 from .spec import Spec
-from .spheres import CENTRES_NEEDED, common_point, side_of
+from .spheres import CENTRES_NEEDED, find_common_point, find_side
 from .structures import PlatformPlacement, Structure, structure_of
 
 FAR = 1e12  # mm; more than any pose's coordinate
@@ -85,7 +85,7 @@ class Model:
     ) -> list[tuple[Limit, Scalar]]:
         home = self.rods_at_home if any(cone.axis is None for cone in self.spec.limits.cones) else None
         coordinates = list(zip(self.structure.coordinates, placed.coordinates, strict=True))
-        return limits_of(self.spec, placed, coordinates, joints, [leg.reach for leg in legs], home)
+        return list_limits(self.spec, placed, coordinates, joints, [leg.reach for leg in legs], home)
 
     def closures(self, rotation: Sequence[Vec], origin: Vec, joints: Sequence[Scalar]) -> list[Scalar]:
         """Every leg's closure, mm²."""
@@ -98,14 +98,14 @@ class Model:
         return [float(self.spec.home.get(letter, 0.0)) for letter in self.axes]
 
     @cached_property
-    def rods_at_home(self) -> Home:
+    def rods_at_home(self) -> HomeRods:
         joints, placed, _ = self.invert(self.home, self.mode)
         points = platform_points(self.spec, placed.rotation, placed.origin)
         given = leg_joints(self.spec, joints)
         rods = [leg.struts(p, q)[0] for leg, p, q in zip(self.spec.legs, points, given, strict=True)]
         units = [scale(sub(point, foot), 1.0 / norm(sub(point, foot))) for foot, point in rods]
-        back = transposed(placed.rotation)
-        return Home(tuple(units), tuple(apply(back, u) for u in units))
+        back = transpose(placed.rotation)
+        return HomeRods(tuple(units), tuple(apply(back, u) for u in units))
 
     @cached_property
     def sizes(self) -> list[float]:
@@ -145,7 +145,7 @@ class Model:
         """The side of the spheres' centres on which the platform is at home."""
         joints, placed, _ = self.invert(self.home, self.mode)
         centres, _, plane = self._spheres(joints)
-        return side_of(centres, plane, placed.origin)
+        return find_side(centres, plane, placed.origin)
 
     @property
     def leg_count(self) -> int:
@@ -228,8 +228,8 @@ class Model:
         first, *others = self.structure.pose(coordinates, self._serial(joints))
         points = platform_points(self.spec, *self.structure.frame(coordinates))
         for leg, point, q in zip(self.spec.legs, points, leg_joints(self.spec, joints), strict=True):
-            for margin in leg.inside(point, q):
-                first = smaller(first, FAR + sqrt(margin))
+            for margin in leg.assembly_margins(point, q):
+                first = minimum(first, FAR + sqrt(margin))
         return [first, *others]
 
     def newton_tape(self, derivatives: bool) -> Tape:
@@ -258,7 +258,7 @@ class Model:
         f = self.scaled_closures(coordinates, joints)
         entries = [derivative(row, y) for row in f for y in coordinates]
         home, placed, _ = self.invert(self.home, self.mode)
-        at_home = values(trace, entries, [*placed.coordinates, *home])
+        at_home = evaluate(trace, entries, [*placed.coordinates, *home])
         matrix = np.array(at_home, float).reshape(len(f), len(coordinates))
         order = list(range(len(f)))
         for k in range(len(order) - 1):
@@ -319,7 +319,7 @@ class Model:
         """pose, joints -> A (n·n), B (n·n) and the legs' spans: see :mod:`parakin.model.rates`."""
 
         def outputs(trace: Trace) -> list[Scalar]:
-            twist = rates(self.spec, self.structure, *self._pose_and_joints(trace))
+            twist = compute_twist_rates(self.spec, self.structure, *self._pose_and_joints(trace))
             return [scalar for row in (*twist.a, *twist.b, twist.spans) for scalar in row]
 
         return self._tape(("rates",), self._poses + len(self.drives), outputs)
@@ -344,7 +344,7 @@ class Model:
     def spheres(self, joints: Sequence[Scalar], side: float | None, near: Vec | None = None) -> list[Scalar]:
         """The motion's coordinates by the common point of the legs' spheres; ``near`` picks the nearer of two."""
         centres, radii, plane = self._spheres(joints)
-        return self.structure.coordinates_at(common_point(centres, radii, plane, side, near))
+        return self.structure.coordinates_at(find_common_point(centres, radii, plane, side, near))
 
     def _spheres(self, joints: Sequence[Scalar]) -> tuple[list[Vec], list[Scalar], list[int]]:
         """Centres and radii of the spheres on which the platform's origin lies, and the coordinates it moves in."""

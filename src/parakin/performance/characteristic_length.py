@@ -8,12 +8,12 @@ from math import isfinite
 
 import numpy as np
 
-from ..algebra import Trace, derivative, norm, values
+from ..algebra import Trace, derivative, evaluate, norm
 from ..arrays import Array
 from ..errors import PoseError
 from ..kernels.batch import evaluate_tape
 from ..machine import Machine
-from ..model.chain import frame
+from ..model.chain import compose_chain
 from ..model.limits import leg_joints
 
 _NONE = 1e-9  # mm; a length no greater is none
@@ -67,7 +67,7 @@ def _mean(lengths: Sequence[float] | Array) -> float:
 def _reach(machine: Machine) -> float:
     head = machine.spec.head
     last = max((i for i, step in enumerate(head) if step.drive is not None), default=-1)
-    return float(norm(frame(head[last + 1 :], ())[1]))
+    return float(norm(compose_chain(head[last + 1 :], ())[1]))
 
 
 def _radius(machine: Machine) -> float:
@@ -88,7 +88,7 @@ def _arms(machine: Machine) -> float:
         foot, _ = leg.struts(leg.platform, list(q))[0]
         for i, drive in enumerate(leg.drives):
             if drive.unit == "rad":
-                found.append(float(norm(values(trace, [derivative(c, q[i]) for c in foot], given))))
+                found.append(float(norm(evaluate(trace, [derivative(c, q[i]) for c in foot], given))))
     return _mean(found)
 
 

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from ..arrays import Array
 from ..kernels.batch import evaluate_tape
 from ..machine import Machine
-from ..model.rates import drives_of_rows
+from ..model.rates import list_closure_joints
 from .characteristic_length import Length
 
 
@@ -77,4 +77,4 @@ def column_scales(machine: Machine, length: Length) -> tuple[Array, Array]:
 
 def drives_of_legs(machine: Machine) -> list[int]:
     """The joint that each leg's row is of."""
-    return drives_of_rows(machine.spec)
+    return list_closure_joints(machine.spec)

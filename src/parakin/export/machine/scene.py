@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ...machine import Machine
-from ...model.chain import UNIT, frame
+from ...model.chain import UNIT, compose_chain
 from ...model.legs import Leg
 from ...model.limits import leg_joints, platform_points
 from ...model.parts import Step
@@ -222,7 +222,7 @@ def _chain(steps: Sequence[Step], joints: Sequence[float]) -> Iterator[tuple[Poi
     driven = 0
     for count, step in enumerate(steps, start=1):
         driven += step.drive is not None
-        rotation, origin = frame(steps[:count], joints[:driven])
+        rotation, origin = compose_chain(steps[:count], joints[:driven])
         yield np.array(rotation, float), np.array(origin, float)
 
 

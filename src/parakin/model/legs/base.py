@@ -1,4 +1,4 @@
-"""What every leg kind answers. A kind is one module here: a frozen dataclass whose fields are its sizes."""
+"""The interface of a leg kind. A kind is one module here: a frozen dataclass whose fields are its sizes."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ from ..parts import Drive, Point, Unit
 
 @dataclass(frozen=True)
 class Reach:
-    """What must be ≥ 0 for a leg to reach a point, mm²; of a rod its length less the distance to span, both squared."""
+    """A margin, mm², that is ≥ 0 where a leg reaches a point; of a rod its squared length less the squared distance."""
 
     margin: Scalar
-    rod: float = 0.0  # mm; 0 where it is no matter of one rod's length
+    rod: float = 0.0  # mm; 0 where the reach does not depend on one rod alone
 
 
 @dataclass(frozen=True)
@@ -43,26 +43,26 @@ class Leg(ABC):
 
     @abstractmethod
     def closures(self, point: Vec, joints: list[Scalar]) -> list[Scalar]:
-        """f(point, q) = 0 where the leg closes, one a joint; smooth, without roots or quotients of its own."""
+        """Closures f(point, q) = 0 of the leg, one for each joint; smooth, without roots or quotients of their own."""
 
     @abstractmethod
     def inverse(self, point: Vec, signs: str) -> Inverse:
-        """Joints that close the leg, in the working mode ``signs``; NaN where it can't."""
+        """Joints that close the leg, in the working mode ``signs``; NaN where none do."""
 
     @abstractmethod
     def struts(self, point: Vec, joints: list[Scalar]) -> list[tuple[Vec, Vec]]:
         """Both ends of each strut, base frame, the foot's end first; the strut to the platform comes first."""
 
-    def inside(self, point: Vec, joints: list[Scalar]) -> tuple[Scalar, ...]:
-        """What is ≥ 0 where a leg that closes does so as it is built: its closures may hold elsewhere too."""
+    def assembly_margins(self, point: Vec, joints: list[Scalar]) -> tuple[Scalar, ...]:
+        """Margins ≥ 0 where a leg closes as it is built; its closures may be zero elsewhere too."""
         return ()
 
-    def held_at(self) -> Vec | None:
-        """The foot of a leg whose foot does not move; legs that share it can't be kept clear of each other."""
+    def fixed_foot(self) -> Vec | None:
+        """The foot of a leg if it does not move; no clearance is kept between legs that share it."""
         return None
 
     def size(self, at_home: float) -> float:
-        """A length, mm, that the leg (``at_home`` at home) seldom falls below: it turns closures into distances."""
+        """A length, mm, that the leg seldom falls below; it turns closures into distances. ``at_home``: at home."""
         return at_home
 
     def sphere(self, joints: list[Scalar]) -> tuple[Vec, Scalar] | None:

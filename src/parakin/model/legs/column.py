@@ -29,7 +29,7 @@ class Column(Leg):
         # The link's revolute joint keeps the platform's joint in the radial plane.
         return [self.radius * (y * c - x * s), 0.5 * (out * out + up * up - self.rod**2)]
 
-    def inside(self, point: Vec, joints: list[Scalar]) -> tuple[Scalar, ...]:
+    def assembly_margins(self, point: Vec, joints: list[Scalar]) -> tuple[Scalar, ...]:
         s, c = sincos(joints[0])
         return (point[0] * c + point[1] * s,)  # on the carriage's side of the rail's axis
 

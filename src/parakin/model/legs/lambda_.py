@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from ...algebra import Scalar, Vec, along, dot, scale, sqrt, sub
+from ...algebra import Scalar, Vec, dot, move_along, scale, sqrt, sub
 from ..parts import Direction, Point, Signs, Size
 from .base import Inverse, Leg, Reach
 
@@ -30,7 +30,7 @@ class Lambda(Leg):
 
     def closures(self, point: Vec, joints: list[Scalar]) -> list[Scalar]:
         first, second = joints
-        u = sub(point, along(self.foot, self.rail, first))
+        u = sub(point, move_along(self.foot, self.rail, first))
         gap = second - first
         height = (self._lower / self.long) * dot(u, self.rail)  # of the hinge over the long rod's slider
         return [
@@ -41,7 +41,7 @@ class Lambda(Leg):
     def inverse(self, point: Vec, signs: str) -> Inverse:
         w = sub(point, self.foot)
         s = dot(w, self.rail)
-        off = along(w, self.rail, -s)
+        off = move_along(w, self.rail, -s)
         reach = self.long**2 - dot(off, off)
         rise = sqrt(reach) if signs[0] == "-" else -sqrt(reach)
         height = (self._lower / self.long) * rise
@@ -54,13 +54,13 @@ class Lambda(Leg):
         )
 
     def struts(self, point: Vec, joints: list[Scalar]) -> list[tuple[Vec, Vec]]:
-        start = along(self.foot, self.rail, joints[0])
+        start = move_along(self.foot, self.rail, joints[0])
         rod = scale(sub(point, start), self._lower / self.long)
         hinge = (start[0] + rod[0], start[1] + rod[1], start[2] + rod[2])
-        return [(start, point), (along(self.foot, self.rail, joints[1]), hinge)]
+        return [(start, point), (move_along(self.foot, self.rail, joints[1]), hinge)]
 
     def height_and_distance(self, joints: list[Scalar]) -> tuple[Scalar, Scalar]:
-        """Of the platform's joint: how far along the rail, and how far from it, mm: the direct problem's closed form.
+        """Compute how far the platform's joint is along the rail and from it, mm: the direct problem in closed form.
 
         The short rod's triangle has the sides gap, lower part of the long rod and short rod.
         """

@@ -26,10 +26,10 @@ class Length(Leg):
     def struts(self, point: Vec, joints: list[Scalar]) -> list[tuple[Vec, Vec]]:
         return [(self.foot, point)]
 
-    def inside(self, point: Vec, joints: list[Scalar]) -> tuple[Scalar, ...]:
+    def assembly_margins(self, point: Vec, joints: list[Scalar]) -> tuple[Scalar, ...]:
         return (joints[0],)
 
-    def held_at(self) -> Vec:
+    def fixed_foot(self) -> Vec:
         return self.foot
 
     def size(self, at_home: float) -> float:

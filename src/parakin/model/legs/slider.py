@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from ...algebra import Scalar, Vec, along, dot, sqrt, sub
+from ...algebra import Scalar, Vec, dot, move_along, sqrt, sub
 from ..parts import Direction, Point, Signs, Size
 from .base import Inverse, Leg, Reach
 
@@ -24,7 +24,7 @@ class Slider(Leg):
     branch: Signs = Signs("-")  # "+": the foot is farther along the rail than the platform's joint
 
     def _foot(self, q: Scalar) -> Vec:
-        return along(self.foot, self.rail, q)
+        return move_along(self.foot, self.rail, q)
 
     def closures(self, point: Vec, joints: list[Scalar]) -> list[Scalar]:
         u = sub(point, self._foot(joints[0]))
@@ -33,7 +33,7 @@ class Slider(Leg):
     def inverse(self, point: Vec, signs: str) -> Inverse:
         w = sub(point, self.foot)
         s = dot(w, self.rail)
-        off = along(w, self.rail, -s)  # from the rail, at right angles
+        off = move_along(w, self.rail, -s)  # from the rail, at right angles
         reach = self.rod**2 - dot(off, off)
         root = sqrt(reach)
         return Inverse([s - root if signs == "-" else s + root], (Reach(reach, self.rod),))

@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 from ...algebra import IDENTITY, ORIGIN, Mat, Scalar, Vec
-from ..chain import UNIT, Pointing, frame
+from ..chain import UNIT, Pointing, compose_chain
 from ..spec import Spec
 
 # Axis letters of a pose, ISO 841, by the elementary transforms that move along and about them.
@@ -48,7 +48,7 @@ class Structure(ABC):
 
     def __init__(self, spec: Spec):
         self.spec = spec
-        self.mount, self.base = frame(spec.mounting, ())
+        self.mount, self.base = compose_chain(spec.mounting, ())
         self.coordinates = spec.motion
         self.head_joints = sum(step.drive is not None for step in spec.head)
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from ...algebra import IDENTITY, Mat, Scalar, Vec, add, apply, sub, transposed
-from ..chain import UNIT, Pointing, back, frame, inverse_rotations
+from ...algebra import IDENTITY, Mat, Scalar, Vec, add, apply, sub, transpose
+from ..chain import UNIT, Pointing, compose_chain, invert_rotations, to_local
 from ..parts import TRANSLATIONS
 from ..spec import Spec
 from .base import PlatformPlacement
@@ -20,8 +20,8 @@ class Carried(FiveAxis):
     def __init__(self, spec: Spec):
         super().__init__(spec)
         self.coordinates = TRANSLATIONS
-        chain = [*inverse_rotations(spec.table), *spec.mounting, *spec.head]
-        self.pointing = Pointing.of(chain, "head" if self.head_joints else "table")
+        chain = [*invert_rotations(spec.table), *spec.mounting, *spec.head]
+        self.pointing = Pointing.from_steps(chain, "head" if self.head_joints else "table")
         # The turning axes as they follow on each other: the table's, inverted, then the head's.
         drives = [step.drive for step in spec.head if step.drive] + [step.drive for step in spec.table if step.drive]
         self.serial_order = tuple(drives.index(step.drive) for step in chain if step.drive is not None)
@@ -31,10 +31,10 @@ class Carried(FiveAxis):
 
     def _origin(self, pose: Sequence[Scalar], serial: Sequence[Scalar]) -> Vec:
         head, table = self._split(serial)
-        top, place = frame(self.spec.table, table)
+        top, place = compose_chain(self.spec.table, table)
         world = add(place, apply(top, pose[:3]))
-        _, tip = frame(self.spec.head, head)
-        return sub(back(self.mount, self.base, world), tip)
+        _, tip = compose_chain(self.spec.head, head)
+        return sub(to_local(self.mount, self.base, world), tip)
 
     def place(self, pose: Sequence[Scalar], branch: str, first: Scalar | None = None) -> PlatformPlacement:
         k, _, _ = tool_axis(pose[3], pose[4])
@@ -53,14 +53,14 @@ class Carried(FiveAxis):
 
     def _axis(self, serial: Sequence[Scalar]) -> Vec:
         head, table = self._split(serial)
-        k = apply(self.mount, apply(frame(self.spec.head, head)[0], UNIT["tz"]))
-        return apply(transposed(frame(self.spec.table, table)[0]), k)
+        k = apply(self.mount, apply(compose_chain(self.spec.head, head)[0], UNIT["tz"]))
+        return apply(transpose(compose_chain(self.spec.table, table)[0]), k)
 
     def pose(self, coordinates: Sequence[Scalar], serial: Sequence[Scalar]) -> list[Scalar]:
         head, table = self._split(serial)
-        tip = add(tuple(coordinates), frame(self.spec.head, head)[1])
-        top, place = frame(self.spec.table, table)
-        return [*back(top, place, add(apply(self.mount, tip), self.base)), *axis_angles(self._axis(serial))]
+        tip = add(tuple(coordinates), compose_chain(self.spec.head, head)[1])
+        top, place = compose_chain(self.spec.table, table)
+        return [*to_local(top, place, add(apply(self.mount, tip), self.base)), *axis_angles(self._axis(serial))]
 
     def closure(
         self, pose: Sequence[Scalar], serial: Sequence[Scalar], turn: Sequence[Scalar] = ()

@@ -11,23 +11,23 @@ from ...algebra import (
     Scalar,
     Vec,
     add,
-    along,
     apply,
     atan2,
+    axis_rotation,
     cross,
     dot,
+    minimum,
+    move_along,
     norm,
     product,
     scale,
     sincos,
-    smaller,
     sqrt,
     sub,
-    transposed,
-    turn,
+    transpose,
 )
 from ...errors import DescriptionError
-from ..chain import UNIT, Pointing, back, frame, rotation_about
+from ..chain import UNIT, Pointing, compose_chain, rotation_about, to_local
 from ..parts import ROTATIONS, Step
 from ..spec import Spec
 from .base import PlatformPlacement
@@ -56,7 +56,7 @@ class CentralLeg(FiveAxis):
             raise DescriptionError("table", "a machine with a central leg has its turning axes in the head")
         self.roll = len(turns) == 3
         spin = [Step("rz", drive=spec.legs[0].drives[0])] if self.roll else []
-        self.pointing = Pointing.of([*spin, *spec.head], "head")
+        self.pointing = Pointing.from_steps([*spin, *spec.head], "head")
         self.serial_order = () if self.roll else (0, 1)
         self.assembly_method = None if self.roll else "central leg"
         self.above, self.reach = self._wrist_centre()
@@ -64,32 +64,32 @@ class CentralLeg(FiveAxis):
         home = tuple(float(spec.home.get(letter, 0.0)) for letter in self.axes)
         self.sign = 1.0 if self._centre(home[:3], tool_axis(*home[3:])[0])[2] > 0.0 else -1.0
         swing = [Step(turns[0], drive=spec.legs[0].drives[0]), Step(turns[1], drive=spec.legs[0].drives[0])]
-        self.swing = Pointing.of(swing, "motion")
+        self.swing = Pointing.from_steps(swing, "motion")
         self.swing = Pointing(self.swing.first, self.swing.second, (0.0, 0.0, self.sign))
 
     def _wrist_centre(self) -> tuple[float, float]:
         """(h, l): the point (0, 0, h) of the platform lies at the tip + l·k in every position of the head."""
         poses = [(0.0, 0.0), (0.7, 0.4), (-1.1, 0.9), (0.3, -1.3)]
-        frames = [frame(self.spec.head, angles[2 - self.head_joints :]) for angles in poses]
+        frames = [compose_chain(self.spec.head, angles[2 - self.head_joints :]) for angles in poses]
         tips = [tip for _, tip in frames]
         axes = [apply(rotation, UNIT["tz"]) for rotation, _ in frames]
         change = sub(axes[1], axes[0])
         length = -float(dot(sub(tips[1], tips[0]), change) / dot(change, change))
-        centres = [along(tip, k, length) for tip, k in zip(tips, axes, strict=True)]
+        centres = [move_along(tip, k, length) for tip, k in zip(tips, axes, strict=True)]
         height = centres[0][2]
         if max(norm(sub(c, (0.0, 0.0, height))) for c in centres) > 1e-9 * (1.0 + abs(length) + abs(height)):
             raise DescriptionError("head", "its axes must meet in one point of the central leg, on the tool's axis")
         return float(height), length
 
     def _centre(self, tip: Sequence[Scalar], k: Vec) -> Vec:
-        return back(self.mount, self.base, along(tuple(tip), k, self.reach))
+        return to_local(self.mount, self.base, move_along(tuple(tip), k, self.reach))
 
     def _hung(self, tip: Sequence[Scalar], k: Vec) -> tuple[Vec, Vec, Scalar]:
         """The central leg's direction, the platform's origin, and tz, for a tip and a tool axis."""
         centre = self._centre(tip, k)
         distance = norm(centre)
         direction = scale(centre, 1.0 / distance)
-        origin = along(centre, direction, -self.sign * self.above)  # not by the rotation: bounds stay narrow
+        origin = move_along(centre, direction, -self.sign * self.above)  # not by the rotation: bounds stay narrow
         return direction, origin, self.sign * distance - self.above
 
     def _swing(self, tip: Sequence[Scalar], k: Vec) -> tuple[Mat, Vec, Scalar, list[Scalar]]:
@@ -110,11 +110,11 @@ class CentralLeg(FiveAxis):
     def place(self, pose: Sequence[Scalar], branch: str, first: Scalar | None = None) -> PlatformPlacement:
         k, _, _ = tool_axis(pose[3], pose[4])
         rotation, origin, tz, angles = self._swing(pose[:3], k)
-        found = self.pointing.solve(apply(transposed(rotation), apply(transposed(self.mount), k)), branch, first)
+        found = self.pointing.solve(apply(transpose(rotation), apply(transpose(self.mount), k)), branch, first)
         serial = list(found.joints)
         if self.roll:
             spin = serial.pop(0)
-            rotation = product(rotation, turn("rz", *sincos(spin)))
+            rotation = product(rotation, axis_rotation("rz", *sincos(spin)))
             angles.append(spin)
         return PlatformPlacement(rotation, origin, [*angles, tz], serial, found.reach, found.freedom)
 
@@ -124,18 +124,18 @@ class CentralLeg(FiveAxis):
     def frame(self, coordinates: Sequence[Scalar]) -> tuple[Mat, Vec]:
         rotation = IDENTITY
         for word, angle in zip(self.coordinates, coordinates[:-1], strict=False):
-            rotation = product(rotation, turn(word, *sincos(angle)))
+            rotation = product(rotation, axis_rotation(word, *sincos(angle)))
         return rotation, scale([row[2] for row in rotation], coordinates[-1])
 
     def pose(self, coordinates: Sequence[Scalar], serial: Sequence[Scalar]) -> list[Scalar]:
         rotation, origin = self.frame(coordinates)
-        turned, tip = frame(self.spec.head, serial)
+        turned, tip = compose_chain(self.spec.head, serial)
         world = add(apply(self.mount, add(origin, apply(rotation, tip))), self.base)
         k = apply(self.mount, apply(rotation, apply(turned, UNIT["tz"])))
         b, c = axis_angles(k)
         # Beyond these the leg points there the other way round, with its platform turned: no pose says that.
         for margin in self._inside(coordinates):
-            b = smaller(b, 2.0 * pi + sqrt(margin))
+            b = minimum(b, 2.0 * pi + sqrt(margin))
         return [*world, b, c]
 
     def _inside(self, coordinates: Sequence[Scalar]) -> Iterator[Scalar]:
@@ -150,16 +150,16 @@ class CentralLeg(FiveAxis):
             return super().place_with_joints(pose, serial)
         k, _, _ = tool_axis(pose[3], pose[4])
         rotation, origin, tz, angles = self._swing(pose[:3], k)
-        v = apply(transposed(rotation), apply(transposed(self.mount), k))
-        w = apply(frame(self.spec.head, serial)[0], UNIT["tz"])  # turned onto v by the platform's own turn
+        v = apply(transpose(rotation), apply(transpose(self.mount), k))
+        w = apply(compose_chain(self.spec.head, serial)[0], UNIT["tz"])  # turned onto v by the platform's own turn
         spin = atan2(w[0] * v[1] - w[1] * v[0], w[0] * v[0] + w[1] * v[1])
-        rotation = product(rotation, turn("rz", *sincos(spin)))
+        rotation = product(rotation, axis_rotation("rz", *sincos(spin)))
         return PlatformPlacement(rotation, origin, [*angles, spin, tz], list(serial))
 
     def closure(
         self, pose: Sequence[Scalar], serial: Sequence[Scalar], turn: Sequence[Scalar] = ()
     ) -> tuple[Mat, Vec, list[Scalar]]:
-        turned, _ = frame(self.spec.head, serial)
+        turned, _ = compose_chain(self.spec.head, serial)
         k, _, _ = turned_axis(pose, turn)
         if self.roll:
             return self._rolled(pose[:3], k, apply(turned, UNIT["tz"]))
@@ -171,10 +171,10 @@ class CentralLeg(FiveAxis):
         """The platform turned about the central leg so that ``w``, the tool's axis in it, stands over k; its own turn
         takes one of the two conditions. No angle of the central leg is needed, which would be free where it hangs."""
         direction, origin, _ = self._hung(tip, k)
-        z, k = scale(direction, self.sign), apply(transposed(self.mount), k)
+        z, k = scale(direction, self.sign), apply(transpose(self.mount), k)
         across = cross(z, k)
         ahead = cross(across, z)
         size = 1.0 / (norm(across) * sqrt(w[0] * w[0] + w[1] * w[1]))
         x = scale(sub(scale(ahead, w[0]), scale(across, w[1])), size)
         y = scale(add(scale(ahead, w[1]), scale(across, w[0])), size)
-        return transposed((x, y, z)), origin, [w[2] - dot(z, k)]
+        return transpose((x, y, z)), origin, [w[2] - dot(z, k)]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from ...algebra import Scalar, Vec, along, atan2, dot, sincos, sqrt
+from ...algebra import Scalar, Vec, atan2, dot, move_along, sincos, sqrt
 from .base import Structure
 
 
@@ -26,7 +26,7 @@ def turned_axis(pose: Sequence[Scalar], turn: Sequence[Scalar]) -> tuple[Vec, Ve
     if not turn:
         return k, e1, e2
     first, second = turn
-    return along(along(k, e1, first), e2, second), along(e1, k, -first), along(e2, k, -second)
+    return move_along(move_along(k, e1, first), e2, second), move_along(e1, k, -first), move_along(e2, k, -second)
 
 
 class FiveAxis(Structure):

@@ -7,10 +7,10 @@ from typing import Literal
 
 import numpy as np
 
-from ...algebra import IDENTITY, Mat, Scalar, Vec, add, apply, atan2, product, sincos, sqrt, sub, transposed
-from ...algebra import turn as turned
+from ...algebra import IDENTITY, Mat, Scalar, Vec, add, apply, atan2, product, sincos, sqrt, sub, transpose
+from ...algebra import axis_rotation as turned
 from ...errors import DescriptionError
-from ..chain import UNIT, back, frame
+from ..chain import UNIT, compose_chain, to_local
 from ..legs.lambda_ import Lambda
 from ..parts import ROTATIONS, TRANSLATIONS
 from ..spec import Spec
@@ -46,7 +46,7 @@ class Free(Structure):
         self.coordinates = tuple(word for word in (*TRANSLATIONS, *ROTATIONS) if word in words)
         self.axes = tuple(LETTERS[word] for word in self.coordinates)
         self.turns = tuple(f"w{word[1]}" for word in self.coordinates if word in ROTATIONS)
-        self.tool, self.tip = frame(spec.head, ())
+        self.tool, self.tip = compose_chain(spec.head, ())
         self.assembly_method = self._assembly_method()
 
     def place(self, pose: Sequence[Scalar], branch: str, first: Scalar | None = None) -> PlatformPlacement:
@@ -82,8 +82,8 @@ class Free(Structure):
         if turn:
             rotation = product(self._small(turn), rotation)
         if len(self.axes) == 6:  # the tool's frame is posed; the platform's follows
-            rotation = product(product(transposed(self.mount), rotation), transposed(self.tool))
-        tip = back(self.mount, self.base, tuple(given.get(letter, 0.0) for letter in "XYZ"))
+            rotation = product(product(transpose(self.mount), rotation), transpose(self.tool))
+        tip = to_local(self.mount, self.base, tuple(given.get(letter, 0.0) for letter in "XYZ"))
         origin = sub(tip, apply(rotation, self.tip))
         return rotation, tuple(o if letter in given else 0.0 for o, letter in zip(origin, "XYZ", strict=True))
 

@@ -14,7 +14,7 @@ from ...algebra import Scalar, Term, Trace, derivative, norm
 from ...arrays import Array
 from ...kernels.intervals import IntervalProgram
 from ...machine import Machine
-from ...model.rates import Rates, rates
+from ...model.rates import TwistRates, compute_twist_rates
 from ..characteristic_length import Length
 from ..jacobians import column_scales, drives_of_legs
 
@@ -97,16 +97,16 @@ class Box:
         return [free[axis] if axis in free else np.float64(self.held[axis]) for axis in self.machine.axes]
 
     @cached_property
-    def _rates(self) -> tuple[Rates, list[Scalar]]:
+    def _rates(self) -> tuple[TwistRates, list[Scalar]]:
         model = self.machine.model
         with np.errstate(all="ignore"):
             joints, placed, legs = model.invert(self._pose, self.mode)
-            found = rates(model.spec, model.structure, self._pose, joints)
+            found = compute_twist_rates(model.spec, model.structure, self._pose, joints)
         columns_a, columns_b = column_scales(self.machine, self.length)
         a = [[x * float(k) for x, k in zip(row, columns_a, strict=True)] for row in found.a]
         b = [[x * float(k) for x, k in zip(row, columns_b, strict=True)] for row in found.b]
         reach = [*placed.reach, *(reach.margin for leg in legs for reach in leg.reach)]
-        return Rates(a, b, found.spans), reach
+        return TwistRates(a, b, found.spans), reach
 
     @property
     def reach(self) -> list[Scalar]:

@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 
 from ... import algebra as alg
-from ...algebra import Scalar, Term, Trace, absolute, derivative, larger, needed, norm, smaller, sub
+from ...algebra import Scalar, Term, Trace, absolute, derivative, find_dependencies, maximum, minimum, norm, sub
 from ...kernels.intervals import IntervalProgram
 from ...machine import Machine
 from ...model.parts import ROTATIONS
@@ -39,12 +39,12 @@ class Constraint:
     @cached_property
     def _nodes(self) -> list[Term]:
         margin = self.margin
-        return [self._trace.nodes[i] for i in needed([margin])] if isinstance(margin, Term) else []
+        return [self._trace.nodes[i] for i in find_dependencies([margin])] if isinstance(margin, Term) else []
 
     @cached_property
     def smooth(self) -> bool:
         """No corners: Taylor's formula holds to the second order. What is held moves, so it has a first order only."""
-        corners = (alg.MIN, alg.MAX, alg.ABS, alg.COPYSIGN, alg.SELECT, alg.HELD)
+        corners = (alg.MIN, alg.MAX, alg.ABS, alg.COPYSIGN, alg.SELECT, alg.STOP_GRADIENT)
         return not any(node.op in corners for node in self._nodes)
 
     @cached_property
@@ -54,7 +54,7 @@ class Constraint:
         for node in self._nodes:
             if node.op == alg.ATAN2:
                 y, x = node.args
-                guard = smaller(guard, larger(x, absolute(y)))
+                guard = minimum(guard, maximum(x, absolute(y)))
         return guard
 
     @cached_property

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from ...algebra import Scalar
-from ...model.rates import rates
+from ...model.rates import compute_twist_rates
 from ..certified.constraints import Constraint
 from ..certified.region import Region
 
@@ -31,7 +31,7 @@ def sides(region: Region) -> tuple[Constraint, Constraint]:
 def _block(region: Region, pose: Sequence[Scalar]) -> list[list[Scalar]]:
     model = region.machine.model
     with np.errstate(all="ignore"):  # what a pose out of reach makes of numbers is NaN
-        found = rates(model.spec, model.structure, pose, model.invert(pose, region.mode)[0])
+        found = compute_twist_rates(model.spec, model.structure, pose, model.invert(pose, region.mode)[0])
     legs = len(found.spans)
     size = legs if len(found.a) - legs == 2 else len(found.a)
     return [row[:size] for row in found.a[:size]]

@@ -56,7 +56,7 @@ class Distance:
     def _least(self) -> Tape:
         least: alg.Scalar = np.inf
         for constraint in self._own:
-            least = alg.smaller(least, _distance(constraint))
+            least = alg.minimum(least, _distance(constraint))
         return self._tape([least])
 
     @cached_property
@@ -120,7 +120,7 @@ class Distance:
 
 def _distance(constraint: Constraint) -> alg.Scalar:
     gradient = [alg.derivative(constraint.margin, x) for x in constraint.places]
-    return constraint.margin / alg.larger(alg.norm(gradient), _FLAT)
+    return constraint.margin / alg.maximum(alg.norm(gradient), _FLAT)
 
 
 @dataclass(frozen=True, eq=False)

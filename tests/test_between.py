@@ -10,7 +10,7 @@ import parakin as pk
 from parakin.kinematics.wrist import PRINTED
 from parakin.machine import Machine
 from parakin.performance.singularities import singularity_margins
-from parakin.toolpath.checking.check import between
+from parakin.toolpath.checking.check import check_path
 from parakin.toolpath.checking.search import Search
 from parakin.toolpath.path import ToolPath
 from parakin.toolpath.posting.offences import describe_place, judge_path
@@ -174,7 +174,7 @@ def drawn(name, count, seed=0):
 def test_offences_are_those_of_a_dense_sample(name):
     machine, poses = drawn(name, 120)
     posted = posted_on(machine, poses)
-    checked = between(posted)
+    checked = check_path(posted)
     sampled = Sampled(posted, 800)
     assert checked.checked and not posted.checked
     search = Search(posted)
@@ -192,10 +192,10 @@ def test_offences_are_those_of_a_dense_sample(name):
         told = found[part.name].count if part.name in found else 0
         assert count <= told <= count + unsure, part.name
     # The motions, whatever they break.
-    strays = checked.strays[sampled.motion]
-    names = [checked.limits[i - 1] if i else "" for i in strays.tolist()]
+    broken_motions = checked.broken_motions[sampled.motion]
+    names = [checked.limits[i - 1] if i else "" for i in broken_motions.tolist()]
     off = np.array([n != "" and n not in ("turns", "singularity") for n in names])
-    assert not (broken.any(1) & (strays == 0)).any()
+    assert not (broken.any(1) & (broken_motions == 0)).any()
     assert not (off & ~broken.any(1) & ~doubtful.any(1)).any()
 
 
@@ -203,7 +203,7 @@ def test_offences_are_those_of_a_dense_sample(name):
 def test_worst_values_and_first_places_are_those_of_a_dense_sample(name):
     machine, poses = drawn(name, 60, seed=1)
     posted = posted_on(machine, poses)
-    checked = between(posted)
+    checked = check_path(posted)
     sampled = Sampled(posted, 400)
     of_serial = Search(posted).motions.of_serial
     columns = {limit: i for i, limit in enumerate(machine.limits)}
@@ -254,7 +254,7 @@ def test_a_chord_bulges_over_a_carriages_end():
     machine, poses, peak = delta_chord(high=-1.0)
     posted = posted_on(machine, poses)
     assert posted.broken_record_count == 0
-    checked = between(posted)
+    checked = check_path(posted)
     assert checked.broken_record_count == 0
     assert checked.broken_motion_count == 1
     assert [offence.limit for offence in checked.offences] == ["tower_a.max"]
@@ -280,7 +280,7 @@ def test_a_chord_bulges_over_a_carriages_end():
 @pytest.mark.parametrize(("slack", "off"), [(1e-4, 0), (1e-5, 0), (-1e-4, 1), (-1e-5, 1)])
 def test_a_limit_just_touched_is_told(slack, off):
     machine, poses, _ = delta_chord(high=slack)
-    checked = between(posted_on(machine, poses))
+    checked = check_path(posted_on(machine, poses))
     assert (checked.broken_motion_count, checked.broken_record_count) == (off, 0)
     if off:
         assert checked.first.excess == pytest.approx(-slack, rel=0.05)
@@ -288,7 +288,7 @@ def test_a_limit_just_touched_is_told(slack, off):
 
 def test_a_limit_touched_to_the_last_digit_counts_as_kept():
     machine, poses, _ = delta_chord(high=0.0)
-    checked = between(posted_on(machine, poses))
+    checked = check_path(posted_on(machine, poses))
     assert checked.broken_motion_count == 0
     assert checked.first is None
 
@@ -300,7 +300,7 @@ def test_a_path_along_a_limit_is_kept():
     x = np.linspace(0.0, 0.0, 200)
     z = np.linspace(0.0, 40.0, 200)
     poses = np.column_stack([x, x, z])
-    assert between(posted_on(machine, np.concatenate([poses, poses[::-1]]))).first is None
+    assert check_path(posted_on(machine, np.concatenate([poses, poses[::-1]]))).first is None
 
 
 def bulging(machine, kind):
@@ -331,7 +331,7 @@ def test_cones_and_clearances_are_passed_between_two_records(kind):
     else:
         cones = [replace(c, angle=c.angle - shift) if f".{c.at}" == kind else c for c in limits.cones]
         limits = replace(limits, cones=tuple(cones))
-    checked = between(posted_on(Machine(replace(machine.spec, limits=limits, home=home)), ends))
+    checked = check_path(posted_on(Machine(replace(machine.spec, limits=limits, home=home)), ends))
     found = {offence.limit: offence for offence in checked.offences}[part.name]
     assert found.excess == pytest.approx(shift - least, rel=1e-6)
     assert (found.record, found.count) == (1, 1)
@@ -347,7 +347,7 @@ def test_a_leg_that_cannot_close_between_two_records():
     ends = [pose(wide, X=75.0, C=160.0), pose(wide, X=75.0, C=200.0)]
     posted = posted_on(wide, ends)
     assert posted.broken_record_count == 0
-    checked = between(posted)
+    checked = check_path(posted)
     found = {offence.limit: offence for offence in checked.offences}["l1.reach"]
     assert found.share == pytest.approx(0.5, abs=1e-3)
     assert "can't close" in found.text
@@ -359,7 +359,7 @@ def test_records_out_of_reach_are_left_to_their_own_offence():
     machine = pk.load("linear_delta")
     poses = [[0.0, 0.0, 280.0], [40.0, 0.0, 280.0], [900.0, 0.0, 280.0], [40.0, 0.0, 280.0], [0.0, 0.0, 280.0]]
     posted = posted_on(machine, poses)
-    checked = between(posted)
+    checked = check_path(posted)
     assert np.isnan(posted.joints[2]).any()
     assert checked.broken_record_count == posted.broken_record_count == 1
     assert checked.broken_motion_count == 0
@@ -386,13 +386,13 @@ def test_turns_counted_over_the_seam(name):
     posted = posted_on(machine, poses, turns=turns)
     values = posted.joints[:, joint]
     assert np.ptp(values) > math.radians(300.0)  # over ±180° somewhere
-    assert between(posted).first is None
+    assert check_path(posted).first is None
     # A range that ends within a motion, and one that holds all.
     name = machine.joints[joint]
     end = 0.5 * (values[20] + values[21])
     others = values.min(), values.max()
     ranges = (others[0] - 0.1, end) if values[-1] > values[0] else (end, others[1] + 0.1)
-    checked = between(posted_on(ranged(machine, {name: ranges}), poses, turns=turns))
+    checked = check_path(posted_on(ranged(machine, {name: ranges}), poses, turns=turns))
     assert checked.first.record == 21
     assert checked.first.begins == pytest.approx(0.5, abs=0.03)
 
@@ -404,16 +404,16 @@ def test_a_pole_is_crossed_without_a_swing(name):
     poses = [pose(machine, B=angle, C=40.0) for angle in b]
     posted = posted_on(machine, poses)
     assert np.ptp(posted.joints[:, -2:], axis=0).max() < math.radians(15.0)
-    assert between(posted).first is None
+    assert check_path(posted).first is None
 
 
 def test_beside_a_pole_the_swing_is_followed():
     machine = pk.load("orthoglide5_head")
     poses = [pose(machine, B=5.0, C=0.0), pose(machine, B=1e-3, C=20.0), pose(machine, B=1e-3, C=140.0)]
     poses.append(pose(machine, B=5.0, C=160.0))
-    assert between(posted_on(machine, poses)).first is None
+    assert check_path(posted_on(machine, poses)).first is None
     tight = ranged(machine, {"theta1": (math.radians(-10.0), math.radians(150.0))})
-    first = between(posted_on(tight, poses)).first
+    first = check_path(posted_on(tight, poses)).first
     assert (first.record, first.limit) == (3, "theta1.max")
     assert first.begins == pytest.approx(0.5, abs=1e-6)
 
@@ -423,11 +423,11 @@ def test_upright_throughout():
     rng = np.random.default_rng(2)
     poses = np.tile(machine.home, (300, 1))
     poses[:, :3] += rng.uniform(-30.0, 30.0, (300, 3))
-    assert between(posted_on(machine, poses)).first is None
+    assert check_path(posted_on(machine, poses)).first is None
     poses[:, 3] = rng.uniform(0.0, 1.5e-6, 300)  # rounding in the file
     search = Search(posted_on(machine, poses))
     search.run(lambda fraction: None)
-    assert not search.strays.any()
+    assert not search.broken_motions.any()
     assert search.prover.boxes < 3 * 300
 
 
@@ -439,7 +439,7 @@ def test_three_axis_work_on_a_table_at_its_pole(c):
     joints = table.follow(np.vstack([pose(table, X=0.0, B=1e-3, C=c), ends]))[1:]
     posted = replace(posted_on(table, ends), joints=joints)
     posted = replace(posted, broken=np.atleast_1d(table.check(ends, joints)))
-    checked = between(posted)
+    checked = check_path(posted)
     share = np.linspace(0.0, 1.0, 501)[:, None, None]
     dense = (ends[:-1] + share * np.diff(ends, axis=0)).reshape(-1, 5)
     held = table.follow(np.vstack([pose(table, X=0.0, B=1e-3, C=c), dense]))[1:]
@@ -448,20 +448,20 @@ def test_three_axis_work_on_a_table_at_its_pole(c):
     stray = ((at_ends >= 0.0) & (least < -1e-6)).any(1)
     unsure = ((at_ends >= 0.0) & (np.abs(least) <= 1e-3)).any(1)
     assert stray.any() and not stray.all()
-    assert checked.strays is not None and "untold" not in {offence.limit for offence in checked.offences}
-    assert ((checked.strays[1:] > 0) == stray)[~unsure & np.isfinite(margins).all((0, 2))].all()
+    assert checked.broken_motions is not None and "untold" not in {offence.limit for offence in checked.offences}
+    assert ((checked.broken_motions[1:] > 0) == stray)[~unsure & np.isfinite(margins).all((0, 2))].all()
 
 
 def test_joints_that_are_whole_turns_off():
     machine = pk.load("orthoglide5_head")
     poses = [pose(machine, B=30.0, C=angle) for angle in (0.0, 20.0, 150.0, 160.0)]
-    assert between(posted_on(machine, poses)).first is None
+    assert check_path(posted_on(machine, poses)).first is None
     turns = np.zeros((4, 5))
     turns[2:, 3] = -1.0
-    checked = between(posted_on(machine, poses, turns=turns))
+    checked = check_path(posted_on(machine, poses, turns=turns))
     assert [offence.limit for offence in checked.offences] == ["turns"]
     assert (checked.first.record, checked.broken_motion_count, checked.limits[-1]) == (2, 1, "turns")
-    assert checked.limits[checked.strays[2] - 1] == "turns"
+    assert checked.limits[checked.broken_motions[2] - 1] == "turns"
     assert checked.first.value == pytest.approx(math.radians(130.0), abs=1e-9)
     text = "joint theta1 would turn by 130.0° from the record before, not by -230.0°"
     assert checked.first.text == text
@@ -472,8 +472,8 @@ def test_a_motion_of_whole_turns():
     poses = [pose(machine, B=30.0, C=angle) for angle in (0.0, -360.0, -350.0)]
     back = np.zeros((3, 5))
     back[1:, 3] = -1.0
-    assert between(posted_on(machine, poses, turns=back)).first is None
-    first = between(posted_on(machine, poses)).first
+    assert check_path(posted_on(machine, poses, turns=back)).first is None
+    first = check_path(posted_on(machine, poses)).first
     assert (first.limit, first.record) == ("turns", 1)
     assert first.value == pytest.approx(-TURN, abs=1e-9)
 
@@ -483,12 +483,12 @@ def test_records_that_change_the_working_mode_far_from_the_pole():
     # from C = 95° to 265° goes round that pole, while following the records alone leads across it.
     machine = pk.load("tricept")
     ends = np.array([pose(machine, X=300.0, Z=-1600.0, B=21.0, C=c) for c in (95.0, 265.0)])
-    checked = between(posted_on(machine, ends))
+    checked = check_path(posted_on(machine, ends))
     assert [offence.limit for offence in checked.offences] == ["turns"]
     assert checked.broken_motion_count == 1
     assert "at once" in checked.first.text
     dense = posted_on(machine, ends[0] + np.linspace(0.0, 1.0, 400)[:, None] * (ends[1] - ends[0]))
-    assert between(dense).first is None
+    assert check_path(dense).first is None
 
 
 # Singularities.
@@ -501,13 +501,13 @@ def test_a_parallel_singularity_is_found_where_the_rods_are_parallel():
     rod = 400.0
     posted = posted_on(wide, [[200.0, 200.0], [300.0, 300.0], [310.0, 300.0], [250.0, 200.0]])
     assert posted.broken_record_count == 0
-    checked = between(posted)
+    checked = check_path(posted)
     assert [offence.limit for offence in checked.offences] == ["singularity"]
     first = checked.first
     assert (first.record, first.count, checked.broken_motion_count) == (1, 2, 2)
     assert 200.0 + 100.0 * first.begins == pytest.approx(rod / math.sqrt(2.0), abs=0.05)
     assert first.text == "the machine would pass a parallel singularity"
-    assert between(posted_on(wide, [[200.0, 200.0], [282.0, 282.0], [200.0, 200.0]])).first is None
+    assert check_path(posted_on(wide, [[200.0, 200.0], [282.0, 282.0], [200.0, 200.0]])).first is None
 
 
 def test_parallel_singularities_are_those_of_a_dense_sample():
@@ -516,7 +516,7 @@ def test_parallel_singularities_are_those_of_a_dense_sample():
     half = np.array([60.0, 60.0, 60.0, 0.2, 0.2, 0.5])
     poses = machine.home + rng.uniform(-1.0, 1.0, (80, 6)) * half - [0, 0, 0, 0, 0, 0.4]
     posted = posted_on(machine, poses)
-    checked = between(posted)
+    checked = check_path(posted)
     share = np.linspace(0.0, 1.0, 400)[:, None, None]
     margin = singularity_margins(machine, poses[:-1] + share * np.diff(poses, axis=0))[:, :, 0]
     crossed = margin.min(0) * margin.max(0) < 0.0
@@ -549,7 +549,7 @@ def test_a_dense_path_well_inside_is_proved_with_few_boxes(name):
     count = 20_000
     search = Search(posted_on(machine, dense_path(machine, count)))
     search.run(lambda fraction: None)
-    assert not search.strays.any()
+    assert not search.broken_motions.any()
     assert search.prover.boxes < count / 30
     assert search.motions.looked_at < count / 30
 
@@ -558,9 +558,9 @@ def test_what_takes_too_long_is_told(monkeypatch):
     machine, poses = pk.load("linear_delta"), np.array([[-70.0, 130.0, 270.0], [80.0, 160.0, 280.0]])
     rows = poses[0] + np.linspace(0.0, 1.0, 10_001)[:, None] * (poses[1] - poses[0])
     machine = ranged(machine, {"tower_a": (700.0, machine.inverse(rows)[:, 0].max() + 1e-4)})
-    assert between(posted_on(machine, poses)).first is None
+    assert check_path(posted_on(machine, poses)).first is None
     monkeypatch.setattr("parakin.toolpath.checking.search.MOST_CUTS", 0)
-    checked = between(posted_on(machine, poses))
+    checked = check_path(posted_on(machine, poses))
     assert [offence.limit for offence in checked.offences] == ["untold"]
     assert checked.first.text == "whether this motion keeps all limits can't be told"
     assert (checked.first.record, checked.broken_motion_count) == (1, 1)
@@ -570,24 +570,24 @@ def test_what_takes_too_long_is_told(monkeypatch):
 def test_paths_without_motions(count):
     machine = pk.load("tricept")
     said = []
-    checked = between(posted_on(machine, np.tile(machine.home, (count, 1))), said.append)
+    checked = check_path(posted_on(machine, np.tile(machine.home, (count, 1))), said.append)
     assert checked.checked and checked.first is None and checked.offences == ()
-    assert len(checked.strays) == count
+    assert len(checked.broken_motions) == count
     assert said[-1] == 1.0
 
 
 def test_a_single_record_off_limits_keeps_its_offence():
     machine = pk.load("linear_delta")
     posted = posted_on(machine, [[0.0, 0.0, 700.0]])
-    checked = between(posted)
+    checked = check_path(posted)
     assert checked.first.text == posted.first.text
     assert describe_place(checked, checked.first) == "part.cls:101"
-    assert between(checked) is checked
+    assert check_path(checked) is checked
 
 
 def test_progress_and_records_that_repeat():
     machine = pk.load("orthoglide5_table")
     poses = np.repeat(dense_path(machine, 500), 2, axis=0)
     said = []
-    assert between(posted_on(machine, poses), said.append).first is None
+    assert check_path(posted_on(machine, poses), said.append).first is None
     assert said == sorted(said) and said[-1] == 1.0

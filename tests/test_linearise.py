@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 
 import parakin as pk
 from parakin.toolpath.linearise.interpolation import Programmed, denser
-from parakin.toolpath.linearise.linearise import linearised
+from parakin.toolpath.linearise.linearise import linearise_path
 from parakin.toolpath.path import Event, ToolPath
 from parakin.toolpath.posting.post import post_path
 
@@ -163,7 +163,7 @@ def test_the_tool_stays_within_both_tolerances(name, under, chord, angle):
     machine, path = a_path(name)
     posted = post_path(machine, path)
     assert np.isfinite(posted.joints).all()
-    result = linearised(posted, under, chord=chord, angle=angle)
+    result = linearise_path(posted, under, chord=chord, angle=angle)
     assert within(posted, result, under, chord, angle) <= 1.0
     assert (within(posted, posted, under, chord, angle) > 1.0) == (len(result.path) > len(path))
 
@@ -173,7 +173,7 @@ def test_lambda6_as_a_program_turns_it(under):
     machine = pk.load("lambda6")
     turns = np.radians([[5, -5, 30], [-8, 6, 45], [10, 10, 20]])
     posted = post_path(machine, turned([[0, 0, 1400], [60, -40, 1420], [-50, 30, 1390]], turns))
-    result = linearised(posted, under, chord=0.02)
+    result = linearise_path(posted, under, chord=0.02)
     assert within(posted, result, under, 0.02, 1e-3) <= 1.0
     assert (len(result.path) > 3) == (under == "joints")
 
@@ -189,7 +189,7 @@ def test_no_point_can_be_spared(name, under):
     posted = post_path(
         machine, replace(path, **{f: getattr(path, f)[:2] for f in ("tip", "axis", "line", "rapid", "feed", "spindle")})
     )
-    result = linearised(posted, under, chord=chord, angle=angle)
+    result = linearise_path(posted, under, chord=chord, angle=angle)
     count = len(result.path) - 2
     assert count > 1
     for j in range(1, count + 1):
@@ -201,10 +201,10 @@ def test_no_point_can_be_spared(name, under):
 def test_a_long_line_of_a_linear_delta():
     machine = pk.load("linear_delta")
     posted = post_path(machine, path_of([[-100, 0, 280], [100, 0, 280]]))
-    assert linearised(posted, "pose") is posted
+    assert linearise_path(posted, "pose") is posted
     counts = []
     for chord in (0.1, 0.01, 0.001):
-        result = linearised(posted, "joints", chord=chord)
+        result = linearise_path(posted, "joints", chord=chord)
         assert within(posted, result, "joints", chord, 1e-3) <= 1.0
         counts.append(len(result.path) - 1)
     # a tolerance a hundredth as wide takes ten times as many parts
@@ -217,7 +217,7 @@ def test_a_dense_path_needs_nothing(under):
     t = np.linspace(0.0, 2.0, 400)
     path = path_of(np.column_stack([40 * np.cos(t), 40 * np.sin(t), -1650 + t]), axis_of(20 + t, 50 * t))
     posted = post_path(machine, path)
-    assert linearised(posted, under, chord=0.01, angle=1e-3) is posted
+    assert linearise_path(posted, under, chord=0.01, angle=1e-3) is posted
 
 
 # Programs that turn the tool themselves.
@@ -239,7 +239,7 @@ def test_turns_of_a_program(under, angles):
         machine, turned([[20, 0, z], [-20, 30, z], [20, 30, z], [0, 10, z], [0, 10, z]], turns), workpiece=workpiece
     )
     assert np.isfinite(posted.joints).all()
-    result = linearised(posted, under, chord=0.03, angle=2e-3)
+    result = linearise_path(posted, under, chord=0.03, angle=2e-3)
     assert within(posted, result, under, 0.03, 2e-3) <= 1.0
     if workpiece is None and under == "pose":
         assert len(result.path) == 5  # B and C are the pose's own
@@ -252,7 +252,7 @@ def test_whole_turns_in_one_motion_hide_nothing():
         turns = np.vstack([start, start + [0, 0, whole * 2 * math.pi]])
         # The poses are not the turns.
         posted = post_path(machine, turned([[0, 0, 0], [5, 0, 0]], turns), workpiece=pk.workpiece(B=20 * DEGREE))
-        result = linearised(posted, "pose", angle=5e-3)
+        result = linearise_path(posted, "pose", angle=5e-3)
         assert within(posted, result, "pose", 0.01, 5e-3) <= 1.0
         assert len(result.path) > 10 * whole
 
@@ -284,7 +284,7 @@ def swing(posted):
 @pytest.mark.parametrize("name", ["orthoglide5_head", "orthoglide5_table"])
 def test_a_pass_within_the_tolerance_is_led_through_the_pole(name, under, count, miss):
     posted = post_path(pk.load(name), across(name, miss, count))
-    result = linearised(posted, under, chord=0.05)
+    result = linearise_path(posted, under, chord=0.05)
     assert within(posted, result, under, 0.05, 1e-3) <= 1.0
     assert swing(result) < 8.0
     assert not result.path.notes
@@ -296,7 +296,7 @@ def test_a_pass_within_the_tolerance_is_led_through_the_pole(name, under, count,
 @pytest.mark.parametrize("miss", [2e-3, 0.014])
 def test_a_pass_beside_the_pole_is_told(under, count, miss):
     posted = post_path(pk.load("orthoglide5_head"), across("orthoglide5_head", miss, count))
-    result = linearised(posted, under, chord=0.05)
+    result = linearise_path(posted, under, chord=0.05)
     assert within(posted, result, under, 0.05, 1e-3) <= 1.0
     assert swing(result) > 170.0
     (note,) = result.path.notes
@@ -306,7 +306,7 @@ def test_a_pass_beside_the_pole_is_told(under, count, miss):
     head, _, told = note.text.partition(": theta1 swings ")
     assert head == f"the tool axis passes {off}° beside the head's pole"
     assert float(told.removesuffix("°")) == pytest.approx(around, abs=4.0)
-    assert linearised(result, under, chord=0.05).path.notes == (note,)  # once
+    assert linearise_path(result, under, chord=0.05).path.notes == (note,)  # once
 
 
 @UNDER
@@ -322,7 +322,7 @@ def test_the_wrist_of_a_tricept(under):
     for count, most in ((2, 4.0), (300, 4.0)):
         k = programmed(path_of(tip, axis), 1, np.linspace(0, 1, count))[1]
         posted = post_path(machine, path_of(np.tile(tip[0], (count, 1)), k))
-        result = linearised(posted, under, chord=0.02, angle=3e-3)
+        result = linearise_path(posted, under, chord=0.02, angle=3e-3)
         assert within(posted, result, under, 0.02, 3e-3) <= 1.0
         assert swing(result) < most
         assert not [note for note in result.path.notes if "theta1" in note.text]
@@ -338,7 +338,7 @@ def test_jitter_about_the_pole_is_stilled():
     )
     posted = post_path(machine, path)
     assert swing(posted) > 90.0
-    result = linearised(posted, "joints")
+    result = linearise_path(posted, "joints")
     assert within(posted, result, "joints", 0.01, 1e-3) <= 1.0
     assert swing(result) < 8.0
     assert not result.path.notes
@@ -348,7 +348,7 @@ def test_a_corner_on_the_pole_is_told():
     path = across("orthoglide5_head", 0.0, 3)
     path.axis[2] = axis_of(20.0, 120.0)  # came along 210 deg, goes on along 120
     posted = post_path(pk.load("orthoglide5_head"), path)
-    result = linearised(posted, "joints", chord=0.05)
+    result = linearise_path(posted, "joints", chord=0.05)
     assert within(posted, result, "joints", 0.05, 1e-3) <= 1.0
     assert [note.text for note in result.path.notes] == [
         "the tool axis passes 0° beside the head's pole: theta1 swings 90°"
@@ -373,7 +373,7 @@ def test_lines_feeds_events_and_times():
     )
     path = replace(path, line=np.array([10, 11, 12, 15]), tool={"number": 3.0})
     posted = post_path(machine, path, workpiece=pk.workpiece(X=1, Y=2, Z=3))
-    result = linearised(posted, "joints")
+    result = linearise_path(posted, "joints")
     new = result.path
     assert np.array_equal(result.frame, posted.frame)
     assert (new.source, new.tool, new.units, new.frame) == (path.source, path.tool, path.units, None)
@@ -399,7 +399,7 @@ def test_the_file_s_own_frame_stays():
     posted = post_path(
         pk.load("linear_delta"), path_of([[-80, 0, 0], [80, 0, 0]], frame=frame), workpiece=pk.workpiece(X=1, Y=1)
     )
-    result = linearised(posted, "joints")
+    result = linearise_path(posted, "joints")
     assert within(posted, result, "joints", 0.01, 1e-3) <= 1.0
 
 
@@ -407,7 +407,7 @@ def test_rapid_motions_are_kept_to_their_lines():
     posted = post_path(
         pk.load("linear_delta"), replace(path_of([[-100, 0, 280], [100, 0, 280]]), rapid=np.ones(2, bool))
     )
-    assert len(linearised(posted, "joints").path) > 20
+    assert len(linearise_path(posted, "joints").path) > 20
 
 
 @UNDER
@@ -418,7 +418,7 @@ def test_a_rapid_that_turns_back(under):
     path = replace(path_of(around, axis_of(np.full(500, 12.0), turn)), rapid=np.arange(500) % 90 == 89)
     posted = post_path(machine, path)
     assert posted.rewinds and posted.broken_record_count == 0
-    result = linearised(posted, under)
+    result = linearise_path(posted, under)
     assert result.broken_record_count == 0
     if under == "pose":
         assert result.rewinds == posted.rewinds
@@ -443,7 +443,7 @@ def test_paths_with_nothing_to_do():
     for tip in (np.empty((0, 3)), [[0, 0, -1650]]):
         posted = post_path(machine, path_of(np.reshape(tip, (-1, 3))))
         for under in ("pose", "joints"):
-            assert linearised(posted, under) is posted
+            assert linearise_path(posted, under) is posted
 
 
 @UNDER
@@ -451,7 +451,7 @@ def test_paths_with_nothing_to_do():
 def test_an_upright_tool_stays_on_the_pole(name, under):
     machine = pk.load(name)
     posted = post_path(machine, path_of(machine.home[:3] + np.array([[0, 0, 0], [0.5, 0, 0], [0.5, 0.5, 0]])))
-    result = linearised(posted, under)
+    result = linearise_path(posted, under)
     assert within(posted, result, under, 0.01, 1e-3) <= 1.0
     assert len(result.path) == 3 and not result.path.notes
 
@@ -461,7 +461,7 @@ def test_records_out_of_reach_are_left_alone(under):
     posted = post_path(
         pk.load("linear_delta"), path_of([[-100, 0, 280], [0, 0, 280], [2000, 0, 280], [0, 0, 280], [0, 100, 280]])
     )
-    result = linearised(posted, under)
+    result = linearise_path(posted, under)
     counts = np.bincount(result.path.line)
     assert counts[12] == counts[13] == 1  # there and back
     if under == "joints":
@@ -474,12 +474,12 @@ def test_a_motion_out_of_reach_in_between_is_an_offence():
     posted = post_path(machine, path_of([[234, -112, 0], [254, 170, 0]]))
     assert np.isfinite(posted.joints).all()
     assert not np.isfinite(machine.inverse(0.5 * (posted.poses[0] + posted.poses[1]))).all()
-    result = linearised(posted, "joints")
+    result = linearise_path(posted, "joints")
     assert result.broken_record_count > posted.broken_record_count
     lost = np.flatnonzero(~np.isfinite(result.joints).all(axis=1))
     assert len(lost) == 1 and result.path.line[lost[0]] == 11
     assert result.offences[0].line == 11
-    assert len(linearised(posted, "pose").path) == 2
+    assert len(linearise_path(posted, "pose").path) == 2
 
 
 def test_opposite_axes_are_refused_with_their_line():
@@ -487,7 +487,7 @@ def test_opposite_axes_are_refused_with_their_line():
     posted = post_path(pk.load("hexapod"), path)
     if np.isfinite(posted.joints).all():
         with pytest.raises(pk.PoseError, match=r"part\.cls:11: the tool axis turns to its opposite"):
-            linearised(posted, "pose")
+            linearise_path(posted, "pose")
     with pytest.raises(pk.PoseError, match=r"part\.cls:11: the tool axis turns to its opposite"):
         Programmed(path).at(np.array([1]), np.array([0.5]))
 
@@ -496,9 +496,9 @@ def test_opposite_axes_are_refused_with_their_line():
 def test_bad_tolerances(bad):
     posted = post_path(pk.load("tricept"), path_of([[0, 0, -1650]]))
     with pytest.raises(pk.PoseError, match=next(iter(bad))):
-        linearised(posted, "pose", **bad)
+        linearise_path(posted, "pose", **bad)
     with pytest.raises(pk.PoseError, match="under"):
-        linearised(posted, "both")
+        linearise_path(posted, "both")
 
 
 # The programmed path.

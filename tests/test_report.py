@@ -10,7 +10,7 @@ import pytest
 import parakin as pk
 from parakin.export.report.report import report_html
 from parakin.machine import Machine
-from parakin.toolpath.checking.check import between
+from parakin.toolpath.checking.check import check_path
 from parakin.toolpath.path import Note, ToolPath
 from parakin.toolpath.posting.post import post_path
 from parakin.toolpath.timing import plan_trajectory
@@ -265,8 +265,8 @@ def test_inverse_time_counts_as_programmed():
 
 def test_offences_on_the_way_say_where():
     # Both ends are 934 mm or more from each foot's joint, the middle is not.
-    posted = between(post_path(pk.load("tricept"), path_of([[-300, 0, -1450], [0, 0, -1340], [300, 0, -1450]])))
-    halfway = between(post_path(pk.load("tricept"), path_of([[-200, 0, -1345], [200, 0, -1345]])))
+    posted = check_path(post_path(pk.load("tricept"), path_of([[-300, 0, -1450], [0, 0, -1340], [300, 0, -1450]])))
+    halfway = check_path(post_path(pk.load("tricept"), path_of([[-200, 0, -1345], [200, 0, -1345]])))
     for checked in (posted, halfway):
         html = report_html(checked)
         assert "were not checked" not in html
@@ -277,5 +277,5 @@ def test_offences_on_the_way_say_where():
         if checked.broken_motion_count:
             assert traces_of(figures_of(html)["path"], "motions off limits")
     assert any(offence.share < 1.0 for offence in (*posted.offences, *halfway.offences))
-    runs = between(post_path(pk.load("tricept"), path_of([[0, 0, -1650], [50, 0, -1650]])))
+    runs = check_path(post_path(pk.load("tricept"), path_of([[0, 0, -1650], [50, 0, -1650]])))
     assert "All 2 records and the motions between them stay within every limit of tricept.<" in report_html(runs)

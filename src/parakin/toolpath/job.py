@@ -9,8 +9,8 @@ from typing import Literal, TypeAlias
 
 from ..errors import PoseError
 from ..machine import Machine
-from .checking.check import between
-from .linearise.linearise import linearised
+from .checking.check import check_path
+from .linearise.linearise import linearise_path
 from .path import Floats, ToolPath
 from .posting.post import post_path
 from .posting.posted import Posted
@@ -96,12 +96,12 @@ def prepare(
     lean = 0.5 * axis_tolerance / steps
     posted, trajectory, why = programmed, None, ""
     try:
-        posted = linearised(posted, "pose", chord=0.5 * tolerance, angle=lean, progress=part(0.1, 0.2))
+        posted = linearise_path(posted, "pose", chord=0.5 * tolerance, angle=lean, progress=part(0.1, 0.2))
         if target == "joints":
-            posted = linearised(posted, "joints", chord=0.5 * tolerance, angle=lean, progress=part(0.2, 0.4))
+            posted = linearise_path(posted, "joints", chord=0.5 * tolerance, angle=lean, progress=part(0.2, 0.4))
     except PoseError as error:
         why = str(error)
-    posted = between(posted, progress=part(0.4, 0.6))
+    posted = check_path(posted, progress=part(0.4, 0.6))
     if not why:
         try:
             trajectory = plan_trajectory(

@@ -160,9 +160,9 @@ def _red(posted: Posted, tips: Points) -> list[Trace]:
 
 def _strays(posted: Posted, tips: Points) -> list[Trace]:
     """Motions that break a limit which both their records keep; a sample of them if there are many."""
-    if posted.strays is None or not posted.broken_motion_count:
+    if posted.broken_motions is None or not posted.broken_motion_count:
         return []
-    to = np.flatnonzero(posted.strays)
+    to = np.flatnonzero(posted.broken_motions)
     to = to[:: max(1, len(to) // _MARKED)]
     kept = np.unique(np.concatenate([to - 1, to]))
     wanted = np.isin(kept[1:], to) & (np.diff(kept) == 1)

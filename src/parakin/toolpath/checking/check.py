@@ -18,7 +18,7 @@ _BLOCK = 1 << 16  # records
 TURN = 2.0 * math.pi
 
 
-def between(posted: Posted, progress: Callable[[float], None] | None = None) -> Posted:
+def check_path(posted: Posted, progress: Callable[[float], None] | None = None) -> Posted:
     """A posted path with what its motions break between the records.
 
     From record to record every coordinate of the pose goes straight and the joints go on as the machine takes them,
@@ -44,19 +44,20 @@ def between(posted: Posted, progress: Callable[[float], None] | None = None) -> 
     say = progress or (lambda fraction: None)
     search = Search(posted)
     search.run(lambda fraction: say(0.9 * fraction))
-    names = {search.turns: TURNS, search.singular: SINGULARITY, search.untold: UNDECIDED}
+    names = {search.turns: TURNS, search.singular: SINGULARITY, search.undecided: UNDECIDED}
     extra = [column for column in names if search.tallies[column].count]
     limits = (*posted.limits, *(names[column] for column in extra))
-    strays = search.strays.copy()
+    broken_motions = search.broken_motions.copy()
     for number, column in enumerate(extra, len(posted.limits)):
-        strays[search.strays == 1 + column] = 1 + number
+        broken_motions[search.broken_motions == 1 + column] = 1 + number
     offences = _Merged(posted, search).offences()
     first = _first(posted, search, offences)
     grave = find_gravest(posted.machine, offences) if offences else None
     say(1.0)
     return replace(
-        posted, limits=limits, offences=tuple(offences), first=first, worst=grave, checked=True, strays=strays
-    )
+        posted, limits=limits, offences=tuple(offences), first=first, worst=grave, checked=True,
+        broken_motions=broken_motions,
+    )  # fmt: skip
 
 
 class _Merged:
@@ -97,8 +98,8 @@ class _Merged:
         tally = self.search.tallies[column]
         if column == self.search.turns:
             return turned(self.posted, self.search)
-        if column == self.search.untold:
-            return untold(self.posted, self.search)
+        if column == self.search.undecided:
+            return describe_undecided(self.posted, self.search)
         if column == self.search.singular:
             share = first_place(self.search, tally.motion, column, tally.share)
             return passing(self.posted, tally.motion, share, tally.count)
@@ -168,9 +169,9 @@ def passing(posted: Posted, motion: int, share: float, count: int) -> Offence:
     return Offence(SINGULARITY, text, motion, line, 0.0, 0.0, "1", math.inf, count, share, share)
 
 
-def untold(posted: Posted, search: Search) -> Offence:
+def describe_undecided(posted: Posted, search: Search) -> Offence:
     """A motion that could not be decided on."""
-    tally = search.tallies[search.untold]
+    tally = search.tallies[search.undecided]
     text = "whether this motion keeps all limits can't be told"
     line = int(posted.path.line[tally.motion])
     return Offence(UNDECIDED, text, tally.motion, line, math.nan, 0.0, "1", math.inf, tally.count)
@@ -201,8 +202,8 @@ def _begun(posted: Posted, search: Search, column: int) -> tuple[float, Offence]
     if column == search.turns:
         offence = turned(posted, search)
         return offence.begins, offence
-    if column == search.untold:
-        return 1.0, untold(posted, search)
+    if column == search.undecided:
+        return 1.0, describe_undecided(posted, search)
     share = first_place(search, tally.motion, column, tally.share)
     if column == search.singular:
         return share, passing(posted, tally.motion, share, tally.count)

@@ -20,22 +20,25 @@ _MOST = 1.5 * np.pi  # rad: farther from one end of a part to the other no joint
 
 
 class Search:
-    """The bracketing of one path. Columns are the machine's limits, then ``turns``, ``singular`` and ``untold``."""
+    """The bracketing of one path. Columns are the machine's limits, then ``turns``, ``singular`` and ``undecided``."""
 
     def __init__(self, posted: Posted):
         self.posted = posted
         self.motions = Motions(posted)
         self.prover = Prover(self.motions)
         self.limits = len(posted.machine.limits)
-        self.turns, self.singular, self.untold = (self.limits + i for i in range(3))
+        self.turns, self.singular, self.undecided = (self.limits + i for i in range(3))
         self.floor = -self.prover.tolerance
         self.tallies = [Tally() for _ in range(self.limits + 3)]
         self.jump: Jump | None = None  # the first
-        self.strays = np.zeros(len(posted.path), np.int64)
+        self.broken_motions = np.zeros(len(posted.path), np.int64)
 
     def run(self, say: Callable[[float], None]) -> None:
-        """Look at every motion: fills ``tallies`` and ``strays`` (n,), 1 + the column of a limit that is broken on the
-        motion to a record, though its ends keep it."""
+        """Check every motion; fills ``tallies`` and ``broken_motions``.
+
+        ``broken_motions`` (n,) is 1 + the column of a limit that the motion to a record breaks, though its ends keep
+        it.
+        """
         count = len(self.posted.path)
         for records in blocks(count):
             left = unproved(self.prover, records, self.floor, whole=True)
@@ -64,7 +67,7 @@ class Search:
         parts = self.whole(motion)
         across = Motions.over_the_pole(parts.start, parts.end)
         need = np.ones((len(parts), self.limits + 3), bool)
-        need[:, self.untold] = False
+        need[:, self.undecided] = False
         need[:, : self.limits] = (parts.start.margins >= 0.0) & (parts.end.margins >= 0.0)
         need[:, : self.limits] &= ~(across[:, None] & self.motions.of_serial)
         ledger = Ledger.of(need)
@@ -106,7 +109,7 @@ class Search:
         """Count the cuts of motions, and give up those that are cut too often."""
         np.add.at(ledger.cuts, number, 1)
         spent = np.flatnonzero((ledger.cuts > MOST_CUTS) & ledger.need.any(1))
-        ledger.found(spent, self.untold, np.ones(len(spent)))
+        ledger.found(spent, self.undecided, np.ones(len(spent)))
         ledger.need[spent] = False
 
     def reached(self, records: Indices) -> Flags:
@@ -155,8 +158,8 @@ class Search:
             tally.count += len(rows)
             if tally.motion < 0:
                 tally.motion, tally.share = int(motion[rows[0]]), float(ledger.share[rows[0], column])
-            fresh = motion[rows][self.strays[motion[rows]] == 0]
-            self.strays[fresh] = 1 + column
+            fresh = motion[rows][self.broken_motions[motion[rows]] == 0]
+            self.broken_motions[fresh] = 1 + column
 
     def passed(self, one: Floats, two: Floats) -> Flags:
         """Where two determinants tell of a singularity between their places, or next to one of them."""

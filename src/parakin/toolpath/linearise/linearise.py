@@ -24,7 +24,7 @@ _ROUNDS = 12
 _BLOCK = 1 << 16  # motions
 
 
-def linearised(
+def linearise_path(
     posted: Posted, under: Under, *, chord: float = 0.01, angle: float = 1e-3, progress: Progress | None = None
 ) -> Posted:
     """A posted path with the fewest records added that keep the tool on the programmed path between them.

@@ -58,8 +58,8 @@ class Posted:
     first : where the path first breaks any limit; on a motion with the motion's worst value
     worst : of ``offences``, the one farthest off: a pose that can't be reached at all, else the greatest excess as a
         share of the limit's range
-    checked : the motions between the records are checked, too: see :func:`parakin.toolpath.checking.check.between`
-    strays : (n,) 0 where the motion to a record breaks nothing but what its ends break, else 1 + the index in
+    checked : the motions between the records are checked, too: see :func:`parakin.toolpath.checking.check.check_path`
+    broken_motions : (n,) 0 where the motion to a record breaks nothing but what its ends break, else 1 + the index in
         ``limits`` of a limit that it does; None where ``checked`` is not
     rewinds : records to which a rapid motion leads that turns C, and a joint with it, back by whole turns
     """
@@ -76,7 +76,7 @@ class Posted:
     first: Offence | None
     worst: Offence | None
     checked: bool = False
-    strays: NDArray[np.int64] | None = None
+    broken_motions: NDArray[np.int64] | None = None
     rewinds: tuple[int, ...] = ()
 
     @property
@@ -87,4 +87,4 @@ class Posted:
     @property
     def broken_motion_count(self) -> int:
         """How many motions break a limit that the records at both their ends keep."""
-        return 0 if self.strays is None else int(np.count_nonzero(self.strays))
+        return 0 if self.broken_motions is None else int(np.count_nonzero(self.broken_motions))

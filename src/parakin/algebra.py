@@ -211,6 +211,7 @@ def stop_gradient(x: Scalar) -> Scalar:
 
 
 def absolute(x: Scalar) -> Scalar:
+    """|x|."""
     if isinstance(x, Term):
         return x.trace.node(ABS, (x,), ())
     return np.abs(x)

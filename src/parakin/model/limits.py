@@ -40,7 +40,7 @@ class Limit:
 
 def list_limits(
     spec: Spec,
-    pose: PlatformPlacement,
+    placement: PlatformPlacement,
     coordinates: Sequence[tuple[str, Scalar]],
     joints: Sequence[Scalar],
     reaches: Sequence[tuple[Reach, ...]],
@@ -48,6 +48,7 @@ def list_limits(
 ) -> list[tuple[Limit, Scalar]]:
     """List all limits with their margins.
 
+    placement : the platform's for a pose
     coordinates : the motion's, with their names
     joints : the joint vector
     reaches : each leg's own margins
@@ -56,12 +57,12 @@ def list_limits(
     Reach comes first, so that no other limit is named where a leg can't close.
     """
     return [
-        *_list_reach(spec, pose, reaches),
+        *_list_reach(spec, placement, reaches),
         *_list_drive_limits(spec, joints),
         *_list_passive_limits(spec, dict(coordinates)),
         *_list_gaps(spec, joints),
-        *_list_cones(spec, pose, joints, home),
-        *_list_clearances(spec, pose, joints),
+        *_list_cones(spec, placement, joints, home),
+        *_list_clearances(spec, placement, joints),
     ]
 
 
@@ -94,9 +95,9 @@ def _bound_value(
 
 
 def _list_reach(
-    spec: Spec, pose: PlatformPlacement, reaches: Sequence[tuple[Reach, ...]]
+    spec: Spec, placement: PlatformPlacement, reaches: Sequence[tuple[Reach, ...]]
 ) -> Iterator[tuple[Limit, Scalar]]:
-    for margin in pose.reach:
+    for margin in placement.reach:
         yield Limit("tool.reach", "the tool's axis", "1", "reach"), margin
     for leg, margins in zip(spec.legs, reaches, strict=True):
         for drive, reach in zip(leg.drives, margins, strict=False):
@@ -110,23 +111,25 @@ def _list_drive_limits(spec: Spec, joints: Sequence[Scalar]) -> Iterator[tuple[L
         yield from _bound_value(drive.name, subject, drive.unit, q, drive.low, drive.high)
 
 
-def _list_passive_limits(spec: Spec, given: Mapping[str, Scalar]) -> Iterator[tuple[Limit, Scalar]]:
+def _list_passive_limits(spec: Spec, coordinates: Mapping[str, Scalar]) -> Iterator[tuple[Limit, Scalar]]:
     for bound in spec.limits.passive:
         unit: Literal["mm", "rad"] = "mm" if bound.name.startswith("t") else "rad"
-        yield from _bound_value(bound.name, f"passive {bound.name}", unit, given[bound.name], bound.low, bound.high)
+        yield from _bound_value(
+            bound.name, f"passive {bound.name}", unit, coordinates[bound.name], bound.low, bound.high
+        )
 
 
 def _list_gaps(spec: Spec, joints: Sequence[Scalar]) -> Iterator[tuple[Limit, Scalar]]:
-    given = {drive.name: q for drive, q in zip(spec.drives, joints, strict=True)}
+    position = {drive.name: q for drive, q in zip(spec.drives, joints, strict=True)}
     for gap in spec.limits.gaps:
         name = f"gap {gap.first}-{gap.second}"
-        yield from _bound_value(name, name, "mm", given[gap.second] - given[gap.first], gap.low, gap.high)
+        yield from _bound_value(name, name, "mm", position[gap.second] - position[gap.first], gap.low, gap.high)
 
 
-def _compute_rods(spec: Spec, pose: PlatformPlacement, joints: Sequence[Scalar]) -> list[list[tuple[Vec, Vec]]]:
-    points = platform_points(spec, pose.rotation, pose.origin)
-    given = leg_joints(spec, joints)
-    return [leg.struts(point, q) for leg, point, q in zip(spec.legs, points, given, strict=True)]
+def _compute_rods(spec: Spec, placement: PlatformPlacement, joints: Sequence[Scalar]) -> list[list[tuple[Vec, Vec]]]:
+    points = platform_points(spec, placement.rotation, placement.origin)
+    by_leg = leg_joints(spec, joints)
+    return [leg.struts(point, q) for leg, point, q in zip(spec.legs, points, by_leg, strict=True)]
 
 
 def _find_cone_axis(cone: Cone, number: int, home: HomeRods | None) -> Vec:
@@ -137,16 +140,16 @@ def _find_cone_axis(cone: Cone, number: int, home: HomeRods | None) -> Vec:
 
 
 def _list_cones(
-    spec: Spec, pose: PlatformPlacement, joints: Sequence[Scalar], home: HomeRods | None
+    spec: Spec, placement: PlatformPlacement, joints: Sequence[Scalar], home: HomeRods | None
 ) -> Iterator[tuple[Limit, Scalar]]:
     if not spec.limits.cones:
         return
-    rods = [struts[0] for struts in _compute_rods(spec, pose, joints)]
+    rods = [struts[0] for struts in _compute_rods(spec, placement, joints)]
     for cone in spec.limits.cones:
         for number, (leg, (foot, point)) in enumerate(zip(spec.legs, rods, strict=True)):
             axis = _find_cone_axis(cone, number, home)
             if cone.at == "platform":
-                axis = apply(pose.rotation, axis)
+                axis = apply(placement.rotation, axis)
             rod = sub(point, foot)
             angle = atan2(norm(cross(axis, rod)), dot(axis, rod))
             name = leg.drives[0].name
@@ -154,12 +157,14 @@ def _list_cones(
             yield limit, cone.angle - angle
 
 
-def _list_clearances(spec: Spec, pose: PlatformPlacement, joints: Sequence[Scalar]) -> Iterator[tuple[Limit, Scalar]]:
+def _list_clearances(
+    spec: Spec, placement: PlatformPlacement, joints: Sequence[Scalar]
+) -> Iterator[tuple[Limit, Scalar]]:
     least = spec.limits.clearance
     if least is None:
         return
     # Measured from the platform's end, where neighbours are closest: the platform's position cancels in the difference.
-    struts = [struts[0][::-1] for struts in _compute_rods(spec, pose, joints)]
+    struts = [struts[0][::-1] for struts in _compute_rods(spec, placement, joints)]
     for (one, a), (two, b) in combinations(zip(spec.legs, struts, strict=True), 2):
         if _share_joint(one, two):
             continue

@@ -20,7 +20,7 @@ class NoteBook:
             kind = self._kinds.setdefault(text, [line, 0])
         kind[1] += count
 
-    def notes(self) -> tuple[Note, ...]:
+    def list_notes(self) -> tuple[Note, ...]:
         """All notes in the order of their lines."""
         notes = [Note(line, text if n == 1 else f"{text} ({n} times)") for text, (line, n) in self._kinds.items()]
         return tuple(sorted(notes))

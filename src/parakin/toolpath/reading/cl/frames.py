@@ -24,6 +24,7 @@ class Frame:
     origin: Array
 
     def scale_origin(self, factor: float) -> "Frame":
+        """Return the frame with its origin in another unit."""
         return Frame(self.rotation, self.origin * factor)
 
     def equals(self, other: "Frame") -> bool:

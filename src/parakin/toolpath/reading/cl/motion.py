@@ -158,7 +158,7 @@ class ClMotion:
         """Bring the records read so far into the first frame, which is the one in force at the first record."""
         if self.records.n and not self.records.placed:
             self.first_frame, self.first_scale = self.frame, self.transform.scale
-        self.records.place(self.transform)
+        self.records.place_rows(self.transform)
 
     # records
 
@@ -259,7 +259,7 @@ class ClMotion:
         a = self.axis
         x, y, z = hole
 
-        def above(height: float) -> Triple:
+        def point_above(height: float) -> Triple:
             return x + height * a[0], y + height * a[1], z + height * a[2]
 
         if cycle.retract is not None:
@@ -275,13 +275,13 @@ class ClMotion:
             if rise > _SAME_HEIGHT:
                 self.add_record((px + rise * a[0], py + rise * a[1], pz + rise * a[2]), line, rapid=True)
             elif rise < -_SAME_HEIGHT:
-                self.add_record(above(height), line, rapid=True)
-        self.add_record(above(cycle.clear), line, rapid=True)
+                self.add_record(point_above(height), line, rapid=True)
+        self.add_record(point_above(cycle.clear), line, rapid=True)
         feed = self.feed if cycle.feed is None else self.convert_feed(*cycle.feed)
         if cycle.feed is not None:
             self.check_feed(line, feed, cycle.feed[0])
-        self.add_record(above(cycle.depth), line, rapid=False, feed=feed)
-        self.add_record(above(out), line, rapid=True)
+        self.add_record(point_above(cycle.depth), line, rapid=False, feed=feed)
+        self.add_record(point_above(out), line, rapid=True)
         self.notes.add(line, "a drill cycle's hole, written out as motion")
 
 

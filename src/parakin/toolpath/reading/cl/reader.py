@@ -69,13 +69,13 @@ class ClReader:
     buffer : bytes of the file; the first ``kept`` of them are an unfinished line
     line : lines completed
     continued : the parts of a statement that $ continues, from line ``continued_from`` on
-    matrix : rows read so far of the matrix after $$*CATIA0, which stands in line ``matrix_from``; None outside it
+    matrix : rows read so far of the matrix after $$*CATIA0 in line ``matrix_from``; None outside it
     skipped : statements after FINI: the first one's line and their count
     """
 
     def __init__(self, source: str, size: int, arc_tolerance: float):
         self.source = source
-        # columns for as many records as the file may well hold; memory not written to is not taken
+        # columns for as many records as the file may well hold; the system gives memory when it is written to
         self.motion = ClMotion(min(size // _BYTES_PER_RECORD, _MOST_EXPECTED), arc_tolerance)
         self.actions = ClActions(self.motion)
         self.bulk = size >= _BULK_FROM
@@ -177,7 +177,7 @@ class ClReader:
             units=actions.units,
             tool=actions.tool,
             events=tuple(actions.events),
-            notes=motion.notes.notes(),
+            notes=motion.notes.list_notes(),
         )
 
     # runs of plain lines
@@ -197,7 +197,7 @@ class ClReader:
             at = end + 1
 
     def _may_read_plain_lines(self) -> bool:
-        """Whether the next line stands for itself."""
+        """Whether the next line depends on no line before it."""
         motion = self.motion
         within = self.continued or self.matrix is not None or motion.circle or motion.cycle
         return not (within or self.actions.finished)

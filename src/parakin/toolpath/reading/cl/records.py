@@ -38,7 +38,7 @@ class ClRecords:
         """Give back the room that is not used."""
         self._resize(self.n)
 
-    def place(self, transform: FileTransform) -> None:
+    def place_rows(self, transform: FileTransform) -> None:
         """Bring the rows read since the last call into the first frame, in mm."""
         for a in range(self.placed, self.n, _BLOCK):
             b = min(a + _BLOCK, self.n)

@@ -15,7 +15,7 @@ _NO_TEXT = re.compile(
 
 
 def ends_text(begun: str, text: str) -> bool:
-    """Whether the trailing $ of a message can't have meant to continue it, since the line after it is motion."""
+    """Whether a message with a trailing $ ends there all the same, because the line after it is motion."""
     return _TEXT.match(begun) is not None and _NO_TEXT.match(text) is not None
 
 

@@ -15,7 +15,7 @@ from .records import FEED, LINE, RAPID, SECONDS, SPINDLE, WIDTH, GcodeRecords
 AXES = "XYZABC"
 STILL = 1e-7  # mm: where X, Y and Z move less, RS274/NGC as LinuxCNC has it takes F for degrees per minute
 CENTRES = "IJK"
-_MOST_POINTS = 20_000_000  # of all arcs: some GB of memory
+_MOST_POINTS = 20_000_000  # of all arcs: a few GB of memory
 
 
 class GcodeMotion:
@@ -128,7 +128,7 @@ class GcodeMotion:
         rows[:, FEED] = math.nan if self.inverse_time else self.feed
         rows[:, SECONDS] = seconds / len(points)
         rows[:, SPINDLE], rows[:, RAPID], rows[:, LINE] = self.rpm, 0.0, line
-        self.records.add(rows)
+        self.records.add_rows(rows)
         self.here = end
 
     def _check_known(self, name: str, plane: tuple[int, int, int], named: set[str]) -> None:

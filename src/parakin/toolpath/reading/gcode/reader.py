@@ -172,7 +172,7 @@ class GcodeReader:
             units=executor.units,
             tool=executor.tool,
             events=tuple(Event(max(0, e.record - dropped), e.line, e.text) for e in executor.events),
-            notes=motion.notes.notes(),
+            notes=motion.notes.list_notes(),
             turns=turns if any(motion.turned) else None,
             seconds=None if np.isnan(seconds).all() else seconds,
         )

@@ -15,7 +15,7 @@ _CHUNK = 1 << 16  # rows kept as they are made, before they go into columns
 
 
 class GcodeRecords:
-    """Rows of numbers. ``fresh`` takes them one after another; ``count`` is the number of all rows."""
+    """Rows of WIDTH numbers; ``fresh`` takes their numbers one after another."""
 
     def __init__(self) -> None:
         self.fresh = array("d")
@@ -24,9 +24,10 @@ class GcodeRecords:
 
     @property
     def count(self) -> int:
+        """The number of all rows."""
         return self._moved + len(self.fresh) // WIDTH
 
-    def add(self, rows: Array) -> None:
+    def add_rows(self, rows: Array) -> None:
         """Add rows (k, WIDTH)."""
         self.fresh.frombytes(np.ascontiguousarray(rows, np.float64).tobytes())
 

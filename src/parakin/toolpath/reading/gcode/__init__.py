@@ -1,1 +1,1 @@
-"""G-code, RS274/NGC."""
+"""G-code, RS274/NGC as LinuxCNC reads it."""

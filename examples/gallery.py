@@ -21,10 +21,10 @@ from parakin.export.files import write_all
 from parakin.export.workspace.meshes import Shell, shell
 from parakin.workspaces.certified.subdivision import Cells
 from parakin.workspaces.certified.workspace import Workspace
-from parakin.workspaces.inscribed.largest_box import Box, largest_box
-from parakin.workspaces.sampled.field import field
-from parakin.workspaces.sampled.polar import PolarWorkspace, polar_sweep
-from parakin.workspaces.sampled.slices import sections
+from parakin.workspaces.inscribed.largest_box import InscribedBox, find_largest_box
+from parakin.workspaces.sampled.cross_sections import find_cross_sections
+from parakin.workspaces.sampled.distance_field import sample_field
+from parakin.workspaces.sampled.polar_sweep import PolarWorkspace, sweep_polar
 
 BLUE, ORANGE, GREEN, GREY = "#1565c0", "#ef6c00", "#2e7d32", "#90a4ae"
 TILT = np.deg2rad(15.0)
@@ -95,7 +95,7 @@ def edges(low: np.ndarray, high: np.ndarray) -> list[list[np.ndarray]]:
 
 def meshed(found: Workspace, step: float) -> Shell:
     assert found.box is not None
-    return shell(field(found.region, found.box, step))
+    return shell(sample_field(found.region, found.box, step))
 
 
 def proved(found: Workspace) -> str:
@@ -107,10 +107,10 @@ def proved(found: Workspace) -> str:
 def tricept(page: Page) -> None:
     page.paper("Tricept: FME Transactions 41 (2013)")
     found = pk.workspace(pk.region(pk.load("tricept"), at={"B": 0.0, "C": 0.0}))
-    boxes: list[tuple[str, Box, str]] = [
-        ("a", largest_box(found.region), ORANGE),
-        ("b", largest_box(found.region, shape=(3.0, 3.0, 1.0)), GREEN),
-        ("c", largest_box(found.region, shape=(1.0, 1.0, 1.0)), "#6a1b9a"),
+    boxes: list[tuple[str, InscribedBox, str]] = [
+        ("a", find_largest_box(found.region), ORANGE),
+        ("b", find_largest_box(found.region, shape=(3.0, 3.0, 1.0)), GREEN),
+        ("c", find_largest_box(found.region, shape=(1.0, 1.0, 1.0)), "#6a1b9a"),
     ]
     figure, (ax,) = space()
     shape = meshed(found, 40.0)
@@ -125,7 +125,7 @@ def tricept(page: Page) -> None:
         "Figure 4: workspace in three-axis machining, B = C = 0, with parallelepipeds inside",
         figure,
         f"{proved(found)}. Boxes proved inside (a the largest found, b of 3:3:1, c a cube): {sizes}. Bounded by "
-        + ", ".join(f"{bound.limit} ({bound.share:.0%})" for bound in found.bounded_by[:6])
+        + ", ".join(f"{bound.limit} ({bound.fraction:.0%})" for bound in found.bounded_by[:6])
         + ".",
     )
 
@@ -149,7 +149,7 @@ def hbg80(page: Page) -> None:
     )
     figure, (ax,) = plane()
     for net in two.nets:
-        for lines in (net.places, net.places.swapaxes(0, 1)):
+        for lines in (net.positions, net.positions.swapaxes(0, 1)):
             for line in lines[::3]:
                 ax.plot(*line.T, color=BLUE if net.side == "home" else GREY, linewidth=0.6)
     page.add("hbg80_3_2", "Figure 3.2: workspace of the two-axis machine as a net", figure, "Both drives run.")
@@ -169,7 +169,7 @@ def hbg80(page: Page) -> None:
     figure, (ax,) = space()
     for net in three.nets:
         colour = BLUE if net.side == "home" else GREY
-        for lines in (net.places, net.places.swapaxes(0, 1)):
+        for lines in (net.positions, net.positions.swapaxes(0, 1)):
             ax.add_collection3d(Line3DCollection(list(lines[::2]), colors=colour, linewidths=0.5))
     frame(ax, *whole.box, whole.axes)
     page.add(
@@ -184,7 +184,7 @@ def lambda6(page: Page) -> None:
     page.paper("Lambda: IJEEC 6 (2022)")
     machine = pk.load("lambda6")
     level = {"A": 0.0, "B": 0.0, "C": 0.0}
-    one = polar_sweep(pk.region(machine, at={**level, "Z": 1400.0}), step=10.0, rays=72)
+    one = sweep_polar(pk.region(machine, at={**level, "Z": 1400.0}), step=10.0, rays=72)
     figure, (ax,) = plane()
     for angle, radius in zip(one.angles, one.radii[0], strict=True):
         ax.plot(*np.outer([np.cos(angle), np.sin(angle)], [0.0, radius]), color=GREY, linewidth=0.5)
@@ -195,7 +195,7 @@ def lambda6(page: Page) -> None:
         figure,
         f"72 rays, ρ by 10 mm until the first place that is not allowed: {one.estimate:,.0f} mm².",
     )
-    swept = polar_sweep(pk.region(machine, at=level), step=10.0, planes=50.0)
+    swept = sweep_polar(pk.region(machine, at=level), step=10.0, planes=50.0)
     figure, (ax,) = space()
     stacked(ax, swept, BLUE)
     page.add(
@@ -265,7 +265,7 @@ def orthoglide(page: Page) -> None:
         f"smallest {cells.size.min():.1f} mm. {proved(found)}. The thin end is in the other assembly mode.",
     )
     figure, (ax,) = plane()
-    cut = sections(field(found.region, found.box, 4.0), "Z", [0.0])[0]
+    cut = find_cross_sections(sample_field(found.region, found.box, 4.0), "Z", [0.0])[0]
     for outline in cut.outlines:
         ax.fill(*outline.T, facecolor="#bbdefb", edgecolor=BLUE, linewidth=1.5)
     cube = np.array([[-123.336, -123.336], [76.664, 76.664]])

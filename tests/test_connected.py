@@ -11,10 +11,10 @@ from scipy.sparse.csgraph import connected_components
 
 import parakin as pk
 from parakin.workspaces.certified.subdivision import Subdivision
-from parakin.workspaces.connected.adjacency import labelled, touching
-from parakin.workspaces.connected.assembly_mode import determinant
-from parakin.workspaces.connected.connected import connected_parts
-from parakin.workspaces.inscribed.largest_box import largest_box
+from parakin.workspaces.connected.adjacency import find_adjacent_cells, label_components
+from parakin.workspaces.connected.assembly_mode import expand_determinant
+from parakin.workspaces.connected.components import find_components
+from parakin.workspaces.inscribed.largest_box import find_largest_box
 
 # Two struts in line with the machine's y axis: singular where x = 0, and nowhere else.
 RING = """
@@ -38,35 +38,35 @@ def ring(tmp_path, least, at=None):
 @pytest.mark.parametrize("least", [0, 50])
 def test_struts_in_line_part_a_disc(tmp_path, least):
     asked = ring(tmp_path, least)
-    found = connected_parts(asked, start=(-60.0, 20.0), cell=0.5)
+    found = find_components(asked, start=(-60.0, 20.0), cell=0.5)
     area = pi * (100.0**2 - least**2) / 2.0
     assert found.at_least == len(found) == 2
-    assert sorted(part.sign for part in found.parts) == [-1, 1]
-    for part in found.parts:
+    assert sorted(part.sign for part in found.components) == [-1, 1]
+    for part in found.components:
         assert part.apart
         assert part.volume.inner <= area <= part.volume.outer
         assert part.volume.outer < 1.03 * part.volume.inner
         assert part.volume.estimate == pytest.approx(area, rel=2e-3)
-        assert part.sign * part.place[0] > 0.0
-        assert least <= np.hypot(*part.place) <= 100.0
+        assert part.sign * part.position[0] > 0.0
+        assert least <= np.hypot(*part.position) <= 100.0
         assert (part.low <= np.array([0.0, -100.0] if part.sign > 0 else [-100.0, -100.0])).all()
         assert (part.high >= np.array([100.0, 100.0] if part.sign > 0 else [0.0, 100.0])).all()
     assert found.undecided < 0.01
-    assert found.parts[found.start].sign == -1
-    assert found.parts[connected_parts(asked, start=(1e-3, 70.0)).start].sign == 1
+    assert found.components[found.start].sign == -1
+    assert found.components[find_components(asked, start=(1e-3, 70.0)).start].sign == 1
 
 
 def test_one_sign_can_have_two_parts(tmp_path):
     asked = ring(tmp_path, 50, at={"X": 10.0})
-    found = connected_parts(asked, start=(10.0, -70.0))
+    found = find_components(asked, start=(10.0, -70.0))
     length = sqrt(100.0**2 - 10.0**2) - sqrt(50.0**2 - 10.0**2)
     assert found.at_least == len(found) == 2
-    assert [part.sign for part in found.parts] == [1, 1]
-    assert all(part.apart for part in found.parts)
-    for part in found.parts:
+    assert [part.sign for part in found.components] == [1, 1]
+    assert all(part.apart for part in found.components)
+    for part in found.components:
         assert part.volume.estimate == pytest.approx(length, rel=1e-3)
         assert part.volume.inner <= length <= part.volume.outer
-    assert found.parts[found.start].place[0] < 0.0
+    assert found.components[found.start].position[0] < 0.0
 
 
 def flooded(asked, n, pad=1.02):
@@ -103,55 +103,57 @@ FLOODED = [("hbg80_2d", 900, 2), ("hbg80_3d", 100, 2), ("orthoglide", 100, 2), (
 @pytest.mark.parametrize(("name", "n", "parts"), FLOODED)
 def test_parts_are_those_of_a_flood_fill(name, n, parts):
     asked = pk.region(pk.load(name), **ASKED[name])
-    found = connected_parts(asked, start=asked.machine.home)
+    found = find_components(asked, start=asked.machine.home)
     expected = flooded(asked, n)
     assert len(found) == found.at_least == len(expected) == parts
-    for part, (sign, volume) in zip(found.parts, expected, strict=True):
+    for part, (sign, volume) in zip(found.components, expected, strict=True):
         assert part.sign == sign
         assert part.apart
         assert part.volume.estimate == pytest.approx(volume, rel=0.03)
         assert part.volume.inner < volume * 1.03
         assert part.volume.outer > volume * 0.97
-    assert found.parts[found.start].sign == 1
-    assert found.undecided < 1e-6 * found.parts[0].volume.estimate
+    assert found.components[found.start].sign == 1
+    assert found.undecided < 1e-6 * found.components[0].volume.estimate
 
 
 @pytest.mark.parametrize("name", ["hbg80_2d", "orthoglide"])
 def test_a_part_holds_the_place_it_names(name):
     asked = pk.region(pk.load(name), **ASKED[name])
-    first = connected_parts(asked)
+    first = find_components(asked)
     assert first.start is None
-    for number, part in enumerate(first.parts):
-        pose = asked.poses(part.place[None])[0]
+    for number, part in enumerate(first.components):
+        pose = asked.poses(part.position[None])[0]
         assert asked.machine.check(pose) == 0
-        again = connected_parts(asked, start=pose)
+        again = find_components(asked, start=pose)
         assert again.start == number
 
 
 def test_coarse_cells_never_prove_too_many_parts():
     asked = pk.region(pk.load("hbg80_3d"))
-    truth = connected_parts(asked).parts
+    truth = find_components(asked).components
     for cell in (120.0, 60.0, 30.0, 15.0):
-        found = connected_parts(asked, cell=cell)
+        found = find_components(asked, cell=cell)
         assert found.at_least <= 2
-        largest = found.parts[0].volume
+        largest = found.components[0].volume
         assert largest.inner <= truth[0].volume.outer
         assert largest.outer >= truth[0].volume.inner
-        assert sum(part.volume.outer for part in found.parts) + found.undecided >= sum(p.volume.inner for p in truth)
+        assert sum(part.volume.outer for part in found.components) + found.undecided >= sum(
+            p.volume.inner for p in truth
+        )
 
 
 def test_every_turn_counts_and_the_parts_shrink():
     m = pk.load("hexapod")
-    fixed = connected_parts(pk.region(m), cell=40.0)
-    swept = connected_parts(pk.region(m, every={"A": (-0.2, 0.2), "B": (-0.2, 0.2)}), start=m.home, cell=40.0)
+    fixed = find_components(pk.region(m), cell=40.0)
+    swept = find_components(pk.region(m, every={"A": (-0.2, 0.2), "B": (-0.2, 0.2)}), start=m.home, cell=40.0)
     assert (fixed.at_least, swept.at_least, swept.start) == (1, 1, 0)
-    assert swept.parts[0].volume.outer < fixed.parts[0].volume.inner
+    assert swept.components[0].volume.outer < fixed.components[0].volume.inner
 
 
 def test_the_volumes_of_all_parts_are_the_workspace():
     m = pk.load("orthoglide")
     whole = pk.workspace(pk.region(m), gap=0.005).volume
-    parts = connected_parts(pk.region(m)).parts
+    parts = find_components(pk.region(m)).components
     assert sum(part.volume.inner for part in parts) <= whole.outer
     assert sum(part.volume.outer for part in parts) >= whole.inner
     assert sum(part.volume.estimate for part in parts) == pytest.approx(whole.estimate, rel=5e-3)
@@ -159,14 +161,14 @@ def test_the_volumes_of_all_parts_are_the_workspace():
 
 def test_it_tells_enough_to_run_it_again(tmp_path):
     asked = ring(tmp_path, 50)
-    found = connected_parts(asked, start=(60.0, 0.0), cell=2.0)
+    found = find_components(asked, start=(60.0, 0.0), cell=2.0)
     told = found.parameters
     kind = {key: told[key] for key in ("at", "every", "some", "without", "mode")}
-    again = connected_parts(
+    again = find_components(
         pk.region(asked.machine, **kind), **{key: told[key] for key in ("start", "cell", "seconds")}
     )
     assert again.start == found.start
-    assert [part.volume for part in again.parts] == [part.volume for part in found.parts]
+    assert [part.volume for part in again.components] == [part.volume for part in found.components]
 
 
 @pytest.mark.parametrize(
@@ -181,31 +183,31 @@ def test_it_tells_enough_to_run_it_again(tmp_path):
 )
 def test_a_start_that_is_none_is_refused(tmp_path, start, said):
     with pytest.raises(pk.PoseError, match=said):
-        connected_parts(ring(tmp_path, 0), start=start)
+        find_components(ring(tmp_path, 0), start=start)
 
 
 def test_what_makes_no_sense_is_refused(tmp_path):
     m = pk.load("hexapod")
     with pytest.raises(pk.PoseError, match="some"):
-        connected_parts(pk.region(m, some={"A": (-0.1, 0.1)}))
+        find_components(pk.region(m, some={"A": (-0.1, 0.1)}))
     with pytest.raises(pk.PoseError, match=r"A is 0\.2, but held at 0 here"):
-        connected_parts(pk.region(m), start=[0, 0, m.home[2], 0.2, 0, 0])
+        find_components(pk.region(m), start=[0, 0, m.home[2], 0.2, 0, 0])
     with pytest.raises(pk.PoseError, match="beyond its range"):
-        connected_parts(pk.region(m, every={"A": (-0.1, 0.1)}), start=[0, 0, m.home[2], 0.2, 0, 0])
+        find_components(pk.region(m, every={"A": (-0.1, 0.1)}), start=[0, 0, m.home[2], 0.2, 0, 0])
     with pytest.raises(pk.PoseError, match="cell"):
-        connected_parts(ring(tmp_path, 0), cell=-1.0)
+        find_components(ring(tmp_path, 0), cell=-1.0)
     with pytest.raises(pk.PoseError, match="too fine"):
-        connected_parts(ring(tmp_path, 0), cell=0.01)
+        find_components(ring(tmp_path, 0), cell=0.01)
     with pytest.raises(pk.PoseError, match="empty"):
-        connected_parts(pk.region(pk.load("tricept"), {"Z": 500.0}))
+        find_components(pk.region(pk.load("tricept"), {"Z": 500.0}))
 
 
 def test_the_determinant_is_numpys():
     rng = np.random.default_rng(1)
     for n in range(1, 7):
         matrix = rng.uniform(-1, 1, (n, n))
-        assert determinant(matrix.tolist()) == pytest.approx(np.linalg.det(matrix), abs=1e-12)
-    assert determinant([[0.0, 2.0], [3.0, 0.0]]) == -6.0
+        assert expand_determinant(matrix.tolist()) == pytest.approx(np.linalg.det(matrix), abs=1e-12)
+    assert expand_determinant([[0.0, 2.0], [3.0, 0.0]]) == -6.0
 
 
 @pytest.mark.parametrize("d", [1, 2, 3])
@@ -218,7 +220,7 @@ def test_cells_that_touch(d):
             parts = [(low + size // 2 * np.array(i), size // 2) for i in np.ndindex(*(2,) * d)]
             cells += [part for part in parts if rng.random() < 0.8]
     low, size = np.array([c[0] for c in cells]), np.array([c[1] for c in cells])[:, None].repeat(d, 1)
-    faces, points = touching(0.37 * low - 5.0, 0.37 * size)
+    faces, points = find_adjacent_cells(0.37 * low - 5.0, 0.37 * size)
     expected: tuple[set, set] = (set(), set())
     for a, b in combinations(range(len(cells)), 2):
         common = np.minimum(low[a] + size[a], low[b] + size[b]) - np.maximum(low[a], low[b])
@@ -230,7 +232,7 @@ def test_cells_that_touch(d):
     assert set(map(tuple, points.tolist())) == expected[1]
     graph = coo_array((np.ones(len(faces)), faces.T), shape=(len(cells),) * 2)
     count, label = connected_components(graph, directed=False)
-    own = labelled(len(cells), faces)
+    own = label_components(len(cells), faces)
     assert own.max() + 1 == count
     assert len(set(zip(label.tolist(), own.tolist(), strict=True))) == count
 
@@ -239,10 +241,10 @@ def test_a_machine_that_is_singular_everywhere_has_no_parts(tmp_path):
     path = tmp_path / "ring.yaml"
     path.write_text(RING.replace("[0, -900 mm, 0]", "[0, 0, 0]").replace("LEAST", "50"), encoding="utf-8")
     asked = pk.region(pk.load(path))
-    found = connected_parts(asked, cell=2.0)
+    found = find_components(asked, cell=2.0)
     assert (len(found), found.at_least, found.undecided) == (0, 0, 0.0)
     with pytest.raises(pk.PoseError, match="singularity"):
-        connected_parts(asked, start=(60.0, 0.0))
+        find_components(asked, start=(60.0, 0.0))
 
 
 def test_a_break_gives_no_half_answer(tmp_path, monkeypatch):
@@ -253,6 +255,6 @@ def test_a_break_gives_no_half_answer(tmp_path, monkeypatch):
 
     monkeypatch.setattr(Subdivision, "refine", broken)
     with pytest.raises(KeyboardInterrupt):
-        connected_parts(asked)
+        find_components(asked)
     with pytest.raises(KeyboardInterrupt):
-        largest_box(asked)
+        find_largest_box(asked)

@@ -18,8 +18,17 @@ from parakin.kernels.batch import evaluate_tape
 from parakin.kernels.tape import compile_tape
 from parakin.model.limits import segment_distance
 from parakin.workspaces.certified.constraints import Constraint
-from parakin.workspaces.certified.plane_cuts import CLEARED, EXCLUDED, KEPT, narrowest, share, united
-from parakin.workspaces.certified.subdivision import Cuts, Items, Lines, bounds
+from parakin.workspaces.certified.plane_cuts import (
+    CLEARED,
+    EXCLUDED,
+    KEPT,
+    LinearBounds,
+    PlaneCuts,
+    bound_fraction,
+    bound_unions,
+    keep_tightest_planes,
+)
+from parakin.workspaces.certified.subdivision import OrientationBoxes, add_cuts, bound_margin
 
 ROOM = np.empty(3)
 
@@ -57,7 +66,7 @@ def planes(rng, count):
 def test_a_share_of_a_box_is_the_exact_one():
     apart, some = [], 0
     for b, slopes in planes(np.random.default_rng(51), 6000):
-        low, high = share(b, slopes, ROOM)
+        low, high = bound_fraction(b, slopes, ROOM)
         exact = exact_share(b, slopes)
         total = sum(abs(Fraction(slope)) for slope in slopes)
         # A height within roundings of a corner's may count as at it: margins are bounded with room for that.
@@ -75,16 +84,16 @@ def test_a_share_of_a_box_is_the_exact_one():
 
 def test_a_corner_too_small_for_roundings_is_no_whole_box():
     for size in (1e-6, 1e-9, 1e-12):
-        low, high = share(3.0 - size, np.ones(3), ROOM)
+        low, high = bound_fraction(3.0 - size, np.ones(3), ROOM)
         assert 0.999 < low < 1.0 <= high
-        low, high = share(size - 3.0, np.ones(3), ROOM)
+        low, high = bound_fraction(size - 3.0, np.ones(3), ROOM)
         assert low == 0.0 < high < 1e-3
 
 
 def test_what_is_not_known_leaves_all_open():
-    assert share(np.nan, np.zeros(2), ROOM) == (0.0, 1.0)
-    assert share(-np.inf, np.zeros(2), ROOM) == (0.0, 0.0)
-    assert share(np.inf, np.zeros(2), ROOM) == (1.0, 1.0)
+    assert bound_fraction(np.nan, np.zeros(2), ROOM) == (0.0, 1.0)
+    assert bound_fraction(-np.inf, np.zeros(2), ROOM) == (0.0, 0.0)
+    assert bound_fraction(np.inf, np.zeros(2), ROOM) == (1.0, 1.0)
 
 
 # Straight bounds of margins.
@@ -115,9 +124,9 @@ def margin_of(program, count):
 def assert_bounds_hold(constraint, value, low, size, bottom, top, every, rng, off=1e-9):
     """Compare the bounds with values in random places and turns of the boxes; how many boxes had straight ones."""
     n, d, s = *low.shape, bottom.shape[1]
-    items = Items(np.arange(n), bottom, top, np.zeros((n, 0), bool))
+    items = OrientationBoxes(np.arange(n), bottom, top, np.zeros((n, 0), bool))
     with np.errstate(all="ignore"):
-        found = bounds(constraint, low, size, items, every)
+        found = bound_margin(constraint, low, size, items, every)
     middle = 0.5 * (bottom + top)
     for draw in range(60):
         v = rng.uniform(-1, 1, (n, d)) if draw % 4 else rng.choice([-1.0, 0.0, 1.0], (n, d))
@@ -136,7 +145,7 @@ def assert_bounds_hold(constraint, value, low, size, bottom, top, every, rng, of
                 there = turns.copy()
                 there[:, k] = end[:, k]
                 least = value(np.hstack([x, there]))
-                assert not ((g < least - room - off * np.abs(g)) & (found.turn[:, k] == side)).any()
+                assert not ((g < least - room - off * np.abs(g)) & (found.least_at[:, k] == side)).any()
     return int((found.slopes != 0.0).any(1).sum())
 
 
@@ -170,8 +179,8 @@ def test_straight_bounds_are_of_the_second_order():
     constraint = Constraint("smooth", margin, [x, y], [turn])
     opens = []
     for size in (0.1, 0.01):
-        items = Items(np.zeros(1, int), np.full((1, 1), 0.3), np.full((1, 1), 0.3), np.zeros((1, 0), bool))
-        found = bounds(constraint, np.array([[1.0, 2.0]]), np.full((1, 2), size), items, True)
+        items = OrientationBoxes(np.zeros(1, int), np.full((1, 1), 0.3), np.full((1, 1), 0.3), np.zeros((1, 0), bool))
+        found = bound_margin(constraint, np.array([[1.0, 2.0]]), np.full((1, 2), size), items, True)
         opens.append(found.high[0] - found.low[0])
     assert opens[1] < 1.5e-2 * opens[0]
 
@@ -250,12 +259,19 @@ def least_distance(a, b, c, d):
 # Cuts of several limits together.
 
 
+def linear_bounds(low, high, slopes):
+    """Of undecided cells, without angles."""
+    n = len(low)
+    nothing = np.zeros((n, 0))
+    return LinearBounds(np.full(n, KEPT, np.int8), nothing.astype(np.int8), low, high, slopes, nothing)
+
+
 def test_cuts_together_leave_between_inner_and_outer():
     """Of each limit several items, which must all hold, with a margin somewhere between its straight bounds."""
     rng = np.random.default_rng(54)
     cells, draws = 60, 20_000
     for d in (1, 2, 3):
-        cuts = Cuts(cells)
+        cuts = PlaneCuts.start(cells)
         v = rng.uniform(-1, 1, (draws, d))
         good = np.ones((cells, draws), bool)
         for limit in range(3):
@@ -269,12 +285,10 @@ def test_cuts_together_leave_between_inner_and_outer():
             slopes[~(np.isfinite(low) & np.isfinite(high))] = 0.0
             for i, c in enumerate(cell):
                 good[c] &= v @ slopes[i] + true[i] >= 0.0
-            nothing = np.zeros((n, 0))
-            found = Lines(np.full(n, KEPT, np.int8), nothing.astype(np.int8), low, high, slopes, nothing)
-            cuts.add(limit, cell, np.ones((cells, d)), found)
+            add_cuts(cuts, limit, cell, np.ones((cells, d)), linear_bounds(low, high, slopes))
         part = good.mean(1)
         sigma = 5.0 * np.sqrt(part * (1.0 - part) / draws) + 1e-3
-        shares = cuts.shares
+        shares = cuts.fractions
         assert (shares.inner <= part + sigma).all()
         assert (shares.outer >= part - sigma).all()
         assert (shares.outer - shares.inner).mean() < 0.6
@@ -286,18 +300,15 @@ def test_the_work_is_the_same_however_it_is_divided(monkeypatch):
     rng = np.random.default_rng(55)
     n, cells = 9000, 40
     cell = np.sort(rng.integers(0, cells, n))
-    nothing = np.zeros((n, 0))
     height = 3.0 + rng.exponential(0.1, n)
-    lines = Lines(
-        np.full(n, KEPT, np.int8), nothing.astype(np.int8), height, height + 0.1, rng.normal(size=(n, 2)), nothing
-    )
+    lines = linear_bounds(height, height + 0.1, rng.normal(size=(n, 2)))
     found = []
     for threads in (1, 2, 7):
         monkeypatch.setattr("parakin.kernels.batch.count_cores", lambda threads=threads: threads)
         monkeypatch.setattr("parakin.kernels.batch.SMALL", 100)
-        cuts = Cuts(cells)
-        cuts.add(0, cell, np.ones((cells, 2)), lines)
-        found.append((cuts.bad, cuts.outer, cuts.lost, cuts.area))
+        cuts = PlaneCuts.start(cells)
+        add_cuts(cuts, 0, cell, np.ones((cells, 2)), lines)
+        found.append((cuts.cut_off, cuts.outer, cuts.cut_off_estimate, cuts.area))
     for other in found[1:]:
         for one, two in zip(found[0], other, strict=True):
             assert np.array_equal(one, two)
@@ -317,7 +328,7 @@ def test_leaves_together_leave_no_less_than_their_union():
             leaf = np.sort(rng.permutation(n)[:130])
             slopes = base[cell[leaf]] + 0.2 * rng.normal(size=(len(leaf), d))
             high = rng.normal(size=len(leaf))
-            narrowest(leaf, high, slopes, outer, line, 0, len(leaf))
+            keep_tightest_planes(leaf, linear_bounds(high, high, slopes), outer, line)
             good[leaf] &= slopes @ v.T + high[:, None] >= 0.0
         union = np.array([good[cell == c].any(0).mean() if (cell == c).any() else 0.0 for c in range(cells)])
         length = np.linalg.norm(line[:, :-1], axis=1)
@@ -327,6 +338,6 @@ def test_leaves_together_leave_no_less_than_their_union():
         order = np.argsort(outer, kind="stable")
         first[cell[order]] = order
         result = np.empty(cells)
-        united(cell, first, line, outer, result)
+        bound_unions(cell, first, line, outer, result)
         assert (result >= union - 5.0 * np.sqrt(union * (1.0 - union) / draws) - 1e-4).all()
         assert (result[union == 0.0] < 1.0).any()

@@ -14,8 +14,8 @@ from parakin.export.workspace.cells import cells_csv, cells_vtu
 from parakin.export.workspace.meshes import mesh_file, shell
 from parakin.export.workspace.summary import amount, asked, between
 from parakin.performance.indices import performance
-from parakin.workspaces.sampled.field import Distance, field
-from parakin.workspaces.sampled.slices import enclosed, sections
+from parakin.workspaces.sampled.cross_sections import compute_signed_area, find_cross_sections
+from parakin.workspaces.sampled.distance_field import DistanceField, sample_field
 
 SPACE = [name for name in pk.machines() if "Z" in pk.load(name).axes]
 
@@ -65,9 +65,9 @@ def overlap(radius, distance):
     return 2 * radius**2 * acos(distance / (2 * radius)) - distance / 2 * sqrt(4 * radius**2 - distance**2)
 
 
-def around(machine, **asked_):
-    found = pk.workspace(pk.region(machine, **asked_))
-    return found, field(found.region, found.box)
+def around(machine, gap=0.01, **asked_):
+    found = pk.workspace(pk.region(machine, **asked_), gap)
+    return found, sample_field(found.region, found.box)
 
 
 def solid(shape):
@@ -85,9 +85,9 @@ def test_the_field_of_struts_is_the_distance(lens):
     rng = np.random.default_rng(1)
     places = rng.uniform([-200, -400, -400], [200, 400, 400], (5000, 3))
     gaps = [500.0 - np.linalg.norm(places - [x, 0, 0], axis=1) for x in (-400, 400)]
-    distance = Distance(pk.region(lens))
-    assert np.abs(distance.at(places) - np.minimum(*gaps)).max() < 1e-9
-    limits = np.array(distance.region.limits)[distance.nearest(places)]
+    distance = DistanceField(pk.region(lens))
+    assert np.abs(distance.evaluate(places) - np.minimum(*gaps)).max() < 1e-9
+    limits = np.array(distance.region.limits)[distance.find_nearest_limits(places)]
     assert (limits == np.where(gaps[0] < gaps[1], "q0.max", "q1.max")).all()
 
 
@@ -100,7 +100,7 @@ def test_the_field_is_positive_where_the_machine_is_allowed(name):
     places = rng.uniform(low - 200, high + 200, (20_000, len(low)))
     allowed = machine.check(here.poses(places)) == 0
     assert 0.01 < allowed.mean() < 0.9
-    assert ((Distance(here).at(places) > 0.0) == allowed).all()
+    assert ((DistanceField(here).evaluate(places) > 0.0) == allowed).all()
 
 
 @pytest.mark.parametrize("kind", ["every", "some"])
@@ -108,30 +108,32 @@ def test_the_field_over_turns_asks_all_of_them(kind):
     machine = pk.load("hexapod")
     spans = {"A": (-0.1, 0.1), "B": (-0.05, 0.2)}
     here = pk.region(machine, **{kind: spans})
-    distance = Distance(here)
-    assert len(distance.turns) == 4 * 4  # 5 deg steps or less, at least three, both ends
+    distance = DistanceField(here)
+    assert len(distance.orientations) == 4 * 4  # 5 deg steps or less, at least three, both ends
     for i, span in enumerate(spans.values()):
-        assert (distance.turns[:, i].min(), distance.turns[:, i].max()) == pytest.approx(span)
+        assert (distance.orientations[:, i].min(), distance.orientations[:, i].max()) == pytest.approx(span)
     low, high = pk.workspace(pk.region(machine)).box
     places = np.random.default_rng(3).uniform(low, high, (3000, 3))
-    verdicts = [machine.check(here.poses(places, np.tile(turn, (len(places), 1)))) == 0 for turn in distance.turns]
+    verdicts = [
+        machine.check(here.poses(places, np.tile(turn, (len(places), 1)))) == 0 for turn in distance.orientations
+    ]
     allowed = np.all(verdicts, 0) if kind == "every" else np.any(verdicts, 0)
     assert 0.02 < allowed.mean() < 0.98
-    assert ((distance.at(places) > 0.0) == allowed).all()
-    assert ((distance.at(places, enough=5.0) > 0.0) == allowed).all()
+    assert ((distance.evaluate(places) > 0.0) == allowed).all()
+    assert ((distance.evaluate(places, enough=5.0) > 0.0) == allowed).all()
 
 
 def test_a_narrow_range_has_three_turns_and_a_wide_one_is_thinned():
     machine = pk.load("hexapod")
-    assert len(Distance(pk.region(machine, every={"A": (0.0, 0.01)})).turns) == 3
-    assert len(Distance(pk.region(machine, some={"A": (0.2, 0.2)})).turns) == 1
-    assert len(Distance(pk.region(machine, dexterous=True)).turns) <= 4096
+    assert len(DistanceField(pk.region(machine, every={"A": (0.0, 0.01)})).orientations) == 3
+    assert len(DistanceField(pk.region(machine, some={"A": (0.2, 0.2)})).orientations) == 1
+    assert len(DistanceField(pk.region(machine, dexterous=True)).orientations) <= 4096
 
 
 def test_the_grid_covers_a_thin_region(tmp_path):
     legs = [((0, 0, -5000), NOWHERE, 5000, 5002), (NOWHERE, NOWHERE, 1, 200), LOOSE]  # a bowl, 2 thick
     machine = struts(tmp_path / "bowl.yaml", "tx ty tz", legs, {"X": "50 mm", "Y": "0 mm", "Z": "1 mm"})
-    whole = field(pk.region(machine), (np.array([-205.0, -205.0, -5.0]), np.array([205.0, 205.0, 3.0])))
+    whole = sample_field(pk.region(machine), (np.array([-205.0, -205.0, -5.0]), np.array([205.0, 205.0, 3.0])))
     assert whole.step == pytest.approx([410 / 60, 410 / 60, 8 / 16])
     assert solid(shell(whole)).volume == pytest.approx(pi * 200**2 * 2, rel=0.03)
 
@@ -140,7 +142,7 @@ def test_steps_that_make_no_sense(lens):
     found, _ = around(lens)
     for refused in (0.0, -1.0, float("nan"), 0.01):
         with pytest.raises(pk.PoseError, match="step"):
-            field(found.region, found.box, refused)
+            sample_field(found.region, found.box, refused)
 
 
 # Meshes.
@@ -173,7 +175,7 @@ def test_a_region_in_parts_gives_a_body_each(tmp_path):
     legs = [(foot, NOWHERE, 450, 520) for foot in feet]  # above the feet and below them
     home = {"X": "0 mm", "Y": "0 mm", "Z": "380 mm"}
     found = pk.workspace(pk.region(struts(tmp_path / "parts.yaml", "tx ty tz", legs, home)))
-    bodies = solid(shell(field(found.region, found.box, step=5.0))).split()
+    bodies = solid(shell(sample_field(found.region, found.box, step=5.0))).split()
     assert sorted(np.sign(body.centroid[2]) for body in bodies) == [-1, 1]
     assert bodies[0].volume == pytest.approx(bodies[1].volume, rel=0.01)
     assert bodies[0].volume * 2 == pytest.approx(found.volume.estimate, rel=0.02)
@@ -222,48 +224,48 @@ def test_mesh_files_open_again(lens, kind):
 def test_cross_sections_of_a_lens(lens):
     _, whole = around(lens)
     heights = [-290.0, -100.0, 0.0, 250.0, 310.0]
-    for section, z in zip(sections(whole, "Z", heights), heights, strict=True):
-        assert (section.axis, section.value, section.places) == ("Z", z, ("X", "Y"))
+    for section, z in zip(find_cross_sections(whole, "Z", heights), heights, strict=True):
+        assert (section.axis, section.value, section.plane) == ("Z", z, ("X", "Y"))
         assert section.area == pytest.approx(overlap(sqrt(500**2 - z**2), 800), rel=1e-3, abs=30.0)  # mm², at the tips
         for outline in section.outlines:
             assert (outline[0] == outline[-1]).all()
-    across = sections(whole, "X", [60.0])[0]
-    assert across.places == ("Y", "Z")
+    across = find_cross_sections(whole, "X", [60.0])[0]
+    assert across.plane == ("Y", "Z")
     assert across.area == pytest.approx(pi * (500**2 - 460**2), rel=1e-3)
     assert np.abs(np.linalg.norm(across.outlines[0], axis=1) - sqrt(500**2 - 460**2)).max() < 0.01
 
 
 def test_sections_are_evenly_spaced_over_what_there_is(lens):
     _, whole = around(lens)
-    found = sections(whole)
+    found = find_cross_sections(whole)
     assert [section.value for section in found] == pytest.approx([-240, -120, 0, 120, 240], abs=10)
     assert all(section.axis == "Z" and len(section.outlines) == 1 for section in found)
-    assert len(sections(whole, "Y", 3)) == 3
+    assert len(find_cross_sections(whole, "Y", 3)) == 3
 
 
 def test_holes_are_no_part_of_the_area(hollow):
     _, whole = around(hollow)
-    for section in sections(whole, "Z", [0.0, 150.0, 400.0]):
+    for section in find_cross_sections(whole, "Z", [0.0, 150.0, 400.0]):
         z = section.value
         hole = 200**2 - z**2
         assert section.area == pytest.approx(pi * (500**2 - z**2 - max(0.0, hole)), rel=1e-3)
         assert len(section.outlines) == 1 + (hole > 0)
-        assert enclosed(section.outlines[0]) > 0.0
-        assert all(enclosed(outline) < 0.0 for outline in section.outlines[1:])
+        assert compute_signed_area(section.outlines[0]) > 0.0
+        assert all(compute_signed_area(outline) < 0.0 for outline in section.outlines[1:])
 
 
 @pytest.mark.parametrize("name", ["hexapod", "lambda6", "tricept"])
 def test_cross_sections_lie_in_the_certified_bracket(name):
     machine = pk.load(name)
     _, whole = around(machine)
-    for section in sections(whole, values=3):
+    for section in find_cross_sections(whole, values=3):
         volume = pk.workspace(pk.region(machine, at={"Z": section.value}), gap=0.005).volume
         assert volume.inner * 0.998 < section.area < volume.outer * 1.002
 
 
 def test_the_outline_of_a_planar_machine_is_its_only_section():
     found, whole = around(pk.load("hbg80_2d"))
-    (section,) = sections(whole)
+    (section,) = find_cross_sections(whole)
     assert section.axis is section.value is None
     assert found.volume.inner < section.area < found.volume.outer
 
@@ -272,7 +274,7 @@ def test_total_and_inclusive_orientation_of_a_strut(turning):
     every, some = {"every": {"C": (-pi, pi)}}, {"some": {"C": (-pi, pi)}}
     for kind, low, high in ((every, 300, 400), (some, 100, 600)):
         _, whole = around(turning, **kind)
-        (section,) = sections(field(whole.region, whole.box, turn_step=0.02))
+        (section,) = find_cross_sections(sample_field(whole.region, whole.box, turns_step=0.02))
         assert section.area == pytest.approx(pi * (high**2 - low**2), rel=2e-3)
         assert len(section.outlines) == 2
 
@@ -280,13 +282,13 @@ def test_total_and_inclusive_orientation_of_a_strut(turning):
 def test_sections_that_make_no_sense(lens):
     _, whole = around(lens)
     with pytest.raises(pk.PoseError, match="A"):
-        sections(whole, "A")
+        find_cross_sections(whole, "A")
     found, line = around(lens, at={"X": 0.0, "Y": 0.0})
     assert line.span[0] == pytest.approx([-300], abs=1)
     with pytest.raises(pk.PoseError, match="Z"):
-        sections(line)
+        find_cross_sections(line)
     with pytest.raises(pk.PoseError, match="step"):
-        sections(whole, step=-1.0)
+        find_cross_sections(whole, step=-1.0)
     assert found.axes == ("Z",)
 
 

@@ -18,7 +18,7 @@ from parakin.kernels.intervals import IntervalProgram
 from parakin.machine import Machine
 from parakin.workspaces.certified import subdivision as subdivide
 from parakin.workspaces.certified.constraints import Constraint
-from parakin.workspaces.certified.total import EveryTurn
+from parakin.workspaces.certified.total import TotalSubdivision
 from parakin.workspaces.certified.workspace import Volume
 
 
@@ -103,10 +103,10 @@ def test_what_limits_imply_holds_wherever_they_do(what, tmp_path):
         for constraint in asked.constraints:
             if constraint.implied:
                 rows = np.hstack([places, turns])
-                assert (constraint.at(rows, rows)[1][allowed, 0] >= 0.0).all()
+                assert (constraint.point_program(rows, rows)[1][allowed, 0] >= 0.0).all()
                 seen += int(allowed.sum())
                 rows[:, :3] *= 1e5 / np.linalg.norm(rows[:, :3], axis=1, keepdims=True)
-                far += (constraint.at(rows, rows)[1][:, 0] < 0.0).all()
+                far += (constraint.point_program(rows, rows)[1][:, 0] < 0.0).all()
     assert seen > 1000
     assert far or what == "carried"  # of whose machines not all have a table
 
@@ -135,10 +135,10 @@ def test_cells_lie_side_by_side_to_the_last_digit():
 def subdivide_all(low, high, times):
     """Cells of a box under a constraint that nothing is known of, all halved so often."""
     x, y = alg.Trace().inputs(2)
-    work = EveryTurn([Constraint("vague", nan, [x, y])], low, high, (np.zeros(0), np.zeros(0)))
+    work = TotalSubdivision([Constraint("vague", nan, [x, y])], low, high, (np.zeros(0), np.zeros(0)))
     for _ in range(times):
-        work.refine(np.arange(len(work.open.low)))
-    return work.cells("gap")
+        work.refine(np.arange(len(work.open_cells.low)))
+    return work.collect_cells("gap")
 
 
 def test_the_extent_holds_the_region_and_little_more():

@@ -7,8 +7,8 @@ import pytest
 
 import parakin as pk
 from parakin.errors import NoMethodError, PoseError
-from parakin.workspaces.sampled.grid import dense_grid
-from parakin.workspaces.sampled.polar import polar_sweep
+from parakin.workspaces.sampled.grid import sample_grid
+from parakin.workspaces.sampled.polar_sweep import sweep_polar
 
 # A sweep may be off by this share of a layer as thick as its step all over the boundary.
 WITHIN = 0.25
@@ -68,7 +68,7 @@ def test_a_grid_says_what_check_says(name, rng):
         asked = pk.region(machine, at)
         half = np.where(np.array(machine.axis_units) == "mm", 700.0, 0.0)
         ends = [(machine.home + s * half)[: len(asked.free_axes)] for s in (-1.0, 1.0)]
-        grid = dense_grid(asked, 11.0 if len(asked.free_axes) == 3 else 1.0, ends)
+        grid = sample_grid(asked, 11.0 if len(asked.free_axes) == 3 else 1.0, ends)
         places, broken = places_of(grid, rng, 20_000)
         assert np.array_equal(broken, machine.check(asked.poses(places)))
         assert len(np.unique(broken)) > 4
@@ -89,7 +89,7 @@ def test_with_turns_a_grid_looks_at_every_combination(name, step, asked, rng):
     machine = pk.load(name)
     question = pk.region(machine, **asked)
     ends = [machine.home[:3] - 12.0 * step, machine.home[:3] + 12.0 * step]
-    grid = dense_grid(question, step, ends, turns_step=8.0 * DEG)
+    grid = sample_grid(question, step, ends, turns_step=8.0 * DEG)
     places, broken = places_of(grid, rng, 4000)
     samples = []
     for low, high in question.swept_axes.values():
@@ -110,7 +110,9 @@ def test_with_turns_a_grid_looks_at_every_combination(name, step, asked, rng):
 def test_a_grid_finds_the_certified_volume(name, asked, step):
     machine = pk.load(name)
     agrees(
-        lambda h: dense_grid(pk.region(machine, **asked), h), pk.workspace(pk.region(machine, **asked), gap=0.004), step
+        lambda h: sample_grid(pk.region(machine, **asked), h),
+        pk.workspace(pk.region(machine, **asked), gap=0.004),
+        step,
     )
 
 
@@ -121,18 +123,18 @@ def total():
 
 def test_a_grid_finds_the_certified_total_orientation_workspace(total):
     asked = pk.region(pk.load("lambda6"), **SMALL)
-    agrees(lambda h: dense_grid(asked, h), total, 80.0)
+    agrees(lambda h: sample_grid(asked, h), total, 80.0)
 
 
 def test_what_follows_from_a_grid_is_what_follows_from_the_proof():
     machine = pk.load("tricept")
     certified = pk.workspace(pk.region(machine, **UPRIGHT), gap=0.01)
-    grid = dense_grid(pk.region(machine, **UPRIGHT), 20.0)
+    grid = sample_grid(pk.region(machine, **UPRIGHT), 20.0)
     low, high = grid.box
     assert (low + 0.5 * grid.step >= certified.box[0]).all() and (high - 0.5 * grid.step <= certified.box[1]).all()
     assert np.abs(grid.centroid - certified.centroid).max() < 2.0
-    proved = {bound.limit: bound.share for bound in certified.bounded_by}
-    shares = {bound.limit: bound.share for bound in grid.bounded_by}
+    proved = {bound.limit: bound.fraction for bound in certified.bounded_by}
+    shares = {bound.limit: bound.fraction for bound in grid.bounded_by}
     assert sum(shares.values()) == pytest.approx(1.0)
     assert all(abs(shares.get(limit, 0.0) - share) < 0.04 for limit, share in proved.items())
     assert max(proved.values()) > 0.1
@@ -145,25 +147,25 @@ def test_what_follows_from_a_grid_is_what_follows_from_the_proof():
 def test_a_box_cuts_a_part_out_of_the_same_lattice():
     asked = pk.region(pk.load("orthoglide"))
     low, high = (-103.0, 0.0, -50.0), (200.0, 52.4, 400.0)
-    whole, part = dense_grid(asked, 5.0), dense_grid(asked, 5.0, (low, high))
+    whole, part = sample_grid(asked, 5.0), sample_grid(asked, 5.0, (low, high))
     kept = [(x >= a) & (x <= b) for x, a, b in zip(whole.coordinates, low, high, strict=True)]
     within = (whole.broken == 0)[np.ix_(*kept)]
     assert (part.broken == 0).sum() == within.sum() > 1000
     assert part.coordinates[0][0] == -102.5 and part.coordinates[1][-1] == 47.5
     assert (part.box[0] >= (-105.0, 0.0, -50.0)).all() and part.box[1][1] == 50.0
     # Where the box cuts, the region goes on: nothing bounds it there.
-    assert sum(bound.share for bound in part.bounded_by) == pytest.approx(1.0)
+    assert sum(bound.fraction for bound in part.bounded_by) == pytest.approx(1.0)
     assert all(bound.middle[1] < 50.0 for bound in part.bounded_by)
 
 
 def test_a_line_and_single_cells_are_grids_too():
     machine = pk.load("orthoglide")
-    line = dense_grid(pk.region(machine, {"X": 0.0, "Y": 0.0}), 0.01)
+    line = sample_grid(pk.region(machine, {"X": 0.0, "Y": 0.0}), 0.01)
     certified = pk.workspace(pk.region(machine, {"X": 0.0, "Y": 0.0}), gap=1e-4).volume
     assert line.unit == "mm" and certified.inner - 0.02 <= line.estimate <= certified.outer + 0.02
-    thin = dense_grid(pk.region(machine), 5.0, ([0.0, 0.0, -250.0], [5.0, 5.0, 250.0]))
+    thin = sample_grid(pk.region(machine), 5.0, ([0.0, 0.0, -250.0], [5.0, 5.0, 250.0]))
     assert thin.broken.shape == (1, 1, 100)
-    flat = dense_grid(pk.region(machine), 5.0, ([-250.0, 0.0, 0.0], [250.0, 5.0, 5.0]))
+    flat = sample_grid(pk.region(machine), 5.0, ([-250.0, 0.0, 0.0], [250.0, 5.0, 5.0]))
     assert flat.broken.shape == (100, 1, 1)
     assert thin.estimate == flat.estimate > 0.0
 
@@ -171,23 +173,23 @@ def test_a_line_and_single_cells_are_grids_too():
 def test_a_sweep_can_be_run_again_from_its_parameters():
     machine = pk.load("lambda6")
     asked = pk.region(machine, some={"C": (0.2, 0.7)}, without=["gap*"])
-    grid = dense_grid(asked, 60.0, turns_step=0.1)
+    grid = sample_grid(asked, 60.0, turns_step=0.1)
     p = grid.parameters
     same = pk.region(machine, p["at"], p["every"], p["some"], without=p["without"], mode=p["mode"])
-    again = dense_grid(same, p["step"], p["box"], p["turns_step"])
+    again = sample_grid(same, p["step"], p["box"], p["turns_step"])
     assert p["method"] == "grid" and again.estimate == grid.estimate > 0.0
     assert np.array_equal(again.broken, grid.broken)
 
 
 def test_progress_comes_to_its_end():
     seen = []
-    dense_grid(pk.region(pk.load("lambda6"), every={"C": (0.4, 0.5)}), 8.0, progress=seen.append)
+    sample_grid(pk.region(pk.load("lambda6"), every={"C": (0.4, 0.5)}), 8.0, progress=seen.append)
     assert len(seen) > 1 and seen == sorted(seen) and seen[-1] == 1.0
 
 
 def test_an_empty_region_is_an_empty_grid():
     for at in ({"Z": 5000.0, "B": 0.0, "C": 0.0}, {"Z": -1650.0, "B": 3.0, "C": 0.0}):
-        grid = dense_grid(pk.region(pk.load("tricept"), at), 10.0)
+        grid = sample_grid(pk.region(pk.load("tricept"), at), 10.0)
         assert grid.empty and grid.estimate == 0.0 and grid.box is None and grid.centroid is None
         assert grid.bounded_by == ()
 
@@ -199,25 +201,25 @@ def test_an_empty_region_is_an_empty_grid():
 def test_rays_find_the_certified_area(name, asked, step):
     machine = pk.load(name)
     certified = pk.workspace(pk.region(machine, **asked), gap=0.002)
-    agrees(lambda h: polar_sweep(pk.region(machine, **asked), h, rays=720), certified, step)
+    agrees(lambda h: sweep_polar(pk.region(machine, **asked), h, rays=720), certified, step)
 
 
 def test_rays_find_the_certified_volume_of_what_is_star_shaped():
     machine = pk.load("lambda6")
     certified = pk.workspace(pk.region(machine), gap=0.004)
-    agrees(lambda h: polar_sweep(pk.region(machine), h, rays=180), certified, 80.0)
+    agrees(lambda h: sweep_polar(pk.region(machine), h, rays=180), certified, 80.0)
 
 
 def test_rays_find_the_certified_total_orientation_workspace(total):
     asked = pk.region(pk.load("lambda6"), **SMALL)
-    agrees(lambda h: polar_sweep(asked, h, rays=120), total, 80.0)
+    agrees(lambda h: sweep_polar(asked, h, rays=120), total, 80.0)
 
 
 @pytest.mark.parametrize(("name", "asked"), [("tricept", UPRIGHT), ("orthoglide", {}), ("hbg80_3d", {})])
 def test_a_ray_ends_at_the_first_place_not_allowed(name, asked, rng):
     machine = pk.load(name)
     question = pk.region(machine, **asked)
-    found = polar_sweep(question, 7.0, planes=31.0, rays=40)
+    found = sweep_polar(question, 7.0, planes=31.0, rays=40)
     assert 0.0 < np.isnan(found.radii).mean() < 1.0
     for plane, ray in zip(rng.integers(0, len(found.heights), 60), rng.integers(0, len(found.angles), 60), strict=True):
         radius = found.radii[plane, ray]
@@ -238,7 +240,7 @@ def test_a_ray_ends_at_the_first_place_not_allowed(name, asked, rng):
 
 def test_outlines_are_closed_and_of_the_planes_that_hold_the_axis():
     machine = pk.load("orthoglide")
-    found = polar_sweep(pk.region(machine), 5.0, planes=40.0, rays=36, axis=(-20.0, 10.0))
+    found = sweep_polar(pk.region(machine), 5.0, planes=40.0, rays=36, axis=(-20.0, 10.0))
     held = ~np.isnan(found.radii).any(1)
     assert len(found.outlines) == held.sum() > 2
     for line, height, radii in zip(found.outlines, found.heights[held], found.radii[held], strict=True):
@@ -253,10 +255,10 @@ def test_outlines_are_closed_and_of_the_planes_that_hold_the_axis():
 
 
 def test_a_polar_sweep_is_of_two_or_three_places():
-    flat = polar_sweep(pk.region(pk.load("hbg80_2d")), 10.0)
+    flat = sweep_polar(pk.region(pk.load("hbg80_2d")), 10.0)
     assert flat.heights is None and flat.radii.shape == (1, 72) and flat.outlines[0].shape == (73, 2)
     with pytest.raises(PoseError, match="needs a plane"):
-        polar_sweep(pk.region(pk.load("hbg80_2d"), {"X": 200.0}), 10.0)
+        sweep_polar(pk.region(pk.load("hbg80_2d"), {"X": 200.0}), 10.0)
 
 
 # The sweep of the drives.
@@ -284,13 +286,13 @@ def test_a_contour_of_the_planar_machine_is_the_circle_it_must_be():
         centre = [at, 0.0] if drive == "Xhbg" else [0.0, at]
         for piece in image.pieces:
             assert np.hypot(*(piece - centre).T) == pytest.approx(400.0, abs=1e-9)
-        there = ~np.isnan(image.places).any(-1)
+        there = ~np.isnan(image.positions).any(-1)
         # A thousandth beyond that limit nothing is allowed.
         joints = image.joints[there]
-        assert machine.inverse(image.places[there]) == pytest.approx(joints, abs=1e-6)
+        assert machine.inverse(image.positions[there]) == pytest.approx(joints, abs=1e-6)
         beyond = machine.forward(
             joints + np.where(np.array(machine.joints) == drive, -1 if end == "min" else 1, 0) * 1e-3,
-            near=image.places[there],
+            near=image.positions[there],
         )
         known = beyond.converged & np.isfinite(machine.inverse(beyond.poses)).all(1)
         assert known.any() and machine.check(beyond.poses[known]).all()
@@ -304,10 +306,10 @@ def test_the_net_of_the_shell_lies_on_spheres_and_is_the_boundary():
     assert {image.side for image in found.nets} == {"home", "other"}
     inward = 0
     for image in found.nets:
-        assert image.places.shape == (25, 25, 3)
+        assert image.positions.shape == (25, 25, 3)
         ((drive, end),) = image.strategy.stands
         index, at = machine.joints.index(drive), {"min": -750.0, "max": -350.0}[end]
-        places = image.places[~np.isnan(image.places).any(-1)]
+        places = image.positions[~np.isnan(image.positions).any(-1)]
         point = places + [-80.0, -80.0, 120.0]  # where the mean rods meet
         slider = np.zeros(3)
         slider[index] = -at if drive == "Zhbg" else at
@@ -326,8 +328,8 @@ def test_a_drive_stands_at_its_limit_though_rounding_says_otherwise():
     image = next(
         i for i in pk.sweep_drives(pk.region(machine), 8).nets if i.strategy.name == "rho_x and rho_y run, rho_z at max"
     )
-    assert np.isfinite(image.places).any()
-    assert (machine.check(image.places[np.isfinite(image.places).all(-1)]) > 0).any()
+    assert np.isfinite(image.positions).any()
+    assert (machine.check(image.positions[np.isfinite(image.positions).all(-1)]) > 0).any()
 
 
 @pytest.mark.parametrize(
@@ -345,29 +347,29 @@ def test_bad_numbers_are_refused_in_one_line():
     tricept, lambda6 = pk.region(pk.load("tricept")), pk.region(pk.load("lambda6"), every={"C": (0.4, 0.5)})
     flat = pk.load("hbg80_2d")
     for step in (0.0, -1.0, np.nan, np.inf):
-        for sweep in (dense_grid, polar_sweep):
+        for sweep in (sample_grid, sweep_polar):
             with pytest.raises(PoseError, match=r"^step: a number above 0 mm expected"):
                 sweep(tricept, step)
     with pytest.raises(PoseError, match=r"^step: 0\.1 mm makes .* cells, at most 500,000,000 go; from .* mm on$"):
-        dense_grid(tricept, 0.1)
+        sample_grid(tricept, 0.1)
     with pytest.raises(PoseError, match=r"^step: 1e-05 mm makes .* steps of a ray"):
-        polar_sweep(tricept, 1e-5, planes=100.0)
+        sweep_polar(tricept, 1e-5, planes=100.0)
     with pytest.raises(PoseError, match=r"^planes: .* planes of 72 rays"):
-        polar_sweep(tricept, 1.0, planes=1e-4)
+        sweep_polar(tricept, 1.0, planes=1e-4)
     with pytest.raises(PoseError, match=r"^planes: a number above 0 mm expected, not 0"):
-        polar_sweep(tricept, 1.0, planes=0.0)
+        sweep_polar(tricept, 1.0, planes=0.0)
     with pytest.raises(PoseError, match=r"^turns_step: a number above 0 rad expected, not -1"):
-        dense_grid(lambda6, 50.0, turns_step=-1.0)
+        sample_grid(lambda6, 50.0, turns_step=-1.0)
     with pytest.raises(PoseError, match=r"^turns_step: .* turns, at most"):
-        dense_grid(lambda6, 50.0, turns_step=1e-9)
+        sample_grid(lambda6, 50.0, turns_step=1e-9)
     with pytest.raises(PoseError, match=r"^rays: at least 3"):
-        polar_sweep(tricept, 10.0, rays=2)
+        sweep_polar(tricept, 10.0, rays=2)
     for axis in ((0.0,), (0.0, np.nan), 0.0):
         with pytest.raises(PoseError, match=r"^axis: two numbers expected, X and Y in mm"):
-            polar_sweep(tricept, 10.0, axis=axis)
+            sweep_polar(tricept, 10.0, axis=axis)
     for box in (([0.0, 0.0], [1.0, 1.0]), ([0.0] * 3, [1.0, 1.0, -1.0]), ([0.0] * 3, [1.0, 1.0, np.inf])):
         with pytest.raises(PoseError, match=r"^box: a lower and an upper corner expected, each of X Y Z in mm"):
-            dense_grid(tricept, 1.0, box)
+            sample_grid(tricept, 1.0, box)
     for cells in (0, -3, 40_000):
         with pytest.raises(PoseError, match=r"^cells: 1 to 31622 parts of each drive expected"):
             pk.sweep_drives(pk.region(flat), cells)

@@ -190,7 +190,7 @@ def test_nothing_at_all(ball, tmp_path, capsys):
 
 
 def test_interrupted_it_gives_what_it_has(ball, capsys, monkeypatch):
-    decide, calls = Subdivision._next, []
+    decide, calls = Subdivision._choose_parents, []
 
     def stopped(self, *arguments):
         calls.append(1)
@@ -198,7 +198,7 @@ def test_interrupted_it_gives_what_it_has(ball, capsys, monkeypatch):
             raise KeyboardInterrupt
         return decide(self, *arguments)
 
-    monkeypatch.setattr(Subdivision, "_next", stopped)
+    monkeypatch.setattr(Subdivision, "_choose_parents", stopped)
     said = told(capsys, ball, "--gap", "1e-6", "--time", "1e6", code=130)
     assert said["stopped"] == "interrupted"
     assert 0 < said["volume"]["inner"] < VOLUME < said["volume"]["outer"]

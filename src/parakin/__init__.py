@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from .workspaces.certified.region import Region
     from .workspaces.certified.region import make_region as region
     from .workspaces.certified.workspace import Workspace, workspace
-    from .workspaces.sampled.drives import sweep_drives
+    from .workspaces.sampled.drive_sweep import sweep_drives
 
 __version__ = "0.1.0"
 __all__ = [
@@ -97,7 +97,7 @@ _LAZY = {
     "prepare": "toolpath.job",
     "read_path": "toolpath.reading.detect",
     "region": "workspaces.certified.region:make_region",
-    "sweep_drives": "workspaces.sampled.drives",
+    "sweep_drives": "workspaces.sampled.drive_sweep",
     "workpiece": "toolpath.posting.frames",
     "workspace": "workspaces.certified.workspace",
 }

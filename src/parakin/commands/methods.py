@@ -12,7 +12,7 @@ from ..errors import InputError
 if TYPE_CHECKING:
     from ..workspaces.certified.region import Region
     from ..workspaces.certified.workspace import Workspace
-    from ..workspaces.sampled.sampling import Swept
+    from ..workspaces.sampled.sampling import SampledWorkspace
 
 Method = Literal["certified", "grid", "polar", "drives"]
 
@@ -32,7 +32,9 @@ class Effort:
     step: float | None
 
 
-def found_by(method: Method, asked: Region, effort: Effort, progress: Callable[[float], None]) -> Workspace | Swept:
+def found_by(
+    method: Method, asked: Region, effort: Effort, progress: Callable[[float], None]
+) -> Workspace | SampledWorkspace:
     """The workspace; options that the method does not take are refused."""
     if method == "certified":
         return _certified(asked, effort, progress)
@@ -53,21 +55,21 @@ def _certified(asked: Region, effort: Effort, progress: Callable[[float], None])
     return workspace(asked, gap, effort.cell, seconds, progress)
 
 
-def _swept(method: Method, asked: Region, step: float | None, progress: Callable[[float], None]) -> Swept:
-    from ..workspaces.sampled.grid import dense_grid
-    from ..workspaces.sampled.polar import polar_sweep
-    from ..workspaces.sampled.sampling import surroundings
+def _swept(method: Method, asked: Region, step: float | None, progress: Callable[[float], None]) -> SampledWorkspace:
+    from ..workspaces.sampled.grid import sample_grid
+    from ..workspaces.sampled.polar_sweep import sweep_polar
+    from ..workspaces.sampled.sampling import find_bounding_box
 
-    box = surroundings(asked)
+    box = find_bounding_box(asked)
     edge = 1.0 if box is None else float((box[1] - box[0]).max())
     size = edge / _STEPS[method].get(len(asked.free_axes), 1) if step is None else step
     if method == "grid":
-        return dense_grid(asked, size, progress=progress)
-    return polar_sweep(asked, size, planes=max(size, edge / _PLANES), progress=progress)
+        return sample_grid(asked, size, progress=progress)
+    return sweep_polar(asked, size, planes=max(size, edge / _PLANES), progress=progress)
 
 
-def _drives(asked: Region, step: float | None, progress: Callable[[float], None]) -> Swept:
-    from ..workspaces.sampled.drives import sweep_drives
+def _drives(asked: Region, step: float | None, progress: Callable[[float], None]) -> SampledWorkspace:
+    from ..workspaces.sampled.drive_sweep import sweep_drives
 
     machine = asked.machine
     if asked.kind != "constant" or asked.without or any(axis in asked.fixed_axes for axis in "XYZ"):

@@ -12,8 +12,8 @@ from .regions import values_of
 
 if TYPE_CHECKING:
     from ..workspaces.certified.region import Region
-    from ..workspaces.connected.connected import Parts
-    from ..workspaces.inscribed.largest_box import Box
+    from ..workspaces.connected.components import Components
+    from ..workspaces.inscribed.largest_box import InscribedBox
 
 
 @dataclass(frozen=True)
@@ -31,25 +31,25 @@ class Within:
 class Found:
     """What was found; None for what was not asked."""
 
-    box: Box | None = None
-    parts: Parts | None = None
+    box: InscribedBox | None = None
+    parts: Components | None = None
 
 
 def looked_within(asked: Region, wanted: Within) -> Found:
     """The box and the parts that are wanted."""
     box, parts = None, None
     if wanted.box or wanted.shape is not None or wanted.around is not None:
-        from ..workspaces.inscribed.largest_box import largest_box
+        from ..workspaces.inscribed.largest_box import find_largest_box
 
         shape = None if wanted.shape is None else _shape(wanted.shape)
         around = None if wanted.around is None else _place(asked, wanted.around)
         try:
-            box = largest_box(asked, shape, around)
+            box = find_largest_box(asked, shape, around)
         except PoseError as error:
             source = "--around" if around is not None else "--shape" if shape is not None else "--box"
             raise InputError(_plain(error), source) from None
     if wanted.parts or wanted.start is not None:
-        from ..workspaces.connected.connected import connected_parts
+        from ..workspaces.connected.components import find_components
 
         start = None
         if wanted.start is not None:
@@ -57,7 +57,7 @@ def looked_within(asked: Region, wanted: Within) -> Found:
             home = zip(asked.machine.axes, asked.machine.home.tolist(), strict=True)
             start = list(({**dict(home), **asked.fixed_axes, **given}).values())
         try:
-            parts = connected_parts(asked, start)
+            parts = find_components(asked, start)
         except PoseError as error:
             raise InputError(_plain(error), "--parts" if start is None else "--start") from None
     return Found(box, parts)
@@ -119,11 +119,11 @@ def within_told(found: Found) -> Mapping[str, Any]:
                         "estimate": part.volume.estimate,
                         "outer": part.volume.outer,
                     },
-                    "place": part.place.tolist(),
+                    "place": part.position.tolist(),
                     "box": {"low": part.low.tolist(), "high": part.high.tolist()},
                     "apart": part.apart,
                 }
-                for part in parts.parts
+                for part in parts.components
             ],
         }
     return told
@@ -147,7 +147,7 @@ def within_summary(found: Found) -> str:
         parts = found.parts
         d = len(parts.region.free_axes)
         lines += ["", f"parts that a path can't leave  {len(parts)}, at least {parts.at_least} proved to be different"]
-        for number, part in enumerate(parts.parts):
+        for number, part in enumerate(parts.components):
             sign = "as at home" if part.sign > 0 else "the other assembly"
             here = ", holds the start" if number == parts.start else ""
             size = amount(part.volume.estimate, d)

@@ -9,7 +9,7 @@ from .console import fixed, table
 
 if TYPE_CHECKING:
     from ..workspaces.certified.workspace import Workspace
-    from ..workspaces.sampled.sampling import Swept
+    from ..workspaces.sampled.sampling import SampledWorkspace
 
 _STOPPED = {
     "gap": "as asked for",
@@ -21,7 +21,7 @@ _STOPPED = {
 }
 
 
-def summary(found: Workspace | Swept, seconds: float) -> str:
+def summary(found: Workspace | SampledWorkspace, seconds: float) -> str:
     """The account for people."""
     from ..export.workspace.summary import heading
     from ..workspaces.certified.workspace import Workspace
@@ -41,7 +41,9 @@ def summary(found: Workspace | Swept, seconds: float) -> str:
             ]
         if found.centroid is not None:
             rows.append(("centroid", _place(found.axes, found.centroid.tolist())))
-        bounds = [(bound.limit, f"{bound.share:.1%}", _place(found.axes, bound.middle)) for bound in found.bounded_by]
+        bounds = [
+            (bound.limit, f"{bound.fraction:.1%}", _place(found.axes, bound.middle)) for bound in found.bounded_by
+        ]
     rows.append(("time", f"{seconds:.1f} s"))
     lines = [head, "", *(f"{name:<8}  {text}" for name, text in rows)]
     if bounds:
@@ -62,7 +64,7 @@ def _proved(found: Workspace) -> list[tuple[str, str]]:
     ]
 
 
-def _estimated(found: Swept) -> list[tuple[str, str]]:
+def _estimated(found: SampledWorkspace) -> list[tuple[str, str]]:
     from ..export.workspace.summary import amount, note
 
     d = len(found.axes)

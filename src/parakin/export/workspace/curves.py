@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ...workspaces.sampled.drives import DriveWorkspace, Image
-from ...workspaces.sampled.polar import PolarWorkspace
+from ...workspaces.sampled.drive_sweep import DriveImage, DriveWorkspace
+from ...workspaces.sampled.polar_sweep import PolarWorkspace
 
 Floats = NDArray[np.float64]
 
@@ -44,8 +44,8 @@ def _meridians(found: PolarWorkspace) -> list[Floats]:
     return [piece for line in np.concatenate([ends, heights], 2).swapaxes(0, 1) for piece in _pieces(line)]
 
 
-def _meshes(image: Image) -> list[Floats]:
-    places = image.places
+def _meshes(image: DriveImage) -> list[Floats]:
+    places = image.positions
     found = []
     for sheet in (places, places.swapaxes(0, 1)):
         for index in np.unique(np.linspace(0, len(sheet) - 1, _MESHES + 1).round().astype(int)).tolist():

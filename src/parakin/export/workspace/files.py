@@ -11,11 +11,11 @@ import numpy as np
 from ...arrays import Array
 from ...errors import PoseError
 from ...workspaces.certified.workspace import Workspace
-from ...workspaces.sampled.drives import DriveWorkspace
-from ...workspaces.sampled.field import Field, field
-from ...workspaces.sampled.polar import PolarWorkspace
-from ...workspaces.sampled.sampling import Swept, surroundings
-from ...workspaces.sampled.slices import Section, sections
+from ...workspaces.sampled.cross_sections import CrossSection, find_cross_sections
+from ...workspaces.sampled.distance_field import SampledField, sample_field
+from ...workspaces.sampled.drive_sweep import DriveWorkspace
+from ...workspaces.sampled.polar_sweep import PolarWorkspace
+from ...workspaces.sampled.sampling import SampledWorkspace, find_bounding_box
 from .cells import cells_csv, cells_vtu
 from .curves import curves
 from .meshes import Shell, mesh_file, shell
@@ -40,16 +40,16 @@ def unfit(suffix: str, method: str, dimension: int) -> str | None:
 class Drawing:
     """A workspace with its field (None if it is empty) and its cross-sections, from which its files are made."""
 
-    found: Workspace | Swept
-    whole: Field | None
-    slices: tuple[Section, ...]
+    found: Workspace | SampledWorkspace
+    whole: SampledField | None
+    slices: tuple[CrossSection, ...]
 
     @cached_property
     def shell(self) -> Shell:
         return shell(self._whole)
 
     @property
-    def _whole(self) -> Field:
+    def _whole(self) -> SampledField:
         if self.whole is None:
             raise PoseError("the workspace is empty")
         if not len(self.whole.inside):
@@ -72,26 +72,26 @@ class Drawing:
         return plane_png(self.found, self._whole, self.slices)
 
 
-def drawing(found: Workspace | Swept, step: float | None, progress: Callable[[float], None]) -> Drawing:
-    """The field and the cross-sections of a workspace; ``step`` as for ``field``."""
+def drawing(found: Workspace | SampledWorkspace, step: float | None, progress: Callable[[float], None]) -> Drawing:
+    """The field and the cross-sections of a workspace; ``step`` as for ``sample_field``."""
     box = _box(found)
     if box is None:
         return Drawing(found, None, ())
     space = len(found.axes) == 3
-    whole = field(found.region, box, step, progress=lambda done: progress(0.5 * done if space else done))
-    slices: tuple[Section, ...] = ()
+    whole = sample_field(found.region, box, step, progress=lambda done: progress(0.5 * done if space else done))
+    slices: tuple[CrossSection, ...] = ()
     if len(found.axes) > 1:
-        slices = sections(whole, step=step, progress=lambda done: progress(0.5 + 0.5 * done))
+        slices = find_cross_sections(whole, step=step, progress=lambda done: progress(0.5 + 0.5 * done))
     return Drawing(found, whole, slices)
 
 
-def _box(found: Workspace | Swept) -> tuple[Array, Array] | None:
+def _box(found: Workspace | SampledWorkspace) -> tuple[Array, Array] | None:
     """A box proved to hold the region; None if it is empty."""
-    if isinstance(found, Swept):
-        return surroundings(found.region)
+    if isinstance(found, SampledWorkspace):
+        return find_bounding_box(found.region)
     if found.box is None or found.stopped != "gap" or not found.region.every_orientation:
         return found.box  # nothing more that takes long
-    box = surroundings(found.region)
+    box = find_bounding_box(found.region)
     if box is None:
         return None
     low, high = np.maximum(box[0], found.box[0]), np.minimum(box[1], found.box[1])

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import PoseError
-from ...workspaces.sampled.field import Field
+from ...workspaces.sampled.distance_field import SampledField
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,7 +29,7 @@ class Shell:
         return float((np.cross(a, b) * c).sum() / 6.0)
 
 
-def shell(field: Field) -> Shell:
+def shell(field: SampledField) -> Shell:
     """Where a field in space is 0, by marching cubes.
 
     Raises :class:`PoseError` for a field that is not in space.
@@ -39,7 +39,7 @@ def shell(field: Field) -> Shell:
     if field.values.ndim != 3:
         raise PoseError("a mesh needs a volume, this workspace is flat")
     vertices, faces, _, _ = marching_cubes(field.values, 0.0, gradient_direction="ascent")
-    return Shell(field.crossings(vertices.astype(np.float64)), faces.astype(np.int64))
+    return Shell(field.refine_crossings(vertices.astype(np.float64)), faces.astype(np.int64))
 
 
 def mesh_file(shape: Shell, kind: str) -> bytes:

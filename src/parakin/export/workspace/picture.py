@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...workspaces.certified.workspace import Workspace
-from ...workspaces.sampled.field import Field
-from ...workspaces.sampled.sampling import Swept
+from ...workspaces.sampled.distance_field import SampledField
+from ...workspaces.sampled.sampling import SampledWorkspace
 from ..machine.figures import FAINT, INK
 from .curves import Curves
 from .meshes import Shell
@@ -21,7 +21,7 @@ from .summary import amount, heading, size
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from ...workspaces.sampled.slices import Section
+    from ...workspaces.sampled.cross_sections import CrossSection
 
 Floats = NDArray[np.float64]
 
@@ -33,24 +33,26 @@ _WIDE = 96  # letters of a heading's line
 _PIXELS = 2  # along a step of a planar field
 
 
-def space_png(found: Workspace | Swept, shape: Shell, slices: Sequence[Section]) -> bytes:
+def space_png(found: Workspace | SampledWorkspace, shape: Shell, slices: Sequence[CrossSection]) -> bytes:
     """A PNG of a workspace in space: its shaded shell, coloured by height, and beside it its cross-sections."""
     return _png(found, (12.0, 6.6), lambda figure: _space(figure, found, shape, slices))
 
 
-def plane_png(found: Workspace | Swept, whole: Field, slices: Sequence[Section]) -> bytes:
+def plane_png(found: Workspace | SampledWorkspace, whole: SampledField, slices: Sequence[CrossSection]) -> bytes:
     """A PNG of a workspace in a plane: its area, a colour for each limit where that is nearest."""
     return _png(found, (9.6, 7.2), lambda figure: _plane(figure, found, whole, slices))
 
 
-def curves_png(found: Swept, whole: Field, groups: Sequence[Curves], slices: Sequence[Section]) -> bytes:
+def curves_png(
+    found: SampledWorkspace, whole: SampledField, groups: Sequence[Curves], slices: Sequence[CrossSection]
+) -> bytes:
     """A PNG of what a sweep found as curves; of a workspace in space with its cross-sections beside them."""
     if len(found.axes) == 3:
         return _png(found, (12.0, 6.6), lambda figure: _net(figure, found, whole, groups, slices))
     return _png(found, (9.6, 7.2), lambda figure: _flat_net(figure, found, groups))
 
 
-def _png(found: Workspace | Swept, inches: tuple[float, float], draw: Callable[[Figure], None]) -> bytes:
+def _png(found: Workspace | SampledWorkspace, inches: tuple[float, float], draw: Callable[[Figure], None]) -> bytes:
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
@@ -63,7 +65,7 @@ def _png(found: Workspace | Swept, inches: tuple[float, float], draw: Callable[[
     return data.getvalue()
 
 
-def _title(figure: Figure, found: Workspace | Swept) -> None:
+def _title(figure: Figure, found: Workspace | SampledWorkspace) -> None:
     name = found.machine.spec.title or found.machine.name
     figure.text(0.025, 0.945, name, color=INK, fontsize=15, weight="bold", parse_math=False)
     what = f"{fill(heading(found), _WIDE)}\n{size(found)}"
@@ -73,7 +75,7 @@ def _title(figure: Figure, found: Workspace | Swept) -> None:
 # In space.
 
 
-def _space(figure: Figure, found: Workspace | Swept, shape: Shell, slices: Sequence[Section]) -> None:
+def _space(figure: Figure, found: Workspace | SampledWorkspace, shape: Shell, slices: Sequence[CrossSection]) -> None:
     from matplotlib import colormaps
     from matplotlib.colors import Normalize
     from mpl_toolkits import mplot3d  # noqa: F401  it brings the projection
@@ -124,7 +126,7 @@ def _faces(axes: Any, shape: Shell, colours: Floats) -> None:
     axes.add_collection3d(Poly3DCollection(corners[front], facecolors=lit, edgecolors=lit, linewidths=0.4))
 
 
-def _sections(figure: Figure, slices: Sequence[Section], colour: Any) -> None:
+def _sections(figure: Figure, slices: Sequence[CrossSection], colour: Any) -> None:
     axes: Any = figure.add_axes((0.645, 0.12, 0.325, 0.60))
     for section in slices:
         label = f"{section.axis} = {section.value:,.1f} mm   {amount(section.area, 2)}"
@@ -132,7 +134,7 @@ def _sections(figure: Figure, slices: Sequence[Section], colour: Any) -> None:
             axes.plot(*outline.T, color=colour(section.value), linewidth=1.6, label="" if number else label)
         if not section.outlines:
             axes.plot([], [], color=colour(section.value), linewidth=1.6, label=label)
-    _flat(axes, slices[0].places)
+    _flat(axes, slices[0].plane)
     axes.legend(
         loc="lower left", bbox_to_anchor=(-0.02, 1.02), **_LEGEND, title="cross-sections"
     ).get_title().set_color(INK)
@@ -152,7 +154,9 @@ def _flat(axes: Any, names: Sequence[str]) -> None:
 # In a plane.
 
 
-def _plane(figure: Figure, found: Workspace | Swept, whole: Field, slices: Sequence[Section]) -> None:
+def _plane(
+    figure: Figure, found: Workspace | SampledWorkspace, whole: SampledField, slices: Sequence[CrossSection]
+) -> None:
     from matplotlib import colormaps
     from matplotlib.patches import Patch, PathPatch
     from matplotlib.path import Path
@@ -162,7 +166,7 @@ def _plane(figure: Figure, found: Workspace | Swept, whole: Field, slices: Seque
     step = whole.step / _PIXELS
     near = np.repeat(np.repeat(whole.values > -whole.step.min(), _PIXELS, 0), _PIXELS, 1)
     low = whole.low - 0.5 * whole.step
-    nearest = whole.distance.nearest(low + (np.argwhere(near) + 0.5) * step)
+    nearest = whole.distance.find_nearest_limits(low + (np.argwhere(near) + 0.5) * step)
     limit = np.full(tuple(fine), -1)
     limit[near] = nearest
     count = np.bincount(nearest, minlength=len(found.region.limits))
@@ -188,7 +192,13 @@ def _plane(figure: Figure, found: Workspace | Swept, whole: Field, slices: Seque
 # Curves of a sweep.
 
 
-def _net(figure: Figure, found: Swept, whole: Field, groups: Sequence[Curves], slices: Sequence[Section]) -> None:
+def _net(
+    figure: Figure,
+    found: SampledWorkspace,
+    whole: SampledField,
+    groups: Sequence[Curves],
+    slices: Sequence[CrossSection],
+) -> None:
     from matplotlib import colormaps
     from matplotlib.colors import Normalize
     from mpl_toolkits import mplot3d  # noqa: F401  it brings the projection
@@ -209,7 +219,7 @@ def _net(figure: Figure, found: Swept, whole: Field, groups: Sequence[Curves], s
         _sections(figure, slices, lambda value: colours(0.12 + 0.8 * scale(value)))
 
 
-def _flat_net(figure: Figure, found: Swept, groups: Sequence[Curves]) -> None:
+def _flat_net(figure: Figure, found: SampledWorkspace, groups: Sequence[Curves]) -> None:
     from matplotlib import colormaps
 
     palette: Any = colormaps["tab10"]

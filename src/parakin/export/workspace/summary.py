@@ -11,15 +11,15 @@ import numpy as np
 from ...arrays import Array
 from ...workspaces.certified.region import Region
 from ...workspaces.certified.workspace import Volume, Workspace
-from ...workspaces.sampled.drives import DriveWorkspace
+from ...workspaces.sampled.drive_sweep import DriveWorkspace
 from ...workspaces.sampled.grid import GridWorkspace
-from ...workspaces.sampled.polar import PolarWorkspace
-from ...workspaces.sampled.sampling import Swept
+from ...workspaces.sampled.polar_sweep import PolarWorkspace
+from ...workspaces.sampled.sampling import SampledWorkspace
 from ..ranges import edge
 from .curves import curves
 
 if TYPE_CHECKING:
-    from ...workspaces.sampled.slices import Section
+    from ...workspaces.sampled.cross_sections import CrossSection
 
 KINDS = {
     "constant": "constant orientation",
@@ -39,21 +39,21 @@ _UNITS = {
 # For people.
 
 
-def heading(found: Workspace | Swept) -> str:
+def heading(found: Workspace | SampledWorkspace) -> str:
     """``tricept: workspace, constant orientation, B = 0°, C = 0°``."""
-    method = METHODS[found.method] if isinstance(found, Swept) else ""
+    method = METHODS[found.method] if isinstance(found, SampledWorkspace) else ""
     return f"{found.machine.name}: workspace{method}, {asked(found.region)}"
 
 
-def size(found: Workspace | Swept) -> str:
+def size(found: Workspace | SampledWorkspace) -> str:
     """``19.9 litres, proved between 19.84 and 19.97 litres``."""
     d = len(found.axes)
-    if isinstance(found, Swept):
+    if isinstance(found, SampledWorkspace):
         return f"{amount(found.estimate, d)}, an estimate"
     return f"{amount(found.volume.estimate, d)}, proved between {between(found.volume, d)}"
 
 
-def note(found: Swept) -> str:
+def note(found: SampledWorkspace) -> str:
     """What a method does not see; empty if it sees all."""
     return found.note if isinstance(found, PolarWorkspace | DriveWorkspace) else ""
 
@@ -101,7 +101,7 @@ def _unit(value: float, dimension: int) -> tuple[str, float]:
 # For programs.
 
 
-def account(found: Workspace | Swept, slices: Sequence[Section]) -> dict[str, Any]:
+def account(found: Workspace | SampledWorkspace, slices: Sequence[CrossSection]) -> dict[str, Any]:
     """The whole result but for the cells; mm and degrees, null for what a method does not tell."""
     return {
         "schema": "parakin.workspace/1",
@@ -109,7 +109,7 @@ def account(found: Workspace | Swept, slices: Sequence[Section]) -> dict[str, An
         "kind": found.region.kind,
         "axes": list(found.axes),
         "unit": found.unit,
-        **(_estimated(found) if isinstance(found, Swept) else _proved(found)),
+        **(_estimated(found) if isinstance(found, SampledWorkspace) else _proved(found)),
         "slices": [
             {
                 "axis": section.axis,
@@ -136,7 +136,7 @@ def _proved(found: Workspace) -> dict[str, Any]:
     }
 
 
-def _estimated(found: Swept) -> dict[str, Any]:
+def _estimated(found: SampledWorkspace) -> dict[str, Any]:
     """As of the certified one; ``empty`` is null where nothing was found, for nothing is proved."""
     content: dict[str, Any] = {
         "volume": {"inner": None, "estimate": found.estimate, "outer": None},
@@ -162,7 +162,7 @@ def _shape(found: Workspace | GridWorkspace) -> dict[str, Any]:
         "box": None if found.box is None else {"low": found.box[0].tolist(), "high": found.box[1].tolist()},
         "centroid": None if found.centroid is None else found.centroid.tolist(),
         "bounded_by": [
-            {"limit": bound.limit, "share": bound.share, "middle": list(bound.middle)} for bound in found.bounded_by
+            {"limit": bound.limit, "share": bound.fraction, "middle": list(bound.middle)} for bound in found.bounded_by
         ],
     }
 
@@ -171,7 +171,7 @@ def _rounded(points: Array) -> Any:
     return (np.round(points, 2) + 0.0).tolist()
 
 
-def _at_the_rim(found: Workspace | Swept) -> dict[str, Any]:
+def _at_the_rim(found: Workspace | SampledWorkspace) -> dict[str, Any]:
     """The parameters, angles in degrees."""
     turning = {axis for axis, unit in zip(found.machine.axes, found.machine.axis_units, strict=True) if unit == "rad"}
     parameters = dict(found.parameters)

@@ -1,4 +1,4 @@
-"""What must be ≥ 0 for a pose to be allowed, as functions of the place x and of the turns θ that are swept."""
+"""Constraints: what must be ≥ 0 for a pose to be allowed, as functions of position x and of the swept orientation θ."""
 
 from __future__ import annotations
 
@@ -14,27 +14,29 @@ from ...kernels.intervals import IntervalProgram
 from ...machine import Machine
 from ...model.parts import ROTATIONS
 
-_ROUNDING = 1e-12  # relative, of what limits are found to imply
+_ROUNDING = 1e-12  # relative, of bounds that limits imply
 
 
 @dataclass(frozen=True, eq=False)
 class Constraint:
-    """One margin, ≥ 0 where it holds, of ``places`` x and ``turns`` θ.
+    """One margin, ≥ 0 where it is kept, of a position x and an orientation θ.
 
-    Two programs bound it over boxes of x, then θ, by Taylor's formula about the middle: ``at`` gives the margin and, of
-    a smooth one, its gradient by x; ``over`` gives the margin, the guard, the gradient by θ and the second derivatives
-    by x (d(d + 1)/2 of them), or of one with corners the gradient by x instead.
+    Two programs bound it over boxes of x, then θ, by Taylor's formula about the middle. ``point_program`` gives the
+    margin and, of a smooth one, its gradient by x. ``box_program`` gives the margin, the guard, the gradient by θ and
+    the second derivatives by x (d(d + 1)/2 of them), or of one with corners the gradient by x instead.
+
+    implied : it follows from others, and serves only to prove that they can't hold
     """
 
     name: str
     margin: Scalar
-    places: Sequence[Term]
-    turns: Sequence[Term] = ()
-    implied: bool = False  # by others, and of use only to show that they can't hold
+    position: Sequence[Term]
+    orientation: Sequence[Term] = ()
+    implied: bool = False
 
     @cached_property
     def _trace(self) -> Trace:
-        return self.places[0].trace
+        return self.position[0].trace
 
     @cached_property
     def _nodes(self) -> list[Term]:
@@ -42,14 +44,17 @@ class Constraint:
         return [self._trace.nodes[i] for i in find_dependencies([margin])] if isinstance(margin, Term) else []
 
     @cached_property
-    def smooth(self) -> bool:
-        """No corners: Taylor's formula holds to the second order. What is held moves, so it has a first order only."""
+    def is_smooth(self) -> bool:
+        """Whether the margin has no corners, so that Taylor's formula holds to the second order.
+
+        A term with a stopped gradient has only a first order, for it moves all the same.
+        """
         corners = (alg.MIN, alg.MAX, alg.ABS, alg.COPYSIGN, alg.SELECT, alg.STOP_GRADIENT)
         return not any(node.op in corners for node in self._nodes)
 
     @cached_property
     def guard(self) -> Scalar:
-        """> 0 where no angle jumps by a turn, so that derivatives tell how the margin changes."""
+        """A term > 0 where no angle jumps by a turn, so that derivatives bound how the margin changes."""
         guard: Scalar = 1.0
         for node in self._nodes:
             if node.op == alg.ATAN2:
@@ -58,62 +63,63 @@ class Constraint:
         return guard
 
     @cached_property
-    def at(self) -> IntervalProgram:
-        gradient = [derivative(self.margin, x) for x in self.places] if self.smooth else []
+    def point_program(self) -> IntervalProgram:
+        gradient = [derivative(self.margin, x) for x in self.position] if self.is_smooth else []
         return IntervalProgram(self._trace, [self.margin, *gradient])
 
     @cached_property
-    def over(self) -> IntervalProgram:
-        first = [derivative(self.margin, x) for x in self.places]
-        if self.smooth:
-            first = [derivative(g, y) for i, g in enumerate(first) for y in self.places[i:]]
-        by_turns = [derivative(self.margin, x) for x in self.turns]
-        return IntervalProgram(self._trace, [self.margin, self.guard, *by_turns, *first])
+    def box_program(self) -> IntervalProgram:
+        by_position = [derivative(self.margin, x) for x in self.position]
+        if self.is_smooth:
+            by_position = [derivative(g, y) for i, g in enumerate(by_position) for y in self.position[i:]]
+        by_orientation = [derivative(self.margin, x) for x in self.orientation]
+        return IntervalProgram(self._trace, [self.margin, self.guard, *by_orientation, *by_position])
 
 
 @dataclass(frozen=True, eq=False)
-class Slice:
-    """Poses of a machine in which some axes are places or turns that vary, and the others are held."""
+class TracedPose:
+    """A machine's pose as terms: free and swept axes are inputs of a trace, fixed axes are numbers."""
 
     machine: Machine
-    places: tuple[str, ...]
-    turns: tuple[str, ...]
-    held: Mapping[str, float]
+    free_axes: tuple[str, ...]
+    swept_axes: tuple[str, ...]
+    fixed_axes: Mapping[str, float]
     mode: str
 
     @cached_property
     def inputs(self) -> list[Term]:
-        return Trace().inputs(len(self.places) + len(self.turns))
+        """A term for each free axis, then for each swept one."""
+        return Trace().inputs(len(self.free_axes) + len(self.swept_axes))
 
     @cached_property
     def pose(self) -> list[Scalar]:
-        """The whole pose: terms for what varies, numbers for what is held, so that the trace folds them away."""
-        free = dict(zip((*self.places, *self.turns), self.inputs, strict=True))
-        return [free[axis] if axis in free else np.float64(self.held[axis]) for axis in self.machine.axes]
+        """The whole pose; the trace folds away what depends on fixed axes alone."""
+        varied = dict(zip((*self.free_axes, *self.swept_axes), self.inputs, strict=True))
+        return [varied[axis] if axis in varied else np.float64(self.fixed_axes[axis]) for axis in self.machine.axes]
 
-    def constraints(self, without: Sequence[str] = ()) -> list[Constraint]:
-        """The machine's limits, but for those named in ``without``."""
-        with np.errstate(all="ignore"):  # what a pose held out of reach makes of numbers is a margin that is broken
-            margins = self.machine.model.own_margins(self.pose, self.mode)
-        d = len(self.places)
-        x, turns = self.inputs[:d], self.inputs[d:]
-        kept = [(limit.name, g) for limit, g in margins if limit.name not in without]
-        found = [Constraint(name, g, x, turns) for name, g in kept]
-        implied = [*_across_the_jump(kept), *self._about_the_feet(without)]
-        return found + [Constraint(name, g, x, turns, implied=True) for name, g in implied]
+    def build_constraints(self, without: Sequence[str] = ()) -> list[Constraint]:
+        """Build the constraints of the machine's limits, but for those named in ``without``."""
+        with np.errstate(all="ignore"):  # fixed axes out of reach give numbers that are not finite, a broken margin
+            margins = self.machine.trace_margins(self.pose, self.mode)
+        d = len(self.free_axes)
+        x, orientation = self.inputs[:d], self.inputs[d:]
+        kept = [(name, g) for name, g in zip(self.machine.limits, margins, strict=True) if name not in without]
+        constraints = [Constraint(name, g, x, orientation) for name, g in kept]
+        implied = [*_bound_angle_sizes(kept), *self._bound_reach(without)]
+        return constraints + [Constraint(name, g, x, orientation, implied=True) for name, g in implied]
 
-    def _about_the_feet(self, without: Sequence[str]) -> list[tuple[str, Scalar]]:
-        """How near the legs hold the platform's origin, however it is turned.
+    def _bound_reach(self, without: Sequence[str]) -> list[tuple[str, Scalar]]:
+        """Bound how far the platform's origin may be from each leg, whatever the orientation.
 
-        With a central leg the rotation follows from the place, and near the axis of its first turn nothing is known of
-        it: there this still tells how far the machine can reach.
+        With a central leg the rotation follows from the position, and near the axis of its first turn the rotation has
+        no bounds: there this still bounds the machine's reach.
         """
         spec = self.machine.spec
         if spec.motion[0] not in ROTATIONS:
             return []
         with np.errstate(all="ignore"):
-            _, placed, _ = self.machine.model.invert(self.pose, self.mode)
-        found = []
+            _, platform, _ = self.machine.trace_inverse(self.pose, self.mode)
+        margins = []
         for leg in spec.legs:
             low = [-np.inf if f"{drive.name}.min" in without else drive.low for drive in leg.drives]
             high = [np.inf if f"{drive.name}.max" in without else drive.high for drive in leg.drives]
@@ -128,19 +134,19 @@ class Slice:
             if np.isfinite(down[:3]).all() and np.isfinite(up).all():
                 middle, half = 0.5 * (down + up)[:3], 0.5 * (up - down)[:3]
                 most = (up[3] + np.linalg.norm(half) + np.linalg.norm(leg.platform)) * (1.0 + _ROUNDING)
-                found.append((leg.drives[0].name, most - norm(sub(placed.origin, middle.tolist()))))
-        return found
+                margins.append((leg.drives[0].name, most - norm(sub(platform.origin, middle.tolist()))))
+        return margins
 
 
-def _across_the_jump(margins: Sequence[tuple[str, Scalar]]) -> list[tuple[str, Scalar]]:
-    """What limits on both sides of an angle say of its size, which does not jump at ±180° as the angle does."""
-    found: dict[int, dict[bool, tuple[float, Term, str]]] = {}
+def _bound_angle_sizes(margins: Sequence[tuple[str, Scalar]]) -> list[tuple[str, Scalar]]:
+    """Derive margins of an angle's size from limits on both sides of it: a size does not jump at ±180°."""
+    bounds: dict[int, dict[bool, tuple[float, Term, str]]] = {}
     for name, g in margins:
         if isinstance(g, Term) and g.op == alg.LIN and len(g.args) == 1 and g.args[0].op == alg.ATAN2:
             angle = g.args[0]
-            found.setdefault(angle.index, {})[g.k[1] < 0.0] = abs(g.k[0] / g.k[1]), angle, name
+            bounds.setdefault(angle.index, {})[g.k[1] < 0.0] = abs(g.k[0] / g.k[1]), angle, name
     sizes = []
-    for sides in found.values():
+    for sides in bounds.values():
         most = max(bound for bound, _, _ in sides.values())
         _, angle, name = next(iter(sides.values()))
         if len(sides) == 2 and most < np.pi:

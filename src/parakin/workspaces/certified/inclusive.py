@@ -1,133 +1,162 @@
-"""Places where all constraints hold for at least one turn θ of a box."""
+"""The inclusive orientation workspace: positions where all constraints hold at one orientation θ of a box at least."""
 
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .plane_cuts import CLEARED, EXCLUDED, KEPT, narrowest, surpassed, united
-from .subdivision import Array, Cells, Cuts, Indices, Items, Shares, Subdivision, both, bounds, halved
+from ...arrays import Array, Flags, Indices
+from .plane_cuts import (
+    CLEARED,
+    EXCLUDED,
+    KEPT,
+    CellFractions,
+    PlaneCuts,
+    bound_unions,
+    find_redundant_leaves,
+    keep_tightest_planes,
+)
+from .subdivision import Cells, OrientationBoxes, Subdivision, add_cuts, bisect_boxes, bound_margin, concatenate_boxes
 
-LOOKS = 4  # at narrowed turns, a round
-MOST = 128  # boxes of turns that a cell may have
-_OPEN = 0.25  # how much more than the place the turns may leave open before they are halved
+LOOKS = 4  # at narrowed orientations, a round
+MOST = 128  # boxes of orientations that a cell may have
+_SPREAD = 0.25  # of the margins' change with position: boxes that change them more with orientation are bisected
 
 
-class SomeTurn(Subdivision):
-    """Each cell keeps the boxes of turns, its leaves, that may hold one, with the constraints not yet shown there."""
+class LeafBounds(NamedTuple):
+    """What is proved of N leaves: boxes of orientations of a cell, in which one may be allowed.
 
-    def _first(self, cell: Indices, low: Array, high: Array) -> list[Items]:
-        return [Items(cell, low, high, np.ones((len(cell), len(self.constraints)), np.bool_))]
+    fractions : what each leaf holds of its cell
+    planes : (N, d + 1) the linear bound that leaves least of the cell: slopes of length 1, then the height
+    proved_height : (N,) if one limit alone is open, the height of the plane above which the leaf is proved to hold
+    best_at : (N, s) -1 or 1 where all constraints are best at the lower or upper end of an angle, else 0
+    spread : (N, s) how far the margins change with each angle, as a fraction of their change with position
+    """
 
-    def _examined(self, low: Array, size: Array, left: list[Items]) -> tuple[Cells, list[Items]]:
-        (leaves,) = left
-        done: list[tuple[Items, Shares, Array]] = []
+    fractions: CellFractions
+    planes: Array
+    proved_height: Array
+    best_at: NDArray[np.int8]
+    spread: Array
+
+
+class InclusiveSubdivision(Subdivision):
+    """The subdivision in which each cell keeps its leaves, with the constraints not yet proved to hold in each."""
+
+    def _list_boxes(self, cell: Indices, low: Array, high: Array) -> list[OrientationBoxes]:
+        return [OrientationBoxes(cell, low, high, np.ones((len(cell), len(self.constraints)), np.bool_))]
+
+    def _examine(self, low: Array, size: Array, boxes: list[OrientationBoxes]) -> tuple[Cells, list[OrientationBoxes]]:
+        (leaves,) = boxes
+        finished: list[tuple[OrientationBoxes, CellFractions, Array]] = []
         inside, count = np.zeros(len(low), np.bool_), np.zeros(len(low), np.int64)
         for look in range(LOOKS + 1):
             leaves = leaves.take(~inside[leaves.cell])
-            leaves, found, line, sure, turn, spread = self._looked_at(low, size, leaves)
-            inside[leaves.cell[found.inner >= 1.0]] = True
+            leaves, bounds = self._bound_leaves(low, size, leaves)
+            inside[leaves.cell[bounds.fractions.inner >= 1.0]] = True
             most = count + np.bincount(leaves.cell, minlength=len(low))
-            again = (turn != 0).any(1) | ((spread.sum(1) > _OPEN) & (most[leaves.cell] < MOST))
+            again = (bounds.best_at != 0).any(1) | ((bounds.spread.sum(1) > _SPREAD) & (most[leaves.cell] < MOST))
             again = np.asarray(again & ~inside[leaves.cell] & (look < LOOKS))
-            needless = _needless(len(low), leaves.cell, sure, line)
-            again &= ~needless
-            stay = ~again & ~needless
-            done.append((leaves.take(stay), _taken(found, stay), line[stay]))
-            count += np.bincount(done[-1][0].cell, minlength=len(low))
+            redundant = _find_redundant(len(low), leaves.cell, bounds)
+            again &= ~redundant
+            stay = ~again & ~redundant
+            finished.append((leaves.take(stay), bounds.fractions.take(stay), bounds.planes[stay]))
+            count += np.bincount(finished[-1][0].cell, minlength=len(low))
             if not again.any():
                 break
-            leaves = _narrowed(leaves.take(again), turn[again], spread[again])
-        leaves = both([part for part, _, _ in done])
-        found = Shares(*(np.concatenate([getattr(part, name) for _, part, _ in done]) for name in _NAMES))
-        lines = np.concatenate([part for _, _, part in done])
-        return self._sorted_out(low, size, _of_cells(len(low), leaves.cell, found, lines, inside), [leaves])
+            leaves = _narrow(leaves.take(again), bounds.best_at[again], bounds.spread[again])
+        leaves = concatenate_boxes([part for part, _, _ in finished])
+        columns = zip(*(part for _, part, _ in finished), strict=True)
+        fractions = CellFractions(*(np.concatenate(column) for column in columns))
+        planes = np.concatenate([part for _, _, part in finished])
+        return self._sort_out(low, size, _merge_leaves(leaves.cell, fractions, planes, inside), [leaves])
 
-    def _looked_at(
-        self, low: Array, size: Array, leaves: Items
-    ) -> tuple[Items, Shares, Array, Array, NDArray[np.int8], Array]:
-        """The leaves that may hold a turn: their shares, the straight bound that leaves least (slopes of length 1, then
-        height), the height from which on a leaf is proved to hold if one limit alone is open there, where each turn is
-        best, and what it leaves open."""
+    def _bound_leaves(self, low: Array, size: Array, leaves: OrientationBoxes) -> tuple[OrientationBoxes, LeafBounds]:
+        """Bound all constraints over leaves; returns those that may hold an allowed orientation, and their bounds."""
         n, s = leaves.low.shape
-        cuts, needs = Cuts(n), leaves.needs.copy()
-        alive: NDArray[np.bool_] = np.ones(n, np.bool_)
+        cuts, needs = PlaneCuts.start(n), leaves.needs.copy()
+        alive: Flags = np.ones(n, np.bool_)
         half = 0.5 * size[leaves.cell]
         best_low, best_high = np.ones((n, s), np.bool_), np.ones((n, s), np.bool_)
         spread = np.zeros((n, s))
-        least, line = np.ones(n), np.zeros((n, low.shape[1] + 1))
-        sure, limits = np.full(n, -np.inf), np.zeros(n, np.int64)
+        tightest, planes = np.ones(n), np.zeros((n, low.shape[1] + 1))
+        proved_height, limits = np.full(n, -np.inf), np.zeros(n, np.int64)
         for number, constraint in enumerate(self.constraints):
             which = np.flatnonzero(needs[:, number] & alive)
-            found = bounds(constraint, low, size, leaves.take(which), every=False)
-            needs[which[found.state == CLEARED], number] = False
-            alive[which[found.state == EXCLUDED]] = False
+            bounds = bound_margin(constraint, low, size, leaves.take(which), every=False)
+            needs[which[bounds.state == CLEARED], number] = False
+            alive[which[bounds.state == EXCLUDED]] = False
             if constraint.implied:
                 continue
-            kept = which[found.state == KEPT]
-            found = found.take(found.state == KEPT)
-            cuts.add(number, kept, half, found)
-            narrowest(kept, found.high, found.slopes, least, line, 0, len(kept))
-            sure[kept] = found.low
+            kept = which[bounds.state == KEPT]
+            bounds = bounds.take(bounds.state == KEPT)
+            add_cuts(cuts, number, kept, half, bounds)
+            keep_tightest_planes(kept, bounds, tightest, planes)
+            proved_height[kept] = bounds.low
             limits[kept] += 1
-            best_low[kept] &= found.turn == 1
-            best_high[kept] &= found.turn == -1
-            room = np.abs(found.slopes).sum(1, keepdims=True)
+            best_low[kept] &= bounds.least_at == 1
+            best_high[kept] &= bounds.least_at == -1
+            change = np.abs(bounds.slopes).sum(1, keepdims=True)
             with np.errstate(divide="ignore", invalid="ignore"):
-                spread[kept] = np.fmax(spread[kept], found.spread / room)
+                spread[kept] = np.fmax(spread[kept], bounds.spread / change)
             alive = np.asarray(alive & (cuts.outer > 0.0))
         wide = (leaves.high > leaves.low) & np.any(needs, axis=1, keepdims=True)
-        turn = np.where(wide & best_high, 1, np.where(wide & best_low, -1, 0)).astype(np.int8)
-        length = np.linalg.norm(line[:, :-1], axis=1)
-        sure = np.where((length > 0.0) & (limits == 1), sure / np.where(length > 0.0, length, 1.0), -np.inf)
-        line[length > 0.0] /= length[length > 0.0, None]
-        line[length == 0.0, -1] = np.inf
+        best_at = np.where(wide & best_high, 1, np.where(wide & best_low, -1, 0)).astype(np.int8)
+        _normalise_planes(planes, proved_height, limits == 1)
         spread = np.where(wide, spread, 0.0)
+        fractions = cuts.fractions.take(alive)
         kept_leaves = replace(leaves, needs=needs).take(alive)
-        return kept_leaves, _taken(cuts.shares, alive), line[alive], sure[alive], turn[alive], spread[alive]
+        return kept_leaves, LeafBounds(fractions, planes[alive], proved_height[alive], best_at[alive], spread[alive])
 
 
-_NAMES = ("inner", "outer", "estimate", "limit", "area")
+def _normalise_planes(planes: Array, proved_height: Array, one_limit: Flags) -> None:
+    """Scale slopes to length 1; a height is proved only where one limit alone is open and the plane is not level."""
+    length = np.linalg.norm(planes[:, :-1], axis=1)
+    steep = length > 0.0
+    proved_height[:] = np.where(steep & one_limit, proved_height / np.where(steep, length, 1.0), -np.inf)
+    planes[steep] /= length[steep, None]
+    planes[length == 0.0, -1] = np.inf
 
 
-def _taken(shares: Shares, which: NDArray[np.bool_]) -> Shares:
-    return Shares(*(getattr(shares, name)[which] for name in _NAMES))
-
-
-def _narrowed(leaves: Items, turn: NDArray[np.int8], spread: Array) -> Items:
-    """Leaves put where all constraints are best, where they agree; else halved where they leave most open."""
+def _narrow(leaves: OrientationBoxes, best_at: NDArray[np.int8], spread: Array) -> OrientationBoxes:
+    """Shrink leaves to the ends where all constraints are best, where they agree; bisect the others."""
     low, high = leaves.low.copy(), leaves.high.copy()
-    low[turn > 0] = leaves.high[turn > 0]
-    high[turn < 0] = leaves.low[turn < 0]
-    return halved(replace(leaves, low=low, high=high), ~(turn != 0).any(1), spread)
+    low[best_at > 0] = leaves.high[best_at > 0]
+    high[best_at < 0] = leaves.low[best_at < 0]
+    return bisect_boxes(replace(leaves, low=low, high=high), ~(best_at != 0).any(1), spread)
 
 
-def _needless(count: int, cell: Indices, sure: Array, line: Array) -> NDArray[np.bool_]:
-    """Leaves that add nothing to what one leaf of their cell is proved to hold."""
+def _find_redundant(count: int, cell: Indices, bounds: LeafBounds) -> Flags:
+    """Find the leaves that add nothing to what one leaf of their cell is proved to hold; ``count`` is of the cells."""
     witness = np.full(count, -1)
-    order = np.argsort(sure, kind="stable")
-    order = order[np.isfinite(sure[order])]
+    order = np.argsort(bounds.proved_height, kind="stable")
+    order = order[np.isfinite(bounds.proved_height[order])]
     witness[cell[order]] = order  # of several the last is kept
-    needless = np.zeros(len(cell), np.bool_)
-    surpassed(cell, witness, sure, line, needless)
-    return needless
+    redundant = np.zeros(len(cell), np.bool_)
+    find_redundant_leaves(cell, witness, bounds.proved_height, bounds.planes, redundant)
+    return redundant
 
 
-def _of_cells(count: int, cell: Indices, found: Shares, line: Array, inside: NDArray[np.bool_]) -> Shares:
-    """Of each cell the best leaf's inner share, and no more than all leaves leave together."""
+def _merge_leaves(cell: Indices, leaves: CellFractions, planes: Array, inside: Flags) -> CellFractions:
+    """Merge the leaves of each cell: the best one's inner fraction, and no more than all leave together.
+
+    cell : (N,) of each leaf; inside : (cells,) where the whole cell is proved inside
+    """
+    count = len(inside)
     inner, estimate, outer = np.zeros(count), np.zeros(count), np.zeros(count)
     limit, area = np.full(count, -1, np.int64), np.zeros(count)
-    np.maximum.at(inner, cell, found.inner)
+    np.maximum.at(inner, cell, leaves.inner)
     widest = np.full(count, -1)
-    order = np.argsort(found.outer, kind="stable")  # of several the last is kept
+    order = np.argsort(leaves.outer, kind="stable")  # of several the last is kept
     widest[cell[order]] = order
-    united(cell, widest, line, found.outer, outer)
-    order = np.argsort(found.estimate, kind="stable")
-    estimate[cell[order]], limit[cell[order]] = found.estimate[order], found.limit[order]
-    area[cell[order]] = found.area[order]
+    bound_unions(cell, widest, planes, leaves.outer, outer)
+    order = np.argsort(leaves.estimate, kind="stable")
+    estimate[cell[order]], limit[cell[order]] = leaves.estimate[order], leaves.limit[order]
+    area[cell[order]] = leaves.area[order]
     inner[inside], outer[inside], estimate[inside], limit[inside], area[inside] = 1.0, 1.0, 1.0, -1, 0.0
     # A leaf that lost no need has a limit only in its estimate; an undecided cell must name one.
     limit[~inside & (outer > 0.0) & (limit < 0)] = 0
-    return Shares(inner, outer, estimate, limit, area)
+    return CellFractions(inner, outer, estimate, limit, area)

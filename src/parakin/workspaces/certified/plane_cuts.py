@@ -1,24 +1,129 @@
-"""What a margin cuts off a box, proved: straight bounds of the margin, and the share of the box above them.
+"""Plane cuts of boxes: linear bounds of a margin over a box, and the fraction of the box above such a plane.
 
-Over a box of half widths h about c a margin g is bounded by g(c) + m·(x - c) and what its derivatives' bounds leave
-open, of the order of h². A straight cut's share of a box has a closed form, so what is inside and what is outside is
-known far closer than by whole boxes.
+Over a box of half widths h about c a margin g is bounded by g(c) + m·(x - c) and a remainder, which follows from the
+bounds of its derivatives and is of the order of h². The fraction of a box above a plane has a closed form, so the
+volume inside and outside is known far closer than by whole boxes.
+
+x is a position, of d ≤ 3 coordinates; θ is an orientation, of s angles; v = (x - c)/h is in [-1, 1]^d.
 """
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numba import njit
+from numpy.typing import NDArray
 
-_FLAT = 1e-4  # a slope less than this share of the steepest counts as open: the closed form cancels below
-_ROUNDING = 1e-7  # what the closed form may be off, with slopes no flatter than that
+from ...arrays import Array, Flags, Indices
 
-KEPT, CLEARED, EXCLUDED = 0, 1, 2
+_FLAT = 1e-4  # of the steepest slope: a slope less than that is taken as unknown, for the closed form cancels below it
+_ROUNDING = 1e-7  # the error of the closed form, with slopes no flatter than that
+
+KEPT, CLEARED, EXCLUDED = 0, 1, 2  # a margin over a box: undecided, kept everywhere, broken for every x
+
+
+class MarginBounds(NamedTuple):
+    """Bounds that the programs of a :class:`~.constraints.Constraint` give over N boxes (x, θ) and in their middles.
+
+    is_smooth : the constraint has second derivatives
+    box_low, box_high : (N, .) over the box: the margin, the guard, the derivatives by θ, then of a smooth margin the
+        second derivatives by x, else the first ones
+    middle_low, middle_high : (N, .) in the middle: the margin, and of a smooth one the derivatives by x
+    half : (N, d + s) half widths
+    """
+
+    is_smooth: bool
+    box_low: Array
+    box_high: Array
+    middle_low: Array
+    middle_high: Array
+    half: Array
+
+
+class LinearBounds(NamedTuple):
+    """Linear bounds of one margin over N boxes (x, θ), and what they decide.
+
+    state : (N,) KEPT, CLEARED where the margin is ≥ 0 all over the box, EXCLUDED where it is < 0 for every x
+    least_at : (N, s) -1 or 1 where the margin is least at the lower or upper end of θ, else 0
+    low, high, slopes : (N,), (N,), (N, d); if the margin must be kept at every θ, slopes·v + low ≤ margin for all θ and
+        margin ≤ slopes·v + high in the middle θ, else the same with "all" and "middle" exchanged
+    spread : (N, s) how far the margin may change with each θ
+    """
+
+    state: NDArray[np.int8]
+    least_at: NDArray[np.int8]
+    low: Array
+    high: Array
+    slopes: Array
+    spread: Array
+
+    @classmethod
+    def allocate(cls, n: int, d: int, s: int) -> LinearBounds:
+        """Make room for the bounds over n boxes."""
+        return cls(
+            np.empty(n, np.int8),
+            np.empty((n, s), np.int8),
+            np.empty(n),
+            np.empty(n),
+            np.empty((n, d)),
+            np.empty((n, s)),
+        )
+
+    def take(self, which: Flags | Indices) -> LinearBounds:
+        """Keep some of the boxes."""
+        return LinearBounds(*(column[which] for column in self))
+
+
+class CellFractions(NamedTuple):
+    """What is found of N cells, as fractions of their volumes.
+
+    inner, outer, estimate : (N,) inside at least, at most, and likely
+    limit : (N,) index of the constraint that leaves least of the cell, -1 for none
+    area : (N,) of its boundary in the cell, per unit of the cell's volume
+    """
+
+    inner: Array
+    outer: Array
+    estimate: Array
+    limit: Indices
+    area: Array
+
+    def take(self, which: Flags) -> CellFractions:
+        """Keep some of the cells."""
+        return CellFractions(*(column[which] for column in self))
+
+
+class PlaneCuts(NamedTuple):
+    """What the constraints cut off each of N cells together, one constraint after the other.
+
+    cut_off : (N,) sum of the fractions that each constraint may cut off
+    outer : (N,) least fraction that any constraint leaves
+    cut_off_estimate, least_estimate : (N,) the same two by the middles of the bounds
+    limit, area : as of :class:`CellFractions`
+    """
+
+    cut_off: Array
+    outer: Array
+    cut_off_estimate: Array
+    least_estimate: Array
+    limit: Indices
+    area: Array
+
+    @classmethod
+    def start(cls, n: int) -> PlaneCuts:
+        """Start with n cells that no constraint cuts."""
+        return cls(np.zeros(n), np.ones(n), np.zeros(n), np.full(n, np.inf), np.full(n, -1, np.int64), np.zeros(n))
+
+    @property
+    def fractions(self) -> CellFractions:
+        estimate = 0.5 * (np.maximum(0.0, 1.0 - self.cut_off_estimate) + np.minimum(self.least_estimate, 1.0))
+        return CellFractions(np.maximum(0.0, 1.0 - self.cut_off), self.outer, estimate, self.limit, self.area)
 
 
 @njit(nogil=True, cache=True)
-def _above(b, w, n):
-    """Share of the v in [-1, 1]^n with b + w·v ≥ 0, for n ≤ 3 positive w."""
+def _compute_fraction(b, w, n):
+    """Compute the fraction of the v in [-1, 1]^n with b + w·v ≥ 0, for n ≤ 3 positive w, by cutting off corners."""
     total = 0.0
     for k in range(n):
         total += w[k]
@@ -26,7 +131,7 @@ def _above(b, w, n):
         return 1.0
     if b <= -total:
         return 0.0
-    t = 0.5 * (total - abs(b))  # the smaller of both parts, cut off a corner
+    t = 0.5 * (total - abs(b))  # the smaller of both parts, at a corner
     if n == 1:
         part = t / w[0]
     elif n == 2:
@@ -43,10 +148,10 @@ def _above(b, w, n):
 
 
 @njit(nogil=True, cache=True)
-def share(b, slopes, room):
-    """(least, greatest) share of the box above b + slopes·v, v in [-1, 1]^d, whatever the rounding.
+def bound_fraction(b, slopes, scratch):
+    """Bound the fraction of a box above b + slopes·v ≥ 0, v in [-1, 1]^d, rounding included: (least, greatest).
 
-    ``room`` (3,) is overwritten.
+    ``scratch`` (3,) is overwritten.
     """
     steepest, total = 0.0, 0.0
     for slope in slopes:
@@ -61,104 +166,118 @@ def share(b, slopes, room):
     n, flat = 0, 0.0
     for slope in slopes:
         if abs(slope) > _FLAT * steepest:
-            room[n] = abs(slope) / steepest
+            scratch[n] = abs(slope) / steepest
             n += 1
         else:
             flat += abs(slope) / steepest
     # A part that rounds to all or to nothing is neither: what is cut off at a corner can be smaller than a rounding.
-    least = max(0.0, _above(b / steepest - flat, room, n) - _ROUNDING)
-    most = min(1.0, _above(b / steepest + flat, room, n) + _ROUNDING)
+    least = max(0.0, _compute_fraction(b / steepest - flat, scratch, n) - _ROUNDING)
+    most = min(1.0, _compute_fraction(b / steepest + flat, scratch, n) + _ROUNDING)
     return least, most
 
 
 @njit(nogil=True, cache=True)
-def lines(
-    smooth, over_down, over_up, at_down, at_up, half, d, every, state, turn, low, high, slopes, spread, start, stop
-):
-    """Straight bounds of one margin over boxes (x, θ), and what they decide.
-
-    over_down, over_up, at_down, at_up : (N, .) bounds that the programs of a constraint give over the box and in its
-        middle; see :class:`parakin.workspaces.certified.constraints.Constraint`
-    half : (N, d + s) half widths
-    every : the margin must hold for all θ (else for one)
-    state : (N,) KEPT, CLEARED where it holds over the whole box, EXCLUDED where it is broken for all x
-    turn : (N, s) int8, -1 or 1 where the least margin (``every``) stands at the lower or upper end of θ; else 0
-    low, high, slopes : (N,), (N,), (N, d): slopes·v + low ≤ margin, for all θ with ``every``, else in the middle one;
-        margin ≤ slopes·v + high, in the middle θ with ``every``, else for all; v in [-1, 1]^d
-    spread : (N, s) what each θ leaves open
-    """
-    s = half.shape[1] - d
-    for i in range(start, stop):
-        less, more, steep, turns = 0.0, 0.0, 0.0, 0.0
-        column = 2 + s
-        for k in range(d):
-            if smooth:
-                a, b = at_down[i, 1 + k], at_up[i, 1 + k]
-                for n in range(k, d):
-                    p, q = over_down[i, column], over_up[i, column]
-                    column += 1
-                    if n == k:
-                        scale = 0.5 * half[i, k] * half[i, k]
-                        less += max(-p, 0.0) * scale
-                        more += max(q, 0.0) * scale
-                    else:
-                        scale = max(abs(p), abs(q)) * half[i, k] * half[i, n]
-                        less += scale
-                        more += scale
-            else:
-                a, b = over_down[i, column], over_up[i, column]
+def _bound_change_with_position(given, i, slopes):
+    """Bound how box i's margin changes with x: slopes (d,), and remainders (below, above), rounded up."""
+    below, above = 0.0, 0.0
+    d = len(slopes)
+    column = 2 + given.half.shape[1] - d
+    for k in range(d):
+        if given.is_smooth:
+            a, b = given.middle_low[i, 1 + k], given.middle_high[i, 1 + k]
+            for n in range(k, d):
+                p, q = given.box_low[i, column], given.box_high[i, column]
                 column += 1
-            slopes[i, k] = 0.5 * (a + b) * half[i, k]
-            steep += abs(slopes[i, k])
-            left = (0.5 * (b - a) + 1e-15 * max(abs(a), abs(b))) * half[i, k]
-            less += left
-            more += left
-        for k in range(s):
-            a, b = over_down[i, 2 + k], over_up[i, 2 + k]
-            spread[i, k] = max(abs(a), abs(b)) * half[i, d + k] if half[i, d + k] > 0.0 else 0.0
-            turns += spread[i, k]
-            turn[i, k] = 0
-            if (half[i, d + k] > 0.0) & (over_down[i, 1] > 0.0):
-                turn[i, k] = -1 if a >= 0.0 else (1 if b <= 0.0 else 0)
-        less, more = less * (1.0 + 1e-14), more * (1.0 + 1e-14)
-        straight = np.isfinite(at_down[i, 0] + at_up[i, 0] + steep + less + more + turns) & (over_down[i, 1] > 0.0)
-        bottom, top = over_down[i, 0], over_up[i, 0]
-        top_there = top  # for every x, in the middle θ
-        if straight:
-            low[i], high[i] = at_down[i, 0] - less, at_up[i, 0] + more
-            bottom = max(bottom, low[i] - steep - turns)
-            top = min(top, high[i] + steep + turns)
-            top_there = min(top, high[i] + steep)
-            if every:
-                low[i] -= turns
-            else:
-                high[i] += turns
+                if n == k:
+                    scale = 0.5 * given.half[i, k] * given.half[i, k]
+                    below += max(-p, 0.0) * scale
+                    above += max(q, 0.0) * scale
+                else:
+                    scale = max(abs(p), abs(q)) * given.half[i, k] * given.half[i, n]
+                    below += scale
+                    above += scale
         else:
-            low[i], high[i] = bottom, top
-            for k in range(d):
-                slopes[i, k] = 0.0
-            for k in range(s):
-                spread[i, k] = np.inf if half[i, d + k] > 0.0 else 0.0
-        if bottom >= 0.0:
-            state[i] = CLEARED
-        elif (top_there if every else top) < 0.0:
-            state[i] = EXCLUDED
-        else:
-            state[i] = KEPT
+            a, b = given.box_low[i, column], given.box_high[i, column]
+            column += 1
+        slopes[k] = 0.5 * (a + b) * given.half[i, k]
+        rest = (0.5 * (b - a) + 1e-15 * max(abs(a), abs(b))) * given.half[i, k]
+        below += rest
+        above += rest
+    return below * (1.0 + 1e-14), above * (1.0 + 1e-14)
 
 
 @njit(nogil=True, cache=True)
-def gather(cell, half, low, high, slopes, number, bad, outer, lost, near, limit, area, start, stop):
-    """Add one limit's cuts to what is known of every cell.
+def _bound_change_with_orientation(given, i, least_at, spread):
+    """Bound how far box i's margin changes with each θ, the sum of them, and at which end the margin is least."""
+    s = len(spread)
+    d = given.half.shape[1] - s
+    total = 0.0
+    for k in range(s):
+        a, b = given.box_low[i, 2 + k], given.box_high[i, 2 + k]
+        spread[k] = max(abs(a), abs(b)) * given.half[i, d + k] if given.half[i, d + k] > 0.0 else 0.0
+        total += spread[k]
+        least_at[k] = 0
+        if (given.half[i, d + k] > 0.0) & (given.box_low[i, 1] > 0.0):
+            least_at[k] = -1 if a >= 0.0 else (1 if b <= 0.0 else 0)
+    return total
 
-    cell : (N,) of each item, sorted; items of one cell are parts of the θ that must all hold
-    half : (cells, d) half widths
-    bad : Σ of the shares that a limit may cut off; outer : the least share any leaves; lost, near : the same for the
-    middle of the bounds; limit : the one that leaves least, and its ``area`` a unit of volume
+
+@njit(nogil=True, cache=True)
+def bound_linearly(given, every, result, start, stop):
+    """Bound one margin over boxes by planes, by Taylor's formula about the middle, and decide by them.
+
+    given : :class:`MarginBounds`; result : :class:`LinearBounds`, filled from start to stop
+    every : the margin must be kept at every θ, else at one
     """
-    d = slopes.shape[1]
-    room, merged = np.empty(3), np.empty(d)
-    while 0 < start < len(cell) and cell[start] == cell[start - 1]:  # a cell belongs to where its items begin
+    s = result.spread.shape[1]
+    d = result.slopes.shape[1]
+    for i in range(start, stop):
+        slopes, spread = result.slopes[i], result.spread[i]
+        below, above = _bound_change_with_position(given, i, slopes)
+        steep = 0.0
+        for k in range(d):
+            steep += abs(slopes[k])
+        turned = _bound_change_with_orientation(given, i, result.least_at[i], spread)
+        no_jump = given.box_low[i, 1] > 0.0
+        sizes = given.middle_low[i, 0] + given.middle_high[i, 0] + steep + below + above + turned
+        bottom, top = given.box_low[i, 0], given.box_high[i, 0]
+        top_in_middle = top  # for every x, in the middle θ
+        if np.isfinite(sizes) & no_jump:
+            low, high = given.middle_low[i, 0] - below, given.middle_high[i, 0] + above
+            bottom = max(bottom, low - steep - turned)
+            top = min(top, high + steep + turned)
+            top_in_middle = min(top, high + steep)
+            if every:
+                low -= turned
+            else:
+                high += turned
+        else:
+            low, high = bottom, top
+            for k in range(d):
+                slopes[k] = 0.0
+            for k in range(s):
+                spread[k] = np.inf if given.half[i, d + k] > 0.0 else 0.0
+        result.low[i], result.high[i] = low, high
+        if bottom >= 0.0:
+            result.state[i] = CLEARED
+        elif (top_in_middle if every else top) < 0.0:
+            result.state[i] = EXCLUDED
+        else:
+            result.state[i] = KEPT
+
+
+@njit(nogil=True, cache=True)
+def accumulate_cuts(bounds, number, cell, half, cuts, start, stop):
+    """Add what one constraint cuts off every cell.
+
+    bounds : :class:`LinearBounds` over boxes (x, θ); number : the constraint's
+    cell : (N,) of each box, sorted; the boxes of one cell are parts of the θ at all of which the margin must be kept
+    half : (cells, d) half widths
+    cuts : :class:`PlaneCuts`, changed
+    """
+    d = bounds.slopes.shape[1]
+    scratch, merged = np.empty(3), np.empty(d)
+    while 0 < start < len(cell) and cell[start] == cell[start - 1]:  # a cell belongs to where its boxes begin
         start += 1
     i = start
     while i < stop:
@@ -168,89 +287,101 @@ def gather(cell, half, low, high, slopes, number, bad, outer, lost, near, limit,
             end += 1
         worst = i
         for j in range(i, end):
-            if low[j] < low[worst]:
+            if bounds.low[j] < bounds.low[worst]:
                 worst = j
-        least, middle = low[worst], 0.5 * (low[worst] + high[worst])
+        least, middle = bounds.low[worst], 0.5 * (bounds.low[worst] + bounds.high[worst])
         for j in range(i, end):
             shift = 0.0
             for k in range(d):
-                shift += abs(slopes[j, k] - slopes[worst, k])
-            least = min(least, low[j] - shift)
-            outer[c] = min(outer[c], share(high[j], slopes[j], room)[1])
-        merged[:] = slopes[worst]
-        bad[c] += 1.0 - share(least, merged, room)[0]
-        part = share(middle, merged, room)
-        part_here = 0.5 * (part[0] + part[1])
-        lost[c] += 1.0 - part_here
-        if part_here < near[c]:
-            near[c] = part_here
-            limit[c] = number
-            steep, gradient = 0.0, 0.0
-            for k in range(d):
-                steep += abs(merged[k])
-                gradient += (merged[k] / half[c, k]) ** 2
-            step = 1e-3 * steep
-            area[c] = 0.0
-            if step > 0.0:
-                more, less = share(middle + step, merged, room)[0], share(middle - step, merged, room)[0]
-                area[c] = (more - less) / (2.0 * step) * np.sqrt(gradient)
+                shift += abs(bounds.slopes[j, k] - bounds.slopes[worst, k])
+            least = min(least, bounds.low[j] - shift)
+            cuts.outer[c] = min(cuts.outer[c], bound_fraction(bounds.high[j], bounds.slopes[j], scratch)[1])
+        merged[:] = bounds.slopes[worst]
+        cuts.cut_off[c] += 1.0 - bound_fraction(least, merged, scratch)[0]
+        ends = bound_fraction(middle, merged, scratch)
+        estimate = 0.5 * (ends[0] + ends[1])
+        cuts.cut_off_estimate[c] += 1.0 - estimate
+        if estimate < cuts.least_estimate[c]:
+            cuts.least_estimate[c] = estimate
+            cuts.limit[c] = number
+            cuts.area[c] = _estimate_area(middle, merged, half[c], scratch)
         i = end
 
 
 @njit(nogil=True, cache=True)
-def narrowest(box, high, slopes, outer, line, start, stop):
-    """Of every box the upper bound that leaves it least: that share to ``outer``, slopes and height to ``line``.
+def _estimate_area(b, slopes, half, scratch):
+    """Estimate the area of the plane b + slopes·v = 0 in a box of half widths, per unit of its volume."""
+    steep, gradient = 0.0, 0.0
+    for k in range(len(slopes)):
+        steep += abs(slopes[k])
+        gradient += (slopes[k] / half[k]) ** 2
+    step = 1e-3 * steep
+    if not step > 0.0:
+        return 0.0
+    more, less = bound_fraction(b + step, slopes, scratch)[0], bound_fraction(b - step, slopes, scratch)[0]
+    return (more - less) / (2.0 * step) * np.sqrt(gradient)
 
-    box : (N,) of each bound, none twice; line : (boxes, d + 1)
+
+@njit(nogil=True, cache=True)
+def keep_tightest_planes(box, bounds, outer, planes):
+    """Keep of every box the upper bound that leaves least of it.
+
+    box : (N,) of each bound, none twice
+    outer, planes : (boxes,) the fraction it leaves, (boxes, d + 1) its slopes and height; changed
     """
-    room = np.empty(3)
-    for i in range(start, stop):
-        most = share(high[i], slopes[i], room)[1]
+    scratch = np.empty(3)
+    for i in range(len(box)):
+        most = bound_fraction(bounds.high[i], bounds.slopes[i], scratch)[1]
         c = box[i]
         if most < outer[c]:
             outer[c] = most
-            line[c, :-1] = slopes[i]
-            line[c, -1] = high[i]
+            planes[c, :-1] = bounds.slopes[i]
+            planes[c, -1] = bounds.high[i]
 
 
 @njit(nogil=True, cache=True)
-def united(cell, first, line, outer, result):
-    """Of every cell no more than what some leaf's bound leaves, of leaves whose bounds lie much the same way.
+def bound_unions(cell, widest, planes, outer, result):
+    """Bound what the leaves of each cell leave of it together, closely if their planes are nearly parallel.
 
-    cell : (N,) of each leaf; first : (cells,) its leaf that leaves most; line, outer : of the leaves, as from
-    :func:`narrowest`, a line of length 1; result : (cells,) shares. What is above one line is above the first cell's,
-    moved by as much as the two differ within the box.
+    What is above one leaf's plane is above that of the cell's widest leaf, moved by as much as the two differ within
+    the box.
+
+    cell : (N,) of each leaf; widest : (cells,) its leaf that leaves most, or -1
+    planes, outer : of the leaves, as from :func:`keep_tightest_planes`, with slopes of length 1
+    result : (cells,) fractions
     """
-    d = line.shape[1] - 1
-    room = np.empty(3)
-    height = np.full(len(first), -np.inf)
-    total = np.zeros(len(first))
+    d = planes.shape[1] - 1
+    scratch = np.empty(3)
+    height = np.full(len(widest), -np.inf)
+    total = np.zeros(len(widest))
     for i in range(len(cell)):
-        reference = line[first[cell[i]]]
-        moved = line[i, d]
+        reference = planes[widest[cell[i]]]
+        moved = planes[i, d]
         for k in range(d):
-            moved += abs(line[i, k] - reference[k])
+            moved += abs(planes[i, k] - reference[k])
         height[cell[i]] = max(height[cell[i]], moved)
         total[cell[i]] += outer[i]
-    for c in range(len(first)):
+    for c in range(len(widest)):
         result[c] = 0.0
-        if first[c] >= 0:
-            result[c] = min(1.0, total[c], share(height[c], line[first[c], :d], room)[1])
+        if widest[c] >= 0:
+            result[c] = min(1.0, total[c], bound_fraction(height[c], planes[widest[c], :d], scratch)[1])
 
 
 @njit(nogil=True, cache=True)
-def surpassed(cell, witness, sure, line, result):
-    """Whether a leaf adds nothing to what its cell's witness is proved to hold.
+def find_redundant_leaves(cell, witness, proved_height, planes, result):
+    """Find the leaves that add nothing to what one leaf of their cell, its witness, is proved to hold.
 
-    witness : (cells,) a leaf, or -1; sure : (N,) height of the line above which a leaf is proved to hold, in the
-    direction of its ``line`` (N, d + 1), as in :func:`united`
+    cell : (N,) of each leaf; witness : (cells,) a leaf, or -1
+    proved_height : (N,) height of the parallel to the leaf's plane above which the leaf is proved to hold
+    planes : (N, d + 1), as in :func:`bound_unions`
+    result : (N,) flags
     """
-    d = line.shape[1] - 1
+    d = planes.shape[1] - 1
     for i in range(len(cell)):
         w = witness[cell[i]]
         result[i] = False
         if w >= 0 and w != i:
-            moved = line[i, d]
+            moved = planes[i, d]
             for k in range(d):
-                moved += abs(line[i, k] - line[w, k])
-            result[i] = sure[w] >= moved
+                moved += abs(planes[i, k] - planes[w, k])
+            result[i] = proved_height[w] >= moved

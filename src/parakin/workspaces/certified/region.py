@@ -15,10 +15,10 @@ from ...arrays import Array
 from ...errors import PoseError
 from ...kernels.elementary import GREATEST_ANGLE
 from ...machine import Machine
-from .constraints import Constraint, Slice
-from .inclusive import SomeTurn
+from .constraints import Constraint, TracedPose
+from .inclusive import InclusiveSubdivision
 from .subdivision import Subdivision
-from .total import EveryTurn
+from .total import TotalSubdivision
 
 Kind = Literal["constant", "total", "inclusive", "dexterous"]
 Span = tuple[float, float]
@@ -52,18 +52,23 @@ class Region:
     mode: str
 
     @cached_property
-    def slice(self) -> Slice:
-        return Slice(self.machine, self.free_axes, tuple(self.swept_axes), self.fixed_axes, self.mode)
+    def traced_pose(self) -> TracedPose:
+        return TracedPose(self.machine, self.free_axes, tuple(self.swept_axes), self.fixed_axes, self.mode)
 
     @cached_property
     def constraints(self) -> list[Constraint]:
         """What must be ≥ 0 for a pose to be allowed, as functions of position and orientation."""
-        return self.slice.constraints(self.without)
+        return self.traced_pose.build_constraints(self.without)
 
     @property
     def limits(self) -> tuple[str, ...]:
         """Names of the limits that count, in the order of the constraints."""
         return tuple(constraint.name for constraint in self.constraints if not constraint.implied)
+
+    @property
+    def volume_unit(self) -> str:
+        """Unit of a volume of positions: mm³, in the plane mm², along a line mm."""
+        return ("mm", "mm²", "mm³")[len(self.free_axes) - 1]
 
     @property
     def every_orientation(self) -> bool:
@@ -111,8 +116,8 @@ class Region:
 
     def subdivide(self, low: Array, high: Array, more: Sequence[Constraint] = ()) -> Subdivision:
         """Begin the subdivision of a box of positions, (d,) mm, under ``more`` constraints besides."""
-        kind = EveryTurn if self.every_orientation else SomeTurn
-        return kind([*self.constraints, *more], low, high, self.swept_bounds)
+        subdivision = TotalSubdivision if self.every_orientation else InclusiveSubdivision
+        return subdivision([*self.constraints, *more], low, high, self.swept_bounds)
 
     @cached_property
     def extent(self) -> tuple[Array, Array] | None:
@@ -124,15 +129,15 @@ class Region:
         subdivision = self.subdivide(-far, far)
         before = 2.0 * far
         while True:
-            cells = subdivision.cells("gap")
+            cells = subdivision.collect_cells("gap")
             if not len(cells.low):
                 return None
             low, high = cells.low.min(0), (cells.low + cells.size).max(0)
             far_out = (low <= -FAR) | (high >= FAR)
             inside = cells.take(cells.inside)
             for_good = ((inside.low <= -FAR) | (inside.low + inside.size >= FAR)).any(0)
-            count = len(subdivision.open.low)
-            done = not count or count > _MANY or subdivision.open.size.max() < _TINY
+            count = len(subdivision.open_cells.low)
+            done = not count or count > _MANY or subdivision.open_cells.size.max() < _TINY
             if for_good.any() or (far_out.any() and done):
                 axis = self.free_axes[int((for_good if for_good.any() else far_out).argmax())]
                 raise PoseError(f"the limits that count do not bound the workspace in {axis}")

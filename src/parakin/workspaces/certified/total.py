@@ -1,71 +1,87 @@
-"""Places where all constraints hold for every turn θ of a box; for one θ where the box is a point."""
+"""The total orientation workspace: positions where all constraints hold at every orientation θ of a box.
+
+A box of one orientation gives the workspace of constant orientation.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...arrays import Array, Flags, Indices
 from .constraints import Constraint
-from .plane_cuts import EXCLUDED, KEPT
-from .subdivision import Array, Cells, Cuts, Indices, Items, Lines, Subdivision, bounds, halved, in_order
+from .plane_cuts import EXCLUDED, KEPT, LinearBounds, PlaneCuts
+from .subdivision import Cells, OrientationBoxes, Subdivision, add_cuts, bisect_boxes, bound_margin, concatenate_boxes
 
-LOOKS = 6  # at narrowed turns, a round
-MOST = 32  # boxes of turns that a constraint may have in a cell
-_OPEN = 0.15  # how much more than the place the turns may leave open before they are halved
+LOOKS = 6  # at narrowed orientations, a round
+MOST = 32  # boxes of orientations that a constraint may have in a cell
+_SPREAD = 0.15  # of the margin's change with position: boxes that change it more with orientation are bisected
 
 
-class EveryTurn(Subdivision):
-    """Of the turns, each constraint keeps only those where it may be least."""
+class TotalSubdivision(Subdivision):
+    """The subdivision in which each constraint keeps only the orientations where it may be least."""
 
-    def _first(self, cell: Indices, low: Array, high: Array) -> list[Items]:
-        return [Items(cell, low, high, np.zeros((len(cell), 0), np.bool_))] * len(self.constraints)
+    def _list_boxes(self, cell: Indices, low: Array, high: Array) -> list[OrientationBoxes]:
+        return [OrientationBoxes(cell, low, high, np.zeros((len(cell), 0), np.bool_))] * len(self.constraints)
 
-    def _examined(self, low: Array, size: Array, left: list[Items]) -> tuple[Cells, list[Items]]:
-        cuts, gone = Cuts(len(low)), np.zeros(len(low), np.bool_)
-        kept: list[Items] = []
-        for number, (constraint, items) in enumerate(zip(self.constraints, left, strict=True)):
-            items, found = self._settled(constraint, low, size, items, gone)
+    def _examine(self, low: Array, size: Array, boxes: list[OrientationBoxes]) -> tuple[Cells, list[OrientationBoxes]]:
+        cuts, outside = PlaneCuts.start(len(low)), np.zeros(len(low), np.bool_)
+        open_boxes: list[OrientationBoxes] = []
+        for number, (constraint, own) in enumerate(zip(self.constraints, boxes, strict=True)):
+            own, bounds = self._bound_constraint(constraint, low, size, own, outside)
             if not constraint.implied:
-                cuts.add(number, items.cell, 0.5 * size, found)
-            kept.append(items)
-            gone |= cuts.outer <= 0.0
-        cuts.outer[gone] = 0.0
-        return self._sorted_out(low, size, cuts.shares, kept)
+                add_cuts(cuts, number, own.cell, 0.5 * size, bounds)
+            open_boxes.append(own)
+            outside |= cuts.outer <= 0.0
+        cuts.outer[outside] = 0.0
+        return self._sort_out(low, size, cuts.fractions, open_boxes)
 
-    def _settled(
-        self, constraint: Constraint, low: Array, size: Array, items: Items, gone: NDArray[np.bool_]
-    ) -> tuple[Items, Lines]:
-        """The items that a constraint is not cleared of, sorted by cell, with bounds; cells it excludes are marked."""
-        finished: list[tuple[Items, Lines]] = []
+    def _bound_constraint(
+        self, constraint: Constraint, low: Array, size: Array, boxes: OrientationBoxes, outside: Flags
+    ) -> tuple[OrientationBoxes, LinearBounds]:
+        """Narrow the boxes of orientations to where a margin may be least, and bound it there.
+
+        Returns the boxes in which it is not proved to hold, sorted by cell, with bounds; the cells that it excludes are
+        marked in ``outside``.
+        """
+        finished: list[tuple[OrientationBoxes, LinearBounds]] = []
         count = np.zeros(len(low), np.int64)
-        for attempt in range(LOOKS + 1):
-            items = items.take(~gone[items.cell])
-            found = bounds(constraint, low, size, items, every=True)
-            gone[items.cell[found.state == EXCLUDED]] = True
-            vague = items.take(~np.all(np.isfinite(found.spread), axis=1))  # too wide to tell of its middle: look there
-            middle = 0.5 * (vague.low + vague.high)
-            there = bounds(constraint, low, size, replace(vague, low=middle, high=middle), every=True)
-            gone[vague.cell[there.state == EXCLUDED]] = True
-            kept = found.state == KEPT
+        for look in range(LOOKS + 1):
+            boxes = boxes.take(~outside[boxes.cell])
+            bounds = bound_margin(constraint, low, size, boxes, every=True)
+            outside[boxes.cell[bounds.state == EXCLUDED]] = True
+            wide = boxes.take(~np.all(np.isfinite(bounds.spread), axis=1))  # without bounds in their middle: look there
+            middle = 0.5 * (wide.low + wide.high)
+            in_middle = bound_margin(constraint, low, size, replace(wide, low=middle, high=middle), every=True)
+            outside[wide.cell[in_middle.state == EXCLUDED]] = True
+            kept = bounds.state == KEPT
             again = np.zeros(len(kept), np.bool_)
-            if attempt < LOOKS and items.low.shape[1]:
-                spread, room = found.spread.sum(1), np.abs(found.slopes).sum(1)
-                few = (count + np.bincount(items.cell, minlength=len(low)))[items.cell] < MOST
-                wide = few & (spread > _OPEN * room) & (spread > 0.0)
-                again = kept & ((found.turn != 0).any(1) | wide)
-            finished.append((items.take(kept & ~again), found.take(kept & ~again)))
+            if look < LOOKS and boxes.low.shape[1]:
+                spread, change = bounds.spread.sum(1), np.abs(bounds.slopes).sum(1)
+                few = (count + np.bincount(boxes.cell, minlength=len(low)))[boxes.cell] < MOST
+                large = few & (spread > _SPREAD * change) & (spread > 0.0)
+                again = kept & ((bounds.least_at != 0).any(1) | large)
+            finished.append((boxes.take(kept & ~again), bounds.take(kept & ~again)))
             count += np.bincount(finished[-1][0].cell, minlength=len(low))
             if not again.any():
                 break
-            items = _narrowed(items.take(again), found.take(again))
-        return in_order(finished)
+            boxes = _narrow(boxes.take(again), bounds.take(again))
+        return _sort_by_cell(finished)
 
 
-def _narrowed(items: Items, found: Lines) -> Items:
-    """Turns put where the margin is least, where that is known; else halved where they leave most open."""
-    low, high = items.low.copy(), items.high.copy()
-    high[found.turn < 0] = items.low[found.turn < 0]
-    low[found.turn > 0] = items.high[found.turn > 0]
-    return halved(replace(items, low=low, high=high), ~(found.turn != 0).any(1), found.spread)
+def _narrow(boxes: OrientationBoxes, bounds: LinearBounds) -> OrientationBoxes:
+    """Shrink boxes to the ends where the margin is least, where these are known; bisect the others."""
+    low, high = boxes.low.copy(), boxes.high.copy()
+    high[bounds.least_at < 0] = boxes.low[bounds.least_at < 0]
+    low[bounds.least_at > 0] = boxes.high[bounds.least_at > 0]
+    return bisect_boxes(replace(boxes, low=low, high=high), ~(bounds.least_at != 0).any(1), bounds.spread)
+
+
+def _sort_by_cell(parts: Sequence[tuple[OrientationBoxes, LinearBounds]]) -> tuple[OrientationBoxes, LinearBounds]:
+    """Put all parts together, sorted by cell."""
+    boxes = concatenate_boxes([part for part, _ in parts])
+    bounds = LinearBounds(*(np.concatenate(columns) for columns in zip(*(part for _, part in parts), strict=True)))
+    order = np.argsort(boxes.cell, kind="stable")
+    return boxes.take(order), bounds.take(order)

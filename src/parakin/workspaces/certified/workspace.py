@@ -1,4 +1,4 @@
-"""The certified workspace: what is inside and what is outside, proved, with what follows from its cells."""
+"""The certified workspace: a region's volume, proved to lie between two numbers, and what follows from its cells."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ from ...arrays import Array, Progress
 from ...errors import PoseError
 from ...machine import Machine
 from .region import Region
-from .subdivision import Cells
+from .subdivision import Cells, make_empty_cells
 
-CLOSE = 1.0 / 128.0  # of the box: the cells against which it rests
 ROUNDING = 1e-9  # relative, of the sums of volumes
+_CLOSE = 1.0 / 128.0  # of the bounding box: the size of the cells at its faces
 
 
 @dataclass(frozen=True)
@@ -32,18 +32,18 @@ class Volume:
 
     @property
     def gap(self) -> float:
-        """(outer - inner)/estimate; 0 for nothing at all."""
+        """(outer - inner)/estimate; 0 if both are zero."""
         return (
             (self.outer - self.inner) / self.estimate if self.estimate > 0.0 else (np.inf if self.outer > 0.0 else 0.0)
         )
 
 
 @dataclass(frozen=True)
-class Bound:
-    """A limit with its share of the region's boundary, and the middle of its part."""
+class BoundingLimit:
+    """A limit that bounds a region, the fraction of the boundary that it makes, and the middle of that part, mm."""
 
     limit: str
-    share: float
+    fraction: float
     middle: tuple[float, ...]
 
 
@@ -51,8 +51,9 @@ class Bound:
 class Workspace:
     """A region with its proved volume, and the cells that prove it.
 
-    ``stopped`` says why the work ended: ``gap`` reached, ``cell`` size reached, ``time``, ``interrupted``,
-    ``resolution`` (of the numbers) or ``memory``. ``parameters`` are enough to run it again.
+    stopped : why the subdivision ended: ``gap`` reached, ``cell`` size reached, ``time``, ``interrupted``,
+        ``resolution`` (of the numbers) or ``memory``
+    parameters : enough to run it again
     """
 
     region: Region
@@ -66,12 +67,13 @@ class Workspace:
 
     @property
     def axes(self) -> tuple[str, ...]:
-        """The axes of a place."""
+        """The axes of a position."""
         return self.region.free_axes
 
     @property
     def unit(self) -> str:
-        return ("mm", "mm²", "mm³")[len(self.axes) - 1]
+        """Of the volume."""
+        return self.region.volume_unit
 
     @cached_property
     def volume(self) -> Volume:
@@ -80,7 +82,7 @@ class Workspace:
 
     @property
     def empty(self) -> bool:
-        """Proved to hold no place at all."""
+        """Whether it is proved to hold no position."""
         return not len(self.cells.low)
 
     @cached_property
@@ -92,23 +94,25 @@ class Workspace:
 
     @cached_property
     def centroid(self) -> Array | None:
+        """The middle of the volume, (d,) mm, as estimated; None without a volume."""
         weights = self.cells.estimate * self.cells.volumes
         if not weights.sum() > 0.0:
             return None
         return np.asarray(weights @ (self.cells.low + 0.5 * self.cells.size) / weights.sum())
 
     @cached_property
-    def bounded_by(self) -> tuple[Bound, ...]:
+    def bounded_by(self) -> tuple[BoundingLimit, ...]:
         """The limits that bound the region, the one with most of its boundary first."""
         edge = ~self.cells.inside & (self.cells.area > 0.0)
         limit, area = self.cells.limit[edge], self.cells.area[edge]
         middles = (self.cells.low + 0.5 * self.cells.size)[edge]
-        found = []
+        limits = []
         for number in np.unique(limit):
             own = area[limit == number]
             middle = own @ middles[limit == number] / own.sum()
-            found.append(Bound(self.region.limits[number], float(own.sum() / area.sum()), tuple(middle.tolist())))
-        return tuple(sorted(found, key=lambda bound: -bound.share))
+            fraction = float(own.sum() / area.sum())
+            limits.append(BoundingLimit(self.region.limits[number], fraction, tuple(middle.tolist())))
+        return tuple(sorted(limits, key=lambda limit: -limit.fraction))
 
     @property
     def surface(self) -> float:
@@ -145,17 +149,11 @@ def workspace(
     began = time.monotonic()
     extent = region.extent
     if extent is None:
-        return Workspace(region, nothing(len(region.free_axes)), "gap", parameters)
+        return Workspace(region, make_empty_cells(len(region.free_axes)), "gap", parameters)
     rest = None if seconds is None else seconds - (time.monotonic() - began)
     subdivision = region.subdivide(*extent)
     stopped = subdivision.run(gap, cell, rest, progress).stopped
     if stopped == "gap":
         with suppress(KeyboardInterrupt):  # the volume is known; only its box could be closer
-            subdivision.tighten(CLOSE, began + (inf if seconds is None else seconds))
-    return Workspace(region, subdivision.cells(stopped), stopped, parameters)
-
-
-def nothing(places: int) -> Cells:
-    """No cells at all."""
-    none = np.zeros(0)
-    return Cells(np.zeros((0, places)), np.zeros((0, places)), none, none, none, np.zeros(0, np.int64), none)
+            subdivision.tighten(_CLOSE, began + (inf if seconds is None else seconds))
+    return Workspace(region, subdivision.collect_cells(stopped), stopped, parameters)

@@ -1,4 +1,4 @@
-"""det A as a margin over a region: on which side of the parallel singularities a place is."""
+"""The sign of det A as a constraint: on which side of the parallel singularities a position is, its assembly mode."""
 
 from __future__ import annotations
 
@@ -7,47 +7,47 @@ from collections.abc import Sequence
 import numpy as np
 
 from ...algebra import Scalar
-from ...model.rates import compute_twist_rates
 from ..certified.constraints import Constraint
 from ..certified.region import Region
 
 NAME = "parallel singularity"
-NOUGHT = 1e-12  # of the product of the rows' sizes at home: a determinant no greater has no sign
+ZERO = 1e-12  # of the product of the rows' sizes at home: a determinant no greater has no sign
 
 
-def sides(region: Region) -> tuple[Constraint, Constraint]:
-    """det A > 0 and det A < 0, the first where its sign is as at home, and as margins of no unit.
+def make_side_constraints(region: Region) -> tuple[Constraint, Constraint]:
+    """Make the constraints det A > 0 and det A < 0, without unit, the first where the sign is that of home.
 
-    A is of the tool's twist, so that free angles of the pose do not count; of five axes it is the legs' rows against
-    the translations, for head and table never matter here.
+    A is of the tool's twist, so that free angles of the pose do not count. Of five axes it is the legs' rows against
+    the translations, for head and table have no parallel singularity.
     """
-    asked = region.slice
+    traced = region.traced_pose
     d = len(region.free_axes)
-    margin = determinant(_block(region, asked.pose)) / _size(region)
-    x, turns = asked.inputs[:d], asked.inputs[d:]
-    return Constraint(NAME, margin - NOUGHT, x, turns), Constraint(NAME, -margin - NOUGHT, x, turns)
+    margin = expand_determinant(_trace_leg_rows(region, traced.pose)) / _scale_at_home(region)
+    x, orientation = traced.inputs[:d], traced.inputs[d:]
+    return Constraint(NAME, margin - ZERO, x, orientation), Constraint(NAME, -margin - ZERO, x, orientation)
 
 
-def _block(region: Region, pose: Sequence[Scalar]) -> list[list[Scalar]]:
-    model = region.machine.model
-    with np.errstate(all="ignore"):  # what a pose out of reach makes of numbers is NaN
-        found = compute_twist_rates(model.spec, model.structure, pose, model.invert(pose, region.mode)[0])
-    legs = len(found.spans)
-    size = legs if len(found.a) - legs == 2 else len(found.a)
-    return [row[:size] for row in found.a[:size]]
+def _trace_leg_rows(region: Region, pose: Sequence[Scalar]) -> list[list[Scalar]]:
+    """Trace the square block of A that can become singular."""
+    machine = region.machine
+    with np.errstate(all="ignore"):  # a pose out of reach gives NaN
+        rates = machine.trace_rates(pose, machine.trace_inverse(pose, region.mode)[0])
+    legs = len(rates.spans)
+    size = legs if len(rates.a) - legs == 2 else len(rates.a)
+    return [row[:size] for row in rates.a[:size]]
 
 
-def _size(region: Region) -> float:
-    """What det A is at most at home (Hadamard), with its sign; of another working mode that is not there, of none."""
-    rows = np.array(_block(region, [np.float64(value) for value in region.machine.home]), float)
+def _scale_at_home(region: Region) -> float:
+    """Compute Hadamard's bound of det A at home, with its sign there; 1 where another working mode can't reach home."""
+    rows = np.array(_trace_leg_rows(region, [np.float64(value) for value in region.machine.home]), float)
     most = float(np.prod(np.sqrt((rows**2).sum(1))))
     if not (np.isfinite(most) and most > 0.0):
         return 1.0
     return -most if np.linalg.det(rows) < 0.0 else most
 
 
-def determinant(rows: Sequence[Sequence[Scalar]]) -> Scalar:
-    """Of scalars of any kind, without a quotient: by all minors of the first rows."""
+def expand_determinant(rows: Sequence[Sequence[Scalar]]) -> Scalar:
+    """Expand a determinant of scalars of any kind, without quotients, by all minors of the first rows."""
     minors: dict[tuple[int, ...], Scalar] = {(): 1.0}
     for row in rows:
         longer: dict[tuple[int, ...], Scalar] = {}

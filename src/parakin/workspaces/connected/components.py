@@ -1,175 +1,176 @@
-"""What hangs together of a region on one side of a singularity, by its certified cells."""
+"""The connected components of a region: what a continuous path can reach without a singularity or another working mode.
+
+They are the t-connected regions of Chablat and Wenger. A region ends where a leg is out of reach, and there are the
+serial singularities of a working mode; the parallel ones separate components where det A changes its sign.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
-from itertools import product
+from math import isfinite
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike
 
 from ...arrays import Array
+from ...errors import PoseError
 from ..certified.constraints import Constraint
-from ..certified.containment import verdicts
+from ..certified.containment import prove_boxes
 from ..certified.region import Region
-from ..certified.subdivision import Cells
-from ..inscribed.seeds import whole
-from .adjacency import Indices, labelled, touching
+from ..certified.workspace import ROUNDING, Volume
+from ..inscribed.seeds import find_outline_cells
+from .adjacency import refuse_too_many_cells
+from .assembly_mode import make_side_constraints
+from .cell_components import CellComponent, Resolution, find_cell_components
 
-_GAP = 1e-9  # never reached: the cells' size ends the work
-_FINER, _DEEPER = 8, 2  # how much finer, and how often, a speck is looked at
-_ROUNDS = 4  # of looking for boxes that join
-_AT = (0.5, 0.02, 0.98)  # where across the common part of two cells a joining box may run
-_THIN = 1e-3  # of a cell: its half width
-_PARTS = 64  # it may be cut into to be proved
-_LINKS = 4096  # looked at in a round
-_FEW = 8  # cells: fewer that nothing joins nor parts are no island of their own
+_FINE = {1: 4096, 2: 512, 3: 128}  # cells along the longest edge, by dimension
+_NEAR = 32  # cells of a component from which a path to a position is looked for
+
+_Found = tuple["Component", CellComponent]
 
 
 @dataclass(frozen=True, eq=False)
-class Island:
-    """Cells proved inside, (N, d), that hang together.
+class Component:
+    """One connected component of a region.
 
-    inner, estimate, outer : volumes, the outer one with all that may belong to it
-    box : corners of a box proved to hold it
-    apart : nothing undecided joins it to another
+    sign : of det A, 1 where it is as at home, else -1
+    volume : mm³ (in the plane mm²): at least what is proved to hang together, at most with all cells that may
+    position : a position in it, (d,) mm
+    low, high : corners of a box proved to hold it
+    apart : it is proved to hang together with no other component
     """
 
+    sign: int
+    volume: Volume
+    position: Array
     low: Array
-    size: Array
-    inner: float
-    estimate: float
-    outer: float
-    box: tuple[Array, Array]
+    high: Array
     apart: bool
 
 
 @dataclass(frozen=True, eq=False)
-class Islands:
-    """All islands, how many of them are proved to be different, and the volume that may be more of them."""
+class Components:
+    """The connected components of a region, the largest first.
 
-    islands: list[Island]
+    at_least : how many are proved to be different
+    undecided : volume of what may be more of them, or belong to one: too small for the cells
+    start : index of the component that holds the start; None if none was given
+    cell : edge to which the boundary was refined, mm
+    stopped : why the subdivision ended, as of :class:`~.certified.workspace.Workspace`
+    parameters : enough to run it again
+    """
+
+    region: Region
+    components: tuple[Component, ...]
     at_least: int
     undecided: float
+    start: int | None
+    cell: float
     stopped: str
+    parameters: Mapping[str, Any]
+
+    def __len__(self) -> int:
+        return len(self.components)
 
 
-def islands(
+def find_components(
     region: Region,
-    constraint: Constraint,
-    low: Array,
-    high: Array,
-    cell: float,
-    seconds: float | None,
-    deeper: int = _DEEPER,
-) -> Islands:
-    """The islands of a region within a box, where the constraint holds too, by cells of the given size."""
-    cells = whole(region.subdivide(low, high, [constraint]).run(_GAP, cell, seconds))
-    if not len(cells.low):
-        return Islands([], 0, 0.0, cells.stopped)
-    faces, points = touching(cells.low, cells.size)
-    inside, group = cells.inside, labelled(len(cells.low), points)
-    island = _joined(region, constraint, cells, faces, points)
-    owner = _owners(island, inside, points)
-    found, at_least, undecided = [], 0, 0.0
-    for number in np.unique(group):
-        members = group == number
-        own = np.unique(island[members & inside]).tolist()
-        if len(own) > 1:
-            own = [which for which in own if (island == which).sum() >= _FEW] or own[:1]
-        if not own:
-            speck = _speck(region, constraint, cells, members, cell, seconds, deeper)
-            found += speck.islands
-            at_least += speck.at_least
-            undecided += speck.undecided
-            continue
-        at_least += 1
-        vague = cells.take(members & ~inside)
-        lost = members & inside & ~np.isin(island, own)
-        undecided += float(cells.volumes[lost].sum())
-        box = cells.low[members].min(0), (cells.low + cells.size)[members].max(0)
-        for which in own:
-            mine = cells.take(inside & (island == which))
-            inner = float(mine.volumes.sum())
-            estimate = inner + _total(cells, cells.estimate, ~inside & (owner == which))
-            outer = inner + vague.total(vague.outer) + float(cells.volumes[lost].sum())
-            found.append(Island(mine.low, mine.size, inner, estimate, outer, box, len(own) == 1))
-    return Islands(found, at_least, undecided, cells.stopped)
+    start: ArrayLike | None = None,
+    cell: float | None = None,
+    seconds: float | None = 60.0,
+) -> Components:
+    """Find the connected components of a region under singularities and the working mode, by certified cells.
+
+    Of a total region every orientation counts. Cells proved inside hang together if they share a face, or if a small
+    box proved inside joins them.
+
+    Parameters
+    ----------
+    start : a pose, mm and rad, whose component is wanted
+    cell : edge to which the boundary is refined, mm; 1/128 of the region's extent if not given (1/512 in the plane)
+    seconds : stop refining cells after this time, for each sign of det A; None for no end
+
+    Raises :class:`PoseError` for an inclusive region, a start outside it, or one that is too near to the boundary.
+    """
+    if not region.every_orientation:
+        raise PoseError("some: of one turn for each place nothing is known of the turns between; hold or sweep them")
+    if cell is not None and not (isfinite(cell) and cell > 0.0):
+        raise PoseError(f"cell: a size above 0 mm expected, not {cell:g}")
+    sides = dict(zip((1, -1), make_side_constraints(region), strict=True))
+    position, sign = (None, 0) if start is None else _locate_start(region, start, sides)
+    outline = find_outline_cells(region)
+    low, high = outline.low.min(0), (outline.low + outline.size).max(0)
+    edge = float((high - low).max()) / _FINE[len(low)] if cell is None else cell
+    refuse_too_many_cells(np.ceil((high - low) / edge), edge)
+    found: list[_Found] = []
+    at_least, undecided, stopped = 0, 0.0, "cell"
+    for own_sign, constraint in sides.items():
+        one_side = find_cell_components(region, constraint, low, high, Resolution(edge, seconds))
+        found += [(_describe_component(own_sign, cells), cells) for cells in one_side.components]
+        at_least += one_side.at_least
+        undecided += one_side.undecided
+        stopped = one_side.stopped if stopped == "cell" else stopped
+    found.sort(key=lambda each: -each[0].volume.estimate)
+    parameters = {
+        **region.parameters,
+        "start": None if start is None else np.asarray(start, float).tolist(),
+        "cell": edge,
+        "seconds": seconds,
+    }
+    index = None if position is None else _find_holder(region, position, sign, sides[sign], found)
+    components = tuple(component for component, _ in found)
+    return Components(region, components, at_least, undecided, index, edge, stopped, parameters)
 
 
-def _total(cells: Cells, shares: Array, which: NDArray[np.bool_]) -> float:
-    return float(shares[which] @ cells.volumes[which])
+def _describe_component(sign: int, cells: CellComponent) -> Component:
+    volume = Volume(cells.inner * (1.0 - ROUNDING), cells.estimate, cells.outer * (1.0 + ROUNDING))
+    largest = int(cells.size.prod(1).argmax())
+    position = cells.low[largest] + 0.5 * cells.size[largest]
+    return Component(sign, volume, position, *cells.box, cells.apart)
 
 
-def _speck(
-    region: Region,
-    constraint: Constraint,
-    cells: Cells,
-    members: NDArray[np.bool_],
-    cell: float,
-    seconds: float | None,
-    deeper: int,
-) -> Islands:
-    """Undecided cells on their own, looked at more finely if nothing else is in their box."""
-    low, high = cells.low[members].min(0), (cells.low + cells.size)[members].max(0)
-    others = ~members & (cells.low < high).all(1) & (cells.low + cells.size > low).all(1)
-    if not deeper or others.any():
-        return Islands([], 0, _total(cells, cells.outer, members), cells.stopped)
-    return islands(region, constraint, low, high, cell / _FINER, seconds, deeper - 1)
+def _locate_start(region: Region, start: ArrayLike, sides: Mapping[int, Constraint]) -> tuple[Array, int]:
+    """Check that the start is in the region; returns its position, and the sign of det A there."""
+    machine = region.machine
+    rows, lead = machine.rows(start, machine.axes, "start")
+    if lead:
+        raise PoseError(f"start: one pose of {' '.join(machine.axes)} expected")
+    pose = dict(zip(machine.axes, rows[0].tolist(), strict=True))
+    for axis, value in region.fixed_axes.items():
+        if not abs(pose[axis] - value) <= 1e-9 * max(1.0, abs(value)):
+            raise PoseError(f"start: {axis} is {pose[axis]:g}, but held at {value:g} here")
+    for axis, (first, last) in region.swept_axes.items():
+        if not first <= pose[axis] <= last:
+            raise PoseError(f"start: {axis} is {pose[axis]:g}, beyond its range {first:g} to {last:g}")
+    position = np.array([pose[axis] for axis in region.free_axes])
+    if not np.isfinite(position).all():
+        raise PoseError("start: a pose of finite numbers expected")
+    containment = prove_boxes(region, position[None], position[None])
+    if containment.limit[0] >= 0:
+        name = containment.names[int(containment.limit[0])]
+        raise PoseError(f"start: it is outside the region, {name} is broken")
+    for sign, constraint in sides.items():
+        if prove_boxes(region, position[None], position[None], [constraint]).proved[0]:
+            return position, sign
+    raise PoseError("start: it is on the region's boundary or at a parallel singularity")
 
 
-def _joined(region: Region, constraint: Constraint, cells: Cells, faces: Indices, points: Indices) -> Indices:
-    """Numbers, equal for cells inside that hang together: by faces, or by small boxes that are proved inside."""
-    inside, count = cells.inside, len(cells.low)
-    pairs = faces[inside[faces].all(1)]
-    island = labelled(count, pairs)
-    for _ in range(_ROUNDS):
-        links = _links(island, inside, points)
-        good = _bridged(region, constraint, cells, links)
-        if not good.any():
-            break
-        pairs = np.concatenate([pairs, links[good]])
-        island = labelled(count, pairs)
-    return island
-
-
-def _links(island: Indices, inside: NDArray[np.bool_], points: Indices) -> Indices:
-    """Pairs of cells inside, of different islands, that touch, or that one undecided cell touches."""
-    a, b = points.T
-    direct = points[inside[a] & inside[b] & (island[a] != island[b])]
-    by = np.concatenate([points[inside[a] & ~inside[b]][:, ::-1], points[~inside[a] & inside[b]]])
-    _, first = np.unique(by[:, 0] * len(island) + island[by[:, 1]], return_index=True)
-    by = by[first]  # sorted by the undecided cell: one cell of each island that it touches
-    same = by[1:, 0] == by[:-1, 0]
-    links = np.concatenate([direct, np.column_stack([by[:-1, 1], by[1:, 1]])[same]])
-    return links[:: max(1, -(-len(links) // _LINKS))]
-
-
-def _bridged(region: Region, constraint: Constraint, cells: Cells, links: Indices) -> NDArray[np.bool_]:
-    """Whether thin boxes from cell to cell are proved inside."""
-    good = np.zeros(len(links), np.bool_)
-    top = cells.low + cells.size
-    ends = np.stack([cells.low[links].max(1), top[links].min(1)])
-    apart = ends[0] > ends[1]
-    low, high = ends.min(0), ends.max(0)
-    thin = _THIN * cells.size.min(0)
-    for at in product(_AT, repeat=low.shape[1]):
-        left = np.flatnonzero(~good)
-        if not len(left):
-            break
-        middle = low[left] + np.array(at) * (high[left] - low[left])
-        bottom = np.where(apart[left], low[left], middle - thin)
-        over = np.where(apart[left], high[left], middle + thin)
-        good[left] = verdicts(region, bottom, over, [constraint], _PARTS).proved
-    return good
-
-
-def _owners(island: Indices, inside: NDArray[np.bool_], points: Indices) -> Indices:
-    """The island that each undecided cell touches, or touches by way of others; -1 for none."""
-    owner = np.where(inside, island, -1)
-    while True:
-        a, b = owner[points[:, 0]], owner[points[:, 1]]
-        to = np.concatenate([points[(a < 0) & (b >= 0)][:, 0], points[(b < 0) & (a >= 0)][:, 1]])
-        if not len(to):
-            return owner
-        np.maximum.at(owner, to, np.concatenate([b[(a < 0) & (b >= 0)], a[(b < 0) & (a >= 0)]]))
+def _find_holder(region: Region, position: Array, sign: int, constraint: Constraint, found: list[_Found]) -> int:
+    """Find the component that holds a position, or that a box proved inside joins to it."""
+    near: list[tuple[float, int, Array, Array]] = []
+    for number, (component, cells) in enumerate(found):
+        if component.sign == sign:
+            points = np.clip(position, cells.low, cells.low + cells.size)
+            distance = np.abs(points - position).max(1)
+            for cell in np.argsort(distance, kind="stable")[:_NEAR]:
+                low, high = np.minimum(points[cell], position), np.maximum(points[cell], position)
+                near.append((float(distance[cell]), number, low, high))
+    near.sort(key=lambda each: each[0])
+    if near:
+        bottom, top = (np.array([each[i] for each in near]) for i in (2, 3))
+        joined = prove_boxes(region, bottom, top, [constraint]).proved
+        if joined.any():
+            return near[int(joined.argmax())][1]
+    raise PoseError("start: it is too near to the boundary to tell its part; smaller cells would")

@@ -1,4 +1,4 @@
-"""The largest box with edges along the axes inside a region, every place of it proved to be allowed."""
+"""The largest box with edges along the axes inside a region, every position of it proved to be allowed."""
 
 from __future__ import annotations
 
@@ -12,21 +12,21 @@ from numpy.typing import ArrayLike
 
 from ...arrays import Array
 from ...errors import PoseError
-from ..certified.containment import verdicts
+from ..certified.containment import prove_boxes
 from ..certified.region import Region
-from .growth import Family, climbed, grown
-from .seeds import outline, starts
+from .growth import BoxFamily, climb_volume, grow_faces
+from .seeds import find_outline_cells, find_seeds
 
 TOLERANCE = 1e-4  # of the region's extent
-_HAIR = 1.0 - np.array([1e-14, 1e-12, 1e-9, 1e-6])
-_OUTSIDE = 2.0 ** np.arange(6)  # tolerances by which a face is moved to see what stops it
+_SLIGHTLY_SMALLER = 1.0 - np.array([1e-14, 1e-12, 1e-9, 1e-6])
+_OUTSIDE = 2.0 ** np.arange(6)  # tolerances by which a face is moved to find what stops it
 
 
 @dataclass(frozen=True)
-class Stop:
-    """The limit that is broken just outside a face, at a pose.
+class FaceStop:
+    """The limit that is broken just outside a face, and a pose where it is.
 
-    Both are None where the face alone could still move, or where nothing broken was met within 32 tolerances.
+    Both are None where the face alone could still move, or where no broken limit was found within 32 tolerances.
     """
 
     face: str  # "-X", "+X", "-Y", ...
@@ -35,32 +35,32 @@ class Stop:
 
 
 @dataclass(frozen=True, eq=False)
-class Box:
-    """A box [low, high] of places, mm, all of them proved to be in the region.
+class InscribedBox:
+    """A box [low, high] of positions, mm, all of them proved to be in the region.
 
-    volume : mm³ (in the plane an area, mm²)
     stops : what stops each face, the lower and the upper one of each axis in turn
     tolerance : mm; by so much no face (of a box of given proportions or centre: not the box) could be proved to grow
-    proved : always; a box that is not is none
     parameters : enough to run it again
+    proved : always true
     """
 
     region: Region
     low: Array
     high: Array
-    stops: tuple[Stop, ...]
+    stops: tuple[FaceStop, ...]
     tolerance: float
     parameters: Mapping[str, Any]
     proved: bool = True
 
     @property
     def axes(self) -> tuple[str, ...]:
+        """The axes of a position."""
         return self.region.free_axes
 
     @property
     def unit(self) -> str:
         """Of the volume."""
-        return ("mm", "mm²", "mm³")[len(self.axes) - 1]
+        return self.region.volume_unit
 
     @property
     def edges(self) -> Array:
@@ -72,46 +72,46 @@ class Box:
 
     @property
     def volume(self) -> float:
+        """The volume, mm³ (in the plane an area, mm²)."""
         return float(self.edges.prod())
 
 
-def largest_box(
+def find_largest_box(
     region: Region,
     shape: Sequence[float] | None = None,
     around: ArrayLike | None = None,
     tolerance: float | None = None,
-) -> Box:
-    """A box inside a region that is as large as can be found, with edges along the axes.
+) -> InscribedBox:
+    """Find a large box inside a region, edges along the axes, by growth from several seeds.
 
-    It is the best of several that were grown from great boxes of a coarse grid; each is proved by intervals, and none
-    of its faces can be moved outward by more than the tolerance. No proof is given that no other is larger.
+    The best of them is taken. It is proved by intervals, and none of its faces can be moved outward by more than the
+    tolerance; that no other box is larger is not proved.
 
     Parameters
     ----------
-    shape : proportions of its edges, one for each axis of a place; without them its volume is made greatest
-    around : its centre, mm, one number for each axis of a place
+    shape : proportions of its edges, one for each axis of a position; without them its volume is made greatest
+    around : its centre, mm, one number for each axis of a position
     tolerance : mm; 1e-4 of the region's greatest extent if not given
 
-    Raises :class:`PoseError` for a region in which nothing can be proved inside, a centre that is not, or a shape that
-    is none.
+    Raises :class:`PoseError` for a region in which no box is proved inside, a centre outside, or an invalid shape.
     """
-    proportions = None if shape is None else _shape(region, shape)
-    centre = None if around is None else _centre(region, around)
+    proportions = None if shape is None else _check_shape(region, shape)
+    centre = None if around is None else _check_centre(region, around)
     if tolerance is not None and not (np.isfinite(tolerance) and tolerance > 0.0):
         raise PoseError(f"tolerance: a length above 0 mm expected, not {tolerance:g}")
-    cells = outline(region)
-    low, high = cells.low.min(0), (cells.low + cells.size).max(0)
+    outline = find_outline_cells(region)
+    low, high = outline.low.min(0), (outline.low + outline.size).max(0)
     smallest = TOLERANCE * float((high - low).max()) if tolerance is None else float(tolerance)
-    found: list[Array] = []
-    for bottom, top in starts(region, cells, proportions, centre):
-        family = Family.of(bottom, top, proportions, centre)
+    boxes: list[Array] = []
+    for seed_low, seed_high in find_seeds(region, outline, proportions, centre):
+        family = BoxFamily.start_from(seed_low, seed_high, proportions, centre)
         z = family.first
         if proportions is None or centre is None:
-            z = climbed(region, family, z, smallest)
-        z = grown(region, family, z, smallest)
-        found.append(family.box(z))
-    found.sort(key=lambda box: -float((box[1] - box[0]).prod()))
-    proved = next((box for box in map(partial(_proved, region), found) if box is not None), None)
+            z = climb_volume(region, family, z, smallest)
+        z = grow_faces(region, family, z, smallest)
+        boxes.append(family.make_boxes(z))
+    boxes.sort(key=lambda box: -float((box[1] - box[0]).prod()))
+    proved = next((box for box in map(partial(_prove_final_box, region), boxes) if box is not None), None)
     if proved is None:
         what = "around the place" if centre is not None else "in the region"
         raise PoseError(f"no box {what} could be proved to be inside")
@@ -122,49 +122,52 @@ def largest_box(
         "around": None if centre is None else centre.tolist(),
         "tolerance": smallest,
     }
-    return Box(region, first, last, _stops(region, first, last, smallest), smallest, parameters)
+    return InscribedBox(region, first, last, _find_stops(region, first, last, smallest), smallest, parameters)
 
 
-def _proved(region: Region, box: Array) -> Array | None:
-    """The box as it will be given, proved to the last digit; a hair smaller if it must be."""
+def _prove_final_box(region: Region, box: Array) -> Array | None:
+    """Prove the box as it will be given, to the last digit, or a slightly smaller one."""
     middle, half = box.mean(0), 0.5 * (box[1] - box[0])
-    tries = np.array([box, *(np.array([middle - share * half, middle + share * half]) for share in _HAIR)])
-    good = verdicts(region, tries[:, 0], tries[:, 1]).proved
-    return np.asarray(tries[good.argmax()]) if good.any() else None
+    smaller = (np.array([middle - scale * half, middle + scale * half]) for scale in _SLIGHTLY_SMALLER)
+    tries = np.array([box, *smaller])
+    proved = prove_boxes(region, tries[:, 0], tries[:, 1]).proved
+    return np.asarray(tries[proved.argmax()]) if proved.any() else None
 
 
-def _shape(region: Region, shape: Sequence[float]) -> Array:
+def _check_shape(region: Region, shape: Sequence[float]) -> Array:
     given = np.asarray(shape, float)
     if given.shape != (len(region.free_axes),) or not (np.isfinite(given).all() and (given > 0.0).all()):
         raise PoseError(f"shape: {len(region.free_axes)} numbers above 0 expected, for {' '.join(region.free_axes)}")
     return np.asarray(given / given.max())
 
 
-def _centre(region: Region, around: ArrayLike) -> Array:
-    place = np.asarray(around, float)
-    if place.shape != (len(region.free_axes),) or not np.isfinite(place).all():
+def _check_centre(region: Region, around: ArrayLike) -> Array:
+    centre = np.asarray(around, float)
+    if centre.shape != (len(region.free_axes),) or not np.isfinite(centre).all():
         raise PoseError(f"around: {len(region.free_axes)} numbers expected, for {' '.join(region.free_axes)}")
-    found = verdicts(region, place[None], place[None])
-    if found.limit[0] >= 0:
-        where = ", ".join(f"{axis} {value:g}" for axis, value in zip(region.free_axes, place, strict=True))
-        raise PoseError(f"around: {where} is outside the region, it breaks {found.names[int(found.limit[0])]}")
-    return place
+    containment = prove_boxes(region, centre[None], centre[None])
+    if containment.limit[0] >= 0:
+        where = ", ".join(f"{axis} {value:g}" for axis, value in zip(region.free_axes, centre, strict=True))
+        name = containment.names[int(containment.limit[0])]
+        raise PoseError(f"around: {where} is outside the region, it breaks {name}")
+    return centre
 
 
-def _stops(region: Region, low: Array, high: Array, tolerance: float) -> tuple[Stop, ...]:
-    """What is met just outside each face, by layers ever thicker."""
+def _find_stops(region: Region, low: Array, high: Array, tolerance: float) -> tuple[FaceStop, ...]:
+    """Find a broken limit just outside each face, by layers ever thicker."""
     stops = []
     for axis, name in enumerate(region.free_axes):
         for side, sign in enumerate("-+"):
             layers = np.tile(np.array([low, high]), (len(_OUTSIDE), 1, 1))
             layers[:, 1 - side, axis] = (low, high)[side][axis]
             layers[:, side, axis] += (2 * side - 1) * tolerance * _OUTSIDE
-            found = verdicts(region, layers[:, 0], layers[:, 1])
-            met = np.flatnonzero(found.limit >= 0)
-            if found.proved[0] or not len(met):
-                stops.append(Stop(sign + name, None, None))
+            containment = prove_boxes(region, layers[:, 0], layers[:, 1])
+            broken = np.flatnonzero(containment.limit >= 0)
+            if containment.proved[0] or not len(broken):
+                stops.append(FaceStop(sign + name, None, None))
                 continue
-            first = met[:1]
-            pose = region.poses(found.places[first], found.turns[first])[0]
-            stops.append(Stop(sign + name, found.names[int(found.limit[first[0]])], tuple(pose.tolist())))
+            first = broken[:1]
+            pose = region.poses(containment.positions[first], containment.orientations[first])[0]
+            limit = containment.names[int(containment.limit[first[0]])]
+            stops.append(FaceStop(sign + name, limit, tuple(pose.tolist())))
     return tuple(stops)

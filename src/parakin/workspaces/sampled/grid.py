@@ -1,72 +1,80 @@
-"""The dense grid: every place of a regular lattice, looked at."""
+"""The dense grid: a workspace by the cells of a regular lattice whose middles are allowed."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from math import floor, prod
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ...arrays import Array
+from ...arrays import Array, Flags, Indices, Progress
 from ...errors import PoseError
 from ..certified.region import Region
-from ..certified.workspace import Bound
-from .sampling import TURNS_STEP, Codes, FirstBroken, Swept, centres, positive, surroundings
+from ..certified.workspace import BoundingLimit
+from .sampling import (
+    TURNS_STEP,
+    BrokenLimitFinder,
+    LimitCodes,
+    SampledWorkspace,
+    check_positive,
+    find_bounding_box,
+    list_cell_middles,
+)
 
 MOST_CELLS = 500_000_000  # a byte each
 
 
 @dataclass(frozen=True, eq=False)
-class GridWorkspace(Swept):
+class GridWorkspace(SampledWorkspace):
     """A region by the cells whose middles are allowed: ``estimate`` is their number times the volume of one.
 
-    coordinates : each axis's, mm, of the cells' middles
-    broken : as many numbers as coordinates, 0 where the place is allowed, else 1 + the index in ``region.limits`` of
-        the first limit broken: with every turn, in the first turn sample that breaks one; with some, near the middle
+    coordinates : of the cells' middles along each axis, mm
+    broken : (n, ...) as many axes as coordinates, 0 where the position is allowed, else 1 + the index in
+        ``region.limits`` of the first limit broken, as :class:`BrokenLimitFinder` finds it
     """
 
     coordinates: tuple[Array, ...]
-    broken: Codes
+    broken: LimitCodes
 
     @property
-    def mask(self) -> NDArray[np.bool_]:
-        """Where a place is allowed."""
+    def mask(self) -> Flags:
+        """Where a position is allowed."""
         return np.asarray(self.broken == 0)
 
     @cached_property
-    def _lines(self) -> list[NDArray[np.int64]]:
+    def _layer_counts(self) -> list[Indices]:
         """How many cells are allowed in each layer across each axis."""
         mask, d = self.mask, len(self.coordinates)
         return [np.count_nonzero(mask, axis=tuple(b for b in range(d) if b != a)) for a in range(d)]
 
     @property
     def empty(self) -> bool:
-        """No cell's middle is allowed; the region may still be smaller than the cells."""
-        return not self._lines[0].any()
+        """Whether no cell's middle is allowed; the region may still be smaller than the cells."""
+        return not self._layer_counts[0].any()
 
     @property
     def box(self) -> tuple[Array, Array] | None:
         """Lower and upper corner of the box about all allowed cells; None if there are none."""
         if self.empty:
             return None
-        used = [x[count > 0] for x, count in zip(self.coordinates, self._lines, strict=True)]
-        return np.array([x[0] for x in used]) - 0.5 * self.step, np.array([x[-1] for x in used]) + 0.5 * self.step
+        allowed = [x[count > 0] for x, count in zip(self.coordinates, self._layer_counts, strict=True)]
+        return np.array([x[0] for x in allowed]) - 0.5 * self.step, np.array([x[-1] for x in allowed]) + 0.5 * self.step
 
     @property
     def centroid(self) -> Array | None:
+        """The middle of the allowed cells, (d,) mm; None if there are none."""
         if self.empty:
             return None
-        lines = zip(self.coordinates, self._lines, strict=True)
-        return np.array([float(np.dot(x, count) / count.sum()) for x, count in lines])
+        layers = zip(self.coordinates, self._layer_counts, strict=True)
+        return np.array([float(np.dot(x, count) / count.sum()) for x, count in layers])
 
     @cached_property
-    def bounded_by(self) -> tuple[Bound, ...]:
-        """The limits broken just outside, with their shares of the cells' faces there, the greatest first.
+    def bounded_by(self) -> tuple[BoundingLimit, ...]:
+        """The limits broken just outside, by the number of the cells' faces there, the greatest first.
 
-        Where the region goes on beyond the grid nothing is counted.
+        Faces at the end of the grid are not counted.
         """
         names, d = self.region.limits, len(self.coordinates)
         count, total = np.zeros(len(names)), np.zeros((len(names), d))
@@ -75,66 +83,65 @@ class GridWorkspace(Swept):
             broken = self.broken.transpose(order)
             mask = broken == 0
             for outside, shift in ((mask[:-1] < mask[1:], 0), (mask[1:] < mask[:-1], 1)):
-                found = list(np.nonzero(outside))
-                found[0] = found[0] + shift
-                limit = broken[tuple(found)].astype(np.int64) - 1
+                cells = list(np.nonzero(outside))
+                cells[0] = cells[0] + shift
+                limit = broken[tuple(cells)].astype(np.int64) - 1
                 count += np.bincount(limit, minlength=len(names))
-                for b, index in zip(order, found, strict=True):
-                    place = self.coordinates[b][index] + ((0.5 - shift) * self.step if b == a else 0.0)
-                    total[:, b] += np.bincount(limit, place, len(names))
-        bounds = [
-            Bound(names[i], float(count[i] / count.sum()), tuple((total[i] / count[i]).tolist()))
+                for b, index in zip(order, cells, strict=True):
+                    coordinate = self.coordinates[b][index] + ((0.5 - shift) * self.step if b == a else 0.0)
+                    total[:, b] += np.bincount(limit, coordinate, len(names))
+        limits = [
+            BoundingLimit(names[i], float(count[i] / count.sum()), tuple((total[i] / count[i]).tolist()))
             for i in np.flatnonzero(count)
         ]
-        return tuple(sorted(bounds, key=lambda bound: -bound.share))
+        return tuple(sorted(limits, key=lambda limit: -limit.fraction))
 
 
-def dense_grid(
-    asked: Region,
+def sample_grid(
+    region: Region,
     step: float,
     box: tuple[Sequence[float], Sequence[float]] | None = None,
     turns_step: float | None = None,
-    progress: Callable[[float], None] | None = None,
+    progress: Progress | None = None,
 ) -> GridWorkspace:
-    """A region looked at in the middle of every cell of a lattice.
+    """Sample a region in the middle of every cell of a regular lattice.
 
     Parameters
     ----------
-    asked : made by :func:`parakin.workspaces.certified.region.region`
+    region : made by :func:`parakin.region`
     step : edge of the cells, mm; their middles are odd multiples of half of it
-    box : lower and upper corner, mm; only cells with their middle in it are looked at. Else all that may be allowed
-    turns_step : of swept turns samples at most so far apart, rad, are looked at, both ends included; 5° by default
+    box : lower and upper corner, mm, of the cells' middles; by default a box that holds the region
+    turns_step : between samples of the swept axes at most, rad, both ends of each range included; 5° by default
     progress : called with the fraction done
 
-    Raises :class:`PoseError` for numbers that make no sense, more than 5e8 cells, or limits that do not bound the
-    region where no box does.
+    Raises :class:`PoseError` for invalid numbers, more than 5e8 cells, or a region that neither limits nor a box bound.
     """
-    positive("step", step, "mm")
-    look = FirstBroken(asked, turns_step)
-    where = surroundings(asked) if box is None else _checked(box, asked.free_axes)
+    check_positive("step", step, "mm")
+    finder = BrokenLimitFinder(region, turns_step)
+    bounds = find_bounding_box(region) if box is None else _check_box(box, region.free_axes)
     parameters = {
-        **asked.parameters,
+        **region.parameters,
         "method": "grid",
         "step": step,
         "box": None if box is None else [list(map(float, corner)) for corner in box],
         "turns_step": TURNS_STEP if turns_step is None else turns_step,
     }
-    if where is None:
-        nothing = tuple(np.zeros(0) for _ in asked.free_axes)
-        return GridWorkspace(asked, "grid", 0.0, step, parameters, nothing, look.on_grid(nothing))
-    cells = prod(floor((b - a) / step) + 1 for a, b in zip(*where, strict=True))
+    if bounds is None:
+        coordinates = tuple(np.zeros(0) for _ in region.free_axes)
+        return GridWorkspace(region, "grid", 0.0, step, parameters, coordinates, finder.find_on_grid(coordinates))
+    cells = prod(floor((b - a) / step) + 1 for a, b in zip(*bounds, strict=True))
     if cells > MOST_CELLS:
-        room = float(np.prod([b - a for a, b in zip(*where, strict=True)]))
-        least = (room / MOST_CELLS) ** (1.0 / len(asked.free_axes))
+        volume = float(np.prod([b - a for a, b in zip(*bounds, strict=True)]))
+        least = (volume / MOST_CELLS) ** (1.0 / len(region.free_axes))
         raise PoseError(f"step: {step:g} mm makes {cells:.2g} cells, at most {MOST_CELLS:,} go; from {least:.2g} mm on")
-    coordinates = tuple(centres(a, b, step) for a, b in zip(*where, strict=True))
-    broken = look.on_grid(coordinates, progress)
+    coordinates = tuple(list_cell_middles(a, b, step) for a, b in zip(*bounds, strict=True))
+    broken = finder.find_on_grid(coordinates, progress)
     allowed = broken.size - np.count_nonzero(broken)
-    return GridWorkspace(asked, "grid", allowed * step**broken.ndim, step, parameters, coordinates, broken)
+    return GridWorkspace(region, "grid", allowed * step**broken.ndim, step, parameters, coordinates, broken)
 
 
-def _checked(box: tuple[Sequence[float], Sequence[float]], places: Sequence[str]) -> tuple[Array, Array]:
+def _check_box(box: tuple[Sequence[float], Sequence[float]], axes: Sequence[str]) -> tuple[Array, Array]:
     low, high = (np.array(corner, float).reshape(-1) for corner in box)
-    if not (len(low) == len(high) == len(places) and np.isfinite(high - low).all() and (low < high).all()):
-        raise PoseError(f"box: a lower and an upper corner expected, each of {' '.join(places)} in mm")
+    if not (len(low) == len(high) == len(axes) and np.isfinite(high - low).all() and (low < high).all()):
+        raise PoseError(f"box: a lower and an upper corner expected, each of {' '.join(axes)} in mm")
     return low, high

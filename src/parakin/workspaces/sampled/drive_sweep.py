@@ -1,5 +1,7 @@
-"""The sweep of the drives, after the HBG80 paper (section 3): some run while the others stand at a limit, and direct
-kinematics maps them to contours, to the net of the shell, and to the volume."""
+"""The sweep of the drives, after the HBG80 paper (section 3): some drives run while the others stand at a limit.
+
+Forward kinematics maps them to contours, to the net of the shell, and to the volume.
+"""
 
 from __future__ import annotations
 
@@ -12,10 +14,9 @@ import numpy as np
 
 from ...arrays import Array, Progress
 from ...errors import NoMethodError, PoseError
-from ...kernels.batch import evaluate_tape_with_residual
 from ...machine import Machine
 from ..certified.region import Region
-from .sampling import Swept
+from .sampling import SampledWorkspace
 
 NOTE = (
     "contours and nets show what the drives' limits bound; where another limit does (reach, cones, clearance) they "
@@ -23,11 +24,11 @@ NOTE = (
 )
 MOST_CELLS = 1_000_000_000
 _AT_ONCE = 1 << 18
-_SAME = 1e-6  # mm or rad: the drives come back
+_SAME = 1e-6  # mm or rad: how closely the inverse must give the drives back
 
 
 @dataclass(frozen=True)
-class Strategy:
+class DriveStrategy:
     """Which drives run, and at which limit, ``min`` or ``max``, each other one stands."""
 
     runs: tuple[str, ...]
@@ -41,53 +42,53 @@ class Strategy:
 
 
 @dataclass(frozen=True, eq=False)
-class Image:
-    """Where a strategy takes the tool, with the platform on one side of the legs' centres.
+class DriveImage:
+    """Where a strategy moves the tool, with the platform on one side of the legs' centres.
 
     side : ``home`` where the platform is on the side it has at home, else ``other``
-    joints, places : (n, d) for one drive that runs, (n, n, d) for two; places are NaN where they are not allowed
+    joints, positions : (n, d) for one drive that runs, (n, n, d) for two; positions are NaN where they are not allowed
     """
 
-    strategy: Strategy
+    strategy: DriveStrategy
     side: str
     joints: Array
-    places: Array
+    positions: Array
 
     @property
     def pieces(self) -> list[Array]:
         """A contour's parts without gaps, each (k, d)."""
-        there = ~np.isnan(self.places).any(-1)
-        edges = np.flatnonzero(np.diff(there.astype(np.int8), prepend=0, append=0))
-        return [self.places[a:b] for a, b in zip(edges[::2], edges[1::2], strict=True)]
+        allowed = ~np.isnan(self.positions).any(-1)
+        edges = np.flatnonzero(np.diff(allowed.astype(np.int8), prepend=0, append=0))
+        return [self.positions[a:b] for a, b in zip(edges[::2], edges[1::2], strict=True)]
 
 
 @dataclass(frozen=True, eq=False)
-class DriveWorkspace(Swept):
+class DriveWorkspace(SampledWorkspace):
     """A workspace as the drives reach it: ``estimate`` is |det J| summed over the drives' box, J = A⁻¹B.
 
     ``step`` is the greatest step of a drive. Images that are not allowed anywhere are left out.
     """
 
-    contours: tuple[Image, ...]
-    nets: tuple[Image, ...]
+    contours: tuple[DriveImage, ...]
+    nets: tuple[DriveImage, ...]
     note: str = NOTE
 
 
-def strategies(machine: Machine, running: int) -> list[Strategy]:
-    """All ways to let so many drives run while each other one stands at a limit."""
-    found = []
+def list_strategies(machine: Machine, running: int) -> list[DriveStrategy]:
+    """List all ways to let so many drives run while each other one stands at a limit."""
+    strategies = []
     for runs in combinations(machine.joints, running):
         others = [name for name in machine.joints if name not in runs]
         for ends in product(("min", "max"), repeat=len(others)):
-            found.append(Strategy(runs, tuple(zip(others, ends, strict=True))))
-    return found
+            strategies.append(DriveStrategy(runs, tuple(zip(others, ends, strict=True))))
+    return strategies
 
 
 def sweep_drives(region: Region, cells: int = 64, progress: Progress | None = None) -> DriveWorkspace:
-    """Find the whole workspace of a machine from its drives: cut their ranges into cells and map these forward.
+    """Sample the whole workspace of a machine from its drives: cut their ranges into cells and map these forward.
 
     A pose counts where its own inverse in the working mode gives the same drives back and every limit holds. Both
-    common points of the legs' spheres (circles) are looked at.
+    common points of the legs' spheres (circles) are tried.
 
     Parameters
     ----------
@@ -102,36 +103,34 @@ def sweep_drives(region: Region, cells: int = 64, progress: Progress | None = No
     machine = region.machine
     _refuse_others(machine)
     if region.fixed_axes or region.without:
-        raise PoseError(
-            "region: a sweep of the drives takes the whole workspace, without fixed axes and with all limits"
-        )
+        raise PoseError("region: a sweep of the drives takes the whole workspace, no fixed axes and all limits")
     d = len(machine.joints)
     if cells < 1 or cells**d > MOST_CELLS:
         raise PoseError(f"cells: 1 to {int(MOST_CELLS ** (1.0 / d) + 1e-9)} parts of each drive expected, not {cells}")
-    drives = machine.model.drives
-    step = max((drive.high - drive.low) / cells for drive in drives)
+    step = max((drive.high - drive.low) / cells for drive in machine.drives)
     parameters = {**region.parameters, "method": "drives", "cells": cells}
-    volume = _volume(machine, cells, region.mode, progress)
-    contours, nets = (_images(machine, strategies(machine, running), cells, region.mode) for running in (1, 2))
+    volume = _sum_volume(machine, cells, region.mode, progress)
+    contours, nets = (
+        _map_strategies(machine, list_strategies(machine, running), cells, region.mode) for running in (1, 2)
+    )
     return DriveWorkspace(region, "drives", volume, step, parameters, contours, nets)
 
 
 def _refuse_others(machine: Machine) -> None:
-    model, why = machine.model, ""
+    why = ""
     if any(unit == "rad" for unit in machine.axis_units):
         why = "its tool turns"
-    elif not model.by_spheres or len(machine.joints) != len(machine.axes):
+    elif not machine.has_closed_forward or len(machine.joints) != len(machine.axes):
         why = "it has not one rod for each axis"
-    elif free := [drive.name for drive in model.drives if not isfinite(drive.high - drive.low)]:
+    elif free := [drive.name for drive in machine.drives if not isfinite(drive.high - drive.low)]:
         why = f"{free[0]} has no limit to stand at"
     if why:
         raise NoMethodError(f"{machine.name}: no sweep of the drives, {why}")
 
 
-def _placed(machine: Machine, joints: Array, side: float, mode: str) -> Array:
-    """Poses on one side for joints, (N, d) each; NaN where one does not count."""
-    poses = np.empty((len(joints), len(machine.axes)))
-    residual = evaluate_tape_with_residual(machine.model.spheres_tape(side), joints, poses, np.empty((len(joints), 0)))
+def _find_poses(machine: Machine, joints: Array, side: float, mode: str) -> Array:
+    """Find the poses on one side of the legs' centres for joints, (N, d) each; NaN where one does not count."""
+    poses, residual = machine.common_points(joints, side)
     with np.errstate(invalid="ignore"):
         counts = (residual <= machine.closure_tolerance) & (abs(machine.inverse(poses, mode) - joints) <= _SAME).all(1)
     # The joints as they stand: those of the inverse lie a rounding beyond the limits.
@@ -140,39 +139,43 @@ def _placed(machine: Machine, joints: Array, side: float, mode: str) -> Array:
     return poses
 
 
-def _sides(machine: Machine) -> list[tuple[str, float]]:
-    return [("home", machine.model.home_side), ("other", -machine.model.home_side)]
+def _list_sides(machine: Machine) -> list[tuple[str, float]]:
+    return [("home", machine.home_side), ("other", -machine.home_side)]
 
 
-def _images(machine: Machine, ways: Sequence[Strategy], cells: int, mode: str) -> tuple[Image, ...]:
-    found = []
-    for way in ways:
-        stands = dict(way.stands)
+def _map_strategies(
+    machine: Machine, strategies: Sequence[DriveStrategy], cells: int, mode: str
+) -> tuple[DriveImage, ...]:
+    """Map the drives of each strategy forward, on both sides."""
+    images = []
+    for strategy in strategies:
+        stands = dict(strategy.stands)
         columns = []
-        for drive in machine.model.drives:
-            if drive.name in way.runs:
+        for drive in machine.drives:
+            if drive.name in strategy.runs:
                 columns.append(np.linspace(drive.low, drive.high, cells + 1))
             else:
                 columns.append(np.array([drive.low if stands[drive.name] == "min" else drive.high]))
         joints = np.stack(np.meshgrid(*columns, indexing="ij"), -1)
-        shape = (*[cells + 1] * len(way.runs), len(columns))
-        for name, side in _sides(machine):
-            places = _placed(machine, np.ascontiguousarray(joints.reshape(-1, len(columns))), side, mode)
-            if not np.isnan(places).all():
-                found.append(Image(way, name, joints.reshape(shape), places.reshape(shape)))
-    return tuple(found)
+        shape = (*[cells + 1] * len(strategy.runs), len(columns))
+        for name, side in _list_sides(machine):
+            poses = _find_poses(machine, np.ascontiguousarray(joints.reshape(-1, len(columns))), side, mode)
+            if not np.isnan(poses).all():
+                images.append(DriveImage(strategy, name, joints.reshape(shape), poses.reshape(shape)))
+    return tuple(images)
 
 
-def _volume(machine: Machine, cells: int, mode: str, progress: Progress | None) -> float:
-    low, high = (np.array([getattr(drive, end) for drive in machine.model.drives]) for end in ("low", "high"))
+def _sum_volume(machine: Machine, cells: int, mode: str, progress: Progress | None) -> float:
+    """Sum |det J| over the middles of the drives' cells, on both sides."""
+    low, high = (np.array([getattr(drive, end) for drive in machine.drives]) for end in ("low", "high"))
     size, d = (high - low) / cells, len(low)
     total = 0.0
     for start in range(0, cells**d, _AT_ONCE):
         stop = min(start + _AT_ONCE, cells**d)
         index = np.stack(np.unravel_index(np.arange(start, stop), (cells,) * d), 1)
         joints = low + (index + 0.5) * size
-        for _, side in _sides(machine):
-            poses = _placed(machine, joints, side, mode)
+        for _, side in _list_sides(machine):
+            poses = _find_poses(machine, joints, side, mode)
             a, b = machine.jacobians(poses[~np.isnan(poses).any(1)], mode)
             total += float(abs(np.linalg.det(b) / np.linalg.det(a)).sum())
         if progress:

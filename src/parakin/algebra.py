@@ -100,6 +100,7 @@ def _split_factor(term: Term) -> tuple[float, Term]:
 
 
 def _multiply_constant(term: Term, k: float) -> Scalar:
+    """k·term, without a node for k of 0 or 1 and without a chain of multiples."""
     if k == 0.0:
         return 0.0
     if k == 1.0:
@@ -110,6 +111,7 @@ def _multiply_constant(term: Term, k: float) -> Scalar:
 
 
 def _split_linear(term: Scalar) -> tuple[float, list[tuple[float, Term]]]:
+    """Split a scalar into a constant and multiples (k, a) of terms, whose sum it is."""
     if not isinstance(term, Term):
         return float(term), []
     if term.op == LIN:
@@ -118,6 +120,7 @@ def _split_linear(term: Scalar) -> tuple[float, list[tuple[float, Term]]]:
 
 
 def _add_multiple(x: Term, y: Scalar, sign: float) -> Scalar:
+    """x + sign·y in as few operations as there are for it; equal terms are joined."""
     if not isinstance(y, Term | float | int | np.floating):
         return NotImplemented
     kx, parts = _split_linear(x)

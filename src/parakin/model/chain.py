@@ -33,6 +33,7 @@ from .parts import ROTATIONS, TRANSLATIONS, Step
 UNIT: dict[str, Vec] = {
     word: tuple(1.0 if word[1] == letter else 0.0 for letter in "xyz") for word in (*TRANSLATIONS, *ROTATIONS)
 }
+_PARALLEL = 1e-6  # sine of the angle between two axes; below this they are parallel
 
 
 def exact_sincos(angle: float) -> tuple[float, float]:
@@ -101,16 +102,18 @@ class Pointing:
         if len(axes) != 2:
             raise DescriptionError(part, f"{len(axes)} driven turns point the tool, two are needed")
         pointing = cls(axes[0], axes[1], apply(rotation, UNIT["tz"]), (signs[0], signs[1]))
-        if norm(cross(axes[0], axes[1])) < 1e-6:
+        if norm(cross(axes[0], axes[1])) < _PARALLEL:
             raise DescriptionError(part, "its two axes are parallel and can't point the tool")
-        if norm(cross(pointing.second, pointing.start)) < 1e-6:
+        if norm(cross(pointing.second, pointing.start)) < _PARALLEL:
             raise DescriptionError(part, "its second axis lies along the tool and can't point it")
         return pointing
 
     @property
     def level(self) -> bool:
-        """Whether the direction at rest is closer to the normal of both axes than to their plane: then one of the two
-        solutions is near rest, the other far from it."""
+        """Whether the direction at rest is nearer to the normal of both axes than to their plane.
+
+        Then one of the two solutions is near rest, the other far from it.
+        """
         normal = cross(self.first, self.second)
         return bool(abs(dot(self.start, normal)) > abs(dot(self.second, cross(self.start, normal))))
 

@@ -11,7 +11,7 @@ from parakin.kinematics.wrist import PRINTED
 from parakin.machine import Machine
 from parakin.performance.singularities import singularity_margins
 from parakin.toolpath.checking.check import check_path
-from parakin.toolpath.checking.search import Search
+from parakin.toolpath.checking.motion_bisection import MotionBisection
 from parakin.toolpath.path import ToolPath
 from parakin.toolpath.posting.offences import describe_place, judge_path
 from parakin.toolpath.posting.posted import Posted
@@ -177,10 +177,10 @@ def test_offences_are_those_of_a_dense_sample(name):
     checked = check_path(posted)
     sampled = Sampled(posted, 800)
     assert checked.checked and not posted.checked
-    search = Search(posted)
+    bisection = MotionBisection(posted)
     ends = (sampled.margins[0] >= 0.0) & (sampled.margins[-1] >= 0.0)
     least = np.where(np.isnan(sampled.margins), -np.inf, sampled.margins).min(0)
-    least[~sampled.followed] = np.where(search.motions.of_serial, np.inf, least[~sampled.followed])
+    least[~sampled.followed] = np.where(bisection.motions.wrist_limits, np.inf, least[~sampled.followed])
     doubtful = ends & (np.abs(least) < SEEN)
     broken = ends & (least < -SEEN)
     found = {offence.limit: offence for offence in checked.offences}
@@ -205,10 +205,10 @@ def test_worst_values_and_first_places_are_those_of_a_dense_sample(name):
     posted = posted_on(machine, poses)
     checked = check_path(posted)
     sampled = Sampled(posted, 400)
-    of_serial = Search(posted).motions.of_serial
+    wrist_limits = MotionBisection(posted).motions.wrist_limits
     columns = {limit: i for i, limit in enumerate(machine.limits)}
     margins = np.where(np.isnan(sampled.margins), np.inf, sampled.margins)
-    margins[:, ~sampled.followed] = np.where(of_serial, np.inf, margins[:, ~sampled.followed])
+    margins[:, ~sampled.followed] = np.where(wrist_limits, np.inf, margins[:, ~sampled.followed])
     records = machine.margins(poses, posted.joints, posted.mode)
     looked = 0
     for offence in checked.offences:
@@ -425,10 +425,10 @@ def test_upright_throughout():
     poses[:, :3] += rng.uniform(-30.0, 30.0, (300, 3))
     assert check_path(posted_on(machine, poses)).first is None
     poses[:, 3] = rng.uniform(0.0, 1.5e-6, 300)  # rounding in the file
-    search = Search(posted_on(machine, poses))
-    search.run(lambda fraction: None)
-    assert not search.broken_motions.any()
-    assert search.prover.boxes < 3 * 300
+    bisection = MotionBisection(posted_on(machine, poses))
+    bisection.check_motions(lambda fraction: None)
+    assert not bisection.broken_motions.any()
+    assert bisection.prover.boxes < 3 * 300
 
 
 @pytest.mark.parametrize("c", [0.0, 40.0, -115.0])
@@ -547,11 +547,11 @@ def dense_path(machine, count):
 def test_a_dense_path_well_inside_is_proved_with_few_boxes(name):
     machine = pk.load(name)
     count = 20_000
-    search = Search(posted_on(machine, dense_path(machine, count)))
-    search.run(lambda fraction: None)
-    assert not search.broken_motions.any()
-    assert search.prover.boxes < count / 30
-    assert search.motions.looked_at < count / 30
+    bisection = MotionBisection(posted_on(machine, dense_path(machine, count)))
+    bisection.check_motions(lambda fraction: None)
+    assert not bisection.broken_motions.any()
+    assert bisection.prover.boxes < count / 30
+    assert bisection.motions.computed_points < count / 30
 
 
 def test_what_takes_too_long_is_told(monkeypatch):
@@ -559,7 +559,7 @@ def test_what_takes_too_long_is_told(monkeypatch):
     rows = poses[0] + np.linspace(0.0, 1.0, 10_001)[:, None] * (poses[1] - poses[0])
     machine = ranged(machine, {"tower_a": (700.0, machine.inverse(rows)[:, 0].max() + 1e-4)})
     assert check_path(posted_on(machine, poses)).first is None
-    monkeypatch.setattr("parakin.toolpath.checking.search.MOST_CUTS", 0)
+    monkeypatch.setattr("parakin.toolpath.checking.motion_bisection.MOST_CUTS", 0)
     checked = check_path(posted_on(machine, poses))
     assert [offence.limit for offence in checked.offences] == ["untold"]
     assert checked.first.text == "whether this motion keeps all limits can't be told"

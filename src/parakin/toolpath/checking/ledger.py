@@ -1,38 +1,46 @@
-"""What bracketing a path's motions has told so far."""
+"""What the bisection of a path's motions has proved and found: tallies of broken limits, a jump, open proofs."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
-from ..path import Floats
-from .motions import Indices
-from .sections import Flags
+from ...arrays import Array, Flags, Indices
+
+
+class WorstMargin(NamedTuple):
+    """The least margin of a limit, with its motion (-1 where there is none) and share."""
+
+    margin: float
+    motion: int
+    share: float
+
+
+NO_WORST = WorstMargin(np.inf, -1, 1.0)
 
 
 @dataclass
 class Tally:
-    """What is known of one limit broken between records.
+    """What is known of one limit that motions break between their records.
 
-    count : motions whose ends keep it
-    motion, share : the first of them, and a place on it where it is broken
-    margin, worst, at : the least margin seen, the motion and the share where
+    count : motions that break it though their ends keep it
+    motion, share : the first of these motions, and a share of it at which the limit is broken
+    worst : the least margin computed so far
     """
 
     count: int = 0
     motion: int = -1
     share: float = 1.0
-    margin: float = np.inf
-    worst: int = -1
-    at: float = 1.0
+    worst: WorstMargin = NO_WORST
 
-    def see(self, motion: Indices, share: Floats, margin: Floats) -> None:
-        """Margins at places on motions."""
+    def add_margins(self, motion: Indices, share: Array, margin: Array) -> None:
+        """Keep the least of margins (n,) at shares (n,) of motions (n,)."""
         if len(margin):
             i = int(np.argmin(margin))
-            if margin[i] < self.margin:
-                self.margin, self.worst, self.at = float(margin[i]), int(motion[i]), float(share[i])
+            if margin[i] < self.worst.margin:
+                self.worst = WorstMargin(float(margin[i]), int(motion[i]), float(share[i]))
 
 
 @dataclass(frozen=True)
@@ -40,36 +48,43 @@ class Jump:
     """A turning joint that can't go on from record to record.
 
     motion, share : where
-    by, told : rad, how far it would have to jump there, and how far it goes from record to record
-    beside : rad that the tool passes beside the joint's axis, where it changes head and table's working mode; None
-        where turns are counted wrong
+    change : rad that the joint would have to jump there
+    counted : rad that it goes from record to record by the records' own values
+    off_axis : rad that the tool passes beside the joint's axis, where the wrist changes its working mode; None where
+        turns are counted wrong
     """
 
     motion: int
     share: float
     joint: int
-    by: float
-    told: float
-    beside: float | None
+    change: float
+    counted: float
+    off_axis: float | None
 
 
 @dataclass(frozen=True, eq=False)
 class Ledger:
-    """Of some motions, (n, columns): what is still to be shown of them, what is broken, and a share where it is; and
-    (n,) how often they were cut."""
+    """The state of the proofs of n motions, one column for each limit.
 
-    need: Flags
+    unproved : (n, columns) what is still to be proved
+    broken, share : (n, columns) what is broken, and a share of the motion at which it is
+    cuts : (n,) how often the motion was cut
+    """
+
+    unproved: Flags
     broken: Flags
-    share: Floats
+    share: Array
     cuts: Indices
 
-    @staticmethod
-    def of(need: Flags) -> Ledger:
-        return Ledger(need, np.zeros(need.shape, bool), np.ones(need.shape), np.zeros(len(need), np.int64))
+    @classmethod
+    def open_for(cls, unproved: Flags) -> Ledger:
+        """Make the ledger of motions of which nothing is decided yet."""
+        shape = unproved.shape
+        return cls(unproved, np.zeros(shape, bool), np.ones(shape), np.zeros(len(unproved), np.int64))
 
-    def found(self, number: Indices, column: int, share: Floats) -> None:
-        """A column is broken on motions."""
-        new = ~self.broken[number, column]
-        self.share[number[new], column] = share[new]
+    def mark_broken(self, number: Indices, column: int, share: Array) -> None:
+        """Note that motions ``number`` break a column's limit at shares; the share noted first stays."""
+        fresh = ~self.broken[number, column]
+        self.share[number[fresh], column] = share[fresh]
         self.broken[number, column] = True
-        self.need[number, column] = False
+        self.unproved[number, column] = False

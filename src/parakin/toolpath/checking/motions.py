@@ -1,5 +1,4 @@
-"""A path between its records: the pose goes straight from one to the next, and the joints go on as the machine takes
-them."""
+"""The motions of a posted path: the pose goes straight from record to record, the joints go on without a jump."""
 
 from __future__ import annotations
 
@@ -9,138 +8,158 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from ...arrays import Array, Flags, Indices
 from ...kinematics.wrist import PRINTED, find_nearest_turn
 from ...machine import Machine
 from ...performance.characteristic_length import characteristic_length
 from ...performance.jacobians import column_scales
-from ..path import Floats
 from ..posting.posted import Posted
 
-Indices = NDArray[np.int64]
-Signs = NDArray[np.int8]
+WristModes = NDArray[np.int8]
 
-ONE, OTHER, EITHER = 0, 1, 2  # working modes of head and table: the path's own, the other one, free
-NEAR = 1e-4  # of det A at home, next to a parallel singularity
+OWN, OTHER, EITHER = 0, 1, 2  # working modes of the wrist: the path's own, its other one, either one on the pole
+NEAR_SINGULAR = 1e-4  # of det A at home: a determinant no greater is next to a parallel singularity
 SIGNLESS = 1e-12  # a determinant of unit wrenches no greater has no sign
 
 
 @dataclass(frozen=True, eq=False)
-class Places:
-    """Places on motions, n of them: poses, joints taken there, the limits' margins, head and table's working mode."""
+class MotionPoints:
+    """n points of motions: poses, the joints that the machine has there, the limits' margins, the wrist's modes."""
 
-    poses: Floats
-    joints: Floats
-    margins: Floats
-    sign: Signs
+    poses: Array
+    joints: Array
+    margins: Array
+    wrist_modes: WristModes
 
-    def take(self, which: NDArray[np.bool_] | Indices) -> Places:
-        return Places(self.poses[which], self.joints[which], self.margins[which], self.sign[which])
+    def select(self, which: Flags | Indices) -> MotionPoints:
+        """Return some of the points."""
+        return MotionPoints(self.poses[which], self.joints[which], self.margins[which], self.wrist_modes[which])
 
-    def joined(self, other: Places) -> Places:
-        poses, joints = np.concatenate([self.poses, other.poses]), np.concatenate([self.joints, other.joints])
-        margins, sign = np.concatenate([self.margins, other.margins]), np.concatenate([self.sign, other.sign])
-        return Places(poses, joints, margins, sign)
+    def append(self, other: MotionPoints) -> MotionPoints:
+        """Return these points and others behind them."""
+        return MotionPoints(
+            np.concatenate([self.poses, other.poses]),
+            np.concatenate([self.joints, other.joints]),
+            np.concatenate([self.margins, other.margins]),
+            np.concatenate([self.wrist_modes, other.wrist_modes]),
+        )
 
 
-class Motions:
-    """The motions of a posted path; motion i leads from record i - 1 to record i, i ≥ 1."""
+class PathMotions:
+    """The motions of a posted path; motion i leads from record i - 1 to record i, i ≥ 1.
+
+    wrist_limits : (limits,) which of the machine's limits bound a joint of the wrist
+    computed_points : how many points had their margins computed, a measure of the work
+    """
 
     def __init__(self, posted: Posted):
         self.posted, self.machine = posted, posted.machine
         self.wrist = self.machine.wrist
-        self.serial = [] if self.wrist is None else sorted(self.wrist.pair)
-        self.turning = [i for i, unit in enumerate(self.machine.joint_units) if unit == "rad"]
+        self.wrist_joints = [] if self.wrist is None else sorted(self.wrist.pair)
+        self.turning_joints = [i for i, unit in enumerate(self.machine.joint_units) if unit == "rad"]
         self.modes = [posted.mode] if self.wrist is None else [posted.mode, self.wrist.other_mode(posted.mode)]
-        names, ends = (
-            self.machine.limits,
-            [f"{self.machine.joints[i]}.{k}" for i in self.serial for k in ("min", "max")],
-        )
-        self.of_serial = np.array([name in ends for name in names], bool)  # columns of the limits
-        self.looked_at = 0  # places, so that the work can be told
+        ends = [f"{self.machine.joints[i]}.{side}" for i in self.wrist_joints for side in ("min", "max")]
+        self.wrist_limits = np.array([name in ends for name in self.machine.limits], bool)
+        self.computed_points = 0
 
-    def at_records(self, records: Indices) -> Places:
-        """What the path has there."""
+    def get_record_points(self, records: Indices) -> MotionPoints:
+        """Return the points at records, with the joints that the path has there."""
         poses, joints = self.posted.poses[records], self.posted.joints[records]
-        return Places(poses, joints, self._margins(poses, joints), self.signs(poses, joints))
+        return MotionPoints(poses, joints, self._compute_margins(poses, joints), self.find_wrist_modes(poses, joints))
 
-    def along(self, motion: Indices, share: Floats) -> Floats:
-        """Poses (n, axes) after a share of each motion."""
+    def interpolate_poses(self, motion: Indices, share: Array) -> Array:
+        """Interpolate poses (n, axes) at a share of each motion."""
         start, end = self.posted.poses[motion - 1], self.posted.poses[motion]
         return np.ascontiguousarray(start + share[:, None] * (end - start))
 
-    def at(self, motion: Indices, share: Floats, guess: Floats, sign: Signs) -> Places:
-        """Places on motions, with the joints nearest to ``guess``; ``sign`` is the working mode where it is known."""
-        poses = self.along(motion, share)
-        joints, sign = self._taken(poses, guess, sign)
-        return Places(poses, joints, self._margins(poses, joints), sign)
+    def compute_points(self, motion: Indices, share: Array, guess: Array, wrist_modes: WristModes) -> MotionPoints:
+        """Compute points at shares of motions, with the joints nearest to a guess (n, joints).
 
-    def _margins(self, poses: Floats, joints: Floats) -> Floats:
-        self.looked_at += len(poses)
+        wrist_modes : (n,) the wrist's working mode where it is known, else EITHER
+        """
+        poses = self.interpolate_poses(motion, share)
+        joints, wrist_modes = self._solve_nearest(poses, guess, wrist_modes)
+        return MotionPoints(poses, joints, self._compute_margins(poses, joints), wrist_modes)
+
+    def _compute_margins(self, poses: Array, joints: Array) -> Array:
+        self.computed_points += len(poses)
         return self.machine.margins(poses, joints, self.posted.mode)
 
-    def signs(self, poses: Floats, joints: Floats) -> Signs:
-        """The working mode of head and table that joints are of."""
-        signs = np.zeros(len(poses), np.int8)
+    def find_wrist_modes(self, poses: Array, joints: Array) -> WristModes:
+        """Find the wrist's working mode that joints (n, joints) of poses (n, axes) are in, (n,)."""
+        wrist_modes = np.zeros(len(poses), np.int8)
         if self.wrist is None:
-            return signs
+            return wrist_modes
         odd = np.flatnonzero(~self.wrist.has_mode(poses, joints, self.modes[0]))
-        signs[odd] = np.where(self.wrist.has_mode(poses[odd], joints[odd], self.modes[1]), OTHER, EITHER)
-        return signs
+        wrist_modes[odd] = np.where(self.wrist.has_mode(poses[odd], joints[odd], self.modes[1]), OTHER, EITHER)
+        return wrist_modes
 
-    def _taken(self, poses: Floats, guess: Floats, sign: Signs) -> tuple[Floats, Signs]:
-        joints = self._counted(self.machine.inverse(poses, self.modes[0]), guess)
+    def _solve_nearest(self, poses: Array, guess: Array, wrist_modes: WristModes) -> tuple[Array, WristModes]:
+        """Solve the inverse problem nearest to a guess; on the pole the first joint is the guess's."""
+        joints = self._count_turns(self.machine.inverse(poses, self.modes[0]), guess)
         if self.wrist is None:
             return joints, np.zeros(len(poses), np.int8)
-        other = self._counted(self.machine.inverse(poses, self.modes[1]), guess)
-        far, near = (((q - guess)[:, self.serial] ** 2).sum(1) for q in (joints, other))
-        found = np.where(sign == EITHER, np.where(near < far, OTHER, ONE), sign).astype(np.int8)
-        joints[found == OTHER] = other[found == OTHER]
+        other = self._count_turns(self.machine.inverse(poses, self.modes[1]), guess)
+        own_way, other_way = (((q - guess)[:, self.wrist_joints] ** 2).sum(1) for q in (joints, other))
+        nearer = np.where(other_way < own_way, OTHER, OWN)
+        wrist_modes = np.where(wrist_modes == EITHER, nearer, wrist_modes).astype(np.int8)
+        joints[wrist_modes == OTHER] = other[wrist_modes == OTHER]
         first = guess[:, self.wrist.first]
         free = np.flatnonzero(self.wrist.find_free(poses, PRINTED) & np.isfinite(first))
         if len(free):
             solved = self.wrist.solve_with_first(poses[free], self.modes[0], first[free])
-            joints[free] = self._counted(solved, guess[free])
-            found[free] = EITHER
-        return joints, found
+            joints[free] = self._count_turns(solved, guess[free])
+            wrist_modes[free] = EITHER
+        return joints, wrist_modes
 
-    def _counted(self, joints: Floats, guess: Floats) -> Floats:
-        for i in self.turning:
+    def _count_turns(self, joints: Array, guess: Array) -> Array:
+        """Bring turning joints within half a turn of a guess; in place."""
+        for i in self.turning_joints:
             counted = find_nearest_turn(joints[:, i], guess[:, i])
             joints[:, i] = np.where(np.isfinite(counted), counted, joints[:, i])
         return joints
 
-    @staticmethod
-    def over_the_pole(start: Places, end: Places) -> NDArray[np.bool_]:
-        """Which motions change head and table's working mode on the way.
-
-        These joints go straight from value to value, past the pole: none of their limits is broken that the ends keep.
-        """
-        return np.asarray((start.sign != end.sign) & (start.sign != EITHER) & (end.sign != EITHER))
-
-    def sides(self, places: Places) -> Floats:
-        """det A of unit wrenches, (n,): its sign changes where a parallel singularity is passed."""
+    def compute_determinants(self, points: MotionPoints) -> Array:
+        """Compute det A of unit wrenches, (n,): its sign changes where a motion passes a parallel singularity."""
         a_scale, _, n = self._scales
-        a, _, spans = self.machine.twist_rates(places.poses, places.joints)
+        a, _, spans = self.machine.twist_rates(points.poses, points.joints)
         a, legs = a * a_scale, spans.shape[1]
         size = legs if n - legs == 2 else n  # five axes: head and table never matter
         with np.errstate(all="ignore"):
-            determinant: Floats = np.linalg.det(a[:, :size, :size]) / spans.prod(1)
-        return determinant
+            determinants: Array = np.linalg.det(a[:, :size, :size]) / spans.prod(1)
+        return determinants
 
     @cached_property
-    def next_to_singular(self) -> float:
-        """A determinant no greater is as good as 0."""
+    def singular_determinant(self) -> float:
+        """The greatest determinant that counts as next to a parallel singularity."""
         home = self.machine.home[None]
         joints = self.machine.inverse(home, self.posted.mode)
-        at_home = abs(float(self.sides(Places(home, joints, np.empty((1, 0)), np.zeros(1, np.int8)))[0]))
-        return NEAR * at_home if at_home > SIGNLESS else SIGNLESS
+        points = MotionPoints(home, joints, np.empty((1, 0)), np.zeros(1, np.int8))
+        at_home = abs(float(self.compute_determinants(points)[0]))
+        return NEAR_SINGULAR * at_home if at_home > SIGNLESS else SIGNLESS
 
     @cached_property
-    def _scales(self) -> tuple[Floats, Floats, int]:
+    def _scales(self) -> tuple[Array, Array, int]:
         return (*column_scales(self.machine, characteristic_length(self.machine)), len(self.machine.axes))
 
 
-def machine_size(machine: Machine) -> float:
-    """The greatest length that a limit names, mm; at least 1."""
+def find_pole_crossings(first: MotionPoints, last: MotionPoints) -> Flags:
+    """Find motions (n,) that pass over the wrist's pole: its working mode is another at their end.
+
+    The wrist's joints go straight from value to value there, past the pole: these motions break no limit of a wrist
+    joint that their ends keep.
+    """
+    one, two = first.wrist_modes, last.wrist_modes
+    return np.asarray((one != two) & (one != EITHER) & (two != EITHER))
+
+
+def merge_wrist_modes(one: WristModes, two: WristModes) -> WristModes:
+    """Merge the modes (n,) at both ends of ways into the one that holds on the way; EITHER where it is not known."""
+    merged = np.where(one == EITHER, two, np.where((two == EITHER) | (two == one), one, EITHER))
+    return merged.astype(np.int8)
+
+
+def measure_machine_size(machine: Machine) -> float:
+    """Return the greatest length that a limit names, mm; at least 1."""
     sizes = [abs(limit.bound) for limit in machine.limit_parts if limit.unit != "rad"]
     return max([1.0, *sizes])

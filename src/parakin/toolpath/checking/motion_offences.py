@@ -1,0 +1,52 @@
+"""Offences on motions: a limit of the machine, turns that can't go on, a singularity, an undecided motion."""
+
+from __future__ import annotations
+
+import math
+
+from ...kinematics.wrist import TURN
+from ..posting.offences import SINGULARITY, TURNS, UNDECIDED, describe_broken_limit, format_measure
+from ..posting.posted import Offence, Posted
+from .ledger import WorstMargin
+from .motion_bisection import MotionBisection
+
+
+def make_limit_offence(posted: Posted, column: int, worst: WorstMargin, begins: float, count: int) -> Offence:
+    """Make the offence of a limit of the machine, by its worst margin on a motion."""
+    limit = posted.machine.limit_parts[column]
+    described = describe_broken_limit(limit, -worst.margin)
+    line = int(posted.path.line[worst.motion])
+    return Offence(limit.name, described.text, worst.motion, line, *described.numbers, count, worst.share, begins)
+
+
+def make_turns_offence(posted: Posted, bisection: MotionBisection) -> Offence:
+    """Make the offence of the first turning joint that jumps, or turns farther than the records tell."""
+    jump = bisection.jump
+    assert jump is not None
+    name, line = posted.machine.joints[jump.joint], int(posted.path.line[jump.motion])
+    count = bisection.tallies[bisection.turns].count
+    if jump.off_axis is None:
+        swing = jump.counted - TURN * round(jump.change / TURN)
+        by, counted = (format_measure(angle, "rad", 0.0) for angle in (swing, jump.counted))
+        text = f"joint {name} would turn by {by} from the record before, not by {counted}"
+        excess = abs(swing - jump.counted)
+        return Offence(TURNS, text, jump.motion, line, swing, jump.counted, "rad", excess, count)
+    by, beside = (format_measure(abs(angle), "rad", 0.0) for angle in (jump.change, jump.off_axis))
+    text = f"joint {name} would have to turn by {by} at once, where the tool passes {beside} beside its axis"
+    share, change = jump.share, abs(jump.change)
+    return Offence(TURNS, text, jump.motion, line, change, 0.0, "rad", change, count, share, share)
+
+
+def make_singularity_offence(posted: Posted, motion: int, share: float, count: int) -> Offence:
+    """Make the offence of a parallel singularity on a motion."""
+    line = int(posted.path.line[motion])
+    text = "the machine would pass a parallel singularity"
+    return Offence(SINGULARITY, text, motion, line, 0.0, 0.0, "1", math.inf, count, share, share)
+
+
+def make_undecided_offence(posted: Posted, bisection: MotionBisection) -> Offence:
+    """Make the offence of the first motion that bisection could not decide."""
+    tally = bisection.tallies[bisection.undecided]
+    text = "whether this motion keeps all limits can't be told"
+    line = int(posted.path.line[tally.motion])
+    return Offence(UNDECIDED, text, tally.motion, line, math.nan, 0.0, "1", math.inf, tally.count)

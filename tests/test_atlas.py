@@ -10,16 +10,29 @@ from scipy.spatial.transform import Rotation
 
 import parakin as pk
 from parakin.cli import main
-from parakin.performance.certified.interval_matrices import Over
-from parakin.performance.certified.proofs import amplification, amplification_brackets, box_of, no_singularity
-from parakin.performance.characteristic_length import characteristic_length
+from parakin.performance.certified.interval_matrices import MatrixBounds
+from parakin.performance.certified.proofs import (
+    bracket_extremes,
+    make_pose_box,
+    prove_amplification,
+    prove_no_singularity,
+)
+from parakin.performance.characteristic_length import choose_characteristic_length
 from parakin.performance.extremes import MEASURES
-from parakin.performance.indices import performance
-from parakin.performance.jacobians import twist_jacobians, twist_names
-from parakin.performance.singularities import margin_names, singularity_margins
+from parakin.performance.indices import compute_performance
+from parakin.performance.jacobians import list_twist_names
+from parakin.performance.singularities import compute_singularity_margins, list_margin_names
 
 NAMES = pk.machines()
 everyone = pytest.mark.parametrize("m", [pk.load(name) for name in NAMES], ids=NAMES)
+
+
+def twist_jacobians(machine, poses, mode=None):
+    """A and B of the twist at poses (..., axes)."""
+    poses = np.asarray(poses, float)
+    rows, n = poses.reshape(-1, poses.shape[-1]), len(machine.axes)
+    a, b, _ = machine.twist_rates(rows, machine.inverse(rows, mode))
+    return a.reshape(*poses.shape[:-1], n, n), b.reshape(*poses.shape[:-1], n, n)
 
 
 def allowed_poses(m, count, seed=0):
@@ -37,7 +50,7 @@ def allowed_poses(m, count, seed=0):
 def moved(m, poses, component, step):
     """The poses after the tool has gone on by a step of one component of the twist, by geometry of their own."""
     poses = poses.copy()
-    name = twist_names(m)[component]
+    name = list_twist_names(m)[component]
     if name in "XYZ":
         poses[:, m.axes.index(name)] += step
     elif name in ("w1", "w2"):
@@ -69,7 +82,7 @@ def differences(m, poses, component, step, mode):
 def check_rates(m, poses, mode=None):
     """A t' = B q' against differences of the inverse, where two step widths agree."""
     a, b = twist_jacobians(m, poses, mode)
-    for component, name in enumerate(twist_names(m)):
+    for component, name in enumerate(list_twist_names(m)):
         h = 1e-2 if name in "XYZ" else 1e-4
         slopes, other = (differences(m, poses, component, step, mode) for step in (h, 0.5 * h))
         good = np.abs(slopes - other).max(1) < 1e-7 * (1 + np.abs(slopes).max(1))
@@ -135,7 +148,7 @@ def test_performance_of_the_orthoglide_is_that_of_its_rods():
     poses = np.random.default_rng(4).uniform(-110, 70, (50, 3))
     rods = poses[:, None, :] - m.inverse(poses)[:, :, None] * np.eye(3)
     j = np.linalg.inv(rods / np.einsum("nii->ni", rods)[:, :, None])
-    found = performance(m, poses.reshape(5, 10, 3))
+    found = compute_performance(m, poses.reshape(5, 10, 3))
     psi = np.linalg.svd(j, compute_uv=False).reshape(5, 10, 3)
     assert np.allclose(found.psi, psi, rtol=1e-12)
     assert np.allclose(found.condition, psi[..., 0] / psi[..., 2])
@@ -157,7 +170,7 @@ def test_the_condition_number_takes_no_root_of_its_own():
     m = pk.load("orthoglide")
     t = 60.0
     v = t / np.sqrt(m.spec.sizes["L"] ** 2 - 2 * t * t)
-    found = performance(m, [t, t, t])
+    found = compute_performance(m, [t, t, t])
     assert found.condition == pytest.approx((1 + v) / (1 - 2 * v), rel=1e-12)
     assert found.psi == pytest.approx([1 / (1 - 2 * v), 1 / (1 + v), 1 / (1 + v)], rel=1e-12)
 
@@ -165,7 +178,7 @@ def test_the_condition_number_takes_no_root_of_its_own():
 @pytest.mark.parametrize("name", ["orthoglide", "hbg80_3d"])
 def test_isotropic_at_home(name):
     m = pk.load(name)
-    found = performance(m, m.home)
+    found = compute_performance(m, m.home)
     assert found.psi == pytest.approx([1, 1, 1], abs=1e-12)
     assert found.margins == pytest.approx([1, 1, 1, 1], abs=1e-12)
 
@@ -174,7 +187,7 @@ def test_isotropic_at_home(name):
 def test_singular_and_unreachable_poses_are_told_without_a_warning():
     m = pk.load("lambda6")
     centre = m.home * [1, 1, 1, 1, 1, 0]
-    found = performance(m, [centre, m.home, [9e3, 0, 0, 0, 0, 0]])
+    found = compute_performance(m, [centre, m.home, [9e3, 0, 0, 0, 0, 0]])
     assert found.greatest[0] == found.condition[0] == np.inf
     assert abs(found.margins[0, 0]) < 1e-14
     assert found.margins[1, 0] > 0.5
@@ -182,23 +195,23 @@ def test_singular_and_unreachable_poses_are_told_without_a_warning():
     assert np.isnan(found.margins[2]).all()
     assert np.isfinite(found.psi[1]).all()
     beyond = centre - [0, 0, 0, 0, 0, 0.3]
-    assert singularity_margins(m, beyond)[0] < 0
+    assert compute_singularity_margins(m, beyond)[0] < 0
     m = pk.load("tricept")
-    found = performance(m, m.home)  # θ2 = 0
+    found = compute_performance(m, m.home)  # θ2 = 0
     assert found.least == 0.0
     assert found.condition == np.inf
     assert found.manipulability == 0.0
     assert np.isfinite(found.greatest)
     assert found.margins[-1] == 0.0
-    assert performance(m, np.zeros((0, 5))).psi.shape == (0, 5)
+    assert compute_performance(m, np.zeros((0, 5))).psi.shape == (0, 5)
 
 
 @pytest.mark.parametrize("name", ["tricept", "orthoglide5_head"])
 def test_the_heads_margin_is_the_sine_of_its_second_angle(name):
     m = pk.load(name)
     poses = allowed_poses(m, 50)
-    margins = singularity_margins(m, poses)
-    assert margin_names(m)[-1] == "serial theta1-theta2"
+    margins = compute_singularity_margins(m, poses)
+    assert list_margin_names(m)[-1] == "serial theta1-theta2"
     assert np.allclose(margins[:, -1], np.abs(np.sin(m.inverse(poses)[:, -1])), atol=1e-12)
 
 
@@ -215,26 +228,26 @@ def test_the_parallel_margin_of_a_hexapod_is_that_of_its_lines():
         lines.append(np.concatenate([unit, np.cross(arm, unit) / length], 1))
     det = np.linalg.det(np.stack(lines, 1))
     assert (np.sign(det) == np.sign(det[0])).all()
-    assert np.allclose(singularity_margins(m, poses, length)[:, 0], np.abs(det), rtol=1e-9)
+    assert np.allclose(compute_singularity_margins(m, poses, length)[:, 0], np.abs(det), rtol=1e-9)
 
 
 def test_the_length_makes_angles_millimetres():
     m = pk.load("hexapod")
-    rule = characteristic_length(m)
+    rule = choose_characteristic_length(m)
     corners = np.array([leg.platform for leg in m.spec.legs])
     assert rule.value == pytest.approx(np.sqrt(np.square(corners - corners.mean(0)).sum(1).mean()))
     pose = allowed_poses(m, 1)[0]
-    one, two = performance(m, pose, 100.0), performance(m, pose, 200.0)
+    one, two = compute_performance(m, pose, 100.0), compute_performance(m, pose, 200.0)
     assert two.manipulability / one.manipulability == pytest.approx(8.0)
     a, b = twist_jacobians(m, pose)
     j = np.diag([1, 1, 1, 100, 100, 100]) @ np.linalg.solve(a, b)
     assert one.psi == pytest.approx(np.linalg.svd(j, compute_uv=False))
-    assert characteristic_length(pk.load("tricept")).value == pytest.approx(150.0)
-    assert characteristic_length(pk.load("orthoglide5_table")).value == pytest.approx(100.0)
-    assert characteristic_length(pk.load("linear_delta")).value is None
+    assert choose_characteristic_length(pk.load("tricept")).value == pytest.approx(150.0)
+    assert choose_characteristic_length(pk.load("orthoglide5_table")).value == pytest.approx(100.0)
+    assert choose_characteristic_length(pk.load("linear_delta")).value is None
     for wrong in (0.0, -1.0, np.nan, np.inf):
         with pytest.raises(pk.PoseError):
-            performance(m, pose, wrong)
+            compute_performance(m, pose, wrong)
 
 
 # The atlas.
@@ -248,7 +261,7 @@ def test_isotropic_poses_of_the_workspace(name, count):
     assert len(found.isotropic) == count  # home, and its image beyond a parallel singularity
     assert np.abs(found.isotropic - m.home).max(1).min() < 1e-6
     assert (m.check(found.isotropic) == 0).all()
-    assert np.allclose(performance(m, found.isotropic).condition, 1.0, atol=1e-8)
+    assert np.allclose(compute_performance(m, found.isotropic).condition, 1.0, atol=1e-8)
     assert found.singular
     assert found.extreme("condition", "least").value == pytest.approx(1.0, abs=1e-9)
     assert found.extreme("condition", "greatest").value == np.inf
@@ -268,10 +281,10 @@ def test_no_sample_of_the_workspace_is_beyond_its_extremes(name):
     samples[:, 3:] = m.home[3:]
     samples = samples[m.check(samples) == 0]
     assert len(samples) > 4000
-    told = performance(m, samples)
+    told = compute_performance(m, samples)
     for extreme in found.extremes:
         assert m.check(extreme.pose) == 0
-        at = performance(m, extreme.pose)
+        at = compute_performance(m, extreme.pose)
         names = told.margin_names
         values, value = (
             (getattr(told, extreme.quantity), getattr(at, extreme.quantity))
@@ -307,7 +320,7 @@ def test_an_atlas_of_a_slice_and_questions_that_make_no_sense():
 
 
 def cube(m, low, high):
-    return box_of(m, dict.fromkeys(m.axes, (low, high)))
+    return make_pose_box(m, dict.fromkeys(m.axes, (low, high)))
 
 
 BOXES = {
@@ -325,16 +338,16 @@ BOXES = {
 
 @everyone
 def test_bounds_over_boxes_hold_the_rates_at_their_samples(m):
-    box = box_of(m, BOXES[m.name])
+    box = make_pose_box(m, BOXES[m.name])
     points = np.random.default_rng(6).uniform(box.low, box.high, (500, len(box.spans)))
     scale = box.length.factor
-    turns = len(m.model.structure.turns)
+    turns = len(m.structure.turns)
     columns = {
         "a": np.array([1.0] * (len(m.axes) - turns) + [1 / scale] * turns),
         "b": np.where(np.array(m.joint_units) == "rad", 1 / scale, 1.0),
     }
     for name, rates in zip("ab", twist_jacobians(m, box.poses(points)), strict=True):
-        found = Over(getattr(box, name), box.inputs, box.trace)(box.low[None], box.high[None])
+        found = MatrixBounds(getattr(box, name), box.inputs, box.trace)(box.low[None], box.high[None])
         assert found.bounded.all()
         linear = found.middle[0] + np.einsum("nd,dij->nij", points - 0.5 * (box.low + box.high), found.slopes[0])
         size = np.abs(found.middle).max()
@@ -344,15 +357,15 @@ def test_bounds_over_boxes_hold_the_rates_at_their_samples(m):
 
 @everyone
 def test_brackets_hold_the_amplification_of_every_sample(m):
-    box = box_of(m, BOXES[m.name])
-    found = amplification_brackets(box, tolerance=1e-3, boxes=6_000)
+    box = make_pose_box(m, BOXES[m.name])
+    found = bracket_extremes(box, tolerance=1e-3, boxes=6_000)
     points = np.random.default_rng(6).uniform(box.low, box.high, (5000, len(box.spans)))
-    told = performance(m, box.poses(points))
+    told = compute_performance(m, box.poses(points))
     least, greatest = found.brackets
     assert told.greatest.max() <= greatest.high
     assert told.least.min() >= least.low
-    assert performance(m, greatest.pose).greatest == pytest.approx(greatest.low)
-    assert performance(m, least.pose).least == pytest.approx(least.high)
+    assert compute_performance(m, greatest.pose).greatest == pytest.approx(greatest.low)
+    assert compute_performance(m, least.pose).least == pytest.approx(least.high)
     assert greatest.low >= told.greatest.max() * (1 - 1e-6)
     if m.name != "tricept":
         assert least.closed
@@ -366,16 +379,16 @@ def test_brackets_hold_the_amplification_of_every_sample(m):
 
 @everyone
 def test_boxes_are_proved_free_of_singularities(m):
-    box = box_of(m, BOXES[m.name])
+    box = make_pose_box(m, BOXES[m.name])
     for kind in ("parallel", "serial"):
-        assert no_singularity(box, kind).verdict == "proved"
+        assert prove_no_singularity(box, kind).verdict == "proved"
 
 
 def test_the_shipped_orthoglide_keeps_its_bounds_in_its_cube():
     m = pk.load("orthoglide")
     rod = m.spec.sizes["L"]
     low, high = -2 * rod / np.sqrt(17), rod / np.sqrt(11)
-    proof = amplification(cube(m, low, high), 1 / 3, 3)
+    proof = prove_amplification(cube(m, low, high), 1 / 3, 3)
     assert proof.verdict == "proved"
     assert proof.counterexample is None
     assert proof.tolerance == 1e-6
@@ -389,45 +402,45 @@ def test_the_shipped_orthoglide_keeps_its_bounds_in_its_cube():
 def test_a_false_claim_on_the_amplification_is_refuted_by_a_pose():
     m = pk.load("orthoglide")
     for low, high, bounds in ((-100, 90, (1 / 3, 3)), (-100, 60, (0.6, 3)), (-123.4, 76, (1 / 3, 2.999))):
-        proof = amplification(cube(m, low, high), *bounds)
+        proof = prove_amplification(cube(m, low, high), *bounds)
         assert proof.verdict == "refuted"
-        psi = performance(m, proof.counterexample).psi
+        psi = compute_performance(m, proof.counterexample).psi
         assert psi.max() > bounds[1] * (1 + 1e-6) or psi.min() < bounds[0] * (1 - 1e-6)
         assert ((proof.counterexample >= low) & (proof.counterexample <= high)).all()
 
 
 def test_singularities_are_met():
     m = pk.load("orthoglide")
-    proof = no_singularity(cube(m, -100, 150), "parallel")
+    proof = prove_no_singularity(cube(m, -100, 150), "parallel")
     assert proof.verdict == "refuted"
-    assert abs(singularity_margins(m, proof.counterexample)[0]) < 1e-12
-    proof = amplification(cube(m, -100, 150), 0.1, 100.0)
+    assert abs(compute_singularity_margins(m, proof.counterexample)[0]) < 1e-12
+    proof = prove_amplification(cube(m, -100, 150), 0.1, 100.0)
     assert proof.verdict == "refuted"
-    assert performance(m, proof.counterexample).greatest > 1e6
+    assert compute_performance(m, proof.counterexample).greatest > 1e6
     m = pk.load("lambda6")
-    for box in (box_of(m, {"C": (-0.1, 0.3)}), box_of(m, {}, at={"C": 0.0})):
-        proof = no_singularity(box, "parallel")
+    for box in (make_pose_box(m, {"C": (-0.1, 0.3)}), make_pose_box(m, {}, at={"C": 0.0})):
+        proof = prove_no_singularity(box, "parallel")
         assert proof.verdict == "refuted"
         assert abs(proof.counterexample[5]) < 1e-9
-        assert no_singularity(box, "serial").verdict == "proved"
+        assert prove_no_singularity(box, "serial").verdict == "proved"
     m = pk.load("tricept")
-    box = box_of(m, {"X": (-110, 90), "Y": (-130, 70), "Z": (-1650, -1500)})
-    proof = no_singularity(box, "serial")
+    box = make_pose_box(m, {"X": (-110, 90), "Y": (-130, 70), "Z": (-1650, -1500)})
+    proof = prove_no_singularity(box, "serial")
     assert proof.verdict == "refuted"
     assert np.abs(proof.counterexample[:2]).max() < 1e-5  # the wrist stands straight
-    assert no_singularity(box, "parallel").verdict == "proved"
+    assert prove_no_singularity(box, "parallel").verdict == "proved"
 
 
 def test_a_box_out_of_reach_is_refuted_and_one_out_of_time_is_left_open():
     m = pk.load("orthoglide")
-    proof = no_singularity(cube(m, -100, 200), "serial")
+    proof = prove_no_singularity(cube(m, -100, 200), "serial")
     assert proof.verdict == "refuted"
     assert "does not reach" in proof.reason
     assert np.isnan(m.inverse(proof.counterexample)).all()
-    proof = no_singularity(cube(m, -120, 75), "parallel", boxes=2)
+    proof = prove_no_singularity(cube(m, -120, 75), "parallel", boxes=2)
     assert proof.verdict == "undecided"
     assert proof.counterexample is not None
-    proof = amplification(cube(m, -120, 75), 0.4, 2.9999, boxes=10)
+    proof = prove_amplification(cube(m, -120, 75), 0.4, 2.9999, boxes=10)
     assert proof.verdict == "undecided"
     assert "psi lies between" in proof.reason
 
@@ -437,14 +450,14 @@ def test_boxes_that_are_none():
     wrong = [{"Q": (0, 1)}, {"X": (1, 0)}, {"X": (0, np.inf)}]
     for spans in wrong:
         with pytest.raises(pk.PoseError):
-            box_of(m, spans)
+            make_pose_box(m, spans)
     for at in ({"X": 0.0}, {"Y": np.nan}, {"Q": 0.0}):
         with pytest.raises(pk.PoseError):
-            box_of(m, {"X": (0, 1)}, at)
-    box = box_of(m, {"X": (0, 1)})
+            make_pose_box(m, {"X": (0, 1)}, at)
+    box = make_pose_box(m, {"X": (0, 1)})
     for bounds in ((-1, 2), (2, 1), (0, np.inf)):
         with pytest.raises(pk.PoseError):
-            amplification(box, *bounds)
+            prove_amplification(box, *bounds)
 
 
 # The command.
@@ -459,7 +472,7 @@ def test_the_command_at_a_pose(capsys):
     said = json.loads(told(capsys, "tricept", "--pose", "X=100,Z=-1500,B=10", "--json"))
     assert said["schema"] == "parakin.atlas/1"
     m = pk.load("tricept")
-    found = performance(m, [100, 0, -1500, np.radians(10), 0])
+    found = compute_performance(m, [100, 0, -1500, np.radians(10), 0])
     pose = said["pose"]
     assert pose["pose"] == pytest.approx({"X": 100, "Y": 0, "Z": -1500, "B": 10, "C": 0})
     assert pose["condition"] == pytest.approx(float(found.condition))
@@ -489,7 +502,7 @@ def test_the_command_over_the_workspace(capsys, tmp_path):
     assert (poses[:, 2] == -20).all()
     assert np.array_equal([row["allowed"] == "1" for row in rows], m.check(poses) == 0)
     values = np.array([float(row["condition number"]) for row in rows])
-    assert np.allclose(values, performance(m, poses).condition, rtol=1e-8)
+    assert np.allclose(values, compute_performance(m, poses).condition, rtol=1e-8)
 
 
 def test_the_command_proves_and_refutes(capsys):
@@ -501,7 +514,7 @@ def test_the_command_proves_and_refutes(capsys):
     said = json.loads(told(capsys, "orthoglide", "--box", box, "--amplification", "1/2:2", "--json", code=3))
     assert said["verdict"] == "refuted"
     pose = said["box"]["claims"][2]["counterexample"]
-    assert performance(pk.load("orthoglide"), list(pose.values())).greatest > 2
+    assert compute_performance(pk.load("orthoglide"), list(pose.values())).greatest > 2
     assert "refuted" in told(capsys, "orthoglide", "--box", box, "--amplification", "1/2:2", code=3)
 
 

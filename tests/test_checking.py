@@ -9,7 +9,7 @@ import pytest
 import parakin as pk
 from parakin.kinematics.wrist import PRINTED
 from parakin.machine import Machine
-from parakin.performance.singularities import singularity_margins
+from parakin.performance.singularities import compute_singularity_margins
 from parakin.toolpath.checking.check import check_path
 from parakin.toolpath.checking.motion_bisection import MotionBisection
 from parakin.toolpath.path import ToolPath
@@ -518,7 +518,7 @@ def test_parallel_singularities_are_those_of_a_dense_sample():
     posted = posted_on(machine, poses)
     checked = check_path(posted)
     share = np.linspace(0.0, 1.0, 400)[:, None, None]
-    margin = singularity_margins(machine, poses[:-1] + share * np.diff(poses, axis=0))[:, :, 0]
+    margin = compute_singularity_margins(machine, poses[:-1] + share * np.diff(poses, axis=0))[:, :, 0]
     crossed = margin.min(0) * margin.max(0) < 0.0
     near = ~crossed & (np.abs(margin).min(0) < 1e-3)
     offence = {offence.limit: offence for offence in checked.offences}["singularity"]

@@ -7,12 +7,12 @@ import pytest
 
 import parakin as pk
 from parakin.cli import main
-from parakin.performance.design import DESIGNS, orthoglide
-from parakin.performance.indices import performance
+from parakin.performance.design import DESIGNS, design_orthoglide
+from parakin.performance.indices import compute_performance
 
 
 def test_the_shipped_orthoglide_is_the_design_for_200_mm_and_3():
-    found, m = orthoglide(200.0, 3.0), pk.load("orthoglide")
+    found, m = design_orthoglide(200.0, 3.0), pk.load("orthoglide")
     assert found.rod == pytest.approx(254.264, abs=5e-4)
     assert found.stroke == pytest.approx((61.668, 330.928), abs=5e-4)
     assert found.cube == pytest.approx((-123.336, 76.664), abs=5e-4)
@@ -27,19 +27,19 @@ def test_the_shipped_orthoglide_is_the_design_for_200_mm_and_3():
 
 @pytest.mark.parametrize("bound", [1.001, 1.3, 1.8, 2.0, 2.5, 4.0, 10.0, 100.0])
 def test_psi_stays_within_its_bounds_and_reaches_them(bound):
-    found = orthoglide(300.0, bound)
+    found = design_orthoglide(300.0, bound)
     low, high = found.cube
     m = found.machine
     assert high - low == pytest.approx(300.0)
     corners = np.array(np.meshgrid(*[[low, high]] * 3)).reshape(3, -1).T
     inside = np.random.default_rng(1).uniform(low, high, (20_000, 3))
     poses = np.concatenate([corners, inside])
-    told = performance(m, poses)
+    told = compute_performance(m, poses)
     assert told.greatest.max() <= bound * (1 + 1e-9)
     assert told.least.min() >= (1 - 1e-9) / bound
     assert (m.check(inside) == 0).all()
     assert (m.margins(corners) > -1e-9 * found.rod).all()
-    ends = performance(m, [[low] * 3, [high] * 3])  # one bound at least is reached in both corners
+    ends = compute_performance(m, [[low] * 3, [high] * 3])  # one bound at least is reached in both corners
     reached = np.maximum(ends.greatest, 1 / ends.least)
     assert reached == pytest.approx([bound, bound], rel=1e-9)
     assert found.proof.verdict == "proved"
@@ -47,7 +47,7 @@ def test_psi_stays_within_its_bounds_and_reaches_them(bound):
 
 
 def test_no_lesser_stroke_holds_the_cube():
-    found = orthoglide(200.0, 3.0)
+    found = design_orthoglide(200.0, 3.0)
     low, high = found.cube
     grid = np.linspace(low, high, 61)
     joints = found.machine.inverse(np.stack(np.meshgrid(grid, grid, np.append(grid, 0.0)), -1).reshape(-1, 3))
@@ -73,7 +73,7 @@ def test_no_lesser_stroke_holds_the_cube():
 )
 def test_refusals(cube, bound):
     with pytest.raises(pk.PoseError) as caught:
-        orthoglide(cube, bound)
+        design_orthoglide(cube, bound)
     assert "expected" in str(caught.value)
 
 
@@ -89,7 +89,7 @@ def test_the_command(capsys, tmp_path):
     m = pk.load(path)
     assert m.spec.sizes["L"] == said["rod"]
     assert [m.model.drives[0].low, m.model.drives[0].high] == said["stroke"]
-    assert performance(m, said["cube"]).greatest == pytest.approx([3.0, 3.0])
+    assert compute_performance(m, said["cube"]).greatest == pytest.approx([3.0, 3.0])
     assert main(["design", "orthoglide", "--cube", "200", "--amplification", "3"]) == 0
     out = capsys.readouterr().out
     assert "254.2645 mm" in out

@@ -13,7 +13,7 @@ import parakin as pk
 from parakin.export.workspace.cells import cells_csv, cells_vtu
 from parakin.export.workspace.meshes import mesh_file, shell
 from parakin.export.workspace.summary import amount, asked, between
-from parakin.performance.indices import performance
+from parakin.performance.indices import compute_performance
 from parakin.workspaces.sampled.cross_sections import compute_signed_area, find_cross_sections
 from parakin.workspaces.sampled.distance_field import DistanceField, sample_field
 
@@ -331,7 +331,7 @@ def test_vtu_tells_the_performance_at_the_cells(tmp_path):
     assert data["amplification_greatest"][inside] == pytest.approx(psi[:, 0])
     assert data["amplification_least"][inside] == pytest.approx(psi[:, 2])
     assert data["condition"][inside] == pytest.approx(psi[:, 0] / psi[:, 2])
-    out = np.isnan(performance(found.machine, middles).condition)
+    out = np.isnan(compute_performance(found.machine, middles).condition)
     assert (np.isnan(data["condition"]) == out).all()
 
 

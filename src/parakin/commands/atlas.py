@@ -20,8 +20,8 @@ from .values import parse_row, parse_value
 if TYPE_CHECKING:
     from ..arrays import Array
     from ..machine import Machine
-    from ..performance.atlas import Atlas, Map
-    from ..performance.certified.proofs import Brackets, Proof
+    from ..performance.atlas import Atlas, PerformanceMap
+    from ..performance.certified.proofs import AmplificationBrackets, Proof
     from ..performance.indices import Performance
     from ..workspaces.certified.region import Region
 
@@ -146,13 +146,13 @@ class _Found:
         self.broken = ""
         self.spans: Spans = {}
         self.proofs: list[Proof] = []
-        self.brackets: Brackets | None = None
+        self.brackets: AmplificationBrackets | None = None
         self.atlas: Atlas | None = None
 
     def look(self, pose: Array, length: float | None) -> None:
-        from ..performance.indices import performance
+        from ..performance.indices import compute_performance
 
-        self.pose = performance(self.machine, pose, length, self.asked.mode)
+        self.pose = compute_performance(self.machine, pose, length, self.asked.mode)
         broken = int(self.machine.check(pose, mode=self.asked.mode))
         self.broken = self.machine.limits[broken - 1] if broken else ""
 
@@ -164,30 +164,35 @@ class _Found:
         length: float | None,
         progress: Progress,
     ) -> None:
-        from ..performance.certified.proofs import amplification, amplification_brackets, box_of, no_singularity
+        from ..performance.certified.proofs import (
+            bracket_extremes,
+            make_pose_box,
+            prove_amplification,
+            prove_no_singularity,
+        )
 
         self.spans = spans
-        box = box_of(self.machine, spans, at, length, self.asked.mode)
-        self.proofs = [no_singularity(box, "parallel"), no_singularity(box, "serial")]
+        box = make_pose_box(self.machine, spans, at, length, self.asked.mode)
+        self.proofs = [prove_no_singularity(box, "parallel"), prove_no_singularity(box, "serial")]
         told = progress.part("proving", 0.0, 1.0)
         if bounds is not None:
-            self.proofs.append(amplification(box, *bounds, progress=told))
+            self.proofs.append(prove_amplification(box, *bounds, progress=told))
         elif all(proof.verdict == "proved" for proof in self.proofs):
-            self.brackets = amplification_brackets(box, progress=told)
+            self.brackets = bracket_extremes(box, progress=told)
 
     def draw(self, step: float | None, length: float | None, progress: Progress) -> None:
         from ..performance.atlas import atlas
 
         self.atlas = atlas(self.asked, step, length, progress.part("looking at the workspace", 0.0, 1.0))
 
-    def mapped(self, cut: Region, step: float | None, length: float | None) -> Map:
-        from ..performance.atlas import map_of
+    def mapped(self, cut: Region, step: float | None, length: float | None) -> PerformanceMap:
+        from ..performance.atlas import map_performance
 
         assert self.atlas is not None
         if cut is self.asked:
             return self.atlas.map
         try:
-            return map_of(cut, step, length)
+            return map_performance(cut, step, length)
         except PoseError as error:
             axis = next(axis for axis in self.asked.free_axes if axis in cut.fixed_axes)
             raise InputError(f"{axis}={cut.fixed_axes[axis]:g}: {error}", "--slice") from None

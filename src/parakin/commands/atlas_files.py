@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from ..errors import InputError
 
 if TYPE_CHECKING:
-    from ..performance.atlas import Atlas, Map
+    from ..performance.atlas import Atlas, PerformanceMap
     from ..workspaces.certified.region import Region
 
 
@@ -28,7 +28,7 @@ class Files:
         if self.path.suffix and self.path.suffix.lower() not in (".png", ".csv") and not self.path.is_dir():
             raise InputError(f'"{self.path}": expected a folder, or a file that ends in .png or .csv', "--output")
 
-    def write(self, found: Atlas, maps: Sequence[Map]) -> dict[str, str]:
+    def write(self, found: Atlas, maps: Sequence[PerformanceMap]) -> dict[str, str]:
         """Write the maps' pictures and their table; returns the paths."""
         from ..export.atlas_maps import maps_csv, maps_png
         from ..export.files import Content, write_all
@@ -49,7 +49,7 @@ class Files:
         return {key: str(folder / name) for key, name in names.items()}
 
 
-def _place(drawn: Map, asked: Region) -> str:
+def _place(drawn: PerformanceMap, asked: Region) -> str:
     """Of a slice where it is, for its file's name."""
     return "".join(
         f".{axis}{drawn.region.fixed_axes[axis]:g}" for axis in asked.free_axes if axis in drawn.region.fixed_axes

@@ -12,8 +12,8 @@ if TYPE_CHECKING:
     from ..machine import Machine
     from ..performance.atlas import Atlas
     from ..performance.certified.amplification import Bracket
-    from ..performance.certified.proofs import Brackets, Proof
-    from ..performance.characteristic_length import Length
+    from ..performance.certified.proofs import AmplificationBrackets, Proof
+    from ..performance.characteristic_length import CharacteristicLength
     from ..performance.indices import Performance
 
 _TITLES = {"condition": "condition number", "greatest": "greatest psi", "least": "least psi"}
@@ -34,11 +34,11 @@ def _pose_text(machine: Machine, pose: Array, axes: Sequence[str] | None = None)
     return ", ".join(f"{axis} {fixed(value, 3)}" for axis, value in given.items() if axes is None or axis in axes)
 
 
-def _length_json(length: Length) -> dict[str, Any]:
+def _length_json(length: CharacteristicLength) -> dict[str, Any]:
     return {"value": length.value, "rule": length.rule}
 
 
-def _length_text(length: Length) -> str:
+def _length_text(length: CharacteristicLength) -> str:
     return f"characteristic length {length.value:.6g} mm, {length.rule}" if length.value is not None else ""
 
 
@@ -113,10 +113,10 @@ def atlas_json(found: Atlas) -> dict[str, Any]:
 
 def _parallel(found: Atlas) -> list[float]:
     """The parallel margin at the isotropic poses: below 0 they lie beyond a singularity, seen from home."""
-    from ..performance.singularities import singularity_margins
+    from ..performance.singularities import compute_singularity_margins
 
     told = found.map.performance
-    margins = singularity_margins(found.machine, found.isotropic, told.length.value, found.map.region.mode)
+    margins = compute_singularity_margins(found.machine, found.isotropic, told.length.value, found.map.region.mode)
     return [float(row[0]) for row in margins]
 
 
@@ -156,7 +156,10 @@ def _bracket_json(machine: Machine, found: Bracket) -> dict[str, Any]:
 
 
 def proofs_json(
-    machine: Machine, spans: Mapping[str, tuple[float, float]], proofs: Sequence[Proof], more: Brackets | None
+    machine: Machine,
+    spans: Mapping[str, tuple[float, float]],
+    proofs: Sequence[Proof],
+    more: AmplificationBrackets | None,
 ) -> dict[str, Any]:
     brackets = _brackets(proofs, more)
     units = dict(zip(machine.axes, machine.axis_units, strict=True))
@@ -177,13 +180,16 @@ def proofs_json(
     }
 
 
-def _brackets(proofs: Sequence[Proof], more: Brackets | None) -> Sequence[Bracket]:
+def _brackets(proofs: Sequence[Proof], more: AmplificationBrackets | None) -> Sequence[Bracket]:
     found: list[Bracket] = [bracket for proof in proofs for bracket in proof.brackets]
     return found if more is None else more.brackets
 
 
 def proofs_text(
-    machine: Machine, spans: Mapping[str, tuple[float, float]], proofs: Sequence[Proof], more: Brackets | None
+    machine: Machine,
+    spans: Mapping[str, tuple[float, float]],
+    proofs: Sequence[Proof],
+    more: AmplificationBrackets | None,
 ) -> str:
     units = dict(zip(machine.axes, machine.axis_units, strict=True))
     sides = [

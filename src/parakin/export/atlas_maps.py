@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, BinaryIO
 import numpy as np
 from numpy.typing import NDArray
 
-from ..performance.atlas import Map
+from ..performance.atlas import PerformanceMap
 from ..performance.singularities import PARALLEL
 from .machine.figures import FAINT, INK
 from .workspace.summary import asked
@@ -33,7 +33,7 @@ class _Panel:
     endless: bool = False  # it grows without end near a singularity: the greatest values are not told apart
 
 
-def maps_png(found: Map, marks: Floats) -> bytes:
+def maps_png(found: PerformanceMap, marks: Floats) -> bytes:
     """A PNG of a map over one or two axes: condition number, greatest and least amplification, parallel margin.
 
     ``marks`` (k, axes) are poses to mark by a cross. Outside the region's outline nothing is drawn.
@@ -72,7 +72,7 @@ def maps_png(found: Map, marks: Floats) -> bytes:
     return data.getvalue()
 
 
-def _panels(found: Map) -> list[_Panel]:
+def _panels(found: PerformanceMap) -> list[_Panel]:
     told = found.performance
     margin = told.margins[..., told.margin_names.index(PARALLEL)]
     return [
@@ -83,7 +83,7 @@ def _panels(found: Map) -> list[_Panel]:
     ]
 
 
-def _drawn(figure: Figure, axes: Any, found: Map, panel: _Panel) -> None:
+def _drawn(figure: Figure, axes: Any, found: PerformanceMap, panel: _Panel) -> None:
     from matplotlib.colors import TwoSlopeNorm
 
     x, y = found.grid
@@ -101,7 +101,7 @@ def _drawn(figure: Figure, axes: Any, found: Map, panel: _Panel) -> None:
     levels = np.linspace(low, high, _LEVELS + 1)
     values = np.ma.masked_invalid(np.where(np.isinf(panel.values), high, panel.values).T)
     filled = axes.contourf(x, y, values, levels=levels, extend="max" if panel.endless else "neither", **colours)
-    room = np.nan_to_num(found.room, nan=-1.0).T
+    room = np.nan_to_num(found.slack, nan=-1.0).T
     if room.min() < 0.0:
         axes.contourf(x, y, room, levels=[room.min() - 1.0, 0.0], colors="white")
         axes.contour(x, y, room, levels=[0.0], colors=_OUTLINE, linewidths=1.2)
@@ -111,7 +111,7 @@ def _drawn(figure: Figure, axes: Any, found: Map, panel: _Panel) -> None:
     bar.ax.tick_params(labelsize=8, colors=_GREY)
 
 
-def maps_csv(maps: Sequence[Map]) -> Callable[[BinaryIO], None]:
+def maps_csv(maps: Sequence[PerformanceMap]) -> Callable[[BinaryIO], None]:
     """What writes all places of the maps that can be reached: pose (mm, degrees), whether allowed, all numbers."""
 
     def write(file: BinaryIO) -> None:
@@ -129,7 +129,7 @@ def maps_csv(maps: Sequence[Map]) -> Callable[[BinaryIO], None]:
     return write
 
 
-def _lines(found: Map, factors: Floats) -> Iterator[str]:
+def _lines(found: PerformanceMap, factors: Floats) -> Iterator[str]:
     told, n = found.performance, len(factors)
     columns = [told.poses * factors, found.allowed[..., None]]
     columns += [getattr(told, name)[..., None] for name in ("condition", "greatest", "least", "manipulability")]

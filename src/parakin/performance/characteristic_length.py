@@ -1,4 +1,4 @@
-"""The characteristic length by which angles become millimetres, so that numbers of mixed units can be compared."""
+"""The characteristic length: by it angles become millimetres, so that numbers of mixed units can be compared."""
 
 from __future__ import annotations
 
@@ -11,16 +11,15 @@ import numpy as np
 from ..algebra import Trace, derivative, evaluate, norm
 from ..arrays import Array
 from ..errors import PoseError
-from ..kernels.batch import evaluate_tape
 from ..machine import Machine
 from ..model.chain import compose_chain
 from ..model.limits import leg_joints
 
-_NONE = 1e-9  # mm; a length no greater is none
+_ZERO = 1e-9  # mm; a length no greater counts as zero
 
 
 @dataclass(frozen=True)
-class Length:
+class CharacteristicLength:
     """The characteristic length, mm, and where it comes from; ``value`` is None for a machine without angles."""
 
     value: float | None
@@ -28,72 +27,71 @@ class Length:
 
     @property
     def factor(self) -> float:
-        """What radians are multiplied by, mm; 1 where there are none."""
+        """What radians are multiplied by, mm; 1 for a machine without angles."""
         return 1.0 if self.value is None else self.value
 
 
-def characteristic_length(machine: Machine, length: float | None = None) -> Length:
-    """``length`` (mm) if it is given, else by the first of these rules that gives one.
+def choose_characteristic_length(machine: Machine, length: float | None = None) -> CharacteristicLength:
+    """Take ``length`` (mm) if it is given, else the first of these rules that gives one.
 
     - axes X Y Z B C: the tool's reach, from the head's last turn (without one from the platform) to the tip;
     - a platform that turns: the radius of its joints about their middle, root mean square;
     - drives that turn and a platform that does not: the arms' length, root mean square;
     - else the rods' length at home, root mean square.
 
-    Raises :class:`PoseError` for a length that is none.
+    Raises :class:`PoseError` for an invalid length.
     """
     if length is not None:
         if not (isfinite(length) and length > 0.0):
             raise PoseError(f"length: a length above 0 mm expected, not {length:g}")
-        return Length(float(length), "given")
-    turns = machine.model.structure.turns
+        return CharacteristicLength(float(length), "given")
+    turns = machine.structure.turns
     if not turns and "rad" not in machine.joint_units:
-        return Length(None, "no angles")
+        return CharacteristicLength(None, "no angles")
     five = machine.axes == ("X", "Y", "Z", "B", "C")
     rules = {
-        "the tool's reach": _reach(machine) if five else 0.0,
-        "the radius of the platform's joints": _radius(machine) if turns else 0.0,
-        "the length of the arms": 0.0 if turns else _arms(machine),
-        "the length of the rods at home": _mean(_spans_at_home(machine)),
+        "the tool's reach": _measure_tool_reach(machine) if five else 0.0,
+        "the radius of the platform's joints": _measure_platform_radius(machine) if turns else 0.0,
+        "the length of the arms": 0.0 if turns else _measure_arms(machine),
+        "the length of the rods at home": _compute_rms(_measure_rods_at_home(machine)),
     }
-    rule = next(name for name, value in rules.items() if value > _NONE)
-    return Length(rules[rule], rule)
+    rule = next(name for name, value in rules.items() if value > _ZERO)
+    return CharacteristicLength(rules[rule], rule)
 
 
-def _mean(lengths: Sequence[float] | Array) -> float:
+def _compute_rms(lengths: Sequence[float] | Array) -> float:
     return float(np.sqrt(np.mean(np.square(lengths)))) if len(lengths) else 0.0
 
 
-def _reach(machine: Machine) -> float:
+def _measure_tool_reach(machine: Machine) -> float:
     head = machine.spec.head
     last = max((i for i, step in enumerate(head) if step.drive is not None), default=-1)
     return float(norm(compose_chain(head[last + 1 :], ())[1]))
 
 
-def _radius(machine: Machine) -> float:
-    turns = machine.model.structure.turns
+def _measure_platform_radius(machine: Machine) -> float:
+    turns = machine.structure.turns
     joints = np.array([leg.platform for leg in machine.spec.legs])
     if len(turns) == 1:  # along the axis of its only turn nothing moves
         joints[:, "xyz".index(turns[0][1])] = 0.0
-    return _mean(np.linalg.norm(joints - joints.mean(0), axis=1))
+    return _compute_rms(np.linalg.norm(joints - joints.mean(0), axis=1))
 
 
-def _arms(machine: Machine) -> float:
-    """How fast the feet of turning drives move, mm/rad."""
+def _measure_arms(machine: Machine) -> float:
+    """Measure the arms of turning drives at home: how fast their feet move, mm/rad."""
     at_home = leg_joints(machine.spec, machine.inverse(machine.home).tolist())
-    found = []
+    lengths = []
     for leg, given in zip(machine.spec.legs, at_home, strict=True):
         trace = Trace()
         q = trace.inputs(len(given))
         foot, _ = leg.struts(leg.platform, list(q))[0]
         for i, drive in enumerate(leg.drives):
             if drive.unit == "rad":
-                found.append(float(norm(evaluate(trace, [derivative(c, q[i]) for c in foot], given))))
-    return _mean(found)
+                lengths.append(float(norm(evaluate(trace, [derivative(c, q[i]) for c in foot], given))))
+    return _compute_rms(lengths)
 
 
-def _spans_at_home(machine: Machine) -> Array:
-    tape = machine.model.rates_tape()
+def _measure_rods_at_home(machine: Machine) -> Array:
     home = machine.home[None]
-    rows = evaluate_tape(tape, home, np.empty((1, tape.outputs)), machine.inverse(home), whole=False)
-    return rows[0, 2 * len(machine.axes) ** 2 :]
+    _, _, spans = machine.twist_rates(home, machine.inverse(home), whole=False)
+    return spans.reshape(-1)

@@ -1,4 +1,4 @@
-"""Machines designed for what they are to do: sizes that follow in closed form, and are then proved."""
+"""Dimensional synthesis: a machine's sizes in closed form from the amplification it must keep, and their proof."""
 
 from __future__ import annotations
 
@@ -14,11 +14,10 @@ from ..model.legs.slider import Slider
 from ..model.parts import Direction, Drive, Point, Signs, Size
 from ..model.spec import Spec
 from ..workspaces.certified.region import FAR
-from .certified.proofs import Proof, box_of
-from .certified.proofs import amplification as amplified
+from .certified.proofs import Proof, make_pose_box, prove_amplification
 
 SMALLEST = 0.001  # mm, of a cube
-LEAST, MOST = 1.001, 1e6  # of an amplification: beyond these the numbers tell nothing
+LEAST, MOST = 1.001, 1e6  # of an amplification: beyond these the numbers have no digits left
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,18 +40,20 @@ class Design:
 
     @property
     def machine(self) -> Machine:
-        return _orthoglide(self.rod, self.stroke)
+        return _make_orthoglide(self.rod, self.stroke)
 
 
-def orthoglide(cube: float, amplification: float) -> Design:
-    """The Orthoglide of Chablat and Wenger (Chemnitz, 2000) for a cube of edge ``cube``, mm, and a bound λ > 1 of psi.
+def design_orthoglide(cube: float, amplification: float) -> Design:
+    """Design the Orthoglide of Chablat and Wenger (Chemnitz, 2000) for a cube of edge ``cube``, mm, and 1/λ ≤ psi ≤ λ.
+
+    ``amplification`` is λ > 1.
 
     On the diagonal x = y = z = t, with s = √(L² - 2t²) and v = t/s, psi is 1/(1 + v), twice, and 1/(1 - 2v), so that
     1/λ ≤ psi ≤ λ ends at v = min((1 - 1/λ)/2, λ - 1) above and at v = -min(1 - 1/λ, (λ - 1)/2) below. These are two
     corners of the cube, t = L·v/√(1 + 2v²), which gives L; that psi stays within its bounds all over the cube is proved
     by intervals.
 
-    Raises :class:`PoseError` for numbers that are none, :class:`NoMethodError` if the proof does not come out.
+    Raises :class:`PoseError` for invalid numbers, :class:`NoMethodError` if the proof fails.
     """
     if not SMALLEST <= cube <= FAR:
         raise PoseError(f"cube: an edge from {SMALLEST:g} to {FAR:g} mm expected, not {cube:g}")
@@ -66,14 +67,14 @@ def orthoglide(cube: float, amplification: float) -> Design:
     rod = cube / (high - low)
     low, high = low * rod, high * rod
     stroke = low + sqrt(rod * rod - 2.0 * max(-low, high) ** 2), high + rod
-    machine = _orthoglide(rod, stroke)
-    proof = _proved(machine, low, high, lam)
+    machine = _make_orthoglide(rod, stroke)
+    proof = _prove_cube(machine, low, high, lam)
     return Design("orthoglide", cube, lam, rod, stroke, (low, high), proof)
 
 
-def _proved(machine: Machine, low: float, high: float, bound: float) -> Proof:
-    box = box_of(machine, dict.fromkeys(machine.axes, (low, high)))
-    proof = amplified(box, 1.0 / bound, bound)
+def _prove_cube(machine: Machine, low: float, high: float, bound: float) -> Proof:
+    box = make_pose_box(machine, dict.fromkeys(machine.axes, (low, high)))
+    proof = prove_amplification(box, 1.0 / bound, bound)
     if proof.verdict != "proved":
         raise NoMethodError(f"amplification {bound:g}: the closed form does not hold all over the cube, {proof.reason}")
     corners = np.array(np.meshgrid(*[[low, high]] * 3)).reshape(3, -1).T
@@ -82,7 +83,7 @@ def _proved(machine: Machine, low: float, high: float, bound: float) -> Proof:
     return proof
 
 
-def _orthoglide(rod: float, stroke: tuple[float, float]) -> Machine:
+def _make_orthoglide(rod: float, stroke: tuple[float, float]) -> Machine:
     rails = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
     origin = Point((0.0, 0.0, 0.0))
     legs = tuple(
@@ -92,4 +93,4 @@ def _orthoglide(rod: float, stroke: tuple[float, float]) -> Machine:
     return Machine(Spec("orthoglide", "", "", ("tx", "ty", "tz"), legs, {"X": 0.0, "Y": 0.0, "Z": 0.0}))
 
 
-DESIGNS: dict[str, Callable[[float, float], Design]] = {"orthoglide": orthoglide}
+DESIGNS: dict[str, Callable[[float, float], Design]] = {"orthoglide": design_orthoglide}

@@ -1,4 +1,4 @@
-"""How well a machine moves and holds its tool at a pose: amplification of velocity and force, conditioning."""
+"""Performance indices at poses: amplification of velocity and force, condition number, manipulability."""
 
 from __future__ import annotations
 
@@ -9,19 +9,19 @@ from numpy.typing import ArrayLike
 
 from ..arrays import Array
 from ..machine import Machine
-from .characteristic_length import Length, characteristic_length
-from .jacobians import Scaled, scaled_rates, twist_names
-from .singularities import home_signs, margin_names, margins_of
+from .characteristic_length import CharacteristicLength, choose_characteristic_length
+from .jacobians import ScaledRates, compute_scaled_rates, list_twist_names
+from .singularities import derive_margins, find_home_signs, list_margin_names
 
-SINGULAR = 1e-13  # of the greatest singular value; a lesser one is nought
+_SINGULAR = 1e-13  # of the greatest singular value; a lesser one counts as zero
 
 
 @dataclass(frozen=True, eq=False)
 class Performance:
-    """Numbers at poses (..., axes), in one unit: angles are multiplied by the characteristic length.
+    """Performance indices at poses (..., axes), in one unit: angles are multiplied by the characteristic length.
 
-    J maps joints' rates to the tool's twist, t' = J q'. NaN where the machine is out of reach; infinity and 0 tell a
-    singularity.
+    J maps joints' rates to the tool's twist, t' = J q'. NaN where the machine is out of reach; a singularity gives
+    infinity and zero.
 
     psi : (..., n) singular values of J, the greatest first: how much faster than the drives the tool moves
     directions : (..., n, n), a row for each of ``psi``: the direction, a unit twist in the order of ``twist``, of the
@@ -31,7 +31,7 @@ class Performance:
     """
 
     machine: Machine
-    length: Length
+    length: CharacteristicLength
     twist: tuple[str, ...]
     margin_names: tuple[str, ...]
     poses: Array
@@ -52,50 +52,50 @@ class Performance:
     @property
     def condition(self) -> Array:
         """Condition number of J, σmax/σmin, (...,): 1 at an isotropic pose, infinite at a singular one."""
-        return _quotient(self.greatest, self.least)
+        return _divide(self.greatest, self.least)
 
     @property
     def manipulability(self) -> Array:
-        """|det J|, the product of psi (Yoshikawa), (...,); NaN where J has both an infinite psi and a psi of 0."""
+        """|det J|, the product of psi (Yoshikawa), (...,); NaN where J has both an infinite psi and a psi of zero."""
         with np.errstate(invalid="ignore", over="ignore"):
             return np.asarray(self.psi.prod(-1))
 
     @property
     def force(self) -> Array:
         """Force amplification along ``directions``: 1/psi, (..., n)."""
-        return _quotient(np.ones_like(self.psi), self.psi)
+        return _divide(np.ones_like(self.psi), self.psi)
 
 
-def _quotient(x: Array, y: Array) -> Array:
+def _divide(x: Array, y: Array) -> Array:
     with np.errstate(divide="ignore", invalid="ignore"):
         return x / y
 
 
-def performance(
+def compute_performance(
     machine: Machine, poses: ArrayLike, length: float | None = None, mode: str | None = None
 ) -> Performance:
-    """Amplification, conditioning and singularity margins at poses.
+    """Compute amplification, conditioning and singularity margins at poses.
 
     Parameters
     ----------
     poses : (..., axes), mm and rad; any leading shape
     length : characteristic length by which angles become mm, mm; by default by the rule of
-        :func:`parakin.performance.characteristic_length.characteristic_length`
+        :func:`~.characteristic_length.choose_characteristic_length`
     mode : working mode
 
-    Limits are not looked at. Raises :class:`PoseError` for poses, a length or a mode that are none.
+    Limits are not checked. Raises :class:`PoseError` for invalid poses, length or mode.
     """
     rows, lead = machine.rows(poses, machine.axes, "poses")
-    mode, scale = machine.checked_mode(mode), characteristic_length(machine, length)
-    rates = scaled_rates(machine, rows, scale, mode)
-    margins = margins_of(machine, rates, home_signs(machine, scale, mode))
-    psi, directions = amplifications(rates)
+    mode, scale = machine.checked_mode(mode), choose_characteristic_length(machine, length)
+    rates = compute_scaled_rates(machine, rows, scale, mode)
+    margins = derive_margins(machine, rates, find_home_signs(machine, scale, mode))
+    psi, directions = _compute_amplifications(rates)
     n = rows.shape[1]
     return Performance(
         machine,
         scale,
-        twist_names(machine),
-        margin_names(machine),
+        list_twist_names(machine),
+        list_margin_names(machine),
         rows.reshape(*lead, n),
         psi.reshape(*lead, n),
         directions.reshape(*lead, n, n),
@@ -103,8 +103,8 @@ def performance(
     )
 
 
-def amplifications(rates: Scaled) -> tuple[Array, Array]:
-    """psi (N, n), the greatest first, and their directions (N, n, n)."""
+def _compute_amplifications(rates: ScaledRates) -> tuple[Array, Array]:
+    """Compute psi (N, n), the greatest first, and their directions (N, n, n), by singular values of J or of J⁻¹."""
     n = rates.a.shape[1]
     a, b = rates.a, rates.b
     known = np.asarray(np.isfinite(a).all((1, 2)) & np.isfinite(b).all((1, 2)))
@@ -114,8 +114,8 @@ def amplifications(rates: Scaled) -> tuple[Array, Array]:
     divisor, dividend = np.where(backward[:, None, None], b, a), np.where(backward[:, None, None], a, b)
     solvable = np.maximum(size_a, size_b) > 0.0
     u, s, v = np.linalg.svd(np.linalg.solve(np.where(solvable[:, None, None], divisor, np.eye(n)), dividend))
-    both = ~solvable | (s[:, 0] * SINGULAR > 1.0)  # legs and drives are singular together: J has no value at all
-    s = np.where(s <= SINGULAR * s[:, :1], 0.0, s)
+    both = ~solvable | (s[:, 0] * _SINGULAR > 1.0)  # legs and drives are singular together: J has no value at all
+    s = np.where(s <= _SINGULAR * s[:, :1], 0.0, s)
     with np.errstate(divide="ignore"):
         psi = np.where(backward[:, None], 1.0 / s[:, ::-1], s)
     directions = np.where(backward[:, None, None], v[:, ::-1], u.swapaxes(1, 2))

@@ -1,4 +1,4 @@
-"""How far a machine is from its singularities, as dimensionless margins that are 0 at them."""
+"""Singularity margins: how far a machine is from its parallel and serial singularities, without unit, zero at them."""
 
 from __future__ import annotations
 
@@ -7,64 +7,65 @@ from numpy.typing import ArrayLike
 
 from ..arrays import Array
 from ..machine import Machine
-from .characteristic_length import Length, characteristic_length
-from .jacobians import Scaled, drives_of_legs, scaled_rates
+from .characteristic_length import CharacteristicLength, choose_characteristic_length
+from .jacobians import ScaledRates, compute_scaled_rates, list_leg_joints
 
 PARALLEL = "parallel"
-_NOUGHT = 1e-12  # a margin no greater has no sign
+_ZERO = 1e-12  # a margin no greater has no sign
 
 
-def margin_names(machine: Machine) -> tuple[str, ...]:
-    """``parallel``, then ``serial JOINT`` for each joint of the legs, then ``serial JOINT-JOINT`` of head and table."""
-    order = drives_of_legs(machine)
+def list_margin_names(machine: Machine) -> tuple[str, ...]:
+    """List the margins: ``parallel``, ``serial JOINT`` for each joint of the legs, ``serial JOINT-JOINT``."""
+    order = list_leg_joints(machine)
     serial = machine.joints[len(order) :]
     names = [PARALLEL, *(f"serial {machine.joints[i]}" for i in order)]
     return (*names, f"serial {'-'.join(serial)}") if serial else tuple(names)
 
 
-def singularity_margins(
+def compute_singularity_margins(
     machine: Machine, poses: ArrayLike, length: float | None = None, mode: str | None = None
 ) -> Array:
-    """Signed margins (..., margins) in the order of :func:`margin_names`; 0 where singular, NaN out of reach.
+    """Compute signed margins (..., margins), named by :func:`list_margin_names`; 0 where singular, NaN out of reach.
 
     - parallel: det A of unit wrenches (legs' rows divided by their rods' lengths, angles times the characteristic
       length), positive as at home. Of a five-axis machine, whose head and table never matter here, that is the
-      determinant of the legs' rows against the translations. Where it is 0 the tool moves though the drives stand.
-    - serial, of a leg's joint: the share of the drive's motion that reaches the platform's joint (mm a mm; a radian
-      counts as the characteristic length), positive as at home. Where it is 0 the drive moves and the platform's joint
-      need not.
+      determinant of the legs' rows against the translations. Where it is zero the tool moves though the drives stand.
+    - serial, of a leg's joint: the part of the drive's motion that reaches the platform's joint (mm a mm; a radian
+      counts as the characteristic length), positive as at home. Where it is zero the drive moves and the platform's
+      joint need not.
     - serial, of head and table: |(a1 × a2)·k| of their turning axes and the tool's; of axes at right angles the sine of
       the angle between the tool and the first one.
 
     Parameters
     ----------
     poses : (..., axes), mm and rad
-    length : characteristic length, mm; see :func:`parakin.performance.characteristic_length.characteristic_length`
+    length : characteristic length, mm; see :func:`~.characteristic_length.choose_characteristic_length`
     mode : working mode
     """
     rows, lead = machine.rows(poses, machine.axes, "poses")
-    mode, scale = machine.checked_mode(mode), characteristic_length(machine, length)
-    found = margins_of(machine, scaled_rates(machine, rows, scale, mode), home_signs(machine, scale, mode))
-    return found.reshape(*lead, found.shape[1])
+    mode, scale = machine.checked_mode(mode), choose_characteristic_length(machine, length)
+    signs = find_home_signs(machine, scale, mode)
+    margins = derive_margins(machine, compute_scaled_rates(machine, rows, scale, mode), signs)
+    return margins.reshape(*lead, margins.shape[1])
 
 
-def home_signs(machine: Machine, length: Length, mode: str) -> Array:
-    """±1 for each margin, by which it is positive at home; 1 where home itself is singular or out of reach."""
-    found = _unsigned(machine, scaled_rates(machine, machine.home[None], length, mode))[0]
-    return np.where(found < -_NOUGHT, -1.0, 1.0)
+def find_home_signs(machine: Machine, length: CharacteristicLength, mode: str) -> Array:
+    """Find ±1 for each margin, by which it is positive at home; 1 where home itself is singular or out of reach."""
+    margins = _compute_determinants(machine, compute_scaled_rates(machine, machine.home[None], length, mode))[0]
+    return np.where(margins < -_ZERO, -1.0, 1.0)
 
 
-def margins_of(machine: Machine, rates: Scaled, signs: Array) -> Array:
-    """The margins (N, margins) that follow from scaled rates."""
-    return _unsigned(machine, rates) * signs + 0.0  # nought has no sign
+def derive_margins(machine: Machine, rates: ScaledRates, signs: Array) -> Array:
+    """Derive the margins (N, margins) from scaled rates."""
+    return _compute_determinants(machine, rates) * signs + 0.0  # zero has no sign
 
 
-def _unsigned(machine: Machine, rates: Scaled) -> Array:
+def _compute_determinants(machine: Machine, rates: ScaledRates) -> Array:
     legs, n = rates.legs, rates.a.shape[1]
     block = legs if n - legs == 2 else n
     with np.errstate(invalid="ignore"):
         columns = [np.linalg.det(rates.a[:, :block, :block])]
-        columns += [rates.b[:, row, joint] for row, joint in enumerate(drives_of_legs(machine))]
+        columns += [rates.b[:, row, joint] for row, joint in enumerate(list_leg_joints(machine))]
         if n > legs:
             columns.append(np.abs(np.linalg.det(rates.b[:, legs:, legs:])))
     return np.stack(columns, 1)

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ...performance.indices import performance
+from ...performance.indices import compute_performance
 from ...workspaces.certified.workspace import Workspace
 from .vtu import vtu
 
@@ -39,7 +39,7 @@ def cells_vtu(found: Workspace) -> bytes:
     cells, region = found.cells, found.region
     middle = cells.low + 0.5 * cells.size
     turns = np.array([[0.5 * (low + high) for low, high in region.swept_axes.values()]] * len(middle))
-    good = performance(region.machine, region.poses(middle, turns), mode=region.mode)
+    good = compute_performance(region.machine, region.poses(middle, turns), mode=region.mode)
     fields: dict[str, Any] = {
         "state": cells.inside.astype(np.int8),
         "inner": cells.inner,

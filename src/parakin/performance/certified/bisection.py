@@ -1,4 +1,4 @@
-"""Boxes of poses cut in halves until something is proved of every one of them, within a budget of boxes and time."""
+"""Interval bisection: boxes of poses are halved until a claim is proved of every part, within a budget."""
 
 from __future__ import annotations
 
@@ -8,34 +8,33 @@ from dataclasses import dataclass, field
 from math import inf
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ...arrays import Array
-from .interval_matrices import Linear, Over
+from ...arrays import Array, Flags, Indices
+from .interval_matrices import LinearMatrices, MatrixBounds
 
-AT_ONCE = 512
+AT_ONCE = 512  # boxes
 _FINEST = 1e-13  # of the first box: below this the numbers have no digits left
 _ROUNDING = 1e-12  # relative, of products and singular values of small matrices
 
-Decided = tuple[NDArray[np.bool_], NDArray[np.int64]]  # which boxes are, and along which input to cut the others
+Decided = tuple[Flags, Indices]  # which boxes are decided, and across which input to bisect the others
 
 
 @dataclass
 class Budget:
-    """How many boxes and how long; ``used`` counts on over all that is proved with it."""
+    """How many boxes and how long, s; ``used`` counts on over all that is proved with it."""
 
     boxes: int
     seconds: float | None
     used: int = 0
     _began: float = field(default_factory=time.monotonic)
 
-    def spent(self) -> bool:
+    def is_spent(self) -> bool:
         late = inf if self.seconds is None else self._began + self.seconds
         return self.used >= self.boxes or time.monotonic() > late
 
 
-def halves(low: Array, high: Array, axis: NDArray[np.int64]) -> tuple[Array, Array]:
-    """Every box (N, d) cut across one of its inputs, the first halves before the second ones."""
+def bisect_inputs(low: Array, high: Array, axis: Indices) -> tuple[Array, Array]:
+    """Bisect every box (N, d) across one of its inputs, the first halves before the second ones."""
     row = np.arange(len(low))
     middle = 0.5 * (low[row, axis] + high[row, axis])
     below, above = high.copy(), low.copy()
@@ -43,15 +42,17 @@ def halves(low: Array, high: Array, axis: NDArray[np.int64]) -> tuple[Array, Arr
     return np.concatenate([low, above]), np.concatenate([below, high])
 
 
-def widest(low: Array, high: Array, first: Array) -> NDArray[np.int64]:
-    """The input along which a box is widest, as a share of the ``first`` one's widths (d,)."""
+def find_widest_inputs(low: Array, high: Array, first: Array) -> Indices:
+    """Find the input along which each box is widest, relative to the ``first`` box's widths (d,)."""
     if not len(first):
         return np.zeros(len(low), np.int64)
     return np.asarray(((high - low) / first).argmax(1))
 
 
-def left_over(decide: Callable[[Array, Array], Decided], low: Array, high: Array, budget: Budget) -> Array | None:
-    """None where ``decide`` is true all over the box [low, high]; else the middle of a part that it left open."""
+def find_undecided_part(
+    decide: Callable[[Array, Array], Decided], low: Array, high: Array, budget: Budget
+) -> Array | None:
+    """Bisect the box [low, high] until all parts are decided: None, else the middle of a part left undecided."""
     first = high - low
     bottom, top = low[None], high[None]
     while len(bottom):
@@ -63,34 +64,37 @@ def left_over(decide: Callable[[Array, Array], Decided], low: Array, high: Array
         bottom, top = bottom[: now.start], top[: now.start]
         if len(lower):
             fine = ((upper - lower) <= _FINEST * first).all(1)
-            if fine.any() or budget.spent():
+            if fine.any() or budget.is_spent():
                 return np.asarray(0.5 * (lower[0] + upper[0]))
-            halved = halves(lower, upper, axis)
-            bottom, top = np.concatenate([bottom, halved[0]]), np.concatenate([top, halved[1]])
+            lower, upper = bisect_inputs(lower, upper, axis)
+            bottom, top = np.concatenate([bottom, lower]), np.concatenate([top, upper])
     return None
 
 
-def nowhere_negative(over: Over, first: Array) -> Callable[[Array, Array], Decided]:
-    """What decides that no entry is negative in a box."""
+def decide_nonnegative(bounds: MatrixBounds, first: Array) -> Callable[[Array, Array], Decided]:
+    """Make the function that decides, for boxes (N, d), that no entry is negative."""
 
     def decide(low: Array, high: Array) -> Decided:
-        found = over(low, high)
-        least = found.middle - (found.turned + found.rest) * (1.0 + _ROUNDING)
-        return np.asarray((least >= 0.0).all((1, 2))), widest(low, high, first)
+        matrices = bounds(low, high)
+        least = matrices.middle - (matrices.linear_change + matrices.rest) * (1.0 + _ROUNDING)
+        return np.asarray((least >= 0.0).all((1, 2))), find_widest_inputs(low, high, first)
 
     return decide
 
 
-def regular(over: Over, first: Array) -> Callable[[Array, Array], Decided]:
-    """What decides that all matrices in a box are regular: with Y about the inverse of the middle one, 1 - Y·A has a
-    spectral radius below 1 for all A there."""
+def decide_regular(bounds: MatrixBounds, first: Array) -> Callable[[Array, Array], Decided]:
+    """Make the function that decides, for boxes (N, d), that all matrices in it are regular.
+
+    They are if 1 - Y·A has a spectral radius below 1 for all A there, with Y about the inverse of the middle one.
+    """
 
     def decide(low: Array, high: Array) -> Decided:
-        found = over(low, high)
-        decided, axis = np.zeros(len(low), np.bool_), widest(low, high, first)
-        inverse, good = inverted(found)
-        part = found.take(good).times(inverse)
-        decided[good] = _radius(off_one(part, found.take(good), inverse) + part.turned + part.rest) < 1.0 - _ROUNDING
+        matrices = bounds(low, high)
+        decided, axis = np.zeros(len(low), np.bool_), find_widest_inputs(low, high, first)
+        inverse, good = invert_middles(matrices)
+        part = matrices.take(good).multiply_left(inverse)
+        off = bound_inverse_error(part, matrices.take(good), inverse)
+        decided[good] = _bound_spectral_radius(off + part.linear_change + part.rest) < 1.0 - _ROUNDING
         if len(first):
             axis[good] = part.widest
         return decided, axis
@@ -98,26 +102,26 @@ def regular(over: Over, first: Array) -> Callable[[Array, Array], Decided]:
     return decide
 
 
-def inverted(found: Linear) -> tuple[Array, NDArray[np.bool_]]:
-    """The inverses of the bounded, regular middles among them, and which these are."""
-    good = found.bounded
+def invert_middles(matrices: LinearMatrices) -> tuple[Array, Flags]:
+    """Invert the bounded, regular middles; returns the inverses, and which these are."""
+    good = matrices.bounded
     with np.errstate(all="ignore"):
-        size = np.abs(np.linalg.det(np.where(good[:, None, None], found.middle, 0.0)))
+        size = np.abs(np.linalg.det(np.where(good[:, None, None], matrices.middle, 0.0)))
     good = good & (size > 0.0) & np.isfinite(size)
-    inverse = np.linalg.inv(found.middle[good])
+    inverse = np.linalg.inv(matrices.middle[good])
     fine = np.isfinite(inverse).all((1, 2))
     good[np.flatnonzero(good)[~fine]] = False
     return inverse[fine], good
 
 
-def off_one(product: Linear, given: Linear, inverse: Array) -> Array:
-    """How far the product of the middle with its computed inverse may be from 1, entry by entry."""
+def bound_inverse_error(product: LinearMatrices, given: LinearMatrices, inverse: Array) -> Array:
+    """Bound how far the product of the middle with its computed inverse may be from 1, entry by entry."""
     n = inverse.shape[1]
     return np.asarray(np.abs(product.middle - np.eye(n)) + _ROUNDING * (np.abs(inverse) @ np.abs(given.middle)))
 
 
-def _radius(matrices: Array) -> Array:
-    """An upper bound of the spectral radius of matrices (N, n, n) without negative entries."""
+def _bound_spectral_radius(matrices: Array) -> Array:
+    """Bound the spectral radius of matrices (N, n, n) without negative entries, by Collatz and Wielandt."""
     best = np.full(len(matrices), inf)
     vector = np.ones(matrices.shape[:2])
     for _ in range(3):

@@ -1,62 +1,67 @@
-"""Poses of a box at which a machine is singular, looked for before anything is proved."""
+"""Counterexamples: singular poses of a box, searched for before anything is proved."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from typing import Literal
 
 import numpy as np
 
 from ...arrays import Array
-from ..search import climb_within
-from ..singularities import PARALLEL, margin_names, singularity_margins
-from .interval_matrices import Box
+from ..search import search_maxima_in_box
+from ..singularities import PARALLEL, compute_singularity_margins, list_margin_names
+from .interval_matrices import PoseBox
 
 Kind = Literal["parallel", "serial"]
 
-NOUGHT = 1e-9  # a singularity margin no greater is a singularity
+ZERO = 1e-9  # a singularity margin no greater is a singularity
 
 
-def _margins(box: Box, kind: Kind, points: Array) -> Array:
-    """(N, margins) of one kind at points of the box."""
-    found = singularity_margins(box.machine, box.poses(points), box.length.value, box.mode)
-    wanted = [(name == PARALLEL) == (kind == "parallel") for name in margin_names(box.machine)]
-    return np.asarray(found[:, wanted])
-
-
-def singular_pose(box: Box, kind: Kind) -> tuple[Array, str] | None:
-    """A pose of the box where a margin is 0, with the margin's name; None if none was met."""
+def find_singular_pose(box: PoseBox, kind: Kind) -> tuple[Array, str] | None:
+    """Find a pose of the box where a margin is zero, with the margin's name; None if none was found."""
     points = box.samples
-    margins = _margins(box, kind, points)
-    names = [name for name in margin_names(box.machine) if (name == PARALLEL) == (kind == "parallel")]
+    names = [name for name in list_margin_names(box.machine) if _is_of_kind(name, kind)]
+    margins = _compute_margins(box, kind, points)
     for number, name in enumerate(names):
         values = margins[:, number]
+        evaluate = partial(_compute_margin, box, kind, number)
         if (values > 0.0).any() and (values < 0.0).any():
-            ends = points[int(np.nanargmax(values))], points[int(np.nanargmin(values))]
-            point = _crossing(lambda x, n=number: float(_margins(box, kind, x[None])[0, n]), *ends)  # type: ignore[misc]
+            point = _bisect_crossing(evaluate, points[int(np.nanargmax(values))], points[int(np.nanargmin(values))])
         else:
-            point = _least(box, kind, number, points, values)
-        if abs(_margins(box, kind, point[None])[0, number]) <= NOUGHT:
+            point = _search_least(evaluate, box, points[[int(np.nanargmin(np.abs(values)))]])
+        if abs(evaluate(point[None])[0]) <= ZERO:
             return box.poses(point[None])[0], name
     return None
 
 
-def _crossing(value: Callable[[Array], float], above: Array, below: Array) -> Array:
-    """Where a value changes its sign between two points, to the last digits."""
+def _is_of_kind(name: str, kind: Kind) -> bool:
+    return (name == PARALLEL) == (kind == "parallel")
+
+
+def _compute_margins(box: PoseBox, kind: Kind, points: Array) -> Array:
+    """Compute the singularity margins of one kind at points of the box, (N, margins)."""
+    margins = compute_singularity_margins(box.machine, box.poses(points), box.length.value, box.mode)
+    return np.asarray(margins[:, [_is_of_kind(name, kind) for name in list_margin_names(box.machine)]])
+
+
+def _compute_margin(box: PoseBox, kind: Kind, number: int, points: Array) -> Array:
+    return _compute_margins(box, kind, points)[:, number]
+
+
+def _bisect_crossing(evaluate: Callable[[Array], Array], above: Array, below: Array) -> Array:
+    """Find by bisection where a value changes its sign between two points, to the last digits."""
     for _ in range(100):
         middle = 0.5 * (above + below)
-        if value(middle) > 0.0:
+        if evaluate(middle[None])[0] > 0.0:
             above = middle
         else:
             below = middle
-    return above if abs(value(above)) < abs(value(below)) else below
+    return above if abs(evaluate(above[None])[0]) < abs(evaluate(below[None])[0]) else below
 
 
-def _least(box: Box, kind: Kind, number: int, points: Array, values: Array) -> Array:
-    """The point of the box where a margin's size is least, by search from the least sample."""
-    start = points[[int(np.nanargmin(np.abs(values)))]]
+def _search_least(evaluate: Callable[[Array], Array], box: PoseBox, start: Array) -> Array:
+    """Search for the point of the box where a margin's size is least, from a sample (1, d)."""
     if start.shape[1]:
-        start, _ = climb_within(
-            lambda places: -np.abs(_margins(box, kind, places)[:, number]), box.low, box.high, start, 1e-14
-        )
+        start, _ = search_maxima_in_box(lambda points: -np.abs(evaluate(points)), box.low, box.high, start, 1e-14)
     return np.asarray(start[0])

@@ -1,4 +1,4 @@
-"""A machine's rates over whole boxes of poses: A, B and J⁻¹ as terms, and what is proved of matrices of such terms."""
+"""Interval matrices: A and B of a machine as terms over a box of poses, and linear bounds of matrices of terms."""
 
 from __future__ import annotations
 
@@ -7,36 +7,36 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ... import algebra as alg
 from ...algebra import Scalar, Term, Trace, derivative, norm
-from ...arrays import Array
+from ...arrays import Array, Flags, Indices
 from ...kernels.intervals import IntervalProgram
 from ...machine import Machine
-from ...model.rates import TwistRates, compute_twist_rates
-from ..characteristic_length import Length
-from ..jacobians import column_scales, drives_of_legs
+from ...model.rates import TwistRates
+from ..characteristic_length import CharacteristicLength
+from ..jacobians import list_column_scales, list_leg_joints
 
 Matrix = Sequence[Sequence[Scalar]]
 
 _SAMPLES = {0: 1, 1: 65, 2: 17, 3: 9, 4: 5}  # along each input of a box; 3 of more than these
 
 
-class Turns(Trace):
-    """A trace in which the sine and cosine of an arc tangent are quotients: their bounds know no jump at ±180°."""
+class JumpFreeTrace(Trace):
+    """A trace in which the sine and cosine of an arc tangent are quotients: their bounds have no jump at ±180°."""
 
     def node(self, op: int, args: tuple[Term, ...], k: tuple[float, ...]) -> Term:
         if op in (alg.SIN, alg.COS):
-            turned = self._turned(args[0])
-            if turned is not None:
-                sine, cosine = turned
+            both = self._derive_sincos(args[0])
+            if both is not None:
+                sine, cosine = both
                 result: Term = sine if op == alg.SIN else cosine
                 return result
         return super().node(op, args, k)
 
     @staticmethod
-    def _turned(angle: Term) -> tuple[Scalar, Scalar] | None:
+    def _derive_sincos(angle: Term) -> tuple[Scalar, Scalar] | None:
+        """Derive sine and cosine of ±atan2(y, x) + offset as quotients; None for other angles."""
         offset, sign, inner = 0.0, 1.0, angle
         if angle.op == alg.LIN and len(angle.args) == 1 and abs(angle.k[1]) == 1.0:
             (offset, sign), inner = angle.k, angle.args[0]
@@ -52,14 +52,14 @@ class Turns(Trace):
 
 
 @dataclass(frozen=True, eq=False)
-class Box:
-    """Poses of a machine that fill a box: the axes in ``spans`` vary, the others are ``held``; mm and rad."""
+class PoseBox:
+    """A box of poses of a machine: the axes in ``spans`` vary, ``fixed_axes`` have one value; mm and rad."""
 
     machine: Machine
     spans: Mapping[str, tuple[float, float]]
-    held: Mapping[str, float]
+    fixed_axes: Mapping[str, float]
     mode: str
-    length: Length
+    length: CharacteristicLength
 
     @cached_property
     def low(self) -> Array:
@@ -80,37 +80,37 @@ class Box:
         """Whole poses (N, axes) at points (N, d) of the box."""
         rows = np.empty((len(points), len(self.machine.axes)))
         for i, axis in enumerate(self.machine.axes):
-            rows[:, i] = points[:, list(self.spans).index(axis)] if axis in self.spans else self.held[axis]
+            rows[:, i] = points[:, list(self.spans).index(axis)] if axis in self.spans else self.fixed_axes[axis]
         return rows
 
     @cached_property
     def inputs(self) -> list[Term]:
-        return Turns().inputs(len(self.spans))
+        return JumpFreeTrace().inputs(len(self.spans))
 
     @cached_property
     def trace(self) -> Trace:
-        return self.inputs[0].trace if self.inputs else Turns()
+        return self.inputs[0].trace if self.inputs else JumpFreeTrace()
 
     @cached_property
     def _pose(self) -> list[Scalar]:
-        free = dict(zip(self.spans, self.inputs, strict=True))
-        return [free[axis] if axis in free else np.float64(self.held[axis]) for axis in self.machine.axes]
+        varied = dict(zip(self.spans, self.inputs, strict=True))
+        return [varied[axis] if axis in varied else np.float64(self.fixed_axes[axis]) for axis in self.machine.axes]
 
     @cached_property
     def _rates(self) -> tuple[TwistRates, list[Scalar]]:
-        model = self.machine.model
+        machine = self.machine
         with np.errstate(all="ignore"):
-            joints, placed, legs = model.invert(self._pose, self.mode)
-            found = compute_twist_rates(model.spec, model.structure, self._pose, joints)
-        columns_a, columns_b = column_scales(self.machine, self.length)
-        a = [[x * float(k) for x, k in zip(row, columns_a, strict=True)] for row in found.a]
-        b = [[x * float(k) for x, k in zip(row, columns_b, strict=True)] for row in found.b]
-        reach = [*placed.reach, *(reach.margin for leg in legs for reach in leg.reach)]
-        return TwistRates(a, b, found.spans), reach
+            joints, platform, legs = machine.trace_inverse(self._pose, self.mode)
+            rates = machine.trace_rates(self._pose, joints)
+        columns_a, columns_b = list_column_scales(machine, self.length)
+        a = [[x * float(k) for x, k in zip(row, columns_a, strict=True)] for row in rates.a]
+        b = [[x * float(k) for x, k in zip(row, columns_b, strict=True)] for row in rates.b]
+        reach = [*platform.reach, *(reach.margin for leg in legs for reach in leg.reach)]
+        return TwistRates(a, b, rates.spans), reach
 
     @property
     def reach(self) -> list[Scalar]:
-        """What is ≥ 0 where the legs close and the tool can be pointed."""
+        """Margins that are ≥ 0 where the legs close and the tool can be pointed."""
         return self._rates[1]
 
     @property
@@ -125,17 +125,17 @@ class Box:
 
     @cached_property
     def parallel(self) -> Matrix:
-        """What is regular but at parallel singularities: A, of five axes the legs' rows against the translations."""
+        """The matrix that is singular at parallel singularities: A, of five axes the legs' rows by the translations."""
         a, legs = self._rates[0].a, len(self._rates[0].spans)
         size = legs if len(a) - legs == 2 else len(a)
         return [row[:size] for row in a[:size]]
 
     @cached_property
     def serial(self) -> Matrix:
-        """What is regular but at serial singularities: the determinants of B's blocks along a diagonal."""
-        found = self._rates[0]
-        blocks = [found.b[row][joint] for row, joint in enumerate(drives_of_legs(self.machine))]
-        turns = [row[len(blocks) :] for row in found.b[len(blocks) :]]
+        """The matrix that is singular at serial singularities: the determinants of B's blocks on a diagonal."""
+        b = self._rates[0].b
+        blocks = [b[row][joint] for row, joint in enumerate(list_leg_joints(self.machine))]
+        turns = [row[len(blocks) :] for row in b[len(blocks) :]]
         if len(turns) == 1:
             blocks.append(turns[0][0])
         elif turns:
@@ -144,10 +144,10 @@ class Box:
 
 
 @dataclass(frozen=True, eq=False)
-class Linear:
-    """Matrices over boxes: ``middle`` + Σ (``slopes`` ± ``spread``)·δ ± ``own``, entry by entry, for |δ| ≤ ``half``.
+class LinearMatrices:
+    """Matrices over N boxes: ``middle`` + Σ (``slopes`` ± ``spread``)·δ ± ``own``, entry by entry, for |δ| ≤ ``half``.
 
-    middle, own (N, n, m); slopes, spread (N, d, n, m); half (N, d). What is not bounded is infinite or NaN.
+    middle, own (N, n, m); slopes, spread (N, d, n, m); half (N, d). An entry without bounds is infinite or NaN.
     """
 
     middle: Array
@@ -156,23 +156,25 @@ class Linear:
     spread: Array
     half: Array
 
-    def take(self, which: NDArray[np.bool_]) -> Linear:
-        return Linear(*(column[which] for column in (self.middle, self.own, self.slopes, self.spread, self.half)))
+    def take(self, which: Flags) -> LinearMatrices:
+        """Keep some of the boxes."""
+        columns = (self.middle, self.own, self.slopes, self.spread, self.half)
+        return LinearMatrices(*(column[which] for column in columns))
 
     @cached_property
-    def bounded(self) -> NDArray[np.bool_]:
+    def bounded(self) -> Flags:
         """(N,) where everything is finite."""
         ends = np.isfinite(self.middle).all((1, 2)) & np.isfinite(self.own).all((1, 2))
         return np.asarray(ends & np.isfinite(self.slopes).all((1, 2, 3)) & np.isfinite(self.spread).all((1, 2, 3)))
 
-    def times(self, left: Array) -> Linear:
-        """``left`` (N, n, n) times these."""
+    def multiply_left(self, left: Array) -> LinearMatrices:
+        """Multiply by matrices (N, n, n) from the left."""
         size = np.abs(left)
         spread = size[:, None] @ self.spread
-        return Linear(left @ self.middle, size @ self.own, left[:, None] @ self.slopes, spread, self.half)
+        return LinearMatrices(left @ self.middle, size @ self.own, left[:, None] @ self.slopes, spread, self.half)
 
     @cached_property
-    def turned(self) -> Array:
+    def linear_change(self) -> Array:
         """By how much the linear part changes at most, (N, n, m)."""
         return np.asarray(np.einsum("nd,ndij->nij", self.half, np.abs(self.slopes)))
 
@@ -182,15 +184,15 @@ class Linear:
         return np.asarray(self.own + np.einsum("nd,ndij->nij", self.half, self.spread))
 
     @property
-    def widest(self) -> NDArray[np.int64]:
-        """(N,) the input whose range changes most."""
+    def widest(self) -> Indices:
+        """The input that changes the matrix most, (N,)."""
         sizes = (np.sqrt(np.square(part).sum((2, 3))) for part in (self.slopes, self.spread))
         return np.asarray((self.half * sum(sizes)).argmax(1))
 
 
 @dataclass(frozen=True, eq=False)
-class Over:
-    """Matrices of terms, to be bounded over boxes of their inputs by the mean value theorem."""
+class MatrixBounds:
+    """A matrix of terms, to be bounded over boxes of their inputs by the mean value theorem."""
 
     matrix: Matrix
     inputs: Sequence[Term]
@@ -202,19 +204,20 @@ class Over:
         slopes = [derivative(x, term) for term in self.inputs for x in entries]
         return IntervalProgram(self.trace, entries), IntervalProgram(self.trace, slopes)
 
-    def __call__(self, low: Array, high: Array) -> Linear:
+    def __call__(self, low: Array, high: Array) -> LinearMatrices:
+        """Bound it over boxes [low, high], (N, d)."""
         count, d = low.shape
         shape = len(self.matrix), len(self.matrix[0])
         at, over = self._programs
         middle = 0.5 * (low + high)
         half = np.maximum(middle - low, high - middle)
-        entries = _centred(*(end.reshape(count, *shape) for end in at(middle, middle)))
-        slopes = _centred(*(end.reshape(count, d, *shape) for end in over(low, high)))
-        return Linear(*entries, *slopes, half)
+        entries = _compute_middles(*(end.reshape(count, *shape) for end in at(middle, middle)))
+        slopes = _compute_middles(*(end.reshape(count, d, *shape) for end in over(low, high)))
+        return LinearMatrices(*entries, *slopes, half)
 
 
-def _centred(down: Array, up: Array) -> tuple[Array, Array]:
-    """Middles and radii, rounded up."""
+def _compute_middles(down: Array, up: Array) -> tuple[Array, Array]:
+    """Compute middles and radii of intervals, radii rounded up."""
     with np.errstate(invalid="ignore", over="ignore"):
         middle = 0.5 * down + 0.5 * up
         return middle, np.maximum(up - middle, middle - down) * (1.0 + 1e-15)

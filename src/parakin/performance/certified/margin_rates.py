@@ -1,4 +1,4 @@
-"""How the limits' margins, the turning joints and the closed chain change over boxes of poses, all axes at once."""
+"""Rates of margins: how limits' margins, turning joints and the closed chain change over boxes of poses."""
 
 from __future__ import annotations
 
@@ -7,28 +7,27 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...algebra import Scalar, Term, Trace, derivative
-from ...arrays import Array
+from ...arrays import Array, Flags
 from ...kernels.intervals import IntervalProgram
 from ...machine import Machine
-from ..characteristic_length import characteristic_length
-from .bisection import Decided, regular
-from .interval_matrices import Box, Linear, Over, Turns
+from ..characteristic_length import choose_characteristic_length
+from .bisection import Decided, decide_regular
+from .interval_matrices import JumpFreeTrace, LinearMatrices, MatrixBounds, PoseBox
 
-_MOST = 1e300  # stands for no bound, so that times nought it is nought
+_MOST = 1e300  # stands for no bound, so that times zero it is zero
 
 
 @dataclass(frozen=True, eq=False)
-class Variation:
+class MarginRates:
     """A machine in one working mode, bounded over boxes [low, high] of poses, (N, axes) mm and rad.
 
     Margins are in the order of :attr:`Machine.limits`; ``turning`` are the joints that are angles. Bounds hold wherever
     in the box the legs close.
 
-    Of an angle that jumps at ±180° sine and cosine are taken as quotients, which do not jump; but where the angle is
-    free these have no bounds, so there they are taken as what they are.
+    Sine and cosine of an angle that jumps at ±180° are taken as quotients, which do not jump. Where the angle is free
+    the quotients have no bounds, and there the functions themselves are taken.
     """
 
     machine: Machine
@@ -38,33 +37,32 @@ class Variation:
     def turning(self) -> list[int]:
         return [i for i, unit in enumerate(self.machine.joint_units) if unit == "rad"]
 
-    def _margins(self, pose: list[Term]) -> list[Scalar]:
-        return [margin for _, margin in self.machine.model.own_margins(pose, self.mode)]
-
-    def _rates_in(self, trace: Trace) -> IntervalProgram:
+    def _compile_rates(self, trace: Trace) -> IntervalProgram:
         pose = trace.inputs(len(self.machine.axes))
-        joints = self.machine.model.invert(pose, self.mode)[0]
-        values = [*self._margins(pose), *(joints[i] for i in self.turning)]
+        joints = self.machine.trace_inverse(pose, self.mode)[0]
+        margins = self.machine.trace_margins(pose, self.mode)
+        values: list[Scalar] = [*margins, *(joints[i] for i in self.turning)]
         return IntervalProgram(trace, [derivative(value, axis) for value in values for axis in pose])
 
     @cached_property
     def _rates(self) -> IntervalProgram:
-        return self._rates_in(Turns())
+        return self._compile_rates(JumpFreeTrace())
 
     @cached_property
     def _rates_where_free(self) -> IntervalProgram:
-        return self._rates_in(Trace())
+        return self._compile_rates(Trace())
 
     @cached_property
     def _values(self) -> IntervalProgram:
         pose = Trace().inputs(len(self.machine.axes))
-        freedom = self.machine.model.invert(pose, self.mode)[1].freedom
-        return IntervalProgram(pose[0].trace, [*self._margins(pose), 1.0 if freedom is None else freedom])
+        freedom = self.machine.trace_inverse(pose, self.mode)[1].freedom
+        margins = self.machine.trace_margins(pose, self.mode)
+        return IntervalProgram(pose[0].trace, [*margins, 1.0 if freedom is None else freedom])
 
-    def rates(self, low: Array, high: Array) -> tuple[Array, Array]:
-        """Bounds of the derivatives of every margin, then of every turning joint, by every axis: (N, values, axes).
+    def bound_rates(self, low: Array, high: Array) -> tuple[Array, Array]:
+        """Bound the derivatives of every margin, then of every turning joint, by every axis: (N, values, axes).
 
-        Those of an angle know no jump at ±180°. What has no bound is ±1e300.
+        Those of an angle have no jump at ±180°. A derivative without bounds gives ±1e300.
         """
         down, up = self._rates(low, high)
         if self.machine.wrist is not None:
@@ -74,55 +72,59 @@ class Variation:
         shape = (len(low), -1, len(self.machine.axes))
         return np.clip(down, -_MOST, _MOST).reshape(shape), np.clip(up, -_MOST, _MOST).reshape(shape)
 
-    def least(self, low: Array, high: Array) -> tuple[Array, Array]:
-        """What every margin (N, margins) is at least, with angles within ±180°, and what sin² of the tool's axis
-        against the first axis of head and table is at most, (N,); 1 where there is none."""
+    def bound_margins(self, low: Array, high: Array) -> tuple[Array, Array]:
+        """Bound every margin from below, (N, margins), and the wrist's freedom from above, (N,).
+
+        Angles are within ±180°. The freedom is sin² of the tool's axis against the first axis of head and table; 1 for
+        a machine without.
+        """
         down, up = self._values(low, high)
         return down[:, :-1], up[:, -1]
 
-    def regular(self, low: Array, high: Array) -> NDArray[np.bool_]:
-        """(N,) where it is proved that no parallel singularity is in the box."""
-        decided: NDArray[np.bool_] = self._regular(low, high)[0]
+    def prove_regular(self, low: Array, high: Array) -> Flags:
+        """Prove that no parallel singularity is in the box, (N,)."""
+        decided: Flags = self._decide_regular(low, high)[0]
         if self.machine.wrist is not None:
             rows = np.flatnonzero(~decided)
-            decided[rows] = self._regular_where_free(low[rows], high[rows])[0]
+            decided[rows] = self._decide_regular_where_free(low[rows], high[rows])[0]
         return decided
 
     @cached_property
-    def _regular(self) -> Callable[[Array, Array], Decided]:
-        box = Box(self.machine, self._spans, {}, self.mode, characteristic_length(self.machine))
-        return regular(Over(box.parallel, box.inputs, box.trace), np.ones(len(self._spans)))
+    def _decide_regular(self) -> Callable[[Array, Array], Decided]:
+        box = PoseBox(self.machine, self._spans, {}, self.mode, choose_characteristic_length(self.machine))
+        return decide_regular(MatrixBounds(box.parallel, box.inputs, box.trace), np.ones(len(self._spans)))
 
     @cached_property
-    def _regular_where_free(self) -> Callable[[Array, Array], Decided]:
-        box = _PlainBox(self.machine, self._spans, {}, self.mode, characteristic_length(self.machine))
-        return regular(_ByValue(box.parallel, box.inputs, box.trace), np.ones(0))
+    def _decide_regular_where_free(self) -> Callable[[Array, Array], Decided]:
+        box = _PlainPoseBox(self.machine, self._spans, {}, self.mode, choose_characteristic_length(self.machine))
+        return decide_regular(_EntryBounds(box.parallel, box.inputs, box.trace), np.ones(0))
 
     @property
     def _spans(self) -> dict[str, tuple[float, float]]:
         return dict.fromkeys(self.machine.axes, (0.0, 0.0))
 
 
-class _PlainBox(Box):
-    """A box whose terms take sine and cosine of an angle as what they are."""
+class _PlainPoseBox(PoseBox):
+    """A box whose terms keep sine and cosine of an angle as they are."""
 
     @cached_property
     def inputs(self) -> list[Term]:
         return Trace().inputs(len(self.spans))
 
 
-class _ByValue(Over):
-    """Matrices bounded by their entries alone, where these have no bounded derivatives."""
+class _EntryBounds(MatrixBounds):
+    """A matrix bounded by its entries alone, where these have no bounded derivatives."""
 
     @cached_property
     def _entries(self) -> IntervalProgram:
         return IntervalProgram(self.trace, [entry for row in self.matrix for entry in row])
 
-    def __call__(self, low: Array, high: Array) -> Linear:
+    def __call__(self, low: Array, high: Array) -> LinearMatrices:
+        """Bound it over boxes [low, high], (N, d)."""
         count, shape = len(low), (len(self.matrix), len(self.matrix[0]))
         down, up = (end.reshape(count, *shape) for end in self._entries(low, high))
         with np.errstate(invalid="ignore", over="ignore"):
             middle = 0.5 * down + 0.5 * up
             own = np.maximum(up - middle, middle - down) * (1.0 + 1e-15)
         none = np.zeros((count, 0, *shape))
-        return Linear(middle, own, none, none, np.zeros((count, 0)))
+        return LinearMatrices(middle, own, none, none, np.zeros((count, 0)))

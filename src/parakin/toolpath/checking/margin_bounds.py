@@ -13,7 +13,7 @@ import numpy as np
 
 from ...arrays import Array, Flags, Indices
 from ...kinematics.wrist import ASIDE, LEEWAY, PROVED
-from ...performance.certified.margin_rates import Variation
+from ...performance.certified.margin_rates import MarginRates
 from .motion_sections import Sections
 from .motions import (
     EITHER,
@@ -66,7 +66,7 @@ class MotionProver:
     def __init__(self, motions: PathMotions):
         self.motions = motions
         machine = motions.machine
-        self.variations = [Variation(machine, mode) for mode in motions.modes]
+        self.margin_rates = [MarginRates(machine, mode) for mode in motions.modes]
         columns = {name: column for column, name in enumerate(machine.limits)}
         self._range_columns = {  # of each turning joint: its limits
             joint: [
@@ -93,8 +93,8 @@ class MotionProver:
         counted = np.zeros(len(sections), bool)
         boxes = self._box_sections(sections)
         self.boxes += len(sections)
-        for variation, rows in self._group_by_mode(boxes.wrist_modes):
-            down, up = variation.rates(boxes.low[rows], boxes.high[rows])
+        for rates, rows in self._group_by_mode(boxes.wrist_modes):
+            down, up = rates.bound_rates(boxes.low[rows], boxes.high[rows])
             way = step[rows][:, None, :]
             down, up = np.minimum(down * way, up * way).sum(2), np.maximum(down * way, up * way).sum(2)
             least[rows] = _bound_from_ends(m0[rows], m1[rows], down[:, :count], up[:, :count])
@@ -122,8 +122,8 @@ class MotionProver:
         still = (at.wrist_modes == EITHER) & self._find_still(q_high - q_low)
         boxes = self._move_aside(at, still, low, high, wrist_modes)
         self.boxes += len(low)
-        for variation, rows in self._group_by_mode(boxes.wrist_modes):
-            down, up = variation.rates(boxes.low[rows], boxes.high[rows])
+        for rates, rows in self._group_by_mode(boxes.wrist_modes):
+            down, up = rates.bound_rates(boxes.low[rows], boxes.high[rows])
             b, a = below[rows], above[rows]
             down, up = np.minimum(down * a, up * b).sum(2), np.maximum(up * a, down * b).sum(2)
             least[rows] = at.margins[rows] + down[:, :count]
@@ -143,13 +143,13 @@ class MotionProver:
                 margins[:, column] = q_low[:, joint] - drive.low if is_min else drive.high - q_high[:, joint]
         return margins
 
-    def _group_by_mode(self, wrist_modes: WristModes) -> list[tuple[Variation, Indices]]:
+    def _group_by_mode(self, wrist_modes: WristModes) -> list[tuple[MarginRates, Indices]]:
         """List the rows to bound in each working mode, in blocks; rows that change their mode are in none."""
-        groups = [(self.variations[0], np.flatnonzero(wrist_modes == OWN))]
-        if len(self.variations) > 1:
-            groups.append((self.variations[1], np.flatnonzero(wrist_modes == OTHER)))
+        groups = [(self.margin_rates[0], np.flatnonzero(wrist_modes == OWN))]
+        if len(self.margin_rates) > 1:
+            groups.append((self.margin_rates[1], np.flatnonzero(wrist_modes == OTHER)))
         starts = [(v, rows, i) for v, rows in groups for i in range(0, len(rows), _BOXES_AT_ONCE)]
-        return [(variation, rows[i : i + _BOXES_AT_ONCE]) for variation, rows, i in starts]
+        return [(rates, rows[i : i + _BOXES_AT_ONCE]) for rates, rows, i in starts]
 
     def _find_still(self, change: Array) -> Flags:
         """Find rows of joints' changes (n, joints) in which the wrist does not turn."""
@@ -191,9 +191,9 @@ class MotionProver:
         Both joints of the wrist go straight from value to value there.
         """
         worst, freedom = np.full(least.shape, np.inf), np.zeros(len(least))
-        for number, variation in enumerate(self.variations):
+        for number, rates in enumerate(self.margin_rates):
             rows = np.flatnonzero((boxes.wrist_modes == number) | (boxes.wrist_modes == EITHER))
-            down, up = variation.least(boxes.low[rows], boxes.high[rows])
+            down, up = rates.bound_margins(boxes.low[rows], boxes.high[rows])
             worst[rows], freedom[rows] = np.minimum(worst[rows], down), np.maximum(freedom[rows], up)
         worst[boxes.aside] -= self._aside
         np.maximum(least, worst, out=least, where=self._bounded_by_value & ~np.isnan(worst))
@@ -215,11 +215,11 @@ class MotionProver:
     def prove_regular_boxes(self, low: Array, high: Array, wrist_modes: WristModes) -> Flags:
         """Prove boxes [low, high] of poses (n, axes) free of parallel singularities in their modes, (n,)."""
         regular = np.ones(len(low), bool)
-        for number, variation in enumerate(self.variations):
+        for number, rates in enumerate(self.margin_rates):
             rows = np.flatnonzero((wrist_modes == number) | (wrist_modes == EITHER))
             for i in range(0, len(rows), _BOXES_AT_ONCE):
                 block = rows[i : i + _BOXES_AT_ONCE]
-                regular[block] &= variation.regular(low[block], high[block])
+                regular[block] &= rates.prove_regular(low[block], high[block])
         return regular
 
     def find_finest(self, sections: Sections) -> Flags:

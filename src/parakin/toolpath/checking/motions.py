@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from ...arrays import Array, Flags, Indices
 from ...kinematics.wrist import PRINTED, find_nearest_turn
 from ...machine import Machine
-from ...performance.characteristic_length import characteristic_length
-from ...performance.jacobians import column_scales
+from ...performance.characteristic_length import choose_characteristic_length
+from ...performance.jacobians import list_column_scales
 from ..posting.posted import Posted
 
 WristModes = NDArray[np.int8]
@@ -140,7 +140,7 @@ class PathMotions:
 
     @cached_property
     def _scales(self) -> tuple[Array, Array, int]:
-        return (*column_scales(self.machine, characteristic_length(self.machine)), len(self.machine.axes))
+        return (*list_column_scales(self.machine, choose_characteristic_length(self.machine)), len(self.machine.axes))
 
 
 def find_pole_crossings(first: MotionPoints, last: MotionPoints) -> Flags:

@@ -10,7 +10,7 @@ import numpy as np
 
 from ...errors import PoseError
 from ...machine import Machine
-from ...performance.search import spread
+from ...performance.search import pick_best_apart
 from ..path import Floats, ToolPath
 from ..posting.working_mode import list_candidate_modes
 from .margins import AXES, Indices, PlacementMargins, PlacementScore
@@ -128,7 +128,7 @@ class _Search:
         points = _spread_out(_LOOKED_AT, d) if d else np.empty((1, 0))
         parts = np.array_split(points, range(32, len(points), 32))
         worths = np.concatenate([score_rows(*self.rows(part)) for part in parts])
-        starts = spread(points, worths, _STARTS, np.full(d, _APART)) if d else np.zeros(1, np.int64)
+        starts = pick_best_apart(points, worths, _STARTS, np.full(d, _APART)) if d else np.zeros(1, np.int64)
         tops = []
         for number, start in enumerate(starts.tolist(), 1):
             tops.append(maximise_least(self.rows, points[start], _STEPS))

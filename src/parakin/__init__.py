@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from .kinematics.forward import Solution
     from .machine import Machine
     from .performance.atlas import Atlas, atlas
-    from .toolpath.job import Job, prepare
+    from .toolpath.job import Job, Tolerances, prepare
     from .toolpath.path import ToolPath
     from .toolpath.placing.placement import Placement, find_placement
     from .toolpath.posting.frames import workpiece
@@ -37,6 +37,7 @@ __all__ = [
     "PoseError",
     "Region",
     "Solution",
+    "Tolerances",
     "ToolPath",
     "Trajectory",
     "Workspace",
@@ -89,6 +90,7 @@ _LAZY = {
     "Placement": "toolpath.placing.placement",
     "Region": "workspaces.certified.region",
     "Solution": "kinematics.forward",
+    "Tolerances": "toolpath.job",
     "ToolPath": "toolpath.path",
     "Trajectory": "toolpath.timing.trajectory",
     "Workspace": "workspaces.certified.workspace",

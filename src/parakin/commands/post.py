@@ -90,7 +90,7 @@ def post(
             raise InputError(f"expected {unit}", option)
     announce_compiling()
     from ..export.files import write_all
-    from ..toolpath.job import prepare
+    from ..toolpath.job import Tolerances, prepare
     from ..toolpath.reading.detect import read_path
     from .post_summary import as_json, summary
 
@@ -104,11 +104,11 @@ def post(
             placement = _placement(chosen, path, place, mode, progress)
             frame, mode = placement.workpiece, placement.mode
         job = prepare(
-            chosen, path, workpiece=frame, mode=mode, target=target or "linuxcnc", tolerance=tolerance,
-            axis_tolerance=radians(angle_tolerance), corners=corners,
+            chosen, path, workpiece=frame, mode=mode, target=target or "linuxcnc",
+            tolerances=Tolerances(tolerance, radians(angle_tolerance)), corners=corners,
             progress=progress.part("checking and timing", 0.3, 0.7),
         )  # fmt: skip
-        files, missing = _contents(part.stem, job, target, force, tolerance, rate, parquet, progress)
+        files, missing = _contents(part.stem, job, target, force, rate, parquet, progress)
         paths = write_all(output, dict(files.values()))
     written = {kind: str(name) for kind, name in zip(files, paths, strict=True)}
     if json:
@@ -131,7 +131,6 @@ def _contents(
     job: Job,
     target: str | None,
     force: bool,
-    tolerance: float,
     rate: float | None,
     parquet: bool,
     progress: Progress,
@@ -157,14 +156,14 @@ def _contents(
                 files["setpoints-parquet"] = (f"{stem}.setpoints.parquet", writer)
     if target is not None:
         try:
-            files["program"] = (f"{stem}.{target}.ngc", _program(job, target, force, tolerance))
+            files["program"] = (f"{stem}.{target}.ngc", _program(job, target, force))
         except PoseError as error:
             missing.append(f"no program: {error}")
     files["report"] = (f"{stem}.report.html", report_html(posted, trajectory, job.unplanned, job.waits))
     return files, missing
 
 
-def _program(job: Job, target: str, force: bool, tolerance: float) -> Content:
+def _program(job: Job, target: str, force: bool) -> Content:
     from ..controllers import joint_program, linuxcnc_program
     from ..toolpath.posting.offences import describe_place
 
@@ -176,6 +175,4 @@ def _program(job: Job, target: str, force: bool, tolerance: float) -> Content:
     broken = "\n".join(f"{describe_place(posted, offence)}: {offence.text}" for offence in posted.offences)
     if target == "joints":
         return joint_program(job.trajectory, forced=broken or None)
-    return linuxcnc_program(
-        job.trajectory, forced=broken or None, tolerance=0.5 * tolerance
-    )  # the trajectory's corners have half
+    return linuxcnc_program(job.trajectory, forced=broken or None, tolerance=job.corner_tolerance)

@@ -1,38 +1,46 @@
-"""From a tool path to all that a controller needs: linearised, checked everywhere, timed."""
+"""Prepare a job: a tool path on a machine that is linearised, checked everywhere, and timed."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from math import isfinite
-from typing import Literal, TypeAlias
+from typing import Literal, NamedTuple, TypeAlias
 
+from ..arrays import Array, Progress
 from ..errors import PoseError
 from ..machine import Machine
 from .checking.check import check_path
 from .linearise.linearise import linearise_path
-from .path import Floats, ToolPath
+from .path import ToolPath
 from .posting.post import post_path
 from .posting.posted import Posted
 from .timing import Corners, Trajectory, plan_trajectory
 from .timing.stops import find_stops, sum_dwells
 
-Progress = Callable[[float], None]
 Target: TypeAlias = Literal["linuxcnc", "joints"]  # moves the tool straight; moves every joint evenly
 
-TOLERANCE = 0.01  # mm
-AXIS_TOLERANCE = 1e-3  # rad
+
+class Tolerances(NamedTuple):
+    """How far the tool may be off the programmed path: its tip, mm, and its axis, rad."""
+
+    tip: float = 0.01
+    axis: float = 1e-3
+
+    def halve(self) -> Tolerances:
+        """Return half of both: one half is for the controller's interpolation, the other for rounding corners."""
+        return Tolerances(0.5 * self.tip, 0.5 * self.axis)
 
 
 @dataclass(frozen=True, eq=False)
 class Job:
     """A tool path made ready for a machine and its controller.
 
-    programmed : as it came, on the machine
-    posted : with the records that the controller's interpolation needs, checked between all of them
+    programmed : the path as it came, on the machine
+    posted : the path with the records that the controller's interpolation needs, checked between all of them
     trajectory : None where there is none
-    unplanned : why there is none
-    waits : s, that the program waits by its own words, besides the trajectory's
+    unplanned : why there is no trajectory
+    waits : s, that the program waits by its own words, besides the trajectory's time
+    corner_tolerance : mm that corners may take the tip off the path
     """
 
     programmed: Posted
@@ -40,6 +48,7 @@ class Job:
     trajectory: Trajectory | None
     unplanned: str
     waits: float
+    corner_tolerance: float
 
     @property
     def inserted(self) -> int:
@@ -48,8 +57,10 @@ class Job:
 
     @property
     def runs(self) -> bool:
-        """Whether the machine can run it: nothing is off limits, and nothing but unknown rates of its drives keeps it
-        from having a trajectory."""
+        """Whether the machine can run the job: nothing is off limits, and it has a trajectory.
+
+        Without one it can run too where the rates of its drives are unknown.
+        """
         rated = all(isfinite(drive.speed) or isfinite(drive.acceleration) for drive in self.posted.machine.drives)
         return self.posted.first is None and (self.trajectory is not None or not rated)
 
@@ -63,11 +74,10 @@ def prepare(
     machine: Machine,
     path: ToolPath,
     *,
-    workpiece: Floats | None = None,
+    workpiece: Array | None = None,
     mode: str | None = None,
     target: Target = "linuxcnc",
-    tolerance: float = TOLERANCE,
-    axis_tolerance: float = AXIS_TOLERANCE,
+    tolerances: Tolerances = Tolerances(),  # noqa: B008  it never changes
     corners: Corners = "round",
     progress: Progress | None = None,
 ) -> Job:
@@ -77,38 +87,38 @@ def prepare(
     ----------
     machine, path, workpiece, mode : as for :func:`~.posting.post.post_path`
     target : what the controller interpolates: ``linuxcnc`` the tool's pose, ``joints`` the joints
-    tolerance, axis_tolerance : mm and rad that tip and axis may be off the programmed path in all: half of each is for
-        the controller's interpolation, half for rounding corners
+    tolerances : of tip and axis about the programmed path; half of each is for the controller's interpolation, half for
+        rounding corners
     corners : ``round`` or ``stop``, as for :func:`~.timing.plan.plan_trajectory`
     progress : called now and then with the fraction done, 0 to 1
 
-    Raises :class:`PoseError` or :class:`InputError` for what can't be asked. What the machine can't do raises nothing:
-    it is an offence of :attr:`Job.posted` or the reason in :attr:`Job.unplanned`.
+    Raises :class:`PoseError` or :class:`InputError` for invalid arguments. What the machine can't do raises nothing: it
+    is an offence of :attr:`Job.posted` or the reason in :attr:`Job.unplanned`.
     """
-    say = progress or (lambda fraction: None)
+    report = progress or (lambda fraction: None)
 
-    def part(begin: float, end: float) -> Progress:
-        return lambda fraction: say(begin + (end - begin) * fraction)
+    def report_part(begin: float, end: float) -> Progress:
+        return lambda fraction: report(begin + (end - begin) * fraction)
 
-    programmed = post_path(machine, path, workpiece=workpiece, mode=mode, progress=part(0.0, 0.1))
-    # The angles of the pose change evenly in either case, as the trajectory has them; the tip is on its line by then.
-    steps = 1 if target == "linuxcnc" else 2
-    lean = 0.5 * axis_tolerance / steps
-    posted, trajectory, why = programmed, None, ""
+    half = tolerances.halve()
+    programmed = post_path(machine, path, workpiece=workpiece, mode=mode, progress=report_part(0.0, 0.1))
+    posted, trajectory, unplanned = programmed, None, ""
+    # The pose's angles change evenly under either target, as the trajectory has them, and the tip is on its line by
+    # then: two steps share the tolerance of the axis.
+    lean = half.axis / (1 if target == "linuxcnc" else 2)
     try:
-        posted = linearise_path(posted, "pose", chord=0.5 * tolerance, angle=lean, progress=part(0.1, 0.2))
+        posted = linearise_path(posted, "pose", chord=half.tip, angle=lean, progress=report_part(0.1, 0.2))
         if target == "joints":
-            posted = linearise_path(posted, "joints", chord=0.5 * tolerance, angle=lean, progress=part(0.2, 0.4))
+            posted = linearise_path(posted, "joints", chord=half.tip, angle=lean, progress=report_part(0.2, 0.4))
     except PoseError as error:
-        why = str(error)
-    posted = check_path(posted, progress=part(0.4, 0.6))
-    if not why:
+        unplanned = str(error)
+    posted = check_path(posted, progress=report_part(0.4, 0.6))
+    if not unplanned:
         try:
             trajectory = plan_trajectory(
-                posted, corners=corners, tolerance=0.5 * tolerance, axis_tolerance=0.5 * axis_tolerance,
-                stops=find_stops(posted.path),
-            )  # fmt: skip
+                posted, corners=corners, tolerance=half.tip, axis_tolerance=half.axis, stops=find_stops(posted.path)
+            )
         except PoseError as error:
-            why = str(error)
-    say(1.0)
-    return Job(programmed, posted, trajectory, why, sum_dwells(path))
+            unplanned = str(error)
+    report(1.0)
+    return Job(programmed, posted, trajectory, unplanned, sum_dwells(path), half.tip)

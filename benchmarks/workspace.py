@@ -10,7 +10,6 @@ from measure import best, table
 
 import parakin as pk
 from parakin.kernels.batch import count_cores
-from parakin.workspaces.sampled.grid import GridWorkspace, sample_grid
 from parakin.workspaces.sampled.sampling import BrokenLimitFinder, find_bounding_box
 
 OWN_ERROR = 0.05  # of the NumPy grid: half the volume of the cells that its boundary cuts, relative to its volume
@@ -92,7 +91,7 @@ def own_error(mask: np.ndarray) -> float:
     return 0.5 * cut / (np.count_nonzero(within) + 0.5 * cut)
 
 
-def by_rule(grid: Callable[[float], GridWorkspace]) -> GridWorkspace:
+def by_rule(grid: Callable[[float], pk.GridWorkspace]) -> pk.GridWorkspace:
     """The grid whose own error is as wanted: that shrinks with the step."""
     step = 40.0
     for _ in range(3):
@@ -110,7 +109,7 @@ def main() -> str:
 
     one, third = best(certified(gap=0.01), 5), best(certified(gap=0.003), 3)
     cells = [best(certified(cell=cell), 3) for cell in (40.0, 20.0, 10.0)]
-    ruled = by_rule(lambda step: sample_grid(upright, step))
+    ruled = by_rule(lambda step: pk.sample_grid(upright, step))
     plain = best(lambda: on_grid(ruled.coordinates), 3)
     differ = int((on_grid(ruled.coordinates) != ruled.mask).sum())
     finder = BrokenLimitFinder(upright)
@@ -136,14 +135,14 @@ def main() -> str:
 def total_orientation() -> str:
     """The Lambda machine in every A, B, C within 15°, 5° apart, places 20 mm apart."""
     asked = pk.region(pk.load("lambda6"), every=TOTAL)
-    grid = sample_grid(asked, 20.0)
+    grid = pk.sample_grid(asked, 20.0)
     turns = [tuple(turn) for turn in BrokenLimitFinder(asked).orientations]
     box = find_bounding_box(asked)
     with np.errstate(invalid="ignore"):
         plain = best(lambda: in_every_turn(grid.coordinates, turns, drop=False), 1)
         dropping = best(lambda: in_every_turn(grid.coordinates, turns, drop=True), 1)
         differ = int((in_every_turn(grid.coordinates, turns, drop=True) != grid.mask).sum())
-    own, search = best(lambda: sample_grid(asked, 20.0, box), 5), best(lambda: find_bounding_box(asked), 3)
+    own, search = best(lambda: pk.sample_grid(asked, 20.0, box), 5), best(lambda: find_bounding_box(asked), 3)
     rows = [
         ["NumPy, every place in every turn", f"{plain:.3f}", "1.00", ""],
         ["NumPy, places dropped once ruled out", f"{dropping:.3f}", f"{dropping / plain:.3f}", ""],

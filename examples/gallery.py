@@ -17,14 +17,6 @@ from matplotlib.figure import Figure
 from mpl_toolkits.mplot3d.art3d import Line3DCollection, Poly3DCollection
 
 import parakin as pk
-from parakin.export.files import write_all
-from parakin.export.workspace.meshes import Shell, shell
-from parakin.workspaces.certified.subdivision import Cells
-from parakin.workspaces.certified.workspace import Workspace
-from parakin.workspaces.inscribed.largest_box import InscribedBox, find_largest_box
-from parakin.workspaces.sampled.cross_sections import find_cross_sections
-from parakin.workspaces.sampled.distance_field import sample_field
-from parakin.workspaces.sampled.polar_sweep import PolarWorkspace, sweep_polar
 
 BLUE, ORANGE, GREEN, GREY = "#1565c0", "#ef6c00", "#2e7d32", "#90a4ae"
 TILT = np.deg2rad(15.0)
@@ -35,7 +27,7 @@ class Page:
     """Figures with their numbers, in the order they are added."""
 
     def __init__(self) -> None:
-        self.files: dict[str, bytes | str] = {}
+        self.files: dict[str, bytes] = {}
         self.text = [
             "# Gallery",
             "",
@@ -77,7 +69,7 @@ def frame(ax: Any, low: np.ndarray, high: np.ndarray, names: tuple[str, ...]) ->
     ax.locator_params(nbins=5)
 
 
-def solid(ax: Any, shape: Shell, colour: str, alpha: float) -> None:
+def solid(ax: Any, shape: pk.Mesh, colour: str, alpha: float) -> None:
     corners = shape.vertices[shape.faces]
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-12)
@@ -93,12 +85,12 @@ def edges(low: np.ndarray, high: np.ndarray) -> list[list[np.ndarray]]:
     return [[a, b] for i, a in enumerate(corners) for b in corners[i + 1 :] if np.count_nonzero(a != b) == 1]
 
 
-def meshed(found: Workspace, step: float) -> Shell:
+def meshed(found: pk.Workspace, step: float) -> pk.Mesh:
     assert found.box is not None
-    return shell(sample_field(found.region, found.box, step))
+    return pk.make_mesh(pk.sample_field(found.region, found.box, step))
 
 
-def proved(found: Workspace) -> str:
+def proved(found: pk.Workspace) -> str:
     v, scale, unit = found.volume, (1e9, "m³") if len(found.axes) == 3 else (1e6, "m²"), found.unit
     factor, big = scale
     return f"certified {v.estimate / factor:.4f} {big}, proved between {v.inner:,.0f} and {v.outer:,.0f} {unit}"
@@ -107,10 +99,10 @@ def proved(found: Workspace) -> str:
 def tricept(page: Page) -> None:
     page.paper("Tricept: FME Transactions 41 (2013)")
     found = pk.workspace(pk.region(pk.load("tricept"), at={"B": 0.0, "C": 0.0}))
-    boxes: list[tuple[str, InscribedBox, str]] = [
-        ("a", find_largest_box(found.region), ORANGE),
-        ("b", find_largest_box(found.region, shape=(3.0, 3.0, 1.0)), GREEN),
-        ("c", find_largest_box(found.region, shape=(1.0, 1.0, 1.0)), "#6a1b9a"),
+    boxes: list[tuple[str, pk.InscribedBox, str]] = [
+        ("a", pk.find_largest_box(found.region), ORANGE),
+        ("b", pk.find_largest_box(found.region, shape=(3.0, 3.0, 1.0)), GREEN),
+        ("c", pk.find_largest_box(found.region, shape=(1.0, 1.0, 1.0)), "#6a1b9a"),
     ]
     figure, (ax,) = space()
     shape = meshed(found, 40.0)
@@ -184,7 +176,7 @@ def lambda6(page: Page) -> None:
     page.paper("Lambda: IJEEC 6 (2022)")
     machine = pk.load("lambda6")
     level = {"A": 0.0, "B": 0.0, "C": 0.0}
-    one = sweep_polar(pk.region(machine, at={**level, "Z": 1400.0}), step=10.0, rays=72)
+    one = pk.sweep_polar(pk.region(machine, at={**level, "Z": 1400.0}), step=10.0, rays=72)
     figure, (ax,) = plane()
     for angle, radius in zip(one.angles, one.radii[0], strict=True):
         ax.plot(*np.outer([np.cos(angle), np.sin(angle)], [0.0, radius]), color=GREY, linewidth=0.5)
@@ -195,7 +187,7 @@ def lambda6(page: Page) -> None:
         figure,
         f"72 rays, ρ by 10 mm until the first place that is not allowed: {one.estimate:,.0f} mm².",
     )
-    swept = sweep_polar(pk.region(machine, at=level), step=10.0, planes=50.0)
+    swept = pk.sweep_polar(pk.region(machine, at=level), step=10.0, planes=50.0)
     figure, (ax,) = space()
     stacked(ax, swept, BLUE)
     page.add(
@@ -232,17 +224,17 @@ def lambda6(page: Page) -> None:
     )
 
 
-def blocks(cells: Cells) -> Poly3DCollection:
+def blocks(low: np.ndarray, size: np.ndarray) -> Poly3DCollection:
     """The faces of boxes that look at the viewer: +x, -y, +z."""
     faces, colours = [], []
     for axis, end, shade in ((0, 1.0, "#64b5f6"), (1, 0.0, "#42a5f5"), (2, 1.0, "#bbdefb")):
         square = np.insert(np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]]), axis, end, axis=1)
-        faces.append(cells.low[:, None] + square * cells.size[:, None])
-        colours += [shade] * len(cells.low)
+        faces.append(low[:, None] + square * size[:, None])
+        colours += [shade] * len(low)
     return Poly3DCollection(np.concatenate(faces), facecolors=colours, edgecolors="#37474f", linewidths=0.15)
 
 
-def stacked(ax: Any, swept: PolarWorkspace, colour: str) -> None:
+def stacked(ax: Any, swept: pk.PolarWorkspace, colour: str) -> None:
     lines = swept.outlines
     ax.add_collection3d(Line3DCollection(lines, colors=colour, linewidths=1.0))
     points = np.concatenate(lines)
@@ -255,7 +247,8 @@ def orthoglide(page: Page) -> None:
     cells = found.cells
     assert found.box is not None
     figure, (ax,) = space()
-    ax.add_collection3d(blocks(cells.take(cells.estimate > 0.5)))
+    full = cells.estimate > 0.5
+    ax.add_collection3d(blocks(cells.low[full], cells.size[full]))
     frame(ax, *found.box, found.axes)
     page.add(
         "orthoglide_3",
@@ -265,7 +258,7 @@ def orthoglide(page: Page) -> None:
         f"smallest {cells.size.min():.1f} mm. {proved(found)}. The thin end is in the other assembly mode.",
     )
     figure, (ax,) = plane()
-    cut = find_cross_sections(sample_field(found.region, found.box, 4.0), "Z", [0.0])[0]
+    cut = pk.find_cross_sections(pk.sample_field(found.region, found.box, 4.0), "Z", [0.0])[0]
     for outline in cut.outlines:
         ax.fill(*outline.T, facecolor="#bbdefb", edgecolor=BLUE, linewidth=1.5)
     cube = np.array([[-123.336, -123.336], [76.664, 76.664]])
@@ -288,8 +281,11 @@ def main() -> None:
     for paper in (tricept, hbg80, lambda6, orthoglide):
         paper(page)
         print(f"{paper.__name__} done", flush=True)
-    write_all(folder / "gallery", page.files)
-    (written,) = write_all(folder, {"gallery.md": "\n".join(page.text).rstrip() + "\n"})
+    (folder / "gallery").mkdir(parents=True, exist_ok=True)
+    for name, data in page.files.items():
+        (folder / "gallery" / name).write_bytes(data)
+    written = folder / "gallery.md"
+    written.write_text("\n".join(page.text).rstrip() + "\n", encoding="utf-8")
     print(written)
 
 

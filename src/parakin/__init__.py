@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING
 from .errors import DescriptionError, InputError, InputErrors, NoMethodError, ParakinError, PoseError
 
 if TYPE_CHECKING:
+    from .export.workspace.meshes import Shell as Mesh
+    from .export.workspace.meshes import shell as make_mesh
     from .kinematics.forward import Solution
     from .machine import Machine
     from .performance.atlas import Atlas, atlas
@@ -21,34 +23,55 @@ if TYPE_CHECKING:
     from .workspaces.certified.region import Region
     from .workspaces.certified.region import make_region as region
     from .workspaces.certified.workspace import Workspace, workspace
-    from .workspaces.sampled.drive_sweep import sweep_drives
+    from .workspaces.connected.components import Components, find_components
+    from .workspaces.inscribed.largest_box import InscribedBox, find_largest_box
+    from .workspaces.sampled.cross_sections import CrossSection, find_cross_sections
+    from .workspaces.sampled.distance_field import SampledField, sample_field
+    from .workspaces.sampled.drive_sweep import DriveWorkspace, sweep_drives
+    from .workspaces.sampled.grid import GridWorkspace, sample_grid
+    from .workspaces.sampled.polar_sweep import PolarWorkspace, sweep_polar
 
 __version__ = "0.1.0"
 __all__ = [
     "Atlas",
+    "Components",
+    "CrossSection",
     "DescriptionError",
+    "DriveWorkspace",
+    "GridWorkspace",
     "InputError",
     "InputErrors",
+    "InscribedBox",
     "Job",
     "Machine",
+    "Mesh",
     "NoMethodError",
     "ParakinError",
     "Placement",
+    "PolarWorkspace",
     "PoseError",
     "Region",
+    "SampledField",
     "Solution",
     "Tolerances",
     "ToolPath",
     "Trajectory",
     "Workspace",
     "atlas",
+    "find_components",
+    "find_cross_sections",
+    "find_largest_box",
     "find_placement",
     "load",
     "machines",
+    "make_mesh",
     "prepare",
     "read_path",
     "region",
+    "sample_field",
+    "sample_grid",
     "sweep_drives",
+    "sweep_polar",
     "workpiece",
     "workspace",
 ]
@@ -85,21 +108,36 @@ def load(name: str | PathLike[str], parameters: Mapping[str, float | str] | None
 # The public names that are loaded when they are first used: the module, and the name there if it is another.
 _LAZY = {
     "Atlas": "performance.atlas",
+    "Components": "workspaces.connected.components",
+    "CrossSection": "workspaces.sampled.cross_sections",
+    "DriveWorkspace": "workspaces.sampled.drive_sweep",
+    "GridWorkspace": "workspaces.sampled.grid",
+    "InscribedBox": "workspaces.inscribed.largest_box",
     "Job": "toolpath.job",
     "Machine": "machine",
+    "Mesh": "export.workspace.meshes:Shell",
     "Placement": "toolpath.placing.placement",
+    "PolarWorkspace": "workspaces.sampled.polar_sweep",
     "Region": "workspaces.certified.region",
+    "SampledField": "workspaces.sampled.distance_field",
     "Solution": "kinematics.forward",
     "Tolerances": "toolpath.job",
     "ToolPath": "toolpath.path",
     "Trajectory": "toolpath.timing.trajectory",
     "Workspace": "workspaces.certified.workspace",
     "atlas": "performance.atlas",
+    "find_components": "workspaces.connected.components",
+    "find_cross_sections": "workspaces.sampled.cross_sections",
+    "find_largest_box": "workspaces.inscribed.largest_box",
     "find_placement": "toolpath.placing.placement",
+    "make_mesh": "export.workspace.meshes:shell",
     "prepare": "toolpath.job",
     "read_path": "toolpath.reading.detect",
     "region": "workspaces.certified.region:make_region",
+    "sample_field": "workspaces.sampled.distance_field",
+    "sample_grid": "workspaces.sampled.grid",
     "sweep_drives": "workspaces.sampled.drive_sweep",
+    "sweep_polar": "workspaces.sampled.polar_sweep",
     "workpiece": "toolpath.posting.frames",
     "workspace": "workspaces.certified.workspace",
 }

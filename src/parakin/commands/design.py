@@ -84,7 +84,8 @@ def design(
     print(f"rod     {fixed(found.rod, _DIGITS)} mm")
     print(f"stroke  {fixed(found.stroke[0], _DIGITS)} to {fixed(found.stroke[1], _DIGITS)} mm")
     print(f"cube    {fixed(low, _DIGITS)} to {fixed(high, _DIGITS)} mm on each axis")
-    print(f"psi     {least.found:.6f} to {greatest.found:.6f}, {found.proof.verdict} to {found.proof.tolerance:g}")
+    verdict = f"{found.proof.verdict} to {found.proof.tolerance:g}"
+    print(f"psi     {least.attained:.6f} to {greatest.attained:.6f}, {verdict}")
     if output is not None:
         print(f"\nmachine {output}")
     return 0

@@ -9,7 +9,7 @@ def design_yaml(design: Design) -> str:
     """The machine file of a designed Orthoglide, with all digits of its sizes."""
     low, high = design.stroke
     corner, other = design.cube
-    least, greatest = (bracket.found for bracket in design.proof.brackets)
+    least, greatest = (bracket.attained for bracket in design.proof.brackets)
     return f"""\
 # An Orthoglide designed for a cube: its velocity amplifications psi stay between 1/{design.amplification:.9g} and \
 {design.amplification:.9g}

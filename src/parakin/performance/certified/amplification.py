@@ -37,7 +37,7 @@ class Bracket:
     closed: bool
 
     @property
-    def found(self) -> float:
+    def attained(self) -> float:
         """The value of psi at ``pose``."""
         return self.low if self.side == "greatest" else self.high
 

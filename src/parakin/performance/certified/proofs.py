@@ -179,11 +179,11 @@ def _report_half(progress: Progress, begin: float, fraction: float) -> None:
 
 
 def _judge_brackets(least: Bracket, greatest: Bracket, low: float, high: float) -> tuple[Verdict, Array | None, str]:
-    if greatest.found > high:
-        value = f"{greatest.found:.9g}" if greatest.found < UNBOUNDED else "infinite, a parallel singularity"
+    if greatest.attained > high:
+        value = f"{greatest.attained:.9g}" if greatest.attained < UNBOUNDED else "infinite, a parallel singularity"
         return "refuted", greatest.pose, f"the greatest psi there is {value}"
-    if least.found < low:
-        value = f"{least.found:.9g}" if least.found > 1.0 / UNBOUNDED else "0, a serial singularity"
+    if least.attained < low:
+        value = f"{least.attained:.9g}" if least.attained > 1.0 / UNBOUNDED else "0, a serial singularity"
         return "refuted", least.pose, f"the least psi there is {value}"
     if greatest.high <= high and least.low >= low:
         return "proved", None, ""

@@ -200,13 +200,14 @@ class Subdivision(ABC):
         """
 
     def _sort_out(
-        self, low: Array, size: Array, found: CellFractions, boxes: list[OrientationBoxes]
+        self, low: Array, size: Array, fractions: CellFractions, boxes: list[OrientationBoxes]
     ) -> tuple[Cells, list[OrientationBoxes]]:
         """Lay aside the cells proved inside and drop those outside; returns the others."""
-        estimate = np.clip(found.estimate, found.inner, found.outer)
-        limit = np.where(found.inner >= 1.0, -1, found.limit)
-        cells = Cells(low, size, found.inner, found.outer, estimate, limit, found.area * size.prod(1))
-        outside = found.outer <= 0.0
+        estimate = np.clip(fractions.estimate, fractions.inner, fractions.outer)
+        limit = np.where(fractions.inner >= 1.0, -1, fractions.limit)
+        area = fractions.area * size.prod(1)
+        cells = Cells(low, size, fractions.inner, fractions.outer, estimate, limit, area)
+        outside = fractions.outer <= 0.0
         self._decided.append(cells.take(~outside & (limit < 0)))
         undecided = np.flatnonzero(~outside & (limit >= 0))
         new = np.full(len(low), -1)

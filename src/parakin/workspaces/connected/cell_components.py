@@ -93,9 +93,9 @@ def find_cell_components(
             own = [which for which in own if (component == which).sum() >= _FEW] or own[:1]
         if own:
             at_least += 1
-            found, lost = _measure_components(labelled, members, own)
+            own_components, lost = _measure_components(labelled, members, own)
             undecided += lost
-            components += found
+            components += own_components
         else:
             finer = _refine_group(region, constraint, cells, members, resolution)
             components += finer.components

@@ -28,7 +28,7 @@ from .cell_components import CellComponent, Resolution, find_cell_components
 _FINE = {1: 4096, 2: 512, 3: 128}  # cells along the longest edge, by dimension
 _NEAR = 32  # cells of a component from which a path to a position is looked for
 
-_Found = tuple["Component", CellComponent]
+_Pair = tuple["Component", CellComponent]
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,23 +104,23 @@ def find_components(
     low, high = outline.low.min(0), (outline.low + outline.size).max(0)
     edge = float((high - low).max()) / _FINE[len(low)] if cell is None else cell
     refuse_too_many_cells(np.ceil((high - low) / edge), edge)
-    found: list[_Found] = []
+    pairs: list[_Pair] = []
     at_least, undecided, stopped = 0, 0.0, "cell"
     for own_sign, constraint in sides.items():
         one_side = find_cell_components(region, constraint, low, high, Resolution(edge, seconds))
-        found += [(_describe_component(own_sign, cells), cells) for cells in one_side.components]
+        pairs += [(_describe_component(own_sign, cells), cells) for cells in one_side.components]
         at_least += one_side.at_least
         undecided += one_side.undecided
         stopped = one_side.stopped if stopped == "cell" else stopped
-    found.sort(key=lambda each: -each[0].volume.estimate)
+    pairs.sort(key=lambda each: -each[0].volume.estimate)
     parameters = {
         **region.parameters,
         "start": None if start is None else np.asarray(start, float).tolist(),
         "cell": edge,
         "seconds": seconds,
     }
-    index = None if position is None else _find_holder(region, position, sign, sides[sign], found)
-    components = tuple(component for component, _ in found)
+    index = None if position is None else _find_holder(region, position, sign, sides[sign], pairs)
+    components = tuple(component for component, _ in pairs)
     return Components(region, components, at_least, undecided, index, edge, stopped, parameters)
 
 
@@ -157,10 +157,10 @@ def _locate_start(region: Region, start: ArrayLike, sides: Mapping[int, Constrai
     raise PoseError("start: it is on the region's boundary or at a parallel singularity")
 
 
-def _find_holder(region: Region, position: Array, sign: int, constraint: Constraint, found: list[_Found]) -> int:
+def _find_holder(region: Region, position: Array, sign: int, constraint: Constraint, pairs: list[_Pair]) -> int:
     """Find the component that holds a position, or that a box proved inside joins to it."""
     near: list[tuple[float, int, Array, Array]] = []
-    for number, (component, cells) in enumerate(found):
+    for number, (component, cells) in enumerate(pairs):
         if component.sign == sign:
             points = np.clip(position, cells.low, cells.low + cells.size)
             distance = np.abs(points - position).max(1)

@@ -1,4 +1,4 @@
-"""Questions of workspaces that make no sense, that nothing answers, or that are cut short."""
+"""Regions and workspaces of them: questions that make no sense, that nothing answers, or that are cut short."""
 
 import math
 

@@ -21,7 +21,6 @@ import numpy as np
 import turbine_blade
 
 import parakin as pk
-from parakin.controllers import linuxcnc_program, program_seconds
 
 HERE = Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE.parent / "tests" / "linuxcnc"))
@@ -54,13 +53,13 @@ def measured(machine, simulation, text, start):
     if "told" in run.seen:
         sys.exit(f"LinuxCNC says: {run.seen['told']}")
     shown = run.part(first_line(text), start)
-    limits = outward(machine, np.array([[drive.speed for drive in machine.model.drives]]))
+    limits = outward(machine, np.array([[drive.speed for drive in machine.drives]]))
     return np.abs(np.diff(run.joints[shown], axis=0)) / CYCLE / limits, run.line[shown][1:]
 
 
 def accelerations(machine, shares):
     """The greatest acceleration as a share of its limit, and for how much of the time one is beyond it."""
-    drives = machine.model.drives
+    drives = machine.drives
     rates = np.array([drive.speed / drive.acceleration for drive in drives])
     found = (np.abs(np.diff(shares, axis=0)) / CYCLE * rates).max(1)
     return found.max(), (found > 1.05).mean()
@@ -106,7 +105,7 @@ def programs(machine, folder, place, upright):
     """The job, and its programs: as programmed and as posted."""
     job = pk.prepare(machine, part(folder, upright), workpiece=place)
     file = io.BytesIO()
-    linuxcnc_program(job.trajectory)(file)
+    pk.make_linuxcnc_program(job.trajectory)(file)
     return job, as_programmed(job.posted), file.getvalue().decode("ascii")
 
 
@@ -117,7 +116,7 @@ def told(job, text, ours):
     return (
         f"posted: {len(job.posted.path)} records ({job.inserted} inserted), {text.count('G53 G1')} motions; "
         f"{took:.3f} s, trajectory {planned:.3f} s ({took / planned - 1.0:+.1%}), "
-        f"program {program_seconds(job.trajectory):.3f} s; "
+        f"program {pk.predict_linuxcnc_seconds(job.trajectory):.3f} s; "
         f"{worst} at {ours.max():.3f} of its speed"
     )
 

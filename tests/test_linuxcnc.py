@@ -20,7 +20,6 @@ from test_forward import CLOSE, allowed, garbage, legs_regularity, nudged
 
 import parakin as pk
 from parakin.cli import main
-from parakin.controllers.linuxcnc import configuration
 from parakin.controllers.linuxcnc.module import write_module
 from parakin.kinematics.forward import find_roots
 
@@ -285,7 +284,7 @@ def numbers(text):
 
 @everyone
 def test_the_ini_says_what_the_machine_says(m):
-    files = configuration(m)
+    files = pk.make_linuxcnc_configuration(m)
     assert sorted(files) == sorted(f"{m.name}{end}" for end in ("_kins.c", ".ini", ".hal", ".tbl", ".ngc", ".md"))
     ini = sections(files[f"{m.name}.ini"])
     assert ini["KINS"]["KINEMATICS"] == f"{m.name}_kins"
@@ -309,7 +308,7 @@ def test_the_ini_says_what_the_machine_says(m):
 
 @everyone
 def test_the_axes_hold_the_poses_that_the_machine_can_take(m):
-    ini = sections(configuration(m)[f"{m.name}.ini"])
+    ini = sections(pk.make_linuxcnc_configuration(m)[f"{m.name}.ini"])
     ends = [[float(ini[f"AXIS_{axis}"][f"{end}_LIMIT"]) for axis in m.axes] for end in ("MIN", "MAX")]
     scale = np.where(np.array(m.axis_units) == "rad", np.degrees(1.0), 1.0)
     low, high = np.array(ends) / scale
@@ -323,7 +322,7 @@ def test_the_axes_hold_the_poses_that_the_machine_can_take(m):
 
 @everyone
 def test_the_first_program_stays_inside(m):
-    text = configuration(m)[f"{m.name}.ngc"]
+    text = pk.make_linuxcnc_configuration(m)[f"{m.name}.ngc"]
     blocks = [re.findall(r"([XYZABC])(\S+)", line) for line in text.splitlines() if line.startswith("G1")]
     assert all([letter for letter, _ in block] == list(m.axes) for block in blocks)
     scale = np.where(np.array(m.axis_units) == "rad", np.degrees(1.0), 1.0)
@@ -339,24 +338,24 @@ def test_a_program_for_a_home_in_a_corner(tmp_path):
     path = tmp_path / "corner.yaml"
     path.write_text(text.replace("-400 mm, 200 mm", "-97.3 mm, 200 mm").replace("hbg80_2d", "corner"), encoding="utf-8")
     m = pk.load(path)
-    assert 0 < len(re.findall("^G1", configuration(m)["corner.ngc"], re.M)) <= 7
+    assert 0 < len(re.findall("^G1", pk.make_linuxcnc_configuration(m)["corner.ngc"], re.M)) <= 7
 
 
 def test_what_a_description_leaves_open_is_chosen_and_said(tmp_path):
     text = (Path(pk.__file__).parent / "machines" / "hexapod.yaml").read_text(encoding="utf-8")
     path = tmp_path / "hexapod.yaml"
     path.write_text(text.replace("  acceleration: 5 m/s2\n", ""), encoding="utf-8")
-    text = configuration(pk.load(path))["hexapod.ini"]
+    text = pk.make_linuxcnc_configuration(pk.load(path))["hexapod.ini"]
     joint = text[text.index("[JOINT_0]") : text.index("[JOINT_1]")]
     assert "does not say it: acceleration\n" in joint
     assert "MAX_VELOCITY = 500\n" in joint
-    text = configuration(pk.load("linear_delta"))["linear_delta.ini"]
+    text = pk.make_linuxcnc_configuration(pk.load("linear_delta"))["linear_delta.ini"]
     assert "does not say it" not in text
 
 
 @pytest.mark.parametrize("name", NAMES)
 def test_the_module_is_under_the_gpl_and_names_itself(name):
-    text = configuration(pk.load(name))[f"{name}_kins.c"]
+    text = pk.make_linuxcnc_configuration(pk.load(name))[f"{name}_kins.c"]
     assert "GNU General Public" in text.split("*/")[0]
     assert 'MODULE_LICENSE("GPL")' in text
     assert f'#define MODULE "{name}_kins"' in text
@@ -367,9 +366,9 @@ def test_the_module_is_under_the_gpl_and_names_itself(name):
 def test_a_module_of_another_making_is_not_loaded(modules):
     m = pk.load("tricept")
     mark = re.search('#define MADE "(.*)"', write_module(m))[1]
-    assert f"KINEMATICS made={mark}\n" in configuration(m)["tricept.hal"]
+    assert f"KINEMATICS made={mark}\n" in pk.make_linuxcnc_configuration(m)["tricept.hal"]
     other = pk.load("tricept", parameters={"R": "351 mm"})
-    assert f"made={mark}" not in configuration(other)["tricept.hal"]
+    assert f"made={mark}" not in pk.make_linuxcnc_configuration(other)["tricept.hal"]
     library = modules(m).library
     given = ctypes.POINTER(ctypes.c_char_p).in_dll(library, "stub_string_made")
     codes = []
@@ -384,7 +383,7 @@ def test_a_module_of_another_making_is_not_loaded(modules):
 
 def test_the_command_writes_the_files(tmp_path, capsys):
     assert main(["linuxcnc", "tricept", "-o", str(tmp_path / "out")]) == 0
-    files = configuration(pk.load("tricept"))
+    files = pk.make_linuxcnc_configuration(pk.load("tricept"))
     assert sorted(path.name for path in (tmp_path / "out").iterdir()) == sorted(files)
     for name, text in files.items():
         assert (tmp_path / "out" / name).read_text(encoding="utf-8") == text

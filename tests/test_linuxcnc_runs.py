@@ -13,10 +13,7 @@ import pytest
 from geometry import Description
 
 import parakin as pk
-from parakin.controllers import linuxcnc_program, program_seconds
-from parakin.toolpath.job import prepare
 from parakin.toolpath.posting.post import post_path
-from parakin.toolpath.reading.detect import read_path
 from parakin.toolpath.timing import plan_trajectory
 
 HERE = Path(__file__).parent / "linuxcnc"
@@ -148,15 +145,15 @@ def first_passes(machine, folder, feed=FEED, count=130):
     file = folder / "turbine_blade.cls"
     feeds = turbine_blade.FEEDS | {"cut": feed}
     file.write_text("\n".join(turbine_blade.nx_lines(path, feeds)) + "\n", encoding="ascii")
-    read, part = read_path(file), slice(count)
+    read, part = pk.read_path(file), slice(count)
     events = tuple(event for event in read.events if event.record < count)
     arrays = {name: getattr(read, name)[part] for name in ("tip", "axis", "line", "rapid", "feed", "spindle")}
-    return prepare(machine, replace(read, events=events, **arrays), workpiece=place)
+    return pk.prepare(machine, replace(read, events=events, **arrays), workpiece=place)
 
 
 def written(trajectory, **options):
     file = io.BytesIO()
-    linuxcnc_program(trajectory, **options)(file)
+    pk.make_linuxcnc_program(trajectory, **options)(file)
     return file.getvalue().decode("ascii")
 
 
@@ -185,7 +182,7 @@ def test_a_posted_program_keeps_the_joints_speeds_and_its_time(machine, linuxcnc
     part = run.part(first_line(text), world(machine, posted.poses[:1])[0])
     assert shares(machine, run.joints[part]).max() > 0.6  # it is not just slow
     assert (part.stop - part.start - 1) * CYCLE == pytest.approx(trajectory.seconds, rel=0.05)
-    assert (part.stop - part.start - 1) * CYCLE == pytest.approx(program_seconds(trajectory), rel=0.02)
+    assert (part.stop - part.start - 1) * CYCLE == pytest.approx(pk.predict_linuxcnc_seconds(trajectory), rel=0.02)
     ends = world(machine, posted.poses[[0, -1]])
     assert np.abs(run.poses[[part.start, -1]] - ends).max() < 2e-6
     assert aside(run.poses[part][:, :3], world(machine, posted.poses)[:, :3]).max() < 0.005 + 2e-6  # as asked for

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 import parakin as pk
-from parakin.export.machine.picture import machine_html, machine_png
+from parakin.export.machine.picture import render_machine_html, render_machine_png
 from parakin.export.machine.scene import around, scene
 from parakin.export.machine.solids import solids
-from parakin.export.ranges import shown
+from parakin.export.number_format import format_value
 from parakin.export.report.curves import extremes
-from parakin.export.report.report import report_html
+from parakin.export.report.report import render_report
 from parakin.toolpath.path import Note, ToolPath
 from parakin.toolpath.posting.post import post_path
 from parakin.toolpath.posting.posted import Posted
@@ -174,7 +174,7 @@ def test_solids_are_closed(machine):
 
 @machines
 def test_picture_page(machine):
-    html = machine_html(machine)
+    html = render_machine_html(machine)
     check_nothing_is_loaded(html)
     figure = figures_of(html)["machine"]
     ratio, axes = figure["layout"]["scene"]["aspectratio"], figure["layout"]["scene"]
@@ -185,7 +185,7 @@ def test_picture_page(machine):
 
 @pytest.mark.parametrize("name", ["hbg80_2d", "orthoglide5_table"])
 def test_png(name):
-    data = machine_png(LOADED[name], near_home(LOADED[name]))
+    data = render_machine_png(LOADED[name], near_home(LOADED[name]))
     assert data.startswith(b"\x89PNG\r\n\x1a\n")
     assert data[16:24] == bytes([0, 0, 4, 128, 0, 0, 4, 128])  # 1152 x 1152
 
@@ -202,7 +202,7 @@ def check_nothing_is_loaded(html):
 
 @machines
 def test_clean_path_runs(machine):
-    html = report_html(post_path(machine, path_of(*clean(machine))))
+    html = render_report(post_path(machine, path_of(*clean(machine))))
     check_nothing_is_loaded(html)
     assert "<strong>Runs</strong>" in html
     assert "<h2>Offences</h2>" not in html
@@ -225,7 +225,7 @@ def test_off_limits_says_where_and_how_much(tmp_path):
     lines = [f"GOTO/{x},0,-1650,0,0,1" for x in (0, 10, 20, 900, 30, 950)]
     part.write_text("\n".join(["TOOL PATH/A", *lines]) + "\n")
     posted = post_path(machine, read_cl(part))
-    html = report_html(posted)
+    html = render_report(posted)
     assert posted.first is not None
     assert "<strong>Does not run</strong>" in html
     assert f"part.cls:5: {posted.first.text}" in html
@@ -235,7 +235,7 @@ def test_off_limits_says_where_and_how_much(tmp_path):
     red = next(t for t in figures_of(html)["path"]["data"] if t["name"] == "off limits")
     assert red["x"] == [900.0, 950.0]
     part.unlink()  # the report does without the source
-    assert "<code></code>" in report_html(posted)
+    assert "<code></code>" in render_report(posted)
 
 
 def test_nothing_to_run():
@@ -243,7 +243,7 @@ def test_nothing_to_run():
     broken = np.empty(0, np.int64)
     path = path_of(np.empty((0, 3)))
     posted = Posted(machine, path, "+", np.eye(3, 4), none, none, broken, machine.limits, (), None, None)
-    html = report_html(posted)
+    html = render_report(posted)
     assert "Nothing to run" in html
     assert not figures_of(html)
 
@@ -251,13 +251,13 @@ def test_nothing_to_run():
 @pytest.mark.parametrize("n", [1, 2])
 def test_very_short_paths(n):
     machine = LOADED["tricept"]
-    html = report_html(post_path(machine, path_of(np.tile(tip_of(machine, machine.home), (n, 1)))))
+    html = render_report(post_path(machine, path_of(np.tile(tip_of(machine, machine.home), (n, 1)))))
     assert "<strong>Runs</strong>" in html
 
 
 def test_everything_out_of_reach():
     machine = LOADED["linear_delta"]
-    html = report_html(post_path(machine, path_of(circles(machine, 30, 5.0) + np.array([9000.0, 0.0, 0.0]))))
+    html = render_report(post_path(machine, path_of(circles(machine, 30, 5.0) + np.array([9000.0, 0.0, 0.0]))))
     assert "<strong>Does not run</strong>" in html
     assert "never reached" in html
 
@@ -269,7 +269,7 @@ def test_untrusted_text_is_escaped(tmp_path):
     part.write_text(f"GOTO/0,0,-1650 $$ {evil}\n" * 30)
     notes = (Note(1, f"unknown word {evil}"), Note(0, evil))
     posted = post_path(machine, path_of(np.array([[900.0, 0, -1650], [0, 0, -1650]]), str(part), notes=notes))
-    text = own_text(report_html(posted))
+    text = own_text(render_report(posted))
     assert "<img" not in text
     assert "alert(1)</script>" not in text
     assert text.count("&lt;/script&gt;&lt;script&gt;alert(1)") == 4  # two quoted lines, two notes
@@ -283,7 +283,7 @@ def test_long_paths_stay_small_and_keep_extremes():
     tip[77_777, 2] += 40.0
     rapid = np.arange(n) % 50 < 5
     posted = post_path(machine, path_of(tip, rapid=rapid))
-    html = report_html(posted)
+    html = render_report(posted)
     assert posted.broken_record_count > 10_000
     assert len(html) < 8_000_000
     for curve, values in zip(figures_of(html)["curves"]["data"][::2], posted.joints.T, strict=True):
@@ -326,4 +326,4 @@ def test_extremes_are_kept(most):
      (-3e-4, "mm", "-0.0003 mm"), (float("nan"), "mm", "–")],
 )  # fmt: skip
 def test_values_for_people(value, unit, text):
-    assert shown(value, unit) == text
+    assert format_value(value, unit) == text

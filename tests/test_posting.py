@@ -215,7 +215,7 @@ def test_every_machine_takes_a_small_part(name):
     assert np.isfinite(posted.joints).all()
     assert np.max(np.abs(np.diff(posted.joints, axis=0))) < 60  # mm, for steps of 5
     check = io.BytesIO()
-    table.csv_writer(posted)(check)
+    table.make_joint_csv(posted)(check)
     assert check.getvalue().count(b"\n") == len(path) + 1
 
 
@@ -254,7 +254,7 @@ def test_unknown_mode():
 
 def table_of(posted):
     file = io.BytesIO()
-    table.csv_writer(posted)(file)
+    table.make_joint_csv(posted)(file)
     return list(csv.DictReader(io.StringIO(file.getvalue().decode())))
 
 
@@ -322,7 +322,7 @@ def test_parquet_holds_the_same():
     machine = pk.load("linear_delta")
     posted = post_path(machine, path_of([[0, 0, 280], [1000, 0, 280], [5, 0, 280]], first_line=4))
     file = io.BytesIO()
-    table.parquet_writer(posted)(file)
+    table.make_joint_parquet(posted)(file)
     read = pq.read_table(io.BytesIO(file.getvalue()))
     assert read.column_names == table.columns(posted)
     assert read["X [mm]"].to_pylist() == [0.0, 1000.0, 5.0]

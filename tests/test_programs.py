@@ -13,17 +13,14 @@ import numpy as np
 import pytest
 
 import parakin as pk
-from parakin.controllers import joint_program, linuxcnc_program, program_seconds, read_joint_program
 from parakin.controllers.joints.program import joint_letters
-from parakin.controllers.linuxcnc.approach import approach
-from parakin.controllers.linuxcnc.program import _timed
-from parakin.controllers.linuxcnc.rates import axis_rates
-from parakin.controllers.linuxcnc.straight_motions import CYCLE, motions
-from parakin.errors import InputError, PoseError
+from parakin.controllers.linuxcnc.approach import plan_approach
+from parakin.controllers.linuxcnc.axis_rates import choose_axis_rates
+from parakin.controllers.linuxcnc.program import split_slow_turns
+from parakin.controllers.linuxcnc.straight_motions import CYCLE, build_straight_motions
 from parakin.export.files import write_all
 from parakin.toolpath.path import Event, ToolPath
 from parakin.toolpath.posting.post import post_path
-from parakin.toolpath.reading.detect import read_path
 from parakin.toolpath.reading.gcode.reader import read_gcode
 from parakin.toolpath.timing import plan_trajectory
 
@@ -50,7 +47,7 @@ def trajectories(tmp_path_factory):
             place, upright = PLACES[name]
             lines = turbine_blade.nx_lines(turbine_blade.tool_path(400, upright), turbine_blade.FEEDS | {"cut": 1e4})
             (folder / "part.cls").write_text("\n".join(lines) + "\n", encoding="ascii")
-            known[name] = plan_trajectory(post_path(pk.load(name), read_path(folder / "part.cls"), workpiece=place))
+            known[name] = plan_trajectory(post_path(pk.load(name), pk.read_path(folder / "part.cls"), workpiece=place))
         return known[name]
 
     return trajectory_of
@@ -85,7 +82,7 @@ def motion_lines(text):
 def test_what_is_written_for_linuxcnc_is_read_back(trajectories, name, tmp_path):
     trajectory = trajectories(name)
     machine, posted = trajectory.posted.machine, trajectory.posted
-    (file,) = write_all(tmp_path, {"part.ngc": linuxcnc_program(trajectory)})
+    (file,) = write_all(tmp_path, {"part.ngc": pk.make_linuxcnc_program(trajectory)})
     read = read_gcode(file, workpiece=AS_IT_IS)
     turns = np.zeros((len(read), 3)) if read.turns is None else read.turns
     columns = [("XYZ".index(a), read.tip) if a in "XYZ" else ("ABC".index(a), turns) for a in machine.axes]
@@ -98,8 +95,8 @@ def test_what_is_written_for_linuxcnc_is_read_back(trajectories, name, tmp_path)
     assert np.abs(rows[found] - wanted).max() < HALF
     assert len(set(found)) == len(trajectory.curve.corner)
     assert found[-1] == len(rows) - 1
-    assert read.seconds[found[0] + 1 :].sum() == pytest.approx(program_seconds(trajectory), abs=1e-6)
-    assert program_seconds(trajectory) == pytest.approx(trajectory.seconds, rel=0.05)
+    assert read.seconds[found[0] + 1 :].sum() == pytest.approx(pk.predict_linuxcnc_seconds(trajectory), abs=1e-6)
+    assert pk.predict_linuxcnc_seconds(trajectory) == pytest.approx(trajectory.seconds, rel=0.05)
     for begin, end in pairwise(found):  # what was added lies on the straight way
         if end > begin + 1:
             way = rows[end] - rows[begin]
@@ -110,7 +107,7 @@ def test_what_is_written_for_linuxcnc_is_read_back(trajectories, name, tmp_path)
 
 @every_place
 def test_every_motion_is_in_machine_coordinates_and_inverse_time(trajectories, name):
-    text = text_of(linuxcnc_program(trajectories(name)))
+    text = text_of(pk.make_linuxcnc_program(trajectories(name)))
     lines = motion_lines(text)
     letters = " ".join(rf"{axis}-?\d+\.\d{{6}}" for axis in trajectories(name).posted.machine.axes)
     assert all(re.fullmatch(rf"G53 G1 {letters} F\d+\.\d{{6}}", line) for line in lines)
@@ -123,7 +120,7 @@ def test_every_motion_is_in_machine_coordinates_and_inverse_time(trajectories, n
     head = text.splitlines()[:3]
     assert "turbine_blade" in head[0] or "part.cls" in head[0]
     assert f"{name}, mode {trajectories(name).posted.mode}" in head[0]
-    assert f"{program_seconds(trajectories(name)):.3f} s" in head[1]
+    assert f"{pk.predict_linuxcnc_seconds(trajectories(name)):.3f} s" in head[1]
     assert "OFF LIMITS" not in text
 
 
@@ -149,14 +146,14 @@ def test_no_joint_passes_its_speed(trajectories, name):
 
 
 def text_of_trajectory(trajectory):
-    return text_of(linuxcnc_program(trajectory))
+    return text_of(pk.make_linuxcnc_program(trajectory))
 
 
 @every_place
 def test_motions_take_whole_cycles_and_blend_within_the_speeds(trajectories, name):
     trajectory = trajectories(name)
-    speeds, accelerations = axis_rates(trajectory.posted.machine)
-    found = motions(trajectory, speeds, accelerations)
+    speeds, accelerations = choose_axis_rates(trajectory.posted.machine)
+    found = build_straight_motions(trajectory, speeds, accelerations)
     cycles = found.seconds / CYCLE
     assert np.abs(cycles - np.rint(cycles)).max() < 1e-6
     steps = np.abs(np.diff(found.ends, axis=0, prepend=trajectory.curve.corner[:1]))
@@ -171,11 +168,11 @@ def test_a_tip_that_all_but_stands_is_turned_first_and_moved_then():
     machine = pk.load("tricept")
     before = np.array([[10.0, 0.0, -1600.0, 20.0, 0.0]])
     ends = np.array([[10.000001, 0.0, -1600.0, 25.0, 0.0], [11.0, 0.0, -1600.0, 25.0, 0.0]])
-    rows, seconds = _timed(machine, before, ends, np.array([1.0, 0.5]))
+    rows, seconds = split_slow_turns(machine, before, ends, np.array([1.0, 0.5]))
     assert rows.tolist() == [[10.0, 0.0, -1600.0, 25.0, 0.0], *ends.tolist()]
     assert seconds[[0, 2]].tolist() == [1.0, 0.5]
     assert 0.0 < seconds[1] < 0.01
-    same = _timed(machine, before, ends[1:], np.array([1.5]))
+    same = split_slow_turns(machine, before, ends[1:], np.array([1.5]))
     assert same[0].tolist() == ends[1:].tolist()
 
 
@@ -183,7 +180,8 @@ def test_where_the_trajectory_stands_still_linuxcnc_does_too():
     machine = pk.load("linear_delta")
     path = path_of([[0.0, 0.0, 280.0], [40.0, 0.0, 280.0], [40.0, 40.0, 280.0], [80.0, 40.0, 280.0]])
     stopping, rounding = (
-        text_of(linuxcnc_program(plan_trajectory(post_path(machine, path), corners=c))) for c in ("stop", "round")
+        text_of(pk.make_linuxcnc_program(plan_trajectory(post_path(machine, path), corners=c)))
+        for c in ("stop", "round")
     )
     assert rounding.count("G61\n") == 1  # at the first record
     assert stopping.count("G61\n") == 3
@@ -201,7 +199,7 @@ def test_from_home_the_wrist_does_not_jump(name, mode):
     mode = machine.mode[:-1] + mode
     first = machine.home + np.array([15.0, 10.0, -5.0, 0.4, 2.0])
     joints = machine.inverse(first, mode)
-    poses, seconds = approach(machine, first, joints, mode)
+    poses, seconds = plan_approach(machine, first, joints, mode)
     assert np.abs(poses[-1] - first).max() == 0.0
     assert seconds[0] >= 4.0
     assert np.abs(poses[0][:3] - machine.home[:3]).max() < 1e-12
@@ -215,7 +213,7 @@ def test_from_home_the_wrist_does_not_jump(name, mode):
     assert np.abs(np.diff(rows, axis=0))[:, wrist].max() < 0.01
     assert np.abs(rows[-1] - joints).max() < 1e-6  # on the turn that is planned, too
     other = joints + 2.0 * np.pi * (np.arange(len(joints)) == wrist)
-    turned = approach(machine, first, other, mode)[0]
+    turned = plan_approach(machine, first, other, mode)[0]
     assert abs(turned[1][4] - poses[1][4]) == pytest.approx(2.0 * np.pi)
 
 
@@ -223,27 +221,27 @@ def test_what_linuxcnc_cant_follow_is_refused(trajectories):
     machine = pk.load("linear_delta")
     trajectory = plan_trajectory(post_path(machine, path_of([[0.0, 0.0, 280.0], [1.0, 0.0, 280.0]])))
     other = next(mode for mode in machine.modes if mode != machine.mode)
-    with pytest.raises(PoseError, match="mode"):
-        linuxcnc_program(replace(trajectory, posted=replace(trajectory.posted, mode=other)))
+    with pytest.raises(pk.PoseError, match="mode"):
+        pk.make_linuxcnc_program(replace(trajectory, posted=replace(trajectory.posted, mode=other)))
     posted = trajectories("tricept").posted
     poses = posted.poses.copy()
     poses[:, 4] += 700.0
-    with pytest.raises(PoseError, match="C would turn"):
-        linuxcnc_program(replace(trajectories("tricept"), posted=replace(posted, poses=poses)))
+    with pytest.raises(pk.PoseError, match="C would turn"):
+        pk.make_linuxcnc_program(replace(trajectories("tricept"), posted=replace(posted, poses=poses)))
     for tolerance in (0.0, -1.0, float("inf"), float("nan")):
-        with pytest.raises(PoseError, match="tolerance"):
-            linuxcnc_program(trajectories("tricept"), tolerance=tolerance)
+        with pytest.raises(pk.PoseError, match="tolerance"):
+            pk.make_linuxcnc_program(trajectories("tricept"), tolerance=tolerance)
 
 
 def test_a_path_of_one_record(tmp_path):
     machine = pk.load("hexapod")
     trajectory = plan_trajectory(post_path(machine, path_of([[0.0, 0.0, -940.0]] * 2)))
-    lines = motion_lines(text_of(linuxcnc_program(trajectory)))
+    lines = motion_lines(text_of(pk.make_linuxcnc_program(trajectory)))
     assert len(lines) == 1
     assert "Z-940.000000" in lines[0]
-    assert program_seconds(trajectory) == 0.0
-    (file,) = write_all(tmp_path, {"one.ngc": joint_program(trajectory)})
-    assert len(read_joint_program(file).joints) == 1
+    assert pk.predict_linuxcnc_seconds(trajectory) == 0.0
+    (file,) = write_all(tmp_path, {"one.ngc": pk.make_joint_program(trajectory)})
+    assert len(pk.read_joint_program(file).joints) == 1
 
 
 # Joints
@@ -253,8 +251,8 @@ def test_a_path_of_one_record(tmp_path):
 def test_what_is_written_in_joints_is_read_back(trajectories, name, tmp_path):
     trajectory = trajectories(name)
     machine = trajectory.posted.machine
-    (file,) = write_all(tmp_path, {"part.ngc": joint_program(trajectory)})
-    read = read_joint_program(file)
+    (file,) = write_all(tmp_path, {"part.ngc": pk.make_joint_program(trajectory)})
+    read = pk.read_joint_program(file)
     assert read.letters == joint_letters(machine)
     kept = np.append(True, np.diff(trajectory.curve.corner_of_record) > 0)
     assert np.abs(read.joints - rim(trajectory.posted.joints[kept], machine.joint_units)).max() < HALF
@@ -277,10 +275,10 @@ def test_linear_joints_are_xyzuvw_and_turning_ones_abc():
 def test_more_joints_than_letters(monkeypatch):
     machine = pk.load("hexapod")
     monkeypatch.setitem(machine.__dict__, "joint_units", ("mm",) * 7)
-    with pytest.raises(PoseError, match="hexapod has 7 linear and 0 turning joints; G-code has letters for 6 and 3"):
+    with pytest.raises(pk.PoseError, match="hexapod has 7 linear and 0 turning joints; G-code has letters for 6 and 3"):
         joint_letters(machine)
     monkeypatch.setitem(machine.__dict__, "joint_units", ("rad",) * 4 + ("mm",))
-    with pytest.raises(PoseError, match="1 linear and 4 turning"):
+    with pytest.raises(pk.PoseError, match="1 linear and 4 turning"):
         joint_letters(machine)
 
 
@@ -312,8 +310,8 @@ HEAD = "G21 G90\nG93\n"
 def test_what_is_no_program_in_joints(tmp_path, text, line, word):
     file = tmp_path / "joints.ngc"
     file.write_text(text)
-    with pytest.raises(InputError) as caught:
-        read_joint_program(file)
+    with pytest.raises(pk.InputError) as caught:
+        pk.read_joint_program(file)
     assert caught.value.line == line
     assert caught.value.source == str(file)
     assert word in caught.value.message
@@ -321,17 +319,17 @@ def test_what_is_no_program_in_joints(tmp_path, text, line, word):
 
 
 def test_files_that_cant_be_read(tmp_path):
-    with pytest.raises(InputError, match="cannot be read"):
-        read_joint_program(tmp_path / "nothing.ngc")
+    with pytest.raises(pk.InputError, match="cannot be read"):
+        pk.read_joint_program(tmp_path / "nothing.ngc")
     (tmp_path / "binary.ngc").write_bytes(b"\xff\xfe\x00")
-    with pytest.raises(InputError, match="plain text"):
-        read_joint_program(tmp_path / "binary.ngc")
+    with pytest.raises(pk.InputError, match="plain text"):
+        pk.read_joint_program(tmp_path / "binary.ngc")
 
 
 # What is not motion
 
 
-def told(events, dialect="nx", writer=linuxcnc_program, **fields):
+def told(events, dialect="nx", writer=pk.make_linuxcnc_program, **fields):
     """The lines of a program of three records that are no motion and no mode, and where its motions are among them."""
     path = path_of([[0.0, 0.0, 280.0], [5.0, 0.0, 280.0], [5.0, 5.0, 280.0]], dialect=dialect, **fields)
     path = replace(path, events=tuple(Event(record, 10 * record + i, text) for i, (record, text) in enumerate(events)))
@@ -339,7 +337,7 @@ def told(events, dialect="nx", writer=linuxcnc_program, **fields):
     return text.splitlines()
 
 
-@pytest.mark.parametrize("writer", [linuxcnc_program, joint_program])
+@pytest.mark.parametrize("writer", [pk.make_linuxcnc_program, pk.make_joint_program])
 @pytest.mark.parametrize(
     ("dialect", "text", "expected"),
     [
@@ -374,7 +372,7 @@ def test_events_in_words(writer, dialect, text, expected):
     at = lines.index(expected)
     reached = [i for i, line in enumerate(lines) if re.search(r"^(G53 )?G1 ", line)]
     assert reached[0] < at < reached[-1]
-    if writer is linuxcnc_program:
+    if writer is pk.make_linuxcnc_program:
         assert [i for i in reached if i < at] == reached[:1]
 
 
@@ -400,7 +398,7 @@ def test_another_tool_stops_the_program():
     assert lines[lines.index("M0") - 1] == "( line 21: LOAD/TOOL,2 )"
 
 
-@pytest.mark.parametrize("writer", [linuxcnc_program, joint_program])
+@pytest.mark.parametrize("writer", [pk.make_linuxcnc_program, pk.make_joint_program])
 def test_forced_it_says_so(trajectories, writer):
     offences = "part.cls:214: leg d2 would be 1,533.2 mm, limit 1,520\npart.cls:9: " + 60 * "very long "
     text = text_of(writer(trajectories("tricept"), forced=offences))

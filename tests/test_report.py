@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import parakin as pk
-from parakin.export.report.report import report_html
+from parakin.export.report.report import render_report
 from parakin.machine import Machine
 from parakin.toolpath.checking.check import check_path
 from parakin.toolpath.path import Note, ToolPath
@@ -44,7 +44,7 @@ def trajectory():
 
 @pytest.fixture(scope="module")
 def html(trajectory):
-    return report_html(trajectory.posted, trajectory)
+    return render_report(trajectory.posted, trajectory)
 
 
 @pytest.fixture(scope="module")
@@ -181,7 +181,7 @@ def test_feed_is_seen_among_many_short_rapids():
     turn = np.linspace(0.0, 200.0, 4000)
     tip = np.stack([80 * np.cos(turn), 80 * np.sin(turn), 280 + 0 * turn], axis=1)
     trajectory = plan_trajectory(post_path(pk.load("linear_delta"), path_of(tip, rapid=np.arange(4000) % 10 < 2)))
-    figure = figures_of(report_html(trajectory.posted, trajectory))["time"]
+    figure = figures_of(render_report(trajectory.posted, trajectory))["time"]
     assert 3 * len(trajectory.profile.row) > 9000
     for name in ("programmed feed", "set by the feed"):
         y = np.array(traces_of(figure, name)[0]["y"], float)
@@ -227,7 +227,7 @@ def test_jerks_are_drawn_where_they_are_limited():
     trajectory = plan_trajectory(
         post_path(Machine(replace(machine.spec, legs=legs)), path_of([[0, 0, 280], [30, 10, 285], [0, 40, 280]]))
     )
-    figure = figures_of(report_html(trajectory.posted, trajectory))["time"]
+    figure = figures_of(render_report(trajectory.posted, trajectory))["time"]
     for name in machine.joints:
         _, y = xy(traces_of(figure, f"{name} jerk")[0])
         assert 1e4 < np.abs(y).max() <= 2e5 * 1.01
@@ -239,13 +239,13 @@ def test_jerks_are_drawn_where_they_are_limited():
 
 def test_a_trajectory_that_stands_still():
     trajectory = plan_trajectory(post_path(pk.load("linear_delta"), path_of([[0, 0, 280]])))
-    html = report_html(trajectory.posted, trajectory)
+    html = render_report(trajectory.posted, trajectory)
     assert set(figures_of(html)) == {"machine", "path", "curves"}
     assert "Cycle time 0 s" in text_of(html)
 
 
 def test_without_a_trajectory_nothing_is_said_of_it(trajectory):
-    html = report_html(trajectory.posted)
+    html = render_report(trajectory.posted)
     assert set(figures_of(html)) == {"machine", "path", "curves"}
     assert "Cycle time" not in html
     assert "<h2>Time</h2>" not in html
@@ -255,7 +255,7 @@ def test_inverse_time_counts_as_programmed():
     path = path_of([[0, 0, 280], [30, 0, 280], [60, 0, 280]], feed=np.array([np.nan, np.nan, 1200.0]))
     path = replace(path, seconds=np.array([np.nan, 4.0, np.nan]), dialect="gcode", notes=(Note(0, "of all"),))
     trajectory = plan_trajectory(post_path(pk.load("linear_delta"), path))
-    html = report_html(trajectory.posted, trajectory)
+    html = render_report(trajectory.posted, trajectory)
     assert "5.5 s in feed motions, at the programmed feeds<" in html  # 4 s, and 30 mm at 20 mm/s
     programmed = np.array(traces_of(figures_of(html)["time"], "programmed feed")[0]["y"], float)
     np.testing.assert_allclose(np.unique(programmed), [450.0, 1200.0])
@@ -268,7 +268,7 @@ def test_offences_on_the_way_say_where():
     posted = check_path(post_path(pk.load("tricept"), path_of([[-300, 0, -1450], [0, 0, -1340], [300, 0, -1450]])))
     halfway = check_path(post_path(pk.load("tricept"), path_of([[-200, 0, -1345], [200, 0, -1345]])))
     for checked in (posted, halfway):
-        html = report_html(checked)
+        html = render_report(checked)
         assert "were not checked" not in html
         assert "Records and motions" in html
         between_records = [offence for offence in checked.offences if offence.share < 1.0]
@@ -278,4 +278,4 @@ def test_offences_on_the_way_say_where():
             assert traces_of(figures_of(html)["path"], "motions off limits")
     assert any(offence.share < 1.0 for offence in (*posted.offences, *halfway.offences))
     runs = check_path(post_path(pk.load("tricept"), path_of([[0, 0, -1650], [50, 0, -1650]])))
-    assert "All 2 records and the motions between them stay within every limit of tricept.<" in report_html(runs)
+    assert "All 2 records and the motions between them stay within every limit of tricept.<" in render_report(runs)

@@ -10,7 +10,13 @@ import pyarrow.parquet as pq
 import pytest
 
 import parakin as pk
-from parakin.export.tables.setpoints import MOST_ROWS, row_count, setpoint_columns, setpoints_csv, setpoints_parquet
+from parakin.export.tables.setpoints import (
+    MOST_ROWS,
+    count_setpoints,
+    make_setpoint_csv,
+    make_setpoint_parquet,
+    setpoint_columns,
+)
 from parakin.toolpath.path import ToolPath
 from parakin.toolpath.posting.post import post_path
 from parakin.toolpath.timing import plan_trajectory
@@ -37,7 +43,7 @@ def trajectory():
 @pytest.fixture(scope="module")
 def table(trajectory):
     file = io.BytesIO()
-    setpoints_csv(trajectory, RATE)(file)
+    make_setpoint_csv(trajectory, RATE)(file)
     return file.getvalue().decode()
 
 
@@ -69,7 +75,7 @@ def test_csv_is_the_trajectory_sampled(trajectory, table):
 
 def test_parquet_is_the_trajectory_sampled(trajectory):
     file = io.BytesIO()
-    setpoints_parquet(trajectory, RATE)(file)
+    make_setpoint_parquet(trajectory, RATE)(file)
     read = pq.read_table(io.BytesIO(file.getvalue()))
     assert read.column_names == setpoint_columns(trajectory)
     expected = in_degrees(trajectory, trajectory.sample(RATE))
@@ -80,9 +86,9 @@ def test_parquet_is_the_trajectory_sampled(trajectory):
 def test_parquet_in_several_groups(trajectory, monkeypatch):
     monkeypatch.setattr("parakin.export.tables.setpoints._GROUP", 1000)
     file, said = io.BytesIO(), []
-    setpoints_parquet(trajectory, 1000.0, said.append)(file)
+    make_setpoint_parquet(trajectory, 1000.0, said.append)(file)
     read = pq.ParquetFile(io.BytesIO(file.getvalue()))
-    assert read.num_row_groups == math.ceil(row_count(trajectory, 1000.0) / 1000) > 2
+    assert read.num_row_groups == math.ceil(count_setpoints(trajectory, 1000.0) / 1000) > 2
     np.testing.assert_array_equal(read.read()["time [s]"].to_numpy(), trajectory.sample(1000.0).times)
     assert said == sorted(said)
     assert said[-1] == 1.0
@@ -90,10 +96,10 @@ def test_parquet_in_several_groups(trajectory, monkeypatch):
 
 @pytest.mark.parametrize("rate", [3.0, 250.0, 999.9])
 def test_the_last_row_is_the_first_at_rest(trajectory, rate):
-    count = row_count(trajectory, rate)
+    count = count_setpoints(trajectory, rate)
     assert (count - 2) / rate < trajectory.seconds <= (count - 1) / rate
     file = io.BytesIO()
-    setpoints_csv(trajectory, rate)(file)
+    make_setpoint_csv(trajectory, rate)(file)
     rows = list(csv.DictReader(io.StringIO(file.getvalue().decode())))
     assert len(rows) == count
     assert {rows[-1][name] for name in rows[-1] if "speed" in name or "acceleration" in name} == {"0"}
@@ -101,14 +107,14 @@ def test_the_last_row_is_the_first_at_rest(trajectory, rate):
 
 
 def test_a_cycle_of_whole_ticks_ends_on_one(trajectory):
-    assert row_count(trajectory, 1.0 / trajectory.seconds) == 2
-    assert row_count(trajectory, 1000.0 / trajectory.seconds) == 1001
+    assert count_setpoints(trajectory, 1.0 / trajectory.seconds) == 2
+    assert count_setpoints(trajectory, 1000.0 / trajectory.seconds) == 1001
 
 
 def test_a_machine_without_turns():
     trajectory = trajectory_of("linear_delta", [[0, 0, 280], [40, 0, 280]])
     file = io.BytesIO()
-    setpoints_csv(trajectory, 100.0)(file)
+    make_setpoint_csv(trajectory, 100.0)(file)
     head = file.getvalue().decode().partition("\n")[0]
     assert "deg" not in head
     assert head.count(",") == 3 * 3 + 3
@@ -116,13 +122,13 @@ def test_a_machine_without_turns():
 
 def test_a_single_record_stands_still():
     trajectory = trajectory_of("linear_delta", [[1, 2, 280]])
-    for writer in (setpoints_csv, setpoints_parquet):
+    for writer in (make_setpoint_csv, make_setpoint_parquet):
         file = io.BytesIO()
         writer(trajectory, 1000.0)(file)
     assert pq.read_table(io.BytesIO(file.getvalue()))["Y [mm]"].to_pylist() == [2.0]
 
 
-@pytest.mark.parametrize("writer", [setpoints_csv, setpoints_parquet])
+@pytest.mark.parametrize("writer", [make_setpoint_csv, make_setpoint_parquet])
 @pytest.mark.parametrize("rate", [0.0, -1.0, math.nan, math.inf, 1e12, 1e300])
 def test_senseless_rates_are_refused_at_once(trajectory, writer, rate):
     with pytest.raises(pk.InputError) as caught:
@@ -133,9 +139,9 @@ def test_senseless_rates_are_refused_at_once(trajectory, writer, rate):
 
 
 def test_rows_are_refused_by_their_count(trajectory):
-    assert row_count(trajectory, 0.999 * MOST_ROWS / trajectory.seconds) <= MOST_ROWS
+    assert count_setpoints(trajectory, 0.999 * MOST_ROWS / trajectory.seconds) <= MOST_ROWS
     with pytest.raises(pk.InputError, match="at most 100,000,000"):
-        row_count(trajectory, 1.001 * MOST_ROWS / trajectory.seconds)
+        count_setpoints(trajectory, 1.001 * MOST_ROWS / trajectory.seconds)
 
 
 class Sink:
@@ -150,10 +156,10 @@ class Sink:
 def test_long_tables_do_not_fill_the_memory(trajectory):
     rate = 1_000_000.0 / trajectory.seconds
     file = Sink()
-    setpoints_csv(trajectory, 1000.0)(Sink())  # compiled
+    make_setpoint_csv(trajectory, 1000.0)(Sink())  # compiled
     tracemalloc.start()
     try:
-        setpoints_csv(trajectory, rate)(file)
+        make_setpoint_csv(trajectory, rate)(file)
         peak = tracemalloc.get_traced_memory()[1]
     finally:
         tracemalloc.stop()

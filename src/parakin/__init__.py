@@ -9,6 +9,12 @@ from typing import TYPE_CHECKING
 from .errors import DescriptionError, InputError, InputErrors, NoMethodError, ParakinError, PoseError
 
 if TYPE_CHECKING:
+    from .controllers.joints.program import make_joint_program
+    from .controllers.joints.reader import JointProgram, read_joint_program
+    from .controllers.linuxcnc.configuration import make_linuxcnc_configuration
+    from .controllers.linuxcnc.program import make_linuxcnc_program, predict_linuxcnc_seconds
+    from .export.machine.picture import render_machine_html, render_machine_png
+    from .export.report.report import render_report
     from .export.workspace.meshes import Shell as Mesh
     from .export.workspace.meshes import shell as make_mesh
     from .kinematics.forward import Solution
@@ -43,6 +49,7 @@ __all__ = [
     "InputErrors",
     "InscribedBox",
     "Job",
+    "JointProgram",
     "Machine",
     "Mesh",
     "NoMethodError",
@@ -64,10 +71,18 @@ __all__ = [
     "find_placement",
     "load",
     "machines",
+    "make_joint_program",
+    "make_linuxcnc_configuration",
+    "make_linuxcnc_program",
     "make_mesh",
+    "predict_linuxcnc_seconds",
     "prepare",
+    "read_joint_program",
     "read_path",
     "region",
+    "render_machine_html",
+    "render_machine_png",
+    "render_report",
     "sample_field",
     "sample_grid",
     "sweep_drives",
@@ -114,6 +129,7 @@ _LAZY = {
     "GridWorkspace": "workspaces.sampled.grid",
     "InscribedBox": "workspaces.inscribed.largest_box",
     "Job": "toolpath.job",
+    "JointProgram": "controllers.joints.reader",
     "Machine": "machine",
     "Mesh": "export.workspace.meshes:Shell",
     "Placement": "toolpath.placing.placement",
@@ -130,10 +146,18 @@ _LAZY = {
     "find_cross_sections": "workspaces.sampled.cross_sections",
     "find_largest_box": "workspaces.inscribed.largest_box",
     "find_placement": "toolpath.placing.placement",
+    "make_joint_program": "controllers.joints.program",
+    "make_linuxcnc_configuration": "controllers.linuxcnc.configuration",
+    "make_linuxcnc_program": "controllers.linuxcnc.program",
     "make_mesh": "export.workspace.meshes:shell",
+    "predict_linuxcnc_seconds": "controllers.linuxcnc.program",
     "prepare": "toolpath.job",
+    "read_joint_program": "controllers.joints.reader",
     "read_path": "toolpath.reading.detect",
     "region": "workspaces.certified.region:make_region",
+    "render_machine_html": "export.machine.picture",
+    "render_machine_png": "export.machine.picture",
+    "render_report": "export.report.report",
     "sample_field": "workspaces.sampled.distance_field",
     "sample_grid": "workspaces.sampled.grid",
     "sweep_drives": "workspaces.sampled.drive_sweep",

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TypeAlias
+from typing import BinaryIO, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,3 +12,4 @@ Array: TypeAlias = NDArray[np.float64]  # lengths in mm, angles in rad, unless a
 Indices: TypeAlias = NDArray[np.int64]  # zero-based numbers of rows or columns
 Flags: TypeAlias = NDArray[np.bool_]  # one truth a row
 Progress: TypeAlias = Callable[[float], None]  # called now and then with the fraction done, 0 to 1
+Writer: TypeAlias = Callable[[BinaryIO], None]  # writes a file's content

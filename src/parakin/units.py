@@ -110,6 +110,16 @@ def evaluate_expression(text: str, names: Mapping[str, Quantity | None] | None =
     return _ExpressionParser(text, names or {}).parse()
 
 
+def to_display(value: float, unit: str) -> float:
+    """Convert a value in mm or rad to mm or degrees; any other unit stays."""
+    return math.degrees(value) if unit == "rad" else value
+
+
+def display_unit(unit: str) -> str:
+    """The unit's name on a display: ``deg`` for ``rad``."""
+    return "deg" if unit == "rad" else unit
+
+
 def is_reserved(name: str) -> bool:
     """Whether a unit or a function has this name, so that a size can't have it."""
     return name in _FUNCTIONS or name in _UNIT_WORDS

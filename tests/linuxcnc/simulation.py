@@ -14,7 +14,6 @@ from pathlib import Path
 import numpy as np
 
 import parakin as pk
-from parakin.controllers.linuxcnc import configuration
 
 HERE = Path(__file__).parent
 MODULES = Path("/usr/lib/linuxcnc/modules")
@@ -138,7 +137,7 @@ class Simulation:
 def simulated(machine):
     """A :class:`Simulation`; the kinematics is built and installed, and removed at the end."""
     with tempfile.TemporaryDirectory(dir="/var/tmp") as name:  # pytest's own folders are closed to others
-        folder, files = Path(name), configuration(machine)
+        folder, files = Path(name), pk.make_linuxcnc_configuration(machine)
         ini = files[f"{machine.name}.ini"].replace("DISPLAY = axis", "DISPLAY = ./ui.py")
         files[f"{machine.name}.ini"] = ini.replace("[KINS]", "HALFILE = sampler.hal\n\n[KINS]")
         for file, text in (files | {"sampler.hal": sampler(machine)}).items():

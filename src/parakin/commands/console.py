@@ -1,9 +1,7 @@
-"""What a command says: plain tables, JSON, a progress bar, a word on what takes long."""
+"""What a command prints: plain tables, JSON, a progress bar, a remark on what takes long."""
 
 from __future__ import annotations
 
-import json
-import math
 import sys
 import time
 from collections.abc import Callable, Mapping, Sequence
@@ -12,14 +10,20 @@ from functools import cache
 from types import TracebackType
 from typing import TYPE_CHECKING, Any
 
+from ..export.json.text import format_json
+from ..export.json.text import format_json as json_text
+from ..export.number_format import format_fixed as fixed
+from ..units import display_unit as rim_unit
+from ..units import to_display as rim
+
 if TYPE_CHECKING:
     from rich.progress import Progress as Bar
 
-_QUIET = 1.0  # seconds of work before a bar appears
+_QUIET = 1.0  # s of work before a bar appears
 
 
-def table(rows: Sequence[Sequence[str]], header: Sequence[str], right: str = "") -> str:
-    """Columns side by side, two blanks apart; in ``right``, ``r`` stands for a column set right."""
+def format_table(rows: Sequence[Sequence[str]], header: Sequence[str], right: str = "") -> str:
+    """Format columns side by side, two blanks apart; in ``right``, ``r`` stands for a column aligned right."""
     everything = [header, *rows]
     widths = [max(len(line[c]) for line in everything) for c in range(len(header))]
     sides = right.ljust(len(header))
@@ -33,41 +37,13 @@ def table(rows: Sequence[Sequence[str]], header: Sequence[str], right: str = "")
 
 
 def say(text: str) -> None:
-    """A remark beside the command's output."""
+    """Print a remark beside the command's output."""
     print(text, file=sys.stderr)
 
 
 def print_json(content: Mapping[str, Any]) -> None:
-    print(json_text(content))
-
-
-def json_text(content: Mapping[str, Any]) -> str:
-    """Numbers that are not finite become null."""
-    return json.dumps(_finite(content), indent=2, allow_nan=False)
-
-
-def _finite(content: Any) -> Any:
-    if isinstance(content, float):
-        return content if math.isfinite(content) else None
-    if isinstance(content, Mapping):
-        return {key: _finite(value) for key, value in content.items()}
-    if isinstance(content, Sequence) and not isinstance(content, str):
-        return [_finite(value) for value in content]
-    return content
-
-
-def fixed(value: float, digits: int, thousands: str = ",") -> str:
-    """A number in fixed digits; nought has no sign."""
-    return format(round(value, digits) + 0.0, f"{thousands}.{digits}f")
-
-
-def rim(value: float, unit: str) -> float:
-    """mm stay, rad become degrees."""
-    return math.degrees(value) if unit == "rad" else value
-
-
-def rim_unit(unit: str) -> str:
-    return "deg" if unit == "rad" else unit
+    """Print an object as JSON."""
+    print(format_json(content))
 
 
 @cache
@@ -90,7 +66,7 @@ def announce_compiling() -> None:
 
 
 class Progress(AbstractContextManager["Progress"]):
-    """A bar on a terminal's stderr from one second of work on."""
+    """Show a bar on a terminal's stderr after one second of work."""
 
     def __init__(self) -> None:
         self.started = time.monotonic()
@@ -103,7 +79,7 @@ class Progress(AbstractContextManager["Progress"]):
             self.bar.stop()
 
     def part(self, what: str, begin: float, end: float) -> Callable[[float], None]:
-        """What to call with the fraction done of a part of the work, which goes from ``begin`` to ``end`` of it all."""
+        """Make the function to call with the fraction done of a part, from ``begin`` to ``end`` of the whole work."""
         return lambda fraction: self._show(what, begin + (end - begin) * fraction)
 
     def _show(self, what: str, fraction: float) -> None:
@@ -117,3 +93,19 @@ class Progress(AbstractContextManager["Progress"]):
             self.bar.add_task(what, total=1.0)
             self.bar.start()
         self.bar.update(self.bar.task_ids[0], description=what, completed=fraction)
+
+
+# Names that other commands still use.
+__all__ = [
+    "Progress",
+    "announce_compiling",
+    "fixed",
+    "format_table",
+    "json_text",
+    "print_json",
+    "rim",
+    "rim_unit",
+    "say",
+    "table",
+]
+table = format_table

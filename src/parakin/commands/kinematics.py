@@ -3,20 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Literal
 
 from cyclopts import Parameter
 
 from ..errors import InputError
-from .console import announce_compiling, fixed, print_json, rim, rim_unit, say, table
-from .offences import offence_json, offence_line
+from ..export.json.poses import encode_poses
+from ..export.number_format import format_fixed
+from ..export.tables.poses import PoseTable, Side, format_pose_csv
+from ..units import display_unit, to_display
+from .console import announce_compiling, format_table, print_json, say
+from .offences import format_offence
 from .options import OFF_LIMITS, Json, Mode, Name, Sizes, machine_of
 from .values import parse_row
 
 if TYPE_CHECKING:
-    from ..arrays import Array
+    from ..arrays import Array, Indices
     from ..kinematics.forward import Solution
     from ..machine import Machine
     from ..toolpath.posting.offences import Judgement
@@ -24,6 +28,8 @@ if TYPE_CHECKING:
 
 Csv = Annotated[Path | None, Parameter(help="Rows of values instead, mm and degrees; with a header in any order.")]
 Output = Annotated[Path | None, Parameter(name=["--output", "-o"], help="Write the result there, as CSV.")]
+
+_LOST = 10  # rows without a pose that are named
 
 
 def inverse(
@@ -48,15 +54,15 @@ def inverse(
         A pose in mm and degrees, in the order of the axes or by name: X=10 Z=-1400; the rest comes from home.
     """
     machine = machine_of(name, sizes)
-    poses, lines = _given(machine, values, csv, machine.axes, machine.axis_units, machine.home, "pose")
+    poses, lines = _read_values(machine, "pose", values, csv, machine.home)
     announce_compiling()
     from ..toolpath.posting.offences import judge_path
 
     joints = machine.inverse(poses, mode)
-    found = judge_path(machine, poses, joints, lines, mode)
-    result = _Result(machine, poses, joints, [_name(found, i) for i in range(len(poses))])
-    result.tell("inverse", "joints", csv, output, json, found.offences)
-    return OFF_LIMITS if found.offences else 0
+    judgement = judge_path(machine, poses, joints, lines, mode)
+    table = PoseTable(machine, poses, joints, [_name_broken(judgement, i) for i in range(len(poses))])
+    _show_table(table, _Request("inverse", "joints", csv, output, json), judgement.offences)
+    return OFF_LIMITS if judgement.offences else 0
 
 
 def forward(
@@ -86,8 +92,7 @@ def forward(
 
     machine = machine_of(name, sizes)
     announce_compiling()
-    at_home = machine.inverse(machine.home)
-    joints, lines = _given(machine, values, csv, machine.joints, machine.joint_units, at_home, "joints")
+    joints, lines = _read_values(machine, "joints", values, csv, machine.inverse(machine.home))
     start = None
     if near is not None:
         parts = [part.strip() for part in near.split(",")]
@@ -95,135 +100,96 @@ def forward(
     from ..toolpath.posting.offences import judge_path
 
     solution = machine.forward(joints, start)
-    good = np.flatnonzero(solution.converged)
-    found = judge_path(machine, solution.poses[good], joints[good], lines[good])
-    offences = tuple(replace(offence, record=int(good[offence.record])) for offence in found.offences)
-    verdicts = ["not converged"] * len(joints)
-    for i, index in enumerate(good.tolist()):
-        verdicts[index] = _name(found, i)
-    result = _Result(machine, solution.poses, joints, verdicts, solution)
-    result.tell("forward", "pose", csv, output, json, offences)
-    for index in np.flatnonzero(~solution.converged).tolist()[:10]:
-        place = f"{csv}:{lines[index]}" if csv else "joints"
-        open_by = solution.residual[index]
-        closes = np.isnan(open_by) or open_by <= machine.closure_tolerance
-        say(f"{place}: no pose found" + ("" if closes else f" (the legs fail to close by {open_by:.3g} mm)"))
-    lost = len(joints) - len(good)
-    if lost > 10:
-        say(f"{csv}: no pose found for {lost - 10:,} more rows")
-    return OFF_LIMITS if lost or found.offences else 0
+    solved = np.flatnonzero(solution.converged)
+    judgement = judge_path(machine, solution.poses[solved], joints[solved], lines[solved])
+    offences = tuple(replace(offence, record=int(solved[offence.record])) for offence in judgement.offences)
+    broken = ["not converged"] * len(joints)
+    for i, row in enumerate(solved.tolist()):
+        broken[row] = _name_broken(judgement, i)
+    table = PoseTable(machine, solution.poses, joints, broken, solution)
+    _show_table(table, _Request("forward", "pose", csv, output, json), offences)
+    _report_lost(machine, solution, csv, lines)
+    return OFF_LIMITS if len(solved) < len(joints) or offences else 0
 
 
-def _name(found: Judgement, index: int) -> str:
-    broken = int(found.broken[index])
-    return found.limits[broken - 1] if broken else ""
-
-
-def _given(
-    machine: Machine,
-    values: tuple[str, ...],
-    csv: Path | None,
-    names: tuple[str, ...],
-    units: tuple[str, ...],
-    default: Array,
-    what: str,
-) -> tuple[Array, Any]:
-    """The rows a command is given, mm and rad, and their lines in the CSV."""
+def _report_lost(machine: Machine, solution: Solution, csv: Path | None, lines: Indices) -> None:
+    """Print the rows without a pose, some of them by their line."""
     import numpy as np
 
+    lost = np.flatnonzero(~solution.converged).tolist()
+    for row in lost[:_LOST]:
+        place = f"{csv}:{lines[row]}" if csv else "joints"
+        residual = solution.residual[row]
+        closes = np.isnan(residual) or residual <= machine.closure_tolerance
+        say(f"{place}: no pose found" + ("" if closes else f" (the legs fail to close by {residual:.3g} mm)"))
+    if len(lost) > _LOST:
+        say(f"{csv}: no pose found for {len(lost) - _LOST:,} more rows")
+
+
+def _name_broken(judgement: Judgement, row: int) -> str:
+    broken = int(judgement.broken[row])
+    return judgement.limits[broken - 1] if broken else ""
+
+
+def _read_values(
+    machine: Machine, side: Side, values: tuple[str, ...], csv: Path | None, default: Array
+) -> tuple[Array, Indices]:
+    """Read the rows that a command is given, mm and rad, and their lines in the CSV."""
+    import numpy as np
+
+    poses = machine.axes, machine.axis_units
+    names, units = poses if side == "pose" else (machine.joints, machine.joint_units)
     if csv is not None:
         if values:
-            raise InputError("values on the line and --csv, expected one of them", what)
+            raise InputError("values on the line and --csv, expected one of them", side)
         from .rows import read_rows
 
         return read_rows(csv, names, units)
     if not values:
-        raise InputError(f"no values, expected {' '.join(names)} (or --csv FILE)", what)
-    return parse_row(values, names, units, default, what)[None, :], np.zeros(1, np.int64)
+        raise InputError(f"no values, expected {' '.join(names)} (or --csv FILE)", side)
+    return parse_row(values, names, units, default, side)[None, :], np.zeros(1, np.int64)
 
 
-class _Result:
-    """Poses and joints side by side, and what to say of each."""
+@dataclass(frozen=True)
+class _Request:
+    """What a command is to show: the problem, which side of its table is the answer, and the options on output."""
 
-    def __init__(
-        self, machine: Machine, poses: Array, joints: Array, verdicts: list[str], solution: Solution | None = None
-    ):
-        self.machine, self.poses, self.joints, self.verdicts = machine, poses, joints, verdicts
-        self.solution = solution  # of the direct problem
+    problem: Literal["inverse", "forward"]
+    answer: Side
+    csv: Path | None
+    output: Path | None
+    json: bool
 
-    def tell(
-        self, command: str, what: str, csv: Path | None, output: Path | None, json: bool, offences: Sequence[Offence]
-    ) -> None:
-        """Print or write the result; ``what`` was asked for, ``joints`` or ``pose``."""
-        for offence in offences:
-            say(offence_line(f"{csv}:{offence.line}", offence, "row") if csv else f"pose: {offence.text}")
-        if output is not None:
-            from ..export.files import write_all
 
-            write_all(output.parent, {output.name: self._csv()})
-        if json:
-            print_json(
-                {
-                    "schema": f"parakin.{command}/1",
-                    "machine": self.machine.name,
-                    "verdict": "off limits" if any(self.verdicts) else "ok",
-                    "rows": self._rows(),
-                    "offences": [offence_json(offence) for offence in offences],
-                    "files": {} if output is None else {"table": str(output)},
-                }
-            )
-        elif output is not None:
-            print(f"table {output}")
-        elif csv is not None:
-            print(self._csv(), end="")
-        else:
-            names, units, values = self._columns(what)
-            cells = [
-                (name, "-" if value != value else fixed(rim(value, unit), 6), rim_unit(unit))
-                for name, unit, value in zip(names, units, values[0].tolist(), strict=True)
-            ]
-            print(table(cells, (what, "", ""), " r"))
-            if self.solution is not None and self.solution.converged[0]:
-                print(f"\nconverged in {self.solution.steps[0]} steps, residual {self.solution.residual[0]:.1e} mm")
+def _show_table(table: PoseTable, request: _Request, offences: Sequence[Offence]) -> None:
+    """Print or write a table, and print its offences."""
+    csv, output = request.csv, request.output
+    for offence in offences:
+        say(format_offence(f"{csv}:{offence.line}", offence, "row") if csv else f"pose: {offence.text}")
+    if output is not None:
+        from ..export.files import write_all
 
-    def _rows(self) -> list[dict[str, Any]]:
-        rows: list[dict[str, Any]] = [
-            {"pose": pose, "joints": joints, "broken": verdict or None}
-            for pose, joints, verdict in zip(self._named("pose"), self._named("joints"), self.verdicts, strict=True)
-        ]
-        if self.solution is not None:
-            verdicts = zip(self.solution.residual.tolist(), self.solution.converged.tolist(), strict=True)
-            for row, (residual, converged) in zip(rows, verdicts, strict=True):
-                row |= {"residual": residual, "converged": converged}
-        return rows
+        write_all(output.parent, {output.name: format_pose_csv(table)})
+    if request.json:
+        files = {} if output is None else {"table": str(output)}
+        print_json(encode_poses(request.problem, table, offences, files))
+    elif output is not None:
+        print(f"table {output}")
+    elif csv is not None:
+        print(format_pose_csv(table), end="")
+    else:
+        print(_format_answer(table, request.answer))
 
-    def _columns(self, what: str) -> tuple[tuple[str, ...], tuple[str, ...], Array]:
-        machine = self.machine
-        if what == "pose":
-            return machine.axes, machine.axis_units, self.poses
-        return machine.joints, machine.joint_units, self.joints
 
-    def _named(self, what: str) -> list[dict[str, float]]:
-        names, units, values = self._columns(what)
-        factors = [rim(1.0, unit) for unit in units]
-        return [
-            {name: value * factor for name, value, factor in zip(names, line, factors, strict=True)}
-            for line in values.tolist()
-        ]
-
-    def _csv(self) -> str:
-        (axes, pose_units, poses), (names, joint_units, joints) = self._columns("pose"), self._columns("joints")
-        units = (*pose_units, *joint_units)
-        head = [f"{n} [{rim_unit(u)}]" for n, u in zip((*axes, *names), units, strict=True)]
-        form = [(rim(1.0, unit), 8 if unit == "rad" else 6) for unit in units]
-        residuals: list[float] = []
-        if self.solution is not None:
-            residuals = self.solution.residual.tolist()
-            head.append("residual [mm]")
-        lines = [",".join([*head, "broken"])]
-        for i, (pose, joint, verdict) in enumerate(zip(poses.tolist(), joints.tolist(), self.verdicts, strict=True)):
-            cells = zip((*pose, *joint), form, strict=True)
-            texts = ["" if value != value else fixed(value * factor, digits, "") for value, (factor, digits) in cells]
-            texts += [f"{residual:.1e}" for residual in residuals[i : i + 1]]
-            lines.append(",".join([*texts, verdict]))
-        return "\n".join(lines) + "\n"
+def _format_answer(table: PoseTable, answer: Side) -> str:
+    """Format the answer for a single row."""
+    names, units, values = table.columns(answer)
+    cells = [
+        (name, "-" if value != value else format_fixed(to_display(value, unit), 6), display_unit(unit))
+        for name, unit, value in zip(names, units, values[0].tolist(), strict=True)
+    ]
+    text = format_table(cells, (answer, "", ""), " r")
+    solution = table.solution
+    if solution is not None and solution.converged[0]:
+        text += f"\n\nconverged in {solution.steps[0]} steps, residual {solution.residual[0]:.1e} mm"
+    return text

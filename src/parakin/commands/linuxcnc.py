@@ -32,10 +32,10 @@ def linuxcnc(
     """
     machine = machine_of(name, sizes)
     announce_compiling()
-    from ..controllers.linuxcnc import configuration
+    from ..controllers.linuxcnc.configuration import make_linuxcnc_configuration
     from ..export.files import write_all
 
-    files = configuration(machine)
+    files = make_linuxcnc_configuration(machine)
     paths = [str(path) for path in write_all(Path(machine.name) if output is None else output, files)]
     if json:
         print_json({"schema": "parakin.linuxcnc/1", "machine": machine.name, "files": paths})

@@ -2,22 +2,23 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from math import isfinite, radians
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
 from cyclopts import Parameter
 
+from ..controllers import Target, load_controller
 from ..errors import InputError, PoseError
 from .console import Progress, announce_compiling, print_json
 from .options import OFF_LIMITS, Json, Mode, Sizes, machine_names, machine_of
 from .workpiece import parse_bounds, parse_workpiece
 
 if TYPE_CHECKING:
+    from ..arrays import Writer
     from ..export.files import Content
-    from ..machine import Machine
     from ..toolpath.job import Job
-    from ..toolpath.path import ToolPath
-    from ..toolpath.placing.placement import Placement
 
 
 def post(
@@ -28,7 +29,7 @@ def post(
     workpiece: Annotated[str | None, Parameter(allow_leading_hyphen=True)] = None,
     place: Annotated[str | None, Parameter(allow_leading_hyphen=True)] = None,
     mode: Mode = None,
-    target: Literal["linuxcnc", "joints"] | None = None,
+    target: Target | None = None,
     force: Annotated[bool, Parameter(negative=())] = False,
     tolerance: float = 0.01,
     angle_tolerance: float = 0.05,
@@ -75,24 +76,19 @@ def post(
     parquet
         Write the tables as .parquet too.
     """
-    from math import isfinite, radians
-
-    from ..toolpath.posting.frames import compose_frames
-
     chosen = machine_of(machine, sizes)
     if place is not None and workpiece is not None:
         raise InputError("--place finds the workpiece's pose; expected it or --workpiece", "--place")
     frame = None if workpiece is None else parse_workpiece(workpiece)
-    lengths = {"--tolerance": tolerance, "--angle-tolerance": angle_tolerance, "--arc-tolerance": arc_tolerance}
-    for option, value in lengths.items():
-        if not (value > 0.0 and isfinite(value)):
-            unit = "an angle above zero, in degrees" if "angle" in option else "a length above zero, in mm"
-            raise InputError(f"expected {unit}", option)
+    _check_tolerances(tolerance, angle_tolerance, arc_tolerance)
     announce_compiling()
     from ..export.files import write_all
+    from ..export.json.job import encode_job
     from ..toolpath.job import Tolerances, prepare
+    from ..toolpath.placing.placement import find_placement
+    from ..toolpath.posting.frames import compose_frames
     from ..toolpath.reading.detect import read_path
-    from .post_summary import as_json, summary
+    from .post_summary import summarise_job
 
     with Progress() as progress:
         path = read_path(
@@ -101,70 +97,78 @@ def post(
         )  # fmt: skip
         placement = None
         if place is not None:
-            placement = _placement(chosen, path, place, mode, progress)
+            saying = progress.part("placing the part", 0.1, 0.3)
+            placement = find_placement(chosen, path, parse_bounds(place), mode=mode, progress=saying)
             frame, mode = placement.workpiece, placement.mode
         job = prepare(
-            chosen, path, workpiece=frame, mode=mode, target=target or "linuxcnc",
-            tolerances=Tolerances(tolerance, radians(angle_tolerance)), corners=corners,
+            chosen, path, workpiece=frame, mode=mode, tolerances=Tolerances(tolerance, radians(angle_tolerance)),
+            interpolation=load_controller(target).interpolation if target else "pose", corners=corners,
             progress=progress.part("checking and timing", 0.3, 0.7),
         )  # fmt: skip
-        files, missing = _contents(part.stem, job, target, force, rate, parquet, progress)
+        files, missing = _make_files(part.stem, job, _Wanted(target, force, rate, parquet), progress)
         paths = write_all(output, dict(files.values()))
     written = {kind: str(name) for kind, name in zip(files, paths, strict=True)}
     if json:
-        print_json(as_json(job, written, placement, missing))
+        print_json(encode_job(job, placement, missing, written))
     else:
-        print(summary(job, target, written, placement, missing))
+        print(summarise_job(job, target, written, placement, missing))
     return 0 if job.runs and not missing else OFF_LIMITS
 
 
-def _placement(machine: Machine, path: ToolPath, place: str, mode: str | None, progress: Progress) -> Placement:
-    from ..toolpath.placing.placement import find_placement
+def _check_tolerances(tolerance: float, angle_tolerance: float, arc_tolerance: float) -> None:
+    lengths = {"--tolerance": tolerance, "--angle-tolerance": angle_tolerance, "--arc-tolerance": arc_tolerance}
+    for option, value in lengths.items():
+        if not (value > 0.0 and isfinite(value)):
+            unit = "an angle above zero, in degrees" if "angle" in option else "a length above zero, in mm"
+            raise InputError(f"expected {unit}", option)
 
-    return find_placement(
-        machine, path, parse_bounds(place), mode=mode, progress=progress.part("placing the part", 0.1, 0.3)
-    )
+
+@dataclass(frozen=True)
+class _Wanted:
+    """The options that say which files to write besides the joint table and the report."""
+
+    target: Target | None
+    force: bool
+    rate: float | None
+    parquet: bool
 
 
-def _contents(
-    stem: str,
-    job: Job,
-    target: str | None,
-    force: bool,
-    rate: float | None,
-    parquet: bool,
-    progress: Progress,
+def _make_files(
+    stem: str, job: Job, wanted: _Wanted, progress: Progress
 ) -> tuple[dict[str, tuple[str, Content]], list[str]]:
-    """The files by their kinds, with their names; and why some that were asked for are not among them."""
-    from ..export.report.report import report_html
+    """Make the files by their kinds, with their names; and tell why some that are wanted are not among them."""
+    from ..export.report.report import render_report
     from ..export.tables import joints as joint_table
     from ..export.tables import setpoints as setpoint_table
 
     posted, trajectory, missing = job.posted, job.trajectory, list[str]()
     saying = progress.part("writing the tables", 0.7, 0.9)
-    files: dict[str, tuple[str, Content]] = {"table": (f"{stem}.joints.csv", joint_table.csv_writer(posted, saying))}
-    if parquet:
-        files["parquet"] = (f"{stem}.joints.parquet", joint_table.parquet_writer(posted, saying))
-    if rate is not None:
+    files: dict[str, tuple[str, Content]] = {
+        "table": (f"{stem}.joints.csv", joint_table.make_joint_csv(posted, saying))
+    }
+    if wanted.parquet:
+        files["parquet"] = (f"{stem}.joints.parquet", joint_table.make_joint_parquet(posted, saying))
+    if wanted.rate is not None:
         if trajectory is None:
             missing.append(f"no setpoints: {job.unplanned}")
         else:
             saying = progress.part("writing the setpoints", 0.9, 1.0)
-            files["setpoints"] = (f"{stem}.setpoints.csv", setpoint_table.setpoints_csv(trajectory, rate, saying))
-            if parquet:
-                writer = setpoint_table.setpoints_parquet(trajectory, rate, saying)
-                files["setpoints-parquet"] = (f"{stem}.setpoints.parquet", writer)
-    if target is not None:
+            content = setpoint_table.make_setpoint_csv(trajectory, wanted.rate, saying)
+            files["setpoints"] = (f"{stem}.setpoints.csv", content)
+            if wanted.parquet:
+                content = setpoint_table.make_setpoint_parquet(trajectory, wanted.rate, saying)
+                files["setpoints-parquet"] = (f"{stem}.setpoints.parquet", content)
+    if wanted.target is not None:
+        suffix = load_controller(wanted.target).suffix
         try:
-            files["program"] = (f"{stem}.{target}.ngc", _program(job, target, force))
+            files["program"] = (f"{stem}.{wanted.target}{suffix}", _make_program(job, wanted.target, wanted.force))
         except PoseError as error:
             missing.append(f"no program: {error}")
-    files["report"] = (f"{stem}.report.html", report_html(posted, trajectory, job.unplanned, job.waits))
+    files["report"] = (f"{stem}.report.html", render_report(posted, trajectory, job.unplanned, job.waits))
     return files, missing
 
 
-def _program(job: Job, target: str, force: bool) -> Content:
-    from ..controllers import joint_program, linuxcnc_program
+def _make_program(job: Job, target: Target, force: bool) -> Writer:
     from ..toolpath.posting.offences import describe_place
 
     posted = job.posted
@@ -173,6 +177,4 @@ def _program(job: Job, target: str, force: bool) -> Content:
     if job.trajectory is None:
         raise PoseError(job.unplanned)
     broken = "\n".join(f"{describe_place(posted, offence)}: {offence.text}" for offence in posted.offences)
-    if target == "joints":
-        return joint_program(job.trajectory, forced=broken or None)
-    return linuxcnc_program(job.trajectory, forced=broken or None, tolerance=job.corner_tolerance)
+    return load_controller(target).make_program(job.trajectory, broken or None, job.corner_tolerance)

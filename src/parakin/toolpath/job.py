@@ -17,7 +17,7 @@ from .posting.posted import Posted
 from .timing import Corners, Trajectory, plan_trajectory
 from .timing.stops import find_stops, sum_dwells
 
-Target: TypeAlias = Literal["linuxcnc", "joints"]  # moves the tool straight; moves every joint evenly
+Interpolation: TypeAlias = Literal["pose", "joints"]  # what a controller moves evenly between two records
 
 
 class Tolerances(NamedTuple):
@@ -76,7 +76,7 @@ def prepare(
     *,
     workpiece: Array | None = None,
     mode: str | None = None,
-    target: Target = "linuxcnc",
+    interpolation: Interpolation = "pose",
     tolerances: Tolerances = Tolerances(),  # noqa: B008  it never changes
     corners: Corners = "round",
     progress: Progress | None = None,
@@ -86,7 +86,7 @@ def prepare(
     Parameters
     ----------
     machine, path, workpiece, mode : as for :func:`~.posting.post.post_path`
-    target : what the controller interpolates: ``linuxcnc`` the tool's pose, ``joints`` the joints
+    interpolation : what the controller moves evenly between two records, the tool's ``pose`` or the ``joints``
     tolerances : of tip and axis about the programmed path; half of each is for the controller's interpolation, half for
         rounding corners
     corners : ``round`` or ``stop``, as for :func:`~.timing.plan.plan_trajectory`
@@ -103,12 +103,12 @@ def prepare(
     half = tolerances.halve()
     programmed = post_path(machine, path, workpiece=workpiece, mode=mode, progress=report_part(0.0, 0.1))
     posted, trajectory, unplanned = programmed, None, ""
-    # The pose's angles change evenly under either target, as the trajectory has them, and the tip is on its line by
+    # The pose's angles change evenly in either case, as the trajectory has them, and the tip is on its line by
     # then: two steps share the tolerance of the axis.
-    lean = half.axis / (1 if target == "linuxcnc" else 2)
+    lean = half.axis / (1 if interpolation == "pose" else 2)
     try:
         posted = linearise_path(posted, "pose", chord=half.tip, angle=lean, progress=report_part(0.1, 0.2))
-        if target == "joints":
+        if interpolation == "joints":
             posted = linearise_path(posted, "joints", chord=half.tip, angle=lean, progress=report_part(0.2, 0.4))
     except PoseError as error:
         unplanned = str(error)

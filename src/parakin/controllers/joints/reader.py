@@ -1,4 +1,4 @@
-"""Programs in joint space, read back."""
+"""Read programs in joint space back."""
 
 from __future__ import annotations
 
@@ -7,10 +7,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...arrays import Array, Indices
 from ...errors import InputError
-from ...toolpath.path import Floats
 from ...toolpath.reading.gcode.block import VALUES, Block, parse_block
 from ...toolpath.reading.gcode.codes import format_g_code
 from .program import LINEAR, TURNING
@@ -32,13 +31,13 @@ class JointProgram:
     """
 
     letters: tuple[str, ...]
-    joints: Floats
-    seconds: Floats
-    line: NDArray[np.int64]
+    joints: Array
+    seconds: Array
+    line: Indices
 
 
 def read_joint_program(path: str | os.PathLike[str]) -> JointProgram:
-    """Read what :func:`.joint_program` writes: G1 in G21, G90 and G93, each with a value for every joint.
+    """Read what :func:`.make_joint_program` writes: G1 in G21, G90 and G93, each with a value for every joint.
 
     Raises :class:`InputError` with file and line for everything else.
     """
@@ -49,10 +48,10 @@ def read_joint_program(path: str | os.PathLike[str]) -> JointProgram:
         raise InputError(f"cannot be read: {error.strerror}", source) from error
     except UnicodeDecodeError as error:
         raise InputError("expected plain text", source) from error
-    reader = _Reader()
+    reader = _JointProgramReader()
     for number, line in enumerate(text.split("\n"), 1):
         try:
-            reader.take(parse_block(line.strip(" \t\r"), VALUES + "UVW"), number)
+            reader.read_block(parse_block(line.strip(" \t\r"), VALUES + "UVW"), number)
         except InputError as error:
             raise InputError(error.message, source, number) from error
     if not reader.rows:
@@ -62,7 +61,9 @@ def read_joint_program(path: str | os.PathLike[str]) -> JointProgram:
     return JointProgram(letters, joints, np.array(reader.seconds), np.array(reader.lines, np.int64))
 
 
-class _Reader:
+class _JointProgramReader:
+    """Take a program's blocks one by one; errors carry no place."""
+
     def __init__(self) -> None:
         self.letters: set[str] = set()
         self.rows: list[dict[str, float]] = []
@@ -71,16 +72,15 @@ class _Reader:
         self.stated: set[str] = set()
         self.ended = False
 
-    def take(self, block: Block, line: int) -> None:
-        """One line; errors carry no place."""
+    def read_block(self, block: Block, line: int) -> None:
         values = block.values
         if self.ended and (values or block.g or block.m):
             raise InputError("a block after the program's end")
         for group, code in block.g.items():
-            self._mode(group, code)
+            self._set_mode(group, code)
         row = {letter: values.pop(letter) for letter in _LETTERS if letter in values}
         if row:
-            self._move(row, block, line)
+            self._add_motion(row, block, line)
         values.pop("S", None)
         if block.g.get("once") == _DWELL:
             values.pop("P", None)
@@ -88,12 +88,12 @@ class _Reader:
             raise InputError(f"{letter}{value:g}: no code of this block uses it")
         self.ended = block.m.get("stop") in (2, 30)
 
-    def _mode(self, group: str, code: int) -> None:
+    def _set_mode(self, group: str, code: int) -> None:
         self.stated.add(group)
         if code not in (_MODES.get(group), _DWELL if group == "once" else _STRAIGHT if group == "motion" else None):
             raise InputError(f"{format_g_code(code)}: not of a program in joint space; expected G1 in G21, G90 and G93")
 
-    def _move(self, row: dict[str, float], block: Block, line: int) -> None:
+    def _add_motion(self, row: dict[str, float], block: Block, line: int) -> None:
         for group, name in _STATED.items():
             if group not in self.stated:
                 raise InputError(f"a motion before {name}")

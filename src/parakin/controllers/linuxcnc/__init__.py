@@ -1,27 +1,13 @@
-"""A machine as a LinuxCNC configuration: its kinematics in C, and the files that LinuxCNC starts with."""
+"""LinuxCNC: kinematics in C, the configuration that it starts with, and programs."""
 
-from __future__ import annotations
+from ..controller import Controller
+from .program import make_linuxcnc_program, predict_linuxcnc_seconds
 
-from ...machine import Machine
-from .config import hal, ini, tool_table
-from .first_program import write_first_program
-from .module import kinematics_name, write_module
-from .page import write_page
-
-__all__ = ["configuration"]
-
-
-def configuration(machine: Machine) -> dict[str, str]:
-    """{file: text} of a configuration for LinuxCNC 2.9 that runs as a simulation.
-
-    The kinematics module (C, built by LinuxCNC's ``halcompile --install``), the ini and HAL files, the tool table, a
-    first program and a page that tells how to start, all named after the machine.
-    """
-    return {
-        f"{kinematics_name(machine)}.c": write_module(machine),
-        f"{machine.name}.ini": ini(machine),
-        f"{machine.name}.hal": hal(machine),
-        f"{machine.name}.tbl": tool_table(machine),
-        f"{machine.name}.ngc": write_first_program(machine),
-        f"{machine.name}.md": write_page(machine),
-    }
+CONTROLLER = Controller(
+    title="LinuxCNC",
+    interpolation="pose",
+    make_program=lambda trajectory, forced, tolerance: make_linuxcnc_program(
+        trajectory, forced=forced, tolerance=tolerance
+    ),
+    predict_seconds=predict_linuxcnc_seconds,
+)

@@ -1,15 +1,16 @@
-"""The files that tell LinuxCNC of a machine: ini, HAL for a simulation, tool table."""
+"""Write the files that describe a machine to LinuxCNC: ini, HAL for a simulation, tool table."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from math import degrees, isfinite
+from math import isfinite
 
 from ...machine import Machine
 from ...model.parts import Drive
-from .extent import extent
-from .module import kinematics_name, made
-from .rates import ACCELERATION, SPEED, of_axes, slowest
+from ...units import to_display
+from .axis_ranges import estimate_axis_ranges
+from .axis_rates import ACCELERATION, SPEED, choose_unit_rates, find_slowest_drive
+from .module import hash_kinematics, kinematics_name
 
 _LAG = 0.01  # s: following error allowed, as time at full speed; the simulation lags by 0.001 s or two
 
@@ -95,9 +96,9 @@ net tool-change iocontrol.0.tool-change => iocontrol.0.tool-changed
 """
 
 
-def ini(machine: Machine) -> str:
-    """The ini file."""
-    (fast, acceleration), turning = of_axes(machine, "mm"), slowest(machine, "rad")[0]
+def write_ini(machine: Machine) -> str:
+    """Write the ini file."""
+    (fast, acceleration), turning = choose_unit_rates(machine, "mm"), find_slowest_drive(machine, "rad")[0]
     home = dict(zip(machine.axes, machine.home.tolist(), strict=True))
     head = _INI.format(
         title=" ".join(machine.spec.title.split()),
@@ -106,80 +107,77 @@ def ini(machine: Machine) -> str:
         letters="".join(machine.axes),
         joints=len(machine.joints),
         kinematics=kinematics_name(machine),
-        home=" ".join(number(home.get(axis, 0.0)) for axis in "XYZ"),
-        jog=number(0.25 * fast),
-        fast=number(fast),
-        turn_jog=number(rim(0.25 * turning, "rad")),
-        turn_fast=number(rim(turning, "rad")),
-        acceleration=number(acceleration),
+        home=" ".join(format_number(home.get(axis, 0.0)) for axis in "XYZ"),
+        jog=format_number(0.25 * fast),
+        fast=format_number(fast),
+        turn_jog=format_number(to_display(0.25 * turning, "rad")),
+        turn_fast=format_number(to_display(turning, "rad")),
+        acceleration=format_number(acceleration),
     )
-    low, high = (ends.tolist() for ends in extent(machine))
+    low, high = (ends.tolist() for ends in estimate_axis_ranges(machine))
     axes = [
-        _section(f"AXIS_{axis}", [*_range(a, b, unit), *_rates(*of_axes(machine, unit), unit)])
+        _format_section(
+            f"AXIS_{axis}", [*_format_range(a, b, unit), *_format_rates(*choose_unit_rates(machine, unit), unit)]
+        )
         for axis, unit, a, b in zip(machine.axes, machine.axis_units, low, high, strict=True)
     ]
     at_home = machine.inverse(machine.home).tolist()
-    joints = [_joint(i, drive, q) for i, (drive, q) in enumerate(zip(machine.drives, at_home, strict=True))]
+    joints = [_format_joint(i, drive, q) for i, (drive, q) in enumerate(zip(machine.drives, at_home, strict=True))]
     return "\n".join([head, *axes, *joints])
 
 
-def rim(value: float, unit: str) -> float:
-    """mm stay, rad become degrees."""
-    return degrees(value) if unit == "rad" else value
-
-
-def number(value: float) -> str:
-    """Nine digits after the point at most: a nanometre's thousandth."""
+def format_number(value: float) -> str:
+    """Format with nine digits after the point at most, a thousandth of a nanometre."""
     text = f"{value:.9f}".rstrip("0").rstrip(".")
     return "0" if text == "-0" else text
 
 
-def _section(name: str, lines: Iterable[str]) -> str:
+def _format_section(name: str, lines: Iterable[str]) -> str:
     return "\n".join([f"[{name}]", *lines, ""])
 
 
-def _range(low: float, high: float, unit: str) -> Iterator[str]:
-    yield f"MIN_LIMIT = {number(rim(low, unit))}"
-    yield f"MAX_LIMIT = {number(rim(high, unit))}"
+def _format_range(low: float, high: float, unit: str) -> Iterator[str]:
+    yield f"MIN_LIMIT = {format_number(to_display(low, unit))}"
+    yield f"MAX_LIMIT = {format_number(to_display(high, unit))}"
 
 
-def _rates(speed: float, acceleration: float, unit: str) -> Iterator[str]:
-    yield f"MAX_VELOCITY = {number(rim(speed, unit))}"
-    yield f"MAX_ACCELERATION = {number(rim(acceleration, unit))}"
+def _format_rates(speed: float, acceleration: float, unit: str) -> Iterator[str]:
+    yield f"MAX_VELOCITY = {format_number(to_display(speed, unit))}"
+    yield f"MAX_ACCELERATION = {format_number(to_display(acceleration, unit))}"
 
 
-def _joint(index: int, drive: Drive, home: float) -> str:
+def _format_joint(index: int, drive: Drive, home: float) -> str:
     unit = drive.unit
     missing = [what for what in ("speed", "acceleration") if not isfinite(getattr(drive, what))]
     speed = drive.speed if isfinite(drive.speed) else SPEED[unit]
     acceleration = drive.acceleration if isfinite(drive.acceleration) else ACCELERATION[unit]
-    lag = rim(_LAG * speed, unit)
+    lag = to_display(_LAG * speed, unit)
     lines = [
         f"# {drive.name}",
         f"TYPE = {'ANGULAR' if unit == 'rad' else 'LINEAR'}",
-        *_range(drive.low, drive.high, unit),
+        *_format_range(drive.low, drive.high, unit),
         *([f"# chosen, for the machine's description does not say it: {' and '.join(missing)}"] if missing else []),
-        *_rates(speed, acceleration, unit),
-        f"FERROR = {number(lag)}",
-        f"MIN_FERROR = {number(0.1 * lag)}",
-        f"HOME = {number(rim(home, unit))}",
-        f"HOME_OFFSET = {number(rim(home, unit))}",
+        *_format_rates(speed, acceleration, unit),
+        f"FERROR = {format_number(lag)}",
+        f"MIN_FERROR = {format_number(0.1 * lag)}",
+        f"HOME = {format_number(to_display(home, unit))}",
+        f"HOME_OFFSET = {format_number(to_display(home, unit))}",
         "HOME_SEARCH_VEL = 0",
         "HOME_LATCH_VEL = 0",
         "HOME_SEQUENCE = 0",
     ]
-    return _section(f"JOINT_{index}", lines)
+    return _format_section(f"JOINT_{index}", lines)
 
 
-def hal(machine: Machine) -> str:
-    """The HAL file of a simulation: every joint is at once where it is sent."""
+def write_hal(machine: Machine) -> str:
+    """Write the HAL file of a simulation: every joint is at once where it is sent."""
     loops = [
         f"net joint-{i} joint.{i}.motor-pos-cmd => joint.{i}.motor-pos-fb  # {name}"
         for i, name in enumerate(machine.joints)
     ]
-    return _HAL.format(name=machine.name, made=made(machine), loops="\n".join(loops))
+    return _HAL.format(name=machine.name, made=hash_kinematics(machine), loops="\n".join(loops))
 
 
-def tool_table(machine: Machine) -> str:
-    """One tool, whose length the machine's description has already."""
+def write_tool_table(machine: Machine) -> str:
+    """Write the tool table: one tool, whose length the machine's description has already."""
     return f"T1 P1 Z0 D0 ;the tool of {machine.name}, whose length the kinematics knows\n"

@@ -1,4 +1,4 @@
-"""A first program: a square at home."""
+"""Write a first program: a square at home."""
 
 from __future__ import annotations
 
@@ -9,31 +9,32 @@ import numpy as np
 
 from ...arrays import Array
 from ...machine import Machine
-from .config import number, rim
+from ...units import to_display
+from .config import format_number
 
 _SIDE = 40.0  # mm: the square's side, halved until the machine can go round it
-_LEAST = 0.1
+_LEAST = 0.1  # mm
 _CORNERS = ((0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0), (0.0, 0.0))
-_TILT = pi / 12.0  # of a tool on a wrist, whose pole the square would else go round or through
-_POINTS = 50  # of a side that are looked at
+_TILT = pi / 12.0  # rad, of a tool on a wrist, whose pole the square would else go round or through
+_POINTS = 50  # of a side that are checked
 _FEED = 3000.0  # mm/min
 
 
 def write_first_program(machine: Machine) -> str:
-    """G-code that the machine can run as soon as it is homed; what LinuxCNC opens by itself lies out of its reach."""
-    square = _square(machine)
+    """Write G-code that the machine can run once it is homed; what LinuxCNC opens by itself lies out of its reach."""
+    words = groupby(_format_words(machine, pose) for pose in _find_square(machine))
     lines = [
         f"( {machine.name}: a square at home )",
         "G21 G90 G94 G61 G49 G54",
-        *(f"G1 {words} F{number(_FEED)}" for words, _ in groupby(_words(machine, pose) for pose in square)),
+        *(f"G1 {pose} F{format_number(_FEED)}" for pose, _ in words),
         "M2",
         "",
     ]
     return "\n".join(lines)
 
 
-def _square(machine: Machine) -> Array:
-    """Home, the corners of the largest square with a corner there, and home, (n, axes); home alone if none is."""
+def _find_square(machine: Machine) -> Array:
+    """Find the largest square with a corner at home; return home, its corners, and home, (n, axes), or home alone."""
     side = _SIDE
     while side >= _LEAST:
         for quadrant in product((1.0, -1.0), repeat=2):
@@ -41,20 +42,20 @@ def _square(machine: Machine) -> Array:
             corners[:, :2] += side * np.array(quadrant) * _CORNERS
             if machine.wrist is not None:
                 corners[:, machine.axes.index("B")] += _TILT
-            way = np.concatenate([machine.home[None], corners, machine.home[None]])
-            if _goes(machine, way):
-                return way
+            poses = np.concatenate([machine.home[None], corners, machine.home[None]])
+            if _is_allowed(machine, poses):
+                return poses
         side *= 0.5
     return machine.home[None, :]
 
 
-def _goes(machine: Machine, way: Array) -> bool:
-    """Whether every limit is kept on the way, by joints that count their turns."""
+def _is_allowed(machine: Machine, poses: Array) -> bool:
+    """Whether every limit is kept on the way from pose to pose, by joints that count their turns."""
     share = np.linspace(0.0, 1.0, _POINTS)[:, None, None]
-    between = (way[:-1] + share * np.diff(way, axis=0)).swapaxes(0, 1).reshape(-1, len(machine.axes))
+    between = (poses[:-1] + share * np.diff(poses, axis=0)).swapaxes(0, 1).reshape(-1, len(machine.axes))
     return not machine.check(between, machine.follow(between)).any()
 
 
-def _words(machine: Machine, pose: Array) -> str:
+def _format_words(machine: Machine, pose: Array) -> str:
     values = zip(machine.axes, pose.tolist(), machine.axis_units, strict=True)
-    return " ".join(f"{axis}{number(rim(value, unit))}" for axis, value, unit in values)
+    return " ".join(f"{axis}{format_number(to_display(value, unit))}" for axis, value, unit in values)

@@ -1,4 +1,4 @@
-"""The kinematics module: a machine's mathematics as C, with the runtime that LinuxCNC calls."""
+"""Write the kinematics module: a machine's mathematics as C, with the runtime that LinuxCNC calls."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from ...kinematics.forward import MOST_STEPS
 from ...kinematics.wrist import EXACT, GAIN, SWING, TURN
 from ...machine import Machine
 from ...model.limits import Limit
-from .tape_to_c import Vector, function, number, test
+from .tape_to_c import CVector, to_c, write_function, write_test
 
 _SAME = 0.01
 _FIELDS = {"X": "tran.x", "Y": "tran.y", "Z": "tran.z", "A": "a", "B": "b", "C": "c"}
@@ -55,31 +55,35 @@ def kinematics_name(machine: Machine) -> str:
 
 
 def write_module(machine: Machine) -> str:
-    """The C source of a machine's kinematics module, complete in one file."""
+    """Write the C source of a machine's kinematics module, complete in one file."""
     name = kinematics_name(machine)
     title = " ".join(machine.spec.title.split()).replace("*/", "* /")
     head = _HEADER.format(name=name, machine=machine.name, title=title)
     return "\n".join(
-        [head, f'#define MADE "{made(machine)}" /* what the configuration of the same making names */', *_body(machine)]
+        [
+            head,
+            f'#define MADE "{hash_kinematics(machine)}" /* what the configuration of the same making names */',
+            *_write_body(machine),
+        ]
     )
 
 
-def made(machine: Machine) -> str:
-    """A mark of a machine's kinematics, by which a module of an older description is known."""
-    return sha256("\n".join(_body(machine)).encode()).hexdigest()[:16]
+def hash_kinematics(machine: Machine) -> str:
+    """Hash a machine's kinematics, so that a module of an older description is recognised."""
+    return sha256("\n".join(_write_body(machine)).encode()).hexdigest()[:16]
 
 
-def _body(machine: Machine) -> list[str]:
+def _write_body(machine: Machine) -> list[str]:
     runtime = files(__package__).joinpath("runtime.c").read_text(encoding="utf-8")
     for name, value in {"SWING": SWING / TURN, "GAIN": GAIN}.items():
-        runtime = runtime.replace(f"@{name}@", number(value))
-    numbers = _numbers(machine, kinematics_name(machine))
-    return [numbers, _transfer(machine), _ELEMENTARY, *_mathematics(machine), runtime]
+        runtime = runtime.replace(f"@{name}@", to_c(value))
+    numbers = _write_numbers(machine, kinematics_name(machine))
+    return [numbers, _write_transfer(machine), _ELEMENTARY, *_write_mathematics(machine), runtime]
 
 
-def _numbers(machine: Machine, name: str) -> str:
-    """The sizes of everything, and the constants of the method; mm and rad."""
-    by_spheres, open_by = int(machine.has_closed_forward), number(machine.closure_tolerance)
+def _write_numbers(machine: Machine, name: str) -> str:
+    """Write the sizes of everything, and the constants of the method; mm and rad."""
+    by_spheres, open_by = int(machine.has_closed_forward), to_c(machine.closure_tolerance)
     lines = [
         f'#define MODULE "{name}"',
         f"#define AXES {len(machine.axes)}",
@@ -88,69 +92,71 @@ def _numbers(machine: Machine, name: str) -> str:
         f"#define SPHERES {by_spheres} /* the forward in closed form: the common point of spheres */",
         f"#define WRIST {int(machine.wrist is not None)} /* two turning joints point the tool */",
         f"#define TOOL_AXIS {int(machine.has_direction)} /* of the orientation only the tool's axis counts */",
-        f"#define LEG_MODES {_leg_modes(machine)} /* choices of the legs' inverse */",
-        f"#define SAME {number(_SAME)} /* mm or rad: joints nearer to each other stand in one working mode */",
-        f"#define TURN {number(TURN)}",
-        f"#define DEGREE {number(np.pi / 180.0)}",
-        f"#define FREE {number(EXACT)} /* rad: nearer to a turning axis the tool's tells its angle by rounding only */",
+        f"#define LEG_MODES {_count_leg_modes(machine)} /* choices of the legs' inverse */",
+        f"#define SAME {to_c(_SAME)} /* mm or rad: joints nearer to each other stand in one working mode */",
+        f"#define TURN {to_c(TURN)}",
+        f"#define DEGREE {to_c(np.pi / 180.0)}",
+        f"#define FREE {to_c(EXACT)} /* rad: nearer to a turning axis the tool's tells its angle by rounding only */",
         f"#define TOLERANCE {open_by} /* mm by which the legs of an answer may fail to close */",
-        *_wrist(machine),
-        *_newton(machine),
-        _array("double", "home", [number(value) for value in machine.home]),
-        _array("int", "turning", [str(int(unit == "rad")) for unit in machine.joint_units]),
+        *_write_wrist(machine),
+        *_write_newton(machine),
+        _write_array("double", "home", [to_c(value) for value in machine.home]),
+        _write_array("int", "turning", [str(int(unit == "rad")) for unit in machine.joint_units]),
     ]
     if not machine.has_direction:
-        lines.append(_array("int", "turning_axis", [str(int(unit == "rad")) for unit in machine.axis_units]))
+        lines.append(_write_array("int", "turning_axis", [str(int(unit == "rad")) for unit in machine.axis_units]))
     return "\n".join(lines) + "\n"
 
 
-def _leg_modes(machine: Machine) -> int:
+def _count_leg_modes(machine: Machine) -> int:
     return len(machine.mode) - (machine.wrist is not None)
 
 
-def _array(kind: str, name: str, values: Sequence[str]) -> str:
+def _write_array(kind: str, name: str, values: Sequence[str]) -> str:
     return f"static const {kind} {name}[] = {{{', '.join(values)}}};"
 
 
-def _wrist(machine: Machine) -> Iterator[str]:
+def _write_wrist(machine: Machine) -> Iterator[str]:
     wrist = machine.wrist
     if wrist is not None:
         yield f"#define FIRST {wrist.first} /* the wrist's joints, as its axes follow on each other */"
         yield f"#define SECOND {wrist.second}"
-        yield f"#define SECOND_LOW {number(wrist.drive.low)}"
-        yield f"#define SECOND_HIGH {number(wrist.drive.high)}"
+        yield f"#define SECOND_LOW {to_c(wrist.drive.low)}"
+        yield f"#define SECOND_HIGH {to_c(wrist.drive.high)}"
 
 
-def _newton(machine: Machine) -> Iterator[str]:
+def _write_newton(machine: Machine) -> Iterator[str]:
     tapes = machine.tapes(machine.mode)
     if tapes.newton is not None:
         least, most = min(machine.leg_sizes), max(machine.leg_sizes)
         side = float(np.sign(machine.sides(machine.home[None, :])[0]))
-        yield f"#define FINE {number(0.01 * machine.closure_tolerance)} /* mm: where Newton's method has arrived */"
-        yield f"#define SIZE {number(least)} /* of the legs, mm */"
-        yield f"#define WORTH {number(WORTH)} /* mm: where a step will end no worse than this, the matrix serves on */"
-        yield f"#define SLOW {number(SLOW)} /* a kept matrix that gains less than this a step is made anew */"
+        yield f"#define FINE {to_c(0.01 * machine.closure_tolerance)} /* mm: where Newton's method has arrived */"
+        yield f"#define SIZE {to_c(least)} /* of the legs, mm */"
+        yield f"#define WORTH {to_c(WORTH)} /* mm: where a step will end no worse than this, the matrix serves on */"
+        yield f"#define SLOW {to_c(SLOW)} /* a kept matrix that gains less than this a step is made anew */"
         yield f"#define MOST_STEPS {MOST_STEPS}"
-        yield f"#define HOME_SIDE {number(side)} /* of the singularities; on the other one is another assembly */"
+        yield f"#define HOME_SIDE {to_c(side)} /* of the singularities; on the other one is another assembly */"
         caps = [most / 3.0 if word.startswith("t") else 0.5 for word in tapes.coordinates]
-        yield _array("double", "caps", [number(cap) for cap in caps]) + " /* greatest step */"
+        yield _write_array("double", "caps", [to_c(cap) for cap in caps]) + " /* greatest step */"
 
 
-def _transfer(machine: Machine) -> str:
-    """Poses and joints between LinuxCNC's millimetres and degrees and the mathematics' millimetres and radians."""
+def _write_transfer(machine: Machine) -> str:
+    """Write the conversions of poses and joints between LinuxCNC's mm and degrees and the mathematics' mm and rad."""
     axes = list(zip((_FIELDS[axis] for axis in machine.axes), machine.axis_units, strict=True))
     joints = list(enumerate(machine.joint_units))
     idle = [field for field in _FIELDS.values() if field not in dict(axes)]
     bodies = {
         "read_pose(const EmcPose *world, double *x)": [
-            f"x[{i}] = world->{field}{_inward(unit)};" for i, (field, unit) in enumerate(axes)
+            f"x[{i}] = world->{field}{_scale_inward(unit)};" for i, (field, unit) in enumerate(axes)
         ],
         "write_pose(const double *x, EmcPose *world)": [
-            *(f"world->{field} = x[{i}]{_outward(unit)};" for i, (field, unit) in enumerate(axes)),
+            *(f"world->{field} = x[{i}]{_scale_outward(unit)};" for i, (field, unit) in enumerate(axes)),
             *(f"world->{field} = 0.0;" for field in [*idle, "u", "v", "w"]),
         ],
-        "read_joints(const double *joints, double *q)": [f"q[{i}] = joints[{i}]{_inward(u)};" for i, u in joints],
-        "write_joints(const double *q, double *joints)": [f"joints[{i}] = q[{i}]{_outward(u)};" for i, u in joints],
+        "read_joints(const double *joints, double *q)": [f"q[{i}] = joints[{i}]{_scale_inward(u)};" for i, u in joints],
+        "write_joints(const double *q, double *joints)": [
+            f"joints[{i}] = q[{i}]{_scale_outward(u)};" for i, u in joints
+        ],
     }
     return "\n".join(
         "\n".join([f"static void {head}", "{", *(f"    {line}" for line in lines), "}", ""])
@@ -158,47 +164,49 @@ def _transfer(machine: Machine) -> str:
     )
 
 
-def _inward(unit: str) -> str:
+def _scale_inward(unit: str) -> str:
     return " * DEGREE" if unit == "rad" else ""
 
 
-def _outward(unit: str) -> str:
+def _scale_outward(unit: str) -> str:
     return " / DEGREE" if unit == "rad" else ""
 
 
-def _mathematics(machine: Machine) -> Iterator[str]:
-    """The machine's tapes as functions, in the order of their use."""
+def _write_mathematics(machine: Machine) -> Iterator[str]:
+    """Yield the machine's tapes as functions, in the order of their use."""
     tapes, wrist = machine.tapes(machine.mode), machine.wrist
-    x, q = Vector("x", len(machine.axes)), Vector("q", len(machine.joints))
-    near, first = Vector("near", len(machine.axes)), Vector("first", 1)
-    f = Vector("f", machine.leg_count)
-    yield function("inverse", tapes.inverse, [x], [q])
+    x, q = CVector("x", len(machine.axes)), CVector("q", len(machine.joints))
+    near, first = CVector("near", len(machine.axes)), CVector("first", 1)
+    f = CVector("f", machine.leg_count)
+    yield write_function("inverse", tapes.inverse, [x], [q])
     if wrist is not None:
-        yield function("freedom", wrist.freedom_tape(), [x], [Vector("lean", 1)])
-        yield function("inverse_held", wrist.first_given_tape(machine.mode), [x, first], [q])
-        yield function("inverse_over", machine.tapes(wrist.other_mode(machine.mode)).inverse, [x], [q])
-    yield test("allowed", _limits_tape(machine), [x, q])
+        yield write_function("freedom", wrist.freedom_tape(), [x], [CVector("lean", 1)])
+        yield write_function("inverse_held", wrist.first_given_tape(machine.mode), [x, first], [q])
+        yield write_function("inverse_over", machine.tapes(wrist.other_mode(machine.mode)).inverse, [x], [q])
+    yield write_test("allowed", _compile_limits(machine), [x, q])
     if tapes.common_point is not None:
-        yield function("common_point", tapes.common_point, [q, near], [x, f])
+        yield write_function("common_point", tapes.common_point, [q, near], [x, f])
     if tapes.newton is not None:
-        y, newton = Vector("y", len(tapes.coordinates)), tapes.newton
-        yield function("begin", newton.begin, [near, q], [y])
-        yield function("closures", newton.closures, [y, q], [f])
-        yield function("closures_and_slopes", newton.closures_and_slopes, [y, q], [f, Vector("a", f.length * y.length)])
-        yield function("end", newton.end, [y, q], [x])
+        y, newton = CVector("y", len(tapes.coordinates)), tapes.newton
+        yield write_function("begin", newton.begin, [near, q], [y])
+        yield write_function("closures", newton.closures, [y, q], [f])
+        yield write_function(
+            "closures_and_slopes", newton.closures_and_slopes, [y, q], [f, CVector("a", f.length * y.length)]
+        )
+        yield write_function("end", newton.end, [y, q], [x])
 
 
-def _limits_tape(machine: Machine) -> Tape:
-    """pose, joints -> every margin but those of the drives' ranges, which LinuxCNC has in its ini file and watches."""
+def _compile_limits(machine: Machine) -> Tape:
+    """Compile pose, joints -> every margin but those of the drives' ranges, which LinuxCNC watches by its ini file."""
     trace = Trace()
     pose = trace.inputs(len(machine.axes))
     joints = trace.inputs(len(machine.joints), len(machine.axes))
     margins = zip(machine.limit_parts, machine.trace_margins(pose, machine.mode, joints), strict=True)
-    watched = [margin for limit, margin in margins if not is_of_a_drive(machine, limit)]
+    watched = [margin for limit, margin in margins if not bounds_drive(machine, limit)]
     return compile_tape(trace, watched, len(pose) + len(joints))
 
 
-def is_of_a_drive(machine: Machine, limit: Limit) -> bool:
+def bounds_drive(machine: Machine, limit: Limit) -> bool:
     """Whether a limit is one end of a drive's range."""
     return limit.side != "reach" and limit.subject in {
         f"{what} {name}" for name in machine.joints for what in ("leg", "joint")

@@ -1,9 +1,10 @@
-"""The page that says how to use a configuration."""
+"""Write the page that says how to use a configuration."""
 
 from __future__ import annotations
 
 from ...machine import Machine
-from .config import number, rim
+from ...units import to_display
+from .config import format_number
 from .module import kinematics_name
 
 _PAGE = """\
@@ -64,16 +65,16 @@ _FRAMES = {
 
 
 def write_page(machine: Machine) -> str:
-    """The page, Markdown."""
+    """Write the page, Markdown."""
     home = zip(machine.axes, machine.home.tolist(), machine.axis_units, strict=True)
-    stands = [f"{axis} {number(rim(value, unit))}" for axis, value, unit in home]
+    words = [f"{axis} {format_number(to_display(value, unit))}" for axis, value, unit in home]
     return _PAGE.format(
         title=" ".join(machine.spec.title.split()),
         name=machine.name,
         kinematics=kinematics_name(machine),
         joints=" ".join(machine.joints),
         axes=" ".join(machine.axes),
-        home=", ".join(stands),
+        home=", ".join(words),
         frame=_FRAMES.get(machine.axes[3:], "the axes are those of the machine's frame"),
         pole=_POLE if machine.wrist is not None else "",
     )

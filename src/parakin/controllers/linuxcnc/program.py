@@ -2,34 +2,31 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterator
 from itertools import pairwise
 from typing import BinaryIO
 
 import numpy as np
 
-from ...arrays import Array
+from ...arrays import Array, Writer
 from ...errors import PoseError
 from ...machine import Machine
 from ...toolpath.timing.corners import check_tolerance
 from ...toolpath.timing.trajectory import Trajectory
-from ..events import comments, spoken
-from ..gcode_blocks import at_the_rim, blocks
-from .approach import approach
-from .extent import TURNS
-from .rates import axis_rates
-from .straight_motions import Motions, motions
+from ..event_lines import format_events
+from ..gcode_text import CHUNK, format_blocks, format_comments, join_lines, to_display
+from .approach import plan_approach
+from .axis_ranges import TURNS
+from .axis_rates import choose_axis_rates
+from .straight_motions import StraightMotions, build_straight_motions
 
-Writer = Callable[[BinaryIO], None]
-
-_CHUNK = 1 << 16  # motions written at a time
 _SLOWEST = 0.11 / 60.0  # mm/s: what is slower LinuxCNC runs at 0.1 mm/min in inverse time
 _INSTANT = 0.002  # s
 _TURNING = 0.4  # of the tolerance: two motions that turn the tool LinuxCNC blends less well than it reckons
 
 
-def linuxcnc_program(trajectory: Trajectory, *, forced: str | None = None, tolerance: float = 0.005) -> Writer:
-    """What writes a trajectory as a program for LinuxCNC 2.9 and the configuration of :func:`..linuxcnc.configuration`.
+def make_linuxcnc_program(trajectory: Trajectory, *, forced: str | None = None, tolerance: float = 0.005) -> Writer:
+    """Make the writer of a trajectory as a program for LinuxCNC 2.9 with :func:`parakin.make_linuxcnc_configuration`.
 
     Parameters
     ----------
@@ -39,7 +36,7 @@ def linuxcnc_program(trajectory: Trajectory, *, forced: str | None = None, toler
 
     Every motion is in the machine's own coordinates (G53), whatever offsets are in force, and in inverse time (G93).
     Records at one place are written once; where the trajectory's speed changes points are added on the straight line.
-    The program begins with a slow motion to the first record and takes :func:`program_seconds` from there.
+    The program begins with a slow motion to the first record and takes :func:`predict_linuxcnc_seconds` from there.
 
     Raises :class:`PoseError` where LinuxCNC's kinematics can't follow: another working mode, or too many turns of C.
     """
@@ -49,20 +46,21 @@ def linuxcnc_program(trajectory: Trajectory, *, forced: str | None = None, toler
     if not machine.mode.startswith(legs):
         raise PoseError(f"mode {posted.mode!r}: LinuxCNC's kinematics of {machine.name} has {machine.mode!r} only")
     _refuse_turns(machine, posted.poses)
-    found = motions(trajectory, *axis_rates(machine))
+    motions = build_straight_motions(trajectory, *choose_axis_rates(machine))
     blend = tolerance * (_TURNING if set(machine.axes) & set("ABC") else 1.0)
-    way = approach(machine, trajectory.curve.corner[0], trajectory.joint_path.joints[0], posted.mode)
+    approach = plan_approach(machine, trajectory.curve.corner[0], trajectory.joint_path.joints[0], posted.mode)
 
     def write(file: BinaryIO) -> None:
-        for text in _program(trajectory, found, way, forced, f"G64 P{blend:g} Q0"):
+        for text in _format_program(trajectory, motions, approach, forced, f"G64 P{blend:g} Q0"):
             file.write(text.encode("ascii"))
 
     return write
 
 
-def program_seconds(trajectory: Trajectory) -> float:
-    """What LinuxCNC takes for a program, s, from the first record on: the trajectory's time and what its axes add."""
-    return float(motions(trajectory, *axis_rates(trajectory.posted.machine)).seconds.sum())
+def predict_linuxcnc_seconds(trajectory: Trajectory) -> float:
+    """Predict what LinuxCNC takes for a program from the first record on, s: the trajectory's time and more."""
+    motions = build_straight_motions(trajectory, *choose_axis_rates(trajectory.posted.machine))
+    return float(motions.seconds.sum())
 
 
 def _refuse_turns(machine: Machine, poses: Array) -> None:
@@ -75,50 +73,54 @@ def _refuse_turns(machine: Machine, poses: Array) -> None:
             )
 
 
-def _program(
-    trajectory: Trajectory, found: Motions, to_first: tuple[Array, Array], forced: str | None, blend: str
+def _format_program(
+    trajectory: Trajectory, motions: StraightMotions, approach: tuple[Array, Array], forced: str | None, blend: str
 ) -> Iterator[str]:
     posted, path = trajectory.posted, trajectory.posted.path
     machine = posted.machine
-    ends = at_the_rim(found.ends, machine.axis_units)
-    way, times = at_the_rim(to_first[0], machine.axis_units), to_first[1]
+    ends = to_display(motions.ends, machine.axis_units)
+    way, times = to_display(approach[0], machine.axis_units), approach[1]
     head = [
         f"{path.source} on {machine.name}, mode {posted.mode}; made by parakin for LinuxCNC",
-        f"{found.seconds.sum():.3f} s from the first record on; {times.sum():.1f} s to it, from wherever the tool is",
+        f"{motions.seconds.sum():.3f} s from the first record on; {times.sum():.1f} s to it, from wherever the tool is",
         f"machine coordinates, {' '.join(machine.axes)} in mm and degrees; F is the inverse of minutes",
         *(f"OFF LIMITS: written with --force: {line}" for line in (forced or "").splitlines()),
     ]
-    yield _lines(line for remark in head for line in comments(remark))
+    yield join_lines(line for remark in head for line in format_comments(remark))
     yield "G21 G90 G17 G40 G49\n"
-    reached = np.searchsorted(found.piece, trajectory.curve.corner_of_record)  # how many motions lead to each record
-    said = spoken(path, [int(reached[event.record - 1]) if event.record else -1 for event in path.events])
-    yield _lines(said.pop(-1, []))
-    yield "G93 G61\n" + blocks("G53 G1 ", machine.axes, way, times) + blend + "\n"
-    stops = np.flatnonzero(found.halt[:-1]).tolist()
+    reached = np.searchsorted(motions.piece, trajectory.curve.corner_of_record)  # how many motions lead to each record
+    events = format_events(path, [int(reached[event.record - 1]) if event.record else -1 for event in path.events])
+    yield join_lines(events.pop(-1, []))
+    yield "G93 G61\n" + format_blocks("G53 G1 ", machine.axes, way, times) + blend + "\n"
+    stops = np.flatnonzero(motions.halt[:-1]).tolist()
     halting = set(stops)
-    breaks = sorted({0, len(ends), *said, *stops, *(at + 1 for at in stops)})
+    breaks = sorted({0, len(ends), *events, *stops, *(at + 1 for at in stops)})
     for begin, end in pairwise([*breaks, len(ends)]):
-        yield _lines(said.get(begin, []))
+        yield join_lines(events.get(begin, []))
         exact = begin in halting
         if exact:
             yield "G61\n"
-        for start in range(begin, end, _CHUNK):
-            part = slice(start, min(start + _CHUNK, end))
+        for start in range(begin, end, CHUNK):
+            chunk = slice(start, min(start + CHUNK, end))
             before = ends[start - 1 : start] if start else way[-1:]
-            yield blocks("G53 G1 ", machine.axes, *_timed(machine, before, ends[part], found.seconds[part]))
+            rows, seconds = split_slow_turns(machine, before, ends[chunk], motions.seconds[chunk])
+            yield format_blocks("G53 G1 ", machine.axes, rows, seconds)
         if exact:
             yield blend + "\n"
     yield "M2\n"
 
 
-def _lines(lines: Iterable[str]) -> str:
-    return "".join(line + "\n" for line in lines)
-
-
-def _timed(machine: Machine, before: Array, ends: Array, seconds: Array) -> tuple[Array, Array]:
-    """Rows in mm and degrees with their times; where the tool's tip all but stands while the tool turns, in two steps.
+def split_slow_turns(machine: Machine, before: Array, ends: Array, seconds: Array) -> tuple[Array, Array]:
+    """Split motions in which the tool turns while its tip all but stands: first the turn, then the tip's motion.
 
     LinuxCNC goes by the tip's speed, and no slower than 0.1 mm/min; a turn by itself goes by its own.
+
+    Parameters
+    ----------
+    before : (1, axes) the row that the first motion starts from, mm and degrees
+    ends, seconds : (k, axes) and (k,) of the motions
+
+    Returns rows and their times.
     """
     linear = np.array([unit == "mm" for unit in machine.axis_units])
     steps = np.abs(np.diff(ends, axis=0, prepend=before))

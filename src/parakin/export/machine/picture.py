@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ...machine import Machine
-from ..ranges import shown
+from ..number_format import format_value
 from .figures import INK, frame_traces, label_trace, machine_traces, page, placed, scene_layout
 from .scene import Points, Scene, scene
 from .solids import LOOKS, solids
@@ -18,7 +18,7 @@ from .solids import LOOKS, solids
 _LIGHT = np.array([0.35, -0.65, 0.70]) / np.linalg.norm([0.35, -0.65, 0.70])
 
 
-def machine_html(machine: Machine, pose: ArrayLike | None = None) -> str:
+def render_machine_html(machine: Machine, pose: ArrayLike | None = None) -> str:
     """A self-contained HTML page with the machine at a pose, (axes,) mm and rad, home by default."""
     drawn = scene(machine, pose)
     size = drawn.size
@@ -31,7 +31,7 @@ def machine_html(machine: Machine, pose: ArrayLike | None = None) -> str:
     layout["showlegend"] = False
     at = machine.home if pose is None else machine.rows(pose, machine.axes, "pose")[0][0]
     rows = "".join(
-        f"<tr><td>{escape(name)}</td><td class=n>{shown(value, unit)}</td></tr>"
+        f"<tr><td>{escape(name)}</td><td class=n>{format_value(value, unit)}</td></tr>"
         for names, units, values in (
             (machine.axes, machine.axis_units, at),
             (machine.joints, machine.joint_units, machine.inverse(at)),
@@ -50,7 +50,7 @@ def machine_html(machine: Machine, pose: ArrayLike | None = None) -> str:
     return page(machine.spec.title or machine.name, body)
 
 
-def machine_png(machine: Machine, pose: ArrayLike | None = None) -> bytes:
+def render_machine_png(machine: Machine, pose: ArrayLike | None = None) -> bytes:
     """A PNG of the machine at a pose, (axes,) mm and rad, home by default; a planar machine in its plane."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure

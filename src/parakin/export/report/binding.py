@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..machine.figures import Figure, Trace, numbers, scene_layout
-from .cards import duration
+from ..number_format import format_duration
 from .path_view import PathView, stroke, telling, tip_points
 from .timing_samples import switches
 
@@ -47,7 +47,7 @@ def percent(share: float) -> str:
 
 
 def _brief(seconds: float) -> str:
-    return duration(seconds) if seconds >= 1.0 else f"{seconds:.2g} s"
+    return format_duration(seconds) if seconds >= 1.0 else f"{seconds:.2g} s"
 
 
 def _breakable(name: str) -> str:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from ...toolpath.posting.range_use import RangeUse
 from ..machine.figures import Figure, Trace, numbers
-from ..ranges import edge
+from ..number_format import format_bound
 from .panels import Panel, stacked
 
 if TYPE_CHECKING:
@@ -107,7 +107,7 @@ def _range(use: RangeUse, scale: float) -> list[float]:
 def _heading(use: RangeUse) -> str:
     limits = "no limits"
     if isfinite(use.low) or isfinite(use.high):
-        low, high = (edge(v, use.unit) if isfinite(v) else "–" for v in (use.low, use.high))
+        low, high = (format_bound(v, use.unit) if isfinite(v) else "–" for v in (use.low, use.high))
         limits = f"limits {low} to {high}"
     return heading(use.name, "°" if use.unit == "rad" else use.unit, limits)
 

@@ -7,8 +7,8 @@ from math import isfinite
 from typing import TYPE_CHECKING
 
 from ...toolpath.posting.range_use import RangeUse
-from ..ranges import edge, shown
-from .cards import card
+from ..number_format import format_bound, format_value
+from .cards import make_card
 
 if TYPE_CHECKING:
     from ...toolpath.posting.posted import Posted
@@ -26,7 +26,7 @@ def range_card(posted: Posted, uses: list[RangeUse]) -> str:
         "<span class=key style='background:var(--bad)'></span>used beyond a limit. At the right the least margin"
         " over the path, and where."
     )
-    return card("Ranges", body, key)
+    return make_card("Ranges", body, key)
 
 
 def _bar(posted: Posted, use: RangeUse) -> str:
@@ -52,15 +52,19 @@ def _bar(posted: Posted, use: RangeUse) -> str:
             pieces.append(stretch("out", max(use.least, use.high), use.most))
     if isfinite(use.margin):
         line = int(posted.path.line[use.record])
-        slack = f"{shown(use.margin, use.unit)} left" if use.margin >= 0.0 else f"{shown(-use.margin, use.unit)} beyond"
+        slack = (
+            f"{format_value(use.margin, use.unit)} left"
+            if use.margin >= 0.0
+            else f"{format_value(-use.margin, use.unit)} beyond"
+        )
         slack += f"<br><small>line {line}</small>"
     else:
         slack = "<small>no limit</small>" if isfinite(use.least) else "<small>never reached</small>"
     lost = f"<br><small>{use.lost:,} can’t be told</small>" if use.lost else ""
     name = escape(use.name).replace(".", ".<wbr>").replace("-", "-<wbr>")
     bad = " bad" if use.margin < 0.0 else ""
-    span = f"{shown(use.least, use.unit).removesuffix(' mm')} … {shown(use.most, use.unit)}"
-    low, high = (edge(v, use.unit) if isfinite(v) else "" for v in (use.low, use.high))
+    span = f"{format_value(use.least, use.unit).removesuffix(' mm')} … {format_value(use.most, use.unit)}"
+    low, high = (format_bound(v, use.unit) if isfinite(v) else "" for v in (use.low, use.high))
     return (
         f"<div class='bar{bad}'><div><b>{name}</b></div><div><div class=scale>{''.join(pieces)}</div>"
         f"<div class=ends><span>{low}</span><span>used {span}</span><span>{high}</span></div></div>"

@@ -11,7 +11,8 @@ import numpy as np
 from ...toolpath.posting.offences import describe_place
 from ...toolpath.posting.range_use import RangeUse, measure_range_use
 from ..machine.figures import page, placed
-from .cards import card, counted, duration
+from ..number_format import format_count, format_duration
+from .cards import make_card
 from .curves import joint_curves
 from .path_view import PathView, path_view
 from .ranges import range_card
@@ -23,7 +24,7 @@ if TYPE_CHECKING:
     from ...toolpath.timing import Trajectory
 
 
-def report_html(posted: Posted, trajectory: Trajectory | None = None, unplanned: str = "", waits: float = 0.0) -> str:
+def render_report(posted: Posted, trajectory: Trajectory | None = None, unplanned: str = "", waits: float = 0.0) -> str:
     """The report as one HTML document: verdict, ranges, path, curves, time by a ``trajectory``, offences, notes, facts.
 
     ``unplanned`` tells why there is no trajectory, ``waits`` how long (s) the program waits besides it.
@@ -52,23 +53,23 @@ def _verdict(posted: Posted, trajectory: Trajectory | None, unplanned: str, wait
         return f"<section class='card verdict bad'>{text}</section>\n"
     time = "" if trajectory is None else f"<p>{cycle_text(trajectory)}</p>"
     if waits:
-        time += f"<p>Besides, the program waits {duration(waits)} by its own words.</p>"
+        time += f"<p>Besides, the program waits {format_duration(waits)} by its own words.</p>"
     if unplanned:
         time += f"<p>No cycle time: {escape(unplanned)}</p>"
     if first is None:
         both = " and the motions between them" if posted.checked else ""
-        text = f"All {counted(len(path), 'record')}{both} stay within every limit of {escape(posted.machine.name)}."
+        text = (
+            f"All {format_count(len(path), 'record')}{both} stay within every limit of {escape(posted.machine.name)}."
+        )
         verdict = "Stays within the limits" if unplanned else "Runs"
         said = f"<strong>{verdict}</strong><p>{text}{_unchecked(posted)}</p>{time}"
         return f"<section class='card verdict'>{said}</section>\n"
-    broken = posted.broken_record_count
-    counts = f"{broken:,} of {counted(len(path), 'record')} off limits ({broken / len(path):.2%})"
-    if posted.broken_motion_count:
-        breaks = "breaks" if posted.broken_motion_count == 1 else "break"
-        counts += (
-            f"; {counted(posted.broken_motion_count, 'motion')} {breaks} a limit that the records at both ends keep"
-        )
-    counts += f"; {counted(len(posted.offences), 'limit')} broken."
+    broken, motions = posted.broken_record_count, posted.broken_motion_count
+    counts = f"{broken:,} of {format_count(len(path), 'record')} off limits ({broken / len(path):.2%})"
+    if motions:
+        breaks = "breaks" if motions == 1 else "break"
+        counts += f"; {format_count(motions, 'motion')} {breaks} a limit that the records at both ends keep"
+    counts += f"; {format_count(len(posted.offences), 'limit')} broken."
     return (
         "<section class='card verdict bad'><strong>Does not run</strong>"
         f"<p class=first>{escape(describe_place(posted, first))}: {escape(first.text)}</p>"
@@ -98,7 +99,7 @@ def _space(posted: Posted, view: PathView) -> str:
         f"<div>{placed('path', view.path, '620px')}<p class=sub>The tool tip’s path, coloured by the least margin of"
         " all limits as a share of half the limit’s range: 0 % is a limit. Rapid motions are dashed.</p></div>"
     )
-    return card("Path in the workspace", f"<div class=two>{left}{right}</div>")
+    return make_card("Path in the workspace", f"<div class=two>{left}{right}</div>")
 
 
 def _curves(posted: Posted, uses: list[RangeUse]) -> str:
@@ -106,4 +107,4 @@ def _curves(posted: Posted, uses: list[RangeUse]) -> str:
     sub = "Limits are dashed; red lies beyond one. "
     if len(posted.path) > 4000:
         sub += "Of every stretch of records the least and the greatest value is drawn, so no extreme is left out."
-    return card("Joints over the path", placed("curves", figure, f"{height}px"), sub)
+    return make_card("Joints over the path", placed("curves", figure, f"{height}px"), sub)

@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ... import __version__
-from ..ranges import shown
-from .cards import card, duration, facts
+from ..number_format import format_duration, format_value
+from .cards import make_card, make_fact_table
 
 if TYPE_CHECKING:
     from ...toolpath.path import ToolPath
@@ -56,11 +56,11 @@ def offence_card(posted: Posted) -> str:
         f"<th class=n>Records{' and motions' if posted.checked else ''}</th><th>The line reads</th></tr>"
     )
     rows = f"{head}{first}<tr><th colspan=5>Every broken limit at its worst</th></tr>{worst}"
-    return card("Offences", f"<div class=wide><table>{rows}</table></div>")
+    return make_card("Offences", f"<div class=wide><table>{rows}</table></div>")
 
 
 def _offence(offence: Offence, text: dict[int, str], count: bool) -> str:
-    beyond, reads = shown(offence.excess, offence.unit), escape(text.get(offence.line, ""))
+    beyond, reads = format_value(offence.excess, offence.unit), escape(text.get(offence.line, ""))
     place = f"{offence.line}<br><small>{on_the_way(offence)}</small>" if offence.share < 1.0 else str(offence.line)
     return (
         f"<tr><td>{place}</td><td>{escape(offence.text)}</td><td class=n>{beyond}</td>"
@@ -82,22 +82,22 @@ def note_card(path: ToolPath) -> str:
     )
     more = len(path.notes) - _NOTES
     tail = f"<p class=sub>{more:,} more notes are not listed.</p>" if more > 0 else ""
-    return card("Notes of the reader", f"<table>{rows}</table>{tail}")
+    return make_card("Notes of the reader", f"<table>{rows}</table>{tail}")
 
 
 def fact_card(posted: Posted) -> str:
     path, machine = posted.path, posted.machine
     steps, rapid = _steps(path), path.rapid[1:]
     seconds, unknown = programmed(path)
-    time = duration(seconds) + " in feed motions, at the programmed feeds"
+    time = format_duration(seconds) + " in feed motions, at the programmed feeds"
     if unknown > 0.0:
-        time += f"; {shown(unknown, 'mm')} without a feed not counted"
+        time += f"; {format_value(unknown, 'mm')} without a feed not counted"
     tool = ", ".join(f"{key.replace('_', ' ')} {value:g}" if isinstance(value, float) else f"{key} {value}"
                      for key, value in path.tool.items())  # fmt: skip
     rows = [
         ("Records", f"{len(path):,}, of them {int(path.rapid.sum()):,} in rapid"),
-        ("Path in feed", shown(float(steps[~rapid].sum()), "mm")),
-        ("Path in rapid", shown(float(steps[rapid].sum()), "mm")),
+        ("Path in feed", format_value(float(steps[~rapid].sum()), "mm")),
+        ("Path in rapid", format_value(float(steps[rapid].sum()), "mm")),
         ("Programmed time", time),
         ("Workpiece in the machine", _placement(posted.frame)),
         ("Machine", f"{machine.spec.title} ({machine.name}): axes {' '.join(machine.axes)}"),
@@ -106,7 +106,7 @@ def fact_card(posted: Posted) -> str:
         ("Tool", tool or "not named"),
         ("Written by", f"parakin {__version__}"),
     ]
-    return card("Facts", facts(rows))
+    return make_card("Facts", make_fact_table(rows))
 
 
 def programmed(path: ToolPath) -> tuple[float, float]:
@@ -128,6 +128,6 @@ def _placement(frame: NDArray[np.float64]) -> str:
     r, origin = frame[:, :3], frame[:, 3]
     b = np.arctan2(-r[2, 0], np.hypot(r[0, 0], r[1, 0]))
     a, c = np.arctan2(r[2, 1], r[2, 2]), np.arctan2(r[1, 0], r[0, 0])
-    parts = [f"{letter} {shown(float(v), 'mm')}" for letter, v in zip("XYZ", origin, strict=True)]
-    parts += [f"{letter} {shown(float(v), 'rad')}" for letter, v in zip("ABC", (a, b, c), strict=True)]
+    parts = [f"{letter} {format_value(float(v), 'mm')}" for letter, v in zip("XYZ", origin, strict=True)]
+    parts += [f"{letter} {format_value(float(v), 'rad')}" for letter, v in zip("ABC", (a, b, c), strict=True)]
     return ", ".join(parts)

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..machine.figures import placed
-from ..ranges import shown
+from ..number_format import format_duration, format_value
 from .binding import bound_path, colours, share_bars
-from .cards import card, duration
+from .cards import make_card
 from .path_view import PathView
 from .tables import programmed
 from .timing_curves import draw_timing_curves
@@ -27,17 +27,18 @@ def cycle_text(trajectory: Trajectory) -> str:
     spans = np.diff(trajectory.times, prepend=0.0)
     cut, rapid = (float(spans[path.rapid == fast].sum()) for fast in (False, True))
     asked, unknown = programmed(path)
-    beside = f"{duration(asked)} at the programmed feeds"
+    beside = f"{format_duration(asked)} at the programmed feeds"
     if unknown > 0.0:
-        beside += f", {shown(unknown, 'mm')} without a feed not counted"
-    tail = f", {duration(rapid)} in rapid" if rapid > 0.0 else ""
-    return f"Cycle time <b>{duration(trajectory.seconds)}</b>: {duration(cut)} in feed motions ({beside}){tail}."
+        beside += f", {format_value(unknown, 'mm')} without a feed not counted"
+    tail = f", {format_duration(rapid)} in rapid" if rapid > 0.0 else ""
+    cycle, feed = format_duration(trajectory.seconds), format_duration(cut)
+    return f"Cycle time <b>{cycle}</b>: {feed} in feed motions ({beside}){tail}."
 
 
 def timing_card(trajectory: Trajectory, view: PathView) -> str:
     """The card; of a trajectory that stands still nothing but its cycle time."""
     if trajectory.seconds < _STILL:
-        return card("Time", "", cycle_text(trajectory))
+        return make_card("Time", "", cycle_text(trajectory))
     shades = colours(trajectory)
     figure, height = draw_timing_curves(trajectory, shades)
     body = (
@@ -49,4 +50,4 @@ def timing_card(trajectory: Trajectory, view: PathView) -> str:
         " acceleration or jerk sets the pace. Of every stretch the least and the greatest value is drawn, so no extreme"
         " is left out.</p>"
     )
-    return card("Time", body, cycle_text(trajectory))
+    return make_card("Time", body, cycle_text(trajectory))

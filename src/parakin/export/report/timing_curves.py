@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from ...toolpath.posting.range_use import RangeUse
 from ..machine.figures import Figure, Trace, numbers
-from ..ranges import edge
+from ..number_format import format_bound
 from .binding import bars_over_time
 from .curves import heading, panel_of
 from .panels import Panel, stacked
@@ -118,7 +118,7 @@ def _motion(trajectory: Trajectory, curves: dict[str, Thinned], number: int, kin
     drive = trajectory.posted.machine.model.drives[number]
     bound, (per, colour, ticks) = getattr(drive, kind), _KINDS[kind]
     unit, scale = _rim(trajectory.posted.machine, number)
-    text = f"limit {edge(bound, drive.unit)}" if isfinite(bound) else "no limit"
+    text = f"limit {format_bound(bound, drive.unit)}" if isfinite(bound) else "no limit"
     title = heading(f"{drive.name} {kind}", unit + per, text)
     name = f"{drive.name}.{kind}"
     if name not in curves:  # a jerk without a limit beside others with one

@@ -35,7 +35,7 @@ def _units(posted: Posted) -> tuple[str, ...]:
     return (*posted.machine.axis_units, *posted.machine.joint_units)
 
 
-def csv_writer(posted: Posted, progress: Progress | None = None) -> Writer:
+def make_joint_csv(posted: Posted, progress: Progress | None = None) -> Writer:
     """What writes the table as CSV: lengths to 1e-6 mm, angles to 1e-8 deg, a field empty where there is no value.
 
     ``record`` counts from 0, ``rapid`` is 0 or 1, ``broken`` names the first limit that the record breaks.
@@ -87,7 +87,7 @@ def in_batches(file: BinaryIO, count: int, widest: int, fill: Fill, say: Progres
     say(1.0)
 
 
-def parquet_writer(posted: Posted, progress: Progress | None = None) -> Writer:
+def make_joint_parquet(posted: Posted, progress: Progress | None = None) -> Writer:
     """What writes the table as Parquet: the CSV's columns in full precision, null where there is no value."""
 
     def write(file: BinaryIO) -> None:

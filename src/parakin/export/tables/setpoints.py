@@ -41,7 +41,7 @@ def _turning(trajectory: Trajectory) -> list[bool]:
     return [unit == "rad" for unit in (*(machine.joint_units * len(_KINDS)), *machine.axis_units)]
 
 
-def row_count(trajectory: Trajectory, rate: float) -> int:
+def count_setpoints(trajectory: Trajectory, rate: float) -> int:
     """How many setpoints there are at ``rate`` Hz, the last the first one at which the motion is over.
 
     Raises :class:`InputError` for a rate that isn't above 0, or at which there would be more than ``MOST_ROWS``.
@@ -62,12 +62,12 @@ def _block(trajectory: Trajectory, rate: float, start: int, stop: int) -> Floats
     return trajectory.at(np.arange(start, stop) / rate).table
 
 
-def setpoints_csv(trajectory: Trajectory, rate: float, progress: Progress | None = None) -> Writer:
+def make_setpoint_csv(trajectory: Trajectory, rate: float, progress: Progress | None = None) -> Writer:
     """What writes the setpoints at ``rate`` Hz as CSV, with the digits of the joint table; times to 1e-8 s.
 
-    Raises :class:`InputError` as :func:`row_count` does.
+    Raises :class:`InputError` as :func:`count_setpoints` does.
     """
-    count, turning = row_count(trajectory, rate), _turning(trajectory)
+    count, turning = count_setpoints(trajectory, rate), _turning(trajectory)
     digits = np.array([_TIME_DIGITS, *(ANGLE_DIGITS if turns else LENGTH_DIGITS for turns in turning)])
     scales = 10.0**digits * np.array([1.0, *(DEGREES if turns else 1.0 for turns in turning)])
 
@@ -86,12 +86,12 @@ def setpoints_csv(trajectory: Trajectory, rate: float, progress: Progress | None
     return write
 
 
-def setpoints_parquet(trajectory: Trajectory, rate: float, progress: Progress | None = None) -> Writer:
+def make_setpoint_parquet(trajectory: Trajectory, rate: float, progress: Progress | None = None) -> Writer:
     """What writes the setpoints at ``rate`` Hz as Parquet: the CSV's columns in full precision.
 
-    Raises :class:`InputError` as :func:`row_count` does.
+    Raises :class:`InputError` as :func:`count_setpoints` does.
     """
-    count = row_count(trajectory, rate)
+    count = count_setpoints(trajectory, rate)
     factors = [1.0, *(DEGREES if turns else 1.0 for turns in _turning(trajectory))]
 
     def write(file: BinaryIO) -> None:

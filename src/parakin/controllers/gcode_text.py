@@ -1,0 +1,48 @@
+"""Write G-code: blocks of rows of numbers, and comments."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+
+import numpy as np
+
+from ..arrays import Array
+
+DIGITS = 6  # after the point: of mm, of degrees, and of the inverse of minutes
+LONGEST_COMMENT = 200  # characters; LinuxCNC takes 255 in a line
+CHUNK = 1 << 16  # motions written at a time
+_ROWS = 1 << 14  # formatted at a time
+
+
+def to_display(values: Array, units: Sequence[str]) -> Array:
+    """Convert rows from mm and rad to mm and degrees, rounded to the digits that are printed."""
+    scale = np.where(np.array(units) == "rad", 180.0 / np.pi, 1.0)
+    return np.round(values * scale, DIGITS) + 0.0
+
+
+def format_blocks(lead: str, letters: Sequence[str], rows: Array, seconds: Array) -> str:
+    """Format lines ``lead X.. Y.. F..`` of rows (k, letters), mm and degrees; F is the inverse of a line's minutes."""
+    number = f"%.{DIGITS}f"
+    line = lead + " ".join(f"{letter}{number}" for letter in letters) + f" F{number}\n"
+    table = np.column_stack([rows, 60.0 / seconds])
+    chunks = [table[begin : begin + _ROWS] for begin in range(0, len(table), _ROWS)]
+    return "".join(line * len(chunk) % tuple(chunk.ravel().tolist()) for chunk in chunks)
+
+
+def format_comments(text: str) -> Iterator[str]:
+    """Cut a remark into comments short enough for a line, none of which a controller acts upon."""
+    plain = to_plain(text)
+    for begin in range(0, max(len(plain), 1), LONGEST_COMMENT):
+        yield f"( {plain[begin : begin + LONGEST_COMMENT]} )"
+
+
+def to_plain(text: str) -> str:
+    """Replace what can't stand in a comment: brackets, separators, and characters that are not ASCII."""
+    words = " ".join(text.replace("°", " deg").split())
+    plain = "".join(c if " " <= c <= "~" else "?" for c in words)
+    return plain.translate(str.maketrans("();%", "[],?")).strip()
+
+
+def join_lines(lines: Iterable[str]) -> str:
+    """Join lines, each with its end."""
+    return "".join(line + "\n" for line in lines)

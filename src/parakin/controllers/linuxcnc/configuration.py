@@ -1,0 +1,25 @@
+"""A machine as a LinuxCNC configuration: its kinematics in C, and the files that LinuxCNC starts with."""
+
+from __future__ import annotations
+
+from ...machine import Machine
+from .config import write_hal, write_ini, write_tool_table
+from .first_program import write_first_program
+from .module import kinematics_name, write_module
+from .page import write_page
+
+
+def make_linuxcnc_configuration(machine: Machine) -> dict[str, str]:
+    """Make a configuration for LinuxCNC 2.9 that runs as a simulation: {file: text}.
+
+    The files are the kinematics module (C, built by LinuxCNC's ``halcompile --install``), the ini and HAL files, the
+    tool table, a first program and a page that tells how to start, all named after the machine.
+    """
+    return {
+        f"{kinematics_name(machine)}.c": write_module(machine),
+        f"{machine.name}.ini": write_ini(machine),
+        f"{machine.name}.hal": write_hal(machine),
+        f"{machine.name}.tbl": write_tool_table(machine),
+        f"{machine.name}.ngc": write_first_program(machine),
+        f"{machine.name}.md": write_page(machine),
+    }

@@ -1,0 +1,72 @@
+"""A job as an object for JSON, ``parakin.post/1``."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ...units import display_unit, to_display
+from .offence import encode_offence
+
+if TYPE_CHECKING:
+    from ...toolpath.job import Job
+    from ...toolpath.placing.placement import Placement
+    from ...toolpath.posting.posted import Posted
+
+
+def encode_job(
+    job: Job, placement: Placement | None, missing: Sequence[str], files: Mapping[str, str]
+) -> dict[str, Any]:
+    """Encode a job, the placement that was found for it, why files are missing, and the files by their kinds."""
+    posted, trajectory = job.posted, job.trajectory
+    path, first, worst = posted.path, posted.first, posted.worst
+    return {
+        "schema": "parakin.post/1",
+        "part": path.source,
+        "machine": posted.machine.name,
+        "mode": posted.mode,
+        "verdict": "ok" if job.runs else "off limits" if first is not None else "no law",
+        "records": len(path),
+        "inserted": job.inserted,
+        "off_limits": posted.broken_record_count,
+        "motions_off_limits": posted.broken_motion_count,
+        "frame": posted.frame.tolist(),
+        "placement": None if placement is None else _encode_placement(placement),
+        "joints": encode_joint_ranges(posted),
+        "seconds": job.seconds,
+        "waits": job.waits,
+        "bound_by": {} if trajectory is None else trajectory.shares,
+        "rewinds": list(posted.rewinds),
+        "offences": [encode_offence(offence) for offence in posted.offences],
+        "first": None if first is None else encode_offence(first),
+        "worst": None if worst is None else encode_offence(worst),
+        "notes": [{"line": note.line, "text": note.text} for note in path.notes],
+        "missing": list(missing),
+        "files": dict(files),
+    }
+
+
+def encode_joint_ranges(posted: Posted) -> list[dict[str, Any]]:
+    """Encode what a path uses of each joint's range: its least and greatest value, and the range's ends."""
+    rows = []
+    for drive, values in zip(posted.machine.drives, posted.joints.T, strict=True):
+        ends = (drive.low, drive.high, np.fmin.reduce(values), np.fmax.reduce(values))
+        low, high, least, most = (to_display(float(end), drive.unit) for end in ends)
+        rows.append(
+            {"joint": drive.name, "unit": display_unit(drive.unit), "min": least, "max": most, "low": low, "high": high}
+        )
+    return rows
+
+
+def _encode_placement(placement: Placement) -> dict[str, Any]:
+    return {
+        "workpiece": {
+            axis: to_display(value, "mm" if axis in "XYZ" else "rad") for axis, value in placement.values.items()
+        },
+        "margin": placement.margin,
+        "limit": placement.limit,
+        "record": placement.record,
+        "tried": placement.tried,
+    }

@@ -1,0 +1,70 @@
+"""A machine as an object for JSON, ``parakin.machines/1`` and ``parakin.show/1``."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from typing import TYPE_CHECKING, Any
+
+from ...units import display_unit, to_display
+
+if TYPE_CHECKING:
+    from ...machine import Machine
+
+RATES = ("speed", "acceleration", "jerk")
+
+
+def encode_machines(machines: Iterable[Machine]) -> dict[str, Any]:
+    """Encode the heads of machines' descriptions."""
+    return {"schema": "parakin.machines/1", "machines": [_encode_head(machine) for machine in machines]}
+
+
+def encode_machine(machine: Machine, files: Mapping[str, str]) -> dict[str, Any]:
+    """Encode a whole machine, and the files that were written by their kinds."""
+    return {
+        "schema": "parakin.show/1",
+        **_encode_head(machine),
+        **encode_details(machine),
+        "files": dict(files),
+    }
+
+
+def _encode_head(machine: Machine) -> dict[str, Any]:
+    spec = machine.spec
+    return {
+        "name": spec.name,
+        "title": spec.title,
+        "axes": list(machine.axes),
+        "joints": list(machine.joints),
+        "source": " ".join(spec.source.split()),
+    }
+
+
+def encode_details(machine: Machine) -> dict[str, Any]:
+    """Encode working modes, sizes, drives, limits and home."""
+    drives = [
+        {
+            "joint": drive.name,
+            "unit": display_unit(drive.unit),
+            **{key: to_display(getattr(drive, key), drive.unit) for key in ("low", "high", *RATES)},
+        }
+        for drive in machine.drives
+    ]
+    limits = [
+        {
+            "name": limit.name,
+            "of": limit.subject,
+            "side": limit.side,
+            "bound": None if limit.side == "reach" else to_display(limit.bound, limit.unit),
+            "unit": display_unit(limit.unit),
+        }
+        for limit in machine.limit_parts
+    ]
+    home = zip(machine.axes, machine.home.tolist(), machine.axis_units, strict=True)
+    return {
+        "mode": machine.mode,
+        "modes": list(machine.modes),
+        "sizes": dict(machine.spec.sizes),
+        "drives": drives,
+        "limits": limits,
+        "home": {axis: to_display(value, unit) for axis, value, unit in home},
+    }

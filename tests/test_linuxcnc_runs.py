@@ -79,10 +79,9 @@ def read_to(machine, poses, joints):
 
 def near_the_pole(machine, joints):
     """Where the first joint of a wrist is free or nearly so, (n,)."""
-    first, last = machine.wrist.first, len(machine.joints) - 1
-    if first is None:
+    if machine.wrist is None:
         return np.zeros(len(joints), bool)
-    return np.abs(joints[:, last - 1 if first == last else last]) < 0.01
+    return np.abs(joints[:, machine.wrist.second]) < 0.01
 
 
 def check_joints(machine, poses, joints):

@@ -315,6 +315,13 @@ class Machine:
         a, b = (both[:, i * m * m : (i + 1) * m * m].reshape(-1, m, m) for i in (0, 1))
         return a, b, both[:, 2 * m * m :]
 
+    def place_platform(self, pose: Array, mode: str, joints: Array | None = None) -> PlatformPlacement:
+        """The platform's frame for one pose (axes,), in a working mode or for the joints that a path takes there."""
+        with np.errstate(invalid="ignore", divide="ignore"):
+            if joints is None:
+                return self.structure.place(list(pose), self.model.split_mode(mode)[1])
+            return self.structure.place_with_joints(list(pose), list(joints[self.leg_count :]))
+
     # The same on scalars of any kind (:mod:`parakin.algebra`), for interpreters such as intervals.
 
     def trace_inverse(self, pose: Sequence[Scalar], mode: str) -> tuple[list[Scalar], PlatformPlacement, list[Inverse]]:

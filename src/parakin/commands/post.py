@@ -20,24 +20,101 @@ if TYPE_CHECKING:
     from ..export.files import Content
     from ..toolpath.job import Job
 
+Part = Annotated[
+    Path,
+    Parameter(help="The CL file, of CATIA (APT) or Siemens NX, or a G-code program."),
+]
+MachineName = Annotated[
+    str,
+    Parameter(
+        name=["--machine", "-m"],
+        completer=machine_names,
+        help="A shipped machine's name (see parakin machines) or a YAML file.",
+    ),
+]
+WorkpieceText = Annotated[
+    str | None,
+    Parameter(
+        allow_leading_hyphen=True,
+        help=(
+            "Where the part lies, on top of the file's own frame: x,y,z[,a,b,c] in mm and degrees, or "
+            "X=10,Z=-1400,C=30."
+        ),
+    ),
+]
+PlaceBounds = Annotated[
+    str | None,
+    Parameter(
+        allow_leading_hyphen=True,
+        help="Find where the part lies best instead, within bounds: X=-100:100,Y=-100:100,C=-180:180.",
+    ),
+]
+TargetName = Annotated[
+    Target | None,
+    Parameter(
+        help=(
+            "Write a program too: linuxcnc, which moves the tool straight (PART.linuxcnc.ngc), or joints, for "
+            "controllers that know no kinematics (PART.joints.ngc)."
+        )
+    ),
+]
+Force = Annotated[
+    bool,
+    Parameter(
+        negative=(),
+        help="Write the program even if the path is off limits; its header says so.",
+    ),
+]
+TipTolerance = Annotated[
+    float,
+    Parameter(help="How far the tool's tip may be off the programmed path, in mm."),
+]
+AxisTolerance = Annotated[
+    float,
+    Parameter(help="How far the tool's axis may lean off the programmed one, in degrees."),
+]
+ArcTolerance = Annotated[
+    float,
+    Parameter(help="How far the lines that replace an arc may lie off it, in mm."),
+]
+CornerStyle = Annotated[
+    Literal["round", "stop"],
+    Parameter(help="Round them within the tolerance, or stop at them."),
+]
+Rate = Annotated[
+    float | None,
+    Parameter(help="Write setpoints too, so many a second: PART.setpoints.csv."),
+]
+Folder = Annotated[
+    Path,
+    Parameter(
+        name=["--output", "-o"],
+        help="Folder for the files.",
+    ),
+]
+Parquet = Annotated[
+    bool,
+    Parameter(help="Write the tables as .parquet too."),
+]
+
 
 def post(
-    part: Path,
+    part: Part,
     /,
     *,
-    machine: Annotated[str, Parameter(name=["--machine", "-m"], completer=machine_names)],
-    workpiece: Annotated[str | None, Parameter(allow_leading_hyphen=True)] = None,
-    place: Annotated[str | None, Parameter(allow_leading_hyphen=True)] = None,
+    machine: MachineName,
+    workpiece: WorkpieceText = None,
+    place: PlaceBounds = None,
     mode: Mode = None,
-    target: Target | None = None,
-    force: Annotated[bool, Parameter(negative=())] = False,
-    tolerance: float = 0.01,
-    angle_tolerance: float = 0.05,
-    arc_tolerance: float = 0.01,
-    corners: Literal["round", "stop"] = "round",
-    rate: float | None = None,
-    output: Annotated[Path, Parameter(name=["--output", "-o"])] = Path(),
-    parquet: bool = False,
+    target: TargetName = None,
+    force: Force = False,
+    tolerance: TipTolerance = 0.01,
+    angle_tolerance: AxisTolerance = 0.05,
+    arc_tolerance: ArcTolerance = 0.01,
+    corners: CornerStyle = "round",
+    rate: Rate = None,
+    output: Folder = Path(),
+    parquet: Parquet = False,
     json: Json = False,
     sizes: Sizes = None,
 ) -> int:
@@ -45,36 +122,6 @@ def post(
 
     Writes PART.joints.csv and PART.report.html. The exit code is 0 if the machine can run the path, 3 if it can't
     (table and report are written all the same, a program only with --force), 2 for input that can't be read.
-
-    Parameters
-    ----------
-    part
-        The CL file, of CATIA (APT) or Siemens NX, or a G-code program.
-    machine
-        A shipped machine's name (see parakin machines) or a YAML file.
-    workpiece
-        Where the part lies, on top of the file's own frame: x,y,z[,a,b,c] in mm and degrees, or X=10,Z=-1400,C=30.
-    place
-        Find where the part lies best instead, within bounds: X=-100:100,Y=-100:100,C=-180:180.
-    target
-        Write a program too: linuxcnc, which moves the tool straight (PART.linuxcnc.ngc), or joints, for controllers
-        that know no kinematics (PART.joints.ngc).
-    force
-        Write the program even if the path is off limits; its header says so.
-    tolerance
-        How far the tool's tip may be off the programmed path, in mm.
-    angle_tolerance
-        How far the tool's axis may lean off the programmed one, in degrees.
-    arc_tolerance
-        How far the lines that replace an arc may lie off it, in mm.
-    corners
-        Round them within the tolerance, or stop at them.
-    rate
-        Write setpoints too, so many a second: PART.setpoints.csv.
-    output
-        Folder for the files.
-    parquet
-        Write the tables as .parquet too.
     """
     chosen = machine_of(machine, sizes)
     if place is not None and workpiece is not None:

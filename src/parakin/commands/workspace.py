@@ -23,63 +23,106 @@ if TYPE_CHECKING:
 
 _INTERRUPTED = 130  # exit code
 
+MachineName = Annotated[
+    Name,
+    Parameter(help="A shipped machine's name or a YAML file."),
+]
+Dexterous = Annotated[
+    bool,
+    Parameter(help="Every value of every turning axis must be allowed."),
+]
+MethodName = Annotated[
+    Method,
+    Parameter(
+        help=(
+            "certified proves; grid looks at a lattice of places, polar along rays from an axis, drives maps the "
+            "drives."
+        )
+    ),
+]
+Gap = Annotated[
+    float | None,
+    Parameter(help="How far apart the two numbers may be, relative to the volume; 0.01 by default."),
+]
+CellSize = Annotated[
+    str | None,
+    Parameter(help="Refine the whole boundary to cells of this size instead, mm."),
+]
+TimeLimit = Annotated[
+    float | None,
+    Parameter(help="Stop after this time with what there is, s; 60 by default."),
+]
+Step = Annotated[
+    str | None,
+    Parameter(help="Of the sampling methods, and of the grids for meshes and cross-sections, mm."),
+]
+LargestBox = Annotated[
+    bool,
+    Parameter(help="Look for the largest box inside, proved too, its edges along the axes."),
+]
+Proportions = Annotated[
+    str | None,
+    Parameter(help="Proportions of that box: 3:3:1."),
+]
+Centre = Annotated[
+    str | None,
+    Parameter(
+        allow_leading_hyphen=True,
+        help="The place that box is centred at: X=0,Y=0,Z=-1400.",
+    ),
+]
+CountParts = Annotated[
+    bool,
+    Parameter(
+        help="Count the parts that a path can't leave without crossing a singularity or changing the working mode."
+    ),
+]
+Start = Annotated[
+    str | None,
+    Parameter(
+        allow_leading_hyphen=True,
+        help=(
+            "A pose, X=0,Y=0,Z=-1400, to tell in which of these parts it lies; axes that are not named stand as "
+            "at home."
+        ),
+    ),
+]
+Files = Annotated[
+    list[Path] | None,
+    Parameter(
+        name=["--output", "-o"],
+        help=("A file, by its ending: .stl .ply .glb (mesh, mm), .vtu .csv (cells), .png, .json. May be given again."),
+    ),
+]
+
 
 def workspace(
-    name: Name,
+    name: MachineName,
     /,
     *,
     at: At = None,
     every: Every = None,
     some: Some = None,
-    dexterous: bool = False,
+    dexterous: Dexterous = False,
     without: Without = None,
-    method: Method = "certified",
-    gap: float | None = None,
-    cell: str | None = None,
-    time: float | None = None,
-    step: str | None = None,
-    box: bool = False,
-    shape: str | None = None,
-    around: Annotated[str | None, Parameter(allow_leading_hyphen=True)] = None,
-    parts: bool = False,
-    start: Annotated[str | None, Parameter(allow_leading_hyphen=True)] = None,
+    method: MethodName = "certified",
+    gap: Gap = None,
+    cell: CellSize = None,
+    time: TimeLimit = None,
+    step: Step = None,
+    box: LargestBox = False,
+    shape: Proportions = None,
+    around: Centre = None,
+    parts: CountParts = False,
+    start: Start = None,
     mode: Mode = None,
-    output: Annotated[list[Path] | None, Parameter(name=["--output", "-o"])] = None,
+    output: Files = None,
     json: Json = False,
     sizes: Sizes = None,
 ) -> int:
     """Where a machine is allowed: the volume, proved to lie between two numbers, what bounds it, and its shape.
 
     The exit code is 3 if a file has nothing to be filled with, for the workspace is empty.
-
-    Parameters
-    ----------
-    name
-        A shipped machine's name or a YAML file.
-    dexterous
-        Every value of every turning axis must be allowed.
-    method
-        certified proves; grid looks at a lattice of places, polar along rays from an axis, drives maps the drives.
-    gap
-        How far apart the two numbers may be, relative to the volume; 0.01 by default.
-    cell
-        Refine the whole boundary to cells of this size instead, mm.
-    time
-        Stop after this time with what there is, s; 60 by default.
-    step
-        Of the sampling methods, and of the grids for meshes and cross-sections, mm.
-    box
-        Look for the largest box inside, proved too, its edges along the axes.
-    shape
-        Proportions of that box: 3:3:1.
-    around
-        The place that box is centred at: X=0,Y=0,Z=-1400.
-    parts
-        Count the parts that a path can't leave without crossing a singularity or changing the working mode.
-    start
-        A pose, X=0,Y=0,Z=-1400, to tell in which of these parts it lies; axes that are not named stand as at home.
-    output
-        A file, by its ending: .stl .ply .glb (mesh, mm), .vtu .csv (cells), .png, .json. May be given again.
     """
     machine = machine_of(name, sizes)
     asked = region_of(machine, at, every, some, dexterous, without, mode)

@@ -85,15 +85,12 @@ def scene(
     joints : (joints,) those that a path really takes there, if they are known; they settle an angle that is free
     mode : working mode
     """
-    spec, model = machine.spec, machine.model
+    spec = machine.spec
     given = machine.rows(machine.home if pose is None else pose, machine.axes, "pose")[0][0]
     mode = mode or machine.mode
     q = machine.inverse(given, mode) if joints is None else machine.rows(joints, machine.joints, "joints")[0][0]
     with np.errstate(invalid="ignore", divide="ignore"):
-        if joints is None:
-            placed = model.structure.place(list(given), model.split_mode(mode)[1])
-        else:
-            placed = model.structure.place_with_joints(list(given), list(q[len(q) - model.serial :]))
+        placed = machine.place_platform(given, mode, None if joints is None else q)
         drawn = _Drawing(machine, placed, q).drawing()
     parts = tuple(part for part in drawn.parts if np.isfinite(part.points).all())
     labels = _joined([label for label in drawn.labels if np.isfinite(label[1]).all()])
@@ -106,7 +103,7 @@ class _Drawing:
     """The parts of one scene, gathered in the base frame and put into M."""
 
     def __init__(self, machine: Machine, placed: PlatformPlacement, joints: Points):
-        self.spec, self.structure = machine.spec, machine.model.structure
+        self.spec, self.structure = machine.spec, machine.structure
         self.placed, self.joints = placed, joints
         self.mount = np.array(self.structure.mount, float)
         self.base = np.array(self.structure.base, float)

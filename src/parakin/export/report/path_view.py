@@ -225,7 +225,7 @@ def _mean_pose(machine: Machine, poses: Floats) -> Floats:
         if letter in machine.axes:
             column = real[:, machine.axes.index(letter)]
             pose[machine.axes.index(letter)] = 0.5 * (column.min() + column.max())
-    if machine.axes[-2:] == ("B", "C") and "A" not in machine.axes:
+    if machine.has_direction:
         b, c = real[:, -2:].T
         k = np.array([(np.sin(b) * np.cos(c)).mean(), (np.sin(b) * np.sin(c)).mean(), np.cos(b).mean()])
         pose[-2:] = np.arctan2(np.hypot(k[0], k[1]), k[2]), np.arctan2(k[1], k[0])

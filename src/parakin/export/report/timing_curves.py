@@ -34,7 +34,7 @@ _ROOM = 1.15  # times the greatest programmed feed: what the feed's axis shows
 def draw_timing_curves(trajectory: Trajectory, shades: dict[str, str]) -> tuple[Figure, int]:
     """The curves over the cycle, and the figure's height in px; ``shades`` are the limits' colours."""
     machine = trajectory.posted.machine
-    kinds = [kind for kind in _KINDS if kind != "jerk" or any(d.jerk < inf for d in machine.model.drives)]
+    kinds = [kind for kind in _KINDS if kind != "jerk" or any(d.jerk < inf for d in machine.drives)]
     curves = thinned(trajectory, min(_MOST, _ALL // (len(machine.joints) * (1 + len(kinds)) + 2)))
     binds = Panel(heading("what sets the pace", "share of the time", ""), bars_over_time(trajectory, shades),
                   [0.0, 1.0], ticks=".0%")  # fmt: skip
@@ -106,7 +106,7 @@ def _feed(trajectory: Trajectory, curves: dict[str, Thinned]) -> Panel:
 
 
 def _position(trajectory: Trajectory, curves: dict[str, Thinned], number: int) -> Panel:
-    drive, curve = trajectory.posted.machine.model.drives[number], curves[trajectory.posted.machine.joints[number]]
+    drive, curve = trajectory.posted.machine.drives[number], curves[trajectory.posted.machine.joints[number]]
     use = RangeUse(drive.name, drive.name, drive.unit, drive.low, drive.high, *_ends(curve))
     unit, scale = _rim(trajectory.posted.machine, number)
     trace = _line(trajectory, curve, None, {"color": _BLUE, "width": 1.3}, escape(drive.name), unit, scale)
@@ -115,7 +115,7 @@ def _position(trajectory: Trajectory, curves: dict[str, Thinned], number: int) -
 
 def _motion(trajectory: Trajectory, curves: dict[str, Thinned], number: int, kind: str) -> Panel:
     """A joint's speed, acceleration or jerk, coloured where its limit sets the pace."""
-    drive = trajectory.posted.machine.model.drives[number]
+    drive = trajectory.posted.machine.drives[number]
     bound, (per, colour, ticks) = getattr(drive, kind), _KINDS[kind]
     unit, scale = _rim(trajectory.posted.machine, number)
     text = f"limit {format_bound(bound, drive.unit)}" if isfinite(bound) else "no limit"

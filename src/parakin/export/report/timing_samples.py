@@ -81,7 +81,7 @@ def _blocks(trajectory: Trajectory) -> Iterator[tuple[Floats, Indices, Indices, 
     profile, joint_path, machine = trajectory.profile, trajectory.joint_path, trajectory.posted.machine
     edges = switches(trajectory)
     tip = [i for i, axis in enumerate(machine.axes) if axis in "XYZ"]
-    jerky = [i for i, drive in enumerate(machine.model.drives) if drive.jerk < np.inf]
+    jerky = [i for i, drive in enumerate(machine.drives) if drive.jerk < np.inf]
     pieces = np.flatnonzero(np.diff(profile.time) > _SHORTEST)
     for first in range(0, len(pieces), _BLOCK):
         piece = pieces[first : first + _BLOCK]

@@ -1,10 +1,12 @@
 """Tables of numbers as decimal text, fast: fixed digits, trailing zeros left away."""
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numba as nb
 import numpy as np
 from numpy.typing import NDArray
+
+from ...arrays import Array, Flags, Indices
 
 WIDEST = 26  # bytes a number takes at most, its separator included
 _COMMA, _MINUS, _POINT, _LF, _ZERO = (ord(c) for c in ",-.\n0")
@@ -14,8 +16,8 @@ _PAIRS = np.frombuffer("".join(f"{i:02}" for i in range(100)).encode(), np.uint8
 
 
 @nb.njit(cache=True, nogil=True, inline="always")
-def _integer(value: Any, out: NDArray[np.uint8], at: Any) -> Any:
-    """A natural number from ``at`` on; returns its end."""
+def _format_integer(value: Any, out: NDArray[np.uint8], at: Any) -> Any:
+    """Write a natural number from ``at`` on; returns its end."""
     length = 1
     bound = np.uint64(10)
     while length < 19 and value >= bound:
@@ -35,9 +37,8 @@ def _integer(value: Any, out: NDArray[np.uint8], at: Any) -> Any:
 
 
 @nb.njit(cache=True, nogil=True, inline="always")
-def _decimal(value: Any, scale: Any, digits: Any, out: NDArray[np.uint8], at: Any) -> Any:
-    """``value·scale`` is the integer to print, with a point before its last 4, 6 or 8 ``digits``; nothing for what is
-    no number."""
+def _format_decimal(value: Any, scale: Any, digits: Any, out: NDArray[np.uint8], at: Any) -> Any:
+    """Write the integer ``value·scale`` with a point before its last 4, 6 or 8 ``digits``; nothing for NaN."""
     scaled = np.rint(value * scale)
     size = abs(scaled)
     if not size < _LARGEST:
@@ -53,7 +54,7 @@ def _decimal(value: Any, scale: Any, digits: Any, out: NDArray[np.uint8], at: An
         natural = whole // _E4
         rest = whole - natural * _E4
     out[at] = _MINUS
-    at = _integer(natural, out, at + np.int64(scaled < 0.0))
+    at = _format_integer(natural, out, at + np.int64(scaled < 0.0))
     if rest == 0:
         return at
     out[at] = _POINT
@@ -71,53 +72,67 @@ def _decimal(value: Any, scale: Any, digits: Any, out: NDArray[np.uint8], at: An
     return p + 1
 
 
-@nb.njit(cache=True, nogil=True)
-def rows(
-    first: int,
-    last: int,
-    lines: NDArray[np.int64],
-    poses: NDArray[np.float64],
-    joints: NDArray[np.float64],
-    feed: NDArray[np.float64],
-    rapid: NDArray[np.bool_],
-    broken: NDArray[np.int64],
-    scales: NDArray[np.float64],
-    digits: NDArray[np.int64],
-    names: NDArray[np.uint8],
-    starts: NDArray[np.int64],
-    out: NDArray[np.uint8],
-) -> int:
-    """Rows ``first`` to ``last`` of a joint table as CSV into ``out``; returns how many bytes.
+class JointColumns(NamedTuple):
+    """The columns of a joint table, as in :class:`~parakin.toolpath.posting.posted.Posted`."""
 
-    lines ... broken : the table's columns, as in :class:`~parakin.toolpath.posting.posted.Posted`
-    scales, digits : for poses, joints and feed, what makes the printed integer, and how many of its digits are decimals
-    names, starts : the limits' names one after another, and where each begins and the last ends
+    lines: Indices
+    poses: Array
+    joints: Array
+    feed: Array
+    rapid: Flags
+    broken: Indices
+
+
+class NumberFormat(NamedTuple):
+    """For each number of a row, what makes the printed integer, and how many of its digits are decimals."""
+
+    scales: Array
+    digits: Indices
+
+
+class LimitNames(NamedTuple):
+    """The limits' names one after another, as bytes, and where each begins and the last ends."""
+
+    text: NDArray[np.uint8]
+    starts: Indices
+
+
+@nb.njit(cache=True, nogil=True)
+def format_joint_rows(
+    first: int, last: int, columns: JointColumns, form: NumberFormat, names: LimitNames, out: NDArray[np.uint8]
+) -> int:
+    """Write rows ``first`` to ``last`` of a joint table as CSV into ``out``; returns how many bytes.
+
+    form : of poses, joints and feed
     """
+    lines, poses, joints, feed, rapid, broken = columns
+    scales, digits = form
+    text, starts = names
     at = 0
     axes = poses.shape[1]
     moving = axes + joints.shape[1]
     for n in range(first, last):
-        at = _integer(np.uint64(n), out, at)
+        at = _format_integer(np.uint64(n), out, at)
         out[at] = _COMMA
-        at = _integer(np.uint64(lines[n]), out, at + 1)
+        at = _format_integer(np.uint64(lines[n]), out, at + 1)
         out[at] = _COMMA
         at += 1
         for c in range(axes):
-            at = _decimal(poses[n, c], scales[c], digits[c], out, at)
+            at = _format_decimal(poses[n, c], scales[c], digits[c], out, at)
             out[at] = _COMMA
             at += 1
         for c in range(axes, moving):
-            at = _decimal(joints[n, c - axes], scales[c], digits[c], out, at)
+            at = _format_decimal(joints[n, c - axes], scales[c], digits[c], out, at)
             out[at] = _COMMA
             at += 1
-        at = _decimal(feed[n], scales[moving], digits[moving], out, at)
+        at = _format_decimal(feed[n], scales[moving], digits[moving], out, at)
         out[at] = _COMMA
         out[at + 1] = _ZERO + rapid[n]
         out[at + 2] = _COMMA
         at += 3
         if broken[n] > 0:
             for c in range(starts[broken[n] - 1], starts[broken[n]]):
-                out[at] = names[c]
+                out[at] = text[c]
                 at += 1
         out[at] = _LF
         at += 1
@@ -125,15 +140,15 @@ def rows(
 
 
 @nb.njit(cache=True, nogil=True)
-def cells(
+def format_cells(
     values: NDArray[np.float64], scales: NDArray[np.float64], digits: NDArray[np.int64], out: NDArray[np.uint8]
 ) -> int:
-    """A table of numbers (rows, columns) as CSV into ``out``; returns how many bytes. Scales and digits as above."""
+    """Write a table of numbers (rows, columns) as CSV into ``out``; returns how many bytes."""
     at = 0
     last = values.shape[1] - 1
     for n in range(len(values)):
         for c in range(last + 1):
-            at = _decimal(values[n, c], scales[c], digits[c], out, at)
+            at = _format_decimal(values[n, c], scales[c], digits[c], out, at)
             out[at] = _COMMA if c < last else _LF
             at += 1
     return at

@@ -49,21 +49,23 @@ def make_joint_csv(posted: Posted, progress: Progress | None = None) -> Writer:
 
 
 def _write_rows(posted: Posted, file: BinaryIO, say: Progress) -> None:
-    from .decimals import WIDEST, rows
+    from .decimals import WIDEST, JointColumns, LimitNames, NumberFormat, format_joint_rows
 
     units = _units(posted)
     digits = [ANGLE_DIGITS if unit == "rad" else LENGTH_DIGITS for unit in units]
     scales = [10.0**d * (DEGREES if unit == "rad" else 1.0) for d, unit in zip(digits, units, strict=True)]
     names = [name.encode() for name in posted.limits]
     path = posted.path
-    table = (
-        path.line, posted.poses, posted.joints, path.feed, path.rapid, posted.broken,
-        np.array([*scales, 10.0**_FEED_DIGITS]), np.array([*digits, _FEED_DIGITS]),
-        np.frombuffer(b"".join(names) or b" ", np.uint8), np.cumsum([0, *map(len, names)]),
-    )  # fmt: skip
+    columns = JointColumns(path.line, posted.poses, posted.joints, path.feed, path.rapid, posted.broken)
+    form = NumberFormat(np.array([*scales, 10.0**_FEED_DIGITS]), np.array([*digits, _FEED_DIGITS]))
+    limits = LimitNames(np.frombuffer(b"".join(names) or b" ", np.uint8), np.cumsum([0, *map(len, names)]))
     count = len(path)
     widest = WIDEST * (len(units) + 4) + max(map(len, names), default=0)
-    in_batches(file, count, widest, lambda start, stop, buffer: rows(start, stop, *table, buffer), say)
+
+    def fill(start: int, stop: int, buffer: NDArray[np.uint8]) -> int:
+        return int(format_joint_rows(start, stop, columns, form, limits, buffer))
+
+    in_batches(file, count, widest, fill, say)
 
 
 def in_batches(file: BinaryIO, count: int, widest: int, fill: Fill, say: Progress) -> None:

@@ -72,14 +72,14 @@ def make_setpoint_csv(trajectory: Trajectory, rate: float, progress: Progress | 
     scales = 10.0**digits * np.array([1.0, *(DEGREES if turns else 1.0 for turns in turning)])
 
     def write(file: BinaryIO) -> None:
-        from .decimals import WIDEST, cells
+        from .decimals import WIDEST, format_cells
 
         file.write((",".join(setpoint_columns(trajectory)) + "\n").encode())
         in_batches(
             file,
             count,
             WIDEST * len(digits),
-            lambda start, stop, buffer: cells(_block(trajectory, rate, start, stop), scales, digits, buffer),
+            lambda start, stop, buffer: format_cells(_block(trajectory, rate, start, stop), scales, digits, buffer),
             progress or (lambda fraction: None),
         )
 

@@ -47,7 +47,7 @@ def linearise_path(
     through the pole itself if the axis misses it by less than the tolerance, and the angle does not swing then: see
     :func:`~.through.through_the_poles`. A pass on which it swings by more than 45° is told by a note of the path.
 
-    Raises :class:`PoseError` for a tolerance that is none, for a motion between opposite tool axes, and for one that
+    Raises :class:`PoseError` for an invalid tolerance, for a motion between opposite tool axes, and for one that
     can't be kept however many records are added; both with their line.
     """
     check_tolerance(chord, "chord")

@@ -191,7 +191,7 @@ def make_region(
         raise PoseError("one of every, some and dexterous can be asked at a time")
     if dexterous:
         swept = {axis: _EVERY_WAY[axis] for axis in turning}
-        if turning == ["B", "C"]:
+        if machine.has_direction:
             swept["B"] = (0.0, pi)
     kind: Kind = "dexterous" if dexterous else "total" if every else "inclusive" if some else "constant"
     _refuse_unknown_axes(machine, (*fixed, *swept))

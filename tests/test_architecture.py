@@ -119,3 +119,58 @@ def test_starting_imports_nothing_heavy(module):
     heavy = {"numpy", "numba", "pydantic", "plotly", "matplotlib", "pyarrow", "scipy", "ruamel.yaml"}
     heavy |= {"trimesh", "skimage"}
     assert not heavy & set(loaded)
+
+
+def functions(module: str) -> list[ast.FunctionDef]:
+    tree = ast.parse(MODULES[module].read_text(encoding="utf-8"))
+    return [node for node in ast.walk(tree) if isinstance(node, ast.FunctionDef)]
+
+
+def parameters(function: ast.FunctionDef) -> int:
+    names = [*function.args.posonlyargs, *function.args.args, *function.args.kwonlyargs]
+    return len([name for name in names if name.arg not in ("self", "cls")])
+
+
+ABOVE = [m for m in MODULES if room_of(m) is not None and HEIGHT[room_of(m)] > HEIGHT["machine"]]
+
+
+@pytest.mark.parametrize("module", ABOVE)
+def test_nobody_above_the_machine_asks_its_model(module):
+    tree = ast.parse(MODULES[module].read_text(encoding="utf-8"))
+    asked = [n.lineno for n in ast.walk(tree) if isinstance(n, ast.Attribute) and n.attr == "model"]
+    assert not asked
+
+
+@pytest.mark.parametrize("module", [m for m in MODULES if room_of(m) != "model"])
+def test_structures_are_asked_for_behaviour_not_for_their_type(module):
+    tree = ast.parse(MODULES[module].read_text(encoding="utf-8"))
+    calls = [n for n in ast.walk(tree) if isinstance(n, ast.Call) and ast.unparse(n.func) == "isinstance"]
+    assert not [call.lineno for call in calls if "structure" in ast.unparse(call.args[0])]
+
+
+@pytest.mark.parametrize("module", [m for m in MODULES if room_of(m) != "commands"])
+def test_no_function_takes_more_than_eight_parameters(module):
+    assert not [f.name for f in functions(module) if parameters(f) > 8]
+
+
+TAPES = {"kernels.blocks.interpret", "kernels.enclosures.interpret"}
+
+
+@pytest.mark.parametrize("module", MODULES)
+def test_no_function_is_longer_than_seventy_lines(module):
+    long = [f.name for f in functions(module) if f.end_lineno - f.lineno >= 70]
+    assert not [name for name in long if f"{module}.{name}" not in TAPES]
+
+
+def test_a_class_name_occurs_once():
+    owners: dict[str, list[str]] = {}
+    for module, path in MODULES.items():
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.ClassDef):
+                owners.setdefault(node.name, []).append(module)
+    assert not {name: modules for name, modules in owners.items() if len(modules) > 1}
+
+
+def test_a_riddling_file_name_stands_once():
+    names = [path.stem for path in MODULES.values()]
+    assert not [name for name in ("parts", "cuts", "words", "motions", "blocks") if names.count(name) > 1]

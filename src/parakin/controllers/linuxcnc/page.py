@@ -58,10 +58,9 @@ _POLE = """\
   another direction makes it turn at once: begin a program with the tool tilted the way it goes on.
 """
 
-_FRAMES = {
-    ("B", "C"): "the tool's axis is Rz(C)·Ry(B)·z, from the tip into the holder",
-    ("A", "B", "C"): "the tool's frame is Rz(C)·Ry(B)·Rx(A)",
-}
+_DIRECTION = "the tool's axis is Rz(C)·Ry(B)·z, from the tip into the holder"
+_ORIENTATION = "the tool's frame is Rz(C)·Ry(B)·Rx(A)"
+_PLACE = "the axes are those of the machine's frame"
 
 
 def write_page(machine: Machine) -> str:
@@ -75,6 +74,6 @@ def write_page(machine: Machine) -> str:
         joints=" ".join(machine.joints),
         axes=" ".join(machine.axes),
         home=", ".join(words),
-        frame=_FRAMES.get(machine.axes[3:], "the axes are those of the machine's frame"),
+        frame=_DIRECTION if machine.has_direction else _ORIENTATION if len(machine.axes) == 6 else _PLACE,
         pole=_POLE if machine.wrist is not None else "",
     )

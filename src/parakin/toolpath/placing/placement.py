@@ -85,7 +85,7 @@ def find_placement(
     ends = np.array([bounds[axis] for axis in axes]).reshape(-1, 2)
     results, tried = [], 0
     for each in list_candidate_modes(machine, mode):
-        search = _Search(PlacementMargins(machine, path, each, axes, ends[:, 0], ends[:, 1], held), say)
+        search = _PlacementSearch(PlacementMargins(machine, path, each, axes, ends[:, 0], ends[:, 1], held), say)
         results.append((*search.run(), search.placing))
         tried += search.tried
         if results[-1][1].margin >= 0.0:
@@ -97,7 +97,7 @@ def find_placement(
     return Placement(placing.workpiece(point), values, placing.mode, found.margin, found.limit, found.record, tried)
 
 
-class _Search:
+class _PlacementSearch:
     """One search, in one working mode.
 
     records : those looked at, ascending

@@ -23,7 +23,7 @@ _ROUNDING = 1e-7  # the error of the closed form, with slopes no flatter than th
 KEPT, CLEARED, EXCLUDED = 0, 1, 2  # a margin over a box: undecided, kept everywhere, broken for every x
 
 
-class MarginBounds(NamedTuple):
+class TaylorBounds(NamedTuple):
     """Bounds that the programs of a :class:`~.constraints.Constraint` give over N boxes (x, θ) and in their middles.
 
     is_smooth : the constraint has second derivatives
@@ -226,7 +226,7 @@ def _bound_change_with_orientation(given, i, least_at, spread):
 def bound_linearly(given, every, result, start, stop):
     """Bound one margin over boxes by planes, by Taylor's formula about the middle, and decide by them.
 
-    given : :class:`MarginBounds`; result : :class:`LinearBounds`, filled from start to stop
+    given : :class:`TaylorBounds`; result : :class:`LinearBounds`, filled from start to stop
     every : the margin must be kept at every θ, else at one
     """
     s = result.spread.shape[1]

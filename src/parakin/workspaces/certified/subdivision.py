@@ -20,7 +20,7 @@ import numpy as np
 from ...arrays import Array, Flags, Indices, Progress
 from ...kernels.batch import run_in_threads
 from .constraints import Constraint
-from .plane_cuts import CellFractions, LinearBounds, MarginBounds, PlaneCuts, accumulate_cuts, bound_linearly
+from .plane_cuts import CellFractions, LinearBounds, PlaneCuts, TaylorBounds, accumulate_cuts, bound_linearly
 
 FIRST = 8  # cells along the longest side of the first box
 MOST = 3_000_000  # undecided cells at a time
@@ -153,7 +153,7 @@ def bound_margin(constraint: Constraint, low: Array, size: Array, boxes: Orienta
     half = np.maximum(middle - bottom, top - middle)
     over_box = constraint.box_program(bottom, top)
     in_middle = constraint.point_program(middle, middle)
-    given = MarginBounds(constraint.is_smooth, *over_box, *in_middle, half)
+    given = TaylorBounds(constraint.is_smooth, *over_box, *in_middle, half)
     result = LinearBounds.allocate(n, d, s)
     run_in_threads(n, lambda start, stop: bound_linearly(given, every, result, start, stop))
     return result

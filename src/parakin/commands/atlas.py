@@ -10,18 +10,27 @@ from cyclopts import Parameter
 
 from ..errors import InputError, PoseError, quote
 from ..units import NUMBER, QuantityError, parse_quantity
-from .atlas_files import Files
-from .atlas_summary import atlas_json, atlas_text, performance_json, performance_text, proofs_json, proofs_text
+from .atlas_files import AtlasFiles
+from .atlas_json import encode_atlas, encode_performance, encode_proofs
+from .atlas_summary import format_atlas, format_performance, format_proofs
 from .console import Progress, announce_compiling, print_json, rim
 from .options import OFF_LIMITS, Json, Mode, Name, Sizes, machine_of
-from .regions import At, Without, length, parts_of, ranges_of, region_of, values_of
+from .region_options import (
+    At,
+    Without,
+    parse_axis_ranges,
+    parse_axis_values,
+    parse_length,
+    read_region,
+    split_axes,
+)
 from .values import parse_row, parse_value
 
 if TYPE_CHECKING:
     from ..arrays import Array
-    from ..machine import Machine
     from ..performance.atlas import Atlas, PerformanceMap
-    from ..performance.certified.proofs import AmplificationBrackets, Proof
+    from ..performance.certified.amplification import Bracket
+    from ..performance.certified.proofs import Proof
     from ..performance.indices import Performance
     from ..workspaces.certified.region import Region
 
@@ -70,38 +79,33 @@ def atlas(
         A folder for the maps, PNG and CSV, or one file by its ending.
     """
     machine = machine_of(name, sizes)
-    asked = region_of(machine, at, without=without, mode=mode)
-    scale, apart = length(size, "--length"), length(step, "--step")
-    spans = ranges_of(machine, box, "--box")
-    bounds = _bounds(amplification, bool(spans))
-    cuts = _cuts(machine, asked, slices or ())
+    region = read_region(machine, at, without=without, mode=mode)
+    scale, apart = parse_length(size, "--length"), parse_length(step, "--step")
+    spans = parse_axis_ranges(machine, box, "--box")
+    bounds = _parse_claim(amplification, bool(spans))
+    cuts = _cut_region(region, slices or ())
     if slices and output is None:
         raise InputError("a map is a file, name it or its folder with -o", "--slice")
-    files = Files(machine.name, output, len(cuts)) if output is not None else None
-    rows = None
-    if pose is not None:
-        default = asked.poses(machine.home[[machine.axes.index(axis) for axis in asked.free_axes]][None])[0]
-        rows = parse_row(
-            [part.strip() for part in pose.split(",")], machine.axes, machine.axis_units, default, "--pose"
-        )
+    files = AtlasFiles(machine.name, output, len(cuts)) if output is not None else None
+    one_pose = None if pose is None else _parse_pose(region, pose)
     announce_compiling()
-    found = _Found(machine, asked)
+    results = _AtlasResults(region, scale)
     with Progress() as progress:
-        if rows is not None:
-            found.look(rows, scale)
+        if one_pose is not None:
+            results.examine_pose(one_pose)
         if spans:
-            found.prove(spans, values_of(machine, at, "--at"), bounds, scale, progress)
+            results.prove_box(spans, parse_axis_values(machine, at, "--at"), bounds, progress)
         if files is not None or not (spans or pose):
-            found.draw(apart, scale, progress)
+            results.compute_atlas(apart, progress)
         written = {}
-        if files is not None and found.atlas is not None:
-            written = files.write(found.atlas, [found.mapped(cut, apart, scale) for cut in cuts])
-    found.tell(json, written)
-    return OFF_LIMITS if found.refused else 0
+        if files is not None and results.atlas is not None:
+            written = files.write(results.atlas, [results.map_slice(cut, apart) for cut in cuts])
+    results.print(json, written)
+    return OFF_LIMITS if results.refused else 0
 
 
-def _bounds(text: str | None, has_box: bool) -> tuple[float, float] | None:
-    """The ends of a claim on the amplification."""
+def _parse_claim(text: str | None, has_box: bool) -> tuple[float, float] | None:
+    """Parse the ends of a claim on the amplification."""
     if text is None:
         return None
     if not has_box:
@@ -116,54 +120,61 @@ def _bounds(text: str | None, has_box: bool) -> tuple[float, float] | None:
     return ends
 
 
-def _cuts(machine: Machine, asked: Region, slices: Sequence[str]) -> list[Region]:
-    """The regions to draw: those that --slice names, else one through home, or all of one that is flat already."""
-    held = []
+def _parse_pose(region: Region, text: str) -> Array:
+    """Parse a pose; axes that are not named are as in the region, else as at home."""
+    machine = region.machine
+    home = machine.home[[machine.axes.index(axis) for axis in region.free_axes]]
+    parts = [part.strip() for part in text.split(",")]
+    return parse_row(parts, machine.axes, machine.axis_units, region.poses(home[None])[0], "--pose")
+
+
+def _cut_region(region: Region, slices: Sequence[str]) -> list[Region]:
+    """Cut the slices to map: those of --slice, else one through home, or all of a region that is flat already."""
+    machine, cuts = region.machine, []
     for text in slices:
-        parts = parts_of(machine, text, "--slice", "Z=-100")
+        parts = split_axes(machine, text, "--slice", "Z=-100")
         if len(parts) != 1:
             raise InputError(f"{quote(text)}: one axis and its value expected", "--slice")
-        axis, value = parts[0]
-        if axis not in asked.free_axes or len(asked.free_axes) < 2:
-            raise InputError(f"{axis} is no place to cut at, {' '.join(asked.free_axes)} are left", "--slice")
-        held.append((axis, parse_value(axis, value, "--slice")))
-        if held[-1] in held[:-1]:
+        ((axis, value),) = parts.items()
+        if axis not in region.free_axes or len(region.free_axes) < 2:
+            raise InputError(f"{axis} is no place to cut at, {' '.join(region.free_axes)} are left", "--slice")
+        cuts.append((axis, parse_value(axis, value, "--slice")))
+        if cuts[-1] in cuts[:-1]:
             raise InputError(f"{quote(text)} is given twice", "--slice")
-    if not slices and len(asked.free_axes) < 3:
-        return [asked]
+    if not slices and len(region.free_axes) < 3:
+        return [region]
     if not slices:
-        axis = asked.free_axes[-1]
-        held = [(axis, float(machine.home[machine.axes.index(axis)]))]
-    return [asked.fix({axis: value}) for axis, value in held]
+        axis = region.free_axes[-1]
+        cuts = [(axis, float(machine.home[machine.axes.index(axis)]))]
+    return [region.fix({axis: value}) for axis, value in cuts]
 
 
-class _Found:
-    """All that a run of the command finds, and how it is told."""
+class _AtlasResults:
+    """All results of a run of the command, and how they are printed.
 
-    def __init__(self, machine: Machine, asked: Region):
-        self.machine, self.asked = machine, asked
-        self.pose: Performance | None = None
-        self.broken = ""
+    length : the characteristic length, mm, or None for the machine's own
+    """
+
+    def __init__(self, region: Region, length: float | None):
+        self.machine, self.region, self.length = region.machine, region, length
+        self.performance: Performance | None = None
+        self.broken_limit = ""
         self.spans: Spans = {}
         self.proofs: list[Proof] = []
-        self.brackets: AmplificationBrackets | None = None
+        self.brackets: Sequence[Bracket] = ()
         self.atlas: Atlas | None = None
 
-    def look(self, pose: Array, length: float | None) -> None:
+    def examine_pose(self, pose: Array) -> None:
         from ..performance.indices import compute_performance
 
-        self.pose = compute_performance(self.machine, pose, length, self.asked.mode)
-        broken = int(self.machine.check(pose, mode=self.asked.mode))
-        self.broken = self.machine.limits[broken - 1] if broken else ""
+        self.performance = compute_performance(self.machine, pose, self.length, self.region.mode)
+        broken = int(self.machine.check(pose, mode=self.region.mode))
+        self.broken_limit = self.machine.limits[broken - 1] if broken else ""
 
-    def prove(
-        self,
-        spans: Spans,
-        at: dict[str, float],
-        bounds: tuple[float, float] | None,
-        length: float | None,
-        progress: Progress,
+    def prove_box(
+        self, spans: Spans, at: dict[str, float], bounds: tuple[float, float] | None, progress: Progress
     ) -> None:
+        """Prove a box free of singularities, and its amplification within bounds, or bracket it if there are none."""
         from ..performance.certified.proofs import (
             bracket_extremes,
             make_pose_box,
@@ -172,29 +183,31 @@ class _Found:
         )
 
         self.spans = spans
-        box = make_pose_box(self.machine, spans, at, length, self.asked.mode)
+        box = make_pose_box(self.machine, spans, at, self.length, self.region.mode)
         self.proofs = [prove_no_singularity(box, "parallel"), prove_no_singularity(box, "serial")]
-        told = progress.part("proving", 0.0, 1.0)
+        report = progress.part("proving", 0.0, 1.0)
         if bounds is not None:
-            self.proofs.append(prove_amplification(box, *bounds, progress=told))
+            self.proofs.append(prove_amplification(box, *bounds, progress=report))
+            self.brackets = self.proofs[-1].brackets
         elif all(proof.verdict == "proved" for proof in self.proofs):
-            self.brackets = bracket_extremes(box, progress=told)
+            self.brackets = bracket_extremes(box, progress=report).brackets
 
-    def draw(self, step: float | None, length: float | None, progress: Progress) -> None:
+    def compute_atlas(self, step: float | None, progress: Progress) -> None:
         from ..performance.atlas import atlas
 
-        self.atlas = atlas(self.asked, step, length, progress.part("looking at the workspace", 0.0, 1.0))
+        report = progress.part("looking at the workspace", 0.0, 1.0)
+        self.atlas = atlas(self.region, step, self.length, report)
 
-    def mapped(self, cut: Region, step: float | None, length: float | None) -> PerformanceMap:
+    def map_slice(self, cut: Region, step: float | None) -> PerformanceMap:
         from ..performance.atlas import map_performance
 
         assert self.atlas is not None
-        if cut is self.asked:
+        if cut is self.region:
             return self.atlas.map
         try:
-            return map_performance(cut, step, length)
+            return map_performance(cut, step, self.length)
         except PoseError as error:
-            axis = next(axis for axis in self.asked.free_axes if axis in cut.fixed_axes)
+            axis = next(axis for axis in self.region.free_axes if axis in cut.fixed_axes)
             raise InputError(f"{axis}={cut.fixed_axes[axis]:g}: {error}", "--slice") from None
 
     @property
@@ -202,39 +215,40 @@ class _Found:
         for verdict in ("refuted", "undecided"):
             if any(proof.verdict == verdict for proof in self.proofs):
                 return verdict
-        return "off limits" if self.broken else "ok"
+        return "off limits" if self.broken_limit else "ok"
 
     @property
     def refused(self) -> bool:
-        return bool(self.broken) or any(proof.verdict == "refuted" for proof in self.proofs)
+        return bool(self.broken_limit) or any(proof.verdict == "refuted" for proof in self.proofs)
 
-    def tell(self, json: bool, written: dict[str, str]) -> None:
-        machine = self.machine
+    def print(self, json: bool, written: dict[str, str]) -> None:
+        """Print the results, as JSON or as text, and the files written."""
         if json:
-            told: dict[str, Any] = {
-                "schema": "parakin.atlas/1",
-                "machine": machine.name,
-                "mode": self.asked.mode,
-                "at": {
-                    axis: rim(value, unit)
-                    for axis, unit in zip(machine.axes, machine.axis_units, strict=True)
-                    if (value := self.asked.fixed_axes.get(axis)) is not None
-                },
-                "verdict": self.verdict,
-                "pose": None if self.pose is None else performance_json(self.pose, self.broken),
-                "box": proofs_json(machine, self.spans, self.proofs, self.brackets) if self.spans else None,
-                "region": None if self.atlas is None else atlas_json(self.atlas),
-                "files": written,
-            }
-            print_json(told)
+            print_json(self._encode(written))
             return
         parts = []
-        if self.pose is not None:
-            parts.append(performance_text(self.pose, self.broken))
+        if self.performance is not None:
+            parts.append(format_performance(self.performance, self.broken_limit))
         if self.spans:
-            parts.append(proofs_text(machine, self.spans, self.proofs, self.brackets))
+            parts.append(format_proofs(self.machine, self.spans, self.proofs, self.brackets))
         if self.atlas is not None:
-            parts.append(atlas_text(self.atlas))
+            parts.append(format_atlas(self.atlas))
         if written:
             parts.append("\n".join(f"{kind:<7} {path}" for kind, path in written.items()))
         print("\n\n".join(parts))
+
+    def _encode(self, written: dict[str, str]) -> dict[str, Any]:
+        machine, fixed = self.machine, self.region.fixed_axes
+        units = dict(zip(machine.axes, machine.axis_units, strict=True))
+        proofs = encode_proofs(machine, self.spans, self.proofs, self.brackets) if self.spans else None
+        return {
+            "schema": "parakin.atlas/1",
+            "machine": machine.name,
+            "mode": self.region.mode,
+            "at": {axis: rim(fixed[axis], units[axis]) for axis in machine.axes if axis in fixed},
+            "verdict": self.verdict,
+            "pose": None if self.performance is None else encode_performance(self.performance, self.broken_limit),
+            "box": proofs,
+            "region": None if self.atlas is None else encode_atlas(self.atlas),
+            "files": written,
+        }

@@ -15,8 +15,11 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class Files:
-    """The files to write: of a folder all, else the one of its ending."""
+class AtlasFiles:
+    """The files to write: all of them into a folder, or the one that the path's ending names.
+
+    name : the machine's; maps : how many
+    """
 
     name: str
     path: Path
@@ -28,7 +31,7 @@ class Files:
         if self.path.suffix and self.path.suffix.lower() not in (".png", ".csv") and not self.path.is_dir():
             raise InputError(f'"{self.path}": expected a folder, or a file that ends in .png or .csv', "--output")
 
-    def write(self, found: Atlas, maps: Sequence[PerformanceMap]) -> dict[str, str]:
+    def write(self, atlas: Atlas, maps: Sequence[PerformanceMap]) -> dict[str, str]:
         """Write the maps' pictures and their table; returns the paths."""
         from ..export.atlas_maps import maps_csv, maps_png
         from ..export.files import Content, write_all
@@ -39,8 +42,9 @@ class Files:
         if kind != ".csv":
             for number, drawn in enumerate(maps):
                 key = "map" if self.maps == 1 else f"map {number + 1}"
-                names[key] = self.path.name if kind else f"{self.name}.atlas{_place(drawn, found.map.region)}.png"
-                contents[names[key]] = maps_png(drawn, found.isotropic_on(drawn))
+                position = _format_slice_position(drawn.region, atlas.map.region)
+                names[key] = self.path.name if kind else f"{self.name}.atlas{position}.png"
+                contents[names[key]] = maps_png(drawn, atlas.isotropic_on(drawn))
         if kind != ".png":
             names["table"] = self.path.name if kind else f"{self.name}.atlas.csv"
             contents[names["table"]] = maps_csv(maps)
@@ -49,8 +53,7 @@ class Files:
         return {key: str(folder / name) for key, name in names.items()}
 
 
-def _place(drawn: PerformanceMap, asked: Region) -> str:
-    """Of a slice where it is, for its file's name."""
-    return "".join(
-        f".{axis}{drawn.region.fixed_axes[axis]:g}" for axis in asked.free_axes if axis in drawn.region.fixed_axes
-    )
+def _format_slice_position(cut: Region, region: Region) -> str:
+    """Format where a slice cuts a region, for its file's name."""
+    fixed = cut.fixed_axes
+    return "".join(f".{axis}{fixed[axis]:g}" for axis in region.free_axes if axis in fixed)

@@ -1,28 +1,32 @@
-"""``parakin design``: a machine's sizes from what it is to do."""
+"""``parakin design``: a machine's sizes from the amplification that it must keep."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
 
 from ..errors import InputError, quote, suggest
 from .console import announce_compiling, fixed, print_json
 from .options import Json
-from .regions import length
+from .region_options import parse_length
+
+if TYPE_CHECKING:
+    from ..performance.design import Design
 
 _DIGITS = 4  # of lengths
 
 
-def _families(context: object) -> list[str]:
+def _list_families(context: object) -> list[str]:
     from ..performance.design import DESIGNS
 
     return list(DESIGNS)
 
 
 def design(
-    family: Annotated[str, Parameter(completer=_families)],
+    family: Annotated[str, Parameter(completer=_list_families)],
     /,
     *,
     cube: Annotated[str, Parameter(allow_leading_hyphen=True)],
@@ -43,7 +47,7 @@ def design(
     output
         A machine file to write, .yaml.
     """
-    edge = length(cube, "--cube")
+    edge = parse_length(cube, "--cube")
     assert edge is not None
     if output is not None and output.suffix.lower() not in (".yaml", ".yml"):
         raise InputError(f'"{output}": expected a file name that ends in .yaml', "--output")
@@ -52,40 +56,51 @@ def design(
 
     if family not in DESIGNS:
         raise InputError(f"unknown family {quote(family)}{suggest(family, DESIGNS)}", "design")
-    found = DESIGNS[family](edge, amplification)
+    result = DESIGNS[family](edge, amplification)
     files: dict[str, str] = {}
     if output is not None:
         from ..export.design import design_yaml
         from ..export.files import write_all
 
-        write_all(output.parent, {output.name: design_yaml(found)})
+        write_all(output.parent, {output.name: design_yaml(result)})
         files["machine"] = str(output)
-    low, high = found.cube
-    least, greatest = found.proof.brackets
     if json:
-        print_json(
-            {
-                "schema": "parakin.design/1",
-                "family": family,
-                "edge": found.edge,
-                "amplification": found.amplification,
-                "rod": found.rod,
-                "stroke": list(found.stroke),
-                "cube": [[low] * 3, [high] * 3],
-                "verdict": found.proof.verdict,
-                "tolerance": found.proof.tolerance,
-                "psi": {"least": [least.low, least.high], "greatest": [greatest.low, greatest.high]},
-                "files": files,
-            }
-        )
+        print_json(_encode_design(result, files))
         return 0
-    bound = f"{found.amplification:.9g}"
-    print(f"{family} for a cube of {found.edge:.9g} mm, 1/{bound} <= psi <= {bound}\n")
-    print(f"rod     {fixed(found.rod, _DIGITS)} mm")
-    print(f"stroke  {fixed(found.stroke[0], _DIGITS)} to {fixed(found.stroke[1], _DIGITS)} mm")
-    print(f"cube    {fixed(low, _DIGITS)} to {fixed(high, _DIGITS)} mm on each axis")
-    verdict = f"{found.proof.verdict} to {found.proof.tolerance:g}"
-    print(f"psi     {least.attained:.6f} to {greatest.attained:.6f}, {verdict}")
+    print(_format_design(result))
     if output is not None:
         print(f"\nmachine {output}")
     return 0
+
+
+def _encode_design(design: Design, files: Mapping[str, str]) -> dict[str, Any]:
+    low, high = design.cube
+    least, greatest = design.proof.brackets
+    return {
+        "schema": "parakin.design/1",
+        "family": design.family,
+        "edge": design.edge,
+        "amplification": design.amplification,
+        "rod": design.rod,
+        "stroke": list(design.stroke),
+        "cube": [[low] * 3, [high] * 3],
+        "verdict": design.proof.verdict,
+        "tolerance": design.proof.tolerance,
+        "psi": {"least": [least.low, least.high], "greatest": [greatest.low, greatest.high]},
+        "files": files,
+    }
+
+
+def _format_design(design: Design) -> str:
+    (low, high), (first, last) = design.cube, design.stroke
+    least, greatest = design.proof.brackets
+    bound, verdict = f"{design.amplification:.9g}", f"{design.proof.verdict} to {design.proof.tolerance:g}"
+    return "\n".join(
+        [
+            f"{design.family} for a cube of {design.edge:.9g} mm, 1/{bound} <= psi <= {bound}\n",
+            f"rod     {fixed(design.rod, _DIGITS)} mm",
+            f"stroke  {fixed(first, _DIGITS)} to {fixed(last, _DIGITS)} mm",
+            f"cube    {fixed(low, _DIGITS)} to {fixed(high, _DIGITS)} mm on each axis",
+            f"psi     {least.attained:.6f} to {greatest.attained:.6f}, {verdict}",
+        ]
+    )

@@ -11,11 +11,11 @@ from cyclopts import Parameter
 
 from ..errors import InputError, PoseError
 from .console import Progress, announce_compiling, json_text, print_json, say
-from .methods import Effort, Method, found_by
 from .options import OFF_LIMITS, Json, Mode, Name, Sizes, machine_of
-from .regions import At, Every, Some, Without, length, region_of
-from .within import Within, looked_within, within_summary, within_told
-from .workspace_summary import summary
+from .region_options import At, Every, Some, Without, parse_length, read_region
+from .workspace_inside import InsideOptions, encode_inside, explore_inside, format_inside
+from .workspace_methods import Effort, Method, find_workspace
+from .workspace_summary import format_workspace
 
 if TYPE_CHECKING:
     from ..export.files import Content
@@ -125,9 +125,9 @@ def workspace(
     The exit code is 3 if a file has nothing to be filled with, for the workspace is empty.
     """
     machine = machine_of(name, sizes)
-    asked = region_of(machine, at, every, some, dexterous, without, mode)
-    effort = Effort(gap, length(cell, "--cell"), time, length(step, "--step"))
-    files = _files(output or (), method, len(asked.free_axes))
+    region = read_region(machine, at, every, some, dexterous, without, mode)
+    effort = Effort(gap, parse_length(cell, "--cell"), time, parse_length(step, "--step"))
+    files = _sort_files(output or (), method, len(region.free_axes))
     announce_compiling()
     from ..export.workspace.files import Drawing, drawing
     from ..export.workspace.summary import account
@@ -135,21 +135,21 @@ def workspace(
 
     began = clock.monotonic()
     with Progress() as progress:
-        sketched = json or bool(set(files) - {".vtu", ".csv"})
-        found = found_by(method, asked, effort, progress.part("looking for it", 0.0, 0.6 if sketched else 1.0))
+        is_drawn = json or bool(set(files) - {".vtu", ".csv"})
+        found = find_workspace(method, region, effort, progress.part("looking for it", 0.0, 0.6 if is_drawn else 1.0))
         seconds = clock.monotonic() - began
         drawn = Drawing(found, None, ())
-        if sketched:
+        if is_drawn:
             drawn = drawing(found, effort.step, progress.part("drawing", 0.6, 1.0))
-        told = account(found, drawn.slices)
-        within = looked_within(asked, Within(box, shape, around, parts, start))
-        told.update(within_told(within))
-        told["parameters"] = {"step": effort.step, **told["parameters"], "set": list(sizes or ())}
-        written, refused = _written(files, drawn, told)
+        content = account(found, drawn.slices)
+        inside = explore_inside(region, InsideOptions(box, shape, around, parts, start))
+        content.update(encode_inside(inside))
+        content["parameters"] = {"step": effort.step, **content["parameters"], "set": list(sizes or ())}
+        written, refused = _write_files(files, drawn, content)
     if json:
-        print_json({**told, "files": written})
+        print_json({**content, "files": written})
     else:
-        print(summary(found, seconds) + within_summary(within))
+        print(format_workspace(found, seconds) + format_inside(inside))
         if written:
             print("\n" + "\n".join(f"{kind:<5} {path}" for kind, path in written.items()))
     for path, reason in refused.items():
@@ -159,28 +159,28 @@ def workspace(
     return OFF_LIMITS if refused else 0
 
 
-def _files(paths: Sequence[Path], method: str, dimension: int) -> dict[str, Path]:
-    """The files by their endings."""
+def _sort_files(paths: Sequence[Path], method: str, dimension: int) -> dict[str, Path]:
+    """Sort the files by their endings; unknown, repeated and unfit ones are refused."""
     from ..export.workspace.files import SUFFIXES, unfit
 
-    found: dict[str, Path] = {}
+    files: dict[str, Path] = {}
     for path in paths:
         suffix = path.suffix.lower()
         if suffix not in SUFFIXES:
             raise InputError(f'"{path}": expected a file name that ends in {", ".join(SUFFIXES)}', "--output")
-        if suffix in found:
+        if suffix in files:
             raise InputError(f'"{path}": a second {suffix}', "--output")
         reason = unfit(suffix, method, dimension)
         if reason:
             raise InputError(f'"{path}": {reason}', "--output")
-        found[suffix] = path
-    return found
+        files[suffix] = path
+    return files
 
 
-def _written(
-    files: Mapping[str, Path], drawn: Drawing, told: Mapping[str, Any]
+def _write_files(
+    files: Mapping[str, Path], drawn: Drawing, content: Mapping[str, Any]
 ) -> tuple[dict[str, str], dict[Path, str]]:
-    """The files written, by their endings without the dot, and those that were not, with the reason."""
+    """Write files; returns those written, by their endings without the dot, and those refused, with the reason."""
     from ..export.files import write_all
 
     contents: dict[str, Content] = {}
@@ -192,10 +192,10 @@ def _written(
             refused[path] = str(error)
     written = {suffix.removeprefix("."): str(files[suffix]) for suffix in contents}
     if ".json" in contents:
-        contents[".json"] = json_text({**told, "files": written})
+        contents[".json"] = json_text({**content, "files": written})
     folders: dict[Path, dict[str, Content]] = {}
-    for suffix, content in contents.items():
-        folders.setdefault(files[suffix].parent, {})[files[suffix].name] = content
+    for suffix, data in contents.items():
+        folders.setdefault(files[suffix].parent, {})[files[suffix].name] = data
     for folder, group in folders.items():
         write_all(folder, group)
     return written, refused

@@ -1,4 +1,4 @@
-"""What ``parakin workspace`` says of a workspace to people."""
+"""The text that ``parakin workspace`` prints of a workspace."""
 
 from __future__ import annotations
 
@@ -21,66 +21,67 @@ _STOPPED = {
 }
 
 
-def summary(found: Workspace | SampledWorkspace, seconds: float) -> str:
-    """The account for people."""
+def format_workspace(workspace: Workspace | SampledWorkspace, seconds: float) -> str:
+    """Format a workspace for people, and the time it took, s."""
     from ..export.workspace.summary import heading
     from ..workspaces.certified.workspace import Workspace
     from ..workspaces.sampled.grid import GridWorkspace
 
-    head = heading(found)
-    if isinstance(found, Workspace) and found.empty:
+    head = heading(workspace)
+    if isinstance(workspace, Workspace) and workspace.empty:
         return f"{head}\n\nempty: no pose is allowed, proved in {seconds:.1f} s"
-    rows = _proved(found) if isinstance(found, Workspace) else _estimated(found)
-    bounds = []
-    if isinstance(found, Workspace | GridWorkspace):
-        if found.box is not None:
-            ends = zip(found.axes, *found.box, strict=True)
+    rows = _list_certified(workspace) if isinstance(workspace, Workspace) else _list_sampled(workspace)
+    limits = []
+    if isinstance(workspace, Workspace | GridWorkspace):
+        if workspace.box is not None:
+            ends = zip(workspace.axes, *workspace.box, strict=True)
             rows += [
                 ("" if i else "within", f"{axis} {fixed(low, 1)} to {fixed(high, 1)} mm")
                 for i, (axis, low, high) in enumerate(ends)
             ]
-        if found.centroid is not None:
-            rows.append(("centroid", _place(found.axes, found.centroid.tolist())))
-        bounds = [
-            (bound.limit, f"{bound.fraction:.1%}", _place(found.axes, bound.middle)) for bound in found.bounded_by
+        if workspace.centroid is not None:
+            rows.append(("centroid", _format_position(workspace.axes, workspace.centroid.tolist())))
+        limits = [
+            (limit.limit, f"{limit.fraction:.1%}", _format_position(workspace.axes, limit.middle))
+            for limit in workspace.bounded_by
         ]
     rows.append(("time", f"{seconds:.1f} s"))
     lines = [head, "", *(f"{name:<8}  {text}" for name, text in rows)]
-    if bounds:
-        lines += ["", table(bounds, ("bounded by", "share", "about"), " r")]
+    if limits:
+        lines += ["", table(limits, ("bounded by", "share", "about"), " r")]
     return "\n".join(lines)
 
 
-def _proved(found: Workspace) -> list[tuple[str, str]]:
+def _list_certified(workspace: Workspace) -> list[tuple[str, str]]:
     from ..export.workspace.summary import amount, between
 
-    volume, d, cells = found.volume, len(found.axes), found.cells
+    volume, d, cells = workspace.volume, len(workspace.axes), workspace.cells
     inside = int(cells.inside.sum())
     return [
-        (_what(d), f"{volume.estimate:,.0f} {found.unit}, {amount(volume.estimate, d)}"),
-        ("proved", f"{volume.inner:,.0f} to {volume.outer:,.0f} {found.unit}, between {between(volume, d)}"),
-        ("gap", f"{volume.gap:.2%}, {_STOPPED[found.stopped]}"),
+        (_name_volume(d), f"{volume.estimate:,.0f} {workspace.unit}, {amount(volume.estimate, d)}"),
+        ("proved", f"{volume.inner:,.0f} to {volume.outer:,.0f} {workspace.unit}, between {between(volume, d)}"),
+        ("gap", f"{volume.gap:.2%}, {_STOPPED[workspace.stopped]}"),
         ("cells", f"{inside:,} inside, {len(cells.low) - inside:,} at the boundary"),
     ]
 
 
-def _estimated(found: SampledWorkspace) -> list[tuple[str, str]]:
+def _list_sampled(workspace: SampledWorkspace) -> list[tuple[str, str]]:
     from ..export.workspace.summary import amount, note
 
-    d = len(found.axes)
+    d, estimate = len(workspace.axes), workspace.estimate
     rows = [
-        (_what(d), f"{found.estimate:,.0f} {found.unit}, {amount(found.estimate, d)}; an estimate, nothing is proved"),
-        ("step", f"{found.step:,.4g} {'mm' if found.method != 'drives' else 'mm, of the drives'}"),
+        (_name_volume(d), f"{estimate:,.0f} {workspace.unit}, {amount(estimate, d)}; an estimate, nothing is proved"),
+        ("step", f"{workspace.step:,.4g} {'mm' if workspace.method != 'drives' else 'mm, of the drives'}"),
     ]
-    if not found.estimate > 0.0:
-        rows[0] = (_what(d), "none of the places looked at is allowed; nothing is proved")
-    said = note(found)
-    return rows + ([("note", said)] if said else [])
+    if not estimate > 0.0:
+        rows[0] = (_name_volume(d), "none of the places looked at is allowed; nothing is proved")
+    text = note(workspace)
+    return rows + ([("note", text)] if text else [])
 
 
-def _what(dimension: int) -> str:
+def _name_volume(dimension: int) -> str:
     return ("length", "area", "volume")[dimension - 1]
 
 
-def _place(axes: Sequence[str], values: Sequence[float]) -> str:
+def _format_position(axes: Sequence[str], values: Sequence[float]) -> str:
     return "  ".join(f"{axis} {fixed(value, 1)}" for axis, value in zip(axes, values, strict=True)) + " mm"

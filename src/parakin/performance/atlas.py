@@ -18,6 +18,7 @@ from .certified.counterexamples import ZERO
 from .characteristic_length import CharacteristicLength, choose_characteristic_length
 from .extremes import Extreme, Side, compute_slack, find_extremes, find_isotropic_poses
 from .indices import Performance, compute_performance
+from .singularities import compute_singularity_margins
 
 MOST = 4_000_000  # positions of a grid
 _ALONG = {1: 400, 2: 120, 3: 36}  # positions along the longest side, at most, if no step is given
@@ -77,6 +78,12 @@ class Atlas:
         """Names of the margins that are not positive all over the region: it meets these singularities."""
         names = self.map.performance.margin_names
         return tuple(e.quantity for e in self.extremes if e.quantity in names and e.value <= ZERO)
+
+    @cached_property
+    def isotropic_margins(self) -> Array:
+        """The parallel margin at the isotropic poses, (k,): below zero, a singularity separates them from home."""
+        region, length = self.map.region, self.map.performance.length.value
+        return compute_singularity_margins(self.machine, self.isotropic, length, region.mode)[:, 0]
 
     def extreme(self, quantity: str, side: Side) -> Extreme:
         """One of :attr:`extremes`: of ``condition``, ``greatest``, ``least``, ``manipulability`` or of a margin."""

@@ -1,4 +1,4 @@
-"""The options that say which workspace is asked for, read: ``--at B=0 --every A=-15:15``."""
+"""The options that make a region, such as ``--at B=0 --every A=-15:15``, and values of axes in options."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ Without = Annotated[
 ]
 
 
-def region_of(
+def read_region(
     machine: Machine,
     at: str | None = None,
     every: str | None = None,
@@ -44,20 +44,20 @@ def region_of(
     without: Sequence[str] | None = None,
     mode: str | None = None,
 ) -> Region:
-    """The region that the options ask for; what is wrong with one of them is told with its name."""
+    """Make the region of the options; an error names the option that is invalid by itself."""
     from ..workspaces.certified.region import make_region
 
-    given: dict[str, Any] = {
-        "at": values_of(machine, at, "--at"),
-        "every": ranges_of(machine, every, "--every"),
-        "some": ranges_of(machine, some, "--some"),
+    arguments: dict[str, Any] = {
+        "at": parse_axis_values(machine, at, "--at"),
+        "every": parse_axis_ranges(machine, every, "--every"),
+        "some": parse_axis_ranges(machine, some, "--some"),
         "without": without or (),
         "mode": mode,
     }
     try:
-        return make_region(machine, dexterous=dexterous, **given)
+        return make_region(machine, dexterous=dexterous, **arguments)
     except PoseError:
-        for option, value in given.items():  # which of them is invalid by itself
+        for option, value in arguments.items():
             try:
                 make_region(machine, **{option: value})
             except PoseError as error:
@@ -65,16 +65,18 @@ def region_of(
         raise
 
 
-def values_of(machine: Machine, text: str | None, source: str) -> dict[str, float]:
-    """Axes with a value each, mm and rad: ``B=0,C=0``."""
-    return {axis: parse_value(axis, value, source) for axis, value in parts_of(machine, text, source, "X=10,Z=-1400")}
+def parse_axis_values(machine: Machine, text: str | None, source: str) -> dict[str, float]:
+    """Parse axes with a value each, ``B=0,C=0``: mm and rad."""
+    texts = split_axes(machine, text, source, "X=10,Z=-1400")
+    return {axis: parse_value(axis, value, source) for axis, value in texts.items()}
 
 
-def ranges_of(machine: Machine, text: str | None, source: str) -> dict[str, tuple[float, float]]:
+def parse_axis_ranges(machine: Machine, text: str | None, source: str) -> dict[str, tuple[float, float]]:
+    """Parse axes with a range each, ``A=-15:15``: mm and rad."""
     from ..errors import quote
 
     ranges = {}
-    for axis, value in parts_of(machine, text, source, "A=-15:15,B=-15:15"):
+    for axis, value in split_axes(machine, text, source, "A=-15:15,B=-15:15").items():
         low, colon, high = (part.strip() for part in value.partition(":"))
         if not (low and colon and high):
             raise InputError(f"{axis}: expected a range LOW:HIGH, such as -15:15", source)
@@ -84,11 +86,11 @@ def ranges_of(machine: Machine, text: str | None, source: str) -> dict[str, tupl
     return ranges
 
 
-def parts_of(machine: Machine, text: str | None, source: str, example: str) -> list[tuple[str, str]]:
-    """Axes and what is said of each."""
+def split_axes(machine: Machine, text: str | None, source: str, example: str) -> dict[str, str]:
+    """Split ``AXIS=TEXT,AXIS=TEXT`` into the text of each axis."""
     from ..errors import quote, suggest
 
-    found: dict[str, str] = {}
+    texts: dict[str, str] = {}
     for part in text.split(",") if text is not None else ():
         axis, equals, value = (word.strip() for word in part.partition("="))
         if not (axis and equals and value):
@@ -96,14 +98,14 @@ def parts_of(machine: Machine, text: str | None, source: str, example: str) -> l
         axis = axis.upper()
         if axis not in machine.axes:
             raise InputError(f"unknown axis {quote(axis)}{suggest(axis, machine.axes)}", source)
-        if axis in found:
+        if axis in texts:
             raise InputError(f"{axis} is given twice", source)
-        found[axis] = value
-    return list(found.items())
+        texts[axis] = value
+    return texts
 
 
-def length(text: str | None, source: str) -> float | None:
-    """A length above 0, mm, with or without a unit."""
+def parse_length(text: str | None, source: str) -> float | None:
+    """Parse a length above zero, with or without a unit: mm; None for no text."""
     from ..errors import quote
 
     if text is None:

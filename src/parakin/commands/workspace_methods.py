@@ -1,8 +1,7 @@
-"""The methods by which ``parakin workspace`` finds one, with what each takes of the options."""
+"""The methods by which ``parakin workspace`` finds a workspace, and which options each takes."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from math import ceil
 from typing import TYPE_CHECKING, Literal
@@ -10,6 +9,7 @@ from typing import TYPE_CHECKING, Literal
 from ..errors import InputError
 
 if TYPE_CHECKING:
+    from ..arrays import Progress
     from ..workspaces.certified.region import Region
     from ..workspaces.certified.workspace import Workspace
     from ..workspaces.sampled.sampling import SampledWorkspace
@@ -19,12 +19,12 @@ Method = Literal["certified", "grid", "polar", "drives"]
 GAP, SECONDS = 0.01, 60.0
 _STEPS = {"grid": {1: 10_000, 2: 1000, 3: 200}, "polar": {2: 1000, 3: 400}}  # along the longest edge, by dimension
 _PLANES = 50  # of a polar sweep along that edge
-_CELLS = {2: 512, 3: 64}  # of each drive
+_CELLS = {2: 512, 3: 64}  # of each drive, by the number of drives
 
 
 @dataclass(frozen=True)
 class Effort:
-    """How hard to try: the options that are no part of the question, mm and s; None where one is not given."""
+    """The options that say how precisely to work, mm and s; None for one that is not given."""
 
     gap: float | None
     cell: float | None
@@ -32,19 +32,19 @@ class Effort:
     step: float | None
 
 
-def found_by(
-    method: Method, asked: Region, effort: Effort, progress: Callable[[float], None]
-) -> Workspace | SampledWorkspace:
-    """The workspace; options that the method does not take are refused."""
+def find_workspace(method: Method, region: Region, effort: Effort, progress: Progress) -> Workspace | SampledWorkspace:
+    """Find the workspace of a region by a method; an option that the method does not take is refused."""
     if method == "certified":
-        return _certified(asked, effort, progress)
+        return _certify(region, effort, progress)
     for option in ("gap", "cell", "time"):
         if getattr(effort, option) is not None:
             raise InputError(f"--method {method} has none, only certified has", f"--{option}")
-    return _drives(asked, effort.step, progress) if method == "drives" else _swept(method, asked, effort.step, progress)
+    if method == "drives":
+        return _sweep_drives(region, effort.step, progress)
+    return _sample_positions(method, region, effort.step, progress)
 
 
-def _certified(asked: Region, effort: Effort, progress: Callable[[float], None]) -> Workspace:
+def _certify(region: Region, effort: Effort, progress: Progress) -> Workspace:
     from ..workspaces.certified.workspace import workspace
 
     gap, seconds = GAP if effort.gap is None else effort.gap, SECONDS if effort.time is None else effort.time
@@ -52,30 +52,30 @@ def _certified(asked: Region, effort: Effort, progress: Callable[[float], None])
         raise InputError("expected a number above 0", "--gap")
     if not seconds > 0.0:
         raise InputError("expected a time above 0, in s", "--time")
-    return workspace(asked, gap, effort.cell, seconds, progress)
+    return workspace(region, gap, effort.cell, seconds, progress)
 
 
-def _swept(method: Method, asked: Region, step: float | None, progress: Callable[[float], None]) -> SampledWorkspace:
+def _sample_positions(method: Method, region: Region, step: float | None, progress: Progress) -> SampledWorkspace:
     from ..workspaces.sampled.grid import sample_grid
     from ..workspaces.sampled.polar_sweep import sweep_polar
     from ..workspaces.sampled.sampling import find_bounding_box
 
-    box = find_bounding_box(asked)
+    box = find_bounding_box(region)
     edge = 1.0 if box is None else float((box[1] - box[0]).max())
-    size = edge / _STEPS[method].get(len(asked.free_axes), 1) if step is None else step
+    size = edge / _STEPS[method].get(len(region.free_axes), 1) if step is None else step
     if method == "grid":
-        return sample_grid(asked, size, progress=progress)
-    return sweep_polar(asked, size, planes=max(size, edge / _PLANES), progress=progress)
+        return sample_grid(region, size, progress=progress)
+    return sweep_polar(region, size, planes=max(size, edge / _PLANES), progress=progress)
 
 
-def _drives(asked: Region, step: float | None, progress: Callable[[float], None]) -> SampledWorkspace:
+def _sweep_drives(region: Region, step: float | None, progress: Progress) -> SampledWorkspace:
     from ..workspaces.sampled.drive_sweep import sweep_drives
 
-    machine = asked.machine
-    if asked.kind != "constant" or asked.without or any(axis in asked.fixed_axes for axis in "XYZ"):
+    machine = region.machine
+    if region.kind != "constant" or region.without or any(axis in region.fixed_axes for axis in "XYZ"):
         raise InputError("drives sweeps the whole workspace: no --at, --every, --some or --without", "--method")
     if step is None:
         cells = _CELLS.get(len(machine.joints), 1)
     else:
         cells = max(1, *(ceil((drive.high - drive.low) / step) for drive in machine.drives))
-    return sweep_drives(asked, cells, progress)
+    return sweep_drives(region, cells, progress)

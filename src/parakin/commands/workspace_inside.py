@@ -1,0 +1,180 @@
+"""The inside of a workspace for ``parakin workspace``: the largest box in it, and its connected components."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from ..errors import InputError, PoseError
+from .console import fixed, rim
+from .region_options import parse_axis_values
+
+if TYPE_CHECKING:
+    from ..workspaces.certified.region import Region
+    from ..workspaces.connected.components import Components
+    from ..workspaces.inscribed.largest_box import InscribedBox
+
+
+@dataclass(frozen=True)
+class InsideOptions:
+    """The options, as given."""
+
+    box: bool = False
+    shape: str | None = None
+    around: str | None = None
+    parts: bool = False
+    start: str | None = None
+
+
+@dataclass(frozen=True)
+class Inside:
+    """The largest box and the connected components; None for what is not wanted."""
+
+    box: InscribedBox | None = None
+    components: Components | None = None
+
+
+def explore_inside(region: Region, options: InsideOptions) -> Inside:
+    """Find the box and the components that the options want."""
+    box, components = None, None
+    if options.box or options.shape is not None or options.around is not None:
+        box = _find_box(region, options)
+    if options.parts or options.start is not None:
+        components = _find_components(region, options)
+    return Inside(box, components)
+
+
+def _find_box(region: Region, options: InsideOptions) -> InscribedBox:
+    from ..workspaces.inscribed.largest_box import find_largest_box
+
+    shape = None if options.shape is None else _parse_shape(options.shape)
+    around = None if options.around is None else _parse_position(region, options.around)
+    try:
+        return find_largest_box(region, shape, around)
+    except PoseError as error:
+        source = "--around" if around is not None else "--shape" if shape is not None else "--box"
+        raise InputError(_strip_argument(error), source) from None
+
+
+def _find_components(region: Region, options: InsideOptions) -> Components:
+    from ..workspaces.connected.components import find_components
+
+    machine, start = region.machine, None
+    if options.start is not None:
+        given = parse_axis_values(machine, options.start, "--start")
+        home = zip(machine.axes, machine.home.tolist(), strict=True)
+        start = list(({**dict(home), **region.fixed_axes, **given}).values())
+    try:
+        return find_components(region, start)
+    except PoseError as error:
+        raise InputError(_strip_argument(error), "--parts" if start is None else "--start") from None
+
+
+def _strip_argument(error: PoseError) -> str:
+    """Strip the argument's name from an error: the option stands before it."""
+    name, colon, rest = str(error).partition(": ")
+    return rest if colon and name in ("shape", "around", "start", "cell") else str(error)
+
+
+def _parse_shape(text: str) -> list[float]:
+    from ..errors import quote
+
+    try:
+        return [float(part) for part in text.split(":")]
+    except ValueError:
+        raise InputError(f"{quote(text)}: expected proportions such as 3:3:1", "--shape") from None
+
+
+def _parse_position(region: Region, text: str) -> list[float]:
+    given = parse_axis_values(region.machine, text, "--around")
+    if set(given) != set(region.free_axes):
+        raise InputError(f"expected {', '.join(region.free_axes)}, no more and no less", "--around")
+    return [given[axis] for axis in region.free_axes]
+
+
+def encode_inside(inside: Inside) -> Mapping[str, Any]:
+    """Encode the box and the components for JSON: mm and degrees."""
+    content: dict[str, Any] = {}
+    if inside.box is not None:
+        content["box_inside"] = _encode_box(inside.box)
+    if inside.components is not None:
+        content["parts"] = _encode_components(inside.components)
+    return content
+
+
+def _encode_box(box: InscribedBox) -> dict[str, Any]:
+    return {
+        "low": box.low.tolist(),
+        "high": box.high.tolist(),
+        "volume": box.volume,
+        "proved": box.proved,
+        "tolerance": box.tolerance,
+        "stops": [{"face": stop.face, "limit": stop.limit} for stop in box.stops],
+        "shape": box.parameters["shape"],
+        "around": box.parameters["around"],
+    }
+
+
+def _encode_components(found: Components) -> dict[str, Any]:
+    start, units = found.parameters["start"], found.region.machine.axis_units
+    return {
+        "count": len(found),
+        "at_least": found.at_least,
+        "undecided": found.undecided,
+        "cell": found.cell,
+        "stopped": found.stopped,
+        "holds_start": found.start,
+        "start": start and [rim(value, unit) for value, unit in zip(start, units, strict=True)],
+        "each": [
+            {
+                "sign": component.sign,
+                "volume": {
+                    "inner": component.volume.inner,
+                    "estimate": component.volume.estimate,
+                    "outer": component.volume.outer,
+                },
+                "place": component.position.tolist(),
+                "box": {"low": component.low.tolist(), "high": component.high.tolist()},
+                "apart": component.apart,
+            }
+            for component in found.components
+        ],
+    }
+
+
+def format_inside(inside: Inside) -> str:
+    """Format the box and the components for people."""
+    lines: list[str] = []
+    if inside.box is not None:
+        lines += _format_box(inside.box)
+    if inside.components is not None:
+        lines += _format_components(inside.components)
+    return "".join(f"\n{line}" for line in lines)
+
+
+def _format_box(box: InscribedBox) -> list[str]:
+    from ..export.workspace.summary import amount
+
+    edges = " × ".join(fixed(edge, 1) for edge in box.edges.tolist())
+    lines = ["", f"box inside  {edges} mm, {amount(box.volume, len(box.axes))}, proved"]
+    ends = zip(box.axes, box.low.tolist(), box.high.tolist(), box.stops[::2], box.stops[1::2], strict=True)
+    for axis, low, high, first, last in ends:
+        stops = f"stopped by {first.limit or '-'} and {last.limit or '-'}"
+        lines.append(f"            {axis} {fixed(low, 1)} to {fixed(high, 1)} mm, {stops}")
+    return lines
+
+
+def _format_components(found: Components) -> list[str]:
+    from ..export.workspace.summary import amount, between
+
+    d = len(found.region.free_axes)
+    lines = ["", f"parts that a path can't leave  {len(found)}, at least {found.at_least} proved to be different"]
+    for number, component in enumerate(found.components):
+        sign = "as at home" if component.sign > 0 else "the other assembly"
+        here = ", holds the start" if number == found.start else ""
+        size = amount(component.volume.estimate, d)
+        lines.append(f"            {size}, between {between(component.volume, d)}, {sign}{here}")
+    if found.undecided >= 0.005:
+        lines.append(f"            undecided {amount(found.undecided, d)}")
+    return lines

@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING, Annotated, Any
 from cyclopts import Parameter
 
 from ..errors import InputError, PoseError, quote
-from ..units import NUMBER, QuantityError, parse_quantity
+from ..export.json.performance import encode_atlas, encode_performance, encode_proofs
+from ..units import NUMBER, QuantityError, parse_quantity, to_display
 from .atlas_files import AtlasFiles
-from .atlas_json import encode_atlas, encode_performance, encode_proofs
 from .atlas_summary import format_atlas, format_performance, format_proofs
-from .console import Progress, announce_compiling, print_json, rim
+from .console import Progress, announce_compiling, print_json
 from .options import OFF_LIMITS, Json, Mode, Name, Sizes, machine_of
 from .region_options import (
     At,
@@ -245,7 +245,7 @@ class _AtlasResults:
             "schema": "parakin.atlas/1",
             "machine": machine.name,
             "mode": self.region.mode,
-            "at": {axis: rim(fixed[axis], units[axis]) for axis in machine.axes if axis in fixed},
+            "at": {axis: to_display(fixed[axis], units[axis]) for axis in machine.axes if axis in fixed},
             "verdict": self.verdict,
             "pose": None if self.performance is None else encode_performance(self.performance, self.broken_limit),
             "box": proofs,

@@ -5,8 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
-from .atlas_json import encode_pose
-from .console import fixed, rim, rim_unit, table
+from ..export.json.performance import encode_pose
+from ..export.number_format import format_fixed
+from ..units import display_unit, to_display
+from .console import format_table
 
 if TYPE_CHECKING:
     from ..arrays import Array
@@ -27,7 +29,13 @@ def _format_number(value: float) -> str:
 def _format_pose(machine: Machine, pose: Array, axes: Sequence[str] | None = None) -> str:
     """Format a pose, ``X 10.000, Y 0.000``: all axes or some, mm and degrees."""
     values = encode_pose(machine, pose)
-    return ", ".join(f"{axis} {fixed(value, 3)}" for axis, value in values.items() if axes is None or axis in axes)
+    return ", ".join(
+        f"{axis} {format_fixed(value, 3)}" for axis, value in values.items() if axes is None or axis in axes
+    )
+
+
+def _format_axis_value(value: float, unit: str) -> str:
+    return format_fixed(to_display(value, unit), 3)
 
 
 def _format_length(length: CharacteristicLength) -> str:
@@ -45,14 +53,14 @@ def format_performance(performance: Performance, broken_limit: str) -> str:
         *((f"margin {name}", _format_number(margin)) for name, margin in margins),
     ]
     lines += [_format_length(performance.length)] * (performance.length.value is not None)
-    lines += ["", table(rows, ("singularities at 0", ""), " r"), ""]
+    lines += ["", format_table(rows, ("singularities at 0", ""), " r"), ""]
     columns = (performance.psi.tolist(), performance.force.tolist(), performance.directions.tolist())
     axes = [
         (_format_number(p), _format_number(f), *(_format_number(round(x, 6)) for x in direction))
         for p, f, direction in zip(*columns, strict=True)
     ]
     head = ("velocity psi", "force 1/psi", *performance.twist)
-    lines.append(table(axes, head, "r" * len(head)))
+    lines.append(format_table(axes, head, "r" * len(head)))
     return "\n".join(lines)
 
 
@@ -63,7 +71,7 @@ def format_atlas(atlas: Atlas) -> str:
     head = f"{machine.name} over the workspace"
     if atlas.map.region.fixed_axes:
         head += " at " + ", ".join(
-            f"{axis} {fixed(rim(value, units[axis]), 3)}" for axis, value in atlas.map.region.fixed_axes.items()
+            f"{axis} {_format_axis_value(value, units[axis])}" for axis, value in atlas.map.region.fixed_axes.items()
         )
     lines = [head, f"{len(inside.poses):,} places on a grid of {atlas.map.step:g} mm, extremes found between them"]
     lines += [_format_length(inside.length)] * (inside.length.value is not None)
@@ -73,7 +81,7 @@ def format_atlas(atlas: Atlas) -> str:
         name = f"margin {name}" if extreme.quantity in inside.margin_names else name
         pose = _format_pose(machine, extreme.pose, axes)
         rows.append((name, extreme.side, _format_number(extreme.value), pose))
-    lines += ["", table(rows, ("", "", "", "at [mm]"), "  r"), ""]
+    lines += ["", format_table(rows, ("", "", "", "at [mm]"), "  r"), ""]
     if atlas.singular:
         lines.append(f"singular: the workspace meets {', '.join(atlas.singular)}")
     several = "" if atlas.isolated else " (samples of a curve of them)"
@@ -93,10 +101,11 @@ def format_proofs(
 ) -> str:
     """Format proofs over the box of ``spans``, and brackets of the amplification there."""
     units = dict(zip(machine.axes, machine.axis_units, strict=True))
-    sides = [
-        f"{axis} {fixed(rim(low, units[axis]), 3)} to {fixed(rim(high, units[axis]), 3)} {rim_unit(units[axis])}"
-        for axis, (low, high) in spans.items()
-    ]
+    sides = []
+    for axis, (low, high) in spans.items():
+        unit = units[axis]
+        ends = f"{_format_axis_value(low, unit)} to {_format_axis_value(high, unit)}"
+        sides.append(f"{axis} {ends} {display_unit(unit)}")
     lines = [f"{machine.name} all over {', '.join(sides)}", ""]
     width = max(len(proof.claim) for proof in proofs)
     for proof in proofs:

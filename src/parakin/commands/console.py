@@ -11,10 +11,6 @@ from types import TracebackType
 from typing import TYPE_CHECKING, Any
 
 from ..export.json.text import format_json
-from ..export.json.text import format_json as json_text
-from ..export.number_format import format_fixed as fixed
-from ..units import display_unit as rim_unit
-from ..units import to_display as rim
 
 if TYPE_CHECKING:
     from rich.progress import Progress as Bar
@@ -93,19 +89,3 @@ class Progress(AbstractContextManager["Progress"]):
             self.bar.add_task(what, total=1.0)
             self.bar.start()
         self.bar.update(self.bar.task_ids[0], description=what, completed=fraction)
-
-
-# Names that other commands still use.
-__all__ = [
-    "Progress",
-    "announce_compiling",
-    "fixed",
-    "format_table",
-    "json_text",
-    "print_json",
-    "rim",
-    "rim_unit",
-    "say",
-    "table",
-]
-table = format_table

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
 from ..errors import InputError, quote, suggest
-from .console import announce_compiling, fixed, print_json
+from ..export.json.design import encode_design
+from ..export.number_format import format_fixed
+from .console import announce_compiling, print_json
 from .options import Json
 from .region_options import parse_length
 
@@ -65,30 +66,12 @@ def design(
         write_all(output.parent, {output.name: design_yaml(result)})
         files["machine"] = str(output)
     if json:
-        print_json(_encode_design(result, files))
+        print_json(encode_design(result, files))
         return 0
     print(_format_design(result))
     if output is not None:
         print(f"\nmachine {output}")
     return 0
-
-
-def _encode_design(design: Design, files: Mapping[str, str]) -> dict[str, Any]:
-    low, high = design.cube
-    least, greatest = design.proof.brackets
-    return {
-        "schema": "parakin.design/1",
-        "family": design.family,
-        "edge": design.edge,
-        "amplification": design.amplification,
-        "rod": design.rod,
-        "stroke": list(design.stroke),
-        "cube": [[low] * 3, [high] * 3],
-        "verdict": design.proof.verdict,
-        "tolerance": design.proof.tolerance,
-        "psi": {"least": [least.low, least.high], "greatest": [greatest.low, greatest.high]},
-        "files": files,
-    }
 
 
 def _format_design(design: Design) -> str:
@@ -98,9 +81,9 @@ def _format_design(design: Design) -> str:
     return "\n".join(
         [
             f"{design.family} for a cube of {design.edge:.9g} mm, 1/{bound} <= psi <= {bound}\n",
-            f"rod     {fixed(design.rod, _DIGITS)} mm",
-            f"stroke  {fixed(first, _DIGITS)} to {fixed(last, _DIGITS)} mm",
-            f"cube    {fixed(low, _DIGITS)} to {fixed(high, _DIGITS)} mm on each axis",
+            f"rod     {format_fixed(design.rod, _DIGITS)} mm",
+            f"stroke  {format_fixed(first, _DIGITS)} to {format_fixed(last, _DIGITS)} mm",
+            f"cube    {format_fixed(low, _DIGITS)} to {format_fixed(high, _DIGITS)} mm on each axis",
             f"psi     {least.attained:.6f} to {greatest.attained:.6f}, {verdict}",
         ]
     )

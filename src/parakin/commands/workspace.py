@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 from cyclopts import Parameter
 
 from ..errors import InputError, PoseError
-from .console import Progress, announce_compiling, json_text, print_json, say
+from ..export.json.text import format_json
+from .console import Progress, announce_compiling, print_json, say
 from .options import OFF_LIMITS, Json, Mode, Name, Sizes, machine_of
 from .region_options import At, Every, Some, Without, parse_length, read_region
 from .workspace_inside import InsideOptions, encode_inside, explore_inside, format_inside
@@ -192,7 +193,7 @@ def _write_files(
             refused[path] = str(error)
     written = {suffix.removeprefix("."): str(files[suffix]) for suffix in contents}
     if ".json" in contents:
-        contents[".json"] = json_text({**content, "files": written})
+        contents[".json"] = format_json({**content, "files": written})
     folders: dict[Path, dict[str, Content]] = {}
     for suffix, data in contents.items():
         folders.setdefault(files[suffix].parent, {})[files[suffix].name] = data

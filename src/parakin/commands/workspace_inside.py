@@ -7,7 +7,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from ..errors import InputError, PoseError
-from .console import fixed, rim
+from ..export.json.workspace_inside import encode_box, encode_components
+from ..export.number_format import format_fixed
 from .region_options import parse_axis_values
 
 if TYPE_CHECKING:
@@ -97,50 +98,10 @@ def encode_inside(inside: Inside) -> Mapping[str, Any]:
     """Encode the box and the components for JSON: mm and degrees."""
     content: dict[str, Any] = {}
     if inside.box is not None:
-        content["box_inside"] = _encode_box(inside.box)
+        content["box_inside"] = encode_box(inside.box)
     if inside.components is not None:
-        content["parts"] = _encode_components(inside.components)
+        content["parts"] = encode_components(inside.components)
     return content
-
-
-def _encode_box(box: InscribedBox) -> dict[str, Any]:
-    return {
-        "low": box.low.tolist(),
-        "high": box.high.tolist(),
-        "volume": box.volume,
-        "proved": box.proved,
-        "tolerance": box.tolerance,
-        "stops": [{"face": stop.face, "limit": stop.limit} for stop in box.stops],
-        "shape": box.parameters["shape"],
-        "around": box.parameters["around"],
-    }
-
-
-def _encode_components(found: Components) -> dict[str, Any]:
-    start, units = found.parameters["start"], found.region.machine.axis_units
-    return {
-        "count": len(found),
-        "at_least": found.at_least,
-        "undecided": found.undecided,
-        "cell": found.cell,
-        "stopped": found.stopped,
-        "holds_start": found.start,
-        "start": start and [rim(value, unit) for value, unit in zip(start, units, strict=True)],
-        "each": [
-            {
-                "sign": component.sign,
-                "volume": {
-                    "inner": component.volume.inner,
-                    "estimate": component.volume.estimate,
-                    "outer": component.volume.outer,
-                },
-                "place": component.position.tolist(),
-                "box": {"low": component.low.tolist(), "high": component.high.tolist()},
-                "apart": component.apart,
-            }
-            for component in found.components
-        ],
-    }
 
 
 def format_inside(inside: Inside) -> str:
@@ -156,12 +117,12 @@ def format_inside(inside: Inside) -> str:
 def _format_box(box: InscribedBox) -> list[str]:
     from ..export.workspace.summary import amount
 
-    edges = " × ".join(fixed(edge, 1) for edge in box.edges.tolist())
+    edges = " × ".join(format_fixed(edge, 1) for edge in box.edges.tolist())
     lines = ["", f"box inside  {edges} mm, {amount(box.volume, len(box.axes))}, proved"]
     ends = zip(box.axes, box.low.tolist(), box.high.tolist(), box.stops[::2], box.stops[1::2], strict=True)
     for axis, low, high, first, last in ends:
         stops = f"stopped by {first.limit or '-'} and {last.limit or '-'}"
-        lines.append(f"            {axis} {fixed(low, 1)} to {fixed(high, 1)} mm, {stops}")
+        lines.append(f"            {axis} {format_fixed(low, 1)} to {format_fixed(high, 1)} mm, {stops}")
     return lines
 
 

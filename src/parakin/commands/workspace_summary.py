@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from .console import fixed, table
+from ..export.number_format import format_fixed
+from .console import format_table
 
 if TYPE_CHECKING:
     from ..workspaces.certified.workspace import Workspace
@@ -36,7 +37,7 @@ def format_workspace(workspace: Workspace | SampledWorkspace, seconds: float) ->
         if workspace.box is not None:
             ends = zip(workspace.axes, *workspace.box, strict=True)
             rows += [
-                ("" if i else "within", f"{axis} {fixed(low, 1)} to {fixed(high, 1)} mm")
+                ("" if i else "within", f"{axis} {format_fixed(low, 1)} to {format_fixed(high, 1)} mm")
                 for i, (axis, low, high) in enumerate(ends)
             ]
         if workspace.centroid is not None:
@@ -48,7 +49,7 @@ def format_workspace(workspace: Workspace | SampledWorkspace, seconds: float) ->
     rows.append(("time", f"{seconds:.1f} s"))
     lines = [head, "", *(f"{name:<8}  {text}" for name, text in rows)]
     if limits:
-        lines += ["", table(limits, ("bounded by", "share", "about"), " r")]
+        lines += ["", format_table(limits, ("bounded by", "share", "about"), " r")]
     return "\n".join(lines)
 
 
@@ -84,4 +85,4 @@ def _name_volume(dimension: int) -> str:
 
 
 def _format_position(axes: Sequence[str], values: Sequence[float]) -> str:
-    return "  ".join(f"{axis} {fixed(value, 1)}" for axis, value in zip(axes, values, strict=True)) + " mm"
+    return "  ".join(f"{axis} {format_fixed(value, 1)}" for axis, value in zip(axes, values, strict=True)) + " mm"

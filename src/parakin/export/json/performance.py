@@ -5,22 +5,22 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-from .console import rim
+from ...units import to_display
 
 if TYPE_CHECKING:
-    from ..arrays import Array
-    from ..machine import Machine
-    from ..performance.atlas import Atlas
-    from ..performance.certified.amplification import Bracket
-    from ..performance.certified.proofs import Proof
-    from ..performance.characteristic_length import CharacteristicLength
-    from ..performance.indices import Performance
+    from ...arrays import Array
+    from ...machine import Machine
+    from ...performance.atlas import Atlas
+    from ...performance.certified.amplification import Bracket
+    from ...performance.certified.proofs import Proof
+    from ...performance.characteristic_length import CharacteristicLength
+    from ...performance.indices import Performance
 
 
 def encode_pose(machine: Machine, pose: Array) -> dict[str, float]:
     """Encode a pose by its axes, mm and degrees."""
     values = zip(machine.axes, pose.tolist(), machine.axis_units, strict=True)
-    return {axis: rim(value, unit) for axis, value, unit in values}
+    return {axis: to_display(value, unit) for axis, value, unit in values}
 
 
 def _encode_length(length: CharacteristicLength) -> dict[str, Any]:
@@ -81,7 +81,7 @@ def encode_proofs(
     """Encode proofs over the box of ``spans``, and brackets of the amplification there."""
     units = dict(zip(machine.axes, machine.axis_units, strict=True))
     return {
-        "spans": {axis: [rim(end, units[axis]) for end in span] for axis, span in spans.items()},
+        "spans": {axis: [to_display(end, units[axis]) for end in span] for axis, span in spans.items()},
         "claims": [
             {
                 "claim": proof.claim,

@@ -9,10 +9,10 @@ import pytest
 
 import parakin as pk
 from parakin.export.machine.picture import render_machine_html, render_machine_png
-from parakin.export.machine.scene import around, scene
-from parakin.export.machine.solids import solids
+from parakin.export.machine.scene import build_scene, order_polygon
+from parakin.export.machine.solids import build_solids
 from parakin.export.number_format import format_value
-from parakin.export.report.curves import extremes
+from parakin.export.report.joint_curves import pick_extremes
 from parakin.export.report.report import render_report
 from parakin.toolpath.path import Note, ToolPath
 from parakin.toolpath.posting.post import post_path
@@ -82,7 +82,7 @@ def own_text(html):
 def test_struts_have_their_lengths(machine, at_home):
     pose = machine.home if at_home else near_home(machine)
     joints = dict(zip(machine.joints, machine.inverse(pose), strict=True))
-    drawn = scene(machine, pose)
+    drawn = build_scene(machine, pose)
     lengths = {(part.kind, part.name): np.linalg.norm(np.diff(part.points, axis=0)) for part in drawn.parts}
     for leg in machine.spec.legs:
         first, last = leg.drives[0].name, leg.drives[-1].name
@@ -98,7 +98,7 @@ def test_struts_have_their_lengths(machine, at_home):
 @machines
 def test_the_tool_stands_at_the_pose(machine):
     pose = near_home(machine)
-    drawn = scene(machine, pose)
+    drawn = build_scene(machine, pose)
     tip = drawn.workpiece[:, :3] @ tip_of(machine, pose) + drawn.workpiece[:, 3]
     np.testing.assert_allclose(drawn.frames["tool"][:, 3], tip, atol=1e-9)
     for part in drawn.of("tool"):
@@ -111,7 +111,7 @@ def test_the_tool_stands_at_the_pose(machine):
 
 @machines
 def test_rails_cover_the_range_and_carry_the_feet(machine):
-    drawn = scene(machine)
+    drawn = build_scene(machine)
     for leg in machine.spec.legs:
         for drive, unit in zip(leg.drives, leg.units, strict=True):
             rails = [part for part in drawn.of("rail") if part.name == drive.name]
@@ -127,18 +127,18 @@ def test_rails_cover_the_range_and_carry_the_feet(machine):
 
 @machines
 def test_every_drive_has_a_label(machine):
-    names = ", ".join(name for name, _ in scene(machine).labels).split(", ")
+    names = ", ".join(name for name, _ in build_scene(machine).labels).split(", ")
     assert sorted(names) == sorted(machine.joints)
 
 
 def test_planar_machines_have_a_normal():
-    assert scene(LOADED["hbg80_2d"]).normal.tolist() == [0.0, 0.0, 1.0]
-    assert scene(LOADED["tricept"]).normal is None
+    assert build_scene(LOADED["hbg80_2d"]).normal.tolist() == [0.0, 0.0, 1.0]
+    assert build_scene(LOADED["tricept"]).normal is None
 
 
 def test_out_of_reach_leaves_what_has_a_place():
     machine = LOADED["linear_delta"]
-    drawn = scene(machine, [9000.0, 0.0, 0.0])
+    drawn = build_scene(machine, [9000.0, 0.0, 0.0])
     assert not drawn.of("rod")
     assert drawn.of("platform")
     assert all(np.isfinite(part.points).all() for part in drawn.parts)
@@ -148,22 +148,22 @@ def test_a_free_angle_is_the_paths():
     machine = LOADED["tricept"]
     joints = machine.inverse(machine.home)
     joints[machine.joints.index("theta1")] = 0.7
-    turned = scene(machine, machine.home, joints).frames["tool"]
-    np.testing.assert_allclose(turned[:, 3], scene(machine).frames["tool"][:, 3], atol=1e-9)
+    turned = build_scene(machine, machine.home, joints).frames["tool"]
+    np.testing.assert_allclose(turned[:, 3], build_scene(machine).frames["tool"][:, 3], atol=1e-9)
     assert turned[1, 0] == pytest.approx(np.sin(0.7))
 
 
 def test_around_orders_points():
     square = np.array([[0, 0, 0], [1, 1, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0]], float)
-    ring = around(square)
+    ring = order_polygon(square)
     assert len(ring) == 4
     np.testing.assert_allclose(np.linalg.norm(ring - np.roll(ring, 1, axis=0), axis=1), 1.0)
-    assert len(around(np.array([[0, 0, 0], [1, 0, 0], [3, 0, 0]], float))) == 2
+    assert len(order_polygon(np.array([[0, 0, 0], [1, 0, 0], [3, 0, 0]], float))) == 2
 
 
 @machines
 def test_solids_are_closed(machine):
-    for solid in solids(scene(machine)):
+    for solid in build_solids(build_scene(machine)):
         edges = np.sort(solid.triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
         assert np.isfinite(solid.vertices).all()
         assert (np.unique(edges, axis=0, return_counts=True)[1] == 2).all()
@@ -312,12 +312,12 @@ def test_extremes_are_kept(most):
     values = np.cumsum(rng.normal(size=10_007))
     values[5000:5600] = np.nan
     values[1234], values[9876] = 1e6, -1e6
-    kept = extremes(values, most)
+    kept = pick_extremes(values, most)
     assert (np.diff(kept) > 0).all()
     assert len(kept) <= most + 2
     assert {0, 1234, 9876, 10_006} <= set(kept.tolist())
     assert np.isnan(values[kept]).any()
-    assert len(extremes(values, 20_000)) == len(values)
+    assert len(pick_extremes(values, 20_000)) == len(values)
 
 
 @pytest.mark.parametrize(

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .scene import Points, Scene
-from .solids import LOOKS, Solid, solids
+from .solids import LOOKS, Solid, build_solids
 
 Figure = dict[str, Any]  # plotly's {"data": [traces], "layout": {...}}
 Trace = dict[str, Any]
@@ -26,21 +26,26 @@ INK, FAINT = "#263238", "#e3e8ec"
 _LIGHT = {"ambient": 0.62, "diffuse": 0.75, "specular": 0.15, "roughness": 0.6}
 
 
-def numbers(values: ArrayLike, digits: int = 3) -> list[float | None]:
-    """Rounded numbers for JSON, with None for NaN and infinity: plotly leaves a gap there."""
+def round_numbers(values: ArrayLike, digits: int = 3) -> list[float | None]:
+    """Round numbers for JSON, with None for NaN and infinity: plotly leaves a gap there."""
     array = np.round(np.asarray(values, float).ravel(), digits) + 0.0
     return [v if ok else None for v, ok in zip(array.tolist(), np.isfinite(array).tolist(), strict=True)]
 
 
-def page(title: str, body: str) -> str:
-    """A whole HTML page around a body that may hold :func:`placed` figures; ``body`` is HTML, ``title`` is text."""
+def split_coordinates(points: ArrayLike, digits: int) -> dict[str, list[float | None]]:
+    """Split points (n, 3) into rounded ``x``, ``y`` and ``z`` for a trace."""
+    return {letter: round_numbers(column, digits) for letter, column in zip("xyz", np.asarray(points).T, strict=True)}
+
+
+def render_page(title: str, body: str) -> str:
+    """Render a whole HTML page around a body with figures (:func:`embed_figure`); ``body`` is HTML, ``title`` text."""
     template = Template(files(__package__).joinpath("page.html").read_text("utf-8"))
     script = files("plotly").joinpath("package_data", "plotly.min.js").read_text("utf-8")
     return template.substitute(title=escape(title), body=body, plotly=script)
 
 
-def placed(name: str, figure: Figure, height: str) -> str:
-    """HTML of a figure; ``height`` is a CSS length."""
+def embed_figure(name: str, figure: Figure, height: str) -> str:
+    """Render a figure as HTML; ``height`` is a CSS length."""
     # Within a script element only "<" could end or open anything.
     data = json.dumps(figure, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c")
     return (
@@ -49,21 +54,21 @@ def placed(name: str, figure: Figure, height: str) -> str:
     )
 
 
-def machine_traces(scene: Scene, name: str, scale: float, colour: str | None = None) -> list[Trace]:
-    """A machine as meshes, one a colour; one entry of the legend, ``name``, shows and hides them all.
+def build_machine_traces(scene: Scene, name: str, scale: float, colour: str | None = None) -> list[Trace]:
+    """Build a machine as meshes, one for each colour; one entry of the legend, ``name``, shows and hides them all.
 
-    ``colour`` draws it as a shadow of itself in that one colour.
+    With ``colour`` the machine is drawn as a shadow in that one colour.
     """
     by_kind: dict[str, list[Solid]] = {}
-    for solid in solids(scene, scale):
+    for solid in build_solids(scene, scale):
         by_kind.setdefault(solid.kind if colour is None else "shadow", []).append(solid)
     traces = []
     shown = next((kind for kind in ("telescope", "rod") if kind in by_kind), next(iter(by_kind), ""))
     for kind, group in by_kind.items():
         first = np.cumsum([0, *[len(solid.vertices) for solid in group[:-1]]])
-        x, y, z = np.vstack([solid.vertices for solid in group]).T
         i, j, k = np.vstack([solid.triangles + start for solid, start in zip(group, first, strict=True)]).T
-        trace: Trace = {"type": "mesh3d", "x": numbers(x, 1), "y": numbers(y, 1), "z": numbers(z, 1)}
+        vertices = np.vstack([solid.vertices for solid in group])
+        trace: Trace = {"type": "mesh3d", **split_coordinates(vertices, 1)}
         trace |= {"i": i.tolist(), "j": j.tolist(), "k": k.tolist(), "hoverinfo": "skip", "lighting": _LIGHT}
         trace["lightposition"] = {"x": 4e4, "y": -8e4, "z": 9e4}
         trace |= {"color": colour or LOOKS[kind].colour, "opacity": 1.0 if colour is None else 0.22}
@@ -72,34 +77,28 @@ def machine_traces(scene: Scene, name: str, scale: float, colour: str | None = N
     return traces
 
 
-def label_trace(scene: Scene, name: str) -> Trace:
-    """The drives' names at their places."""
-    x, y, z = np.array([place for _, place in scene.labels]).T
-    trace: Trace = {"type": "scatter3d", "mode": "text", "x": numbers(x, 1), "y": numbers(y, 1), "z": numbers(z, 1)}
+def build_label_trace(scene: Scene, name: str) -> Trace:
+    """Build the drives' names at their places."""
+    places = np.array([place for _, place in scene.labels])
+    trace: Trace = {"type": "scatter3d", "mode": "text", **split_coordinates(places, 1)}
     trace |= {"text": [escape(text) for text, _ in scene.labels], "textfont": {"size": 13, "color": INK}}
     return trace | {"textposition": "top right", "hoverinfo": "skip", "legendgroup": name, "showlegend": False}
 
 
-def frame_traces(frame: Points, size: float, text: str, group: str) -> list[Trace]:
-    """The axes of a frame: X red, Y green, Z blue, with their letters; ``text`` names the frame at its origin."""
+def build_frame_traces(frame: Points, size: float, text: str, group: str) -> list[Trace]:
+    """Build the axes of a frame: X red, Y green, Z blue, with their letters; ``text`` names the frame at its origin."""
     traces = []
     for letter, axis, colour in zip("XYZ", frame[:, :3].T, ("#c62828", "#2e7d32", "#1565c0"), strict=True):
-        x, y, z = np.array([frame[:, 3], frame[:, 3] + size * axis]).T
-        trace: Trace = {
-            "type": "scatter3d",
-            "mode": "lines+text",
-            "x": numbers(x, 1),
-            "y": numbers(y, 1),
-            "z": numbers(z, 1),
-        }
+        ends = np.array([frame[:, 3], frame[:, 3] + size * axis])
+        trace: Trace = {"type": "scatter3d", "mode": "lines+text", **split_coordinates(ends, 1)}
         trace |= {"text": [text if letter == "X" else "", letter], "textfont": {"size": 12, "color": colour}}
         trace |= {"line": {"color": colour, "width": 4}, "hoverinfo": "skip", "showlegend": False, "legendgroup": group}
         traces.append(trace)
     return traces
 
 
-def scene_layout(boxes: Iterable[Points], normal: Points | None) -> Figure:
-    """Layout of a 3D figure around (2, 3) boxes, with equal scales; a planar machine is seen straight on."""
+def build_scene_layout(boxes: Iterable[Points], normal: Points | None) -> Figure:
+    """Lay out a 3D figure around (2, 3) boxes, with equal scales; a planar machine is seen straight on."""
     corners = np.vstack(list(boxes))
     low, high = corners.min(0), corners.max(0)
     pad = 0.09 * float(np.linalg.norm(high - low)) + 1.0
@@ -123,7 +122,7 @@ def scene_layout(boxes: Iterable[Points], normal: Points | None) -> Figure:
         camera["up"] = {"x": 0, "y": 1, "z": 0} if abs(normal[2]) > 0.5 else {"x": 0, "y": 0, "z": 1}
     # Equal scales, as aspectmode "data" gives, but of a size that fills the view and no more.
     ratio = dict(
-        zip("xyz", (spans * (_filling(spans) if normal is None else 1.25 / spans.max())).tolist(), strict=True)
+        zip("xyz", (spans * (_fit_scale(spans) if normal is None else 1.25 / spans.max())).tolist(), strict=True)
     )
     scene = {"aspectmode": "manual", "aspectratio": ratio, "camera": camera, "dragmode": "orbit", **axes}
     legend = {"orientation": "h", "x": 0.0, "y": 1.0, "yanchor": "bottom", "itemsizing": "constant"}
@@ -131,7 +130,7 @@ def scene_layout(boxes: Iterable[Points], normal: Points | None) -> Figure:
     return layout | {"font": {**FONT, "color": INK}, "modebar": {"orientation": "v"}}
 
 
-def _filling(spans: Points) -> float:
-    """The scale at which a box of these sides fills the view from the front right."""
+def _fit_scale(spans: Points) -> float:
+    """Find the scale at which a box of these sides fills the view from the front right."""
     across, up = 0.82 * spans[0] + 0.58 * spans[1], spans[2] + 0.2 * (spans[0] + spans[1])
     return float(1.5 / max(across, up))

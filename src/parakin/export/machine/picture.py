@@ -1,4 +1,4 @@
-"""A machine's picture: an interactive page of its own, or a PNG."""
+"""A machine's picture: an interactive page, or a PNG."""
 
 from __future__ import annotations
 
@@ -11,23 +11,31 @@ from numpy.typing import ArrayLike
 
 from ...machine import Machine
 from ..number_format import format_value
-from .figures import INK, frame_traces, label_trace, machine_traces, page, placed, scene_layout
-from .scene import Points, Scene, scene
-from .solids import LOOKS, solids
+from .figures import (
+    INK,
+    build_frame_traces,
+    build_label_trace,
+    build_machine_traces,
+    build_scene_layout,
+    embed_figure,
+    render_page,
+)
+from .scene import Points, Scene, build_scene
+from .solids import LOOKS, build_solids
 
 _LIGHT = np.array([0.35, -0.65, 0.70]) / np.linalg.norm([0.35, -0.65, 0.70])
 
 
 def render_machine_html(machine: Machine, pose: ArrayLike | None = None) -> str:
-    """A self-contained HTML page with the machine at a pose, (axes,) mm and rad, home by default."""
-    drawn = scene(machine, pose)
+    """Render a self-contained HTML page with the machine at a pose, (axes,) mm and rad, home by default."""
+    drawn = build_scene(machine, pose)
     size = drawn.size
-    traces = machine_traces(drawn, "machine", size)
+    traces = build_machine_traces(drawn, "machine", size)
     if drawn.labels:
-        traces.append(label_trace(drawn, "machine"))
+        traces.append(build_label_trace(drawn, "machine"))
     for name, frame in drawn.frames.items():
-        traces += frame_traces(frame, 0.09 * size, "", name)
-    layout = scene_layout([drawn.box], drawn.normal)
+        traces += build_frame_traces(frame, 0.09 * size, "", name)
+    layout = build_scene_layout([drawn.box], drawn.normal)
     layout["showlegend"] = False
     at = machine.home if pose is None else machine.rows(pose, machine.axes, "pose")[0][0]
     rows = "".join(
@@ -43,26 +51,26 @@ def render_machine_html(machine: Machine, pose: ArrayLike | None = None) -> str:
         f"<header><h1>{escape(machine.spec.title or machine.name)}</h1>"
         f"<p class=sub>{escape(machine.name)}: axes {escape(' '.join(machine.axes))}, "
         f"joints {escape(' '.join(machine.joints))}</p></header>\n"
-        f"<section class=card>{placed('machine', {'data': traces, 'layout': layout}, '720px')}</section>\n"
+        f"<section class=card>{embed_figure('machine', {'data': traces, 'layout': layout}, '720px')}</section>\n"
         f"<section class=card><h2>{what} and joints</h2><table class=narrow>{rows}</table>"
         f"<p class=sub>{escape(machine.spec.source)}</p></section>\n"
     )
-    return page(machine.spec.title or machine.name, body)
+    return render_page(machine.spec.title or machine.name, body)
 
 
 def render_machine_png(machine: Machine, pose: ArrayLike | None = None) -> bytes:
-    """A PNG of the machine at a pose, (axes,) mm and rad, home by default; a planar machine in its plane."""
+    """Render a PNG of the machine at a pose, (axes,) mm and rad, home by default; a planar machine in its plane."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
     from mpl_toolkits import mplot3d  # noqa: F401  it brings the projection
 
-    drawn = scene(machine, pose)
+    drawn = build_scene(machine, pose)
     figure = Figure(figsize=(7.2, 7.2), dpi=160, facecolor="white")
     canvas = FigureCanvasAgg(figure)
     axes: Any = figure.add_axes((0.0, 0.0, 1.0, 1.0), projection="3d")
-    _view(axes, drawn)
-    _solids(axes, drawn)
-    _frames(axes, drawn)
+    _set_view(axes, drawn)
+    _add_solids(axes, drawn)
+    _add_frames(axes, drawn)
     for name, place in drawn.labels:
         axes.text(*(place + 0.022 * drawn.size), name, color=INK, fontsize=10.5, zorder=1000, parse_math=False)
     title = machine.spec.title or machine.name
@@ -72,8 +80,8 @@ def render_machine_png(machine: Machine, pose: ArrayLike | None = None) -> bytes
     return data.getvalue()
 
 
-def _view(axes: Any, drawn: Scene) -> None:
-    """Equal scales, a calm background, and the view: a planar machine straight on, others from the front right."""
+def _set_view(axes: Any, drawn: Scene) -> None:
+    """Set equal scales, the background, and the view: a planar machine straight on, others from the front right."""
     low, high = drawn.box
     middle, half = (low + high) / 2.0, 0.5 * (high - low) + (0.06 if drawn.normal is None else 0.1) * drawn.size
     for name, m, h in zip("xyz", middle, half, strict=True):
@@ -103,13 +111,13 @@ def _view(axes: Any, drawn: Scene) -> None:
     out.set_label_text("")
 
 
-def _solids(axes: Any, drawn: Scene) -> None:
-    """All faces in one collection, for only within one are they drawn from the back to the front."""
+def _add_solids(axes: Any, drawn: Scene) -> None:
+    """Add all faces in one collection, for only within one are they drawn from the back to the front."""
     from matplotlib.colors import to_rgb
     from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
     faces, colours = [], []
-    for solid in solids(drawn, piece=drawn.size / 150.0):
+    for solid in build_solids(drawn, piece=drawn.size / 150.0):
         corners = solid.vertices[solid.triangles]
         normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
         lengths = np.linalg.norm(normals, axis=1, keepdims=True)
@@ -121,7 +129,7 @@ def _solids(axes: Any, drawn: Scene) -> None:
     axes.add_collection3d(Poly3DCollection(np.vstack(faces), facecolors=colour, edgecolors=colour, linewidths=0.4))
 
 
-def _frames(axes: Any, drawn: Scene) -> None:
+def _add_frames(axes: Any, drawn: Scene) -> None:
     length = 0.085 * drawn.size
     for frame in drawn.frames.values():
         for letter, axis, colour in zip("XYZ", frame[:, :3].T, ("#c62828", "#2e7d32", "#1565c0"), strict=True):

@@ -1,7 +1,7 @@
-"""What of a machine is to be drawn at a pose: named points, lines and polygons in mm, in the machine frame M.
+"""A machine at a pose as named points, lines and polygons in mm, in the machine frame M.
 
 All of it follows from the description: a rail is where a drive's range takes a strut's foot, a strut on a foot that
-no drive moves is a telescope, and so on; nothing here knows a machine or a leg kind.
+no drive moves is a telescope, and so on. Nothing here knows a machine or a leg kind.
 """
 
 from __future__ import annotations
@@ -29,8 +29,8 @@ _DISC = np.linspace(0.0, 2.0 * pi, 33)[:-1]
 
 
 @dataclass(frozen=True, eq=False)
-class Part:
-    """One thing to draw. ``points`` (k, 3) in order; a polygon if ``closed``; a single point is a joint."""
+class ScenePart:
+    """One thing to draw: ``points`` (k, 3) in order, a polygon if ``closed``; a single point is a joint."""
 
     kind: Kind
     name: str
@@ -42,18 +42,18 @@ class Part:
 class Scene:
     """A machine at a pose.
 
-    parts : what to draw; what a pose out of reach has no place for is left out
+    parts : what to draw, without what has no place at a pose out of reach
     labels : names of the drives and where to write them
     frames : (3, 4) of the machine (its origin), the tool and, on a machine with a table, the workpiece
     normal : of the plane of a planar machine, else None
     """
 
-    parts: tuple[Part, ...]
+    parts: tuple[ScenePart, ...]
     labels: tuple[tuple[str, Points], ...]
     frames: dict[str, Points]
     normal: Points | None
 
-    def of(self, *kinds: Kind) -> tuple[Part, ...]:
+    def of(self, *kinds: Kind) -> tuple[ScenePart, ...]:
         """The parts of these kinds."""
         return tuple(part for part in self.parts if part.kind in kinds)
 
@@ -74,71 +74,70 @@ class Scene:
         return self.frames.get("workpiece", self.frames["machine"])
 
 
-def scene(
+def build_scene(
     machine: Machine, pose: ArrayLike | None = None, joints: ArrayLike | None = None, mode: str | None = None
 ) -> Scene:
-    """A machine at a pose, home by default.
+    """Build the scene of a machine at a pose, home by default.
 
     Parameters
     ----------
     pose : (axes,) mm, rad
-    joints : (joints,) those that a path really takes there, if they are known; they settle an angle that is free
+    joints : (joints,) those that a path really takes there, if they are known; they decide an angle that is free
     mode : working mode
     """
-    spec = machine.spec
-    given = machine.rows(machine.home if pose is None else pose, machine.axes, "pose")[0][0]
+    row = machine.rows(machine.home if pose is None else pose, machine.axes, "pose")[0][0]
     mode = mode or machine.mode
-    q = machine.inverse(given, mode) if joints is None else machine.rows(joints, machine.joints, "joints")[0][0]
+    q = machine.inverse(row, mode) if joints is None else machine.rows(joints, machine.joints, "joints")[0][0]
     with np.errstate(invalid="ignore", divide="ignore"):
-        placed = machine.place_platform(given, mode, None if joints is None else q)
-        drawn = _Drawing(machine, placed, q).drawing()
-    parts = tuple(part for part in drawn.parts if np.isfinite(part.points).all())
-    labels = _joined([label for label in drawn.labels if np.isfinite(label[1]).all()])
+        placement = machine.place_platform(row, mode, None if joints is None else q)
+        builder = _SceneBuilder(machine, placement, q)
+        builder.build()
+    parts = tuple(part for part in builder.parts if np.isfinite(part.points).all())
+    labels = _join_labels([label for label in builder.labels if np.isfinite(label[1]).all()])
     missing = [letter for letter in "XYZ" if letter not in machine.axes]
-    normal = drawn.mount[:, "XYZ".index(missing[0])] if missing and not spec.table else None
-    return Scene(parts, labels, drawn.frames, normal)
+    normal = builder.mount[:, "XYZ".index(missing[0])] if missing and not machine.spec.table else None
+    return Scene(parts, labels, builder.frames, normal)
 
 
-class _Drawing:
-    """The parts of one scene, gathered in the base frame and put into M."""
+class _SceneBuilder:
+    """Gather the parts of one scene in the base frame and put them into M."""
 
-    def __init__(self, machine: Machine, placed: PlatformPlacement, joints: Points):
+    def __init__(self, machine: Machine, placement: PlatformPlacement, joints: Points):
         self.spec, self.structure = machine.spec, machine.structure
-        self.placed, self.joints = placed, joints
+        self.placement, self.joints = placement, joints
         self.mount = np.array(self.structure.mount, float)
         self.base = np.array(self.structure.base, float)
-        self.turned, self.origin = np.array(placed.rotation, float), np.array(placed.origin, float)
-        self.parts: list[Part] = []
+        self.rotation, self.origin = np.array(placement.rotation, float), np.array(placement.origin, float)
+        self.parts: list[ScenePart] = []
         self.labels: list[tuple[str, Points]] = []
         self.frames = {"machine": np.eye(3, 4)}
 
-    def drawing(self) -> _Drawing:
-        self._legs()
-        self._platform()
-        self._head()
+    def build(self) -> None:
+        self._add_legs()
+        self._add_platform()
+        self._add_head()
         if self.spec.table:
-            self._table()
-        return self
+            self._add_table()
 
-    def _m(self, points: ArrayLike) -> Points:
-        """Points of the base frame in M."""
-        placed: Points = np.asarray(points, float) @ self.mount.T + self.base
-        return placed
+    def _to_machine(self, points: ArrayLike) -> Points:
+        """Transform points of the base frame into M."""
+        points_in_m: Points = np.asarray(points, float) @ self.mount.T + self.base
+        return points_in_m
 
     def _add(self, kind: Kind, name: str, points: ArrayLike, closed: bool = False) -> None:
-        self.parts.append(Part(kind, name, self._m(points).reshape(-1, 3), closed))
+        self.parts.append(ScenePart(kind, name, self._to_machine(points).reshape(-1, 3), closed))
 
-    def _legs(self) -> None:
+    def _add_legs(self) -> None:
         spec, anchors = self.spec, []
-        points = platform_points(spec, self.placed.rotation, self.placed.origin)
+        points = platform_points(spec, self.placement.rotation, self.placement.origin)
         for leg, point, q in zip(spec.legs, points, leg_joints(spec, self.joints.tolist()), strict=True):
             struts = [np.array(ends, float) for ends in leg.struts(point, q)]
             moved: dict[int, list[str]] = {}
-            for number, (drive, feet) in enumerate(zip(leg.drives, _feet(leg, point, q, struts[0]), strict=True)):
+            for number, (drive, feet) in enumerate(zip(leg.drives, _sweep_feet(leg, point, q, struts[0]), strict=True)):
                 for strut in np.flatnonzero(np.ptp(feet, axis=0).max(axis=-1) > _NEAR):
                     moved.setdefault(int(strut), []).append(drive.name)
                     # An arm that ends at the foot is what moves it; there is no rail then.
-                    if not any(_same(other[1], struts[strut][0]) for other in struts):
+                    if not any(_coincide(other[1], struts[strut][0]) for other in struts):
                         rail = feet[[0, -1], strut] if leg.units[number] == "mm" else feet[:, strut]
                         self._add("rail", drive.name, rail)
             for number, ends in enumerate(struts):
@@ -147,49 +146,49 @@ class _Drawing:
                 if number not in moved:
                     anchors.append(ends[0])
             for number, names in moved.items():
-                self.labels.append((", ".join(names), self._m(struts[number][0])))
+                self.labels.append((", ".join(names), self._to_machine(struts[number][0])))
             if not moved:
-                self.labels.append((leg.drives[0].name, self._m(struts[0].mean(axis=0))))
+                self.labels.append((leg.drives[0].name, self._to_machine(struts[0].mean(axis=0))))
         if self.structure.has_central_leg:
             self._add("central", "central leg", [np.zeros(3), self.origin])
         if anchors:
-            ring = around(np.array(anchors))
+            ring = order_polygon(np.array(anchors))
             self._add("base", "base", ring, len(ring) > 2)
 
-    def _platform(self) -> None:
-        ring = around(np.array([leg.platform for leg in self.spec.legs], float))
-        self._add("platform", "platform", ring @ self.turned.T + self.origin, len(ring) > 2)
-        middle = ring.mean(axis=0) @ self.turned.T + self.origin
-        if not _same(middle, self.origin) and not self.structure.has_central_leg:
+    def _add_platform(self) -> None:
+        ring = order_polygon(np.array([leg.platform for leg in self.spec.legs], float))
+        self._add("platform", "platform", ring @ self.rotation.T + self.origin, len(ring) > 2)
+        middle = ring.mean(axis=0) @ self.rotation.T + self.origin
+        if not _coincide(middle, self.origin) and not self.structure.has_central_leg:
             self._add("head", "platform", [middle, self.origin])
 
-    def _head(self) -> None:
+    def _add_head(self) -> None:
         head = self.spec.head
-        serial = list(self.placed.serial)[: self.structure.head_joints]
-        chain = list(_chain(head, serial))
-        links = _distinct([np.zeros(3), *[origin for _, origin in chain]])
+        serial = list(self.placement.serial)[: self.structure.head_joints]
+        chain = list(_compose_steps(head, serial))
+        links = _remove_duplicates([np.zeros(3), *[origin for _, origin in chain]])
         rotation, tip = chain[-1] if chain else (np.eye(3), np.zeros(3))
-        at = np.array(links) @ self.turned.T + self.origin
+        at = np.array(links) @ self.rotation.T + self.origin
         if len(at) > 2:
             self._add("head", "head", at[:-1])
         if len(at) > 1:
             self._add("tool", "tool", at[-2:])
         for step, (_, origin) in zip(head, chain, strict=True):
             if step.drive is not None:
-                self.labels.append((step.drive.name, self._m(self.turned @ origin + self.origin)))
-        place = self._m(self.turned @ tip + self.origin)
-        self.frames["tool"] = np.column_stack([self.mount @ self.turned @ rotation, place])
+                self.labels.append((step.drive.name, self._to_machine(self.rotation @ origin + self.origin)))
+        place = self._to_machine(self.rotation @ tip + self.origin)
+        self.frames["tool"] = np.column_stack([self.mount @ self.rotation @ rotation, place])
 
-    def _table(self) -> None:
-        """A disc at the workpiece's frame, and the axes that turn it; these are in M, whatever the mounting."""
+    def _add_table(self) -> None:
+        """Add a disc at the workpiece's frame, and the axes that turn it; these are in M, whatever the mounting."""
         table = self.spec.table
-        serial = list(self.placed.serial)[self.structure.head_joints :]
-        chain = list(_chain(table, serial))
+        serial = list(self.placement.serial)[self.structure.head_joints :]
+        chain = list(_compose_steps(table, serial))
         rotation, origin = chain[-1]
         self.frames["workpiece"] = np.column_stack([rotation, origin])
         radius = 0.12 * float(np.linalg.norm(np.ptp(np.vstack([part.points for part in self.parts]), axis=0)))
         disc = np.column_stack([np.cos(_DISC), np.sin(_DISC), 0.0 * _DISC]) * radius
-        self.parts.append(Part("table", "table", disc @ rotation.T + origin, True))
+        self.parts.append(ScenePart("table", "table", disc @ rotation.T + origin, True))
         for step, (turned, pivot) in zip(table, chain, strict=True):
             if step.drive is None:
                 continue
@@ -198,15 +197,15 @@ class _Drawing:
             upright = abs(float(axis @ rotation[:, 2])) > 0.999
             reach = 1.3 * radius * axis
             ends = [origin, origin - 0.5 * radius * rotation[:, 2]] if upright else [pivot - reach, pivot + reach]
-            self.parts.append(Part("axis", step.drive.name, np.array(ends)))
+            self.parts.append(ScenePart("axis", step.drive.name, np.array(ends)))
             self.labels.append((step.drive.name, ends[1]))
 
 
-def _joined(labels: list[tuple[str, Points]]) -> tuple[tuple[str, Points], ...]:
-    """Labels with those of one place in one."""
+def _join_labels(labels: list[tuple[str, Points]]) -> tuple[tuple[str, Points], ...]:
+    """Join the labels at one place into one."""
     joined: list[tuple[str, Points]] = []
     for name, place in labels:
-        same = next((i for i, (_, other) in enumerate(joined) if _same(place, other)), None)
+        same = next((i for i, (_, other) in enumerate(joined) if _coincide(place, other)), None)
         if same is None:
             joined.append((name, place))
         else:
@@ -214,8 +213,8 @@ def _joined(labels: list[tuple[str, Points]]) -> tuple[tuple[str, Points], ...]:
     return tuple(joined)
 
 
-def _chain(steps: Sequence[Step], joints: Sequence[float]) -> Iterator[tuple[Points, Points]]:
-    """Rotation and origin after every step of a serial chain."""
+def _compose_steps(steps: Sequence[Step], joints: Sequence[float]) -> Iterator[tuple[Points, Points]]:
+    """Yield rotation and origin after every step of a serial chain."""
     driven = 0
     for count, step in enumerate(steps, start=1):
         driven += step.drive is not None
@@ -223,26 +222,28 @@ def _chain(steps: Sequence[Step], joints: Sequence[float]) -> Iterator[tuple[Poi
         yield np.array(rotation, float), np.array(origin, float)
 
 
-def _feet(leg: Leg, point: Sequence[float], joints: list[float], strut: Points) -> Iterator[Points]:
-    """The feet of all struts over each drive's range, (samples, struts, 3); the drives after it at their low end."""
+def _sweep_feet(leg: Leg, point: Sequence[float], joints: list[float], strut: Points) -> Iterator[Points]:
+    """Yield all struts' feet over each drive's range, (samples, struts, 3), the drives after it at their low end."""
     length = float(np.linalg.norm(strut[1] - strut[0]))
-    spans = [_span(d.low, d.high, q, unit, length) for d, q, unit in zip(leg.drives, joints, leg.units, strict=True)]
+    spans = [
+        _cut_range(d.low, d.high, q, unit, length) for d, q, unit in zip(leg.drives, joints, leg.units, strict=True)
+    ]
     for number, (low, high) in enumerate(spans):
-        held = [low for low, _ in spans[number + 1 :]]
+        after = [low for low, _ in spans[number + 1 :]]
         sweep = np.linspace(low, high, 49)
-        yield np.array([[ends[0] for ends in leg.struts(point, [*joints[:number], q, *held])] for q in sweep], float)
+        yield np.array([[ends[0] for ends in leg.struts(point, [*joints[:number], q, *after])] for q in sweep], float)
 
 
-def _span(low: float, high: float, q: float, unit: str, length: float) -> tuple[float, float]:
-    """A drive's range to draw, cut where it is endless: a full turn, or half a strut's length to both sides."""
+def _cut_range(low: float, high: float, q: float, unit: str, length: float) -> tuple[float, float]:
+    """Cut a drive's range where it has no end: to a full turn, or half a strut's length to both sides."""
     reach = pi if unit == "rad" else 0.5 * length
     low, high = (low if isfinite(low) else q - reach), (high if isfinite(high) else q + reach)
     return (q - pi, q + pi) if unit == "rad" and high - low > 2.0 * pi else (low, high)
 
 
-def around(points: Points) -> Points:
-    """The distinct points as a polygon: in order round their middle in their own plane; of a line the ends."""
-    points = np.array(_distinct(list(points)))
+def order_polygon(points: Points) -> Points:
+    """Order the distinct points round their middle in their own plane; of a line return the ends."""
+    points = np.array(_remove_duplicates(list(points)))
     if len(points) < 3:
         return points
     off = points - points.mean(axis=0)
@@ -253,13 +254,13 @@ def around(points: Points) -> Points:
     return points[np.argsort(np.arctan2(off @ axes[1], off @ axes[0]))]
 
 
-def _distinct(points: list[Points]) -> list[Points]:
+def _remove_duplicates(points: list[Points]) -> list[Points]:
     kept: list[Points] = []
     for point in points:
-        if not any(_same(point, other) for other in kept):
+        if not any(_coincide(point, other) for other in kept):
             kept.append(point)
     return kept
 
 
-def _same(a: Points, b: Points) -> bool:
+def _coincide(a: Points, b: Points) -> bool:
     return bool(np.linalg.norm(a - b) < _NEAR)

@@ -1,4 +1,4 @@
-"""The solids that stand for a machine's parts in its pictures: bars, plates and balls as triangle meshes."""
+"""A scene as solids: bars, plates and balls as triangle meshes."""
 
 from __future__ import annotations
 
@@ -8,9 +8,9 @@ from math import ceil, inf
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from .scene import Kind, Part, Points, Scene
+from ...arrays import Indices
+from .scene import Kind, Points, Scene, ScenePart
 
 _SIDES = 14
 
@@ -21,7 +21,7 @@ class Solid(NamedTuple):
     kind: str
     name: str
     vertices: Points
-    triangles: NDArray[np.int64]
+    triangles: Indices
 
 
 class Look(NamedTuple):
@@ -49,58 +49,60 @@ LOOKS: dict[str, Look] = {
 }
 
 
-def solids(scene: Scene, scale: float | None = None, piece: float = inf) -> Iterator[Solid]:
-    """All meshes of a scene.
+def build_solids(scene: Scene, scale: float | None = None, piece: float = inf) -> Iterator[Solid]:
+    """Build all meshes of a scene.
 
     Parameters
     ----------
-    scale : the size that thicknesses go by, mm; the scene's own by default
+    scale : the size that thicknesses follow, mm; the scene's own by default
     piece : bars are cut into lengths of at most this, mm, for a renderer that sorts faces by their middles
     """
     size = scene.size if scale is None else scale
     for part in scene.parts:
-        yield from _part(part, size, piece)
+        yield from _build_part(part, size, piece)
 
 
-def _part(part: Part, size: float, piece: float) -> Iterator[Solid]:
+def _build_part(part: ScenePart, size: float, piece: float) -> Iterator[Solid]:
     radius = LOOKS[part.kind].radius * size
     points = part.points
     if part.kind in ("platform", "table") and part.closed:
-        yield _plate(part.kind, part.name, points, radius)
+        yield _build_plate(part.kind, part.name, points, radius)
     elif len(points) == 1:
-        yield _ball(part.kind, part.name, points[0], 2.0 * radius)
+        yield _build_ball(part.kind, part.name, points[0], 2.0 * radius)
     else:
         ends = np.vstack([points, points[:1]]) if part.closed else points
         bars = list(pairwise(ends))
         for a, b in bars:
-            yield from _link(part.kind, part.name, a, b, size, piece)
+            yield from _build_link(part.kind, part.name, a, b, size, piece)
         if len(bars) > 1 and part.kind != "rail":
             for corner in points:
-                yield _ball(part.kind, part.name, corner, radius)
+                yield _build_ball(part.kind, part.name, corner, radius)
     if part.kind in ("telescope", "rod", "arm"):
         foot: Kind | str = "carriage" if part.kind != "telescope" else "joint"
-        yield _ball(foot, part.name, points[0], LOOKS[foot].radius * size)
-        yield _ball("joint", part.name, points[1], LOOKS["joint"].radius * size)
+        yield _build_ball(foot, part.name, points[0], LOOKS[foot].radius * size)
+        yield _build_ball("joint", part.name, points[1], LOOKS["joint"].radius * size)
 
 
-def _link(kind: str, name: str, a: Points, b: Points, size: float, piece: float) -> Iterator[Solid]:
+def _build_link(kind: str, name: str, a: Points, b: Points, size: float, piece: float) -> Iterator[Solid]:
     radius = LOOKS[kind].radius * size
     if kind == "tool":
-        yield _bar(kind, name, a, b, radius, piece, 0.25 * radius)
+        yield _build_bar(kind, name, a, b, radius, piece, 0.25 * radius)
     elif kind == "telescope":
         middle = a + 0.58 * (b - a)
-        yield _bar(kind, name, a, middle, radius, piece)
-        yield _bar("piston", name, middle, b, LOOKS["piston"].radius * size, piece)
+        yield _build_bar(kind, name, a, middle, radius, piece)
+        yield _build_bar("piston", name, middle, b, LOOKS["piston"].radius * size, piece)
     else:
-        yield _bar(kind, name, a, b, radius, piece)
+        yield _build_bar(kind, name, a, b, radius, piece)
 
 
-def _bar(kind: str, name: str, a: Points, b: Points, radius: float, piece: float, end: float | None = None) -> Solid:
-    """A round bar from a to b, of another radius at its end if given, closed at both ends."""
+def _build_bar(
+    kind: str, name: str, a: Points, b: Points, radius: float, piece: float, end: float | None = None
+) -> Solid:
+    """Build a round bar from a to b, closed at both ends, with another radius at its end if ``end`` is given."""
     along = b - a
     length = float(np.linalg.norm(along))
     if length == 0.0:
-        return _ball(kind, name, a, radius)
+        return _build_ball(kind, name, a, radius)
     pieces = max(1, ceil(length / piece))
     across = np.cross(along, np.eye(3)[np.abs(along).argmin()])
     across /= np.linalg.norm(across)
@@ -109,11 +111,11 @@ def _bar(kind: str, name: str, a: Points, b: Points, radius: float, piece: float
     circle = np.outer(np.cos(turn), across) + np.outer(np.sin(turn), other)
     radii = np.linspace(radius, radius if end is None else end, pieces + 1)
     rings = [a + t * along + r * circle for t, r in zip(np.linspace(0.0, 1.0, pieces + 1), radii, strict=True)]
-    return Solid(kind, name, np.vstack([*rings, a[None], b[None]]), _skin(pieces + 1, _SIDES))
+    return Solid(kind, name, np.vstack([*rings, a[None], b[None]]), _build_skin(pieces + 1, _SIDES))
 
 
-def _skin(rings: int, sides: int) -> NDArray[np.int64]:
-    """Triangles over rings of vertices, and over the fans to the two poles that follow them, outward."""
+def _build_skin(rings: int, sides: int) -> Indices:
+    """Build triangles, facing outward, over rings of vertices and the fans to the two poles that follow them."""
     i = np.arange(sides)
     j = (i + 1) % sides
     faces = []
@@ -126,18 +128,18 @@ def _skin(rings: int, sides: int) -> NDArray[np.int64]:
     return np.vstack(faces)
 
 
-def _plate(kind: str, name: str, ring: Points, half: float) -> Solid:
-    """A plate over a ring of corners; its middle is the fan's pole, so the corners need not lie in one plane."""
+def _build_plate(kind: str, name: str, ring: Points, half: float) -> Solid:
+    """Build a plate over a ring of corners; its middle is the fan's pole, so the corners need not lie in one plane."""
     off = ring - ring.mean(axis=0)
     normal = np.linalg.svd(off)[2][2]
     if np.cross(off[0], off[1]) @ normal < 0.0:
         normal = -normal
     up = half * normal
     middle = ring.mean(axis=0)
-    return Solid(kind, name, np.vstack([ring - up, ring + up, middle - up, middle + up]), _skin(2, len(ring)))
+    return Solid(kind, name, np.vstack([ring - up, ring + up, middle - up, middle + up]), _build_skin(2, len(ring)))
 
 
-def _ball(kind: str, name: str, centre: Points, radius: float) -> Solid:
+def _build_ball(kind: str, name: str, centre: Points, radius: float) -> Solid:
     sides, rings = 12, 6
     around = np.linspace(0.0, 2.0 * np.pi, sides, endpoint=False)
     layers = []
@@ -145,4 +147,4 @@ def _ball(kind: str, name: str, centre: Points, radius: float) -> Solid:
         flat = np.column_stack([np.cos(around), np.sin(around), 0.0 * around]) * np.cos(tilt)
         layers.append(flat + np.array([0.0, 0.0, np.sin(tilt)]))
     unit = np.vstack([*layers, [[0.0, 0.0, -1.0], [0.0, 0.0, 1.0]]])
-    return Solid(kind, name, centre + radius * unit, _skin(rings, sides))
+    return Solid(kind, name, centre + radius * unit, _build_skin(rings, sides))

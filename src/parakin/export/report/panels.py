@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from ..machine.figures import FAINT, FONT, INK, Figure, Trace
 
-_ROW, _GAP, _BREAK = 118, 34, 44  # px: a diagram's height, what parts it from the next, and what more under an axis
+_ROW, _GAP, _BREAK = 118, 34, 44  # px: a diagram's height, the gap to the next, and more of it under an axis
 _BETWEEN = 0.065  # of the figure's width, between columns
 _TOP, _BOTTOM = 26, 44  # px
 
@@ -23,10 +23,10 @@ class Panel:
     ticks: str = ","
 
 
-def stacked(rows: Sequence[Sequence[Panel]], title: str) -> tuple[Figure, int]:
-    """A figure of rows of panels over one x axis called ``title``, and its height in px.
+def stack_panels(rows: Sequence[Sequence[Panel]], title: str) -> tuple[Figure, int]:
+    """Stack rows of panels over one x axis called ``title``; return the figure and its height in px.
 
-    Rows of one panel come before rows of several; all of several have as many.
+    Rows of one panel come before rows of several; all of the latter have the same number.
     """
     wide = sum(len(row) == 1 for row in rows)
     parted = _BREAK if 0 < wide < len(rows) else 0
@@ -42,8 +42,8 @@ def stacked(rows: Sequence[Sequence[Panel]], title: str) -> tuple[Figure, int]:
         for column, panel in enumerate(row):
             count += 1
             y = "y" if count == 1 else f"y{count}"
-            left, right = _columns(len(row))[column]
-            x = _x(wide > 0, len(row), column)
+            left, right = _split_width(len(row))[column]
+            x = _name_x_axis(wide > 0, len(row), column)
             feet[len(row), column] = y
             traces += [trace | ({"yaxis": y} if x == "x" else {"xaxis": x, "yaxis": y}) for trace in panel.traces]
             axis: Figure = {"domain": [max(0.0, top - _ROW / inner), top], "gridcolor": FAINT, "zeroline": False}
@@ -53,28 +53,30 @@ def stacked(rows: Sequence[Sequence[Panel]], title: str) -> tuple[Figure, int]:
             dash["line"] = {"color": "#c62828", "width": 1.2, "dash": "dash"}
             low, high = panel.span
             layout["shapes"] += [dash | {"y0": b, "y1": b} for b in panel.bounds if low <= b <= high]
-            layout["annotations"].append(_heading(panel.heading, left, top))
+            layout["annotations"].append(_build_annotation(panel.heading, left, top))
     for (columns, column), y in feet.items():
-        x = _x(wide > 0, columns, column)
+        x = _name_x_axis(wide > 0, columns, column)
         axis = {"title": {"text": title, "font": {"size": 12}}, "gridcolor": FAINT, "zeroline": False}
         axis |= {"tickformat": ",", "anchor": y, "rangemode": "nonnegative"}
         if columns > 1:
-            axis |= {"domain": list(_columns(columns)[column]), "nticks": 6} | ({} if x == "x" else {"matches": "x"})
+            axis |= {"domain": list(_split_width(columns)[column]), "nticks": 6}
+            axis |= {} if x == "x" else {"matches": "x"}
         layout[f"xaxis{x[1:]}"] = axis
     return {"data": traces, "layout": layout}, inner + _TOP + _BOTTOM
 
 
-def _columns(count: int) -> list[tuple[float, float]]:
+def _split_width(count: int) -> list[tuple[float, float]]:
+    """Split the figure's width into columns; return their ends as shares of it."""
     width = (1.0 - (count - 1) * _BETWEEN) / count
     return [(c * (width + _BETWEEN), c * (width + _BETWEEN) + width) for c in range(count)]
 
 
-def _x(wide: bool, columns: int, column: int) -> str:
-    """The x axis of a column; where there are rows of one panel, theirs is the first."""
+def _name_x_axis(wide: bool, columns: int, column: int) -> str:
+    """Name the x axis of a column; where there are rows of one panel, theirs is the first."""
     number = 1 if columns == 1 else 1 + column + wide
     return "x" if number == 1 else f"x{number}"
 
 
-def _heading(text: str, left: float, top: float) -> Figure:
+def _build_annotation(text: str, left: float, top: float) -> Figure:
     return {"text": text, "x": left, "xref": "paper", "y": top, "yref": "paper", "xanchor": "left",
             "yanchor": "bottom", "showarrow": False, "font": {"size": 13}}  # fmt: skip

@@ -8,9 +8,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ... import __version__
+from ...arrays import Array
 from ..number_format import format_duration, format_value
 from .cards import make_card, make_fact_table
 
@@ -20,13 +20,13 @@ if TYPE_CHECKING:
 
 _NOTES = 200  # of the reader that are listed
 _LONGEST = 240  # characters of a source line that are quoted
-_READ = 1 << 16  # bytes of one line that are looked at
+_READ = 1 << 16  # bytes of one line that are read
 _DIALECTS = {"apt": "APT", "nx": "Siemens NX", "gcode": "G-code"}
 
 
-def source_lines(path: ToolPath, wanted: Iterable[int]) -> dict[int, str]:
-    """The text of some lines of the source file, as far as it is still there; cut where it is long."""
-    left, found = set(wanted), {}
+def read_source_lines(path: ToolPath, wanted: Iterable[int]) -> dict[int, str]:
+    """Read the text of some lines of the source file, as far as it is still there; long lines are cut."""
+    left, lines = set(wanted), {}
     try:
         source = Path(path.source)
         if not left or not source.is_file():
@@ -36,21 +36,21 @@ def source_lines(path: ToolPath, wanted: Iterable[int]) -> dict[int, str]:
             while left and (piece := file.readline(_READ)):
                 if fresh and number in left:
                     text = piece.decode("utf-8", "replace").rstrip("\r\n")
-                    found[number] = text[:_LONGEST] + ("…" if len(text) > _LONGEST else "")
+                    lines[number] = text[:_LONGEST] + ("…" if len(text) > _LONGEST else "")
                     left.discard(number)
                 fresh = piece.endswith(b"\n")
                 number += fresh
     except (OSError, ValueError):  # a name that no file can have
         pass
-    return found
+    return lines
 
 
-def offence_card(posted: Posted) -> str:
+def render_offence_card(posted: Posted) -> str:
     if posted.first is None:
         return ""
-    text = source_lines(posted.path, {o.line for o in (*posted.offences, posted.first)})
-    first = f"<tr><th colspan=5>First</th></tr>{_offence(posted.first, text, False)}"
-    worst = "".join(_offence(offence, text, True) for offence in posted.offences)
+    text = read_source_lines(posted.path, {o.line for o in (*posted.offences, posted.first)})
+    first = f"<tr><th colspan=5>First</th></tr>{_render_offence(posted.first, text, False)}"
+    worst = "".join(_render_offence(offence, text, True) for offence in posted.offences)
     head = (
         "<tr><th>Line</th><th>What</th><th class=n>Beyond by</th>"
         f"<th class=n>Records{' and motions' if posted.checked else ''}</th><th>The line reads</th></tr>"
@@ -59,21 +59,21 @@ def offence_card(posted: Posted) -> str:
     return make_card("Offences", f"<div class=wide><table>{rows}</table></div>")
 
 
-def _offence(offence: Offence, text: dict[int, str], count: bool) -> str:
+def _render_offence(offence: Offence, text: dict[int, str], count: bool) -> str:
     beyond, reads = format_value(offence.excess, offence.unit), escape(text.get(offence.line, ""))
-    place = f"{offence.line}<br><small>{on_the_way(offence)}</small>" if offence.share < 1.0 else str(offence.line)
+    place = f"{offence.line}<br><small>{format_share(offence)}</small>" if offence.share < 1.0 else str(offence.line)
     return (
         f"<tr><td>{place}</td><td>{escape(offence.text)}</td><td class=n>{beyond}</td>"
         f"<td class=n>{f'{offence.count:,}' if count else ''}</td><td><code>{reads}</code></td></tr>\n"
     )
 
 
-def on_the_way(offence: Offence) -> str:
-    """Where between two records an offence is."""
+def format_share(offence: Offence) -> str:
+    """Format where between two records an offence is."""
     return f"on the way, {100.0 * offence.share:.0f} %"
 
 
-def note_card(path: ToolPath) -> str:
+def render_note_card(path: ToolPath) -> str:
     if not path.notes:
         return ""
     rows = "".join(
@@ -85,10 +85,10 @@ def note_card(path: ToolPath) -> str:
     return make_card("Notes of the reader", f"<table>{rows}</table>{tail}")
 
 
-def fact_card(posted: Posted) -> str:
+def render_fact_card(posted: Posted) -> str:
     path, machine = posted.path, posted.machine
-    steps, rapid = _steps(path), path.rapid[1:]
-    seconds, unknown = programmed(path)
+    steps, rapid = _measure_steps(path), path.rapid[1:]
+    seconds, unknown = sum_programmed_time(path)
     time = format_duration(seconds) + " in feed motions, at the programmed feeds"
     if unknown > 0.0:
         time += f"; {format_value(unknown, 'mm')} without a feed not counted"
@@ -99,7 +99,7 @@ def fact_card(posted: Posted) -> str:
         ("Path in feed", format_value(float(steps[~rapid].sum()), "mm")),
         ("Path in rapid", format_value(float(steps[rapid].sum()), "mm")),
         ("Programmed time", time),
-        ("Workpiece in the machine", _placement(posted.frame)),
+        ("Workpiece in the machine", _format_placement(posted.frame)),
         ("Machine", f"{machine.spec.title} ({machine.name}): axes {' '.join(machine.axes)}"),
         ("Working mode", posted.mode or "the only one"),
         ("File", f"{_DIALECTS[path.dialect]}, in {path.units}"),
@@ -109,9 +109,9 @@ def fact_card(posted: Posted) -> str:
     return make_card("Facts", make_fact_table(rows))
 
 
-def programmed(path: ToolPath) -> tuple[float, float]:
-    """How long the feed motions take at the programmed feeds, s, and how many mm have none."""
-    steps, feed = _steps(path), path.feed[1:]
+def sum_programmed_time(path: ToolPath) -> tuple[float, float]:
+    """Sum what the feed motions take at the programmed feeds, s, and the mm of those without a feed."""
+    steps, feed = _measure_steps(path), path.feed[1:]
     seconds = np.full(len(steps), np.nan) if path.seconds is None else path.seconds[1:]
     cut = ~path.rapid[1:]
     fed, timed = cut & (feed > 0.0), cut & (seconds >= 0.0)
@@ -119,12 +119,13 @@ def programmed(path: ToolPath) -> tuple[float, float]:
     return float((steps[fed] / feed[fed]).sum()) * 60.0 + float(seconds[timed & ~fed].sum()), unknown
 
 
-def _steps(path: ToolPath) -> NDArray[np.float64]:
-    steps: NDArray[np.float64] = np.linalg.norm(np.diff(path.tip, axis=0), axis=1)
+def _measure_steps(path: ToolPath) -> Array:
+    steps: Array = np.linalg.norm(np.diff(path.tip, axis=0), axis=1)
     return steps
 
 
-def _placement(frame: NDArray[np.float64]) -> str:
+def _format_placement(frame: Array) -> str:
+    """Format a frame (3, 4) by its origin and its angles, R = Rz(C)·Ry(B)·Rx(A)."""
     r, origin = frame[:, :3], frame[:, 3]
     b = np.arctan2(-r[2, 0], np.hypot(r[0, 0], r[1, 0]))
     a, c = np.arctan2(r[2, 1], r[2, 2]), np.arctan2(r[1, 0], r[0, 0])

@@ -6,12 +6,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..machine.figures import placed
+from ..machine.figures import embed_figure
 from ..number_format import format_duration, format_value
-from .binding import bound_path, colours, share_bars
+from .binding_limits import build_bound_path, choose_colours, render_share_bars
 from .cards import make_card
 from .path_view import PathView
-from .tables import programmed
+from .tables import sum_programmed_time
 from .timing_curves import draw_timing_curves
 
 if TYPE_CHECKING:
@@ -21,13 +21,13 @@ if TYPE_CHECKING:
 _STILL = 1e-3  # s: a cycle as short has nothing to draw
 
 
-def cycle_text(trajectory: Trajectory) -> str:
-    """The cycle time beside that at the programmed feeds, one line of HTML."""
+def format_cycle(trajectory: Trajectory) -> str:
+    """Format the cycle time beside that at the programmed feeds, one line of HTML."""
     path = trajectory.posted.path
     spans = np.diff(trajectory.times, prepend=0.0)
     cut, rapid = (float(spans[path.rapid == fast].sum()) for fast in (False, True))
-    asked, unknown = programmed(path)
-    beside = f"{format_duration(asked)} at the programmed feeds"
+    programmed, unknown = sum_programmed_time(path)
+    beside = f"{format_duration(programmed)} at the programmed feeds"
     if unknown > 0.0:
         beside += f", {format_value(unknown, 'mm')} without a feed not counted"
     tail = f", {format_duration(rapid)} in rapid" if rapid > 0.0 else ""
@@ -35,19 +35,20 @@ def cycle_text(trajectory: Trajectory) -> str:
     return f"Cycle time <b>{cycle}</b>: {feed} in feed motions ({beside}){tail}."
 
 
-def timing_card(trajectory: Trajectory, view: PathView) -> str:
-    """The card; of a trajectory that stands still nothing but its cycle time."""
+def render_timing_card(trajectory: Trajectory, view: PathView) -> str:
+    """Render the card; a trajectory that stands still has its cycle time only."""
     if trajectory.seconds < _STILL:
-        return make_card("Time", "", cycle_text(trajectory))
-    shades = colours(trajectory)
+        return make_card("Time", "", format_cycle(trajectory))
+    shades = choose_colours(trajectory)
+    path = embed_figure("binding", build_bound_path(trajectory, view, shades), "560px")
     figure, height = draw_timing_curves(trajectory, shades)
     body = (
-        f"<div class=two><div><h3>What sets the pace</h3>{share_bars(trajectory, shades)}</div>"
-        f"<div>{placed('binding', bound_path(trajectory, view, shades), '560px')}<p class=sub>The tool tip’s path, "
+        f"<div class=two><div><h3>What sets the pace</h3>{render_share_bars(trajectory, shades)}</div>"
+        f"<div>{path}<p class=sub>The tool tip’s path, "
         "coloured by the limit that sets the pace. Rapid motions are thin.</p></div></div>"
-        f"<h3>Over the cycle</h3><div class=wide>{placed('time', figure, f'{height}px')}</div>"
+        f"<h3>Over the cycle</h3><div class=wide>{embed_figure('time', figure, f'{height}px')}</div>"
         "<p class=sub>Limits are dashed where they are near. Orange, red and violet: here this joint’s speed,"
         " acceleration or jerk sets the pace. Of every stretch the least and the greatest value is drawn, so no extreme"
         " is left out.</p>"
     )
-    return make_card("Time", body, cycle_text(trajectory))
+    return make_card("Time", body, format_cycle(trajectory))

@@ -7,15 +7,15 @@ from math import degrees, floor, inf, isfinite, log10
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...arrays import Flags
 from ...toolpath.posting.range_use import RangeUse
-from ..machine.figures import Figure, Trace, numbers
+from ..machine.figures import Figure, Trace, round_numbers
 from ..number_format import format_bound
-from .binding import bars_over_time
-from .curves import heading, panel_of
-from .panels import Panel, stacked
-from .timing_samples import Thinned, thinned
+from .binding_limits import build_share_traces
+from .joint_curves import build_panel, format_heading
+from .panels import Panel, stack_panels
+from .timing_samples import ThinnedCurve, thin_curves
 
 if TYPE_CHECKING:
     from ...machine import Machine
@@ -32,33 +32,32 @@ _ROOM = 1.15  # times the greatest programmed feed: what the feed's axis shows
 
 
 def draw_timing_curves(trajectory: Trajectory, shades: dict[str, str]) -> tuple[Figure, int]:
-    """The curves over the cycle, and the figure's height in px; ``shades`` are the limits' colours."""
+    """Draw the curves over the cycle, ``shades`` being the limits' colours; return the figure and its height in px."""
     machine = trajectory.posted.machine
     kinds = [kind for kind in _KINDS if kind != "jerk" or any(d.jerk < inf for d in machine.drives)]
-    curves = thinned(trajectory, min(_MOST, _ALL // (len(machine.joints) * (1 + len(kinds)) + 2)))
-    binds = Panel(heading("what sets the pace", "share of the time", ""), bars_over_time(trajectory, shades),
+    curves = thin_curves(trajectory, min(_MOST, _ALL // (len(machine.joints) * (1 + len(kinds)) + 2)))
+    binds = Panel(format_heading("what sets the pace", "share of the time", ""), build_share_traces(trajectory, shades),
                   [0.0, 1.0], ticks=".0%")  # fmt: skip
-    rows = [[_feed(trajectory, curves)], [binds]]
+    rows = [[_build_feed_panel(trajectory, curves)], [binds]]
     for number in range(len(machine.joints)):
-        rows.append(
-            [_position(trajectory, curves, number), *(_motion(trajectory, curves, number, kind) for kind in kinds)]
-        )
-    figure, height = stacked(rows, "time [s]")
+        rates = [_build_rate_panel(trajectory, curves, number, kind) for kind in kinds]
+        rows.append([_build_position_panel(trajectory, curves, number), *rates])
+    figure, height = stack_panels(rows, "time [s]")
     figure["layout"] |= {"barmode": "stack", "bargap": 0}
     figure["layout"]["xaxis"]["range"] = [0.0, trajectory.seconds]
     return figure, height
 
 
-def _line(
+def _build_line(
     trajectory: Trajectory,
-    curve: Thinned,
-    shown: NDArray[np.bool_] | None,
+    curve: ThinnedCurve,
+    shown: Flags | None,
     look: Figure,
     name: str,
     unit: str,
     scale: float = 1.0,
 ) -> Trace:
-    """A curve; with ``shown`` only the parts behind these points, drawn over it and without answers to the mouse."""
+    """Build a curve; with ``shown`` only the parts behind these points, to lie over it, and silent to the mouse."""
     at = np.arange(len(curve.times))
     if shown is not None:
         drawn = shown | np.concatenate([[False], shown[:-1]])
@@ -70,7 +69,10 @@ def _line(
     peak = np.abs(values[np.isfinite(values)]).max(initial=0.0)
     digits = 3 if peak <= 0.0 else min(9, max(0, 5 - floor(log10(peak))))
     trace: Trace = {"type": "scatter", "mode": "lines", "name": name, "line": look}
-    trace |= {"x": numbers(curve.times[at], max(3, 6 - floor(log10(trajectory.seconds)))), "y": numbers(values, digits)}
+    trace |= {
+        "x": round_numbers(curve.times[at], max(3, 6 - floor(log10(trajectory.seconds)))),
+        "y": round_numbers(values, digits),
+    }
     if shown is not None:
         return trace | {"hoverinfo": "skip"}
     record = curve.record[at]
@@ -79,25 +81,18 @@ def _line(
     return trace | {"hovertemplate": f"{place}<br>%{{y:,.3f}} {unit}<extra>{name}</extra>"}
 
 
-def _feed(trajectory: Trajectory, curves: dict[str, Thinned]) -> Panel:
+def _build_feed_panel(trajectory: Trajectory, curves: dict[str, ThinnedCurve]) -> Panel:
     reached, programmed, fastest = (curves[f"feed.{name}"] for name in ("reached", "programmed", "any"))
     fed = reached.binding == trajectory.names.index("feed")
-    unit = "mm/min"
+    unit, dotted = "mm/min", {"color": "#455a64", "width": 1.2, "dash": "dot", "shape": "hv"}
     traces = [
-        _line(
-            trajectory,
-            programmed,
-            None,
-            {"color": "#455a64", "width": 1.2, "dash": "dot", "shape": "hv"},
-            "programmed feed",
-            unit,
-        ),
-        _line(trajectory, fastest, None, {"color": _GREY, "width": 1}, "feed reached", unit),
-        _line(trajectory, reached, fed, {"color": _BLUE, "width": 1.6}, "set by the feed", unit),
-        _line(trajectory, reached, ~fed, {"color": "#f57c00", "width": 1.6}, "held back", unit),
+        _build_line(trajectory, programmed, None, dotted, "programmed feed", unit),
+        _build_line(trajectory, fastest, None, {"color": _GREY, "width": 1}, "feed reached", unit),
+        _build_line(trajectory, reached, fed, {"color": _BLUE, "width": 1.6}, "set by the feed", unit),
+        _build_line(trajectory, reached, ~fed, {"color": "#f57c00", "width": 1.6}, "held back", unit),
     ]
-    asked = programmed.values[np.isfinite(programmed.values)]
-    top = _ROOM * float(asked.max() if len(asked) else fastest.values.max())
+    feeds = programmed.values[np.isfinite(programmed.values)]
+    top = _ROOM * float(feeds.max() if len(feeds) else fastest.values.max())
     key = (
         f"[{unit}]  <span style='color:{_BLUE}'>set by the feed</span>,"
         " <span style='color:#e65100'>held back by a drive</span>, in rapid grey; programmed dotted"
@@ -105,36 +100,37 @@ def _feed(trajectory: Trajectory, curves: dict[str, Thinned]) -> Panel:
     return Panel(f"<b>feed</b>  <span style='color:#607d8b'>{key}</span>", traces, [0.0, top])
 
 
-def _position(trajectory: Trajectory, curves: dict[str, Thinned], number: int) -> Panel:
+def _build_position_panel(trajectory: Trajectory, curves: dict[str, ThinnedCurve], number: int) -> Panel:
     drive, curve = trajectory.posted.machine.drives[number], curves[trajectory.posted.machine.joints[number]]
-    use = RangeUse(drive.name, drive.name, drive.unit, drive.low, drive.high, *_ends(curve))
-    unit, scale = _rim(trajectory.posted.machine, number)
-    trace = _line(trajectory, curve, None, {"color": _BLUE, "width": 1.3}, escape(drive.name), unit, scale)
-    return panel_of(use, heading(drive.name, unit, ""), [trace])
+    use = RangeUse(drive.name, drive.name, drive.unit, drive.low, drive.high, *_find_ends(curve))
+    unit, scale = _display_scale(trajectory.posted.machine, number)
+    trace = _build_line(trajectory, curve, None, {"color": _BLUE, "width": 1.3}, escape(drive.name), unit, scale)
+    return build_panel(use, format_heading(drive.name, unit, ""), [trace])
 
 
-def _motion(trajectory: Trajectory, curves: dict[str, Thinned], number: int, kind: str) -> Panel:
-    """A joint's speed, acceleration or jerk, coloured where its limit sets the pace."""
+def _build_rate_panel(trajectory: Trajectory, curves: dict[str, ThinnedCurve], number: int, kind: str) -> Panel:
+    """Build the panel of a joint's speed, acceleration or jerk, coloured where its limit sets the pace."""
     drive = trajectory.posted.machine.drives[number]
     bound, (per, colour, ticks) = getattr(drive, kind), _KINDS[kind]
-    unit, scale = _rim(trajectory.posted.machine, number)
+    unit, scale = _display_scale(trajectory.posted.machine, number)
     text = f"limit {format_bound(bound, drive.unit)}" if isfinite(bound) else "no limit"
-    title = heading(f"{drive.name} {kind}", unit + per, text)
+    title = format_heading(f"{drive.name} {kind}", unit + per, text)
     name = f"{drive.name}.{kind}"
     if name not in curves:  # a jerk without a limit beside others with one
         return Panel(title, [], [-1.0, 1.0])
     curve, label = curves[name], escape(f"{drive.name} {kind}")
-    traces = [_line(trajectory, curve, None, {"color": _BLUE, "width": 1.1}, label, unit + per, scale)]
+    traces = [_build_line(trajectory, curve, None, {"color": _BLUE, "width": 1.1}, label, unit + per, scale)]
     bound_here = curve.binding == trajectory.names.index(name)
     if bound_here.any():
-        traces.append(_line(trajectory, curve, bound_here, {"color": colour, "width": 1.8}, label, unit + per, scale))
-    return panel_of(RangeUse(name, name, drive.unit, -bound, bound, *_ends(curve)), title, traces, ticks)
+        look = {"color": colour, "width": 1.8}
+        traces.append(_build_line(trajectory, curve, bound_here, look, label, unit + per, scale))
+    return build_panel(RangeUse(name, name, drive.unit, -bound, bound, *_find_ends(curve)), title, traces, ticks)
 
 
-def _ends(curve: Thinned) -> tuple[float, float]:
+def _find_ends(curve: ThinnedCurve) -> tuple[float, float]:
     return float(curve.values.min()), float(curve.values.max())
 
 
-def _rim(machine: Machine, number: int) -> tuple[str, float]:
-    """A joint's unit for people, and what its values are multiplied by."""
+def _display_scale(machine: Machine, number: int) -> tuple[str, float]:
+    """A joint's unit for people, and the factor of its values."""
     return ("°", degrees(1.0)) if machine.joint_units[number] == "rad" else ("mm", 1.0)

@@ -8,22 +8,19 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
-from .curves import extremes_within
+from ...arrays import Array, Indices
+from .joint_curves import pick_extremes_within
 
 if TYPE_CHECKING:
     from ...toolpath.timing import Trajectory
 
-Floats = NDArray[np.float64]
-Indices = NDArray[np.int64]
-
 _BLOCK = 1 << 15  # pieces of a trajectory at a time
-_SHORTEST = 1e-7  # s: what a piece as short adds is rounding
+_SHORTEST = 1e-7  # s: a piece as short adds rounding only
 
 
 @dataclass(frozen=True, eq=False)
-class Thinned:
+class ThinnedCurve:
     """A curve over time, k points.
 
     times, values : (k,) s; mm or rad, s, and mm/min for feeds; NaN where there is no value
@@ -31,42 +28,45 @@ class Thinned:
     record : (k,) that the motion leads to
     """
 
-    times: Floats
-    values: Floats
+    times: Array
+    values: Array
     binding: Indices
     record: Indices
 
 
-def thinned(trajectory: Trajectory, most: int) -> dict[str, Thinned]:
-    """The trajectory's curves of some ``most`` points each: the tip's ``feed.any``, ``feed.reached`` in feed motions
-    and ``feed.programmed``; for each joint ``d1``, ``d1.speed``, ``d1.acceleration``, and ``d1.jerk`` if it is limited.
+def thin_curves(trajectory: Trajectory, most: int) -> dict[str, ThinnedCurve]:
+    """Thin the trajectory's curves to some ``most`` points each.
 
-    Looked at are the start, the middle and the end of every piece of the speed profile; of these each curve keeps the
-    least and the greatest in every stretch. Stretches are short where pieces are, yet none much longer than the others.
+    They are of the tip ``feed.any``, ``feed.reached`` in feed motions and ``feed.programmed``; of each joint ``d1``,
+    ``d1.speed``, ``d1.acceleration``, and ``d1.jerk`` if it is limited.
+
+    The curves are sampled at the start, the middle and the end of every piece of the speed profile; of these samples
+    each curve keeps the least and the greatest in every stretch. Stretches are short where pieces are, yet none is
+    much longer than the others.
     """
-    parts: dict[str, list[Thinned]] = defaultdict(list)
+    parts: dict[str, list[ThinnedCurve]] = defaultdict(list)
     total, done = 3 * len(trajectory.profile.row), 0
     stretches = most // 3 if total > most else total
-    for times, binding, record, curves in _blocks(trajectory):
+    for times, binding, record, curves in _sample_blocks(trajectory):
         along = 0.5 * (times / trajectory.seconds + np.arange(done, done + len(times)) / total)
         done += len(times)
         for name, values in curves.items():
             kept = np.arange(len(values))
             if total > most:
-                kept = _without_short_gaps(times, values, trajectory.seconds / stretches)
+                kept = _drop_short_gaps(times, values, trajectory.seconds / stretches)
                 starts = np.flatnonzero(np.diff(np.floor(along[kept] * stretches), prepend=-1.0))
-                kept = kept[extremes_within(values[kept], starts)]
-            parts[name].append(Thinned(times[kept], values[kept], binding[kept], record[kept]))
-    return {name: _joined(blocks) for name, blocks in parts.items()}
+                kept = kept[pick_extremes_within(values[kept], starts)]
+            parts[name].append(ThinnedCurve(times[kept], values[kept], binding[kept], record[kept]))
+    return {name: _join_blocks(blocks) for name, blocks in parts.items()}
 
 
-def _joined(blocks: list[Thinned]) -> Thinned:
+def _join_blocks(blocks: list[ThinnedCurve]) -> ThinnedCurve:
     names = ("times", "values", "binding", "record")
-    return Thinned(*(np.concatenate([getattr(block, name) for block in blocks]) for name in names))
+    return ThinnedCurve(*(np.concatenate([getattr(block, name) for block in blocks]) for name in names))
 
 
-def _without_short_gaps(times: Floats, values: Floats, shortest: float) -> Indices:
-    """Points of a curve without those NaN that last no longer: else these part every two points that are left."""
+def _drop_short_gaps(times: Array, values: Array, shortest: float) -> Indices:
+    """Drop those NaN of a curve that last no longer than ``shortest``, s: they would part the points that are left."""
     gone = np.isnan(values)
     if not gone.any():
         return np.arange(len(values))
@@ -76,10 +76,10 @@ def _without_short_gaps(times: Floats, values: Floats, shortest: float) -> Indic
     return np.flatnonzero(~np.repeat(short, lasts - begins + 1))
 
 
-def _blocks(trajectory: Trajectory) -> Iterator[tuple[Floats, Indices, Indices, dict[str, Floats]]]:
-    """Times, what binds, records, and curves by their names, for some pieces at a time."""
+def _sample_blocks(trajectory: Trajectory) -> Iterator[tuple[Array, Indices, Indices, dict[str, Array]]]:
+    """Yield times, what binds, records, and curves by their names, for some pieces at a time."""
     profile, joint_path, machine = trajectory.profile, trajectory.joint_path, trajectory.posted.machine
-    edges = switches(trajectory)
+    edges = find_switches(trajectory)
     tip = [i for i, axis in enumerate(machine.axes) if axis in "XYZ"]
     jerky = [i for i, drive in enumerate(machine.drives) if drive.jerk < np.inf]
     pieces = np.flatnonzero(np.diff(profile.time) > _SHORTEST)
@@ -89,10 +89,10 @@ def _blocks(trajectory: Trajectory) -> Iterator[tuple[Floats, Indices, Indices, 
         times = np.column_stack([begin, 0.5 * (begin + end), end])
         at = trajectory.at(times.ravel())
         record = np.repeat(trajectory.curve.record_of_piece[joint_path.segment[profile.row[piece]]], 3)
-        feed = np.linalg.norm(_rates(at.poses[:, tip], times), axis=1)
-        curves = {"feed.any": 60.0 * feed, "feed.programmed": _programmed(trajectory, record)}
+        feed = np.linalg.norm(_differentiate(at.poses[:, tip], times), axis=1)
+        curves = {"feed.any": 60.0 * feed, "feed.programmed": _find_programmed_feed(trajectory, record)}
         curves["feed.reached"] = np.where(trajectory.posted.path.rapid[record], np.nan, 60.0 * feed)
-        jerks = _rates(at.accelerations[:, jerky], times)
+        jerks = _differentiate(at.accelerations[:, jerky], times)
         for j, name in enumerate(machine.joints):
             curves |= {name: at.joints[:, j], f"{name}.speed": at.speeds[:, j]}
             curves[f"{name}.acceleration"] = at.accelerations[:, j]
@@ -102,26 +102,26 @@ def _blocks(trajectory: Trajectory) -> Iterator[tuple[Floats, Indices, Indices, 
         yield at.times, binding, record, curves
 
 
-def switches(trajectory: Trajectory) -> Floats:
-    """(rows - 1,) s, when what binds at one row of the trajectory's joint path gives way to what binds at the next."""
+def find_switches(trajectory: Trajectory) -> Array:
+    """Find when what binds at one row of the joint path gives way to what binds at the next, (rows - 1,) s."""
     passed = trajectory.profile.row_times
     return 0.5 * (passed[1:] + passed[:-1])
 
 
-def _rates(values: Floats, times: Floats) -> Floats:
-    """Rates of change (3 k, columns) at start, middle and end of k pieces (k, 3), of the parabolas through these."""
+def _differentiate(values: Array, times: Array) -> Array:
+    """Differentiate the parabolas through start, middle and end of k pieces (k, 3) there: (3 k, columns)."""
     first, middle, last = np.moveaxis(values.reshape(len(times), 3, -1), 1, 0)
     rates = np.stack([4.0 * middle - 3.0 * first - last, last - first, first - 4.0 * middle + 3.0 * last], axis=1)
-    result: Floats = (rates / (times[:, 2] - times[:, 0])[:, None, None]).reshape(values.shape)
+    result: Array = (rates / (times[:, 2] - times[:, 0])[:, None, None]).reshape(values.shape)
     return result
 
 
-def _programmed(trajectory: Trajectory, record: Indices) -> Floats:
-    """The programmed feed on motions to records, mm/min; NaN in rapid and where there is none."""
+def _find_programmed_feed(trajectory: Trajectory, record: Indices) -> Array:
+    """Find the programmed feed on motions to records, mm/min; NaN in rapid and where there is none."""
     path = trajectory.posted.path
     feed = path.feed.copy()
     if path.seconds is not None:
         steps = np.linalg.norm(np.diff(path.tip, axis=0, prepend=path.tip[:1]), axis=1)
-        told = path.seconds > 0.0
-        feed[told] = 60.0 * steps[told] / path.seconds[told]
+        timed = path.seconds > 0.0
+        feed[timed] = 60.0 * steps[timed] / path.seconds[timed]
     return np.where(path.rapid, np.nan, feed)[record]

@@ -1,4 +1,4 @@
-"""The report's card of ranges: bars of what each limit allows and what a path uses."""
+"""The report's card of ranges: bars of what each limit allows and what a path uses of it."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ if TYPE_CHECKING:
     from ...toolpath.posting.posted import Posted
 
 
-def range_card(posted: Posted, uses: list[RangeUse]) -> str:
+def render_range_card(posted: Posted, uses: list[RangeUse]) -> str:
     joints, rest = uses[: len(posted.machine.joints)], uses[len(posted.machine.joints) :]
-    body = f"<h3>Joints</h3><div class=two>{''.join(_bar(posted, use) for use in joints)}</div>"
+    body = f"<h3>Joints</h3><div class=two>{''.join(_render_bar(posted, use) for use in joints)}</div>"
     if rest:
-        bars = "".join(_bar(posted, use) for use in rest)
+        bars = "".join(_render_bar(posted, use) for use in rest)
         body += f"<h3>Other limits</h3><div class=two>{bars}</div>"
     key = (
         "<span class=key style='background:#dfe7ee;margin-left:0'></span>allowed"
@@ -29,8 +29,8 @@ def range_card(posted: Posted, uses: list[RangeUse]) -> str:
     return make_card("Ranges", body, key)
 
 
-def _bar(posted: Posted, use: RangeUse) -> str:
-    """The range used inside the range allowed, in per cent of what both cover."""
+def _render_bar(posted: Posted, use: RangeUse) -> str:
+    """Render the range used inside the range allowed, in per cent of what both cover."""
     ends = [v for v in (use.low, use.high, use.least, use.most) if isfinite(v)]
     if not isfinite(use.low) and use.unit in ("mm", "rad") and isfinite(use.high) and use.high > 0.0:
         ends.append(0.0)  # an angle of a cone, or a distance: what has no lower bound begins at 0

@@ -7,12 +7,12 @@ from itertools import chain, repeat
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..machine.figures import Figure, Trace, numbers, scene_layout
+from ...arrays import Indices
+from ..machine.figures import Figure, Trace, build_scene_layout, round_numbers
 from ..number_format import format_duration
-from .path_view import PathView, stroke, telling, tip_points
-from .timing_samples import switches
+from .path_view import PathView, build_stroke, choose_points, find_tips
+from .timing_samples import find_switches
 
 if TYPE_CHECKING:
     from ...toolpath.timing import Trajectory
@@ -26,46 +26,47 @@ _COLOURS = (
 )  # fmt: skip
 
 
-def colours(trajectory: Trajectory) -> dict[str, str]:
-    """A colour for each limit that ever sets the pace, in the order of their shares."""
+def choose_colours(trajectory: Trajectory) -> dict[str, str]:
+    """Choose a colour for each limit that ever sets the pace, in the order of their shares."""
     free = chain(_COLOURS, repeat(_REST))
     return {name: _FEED if name == "feed" else next(free) for name in trajectory.shares}
 
 
-def share_bars(trajectory: Trajectory, shades: dict[str, str]) -> str:
-    """How long each limit sets the pace, as HTML bars."""
+def render_share_bars(trajectory: Trajectory, shades: dict[str, str]) -> str:
+    """Render how long each limit sets the pace, as HTML bars."""
     return "".join(
-        f"<div class='bar pace'><div><b>{_breakable(name)}</b></div><div class=scale>"
+        f"<div class='bar pace'><div><b>{_allow_breaks(name)}</b></div><div class=scale>"
         f"<i style='left:0;width:{100.0 * share:.2f}%;background:{shades[name]}'></i></div>"
-        f"<div class=slack>{percent(share)} <small>{_brief(share * trajectory.seconds)}</small></div></div>\n"
+        f"<div class=slack>{format_percent(share)} <small>{_format_brief(share * trajectory.seconds)}</small></div>"
+        "</div>\n"
         for name, share in trajectory.shares.items()
     )
 
 
-def percent(share: float) -> str:
+def format_percent(share: float) -> str:
     return "below 0.1 %" if share < 0.001 else f"{100.0 * share:.1f} %"
 
 
-def _brief(seconds: float) -> str:
+def _format_brief(seconds: float) -> str:
     return format_duration(seconds) if seconds >= 1.0 else f"{seconds:.2g} s"
 
 
-def _breakable(name: str) -> str:
+def _allow_breaks(name: str) -> str:
     return escape(name).replace(".", ".<wbr>")
 
 
-def bars_over_time(trajectory: Trajectory, shades: dict[str, str]) -> list[Trace]:
-    """For each limit the share of short spans of the cycle in which it sets the pace; they add up to 1."""
+def build_share_traces(trajectory: Trajectory, shades: dict[str, str]) -> list[Trace]:
+    """Build for each limit its share of short spans of the cycle, in which it sets the pace; the shares sum to 1."""
     ends = np.linspace(0.0, trajectory.seconds, _BINS + 1)
-    bounds = np.concatenate([[0.0], switches(trajectory), [trajectory.seconds]])
+    bounds = np.concatenate([[0.0], find_switches(trajectory), [trajectory.seconds]])
     spans = np.diff(bounds)
     traces = []
     for name, shade in shades.items():
         so_far = np.append(0.0, np.cumsum(np.where(trajectory.binding == trajectory.names.index(name), spans, 0.0)))
         share = np.diff(np.interp(ends, bounds, so_far)) * (_BINS / trajectory.seconds)
-        some = np.flatnonzero(share > 1e-6)
+        bins = np.flatnonzero(share > 1e-6)
         trace: Trace = {"type": "bar", "name": escape(name), "marker": {"color": shade, "line": {"width": 0}}}
-        trace |= {"x": numbers(0.5 * (ends[some] + ends[some + 1]), 6), "y": numbers(share[some], 4)}
+        trace |= {"x": round_numbers(0.5 * (ends[bins] + ends[bins + 1]), 6), "y": round_numbers(share[bins], 4)}
         trace |= {
             "width": trajectory.seconds / _BINS,
             "hovertemplate": "%{x:,.3f} s<br>%{y:.1%} %{fullData.name}<extra></extra>",
@@ -74,19 +75,18 @@ def bars_over_time(trajectory: Trajectory, shades: dict[str, str]) -> list[Trace
     return traces
 
 
-def bound_path(trajectory: Trajectory, view: PathView, shades: dict[str, str]) -> Figure:
-    """The tool tip's path, coloured by the limit that sets the pace; rapid motions are thin."""
+def build_bound_path(trajectory: Trajectory, view: PathView, shades: dict[str, str]) -> Figure:
+    """Build the tool tip's path, coloured by the limit that sets the pace; rapid motions are thin."""
     posted, joint_path = trajectory.posted, trajectory.joint_path
     rows = len(joint_path.segment)
-    tips = tip_points(posted.machine, joint_path.poses(np.arange(rows), np.zeros(rows)))
+    tips = find_tips(posted.machine, joint_path.poses(np.arange(rows), np.zeros(rows)))
     tips = tips @ view.place[:, :3].T + view.place[:, 3]
-    record = trajectory.curve.record_of_piece[
-        joint_path.segment[np.maximum(np.arange(rows) - 1, 0)]
-    ]  # that the step to a row leads to
+    before = np.maximum(np.arange(rows) - 1, 0)
+    record = trajectory.curve.record_of_piece[joint_path.segment[before]]  # that the step to a row leads to
     rapid = posted.path.rapid[record]
     limited = (trajectory.binding != 0).astype(float)  # so that thinning drops no stretch where a drive binds
     turns = np.flatnonzero((np.diff(trajectory.binding) != 0) | (np.diff(rapid) != 0))
-    kept = telling((*tips.T, limited), turns, _POINTS)
+    kept = choose_points((*tips.T, limited), turns, _POINTS)
     traces: list[Trace] = []
     for name, shade in shades.items():
         here = trajectory.binding[kept[1:]] == trajectory.names.index(name)
@@ -95,25 +95,25 @@ def bound_path(trajectory: Trajectory, view: PathView, shades: dict[str, str]) -
             if not wanted.any():
                 continue
             line: Figure = {"color": shade, "width": 2 if fast else 5}
-            trace, at = stroke(tips, kept, wanted, line, escape(name))
+            trace, at = build_stroke(tips, kept, wanted, line, escape(name))
             trace |= {
                 "legendgroup": name,
                 "showlegend": not any(t["legendgroup"] == name for t in traces),
             }
-            trace["customdata"] = _places(trajectory, at, record)
+            trace["customdata"] = _describe_points(trajectory, at, record)
             trace["hovertemplate"] = (
                 "%{customdata[0]:,.3f} s, record %{customdata[1]:,}, line %{customdata[2]}"
                 f"<br>%{{x:,.2f}}, %{{y:,.2f}}, %{{z:,.2f}}<extra>{escape(name)}</extra>"
             )
             traces.append(trace)
     points = tips[kept]
-    layout = scene_layout([np.array([points.min(0), points.max(0)])], view.normal)
+    layout = build_scene_layout([np.array([points.min(0), points.max(0)])], view.normal)
     layout["legend"] |= {"font": {"size": 11}}
     return {"data": traces, "layout": layout}
 
 
-def _places(
-    trajectory: Trajectory, rows: NDArray[np.int64], record: NDArray[np.int64]
-) -> list[list[float | int | None]]:
-    times, of = numbers(trajectory.profile.row_times[rows], 3), record[rows]
-    return [[*place] for place in zip(times, of.tolist(), trajectory.posted.path.line[of].tolist(), strict=True)]
+def _describe_points(trajectory: Trajectory, rows: Indices, record: Indices) -> list[list[float | int | None]]:
+    """Describe points by time (s), record and source line, for the mouse."""
+    times, records = round_numbers(trajectory.profile.row_times[rows], 3), record[rows]
+    lines = trajectory.posted.path.line[records]
+    return [[*point] for point in zip(times, records.tolist(), lines.tolist(), strict=True)]

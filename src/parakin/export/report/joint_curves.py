@@ -7,64 +7,61 @@ from math import ceil, degrees, isfinite
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...arrays import Array, Indices
 from ...toolpath.posting.range_use import RangeUse
-from ..machine.figures import Figure, Trace, numbers
+from ..machine.figures import Figure, Trace, round_numbers
 from ..number_format import format_bound
-from .panels import Panel, stacked
+from .panels import Panel, stack_panels
 
 if TYPE_CHECKING:
     from ...toolpath.posting.posted import Posted
-
-Floats = NDArray[np.float64]
-Indices = NDArray[np.int64]
 
 POINTS = 4000  # a curve
 _ALL_POINTS = 36_000  # of all curves together, for machines with many joints
 
 
-def extremes(values: Floats, most: int) -> Indices:
-    """Ascending indices of at most ``most`` + 2 values: in every stretch the least, the greatest and the first NaN.
+def pick_extremes(values: Array, most: int) -> Indices:
+    """Pick at most ``most`` + 2 values: in every stretch the least, the greatest and the first NaN.
 
-    Of a curve with no more values than that all are kept; the first and the last always are.
+    Returns ascending indices. Of a curve with no more values all are kept; the first and the last always are.
     """
     n = len(values)
     if n <= most:
         return np.arange(n)
-    return extremes_within(values, np.arange(0, n, ceil(n / max(1, most // 3))))
+    return pick_extremes_within(values, np.arange(0, n, ceil(n / max(1, most // 3))))
 
 
-def extremes_within(values: Floats, starts: Indices) -> Indices:
-    """As :func:`extremes`, in stretches that begin at ``starts``, ascending from 0."""
+def pick_extremes_within(values: Array, starts: Indices) -> Indices:
+    """Pick as :func:`pick_extremes`, in stretches that begin at ``starts``, ascending from 0."""
     stretch = np.repeat(np.arange(len(starts)), np.diff(starts, append=len(values)))
     kept = [np.array([0, len(values) - 1])]
     least, most = np.fmin.reduceat(values, starts), np.fmax.reduceat(values, starts)
-    for told in (values == least[stretch], values == most[stretch], np.isnan(values)):
-        at = np.flatnonzero(told)
+    for chosen in (values == least[stretch], values == most[stretch], np.isnan(values)):
+        at = np.flatnonzero(chosen)
         kept.append(at[np.diff(stretch[at], prepend=-1) > 0])  # the first in its stretch
     return np.unique(np.concatenate(kept))
 
 
-def joint_curves(posted: Posted, uses: list[RangeUse]) -> tuple[Figure, int]:
-    """One curve a joint over the records, and the figure's height in px; ``uses`` are the joints'."""
+def build_joint_curves(posted: Posted, uses: list[RangeUse]) -> tuple[Figure, int]:
+    """Build one curve for each joint over the records; return the figure and its height in px."""
     most = min(POINTS, _ALL_POINTS // len(uses))
     rows = []
     for use, values in zip(uses, posted.joints.T, strict=True):
-        traces = _curve(posted, use, values, degrees(1.0) if use.unit == "rad" else 1.0, most)
-        rows.append([panel_of(use, _heading(use), traces)])
-    return stacked(rows, "record, counted from 0")
+        traces = _build_curve(posted, use, values, degrees(1.0) if use.unit == "rad" else 1.0, most)
+        rows.append([build_panel(use, _format_use_heading(use), traces)])
+    return stack_panels(rows, "record, counted from 0")
 
 
-def panel_of(use: RangeUse, heading: str, traces: list[Trace], ticks: str = ",") -> Panel:
-    """A panel for a bounded quantity, in mm or degrees, that shows what is used of it and the limits near by."""
+def build_panel(use: RangeUse, heading: str, traces: list[Trace], ticks: str = ",") -> Panel:
+    """Build a panel of a bounded quantity, in mm or degrees, which shows the range used and the limits near it."""
     scale = degrees(1.0) if use.unit == "rad" else 1.0
-    return Panel(heading, traces, _range(use, scale), [b * scale for b in (use.low, use.high)], ticks)
+    return Panel(heading, traces, _choose_axis_range(use, scale), [b * scale for b in (use.low, use.high)], ticks)
 
 
-def _curve(posted: Posted, use: RangeUse, values: Floats, scale: float, most: int) -> list[Trace]:
-    """The curve, and over it in red what lies beyond a limit."""
-    kept = extremes(values, most)
+def _build_curve(posted: Posted, use: RangeUse, values: Array, scale: float, most: int) -> list[Trace]:
+    """Build the curve, and over it in red what lies beyond a limit."""
+    kept = pick_extremes(values, most)
     y, lines = values[kept], posted.path.line[kept].tolist()
     unit = "°" if use.unit == "rad" else f" {use.unit}"
     digits = 4 if use.unit == "rad" else 3
@@ -78,18 +75,18 @@ def _curve(posted: Posted, use: RangeUse, values: Floats, scale: float, most: in
         f"line %{{customdata}}, record %{{x:,}}<br>%{{y:,.3f}}{unit}<extra>%{{fullData.name}}</extra>"
     )
     few = len(kept) < 60
-    traces = [base | {"y": numbers(y * scale, digits), "mode": "lines+markers" if few else "lines",
+    traces = [base | {"y": round_numbers(y * scale, digits), "mode": "lines+markers" if few else "lines",
                       "line": {"color": "#2f6fb3", "width": 1.4}, "marker": {"size": 4}}]  # fmt: skip
     beyond = (y < use.low) | (y > use.high)
     if beyond.any():
-        red = numbers(np.where(beyond, y, np.nan) * scale, digits)
+        red = round_numbers(np.where(beyond, y, np.nan) * scale, digits)
         traces.append(base | {"y": red, "mode": "lines+markers", "line": {"color": "#c62828", "width": 2},
                               "marker": {"size": 3.5, "color": "#c62828"}})  # fmt: skip
     return traces
 
 
-def _range(use: RangeUse, scale: float) -> list[float]:
-    """What the curve's axis shows: the range used, and those limits that lie no farther off than its own width."""
+def _choose_axis_range(use: RangeUse, scale: float) -> list[float]:
+    """Choose the axis' ends: the range used, and those limits that lie no farther off than its own width."""
     if not isfinite(use.least):
         low, high = (use.low, use.high) if isfinite(use.low) and isfinite(use.high) else (-1.0, 1.0)
     else:
@@ -104,14 +101,14 @@ def _range(use: RangeUse, scale: float) -> list[float]:
     return [(low - pad) * scale, (high + pad) * scale]
 
 
-def _heading(use: RangeUse) -> str:
+def _format_use_heading(use: RangeUse) -> str:
     limits = "no limits"
     if isfinite(use.low) or isfinite(use.high):
         low, high = (format_bound(v, use.unit) if isfinite(v) else "–" for v in (use.low, use.high))
         limits = f"limits {low} to {high}"
-    return heading(use.name, "°" if use.unit == "rad" else use.unit, limits)
+    return format_heading(use.name, "°" if use.unit == "rad" else use.unit, limits)
 
 
-def heading(name: str, unit: str, limits: str) -> str:
-    """A panel's heading, in HTML."""
+def format_heading(name: str, unit: str, limits: str) -> str:
+    """Format a panel's heading, in HTML."""
     return f"<b>{escape(name)}</b>  <span style='color:#607d8b'>[{unit}]  {limits}</span>"

@@ -9,8 +9,9 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import parakin as pk
-from parakin.toolpath.linearise.interpolation import Programmed, denser
 from parakin.toolpath.linearise.linearise import linearise_path
+from parakin.toolpath.linearise.path_records import insert_records
+from parakin.toolpath.linearise.programmed_path import ProgrammedPath
 from parakin.toolpath.path import Event, ToolPath
 from parakin.toolpath.posting.post import post_path
 
@@ -194,7 +195,7 @@ def test_no_point_can_be_spared(name, under):
     assert count > 1
     for j in range(1, count + 1):
         assert within(posted, without(posted, result, j), under, chord, angle) > 1.0
-    even = denser(posted.path, np.ones(count - 1, int), np.arange(1, count) / count)
+    even = insert_records(posted.path, np.ones(count - 1, int), np.arange(1, count) / count)
     assert within(posted, post_path(machine, even), under, chord, angle) > 1.0
 
 
@@ -489,7 +490,7 @@ def test_opposite_axes_are_refused_with_their_line():
         with pytest.raises(pk.PoseError, match=r"part\.cls:11: the tool axis turns to its opposite"):
             linearise_path(posted, "pose")
     with pytest.raises(pk.PoseError, match=r"part\.cls:11: the tool axis turns to its opposite"):
-        Programmed(path).at(np.array([1]), np.array([0.5]))
+        ProgrammedPath(path).interpolate(np.array([1]), np.array([0.5]))
 
 
 @pytest.mark.parametrize("bad", [{"chord": 0.0}, {"chord": math.nan}, {"angle": -1.0}, {"angle": math.inf}])
@@ -511,6 +512,6 @@ def test_great_circles_great_and_small(size):
     side /= np.linalg.norm(side)
     b = math.cos(size) * a + math.sin(size) * side
     share = np.linspace(0.0, 1.0, 11)
-    axis = Programmed(path_of(np.zeros((2, 3)), [a, b])).at(np.ones(11, int), share)[1]
+    axis = ProgrammedPath(path_of(np.zeros((2, 3)), [a, b])).interpolate(np.ones(11, int), share)[1]
     np.testing.assert_allclose(np.linalg.norm(axis, axis=1), 1.0, atol=1e-15)
     np.testing.assert_allclose((axis - a) @ side, np.sin(share * size), rtol=1e-2 if size < 1e-12 else 1e-6, atol=1e-17)

@@ -1,1 +1,1 @@
-"""More records, so that a controller's interpolation keeps to the programmed path."""
+"""Linearise a posted path: more records, so that a controller's interpolation keeps the tool on the programmed path."""

@@ -1,4 +1,4 @@
-"""Poses and joints at a single point of a path, as they go on from those at an earlier one."""
+"""Poses and joints at single points of a path, which go on from those at earlier points as posting has them go on."""
 
 from __future__ import annotations
 
@@ -6,88 +6,95 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ...arrays import Array, Flags, Indices
 from ...kinematics.wrist import continue_direction, find_nearest_turn, flip_rotation
 from ...machine import Machine
-from ..path import Floats
 from ..posting.frames import compute_poses, frame_from_angles
 from ..posting.programmed_angles import compute_rotations
-from .interpolation import Flags, Indices
 
-_HERE = frame_from_angles(0, 0, 0, 0, 0, 0)
-_EVEN = 1e-9  # of a rotation
+MACHINE_FRAME = frame_from_angles(0, 0, 0, 0, 0, 0)
+_MATCHING = 1e-9  # of a rotation: what is rounding
 
 
 @dataclass(frozen=True, eq=False)
-class Rows:
-    """Poses (m, axes) and joints (m, joints) of m points."""
+class PosedPoints:
+    """Poses (m, axes) and joints (m, joints) of m points of a path."""
 
-    poses: Floats
-    joints: Floats
+    poses: Array
+    joints: Array
 
-    def __getitem__(self, index: slice | Indices | Flags) -> Rows:
-        return Rows(self.poses[index], self.joints[index])
+    def __getitem__(self, index: slice | Indices | Flags) -> PosedPoints:
+        return PosedPoints(self.poses[index], self.joints[index])
 
-    def put(self, index: Indices, rows: Rows) -> None:
-        self.poses[index], self.joints[index] = rows.poses, rows.joints
+    def assign(self, index: Indices, points: PosedPoints) -> None:
+        """Replace some of the points, in place."""
+        self.poses[index], self.joints[index] = points.poses, points.joints
+
+    def copy(self) -> PosedPoints:
+        """Return points that can be replaced without changing these."""
+        return PosedPoints(self.poses.copy(), self.joints.copy())
 
 
-def continued(machine: Machine, mode: str, tip: Floats, axis: Floats, before: Rows) -> Rows:
-    """Rows for tips and axes (m, 3) in M, each going on from its row of ``before`` as posting has them go on."""
-    poses = _pointing(machine, tip, axis, before)
-    return Rows(poses, _joints(machine, mode, poses, before))
+def continue_points(machine: Machine, mode: str, tip: Array, axis: Array, before: PosedPoints) -> PosedPoints:
+    """Pose tips and axes (m, 3) in M and solve for their joints, each going on from its point of ``before``."""
+    poses = _point_tool(machine, tip, axis, before)
+    return PosedPoints(poses, _solve_joints(machine, mode, poses, before))
 
 
-def turned(machine: Machine, mode: str, tip: Floats, rotation: Floats, even: Floats, before: Rows) -> Rows:
-    """As :func:`continued` where a program turns the tool: rotations (m, 3, 3) in M.
+def continue_turned_points(
+    machine: Machine, mode: str, tip: Array, rotation: Array, even: Array, before: PosedPoints
+) -> PosedPoints:
+    """Pose tips (m, 3) and rotations (m, 3, 3) of the tool in M as :func:`continue_points` does tips and axes.
 
-    ``even`` are the poses to take where they are given, and not NaN.
+    even : (m, axes) the poses to take where they are given, and not NaN
     """
-    poses = _pointing(machine, tip, np.ascontiguousarray(rotation[:, :, 2]), before)
-    columns = _turning_columns(machine)
+    poses = _point_tool(machine, tip, np.ascontiguousarray(rotation[:, :, 2]), before)
+    columns = _list_turning_axes(machine)
     if len(columns) == 3:
-        poses[:, columns] = _decomposed(rotation, before.poses[:, columns])
+        poses[:, columns] = _decompose_rotations(rotation, before.poses[:, columns])
     poses = np.where(np.isfinite(even), even, poses)
-    return Rows(poses, _joints(machine, mode, poses, before))
+    return PosedPoints(poses, _solve_joints(machine, mode, poses, before))
 
 
-def has_turns(machine: Machine, poses: Floats, rotation: Floats) -> Flags:
-    """Whether poses (m, axes) turn the tool as rotations (m, 3, 3) in M do, as far as the machine can."""
-    columns = _turning_columns(machine)
+def find_matching_poses(machine: Machine, poses: Array, rotation: Array) -> Flags:
+    """Find poses (m, axes) that turn the tool as rotations (m, 3, 3) in M do, as far as the machine can."""
+    columns = _list_turning_axes(machine)
     turns = np.zeros((len(poses), 3))
     turns[:, ["ABC".index(machine.axes[column]) for column in columns]] = poses[:, columns]
     off = rotation - compute_rotations(turns)
-    has: Flags = np.abs(off if len(columns) == 3 else off[:, :, 2:]).max(axis=(1, 2)) < _EVEN
-    return has
+    matching: Flags = np.abs(off if len(columns) == 3 else off[:, :, 2:]).max(axis=(1, 2)) < _MATCHING
+    return matching
 
 
-def _turning_columns(machine: Machine) -> list[int]:
+def _list_turning_axes(machine: Machine) -> list[int]:
     return [column for column, letter in enumerate(machine.axes) if letter in "ABC"]
 
 
-def _pointing(machine: Machine, tip: Floats, axis: Floats, before: Rows) -> Floats:
-    poses = compute_poses(machine, tip, axis, _HERE)[0]
+def _point_tool(machine: Machine, tip: Array, axis: Array, before: PosedPoints) -> Array:
+    """Compute poses whose turning axes go on from the poses before, over the pole of B and C too."""
+    poses = compute_poses(machine, tip, axis, MACHINE_FRAME)[0]
     if machine.has_direction:
         continue_direction(poses[:, 3:], before.poses[:, 3:])
     else:
-        for column, letter in enumerate(machine.axes):
-            if letter in "ABC":
-                poses[:, column] = find_nearest_turn(poses[:, column], before.poses[:, column])
+        for column in _list_turning_axes(machine):
+            poses[:, column] = find_nearest_turn(poses[:, column], before.poses[:, column])
     return poses
 
 
-def _decomposed(rotation: Floats, before: Floats) -> Floats:
-    """A, B, C (m, 3) of rotations (m, 3, 3), of both ways to have them the nearer to ``before`` (m, 3)."""
+def _decompose_rotations(rotation: Array, before: Array) -> Array:
+    """Decompose rotations (m, 3, 3) into A, B, C (m, 3); of both solutions the nearer to ``before`` (m, 3)."""
     r = np.moveaxis(rotation, 0, 2)
     level = np.hypot(r[2, 1], r[2, 2])
     a, b, c = np.arctan2(r[2, 1], r[2, 2]), np.arctan2(-r[2, 0], level), np.arctan2(r[1, 0], r[0, 0])
     here = np.column_stack([a, b, c])
-    ways = find_nearest_turn(np.stack([here, flip_rotation(here)]), before)
-    nearer = ((ways - before) ** 2).sum(2).argmin(0)
-    angles: Floats = ways[nearer, np.arange(len(before))]
+    solutions = find_nearest_turn(np.stack([here, flip_rotation(here)]), before)
+    nearer = ((solutions - before) ** 2).sum(2).argmin(0)
+    angles: Array = solutions[nearer, np.arange(len(before))]
     return angles
 
 
-def _joints(machine: Machine, mode: str, poses: Floats, before: Rows) -> Floats:
+def _solve_joints(machine: Machine, mode: str, poses: Array, before: PosedPoints) -> Array:
+    """Solve for joints that go on from the joints before, over the wrist's pole too, turns counted."""
     if machine.wrist is None:
         joints = machine.inverse(poses, mode)
     else:

@@ -1,4 +1,4 @@
-"""How far off the programmed path a controller's interpolation leads the tool."""
+"""The deviation of the tool from the programmed path where a controller moves pose or joints evenly."""
 
 from __future__ import annotations
 
@@ -8,116 +8,120 @@ from typing import Literal, TypeAlias
 
 import numpy as np
 
+from ...arrays import Array, Indices
 from ...machine import Machine
-from ..path import Floats
-from ..posting.frames import compute_poses, frame_from_angles
-from .continuation import Rows
-from .interpolation import Indices, Programmed, axis_of_turns
+from ..posting.frames import compute_poses
+from .continuation import MACHINE_FRAME, PosedPoints
+from .programmed_path import ProgrammedPath, compute_norms, compute_tool_axes
 
-Under: TypeAlias = Literal["pose", "joints"]
-SHARES: Floats = (np.arange(32, dtype=np.float64) + 0.58) / 32.0  # where a part is looked at thoroughly
-FOUND = 0.997  # of the tolerance: what may be found there, for the worst point may lie between
-_BLOCK = 1 << 14  # points looked at together
-_HERE = frame_from_angles(0, 0, 0, 0, 0, 0)
+Interpolation: TypeAlias = Literal["pose", "joints"]  # what a controller moves evenly from record to record
+SHARES: Array = (np.arange(32, dtype=np.float64) + 0.58) / 32.0  # of a span, at which its deviation is measured closely
+ALLOWED = 0.997  # of the tolerance: what may be measured at SHARES, for the worst point may lie between them
+_POINTS_AT_ONCE = 1 << 14
 
 
 @dataclass(frozen=True, eq=False)
-class Parts:
-    """Parts of programmed motions, from one record of a posted path to the next.
+class Spans:
+    """m spans of programmed motions, from one record of a posted path to the next.
 
-    record, begin, end : (m,) the programmed motion by the record it leads to, and the shares of it where a part begins
+    record, begin, end : (m,) the programmed motion by the record it leads to, and the shares of it where a span begins
         and ends
-    first, last : the rows there
+    first, last : the points there
     """
 
     record: Indices
-    begin: Floats
-    end: Floats
-    first: Rows
-    last: Rows
+    begin: Array
+    end: Array
+    first: PosedPoints
+    last: PosedPoints
 
 
 @dataclass(frozen=True, eq=False)
-class Tube:
-    """The tolerances about a programmed path.
+class Deviation:
+    """The measure of a controller's deviation from a programmed path, in tolerances.
 
     programmed : the path, in the machine frame M (with a table: the table's)
-    under : ``pose``, where the pose's coordinates go evenly from record to record, or ``joints``, where the joints do
-    chord, angle : mm and rad
+    interpolation : ``pose``, where the pose's coordinates go evenly from record to record, or ``joints``, where the
+        joints do
+    chord, angle : the tolerances, mm of the tip and rad of the axis
 
-    The tool is compared with the point of its motion that is nearest to its tip; where in tolerances the axis goes
-    farther than the tip, with the point at the same share.
+    The tool is compared with the point of its motion that is nearest to its tip; where the axis goes farther than the
+    tip, in tolerances, with the point at the same share.
     """
 
     machine: Machine
-    programmed: Programmed
-    under: Under
+    programmed: ProgrammedPath
+    interpolation: Interpolation
     chord: float
     angle: float
 
-    def worst(self, parts: Parts, shares: Floats) -> Floats:
-        """The greatest deviation at some shares of each part, (m,), in tolerances; infinite where there is no pose."""
-        worst = np.empty(len(parts.record))
-        step = max(1, _BLOCK // len(shares))
+    def measure_spans(self, spans: Spans, shares: Array) -> Array:
+        """Measure the greatest deviation at shares (k,) of each span, (m,), in tolerances; infinite without a pose."""
+        worst = np.empty(len(spans.record))
+        step = max(1, _POINTS_AT_ONCE // len(shares))
         for start in range(0, len(worst), step):
-            some = slice(start, start + step)
-            first, last = parts.first[some], parts.last[some]
-            record = np.repeat(parts.record[some], len(shares))
-            begin, span = parts.begin[some, None], (parts.end - parts.begin)[some, None]
-            share = (begin + shares * span).ravel()
-            ratio = self.deviations(record, share, self._poses(first, last, shares))[2]
+            block = slice(start, start + step)
+            record = np.repeat(spans.record[block], len(shares))
+            begin, length = spans.begin[block, None], (spans.end - spans.begin)[block, None]
+            share = (begin + shares * length).ravel()
+            poses = self._interpolate_poses(spans.first[block], spans.last[block], shares)
+            ratio = self.measure_poses(record, share, poses)[2]
             ratio = np.where(np.isnan(ratio), np.inf, ratio)
-            worst[some] = ratio.reshape(-1, len(shares)).max(1)
+            worst[block] = ratio.reshape(-1, len(shares)).max(1)
         return worst
 
-    def deviations(self, record: Indices, share: Floats, poses: Floats) -> tuple[Floats, Floats, Floats]:
-        """Of poses (m, axes) reached at shares of the motions to ``record``: mm of the tip, rad of the axis, and the
-        greater of both in tolerances; (m,) each."""
-        point, k = self.programmed.at(record, share)
+    def measure_poses(self, record: Indices, share: Array, poses: Array) -> tuple[Array, Array, Array]:
+        """Measure the deviation of poses (m, axes) that the controller reaches at shares of the motions to ``record``.
+
+        Returns mm of the tip, rad of the axis, and the greater of both in tolerances; (m,) each.
+        """
+        point, k = self.programmed.interpolate(record, share)
         tip = point.copy()
         for column, letter in enumerate(self.machine.axes):
             if letter in "XYZ":
                 tip[:, "XYZ".index(letter)] = poses[:, column]
-        if self.under == "joints":
-            length, turn = self.programmed.extent(record)
-            nearest = np.flatnonzero(length * self.angle > turn * self.chord)
-            if len(nearest):
-                to = record[nearest]
-                way = (self.programmed.tip[to] - self.programmed.tip[to - 1]) / length[nearest, None] ** 2
-                ahead = np.einsum("ij,ij->i", tip[nearest] - point[nearest], way)
-                moved = np.clip(share[nearest] + np.where(np.isfinite(ahead), ahead, 0.0), 0.0, 1.0)
-                point[nearest], k[nearest] = self.programmed.at(to, moved)
-        if self._turns < 2:  # it points the tool as it can
-            k = self._axes(compute_poses(self.machine, point, k, _HERE)[0])
-        off, lean = _norm(tip - point), 2.0 * np.arcsin(np.minimum(1.0, 0.5 * _norm(self._axes(poses) - k)))
+        if self.interpolation == "joints":
+            length, turn = self.programmed.measure_motions(record)
+            by_tip = np.flatnonzero(length * self.angle > turn * self.chord)
+            if len(by_tip):
+                motion = record[by_tip]
+                way = (self.programmed.tip[motion] - self.programmed.tip[motion - 1]) / length[by_tip, None] ** 2
+                ahead = np.einsum("ij,ij->i", tip[by_tip] - point[by_tip], way)
+                nearest = np.clip(share[by_tip] + np.where(np.isfinite(ahead), ahead, 0.0), 0.0, 1.0)
+                point[by_tip], k[by_tip] = self.programmed.interpolate(motion, nearest)
+        if self._turning_axes < 2:  # the machine points the tool as it can
+            k = self._compute_axes(compute_poses(self.machine, point, k, MACHINE_FRAME)[0])
+        off = compute_norms(tip - point)
+        lean = 2.0 * np.arcsin(np.minimum(1.0, 0.5 * compute_norms(self._compute_axes(poses) - k)))
         return off, lean, np.maximum(off / self.chord, lean / self.angle)
 
-    def _poses(self, first: Rows, last: Rows, shares: Floats) -> Floats:
+    def _interpolate_poses(self, first: PosedPoints, last: PosedPoints, shares: Array) -> Array:
+        """Interpolate the controller's poses at shares of spans, share by share of the first span, then of the next."""
         s = shares[None, :, None]
-        poses = _between(first.poses, last.poses, s)
-        if self.under == "joints":
-            joints = _between(first.joints, last.joints, s)
+        poses = _interpolate_rows(first.poses, last.poses, s)
+        if self.interpolation == "joints":
+            joints = _interpolate_rows(first.joints, last.joints, s)
             poses = self.machine.forward(joints, near=poses).poses
         return poses
 
     @property
-    def _turns(self) -> int:
+    def _turning_axes(self) -> int:
+        """How many of A, B and C the machine has."""
         return sum(letter in "ABC" for letter in self.machine.axes)
 
     @cached_property
-    def _upright(self) -> Floats:
+    def _upright(self) -> Array:
         """The tool's axis at A, B, C = 0."""
         return np.array(self.machine.structure.tool_axis, dtype=np.float64)
 
-    def _axes(self, poses: Floats) -> Floats:
-        """Tool axes (m, 3) of poses."""
-        axes = self.machine.axes
+    def _compute_axes(self, poses: Array) -> Array:
+        """Compute the tool axes (m, 3) of poses."""
         turns = np.zeros((len(poses), 3))
-        for column, letter in enumerate(axes):
+        for column, letter in enumerate(self.machine.axes):
             if letter in "ABC":
                 turns[:, "ABC".index(letter)] = poses[:, column]
-        if self._turns >= 2:
-            return axis_of_turns(turns)
+        if self._turning_axes >= 2:
+            return compute_tool_axes(turns)
         x, y, z = self._upright
         (sa, sb, sc), (ca, cb, cc) = np.sin(turns.T), np.cos(turns.T)
         y, z = ca * y - sa * z, sa * y + ca * z
@@ -125,11 +129,6 @@ class Tube:
         return np.column_stack([cc * x - sc * y, sc * x + cc * y, z])
 
 
-def _between(first: Floats, last: Floats, s: Floats) -> Floats:
-    rows: Floats = np.ascontiguousarray((first[:, None] + s * (last - first)[:, None]).reshape(-1, first.shape[1]))
+def _interpolate_rows(first: Array, last: Array, s: Array) -> Array:
+    rows: Array = np.ascontiguousarray((first[:, None] + s * (last - first)[:, None]).reshape(-1, first.shape[1]))
     return rows
-
-
-def _norm(rows: Floats) -> Floats:
-    norms: Floats = np.sqrt(np.einsum("ij,ij->i", rows, rows))
-    return norms

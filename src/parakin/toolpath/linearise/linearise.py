@@ -1,143 +1,154 @@
-"""More records on a posted path, so that a controller's interpolation keeps the tool on the programmed one."""
+"""Insert records into a posted path, so that a controller's interpolation keeps the tool on the programmed path."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 
+from ...arrays import Array, Flags, Indices, Progress
 from ...errors import PoseError
-from ..path import Floats, Note, ToolPath
+from ..path import Note, ToolPath
 from ..posting.posted import Posted
 from ..timing.corners import check_tolerance
-from .cuts import Cuts, Places, cuts, parts_of
-from .deviation import FOUND, SHARES, Tube, Under
-from .interpolation import Flags, Indices, Programmed, denser
-from .pole_passes import notes_of, posted_again, through_the_poles
-from .rewinds import spelled_out
+from .deviation import ALLOWED, SHARES, Deviation, Interpolation
+from .path_cuts import PathCuts, PathPositions, find_cuts, select_spans
+from .path_records import insert_records, repost_path
+from .pole_passes import lead_through_poles
+from .pole_swings import note_swings_of_passes
+from .programmed_path import ProgrammedPath
+from .rewinds import insert_rewind_records
 
-Progress = Callable[[float], None]
-_GLANCE: Floats = np.array([0.31, 0.67])  # neither a bulge nor an S hides from both, nor whole turns
-_EVIDENT = 0.2  # of the tolerance: where no more is found there, no more is to be feared between
+_GLANCE: Array = np.array([0.31, 0.67])  # of a motion: neither a bulge nor an S hides from both, nor whole turns
+_EVIDENT = 0.2  # of the tolerance: where no more is measured at _GLANCE, the whole motion keeps to the tolerance
+_UNMOVED = 1e-12  # mm and rad: what is rounding
 _ROUNDS = 12
-_BLOCK = 1 << 16  # motions
+_MOTIONS_AT_ONCE = 1 << 16
 
 
 def linearise_path(
-    posted: Posted, under: Under, *, chord: float = 0.01, angle: float = 1e-3, progress: Progress | None = None
+    posted: Posted,
+    under: Interpolation,
+    *,
+    chord: float = 0.01,
+    angle: float = 1e-3,
+    progress: Progress | None = None,
 ) -> Posted:
-    """A posted path with the fewest records added that keep the tool on the programmed path between them.
+    """Insert the fewest records into a posted path that keep the tool on the programmed path between them.
 
     Parameters
     ----------
     posted : as from :func:`~..posting.post.post_path`
     under : what the controller moves evenly from record to record: ``pose``, every coordinate of the pose, or
         ``joints``, every joint
-    chord, angle : mm and rad that the tool's tip and axis may be off: see :class:`~.tube.Tube`
+    chord, angle : mm and rad that the tool's tip and axis may be off: see :class:`~.deviation.Deviation`
     progress : called now and then with the fraction done, 0 to 1
 
-    Rapid motions are kept to their lines too. What is added stands on the programmed path, with the line and feed of
-    the record that its motion leads to, and is posted again; every motion of the result is then looked at anew. A
-    motion to or from a record that the machine can't take is left as it is, for it is an offence already; one that
+    Rapid motions are kept to their lines too. An inserted record stands on the programmed path, with the line and feed
+    of the record that its motion leads to, and is posted again; every motion of the result is then measured anew. A
+    motion to or from a record that the machine can't reach is left as it is, for it is an offence already; one that
     leads out of reach in between gets one record there, an offence of the result. Where a rapid motion turns back by
     whole turns, the turning itself is kept to under ``joints``.
 
-    A pass of the tool's axis through a pole, where a turning axis of head, table or (under ``pose``) C is free, is led
+    A pass of the tool's axis over a pole, where a turning axis of head, table or (under ``pose``) C is free, is led
     through the pole itself if the axis misses it by less than the tolerance, and the angle does not swing then: see
-    :func:`~.through.through_the_poles`. A pass on which it swings by more than 45° is told by a note of the path.
+    :func:`~.pole_passes.lead_through_poles`. A pass on which it swings by more than 45° gets a note of the path.
 
-    Raises :class:`PoseError` for an invalid tolerance, for a motion between opposite tool axes, and for one that
-    can't be kept however many records are added; both with their line.
+    Raises :class:`PoseError` for an invalid tolerance, for a motion between opposite tool axes, and for one that can't
+    be kept however many records are inserted; the last two name their line.
     """
     check_tolerance(chord, "chord")
     check_tolerance(angle, "angle")
     if under not in ("pose", "joints"):
         raise PoseError(f"under: 'pose' or 'joints' expected, not {under!r}")
-    say = progress or (lambda fraction: None)
-    posted = spelled_out(posted) if under == "joints" else posted
-    path = posted.path
-    tube = Tube(posted.machine, Programmed(path, posted.frame), under, chord, angle)
-    through = through_the_poles(tube, posted, np.flatnonzero(_sound(posted)))
-    posted, places = through.posted, through.places
-    doubtful = _sound(posted)
+    report = progress or (lambda fraction: None)
+    posted = insert_rewind_records(posted) if under == "joints" else posted
+    deviation = Deviation(posted.machine, ProgrammedPath(posted.path, posted.frame), under, chord, angle)
+    led = lead_through_poles(deviation, posted, np.flatnonzero(_find_sound_motions(posted)))
+    posted, positions = led.posted, led.positions
+    doubtful = _find_sound_motions(posted)
     for attempt in range(_ROUNDS):
-        off = exceeding(tube, posted, places, np.flatnonzero(doubtful))
-        say(1.0 - 0.5 ** (attempt + 1))
-        if not len(off):
-            say(1.0)
-            return _noted(posted, [*notes_of(through, posted, places), *_unkept(posted, under)])
-        found = _cuts(tube, posted, places, off)
-        before, posted = posted, posted_again(posted, denser(posted.path, found.motion, found.share))
-        places = places.cut(found.motion, found.share)
-        doubtful = _changed(before, posted, found.motion) & _sound(posted)
-    raise _hopeless(posted.path, int(off[0]))
+        deviating = find_deviating_motions(deviation, posted, positions, np.flatnonzero(doubtful))
+        report(1.0 - 0.5 ** (attempt + 1))
+        if not len(deviating):
+            report(1.0)
+            swings = [*led.notes, *note_swings_of_passes(led.passes, posted, positions)]
+            return _add_notes(posted, [*swings, *_note_rewinds(posted, under)])
+        cuts = _cut_motions(deviation, posted, positions, deviating)
+        before, posted = posted, repost_path(posted, insert_records(posted.path, cuts.motion, cuts.share))
+        positions = positions.insert(cuts.motion, cuts.share)
+        doubtful = _find_changed_motions(before, posted, cuts.motion) & _find_sound_motions(posted)
+    raise _make_hopeless_error(posted.path, int(deviating[0]))
 
 
-def exceeding(tube: Tube, posted: Posted, places: Places, motion: Indices) -> Indices:
-    """Which of some motions of a posted path leave the tolerances."""
-    found = [np.empty(0, np.int64)]
-    for start in range(0, len(motion), _BLOCK):
-        some = motion[start : start + _BLOCK]
-        some = some[tube.worst(parts_of(posted, places, some), _GLANCE) > _EVIDENT]
-        found.append(some[tube.worst(parts_of(posted, places, some), SHARES) > FOUND])
-    return np.concatenate(found)
+def find_deviating_motions(deviation: Deviation, posted: Posted, positions: PathPositions, motion: Indices) -> Indices:
+    """Find the motions, among some of a posted path, on which the tool leaves the tolerances."""
+    deviating = [np.empty(0, np.int64)]
+    for start in range(0, len(motion), _MOTIONS_AT_ONCE):
+        block = motion[start : start + _MOTIONS_AT_ONCE]
+        block = block[deviation.measure_spans(select_spans(posted, positions, block), _GLANCE) > _EVIDENT]
+        measured = deviation.measure_spans(select_spans(posted, positions, block), SHARES)
+        deviating.append(block[measured > ALLOWED])
+    return np.concatenate(deviating)
 
 
-def _cuts(tube: Tube, posted: Posted, places: Places, motion: Indices) -> Cuts:
-    """Cuts of motions that leave the tolerances; in the middle where the search finds none."""
-    found = cuts(tube, posted, places, motion)
-    if len(found.stuck):
-        raise _hopeless(posted.path, int(found.stuck.min()))
-    left = np.setdiff1d(motion, found.motion)
-    motions, shares = np.concatenate([found.motion, left]), np.concatenate([found.share, np.full(len(left), 0.5)])
-    order = np.lexsort((shares, motions))
-    return Cuts(motions[order], shares[order], found.stuck)
+def _cut_motions(deviation: Deviation, posted: Posted, positions: PathPositions, motion: Indices) -> PathCuts:
+    """Cut motions that leave the tolerances; in the middle where the search finds no cut."""
+    cuts = find_cuts(deviation, posted, positions, motion)
+    if len(cuts.stuck):
+        raise _make_hopeless_error(posted.path, int(cuts.stuck.min()))
+    uncut = np.setdiff1d(motion, cuts.motion)
+    motions, shares = np.concatenate([cuts.motion, uncut]), np.concatenate([cuts.share, np.full(len(uncut), 0.5)])
+    return PathCuts.sort(motions, shares, cuts.stuck)
 
 
-def _hopeless(path: ToolPath, record: int) -> PoseError:
+def _make_hopeless_error(path: ToolPath, record: int) -> PoseError:
     line = int(path.line[record])
     return PoseError(f"{path.source}:{line}: no number of points keeps the tool within its tolerances")
 
 
-def _noted(posted: Posted, notes: list[Note]) -> Posted:
-    """With notes added, but those on a pass that has one already."""
-    told = {(note.line, _subject(note)) for note in posted.path.notes}
-    new = tuple(note for note in notes if (note.line, _subject(note)) not in told)
+def _add_notes(posted: Posted, notes: list[Note]) -> Posted:
+    """Add notes to the path, but none on a pole pass that has one already."""
+    known = {(note.line, _find_subject(note)) for note in posted.path.notes}
+    new = tuple(note for note in notes if (note.line, _find_subject(note)) not in known)
     return replace(posted, path=replace(posted.path, notes=(*posted.path.notes, *new))) if new else posted
 
 
-def _unkept(posted: Posted, under: Under) -> list[Note]:
-    """Notes on motions that turn back by whole turns: evenly moved joints lead the tip off its line there."""
+def _find_subject(note: Note) -> str:
+    """Find which pole and angle a note on a swing is about; empty for another note."""
+    return note.text.partition("beside")[2].partition(" swings")[0]
+
+
+def _note_rewinds(posted: Posted, under: Interpolation) -> list[Note]:
+    """Note motions that turn back by whole turns: evenly moved joints lead the tip off its line there."""
     text = "the rapid motion turns back by whole turns, and the tool's tip leaves its line on it"
     return [Note(int(posted.path.line[record]), text) for record in posted.rewinds if under == "joints"]
 
 
-def _subject(note: Note) -> str:
-    return note.text.partition("beside")[2].partition(" swings")[0]
+def _find_sound_motions(posted: Posted) -> Flags:
+    """Find the motions (n,), by the record they lead to, that can be linearised.
 
-
-def _sound(posted: Posted) -> Flags:
-    """(n,) records to which a motion leads that is looked at: both its ends can be taken, and it does not turn back
-    by whole turns on it."""
-    taken: Flags = np.isfinite(posted.poses.sum(axis=1) + posted.joints.sum(axis=1))
-    sound = np.concatenate([np.zeros(min(len(taken), 1), np.bool_), taken[1:] & taken[:-1]])
+    Both ends are reachable, and the motion does not turn back by whole turns.
+    """
+    reachable: Flags = np.isfinite(posted.poses.sum(axis=1) + posted.joints.sum(axis=1))
+    sound = np.concatenate([np.zeros(min(len(reachable), 1), np.bool_), reachable[1:] & reachable[:-1]])
     sound[list(posted.rewinds)] = False
     return sound
 
 
-def _changed(before: Posted, after: Posted, motion: Indices) -> Flags:
-    """(n,) motions that are not what they were before records were put into some."""
+def _find_changed_motions(before: Posted, after: Posted, motion: Indices) -> Flags:
+    """Find the motions (n,) of a path that changed when records were inserted into some motions of the one before."""
     count = len(before.path)
-    stood = np.cumsum(np.bincount(motion, minlength=count)) + np.arange(count)
-    same = _same(after.poses, before.poses, stood) & _same(after.joints, before.joints, stood)
+    kept = np.cumsum(np.bincount(motion, minlength=count)) + np.arange(count)  # where the old records are now
+    same = _find_same_rows(after.poses[kept], before.poses) & _find_same_rows(after.joints[kept], before.joints)
     changed = np.ones(len(after.path), bool)
-    changed[stood[1:]] = (np.diff(stood) > 1) | ~(same[1:] & same[:-1])
+    changed[kept[1:]] = (np.diff(kept) > 1) | ~(same[1:] & same[:-1])
     return changed
 
 
-def _same(rows: Floats, old: Floats, stood: Indices) -> Flags:
-    off: Flags = np.zeros(len(old), np.bool_)
-    for column in range(old.shape[1]):
-        off |= ~(np.abs(rows[stood, column] - old[:, column]) < 1e-12)
-    return ~off
+def _find_same_rows(rows: Array, others: Array) -> Flags:
+    """Find rows (n, k) that are those of others; a row with NaN is not."""
+    same: Flags = np.ones(len(rows), np.bool_)
+    for column in range(rows.shape[1]):
+        same &= np.abs(rows[:, column] - others[:, column]) < _UNMOVED
+    return same

@@ -1,63 +1,61 @@
-"""A posted path led through the poles it passes within tolerance, and notes on the other passes."""
+"""Passes of the tool axis over a pole: a posted path is led through the poles that it passes within the tolerance."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 
-from ...kinematics.wrist import PRINTED, REPORTED, TRAVEL, VICINITY, wrap_angle
-from ..path import Floats, Note, ToolPath
-from ..posting.post import post_path
+from ...arrays import Array, Indices
+from ...kinematics.wrist import PRINTED, REPORTED
+from ..path import Note
 from ..posting.posted import Posted
-from .cuts import Places, parts_of
-from .deviation import FOUND, SHARES, Tube
-from .interpolation import Indices, Programmed, denser, pointed
-from .pole_steps import Pass, Steps, passes, steps_near
-from .poles import Pole, poles_of
+from .deviation import ALLOWED, SHARES, Deviation
+from .path_cuts import PathPositions, select_spans
+from .path_records import insert_records, replace_axes, repost_path
+from .pole_routing import PolePass, PoleRoute, find_pole_routes, locate_pass
+from .pole_steps import PoleSteps, find_pole_steps
+from .pole_swings import note_swings
+from .poles import Pole, find_poles
+from .programmed_path import ProgrammedPath
 
-_MOVED = 0.99  # of the angle tolerance: what leading through poles may take between records
+# Shares of the angle tolerance.
+_MOST_MOVED = 0.99  # what leading through poles may take between records, for the worst point may lie between SHARES
+_LARGE_MISS = 0.25  # for a smaller one the way to the pole begins with the motion, and no further record is needed
 _TRIES = 8
-_OFTEN = 0.25  # of the angle tolerance: for less the way to the pole begins with the motion
-
-
-@dataclass(frozen=True, eq=False)
-class _Led:
-    """A pass through a pole: rad by which the programmed axis misses it, where it begins and ends, and its line."""
-
-    pole: Pole
-    miss: float
-    begin: float
-    end: float
-    line: int
-
-    @property
-    def name(self) -> tuple[str, float]:
-        return self.pole.text, self.begin
 
 
 @dataclass
-class Through:
-    """A posted path that passes poles as it should.
+class PolePasses:
+    """A posted path led through poles.
 
-    posted, places : the path, and where its records stand on the programmed one
-    led : the passes led through a pole
-    notes : on those that swing
+    posted, positions : the path, and where its records stand on the programmed one
+    passes : those led through a pole
+    notes : on the passes beside a pole on which the free angle swings
     """
 
     posted: Posted
-    places: Places
-    led: list[_Led] = field(default_factory=list)
+    positions: PathPositions
+    passes: list[PolePass] = field(default_factory=list)
     notes: list[Note] = field(default_factory=list)
 
 
-def posted_again(posted: Posted, path: ToolPath) -> Posted:
-    """Another path in the same frame and mode."""
-    return post_path(posted.machine, replace(path, frame=None), workpiece=posted.frame, mode=posted.mode)
+@dataclass(frozen=True, eq=False)
+class _Crossing:
+    """A pole that a motion crosses on a route."""
+
+    pole: Pole
+    steps: PoleSteps
+    route: PoleRoute
+
+    @property
+    def motion(self) -> Indices:
+        """The motion, by the record it leads to, (1,)."""
+        return self.steps.record[self.route.crossing : self.route.crossing + 1]
 
 
-def through_the_poles(tube: Tube, posted: Posted, motion: Indices) -> Through:
-    """A path led through the poles that some of its motions pass within the tube's angle.
+def lead_through_poles(deviation: Deviation, posted: Posted, motion: Indices) -> PolePasses:
+    """Lead a path through the poles that some of its motions pass within the angle tolerance.
 
     The axes of records about such a pass are moved, by less than the tolerance, so that the path crosses the pole
     itself; where a single long motion does that, a record is put there. A pass is left as it is where that takes the
@@ -65,160 +63,94 @@ def through_the_poles(tube: Tube, posted: Posted, motion: Indices) -> Through:
     """
     refused: set[tuple[str, float]] = set()
     for _ in range(_TRIES):
-        result = _led_through(tube, posted, motion, refused)
-        astray = _astray(tube, result)
-        if not astray:
+        led = _lead_unless_refused(deviation, posted, motion, refused)
+        too_far = _find_moved_too_far(deviation, led)
+        if not too_far:
             break
-        refused |= astray
-    return result
+        refused |= too_far
+    return led
 
 
-def _astray(tube: Tube, result: Through) -> set[tuple[str, float]]:
-    """The passes about which the path now leaves the programmed one by more than it may."""
-    found: set[tuple[str, float]] = set()
-    if result.posted.path is tube.programmed.path:
-        return found
-    path, places = Programmed(result.posted.path, result.posted.frame), result.places
-    gone = places.record - 1 + places.end
-    for led in result.led:
-        first, last = np.searchsorted(gone, [led.begin - 1.0, led.end + 1.0])
-        motion = np.arange(max(int(first), 1), min(int(last) + 1, len(gone))).repeat(len(SHARES))
+def _find_moved_too_far(deviation: Deviation, led: PolePasses) -> set[tuple[str, float]]:
+    """Find the passes about which the path now leaves the programmed one by more than it may."""
+    too_far: set[tuple[str, float]] = set()
+    if led.posted.path is deviation.programmed.path:
+        return too_far
+    path, positions = ProgrammedPath(led.posted.path, led.posted.frame), led.positions
+    passed = positions.passed
+    for pole_pass in led.passes:
+        first, last = np.searchsorted(passed, [pole_pass.begin - 1.0, pole_pass.end + 1.0])
+        motion = np.arange(max(int(first), 1), min(int(last) + 1, len(passed))).repeat(len(SHARES))
         share = np.resize(SHARES, len(motion))
-        there = places.begin[motion] + share * (places.end - places.begin)[motion]
-        off = path.at(motion, share)[1] - tube.programmed.at(places.record[motion], there)[1]
-        if np.sqrt((off * off).sum(1).max(initial=0.0)) > _MOVED * tube.angle:
-            found.add(led.name)
-    return found
+        programmed_share = positions.begin[motion] + share * (positions.end - positions.begin)[motion]
+        programmed_axis = deviation.programmed.interpolate(positions.record[motion], programmed_share)[1]
+        off = path.interpolate(motion, share)[1] - programmed_axis
+        if np.sqrt((off * off).sum(1).max(initial=0.0)) > _MOST_MOVED * deviation.angle:
+            too_far.add(pole_pass.key)
+    return too_far
 
 
-def _led_through(tube: Tube, posted: Posted, motion: Indices, refused: set[tuple[str, float]]) -> Through:
-    result = Through(posted, Places.of(len(posted.path)))
-    axis = tube.programmed.axis.copy()
-    crossings: list[tuple[Pole, Steps, Pass]] = []
-    inclined = posted.path.turns is not None and bool(posted.path.turns[:, 0].any())  # no turns are found for axes
-    for pole in poles_of(posted.machine, tube.under, posted.path.turns is not None):
-        steps = steps_near(pole, tube.programmed, posted, motion)
-        kept = []
-        for found in passes(pole, tube.programmed, steps, tube.angle):
-            if (axis[found.record] != tube.programmed.axis[found.record]).any():
+def _lead_unless_refused(
+    deviation: Deviation, posted: Posted, motion: Indices, refused: set[tuple[str, float]]
+) -> PolePasses:
+    """Lead a path through its poles but on the passes that are refused; note those that swing."""
+    led = PolePasses(posted, PathPositions.at_records(len(posted.path)))
+    programmed, turns = deviation.programmed, posted.path.turns
+    axis = programmed.axis.copy()
+    crossings: list[_Crossing] = []
+    inclined = turns is not None and bool(turns[:, 0].any())  # with A no turns are found for other axes
+    for pole in find_poles(posted.machine, deviation.interpolation, turns is not None):
+        steps = find_pole_steps(pole, programmed, posted, motion)
+        routes = []
+        for route in find_pole_routes(pole, programmed, steps, deviation.angle):
+            if (axis[route.record] != programmed.axis[route.record]).any():
                 continue  # led through another pole already
-            led = _led(pole, posted.path, steps, found)
-            if led.name in refused or (inclined and (len(found.record) or found.miss > PRINTED)):
+            pole_pass = locate_pass(pole, posted.path, steps, route)
+            if pole_pass.key in refused or (inclined and (len(route.record) or route.miss > PRINTED)):
                 continue
-            axis[found.record] = found.axis
-            kept.append(found)
-            result.led.append(led)
-        crossings += [(pole, steps, found) for found in kept if found.crossing >= 0]
-        result.notes += _swings(pole, posted.path, steps, kept)
-    moved = np.flatnonzero((axis != tube.programmed.axis).any(1)) if result.led else np.empty(0, np.int64)
+            axis[route.record] = route.axis
+            routes.append(route)
+            led.passes.append(pole_pass)
+        crossings += [_Crossing(pole, steps, route) for route in routes if route.crossing >= 0]
+        led.notes += note_swings(pole, posted.path, steps, routes)
+    moved = np.flatnonzero((axis != programmed.axis).any(1)) if led.passes else np.empty(0, np.int64)
     if len(moved):
-        result.posted = posted_again(posted, pointed(posted.path, moved, axis[moved] @ tube.programmed.rotation))
-    _cross(tube, result, crossings)
-    return result
+        led.posted = repost_path(posted, replace_axes(posted.path, moved, axis[moved] @ programmed.rotation))
+    _insert_crossings(deviation, led, crossings)
+    return led
 
 
-def _led(pole: Pole, path: ToolPath, steps: Steps, found: Pass) -> _Led:
-    first, last = found.steps
-    nearest = first + int(steps.nearest[first : last + 1].argmin())
-    begin, end = steps.record[first] - 1 + steps.begin[first], steps.record[last] - 1 + steps.end[last]
-    return _Led(pole, found.miss, float(begin), float(end), int(path.line[steps.record[nearest]]))
-
-
-def _cross(tube: Tube, result: Through, crossings: list[tuple[Pole, Steps, Pass]]) -> None:
-    """Put records on the poles where motions cross them, but where the interpolation passes there by itself."""
+def _insert_crossings(deviation: Deviation, led: PolePasses, crossings: list[_Crossing]) -> None:
+    """Insert records on the poles where motions cross them, but where the interpolation passes there by itself."""
     if not crossings:
         return
-    posted = result.posted
-    between = Programmed(posted.path, posted.frame)
-    added: list[tuple[int, float, Floats]] = []
-    for pole, steps, found in crossings:
-        motion = steps.record[found.crossing : found.crossing + 1]
-        tip, axis = between.at(motion, np.array([found.share]))
-        miss = float(np.hypot(*pole.beside(tip, axis)[0]))
-        if miss <= PRINTED or _passes(tube, result, pole, motion):
+    posted = led.posted
+    path = ProgrammedPath(posted.path, posted.frame)
+    added: list[tuple[int, float, Array]] = []
+    for crossing in crossings:
+        pole, route, motion = crossing.pole, crossing.route, crossing.motion
+        tip, axis = path.interpolate(motion, np.array([route.share]))
+        miss = float(np.hypot(*pole.project_axes(tip, axis)[0]))
+        if miss <= PRINTED or _crosses_by_itself(deviation, led, pole, motion):
             continue
-        added.append((int(motion[0]), found.share, pole.pointing(tip, axis, np.zeros((1, 2)))[0]))
-        if miss > _OFTEN * tube.angle:
-            for share in found.ends:
-                added.append((int(motion[0]), share, between.at(motion, np.array([share]))[1][0]))
+        added.append((int(motion[0]), route.share, pole.find_axes(tip, axis, np.zeros((1, 2)))[0]))
+        if miss > _LARGE_MISS * deviation.angle:
+            for share in route.ends:
+                added.append((int(motion[0]), share, path.interpolate(motion, np.array([share]))[1][0]))
     if added:
-        added.sort(key=lambda new: new[:2])
-        motions, shares = np.array([new[0] for new in added]), np.array([new[1] for new in added])
-        axes = np.array([new[2] for new in added]) @ between.rotation
-        result.places = result.places.cut(motions, shares)
-        path = denser(posted.path, motions, shares)
-        result.posted = posted_again(posted, pointed(path, motions + np.arange(len(motions)), axes))
+        added.sort(key=lambda record: record[:2])
+        motions, shares = np.array([record[0] for record in added]), np.array([record[1] for record in added])
+        axes = np.array([record[2] for record in added]) @ path.rotation
+        led.positions = led.positions.insert(motions, shares)
+        denser_path = insert_records(posted.path, motions, shares)
+        led.posted = repost_path(posted, replace_axes(denser_path, motions + np.arange(len(motions)), axes))
 
 
-def _passes(tube: Tube, result: Through, pole: Pole, motion: Indices) -> bool:
-    """Whether what goes evenly is the angle that the pole frees, and the motion is within tolerance as it is."""
-    if tube.under == "pose" and not pole.upright:
+def _crosses_by_itself(deviation: Deviation, led: PolePasses, pole: Pole, motion: Indices) -> bool:
+    """Tell whether what goes evenly is the angle that the pole frees, and the motion is within tolerance as it is."""
+    if deviation.interpolation == "pose" and not pole.is_upright:
         return False
-    angle = pole.angles(result.posted)
+    angle = pole.get_angles(led.posted)
     swing = abs(float(angle[motion[0]] - angle[motion[0] - 1]))
-    return swing < REPORTED and bool(tube.worst(parts_of(result.posted, result.places, motion), SHARES)[0] <= FOUND)
-
-
-def _swings(pole: Pole, path: ToolPath, steps: Steps, led: list[Pass]) -> list[Note]:
-    """Notes on the passes that are not led through the pole."""
-    if not len(steps.record):
-        return []
-    with np.errstate(invalid="ignore"):
-        way, turn = np.hypot(*(steps.x1 - steps.x0).T), _turns(steps)
-    near = np.isfinite(way) & (way < 1.0)
-    turn, way = np.where(near, turn, 0.0), np.where(near, way, 1.0)
-    for found in led:
-        turn[found.steps[0] : found.steps[1] + 1] = 0.0
-    gone = np.cumsum(way + np.where(steps.joined, 0.0, 4.0 * TRAVEL))
-    angle = np.concatenate([[0.0], np.cumsum(turn)])
-    at = np.concatenate([[gone[0] - way[0]], gone])
-    middle = gone - 0.5 * way
-    to_and_fro = np.concatenate([[0.0], np.cumsum(np.abs(turn))])
-    swing, turned = (
-        np.abs(np.interp(middle + TRAVEL, at, total) - np.interp(middle - TRAVEL, at, total))
-        for total in (angle, to_and_fro)
-    )
-    swinging = np.flatnonzero((turned > REPORTED) & (steps.nearest < VICINITY))
-    notes = []
-    for group in np.split(swinging, np.flatnonzero((np.diff(swinging) > 1) | ~steps.joined[swinging[1:]]) + 1):
-        if len(group):
-            nearest = group[steps.nearest[group].argmin()]
-            window = slice(*np.searchsorted(at, [middle[nearest] - TRAVEL, middle[nearest] + TRAVEL]))
-            most = max(float(swing[group].max()), float(np.ptp(angle[window])))
-            if most > REPORTED:
-                line = int(path.line[steps.record[nearest]])
-                notes.append(_note(pole, line, float(steps.nearest[nearest]), most))
-    return notes
-
-
-def _turns(steps: Steps) -> Floats:
-    """By how much the free angle turns on each step; what a path turns on the pole itself is the next step's."""
-    begin, end = (np.arctan2(x[:, 1], x[:, 0]) for x in (steps.x0, steps.x1))
-    on = [np.hypot(*x.T) < PRINTED for x in (steps.x0, steps.x1)]
-    number, stretch = np.arange(len(begin)), np.cumsum(~steps.joined)
-    last = np.maximum.accumulate(np.where(on[1], 0, number))  # the last step to end off the pole
-    last = np.concatenate([[0], last[:-1]])
-    known = ~on[0] | ((stretch[last] == stretch) & (last < number) & ~on[1][last])
-    begin = np.where(on[0], end[last], begin)
-    turns: Floats = np.where(known & ~on[1], wrap_angle(end - begin), 0.0)
-    return turns
-
-
-def notes_of(through: Through, posted: Posted, places: Places) -> list[Note]:
-    """Notes on all passes that swing in the end; ``posted`` is the path with all its records."""
-    notes, gone = list(through.notes), places.record - 1 + places.end
-    for led in through.led:
-        rows = np.flatnonzero((gone >= led.begin - 1e-9) & (gone <= led.end + 1e-9))
-        if len(rows) < 3:
-            first, last = np.searchsorted(gone, [led.begin, led.end])
-            rows = np.arange(max(first - 1, 0), min(last + 1, len(gone)))
-        angle = led.pole.angles(posted)[rows]
-        swing = float(np.fmax.reduce(angle, initial=-np.inf) - np.fmin.reduce(angle, initial=np.inf))
-        if swing > REPORTED:
-            notes.append(_note(led.pole, led.line, led.miss, swing))
-    return notes
-
-
-def _note(pole: Pole, line: int, miss: float, swing: float) -> Note:
-    off = f"{np.degrees(miss):.2g}°" if miss > PRINTED else "0°"
-    return Note(line, f"the tool axis passes {off} beside {pole.text}: {pole.angle} swings {np.degrees(swing):.0f}°")
+    spans = select_spans(led.posted, led.positions, motion)
+    return swing < REPORTED and bool(deviation.measure_spans(spans, SHARES)[0] <= ALLOWED)

@@ -6,21 +6,22 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ...arrays import Array
 from ...machine import Machine
-from ..path import Floats
 from ..posting.posted import Posted
-from .deviation import Under
+from .deviation import Interpolation
 
-_STEPS = 60
-_EXACT = 1e-15
-_BLOCK = 1 << 12  # points looked at together
+_PARALLEL = 1e-12  # sine of the angle between two axes of a machine: below this it is rounding
+_CONVERGED = 1e-15  # of a unit vector
+_ROUNDS = 60
+_POINTS_AT_ONCE = 1 << 12
 
 
 @dataclass(frozen=True, eq=False)
 class Pole:
     """A turning axis of head, table or pose along which the tool's axis may come to lie.
 
-    text : as a note has it
+    text : its name in a note
     angle : the name of what is free there: a joint, or C
     joint : its index in the joint vector; None for C
     first : the turning axis, a unit vector in the frame that carries it
@@ -30,7 +31,7 @@ class Pole:
     text: str
     angle: str
     joint: int | None
-    first: Floats
+    first: Array
 
     @property
     def moves(self) -> bool:
@@ -38,51 +39,54 @@ class Pole:
         return self.joint is not None and self.machine.structure.has_central_leg
 
     @property
-    def upright(self) -> bool:
-        """B = 0, or the same axis."""
-        return not self.moves and bool(np.abs(np.cross(self.first, [0.0, 0.0, 1.0])).max() < 1e-12)
+    def is_upright(self) -> bool:
+        """Whether the pole is that of B = 0, or lies on the same axis."""
+        return not self.moves and bool(np.abs(np.cross(self.first, [0.0, 0.0, 1.0])).max() < _PARALLEL)
 
-    def angles(self, posted: Posted) -> Floats:
-        """The angle that the pole frees along a posted path, (n,) rad."""
+    def get_angles(self, posted: Posted) -> Array:
+        """Return the angle that the pole frees along a posted path, (n,) rad."""
         return posted.poses[:, 4] if self.joint is None else posted.joints[:, self.joint]
 
-    def beside(self, tip: Floats, axis: Floats) -> Floats:
-        """Where tool axes (m, 3) pass a plane at right angles to the pole, at a distance of 1: (m, 2), (0, 0) on it.
+    def project_axes(self, tip: Array, axis: Array) -> Array:
+        """Project tool axes (m, 3) from the centre onto the plane that touches the unit sphere at the pole: (m, 2).
 
-        Great circles are straight there, where the pole stands still. Infinite at right angles to the pole.
+        The gnomonic projection: great circles are straight there, where the pole stands still. An axis on the pole is
+        at (0, 0), one at right angles to it infinitely far.
         """
-        place = np.empty((len(tip), 2))
-        for start in range(0, len(tip), _BLOCK):
-            some = slice(start, start + _BLOCK)
-            seen = np.einsum("mji,mj->mi", self._rotation(tip[some], axis[some]), axis[some])
+        projected = np.empty((len(tip), 2))
+        for start in range(0, len(tip), _POINTS_AT_ONCE):
+            block = slice(start, start + _POINTS_AT_ONCE)
+            carried = np.einsum("mji,mj->mi", self._compute_rotations(tip[block], axis[block]), axis[block])
             with np.errstate(divide="ignore", invalid="ignore"):
-                place[some] = (seen @ self._across.T) / (seen @ self.first)[:, None]
-        return place
+                projected[block] = (carried @ self._across.T) / (carried @ self.first)[:, None]
+        return projected
 
-    def pointing(self, tip: Floats, axis: Floats, place: Floats) -> Floats:
-        """Tool axes (m, 3) with :meth:`beside` = ``place`` (m, 2), on the side of the pole on which ``axis`` are."""
+    def find_axes(self, tip: Array, axis: Array, projected: Array) -> Array:
+        """Find the tool axes (m, 3) at points (m, 2) of the projection, on the side of the pole on which ``axis`` are.
+
+        Turning the tool about its tip turns the central leg a little too, so the axes are found by iteration.
+        """
         first = self.first
-        seen = first + place @ self._across
-        seen /= np.linalg.norm(seen, axis=1)[:, None]
-        along = np.einsum("mji,mj,i->m", self._rotation(tip, axis), axis, first)
-        seen = np.where(along[:, None] < 0.0, -seen, seen)
-        # Turning the tool about its tip turns the central leg a little too.
-        for _ in range(_STEPS):
+        carried = first + projected @ self._across
+        carried /= np.linalg.norm(carried, axis=1)[:, None]
+        along = np.einsum("mji,mj,i->m", self._compute_rotations(tip, axis), axis, first)
+        carried = np.where(along[:, None] < 0.0, -carried, carried)
+        for _ in range(_ROUNDS):
             before = axis
-            axis = np.einsum("mij,mj->mi", self._rotation(tip, before), seen)
-            if np.abs(axis - before).max(initial=0.0) < _EXACT:
+            axis = np.einsum("mij,mj->mi", self._compute_rotations(tip, before), carried)
+            if np.abs(axis - before).max(initial=0.0) < _CONVERGED:
                 break
         return axis
 
     @property
-    def _across(self) -> Floats:
+    def _across(self) -> Array:
         """Two directions at right angles to the pole, (2, 3)."""
         one = np.cross(self.first, np.eye(3)[np.abs(self.first).argmin()])
         one /= np.linalg.norm(one)
         return np.stack([one, np.cross(self.first, one)])
 
-    def _rotation(self, tip: Floats, axis: Floats) -> Floats:
-        """Of the frame that carries the pole, (m, 3, 3) in M."""
+    def _compute_rotations(self, tip: Array, axis: Array) -> Array:
+        """Compute the rotations (m, 3, 3) in M of the frame that carries the pole."""
         if not self.moves:
             return np.broadcast_to(np.eye(3), (len(tip), 3, 3))
         kx, ky, kz = axis.T
@@ -92,15 +96,16 @@ class Pole:
         return np.stack([np.stack(np.broadcast_arrays(*row, kx)[:3], axis=-1) for row in rotation], axis=-2)
 
 
-def poles_of(machine: Machine, under: Under, turned: bool) -> list[Pole]:
-    """The poles that matter: of head and table always, and B = 0 where the pose's angles go evenly.
+def find_poles(machine: Machine, interpolation: Interpolation, has_turns: bool) -> list[Pole]:
+    """Find the poles that matter: that of the wrist always, and B = 0 where the pose's angles go evenly.
 
-    ``turned`` where the program gives C itself: then nothing is free at B = 0.
+    has_turns : the program gives C itself, so that nothing is free at B = 0
     """
-    wrist, found = machine.wrist, []
+    poles: list[Pole] = []
+    wrist = machine.wrist
     if wrist is not None:
         text = f"the {'head' if wrist.is_in_head else 'table'}'s pole"
-        found.append(Pole(machine, text, machine.joints[wrist.first], wrist.first, wrist.first_axis))
-    if under == "pose" and machine.has_direction and not any(pole.upright for pole in found):
-        found.append(Pole(machine, "Z, where C is free", "C", None, np.array([0.0, 0.0, 1.0])))
-    return [pole for pole in found if not (turned and pole.upright)]
+        poles.append(Pole(machine, text, machine.joints[wrist.first], wrist.first, wrist.first_axis))
+    if interpolation == "pose" and machine.has_direction and not any(pole.is_upright for pole in poles):
+        poles.append(Pole(machine, "Z, where C is free", "C", None, np.array([0.0, 0.0, 1.0])))
+    return [pole for pole in poles if not (has_turns and pole.is_upright)]

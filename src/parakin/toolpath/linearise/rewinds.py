@@ -1,4 +1,4 @@
-"""Rapid motions that turn back by whole turns, as records along the way."""
+"""Rapid motions that turn back by whole turns, as records in small steps along the way."""
 
 from __future__ import annotations
 
@@ -6,12 +6,12 @@ import numpy as np
 
 from ..posting.posted import Posted
 from ..posting.turn_steps import TURN_STEP
-from .interpolation import axis_of_turns, denser, pointed
-from .pole_passes import posted_again
+from .path_records import insert_records, replace_axes, repost_path
+from .programmed_path import compute_tool_axes
 
 
-def spelled_out(posted: Posted) -> Posted:
-    """A posted path whose own tool axes tell how it turns back, with records in small steps of C.
+def insert_rewind_records(posted: Posted) -> Posted:
+    """Insert records in small steps of C into rapid motions that turn back, so that tool axes alone tell how they turn.
 
     A path whose program gives the turns is left as it is: they can't be told otherwise.
     """
@@ -19,12 +19,12 @@ def spelled_out(posted: Posted) -> Posted:
         return posted
     record = np.array(posted.rewinds, np.int64)
     begin, way = posted.poses[record - 1, 3:], posted.poses[record, 3:] - posted.poses[record - 1, 3:]
-    parts = np.maximum(1, np.ceil(np.abs(way[:, 1]) / TURN_STEP)).astype(np.int64)
-    motion, of = np.repeat(record, parts - 1), np.repeat(np.arange(len(record)), parts - 1)
-    number = np.arange(len(of)) - np.repeat(np.cumsum(parts - 1) - (parts - 1), parts - 1) + 1
-    share = number / parts[of]
-    turns = np.zeros((len(of), 3))
-    turns[:, 1:] = begin[of] + share[:, None] * way[of]
-    axes = axis_of_turns(turns) @ posted.frame[:, :3]
-    path = denser(posted.path, motion, share)
-    return posted_again(posted, pointed(path, motion + np.arange(len(motion)), axes))
+    counts = np.maximum(1, np.ceil(np.abs(way[:, 1]) / TURN_STEP)).astype(np.int64)
+    motion, row = np.repeat(record, counts - 1), np.repeat(np.arange(len(record)), counts - 1)
+    number = np.arange(len(row)) - np.repeat(np.cumsum(counts - 1) - (counts - 1), counts - 1) + 1
+    share = number / counts[row]
+    turns = np.zeros((len(row), 3))
+    turns[:, 1:] = begin[row] + share[:, None] * way[row]
+    axes = compute_tool_axes(turns) @ posted.frame[:, :3]
+    path = insert_records(posted.path, motion, share)
+    return repost_path(posted, replace_axes(path, motion + np.arange(len(motion)), axes))

@@ -1,0 +1,172 @@
+"""Routes of passes through a pole: how the tool axis is led over the pole itself, within the angle tolerance."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...arrays import Array, Indices
+from ...kinematics.wrist import PRINTED
+from ..path import ToolPath
+from .pole_steps import PoleSteps
+from .poles import Pole
+from .programmed_path import ProgrammedPath
+
+_MOST_MOVED = 0.98  # of the angle tolerance: what an axis may be moved; the rest is for rounding
+
+
+@dataclass(frozen=True, eq=False)
+class PoleRoute:
+    """A way through a pole that keeps within the angle tolerance.
+
+    steps : first and last of the :class:`PoleSteps` that it takes
+    miss : rad by which the programmed axis passes beside the pole
+    record, axis : (k,) records whose tool axes are moved, and where to, (k, 3) in M
+    crossing : the step on which the pole is passed, -1 if none
+    share : where on its motion
+    ends : shares of that motion at which the way to the pole begins and ends, where that is within it
+    """
+
+    steps: tuple[int, int]
+    miss: float
+    record: Indices
+    axis: Array
+    crossing: int
+    share: float
+    ends: tuple[float, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class PolePass:
+    """A pass led through a pole.
+
+    miss : rad by which the programmed axis misses the pole
+    begin, end : where it begins and ends, in motions from the start of the path
+    line : the source line of its nearest point
+    """
+
+    pole: Pole
+    miss: float
+    begin: float
+    end: float
+    line: int
+
+    @property
+    def key(self) -> tuple[str, float]:
+        """What tells it from other passes."""
+        return self.pole.text, self.begin
+
+
+def locate_pass(pole: Pole, path: ToolPath, steps: PoleSteps, route: PoleRoute) -> PolePass:
+    """Locate a route on the path."""
+    first, last = route.steps
+    nearest = first + int(steps.nearest[first : last + 1].argmin())
+    begin, end = steps.record[first] - 1 + steps.begin[first], steps.record[last] - 1 + steps.end[last]
+    return PolePass(pole, route.miss, float(begin), float(end), int(path.line[steps.record[nearest]]))
+
+
+def find_pole_routes(pole: Pole, programmed: ProgrammedPath, steps: PoleSteps, angle: float) -> list[PoleRoute]:
+    """Find routes of the passes that can be led through a pole with no axis moved by ``angle`` rad or more.
+
+    Around each pass circles about the pole are tried, the largest first, each half as large as the one before.
+    """
+    close = steps.nearest <= _MOST_MOVED * angle
+    follows = steps.joined & np.concatenate([[False], close[:-1]])[: len(close)]
+    starts = np.flatnonzero(close & ~follows)
+    stops = np.flatnonzero(close & ~np.concatenate([close[1:] & steps.joined[1:], [False]])[: len(close)])
+    radii = np.sqrt(angle) * 0.5 ** np.arange(max(1.0, np.ceil(-np.log2(2.0 * np.sqrt(angle)))))
+    windows = [_find_windows(steps, starts, stops, radius) for radius in radii.tolist()]
+    routes: list[PoleRoute] = []
+    for number in range(len(starts)):
+        if routes and starts[number] <= routes[-1].steps[1]:
+            continue
+        for (first, last), radius in zip(windows, radii.tolist(), strict=True):
+            window = int(first[number]), int(last[number])
+            route = _route_through_pole(pole, programmed, steps, window, radius, angle)
+            if route is not None:
+                routes.append(route)
+                break
+    return routes
+
+
+def _find_windows(steps: PoleSteps, starts: Indices, stops: Indices, radius: float) -> tuple[Indices, Indices]:
+    """Find the first and the last of the steps about each pass that are no farther than ``radius`` from the pole."""
+    if not len(steps.record):
+        return starts, stops
+    begins = np.flatnonzero((np.hypot(*steps.first.T) >= radius) | ~steps.joined)
+    ends = np.flatnonzero((np.hypot(*steps.last.T) >= radius) | ~np.append(steps.joined[1:], False))
+    return begins[np.searchsorted(begins, starts, "right") - 1], ends[np.searchsorted(ends, stops)]
+
+
+def _route_through_pole(
+    pole: Pole, programmed: ProgrammedPath, steps: PoleSteps, window: tuple[int, int], radius: float, angle: float
+) -> PoleRoute | None:
+    """Route the steps of a window over the pole by squeezing them; None if that moves an axis too far.
+
+    In the projection about the pole the path is squeezed towards a line through it: an offset b from the line, after a
+    on it, becomes b·(a/radius)². So the free angle turns evenly, by no more than it must, and without a swing.
+    """
+    first, last = window
+    inside_window = slice(first, last + 1)
+    x = np.concatenate([steps.first[first : first + 1], steps.last[inside_window]])
+    line = _find_line(x[0], x[-1], radius)
+    normal = np.array([-line[1], line[0]])
+    a, b = x @ line, x @ normal
+    weight = np.where(np.hypot(a, b) < radius, 1.0 - (a / radius) ** 2, 0.0)
+    entries = _meet_circle(x[0], x[1], radius), _meet_circle(x[-1], x[-2], radius)
+    # What is left to move where the path enters and leaves the circle.
+    edge = [abs(float(entry @ normal)) ** 3 / radius**2 for entry in entries if entry is not None]
+    crossings = np.flatnonzero(a[:-1] * a[1:] < 0.0)
+    part = a[crossings] / (a[crossings] - a[crossings + 1])
+    miss_line = np.abs(b[crossings] + part * (b[crossings + 1] - b[crossings]))
+    if not max(0.0, np.abs(weight * b).max(), *miss_line, *edge) <= _MOST_MOVED * angle:
+        return None
+    records = np.concatenate([[steps.record[first] - (steps.begin[first] == 0.0)], steps.record[inside_window]])
+    at_record = np.concatenate([[steps.begin[first] == 0.0], steps.end[inside_window] == 1.0])
+    moved = at_record & (np.abs(weight * b) > PRINTED)
+    projected = np.outer(a, line) + np.outer((1.0 - weight) * b, normal)
+    record = records[moved]
+    axis = pole.find_axes(programmed.tip[record], programmed.axis[record], projected[moved])
+    share, crossing = 0.0, -1
+    ends: tuple[float, ...] = ()
+    if len(crossings):
+        crossing = first + int(crossings[0])
+        share = float(steps.begin[crossing] + part[0] * (steps.end[crossing] - steps.begin[crossing]))
+        ends = _find_inner_ends(steps, window, crossing, radius)
+    return PoleRoute(window, float(steps.nearest[inside_window].min()), record, axis, crossing, share, ends)
+
+
+def _find_line(begin: Array, end: Array, radius: float) -> Array:
+    """Find the direction (2,) in which the pole is passed, from where the path comes and goes."""
+    directions = [x / np.hypot(*x) for x in (-begin, end) if np.hypot(*x) >= radius]
+    if len(directions) == 2 and directions[0] @ directions[1] < 0.0:
+        directions[1] = -directions[1]  # the path turns back
+    total: Array = np.sum(directions, axis=0) if directions else end - begin
+    size = np.hypot(*total)
+    return np.array(total / size if size > 0.0 else [1.0, 0.0], dtype=np.float64)
+
+
+def _meet_circle(outside: Array, inside: Array, radius: float) -> Array | None:
+    """Find where the way from outside to inside enters the circle of a radius about the pole."""
+    if np.hypot(*outside) < radius or np.hypot(*inside) >= radius:
+        return None
+    way = inside - outside
+    p, q, r = float(way @ way), float(outside @ way), float(outside @ outside) - radius * radius
+    return outside + way * ((-q - math.sqrt(max(q * q - p * r, 0.0))) / p)
+
+
+def _find_inner_ends(steps: PoleSteps, window: tuple[int, int], crossing: int, radius: float) -> tuple[float, ...]:
+    """Find the shares of the motion that crosses the pole at which it enters the circle and leaves it again."""
+    ends = []
+    first, last = window
+    for step, outside, inside in ((first, steps.first, steps.last), (last, steps.last, steps.first)):
+        entry = _meet_circle(outside[step], inside[step], radius)
+        if entry is None or steps.record[step] != steps.record[crossing]:
+            continue
+        part = np.hypot(*(entry - steps.first[step])) / np.hypot(*(steps.last[step] - steps.first[step]))
+        share = float(steps.begin[step] + part * (steps.end[step] - steps.begin[step]))
+        if 0.0 < share < 1.0:
+            ends.append(share)
+    return tuple(ends)

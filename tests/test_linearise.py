@@ -6,113 +6,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from dense_deviations import DEGREE, UNDER, axis_of, path_of, within
 from scipy.spatial.transform import Rotation
 
 import parakin as pk
 from parakin.toolpath.linearise.linearise import linearise_path
 from parakin.toolpath.linearise.path_records import insert_records
 from parakin.toolpath.linearise.programmed_path import ProgrammedPath
-from parakin.toolpath.path import Event, ToolPath
+from parakin.toolpath.path import Event
 from parakin.toolpath.posting.post import post_path
-
-DEGREE = math.pi / 180.0
-DENSE = 60  # shares of each motion that are looked at
-
-
-def path_of(tip, axis=None, **others):
-    tip = np.atleast_2d(np.asarray(tip, dtype=float))
-    n = len(tip)
-    axis = np.tile([0.0, 0.0, 1.0], (n, 1)) if axis is None else np.asarray(axis, dtype=float)
-    lines = np.arange(10, 10 + n)
-    return ToolPath("part.cls", tip, axis, lines, np.zeros(n, bool), np.full(n, 1000.0), np.full(n, np.nan), **others)
-
-
-def axis_of(b, c):
-    b, c = np.broadcast_arrays(b, c)
-    return Rotation.from_euler("yz", np.stack([b, c], axis=-1), degrees=True).apply([0.0, 0.0, 1.0])
-
-
-def programmed(path, record, share):
-    """Tips and axes in W at shares (m,) of the motion to a record."""
-    s = np.asarray(share)[:, None]
-    tip = path.tip[record - 1] * (1.0 - s) + path.tip[record] * s
-    if path.turns is not None:
-        turns = path.turns[record - 1] * (1.0 - s) + path.turns[record] * s
-        return tip, Rotation.from_euler("xyz", turns).apply([0.0, 0.0, 1.0])
-    a, b = path.axis[record - 1], path.axis[record]
-    normal = np.cross(a, b)
-    size = np.linalg.norm(normal)
-    vector = normal / size * math.atan2(size, a @ b) if size > 0.0 else normal
-    return tip, Rotation.from_rotvec(s * vector).apply(a)
-
-
-def swept(path, record):
-    """How far a motion turns the tool, rad."""
-    if path.turns is not None:
-        return float(np.abs(path.turns[record] - path.turns[record - 1]).sum())
-    return math.atan2(
-        np.linalg.norm(np.cross(path.axis[record - 1], path.axis[record])), path.axis[record - 1] @ path.axis[record]
-    )
-
-
-def tools(machine, poses):
-    """Tips and axes of poses."""
-    columns = {letter: poses[:, i] for i, letter in enumerate(machine.axes)}
-    nothing = np.zeros(len(poses))
-    tip = np.column_stack([columns[letter] for letter in "XYZ"])
-    turns = np.column_stack([columns.get(letter, nothing) for letter in "ABC"])
-    return tip, Rotation.from_euler("xyz", turns).apply([0.0, 0.0, 1.0])
-
-
-def deviations(posted, result, under, chord, angle):
-    """Of a result from what was posted, mm and rad, for every motion of the result: the tool against the point of its
-    line nearest to the tip; where the tip hardly moves, at the same share."""
-    machine, path = posted.machine, posted.path
-    rotation, origin = posted.frame[:, :3], posted.frame[:, 3]
-    share = np.linspace(0.0, 1.0, DENSE)
-    worst = []
-    record = result.path.line - path.line[0]  # every record has a line of its own
-    for j in range(1, len(record)):
-        r = record[j]
-        poses = result.poses[j - 1] + share[:, None] * (result.poses[j] - result.poses[j - 1])
-        if under == "joints":
-            joints = result.joints[j - 1] + share[:, None] * (result.joints[j] - result.joints[j - 1])
-            found = machine.forward(joints, near=poses)
-            assert np.all(found.converged)
-            poses = found.poses
-        tip, axis = tools(machine, poses)
-        length, turn = np.linalg.norm(path.tip[r] - path.tip[r - 1]), swept(path, r)
-        begin, end = (rotation @ path.tip[i] + origin for i in (r - 1, r))
-        if length * angle > turn * chord:
-            at = np.clip((tip - begin) @ (end - begin) / length**2, 0.0, 1.0)
-        else:
-            ends = shares(path, result.path, j - 1 if record[j - 1] == r else None, r), shares(path, result.path, j, r)
-            at = ends[0] + share * (ends[1] - ends[0])
-        p, k = programmed(path, r, at)
-        p, k = p @ rotation.T + origin, k @ rotation.T
-        worst.append(
-            [
-                np.linalg.norm(tip - p, axis=1).max(),
-                np.arctan2(np.linalg.norm(np.cross(axis, k), axis=1), (axis * k).sum(1)).max(),
-            ]
-        )
-    return np.array(worst).reshape(-1, 2).T
-
-
-def shares(path, denser_path, j, r):
-    """Where on the motion to record r the record j of the denser path stands, by its axis."""
-    if j is None:
-        return 0.0
-    if denser_path.line[j] != (denser_path.line[j + 1] if j + 1 < len(denser_path) else -1):
-        return 1.0
-    way = path.tip[r] - path.tip[r - 1]
-    if way @ way > 1e-12:
-        return float((denser_path.tip[j] - path.tip[r - 1]) @ way / (way @ way))
-    if path.turns is not None:
-        way = path.turns[r] - path.turns[r - 1]
-        return float((denser_path.turns[j] - path.turns[r - 1]) @ way / (way @ way))
-    a, k = path.axis[r - 1], denser_path.axis[j]
-    return math.atan2(np.linalg.norm(np.cross(a, k)), a @ k) / swept(path, r)
 
 
 def a_path(name):
@@ -133,17 +35,8 @@ def a_path(name):
     return machine, path_of(tip + shift, axis)
 
 
-NAMES = ["tricept", "orthoglide5_head", "orthoglide5_table", "hexapod", "linear_delta", "lambda6"]
-
-
-UNDER = pytest.mark.parametrize("under", ["pose", "joints"])
 # Not lambda6: with C = 0, as a tool axis alone has it, its platform is at a singularity.
 NAMES = ["tricept", "orthoglide5_head", "orthoglide5_table", "hexapod", "linear_delta"]
-
-
-def within(posted, result, under, chord, angle):
-    tip, axis = deviations(posted, result, under, chord, angle)
-    return max(tip.max(initial=0.0) / chord, axis.max(initial=0.0) / angle)
 
 
 def without(posted, result, j):
@@ -256,104 +149,6 @@ def test_whole_turns_in_one_motion_hide_nothing():
         result = linearise_path(posted, "pose", angle=5e-3)
         assert within(posted, result, "pose", 0.01, 5e-3) <= 1.0
         assert len(result.path) > 10 * whole
-
-
-# Poles.
-
-
-def across(name, miss, count, span=20.0):
-    """Tips and axes over the pole of a head or table, missing it by ``miss`` rad."""
-    x = np.tan(np.radians(np.linspace(-span, span, count)))
-    axis = Rotation.from_euler("z", 30, degrees=True).apply(
-        np.column_stack([x, np.full(count, math.tan(miss)), np.ones(count)])
-    )
-    tip = np.array(
-        {"orthoglide5_head": [0, 0, -100.0], "orthoglide5_table": [0, 0, 0.0], "tricept": [0, 0, -1650.0]}[name]
-    )
-    return path_of(
-        tip + np.linspace(-5, 5, count)[:, None] * [1.0, 0.0, 0.0], axis / np.linalg.norm(axis, axis=1)[:, None]
-    )
-
-
-def swing(posted):
-    return np.degrees(np.ptp(posted.joints[:, posted.machine.wrist.first]))
-
-
-@UNDER
-@pytest.mark.parametrize("count", [2, 5, 201])
-@pytest.mark.parametrize("miss", [0.0, 5e-5, 4e-4, 9e-4])
-@pytest.mark.parametrize("name", ["orthoglide5_head", "orthoglide5_table"])
-def test_a_pass_within_the_tolerance_is_led_through_the_pole(name, under, count, miss):
-    posted = post_path(pk.load(name), across(name, miss, count))
-    result = linearise_path(posted, under, chord=0.05)
-    assert within(posted, result, under, 0.05, 1e-3) <= 1.0
-    assert swing(result) < 8.0
-    assert not result.path.notes
-    assert result.broken_record_count == 0
-
-
-@UNDER
-@pytest.mark.parametrize("count", [2, 201])
-@pytest.mark.parametrize("miss", [2e-3, 0.014])
-def test_a_pass_beside_the_pole_is_told(under, count, miss):
-    posted = post_path(pk.load("orthoglide5_head"), across("orthoglide5_head", miss, count))
-    result = linearise_path(posted, under, chord=0.05)
-    assert within(posted, result, under, 0.05, 1e-3) <= 1.0
-    assert swing(result) > 170.0
-    (note,) = result.path.notes
-    assert note.line == posted.path.line[1 if count == 2 else 101] or note.line == posted.path.line[100]
-    around = 2.0 * math.degrees(math.atan(math.tan(0.05) / miss))  # while the axis turns by 0.05 rad to either side
-    off = f"{math.degrees(miss):.2g}"
-    head, _, told = note.text.partition(": theta1 swings ")
-    assert head == f"the tool axis passes {off}° beside the head's pole"
-    assert float(told.removesuffix("°")) == pytest.approx(around, abs=4.0)
-    assert linearise_path(result, under, chord=0.05).path.notes == (note,)  # once
-
-
-@UNDER
-def test_the_wrist_of_a_tricept(under):
-    """Its pole is the platform's normal, and stands apart from B = 0."""
-    machine = pk.load("tricept")
-    joints = machine.inverse([60.0, -50.0, -1620.0, 0.3, 0.7])
-    ends = np.array([joints, joints])
-    ends[0, 3:], ends[1, 3:] = np.radians([25.0, -18.0]), np.radians([25.0, 18.0])
-    poses = machine.forward(ends, near=[60.0, -50.0, -1620.0, 0.3, 0.7]).poses
-    tip, axis = tools(machine, poses)
-    tip[:] = tip.mean(0)
-    for count, most in ((2, 4.0), (300, 4.0)):
-        k = programmed(path_of(tip, axis), 1, np.linspace(0, 1, count))[1]
-        posted = post_path(machine, path_of(np.tile(tip[0], (count, 1)), k))
-        result = linearise_path(posted, under, chord=0.02, angle=3e-3)
-        assert within(posted, result, under, 0.02, 3e-3) <= 1.0
-        assert swing(result) < most
-        assert not [note for note in result.path.notes if "theta1" in note.text]
-
-
-def test_jitter_about_the_pole_is_stilled():
-    machine = pk.load("orthoglide5_head")
-    rng = np.random.default_rng(5)
-    axis = np.column_stack([rng.uniform(-4e-4, 4e-4, (80, 2)), np.ones(80)])
-    path = path_of(
-        np.column_stack([np.linspace(-20, 20, 80), np.zeros(80), np.full(80, -100.0)]),
-        axis / np.linalg.norm(axis, axis=1)[:, None],
-    )
-    posted = post_path(machine, path)
-    assert swing(posted) > 90.0
-    result = linearise_path(posted, "joints")
-    assert within(posted, result, "joints", 0.01, 1e-3) <= 1.0
-    assert swing(result) < 8.0
-    assert not result.path.notes
-
-
-def test_a_corner_on_the_pole_is_told():
-    path = across("orthoglide5_head", 0.0, 3)
-    path.axis[2] = axis_of(20.0, 120.0)  # came along 210 deg, goes on along 120
-    posted = post_path(pk.load("orthoglide5_head"), path)
-    result = linearise_path(posted, "joints", chord=0.05)
-    assert within(posted, result, "joints", 0.05, 1e-3) <= 1.0
-    assert [note.text for note in result.path.notes] == [
-        "the tool axis passes 0° beside the head's pole: theta1 swings 90°"
-    ]
 
 
 # What is carried over.

@@ -39,10 +39,10 @@ def check_path(posted: Posted, progress: Progress | None = None) -> Posted:
     bisection = MotionBisection(posted)
     bisection.check_motions(lambda fraction: report(0.9 * fraction))
     names = {bisection.turns: TURNS, bisection.singular: SINGULARITY, bisection.undecided: UNDECIDED}
-    broken_names = [column for column in names if bisection.tallies[column].count]
-    limits = (*posted.limits, *(names[column] for column in broken_names))
+    broken_columns = [column for column in names if bisection.tallies[column].count]
+    limits = (*posted.limits, *(names[column] for column in broken_columns))
     broken_motions = bisection.broken_motions.copy()
-    for number, column in enumerate(broken_names, len(posted.limits)):
+    for number, column in enumerate(broken_columns, len(posted.limits)):
         broken_motions[bisection.broken_motions == 1 + column] = 1 + number
     offences = OffenceMerger(posted, bisection).list_offences()
     first = find_first_offence(posted, bisection, offences)

@@ -1,7 +1,7 @@
 """Bounds of the limits' margins over sections and runs of motions, by interval arithmetic.
 
 The mean value theorem bounds a margin from its values at the ends of a section and from the range of its derivatives
-over the box of poses that holds the section; bounds of the margin itself over the box are taken where they are better.
+over the box of poses that holds the section. Bounds of the margin itself over the box count where they are better.
 """
 
 from __future__ import annotations
@@ -57,7 +57,7 @@ class _Boxes(NamedTuple):
 
 
 class MotionProver:
-    """Prover of the limits' margins over sections of motions and over runs of motions.
+    """Prove the limits kept over sections of motions and over runs of motions, with bounds of their margins.
 
     tolerance : (limits,) how far below zero a margin still counts as kept
     boxes : how many were bounded, a measure of the work
@@ -148,8 +148,11 @@ class MotionProver:
         groups = [(self.margin_rates[0], np.flatnonzero(wrist_modes == OWN))]
         if len(self.margin_rates) > 1:
             groups.append((self.margin_rates[1], np.flatnonzero(wrist_modes == OTHER)))
-        starts = [(v, rows, i) for v, rows in groups for i in range(0, len(rows), _BOXES_AT_ONCE)]
-        return [(rates, rows[i : i + _BOXES_AT_ONCE]) for rates, rows, i in starts]
+        return [
+            (rates, rows[start : start + _BOXES_AT_ONCE])
+            for rates, rows in groups
+            for start in range(0, len(rows), _BOXES_AT_ONCE)
+        ]
 
     def _find_still(self, change: Array) -> Flags:
         """Find rows of joints' changes (n, joints) in which the wrist does not turn."""
@@ -217,8 +220,8 @@ class MotionProver:
         regular = np.ones(len(low), bool)
         for number, rates in enumerate(self.margin_rates):
             rows = np.flatnonzero((wrist_modes == number) | (wrist_modes == EITHER))
-            for i in range(0, len(rows), _BOXES_AT_ONCE):
-                block = rows[i : i + _BOXES_AT_ONCE]
+            for start in range(0, len(rows), _BOXES_AT_ONCE):
+                block = rows[start : start + _BOXES_AT_ONCE]
                 regular[block] &= rates.prove_regular(low[block], high[block])
         return regular
 

@@ -25,7 +25,7 @@ Start = tuple[int, float]  # a motion, and the share of it from which a limit is
 
 
 class OffenceMerger:
-    """A posted path's offences at its records, and what bisection found on its motions."""
+    """Merge a posted path's offences at its records with what bisection found on its motions."""
 
     def __init__(self, posted: Posted, bisection: MotionBisection):
         self.posted, self.bisection = posted, bisection

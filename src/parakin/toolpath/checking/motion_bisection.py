@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import numpy as np
 
-from ...arrays import Array, Flags, Indices
+from ...arrays import Array, Flags, Indices, Progress
 from ...kinematics.wrist import FLIP
 from ..posting.posted import Posted
 from .ledger import Jump, Ledger, Tally
@@ -26,7 +24,7 @@ class MotionBisection:
     Columns are the machine's limits, then ``turns``, ``singular`` and ``undecided``.
 
     floor : (limits,) what a margin has to reach to count as kept
-    tallies : what is found of each column
+    tallies : one for each column
     jump : the first joint that can't go on from record to record
     broken_motions : (n,) 1 + a column that the motion to a record breaks though its ends keep it, else zero
     """
@@ -42,7 +40,7 @@ class MotionBisection:
         self.jump: Jump | None = None
         self.broken_motions = np.zeros(len(posted.path), np.int64)
 
-    def check_motions(self, report: Callable[[float], None]) -> None:
+    def check_motions(self, report: Progress) -> None:
         """Check every motion; fills ``tallies``, ``jump`` and ``broken_motions``."""
         count = len(self.posted.path)
         for records in split_into_blocks(count):

@@ -24,7 +24,7 @@ def find_unproved_motions(prover: MotionProver, records: Indices, floor: Array, 
     """Find the motions between consecutive records that are not proved to keep the limits, by bisection of runs.
 
     records : (n,) of a posted path
-    floor : (limits,) what each margin has to reach; -inf where nothing is asked
+    floor : (limits,) what each margin has to reach; -inf for a limit that does not count
     whole : prove also that turns are counted right and that no parallel singularity is passed
     """
     motions, n = prover.motions, len(records)

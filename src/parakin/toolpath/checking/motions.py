@@ -87,7 +87,7 @@ class PathMotions:
 
     def find_wrist_modes(self, poses: Array, joints: Array) -> WristModes:
         """Find the wrist's working mode that joints (n, joints) of poses (n, axes) are in, (n,)."""
-        wrist_modes = np.zeros(len(poses), np.int8)
+        wrist_modes = np.full(len(poses), OWN, np.int8)
         if self.wrist is None:
             return wrist_modes
         odd = np.flatnonzero(~self.wrist.has_mode(poses, joints, self.modes[0]))
@@ -98,7 +98,7 @@ class PathMotions:
         """Solve the inverse problem nearest to a guess; on the pole the first joint is the guess's."""
         joints = self._count_turns(self.machine.inverse(poses, self.modes[0]), guess)
         if self.wrist is None:
-            return joints, np.zeros(len(poses), np.int8)
+            return joints, np.full(len(poses), OWN, np.int8)
         other = self._count_turns(self.machine.inverse(poses, self.modes[1]), guess)
         own_way, other_way = (((q - guess)[:, self.wrist_joints] ** 2).sum(1) for q in (joints, other))
         nearer = np.where(other_way < own_way, OTHER, OWN)
@@ -134,7 +134,7 @@ class PathMotions:
         """The greatest determinant that counts as next to a parallel singularity."""
         home = self.machine.home[None]
         joints = self.machine.inverse(home, self.posted.mode)
-        points = MotionPoints(home, joints, np.empty((1, 0)), np.zeros(1, np.int8))
+        points = MotionPoints(home, joints, np.empty((1, 0)), np.full(1, OWN, np.int8))
         at_home = abs(float(self.compute_determinants(points)[0]))
         return NEAR_SINGULAR * at_home if at_home > SIGNLESS else SIGNLESS
 
@@ -154,7 +154,7 @@ def find_pole_crossings(first: MotionPoints, last: MotionPoints) -> Flags:
 
 
 def merge_wrist_modes(one: WristModes, two: WristModes) -> WristModes:
-    """Merge the modes (n,) at both ends of ways into the one that holds on the way; EITHER where it is not known."""
+    """Merge the modes (n,) at both ends of sections into the one between; EITHER where it is free or not known."""
     merged = np.where(one == EITHER, two, np.where((two == EITHER) | (two == one), one, EITHER))
     return merged.astype(np.int8)
 

@@ -192,6 +192,6 @@ def _guess_shares(low: Array, high: Array, good: Array, bad: Array, begin: Array
     length = np.where(good > 0.0, inner, outer)
     length = np.where(np.isfinite(length) & (length > 0.0), length, 0.5 * (short + long))
     room = long - short
-    edge = np.where(good > 0.0, 1e-4, 0.02)
+    edge = np.where(good > 0.0, 1e-4, 0.02)  # of the bracket: a trial keeps off its ends, so that it always shrinks
     share: Array = begin + np.clip(length, short + edge * room, long - 0.02 * room)
     return share

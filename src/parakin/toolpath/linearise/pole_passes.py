@@ -20,8 +20,8 @@ from .poles import Pole, find_poles
 from .programmed_path import ProgrammedPath
 
 # Shares of the angle tolerance.
-_MOST_MOVED = 0.99  # what leading through poles may take between records, for the worst point may lie between SHARES
-_LARGE_MISS = 0.25  # for a smaller one the way to the pole begins with the motion, and no further record is needed
+_MOST_BETWEEN = 0.99  # what an axis may be moved between records, for the farthest point may lie between SHARES
+_LARGE_MISS = 0.25  # for a smaller miss the way to the pole begins with the motion, and no further record is needed
 _TRIES = 8
 
 
@@ -85,7 +85,7 @@ def _find_moved_too_far(deviation: Deviation, led: PolePasses) -> set[tuple[str,
         programmed_share = positions.begin[motion] + share * (positions.end - positions.begin)[motion]
         programmed_axis = deviation.programmed.interpolate(positions.record[motion], programmed_share)[1]
         off = path.interpolate(motion, share)[1] - programmed_axis
-        if np.sqrt((off * off).sum(1).max(initial=0.0)) > _MOST_MOVED * deviation.angle:
+        if np.sqrt((off * off).sum(1).max(initial=0.0)) > _MOST_BETWEEN * deviation.angle:
             too_far.add(pole_pass.key)
     return too_far
 
@@ -93,7 +93,7 @@ def _find_moved_too_far(deviation: Deviation, led: PolePasses) -> set[tuple[str,
 def _lead_unless_refused(
     deviation: Deviation, posted: Posted, motion: Indices, refused: set[tuple[str, float]]
 ) -> PolePasses:
-    """Lead a path through its poles but on the passes that are refused; note those that swing."""
+    """Lead a path through its poles on all passes but the refused ones; note the passes on which an angle swings."""
     led = PolePasses(posted, PathPositions.at_records(len(posted.path)))
     programmed, turns = deviation.programmed, posted.path.turns
     axis = programmed.axis.copy()

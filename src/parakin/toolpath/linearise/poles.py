@@ -1,4 +1,4 @@
-"""Poles: tool axes along a turning axis, where that axis's angle is free and beside which it swings."""
+"""Poles: a tool axis along a turning axis leaves that axis's angle free, and close by the angle swings."""
 
 from __future__ import annotations
 

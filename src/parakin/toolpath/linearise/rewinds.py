@@ -13,7 +13,7 @@ from .programmed_path import compute_tool_axes
 def insert_rewind_records(posted: Posted) -> Posted:
     """Insert records in small steps of C into rapid motions that turn back, so that tool axes alone tell how they turn.
 
-    A path whose program gives the turns is left as it is: they can't be told otherwise.
+    A path whose program gives the turns is left as it is: its turns can't say that a joint turns back.
     """
     if not posted.rewinds or posted.path.turns is not None or not posted.machine.has_direction:
         return posted

@@ -9,7 +9,7 @@ import numpy as np
 from measure import best, table
 
 import parakin as pk
-from parakin.export.files import write_all
+from parakin.export.files import write_files
 from parakin.export.tables.joints import make_joint_csv
 from parakin.toolpath.posting.post import post_path
 from parakin.toolpath.reading.cl.reader import read_cl
@@ -36,7 +36,7 @@ def main() -> str:
         cl.write_text("UNITS/MM\nMULTAX\nFEDRAT/2000.,MMPM\n" + "".join(f"GOTO/{line}\n" for line in lines) + "FINI\n")
 
         def whole() -> None:
-            write_all(folder, {"joints.csv": make_joint_csv(post_path(machine, read_cl(cl)))})
+            write_files(folder, {"joints.csv": make_joint_csv(post_path(machine, read_cl(cl)))})
 
         loadtxt = best(lambda: np.loadtxt(csv, delimiter=","), 3)
         read = best(lambda: read_cl(cl), 3)

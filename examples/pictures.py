@@ -9,14 +9,13 @@ import argparse
 from pathlib import Path
 
 import parakin as pk
-from parakin.export.files import write_all
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("-o", "--output", type=Path, default=Path("docs/pictures"))
     folder = parser.parse_args().output
-    for path in write_all(folder, {f"{name}.png": pk.render_machine_png(pk.load(name)) for name in pk.machines()}):
+    for path in pk.write_files(folder, {f"{name}.png": pk.render_machine_png(pk.load(name)) for name in pk.machines()}):
         print(path)
 
 

@@ -10,9 +10,9 @@ import pytest
 import trimesh
 
 import parakin as pk
-from parakin.export.workspace.cells import cells_csv, cells_vtu
-from parakin.export.workspace.meshes import mesh_file, shell
-from parakin.export.workspace.summary import amount, asked, between
+from parakin.export.workspace.cells import format_cells_csv, format_cells_vtu
+from parakin.export.workspace.describe import describe_region, format_bracket, format_volume
+from parakin.export.workspace.meshes import format_mesh, make_mesh
 from parakin.performance.indices import compute_performance
 from parakin.workspaces.sampled.cross_sections import compute_signed_area, find_cross_sections
 from parakin.workspaces.sampled.distance_field import DistanceField, sample_field
@@ -135,7 +135,7 @@ def test_the_grid_covers_a_thin_region(tmp_path):
     machine = struts(tmp_path / "bowl.yaml", "tx ty tz", legs, {"X": "50 mm", "Y": "0 mm", "Z": "1 mm"})
     whole = sample_field(pk.region(machine), (np.array([-205.0, -205.0, -5.0]), np.array([205.0, 205.0, 3.0])))
     assert whole.step == pytest.approx([410 / 60, 410 / 60, 8 / 16])
-    assert solid(shell(whole)).volume == pytest.approx(pi * 200**2 * 2, rel=0.03)
+    assert solid(make_mesh(whole)).volume == pytest.approx(pi * 200**2 * 2, rel=0.03)
 
 
 def test_steps_that_make_no_sense(lens):
@@ -150,7 +150,7 @@ def test_steps_that_make_no_sense(lens):
 
 def test_the_mesh_of_a_lens(lens):
     found, whole = around(lens)
-    mesh = solid(shell(whole))
+    mesh = solid(make_mesh(whole))
     volume = pi * (4 * 500 + 800) * (2 * 500 - 800) ** 2 / 12
     assert found.volume.inner < volume < found.volume.outer
     assert mesh.volume == pytest.approx(volume, rel=0.01)
@@ -163,7 +163,7 @@ def test_the_mesh_of_a_lens(lens):
 
 def test_a_cavity_is_no_part_of_the_volume(hollow):
     found, whole = around(hollow)
-    mesh = solid(shell(whole))
+    mesh = solid(make_mesh(whole))
     volume = 4 / 3 * pi * (500**3 - 200**3)
     assert found.volume.inner < volume < found.volume.outer
     assert mesh.volume == pytest.approx(volume, rel=0.01)
@@ -175,7 +175,7 @@ def test_a_region_in_parts_gives_a_body_each(tmp_path):
     legs = [(foot, NOWHERE, 450, 520) for foot in feet]  # above the feet and below them
     home = {"X": "0 mm", "Y": "0 mm", "Z": "380 mm"}
     found = pk.workspace(pk.region(struts(tmp_path / "parts.yaml", "tx ty tz", legs, home)))
-    bodies = solid(shell(sample_field(found.region, found.box, step=5.0))).split()
+    bodies = solid(make_mesh(sample_field(found.region, found.box, step=5.0))).split()
     assert sorted(np.sign(body.centroid[2]) for body in bodies) == [-1, 1]
     assert bodies[0].volume == pytest.approx(bodies[1].volume, rel=0.01)
     assert bodies[0].volume * 2 == pytest.approx(found.volume.estimate, rel=0.02)
@@ -184,7 +184,7 @@ def test_a_region_in_parts_gives_a_body_each(tmp_path):
 @pytest.mark.parametrize("name", SPACE)
 def test_every_shipped_machine_has_a_closed_mesh(name):
     found, whole = around(pk.load(name))
-    mesh = solid(shell(whole))
+    mesh = solid(make_mesh(whole))
     assert found.volume.inner * 0.99 < mesh.volume < found.volume.outer * 1.01
     low, high = found.box
     assert (mesh.bounds[0] >= low).all()
@@ -196,20 +196,20 @@ def test_every_shipped_machine_has_a_closed_mesh(name):
 )
 def test_total_orientation_has_a_closed_mesh(name, turns):
     found, whole = around(pk.load(name), every=turns, gap=0.03)
-    mesh = solid(shell(whole))
+    mesh = solid(make_mesh(whole))
     assert found.volume.inner * 0.98 < mesh.volume < found.volume.outer * 1.02
 
 
 def test_a_mesh_is_in_space_only():
     _, whole = around(pk.load("hbg80_2d"))
     with pytest.raises(pk.PoseError, match="volume"):
-        shell(whole)
+        make_mesh(whole)
 
 
 @pytest.mark.parametrize("kind", [".stl", ".ply", ".glb"])
 def test_mesh_files_open_again(lens, kind):
-    shape = shell(around(lens)[1])
-    data = mesh_file(shape, kind)
+    shape = make_mesh(around(lens)[1])
+    data = format_mesh(shape, kind)
     if kind == ".stl":
         assert not data.startswith(b"solid")  # binary
     again = trimesh.load(BytesIO(data), file_type=kind[1:], force="mesh")
@@ -298,7 +298,7 @@ def test_sections_that_make_no_sense(lens):
 @pytest.mark.parametrize("at, kind", [({}, "hexahedron"), ({"Z": 50.0}, "quad"), ({"X": 0.0, "Y": 0.0}, "line")])
 def test_vtu(lens, tmp_path, at, kind):
     found = pk.workspace(pk.region(lens, at=at))
-    (tmp_path / "cells.vtu").write_bytes(cells_vtu(found))
+    (tmp_path / "cells.vtu").write_bytes(format_cells_vtu(found))
     mesh = meshio.read(tmp_path / "cells.vtu")
     (block,) = mesh.cells
     assert (block.type, len(block.data)) == (kind, len(found.cells.low))
@@ -322,7 +322,7 @@ def test_vtu(lens, tmp_path, at, kind):
 
 def test_vtu_tells_the_performance_at_the_cells(tmp_path):
     found = pk.workspace(pk.region(pk.load("orthoglide")), gap=0.1)
-    (tmp_path / "cells.vtu").write_bytes(cells_vtu(found))
+    (tmp_path / "cells.vtu").write_bytes(format_cells_vtu(found))
     data = {name: values[0] for name, values in meshio.read(tmp_path / "cells.vtu").cell_data.items()}
     middles = found.cells.low + 0.5 * found.cells.size
     j = [np.linalg.solve(a, b) for a, b in zip(*found.machine.jacobians(middles[found.cells.inside]), strict=True)]
@@ -337,7 +337,7 @@ def test_vtu_tells_the_performance_at_the_cells(tmp_path):
 
 def test_csv(lens):
     found = pk.workspace(pk.region(lens))
-    rows = list(csv.DictReader(StringIO(cells_csv(found).decode())))
+    rows = list(csv.DictReader(StringIO(format_cells_csv(found).decode())))
     assert len(rows) == len(found.cells.low)
     volume = {"inner": 0.0, "outer": 0.0}
     for row in rows:
@@ -354,17 +354,17 @@ def test_csv(lens):
 
 
 def test_amounts_are_readable():
-    assert amount(19_901_970.0, 3) == "19.9 litres"
-    assert amount(1.797e9, 3) == "1.80 m³"
-    assert amount(223_515.0, 2) == "2,235 cm²"
-    assert amount(0.25, 2) == "0.25 mm²"
-    assert amount(598.2, 1) == "598 mm"
+    assert format_volume(19_901_970.0, 3) == "19.9 litres"
+    assert format_volume(1.797e9, 3) == "1.80 m³"
+    assert format_volume(223_515.0, 2) == "2,235 cm²"
+    assert format_volume(0.25, 2) == "0.25 mm²"
+    assert format_volume(598.2, 1) == "598 mm"
 
 
 def test_the_bracket_is_rounded_outward(lens):
     volume = pk.workspace(pk.region(lens)).volume
-    low, high = (float(word) for word in between(volume, 3).split() if word[0].isdigit())
-    assert between(volume, 3).endswith(" litres")
+    low, high = (float(word) for word in format_bracket(volume, 3).split() if word[0].isdigit())
+    assert format_bracket(volume, 3).endswith(" litres")
     assert low * 1e6 <= volume.inner < volume.outer <= high * 1e6
     assert high - low < 1.1 * (volume.outer - volume.inner) / 1e6 + 0.2
 
@@ -372,7 +372,7 @@ def test_the_bracket_is_rounded_outward(lens):
 def test_what_was_asked_is_said():
     machine = pk.load("hexapod")
     here = pk.region(machine, at={"C": pi / 6, "Z": -900.0}, every={"A": (-0.1, 0.1)}, without=["strut0.*"])
-    words = asked(here)
+    words = describe_region(here)
     assert words.startswith("total orientation, A -5.73° to 5.73°, Z = -900 mm, B = 0°, C = 30°")
     assert "without strut0.min strut0.max" in words
-    assert asked(pk.region(machine, without=["*.max"])).endswith("without 6 of the limits")
+    assert describe_region(pk.region(machine, without=["*.max"])).endswith("without 6 of the limits")

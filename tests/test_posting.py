@@ -13,7 +13,6 @@ import pyarrow.parquet as pq
 import pytest
 
 import parakin as pk
-from parakin.export.files import write_all
 from parakin.export.tables import joints as table
 from parakin.toolpath.path import ToolPath
 from parakin.toolpath.posting.frames import compute_poses, frame_from_angles
@@ -350,14 +349,14 @@ def test_files_appear_whole_or_not_at_all(tmp_path, error):
     (tmp_path / "a.csv").write_text("before")
     expected = pk.InputError if isinstance(error, OSError) else type(error)
     with pytest.raises(expected):
-        write_all(tmp_path, {"a.csv": b"after", "b.csv": failing(error), "c.csv": "c"})
+        pk.write_files(tmp_path, {"a.csv": b"after", "b.csv": failing(error), "c.csv": "c"})
     assert [path.name for path in tmp_path.iterdir()] == ["a.csv"]
     assert (tmp_path / "a.csv").read_text() == "before"
 
 
 def test_written_files_are_the_users(tmp_path):
     (plain := tmp_path / "plain").write_text("")
-    paths = write_all(tmp_path / "new" / "folder", {"a": "grün", "b": lambda file: file.write(b"b")})
+    paths = pk.write_files(tmp_path / "new" / "folder", {"a": "grün", "b": lambda file: file.write(b"b")})
     assert [path.read_bytes() for path in paths] == ["grün".encode(), b"b"]
     assert paths[0].stat().st_mode == plain.stat().st_mode
 
@@ -369,7 +368,7 @@ def test_a_folder_that_cant_be_made(tmp_path):
     below = tmp_path / "file" / "below"
     for folder, name in ((below, "a"), (tmp_path / "file", "a"), (tmp_path, "taken"), (tmp_path, "pipe")):
         with pytest.raises(pk.InputError):
-            write_all(folder, {name: b""})
+            pk.write_files(folder, {name: b""})
     assert sorted(path.name for path in tmp_path.iterdir()) == ["file", "pipe", "taken"]
 
 

@@ -18,7 +18,6 @@ from parakin.controllers.linuxcnc.approach import plan_approach
 from parakin.controllers.linuxcnc.axis_rates import choose_axis_rates
 from parakin.controllers.linuxcnc.program import split_slow_turns
 from parakin.controllers.linuxcnc.straight_motions import CYCLE, build_straight_motions
-from parakin.export.files import write_all
 from parakin.toolpath.path import Event, ToolPath
 from parakin.toolpath.posting.post import post_path
 from parakin.toolpath.reading.gcode.reader import read_gcode
@@ -82,7 +81,7 @@ def motion_lines(text):
 def test_what_is_written_for_linuxcnc_is_read_back(trajectories, name, tmp_path):
     trajectory = trajectories(name)
     machine, posted = trajectory.posted.machine, trajectory.posted
-    (file,) = write_all(tmp_path, {"part.ngc": pk.make_linuxcnc_program(trajectory)})
+    (file,) = pk.write_files(tmp_path, {"part.ngc": pk.make_linuxcnc_program(trajectory)})
     read = read_gcode(file, workpiece=AS_IT_IS)
     turns = np.zeros((len(read), 3)) if read.turns is None else read.turns
     columns = [("XYZ".index(a), read.tip) if a in "XYZ" else ("ABC".index(a), turns) for a in machine.axes]
@@ -240,7 +239,7 @@ def test_a_path_of_one_record(tmp_path):
     assert len(lines) == 1
     assert "Z-940.000000" in lines[0]
     assert pk.predict_linuxcnc_seconds(trajectory) == 0.0
-    (file,) = write_all(tmp_path, {"one.ngc": pk.make_joint_program(trajectory)})
+    (file,) = pk.write_files(tmp_path, {"one.ngc": pk.make_joint_program(trajectory)})
     assert len(pk.read_joint_program(file).joints) == 1
 
 
@@ -251,7 +250,7 @@ def test_a_path_of_one_record(tmp_path):
 def test_what_is_written_in_joints_is_read_back(trajectories, name, tmp_path):
     trajectory = trajectories(name)
     machine = trajectory.posted.machine
-    (file,) = write_all(tmp_path, {"part.ngc": pk.make_joint_program(trajectory)})
+    (file,) = pk.write_files(tmp_path, {"part.ngc": pk.make_joint_program(trajectory)})
     read = pk.read_joint_program(file)
     assert read.letters == joint_letters(machine)
     kept = np.append(True, np.diff(trajectory.curve.corner_of_record) > 0)

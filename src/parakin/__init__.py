@@ -13,10 +13,10 @@ if TYPE_CHECKING:
     from .controllers.joints.reader import JointProgram, read_joint_program
     from .controllers.linuxcnc.configuration import make_linuxcnc_configuration
     from .controllers.linuxcnc.program import make_linuxcnc_program, predict_linuxcnc_seconds
+    from .export.files import write_files
     from .export.machine.picture import render_machine_html, render_machine_png
     from .export.report.report import render_report
-    from .export.workspace.meshes import Shell as Mesh
-    from .export.workspace.meshes import shell as make_mesh
+    from .export.workspace.meshes import Mesh, make_mesh
     from .kinematics.forward import Solution
     from .machine import Machine
     from .performance.atlas import Atlas, atlas
@@ -89,6 +89,7 @@ __all__ = [
     "sweep_polar",
     "workpiece",
     "workspace",
+    "write_files",
 ]
 
 
@@ -131,7 +132,7 @@ _LAZY = {
     "Job": "toolpath.job",
     "JointProgram": "controllers.joints.reader",
     "Machine": "machine",
-    "Mesh": "export.workspace.meshes:Shell",
+    "Mesh": "export.workspace.meshes",
     "Placement": "toolpath.placing.placement",
     "PolarWorkspace": "workspaces.sampled.polar_sweep",
     "Region": "workspaces.certified.region",
@@ -149,7 +150,7 @@ _LAZY = {
     "make_joint_program": "controllers.joints.program",
     "make_linuxcnc_configuration": "controllers.linuxcnc.configuration",
     "make_linuxcnc_program": "controllers.linuxcnc.program",
-    "make_mesh": "export.workspace.meshes:shell",
+    "make_mesh": "export.workspace.meshes",
     "predict_linuxcnc_seconds": "controllers.linuxcnc.program",
     "prepare": "toolpath.job",
     "read_joint_program": "controllers.joints.reader",
@@ -164,6 +165,7 @@ _LAZY = {
     "sweep_polar": "workspaces.sampled.polar_sweep",
     "workpiece": "toolpath.posting.frames",
     "workspace": "workspaces.certified.workspace",
+    "write_files": "export.files",
 }
 
 

@@ -33,8 +33,8 @@ class AtlasFiles:
 
     def write(self, atlas: Atlas, maps: Sequence[PerformanceMap]) -> dict[str, str]:
         """Write the maps' pictures and their table; returns the paths."""
-        from ..export.atlas_maps import maps_csv, maps_png
-        from ..export.files import Content, write_all
+        from ..export.atlas_maps import make_map_csv, render_map_png
+        from ..export.files import Content, write_files
 
         kind = "" if self.path.is_dir() else self.path.suffix.lower()
         contents: dict[str, Content] = {}
@@ -44,12 +44,12 @@ class AtlasFiles:
                 key = "map" if self.maps == 1 else f"map {number + 1}"
                 position = _format_slice_position(drawn.region, atlas.map.region)
                 names[key] = self.path.name if kind else f"{self.name}.atlas{position}.png"
-                contents[names[key]] = maps_png(drawn, atlas.isotropic_on(drawn))
+                contents[names[key]] = render_map_png(drawn, atlas.isotropic_on(drawn))
         if kind != ".png":
             names["table"] = self.path.name if kind else f"{self.name}.atlas.csv"
-            contents[names["table"]] = maps_csv(maps)
+            contents[names["table"]] = make_map_csv(maps)
         folder = self.path.parent if kind else self.path
-        write_all(folder, contents)
+        write_files(folder, contents)
         return {key: str(folder / name) for key, name in names.items()}
 
 

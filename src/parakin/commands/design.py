@@ -60,10 +60,10 @@ def design(
     result = DESIGNS[family](edge, amplification)
     files: dict[str, str] = {}
     if output is not None:
-        from ..export.design import design_yaml
-        from ..export.files import write_all
+        from ..export.design import format_design_yaml
+        from ..export.files import write_files
 
-        write_all(output.parent, {output.name: design_yaml(result)})
+        write_files(output.parent, {output.name: format_design_yaml(result)})
         files["machine"] = str(output)
     if json:
         print_json(encode_design(result, files))

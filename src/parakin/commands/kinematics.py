@@ -167,9 +167,9 @@ def _show_table(table: PoseTable, request: _Request, offences: Sequence[Offence]
     for offence in offences:
         say(format_offence(f"{csv}:{offence.line}", offence, "row") if csv else f"pose: {offence.text}")
     if output is not None:
-        from ..export.files import write_all
+        from ..export.files import write_files
 
-        write_all(output.parent, {output.name: format_pose_csv(table)})
+        write_files(output.parent, {output.name: format_pose_csv(table)})
     if request.json:
         files = {} if output is None else {"table": str(output)}
         print_json(encode_poses(request.problem, table, offences, files))

@@ -33,10 +33,10 @@ def linuxcnc(
     machine = machine_of(name, sizes)
     announce_compiling()
     from ..controllers.linuxcnc.configuration import make_linuxcnc_configuration
-    from ..export.files import write_all
+    from ..export.files import write_files
 
     files = make_linuxcnc_configuration(machine)
-    paths = [str(path) for path in write_all(Path(machine.name) if output is None else output, files)]
+    paths = [str(path) for path in write_files(Path(machine.name) if output is None else output, files)]
     if json:
         print_json({"schema": "parakin.linuxcnc/1", "machine": machine.name, "files": paths})
     else:

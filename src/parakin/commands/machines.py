@@ -76,11 +76,11 @@ def _write_picture(machine: Machine, output: Path) -> None:
     kind = output.suffix.lower()
     if kind not in (".html", ".png"):
         raise InputError(f'"{output}": expected a file name that ends in .html or .png', "--output")
-    from ..export.files import write_all
+    from ..export.files import write_files
     from ..export.machine.picture import render_machine_html, render_machine_png
 
     render = render_machine_html if kind == ".html" else render_machine_png
-    write_all(output.parent, {output.name: render(machine)})
+    write_files(output.parent, {output.name: render(machine)})
 
 
 def _format_number(value: float | None) -> str:

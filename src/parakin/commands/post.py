@@ -129,7 +129,7 @@ def post(
     frame = None if workpiece is None else parse_workpiece(workpiece)
     _check_tolerances(tolerance, angle_tolerance, arc_tolerance)
     announce_compiling()
-    from ..export.files import write_all
+    from ..export.files import write_files
     from ..export.json.job import encode_job
     from ..toolpath.job import Tolerances, prepare
     from ..toolpath.placing.placement import find_placement
@@ -153,7 +153,7 @@ def post(
             progress=progress.part("checking and timing", 0.3, 0.7),
         )  # fmt: skip
         files, missing = _make_files(part.stem, job, _Wanted(target, force, rate, parquet), progress)
-        paths = write_all(output, dict(files.values()))
+        paths = write_files(output, dict(files.values()))
     written = {kind: str(name) for kind, name in zip(files, paths, strict=True)}
     if json:
         print_json(encode_job(job, placement, missing, written))

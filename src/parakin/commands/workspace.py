@@ -20,7 +20,7 @@ from .workspace_summary import format_workspace
 
 if TYPE_CHECKING:
     from ..export.files import Content
-    from ..export.workspace.files import Drawing
+    from ..export.workspace.workspace_files import WorkspaceFiles
 
 _INTERRUPTED = 130  # exit code
 
@@ -130,8 +130,8 @@ def workspace(
     effort = Effort(gap, parse_length(cell, "--cell"), time, parse_length(step, "--step"))
     files = _sort_files(output or (), method, len(region.free_axes))
     announce_compiling()
-    from ..export.workspace.files import Drawing, drawing
-    from ..export.workspace.summary import account
+    from ..export.json.workspace import encode_workspace
+    from ..export.workspace.workspace_files import WorkspaceFiles, prepare_files
     from ..workspaces.certified.workspace import Workspace
 
     began = clock.monotonic()
@@ -139,16 +139,16 @@ def workspace(
         is_drawn = json or bool(set(files) - {".vtu", ".csv"})
         found = find_workspace(method, region, effort, progress.part("looking for it", 0.0, 0.6 if is_drawn else 1.0))
         seconds = clock.monotonic() - began
-        drawn = Drawing(found, None, ())
+        contents = WorkspaceFiles(found, None, ())
         if is_drawn:
-            drawn = drawing(found, effort.step, progress.part("drawing", 0.6, 1.0))
-        content = account(found, drawn.slices)
+            contents = prepare_files(found, effort.step, progress.part("drawing", 0.6, 1.0))
+        encoded = encode_workspace(found, contents.cross_sections)
         inside = explore_inside(region, InsideOptions(box, shape, around, parts, start))
-        content.update(encode_inside(inside))
-        content["parameters"] = {"step": effort.step, **content["parameters"], "set": list(sizes or ())}
-        written, refused = _write_files(files, drawn, content)
+        encoded.update(encode_inside(inside))
+        encoded["parameters"] = {"step": effort.step, **encoded["parameters"], "set": list(sizes or ())}
+        written, refused = _write_files(files, contents, encoded)
     if json:
-        print_json({**content, "files": written})
+        print_json({**encoded, "files": written})
     else:
         print(format_workspace(found, seconds) + format_inside(inside))
         if written:
@@ -162,7 +162,7 @@ def workspace(
 
 def _sort_files(paths: Sequence[Path], method: str, dimension: int) -> dict[str, Path]:
     """Sort the files by their endings; unknown, repeated and unfit ones are refused."""
-    from ..export.workspace.files import SUFFIXES, unfit
+    from ..export.workspace.workspace_files import SUFFIXES, explain_unfit
 
     files: dict[str, Path] = {}
     for path in paths:
@@ -171,7 +171,7 @@ def _sort_files(paths: Sequence[Path], method: str, dimension: int) -> dict[str,
             raise InputError(f'"{path}": expected a file name that ends in {", ".join(SUFFIXES)}', "--output")
         if suffix in files:
             raise InputError(f'"{path}": a second {suffix}', "--output")
-        reason = unfit(suffix, method, dimension)
+        reason = explain_unfit(suffix, method, dimension)
         if reason:
             raise InputError(f'"{path}": {reason}', "--output")
         files[suffix] = path
@@ -179,24 +179,24 @@ def _sort_files(paths: Sequence[Path], method: str, dimension: int) -> dict[str,
 
 
 def _write_files(
-    files: Mapping[str, Path], drawn: Drawing, content: Mapping[str, Any]
+    files: Mapping[str, Path], source: WorkspaceFiles, encoded: Mapping[str, Any]
 ) -> tuple[dict[str, str], dict[Path, str]]:
-    """Write files; returns those written, by their endings without the dot, and those refused, with the reason."""
-    from ..export.files import write_all
+    """Write files; return those written, by their endings without the dot, and those refused, with the reason."""
+    from ..export.files import write_files
 
     contents: dict[str, Content] = {}
     refused: dict[Path, str] = {}
     for suffix, path in files.items():
         try:
-            contents[suffix] = b"" if suffix == ".json" else drawn.content(suffix)
+            contents[suffix] = b"" if suffix == ".json" else source.make_file(suffix)
         except PoseError as error:
             refused[path] = str(error)
     written = {suffix.removeprefix("."): str(files[suffix]) for suffix in contents}
     if ".json" in contents:
-        contents[".json"] = format_json({**content, "files": written})
+        contents[".json"] = format_json({**encoded, "files": written})
     folders: dict[Path, dict[str, Content]] = {}
     for suffix, data in contents.items():
         folders.setdefault(files[suffix].parent, {})[files[suffix].name] = data
     for folder, group in folders.items():
-        write_all(folder, group)
+        write_files(folder, group)
     return written, refused

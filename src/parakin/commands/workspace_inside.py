@@ -115,10 +115,10 @@ def format_inside(inside: Inside) -> str:
 
 
 def _format_box(box: InscribedBox) -> list[str]:
-    from ..export.workspace.summary import amount
+    from ..export.workspace.describe import format_volume
 
     edges = " × ".join(format_fixed(edge, 1) for edge in box.edges.tolist())
-    lines = ["", f"box inside  {edges} mm, {amount(box.volume, len(box.axes))}, proved"]
+    lines = ["", f"box inside  {edges} mm, {format_volume(box.volume, len(box.axes))}, proved"]
     ends = zip(box.axes, box.low.tolist(), box.high.tolist(), box.stops[::2], box.stops[1::2], strict=True)
     for axis, low, high, first, last in ends:
         stops = f"stopped by {first.limit or '-'} and {last.limit or '-'}"
@@ -127,15 +127,15 @@ def _format_box(box: InscribedBox) -> list[str]:
 
 
 def _format_components(found: Components) -> list[str]:
-    from ..export.workspace.summary import amount, between
+    from ..export.workspace.describe import format_bracket, format_volume
 
     d = len(found.region.free_axes)
     lines = ["", f"parts that a path can't leave  {len(found)}, at least {found.at_least} proved to be different"]
     for number, component in enumerate(found.components):
         sign = "as at home" if component.sign > 0 else "the other assembly"
         here = ", holds the start" if number == found.start else ""
-        size = amount(component.volume.estimate, d)
-        lines.append(f"            {size}, between {between(component.volume, d)}, {sign}{here}")
+        size = format_volume(component.volume.estimate, d)
+        lines.append(f"            {size}, between {format_bracket(component.volume, d)}, {sign}{here}")
     if found.undecided >= 0.005:
-        lines.append(f"            undecided {amount(found.undecided, d)}")
+        lines.append(f"            undecided {format_volume(found.undecided, d)}")
     return lines

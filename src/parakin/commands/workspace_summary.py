@@ -24,11 +24,11 @@ _STOPPED = {
 
 def format_workspace(workspace: Workspace | SampledWorkspace, seconds: float) -> str:
     """Format a workspace for people, and the time it took, s."""
-    from ..export.workspace.summary import heading
+    from ..export.workspace.describe import describe_workspace
     from ..workspaces.certified.workspace import Workspace
     from ..workspaces.sampled.grid import GridWorkspace
 
-    head = heading(workspace)
+    head = describe_workspace(workspace)
     if isinstance(workspace, Workspace) and workspace.empty:
         return f"{head}\n\nempty: no pose is allowed, proved in {seconds:.1f} s"
     rows = _list_certified(workspace) if isinstance(workspace, Workspace) else _list_sampled(workspace)
@@ -54,29 +54,30 @@ def format_workspace(workspace: Workspace | SampledWorkspace, seconds: float) ->
 
 
 def _list_certified(workspace: Workspace) -> list[tuple[str, str]]:
-    from ..export.workspace.summary import amount, between
+    from ..export.workspace.describe import format_bracket, format_volume
 
     volume, d, cells = workspace.volume, len(workspace.axes), workspace.cells
     inside = int(cells.inside.sum())
     return [
-        (_name_volume(d), f"{volume.estimate:,.0f} {workspace.unit}, {amount(volume.estimate, d)}"),
-        ("proved", f"{volume.inner:,.0f} to {volume.outer:,.0f} {workspace.unit}, between {between(volume, d)}"),
+        (_name_volume(d), f"{volume.estimate:,.0f} {workspace.unit}, {format_volume(volume.estimate, d)}"),
+        ("proved", f"{volume.inner:,.0f} to {volume.outer:,.0f} {workspace.unit}, between {format_bracket(volume, d)}"),
         ("gap", f"{volume.gap:.2%}, {_STOPPED[workspace.stopped]}"),
         ("cells", f"{inside:,} inside, {len(cells.low) - inside:,} at the boundary"),
     ]
 
 
 def _list_sampled(workspace: SampledWorkspace) -> list[tuple[str, str]]:
-    from ..export.workspace.summary import amount, note
+    from ..export.workspace.describe import find_note, format_volume
 
     d, estimate = len(workspace.axes), workspace.estimate
+    volume = format_volume(estimate, d)
     rows = [
-        (_name_volume(d), f"{estimate:,.0f} {workspace.unit}, {amount(estimate, d)}; an estimate, nothing is proved"),
+        (_name_volume(d), f"{estimate:,.0f} {workspace.unit}, {volume}; an estimate, nothing is proved"),
         ("step", f"{workspace.step:,.4g} {'mm' if workspace.method != 'drives' else 'mm, of the drives'}"),
     ]
     if not estimate > 0.0:
         rows[0] = (_name_volume(d), "none of the places looked at is allowed; nothing is proved")
-    text = note(workspace)
+    text = find_note(workspace)
     return rows + ([("note", text)] if text else [])
 
 

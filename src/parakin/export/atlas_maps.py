@@ -2,39 +2,37 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from io import BytesIO
 from typing import TYPE_CHECKING, Any, BinaryIO
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..arrays import Array, Writer
 from ..performance.atlas import PerformanceMap
 from ..performance.singularities import PARALLEL
 from .machine.figures import FAINT, INK
-from .workspace.summary import asked
+from .workspace.describe import describe_region
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-Floats = NDArray[np.float64]
-
 _GREY, _OUTLINE = "#607d8b", "#37474f"
 _LEVELS = 24
-_SHARE = 98.0  # percent of the places that the colours tell apart: a singularity's numbers have no end
+_SHARE = 98.0  # percent of the positions that have colours of their own: near a singularity numbers grow without end
 
 
 @dataclass(frozen=True, eq=False)
-class _Panel:
+class _MapPanel:
     title: str
-    values: Floats
+    values: Array
     colours: str
-    endless: bool = False  # it grows without end near a singularity: the greatest values are not told apart
+    endless: bool = False  # it grows without end near a singularity: the greatest values share one colour
 
 
-def maps_png(found: PerformanceMap, marks: Floats) -> bytes:
-    """A PNG of a map over one or two axes: condition number, greatest and least amplification, parallel margin.
+def render_map_png(map_: PerformanceMap, marks: Array) -> bytes:
+    """Render a map over one or two axes: condition number, greatest and least amplification, parallel margin.
 
     ``marks`` (k, axes) are poses to mark by a cross. Outside the region's outline nothing is drawn.
     """
@@ -45,49 +43,49 @@ def maps_png(found: PerformanceMap, marks: Floats) -> bytes:
     canvas = FigureCanvasAgg(figure)
     panels = figure.subplots(2, 2)
     figure.subplots_adjust(left=0.08, right=0.97, bottom=0.06, top=0.86, hspace=0.24, wspace=0.16)
-    for axes, panel in zip(panels.flat, _panels(found), strict=True):
+    for axes, panel in zip(panels.flat, _list_panels(map_), strict=True):
         axes.set_title(panel.title, color=INK, fontsize=11, loc="left")
         axes.tick_params(labelsize=8, colors=_GREY)
         axes.grid(color=FAINT, linewidth=0.6)
         axes.set_axisbelow(True)
-        axes.set_xlabel(f"{found.axes[0]} [mm]", color=_GREY, fontsize=9)
-        if len(found.axes) == 1:
-            values = np.where(found.allowed & np.isfinite(panel.values), panel.values, np.nan)
-            axes.plot(found.grid[0], values, color="#1565c0")
+        axes.set_xlabel(f"{map_.axes[0]} [mm]", color=_GREY, fontsize=9)
+        if len(map_.axes) == 1:
+            values = np.where(map_.allowed & np.isfinite(panel.values), panel.values, np.nan)
+            axes.plot(map_.grid[0], values, color="#1565c0")
             continue
-        axes.set_ylabel(f"{found.axes[1]} [mm]", color=_GREY, fontsize=9)
-        _drawn(figure, axes, found, panel)
-        columns = [found.region.machine.axes.index(axis) for axis in found.axes]
+        axes.set_ylabel(f"{map_.axes[1]} [mm]", color=_GREY, fontsize=9)
+        _draw_panel(figure, axes, map_, panel)
+        columns = [map_.region.machine.axes.index(axis) for axis in map_.axes]
         axes.plot(*marks[:, columns].T, "+", color="#d50000", markersize=9, markeredgewidth=1.6, linestyle="none")
-    machine = found.region.machine
+    machine = map_.region.machine
     figure.text(
         0.03, 0.955, machine.spec.title or machine.name, color=INK, fontsize=15, weight="bold", parse_math=False
     )
-    what = f"{machine.name}: performance, {asked(found.region)}"
-    if found.performance.length.value is not None:
-        what += f"; characteristic length {found.performance.length.value:.6g} mm"
+    what = f"{machine.name}: performance, {describe_region(map_.region)}"
+    if map_.performance.length.value is not None:
+        what += f"; characteristic length {map_.performance.length.value:.6g} mm"
     figure.text(0.03, 0.92, what, color=_GREY, fontsize=10.5, parse_math=False)
     data = BytesIO()
     canvas.print_png(data)  # type: ignore[no-untyped-call]
     return data.getvalue()
 
 
-def _panels(found: PerformanceMap) -> list[_Panel]:
-    told = found.performance
-    margin = told.margins[..., told.margin_names.index(PARALLEL)]
+def _list_panels(map_: PerformanceMap) -> list[_MapPanel]:
+    performance = map_.performance
+    margin = performance.margins[..., performance.margin_names.index(PARALLEL)]
     return [
-        _Panel("condition number", told.condition, "viridis_r", endless=True),
-        _Panel("greatest amplification", told.greatest, "viridis_r", endless=True),
-        _Panel("least amplification", told.least, "viridis"),
-        _Panel("parallel margin", margin, "viridis"),
+        _MapPanel("condition number", performance.condition, "viridis_r", endless=True),
+        _MapPanel("greatest amplification", performance.greatest, "viridis_r", endless=True),
+        _MapPanel("least amplification", performance.least, "viridis"),
+        _MapPanel("parallel margin", margin, "viridis"),
     ]
 
 
-def _drawn(figure: Figure, axes: Any, found: PerformanceMap, panel: _Panel) -> None:
+def _draw_panel(figure: Figure, axes: Any, map_: PerformanceMap, panel: _MapPanel) -> None:
     from matplotlib.colors import TwoSlopeNorm
 
-    x, y = found.grid
-    inside = panel.values[found.allowed & np.isfinite(panel.values)]
+    x, y = map_.grid
+    inside = panel.values[map_.allowed & np.isfinite(panel.values)]
     axes.set_aspect("equal")
     if len(x) < 2 or len(y) < 2 or not len(inside):
         return
@@ -101,7 +99,7 @@ def _drawn(figure: Figure, axes: Any, found: PerformanceMap, panel: _Panel) -> N
     levels = np.linspace(low, high, _LEVELS + 1)
     values = np.ma.masked_invalid(np.where(np.isinf(panel.values), high, panel.values).T)
     filled = axes.contourf(x, y, values, levels=levels, extend="max" if panel.endless else "neither", **colours)
-    room = np.nan_to_num(found.slack, nan=-1.0).T
+    room = np.nan_to_num(map_.slack, nan=-1.0).T
     if room.min() < 0.0:
         axes.contourf(x, y, room, levels=[room.min() - 1.0, 0.0], colors="white")
         axes.contour(x, y, room, levels=[0.0], colors=_OUTLINE, linewidths=1.2)
@@ -111,8 +109,8 @@ def _drawn(figure: Figure, axes: Any, found: PerformanceMap, panel: _Panel) -> N
     bar.ax.tick_params(labelsize=8, colors=_GREY)
 
 
-def maps_csv(maps: Sequence[PerformanceMap]) -> Callable[[BinaryIO], None]:
-    """What writes all places of the maps that can be reached: pose (mm, degrees), whether allowed, all numbers."""
+def make_map_csv(maps: Sequence[PerformanceMap]) -> Writer:
+    """Make the writer of all positions that can be reached: pose (mm, degrees), whether it is allowed, all numbers."""
 
     def write(file: BinaryIO) -> None:
         machine = maps[0].region.machine
@@ -122,18 +120,18 @@ def maps_csv(maps: Sequence[PerformanceMap]) -> Callable[[BinaryIO], None]:
         names = maps[0].performance.margin_names
         file.write((",".join([*head, *names]) + "\n").encode())
         factors = np.where(np.array(units) == "deg", np.degrees(1.0), 1.0)
-        for found in maps:
-            for line in _lines(found, factors):
+        for map_ in maps:
+            for line in _format_lines(map_, factors):
                 file.write(line.encode())
 
     return write
 
 
-def _lines(found: PerformanceMap, factors: Floats) -> Iterator[str]:
-    told, n = found.performance, len(factors)
-    columns = [told.poses * factors, found.allowed[..., None]]
-    columns += [getattr(told, name)[..., None] for name in ("condition", "greatest", "least", "manipulability")]
-    columns.append(told.margins)
+def _format_lines(map_: PerformanceMap, factors: Array) -> Iterator[str]:
+    performance, n = map_.performance, len(factors)
+    columns = [performance.poses * factors, map_.allowed[..., None]]
+    columns += [getattr(performance, name)[..., None] for name in ("condition", "greatest", "least", "manipulability")]
+    columns.append(performance.margins)
     for part in zip(*(column.reshape(-1, 1, column.shape[-1]) for column in columns), strict=True):
         row = np.concatenate(part, 1)[0].tolist()
         if row[n + 2] == row[n + 2]:

@@ -5,8 +5,8 @@ from __future__ import annotations
 from ..performance.design import Design
 
 
-def design_yaml(design: Design) -> str:
-    """The machine file of a designed Orthoglide, with all digits of its sizes."""
+def format_design_yaml(design: Design) -> str:
+    """Format the machine file of a designed Orthoglide, with all digits of its sizes."""
     low, high = design.stroke
     corner, other = design.cube
     least, greatest = (bracket.attained for bracket in design.proof.brackets)

@@ -5,48 +5,49 @@ from __future__ import annotations
 import contextlib
 import os
 import tempfile
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from typing import BinaryIO
 
+from ..arrays import Writer
 from ..errors import InputError
 
-Content = bytes | str | Callable[[BinaryIO], None]
+Content = bytes | str | Writer
 
 
-def write_all(folder: str | os.PathLike[str], files: Mapping[str, Content]) -> list[Path]:
-    """Write files into a folder, made if need be; returns their paths.
+def write_files(folder: str | os.PathLike[str], files: Mapping[str, Content]) -> list[Path]:
+    """Write files into a folder, which is made if it is missing; return their paths.
 
     Parameters
     ----------
     folder : where to
-    files : by their names: bytes, text (UTF-8), or what writes itself to an open binary file
+    files : by their names: bytes, text (UTF-8), or a writer to an open binary file
 
-    All are written under other names first and take their own ones when every one is complete, so that a full disk or
-    an interruption leaves what was there before.
+    All are written under other names first and are renamed when every one is complete, so that a full disk or an
+    interruption leaves what was there before.
 
     Raises :class:`InputError` if the folder can't be made or a file can't be written.
     """
     base = Path(folder)
     targets = [base / name for name in files]
     written: list[str] = []
-    place = str(base)
+    current = str(base)  # for the error's message
     try:
         base.mkdir(parents=True, exist_ok=True)
         for target, content in zip(targets, files.values(), strict=True):
-            place = str(target)
+            current = str(target)
             if target.exists() and not target.is_file():  # a folder, or a device such as /dev/null
-                raise InputError("is no plain file, it can't be replaced by one", place)
+                raise InputError("is no plain file, it can't be replaced by one", current)
             handle, temporary = tempfile.mkstemp(prefix=f".{target.name}.", suffix=".part", dir=base)
             written.append(temporary)
             with os.fdopen(handle, "wb") as file:
-                _fill(file, content)
-            os.chmod(temporary, 0o666 & ~_umask())  # noqa: PTH101  a temporary file is its owner's only
+                _write_content(file, content)
+            os.chmod(temporary, 0o666 & ~_read_umask())  # noqa: PTH101  a temporary file is its owner's only
         for target, temporary in zip(targets, written, strict=True):
-            place = str(target)
+            current = str(target)
             os.replace(temporary, target)  # noqa: PTH105
     except OSError as error:
-        raise InputError(f"can't be written: {error.strerror or error}", place) from error
+        raise InputError(f"can't be written: {error.strerror or error}", current) from error
     finally:
         for temporary in written:
             with contextlib.suppress(FileNotFoundError):
@@ -54,7 +55,7 @@ def write_all(folder: str | os.PathLike[str], files: Mapping[str, Content]) -> l
     return targets
 
 
-def _fill(file: BinaryIO, content: Content) -> None:
+def _write_content(file: BinaryIO, content: Content) -> None:
     if isinstance(content, str):
         content = content.encode()
     if isinstance(content, bytes):
@@ -63,7 +64,7 @@ def _fill(file: BinaryIO, content: Content) -> None:
         content(file)
 
 
-def _umask() -> int:
+def _read_umask() -> int:
     mask = os.umask(0)
     os.umask(mask)
     return mask

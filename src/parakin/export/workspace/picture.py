@@ -1,4 +1,4 @@
-"""A workspace's picture, a PNG: its shaded shell and cross-sections, in the plane its area by what binds."""
+"""A workspace's picture, a PNG: its shaded surface and cross-sections, in the plane its area by what binds."""
 
 from __future__ import annotations
 
@@ -8,22 +8,19 @@ from textwrap import fill
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ...workspaces.certified.workspace import Workspace
+from ...arrays import Array
 from ...workspaces.sampled.distance_field import SampledField
 from ...workspaces.sampled.sampling import SampledWorkspace
 from ..machine.figures import FAINT, INK
-from .curves import Curves
-from .meshes import Shell
-from .summary import amount, heading, size
+from .describe import AnyWorkspace, describe_size, describe_workspace, format_volume
+from .meshes import Mesh
+from .sweep_curves import CurveGroup
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from ...workspaces.sampled.cross_sections import CrossSection
-
-Floats = NDArray[np.float64]
 
 _GREY = "#607d8b"
 _VIEW = {"elev": 22.0, "azim": -56.0}  # from the front right, degrees
@@ -33,65 +30,65 @@ _WIDE = 96  # letters of a heading's line
 _PIXELS = 2  # along a step of a planar field
 
 
-def space_png(found: Workspace | SampledWorkspace, shape: Shell, slices: Sequence[CrossSection]) -> bytes:
-    """A PNG of a workspace in space: its shaded shell, coloured by height, and beside it its cross-sections."""
-    return _png(found, (12.0, 6.6), lambda figure: _space(figure, found, shape, slices))
+def render_space_png(workspace: AnyWorkspace, mesh: Mesh, slices: Sequence[CrossSection]) -> bytes:
+    """Render a workspace in space: its shaded surface, coloured by height, and beside it its cross-sections."""
+    return _render_png(workspace, (12.0, 6.6), lambda figure: _draw_space(figure, workspace, mesh, slices))
 
 
-def plane_png(found: Workspace | SampledWorkspace, whole: SampledField, slices: Sequence[CrossSection]) -> bytes:
-    """A PNG of a workspace in a plane: its area, a colour for each limit where that is nearest."""
-    return _png(found, (9.6, 7.2), lambda figure: _plane(figure, found, whole, slices))
+def render_plane_png(workspace: AnyWorkspace, field: SampledField, slices: Sequence[CrossSection]) -> bytes:
+    """Render a workspace in a plane: its area, a colour for each limit where that is nearest."""
+    return _render_png(workspace, (9.6, 7.2), lambda figure: _draw_plane(figure, workspace, field, slices))
 
 
-def curves_png(
-    found: SampledWorkspace, whole: SampledField, groups: Sequence[Curves], slices: Sequence[CrossSection]
+def render_curves_png(
+    workspace: SampledWorkspace, field: SampledField, groups: Sequence[CurveGroup], slices: Sequence[CrossSection]
 ) -> bytes:
-    """A PNG of what a sweep found as curves; of a workspace in space with its cross-sections beside them."""
-    if len(found.axes) == 3:
-        return _png(found, (12.0, 6.6), lambda figure: _net(figure, found, whole, groups, slices))
-    return _png(found, (9.6, 7.2), lambda figure: _flat_net(figure, found, groups))
+    """Render what a sweep found as curves; of a workspace in space with its cross-sections beside them."""
+    if len(workspace.axes) == 3:
+        return _render_png(workspace, (12.0, 6.6), lambda figure: _draw_net(figure, workspace, field, groups, slices))
+    return _render_png(workspace, (9.6, 7.2), lambda figure: _draw_flat_net(figure, workspace, groups))
 
 
-def _png(found: Workspace | SampledWorkspace, inches: tuple[float, float], draw: Callable[[Figure], None]) -> bytes:
+def _render_png(workspace: AnyWorkspace, inches: tuple[float, float], draw: Callable[[Figure], None]) -> bytes:
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=inches, dpi=150, facecolor="white")
     canvas = FigureCanvasAgg(figure)
     draw(figure)
-    _title(figure, found)
+    _add_title(figure, workspace)
     data = BytesIO()
     canvas.print_png(data)  # type: ignore[no-untyped-call]
     return data.getvalue()
 
 
-def _title(figure: Figure, found: Workspace | SampledWorkspace) -> None:
-    name = found.machine.spec.title or found.machine.name
+def _add_title(figure: Figure, workspace: AnyWorkspace) -> None:
+    name = workspace.machine.spec.title or workspace.machine.name
     figure.text(0.025, 0.945, name, color=INK, fontsize=15, weight="bold", parse_math=False)
-    what = f"{fill(heading(found), _WIDE)}\n{size(found)}"
+    what = f"{fill(describe_workspace(workspace), _WIDE)}\n{describe_size(workspace)}"
     figure.text(0.025, 0.905, what, color=_GREY, fontsize=10.5, va="top", linespacing=1.5, parse_math=False)
 
 
 # In space.
 
 
-def _space(figure: Figure, found: Workspace | SampledWorkspace, shape: Shell, slices: Sequence[CrossSection]) -> None:
+def _draw_space(figure: Figure, workspace: AnyWorkspace, mesh: Mesh, slices: Sequence[CrossSection]) -> None:
     from matplotlib import colormaps
     from matplotlib.colors import Normalize
     from mpl_toolkits import mplot3d  # noqa: F401  it brings the projection
 
-    axis = slices[0].axis if slices else found.axes[-1]
-    along = found.axes.index(str(axis))
-    scale = Normalize(shape.vertices[:, along].min(), shape.vertices[:, along].max())
+    axis = slices[0].axis if slices else workspace.axes[-1]
+    along = workspace.axes.index(str(axis))
+    scale = Normalize(mesh.vertices[:, along].min(), mesh.vertices[:, along].max())
     colours: Any = colormaps["viridis"]
     axes: Any = figure.add_axes((0.0, 0.0, 0.58, 0.88), projection="3d")
-    _frame(axes, shape.vertices.min(0), shape.vertices.max(0), found.axes)
-    _faces(axes, shape, colours(0.12 + 0.8 * scale(shape.vertices[shape.faces][:, :, along].mean(1)))[:, :3])
+    _set_view(axes, mesh.vertices.min(0), mesh.vertices.max(0), workspace.axes)
+    _add_faces(axes, mesh, colours(0.12 + 0.8 * scale(mesh.vertices[mesh.faces][:, :, along].mean(1)))[:, :3])
     if slices:
-        _sections(figure, slices, lambda value: colours(0.12 + 0.8 * scale(value)))
+        _draw_sections(figure, slices, lambda value: colours(0.12 + 0.8 * scale(value)))
 
 
-def _frame(axes: Any, low: Floats, high: Floats, names: Sequence[str]) -> None:
+def _set_view(axes: Any, low: Array, high: Array, names: Sequence[str]) -> None:
     half = 0.54 * (high - low)
     for name, letter, middle, h in zip("xyz", names, 0.5 * (low + high), half, strict=True):
         getattr(axes, f"set_{name}lim")(middle - h, middle + h)
@@ -109,11 +106,11 @@ def _frame(axes: Any, low: Floats, high: Floats, names: Sequence[str]) -> None:
     axes.locator_params(nbins=5)
 
 
-def _faces(axes: Any, shape: Shell, colours: Floats) -> None:
-    """The faces that look at the viewer, lit from above."""
+def _add_faces(axes: Any, mesh: Mesh, colours: Array) -> None:
+    """Add the faces that look at the viewer, lit from above."""
     from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
-    corners = shape.vertices[shape.faces]
+    corners = mesh.vertices[mesh.faces]
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     lengths = np.linalg.norm(normals, axis=1, keepdims=True)
     normals = normals / np.where(lengths > 0.0, lengths, 1.0)
@@ -126,21 +123,21 @@ def _faces(axes: Any, shape: Shell, colours: Floats) -> None:
     axes.add_collection3d(Poly3DCollection(corners[front], facecolors=lit, edgecolors=lit, linewidths=0.4))
 
 
-def _sections(figure: Figure, slices: Sequence[CrossSection], colour: Any) -> None:
+def _draw_sections(figure: Figure, slices: Sequence[CrossSection], colour: Any) -> None:
     axes: Any = figure.add_axes((0.645, 0.12, 0.325, 0.60))
     for section in slices:
-        label = f"{section.axis} = {section.value:,.1f} mm   {amount(section.area, 2)}"
+        label = f"{section.axis} = {section.value:,.1f} mm   {format_volume(section.area, 2)}"
         for number, outline in enumerate(section.outlines):
             axes.plot(*outline.T, color=colour(section.value), linewidth=1.6, label="" if number else label)
         if not section.outlines:
             axes.plot([], [], color=colour(section.value), linewidth=1.6, label=label)
-    _flat(axes, slices[0].plane)
+    _set_plane(axes, slices[0].plane)
     axes.legend(
         loc="lower left", bbox_to_anchor=(-0.02, 1.02), **_LEGEND, title="cross-sections"
     ).get_title().set_color(INK)
 
 
-def _flat(axes: Any, names: Sequence[str]) -> None:
+def _set_plane(axes: Any, names: Sequence[str]) -> None:
     axes.set_aspect("equal", adjustable="datalim")
     axes.set_xlabel(f"{names[0]} [mm]", color=_GREY, fontsize=9)
     axes.set_ylabel(f"{names[1]} [mm]", color=_GREY, fontsize=9)
@@ -154,29 +151,27 @@ def _flat(axes: Any, names: Sequence[str]) -> None:
 # In a plane.
 
 
-def _plane(
-    figure: Figure, found: Workspace | SampledWorkspace, whole: SampledField, slices: Sequence[CrossSection]
-) -> None:
+def _draw_plane(figure: Figure, workspace: AnyWorkspace, field: SampledField, slices: Sequence[CrossSection]) -> None:
     from matplotlib import colormaps
     from matplotlib.patches import Patch, PathPatch
     from matplotlib.path import Path
 
     outlines = [outline for section in slices for outline in section.outlines]
-    fine = np.array(whole.values.shape) * _PIXELS
-    step = whole.step / _PIXELS
-    near = np.repeat(np.repeat(whole.values > -whole.step.min(), _PIXELS, 0), _PIXELS, 1)
-    low = whole.low - 0.5 * whole.step
-    nearest = whole.distance.find_nearest_limits(low + (np.argwhere(near) + 0.5) * step)
+    fine = np.array(field.values.shape) * _PIXELS
+    step = field.step / _PIXELS
+    near = np.repeat(np.repeat(field.values > -field.step.min(), _PIXELS, 0), _PIXELS, 1)
+    low = field.low - 0.5 * field.step
+    nearest = field.distance.find_nearest_limits(low + (np.argwhere(near) + 0.5) * step)
     limit = np.full(tuple(fine), -1)
     limit[near] = nearest
-    count = np.bincount(nearest, minlength=len(found.region.limits))
+    count = np.bincount(nearest, minlength=len(workspace.region.limits))
     palette: Any = colormaps["tab20"]
     image = np.zeros((*limit.shape, 4))
     patches = []
     for place, number in enumerate(np.argsort(-count, kind="stable")[: int((count > 0).sum())].tolist()):
         colour = palette((2 * place + 1 + place // 10) % 20)
         image[limit == number] = colour
-        label = f"{found.region.limits[number]}   {count[number] / len(nearest):.1%}"
+        label = f"{workspace.region.limits[number]}   {count[number] / len(nearest):.1%}"
         patches.append(Patch(facecolor=colour, label=label))
     axes: Any = figure.add_axes((0.08, 0.08, 0.60, 0.72))
     high = low + fine * step
@@ -184,19 +179,19 @@ def _plane(
     edge = Path.make_compound_path(*(Path(outline, closed=True) for outline in outlines))
     picture.set_clip_path(PathPatch(edge, transform=axes.transData))
     axes.add_patch(PathPatch(edge, facecolor="none", edgecolor=INK, linewidth=1.4, zorder=3))
-    _flat(axes, found.axes)
+    _set_plane(axes, workspace.axes)
     axes.legend(handles=patches, loc="upper left", bbox_to_anchor=(1.02, 1.0), **_LEGEND,
                 title="nearest limit, share of the area").get_title().set_color(INK)  # fmt: skip
 
 
-# Curves of a sweep.
+# CurveGroup of a sweep.
 
 
-def _net(
+def _draw_net(
     figure: Figure,
-    found: SampledWorkspace,
-    whole: SampledField,
-    groups: Sequence[Curves],
+    workspace: SampledWorkspace,
+    field: SampledField,
+    groups: Sequence[CurveGroup],
     slices: Sequence[CrossSection],
 ) -> None:
     from matplotlib import colormaps
@@ -204,11 +199,11 @@ def _net(
     from mpl_toolkits import mplot3d  # noqa: F401  it brings the projection
     from mpl_toolkits.mplot3d.art3d import Line3DCollection
 
-    low, high = whole.span
+    low, high = field.span
     scale = Normalize(low[2], high[2])
     colours: Any = colormaps["viridis"]
     axes: Any = figure.add_axes((0.0, 0.0, 0.58, 0.88), projection="3d")
-    _frame(axes, low, high, found.axes)
+    _set_view(axes, low, high, workspace.axes)
     for group in groups:
         width = 0.6 if group.fine else 1.3
         tint = [colours(0.12 + 0.8 * scale(line[:, 2].mean())) for line in group.lines]
@@ -216,10 +211,10 @@ def _net(
             Line3DCollection(group.lines, colors=tint, linewidths=width, alpha=0.6 if group.fine else 1.0)
         )
     if slices:
-        _sections(figure, slices, lambda value: colours(0.12 + 0.8 * scale(value)))
+        _draw_sections(figure, slices, lambda value: colours(0.12 + 0.8 * scale(value)))
 
 
-def _flat_net(figure: Figure, found: SampledWorkspace, groups: Sequence[Curves]) -> None:
+def _draw_flat_net(figure: Figure, workspace: SampledWorkspace, groups: Sequence[CurveGroup]) -> None:
     from matplotlib import colormaps
 
     palette: Any = colormaps["tab10"]
@@ -230,5 +225,5 @@ def _flat_net(figure: Figure, found: SampledWorkspace, groups: Sequence[Curves])
             axes.plot(
                 *line.T, color=colour, linewidth=width, zorder=2 if group.fine else 3, label="" if i else group.name
             )
-    _flat(axes, found.axes)
+    _set_plane(axes, workspace.axes)
     axes.legend(loc="upper left", bbox_to_anchor=(1.02, 1.0), **_LEGEND)

@@ -1,0 +1,99 @@
+"""A workspace's files by their endings, made from one sampled field."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from ...arrays import Array, Progress
+from ...errors import PoseError
+from ...workspaces.certified.workspace import Workspace
+from ...workspaces.sampled.cross_sections import CrossSection, find_cross_sections
+from ...workspaces.sampled.distance_field import SampledField, sample_field
+from ...workspaces.sampled.drive_sweep import DriveWorkspace
+from ...workspaces.sampled.polar_sweep import PolarWorkspace
+from ...workspaces.sampled.sampling import SampledWorkspace, find_bounding_box
+from .cells import format_cells_csv, format_cells_vtu
+from .describe import AnyWorkspace
+from .meshes import Mesh, format_mesh, make_mesh
+from .picture import render_curves_png, render_plane_png, render_space_png
+from .sweep_curves import build_sweep_curves
+
+MESHES = (".stl", ".ply", ".glb")
+SUFFIXES = (*MESHES, ".vtu", ".csv", ".png", ".json")
+
+
+def explain_unfit(suffix: str, method: str, dimension: int) -> str | None:
+    """Explain why a workspace of a dimension, found by a method, has no file of a kind; None if it has one."""
+    if suffix in (".vtu", ".csv") and method != "certified":
+        return "only the method certified has cells"
+    if suffix in MESHES and dimension != 3:
+        return "a mesh needs a volume, this workspace is flat; .png goes, and .vtu and .csv of the method certified"
+    if suffix == ".png" and dimension == 1:
+        return "a picture needs an area, this workspace is a line; .vtu and .csv go, of the method certified"
+    return None
+
+
+@dataclass(frozen=True, eq=False)
+class WorkspaceFiles:
+    """A workspace with its field (None if it is empty) and its cross-sections, from which its files are made."""
+
+    workspace: AnyWorkspace
+    field: SampledField | None
+    cross_sections: tuple[CrossSection, ...]
+
+    @cached_property
+    def mesh(self) -> Mesh:
+        return make_mesh(self._filled_field)
+
+    @property
+    def _filled_field(self) -> SampledField:
+        if self.field is None:
+            raise PoseError("the workspace is empty")
+        if not len(self.field.inside):
+            raise PoseError(f"steps of {self.field.step.min():g} mm miss the workspace")
+        return self.field
+
+    def make_file(self, suffix: str) -> bytes:
+        """Make the file with one of ``SUFFIXES`` but .json; raise :class:`PoseError` if it would be empty."""
+        if suffix in (".csv", ".vtu"):
+            assert isinstance(self.workspace, Workspace)
+            if suffix == ".vtu" and self.workspace.empty:
+                raise PoseError("the workspace is empty")
+            return format_cells_csv(self.workspace) if suffix == ".csv" else format_cells_vtu(self.workspace)
+        if suffix in MESHES:
+            return format_mesh(self.mesh, suffix)
+        if isinstance(self.workspace, PolarWorkspace | DriveWorkspace):
+            curves = build_sweep_curves(self.workspace)
+            return render_curves_png(self.workspace, self._filled_field, curves, self.cross_sections)
+        if len(self.workspace.axes) == 3:
+            return render_space_png(self.workspace, self.mesh, self.cross_sections)
+        return render_plane_png(self.workspace, self._filled_field, self.cross_sections)
+
+
+def prepare_files(workspace: AnyWorkspace, step: float | None, progress: Progress) -> WorkspaceFiles:
+    """Sample the field and find the cross-sections of a workspace; ``step`` as for ``sample_field``."""
+    box = _bound_region(workspace)
+    if box is None:
+        return WorkspaceFiles(workspace, None, ())
+    in_space = len(workspace.axes) == 3
+    field = sample_field(workspace.region, box, step, progress=lambda done: progress(0.5 * done if in_space else done))
+    cross_sections: tuple[CrossSection, ...] = ()
+    if len(workspace.axes) > 1:
+        cross_sections = find_cross_sections(field, step=step, progress=lambda done: progress(0.5 + 0.5 * done))
+    return WorkspaceFiles(workspace, field, cross_sections)
+
+
+def _bound_region(workspace: AnyWorkspace) -> tuple[Array, Array] | None:
+    """Find a box proved to hold the region; None if it is empty."""
+    if isinstance(workspace, SampledWorkspace):
+        return find_bounding_box(workspace.region)
+    if workspace.box is None or workspace.stopped != "gap" or not workspace.region.every_orientation:
+        return workspace.box  # a search that was stopped early, or is slow, is not followed by a long one
+    box = find_bounding_box(workspace.region)
+    if box is None:
+        return None
+    low, high = np.maximum(box[0], workspace.box[0]), np.minimum(box[1], workspace.box[1])
+    return (low, high) if (low < high).all() else None

@@ -37,19 +37,19 @@ for command in (post, inverse, forward, linuxcnc, machines, show, workspace, atl
 app.register_install_completion_command()
 
 
-def _terminated(number: int, frame: object) -> None:
+def _exit_on_signal(number: int, frame: object) -> None:
     raise SystemExit(128 + number)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run a command; returns the exit code."""
+    """Run a command; return the exit code."""
     if isinstance(sys.stdout, io.TextIOWrapper):
         sys.stdout.reconfigure(errors="backslashreplace")  # a terminal may not know the sign for degrees
     if threading.current_thread() is threading.main_thread():
-        signal.signal(signal.SIGTERM, _terminated)  # so that half-written files are removed
+        signal.signal(signal.SIGTERM, _exit_on_signal)  # so that half-written files are removed
     try:
-        given = list(sys.argv[1:] if arguments is None else arguments)
-        code = app(given, exit_on_error=False, print_error=False, result_action="return_value")
+        words = list(sys.argv[1:] if arguments is None else arguments)
+        code = app(words, exit_on_error=False, print_error=False, result_action="return_value")
         sys.stdout.flush()
     except ParakinError as error:
         print(error, file=sys.stderr)

@@ -14,7 +14,7 @@ from ..units import NUMBER, QuantityError, parse_quantity, to_display
 from .atlas_files import AtlasFiles
 from .atlas_summary import format_atlas, format_performance, format_proofs
 from .console import Progress, announce_compiling, print_json
-from .options import OFF_LIMITS, Json, Mode, Name, Sizes, machine_of
+from .options import OFF_LIMITS, Json, Mode, Name, Sizes, load_machine
 from .region_options import (
     At,
     Without,
@@ -78,7 +78,7 @@ def atlas(
     output
         A folder for the maps, PNG and CSV, or one file by its ending.
     """
-    machine = machine_of(name, sizes)
+    machine = load_machine(name, sizes)
     region = read_region(machine, at, without=without, mode=mode)
     scale, apart = parse_length(size, "--length"), parse_length(step, "--step")
     spans = parse_axis_ranges(machine, box, "--box")

@@ -16,7 +16,7 @@ from ..export.tables.poses import PoseTable, Side, format_pose_csv
 from ..units import display_unit, to_display
 from .console import announce_compiling, format_table, print_json, say
 from .offences import format_offence
-from .options import OFF_LIMITS, Json, Mode, Name, Sizes, machine_of
+from .options import OFF_LIMITS, Json, Mode, Name, Sizes, load_machine
 from .values import parse_row
 
 if TYPE_CHECKING:
@@ -53,7 +53,7 @@ def inverse(
     values
         A pose in mm and degrees, in the order of the axes or by name: X=10 Z=-1400; the rest comes from home.
     """
-    machine = machine_of(name, sizes)
+    machine = load_machine(name, sizes)
     poses, lines = _read_values(machine, "pose", values, csv, machine.home)
     announce_compiling()
     from ..toolpath.posting.offences import judge_path
@@ -90,7 +90,7 @@ def forward(
     """
     import numpy as np
 
-    machine = machine_of(name, sizes)
+    machine = load_machine(name, sizes)
     announce_compiling()
     joints, lines = _read_values(machine, "joints", values, csv, machine.inverse(machine.home))
     start = None

@@ -8,7 +8,7 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from .console import announce_compiling, print_json
-from .options import Json, Name, Sizes, machine_of
+from .options import Json, Name, Sizes, load_machine
 
 
 def linuxcnc(
@@ -30,7 +30,7 @@ def linuxcnc(
     output
         Folder for the files; by default one of the machine's name.
     """
-    machine = machine_of(name, sizes)
+    machine = load_machine(name, sizes)
     announce_compiling()
     from ..controllers.linuxcnc.configuration import make_linuxcnc_configuration
     from ..export.files import write_files

@@ -12,7 +12,7 @@ from ..export.json.machine import RATES, encode_details, encode_machine, encode_
 from ..export.number_format import format_fixed
 from ..units import display_unit
 from .console import format_table, print_json
-from .options import Json, Name, Sizes, machine_of
+from .options import Json, Name, Sizes, load_machine
 
 if TYPE_CHECKING:
     from ..machine import Machine
@@ -57,7 +57,7 @@ def show(
         Where to put the picture of the machine at home: an .html to turn and look at, or a .png. By default NAME.html
         in this folder; with --json none.
     """
-    machine = machine_of(name, sizes)
+    machine = load_machine(name, sizes)
     if output is None and not json:
         output = Path(f"{machine.name}.html")
     if output is not None:

@@ -15,13 +15,14 @@ if TYPE_CHECKING:
 OFF_LIMITS = 3  # exit code
 
 
-def machine_names(context: Any) -> list[str]:
+def complete_machine(context: Any) -> list[str]:
+    """List the shipped machines that begin with what is typed, for the shell's completion."""
     from .. import machines
 
     return [name for name in machines() if name.startswith(context.incomplete)]
 
 
-Name = Annotated[str, Parameter(completer=machine_names)]
+Name = Annotated[str, Parameter(completer=complete_machine)]
 Sizes = Annotated[
     list[str] | None, Parameter(name="--set", help="A size of the machine, with its unit: R=360mm. May be given again.")
 ]
@@ -31,25 +32,25 @@ Mode = Annotated[
 Json = Annotated[bool, Parameter(name="--json", help="Print one JSON object and nothing else.")]
 
 
-def machine_of(name: str, sizes: Sequence[str] | None = None) -> Machine:
-    """The machine of a command: a shipped name or a file, with sizes ``NAME=VALUE`` in the place of its own."""
+def load_machine(name: str, sizes: Sequence[str] | None = None) -> Machine:
+    """Load the machine of a command, a shipped name or a file, with sizes ``NAME=VALUE`` that replace its own."""
     from .. import load
 
-    given: dict[str, str] = {}
+    parameters: dict[str, str] = {}
     for text in sizes or ():
         size, equals, value = (part.strip() for part in text.partition("="))
         if not (size and equals and value):
             raise InputError(f'"{text}": expected NAME=VALUE, such as R=360mm', "--set")
-        if size in given:
+        if size in parameters:
             raise InputError(f"{size} is given twice", "--set")
-        given[size] = value
+        parameters[size] = value
     try:
-        return load(name, given)
+        return load(name, parameters)
     except InputErrors as errors:
-        raise InputErrors([_at_option(error) for error in errors.errors]) from None
+        raise InputErrors([_name_option(error) for error in errors.errors]) from None
     except InputError as error:
-        raise _at_option(error) from None
+        raise _name_option(error) from None
 
 
-def _at_option(error: InputError) -> InputError:
+def _name_option(error: InputError) -> InputError:
     return InputError(error.message, "--set") if error.source == "parameters" else error

@@ -12,7 +12,7 @@ from cyclopts import Parameter
 from ..controllers import Target, load_controller
 from ..errors import InputError, PoseError
 from .console import Progress, announce_compiling, print_json
-from .options import OFF_LIMITS, Json, Mode, Sizes, machine_names, machine_of
+from .options import OFF_LIMITS, Json, Mode, Sizes, complete_machine, load_machine
 from .workpiece import parse_bounds, parse_workpiece
 
 if TYPE_CHECKING:
@@ -28,7 +28,7 @@ MachineName = Annotated[
     str,
     Parameter(
         name=["--machine", "-m"],
-        completer=machine_names,
+        completer=complete_machine,
         help="A shipped machine's name (see parakin machines) or a YAML file.",
     ),
 ]
@@ -123,7 +123,7 @@ def post(
     Writes PART.joints.csv and PART.report.html. The exit code is 0 if the machine can run the path, 3 if it can't
     (table and report are written all the same, a program only with --force), 2 for input that can't be read.
     """
-    chosen = machine_of(machine, sizes)
+    chosen = load_machine(machine, sizes)
     if place is not None and workpiece is not None:
         raise InputError("--place finds the workpiece's pose; expected it or --workpiece", "--place")
     frame = None if workpiece is None else parse_workpiece(workpiece)

@@ -12,7 +12,7 @@ from cyclopts import Parameter
 from ..errors import InputError, PoseError
 from ..export.json.text import format_json
 from .console import Progress, announce_compiling, print_json, say
-from .options import OFF_LIMITS, Json, Mode, Name, Sizes, machine_of
+from .options import OFF_LIMITS, Json, Mode, Name, Sizes, load_machine
 from .region_options import At, Every, Some, Without, parse_length, read_region
 from .workspace_inside import InsideOptions, encode_inside, explore_inside, format_inside
 from .workspace_methods import Effort, Method, find_workspace
@@ -125,7 +125,7 @@ def workspace(
 
     The exit code is 3 if a file has nothing to be filled with, for the workspace is empty.
     """
-    machine = machine_of(name, sizes)
+    machine = load_machine(name, sizes)
     region = read_region(machine, at, every, some, dexterous, without, mode)
     effort = Effort(gap, parse_length(cell, "--cell"), time, parse_length(step, "--step"))
     files = _sort_files(output or (), method, len(region.free_axes))

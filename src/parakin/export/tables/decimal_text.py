@@ -1,4 +1,4 @@
-"""Tables of numbers as decimal text, fast: fixed digits, trailing zeros left away."""
+"""Format tables of numbers as decimal text, fast: fixed digits, without trailing zeros."""
 
 from typing import Any, NamedTuple
 
@@ -10,14 +10,14 @@ from ...arrays import Array, Flags, Indices
 
 WIDEST = 26  # bytes a number takes at most, its separator included
 _COMMA, _MINUS, _POINT, _LF, _ZERO = (ord(c) for c in ",-.\n0")
-_LARGEST = 9.0e18  # what is as large once scaled doesn't fit into an integer
+_LARGEST = 9.0e18  # a scaled value as large doesn't fit into an integer
 _HUNDRED, _E4, _E6, _E8 = (np.uint64(10**n) for n in (2, 4, 6, 8))
 _PAIRS = np.frombuffer("".join(f"{i:02}" for i in range(100)).encode(), np.uint8)
 
 
 @nb.njit(cache=True, nogil=True, inline="always")
 def _format_integer(value: Any, out: NDArray[np.uint8], at: Any) -> Any:
-    """Write a natural number from ``at`` on; returns its end."""
+    """Write a natural number from ``at`` on; return its end."""
     length = 1
     bound = np.uint64(10)
     while length < 19 and value >= bound:
@@ -101,7 +101,7 @@ class LimitNames(NamedTuple):
 def format_joint_rows(
     first: int, last: int, columns: JointColumns, form: NumberFormat, names: LimitNames, out: NDArray[np.uint8]
 ) -> int:
-    """Write rows ``first`` to ``last`` of a joint table as CSV into ``out``; returns how many bytes.
+    """Write rows ``first`` to ``last`` of a joint table as CSV into ``out``; return how many bytes.
 
     form : of poses, joints and feed
     """
@@ -140,10 +140,8 @@ def format_joint_rows(
 
 
 @nb.njit(cache=True, nogil=True)
-def format_cells(
-    values: NDArray[np.float64], scales: NDArray[np.float64], digits: NDArray[np.int64], out: NDArray[np.uint8]
-) -> int:
-    """Write a table of numbers (rows, columns) as CSV into ``out``; returns how many bytes."""
+def format_cells(values: Array, scales: Array, digits: Indices, out: NDArray[np.uint8]) -> int:
+    """Write a table of numbers (rows, columns) as CSV into ``out``; return how many bytes."""
     at = 0
     last = values.shape[1] - 1
     for n in range(len(values)):

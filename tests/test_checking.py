@@ -11,7 +11,7 @@ import parakin as pk
 from parakin.machine import Machine
 from parakin.toolpath.checking.check import check_path
 from parakin.toolpath.checking.motion_bisection import MotionBisection
-from parakin.toolpath.posting.offences import describe_place
+from parakin.toolpath.posting.offence_texts import describe_place
 
 # Against dense samples.
 

@@ -1,8 +1,8 @@
-"""Names of the types that every room shares."""
+"""Names of the types that every room shares, and the blocks in which long arrays are worked through."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import BinaryIO, TypeAlias
 
 import numpy as np
@@ -13,3 +13,9 @@ Indices: TypeAlias = NDArray[np.int64]  # zero-based numbers of rows or columns
 Flags: TypeAlias = NDArray[np.bool_]  # one truth a row
 Progress: TypeAlias = Callable[[float], None]  # called now and then with the fraction done, 0 to 1
 Writer: TypeAlias = Callable[[BinaryIO], None]  # writes a file's content
+
+
+def split_rows(count: int, size: int) -> Iterator[slice]:
+    """Split rows into slices of at most ``size`` each."""
+    for start in range(0, count, size):
+        yield slice(start, start + size)

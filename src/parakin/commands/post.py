@@ -216,7 +216,7 @@ def _make_files(
 
 
 def _make_program(job: Job, target: Target, force: bool) -> Writer:
-    from ..toolpath.posting.offences import describe_place
+    from ..toolpath.posting.offence_texts import describe_place
 
     posted = job.posted
     if posted.first is not None and not force:

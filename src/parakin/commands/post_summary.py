@@ -25,7 +25,7 @@ def summarise_job(
 ) -> str:
     """Summarise a job; the last lines name the files."""
     from ..export.json.job import encode_joint_ranges
-    from ..toolpath.posting.offences import describe_place
+    from ..toolpath.posting.offence_texts import describe_place
 
     posted = job.posted
     path = posted.path

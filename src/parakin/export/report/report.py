@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ...toolpath.posting.offences import describe_place
+from ...toolpath.posting.offence_texts import describe_place
 from ...toolpath.posting.range_use import RangeUse, measure_range_use
 from ..machine.figures import embed_figure, render_page
 from ..number_format import format_count, format_duration

@@ -5,7 +5,8 @@ from __future__ import annotations
 import math
 
 from ...kinematics.wrist import TURN
-from ..posting.offences import SINGULARITY, TURNS, UNDECIDED, describe_broken_limit, format_measure
+from ..posting.offence_texts import describe_broken_limit, format_measure
+from ..posting.offences import SINGULARITY, TURNS, UNDECIDED
 from ..posting.posted import Offence, Posted
 from .ledger import WorstMargin
 from .motion_bisection import MotionBisection

@@ -7,10 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...arrays import Array, Flags, Indices
-from ...kinematics.wrist import continue_direction, find_nearest_turn, flip_rotation
+from ...kinematics.rotations import compute_rotations, find_nearest_rotation_turns
+from ...kinematics.wrist import continue_direction, find_nearest_turn
 from ...machine import Machine
 from ..posting.frames import compute_poses, frame_from_angles
-from ..posting.programmed_angles import compute_rotations
+from ..posting.turn_steps import find_turning_columns
 
 MACHINE_FRAME = frame_from_angles(0, 0, 0, 0, 0, 0)
 _MATCHING = 1e-9  # of a rotation: what is rounding
@@ -49,25 +50,21 @@ def continue_turned_points(
     even : (m, axes) the poses to take where they are given, and not NaN
     """
     poses = _point_tool(machine, tip, np.ascontiguousarray(rotation[:, :, 2]), before)
-    columns = _list_turning_axes(machine)
+    columns = find_turning_columns(machine)
     if len(columns) == 3:
-        poses[:, columns] = _decompose_rotations(rotation, before.poses[:, columns])
+        poses[:, columns] = find_nearest_rotation_turns(rotation, before.poses[:, columns])
     poses = np.where(np.isfinite(even), even, poses)
     return PosedPoints(poses, _solve_joints(machine, mode, poses, before))
 
 
 def find_matching_poses(machine: Machine, poses: Array, rotation: Array) -> Flags:
     """Find poses (m, axes) that turn the tool as rotations (m, 3, 3) in M do, as far as the machine can."""
-    columns = _list_turning_axes(machine)
+    columns = find_turning_columns(machine)
     turns = np.zeros((len(poses), 3))
     turns[:, ["ABC".index(machine.axes[column]) for column in columns]] = poses[:, columns]
     off = rotation - compute_rotations(turns)
     matching: Flags = np.abs(off if len(columns) == 3 else off[:, :, 2:]).max(axis=(1, 2)) < _MATCHING
     return matching
-
-
-def _list_turning_axes(machine: Machine) -> list[int]:
-    return [column for column, letter in enumerate(machine.axes) if letter in "ABC"]
 
 
 def _point_tool(machine: Machine, tip: Array, axis: Array, before: PosedPoints) -> Array:
@@ -76,21 +73,9 @@ def _point_tool(machine: Machine, tip: Array, axis: Array, before: PosedPoints) 
     if machine.has_direction:
         continue_direction(poses[:, 3:], before.poses[:, 3:])
     else:
-        for column in _list_turning_axes(machine):
+        for column in find_turning_columns(machine):
             poses[:, column] = find_nearest_turn(poses[:, column], before.poses[:, column])
     return poses
-
-
-def _decompose_rotations(rotation: Array, before: Array) -> Array:
-    """Decompose rotations (m, 3, 3) into A, B, C (m, 3); of both solutions the nearer to ``before`` (m, 3)."""
-    r = np.moveaxis(rotation, 0, 2)
-    level = np.hypot(r[2, 1], r[2, 2])
-    a, b, c = np.arctan2(r[2, 1], r[2, 2]), np.arctan2(-r[2, 0], level), np.arctan2(r[1, 0], r[0, 0])
-    here = np.column_stack([a, b, c])
-    solutions = find_nearest_turn(np.stack([here, flip_rotation(here)]), before)
-    nearer = ((solutions - before) ** 2).sum(2).argmin(0)
-    angles: Array = solutions[nearer, np.arange(len(before))]
-    return angles
 
 
 def _solve_joints(machine: Machine, mode: str, poses: Array, before: PosedPoints) -> Array:

@@ -8,8 +8,8 @@ from functools import cached_property
 import numpy as np
 
 from ...arrays import Array, Flags, Indices
+from ...kinematics.rotations import compute_rotations
 from ..posting.posted import Posted
-from ..posting.programmed_angles import compute_rotations
 from .continuation import PosedPoints, continue_points, continue_turned_points, find_matching_poses
 from .deviation import Deviation, Spans
 from .programmed_path import ProgrammedPath

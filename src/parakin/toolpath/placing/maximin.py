@@ -1,114 +1,127 @@
-"""The greatest least value of many smooth rows in a box: linear programs in a region of trust."""
+"""Maximin: the greatest least value of many smooth rows in a box, by linear programs within a trust region."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import NamedTuple
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..path import Floats
+from ...arrays import Array, Flags
 
-# points (m, d) of the unit box -> rows that must not be below 0 (m, h), and rows whose least counts (m, s)
-Rows = Callable[[Floats], tuple[Floats, Floats]]
+# Points (m, d) of the unit box -> hard rows (m, h), which must not be negative; soft rows (m, s), whose least counts.
+Rows: TypeAlias = Callable[[Array], tuple[Array, Array]]
 
-LOST = -1000.0  # the value of a point where a row is below 0 that must not be, and less by as much as it is
-_STEP = 1e-5  # for derivatives
-_FIRST, _WIDEST, _FINEST = 0.15, 0.5, 1e-9  # regions of trust
-_GAIN = 1e-10  # foretold: less is none
+LOST = -1000.0  # what a point is worth where a hard row is negative, and less by as much as that is
+_STEP = 1e-5  # of the box, for derivatives
+_FIRST, _WIDEST, _FINEST = 0.15, 0.5, 1e-9  # of the box: radii of the trust region
+_GAIN = 1e-10  # predicted: a smaller one ends the search
 _FLAT = 1e-9  # slope of a row that nothing changes
 _SAME = 1e-12  # of rows
-_INSIDE = 1e-3  # how far above 0 rows are sought that must not be below
+_INSIDE = 1e-3  # how far hard rows are raised above zero while one is negative
+_MADE, _WEAK = (
+    0.7,
+    0.2,
+)  # of the predicted gain: a step that makes more widens the region, one that makes less shrinks it
 
 
-class Top(NamedTuple):
-    """A local maximum: the point (d,), what it is worth, and what without the rows that nothing changes there."""
+class LocalMaximum(NamedTuple):
+    """A point (d,), what it is worth, and what it is worth without the rows that nothing changes there."""
 
-    point: Floats
+    point: Array
     worth: float
     rest: float
 
 
-def score_rows(hard: Floats, soft: Floats) -> Floats:
-    """What each point is worth (m,), from its rows; 1 where nothing limits it."""
+def score_rows(hard: Array, soft: Array) -> Array:
+    """Score points by their rows (m, ...): the least soft row, (m,); one where nothing limits a point."""
     low = np.where(np.isnan(hard), -1.0, hard).min(axis=1, initial=np.inf)
     least = np.where(np.isnan(soft), -np.inf, soft).min(axis=1, initial=1.0 if not soft.shape[1] else np.inf)
-    worth: Floats = np.where(low < 0.0, LOST + np.maximum(low, LOST), np.maximum(least, 0.5 * LOST))
+    worth: Array = np.where(low < 0.0, LOST + np.maximum(low, LOST), np.maximum(least, 0.5 * LOST))
     return worth
 
 
-def maximise_least(rows: Rows, start: Floats, rounds: int = 60, trust: float = _FIRST) -> Top:
-    """A local maximum of the least soft row in the unit box, from ``start`` (d,).
+def find_local_maximum(rows: Rows, start: Array, rounds: int = 60, trust: float = _FIRST) -> LocalMaximum:
+    """Find a local maximum of the least soft row in the unit box, from ``start`` (d,): sequential linear programs.
 
     Where the least row is one that nothing changes, the least of the others is raised.
     """
     here, d = start, len(start)
-    hard, soft = (part[0] for part in rows(start[None]))
-    flat = np.zeros(len(soft), bool)
+    hard, soft = (values[0] for values in rows(start[None]))
+    is_flat = np.zeros(len(soft), bool)
     for _ in range(rounds if d else 0):
         around = np.concatenate([here + _STEP * np.eye(d), here - _STEP * np.eye(d)])
-        slopes = [(part[:d] - part[d:]).T / (2.0 * _STEP) for part in rows(around)]
-        flat = np.abs(slopes[1]).max(axis=1) < _FLAT
+        hard_slopes, soft_slopes = ((values[:d] - values[d:]).T / (2.0 * _STEP) for values in rows(around))
+        is_flat = np.abs(soft_slopes).max(axis=1) < _FLAT
         low, high = np.maximum(-trust, -here), np.minimum(trust, 1.0 - here)
-        way, gain = _way(hard, soft[~flat], slopes[0], slopes[1][~flat], low, high)
+        step, gain = _find_best_step(
+            _Linear(hard, hard_slopes), _Linear(soft[~is_flat], soft_slopes[~is_flat]), low, high
+        )
         if gain < _GAIN:
             break
-        there = np.clip(here + way, 0.0, 1.0)
-        new_hard, new_soft = (part[0] for part in rows(there[None]))
-        before, after = _worth(hard, soft, flat), _worth(new_hard, new_soft, flat)
+        there = np.clip(here + step, 0.0, 1.0)
+        new_hard, new_soft = (values[0] for values in rows(there[None]))
+        before, after = _score_point(hard, soft, is_flat), _score_point(new_hard, new_soft, is_flat)
         made = (after.rest - before.rest) / gain if after.worth >= before.worth - _SAME else -1.0
         if made > 0.0:
             here, hard, soft = there, new_hard, new_soft
-        trust = min(_WIDEST, 2.0 * trust) if made > 0.7 else trust if made > 0.2 else 0.3 * trust
+        trust = min(_WIDEST, 2.0 * trust) if made > _MADE else trust if made > _WEAK else 0.3 * trust
         if trust < _FINEST:
             break
-    worth = _worth(hard, soft, flat)
-    return Top(here, worth.worth, worth.rest)
+    return LocalMaximum(here, *_score_point(hard, soft, is_flat))
 
 
 class _Worth(NamedTuple):
+    """What all rows make a point worth, and what those that are not flat do."""
+
     worth: float
     rest: float
 
 
-def _worth(hard: Floats, soft: Floats, flat: NDArray[np.bool_]) -> _Worth:
-    """What all rows make a point worth, and what those that aren't flat do."""
-    return _Worth(float(score_rows(hard[None], soft[None])[0]), float(score_rows(hard[None], soft[None, ~flat])[0]))
+def _score_point(hard: Array, soft: Array, is_flat: Flags) -> _Worth:
+    return _Worth(float(score_rows(hard[None], soft[None])[0]), float(score_rows(hard[None], soft[None, ~is_flat])[0]))
 
 
-def _way(
-    hard: Floats, soft: Floats, hard_slopes: Floats, soft_slopes: Floats, low: Floats, high: Floats
-) -> tuple[Floats, float]:
-    """The step between ``low`` and ``high`` (d,) that raises the least row most, by the slopes, and by how much."""
+class _Linear(NamedTuple):
+    """Rows about a point: their values (k,) and slopes (k, d)."""
+
+    values: Array
+    slopes: Array
+
+    def keep_finite(self) -> _Linear:
+        """Keep the rows whose value and slopes are finite."""
+        finite = np.isfinite(self.values) & np.isfinite(self.slopes).all(axis=1)
+        return _Linear(self.values[finite], self.slopes[finite])
+
+
+def _find_best_step(hard: _Linear, soft: _Linear, low: Array, high: Array) -> tuple[Array, float]:
+    """Find the step between ``low`` and ``high`` (d,) that raises the least row most, by linear programming."""
     from scipy.optimize import linprog
 
-    bounds = list(zip(low.tolist(), high.tolist(), strict=True))
-    ok = np.isfinite(hard) & np.isfinite(hard_slopes).all(axis=1)
-    hard, hard_slopes = hard[ok], hard_slopes[ok]
-    lost = bool((hard < 0.0).any())
-    ok = np.isfinite(soft) & np.isfinite(soft_slopes).all(axis=1)
-    rows, slopes = (hard, hard_slopes) if lost else (soft[ok], soft_slopes[ok])
-    if not len(rows):
+    hard = hard.keep_finite()
+    is_lost = bool((hard.values < 0.0).any())
+    values, slopes = hard if is_lost else soft.keep_finite()
+    if not len(values):
         return np.zeros(len(low)), 0.0
-    reach = np.abs(slopes) @ np.maximum(-low, high)
-    kept = rows - reach <= (rows + reach).min()  # no other can be the least
-    rows, slopes = rows[kept], slopes[kept]
-    left, right = [np.column_stack([-slopes, np.ones(len(rows))])], [rows]
-    if not lost:
-        near = hard - np.abs(hard_slopes) @ np.maximum(-low, high) < 0.0
-        left.append(np.column_stack([-hard_slopes[near], np.zeros(near.sum())]))
-        right.append(hard[near])
-    least = float(rows.min())
-    most = (_INSIDE if lost else np.inf) - least
-    right[0] = right[0] - least  # of the gain: its digits are not lost beside the value's
-    found = linprog(
+    change = np.abs(slopes) @ np.maximum(-low, high)
+    can_be_least = values - change <= (values + change).min()
+    values, slopes = values[can_be_least], slopes[can_be_least]
+    left, right = [np.column_stack([-slopes, np.ones(len(values))])], [values]
+    if not is_lost:
+        near = hard.values - np.abs(hard.slopes) @ np.maximum(-low, high) < 0.0
+        left.append(np.column_stack([-hard.slopes[near], np.zeros(near.sum())]))
+        right.append(hard.values[near])
+    least = float(values.min())
+    most = (_INSIDE if is_lost else np.inf) - least
+    right[0] = right[0] - least  # the program is of the gain: its digits are not lost beside the value's
+    gain_bounds = (0.0, None if np.isinf(most) else most)
+    optimum = linprog(
         np.append(np.zeros(len(low)), -1.0),
         A_ub=np.vstack(left),
         b_ub=np.concatenate(right),
-        bounds=[*bounds, (0.0, None if np.isinf(most) else most)],
+        bounds=[*zip(low.tolist(), high.tolist(), strict=True), gain_bounds],
         method="highs",
     )
-    if found.x is None:
+    if optimum.x is None:
         return np.zeros(len(low)), 0.0
-    return np.asarray(found.x[:-1]), float(found.x[-1])
+    return np.asarray(optimum.x[:-1]), float(optimum.x[-1])

@@ -2,31 +2,30 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 
+from ...arrays import Array, Progress
 from ...errors import PoseError
 from ...machine import Machine
-from ..path import Floats, Note, ToolPath
+from ..path import Note, ToolPath
 from .frames import compose_frames, compute_poses
 from .offences import judge_path
 from .posted import Posted
+from .turn_steps import find_turning_columns
 from .working_mode import choose_branch, list_candidate_modes
-
-Progress = Callable[[float], None]
 
 
 def post_path(
     machine: Machine,
     path: ToolPath,
     *,
-    workpiece: Floats | None = None,
+    workpiece: Array | None = None,
     mode: str | None = None,
     progress: Progress | None = None,
 ) -> Posted:
-    """Joints for every record of a tool path, and what keeps the machine from following it.
+    """Compute the joints for every record of a tool path, and find what keeps the machine from following it.
 
     Parameters
     ----------
@@ -40,41 +39,41 @@ def post_path(
     Turns of joints are counted, and taken back in rapid motions where they have to be: see
     :func:`~.working_mode.choose_branch`.
 
-    Raises :class:`PoseError` for a workpiece that is no transform, an unknown mode, or a motion of thousands of turns.
-    A record that can't be reached raises nothing: it is an offence of the result.
+    Raises :class:`PoseError` for an invalid workpiece, an unknown mode, or a motion of thousands of turns. A record
+    that can't be reached raises nothing: it is an offence of the result.
     """
-    say = progress or (lambda fraction: None)
+    report = progress or (lambda fraction: None)
     if workpiece is not None and (np.shape(workpiece) != (3, 4) or not np.isfinite(workpiece).all()):
         raise PoseError("workpiece: a transform of shape (3, 4) expected")
     frame = compose_frames(workpiece, path.frame)
-    poses, own = compute_poses(machine, path.tip, path.axis, frame, path.turns)
-    say(0.3)
+    poses, path_limits = compute_poses(machine, path.tip, path.axis, frame, path.turns)
+    report(0.3)
     best, fewest = None, (0, 0)
-    for tried in list_candidate_modes(machine, mode):
-        taken = choose_branch(machine, path, poses, tried)
-        say(0.7)
-        found = judge_path(machine, taken.poses, taken.joints, path.line, tried, own)
-        wrong = (int(np.count_nonzero(found.broken)), taken.flips)
-        if best is None or wrong < fewest:
-            best, fewest = (taken, found), wrong
-        if wrong == (0, 0):
+    for candidate in list_candidate_modes(machine, mode):
+        branch = choose_branch(machine, path, poses, candidate)
+        report(0.7)
+        judgement = judge_path(machine, branch.poses, branch.joints, path.line, candidate, path_limits)
+        faults = (int(np.count_nonzero(judgement.broken)), branch.swings)
+        if best is None or faults < fewest:
+            best, fewest = (branch, judgement), faults
+        if faults == (0, 0):
             break
     assert best is not None
-    taken, found = best
-    say(1.0)
-    path = _noted(machine, path)
+    branch, judgement = best
+    report(1.0)
     return Posted(
-        machine, path, taken.mode, frame, taken.poses, taken.joints,
-        found.broken, found.limits, found.offences, found.first, found.worst, rewinds=taken.rewinds,
+        machine, _note_lost_turns(machine, path), branch.mode, frame, branch.poses, branch.joints,
+        judgement.broken, judgement.limits, judgement.offences, judgement.first, judgement.worst,
+        rewinds=branch.rewinds,
     )  # fmt: skip
 
 
-def _noted(machine: Machine, path: ToolPath) -> ToolPath:
-    """The path with a note if it turns the tool about its own axis, and the machine has no turn to do so."""
-    if path.turns is None or {"A", "B", "C"} & set(machine.axes):
+def _note_lost_turns(machine: Machine, path: ToolPath) -> ToolPath:
+    """Add a note to a path that turns the tool about its own axis if the machine has no turn to do so."""
+    if path.turns is None or find_turning_columns(machine):
         return path
     turned = np.flatnonzero(np.abs(np.diff(path.turns, axis=0)).max(1, initial=0.0) > 0.0)
-    note = f"A, B or C turns the tool, and {machine.name} can't: left out where it turns about the tool's own axis"
-    if not len(turned) or any(known.text == note for known in path.notes):
+    text = f"A, B or C turns the tool, and {machine.name} can't: left out where it turns about the tool's own axis"
+    if not len(turned) or any(note.text == text for note in path.notes):
         return path
-    return replace(path, notes=(*path.notes, Note(int(path.line[turned[0] + 1]), note)))
+    return replace(path, notes=(*path.notes, Note(int(path.line[turned[0] + 1]), text)))

@@ -5,10 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...arrays import Array, Indices
 from ...machine import Machine
-from ..path import Floats, ToolPath
+from ..path import ToolPath
 
 
 @dataclass(frozen=True)
@@ -27,7 +27,7 @@ class Offence:
     count : how many records break this limit; once the whole path is checked also the motions that break it between
         records which keep it
     share : where on the motion from the record before the value is: 1 at the record itself
-    begins : from where on that motion the limit is broken; ``share`` where that is not asked for
+    begins : from where on that motion the limit is broken; equal to ``share`` where it was not searched
     """
 
     limit: str
@@ -57,7 +57,7 @@ class Posted:
     offences : one for each broken limit, at its worst record or place; in the order in which the path breaks them
     first : where the path first breaks any limit; on a motion with the motion's worst value
     worst : of ``offences``, the one farthest off: a pose that can't be reached at all, else the greatest excess as a
-        share of the limit's range
+        fraction of the limit's range
     checked : the motions between the records are checked, too: see :func:`parakin.toolpath.checking.check.check_path`
     broken_motions : (n,) 0 where the motion to a record breaks nothing but what its ends break, else 1 + the index in
         ``limits`` of a limit that it does; None where ``checked`` is not
@@ -67,16 +67,16 @@ class Posted:
     machine: Machine
     path: ToolPath
     mode: str
-    frame: Floats
-    poses: Floats
-    joints: Floats
-    broken: NDArray[np.int64]
+    frame: Array
+    poses: Array
+    joints: Array
+    broken: Indices
     limits: tuple[str, ...]
     offences: tuple[Offence, ...]
     first: Offence | None
     worst: Offence | None
     checked: bool = False
-    broken_motions: NDArray[np.int64] | None = None
+    broken_motions: Indices | None = None
     rewinds: tuple[int, ...] = ()
 
     @property

@@ -6,21 +6,24 @@ from dataclasses import dataclass
 from math import inf, isfinite
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...arrays import Array, Indices
 from ...machine import Machine
-from ..path import Floats
+from ...model.limits import Limit
+from .margin_blocks import split_margins
 from .posted import Posted
-
-_BLOCK = 1 << 16  # records at a time: all margins of a long path would not fit
 
 
 @dataclass
 class RangeUse:
-    """One bounded quantity, or a joint without bounds: its range allowed and the range used, mm or rad.
+    """A bounded quantity, or a joint without bounds: its allowed range and the range that a path uses, mm or rad.
 
-    ``margin`` is the least over the path, negative where a bound is broken, at ``record``; ``lost`` counts the
-    records where the quantity does not exist because a leg can't close.
+    name, subject, unit : of the quantity
+    low, high : the allowed range
+    least, most : the range used
+    margin : the least over the path, negative where a bound is broken
+    record : where the margin is the least
+    lost : how many records have no such quantity because a leg can't close
     """
 
     name: str
@@ -36,18 +39,36 @@ class RangeUse:
 
     @property
     def span(self) -> float:
-        """Half the range allowed, or the size of its one bound: what a margin is relative to."""
+        """Half the allowed range, or the size of its one bound: what a margin is relative to."""
         if isfinite(self.low) and isfinite(self.high):
             return 0.5 * (self.high - self.low)
         bound = self.low if isfinite(self.low) else self.high
         return abs(bound) or 1.0
 
+    def widen(self, values: Array) -> None:
+        """Widen the range used by values (k,); NaN does not count."""
+        real = values[~np.isnan(values)]
+        if len(real):
+            self.least, self.most = min(self.least, float(real.min())), max(self.most, float(real.max()))
 
-def list_ranges(machine: Machine) -> tuple[list[RangeUse], NDArray[np.int64]]:
-    """The machine's quantities, joints first, and for every limit the index of its quantity; -1 for a mere reach."""
+    def add_margins(self, limit: Limit, margins: Array, start: int) -> None:
+        """Count in the margins (k,) of one of the two limits, at the records from ``start`` on."""
+        missing = np.isnan(margins)
+        if limit.side == "max" or not isfinite(self.high):
+            self.lost += int(missing.sum())
+        if missing.all():
+            return
+        self.widen(limit.bound - margins if limit.side == "max" else limit.bound + margins)
+        tightest = int(np.where(missing, inf, margins).argmin())
+        if margins[tightest] < self.margin:
+            self.margin, self.record = float(margins[tightest]), start + tightest
+
+
+def list_ranges(machine: Machine) -> tuple[list[RangeUse], Indices]:
+    """List the machine's quantities, joints first, and for every limit the index of its quantity; -1 for a reach."""
     uses = [RangeUse(name, name, unit) for name, unit in zip(machine.joints, machine.joint_units, strict=True)]
     index = {use.name: i for i, use in enumerate(uses)}
-    of = np.full(len(machine.limits), -1)
+    quantities = np.full(len(machine.limits), -1)
     for number, limit in enumerate(machine.limit_parts):
         if limit.side == "reach":
             continue
@@ -56,56 +77,41 @@ def list_ranges(machine: Machine) -> tuple[list[RangeUse], NDArray[np.int64]]:
             index[name] = len(uses)
             uses.append(RangeUse(name, limit.subject, limit.unit))
         use = uses[index[name]]
-        of[number] = index[name]
+        quantities[number] = index[name]
         if limit.side == "min":
             use.low = limit.bound
         else:
             use.high = limit.bound
-    return uses, of
+    return uses, quantities
 
 
-def compute_relative_margin(machine: Machine, margins: Floats) -> Floats:
-    """(n,): the least of all margins, each over half its range; 0 is at a limit, NaN where a leg can't close."""
-    uses, of = list_ranges(machine)
-    kept = of >= 0
-    if not kept.any():
-        return np.where((margins >= 0.0).all(axis=1), 1.0, np.nan)
-    spans = np.array([uses[i].span for i in of[kept]])
-    least: Floats = (margins[:, kept] / spans).min(axis=1)  # NaN goes through
-    return np.where((margins[:, ~kept] >= 0.0).all(axis=1), least, np.nan)
+def compute_relative_margin(machine: Machine, margins: Array) -> Array:
+    """Compute the least margin of every record (n,), each over half its range: zero at a limit.
+
+    margins : (n, limits)
+
+    It is NaN where a leg can't close, and one where the machine has no ranges and every leg closes.
+    """
+    uses, quantities = list_ranges(machine)
+    has_range = quantities >= 0
+    closes = (margins[:, ~has_range] >= 0.0).all(axis=1)
+    if not has_range.any():
+        return np.where(closes, 1.0, np.nan)
+    spans = np.array([uses[i].span for i in quantities[has_range]])
+    least: Array = (margins[:, has_range] / spans).min(axis=1)  # NaN goes through
+    return np.where(closes, least, np.nan)
 
 
-def measure_range_use(posted: Posted) -> tuple[list[RangeUse], Floats]:
-    """Every quantity with its use over the path, and the least relative margin of every record, (n,)."""
+def measure_range_use(posted: Posted) -> tuple[list[RangeUse], Array]:
+    """Measure how a path uses every quantity, and the least relative margin of every record, (n,)."""
     machine = posted.machine
-    uses, of = list_ranges(machine)
+    uses, quantities = list_ranges(machine)
     relative = np.empty(len(posted.poses))
-    for start in range(0, len(relative), _BLOCK):
-        rows = slice(start, start + _BLOCK)
-        joints = posted.joints[rows]
-        margins = machine.margins(posted.poses[rows], joints, posted.mode)
-        relative[rows] = compute_relative_margin(machine, margins)
-        for use, q in zip(uses, joints.T, strict=False):
-            _widen(use, q)
+    for part, margins in split_margins(machine, posted.poses, posted.joints, posted.mode):
+        relative[part] = compute_relative_margin(machine, margins)
+        for use, q in zip(uses, posted.joints[part].T, strict=False):
+            use.widen(q)
         for number, limit in enumerate(machine.limit_parts):
-            if of[number] >= 0:
-                _take(uses[of[number]], limit.side, limit.bound, margins[:, number], start)
+            if quantities[number] >= 0:
+                uses[quantities[number]].add_margins(limit, margins[:, number], part.start)
     return uses, relative
-
-
-def _widen(use: RangeUse, values: Floats) -> None:
-    real = values[~np.isnan(values)]
-    if len(real):
-        use.least, use.most = min(use.least, float(real.min())), max(use.most, float(real.max()))
-
-
-def _take(use: RangeUse, side: str, bound: float, margins: Floats, start: int) -> None:
-    gone = np.isnan(margins)
-    if side == "max" or not isfinite(use.high):
-        use.lost += int(gone.sum())
-    if gone.all():
-        return
-    _widen(use, bound - margins if side == "max" else bound + margins)
-    at = int(np.where(gone, inf, margins).argmin())
-    if margins[at] < use.margin:
-        use.margin, use.record = float(margins[at]), start + at

@@ -5,13 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...arrays import Array, Flags
 from ...kinematics.wrist import PRINTED, SWING, TURN
 from ...machine import Machine
-from ..path import Floats, ToolPath
-from .turn_counts import choose_turns, find_turns_in_range, rewind_in_rapids
-from .turn_steps import add_turn_steps
+from ..path import ToolPath
+from .turn_counts import TurningJoint, choose_turns, find_turns_in_range
+from .turn_rewinds import rewind_in_rapids
+from .turn_steps import add_turn_steps, find_turning_columns, find_turning_joints
 
 
 @dataclass(frozen=True, eq=False)
@@ -21,63 +22,63 @@ class Branch:
     mode : signs of the legs, and of head and table where the path begins
     poses, joints : (n, axes) and (n, joints); C and a joint are turned back from each of ``rewinds`` on
     rewinds : records to which a rapid motion leads that turns back
-    flips : how many motions in feed turn a joint by more than a quarter turn
+    swings : how many motions in feed turn a joint by more than a quarter turn
     """
 
     mode: str
-    poses: Floats
-    joints: Floats
+    poses: Array
+    joints: Array
     rewinds: tuple[int, ...]
-    flips: int
+    swings: int
 
 
 def list_candidate_modes(machine: Machine, mode: str | None) -> list[str]:
-    """The working modes that a path may take: the given one, or the default with either sign of head and table.
+    """List the working modes that a path may take: the given one, or the default with either sign of head and table.
 
     The legs' signs are the machine's: it can't change them without passing a serial singularity.
     """
-    default = machine.checked_mode(mode)
-    return machine.head_modes(default) if mode is None else [default]
+    checked = machine.checked_mode(mode)
+    return machine.head_modes(checked) if mode is None else [checked]
 
 
-def choose_branch(machine: Machine, path: ToolPath, poses: Floats, mode: str) -> Branch:
-    """The joints that follow from poses in a working mode, their turns counted.
+def choose_branch(machine: Machine, path: ToolPath, poses: Array, mode: str) -> Branch:
+    """Choose the joints for poses in a working mode, with their turns counted.
 
     The turns are those with which the fewest records break a limit, then those by which the joints turn least, then
     those nearest to home. A turn is taken back only in a rapid motion, where C goes on by whole turns and the joint
-    with it; the motion is looked at in small steps for that.
+    with it; the motion is followed in small steps for that.
     """
-    joints = _followed(machine, path, poses, mode)
-    turning = [i for i, unit in enumerate(machine.joint_units) if unit == "rad"]
+    joints = _follow_records(machine, path, poses, mode)
+    turning = find_turning_joints(machine)
     rewinds: tuple[int, ...] = ()
     if not turning or not len(joints):
         return Branch(mode, poses, joints, rewinds, 0)
     first = None if machine.wrist is None else machine.wrist.first
-    home = np.nan_to_num(machine.inverse(machine.home, mode))
-    back = None
+    home = np.nan_to_num(machine.inverse(machine.home, mode)).tolist()
+    needs_rewinds = False
     for column in turning:
-        turns = find_turns_in_range(machine.drives[column], joints[:, column], float(home[column]))
-        if turns is not None:
-            joints[:, column] += TURN * turns
-        elif column == first:
-            back = column
-        else:
-            joints[:, column] += TURN * choose_turns(machine, poses, joints, mode, column, float(home[column]))
-    if back is not None:
-        poses, joints, rewinds = rewind_in_rapids(machine, path, poses, joints, mode, float(home[back]))
-    return Branch(mode, poses, joints, rewinds, _flips(joints[:, turning], path.rapid))
+        turns = find_turns_in_range(machine.drives[column], joints[:, column], home[column])
+        if turns is None and column == first:
+            needs_rewinds = True
+            continue
+        if turns is None:
+            turns = choose_turns(TurningJoint.of(machine, poses, joints, mode, column, home[column]))[0]
+        joints[:, column] += TURN * turns
+    if needs_rewinds and first is not None:
+        poses, joints, rewinds = rewind_in_rapids(machine, path, poses, joints, mode, home[first])
+    return Branch(mode, poses, joints, rewinds, _count_swings(joints[:, turning], path.rapid))
 
 
-def _followed(machine: Machine, path: ToolPath, poses: Floats, mode: str) -> Floats:
-    """Joints along poses; where a program turns the tool they go evenly from record to record, however far apart."""
+def _follow_records(machine: Machine, path: ToolPath, poses: Array, mode: str) -> Array:
+    """Follow poses; where a program turns the tool they change evenly from record to record, however far apart."""
     if path.turns is None or machine.wrist is None:
         return machine.follow(poses, mode, PRINTED)
-    thick, at = add_turn_steps(poses, [i for i, letter in enumerate(machine.axes) if letter in "ABC"])
-    joints: Floats = machine.follow(thick, mode, PRINTED)[at]
+    steps, at_records = add_turn_steps(poses, find_turning_columns(machine))
+    joints: Array = machine.follow(steps, mode, PRINTED)[at_records]
     return joints
 
 
-def _flips(angles: Floats, rapid: NDArray[np.bool_]) -> int:
+def _count_swings(angles: Array, rapid: Flags) -> int:
     with np.errstate(invalid="ignore"):
-        wide = (np.abs(np.diff(angles, axis=0)) > SWING).any(axis=1)
-    return int(np.count_nonzero(wide & ~rapid[1:]))
+        swings = (np.abs(np.diff(angles, axis=0)) > SWING).any(axis=1)
+    return int(np.count_nonzero(swings & ~rapid[1:]))

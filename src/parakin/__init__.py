@@ -7,6 +7,7 @@ from os import PathLike, fspath
 from typing import TYPE_CHECKING
 
 from .errors import DescriptionError, InputError, InputErrors, NoMethodError, ParakinError, PoseError
+from .version import __version__
 
 if TYPE_CHECKING:
     from .controllers.joints.program import make_joint_program
@@ -37,7 +38,6 @@ if TYPE_CHECKING:
     from .workspaces.sampled.grid import GridWorkspace, sample_grid
     from .workspaces.sampled.polar_sweep import PolarWorkspace, sweep_polar
 
-__version__ = "0.1.0"
 __all__ = [
     "Atlas",
     "Components",
@@ -64,6 +64,7 @@ __all__ = [
     "ToolPath",
     "Trajectory",
     "Workspace",
+    "__version__",
     "atlas",
     "find_components",
     "find_cross_sections",

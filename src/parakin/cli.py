@@ -11,7 +11,6 @@ from collections.abc import Sequence
 
 from cyclopts import App, CycloptsError, Parameter
 
-from . import __version__
 from .commands.atlas import atlas
 from .commands.design import design
 from .commands.kinematics import forward, inverse
@@ -20,6 +19,7 @@ from .commands.machines import machines, show
 from .commands.post import post
 from .commands.workspace import workspace
 from .errors import ParakinError
+from .version import __version__
 
 _MALFORMED = 2
 _INTERRUPTED = 130

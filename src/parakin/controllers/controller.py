@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from ..arrays import Writer
-    from ..toolpath.job import Interpolation
+    from ..toolpath.linearise.deviation import Interpolation
     from ..toolpath.timing.trajectory import Trajectory
 
 

@@ -48,7 +48,7 @@ def choose_characteristic_length(machine: Machine, length: float | None = None) 
     turns = machine.structure.turns
     if not turns and "rad" not in machine.joint_units:
         return CharacteristicLength(None, "no angles")
-    five = machine.axes == ("X", "Y", "Z", "B", "C")
+    five = machine.has_direction
     rules = {
         "the tool's reach": _measure_tool_reach(machine) if five else 0.0,
         "the radius of the platform's joints": _measure_platform_radius(machine) if turns else 0.0,

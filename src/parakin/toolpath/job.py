@@ -4,20 +4,19 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from math import isfinite
-from typing import Literal, NamedTuple, TypeAlias
+from typing import NamedTuple
 
 from ..arrays import Array, Progress
 from ..errors import PoseError
 from ..machine import Machine
 from .checking.check import check_path
+from .linearise.deviation import Interpolation
 from .linearise.linearise import linearise_path
 from .path import ToolPath
 from .posting.post import post_path
 from .posting.posted import Posted
 from .timing import Corners, Trajectory, plan_trajectory
 from .timing.stops import find_stops, sum_dwells
-
-Interpolation: TypeAlias = Literal["pose", "joints"]  # what a controller moves evenly between two records
 
 
 class Tolerances(NamedTuple):

@@ -5,8 +5,6 @@ from typing import Literal, NamedTuple
 
 from ..arrays import Array, Flags, Indices
 
-Floats = Array
-
 
 class Event(NamedTuple):
     """A statement without motion: a stop, a tool change, coolant, a message.

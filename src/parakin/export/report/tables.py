@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ... import __version__
 from ...arrays import Array
+from ...version import __version__
 from ..number_format import format_duration, format_value
 from .cards import make_card, make_fact_table
 

@@ -323,7 +323,7 @@ def test_parquet_holds_the_same():
     file = io.BytesIO()
     table.make_joint_parquet(posted)(file)
     read = pq.read_table(io.BytesIO(file.getvalue()))
-    assert read.column_names == table.columns(posted)
+    assert read.column_names == table.joint_columns(posted)
     assert read["X [mm]"].to_pylist() == [0.0, 1000.0, 5.0]
     assert read["line"].to_pylist() == [4, 5, 6]
     assert read["tower_a [mm]"].to_pylist()[1] is None

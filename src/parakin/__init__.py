@@ -109,7 +109,7 @@ def load(name: str | PathLike[str], parameters: Mapping[str, float | str] | None
     name : one of :func:`machines`, or a YAML file
     parameters : sizes to override, by the names in the file; numbers are mm or rad, text carries its unit
 
-    Raises :class:`InputError` with file and line for a file that is no machine, or none that works.
+    Raises :class:`InputError` with file and line for a file that describes no machine that works.
     """
     from .description import find_key_line, find_machine_file, read_machine
     from .machine import Machine

@@ -1,10 +1,16 @@
 """The wrist: two turning axes that point the tool, their two working modes, and the pole between these.
 
 Two pairs of angles point a tool: the turning joints of head and table (:class:`Wrist`), and B and C of a pose whose
-orientation is the tool's axis only (:class:`Direction`). Of each pair the *first* axis carries the *second*. Two
-values of the pair, its two modes, point the tool the same way. They meet on the *pole*, where the tool's axis lies
-along the first axis: there the first angle is free, and close by it swings. A path that passes over the pole goes on in
-the other mode, so that the first angle need not turn by half a turn; the second changes its sign instead.
+orientation is the tool's axis only (functions with ``direction`` in their names). Of each pair the *first* axis carries
+the *second*. Two values of the pair, its two modes, point the tool the same way. They meet on the *pole*, where the
+tool's axis lies along the first axis: there the first angle is free, and close by it swings. A path that passes over
+the pole goes on in the other mode, so that the first angle need not turn by half a turn; the second changes its sign
+instead.
+
+Where the way over the pole is taken: a path of poses in :mod:`~.follow`; one point after the other in
+``toolpath/linearise/continuation.py``; a tool path is led through the pole in ``toolpath/linearise/pole_passes.py``;
+``toolpath/checking/motions.py`` proves that nothing else happens; ``controllers/linuxcnc/runtime.c`` does the same as
+``follow`` in the controller.
 
 All thresholds at poles stand here. Angles are rad; those "off the pole" are between the tool's axis and the first axis.
 
@@ -112,6 +118,11 @@ def find_crossings(here: Array, there: Array) -> Flags:
     """
     spared = spares_swing(here[:-1], here[1:], there[1:])
     return np.concatenate([np.zeros(min(len(here), 1), bool), np.cumsum(spared) % 2 == 1])
+
+
+def get_leg_signs(mode: str) -> str:
+    """Return the legs' signs of a working mode that ends with head and table's."""
+    return mode[:-1]
 
 
 def flip_mode(mode: str) -> str:

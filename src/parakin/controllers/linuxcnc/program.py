@@ -10,6 +10,7 @@ import numpy as np
 
 from ...arrays import Array, Writer
 from ...errors import PoseError
+from ...kinematics.wrist import get_leg_signs
 from ...machine import Machine
 from ...toolpath.timing.corners import check_tolerance
 from ...toolpath.timing.trajectory import Trajectory
@@ -42,7 +43,7 @@ def make_linuxcnc_program(trajectory: Trajectory, *, forced: str | None = None, 
     """
     machine, posted = trajectory.posted.machine, trajectory.posted
     check_tolerance(tolerance, "tolerance")
-    legs = posted.mode if machine.wrist is None else posted.mode[:-1]  # a wrist goes on in either mode
+    legs = posted.mode if machine.wrist is None else get_leg_signs(posted.mode)  # a wrist goes on in either mode
     if not machine.mode.startswith(legs):
         raise PoseError(f"mode {posted.mode!r}: LinuxCNC's kinematics of {machine.name} has {machine.mode!r} only")
     _refuse_turns(machine, posted.poses)

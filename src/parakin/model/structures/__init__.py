@@ -14,7 +14,7 @@ __all__ = ["Carried", "CentralLeg", "Free", "PlatformPlacement", "Structure", "s
 
 
 def structure_of(spec: Spec) -> Structure:
-    """The structure of a machine, or a :class:`DescriptionError` that says why it is none."""
+    """Find the structure of a machine; a :class:`DescriptionError` says why there is none."""
     twice = [bound.name for bound in spec.limits.passive if spec.motion.count(bound.name) > 1]
     if twice:
         raise DescriptionError("limits", f"passive {twice[0]} stands twice in the motion, so it is not one coordinate")

@@ -1,4 +1,4 @@
-"""The inclusive orientation workspace: positions where all constraints hold at one orientation θ of a box at least."""
+"""The inclusive workspace: positions where all constraints hold at one orientation θ of a box at least."""
 
 from __future__ import annotations
 

@@ -59,10 +59,10 @@ def prove_boxes(
     bisection = _BoxBisection(region, bottom, top, more, most)
     if region.every_orientation or not bisection.constraints:
         for number, constraint in enumerate(bisection.constraints):
-            bisection.clear_constraint(number, constraint)
+            bisection.prove_constraint(number, constraint)
         bisection.proved[:] = bisection.undecided
     else:
-        bisection.serve_boxes()
+        bisection.prove_at_best_orientations()
     return bisection.result
 
 
@@ -89,7 +89,7 @@ class _BoxBisection:
         self.undecided &= self.boxes <= self.most
         return np.asarray(self.undecided[box])
 
-    def clear_constraint(self, number: int, constraint: Constraint) -> None:
+    def prove_constraint(self, number: int, constraint: Constraint) -> None:
         """Prove one constraint at all orientations: parts are boxes of both, bisected where bounds are widest."""
         d = self.d
         box = np.flatnonzero(self.undecided)
@@ -117,14 +117,14 @@ class _BoxBisection:
             box, low, high = _bisect_parts(box, low, high, _measure_spread(constraint, low, high, d))
         self.undecided[box] = False
 
-    def serve_boxes(self) -> None:
+    def prove_at_best_orientations(self) -> None:
         """Prove each part by one orientation allowed all over it: the one of its whole, or the best at its middle."""
         box, low, high = np.arange(len(self.low)), self.low, self.high
         orientations: Array | None = None
         for _ in range(_ROUNDS):
             which = self._count_parts(box)
             if orientations is not None:
-                which[which] = ~self._prove_at(low[which], high[which], orientations[which])
+                which[which] = ~self._prove_at_orientations(low[which], high[which], orientations[which])
                 orientations = orientations[which]
             box, low, high = box[which], low[which], high[which]
             if not len(box):
@@ -137,13 +137,13 @@ class _BoxBisection:
                 self.limit[box[broken]], self.undecided[box[broken]] = first, False
                 self.positions[box[broken]], self.orientations[box[broken]] = middle[broken], orientations[broken]
             left = self.undecided[box]
-            left[left] = ~self._prove_at(low[left], high[left], orientations[left])
+            left[left] = ~self._prove_at_orientations(low[left], high[left], orientations[left])
             number, low, high = _bisect_parts(np.flatnonzero(left), low[left], high[left], (high - low)[left])
             box, orientations = box[number], orientations[number]
         self.undecided[box] = False
         self.proved[:] = self.undecided
 
-    def _prove_at(self, low: Array, high: Array, orientations: Array) -> Flags:
+    def _prove_at_orientations(self, low: Array, high: Array, orientations: Array) -> Flags:
         """Prove that all limits are kept all over boxes, each at one orientation."""
         proved = np.ones(len(low), np.bool_)
         for constraint in self.constraints:

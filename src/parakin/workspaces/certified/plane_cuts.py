@@ -176,49 +176,49 @@ def bound_fraction(b, slopes, scratch):
     return least, most
 
 
-@njit(nogil=True, cache=True)
-def _bound_change_with_position(given, i, slopes):
-    """Bound how box i's margin changes with x: slopes (d,), and remainders (below, above), rounded up."""
+@njit(nogil=True, cache=True, inline="always")
+def _bound_change_with_position(box_low, box_high, middle_low, middle_high, half, is_smooth, slopes, i):
+    """Bound how box i's margin changes with x: fill its slopes, return remainders (below, above), rounded up."""
     below, above = 0.0, 0.0
-    d = len(slopes)
-    column = 2 + given.half.shape[1] - d
+    d = slopes.shape[1]
+    column = 2 + half.shape[1] - d
     for k in range(d):
-        if given.is_smooth:
-            a, b = given.middle_low[i, 1 + k], given.middle_high[i, 1 + k]
+        if is_smooth:
+            a, b = middle_low[i, 1 + k], middle_high[i, 1 + k]
             for n in range(k, d):
-                p, q = given.box_low[i, column], given.box_high[i, column]
+                p, q = box_low[i, column], box_high[i, column]
                 column += 1
                 if n == k:
-                    scale = 0.5 * given.half[i, k] * given.half[i, k]
+                    scale = 0.5 * half[i, k] * half[i, k]
                     below += max(-p, 0.0) * scale
                     above += max(q, 0.0) * scale
                 else:
-                    scale = max(abs(p), abs(q)) * given.half[i, k] * given.half[i, n]
+                    scale = max(abs(p), abs(q)) * half[i, k] * half[i, n]
                     below += scale
                     above += scale
         else:
-            a, b = given.box_low[i, column], given.box_high[i, column]
+            a, b = box_low[i, column], box_high[i, column]
             column += 1
-        slopes[k] = 0.5 * (a + b) * given.half[i, k]
-        rest = (0.5 * (b - a) + 1e-15 * max(abs(a), abs(b))) * given.half[i, k]
+        slopes[i, k] = 0.5 * (a + b) * half[i, k]
+        rest = (0.5 * (b - a) + 1e-15 * max(abs(a), abs(b))) * half[i, k]
         below += rest
         above += rest
     return below * (1.0 + 1e-14), above * (1.0 + 1e-14)
 
 
-@njit(nogil=True, cache=True)
-def _bound_change_with_orientation(given, i, least_at, spread):
-    """Bound how far box i's margin changes with each θ, the sum of them, and at which end the margin is least."""
-    s = len(spread)
-    d = given.half.shape[1] - s
+@njit(nogil=True, cache=True, inline="always")
+def _bound_change_with_orientation(box_low, box_high, half, least_at, spread, i):
+    """Bound how far box i's margin changes with each θ: fill in that and the end where it is least, return the sum."""
+    s = spread.shape[1]
+    d = half.shape[1] - s
     total = 0.0
     for k in range(s):
-        a, b = given.box_low[i, 2 + k], given.box_high[i, 2 + k]
-        spread[k] = max(abs(a), abs(b)) * given.half[i, d + k] if given.half[i, d + k] > 0.0 else 0.0
-        total += spread[k]
-        least_at[k] = 0
-        if (given.half[i, d + k] > 0.0) & (given.box_low[i, 1] > 0.0):
-            least_at[k] = -1 if a >= 0.0 else (1 if b <= 0.0 else 0)
+        a, b = box_low[i, 2 + k], box_high[i, 2 + k]
+        spread[i, k] = max(abs(a), abs(b)) * half[i, d + k] if half[i, d + k] > 0.0 else 0.0
+        total += spread[i, k]
+        least_at[i, k] = 0
+        if (half[i, d + k] > 0.0) & (box_low[i, 1] > 0.0):
+            least_at[i, k] = -1 if a >= 0.0 else (1 if b <= 0.0 else 0)
     return total
 
 
@@ -229,21 +229,24 @@ def bound_linearly(given, every, result, start, stop):
     given : :class:`TaylorBounds`; result : :class:`LinearBounds`, filled from start to stop
     every : the margin must be kept at every θ, else at one
     """
-    s = result.spread.shape[1]
-    d = result.slopes.shape[1]
+    # Fields are taken out of the tuples once: Numba counts references at every access within a loop.
+    box_low, box_high, half = given.box_low, given.box_high, given.half
+    middle_low, middle_high = given.middle_low, given.middle_high
+    state, slopes, spread = result.state, result.slopes, result.spread
+    d, s = slopes.shape[1], spread.shape[1]
     for i in range(start, stop):
-        slopes, spread = result.slopes[i], result.spread[i]
-        below, above = _bound_change_with_position(given, i, slopes)
+        below, above = _bound_change_with_position(
+            box_low, box_high, middle_low, middle_high, half, given.is_smooth, slopes, i
+        )
         steep = 0.0
         for k in range(d):
-            steep += abs(slopes[k])
-        turned = _bound_change_with_orientation(given, i, result.least_at[i], spread)
-        no_jump = given.box_low[i, 1] > 0.0
-        sizes = given.middle_low[i, 0] + given.middle_high[i, 0] + steep + below + above + turned
-        bottom, top = given.box_low[i, 0], given.box_high[i, 0]
+            steep += abs(slopes[i, k])
+        turned = _bound_change_with_orientation(box_low, box_high, half, result.least_at, spread, i)
+        no_jump = box_low[i, 1] > 0.0
+        bottom, top = box_low[i, 0], box_high[i, 0]
         top_in_middle = top  # for every x, in the middle θ
-        if np.isfinite(sizes) & no_jump:
-            low, high = given.middle_low[i, 0] - below, given.middle_high[i, 0] + above
+        if np.isfinite(middle_low[i, 0] + middle_high[i, 0] + steep + below + above + turned) & no_jump:
+            low, high = middle_low[i, 0] - below, middle_high[i, 0] + above
             bottom = max(bottom, low - steep - turned)
             top = min(top, high + steep + turned)
             top_in_middle = min(top, high + steep)
@@ -254,16 +257,16 @@ def bound_linearly(given, every, result, start, stop):
         else:
             low, high = bottom, top
             for k in range(d):
-                slopes[k] = 0.0
+                slopes[i, k] = 0.0
             for k in range(s):
-                spread[k] = np.inf if given.half[i, d + k] > 0.0 else 0.0
+                spread[i, k] = np.inf if half[i, d + k] > 0.0 else 0.0
         result.low[i], result.high[i] = low, high
         if bottom >= 0.0:
-            result.state[i] = CLEARED
+            state[i] = CLEARED
         elif (top_in_middle if every else top) < 0.0:
-            result.state[i] = EXCLUDED
+            state[i] = EXCLUDED
         else:
-            result.state[i] = KEPT
+            state[i] = KEPT
 
 
 @njit(nogil=True, cache=True)
@@ -275,7 +278,10 @@ def accumulate_cuts(bounds, number, cell, half, cuts, start, stop):
     half : (cells, d) half widths
     cuts : :class:`PlaneCuts`, changed
     """
-    d = bounds.slopes.shape[1]
+    low, high, slopes = bounds.low, bounds.high, bounds.slopes
+    outer, cut_off, cut_off_estimate = cuts.outer, cuts.cut_off, cuts.cut_off_estimate
+    least_estimate, limit, area = cuts.least_estimate, cuts.limit, cuts.area
+    d = slopes.shape[1]
     scratch, merged = np.empty(3), np.empty(d)
     while 0 < start < len(cell) and cell[start] == cell[start - 1]:  # a cell belongs to where its boxes begin
         start += 1
@@ -287,24 +293,24 @@ def accumulate_cuts(bounds, number, cell, half, cuts, start, stop):
             end += 1
         worst = i
         for j in range(i, end):
-            if bounds.low[j] < bounds.low[worst]:
+            if low[j] < low[worst]:
                 worst = j
-        least, middle = bounds.low[worst], 0.5 * (bounds.low[worst] + bounds.high[worst])
+        least, middle = low[worst], 0.5 * (low[worst] + high[worst])
         for j in range(i, end):
             shift = 0.0
             for k in range(d):
-                shift += abs(bounds.slopes[j, k] - bounds.slopes[worst, k])
-            least = min(least, bounds.low[j] - shift)
-            cuts.outer[c] = min(cuts.outer[c], bound_fraction(bounds.high[j], bounds.slopes[j], scratch)[1])
-        merged[:] = bounds.slopes[worst]
-        cuts.cut_off[c] += 1.0 - bound_fraction(least, merged, scratch)[0]
+                shift += abs(slopes[j, k] - slopes[worst, k])
+            least = min(least, low[j] - shift)
+            outer[c] = min(outer[c], bound_fraction(high[j], slopes[j], scratch)[1])
+        merged[:] = slopes[worst]
+        cut_off[c] += 1.0 - bound_fraction(least, merged, scratch)[0]
         ends = bound_fraction(middle, merged, scratch)
         estimate = 0.5 * (ends[0] + ends[1])
-        cuts.cut_off_estimate[c] += 1.0 - estimate
-        if estimate < cuts.least_estimate[c]:
-            cuts.least_estimate[c] = estimate
-            cuts.limit[c] = number
-            cuts.area[c] = _estimate_area(middle, merged, half[c], scratch)
+        cut_off_estimate[c] += 1.0 - estimate
+        if estimate < least_estimate[c]:
+            least_estimate[c] = estimate
+            limit[c] = number
+            area[c] = _estimate_area(middle, merged, half[c], scratch)
         i = end
 
 
@@ -329,14 +335,14 @@ def keep_tightest_planes(box, bounds, outer, planes):
     box : (N,) of each bound, none twice
     outer, planes : (boxes,) the fraction it leaves, (boxes, d + 1) its slopes and height; changed
     """
-    scratch = np.empty(3)
+    scratch, high, slopes = np.empty(3), bounds.high, bounds.slopes
     for i in range(len(box)):
-        most = bound_fraction(bounds.high[i], bounds.slopes[i], scratch)[1]
+        most = bound_fraction(high[i], slopes[i], scratch)[1]
         c = box[i]
         if most < outer[c]:
             outer[c] = most
-            planes[c, :-1] = bounds.slopes[i]
-            planes[c, -1] = bounds.high[i]
+            planes[c, :-1] = slopes[i]
+            planes[c, -1] = high[i]
 
 
 @njit(nogil=True, cache=True)

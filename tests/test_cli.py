@@ -15,6 +15,14 @@ PART = "UNITS/MM\nFEDRAT/1000,MMPM\nGOTO/0,0,-1650,0,0,1\nGOTO/10,0,-1650\nGOTO/
 LONG = "GOTO/0,0,-1650,0,0,1\nGOTO/0,0,-2050\n"
 
 
+@pytest.fixture(scope="module", autouse=True)
+def compiled(tmp_path_factory):
+    """Compile the kernels before any test, for the command announces it on the stream that the tests read."""
+    folder = tmp_path_factory.mktemp("compiled")
+    (folder / "part.cls").write_text(PART)
+    assert main(["post", str(folder / "part.cls"), "-m", "tricept", "-o", str(folder)]) == 0
+
+
 @pytest.fixture
 def part(tmp_path):
     path = tmp_path / "part.cls"

@@ -15,6 +15,7 @@ from .motions import MotionPoints, PathMotions, find_pole_crossings, merge_wrist
 
 SECTIONS_AT_ONCE = 1 << 13
 MOST_CUTS = 1 << 16  # of one motion; then it stays undecided
+PATH_CUTS, MOTION_CUTS = 1 << 18, 64  # of a path, and for each motion of it; then all that is left stays undecided
 _MOST_TURN = 1.5 * np.pi  # rad: only a joint whose turns are counted wrong goes farther on the shortest section
 
 
@@ -26,6 +27,7 @@ class MotionBisection:
     floor : (limits,) what a margin has to reach to count as kept
     tallies : one for each column
     jump : the first joint that can't go on from record to record
+    cuts_left : how many cuts the whole path may still take
     broken_motions : (n,) 1 + a column that the motion to a record breaks though its ends keep it, else zero
     """
 
@@ -39,6 +41,7 @@ class MotionBisection:
         self.tallies = [Tally() for _ in range(self.limits + 3)]
         self.jump: Jump | None = None
         self.broken_motions = np.zeros(len(posted.path), np.int64)
+        self.cuts_left = PATH_CUTS + MOTION_CUTS * len(posted.path)
 
     def check_motions(self, report: Progress) -> None:
         """Check every motion; fills ``tallies``, ``jump`` and ``broken_motions``."""
@@ -127,9 +130,10 @@ class MotionBisection:
         ledger.mark_broken(doubtful.number[passed], self.singular, doubtful.end[passed])
 
     def _count_cuts(self, number: Indices, ledger: Ledger) -> None:
-        """Count the cuts of motions; those cut too often stay undecided."""
+        """Count the cuts of motions; those cut too often stay undecided, and all where the path is."""
         np.add.at(ledger.cuts, number, 1)
-        given_up = np.flatnonzero((ledger.cuts > MOST_CUTS) & ledger.unproved.any(1))
+        self.cuts_left -= len(number)
+        given_up = np.flatnonzero(((ledger.cuts > MOST_CUTS) | (self.cuts_left < 0)) & ledger.unproved.any(1))
         ledger.mark_broken(given_up, self.undecided, np.ones(len(given_up)))
         ledger.unproved[given_up] = False
 

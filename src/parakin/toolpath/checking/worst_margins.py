@@ -14,6 +14,7 @@ from .motions import MotionPoints, find_pole_crossings
 _FIRST_SHARE = 1e-7  # of a motion: how closely a first share is bracketed
 _SHARES = np.arange(1, 8) / 8.0
 _WORST_MARGIN = 1e-7  # relative, by which a worst margin may be missed
+_MOST_SECTIONS = 1 << 16  # bounded for one answer; then the worst that is known, or the first, stands for it
 
 
 def find_first_broken_share(bisection: MotionBisection, motion: int, column: int, known: float = 1.0) -> float:
@@ -33,9 +34,9 @@ def find_first_broken_share(bisection: MotionBisection, motion: int, column: int
     if is_of_wrist and find_pole_crossings(section.first, section.last)[0]:
         one, two = float(section.first.margins[0, column]), float(section.last.margins[0, column])
         return one / (one - two) if two < 0.0 else 1.0
-    stack = [section]  # not proved to keep it, the first ones last
-    while stack:
-        section = stack.pop()
+    stack, left = [section], _MOST_SECTIONS // len(_SHARES)  # not proved to keep it, the first ones last
+    while stack and left:
+        section, left = stack.pop(), left - 1
         length = section.end[0] - section.begin[0]
         if section.begin[0] >= known or length <= _FIRST_SHARE or bool(bisection.prover.find_finest(section)[0]):
             continue
@@ -66,13 +67,14 @@ def find_worst_margins(bisection: MotionBisection, motion: Indices, known: dict[
     columns = np.array(list(known))
     motions = bisection.select_motions(motion[bisection.find_reachable(motion)])
     exempt = find_pole_crossings(motions.first, motions.last)[:, None] & bisection.motions.wrist_limits
-    stack = [motions]  # the last ones first: little is kept
-    while stack:
+    stack, left = [motions], _MOST_SECTIONS + len(motions)  # the last ones first: little is kept
+    while stack and left > 0:
         sections = stack.pop()
         if len(sections) > SECTIONS_AT_ONCE:
             half = np.arange(len(sections)) < len(sections) // 2
             stack += [sections.select(~half), sections.select(half)]
             continue
+        left -= len(sections)
         floor = _compute_floor(bisection, columns, np.array([worst[c].margin for c in columns]))
         bounds = bisection.prover.bound_sections(sections).least[:, columns]
         kept = (bounds >= floor) | exempt[sections.number][:, columns]

@@ -36,7 +36,8 @@ class ToolPath:
     feed : (n,) mm/min, the programmed feed in force, also on rapid records; NaN if there is none or it is unknown
     spindle : (n,) rev/min, NaN if unknown, 0 if switched off
     frame : (3, 4) rotation and origin (mm) of W in the machine frame M as the file gives it, or None
-    dialect : "apt" (APT and CATIA), "nx" (Siemens NX) or "gcode" (RS274/NGC)
+    dialect : the CAM system that a CL file tells, "catia", "nx" (Siemens NX), "creo", "solidworks", "autodesk" or
+        "mastercam"; "apt" where it tells none; "gcode" (RS274/NGC)
     units : the file's own length unit; all lengths here are in mm
     tool : the known data of the first tool; lengths in mm: diameter, corner_radius, length; name, number, type ...
     events : statements without motion, in file order
@@ -54,7 +55,7 @@ class ToolPath:
     feed: Array
     spindle: Array
     frame: Array | None = None
-    dialect: Literal["apt", "nx", "gcode"] = "apt"
+    dialect: Literal["apt", "catia", "nx", "creo", "solidworks", "autodesk", "mastercam", "gcode"] = "apt"
     units: Literal["mm", "inch"] = "mm"
     tool: dict[str, float | str] = field(default_factory=dict)
     events: tuple[Event, ...] = ()

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ...arrays import Array
+from ...toolpath.reading.cl.dialects import TITLES
 from ...version import __version__
 from ..number_format import format_duration, format_value
 from .cards import make_card, make_fact_table
@@ -21,7 +22,6 @@ if TYPE_CHECKING:
 _NOTES = 200  # of the reader that are listed
 _LONGEST = 240  # characters of a source line that are quoted
 _READ = 1 << 16  # bytes of one line that are read
-_DIALECTS = {"apt": "APT", "nx": "Siemens NX", "gcode": "G-code"}
 
 
 def read_source_lines(path: ToolPath, wanted: Iterable[int]) -> dict[int, str]:
@@ -102,7 +102,7 @@ def render_fact_card(posted: Posted) -> str:
         ("Workpiece in the machine", _format_placement(posted.frame)),
         ("Machine", f"{machine.spec.title} ({machine.name}): axes {' '.join(machine.axes)}"),
         ("Working mode", posted.mode or "the only one"),
-        ("File", f"{_DIALECTS[path.dialect]}, in {path.units}"),
+        ("File", f"{TITLES[path.dialect]}, in {path.units}"),
         ("Tool", tool or "not named"),
         ("Written by", f"parakin {__version__}"),
     ]

@@ -12,7 +12,7 @@ from .text import refuse
 
 ON_CIRCLE = 0.01  # mm: further off its circle an arc's start or end is an error; covers coordinates of 3 decimals
 CLOSED = 1e-6  # mm: an end this near the start is a full circle
-_MOST_POINTS = 1_000_000
+_MOST_POINTS = 200_000  # of one arc
 _WIDEST_STEP = math.pi / 4  # rad between two points, however coarse the tolerance
 _ONE_DIAMETER = 1e-3  # sine of the angle between two radii; below this they lie on one diameter
 _ALONG = 0.1  # cosine of the angle between tangent and circle; below this the tangent does not tell the way round
@@ -43,7 +43,15 @@ def find_arc_normal(start: Array, end: Array, centre: Array, tangent: Array) -> 
 
 
 def interpolate_arc(
-    start: Array, end: Array, centre: Array, radius: float, normal: Array, tolerance: float, *, helix: bool
+    start: Array,
+    end: Array,
+    centre: Array,
+    radius: float,
+    normal: Array,
+    tolerance: float,
+    *,
+    helix: bool,
+    turns: int = 0,
 ) -> tuple[Array, Array]:
     """Divide an arc into points (k, 3) after its start, the last one ``end`` itself; with the fraction of the turn at
     each (k,). The points between lie on the circle of the given centre and radius exactly.
@@ -51,6 +59,7 @@ def interpolate_arc(
     start, end, centre : (3,); normal : (3,) unit, the motion is right-handed about it
     tolerance : largest distance of a chord from the arc
     helix : whether start and end may lie at different heights along the normal; the height then grows with the turn
+    turns : full turns before the arc's own
     """
     if not radius > 0.0:
         refuse(f"a circle of radius {radius:g}; expected a radius above zero")
@@ -67,6 +76,7 @@ def interpolate_arc(
     v = np.cross(normal, u)
     turn = math.atan2(float(b @ v), float(b @ u))
     turn = 2.0 * math.pi if abs(turn) * radius <= CLOSED else turn % (2.0 * math.pi)
+    turn += 2.0 * math.pi * turns
     return interpolate_spiral(centre, (u, v, normal), (radius, radius), (height_a, height_b), turn, tolerance, end)
 
 

@@ -17,8 +17,8 @@ _LOOKED_AT = 1 << 16  # bytes
 _JOINTS = b"joints, made by parakin )"  # in the head of a program of joint positions
 # beginnings of lines that only one of the two formats can have
 _CL = re.compile(
-    rb"\s*(?:\$\$|(?:PARTNO|PPRINT|GOTO|GODLTA|FROM|UNITS|TOOL\s+PATH|TLDATA|MSYS|CUTTER|LOADTL|LOAD|SELECT|FEDRAT|SPINDL|"
-    rb"RAPID|MULTAX|PAINT|MACHIN|TLAXIS|ORIGIN|INTOL|OUTTOL|CIRCLE|INDIRV|CYCLE|COOLNT)\s*(?:[/,\s]|$))",
+    rb"\s*(?:\$\$|(?:PARTNO|PPRINT|GOTO|GODLTA|FROM|UNITS|UNIT|TOOL\s+PATH|TLDATA|MSYS|CUTTER|LOADTL|LOAD|SELECT|FEDRAT|SPINDL|"
+    rb"RAPID|MULTAX|PAINT|MACHIN|TLAXIS|ORIGIN|INTOL|OUTTOL|CIRCLE|INDIRV|CYCLE|COOLNT|MODE|MOVARC|CSYS|CUTCOM|GOHOME)\s*(?:[/,\s]|$))",
     re.IGNORECASE,
 )
 _GCODE = re.compile(rb"\s*(?:[%(;]|/?\s*[A-Z]\s*[-+]?\s*\.?\d)", re.IGNORECASE)
@@ -29,11 +29,12 @@ def read_path(
     *,
     arc_tolerance: float = 0.01,
     workpiece: Array | None = None,
+    frame: Literal["file", "ignore"] = "file",
     progress: Progress | None = None,
 ) -> ToolPath:
     """Read a CL file or a G-code program, whichever it is; see :func:`read_cl` and :func:`read_gcode`.
 
-    ``workpiece`` is for G53 in G-code; it does not place the path.
+    ``workpiece`` is for G53 in G-code; it does not place the path. ``frame`` is for CL files.
     """
     if detect_format(path) == "gcode":
         source = os.fsdecode(path)
@@ -41,7 +42,7 @@ def read_path(
             if _JOINTS in (file.read(_LOOKED_AT) or b""):
                 raise InputError("a program of joint positions; expected the tool path that it was made from", source)
         return read_gcode(path, arc_tolerance=arc_tolerance, workpiece=workpiece, progress=progress)
-    return read_cl(path, arc_tolerance=arc_tolerance, progress=progress)
+    return read_cl(path, arc_tolerance=arc_tolerance, frame=frame, progress=progress)
 
 
 def detect_format(path: str | os.PathLike[str]) -> Literal["cl", "gcode"]:

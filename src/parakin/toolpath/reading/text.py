@@ -48,9 +48,9 @@ def quote_short(text: str, longest: int = 24) -> str:
     return ascii(text if len(text) <= longest else text[: longest - 3] + "...")
 
 
-def refuse(message: str) -> NoReturn:
-    """Raise an InputError without file and line."""
-    raise InputError(message)
+def refuse(message: str, line: int | None = None) -> NoReturn:
+    """Raise an InputError without file, and without a line unless it is another one than the reader's own."""
+    raise InputError(message, None, line)
 
 
 def parse_number(token: str) -> float:

@@ -7,22 +7,21 @@ from typing import Literal
 import numpy as np
 
 from ...path import Event
-from ..text import is_number, parse_number, refuse
-from .arguments import (
-    LENGTH_UNITS,
-    DrillCycle,
-    parse_drill_cycle,
-    parse_feed,
-    parse_numbers,
-    parse_spindle,
-    parse_tool_data,
-)
+from ..text import is_number, parse_number, quote_short, refuse
+from .arguments import LENGTH_UNITS, parse_feed, parse_numbers, parse_spindle, parse_tool_data
+from .circles import Circle
+from .cycles import DrillCycle, parse_cycle
+from .dialects import DIALECTS, RIGHT, UNKNOWN, DialectName, find_by_comment, find_by_word
+from .drilling import drill_hole
 from .frames import build_frame, frame_from_matrix, normalize_direction
-from .motion import ClMotion, NxCircle
+from .motion import ClMotion
 
 _ARC = re.compile(r"TLON,GOFWD/\(?CIRCLE/([^()/]*?)\)?,ON,(?:\d+,INTOF,)?\(?LINE/([^()/]*)\)?", re.ASCII)
 _ARC_FORM = "TLON,GOFWD/(CIRCLE/x,y,z,r),ON,2,INTOF,(LINE/x,y,z,x,y,z)"
 _POINT_FORM = "x,y,z or x,y,z,i,j,k"
+_MOVARC_FORM = "MOVARC/cx,cy,cz,ax,ay,az,radius[,ANGLE,degrees]"
+_NX_CIRCLE = 8  # values of a CIRCLE that only Siemens NX writes: tolerances follow the radius
+_MOST_TURNS = 1e6  # of an arc
 
 
 class ClActions:
@@ -33,8 +32,10 @@ class ClActions:
 
     def __init__(self, motion: ClMotion):
         self.motion = motion
-        self.events: list[Event] = []
-        self.dialect: Literal["apt", "nx"] = "apt"
+        self.dialect: DialectName = "apt"
+        self.told_by_word = False
+        self.compensated = False
+        self.informing: dict[str, int] = {}
         self.units: Literal["mm", "inch"] = "mm"
         self.units_given = False
         self.inches_noted = False
@@ -42,15 +43,47 @@ class ClActions:
         self.finished = False
         self._last_cycle: DrillCycle | None = None
 
+    # dialects
+
+    def tell_dialect(self, name: DialectName | None, *, by_word: bool) -> None:
+        """Take a sign of the file's dialect: the first one, but a word tells more than a comment before all motion."""
+        outranks = by_word and not self.told_by_word and not self.motion.records.n
+        if name is not None and (self.dialect == "apt" or outranks):
+            self.dialect, self.told_by_word = name, by_word
+
+    def read_comment(self, text: str) -> None:
+        """Take the dialect that a comment tells before the first motion."""
+        if not self.motion.records.n:
+            self.tell_dialect(find_by_comment(text), by_word=False)
+
+    def read_word(self, word: str, args: list[str]) -> None:
+        """Take the dialect that a word tells."""
+        self.tell_dialect(find_by_word(word, args), by_word=True)
+
     def add_event(self, text: str, line: int) -> None:
         """Keep a statement as an event before the next record."""
-        self.events.append(Event(self.motion.records.n, line, " ".join(text.split())))
+        self.motion.events.append(Event(self.motion.records.n, line, " ".join(text.split())))
 
     # motion
 
     def go_to(self, args: list[str], line: int) -> None:
         """Move to a point, with or without a new tool axis (GOTO)."""
         v = parse_numbers(args, (3, 6), _POINT_FORM)
+        cycle, tip = self.motion.cycle, (v[0], v[1], v[2])
+        if cycle is None:
+            self.motion.move_to(tip, v[3:], line)
+            return
+        before = self.motion.take_axis(v[3:], line)
+        drill_hole(self.motion, cycle, tip, before, line)
+        self.motion.rapid, self.motion.tangent = False, None
+
+    def go_home(self, args: list[str], line: int) -> None:
+        """Move to a stated point in rapid (GOHOME)."""
+        if not args or args == [""]:
+            refuse("the machine's own home, which the file does not state; expected GOHOME/x,y,z or a GOTO")
+        v = parse_numbers(args, (3, 6), f"GOHOME/{_POINT_FORM}")
+        self._refuse_in_cycle_or_circle()
+        self.motion.rapid = True
         self.motion.move_to((v[0], v[1], v[2]), v[3:], line)
 
     def go_by(self, args: list[str], line: int) -> None:
@@ -68,6 +101,7 @@ class ClActions:
         self._refuse_in_cycle_or_circle()
         if v[3:]:
             self.motion.axis = self.motion.normalize_axis(v[3:], line)
+        self.motion.close_arc(None)
         self.motion.add_record((v[0], v[1], v[2]), line, rapid=False)
         self.motion.tangent = None
 
@@ -91,13 +125,42 @@ class ClActions:
         self.motion.add_tangent_arc(circle[:3], circle[3], (ends[3], ends[4], ends[5]), line)
 
     def start_circle(self, args: list[str], line: int) -> None:
-        """Start an arc that the next GOTO ends (CIRCLE of NX)."""
+        """Start an arc that the next GOTO ends (CIRCLE)."""
         form = "cx,cy,cz,ax,ay,az,radius,..."
+        revolutions = None
         if "TIMES" in args:
-            refuse(f"a helix of several turns (TIMES) cannot be turned into motion; expected {form}")
+            k = args.index("TIMES")
+            (revolutions,) = parse_numbers(args[k + 1 :], (1,), f"{form},TIMES,turns")
+            if not 0.0 < revolutions <= _MOST_TURNS:
+                refuse(f"{revolutions:g} turns; expected more than zero and at most {_MOST_TURNS:g}")
+            args = args[:k]
         v = parse_numbers(args, range(7, 13), form)
+        if len(v) >= _NX_CIRCLE:
+            self.tell_dialect("nx", by_word=False)
+        hand = DIALECTS[self.dialect].circle
+        if revolutions is not None and hand == UNKNOWN:
+            refuse("TIMES in a file whose CAM system no header tells; expected the header of the one that wrote it")
+        self._take_circle(v, line, hand, revolutions=revolutions)
+
+    def start_arc(self, args: list[str], line: int) -> None:
+        """Start an arc of a stated angle that the next GOTO ends (MOVARC of Autodesk)."""
+        args = [a for a in args if a not in ("CENTER", "AXIS", "RADIUS")]
+        sweep = None
+        if "ANGLE" in args:
+            k = args.index("ANGLE")
+            (degrees,) = parse_numbers(args[k + 1 :], (1,), _MOVARC_FORM)
+            if not 0.0 < abs(degrees) <= 360.0 * _MOST_TURNS:
+                refuse(f"an angle of {degrees:g} degrees; expected {_MOVARC_FORM}")
+            sweep, args = math.radians(degrees), args[:k]
+        self._take_circle(parse_numbers(args, (7,), _MOVARC_FORM), line, RIGHT, sweep=sweep)
+
+    def _take_circle(
+        self, v: list[float], line: int, hand: int, *, sweep: float | None = None, revolutions: float | None = None
+    ) -> None:
         self._refuse_in_cycle_or_circle()
-        self.motion.circle = NxCircle(line, v[:3], normalize_direction(v[3:6]), v[6])
+        axis = np.array(normalize_direction(v[3:6]))
+        points = self.dialect == "creo"
+        self.motion.circle = Circle(line, np.array(v[:3]), axis, v[6], hand, sweep, revolutions, points)
 
     def set_cycle(self, args: list[str], line: int) -> None:
         """Start, repeat or end a drill cycle at the points from here on (CYCLE)."""
@@ -109,12 +172,13 @@ class ClActions:
                 refuse("CYCLE/ON before any cycle; expected CYCLE/DRILL,... first")
             self.motion.set_cycle(self._last_cycle)
         else:
-            self._last_cycle = parse_drill_cycle(args)
+            self._last_cycle = parse_cycle(args, DIALECTS[self.dialect])
             self.motion.set_cycle(self._last_cycle)
 
     def end_program(self, args: list[str], line: int) -> None:
         """End the program; what follows is not read (FINI)."""
         self._refuse_in_circle()
+        self.motion.close_arc(None)
         self.finished = True
 
     def _refuse_in_cycle_or_circle(self) -> None:
@@ -138,6 +202,8 @@ class ClActions:
     def set_spindle(self, args: list[str], line: int) -> None:
         """Set the spindle's speed from here on (SPINDL)."""
         speed = parse_spindle(args)
+        if "CLW" in args or "CCLW" in args:
+            self.motion.clockwise = "CLW" in args
         if speed.off:
             self.motion.set_speed(0.0)
         elif speed.surface:
@@ -149,9 +215,9 @@ class ClActions:
     # units and frames
 
     def set_units(self, args: list[str], line: int) -> None:
-        """Set the unit of lengths from here on (UNITS)."""
+        """Set the unit of lengths from here on (UNITS, and UNIT of SolidWorks)."""
         if len(args) != 1 or args[0] not in LENGTH_UNITS:
-            refuse("expected UNITS/MM or UNITS/INCHES")
+            refuse("expected UNITS/MM or UNITS/INCHES, UNIT/MM or UNIT/INCH")
         self._refuse_in_cycle_or_circle()
         scale = LENGTH_UNITS[args[0]]
         if not self.motion.records.n:
@@ -188,6 +254,36 @@ class ClActions:
         """Set the workpiece's frame by the three rows after CATIA's $$*CATIA0."""
         self.motion.change_frame(line, frame=frame_from_matrix(rows))
 
+    def set_csys(self, args: list[str], line: int) -> None:
+        """Set the workpiece's frame by a matrix of three rows and four columns (CSYS of Creo)."""
+        v = parse_numbers(args, (12,), "a matrix of three rows and four columns: twelve numbers")
+        self._refuse_in_cycle_or_circle()
+        self.motion.change_frame(line, frame=frame_from_matrix([v[0:4], v[4:8], v[8:12]], "CSYS"))
+
+    # modes that are honoured where they change nothing
+
+    def check_compensation(self, args: list[str], line: int) -> None:
+        """Take cutter compensation off; on, only where the file's path is the tool's centre already (CUTCOM)."""
+        if args == ["OFF"] or args[:2] == ["OFF", "LENGTH"] or args[:2] == ["ON", "LENGTH"]:
+            return
+        if not self.compensated:
+            refuse("cutter compensation left to the controller; expected a path of the tool's centre, and CUTCOM/OFF")
+        self.motion.notes.add(line, "cutter compensation, already in the path: the file says OUTPUT_ON_CENTER")
+
+    def set_compensation_type(self, args: list[str], line: int) -> None:
+        """Take what a path of CUTCOM is: the tool's centre or the part's contour (CUTCOM_GEOMETRY_TYPE of Creo)."""
+        self.compensated = args == ["OUTPUT_ON_CENTER"]
+
+    def check_mode(self, args: list[str], line: int) -> None:
+        """Refuse modes other than milling in absolute coordinates (MODE)."""
+        if args not in (["MILL"], ["ABSOL"]):
+            refuse(f"{quote_short(','.join(args))}; expected MODE/MILL or absolute coordinates")
+
+    def check_off(self, args: list[str], line: int) -> None:
+        """Refuse a transformation that is not taken off (TRACUT/NOMORE)."""
+        if args not in (["OFF"], ["NOMORE"]):
+            refuse("a transformation of the points after it; expected a file with plain points")
+
     # tool
 
     def _set_tool(self, line: int, **data: float | str) -> None:
@@ -222,5 +318,6 @@ class ClActions:
     def start_tool_path(self, args: list[str], line: int) -> None:
         """Start a tool path and set its tool's name (TOOL PATH of NX)."""
         self._refuse_in_cycle_or_circle()
+        self.motion.axis = (0.0, 0.0, 1.0)
         if "TOOL" in args[1:-1]:
             self._set_tool(line, name=args[args.index("TOOL", 1) + 1])

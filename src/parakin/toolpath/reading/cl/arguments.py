@@ -1,4 +1,4 @@
-"""The arguments of CL words: numbers, feeds and speeds, drill cycles, tool data.
+"""The arguments of CL words: numbers, feeds and speeds, tool data; drill cycles are in :mod:`.cycles`.
 
 Pure functions of the text. Errors name no file and no line; the reader adds both.
 """
@@ -70,55 +70,6 @@ def parse_spindle(args: Sequence[str]) -> SpindleSpeed:
     if values and (value is None or value < 0):
         refuse(f"{quote_short(values[0])} is no spindle speed; expected {form}")
     return SpindleSpeed(value, "SFM" in args or "SMM" in args, "OFF" in args)
-
-
-class DrillCycle(NamedTuple):
-    """CYCLE/DRILL as NX writes it. Distances along the tool axis from the hole's point, in the file's unit.
-
-    clear : where rapid ends above the hole
-    depth : where the feed ends, below it
-    retract : where the tool withdraws to, or None for the height it came from (RTRCTO,AUTO)
-    feed : value and unit word, or None for the feed in force
-    """
-
-    clear: float
-    depth: float
-    retract: float | None
-    feed: tuple[float, str] | None
-
-
-def parse_drill_cycle(args: Sequence[str]) -> DrillCycle:
-    """Parse CYCLE/DRILL, refusing a cycle whose motion the statement alone does not settle."""
-    form = "CYCLE/DRILL,RAPTO,r,FEDTO,d[,RTRCTO,r|AUTO][,MMPM|IPM|MMPR|IPR,feed]; write other cycles as plain motion"
-    if not args or args[0] != "DRILL":
-        refuse(f"a cycle that cannot be turned into motion: {quote_short('/'.join(args[:1]))}; expected {form}")
-    rest = list(args[1:])
-    values: dict[str, float] = {}
-    auto = False
-    feed: tuple[float, str] | None = None
-    while rest:
-        word = rest.pop(0)
-        if word == "MANUAL" and "RTRCTO" in values:
-            continue
-        if word == "RTRCTO" and rest and rest[0] == "AUTO":
-            rest.pop(0)
-            auto = True
-            continue
-        name = {"CLEAR": "RAPTO"}.get(word, word)
-        if name not in ("RAPTO", "FEDTO", "RTRCTO", *FEED_UNITS) or not rest:
-            refuse(f"{quote_short(word)} in a cycle that cannot be turned into motion; expected {form}")
-        (value,) = parse_numbers([rest.pop(0)], (1,), form)
-        if name in FEED_UNITS:
-            feed = (value, name)
-        else:
-            values[name] = value
-    if "RAPTO" not in values or "FEDTO" not in values:
-        refuse(f"a cycle without RAPTO and FEDTO; expected {form}")
-    clear, depth = values["RAPTO"], values["FEDTO"]
-    retract = None if auto else values.get("RTRCTO", clear)
-    if not depth < clear or (retract is not None and retract < clear) or (feed is not None and feed[0] < 0):
-        refuse(f"expected FEDTO below RAPTO, RTRCTO not below it and a feed of zero or more in {form}")
-    return DrillCycle(clear, depth, retract, feed)
 
 
 def parse_tool_data(args: Sequence[str], scale: float) -> dict[str, float | str]:

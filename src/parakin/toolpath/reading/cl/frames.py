@@ -88,13 +88,13 @@ def build_frame(origin: list[float], x: list[float], y: list[float]) -> Frame:
     return Frame(np.column_stack([ex, np.cross(ez, ex), ez]), np.array(origin))
 
 
-def frame_from_matrix(rows: list[list[float]]) -> Frame:
+def frame_from_matrix(rows: list[list[float]], word: str = "$$*CATIA0") -> Frame:
     """Build a frame from the three rows of a 3 by 4 matrix; the SVD frees its rotation from rounding."""
     matrix = np.array(rows)
     rotation = matrix[:, :3]
     error = float(np.abs(rotation @ rotation.T - np.eye(3)).max())
     if not error < AXIS_TOLERANCE or np.linalg.det(rotation) < 0.0:
-        refuse("the matrix after $$*CATIA0 is no right-handed rotation; expected unit columns at right angles")
+        refuse(f"the matrix of {word} is no right-handed rotation; expected unit columns at right angles")
     if error > _ROUNDED:
         left, _, right = np.linalg.svd(rotation)
         rotation = left @ right

@@ -6,25 +6,30 @@ from typing import NamedTuple
 import numpy as np
 
 from ....arrays import Array
+from ....errors import InputError
+from ...path import Event
 from ..arcs import find_arc_normal, interpolate_arc, interpolate_axis
 from ..notes import NoteBook
 from ..text import refuse
-from .arguments import FEED_UNITS, DrillCycle
+from .arguments import FEED_UNITS
+from .circles import (
+    Circle,
+    OpenArc,
+    decide_hand,
+    find_tangent,
+    follow_circle,
+    measure_turn,
+    prove_hand,
+    settle_sweep,
+)
+from .cycles import DrillCycle
+from .dialects import RIGHT, UNKNOWN
 from .frames import AXIS_TOLERANCE, MACHINE, SMALLEST_SQUARE, FileTransform, Frame, Triple
 from .records import ClRecords
 
 _HELIX = 0.01  # mm along a circle's axis between an arc's ends; above this the arc is a helix
-_SAME_AXIS = 1e-9  # components of two tool axes that are equal
-_SAME_HEIGHT = 1e-9  # in the file's unit: two heights above a hole that are equal
-
-
-class NxCircle(NamedTuple):
-    """A CIRCLE of NX that waits for its GOTO: source line, centre, unit axis and radius in the file's unit."""
-
-    line: int
-    centre: list[float]
-    axis: Triple
-    radius: float
+_MOST_ARC_POINTS = 5_000_000  # of all arcs of a file: some hundred MB of memory
+_FAR = 1e3  # the length of a direction that stands for a motion
 
 
 class Arc(NamedTuple):
@@ -32,6 +37,7 @@ class Arc(NamedTuple):
 
     line : source line of the points between the ends
     helix : whether the ends may differ in height along the normal
+    turns : full turns before the arc's own
     """
 
     line: int
@@ -39,6 +45,7 @@ class Arc(NamedTuple):
     normal: Array
     radius: float
     helix: bool
+    turns: int = 0
 
 
 class CycleStart(NamedTuple):
@@ -56,28 +63,39 @@ class ClMotion:
     frame, first_frame : the workpiece's frame in the machine in force, and at the first record; None: not given
     off_unit : axes off unit length: how many, first line, worst deviation
     rapid : whether the next motion is rapid
-    rpm, feed : spindle speed and feed in mm/min, NaN if not known; feed_value and feed_unit as programmed
-    tangent, circle, cycle : the direction of INDIRV, the CIRCLE that waits for its GOTO, the drill cycle in force
+    rpm, clockwise : spindle speed, NaN if not known, and which way it turns
+    feed : mm/min, NaN if not known; feed_value and feed_unit as programmed
+    tangent, circle, cycle : the direction of INDIRV, the circle that waits for its GOTO, the drill cycle in force
+    open_arc : the last arc, until the motion after it confirms which way round it goes
+    arc_step : the circle of the last arc with its hand and step, while the next GOTO may go on along it
+    arc_end : the number of records after the last arc and the direction (3,) of its end
     """
 
     def __init__(self, expected: int, arc_tolerance: float):
         self.records = ClRecords(expected)
         self.notes = NoteBook()
+        self.events: list[Event] = []
         self.arc_tolerance = arc_tolerance
         self.transform = FileTransform()
         self.frame: Frame | None = None
         self.first_frame: Frame | None = None
         self.first_scale = 1.0
+        self.frame_line = 0
         self.origin_turn: Array | None = None
         self.position: Triple | None = None
         self.axis: Triple = (0.0, 0.0, 1.0)
         self.off_unit = np.zeros(3)
         self.rapid = False
         self.rpm = math.nan
+        self.clockwise = True
         self.feed_value, self.feed_unit = math.nan, "PERMIN"
         self.feed = math.nan
         self.tangent: Triple | None = None
-        self.circle: NxCircle | None = None
+        self.circle: Circle | None = None
+        self.open_arc: OpenArc | None = None
+        self.arc_step: tuple[Circle, int, float] | None = None
+        self.arc_end: tuple[int, Array] = 0, np.zeros(3)
+        self.arc_points = 0
         self.cycle: DrillCycle | None = None
         self.cycle_start: CycleStart | None = None
 
@@ -99,10 +117,16 @@ class ClMotion:
         self.rpm = rpm
         self.feed = self.convert_feed(self.feed_value, self.feed_unit)
 
-    def check_feed(self, line: int, feed: float, value: float) -> None:
-        """Note a programmed value that makes no feed, at a motion that uses it."""
-        if math.isnan(feed) and not math.isnan(value):
-            self.notes.add(line, "a feed per revolution while the spindle speed is not known: the feed is left open")
+    def require_feed(self, line: int, feed: float, value: float) -> None:
+        """Refuse a cut without a feed; a file's first point is where it starts, not a cut.
+
+        value : of the cycle's own feed as programmed, NaN if it has none
+        """
+        if not math.isnan(feed) or not self.records.n:
+            return
+        if math.isnan(value) and math.isnan(self.feed_value):
+            refuse("a cut without a feed; expected FEDRAT before it", line)
+        refuse("a feed per revolution while the spindle speed is not known; expected SPINDL/n,RPM before it", line)
 
     # frames and units
 
@@ -116,6 +140,8 @@ class ClMotion:
         frame: Frame | None = None,
     ) -> None:
         """Read later records in other units, from another ORIGIN or in another frame; the tool stays where it is."""
+        self.close_arc(None)
+        self.arc_step, self.arc_end = None, (-1, np.zeros(3))
         old, old_turn, position = self.transform, self.transform.turn, self.position
         self.place_records()
         old_origin, old_frame = old.origin, self.frame
@@ -125,6 +151,8 @@ class ClMotion:
             old_frame = self.frame and self.frame.scale_origin(old.scale / scale)
         scale = old.scale if scale is None else scale
         self.frame = frame or old_frame
+        if frame is not None and not self.frame_line:
+            self.frame_line = line
         if origin is not None:
             self.origin_turn = origin_turn
         turn, shift = self._relate_to_first_frame(scale, line)
@@ -151,7 +179,11 @@ class ClMotion:
             return turn, shift
         relative = first.rotation.T @ now.rotation
         shift = first.rotation.T @ (now.origin - first.origin)
-        self.notes.add(line, "another workpiece frame: later points are given in the file's first one")
+        x, y, z = (now.origin + 0.0).tolist()
+        self.notes.add(
+            line,
+            f"another workpiece frame, origin {x:.6g}, {y:.6g}, {z:.6g} mm: its points are given in the file's first one",
+        )
         return relative if turn is None else relative @ turn, shift
 
     def place_records(self) -> None:
@@ -187,27 +219,100 @@ class ClMotion:
         r.n = n + 1
         self.position = tip
 
-    def move_to(self, tip: Triple, ijk: list[float], line: int) -> None:
-        """Move to a point, along an NX circle to its end, or into a hole of the cycle in force (GOTO and GODLTA).
-
-        ijk : the new tool axis, empty if it stays
-        """
+    def take_axis(self, ijk: list[float], line: int) -> Triple:
+        """Set the tool axis, if one is given; return the one before."""
         before = self.axis
         if ijk:
             self.axis = self.normalize_axis(ijk, line)
-        if self.cycle is None or self.cycle.feed is None:
-            self.check_feed(line, self.feed, self.feed_value)
-        if self.circle is not None:
-            circle, self.circle = self.circle, None
-            # NX states the circle's axis for clockwise motion: left-handed about it
-            arc = Arc(circle.line, circle.centre, -np.array(circle.axis), circle.radius, helix=True)
-            self._add_arc(arc, tip, before, line)
-        elif self.cycle is not None:
-            self._drill_hole(self.cycle, tip, before, line)
+        return before
+
+    def move_to(self, tip: Triple, ijk: list[float], line: int) -> None:
+        """Move to a point, or along a circle to its end (GOTO and GODLTA).
+
+        ijk : the new tool axis, empty if it stays
+        """
+        before = self.take_axis(ijk, line)
+        if not self.rapid:
+            self.require_feed(line, self.feed, math.nan)
+        circle, self.circle = self.circle, None
+        if circle is not None:
+            self._move_along_circle(circle, tip, before, line)
+        elif self._follows_arc(tip):
+            self._continue_arc(tip, before, line)
         else:
+            self.close_arc(None if self.rapid or self.position is None else np.subtract(tip, self.position))
+            self.arc_step = None
             self.add_record(tip, line, rapid=self.rapid)
         self.rapid = False
         self.tangent = None
+
+    # circles
+
+    def _follows_arc(self, tip: Triple) -> bool:
+        """Whether a point goes on along the last arc."""
+        if self.arc_step is None or self.rapid or self.position is None:
+            return False
+        circle, hand, step = self.arc_step
+        return follow_circle(circle, self.position, tip, (hand, step), self.transform.scale)
+
+    def _find_heading(self) -> Array | None:
+        """The motion (3,) that the last cut ended with; None if there is none in the frame in force."""
+        records, n = self.records, self.records.n
+        if self.arc_end[0] == n and n:
+            return self.arc_end[1]
+        if n - records.placed < 2 or records.rapid[n - 1]:
+            return None
+        return np.asarray(records.tip[n - 1] - records.tip[n - 2])
+
+    def _move_along_circle(self, circle: Circle, tip: Triple, before: Triple, line: int) -> None:
+        """Add the records of an arc to a point, and keep it open for the motion after it."""
+        if self.position is None:
+            refuse("an arc without a position to start from; expected FROM or GOTO before it")
+        start = self.position
+        known, turns = settle_sweep(circle, start, tip)
+        self.close_arc(find_tangent(circle, start, known) * _FAR if known != UNKNOWN else None)
+        entry = prove_hand(circle, start, self._find_heading(), self.transform.scale)
+        hand, circle = known or entry or RIGHT, circle._replace(hand=known)
+        self.open_arc = OpenArc(circle, hand, entry, self.records.n, start, tip, (before, self.axis), self.rapid, line)
+        self._add_circle(self.open_arc, hand, turns)
+
+    def _continue_arc(self, tip: Triple, before: Triple, line: int) -> None:
+        """Add the records of the last arc from a point on it to the next one."""
+        assert self.arc_step is not None and self.position is not None
+        circle, hand, _ = self.arc_step
+        entry = self.open_arc.entry if self.open_arc else UNKNOWN
+        self.open_arc = OpenArc(
+            circle, hand, entry, self.records.n, self.position, tip, (before, self.axis), self.rapid, line
+        )
+        self._add_circle(self.open_arc, hand, 0)
+
+    def _add_circle(self, arc: OpenArc, hand: int, turns: int) -> None:
+        """Add the records of an arc, going round by a hand."""
+        circle = arc.circle
+        form = Arc(circle.line, circle.centre.tolist(), hand * circle.axis, circle.radius, helix=True, turns=turns)
+        self._add_arc(form, arc.end, arc.axes[0], arc.end_line)
+        self.arc_end = self.records.n, find_tangent(circle, arc.end, hand) * _FAR
+        self.arc_step = (circle, hand, measure_turn(circle, arc.start, arc.end, hand)) if circle.points else None
+
+    def close_arc(self, leaving: Array | None) -> None:
+        """Confirm the way round of the last arc by the motion (3,) that leaves it; turn it where only that proves it.
+
+        leaving : None if no cut leaves it
+        """
+        arc, self.open_arc = self.open_arc, None
+        if arc is None:
+            return
+        try:
+            hand = decide_hand(arc, prove_hand(arc.circle, arc.end, leaving, self.transform.scale))
+        except InputError as error:
+            refuse(error.message, arc.circle.line)
+        if hand != arc.hand:
+            records, begin = self.records, arc.begin
+            feed, rpm, axis, rapid = records.feed[begin], records.spindle[begin], self.axis, self.rapid
+            records.n, self.position, self.axis, self.rapid = begin, arc.start, arc.axes[1], arc.rapid
+            self._add_circle(arc, hand, 0)
+            records.feed[begin : records.n], records.spindle[begin : records.n] = feed, rpm
+            self.axis, self.rapid = axis, rapid
 
     def add_tangent_arc(self, centre: list[float], radius: float, end: Triple, line: int) -> None:
         """Add the records of an APT arc (TLON), which starts along the direction of INDIRV."""
@@ -217,7 +322,9 @@ class ClMotion:
             refuse("expected INDIRV/i,j,k and a position (FROM or GOTO) before the arc")
         start, middle = np.array(self.position), np.array(centre)
         normal = find_arc_normal(start, np.array(end), middle, np.array(self.tangent))
-        self.check_feed(line, self.feed, self.feed_value)
+        if not self.rapid:
+            self.require_feed(line, self.feed, math.nan)
+        self.close_arc(np.array(self.tangent))
         self._add_arc(Arc(line, centre, normal, radius, helix=False), end, self.axis, line)
         self.rapid = False
         self.tangent = None
@@ -231,8 +338,14 @@ class ClMotion:
         if arc.helix and abs(float((last - start) @ arc.normal)) > _HELIX:
             self.notes.add(line, "an arc whose ends differ in height, read as a helix")
         points, fraction = interpolate_arc(
-            start, last, centre, arc.radius * scale, arc.normal, self.arc_tolerance, helix=arc.helix
+            start, last, centre, arc.radius * scale, arc.normal, self.arc_tolerance, helix=arc.helix, turns=arc.turns
         )
+        self.arc_points += len(points)
+        if self.arc_points > _MOST_ARC_POINTS:
+            refuse(
+                f"arcs of more than {_MOST_ARC_POINTS} points in all at a tolerance of {self.arc_tolerance:g} mm; "
+                "expected a coarser one"
+            )
         axes = interpolate_axis(np.array(axis_before), np.array(self.axis), fraction)
         points /= scale
         points[-1] = end
@@ -249,41 +362,8 @@ class ClMotion:
 
     def set_cycle(self, cycle: DrillCycle | None) -> None:
         """Drill at the points from here on, or with None no longer."""
+        self.close_arc(None)
         self.cycle, self.cycle_start = cycle, None
         if cycle is not None and cycle.retract is None and self.position is not None:
             height = sum(p * a for p, a in zip(self.position, self.axis, strict=True))
             self.cycle_start = CycleStart(height, self.axis)
-
-    def _drill_hole(self, cycle: DrillCycle, hole: Triple, axis_before: Triple, line: int) -> None:
-        """Drill one hole: across at height, rapid down to the clearance, feed to depth, rapid out."""
-        a = self.axis
-        x, y, z = hole
-
-        def point_above(height: float) -> Triple:
-            return x + height * a[0], y + height * a[1], z + height * a[2]
-
-        if cycle.retract is not None:
-            out = cycle.retract
-        elif self.cycle_start is None or not _is_same_axis(self.cycle_start.axis, a):
-            refuse("RTRCTO,AUTO without a position before the cycle along the same tool axis; expected RTRCTO,distance")
-        else:
-            out = max(cycle.clear, self.cycle_start.height - (x * a[0] + y * a[1] + z * a[2]))
-        if self.position is not None and axis_before == a:
-            px, py, pz = self.position
-            height = (px - x) * a[0] + (py - y) * a[1] + (pz - z) * a[2]
-            rise = cycle.clear - height
-            if rise > _SAME_HEIGHT:
-                self.add_record((px + rise * a[0], py + rise * a[1], pz + rise * a[2]), line, rapid=True)
-            elif rise < -_SAME_HEIGHT:
-                self.add_record(point_above(height), line, rapid=True)
-        self.add_record(point_above(cycle.clear), line, rapid=True)
-        feed = self.feed if cycle.feed is None else self.convert_feed(*cycle.feed)
-        if cycle.feed is not None:
-            self.check_feed(line, feed, cycle.feed[0])
-        self.add_record(point_above(cycle.depth), line, rapid=False, feed=feed)
-        self.add_record(point_above(out), line, rapid=True)
-        self.notes.add(line, "a drill cycle's hole, written out as motion")
-
-
-def _is_same_axis(one: Triple, other: Triple) -> bool:
-    return not max(abs(p - q) for p, q in zip(one, other, strict=True)) > _SAME_AXIS

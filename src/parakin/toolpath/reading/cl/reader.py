@@ -1,4 +1,4 @@
-"""Read CL files, in the APT dialect CATIA writes and the one of Siemens NX.
+"""Read CL files, in the dialects of :mod:`.dialects`.
 
 Bytes are read a block at a time. Runs of plain GOTO lines, nearly all of a large file, go through compiled code
 (:mod:`.plain_lines`); every other line, and every line that code is not sure of, goes through the line reader, which
@@ -6,13 +6,15 @@ gives the same records. The words are in the table of :mod:`.words`.
 """
 
 import io
+import math
 import os
 import re
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ....arrays import Progress
+from ....arrays import Array, Progress
 from ....errors import InputError
 from ...path import ToolPath
 from ..text import (
@@ -27,7 +29,7 @@ from ..text import (
 )
 from .actions import ClActions
 from .motion import ClMotion
-from .statements import ends_text, execute_statement
+from .statements import HIDDEN, ends_text, execute_statement
 
 _BLOCK = READ_SIZE  # bytes read at a time, into the same buffer: it stays in the cache
 _LONGEST = 4_000_000  # characters in one statement
@@ -37,15 +39,25 @@ _MODAL_LINES = 4096  # FEDRAT, RAPID and PAINT lines in one call of it
 _BYTES_PER_RECORD = 48  # of a usual file
 _MOST_EXPECTED = 1 << 26  # records to reserve room for at first
 _HEADER = re.compile(r"\$\$\s*\*\s*CATIA0\b", re.IGNORECASE)
+_HIDDEN = re.compile(r"\$\$\s*->")  # a statement that Creo hides in a comment
+_MOST_LISTED = 20  # words that only inform
 
 
-def read_cl(path: str | os.PathLike[str], *, arc_tolerance: float = 0.01, progress: Progress | None = None) -> ToolPath:
+def read_cl(
+    path: str | os.PathLike[str],
+    *,
+    arc_tolerance: float = 0.01,
+    frame: Literal["file", "ignore"] = "file",
+    progress: Progress | None = None,
+) -> ToolPath:
     """Read a CL file.
 
     Parameters
     ----------
     path : the file
     arc_tolerance : mm, the largest distance of the straight lines that replace an arc from it
+    frame : "file": the path's frame is the file's (MSYS, CSYS, CATIA's matrix); "ignore": it is None. Later frames of the
+        file are brought into its first one either way
     progress : called now and then with the fraction read, 0 to 1
 
     Returns
@@ -57,10 +69,14 @@ def read_cl(path: str | os.PathLike[str], *, arc_tolerance: float = 0.01, progre
     InputError : the file cannot be read, or a line cannot be understood; one line with file and line number
     """
     check_arc_tolerance(arc_tolerance)
+    if frame not in ("file", "ignore"):
+        raise InputError('expected "file" or "ignore"', "frame")
     source = os.fsdecode(path)
     with open_file(path, source) as file, np.errstate(all="ignore"):
         size = os.fstat(file.fileno()).st_size
-        return ClReader(source, size, arc_tolerance).read(file, progress or (lambda fraction: None))
+        return ClReader(source, size, arc_tolerance, ignore_frame=frame == "ignore").read(
+            file, progress or (lambda fraction: None)
+        )
 
 
 class ClReader:
@@ -73,8 +89,9 @@ class ClReader:
     skipped : statements after FINI: the first one's line and their count
     """
 
-    def __init__(self, source: str, size: int, arc_tolerance: float):
+    def __init__(self, source: str, size: int, arc_tolerance: float, *, ignore_frame: bool = False):
         self.source = source
+        self.ignore_frame = ignore_frame
         # columns for as many records as the file may well hold; the system gives memory when it is written to
         self.motion = ClMotion(min(size // _BYTES_PER_RECORD, _MOST_EXPECTED), arc_tolerance)
         self.actions = ClActions(self.motion)
@@ -147,6 +164,10 @@ class ClReader:
             raise self._fail("expected three rows of four numbers after $$*CATIA0", self.matrix_from)
         if self.motion.circle is not None:
             raise self._fail("CIRCLE: the file ends; expected the GOTO that ends the arc", self.motion.circle.line)
+        try:
+            self.motion.close_arc(None)
+        except InputError as error:
+            raise self._fail(error.message, error.line) from error
         if not self.motion.records.n:
             raise self._fail("no motion; expected at least one record such as GOTO/x,y,z", None)
 
@@ -160,10 +181,12 @@ class ClReader:
             count, first, worst = motion.off_unit.tolist()
             text = f"a tool axis off unit length, normalised; the worst by {worst:.3g}"
             motion.notes.add(int(first), text, int(count))
-        frame = None
-        if motion.first_frame is not None:
-            first_frame = motion.first_frame.scale_origin(motion.first_scale)
-            frame = np.column_stack([first_frame.rotation, first_frame.origin])
+        frame = self._take_frame()
+        if actions.informing:
+            words = sorted(actions.informing)
+            more = f" and {len(words) - _MOST_LISTED} more" if len(words) > _MOST_LISTED else ""
+            shown = ", ".join(quote_short(word)[1:-1] for word in words[:_MOST_LISTED])
+            motion.notes.add(min(actions.informing.values()), f"words that only inform: {shown}{more}")
         return ToolPath(
             source=self.source,
             tip=records.tip,
@@ -176,9 +199,22 @@ class ClReader:
             dialect=actions.dialect,
             units=actions.units,
             tool=actions.tool,
-            events=tuple(actions.events),
+            events=tuple(motion.events),
             notes=motion.notes.list_notes(),
         )
+
+    def _take_frame(self) -> Array | None:
+        """The workpiece's frame (3, 4) in the machine that the path has, named in a note."""
+        motion = self.motion
+        if motion.first_frame is None:
+            return None
+        first = motion.first_frame.scale_origin(motion.first_scale)
+        frame = np.column_stack([first.rotation, first.origin]) + 0.0
+        x, z = (", ".join(f"{value:.6g}" for value in frame[:, k]) for k in (0, 2))
+        origin = ", ".join(f"{value:.6g}" for value in frame[:, 3])
+        fate = ", ignored" if self.ignore_frame else ""
+        motion.notes.add(motion.frame_line, f"the file's frame: origin {origin} mm, X along {x}, Z along {z}{fate}")
+        return None if self.ignore_frame else frame
 
     # runs of plain lines
 
@@ -199,7 +235,7 @@ class ClReader:
     def _may_read_plain_lines(self) -> bool:
         """Whether the next line depends on no line before it."""
         motion = self.motion
-        within = self.continued or self.matrix is not None or motion.circle or motion.cycle
+        within = self.continued or self.matrix is not None or motion.circle or motion.cycle or motion.open_arc
         return not (within or self.actions.finished)
 
     def _read_plain_lines(self, buffer: NDArray[np.uint8], at: int) -> int:
@@ -236,12 +272,20 @@ class ClReader:
         if end > start:
             records.feed[start:end] = motion.feed
             if motion.feed != motion.feed:
-                for line in records.line[start:end].tolist():
-                    motion.check_feed(line, motion.feed, motion.feed_value)
+                cuts = start + int(motion.rapid or not start)
+                if cuts < end:
+                    self._refuse_feed(int(records.line[cuts]))
             if motion.rapid:
                 records.rapid[start] = True
                 motion.rapid = False
             records.n = end
+
+    def _refuse_feed(self, line: int) -> None:
+        self.motion.records.n = 1
+        try:
+            self.motion.require_feed(line, self.motion.feed, math.nan)
+        except InputError as error:
+            raise self._fail(f"GOTO: {error.message}", line) from error
 
     def _read_modal_line(self, text: bytes, line: int) -> None:
         """Read a FEDRAT, RAPID or PAINT line within a run; equal lines are parsed once."""
@@ -269,8 +313,10 @@ class ClReader:
         if "$" in text:
             if _HEADER.match(text):
                 self.matrix, self.matrix_from = [], line
+            self.actions.read_comment(text)
+            if self.matrix is not None:
                 return ""
-            text = text.partition("$$")[0].rstrip()
+            text = self._strip_comment(text, line)
         if not text:
             return ""
         if self.continued and ends_text(self.continued[0], text):
@@ -283,6 +329,15 @@ class ClReader:
             text, line = self._take_continued()
         return self._execute(text, line)
 
+    def _strip_comment(self, text: str, line: int) -> str:
+        """Return a line without its comment; a statement hidden in one is marked."""
+        hidden = _HIDDEN.match(text)
+        if hidden is None:
+            return text.partition("$$")[0].rstrip()
+        if self.continued:
+            raise self._fail("a $$-> statement within a continued one; expected the rest of that", line)
+        return HIDDEN + text[hidden.end() :].partition("$$")[0].strip()
+
     def _execute(self, text: str, line: int) -> str:
         """Act on a whole statement; return its word."""
         if self.actions.finished:
@@ -291,7 +346,7 @@ class ClReader:
         try:
             return execute_statement(self.actions, text, line)
         except InputError as error:
-            raise self._fail(error.message, line) from error
+            raise self._fail(error.message, error.line or line) from error
 
     def _continue_statement(self, text: str, line: int) -> None:
         if not self.continued:
@@ -316,7 +371,7 @@ class ClReader:
                 self.matrix.append([parse_number(f) for f in fields])
                 if len(self.matrix) == 3:
                     rows, self.matrix = self.matrix, None
-                    self.actions.set_frame_matrix(rows, line)
+                    self.actions.set_frame_matrix(rows, self.matrix_from)
             except InputError as error:
                 raise self._fail(error.message, line) from error
         elif self.matrix or not (text.startswith("$$") or not text):

@@ -6,12 +6,16 @@ from ....errors import InputError
 from ..text import quote_short, refuse
 from .actions import ClActions
 from .arguments import remove_blanks
-from .words import TEXT_WORDS, WORDS
+from .words import INFORMING, REFUSED, TEXT_WORDS, WORDS
 
 _TEXT = re.compile(rf"\s*({'|'.join(TEXT_WORDS)})(?![A-Z0-9])", re.IGNORECASE | re.ASCII)
 _NO_TEXT = re.compile(
     rf"\s*({'|'.join(name for name, word in WORDS.items() if word.ends_message)})\s*(?:[/,]|$)", re.IGNORECASE
 )
+
+HIDDEN = "\0"  # no line of a file has it
+_LONGEST_WORD = 10
+_ACTING = tuple(name for name, word in WORDS.items() if word.act is not None and len(name) >= 4)
 
 
 def ends_text(begun: str, text: str) -> bool:
@@ -20,9 +24,14 @@ def ends_text(begun: str, text: str) -> bool:
 
 
 def execute_statement(actions: ClActions, text: str, line: int) -> str:
-    """Act on a whole statement that begins at a line; return its word. Errors name no file and no line."""
+    """Act on a whole statement that begins at a line; return its word. Errors name no file, and a line only of another
+    statement. HIDDEN begins a statement that a comment hides.
+    """
+    hidden = text.startswith(HIDDEN)
+    text = text.removeprefix(HIDDEN)
     message = _TEXT.match(text)
     if message is not None:
+        actions.read_comment(text)
         actions.add_event(text, line)
         return message[1].upper()
     head, _, tail = text.partition("/")
@@ -30,25 +39,57 @@ def execute_statement(actions: ClActions, text: str, line: int) -> str:
     args = [remove_blanks(a) for a in tail.split(",")] if tail.strip() else []
     if comma:
         args = minor.split(",") + args
+    actions.read_word(name, args)
+    if name != "GOTO":
+        actions.motion.arc_step = None
     word = WORDS.get(name)
     if word is None:
-        _note_unknown(actions, name, line)
+        _take_unknown(actions, name, line, hidden=hidden)
         return name
-    if word.nx:
-        actions.dialect = "nx"
     if word.act is not None:
         try:
             word.act(actions, [remove_blanks(text)] if word.whole else args, line)
         except InputError as error:
-            refuse(f"{name}: {error.message}")
+            refuse(error.message if error.line not in (None, line) else f"{name}: {error.message}", error.line)
     if word.event:
         actions.add_event(text, line)
     return name
 
 
-def _note_unknown(actions: ClActions, name: str, line: int) -> None:
+def _take_unknown(actions: ClActions, name: str, line: int, *, hidden: bool) -> None:
+    """Refuse a word that would move, turn, shift or compensate; list one that informs; note any other."""
     letters = re.match(r"[A-Z]*", name)
     begin = letters[0] if letters else ""
     if begin != name and begin in WORDS and WORDS[begin].slash:
         refuse(f"{quote_short(name)}; expected a slash after {begin}")
+    reason = REFUSED.get(name) or REFUSED.get(name.split("=")[-1]) if not hidden or name in REFUSED else None
+    if reason is not None:
+        refuse(f"{quote_short(name)}: {reason}, and cannot be honoured; expected plain motion")
+    if hidden or name in INFORMING:
+        actions.informing.setdefault(name, line)
+        return
+    if name.startswith("GO"):
+        refuse(f"unknown word {quote_short(name)} that begins as motion does; expected GOTO/x,y,z")
+    meant = _find_meant(name)
+    if meant is not None:
+        refuse(f"unknown word {quote_short(name)}; expected {meant}")
     actions.motion.notes.add(line, f"unknown word {quote_short(name)}, not acted on")
+
+
+def _find_meant(name: str) -> str | None:
+    """Find the word that acts from which a name is one letter off: more, less, another, or two of them swapped."""
+    if not 3 <= len(name) <= _LONGEST_WORD:
+        return None
+    return next((word for word in _ACTING if _is_slip(name, word)), None)
+
+
+def _is_slip(name: str, word: str) -> bool:
+    """Whether two words are one slip of the pen apart."""
+    shorter, longer = sorted((name, word), key=len)
+    if len(longer) - len(shorter) > 1:
+        return False
+    k = next((i for i, (p, q) in enumerate(zip(shorter, longer, strict=False)) if p != q), len(shorter))
+    if len(shorter) < len(longer):
+        return shorter[k:] == longer[k + 1 :]
+    swapped = shorter[k : k + 2] == longer[k : k + 2][::-1] and shorter[k + 2 :] == longer[k + 2 :]
+    return swapped or shorter[k + 1 :] == longer[k + 1 :]

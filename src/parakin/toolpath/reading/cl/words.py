@@ -1,7 +1,9 @@
-"""The table of CL words, in the APT dialect that CATIA writes and the one of Siemens NX.
+"""The tables of CL words, of all dialects; what differs between dialects is in :mod:`.dialects`.
 
 To read a new word, add its row to WORDS. If it acts on motion, state or tool, write its method in :mod:`.actions`, with
-the parser of its arguments in :mod:`.arguments`. Words without a row earn a note and do nothing.
+the parser of its arguments in :mod:`.arguments`. A word that moves, turns, shifts or compensates and cannot be honoured
+is a row of REFUSED; one that only informs is in INFORMING. Words without a row earn a note and do nothing, but those
+that begin with GO or are one letter off a word that acts are refused.
 """
 
 from collections.abc import Callable
@@ -16,7 +18,6 @@ class Word(NamedTuple):
     act : the method that acts on the arguments and the source line; unbound, so that a reader is freed with its columns
         as soon as nobody uses it. None: no effect on the motion
     event : whether the statement is an event of the path
-    nx : whether the word tells that the file is Siemens NX's
     ends_message : whether a message before the word has ended, for its text can't begin so
     slash : whether the word without a slash behind it is an error, and not another word that begins the same way
     whole : whether the method takes the statement as one text, in place of its arguments
@@ -24,7 +25,6 @@ class Word(NamedTuple):
 
     act: Callable[[ClActions, list[str], int], None] | None = None
     event: bool = False
-    nx: bool = False
     ends_message: bool = False
     slash: bool = False
     whole: bool = False
@@ -41,7 +41,9 @@ WORDS: dict[str, Word] = {
     "RAPID": Word(ClActions.set_rapid, ends_message=True),
     "INDIRV": Word(ClActions.set_arc_direction, ends_message=True, slash=True),
     "TLON": Word(ClActions.go_along_arc, ends_message=True, whole=True),
-    "CIRCLE": Word(ClActions.start_circle, nx=True, ends_message=True, slash=True),
+    "GOHOME": Word(ClActions.go_home, ends_message=True),
+    "MOVARC": Word(ClActions.start_arc, ends_message=True, slash=True),
+    "CIRCLE": Word(ClActions.start_circle, ends_message=True, slash=True),
     "CYCLE": Word(ClActions.set_cycle, ends_message=True),
     "FINI": Word(ClActions.end_program, event=True, ends_message=True),
     # feed, spindle
@@ -49,17 +51,25 @@ WORDS: dict[str, Word] = {
     "SPINDL": Word(ClActions.set_spindle, event=True),
     # units and frames
     "UNITS": Word(ClActions.set_units, slash=True),
+    "UNIT": Word(ClActions.set_units, slash=True),
     "TLAXIS": Word(ClActions.set_tool_axis, slash=True),
     "ORIGIN": Word(ClActions.set_origin),
-    "MSYS": Word(ClActions.set_frame, nx=True, slash=True),
+    "MSYS": Word(ClActions.set_frame, slash=True),
+    "CSYS": Word(ClActions.set_csys, slash=True),
+    # modes that are honoured where they change nothing
+    "CUTCOM": Word(ClActions.check_compensation),
+    "CUTCOM_GEOMETRY_TYPE": Word(ClActions.set_compensation_type),
+    "MODE": Word(ClActions.check_mode),
+    "TRACUT": Word(ClActions.check_off),
+    "TRANS": Word(ClActions.check_off),
     # tool
-    "TLDATA": Word(ClActions.set_tool_data, nx=True),
+    "TLDATA": Word(ClActions.set_tool_data),
     "CUTTER": Word(ClActions.set_cutter, event=True),
     "LOADTL": Word(ClActions.load_tool, event=True),
     "TOOLNO": Word(ClActions.load_tool, event=True),
-    "LOAD": Word(ClActions.load_tool, event=True, nx=True),
-    "SELECT": Word(ClActions.load_tool, event=True, nx=True),
-    "TOOLPATH": Word(ClActions.start_tool_path, event=True, nx=True),
+    "LOAD": Word(ClActions.load_tool, event=True),
+    "SELECT": Word(ClActions.load_tool, event=True),
+    "TOOLPATH": Word(ClActions.start_tool_path, event=True),
     # no effect on the motion
     "STOP": _EVENT,
     "OPSTOP": _EVENT,
@@ -70,8 +80,8 @@ WORDS: dict[str, Word] = {
     "AUXFUN": _EVENT,
     "DELAY": _EVENT,
     "DWELL": _EVENT,
-    "END-OF-PATH": Word(event=True, nx=True),
-    "PAINT": Word(nx=True),
+    "END-OF-PATH": _EVENT,
+    "PAINT": _SILENT,
     "AUTOPS": _SILENT,
     "INTOL": _SILENT,
     "OUTTOL": _SILENT,
@@ -80,3 +90,26 @@ WORDS: dict[str, Word] = {
     "NOPOST": _SILENT,
 }
 TEXT_WORDS = ("PPRINT", "PARTNO", "REMARK", "TPRINT", "INSERT", "LETTER", "DISPLY")  # a free text follows; events
+
+# words that move, turn, shift or compensate, by the reason why they cannot be honoured
+_REASONS = {
+    "a motion along surfaces, which the file does not give as points": (
+        "GO GOLFT GORGT GOFWD GOBACK GOUP GODOWN TLLFT TLRGT TLONPS TLOFPS PSIS POCKET PROFIL SCURV ARCSLP"
+    ),
+    "a statement of the APT language that repeats or leads to others": (
+        "CALL MACRO TERMAC LOOPST LOOPND JUMPTO TRANTO IF DO UNTIL SUBR ENDSUB INDEX"
+    ),
+    "it moves or copies the points that follow": "COPY MATRIX REFSYS MCSYS TRANSL MIRROR",
+    "it turns an axis of the machine that wrote the file": "ROTATE ROTABL ROTHED ROTREF POSMAP TURRET",
+    "it retracts to a place that the file does not state": "RETRCT RETRACT",
+    "it gives the controller a G-code": "PREFUN",
+    "a motion in step with the spindle": "THREAD PITCH",
+    "a motion that ends at a touch": "PROBE",
+}
+REFUSED = {word: reason for reason, words in _REASONS.items() for word in words.split()}
+_INFORMING = """
+    AIR APPLY BARFED BEGIN BREAK CATCHR CHKPTS CHUCK CLAMP CLDATA CLRSRF CONTRL DATE FEATNO FIXTUR GECENT HEAD HEADER LEADER
+    LINTOL MATERL MCHFIN MCHTOL MFGNO NOTE OFSTNO OPNAME OPSKIP OPTION OSETNO PENDWN PENUP SAFETY SELCTL SEQNO SETSTL TCP
+    TCPCTL TLSTCK TMARK VERSION
+"""
+INFORMING = frozenset(_INFORMING.split())

@@ -1,0 +1,98 @@
+"""Write the motion of drill cycles as records: approach, pecks, dwell and the way out of each hole."""
+
+import math
+
+from ...path import Event
+from ..text import refuse
+from .cycles import DrillCycle
+from .frames import Triple
+from .motion import ClMotion
+
+_SAME_AXIS = 1e-9  # components of two tool axes that are equal
+_SAME_HEIGHT = 1e-9  # in the file's unit: two heights above a hole that are equal
+_PECK_GAP = 0.254  # mm, up after a peck of BRKCHP and above the last depth in DEEP, as LinuxCNC's G73 and G83 have it
+
+
+def drill_hole(motion: ClMotion, cycle: DrillCycle, hole: Triple, axis_before: Triple, line: int) -> None:
+    """Drill one hole: across at height, rapid down to the clearance, feed to depth, out."""
+    a = motion.axis
+    x, y, z = hole
+
+    def point_above(height: float) -> Triple:
+        return x + height * a[0], y + height * a[1], z + height * a[2]
+
+    out = _find_way_out(motion, cycle, hole)
+    feed = motion.feed if cycle.feed is None else motion.convert_feed(*cycle.feed)
+    if motion.position is not None and axis_before == a:
+        px, py, pz = motion.position
+        height = (px - x) * a[0] + (py - y) * a[1] + (pz - z) * a[2]
+        rise = cycle.clear - height
+        if rise > _SAME_HEIGHT:
+            motion.add_record((px + rise * a[0], py + rise * a[1], pz + rise * a[2]), line, rapid=True)
+        elif rise < -_SAME_HEIGHT:
+            motion.add_record(point_above(height), line, rapid=True)
+    motion.add_record(point_above(cycle.clear), line, rapid=True)
+    motion.require_feed(line, feed, math.nan if cycle.feed is None else cycle.feed[0])
+    for height, rapid in _list_strokes(cycle, _PECK_GAP / motion.transform.scale):
+        motion.add_record(point_above(height), line, rapid=rapid, feed=feed)
+    _add_dwell(motion, cycle, line)
+    if cycle.kind == "tap":
+        _reverse_spindle(motion, line)
+        motion.add_record(point_above(cycle.clear), line, rapid=False, feed=feed)
+        _reverse_spindle(motion, line)
+    elif cycle.kind == "bore":
+        motion.add_record(point_above(cycle.clear), line, rapid=False, feed=feed)
+    if cycle.kind not in ("tap", "bore") or abs(out - cycle.clear) > _SAME_HEIGHT:
+        motion.add_record(point_above(out), line, rapid=True)
+    motion.notes.add(line, "a drill cycle's hole, written out as motion")
+
+
+def _find_way_out(motion: ClMotion, cycle: DrillCycle, hole: Triple) -> float:
+    """The height above the hole that the tool withdraws to."""
+    if cycle.retract is not None:
+        return cycle.retract
+    start, axis = motion.cycle_start, motion.axis
+    if start is None or max(abs(p - q) for p, q in zip(start.axis, axis, strict=True)) > _SAME_AXIS:
+        refuse("RTRCTO,AUTO without a position before the cycle along the same tool axis; expected RTRCTO,distance")
+    return max(cycle.clear, start.height - sum(p * q for p, q in zip(hole, axis, strict=True)))
+
+
+def _list_strokes(cycle: DrillCycle, gap: float) -> list[tuple[float, bool]]:
+    """The heights from the clearance to the depth, each with whether it is reached in rapid."""
+    strokes: list[tuple[float, bool]] = []
+    if cycle.kind in ("deep", "break"):
+        # pecks count from the hole's point; the first one goes through the air above it too
+        reached = min(0.0, cycle.clear) - cycle.step
+        while reached > cycle.depth + _SAME_HEIGHT:
+            strokes.append((reached, False))
+            if cycle.kind == "break":
+                strokes.append((min(reached + gap, cycle.clear), True))
+            else:
+                strokes += [(cycle.clear, True), (min(reached + gap, cycle.clear), True)]
+            reached -= cycle.step
+    return [*strokes, (cycle.depth, False)]
+
+
+def _add_dwell(motion: ClMotion, cycle: DrillCycle, line: int) -> None:
+    """Wait at depth."""
+    if cycle.dwell is None:
+        return
+    seconds, in_revolutions = cycle.dwell
+    if in_revolutions:
+        if not motion.rpm > 0.0:
+            refuse("a dwell in revolutions while the spindle speed is not known; expected SPINDL/n,RPM before it")
+        seconds *= 60.0 / motion.rpm
+    if seconds > 0.0:
+        motion.events.append(Event(motion.records.n, line, f"DELAY/{seconds:.6f}"))
+
+
+def _reverse_spindle(motion: ClMotion, line: int) -> None:
+    """Turn the spindle the other way at the end of a tap."""
+    if not motion.rpm > 0.0:
+        refuse("a tap while the spindle speed is not known; expected SPINDL/n,RPM before it")
+    motion.clockwise = not motion.clockwise
+    way = "CLW" if motion.clockwise else "CCLW"
+    motion.events.append(Event(motion.records.n, line, f"SPINDL/RPM,{motion.rpm:.10g},{way}"))
+    motion.notes.add(
+        line, "a tap: fed in and out with the spindle reversed, not in step with it; it needs a floating holder"
+    )

@@ -6,10 +6,18 @@ from hypothesis import HealthCheck, settings
 
 from parakin.errors import InputError
 from parakin.toolpath.reading.cl import reader as cl
+from parakin.toolpath.reading.cl.motion import ClMotion
 from parakin.toolpath.reading.cl.reader import read_cl
 
 COLUMNS = ("tip", "axis", "line", "rapid", "feed", "spindle")
 FAST = settings(deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+
+
+@pytest.fixture(autouse=True)
+def without_feeds(monkeypatch):
+    """These small texts are about other things than feeds; that no feed is no cut is in test_cl_dialects.py."""
+    monkeypatch.setattr(ClMotion, "require_feed", lambda *_: None)
+
 
 CATIA = """\
 $$ -----------------------------------------------------------------

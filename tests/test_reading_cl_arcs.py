@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from cl_reading import both_reader, refused, text_reader
+from cl_reading import both_reader, refused, text_reader, without_feeds  # noqa: F401  without_feeds is taken by every test
 
 from parakin.errors import InputError
 
@@ -124,7 +124,7 @@ def test_nx_helix(both):
     p = both("GOTO/10,0,0\nCIRCLE/0,0,0,0,0,-1,10,.1,.5,0,0\nGOTO/0,10,-3\n")
     np.testing.assert_allclose(np.hypot(p.tip[:, 0], p.tip[:, 1]), 10, atol=1e-12)
     np.testing.assert_allclose(p.tip[:, 2], -3 * np.arctan2(p.tip[:, 1], p.tip[:, 0]) / (math.pi / 2), atol=1e-12)
-    assert "helix" in p.notes[0].text
+    assert "helix" in p.notes[1].text
 
 
 @pytest.mark.parametrize(
@@ -145,7 +145,7 @@ def test_nx_helix(both):
         ("GOTO/10,0,0\nCIRCLE/0,0,0,0,0,0,10,0,0,0,0\nGOTO/0,10,0\n", 2, ["CIRCLE"]),
         ("GOTO/10,0,0\nCIRCLE/0,0,0,0,0,1,-10,0,0,0,0\nGOTO/0,10,0\n", 3, ["radius"]),
         ("GOTO/10,0,0\nCIRCLE/0,0,0,0,0,1\nGOTO/0,10,0\n", 2, ["radius"]),
-        ("GOTO/10,0,0\nCIRCLE/0,0,0,0,0,1,10,0,0,0,0,TIMES,2\nGOTO/0,10,0\n", 2, ["TIMES"]),
+        ("GOTO/10,0,0\nCIRCLE/0,0,0,0,0,1,10,0,0,0,0,TIMES,2\nGOTO/0,10,0\n", 3, ["TIMES"]),
         ("GOTO/10,0,0\nCIRCLE/0,0,0,0,0,1,10\n", 2, ["GOTO"]),
         ("GOTO/10,0,0\nCIRCLE/0,0,0,0,0,1,10\nFINI\n", 3, ["CIRCLE"]),
         ("GOTO/10,0,0\nCIRCLE/0,0,0,0,0,1,10\nGODLTA/1,1,1\n", 3, ["GOTO"]),
@@ -186,7 +186,7 @@ def test_drilling(both):
     ]
     np.testing.assert_array_equal(np.column_stack([p.tip, p.rapid, p.feed]), np.array(expected, float))
     assert p.line.tolist() == [2, 4, 4, 4, 4, 6, 6, 6, 6, 8]
-    assert [(n.line, "(2 times)" in n.text) for n in p.notes] == [(4, True)]
+    assert [(n.line, "(2 times)" in n.text) for n in p.notes] == [(4, True), (5, False)]
 
 
 def test_drilling_at_the_clearance_and_along_a_tilted_axis(both):
@@ -203,7 +203,7 @@ def test_drilling_at_the_clearance_and_along_a_tilted_axis(both):
 @pytest.mark.parametrize(
     "cycle",
     [
-        "CYCLE/TAP,RAPTO,3,FEDTO,-5",
+        "CYCLE/MILL,RAPTO,3,FEDTO,-5",
         "CYCLE/DRILL,DEEP,RAPTO,3,FEDTO,-5",
         "CYCLE/DRILL,126.0,85.0,1.0,MMPR",
         "CYCLE/DRILL,RAPTO,3,FEDTO,-5,STEP,1",

@@ -8,7 +8,7 @@ import tracemalloc
 
 import numpy as np
 import pytest
-from cl_reading import CATIA, COLUMNS, FAST, NX, both_reader
+from cl_reading import CATIA, COLUMNS, FAST, NX, both_reader, without_feeds  # noqa: F401  without_feeds is taken by every test
 from hypothesis import given, settings
 from hypothesis import strategies as st
 

@@ -34,6 +34,7 @@ class ClActions:
         self.motion = motion
         self.dialect: DialectName = "apt"
         self.told_by_word = False
+        self.told_line = 0
         self.compensated = False
         self.informing: dict[str, int] = {}
         self.units: Literal["mm", "inch"] = "mm"
@@ -45,20 +46,21 @@ class ClActions:
 
     # dialects
 
-    def tell_dialect(self, name: DialectName | None, *, by_word: bool) -> None:
+    def tell_dialect(self, name: DialectName | None, line: int, *, by_word: bool) -> None:
         """Take a sign of the file's dialect: the first one, but a word tells more than a comment before all motion."""
         outranks = by_word and not self.told_by_word and not self.motion.records.n
         if name is not None and (self.dialect == "apt" or outranks):
+            self.told_line = line if name != self.dialect else self.told_line
             self.dialect, self.told_by_word = name, by_word
 
-    def read_comment(self, text: str) -> None:
+    def read_comment(self, text: str, line: int) -> None:
         """Take the dialect that a comment tells before the first motion."""
         if not self.motion.records.n:
-            self.tell_dialect(find_by_comment(text), by_word=False)
+            self.tell_dialect(find_by_comment(text), line, by_word=False)
 
-    def read_word(self, word: str, args: list[str]) -> None:
+    def read_word(self, word: str, args: list[str], line: int) -> None:
         """Take the dialect that a word tells."""
-        self.tell_dialect(find_by_word(word, args), by_word=True)
+        self.tell_dialect(find_by_word(word, args), line, by_word=True)
 
     def add_event(self, text: str, line: int) -> None:
         """Keep a statement as an event before the next record."""
@@ -136,7 +138,7 @@ class ClActions:
             args = args[:k]
         v = parse_numbers(args, range(7, 13), form)
         if len(v) >= _NX_CIRCLE:
-            self.tell_dialect("nx", by_word=False)
+            self.tell_dialect("nx", line, by_word=False)
         hand = DIALECTS[self.dialect].circle
         if revolutions is not None and hand == UNKNOWN:
             refuse("TIMES in a file whose CAM system no header tells; expected the header of the one that wrote it")

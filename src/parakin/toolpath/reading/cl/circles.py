@@ -1,7 +1,7 @@
 """Arcs of CL files that a centre and an axis give (CIRCLE, MOVARC): which way round they go, and the proof of it.
 
-The hand of a CIRCLE is its dialect's; the motions before and after it, where they join the arc tangentially, prove it or
-contradict it. Where the dialect is not known, they alone decide. Errors name no file and no line.
+The hand of a CIRCLE is its dialect's; the motions before and after it, where they join the arc tangentially, prove it
+or contradict it. Where the dialect is not known, they alone decide. Errors name no file and no line.
 """
 
 import math
@@ -154,7 +154,9 @@ def follow_circle(circle: Circle, here: Triple, point: Triple, arc_step: tuple[i
     shorter = min(turn, 2.0 * math.pi - turn)
     if circle.radius * (1.0 - math.cos(0.5 * shorter)) * scale <= ON_CIRCLE:
         return turn <= math.pi
-    if abs(turn - step) <= _SAME_STEP * step and turn <= _WIDEST_STEP:
-        return True
-    refuse(f"a point on the circle of line {circle.line} that may end a line or go on along the arc; "
-           "expected a CIRCLE or points at equal steps")  # fmt: skip
+    if abs(turn - step) > _SAME_STEP * step or turn > _WIDEST_STEP:
+        refuse(
+            f"a point on the circle of line {circle.line} that may end a line or go on along the arc; "
+            "expected a CIRCLE or points at equal steps"
+        )
+    return True

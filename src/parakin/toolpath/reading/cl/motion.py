@@ -179,10 +179,10 @@ class ClMotion:
             return turn, shift
         relative = first.rotation.T @ now.rotation
         shift = first.rotation.T @ (now.origin - first.origin)
-        x, y, z = (now.origin + 0.0).tolist()
+        origin = ", ".join(f"{value:.6g}" for value in now.origin + 0.0)
         self.notes.add(
             line,
-            f"another workpiece frame, origin {x:.6g}, {y:.6g}, {z:.6g} mm: its points are given in the file's first one",
+            f"another workpiece frame, origin {origin} mm: its points are given in the file's first one",
         )
         return relative if turn is None else relative @ turn, shift
 

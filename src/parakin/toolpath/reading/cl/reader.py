@@ -28,6 +28,7 @@ from ..text import (
     quote_short,
 )
 from .actions import ClActions
+from .dialects import DIALECTS
 from .motion import ClMotion
 from .statements import HIDDEN, ends_text, execute_statement
 
@@ -56,8 +57,8 @@ def read_cl(
     ----------
     path : the file
     arc_tolerance : mm, the largest distance of the straight lines that replace an arc from it
-    frame : "file": the path's frame is the file's (MSYS, CSYS, CATIA's matrix); "ignore": it is None. Later frames of the
-        file are brought into its first one either way
+    frame : "file": the path's frame is the file's (MSYS, CSYS, CATIA's matrix); "ignore": it is None. Later frames of
+        the file are brought into its first one either way
     progress : called now and then with the fraction read, 0 to 1
 
     Returns
@@ -182,6 +183,8 @@ class ClReader:
             text = f"a tool axis off unit length, normalised; the worst by {worst:.3g}"
             motion.notes.add(int(first), text, int(count))
         frame = self._take_frame()
+        if actions.dialect != "apt":
+            motion.notes.add(actions.told_line, f"read as {DIALECTS[actions.dialect].title} writes it")
         if actions.informing:
             words = sorted(actions.informing)
             more = f" and {len(words) - _MOST_LISTED} more" if len(words) > _MOST_LISTED else ""
@@ -313,7 +316,7 @@ class ClReader:
         if "$" in text:
             if _HEADER.match(text):
                 self.matrix, self.matrix_from = [], line
-            self.actions.read_comment(text)
+            self.actions.read_comment(text, line)
             if self.matrix is not None:
                 return ""
             text = self._strip_comment(text, line)

@@ -31,7 +31,7 @@ def execute_statement(actions: ClActions, text: str, line: int) -> str:
     text = text.removeprefix(HIDDEN)
     message = _TEXT.match(text)
     if message is not None:
-        actions.read_comment(text)
+        actions.read_comment(text, line)
         actions.add_event(text, line)
         return message[1].upper()
     head, _, tail = text.partition("/")
@@ -39,7 +39,7 @@ def execute_statement(actions: ClActions, text: str, line: int) -> str:
     args = [remove_blanks(a) for a in tail.split(",")] if tail.strip() else []
     if comma:
         args = minor.split(",") + args
-    actions.read_word(name, args)
+    actions.read_word(name, args, line)
     if name != "GOTO":
         actions.motion.arc_step = None
     word = WORDS.get(name)
@@ -62,15 +62,15 @@ def _take_unknown(actions: ClActions, name: str, line: int, *, hidden: bool) -> 
     begin = letters[0] if letters else ""
     if begin != name and begin in WORDS and WORDS[begin].slash:
         refuse(f"{quote_short(name)}; expected a slash after {begin}")
-    reason = REFUSED.get(name) or REFUSED.get(name.split("=")[-1]) if not hidden or name in REFUSED else None
-    if reason is not None:
-        refuse(f"{quote_short(name)}: {reason}, and cannot be honoured; expected plain motion")
+    core = re.split("[=)]", name)[-1]  # behind a label or a name: L1)GOTO, M1=MACRO
+    if core in REFUSED:
+        refuse(f"{quote_short(name)}: {REFUSED[core]}, and cannot be honoured; expected plain motion")
     if hidden or name in INFORMING:
         actions.informing.setdefault(name, line)
         return
     if name.startswith("GO"):
         refuse(f"unknown word {quote_short(name)} that begins as motion does; expected GOTO/x,y,z")
-    meant = _find_meant(name)
+    meant = next((word for word in _ACTING if name.endswith(word)), None) or _find_meant(name)
     if meant is not None:
         refuse(f"unknown word {quote_short(name)}; expected {meant}")
     actions.motion.notes.add(line, f"unknown word {quote_short(name)}, not acted on")

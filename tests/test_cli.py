@@ -12,7 +12,7 @@ import parakin as pk
 from parakin.cli import main
 
 PART = "UNITS/MM\nFEDRAT/1000,MMPM\nGOTO/0,0,-1650,0,0,1\nGOTO/10,0,-1650\nGOTO/10,20,-1660\n"
-LONG = "GOTO/0,0,-1650,0,0,1\nGOTO/0,0,-2050\n"
+LONG = "FEDRAT/1000,MMPM\nGOTO/0,0,-1650,0,0,1\nGOTO/0,0,-2050\n"
 
 
 @pytest.fixture(scope="module", autouse=True)

@@ -47,7 +47,7 @@ def test_its_kinematics_are_those_of_three_struts(machine_file):
 
 def test_the_commands_of_the_page_work(machine_file, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
-    Path("part.apt").write_text("UNITS/MM\nRAPID\nGOTO/0,0,0\nGOTO/40,10,0\nGOTO/40,-30,0\nFINI\n")
+    Path("part.apt").write_text("UNITS/MM\nFEDRAT/900,MMPM\nRAPID\nGOTO/0,0,0\nGOTO/40,10,0\nGOTO/40,-30,0\nFINI\n")
     commands = [line for line in PAGE.read_text(encoding="utf-8").splitlines() if line.startswith("parakin ")]
     assert len(commands) == 4
     for command in commands:
@@ -61,7 +61,7 @@ def test_the_commands_of_the_page_work(machine_file, tmp_path, monkeypatch, caps
 
 def test_a_path_off_its_limits_or_plane_is_refused(machine_file, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
-    Path("part.apt").write_text("UNITS/MM\nGOTO/0,0,0\nGOTO/400,0,0\nGOTO/0,0,7\nFINI\n")
+    Path("part.apt").write_text("FEDRAT/900,MMPM\nGOTO/0,0,0\nGOTO/400,0,0\nGOTO/0,0,7\nFINI\n")
     assert main(["post", "part.apt", "--machine", "rpr3.yaml", "-o", "out"]) == 3
     said = "".join(capsys.readouterr())
     assert "part.apt:3" in said

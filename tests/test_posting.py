@@ -120,7 +120,7 @@ def test_turns_are_counted_into_the_drives_range(start, end):
 def test_leg_too_long_is_told_with_its_line(tmp_path):
     # On the axis the struts are sqrt((R - r)² + p²) long with p = -Z - l1 - l2.
     part = tmp_path / "part.cls"
-    part.write_text("GOTO/0,0,-1650,0,0,1\nGOTO/0,0,-2050\n$$ aside\nGOTO/0,0,-2060\nGOTO/0,0,-1650\n")
+    part.write_text("FEDRAT/900,MMPM\nGOTO/0,0,-1650,0,0,1\nGOTO/0,0,-2050\nGOTO/0,0,-2060\nGOTO/0,0,-1650\n")
     posted = post_path(pk.load("tricept"), read_cl(part))
     assert posted.broken.tolist() == [0, 1 + posted.limits.index("d1.max"), 1 + posted.limits.index("d1.max"), 0]
     assert posted.broken_record_count == 2
@@ -130,7 +130,7 @@ def test_leg_too_long_is_told_with_its_line(tmp_path):
     assert worst.value == pytest.approx(length)
     assert worst.excess == pytest.approx(length - 1520)
     assert worst.text == f"leg d2 would be {length:,.1f} mm, limit 1,520"
-    assert (posted.first.limit, posted.first.line) == ("d1.max", 2)
+    assert (posted.first.limit, posted.first.line) == ("d1.max", 3)
     assert posted.first.value == pytest.approx(math.hypot(250, 1600))
     assert posted.worst.line == 4
 

@@ -70,7 +70,8 @@ def _format_spindle(arguments: list[str], event: Event, path: ToolPath) -> str |
     speed = float(path.spindle[event.record]) if event.record < len(path) else float("nan")
     if not 0.0 < speed < 1e9:
         return None
-    turns = [turn for e in path.events if e.line <= event.line for turn in _TURN.findall(e.text.upper())]
+    turns = _TURN.findall(event.text.upper())  # a tap's hole has several events in one line
+    turns = turns or [turn for e in path.events if e.line <= event.line for turn in _TURN.findall(e.text.upper())]
     return f"S{speed:.10g} {'M4' if turns[-1:] == ['CCLW'] else 'M3'}"
 
 

@@ -294,13 +294,15 @@ def test_nx_times(read):
 
 @pytest.mark.parametrize(
     "statement",
-    [*REFUSED, "GOTOO/1,2,3", "GOT0/1,2,3", "GOHOME", "GOSOMEWHERE", "MODE/INCR", "MODE/TURN", "CUTCOM/LEFT"]
-    + ["CUTCOM/ON,RIGHT,3", "TRANS/1,2,3", "TRACUT/LT1"]
-    + ["CSYS/1,2", "RAPDI", "FEDRATE/5", "TLON,GOLFT/L1", "GOFWD/C1,PAST,L2", "SPINDLE/3"]
-    + ["COPY/1,TRANSL,10,0,0,1", "CALL/SUB1", "ROTABL/90", "ORIGN/1,2,3", "MSY/0,0,0,1,0,0,0,1,0", "CYCL/OFF"]
-    + ["UNTS/MM", "GOLFT/L1"]
-    + ["TLLFT,GOLFT/L1", "M1=MACRO/A", "L1)LOOPST", "L1)GOTO/1,2,3", "N10 GOTO/1,2,3"],
-)  # fmt: skip
+    [
+        *REFUSED,
+        *("GOTOO/1,2,3", "GOT0/1,2,3", "GOHOME", "GOSOMEWHERE", "L1)GOTO/1,2,3", "N10 GOTO/1,2,3"),
+        *("MODE/INCR", "MODE/TURN", "CUTCOM/LEFT", "CUTCOM/ON,RIGHT,3", "TRANS/1,2,3", "TRACUT/LT1", "CSYS/1,2"),
+        *("RAPDI", "FEDRATE/5", "SPINDLE/3", "ORIGN/1,2,3", "CYCL/OFF", "UNTS/MM", "MSY/0,0,0,1,0,0,0,1,0"),
+        *("TLON,GOLFT/L1", "GOFWD/C1,PAST,L2", "GOLFT/L1", "TLLFT,GOLFT/L1", "COPY/1,TRANSL,10,0,0,1"),
+        *("CALL/SUB1", "ROTABL/90", "M1=MACRO/A", "L1)LOOPST"),
+    ],
+)
 def test_refused_with_the_line(read, statement):
     refused(read, f"FEDRAT/5\nGOTO/0,0,0\n{statement}\nGOTO/1,0,0\n", 3)
 

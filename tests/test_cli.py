@@ -63,7 +63,7 @@ def test_post(part, out, capsys):
 def test_post_off_limits(part, out, capsys):
     part.write_text(LONG)
     assert main(["post", str(part), "-m", "tricept", "-o", str(out)]) == 3
-    assert f"{part}:2: leg d2 would be 1,619.4 mm, limit 1,520" in capsys.readouterr().out
+    assert f"{part}:3: leg d2 would be 1,619.4 mm, limit 1,520" in capsys.readouterr().out
     with (out / "part.joints.csv").open() as file:
         assert [row["broken"] for row in csv.DictReader(file)] == ["", "d1.max"]
 
@@ -74,7 +74,7 @@ def test_post_json(part, out, capsys):
     said = json.loads(capsys.readouterr().out)
     assert said["schema"] == "parakin.post/1"
     assert (said["verdict"], said["records"], said["off_limits"]) == ("off limits", 2, 1)
-    assert said["first"]["line"] == 2
+    assert said["first"]["line"] == 3
     assert said["worst"]["excess"] == pytest.approx((250**2 + 1600**2) ** 0.5 - 1520)
     assert [joint["joint"] for joint in said["joints"]] == ["d1", "d2", "d3", "theta1", "theta2"]
     assert said["joints"][3]["high"] == pytest.approx(360)

@@ -223,7 +223,7 @@ def test_off_limits_says_where_and_how_much(tmp_path):
     machine = LOADED["tricept"]
     part = tmp_path / "part.cls"
     lines = [f"GOTO/{x},0,-1650,0,0,1" for x in (0, 10, 20, 900, 30, 950)]
-    part.write_text("\n".join(["TOOL PATH/A", *lines]) + "\n")
+    part.write_text("\n".join(["FEDRAT/900,MMPM", *lines]) + "\n")
     posted = post_path(machine, read_cl(part))
     html = render_report(posted)
     assert posted.first is not None

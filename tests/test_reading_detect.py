@@ -38,7 +38,7 @@ def test_which_reader(tmp_path, name, text, kind):
 
 def test_any_file(tmp_path):
     (tmp_path / "a").write_text("G0 X1 Y2 Z3\nG2 X3 I1 F5\n")
-    (tmp_path / "b").write_text("GOTO/1,2,3\nGOTO/3,2,3\n")
+    (tmp_path / "b").write_text("FEDRAT/5\nGOTO/1,2,3\nGOTO/3,2,3\n")
     seen = []
     a, b = read_path(tmp_path / "a", arc_tolerance=0.5, progress=seen.append), read_path(tmp_path / "b")
     assert (a.dialect, b.dialect) == ("gcode", "apt") and seen[-1] == 1.0

@@ -93,8 +93,10 @@ def decide_hand(arc: OpenArc, leaving: int) -> int:
     hand = arc.circle.hand
     if hand != UNKNOWN:
         if -hand in proofs and hand not in proofs:
+            side = "right" if hand == RIGHT else "left"
             refuse(
-                "an arc whose way round in this dialect contradicts the motions that join it; expected a tangential one"
+                f"an arc whose way round, {side}-handed about its axis in this dialect, contradicts the motion that joins it "
+                "tangentially; expected the axis, or the header, of the other way round"
             )
         return hand
     if len(proofs) != 1:

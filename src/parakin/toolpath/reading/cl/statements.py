@@ -15,6 +15,7 @@ _NO_TEXT = re.compile(
 
 HIDDEN = "\0"  # no line of a file has it
 _LONGEST_WORD = 10
+_MOTION = tuple(name for name, word in WORDS.items() if word.act is not None and word.ends_message)
 _ACTING = tuple(name for name, word in WORDS.items() if word.act is not None and len(name) >= 4)
 
 
@@ -70,7 +71,7 @@ def _take_unknown(actions: ClActions, name: str, line: int, *, hidden: bool) -> 
         return
     if name.startswith("GO"):
         refuse(f"unknown word {quote_short(name)} that begins as motion does; expected GOTO/x,y,z")
-    meant = next((word for word in _ACTING if name.endswith(word)), None) or _find_meant(name)
+    meant = next((word for word in _MOTION if name.endswith(word)), None) or _find_meant(name)
     if meant is not None:
         refuse(f"unknown word {quote_short(name)}; expected {meant}")
     actions.motion.notes.add(line, f"unknown word {quote_short(name)}, not acted on")

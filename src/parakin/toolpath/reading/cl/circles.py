@@ -95,8 +95,8 @@ def decide_hand(arc: OpenArc, leaving: int) -> int:
         if -hand in proofs and hand not in proofs:
             side = "right" if hand == RIGHT else "left"
             refuse(
-                f"an arc whose way round, {side}-handed about its axis in this dialect, contradicts the motion that joins "
-                "it tangentially; expected the axis, or the header, of the other way round"
+                f"an arc whose way round, {side}-handed about its axis in this dialect, contradicts the motion "
+                "that joins it tangentially; expected the axis, or the header, of the other way round"
             )
         return hand
     if len(proofs) != 1:

@@ -152,6 +152,8 @@ class Program:
                 texts.append("G4 P1.5" if code == "G4" else code)
         if not {"G4 P1.5", "G64"} <= set(texts):  # both use P
             self.speed = speed
+            if "M6" in texts and self.turning:
+                self.turning = "M5"  # LinuxCNC stops the spindle for the change
             self.turning = next((text for text in texts if text in ("M3", "M4", "M5")), self.turning)
             self.write(words)
             self.events += [(len(self.steps), len(self.lines), text) for text in texts]

@@ -45,7 +45,7 @@ def test_a_whole_program(both):
         (len(p), 16, "M5"),
         (len(p), 17, "M30"),
     ]
-    assert [(n.line, "slash" in n.text) for n in p.notes] == [(13, True)]
+    assert [(n.line, "length" in n.text, "slash" in n.text) for n in p.notes] == [(7, True, False), (13, False, True)]
 
 
 @pytest.mark.parametrize(

@@ -127,7 +127,7 @@ def test_arcs_slightly_off_their_circle(both):
         ("G3 X0 Y10\n", 3, ["either R or I and J"]),
         ("G3\n", 3, ["either R or I and J"]),
         ("G3 X0 Y10 R5 I1\n", 3, ["either R or I and J"]),
-        ("G3 X0 Y10 I-10 K0\n", 3, ["K for an arc in G17"]),
+        ("G3 X0 Y10 I-10 K1\n", 3, ["K for an arc in G17"]),
         ("G18 G3 X0 J1\n", 3, ["J for an arc in G18", "K and I"]),
         ("G19 G3 Y0 I1\n", 3, ["I for an arc in G19", "J and K"]),
         ("G3 X0 Y10 R7\n", 3, ["radius 7 mm", "14.1421 mm", "7.07107 mm or more"]),

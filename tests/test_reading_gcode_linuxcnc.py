@@ -129,12 +129,12 @@ def test_random_programs(tmp_path):
     "text",
     [
         "G1 X1", "G0 X1 X2", "X1", "G0 G1 X1 F1", "G17 G18", "M3 M5", "M7 M8", "G80 X1", "T1.5", "M3.5", "G0 X1 H1",
-        "G0 X1 P1", "G0 X1 R1", "G0 X1 I1", "G40 D1", "G61 P1", "G59.4", "G2 F1 X10", "G2 F1 X10 I5 K0",
+        "G0 X1 P1", "G0 X1 R1", "G0 X1 I1", "G61 P1", "G59.4", "G2 F1 X10", "G2 F1 X10 I5 K1",
         "G2 F1 X10 R5 I5", "G2 F1 R5", "G2 F1 X10 Y0.6 I5", "G2 F1 X10.003 R5", "G2 F1 I5 P0", "G2 F1 I5 P1.5",
         "G18 G2 F1 X1 J1", "G90.1 G2 F1 I5 X10", "G93 G1 X1", "G53", "G53 X1", "G0 G91 G53 X1", "G4", "G0 X1 N5",
         "N-1 G0 X1", "//G0 X1", "G0 X1 )", "G0 X1 (a", "G0 X1 (a (b))", "G0 X1.2.3", "G0 X.", "G0 X", "G0 X1E5",
         "G49 H1", "G0 X1 %", "G43 H1.5", "S-1 M3", "G1 X1 F-1", "G0 X(a)1", "G4 P1 G53 G0 X1", "M-3",
-        "G93 F-1", "G0 X1 F-1 G93", "O5 G0 X1", "O5 sub", "O1.5", ":5", "% x", "G0 X1 M98 P1", "/G0 X1 X2",
+        "G93 F-1", "G0 X1 F-1 G93", "O5 G0 X1", "O1.5", ":5", "% x", "G0 X1 M98 P1", "/G0 X1 X2",
     ],
 )  # fmt: skip
 def test_what_linuxcnc_refuses_is_refused(tmp_path, text):

@@ -77,6 +77,7 @@ def test_turns_given_late(both):
     p = both("G0 X0 Y0 Z0\nG1 X1 F1\nB10\nC0\nA5\n")
     np.testing.assert_array_equal(np.degrees(p.turns[:2]), np.zeros((2, 3)))
     assert [(n.line, n.text[0]) for n in notes(p)] == [(3, "B"), (5, "A")]
+    assert [n.line for n in p.notes if "without tool centre point control" in n.text] == [3]
 
 
 def test_f_is_degrees_where_only_turns_move(both):
@@ -110,7 +111,8 @@ def test_g53(both):
         ("F1\nG0 X0 Y0\nG53 G2 X1 I.5\n", 3, ["G53"]),
         ("G0 X0\nG91\nG53 X1\n", 3, ["G53 in G91"]),
         ("G43 H1\nG53 G0 Z0\n", 2, ["G53", "G43", "G49"]),
-        ("G43.1 Z5\nG53 G0 Z0\n", 2, ["G53", "G43.1"]),
+        ("G43 H1\nG43.1 X5\nG53 G0 Z0\n", 3, ["G53", "G43.1"]),
+        ("G43.1 Z5\nG20\nG53 G0 Z0\n", 3, ["G53", "unit"]),
     ],
 )
 def test_g53_refused(both, text, line, words):
@@ -138,15 +140,35 @@ def test_one_work_system(both, code):
         refused(both_error(both), f"G0 X1\n{code} X2\n", 2, code, "offset")
 
 
-def test_tool_length_offsets_move_nothing(both):
-    p = both("G0 X0 Y0 Z9\nG43 H2 Z8\nG43 Z7\nG43.1 X1 Z2.5\nG20\nG43.1 Z1\nG21 Z6\nG43.2 H4\nG49 Z5\n")
-    assert p.tip[:, 2].tolist() == [9, 8, 7, 6, 5] and p.tip[:, 0].tolist() == [0] * 5
-    assert [e.text for e in p.events] == ["G43 H2", "G43", "G43.1 X1 Z2.5", "G43.1 Z25.4", "G43.2 H4", "G49"]
+def test_tool_length_offsets_of_unknown_length_move_nothing(both):
+    p = both("G0 X0 Y0 Z9\nG43 H2\nX1\nG43 Z7\nG49 X0\nG43 H0 Y1\n")
+    assert p.tip.tolist() == [[0, 0, 9], [1, 0, 9], [1, 0, 7], [0, 0, 7], [0, 1, 7]]
+    assert [e.text for e in p.events] == ["G43 H2", "G43", "G49", "G43 H0"]
+    assert [(n.line, "(2 times)" in n.text) for n in notes(p)] == [(2, True)]
+
+
+def test_tool_lengths(both):
+    """The holder stays where it is, so the tip is elsewhere."""
+    p = both("G0 X0 Y0 Z9\nG43.1 X1 Z2.5\nY1\nG43.2 H3\nZ6\nY2\n", tools={3: 4.0})
+    assert p.tip.tolist() == [[0, 0, 9], [-1, 1, 6.5], [-1, 1, 6], [-1, 2, 6]]
+    assert [e.text for e in p.events] == ["G43.1 X1 Z2.5", "G43.2 H3"]
+    p = both(
+        "T1 M6\nG0 X0 Y0 Z90\nG43\nX1\nT2 M6\nG43 Z5\nG43 H1\nX2\nG49\nX3\nG53 Z9\n",
+        tools={1: 50, 2: 80},
+        workpiece=SHIFTED,
+    )
+    assert p.tip[:, 2].tolist() == [90, 40, 5, 35, 85, 1409]
+    assert p.tool == {"number": 1.0, "length": 50.0}
+    assert both("G0 X0 Y0 Z9\nG43 H1\nG53 Z9\n", tools={1: 50}, workpiece=SHIFTED).tip[-1].tolist() == [0, 0, 1359]
+    assert both("G0 X0 Y0 Z9\nG10 L1 P7 Z3\nG43 H7\nX1\n").tip[-1].tolist() == [1, 0, 6]
+    refused(both_error(both), "G0 Z1\nG43 H5\n", 2, "G43 for tool 5", "table", tools={1: 50})
 
 
 def test_tool_centre_point_control(both):
     p = both("G43.4 H1\nG0 X0 Y0 Z9 B0\n")
-    assert told(p) == [(0, 1, "G43.4 H1")] and [n.line for n in notes(p)] == [1]
+    assert told(p) == [(0, 1, "G43.4 H1")] and [n.line for n in p.notes if "tool centre" in n.text] == [1]
+    p = both("G0 B10\nG43.4 H1\nG0 X0 Y0 Z9\nB20\nG49\nX1\nB0\n")
+    assert [n.line for n in p.notes if n.text.startswith("A, B or C without")] == [7]
     p = both("N10 TRAORI\nG0 X0 Y0 Z9 B0\nTRAORI(1)\n")
     assert [e.line for e in p.events] == [1, 3] and "(2 times)" in notes(p)[0].text
 

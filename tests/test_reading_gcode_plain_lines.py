@@ -56,9 +56,9 @@ def test_progress_and_many_blocks(tmp_path, monkeypatch):
 def test_an_error_far_into_a_large_file(tmp_path):
     path = tmp_path / "big.ngc"
     lines = ["G0 X0 Y0 Z0", "F5", "G1", *["X12.3456 Y-.5 Z1"] * 100_000]
-    lines[50_000] = "X1 Y#2"
+    lines[50_000] = "X1 Y#<b>"
     path.write_text("\n".join(lines))
-    with pytest.raises(InputError, match=r"big\.ngc:50001: parameters"):
+    with pytest.raises(InputError, match=r"big\.ngc:50001: #<b> is not set"):
         read_gcode(path)
 
 

@@ -6,12 +6,13 @@ from typing import NoReturn
 
 from ..text import LARGEST, quote_short, refuse
 from .codes import G43_4, find_g_group, find_m_group, format_g_code
+from .expressions import Key, ParameterStore, read_key, read_value, skip_blanks
 
 LONGEST = 4000  # characters in one line; RS274/NGC allows 256, but files have longer comments
-VALUES = "ABCFHIJKPQRSTXYZ"  # letters of words with a value
+VALUES = "ABCDEFHIJKLPQRSTXYZ"  # letters of words with a value
 NO_PROGRAM = (
-    "O words (subroutines, branches) are not read; expected plain blocks, "
-    "or O and a program number alone in the first block"
+    "O words without sub, call, if, while and the like are not read; "
+    "expected O and a program number alone in the first block"
 )
 
 _BLANKS = " \t"
@@ -23,6 +24,9 @@ _TOKEN = re.compile(
     r"|\((?P<comment>[^()]*)\)|;(?P<rest>.*)|[ \t]+",
     re.ASCII,
 )
+_COMPUTED = re.compile(
+    r"[\[#]|[+-][ \t]*[\[#A-Za-z+-]|(?:[A-Za-z][ \t]*){2,6}\["
+)  # begins a value that is no plain number
 _MOST_M = 4  # M codes in a block, as RS274/NGC has it
 _WHOLE = 1e-3  # so far off a whole number may be
 _TENTH = 1e-6  # so far off a tenth may a G code be, in tenths
@@ -33,8 +37,8 @@ _CONTROLS = {
     "\r": "a carriage return within a line; expected lines that end in LF or CR LF",
 }
 _REFUSED_SIGNS = {
-    "#": "parameters (#) are not read; expected plain numbers",
-    "[": "expressions ([...]) are not read; expected plain numbers",
+    "#": "parameters (#) are not read here; expected plain numbers",
+    "[": "an expression without a letter before it",
     "O": NO_PROGRAM,
     "%": "a % within the program; expected it alone on its line, both at the beginning and at the end, or not at all",
     ":": "a colon (program and main block numbers) is not read; expected O and a number, or N and a number",
@@ -50,6 +54,7 @@ class Block:
     values : by letter, the numbers as written; whoever acts on a word takes it out
     g, m : the code of each modal group, G codes in tenths
     messages : the comments that are messages, without their brackets
+    assignments : parameters and the values that they take
     program : the digits of a program number, which leaves no room for other words
     deleted : whether the line begins with a slash
     spaced : whether a number has blanks within
@@ -59,18 +64,19 @@ class Block:
     g: dict[str, int] = field(default_factory=dict)
     m: dict[str, int] = field(default_factory=dict)
     messages: list[str] = field(default_factory=list)
+    assignments: list[tuple[Key, float]] = field(default_factory=list)
     program: str | None = None
     deleted: bool = False
     spaced: bool = False
 
 
-def parse_block(text: str, letters: str = VALUES) -> Block:
-    """Parse a line, without blanks around it, into words; ``letters`` are those of words with a value."""
-    if len(text) > LONGEST:
-        refuse(f"a line of more than {LONGEST} characters; expected a block of G-code")
-    control = _CONTROL.search(text)
-    if control is not None:
-        refuse(_CONTROLS.get(control[0], f"a control character ({ord(control[0])}); expected plain text"))
+def parse_block(text: str, letters: str = VALUES, store: ParameterStore | None = None) -> Block:
+    """Parse a line, without blanks around it, into words.
+
+    letters : those of words with a value
+    store : the parameters that expressions read; without it, expressions and parameters are refused
+    """
+    check_text(text)
     block = Block()
     at = 0
     if text.startswith("/"):
@@ -81,10 +87,15 @@ def parse_block(text: str, letters: str = VALUES) -> Block:
         if token is None:
             if block.program is not None and text[at].isalpha():
                 refuse(NO_PROGRAM)
-            _refuse_text(text, at)
+            at = _add_computed(block, text, at, first, letters, store)
+            first = False
+            continue
         letter = token["letter"]
         if letter is not None:
-            _add_word(block, letter.upper(), token["number"].rstrip(_BLANKS), first, letters)
+            digits = token["number"].rstrip(_BLANKS)
+            plain = "".join(digits.split())
+            block.spaced = block.spaced or plain != digits
+            _add_word(block, letter.upper(), plain, first, letters)
             first = False
         elif token["name"] is not None:
             _add_g_code(block, G43_4)
@@ -96,6 +107,15 @@ def parse_block(text: str, letters: str = VALUES) -> Block:
     return block
 
 
+def check_text(text: str) -> None:
+    """Refuse a line that is too long or holds control characters."""
+    if len(text) > LONGEST:
+        refuse(f"a line of more than {LONGEST} characters; expected a block of G-code")
+    control = _CONTROL.search(text)
+    if control is not None:
+        refuse(_CONTROLS.get(control[0], f"a control character ({ord(control[0])}); expected plain text"))
+
+
 def round_whole(letter: str, value: float) -> int:
     """Round the value of a word that counts or numbers something; refuse one that is not whole or below zero."""
     if not (value >= 0.0 and abs(value - round(value)) <= _WHOLE):
@@ -103,12 +123,38 @@ def round_whole(letter: str, value: float) -> int:
     return round(value)
 
 
-def _add_word(block: Block, letter: str, digits: str, first: bool, letters: str) -> None:
-    plain = "".join(digits.split())
+def _add_computed(block: Block, text: str, at: int, first: bool, letters: str, store: ParameterStore | None) -> int:
+    """Add a word whose value is an expression, or a parameter that is set; return where the text goes on."""
+    sign = text[at]
+    behind = skip_blanks(text, at + 1)
+    if store is not None and sign == "#":
+        key, at = read_key(text, behind, store)
+        at = skip_blanks(text, at)
+        if text[at : at + 1] != "=":
+            refuse("a parameter without a letter before it or an equals sign behind it")
+        value, at = read_value(text, at + 1, store)
+        if not block.assignments and block.program is not None:
+            refuse(NO_PROGRAM)
+        block.assignments.append((key, value))
+        return at
+    if store is None or not (sign.isascii() and sign.isalpha()) or not _COMPUTED.match(text, behind):
+        _refuse_text(text, at)
+    value, at = read_value(text, behind, store)
+    _add_word(
+        block, sign.upper(), format(value, ".15g") if abs(value) < LARGEST else repr(value), first, letters, value
+    )
+    return at
+
+
+def _add_word(block: Block, letter: str, plain: str, first: bool, letters: str, computed: float | None = None) -> None:
+    """Add a word to the block.
+
+    plain : the number as written, without blanks
+    computed : its value where that is not simply what is written
+    """
     if block.program is not None:
         refuse(NO_PROGRAM)
-    block.spaced = block.spaced or plain != digits
-    value = float(plain)
+    value = float(plain) if computed is None else computed
     if not abs(value) <= LARGEST:
         refuse(f"{letter}: {quote_short(plain)} is out of range")
     if letter in letters:
@@ -161,9 +207,11 @@ def _refuse_text(text: str, at: int) -> NoReturn:
         nested = "(" in text[at + 1 :].partition(")")[0]
         refuse("a comment within a comment" if nested else "a comment without an end; expected a closing bracket")
     rest = text[at + 1 :].lstrip(_BLANKS)
+    if sign.isascii() and sign.isalpha() and rest[:1] == "=":
+        refuse(f"{quote_short(text[at:])}: an equals sign; expected a letter and a number")
     if sign.isascii() and sign.isalpha():
         if rest[:1] in ("#", "["):
-            refuse(_REFUSED_SIGNS[rest[0]])
+            refuse("parameters and expressions are not read here; expected plain numbers")
         letters = re.match(r"[A-Za-z]{2,}", text[at:])
         if letters is not None and rest[:1].isalpha() and len(letters[0]) > 2:
             refuse(f"{quote_short(letters[0])}: names and functions are not read; expected a letter and a number")

@@ -1,40 +1,69 @@
 """Execute the words of a block, in the order of RS274/NGC."""
 
 import math
+from collections.abc import Callable, Mapping
 from typing import Literal
-
-import numpy as np
 
 from ...path import Event
 from ..text import INCH, refuse
 from . import codes
 from .block import NO_PROGRAM, Block, round_whole
-from .codes import format_g_code
+from .codes import find_m_group, format_g_code
+from .cycles import CannedCycles
+from .expressions import Key
+from .machine_parameters import add_machine_parameters
 from .motion import AXES, GcodeMotion
+from .offsets import FIRST_HOME, OffsetExecutor
+from .parameters import Parameters
 
-_TIP_NOTE = "tool centre point control (G43.4 or TRAORI): every point is read as the tool's tip, with it and without"
+_SET_TOOL = 61  # M61
 _DELETED_NOTE = "a block that a slash lets the operator leave out: it is read"
 _SPACED_NOTE = "blanks within a number: it is read without them, as RS274/NGC has it"
 _FEED_NOTE = "F in a block that changes the unit: it is in the unit before, as RS274/NGC has it"
 
 
 class BlockExecutor:
-    """Execute one block at a time. Errors name no file and no line. Lengths in the events' texts are mm."""
+    """Execute one block at a time. Errors name no file and no line. Lengths in the events' texts are mm.
 
-    def __init__(self, motion: GcodeMotion):
+    tools : the lengths of tools by number, mm; None if there is no table
+    reference : X to C of the machine's reference point (G28), mm and degrees
+    """
+
+    def __init__(
+        self,
+        motion: GcodeMotion,
+        tools: Mapping[int, float] | None = None,
+        reference: Mapping[str, float] | None = None,
+    ):
         self.motion = motion
+        self.parameters = Parameters(motion.notes)
         self.events: list[Event] = []
         self.units: Literal["mm", "inch"] = "mm"
         self.units_given = False
         self.tool: dict[str, float | str] = {}
         self.finished = False
         self._begun = False  # whether there was a block with words
+        self._tools = dict(tools or {})
         self._selected_tool = math.nan
+        self._loaded_tool = math.nan
         self._speed = math.nan  # S, rev/min
-        self._spindle: int | None = None  # M3, M4 or M5
-        self._offset: str | None = None  # the tool length offset in force, where it may be other than zero
-        self._system: int | None = None  # the work system, G54 to G59.3
-        self._machine_records = 0  # those given in the machine's own coordinates
+        self._cycles = CannedCycles(motion, self._add_event, self._turn_spindle)
+        self._offsets = OffsetExecutor(motion, self.parameters, self._add_event, tools)
+        add_machine_parameters(self.parameters, motion, self._read_modes())
+        for k, letter in enumerate(AXES):
+            if reference and letter in reference:
+                self.parameters.assign(FIRST_HOME + k, float(reference[letter]))
+
+    def _read_modes(self) -> dict[Key, Callable[[], float]]:
+        """Name the parameters that this executor knows."""
+        return {
+            5400: lambda: self._loaded_tool,
+            "_current_tool": lambda: self._loaded_tool,
+            "_selected_tool": lambda: self._selected_tool,
+            "_rpm": lambda: self._speed,
+            "_spindle_on": lambda: float(self._cycles.spindle in (3, 4)),
+            "_spindle_cw": lambda: float(self._cycles.spindle == 3),
+        }
 
     def execute(self, block: Block, line: int) -> None:
         """Execute a block; each step takes the words it uses out of the block, and a word that is left is refused."""
@@ -42,24 +71,38 @@ class BlockExecutor:
             self.motion.notes.add(line, _DELETED_NOTE)
         if block.spaced:
             self.motion.notes.add(line, _SPACED_NOTE)
+        for key, value in block.assignments:
+            self.parameters.assign(key, value)
         for message in block.messages:
             self._add_event(line, "(" + "".join(c if c.isprintable() else "?" for c in message) + ")")
         self._execute_program_number(block, line)
         named = {letter for letter in AXES if letter in block.values}
+        previous = self.motion.mode
         moves = self._set_motion_code(block, named)
         self._execute_feed(block, line, moves)
         self._execute_spindle_and_tool(block, line)
-        self._execute_once(block, line, moves)
+        self._execute_dwell(block, line, moves)
         self._execute_units(block, line)
         self.motion.plane = block.g.get("plane", self.motion.plane)
-        self._execute_length_offset(block, line)
-        self._execute_work_system(block, line)
+        if block.values.pop("D", None) is not None:
+            self.motion.notes.add(line, "D, a tool's number for radius compensation, which is off: of no effect")
+        # a tool changed in the same block is not yet the one that G43 without H takes
+        self._offsets.execute_length_offset(block, line, math.nan if "tool" in block.m else self._loaded_tool)
+        self._offsets.execute_work_system(block, line)
         self._execute_path_mode(block, line)
         if "distance" in block.g:
             self.motion.incremental = block.g["distance"] == codes.G91
         if "centre" in block.g:
             self.motion.absolute_centres = block.g["centre"] == codes.G90_1
-        self._execute_motion(block, line, named, moves)
+        if "return" in block.g:
+            self._cycles.retract_to_r = block.g["return"] == codes.G99
+        self._offsets.execute_once(block, line)
+        if moves and self.motion.mode in codes.CYCLES:
+            if block.g.get("once") == codes.G53:
+                refuse("G53 expected axis words with G0 or G1")
+            self._cycles.execute(block.values, line, previous)
+        else:
+            self._execute_motion(block, line, named, moves)
         for letter, value in block.values.items():
             refuse(f"{letter}{value:g}: no code of this block uses it")
         if "stop" in block.m:
@@ -82,53 +125,46 @@ class BlockExecutor:
     def _set_motion_code(self, block: Block, named: set[str]) -> bool:
         """Set the motion code in force; return whether the block moves the tool."""
         motion, code = self.motion, block.g.get("motion")
-        offsets = block.g.get("length") == codes.G43_1 and bool(named)
-        if offsets and code is not None:
-            refuse(f"axis words for both G43.1 and {format_g_code(code)}; expected two blocks")
+        once = block.g.get("once")
+        other = once if once in codes.TAKES_AXES else None
+        if block.g.get("length") == codes.G43_1 and named:
+            other = codes.G43_1
+        if other is not None and code is not None:
+            refuse(f"axis words for both {format_g_code(other)} and {format_g_code(code)}; expected two blocks")
         if code is not None or "cancel" in block.g:
             motion.mode = code
-        if named and motion.mode is None and not offsets:
+        if other is not None:
+            return False
+        if named and motion.mode is None:
             refuse(f"{min(named)} without a motion code; expected G0, G1, G2 or G3 with it or before it")
+        if code in codes.CYCLES and not named:
+            refuse(f"{format_g_code(code or 0)} without axis words; expected the place of a hole")
         # an arc needs no axis words, for it can end where it starts
-        return (bool(named) and not offsets) or code in (codes.G2, codes.G3)
+        return bool(named) or code in (codes.G2, codes.G3)
 
     def _execute_motion(self, block: Block, line: int, named: set[str], moves: bool) -> None:
         """Make the records of G0, G1, G2 and G3; ``named`` are the block's axis letters."""
         motion, values = self.motion, block.values
         machine = block.g.get("once") == codes.G53
         if machine:
-            self._check_machine_coordinates(moves)
+            self._check_machine_coordinates(moves, named)
         if not moves:
             return
-        before = motion.records.count
         end = motion.take_end(values, line, machine=machine)
         if motion.mode in (codes.G2, codes.G3):
             motion.add_arc(end, line, values, named)
         else:
             motion.add_line(end, line, values)
         if machine:
-            self._machine_records += motion.records.count - before
+            self._offsets.machine_records += 1
 
-    def _check_machine_coordinates(self, moves: bool) -> None:
+    def _check_machine_coordinates(self, moves: bool, named: set[str]) -> None:
         """Refuse G53 where the block does not settle a point of the workpiece."""
         if not moves or self.motion.mode not in (codes.G0, codes.G1):
             refuse("G53 expected axis words with G0 or G1")
         if self.motion.incremental:
             refuse("G53 in G91; expected G90")
-        motion = self.motion
-        if motion.workpiece is None:
-            refuse(
-                "G53: where the work lies in the machine's coordinates this file does not tell; expected a workpiece"
-            )
-        if not np.array_equal(motion.workpiece[:, :3], np.eye(3)):
-            refuse(
-                "G53 while the work is turned in the machine's coordinates; expected a workpiece that is only shifted"
-            )
-        if self._offset is not None:
-            refuse(
-                f"G53 while a tool length offset ({self._offset}) is in force: "
-                "where it leads the tip this file does not tell; expected G49 before"
-            )
+        self._offsets.check_machine_coordinates("G53", [AXES.index(letter) for letter in named])
 
     # feeds, spindle, tool
 
@@ -162,24 +198,68 @@ class BlockExecutor:
             self._add_event(line, f"S{self._speed:.10g}")
         if "T" in values:
             self._selected_tool = float(round_whole("T", values.pop("T")))
-            self.tool.setdefault("number", self._selected_tool)
+            self._name_tool(self._selected_tool)
             self._add_event(line, f"T{self._selected_tool:.0f}")
-        if "tool" in m:
-            self._add_event(line, "M6")
-            selected = self._selected_tool
-            if self.tool.get("number", selected) != selected and not math.isnan(selected):
-                self.motion.notes.add(line, "another tool: the path's tool is the first one")
-        for group in ("spindle", "coolant", "override"):
-            if group in m:
-                self._add_event(line, f"M{m[group]}")
-        self._spindle = m.get("spindle", self._spindle)
-        speed = 0.0 if self._spindle == codes.SPINDLE_OFF else self._speed
-        self.motion.rpm = math.nan if self._spindle is None else speed
+        for group in ("output", "tool", "spindle", "coolant", "override", "other"):
+            code = m.get(group)
+            if code is None:
+                continue
+            if group == "tool":
+                self._change_tool(line)
+            elif group == "spindle":
+                self._cycles.spindle = code
+                self._add_event(line, f"M{code}")
+            else:
+                self._pass_through(code, values, line)
+        self._set_speed()
+
+    def _set_speed(self) -> None:
+        spindle = self._cycles.spindle
+        speed = 0.0 if spindle == codes.SPINDLE_OFF else self._speed
+        self.motion.rpm = math.nan if spindle is None else speed
+
+    def _turn_spindle(self, line: int, code: int) -> None:
+        """Switch the spindle within a cycle."""
+        self._cycles.spindle = code
+        self._add_event(line, f"M{code}")
+        self._set_speed()
+
+    def _change_tool(self, line: int) -> None:
+        self._add_event(line, "M6")
+        selected = self._loaded_tool = self._selected_tool
+        if self._cycles.spindle is not None:
+            self._cycles.spindle = codes.SPINDLE_OFF  # LinuxCNC stops it for the change
+        if self.tool.get("number", selected) != selected and not math.isnan(selected):
+            self.motion.notes.add(line, "another tool: the path's tool is the first one")
+
+    def _name_tool(self, number: float) -> None:
+        """Keep the number and, where it is known, the length of the first tool."""
+        if "number" not in self.tool:
+            self.tool["number"] = number
+            if number in self._tools:
+                self.tool["length"] = float(self._tools[int(number)])
+
+    def _pass_through(self, code: int, values: dict[str, float], line: int) -> None:
+        """Keep an M code that moves nothing as an event, with its words."""
+        words = codes.M_WORDS.get(code)
+        if words is None and find_m_group(code) == "other":
+            words = codes.UNKNOWN_M_WORDS
+            whose = "a user's own code" if code >= 100 else "a code that LinuxCNC does not know"
+            self.motion.notes.add(line, f"M{code}: {whose}; it is passed through")
+        text = [f"M{code}", *(f"{letter}{values.pop(letter):.10g}" for letter in words or "" if letter in values)]
+        if code in (62, 63, 64, 65, 66) and len(text) == 1:
+            refuse(f"M{code} without P; expected the number of an output or input")
+        if code == _SET_TOOL:
+            if len(text) == 1:
+                refuse(f"M{code} without Q; expected the number of the tool")
+            self._loaded_tool = self._selected_tool = float(text[1][1:])
+            self._name_tool(self._loaded_tool)
+        self._add_event(line, " ".join(text))
 
     # modes
 
-    def _execute_once(self, block: Block, line: int, moves: bool) -> None:
-        """Note a dwell (G4) or the end of G92 offsets (G92.1, G92.2)."""
+    def _execute_dwell(self, block: Block, line: int, moves: bool) -> None:
+        """Note a dwell (G4)."""
         dwells, blends = block.g.get("once") == codes.G4, block.g.get("path") == codes.G64
         if dwells + blends + (moves and self.motion.mode in (codes.G2, codes.G3)) > 1 and "P" in block.values:
             refuse("P in a block with several codes that use it; expected two blocks")
@@ -188,8 +268,6 @@ class BlockExecutor:
             if seconds < 0.0:
                 refuse("G4 expected P, the seconds to wait, of 0 or more")
             self._add_event(line, f"G4 P{seconds:.10g}")
-        elif block.g.get("once") in (codes.G92_1, codes.G92_2):
-            self._add_event(line, format_g_code(block.g["once"]))
 
     def _execute_units(self, block: Block, line: int) -> None:
         """Set the unit of lengths (G20, G21)."""
@@ -202,46 +280,6 @@ class BlockExecutor:
         elif scale != motion.scale:
             motion.notes.add(line, "the unit of length changes within the file")
         motion.scale = scale
-
-    def _execute_length_offset(self, block: Block, line: int) -> None:
-        """Note a tool length offset (G43 to G49). It moves nothing here, for the points are the tip's."""
-        code, values = block.g.get("length"), block.values
-        if code is None:
-            return
-        name = text = format_g_code(code)
-        offset = True
-        if code == codes.G49:
-            offset = False
-        elif code == codes.G43_1:
-            if {"A", "B", "C"} & values.keys():
-                refuse("A, B or C with G43.1; expected X, Y or Z")
-            shifts = {letter: values.pop(letter) * self.motion.scale for letter in "XYZ" if letter in values}
-            offset = any(shifts.values())
-            text = " ".join([name, *(f"{letter}{value:.10g}" for letter, value in shifts.items())])
-        elif "H" in values:
-            number = round_whole("H", values.pop("H"))
-            offset = number > 0 or (code == codes.G43_2 and self._offset is not None)
-            text = f"{name} H{number}"
-        if code == codes.G43_4:
-            self.motion.notes.add(line, _TIP_NOTE)
-        self._offset = name if offset else None
-        self._add_event(line, text)
-
-    def _execute_work_system(self, block: Block, line: int) -> None:
-        """Accept one work system (G54 to G59.3) for the whole program."""
-        code = block.g.get("system")
-        if code is None or code == self._system:
-            return
-        name = format_g_code(code)
-        if self._system is not None:
-            refuse(
-                f"{name} after {format_g_code(self._system)}: the offsets of work systems are not in this file; "
-                "expected one system throughout"
-            )
-        if code != codes.G54 and self.motion.records.count > self._machine_records:
-            refuse(f"{name} after motion in another system; expected it before, for its offset is not in this file")
-        self._system = code
-        self._add_event(line, name)
 
     def _execute_path_mode(self, block: Block, line: int) -> None:
         """Note the path mode (G61, G61.1, G64 with its tolerances in mm)."""

@@ -11,10 +11,12 @@ from .arcs import PLANES, ArcMotion, Flat, centre_from_radius, interpolate_g_arc
 from .block import round_whole
 from .codes import G0, G2, G17, format_g_code
 from .records import FEED, LINE, RAPID, SECONDS, SPINDLE, WIDTH, GcodeRecords
+from .work_systems import WorkSystems
 
 AXES = "XYZABC"
 STILL = 1e-7  # mm: where X, Y and Z move less, RS274/NGC as LinuxCNC has it takes F for degrees per minute
 CENTRES = "IJK"
+_MOST_CYCLE_POINTS = 1_000_000
 _MOST_POINTS = 20_000_000  # of all arcs: a few GB of memory
 
 
@@ -23,6 +25,9 @@ class GcodeMotion:
 
     here : X, Y, Z, A, B, C; X, Y, Z are NaN until they are given, A, B, C 0
     turned : whether A, B, C were given
+    plain_turns : whether the fast reader may read A, B, C
+    tip_control : whether G43.4 is in force
+    untipped_line : the first line with A, B or C without it, 0 if there is none
     mode : the motion code in force in tenths, None if there is none
     plane : the code of the arcs' plane in tenths
     scale : mm in the programmed unit
@@ -30,6 +35,8 @@ class GcodeMotion:
     rate, feed : F as written, and in mm/min; NaN until given
     rpm : spindle speed in rev/min, NaN if not known
     workpiece : (3, 4) rotation and origin (mm) of the work in the machine's coordinates; None if not known
+    systems : the coordinate systems; ``here`` and the records are in the program's coordinates
+    frames : how the records lead to W: the first record of each frame, and the frame
     """
 
     def __init__(self, arc_tolerance: float, workpiece: Array | None):
@@ -37,9 +44,17 @@ class GcodeMotion:
         self.notes = NoteBook()
         self.arc_tolerance = arc_tolerance
         self.workpiece = workpiece
+        self.systems = WorkSystems(workpiece)
+        self.frames = [(0, self.systems.frame())]
         self._arc_points = 0
+        self._cycle_points = 0
         self.here = [math.nan, math.nan, math.nan, 0.0, 0.0, 0.0]
         self.turned = [False, False, False]
+        self.plain_turns = [False, False, False]
+        self.tip_control = False
+        self.untipped_line = 0
+        self.has_jumped = False  # whether a tool length offset has moved the tip since the last motion of a cycle
+        self.was_shifted = False  # whether the program's coordinates have ever moved
         self.mode: int | None = None
         self.plane = G17
         self.scale = 1.0
@@ -58,6 +73,8 @@ class GcodeMotion:
 
         machine : G53, the words are in the machine's own coordinates, where the workpiece's origin shifts the work
         """
+        if machine:
+            return self._take_machine_end(values, line)
         end = list(self.here)
         for k, letter in enumerate(AXES):
             value = values.pop(letter, None)
@@ -65,18 +82,65 @@ class GcodeMotion:
                 continue
             if k < 3:
                 value *= self.scale
-                if machine and self.workpiece is not None:
-                    value -= float(self.workpiece[k, 3])
-            elif not self.turned[k - 3]:
-                self.turned[k - 3] = True
-                if self.records.count and value != 0.0:
-                    self.notes.add(line, f"{letter} is first given here: it is 0 before")
-            if self.incremental and not machine:
+            else:
+                self._give_turn(k - 3, value, line)
+            if self.incremental:
                 if end[k] != end[k]:
                     refuse(f"G91 while {letter} is not known; expected {letter} once in G90 before")
                 value += end[k]
             end[k] = value
         return end
+
+    def _take_machine_end(self, values: dict[str, float], line: int) -> list[float]:
+        point = self.systems.to_work(self.here)
+        for k, letter in enumerate(AXES):
+            value = values.pop(letter, None)
+            if value is None:
+                continue
+            if k < 3:
+                value *= self.scale
+            else:
+                self._give_turn(k - 3, value, line)
+            point[k] = value - self.systems.offset_in_machine(k)
+        return self.systems.from_work(point)
+
+    def _give_turn(self, k: int, value: float, line: int) -> None:
+        """Note that A, B or C (``k``) is given."""
+        if not self.turned[k]:
+            self.turned[k] = True
+            if self.records.count and value != 0.0:
+                self.notes.add(line, f"{AXES[k + 3]} is first given here: it is 0 before")
+        self.plain_turns[k] = True
+        if not self.tip_control:
+            self.untipped_line = self.untipped_line or line
+
+    def set_tip_control(self, on: bool) -> None:
+        """Switch tool centre point control (G43.4) on or off."""
+        if on and not all(value == value for value in self.here[:3]):
+            self.untipped_line = 0  # the turns before are no records
+        if self.tip_control and not on and not self.untipped_line:
+            self.plain_turns = [False] * 3
+        self.tip_control = on
+
+    # coordinate systems
+
+    def find_holder(self) -> list[float]:
+        """Return where the tool's holder is, in W turned by nothing: the tip and the tool length offset in force."""
+        tip = self.systems.to_work(self.here)
+        return [*(p + q for p, q in zip(tip[:3], self.systems.tool.tolist(), strict=True)), *tip[3:]]
+
+    def keep_holder(self, holder: list[float]) -> None:
+        """Let the holder be where it was, in the coordinates now in force."""
+        tip = [*(p - q for p, q in zip(holder[:3], self.systems.tool.tolist(), strict=True)), *holder[3:]]
+        frame = self.systems.frame()
+        if frame == self.frames[-1][1] and not self.systems.tool.any() and not self.was_shifted:
+            return
+        self.was_shifted = True
+        self.here = self.systems.from_work(tip)
+        if frame != self.frames[-1][1]:
+            if self.frames[-1][0] == self.records.count:
+                self.frames.pop()
+            self.frames.append((self.records.count, frame))
 
     # lines
 
@@ -85,14 +149,31 @@ class GcodeMotion:
         rapid = self.mode == G0
         seconds = math.nan
         if not rapid:
-            self._check_feed("G1", values)
+            self.check_feed("G1", values)
             seconds = self._take_seconds(values)
             degrees = math.dist(self.here[3:], end[3:])
             if not self.inverse_time and degrees > 0.0 and self._tip_stays(end):
                 seconds = 60.0 * degrees / self.rate
         feed = math.nan if self.inverse_time else self.feed
         self.records.fresh.extend((*end, feed, seconds, self.rpm, rapid, line))
+        self.here, self.has_jumped = end, False
+
+    def add_cycle_point(self, end: list[float], line: int, *, rapid: bool) -> None:
+        """Add the record of a motion within a cycle, unless it leads nowhere."""
+        if end == self.here and not self.has_jumped:
+            return
+        self.has_jumped = False
+        self._cycle_points += 1
+        if self._cycle_points > _MOST_CYCLE_POINTS:
+            refuse(f"cycles of more than {_MOST_CYCLE_POINTS} motions in all; expected larger steps or fewer repeats")
+        self.records.fresh.extend((*end, self.feed, math.nan, self.rpm, rapid, line))
         self.here = end
+
+    def add_rapid(self, end: list[float], line: int) -> None:
+        """Add the record of a rapid motion, whatever motion code is in force."""
+        feed = math.nan if self.inverse_time else self.feed
+        self.records.fresh.extend((*end, feed, math.nan, self.rpm, True, line))
+        self.here, self.has_jumped = end, False
 
     def _tip_stays(self, end: list[float]) -> bool:
         """Whether X, Y and Z stay; one that is not known does."""
@@ -104,7 +185,7 @@ class GcodeMotion:
         """Add the records of an arc (G2 and G3); ``named`` are the axis words of the block."""
         name, clockwise = format_g_code(self.mode or 0), self.mode == G2
         plane = PLANES[self.plane]
-        self._check_feed(name, values)
+        self.check_feed(name, values)
         seconds = self._take_seconds(values)
         self._check_known(name, plane, named)
         turns = round_whole("P", values.pop("P", 1.0))
@@ -141,6 +222,8 @@ class GcodeMotion:
         """Take R, or I, J and K, out of a block's values and return the arc's centre in its plane, mm."""
         first, second, along = PLANES[self.plane]
         letters = CENTRES[first], CENTRES[second]
+        if values.get(CENTRES[along]) == 0.0:
+            del values[CENTRES[along]]
         if CENTRES[along] in values:
             plane = format_g_code(self.plane)
             refuse(f"{CENTRES[along]} for an arc in {plane}; expected {letters[0]} and {letters[1]}, or R")
@@ -162,7 +245,7 @@ class GcodeMotion:
 
     # feeds
 
-    def _check_feed(self, name: str, values: dict[str, float]) -> None:
+    def check_feed(self, name: str, values: dict[str, float]) -> None:
         """Refuse a motion in feed without a feed in force."""
         if self.inverse_time:
             if "F" not in values:

@@ -25,7 +25,7 @@ def read_plain_lines(lines: list[bytes], at: int, first: int, motion: GcodeMotio
     """
     mode, feed, rate, scale, rpm = motion.mode, motion.feed, motion.rate, motion.scale, motion.rpm
     x, y, z, a, b, c = motion.here
-    has_a, has_b, has_c = motion.turned
+    has_a, has_b, has_c = motion.plain_turns
     incremental, inverse_time = motion.incremental, motion.inverse_time
     add, fullmatch, nan = motion.records.fresh.extend, _LINE.fullmatch, math.nan
     index = at

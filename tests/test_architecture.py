@@ -23,6 +23,7 @@ FLOORS = [
     ["workspaces"],
     ["performance"],
     ["toolpath.path"],
+    ["toolpath.programmed_path"],
     ["toolpath.reading"],
     ["toolpath.posting"],
     ["toolpath.timing", "toolpath.checking", "toolpath.placing"],

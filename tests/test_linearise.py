@@ -12,9 +12,9 @@ from scipy.spatial.transform import Rotation
 import parakin as pk
 from parakin.toolpath.linearise.linearise import linearise_path
 from parakin.toolpath.linearise.path_records import insert_records
-from parakin.toolpath.linearise.programmed_path import ProgrammedPath
 from parakin.toolpath.path import Event
 from parakin.toolpath.posting.post import post_path
+from parakin.toolpath.programmed_path import ProgrammedPath
 
 
 def a_path(name):

@@ -11,8 +11,8 @@ import numpy as np
 from ...arrays import Array, Indices
 from ...machine import Machine
 from ..posting.frames import compute_poses
+from ..programmed_path import ProgrammedPath, compute_norms, compute_tool_axes
 from .continuation import MACHINE_FRAME, PosedPoints
-from .programmed_path import ProgrammedPath, compute_norms, compute_tool_axes
 
 Interpolation: TypeAlias = Literal["pose", "joints"]  # what a controller moves evenly from record to record
 SHARES: Array = (np.arange(32, dtype=np.float64) + 0.58) / 32.0  # of a span, at which its deviation is measured closely

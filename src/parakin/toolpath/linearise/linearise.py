@@ -10,13 +10,13 @@ from ...arrays import Array, Flags, Indices, Progress
 from ...errors import PoseError
 from ..path import Note, ToolPath
 from ..posting.posted import Posted
+from ..programmed_path import ProgrammedPath
 from ..timing.corners import check_tolerance
 from .deviation import ALLOWED, SHARES, Deviation, Interpolation
 from .path_cuts import PathCuts, PathPositions, find_cuts, select_spans
 from .path_records import insert_records, repost_path
 from .pole_passes import lead_through_poles
 from .pole_swings import note_swings_of_passes
-from .programmed_path import ProgrammedPath
 from .rewinds import insert_rewind_records
 
 _GLANCE: Array = np.array([0.31, 0.67])  # of a motion: neither a bulge nor an S hides from both, nor whole turns

@@ -10,9 +10,9 @@ import numpy as np
 from ...arrays import Array, Flags, Indices
 from ...kinematics.rotations import compute_rotations
 from ..posting.posted import Posted
+from ..programmed_path import ProgrammedPath
 from .continuation import PosedPoints, continue_points, continue_turned_points, find_matching_poses
 from .deviation import Deviation, Spans
-from .programmed_path import ProgrammedPath
 
 _SHARES: Array = (np.arange(5, dtype=np.float64) + 1.0) / 6.0  # of a span, at which its deviation is measured here
 _FULL = 0.992  # of the tolerance: what a span may take at _SHARES, for the worst point may lie between them

@@ -11,7 +11,7 @@ from ...kinematics.wrist import find_nearest_direction
 from ..path import ToolPath
 from ..posting.post import post_path
 from ..posting.posted import Posted
-from .programmed_path import ProgrammedPath
+from ..programmed_path import ProgrammedPath
 
 
 def insert_records(path: ToolPath, motion: Indices, share: Array) -> ToolPath:

@@ -10,6 +10,7 @@ from ...arrays import Array, Indices
 from ...kinematics.wrist import PRINTED, REPORTED
 from ..path import Note
 from ..posting.posted import Posted
+from ..programmed_path import ProgrammedPath
 from .deviation import ALLOWED, SHARES, Deviation
 from .path_cuts import PathPositions, select_spans
 from .path_records import insert_records, replace_axes, repost_path
@@ -17,7 +18,6 @@ from .pole_routing import PolePass, PoleRoute, find_pole_routes, locate_pass
 from .pole_steps import PoleSteps, find_pole_steps
 from .pole_swings import note_swings
 from .poles import Pole, find_poles
-from .programmed_path import ProgrammedPath
 
 # Shares of the angle tolerance.
 _MOST_BETWEEN = 0.99  # what an axis may be moved between records, for the farthest point may lie between SHARES

@@ -10,9 +10,9 @@ import numpy as np
 from ...arrays import Array, Indices
 from ...kinematics.wrist import PRINTED
 from ..path import ToolPath
+from ..programmed_path import ProgrammedPath
 from .pole_steps import PoleSteps
 from .poles import Pole
-from .programmed_path import ProgrammedPath
 
 _MOST_MOVED = 0.98  # of the angle tolerance: what an axis may be moved; the rest is for rounding
 

@@ -9,8 +9,8 @@ import numpy as np
 from ...arrays import Array, Flags, Indices
 from ...kinematics.wrist import VICINITY
 from ..posting.posted import Posted
+from ..programmed_path import ProgrammedPath
 from .poles import Pole
-from .programmed_path import ProgrammedPath
 
 FARTHEST_STEP = 1.0  # in the projection: a step that goes farther does not lie near the pole
 _STEP = 0.02  # rad: motions that turn the axis farther are divided into steps

@@ -6,8 +6,8 @@ import numpy as np
 
 from ..posting.posted import Posted
 from ..posting.turn_steps import TURN_STEP
+from ..programmed_path import compute_tool_axes
 from .path_records import insert_records, replace_axes, repost_path
-from .programmed_path import compute_tool_axes
 
 
 def insert_rewind_records(posted: Posted) -> Posted:

@@ -14,6 +14,7 @@ from ...machine import Machine
 from ..path import ToolPath
 from ..posting.frames import PathLimit, compose_frames, compute_poses, frame_from_angles
 from ..posting.margin_blocks import split_margins
+from ..posting.path_samples import SampledPath, sample_path
 from ..posting.range_use import list_ranges
 from ..posting.working_mode import choose_branch
 from .maximin import score_rows
@@ -82,7 +83,7 @@ class PlacementMargins:
             if track is None:
                 joints = self.machine.follow(poses, self.mode, PRINTED)
             else:
-                branch = choose_branch(self.machine, path, poses, self.mode)
+                branch = choose_branch(self.machine, path, self._sample(point, path, poses), self.mode)
                 poses, joints = branch.poses[rows], branch.joints[rows]
             all_poses.append(poses)
             all_joints.append(joints)
@@ -98,7 +99,7 @@ class PlacementMargins:
     def score_placement(self, point: Array) -> PlacementScore:
         """Score the placement at a point over the whole path."""
         poses, path_limits = self._compute_poses(point, self.path)
-        branch = choose_branch(self.machine, self.path, poses, self.mode)
+        branch = choose_branch(self.machine, self.path, self._sample(point, self.path, poses), self.mode)
         is_reach, spans = self._spans
         names, is_hard = list(self.machine.limits), is_reach
         least, records = np.full(len(names), np.inf), np.zeros(len(names), np.int64)
@@ -134,8 +135,13 @@ class PlacementMargins:
         return quantities < 0, np.array(spans)
 
     def _compute_poses(self, point: Array, path: ToolPath) -> tuple[Array, tuple[PathLimit, ...]]:
-        frame = compose_frames(self.build_workpiece(point), path.frame)
-        return compute_poses(self.machine, path.tip, path.axis, frame, path.turns)
+        return compute_poses(self.machine, path.tip, path.axis, self._compose_frame(point, path), path.turns)
+
+    def _sample(self, point: Array, path: ToolPath, poses: Array) -> SampledPath:
+        return sample_path(self.machine, path, self._compose_frame(point, path), self.mode, poses)
+
+    def _compose_frame(self, point: Array, path: ToolPath) -> Array:
+        return compose_frames(self.build_workpiece(point), path.frame)
 
     def _turn_to_middle(self, margins: Array) -> None:
         """Turn every turning joint by the whole turns that bring it nearest to the middle of its range, in place."""

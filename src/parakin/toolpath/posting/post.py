@@ -12,6 +12,7 @@ from ...machine import Machine
 from ..path import Note, ToolPath
 from .frames import compose_frames, compute_poses
 from .offences import judge_path
+from .path_samples import sample_path
 from .posted import Posted
 from .turn_steps import find_turning_columns
 from .working_mode import choose_branch, list_candidate_modes
@@ -49,8 +50,10 @@ def post_path(
     poses, path_limits = compute_poses(machine, path.tip, path.axis, frame, path.turns)
     report(0.3)
     best, fewest = None, (0, 0)
-    for candidate in list_candidate_modes(machine, mode):
-        branch = choose_branch(machine, path, poses, candidate)
+    candidates = list_candidate_modes(machine, mode)
+    sampled = sample_path(machine, path, frame, candidates[0], poses)
+    for candidate in candidates:
+        branch = choose_branch(machine, path, sampled, candidate)
         report(0.7)
         judgement = judge_path(machine, branch.poses, branch.joints, path.line, candidate, path_limits)
         faults = (int(np.count_nonzero(judgement.broken)), branch.swings)

@@ -15,7 +15,7 @@ from ...machine import Machine
 
 TURN_STEP = math.pi / 36.0  # rad: turns that change evenly are followed in steps no longer than this
 _MOST_STEPS = 1 << 16  # in a motion
-_WIDE = math.pi / 3.0  # rad a joint may turn from step to step
+WIDE = math.pi / 3.0  # rad a joint may turn from step to step
 _HALVINGS = 6
 
 
@@ -81,10 +81,10 @@ def trace_passage(machine: Machine, mode: str, begin: Array, end: Array, joints:
         poses[-1] = end
         followed = _follow_from(machine, mode, poses, joints)
         widest = np.abs(np.diff(followed[:, turning], axis=0)).max(initial=0.0)  # NaN goes through
-        if not widest > _WIDE or steps > _MOST_STEPS:
+        if not widest > WIDE or steps > _MOST_STEPS:
             break
         steps *= 2
-    return Passage(poses, followed, bool(widest <= _WIDE))
+    return Passage(poses, followed, bool(widest <= WIDE))
 
 
 def _follow_from(machine: Machine, mode: str, poses: Array, joints: Array) -> Array:

@@ -10,9 +10,10 @@ from ...arrays import Array, Flags
 from ...kinematics.wrist import PRINTED, SWING, TURN
 from ...machine import Machine
 from ..path import ToolPath
+from .path_samples import SampledPath
 from .turn_counts import TurningJoint, choose_turns, find_turns_in_range
 from .turn_rewinds import rewind_in_rapids
-from .turn_steps import add_turn_steps, find_turning_columns, find_turning_joints
+from .turn_steps import find_turning_joints
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,14 +42,15 @@ def list_candidate_modes(machine: Machine, mode: str | None) -> list[str]:
     return machine.head_modes(checked) if mode is None else [checked]
 
 
-def choose_branch(machine: Machine, path: ToolPath, poses: Array, mode: str) -> Branch:
-    """Choose the joints for poses in a working mode, with their turns counted.
+def choose_branch(machine: Machine, path: ToolPath, sampled: SampledPath, mode: str) -> Branch:
+    """Choose the joints for the poses of a path's records in a working mode, with their turns counted.
 
     The turns are those with which the fewest records break a limit, then those by which the joints turn least, then
     those nearest to home. A turn is taken back only in a rapid motion, where C goes on by whole turns and the joint
     with it; the motion is followed in small steps for that.
     """
-    joints = _follow_records(machine, path, poses, mode)
+    poses = sampled.poses[sampled.at_records]
+    joints = machine.follow(sampled.poses, mode, PRINTED)[sampled.at_records]
     turning = find_turning_joints(machine)
     rewinds: tuple[int, ...] = ()
     if not turning or not len(joints):
@@ -67,15 +69,6 @@ def choose_branch(machine: Machine, path: ToolPath, poses: Array, mode: str) -> 
     if needs_rewinds and first is not None:
         poses, joints, rewinds = rewind_in_rapids(machine, path, poses, joints, mode, home[first])
     return Branch(mode, poses, joints, rewinds, _count_swings(joints[:, turning], path.rapid))
-
-
-def _follow_records(machine: Machine, path: ToolPath, poses: Array, mode: str) -> Array:
-    """Follow poses; where a program turns the tool they change evenly from record to record, however far apart."""
-    if path.turns is None or machine.wrist is None:
-        return machine.follow(poses, mode, PRINTED)
-    steps, at_records = add_turn_steps(poses, find_turning_columns(machine))
-    joints: Array = machine.follow(steps, mode, PRINTED)[at_records]
-    return joints
 
 
 def _count_swings(angles: Array, rapid: Flags) -> int:

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...arrays import Array, Indices
-from ...errors import PoseError
-from ..path import ToolPath
+from ..arrays import Array, Flags, Indices
+from ..errors import PoseError
+from .path import ToolPath
 
 _OPPOSITE = 1e-6  # rad: axes as near to opposite as this don't tell the great circle between them
 
@@ -56,6 +56,14 @@ class ProgrammedPath:
         chord = compute_norms(self.axis[record] - self.axis[record - 1])
         return length, 2.0 * np.arcsin(np.minimum(1.0, 0.5 * chord))
 
+    def find_opposite(self, record: Indices) -> Flags:
+        """Find the motions to ``record`` (m,) between opposite axes, where no turns say which way the axis goes."""
+        if self.path.turns is not None:
+            return np.zeros(len(record), np.bool_)
+        a, b = self.axis[record - 1], self.axis[record]
+        opposite: Flags = compute_norms(a + b) < _OPPOSITE
+        return opposite
+
     def _interpolate_axes(self, record: Indices, share: Array) -> Array:
         """Interpolate axes on great circles (slerp), exact for small angles too."""
         a, b = self.axis[record - 1], self.axis[record]
@@ -63,7 +71,7 @@ class ProgrammedPath:
         cosine = compute_dots(a, b)
         across = d - compute_dots(d, a)[:, None] * a  # the part of b at right angles to a
         sine = compute_norms(across)
-        opposite = (cosine < 0.0) & (sine < _OPPOSITE)
+        opposite = self.find_opposite(record)
         if opposite.any():
             line = int(self.path.line[record[opposite.argmax()]])
             raise PoseError(

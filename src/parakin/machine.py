@@ -304,7 +304,7 @@ class Machine:
         return both[:, : n * n].reshape(*lead, n, n), both[:, n * n :].reshape(*lead, n, m)
 
     def twist_rates(self, poses: Array, joints: Array, whole: bool = True) -> tuple[Array, Array, Array]:
-        """A and B (n, m, m) with A t' = B q' for the tool's twist t', and the legs' spans (n, legs), mm.
+        """A and B (n, m, m) with A t' = B q' for the tool's twist t', and the legs' wrench norms (n, legs), mm.
 
         Poses and joints are rows; see :class:`parakin.model.rates.TwistRates`. With ``whole`` a row is NaN if a number
         of it is not finite.
@@ -334,7 +334,7 @@ class Machine:
         return [margin for _, margin in own]
 
     def trace_rates(self, pose: Sequence[Scalar], joints: Sequence[Scalar]) -> TwistRates:
-        """A and B of the tool's twist, and the legs' spans."""
+        """A and B of the tool's twist, and the legs' wrench norms."""
         return compute_twist_rates(self.spec, self.structure, pose, joints)
 
     # Limits.

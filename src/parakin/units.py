@@ -18,7 +18,7 @@ Dimension: TypeAlias = tuple[int, int, int]  # powers of length, angle and time
 
 
 @dataclass(frozen=True)
-class Kind:
+class QuantityKind:
     """An expected kind of quantity: its dimension, its name for messages, and units to propose."""
 
     dimension: Dimension
@@ -30,15 +30,15 @@ class Kind:
         return f"{self.name} ({self.units})" if self.units else self.name
 
 
-NUMBER = Kind((0, 0, 0), "a number", "")
-LENGTH = Kind((1, 0, 0), "a length", "mm, cm, m, in")
-ANGLE = Kind((0, 1, 0), "an angle", "deg, rad")
-SPEED = Kind((1, 0, -1), "a speed", "mm/s, m/s, mm/min, m/min, in/min")
-ANGULAR_SPEED = Kind((0, 1, -1), "an angular speed", "deg/s, rad/s, rpm")
-ACCELERATION = Kind((1, 0, -2), "an acceleration", "mm/s2, m/s2, in/s2")
-ANGULAR_ACCELERATION = Kind((0, 1, -2), "an angular acceleration", "deg/s2, rad/s2")
-JERK = Kind((1, 0, -3), "a jerk", "mm/s3, m/s3, in/s3")
-ANGULAR_JERK = Kind((0, 1, -3), "an angular jerk", "deg/s3, rad/s3")
+NUMBER = QuantityKind((0, 0, 0), "a number", "")
+LENGTH = QuantityKind((1, 0, 0), "a length", "mm, cm, m, in")
+ANGLE = QuantityKind((0, 1, 0), "an angle", "deg, rad")
+SPEED = QuantityKind((1, 0, -1), "a speed", "mm/s, m/s, mm/min, m/min, in/min")
+ANGULAR_SPEED = QuantityKind((0, 1, -1), "an angular speed", "deg/s, rad/s, rpm")
+ACCELERATION = QuantityKind((1, 0, -2), "an acceleration", "mm/s2, m/s2, in/s2")
+ANGULAR_ACCELERATION = QuantityKind((0, 1, -2), "an angular acceleration", "deg/s2, rad/s2")
+JERK = QuantityKind((1, 0, -3), "a jerk", "mm/s3, m/s3, in/s3")
+ANGULAR_JERK = QuantityKind((0, 1, -3), "an angular jerk", "deg/s3, rad/s3")
 _STRAIGHT = (LENGTH, SPEED, ACCELERATION, JERK)
 _ANGULAR = (ANGLE, ANGULAR_SPEED, ANGULAR_ACCELERATION, ANGULAR_JERK)
 _KINDS = {kind.dimension: kind for kind in (NUMBER, *_STRAIGHT, *_ANGULAR)}
@@ -87,7 +87,7 @@ def _build_units() -> dict[str, tuple[float, Dimension]]:
 UNITS = _build_units()  # factor to mm, rad and s, and dimension, by name
 
 
-def parse_quantity(text: str, kind: Kind, names: Mapping[str, Quantity | None] | None = None) -> float:
+def parse_quantity(text: str, kind: QuantityKind, names: Mapping[str, Quantity | None] | None = None) -> float:
     """Evaluate an expression that must be of a kind; return its value in mm, rad and s. A bare 0 needs no unit.
 
     Raises :class:`QuantityError` if it can't be read, is of another kind or has no unit.

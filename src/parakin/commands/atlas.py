@@ -13,7 +13,7 @@ from ..export.json.performance import encode_atlas, encode_performance, encode_p
 from ..units import NUMBER, QuantityError, parse_quantity, to_display
 from .atlas_files import AtlasFiles
 from .atlas_summary import format_atlas, format_performance, format_proofs
-from .console import Progress, announce_compiling, print_json
+from .console import ProgressBar, announce_compiling, print_json
 from .options import OFF_LIMITS, Json, Mode, Name, Sizes, load_machine
 from .region_options import (
     At,
@@ -27,14 +27,12 @@ from .region_options import (
 from .values import parse_row, parse_value
 
 if TYPE_CHECKING:
-    from ..arrays import Array
+    from ..arrays import Array, Span
     from ..performance.atlas import Atlas, PerformanceMap
     from ..performance.certified.amplification import Bracket
     from ..performance.certified.proofs import Proof
     from ..performance.indices import Performance
     from ..workspaces.certified.region import Region
-
-Spans = dict[str, tuple[float, float]]
 
 
 def atlas(
@@ -90,7 +88,7 @@ def atlas(
     one_pose = None if pose is None else _parse_pose(region, pose)
     announce_compiling()
     results = _AtlasResults(region, scale)
-    with Progress() as progress:
+    with ProgressBar() as progress:
         if one_pose is not None:
             results.examine_pose(one_pose)
         if spans:
@@ -159,7 +157,7 @@ class _AtlasResults:
         self.machine, self.region, self.length = region.machine, region, length
         self.performance: Performance | None = None
         self.broken_limit = ""
-        self.spans: Spans = {}
+        self.spans: dict[str, Span] = {}
         self.proofs: list[Proof] = []
         self.brackets: Sequence[Bracket] = ()
         self.atlas: Atlas | None = None
@@ -172,7 +170,7 @@ class _AtlasResults:
         self.broken_limit = self.machine.limits[broken - 1] if broken else ""
 
     def prove_box(
-        self, spans: Spans, at: dict[str, float], bounds: tuple[float, float] | None, progress: Progress
+        self, spans: dict[str, Span], at: dict[str, float], bounds: Span | None, progress: ProgressBar
     ) -> None:
         """Prove a box free of singularities, and its amplification within bounds, or bracket it if there are none."""
         from ..performance.certified.proofs import (
@@ -192,7 +190,7 @@ class _AtlasResults:
         elif all(proof.verdict == "proved" for proof in self.proofs):
             self.brackets = bracket_extremes(box, progress=report).brackets
 
-    def compute_atlas(self, step: float | None, progress: Progress) -> None:
+    def compute_atlas(self, step: float | None, progress: ProgressBar) -> None:
         from ..performance.atlas import atlas
 
         report = progress.part("looking at the workspace", 0.0, 1.0)

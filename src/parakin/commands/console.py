@@ -61,7 +61,7 @@ def announce_compiling() -> None:
     event.register("numba:compile", Announcement())
 
 
-class Progress(AbstractContextManager["Progress"]):
+class ProgressBar(AbstractContextManager["ProgressBar"]):
     """Show a bar on a terminal's stderr after one second of work."""
 
     def __init__(self) -> None:

@@ -12,7 +12,7 @@ from cyclopts import Parameter
 from ..errors import InputError
 from ..export.json.poses import encode_poses
 from ..export.number_format import format_fixed
-from ..export.tables.poses import PoseTable, Side, format_pose_csv
+from ..export.tables.poses import ColumnGroup, PoseTable, format_pose_csv
 from ..units import display_unit, to_display
 from .console import announce_compiling, format_table, print_json, say
 from .offences import format_offence
@@ -132,7 +132,7 @@ def _name_broken(judgement: Judgement, row: int) -> str:
 
 
 def _read_values(
-    machine: Machine, side: Side, values: tuple[str, ...], csv: Path | None, default: Array
+    machine: Machine, side: ColumnGroup, values: tuple[str, ...], csv: Path | None, default: Array
 ) -> tuple[Array, Indices]:
     """Read the rows that a command is given, mm and rad, and their lines in the CSV."""
     import numpy as np
@@ -155,7 +155,7 @@ class _Request:
     """What a command is to show: the problem, which side of its table is the answer, and the options on output."""
 
     problem: Literal["inverse", "forward"]
-    answer: Side
+    answer: ColumnGroup
     csv: Path | None
     output: Path | None
     json: bool
@@ -181,7 +181,7 @@ def _show_table(table: PoseTable, request: _Request, offences: Sequence[Offence]
         print(_format_answer(table, request.answer))
 
 
-def _format_answer(table: PoseTable, answer: Side) -> str:
+def _format_answer(table: PoseTable, answer: ColumnGroup) -> str:
     """Format the answer for a single row."""
     names, units, values = table.columns(answer)
     cells = [

@@ -11,7 +11,7 @@ from cyclopts import Parameter
 
 from ..controllers import Target, load_controller
 from ..errors import InputError, PoseError
-from .console import Progress, announce_compiling, print_json
+from .console import ProgressBar, announce_compiling, print_json
 from .options import OFF_LIMITS, Json, Mode, Sizes, complete_machine, load_machine
 from .workpiece import parse_bounds, parse_workpiece
 
@@ -24,7 +24,7 @@ Part = Annotated[
     Path,
     Parameter(help="The CL file, of CATIA (APT) or Siemens NX, or a G-code program."),
 ]
-MachineName = Annotated[
+MachineOption = Annotated[
     str,
     Parameter(
         name=["--machine", "-m"],
@@ -102,7 +102,7 @@ def post(
     part: Part,
     /,
     *,
-    machine: MachineName,
+    machine: MachineOption,
     workpiece: WorkpieceText = None,
     place: PlaceBounds = None,
     mode: Mode = None,
@@ -137,7 +137,7 @@ def post(
     from ..toolpath.reading.detect import read_path
     from .post_summary import summarise_job
 
-    with Progress() as progress:
+    with ProgressBar() as progress:
         path = read_path(
             part, arc_tolerance=arc_tolerance, workpiece=None if place else compose_frames(frame, None),
             progress=progress.part("reading", 0.0, 0.1),
@@ -181,7 +181,7 @@ class _Wanted:
 
 
 def _make_files(
-    stem: str, job: Job, wanted: _Wanted, progress: Progress
+    stem: str, job: Job, wanted: _Wanted, progress: ProgressBar
 ) -> tuple[dict[str, tuple[str, Content]], list[str]]:
     """Make the files by their kinds, with their names; and tell why some that are wanted are not among them."""
     from ..export.report.report import render_report

@@ -11,7 +11,7 @@ from cyclopts import Parameter
 
 from ..errors import InputError, PoseError
 from ..export.json.text import format_json
-from .console import Progress, announce_compiling, print_json, say
+from .console import ProgressBar, announce_compiling, print_json, say
 from .options import OFF_LIMITS, Json, Mode, Name, Sizes, load_machine
 from .region_options import At, Every, Some, Without, parse_length, read_region
 from .workspace_inside import InsideOptions, encode_inside, explore_inside, format_inside
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 _INTERRUPTED = 130  # exit code
 
-MachineName = Annotated[
+MachineArgument = Annotated[
     Name,
     Parameter(help="A shipped machine's name or a YAML file."),
 ]
@@ -41,7 +41,7 @@ MethodName = Annotated[
         )
     ),
 ]
-Gap = Annotated[
+VolumeGap = Annotated[
     float | None,
     Parameter(help="How far apart the two numbers may be, relative to the volume; 0.01 by default."),
 ]
@@ -53,7 +53,7 @@ TimeLimit = Annotated[
     float | None,
     Parameter(help="Stop after this time with what there is, s; 60 by default."),
 ]
-Step = Annotated[
+StepLength = Annotated[
     str | None,
     Parameter(help="Of the sampling methods, and of the grids for meshes and cross-sections, mm."),
 ]
@@ -78,7 +78,7 @@ CountParts = Annotated[
         help="Count the parts that a path can't leave without crossing a singularity or changing the working mode."
     ),
 ]
-Start = Annotated[
+StartPose = Annotated[
     str | None,
     Parameter(
         allow_leading_hyphen=True,
@@ -98,7 +98,7 @@ Files = Annotated[
 
 
 def workspace(
-    name: MachineName,
+    name: MachineArgument,
     /,
     *,
     at: At = None,
@@ -107,15 +107,15 @@ def workspace(
     dexterous: Dexterous = False,
     without: Without = None,
     method: MethodName = "certified",
-    gap: Gap = None,
+    gap: VolumeGap = None,
     cell: CellSize = None,
     time: TimeLimit = None,
-    step: Step = None,
+    step: StepLength = None,
     box: LargestBox = False,
     shape: Proportions = None,
     around: Centre = None,
     parts: CountParts = False,
-    start: Start = None,
+    start: StartPose = None,
     mode: Mode = None,
     output: Files = None,
     json: Json = False,
@@ -135,7 +135,7 @@ def workspace(
     from ..workspaces.certified.workspace import Workspace
 
     began = clock.monotonic()
-    with Progress() as progress:
+    with ProgressBar() as progress:
         is_drawn = json or bool(set(files) - {".vtu", ".csv"})
         found = find_workspace(method, region, effort, progress.part("looking for it", 0.0, 0.6 if is_drawn else 1.0))
         seconds = clock.monotonic() - began

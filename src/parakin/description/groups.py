@@ -21,7 +21,7 @@ from ..model.legs import KINDS, Leg
 from ..model.parts import Direction, Drive, Point, Signs, Size
 from .document import YamlList, YamlMap, YamlText
 from .sections import CirclePoints, FileSection
-from .values import DRIVE_TYPES, DirectionValue, Extent, PlacedError, PointValue, Word, describe, get_context
+from .values import DRIVE_TYPES, DirectionValue, Extent, PlacedError, PointValue, WordValue, describe, get_context
 
 
 class LegGroup(FileSection):
@@ -127,7 +127,7 @@ def _make_joints_type(leg: type[Leg]) -> Any:
                     get_context(info).add_joint(name, unit)
         return handler(rows)
 
-    return _make_list_type((Word,) * count, read)
+    return _make_list_type((WordValue,) * count, read)
 
 
 def _make_signs_type(leg: type[Leg]) -> Any:

@@ -19,7 +19,7 @@ from .document import YamlMap, YamlText, read_document
 from .groups import Legs
 from .sections import TRANSFORMS, FileSection, HomeSection, LimitsSection, Mounting, Steps
 from .sizes import read_sizes
-from .values import Prose, ReadingContext, Word, describe, get_context, is_word
+from .values import Prose, ReadingContext, WordValue, describe, get_context, is_word
 
 _MACHINES = Path(__file__).parent.parent / "machines"
 
@@ -111,7 +111,7 @@ def _read_motion(value: object, info: ValidationInfo) -> tuple[str, ...]:
 class _MachineSection(FileSection):
     """The whole file, in the order in which its keys are read: later ones may name what earlier ones define."""
 
-    name: Word | None = None
+    name: WordValue | None = None
     title: Prose | None = None
     source: Prose
     sizes: Any = None  # read beforehand: all other values may use them

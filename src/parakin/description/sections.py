@@ -22,16 +22,16 @@ from ..units import ANGLE, LENGTH
 from .document import YamlList, YamlMap, YamlText
 from .values import (
     DRIVE_TYPES,
-    Angle,
     AnglePair,
+    AngleValue,
     DirectionValue,
     Extent,
     Flag,
-    Length,
     LengthPair,
+    LengthValue,
     Opening,
     PlacedError,
-    Word,
+    WordValue,
     accept_words,
     describe,
     get_context,
@@ -74,8 +74,8 @@ class CirclePoints(FileSection):
     where: ClassVar[str] = " in a circle of points"
 
     circle: Extent
-    at: Annotated[list[Angle], ListOf]
-    z: Length = 0.0
+    at: Annotated[list[AngleValue], ListOf]
+    z: LengthValue = 0.0
 
     def compute_points(self) -> list[Vector]:
         """Compute the points, mm; a cosine of 6e-17 (90 deg) is exactly zero."""
@@ -89,7 +89,7 @@ class CirclePoints(FileSection):
 class _DrivenStep(FileSection):
     where: ClassVar[str] = " in a driven transform"
 
-    joint: Word
+    joint: WordValue
     range: tuple[float, float]
     reverse: Flag = False
     offset: float = 0.0
@@ -249,12 +249,12 @@ class HomeSection(FileSection):
 
     where: ClassVar[str] = " in home"
 
-    X: Length | None = None
-    Y: Length | None = None
-    Z: Length | None = None
-    A: Angle | None = None
-    B: Angle | None = None
-    C: Angle | None = None
+    X: LengthValue | None = None
+    Y: LengthValue | None = None
+    Z: LengthValue | None = None
+    A: AngleValue | None = None
+    B: AngleValue | None = None
+    C: AngleValue | None = None
 
     def get_pose(self) -> dict[str, float]:
         """The given coordinates by axis name, mm and rad."""

@@ -29,9 +29,9 @@ from ..units import (
     LENGTH,
     NUMBER,
     SPEED,
-    Kind,
     Quantity,
     QuantityError,
+    QuantityKind,
     UnreadSizeError,
     parse_quantity,
 )
@@ -125,19 +125,19 @@ def accept_words(what: str, *known: str) -> PlainValidator:
 
 
 Prose = Annotated[str, PlainValidator(_read_prose)]
-Word = Annotated[YamlText, PlainValidator(_read_word)]
+WordValue = Annotated[YamlText, PlainValidator(_read_word)]
 Flag = Annotated[bool, PlainValidator(_read_flag)]
 
 
 # Quantities.
 
 
-Bounds: TypeAlias = tuple[float, float, str]  # low < value ≤ high, and both in words
+ValidRange: TypeAlias = tuple[float, float, str]  # low < value ≤ high, and both in words
 
 _SPEEDS = (SPEED, ANGULAR_SPEED, ACCELERATION, ANGULAR_ACCELERATION)
 _JERKS = (JERK, ANGULAR_JERK)
 # Far beyond any machine, and small enough that no result overflows.
-_USUAL_BOUNDS: dict[Kind, Bounds] = {
+_USUAL_BOUNDS: dict[QuantityKind, ValidRange] = {
     NUMBER: (-1e6, 1e6, "-1e6 to 1e6"),
     LENGTH: (-1e6, 1e6, "-1 km to 1 km"),
     ANGLE: (-1e4, 1e4, "-10000 rad to 10000 rad"),
@@ -146,7 +146,7 @@ _USUAL_BOUNDS: dict[Kind, Bounds] = {
 }
 
 
-def read_quantity(value: object, kind: Kind, info: ValidationInfo, bounds: Bounds | None = None) -> float:
+def read_quantity(value: object, kind: QuantityKind, info: ValidationInfo, bounds: ValidRange | None = None) -> float:
     """Read a value in mm, rad and s; NaN if a size in it is itself in error."""
     if not isinstance(value, YamlText):
         raise ValueError(f"expected {kind.wanted}, got {describe(value)}")
@@ -162,7 +162,7 @@ def read_quantity(value: object, kind: Kind, info: ValidationInfo, bounds: Bound
     return result
 
 
-def accept_quantity(kind: Kind, bounds: Bounds | None = None) -> PlainValidator:
+def accept_quantity(kind: QuantityKind, bounds: ValidRange | None = None) -> PlainValidator:
     """Make a validator that accepts quantities of a kind within bounds, by default the usual ones."""
 
     def read(value: object, info: ValidationInfo) -> float:
@@ -196,15 +196,15 @@ def _normalize(value: Vector) -> Vector:
     return (value[0] / length, value[1] / length, value[2] / length)
 
 
-Length = Annotated[float, accept_quantity(LENGTH)]
-Angle = Annotated[float, accept_quantity(ANGLE)]
+LengthValue = Annotated[float, accept_quantity(LENGTH)]
+AngleValue = Annotated[float, accept_quantity(ANGLE)]
 Number = Annotated[float, accept_quantity(NUMBER)]
 Extent = Annotated[float, accept_quantity(LENGTH, (0.0, 1e6, "more than 0 mm, at most 1 km"))]
 Opening = Annotated[float, accept_quantity(ANGLE, (0.0, pi, "more than 0 deg, at most 180 deg"))]
 _PAIR = _require_count(2, "a pair [low, high]")
-LengthPair = Annotated[tuple[Length, Length], _PAIR, WrapValidator(_check_rising)]
-AnglePair = Annotated[tuple[Angle, Angle], _PAIR, WrapValidator(_check_rising)]
-PointValue = Annotated[tuple[Length, Length, Length], _require_count(3, "a point [x, y, z]")]
+LengthPair = Annotated[tuple[LengthValue, LengthValue], _PAIR, WrapValidator(_check_rising)]
+AnglePair = Annotated[tuple[AngleValue, AngleValue], _PAIR, WrapValidator(_check_rising)]
+PointValue = Annotated[tuple[LengthValue, LengthValue, LengthValue], _require_count(3, "a point [x, y, z]")]
 DirectionValue = Annotated[
     tuple[Number, Number, Number], _require_count(3, "a direction [x, y, z]"), AfterValidator(_normalize)
 ]
@@ -223,10 +223,10 @@ class DriveTypes:
 
 DRIVE_TYPES: dict[Unit, DriveTypes] = {
     "mm": DriveTypes(
-        Length, LengthPair, *(Annotated[float, accept_quantity(kind)] for kind in (SPEED, ACCELERATION, JERK))
+        LengthValue, LengthPair, *(Annotated[float, accept_quantity(kind)] for kind in (SPEED, ACCELERATION, JERK))
     ),
     "rad": DriveTypes(
-        Angle,
+        AngleValue,
         AnglePair,
         *(Annotated[float, accept_quantity(kind)] for kind in (ANGULAR_SPEED, ANGULAR_ACCELERATION, ANGULAR_JERK)),
     ),

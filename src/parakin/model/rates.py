@@ -20,12 +20,13 @@ class TwistRates:
 
     a : (n, n) columns are the tool tip's velocity along the machine's translations, then the structure's small turns
     b : (n, m) columns are the joints
-    spans : mm, how much each leg's closure changes as the platform's joint moves by a unit length: a rod's length
+    wrench_norms : mm, how much each leg's closure changes as the platform's joint moves by a unit length: a rod's
+        length; a leg's row of A divided by it is a unit wrench
     """
 
     a: list[list[Scalar]]
     b: list[list[Scalar]]
-    spans: list[Scalar]
+    wrench_norms: list[Scalar]
 
 
 def list_closure_joints(spec: Spec) -> list[int]:
@@ -58,9 +59,10 @@ def compute_twist_rates(
     a = evaluate(trace, [derivative(f, term) for f in rows for term in twist], at_rest)
     b = evaluate(trace, [-derivative(f, term) for f in rows for term in q], at_rest)
     positions = evaluate(trace, [c for point in points for c in point], at_rest)
-    spans = [
+    wrench_norms = [
         norm(evaluate(trace, [derivative(f, c) for c in point], [*at_rest, *positions]))
         for group, point in zip(closures(free), free, strict=True)
         for f in group
     ]
-    return TwistRates([a[i : i + n] for i in range(0, n * n, n)], [b[i : i + m] for i in range(0, n * m, m)], spans)
+    a_rows, b_rows = [a[i : i + n] for i in range(0, n * n, n)], [b[i : i + m] for i in range(0, n * m, m)]
+    return TwistRates(a_rows, b_rows, wrench_norms)

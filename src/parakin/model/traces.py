@@ -316,11 +316,11 @@ class Model:
         return self._tape(("jacobian",), self._poses + len(self.drives), outputs)
 
     def rates_tape(self) -> Tape:
-        """pose, joints -> A (n·n), B (n·n) and the legs' spans: see :mod:`parakin.model.rates`."""
+        """pose, joints -> A (n·n), B (n·n) and the legs' wrench norms: see :mod:`parakin.model.rates`."""
 
         def outputs(trace: Trace) -> list[Scalar]:
             twist = compute_twist_rates(self.spec, self.structure, *self._pose_and_joints(trace))
-            return [scalar for row in (*twist.a, *twist.b, twist.spans) for scalar in row]
+            return [scalar for row in (*twist.a, *twist.b, twist.wrench_norms) for scalar in row]
 
         return self._tape(("rates",), self._poses + len(self.drives), outputs)
 

@@ -16,7 +16,7 @@ from ..machine import Machine
 from ..workspaces.certified.region import Region
 from .certified.counterexamples import ZERO
 from .characteristic_length import CharacteristicLength, choose_characteristic_length
-from .extremes import Extreme, Side, compute_slack, find_extremes, find_isotropic_poses
+from .extremes import Extreme, ExtremeSide, compute_slack, find_extremes, find_isotropic_poses
 from .indices import Performance, compute_performance
 from .singularities import compute_singularity_margins
 
@@ -85,7 +85,7 @@ class Atlas:
         region, length = self.map.region, self.map.performance.length.value
         return compute_singularity_margins(self.machine, self.isotropic, length, region.mode)[:, 0]
 
-    def extreme(self, quantity: str, side: Side) -> Extreme:
+    def extreme(self, quantity: str, side: ExtremeSide) -> Extreme:
         """One of :attr:`extremes`: of ``condition``, ``greatest``, ``least``, ``manipulability`` or of a margin."""
         return next(e for e in self.extremes if e.quantity == quantity and e.side == side)
 

@@ -93,5 +93,5 @@ def _measure_arms(machine: Machine) -> float:
 
 def _measure_rods_at_home(machine: Machine) -> Array:
     home = machine.home[None]
-    _, _, spans = machine.twist_rates(home, machine.inverse(home), whole=False)
-    return spans.reshape(-1)
+    _, _, wrench_norms = machine.twist_rates(home, machine.inverse(home), whole=False)
+    return wrench_norms.reshape(-1)

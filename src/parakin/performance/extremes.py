@@ -13,8 +13,8 @@ from .indices import Performance, compute_performance
 from .jacobians import compute_scaled_rates
 from .search import find_roots, pick_best_apart, pick_best_of_blocks, search_maxima
 
-Side = Literal["least", "greatest"]
-SIDES: tuple[Side, Side] = ("least", "greatest")
+ExtremeSide = Literal["least", "greatest"]
+SIDES: tuple[ExtremeSide, ExtremeSide] = ("least", "greatest")
 MEASURES = ("condition", "greatest", "least", "manipulability")
 
 _ISOTROPIC = 1e-9  # the greatest entry of J⁻¹J⁻ᵀ, divided by its mean diagonal, less 1
@@ -32,7 +32,7 @@ class Extreme:
     """
 
     quantity: str
-    side: Side
+    side: ExtremeSide
     value: float
     pose: Array
 
@@ -107,7 +107,7 @@ def find_extremes(region: Region, inside: Performance, apart: float) -> tuple[Ex
     for (kind, sign), (points, best) in zip(wanted, fine, strict=True):
         if len(best):
             top = int(best.argmax())
-            side: Side = "greatest" if sign > 0.0 else "least"
+            side: ExtremeSide = "greatest" if sign > 0.0 else "least"
             pose = region.poses(points[top : top + 1])[0]
             extremes.append(Extreme(names[kind], side, float(sign * best[top]), pose))
     return tuple(extremes)

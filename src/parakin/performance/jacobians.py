@@ -36,11 +36,12 @@ def compute_scaled_rates(machine: Machine, rows: Array, length: CharacteristicLe
     A leg's row of A is a unit wrench, of B the part of each drive's motion that reaches the platform's joint; the rows
     of head and table are 1/mm times the length. NaN out of reach.
     """
-    a, b, spans = machine.twist_rates(rows, machine.inverse(rows, mode))
+    a, b, wrench_norms = machine.twist_rates(rows, machine.inverse(rows, mode))
     columns_a, columns_b = list_column_scales(machine, length)
-    legs = spans.shape[1]
+    legs = wrench_norms.shape[1]
     with np.errstate(divide="ignore", invalid="ignore"):
-        factors = np.concatenate([1.0 / spans, np.full((len(a), a.shape[1] - legs), length.factor)], 1)[:, :, None]
+        tilt_factors = np.full((len(a), a.shape[1] - legs), length.factor)
+        factors = np.concatenate([1.0 / wrench_norms, tilt_factors], 1)[:, :, None]
         return ScaledRates(a * columns_a * factors, b * columns_b * factors, legs)
 
 

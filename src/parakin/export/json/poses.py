@@ -10,7 +10,7 @@ from .offence import encode_offence
 
 if TYPE_CHECKING:
     from ...toolpath.posting.posted import Offence
-    from ..tables.poses import PoseTable, Side
+    from ..tables.poses import ColumnGroup, PoseTable
 
 
 def encode_poses(
@@ -41,7 +41,7 @@ def _encode_rows(table: PoseTable) -> list[dict[str, Any]]:
     return rows
 
 
-def _encode_values(table: PoseTable, side: Side) -> list[dict[str, float]]:
+def _encode_values(table: PoseTable, side: ColumnGroup) -> list[dict[str, float]]:
     names, units, values = table.columns(side)
     factors = [to_display(1.0, unit) for unit in units]
     return [

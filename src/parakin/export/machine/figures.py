@@ -19,7 +19,7 @@ from .scene import Points, Scene
 from .solids import LOOKS, Solid, build_solids
 
 Figure = dict[str, Any]  # plotly's {"data": [traces], "layout": {...}}
-Trace = dict[str, Any]
+PlotTrace = dict[str, Any]
 
 FONT = {"family": "system-ui, -apple-system, 'Segoe UI', Roboto, 'Helvetica Neue', Arial, sans-serif", "size": 13}
 INK, FAINT = "#263238", "#e3e8ec"
@@ -54,7 +54,7 @@ def embed_figure(name: str, figure: Figure, height: str) -> str:
     )
 
 
-def build_machine_traces(scene: Scene, name: str, scale: float, colour: str | None = None) -> list[Trace]:
+def build_machine_traces(scene: Scene, name: str, scale: float, colour: str | None = None) -> list[PlotTrace]:
     """Build a machine as meshes, one for each colour; one entry of the legend, ``name``, shows and hides them all.
 
     With ``colour`` the machine is drawn as a shadow in that one colour.
@@ -68,7 +68,7 @@ def build_machine_traces(scene: Scene, name: str, scale: float, colour: str | No
         first = np.cumsum([0, *[len(solid.vertices) for solid in group[:-1]]])
         i, j, k = np.vstack([solid.triangles + start for solid, start in zip(group, first, strict=True)]).T
         vertices = np.vstack([solid.vertices for solid in group])
-        trace: Trace = {"type": "mesh3d", **split_coordinates(vertices, 1)}
+        trace: PlotTrace = {"type": "mesh3d", **split_coordinates(vertices, 1)}
         trace |= {"i": i.tolist(), "j": j.tolist(), "k": k.tolist(), "hoverinfo": "skip", "lighting": _LIGHT}
         trace["lightposition"] = {"x": 4e4, "y": -8e4, "z": 9e4}
         trace |= {"color": colour or LOOKS[kind].colour, "opacity": 1.0 if colour is None else 0.22}
@@ -77,20 +77,20 @@ def build_machine_traces(scene: Scene, name: str, scale: float, colour: str | No
     return traces
 
 
-def build_label_trace(scene: Scene, name: str) -> Trace:
+def build_label_trace(scene: Scene, name: str) -> PlotTrace:
     """Build the drives' names at their places."""
     places = np.array([place for _, place in scene.labels])
-    trace: Trace = {"type": "scatter3d", "mode": "text", **split_coordinates(places, 1)}
+    trace: PlotTrace = {"type": "scatter3d", "mode": "text", **split_coordinates(places, 1)}
     trace |= {"text": [escape(text) for text, _ in scene.labels], "textfont": {"size": 13, "color": INK}}
     return trace | {"textposition": "top right", "hoverinfo": "skip", "legendgroup": name, "showlegend": False}
 
 
-def build_frame_traces(frame: Points, size: float, text: str, group: str) -> list[Trace]:
+def build_frame_traces(frame: Points, size: float, text: str, group: str) -> list[PlotTrace]:
     """Build the axes of a frame: X red, Y green, Z blue, with their letters; ``text`` names the frame at its origin."""
     traces = []
     for letter, axis, colour in zip("XYZ", frame[:, :3].T, ("#c62828", "#2e7d32", "#1565c0"), strict=True):
         ends = np.array([frame[:, 3], frame[:, 3] + size * axis])
-        trace: Trace = {"type": "scatter3d", "mode": "lines+text", **split_coordinates(ends, 1)}
+        trace: PlotTrace = {"type": "scatter3d", "mode": "lines+text", **split_coordinates(ends, 1)}
         trace |= {"text": [text if letter == "X" else "", letter], "textfont": {"size": 12, "color": colour}}
         trace |= {"line": {"color": colour, "width": 4}, "hoverinfo": "skip", "showlegend": False, "legendgroup": group}
         traces.append(trace)

@@ -22,7 +22,7 @@ from ...model.parts import Step
 from ...model.structures import PlatformPlacement
 
 Points = NDArray[np.float64]
-Kind = Literal["base", "rail", "telescope", "rod", "arm", "platform", "central", "head", "tool", "table", "axis"]
+SceneKind = Literal["base", "rail", "telescope", "rod", "arm", "platform", "central", "head", "tool", "table", "axis"]
 
 _NEAR = 1e-6  # mm; points nearer than this are one
 _DISC = np.linspace(0.0, 2.0 * pi, 33)[:-1]
@@ -32,7 +32,7 @@ _DISC = np.linspace(0.0, 2.0 * pi, 33)[:-1]
 class ScenePart:
     """One thing to draw: ``points`` (k, 3) in order, a polygon if ``closed``; a single point is a joint."""
 
-    kind: Kind
+    kind: SceneKind
     name: str
     points: Points
     closed: bool = False
@@ -53,7 +53,7 @@ class Scene:
     frames: dict[str, Points]
     normal: Points | None
 
-    def of(self, *kinds: Kind) -> tuple[ScenePart, ...]:
+    def of(self, *kinds: SceneKind) -> tuple[ScenePart, ...]:
         """The parts of these kinds."""
         return tuple(part for part in self.parts if part.kind in kinds)
 
@@ -124,7 +124,7 @@ class _SceneBuilder:
         points_in_m: Points = np.asarray(points, float) @ self.mount.T + self.base
         return points_in_m
 
-    def _add(self, kind: Kind, name: str, points: ArrayLike, closed: bool = False) -> None:
+    def _add(self, kind: SceneKind, name: str, points: ArrayLike, closed: bool = False) -> None:
         self.parts.append(ScenePart(kind, name, self._to_machine(points).reshape(-1, 3), closed))
 
     def _add_legs(self) -> None:
@@ -141,7 +141,7 @@ class _SceneBuilder:
                         rail = feet[[0, -1], strut] if leg.units[number] == "mm" else feet[:, strut]
                         self._add("rail", drive.name, rail)
             for number, ends in enumerate(struts):
-                first: Kind = "rod" if moved.get(0) else "telescope"
+                first: SceneKind = "rod" if moved.get(0) else "telescope"
                 self._add(first if number == 0 else "arm", leg.drives[min(number, len(leg.drives) - 1)].name, ends)
                 if number not in moved:
                     anchors.append(ends[0])

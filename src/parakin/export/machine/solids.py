@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...arrays import Indices
-from .scene import Kind, Points, Scene, ScenePart
+from .scene import Points, Scene, SceneKind, ScenePart
 
 _SIDES = 14
 
@@ -78,7 +78,7 @@ def _build_part(part: ScenePart, size: float, piece: float) -> Iterator[Solid]:
             for corner in points:
                 yield _build_ball(part.kind, part.name, corner, radius)
     if part.kind in ("telescope", "rod", "arm"):
-        foot: Kind | str = "carriage" if part.kind != "telescope" else "joint"
+        foot: SceneKind | str = "carriage" if part.kind != "telescope" else "joint"
         yield _build_ball(foot, part.name, points[0], LOOKS[foot].radius * size)
         yield _build_ball("joint", part.name, points[1], LOOKS["joint"].radius * size)
 

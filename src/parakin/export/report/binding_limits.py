@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ...arrays import Indices
-from ..machine.figures import Figure, Trace, build_scene_layout, round_numbers
+from ..machine.figures import Figure, PlotTrace, build_scene_layout, round_numbers
 from ..number_format import format_duration
 from .path_view import PathView, build_stroke, choose_points, find_tips
 from .timing_samples import find_switches
@@ -55,7 +55,7 @@ def _allow_breaks(name: str) -> str:
     return escape(name).replace(".", ".<wbr>")
 
 
-def build_share_traces(trajectory: Trajectory, shades: dict[str, str]) -> list[Trace]:
+def build_share_traces(trajectory: Trajectory, shades: dict[str, str]) -> list[PlotTrace]:
     """Build for each limit its share of short spans of the cycle, in which it sets the pace; the shares sum to 1."""
     ends = np.linspace(0.0, trajectory.seconds, _BINS + 1)
     bounds = np.concatenate([[0.0], find_switches(trajectory), [trajectory.seconds]])
@@ -65,7 +65,7 @@ def build_share_traces(trajectory: Trajectory, shades: dict[str, str]) -> list[T
         so_far = np.append(0.0, np.cumsum(np.where(trajectory.binding == trajectory.names.index(name), spans, 0.0)))
         share = np.diff(np.interp(ends, bounds, so_far)) * (_BINS / trajectory.seconds)
         bins = np.flatnonzero(share > 1e-6)
-        trace: Trace = {"type": "bar", "name": escape(name), "marker": {"color": shade, "line": {"width": 0}}}
+        trace: PlotTrace = {"type": "bar", "name": escape(name), "marker": {"color": shade, "line": {"width": 0}}}
         trace |= {"x": round_numbers(0.5 * (ends[bins] + ends[bins + 1]), 6), "y": round_numbers(share[bins], 4)}
         trace |= {
             "width": trajectory.seconds / _BINS,
@@ -87,7 +87,7 @@ def build_bound_path(trajectory: Trajectory, view: PathView, shades: dict[str, s
     limited = (trajectory.binding != 0).astype(float)  # so that thinning drops no stretch where a drive binds
     turns = np.flatnonzero((np.diff(trajectory.binding) != 0) | (np.diff(rapid) != 0))
     kept = choose_points((*tips.T, limited), turns, _POINTS)
-    traces: list[Trace] = []
+    traces: list[PlotTrace] = []
     for name, shade in shades.items():
         here = trajectory.binding[kept[1:]] == trajectory.names.index(name)
         for fast in (False, True):

@@ -10,7 +10,7 @@ import numpy as np
 
 from ...arrays import Array, Indices
 from ...toolpath.posting.range_use import RangeUse
-from ..machine.figures import Figure, Trace, round_numbers
+from ..machine.figures import Figure, PlotTrace, round_numbers
 from ..number_format import format_bound
 from .panels import Panel, stack_panels
 
@@ -53,19 +53,19 @@ def build_joint_curves(posted: Posted, uses: list[RangeUse]) -> tuple[Figure, in
     return stack_panels(rows, "record, counted from 0")
 
 
-def build_panel(use: RangeUse, heading: str, traces: list[Trace], ticks: str = ",") -> Panel:
+def build_panel(use: RangeUse, heading: str, traces: list[PlotTrace], ticks: str = ",") -> Panel:
     """Build a panel of a bounded quantity, in mm or degrees, which shows the range used and the limits near it."""
     scale = degrees(1.0) if use.unit == "rad" else 1.0
     return Panel(heading, traces, _choose_axis_range(use, scale), [b * scale for b in (use.low, use.high)], ticks)
 
 
-def _build_curve(posted: Posted, use: RangeUse, values: Array, scale: float, most: int) -> list[Trace]:
+def _build_curve(posted: Posted, use: RangeUse, values: Array, scale: float, most: int) -> list[PlotTrace]:
     """Build the curve, and over it in red what lies beyond a limit."""
     kept = pick_extremes(values, most)
     y, lines = values[kept], posted.path.line[kept].tolist()
     unit = "°" if use.unit == "rad" else f" {use.unit}"
     digits = 4 if use.unit == "rad" else 3
-    base: Trace = {
+    base: PlotTrace = {
         "type": "scatter",
         "x": kept.tolist(),
         "customdata": lines,

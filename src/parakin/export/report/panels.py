@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from ..machine.figures import FAINT, FONT, INK, Figure, Trace
+from ..machine.figures import FAINT, FONT, INK, Figure, PlotTrace
 
 _ROW, _GAP, _BREAK = 118, 34, 44  # px: a diagram's height, the gap to the next, and more of it under an axis
 _BETWEEN = 0.065  # of the figure's width, between columns
@@ -17,7 +17,7 @@ class Panel:
     """One diagram: its heading in HTML, traces without axes, the y axis' range and tick format, and dashed bounds."""
 
     heading: str
-    traces: list[Trace]
+    traces: list[PlotTrace]
     span: list[float]
     bounds: Sequence[float] = ()
     ticks: str = ","
@@ -34,7 +34,7 @@ def stack_panels(rows: Sequence[Sequence[Panel]], title: str) -> tuple[Figure, i
     layout: Figure = {"height": inner + _TOP + _BOTTOM, "showlegend": False, "hovermode": "closest"}
     layout |= {"font": {**FONT, "color": INK}, "margin": {"l": 62, "r": 16, "t": _TOP, "b": _BOTTOM}}
     layout |= {"plot_bgcolor": "#fff", "paper_bgcolor": "#fff", "shapes": [], "annotations": []}
-    traces: list[Trace] = []
+    traces: list[PlotTrace] = []
     feet: dict[tuple[int, int], str] = {}  # of each column, in how many: its lowest y axis
     count = 0
     for number, row in enumerate(rows):

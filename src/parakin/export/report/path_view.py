@@ -14,7 +14,7 @@ from ...machine import Machine
 from ...toolpath.posting.range_use import compute_relative_margin
 from ..machine.figures import (
     Figure,
-    Trace,
+    PlotTrace,
     build_machine_traces,
     build_scene_layout,
     round_numbers,
@@ -121,7 +121,7 @@ def choose_points(values: Sequence[Array], turns: Indices, most: int) -> Indices
 
 def _build_motions(
     posted: Posted, tips: Points, kept: Indices, rapid: bool, line: Figure, name: str
-) -> tuple[Trace, Indices]:
+) -> tuple[PlotTrace, Indices]:
     """Build the motions in feed or in rapid; return also the record of each point. A motion ends at its record."""
     trace, at = build_stroke(tips, kept, posted.path.rapid[kept[1:]] == rapid, line, name)
     trace["customdata"] = posted.path.line[at].tolist()
@@ -129,7 +129,7 @@ def _build_motions(
     return trace, at
 
 
-def build_stroke(points: Points, kept: Indices, wanted: Flags, line: Figure, name: str) -> tuple[Trace, Indices]:
+def build_stroke(points: Points, kept: Indices, wanted: Flags, line: Figure, name: str) -> tuple[PlotTrace, Indices]:
     """Build the ``wanted`` (k - 1,) of the motions between kept points (k,) as one line with gaps.
 
     Returns the line, and the index of each of its points.
@@ -141,11 +141,11 @@ def build_stroke(points: Points, kept: Indices, wanted: Flags, line: Figure, nam
     order = triples[np.column_stack([begins, begins, wanted])]
     at = kept[np.maximum(order, 0)]
     drawn = np.where(order[:, None] < 0, np.nan, points[at])
-    trace: Trace = {"type": "scatter3d", "mode": "lines", "name": name, "line": dict(line)}
+    trace: PlotTrace = {"type": "scatter3d", "mode": "lines", "name": name, "line": dict(line)}
     return trace | split_coordinates(drawn, 2), at
 
 
-def _mark_offences(posted: Posted, tips: Points) -> list[Trace]:
+def _mark_offences(posted: Posted, tips: Points) -> list[PlotTrace]:
     """Mark places off limits; a sample of them if there are many, with the first and every limit's worst."""
     off = np.flatnonzero(posted.broken)
     shown = [offence for offence in (*posted.offences, posted.first) if offence is not None]
@@ -161,12 +161,12 @@ def _mark_offences(posted: Posted, tips: Points) -> list[Trace]:
         to, share = np.array([o.record for o in between]), np.array([o.share for o in between])[:, None]
         points = np.vstack([points, (1.0 - share) * tips[to - 1] + share * tips[to]])
         text += [f"line {o.line}, on the way: {escape(o.limit)}" for o in between]
-    trace: Trace = {"type": "scatter3d", "mode": "markers", "name": "off limits", "hovertext": text}
+    trace: PlotTrace = {"type": "scatter3d", "mode": "markers", "name": "off limits", "hovertext": text}
     trace |= {"hoverinfo": "text", "marker": {"size": 3, "color": "#d50000"}}
     return [trace | split_coordinates(points, 2), *_mark_broken_motions(posted, tips)]
 
 
-def _mark_broken_motions(posted: Posted, tips: Points) -> list[Trace]:
+def _mark_broken_motions(posted: Posted, tips: Points) -> list[PlotTrace]:
     """Mark motions that break a limit which both their records keep; a sample of them if there are many."""
     if posted.broken_motions is None or not posted.broken_motion_count:
         return []
@@ -182,7 +182,7 @@ def _mark_broken_motions(posted: Posted, tips: Points) -> list[Trace]:
 # The workspace around the path.
 
 
-def _sample_workspace(posted: Posted, place: Points, tips: Points, size: float) -> tuple[list[Trace], list[Points]]:
+def _sample_workspace(posted: Posted, place: Points, tips: Points, size: float) -> tuple[list[PlotTrace], list[Points]]:
     """Sample the workspace on a coarse grid of tips at the path's mean orientation.
 
     Returns a translucent surface where the least margin is 0, and its box (2, 3); nothing where no tip is allowed.
@@ -209,13 +209,13 @@ def _sample_workspace(posted: Posted, place: Points, tips: Points, size: float) 
     value = np.clip(np.where(np.isnan(value), -0.1, value), -0.1, 0.1)
     reach = np.array([points[inside].min(0), points[inside].max(0)])
     name = "workspace (coarse sample)"
-    base: Trace = {"name": name, "showlegend": True, "showscale": False, "hoverinfo": "skip", "opacity": 0.16}
+    base: PlotTrace = {"name": name, "showlegend": True, "showscale": False, "hoverinfo": "skip", "opacity": 0.16}
     base["colorscale"] = [[0, "#26a69a"], [1, "#26a69a"]]
     if len(used) == 2:
         points = np.where(inside[:, None], points, np.nan)
         x, y, z = (_split_rows(column, len(sides[1])) for column in points.T)
         return [base | {"type": "surface", "x": x, "y": y, "z": z}], [reach]
-    surface: Trace = {"type": "isosurface", **split_coordinates(points, 1)}
+    surface: PlotTrace = {"type": "isosurface", **split_coordinates(points, 1)}
     surface |= {"value": round_numbers(value, 4), "isomin": 0.0, "isomax": 0.0, "surface": {"count": 1}}
     return [base | surface | {"caps": {c: {"show": False} for c in "xyz"}, "flatshading": False}], [reach]
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from ...arrays import Flags
 from ...toolpath.posting.range_use import RangeUse
-from ..machine.figures import Figure, Trace, round_numbers
+from ..machine.figures import Figure, PlotTrace, round_numbers
 from ..number_format import format_bound
 from .binding_limits import build_share_traces
 from .joint_curves import build_panel, format_heading
@@ -56,7 +56,7 @@ def _build_line(
     name: str,
     unit: str,
     scale: float = 1.0,
-) -> Trace:
+) -> PlotTrace:
     """Build a curve; with ``shown`` only the parts behind these points, to lie over it, and silent to the mouse."""
     at = np.arange(len(curve.times))
     if shown is not None:
@@ -68,7 +68,7 @@ def _build_line(
         values = np.where(drawn[at], values, np.nan)
     peak = np.abs(values[np.isfinite(values)]).max(initial=0.0)
     digits = 3 if peak <= 0.0 else min(9, max(0, 5 - floor(log10(peak))))
-    trace: Trace = {"type": "scatter", "mode": "lines", "name": name, "line": look}
+    trace: PlotTrace = {"type": "scatter", "mode": "lines", "name": name, "line": look}
     trace |= {
         "x": round_numbers(curve.times[at], max(3, 6 - floor(log10(trajectory.seconds)))),
         "y": round_numbers(values, digits),

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from ...kinematics.forward import Solution
     from ...machine import Machine
 
-Side: TypeAlias = Literal["pose", "joints"]
+ColumnGroup: TypeAlias = Literal["pose", "joints"]
 
 _LENGTH_DIGITS, _ANGLE_DIGITS = 6, 8
 
@@ -34,7 +34,7 @@ class PoseTable:
     broken: Sequence[str]
     solution: Solution | None = None
 
-    def columns(self, side: Side) -> tuple[tuple[str, ...], tuple[str, ...], Array]:
+    def columns(self, side: ColumnGroup) -> tuple[tuple[str, ...], tuple[str, ...], Array]:
         """Names, units and values (n, columns) of the poses or of the joints."""
         machine = self.machine
         if side == "pose":

@@ -8,7 +8,7 @@ from itertools import product
 import numpy as np
 
 from ...arrays import Array, Indices, Progress
-from ..extremes import Side
+from ..extremes import ExtremeSide
 from ..indices import compute_performance
 from ..search import pick_best_of_blocks, search_maxima_in_box
 from .bisection import AT_ONCE, Budget, bisect_inputs, bound_inverse_error, find_widest_inputs, invert_middles
@@ -30,7 +30,7 @@ class Bracket:
     narrow as wanted.
     """
 
-    side: Side
+    side: ExtremeSide
     low: float
     high: float
     pose: Array
@@ -44,7 +44,7 @@ class Bracket:
 
 def bracket_amplification(
     box: PoseBox,
-    side: Side,
+    side: ExtremeSide,
     tolerance: float,
     budget: Budget,
     bound: float,
@@ -95,7 +95,7 @@ def bracket_amplification(
 class _AmplificationSearch:
     """The greatest singular value of J, or of J⁻¹: bounds of it over boxes, and the greatest one found so far."""
 
-    def __init__(self, box: PoseBox, side: Side):
+    def __init__(self, box: PoseBox, side: ExtremeSide):
         self.box, self.side = box, side
         divisor, dividend = (box.a, box.b) if side == "greatest" else (box.b, box.a)
         self.divisor, self.dividend = (MatrixBounds(matrix, box.inputs, box.trace) for matrix in (divisor, dividend))

@@ -13,12 +13,12 @@ from ..search import search_maxima_in_box
 from ..singularities import PARALLEL, compute_singularity_margins, list_margin_names
 from .interval_matrices import PoseBox
 
-Kind = Literal["parallel", "serial"]
+SingularityKind = Literal["parallel", "serial"]
 
 ZERO = 1e-9  # a singularity margin no greater is a singularity
 
 
-def find_singular_pose(box: PoseBox, kind: Kind) -> tuple[Array, str] | None:
+def find_singular_pose(box: PoseBox, kind: SingularityKind) -> tuple[Array, str] | None:
     """Find a pose of the box where a margin is zero, with the margin's name; None if none was found."""
     points = box.samples
     names = [name for name in list_margin_names(box.machine) if _is_of_kind(name, kind)]
@@ -35,17 +35,17 @@ def find_singular_pose(box: PoseBox, kind: Kind) -> tuple[Array, str] | None:
     return None
 
 
-def _is_of_kind(name: str, kind: Kind) -> bool:
+def _is_of_kind(name: str, kind: SingularityKind) -> bool:
     return (name == PARALLEL) == (kind == "parallel")
 
 
-def _compute_margins(box: PoseBox, kind: Kind, points: Array) -> Array:
+def _compute_margins(box: PoseBox, kind: SingularityKind, points: Array) -> Array:
     """Compute the singularity margins of one kind at points of the box, (N, margins)."""
     margins = compute_singularity_margins(box.machine, box.poses(points), box.length.value, box.mode)
     return np.asarray(margins[:, [_is_of_kind(name, kind) for name in list_margin_names(box.machine)]])
 
 
-def _compute_margin(box: PoseBox, kind: Kind, number: int, points: Array) -> Array:
+def _compute_margin(box: PoseBox, kind: SingularityKind, number: int, points: Array) -> Array:
     return _compute_margins(box, kind, points)[:, number]
 
 

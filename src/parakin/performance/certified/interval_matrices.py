@@ -106,7 +106,7 @@ class PoseBox:
         a = [[x * float(k) for x, k in zip(row, columns_a, strict=True)] for row in rates.a]
         b = [[x * float(k) for x, k in zip(row, columns_b, strict=True)] for row in rates.b]
         reach = [*platform.reach, *(reach.margin for leg in legs for reach in leg.reach)]
-        return TwistRates(a, b, rates.spans), reach
+        return TwistRates(a, b, rates.wrench_norms), reach
 
     @property
     def reach(self) -> list[Scalar]:
@@ -126,7 +126,7 @@ class PoseBox:
     @cached_property
     def parallel(self) -> Matrix:
         """The matrix that is singular at parallel singularities: A, of five axes the legs' rows by the translations."""
-        a, legs = self._rates[0].a, len(self._rates[0].spans)
+        a, legs = self._rates[0].a, len(self._rates[0].wrench_norms)
         size = legs if len(a) - legs == 2 else len(a)
         return [row[:size] for row in a[:size]]
 

@@ -14,17 +14,16 @@ from typing import Literal
 
 import numpy as np
 
-from ...arrays import Array, Progress
+from ...arrays import Array, Progress, Span
 from ...errors import PoseError
 from ...machine import Machine
 from ..characteristic_length import choose_characteristic_length
 from ..extremes import SIDES
 from .amplification import UNBOUNDED, Bracket, bracket_amplification
 from .bisection import Budget, decide_nonnegative, decide_regular, find_undecided_part
-from .counterexamples import Kind, find_singular_pose
+from .counterexamples import SingularityKind, find_singular_pose
 from .interval_matrices import MatrixBounds, PoseBox
 
-Span = tuple[float, float]
 Verdict = Literal["proved", "refuted", "undecided"]
 
 
@@ -80,7 +79,7 @@ def make_pose_box(
 
 def prove_no_singularity(
     box: PoseBox,
-    kind: Kind,
+    kind: SingularityKind,
     boxes: int = 200_000,
     seconds: float | None = 60.0,
 ) -> Proof:

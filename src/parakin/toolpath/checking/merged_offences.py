@@ -21,7 +21,7 @@ from .worst_margins import find_first_broken_share, find_worst_on_path
 _BETTER = 1e-6  # relative: a point between records must be so much worse than the worst record to stand for the limit
 _BLOCK = 1 << 16  # records
 
-Start = tuple[int, float]  # a motion, and the share of it from which a limit is broken
+OffenceStart = tuple[int, float]  # a motion, and the share of it from which a limit is broken
 
 
 class OffenceMerger:
@@ -46,7 +46,7 @@ class OffenceMerger:
         }
         finite = {column: margin for column, margin in known.items() if math.isfinite(margin)}
         worst_margins = find_worst_on_path(self.bisection, finite)
-        started: list[tuple[Start, Offence]] = []
+        started: list[tuple[OffenceStart, Offence]] = []
         for name, offence in self.of_records.items():
             column = self.columns.get(name)
             start = starts[name]
@@ -90,7 +90,7 @@ class OffenceMerger:
         margin = float(margins[0, self.columns[offence.limit]])
         return -math.inf if math.isnan(margin) else margin
 
-    def _find_first_records(self) -> dict[str, Start]:
+    def _find_first_records(self) -> dict[str, OffenceStart]:
         """Find the first record that breaks each limit, as the end of its motion."""
         posted, starts = self.posted, {}
         missing = {name: self.columns[name] for name in self.of_records if name in self.columns}

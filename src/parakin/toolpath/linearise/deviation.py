@@ -21,7 +21,7 @@ _POINTS_AT_ONCE = 1 << 14
 
 
 @dataclass(frozen=True, eq=False)
-class Spans:
+class MotionSpans:
     """m spans of programmed motions, from one record of a posted path to the next.
 
     record, begin, end : (m,) the programmed motion by the record it leads to, and the shares of it where a span begins
@@ -55,7 +55,7 @@ class Deviation:
     chord: float
     angle: float
 
-    def measure_spans(self, spans: Spans, shares: Array) -> Array:
+    def measure_spans(self, spans: MotionSpans, shares: Array) -> Array:
         """Measure the greatest deviation at shares (k,) of each span, (m,), in tolerances; infinite without a pose."""
         worst = np.empty(len(spans.record))
         step = max(1, _POINTS_AT_ONCE // len(shares))

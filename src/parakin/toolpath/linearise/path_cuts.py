@@ -12,7 +12,7 @@ from ...kinematics.rotations import compute_rotations
 from ..posting.posted import Posted
 from ..programmed_path import ProgrammedPath
 from .continuation import PosedPoints, continue_points, continue_turned_points, find_matching_poses
-from .deviation import Deviation, Spans
+from .deviation import Deviation, MotionSpans
 
 _SHARES: Array = (np.arange(5, dtype=np.float64) + 1.0) / 6.0  # of a span, at which its deviation is measured here
 _FULL = 0.992  # of the tolerance: what a span may take at _SHARES, for the worst point may lie between them
@@ -54,10 +54,10 @@ class PathPositions:
         return PathPositions(record, begin, end)
 
 
-def select_spans(posted: Posted, positions: PathPositions, motion: Indices) -> Spans:
+def select_spans(posted: Posted, positions: PathPositions, motion: Indices) -> MotionSpans:
     """Return whole motions of a posted path as spans."""
     first, last = (PosedPoints(posted.poses[record], posted.joints[record]) for record in (motion - 1, motion))
-    return Spans(positions.record[motion], positions.begin[motion], positions.end[motion], first, last)
+    return MotionSpans(positions.record[motion], positions.begin[motion], positions.end[motion], first, last)
 
 
 @dataclass(frozen=True, eq=False)
@@ -122,7 +122,7 @@ class _CutSearch:
         motion, cut, first = self.motion[rows], self.share[rows], self.points[rows]
         last = self._compute_points(motion, share, first)
         begin, length = self.positions.begin[motion], (self.positions.end - self.positions.begin)[motion]
-        spans = Spans(self.positions.record[motion], begin + cut * length, begin + share * length, first, last)
+        spans = MotionSpans(self.positions.record[motion], begin + cut * length, begin + share * length, first, last)
         return last, self.deviation.measure_spans(spans, _SHARES)
 
     def _compute_points(self, motion: Indices, share: Array, first: PosedPoints) -> PosedPoints:

@@ -16,7 +16,7 @@ from ..posting.frames import PathLimit, compose_frames, compute_poses, frame_fro
 from ..posting.margin_blocks import split_margins
 from ..posting.path_samples import SampledPath, sample_path
 from ..posting.range_use import list_ranges
-from ..posting.working_mode import choose_branch
+from ..posting.working_mode import follow_working_mode
 from .maximin import score_rows
 
 AXES = "XYZABC"
@@ -83,8 +83,8 @@ class PlacementMargins:
             if track is None:
                 joints = self.machine.follow(poses, self.mode, PRINTED)
             else:
-                branch = choose_branch(self.machine, path, self._sample(point, path, poses), self.mode)
-                poses, joints = branch.poses[rows], branch.joints[rows]
+                solution = follow_working_mode(self.machine, path, self._sample(point, path, poses), self.mode)
+                poses, joints = solution.poses[rows], solution.joints[rows]
             all_poses.append(poses)
             all_joints.append(joints)
             path_rows.append(_list_path_rows(path_limits, rows))
@@ -99,11 +99,11 @@ class PlacementMargins:
     def score_placement(self, point: Array) -> PlacementScore:
         """Score the placement at a point over the whole path."""
         poses, path_limits = self._compute_poses(point, self.path)
-        branch = choose_branch(self.machine, self.path, self._sample(point, self.path, poses), self.mode)
+        solution = follow_working_mode(self.machine, self.path, self._sample(point, self.path, poses), self.mode)
         is_reach, spans = self._spans
         names, is_hard = list(self.machine.limits), is_reach
         least, records = np.full(len(names), np.inf), np.zeros(len(names), np.int64)
-        for part, margins in split_margins(self.machine, branch.poses, branch.joints, self.mode):
+        for part, margins in split_margins(self.machine, solution.poses, solution.joints, self.mode):
             margins = margins / spans
             margins = np.where(np.isnan(margins), np.where(is_reach, -1.0, np.inf), margins)
             tightest = margins.argmin(axis=0)

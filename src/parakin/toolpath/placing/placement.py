@@ -9,7 +9,7 @@ from typing import TypeAlias
 
 import numpy as np
 
-from ...arrays import Array, Progress
+from ...arrays import Array, Progress, Span
 from ...errors import PoseError
 from ...machine import Machine
 from ..path import ToolPath
@@ -17,7 +17,7 @@ from ..posting.working_mode import list_candidate_modes
 from .margins import AXES, PlacementMargins
 from .placement_search import PlacementSearch
 
-Bounds: TypeAlias = Mapping[str, tuple[float, float]]
+AxisRanges: TypeAlias = Mapping[str, Span]
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,7 +49,7 @@ class Placement:
 
 
 def find_placement(
-    machine: Machine, path: ToolPath, bounds: Bounds, *, mode: str | None = None, progress: Progress | None = None
+    machine: Machine, path: ToolPath, bounds: AxisRanges, *, mode: str | None = None, progress: Progress | None = None
 ) -> Placement:
     """Find the placement within bounds that has the greatest least margin over all records of a path.
 

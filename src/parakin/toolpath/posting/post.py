@@ -15,7 +15,7 @@ from .offences import judge_path
 from .path_samples import sample_path
 from .posted import Posted
 from .turn_steps import find_turning_columns
-from .working_mode import choose_branch, list_candidate_modes
+from .working_mode import follow_working_mode, list_candidate_modes
 
 
 def post_path(
@@ -38,7 +38,7 @@ def post_path(
     progress : called now and then with the fraction done, 0 to 1
 
     Turns of joints are counted, and taken back in rapid motions where they have to be: see
-    :func:`~.working_mode.choose_branch`.
+    :func:`~.working_mode.follow_working_mode`.
 
     Raises :class:`PoseError` for an invalid workpiece, an unknown mode, or a motion of thousands of turns. A record
     that can't be reached raises nothing: it is an offence of the result.
@@ -53,21 +53,21 @@ def post_path(
     candidates = list_candidate_modes(machine, mode)
     sampled = sample_path(machine, path, frame, candidates[0], poses)
     for candidate in candidates:
-        branch = choose_branch(machine, path, sampled, candidate)
+        solution = follow_working_mode(machine, path, sampled, candidate)
         report(0.7)
-        judgement = judge_path(machine, branch.poses, branch.joints, path.line, candidate, path_limits)
-        faults = (int(np.count_nonzero(judgement.broken)), branch.swings)
+        judgement = judge_path(machine, solution.poses, solution.joints, path.line, candidate, path_limits)
+        faults = (int(np.count_nonzero(judgement.broken)), solution.swings)
         if best is None or faults < fewest:
-            best, fewest = (branch, judgement), faults
+            best, fewest = (solution, judgement), faults
         if faults == (0, 0):
             break
     assert best is not None
-    branch, judgement = best
+    solution, judgement = best
     report(1.0)
     return Posted(
-        machine, _note_lost_turns(machine, path), branch.mode, frame, branch.poses, branch.joints,
+        machine, _note_lost_turns(machine, path), solution.mode, frame, solution.poses, solution.joints,
         judgement.broken, judgement.limits, judgement.offences, judgement.first, judgement.worst,
-        rewinds=branch.rewinds,
+        rewinds=solution.rewinds,
     )  # fmt: skip
 
 

@@ -17,7 +17,7 @@ from ...machine import Machine
 BLOCK = 1 << 13  # records whose many intermediate arrays stay in the cache
 
 # An angle for each turn, each (n,); where the continuous one is free, (n,) or one for all; the lean left, (n,) or None.
-Solution: TypeAlias = tuple[Sequence[Array], Any, Any]
+TurnSolution: TypeAlias = tuple[Sequence[Array], Any, Any]
 
 
 @dataclass(frozen=True)
@@ -35,7 +35,7 @@ class ToolOrientation:
     """
 
     letters: str
-    solve: Callable[[Array], Solution]
+    solve: Callable[[Array], TurnSolution]
     continuous: str | None
     restriction: str = ""
     has_direction: bool = False
@@ -77,7 +77,7 @@ def find_tool_orientation(machine: Machine) -> ToolOrientation:
     if 1.0 - cosine * cosine < EXACT * EXACT:  # no turn, or one about the tool's own axis, which changes nothing
         restriction = "keeps it upright" if abs(at_home[2] - 1.0) < LEVEL else "keeps its direction"
 
-        def solve_no_turn(k: Array) -> Solution:
+        def solve_no_turn(k: Array) -> TurnSolution:
             return [np.zeros(len(k))] * len(letters), False, _measure_angle(k, at_home)
 
         return ToolOrientation(letters, solve_no_turn, None, restriction, spins=bool(letters), tool=tool)
@@ -86,14 +86,14 @@ def find_tool_orientation(machine: Machine) -> ToolOrientation:
     )
 
 
-def _solve_direction(k: Array) -> Solution:
+def _solve_direction(k: Array) -> TurnSolution:
     """Solve k = Rz(C)·Ry(B)·z for B from 0 to 180° and C."""
     kx, ky, kz = k.T
     square = kx * kx + ky * ky
     return [np.arctan2(np.sqrt(square), kz), np.arctan2(ky, kx)], square < PRINTED * PRINTED, None
 
 
-def _solve_three_turns(k: Array, c: float) -> Solution:
+def _solve_three_turns(k: Array, c: float) -> TurnSolution:
     """Solve for A and B with C given: turned back by C, k is Ry(B)·Rx(A)·z = (sin B cos A, -sin A, cos B cos A)."""
     cos, sin = math.cos(c), math.sin(c)
     kx, ky, kz = cos * k[:, 0] + sin * k[:, 1], cos * k[:, 1] - sin * k[:, 0], k[:, 2]
@@ -101,7 +101,7 @@ def _solve_three_turns(k: Array, c: float) -> Solution:
     return [np.arctan2(-ky, np.sqrt(square)), np.arctan2(kx, kz), np.full(len(k), c)], square < PRINTED * PRINTED, None
 
 
-def _solve_one_turn(k: Array, turning: Array, at_home: Array, cosine: float) -> Solution:
+def _solve_one_turn(k: Array, turning: Array, at_home: Array, cosine: float) -> TurnSolution:
     """Find the angle about the axis ``turning`` that brings the tool's axis from ``at_home`` nearest to k.
 
     cosine : of the angle between the two axes

@@ -17,7 +17,7 @@ from .turn_steps import find_turning_joints
 
 
 @dataclass(frozen=True, eq=False)
-class Branch:
+class ModeSolution:
     """A path's joints in one working mode.
 
     mode : signs of the legs, and of head and table where the path begins
@@ -42,7 +42,7 @@ def list_candidate_modes(machine: Machine, mode: str | None) -> list[str]:
     return machine.head_modes(checked) if mode is None else [checked]
 
 
-def choose_branch(machine: Machine, path: ToolPath, sampled: SampledPath, mode: str) -> Branch:
+def follow_working_mode(machine: Machine, path: ToolPath, sampled: SampledPath, mode: str) -> ModeSolution:
     """Choose the joints for the poses of a path's records in a working mode, with their turns counted.
 
     The turns are those with which the fewest records break a limit, then those by which the joints turn least, then
@@ -54,7 +54,7 @@ def choose_branch(machine: Machine, path: ToolPath, sampled: SampledPath, mode: 
     turning = find_turning_joints(machine)
     rewinds: tuple[int, ...] = ()
     if not turning or not len(joints):
-        return Branch(mode, poses, joints, rewinds, 0)
+        return ModeSolution(mode, poses, joints, rewinds, 0)
     first = None if machine.wrist is None else machine.wrist.first
     home = np.nan_to_num(machine.inverse(machine.home, mode)).tolist()
     needs_rewinds = False
@@ -68,7 +68,7 @@ def choose_branch(machine: Machine, path: ToolPath, sampled: SampledPath, mode: 
         joints[:, column] += TURN * turns
     if needs_rewinds and first is not None:
         poses, joints, rewinds = rewind_in_rapids(machine, path, poses, joints, mode, home[first])
-    return Branch(mode, poses, joints, rewinds, _count_swings(joints[:, turning], path.rapid))
+    return ModeSolution(mode, poses, joints, rewinds, _count_swings(joints[:, turning], path.rapid))
 
 
 def _count_swings(angles: Array, rapid: Flags) -> int:

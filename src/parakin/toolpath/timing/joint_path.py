@@ -16,10 +16,10 @@ from .joint_following import find_nearest_joints, follow_curve
 from .kernels.rounded_corners import place_rows
 from .kernels.speed_ceilings import CurveRows, FeedLimits, compute_feed_ceilings
 from .kernels.splines import (
-    JointMotion,
     JointRows,
+    JointState,
     Midpoints,
-    PathMotion,
+    PathState,
     SplineTolerances,
     evaluate_splines,
     fit_splines,
@@ -78,10 +78,10 @@ class JointPath:
         """Compute the poses ``shift`` mm after rows (k,)."""
         return self.curve.poses(self.segment[row], self.offset[row] + shift)
 
-    def evaluate(self, motion: PathMotion) -> JointMotion:
-        """Evaluate the splines: joints, speeds and accelerations for k motions along the path."""
-        out = JointMotion(*(np.empty((len(motion.row), self.joints.shape[1])) for _ in range(3)))
-        run_in_threads(len(motion.row), lambda start, stop: evaluate_splines(self.rows, motion, out, start, stop))
+    def evaluate(self, state: PathState) -> JointState:
+        """Evaluate the splines: joints, speeds and accelerations for k states along the path."""
+        out = JointState(*(np.empty((len(state.row), self.joints.shape[1])) for _ in range(3)))
+        run_in_threads(len(state.row), lambda start, stop: evaluate_splines(self.rows, state, out, start, stop))
         return out
 
     def joints_at(self, row: Indices, shift: Array) -> tuple[Array, Array, Array]:
@@ -90,7 +90,7 @@ class JointPath:
         The third is how much less exact the first turning joint is; see :func:`~.joint_following.find_nearest_joints`.
         """
         still = np.zeros(len(row))
-        splined = self.evaluate(PathMotion(row, shift, still, still)).joints
+        splined = self.evaluate(PathState(row, shift, still, still)).joints
         joints, blur = find_nearest_joints(self.posted.machine, self.posted.mode, self.poses(row, shift), splined)
         return joints, splined, blur
 

@@ -13,7 +13,7 @@ from ...arrays import Array, Indices
 from ..posting.posted import Posted
 from .corners import Curve, check_tolerance
 from .joint_path import JointPath
-from .kernels.splines import PathMotion
+from .kernels.splines import PathState
 from .speed_profile import SpeedProfile
 
 
@@ -93,9 +93,9 @@ class Trajectory:
         shift = np.clip(shift, 0.0, self.joint_path.step[row])
         moving = (times >= 0.0) & (times <= self.seconds)
         speed, acceleration = speed * moving, acceleration * moving
-        motion = self.joint_path.evaluate(PathMotion(row, shift, np.maximum(speed, 0.0), acceleration))
+        state = self.joint_path.evaluate(PathState(row, shift, np.maximum(speed, 0.0), acceleration))
         poses = self.joint_path.poses(row, shift)
-        return Setpoints(columns, times, motion.joints, motion.speeds, motion.accelerations, poses)
+        return Setpoints(columns, times, state.joints, state.speeds, state.accelerations, poses)
 
     def sample(self, rate: float) -> Setpoints:
         """Compute setpoints at ``rate`` Hz, from the start to the first one at which the motion is over."""

@@ -11,7 +11,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from ...arrays import Array
+from ...arrays import Array, Span
 from ...errors import PoseError
 from ...kernels.elementary import GREATEST_ANGLE
 from ...machine import Machine
@@ -20,8 +20,7 @@ from .inclusive import InclusiveSubdivision
 from .subdivision import Subdivision
 from .total import TotalSubdivision
 
-Kind = Literal["constant", "total", "inclusive", "dexterous"]
-Span = tuple[float, float]
+RegionKind = Literal["constant", "total", "inclusive", "dexterous"]
 
 FAR = 1e6  # mm: no machine reaches farther
 _MANY = 20_000  # cells after which a bounded region has left the farthest ones
@@ -44,7 +43,7 @@ class Region:
     """
 
     machine: Machine
-    kind: Kind
+    kind: RegionKind
     free_axes: tuple[str, ...]
     fixed_axes: Mapping[str, float]
     swept_axes: Mapping[str, Span]
@@ -193,7 +192,7 @@ def make_region(
         swept = {axis: _EVERY_WAY[axis] for axis in turning}
         if machine.has_direction:
             swept["B"] = (0.0, pi)
-    kind: Kind = "dexterous" if dexterous else "total" if every else "inclusive" if some else "constant"
+    kind: RegionKind = "dexterous" if dexterous else "total" if every else "inclusive" if some else "constant"
     _refuse_unknown_axes(machine, (*fixed, *swept))
     for axis, span in swept.items():
         _refuse_bad_span(axis, span, turning, fixed)

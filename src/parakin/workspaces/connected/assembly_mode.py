@@ -32,7 +32,7 @@ def _trace_leg_rows(region: Region, pose: Sequence[Scalar]) -> list[list[Scalar]
     machine = region.machine
     with np.errstate(all="ignore"):  # a pose out of reach gives NaN
         rates = machine.trace_rates(pose, machine.trace_inverse(pose, region.mode)[0])
-    legs = len(rates.spans)
+    legs = len(rates.wrench_norms)
     size = legs if len(rates.a) - legs == 2 else len(rates.a)
     return [row[:size] for row in rates.a[:size]]
 

@@ -28,8 +28,8 @@ class JointRows(NamedTuple):
     feed_ceiling: Array
 
 
-class PathMotion(NamedTuple):
-    """Places on a joint path, and the motion of s there, (k,) each: the row before, mm of s after it, ṡ and s̈."""
+class PathState(NamedTuple):
+    """States along a joint path, (k,) each: the row before, mm of s after it, ṡ and s̈."""
 
     row: Indices
     shift: Array
@@ -37,7 +37,7 @@ class PathMotion(NamedTuple):
     acceleration: Array
 
 
-class JointMotion(NamedTuple):
+class JointState(NamedTuple):
     """Joints, their speeds and their accelerations, (k, joints) each."""
 
     joints: Array
@@ -119,12 +119,12 @@ def _fit_stretch(start, stop, step, q, curvature, pivots):
 
 
 @njit(nogil=True, cache=True, error_model="numpy")
-def evaluate_splines(rows, motion, out, start, stop):
-    """Evaluate the splines of ``rows`` for a :class:`PathMotion` into the arrays of ``out``, a :class:`JointMotion`."""
+def evaluate_splines(rows, state, out, start, stop):
+    """Evaluate the splines of ``rows`` for a :class:`PathState` into the arrays of ``out``, a :class:`JointState`."""
     q, bend = rows.joints, rows.curvature
     for k in range(start, stop):
-        i, o = motion.row[k], motion.shift[k]
-        speed, acceleration = motion.speed[k], motion.acceleration[k]
+        i, o = state.row[k], state.shift[k]
+        speed, acceleration = state.speed[k], state.acceleration[k]
         h = rows.step[i] if rows.step[i] > 0.0 else 1.0
         for j in range(q.shape[1]):
             third = (bend[i + 1, j] - bend[i, j]) / h

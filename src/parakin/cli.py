@@ -7,11 +7,14 @@ import os
 import signal
 import sys
 import threading
+import warnings
 from collections.abc import Sequence
+from contextlib import suppress
 
 from cyclopts import App, CycloptsError, Parameter
 
 from .commands.atlas import atlas
+from .commands.console import say
 from .commands.design import design
 from .commands.kinematics import forward, inverse
 from .commands.linuxcnc import linuxcnc
@@ -43,6 +46,8 @@ def _exit_on_signal(number: int, frame: object) -> None:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run a command; return the exit code."""
+    closed = _replace_closed_streams()
+    warnings.showwarning = _show_warning
     if isinstance(sys.stdout, io.TextIOWrapper):
         sys.stdout.reconfigure(errors="backslashreplace")  # a terminal may not know the sign for degrees
     if threading.current_thread() is threading.main_thread():
@@ -52,29 +57,48 @@ def main(arguments: Sequence[str] | None = None) -> int:
         code = app(words, exit_on_error=False, print_error=False, result_action="return_value")
         sys.stdout.flush()
     except ParakinError as error:
-        print(error, file=sys.stderr)
+        say(str(error))
         return _MALFORMED
     except CycloptsError as error:
-        print(f"parakin: {' '.join(str(error).split())}", file=sys.stderr)
-        return _MALFORMED
-    except RuntimeError as error:
-        if "no locator available" not in str(error):
-            raise
-        print(
-            "parakin: nowhere to keep the compiled kernels; set NUMBA_CACHE_DIR to a folder of yours", file=sys.stderr
-        )
+        say(f"parakin: {' '.join(str(error).split())}")
         return _MALFORMED
     except MemoryError:
-        print("parakin: not enough memory", file=sys.stderr)
+        say("parakin: not enough memory")
         return _MALFORMED
     except KeyboardInterrupt:
-        print("parakin: interrupted", file=sys.stderr)
+        say("parakin: interrupted")
         return _INTERRUPTED
     except BrokenPipeError:
-        # The interpreter flushes stdout once more when it ends.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        _discard_output()
         return _BROKEN_PIPE
+    except OSError as error:  # errors of files come as ParakinError
+        _discard_output()
+        what = f"{error.filename}" if error.filename else "the output can't be written"
+        say(f"parakin: {what}: {error.strerror or error}")
+        return _MALFORMED
+    if closed:
+        say("parakin: the output can't be written: it is closed")
+        return _MALFORMED
     return code if isinstance(code, int) else 0
+
+
+def _replace_closed_streams() -> bool:
+    """Let output go nowhere where its stream is closed; return whether that is so of stdout."""
+    closed = sys.stdout is None
+    for name in ("stdout", "stderr"):
+        if getattr(sys, name) is None:
+            setattr(sys, name, open(os.devnull, "w", encoding="utf-8"))  # noqa: PTH123, SIM115  open to the end
+    return closed
+
+
+def _discard_output() -> None:
+    """Let what is not written yet go nowhere: the interpreter flushes stdout once more when it ends."""
+    with suppress(OSError, ValueError):  # a stream that is no file
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+
+
+def _show_warning(message: Warning | str, *place: object, **more: object) -> None:
+    say(f"parakin: {' '.join(str(message).split())}")
 
 
 if __name__ == "__main__":

@@ -3,6 +3,7 @@
 Each error carries its place and prints as one line: ``place: what is wrong, and what was expected``.
 """
 
+import re
 from collections.abc import Iterable
 from difflib import get_close_matches
 
@@ -59,6 +60,15 @@ def quote(text: object) -> str:
     line = " ".join(str(text).split())
     line = "".join(c if c.isprintable() else "?" for c in line)
     return f'"{line}"' if len(line) <= 60 else f'"{line[:57]}..."'
+
+
+CONTROL_CHARACTER = re.compile("[\x00-\x08\x0a-\x1f\x7f-\x9f\u2028-\u202e\u2066-\u2069]")
+"""What a text of one line never holds: control characters but for tabs, and signs that turn or break the line."""
+
+
+def make_printable(text: object) -> str:
+    """Replace what would act on a terminal rather than be read there, such as ESC; line ends stay."""
+    return "\n".join(CONTROL_CHARACTER.sub("?", line) for line in str(text).split("\n"))
 
 
 def suggest(word: str, known: Iterable[str], others: str = "") -> str:

@@ -13,7 +13,7 @@ from ..export.json.performance import encode_atlas, encode_performance, encode_p
 from ..units import NUMBER, QuantityError, parse_quantity, to_display
 from .atlas_files import AtlasFiles
 from .atlas_summary import format_atlas, format_performance, format_proofs
-from .console import ProgressBar, announce_compiling, print_json
+from .console import ProgressBar, announce_compiling, print_json, print_text
 from .options import OFF_LIMITS, Json, Mode, Name, Sizes, load_machine
 from .region_options import (
     At,
@@ -233,7 +233,7 @@ class _AtlasResults:
             parts.append(format_atlas(self.atlas))
         if written:
             parts.append("\n".join(f"{kind:<7} {path}" for kind, path in written.items()))
-        print("\n\n".join(parts))
+        print_text("\n\n".join(parts))
 
     def _encode(self, written: dict[str, str]) -> dict[str, Any]:
         machine, fixed = self.machine, self.region.fixed_axes

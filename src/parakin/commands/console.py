@@ -5,11 +5,12 @@ from __future__ import annotations
 import sys
 import time
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import AbstractContextManager
+from contextlib import AbstractContextManager, suppress
 from functools import cache
 from types import TracebackType
 from typing import TYPE_CHECKING, Any
 
+from ..errors import make_printable
 from ..export.json.text import format_json
 
 if TYPE_CHECKING:
@@ -34,7 +35,13 @@ def format_table(rows: Sequence[Sequence[str]], header: Sequence[str], right: st
 
 def say(text: str) -> None:
     """Print a remark beside the command's output."""
-    print(text, file=sys.stderr)
+    with suppress(OSError):  # a full disk behind stderr
+        print(make_printable(text), file=sys.stderr)
+
+
+def print_text(text: str) -> None:
+    """Print what a command answers, without what would act on the terminal."""
+    print(make_printable(text))
 
 
 def print_json(content: Mapping[str, Any]) -> None:

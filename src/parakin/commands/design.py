@@ -10,7 +10,7 @@ from cyclopts import Parameter
 from ..errors import InputError, quote, suggest
 from ..export.json.design import encode_design
 from ..export.number_format import format_fixed
-from .console import announce_compiling, print_json
+from .console import announce_compiling, print_json, print_text
 from .options import Json
 from .region_options import parse_length
 
@@ -68,9 +68,9 @@ def design(
     if json:
         print_json(encode_design(result, files))
         return 0
-    print(_format_design(result))
+    print_text(_format_design(result))
     if output is not None:
-        print(f"\nmachine {output}")
+        print_text(f"\nmachine {output}")
     return 0
 
 

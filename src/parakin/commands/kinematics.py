@@ -14,7 +14,7 @@ from ..export.json.poses import encode_poses
 from ..export.number_format import format_fixed
 from ..export.tables.poses import ColumnGroup, PoseTable, format_pose_csv
 from ..units import display_unit, to_display
-from .console import announce_compiling, format_table, print_json, say
+from .console import announce_compiling, format_table, print_json, print_text, say
 from .offences import format_offence
 from .options import OFF_LIMITS, Json, Mode, Name, Sizes, load_machine
 from .values import parse_row
@@ -174,11 +174,11 @@ def _show_table(table: PoseTable, request: _Request, offences: Sequence[Offence]
         files = {} if output is None else {"table": str(output)}
         print_json(encode_poses(request.problem, table, offences, files))
     elif output is not None:
-        print(f"table {output}")
+        print_text(f"table {output}")
     elif csv is not None:
-        print(format_pose_csv(table), end="")
+        print_text(format_pose_csv(table).removesuffix("\n"))
     else:
-        print(_format_answer(table, request.answer))
+        print_text(_format_answer(table, request.answer))
 
 
 def _format_answer(table: PoseTable, answer: ColumnGroup) -> str:

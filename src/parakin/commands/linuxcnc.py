@@ -7,7 +7,8 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from .console import announce_compiling, print_json
+from ..errors import InputError
+from .console import announce_compiling, print_json, print_text
 from .options import Json, Name, Sizes, load_machine
 
 
@@ -16,6 +17,7 @@ def linuxcnc(
     /,
     *,
     output: Annotated[Path | None, Parameter(name=["--output", "-o"])] = None,
+    force: bool = False,
     json: Json = False,
     sizes: Sizes = None,
 ) -> int:
@@ -29,16 +31,24 @@ def linuxcnc(
         A shipped machine's name or a YAML file.
     output
         Folder for the files; by default one of the machine's name.
+    force
+        Overwrite files that were edited since parakin wrote them.
     """
     machine = load_machine(name, sizes)
     announce_compiling()
     from ..controllers.linuxcnc.configuration import make_linuxcnc_configuration
+    from ..controllers.linuxcnc.stamp import find_edited_files
     from ..export.files import write_files
 
+    folder = Path(machine.name) if output is None else output
     files = make_linuxcnc_configuration(machine)
-    paths = [str(path) for path in write_files(Path(machine.name) if output is None else output, files)]
+    edited = [] if force else find_edited_files(folder, files)
+    if edited:
+        more = f" (and {', '.join(path.name for path in edited[1:])})" if edited[1:] else ""
+        raise InputError(f"not as parakin wrote it{more}; nothing is written, --force overwrites it", str(edited[0]))
+    paths = [str(path) for path in write_files(folder, files)]
     if json:
         print_json({"schema": "parakin.linuxcnc/1", "machine": machine.name, "files": paths})
     else:
-        print("\n".join(paths))
+        print_text("\n".join(paths))
     return 0

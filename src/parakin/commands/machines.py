@@ -11,7 +11,7 @@ from ..errors import InputError
 from ..export.json.machine import RATES, encode_details, encode_machine, encode_machines
 from ..export.number_format import format_fixed
 from ..units import display_unit
-from .console import format_table, print_json
+from .console import format_table, print_json, print_text
 from .options import Json, Name, Sizes, load_machine
 
 if TYPE_CHECKING:
@@ -30,7 +30,7 @@ def machines(*, json: Json = False) -> int:
         print_json(encode_machines(known))
         return 0
     rows = [(m.name, " ".join(m.axes), " ".join(m.joints), m.spec.title, _shorten(m.spec.source, 60)) for m in known]
-    print(format_table(rows, ("name", "axes", "joints", "title", "source")))
+    print_text(format_table(rows, ("name", "axes", "joints", "title", "source")))
     return 0
 
 
@@ -66,9 +66,9 @@ def show(
         files = {} if output is None else {"picture": str(output)}
         print_json(encode_machine(machine, files))
         return 0
-    print(_summarise_machine(machine))
+    print_text(_summarise_machine(machine))
     print()
-    print(f"picture {output}")
+    print_text(f"picture {output}")
     return 0
 
 

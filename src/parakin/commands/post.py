@@ -11,7 +11,7 @@ from cyclopts import Parameter
 
 from ..controllers import Target, load_controller
 from ..errors import InputError, PoseError
-from .console import ProgressBar, announce_compiling, print_json
+from .console import ProgressBar, announce_compiling, print_json, print_text
 from .options import OFF_LIMITS, Json, Mode, Sizes, complete_machine, load_machine
 from .workpiece import parse_bounds, parse_workpiece
 
@@ -158,7 +158,7 @@ def post(
     if json:
         print_json(encode_job(job, placement, missing, written))
     else:
-        print(summarise_job(job, target, written, placement, missing))
+        print_text(summarise_job(job, target, written, placement, missing))
     return 0 if job.runs and not missing else OFF_LIMITS
 
 

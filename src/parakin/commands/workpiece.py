@@ -60,7 +60,7 @@ def parse_bounds(text: str) -> dict[str, tuple[float, float]]:
         if not (axis and equals and value):
             raise InputError(f"{quote(part.strip())}: expected AXIS=LOW:HIGH or AXIS=VALUE, such as {_EXAMPLE}", _PLACE)
         axis = axis.upper()
-        if axis not in _AXES:
+        if axis not in tuple(_AXES):
             raise InputError(f"unknown axis {quote(axis)}{suggest(axis, _AXES)}", _PLACE)
         if axis in bounds:
             raise InputError(f"{axis} is given twice", _PLACE)

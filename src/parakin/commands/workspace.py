@@ -11,7 +11,7 @@ from cyclopts import Parameter
 
 from ..errors import InputError, PoseError
 from ..export.json.text import format_json
-from .console import ProgressBar, announce_compiling, print_json, say
+from .console import ProgressBar, announce_compiling, print_json, print_text, say
 from .options import OFF_LIMITS, Json, Mode, Name, Sizes, load_machine
 from .region_options import At, Every, Some, Without, parse_length, read_region
 from .workspace_inside import InsideOptions, encode_inside, explore_inside, format_inside
@@ -150,9 +150,9 @@ def workspace(
     if json:
         print_json({**encoded, "files": written})
     else:
-        print(format_workspace(found, seconds) + format_inside(inside))
+        print_text(format_workspace(found, seconds) + format_inside(inside))
         if written:
-            print("\n" + "\n".join(f"{kind:<5} {path}" for kind, path in written.items()))
+            print_text("\n" + "\n".join(f"{kind:<5} {path}" for kind, path in written.items()))
     for path, reason in refused.items():
         say(f"{path}: not written, {reason}")
     if isinstance(found, Workspace) and found.stopped == "interrupted":

@@ -15,7 +15,7 @@ from ruamel.yaml.error import MarkedYAMLError, YAMLError
 from ruamel.yaml.nodes import MappingNode, ScalarNode, SequenceNode
 from ruamel.yaml.reader import ReaderError
 
-from ..errors import InputError, quote
+from ..errors import CONTROL_CHARACTER, InputError, quote
 
 _LONGEST = 100_000  # bytes
 _DEEPEST = 16  # levels; aliases can make a cycle
@@ -115,7 +115,14 @@ class _DocumentBuilder:
         if isinstance(node, SequenceNode):
             items = [self.build(item, item.start_mark.line + 1, depth + 1) for item in node.value]
             return YamlList(items, line)
+        self._refuse_control_characters(node.value, line)
         return YamlText(node.value, line)
+
+    def _refuse_control_characters(self, text: str, line: int) -> None:
+        control = CONTROL_CHARACTER.search(text.replace("\n", " "))
+        if control is not None:
+            message = f"a control character (U+{ord(control[0]):04X}) in a text, expected plain text"
+            self.errors.append(InputError(message, self.source, line))
 
     def _build_map(self, node: MappingNode, line: int, depth: int) -> YamlMap:
         items: dict[YamlText, Any] = {}
@@ -124,6 +131,7 @@ class _DocumentBuilder:
             if not isinstance(key, ScalarNode):
                 self.errors.append(InputError("a key is a list or a mapping, expected a word", self.source, at))
                 continue
+            self._refuse_control_characters(key.value, at)
             name = YamlText(key.value, at)
             if name in items:
                 first = next(k.line for k in items if k == name)

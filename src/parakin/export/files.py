@@ -4,15 +4,27 @@ from __future__ import annotations
 
 import contextlib
 import os
+import shutil
+import signal
 import tempfile
-from collections.abc import Mapping
+import threading
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import BinaryIO
 
 from ..arrays import Writer
-from ..errors import InputError
+from ..errors import InputError, quote
+
+try:
+    import fcntl
+except ImportError:  # no locks on this system: leftovers stay
+    fcntl = None  # type: ignore[assignment]
 
 Content = bytes | str | Writer
+
+_BEGIN, _END = ".parakin-", ".part"  # of the name of a folder of files that are not complete yet
+_TRIES = 3  # to make such a folder and lock it before another process sweeps it
+_SIGNALS = (signal.SIGINT, signal.SIGTERM)
 
 
 def write_files(folder: str | os.PathLike[str], files: Mapping[str, Content]) -> list[Path]:
@@ -23,41 +35,117 @@ def write_files(folder: str | os.PathLike[str], files: Mapping[str, Content]) ->
     folder : where to
     files : by their names: bytes, text (UTF-8), or a writer to an open binary file
 
-    All are written under other names first and are renamed when every one is complete, so that a full disk or an
-    interruption leaves what was there before.
+    All are written into a hidden folder first and move when every one is complete, so that a full disk or an
+    interruption leaves what was there before. A folder that is missing appears with all of them at once. What a killed
+    process has left behind is removed.
 
     Raises :class:`InputError` if the folder can't be made or a file can't be written.
     """
     base = Path(folder)
+    for name in files:
+        if not name or Path(name).name != name:
+            raise InputError(f"{quote(name)} is no file name, expected one without a folder", "files")
     targets = [base / name for name in files]
-    written: list[str] = []
     current = str(base)  # for the error's message
     try:
-        base.mkdir(parents=True, exist_ok=True)
-        for target, content in zip(targets, files.values(), strict=True):
-            current = str(target)
-            if target.exists() and not target.is_file():  # a folder, or a device such as /dev/null
-                raise InputError("is no plain file, it can't be replaced by one", current)
-            handle, temporary = tempfile.mkstemp(prefix=f".{target.name}.", suffix=".part", dir=base)
-            written.append(temporary)
-            with os.fdopen(handle, "wb") as file:
-                _write_content(file, content)
-            os.chmod(temporary, 0o666 & ~_read_umask())  # noqa: PTH101  a temporary file is its owner's only
-        for target, temporary in zip(targets, written, strict=True):
-            current = str(target)
-            os.replace(temporary, target)  # noqa: PTH105
+        is_new = not base.exists()
+        if is_new and base.name not in ("", ".."):
+            base.parent.mkdir(parents=True, exist_ok=True)
+        else:
+            base.mkdir(parents=True, exist_ok=True)
+        with _open_stage(base.parent if is_new else base) as stage:
+            for target, content in zip(targets, files.values(), strict=True):
+                current = str(target)
+                if target.exists() and not target.is_file():  # a folder, or a device such as /dev/null
+                    raise InputError("is no plain file, it can't be replaced by one", current)
+                with (stage / target.name).open("xb") as file:
+                    _write_content(file, content)
+            current = str(base)
+            if is_new and _rename_folder(stage, base):
+                return targets
+            base.mkdir(exist_ok=True)
+            with _delay_signals():
+                for target in targets:
+                    current = str(target)
+                    os.replace(stage / target.name, target)  # noqa: PTH105
     except OSError as error:
         raise InputError(f"can't be written: {error.strerror or error}", current) from error
-    finally:
-        for temporary in written:
-            with contextlib.suppress(FileNotFoundError):
-                os.unlink(temporary)  # noqa: PTH108
     return targets
+
+
+@contextlib.contextmanager
+def _open_stage(base: Path) -> Iterator[Path]:
+    """Make a hidden folder, locked as long as this process lives, and remove it at the end."""
+    _sweep_leftovers(base)
+    for _ in range(_TRIES):
+        stage = Path(tempfile.mkdtemp(prefix=_BEGIN, suffix=_END, dir=base))
+        lock = _lock_folder(stage)
+        if lock is not None or stage.exists():  # else another process took it for a leftover
+            break
+    try:
+        yield stage
+    finally:
+        if lock is not None:
+            os.close(lock)
+        shutil.rmtree(stage, ignore_errors=True)
+
+
+def _lock_folder(folder: Path) -> int | None:
+    """Lock a folder for this process; None where it is locked, or there are no locks."""
+    if fcntl is None:
+        return None
+    handle = None
+    try:
+        handle = os.open(folder, os.O_RDONLY)
+        fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError:
+        if handle is not None:
+            os.close(handle)
+        return None
+    return handle
+
+
+def _sweep_leftovers(base: Path) -> None:
+    """Remove the hidden folders of processes that live no more."""
+    for folder in base.glob(f"{_BEGIN}*{_END}"):
+        lock = None if folder.is_symlink() else _lock_folder(folder)
+        if lock is not None:
+            shutil.rmtree(folder, ignore_errors=True)
+            os.close(lock)
+
+
+def _rename_folder(stage: Path, base: Path) -> bool:
+    """Let the hidden folder become the one that was asked for; False where another process was quicker."""
+    stage.chmod(0o777 & ~_read_umask())
+    try:
+        os.rename(stage, base)  # noqa: PTH104
+    except OSError:
+        if base.is_dir():
+            return False
+        raise
+    return True
+
+
+@contextlib.contextmanager
+def _delay_signals() -> Iterator[None]:
+    """Let an interruption wait until a set of files is complete."""
+    if threading.current_thread() is not threading.main_thread():  # handlers run in the main thread only
+        yield
+        return
+    received: list[int] = []
+    handlers = {number: signal.signal(number, lambda n, frame: received.append(n)) for number in _SIGNALS}
+    try:
+        yield
+    finally:
+        for number, handler in handlers.items():
+            signal.signal(number, signal.SIG_DFL if handler is None else handler)
+        for first in received[:1]:
+            signal.raise_signal(first)
 
 
 def _write_content(file: BinaryIO, content: Content) -> None:
     if isinstance(content, str):
-        content = content.encode()
+        content = content.encode("utf-8", "backslashreplace")  # a file's name may be no text
     if isinstance(content, bytes):
         file.write(content)
     else:

@@ -8,10 +8,11 @@ from __future__ import annotations
 
 import numpy as np
 from llvmlite import ir
-from numba import njit, types
+from numba import types
 from numba.core import cgutils
 from numba.extending import intrinsic
 
+from .compiling import njit
 from .elementary import FAST, atan2, sincos, sqrt, use_widest_vectors
 from .tape import (
     ABS,

@@ -7,8 +7,10 @@ from __future__ import annotations
 
 import numpy as np
 from llvmlite import ir
-from numba import njit, types
+from numba import types
 from numba.extending import intrinsic
+
+from .compiling import njit
 
 # Contraction is welcome. NaN and infinity carry meaning and must survive: no reassociation, which cancels x - x.
 FAST = {"contract", "arcp", "nsz", "afn"}

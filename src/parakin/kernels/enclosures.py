@@ -8,9 +8,9 @@ mode is set, and the loops vectorise. NaN becomes the whole line.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
 from .blocks import LANES, allocate_lanes
+from .compiling import njit
 from .elementary import GREATEST_ANGLE, atan2, sincos, use_widest_vectors
 from .tape import (
     ABS,

@@ -10,10 +10,10 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from ..arrays import Array, Flags
 from .blocks import _MASK, LANES, allocate_lanes, fetch_to_read, fetch_to_write, interpret, load_rows, store_rows
+from .compiling import njit
 from .elementary import FAST, use_widest_vectors
 
 CLOSE = 1e-6  # mm: from a closure this good one more step ends below rounding

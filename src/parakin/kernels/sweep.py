@@ -7,9 +7,9 @@ lane is left.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
 from .blocks import LANES, allocate_lanes, interpret
+from .compiling import njit
 from .elementary import FAST, use_widest_vectors
 
 _MASK = (1 << 40) - 1  # tells the compiler that a register's number is not negative

@@ -7,15 +7,17 @@ from .config import write_hal, write_ini, write_tool_table
 from .first_program import write_first_program
 from .module import kinematics_name, write_module
 from .page import write_page
+from .stamp import stamp_file
 
 
 def make_linuxcnc_configuration(machine: Machine) -> dict[str, str]:
     """Make a configuration for LinuxCNC 2.9 that runs as a simulation: {file: text}.
 
     The files are the kinematics module (C, built by LinuxCNC's ``halcompile --install``), the ini and HAL files, the
-    tool table, a first program and a page that tells how to start, all named after the machine.
+    tool table, a first program and a page that tells how to start, all named after the machine. The last line of each
+    tells by a hash whether the file was edited since.
     """
-    return {
+    texts = {
         f"{kinematics_name(machine)}.c": write_module(machine),
         f"{machine.name}.ini": write_ini(machine),
         f"{machine.name}.hal": write_hal(machine),
@@ -23,3 +25,4 @@ def make_linuxcnc_configuration(machine: Machine) -> dict[str, str]:
         f"{machine.name}.ngc": write_first_program(machine),
         f"{machine.name}.md": write_page(machine),
     }
+    return {name: stamp_file(name, text) for name, text in texts.items()}

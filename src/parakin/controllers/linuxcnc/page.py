@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from html import escape
+
 from ...machine import Machine
 from ...units import to_display
 from .config import format_number
@@ -68,7 +70,7 @@ def write_page(machine: Machine) -> str:
     home = zip(machine.axes, machine.home.tolist(), machine.axis_units, strict=True)
     words = [f"{axis} {format_number(to_display(value, unit))}" for axis, value, unit in home]
     return _PAGE.format(
-        title=" ".join(machine.spec.title.split()),
+        title=escape(" ".join(machine.spec.title.split()), quote=False),
         name=machine.name,
         kinematics=kinematics_name(machine),
         joints=" ".join(machine.joints),

@@ -2,11 +2,11 @@
 
 from typing import Any, NamedTuple
 
-import numba as nb
 import numpy as np
 from numpy.typing import NDArray
 
 from ...arrays import Array, Flags, Indices
+from ...kernels.compiling import njit
 
 WIDEST = 26  # bytes a number takes at most, its separator included
 _COMMA, _MINUS, _POINT, _LF, _ZERO = (ord(c) for c in ",-.\n0")
@@ -15,7 +15,7 @@ _HUNDRED, _E4, _E6, _E8 = (np.uint64(10**n) for n in (2, 4, 6, 8))
 _PAIRS = np.frombuffer("".join(f"{i:02}" for i in range(100)).encode(), np.uint8)
 
 
-@nb.njit(cache=True, nogil=True, inline="always")
+@njit(cache=True, nogil=True, inline="always")
 def _format_integer(value: Any, out: NDArray[np.uint8], at: Any) -> Any:
     """Write a natural number from ``at`` on; return its end."""
     length = 1
@@ -36,7 +36,7 @@ def _format_integer(value: Any, out: NDArray[np.uint8], at: Any) -> Any:
     return at + length
 
 
-@nb.njit(cache=True, nogil=True, inline="always")
+@njit(cache=True, nogil=True, inline="always")
 def _format_decimal(value: Any, scale: Any, digits: Any, out: NDArray[np.uint8], at: Any) -> Any:
     """Write the integer ``value·scale`` with a point before its last 4, 6 or 8 ``digits``; nothing for NaN."""
     scaled = np.rint(value * scale)
@@ -97,7 +97,7 @@ class LimitNames(NamedTuple):
     starts: Indices
 
 
-@nb.njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True)
 def format_joint_rows(
     first: int, last: int, columns: JointColumns, form: NumberFormat, names: LimitNames, out: NDArray[np.uint8]
 ) -> int:
@@ -139,7 +139,7 @@ def format_joint_rows(
     return at
 
 
-@nb.njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True)
 def format_cells(values: Array, scales: Array, digits: Indices, out: NDArray[np.uint8]) -> int:
     """Write a table of numbers (rows, columns) as CSV into ``out``; return how many bytes."""
     at = 0

@@ -36,11 +36,11 @@ def check_arc_tolerance(tolerance: float) -> None:
 
 
 def decode_line(raw: bytes | bytearray) -> str:
-    """Decode a line as UTF-8, or as Latin-1 where it is not UTF-8."""
+    """Decode a line as UTF-8, or as Windows-1252 where it is not UTF-8."""
     try:
         return raw.decode()
     except UnicodeDecodeError:
-        return raw.decode("latin-1")
+        return raw.decode("cp1252", "replace")
 
 
 def quote_short(text: str, longest: int = 24) -> str:

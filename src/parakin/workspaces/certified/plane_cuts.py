@@ -12,10 +12,10 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from ...arrays import Array, Flags, Indices
+from ...kernels.compiling import njit
 
 _FLAT = 1e-4  # of the steepest slope: a slope less than that is taken as unknown, for the closed form cancels below it
 _ROUNDING = 1e-7  # the error of the closed form, with slopes no flatter than that

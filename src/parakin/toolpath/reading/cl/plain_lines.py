@@ -7,11 +7,11 @@ words, exponents, continuations, long mantissas, errors. The line reader then de
 import math
 from typing import Any, NamedTuple
 
-import numba as nb
 import numpy as np
 from numpy.typing import NDArray
 
 from ....arrays import Array, Indices
+from ....kernels.compiling import njit
 from ..text import LARGEST
 from .frames import AXIS_TOLERANCE, SMALLEST_SQUARE
 
@@ -42,7 +42,7 @@ class AxisState(NamedTuple):
     off_unit: Array
 
 
-@nb.njit(cache=True, nogil=True, inline="always")
+@njit(cache=True, nogil=True, inline="always")
 def _begins_modal_word(buffer: NDArray[np.uint8], p: int) -> Any:
     """Whether FEDRAT, RAPID or PAINT begins at p, where at least six bytes are left."""
     a, b, c, d, e = (
@@ -59,13 +59,13 @@ def _begins_modal_word(buffer: NDArray[np.uint8], p: int) -> Any:
     return a == _P and b == _A and c == _I and d == _N and e == _T
 
 
-@nb.njit(cache=True, nogil=True, inline="always")
+@njit(cache=True, nogil=True, inline="always")
 def _spells_goto(a: int, b: int, c: int, d: int) -> Any:
     """Whether four bytes are GOTO, in capitals or not."""
     return (a | _LOWER) == _G and (b | _LOWER) == _O and (c | _LOWER) == _T and (d | _LOWER) == _O
 
 
-@nb.njit(cache=True, nogil=True, inline="always")
+@njit(cache=True, nogil=True, inline="always")
 def _set_axis(i: float, j: float, k: float, line: int, state: AxisState) -> Any:
     """Normalise a tool axis into the state; False for one without length."""
     square = i * i + j * j + k * k
@@ -82,7 +82,7 @@ def _set_axis(i: float, j: float, k: float, line: int, state: AxisState) -> Any:
     return True
 
 
-@nb.njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True)
 def _read_run(buffer: NDArray[np.uint8], cursor: Indices, state: AxisState, records: PlainRecords) -> None:
     """Read GOTO lines up to the first one that is anything else; see :func:`read_goto_lines` for the parameters."""
     start, line, n = cursor[0], cursor[1], cursor[2]
@@ -143,7 +143,7 @@ def _read_run(buffer: NDArray[np.uint8], cursor: Indices, state: AxisState, reco
     cursor[0], cursor[1], cursor[2] = start, line, n
 
 
-@nb.njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True)
 def read_goto_lines(
     buffer: NDArray[np.uint8], cursor: Indices, state: AxisState, records: PlainRecords, modal_lines: Indices
 ) -> int:

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ....arrays import Array, Progress
-from ....errors import InputError
+from ....errors import CONTROL_CHARACTER, InputError
 from ...path import ToolPath
 from ..text import (
     BYTE_ORDER_MARK,
@@ -36,6 +36,7 @@ _BLOCK = READ_SIZE  # bytes read at a time, into the same buffer: it stays in th
 _LONGEST = 4_000_000  # characters in one statement
 _BULK_FROM = 1 << 18  # bytes of a file; loading the compiled code doesn't pay below
 _PLAIN_STARTS = (b"G", b"g", b" ", b"\t", b"\n")  # of lines worth the call of the compiled code
+_END_OF_FILE = "\x1a"  # the sign that DOS ends a text with
 _MODAL_LINES = 4096  # FEDRAT, RAPID and PAINT lines in one call of it
 _BYTES_PER_RECORD = 48  # of a usual file
 _MOST_EXPECTED = 1 << 26  # records to reserve room for at first
@@ -310,6 +311,10 @@ class ClReader:
     def _read_line(self, raw: bytes | bytearray, line: int) -> str:
         """Read one line; return the word of the statement it completes, or nothing."""
         text = decode_line(raw).strip()
+        control = CONTROL_CHARACTER.search(text.strip(_END_OF_FILE))
+        if control is not None:
+            raise self._fail(f"a control character ({ord(control[0])}); expected plain text", line)
+        text = text.rstrip(_END_OF_FILE)
         if self.matrix is not None:
             self._read_matrix_row(text, line)
             return ""

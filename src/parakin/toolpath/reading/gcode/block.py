@@ -4,6 +4,7 @@ import re
 from dataclasses import dataclass, field
 from typing import NoReturn
 
+from ....errors import CONTROL_CHARACTER
 from ..text import LARGEST, quote_short, refuse
 from .codes import G43_4, find_g_group, find_m_group, format_g_code
 from .expressions import Key, ParameterStore, read_key, read_value, skip_blanks
@@ -16,7 +17,6 @@ NO_PROGRAM = (
 )
 
 _BLANKS = " \t"
-_CONTROL = re.compile(r"[\x00-\x08\x0a-\x1f\x7f]")
 # The blanks within a number can't be told from those behind it, so neither part of it is tried twice.
 _TOKEN = re.compile(
     r"(?P<name>(?i:TRAORI))(?![A-Za-z0-9])"
@@ -111,7 +111,7 @@ def check_text(text: str) -> None:
     """Refuse a line that is too long or holds control characters."""
     if len(text) > LONGEST:
         refuse(f"a line of more than {LONGEST} characters; expected a block of G-code")
-    control = _CONTROL.search(text)
+    control = CONTROL_CHARACTER.search(text)
     if control is not None:
         refuse(_CONTROLS.get(control[0], f"a control character ({ord(control[0])}); expected plain text"))
 

@@ -10,9 +10,9 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from ....arrays import Array, Flags
+from ....kernels.compiling import njit
 from .jerk_passes import Pools, StepBounds, Stretch, flatten_peaks, limit_braking, limit_rise, update_controllable
 from .utilisation import Utilisation, measure_utilisation
 

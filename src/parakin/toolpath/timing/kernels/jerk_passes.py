@@ -15,9 +15,9 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from ....arrays import Array, Indices
+from ....kernels.compiling import njit
 from ..drive_limits import DriveLimits
 from .acceleration_limits import AccelerationLimits, allocate_lines
 from .reachability import find_acceleration, find_controllable

@@ -14,9 +14,9 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from ....arrays import Array
+from ....kernels.compiling import njit
 from .acceleration_limits import allocate_lines, bound_acceleration
 
 _TURNS = 60  # Newton's method on a convex, piecewise linear function ends after a few steps

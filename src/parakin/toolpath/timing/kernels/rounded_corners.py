@@ -12,7 +12,8 @@ A row lies on a piece (``segment``) at a distance from the piece's start (``offs
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
+
+from ....kernels.compiling import njit
 
 SLIVER = 2e-3  # of a piece: knots nearer than this are one
 

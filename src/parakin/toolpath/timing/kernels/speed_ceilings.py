@@ -8,9 +8,9 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from ....arrays import Array, Indices
+from ....kernels.compiling import njit
 
 _LITTLE = 1.1  # (q')²·ṡ² may exceed its ends by so much, and they be lowered for that
 

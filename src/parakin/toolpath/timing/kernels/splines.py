@@ -9,9 +9,9 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from ....arrays import Array, Indices
+from ....kernels.compiling import njit
 
 
 class JointRows(NamedTuple):

@@ -9,9 +9,9 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from ....arrays import Array, Flags, Indices
+from ....kernels.compiling import njit
 
 _MORE = 1.1  # power to which corrections are raised: a little more than each alone would need
 

@@ -190,3 +190,39 @@ def test_the_name_of_a_class_or_type_occurs_once():
 def test_a_riddling_file_name_stands_once():
     names = [path.stem for path in MODULES.values()]
     assert not [name for name in ("parts", "cuts", "words", "motions", "blocks") if names.count(name) > 1]
+
+
+COLUMNS = {"kinematics.wrist", "model.structures.five_axis"}  # who may know where B and C stand in a pose
+
+
+def pole_columns(source: str) -> list[int]:
+    """Find the lines that take B or C of a pose by number or by letter."""
+    letters, lines = {"'A'", "'B'", "'C'"}, []
+    for node in ast.walk(ast.parse(source)):
+        names: set[str] = set()
+        if isinstance(node, ast.Subscript):
+            many = isinstance(node.slice, ast.Tuple) and bool(node.slice.elts)
+            index = node.slice.elts[-1] if many else node.slice
+            column = index.lower if isinstance(index, ast.Slice) else index
+            names = {"" if column is None else ast.unparse(column)}
+            of_pose = any(word in ast.unparse(node.value) for word in ("pose", "home"))
+            if of_pose and names & ({"3", "4", "5", "-2", "-1"} if many else {"3", "4", "5", "-2"}):
+                lines.append(node.lineno)
+        elif isinstance(node, ast.Call) and ast.unparse(node.func).endswith(".index"):
+            names = {ast.unparse(node.args[0])}
+        elif isinstance(node, ast.Compare):
+            names = {ast.unparse(side) for side in (node.left, *node.comparators)}
+        if names & letters:
+            lines.append(node.lineno)
+    return lines
+
+
+@pytest.mark.parametrize("module", [m for m in MODULES if m not in COLUMNS and room_of(m) != "toolpath.reading"])
+def test_the_columns_of_b_and_c_are_the_wrists_matter(module):
+    assert not pole_columns(MODULES[module].read_text(encoding="utf-8"))
+
+
+@pytest.mark.parametrize("line", ["poses[:, 4]", "machine.axes.index('C')", "home[3:]", "letter == 'B'", "rates['C']"])
+def test_columns_of_b_and_c_are_seen(line):
+    assert pole_columns(line) == [1]
+    assert not pole_columns("poses[:, direction.c]; home[:3]; joints[:, 4]; code[i, 4]")

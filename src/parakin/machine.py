@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .algebra import Scalar
-from .arrays import Array
+from .arrays import Array, Span
 from .errors import DescriptionError, NoMethodError, PoseError
 from .kernels.batch import evaluate_tape, evaluate_tape_with_residual, find_first_negative
 from .kinematics.assemblies import find_assemblies
@@ -20,13 +20,13 @@ from .kinematics.follow import follow_path
 from .kinematics.forward import Solution, closure_tolerance, find_sides, solve_forward
 from .kinematics.inverse import solve_inverse
 from .kinematics.tapes import KinematicTapes, collect_tapes
-from .kinematics.wrist import EXACT, Wrist, find_wrist, flip_mode
+from .kinematics.wrist import EVERY_DIRECTION, EVERY_ROTATION, EXACT, Wrist, find_wrist, flip_mode
 from .model.legs import Inverse
 from .model.limits import Limit
 from .model.parts import Drive
 from .model.rates import TwistRates, compute_twist_rates
 from .model.spec import Spec
-from .model.structures import PlatformPlacement, Structure
+from .model.structures import DirectionColumns, PlatformPlacement, Structure
 from .model.traces import Model
 
 
@@ -64,6 +64,17 @@ class Machine:
     def has_direction(self) -> bool:
         """Whether B and C of a pose tell the tool's axis, and a turn about it does not count."""
         return self.structure.has_direction
+
+    @property
+    def direction(self) -> DirectionColumns | None:
+        """The columns of B and C in a pose where these tell the tool's axis; None where a turn about it counts too."""
+        return self.structure.direction
+
+    @property
+    def orientation_ranges(self) -> dict[str, Span]:
+        """Ranges of the turning axes, rad, that hold every orientation once."""
+        ranges = EVERY_DIRECTION if self.has_direction else EVERY_ROTATION
+        return {axis: ranges[axis] for axis in self.axes if axis in ranges}
 
     @property
     def drives(self) -> tuple[Drive, ...]:

@@ -13,7 +13,7 @@ from ..kernels.batch import NewtonSteps, Roots, evaluate_tape, evaluate_tape_wit
 from ..model.traces import Model
 from .inverse import solve_inverse
 from .tapes import collect_newton_tapes
-from .wrist import is_upright
+from .wrist import TURN, bring_within_poles, is_upright
 
 CLOSED = 1e-9  # greatest closure error of an answer, mm in a machine of a metre
 MOST_STEPS = 24
@@ -58,9 +58,10 @@ def solve_forward(model: Model, joints: Array, starts: Array | None, method: str
     poses, converged, steps = solution.poses, solution.converged, solution.steps
     if not converged.all():
         poses[~converged] = np.nan
-    if model.structure.has_direction:
-        along_z = is_upright(poses[:, 3])
-        poses[along_z, 4] = 0.0 if starts is None else starts[along_z, 4]
+    direction = model.structure.direction
+    if direction is not None:
+        along_z = is_upright(poses[:, direction.b])
+        poses[along_z, direction.c] = 0.0 if starts is None else starts[along_z, direction.c]
     elif steps.max(initial=0) > WITHIN_A_TURN:
         _count_turns(model, poses, np.array(model.home) if starts is None else starts)
     return solution
@@ -68,17 +69,12 @@ def solve_forward(model: Model, joints: Array, starts: Array | None, method: str
 
 def _count_turns(model: Model, poses: Array, near: Array) -> None:
     """Bring the angles of a free platform to B within ±90° and within half a turn of those near by; in place."""
-    angles = {axis: poses[:, i] for i, axis in enumerate(model.axes) if axis in "ABC"}
-    if len(angles) == 3:
-        b = angles["B"]
-        b -= 2.0 * np.pi * np.round(b / (2.0 * np.pi))
-        over = np.abs(b) > 0.5 * np.pi
-        b[over] = np.copysign(np.pi, b[over]) - b[over]
-        angles["A"][over] += np.pi
-        angles["C"][over] += np.pi
-        del angles["B"]
-    for axis, angle in angles.items():
-        angle -= 2.0 * np.pi * np.round((angle - near[..., model.axes.index(axis)]) / (2.0 * np.pi))
+    columns = [i for i, axis in enumerate(model.axes) if axis in "ABC"]
+    if len(columns) == 3:
+        poses[:, columns] = bring_within_poles(poses[:, columns])
+        del columns[1]
+    for i in columns:
+        poses[:, i] -= TURN * np.round((poses[:, i] - near[..., i]) / TURN)
 
 
 def closure_tolerance(model: Model) -> float:

@@ -23,6 +23,7 @@ PROVED     4e-6         off the pole: a box of poses proved to be nearer counts 
 ASIDE      8e-6         second angle by which a pose is moved off the pole to have its rates bounded
 LEEWAY     1.6e-5       second angle that may change while the first one is free
 SAME_MODE  1e-6         joints no farther from those of a mode are in that mode
+NEAR_MODE  0.01         the same, mm too, for joints as a controller's drives stand: they are never just where told
 SWING      90°          first angles of neighbours farther apart than this swing: the other mode is tried
 FLIP       0.01         off the pole: farther away no path changes its mode
 DISTINCT   0.01         off the pole: from here on the first joint is as exact as the others
@@ -39,10 +40,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..arrays import Array, Flags, Indices
+from ..arrays import Array, Flags, Indices, Span
 from ..kernels.batch import evaluate_tape
 from ..kernels.tape import Tape
 from ..model.parts import Drive
+from ..model.structures import DirectionColumns
 from ..model.traces import Model
 from .inverse import solve_inverse
 
@@ -52,6 +54,7 @@ PROVED = 2.0 * PRINTED
 ASIDE = 8e-6
 LEEWAY = 8.0 * PRINTED
 SAME_MODE = 1e-6
+NEAR_MODE = 0.01
 SWING = 0.5 * np.pi
 FLIP = 0.01
 DISTINCT = 0.01
@@ -60,8 +63,17 @@ TRAVEL = 0.05
 REPORTED = np.radians(45.0)
 TILTED = 0.2
 
+# Ranges of the turning axes that hold every rotation, and every direction, once.
+EVERY_ROTATION: dict[str, Span] = {"A": (-np.pi, np.pi), "B": (-np.pi / 2, np.pi / 2), "C": (-np.pi, np.pi)}
+EVERY_DIRECTION: dict[str, Span] = {"B": (0.0, np.pi), "C": (-np.pi, np.pi)}
+
 GAIN = 0.25  # of the squared way in the same mode: what the way in the other mode may be, for the path to change
 TURN = 2.0 * np.pi
+
+
+def convert_to_freedom(angle: float) -> float:
+    """Return sin² of an angle off the pole: what :meth:`Wrist.measure_freedom` is there."""
+    return float(np.sin(angle) ** 2)
 
 
 def wrap_angle(angle: Array) -> Array:
@@ -153,11 +165,15 @@ def cross_direction_pole(turns: Array, at: Indices) -> None:
         turns[at[across]] = there[across][:, ::-1]
 
 
+def fold_direction(turns: Array) -> tuple[Array, Array]:
+    """Return B ≥ 0 and C, (n,) each, that point the tool as B and C (n, 2) do."""
+    return np.abs(turns[:, 0]), np.where(turns[:, 0] < 0.0, turns[:, 1] + np.pi, turns[:, 1])
+
+
 def continue_direction(turns: Array, before: Array) -> None:
     """Let B and C (n, 2) each go on from those of a row of ``before`` (n, 2), over the pole too; in place."""
-    b, c = np.abs(turns[:, 0]), np.where(turns[:, 0] < 0.0, turns[:, 1] + np.pi, turns[:, 1])
+    (b, c), (b0, c0) = fold_direction(turns), fold_direction(before)
     flipped, was_free = before[:, 0] < 0.0, np.abs(np.sin(before[:, 0])) < PRINTED
-    b0, c0 = np.abs(before[:, 0]), np.where(flipped, before[:, 1] + np.pi, before[:, 1])
     flipped = flipped ^ spares_swing(np.column_stack([c0, b0]), np.column_stack([c, b]), flip_direction(c, b))
     flipped = np.where(was_free, np.abs(wrap_angle(c - before[:, 1])) > SWING, flipped)
     free = np.sin(b) < PRINTED
@@ -182,6 +198,14 @@ def flip_rotation(turns: Array) -> Array:
     return np.column_stack([turns[:, 0] + np.pi, np.pi - turns[:, 1], turns[:, 2] + np.pi])
 
 
+def bring_within_poles(turns: Array) -> Array:
+    """Return the A, B, C (n, 3) of the same rotations with B within ±90°."""
+    a, b, c = turns[:, 0], wrap_angle(turns[:, 1]), turns[:, 2]
+    over = np.abs(b) > 0.5 * np.pi
+    across = np.copysign(np.pi, b) - b
+    return np.column_stack([np.where(over, a + np.pi, a), np.where(over, across, b), np.where(over, c + np.pi, c)])
+
+
 @dataclass(frozen=True, eq=False)
 class Wrist:
     """The two turning joints of head and table that point the tool; see the module.
@@ -197,6 +221,13 @@ class Wrist:
     def pair(self) -> list[int]:
         """Both indices, the first axis first."""
         return [self.first, self.second]
+
+    @property
+    def direction(self) -> DirectionColumns:
+        """The columns of B and C in a pose, which tell the axis that the wrist points the tool along."""
+        direction = self.model.structure.direction
+        assert direction is not None
+        return direction
 
     @property
     def drive(self) -> Drive:
@@ -224,7 +255,7 @@ class Wrist:
 
     def find_free(self, poses: Array, within: float) -> Flags:
         """Find poses (n, axes) no farther than ``within`` rad off the pole: the first joint is free there."""
-        free: Flags = self.measure_freedom(poses) < np.sin(within) ** 2
+        free: Flags = self.measure_freedom(poses) < convert_to_freedom(within)
         return free
 
     def solve_with_first(self, poses: Array, mode: str, first: Array) -> Array:

@@ -50,14 +50,14 @@ def _leave_pole(machine: Machine, wrist: Wrist, first: Array, joints: Array, mod
         return None
     for turns in _TURNS:
         via = np.array(machine.home)
-        via[3:] = np.asarray(tilted.poses).reshape(-1)[3:]
-        via[4] += TURN * turns
+        via[wrist.direction.pair] = np.asarray(tilted.poses).reshape(-1)[wrist.direction.pair]
+        via[wrist.direction.c] += TURN * turns
         line = _sample_line(via, first)
         rows = machine.follow(line, mode, EXACT)
         arrival = rows[-1] - rows[0] + machine.inverse(via, mode)
         if abs(float((arrival - joints)[wrist.first])) < 1e-6 and not machine.check(line, mode=mode).any():
             upright = np.array(machine.home)
-            upright[4] = via[4]
+            upright[wrist.direction.c] = via[wrist.direction.c]
             return [upright, via, first]
     return None
 

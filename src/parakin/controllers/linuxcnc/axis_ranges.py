@@ -12,7 +12,7 @@ from ...machine import Machine
 _ROUNDS, _SAMPLES = 40, 16384
 _BEYOND = 0.25  # of the box so far, on both sides: how far a round samples
 _MARGIN = 0.1  # likewise, added at the end for what the samples miss
-_GREATEST = {"A": pi, "B": pi, "C": pi}
+_GREATEST_TURN = pi
 TURNS = 100  # that C may go on turning either way where of the orientation only the tool's axis counts
 
 
@@ -25,7 +25,7 @@ def estimate_axis_ranges(machine: Machine) -> tuple[Array, Array]:
     """
     rng = np.random.default_rng(0)
     units = np.where(np.array(machine.axis_units) == "mm", 1.0, pi / 180.0)
-    most = np.array([_GREATEST.get(axis, np.inf) for axis in machine.axes])
+    most = np.array([_GREATEST_TURN if unit == "rad" else np.inf for unit in machine.axis_units])
     low, high = machine.home - units, machine.home + units
     for _ in range(_ROUNDS):
         beyond = _BEYOND * (high - low)
@@ -35,7 +35,8 @@ def estimate_axis_ranges(machine: Machine) -> tuple[Array, Array]:
         high = np.maximum(high, allowed.max(0, initial=-np.inf))
     margin = _MARGIN * (high - low)
     low, high = np.maximum(low - margin, -most), np.minimum(high + margin, most)
-    if machine.has_direction:  # B may have either sign, and C go on turning
-        high[3] = max(-low[3], high[3])
-        low[3:], high[3:] = [-high[3], -2.0 * pi * TURNS], [high[3], 2.0 * pi * TURNS]
+    direction = machine.direction
+    if direction is not None:  # B may have either sign, and C go on turning
+        b = max(-low[direction.b], high[direction.b])
+        low[direction.pair], high[direction.pair] = [-b, -2.0 * pi * TURNS], [b, 2.0 * pi * TURNS]
     return np.floor(low / units) * units, np.ceil(high / units) * units

@@ -41,7 +41,7 @@ def _find_square(machine: Machine) -> Array:
             corners = np.tile(machine.home, (len(_CORNERS), 1))
             corners[:, :2] += side * np.array(quadrant) * _CORNERS
             if machine.wrist is not None:
-                corners[:, machine.axes.index("B")] += _TILT
+                corners[:, machine.wrist.direction.b] += _TILT
             poses = np.concatenate([machine.home[None], corners, machine.home[None]])
             if _is_allowed(machine, poses):
                 return poses

@@ -12,12 +12,11 @@ from ...algebra import Trace
 from ...kernels.newton import SLOW, WORTH
 from ...kernels.tape import Tape, compile_tape
 from ...kinematics.forward import MOST_STEPS
-from ...kinematics.wrist import EXACT, GAIN, SWING, TURN
+from ...kinematics.wrist import EXACT, GAIN, NEAR_MODE, SWING, TURN
 from ...machine import Machine
 from ...model.limits import Limit
 from .tape_to_c import CVector, to_c, write_function, write_test
 
-_SAME = 0.01
 _FIELDS = {"X": "tran.x", "Y": "tran.y", "Z": "tran.z", "A": "a", "B": "b", "C": "c"}
 
 _HEADER = """\
@@ -93,7 +92,7 @@ def _write_numbers(machine: Machine, name: str) -> str:
         f"#define WRIST {int(machine.wrist is not None)} /* two turning joints point the tool */",
         f"#define TOOL_AXIS {int(machine.has_direction)} /* of the orientation only the tool's axis counts */",
         f"#define LEG_MODES {_count_leg_modes(machine)} /* choices of the legs' inverse */",
-        f"#define SAME {to_c(_SAME)} /* mm or rad: joints nearer to each other stand in one working mode */",
+        f"#define SAME {to_c(NEAR_MODE)} /* mm or rad: joints nearer to each other stand in one working mode */",
         f"#define TURN {to_c(TURN)}",
         f"#define DEGREE {to_c(np.pi / 180.0)}",
         f"#define FREE {to_c(EXACT)} /* rad: nearer to a turning axis the tool's tells its angle by rounding only */",

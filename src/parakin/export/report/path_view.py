@@ -235,8 +235,8 @@ def _average_pose(machine: Machine, poses: Array) -> Array:
         if letter in machine.axes:
             column = real[:, machine.axes.index(letter)]
             pose[machine.axes.index(letter)] = 0.5 * (column.min() + column.max())
-    if machine.has_direction:
-        b, c = real[:, -2:].T
+    if machine.direction is not None:
+        b, c = real[:, machine.direction.pair].T
         k = np.array([(np.sin(b) * np.cos(c)).mean(), (np.sin(b) * np.sin(c)).mean(), np.cos(b).mean()])
-        pose[-2:] = np.arctan2(np.hypot(k[0], k[1]), k[2]), np.arctan2(k[1], k[0])
+        pose[machine.direction.pair] = np.arctan2(np.hypot(k[0], k[1]), k[2]), np.arctan2(k[1], k[0])
     return pose

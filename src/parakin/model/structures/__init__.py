@@ -5,12 +5,12 @@ from __future__ import annotations
 from ...errors import DescriptionError
 from ..parts import ROTATIONS, TRANSLATIONS
 from ..spec import Spec
-from .base import PlatformPlacement, Structure
+from .base import DirectionColumns, PlatformPlacement, Structure
 from .carried import Carried
 from .central_leg import CentralLeg
 from .free import Free
 
-__all__ = ["Carried", "CentralLeg", "Free", "PlatformPlacement", "Structure", "structure_of"]
+__all__ = ["Carried", "CentralLeg", "DirectionColumns", "Free", "PlatformPlacement", "Structure", "structure_of"]
 
 
 def structure_of(spec: Spec) -> Structure:

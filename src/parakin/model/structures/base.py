@@ -10,7 +10,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import Literal, NamedTuple
 
 from ...algebra import IDENTITY, ORIGIN, Mat, Scalar, Vec
 from ..chain import UNIT, Pointing, compose_chain
@@ -32,6 +32,18 @@ class PlatformPlacement:
     freedom: Scalar | None = None  # 0 where the first joint of head or table is free
 
 
+class DirectionColumns(NamedTuple):
+    """The columns of B and C in a pose, side by side, where these two tell the tool's axis."""
+
+    b: int
+    c: int
+
+    @property
+    def pair(self) -> slice:
+        """Both columns, B first."""
+        return slice(self.b, self.c + 1)
+
+
 class Structure(ABC):
     """What a motion, a mounting, a head and a table make together."""
 
@@ -40,7 +52,7 @@ class Structure(ABC):
     branches: str = ""  # default working mode of head and table
     pointing: Pointing | None = None  # the two turning axes of head and table, in the order in which they follow
     serial_order: tuple[int, ...] = ()  # the serial joints that turn them, in that order
-    has_direction: bool = False  # of the orientation the tool's axis counts only, and B and C tell it
+    direction: DirectionColumns | None = None  # where of the orientation the tool's axis counts only
     has_central_leg: bool = False
     sign: float = 1.0  # of the central leg's length
     tip: Vec = ORIGIN  # of a fixed tool, in the platform's frame
@@ -51,6 +63,11 @@ class Structure(ABC):
         self.mount, self.base = compose_chain(spec.mounting, ())
         self.coordinates = spec.motion
         self.head_joints = sum(step.drive is not None for step in spec.head)
+
+    @property
+    def has_direction(self) -> bool:
+        """Whether of the orientation the tool's axis counts only, and B and C tell it."""
+        return self.direction is not None
 
     @abstractmethod
     def place(self, pose: Sequence[Scalar], branch: str, first: Scalar | None = None) -> PlatformPlacement:

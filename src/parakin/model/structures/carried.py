@@ -9,7 +9,7 @@ from ..chain import UNIT, Pointing, compose_chain, invert_rotations, to_local
 from ..parts import TRANSLATIONS
 from ..spec import Spec
 from .base import PlatformPlacement
-from .five_axis import FiveAxis, axis_angles, tool_axis
+from .five_axis import FiveAxis, axis_angles, turned_axis
 
 
 class Carried(FiveAxis):
@@ -37,7 +37,7 @@ class Carried(FiveAxis):
         return sub(to_local(self.mount, self.base, world), tip)
 
     def place(self, pose: Sequence[Scalar], branch: str, first: Scalar | None = None) -> PlatformPlacement:
-        k, _, _ = tool_axis(pose[3], pose[4])
+        k, _, _ = turned_axis(pose)
         found = self.pointing.solve(k, branch, first)
         serial = [found.joints[self.serial_order.index(i)] for i in range(2)]
         origin = self._origin(pose, serial)

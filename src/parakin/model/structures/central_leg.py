@@ -31,7 +31,7 @@ from ..chain import UNIT, Pointing, compose_chain, rotation_about, to_local
 from ..parts import ROTATIONS, Step
 from ..spec import Spec
 from .base import PlatformPlacement
-from .five_axis import FiveAxis, axis_angles, tool_axis, turned_axis
+from .five_axis import FiveAxis, axis_angles, turned_axis
 
 
 class CentralLeg(FiveAxis):
@@ -62,7 +62,7 @@ class CentralLeg(FiveAxis):
         self.above, self.reach = self._wrist_centre()
         self.sign = 1.0
         home = tuple(float(spec.home.get(letter, 0.0)) for letter in self.axes)
-        self.sign = 1.0 if self._centre(home[:3], tool_axis(*home[3:])[0])[2] > 0.0 else -1.0
+        self.sign = 1.0 if self._centre(home[:3], turned_axis(home)[0])[2] > 0.0 else -1.0
         swing = [Step(turns[0], drive=spec.legs[0].drives[0]), Step(turns[1], drive=spec.legs[0].drives[0])]
         self.swing = Pointing.from_steps(swing, "motion")
         self.swing = Pointing(self.swing.first, self.swing.second, (0.0, 0.0, self.sign))
@@ -108,7 +108,7 @@ class CentralLeg(FiveAxis):
         return rotation, origin, tz, list(found.joints)
 
     def place(self, pose: Sequence[Scalar], branch: str, first: Scalar | None = None) -> PlatformPlacement:
-        k, _, _ = tool_axis(pose[3], pose[4])
+        k, _, _ = turned_axis(pose)
         rotation, origin, tz, angles = self._swing(pose[:3], k)
         found = self.pointing.solve(apply(transpose(rotation), apply(transpose(self.mount), k)), branch, first)
         serial = list(found.joints)
@@ -148,7 +148,7 @@ class CentralLeg(FiveAxis):
     def place_with_joints(self, pose: Sequence[Scalar], serial: Sequence[Scalar]) -> PlatformPlacement:
         if not self.roll:
             return super().place_with_joints(pose, serial)
-        k, _, _ = tool_axis(pose[3], pose[4])
+        k, _, _ = turned_axis(pose)
         rotation, origin, tz, angles = self._swing(pose[:3], k)
         v = apply(transpose(rotation), apply(transpose(self.mount), k))
         w = apply(compose_chain(self.spec.head, serial)[0], UNIT["tz"])  # turned onto v by the platform's own turn

@@ -5,7 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from ...algebra import Scalar, Vec, atan2, dot, move_along, sincos, sqrt
-from .base import Structure
+from .base import DirectionColumns, Structure
+
+_DIRECTION = DirectionColumns(3, 4)
 
 
 def tool_axis(b: Scalar, c: Scalar) -> tuple[Vec, Vec, Vec]:
@@ -20,9 +22,9 @@ def axis_angles(k: Vec) -> list[Scalar]:
     return [atan2(sqrt(k[0] * k[0] + k[1] * k[1]), k[2]), atan2(k[1], k[0])]
 
 
-def turned_axis(pose: Sequence[Scalar], turn: Sequence[Scalar]) -> tuple[Vec, Vec, Vec]:
+def turned_axis(pose: Sequence[Scalar], turn: Sequence[Scalar] = ()) -> tuple[Vec, Vec, Vec]:
     """A pose's tool axis k and its two directions, all turned on by small angles towards these."""
-    k, e1, e2 = tool_axis(pose[3], pose[4])
+    k, e1, e2 = tool_axis(*pose[_DIRECTION.pair])
     if not turn:
         return k, e1, e2
     first, second = turn
@@ -38,7 +40,7 @@ class FiveAxis(Structure):
     axes = ("X", "Y", "Z", "B", "C")
     turns = ("w1", "w2")
     branches = "+"
-    has_direction = True
+    direction = _DIRECTION
 
     def _tilt_rows(self, pose: Sequence[Scalar], turn: Sequence[Scalar], k: Vec) -> list[Scalar]:
         _, e1, e2 = turned_axis(pose, turn)

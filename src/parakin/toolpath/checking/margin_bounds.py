@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...arrays import Array, Flags, Indices
-from ...kinematics.wrist import ASIDE, LEEWAY, PROVED
+from ...kinematics.wrist import ASIDE, LEEWAY, PROVED, convert_to_freedom
 from ...performance.certified.margin_rates import MarginRates
 from .motion_sections import Sections
 from .motions import (
@@ -29,7 +29,6 @@ from .motions import (
 KEPT = 1e-9  # of a limit's size: a margin no farther below zero counts as kept, for it is rounding
 _SHORTEST_SHARE = 2.0**-30  # of a motion: no section is shorter
 _SHORTEST = {"mm": 1e-7, "rad": 1e-9}  # a section that is shorter on every axis is not cut
-_FREE = np.sin(PROVED) ** 2
 _HALF, _TURN = np.pi, 2.0 * np.pi
 _ROUNDING = 1e-6  # rad, of joints and of their bounds
 _BOXES_AT_ONCE = 4096
@@ -200,7 +199,7 @@ class MotionProver:
             worst[rows], freedom[rows] = np.minimum(worst[rows], down), np.maximum(freedom[rows], up)
         worst[boxes.aside] -= self._aside
         np.maximum(least, worst, out=least, where=self._bounded_by_value & ~np.isnan(worst))
-        return freedom <= _FREE if self.motions.wrist is not None else np.zeros(len(least), bool)
+        return freedom <= convert_to_freedom(PROVED) if self.motions.wrist is not None else np.zeros(len(least), bool)
 
     def _allow_free_wrist(self, free: Flags, margins: Array, change: Array, least: Array, counted: Flags) -> None:
         """Bound the wrist's ranges by the margins at the ends where its first joint is free; in place."""

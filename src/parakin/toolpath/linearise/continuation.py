@@ -70,8 +70,8 @@ def find_matching_poses(machine: Machine, poses: Array, rotation: Array) -> Flag
 def _point_tool(machine: Machine, tip: Array, axis: Array, before: PosedPoints) -> Array:
     """Compute poses whose turning axes go on from the poses before, over the pole of B and C too."""
     poses = compute_poses(machine, tip, axis, MACHINE_FRAME)[0]
-    if machine.has_direction:
-        continue_direction(poses[:, 3:], before.poses[:, 3:])
+    if machine.direction is not None:
+        continue_direction(poses[:, machine.direction.pair], before.poses[:, machine.direction.pair])
     else:
         for column in find_turning_columns(machine):
             poses[:, column] = find_nearest_turn(poses[:, column], before.poses[:, column])

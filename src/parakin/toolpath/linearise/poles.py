@@ -45,7 +45,10 @@ class Pole:
 
     def get_angles(self, posted: Posted) -> Array:
         """Return the angle that the pole frees along a posted path, (n,) rad."""
-        return posted.poses[:, 4] if self.joint is None else posted.joints[:, self.joint]
+        if self.joint is not None:
+            return posted.joints[:, self.joint]
+        assert self.machine.direction is not None
+        return posted.poses[:, self.machine.direction.c]
 
     def project_axes(self, tip: Array, axis: Array) -> Array:
         """Project tool axes (m, 3) from the centre onto the plane that touches the unit sphere at the pole: (m, 2).
@@ -106,6 +109,7 @@ def find_poles(machine: Machine, interpolation: Interpolation, has_turns: bool) 
     if wrist is not None:
         text = f"the {'head' if wrist.is_in_head else 'table'}'s pole"
         poles.append(Pole(machine, text, machine.joints[wrist.first], wrist.first, wrist.first_axis))
-    if interpolation == "pose" and machine.has_direction and not any(pole.is_upright for pole in poles):
-        poles.append(Pole(machine, "Z, where C is free", "C", None, np.array([0.0, 0.0, 1.0])))
+    direction = machine.direction
+    if interpolation == "pose" and direction is not None and not any(pole.is_upright for pole in poles):
+        poles.append(Pole(machine, "Z, where C is free", machine.axes[direction.c], None, np.array([0.0, 0.0, 1.0])))
     return [pole for pole in poles if not (has_turns and pole.is_upright)]

@@ -15,10 +15,12 @@ def insert_rewind_records(posted: Posted) -> Posted:
 
     A path whose program gives the turns is left as it is: its turns can't say that a joint turns back.
     """
-    if not posted.rewinds or posted.path.turns is not None or not posted.machine.has_direction:
+    direction = posted.machine.direction
+    if not posted.rewinds or posted.path.turns is not None or direction is None:
         return posted
     record = np.array(posted.rewinds, np.int64)
-    begin, way = posted.poses[record - 1, 3:], posted.poses[record, 3:] - posted.poses[record - 1, 3:]
+    begin, end = (posted.poses[row, direction.pair] for row in (record - 1, record))
+    way = end - begin
     counts = np.maximum(1, np.ceil(np.abs(way[:, 1]) / TURN_STEP)).astype(np.int64)
     motion, row = np.repeat(record, counts - 1), np.repeat(np.arange(len(record)), counts - 1)
     number = np.arange(len(row)) - np.repeat(np.cumsum(counts - 1) - (counts - 1), counts - 1) + 1

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...arrays import Array, Flags, Indices
-from ...kinematics.wrist import PRINTED, wrap_angle
+from ...kinematics.wrist import PRINTED, fold_direction, wrap_angle
 from ...machine import Machine
 from ..path import ToolPath
 from ..programmed_path import ProgrammedPath
@@ -93,9 +93,9 @@ def _compute_rows(machine: Machine, programmed: ProgrammedPath, frame: Array, sa
 def _find_wide_steps(machine: Machine, poses: Array, mode: str, has_free_direction: bool) -> Indices:
     """Find the steps between rows off a pole on which C or the wrist's first joint turns too far, by the row before."""
     wide = np.zeros(len(poses) - 1, np.bool_)
-    if machine.has_direction and has_free_direction:
-        b, c = poses[:, 3], poses[:, 4]
-        wide |= _turns_far(np.where(b < 0.0, c + np.pi, c), np.abs(np.sin(b)) < PRINTED)
+    if machine.direction is not None and has_free_direction:
+        b, c = fold_direction(poses[:, machine.direction.pair])
+        wide |= _turns_far(c, np.abs(np.sin(b)) < PRINTED)
     if machine.wrist is not None:
         first = machine.inverse(poses, mode)[:, machine.wrist.first]
         wide |= _turns_far(first, machine.wrist.find_free(poses, PRINTED))

@@ -69,7 +69,7 @@ def rewind_in_rapids(
             run.pop(0)
         runs = [run for run in runs if run]
     rewinds = [rewind for rewind in rewinds if rewind.before != rewind.behind]
-    new_poses, new_joints, c = poses.copy(), joints.copy(), machine.axes.index("C")
+    new_poses, new_joints, c = poses.copy(), joints.copy(), machine.wrist.direction.c
     new_joints[:, column] += TURN * counts[0]
     for rewind in rewinds:
         new_poses[rewind.record :, c] += TURN * find_turns(rewind)
@@ -99,6 +99,7 @@ def _find_rapid_runs(path: ToolPath) -> list[list[int]]:
 
 def _find_turns_of_c(machine: Machine, poses: Array, joints: Array, mode: str, column: int, rewind: _Rewind) -> int:
     """Find the turns of C that take the joint along as wanted in a motion; zero where no turns do."""
+    assert machine.wrist is not None
     record = rewind.record
     start, goal = joints[record - 1].copy(), joints[record].copy()
     start[column] += TURN * rewind.before
@@ -109,7 +110,7 @@ def _find_turns_of_c(machine: Machine, poses: Array, joints: Array, mode: str, c
     wanted = rewind.behind - rewind.before
     for turns in (wanted, -wanted):
         end = poses[record].copy()
-        end[machine.axes.index("C")] += TURN * turns
+        end[machine.wrist.direction.c] += TURN * turns
         passage = trace_passage(machine, mode, poses[record - 1], end, start, record)
         off = max(np.abs(passage.joints[0] - start).max(), np.abs(passage.joints[-1] - goal).max())
         if passage.smooth and off < _SAME:

@@ -119,15 +119,15 @@ def _bound_axis_turn(machine: Machine, corner: Array, turn: Array) -> Array:
 
     The axis turns no faster than all angles together. A turn of C moves it by sin B only, where A does not turn it.
     """
-    axes = machine.axes
-    letters = [axis for axis in axes if axis in "ABC"]
-    rates = {letter: np.abs(turn[:, axes.index(letter)]) for letter in letters}
-    if machine.has_direction:
-        lean = np.abs(corner[:, axes.index("B")])
+    columns = [i for i, unit in enumerate(machine.axis_units) if unit == "rad"]
+    rates = {i: np.abs(turn[:, i]) for i in columns}
+    direction = machine.direction
+    if direction is not None:
+        lean = np.abs(corner[:, direction.b])
         near = np.pad(lean, 2, mode="edge")  # over a piece the pose lies amid the two corners before and behind
         most = np.max([near[i : i + len(lean)] for i in range(5)], axis=0)
-        rates["C"] = rates["C"] * np.minimum(most, 1.0)
-    return np.sum(list(rates.values()), axis=0) if letters else np.zeros(len(corner))
+        rates[direction.c] = rates[direction.c] * np.minimum(most, 1.0)
+    return np.sum(list(rates.values()), axis=0) if columns else np.zeros(len(corner))
 
 
 def check_tolerance(tolerance: float, what: str) -> float:

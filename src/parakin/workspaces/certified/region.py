@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from fnmatch import fnmatchcase
 from functools import cached_property
-from math import isfinite, pi
+from math import isfinite
 from typing import Any, Literal
 
 import numpy as np
@@ -26,7 +26,6 @@ FAR = 1e6  # mm: no machine reaches farther
 _MANY = 20_000  # cells after which a bounded region has left the farthest ones
 _TINY = 1e-3  # mm: cells so small end the search for the extent
 _SHRINKING = 0.6  # of an edge from round to round, while the cells are much larger than the region
-_EVERY_WAY: dict[str, Span] = {"A": (-pi, pi), "B": (-pi / 2, pi / 2), "C": (-pi, pi)}
 
 
 @dataclass(frozen=True, eq=False)
@@ -189,9 +188,7 @@ def make_region(
     if sum((bool(every), bool(some), dexterous)) > 1:
         raise PoseError("one of every, some and dexterous can be asked at a time")
     if dexterous:
-        swept = {axis: _EVERY_WAY[axis] for axis in turning}
-        if machine.has_direction:
-            swept["B"] = (0.0, pi)
+        swept = machine.orientation_ranges
     kind: RegionKind = "dexterous" if dexterous else "total" if every else "inclusive" if some else "constant"
     _refuse_unknown_axes(machine, (*fixed, *swept))
     for axis, span in swept.items():

@@ -95,14 +95,14 @@ __all__ = [
 
 
 def machines() -> list[str]:
-    """Names of the shipped machines."""
+    """List the names of the shipped machines."""
     from .description import list_shipped_machines
 
     return sorted(list_shipped_machines())
 
 
 def load(name: str | PathLike[str], parameters: Mapping[str, float | str] | None = None) -> Machine:
-    """A machine by its shipped name or by the path of its file.
+    """Load a machine by its shipped name or by the path of its file.
 
     Parameters
     ----------

@@ -74,7 +74,7 @@ class Trace:
         self._derivatives: dict[int, dict[int, Scalar]] = {}
 
     def input(self, number: int) -> Term:
-        """The ``number``-th input."""
+        """Return the ``number``-th input."""
         return self.node(INPUT, (), (float(number),))
 
     def inputs(self, count: int, start: int = 0) -> list[Term]:
@@ -100,7 +100,7 @@ def _split_factor(term: Term) -> tuple[float, Term]:
 
 
 def _multiply_constant(term: Term, k: float) -> Scalar:
-    """k·term, without a node for k of 0 or 1 and without a chain of multiples."""
+    """Multiply a term by k, without a node for k of 0 or 1 and without a chain of multiples."""
     if k == 0.0:
         return 0.0
     if k == 1.0:
@@ -120,7 +120,7 @@ def _split_linear(term: Scalar) -> tuple[float, list[tuple[float, Term]]]:
 
 
 def _add_multiple(x: Term, y: Scalar, sign: float) -> Scalar:
-    """x + sign·y in as few operations as there are for it; equal terms are joined."""
+    """Add sign·y to x in as few operations as possible; equal terms are joined."""
     if not isinstance(y, Term | float | int | np.floating):
         return NotImplemented
     kx, parts = _split_linear(x)
@@ -158,14 +158,14 @@ def sqrt(x: Scalar) -> Scalar:
 
 
 def sincos(x: Scalar) -> tuple[Scalar, Scalar]:
-    """Sine and cosine."""
+    """Compute sine and cosine."""
     if isinstance(x, Term):
         return x.trace.node(SIN, (x,), ()), x.trace.node(COS, (x,), ())
     return np.sin(x), np.cos(x)
 
 
 def atan2(y: Scalar, x: Scalar) -> Scalar:
-    """The angle of (x, y) in (-π, π]; 0 for (0, 0), whatever the signs of the zeros."""
+    """Compute the angle of (x, y) in (-π, π]; 0 for (0, 0), whatever the signs of the zeros."""
     if isinstance(y, Term) or isinstance(x, Term):
         trace = y.trace if isinstance(y, Term) else x.trace
         args = tuple(a if isinstance(a, Term) else trace.constant(a) for a in (y, x))
@@ -174,17 +174,17 @@ def atan2(y: Scalar, x: Scalar) -> Scalar:
 
 
 def minimum(x: Scalar, y: Scalar) -> Scalar:
-    """The lesser of two; NaN if either is."""
+    """Return the lesser of two; NaN if either is."""
     return _apply_binary(MIN, np.minimum, x, y)
 
 
 def maximum(x: Scalar, y: Scalar) -> Scalar:
-    """The greater of two; NaN if either is."""
+    """Return the greater of two; NaN if either is."""
     return _apply_binary(MAX, np.maximum, x, y)
 
 
 def copysign(x: Scalar, y: Scalar) -> Scalar:
-    """|x| with the sign of y; NaN if either is."""
+    """Return |x| with the sign of y; NaN if either is."""
     return _apply_binary(COPYSIGN, np.copysign, x, y)
 
 
@@ -196,7 +196,7 @@ def _apply_binary(op: int, function: Any, x: Scalar, y: Scalar) -> Scalar:
 
 
 def select(x: Scalar, y: Scalar, below: Scalar, otherwise: Scalar) -> Scalar:
-    """``below`` where x < y, else ``otherwise``."""
+    """Return ``below`` where x < y, else ``otherwise``."""
     args = (x, y, below, otherwise)
     traces = [a.trace for a in args if isinstance(a, Term)]
     if traces:
@@ -209,12 +209,15 @@ def select(x: Scalar, y: Scalar, below: Scalar, otherwise: Scalar) -> Scalar:
 
 
 def stop_gradient(x: Scalar) -> Scalar:
-    """x as a constant for :func:`derivative`: the position of a minimum has no first-order effect on it (Danskin)."""
+    """Make x a constant for :func:`derivative`.
+
+    The position of a minimum has no first-order effect on it (Danskin).
+    """
     return x.trace.node(STOP_GRADIENT, (x,), ()) if isinstance(x, Term) else x
 
 
 def absolute(x: Scalar) -> Scalar:
-    """|x|."""
+    """Compute the absolute value |x|."""
     if isinstance(x, Term):
         return x.trace.node(ABS, (x,), ())
     return np.abs(x)
@@ -247,7 +250,7 @@ def scale(u: Vec, k: Scalar) -> Vec:
 
 
 def move_along(start: Vec, direction: Vec, distance: Scalar) -> Vec:
-    """start + distance·direction."""
+    """Compute start + distance·direction."""
     return tuple(a + d * distance for a, d in zip(start, direction, strict=True))
 
 
@@ -269,7 +272,7 @@ def product(m: Mat, n: Mat) -> Mat:
 
 
 def axis_rotation(axis: str, s: Scalar, c: Scalar) -> Mat:
-    """Rotation about a coordinate axis (``rx``, ``ry`` or ``rz``) by the angle of sine s and cosine c."""
+    """Make the rotation about a coordinate axis (``rx``, ``ry`` or ``rz``) by the angle of sine s and cosine c."""
     if axis == "rx":
         return ((1.0, 0.0, 0.0), (0.0, c, -s), (0.0, s, c))
     if axis == "ry":

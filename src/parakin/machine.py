@@ -140,7 +140,7 @@ class Machine:
         return (self.mode, *[mode for mode in every if mode != self.mode])
 
     def head_modes(self, mode: str) -> list[str]:
-        """A working mode, and the one with the other sign of head and table, if these have a choice."""
+        """Return a working mode, and the one with the other sign of head and table, if these have a choice."""
         return [mode, flip_mode(mode)] if self.structure.branches else [mode]
 
     def _refuse_bad_home(self) -> None:
@@ -194,7 +194,7 @@ class Machine:
     # Kinematics.
 
     def inverse(self, poses: ArrayLike, mode: str | None = None, out: Array | None = None) -> Array:
-        """Joints for poses, (..., axes) -> (..., joints); a row of NaN where the legs can't close.
+        """Compute joints for poses, (..., axes) -> (..., joints); a row of NaN where the legs can't close.
 
         Parameters
         ----------
@@ -216,7 +216,7 @@ class Machine:
         return result
 
     def follow(self, poses: ArrayLike, mode: str | None = None, free_below: float = EXACT) -> Array:
-        """Joints along a path, (N, axes) -> (N, joints), continuous: angles unwound, free ones as the neighbour's.
+        """Compute joints along a path, (N, axes) -> (N, joints), continuous: angles unwound, free ones as before.
 
         A turning joint that is free (the tool's axis within ``free_below`` rad of it) takes its value from the last
         pose where it was not, at the path's start from the first one to come; turns are counted on over ±180°. Where
@@ -229,7 +229,7 @@ class Machine:
         return follow_path(self.model, rows, self.checked_mode(mode), free_below)
 
     def forward(self, joints: ArrayLike, near: ArrayLike | None = None, method: str | None = None) -> Solution:
-        """Poses for joints, (..., joints) -> :class:`~.kinematics.forward.Solution`, with residual and verdict.
+        """Compute poses for joints, (..., joints) -> :class:`~.kinematics.forward.Solution`, with residual and verdict.
 
         Parameters
         ----------
@@ -250,7 +250,7 @@ class Machine:
         )
 
     def _starts(self, near: ArrayLike, lead: tuple[int, ...]) -> Array:
-        """Poses to start from as rows, as many as there are joint vectors."""
+        """Return poses to start from as rows, as many as there are joint vectors."""
         rows, own_lead = self.rows(near, self.axes, "near")
         if own_lead == lead:
             return rows
@@ -261,7 +261,7 @@ class Machine:
         return np.ascontiguousarray(wide.reshape(-1, len(self.axes)))
 
     def assemblies(self, joints: ArrayLike) -> Array:
-        """Every real pose of one joint vector, (k, axes); see :func:`~.kinematics.assemblies.find_assemblies`."""
+        """Find every real pose of one joint vector, (k, axes); see :func:`~.kinematics.assemblies.find_assemblies`."""
         rows, lead = self.rows(joints, self.joints, "joints")
         if lead != ():
             raise PoseError(f"joints: one vector ({len(self.joints)},) expected, not {(*lead, len(self.joints))}")
@@ -273,7 +273,7 @@ class Machine:
         return closure_tolerance(self.model)
 
     def sides(self, poses: Array) -> Array:
-        """The determinant whose sign tells the assembly mode, at rows of poses (n, axes): (n,)."""
+        """Compute the determinant whose sign tells the assembly mode, at rows of poses (n, axes): (n,)."""
         return find_sides(self.model, poses)
 
     @property
@@ -287,7 +287,9 @@ class Machine:
         return self.model.home_side
 
     def common_points(self, joints: Array, side: float) -> tuple[Array, Array]:
-        """Poses (n, axes) for rows of joints on one side of the spheres' centres, and what the legs fail to close, mm.
+        """Compute poses (n, axes) where the legs' spheres meet, on one side of their centres, for rows of joints.
+
+        Also what the legs fail to close there, mm.
 
         Raises :class:`NoMethodError` where :attr:`has_closed_forward` is false.
         """
@@ -298,11 +300,11 @@ class Machine:
         return poses, residual
 
     def tapes(self, mode: str) -> KinematicTapes:
-        """The kinematics in a working mode as programs, for interpreters of them such as the C of a controller."""
+        """Compile the kinematics in a working mode for other interpreters, such as the C of a controller."""
         return collect_tapes(self.model, mode)
 
     def jacobians(self, poses: ArrayLike, mode: str | None = None) -> tuple[Array, Array]:
-        """A and B, each (..., n, n), with A x' = B q' for the rates of pose and joints.
+        """Compute A and B, each (..., n, n), with A x' = B q' for the rates of pose and joints.
 
         Rows of legs are their closures' derivatives (a rod's vector, mm); the last two rows of a machine with driven
         head or table say that the tool's axis turns with the pose's. det A = 0 at a parallel singularity (or where the
@@ -315,7 +317,7 @@ class Machine:
         return both[:, : n * n].reshape(*lead, n, n), both[:, n * n :].reshape(*lead, n, m)
 
     def twist_rates(self, poses: Array, joints: Array, whole: bool = True) -> tuple[Array, Array, Array]:
-        """A and B (n, m, m) with A t' = B q' for the tool's twist t', and the legs' wrench norms (n, legs), mm.
+        """Compute A and B (n, m, m) with A t' = B q' for the tool's twist t', and the legs' wrench norms (n, legs), mm.
 
         Poses and joints are rows; see :class:`parakin.model.rates.TwistRates`. With ``whole`` a row is NaN if a number
         of it is not finite.
@@ -327,7 +329,7 @@ class Machine:
         return a, b, both[:, 2 * m * m :]
 
     def place_platform(self, pose: Array, mode: str, joints: Array | None = None) -> PlatformPlacement:
-        """The platform's frame for one pose (axes,), in a working mode or for the joints that a path takes there."""
+        """Find the platform's frame for a pose (axes,), in a working mode or for the joints that a path takes there."""
         with np.errstate(invalid="ignore", divide="ignore"):
             if joints is None:
                 return self.structure.place(list(pose), self.model.split_mode(mode)[1])
@@ -336,16 +338,16 @@ class Machine:
     # The same on scalars of any kind (:mod:`parakin.algebra`), for interpreters such as intervals.
 
     def trace_inverse(self, pose: Sequence[Scalar], mode: str) -> tuple[list[Scalar], PlatformPlacement, list[Inverse]]:
-        """Joints, the platform's placement, and each leg's inverse for a pose."""
+        """Trace joints, the platform's placement, and each leg's inverse for a pose."""
         return self.model.invert(pose, mode)
 
     def trace_margins(self, pose: Sequence[Scalar], mode: str, joints: Sequence[Scalar] | None = None) -> list[Scalar]:
-        """Every limit's margin, in the order of :attr:`limits`, for a pose and the given joints or its inverse."""
+        """Trace every limit's margin, in the order of :attr:`limits`, for a pose and given joints or its inverse."""
         own = self.model.own_margins(pose, mode) if joints is None else self.model.margins(pose, joints, mode)
         return [margin for _, margin in own]
 
     def trace_rates(self, pose: Sequence[Scalar], joints: Sequence[Scalar]) -> TwistRates:
-        """A and B of the tool's twist, and the legs' wrench norms."""
+        """Trace A and B of the tool's twist, and the legs' wrench norms."""
         return compute_twist_rates(self.spec, self.structure, pose, joints)
 
     # Limits.
@@ -357,7 +359,7 @@ class Machine:
         return rows
 
     def margins(self, poses: ArrayLike, joints: ArrayLike | None = None, mode: str | None = None) -> Array:
-        """Every limit's margin, (..., limits), ≥ 0 where it holds; units as in :attr:`limit_parts`.
+        """Compute every limit's margin, (..., limits), ≥ 0 where it holds; units as in :attr:`limit_parts`.
 
         ``joints`` may give those that a path really takes (turns counted, free angles held), else they are the
         inverse's. Margins that do not exist where a leg can't close are NaN.
@@ -379,7 +381,7 @@ class Machine:
         return out.reshape(*lead, count)
 
     def check(self, poses: ArrayLike, joints: ArrayLike | None = None, mode: str | None = None) -> Any:
-        """0 where a pose is allowed, else 1 + the index in :attr:`limits` of the first margin broken, (...,) int.
+        """Return 0 where a pose is allowed, else 1 + the index in :attr:`limits` of the first one broken, (...,) int.
 
         A pose that is not a number breaks the first limit. ``joints`` as in :meth:`margins`.
         """

@@ -116,12 +116,12 @@ def to_display(value: float, unit: str) -> float:
 
 
 def display_unit(unit: str) -> str:
-    """The unit's name on a display: ``deg`` for ``rad``."""
+    """Name the unit on a display: ``deg`` for ``rad``."""
     return "deg" if unit == "rad" else unit
 
 
 def is_reserved(name: str) -> bool:
-    """Whether a unit or a function has this name, so that a size can't have it."""
+    """Tell whether a unit or a function has this name, so that a size can't have it."""
     return name in _FUNCTIONS or name in _UNIT_WORDS
 
 

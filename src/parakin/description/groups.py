@@ -55,7 +55,7 @@ class LegGroup(FileSection):
 
 
 def _list_own_fields(leg: type[Leg]) -> list[Field[Any]]:
-    """The fields of a leg kind beside its drives."""
+    """List the fields of a leg kind beside its drives."""
     return [f for f in fields(leg) if f.name != "drives"]
 
 

@@ -257,5 +257,5 @@ class HomeSection(FileSection):
     C: AngleValue | None = None
 
     def get_pose(self) -> dict[str, float]:
-        """The given coordinates by axis name, mm and rad."""
+        """Return the given coordinates by axis name, mm and rad."""
         return {name: value for name, value in self if value is not None}

@@ -97,7 +97,7 @@ def _read_prose(value: object) -> str:
 
 
 def is_word(value: str) -> bool:
-    """Whether a text may name a machine, a size or a joint: a valid name in C and in G-code comments too."""
+    """Tell whether a text may name a machine, a size or a joint: a valid name in C and in G-code comments too."""
     return re.fullmatch(r"[A-Za-z][A-Za-z0-9_]{0,39}", value) is not None
 
 

@@ -25,7 +25,7 @@ def count_cores() -> int:
 
 @cache
 def _pool() -> ThreadPoolExecutor:
-    """The threads of this process, one a core."""
+    """Make the threads of this process, one a core."""
     return ThreadPoolExecutor(count_cores(), thread_name_prefix="parakin")
 
 

@@ -320,11 +320,11 @@ class Wrist:
     # The tapes, for other interpreters of them.
 
     def freedom_tape(self) -> Tape:
-        """Pose -> sin² of the angle off the pole."""
+        """Compile pose -> sin² of the angle off the pole."""
         return self.model.freedom_tape()
 
     def first_given_tape(self, mode: str) -> Tape:
-        """Pose, first joint -> joints."""
+        """Compile pose, first joint -> joints."""
         return self.model.inverse_with_first_tape(mode)
 
 

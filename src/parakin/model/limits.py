@@ -32,7 +32,7 @@ class Limit:
     bound: float = 0.0
 
     def value(self, margin: float) -> float:
-        """The bounded quantity for a margin; for a reach the margin itself."""
+        """Compute the bounded quantity for a margin; for a reach the margin itself."""
         if self.side == "reach":
             return margin
         return self.bound - margin if self.side == "max" else self.bound + margin

@@ -38,7 +38,7 @@ def list_closure_joints(spec: Spec) -> list[int]:
 def compute_twist_rates(
     spec: Spec, structure: Structure, pose: Sequence[Scalar], joints: Sequence[Scalar]
 ) -> TwistRates:
-    """A and B at a pose and its joints, scalars of any kind."""
+    """Compute A and B at a pose and its joints, scalars of any kind."""
     trace = Trace()
     n, m, legs = len(pose), len(joints), len(spec.legs)
     x, q = trace.inputs(n), trace.inputs(m, n)

@@ -1,5 +1,7 @@
-"""Intersect three spheres, or two circles in a coordinate plane: the direct problem, in closed form, of machines that
-only translate."""
+"""Intersection of three spheres, or of two circles in a coordinate plane.
+
+This is the direct problem, in closed form, of machines that only translate.
+"""
 
 from __future__ import annotations
 

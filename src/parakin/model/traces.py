@@ -54,7 +54,7 @@ class Model:
     def invert(
         self, pose: Sequence[Scalar], mode: str, first: Scalar | None = None
     ) -> tuple[list[Scalar], PlatformPlacement, list[Inverse]]:
-        """Joint vector, placement and each leg's inverse for a pose."""
+        """Compute the joint vector, placement and each leg's inverse for a pose."""
         signs, branch = self.split_mode(mode)
         placed = self.structure.place(pose, branch, first)
         points = platform_points(self.spec, placed.rotation, placed.origin)
@@ -68,7 +68,7 @@ class Model:
         return [by_name[drive.name] for drive in self.drives], placed, legs
 
     def margins(self, pose: Sequence[Scalar], joints: Sequence[Scalar], mode: str) -> list[tuple[Limit, Scalar]]:
-        """Every limit with its margin, for a pose and the joints that a path takes there."""
+        """List every limit with its margin, for a pose and the joints that a path takes there."""
         signs, _ = self.split_mode(mode)
         placed = self.structure.place_with_joints(pose, self._serial(joints))
         points = platform_points(self.spec, placed.rotation, placed.origin)
@@ -76,7 +76,7 @@ class Model:
         return self._margins(placed, joints, legs)
 
     def own_margins(self, pose: Sequence[Scalar], mode: str) -> list[tuple[Limit, Scalar]]:
-        """Every limit with its margin, for a pose and its inverse."""
+        """List every limit with its margin, for a pose and its inverse."""
         joints, placed, legs = self.invert(pose, mode)
         return self._margins(placed, joints, legs)
 
@@ -88,7 +88,7 @@ class Model:
         return list_limits(self.spec, placed, coordinates, joints, [leg.reach for leg in legs], home)
 
     def closures(self, rotation: Sequence[Vec], origin: Vec, joints: Sequence[Scalar]) -> list[Scalar]:
-        """Every leg's closure, mm²."""
+        """List every leg's closure, mm²."""
         points = platform_points(self.spec, rotation, origin)
         given = leg_joints(self.spec, joints)
         return [f for leg, p, q in zip(self.spec.legs, points, given, strict=True) for f in leg.closures(p, q)]
@@ -185,16 +185,16 @@ class Model:
         return list(joints[len(self.drives) - self.serial :])
 
     def inverse_tape(self, mode: str) -> Tape:
-        """pose -> joints."""
+        """Compile pose -> joints."""
         return self._tape(("inverse", mode), self._poses, lambda t: self.invert(t.inputs(self._poses), mode)[0])
 
     def inverse_with_first_tape(self, mode: str) -> Tape:
-        """pose, first joint of the wrist -> joints, for poses where that joint is free."""
+        """Compile pose, first joint of the wrist -> joints, for poses where that joint is free."""
         n = self._poses
         return self._tape(("inverse with first", mode), n + 1, lambda t: self.invert(t.inputs(n), mode, t.input(n))[0])
 
     def freedom_tape(self) -> Tape:
-        """pose -> sin² of the tool axis against the first turning axis of head and table; 1 where there is none."""
+        """Compile pose -> sin² of the tool axis against the first axis of head and table; 1 where there is none."""
 
         def outputs(trace: Trace) -> list[Scalar]:
             placed = self.structure.place(trace.inputs(self._poses), self.structure.branches)
@@ -203,7 +203,7 @@ class Model:
         return self._tape(("freedom",), self._poses, outputs)
 
     def begin_tape(self, from_poses: bool = True) -> Tape:
-        """pose (or coordinates as they are), joints -> the motion's coordinates to start from."""
+        """Compile pose (or coordinates as they are), joints -> the motion's coordinates to start from."""
         width = self._poses if from_poses else self._motions
 
         def outputs(trace: Trace) -> list[Scalar]:
@@ -215,7 +215,7 @@ class Model:
         return self._tape(("begin", from_poses), width + len(self.drives), outputs)
 
     def end_tape(self, to_poses: bool = True) -> Tape:
-        """coordinates, joints -> pose (or coordinates as they are)."""
+        """Compile coordinates, joints -> pose (or coordinates as they are)."""
 
         def outputs(trace: Trace) -> list[Scalar]:
             coordinates, joints = self._coordinates_and_joints(trace)
@@ -233,7 +233,7 @@ class Model:
         return [first, *others]
 
     def newton_tape(self, derivatives: bool) -> Tape:
-        """coordinates, joints -> closures in mm, and then, if wanted, their derivatives by the coordinates.
+        """Compile coordinates, joints -> closures in mm, and then, if wanted, their derivatives by the coordinates.
 
         The closures come in the order in which elimination at home needs no exchange.
         """
@@ -247,7 +247,7 @@ class Model:
         return self._tape(("newton", derivatives), self._motions + len(self.drives), outputs)
 
     def scaled_closures(self, coordinates: Sequence[Scalar], joints: Sequence[Scalar]) -> list[Scalar]:
-        """Every leg's closure in mm, from the motion's coordinates."""
+        """Compute every leg's closure in mm, from the motion's coordinates."""
         closures = self.closures(*self.structure.frame(coordinates), joints)
         return [c * (1.0 / size) for c, size in zip(closures, self.sizes, strict=True)]
 
@@ -270,7 +270,7 @@ class Model:
         return order
 
     def legs_tape(self, mode: str) -> Tape:
-        """coordinates -> the legs' joints, in the joint vector's order, and their derivatives by the coordinates."""
+        """Compile coordinates -> the legs' joints, in the order of the joint vector, and their derivatives."""
 
         def outputs(trace: Trace) -> list[Scalar]:
             coordinates = list(trace.inputs(self._motions))
@@ -287,7 +287,7 @@ class Model:
         return self._tape(("legs", mode), self._motions, outputs)
 
     def margins_tape(self, mode: str) -> Tape:
-        """pose, joints -> every margin, in the order of :attr:`limits`."""
+        """Compile pose, joints -> every margin, in the order of :attr:`limits`."""
 
         def outputs(trace: Trace) -> list[Scalar]:
             pose, joints = self._pose_and_joints(trace)
@@ -296,7 +296,7 @@ class Model:
         return self._tape(("margins", mode), self._poses + len(self.drives), outputs)
 
     def check_tape(self, mode: str) -> Tape:
-        """pose -> every margin, with the inverse in between."""
+        """Compile pose -> every margin, with the inverse in between."""
 
         def outputs(trace: Trace) -> list[Scalar]:
             return [margin for _, margin in self.own_margins(trace.inputs(self._poses), mode)]
@@ -304,7 +304,7 @@ class Model:
         return self._tape(("check", mode), self._poses, outputs)
 
     def jacobian_tape(self) -> Tape:
-        """pose, joints -> A (n·n) and B (n·n) with A x' = B q'."""
+        """Compile pose, joints -> A (n·n) and B (n·n) with A x' = B q'."""
 
         def outputs(trace: Trace) -> list[Scalar]:
             pose, joints = self._pose_and_joints(trace)
@@ -316,7 +316,7 @@ class Model:
         return self._tape(("jacobian",), self._poses + len(self.drives), outputs)
 
     def rates_tape(self) -> Tape:
-        """pose, joints -> A (n·n), B (n·n) and the legs' wrench norms: see :mod:`parakin.model.rates`."""
+        """Compile pose, joints -> A (n·n), B (n·n) and the legs' wrench norms: see :mod:`parakin.model.rates`."""
 
         def outputs(trace: Trace) -> list[Scalar]:
             twist = compute_twist_rates(self.spec, self.structure, *self._pose_and_joints(trace))
@@ -325,7 +325,7 @@ class Model:
         return self._tape(("rates",), self._poses + len(self.drives), outputs)
 
     def spheres_tape(self, side: float | None) -> Tape:
-        """joints -> pose, on the given side of the centres' plane, then the closures there, mm.
+        """Compile joints -> pose, on the given side of the centres' plane, then the closures there, mm.
 
         With None: joints, near pose -> the same, on the pose's side.
         """
@@ -342,12 +342,12 @@ class Model:
         return self._tape(("spheres", side), len(self.drives) + (self._poses if side is None else 0), outputs)
 
     def spheres(self, joints: Sequence[Scalar], side: float | None, near: Vec | None = None) -> list[Scalar]:
-        """The motion's coordinates by the common point of the legs' spheres; ``near`` picks the nearer of two."""
+        """Find the motion's coordinates by the common point of the legs' spheres; ``near`` picks the nearer of two."""
         centres, radii, plane = self._spheres(joints)
         return self.structure.coordinates_at(find_common_point(centres, radii, plane, side, near))
 
     def _spheres(self, joints: Sequence[Scalar]) -> tuple[list[Vec], list[Scalar], list[int]]:
-        """Centres and radii of the spheres on which the platform's origin lies, and the coordinates it moves in."""
+        """Find centres and radii of the spheres that hold the platform's origin, and the coordinates it moves in."""
         centres, radii = [], []
         for leg, q in zip(self.spec.legs, leg_joints(self.spec, joints), strict=True):
             sphere = leg.sphere(q)

@@ -86,11 +86,11 @@ class Atlas:
         return compute_singularity_margins(self.machine, self.isotropic, length, region.mode)[:, 0]
 
     def extreme(self, quantity: str, side: ExtremeSide) -> Extreme:
-        """One of :attr:`extremes`: of ``condition``, ``greatest``, ``least``, ``manipulability`` or of a margin."""
+        """Return one of :attr:`extremes`, of ``condition``, ``greatest``, ``least``, ``manipulability`` or a margin."""
         return next(e for e in self.extremes if e.quantity == quantity and e.side == side)
 
     def isotropic_on(self, drawn: PerformanceMap) -> Array:
-        """The isotropic poses that lie on a slice, (k, axes)."""
+        """Find the isotropic poses that lie on a slice, (k, axes)."""
         off = np.zeros(len(self.isotropic))
         for axis, value in drawn.region.fixed_axes.items():
             off = np.maximum(off, np.abs(self.isotropic[:, self.machine.axes.index(axis)] - value))

@@ -23,7 +23,7 @@ _SHORTEST = 1e-3  # s
 
 
 def joint_letters(machine: Machine) -> tuple[str, ...]:
-    """The letter of each joint: linear ones X Y Z U V W, turning ones A B C, in their order.
+    """Assign a letter to each joint: linear ones X Y Z U V W, turning ones A B C, in their order.
 
     Raises :class:`PoseError` where there are more joints than letters.
     """

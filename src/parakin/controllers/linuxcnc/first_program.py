@@ -50,7 +50,7 @@ def _find_square(machine: Machine) -> Array:
 
 
 def _is_allowed(machine: Machine, poses: Array) -> bool:
-    """Whether every limit is kept on the way from pose to pose, by joints that count their turns."""
+    """Tell whether every limit is kept on the way from pose to pose, by joints that count their turns."""
     share = np.linspace(0.0, 1.0, _POINTS)[:, None, None]
     between = (poses[:-1] + share * np.diff(poses, axis=0)).swapaxes(0, 1).reshape(-1, len(machine.axes))
     return not machine.check(between, machine.follow(between)).any()

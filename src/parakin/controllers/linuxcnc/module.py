@@ -49,7 +49,7 @@ static inline double angle_of(double y, double x) { return atan2(y + 0.0, x + 0.
 
 
 def kinematics_name(machine: Machine) -> str:
-    """The module's name; of LinuxCNC's own only ``xyzab_tdr_kins`` is built likewise."""
+    """Name the kinematics module; of LinuxCNC's own only ``xyzab_tdr_kins`` is built likewise."""
     return f"{machine.name}_kins"
 
 
@@ -206,7 +206,7 @@ def _compile_limits(machine: Machine) -> Tape:
 
 
 def bounds_drive(machine: Machine, limit: Limit) -> bool:
-    """Whether a limit is one end of a drive's range."""
+    """Tell whether a limit is one end of a drive's range."""
     return limit.side != "reach" and limit.subject in {
         f"{what} {name}" for name in machine.joints for what in ("leg", "joint")
     }

@@ -54,7 +54,7 @@ class Scene:
     normal: Points | None
 
     def of(self, *kinds: SceneKind) -> tuple[ScenePart, ...]:
-        """The parts of these kinds."""
+        """List the parts of these kinds."""
         return tuple(part for part in self.parts if part.kind in kinds)
 
     @property

@@ -132,5 +132,5 @@ def _find_ends(curve: ThinnedCurve) -> tuple[float, float]:
 
 
 def _display_scale(machine: Machine, number: int) -> tuple[str, float]:
-    """A joint's unit for people, and the factor of its values."""
+    """Return a joint's unit for people, and the factor of its values."""
     return ("°", degrees(1.0)) if machine.joint_units[number] == "rad" else ("mm", 1.0)

@@ -25,7 +25,10 @@ DEGREES = 180.0 / math.pi
 
 
 def joint_columns(posted: Posted) -> list[str]:
-    """The table's column names, with units: ``record``, ``line``, ``X [mm]``, ..., ``d1 [mm]``, ..., ``broken``."""
+    """Name the table's columns, with units.
+
+    They are ``record``, ``line``, ``X [mm]``, ..., ``d1 [mm]``, ..., ``broken``.
+    """
     machine = posted.machine
     names = zip((*machine.axes, *machine.joints), _units(posted), strict=True)
     moving = [f"{name} [{display_unit(unit)}]" for name, unit in names]

@@ -35,7 +35,7 @@ class PoseTable:
     solution: Solution | None = None
 
     def columns(self, side: ColumnGroup) -> tuple[tuple[str, ...], tuple[str, ...], Array]:
-        """Names, units and values (n, columns) of the poses or of the joints."""
+        """Return names, units and values (n, columns) of the poses or of the joints."""
         machine = self.machine
         if side == "pose":
             return machine.axes, machine.axis_units, self.poses

@@ -22,7 +22,7 @@ _KINDS = (("", ""), (" speed", "/s"), (" acceleration", "/s2"))  # of a joint's 
 
 
 def setpoint_columns(trajectory: Trajectory) -> list[str]:
-    """The columns' names: time, the joints, their speeds and accelerations, the axes.
+    """Name the columns: time, the joints, their speeds and accelerations, the axes.
 
     ``time [s]``; ``d1 [mm]``, ...; ``d1 speed [mm/s]``, ...; ``d1 acceleration [mm/s2]``, ...; ``X [mm]``, ...
     """

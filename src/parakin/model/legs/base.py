@@ -43,28 +43,34 @@ class Leg(ABC):
 
     @abstractmethod
     def closures(self, point: Vec, joints: list[Scalar]) -> list[Scalar]:
-        """Closures f(point, q) = 0 of the leg, one for each joint; smooth, without roots or quotients of their own."""
+        """Return closures f(point, q) = 0 of the leg, one for each joint.
+
+        They are smooth, without roots or quotients of their own.
+        """
 
     @abstractmethod
     def inverse(self, point: Vec, signs: str) -> Inverse:
-        """Joints that close the leg, in the working mode ``signs``; NaN where none do."""
+        """Compute the joints that close the leg, in the working mode ``signs``; NaN where none do."""
 
     @abstractmethod
     def struts(self, point: Vec, joints: list[Scalar]) -> list[tuple[Vec, Vec]]:
-        """Both ends of each strut, base frame, the foot's end first; the strut to the platform comes first."""
+        """Return both ends of each strut, base frame, the foot's end first; the strut to the platform comes first."""
 
     def assembly_margins(self, point: Vec, joints: list[Scalar]) -> tuple[Scalar, ...]:
-        """Margins ≥ 0 where a leg closes as it is built; its closures may be zero elsewhere too."""
+        """Return margins ≥ 0 where a leg closes as it is built; its closures may be zero elsewhere too."""
         return ()
 
     def fixed_foot(self) -> Vec | None:
-        """The foot of a leg if it does not move; no clearance is kept between legs that share it."""
+        """Return the foot of a leg if it does not move; no clearance is kept between legs that share it."""
         return None
 
     def size(self, at_home: float) -> float:
-        """A length, mm, that the leg seldom falls below; it turns closures into distances. ``at_home``: at home."""
+        """Return a length, mm, that the leg seldom falls below.
+
+        It turns closures into distances. ``at_home``: the leg's length at home.
+        """
         return at_home
 
     def sphere(self, joints: list[Scalar]) -> tuple[Vec, Scalar] | None:
-        """Centre and radius of the sphere on which the platform's joint lies; None if the leg holds it otherwise."""
+        """Return centre and radius of the sphere that the platform's joint lies on; None if there is no such sphere."""
         return None

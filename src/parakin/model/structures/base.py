@@ -71,7 +71,7 @@ class Structure(ABC):
 
     @abstractmethod
     def place(self, pose: Sequence[Scalar], branch: str, first: Scalar | None = None) -> PlatformPlacement:
-        """The platform for a pose; ``first`` gives the first serial joint where it is free."""
+        """Place the platform for a pose; ``first`` gives the first serial joint where it is free."""
 
     @property
     def tool_rotation(self) -> Mat:
@@ -84,35 +84,37 @@ class Structure(ABC):
         return UNIT["tz"]
 
     def turn_first_axis(self, pose: Sequence[Scalar]) -> Mat:
-        """The rotation in M of the frame that carries the first axis of :attr:`pointing`."""
+        """Compute the rotation in M of the frame that carries the first axis of :attr:`pointing`."""
         return IDENTITY
 
     @abstractmethod
     def frame(self, coordinates: Sequence[Scalar]) -> tuple[Mat, Vec]:
-        """The platform's frame in the base for the motion's coordinates."""
+        """Compute the platform's frame in the base for the motion's coordinates."""
 
     def place_with_joints(self, pose: Sequence[Scalar], serial: Sequence[Scalar]) -> PlatformPlacement:
-        """As :meth:`place`, for the serial joints that a path takes there, whatever their working mode."""
+        """Place the platform for the serial joints that a path takes there, whatever their working mode."""
         return replace(self.place(pose, self.branches), serial=list(serial))
 
     def coordinates_at(self, origin: Vec) -> list[Scalar]:
-        """The motion's coordinates for the platform's origin in the base, of a motion without turns."""
+        """Find the motion's coordinates for the platform's origin in the base, of a motion without turns."""
         return list(origin)
 
     def coordinates_of(self, rotation: Mat, origin: Vec) -> list[Scalar]:
-        """The motion's coordinates for the platform's frame in the base."""
+        """Find the motion's coordinates for the platform's frame in the base."""
         return self.coordinates_at(origin)
 
     @abstractmethod
     def pose(self, coordinates: Sequence[Scalar], serial: Sequence[Scalar]) -> list[Scalar]:
-        """The tool's pose; at a vertical tool axis C is 0."""
+        """Compute the tool's pose; at a vertical tool axis C is 0."""
 
     @abstractmethod
     def closure(
         self, pose: Sequence[Scalar], serial: Sequence[Scalar], turn: Sequence[Scalar] = ()
     ) -> tuple[Mat, Vec, list[Scalar]]:
-        """The platform's frame from pose and serial joints without any quotient that a singular head would spoil,
-        and what is 0 where head and table point the tool along the pose's axis.
+        """Compute the platform's frame from pose and serial joints, and the closures of head and table.
+
+        There is no quotient in it that a singular head would spoil. The closures are 0 where head and table point the
+        tool along the pose's axis.
 
         ``turn`` turns the tool on about its tip, to the first order, by small angles named in :attr:`turns`: they have
         rates where the pose's own angles have none.

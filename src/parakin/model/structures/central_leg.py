@@ -68,7 +68,7 @@ class CentralLeg(FiveAxis):
         self.swing = Pointing(self.swing.first, self.swing.second, (0.0, 0.0, self.sign))
 
     def _wrist_centre(self) -> tuple[float, float]:
-        """(h, l): the point (0, 0, h) of the platform lies at the tip + l·k in every position of the head."""
+        """Find (h, l): the point (0, 0, h) of the platform lies at the tip + l·k in every position of the head."""
         poses = [(0.0, 0.0), (0.7, 0.4), (-1.1, 0.9), (0.3, -1.3)]
         frames = [compose_chain(self.spec.head, angles[2 - self.head_joints :]) for angles in poses]
         tips = [tip for _, tip in frames]
@@ -85,7 +85,7 @@ class CentralLeg(FiveAxis):
         return to_local(self.mount, self.base, move_along(tuple(tip), k, self.reach))
 
     def _hung(self, tip: Sequence[Scalar], k: Vec) -> tuple[Vec, Vec, Scalar]:
-        """The central leg's direction, the platform's origin, and tz, for a tip and a tool axis."""
+        """Find the central leg's direction, the platform's origin, and tz, for a tip and a tool axis."""
         centre = self._centre(tip, k)
         distance = norm(centre)
         direction = scale(centre, 1.0 / distance)
@@ -93,7 +93,7 @@ class CentralLeg(FiveAxis):
         return direction, origin, self.sign * distance - self.above
 
     def _swing(self, tip: Sequence[Scalar], k: Vec) -> tuple[Mat, Vec, Scalar, list[Scalar]]:
-        """Rotation of the central leg's two turns, the platform's origin, tz, and both turns' angles."""
+        """Find the rotation of the central leg's two turns, the platform's origin, tz, and both turns' angles."""
         direction, origin, tz = self._hung(tip, k)
         found = self.swing.solve(direction, "+")
         rotation = IDENTITY
@@ -139,7 +139,7 @@ class CentralLeg(FiveAxis):
         return [*world, b, c]
 
     def _inside(self, coordinates: Sequence[Scalar]) -> Iterator[Scalar]:
-        """What is ≥ 0 where :meth:`place` would give these coordinates back."""
+        """Compute what is ≥ 0 where :meth:`place` would give these coordinates back."""
         yield self.sign * (coordinates[-1] + self.above)
         if not self.roll:
             s, c = sincos(coordinates[1])
@@ -168,8 +168,11 @@ class CentralLeg(FiveAxis):
         return rotation, origin, self._tilt_rows(pose, turn, pointed)
 
     def _rolled(self, tip: Sequence[Scalar], k: Vec, w: Vec) -> tuple[Mat, Vec, list[Scalar]]:
-        """The platform turned about the central leg so that ``w``, the tool's axis in it, stands over k; its own turn
-        takes one of the two conditions. No angle of the central leg is needed, which would be free where it hangs."""
+        """Turn the platform about the central leg so that ``w``, the tool's axis in it, stands over k.
+
+        Its own turn takes one of the two conditions. No angle of the central leg is needed, which would be free where
+        it hangs.
+        """
         direction, origin, _ = self._hung(tip, k)
         z, k = scale(direction, self.sign), apply(transpose(self.mount), k)
         across = cross(z, k)

@@ -11,19 +11,19 @@ _DIRECTION = DirectionColumns(3, 4)
 
 
 def tool_axis(b: Scalar, c: Scalar) -> tuple[Vec, Vec, Vec]:
-    """The tool's axis k = Rz(C)·Ry(B)·z, and two directions at right angles to it."""
+    """Compute the tool's axis k = Rz(C)·Ry(B)·z, and two directions at right angles to it."""
     sb, cb = sincos(b)
     sc, cc = sincos(c)
     return (sb * cc, sb * sc, cb), (cb * cc, cb * sc, -sb), (-sc, cc, 0.0)
 
 
 def axis_angles(k: Vec) -> list[Scalar]:
-    """B in [0, π] and C of a tool axis (FME Transactions 41, (8) and (9)); C is 0 where it is free."""
+    """Compute B in [0, π] and C of a tool axis (FME Transactions 41, (8) and (9)); C is 0 where it is free."""
     return [atan2(sqrt(k[0] * k[0] + k[1] * k[1]), k[2]), atan2(k[1], k[0])]
 
 
 def turned_axis(pose: Sequence[Scalar], turn: Sequence[Scalar] = ()) -> tuple[Vec, Vec, Vec]:
-    """A pose's tool axis k and its two directions, all turned on by small angles towards these."""
+    """Turn a pose's tool axis k and its two directions by small angles towards these."""
     k, e1, e2 = tool_axis(*pose[_DIRECTION.pair])
     if not turn:
         return k, e1, e2

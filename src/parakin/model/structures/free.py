@@ -88,7 +88,7 @@ class Free(Structure):
         return rotation, tuple(o if letter in given else 0.0 for o, letter in zip(origin, "XYZ", strict=True))
 
     def coordinates_of(self, rotation: Mat, origin: Vec) -> list[Scalar]:
-        """The pose X Y Z A B C of a platform's frame; B in [-90°, 90°]."""
+        """Compute the pose X Y Z A B C of a platform's frame; B in [-90°, 90°]."""
         r = product(product(self.mount, rotation), self.tool)
         tip = add(apply(self.mount, add(origin, apply(rotation, self.tip))), self.base)
         b = atan2(-r[2][0], sqrt(r[0][0] * r[0][0] + r[1][0] * r[1][0]))
@@ -102,7 +102,7 @@ class Free(Structure):
         return list(coordinates)
 
     def _small(self, turn: Sequence[Scalar]) -> Mat:
-        """Rotation by small angles about the axes that the platform turns about."""
+        """Compute the rotation by small angles about the axes that the platform turns about."""
         given = dict(zip(self.turns, turn, strict=True))
         x, y, z = (given.get(name, 0.0) for name in ("wx", "wy", "wz"))
         return ((1.0, -z, y), (z, 1.0, -x), (-y, x, 1.0))

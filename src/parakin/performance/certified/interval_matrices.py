@@ -77,7 +77,7 @@ class PoseBox:
         return np.stack(np.meshgrid(*lines, indexing="ij"), -1).reshape(-1, d) if d else np.zeros((1, 0))
 
     def poses(self, points: Array) -> Array:
-        """Whole poses (N, axes) at points (N, d) of the box."""
+        """Compute whole poses (N, axes) at points (N, d) of the box."""
         rows = np.empty((len(points), len(self.machine.axes)))
         for i, axis in enumerate(self.machine.axes):
             rows[:, i] = points[:, list(self.spans).index(axis)] if axis in self.spans else self.fixed_axes[axis]

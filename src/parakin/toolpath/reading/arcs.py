@@ -20,8 +20,9 @@ _OPPOSITE = 1e-6  # rad: axes this close to opposite have no definite plane
 
 
 def find_arc_normal(start: Array, end: Array, centre: Array, tangent: Array) -> Array:
-    """Find the unit normal (3,) of the circle through start and end about centre, turned so that the motion, which is
-    right-handed about it, starts along the tangent.
+    """Find the unit normal (3,) of the circle through start and end about centre, for a motion along the tangent.
+
+    The motion is right-handed about the normal and starts along the tangent.
 
     start, end, centre, tangent : (3,)
     """
@@ -53,8 +54,9 @@ def interpolate_arc(
     helix: bool,
     turns: int = 0,
 ) -> tuple[Array, Array]:
-    """Divide an arc into points (k, 3) after its start, the last one ``end`` itself; with the fraction of the turn at
-    each (k,). The points between lie on the circle of the given centre and radius exactly.
+    """Divide an arc into points (k, 3) after its start, with the fraction of the turn at each (k,).
+
+    The last one is ``end`` itself. The points between lie on the circle of the given centre and radius exactly.
 
     start, end, centre : (3,); normal : (3,) unit, the motion is right-handed about it
     tolerance : largest distance of a chord from the arc
@@ -89,8 +91,9 @@ def interpolate_spiral(
     tolerance: float,
     end: Array,
 ) -> tuple[Array, Array]:
-    """Divide a circle, helix or slight spiral into points (k, 3) after its start, the last one ``end`` itself; with the
-    fraction of the turn at each (k,).
+    """Divide a circle, helix or slight spiral into points (k, 3), with the fraction of the turn at each (k,).
+
+    They come after its start; the last one is ``end`` itself.
 
     basis : unit vectors (3,) at right angles: towards the start, along the motion there, along the axis of the turn
     radii, heights : at start and end; both grow with the turn

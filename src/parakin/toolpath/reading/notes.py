@@ -21,6 +21,6 @@ class NoteBook:
         kind[1] += count
 
     def list_notes(self) -> tuple[Note, ...]:
-        """All notes in the order of their lines."""
+        """List all notes in the order of their lines."""
         notes = [Note(line, text if n == 1 else f"{text} ({n} times)") for text, (line, n) in self._kinds.items()]
         return tuple(sorted(notes))

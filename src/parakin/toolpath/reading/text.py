@@ -68,5 +68,5 @@ def parse_number(token: str) -> float:
 
 
 def is_number(token: str) -> bool:
-    """Whether :func:`parse_number` can read a token, its size aside."""
+    """Tell whether :func:`parse_number` can read a token, its size aside."""
     return _NUMBER.fullmatch(token.strip()) is not None

@@ -147,7 +147,7 @@ class Region:
             subdivision.refine(np.arange(count))
 
     def poses(self, positions: Array, orientations: Array | None = None) -> Array:
-        """Whole poses (N, axes) at positions (N, d) with values of the swept axes (N, s), in their order."""
+        """Compute whole poses (N, axes) at positions (N, d) with values of the swept axes (N, s), in their order."""
         rows = np.empty((len(positions), len(self.machine.axes)))
         for axis, value in self.fixed_axes.items():
             rows[:, self.machine.axes.index(axis)] = value
@@ -240,7 +240,7 @@ def _refuse_bad_value(axis: str, value: float, turning: Sequence[str]) -> None:
 
 
 def _find_ignored_limits(machine: Machine, patterns: Sequence[str]) -> tuple[str, ...]:
-    """Names of the limits that match, but for the legs' reach; a pattern that matches nothing else is refused."""
+    """Find the limits that match, but for the legs' reach; a pattern that matches nothing else is refused."""
     ignored: list[str] = []
     for pattern in patterns:
         matching = [name for name in machine.limits if fnmatchcase(name, pattern)]

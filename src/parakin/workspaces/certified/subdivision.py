@@ -60,7 +60,7 @@ class Cells:
         return self.limit < 0
 
     def total(self, fractions: Array) -> float:
-        """The volume that fractions of the cells are together, mm³ (mm² in the plane)."""
+        """Sum the volume that fractions of the cells are together, mm³ (mm² in the plane)."""
         return float(np.dot(fractions, self.volumes))
 
     @property

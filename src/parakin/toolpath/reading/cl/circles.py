@@ -106,7 +106,7 @@ def decide_hand(arc: OpenArc, leaving: int) -> int:
 
 
 def measure_turn(circle: Circle, start: Triple, end: Triple, hand: int) -> float:
-    """The angle from start to end about a circle's axis in (0, 2π], rad."""
+    """Measure the angle from start to end about a circle's axis in (0, 2π], rad."""
     a, b = np.array(start) - circle.centre, np.array(end) - circle.centre
     normal = hand * circle.axis
     turn = math.atan2(float(np.cross(a, b) @ normal), float(a @ b - (a @ normal) * (b @ normal)))
@@ -139,7 +139,7 @@ def settle_sweep(circle: Circle, start: Triple, end: Triple) -> tuple[int, int]:
 
 
 def follow_circle(circle: Circle, here: Triple, point: Triple, arc_step: tuple[int, float], scale: float) -> bool:
-    """Whether a point goes on along the circle of the arc before it; False for a line to it.
+    """Tell whether a point goes on along the circle of the arc before it; False for a line to it.
 
     Some systems write several points on an arc. A line to a point of the same circle is told by its other step.
 

@@ -106,7 +106,7 @@ def parse_cycle(args: Sequence[str], dialect: Dialect) -> DrillCycle:
 
 
 def _parse_depth(values: dict[str, float], dialect: Dialect) -> float:
-    """The depth below the hole's point, by the dialect's sense of FEDTO."""
+    """Compute the depth below the hole's point, by the dialect's sense of FEDTO."""
     if "DEPTH" in values:
         if values["DEPTH"] < 0.0:
             refuse(f"a DEPTH below zero; it is a distance below the point in {_FORM}")

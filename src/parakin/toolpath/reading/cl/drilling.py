@@ -48,7 +48,7 @@ def drill_hole(motion: ClMotion, cycle: DrillCycle, hole: Triple, axis_before: T
 
 
 def _find_way_out(motion: ClMotion, cycle: DrillCycle, hole: Triple) -> float:
-    """The height above the hole that the tool withdraws to."""
+    """Find the height above the hole that the tool withdraws to."""
     if cycle.retract is not None:
         return cycle.retract
     start, axis = motion.cycle_start, motion.axis
@@ -58,7 +58,7 @@ def _find_way_out(motion: ClMotion, cycle: DrillCycle, hole: Triple) -> float:
 
 
 def _list_strokes(cycle: DrillCycle, gap: float) -> list[tuple[float, bool]]:
-    """The heights from the clearance to the depth, each with whether it is reached in rapid."""
+    """List the heights from the clearance to the depth, each with whether it is reached in rapid."""
     strokes: list[tuple[float, bool]] = []
     if cycle.kind in ("deep", "break"):
         # pecks count from the hole's point; the first one goes through the air above it too

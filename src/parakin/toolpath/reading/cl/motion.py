@@ -167,7 +167,7 @@ class ClMotion:
         self.set_feed(self.feed_value, None)
 
     def _relate_to_first_frame(self, scale: float, line: int) -> tuple[Array | None, Array]:
-        """The turn (3, 3) or None and the shift (3,) in mm from the frame in force to that of the first record."""
+        """Compute the change from the frame in force to the first record's: turn (3, 3) or None, shift (3,) in mm."""
         turn, shift = self.origin_turn, np.zeros(3)
         if not self.records.n:
             return turn, shift
@@ -249,14 +249,14 @@ class ClMotion:
     # circles
 
     def _follows_arc(self, tip: Triple) -> bool:
-        """Whether a point goes on along the last arc."""
+        """Tell whether a point goes on along the last arc."""
         if self.arc_step is None or self.rapid or self.position is None:
             return False
         circle, hand, step = self.arc_step
         return follow_circle(circle, self.position, tip, (hand, step), self.transform.scale)
 
     def _find_heading(self) -> Array | None:
-        """The motion (3,) that the last cut ended with; None if there is none in the frame in force."""
+        """Find the motion (3,) that the last cut ended with; None if there is none in the frame in force."""
         records, n = self.records, self.records.n
         if self.arc_end[0] == n and n:
             return self.arc_end[1]

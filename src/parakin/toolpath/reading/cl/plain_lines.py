@@ -44,7 +44,7 @@ class AxisState(NamedTuple):
 
 @njit(cache=True, nogil=True, inline="always")
 def _begins_modal_word(buffer: NDArray[np.uint8], p: int) -> Any:
-    """Whether FEDRAT, RAPID or PAINT begins at p, where at least six bytes are left."""
+    """Tell whether FEDRAT, RAPID or PAINT begins at p, where at least six bytes are left."""
     a, b, c, d, e = (
         buffer[_AT(p)] | _LOWER,
         buffer[_AT(p + 1)] | _LOWER,
@@ -61,7 +61,7 @@ def _begins_modal_word(buffer: NDArray[np.uint8], p: int) -> Any:
 
 @njit(cache=True, nogil=True, inline="always")
 def _spells_goto(a: int, b: int, c: int, d: int) -> Any:
-    """Whether four bytes are GOTO, in capitals or not."""
+    """Tell whether four bytes are GOTO, in capitals or not."""
     return (a | _LOWER) == _G and (b | _LOWER) == _O and (c | _LOWER) == _T and (d | _LOWER) == _O
 
 

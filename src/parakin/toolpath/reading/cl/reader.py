@@ -208,7 +208,7 @@ class ClReader:
         )
 
     def _take_frame(self) -> Array | None:
-        """The workpiece's frame (3, 4) in the machine that the path has, named in a note."""
+        """Return the workpiece's frame (3, 4) in the machine that the path has, named in a note."""
         motion = self.motion
         if motion.first_frame is None:
             return None
@@ -237,7 +237,7 @@ class ClReader:
             at = end + 1
 
     def _may_read_plain_lines(self) -> bool:
-        """Whether the next line depends on no line before it."""
+        """Tell whether the next line depends on no line before it."""
         motion = self.motion
         within = self.continued or self.matrix is not None or motion.circle or motion.cycle or motion.open_arc
         return not (within or self.actions.finished)

@@ -20,13 +20,14 @@ _ACTING = tuple(name for name, word in WORDS.items() if word.act is not None and
 
 
 def ends_text(begun: str, text: str) -> bool:
-    """Whether a message with a trailing $ ends there all the same, because the line after it is motion."""
+    """Tell whether a message with a trailing $ ends there all the same, because the line after it is motion."""
     return _TEXT.match(begun) is not None and _NO_TEXT.match(text) is not None
 
 
 def execute_statement(actions: ClActions, text: str, line: int) -> str:
-    """Act on a whole statement that begins at a line; return its word. Errors name no file, and a line only of another
-    statement. HIDDEN begins a statement that a comment hides.
+    """Act on a whole statement that begins at a line; return its word.
+
+    Errors name no file, and a line only of another statement. HIDDEN begins a statement that a comment hides.
     """
     hidden = text.startswith(HIDDEN)
     text = text.removeprefix(HIDDEN)
@@ -85,7 +86,7 @@ def _find_meant(name: str) -> str | None:
 
 
 def _is_slip(name: str, word: str) -> bool:
-    """Whether two words are one slip of the pen apart."""
+    """Tell whether two words are one slip of the pen apart."""
     shorter, longer = sorted((name, word), key=len)
     if len(longer) - len(shorter) > 1:
         return False

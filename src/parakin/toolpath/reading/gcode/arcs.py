@@ -56,8 +56,9 @@ def centre_from_radius(start: Flat, end: Flat, radius: float, clockwise: bool) -
 def interpolate_g_arc(
     start: list[float], end: list[float], arc: ArcMotion, *, inches: bool, tolerance: float
 ) -> tuple[Array, Array]:
-    """Divide an arc into points (k, 3) after its start, the last one ``end`` itself; with the fraction of the turn at
-    each (k,).
+    """Divide an arc into points (k, 3) after its start, with the fraction of the turn at each (k,).
+
+    The last one is ``end`` itself.
 
     start, end : X, Y, Z in mm; the one along the plane's axis may be unknown (NaN), and is so in the points then
     inches : whether the programmed unit is the inch, for what RS274/NGC tolerates

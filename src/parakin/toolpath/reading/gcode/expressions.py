@@ -27,7 +27,7 @@ class ParameterStore(Protocol):
         """Return a parameter's value; refuse one that is not known."""
 
     def exists(self, key: Key) -> bool:
-        """Whether a parameter has a value."""
+        """Tell whether a parameter has a value."""
 
 
 def read_value(text: str, at: int, store: ParameterStore, depth: int = 0) -> tuple[float, int]:

@@ -176,7 +176,7 @@ class GcodeMotion:
         self.here, self.has_jumped = end, False
 
     def _tip_stays(self, end: list[float]) -> bool:
-        """Whether X, Y and Z stay; one that is not known does."""
+        """Tell whether X, Y and Z stay; one that is not known does."""
         return not any(abs(p - q) > STILL for p, q in zip(self.here[:3], end[:3], strict=True))
 
     # arcs

@@ -51,7 +51,7 @@ class Parameters:
         return names[key]
 
     def exists(self, key: Key) -> bool:
-        """Whether a named parameter has been set, or is the control's own."""
+        """Tell whether a named parameter has been set, or is the control's own."""
         return key in self.readers or (isinstance(key, str) and key in self._find_names(key))
 
     def assign(self, key: Key, value: float) -> None:

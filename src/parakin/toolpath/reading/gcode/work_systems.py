@@ -72,7 +72,7 @@ class WorkSystems:
         self._resolve()
 
     def has_shift(self, number: int) -> bool:
-        """Whether a system's place in W is known."""
+        """Tell whether a system's place in W is known."""
         return bool(np.isfinite(self.shift[number]).all())
 
     def place(self, number: int, k: int, value: float, *, moved: bool) -> bool:

@@ -88,7 +88,7 @@ def _start_from_rest(h, jerk):
 
 @njit(nogil=True, cache=True, error_model="numpy")
 def update_controllable(stretch, bounds, touched, controllable, moved):
-    """Backward pass: the greatest x from which the path can be completed, into ``controllable`` (rows,).
+    """Find the greatest x from which the path can be completed (backward pass), into ``controllable`` (rows,).
 
     moved : (rows,) becomes where it changed
     """
@@ -107,7 +107,7 @@ def update_controllable(stretch, bounds, touched, controllable, moved):
 
 @njit(nogil=True, cache=True, error_model="numpy")
 def limit_rise(stretch, bounds, touched, controllable, moved, x, u):
-    """Forward pass: the quickest profile below ``controllable`` whose u rises no faster than it may, into x and u.
+    """Find the quickest x and u below ``controllable`` whose u rises no faster than it may (forward pass).
 
     x : (rows,); u : (steps,)
     moved : (rows,) where ``controllable`` changed; becomes where x did
@@ -137,7 +137,7 @@ def limit_rise(stretch, bounds, touched, controllable, moved, x, u):
 
 @njit(nogil=True, cache=True, error_model="numpy")
 def limit_braking(stretch, bounds, touched, ceiling, moved, x, u):
-    """Backward pass: the profile x, u below ``ceiling`` (rows,) whose braking does not begin too late to end softly.
+    """Find x and u below ``ceiling`` (rows,) whose braking does not begin too late to end softly (backward pass).
 
     moved : (rows,) where ``ceiling`` changed
     """

@@ -76,7 +76,7 @@ def find_acceleration(i, x, after, most, rows, limits, lines):
 
 @njit(nogil=True, cache=True, error_model="numpy")
 def compute_controllable(rows, limits, ceiling, controllable, start, stop):
-    """Backward pass: the greatest x from which every limit can be kept up to row ``stop``, where x ends as 0.
+    """Find the greatest x from which every limit can be kept up to row ``stop``, where x ends as 0 (backward pass).
 
     rows : :class:`~.splines.JointRows`; limits : :class:`AccelerationLimits`
     ceiling : (rows,) of x, 0 where the motion stops; controllable : (rows,) becomes the result
@@ -91,7 +91,7 @@ def compute_controllable(rows, limits, ceiling, controllable, start, stop):
 
 @njit(nogil=True, cache=True, error_model="numpy")
 def compute_reachable(rows, limits, controllable, x, u, start, stop):
-    """Forward pass: the quickest trajectory, x (rows,) from 0 at row ``start`` on, and u (steps,)."""
+    """Find the quickest trajectory, x (rows,) from 0 at row ``start`` on, and u (steps,) (forward pass)."""
     lines = allocate_lines(limits)
     x[start] = 0.0
     for i in range(start, stop):

@@ -12,7 +12,7 @@ import parakin as pk
 from parakin.commands.workpiece import parse_bounds
 from parakin.toolpath.path import ToolPath
 from parakin.toolpath.placing.placement import find_placement
-from parakin.toolpath.posting.frames import frame_from_angles
+from parakin.toolpath.posting.frames import build_frame_from_angles
 from parakin.toolpath.posting.post import post_path
 
 DEGREE = math.pi / 180.0
@@ -61,7 +61,7 @@ def on_grid(machine, path, bounds, each):
     best = -math.inf
     for values in itertools.product(*axes):
         named = dict(zip(bounds, values, strict=True))
-        worth = least(machine, path, frame_from_angles(*(named.get(letter, 0.0) for letter in "XYZABC")))
+        worth = least(machine, path, build_frame_from_angles(*(named.get(letter, 0.0) for letter in "XYZABC")))
         best = max(best, -math.inf if math.isnan(worth) else worth)
     return best
 
@@ -88,7 +88,7 @@ def test_no_placement_of_a_grid_is_better(name, path, text, each, near):
     assert list(found.values) == list(bounds)
     assert all(low <= found.values[axis] <= high for axis, (low, high) in bounds.items())
     values = [found.values.get(letter, 0.0) for letter in "XYZABC"]
-    np.testing.assert_array_equal(found.workpiece, frame_from_angles(*values))
+    np.testing.assert_array_equal(found.workpiece, build_frame_from_angles(*values))
     posted = post_path(machine, path, workpiece=found.workpiece, mode=found.mode)
     margin = machine.margins(posted.poses, posted.joints, posted.mode)[:, machine.limits.index(found.limit)]
     assert margin.argmin() == found.record
@@ -119,7 +119,7 @@ def test_the_same_again():
 def test_on_top_of_the_files_own_frame():
     machine, path = pk.load("linear_delta"), scattered(8, 40, [100, 90, 40])
     bounds = parse_bounds("X=-100:100,Y=-100:100,Z=150:450")
-    shifted = replace(path, frame=frame_from_angles(30.0, -20.0, 10.0, 0.0, 0.0, 0.0))
+    shifted = replace(path, frame=build_frame_from_angles(30.0, -20.0, 10.0, 0.0, 0.0, 0.0))
     one, two = (find_placement(machine, each, bounds) for each in (path, shifted))
     assert one.margin == pytest.approx(two.margin, abs=1e-6)
     assert post_path(machine, shifted, workpiece=two.workpiece).broken_record_count == 0

@@ -16,7 +16,7 @@ from test_kernels import CORNERS, MEANING, SMOOTH, number
 from parakin import algebra as alg
 from parakin.kernels.batch import evaluate_tape
 from parakin.kernels.tape import compile_tape
-from parakin.model.limits import segment_distance
+from parakin.model.limits import compute_segment_distance
 from parakin.workspaces.certified.constraints import Constraint
 from parakin.workspaces.certified.plane_cuts import (
     CLEARED,
@@ -233,7 +233,7 @@ def test_straight_bounds_of_a_clearance_hold_for_the_least_distance():
             )
             for end, move in zip(ends, moves, strict=True)
         ]
-        margin = segment_distance((points[0], points[1]), (points[2], points[3])) - 0.5
+        margin = compute_segment_distance((points[0], points[1]), (points[2], points[3])) - 0.5
 
         def value(rows, ends=ends, moves=moves):
             a, b, c, d = np.moveaxis(ends + np.einsum("pck,nk->npc", moves, rows), 1, 0)

@@ -15,7 +15,7 @@ import pytest
 import parakin as pk
 from parakin.export.tables import joints as table
 from parakin.toolpath.path import ToolPath
-from parakin.toolpath.posting.frames import compute_poses, frame_from_angles
+from parakin.toolpath.posting.frames import build_frame_from_angles, compute_poses
 from parakin.toolpath.posting.post import post_path
 from parakin.toolpath.reading.cl.reader import read_cl
 from parakin.toolpath.reading.gcode.reader import read_gcode
@@ -40,7 +40,7 @@ def home_of(machine):
     """Tool tip and axis at home."""
     home = dict(zip(machine.axes, machine.home.tolist(), strict=True))
     a, b, c = (home.get(letter, 0.0) for letter in "ABC")
-    return np.array([home.get(letter, 0.0) for letter in "XYZ"]), frame_from_angles(0, 0, 0, a, b, c)[:, 2]
+    return np.array([home.get(letter, 0.0) for letter in "XYZ"]), build_frame_from_angles(0, 0, 0, a, b, c)[:, 2]
 
 
 def small_part(machine):
@@ -72,7 +72,7 @@ def test_three_turns_give_the_axis_with_c_as_at_home(name):
     rng = np.random.default_rng(7)
     axis = rng.normal(size=(200, 3))
     axis /= np.linalg.norm(axis, axis=1)[:, None]
-    poses, own = compute_poses(machine, np.zeros((200, 3)), axis, frame_from_angles(0, 0, 0, 0, 0, 0))
+    poses, own = compute_poses(machine, np.zeros((200, 3)), axis, build_frame_from_angles(0, 0, 0, 0, 0, 0))
     assert not own
     assert np.all(poses[:, 5] == machine.home[5])
     np.testing.assert_allclose([rotation(*pose[3:])[:, 2] for pose in poses], axis, atol=1e-12)
@@ -323,7 +323,7 @@ def test_parquet_holds_the_same():
     file = io.BytesIO()
     table.make_joint_parquet(posted)(file)
     read = pq.read_table(io.BytesIO(file.getvalue()))
-    assert read.column_names == table.joint_columns(posted)
+    assert read.column_names == table.name_joint_columns(posted)
     assert read["X [mm]"].to_pylist() == [0.0, 1000.0, 5.0]
     assert read["line"].to_pylist() == [4, 5, 6]
     assert read["tower_a [mm]"].to_pylist()[1] is None
@@ -394,7 +394,7 @@ def test_c_and_the_wrist_stay_continuous_over_the_pole(name):
 
 
 def rotation(a, b, c):
-    return frame_from_angles(0.0, 0.0, 0.0, a, b, c)[:, :3]
+    return build_frame_from_angles(0.0, 0.0, 0.0, a, b, c)[:, :3]
 
 
 def turned_path(machine, turns, tip=None):

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 import parakin as pk
-from parakin.controllers.joints.program import joint_letters
+from parakin.controllers.joints.program import assign_joint_letters
 from parakin.controllers.linuxcnc.approach import plan_approach
 from parakin.controllers.linuxcnc.axis_rates import choose_axis_rates
 from parakin.controllers.linuxcnc.program import split_slow_turns
@@ -252,7 +252,7 @@ def test_what_is_written_in_joints_is_read_back(trajectories, name, tmp_path):
     machine = trajectory.posted.machine
     (file,) = pk.write_files(tmp_path, {"part.ngc": pk.make_joint_program(trajectory)})
     read = pk.read_joint_program(file)
-    assert read.letters == joint_letters(machine)
+    assert read.letters == assign_joint_letters(machine)
     kept = np.append(True, np.diff(trajectory.curve.corner_of_record) > 0)
     assert np.abs(read.joints - rim(trajectory.posted.joints[kept], machine.joint_units)).max() < HALF
     spans = np.diff(trajectory.times[kept])
@@ -267,18 +267,18 @@ def test_what_is_written_in_joints_is_read_back(trajectories, name, tmp_path):
 
 
 def test_linear_joints_are_xyzuvw_and_turning_ones_abc():
-    assert joint_letters(pk.load("hexapod")) == tuple("XYZUVW")
-    assert joint_letters(pk.load("tricept")) == tuple("XYZAB")
+    assert assign_joint_letters(pk.load("hexapod")) == tuple("XYZUVW")
+    assert assign_joint_letters(pk.load("tricept")) == tuple("XYZAB")
 
 
 def test_more_joints_than_letters(monkeypatch):
     machine = pk.load("hexapod")
     monkeypatch.setitem(machine.__dict__, "joint_units", ("mm",) * 7)
     with pytest.raises(pk.PoseError, match="hexapod has 7 linear and 0 turning joints; G-code has letters for 6 and 3"):
-        joint_letters(machine)
+        assign_joint_letters(machine)
     monkeypatch.setitem(machine.__dict__, "joint_units", ("rad",) * 4 + ("mm",))
     with pytest.raises(pk.PoseError, match="1 linear and 4 turning"):
-        joint_letters(machine)
+        assign_joint_letters(machine)
 
 
 HEAD = "G21 G90\nG93\n"

@@ -15,7 +15,7 @@ from parakin.export.tables.setpoints import (
     count_setpoints,
     make_setpoint_csv,
     make_setpoint_parquet,
-    setpoint_columns,
+    name_setpoint_columns,
 )
 from parakin.toolpath.path import ToolPath
 from parakin.toolpath.posting.post import post_path
@@ -49,7 +49,7 @@ def table(trajectory):
 
 def test_columns_have_units(trajectory, table):
     head = next(csv.reader(io.StringIO(table)))
-    assert head == setpoint_columns(trajectory)
+    assert head == name_setpoint_columns(trajectory)
     assert head[:6] == ["time [s]", "d1 [mm]", "d2 [mm]", "d3 [mm]", "theta1 [deg]", "theta2 [deg]"]
     assert head[9:11] == ["theta1 speed [deg/s]", "theta2 speed [deg/s]"]
     assert head[11:15:3] == ["d1 acceleration [mm/s2]", "theta1 acceleration [deg/s2]"]
@@ -68,7 +68,7 @@ def test_csv_is_the_trajectory_sampled(trajectory, table):
     expected = in_degrees(trajectory, trajectory.sample(RATE))
     assert read.shape == expected.shape
     assert len(read) > 20_000
-    digits = np.array([6 if "mm" in name else 8 for name in setpoint_columns(trajectory)])
+    digits = np.array([6 if "mm" in name else 8 for name in name_setpoint_columns(trajectory)])
     off = np.abs(read - expected) - 4e-16 * np.abs(expected)
     assert (off <= 0.5001 * 10.0**-digits).all()
 
@@ -77,7 +77,7 @@ def test_parquet_is_the_trajectory_sampled(trajectory):
     file = io.BytesIO()
     make_setpoint_parquet(trajectory, RATE)(file)
     read = pq.read_table(io.BytesIO(file.getvalue()))
-    assert read.column_names == setpoint_columns(trajectory)
+    assert read.column_names == name_setpoint_columns(trajectory)
     expected = in_degrees(trajectory, trajectory.sample(RATE))
     values = np.column_stack([column.to_numpy() for column in read.columns])
     np.testing.assert_allclose(values, expected, rtol=1e-15, atol=0)

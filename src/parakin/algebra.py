@@ -271,7 +271,7 @@ def product(m: Mat, n: Mat) -> Mat:
     return tuple(tuple(dot(row, column) for column in columns) for row in m)
 
 
-def axis_rotation(axis: str, s: Scalar, c: Scalar) -> Mat:
+def make_axis_rotation(axis: str, s: Scalar, c: Scalar) -> Mat:
     """Make the rotation about a coordinate axis (``rx``, ``ry`` or ``rz``) by the angle of sine s and cosine c."""
     if axis == "rx":
         return ((1.0, 0.0, 0.0), (0.0, c, -s), (0.0, s, c))
@@ -344,7 +344,7 @@ def _differentiate_node(y: Term, x: Term, known: dict[int, Scalar]) -> Scalar:
     raise TypeError(f"no derivative of operation {y.op}")
 
 
-def evaluate(trace: Trace, outputs: Sequence[Scalar], inputs: Sequence[Scalar]) -> list[Scalar]:
+def evaluate_trace(trace: Trace, outputs: Sequence[Scalar], inputs: Sequence[Scalar]) -> list[Scalar]:
     """Evaluate outputs of a trace for given inputs, numbers or arrays: the plain interpreter.
 
     Inputs may also be terms of another trace; what depends on numbers alone is folded there.

@@ -14,7 +14,7 @@ from contextlib import suppress
 from cyclopts import App, CycloptsError, Parameter
 
 from .commands.atlas import atlas
-from .commands.console import say
+from .commands.console import print_remark
 from .commands.design import design
 from .commands.kinematics import forward, inverse
 from .commands.linuxcnc import linuxcnc
@@ -57,16 +57,16 @@ def main(arguments: Sequence[str] | None = None) -> int:
         code = app(words, exit_on_error=False, print_error=False, result_action="return_value")
         sys.stdout.flush()
     except ParakinError as error:
-        say(str(error))
+        print_remark(str(error))
         return _MALFORMED
     except CycloptsError as error:
-        say(f"parakin: {' '.join(str(error).split())}")
+        print_remark(f"parakin: {' '.join(str(error).split())}")
         return _MALFORMED
     except MemoryError:
-        say("parakin: not enough memory")
+        print_remark("parakin: not enough memory")
         return _MALFORMED
     except KeyboardInterrupt:
-        say("parakin: interrupted")
+        print_remark("parakin: interrupted")
         return _INTERRUPTED
     except BrokenPipeError:
         _discard_output()
@@ -74,10 +74,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except OSError as error:  # errors of files come as ParakinError
         _discard_output()
         what = f"{error.filename}" if error.filename else "the output can't be written"
-        say(f"parakin: {what}: {error.strerror or error}")
+        print_remark(f"parakin: {what}: {error.strerror or error}")
         return _MALFORMED
     if closed:
-        say("parakin: the output can't be written: it is closed")
+        print_remark("parakin: the output can't be written: it is closed")
         return _MALFORMED
     return code if isinstance(code, int) else 0
 
@@ -98,7 +98,7 @@ def _discard_output() -> None:
 
 
 def _show_warning(message: Warning | str, *place: object, **more: object) -> None:
-    say(f"parakin: {' '.join(str(message).split())}")
+    print_remark(f"parakin: {' '.join(str(message).split())}")
 
 
 if __name__ == "__main__":

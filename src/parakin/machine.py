@@ -17,7 +17,7 @@ from .errors import DescriptionError, NoMethodError, PoseError
 from .kernels.batch import evaluate_tape, evaluate_tape_with_residual, find_first_negative
 from .kinematics.assemblies import find_assemblies
 from .kinematics.follow import follow_path
-from .kinematics.forward import Solution, closure_tolerance, find_sides, solve_forward
+from .kinematics.forward import Solution, compute_closure_tolerance, find_sides, solve_forward
 from .kinematics.inverse import solve_inverse
 from .kinematics.tapes import KinematicTapes, collect_tapes
 from .kinematics.wrist import EVERY_DIRECTION, EVERY_ROTATION, EXACT, Wrist, find_wrist, flip_mode
@@ -270,7 +270,7 @@ class Machine:
     @property
     def closure_tolerance(self) -> float:
         """The greatest distance by which a leg may fail to close in an answer of :meth:`forward`, mm."""
-        return closure_tolerance(self.model)
+        return compute_closure_tolerance(self.model)
 
     def sides(self, poses: Array) -> Array:
         """Compute the determinant whose sign tells the assembly mode, at rows of poses (n, axes): (n,)."""

@@ -115,7 +115,7 @@ def to_display(value: float, unit: str) -> float:
     return math.degrees(value) if unit == "rad" else value
 
 
-def display_unit(unit: str) -> str:
+def name_display_unit(unit: str) -> str:
     """Name the unit on a display: ``deg`` for ``rad``."""
     return "deg" if unit == "rad" else unit
 

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from parakin.controllers.linuxcnc.module import kinematics_name, write_module
+from parakin.controllers.linuxcnc.module import name_kinematics, write_module
 
 HERE = Path(__file__).parent
 HEADERS = ("rtapi.h", "rtapi_app.h", "rtapi_math.h", "rtapi_string.h", "hal.h", "kinematics.h")
@@ -83,7 +83,7 @@ class Stub:
 
     def built(self, machine):
         """A machine's module."""
-        stub, name = self.library, kinematics_name(machine)
+        stub, name = self.library, name_kinematics(machine)
         source = self.folder / f"{name}.c"
         source.write_text(write_module(machine))
         self._gcc([source], self.folder / f"{name}.so")

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from ..export.json.performance import encode_pose
 from ..export.number_format import format_fixed
-from ..units import display_unit, to_display
+from ..units import name_display_unit, to_display
 from .console import format_table
 
 if TYPE_CHECKING:
@@ -105,7 +105,7 @@ def format_proofs(
     for axis, (low, high) in spans.items():
         unit = units[axis]
         ends = f"{_format_axis_value(low, unit)} to {_format_axis_value(high, unit)}"
-        sides.append(f"{axis} {ends} {display_unit(unit)}")
+        sides.append(f"{axis} {ends} {name_display_unit(unit)}")
     lines = [f"{machine.name} all over {', '.join(sides)}", ""]
     width = max(len(proof.claim) for proof in proofs)
     for proof in proofs:

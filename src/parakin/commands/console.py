@@ -33,7 +33,7 @@ def format_table(rows: Sequence[Sequence[str]], header: Sequence[str], right: st
     )
 
 
-def say(text: str) -> None:
+def print_remark(text: str) -> None:
     """Print a remark beside the command's output."""
     with suppress(OSError):  # a full disk behind stderr
         print(make_printable(text), file=sys.stderr)
@@ -60,7 +60,7 @@ def announce_compiling() -> None:
         def on_start(self, event: object) -> None:
             if not self.said:
                 self.said = True
-                say("compiling the kernels, once for each kind of work; some seconds ...")
+                print_remark("compiling the kernels, once for each kind of work; some seconds ...")
 
         def on_end(self, event: object) -> None:
             pass

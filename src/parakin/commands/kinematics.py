@@ -13,8 +13,8 @@ from ..errors import InputError
 from ..export.json.poses import encode_poses
 from ..export.number_format import format_fixed
 from ..export.tables.poses import ColumnGroup, PoseTable, format_pose_csv
-from ..units import display_unit, to_display
-from .console import announce_compiling, format_table, print_json, print_text, say
+from ..units import name_display_unit, to_display
+from .console import announce_compiling, format_table, print_json, print_remark, print_text
 from .offences import format_offence
 from .options import OFF_LIMITS, Json, Mode, Name, Sizes, load_machine
 from .values import parse_row
@@ -121,9 +121,9 @@ def _report_lost(machine: Machine, solution: Solution, csv: Path | None, lines: 
         place = f"{csv}:{lines[row]}" if csv else "joints"
         residual = solution.residual[row]
         closes = np.isnan(residual) or residual <= machine.closure_tolerance
-        say(f"{place}: no pose found" + ("" if closes else f" (the legs fail to close by {residual:.3g} mm)"))
+        print_remark(f"{place}: no pose found" + ("" if closes else f" (the legs fail to close by {residual:.3g} mm)"))
     if len(lost) > _LOST:
-        say(f"{csv}: no pose found for {len(lost) - _LOST:,} more rows")
+        print_remark(f"{csv}: no pose found for {len(lost) - _LOST:,} more rows")
 
 
 def _name_broken(judgement: Judgement, row: int) -> str:
@@ -165,7 +165,7 @@ def _show_table(table: PoseTable, request: _Request, offences: Sequence[Offence]
     """Print or write a table, and print its offences."""
     csv, output = request.csv, request.output
     for offence in offences:
-        say(format_offence(f"{csv}:{offence.line}", offence, "row") if csv else f"pose: {offence.text}")
+        print_remark(format_offence(f"{csv}:{offence.line}", offence, "row") if csv else f"pose: {offence.text}")
     if output is not None:
         from ..export.files import write_files
 
@@ -185,7 +185,7 @@ def _format_answer(table: PoseTable, answer: ColumnGroup) -> str:
     """Format the answer for a single row."""
     names, units, values = table.columns(answer)
     cells = [
-        (name, "-" if value != value else format_fixed(to_display(value, unit), 6), display_unit(unit))
+        (name, "-" if value != value else format_fixed(to_display(value, unit), 6), name_display_unit(unit))
         for name, unit, value in zip(names, units, values[0].tolist(), strict=True)
     ]
     text = format_table(cells, (answer, "", ""), " r")

@@ -10,7 +10,7 @@ from cyclopts import Parameter
 from ..errors import InputError
 from ..export.json.machine import RATES, encode_details, encode_machine, encode_machines
 from ..export.number_format import format_fixed
-from ..units import display_unit
+from ..units import name_display_unit
 from .console import format_table, print_json, print_text
 from .options import Json, Name, Sizes, load_machine
 
@@ -29,12 +29,14 @@ def machines(*, json: Json = False) -> int:
     if json:
         print_json(encode_machines(known))
         return 0
-    rows = [(m.name, " ".join(m.axes), " ".join(m.joints), m.spec.title, _shorten(m.spec.source, 60)) for m in known]
+    rows = [
+        (m.name, " ".join(m.axes), " ".join(m.joints), m.spec.title, _shorten_text(m.spec.source, 60)) for m in known
+    ]
     print_text(format_table(rows, ("name", "axes", "joints", "title", "source")))
     return 0
 
 
-def _shorten(text: str, most: int) -> str:
+def _shorten_text(text: str, most: int) -> str:
     line = " ".join(text.split())
     return line if len(line) <= most else line[: most - 3].rstrip() + "..."
 
@@ -116,7 +118,7 @@ def _summarise_machine(machine: Machine) -> str:
         format_table(limits, ("limit", "of", "", "bound", ""), "   r"),
         format_table(
             [
-                (axis, _format_number(value), display_unit(unit))
+                (axis, _format_number(value), name_display_unit(unit))
                 for (axis, value), unit in zip(details["home"].items(), machine.axis_units, strict=True)
             ],
             ("home", "", ""), " r",

@@ -11,7 +11,7 @@ from cyclopts import Parameter
 
 from ..errors import InputError, PoseError
 from ..export.json.text import format_json
-from .console import ProgressBar, announce_compiling, print_json, print_text, say
+from .console import ProgressBar, announce_compiling, print_json, print_remark, print_text
 from .options import OFF_LIMITS, Json, Mode, Name, Sizes, load_machine
 from .region_options import At, Every, Some, Without, parse_length, read_region
 from .workspace_inside import InsideOptions, encode_inside, explore_inside, format_inside
@@ -154,7 +154,7 @@ def workspace(
         if written:
             print_text("\n" + "\n".join(f"{kind:<5} {path}" for kind, path in written.items()))
     for path, reason in refused.items():
-        say(f"{path}: not written, {reason}")
+        print_remark(f"{path}: not written, {reason}")
     if isinstance(found, Workspace) and found.stopped == "interrupted":
         return _INTERRUPTED
     return OFF_LIMITS if refused else 0

@@ -35,7 +35,7 @@ class Effort:
 def find_workspace(method: Method, region: Region, effort: Effort, progress: Progress) -> Workspace | SampledWorkspace:
     """Find the workspace of a region by a method; an option that the method does not take is refused."""
     if method == "certified":
-        return _certify(region, effort, progress)
+        return _certify_workspace(region, effort, progress)
     for option in ("gap", "cell", "time"):
         if getattr(effort, option) is not None:
             raise InputError(f"--method {method} has none, only certified has", f"--{option}")
@@ -44,7 +44,7 @@ def find_workspace(method: Method, region: Region, effort: Effort, progress: Pro
     return _sample_positions(method, region, effort.step, progress)
 
 
-def _certify(region: Region, effort: Effort, progress: Progress) -> Workspace:
+def _certify_workspace(region: Region, effort: Effort, progress: Progress) -> Workspace:
     from ..workspaces.certified.workspace import workspace
 
     gap, seconds = GAP if effort.gap is None else effort.gap, SECONDS if effort.time is None else effort.time

@@ -6,7 +6,7 @@ import re
 from collections.abc import Iterator, Sequence
 
 from ..toolpath.path import Event, ToolPath
-from .gcode_text import LONGEST_COMMENT, format_comments, to_plain
+from .gcode_text import LONGEST_COMMENT, format_comments, make_plain
 
 _SAME = re.compile(r"M(?:0|1|3|4|5|7|8|9|60)|S[\d.]+|G4 P[\d.eE+-]+")  # of G-code, carried over as they are
 _END = re.compile(r"M(?:2|30)")  # the program's own end replaces them
@@ -30,7 +30,7 @@ def _format_event(event: Event, path: ToolPath) -> Iterator[str]:
     """Yield the lines of an event, without their ends."""
     message = _MESSAGE.fullmatch(event.text)
     if message:
-        yield f"(MSG,{to_plain(message[1])[:LONGEST_COMMENT]})"
+        yield f"(MSG,{make_plain(message[1])[:LONGEST_COMMENT]})"
         return
     if _END.fullmatch(event.text):
         return

@@ -31,12 +31,12 @@ def format_blocks(lead: str, letters: Sequence[str], rows: Array, seconds: Array
 
 def format_comments(text: str) -> Iterator[str]:
     """Cut a remark into comments short enough for a line, none of which a controller acts upon."""
-    plain = to_plain(text)
+    plain = make_plain(text)
     for begin in range(0, max(len(plain), 1), LONGEST_COMMENT):
         yield f"( {plain[begin : begin + LONGEST_COMMENT]} )"
 
 
-def to_plain(text: str) -> str:
+def make_plain(text: str) -> str:
     """Replace what can't stand in a comment: brackets, separators, and characters that are not ASCII."""
     words = " ".join(text.replace("°", " deg").split())
     plain = "".join(c if " " <= c <= "~" else "?" for c in words)

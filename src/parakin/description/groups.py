@@ -21,7 +21,7 @@ from ..model.legs import KINDS, Leg
 from ..model.parts import Direction, Drive, Point, Signs, Size
 from .document import YamlList, YamlMap, YamlText
 from .sections import CirclePoints, FileSection
-from .values import DRIVE_TYPES, DirectionValue, Extent, PlacedError, PointValue, WordValue, describe, get_context
+from .values import DRIVE_TYPES, DirectionValue, Extent, PlacedError, PointValue, WordValue, describe_value, get_context
 
 
 class LegGroup(FileSection):
@@ -98,7 +98,7 @@ def _make_rows_type(items: tuple[Any, ...], levels: int) -> Any:
                 per_leg = True
             for row in table:
                 if not isinstance(row, list) or len(row) != slots:
-                    raise ValueError(f"expected {slots} values, one a joint of the leg, got {describe(row)}")
+                    raise ValueError(f"expected {slots} values, one a joint of the leg, got {describe_value(row)}")
             rows = handler(table)
         if joints is None:
             return rows
@@ -117,11 +117,11 @@ def _make_joints_type(leg: type[Leg]) -> Any:
 
     def read(value: Any, handler: ValidatorFunctionWrapHandler, info: ValidationInfo) -> Any:
         if not isinstance(value, YamlList) or not value:
-            raise ValueError(f"expected {expected}, got {describe(value)}")
+            raise ValueError(f"expected {expected}, got {describe_value(value)}")
         rows = [[name] for name in value] if count == 1 else value
         for row in rows:
             if not isinstance(row, list) or len(row) != count:
-                raise ValueError(f"expected {expected}, got {describe(row)} for one leg")
+                raise ValueError(f"expected {expected}, got {describe_value(row)} for one leg")
             for name, unit in zip(row, leg.units, strict=True):
                 if isinstance(name, YamlText):
                     get_context(info).add_joint(name, unit)
@@ -135,7 +135,7 @@ def _make_signs_type(leg: type[Leg]) -> Any:
 
     def read(value: object) -> Signs:
         if not isinstance(value, YamlText) or len(value) != count or set(value) - set("+-"):
-            raise ValueError(f"expected {count} of the signs + and -, in quotes, got {describe(value)}")
+            raise ValueError(f"expected {count} of the signs + and -, in quotes, got {describe_value(value)}")
         return Signs(str(value))
 
     return Annotated[Any, PlainValidator(read)]
@@ -182,13 +182,13 @@ def _build_group_model(kind: str) -> type[LegGroup]:
 
 def _read_group(value: object, info: ValidationInfo) -> LegGroup:
     if not isinstance(value, YamlMap):
-        raise ValueError(f"expected a mapping with kind, joints, range, ..., got {describe(value)}")
+        raise ValueError(f"expected a mapping with kind, joints, range, ..., got {describe_value(value)}")
     kind = value.get("kind")
     if kind is None:
         raise ValueError(f'missing key "kind", expected one of {", ".join(KINDS)}')
     if not isinstance(kind, YamlText) or kind not in KINDS:
         line = kind.line if isinstance(kind, YamlText) else value.line
-        raise PlacedError(f"unknown leg kind {describe(kind)}{suggest(str(kind), KINDS)}", line)
+        raise PlacedError(f"unknown leg kind {describe_value(kind)}{suggest(str(kind), KINDS)}", line)
     return _build_group_model(str(kind)).model_validate(value, context=info.context)
 
 
@@ -196,7 +196,7 @@ def _wrap_single_group(value: object) -> object:
     if isinstance(value, YamlMap):
         return YamlList([value], value.line)
     if not isinstance(value, YamlList) or not value:
-        raise ValueError(f"expected a group of legs or a list of groups, got {describe(value)}")
+        raise ValueError(f"expected a group of legs or a list of groups, got {describe_value(value)}")
     return value
 
 

@@ -19,7 +19,7 @@ from .document import YamlMap, YamlText, read_document
 from .groups import Legs
 from .sections import TRANSFORMS, FileSection, HomeSection, LimitsSection, Mounting, Steps
 from .sizes import read_sizes
-from .values import Prose, ReadingContext, WordValue, describe, get_context, is_word
+from .values import Prose, ReadingContext, WordValue, describe_value, get_context, is_word
 
 _MACHINES = Path(__file__).parent.parent / "machines"
 
@@ -68,7 +68,7 @@ def read_machine(path: str | PathLike[str], parameters: Mapping[str, float | str
     source = fspath(path)
     document, errors = read_document(Path(path), source)
     if not isinstance(document, YamlMap):
-        raise InputError(f"expected keys such as name, motion and legs, got {describe(document)}", source, 1)
+        raise InputError(f"expected keys such as name, motion and legs, got {describe_value(document)}", source, 1)
     context = ReadingContext(source, {}, errors)
     context.sizes = read_sizes(document.get("sizes"), parameters or {}, context)
     try:
@@ -100,7 +100,7 @@ def read_machine(path: str | PathLike[str], parameters: Mapping[str, float | str
 def _read_motion(value: object, info: ValidationInfo) -> tuple[str, ...]:
     words = value.split() if isinstance(value, YamlText) else []
     if not words:
-        raise ValueError(f"expected words such as tx ty rz, got {describe(value)}")
+        raise ValueError(f"expected words such as tx ty rz, got {describe_value(value)}")
     for word in words:
         if word not in TRANSFORMS:
             raise ValueError(f"unknown word {quote(word)}{suggest(word, TRANSFORMS)}")

@@ -33,7 +33,7 @@ from .values import (
     PlacedError,
     WordValue,
     accept_words,
-    describe,
+    describe_value,
     get_context,
     read_quantity,
 )
@@ -52,7 +52,7 @@ class FileSection(BaseModel):
     def _report_unknown_keys(cls, value: object, info: ValidationInfo) -> object:
         keys = list(cls.model_fields)
         if not isinstance(value, YamlMap):
-            raise ValueError(f"expected a mapping with the keys {', '.join(keys)}, got {describe(value)}")
+            raise ValueError(f"expected a mapping with the keys {', '.join(keys)}, got {describe_value(value)}")
         for key in value:
             if key not in keys:
                 get_context(info).report(f"unknown key {quote(key)}{cls.where}{suggest(key, keys)}", key.line)
@@ -61,7 +61,7 @@ class FileSection(BaseModel):
 
 def _check_list(value: object) -> object:
     if not isinstance(value, YamlList):
-        raise ValueError(f"expected a list, got {describe(value)}")
+        raise ValueError(f"expected a list, got {describe_value(value)}")
     return value
 
 
@@ -120,7 +120,7 @@ _DRIVEN: dict[Unit, type[_DrivenStep]] = {"mm": _build_driven_model("mm"), "rad"
 
 def _read_step(value: object, info: ValidationInfo) -> Step:
     if not isinstance(value, YamlMap) or len(value) != 1:
-        raise ValueError(f"expected one transform such as tz: 100 mm, got {describe(value)}")
+        raise ValueError(f"expected one transform such as tz: 100 mm, got {describe_value(value)}")
     ((axis, content),) = value.items()
     if axis not in TRANSFORMS:
         raise PlacedError(f"unknown transform {quote(axis)}{suggest(axis, TRANSFORMS)}", axis.line)
@@ -195,7 +195,7 @@ class _PassiveSection(FileSection):
 def _read_slider_name(value: object, info: ValidationInfo) -> str:
     context = get_context(info)
     if not isinstance(value, YamlText):
-        raise ValueError(f"expected a joint's name, got {describe(value)}")
+        raise ValueError(f"expected a joint's name, got {describe_value(value)}")
     if context.legs_read and value not in context.joints:
         raise ValueError(f"unknown joint {quote(value)}{suggest(value, context.joints)}")
     if value in context.joints and context.joints[value][1] != "mm":
@@ -205,7 +205,7 @@ def _read_slider_name(value: object, info: ValidationInfo) -> str:
 
 def _check_pair(value: object) -> object:
     if not isinstance(value, YamlList) or len(value) != 2:
-        raise ValueError(f"expected the names of two joints, got {describe(value)}")
+        raise ValueError(f"expected the names of two joints, got {describe_value(value)}")
     return value
 
 

@@ -9,7 +9,7 @@ from typing import SupportsFloat
 from ..errors import InputError, quote, suggest
 from ..units import Quantity, QuantityError, UnreadSizeError, evaluate_expression, is_reserved
 from .document import Value, YamlMap, YamlText
-from .values import ReadingContext, describe, is_word
+from .values import ReadingContext, describe_value, is_word
 
 
 def read_sizes(
@@ -18,7 +18,7 @@ def read_sizes(
     """Read the file's sizes, each with its parameter if there is one; None for a size that could not be read."""
     sizes: dict[str, Quantity | None] = {}
     if value is not None and not isinstance(value, YamlMap):
-        context.report(f"sizes: expected a mapping of names and quantities, got {describe(value)}", value.line)
+        context.report(f"sizes: expected a mapping of names and quantities, got {describe_value(value)}", value.line)
     elif value is not None:
         for name, content in value.items():
             if not is_word(name):
@@ -47,7 +47,7 @@ def _read_size(name: YamlText, content: Value, sizes: Mapping[str, Quantity | No
     if is_reserved(name):
         raise QuantityError("a unit or a function has this name, expected another for a size")
     if not isinstance(content, YamlText):
-        raise QuantityError(f"expected a quantity such as 350 mm, got {describe(content)}")
+        raise QuantityError(f"expected a quantity such as 350 mm, got {describe_value(content)}")
     return evaluate_expression(content, {k: v for k, v in sizes.items() if k != name})
 
 

@@ -82,7 +82,7 @@ class PlacedError(ValueError):
         super().__init__(message)
 
 
-def describe(value: object) -> str:
+def describe_value(value: object) -> str:
     """Describe a value for a message."""
     return "a list" if isinstance(value, YamlList) else "a mapping" if isinstance(value, YamlMap) else quote(value)
 
@@ -92,7 +92,7 @@ def describe(value: object) -> str:
 
 def _read_prose(value: object) -> str:
     if not isinstance(value, YamlText) or not value.strip():
-        raise ValueError(f"expected some words, got {describe(value)}")
+        raise ValueError(f"expected some words, got {describe_value(value)}")
     return value.strip()
 
 
@@ -103,13 +103,13 @@ def is_word(value: str) -> bool:
 
 def _read_word(value: object) -> YamlText:
     if not isinstance(value, YamlText) or not is_word(value):
-        raise ValueError(f"expected a plain word (letters, digits, _; at most 40), got {describe(value)}")
+        raise ValueError(f"expected a plain word (letters, digits, _; at most 40), got {describe_value(value)}")
     return value
 
 
 def _read_flag(value: object) -> bool:
     if value not in ("true", "false"):
-        raise ValueError(f"expected true or false, got {describe(value)}")
+        raise ValueError(f"expected true or false, got {describe_value(value)}")
     return value == "true"
 
 
@@ -118,7 +118,7 @@ def accept_words(what: str, *known: str) -> PlainValidator:
 
     def read(value: object) -> str:
         if not isinstance(value, YamlText) or value not in known:
-            raise ValueError(f"unknown {what} {describe(value)}{suggest(str(value), known)}")
+            raise ValueError(f"unknown {what} {describe_value(value)}{suggest(str(value), known)}")
         return str(value)
 
     return PlainValidator(read)
@@ -149,7 +149,7 @@ _USUAL_BOUNDS: dict[QuantityKind, ValidRange] = {
 def read_quantity(value: object, kind: QuantityKind, info: ValidationInfo, bounds: ValidRange | None = None) -> float:
     """Read a value in mm, rad and s; NaN if a size in it is itself in error."""
     if not isinstance(value, YamlText):
-        raise ValueError(f"expected {kind.wanted}, got {describe(value)}")
+        raise ValueError(f"expected {kind.wanted}, got {describe_value(value)}")
     try:
         result = parse_quantity(value, kind, get_context(info).sizes)
     except UnreadSizeError:
@@ -174,7 +174,7 @@ def accept_quantity(kind: QuantityKind, bounds: ValidRange | None = None) -> Pla
 def _require_count(count: int, what: str) -> BeforeValidator:
     def check(value: object) -> object:
         if not isinstance(value, YamlList):
-            raise ValueError(f"expected {what}, got {describe(value)}")
+            raise ValueError(f"expected {what}, got {describe_value(value)}")
         if len(value) != count:
             raise ValueError(f"expected {what}, got {len(value)} value{'s' * (len(value) != 1)}")
         return value
@@ -189,7 +189,7 @@ def _check_rising(value: Any, handler: ValidatorFunctionWrapHandler) -> tuple[fl
     return low, high
 
 
-def _normalize(value: Vector) -> Vector:
+def _normalise_vector(value: Vector) -> Vector:
     length = hypot(*value)
     if length < 1e-9:
         raise ValueError("the zero vector, expected a direction")
@@ -206,7 +206,7 @@ LengthPair = Annotated[tuple[LengthValue, LengthValue], _PAIR, WrapValidator(_ch
 AnglePair = Annotated[tuple[AngleValue, AngleValue], _PAIR, WrapValidator(_check_rising)]
 PointValue = Annotated[tuple[LengthValue, LengthValue, LengthValue], _require_count(3, "a point [x, y, z]")]
 DirectionValue = Annotated[
-    tuple[Number, Number, Number], _require_count(3, "a direction [x, y, z]"), AfterValidator(_normalize)
+    tuple[Number, Number, Number], _require_count(3, "a direction [x, y, z]"), AfterValidator(_normalise_vector)
 ]
 
 

@@ -24,16 +24,16 @@ def count_cores() -> int:
 
 
 @cache
-def _pool() -> ThreadPoolExecutor:
+def _make_pool() -> ThreadPoolExecutor:
     """Make the threads of this process, one a core."""
     return ThreadPoolExecutor(count_cores(), thread_name_prefix="parakin")
 
 
 if hasattr(os, "register_at_fork"):  # a forked child has the pool but none of its threads
-    os.register_at_fork(after_in_child=_pool.cache_clear)
+    os.register_at_fork(after_in_child=_make_pool.cache_clear)
 
 
-def freeze(rows: Array) -> Array:
+def freeze_rows(rows: Array) -> Array:
     """Return a read-only view: to Numba that is a type of its own, and the kernels are compiled for it alone."""
     view = rows.view()
     view.flags.writeable = False
@@ -47,7 +47,7 @@ def run_in_threads(count: int, work: Callable[[int, int], None]) -> None:
         work(0, count)
         return
     edges = [count * i // parts for i in range(parts + 1)]
-    for future in [_pool().submit(work, a, b) for a, b in pairwise(edges)]:
+    for future in [_make_pool().submit(work, a, b) for a, b in pairwise(edges)]:
         future.result()
 
 
@@ -56,11 +56,11 @@ def evaluate_tape(tape: Tape, x: Array, out: Array, z: Array | None = None, whol
 
     With ``whole`` a row of the answer is NaN as soon as one number of it, or of its inputs, is not finite.
     """
-    from .blocks import evaluate
+    from .blocks import evaluate_rows
 
     rest = np.empty((len(x), 0)) if z is None else z
-    args = (tape, whole, freeze(x), freeze(rest), out)
-    run_in_threads(len(x), lambda start, stop: evaluate(*args, start, stop))
+    args = (tape, whole, freeze_rows(x), freeze_rows(rest), out)
+    run_in_threads(len(x), lambda start, stop: evaluate_rows(*args, start, stop))
     return out
 
 
@@ -69,7 +69,7 @@ def evaluate_tape_with_residual(tape: Tape, x: Array, out: Array, z: Array) -> A
     from .blocks import evaluate_with_residual
 
     residual = np.empty(len(x))
-    args = (tape, freeze(x), freeze(z), out, residual)
+    args = (tape, freeze_rows(x), freeze_rows(z), out, residual)
     run_in_threads(len(x), lambda start, stop: evaluate_with_residual(*args, start, stop))
     return residual
 
@@ -79,7 +79,7 @@ def find_first_negative(tape: Tape, x: Array, z: Array) -> Indices:
     from .blocks import find_negative
 
     out = np.empty(len(x), np.int64)
-    args = (tape, freeze(x), freeze(z), out)
+    args = (tape, freeze_rows(x), freeze_rows(z), out)
     run_in_threads(len(x), lambda start, stop: find_negative(*args, start, stop))
     return out
 
@@ -123,6 +123,6 @@ def solve_by_newton(tapes: NewtonTapes, limits: NewtonSteps, near: Array, joints
     count = len(joints)
     rows = np.empty((count, tapes.end.outputs))
     roots = Roots(rows, np.empty(count), np.empty(count, np.int32), np.empty(count))
-    args = (tapes, limits, freeze(near), freeze(joints), side, roots)
+    args = (tapes, limits, freeze_rows(near), freeze_rows(joints), side, roots)
     run_in_threads(count, lambda start, stop: solve_newton(*args, start, stop))
     return roots

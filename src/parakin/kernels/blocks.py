@@ -244,7 +244,7 @@ def _load_inputs(x, z, row, stop, r, bad):
 
 
 @njit(nogil=True, cache=True, fastmath=FAST, error_model="numpy")
-def evaluate(tape, whole, x, z, y, start, stop):
+def evaluate_rows(tape, whole, x, z, y, start, stop):
     """Evaluate y[i] = tape(x[i], z[i]) for rows start ≤ i < stop.
 
     With ``whole`` a row is NaN where an input or output is not finite; else that spoils only what follows from it.

@@ -34,7 +34,7 @@ def use_widest_vectors(typing):
 
 
 @intrinsic
-def _to_bits(typing, x):
+def _read_bits(typing, x):
     """Return the bits of a float64 as an integer."""
 
     def generate(context, builder, signature, args):
@@ -44,7 +44,7 @@ def _to_bits(typing, x):
 
 
 @intrinsic
-def _from_bits(typing, bits):
+def _make_float(typing, bits):
     """Return the float64 that has these bits."""
 
     def generate(context, builder, signature, args):
@@ -59,7 +59,7 @@ def sqrt(x):
 
     The processor's own takes as long as twenty products.
     """
-    y = _from_bits(0x5FE6EB50C7B537A9 - (_to_bits(x) >> 1))  # 1/√x within 4 %
+    y = _make_float(0x5FE6EB50C7B537A9 - (_read_bits(x) >> 1))  # 1/√x within 4 %
     e = 1.0 - x * y * y
     y = y + y * e * (0.5 + e * (0.375 + e * 0.3125))
     e = 1.0 - x * y * y
@@ -73,7 +73,7 @@ def sqrt(x):
 def sincos(x):
     """Compute (sin x, cos x) by polynomials; NaN beyond GREATEST_ANGLE."""
     shifted = x * 0.63661977236758134308 + 6755399441055744.0  # 1.5·2^52: the quadrant is in the lowest bits
-    quadrant = _to_bits(shifted)
+    quadrant = _read_bits(shifted)
     q = shifted - 6755399441055744.0
     r = ((x - q * _PI_2[0]) - q * _PI_2[1]) - q * _PI_2[2]
     r = r if abs(x) <= 1e5 else np.nan
@@ -110,9 +110,9 @@ def sincos(x):
         )
     )
     odd = (quadrant & 1) == 1
-    sine = _to_bits(c if odd else s) ^ ((quadrant & 2) << 62)
-    cosine = _to_bits(s if odd else c) ^ (((quadrant + 1) & 2) << 62)
-    return _from_bits(sine), _from_bits(cosine)
+    sine = _read_bits(c if odd else s) ^ ((quadrant & 2) << 62)
+    cosine = _read_bits(s if odd else c) ^ (((quadrant + 1) & 2) << 62)
+    return _make_float(sine), _make_float(cosine)
 
 
 @njit(inline="always", fastmath=FAST)

@@ -55,35 +55,35 @@ def _round_up(x, size):
 
 
 @njit(inline="always", fastmath=FAST)
-def _smaller(x, y):
+def _minimum(x, y):
     return x if x < y else y
 
 
 @njit(inline="always", fastmath=FAST)
-def _larger(x, y):
+def _maximum(x, y):
     return x if x > y else y
 
 
 @njit(inline="always", fastmath=FAST)
-def _multiply(al, ah, bl, bh):
+def _multiply_intervals(al, ah, bl, bh):
     """Bound the product of two intervals, not yet widened; 0·∞ is 0, for an infinite end is never reached."""
     p, q, s, t = al * bl, al * bh, ah * bl, ah * bh
     p = p if p == p else 0.0
     q = q if q == q else 0.0
     s = s if s == s else 0.0
     t = t if t == t else 0.0
-    return _smaller(_smaller(p, q), _smaller(s, t)), _larger(_larger(p, q), _larger(s, t))
+    return _minimum(_minimum(p, q), _minimum(s, t)), _maximum(_maximum(p, q), _maximum(s, t))
 
 
 @njit(inline="always", fastmath=FAST)
 def _magnitude(low, high):
-    return _larger(abs(low), abs(high))
+    return _maximum(abs(low), abs(high))
 
 
 @njit(inline="always", fastmath=FAST)
 def _bound_sine(at_low, at_high, low, high, phase):
     """Bound sin(x + phase) over [low, high] from its values at the ends."""
-    down, up = _smaller(at_low, at_high) - _OFF, _larger(at_low, at_high) + _OFF
+    down, up = _minimum(at_low, at_high) - _OFF, _maximum(at_low, at_high) + _OFF
     slack = 1e-15 * (1.0 + _magnitude(low, high))
     a = (low + phase - slack) * 0.15915494309189535
     b = (high + phase + slack) * 0.15915494309189535
@@ -96,16 +96,16 @@ def _bound_sine(at_low, at_high, low, high, phase):
 @njit(inline="always", fastmath=FAST)
 def _bound_product(k, al, ah, bl, bh, same):
     """Bound k·a·b, not yet widened; ``same`` is true if a is b."""
-    low, high = _multiply(al, ah, bl, bh)
+    low, high = _multiply_intervals(al, ah, bl, bh)
     low = 0.0 if same & (low < 0.0) else low
     low, high = k * low, k * high
-    return _smaller(low, high), _larger(low, high)
+    return _minimum(low, high), _maximum(low, high)
 
 
 @njit(inline="always", fastmath=FAST)
-def _scale(k, low, high):
+def _scale_interval(k, low, high):
     low, high = k * low, k * high
-    return _smaller(low, high), _larger(low, high)
+    return _minimum(low, high), _maximum(low, high)
 
 
 @njit(nogil=True, cache=True, fastmath=FAST, error_model="numpy")
@@ -146,28 +146,28 @@ def interpret(code, constants, r):
         elif op == FMA:
             for j in range(LANES):
                 low, high = _bound_product(k0, r[a + j], r[a + LANES + j], r[b + j], r[b + LANES + j], ab)
-                l2, h2 = _scale(k1, r[c + j], r[c + LANES + j])
+                l2, h2 = _scale_interval(k1, r[c + j], r[c + LANES + j])
                 size = _magnitude(low, high) + _magnitude(l2, h2) + abs(k2)
                 r[d + j] = _round_down(low + l2 + k2, size)
                 r[d + LANES + j] = _round_up(high + h2 + k2, size)
         elif op == LIN1:
             for j in range(LANES):
-                low, high = _scale(k1, r[a + j], r[a + LANES + j])
+                low, high = _scale_interval(k1, r[a + j], r[a + LANES + j])
                 size = abs(k0) + _magnitude(low, high)
                 r[d + j] = _round_down(k0 + low, size)
                 r[d + LANES + j] = _round_up(k0 + high, size)
         elif op == LIN2:
             for j in range(LANES):
-                low, high = _scale(k1, r[a + j], r[a + LANES + j])
-                l2, h2 = _scale(k2, r[b + j], r[b + LANES + j])
+                low, high = _scale_interval(k1, r[a + j], r[a + LANES + j])
+                l2, h2 = _scale_interval(k2, r[b + j], r[b + LANES + j])
                 size = abs(k0) + _magnitude(low, high) + _magnitude(l2, h2)
                 r[d + j] = _round_down(k0 + low + l2, size)
                 r[d + LANES + j] = _round_up(k0 + high + h2, size)
         elif op == LIN3:
             for j in range(LANES):
-                low, high = _scale(k1, r[a + j], r[a + LANES + j])
-                l2, h2 = _scale(k2, r[b + j], r[b + LANES + j])
-                l3, h3 = _scale(k3, r[c + j], r[c + LANES + j])
+                low, high = _scale_interval(k1, r[a + j], r[a + LANES + j])
+                l2, h2 = _scale_interval(k2, r[b + j], r[b + LANES + j])
+                l3, h3 = _scale_interval(k3, r[c + j], r[c + LANES + j])
                 size = abs(k0) + _magnitude(low, high) + _magnitude(l2, h2) + _magnitude(l3, h3)
                 r[d + j] = _round_down(k0 + low + l2 + l3, size)
                 r[d + LANES + j] = _round_up(k0 + high + h2 + h3, size)
@@ -180,14 +180,14 @@ def interpret(code, constants, r):
                 low, high = r[b + j], r[b + LANES + j]
                 through = (low <= 0.0) & (high >= 0.0)
                 il, ih = 1.0 / (1.0 if through else high), 1.0 / (1.0 if through else low)
-                low, high = _multiply(r[a + j], r[a + LANES + j], il, ih)
+                low, high = _multiply_intervals(r[a + j], r[a + LANES + j], il, ih)
                 low, high = _round_down(low, 4.0 * abs(low)), _round_up(high, 4.0 * abs(high))
                 r[d + j] = -np.inf if through else low
                 r[d + LANES + j] = np.inf if through else high
         elif op == SQRT:
             for j in range(LANES):
-                low, high = np.sqrt(_larger(r[a + j], 0.0)), np.sqrt(_larger(r[a + LANES + j], 0.0))
-                r[d + j] = _larger(_round_down(low, low), 0.0)
+                low, high = np.sqrt(_maximum(r[a + j], 0.0)), np.sqrt(_maximum(r[a + LANES + j], 0.0))
+                r[d + j] = _maximum(_round_down(low, low), 0.0)
                 r[d + LANES + j] = _round_up(high, high)
         elif op == SINCOS:  # into d and a, of b
             for j in range(LANES):
@@ -200,29 +200,29 @@ def interpret(code, constants, r):
                 yl, yh, xl, xh = r[a + j], r[a + LANES + j], r[b + j], r[b + LANES + j]
                 p, q, s, t = atan2(yl, xl), atan2(yl, xh), atan2(yh, xl), atan2(yh, xh)
                 cut = (yl < 0.0) & (yh >= 0.0) & (xl <= 0.0)  # the angle jumps there, and at the origin it is any
-                low = _smaller(_smaller(p, q), _smaller(s, t)) - _OFF
-                high = _larger(_larger(p, q), _larger(s, t)) + _OFF
+                low = _minimum(_minimum(p, q), _minimum(s, t)) - _OFF
+                high = _maximum(_maximum(p, q), _maximum(s, t)) + _OFF
                 known = _magnitude(yl, yh) + _magnitude(xl, xh) < _HUGE  # what is greater, or infinite, gives any angle
                 r[d + j] = low if known & (not cut) else -3.1415926535897936
                 r[d + LANES + j] = high if known & (not cut) else 3.1415926535897936
         elif op == MIN:
             for j in range(LANES):
-                r[d + j] = _smaller(r[a + j], r[b + j])
-                r[d + LANES + j] = _smaller(r[a + LANES + j], r[b + LANES + j])
+                r[d + j] = _minimum(r[a + j], r[b + j])
+                r[d + LANES + j] = _minimum(r[a + LANES + j], r[b + LANES + j])
         elif op == MAX:
             for j in range(LANES):
-                r[d + j] = _larger(r[a + j], r[b + j])
-                r[d + LANES + j] = _larger(r[a + LANES + j], r[b + LANES + j])
+                r[d + j] = _maximum(r[a + j], r[b + j])
+                r[d + LANES + j] = _maximum(r[a + LANES + j], r[b + LANES + j])
         elif op == ABS:
             for j in range(LANES):
                 low, high = r[a + j], r[a + LANES + j]
-                least = _smaller(abs(low), abs(high))
+                least = _minimum(abs(low), abs(high))
                 r[d + j] = 0.0 if (low <= 0.0) & (high >= 0.0) else least
                 r[d + LANES + j] = _magnitude(low, high)
         elif op == COPYSIGN:
             for j in range(LANES):
                 low, high = r[a + j], r[a + LANES + j]
-                least = _smaller(abs(low), abs(high))
+                least = _minimum(abs(low), abs(high))
                 least = 0.0 if (low <= 0.0) & (high >= 0.0) else least
                 most = _magnitude(low, high)
                 up, below = r[b + j] >= 0.0, r[b + LANES + j] < 0.0
@@ -233,13 +233,13 @@ def interpret(code, constants, r):
                 below = r[a + LANES + j] < r[b + j]
                 above = r[a + j] >= r[b + LANES + j]
                 cl, ch, el, eh = r[c + j], r[c + LANES + j], r[e + j], r[e + LANES + j]
-                low, high = _smaller(cl, el), _larger(ch, eh)
+                low, high = _minimum(cl, el), _maximum(ch, eh)
                 r[d + j] = cl if below else (el if above else low)
                 r[d + LANES + j] = ch if below else (eh if above else high)
 
 
 @njit(nogil=True, cache=True, fastmath=FAST, error_model="numpy")
-def enclose(tape, low, high, down, up, start, stop):
+def enclose_outputs(tape, low, high, down, up, start, stop):
     """Enclose a tape's outputs over the boxes [low, high] in (down, up), (N, outputs), for rows start ≤ i < stop."""
     r = allocate_lanes(2 * tape.registers)
     r[:] = 0.0

@@ -11,7 +11,7 @@ import numpy as np
 from .. import algebra as alg
 from ..algebra import Scalar, Term, Trace
 from ..arrays import Array
-from .batch import freeze, run_in_threads
+from .batch import freeze_rows, run_in_threads
 from .tape import Tape, compile_tape
 
 Bounds = tuple[Array, Array]
@@ -41,9 +41,9 @@ class IntervalProgram:
         Roots are taken of the part of an interval that is not negative; a quotient by an interval that holds 0 is the
         whole line. So bounds hold wherever the output exists.
         """
-        from .enclosures import enclose
+        from .enclosures import enclose_outputs
 
         down, up = np.empty((len(low), len(self.outputs))), np.empty((len(low), len(self.outputs)))
-        args = (self.tape, freeze(np.ascontiguousarray(low)), freeze(np.ascontiguousarray(high)), down, up)
-        run_in_threads(len(low), lambda start, stop: enclose(*args, start, stop))
+        args = (self.tape, freeze_rows(np.ascontiguousarray(low)), freeze_rows(np.ascontiguousarray(high)), down, up)
+        run_in_threads(len(low), lambda start, stop: enclose_outputs(*args, start, stop))
         return down, up

@@ -9,10 +9,10 @@ from ..arrays import Array
 from ..errors import NoMethodError
 from ..kernels.batch import evaluate_tape_with_residual
 from ..kernels.intervals import IntervalProgram
-from ..model.chain import rotation_about
+from ..model.chain import make_rotation_about
 from ..model.legs.lambda_ import Lambda
 from ..model.traces import Model
-from .forward import closure_tolerance, compute_poses, find_roots
+from .forward import compute_closure_tolerance, compute_poses, find_roots
 from .planar_rpr import solve_planar_rpr
 from .root_isolation import isolate_roots
 
@@ -40,7 +40,7 @@ def find_assemblies(model: Model, joints: Array) -> Array:
         )
     coordinates = methods[model.structure.assembly_method](model, joints)
     given = np.ascontiguousarray(np.broadcast_to(joints, (len(coordinates), joints.shape[1])))
-    good = find_roots(model, coordinates, given, most=0, poses=False).residual <= closure_tolerance(model)
+    good = find_roots(model, coordinates, given, most=0, poses=False).residual <= compute_closure_tolerance(model)
     coordinates, given = coordinates[good], given[good]
     poses = compute_poses(model, np.ascontiguousarray(coordinates), given)
     return poses[np.isfinite(poses).all(1)]
@@ -52,7 +52,7 @@ def _find_common_points(model: Model, joints: Array) -> Array:
     for i, side in enumerate((model.home_side, -model.home_side)):
         tape, pose = model.spheres_tape(side), poses[i : i + 1]
         residual[i] = evaluate_tape_with_residual(tape, joints, pose, np.empty((1, 0)))[0]
-    poses = poses[residual <= closure_tolerance(model)]
+    poses = poses[residual <= compute_closure_tolerance(model)]
     return poses[:1] if len(poses) == 2 and np.array_equal(poses[0], poses[1]) else poses
 
 
@@ -89,7 +89,7 @@ def _polish_roots(model: Model, joints: Array, starts: Array, low: Array, high: 
     given = np.ascontiguousarray(np.broadcast_to(joints, (len(starts), joints.shape[1])))
     roots = find_roots(model, starts, given, poses=False)
     y, slack = roots.rows, 1e-9 * (high - low)
-    good = (roots.residual <= closure_tolerance(model)) & (y >= low - slack).all(1) & (y <= high + slack).all(1)
+    good = (roots.residual <= compute_closure_tolerance(model)) & (y >= low - slack).all(1) & (y <= high + slack).all(1)
     kept: list[Array] = []
     for root in y[good]:
         if not any((np.abs(root - other) <= 1e-6 * (high - low)).all() for other in kept):
@@ -151,7 +151,7 @@ def _solve_lambdas(model: Model, joints: Array) -> Array:
         flat = corners @ tilt.T @ side.T
         height = heights[0] - axis @ (tilt @ corners[0])
         for x, y, turn in solve_planar_rpr(feet @ side.T, distances, flat):
-            spin: Array = np.array(rotation_about(axis.tolist(), np.sin(turn), np.cos(turn)))
+            spin: Array = np.array(make_rotation_about(axis.tolist(), np.sin(turn), np.cos(turn)))
             origin = side.T @ np.array([x, y]) + height * axis
             poses.append(np.array(structure.coordinates_of((spin @ tilt).tolist(), origin.tolist())))
     return np.array(poses).reshape(-1, 6)

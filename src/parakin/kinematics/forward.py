@@ -77,7 +77,7 @@ def _count_turns(model: Model, poses: Array, near: Array) -> None:
         poses[:, i] -= TURN * np.round((poses[:, i] - near[..., i]) / TURN)
 
 
-def closure_tolerance(model: Model) -> float:
+def compute_closure_tolerance(model: Model) -> float:
     """Return the greatest closure error of an answer, mm: rounding grows with the machine."""
     return CLOSED * max(1.0, max(model.sizes) / 1000.0)
 
@@ -118,7 +118,7 @@ def _solve_by_spheres(model: Model, joints: Array, starts: Array | None) -> Solu
         residual = _choose_by_working_mode(model, joints, poses)
     else:
         residual = evaluate_tape_with_residual(model.spheres_tape(None), joints, poses, starts)
-    return Solution(poses, residual, residual <= closure_tolerance(model), np.zeros(len(joints), np.int32))
+    return Solution(poses, residual, residual <= compute_closure_tolerance(model), np.zeros(len(joints), np.int32))
 
 
 def _choose_by_working_mode(model: Model, joints: Array, poses: Array) -> Array:
@@ -133,7 +133,7 @@ def _choose_by_working_mode(model: Model, joints: Array, poses: Array) -> Array:
 
     def is_out_of_mode(poses: Array, joints: Array) -> Flags:
         off = np.abs(solve_inverse(model, poses, model.mode) - joints)[:, : model.leg_count].max(1)
-        fits: Flags = off <= 1e3 * closure_tolerance(model)
+        fits: Flags = off <= 1e3 * compute_closure_tolerance(model)
         return ~fits
 
     lost = np.flatnonzero(is_out_of_mode(poses, joints) & np.isfinite(residual))
@@ -154,7 +154,7 @@ def find_sides(model: Model, poses: Array) -> Array:
 def _solve_by_newton(model: Model, joints: Array, starts: Array | None) -> Solution:
     near = np.array(model.home)[None, :] if starts is None else starts
     result = find_roots(model, near, joints, side=find_sides(model, near) if starts is None else None)
-    good = (result.residual <= closure_tolerance(model)) & (result.turned > 0.0)
+    good = (result.residual <= compute_closure_tolerance(model)) & (result.turned > 0.0)
     if not good.all():
         _continue_from_starts(model, near, joints, result, good)
     return Solution(result.rows, result.residual, good, result.steps)
@@ -175,7 +175,7 @@ def _continue_from_starts(model: Model, near: Array, joints: Array, result: Root
                 step = find_roots(model, walk, begin + (part / parts) * (joints[lost] - begin), side=side)
                 walk = step.rows
                 result.steps[lost] += step.steps
-            fine = (step.residual <= closure_tolerance(model)) & (step.turned > 0.0)
+            fine = (step.residual <= compute_closure_tolerance(model)) & (step.turned > 0.0)
         result.rows[lost[fine]], result.residual[lost[fine]] = walk[fine], step.residual[fine]
         good[lost[fine]] = True
 
@@ -206,4 +206,4 @@ def _solve_by_constant_jacobian(model: Model, joints: Array, starts: Array | Non
             y += np.einsum("nij,nj->ni", inverse, joints[:, :legs] - both[:, :legs])
             both = evaluate_tape(tape, y, np.empty((len(y), legs + legs * m)))
     residual = find_roots(model, y, joints, most=0, poses=False).residual
-    return Solution(compute_poses(model, y, joints), residual, residual <= closure_tolerance(model), steps)
+    return Solution(compute_poses(model, y, joints), residual, residual <= compute_closure_tolerance(model), steps)

@@ -16,9 +16,9 @@ from ..algebra import (
     add,
     apply,
     atan2,
-    axis_rotation,
     cross,
     dot,
+    make_axis_rotation,
     move_along,
     norm,
     product,
@@ -36,7 +36,7 @@ UNIT: dict[str, Vec] = {
 _PARALLEL = 1e-6  # sine of the angle between two axes; below this they are parallel
 
 
-def exact_sincos(angle: float) -> tuple[float, float]:
+def compute_exact_sincos(angle: float) -> tuple[float, float]:
     """Compute sine and cosine of a fixed angle, exact where they are 0, ±1/2 or ±1 (multiples of 30° and 90°)."""
     s, c = float(np.sin(angle)), float(np.cos(angle))
     return tuple(round(2.0 * v) / 2.0 if abs(2.0 * v - round(2.0 * v)) < 1e-15 else v for v in (s, c))  # type: ignore[return-value]
@@ -51,8 +51,8 @@ def compose_chain(steps: Iterable[Step], joints: Sequence[Scalar]) -> tuple[Mat,
         if step.axis in TRANSLATIONS:
             origin = move_along(origin, apply(rotation, UNIT[step.axis]), value)
         else:
-            s, c = exact_sincos(value) if step.drive is None else sincos(value)
-            rotation = product(rotation, axis_rotation(step.axis, s, c))
+            s, c = compute_exact_sincos(value) if step.drive is None else sincos(value)
+            rotation = product(rotation, make_axis_rotation(step.axis, s, c))
     return rotation, origin
 
 
@@ -98,7 +98,7 @@ class Pointing:
             if step.drive is not None:
                 axes.append(apply(rotation, UNIT[step.axis]))
                 signs.append(step.sign)
-            rotation = product(rotation, axis_rotation(step.axis, *exact_sincos(step.value)))
+            rotation = product(rotation, make_axis_rotation(step.axis, *compute_exact_sincos(step.value)))
         if len(axes) != 2:
             raise DescriptionError(part, f"{len(axes)} driven turns point the tool, two are needed")
         pointing = cls(axes[0], axes[1], apply(rotation, UNIT["tz"]), (signs[0], signs[1]))
@@ -153,7 +153,7 @@ class Pointing:
         return PointingAngles(joints, freedom, reach, turns, 1.0 - beta * beta)
 
 
-def rotation_about(axis: Vec, s: Scalar, c: Scalar) -> Mat:
+def make_rotation_about(axis: Vec, s: Scalar, c: Scalar) -> Mat:
     """Compute the rotation about a unit axis by the angle of sine s and cosine c (Rodrigues)."""
     x, y, z = axis
     skew = ((0.0, -z, y), (z, 0.0, -x), (-y, x, 0.0))
@@ -163,6 +163,6 @@ def rotation_about(axis: Vec, s: Scalar, c: Scalar) -> Mat:
     )
 
 
-def to_local(rotation: Mat, origin: Vec, point: Vec) -> Vec:
+def transform_to_local(rotation: Mat, origin: Vec, point: Vec) -> Vec:
     """Transform a point of the outer frame into the frame (rotation, origin)."""
     return apply(transpose(rotation), tuple(p - o for p, o in zip(point, origin, strict=True)))

@@ -74,18 +74,18 @@ class HomeRods:
     platform: tuple[Vec, ...]
 
 
-def leg_joints(spec: Spec, joints: Sequence[Scalar]) -> list[list[Scalar]]:
+def group_joints_by_leg(spec: Spec, joints: Sequence[Scalar]) -> list[list[Scalar]]:
     """Group the joint vector by leg; ``joints`` may go on with those of head and table."""
     index = {drive.name: i for i, drive in enumerate(spec.drives)}
     return [[joints[index[drive.name]] for drive in leg.drives] for leg in spec.legs]
 
 
-def platform_points(spec: Spec, rotation: Mat, origin: Vec) -> list[Vec]:
+def compute_platform_points(spec: Spec, rotation: Mat, origin: Vec) -> list[Vec]:
     """Compute the platform's joint of every leg in the base frame, mm."""
     return [add(origin, apply(rotation, leg.platform)) for leg in spec.legs]
 
 
-def _bound_value(
+def _list_bounds(
     name: str, subject: str, unit: Literal["mm", "rad"], value: Scalar, low: float, high: float
 ) -> Iterator[tuple[Limit, Scalar]]:
     if isfinite(low):
@@ -108,13 +108,13 @@ def _list_drive_limits(spec: Spec, joints: Sequence[Scalar]) -> Iterator[tuple[L
     legs = {drive.name for leg in spec.legs for drive in leg.drives}
     for drive, q in zip(spec.drives, joints, strict=True):
         subject = f"{'leg' if drive.name in legs else 'joint'} {drive.name}"
-        yield from _bound_value(drive.name, subject, drive.unit, q, drive.low, drive.high)
+        yield from _list_bounds(drive.name, subject, drive.unit, q, drive.low, drive.high)
 
 
 def _list_passive_limits(spec: Spec, coordinates: Mapping[str, Scalar]) -> Iterator[tuple[Limit, Scalar]]:
     for bound in spec.limits.passive:
         unit: Literal["mm", "rad"] = "mm" if bound.name.startswith("t") else "rad"
-        yield from _bound_value(
+        yield from _list_bounds(
             bound.name, f"passive {bound.name}", unit, coordinates[bound.name], bound.low, bound.high
         )
 
@@ -123,12 +123,12 @@ def _list_gaps(spec: Spec, joints: Sequence[Scalar]) -> Iterator[tuple[Limit, Sc
     position = {drive.name: q for drive, q in zip(spec.drives, joints, strict=True)}
     for gap in spec.limits.gaps:
         name = f"gap {gap.first}-{gap.second}"
-        yield from _bound_value(name, name, "mm", position[gap.second] - position[gap.first], gap.low, gap.high)
+        yield from _list_bounds(name, name, "mm", position[gap.second] - position[gap.first], gap.low, gap.high)
 
 
 def _compute_rods(spec: Spec, placement: PlatformPlacement, joints: Sequence[Scalar]) -> list[list[tuple[Vec, Vec]]]:
-    points = platform_points(spec, placement.rotation, placement.origin)
-    by_leg = leg_joints(spec, joints)
+    points = compute_platform_points(spec, placement.rotation, placement.origin)
+    by_leg = group_joints_by_leg(spec, joints)
     return [leg.struts(point, q) for leg, point, q in zip(spec.legs, points, by_leg, strict=True)]
 
 
@@ -169,23 +169,26 @@ def _list_clearances(
         if _share_joint(one, two):
             continue
         names = f"{one.drives[0].name}-{two.drives[0].name}"
-        yield Limit(f"clearance {names}", f"clearance of {names}", "mm", "min", least), segment_distance(a, b) - least
+        yield (
+            Limit(f"clearance {names}", f"clearance of {names}", "mm", "min", least),
+            compute_segment_distance(a, b) - least,
+        )
 
 
 def _share_joint(one: Leg, two: Leg) -> bool:
     return one.platform == two.platform or (one.fixed_foot() is not None and one.fixed_foot() == two.fixed_foot())
 
 
-def segment_distance(a: tuple[Vec, Vec], b: tuple[Vec, Vec]) -> Scalar:
+def compute_segment_distance(a: tuple[Vec, Vec], b: tuple[Vec, Vec]) -> Scalar:
     """Compute the least distance of two segments (Ericson, Real-Time Collision Detection, 5.1.9), branch-free."""
     u, v, w = sub(a[1], a[0]), sub(b[1], b[0]), sub(a[0], b[0])
     uu, vv, uv, uw, vw = dot(u, u), dot(v, v), dot(u, v), dot(u, w), dot(v, w)
     # A tiny part of |u|²|v|² avoids 0/0 for parallel segments, where any point is right.
-    s = _clamp((uv * vw - uw * vv) / maximum(uu * vv - uv * uv, 1e-14 * (uu * vv)))
-    t = _clamp((uv * s + vw) / vv)
-    s = _clamp((uv * t - uw) / uu)
+    s = _clamp_fraction((uv * vw - uw * vv) / maximum(uu * vv - uv * uv, 1e-14 * (uu * vv)))
+    t = _clamp_fraction((uv * s + vw) / vv)
+    s = _clamp_fraction((uv * t - uw) / uu)
     return norm(sub(add(w, scale(u, stop_gradient(s))), scale(v, stop_gradient(t))))
 
 
-def _clamp(x: Scalar) -> Scalar:
+def _clamp_fraction(x: Scalar) -> Scalar:
     return maximum(minimum(x, 1.0), 0.0)

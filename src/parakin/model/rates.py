@@ -8,8 +8,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from ..algebra import Scalar, Trace, derivative, evaluate, norm
-from .limits import platform_points
+from ..algebra import Scalar, Trace, derivative, evaluate_trace, norm
+from .limits import compute_platform_points
 from .spec import Spec
 from .structures import Structure
 
@@ -52,15 +52,15 @@ def compute_twist_rates(
         own = [[q[index[drive.name]] for drive in leg.drives] for leg in spec.legs]
         return [leg.closures(p, given) for leg, p, given in zip(spec.legs, points, own, strict=True)]
 
-    points = platform_points(spec, rotation, origin)
+    points = compute_platform_points(spec, rotation, origin)
     rows = [*(f for group in closures(points) for f in group), *tilts]
     twist = [term for term, axis in zip(x, structure.axes, strict=True) if axis in "XYZ"] + turn
     at_rest = [*pose, *joints, *[0.0] * len(turn)]
-    a = evaluate(trace, [derivative(f, term) for f in rows for term in twist], at_rest)
-    b = evaluate(trace, [-derivative(f, term) for f in rows for term in q], at_rest)
-    positions = evaluate(trace, [c for point in points for c in point], at_rest)
+    a = evaluate_trace(trace, [derivative(f, term) for f in rows for term in twist], at_rest)
+    b = evaluate_trace(trace, [-derivative(f, term) for f in rows for term in q], at_rest)
+    positions = evaluate_trace(trace, [c for point in points for c in point], at_rest)
     wrench_norms = [
-        norm(evaluate(trace, [derivative(f, c) for c in point], [*at_rest, *positions]))
+        norm(evaluate_trace(trace, [derivative(f, c) for c in point], [*at_rest, *positions]))
         for group, point in zip(closures(free), free, strict=True)
         for f in group
     ]

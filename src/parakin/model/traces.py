@@ -10,15 +10,15 @@ from functools import cached_property
 
 import numpy as np
 
-from ..algebra import Scalar, Trace, Vec, apply, derivative, evaluate, minimum, norm, scale, sqrt, sub, transpose
+from ..algebra import Scalar, Trace, Vec, apply, derivative, evaluate_trace, minimum, norm, scale, sqrt, sub, transpose
 from ..errors import DescriptionError
 from ..kernels.tape import Tape, compile_tape
 from .legs import Inverse
-from .limits import HomeRods, Limit, leg_joints, list_limits, platform_points
+from .limits import HomeRods, Limit, compute_platform_points, group_joints_by_leg, list_limits
 from .rates import compute_twist_rates
 from .spec import Spec
 from .spheres import CENTRES_NEEDED, find_common_point, find_side
-from .structures import PlatformPlacement, Structure, structure_of
+from .structures import PlatformPlacement, Structure, make_structure
 
 FAR = 1e12  # mm; more than any pose's coordinate
 
@@ -28,7 +28,7 @@ class Model:
 
     def __init__(self, spec: Spec):
         self.spec = spec
-        self.structure: Structure = structure_of(spec)
+        self.structure: Structure = make_structure(spec)
         self.axes = self.structure.axes
         self.drives = spec.drives
         self.serial = len(self.drives) - sum(len(leg.drives) for leg in spec.legs)
@@ -57,7 +57,7 @@ class Model:
         """Compute the joint vector, placement and each leg's inverse for a pose."""
         signs, branch = self.split_mode(mode)
         placed = self.structure.place(pose, branch, first)
-        points = platform_points(self.spec, placed.rotation, placed.origin)
+        points = compute_platform_points(self.spec, placed.rotation, placed.origin)
         legs = [leg.inverse(point, s) for leg, point, s in zip(self.spec.legs, points, signs, strict=True)]
         by_name = {
             drive.name: q
@@ -71,7 +71,7 @@ class Model:
         """List every limit with its margin, for a pose and the joints that a path takes there."""
         signs, _ = self.split_mode(mode)
         placed = self.structure.place_with_joints(pose, self._serial(joints))
-        points = platform_points(self.spec, placed.rotation, placed.origin)
+        points = compute_platform_points(self.spec, placed.rotation, placed.origin)
         legs = [leg.inverse(point, s) for leg, point, s in zip(self.spec.legs, points, signs, strict=True)]
         return self._margins(placed, joints, legs)
 
@@ -89,8 +89,8 @@ class Model:
 
     def closures(self, rotation: Sequence[Vec], origin: Vec, joints: Sequence[Scalar]) -> list[Scalar]:
         """List every leg's closure, mm²."""
-        points = platform_points(self.spec, rotation, origin)
-        given = leg_joints(self.spec, joints)
+        points = compute_platform_points(self.spec, rotation, origin)
+        given = group_joints_by_leg(self.spec, joints)
         return [f for leg, p, q in zip(self.spec.legs, points, given, strict=True) for f in leg.closures(p, q)]
 
     @cached_property
@@ -100,8 +100,8 @@ class Model:
     @cached_property
     def rods_at_home(self) -> HomeRods:
         joints, placed, _ = self.invert(self.home, self.mode)
-        points = platform_points(self.spec, placed.rotation, placed.origin)
-        given = leg_joints(self.spec, joints)
+        points = compute_platform_points(self.spec, placed.rotation, placed.origin)
+        given = group_joints_by_leg(self.spec, joints)
         rods = [leg.struts(p, q)[0] for leg, p, q in zip(self.spec.legs, points, given, strict=True)]
         units = [scale(sub(point, foot), 1.0 / norm(sub(point, foot))) for foot, point in rods]
         back = transpose(placed.rotation)
@@ -111,8 +111,8 @@ class Model:
     def sizes(self) -> list[float]:
         """A length a closure, mm: divided by it a closure is (no less than) the distance by which its leg is open."""
         joints, placed, _ = self.invert(self.home, self.mode)
-        points = platform_points(self.spec, placed.rotation, placed.origin)
-        given = leg_joints(self.spec, joints)
+        points = compute_platform_points(self.spec, placed.rotation, placed.origin)
+        given = group_joints_by_leg(self.spec, joints)
         sizes = []
         for leg, point, q in zip(self.spec.legs, points, given, strict=True):
             foot, end = leg.struts(point, q)[0]
@@ -226,8 +226,8 @@ class Model:
     def _compute_pose(self, coordinates: Sequence[Scalar], joints: Sequence[Scalar]) -> list[Scalar]:
         """Compute the pose; NaN where a leg closes otherwise than it is built, as a strut of negative length does."""
         first, *others = self.structure.pose(coordinates, self._serial(joints))
-        points = platform_points(self.spec, *self.structure.frame(coordinates))
-        for leg, point, q in zip(self.spec.legs, points, leg_joints(self.spec, joints), strict=True):
+        points = compute_platform_points(self.spec, *self.structure.frame(coordinates))
+        for leg, point, q in zip(self.spec.legs, points, group_joints_by_leg(self.spec, joints), strict=True):
             for margin in leg.assembly_margins(point, q):
                 first = minimum(first, FAR + sqrt(margin))
         return [first, *others]
@@ -258,7 +258,7 @@ class Model:
         f = self.scaled_closures(coordinates, joints)
         entries = [derivative(row, y) for row in f for y in coordinates]
         home, placed, _ = self.invert(self.home, self.mode)
-        at_home = evaluate(trace, entries, [*placed.coordinates, *home])
+        at_home = evaluate_trace(trace, entries, [*placed.coordinates, *home])
         matrix = np.array(at_home, float).reshape(len(f), len(coordinates))
         order = list(range(len(f)))
         for k in range(len(order) - 1):
@@ -274,7 +274,7 @@ class Model:
 
         def outputs(trace: Trace) -> list[Scalar]:
             coordinates = list(trace.inputs(self._motions))
-            points = platform_points(self.spec, *self.structure.frame(coordinates))
+            points = compute_platform_points(self.spec, *self.structure.frame(coordinates))
             signs, _ = self.split_mode(mode)
             joints = {
                 drive.name: q
@@ -349,7 +349,7 @@ class Model:
     def _spheres(self, joints: Sequence[Scalar]) -> tuple[list[Vec], list[Scalar], list[int]]:
         """Find centres and radii of the spheres that hold the platform's origin, and the coordinates it moves in."""
         centres, radii = [], []
-        for leg, q in zip(self.spec.legs, leg_joints(self.spec, joints), strict=True):
+        for leg, q in zip(self.spec.legs, group_joints_by_leg(self.spec, joints), strict=True):
             sphere = leg.sphere(q)
             assert sphere is not None
             centres.append(sub(sphere[0], leg.platform))

@@ -8,12 +8,12 @@ from math import isfinite
 
 import numpy as np
 
-from ..algebra import Trace, derivative, evaluate, norm
+from ..algebra import Trace, derivative, evaluate_trace, norm
 from ..arrays import Array
 from ..errors import PoseError
 from ..machine import Machine
 from ..model.chain import compose_chain
-from ..model.limits import leg_joints
+from ..model.limits import group_joints_by_leg
 
 _ZERO = 1e-9  # mm; a length no greater counts as zero
 
@@ -79,7 +79,7 @@ def _measure_platform_radius(machine: Machine) -> float:
 
 def _measure_arms(machine: Machine) -> float:
     """Measure the arms of turning drives at home: how fast their feet move, mm/rad."""
-    at_home = leg_joints(machine.spec, machine.inverse(machine.home).tolist())
+    at_home = group_joints_by_leg(machine.spec, machine.inverse(machine.home).tolist())
     lengths = []
     for leg, given in zip(machine.spec.legs, at_home, strict=True):
         trace = Trace()
@@ -87,7 +87,7 @@ def _measure_arms(machine: Machine) -> float:
         foot, _ = leg.struts(leg.platform, list(q))[0]
         for i, drive in enumerate(leg.drives):
             if drive.unit == "rad":
-                lengths.append(float(norm(evaluate(trace, [derivative(c, q[i]) for c in foot], given))))
+                lengths.append(float(norm(evaluate_trace(trace, [derivative(c, q[i]) for c in foot], given))))
     return _compute_rms(lengths)
 
 

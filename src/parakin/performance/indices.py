@@ -52,7 +52,7 @@ class Performance:
     @property
     def condition(self) -> Array:
         """Condition number of J, σmax/σmin, (...,): 1 at an isotropic pose, infinite at a singular one."""
-        return _divide(self.greatest, self.least)
+        return _divide_quietly(self.greatest, self.least)
 
     @property
     def manipulability(self) -> Array:
@@ -63,10 +63,10 @@ class Performance:
     @property
     def force(self) -> Array:
         """Force amplification along ``directions``: 1/psi, (..., n)."""
-        return _divide(np.ones_like(self.psi), self.psi)
+        return _divide_quietly(np.ones_like(self.psi), self.psi)
 
 
-def _divide(x: Array, y: Array) -> Array:
+def _divide_quietly(x: Array, y: Array) -> Array:
     with np.errstate(divide="ignore", invalid="ignore"):
         return x / y
 

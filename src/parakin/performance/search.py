@@ -100,7 +100,7 @@ def find_roots(residuals: Callable[[Array], Array], starts: Array, step: Array) 
     points, damping = starts.copy(), np.full(count, 1e-3)
     r = residuals(points)
     for _ in range(60):
-        slopes = _differentiate(residuals, points, step)
+        slopes = _estimate_derivatives(residuals, points, step)
         normal = slopes.swapaxes(1, 2) @ slopes
         size = np.einsum("nii->n", normal)[:, None, None] + 1e-300
         way = -np.linalg.solve(
@@ -113,11 +113,11 @@ def find_roots(residuals: Callable[[Array], Array], starts: Array, step: Array) 
         points[better], r[better] = tries[better], new[better]
         damping = np.clip(np.where(better, 0.1 * damping, 10.0 * damping), 1e-18, 1e6)
     worst = np.abs(r).max(1)
-    sizes = np.linalg.svd(_differentiate(residuals, points, step), compute_uv=False)
+    sizes = np.linalg.svd(_estimate_derivatives(residuals, points, step), compute_uv=False)
     return points, np.where(np.isnan(worst), np.inf, worst), sizes[:, -1] / (sizes[:, 0] + 1e-300)
 
 
-def _differentiate(residuals: Callable[[Array], Array], points: Array, step: Array) -> Array:
+def _estimate_derivatives(residuals: Callable[[Array], Array], points: Array, step: Array) -> Array:
     """Estimate derivatives (m, k, d) by central differences, by coordinates in units of ``step``; 0 if not finite."""
     h = 1e-5
     columns = [(residuals(points + h * way) - residuals(points - h * way)) / (2.0 * h) for way in np.diag(step)]

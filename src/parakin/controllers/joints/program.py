@@ -22,7 +22,7 @@ _APPROACH_LEAST = 4.0  # s, for that way
 _SHORTEST = 1e-3  # s
 
 
-def joint_letters(machine: Machine) -> tuple[str, ...]:
+def assign_joint_letters(machine: Machine) -> tuple[str, ...]:
     """Assign a letter to each joint: linear ones X Y Z U V W, turning ones A B C, in their order.
 
     Raises :class:`PoseError` where there are more joints than letters.
@@ -51,7 +51,7 @@ def make_joint_program(trajectory: Trajectory, *, forced: str | None = None) -> 
 
     Raises :class:`PoseError` where there are more joints than letters.
     """
-    letters = joint_letters(trajectory.posted.machine)
+    letters = assign_joint_letters(trajectory.posted.machine)
 
     def write(file: BinaryIO) -> None:
         for text in _format_program(trajectory, letters, forced):

@@ -10,7 +10,7 @@ from ...model.parts import Drive
 from ...units import to_display
 from .axis_ranges import estimate_axis_ranges
 from .axis_rates import ACCELERATION, SPEED, choose_unit_rates, find_slowest_drive
-from .module import hash_kinematics, kinematics_name
+from .module import hash_kinematics, name_kinematics
 
 _LAG = 0.01  # s: following error allowed, as time at full speed; the simulation lags by 0.001 s or two
 
@@ -106,7 +106,7 @@ def write_ini(machine: Machine) -> str:
         axes=" ".join(machine.axes),
         letters="".join(machine.axes),
         joints=len(machine.joints),
-        kinematics=kinematics_name(machine),
+        kinematics=name_kinematics(machine),
         home=" ".join(format_number(home.get(axis, 0.0)) for axis in "XYZ"),
         jog=format_number(0.25 * fast),
         fast=format_number(fast),

@@ -5,7 +5,7 @@ from __future__ import annotations
 from ...machine import Machine
 from .config import write_hal, write_ini, write_tool_table
 from .first_program import write_first_program
-from .module import kinematics_name, write_module
+from .module import name_kinematics, write_module
 from .page import write_page
 from .stamp import stamp_file
 
@@ -18,7 +18,7 @@ def make_linuxcnc_configuration(machine: Machine) -> dict[str, str]:
     tells by a hash whether the file was edited since.
     """
     texts = {
-        f"{kinematics_name(machine)}.c": write_module(machine),
+        f"{name_kinematics(machine)}.c": write_module(machine),
         f"{machine.name}.ini": write_ini(machine),
         f"{machine.name}.hal": write_hal(machine),
         f"{machine.name}.tbl": write_tool_table(machine),

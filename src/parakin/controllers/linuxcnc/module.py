@@ -15,7 +15,7 @@ from ...kinematics.forward import MOST_STEPS
 from ...kinematics.wrist import EXACT, GAIN, NEAR_MODE, SWING, TURN
 from ...machine import Machine
 from ...model.limits import Limit
-from .tape_to_c import CVector, to_c, write_function, write_test
+from .tape_to_c import CVector, format_c, write_function, write_test
 
 _FIELDS = {"X": "tran.x", "Y": "tran.y", "Z": "tran.z", "A": "a", "B": "b", "C": "c"}
 
@@ -48,14 +48,14 @@ static inline double angle_of(double y, double x) { return atan2(y + 0.0, x + 0.
 """
 
 
-def kinematics_name(machine: Machine) -> str:
+def name_kinematics(machine: Machine) -> str:
     """Name the kinematics module; of LinuxCNC's own only ``xyzab_tdr_kins`` is built likewise."""
     return f"{machine.name}_kins"
 
 
 def write_module(machine: Machine) -> str:
     """Write the C source of a machine's kinematics module, complete in one file."""
-    name = kinematics_name(machine)
+    name = name_kinematics(machine)
     title = " ".join(machine.spec.title.split()).replace("*/", "* /")
     head = _HEADER.format(name=name, machine=machine.name, title=title)
     return "\n".join(
@@ -75,14 +75,14 @@ def hash_kinematics(machine: Machine) -> str:
 def _write_body(machine: Machine) -> list[str]:
     runtime = files(__package__).joinpath("runtime.c").read_text(encoding="utf-8")
     for name, value in {"SWING": SWING / TURN, "GAIN": GAIN}.items():
-        runtime = runtime.replace(f"@{name}@", to_c(value))
-    numbers = _write_numbers(machine, kinematics_name(machine))
+        runtime = runtime.replace(f"@{name}@", format_c(value))
+    numbers = _write_numbers(machine, name_kinematics(machine))
     return [numbers, _write_transfer(machine), _ELEMENTARY, *_write_mathematics(machine), runtime]
 
 
 def _write_numbers(machine: Machine, name: str) -> str:
     """Write the sizes of everything, and the constants of the method; mm and rad."""
-    by_spheres, open_by = int(machine.has_closed_forward), to_c(machine.closure_tolerance)
+    by_spheres, open_by = int(machine.has_closed_forward), format_c(machine.closure_tolerance)
     lines = [
         f'#define MODULE "{name}"',
         f"#define AXES {len(machine.axes)}",
@@ -92,14 +92,15 @@ def _write_numbers(machine: Machine, name: str) -> str:
         f"#define WRIST {int(machine.wrist is not None)} /* two turning joints point the tool */",
         f"#define TOOL_AXIS {int(machine.has_direction)} /* of the orientation only the tool's axis counts */",
         f"#define LEG_MODES {_count_leg_modes(machine)} /* choices of the legs' inverse */",
-        f"#define SAME {to_c(NEAR_MODE)} /* mm or rad: joints nearer to each other stand in one working mode */",
-        f"#define TURN {to_c(TURN)}",
-        f"#define DEGREE {to_c(np.pi / 180.0)}",
-        f"#define FREE {to_c(EXACT)} /* rad: nearer to a turning axis the tool's tells its angle by rounding only */",
+        f"#define SAME {format_c(NEAR_MODE)} /* mm or rad: joints nearer to each other stand in one working mode */",
+        f"#define TURN {format_c(TURN)}",
+        f"#define DEGREE {format_c(np.pi / 180.0)}",
+        f"#define FREE {format_c(EXACT)} "
+        "/* rad: nearer to a turning axis the tool's tells its angle by rounding only */",
         f"#define TOLERANCE {open_by} /* mm by which the legs of an answer may fail to close */",
         *_write_wrist(machine),
         *_write_newton(machine),
-        _write_array("double", "home", [to_c(value) for value in machine.home]),
+        _write_array("double", "home", [format_c(value) for value in machine.home]),
         _write_array("int", "turning", [str(int(unit == "rad")) for unit in machine.joint_units]),
     ]
     if not machine.has_direction:
@@ -120,8 +121,8 @@ def _write_wrist(machine: Machine) -> Iterator[str]:
     if wrist is not None:
         yield f"#define FIRST {wrist.first} /* the wrist's joints, as its axes follow on each other */"
         yield f"#define SECOND {wrist.second}"
-        yield f"#define SECOND_LOW {to_c(wrist.drive.low)}"
-        yield f"#define SECOND_HIGH {to_c(wrist.drive.high)}"
+        yield f"#define SECOND_LOW {format_c(wrist.drive.low)}"
+        yield f"#define SECOND_HIGH {format_c(wrist.drive.high)}"
 
 
 def _write_newton(machine: Machine) -> Iterator[str]:
@@ -129,14 +130,15 @@ def _write_newton(machine: Machine) -> Iterator[str]:
     if tapes.newton is not None:
         least, most = min(machine.leg_sizes), max(machine.leg_sizes)
         side = float(np.sign(machine.sides(machine.home[None, :])[0]))
-        yield f"#define FINE {to_c(0.01 * machine.closure_tolerance)} /* mm: where Newton's method has arrived */"
-        yield f"#define SIZE {to_c(least)} /* of the legs, mm */"
-        yield f"#define WORTH {to_c(WORTH)} /* mm: where a step will end no worse than this, the matrix serves on */"
-        yield f"#define SLOW {to_c(SLOW)} /* a kept matrix that gains less than this a step is made anew */"
+        yield f"#define FINE {format_c(0.01 * machine.closure_tolerance)} /* mm: where Newton's method has arrived */"
+        yield f"#define SIZE {format_c(least)} /* of the legs, mm */"
+        worth = format_c(WORTH)
+        yield f"#define WORTH {worth} /* mm: where a step will end no worse than this, the matrix serves on */"
+        yield f"#define SLOW {format_c(SLOW)} /* a kept matrix that gains less than this a step is made anew */"
         yield f"#define MOST_STEPS {MOST_STEPS}"
-        yield f"#define HOME_SIDE {to_c(side)} /* of the singularities; on the other one is another assembly */"
+        yield f"#define HOME_SIDE {format_c(side)} /* of the singularities; on the other one is another assembly */"
         caps = [most / 3.0 if word.startswith("t") else 0.5 for word in tapes.coordinates]
-        yield _write_array("double", "caps", [to_c(cap) for cap in caps]) + " /* greatest step */"
+        yield _write_array("double", "caps", [format_c(cap) for cap in caps]) + " /* greatest step */"
 
 
 def _write_transfer(machine: Machine) -> str:

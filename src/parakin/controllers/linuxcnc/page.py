@@ -7,7 +7,7 @@ from html import escape
 from ...machine import Machine
 from ...units import to_display
 from .config import format_number
-from .module import kinematics_name
+from .module import name_kinematics
 
 _PAGE = """\
 # {title} under LinuxCNC
@@ -72,7 +72,7 @@ def write_page(machine: Machine) -> str:
     return _PAGE.format(
         title=escape(" ".join(machine.spec.title.split()), quote=False),
         name=machine.name,
-        kinematics=kinematics_name(machine),
+        kinematics=name_kinematics(machine),
         joints=" ".join(machine.joints),
         axes=" ".join(machine.axes),
         home=", ".join(words),

@@ -52,7 +52,7 @@ def write_test(name: str, tape: Tape, inputs: Sequence[CVector]) -> str:
     )
 
 
-def to_c(value: float) -> str:
+def format_c(value: float) -> str:
     """Format a constant of C that is exactly this double."""
     if isinf(value):
         return "HUGE_VAL" if value > 0.0 else "-HUGE_VAL"
@@ -96,20 +96,20 @@ def _write_statements(tape: Tape, inputs: Sequence[CVector]) -> tuple[list[str],
 def _write_expression(operation: int, a: Sequence[str], k: Sequence[float]) -> str:
     if operation in _SUMS:
         terms = [_write_product(factor, name) for factor, name in zip(k[1:], a[: _SUMS[operation]], strict=False)]
-        return _write_sum([to_c(k[0]), *terms] if k[0] != 0.0 or not terms else terms)
+        return _write_sum([format_c(k[0]), *terms] if k[0] != 0.0 or not terms else terms)
     if operation in _PRODUCTS:
         pairs = [f"{a[2 * i]} * {a[2 * i + 1]}" for i in range(_PRODUCTS[operation])]
         return _write_sum([_write_product(factor, pair) for factor, pair in zip(k, pairs, strict=False)])
     if operation == t.FMA:
         terms = [_write_product(k[0], f"{a[0]} * {a[1]}"), _write_product(k[1], a[2])]
-        return _write_sum([*terms, to_c(k[2])] if k[2] != 0.0 else terms)
+        return _write_sum([*terms, format_c(k[2])] if k[2] != 0.0 else terms)
     return _CALLS[operation].format(*a)
 
 
 def _write_product(factor: float, name: str) -> str:
     if abs(factor) == 1.0:
         return name if factor > 0.0 else f"-{name}"
-    return f"{to_c(factor)} * {name}"
+    return f"{format_c(factor)} * {name}"
 
 
 def _write_sum(terms: Sequence[str]) -> str:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ...units import display_unit, to_display
+from ...units import name_display_unit, to_display
 from .offence import encode_offence
 
 if TYPE_CHECKING:
@@ -55,7 +55,14 @@ def encode_joint_ranges(posted: Posted) -> list[dict[str, Any]]:
         ends = (drive.low, drive.high, np.fmin.reduce(values), np.fmax.reduce(values))
         low, high, least, most = (to_display(float(end), drive.unit) for end in ends)
         rows.append(
-            {"joint": drive.name, "unit": display_unit(drive.unit), "min": least, "max": most, "low": low, "high": high}
+            {
+                "joint": drive.name,
+                "unit": name_display_unit(drive.unit),
+                "min": least,
+                "max": most,
+                "low": low,
+                "high": high,
+            }
         )
     return rows
 

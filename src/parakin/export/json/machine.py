@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING, Any
 
-from ...units import display_unit, to_display
+from ...units import name_display_unit, to_display
 
 if TYPE_CHECKING:
     from ...machine import Machine
@@ -44,7 +44,7 @@ def encode_details(machine: Machine) -> dict[str, Any]:
     drives = [
         {
             "joint": drive.name,
-            "unit": display_unit(drive.unit),
+            "unit": name_display_unit(drive.unit),
             **{key: to_display(getattr(drive, key), drive.unit) for key in ("low", "high", *RATES)},
         }
         for drive in machine.drives
@@ -55,7 +55,7 @@ def encode_details(machine: Machine) -> dict[str, Any]:
             "of": limit.subject,
             "side": limit.side,
             "bound": None if limit.side == "reach" else to_display(limit.bound, limit.unit),
-            "unit": display_unit(limit.unit),
+            "unit": name_display_unit(limit.unit),
         }
         for limit in machine.limit_parts
     ]

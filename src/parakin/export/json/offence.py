@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from ...units import display_unit, to_display
+from ...units import name_display_unit, to_display
 
 if TYPE_CHECKING:
     from ...toolpath.posting.posted import Offence
@@ -22,6 +22,6 @@ def encode_offence(offence: Offence) -> dict[str, Any]:
         "value": to_display(offence.value, offence.unit),
         "bound": to_display(offence.bound, offence.unit),
         "excess": to_display(offence.excess, offence.unit),
-        "unit": display_unit(offence.unit),
+        "unit": name_display_unit(offence.unit),
         "count": offence.count,
     }

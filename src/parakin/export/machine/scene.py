@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 from ...machine import Machine
 from ...model.chain import UNIT, compose_chain
 from ...model.legs import Leg
-from ...model.limits import leg_joints, platform_points
+from ...model.limits import compute_platform_points, group_joints_by_leg
 from ...model.parts import Step
 from ...model.structures import PlatformPlacement
 
@@ -129,8 +129,8 @@ class _SceneBuilder:
 
     def _add_legs(self) -> None:
         spec, anchors = self.spec, []
-        points = platform_points(spec, self.placement.rotation, self.placement.origin)
-        for leg, point, q in zip(spec.legs, points, leg_joints(spec, self.joints.tolist()), strict=True):
+        points = compute_platform_points(spec, self.placement.rotation, self.placement.origin)
+        for leg, point, q in zip(spec.legs, points, group_joints_by_leg(spec, self.joints.tolist()), strict=True):
             struts = [np.array(ends, float) for ends in leg.struts(point, q)]
             moved: dict[int, list[str]] = {}
             for number, (drive, feet) in enumerate(zip(leg.drives, _sweep_feet(leg, point, q, struts[0]), strict=True)):

@@ -103,7 +103,7 @@ def _build_feed_panel(trajectory: Trajectory, curves: dict[str, ThinnedCurve]) -
 def _build_position_panel(trajectory: Trajectory, curves: dict[str, ThinnedCurve], number: int) -> Panel:
     drive, curve = trajectory.posted.machine.drives[number], curves[trajectory.posted.machine.joints[number]]
     use = RangeUse(drive.name, drive.name, drive.unit, drive.low, drive.high, *_find_ends(curve))
-    unit, scale = _display_scale(trajectory.posted.machine, number)
+    unit, scale = _find_display_scale(trajectory.posted.machine, number)
     trace = _build_line(trajectory, curve, None, {"color": _BLUE, "width": 1.3}, escape(drive.name), unit, scale)
     return build_panel(use, format_heading(drive.name, unit, ""), [trace])
 
@@ -112,7 +112,7 @@ def _build_rate_panel(trajectory: Trajectory, curves: dict[str, ThinnedCurve], n
     """Build the panel of a joint's speed, acceleration or jerk, coloured where its limit sets the pace."""
     drive = trajectory.posted.machine.drives[number]
     bound, (per, colour, ticks) = getattr(drive, kind), _KINDS[kind]
-    unit, scale = _display_scale(trajectory.posted.machine, number)
+    unit, scale = _find_display_scale(trajectory.posted.machine, number)
     text = f"limit {format_bound(bound, drive.unit)}" if isfinite(bound) else "no limit"
     title = format_heading(f"{drive.name} {kind}", unit + per, text)
     name = f"{drive.name}.{kind}"
@@ -131,6 +131,6 @@ def _find_ends(curve: ThinnedCurve) -> tuple[float, float]:
     return float(curve.values.min()), float(curve.values.max())
 
 
-def _display_scale(machine: Machine, number: int) -> tuple[str, float]:
+def _find_display_scale(machine: Machine, number: int) -> tuple[str, float]:
     """Return a joint's unit for people, and the factor of its values."""
     return ("°", degrees(1.0)) if machine.joint_units[number] == "rad" else ("mm", 1.0)

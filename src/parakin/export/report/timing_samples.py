@@ -89,10 +89,10 @@ def _sample_blocks(trajectory: Trajectory) -> Iterator[tuple[Array, Indices, Ind
         times = np.column_stack([begin, 0.5 * (begin + end), end])
         at = trajectory.at(times.ravel())
         record = np.repeat(trajectory.curve.record_of_piece[joint_path.segment[profile.row[piece]]], 3)
-        feed = np.linalg.norm(_differentiate(at.poses[:, tip], times), axis=1)
+        feed = np.linalg.norm(_differentiate_parabolas(at.poses[:, tip], times), axis=1)
         curves = {"feed.any": 60.0 * feed, "feed.programmed": _find_programmed_feed(trajectory, record)}
         curves["feed.reached"] = np.where(trajectory.posted.path.rapid[record], np.nan, 60.0 * feed)
-        jerks = _differentiate(at.accelerations[:, jerky], times)
+        jerks = _differentiate_parabolas(at.accelerations[:, jerky], times)
         for j, name in enumerate(machine.joints):
             curves |= {name: at.joints[:, j], f"{name}.speed": at.speeds[:, j]}
             curves[f"{name}.acceleration"] = at.accelerations[:, j]
@@ -108,7 +108,7 @@ def find_switches(trajectory: Trajectory) -> Array:
     return 0.5 * (passed[1:] + passed[:-1])
 
 
-def _differentiate(values: Array, times: Array) -> Array:
+def _differentiate_parabolas(values: Array, times: Array) -> Array:
     """Differentiate the parabolas through start, middle and end of k pieces (k, 3) there: (3 k, columns)."""
     first, middle, last = np.moveaxis(values.reshape(len(times), 3, -1), 1, 0)
     rates = np.stack([4.0 * middle - 3.0 * first - last, last - first, first - 4.0 * middle + 3.0 * last], axis=1)

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from ...arrays import Progress, Writer
 from ...kernels.batch import count_cores
 from ...toolpath.posting.posted import Posted
-from ...units import display_unit
+from ...units import name_display_unit
 
 Bytes: TypeAlias = NDArray[np.uint8]
 Fill: TypeAlias = Callable[[int, int, Bytes], int]  # writes rows from, to as text into a buffer; returns the bytes
@@ -24,18 +24,18 @@ LENGTH_DIGITS, ANGLE_DIGITS, _FEED_DIGITS = 6, 8, 4
 DEGREES = 180.0 / math.pi
 
 
-def joint_columns(posted: Posted) -> list[str]:
+def name_joint_columns(posted: Posted) -> list[str]:
     """Name the table's columns, with units.
 
     They are ``record``, ``line``, ``X [mm]``, ..., ``d1 [mm]``, ..., ``broken``.
     """
     machine = posted.machine
-    names = zip((*machine.axes, *machine.joints), _units(posted), strict=True)
-    moving = [f"{name} [{display_unit(unit)}]" for name, unit in names]
+    names = zip((*machine.axes, *machine.joints), _list_units(posted), strict=True)
+    moving = [f"{name} [{name_display_unit(unit)}]" for name, unit in names]
     return ["record", "line", *moving, "feed [mm/min]", "rapid", "broken"]
 
 
-def _units(posted: Posted) -> tuple[str, ...]:
+def _list_units(posted: Posted) -> tuple[str, ...]:
     return (*posted.machine.axis_units, *posted.machine.joint_units)
 
 
@@ -46,7 +46,7 @@ def make_joint_csv(posted: Posted, progress: Progress | None = None) -> Writer:
     """
 
     def write(file: BinaryIO) -> None:
-        file.write((",".join(joint_columns(posted)) + "\n").encode())
+        file.write((",".join(name_joint_columns(posted)) + "\n").encode())
         _write_rows(posted, file, progress or (lambda fraction: None))
 
     return write
@@ -55,7 +55,7 @@ def make_joint_csv(posted: Posted, progress: Progress | None = None) -> Writer:
 def _write_rows(posted: Posted, file: BinaryIO, say: Progress) -> None:
     from .decimal_text import WIDEST, JointColumns, LimitNames, NumberFormat, format_joint_rows
 
-    units = _units(posted)
+    units = _list_units(posted)
     digits = [ANGLE_DIGITS if unit == "rad" else LENGTH_DIGITS for unit in units]
     scales = [10.0**d * (DEGREES if unit == "rad" else 1.0) for d, unit in zip(digits, units, strict=True)]
     names = [name.encode() for name in posted.limits]
@@ -100,7 +100,7 @@ def make_joint_parquet(posted: Posted, progress: Progress | None = None) -> Writ
         import pyarrow as pa
         import pyarrow.parquet as pq
 
-        names, units = joint_columns(posted), _units(posted)
+        names, units = name_joint_columns(posted), _list_units(posted)
         types = [pa.int64(), pa.int64(), *[pa.float64() for _ in units], pa.float64(), pa.bool_()]
         kinds = [*types, pa.dictionary(pa.int32(), pa.string())]
         schema = pa.schema(list(zip(names, kinds, strict=True)))

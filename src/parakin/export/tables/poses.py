@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal, TypeAlias
 
-from ...units import display_unit, to_display
+from ...units import name_display_unit, to_display
 from ..number_format import format_fixed
 
 if TYPE_CHECKING:
@@ -46,7 +46,7 @@ def format_pose_csv(table: PoseTable) -> str:
     """Format the table as CSV: lengths to 1e-6 mm, angles to 1e-8 deg, a field empty where there is no value."""
     (axes, pose_units, poses), (names, joint_units, joints) = table.columns("pose"), table.columns("joints")
     units = (*pose_units, *joint_units)
-    head = [f"{name} [{display_unit(unit)}]" for name, unit in zip((*axes, *names), units, strict=True)]
+    head = [f"{name} [{name_display_unit(unit)}]" for name, unit in zip((*axes, *names), units, strict=True)]
     formats = [(to_display(1.0, unit), _ANGLE_DIGITS if unit == "rad" else _LENGTH_DIGITS) for unit in units]
     residuals: list[float] = []
     if table.solution is not None:

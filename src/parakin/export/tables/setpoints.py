@@ -9,7 +9,7 @@ import numpy as np
 
 from ...arrays import Array, Progress, Writer
 from ...errors import InputError
-from ...units import display_unit
+from ...units import name_display_unit
 from .joints import ANGLE_DIGITS, DEGREES, LENGTH_DIGITS, Bytes, write_batches
 
 if TYPE_CHECKING:
@@ -21,7 +21,7 @@ _TIME_DIGITS = 8
 _KINDS = (("", ""), (" speed", "/s"), (" acceleration", "/s2"))  # of a joint's columns: name, and what the unit is per
 
 
-def setpoint_columns(trajectory: Trajectory) -> list[str]:
+def name_setpoint_columns(trajectory: Trajectory) -> list[str]:
     """Name the columns: time, the joints, their speeds and accelerations, the axes.
 
     ``time [s]``; ``d1 [mm]``, ...; ``d1 speed [mm/s]``, ...; ``d1 acceleration [mm/s2]``, ...; ``X [mm]``, ...
@@ -29,8 +29,8 @@ def setpoint_columns(trajectory: Trajectory) -> list[str]:
     machine = trajectory.posted.machine
     joints = list(zip(machine.joints, machine.joint_units, strict=True))
     axes = zip(machine.axes, machine.axis_units, strict=True)
-    names = [f"{name}{kind} [{display_unit(unit)}{per}]" for kind, per in _KINDS for name, unit in joints]
-    return ["time [s]", *names, *(f"{name} [{display_unit(unit)}]" for name, unit in axes)]
+    names = [f"{name}{kind} [{name_display_unit(unit)}{per}]" for kind, per in _KINDS for name, unit in joints]
+    return ["time [s]", *names, *(f"{name} [{name_display_unit(unit)}]" for name, unit in axes)]
 
 
 def _find_angles(trajectory: Trajectory) -> list[bool]:
@@ -75,7 +75,7 @@ def make_setpoint_csv(trajectory: Trajectory, rate: float, progress: Progress | 
         def fill(start: int, stop: int, buffer: Bytes) -> int:
             return int(format_cells(_sample_setpoints(trajectory, rate, start, stop), scales, digits, buffer))
 
-        file.write((",".join(setpoint_columns(trajectory)) + "\n").encode())
+        file.write((",".join(name_setpoint_columns(trajectory)) + "\n").encode())
         write_batches(file, count, WIDEST * len(digits), fill, progress or (lambda fraction: None))
 
     return write
@@ -93,7 +93,7 @@ def make_setpoint_parquet(trajectory: Trajectory, rate: float, progress: Progres
         import pyarrow as pa
         import pyarrow.parquet as pq
 
-        schema = pa.schema([(name, pa.float64()) for name in setpoint_columns(trajectory)])
+        schema = pa.schema([(name, pa.float64()) for name in name_setpoint_columns(trajectory)])
         with pq.ParquetWriter(file, schema, use_dictionary=False) as writer:  # hardly a value comes twice
             for start in range(0, count, _GROUP):
                 stop = min(start + _GROUP, count)

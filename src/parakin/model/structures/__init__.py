@@ -13,7 +13,7 @@ from .free import Free
 __all__ = ["Carried", "CentralLeg", "DirectionColumns", "Free", "PlatformPlacement", "Structure", "structure_of"]
 
 
-def structure_of(spec: Spec) -> Structure:
+def make_structure(spec: Spec) -> Structure:
     """Find the structure of a machine; a :class:`DescriptionError` says why there is none."""
     twice = [bound.name for bound in spec.limits.passive if spec.motion.count(bound.name) > 1]
     if twice:

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from ...algebra import IDENTITY, Mat, Scalar, Vec, add, apply, sub, transpose
-from ..chain import UNIT, Pointing, compose_chain, invert_rotations, to_local
+from ..chain import UNIT, Pointing, compose_chain, invert_rotations, transform_to_local
 from ..parts import TRANSLATIONS
 from ..spec import Spec
 from .base import PlatformPlacement
-from .five_axis import FiveAxis, axis_angles, turned_axis
+from .five_axis import FiveAxis, compute_axis_angles, turn_tool_axis
 
 
 class Carried(FiveAxis):
@@ -34,10 +34,10 @@ class Carried(FiveAxis):
         top, place = compose_chain(self.spec.table, table)
         world = add(place, apply(top, pose[:3]))
         _, tip = compose_chain(self.spec.head, head)
-        return sub(to_local(self.mount, self.base, world), tip)
+        return sub(transform_to_local(self.mount, self.base, world), tip)
 
     def place(self, pose: Sequence[Scalar], branch: str, first: Scalar | None = None) -> PlatformPlacement:
-        k, _, _ = turned_axis(pose)
+        k, _, _ = turn_tool_axis(pose)
         found = self.pointing.solve(k, branch, first)
         serial = [found.joints[self.serial_order.index(i)] for i in range(2)]
         origin = self._origin(pose, serial)
@@ -60,7 +60,10 @@ class Carried(FiveAxis):
         head, table = self._split(serial)
         tip = add(tuple(coordinates), compose_chain(self.spec.head, head)[1])
         top, place = compose_chain(self.spec.table, table)
-        return [*to_local(top, place, add(apply(self.mount, tip), self.base)), *axis_angles(self._axis(serial))]
+        return [
+            *transform_to_local(top, place, add(apply(self.mount, tip), self.base)),
+            *compute_axis_angles(self._axis(serial)),
+        ]
 
     def closure(
         self, pose: Sequence[Scalar], serial: Sequence[Scalar], turn: Sequence[Scalar] = ()

@@ -13,9 +13,9 @@ from ...algebra import (
     add,
     apply,
     atan2,
-    axis_rotation,
     cross,
     dot,
+    make_axis_rotation,
     minimum,
     move_along,
     norm,
@@ -27,11 +27,11 @@ from ...algebra import (
     transpose,
 )
 from ...errors import DescriptionError
-from ..chain import UNIT, Pointing, compose_chain, rotation_about, to_local
+from ..chain import UNIT, Pointing, compose_chain, make_rotation_about, transform_to_local
 from ..parts import ROTATIONS, Step
 from ..spec import Spec
 from .base import PlatformPlacement
-from .five_axis import FiveAxis, axis_angles, turned_axis
+from .five_axis import FiveAxis, compute_axis_angles, turn_tool_axis
 
 
 class CentralLeg(FiveAxis):
@@ -59,15 +59,15 @@ class CentralLeg(FiveAxis):
         self.pointing = Pointing.from_steps([*spin, *spec.head], "head")
         self.serial_order = () if self.roll else (0, 1)
         self.assembly_method = None if self.roll else "central leg"
-        self.above, self.reach = self._wrist_centre()
+        self.above, self.reach = self._find_wrist_centre()
         self.sign = 1.0
         home = tuple(float(spec.home.get(letter, 0.0)) for letter in self.axes)
-        self.sign = 1.0 if self._centre(home[:3], turned_axis(home)[0])[2] > 0.0 else -1.0
+        self.sign = 1.0 if self._centre(home[:3], turn_tool_axis(home)[0])[2] > 0.0 else -1.0
         swing = [Step(turns[0], drive=spec.legs[0].drives[0]), Step(turns[1], drive=spec.legs[0].drives[0])]
         self.swing = Pointing.from_steps(swing, "motion")
         self.swing = Pointing(self.swing.first, self.swing.second, (0.0, 0.0, self.sign))
 
-    def _wrist_centre(self) -> tuple[float, float]:
+    def _find_wrist_centre(self) -> tuple[float, float]:
         """Find (h, l): the point (0, 0, h) of the platform lies at the tip + l·k in every position of the head."""
         poses = [(0.0, 0.0), (0.7, 0.4), (-1.1, 0.9), (0.3, -1.3)]
         frames = [compose_chain(self.spec.head, angles[2 - self.head_joints :]) for angles in poses]
@@ -82,9 +82,9 @@ class CentralLeg(FiveAxis):
         return float(height), length
 
     def _centre(self, tip: Sequence[Scalar], k: Vec) -> Vec:
-        return to_local(self.mount, self.base, move_along(tuple(tip), k, self.reach))
+        return transform_to_local(self.mount, self.base, move_along(tuple(tip), k, self.reach))
 
-    def _hung(self, tip: Sequence[Scalar], k: Vec) -> tuple[Vec, Vec, Scalar]:
+    def _aim_central_leg(self, tip: Sequence[Scalar], k: Vec) -> tuple[Vec, Vec, Scalar]:
         """Find the central leg's direction, the platform's origin, and tz, for a tip and a tool axis."""
         centre = self._centre(tip, k)
         distance = norm(centre)
@@ -92,29 +92,29 @@ class CentralLeg(FiveAxis):
         origin = move_along(centre, direction, -self.sign * self.above)  # not by the rotation: bounds stay narrow
         return direction, origin, self.sign * distance - self.above
 
-    def _swing(self, tip: Sequence[Scalar], k: Vec) -> tuple[Mat, Vec, Scalar, list[Scalar]]:
+    def _solve_swing(self, tip: Sequence[Scalar], k: Vec) -> tuple[Mat, Vec, Scalar, list[Scalar]]:
         """Find the rotation of the central leg's two turns, the platform's origin, tz, and both turns' angles."""
-        direction, origin, tz = self._hung(tip, k)
+        direction, origin, tz = self._aim_central_leg(tip, k)
         found = self.swing.solve(direction, "+")
         rotation = IDENTITY
         axes = self.swing.first, self.swing.second
         if self.roll:  # hanging along the first axis its turn is free, and 0 then: no quotient may stand in the way
             for axis, angle in zip(axes, found.joints, strict=True):
-                rotation = product(rotation, rotation_about(axis, *sincos(angle)))
+                rotation = product(rotation, make_rotation_about(axis, *sincos(angle)))
         else:
             scales = 1.0 / found.freedom, 1.0 / found.second_size
             for axis, (s, c), size in zip(axes, found.turns, scales, strict=True):
-                rotation = product(rotation, rotation_about(axis, s * size, c * size))
+                rotation = product(rotation, make_rotation_about(axis, s * size, c * size))
         return rotation, origin, tz, list(found.joints)
 
     def place(self, pose: Sequence[Scalar], branch: str, first: Scalar | None = None) -> PlatformPlacement:
-        k, _, _ = turned_axis(pose)
-        rotation, origin, tz, angles = self._swing(pose[:3], k)
+        k, _, _ = turn_tool_axis(pose)
+        rotation, origin, tz, angles = self._solve_swing(pose[:3], k)
         found = self.pointing.solve(apply(transpose(rotation), apply(transpose(self.mount), k)), branch, first)
         serial = list(found.joints)
         if self.roll:
             spin = serial.pop(0)
-            rotation = product(rotation, axis_rotation("rz", *sincos(spin)))
+            rotation = product(rotation, make_axis_rotation("rz", *sincos(spin)))
             angles.append(spin)
         return PlatformPlacement(rotation, origin, [*angles, tz], serial, found.reach, found.freedom)
 
@@ -124,7 +124,7 @@ class CentralLeg(FiveAxis):
     def frame(self, coordinates: Sequence[Scalar]) -> tuple[Mat, Vec]:
         rotation = IDENTITY
         for word, angle in zip(self.coordinates, coordinates[:-1], strict=False):
-            rotation = product(rotation, axis_rotation(word, *sincos(angle)))
+            rotation = product(rotation, make_axis_rotation(word, *sincos(angle)))
         return rotation, scale([row[2] for row in rotation], coordinates[-1])
 
     def pose(self, coordinates: Sequence[Scalar], serial: Sequence[Scalar]) -> list[Scalar]:
@@ -132,13 +132,13 @@ class CentralLeg(FiveAxis):
         turned, tip = compose_chain(self.spec.head, serial)
         world = add(apply(self.mount, add(origin, apply(rotation, tip))), self.base)
         k = apply(self.mount, apply(rotation, apply(turned, UNIT["tz"])))
-        b, c = axis_angles(k)
+        b, c = compute_axis_angles(k)
         # Beyond these the leg points there the other way round, with its platform turned: no pose says that.
-        for margin in self._inside(coordinates):
+        for margin in self._list_branch_margins(coordinates):
             b = minimum(b, 2.0 * pi + sqrt(margin))
         return [*world, b, c]
 
-    def _inside(self, coordinates: Sequence[Scalar]) -> Iterator[Scalar]:
+    def _list_branch_margins(self, coordinates: Sequence[Scalar]) -> Iterator[Scalar]:
         """Compute what is ≥ 0 where :meth:`place` would give these coordinates back."""
         yield self.sign * (coordinates[-1] + self.above)
         if not self.roll:
@@ -148,32 +148,32 @@ class CentralLeg(FiveAxis):
     def place_with_joints(self, pose: Sequence[Scalar], serial: Sequence[Scalar]) -> PlatformPlacement:
         if not self.roll:
             return super().place_with_joints(pose, serial)
-        k, _, _ = turned_axis(pose)
-        rotation, origin, tz, angles = self._swing(pose[:3], k)
+        k, _, _ = turn_tool_axis(pose)
+        rotation, origin, tz, angles = self._solve_swing(pose[:3], k)
         v = apply(transpose(rotation), apply(transpose(self.mount), k))
         w = apply(compose_chain(self.spec.head, serial)[0], UNIT["tz"])  # turned onto v by the platform's own turn
         spin = atan2(w[0] * v[1] - w[1] * v[0], w[0] * v[0] + w[1] * v[1])
-        rotation = product(rotation, axis_rotation("rz", *sincos(spin)))
+        rotation = product(rotation, make_axis_rotation("rz", *sincos(spin)))
         return PlatformPlacement(rotation, origin, [*angles, spin, tz], list(serial))
 
     def closure(
         self, pose: Sequence[Scalar], serial: Sequence[Scalar], turn: Sequence[Scalar] = ()
     ) -> tuple[Mat, Vec, list[Scalar]]:
         turned, _ = compose_chain(self.spec.head, serial)
-        k, _, _ = turned_axis(pose, turn)
+        k, _, _ = turn_tool_axis(pose, turn)
         if self.roll:
-            return self._rolled(pose[:3], k, apply(turned, UNIT["tz"]))
-        rotation, origin, _, _ = self._swing(pose[:3], k)
+            return self._roll_platform(pose[:3], k, apply(turned, UNIT["tz"]))
+        rotation, origin, _, _ = self._solve_swing(pose[:3], k)
         pointed = apply(self.mount, apply(rotation, apply(turned, UNIT["tz"])))
         return rotation, origin, self._tilt_rows(pose, turn, pointed)
 
-    def _rolled(self, tip: Sequence[Scalar], k: Vec, w: Vec) -> tuple[Mat, Vec, list[Scalar]]:
+    def _roll_platform(self, tip: Sequence[Scalar], k: Vec, w: Vec) -> tuple[Mat, Vec, list[Scalar]]:
         """Turn the platform about the central leg so that ``w``, the tool's axis in it, stands over k.
 
         Its own turn takes one of the two conditions. No angle of the central leg is needed, which would be free where
         it hangs.
         """
-        direction, origin, _ = self._hung(tip, k)
+        direction, origin, _ = self._aim_central_leg(tip, k)
         z, k = scale(direction, self.sign), apply(transpose(self.mount), k)
         across = cross(z, k)
         ahead = cross(across, z)

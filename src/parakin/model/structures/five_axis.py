@@ -10,21 +10,21 @@ from .base import DirectionColumns, Structure
 _DIRECTION = DirectionColumns(3, 4)
 
 
-def tool_axis(b: Scalar, c: Scalar) -> tuple[Vec, Vec, Vec]:
+def compute_tool_axis(b: Scalar, c: Scalar) -> tuple[Vec, Vec, Vec]:
     """Compute the tool's axis k = Rz(C)·Ry(B)·z, and two directions at right angles to it."""
     sb, cb = sincos(b)
     sc, cc = sincos(c)
     return (sb * cc, sb * sc, cb), (cb * cc, cb * sc, -sb), (-sc, cc, 0.0)
 
 
-def axis_angles(k: Vec) -> list[Scalar]:
+def compute_axis_angles(k: Vec) -> list[Scalar]:
     """Compute B in [0, π] and C of a tool axis (FME Transactions 41, (8) and (9)); C is 0 where it is free."""
     return [atan2(sqrt(k[0] * k[0] + k[1] * k[1]), k[2]), atan2(k[1], k[0])]
 
 
-def turned_axis(pose: Sequence[Scalar], turn: Sequence[Scalar] = ()) -> tuple[Vec, Vec, Vec]:
+def turn_tool_axis(pose: Sequence[Scalar], turn: Sequence[Scalar] = ()) -> tuple[Vec, Vec, Vec]:
     """Turn a pose's tool axis k and its two directions by small angles towards these."""
-    k, e1, e2 = tool_axis(*pose[_DIRECTION.pair])
+    k, e1, e2 = compute_tool_axis(*pose[_DIRECTION.pair])
     if not turn:
         return k, e1, e2
     first, second = turn
@@ -43,5 +43,5 @@ class FiveAxis(Structure):
     direction = _DIRECTION
 
     def _tilt_rows(self, pose: Sequence[Scalar], turn: Sequence[Scalar], k: Vec) -> list[Scalar]:
-        _, e1, e2 = turned_axis(pose, turn)
+        _, e1, e2 = turn_tool_axis(pose, turn)
         return [dot(e1, k), dot(e2, k)]

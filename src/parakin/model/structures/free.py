@@ -8,9 +8,9 @@ from typing import Literal
 import numpy as np
 
 from ...algebra import IDENTITY, Mat, Scalar, Vec, add, apply, atan2, product, sincos, sqrt, sub, transpose
-from ...algebra import axis_rotation as turned
+from ...algebra import make_axis_rotation as turned
 from ...errors import DescriptionError
-from ..chain import UNIT, compose_chain, to_local
+from ..chain import UNIT, compose_chain, transform_to_local
 from ..legs.lambda_ import Lambda
 from ..parts import ROTATIONS, TRANSLATIONS
 from ..spec import Spec
@@ -80,10 +80,10 @@ class Free(Structure):
             if letter in given:
                 rotation = product(rotation, turned(word, *sincos(given[letter])))
         if turn:
-            rotation = product(self._small(turn), rotation)
+            rotation = product(self._make_small_rotation(turn), rotation)
         if len(self.axes) == 6:  # the tool's frame is posed; the platform's follows
             rotation = product(product(transpose(self.mount), rotation), transpose(self.tool))
-        tip = to_local(self.mount, self.base, tuple(given.get(letter, 0.0) for letter in "XYZ"))
+        tip = transform_to_local(self.mount, self.base, tuple(given.get(letter, 0.0) for letter in "XYZ"))
         origin = sub(tip, apply(rotation, self.tip))
         return rotation, tuple(o if letter in given else 0.0 for o, letter in zip(origin, "XYZ", strict=True))
 
@@ -101,7 +101,7 @@ class Free(Structure):
     def pose(self, coordinates: Sequence[Scalar], serial: Sequence[Scalar]) -> list[Scalar]:
         return list(coordinates)
 
-    def _small(self, turn: Sequence[Scalar]) -> Mat:
+    def _make_small_rotation(self, turn: Sequence[Scalar]) -> Mat:
         """Compute the rotation by small angles about the axes that the platform turns about."""
         given = dict(zip(self.turns, turn, strict=True))
         x, y, z = (given.get(name, 0.0) for name in ("wx", "wy", "wz"))

@@ -10,10 +10,10 @@ from ...arrays import Array, Flags, Indices
 from ...kinematics.rotations import compute_rotations, find_nearest_rotation_turns
 from ...kinematics.wrist import continue_direction, find_nearest_turn
 from ...machine import Machine
-from ..posting.frames import compute_poses, frame_from_angles
+from ..posting.frames import build_frame_from_angles, compute_poses
 from ..posting.turn_steps import find_turning_columns
 
-MACHINE_FRAME = frame_from_angles(0, 0, 0, 0, 0, 0)
+MACHINE_FRAME = build_frame_from_angles(0, 0, 0, 0, 0, 0)
 _MATCHING = 1e-9  # of a rotation: what is rounding
 
 

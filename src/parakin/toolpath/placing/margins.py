@@ -12,7 +12,7 @@ from ...arrays import Array, Flags, Indices
 from ...kinematics.wrist import PRINTED, TURN
 from ...machine import Machine
 from ..path import ToolPath
-from ..posting.frames import PathLimit, compose_frames, compute_poses, frame_from_angles
+from ..posting.frames import PathLimit, build_frame_from_angles, compose_frames, compute_poses
 from ..posting.margin_blocks import split_margins
 from ..posting.path_samples import SampledPath, sample_path
 from ..posting.range_use import list_ranges
@@ -67,7 +67,7 @@ class PlacementMargins:
     def build_workpiece(self, point: Array) -> Array:
         """Build the transform (3, 4) of the placement at a point."""
         values = self.list_values(point)
-        return frame_from_angles(*(values.get(letter, 0.0) for letter in AXES))
+        return build_frame_from_angles(*(values.get(letter, 0.0) for letter in AXES))
 
     def compute_rows(self, points: Array, records: Indices, track: Indices | None) -> tuple[Array, Array]:
         """Compute hard and soft rows (m, ...) of points (m, d) at some records, ascending.

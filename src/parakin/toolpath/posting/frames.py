@@ -28,10 +28,10 @@ def workpiece(
     C: float = 0.0,
 ) -> Array:
     """Build the transform that places a workpiece, (3, 4): R = Rz(C)·Ry(B)·Rx(A) and the origin; mm, rad."""
-    return frame_from_angles(X, Y, Z, A, B, C)
+    return build_frame_from_angles(X, Y, Z, A, B, C)
 
 
-def frame_from_angles(x: float, y: float, z: float, a: float, b: float, c: float) -> Array:
+def build_frame_from_angles(x: float, y: float, z: float, a: float, b: float, c: float) -> Array:
     """Build a transform (3, 4): R = Rz(c)·Ry(b)·Rx(a) and the origin; mm, rad."""
     rotation = list_rotation_rows(*((math.sin(angle), math.cos(angle)) for angle in (a, b, c)))
     return np.column_stack([rotation, [x, y, z]])
@@ -39,7 +39,7 @@ def frame_from_angles(x: float, y: float, z: float, a: float, b: float, c: float
 
 def compose_frames(outer: Array | None, inner: Array | None) -> Array:
     """Compose two transforms (3, 4), ``outer`` after ``inner``; None stands for no change."""
-    outer = frame_from_angles(0, 0, 0, 0, 0, 0) if outer is None else outer
+    outer = build_frame_from_angles(0, 0, 0, 0, 0, 0) if outer is None else outer
     if inner is None:
         return outer
     rotation = outer[:, :3] @ inner[:, :3]

@@ -29,7 +29,7 @@ def find_turns_in_range(drive: Drive, angles: Array, home: float) -> int | None:
     fitting = _find_fitting_counts(drive, low, high)
     if fitting[0] > fitting[1]:
         return None
-    least, near = _clip(0, fitting), _clip(round((home - 0.5 * (low + high)) / TURN), fitting)
+    least, near = _clip_turns(0, fitting), _clip_turns(round((home - 0.5 * (low + high)) / TURN), fitting)
     gain = _measure_distance(least, low, high, home) - _NEARER
     return near if _measure_distance(near, low, high, home) < gain else least
 
@@ -42,7 +42,7 @@ def _find_fitting_counts(drive: Drive, low: float, high: float) -> tuple[int, in
     return least, most
 
 
-def _clip(turns: int, ends: tuple[int, int]) -> int:
+def _clip_turns(turns: int, ends: tuple[int, int]) -> int:
     return min(max(turns, ends[0]), ends[1])
 
 
@@ -119,7 +119,7 @@ class _Stretch:
         near = (joint.home - 0.5 * (self.low + self.high)) / TURN
         if not before:
             return _list_nearest(*ends, near, _MOST_AT_START)
-        return sorted({*ends, _clip(round(near), ends), *(_clip(turns, ends) for turns in before)})
+        return sorted({*ends, _clip_turns(round(near), ends), *(_clip_turns(turns, ends) for turns in before)})
 
     def measure_cost(self, joint: TurningJoint, turns: int) -> tuple[int, float]:
         """Measure records off limits and rad from home with a count of turns."""

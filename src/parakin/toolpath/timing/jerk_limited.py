@@ -28,11 +28,11 @@ def limit_jerk(
     steps, parts = _grade_stops(joint_path, limits)
     joint_path, x, ceiling = _add_rows(joint_path, steps, parts, x, ceiling)
     for _ in range(_TRIES):
-        rough = _plan(joint_path, limits, x, ceiling, 1)[2] < _ROUGH
+        rough = _plan_profile(joint_path, limits, x, ceiling, 1)[2] < _ROUGH
         rough[1:-1] |= rough[2:] | rough[:-2]
         steps = np.flatnonzero(rough & (joint_path.step > _SHORT))
         joint_path, x, ceiling = _add_rows(joint_path, steps, np.full(len(steps), 0.5), x, ceiling)
-    return joint_path, *_plan(joint_path, limits, x, ceiling)[:2]
+    return joint_path, *_plan_profile(joint_path, limits, x, ceiling)[:2]
 
 
 def _grade_stops(joint_path: JointPath, limits: DriveLimits) -> tuple[Indices, Array]:
@@ -73,7 +73,7 @@ def _add_rows(
     return refine_joint_path(joint_path, steps, parts), x, ceiling
 
 
-def _plan(
+def _plan_profile(
     joint_path: JointPath, limits: DriveLimits, x: Array, ceiling: Array, rounds: int = 0
 ) -> tuple[SpeedProfile, Indices, Array]:
     """Plan a profile: with what binds it at each row, and the least kept fraction of s⃛ on each step."""

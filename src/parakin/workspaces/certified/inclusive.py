@@ -67,7 +67,7 @@ class InclusiveSubdivision(Subdivision):
             count += np.bincount(finished[-1][0].cell, minlength=len(low))
             if not again.any():
                 break
-            leaves = _narrow(leaves.take(again), bounds.best_at[again], bounds.spread[again])
+            leaves = _narrow_leaves(leaves.take(again), bounds.best_at[again], bounds.spread[again])
         leaves = concatenate_boxes([part for part, _, _ in finished])
         columns = zip(*(part for _, part, _ in finished), strict=True)
         fractions = CellFractions(*(np.concatenate(column) for column in columns))
@@ -121,7 +121,7 @@ def _normalise_planes(planes: Array, proved_height: Array, one_limit: Flags) -> 
     planes[length == 0.0, -1] = np.inf
 
 
-def _narrow(leaves: OrientationBoxes, best_at: NDArray[np.int8], spread: Array) -> OrientationBoxes:
+def _narrow_leaves(leaves: OrientationBoxes, best_at: NDArray[np.int8], spread: Array) -> OrientationBoxes:
     """Shrink leaves to the ends where all constraints are best, where they agree; bisect the others."""
     low, high = leaves.low.copy(), leaves.high.copy()
     low[best_at > 0] = leaves.high[best_at > 0]

@@ -67,11 +67,11 @@ class TotalSubdivision(Subdivision):
             count += np.bincount(finished[-1][0].cell, minlength=len(low))
             if not again.any():
                 break
-            boxes = _narrow(boxes.take(again), bounds.take(again))
+            boxes = _narrow_boxes(boxes.take(again), bounds.take(again))
         return _sort_by_cell(finished)
 
 
-def _narrow(boxes: OrientationBoxes, bounds: LinearBounds) -> OrientationBoxes:
+def _narrow_boxes(boxes: OrientationBoxes, bounds: LinearBounds) -> OrientationBoxes:
     """Shrink boxes to the ends where the margin is least, where these are known; bisect the others."""
     low, high = boxes.low.copy(), boxes.high.copy()
     high[bounds.least_at < 0] = boxes.low[bounds.least_at < 0]

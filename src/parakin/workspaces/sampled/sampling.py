@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from ...arrays import Array, Progress
 from ...errors import PoseError
-from ...kernels.batch import evaluate_tape, freeze, run_in_threads
+from ...kernels.batch import evaluate_tape, freeze_rows, run_in_threads
 from ...kernels.staged import stage_margins
 from ...machine import Machine
 from ..certified.region import Region
@@ -130,7 +130,7 @@ class BrokenLimitFinder:
         while start < len(self.orientations) and len(undecided):
             stop = 4 * start or 1
             rows, own_codes = np.ascontiguousarray(positions[undecided]), codes[undecided]
-            args = (self._program, freeze(rows), freeze(self._fixed[start:stop]), every, own_codes)
+            args = (self._program, freeze_rows(rows), freeze_rows(self._fixed[start:stop]), every, own_codes)
             run_in_threads(len(rows), lambda a, b: sweep_turns(*args, a, b))  # noqa: B023  done within the loop's turn
             codes[undecided] = own_codes
             every, start = self.region.every_orientation, stop

@@ -13,7 +13,7 @@ from .circles import Circle
 from .cycles import DrillCycle, parse_cycle
 from .dialects import DIALECTS, RIGHT, UNKNOWN, DialectName, find_by_comment, find_by_word
 from .drilling import drill_hole
-from .frames import build_frame, frame_from_matrix, normalize_direction
+from .frames import build_frame, build_frame_from_matrix, normalise_direction
 from .motion import ClMotion
 
 _ARC = re.compile(r"TLON,GOFWD/\(?CIRCLE/([^()/]*?)\)?,ON,(?:\d+,INTOF,)?\(?LINE/([^()/]*)\)?", re.ASCII)
@@ -114,7 +114,7 @@ class ClActions:
     def set_arc_direction(self, args: list[str], line: int) -> None:
         """Set the direction in which the arc of TLON starts (INDIRV)."""
         i, j, k = parse_numbers(args, (3,), "a direction i,j,k")
-        self.motion.tangent = normalize_direction([i, j, k])
+        self.motion.tangent = normalise_direction([i, j, k])
 
     def go_along_arc(self, args: list[str], line: int) -> None:
         """Move along a circle to the end of a line (TLON); the only argument is the whole statement."""
@@ -160,7 +160,7 @@ class ClActions:
         self, v: list[float], line: int, hand: int, *, sweep: float | None = None, revolutions: float | None = None
     ) -> None:
         self._refuse_in_cycle_or_circle()
-        axis = np.array(normalize_direction(v[3:6]))
+        axis = np.array(normalise_direction(v[3:6]))
         points = self.dialect == "creo"
         self.motion.circle = Circle(line, np.array(v[:3]), axis, v[6], hand, sweep, revolutions, points)
 
@@ -240,8 +240,8 @@ class ClActions:
         self._refuse_in_cycle_or_circle()
         turn = None
         if v[3:]:
-            z = np.array(normalize_direction(v[6:9]))
-            turn = build_frame(v[:3], v[3:6], np.cross(z, normalize_direction(v[3:6])).tolist()).rotation.T
+            z = np.array(normalise_direction(v[6:9]))
+            turn = build_frame(v[:3], v[3:6], np.cross(z, normalise_direction(v[3:6])).tolist()).rotation.T
         if any(v[:3]) or turn is not None:
             self.motion.notes.add(line, "ORIGIN is subtracted from the points after it")
         self.motion.change_frame(line, origin=np.array(v[:3]), origin_turn=turn)
@@ -254,13 +254,13 @@ class ClActions:
 
     def set_frame_matrix(self, rows: list[list[float]], line: int) -> None:
         """Set the workpiece's frame by the three rows after CATIA's $$*CATIA0."""
-        self.motion.change_frame(line, frame=frame_from_matrix(rows))
+        self.motion.change_frame(line, frame=build_frame_from_matrix(rows))
 
     def set_csys(self, args: list[str], line: int) -> None:
         """Set the workpiece's frame by a matrix of three rows and four columns (CSYS of Creo)."""
         v = parse_numbers(args, (12,), "a matrix of three rows and four columns: twelve numbers")
         self._refuse_in_cycle_or_circle()
-        self.motion.change_frame(line, frame=frame_from_matrix([v[0:4], v[4:8], v[8:12]], "CSYS"))
+        self.motion.change_frame(line, frame=build_frame_from_matrix([v[0:4], v[4:8], v[8:12]], "CSYS"))
 
     # modes that are honoured where they change nothing
 

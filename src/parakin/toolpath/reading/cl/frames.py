@@ -70,7 +70,7 @@ class FileTransform:
         return np.asarray(local / self.scale + self.origin)
 
 
-def normalize_direction(ijk: list[float]) -> Triple:
+def normalise_direction(ijk: list[float]) -> Triple:
     """Scale a vector to unit length; one without length is refused."""
     norm = math.hypot(*ijk)
     if not norm > _SHORTEST:
@@ -80,7 +80,7 @@ def normalize_direction(ijk: list[float]) -> Triple:
 
 def build_frame(origin: list[float], x: list[float], y: list[float]) -> Frame:
     """Build a frame from its origin and the directions of X and Y, which must be orthogonal; Z is their product."""
-    ex, ey = np.array(normalize_direction(x)), np.array(normalize_direction(y))
+    ex, ey = np.array(normalise_direction(x)), np.array(normalise_direction(y))
     if abs(float(ex @ ey)) > AXIS_TOLERANCE:
         refuse("the X and Y directions of MSYS are not at right angles")
     ez = np.cross(ex, ey)
@@ -88,7 +88,7 @@ def build_frame(origin: list[float], x: list[float], y: list[float]) -> Frame:
     return Frame(np.column_stack([ex, np.cross(ez, ex), ez]), np.array(origin))
 
 
-def frame_from_matrix(rows: list[list[float]], word: str = "$$*CATIA0") -> Frame:
+def build_frame_from_matrix(rows: list[list[float]], word: str = "$$*CATIA0") -> Frame:
     """Build a frame from the three rows of a 3 by 4 matrix; the SVD frees its rotation from rounding."""
     matrix = np.array(rows)
     rotation = matrix[:, :3]

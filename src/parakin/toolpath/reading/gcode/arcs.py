@@ -36,7 +36,7 @@ class ArcMotion(NamedTuple):
     turns: int
 
 
-def centre_from_radius(start: Flat, end: Flat, radius: float, clockwise: bool) -> Flat:
+def find_arc_centre(start: Flat, end: Flat, radius: float, clockwise: bool) -> Flat:
     """Find the centre of an arc given by R: less than half a turn for a radius above zero, more for one below."""
     dx, dy = end[0] - start[0], end[1] - start[1]
     chord = math.hypot(dx, dy)

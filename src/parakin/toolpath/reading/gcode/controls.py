@@ -14,47 +14,47 @@ class OtherControl(NamedTuple):
     block: re.Pattern[str]
 
 
-def _compile(text: str) -> re.Pattern[str]:
+def _compile_pattern(text: str) -> re.Pattern[str]:
     return re.compile(text, re.IGNORECASE | re.ASCII)
 
 
 CONTROLS = (
     OtherControl(
         "Heidenhain",
-        _compile(r"\s*(?:\d+\s+)?(?:BEGIN|END)\s+PGM\b|\s*%\s*\w+\s+G7[01]\b"),
-        _compile(
+        _compile_pattern(r"\s*(?:\d+\s+)?(?:BEGIN|END)\s+PGM\b|\s*%\s*\w+\s+G7[01]\b"),
+        _compile_pattern(
             r"\s*(?:\d+\s+)?(?:BLK\s+FORM|TOOL\s+(?:CALL|DEF)|CYCL\s+(?:DEF|CALL)|L(?:N|BL)?\s+[A-Z]|CC?\s+X|M128\b"
             r"|FN\s*\d|PLANE\s|CALL\s+(?:LBL|PGM)|STOP\b|FUNCTION\s)|.*\b(?:FMAX|R0\s+F\d)|[^(;]*\*\s*$"
         ),
     ),
     OtherControl(
         "Siemens (Sinumerik)",
-        _compile(r"[\s;]*(?:%_N_\w+|\$PATH=|%MPF)"),
-        _compile(
+        _compile_pattern(r"[\s;]*(?:%_N_\w+|\$PATH=|%MPF)"),
+        _compile_pattern(
             r"[^(;#]*(?:\b[A-Z]{1,8}\d*\s*=|\bCYCLE\d+\s*\(|\bTRA(?:ORI|FOOF|NS)\b|\bSUPA\b|\bG500\b|\bMSG\s*\(|\bDEF\s+(?:REAL|INT)\b"
             r"|\bMCALL\b|\bSOFT\b|\bFFWON\b|\bCOMPCAD\b|\bORI(?:WKS|MKS|AXES|VECT)\b|\bCUT3D\w+\b|\bWORKPIECE\s*\()"
         ),
     ),
     OtherControl(
         "Haas",
-        _compile(r"\s*\(.*\bHaas\b"),
-        _compile(r"[^(;]*\b(?:G187|G15[34]\s*P|M97\s*P|G234|G254|G47|G1[23]\s*[IQD]|G150)(?!\d)"),
+        _compile_pattern(r"\s*\(.*\bHaas\b"),
+        _compile_pattern(r"[^(;]*\b(?:G187|G15[34]\s*P|M97\s*P|G234|G254|G47|G1[23]\s*[IQD]|G150)(?!\d)"),
     ),
     OtherControl(
         "Marlin, Klipper or another 3D printer's control",
-        _compile(
+        _compile_pattern(
             r"\s*;\s*(?:FLAVOR:|LAYER:|TYPE:|Generated\s+(?:by|with)\s+(?:Cura|PrusaSlicer|Slic3r|OrcaSlicer|BambuStudio)"
             r"|Sliced\s+by)|.*\bSET_VELOCITY_LIMIT\b"
         ),
-        _compile(
+        _compile_pattern(
             r"[^(;]*(?:(?<![A-Z0-9.])E[-+]?[\d.]|\bM(?:8[23]|10[4679]|109|140|190|20[1-5]|221|420)(?!\d))|\s*[A-Z]{3,}_[A-Z_]+"
         ),
     ),
-    OtherControl("grbl", _compile(r"\s*[(;]\s*grbl\b"), _compile(r"\s*\$")),
+    OtherControl("grbl", _compile_pattern(r"\s*[(;]\s*grbl\b"), _compile_pattern(r"\s*\$")),
     OtherControl(
         "Fanuc",
-        _compile(r"\s*\(.*\bFanuc\b"),
-        _compile(
+        _compile_pattern(r"\s*\(.*\bFanuc\b"),
+        _compile_pattern(
             r"[^(;]*(?:\bG0?5(?:\.1\s*Q|\s*P)|\bG54\.1\s*P|\bG6(?:5|6|8(?:\.[23])?|9)(?!\d)|\bM0?9[89](?!\d)|\bG10\.6|\bG0?8\s*P"
             r"|\bG43\.5|\bG53\.1|\bG15(?!\d)|\bG16(?!\d)|\bG5[01](?:\.1)?(?!\d))"
             r"|\s*(?:N\d+\s*)?(?:IF\s*\[|WHILE\s*\[|GOTO\s*\d|END\s*\d|POPEN|DPRNT|SETVN)"

@@ -140,7 +140,7 @@ def _check_finite(value: float) -> float:
     return value
 
 
-def _divide(left: float, right: float) -> float:
+def _divide_numbers(left: float, right: float) -> float:
     if right == 0.0:
         refuse("a division by zero")
     return left / right
@@ -187,7 +187,7 @@ _OPERATIONS: dict[str, Callable[[float, float], float]] = {
     "+": operator.add,
     "-": operator.sub,
     "*": operator.mul,
-    "/": _divide,
+    "/": _divide_numbers,
     "MOD": _find_remainder,
     "**": _raise_power,
 }

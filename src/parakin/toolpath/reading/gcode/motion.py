@@ -7,7 +7,7 @@ import numpy as np
 from ....arrays import Array
 from ..notes import NoteBook
 from ..text import refuse
-from .arcs import PLANES, ArcMotion, Flat, centre_from_radius, interpolate_g_arc
+from .arcs import PLANES, ArcMotion, Flat, find_arc_centre, interpolate_g_arc
 from .block import round_whole
 from .codes import G0, G2, G17, format_g_code
 from .records import FEED, LINE, RAPID, SECONDS, SPINDLE, WIDTH, GcodeRecords
@@ -235,7 +235,7 @@ class GcodeMotion:
         if radius is not None:
             if not named & {AXES[first], AXES[second]}:
                 refuse(f"a full circle by R has no definite centre; expected {letters[0]} or {letters[1]}")
-            return centre_from_radius(start, last, radius * self.scale, self.mode == G2)
+            return find_arc_centre(start, last, radius * self.scale, self.mode == G2)
         if self.absolute_centres and len(given) != 2:
             refuse(f"{name} in G90.1; expected both {letters[0]} and {letters[1]}")
         out = [values.pop(letter, 0.0) * self.scale for letter in letters]

@@ -226,3 +226,53 @@ def test_the_columns_of_b_and_c_are_the_wrists_matter(module):
 def test_columns_of_b_and_c_are_seen(line):
     assert pole_columns(line) == [1]
     assert not pole_columns("poses[:, direction.c]; home[:3]; joints[:, 4]; code[i, 4]")
+
+
+WORDS = """
+accept accumulate act add advance align allocate allow announce append apply assign average begin bind bisect blend
+bore bound box bracket bring build cancel centre certify change check choose clamp clear climb clip close coincide
+collect combine compare compile complete compose compute concatenate confirm continue convert copy correct count cross
+cut decide decode decompose delay derive describe design detect differentiate discard divide draw drill drop ease
+embed enclose encode end estimate evaluate exclude execute exit expand explain explore extend extract factor fail
+fetch fill filter find finish fit fix flag flatten flip fold follow forbid format freeze gather get give go grade
+group grow guess halve hash ignore import insert integrate interpolate interpret intersect invert is isolate iterate
+join judge keep label lay lead leave let limit linearise list load locate lock lower make map march mark match
+maximise measure meet merge minimise move multiply name narrow normalise note number open order paint parse peel pick
+place plan point polish pose post predict prepare print project prove put quote raise rate read recognise reduce
+refine refuse reject release remove rename render repeat replace report repost require reset resolve restore restrict
+return reverse rewind rotate round route run sample save say scale score search select separate set settle share shift
+shorten show shrink skip smooth snap solve sort space split spread square stack stage stamp start stop store stretch
+strip subtract suggest sum summarise swap sweep switch tabulate take tally tell test thin tighten trace transform
+translate transpose trim turn undo unwind update use validate verify wait walk warn weigh widen wrap write yield
+"""
+VERBS = set(WORDS.split())
+# Questions with yes or no for an answer begin with a verb in the third person.
+QUESTIONS = {"begins", "bounds", "changes", "crosses", "ends", "has", "is", "spares", "spells", "turns"}
+# Names that a mathematician, or Numba, knows.
+MATHEMATICS = {"absolute", "atan2", "copysign", "cross", "derivative", "dot", "magnitude", "maximum", "minimum", "norm"}
+MATHEMATICS |= {"njit", "product", "sincos", "sqrt", "sub"}
+# What people type: a command has its function's name, and so do a few words of `pk`.
+COMMANDS = {"atlas", "design", "forward", "inverse", "linuxcnc", "machines", "post", "show", "workspace"}
+TYPED = COMMANDS | {"main", "to_display", "workpiece"}
+
+
+@pytest.mark.parametrize("module", MODULES)
+def test_a_function_is_named_by_a_verb(module):
+    for node in ast.parse(MODULES[module].read_text(encoding="utf-8")).body:
+        if isinstance(node, ast.FunctionDef) and not node.name.startswith("__"):
+            name = node.name.removeprefix("_")
+            known = name in MATHEMATICS or name in TYPED or name.split("_")[0] in VERBS | QUESTIONS
+            assert known, f"{node.name}: verb and object expected (VERBS lists the verbs)"
+
+
+def is_property(function: ast.FunctionDef) -> bool:
+    return any("property" in ast.unparse(decorator) for decorator in function.decorator_list)
+
+
+@pytest.mark.parametrize("module", MODULES)
+def test_a_function_is_described_by_a_verb(module):
+    for function in functions(module):
+        text = ast.get_docstring(function)
+        if text and not is_property(function) and not (room_of(module) == "commands" and function.name in COMMANDS):
+            first = text.split()[0].strip(".,:")
+            assert first[0].isupper() and first.lower() in VERBS, f"{function.name}: {first} (VERBS lists the verbs)"

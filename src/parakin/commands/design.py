@@ -17,7 +17,7 @@ from .region_options import parse_length
 if TYPE_CHECKING:
     from ..performance.design import Design
 
-_DIGITS = 4  # of lengths
+_DIGITS = 4  # digits of lengths
 
 
 def _list_families(context: object) -> list[str]:

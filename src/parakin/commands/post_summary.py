@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 _NOTES = 5  # remarks on the file that are printed
 _BINDING = 4  # limits that are named of those that bind
-_SHARE = 0.005  # of the time: what binds for less is not named
+_SHARE = 0.005  # what binds for less than this fraction of the time is not named
 
 
 def summarise_job(

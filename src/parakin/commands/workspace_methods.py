@@ -18,8 +18,8 @@ Method = Literal["certified", "grid", "polar", "drives"]
 
 GAP, SECONDS = 0.01, 60.0
 _STEPS = {"grid": {1: 10_000, 2: 1000, 3: 200}, "polar": {2: 1000, 3: 400}}  # along the longest edge, by dimension
-_PLANES = 50  # of a polar sweep along that edge
-_CELLS = {2: 512, 3: 64}  # of each drive, by the number of drives
+_PLANES = 50  # planes of a polar sweep along the longest edge
+_CELLS = {2: 512, 3: 64}  # cells of each drive's range, by the number of drives
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ from collections.abc import Iterator, Sequence
 from ..toolpath.path import Event, ToolPath
 from .gcode_text import LONGEST_COMMENT, format_comments, make_plain
 
-_SAME = re.compile(r"M(?:0|1|3|4|5|7|8|9|60)|S[\d.]+|G4 P[\d.eE+-]+")  # of G-code, carried over as they are
+_SAME = re.compile(r"M(?:0|1|3|4|5|7|8|9|60)|S[\d.]+|G4 P[\d.eE+-]+")  # G-code that is carried over as it is
 _END = re.compile(r"M(?:2|30)")  # the program's own end replaces them
 _MESSAGE = re.compile(r"\(\s*msg\s*,(.*)\)", re.I | re.S)
 _STATEMENT = re.compile(r"([A-Z-]+)\s*(?:/(.*))?", re.S)

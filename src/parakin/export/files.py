@@ -23,7 +23,7 @@ except ImportError:  # no locks on this system: leftovers stay
 Content = bytes | str | Writer
 
 _BEGIN, _END = ".parakin-", ".part"  # of the name of a folder of files that are not complete yet
-_TRIES = 3  # to make such a folder and lock it before another process sweeps it
+_TRIES = 3  # attempts to make such a folder and lock it before another process sweeps it
 _SIGNALS = (signal.SIGINT, signal.SIGTERM)
 
 

@@ -12,7 +12,7 @@ from ..arrays import Array, Flags
 from ..errors import NoMethodError
 from ..kernels.intervals import IntervalProgram
 
-SMALL = 1e-7  # of the box's width: a box still undecided at this size holds a (nearly) double root
+SMALL = 1e-7  # a box still undecided at this fraction of the first box's width holds a (nearly) double root
 MOST = 400_000  # boxes at a time
 
 

@@ -20,7 +20,7 @@ from .wrist import (
     wrap_angle,
 )
 
-LEVEL = 1e-12  # of a rotation's entries: what is rounding
+LEVEL = 1e-12  # rounding error of a rotation's entries
 _BLOCK = 1 << 13  # rotations whose many intermediate arrays stay in the cache
 
 

@@ -23,7 +23,7 @@ from .singularities import compute_singularity_margins
 MOST = 4_000_000  # positions of a grid
 _ALONG = {1: 400, 2: 120, 3: 36}  # positions along the longest side, at most, if no step is given
 _AT_ONCE = 1 << 15
-_ON = 1e-3  # of a grid's step: a pose no farther off is on the slice
+_ON = 1e-3  # a pose nearer than this fraction of a grid's step lies on the slice
 _ROUGH, _SECONDS = 0.1, 10.0  # gap and time of the workspace by which the grid is placed
 
 

@@ -21,7 +21,7 @@ _ISOTROPIC = 1e-9  # the greatest entry of J⁻¹J⁻ᵀ, divided by its mean di
 _STARTS, _BEST = 27, 3  # of each extreme: positions to start from, and those of them that are refined
 _ROUGH, _FINE = 0.02, 1e-10  # last steps of the two searches, in steps of the grid
 _ROOTS = 96  # starts for isotropic poses
-_DEFICIENT = 1e-6  # of the residuals' derivative: a root with less is one of a curve of them
+_DEFICIENT = 1e-6  # rank deficiency of the residuals' derivative below which a root is one of a curve of roots
 
 
 @dataclass(frozen=True, eq=False)

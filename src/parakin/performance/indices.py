@@ -13,7 +13,7 @@ from .characteristic_length import CharacteristicLength, choose_characteristic_l
 from .jacobians import ScaledRates, compute_scaled_rates, list_twist_names
 from .singularities import derive_margins, find_home_signs, list_margin_names
 
-_SINGULAR = 1e-13  # of the greatest singular value; a lesser one counts as zero
+_SINGULAR = 1e-13  # singular values below this fraction of the greatest count as zero
 
 
 @dataclass(frozen=True, eq=False)

@@ -12,7 +12,7 @@ from ..arrays import Array, Indices
 Objective = Callable[[Array, Indices], Array]
 
 _ROUNDS = 200
-_FINEST = 1e-10  # of the first step
+_FINEST = 1e-10  # last step as a fraction of the first
 _RANDOM = 3  # directions at random, and near the last one that led on, for each axis: edges of the region slant
 
 

@@ -17,7 +17,7 @@ from ..event_lines import format_events
 from ..gcode_text import CHUNK, format_blocks, format_comments, join_lines, to_display
 
 LINEAR, TURNING = "XYZUVW", "ABC"
-_APPROACH_SHARE = 0.25  # of the joints' speeds, on the way to the first record
+_APPROACH_SHARE = 0.25  # fraction of the joints' speeds that is used on the way to the first record
 _APPROACH_LEAST = 4.0  # s, for that way
 _SHORTEST = 1e-3  # s
 

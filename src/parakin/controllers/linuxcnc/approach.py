@@ -10,10 +10,10 @@ from ...kinematics.wrist import EXACT, TILTED, TURN, Wrist
 from ...machine import Machine
 from ...toolpath.timing.drive_limits import DriveLimits
 
-_SPEED_SHARE = 0.25  # of the joints' speeds
+_SPEED_SHARE = 0.25  # fraction of the joints' speeds
 _FROM_ANYWHERE = 4.0  # s, at least: for the motion whose start is not known
 _LEAST = 0.5  # s, of a motion
-_SAMPLES = 500  # on a motion
+_SAMPLES = 500  # samples of a motion
 _TURNS = (0, 1, -1, 2, -2)
 
 

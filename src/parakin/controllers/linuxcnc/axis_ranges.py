@@ -10,10 +10,10 @@ from ...arrays import Array
 from ...machine import Machine
 
 _ROUNDS, _SAMPLES = 40, 16384
-_BEYOND = 0.25  # of the box so far, on both sides: how far a round samples
+_BEYOND = 0.25  # a round samples as far outside the box so far, as a fraction of it, on both sides
 _MARGIN = 0.1  # likewise, added at the end for what the samples miss
 _GREATEST_TURN = pi
-TURNS = 100  # that C may go on turning either way where of the orientation only the tool's axis counts
+TURNS = 100  # turns of C to either side of a machine that poses only the tool's axis
 
 
 def estimate_axis_ranges(machine: Machine) -> tuple[Array, Array]:

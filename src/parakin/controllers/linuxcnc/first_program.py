@@ -16,7 +16,7 @@ _SIDE = 40.0  # mm: the square's side, halved until the machine can go round it
 _LEAST = 0.1  # mm
 _CORNERS = ((0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0), (0.0, 0.0))
 _TILT = pi / 12.0  # rad, of a tool on a wrist, whose pole the square would else go round or through
-_POINTS = 50  # of a side that are checked
+_POINTS = 50  # points that are checked on each side
 _FEED = 3000.0  # mm/min
 
 

@@ -23,7 +23,7 @@ from .straight_motions import StraightMotions, build_straight_motions
 
 _SLOWEST = 0.11 / 60.0  # mm/s: what is slower LinuxCNC runs at 0.1 mm/min in inverse time
 _INSTANT = 0.002  # s
-_TURNING = 0.4  # of the tolerance: two motions that turn the tool LinuxCNC blends less well than it reckons
+_TURNING = 0.4  # fraction of the tolerance where two motions turn the tool: LinuxCNC blends them less well
 
 
 def make_linuxcnc_program(trajectory: Trajectory, *, forced: str | None = None, tolerance: float = 0.005) -> Writer:

@@ -14,9 +14,9 @@ from .joint_utilisation import measure_joint_utilisation
 from .speed_changes import find_speed_changes
 
 CYCLE = 1e-3  # s: of the controller. Motions that take whole cycles it blends evenly, others with a bump of speed
-_USABLE = 0.997  # of the joints' speeds; the rest is for what lies between samples and for the controller's rounding
+_USABLE = 0.997  # fraction of the joints' speeds; the rest is for the way between samples and for rounding
 _EVEN = 0.1  # mm/mm: corners sharper than this turn the joints elsewhere
-_ROUNDING = 1e-6  # of a cycle
+_ROUNDING = 1e-6  # cycles
 
 
 @dataclass(frozen=True, eq=False)

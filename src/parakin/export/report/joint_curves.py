@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from ...toolpath.posting.posted import Posted
 
 POINTS = 4000  # a curve
-_ALL_POINTS = 36_000  # of all curves together, for machines with many joints
+_ALL_POINTS = 36_000  # greatest number of points of all curves together, for machines with many joints
 
 
 def pick_extremes(values: Array, most: int) -> Indices:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from ..machine.figures import FAINT, FONT, INK, Figure, PlotTrace
 
 _ROW, _GAP, _BREAK = 118, 34, 44  # px: a diagram's height, the gap to the next, and more of it under an axis
-_BETWEEN = 0.065  # of the figure's width, between columns
+_BETWEEN = 0.065  # gap between columns, as a fraction of the figure's width
 _TOP, _BOTTOM = 26, 44  # px
 
 

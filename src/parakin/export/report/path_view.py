@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from ...toolpath.posting.posted import Posted
 
 _CLOSE, _FAR, _MARKED = 20_000, 4_000, 3_000  # points of the path close up, on its machine, and off limits
-_CELLS = 27  # of the workspace's sample along each side
+_CELLS = 27  # cells of the workspace's sample along each side
 _SCALE = [[0.0, "#c62828"], [0.12, "#ef8a3c"], [0.35, "#e8c547"], [0.65, "#4aa58c"], [1.0, "#1f5f99"]]
 
 

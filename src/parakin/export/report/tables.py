@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from ...toolpath.path import ToolPath
     from ...toolpath.posting.posted import Offence, Posted
 
-_NOTES = 200  # of the reader that are listed
+_NOTES = 200  # greatest number of the reader's notes that are listed
 _LONGEST = 240  # characters of a source line that are quoted
 _READ = 1 << 16  # bytes of one line that are read
 

@@ -28,7 +28,7 @@ _KINDS = {  # of limits: what their unit is per, their colour, and how the axis 
     "acceleration": ("/s²", "#d32f2f", "~s"),
     "jerk": ("/s³", "#7b1fa2", "~s"),
 }
-_ROOM = 1.15  # times the greatest programmed feed: what the feed's axis shows
+_ROOM = 1.15  # the feed's axis shows the greatest programmed feed times this
 
 
 def draw_timing_curves(trajectory: Trajectory, shades: dict[str, str]) -> tuple[Figure, int]:

@@ -10,7 +10,7 @@ from ...arrays import Array
 from ...workspaces.sampled.drive_sweep import DriveImage, DriveWorkspace
 from ...workspaces.sampled.polar_sweep import PolarWorkspace
 
-_MESHES = 16  # of a net, each way
+_MESHES = 16  # meshes of a net in each direction
 
 
 @dataclass(frozen=True, eq=False)

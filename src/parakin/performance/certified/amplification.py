@@ -15,7 +15,7 @@ from .bisection import AT_ONCE, Budget, bisect_inputs, bound_inverse_error, find
 from .interval_matrices import LinearMatrices, MatrixBounds, PoseBox
 
 _ROUNDING = 1e-12  # relative, of products and singular values of small matrices
-_FINEST = 1e-13  # of the first box
+_FINEST = 1e-13  # smallest box as a fraction of the first
 _EXCEEDED = 20_000  # boxes for a bracket beyond its bound
 _CORNERS = 6  # inputs up to which all corners are examined
 _STARTS = 8

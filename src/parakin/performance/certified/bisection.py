@@ -13,7 +13,7 @@ from ...arrays import Array, Flags, Indices
 from .interval_matrices import LinearMatrices, MatrixBounds
 
 AT_ONCE = 512  # boxes
-_FINEST = 1e-13  # of the first box: below this the numbers have no digits left
+_FINEST = 1e-13  # smallest box as a fraction of the first: below this no digits are left
 _ROUNDING = 1e-12  # relative, of products and singular values of small matrices
 
 Decided = tuple[Flags, Indices]  # which boxes are decided, and across which input to bisect the others

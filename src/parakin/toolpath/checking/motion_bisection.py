@@ -14,7 +14,7 @@ from .motion_sections import Sections
 from .motions import MotionPoints, PathMotions, find_pole_crossings, merge_wrist_modes
 
 SECTIONS_AT_ONCE = 1 << 13
-MOST_CUTS = 1 << 16  # of one motion; then it stays undecided
+MOST_CUTS = 1 << 16  # greatest number of cuts of one motion; after them it stays undecided
 PATH_CUTS, MOTION_CUTS = 1 << 18, 64  # of a path, and for each motion of it; then all that is left stays undecided
 _MOST_TURN = 1.5 * np.pi  # rad: only a joint whose turns are counted wrong goes farther on the shortest section
 

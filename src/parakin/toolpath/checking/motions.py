@@ -18,7 +18,7 @@ from ..posting.posted import Posted
 WristModes = NDArray[np.int8]
 
 OWN, OTHER, EITHER = 0, 1, 2  # working modes of the wrist: the path's own, its other one, either one on the pole
-NEAR_SINGULAR = 1e-4  # of det A at home: a determinant no greater is next to a parallel singularity
+NEAR_SINGULAR = 1e-4  # determinants up to this fraction of det A at home are next to a parallel singularity
 SIGNLESS = 1e-12  # a determinant of unit wrenches no greater has no sign
 
 

@@ -11,7 +11,7 @@ from .motion_runs import find_unproved_motions, split_into_blocks
 from .motion_sections import Sections
 from .motions import MotionPoints, find_pole_crossings
 
-_FIRST_SHARE = 1e-7  # of a motion: how closely a first share is bracketed
+_FIRST_SHARE = 1e-7  # a first share is bracketed to this fraction of a motion
 _SHARES = np.arange(1, 8) / 8.0
 _WORST_MARGIN = 1e-7  # relative, by which a worst margin may be missed
 _MOST_SECTIONS = 1 << 16  # bounded for one answer; then the worst that is known, or the first, stands for it

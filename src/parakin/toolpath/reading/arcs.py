@@ -12,7 +12,7 @@ from .text import refuse
 
 ON_CIRCLE = 0.01  # mm: further off its circle an arc's start or end is an error; covers coordinates of 3 decimals
 CLOSED = 1e-6  # mm: an end this near the start is a full circle
-_MOST_POINTS = 200_000  # of one arc
+_MOST_POINTS = 200_000  # greatest number of points of one arc
 _WIDEST_STEP = math.pi / 4  # rad between two points, however coarse the tolerance
 _ONE_DIAMETER = 1e-3  # sine of the angle between two radii; below this they lie on one diameter
 _ALONG = 0.1  # cosine of the angle between tangent and circle; below this the tangent does not tell the way round

@@ -14,7 +14,7 @@ from .text import BYTE_ORDER_MARK, open_file
 
 _GCODE_SUFFIXES = frozenset((".ngc", ".nc", ".gcode", ".tap", ".cnc"))
 _LOOKED_AT = 1 << 16  # bytes
-_JOINTS = b"joints, made by parakin )"  # in the head of a program of joint positions
+_JOINTS = b"joints, made by parakin )"  # stands in the head of a program of joint positions
 # beginnings of lines that only one of the two formats can have
 _CL = re.compile(
     rb"\s*(?:\$\$|(?:PARTNO|PPRINT|GOTO|GODLTA|FROM|UNITS|UNIT|TOOL\s+PATH|TLDATA|MSYS|CUTTER|LOADTL|LOAD|SELECT|FEDRAT|SPINDL|"

@@ -19,8 +19,8 @@ LEVER = 100.0  # mm/rad: the weight of a turn beside a motion of the tip in the 
 CORNER = np.deg2rad(1.0)  # a path that turns by no more is not stopped at
 _SAME = 1e-6  # mm: records no farther apart are one corner
 _TIGHT = 1e-5  # mm of reach for each rad (mm/mm) of turn: a corner passed so slowly is as well stopped at
-_BESIDE = 0.05  # of a piece: a rounding ends no nearer to the piece's end than that, or at it
-_KEPT = 0.995  # of the tolerances; the rest is for the error of the joints' splines
+_BESIDE = 0.05  # a rounding ends at a piece's end, or at least this fraction of the piece from it
+_KEPT = 0.995  # fraction of the tolerances that corners use; the rest is for the error of the joints' splines
 
 
 class Curve(NamedTuple):

@@ -13,8 +13,8 @@ from .kernels.utilisation import Utilisation
 from .speed_profile import SpeedProfile
 
 _FIRST, _LEAST = 1.0 / 32.0, 1e-4  # of the way in which s̈ is built up, and mm: the first row behind a stop
-_LAST = 0.6  # of a step: no new row beyond
-_TRIES = 2  # of planning, to find the steps over which s⃛ would have to change
+_LAST = 0.6  # no new row is put beyond this fraction of a step
+_TRIES = 2  # rounds of planning, to find the steps over which s⃛ would have to change
 _ROUGH, _SHORT = 0.6, 2e-3  # the kept fraction of s⃛ below which a step is cut, and mm: one that is not
 
 

@@ -29,14 +29,14 @@ from .kernels.splines import (
 LONGEST = 2.0  # mm of the path's length: no step is longer
 STEPS_PER_RAD = 12.0  # into which half a corner is cut, for each rad (mm/mm) by which the path turns there
 MOST_STEPS, ENOUGH = 8, 2_000_000  # of half a corner, no more than so many, and fewer on paths of so many steps in all
-CLOSE = 3e-4  # of a joint's limit: what the acceleration of the splines may be off
-FINE = 1e-3  # of the tolerances: what the joints of the splines may be off
+CLOSE = 3e-4  # greatest error of the splines' acceleration, as a fraction of a joint's limit
+FINE = 1e-3  # greatest error of the splines' joints, as a fraction of the tolerances
 _ROUNDS = 60
 _ANEW = 5  # rounds after which the joints are followed from the start again
 _FINEST = 1e-7  # mm: a step this short is not cut
 _DISTURBED = 4  # rows beyond a new one over which the splines still change
 _BLOCK = 1 << 16  # steps measured at a time
-_NOISE = 1e-11  # of a joint's size: what its rounding may be
+_NOISE = 1e-11  # rounding error as a fraction of a joint's size
 
 
 @dataclass(frozen=True, eq=False)

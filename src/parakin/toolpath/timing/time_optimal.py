@@ -16,11 +16,11 @@ from .kernels.utilisation import Utilisation, measure_utilisation
 from .speed_profile import SpeedProfile
 
 UNBOUND = 1e12  # mm²/s², of ṡ²: nothing is as fast
-WORTH = 5e-4  # of the cycle time: what more rows must save
+WORTH = 5e-4  # least fraction of the cycle time that more rows must save
 _ROUNDS = 4
 _RAMP = 0.1  # s in which a drive is assumed to reach its acceleration where only a jerk is given
 _ROUNDING = 1e-8
-_PLACES = 5  # of each step at which utilisation is measured
+_PLACES = 5  # places on each step where utilisation is measured
 
 
 def compute_ceilings(joint_path: JointPath, limits: DriveLimits) -> StepCeilings:

@@ -21,9 +21,9 @@ from .plane_cuts import (
 )
 from .subdivision import Cells, OrientationBoxes, Subdivision, add_cuts, bisect_boxes, bound_margin, concatenate_boxes
 
-LOOKS = 4  # at narrowed orientations, a round
+LOOKS = 4  # tries at narrowed orientations in a round
 MOST = 128  # boxes of orientations that a cell may have
-_SPREAD = 0.25  # of the margins' change with position: boxes that change them more with orientation are bisected
+_SPREAD = 0.25  # boxes whose margins change more with orientation than this × their change with position are bisected
 
 
 class LeafBounds(NamedTuple):

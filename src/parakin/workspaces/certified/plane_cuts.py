@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from ...arrays import Array, Flags, Indices
 from ...kernels.compiling import njit
 
-_FLAT = 1e-4  # of the steepest slope: a slope less than that is taken as unknown, for the closed form cancels below it
+_FLAT = 1e-4  # slopes below this fraction of the steepest count as unknown: the closed form cancels there
 _ROUNDING = 1e-7  # the error of the closed form, with slopes no flatter than that
 
 KEPT, CLEARED, EXCLUDED = 0, 1, 2  # a margin over a box: undecided, kept everywhere, broken for every x

@@ -25,7 +25,7 @@ RegionKind = Literal["constant", "total", "inclusive", "dexterous"]
 FAR = 1e6  # mm: no machine reaches farther
 _MANY = 20_000  # cells after which a bounded region has left the farthest ones
 _TINY = 1e-3  # mm: cells so small end the search for the extent
-_SHRINKING = 0.6  # of an edge from round to round, while the cells are much larger than the region
+_SHRINKING = 0.6  # ratio of a cell's edge to that of the round before, while cells are much larger than the region
 
 
 @dataclass(frozen=True, eq=False)

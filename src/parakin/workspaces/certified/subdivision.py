@@ -27,7 +27,7 @@ MOST = 3_000_000  # undecided cells at a time
 AT_ONCE = 8192  # cells refined together
 OUTERMOST = 20_000  # cells refined for a closer box about all of them
 _FEW = 64  # cells refined together at least, where the time is short
-_FINEST = 2.0**-24  # of the first cells' edge: below this the numbers have no digits left
+_FINEST = 2.0**-24  # smallest cell as a fraction of the first cells' edge: below this no digits are left
 _DIGITS = 26  # binary, of the first cells' corners; the others are for their parts
 
 

@@ -15,9 +15,9 @@ from .constraints import Constraint
 from .plane_cuts import EXCLUDED, KEPT, LinearBounds, PlaneCuts
 from .subdivision import Cells, OrientationBoxes, Subdivision, add_cuts, bisect_boxes, bound_margin, concatenate_boxes
 
-LOOKS = 6  # at narrowed orientations, a round
+LOOKS = 6  # tries at narrowed orientations in a round
 MOST = 32  # boxes of orientations that a constraint may have in a cell
-_SPREAD = 0.15  # of the margin's change with position: boxes that change it more with orientation are bisected
+_SPREAD = 0.15  # boxes whose margin changes more with orientation than this × its change with position are bisected
 
 
 class TotalSubdivision(Subdivision):

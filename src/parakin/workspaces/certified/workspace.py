@@ -19,7 +19,7 @@ from .region import Region
 from .subdivision import Cells, make_empty_cells
 
 ROUNDING = 1e-9  # relative, of the sums of volumes
-_CLOSE = 1.0 / 128.0  # of the bounding box: the size of the cells at its faces
+_CLOSE = 1.0 / 128.0  # size of the cells at the bounding box's faces, as a fraction of the box
 
 
 @dataclass(frozen=True)

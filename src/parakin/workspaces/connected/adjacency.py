@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from ...arrays import Array, Indices
 from ...errors import PoseError
 
-MOST = 1 << 26  # of the finest cells, in all of the box that holds them
+MOST = 1 << 26  # greatest number of finest cells in the box that holds all cells
 
 
 def find_adjacent_cells(low: Array, size: Array) -> tuple[Indices, Indices]:

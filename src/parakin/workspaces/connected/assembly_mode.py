@@ -11,7 +11,7 @@ from ..certified.constraints import Constraint
 from ..certified.region import Region
 
 NAME = "parallel singularity"
-ZERO = 1e-12  # of the product of the rows' sizes at home: a determinant no greater has no sign
+ZERO = 1e-12  # determinants up to this fraction of the product of the rows' sizes at home have no sign
 
 
 def make_side_constraints(region: Region) -> tuple[Constraint, Constraint]:

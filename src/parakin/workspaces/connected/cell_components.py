@@ -18,10 +18,10 @@ from .adjacency import find_adjacent_cells, label_components
 
 _GAP = 1e-9  # never reached: the cells' size ends the subdivision
 _FINER, _DEEPER = 8, 2  # how much finer, and how often, an undecided group of cells is subdivided
-_ROUNDS = 4  # of the search for boxes that join
+_ROUNDS = 4  # rounds of the search for boxes that join cells
 _ALONG = (0.5, 0.02, 0.98)  # where across the common part of two cells a joining box may run
-_THIN = 1e-3  # of a cell: half width of a joining box
-_PARTS = 64  # of a joining box examined to prove it
+_THIN = 1e-3  # half width of a joining box, as a fraction of a cell
+_PARTS = 64  # greatest number of parts of a joining box that are examined
 _LINKS = 4096  # examined in a round
 _FEW = 8  # cells: fewer that nothing joins nor separates are no component of their own
 

@@ -15,9 +15,9 @@ from ..certified.region import Region
 
 MOST = 512  # parts of a box examined on the way; the last boxes get more
 _STEPS = 40
-_FIRST = 0.25  # of the edges: the trust region of the first step
-_LENGTHS = (4.0, 2.0, 1.0, 0.6, 0.3, 0.1)  # of a predicted step; where orientations adapt it may go farther
-_BACK = (0.0, 0.01, 0.05, 0.2)  # of its length, by which the box is then drawn in: limits are not straight
+_FIRST = 0.25  # trust region of the first step, as a fraction of the edges
+_LENGTHS = (4.0, 2.0, 1.0, 0.6, 0.3, 0.1)  # tried fractions of a step; where orientations adapt it may go farther
+_BACK = (0.0, 0.01, 0.05, 0.2)  # fractions of a step by which the box is then drawn in, as limits are curved
 _NODES = 5  # points along a box's edge where limits are linearised; 3 with swept axes
 _REMEMBERED = 64  # points where a limit was broken, at which it is linearised too
 _TRIED = 12  # lengths at a time when one face moves

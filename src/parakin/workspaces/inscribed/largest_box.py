@@ -17,7 +17,7 @@ from ..certified.region import Region
 from .growth import BoxFamily, climb_volume, grow_faces
 from .seeds import find_outline_cells, find_seeds
 
-TOLERANCE = 1e-4  # of the region's extent
+TOLERANCE = 1e-4  # fraction of the region's extent
 _SLIGHTLY_SMALLER = 1.0 - np.array([1e-14, 1e-12, 1e-9, 1e-6])
 _OUTSIDE = 2.0 ** np.arange(6)  # tolerances by which a face is moved to find what stops it
 

@@ -15,11 +15,11 @@ from .mask_boxes import find_blocks, find_corner_boxes, find_largest_boxes
 
 GRID = 32  # cells along the longest edge
 COUNT = 4  # seeds; half as many where the best orientation must be searched for
-_GAP = 0.5  # to which the region is known first
+_GAP = 0.5  # the region is first subdivided to this relative gap
 _SECONDS = 30.0
 _SHRUNK = (1.0, 1.0 - 1e-6, 0.99, 0.9, 0.5, 0.2, 0.05)  # sizes of a box, of which the first proved one is taken
-_SMALL = 0.5 ** np.arange(1, 24)  # of the room about a centre
-_LEAST = 0.02  # of the largest seed's volume: smaller ones are dropped
+_SMALL = 0.5 ** np.arange(1, 24)  # sizes of a box, as fractions of the room about its centre
+_LEAST = 0.02  # seeds smaller than this fraction of the largest one's volume are dropped
 
 
 def find_outline_cells(region: Region) -> Cells:

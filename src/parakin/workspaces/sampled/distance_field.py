@@ -30,7 +30,7 @@ _FLAT = 1e-12  # a gradient no greater counts as zero
 _CUT = 2.0  # steps from the boundary at which the distance is cut off
 _OFF = 1e-3  # steps by which nodes are kept off the boundary: no surface passes through one
 _ON_EDGE = 1e-4  # steps: less is the rounding of a point on an edge
-_HALVINGS = 4  # of a grid's edge, to find where the boundary crosses it
+_HALVINGS = 4  # bisections of a grid's edge, to find where the boundary crosses it
 
 
 @dataclass(frozen=True, eq=False)

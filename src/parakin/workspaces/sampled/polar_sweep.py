@@ -22,8 +22,8 @@ from .sampling import (
 
 NOTE = "a ray ends at the first place that is not allowed: what lies behind, or off an axis not allowed, is not seen"
 MOST_RAYS, MOST_STEPS = 20_000_000, 10_000_000
-_STEPS = 32  # of each ray at a time
-_RAYS = 1 << 16  # at a time
+_STEPS = 32  # steps of each ray that are tested at a time
+_RAYS = 1 << 16  # rays that are marched at a time
 
 
 @dataclass(frozen=True, eq=False)

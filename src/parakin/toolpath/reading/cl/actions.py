@@ -21,7 +21,7 @@ _ARC_FORM = "TLON,GOFWD/(CIRCLE/x,y,z,r),ON,2,INTOF,(LINE/x,y,z,x,y,z)"
 _POINT_FORM = "x,y,z or x,y,z,i,j,k"
 _MOVARC_FORM = "MOVARC/cx,cy,cz,ax,ay,az,radius[,ANGLE,degrees]"
 _NX_CIRCLE = 8  # values of a CIRCLE that only Siemens NX writes: tolerances follow the radius
-_MOST_TURNS = 1e6  # of an arc
+_MOST_TURNS = 1e6  # greatest number of turns of an arc
 
 
 class ClActions:

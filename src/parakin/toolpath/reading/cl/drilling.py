@@ -9,7 +9,7 @@ from .frames import Triple
 from .motion import ClMotion
 
 _SAME_AXIS = 1e-9  # components of two tool axes that are equal
-_SAME_HEIGHT = 1e-9  # in the file's unit: two heights above a hole that are equal
+_SAME_HEIGHT = 1e-9  # greatest difference of two heights above a hole that count as equal, in the file's unit
 _PECK_GAP = 0.254  # mm, up after a peck of BRKCHP and above the last depth in DEEP, as LinuxCNC's G73 and G83 have it
 
 

@@ -28,7 +28,7 @@ from .frames import AXIS_TOLERANCE, MACHINE, SMALLEST_SQUARE, FileTransform, Fra
 from .records import ClRecords
 
 _HELIX = 0.01  # mm along a circle's axis between an arc's ends; above this the arc is a helix
-_MOST_ARC_POINTS = 5_000_000  # of all arcs of a file: some hundred MB of memory
+_MOST_ARC_POINTS = 5_000_000  # greatest number of points of all arcs of a file: some hundred MB of memory
 _FAR = 1e3  # the length of a direction that stands for a motion
 
 

@@ -19,7 +19,7 @@ from .frames import AXIS_TOLERANCE, SMALLEST_SQUARE
 # of the two rounds correctly: the result is the one float() gives.
 _POWERS = 10.0 ** np.arange(23)
 _EXACT = 2**53
-_MOST_DIGITS = 18  # of a mantissa that int64 surely holds
+_MOST_DIGITS = 18  # greatest number of digits of a mantissa that fits into int64
 _SPACE, _TAB, _CR, _LF, _PLUS, _COMMA, _MINUS, _POINT, _SLASH, _ZERO, _DOLLAR = (ord(c) for c in " \t\r\n+,-./0$")
 _G, _O, _T, _F, _E, _D, _R, _A, _P, _I, _N = (ord(c) for c in "gotfedrapin")
 _LOWER = 0x20  # makes a letter small

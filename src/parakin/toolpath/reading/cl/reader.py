@@ -35,10 +35,10 @@ from .statements import HIDDEN, ends_text, execute_statement
 _BLOCK = READ_SIZE  # bytes read at a time, into the same buffer: it stays in the cache
 _LONGEST = 4_000_000  # characters in one statement
 _BULK_FROM = 1 << 18  # bytes of a file; loading the compiled code doesn't pay below
-_PLAIN_STARTS = (b"G", b"g", b" ", b"\t", b"\n")  # of lines worth the call of the compiled code
+_PLAIN_STARTS = (b"G", b"g", b" ", b"\t", b"\n")  # first bytes of lines that are worth a call of the compiled code
 _END_OF_FILE = "\x1a"  # the sign that DOS ends a text with
 _MODAL_LINES = 4096  # FEDRAT, RAPID and PAINT lines in one call of it
-_BYTES_PER_RECORD = 48  # of a usual file
+_BYTES_PER_RECORD = 48  # bytes a record takes in a usual file
 _MOST_EXPECTED = 1 << 26  # records to reserve room for at first
 _HEADER = re.compile(r"\$\$\s*\*\s*CATIA0\b", re.IGNORECASE)
 _HIDDEN = re.compile(r"\$\$\s*->")  # a statement that Creo hides in a comment

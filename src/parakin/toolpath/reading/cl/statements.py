@@ -13,7 +13,7 @@ _NO_TEXT = re.compile(
     rf"\s*({'|'.join(name for name, word in WORDS.items() if word.ends_message)})\s*(?:[/,]|$)", re.IGNORECASE
 )
 
-HIDDEN = "\0"  # no line of a file has it
+HIDDEN = "\0"  # a character that no line of a file has
 _LONGEST_WORD = 10
 _MOTION = tuple(name for name, word in WORDS.items() if word.act is not None and word.ends_message)
 _ACTING = tuple(name for name, word in WORDS.items() if word.act is not None and len(name) >= 4)

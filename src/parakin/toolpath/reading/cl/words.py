@@ -31,7 +31,7 @@ class Word(NamedTuple):
 
 
 _EVENT = Word(event=True)
-_SILENT = Word()  # for the display or the original post-processor only
+_SILENT = Word()  # words for the display or the original post-processor only
 
 WORDS: dict[str, Word] = {
     # motion

@@ -54,7 +54,7 @@ M_WORDS = {  # the words of codes that LinuxCNC reads and that move nothing; the
     19: "RQP", 50: "P", 51: "P", 52: "P", 53: "P", 61: "Q", 62: "P", 63: "P", 64: "P", 65: "P",
     66: "PELQ", 67: "EQ", 68: "EQ", 70: "", 71: "",
 }  # fmt: skip
-UNKNOWN_M_WORDS = "PQREL"  # of a user's own codes and of those that LinuxCNC does not know
+UNKNOWN_M_WORDS = "PQREL"  # words of a user's own M codes and of those that LinuxCNC does not know
 END_CODES, SPINDLE_OFF = (2, 30), 5  # M codes
 _G_GROUP = {code: group for group, codes in G_GROUPS.items() for code in codes}
 _M_GROUP = {code: group for group, codes in M_GROUPS.items() for code in codes}

@@ -9,7 +9,7 @@ from .parameters import Parameters
 from .work_systems import COUNT
 
 _LOCAL, _SYSTEM, _ORIGINS, _TOOL, _POSITION = 5211, 5220, 5221, 5401, 5420
-_ROTATION = 9  # of a work system, behind its first number; each has twenty numbers
+_ROTATION = 9  # offset of a work system's rotation from its first number; each has twenty numbers
 _PER_SYSTEM = 20
 
 

@@ -17,7 +17,7 @@ AXES = "XYZABC"
 STILL = 1e-7  # mm: where X, Y and Z move less, RS274/NGC as LinuxCNC has it takes F for degrees per minute
 CENTRES = "IJK"
 _MOST_CYCLE_POINTS = 1_000_000
-_MOST_POINTS = 20_000_000  # of all arcs: a few GB of memory
+_MOST_POINTS = 20_000_000  # greatest number of points of all arcs: a few GB of memory
 
 
 class GcodeMotion:

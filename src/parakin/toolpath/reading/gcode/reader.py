@@ -28,7 +28,7 @@ from .work_systems import apply_frames
 
 _MOST_BLOCKS = 1_000_000  # executed again in loops and calls; a long line counts as several
 _COUNTED_AS_ONE = 32  # characters
-_HEADER_LINES = 200  # in which a file may name its control
+_HEADER_LINES = 200  # lines in which a file may name its control
 _ROTARY_NOTE = (
     "A, B or C without tool centre point control (G43.4): X, Y and Z are read as the tool's tip, "
     "A, B and C as its orientation there"

@@ -19,11 +19,11 @@ from .utilisation import Utilisation, measure_utilisation
 _ACROSS, _BOTH = 0.5, 0.3  # shares of a jerk limit that q'''·ṡ³ and 3q''·ṡ·s̈ may take
 _CLOSE = 1e-3  # beyond a limit: less is left to stretching, and after many rounds more from round to round
 _PATIENT, _ROUNDS = 20, 60
-_SAME = 1e-6  # of a piece's speed and jerk: what is not a change
-_PLACES = 4  # of each piece at which utilisation is measured
+_SAME = 1e-6  # smaller changes, relative to a piece's speed and jerk, count as none
+_PLACES = 4  # places on each piece where utilisation is measured
 _ALONE = 2  # rounds after which a step's neighbours are made softer with it
-_AT_ONCE = 0.4  # no less of s⃛ is left from one round to the next
-_SURE = 1.0001  # what the limits may be exceeded between the places where utilisation is measured
+_AT_ONCE = 0.4  # least ratio of a step's s⃛ to that of the round before
+_SURE = 1.0001  # the profile is slowed by this × the worst utilisation, which is measured at some places only
 
 
 class JerkScratch(NamedTuple):

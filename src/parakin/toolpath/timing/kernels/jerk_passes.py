@@ -23,7 +23,7 @@ from .acceleration_limits import AccelerationLimits, allocate_lines
 from .reachability import find_acceleration, find_controllable
 from .splines import JointRows
 
-_LEAST = 0.1  # of a jerk limit that is left for s⃛ in any case
+_LEAST = 0.1  # least fraction of a jerk limit that is left for s⃛
 
 
 class Stretch(NamedTuple):

@@ -20,7 +20,7 @@ from ....kernels.compiling import njit
 from .acceleration_limits import allocate_lines, bound_acceleration
 
 _TURNS = 60  # Newton's method on a convex, piecewise linear function ends after a few steps
-_SAFE = 1.0 - 1e-11  # of what is controllable; the rest is for rounding
+_SAFE = 1.0 - 1e-11  # fraction of the controllable speed that is used; the rest is for rounding
 _CLEAR, _BESIDE = 0.02, 1e-5  # of a step: how near a new row may be to an existing one, and to a stop
 
 

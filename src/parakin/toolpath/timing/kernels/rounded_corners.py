@@ -15,7 +15,7 @@ import numpy as np
 
 from ....kernels.compiling import njit
 
-SLIVER = 2e-3  # of a piece: knots nearer than this are one
+SLIVER = 2e-3  # knots nearer to each other than this fraction of a piece are one
 
 
 @njit(nogil=True, cache=True)

@@ -49,10 +49,10 @@ def text_of(d):
 UNITS = {"length": ["mm"], "slider": ["mm"], "crank": ["rad"], "lambda": ["mm", "mm"], "column": ["rad", "mm"]}
 SINGLE = ["length", "slider", "crank"]
 FAMILIES = {  # motion, leg kinds to draw from
-    "six": ("tx ty tz rx ry rz", SINGLE),
+    "six": ("tx ty tz rz ry rx", SINGLE),
     "lambdas": ("tx ty tz rz ry rx", ["lambda"]),
-    "columns": ("tx ty tz ry rz rx", ["column"]),
-    "any": ("tx ty tz rx ry rz", [*SINGLE, "lambda", "column"]),
+    "columns": ("tx ty tz rz ry rx", ["column"]),
+    "any": ("tx ty tz rz ry rx", [*SINGLE, "lambda", "column"]),
     "translational": ("tx ty tz", SINGLE),
     "carried": ("tx ty tz", SINGLE),
     "plane": ("tx tz", SINGLE),

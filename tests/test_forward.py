@@ -91,7 +91,8 @@ def test_from_home_what_converges_closes(m, method):
     done = found.converged
     if method is None:
         assert done.mean() >= converged
-    assert done.mean() > 0.97
+    else:  # all that are on home's side, in the machine's working mode
+        assert done[m.sides(poses) * m.sides(m.home[None]) > 0.0].mean() > 0.999
     miss, tilt = Description.of(m.spec).misses(found.poses[done], joints[done])
     assert miss.max() < CLOSE
     assert tilt.max() < 1e-11

@@ -83,3 +83,7 @@ def suggest(word: str, known: Iterable[str], others: str = "") -> str:
         return f', did you mean "{close[0]}"?'
     others = others or (words[0] if len(words) == 1 else "one of " + ", ".join(words) if words else "")
     return f", expected {others}" if others else ""
+
+
+class SingularHomeWarning(UserWarning):
+    """A machine's home is a singularity: the direct problem has no side to stay on there."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Sequence
 from functools import cached_property
 from itertools import product
@@ -13,12 +14,12 @@ from numpy.typing import ArrayLike
 
 from .algebra import Scalar
 from .arrays import Array, Span
-from .errors import DescriptionError, NoMethodError, PoseError
+from .errors import DescriptionError, NoMethodError, PoseError, SingularHomeWarning
 from .kernels.batch import evaluate_tape, evaluate_tape_with_residual, find_first_negative
 from .kinematics.assemblies import find_assemblies
 from .kinematics.follow import follow_path
 from .kinematics.forward import Solution, compute_closure_tolerance, find_sides, solve_forward
-from .kinematics.inverse import solve_inverse
+from .kinematics.inverse import SINGULAR, measure_regularity, solve_inverse
 from .kinematics.tapes import KinematicTapes, collect_tapes
 from .kinematics.wrist import EVERY_DIRECTION, EVERY_ROTATION, EXACT, Wrist, find_wrist, flip_mode
 from .model.legs import Inverse
@@ -28,6 +29,8 @@ from .model.rates import TwistRates, compute_twist_rates
 from .model.spec import Spec
 from .model.structures import DirectionColumns, PlatformPlacement, Structure
 from .model.traces import Model
+
+_ABOUT = 8  # poses about home that are looked at
 
 
 class Machine:
@@ -158,6 +161,19 @@ class Machine:
                 if limit.side == "reach":
                     what = f"{limit.subject} does not reach it"
                 raise DescriptionError("home", f"{what}; home is a pose of the tool in the machine frame")
+        self._warn_of_singular_home()
+
+    def _warn_of_singular_home(self) -> None:
+        """Warn of a machine that is singular at home, and perhaps everywhere."""
+        rng = np.random.default_rng(0)
+        about = np.array([0.01 * max(self.leg_sizes) if unit == "mm" else 0.1 for unit in self.axis_units])
+        poses = self.home + np.vstack([np.zeros(len(about)), rng.uniform(-1.0, 1.0, (_ABOUT, len(about))) * about])
+        for kind, regularity in measure_regularity(self.model, poses).items():
+            singular = regularity[np.isfinite(regularity)] <= SINGULAR
+            if singular.any() and singular[0]:
+                where = "and all poses about it are" if singular.all() else "is"
+                text = f"{self.name}: home {where} a {kind} singularity (margin {regularity[0]:.1g} of 1)"
+                warnings.warn(f"{text}: forward finds no pose from there", SingularHomeWarning, stacklevel=4)
 
     # Input at the boundary.
 
@@ -228,7 +244,13 @@ class Machine:
             raise PoseError(f"poses: a path of shape (N, {len(self.axes)}) expected")
         return follow_path(self.model, rows, self.checked_mode(mode), free_below)
 
-    def forward(self, joints: ArrayLike, near: ArrayLike | None = None, method: str | None = None) -> Solution:
+    def forward(
+        self,
+        joints: ArrayLike,
+        near: ArrayLike | None = None,
+        method: str | None = None,
+        mode: str | None = None,
+    ) -> Solution:
         """Compute poses for joints, (..., joints) -> :class:`~.kinematics.forward.Solution`, with residual and verdict.
 
         Parameters
@@ -238,15 +260,18 @@ class Machine:
             assembly mode (in closed form: its working mode first)
         method : ``"closed"`` (three spheres, two circles), ``"newton"``, or ``"constant"`` (the Jacobian of the start
             kept throughout: FME Transactions 41, (31)); by default the closed form where there is one, else Newton
+        mode : working mode that the legs stand in, head and table may stand in either of theirs; by default the
+            machine's, but where a near pose tells by its own joints that the legs stand in another one
         """
         rows, lead = self.rows(joints, self.joints, "joints")
         starts = None if near is None else self._starts(near, lead)
-        solution = solve_forward(self.model, rows, starts, method)
+        solution = solve_forward(self.model, rows, starts, method, None if mode is None else self.checked_mode(mode))
         return Solution(
             solution.poses.reshape(*lead, len(self.axes)),
             solution.residual.reshape(lead)[()],
             solution.converged.reshape(lead)[()],
             solution.steps.reshape(lead)[()],
+            solution.why.reshape(lead)[()],
         )
 
     def _starts(self, near: ArrayLike, lead: tuple[int, ...]) -> Array:
@@ -274,7 +299,7 @@ class Machine:
 
     def sides(self, poses: Array) -> Array:
         """Compute the determinant whose sign tells the assembly mode, at rows of poses (n, axes): (n,)."""
-        return find_sides(self.model, poses)
+        return find_sides(self.model, poses, self.mode)
 
     @property
     def has_closed_forward(self) -> bool:

@@ -1,8 +1,9 @@
 """Newton's method on the legs' closures, many poses side by side: the general direct problem.
 
-Every lane takes the same steps, so a block ends when its slowest lane has converged. The matrix is factored only while
-it still matters; the last steps keep it (a chord step costs a tenth). Row exchanges are chosen lane by lane, and passed
-over where no lane needs one.
+A block ends when its slowest lane has converged, but every lane decides for itself which matrix it keeps and where it
+stops, so an answer does not depend on the rows that share its block. A lane's matrix is made anew only while that still
+matters; its last steps keep it. Where all lanes do, a step costs a tenth. Row exchanges are chosen lane by lane, and
+passed over where no lane needs one.
 """
 
 from __future__ import annotations
@@ -32,8 +33,11 @@ class NewtonBlock(NamedTuple):
     matrix, exchanges : (m·m rows) the factored ∂f/∂y, and which lanes exchanged rows
     exchanged : (m·m,) whether any lane did
     determinant, first_determinant : of the last and the first matrix
-    worst : the greatest closure of each lane
+    worst, before : the greatest closure of each lane, now and a step before
     shrink : the part of its step that a lane takes
+    renews, stops : which lanes want a new matrix, and which take no step any more (2) or one (1)
+    steps : that each lane took
+    kept : (2·m·m + 1 rows) matrix, exchanges and determinant of lanes that keep theirs
     """
 
     registers: Array
@@ -45,7 +49,12 @@ class NewtonBlock(NamedTuple):
     determinant: Array
     first_determinant: Array
     worst: Array
+    before: Array
     shrink: Array
+    renews: Array
+    stops: Array
+    steps: Array
+    kept: Array
 
 
 @njit(nogil=True, cache=True)
@@ -58,8 +67,13 @@ def _allocate_block(tapes, m, joints):
     r, point = allocate_lanes(registers), allocate_lanes(m + joints)
     matrix, exchanges, closures = allocate_lanes(m * m), allocate_lanes(m * m), allocate_lanes(m)
     exchanged = np.zeros(m * m, np.bool_)
-    determinant, first, worst, shrink = allocate_lanes(1), allocate_lanes(1), allocate_lanes(1), allocate_lanes(1)
-    return NewtonBlock(r, point, closures, matrix, exchanges, exchanged, determinant, first, worst, shrink)
+    determinant, first, worst, before = allocate_lanes(1), allocate_lanes(1), allocate_lanes(1), allocate_lanes(1)
+    shrink, renews, stops, steps = allocate_lanes(1), allocate_lanes(1), allocate_lanes(1), allocate_lanes(1)
+    kept = allocate_lanes(2 * m * m + 1)
+    return NewtonBlock(
+        r, point, closures, matrix, exchanges, exchanged, determinant, first, worst, before, shrink, renews, stops,
+        steps, kept,
+    )  # fmt: skip
 
 
 @njit(nogil=True, cache=True)
@@ -140,8 +154,8 @@ def solve_factored(a, m, exchanges, exchanged, f):
 
 
 @njit(nogil=True, cache=True, fastmath=FAST, error_model="numpy")
-def evaluate_closures(tape, m, block, n):
-    """Evaluate a tape that gives m closures first; returns the greatest of the block's first n lanes."""
+def evaluate_closures(tape, m, block):
+    """Evaluate a tape that gives m closures first, and the greatest of each lane."""
     r, f, worst = block.registers, block.closures, block.worst
     copy_lanes(block.point, 0, r, 0, tape.inputs)
     interpret(tape.code, tape.constants, r)
@@ -152,18 +166,14 @@ def evaluate_closures(tape, m, block, n):
             v = r[s + j]
             f[t + j] = v
             worst[j] = abs(v) if (abs(v) > worst[j]) | (v != v) else worst[j]
-    greatest = 0.0
-    for j in range(n):
-        greatest = worst[j] if worst[j] > greatest else greatest  # false for NaN: such a lane is done
-    return greatest
 
 
 @njit(nogil=True, cache=True, fastmath=FAST, error_model="numpy")
 def _take_step(m, caps, block):
     """Take the step that stands in ``closures`` from ``point``, shrunk where a coordinate would change by too much."""
-    f, shrink, point, worst = block.closures, block.shrink, block.point, block.worst
-    for j in range(LANES):  # a lane that is done stays: beside a slow one it would take steps of pure rounding
-        shrink[j] = 0.0 if worst[j] < FINE else 1.0
+    f, shrink, point, worst, stops = block.closures, block.shrink, block.point, block.worst, block.stops
+    for j in range(LANES):
+        shrink[j] = 0.0 if (worst[j] < FINE) | (stops[j] > 1.5) else 1.0
     for i in range(m):
         s = (i & _MASK) * LANES
         for j in range(LANES):
@@ -176,32 +186,74 @@ def _take_step(m, caps, block):
 
 
 @njit(nogil=True, cache=True, fastmath=FAST, error_model="numpy")
+def _renew_matrix(full, m, block, some):
+    """Factor the slopes that the tape left, for the lanes that want it; with ``some`` the others keep their matrix."""
+    matrix, exchanges, exchanged, kept = block.matrix, block.exchanges, block.exchanged, block.kept
+    square = m * m
+    if some:
+        copy_lanes(matrix, 0, kept, 0, square)
+        copy_lanes(exchanges, 0, kept, square, square)
+        copy_lanes(block.determinant, 0, kept, 2 * square, 1)
+        before = exchanged.copy()
+    copy_lanes(block.registers, full.inputs + m, matrix, 0, square)
+    factor_matrix(matrix, m, exchanges, exchanged, block.determinant)
+    if some:
+        renews = block.renews
+        for i in range(square):
+            exchanged[i] |= before[i]
+            s, t = (i & _MASK) * LANES, ((square + i) & _MASK) * LANES
+            for j in range(LANES):
+                matrix[s + j] = matrix[s + j] if renews[j] > 0.0 else kept[s + j]
+                exchanges[s + j] = exchanges[s + j] if renews[j] > 0.0 else kept[t + j]
+        s = ((2 * square) & _MASK) * LANES
+        for j in range(LANES):
+            block.determinant[j] = block.determinant[j] if renews[j] > 0.0 else kept[s + j]
+
+
+@njit(nogil=True, cache=True, fastmath=FAST, error_model="numpy")
+def _decide(size, block, n, step):
+    """Decide for each lane whether its next matrix is a new one, and whether it stops; returns how many go on.
+
+    A lane whose closures are NaN stops.
+    """
+    worst, before, renews, stops, steps = block.worst, block.before, block.renews, block.stops, block.steps
+    for j in range(LANES):
+        w, ratio = worst[j], worst[j] / before[j]
+        new = renews[j] > 0.0
+        anew = w * w > WORTH * size if new else ratio > SLOW
+        enough = w < CLOSE if new else (ratio <= SLOW) & (w * ratio < FINE)
+        going = (stops[j] < 0.5) & (w == w)
+        steps[j] = step if stops[j] < 1.5 else steps[j]
+        renews[j] = 1.0 if going & anew else 0.0
+        stops[j] = (1.0 if enough else 0.0) if going else 2.0
+        before[j] = w
+    count = 0
+    for j in range(n):
+        count += 1 if stops[j] < 1.5 else 0
+    return count
+
+
+@njit(nogil=True, cache=True, fastmath=FAST, error_model="numpy")
 def solve_block(tapes, limits, m, block, n):
-    """Run Newton's method on one block, from its point to the root; returns the number of steps."""
-    full = tapes.closures_and_slopes
-    refactor, last = True, False
-    before = np.inf
+    """Run Newton's method on one block, from its point to the root."""
+    full, renews = tapes.closures_and_slopes, block.renews
+    renews[:] = 1.0
+    block.before[:] = np.inf
+    for j in range(LANES):
+        block.stops[j] = 0.0 if j < n else 2.0
     for step in range(limits.most + 1):
-        if refactor:
-            greatest = evaluate_closures(full, m, block, n)
-            copy_lanes(block.registers, full.inputs + m, block.matrix, 0, m * m)
-            factor_matrix(block.matrix, m, block.exchanges, block.exchanged, block.determinant)
+        wanted = 0
+        for j in range(n):
+            wanted += 1 if renews[j] > 0.0 else 0
+        evaluate_closures(full if wanted > 0 else tapes.closures, m, block)
+        if wanted > 0:
+            _renew_matrix(full, m, block, wanted < n)
             if step == 0:
                 copy_lanes(block.determinant, 0, block.first_determinant, 0, 1)
-            refactor = greatest * greatest > WORTH * limits.size
-            enough = greatest < CLOSE
-        else:
-            greatest = evaluate_closures(tapes.closures, m, block, n)
-            ratio = greatest / before
-            refactor = ratio > SLOW
-            enough = (ratio <= SLOW) & (greatest * ratio < FINE)
-        if last or step == limits.most:
-            return step
-        last = enough
-        before = greatest
+        if _decide(limits.size, block, n, step) == 0:
+            return
         solve_factored(block.matrix, m, block.exchanges, block.exchanged, block.closures)
         _take_step(m, limits.caps, block)
-    return limits.most
 
 
 @njit(nogil=True, cache=True, fastmath=FAST, error_model="numpy")
@@ -239,9 +291,9 @@ def solve_newton(tapes, limits, near, q, side, roots, start, stop):
         fetch_to_write(roots.rows, row, stop)
         interpret(tapes.begin.code, tapes.begin.constants, r)
         copy_lanes(r, tapes.begin.inputs, block.point, 0, m)
-        step = solve_block(tapes, limits, m, block, n)
+        solve_block(tapes, limits, m, block, n)
         for j in range(n):
-            roots.steps[row + j] = step
+            roots.steps[row + j] = int(block.steps[j])
             if side.shape[0] == 0:
                 roots.turned[row + j] = determinant[j] * block.first_determinant[j]
             else:

@@ -2,23 +2,41 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from itertools import pairwise, product
 from typing import Any
 
 import numpy as np
 
-from ..arrays import Array, Flags
+from ..arrays import Array, Flags, Indices
 from ..errors import NoMethodError, PoseError
 from ..kernels.batch import NewtonSteps, Roots, evaluate_tape, evaluate_tape_with_residual, solve_by_newton
 from ..model.traces import Model
-from .inverse import solve_inverse
+from .inverse import SINGULAR, solve_inverse
 from .tapes import collect_newton_tapes
-from .wrist import TURN, bring_within_poles, is_upright
+from .wrist import TURN, bring_within_poles, flip_mode, is_upright, wrap_angle
 
 CLOSED = 1e-9  # greatest closure error of an answer, mm in a machine of a metre
 MOST_STEPS = 24
 WITHIN_A_TURN = 6  # steps of half a radian at most, which can't leave the start's turn
-CONTINUATIONS = (8, 64)  # parts of the way from a known pose, where Newton's method in one go fails
+ARM = 0.2  # of the greatest leg: the length by which angles of turning drives are compared with lengths
+STANDS_IN = 0.5  # of the way to another mode: how near joints must be to tell that a pose's legs stand in a mode
+NEARER = 0.1  # of the way to the answer in the default mode: one in another mode that is nearer is taken instead
+STANDS_AT = 0.1  # of the legs: how near these joints must be
+BESIDE = 0.05  # of the legs: an answer no farther from its start counts in whatever mode, if it has none in the default
+SAME_MODE = 1e-6  # mm by which the joints of an answer may differ from its inverse's in the working mode
+FIRST_PART, LEAST_PART = 1.0 / 8.0, 1e-5  # of the way in joints that a step of the continuation takes
+MOST_PARTS = 400  # steps of the continuation
+NEAR_STEPS = 6  # of Newton's method for a step of the continuation; one that needs more is halved
+
+# Why there is no answer.
+ANSWERED, OPEN, ON_ANOTHER_SIDE, OTHER_MODE = range(4)
+REASONS = (
+    "",
+    "the legs do not close near the start",
+    "a parallel singularity lies between the start and the joints",
+    "the legs close in another working mode only",
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,44 +45,115 @@ class Solution:
 
     poses : (..., axes), NaN where not converged; C of an upright tool is the near pose's, else 0
     residual : (...,) the greatest distance by which a leg fails to close there, mm
-    converged : (...,) True where the legs close and the pose is of the same assembly mode as the start
+    converged : (...,) True where the legs close, in the working mode asked for and the start's assembly mode
     steps : (...,) Newton's steps; 0 in closed form
+    why : (...,) why there is no answer, an index of :data:`REASONS`; 0 where there is one
     """
 
     poses: Array
     residual: Array
     converged: Any
     steps: Any
+    why: Any
 
 
-def solve_forward(model: Model, joints: Array, starts: Array | None, method: str | None = None) -> Solution:
+def solve_forward(
+    model: Model, joints: Array, starts: Array | None, method: str | None = None, mode: str | None = None
+) -> Solution:
     """Solve the direct problem of rows of joints (N, joints), from rows of poses (N, axes) or from home.
 
     Parameters and errors as of :meth:`parakin.Machine.forward`; every field of the solution has N rows.
 
-    Newton's answer counts only if it lies in the start's assembly mode: where the determinant of A changes sign on the
-    way the answer is sought once more along the joints' straight line from the start, and refused if that fails too.
+    An answer counts only if its inverse in the working mode is the given joints, and if it lies on the start's side of
+    the parallel singularities, told by the determinant of the twist with the start's own joints. Where Newton's method
+    fails that in one go, the answer is continued along the joints' straight line from the start.
     """
     if method is None:
         method = "closed" if model.by_spheres else "newton"
-    if method == "closed":
-        solution = _solve_by_spheres(model, joints, starts)
-    elif method == "newton":
-        solution = _solve_by_newton(model, joints, starts)
-    elif method == "constant":
-        solution = _solve_by_constant_jacobian(model, joints, starts)
-    else:
+    if method not in _METHODS:
         raise PoseError(f'method {method!r}: "closed", "newton" or "constant" expected')
-    poses, converged, steps = solution.poses, solution.converged, solution.steps
-    if not converged.all():
-        poses[~converged] = np.nan
+    solve = _METHODS[method]
+    solution = solve(model, joints, starts, model.mode if mode is None else mode)
+    if mode is None and starts is not None and model.has_modes:
+        for other, rows in _group_by_mode(model, starts, joints, solution.why == ANSWERED).items():
+            found = solve(model, joints[rows], starts[rows], other)
+            own = _take_rows(solution, rows)
+            nearer = _measure_way(model, found, starts[rows]) < NEARER * _measure_way(model, own, starts[rows])
+            better = (found.why == ANSWERED) & (nearer | (own.why != ANSWERED))
+            _put_rows(solution, rows[better], _take_rows(found, better))
+        lost = np.flatnonzero(solution.why != ANSWERED)
+        if len(lost):  # where the start does not tell the mode, an answer next to it counts in any
+            found = solve(model, joints[lost], starts[lost], None)
+            with np.errstate(invalid="ignore"):
+                beside = _measure_way(model, found, starts[lost]) <= BESIDE * max(model.sizes)
+            taken = (found.why == ANSWERED) & beside
+            _put_rows(solution, lost[taken], _take_rows(found, taken))
+    poses, steps = solution.poses, solution.steps
+    poses[solution.why != ANSWERED] = np.nan
     direction = model.structure.direction
     if direction is not None:
         along_z = is_upright(poses[:, direction.b])
         poses[along_z, direction.c] = 0.0 if starts is None else starts[along_z, direction.c]
     elif steps.max(initial=0) > WITHIN_A_TURN:
         _count_turns(model, poses, np.array(model.home) if starts is None else starts)
-    return solution
+    return replace(solution, converged=solution.why == ANSWERED)
+
+
+def _group_by_mode(model: Model, poses: Array, joints: Array, answered: Flags) -> dict[str, Indices]:
+    """Group rows by the working mode other than the default whose joints at the poses are near to the given ones.
+
+    Each leg's joints must be near to the given ones in that mode, and nearer than in any other. Rows that are answered
+    in the default mode, and near to it, are left there.
+    """
+    near = STANDS_AT * max(model.sizes)
+    in_default = np.abs(_compare_with_mode(model, poses, joints, model.mode)).max(1, initial=0.0) <= near
+    rows = np.flatnonzero(~(in_default & answered))
+    if not len(rows):
+        return {}
+    poses, joints = poses[rows], joints[rows]
+    signs = [len(leg.branches) for leg in model.spec.legs]
+    columns = np.cumsum([0, *(len(leg.drives) for leg in model.spec.legs)])
+    head, found = model.mode[sum(signs) :], np.full(len(rows), "", dtype=object)
+    choices = ["".join(choice) for choice in product("+-", repeat=max(signs))]
+    modes = ["".join(choice[:count] for count in signs) + head for choice in choices]
+    off = np.stack([np.abs(_compare_with_mode(model, poses, joints, mode)) for mode in modes])
+    off = np.where(np.isfinite(off), off, np.inf)
+    clear = np.ones(len(rows), np.bool_)
+    for (first, last), count in zip(pairwise(columns), signs, strict=True):
+        own = off[:: 2 ** (max(signs) - count), :, first:last].max(2)  # choices that differ in this leg's signs
+        ordered = np.sort(own, 0)
+        clear &= ordered[0] <= near
+        if count:
+            clear &= ordered[0] <= STANDS_IN * ordered[1]
+        names = np.array([choice[:count] for choice in choices[:: 2 ** (max(signs) - count)]], dtype=object)
+        found += names[own.argmin(0)]
+    groups: dict[str, list[int]] = {}
+    for row in np.flatnonzero(clear).tolist():
+        groups.setdefault(found[row] + head, []).append(int(rows[row]))
+    groups.pop(model.mode, None)
+    return {mode: np.array(members) for mode, members in groups.items()}
+
+
+def _measure_way(model: Model, solution: Solution, starts: Array) -> Array:
+    """Measure how far answers lie from their starts, mm, a turn counted as the greatest leg."""
+    turning = [axis in "ABC" for axis in model.axes]
+    way = solution.poses - starts
+    way[:, turning] = wrap_angle(way[:, turning]) * max(model.sizes)
+    length: Array = np.linalg.norm(way, axis=1)
+    return length
+
+
+def _take_rows(solution: Solution, rows: Indices | Flags) -> Solution:
+    return Solution(
+        solution.poses[rows], solution.residual[rows], solution.converged[rows], solution.steps[rows],
+        solution.why[rows],
+    )  # fmt: skip
+
+
+def _put_rows(solution: Solution, rows: Indices, other: Solution) -> None:
+    """Put another solution in place of some rows of one."""
+    for name in ("poses", "residual", "steps", "why"):
+        getattr(solution, name)[rows] = getattr(other, name)
 
 
 def _count_turns(model: Model, poses: Array, near: Array) -> None:
@@ -110,77 +199,154 @@ def find_roots(
     return solve_by_newton(tapes, steps, np.ascontiguousarray(near), joints, np.empty(0) if side is None else side)
 
 
-def _solve_by_spheres(model: Model, joints: Array, starts: Array | None) -> Solution:
+def find_in_mode(model: Model, poses: Array, joints: Array, mode: str | None) -> Flags:
+    """Find rows whose legs' joints are those of the inverse at a pose (n, axes) in a working mode, or in any (None).
+
+    Turns do not count. Head and table take the joints as given: they may stand in either of their modes.
+    """
+    if mode is None or not model.has_modes:
+        return np.ones(len(poses), np.bool_)
+    off = np.abs(_compare_with_mode(model, poses, joints, mode))
+    return np.asarray((off <= SAME_MODE * max(1.0, max(model.sizes) / 1000.0)).all(1))
+
+
+def _compare_with_mode(model: Model, poses: Array, joints: Array, mode: str) -> Array:
+    """Subtract the given joints from the legs' joints in a working mode, leg by leg, mm.
+
+    Angles are taken within half a turn, and times an arm of :data:`ARM` of the greatest leg.
+    """
+    off = evaluate_tape(model.mode_tape(mode), poses, np.empty((len(poses), model.leg_count)), joints)
+    turning = [unit == "rad" for leg in model.spec.legs for unit in leg.units]
+    off[:, turning] = wrap_angle(off[:, turning]) * ARM * max(model.sizes)
+    return off
+
+
+def _judge(model: Model, roots: Roots, joints: Array, mode: str | None) -> Indices:
+    """Tell why roots are no answers, as indices of :data:`REASONS`; zero where they are."""
+    turned = roots.turned * _measure_angles(model, roots.rows)
+    with np.errstate(invalid="ignore"):
+        why = np.where(find_in_mode(model, roots.rows, joints, mode), ANSWERED, OTHER_MODE)
+        why[~(turned > 0.0)] = ON_ANOTHER_SIDE
+        why[~(roots.residual <= compute_closure_tolerance(model))] = OPEN
+    return why
+
+
+def _measure_angles(model: Model, poses: Array) -> Array | float:
+    """Compute the sign, and size, by which the determinant of the pose's rates differs from the twist's."""
+    if len(model.axes) < 6:
+        return 1.0
+    return evaluate_tape(model.angles_tape(), poses, np.empty((len(poses), 1)))[:, 0]
+
+
+def _solve_by_spheres(model: Model, joints: Array, starts: Array | None, mode: str | None) -> Solution:
+    """Take, of both common points, the one in the working mode that is nearer to the start, or on home's side."""
     if not model.by_spheres:
         raise NoMethodError(f"{model.spec.name}: no closed form of the direct problem; use method='newton'")
-    poses = np.empty((len(joints), len(model.axes)))
+    count = len(joints)
+    first, second = np.empty((count, len(model.axes))), np.empty((count, len(model.axes)))
     if starts is None:
-        residual = _choose_by_working_mode(model, joints, poses)
+        nothing = np.empty((count, 0))
+        residual = evaluate_tape_with_residual(model.spheres_tape(model.home_side), joints, first, nothing)
     else:
-        residual = evaluate_tape_with_residual(model.spheres_tape(None), joints, poses, starts)
-    return Solution(poses, residual, residual <= compute_closure_tolerance(model), np.zeros(len(joints), np.int32))
+        residual = evaluate_tape_with_residual(model.spheres_tape(None), joints, first, starts)
+    why = np.where(residual <= compute_closure_tolerance(model), ANSWERED, OPEN)
+    if model.has_modes:
+        lost = np.flatnonzero((why == ANSWERED) & ~find_in_mode(model, first, joints, mode))
+        why[lost] = OTHER_MODE
+        if starts is None and len(lost):
+            given, others, tape = joints[lost], second[lost], model.spheres_tape(-model.home_side)
+            open_by = evaluate_tape_with_residual(tape, given, others, np.empty((len(lost), 0)))
+            fit = (open_by <= compute_closure_tolerance(model)) & find_in_mode(model, others, given, mode)
+            first[lost[fit]], residual[lost[fit]], why[lost[fit]] = others[fit], open_by[fit], ANSWERED
+    return Solution(first, residual, why == ANSWERED, np.zeros(count, np.int32), why)
 
 
-def _choose_by_working_mode(model: Model, joints: Array, poses: Array) -> Array:
-    """Fill ``poses`` with the common point on home's side, and return the residuals, mm.
+def find_sides(model: Model, poses: Array, mode: str | None = None, joints: Array | None = None) -> Array:
+    """Compute the determinant of the twist at poses, (N,), but for its size.
 
-    Where only the other common point has these joints in the machine's own working mode, that one is taken.
+    Its sign tells the assembly mode, and zero is a singularity. Its closures are those of the poses' own joints in a
+    working mode; where these do not exist, of ``joints`` (1 or N rows), if given.
     """
-    nothing = np.empty((len(joints), 0))
-    residual = evaluate_tape_with_residual(model.spheres_tape(model.home_side), joints, poses, nothing)
-    if not model.has_modes:
-        return residual
-
-    def is_out_of_mode(poses: Array, joints: Array) -> Flags:
-        off = np.abs(solve_inverse(model, poses, model.mode) - joints)[:, : model.leg_count].max(1)
-        fits: Flags = off <= 1e3 * compute_closure_tolerance(model)
-        return ~fits
-
-    lost = np.flatnonzero(is_out_of_mode(poses, joints) & np.isfinite(residual))
-    if len(lost):
-        others, their_joints = np.empty((len(lost), poses.shape[1])), joints[lost]
-        other_tape = model.spheres_tape(-model.home_side)
-        their_residual = evaluate_tape_with_residual(other_tape, their_joints, others, nothing[lost])
-        fit = ~is_out_of_mode(others, their_joints)
-        poses[lost[fit]], residual[lost[fit]] = others[fit], their_residual[fit]
-    return residual
+    mode = model.mode if mode is None else mode
+    own = solve_inverse(model, poses, mode)
+    if joints is not None and model.structure.branches:  # with the head or table as it is given
+        other = solve_inverse(model, poses, flip_mode(mode))
+        serial = slice(model.leg_count, None)
+        far = [np.abs(wrap_angle((turned - joints)[:, serial])).max(1, initial=0.0) for turned in (own, other)]
+        nearer = far[1] < far[0]
+        own[nearer] = other[nearer]
+    if joints is not None:
+        own = np.where(np.isfinite(own).all(1, keepdims=True), own, joints)
+    sides = find_roots(model, poses, own, most=0, side=np.ones(1)).turned
+    sides[np.abs(sides) <= SINGULAR * _bound_determinant(model)] = 0.0
+    return sides * _measure_angles(model, poses)
 
 
-def find_sides(model: Model, poses: Array) -> Array:
-    """Compute the determinant of the closures' derivatives at poses, (N,); its sign tells the assembly mode."""
-    return find_roots(model, poses, solve_inverse(model, poses, model.mode), most=0, side=np.ones(1)).turned
+def _bound_determinant(model: Model) -> float:
+    """Return the greatest determinant that closures' derivatives of home's sizes can have, by Hadamard."""
+    home, tape = np.array(model.home)[None, :], model.newton_tape(True)
+    joints, count = solve_inverse(model, home, model.mode), len(model.structure.coordinates)
+    coordinates = evaluate_tape(model.begin_tape(), home, np.empty((1, count)), joints)
+    slopes = evaluate_tape(tape, coordinates, np.empty((1, tape.outputs)), joints)[0, model.leg_count :]
+    scales = np.array([max(model.sizes) if word.startswith("r") else 1.0 for word in model.structure.coordinates])
+    return float(np.linalg.norm(slopes.reshape(-1, count) / scales, axis=1).prod() * scales.prod())
 
 
-def _solve_by_newton(model: Model, joints: Array, starts: Array | None) -> Solution:
-    near = np.array(model.home)[None, :] if starts is None else starts
-    result = find_roots(model, near, joints, side=find_sides(model, near) if starts is None else None)
-    good = (result.residual <= compute_closure_tolerance(model)) & (result.turned > 0.0)
-    if not good.all():
-        _continue_from_starts(model, near, joints, result, good)
-    return Solution(result.rows, result.residual, good, result.steps)
+def _solve_by_newton(model: Model, joints: Array, starts: Array | None, mode: str | None) -> Solution:
+    home = np.array(model.home)[None, :]
+    near = home if starts is None else starts
+    if model.has_modes or starts is None:
+        side = find_sides(model, near, mode, None if starts is None else joints)
+        roots = find_roots(model, near, joints, side=side)
+        why = _judge(model, roots, joints, mode)
+    else:  # struts of any length have the same determinant, so the start's need not be known beforehand
+        roots = find_roots(model, near, joints)
+        roots.turned[roots.turned <= (SINGULAR * _bound_determinant(model)) ** 2] = 0.0
+        why = _judge(model, roots._replace(turned=roots.turned * _measure_angles(model, near)), joints, mode)
+    if (why != ANSWERED).any():
+        _continue_from_starts(model, near, joints, (roots, why), mode)
+    return Solution(roots.rows, roots.residual, why == ANSWERED, roots.steps, why)
 
 
-def _continue_from_starts(model: Model, near: Array, joints: Array, result: Roots, good: Flags) -> None:
-    """Continue along the joints' straight line from the start where Newton's method in one go failed; in place."""
-    whole = np.isfinite(joints).all(1) & np.isfinite(near).all(1)
-    for parts in CONTINUATIONS:
-        lost = np.flatnonzero(~good & whole)
-        if not len(lost):
-            return
-        walk = np.broadcast_to(near if len(near) == 1 else near[lost], (len(lost), near.shape[1]))
-        begin = solve_inverse(model, walk, model.mode)
-        side = find_sides(model, np.ascontiguousarray(walk))
-        with np.errstate(invalid="ignore", over="ignore"):
-            for part in range(1, parts + 1):
-                step = find_roots(model, walk, begin + (part / parts) * (joints[lost] - begin), side=side)
-                walk = step.rows
-                result.steps[lost] += step.steps
-            fine = (step.residual <= compute_closure_tolerance(model)) & (step.turned > 0.0)
-        result.rows[lost[fine]], result.residual[lost[fine]] = walk[fine], step.residual[fine]
-        good[lost[fine]] = True
+def _continue_from_starts(
+    model: Model, near: Array, joints: Array, into: tuple[Roots, Indices], mode: str | None
+) -> None:
+    """Continue along the joints' straight line from the start where Newton's method in one go failed; in place.
+
+    Steps are halved where Newton's method does not converge at once, on the same side and in the working mode, and
+    doubled where it does. A row that can't be continued keeps the reason of its last step.
+    """
+    roots, why = into
+    walk = np.broadcast_to(near, (len(joints), near.shape[1]))
+    begin = solve_inverse(model, walk, model.mode if mode is None else mode)
+    rows = np.flatnonzero((why != ANSWERED) & np.isfinite(joints).all(1) & np.isfinite(begin).all(1))
+    if not len(rows):
+        return
+    walk, begin, goal = np.ascontiguousarray(walk[rows]), begin[rows], joints[rows]
+    side = find_sides(model, walk, mode)
+    gone, part = np.zeros(len(rows)), np.full(len(rows), FIRST_PART)
+    for _ in range(MOST_PARTS):
+        going = np.flatnonzero((gone < 1.0) & (part >= LEAST_PART))
+        if not len(going):
+            break
+        share = np.minimum(1.0, gone[going] + part[going])
+        given = begin[going] + share[:, None] * (goal[going] - begin[going])
+        step = find_roots(model, walk[going], given, most=NEAR_STEPS, side=side[going])
+        reason = _judge(model, step, given, mode)
+        roots.steps[rows[going]] += step.steps
+        fine = np.asarray(reason == ANSWERED)
+        kept = going[fine]
+        walk[kept], gone[kept] = step.rows[fine], share[fine]
+        part[kept] *= 2.0
+        part[going[~fine]] *= 0.5
+        why[rows[going]] = reason
+        done = kept[gone[kept] >= 1.0]
+        at_end = np.flatnonzero(fine & (share >= 1.0))
+        roots.rows[rows[done]], roots.residual[rows[done]] = step.rows[at_end], step.residual[at_end]
+    why[rows[gone < 1.0]] = np.where(why[rows[gone < 1.0]] == ANSWERED, OPEN, why[rows[gone < 1.0]])
 
 
-def _solve_by_constant_jacobian(model: Model, joints: Array, starts: Array | None) -> Solution:
+def _solve_by_constant_jacobian(model: Model, joints: Array, starts: Array | None, mode: str | None) -> Solution:
     """Iterate x ← x + J⁻¹·(d - d(x)) with the start's Jacobian, to 1 µm in every leg; FME Transactions 41, (31)."""
     legs, m = model.leg_count, len(model.structure.coordinates)
     tape = model.legs_tape(model.mode)
@@ -205,5 +371,12 @@ def _solve_by_constant_jacobian(model: Model, joints: Array, starts: Array | Non
         for _ in range(40):  # on to rounding, uncounted: the verdict is the same for every method
             y += np.einsum("nij,nj->ni", inverse, joints[:, :legs] - both[:, :legs])
             both = evaluate_tape(tape, y, np.empty((len(y), legs + legs * m)))
-    residual = find_roots(model, y, joints, most=0, poses=False).residual
-    return Solution(compute_poses(model, y, joints), residual, residual <= compute_closure_tolerance(model), steps)
+    roots = find_roots(model, y, joints, most=0, poses=False)
+    poses = compute_poses(model, y, joints)
+    with np.errstate(invalid="ignore"):
+        why = np.where(find_in_mode(model, poses, joints, mode), ANSWERED, OTHER_MODE)
+        why[~(roots.residual <= compute_closure_tolerance(model))] = OPEN
+    return Solution(poses, roots.residual, why == ANSWERED, steps, why)
+
+
+_METHODS = {"closed": _solve_by_spheres, "newton": _solve_by_newton, "constant": _solve_by_constant_jacobian}

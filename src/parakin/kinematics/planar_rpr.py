@@ -9,9 +9,11 @@ from __future__ import annotations
 import numpy as np
 
 from ..arrays import Array
+from ..errors import NoMethodError
 
 _SAMPLES = 16  # the polynomial has harmonics up to the fourth (which cancels), so nine would do
 _STEPS, _IDLE = 50, 4
+_SINGULAR, _STRIDE = 1e-6, 1e-3  # of the greatest singular value, and of the size: what tells a continuum
 
 
 def solve_planar_rpr(centres: Array, radii: Array, corners: Array) -> Array:
@@ -37,7 +39,22 @@ def solve_planar_rpr(centres: Array, radii: Array, corners: Array) -> Array:
     for error, pose in sorted(polished, key=lambda item: item[0]):  # of equal ones the best closed
         if error < 1e-11 * size and not any(_is_same(pose, other, size) for other in poses):
             poses.append(pose)
+    if any(_moves_on(pose, centres, radii, corners) for pose in poses):
+        raise NoMethodError("the assemblies are a continuum here: the legs leave the platform free to move")
     return np.array(sorted(poses, key=lambda p: (p[2], p[0], p[1]))).reshape(-1, 3)
+
+
+def _moves_on(pose: Array, centres: Array, radii: Array, corners: Array) -> bool:
+    """Tell whether a solution belongs to a continuum: a step along the null direction can be closed again there."""
+    _, jacobian = _linearise(pose, centres, corners)
+    size = float(np.abs(jacobian).max())
+    scaled = jacobian * np.array([1.0, 1.0, 1.0 / max(size, 1e-300)])  # the turn in units of a length of its own
+    _, values, directions = np.linalg.svd(scaled)
+    if values[-1] > _SINGULAR * values[0]:
+        return False
+    step = _STRIDE * size * directions[-1] * np.array([1.0, 1.0, 1.0 / max(size, 1e-300)])
+    error, moved = _polish_pose(pose + step, centres, radii, corners)
+    return error < 1e-11 * size and not _is_same(pose, moved, size)
 
 
 def _turn_points(angle: Array, points: Array) -> Array:
@@ -81,8 +98,7 @@ def _polish_pose(pose: Array, centres: Array, radii: Array, corners: Array) -> t
     """Polish a pose by Newton's method until it gains no more; return the best and its greatest error of a radius."""
     best, least, idle = pose, np.inf, 0
     for _ in range(_STEPS):
-        arms = _turn_points(pose[2], corners)
-        rods = pose[:2] + arms - centres
+        rods, jacobian = _linearise(pose, centres, corners)
         f = 0.5 * ((rods * rods).sum(1) - radii**2)
         error = float(np.abs(np.linalg.norm(rods, axis=1) - np.abs(radii)).max())
         idle = 0 if error < 0.5 * least else idle + 1
@@ -90,9 +106,15 @@ def _polish_pose(pose: Array, centres: Array, radii: Array, corners: Array) -> t
             best, least = pose, error
         if idle > _IDLE:
             break
-        jacobian = np.column_stack([rods, rods[:, 1] * arms[:, 0] - rods[:, 0] * arms[:, 1]])
         pose = pose - np.linalg.lstsq(jacobian, f, rcond=1e-13)[0]
     return least, np.array([best[0], best[1], np.pi - (np.pi - best[2]) % (2.0 * np.pi)])
+
+
+def _linearise(pose: Array, centres: Array, corners: Array) -> tuple[Array, Array]:
+    """Compute the rods (3, 2), and the derivatives (3, 3) of half their squared lengths by x, y and φ."""
+    arms = _turn_points(pose[2], corners)
+    rods = pose[:2] + arms - centres
+    return rods, np.column_stack([rods, rods[:, 1] * arms[:, 0] - rods[:, 0] * arms[:, 1]])
 
 
 def _is_same(a: Array, b: Array, size: float) -> bool:

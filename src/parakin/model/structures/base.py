@@ -103,6 +103,11 @@ class Structure(ABC):
         """Find the motion's coordinates for the platform's frame in the base."""
         return self.coordinates_at(origin)
 
+    def measure_angles(self, coordinates: Sequence[Scalar]) -> Scalar:
+        """The determinant that leads from small turns to rates of the coordinates' angles, but for its size: where it
+        changes its sign the angles are singular, not the machine."""
+        return 1.0
+
     @abstractmethod
     def pose(self, coordinates: Sequence[Scalar], serial: Sequence[Scalar]) -> list[Scalar]:
         """Compute the tool's pose; at a vertical tool axis C is 0."""

@@ -36,6 +36,10 @@ class Free(Structure):
             raise DescriptionError(
                 "motion", f"{' '.join(spec.motion)}: with three turns a free motion has three translations"
             )
+        if len(turns) == 3 and turns != ["rz", "ry", "rx"]:
+            raise DescriptionError(
+                "motion", f"{' '.join(spec.motion)}: its three turns go rz ry rx, as C, B and A of a pose do"
+            )
         if len(turns) < 3 and spec.mounting:
             if not words >= set(TRANSLATIONS):
                 raise DescriptionError(
@@ -61,6 +65,9 @@ class Free(Structure):
         rails = [np.array(leg.rail) for leg in legs if isinstance(leg, Lambda)]
         parallel = len(rails) == len(legs) == 3 and all(np.allclose(rail, rails[0], atol=1e-12) for rail in rails)
         return "lambda" if parallel else None
+
+    def measure_angles(self, coordinates: Sequence[Scalar]) -> Scalar:
+        return sincos(coordinates[4])[1] if len(self.axes) == 6 else 1.0
 
     @property
     def tool_rotation(self) -> Mat:

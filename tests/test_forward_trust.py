@@ -1,0 +1,213 @@
+"""The direct problem's promise: the working mode, the start's own side of the singularities, one row at a time."""
+
+import warnings
+
+import numpy as np
+import pytest
+
+import parakin as pk
+from parakin.errors import SingularHomeWarning
+from parakin.kinematics.forward import ANSWERED, ON_ANOTHER_SIDE, OPEN, OTHER_MODE, REASONS
+
+RAILS = """\
+name: six_vertical_rails
+source: Sizes were chosen.
+sizes: {R: 260 mm, r: 85 mm}
+motion: tx ty tz rz ry rx
+legs:
+  kind: slider
+  joints: [q1, q2, q3, q4, q5, q6]
+  foot: {circle: R, at: [43 deg, 137 deg, 163 deg, 257 deg, 283 deg, 17 deg]}
+  platform: {circle: r, at: [72 deg, 108 deg, 192 deg, 228 deg, 312 deg, 348 deg]}
+  rail: [0, 0, 1]
+  rod: 265 mm
+  branch: "-"
+  range: [-2 m, 2 m]
+home: {X: 0 mm, Y: 0 mm, Z: 100 mm, A: 0, B: 0, C: 0}
+"""
+
+PRR = """\
+name: prr
+source: Sizes were chosen.
+motion: tx ty rz
+legs:
+  kind: slider
+  joints: [q1, q2, q3]
+  foot: {circle: 300 mm, at: [210 deg, 330 deg, 90 deg]}
+  rail: [[cos(60 deg), -sin(60 deg), 0], [cos(60 deg), sin(60 deg), 0], [-1, 0, 0]]
+  rod: 350 mm
+  branch: "-"
+  platform: {circle: 80 mm, at: [210 deg, 330 deg, 90 deg]}
+  range: [-1 m, 1 m]
+home: {X: 0 mm, Y: 0 mm, C: 5 deg}
+"""
+
+CONGRUENT = """\
+name: congruent
+source: Congruent triangles.
+motion: tx ty rz
+legs:
+  kind: length
+  joints: [d1, d2, d3]
+  foot: {circle: 200 mm, at: [90 deg, 210 deg, 330 deg]}
+  platform: {circle: 200 mm, at: [90 deg, 210 deg, 330 deg]}
+  range: [10 mm, 650 mm]
+home: {X: 100 mm, Y: 50 mm, C: 10 deg}
+"""
+
+HEXAGONS = """\
+name: hexagons
+source: Regular hexagons joined corner to corner are singular everywhere.
+sizes: {R: 400 mm, r: 200 mm}
+motion: tx ty tz rz ry rx
+legs:
+  kind: length
+  joints: [a, b, c, d, e, f]
+  foot: {circle: R, at: [0 deg, 60 deg, 120 deg, 180 deg, 240 deg, 300 deg]}
+  platform: {circle: r, at: [0 deg, 60 deg, 120 deg, 180 deg, 240 deg, 300 deg]}
+  range: [300 mm, 1500 mm]
+home: {X: 0 mm, Y: 0 mm, Z: -800 mm, A: 0 deg, B: 0 deg, C: 0 deg}
+"""
+
+
+@pytest.fixture
+def load(tmp_path):
+    def loaded(text):
+        path = tmp_path / "machine.yaml"
+        path.write_text(text)
+        return pk.load(path)
+
+    return loaded
+
+
+def draw(machine, count, spread=(250.0, 0.5), seed=0):
+    """Reachable poses about home."""
+    size = np.array([spread[axis in "ABC"] for axis in machine.axes])
+    poses = machine.home + np.random.default_rng(seed).uniform(-1.0, 1.0, (count, len(size))) * size
+    return poses[np.isfinite(machine.inverse(poses)).all(1)]
+
+
+def twist_side(poses):
+    """The determinant of the default hexapod's struts as screws: it knows no angles of a pose."""
+    inch = 25.4
+    foot = np.array([[-22.95, 13.25, 0], [22.95, 13.25, 0], [22.95, 13.25, 0], [0, -26.5, 0], [0, -26.5, 0]])
+    foot = np.vstack([foot, [-22.95, 13.25, 0]]) * inch
+    plate = np.array([[-1, 11.5, 0], [1, 11.5, 0], [10.459, -4.884, 0], [9.459, -6.616, 0], [-9.459, -6.616, 0]])
+    plate = np.vstack([plate, [-10.459, -4.884, 0]]) * inch + [0, 0, 150.0]
+    sides = []
+    for pose in poses:
+        (sa, sb, sc), (ca, cb, cc) = np.sin(pose[3:]), np.cos(pose[3:])
+        turn = np.array([[cc, -sc, 0], [sc, cc, 0], [0, 0, 1]]) @ np.array([[cb, 0, sb], [0, 1, 0], [-sb, 0, cb]])
+        arms = plate @ (turn @ np.array([[1, 0, 0], [0, ca, -sa], [0, sa, ca]])).T
+        rods = pose[:3] + arms - foot
+        rods /= np.linalg.norm(rods, axis=1)[:, None]
+        sides.append(np.linalg.det(np.hstack([rods, np.cross(arms, rods) / 300.0])))
+    return np.array(sides)
+
+
+def test_an_answer_is_in_the_working_mode(load):
+    machine = load(RAILS)
+    joints = machine.inverse(draw(machine, 20_000))
+    found = machine.forward(joints)
+    assert len(joints) > 800
+    assert found.converged.mean() > 0.99
+    off = machine.inverse(found.poses[found.converged]) - joints[found.converged]
+    assert np.abs(off).max() < 1e-6
+
+
+@pytest.mark.parametrize(
+    "name", ["lambda6", "hbg80_2d", "hbg80_3d", "orthoglide", "linear_delta", "hexapod", "tricept"]
+)
+@pytest.mark.parametrize("far", [0.0, 1.0, 100.0])
+def test_an_answers_inverse_is_the_joints(name, far):
+    machine = pk.load(name)
+    poses = draw(machine, 3000, (200.0, 0.4))
+    joints = machine.inverse(poses)
+    step = np.array([far if unit == "mm" else far * 3e-3 for unit in machine.axis_units])
+    near = poses + np.random.default_rng(1).uniform(-1.0, 1.0, poses.shape) * step
+    # Without a mode a near pose may tell another one by its own joints; far away that is chance.
+    for kwargs in ({"near": near} if far < 10.0 else {}, {"near": near, "mode": machine.mode}, {}):
+        found = machine.forward(joints, **kwargs)
+        back = machine.inverse(found.poses[found.converged]) - joints[found.converged]
+        turning = np.array(machine.joint_units) == "rad"
+        back[:, turning] = (back[:, turning] + np.pi) % (2.0 * np.pi) - np.pi
+        pole = np.abs(found.poses[found.converged][:, 3]) < 1e-6 if machine.has_direction else np.zeros(len(back), bool)
+        legs = back[:, : machine.leg_count]
+        assert np.abs(legs[~pole]).max(initial=0.0) < 1e-6
+        assert found.converged.mean() > 0.7
+
+
+def test_the_side_is_the_near_poses_own(load):
+    machine = load(PRR)
+    truth = np.array([-140.0, -129.0, np.radians(-9.0)])
+    joints = machine.inverse(truth)
+    for near in (None, machine.home, truth + [1.0, -1.0, 0.01]):
+        found = machine.forward(joints, near=near)
+        assert found.converged
+        np.testing.assert_allclose(found.poses, truth, atol=1e-7)
+
+
+def test_sides_know_no_angles_of_the_pose():
+    machine = pk.load("hexapod")
+    poses = draw(machine, 400, (200.0, 0.5), 3)
+    rng = np.random.default_rng(4)
+    near = poses + rng.uniform(-1.0, 1.0, poses.shape) * [400.0, 400.0, 400.0, 1.4, 1.4, 1.4]
+    twin = np.column_stack([near[:, :3], near[:, 3] + np.pi, np.pi - near[:, 4], near[:, 5] + np.pi])
+    assert (np.abs(near[:, 4]) > 0.5 * np.pi).any()
+    for start in (near, twin):  # the same poses, written otherwise
+        found = machine.forward(machine.inverse(poses), near=start)
+        done = found.converged
+        assert done.mean() > 0.5
+        assert (twist_side(found.poses[done]) * twist_side(start[done]) > 0.0).all()
+
+
+@pytest.mark.parametrize("name", ["hexapod", "lambda6", "tricept"])
+def test_a_row_hangs_on_itself_alone(name):
+    machine = pk.load(name)
+    poses = draw(machine, 1500, (250.0, 0.6), 5)
+    rng = np.random.default_rng(6)
+    step = np.array([200.0 if unit == "mm" else 0.5 for unit in machine.axis_units])
+    near = poses + rng.uniform(-1.0, 1.0, poses.shape) * step
+    joints = machine.inverse(poses)
+    together, order = machine.forward(joints, near=near), rng.permutation(len(poses))
+    shuffled = machine.forward(joints[order], near=near[order])
+    np.testing.assert_array_equal(shuffled.poses, together.poses[order])
+    np.testing.assert_array_equal(shuffled.why, together.why[order])
+    for row in range(0, len(poses), 150):
+        np.testing.assert_array_equal(machine.forward(joints[row], near=near[row]).poses, together.poses[row])
+
+
+def test_why_there_is_no_answer(load):
+    machine = pk.load("hexapod")
+    found = machine.forward(machine.inverse(machine.home) + [5000.0, -5000.0, 5000.0, -5000.0, 5000.0, -5000.0])
+    assert (found.converged, found.why) == (False, OPEN)
+    assert {REASONS[why] for why in (OPEN, ON_ANOTHER_SIDE, OTHER_MODE)} and REASONS[ANSWERED] == ""
+    across = pk.load("hbg80_2d")
+    poses = draw(across, 2000)
+    far = poses[across.sides(poses) * across.sides(across.home[None]) < 0.0]
+    found = across.forward(across.inverse(far), method="newton")
+    assert len(far) > 100 and not found.converged.any()
+    assert np.isin(found.why, (ON_ANOTHER_SIDE, OTHER_MODE, OPEN)).all()
+
+
+def test_a_continuum_is_named(load):
+    machine = load(CONGRUENT)
+    with pytest.raises(pk.NoMethodError, match="continuum"):
+        machine.assemblies([150.0, 150.0, 150.0])
+    assert 0 < len(machine.assemblies([150.0, 150.0, 151.0])) <= 6
+
+
+def test_a_machine_singular_everywhere_is_warned_of_and_finds_nothing(load):
+    with pytest.warns(SingularHomeWarning, match="all poses about it are a parallel singularity"):
+        machine = load(HEXAGONS)
+    poses = draw(machine, 100, (50.0, 0.2))
+    joints = machine.inverse(poses)
+    assert not machine.forward(joints).converged.any()
+    assert not machine.forward(joints, near=poses + 1e-4).converged.any()
+
+
+def test_shipped_homes_are_no_singularities():
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        for name in pk.machines():
+            pk.load(name)

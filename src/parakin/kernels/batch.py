@@ -90,11 +90,13 @@ class NewtonSteps(NamedTuple):
     caps : (m,) the greatest change of each coordinate in one step
     size : the legs' length, mm
     most : steps; zero only evaluates the start
+    closed : mm, the greatest closure of a root
     """
 
     caps: Array
     size: float
     most: int
+    closed: float
 
 
 class Roots(NamedTuple):

@@ -21,6 +21,7 @@ CLOSE = 1e-6  # mm: from a closure this good one more step ends below rounding
 WORTH = 1e-4  # mm: where a step will end no worse than this, the matrix at hand serves on
 SLOW = 0.05  # a kept matrix that gains less than this a step is made anew
 FINE = 1e-12  # mm: where the next step is predicted to end, it is the last
+DOUBLE = 0.2  # a new matrix that leaves more than this a step is beside a double root, where each leaves a quarter
 PIVOT = 4.0  # how many times greater an entry must be to become the pivot
 
 
@@ -211,18 +212,20 @@ def _renew_matrix(full, m, block, some):
 
 
 @njit(nogil=True, cache=True, fastmath=FAST, error_model="numpy")
-def _decide(size, block, n, step):
+def _decide(limits, block, n, step):
     """Decide for each lane whether its next matrix is a new one, and whether it stops; returns how many go on.
 
-    A lane whose closures are NaN stops.
+    A lane whose closures are NaN stops. One whose last step did not close the legs goes on.
     """
+    size, closed = limits.size, limits.closed
     worst, before, renews, stops, steps = block.worst, block.before, block.renews, block.stops, block.steps
     for j in range(LANES):
         w, ratio = worst[j], worst[j] / before[j]
         new = renews[j] > 0.0
-        anew = w * w > WORTH * size if new else ratio > SLOW
-        enough = w < CLOSE if new else (ratio <= SLOW) & (w * ratio < FINE)
-        going = (stops[j] < 0.5) & (w == w)
+        double = (ratio > DOUBLE) & (w > closed)
+        anew = (w * w > WORTH * size) | double if new else ratio > SLOW
+        enough = (w < CLOSE) & (not double) if new else (ratio <= SLOW) & (w * ratio < FINE)
+        going = ((stops[j] < 0.5) | (stops[j] < 1.5) & (w > closed)) & (w == w)
         steps[j] = step if stops[j] < 1.5 else steps[j]
         renews[j] = 1.0 if going & anew else 0.0
         stops[j] = (1.0 if enough else 0.0) if going else 2.0
@@ -250,7 +253,7 @@ def solve_block(tapes, limits, m, block, n):
             _renew_matrix(full, m, block, wanted < n)
             if step == 0:
                 copy_lanes(block.determinant, 0, block.first_determinant, 0, 1)
-        if _decide(limits.size, block, n, step) == 0:
+        if _decide(limits, block, n, step) == 0:
             return
         solve_factored(block.matrix, m, block.exchanges, block.exchanged, block.closures)
         _take_step(m, limits.caps, block)

@@ -195,7 +195,7 @@ def find_roots(
     # A step goes at most a third of the legs' size or half a radian.
     caps = np.array([size / 3.0 if word.startswith("t") else 0.5 for word in model.structure.coordinates])
     tapes = collect_newton_tapes(model, poses)
-    steps = NewtonSteps(caps, min(model.sizes), most, closure_tolerance(model))
+    steps = NewtonSteps(caps, min(model.sizes), most, compute_closure_tolerance(model))
     return solve_by_newton(tapes, steps, np.ascontiguousarray(near), joints, np.empty(0) if side is None else side)
 
 

@@ -287,14 +287,14 @@ class Model:
         return self._tape(("legs", mode), self._motions, outputs)
 
     def mode_tape(self, mode: str) -> Tape:
-        """pose, joints -> the legs' joints in a working mode, at that platform, less the given ones."""
+        """Compile pose, joints -> the legs' joints in a working mode, at that platform, less the given ones."""
 
         def outputs(trace: Trace) -> list[Scalar]:
             pose, joints = self._pose_and_joints(trace)
             placed = self.structure.place_with_joints(pose, self._serial(joints))
             signs, _ = self.split_mode(mode)
-            points = platform_points(self.spec, placed.rotation, placed.origin)
-            own = leg_joints(self.spec, joints)
+            points = compute_platform_points(self.spec, placed.rotation, placed.origin)
+            own = group_joints_by_leg(self.spec, joints)
             return [
                 q - given
                 for leg, point, s, all_given in zip(self.spec.legs, points, signs, own, strict=True)
@@ -304,7 +304,7 @@ class Model:
         return self._tape(("mode", mode), self._poses + len(self.drives), outputs)
 
     def angles_tape(self) -> Tape:
-        """pose -> :meth:`~.structures.Structure.measure_angles` there."""
+        """Compile pose -> :meth:`~.structures.Structure.measure_angles` there."""
         return self._tape(("angles",), self._poses, lambda t: [self.structure.measure_angles(t.inputs(self._poses))])
 
     def margins_tape(self, mode: str) -> Tape:

@@ -104,8 +104,10 @@ class Structure(ABC):
         return self.coordinates_at(origin)
 
     def measure_angles(self, coordinates: Sequence[Scalar]) -> Scalar:
-        """The determinant that leads from small turns to rates of the coordinates' angles, but for its size: where it
-        changes its sign the angles are singular, not the machine."""
+        """Compute, but for its size, the determinant that leads from small turns to rates of the coordinates' angles.
+
+        Where it changes its sign the angles are singular, not the machine.
+        """
         return 1.0
 
     @abstractmethod

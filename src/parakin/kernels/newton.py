@@ -187,7 +187,7 @@ def _take_step(m, caps, block):
 
 
 @njit(nogil=True, cache=True, fastmath=FAST, error_model="numpy")
-def _renew_matrix(full, m, block, some):
+def _update_matrix(full, m, block, some):
     """Factor the slopes that the tape left, for the lanes that want it; with ``some`` the others keep their matrix."""
     matrix, exchanges, exchanged, kept = block.matrix, block.exchanges, block.exchanged, block.kept
     square = m * m
@@ -212,7 +212,7 @@ def _renew_matrix(full, m, block, some):
 
 
 @njit(nogil=True, cache=True, fastmath=FAST, error_model="numpy")
-def _decide(limits, block, n, step):
+def _choose_next_matrix(limits, block, n, step):
     """Decide for each lane whether its next matrix is a new one, and whether it stops; returns how many go on.
 
     A lane whose closures are NaN stops. One whose last step did not close the legs goes on.
@@ -250,10 +250,10 @@ def solve_block(tapes, limits, m, block, n):
             wanted += 1 if renews[j] > 0.0 else 0
         evaluate_closures(full if wanted > 0 else tapes.closures, m, block)
         if wanted > 0:
-            _renew_matrix(full, m, block, wanted < n)
+            _update_matrix(full, m, block, wanted < n)
             if step == 0:
                 copy_lanes(block.determinant, 0, block.first_determinant, 0, 1)
-        if _decide(limits, block, n, step) == 0:
+        if _choose_next_matrix(limits, block, n, step) == 0:
             return
         solve_factored(block.matrix, m, block.exchanges, block.exchanged, block.closures)
         _take_step(m, limits.caps, block)

@@ -39,12 +39,12 @@ def solve_planar_rpr(centres: Array, radii: Array, corners: Array) -> Array:
     for error, pose in sorted(polished, key=lambda item: item[0]):  # of equal ones the best closed
         if error < 1e-11 * size and not any(_is_same(pose, other, size) for other in poses):
             poses.append(pose)
-    if any(_moves_on(pose, centres, radii, corners) for pose in poses):
+    if any(_is_in_continuum(pose, centres, radii, corners) for pose in poses):
         raise NoMethodError("the assemblies are a continuum here: the legs leave the platform free to move")
     return np.array(sorted(poses, key=lambda p: (p[2], p[0], p[1]))).reshape(-1, 3)
 
 
-def _moves_on(pose: Array, centres: Array, radii: Array, corners: Array) -> bool:
+def _is_in_continuum(pose: Array, centres: Array, radii: Array, corners: Array) -> bool:
     """Tell whether a solution belongs to a continuum: a step along the null direction can be closed again there."""
     _, jacobian = _linearise(pose, centres, corners)
     size = float(np.abs(jacobian).max())

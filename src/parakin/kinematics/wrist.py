@@ -36,9 +36,12 @@ TILTED     0.2          second angle at which a tool that starts on the pole is 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..arrays import Array, Flags, Indices, Span
 from ..kernels.batch import evaluate_tape
@@ -63,11 +66,16 @@ TRAVEL = 0.05
 REPORTED = np.radians(45.0)
 TILTED = 0.2
 
+# Working modes of the wrist along a path: the path's own, its other one, either one (on the pole, or not known).
+OWN, OTHER, EITHER = 0, 1, 2
+WristModes = NDArray[np.int8]
+
 # Ranges of the turning axes that hold every rotation, and every direction, once.
 EVERY_ROTATION: dict[str, Span] = {"A": (-np.pi, np.pi), "B": (-np.pi / 2, np.pi / 2), "C": (-np.pi, np.pi)}
 EVERY_DIRECTION: dict[str, Span] = {"B": (0.0, np.pi), "C": (-np.pi, np.pi)}
 
 GAIN = 0.25  # of the squared way in the same mode: what the way in the other mode may be, for the path to change
+MODE_LEVER = 100.0  # mm/rad: where the joints of two modes are compared, how far a turn by one rad is
 TURN = 2.0 * np.pi
 
 
@@ -86,6 +94,17 @@ def find_nearest_turn(angle: Array, near: Array) -> Array:
     """Bring angles within half a turn of others by adding the way from these, which is exact where it is short."""
     nearest: Array = near + wrap_angle(angle - near)
     return nearest
+
+
+def count_nearest_turns(joints: Array, near: Array, columns: Sequence[int]) -> None:
+    """Count the turns of joints (n, joints) in ``columns`` so that they are within half a turn of others; in place.
+
+    A joint that needs no turn is left bit for bit, and so is one whose neighbour is NaN.
+    """
+    for column in columns:
+        angle = joints[:, column]
+        counted = angle - TURN * np.round((angle - near[:, column]) / TURN)
+        joints[:, column] = np.where(np.isfinite(counted), counted, angle)
 
 
 def unwind_angles(angles: Array) -> Array:
@@ -222,6 +241,11 @@ class Wrist:
         """Both indices, the first axis first."""
         return [self.first, self.second]
 
+    @cached_property
+    def turning(self) -> list[int]:
+        """Indices of all joints that turn, legs' too."""
+        return [i for i, drive in enumerate(self.model.drives) if drive.unit == "rad"]
+
     @property
     def direction(self) -> DirectionColumns:
         """The columns of B and C in a pose, which tell the axis that the wrist points the tool along."""
@@ -263,6 +287,47 @@ class Wrist:
         given = np.ascontiguousarray(first.reshape(-1, 1))
         into = np.empty((len(poses), len(self.model.drives)))
         return evaluate_tape(self.first_given_tape(mode), np.ascontiguousarray(poses), into, given)
+
+    def solve_nearest(
+        self, poses: Array, mode: str, guess: Array, within: float, modes: WristModes | None = None
+    ) -> tuple[Array, WristModes]:
+        """Solve the inverse problem of poses (n, axes) in both modes and keep the joints nearer to a guess (n, joints).
+
+        Turns are counted, and MODE_LEVER mm of a leg's way are as far as a rad. A mode that does not reach a pose is
+        not kept if the other one does. No farther than ``within`` rad off the pole the first joint is the guess's.
+
+        Parameters
+        ----------
+        mode : the path's own
+        modes : (n,) which mode to keep off the pole; EITHER where it is not known
+
+        Returns the joints, and the mode of each row: EITHER on the pole.
+        """
+        free = np.flatnonzero(self.find_free(poses, within) & np.isfinite(guess[:, self.first]))
+        solutions, ways = [], []
+        scale = np.array([1.0 if drive.unit == "rad" else MODE_LEVER for drive in self.model.drives])
+        for each in (mode, self.other_mode(mode)):
+            joints = solve_inverse(self.model, poses, each)
+            if len(free):
+                joints[free] = self.solve_with_first(poses[free], each, guess[free, self.first])
+            count_nearest_turns(joints, guess, self.turning)
+            solutions.append(joints)
+            ways.append((np.abs(joints - guess) / scale).sum(1))
+        own, other = solutions
+        lost = np.isnan(own[:, self.first]) & np.isfinite(other[:, self.first])
+        kept = np.where(lost | (ways[OTHER] < ways[OWN]), OTHER, OWN).astype(np.int8)
+        if modes is not None:
+            kept = np.where(modes == EITHER, kept, modes)
+        at = np.flatnonzero(kept == OTHER)
+        own[at] = other[at]
+        kept[free] = EITHER
+        return own, kept
+
+    def measure_blur(self, poses: Array) -> Array:
+        """Compute the factor (n,), ≥ 1, by which the first joint is less exact than the others at poses (n, axes)."""
+        freedom = np.maximum(self.measure_freedom(poses), convert_to_freedom(EXACT))
+        blur: Array = np.maximum(1.0, DISTINCT / np.sqrt(freedom))
+        return blur
 
     def find_reachable(self, joints: Array) -> Flags:
         """Find rows of joints (n, joints) that exist and whose second joint is within its range."""

@@ -12,16 +12,12 @@ from typing import NamedTuple
 import numpy as np
 
 from ...arrays import Array, Flags, Indices
-from ...kinematics.wrist import ASIDE, LEEWAY, PROVED, convert_to_freedom
+from ...kinematics.wrist import ASIDE, EITHER, LEEWAY, OTHER, OWN, PROVED, WristModes, convert_to_freedom
 from ...performance.certified.margin_rates import MarginRates
 from .motion_sections import Sections
 from .motions import (
-    EITHER,
-    OTHER,
-    OWN,
     MotionPoints,
     PathMotions,
-    WristModes,
     measure_machine_size,
     merge_wrist_modes,
 )

@@ -7,8 +7,8 @@ from collections.abc import Iterator
 import numpy as np
 
 from ...arrays import Array, Flags, Indices
+from ...kinematics.wrist import EITHER, OTHER, OWN
 from .margin_bounds import MotionProver
-from .motions import EITHER, OTHER, OWN
 
 RUN = 64  # motions bounded at once
 BLOCK = 1 << 15  # motions whose records are looked up together

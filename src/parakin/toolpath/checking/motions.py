@@ -6,18 +6,14 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...arrays import Array, Flags, Indices
-from ...kinematics.wrist import PRINTED, find_nearest_turn
+from ...kinematics.wrist import EITHER, OTHER, OWN, PRINTED, WristModes, count_nearest_turns
 from ...machine import Machine
 from ...performance.characteristic_length import choose_characteristic_length
 from ...performance.jacobians import list_column_scales
 from ..posting.posted import Posted
 
-WristModes = NDArray[np.int8]
-
-OWN, OTHER, EITHER = 0, 1, 2  # working modes of the wrist: the path's own, its other one, either one on the pole
 NEAR_SINGULAR = 1e-4  # determinants up to this fraction of det A at home are next to a parallel singularity
 SIGNLESS = 1e-12  # a determinant of unit wrenches no greater has no sign
 
@@ -95,29 +91,11 @@ class PathMotions:
         return wrist_modes
 
     def _solve_nearest(self, poses: Array, guess: Array, wrist_modes: WristModes) -> tuple[Array, WristModes]:
-        """Solve the inverse problem nearest to a guess; on the pole the first joint is the guess's."""
-        joints = self._count_turns(self.machine.inverse(poses, self.modes[0]), guess)
-        if self.wrist is None:
-            return joints, np.full(len(poses), OWN, np.int8)
-        other = self._count_turns(self.machine.inverse(poses, self.modes[1]), guess)
-        own_way, other_way = (((q - guess)[:, self.wrist_joints] ** 2).sum(1) for q in (joints, other))
-        nearer = np.where(other_way < own_way, OTHER, OWN)
-        wrist_modes = np.where(wrist_modes == EITHER, nearer, wrist_modes).astype(np.int8)
-        joints[wrist_modes == OTHER] = other[wrist_modes == OTHER]
-        first = guess[:, self.wrist.first]
-        free = np.flatnonzero(self.wrist.find_free(poses, PRINTED) & np.isfinite(first))
-        if len(free):
-            solved = self.wrist.solve_with_first(poses[free], self.modes[0], first[free])
-            joints[free] = self._count_turns(solved, guess[free])
-            wrist_modes[free] = EITHER
-        return joints, wrist_modes
-
-    def _count_turns(self, joints: Array, guess: Array) -> Array:
-        """Bring turning joints within half a turn of a guess; in place."""
-        for i in self.turning_joints:
-            counted = find_nearest_turn(joints[:, i], guess[:, i])
-            joints[:, i] = np.where(np.isfinite(counted), counted, joints[:, i])
-        return joints
+        if self.wrist is not None:
+            return self.wrist.solve_nearest(poses, self.modes[0], guess, PRINTED, wrist_modes)
+        joints = self.machine.inverse(poses, self.modes[0])
+        count_nearest_turns(joints, guess, self.turning_joints)
+        return joints, np.full(len(poses), OWN, np.int8)
 
     def compute_determinants(self, points: MotionPoints) -> Array:
         """Compute det A of unit wrenches, (n,): its sign changes where a motion passes a parallel singularity."""

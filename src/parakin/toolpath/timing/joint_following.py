@@ -9,11 +9,8 @@ from __future__ import annotations
 import numpy as np
 
 from ...arrays import Array
-from ...kernels.batch import run_in_threads
-from ...kinematics.wrist import DISTINCT, EXACT
+from ...kinematics.wrist import EXACT, count_nearest_turns
 from ...machine import Machine
-from .corners import LEVER
-from .kernels.splines import choose_nearest
 
 
 def follow_curve(machine: Machine, mode: str, poses: Array, length: Array) -> Array:
@@ -24,29 +21,17 @@ def follow_curve(machine: Machine, mode: str, poses: Array, length: Array) -> Ar
         if free.any() and not free.all():
             guess = np.stack([np.interp(length[free], length[~free], column) for column in joints[~free].T], axis=1)
             guess[:, wrist.first] = _ease_angles(length[free], length[~free], joints[~free, wrist.first])
-            joints[free] = find_nearest_joints(machine, mode, np.ascontiguousarray(poses[free]), guess)[0]
+            joints[free] = find_nearest_joints(machine, mode, np.ascontiguousarray(poses[free]), guess)
     return joints
 
 
-def find_nearest_joints(machine: Machine, mode: str, poses: Array, guess: Array) -> tuple[Array, Array]:
-    """Find the joints of poses that are nearest to a guess (rows, joints), in either mode of the wrist.
-
-    The second array (rows,), ≥ 1, is the factor by which the first turning joint is less exact than the others.
-    """
-    wrist, blur = machine.wrist, np.ones(len(poses))
-    modes = [mode] if wrist is None else [mode, wrist.other_mode(mode)]
-    solutions = [machine.inverse(poses, mode) for mode in modes]
-    if wrist is not None:
-        freedom, least = wrist.measure_freedom(poses), np.sin(EXACT) ** 2
-        free = freedom < least
-        if free.any():
-            for mode, joints in zip(modes, solutions, strict=True):
-                joints[free] = wrist.solve_with_first(poses[free], mode, guess[free, wrist.first])
-        blur = np.maximum(1.0, DISTINCT / np.sqrt(np.maximum(freedom, least)))
-    units = np.array(machine.joint_units)
-    args = (solutions[0], solutions[-1], guess, units == "rad", np.where(units == "mm", LEVER, 1.0))
-    run_in_threads(len(poses), lambda start, stop: choose_nearest(*args, start, stop))
-    return solutions[0], blur
+def find_nearest_joints(machine: Machine, mode: str, poses: Array, guess: Array) -> Array:
+    """Find the joints of poses that are nearest to a guess (rows, joints), in either mode of the wrist."""
+    if machine.wrist is not None:
+        return machine.wrist.solve_nearest(poses, mode, guess, EXACT)[0]
+    joints = machine.inverse(poses, mode)
+    count_nearest_turns(joints, guess, [i for i, unit in enumerate(machine.joint_units) if unit == "rad"])
+    return joints
 
 
 def _ease_angles(at: Array, known: Array, angles: Array) -> Array:

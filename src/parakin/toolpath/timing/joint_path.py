@@ -87,12 +87,13 @@ class JointPath:
     def joints_at(self, row: Indices, shift: Array) -> tuple[Array, Array, Array]:
         """Compute the machine's joints ``shift`` mm after rows (k,), the nearest to the splines, and the splines.
 
-        The third is how much less exact the first turning joint is; see :func:`~.joint_following.find_nearest_joints`.
+        The third (k,) is how much less exact the wrist's first joint is than the others, ≥ 1.
         """
         still = np.zeros(len(row))
         splined = self.evaluate(PathState(row, shift, still, still)).joints
-        joints, blur = find_nearest_joints(self.posted.machine, self.posted.mode, self.poses(row, shift), splined)
-        return joints, splined, blur
+        machine, poses = self.posted.machine, self.poses(row, shift)
+        blur = np.ones(len(row)) if machine.wrist is None else machine.wrist.measure_blur(poses)
+        return find_nearest_joints(machine, self.posted.mode, poses, splined), splined, blur
 
 
 def build_joint_path(

@@ -158,26 +158,3 @@ def mark_coarse_steps(rows, steps, middle, tolerances, coarse, start, stop):
                 coarse[k] |= off > tolerances.joints[j] or harder
             elif off != off:
                 coarse[k] = True
-
-
-@njit(nogil=True, cache=True, error_model="numpy")
-def choose_nearest(joints, others, guess, turning, scale, start, stop):
-    """Replace rows of ``joints`` (rows, joints) by those of ``others`` where these are nearer to ``guess``.
-
-    Turning joints are first moved by whole turns as near to the guess as they go, in both arrays.
-
-    turning : (joints,) which joints turn; scale : (joints,) the unit of a joint's distance
-    """
-    for r in range(start, stop):
-        distance, other_distance = 0.0, 0.0
-        for j in range(guess.shape[1]):
-            a, b = joints[r, j], others[r, j]
-            if turning[j]:
-                a -= 2.0 * np.pi * np.round((a - guess[r, j]) / (2.0 * np.pi))
-                b -= 2.0 * np.pi * np.round((b - guess[r, j]) / (2.0 * np.pi))
-            joints[r, j], others[r, j] = a, b
-            distance += abs(a - guess[r, j]) / scale[j]
-            other_distance += abs(b - guess[r, j]) / scale[j]
-        if other_distance < distance or distance != distance:
-            for j in range(guess.shape[1]):
-                joints[r, j] = others[r, j]

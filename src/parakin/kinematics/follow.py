@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from ..arrays import Array
 from ..model.traces import Model
 from .inverse import solve_inverse
@@ -9,14 +11,18 @@ from .wrist import EXACT, fill_free, find_wrist, unwind_angles
 
 
 def follow_path(model: Model, poses: Array, mode: str, free_below: float = EXACT) -> Array:
-    """Solve the inverse problem along a path (n, axes); see :meth:`parakin.Machine.follow`."""
+    """Solve the inverse problem along a path (n, axes); see :meth:`parakin.Machine.follow`.
+
+    On a path that never leaves the pole the first joint stands as at home.
+    """
     joints, wrist = solve_inverse(model, poses, mode), find_wrist(model)
     if wrist is not None:
         free = wrist.find_free(poses, free_below)
         wrist.cross_pole(poses, mode, joints, ~free)
-        if free.any() and not free.all():
-            first = fill_free(joints[:, wrist.first], free)[free]
-            joints[free] = wrist.solve_with_first(poses[free], mode, first)
+        if free.any():
+            at_home = solve_inverse(model, np.array([model.home]), model.mode)[0, wrist.first]
+            first = np.full(len(poses), at_home) if free.all() else fill_free(joints[:, wrist.first], free)
+            joints[free] = wrist.solve_with_first(poses[free], mode, first[free])
     for i, drive in enumerate(model.drives):
         if drive.unit == "rad":
             joints[:, i] = unwind_angles(joints[:, i])

@@ -23,7 +23,8 @@ def insert_records(path: ToolPath, motion: Indices, share: Array) -> ToolPath:
     motion, share : (m,) where: motions in ascending order, by the record they lead to, and shares of them in ascending
         order within each
 
-    The time of a motion is divided in proportion. Events keep their place before the motion.
+    The time of a motion is divided in proportion; a part of no length has none. Events keep their place before the
+    motion.
     """
     if not len(motion):
         return path
@@ -38,7 +39,7 @@ def insert_records(path: ToolPath, motion: Indices, share: Array) -> ToolPath:
     if seconds is not None:
         end = np.insert(np.ones(len(path)), motion, share)
         begin = np.where(np.append(False, source[1:] == source[:-1]), np.append(0.0, end[:-1]), 0.0)
-        seconds = seconds[source] * (end - begin)
+        seconds = np.where(end > begin, seconds[source] * (end - begin), np.nan)
     return replace(
         path,
         tip=_insert_rows(path.tip, source, added, tip),

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from ...arrays import Array, Indices
+from ...arrays import Indices
 from ...kinematics.wrist import PRINTED, REPORTED
 from ..path import Note
 from ..posting.posted import Posted
@@ -14,6 +14,7 @@ from ..programmed_path import ProgrammedPath
 from .deviation import ALLOWED, SHARES, Deviation
 from .path_cuts import PathPositions, select_spans
 from .path_records import insert_records, replace_axes, repost_path
+from .pole_holds import PoleHold, are_apart, find_pole_holds, note_holds
 from .pole_routing import PolePass, PoleRoute, find_pole_routes, locate_pass
 from .pole_steps import PoleSteps, find_pole_steps
 from .pole_swings import note_swings
@@ -31,12 +32,14 @@ class PolePasses:
 
     posted, positions : the path, and where its records stand on the programmed one
     passes : those led through a pole
-    notes : on the passes beside a pole on which the free angle swings
+    holds : stretches held beside a pole
+    notes : on the passes beside a pole on which the free angle swings, and on the holds on which it turns
     """
 
     posted: Posted
     positions: PathPositions
     passes: list[PolePass] = field(default_factory=list)
+    holds: list[PoleHold] = field(default_factory=list)
     notes: list[Note] = field(default_factory=list)
 
 
@@ -58,8 +61,9 @@ def lead_through_poles(deviation: Deviation, posted: Posted, motion: Indices) ->
     """Lead a path through the poles that some of its motions pass within the angle tolerance.
 
     The axes of records about such a pass are moved, by less than the tolerance, so that the path crosses the pole
-    itself; where a single long motion does that, a record is put there. A pass is left as it is where that takes the
-    axis out of tolerance between two records.
+    itself; where a single long motion does that, a record is put there. Where the path turns another way on the pole,
+    starts, ends or jitters there, its axis is held beside the pole: see :mod:`~.pole_holds`. A pass is left as it is
+    where that takes the axis out of tolerance between two records.
     """
     refused: set[tuple[str, float]] = set()
     for _ in range(_TRIES):
@@ -78,7 +82,7 @@ def _find_moved_too_far(deviation: Deviation, led: PolePasses) -> set[tuple[str,
         return too_far
     path, positions = ProgrammedPath(led.posted.path, led.posted.frame), led.positions
     passed = positions.passed
-    for pole_pass in led.passes:
+    for pole_pass in (*led.passes, *(hold.located for hold in led.holds)):
         first, last = np.searchsorted(passed, [pole_pass.begin - 1.0, pole_pass.end + 1.0])
         motion = np.arange(max(int(first), 1), min(int(last) + 1, len(passed))).repeat(len(SHARES))
         share = np.resize(SHARES, len(motion))
@@ -112,21 +116,36 @@ def _lead_unless_refused(
             routes.append(route)
             led.passes.append(pole_pass)
         crossings += [_Crossing(pole, steps, route) for route in routes if route.crossing >= 0]
-        led.notes += note_swings(pole, posted.path, steps, routes)
-    moved = np.flatnonzero((axis != programmed.axis).any(1)) if led.passes else np.empty(0, np.int64)
+        held: list[PoleHold] = []
+        if deviation.interpolation == "pose" and not inclined:
+            for hold in find_pole_holds(pole, posted, programmed, steps, routes, deviation.angle):
+                is_free = (axis[hold.record] == programmed.axis[hold.record]).all()
+                others = [*led.passes, *(other.located for other in led.holds)]
+                if hold.located.key not in refused and is_free and are_apart(hold, others):
+                    axis[hold.record] = hold.axis
+                    held.append(hold)
+        led.holds += held
+        taken = [*(route.steps for route in routes), *(hold.steps for hold in held)]
+        led.notes += [*note_swings(pole, posted.path, steps, taken), *note_holds(held)]
+    moved = np.flatnonzero((axis != programmed.axis).any(1))
     if len(moved):
         led.posted = repost_path(posted, replace_axes(posted.path, moved, axis[moved] @ programmed.rotation))
-    _insert_crossings(deviation, led, crossings)
+    _insert_records_at_poles(deviation, led, crossings)
     return led
 
 
-def _insert_crossings(deviation: Deviation, led: PolePasses, crossings: list[_Crossing]) -> None:
-    """Insert records on the poles where motions cross them, but where the interpolation passes there by itself."""
-    if not crossings:
+def _insert_records_at_poles(deviation: Deviation, led: PolePasses, crossings: list[_Crossing]) -> None:
+    """Insert the records of holds, and those on the poles where motions cross them.
+
+    None is inserted where the interpolation passes over the pole by itself.
+    """
+    if not crossings and not led.holds:
         return
     posted = led.posted
     path = ProgrammedPath(posted.path, posted.frame)
-    added: list[tuple[int, float, Array]] = []
+    added = [
+        row for hold in led.holds for row in zip(hold.motion.tolist(), hold.share.tolist(), hold.added, strict=True)
+    ]
     for crossing in crossings:
         pole, route, motion = crossing.pole, crossing.route, crossing.motion
         tip, axis = path.interpolate(motion, np.array([route.share]))

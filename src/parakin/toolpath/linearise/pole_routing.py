@@ -15,6 +15,9 @@ from .pole_steps import PoleSteps
 from .poles import Pole
 
 _MOST_MOVED = 0.98  # of the angle tolerance: what an axis may be moved; the rest is for rounding
+_BENT = np.sin(
+    np.radians(20.0)
+)  # off the line through the pole on the circle, over the radius: what bends more is held
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,17 +114,22 @@ def _route_through_pole(
     first, last = window
     inside_window = slice(first, last + 1)
     x = np.concatenate([steps.first[first : first + 1], steps.last[inside_window]])
+    if min(np.hypot(*x[0]), np.hypot(*x[-1])) < radius:
+        return None  # the path begins or ends on the pole
     line = _find_line(x[0], x[-1], radius)
     normal = np.array([-line[1], line[0]])
     a, b = x @ line, x @ normal
     weight = np.where(np.hypot(a, b) < radius, 1.0 - (a / radius) ** 2, 0.0)
     entries = _meet_circle(x[0], x[1], radius), _meet_circle(x[-1], x[-2], radius)
     # What is left to move where the path enters and leaves the circle.
-    edge = [abs(float(entry @ normal)) ** 3 / radius**2 for entry in entries if entry is not None]
+    offsets = [abs(float(entry @ normal)) for entry in entries if entry is not None]
+    edge = [offset**3 / radius**2 for offset in offsets]
     crossings = np.flatnonzero(a[:-1] * a[1:] < 0.0)
     part = a[crossings] / (a[crossings] - a[crossings + 1])
     miss_line = np.abs(b[crossings] + part * (b[crossings + 1] - b[crossings]))
     if not max(0.0, np.abs(weight * b).max(), *miss_line, *edge) <= _MOST_MOVED * angle:
+        return None
+    if len(crossings) > 1 or max(offsets, default=0.0) > _BENT * radius:
         return None
     records = np.concatenate([[steps.record[first] - (steps.begin[first] == 0.0)], steps.record[inside_window]])
     at_record = np.concatenate([[steps.begin[first] == 0.0], steps.end[inside_window] == 1.0])

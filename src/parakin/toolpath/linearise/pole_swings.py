@@ -11,7 +11,7 @@ from ...kinematics.wrist import PRINTED, REPORTED, TRAVEL, VICINITY, wrap_angle
 from ..path import Note, ToolPath
 from ..posting.posted import Posted
 from .path_cuts import PathPositions
-from .pole_routing import PolePass, PoleRoute
+from .pole_routing import PolePass
 from .pole_steps import FARTHEST_STEP, PoleSteps
 from .poles import Pole
 
@@ -19,9 +19,10 @@ _APART = 4.0 * TRAVEL  # travel put between stretches of steps, so that no swing
 _SAME_PLACE = 1e-9  # of a motion: what is rounding
 
 
-def note_swings(pole: Pole, path: ToolPath, steps: PoleSteps, routes: Sequence[PoleRoute]) -> list[Note]:
-    """Note the passes that are not led through a pole and on which the free angle swings.
+def note_swings(pole: Pole, path: ToolPath, steps: PoleSteps, led: Sequence[tuple[int, int]]) -> list[Note]:
+    """Note the passes that are not led through a pole nor held, and on which the free angle swings.
 
+    led : first and last of the steps of each pass that is
     The swing is measured over the axis's travel by TRAVEL before and behind each step.
     """
     if not len(steps.record):
@@ -30,8 +31,8 @@ def note_swings(pole: Pole, path: ToolPath, steps: PoleSteps, routes: Sequence[P
         way, turn = np.hypot(*(steps.last - steps.first).T), _measure_turns(steps)
     near = np.isfinite(way) & (way < FARTHEST_STEP)
     turn, way = np.where(near, turn, 0.0), np.where(near, way, FARTHEST_STEP)
-    for route in routes:
-        turn[route.steps[0] : route.steps[1] + 1] = 0.0
+    for first, last in led:
+        turn[first : last + 1] = 0.0
     travel = np.cumsum(way + np.where(steps.joined, 0.0, _APART))
     angle = np.concatenate([[0.0], np.cumsum(turn)])
     at = np.concatenate([[travel[0] - way[0]], travel])

@@ -1,0 +1,256 @@
+"""Holds beside a pole: the tool axis keeps its azimuth about the pole, and turns to another one at a single place.
+
+A path that comes to a pole in one direction and leaves it in another, that starts or ends there, or that jitters about
+it can't be led straight through. The free angle has to stand still or to turn, and a controller that is given poses
+turns it only as fast as the poses say. So within the angle tolerance of the pole the axis is held on a small circle
+about it, in the direction from which the path comes; at the record nearest to the pole it goes on along that circle, or
+straight over the pole, to the direction in which the path leaves, while the tip stands still.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from ...arrays import Array, Flags, Indices
+from ...kinematics.wrist import EXACT, PRINTED, REPORTED, wrap_angle
+from ..path import Note
+from ..posting.frames import compute_poses
+from ..posting.posted import Posted
+from ..programmed_path import ProgrammedPath
+from .continuation import MACHINE_FRAME
+from .pole_routing import PolePass, PoleRoute
+from .pole_steps import PoleSteps
+from .poles import Pole
+
+# Shares of the angle tolerance. Their sum is what an axis may be moved; the rest is for rounding.
+NEAR = 0.72  # an axis no farther off the pole is held
+_ASIDE = 0.2  # off the pole, where it is held
+_LEAST_ASIDE = 5.0 * PRINTED  # rad: nearer to the pole the printed digits would turn the free angle
+_ARC = np.radians(15.0)  # a turn beside the pole is divided into arcs no longer
+_STRAIGHT = np.radians(1.0)  # what turns less needs no record of its own
+_EDGE = 1e-9  # of a motion: what is rounding
+
+
+@dataclass(frozen=True, eq=False)
+class PoleHold:
+    """A stretch of a path held beside a pole.
+
+    steps : first and last of the :class:`PoleSteps` that it takes
+    located : the pole, and where the stretch is on the path
+    record, axis : (k,) records whose tool axes are moved, and where to, (k, 3) in M
+    motion, share, added : (m,) motions and shares where records are inserted, in order, and their axes, (m, 3) in M
+    turn : rad by which the free angle turns there
+    aside : rad off the pole at which the axis is held
+    """
+
+    steps: tuple[int, int]
+    located: PolePass
+    record: Indices
+    axis: Array
+    motion: Indices
+    share: Array
+    added: Array
+    turn: float
+    aside: float
+
+    def describe(self) -> Note:
+        """Describe the turn as a note of the path."""
+        pole, tilt = self.located.pole, np.degrees(self.aside)
+        where = f"the tool held {tilt:.2g}° beside it" if self.aside else "the tool held on it"
+        text = f"{pole.angle} turns by {np.degrees(self.turn):.0f}° at {pole.text}, {where}; the tip stands still"
+        return Note(self.located.line, text)
+
+
+@dataclass(frozen=True, eq=False)
+class _Points:
+    """m points of a path to be moved, by motion and share, and where they go in the projection about a pole, (m, 2)."""
+
+    motion: Indices
+    share: Array
+    projected: Array
+
+
+def find_pole_holds(
+    pole: Pole, posted: Posted, programmed: ProgrammedPath, steps: PoleSteps, routes: list[PoleRoute], angle: float
+) -> list[PoleHold]:
+    """Find where a path comes within the angle tolerance of a pole without a route through it, and hold it there."""
+    aside = 0.0 if pole.joint is None else _ASIDE * angle
+    if pole.joint is not None and aside < _LEAST_ASIDE:
+        return []
+    radius = NEAR * angle
+    routed = np.zeros(len(steps.record), np.bool_)
+    for route in routes:
+        routed[route.steps[0] : route.steps[1] + 1] = True
+    runs = _find_runs(steps, (steps.nearest < radius) & ~routed, radius)
+    builder = _HoldBuilder(pole, posted, programmed, steps, radius, aside)
+    return [hold for run in runs if (hold := builder.build(run)) is not None]
+
+
+def _find_runs(steps: PoleSteps, near: Flags, radius: float) -> list[tuple[int, int]]:
+    """Find the first and the last of the steps of each stretch that stays within a circle about the pole."""
+    inside = np.hypot(*steps.first.T) < radius
+    follows = near & np.append(False, near[:-1]) & steps.joined & inside
+    starts = np.flatnonzero(near & ~follows)
+    ends = np.flatnonzero(near & ~np.append(follows[1:], False))
+    return list(zip(starts.tolist(), ends.tolist(), strict=True))
+
+
+@dataclass(frozen=True, eq=False)
+class _HoldBuilder:
+    """Builds the holds of a path beside a pole: within ``radius`` of it the axis is held ``aside`` of it, rad."""
+
+    pole: Pole
+    posted: Posted
+    programmed: ProgrammedPath
+    steps: PoleSteps
+    radius: float
+    aside: float
+
+    def build(self, run: tuple[int, int]) -> PoleHold | None:
+        """Build the hold of a run of steps; None where nothing is to be moved."""
+        steps, (first, last) = self.steps, run
+        entry = _meet_circle(steps.first[first], steps.last[first], self.radius)
+        leave = _meet_circle(steps.last[last], steps.first[last], self.radius)
+        record, number, distance = self._list_records(run)
+        if entry is None and leave is None and (not len(record) or distance.max() < 0.5 * EXACT):
+            return None
+        come, go = self._find_azimuths(entry, leave, record)
+        if len(record):
+            nearest = number[distance.argmin()]
+            place, before = (int(steps.record[nearest]), float(steps.end[nearest])), number < nearest
+        else:
+            nearest = first + int(steps.nearest[first : last + 1].argmin())
+            place, before = (int(steps.record[nearest]), float(steps.share[nearest])), np.zeros(0, np.bool_)
+        moved = self.aside * np.where(before[:, None], _direct(come), _direct(go))
+        turned, turn = self._turn(place, come, go)
+        if len(record) and len(turned.motion):  # the last of them is the record itself
+            turned = _Points(turned.motion[:-1], turned.share[:-1], turned.projected[:-1])
+        points = _join(_place_end(steps, first, entry), turned, _place_end(steps, last, leave))
+        if not len(record) and not len(points.motion):
+            return None
+        tip, axis = self.programmed.interpolate(points.motion, points.share)
+        added = self.pole.find_axes(tip, axis, points.projected)
+        axes = self.pole.find_axes(self.programmed.tip[record], self.programmed.axis[record], moved)
+        located = self._locate(run)
+        return PoleHold(run, located, record, axes, points.motion, points.share, added, abs(turn), self.aside)
+
+    def _locate(self, run: tuple[int, int]) -> PolePass:
+        steps, (first, last) = self.steps, run
+        nearest = first + int(steps.nearest[first : last + 1].argmin())
+        begin, end = steps.record[first] - 1 + steps.begin[first], steps.record[last] - 1 + steps.end[last]
+        line = int(self.programmed.path.line[steps.record[nearest]])
+        return PolePass(self.pole, float(steps.nearest[nearest]), float(begin), float(end), line)
+
+    def _find_azimuths(self, entry: Array | None, leave: Array | None, record: Indices) -> tuple[float, float]:
+        """Find the directions from the pole in which the axis is held before the turn and behind it."""
+        come, go = (None if end is None else float(np.arctan2(end[1], end[0])) for end in (entry, leave))
+        if come is None and go is None:
+            go = self._find_azimuth_of_home(int(record[0])) if self.aside else 0.0
+        before, behind = (go if come is None else come), (come if go is None else go)
+        assert before is not None and behind is not None
+        return before, behind
+
+    def _find_azimuth_of_home(self, record: int) -> float:
+        """Find the direction in which the free joint stands as at home, for a path that never leaves the pole."""
+        machine = self.posted.machine
+        assert machine.wrist is not None
+        tip, axis = self.programmed.tip[[record, record]], self.programmed.axis[[record, record]]
+        axes = self.pole.find_axes(tip, axis, self.aside * np.eye(2))
+        poses = compute_poses(machine, tip, axes, MACHINE_FRAME)[0]
+        first = machine.inverse(poses, self.posted.mode)[:, machine.wrist.first]
+        at_home = machine.inverse(machine.home)[machine.wrist.first]
+        sense = 1.0 if wrap_angle(first[1] - first[0]) > 0.0 else -1.0
+        return sense * float(at_home - first[0])
+
+    def _list_records(self, run: tuple[int, int]) -> tuple[Indices, Indices, Array]:
+        """List the records in a run, the step that ends at each (-1 before the first), and the distances off the pole.
+
+        (k,) each
+        """
+        steps, (first, last) = self.steps, run
+        number = np.arange(first, last + 1)
+        number = number[(steps.end[number] == 1.0) & (np.hypot(*steps.last[number].T) < self.radius)]
+        record, distance = steps.record[number], np.hypot(*steps.last[number].T)
+        start = float(np.hypot(*steps.first[first]))
+        if start < self.radius and steps.begin[first] == 0.0:
+            record, number = np.append(steps.record[first] - 1, record), np.append(-1, number)
+            distance = np.append(start, distance)
+        return record, number, distance
+
+    def _turn(self, place: tuple[int, float], come: float, go: float) -> tuple[_Points, float]:
+        """Turn the axis about the pole from one direction to another at a place, and measure the free angle's turn.
+
+        Behind the pole the free angle is the same in the opposite direction, in the other mode.
+        """
+        aside, turn = self.aside, float(wrap_angle(np.array(go - come)))
+        over = self._can_change_mode and abs(turn) > 0.5 * np.pi
+        if over:
+            come, turn = come + np.pi, float(wrap_angle(np.array(turn - np.pi)))
+        count = int(np.ceil(abs(turn) / _ARC)) if abs(turn) > _STRAIGHT else 0
+        if not aside:
+            points = [np.zeros(2)] * (2 if count else 0)
+        else:
+            points = [aside * _direct(come + turn * k / count) for k in range(count + 1)] if count else []
+            if over:
+                points = [aside * _direct(come - np.pi), np.zeros(2), *(points or [aside * _direct(go)])]
+        motion, share = place
+        projected = np.array(points).reshape(-1, 2)
+        return _Points(np.full(len(points), motion, np.int64), np.full(len(points), share), projected), turn
+
+    @cached_property
+    def _can_change_mode(self) -> bool:
+        """Whether the second joint may go as far to the other side of the pole as it goes on the path."""
+        posted, wrist = self.posted, self.posted.machine.wrist
+        if wrist is None or not len(posted.poses):
+            return True
+        modes = posted.mode, wrist.other_mode(posted.mode)
+        second = np.concatenate([posted.machine.inverse(posted.poses, mode)[:, wrist.second] for mode in modes])
+        with np.errstate(invalid="ignore"):
+            return not ((second < wrist.drive.low) | (second > wrist.drive.high)).any()
+
+
+def _direct(azimuth: float) -> Array:
+    return np.array([np.cos(azimuth), np.sin(azimuth)])
+
+
+def _meet_circle(outside: Array, inside: Array, radius: float) -> Array | None:
+    """Find where a step from outside enters a circle about the pole, at whatever point it leaves it; None if inside."""
+    if np.hypot(*outside) < radius:
+        return None
+    way = inside - outside
+    p, q, r = float(way @ way), float(outside @ way), float(outside @ outside) - radius * radius
+    part = (-q - math.sqrt(max(q * q - p * r, 0.0))) / p
+    return outside + min(1.0, max(0.0, part)) * way
+
+
+def _place_end(steps: PoleSteps, step: int, point: Array | None) -> _Points:
+    """Place the record at which a path comes within the circle, or leaves it; none where a record is there already."""
+    count = 0
+    share = 0.0
+    if point is not None:
+        begin, end = steps.first[step], steps.last[step]
+        part = float(np.hypot(*(point - begin)) / np.hypot(*(end - begin)))
+        share = float(steps.begin[step] + part * (steps.end[step] - steps.begin[step]))
+        count = int(_EDGE < share < 1.0 - _EDGE)
+    motion = np.full(count, steps.record[step], np.int64)
+    projected = np.zeros((count, 2)) if point is None else np.tile(point, (count, 1))
+    return _Points(motion, np.full(count, share), projected)
+
+
+def _join(*parts: _Points) -> _Points:
+    motion, share = (np.concatenate([getattr(part, name) for part in parts]) for name in ("motion", "share"))
+    return _Points(motion, share, np.concatenate([part.projected for part in parts]))
+
+
+def are_apart(hold: PoleHold, others: list[PolePass]) -> bool:
+    """Tell whether a hold shares no stretch of the path with others."""
+    return all(hold.located.end <= other.begin or hold.located.begin >= other.end for other in others)
+
+
+def note_holds(holds: list[PoleHold]) -> list[Note]:
+    """Note the holds on which a joint turns, or C by much."""
+    return [hold.describe() for hold in holds if hold.turn > (_STRAIGHT if hold.aside else REPORTED)]

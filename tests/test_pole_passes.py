@@ -103,5 +103,5 @@ def test_a_corner_on_the_pole_is_told():
     result = linearise_path(posted, "joints", chord=0.05)
     assert within(posted, result, "joints", 0.05, 1e-3) <= 1.0
     assert [note.text for note in result.path.notes] == [
-        "the tool axis passes 0° beside the head's pole: theta1 swings 90°"
+        "theta1 turns by 90° at the head's pole, the tool held 0.011° beside it; the tip stands still"
     ]

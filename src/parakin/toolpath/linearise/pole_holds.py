@@ -32,6 +32,8 @@ _ASIDE = 0.2  # off the pole, where it is held
 _LEAST_ASIDE = 5.0 * PRINTED  # rad: nearer to the pole the printed digits would turn the free angle
 _ARC = np.radians(15.0)  # a turn beside the pole is divided into arcs no longer
 _STRAIGHT = np.radians(1.0)  # what turns less needs no record of its own
+_STILL = 0.95  # of the circle: the middle of an arc comes no nearer
+_OPPOSITE = 1.0 - 1e-6  # cosine between the ways to the pole and from it
 _EDGE = 1e-9  # of a motion: what is rounding
 
 
@@ -39,15 +41,13 @@ _EDGE = 1e-9  # of a motion: what is rounding
 class PoleHold:
     """A stretch of a path held beside a pole.
 
-    steps : first and last of the :class:`PoleSteps` that it takes
     located : the pole, and where the stretch is on the path
-    record, axis : (k,) records whose tool axes are moved, and where to, (k, 3) in M
+    record, axis : (k,) records whose tool axes are moved, and where to, (k, 3) in M; none where it is held already
     motion, share, added : (m,) motions and shares where records are inserted, in order, and their axes, (m, 3) in M
     turn : rad by which the free angle turns there
     aside : rad off the pole at which the axis is held
     """
 
-    steps: tuple[int, int]
     located: PolePass
     record: Indices
     axis: Array
@@ -118,6 +118,9 @@ class _HoldBuilder:
         record, number, distance = self._list_records(run)
         if entry is None and leave is None and (not len(record) or distance.max() < 0.5 * EXACT):
             return None
+        if self._is_held_already(run):
+            nothing, nowhere = np.empty(0, np.int64), np.empty((0, 3))
+            return PoleHold(self._locate(run), nothing, nowhere, nothing, np.empty(0), nowhere, 0.0, self.aside)
         come, go = self._find_azimuths(entry, leave, record)
         if len(record):
             nearest = number[distance.argmin()]
@@ -136,7 +139,18 @@ class _HoldBuilder:
         added = self.pole.find_axes(tip, axis, points.projected)
         axes = self.pole.find_axes(self.programmed.tip[record], self.programmed.axis[record], moved)
         located = self._locate(run)
-        return PoleHold(run, located, record, axes, points.motion, points.share, added, abs(turn), self.aside)
+        return PoleHold(located, record, axes, points.motion, points.share, added, abs(turn), self.aside)
+
+    def _is_held_already(self, run: tuple[int, int]) -> bool:
+        """Tell whether a run comes no nearer to the pole than the circle of a hold, or goes straight over the pole."""
+        steps, (first, last) = self.steps, run
+        near = first + np.flatnonzero(steps.nearest[first : last + 1] < _STILL * self.aside)
+        ends_there = np.hypot(*steps.last[near].T) < PRINTED
+        before, behind = near[ends_there], near[~ends_there]
+        if not np.array_equal(before + 1, behind) or (len(behind) and behind[-1] > last):
+            return False
+        a, b = steps.first[before], steps.last[behind]
+        return bool(((a * b).sum(1) <= -_OPPOSITE * np.hypot(*a.T) * np.hypot(*b.T)).all())
 
     def _locate(self, run: tuple[int, int]) -> PolePass:
         steps, (first, last) = self.steps, run
@@ -244,6 +258,18 @@ def _place_end(steps: PoleSteps, step: int, point: Array | None) -> _Points:
 def _join(*parts: _Points) -> _Points:
     motion, share = (np.concatenate([getattr(part, name) for part in parts]) for name in ("motion", "share"))
     return _Points(motion, share, np.concatenate([part.projected for part in parts]))
+
+
+def find_held_steps(steps: PoleSteps, holds: list[PoleHold]) -> list[tuple[int, int]]:
+    """Find the first and the last of the steps on each hold, also of another pole."""
+    held = []
+    for hold in holds:
+        within = (steps.record - 1 + steps.end > hold.located.begin) & (
+            steps.record - 1 + steps.begin < hold.located.end
+        )
+        number = np.flatnonzero(within)
+        held += [(int(number[0]), int(number[-1]))] if len(number) else []
+    return held
 
 
 def are_apart(hold: PoleHold, others: list[PolePass]) -> bool:

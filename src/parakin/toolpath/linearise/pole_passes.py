@@ -14,7 +14,7 @@ from ..programmed_path import ProgrammedPath
 from .deviation import ALLOWED, SHARES, Deviation
 from .path_cuts import PathPositions, select_spans
 from .path_records import insert_records, replace_axes, repost_path
-from .pole_holds import PoleHold, are_apart, find_pole_holds, note_holds
+from .pole_holds import PoleHold, are_apart, find_held_steps, find_pole_holds, note_holds
 from .pole_routing import PolePass, PoleRoute, find_pole_routes, locate_pass
 from .pole_steps import PoleSteps, find_pole_steps
 from .pole_swings import note_swings
@@ -117,7 +117,7 @@ def _lead_unless_refused(
             led.passes.append(pole_pass)
         crossings += [_Crossing(pole, steps, route) for route in routes if route.crossing >= 0]
         held: list[PoleHold] = []
-        if deviation.interpolation == "pose" and not inclined:
+        if not inclined:
             for hold in find_pole_holds(pole, posted, programmed, steps, routes, deviation.angle):
                 is_free = (axis[hold.record] == programmed.axis[hold.record]).all()
                 others = [*led.passes, *(other.located for other in led.holds)]
@@ -125,7 +125,7 @@ def _lead_unless_refused(
                     axis[hold.record] = hold.axis
                     held.append(hold)
         led.holds += held
-        taken = [*(route.steps for route in routes), *(hold.steps for hold in held)]
+        taken = [*(route.steps for route in routes), *find_held_steps(steps, led.holds)]
         led.notes += [*note_swings(pole, posted.path, steps, taken), *note_holds(held)]
     moved = np.flatnonzero((axis != programmed.axis).any(1))
     if len(moved):

@@ -8,7 +8,10 @@ import numpy as np
 
 from ..arrays import Array
 
-DIGITS = 6  # after the point: of mm, of degrees, and of the inverse of minutes
+# Digits after the point. Beside the pole of a wrist a turning joint goes by tens of degrees for thousandths of them of
+# the pose's angles, and steps of 1e-6° could be told from a smooth motion.
+DIGITS = {"mm": 6, "rad": 8}
+_DIGITS_OF_F = 6
 LONGEST_COMMENT = 200  # characters; LinuxCNC takes 255 in a line
 CHUNK = 1 << 16  # motions written at a time
 _ROWS = 1 << 14  # formatted at a time
@@ -17,13 +20,17 @@ _ROWS = 1 << 14  # formatted at a time
 def to_display(values: Array, units: Sequence[str]) -> Array:
     """Convert rows from mm and rad to mm and degrees, rounded to the digits that are printed."""
     scale = np.where(np.array(units) == "rad", 180.0 / np.pi, 1.0)
-    return np.round(values * scale, DIGITS) + 0.0
+    columns = zip((values * scale).T, units, strict=True)
+    return np.stack([np.round(column, DIGITS[unit]) for column, unit in columns], axis=-1) + 0.0
 
 
-def format_blocks(lead: str, letters: Sequence[str], rows: Array, seconds: Array) -> str:
-    """Format lines ``lead X.. Y.. F..`` of rows (k, letters), mm and degrees; F is the inverse of a line's minutes."""
-    number = f"%.{DIGITS}f"
-    line = lead + " ".join(f"{letter}{number}" for letter in letters) + f" F{number}\n"
+def format_blocks(lead: str, letters: Sequence[str], units: Sequence[str], rows: Array, seconds: Array) -> str:
+    """Format lines ``lead X.. Y.. F..`` of rows (k, letters), mm and degrees; F is the inverse of a line's minutes.
+
+    units : of the letters, ``mm`` or ``rad``
+    """
+    words = " ".join(f"{letter}%.{DIGITS[unit]}f" for letter, unit in zip(letters, units, strict=True))
+    line = f"{lead}{words} F%.{_DIGITS_OF_F}f\n"
     table = np.column_stack([rows, 60.0 / seconds])
     chunks = [table[begin : begin + _ROWS] for begin in range(0, len(table), _ROWS)]
     return "".join(line * len(chunk) % tuple(chunk.ravel().tolist()) for chunk in chunks)

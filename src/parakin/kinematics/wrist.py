@@ -126,6 +126,17 @@ def fill_free(angles: Array, free: Flags) -> Array:
     return angles[np.where(last < 0, fixed[0], last)] if len(fixed) else angles
 
 
+def turn_ahead(angles: Array, free: Flags) -> Array:
+    """Replace free angles of a path (n,) as :func:`fill_free` does, but turn on the last of several free rows.
+
+    So an angle that nothing depends on has turned before it counts again, and not while it begins to.
+    """
+    filled = fill_free(angles, free)
+    last = np.flatnonzero(free[1:-1] & free[:-2] & ~free[2:]) + 1
+    filled[last] = filled[last + 1]
+    return filled
+
+
 def has_swing(pairs: Array) -> bool:
     """Tell whether first angles of neighbours on a path (n, 2 or more; first, second) swing."""
     return bool((np.abs(wrap_angle(np.diff(pairs[:, 0]))) > SWING).any())

@@ -83,11 +83,11 @@ def _format_program(trajectory: Trajectory, letters: tuple[str, ...], forced: st
     yield "G21 G90 G17 G40 G49\n"
     events = format_events(path, [int(corner[event.record - 1]) if event.record else -1 for event in path.events])
     yield join_lines(events.pop(-1, []))
-    yield "G93\n" + format_blocks("G1 ", letters, rows[:1], np.array([approach]))
+    yield "G93\n" + format_blocks("G1 ", letters, machine.joint_units, rows[:1], np.array([approach]))
     breaks = sorted({0, len(seconds), *events})
     for start, end in pairwise([*breaks, len(seconds)]):
         yield join_lines(events.get(start, []))
         for first in range(start, end, CHUNK):
             chunk = slice(first, min(first + CHUNK, end))
-            yield format_blocks("G1 ", letters, rows[1:][chunk], seconds[chunk])
+            yield format_blocks("G1 ", letters, machine.joint_units, rows[1:][chunk], seconds[chunk])
     yield "M2\n"

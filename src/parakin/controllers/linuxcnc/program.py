@@ -92,7 +92,7 @@ def _format_program(
     reached = np.searchsorted(motions.piece, trajectory.curve.corner_of_record)  # how many motions lead to each record
     events = format_events(path, [int(reached[event.record - 1]) if event.record else -1 for event in path.events])
     yield join_lines(events.pop(-1, []))
-    yield "G93 G61\n" + format_blocks("G53 G1 ", machine.axes, way, times) + blend + "\n"
+    yield "G93 G61\n" + format_blocks("G53 G1 ", machine.axes, machine.axis_units, way, times) + blend + "\n"
     stops = np.flatnonzero(motions.halt[:-1]).tolist()
     halting = set(stops)
     breaks = sorted({0, len(ends), *events, *stops, *(at + 1 for at in stops)})
@@ -105,7 +105,7 @@ def _format_program(
             chunk = slice(start, min(start + CHUNK, end))
             before = ends[start - 1 : start] if start else way[-1:]
             rows, seconds = split_slow_turns(machine, before, ends[chunk], motions.seconds[chunk])
-            yield format_blocks("G53 G1 ", machine.axes, rows, seconds)
+            yield format_blocks("G53 G1 ", machine.axes, machine.axis_units, rows, seconds)
         if exact:
             yield blend + "\n"
     yield "M2\n"

@@ -60,9 +60,8 @@ class PoleHold:
     def describe(self) -> Note:
         """Describe the turn as a note of the path."""
         pole, tilt = self.located.pole, np.degrees(self.aside)
-        where = f"the tool held {tilt:.2g}° beside it" if self.aside else "the tool held on it"
-        text = f"{pole.angle} turns by {np.degrees(self.turn):.0f}° at {pole.text}, {where}; the tip stands still"
-        return Note(self.located.line, text)
+        where = f", the tool held {tilt:.2g}° beside it; the tip stands still" if self.aside else ""
+        return Note(self.located.line, f"{pole.angle} turns by {np.degrees(self.turn):.0f}° at {pole.text}{where}")
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,6 +98,9 @@ def _find_runs(steps: PoleSteps, near: Flags, radius: float) -> list[tuple[int, 
     return list(zip(starts.tolist(), ends.tolist(), strict=True))
 
 
+_NOTHING = _Points(np.empty(0, np.int64), np.empty(0), np.empty((0, 2)))
+
+
 @dataclass(frozen=True, eq=False)
 class _HoldBuilder:
     """Builds the holds of a path beside a pole: within ``radius`` of it the axis is held ``aside`` of it, rad."""
@@ -118,7 +120,7 @@ class _HoldBuilder:
         record, number, distance = self._list_records(run)
         if entry is None and leave is None and (not len(record) or distance.max() < 0.5 * EXACT):
             return None
-        if self._is_held_already(run):
+        if self._is_held_already(run, distance):
             nothing, nowhere = np.empty(0, np.int64), np.empty((0, 3))
             return PoleHold(self._locate(run), nothing, nowhere, nothing, np.empty(0), nowhere, 0.0, self.aside)
         come, go = self._find_azimuths(entry, leave, record)
@@ -132,6 +134,8 @@ class _HoldBuilder:
         turned, turn = self._turn(place, come, go)
         if len(record) and len(turned.motion):  # the last of them is the record itself
             turned = _Points(turned.motion[:-1], turned.share[:-1], turned.projected[:-1])
+        if len(record) > 1 and not self.aside:
+            turned = _NOTHING
         points = _join(_place_end(steps, first, entry), turned, _place_end(steps, last, leave))
         if not len(record) and not len(points.motion):
             return None
@@ -141,9 +145,15 @@ class _HoldBuilder:
         located = self._locate(run)
         return PoleHold(located, record, axes, points.motion, points.share, added, abs(turn), self.aside)
 
-    def _is_held_already(self, run: tuple[int, int]) -> bool:
-        """Tell whether a run comes no nearer to the pole than the circle of a hold, or goes straight over the pole."""
+    def _is_held_already(self, run: tuple[int, int], distance: Array) -> bool:
+        """Tell whether a run stands on the circle of a hold, and where it does not, goes straight over the pole.
+
+        distance : (k,) of its records off the pole
+        """
         steps, (first, last) = self.steps, run
+        on_circle = np.abs(distance - self.aside) < (1.0 - _STILL) * self.aside
+        if not self.aside or not (on_circle | (distance < PRINTED) | (distance > _STILL * self.radius)).all():
+            return False
         near = first + np.flatnonzero(steps.nearest[first : last + 1] < _STILL * self.aside)
         ends_there = np.hypot(*steps.last[near].T) < PRINTED
         before, behind = near[ends_there], near[~ends_there]
@@ -198,10 +208,11 @@ class _HoldBuilder:
     def _turn(self, place: tuple[int, float], come: float, go: float) -> tuple[_Points, float]:
         """Turn the axis about the pole from one direction to another at a place, and measure the free angle's turn.
 
-        Behind the pole the free angle is the same in the opposite direction, in the other mode.
+        Behind the pole the free angle is the same in the opposite direction, in the other mode. On the pole itself C
+        turns between any two records.
         """
         aside, turn = self.aside, float(wrap_angle(np.array(go - come)))
-        over = self._can_change_mode and abs(turn) > 0.5 * np.pi
+        over = abs(turn) > 0.5 * np.pi and (not aside or self._can_change_mode)
         if over:
             come, turn = come + np.pi, float(wrap_angle(np.array(turn - np.pi)))
         count = int(np.ceil(abs(turn) / _ARC)) if abs(turn) > _STRAIGHT else 0

@@ -83,7 +83,7 @@ def compute_poses(
 
     Else a turn about the tool's axis is free: C is as at home where the machine turns three ways, and B and C determine
     the axis's direction where it turns two ways (B from 0 to 180°, but below 0 where a path has passed over B = 0, so
-    that C does not jump by half a turn; at B = 0 C keeps the neighbour's value).
+    that C does not jump by half a turn; at B = 0 C keeps the neighbour's value, and turns ahead to the next one).
 
     Raises :class:`PoseError` for a motion of thousands of turns, where they have to be followed.
     """

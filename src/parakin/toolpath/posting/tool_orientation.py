@@ -11,7 +11,7 @@ import numpy as np
 
 from ...arrays import Array, split_rows
 from ...kinematics.rotations import LEVEL
-from ...kinematics.wrist import EXACT, PRINTED, cross_direction_pole, fill_free, unwind_angles
+from ...kinematics.wrist import EXACT, PRINTED, cross_direction_pole, turn_ahead, unwind_angles
 from ...machine import Machine
 
 BLOCK = 1 << 13  # records whose many intermediate arrays stay in the cache
@@ -118,8 +118,8 @@ def _measure_angle(k: Array, fixed: Array) -> Array:
 
 
 def _make_continuous(angle: Array, free: Any) -> Array:
-    """Unwind an angle along a path; where it is free, it keeps the last value."""
+    """Unwind an angle along a path; where it is free, it keeps the last value, or turns ahead to the next one."""
     if free.any():
-        angle = np.zeros_like(angle) if free.all() else fill_free(angle, free)
+        angle = np.zeros_like(angle) if free.all() else turn_ahead(angle, free)
     has_jumps = bool(np.any(np.abs(np.diff(angle)) > math.pi))
     return unwind_angles(angle) if has_jumps else angle

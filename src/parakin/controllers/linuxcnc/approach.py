@@ -6,7 +6,7 @@ import numpy as np
 
 from ...arrays import Array
 from ...errors import PoseError
-from ...kinematics.wrist import EXACT, TILTED, TURN, Wrist
+from ...kinematics.wrist import EXACT, PRINTED, TILTED, TURN, Wrist, find_nearest_turn, is_upright, wrap_angle
 from ...machine import Machine
 from ...toolpath.timing.drive_limits import DriveLimits
 
@@ -15,6 +15,8 @@ _FROM_ANYWHERE = 4.0  # s, at least: for the motion whose start is not known
 _LEAST = 0.5  # s, of a motion
 _SAMPLES = 500  # samples of a motion
 _TURNS = (0, 1, -1, 2, -2)
+_SHARES = (1.0, 0.1, 0.01)  # of the way back home and of TILTED, for the poses that lead to a record beside the pole
+_ROUNDS = 60
 
 
 def plan_approach(machine: Machine, first: Array, joints: Array, mode: str) -> tuple[Array, Array]:
@@ -28,13 +30,20 @@ def plan_approach(machine: Machine, first: Array, joints: Array, mode: str) -> t
     At home the tool may lie along the first axis of a wrist, which then is free: it would have to jump as soon as the
     tool tilts in another direction than that axis stands for. So the tool is put upright above home first, turned,
     which moves no joint there, tilted in the direction the axis stands for, and brought to the record on the turn that
-    it is planned on.
+    it is planned on. A record beside the pole is come to straight from aside, lest the axis swing on the way.
+
+    Raises :class:`PoseError` where no such way is found.
     """
-    way = [first]
     wrist = machine.wrist
+    way = [first] if wrist is None else _come_from_aside(machine, wrist, first, joints, mode)
     if wrist is not None and wrist.find_free(machine.home[None], EXACT)[0]:
-        way = _leave_pole(machine, wrist, first, joints, mode) or way
-    if len(way) == 1 and mode != machine.mode:
+        aside = joints if len(way) == 1 else _follow_back(machine, way, joints, mode)
+        left = _leave_pole(machine, wrist, way[0], aside, mode)
+        if left is None:
+            name, angle = machine.joints[wrist.first], np.degrees(joints[wrist.first])
+            raise PoseError(f"no way from home to the first record, where {name} is at {angle:.1f}° in mode {mode!r}")
+        way = [*left, *way]
+    elif mode != machine.mode:
         raise PoseError(f"mode {mode!r}: no way from home, which is in {machine.mode!r}, to the first record")
     poses = np.array(way)
     starts = np.concatenate([machine.home[None], poses[:-1]])
@@ -43,8 +52,52 @@ def plan_approach(machine: Machine, first: Array, joints: Array, mode: str) -> t
     return poses, np.array(seconds)
 
 
-def _leave_pole(machine: Machine, wrist: Wrist, first: Array, joints: Array, mode: str) -> list[Array] | None:
-    """Go upright at home, tilted there, and to the first record; None where there is no such way."""
+def _come_from_aside(machine: Machine, wrist: Wrist, first: Array, joints: Array, mode: str) -> list[Array]:
+    """Come straight from home to a record beside the pole with the first joint as it is there: the poses on the way."""
+    off_pole = float(np.sqrt(wrist.measure_freedom(first[None])[0]))
+    if off_pole > 0.5 * TILTED:
+        return [first]
+    own = mode if off_pole < PRINTED or wrist.has_mode(first[None], joints[None], mode)[0] else wrist.other_mode(mode)
+    c, way = wrist.direction.c, list[Array]()
+    for share in _SHARES:
+        pose = _tilt_aside(machine, first + share * (machine.home - first), wrist.tilt(joints, own, share * TILTED))
+        if pose is None:
+            return [first]
+        pose[c] = find_nearest_turn(pose[c], way[-1][c] if way else first[c])
+        way.append(pose)
+    if is_upright(first[wrist.direction.b], PRINTED):  # C turns there by itself
+        way.append(np.where(np.arange(len(first)) == c, way[-1], first))
+    return [*way, first]
+
+
+def _tilt_aside(machine: Machine, near: Array, joints: Array) -> Array | None:
+    """Find the pose with the tip of a near one in which the wrist stands as in joints; None if there is none."""
+    wrist, pose = machine.wrist, near.copy()
+    assert wrist is not None
+    for _ in range(_ROUNDS):
+        legs = machine.inverse(pose, machine.mode)
+        legs[wrist.pair] = joints[wrist.pair]
+        solution = machine.forward(legs, near=pose)
+        if not solution.converged:
+            return None
+        turned = np.array(solution.poses)[wrist.direction.pair]
+        is_there = np.abs(wrap_angle(turned - pose[wrist.direction.pair])).max() < EXACT
+        pose[wrist.direction.pair] = turned
+        if is_there:
+            return pose
+    return None
+
+
+def _follow_back(machine: Machine, way: list[Array], joints: Array, mode: str) -> Array:
+    """Find the joints (joints,) at the start of a way that comes to joints straight from aside."""
+    assert machine.wrist is not None
+    start = machine.inverse(way[0], mode)
+    start[machine.wrist.first] = find_nearest_turn(start[machine.wrist.first], joints[machine.wrist.first])
+    return np.asarray(start)
+
+
+def _leave_pole(machine: Machine, wrist: Wrist, goal: Array, joints: Array, mode: str) -> list[Array] | None:
+    """Go upright at home and tilted there, from where a line leads to a pose and its joints; None if there is none."""
     tilted = machine.forward(wrist.tilt(machine.inverse(machine.home), mode, TILTED), near=machine.home)
     if not np.all(tilted.converged):
         return None
@@ -52,13 +105,13 @@ def _leave_pole(machine: Machine, wrist: Wrist, first: Array, joints: Array, mod
         via = np.array(machine.home)
         via[wrist.direction.pair] = np.asarray(tilted.poses).reshape(-1)[wrist.direction.pair]
         via[wrist.direction.c] += TURN * turns
-        line = _sample_line(via, first)
+        line = _sample_line(via, goal)
         rows = machine.follow(line, mode, EXACT)
         arrival = rows[-1] - rows[0] + machine.inverse(via, mode)
         if abs(float((arrival - joints)[wrist.first])) < 1e-6 and not machine.check(line, mode=mode).any():
             upright = np.array(machine.home)
             upright[wrist.direction.c] = via[wrist.direction.c]
-            return [upright, via, first]
+            return [upright, via]
     return None
 
 

@@ -229,8 +229,8 @@ def test_columns_of_b_and_c_are_seen(line):
 
 
 WORDS = """
-accept accumulate act add advance align allocate allow announce append apply assign average begin bind bisect blend
-bore bound box bracket bring build cancel centre certify change check choose clamp clear climb clip close coincide
+accept accumulate act add advance align allocate allow announce append apply approach assign average begin bind bisect
+blend bore bound box bracket bring build cancel centre certify change check choose clamp clear climb clip close coincide
 collect combine compare compile complete compose compute concatenate confirm continue convert copy correct count cross
 cut decide decode decompose delay derive describe design detect differentiate discard divide draw drill drop ease
 embed enclose encode end estimate evaluate exclude execute exit expand explain explore extend extract factor fail

@@ -35,7 +35,7 @@ def plan_approach(machine: Machine, first: Array, joints: Array, mode: str) -> t
     Raises :class:`PoseError` where no such way is found.
     """
     wrist = machine.wrist
-    way = [first] if wrist is None else _come_from_aside(machine, wrist, first, joints, mode)
+    way = [first] if wrist is None else _approach_from_aside(machine, wrist, first, joints, mode)
     if wrist is not None and wrist.find_free(machine.home[None], EXACT)[0]:
         aside = joints if len(way) == 1 else _follow_back(machine, way, joints, mode)
         left = _leave_pole(machine, wrist, way[0], aside, mode)
@@ -52,15 +52,17 @@ def plan_approach(machine: Machine, first: Array, joints: Array, mode: str) -> t
     return poses, np.array(seconds)
 
 
-def _come_from_aside(machine: Machine, wrist: Wrist, first: Array, joints: Array, mode: str) -> list[Array]:
-    """Come straight from home to a record beside the pole with the first joint as it is there: the poses on the way."""
+def _approach_from_aside(machine: Machine, wrist: Wrist, first: Array, joints: Array, mode: str) -> list[Array]:
+    """Approach a record beside the pole straight from home, with the first joint as it is there; return the poses."""
     off_pole = float(np.sqrt(wrist.measure_freedom(first[None])[0]))
     if off_pole > 0.5 * TILTED:
         return [first]
     own = mode if off_pole < PRINTED or wrist.has_mode(first[None], joints[None], mode)[0] else wrist.other_mode(mode)
     c, way = wrist.direction.c, list[Array]()
     for share in _SHARES:
-        pose = _tilt_aside(machine, first + share * (machine.home - first), wrist.tilt(joints, own, share * TILTED))
+        pose = _find_tilted_pose(
+            machine, first + share * (machine.home - first), wrist.tilt(joints, own, share * TILTED)
+        )
         if pose is None:
             return [first]
         pose[c] = find_nearest_turn(pose[c], way[-1][c] if way else first[c])
@@ -70,7 +72,7 @@ def _come_from_aside(machine: Machine, wrist: Wrist, first: Array, joints: Array
     return [*way, first]
 
 
-def _tilt_aside(machine: Machine, near: Array, joints: Array) -> Array | None:
+def _find_tilted_pose(machine: Machine, near: Array, joints: Array) -> Array | None:
     """Find the pose with the tip of a near one in which the wrist stands as in joints; None if there is none."""
     wrist, pose = machine.wrist, near.copy()
     assert wrist is not None
@@ -97,7 +99,7 @@ def _follow_back(machine: Machine, way: list[Array], joints: Array, mode: str) -
 
 
 def _leave_pole(machine: Machine, wrist: Wrist, goal: Array, joints: Array, mode: str) -> list[Array] | None:
-    """Go upright at home and tilted there, from where a line leads to a pose and its joints; None if there is none."""
+    """Leave the pole at home to where a line leads to a pose and its joints; None where no line does."""
     tilted = machine.forward(wrist.tilt(machine.inverse(machine.home), mode, TILTED), near=machine.home)
     if not np.all(tilted.converged):
         return None

@@ -130,7 +130,7 @@ class _HoldBuilder:
         else:
             nearest = first + int(steps.nearest[first : last + 1].argmin())
             place, before = (int(steps.record[nearest]), float(steps.share[nearest])), np.zeros(0, np.bool_)
-        moved = self.aside * np.where(before[:, None], _direct(come), _direct(go))
+        moved = self.aside * np.where(before[:, None], _point_towards(come), _point_towards(go))
         turned, turn = self._turn(place, come, go)
         if len(record) and len(turned.motion):  # the last of them is the record itself
             turned = _Points(turned.motion[:-1], turned.share[:-1], turned.projected[:-1])
@@ -219,9 +219,9 @@ class _HoldBuilder:
         if not aside:
             points = [np.zeros(2)] * (2 if count else 0)
         else:
-            points = [aside * _direct(come + turn * k / count) for k in range(count + 1)] if count else []
+            points = [aside * _point_towards(come + turn * k / count) for k in range(count + 1)] if count else []
             if over:
-                points = [aside * _direct(come - np.pi), np.zeros(2), *(points or [aside * _direct(go)])]
+                points = [aside * _point_towards(come - np.pi), np.zeros(2), *(points or [aside * _point_towards(go)])]
         motion, share = place
         projected = np.array(points).reshape(-1, 2)
         return _Points(np.full(len(points), motion, np.int64), np.full(len(points), share), projected), turn
@@ -238,7 +238,7 @@ class _HoldBuilder:
             return not ((second < wrist.drive.low) | (second > wrist.drive.high)).any()
 
 
-def _direct(azimuth: float) -> Array:
+def _point_towards(azimuth: float) -> Array:
     return np.array([np.cos(azimuth), np.sin(azimuth)])
 
 
@@ -283,7 +283,7 @@ def find_held_steps(steps: PoleSteps, holds: list[PoleHold]) -> list[tuple[int, 
     return held
 
 
-def are_apart(hold: PoleHold, others: list[PolePass]) -> bool:
+def is_apart(hold: PoleHold, others: list[PolePass]) -> bool:
     """Tell whether a hold shares no stretch of the path with others."""
     return all(hold.located.end <= other.begin or hold.located.begin >= other.end for other in others)
 

@@ -14,7 +14,7 @@ from ..programmed_path import ProgrammedPath
 from .deviation import ALLOWED, SHARES, Deviation
 from .path_cuts import PathPositions, select_spans
 from .path_records import insert_records, replace_axes, repost_path
-from .pole_holds import PoleHold, are_apart, find_held_steps, find_pole_holds, note_holds
+from .pole_holds import PoleHold, find_held_steps, find_pole_holds, is_apart, note_holds
 from .pole_routing import PolePass, PoleRoute, find_pole_routes, locate_pass
 from .pole_steps import PoleSteps, find_pole_steps
 from .pole_swings import note_swings
@@ -121,7 +121,7 @@ def _lead_unless_refused(
             for hold in find_pole_holds(pole, posted, programmed, steps, routes, deviation.angle):
                 is_free = (axis[hold.record] == programmed.axis[hold.record]).all()
                 others = [*led.passes, *(other.located for other in led.holds)]
-                if hold.located.key not in refused and is_free and are_apart(hold, others):
+                if hold.located.key not in refused and is_free and is_apart(hold, others):
                     axis[hold.record] = hold.axis
                     held.append(hold)
         led.holds += held

@@ -83,7 +83,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _replace_closed_streams() -> bool:
-    """Let output go nowhere where its stream is closed; return whether that is so of stdout."""
+    """Redirect closed output streams to nowhere; return whether stdout was closed."""
     closed = sys.stdout is None
     for name in ("stdout", "stderr"):
         if getattr(sys, name) is None:
@@ -92,7 +92,7 @@ def _replace_closed_streams() -> bool:
 
 
 def _discard_output() -> None:
-    """Let what is not written yet go nowhere: the interpreter flushes stdout once more when it ends."""
+    """Redirect stdout to nowhere, since the interpreter flushes it once more when it ends."""
     with suppress(OSError, ValueError):  # a stream that is no file
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 

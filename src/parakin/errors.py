@@ -67,12 +67,12 @@ CONTROL_CHARACTER = re.compile("[\x00-\x08\x0a-\x1f\x7f-\x9f\u2028-\u202e\u2066-
 
 
 def make_printable(text: object) -> str:
-    """Replace what would act on a terminal rather than be read there, such as ESC; line ends stay."""
+    """Replace characters that control a terminal, such as ESC; line ends stay."""
     return "\n".join(CONTROL_CHARACTER.sub("?", line) for line in str(text).split("\n"))
 
 
 def suggest(word: str, known: Iterable[str], others: str = "") -> str:
-    """End a message on an unknown word: ``, did you mean "x"?`` if a known one is close, else ``, expected ...``.
+    """Complete a message on an unknown word: ``, did you mean "x"?`` if a known one is close, else ``, expected ...``.
 
     ``others`` says what is expected; the default names all known words.
     """

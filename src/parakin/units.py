@@ -148,7 +148,7 @@ def _sqrt(x: Quantity) -> Quantity:
 
 
 def _accept_angle(function: Callable[[float], float]) -> Callable[[Quantity], Quantity]:
-    """Make a function of a quantity from a function of an angle; it takes a bare 0 too."""
+    """Make a function of a quantity from a function of an angle; a bare 0 is accepted too."""
 
     def call(x: Quantity) -> Quantity:
         if x.dimension != ANGLE.dimension and x != Quantity(0.0):

@@ -40,7 +40,7 @@ def print_remark(text: str) -> None:
 
 
 def print_text(text: str) -> None:
-    """Print what a command answers, without what would act on the terminal."""
+    """Print a command's answer without characters that control the terminal."""
     print(make_printable(text))
 
 
@@ -51,7 +51,7 @@ def print_json(content: Mapping[str, Any]) -> None:
 
 @cache
 def announce_compiling() -> None:
-    """Say once if kernels must be compiled, which takes a while: their cache is empty or out of date."""
+    """Say once that kernels are being compiled, if their cache is empty or out of date."""
     from numba.core import event
 
     class Announcement(event.Listener):  # type: ignore[misc]

@@ -152,7 +152,7 @@ def _read_values(
 
 @dataclass(frozen=True)
 class _Request:
-    """What a command is to show: the problem, which side of its table is the answer, and the options on output."""
+    """What a command shows: the problem, the side of its table that is the answer, and the options on output."""
 
     problem: Literal["inverse", "forward"]
     answer: ColumnGroup

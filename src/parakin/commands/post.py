@@ -183,7 +183,7 @@ class _Wanted:
 def _make_files(
     stem: str, job: Job, wanted: _Wanted, progress: ProgressBar
 ) -> tuple[dict[str, tuple[str, Content]], list[str]]:
-    """Make the files by their kinds, with their names; and tell why some that are wanted are not among them."""
+    """Make the requested files, named by kind, and give the reasons for those that can't be made."""
     from ..export.report.report import render_report
     from ..export.tables import joints as joint_table
     from ..export.tables import setpoints as setpoint_table

@@ -82,7 +82,7 @@ def _format_placement(placement: Placement) -> str:
 
 
 def _format_times(job: Job, target: Target | None) -> list[str]:
-    """Format the cycle time, and what the controller takes if it is another time."""
+    """Format the cycle time, and the controller's time if it differs."""
     if job.trajectory is None or job.seconds is None:
         return [f"no cycle time: {job.unplanned}"]
     text = f"cycle time {format_duration(job.seconds)}"

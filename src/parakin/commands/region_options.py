@@ -44,7 +44,7 @@ def read_region(
     without: Sequence[str] | None = None,
     mode: str | None = None,
 ) -> Region:
-    """Make the region of the options; an error names the option that is invalid by itself."""
+    """Make the region that the options describe; an error names the option that is invalid."""
     from ..workspaces.certified.region import make_region
 
     arguments: dict[str, Any] = {

@@ -30,7 +30,7 @@ class InsideOptions:
 
 @dataclass(frozen=True)
 class Inside:
-    """The largest box and the connected components; None for what is not wanted."""
+    """The largest box and the connected components; None for what was not requested."""
 
     box: InscribedBox | None = None
     components: Components | None = None
@@ -73,7 +73,7 @@ def _find_components(region: Region, options: InsideOptions) -> Components:
 
 
 def _strip_argument(error: PoseError) -> str:
-    """Strip the argument's name from an error: the option stands before it."""
+    """Remove the argument's name from an error, because the option stands before it."""
     name, colon, rest = str(error).partition(": ")
     return rest if colon and name in ("shape", "around", "start", "cell") else str(error)
 

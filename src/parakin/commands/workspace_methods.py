@@ -33,7 +33,7 @@ class Effort:
 
 
 def find_workspace(method: Method, region: Region, effort: Effort, progress: Progress) -> Workspace | SampledWorkspace:
-    """Find the workspace of a region by a method; an option that the method does not take is refused."""
+    """Find the workspace of a region by a method; refuse options that the method does not take."""
     if method == "certified":
         return _certify_workspace(region, effort, progress)
     for option in ("gap", "cell", "time"):

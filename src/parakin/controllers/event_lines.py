@@ -76,7 +76,7 @@ def _format_spindle(arguments: list[str], event: Event, path: ToolPath) -> str |
 
 
 def _changes_tool(event: Event, path: ToolPath) -> bool:
-    """Tell whether an event is a tool change between motions, which the operator has to make."""
+    """Tell whether an event is a tool change between motions that the operator has to make."""
     name = event.text.upper()
     tool = name == "M6" or name.startswith("LOAD/TOOL") or name.split("/")[0].strip() in _TOOLS
     return tool and 0 < event.record < len(path)

@@ -37,7 +37,7 @@ def format_blocks(lead: str, letters: Sequence[str], units: Sequence[str], rows:
 
 
 def format_comments(text: str) -> Iterator[str]:
-    """Cut a remark into comments short enough for a line, none of which a controller acts upon."""
+    """Split a remark into comments that fit on a line and that no controller acts upon."""
     plain = make_plain(text)
     for begin in range(0, max(len(plain), 1), LONGEST_COMMENT):
         yield f"( {plain[begin : begin + LONGEST_COMMENT]} )"

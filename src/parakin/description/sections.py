@@ -138,7 +138,7 @@ Steps = Annotated[tuple[StepValue, ...], ListOf]
 
 
 def _expand_mounting(value: object, info: ValidationInfo) -> object:
-    """Expand a word such as horizontal to its turn about X, which makes a hanging tool point along +Y."""
+    """Expand a word such as horizontal to its turn about X, by which a hanging tool points along +Y."""
     if not isinstance(value, YamlText):
         return value
     way, _, angle = value.strip().partition(" ")

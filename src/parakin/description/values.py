@@ -147,7 +147,7 @@ _USUAL_BOUNDS: dict[QuantityKind, ValidRange] = {
 
 
 def read_quantity(value: object, kind: QuantityKind, info: ValidationInfo, bounds: ValidRange | None = None) -> float:
-    """Read a value in mm, rad and s; NaN if a size in it is itself in error."""
+    """Read a value in mm, rad and s; NaN if it uses a size that is invalid."""
     if not isinstance(value, YamlText):
         raise ValueError(f"expected {kind.wanted}, got {describe_value(value)}")
     try:

@@ -110,7 +110,7 @@ def _draw_panel(figure: Figure, axes: Any, map_: PerformanceMap, panel: _MapPane
 
 
 def make_map_csv(maps: Sequence[PerformanceMap]) -> Writer:
-    """Make the writer of all positions that can be reached: pose (mm, degrees), whether it is allowed, all numbers."""
+    """Make the writer of all reachable positions: pose (mm, degrees), whether it is allowed, and all numbers."""
 
     def write(file: BinaryIO) -> None:
         machine = maps[0].region.machine

@@ -106,7 +106,7 @@ def _lock_folder(folder: Path) -> int | None:
 
 
 def _sweep_leftovers(base: Path) -> None:
-    """Remove the hidden folders of processes that live no more."""
+    """Remove the hidden folders of processes that have ended."""
     for folder in base.glob(f"{_BEGIN}*{_END}"):
         lock = None if folder.is_symlink() else _lock_folder(folder)
         if lock is not None:
@@ -115,7 +115,7 @@ def _sweep_leftovers(base: Path) -> None:
 
 
 def _rename_folder(stage: Path, base: Path) -> bool:
-    """Let the hidden folder become the one that was asked for; False where another process was quicker."""
+    """Rename the hidden folder to the requested one; False where another process made that first."""
     stage.chmod(0o777 & ~_read_umask())
     try:
         os.rename(stage, base)  # noqa: PTH104
@@ -128,7 +128,7 @@ def _rename_folder(stage: Path, base: Path) -> bool:
 
 @contextlib.contextmanager
 def _delay_signals() -> Iterator[None]:
-    """Let an interruption wait until a set of files is complete."""
+    """Delay interruptions until a set of files is complete."""
     if threading.current_thread() is not threading.main_thread():  # handlers run in the main thread only
         yield
         return

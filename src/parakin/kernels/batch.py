@@ -34,7 +34,7 @@ if hasattr(os, "register_at_fork"):  # a forked child has the pool but none of i
 
 
 def freeze_rows(rows: Array) -> Array:
-    """Return a read-only view: to Numba that is a type of its own, and the kernels are compiled for it alone."""
+    """Return a read-only view; Numba compiles the kernels for read-only arrays alone."""
     view = rows.view()
     view.flags.writeable = False
     return view
@@ -85,7 +85,7 @@ def find_first_negative(tape: Tape, x: Array, z: Array) -> Indices:
 
 
 class NewtonSteps(NamedTuple):
-    """What bounds Newton's steps.
+    """Bounds of Newton's steps.
 
     caps : (m,) the greatest change of each coordinate in one step
     size : the legs' length, mm
@@ -100,9 +100,9 @@ class NewtonSteps(NamedTuple):
 
 
 class Roots(NamedTuple):
-    """What Newton's method ended with, a row for each problem.
+    """The results of Newton's method, a row for each problem.
 
-    rows : what the last tape makes of the root
+    rows : outputs of the last tape at the root
     residual : (N,) the greatest closure left, mm; NaN where the row is
     steps : (N,)
     turned : (N,) the determinant of the last factored matrix times that of the start, or times the side that was

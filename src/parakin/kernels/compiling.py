@@ -70,7 +70,7 @@ class _TolerantCache(FunctionCache):  # type: ignore[misc]
 
 
 def njit(*, cache: bool = False, **options: Any) -> Callable[[Callable[..., Any]], Any]:
-    """Compile a function as ``numba.njit`` does, with a cache that never stands in the way."""
+    """Compile a function as ``numba.njit`` does, but never fail because of the cache."""
 
     def compile_function(function: Callable[..., Any]) -> Any:
         kernel = numba.njit(**options)(function)

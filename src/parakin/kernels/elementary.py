@@ -22,7 +22,7 @@ GREATEST_ANGLE = 1e5  # rad; beyond it the reduction loses digits, and the answe
 
 @intrinsic
 def use_widest_vectors(typing):
-    """Let the function that calls this use the machine's widest vectors; LLVM's default halves them on many x86."""
+    """Make the calling function use the machine's widest vectors; LLVM's default halves them on many x86."""
 
     def generate(context, builder, signature, args):
         # llvmlite's own check knows enumerated attributes only.

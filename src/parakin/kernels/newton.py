@@ -129,7 +129,7 @@ def factor_matrix(a, m, exchanges, exchanged, determinant):
 
 @njit(nogil=True, cache=True, fastmath=FAST, error_model="numpy")
 def solve_factored(a, m, exchanges, exchanged, f):
-    """Solve with what :func:`factor_matrix` left: ``f`` (m·LANES,) becomes the solution."""
+    """Solve with the factors of :func:`factor_matrix`: ``f`` (m·LANES,) becomes the solution."""
     use_widest_vectors()
     for k in range(m):
         fk = (k & _MASK) * LANES
@@ -171,7 +171,7 @@ def evaluate_closures(tape, m, block):
 
 @njit(nogil=True, cache=True, fastmath=FAST, error_model="numpy")
 def _take_step(m, caps, block):
-    """Take the step that stands in ``closures`` from ``point``, shrunk where a coordinate would change by too much."""
+    """Take the step in ``closures`` from ``point``, shrunk where a coordinate would change by too much."""
     f, shrink, point, worst, stops = block.closures, block.shrink, block.point, block.worst, block.stops
     for j in range(LANES):
         shrink[j] = 0.0 if (worst[j] < FINE) | (stops[j] > 1.5) else 1.0

@@ -103,7 +103,7 @@ class _Registers:
         return self[term]
 
     def release(self, index: int) -> None:
-        """Release the register of a term that is used no more, unless it is an output's."""
+        """Free the register of a term that is not used any more, unless it is an output's."""
         if index not in self._own:
             self._free.append(self._of[index])
 

@@ -95,7 +95,7 @@ def _find_starts(angle: float, centres: Array, radii: Array, corners: Array) -> 
 
 
 def _polish_pose(pose: Array, centres: Array, radii: Array, corners: Array) -> tuple[float, Array]:
-    """Polish a pose by Newton's method until it gains no more; return the best and its greatest error of a radius."""
+    """Polish a pose by Newton's method as long as it improves; return the best and its greatest error of a radius."""
     best, least, idle = pose, np.inf, 0
     for _ in range(_STEPS):
         rods, jacobian = _linearise(pose, centres, corners)

@@ -56,7 +56,7 @@ def isolate_roots(program: IntervalProgram, low: Array, high: Array) -> Array:
 def _apply_krawczyk(
     low: Array, high: Array, middle: Array, f_low: Array, f_high: Array, j_low: Array, j_high: Array
 ) -> tuple[Array, Array, Flags]:
-    """Cut boxes down by Krawczyk's operator c - Y·f(c) + (1 - Y·F'(X))·(X - c), and tell where it proves one root."""
+    """Shrink boxes by Krawczyk's operator c - Y·f(c) + (1 - Y·F'(X))·(X - c); tell where it proves one root."""
     n = low.shape[1]
     centre = 0.5 * (j_low + j_high)
     finite: Flags = np.asarray(np.isfinite(centre).all((1, 2)))

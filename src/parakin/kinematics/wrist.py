@@ -80,7 +80,7 @@ TURN = 2.0 * np.pi
 
 
 def convert_to_freedom(angle: float) -> float:
-    """Return sin² of an angle off the pole: what :meth:`Wrist.measure_freedom` is there."""
+    """Convert an angle off the pole to its sin², the measure of :meth:`Wrist.measure_freedom`."""
     return float(np.sin(angle) ** 2)
 
 

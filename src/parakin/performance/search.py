@@ -17,7 +17,7 @@ _RANDOM = 3  # directions at random, and near the last one that led on, for each
 
 
 def search_maxima(objective: Objective, starts: Array, step: Array, finest: float = _FINEST) -> tuple[Array, Array]:
-    """Find local maxima (m, d) of an objective and its values (m,) there, from starts (m, d), by a compass search.
+    """Find local maxima (m, d) of an objective and its values (m,) there, from starts (m, d), by compass search.
 
     ``step`` (d,) is the first step, ``finest`` times that the last. All searches go on side by side, in the same
     directions every time.

@@ -62,7 +62,7 @@ def read_joint_program(path: str | os.PathLike[str]) -> JointProgram:
 
 
 class _JointProgramReader:
-    """Take a program's blocks one by one; errors carry no place."""
+    """A reader of a program's blocks, one at a time; errors carry no place."""
 
     def __init__(self) -> None:
         self.letters: set[str] = set()

@@ -21,7 +21,7 @@ _FEED = 3000.0  # mm/min
 
 
 def write_first_program(machine: Machine) -> str:
-    """Write G-code that the machine can run once it is homed; what LinuxCNC opens by itself lies out of its reach."""
+    """Write G-code that the machine can run once it is homed; LinuxCNC's own example lies out of its reach."""
     words = groupby(_format_words(machine, pose) for pose in _find_square(machine))
     lines = [
         f"( {machine.name}: a square at home )",

@@ -59,7 +59,7 @@ def make_linuxcnc_program(trajectory: Trajectory, *, forced: str | None = None, 
 
 
 def predict_linuxcnc_seconds(trajectory: Trajectory) -> float:
-    """Predict what LinuxCNC takes for a program from the first record on, s: the trajectory's time and more."""
+    """Predict LinuxCNC's time for a program from the first record on, s: the trajectory's time and more."""
     motions = build_straight_motions(trajectory, *choose_axis_rates(trajectory.posted.machine))
     return float(motions.seconds.sum())
 
@@ -112,7 +112,7 @@ def _format_program(
 
 
 def split_slow_turns(machine: Machine, before: Array, ends: Array, seconds: Array) -> tuple[Array, Array]:
-    """Split motions in which the tool turns while its tip all but stands: first the turn, then the tip's motion.
+    """Split motions in which the tool turns while its tip hardly moves: first the turn, then the tip's motion.
 
     LinuxCNC goes by the tip's speed, and no slower than 0.1 mm/min; a turn by itself goes by its own.
 

@@ -13,7 +13,7 @@ _SAMPLING = 0.001  # s, between the samples of the trajectory's speed
 
 
 def find_speed_changes(trajectory: Trajectory, accelerations: Array) -> tuple[Indices, Array, Array]:
-    """Find where to divide the pieces of a trajectory's curve, so that one speed serves for each part.
+    """Find where to divide the pieces of a trajectory's curve so that each part needs one speed only.
 
     accelerations : (axes,) mm, rad and s; no part is so short that the controller could not stand still at both ends
 

@@ -78,7 +78,7 @@ def build_straight_motions(trajectory: Trajectory, speeds: Array, accelerations:
 
 
 def _divide_pieces(trajectory: Trajectory, accelerations: Array) -> _Division:
-    """Divide the curve's pieces where the speed changes along them."""
+    """Divide the curve's pieces where the speed along them changes."""
     curve, profile, pieces = trajectory.curve, trajectory.profile, len(trajectory.curve.length)
     after, offset, reached = find_speed_changes(trajectory, accelerations)
     first = np.searchsorted(trajectory.joint_path.segment, np.arange(1, pieces))

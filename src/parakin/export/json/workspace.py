@@ -57,7 +57,7 @@ def _encode_certified(workspace: Workspace) -> dict[str, Any]:
 
 
 def _encode_sampled(workspace: SampledWorkspace) -> dict[str, Any]:
-    """Encode with the keys of a certified one; ``empty`` is null if no place is allowed, for nothing is proved."""
+    """Encode with the keys of a certified workspace; ``empty`` is null if no sample is allowed: nothing is proved."""
     extent: dict[str, Any] = {"box": None, "centroid": None, "bounded_by": []}
     content: dict[str, Any] = {
         "volume": {"inner": None, "estimate": workspace.estimate, "outer": None},

@@ -27,7 +27,7 @@ _COLOURS = (
 
 
 def choose_colours(trajectory: Trajectory) -> dict[str, str]:
-    """Choose a colour for each limit that ever sets the pace, in the order of their shares."""
+    """Choose a colour for each limit that binds anywhere, in the order of their shares."""
     free = chain(_COLOURS, repeat(_REST))
     return {name: _FEED if name == "feed" else next(free) for name in trajectory.shares}
 

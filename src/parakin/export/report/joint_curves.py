@@ -60,7 +60,7 @@ def build_panel(use: RangeUse, heading: str, traces: list[PlotTrace], ticks: str
 
 
 def _build_curve(posted: Posted, use: RangeUse, values: Array, scale: float, most: int) -> list[PlotTrace]:
-    """Build the curve, and over it in red what lies beyond a limit."""
+    """Build the curve, and over it in red the parts beyond a limit."""
     kept = pick_extremes(values, most)
     y, lines = values[kept], posted.path.line[kept].tolist()
     unit = "°" if use.unit == "rad" else f" {use.unit}"
@@ -86,7 +86,7 @@ def _build_curve(posted: Posted, use: RangeUse, values: Array, scale: float, mos
 
 
 def _choose_axis_range(use: RangeUse, scale: float) -> list[float]:
-    """Choose the axis' ends: the range used, and those limits that lie no farther off than its own width."""
+    """Choose the axis' ends: the range used, and the limits no farther from it than its own width."""
     if not isfinite(use.least):
         low, high = (use.low, use.high) if isfinite(use.low) and isfinite(use.high) else (-1.0, 1.0)
     else:

@@ -110,7 +110,7 @@ def _choose_path_points(posted: Posted, tips: Points, relative: Array, most: int
 
 
 def choose_points(values: Sequence[Array], turns: Indices, most: int) -> Indices:
-    """Choose points to draw of a path: every value's extremes, and those around ``turns`` unless too many."""
+    """Choose points of a path to draw: every value's extremes, and those around ``turns`` unless too many."""
     if len(values[0]) <= most:
         return np.arange(len(values[0]))
     parts = [pick_extremes(column, most // len(values)) for column in values]

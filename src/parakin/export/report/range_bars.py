@@ -30,7 +30,7 @@ def render_range_card(posted: Posted, uses: list[RangeUse]) -> str:
 
 
 def _render_bar(posted: Posted, use: RangeUse) -> str:
-    """Render the range used inside the range allowed, in per cent of what both cover."""
+    """Render the used range inside the allowed one, in per cent of both together."""
     ends = [v for v in (use.low, use.high, use.least, use.most) if isfinite(v)]
     if not isfinite(use.low) and use.unit in ("mm", "rad") and isfinite(use.high) and use.high > 0.0:
         ends.append(0.0)  # an angle of a cone, or a distance: what has no lower bound begins at 0

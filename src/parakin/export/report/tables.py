@@ -25,7 +25,7 @@ _READ = 1 << 16  # bytes of one line that are read
 
 
 def read_source_lines(path: ToolPath, wanted: Iterable[int]) -> dict[int, str]:
-    """Read the text of some lines of the source file, as far as it is still there; long lines are cut."""
+    """Read some lines of the source file, if it still exists; long lines are cut."""
     left, lines = set(wanted), {}
     try:
         source = Path(path.source)
@@ -110,7 +110,7 @@ def render_fact_card(posted: Posted) -> str:
 
 
 def sum_programmed_time(path: ToolPath) -> tuple[float, float]:
-    """Sum what the feed motions take at the programmed feeds, s, and the mm of those without a feed."""
+    """Sum the time of the feed motions at the programmed feeds, s, and the length of those without a feed, mm."""
     steps, feed = _measure_steps(path), path.feed[1:]
     seconds = np.full(len(steps), np.nan) if path.seconds is None else path.seconds[1:]
     cut = ~path.rapid[1:]

@@ -57,7 +57,7 @@ def _build_line(
     unit: str,
     scale: float = 1.0,
 ) -> PlotTrace:
-    """Build a curve; with ``shown`` only the parts behind these points, to lie over it, and silent to the mouse."""
+    """Build a curve; with ``shown`` only the parts behind these points, drawn over it without hover texts."""
     at = np.arange(len(curve.times))
     if shown is not None:
         drawn = shown | np.concatenate([[False], shown[:-1]])

@@ -66,7 +66,7 @@ def _join_blocks(blocks: list[ThinnedCurve]) -> ThinnedCurve:
 
 
 def _drop_short_gaps(times: Array, values: Array, shortest: float) -> Indices:
-    """Drop those NaN of a curve that last no longer than ``shortest``, s: they would part the points that are left."""
+    """Drop the NaN of gaps no longer than ``shortest``, s, which would separate the points that are left."""
     gone = np.isnan(values)
     if not gone.any():
         return np.arange(len(values))
@@ -77,7 +77,7 @@ def _drop_short_gaps(times: Array, values: Array, shortest: float) -> Indices:
 
 
 def _sample_blocks(trajectory: Trajectory) -> Iterator[tuple[Array, Indices, Indices, dict[str, Array]]]:
-    """Yield times, what binds, records, and curves by their names, for some pieces at a time."""
+    """Yield times, binding limits, records, and curves by name, for some pieces at a time."""
     profile, joint_path, machine = trajectory.profile, trajectory.joint_path, trajectory.posted.machine
     edges = find_switches(trajectory)
     tip = [i for i, axis in enumerate(machine.axes) if axis in "XYZ"]
@@ -103,7 +103,7 @@ def _sample_blocks(trajectory: Trajectory) -> Iterator[tuple[Array, Indices, Ind
 
 
 def find_switches(trajectory: Trajectory) -> Array:
-    """Find when what binds at one row of the joint path gives way to what binds at the next, (rows - 1,) s."""
+    """Find the times when the binding limit of one row of the joint path gives way to the next row's, (rows - 1,) s."""
     passed = trajectory.profile.row_times
     return 0.5 * (passed[1:] + passed[:-1])
 

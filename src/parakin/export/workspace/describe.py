@@ -30,7 +30,7 @@ _UNITS = {
 
 
 def describe_workspace(workspace: AnyWorkspace) -> str:
-    """Describe what a workspace is of: ``tricept: workspace, constant orientation, B = 0°, C = 0°``."""
+    """Describe the question that a workspace answers: ``tricept: workspace, constant orientation, B = 0°, C = 0°``."""
     method = _METHODS[workspace.method] if isinstance(workspace, SampledWorkspace) else ""
     return f"{workspace.machine.name}: workspace{method}, {describe_region(workspace.region)}"
 
@@ -44,7 +44,7 @@ def describe_size(workspace: AnyWorkspace) -> str:
 
 
 def find_note(workspace: SampledWorkspace) -> str:
-    """Find the note on what a method does not see; empty if it sees all."""
+    """Find the note on what a method can't see; empty if it sees everything."""
     return workspace.note if isinstance(workspace, PolarWorkspace | DriveWorkspace) else ""
 
 
@@ -73,7 +73,7 @@ def format_volume(value: float, dimension: int) -> str:
 
 
 def format_bracket(volume: Volume, dimension: int) -> str:
-    """Format the proved bracket, rounded outward, with digits that tell its ends apart: ``19.84 and 19.97 litres``."""
+    """Format the proved bracket, rounded outward, with enough digits to part its ends: ``19.84 and 19.97 litres``."""
     unit, size = _choose_unit(volume.estimate, dimension)
     gap = (volume.outer - volume.inner) / size
     scale = 10 ** min(9, max(0, 2 - ceil(log10(gap)))) if gap > 0.0 else 1000
@@ -83,5 +83,5 @@ def format_bracket(volume: Volume, dimension: int) -> str:
 
 
 def _choose_unit(value: float, dimension: int) -> tuple[str, float]:
-    """Choose the largest unit of which there is at least one; return its name and its size."""
+    """Choose the largest unit in which the value is at least one; return its name and its size."""
     return next((pair for pair in _UNITS[dimension] if value >= pair[1]), _UNITS[dimension][-1])

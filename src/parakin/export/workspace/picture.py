@@ -43,7 +43,7 @@ def render_plane_png(workspace: AnyWorkspace, field: SampledField, slices: Seque
 def render_curves_png(
     workspace: SampledWorkspace, field: SampledField, groups: Sequence[CurveGroup], slices: Sequence[CrossSection]
 ) -> bytes:
-    """Render what a sweep found as curves; of a workspace in space with its cross-sections beside them."""
+    """Render the curves of a sweep; a workspace in space with its cross-sections beside them."""
     if len(workspace.axes) == 3:
         return _render_png(workspace, (12.0, 6.6), lambda figure: _draw_net(figure, workspace, field, groups, slices))
     return _render_png(workspace, (9.6, 7.2), lambda figure: _draw_flat_net(figure, workspace, groups))

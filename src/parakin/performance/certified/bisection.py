@@ -115,7 +115,7 @@ def invert_middles(matrices: LinearMatrices) -> tuple[Array, Flags]:
 
 
 def bound_inverse_error(product: LinearMatrices, given: LinearMatrices, inverse: Array) -> Array:
-    """Bound how far the product of the middle with its computed inverse may be from 1, entry by entry."""
+    """Bound the error of the computed inverse, entry by entry: how far middle × inverse may be from the identity."""
     n = inverse.shape[1]
     return np.asarray(np.abs(product.middle - np.eye(n)) + _ROUNDING * (np.abs(inverse) @ np.abs(given.middle)))
 

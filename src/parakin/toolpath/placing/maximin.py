@@ -72,7 +72,7 @@ def find_local_maximum(rows: Rows, start: Array, rounds: int = 60, trust: float 
 
 
 class _Worth(NamedTuple):
-    """What all rows make a point worth, and what those that are not flat do."""
+    """The scores of a point: by all rows, and by those that are not flat."""
 
     worth: float
     rest: float

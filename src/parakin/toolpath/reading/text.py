@@ -68,5 +68,5 @@ def parse_number(token: str) -> float:
 
 
 def is_number(token: str) -> bool:
-    """Tell whether :func:`parse_number` can read a token, its size aside."""
+    """Tell whether :func:`parse_number` can read a token, whatever its size."""
     return _NUMBER.fullmatch(token.strip()) is not None

@@ -21,7 +21,7 @@ _ROUGH, _SHORT = 0.6, 2e-3  # the kept fraction of s⃛ below which a step is cu
 def limit_jerk(
     joint_path: JointPath, limits: DriveLimits, x: Array, ceiling: Array
 ) -> tuple[JointPath, SpeedProfile, Indices]:
-    """Limit the jerk of the quickest profile: the joint path, its profile, and what binds it at each row.
+    """Limit the jerk of the quickest profile; return the joint path, its profile, and the limit that binds at each row.
 
     x : (rows,) ṡ² of the quickest profile; ceiling : (steps,) of ṡ²
     """
@@ -76,7 +76,7 @@ def _add_rows(
 def _plan_profile(
     joint_path: JointPath, limits: DriveLimits, x: Array, ceiling: Array, rounds: int = 0
 ) -> tuple[SpeedProfile, Indices, Array]:
-    """Plan a profile: with what binds it at each row, and the least kept fraction of s⃛ on each step."""
+    """Plan a profile; return it, the limit that binds at each row, and the least kept fraction of s⃛ on each step."""
     rows = len(joint_path.segment)
     profile, scratch = SpeedProfile.allocate(2 * rows, rows), _allocate_scratch(rows)
     scratch.x[:] = x

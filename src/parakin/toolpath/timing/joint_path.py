@@ -151,7 +151,7 @@ def _divide_steps(coarse: Indices, step: Array) -> tuple[Indices, Array]:
 
 
 def _widen_flags(flags: Flags) -> Flags:
-    """Flag the neighbours of flagged steps too, as far as a new row disturbs the splines."""
+    """Flag also the neighbours of flagged steps whose splines a new row disturbs."""
     result = flags.copy()
     for by in range(1, _DISTURBED + 1):
         result[by:] |= flags[:-by]

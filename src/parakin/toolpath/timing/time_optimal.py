@@ -93,7 +93,7 @@ def build_uniform_profile(joint_path: JointPath, limits: DriveLimits) -> tuple[S
 def _write_steps(
     joint_path: JointPath, limits: DriveLimits, speed: Array, acceleration: Array, spans: Array
 ) -> tuple[SpeedProfile, Indices]:
-    """Write a profile of one piece for each step, stretched in time by what a limit is exceeded, and what binds it."""
+    """Write a profile of one piece for each step, stretched in time by the excess over a limit; note what binds it."""
     row_times = np.append(0.0, np.cumsum(spans))
     row = np.flatnonzero(joint_path.step > 0.0)
     time, still = np.append(row_times[row], row_times[-1]), np.zeros(len(row))

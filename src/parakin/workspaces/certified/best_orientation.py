@@ -26,7 +26,7 @@ def evaluate_margins(region: Region, positions: Array, orientations: Array, more
 
 
 def find_best_orientations(region: Region, positions: Array, more: Sequence[Constraint] = ()) -> tuple[Array, Array]:
-    """Find the orientation whose least margin is greatest at each position (N, d), by samples ever closer to the best.
+    """Find the orientation of the greatest least margin at each position (N, d), by sampling ever closer to the best.
 
     Each margin is divided by its greatest size. Returns the orientations (N, s) and the margins there.
     """

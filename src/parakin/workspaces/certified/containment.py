@@ -23,7 +23,7 @@ _ULP = 2.3e-16
 
 @dataclass(frozen=True, eq=False)
 class Containment:
-    """What is proved of N boxes of positions.
+    """Results of a proof about N boxes of positions.
 
     proved : (N,) every position of the box is in the region
     limit : (N,) index in ``names`` of a limit that is broken in the box, -1 where none was found
@@ -84,7 +84,7 @@ class _BoxBisection:
         return Containment(self.proved, self.limit, self.positions, self.orientations, self.boxes, names)
 
     def _count_parts(self, box: Indices) -> Flags:
-        """Count parts; returns those of boxes still undecided, of which not too many were examined."""
+        """Count parts; returns those of undecided boxes without too many examined parts."""
         self.boxes += np.bincount(box, minlength=len(self.boxes))
         self.undecided &= self.boxes <= self.most
         return np.asarray(self.undecided[box])

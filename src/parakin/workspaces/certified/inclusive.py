@@ -130,7 +130,7 @@ def _narrow_leaves(leaves: OrientationBoxes, best_at: NDArray[np.int8], spread: 
 
 
 def _find_redundant(count: int, cell: Indices, bounds: LeafBounds) -> Flags:
-    """Find the leaves that add nothing to what one leaf of their cell is proved to hold; ``count`` is of the cells."""
+    """Find the leaves whose allowed part another leaf of their cell is proved to contain; ``count`` is of the cells."""
     witness = np.full(count, -1)
     order = np.argsort(bounds.proved_height, kind="stable")
     order = order[np.isfinite(bounds.proved_height[order])]
@@ -141,7 +141,7 @@ def _find_redundant(count: int, cell: Indices, bounds: LeafBounds) -> Flags:
 
 
 def _merge_leaves(cell: Indices, leaves: CellFractions, planes: Array, inside: Flags) -> CellFractions:
-    """Merge the leaves of each cell: the best one's inner fraction, and no more than all leave together.
+    """Merge the leaves of each cell: the inner fraction of the best leaf, the outer fraction of all together.
 
     cell : (N,) of each leaf; inside : (cells,) where the whole cell is proved inside
     """

@@ -76,7 +76,7 @@ class LinearBounds(NamedTuple):
 
 
 class CellFractions(NamedTuple):
-    """What is found of N cells, as fractions of their volumes.
+    """Bounds and estimates of N cells' allowed parts, as fractions of their volumes.
 
     inner, outer, estimate : (N,) inside at least, at most, and likely
     limit : (N,) index of the constraint that leaves least of the cell, -1 for none
@@ -271,7 +271,7 @@ def bound_linearly(given, every, result, start, stop):
 
 @njit(nogil=True, cache=True)
 def accumulate_cuts(bounds, number, cell, half, cuts, start, stop):
-    """Add what one constraint cuts off every cell.
+    """Add the parts that one constraint cuts off every cell.
 
     bounds : :class:`LinearBounds` over boxes (x, θ); number : the constraint's
     cell : (N,) of each box, sorted; the boxes of one cell are parts of the θ at all of which the margin must be kept
@@ -347,7 +347,7 @@ def keep_tightest_planes(box, bounds, outer, planes):
 
 @njit(nogil=True, cache=True)
 def bound_unions(cell, widest, planes, outer, result):
-    """Bound what the leaves of each cell leave of it together, closely if their planes are nearly parallel.
+    """Bound the union of the leaves of each cell; the bound is close if their planes are nearly parallel.
 
     What is above one leaf's plane is above that of the cell's widest leaf, moved by as much as the two differ within
     the box.
@@ -375,7 +375,7 @@ def bound_unions(cell, widest, planes, outer, result):
 
 @njit(nogil=True, cache=True)
 def find_redundant_leaves(cell, witness, proved_height, planes, result):
-    """Find the leaves that add nothing to what one leaf of their cell, its witness, is proved to hold.
+    """Find the leaves whose allowed part one other leaf of their cell, the witness, is proved to contain.
 
     cell : (N,) of each leaf; witness : (cells,) a leaf, or -1
     proved_height : (N,) height of the parallel to the leaf's plane above which the leaf is proved to hold

@@ -240,7 +240,7 @@ def _refuse_bad_value(axis: str, value: float, turning: Sequence[str]) -> None:
 
 
 def _find_ignored_limits(machine: Machine, patterns: Sequence[str]) -> tuple[str, ...]:
-    """Find the limits that match, but for the legs' reach; a pattern that matches nothing else is refused."""
+    """Find the limits to ignore, without the legs' reach; a pattern that matches nothing else is refused."""
     ignored: list[str] = []
     for pattern in patterns:
         matching = [name for name in machine.limits if fnmatchcase(name, pattern)]

@@ -92,7 +92,7 @@ def make_empty_cells(dimension: int) -> Cells:
 
 @dataclass(frozen=True, eq=False)
 class OrientationBoxes:
-    """What is still to be proved: boxes of orientations [low, high], (N, s) rad, each in a cell.
+    """Boxes of orientations [low, high], (N, s) rad, each in a cell, that are still to be proved.
 
     cell : (N,) index of the cell
     needs : (N, constraints) which constraints, where a list is not one constraint's alone
@@ -108,7 +108,7 @@ class OrientationBoxes:
         return OrientationBoxes(self.cell[which], self.low[which], self.high[which], self.needs[which])
 
     def renumber(self, new: Indices) -> OrientationBoxes:
-        """Give the cells new numbers; the boxes of cells without one (-1) are dropped."""
+        """Renumber the cells; the boxes of cells without a number (-1) are dropped."""
         kept = self.take(new[self.cell] >= 0)
         return replace(kept, cell=new[kept.cell])
 
@@ -160,7 +160,7 @@ def bound_margin(constraint: Constraint, low: Array, size: Array, boxes: Orienta
 
 
 def add_cuts(cuts: PlaneCuts, number: int, cell: Indices, half: Array, bounds: LinearBounds) -> None:
-    """Add what a constraint cuts off cells of half widths (cells, d); ``cell`` is sorted, all its bounds must hold."""
+    """Add the cuts of a constraint to cells of half widths (cells, d); ``cell`` is sorted, all its bounds must hold."""
     run_in_threads(len(cell), lambda start, stop: accumulate_cuts(bounds, number, cell, half, cuts, start, stop))
 
 
@@ -194,7 +194,7 @@ class Subdivision(ABC):
 
     @abstractmethod
     def _examine(self, low: Array, size: Array, boxes: list[OrientationBoxes]) -> tuple[Cells, list[OrientationBoxes]]:
-        """Bound the cells' fractions; cells decided inside are laid aside, those outside are dropped.
+        """Bound the cells' fractions; store the cells that are decided inside and drop those outside.
 
         ``boxes`` is what was not proved of the cells they were cut from.
         """
@@ -202,7 +202,7 @@ class Subdivision(ABC):
     def _sort_out(
         self, low: Array, size: Array, fractions: CellFractions, boxes: list[OrientationBoxes]
     ) -> tuple[Cells, list[OrientationBoxes]]:
-        """Lay aside the cells proved inside and drop those outside; returns the others."""
+        """Store the cells proved inside, drop those outside, and return the others."""
         estimate = np.clip(fractions.estimate, fractions.inner, fractions.outer)
         limit = np.where(fractions.inner >= 1.0, -1, fractions.limit)
         area = fractions.area * size.prod(1)
@@ -215,7 +215,7 @@ class Subdivision(ABC):
         return cells.take(undecided), [part.renumber(new) for part in boxes]
 
     def refine(self, parents: Indices, deadline: float = inf) -> None:
-        """Cut open cells into 2^d parts each, the first ones first, as many as the time allows.
+        """Divide open cells into 2^d parts each, the first ones first, as many as the time allows.
 
         Interrupted, it leaves the cells as they were.
         """

@@ -15,7 +15,7 @@ MOST = 1 << 26  # greatest number of finest cells in the box that holds all cell
 
 
 def find_adjacent_cells(low: Array, size: Array) -> tuple[Indices, Indices]:
-    """Find pairs (m, 2) of cells that share a face, and of those that share at least a point.
+    """Find pairs (m, 2) of cells that share a face, and pairs that share at least a point.
 
     The cells are painted into an image of the finest ones, whose shifts by one are compared.
 

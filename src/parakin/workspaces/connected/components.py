@@ -158,7 +158,7 @@ def _locate_start(region: Region, start: ArrayLike, sides: Mapping[int, Constrai
 
 
 def _find_holder(region: Region, position: Array, sign: int, constraint: Constraint, pairs: list[_Pair]) -> int:
-    """Find the component that holds a position, or that a box proved inside joins to it."""
+    """Find the component that contains a position, or that a box proved inside connects with it."""
     near: list[tuple[float, int, Array, Array]] = []
     for number, (component, cells) in enumerate(pairs):
         if component.sign == sign:

@@ -82,7 +82,7 @@ def find_largest_box(
     around: ArrayLike | None = None,
     tolerance: float | None = None,
 ) -> InscribedBox:
-    """Find a large box inside a region, edges along the axes, by growth from several seeds.
+    """Find a large axis-parallel box inside a region, by growth from several seeds.
 
     The best of them is taken. It is proved by intervals, and none of its faces can be moved outward by more than the
     tolerance; that no other box is larger is not proved.

@@ -75,7 +75,7 @@ class DriveWorkspace(SampledWorkspace):
 
 
 def list_strategies(machine: Machine, running: int) -> list[DriveStrategy]:
-    """List all ways to let so many drives run while each other one stands at a limit."""
+    """List all ways to run ``running`` drives while each other one stands at a limit."""
     strategies = []
     for runs in combinations(machine.joints, running):
         others = [name for name in machine.joints if name not in runs]

@@ -31,7 +31,7 @@ _AT_ONCE, _AT_ONCE_SWEPT = 1 << 24, 1 << 18  # positions of a grid, without and 
 
 @dataclass(frozen=True, eq=False)
 class SampledWorkspace:
-    """A region by samples of its positions.
+    """A region, estimated by samples of its positions.
 
     estimate : of its volume, mm³ (in the plane mm²)
     step : between samples, mm

@@ -24,7 +24,7 @@ _BLANKS = re.compile(r"(?<![\d.])\s+|\s+(?![\d.])", re.ASCII)
 
 
 def remove_blanks(text: str) -> str:
-    """Turn to capitals and remove blanks, but for those between digits: a comma is missing there, and 1 2 is not 12."""
+    """Convert to capitals and remove blanks, except between digits: a comma is missing there, and 1 2 is not 12."""
     return _BLANKS.sub("", text).strip().upper()
 
 

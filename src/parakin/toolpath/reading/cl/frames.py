@@ -28,7 +28,7 @@ class Frame:
         return Frame(self.rotation, self.origin * factor)
 
     def equals(self, other: "Frame") -> bool:
-        """Tell whether both are equal, the last digits of the origin aside."""
+        """Tell whether two frames are equal, except for the last digits of the origin."""
         near = np.abs(self.origin - other.origin) <= 1e-12 * np.maximum(1.0, np.abs(other.origin))
         return np.array_equal(self.rotation, other.rotation) and bool(near.all())
 

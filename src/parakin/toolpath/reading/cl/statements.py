@@ -86,7 +86,7 @@ def _find_meant(name: str) -> str | None:
 
 
 def _is_slip(name: str, word: str) -> bool:
-    """Tell whether two words are one slip of the pen apart."""
+    """Tell whether two words differ by one typing error."""
     shorter, longer = sorted((name, word), key=len)
     if len(longer) - len(shorter) > 1:
         return False

@@ -176,7 +176,7 @@ class GcodeMotion:
         self.here, self.has_jumped = end, False
 
     def _tip_stays(self, end: list[float]) -> bool:
-        """Tell whether X, Y and Z stay; one that is not known does."""
+        """Tell whether a motion leaves X, Y and Z as they are; unknown coordinates count as unchanged."""
         return not any(abs(p - q) > STILL for p, q in zip(self.here[:3], end[:3], strict=True))
 
     # arcs

@@ -83,7 +83,7 @@ class Parameters:
             self._numbered[k + 1] = arguments[k] if k < len(arguments) else 0.0
 
     def leave(self) -> None:
-        """End a subroutine: parameters 1 to 30 are again what they were."""
+        """End a subroutine: restore the caller's parameters 1 to 30."""
         self._local.pop()
         for k, value in enumerate(self._saved.pop(), 1):
             if value is None:

@@ -44,7 +44,7 @@ class GcodeRecords:
         self.fresh = array("d")
 
     def take_columns(self) -> Array:
-        """Return all rows as columns (WIDTH, n) and let go of them."""
+        """Return all rows as columns (WIDTH, n) and release them."""
         self._move_to_columns()
         columns, self._columns = self._columns, []
         return np.concatenate(columns, axis=1)

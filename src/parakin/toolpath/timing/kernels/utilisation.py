@@ -48,7 +48,7 @@ class _PlaceUtilisation(NamedTuple):
 
 @njit(nogil=True, cache=True, error_model="numpy")
 def _measure_places(step, rows, limits, places):
-    """Measure what each place on a step takes of the joints' limits."""
+    """Measure the utilisation of the joints' limits at each place on a step."""
     h, q, bend = rows.step[step], rows.joints, rows.curvature
     greatest, joint, causes = places.greatest, places.joint, places.causes
     greatest[:], joint[:], causes[:] = 0.0, 0, 0.0
@@ -106,7 +106,7 @@ def _write_motion(piece, profile, length, motion):
 
 @njit(nogil=True, cache=True, error_model="numpy")
 def _lower_kept(speed_use, causes, kept):
-    """Lower the kept fractions of ṡ, s̈ and s⃛ by what goes beyond a limit at a place."""
+    """Lower the kept fractions of ṡ, s̈ and s⃛ by the excess over a limit at a place."""
     speed = max(speed_use, np.sqrt(causes[1]), np.cbrt(causes[4]), np.cbrt(causes[3]))
     acceleration = max(causes[0], causes[3] ** (2.0 / 3.0))
     kept[0] = min(kept[0], speed**-_MORE)

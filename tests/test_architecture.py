@@ -228,41 +228,37 @@ def test_columns_of_b_and_c_are_seen(line):
     assert not pole_columns("poses[:, direction.c]; home[:3]; joints[:, 4]; code[i, 4]")
 
 
+# A line for each first letter.
 WORDS = """
-<<<<<<< HEAD
-accept accumulate act add advance align allocate allow announce append apply approach approach assign average begin bind bisect
-blend bore bound box bracket bring build cancel centre certify change check choose clamp clear climb clip close coincide
-collect combine compare compile complete compose compute concatenate confirm continue convert copy correct count cross
-cut decide decode decompose delay derive describe design detect differentiate discard divide draw drill drop ease
-embed enclose encode end estimate evaluate exclude execute exit expand explain explore extend extract factor fail
-fetch fill filter find finish fit fix flag flatten flip fold follow forbid format freeze gather get give go grade
-group grow guess halve hash ignore import insert integrate interpolate interpret intersect invert is isolate iterate
-join judge keep label lay lead leave let limit linearise list load locate lock lower make map march mark match
-maximise measure meet merge minimise move multiply name narrow normalise note number open order paint parse peel pick
-place plan point polish pose post predict prepare print project prove put quote raise rate read recognise reduce
-refine refuse reject release remove rename render repeat replace report repost require reset resolve restore restrict
-return reverse rewind rotate round route run sample save say scale score search select separate set settle share shift
-shorten show shrink skip smooth snap solve sort space split spread square stack stage stamp start stop store stretch
-strip subtract suggest sum summarise swap sweep switch tabulate take tally tell test thin tighten trace transform
-translate transpose trim turn undo unwind update use validate verify wait walk warn weigh widen wrap write yield
-=======
-accept accumulate act add advance align allocate allow announce append apply approach assign average begin bind bisect blend
-bore bound box bracket bring build cancel centre certify change check choose clamp clear climb clip clone close
-coincide collect combine compare compile complete compose compute concatenate confirm continue convert copy correct
-count cross cut decide decode decompose delay derive describe design detect differentiate discard divide draw drill
-drop ease embed enclose encode end erase estimate evaluate exclude execute exit expand explain explore extend extract
-factor fail fetch fill filter find finish fit fix flag flatten flip fold follow forbid format free freeze gather get
-give go grade group grow guess halve hash ignore import insert integrate interpolate interpret intersect invert is
-isolate iterate join judge keep label lay lead leave let limit linearise list load locate lock lower make map march
-mark match maximise measure meet merge minimise move multiply name narrow normalise note number open order paint parse
-peel pick place plan point polish pose post predict prepare print project prove put quote raise rate read rebuild
-recognise record redirect reduce refine refuse reject relate release remove rename render renumber reorder repeat
-replace report repost require reserve reset resize resolve restore restrict retry return reuse reverse rewind rotate
-round route run sample save say scale score search select separate set settle share shift shorten show shrink skip
-smooth snap solve sort space split spread square stack stage stamp start stop store stretch strip subtract suggest sum
-summarise swap sweep switch tabulate take tally tell test thin tighten trace track transform translate transpose trap
-trim turn undo unwind update use validate verify wait walk warn warp weigh widen wrap write yield
->>>>>>> 241d12e (Tests: more verbs)
+accept accumulate act add advance align allocate allow announce append apply approach assign average
+begin bind bisect blend bore bound box bracket bring build
+cancel centre certify change check choose clamp clear climb clip clone close coincide collect combine compare compile
+complete compose compute concatenate confirm continue convert copy correct count cross cut
+decide decode decompose delay derive describe design detect differentiate discard divide draw drill drop
+ease embed enclose encode end erase estimate evaluate exclude execute exit expand explain explore extend extract
+factor fail fetch fill filter find finish fit fix flag flatten flip fold follow forbid format free freeze
+gather get give go grade group grow guess
+halve hash
+ignore import insert integrate interpolate interpret intersect invert is isolate iterate
+join judge
+keep
+label lay lead leave let limit linearise list load locate lock lower
+make map march mark match maximise measure meet merge minimise move multiply
+name narrow normalise note number
+open order
+paint parse peel pick place plan point polish pose post predict prepare print project prove put
+quote
+raise rate read rebuild recognise record redirect reduce refine refuse reject relate release remove rename render
+renumber reorder repeat replace report repost require reserve reset resize resolve restore restrict retry return reuse
+reverse rewind rotate round route run
+sample save say scale score search select separate set settle share shift shorten show shrink skip smooth snap solve
+sort space split spread square stack stage stamp start stop store stretch strip subtract suggest sum summarise swap
+sweep switch
+tabulate take tally tell test thin tighten trace track transform translate transpose trap trim turn
+undo unwind update use
+validate verify
+wait walk warn warp weigh widen wrap write
+yield
 """
 VERBS = set(WORDS.split())
 # Questions with yes or no for an answer begin with a verb in the third person.

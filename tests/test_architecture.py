@@ -16,6 +16,7 @@ ROOT = Path(parakin.__file__).parent
 FLOORS = [
     ["errors", "arrays", "version"],
     ["units", "algebra"],
+    ["arguments"],
     ["kernels"],
     ["model"],
     ["kinematics", "description"],

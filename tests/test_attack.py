@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import resource
 import signal
 import subprocess
 import sys
@@ -273,3 +274,18 @@ def test_an_axis_of_place_is_one_letter(tmp_path, capsys, text):
     path.write_text("UNITS/MM\nFEDRAT/3000\nGOTO/0,0,-1600\nGOTO/10,0,-1600\n")
     assert main(["post", str(path), "-m", "tricept", "--place", text]) == 2
     assert is_one_line(capsys.readouterr().err)
+
+
+# Slow motions.
+
+
+def test_a_very_slow_program_takes_little_memory(tmp_path):
+    """5,000 minutes at 0.0001 mm/min: a sample of its speed each millisecond would fill the memory."""
+    path = tmp_path / "a.cls"
+    path.write_text("UNITS/MM\nFEDRAT/0.0001,MMPM\nGOTO/0,0,0\nGOTO/0.25,0,0\nGOTO/0.5,0,0\nFINI\n")
+    job = pk.prepare(pk.load("tricept"), pk.read_path(path), workpiece=pk.workpiece(Z=-1400))
+    assert job.seconds > 100_000
+    before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    (program,) = pk.write_files(tmp_path, {"a.ngc": pk.make_linuxcnc_program(job.trajectory)})
+    assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before < 200_000  # kB
+    assert len(program.read_text().splitlines()) < 1000

@@ -75,7 +75,7 @@ def test_any_numbers_in_any_order_give_the_same(m):
 def no_rows(n):
     """What is no batch of rows of n numbers."""
     row = [0.0] * n
-    yield from (None, "", "x", 1.0, [], [[]], {}, {"X": 1.0}, object(), [1.0, "a"], [[1.0, 2.0], [1.0]], b"12345")
+    yield from (None, "", "x", 1.0, [], [[]], {}, {"Q": 1.0}, object(), [1.0, "a"], [[1.0, 2.0], [1.0]], b"12345")
     yield from ([["1"] * n], [row, [*row, 0.0]], [10**400, *row[1:]], [*row[1:], None])
     yield from (np.zeros((1, n), dtype=complex), np.array([["a"] * n]), np.array([object()] * n), np.zeros((n, n + 1)))
     yield from (np.array(["1"] * n, dtype=object), np.zeros(n, dtype="M8[s]"))

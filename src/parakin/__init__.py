@@ -111,6 +111,10 @@ def load(name: str | PathLike[str], parameters: Mapping[str, float | str] | None
 
     Raises :class:`InputError` with file and line for a file that describes no machine that works.
     """
+    if not isinstance(name, (str, PathLike)):
+        raise InputError(f"name: a text or a path expected, not a {type(name).__name__}")
+    if parameters is not None and not (isinstance(parameters, Mapping) and all(isinstance(k, str) for k in parameters)):
+        raise InputError(f"parameters: a dict by names expected, not a {type(parameters).__name__}")
     from .description import find_key_line, find_machine_file, read_machine
     from .machine import Machine
 
@@ -168,6 +172,10 @@ _LAZY = {
     "workspace": "workspaces.certified.workspace",
     "write_files": "export.files",
 }
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)
 
 
 def __getattr__(name: str) -> object:

@@ -11,6 +11,9 @@ from difflib import get_close_matches
 class ParakinError(Exception):
     """Anything parakin refuses; ``str()`` is one line fit for a terminal."""
 
+    def __init__(self, *arguments: object):
+        super().__init__(*(make_printable(part) if isinstance(part, str) else part for part in arguments))
+
 
 class InputError(ParakinError):
     """Malformed input.

@@ -6,13 +6,12 @@ import warnings
 from collections.abc import Sequence
 from functools import cached_property
 from itertools import product
-from numbers import Real
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from .algebra import Scalar
+from .arguments import RowsLike, bound_angles, describe_value, read_rows, warn_of_wide_angles
 from .arrays import Array, Span
 from .errors import DescriptionError, NoMethodError, PoseError, SingularHomeWarning
 from .kernels.batch import evaluate_tape, evaluate_tape_with_residual, find_first_negative
@@ -177,25 +176,34 @@ class Machine:
 
     # Input at the boundary.
 
-    def rows(self, values: ArrayLike, names: tuple[str, ...], what: str) -> tuple[Array, tuple[int, ...]]:
-        """Check ``values`` and return them as C-ordered float64 rows (N, names), with their leading shape."""
-        try:
-            array = np.asarray(values)
-            if array.dtype.kind == "O" and all(isinstance(v, Real) for v in array.flat):
-                array = array.astype(np.float64)
-            if array.dtype.kind not in "biuf":
-                raise PoseError(f"{what}: numbers expected, not {array.dtype}")
-            array = array.astype(np.float64, copy=False)
-        except (ValueError, TypeError, OverflowError) as error:
-            raise PoseError(f"{what}: rows of numbers expected ({error})") from None
-        if array.ndim == 0 or array.shape[-1] != len(names):
-            raise PoseError(f"{what}: shape (..., {len(names)}) for {' '.join(names)} expected, not {array.shape}")
-        return np.ascontiguousarray(array.reshape(-1, len(names))), array.shape[:-1]
+    def rows(self, values: RowsLike, names: tuple[str, ...], what: str) -> tuple[Array, tuple[int, ...]]:
+        """Check ``values`` and return them as C-ordered float64 rows (N, names), with their leading shape.
+
+        Texts carry their unit, ``"30 deg"``; a dict has values by name, the rest is home's.
+        """
+        of_pose = names == self.axes
+        units = self.axis_units if of_pose else self.joint_units
+
+        def make_rest() -> Array:
+            return self.home if of_pose else self.inverse(self.home)
+
+        array = read_rows(values, names, units, make_rest, what)
+        rows = np.ascontiguousarray(array.reshape(-1, len(names)))
+        warn_of_wide_angles(values, rows, names, self._greatest_angles[0 if of_pose else 1], what)
+        return rows, array.shape[:-1]
+
+    @cached_property
+    def _greatest_angles(self) -> tuple[Array, Array]:
+        """Bounds (axes,) of a pose and (joints,) of joints, beyond which a number may be meant in degrees."""
+        reach = [max(abs(drive.low), abs(drive.high)) for drive in self.drives]
+        return bound_angles(self.axis_units, [0.0] * len(self.axes)), bound_angles(self.joint_units, reach)
 
     def checked_mode(self, mode: str | None) -> str:
         """Check a working mode and return it, the default one for None; an invalid one raises :class:`PoseError`."""
         if mode is None:
             return self.mode
+        if not isinstance(mode, str):
+            raise PoseError(f"mode: a text such as {self.mode!r} expected, not {describe_value(mode)}")
         if mode not in self.modes:
             raise PoseError(f"mode {mode!r}: one of {', '.join(repr(m) for m in self.modes[:8])} expected")
         return mode
@@ -209,7 +217,7 @@ class Machine:
 
     # Kinematics.
 
-    def inverse(self, poses: ArrayLike, mode: str | None = None, out: Array | None = None) -> Array:
+    def inverse(self, poses: RowsLike, mode: str | None = None, out: Array | None = None) -> Array:
         """Compute joints for poses, (..., axes) -> (..., joints); a row of NaN where the legs can't close.
 
         Parameters
@@ -231,7 +239,7 @@ class Machine:
             result[...] = solve_inverse(self.model, rows, mode).reshape(shape)
         return result
 
-    def follow(self, poses: ArrayLike, mode: str | None = None, free_below: float = EXACT) -> Array:
+    def follow(self, poses: RowsLike, mode: str | None = None, free_below: float = EXACT) -> Array:
         """Compute joints along a path, (N, axes) -> (N, joints), continuous: angles unwound, free ones as before.
 
         A turning joint that is free (the tool's axis within ``free_below`` rad of it) takes its value from the last
@@ -246,8 +254,8 @@ class Machine:
 
     def forward(
         self,
-        joints: ArrayLike,
-        near: ArrayLike | None = None,
+        joints: RowsLike,
+        near: RowsLike | None = None,
         method: str | None = None,
         mode: str | None = None,
     ) -> Solution:
@@ -264,6 +272,8 @@ class Machine:
             machine's, but where a near pose tells by its own joints that the legs stand in another one
         """
         rows, lead = self.rows(joints, self.joints, "joints")
+        if not isinstance(method, str | None):
+            raise PoseError(f"method: a text expected, not {describe_value(method)}")
         starts = None if near is None else self._starts(near, lead)
         solution = solve_forward(self.model, rows, starts, method, None if mode is None else self.checked_mode(mode))
         return Solution(
@@ -274,7 +284,7 @@ class Machine:
             solution.why.reshape(lead)[()],
         )
 
-    def _starts(self, near: ArrayLike, lead: tuple[int, ...]) -> Array:
+    def _starts(self, near: RowsLike, lead: tuple[int, ...]) -> Array:
         """Return poses to start from as rows, as many as there are joint vectors."""
         rows, own_lead = self.rows(near, self.axes, "near")
         if own_lead == lead:
@@ -282,10 +292,12 @@ class Machine:
         try:
             wide = np.broadcast_to(rows.reshape(*own_lead, len(self.axes)), (*lead, len(self.axes)))
         except ValueError:
-            raise PoseError(f"near: shape {(*lead, len(self.axes))} expected, not {np.shape(near)}") from None
+            raise PoseError(
+                f"near: shape {(*lead, len(self.axes))} expected, not {(*own_lead, len(self.axes))}"
+            ) from None
         return np.ascontiguousarray(wide.reshape(-1, len(self.axes)))
 
-    def assemblies(self, joints: ArrayLike) -> Array:
+    def assemblies(self, joints: RowsLike) -> Array:
         """Find every real pose of one joint vector, (k, axes); see :func:`~.kinematics.assemblies.find_assemblies`."""
         rows, lead = self.rows(joints, self.joints, "joints")
         if lead != ():
@@ -328,7 +340,7 @@ class Machine:
         """Compile the kinematics in a working mode for other interpreters, such as the C of a controller."""
         return collect_tapes(self.model, mode)
 
-    def jacobians(self, poses: ArrayLike, mode: str | None = None) -> tuple[Array, Array]:
+    def jacobians(self, poses: RowsLike, mode: str | None = None) -> tuple[Array, Array]:
         """Compute A and B, each (..., n, n), with A x' = B q' for the rates of pose and joints.
 
         Rows of legs are their closures' derivatives (a rod's vector, mm); the last two rows of a machine with driven
@@ -377,13 +389,13 @@ class Machine:
 
     # Limits.
 
-    def _joints_of(self, joints: ArrayLike, count: int) -> Array:
+    def _joints_of(self, joints: RowsLike, count: int) -> Array:
         rows = self.rows(joints, self.joints, "joints")[0]
         if len(rows) != count:
             raise PoseError(f"joints: {count} rows expected, as many as poses, not {len(rows)}")
         return rows
 
-    def margins(self, poses: ArrayLike, joints: ArrayLike | None = None, mode: str | None = None) -> Array:
+    def margins(self, poses: RowsLike, joints: RowsLike | None = None, mode: str | None = None) -> Array:
         """Compute every limit's margin, (..., limits), ≥ 0 where it holds; units as in :attr:`limit_parts`.
 
         ``joints`` may give those that a path really takes (turns counted, free angles held), else they are the
@@ -405,7 +417,7 @@ class Machine:
                 out[lost & (out >= 0.0).all(1), :1] = np.nan
         return out.reshape(*lead, count)
 
-    def check(self, poses: ArrayLike, joints: ArrayLike | None = None, mode: str | None = None) -> Any:
+    def check(self, poses: RowsLike, joints: RowsLike | None = None, mode: str | None = None) -> Any:
         """Return 0 where a pose is allowed, else 1 + the index in :attr:`limits` of the first one broken, (...,) int.
 
         A pose that is not a number breaks the first limit. ``joints`` as in :meth:`margins`.

@@ -12,6 +12,7 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import BinaryIO
 
+from ..arguments import check_arguments
 from ..arrays import Writer
 from ..errors import InputError, quote
 
@@ -27,6 +28,7 @@ _TRIES = 3  # attempts to make such a folder and lock it before another process 
 _SIGNALS = (signal.SIGINT, signal.SIGTERM)
 
 
+@check_arguments
 def write_files(folder: str | os.PathLike[str], files: Mapping[str, Content]) -> list[Path]:
     """Write files into a folder, which is made if it is missing; return their paths.
 

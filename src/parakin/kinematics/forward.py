@@ -56,6 +56,9 @@ class Solution:
     steps: Any
     why: Any
 
+    def __repr__(self) -> str:
+        return f"<parakin solution: {np.count_nonzero(self.converged)} of {np.size(self.converged)} poses found>"
+
 
 def solve_forward(
     model: Model, joints: Array, starts: Array | None, method: str | None = None, mode: str | None = None

@@ -37,3 +37,6 @@ class Spec:
         legs = [leg.drives[i] for i in range(most) for leg in self.legs if i < len(leg.drives)]
         serial = [step.drive for step in (*self.head, *self.table) if step.drive is not None]
         return (*legs, *serial)
+
+    def __repr__(self) -> str:
+        return f"<parakin description of {self.name}: {len(self.legs)} legs>"

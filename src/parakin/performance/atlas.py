@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from ..arguments import check_arguments
 from ..arrays import Array, Flags, Progress
 from ..errors import PoseError
 from ..machine import Machine
@@ -54,6 +55,12 @@ class PerformanceMap:
         """Of the allowed positions alone, (N,)."""
         return _change_columns(self.performance, lambda column: column[self.allowed])
 
+    def __repr__(self) -> str:
+        return (
+            f"<parakin map of {self.region.machine.name}: "
+            f"{' x '.join(map(str, self.allowed.shape))} positions, {self.step:.6g} mm apart>"
+        )
+
 
 @dataclass(frozen=True, eq=False)
 class Atlas:
@@ -96,7 +103,14 @@ class Atlas:
             off = np.maximum(off, np.abs(self.isotropic[:, self.machine.axes.index(axis)] - value))
         return self.isotropic[off < _ON * drawn.step]
 
+    def __repr__(self) -> str:
+        return (
+            f"<parakin atlas of {self.machine.name}: "
+            f"{len(self.map.inside.poses)} positions, {len(self.extremes)} extremes>"
+        )
 
+
+@check_arguments
 def atlas(
     region: Region,
     step: float | None = None,

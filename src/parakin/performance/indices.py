@@ -65,6 +65,9 @@ class Performance:
         """Force amplification along ``directions``: 1/psi, (..., n)."""
         return _divide_quietly(np.ones_like(self.psi), self.psi)
 
+    def __repr__(self) -> str:
+        return f"<parakin performance of {self.machine.name}: poses {self.poses.shape}>"
+
 
 def _divide_quietly(x: Array, y: Array) -> Array:
     with np.errstate(divide="ignore", invalid="ignore"):

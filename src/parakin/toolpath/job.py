@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from math import isfinite
 from typing import NamedTuple
 
+from ..arguments import check_arguments, check_positive
 from ..arrays import Array, Progress
 from ..errors import PoseError
 from ..machine import Machine
@@ -68,7 +69,13 @@ class Job:
         """The cycle time, None where there is no trajectory."""
         return None if self.trajectory is None else self.trajectory.seconds + self.waits
 
+    def __repr__(self) -> str:
+        time = "no time" if self.seconds is None else f"{self.seconds:.6g} s"
+        state = "off limits" if self.posted.first is not None else time
+        return f"<parakin job on {self.posted.machine.name}: {len(self.posted.path)} records, {state}>"
 
+
+@check_arguments
 def prepare(
     machine: Machine,
     path: ToolPath,
@@ -94,6 +101,8 @@ def prepare(
     Raises :class:`PoseError` or :class:`InputError` for invalid arguments. What the machine can't do raises nothing: it
     is an offence of :attr:`Job.posted` or the reason in :attr:`Job.unplanned`.
     """
+    for name, value, unit in zip(tolerances._fields, tolerances, ("mm", "rad"), strict=True):
+        check_positive(f"tolerances.{name}", value, unit)
     report = progress or (lambda fraction: None)
 
     def report_part(begin: float, end: float) -> Progress:

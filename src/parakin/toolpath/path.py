@@ -4,6 +4,7 @@ from dataclasses import dataclass, field
 from typing import Literal, NamedTuple
 
 from ..arrays import Array, Flags, Indices
+from ..errors import quote
 
 
 class Event(NamedTuple):
@@ -65,3 +66,6 @@ class ToolPath:
 
     def __len__(self) -> int:
         return len(self.line)
+
+    def __repr__(self) -> str:
+        return f"<parakin tool path {quote(self.source)}: {len(self)} records, {self.dialect}>"

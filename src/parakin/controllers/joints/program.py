@@ -8,6 +8,7 @@ from typing import BinaryIO
 
 import numpy as np
 
+from ...arguments import check_arguments
 from ...arrays import Writer
 from ...errors import PoseError
 from ...machine import Machine
@@ -38,6 +39,7 @@ def assign_joint_letters(machine: Machine) -> tuple[str, ...]:
     return tuple(letters)
 
 
+@check_arguments
 def make_joint_program(trajectory: Trajectory, *, forced: str | None = None) -> Writer:
     """Make the writer of a trajectory as a program in joint space, in mm, degrees and inverse time (G93).
 

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from ...arguments import check_arguments
 from ...arrays import Array, Indices
 from ...errors import InputError
 from ...toolpath.reading.gcode.block import VALUES, Block, parse_block
@@ -35,7 +36,13 @@ class JointProgram:
     seconds: Array
     line: Indices
 
+    def __repr__(self) -> str:
+        return (
+            f"<parakin joint program: {len(self.line)} motions of {' '.join(self.letters)}, {self.seconds.sum():.6g} s>"
+        )
 
+
+@check_arguments
 def read_joint_program(path: str | os.PathLike[str]) -> JointProgram:
     """Read what :func:`.make_joint_program` writes: G1 in G21, G90 and G93, each with a value for every joint.
 

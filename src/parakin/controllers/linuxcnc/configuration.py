@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from ...arguments import check_arguments
 from ...machine import Machine
 from .config import write_hal, write_ini, write_tool_table
 from .first_program import write_first_program
@@ -10,6 +11,7 @@ from .page import write_page
 from .stamp import stamp_file
 
 
+@check_arguments
 def make_linuxcnc_configuration(machine: Machine) -> dict[str, str]:
     """Make a configuration for LinuxCNC 2.9 that runs as a simulation: {file: text}.
 

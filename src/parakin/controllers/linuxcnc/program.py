@@ -8,6 +8,7 @@ from typing import BinaryIO
 
 import numpy as np
 
+from ...arguments import check_arguments
 from ...arrays import Array, Writer
 from ...errors import PoseError
 from ...kinematics.wrist import get_leg_signs
@@ -26,6 +27,7 @@ _INSTANT = 0.002  # s
 _TURNING = 0.4  # fraction of the tolerance where two motions turn the tool: LinuxCNC blends them less well
 
 
+@check_arguments
 def make_linuxcnc_program(trajectory: Trajectory, *, forced: str | None = None, tolerance: float = 0.005) -> Writer:
     """Make the writer of a trajectory as a program for LinuxCNC 2.9 with :func:`parakin.make_linuxcnc_configuration`.
 
@@ -58,6 +60,7 @@ def make_linuxcnc_program(trajectory: Trajectory, *, forced: str | None = None, 
     return write
 
 
+@check_arguments
 def predict_linuxcnc_seconds(trajectory: Trajectory) -> float:
     """Predict LinuxCNC's time for a program from the first record on, s: the trajectory's time and more."""
     motions = build_straight_motions(trajectory, *choose_axis_rates(trajectory.posted.machine))

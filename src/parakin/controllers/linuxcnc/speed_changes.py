@@ -10,6 +10,7 @@ from ...toolpath.timing.trajectory import Trajectory
 _STEP = 0.05  # of a motion's greatest speed: the trajectory's speed changes by as much within a part of it
 _SHORTEST = 0.008  # s: no part takes less
 _SAMPLING = 0.001  # s, between the samples of the trajectory's speed
+_MOST_SAMPLES = 100_000  # of a piece at that distance; a step of a longer one has a hundredth of them at most
 
 
 def find_speed_changes(trajectory: Trajectory, accelerations: Array) -> tuple[Indices, Array, Array]:
@@ -28,7 +29,7 @@ def find_speed_changes(trajectory: Trajectory, accelerations: Array) -> tuple[In
     divisions = list[tuple[int, float, float]]()
     for piece in np.flatnonzero(varied).tolist():
         begin, end = times[piece], times[piece + 1]
-        samples = np.linspace(begin, end, int((end - begin) / _SAMPLING) + 2)[1:-1]
+        samples = _sample_times(begin, end, profile.time)
         step = np.clip(np.searchsorted(profile.time, samples, "right") - 1, 0, len(profile.row) - 1)
         t = samples - profile.time[step]
         speed = profile.speed[step] + t * (profile.acceleration[step] + 0.5 * t * profile.jerk[step])
@@ -38,6 +39,20 @@ def find_speed_changes(trajectory: Trajectory, accelerations: Array) -> tuple[In
         divisions += [(piece, offset[i], samples[i]) for i in chosen]
     table = np.array(divisions).reshape(-1, 3)
     return table[:, 0].astype(np.int64), table[:, 1], table[:, 2]
+
+
+def _sample_times(begin: float, end: float, knots: Array) -> Array:
+    """Sample a piece evenly, or a long one by each of its steps, which stand between the knots, (samples,) s."""
+    count = int((end - begin) / _SAMPLING)
+    if count <= _MOST_SAMPLES:
+        return np.linspace(begin, end, count + 2)[1:-1]
+    first, last = np.searchsorted(knots, [begin, end])
+    ends = np.unique(np.concatenate([[begin], knots[first:last], [end]]))
+    spans = np.diff(ends)
+    counts = np.clip(spans / _SAMPLING, 1, _MOST_SAMPLES // 100).astype(np.int64)
+    within = np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts)
+    times: Array = (np.repeat(ends[:-1], counts) + np.repeat(spans / counts, counts) * within)[1:]
+    return times
 
 
 def _measure_speeds(trajectory: Trajectory, first: Indices) -> tuple[Array, Array]:

@@ -7,8 +7,8 @@ from io import BytesIO
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 
+from ...arguments import RowsLike, check_arguments
 from ...machine import Machine
 from ..number_format import format_value
 from .figures import (
@@ -26,7 +26,8 @@ from .solids import LOOKS, build_solids
 _LIGHT = np.array([0.35, -0.65, 0.70]) / np.linalg.norm([0.35, -0.65, 0.70])
 
 
-def render_machine_html(machine: Machine, pose: ArrayLike | None = None) -> str:
+@check_arguments
+def render_machine_html(machine: Machine, pose: RowsLike | None = None) -> str:
     """Render a self-contained HTML page with the machine at a pose, (axes,) mm and rad, home by default."""
     drawn = build_scene(machine, pose)
     size = drawn.size
@@ -58,7 +59,8 @@ def render_machine_html(machine: Machine, pose: ArrayLike | None = None) -> str:
     return render_page(machine.spec.title or machine.name, body)
 
 
-def render_machine_png(machine: Machine, pose: ArrayLike | None = None) -> bytes:
+@check_arguments
+def render_machine_png(machine: Machine, pose: RowsLike | None = None) -> bytes:
     """Render a PNG of the machine at a pose, (axes,) mm and rad, home by default; a planar machine in its plane."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure

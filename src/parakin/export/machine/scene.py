@@ -14,6 +14,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ...arguments import RowsLike
 from ...machine import Machine
 from ...model.chain import UNIT, compose_chain
 from ...model.legs import Leg
@@ -75,7 +76,7 @@ class Scene:
 
 
 def build_scene(
-    machine: Machine, pose: ArrayLike | None = None, joints: ArrayLike | None = None, mode: str | None = None
+    machine: Machine, pose: RowsLike | None = None, joints: ArrayLike | None = None, mode: str | None = None
 ) -> Scene:
     """Build the scene of a machine at a pose, home by default.
 

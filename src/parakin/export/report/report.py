@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from html import escape
+from math import inf
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ...arguments import check_arguments
+from ...errors import PoseError
 from ...toolpath.posting.offence_texts import describe_place
 from ...toolpath.posting.range_use import RangeUse, measure_range_use
 from ..machine.figures import embed_figure, render_page
@@ -24,12 +27,15 @@ if TYPE_CHECKING:
     from ...toolpath.timing import Trajectory
 
 
+@check_arguments
 def render_report(posted: Posted, trajectory: Trajectory | None = None, unplanned: str = "", waits: float = 0.0) -> str:
     """Render the report as one HTML document: verdict, ranges, path, curves, time, offences, notes, facts.
 
     ``unplanned`` says why there is no trajectory, ``waits`` how long (s) the program waits besides it. Whatever the
     length of the path the document stays below some 8 MB: of every stretch the extremes are drawn.
     """
+    if not 0.0 <= waits < inf:
+        raise PoseError(f"waits: a time of 0 s or more expected, not {waits:g}")
     path, machine = posted.path, posted.machine
     name = Path(path.source).name or path.source
     title = f"{name} on {machine.spec.title or machine.name}"

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ...arguments import check_arguments
 from ...arrays import Array, Indices
 from ...errors import PoseError
 from ...workspaces.sampled.distance_field import SampledField
@@ -28,7 +29,11 @@ class Mesh:
         a, b, c = np.moveaxis(self.vertices[self.faces] - self.vertices.mean(0), 1, 0)
         return float((np.cross(a, b) * c).sum() / 6.0)
 
+    def __repr__(self) -> str:
+        return f"<parakin mesh: {len(self.vertices)} vertices, {len(self.faces)} triangles, {self.volume:.6g} mm³>"
 
+
+@check_arguments
 def make_mesh(field: SampledField) -> Mesh:
     """Make the surface where a field in space is 0, by marching cubes.
 

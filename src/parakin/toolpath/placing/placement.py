@@ -3,21 +3,22 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TypeAlias
 
 import numpy as np
 
+from ...arguments import check_arguments, parse_span
 from ...arrays import Array, Progress, Span
-from ...errors import PoseError
+from ...errors import PoseError, quote
 from ...machine import Machine
 from ..path import ToolPath
 from ..posting.working_mode import list_candidate_modes
 from .margins import AXES, PlacementMargins
 from .placement_search import PlacementSearch
 
-AxisRanges: TypeAlias = Mapping[str, Span]
+AxisRanges: TypeAlias = Mapping[str, Span | Sequence[float | str]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,7 +48,14 @@ class Placement:
         """Whether the machine can follow the whole path there."""
         return self.margin >= 0.0
 
+    def __repr__(self) -> str:
+        values = ", ".join(f"{axis} {value:.6g}" for axis, value in self.values.items())
+        return (
+            f"<parakin placement: {values or 'no axis free'} (mm, rad), mode {self.mode!r}, margin {self.margin:.4g}>"
+        )
 
+
+@check_arguments
 def find_placement(
     machine: Machine, path: ToolPath, bounds: AxisRanges, *, mode: str | None = None, progress: Progress | None = None
 ) -> Placement:
@@ -56,7 +64,7 @@ def find_placement(
     Parameters
     ----------
     machine, path : as :func:`~..posting.post.post_path` takes them
-    bounds : by axis (X Y Z mm, A B C rad) the least and the greatest value
+    bounds : by axis the least and the greatest value, mm and rad or texts with their unit
     mode : working mode; None: the default one, and head and table's other sign where that allows no placement
     progress : called now and then with the fraction done, 0 to 1
 
@@ -65,15 +73,19 @@ def find_placement(
 
     Raises :class:`PoseError` for invalid bounds, an unknown mode and a path without records.
     """
-    for axis, (low, high) in bounds.items():
-        if axis not in AXES or not -math.inf < low <= high < math.inf:
+    for axis in bounds:
+        if axis not in tuple(AXES):
+            raise PoseError(f"bounds: unknown axis {quote(axis)}, an axis of X Y Z A B C and low <= high expected")
+    spans = {axis: parse_span(axis, span, "mm" if axis in "XYZ" else "rad") for axis, span in bounds.items()}
+    for axis, (low, high) in spans.items():
+        if not -math.inf < low <= high < math.inf:
             raise PoseError(f"bounds: {axis} from {low} to {high}; an axis of X Y Z A B C and low <= high expected")
     if not len(path):
         raise PoseError("path: no records to place")
     report = progress or (lambda fraction: None)
-    axes = tuple(axis for axis in AXES if axis in bounds and bounds[axis][0] < bounds[axis][1])
-    fixed = {axis: ends[0] for axis, ends in bounds.items() if axis not in axes}
-    low_high = np.array([bounds[axis] for axis in axes]).reshape(-1, 2)
+    axes = tuple(axis for axis in AXES if axis in spans and spans[axis][0] < spans[axis][1])
+    fixed = {axis: ends[0] for axis, ends in spans.items() if axis not in axes}
+    low_high = np.array([spans[axis] for axis in axes]).reshape(-1, 2)
     results, tried = [], 0
     for candidate in list_candidate_modes(machine, mode):
         margins = PlacementMargins(machine, path, candidate, axes, low_high[:, 0], low_high[:, 1], fixed)

@@ -8,7 +8,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ...arguments import check_arguments, parse_coordinate
 from ...arrays import Array, Flags, split_rows
+from ...errors import PoseError
 from ...kinematics.rotations import compute_rotations, list_rotation_rows
 from ...machine import Machine
 from .programmed_angles import find_programmed_angles
@@ -19,16 +21,24 @@ LEAN = 1e-4  # rad a tool axis may lean where the machine can't tilt it: roundin
 OFF_PLANE = 1e-6  # mm, the same across the plane of a machine that works in one
 
 
+@check_arguments
 def workpiece(
-    X: float = 0.0,
-    Y: float = 0.0,
-    Z: float = 0.0,
-    A: float = 0.0,
-    B: float = 0.0,
-    C: float = 0.0,
+    X: float | str = 0.0,
+    Y: float | str = 0.0,
+    Z: float | str = 0.0,
+    A: float | str = 0.0,
+    B: float | str = 0.0,
+    C: float | str = 0.0,
 ) -> Array:
-    """Build the transform that places a workpiece, (3, 4): R = Rz(C)·Ry(B)·Rx(A) and the origin; mm, rad."""
-    return build_frame_from_angles(X, Y, Z, A, B, C)
+    """Build the transform that places a workpiece, (3, 4): R = Rz(C)·Ry(B)·Rx(A) and the origin.
+
+    Numbers are mm and rad; texts carry their unit, ``B="30 deg"``.
+    """
+    values = {"X": X, "Y": Y, "Z": Z, "A": A, "B": B, "C": C}
+    numbers = [parse_coordinate(axis, value, "mm" if axis in "XYZ" else "rad") for axis, value in values.items()]
+    if not all(map(math.isfinite, numbers)):
+        raise PoseError(f"workpiece: finite numbers expected, not {' '.join(f'{number:g}' for number in numbers)}")
+    return build_frame_from_angles(*numbers)
 
 
 def build_frame_from_angles(x: float, y: float, z: float, a: float, b: float, c: float) -> Array:

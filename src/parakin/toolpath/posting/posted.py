@@ -88,3 +88,7 @@ class Posted:
     def broken_motion_count(self) -> int:
         """How many motions break a limit that the records at both their ends keep."""
         return 0 if self.broken_motions is None else int(np.count_nonzero(self.broken_motions))
+
+    def __repr__(self) -> str:
+        broken = len(self.offences)
+        return f"<parakin posted path on {self.machine.name}: {len(self.path)} records, {broken} limits broken>"

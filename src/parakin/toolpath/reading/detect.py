@@ -5,6 +5,7 @@ import re
 from pathlib import PurePath
 from typing import Literal
 
+from ...arguments import check_arguments
 from ...arrays import Array, Progress
 from ...errors import InputError
 from ..path import ToolPath
@@ -24,6 +25,7 @@ _CL = re.compile(
 _GCODE = re.compile(rb"\s*(?:[%(;]|/?\s*[A-Z]\s*[-+]?\s*\.?\d)", re.IGNORECASE)
 
 
+@check_arguments
 def read_path(
     path: str | os.PathLike[str],
     *,

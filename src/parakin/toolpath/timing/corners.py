@@ -58,6 +58,9 @@ class Curve(NamedTuple):
         run_in_threads(len(segment), lambda start, stop: blend_poses(self, segment, offset, poses, start, stop))
         return poses
 
+    def __repr__(self) -> str:
+        return f"<parakin curve: {len(self.length)} pieces, {self.length.sum():.6g} mm>"
+
 
 def round_corners(
     posted: Posted, corners: Corners, tolerance: float, axis_tolerance: float, stops: Flags, smooth: bool

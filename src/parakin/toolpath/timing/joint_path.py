@@ -95,6 +95,9 @@ class JointPath:
         blur = np.ones(len(row)) if machine.wrist is None else machine.wrist.measure_blur(poses)
         return find_nearest_joints(machine, self.posted.mode, poses, splined), splined, blur
 
+    def __repr__(self) -> str:
+        return f"<parakin joint path: {len(self.segment)} rows>"
+
 
 def build_joint_path(
     posted: Posted, curve: Curve, limits: DriveLimits, tolerance: float, axis_tolerance: float

@@ -55,3 +55,6 @@ class SpeedProfile(NamedTuple):
         v, a, e = self.speed[piece], self.acceleration[piece], self.jerk[piece]
         shift = self.shift[piece] + t * (v + t * (0.5 * a + t * e / 6.0))
         return self.row[piece], shift, v + t * (a + 0.5 * t * e), a + t * e
+
+    def __repr__(self) -> str:
+        return f"<parakin speed profile: {len(self.row)} pieces>"

@@ -9,12 +9,16 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ...arguments import check_arguments, read_numbers
 from ...arrays import Array, Indices
+from ...errors import PoseError
 from ..posting.posted import Posted
 from .corners import Curve, check_tolerance
 from .joint_path import JointPath
 from .kernels.splines import PathState
 from .speed_profile import SpeedProfile
+
+_MOST_SETPOINTS = 20_000_000  # in memory at a time
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,6 +42,9 @@ class Setpoints:
     def table(self) -> Array:
         """All columns as one table: ``time``, ``d1`` ..., ``d1.speed`` ..., ``d1.acceleration`` ..., ``X`` ..."""
         return np.column_stack([self.times, self.joints, self.speeds, self.accelerations, self.poses])
+
+    def __repr__(self) -> str:
+        return f"<parakin setpoints: {len(self.times)} times, {' '.join(self.columns[:8])} ...>"
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,7 +88,7 @@ class Trajectory:
 
     def at(self, times: ArrayLike) -> Setpoints:
         """Compute the setpoints at times (k,); before the start and after the end the machine stands still."""
-        times = np.atleast_1d(np.asarray(times, np.float64))
+        times = read_numbers("times", times)
         profile, machine = self.profile, self.posted.machine
         kinds = ("", ".speed", ".acceleration")
         columns = ("time", *(joint + kind for kind in kinds for joint in machine.joints), *machine.axes)
@@ -97,10 +104,25 @@ class Trajectory:
         poses = self.joint_path.poses(row, shift)
         return Setpoints(columns, times, state.joints, state.speeds, state.accelerations, poses)
 
+    @check_arguments
     def sample(self, rate: float) -> Setpoints:
-        """Compute setpoints at ``rate`` Hz, from the start to the first one at which the motion is over."""
-        count = int(np.ceil(self.seconds * check_tolerance(rate, "rate") - 1e-9)) + 1
+        """Compute setpoints at ``rate`` Hz, from the start to the first one at which the motion is over.
+
+        Raises :class:`PoseError` for a rate that is not above zero, or at which they would fill the memory.
+        """
+        check_tolerance(rate, "rate")
+        if not self.seconds * rate <= _MOST_SETPOINTS:
+            raise PoseError(
+                f"rate: {rate:g} Hz over {self.seconds:,.1f} s would make {self.seconds * rate:.3g} setpoints, at most "
+                f"{_MOST_SETPOINTS:,} are possible; Trajectory.at gives them a part at a time"
+            )
+        count = int(np.ceil(self.seconds * rate - 1e-9)) + 1
         return self.at(np.arange(count) / rate)
+
+    def __repr__(self) -> str:
+        return (
+            f"<parakin trajectory on {self.posted.machine.name}: {len(self.posted.path)} records, {self.seconds:.6g} s>"
+        )
 
 
 def name_limits(joints: Sequence[str]) -> tuple[str, ...]:

@@ -11,6 +11,7 @@ from typing import Any, Literal
 
 import numpy as np
 
+from ...arguments import check_arguments, parse_coordinate, parse_span
 from ...arrays import Array, Span
 from ...errors import PoseError
 from ...kernels.elementary import GREATEST_ANGLE
@@ -94,11 +95,14 @@ class Region:
             "mode": self.mode,
         }
 
-    def fix(self, values: Mapping[str, float]) -> Region:
+    @check_arguments
+    def fix(self, values: Mapping[str, float | str]) -> Region:
         """Fix free or swept axes at values, mm and rad.
 
         Raises :class:`PoseError` for values that are not finite or beyond what can be computed.
         """
+        _refuse_unknown_axes(self.machine, values)
+        values = parse_coordinates(self.machine, values)
         turning = _list_turning_axes(self.machine)
         for axis, value in values.items():
             _refuse_bad_value(axis, value, turning)
@@ -158,12 +162,19 @@ class Region:
             rows[:, self.machine.axes.index(axis)] = orientations[:, i]
         return rows
 
+    def __repr__(self) -> str:
+        fixed = ", ".join(f"{axis} {value:.6g}" for axis, value in self.fixed_axes.items())
+        return (
+            f"<parakin region of {self.machine.name}: {' '.join(self.free_axes)}, {self.kind}{fixed and ' at '}{fixed}>"
+        )
 
+
+@check_arguments
 def make_region(
     machine: Machine,
-    at: Mapping[str, float] | None = None,
-    every: Mapping[str, Span] | None = None,
-    some: Mapping[str, Span] | None = None,
+    at: Mapping[str, float | str] | None = None,
+    every: Mapping[str, Sequence[float | str]] | None = None,
+    some: Mapping[str, Sequence[float | str]] | None = None,
     dexterous: bool = False,
     without: Sequence[str] = (),
     mode: str | None = None,
@@ -172,9 +183,10 @@ def make_region(
 
     Parameters
     ----------
-    at : axes to fix, mm and rad; turning axes that are not named keep their value at home
-    every : turning axes with a range (low, high), rad, at every value of which the machine must be allowed: total
-        orientation workspace
+    at : axes to fix, numbers in mm and rad or texts with their unit (``{"B": "30 deg"}``); turning axes that are not
+        named keep their value at home
+    every : turning axes with a range (low, high), rad or texts as above, at every value of which the machine must be
+        allowed: total orientation workspace
     some : turning axes with a range at one value of which it must be: inclusive orientation workspace
     dexterous : the machine must be allowed at every value of every turning axis
     without : names of limits that do not count, with ``*`` for any letters; legs must reach in any case
@@ -182,15 +194,17 @@ def make_region(
 
     Raises :class:`PoseError`.
     """
-    fixed = dict(at or {})
-    swept = {axis: (float(low), float(high)) for axis, (low, high) in {**(every or {}), **(some or {})}.items()}
+    _refuse_unknown_axes(machine, (*(at or {}), *(every or {}), *(some or {})))
+    fixed = parse_coordinates(machine, at or {})
+    units = dict(zip(machine.axes, machine.axis_units, strict=True))
+    spans = {**(every or {}), **(some or {})}
+    swept = {axis: parse_span(axis, span, units[axis]) for axis, span in spans.items()}
     turning = _list_turning_axes(machine)
     if sum((bool(every), bool(some), dexterous)) > 1:
         raise PoseError("one of every, some and dexterous can be asked at a time")
     if dexterous:
         swept = machine.orientation_ranges
     kind: RegionKind = "dexterous" if dexterous else "total" if every else "inclusive" if some else "constant"
-    _refuse_unknown_axes(machine, (*fixed, *swept))
     for axis, span in swept.items():
         _refuse_bad_span(axis, span, turning, fixed)
     for axis, value in fixed.items():
@@ -209,6 +223,12 @@ def make_region(
         _find_ignored_limits(machine, without),
         machine.checked_mode(mode),
     )
+
+
+def parse_coordinates(machine: Machine, values: Mapping[str, float | str]) -> dict[str, float]:
+    """Parse values of axes, numbers (mm, rad) or texts with their unit; return mm and rad."""
+    units = dict(zip(machine.axes, machine.axis_units, strict=True))
+    return {axis: parse_coordinate(axis, value, units[axis]) for axis, value in values.items()}
 
 
 def _list_turning_axes(machine: Machine) -> list[str]:

@@ -74,6 +74,9 @@ class Cells:
         columns: dict[str, Any] = {name: getattr(self, name)[which] for name in _COLUMNS}
         return replace(self, **columns)
 
+    def __repr__(self) -> str:
+        return f"<parakin cells: {len(self.low)}, {np.count_nonzero(self.inside)} of them inside>"
+
 
 _COLUMNS = ("low", "size", "inner", "outer", "estimate", "limit", "area")
 

@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from ...arguments import check_arguments
 from ...arrays import Array, Progress
 from ...errors import PoseError
 from ...machine import Machine
@@ -119,7 +120,15 @@ class Workspace:
         """The boundary's area, mm² (in the plane its length, mm), as estimated."""
         return float(self.cells.area[~self.cells.inside].sum())
 
+    def __repr__(self) -> str:
+        low, high = self.volume.inner, self.volume.outer
+        return (
+            f"<parakin workspace of {self.machine.name}: "
+            f"{low:.6g} to {high:.6g} {self.unit}, {len(self.cells.low)} cells>"
+        )
 
+
+@check_arguments
 def workspace(
     region: Region,
     gap: float = 0.01,

@@ -12,8 +12,8 @@ from math import isfinite
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 
+from ...arguments import RowsLike, check_arguments
 from ...arrays import Array
 from ...errors import PoseError
 from ..certified.constraints import Constraint
@@ -49,6 +49,9 @@ class Component:
     high: Array
     apart: bool
 
+    def __repr__(self) -> str:
+        return f"<parakin component: sign {self.sign:+d}, {self.volume.inner:.6g} to {self.volume.outer:.6g}>"
+
 
 @dataclass(frozen=True, eq=False)
 class Components:
@@ -74,10 +77,17 @@ class Components:
     def __len__(self) -> int:
         return len(self.components)
 
+    def __repr__(self) -> str:
+        return (
+            f"<parakin components of a region of {self.region.machine.name}: "
+            f"{len(self)}, at least {self.at_least} different>"
+        )
 
+
+@check_arguments
 def find_components(
     region: Region,
-    start: ArrayLike | None = None,
+    start: RowsLike | None = None,
     cell: float | None = None,
     seconds: float | None = 60.0,
 ) -> Components:
@@ -98,6 +108,8 @@ def find_components(
         raise PoseError("some: of one turn for each place nothing is known of the turns between; hold or sweep them")
     if cell is not None and not (isfinite(cell) and cell > 0.0):
         raise PoseError(f"cell: a size above 0 mm expected, not {cell:g}")
+    if seconds is not None and not seconds > 0.0:
+        raise PoseError(f"seconds: a time above 0 s expected, not {seconds:g}")
     sides = dict(zip((1, -1), make_side_constraints(region), strict=True))
     position, sign = (None, 0) if start is None else _locate_start(region, start, sides)
     outline = find_outline_cells(region)
@@ -115,7 +127,7 @@ def find_components(
     pairs.sort(key=lambda each: -each[0].volume.estimate)
     parameters = {
         **region.parameters,
-        "start": None if start is None else np.asarray(start, float).tolist(),
+        "start": None if start is None else region.machine.rows(start, region.machine.axes, "start")[0][0].tolist(),
         "cell": edge,
         "seconds": seconds,
     }
@@ -131,7 +143,7 @@ def _describe_component(sign: int, cells: CellComponent) -> Component:
     return Component(sign, volume, position, *cells.box, cells.apart)
 
 
-def _locate_start(region: Region, start: ArrayLike, sides: Mapping[int, Constraint]) -> tuple[Array, int]:
+def _locate_start(region: Region, start: RowsLike, sides: Mapping[int, Constraint]) -> tuple[Array, int]:
     """Check that the start is in the region; returns its position, and the sign of det A there."""
     machine = region.machine
     rows, lead = machine.rows(start, machine.axes, "start")

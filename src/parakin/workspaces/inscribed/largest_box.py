@@ -8,8 +8,8 @@ from functools import partial
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 
+from ...arguments import RowsLike, check_arguments, read_vector
 from ...arrays import Array
 from ...errors import PoseError
 from ..certified.containment import prove_boxes
@@ -75,11 +75,18 @@ class InscribedBox:
         """The volume, mm³ (in the plane an area, mm²)."""
         return float(self.edges.prod())
 
+    def __repr__(self) -> str:
+        edges = ", ".join(
+            f"{axis} {low:.6g} to {high:.6g}" for axis, low, high in zip(self.axes, self.low, self.high, strict=True)
+        )
+        return f"<parakin box in {self.region.machine.name}: {edges}, {self.volume:.6g} {self.unit}>"
 
+
+@check_arguments
 def find_largest_box(
     region: Region,
     shape: Sequence[float] | None = None,
-    around: ArrayLike | None = None,
+    around: RowsLike | None = None,
     tolerance: float | None = None,
 ) -> InscribedBox:
     """Find a large axis-parallel box inside a region, by growth from several seeds.
@@ -135,16 +142,14 @@ def _prove_final_box(region: Region, box: Array) -> Array | None:
 
 
 def _check_shape(region: Region, shape: Sequence[float]) -> Array:
-    given = np.asarray(shape, float)
-    if given.shape != (len(region.free_axes),) or not (np.isfinite(given).all() and (given > 0.0).all()):
+    given = read_vector("shape", shape, region.free_axes, "numbers above 0")
+    if not (given > 0.0).all():
         raise PoseError(f"shape: {len(region.free_axes)} numbers above 0 expected, for {' '.join(region.free_axes)}")
     return np.asarray(given / given.max())
 
 
-def _check_centre(region: Region, around: ArrayLike) -> Array:
-    centre = np.asarray(around, float)
-    if centre.shape != (len(region.free_axes),) or not np.isfinite(centre).all():
-        raise PoseError(f"around: {len(region.free_axes)} numbers expected, for {' '.join(region.free_axes)}")
+def _check_centre(region: Region, around: RowsLike) -> Array:
+    centre = read_vector("around", around, region.free_axes)
     containment = prove_boxes(region, centre[None], centre[None])
     if containment.limit[0] >= 0:
         where = ", ".join(f"{axis} {value:g}" for axis, value in zip(region.free_axes, centre, strict=True))

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ...arguments import check_arguments, check_positive
 from ...arrays import Array, Progress
 from ...errors import PoseError
 from .distance_field import SampledField, sample_field
@@ -33,6 +34,10 @@ class CrossSection:
         """The area without holes, mm²."""
         return sum((compute_signed_area(outline) for outline in self.outlines), 0.0)
 
+    def __repr__(self) -> str:
+        at = "of a plane" if self.axis is None else f"at {self.axis} {self.value:.6g} mm"
+        return f"<parakin cross-section {at}: {len(self.outlines)} outlines, {self.area:.6g} mm²>"
+
 
 def compute_signed_area(outline: Array) -> float:
     """Compute the area of a closed polygon (n, 2), mm², by the shoelace formula; below zero for a clockwise one."""
@@ -40,6 +45,7 @@ def compute_signed_area(outline: Array) -> float:
     return float(0.5 * (x[:-1] @ y[1:] - x[1:] @ y[:-1]))
 
 
+@check_arguments
 def find_cross_sections(
     field: SampledField,
     axis: str | None = None,
@@ -60,6 +66,8 @@ def find_cross_sections(
     Raises :class:`PoseError` for a region along a line, an axis that is not the region's, or an invalid step.
     """
     region = field.region
+    if step is not None:
+        check_positive("step", step, "mm")
     if len(region.free_axes) == 1:
         raise PoseError(f"a workspace along {region.free_axes[0]} alone has no cross-sections")
     if len(region.free_axes) == 2:

@@ -13,6 +13,7 @@ from math import ceil
 import numpy as np
 
 from ... import algebra as alg
+from ...arguments import check_arguments, check_positive, read_corners
 from ...arrays import Array, Indices, Progress
 from ...errors import PoseError
 from ...kernels.batch import evaluate_tape
@@ -182,6 +183,11 @@ class SampledField:
         refined[off_edge] = crossings[off_edge]
         return self.low + refined * self.step
 
+    def __repr__(self) -> str:
+        return (
+            f"<parakin distance field of {self.region.machine.name}: {' x '.join(map(str, self.values.shape))} nodes>"
+        )
+
 
 def choose_steps(low: Array, high: Array, step: float | None) -> Array:
     """Choose the grid's step along each axis: ``step`` mm or a part of the longest edge, shorter along a short edge.
@@ -195,6 +201,7 @@ def choose_steps(low: Array, high: Array, step: float | None) -> Array:
     return np.asarray(np.minimum(wanted, edges / _LEAST))
 
 
+@check_arguments
 def sample_field(
     region: Region,
     box: tuple[Array, Array],
@@ -213,7 +220,8 @@ def sample_field(
 
     Raises :class:`PoseError` for a step that makes too many nodes.
     """
-    low, high = box
+    check_positive("turns_step", turns_step, "rad")
+    low, high = read_corners("box", box, region.free_axes)
     size = choose_steps(low, high, step)
     inner = np.ceil((high - low) / size - 1e-9)
     if np.prod(inner + 3) > _MOST:

@@ -12,6 +12,7 @@ from math import isfinite
 
 import numpy as np
 
+from ...arguments import check_arguments
 from ...arrays import Array, Progress
 from ...errors import NoMethodError, PoseError
 from ...machine import Machine
@@ -62,7 +63,7 @@ class DriveImage:
         return [self.positions[a:b] for a, b in zip(edges[::2], edges[1::2], strict=True)]
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class DriveWorkspace(SampledWorkspace):
     """A workspace as the drives reach it: ``estimate`` is |det J| summed over the drives' box, J = A⁻¹B.
 
@@ -84,6 +85,7 @@ def list_strategies(machine: Machine, running: int) -> list[DriveStrategy]:
     return strategies
 
 
+@check_arguments
 def sweep_drives(region: Region, cells: int = 64, progress: Progress | None = None) -> DriveWorkspace:
     """Sample the whole workspace of a machine from its drives: cut their ranges into cells and map these forward.
 

@@ -9,6 +9,7 @@ from math import floor, prod
 
 import numpy as np
 
+from ...arguments import check_arguments, check_positive, read_corners
 from ...arrays import Array, Flags, Indices, Progress
 from ...errors import PoseError
 from ..certified.region import Region
@@ -18,7 +19,6 @@ from .sampling import (
     BrokenLimitFinder,
     LimitCodes,
     SampledWorkspace,
-    check_positive,
     find_bounding_box,
     list_cell_middles,
 )
@@ -26,7 +26,7 @@ from .sampling import (
 MOST_CELLS = 500_000_000  # a byte each
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class GridWorkspace(SampledWorkspace):
     """A region by the cells whose middles are allowed: ``estimate`` is their number times the volume of one.
 
@@ -97,6 +97,7 @@ class GridWorkspace(SampledWorkspace):
         return tuple(sorted(limits, key=lambda limit: -limit.fraction))
 
 
+@check_arguments
 def sample_grid(
     region: Region,
     step: float,
@@ -118,7 +119,7 @@ def sample_grid(
     """
     check_positive("step", step, "mm")
     finder = BrokenLimitFinder(region, turns_step)
-    bounds = find_bounding_box(region) if box is None else _check_box(box, region.free_axes)
+    bounds = find_bounding_box(region) if box is None else read_corners("box", box, region.free_axes)
     parameters = {
         **region.parameters,
         "method": "grid",
@@ -138,10 +139,3 @@ def sample_grid(
     broken = finder.find_on_grid(coordinates, progress)
     allowed = broken.size - np.count_nonzero(broken)
     return GridWorkspace(region, "grid", allowed * step**broken.ndim, step, parameters, coordinates, broken)
-
-
-def _check_box(box: tuple[Sequence[float], Sequence[float]], axes: Sequence[str]) -> tuple[Array, Array]:
-    low, high = (np.array(corner, float).reshape(-1) for corner in box)
-    if not (len(low) == len(high) == len(axes) and np.isfinite(high - low).all() and (low < high).all()):
-        raise PoseError(f"box: a lower and an upper corner expected, each of {' '.join(axes)} in mm")
-    return low, high

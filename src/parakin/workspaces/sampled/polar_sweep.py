@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ...arguments import check_arguments, check_positive, read_vector
 from ...arrays import Array, Progress
 from ...errors import PoseError
 from ..certified.region import Region
@@ -15,7 +16,6 @@ from .sampling import (
     BrokenLimitFinder,
     LimitCodes,
     SampledWorkspace,
-    check_positive,
     find_bounding_box,
     list_cell_middles,
 )
@@ -26,7 +26,7 @@ _STEPS = 32  # steps of each ray that are tested at a time
 _RAYS = 1 << 16  # rays that are marched at a time
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class PolarWorkspace(SampledWorkspace):
     """A region along rays from an axis: only what is star-shaped about the axis in each plane, as :attr:`note` says.
 
@@ -63,6 +63,7 @@ class PolarWorkspace(SampledWorkspace):
         return lines
 
 
+@check_arguments
 def sweep_polar(
     region: Region,
     step: float,
@@ -93,12 +94,13 @@ def sweep_polar(
     distance = step if planes is None else check_positive("planes", planes, "mm")
     if rays < 3:
         raise PoseError(f"rays: at least 3 expected, not {rays}")
+    if rays > MOST_RAYS:
+        raise PoseError(f"rays: at most {MOST_RAYS:,} expected, not {rays}")
     if len(region.free_axes) < 2:
         raise PoseError(f"a polar sweep needs a plane, only {' '.join(region.free_axes)} is left free")
     home = dict(zip(region.machine.axes, region.machine.home.tolist(), strict=True))
-    middle = np.array([home[name] for name in region.free_axes[:2]] if axis is None else axis, float)
-    if middle.shape != (2,) or not np.isfinite(middle).all():
-        raise PoseError(f"axis: two numbers expected, {' and '.join(region.free_axes[:2])} in mm")
+    names = region.free_axes[:2]
+    middle = np.array([home[name] for name in names]) if axis is None else read_vector("axis", axis, names)
     finder = BrokenLimitFinder(region, turns_step)
     box = find_bounding_box(region)
     heights = None

@@ -8,12 +8,13 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise, product
-from math import ceil, floor, isfinite, prod
+from math import ceil, floor, prod
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ...arguments import check_positive
 from ...arrays import Array, Progress
 from ...errors import PoseError
 from ...kernels.batch import evaluate_tape, freeze_rows, run_in_threads
@@ -58,12 +59,11 @@ class SampledWorkspace:
         """Of the volume."""
         return self.region.volume_unit
 
-
-def check_positive(name: str, value: float, unit: str) -> float:
-    """Raise :class:`PoseError` unless a value is above zero; returns it."""
-    if not (isfinite(value) and value > 0.0):
-        raise PoseError(f"{name}: a number above 0 {unit} expected, not {value:g}")
-    return float(value)
+    def __repr__(self) -> str:
+        return (
+            f"<parakin {self.method} workspace of {self.machine.name}: "
+            f"about {self.estimate:.6g} {self.unit}, step {self.step:.6g}>"
+        )
 
 
 def sample_orientations(region: Region, step: float | None) -> Array:

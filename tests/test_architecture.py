@@ -292,3 +292,36 @@ def test_a_function_is_described_by_a_verb(module):
         if text and not is_property(function) and not (room_of(module) == "commands" and function.name in COMMANDS):
             first = text.split()[0].strip(".,:")
             assert first[0].isupper() and first.lower() in VERBS, f"{function.name}: {first} (VERBS lists the verbs)"
+
+
+def bodies(module: str) -> list[tuple[str, str]]:
+    """What functions of two statements or more do, docstrings apart, with each one's name."""
+    made = []
+    for function in functions(module):
+        steps = function.body[1:] if ast.get_docstring(function) is not None else function.body
+        if len(steps) > 1 and function.name != "__init__":
+            made.append(("\n".join(map(ast.unparse, steps)), f"{module}.{function.name}"))
+    return made
+
+
+def test_no_two_functions_have_one_body():
+    owners: dict[str, list[str]] = {}
+    for module in MODULES:
+        for body, name in bodies(module):
+            owners.setdefault(body, []).append(name)
+    assert len(owners) > 500
+    assert not [names for names in owners.values() if len(names) > 1]
+
+
+THRESHOLDS = {"EXACT", "PRINTED", "PROVED", "ASIDE", "LEEWAY", "SAME_MODE", "NEAR_MODE", "SWING", "FLIP", "DISTINCT"}
+THRESHOLDS |= {"VICINITY", "TRAVEL", "REPORTED", "TILTED", "OWN", "OTHER", "EITHER"}
+
+
+@pytest.mark.parametrize("module", [m for m in MODULES if m != "kinematics.wrist"])
+def test_pole_thresholds_and_modes_are_the_wrists_matter(module):
+    """No other file has a threshold or a mode of the same name, or turns one into sin²."""
+    for node in ast.walk(ast.parse(MODULES[module].read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Assign):
+            assert not {ast.unparse(target).lstrip("_") for target in node.targets} & THRESHOLDS
+        if isinstance(node, ast.Call) and ast.unparse(node.func) in ("np.sin", "sin", "math.sin"):
+            assert ast.unparse(node.args[0]) not in THRESHOLDS

@@ -11,7 +11,7 @@ import pytest
 import parakin as pk
 from parakin.toolpath.path import ToolPath
 from parakin.toolpath.posting.post import post_path
-from parakin.toolpath.reading.gcode.reader import compute_tool_axes
+from parakin.toolpath.programmed_path import compute_tool_axes
 
 DEGREE = math.pi / 180.0
 TURN = 360.0 * DEGREE

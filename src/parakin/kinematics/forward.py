@@ -14,7 +14,7 @@ from ..kernels.batch import NewtonSteps, Roots, evaluate_tape, evaluate_tape_wit
 from ..model.traces import Model
 from .inverse import SINGULAR, solve_inverse
 from .tapes import collect_newton_tapes
-from .wrist import TURN, bring_within_poles, flip_mode, is_upright, wrap_angle
+from .wrist import SAME_MODE, TURN, bring_within_poles, flip_mode, is_upright, wrap_angle
 
 CLOSED = 1e-9  # greatest closure error of an answer, mm in a machine of a metre
 MOST_STEPS = 24
@@ -24,7 +24,6 @@ STANDS_IN = 0.5  # of the way to another mode: how near joints must be to tell t
 NEARER = 0.1  # of the way to the answer in the default mode: one in another mode that is nearer is taken instead
 STANDS_AT = 0.1  # of the legs: how near these joints must be
 BESIDE = 0.05  # of the legs: an answer no farther from its start counts in whatever mode, if it has none in the default
-SAME_MODE = 1e-6  # mm by which the joints of an answer may differ from its inverse's in the working mode
 FIRST_PART, LEAST_PART = 1.0 / 8.0, 1e-5  # of the way in joints that a step of the continuation takes
 MOST_PARTS = 400  # steps of the continuation
 NEAR_STEPS = 6  # of Newton's method for a step of the continuation; one that needs more is halved

@@ -22,7 +22,7 @@ PRINTED    2e-6         off the pole: nearer, the six decimals of a CL file tell
 PROVED     4e-6         off the pole: a box of poses proved to be nearer counts as on it
 ASIDE      8e-6         second angle by which a pose is moved off the pole to have its rates bounded
 LEEWAY     1.6e-5       second angle that may change while the first one is free
-SAME_MODE  1e-6         joints no farther from those of a mode are in that mode
+SAME_MODE  1e-6         joints no farther from those of a mode are in that mode; mm too, for machines up to a metre
 NEAR_MODE  0.01         the same, mm too, for joints as a controller's drives stand: they are never just where told
 SWING      90°          first angles of neighbours farther apart than this swing: the other mode is tried
 FLIP       0.01         off the pole: farther away no path changes its mode

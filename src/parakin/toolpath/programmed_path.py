@@ -83,7 +83,7 @@ class ProgrammedPath:
 
 
 def compute_tool_axes(turns: Array) -> Array:
-    """Compute the tool axes Rz(C)·Ry(B)·Rx(A)·z of A, B, C (m, 3)."""
+    """Compute the tool axes Rz(C)·Ry(B)·Rx(A)·z, unit vectors (m, 3), of turns A, B, C (m, 3) in rad."""
     (sa, sb, sc), (ca, cb, cc) = np.sin(turns.T), np.cos(turns.T)
     return np.column_stack([cc * sb * ca + sc * sa, sc * sb * ca - cc * sa, cb * ca])
 

@@ -6,7 +6,7 @@ from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from typing import ClassVar
 
-from ...algebra import Scalar, Vec
+from ...algebra import Scalar, Vec, dot, sub
 from ..parts import Drive, Point, Unit
 
 
@@ -24,6 +24,12 @@ class Inverse:
 
     joints: list[Scalar]
     reach: tuple[Reach, ...] = ()
+
+
+def close_rod(foot: Vec, point: Vec, square: Scalar) -> Scalar:
+    """Return the closure ½(|u|² - L²), mm², of a rod from ``foot`` to ``point`` whose squared length is ``square``."""
+    u = sub(point, foot)
+    return 0.5 * (dot(u, u) - square)
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from ...algebra import Scalar, Vec, add, atan2, cross, dot, scale, sincos, sqrt, sub
 from ..parts import Direction, Point, Signs, Size
-from .base import Inverse, Leg, Reach
+from .base import Inverse, Leg, Reach, close_rod
 
 
 @dataclass(frozen=True)
@@ -28,8 +28,7 @@ class Crank(Leg):
         return add(self.pivot, add(scale(self.zero, self.arm * c), scale(side, self.arm * s)))
 
     def closures(self, point: Vec, joints: list[Scalar]) -> list[Scalar]:
-        u = sub(point, self._foot(joints[0]))
-        return [0.5 * (dot(u, u) - self.rod**2)]
+        return [close_rod(self._foot(joints[0]), point, self.rod**2)]
 
     def inverse(self, point: Vec, signs: str) -> Inverse:
         # |w - arm·(zero c + side s)| = rod gives x c + y s = m, with (x, y) the point in the arm's plane.

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from ...algebra import Scalar, Vec, dot, norm, sub
+from ...algebra import Scalar, Vec, norm, sub
 from ..parts import Point
-from .base import Inverse, Leg
+from .base import Inverse, Leg, close_rod
 
 
 @dataclass(frozen=True)
@@ -17,8 +17,7 @@ class Length(Leg):
     foot: Point
 
     def closures(self, point: Vec, joints: list[Scalar]) -> list[Scalar]:
-        u = sub(point, self.foot)
-        return [0.5 * (dot(u, u) - joints[0] * joints[0])]
+        return [close_rod(self.foot, point, joints[0] * joints[0])]
 
     def inverse(self, point: Vec, signs: str) -> Inverse:
         return Inverse([norm(sub(point, self.foot))])

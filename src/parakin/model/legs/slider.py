@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 from ...algebra import Scalar, Vec, dot, move_along, sqrt, sub
 from ..parts import Direction, Point, Signs, Size
-from .base import Inverse, Leg, Reach
+from .base import Inverse, Leg, Reach, close_rod
 
 
 @dataclass(frozen=True)
@@ -27,8 +27,7 @@ class Slider(Leg):
         return move_along(self.foot, self.rail, q)
 
     def closures(self, point: Vec, joints: list[Scalar]) -> list[Scalar]:
-        u = sub(point, self._foot(joints[0]))
-        return [0.5 * (dot(u, u) - self.rod**2)]
+        return [close_rod(self._foot(joints[0]), point, self.rod**2)]
 
     def inverse(self, point: Vec, signs: str) -> Inverse:
         w = sub(point, self.foot)

@@ -18,7 +18,7 @@ from .frames import AXIS_TOLERANCE, SMALLEST_SQUARE
 # 10**22 is the last power of ten a double holds exactly. A mantissa up to 2**53 is exact too, so that one division
 # of the two rounds correctly: the result is the one float() gives.
 _POWERS = 10.0 ** np.arange(23)
-_EXACT = 2**53
+_WHOLE = 2**53
 _MOST_DIGITS = 18  # greatest number of digits of a mantissa that fits into int64
 _SPACE, _TAB, _CR, _LF, _PLUS, _COMMA, _MINUS, _POINT, _SLASH, _ZERO, _DOLLAR = (ord(c) for c in " \t\r\n+,-./0$")
 _G, _O, _T, _F, _E, _D, _R, _A, _P, _I, _N = (ord(c) for c in "gotfedrapin")
@@ -120,7 +120,7 @@ def _read_run(buffer: NDArray[np.uint8], cursor: Indices, state: AxisState, reco
                     p += 1
                 decimals = p - first
                 digits += decimals
-            if digits == 0 or digits > _MOST_DIGITS or mantissa > _EXACT or mantissa / _POWERS[decimals] > LARGEST:
+            if digits == 0 or digits > _MOST_DIGITS or mantissa > _WHOLE or mantissa / _POWERS[decimals] > LARGEST:
                 count = 0
                 break
             values[count] = mantissa / _POWERS[decimals] * (1.0 - 2.0 * negative)

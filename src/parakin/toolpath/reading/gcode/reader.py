@@ -16,6 +16,7 @@ import numpy as np
 from ....arrays import Array, Progress
 from ....errors import InputError
 from ...path import Event, ToolPath
+from ...programmed_path import compute_tool_axes
 from ..text import BYTE_ORDER_MARK, READ_SIZE, check_arc_tolerance, decode_line, open_file
 from .block import LONGEST, VALUES, check_text, parse_block
 from .control_flow import ControlFlow, ControlLine, find_control
@@ -327,9 +328,3 @@ class GcodeReader:
             text = "a motion before X, Y and Z are all known: the records begin behind it"
             self.motion.notes.add(int(columns[LINE, 0]), text, dropped)
         return dropped
-
-
-def compute_tool_axes(turns: Array) -> Array:
-    """Compute the tool axes Rz(C)·Ry(B)·Rx(A)·z, unit vectors (n, 3), of turns A, B, C (n, 3) in rad."""
-    (sa, sb, sc), (ca, cb, cc) = np.sin(turns.T), np.cos(turns.T)
-    return np.column_stack([cc * sb * ca + sc * sa, sc * sb * ca - cc * sa, cb * ca])

@@ -28,7 +28,7 @@ from .poles import Pole
 
 # Shares of the angle tolerance. Their sum is what an axis may be moved; the rest is for rounding.
 NEAR = 0.72  # an axis no farther off the pole is held
-_ASIDE = 0.2  # off the pole, where it is held
+_OFF_POLE = 0.2  # off the pole, where it is held
 _LEAST_ASIDE = 5.0 * PRINTED  # rad: nearer to the pole the printed digits would turn the free angle
 _ARC = np.radians(15.0)  # a turn beside the pole is divided into arcs no longer
 _STRAIGHT = np.radians(1.0)  # what turns less needs no record of its own
@@ -77,7 +77,7 @@ def find_pole_holds(
     pole: Pole, posted: Posted, programmed: ProgrammedPath, steps: PoleSteps, routes: list[PoleRoute], angle: float
 ) -> list[PoleHold]:
     """Find where a path comes within the angle tolerance of a pole without a route through it, and hold it there."""
-    aside = 0.0 if pole.joint is None else _ASIDE * angle
+    aside = 0.0 if pole.joint is None else _OFF_POLE * angle
     if pole.joint is not None and aside < _LEAST_ASIDE:
         return []
     radius = NEAR * angle

@@ -83,6 +83,33 @@ def test_a_path_over_the_pole_goes_on_in_the_other_mode(machine):
     assert modes[0] != modes[1]
 
 
+def test_the_nearest_joints_are_those_of_the_mode_that_a_guess_is_in(machine):
+    poses, wrist = tilted(machine, np.linspace(0.05, 0.4, 20)), machine.wrist
+    solutions = [machine.inverse(poses, mode) for mode in machine.head_modes(machine.mode)]
+    for number, joints in enumerate(solutions):
+        guess = joints + 0.01
+        guess[:, wrist.pair] += 4.0 * np.pi
+        nearest, modes = wrist.solve_nearest(poses, machine.mode, guess, w.PRINTED)
+        assert (modes == number).all()
+        off = np.zeros(joints.shape[1])
+        off[wrist.pair] = 4.0 * np.pi
+        np.testing.assert_allclose(nearest - joints, np.tile(off, (len(joints), 1)), atol=1e-9)
+    known = np.full(len(poses), w.OWN, np.int8)
+    kept, modes = wrist.solve_nearest(poses, machine.mode, solutions[1], w.PRINTED, known)
+    assert (modes == w.OWN).all()
+    np.testing.assert_allclose(w.wrap_angle((kept - solutions[0])[:, wrist.pair]), 0.0, atol=1e-9)
+
+
+def test_on_the_pole_the_nearest_joints_have_the_guess_s_first(machine):
+    poses = upright(machine, 5)
+    guess = machine.inverse(poses)
+    guess[:, machine.wrist.first] = np.linspace(-1.0, 1.0, 5)
+    joints, modes = machine.wrist.solve_nearest(poses, machine.mode, guess, w.PRINTED)
+    assert (modes == w.EITHER).all()
+    np.testing.assert_array_equal(joints[:, machine.wrist.first], guess[:, machine.wrist.first])
+    assert machine.wrist.measure_blur(poses).min() > 1e6
+
+
 @given(angles, angles)
 def test_the_nearest_turn(angle, near):
     nearest = w.find_nearest_turn(np.array([angle]), np.array([near]))[0]

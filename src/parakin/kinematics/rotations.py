@@ -88,10 +88,10 @@ def follow_rotations(turns: Array, rotation: Array, near: Array) -> Array:
     count = len(turns)
     here, cosine = np.empty((count, 3)), np.empty(count)
     entries = np.empty((count, 7))  # the columns y and z of each rotation, and x's last entry
-    for part in split_rows(count, _BLOCK):
-        rotations = rotation @ compute_rotations(turns[part])
-        here[part], cosine[part] = decompose_rotations(rotations)
-        entries[part] = rotations.reshape(-1, 9)[:, [1, 4, 7, 2, 5, 8, 6]]
+    for block in split_rows(count, _BLOCK):
+        rotations = rotation @ compute_rotations(turns[block])
+        here[block], cosine[block] = decompose_rotations(rotations)
+        entries[block] = rotations.reshape(-1, 9)[:, [1, 4, 7, 2, 5, 8, 6]]
     there = flip_rotation(here)
     free = cosine < EXACT
     regular = np.flatnonzero(~free)
@@ -115,7 +115,7 @@ def follow_rotations(turns: Array, rotation: Array, near: Array) -> Array:
 def follow_twists(turns: Array, rotation: Array, tool: Array, letter: str) -> Array:
     """Follow the turn about an axis of ``rotation``·R(turns)·``tool``ᵀ along a path (n, 3): angles (n,), continuous."""
     angles = [
-        find_twist(rotation @ compute_rotations(turns[part]) @ tool.T, letter)
-        for part in split_rows(len(turns), _BLOCK)
+        find_twist(rotation @ compute_rotations(turns[block]) @ tool.T, letter)
+        for block in split_rows(len(turns), _BLOCK)
     ]
     return unwind_angles(np.concatenate(angles))

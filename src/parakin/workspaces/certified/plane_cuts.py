@@ -133,18 +133,18 @@ def _compute_fraction(b, w, n):
         return 0.0
     t = 0.5 * (total - abs(b))  # the smaller of both parts, at a corner
     if n == 1:
-        part = t / w[0]
+        fraction = t / w[0]
     elif n == 2:
         p, q = max(t - w[0], 0.0), max(t - w[1], 0.0)
-        part = (t * t - p * p - q * q) / (2.0 * w[0] * w[1])  # t ≤ (w0 + w1)/2: the far corner is not reached
+        fraction = (t * t - p * p - q * q) / (2.0 * w[0] * w[1])  # t ≤ (w0 + w1)/2: the far corner is not reached
     else:
-        part = t * t * t
+        fraction = t * t * t
         for k in range(3):
             p = max(t - w[k], 0.0)
             q = max(t - w[k] - w[(k + 1) % 3], 0.0)
-            part += q * q * q - p * p * p
-        part /= 6.0 * w[0] * w[1] * w[2]
-    return 1.0 - part if b > 0.0 else part
+            fraction += q * q * q - p * p * p
+        fraction /= 6.0 * w[0] * w[1] * w[2]
+    return 1.0 - fraction if b > 0.0 else fraction
 
 
 @njit(nogil=True, cache=True)

@@ -25,7 +25,9 @@ if TYPE_CHECKING:
     from .toolpath.path import ToolPath
     from .toolpath.placing.placement import Placement, find_placement
     from .toolpath.posting.frames import workpiece
+    from .toolpath.posting.tool_lengths import fit_tool_lengths
     from .toolpath.reading.detect import read_path
+    from .toolpath.reading.tool_table import read_tool_table
     from .toolpath.timing.trajectory import Trajectory
     from .workspaces.certified.region import Region
     from .workspaces.certified.region import make_region as region
@@ -70,6 +72,7 @@ __all__ = [
     "find_cross_sections",
     "find_largest_box",
     "find_placement",
+    "fit_tool_lengths",
     "load",
     "machines",
     "make_joint_program",
@@ -80,6 +83,7 @@ __all__ = [
     "prepare",
     "read_joint_program",
     "read_path",
+    "read_tool_table",
     "region",
     "render_machine_html",
     "render_machine_png",
@@ -152,6 +156,7 @@ _LAZY = {
     "find_cross_sections": "workspaces.sampled.cross_sections",
     "find_largest_box": "workspaces.inscribed.largest_box",
     "find_placement": "toolpath.placing.placement",
+    "fit_tool_lengths": "toolpath.posting.tool_lengths",
     "make_joint_program": "controllers.joints.program",
     "make_linuxcnc_configuration": "controllers.linuxcnc.configuration",
     "make_linuxcnc_program": "controllers.linuxcnc.program",
@@ -160,6 +165,7 @@ _LAZY = {
     "prepare": "toolpath.job",
     "read_joint_program": "controllers.joints.reader",
     "read_path": "toolpath.reading.detect",
+    "read_tool_table": "toolpath.reading.tool_table",
     "region": "workspaces.certified.region:make_region",
     "render_machine_html": "export.machine.picture",
     "render_machine_png": "export.machine.picture",

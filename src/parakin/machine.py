@@ -93,6 +93,13 @@ class Machine:
         """The length of the leg of each closure at home, mm."""
         return self.model.sizes
 
+    @property
+    def tool_length(self) -> float:
+        """The length of the machine's own tool, mm: the shift along the tool's axis with which the head ends, or 0."""
+        last = self.spec.head[-1] if self.spec.head else None
+        fixed = last is not None and last.axis == "tz" and last.drive is None
+        return max(0.0, -last.value) if last is not None and fixed else 0.0
+
     @cached_property
     def wrist(self) -> Wrist | None:
         """The two turning joints of head and table that point the tool; None where there are no two."""

@@ -13,6 +13,17 @@ from ..controllers import Target, load_controller
 from ..errors import InputError, PoseError
 from .console import ProgressBar, announce_compiling, print_json, print_text
 from .options import OFF_LIMITS, Json, Mode, Sizes, complete_machine, load_machine
+from .part_options import (
+    FrameChoice,
+    PartOptions,
+    Reference,
+    Start,
+    ToolLengthText,
+    ToolTable,
+    fit_part,
+    parse_tool_length,
+    read_part,
+)
 from .workpiece import parse_bounds, parse_workpiece
 
 if TYPE_CHECKING:
@@ -105,6 +116,11 @@ def post(
     machine: MachineOption,
     workpiece: WorkpieceText = None,
     place: PlaceBounds = None,
+    frame: FrameChoice = "file",
+    start: Start = None,
+    reference: Reference = None,
+    tools: ToolTable = None,
+    tool_length: ToolLengthText = None,
     mode: Mode = None,
     target: TargetName = None,
     force: Force = False,
@@ -126,29 +142,30 @@ def post(
     chosen = load_machine(machine, sizes)
     if place is not None and workpiece is not None:
         raise InputError("--place finds the workpiece's pose; expected it or --workpiece", "--place")
-    frame = None if workpiece is None else parse_workpiece(workpiece)
+    placed = None if workpiece is None else parse_workpiece(workpiece)
     _check_tolerances(tolerance, angle_tolerance, arc_tolerance)
+    length = parse_tool_length(tool_length, tools)
     announce_compiling()
     from ..export.files import write_files
     from ..export.json.job import encode_job
     from ..toolpath.job import Tolerances, prepare
     from ..toolpath.placing.placement import find_placement
     from ..toolpath.posting.frames import compose_frames
-    from ..toolpath.reading.detect import read_path
     from .post_summary import summarise_job
 
     with ProgressBar() as progress:
-        path = read_path(
-            part, arc_tolerance=arc_tolerance, workpiece=None if place else compose_frames(frame, None),
-            progress=progress.part("reading", 0.0, 0.1),
+        path = read_part(
+            part, PartOptions(frame, start, reference, tools), arc_tolerance,
+            None if place else compose_frames(placed, None), progress.part("reading", 0.0, 0.1),
         )  # fmt: skip
+        path = fit_part(chosen, path, length)
         placement = None
         if place is not None:
             saying = progress.part("placing the part", 0.1, 0.3)
             placement = find_placement(chosen, path, parse_bounds(place), mode=mode, progress=saying)
-            frame, mode = placement.workpiece, placement.mode
+            placed, mode = placement.workpiece, placement.mode
         job = prepare(
-            chosen, path, workpiece=frame, mode=mode, tolerances=Tolerances(tolerance, radians(angle_tolerance)),
+            chosen, path, workpiece=placed, mode=mode, tolerances=Tolerances(tolerance, radians(angle_tolerance)),
             interpolation=load_controller(target).interpolation if target else "pose", corners=corners,
             progress=progress.part("checking and timing", 0.3, 0.7),
         )  # fmt: skip
@@ -211,7 +228,7 @@ def _make_files(
             files["program"] = (f"{stem}.{wanted.target}{suffix}", _make_program(job, wanted.target, wanted.force))
         except PoseError as error:
             missing.append(f"no program: {error}")
-    files["report"] = (f"{stem}.report.html", render_report(posted, trajectory, job.unplanned, job.waits))
+    files["report"] = (f"{stem}.report.html", render_report(posted, trajectory, job.unplanned, job.waits, job.outside))
     return files, missing
 
 

@@ -25,7 +25,9 @@ def summarise_job(
 ) -> str:
     """Summarise a job; the last lines name the files."""
     from ..export.json.job import encode_joint_ranges
+    from ..toolpath.placing.outside import describe_outside
     from ..toolpath.posting.offence_texts import describe_place
+    from ..toolpath.posting.setup_texts import describe_setup
 
     posted = job.posted
     path = posted.path
@@ -35,6 +37,7 @@ def summarise_job(
     lines = [f"{path.source} on {posted.machine.name}: {count}, {_format_verdict(posted)}", ""]
     if placement is not None:
         lines += [_format_placement(placement), ""]
+    lines += [*describe_setup(posted), ""]
     header = ("joint", "from", "to", "", "limits")
     lines += [
         format_table([_format_range(joint) for joint in encode_joint_ranges(posted)], header, " rr"),
@@ -42,7 +45,10 @@ def summarise_job(
         *_format_times(job, target if "program" in written else None),
         "",
     ]
-    lines += [format_offence(describe_place(posted, offence), offence, "record") for offence in posted.offences]
+    if job.outside is not None:
+        lines.append(f"{path.source}: {describe_outside(job.outside)}")
+    else:
+        lines += [format_offence(describe_place(posted, offence), offence, "record") for offence in posted.offences]
     if posted.rewinds:
         places = ", ".join(str(int(path.line[record])) for record in posted.rewinds[:_NOTES])
         more = " ..." if len(posted.rewinds) > _NOTES else ""

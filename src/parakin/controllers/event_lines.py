@@ -5,25 +5,74 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Sequence
 
-from ..toolpath.path import Event, ToolPath
+from ..errors import PoseError
+from ..toolpath.path import Event, ToolPath, ToolUse
+from ..toolpath.posting.tool_lengths import describe_tool
 from .gcode_text import LONGEST_COMMENT, format_comments, make_plain
 
-_SAME = re.compile(r"M(?:0|1|3|4|5|7|8|9|60)|S[\d.]+|G4 P[\d.eE+-]+")  # G-code that is carried over as it is
+# of G-code, carried over as they are: spindle, coolant, stops, dwells, outputs, inputs, the controller's own codes
+_NUMBER = r"[-+\d.eE]+"
+_SAME = re.compile(rf"M\d+(?: [PQREL]{_NUMBER})*|S{_NUMBER}|G4 P{_NUMBER}")
+_COMMENTED = {6, 61}  # M codes of the tool: the change is a stop for the operator, and no tool offset may come of it
 _END = re.compile(r"M(?:2|30)")  # the program's own end replaces them
+_UNCARRIED = {70, 71, 72, 73}  # M codes that save and restore modes which the program sets itself
 _MESSAGE = re.compile(r"\(\s*msg\s*,(.*)\)", re.I | re.S)
 _STATEMENT = re.compile(r"([A-Z-]+)\s*(?:/(.*))?", re.S)
 _TURN = re.compile(r"^SPINDL\b.*\b(CC?LW)\b")  # which way the spindle turns; a later ON does not repeat it
 _DWELL = re.compile(r"\d*\.?\d+")
-_TOOLS = {"LOADTL", "TOOLNO"}
+_LOADING = re.compile(r"M6$|(?:LOADTL|TOOLNO)\b|LOAD\s*/\s*TOOL\b", re.I)  # statements that change the tool
 _COOLANT = {"ON": "M8", "FLOOD": "M8", "MIST": "M7", "OFF": "M9"}
+_LARGEST_CODE = 199  # of a controller's own M codes
 
 
 def format_events(path: ToolPath, places: Sequence[int]) -> dict[int, list[str]]:
-    """Format a path's events; return the lines by place, ``places`` having one for each event."""
+    """Format a path's events; return the lines by place, ``places`` having one for each event.
+
+    Before a tool is changed spindle and coolant are stopped; what the file says after it starts them again.
+
+    Raises :class:`PoseError` with file and line for an event that no controller can be told.
+    """
     lines = dict[int, list[str]]()
-    for place, event in zip(places, path.events, strict=True):
-        lines.setdefault(place, []).extend(_format_event(event, path))
+    changes = _find_changes(path)
+    for number, (place, event) in enumerate(zip(places, path.events, strict=True)):
+        here = lines.setdefault(place, [])
+        if number in changes:
+            use = changes[number]
+            here += ["M5", "M9", *([] if use is None else [_format_tool(use)])]
+        here += _format_event(event, path)
+        here += ["M0"] if number in changes else []
     return lines
+
+
+def check_events(path: ToolPath) -> None:
+    """Refuse a path with an event that no controller can be told; see :func:`format_events`."""
+    for event in path.events:
+        _find_word(event, path)
+
+
+def _find_changes(path: ToolPath) -> dict[int, ToolUse | None]:
+    """Find the events that change the tool, by their numbers: the statement that loads it, else the first one there.
+
+    A path that does not tell its tools is judged by its statements, and the tools are None.
+    """
+    changes = dict[int, ToolUse | None]()
+    if not any(use.data for use in path.tools):
+        between = (number for number, event in enumerate(path.events) if 0 < event.record < len(path))
+        return {number: None for number in between if _LOADING.match(path.events[number].text)}
+    for use in path.tools:
+        if not (use.changed and 0 < use.record < len(path)):
+            continue
+        there = [number for number, event in enumerate(path.events) if event.record == use.record]
+        loading = [number for number in there if path.events[number].line == use.line]
+        if there:
+            changes[(loading or there)[0]] = use
+    return changes
+
+
+def _format_tool(use: ToolUse) -> str:
+    """Tell the operator which tool comes next."""
+    text = f"{describe_tool(use)}, length {use.length:.6g} mm"
+    return f"(MSG,{make_plain(text)[:LONGEST_COMMENT]})"
 
 
 def _format_event(event: Event, path: ToolPath) -> Iterator[str]:
@@ -39,14 +88,12 @@ def _format_event(event: Event, path: ToolPath) -> Iterator[str]:
         yield word
     else:
         yield from format_comments(f"line {event.line}: {event.text}")
-        if _changes_tool(event, path):
-            yield "M0"
 
 
 def _find_word(event: Event, path: ToolPath) -> str | None:
     """Find the G-code word that says the same as an event; None where there is none."""
     if path.dialect == "gcode":
-        return event.text if _SAME.fullmatch(event.text) else None
+        return _keep_word(event, path)
     statement = _STATEMENT.fullmatch(event.text.upper())
     name, rest = (statement[1], statement[2] or "") if statement else ("", "")
     arguments = [part.strip() for part in rest.split(",")]
@@ -60,7 +107,33 @@ def _find_word(event: Event, path: ToolPath) -> str | None:
         return f"G4 P{arguments[0]}"
     if name == "SPINDL":
         return _format_spindle(arguments, event, path)
+    if name == "AUXFUN":
+        return _format_auxiliary(arguments, event, path)
     return None
+
+
+def _keep_word(event: Event, path: ToolPath) -> str | None:
+    """Keep a G-code word as it is; None where it sets what the program sets itself."""
+    if not _SAME.fullmatch(event.text):
+        return None
+    code = re.match(r"M(\d+)", event.text)
+    number = int(code[1]) if code else 0
+    if number in _COMMENTED | _UNCARRIED:
+        return None
+    if number > _LARGEST_CODE:
+        raise PoseError(f"{path.source}:{event.line}: M{number} can't be passed on; M0 to M{_LARGEST_CODE} expected")
+    return event.text
+
+
+def _format_auxiliary(arguments: list[str], event: Event, path: ToolPath) -> str:
+    """Switch what the controller calls by an M code (AUXFUN)."""
+    number = arguments[0] if len(arguments) == 1 else ""
+    if not number.isascii() or not number.isdigit() or int(number) > _LARGEST_CODE or int(number) in (2, 6, 30, 98, 99):
+        raise PoseError(
+            f"{path.source}:{event.line}: {make_plain(event.text)[:40]} can't be passed on; "
+            f"AUXFUN and the number of an M code that moves nothing expected"
+        )
+    return f"M{int(number)}"
 
 
 def _format_spindle(arguments: list[str], event: Event, path: ToolPath) -> str | None:
@@ -73,10 +146,3 @@ def _format_spindle(arguments: list[str], event: Event, path: ToolPath) -> str |
     turns = _TURN.findall(event.text.upper())  # a tap's hole has several events in one line
     turns = turns or [turn for e in path.events if e.line <= event.line for turn in _TURN.findall(e.text.upper())]
     return f"S{speed:.10g} {'M4' if turns[-1:] == ['CCLW'] else 'M3'}"
-
-
-def _changes_tool(event: Event, path: ToolPath) -> bool:
-    """Tell whether an event is a tool change between motions that the operator has to make."""
-    name = event.text.upper()
-    tool = name == "M6" or name.startswith("LOAD/TOOL") or name.split("/")[0].strip() in _TOOLS
-    return tool and 0 < event.record < len(path)

@@ -14,8 +14,10 @@ from .checking.check import check_path
 from .linearise.deviation import Interpolation
 from .linearise.linearise import linearise_path
 from .path import ToolPath
+from .placing.outside import Outside, find_outside
 from .posting.post import post_path
 from .posting.posted import Posted
+from .posting.tool_lengths import fit_tool_lengths
 from .timing import Corners, Trajectory, plan_trajectory
 from .timing.stops import find_stops, sum_dwells
 
@@ -41,6 +43,7 @@ class Job:
     unplanned : why there is no trajectory
     waits : s, that the program waits by its own words, besides the trajectory's time
     corner_tolerance : mm that corners may take the tip off the path
+    outside : where the part would have to lie, if the path lies outside the workspace as a whole
     """
 
     programmed: Posted
@@ -49,6 +52,7 @@ class Job:
     unplanned: str
     waits: float
     corner_tolerance: float
+    outside: Outside | None = None
 
     @property
     def inserted(self) -> int:
@@ -109,6 +113,7 @@ def prepare(
         return lambda fraction: report(begin + (end - begin) * fraction)
 
     half = tolerances.halve()
+    path = fit_tool_lengths(machine, path)
     programmed = post_path(machine, path, workpiece=workpiece, mode=mode, progress=report_part(0.0, 0.1))
     posted, trajectory, unplanned = programmed, None, ""
     # The pose's angles change evenly in either case, as the trajectory has them, and the tip is on its line by
@@ -129,4 +134,5 @@ def prepare(
         except PoseError as error:
             unplanned = str(error)
     report(1.0)
-    return Job(programmed, posted, trajectory, unplanned, sum_dwells(path), half.tip)
+    outside = find_outside(programmed, path, workpiece)
+    return Job(programmed, posted, trajectory, unplanned, sum_dwells(path), half.tip, outside)

@@ -1,5 +1,7 @@
 """The neutral tool path: every reader returns one, and all further work starts from it."""
 
+import math
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Literal, NamedTuple
 
@@ -25,6 +27,28 @@ class Note(NamedTuple):
     text: str
 
 
+class ToolUse(NamedTuple):
+    """A tool, from a record on.
+
+    record : the index of the first record with it
+    line : where the file loads it, 1-based; 0 where it does not say
+    data : what is known of it, as in :attr:`ToolPath.tool`; lengths in mm
+    length_line : where the file tells its length, 0 where it does not
+    changed : whether it is put into the spindle there; False for the file's first tool, and where only its length
+        offset changes
+    from_table : whether its set length is a tool table's, which goes before the file's
+    length : mm that count, from the spindle's nose to the tip; NaN in a path as read
+    """
+
+    record: int
+    line: int
+    data: Mapping[str, float | str]
+    changed: bool = False
+    from_table: bool = False
+    length_line: int = 0
+    length: float = math.nan
+
+
 @dataclass(frozen=True, eq=False)
 class ToolPath:
     """A tool path as programmed, n records, each a tool position.
@@ -40,12 +64,18 @@ class ToolPath:
     dialect : the CAM system that a CL file tells, "catia", "nx" (Siemens NX), "creo", "solidworks", "autodesk" or
         "mastercam"; "apt" where it tells none; "gcode" (RS274/NGC)
     units : the file's own length unit; all lengths here are in mm
-    tool : the known data of the first tool; lengths in mm: diameter, corner_radius, length; name, number, type ...
+    tool : the known data of the first tool; lengths in mm: diameter, corner_radius, length of the cutter, set_length
+        from the spindle's nose to the tip; name, number, type ...
     events : statements without motion, in file order
     notes : remarks for the user, by line
     turns : (n, 3) rad, A, B, C as programmed, R = Rz(C)·Ry(B)·Rx(A) and axis = R·z; None if the file programs none
     seconds : (n,) s, the time of the motion to this record where the file gives it in place of a feed: by inverse time
         (G93), or by degrees per minute where only A, B and C move; NaN elsewhere, None if there is no such record
+    tools : all tools in the order of their records; empty where the file tells of none
+    fitted_length : mm, the machine's own tool length that the path is fitted to: ``tip`` is then where the tip of a
+        tool of that length has to be, and ``tools`` have the lengths that count; None for a path as read
+    extension : (n,) mm, how much longer the tool is than ``fitted_length``: its own tip is at
+        ``tip - extension * axis``; None where that is zero throughout
     """
 
     source: str
@@ -63,6 +93,9 @@ class ToolPath:
     notes: tuple[Note, ...] = ()
     turns: Array | None = None
     seconds: Array | None = None
+    tools: tuple[ToolUse, ...] = ()
+    fitted_length: float | None = None
+    extension: Array | None = None
 
     def __len__(self) -> int:
         return len(self.line)

@@ -17,12 +17,14 @@ class ProgrammedPath:
     The tip goes straight from record to record, and the axis evenly on the great circle; where the path gives turns,
     A, B and C go evenly instead. A motion is named by the record that it leads to, 1 or more, and a point on it by its
     share of the motion, from 0 to 1.
+
+    Tips are those of the machine's own tool; where the path's tool is longer, it is that one's tip that goes straight.
     """
 
     def __init__(self, path: ToolPath, frame: Array | None = None):
         self.path = path
         self.rotation = np.eye(3) if frame is None else np.ascontiguousarray(frame[:, :3])
-        self.tip, self.axis = path.tip, path.axis
+        self.tip, self.axis, self.extension = path.tip, path.axis, path.extension
         if frame is not None:
             self.tip, self.axis = path.tip @ self.rotation.T + frame[:, 3], path.axis @ self.rotation.T
 
@@ -35,9 +37,20 @@ class ProgrammedPath:
         begin = self.tip[record - 1]
         tip = begin + s * (self.tip[record] - begin)
         turns = self.interpolate_turns(record, share)
-        if turns is None:
-            return tip, self._interpolate_axes(record, share)
-        return tip, compute_tool_axes(turns) @ self.rotation.T
+        axis = self._interpolate_axes(record, share) if turns is None else compute_tool_axes(turns) @ self.rotation.T
+        if self.extension is None:
+            return tip, axis
+        # the longer tool's own tip goes straight, and the machine's tip is up the axis from it
+        first, last = (self.extension[at][:, None] * self.axis[at] for at in (record - 1, record))
+        return tip - (first + s * (last - first)) + self.interpolate_extension(record, share)[:, None] * axis, axis
+
+    def interpolate_extension(self, record: Indices, share: Array) -> Array:
+        """Interpolate how much longer the tool is than the machine's own (m,), mm."""
+        if self.extension is None:
+            return np.zeros(len(record))
+        begin = self.extension[record - 1]
+        extension: Array = begin + share * (self.extension[record] - begin)
+        return extension
 
     def interpolate_turns(self, record: Indices, share: Array) -> Array | None:
         """Interpolate A, B, C (m, 3), rad, of a path that gives them; None for another."""

@@ -12,9 +12,10 @@ from ...arguments import check_arguments
 from ...arrays import Writer
 from ...errors import PoseError
 from ...machine import Machine
+from ...toolpath.posting.setup_texts import describe_setup
 from ...toolpath.timing.drive_limits import DriveLimits
 from ...toolpath.timing.trajectory import Trajectory
-from ..event_lines import format_events
+from ..event_lines import check_events, format_events
 from ..gcode_text import CHUNK, format_blocks, format_comments, join_lines, to_display
 
 LINEAR, TURNING = "XYZUVW", "ABC"
@@ -55,6 +56,8 @@ def make_joint_program(trajectory: Trajectory, *, forced: str | None = None) -> 
     """
     letters = assign_joint_letters(trajectory.posted.machine)
 
+    check_events(trajectory.posted.path)
+
     def write(file: BinaryIO) -> None:
         for text in _format_program(trajectory, letters, forced):
             file.write(text.encode("ascii"))
@@ -79,6 +82,7 @@ def _format_program(trajectory: Trajectory, letters: tuple[str, ...], forced: st
         ", ".join(f"{letter} is {name} in {'deg' if unit == 'rad' else 'mm'}" for letter, name, unit in names),
         f"{seconds.sum():.3f} s from the first record on; {approach:.1f} s to it; F is the inverse of minutes",
         "work and tool offsets have to be zero",
+        *describe_setup(posted),
         *(f"OFF LIMITS: written with --force: {line}" for line in (forced or "").splitlines()),
     ]
     yield join_lines(line for remark in head for line in format_comments(remark))

@@ -13,9 +13,10 @@ from ...arrays import Array, Writer
 from ...errors import PoseError
 from ...kinematics.wrist import get_leg_signs
 from ...machine import Machine
+from ...toolpath.posting.setup_texts import describe_setup
 from ...toolpath.timing.corners import check_tolerance
 from ...toolpath.timing.trajectory import Trajectory
-from ..event_lines import format_events
+from ..event_lines import check_events, format_events
 from ..gcode_text import CHUNK, format_blocks, format_comments, join_lines, to_display
 from .approach import plan_approach
 from .axis_ranges import TURNS
@@ -53,6 +54,8 @@ def make_linuxcnc_program(trajectory: Trajectory, *, forced: str | None = None, 
     blend = tolerance * (_TURNING if set(machine.axes) & set("ABC") else 1.0)
     approach = plan_approach(machine, trajectory.curve.corner[0], trajectory.joint_path.joints[0], posted.mode)
 
+    check_events(posted.path)
+
     def write(file: BinaryIO) -> None:
         for text in _format_program(trajectory, motions, approach, forced, f"G64 P{blend:g} Q0"):
             file.write(text.encode("ascii"))
@@ -88,6 +91,7 @@ def _format_program(
         f"{path.source} on {machine.name}, mode {posted.mode}; made by parakin for LinuxCNC",
         f"{motions.seconds.sum():.3f} s from the first record on; {times.sum():.1f} s to it, from wherever the tool is",
         f"machine coordinates, {' '.join(machine.axes)} in mm and degrees; F is the inverse of minutes",
+        *describe_setup(posted),
         *(f"OFF LIMITS: written with --force: {line}" for line in (forced or "").splitlines()),
     ]
     yield join_lines(line for remark in head for line in format_comments(remark))

@@ -7,11 +7,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ...toolpath.placing.outside import Outside, describe_outside, format_option
 from ...units import name_display_unit, to_display
 from .offence import encode_offence
 
 if TYPE_CHECKING:
+    from ...arrays import Array
     from ...toolpath.job import Job
+    from ...toolpath.path import ToolUse
     from ...toolpath.placing.placement import Placement
     from ...toolpath.posting.posted import Posted
 
@@ -33,6 +36,9 @@ def encode_job(
         "off_limits": posted.broken_record_count,
         "motions_off_limits": posted.broken_motion_count,
         "frame": posted.frame.tolist(),
+        "file_frame": None if job.programmed.path.frame is None else job.programmed.path.frame.tolist(),
+        "tool_length": path.fitted_length,
+        "tools": [_encode_tool(use) for use in path.tools],
         "placement": None if placement is None else _encode_placement(placement),
         "joints": encode_joint_ranges(posted),
         "seconds": job.seconds,
@@ -40,12 +46,37 @@ def encode_job(
         "bound_by": {} if trajectory is None else trajectory.shares,
         "rewinds": list(posted.rewinds),
         "offences": [encode_offence(offence) for offence in posted.offences],
+        "outside": None if job.outside is None else _encode_outside(job.outside),
         "first": None if first is None else encode_offence(first),
         "worst": None if worst is None else encode_offence(worst),
         "notes": [{"line": note.line, "text": note.text} for note in path.notes],
         "missing": list(missing),
         "files": dict(files),
     }
+
+
+def _encode_outside(outside: Outside) -> dict[str, Any]:
+    """Encode where a path and the workspace are, by axis, and the workpiece that would bring the one into the other."""
+
+    def encode_bounds(bounds: Array) -> dict[str, list[float]]:
+        return {letter: ends.tolist() for letter, ends in zip("XYZ", bounds.T, strict=True) if ends[0] == ends[0]}
+
+    values = {axis: to_display(value, "mm" if axis in "XYZ" else "rad") for axis, value in outside.workpiece.items()}
+    return {
+        "text": describe_outside(outside),
+        "path": encode_bounds(outside.path),
+        "workspace": encode_bounds(outside.workspace),
+        "workpiece": values,
+        "option": format_option(outside),
+        "off_limits_there": outside.broken,
+    }
+
+
+def _encode_tool(use: ToolUse) -> dict[str, Any]:
+    """Encode a tool with the length that counts; a cutter's length is without its holder. Lengths are mm."""
+    data = {key: value for key, value in use.data.items() if key not in ("length", "set_length")}
+    cutter = use.data.get("length")
+    return {"record": use.record, "line": use.line, "length": use.length, "cutter_length": cutter, **data}
 
 
 def encode_joint_ranges(posted: Posted) -> list[dict[str, Any]]:

@@ -5,12 +5,13 @@ from __future__ import annotations
 from html import escape
 from math import inf
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from ...arguments import check_arguments
 from ...errors import PoseError
+from ...toolpath.placing.outside import Outside, describe_outside
 from ...toolpath.posting.offence_texts import describe_place
 from ...toolpath.posting.range_use import RangeUse, measure_range_use
 from ..machine.figures import embed_figure, render_page
@@ -28,10 +29,17 @@ if TYPE_CHECKING:
 
 
 @check_arguments
-def render_report(posted: Posted, trajectory: Trajectory | None = None, unplanned: str = "", waits: float = 0.0) -> str:
+def render_report(
+    posted: Posted,
+    trajectory: Trajectory | None = None,
+    unplanned: str = "",
+    waits: float = 0.0,
+    outside: Outside | None = None,
+) -> str:
     """Render the report as one HTML document: verdict, ranges, path, curves, time, offences, notes, facts.
 
-    ``unplanned`` says why there is no trajectory, ``waits`` how long (s) the program waits besides it. Whatever the
+    ``unplanned`` says why there is no trajectory, ``waits`` how long (s) the program waits besides it,
+    ``outside`` where the part would have to lie. Whatever the
     length of the path the document stays below some 8 MB: of every stretch the extremes are drawn.
     """
     if not 0.0 <= waits < inf:
@@ -41,7 +49,7 @@ def render_report(posted: Posted, trajectory: Trajectory | None = None, unplanne
     title = f"{name} on {machine.spec.title or machine.name}"
     parts = [
         f"<header><h1>{escape(title)}</h1><p class=sub>{escape(path.source)}</p></header>\n",
-        _render_verdict(posted, trajectory, unplanned, waits),
+        _render_verdict(posted, trajectory, _Remarks(unplanned, waits, outside)),
     ]
     if len(path):
         uses, relative = measure_range_use(posted)
@@ -52,7 +60,16 @@ def render_report(posted: Posted, trajectory: Trajectory | None = None, unplanne
     return render_page(title, "".join(parts))
 
 
-def _render_verdict(posted: Posted, trajectory: Trajectory | None, unplanned: str, waits: float) -> str:
+class _Remarks(NamedTuple):
+    """What the verdict says besides: see :func:`render_report`."""
+
+    unplanned: str
+    waits: float
+    outside: Outside | None
+
+
+def _render_verdict(posted: Posted, trajectory: Trajectory | None, remarks: _Remarks) -> str:
+    unplanned, waits, outside = remarks
     path, first = posted.path, posted.first
     if not len(path):
         text = "<strong>Nothing to run</strong><p>The file has no motion.</p>"
@@ -76,9 +93,10 @@ def _render_verdict(posted: Posted, trajectory: Trajectory | None, unplanned: st
         breaks = "breaks" if motions == 1 else "break"
         counts += f"; {format_count(motions, 'motion')} {breaks} a limit that the records at both ends keep"
     counts += f"; {format_count(len(posted.offences), 'limit')} broken."
+    place = f"{describe_place(posted, first)}: {first.text}" if outside is None else describe_outside(outside)
     return (
         "<section class='card verdict bad'><strong>Does not run</strong>"
-        f"<p class=first>{escape(describe_place(posted, first))}: {escape(first.text)}</p>"
+        f"<p class=first>{escape(place)}</p>"
         f"<p>{counts}{_note_unchecked(posted)}</p>{time}</section>\n"
     )
 

@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ...arrays import Array
+from ...toolpath.posting.frames import find_frame_angles
+from ...toolpath.posting.setup_texts import describe_tools
 from ...toolpath.reading.cl.dialects import TITLES
 from ...version import __version__
 from ..number_format import format_duration, format_value
@@ -104,6 +106,7 @@ def render_fact_card(posted: Posted) -> str:
         ("Working mode", posted.mode or "the only one"),
         ("File", f"{TITLES[path.dialect]}, in {path.units}"),
         ("Tool", tool or "not named"),
+        *(("Tool length", text) for text in describe_tools(path)),
         ("Written by", f"parakin {__version__}"),
     ]
     return make_card("Facts", make_fact_table(rows))
@@ -126,9 +129,7 @@ def _measure_steps(path: ToolPath) -> Array:
 
 def _format_placement(frame: Array) -> str:
     """Format a frame (3, 4) by its origin and its angles, R = Rz(C)·Ry(B)·Rx(A)."""
-    r, origin = frame[:, :3], frame[:, 3]
-    b = np.arctan2(-r[2, 0], np.hypot(r[0, 0], r[1, 0]))
-    a, c = np.arctan2(r[2, 1], r[2, 2]), np.arctan2(r[1, 0], r[0, 0])
-    parts = [f"{letter} {format_value(float(v), 'mm')}" for letter, v in zip("XYZ", origin, strict=True)]
-    parts += [f"{letter} {format_value(float(v), 'rad')}" for letter, v in zip("ABC", (a, b, c), strict=True)]
+    parts = [f"{letter} {format_value(float(v), 'mm')}" for letter, v in zip("XYZ", frame[:, 3], strict=True)]
+    angles = zip("ABC", find_frame_angles(frame), strict=True)
+    parts += [f"{letter} {format_value(angle, 'rad')}" for letter, angle in angles]
     return ", ".join(parts)

@@ -91,8 +91,10 @@ class Deviation:
                 point[by_tip], k[by_tip] = self.programmed.interpolate(motion, nearest)
         if self._turning_axes < 2:  # the machine points the tool as it can
             k = self._compute_axes(compute_poses(self.machine, point, k, MACHINE_FRAME)[0])
-        off = compute_norms(tip - point)
-        lean = 2.0 * np.arcsin(np.minimum(1.0, 0.5 * compute_norms(self._compute_axes(poses) - k)))
+        reached = self._compute_axes(poses)
+        extension = self.programmed.interpolate_extension(record, share)
+        off = compute_norms(tip - point - extension[:, None] * (reached - k) if extension.any() else tip - point)
+        lean = 2.0 * np.arcsin(np.minimum(1.0, 0.5 * compute_norms(reached - k)))
         return off, lean, np.maximum(off / self.chord, lean / self.angle)
 
     def _interpolate_poses(self, first: PosedPoints, last: PosedPoints, shares: Array) -> Array:

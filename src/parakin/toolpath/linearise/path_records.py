@@ -51,6 +51,8 @@ def insert_records(path: ToolPath, motion: Indices, share: Array) -> ToolPath:
         events=tuple(event._replace(record=int(first[event.record])) for event in path.events),
         turns=None if path.turns is None or turns is None else _insert_rows(path.turns, source, added, turns),
         seconds=seconds,
+        tools=tuple(use._replace(record=int(first[use.record])) for use in path.tools),
+        extension=_insert_extension(programmed, motion, share, source, added),
     )
 
 
@@ -59,17 +61,30 @@ def replace_axes(path: ToolPath, record: Indices, axis: Array) -> ToolPath:
 
     Turns that the path gives change with them: B and C become the nearest that point there; A has to be 0.
     """
-    axes, turns = path.axis.copy(), path.turns
+    axes, turns, tip = path.axis.copy(), path.turns, path.tip
     axes[record] = axis
+    if path.extension is not None:  # the tip of the longer tool stays
+        tip = tip.copy()
+        tip[record] += path.extension[record][:, None] * (axis - path.axis[record])
     if turns is not None:
         turns = turns.copy()
         turns[record] = find_nearest_direction(axis, turns[record])
-    return replace(path, axis=axes, turns=turns)
+    return replace(path, tip=tip, axis=axes, turns=turns)
 
 
 def repost_path(posted: Posted, path: ToolPath) -> Posted:
     """Post another path in the frame and mode of a posted one."""
     return post_path(posted.machine, replace(path, frame=None), workpiece=posted.frame, mode=posted.mode)
+
+
+def _insert_extension(
+    programmed: ProgrammedPath, motion: Indices, share: Array, source: Indices, added: Flags
+) -> Array | None:
+    if programmed.extension is None:
+        return None
+    spread = programmed.extension[source]
+    spread[added] = programmed.interpolate_extension(motion, share)
+    return spread
 
 
 def _insert_rows(rows: Array, source: Indices, added: Flags, new: Array) -> Array:

@@ -14,6 +14,7 @@ from ...arrays import Array, Progress, Span
 from ...errors import PoseError, quote
 from ...machine import Machine
 from ..path import ToolPath
+from ..posting.tool_lengths import fit_tool_lengths
 from ..posting.working_mode import list_candidate_modes
 from .margins import AXES, PlacementMargins
 from .placement_search import PlacementSearch
@@ -82,6 +83,7 @@ def find_placement(
             raise PoseError(f"bounds: {axis} from {low} to {high}; an axis of X Y Z A B C and low <= high expected")
     if not len(path):
         raise PoseError("path: no records to place")
+    path = fit_tool_lengths(machine, path)
     report = progress or (lambda fraction: None)
     axes = tuple(axis for axis in AXES if axis in spans and spans[axis][0] < spans[axis][1])
     fixed = {axis: ends[0] for axis, ends in spans.items() if axis not in axes}

@@ -47,6 +47,13 @@ def build_frame_from_angles(x: float, y: float, z: float, a: float, b: float, c:
     return np.column_stack([rotation, [x, y, z]])
 
 
+def find_frame_angles(frame: Array) -> tuple[float, float, float]:
+    """Find A, B and C of a transform (3, 4), rad: R = Rz(C)·Ry(B)·Rx(A)."""
+    r = frame[:, :3]
+    b = math.atan2(-r[2, 0], math.hypot(r[0, 0], r[1, 0]))
+    return math.atan2(r[2, 1], r[2, 2]), b, math.atan2(r[1, 0], r[0, 0])
+
+
 def compose_frames(outer: Array | None, inner: Array | None) -> Array:
     """Compose two transforms (3, 4), ``outer`` after ``inner``; None stands for no change."""
     outer = build_frame_from_angles(0, 0, 0, 0, 0, 0) if outer is None else outer

@@ -14,6 +14,7 @@ from .frames import compose_frames, compute_poses
 from .offences import judge_path
 from .path_samples import sample_path
 from .posted import Posted
+from .tool_lengths import fit_tool_lengths
 from .turn_steps import find_turning_columns
 from .working_mode import follow_working_mode, list_candidate_modes
 
@@ -46,6 +47,7 @@ def post_path(
     report = progress or (lambda fraction: None)
     if workpiece is not None and (np.shape(workpiece) != (3, 4) or not np.isfinite(workpiece).all()):
         raise PoseError("workpiece: a transform of shape (3, 4) expected")
+    path = fit_tool_lengths(machine, path)
     frame = compose_frames(workpiece, path.frame)
     poses, path_limits = compute_poses(machine, path.tip, path.axis, frame, path.turns)
     report(0.3)

@@ -2,6 +2,7 @@
 
 import os
 import re
+from collections.abc import Mapping
 from pathlib import PurePath
 from typing import Literal
 
@@ -32,19 +33,29 @@ def read_path(
     arc_tolerance: float = 0.01,
     workpiece: Array | None = None,
     frame: Literal["file", "ignore"] = "file",
+    start: Mapping[str, float] | None = None,
+    tools: Mapping[int, float] | None = None,
+    reference: Mapping[str, float] | None = None,
     progress: Progress | None = None,
 ) -> ToolPath:
     """Read a CL file or a G-code program, whichever it is; see :func:`read_cl` and :func:`read_gcode`.
 
-    ``workpiece`` is for G53 in G-code; it does not place the path. ``frame`` is for CL files.
+    ``workpiece`` is for G53 in G-code; it does not place the path. ``frame`` is for CL files, ``start`` and
+    ``reference`` are for G-code. ``tools``, lengths by number as from :func:`parakin.read_tool_table`, is for both.
     """
     if detect_format(path) == "gcode":
         source = os.fsdecode(path)
         with open_file(path, source) as file:
             if _JOINTS in (file.read(_LOOKED_AT) or b""):
                 raise InputError("a program of joint positions; expected the tool path that it was made from", source)
-        return read_gcode(path, arc_tolerance=arc_tolerance, workpiece=workpiece, progress=progress)
-    return read_cl(path, arc_tolerance=arc_tolerance, frame=frame, progress=progress)
+        return read_gcode(
+            path, arc_tolerance=arc_tolerance, workpiece=workpiece, start=start, tools=tools, reference=reference,
+            progress=progress,
+        )  # fmt: skip
+    for name, given in (("start", start), ("reference", reference)):
+        if given is not None:
+            raise InputError("only a G-code program takes it for granted; this is a CL file", name)
+    return read_cl(path, arc_tolerance=arc_tolerance, frame=frame, tools=tools, progress=progress)
 
 
 def detect_format(path: str | os.PathLike[str]) -> Literal["cl", "gcode"]:

@@ -9,6 +9,7 @@ import numpy as np
 from ...arrays import Array, Flags, Indices
 from ...errors import PoseError
 from ...kernels.batch import run_in_threads
+from ..path import ToolPath
 from ..posting.posted import Posted
 from .corners import Curve
 from .drive_limits import DriveLimits
@@ -36,6 +37,7 @@ _ANEW = 5  # rounds after which the joints are followed from the start again
 _FINEST = 1e-7  # mm: a step this short is not cut
 _DISTURBED = 4  # rows beyond a new one over which the splines still change
 _BLOCK = 1 << 16  # steps measured at a time
+_STILL = 1e-9  # mm: a tip that moves less stands still
 _NOISE = 1e-11  # rounding error as a fraction of a joint's size
 
 
@@ -218,12 +220,23 @@ def _fit_rows(posted: Posted, curve: Curve, segment: Indices, offset: Array, joi
     return joint_path
 
 
+def _compare_tips(path: ToolPath) -> Array:
+    """Compare the way of the machine's own tip with that of the longer tool's tip, which keeps the feed: (n,)."""
+    assert path.extension is not None
+    ways = (path.tip, path.tip - path.extension[:, None] * path.axis)
+    machine, tool = (np.linalg.norm(np.diff(tip, axis=0, prepend=tip[:1]), axis=1) for tip in ways)
+    ratio: Array = np.divide(machine, tool, out=np.full(len(path), np.inf), where=tool > _STILL)
+    ratio[(machine <= _STILL) & (tool <= _STILL)] = 1.0
+    return ratio
+
+
 def _compute_feed_ceiling(posted: Posted, curve: Curve, rows: CurveRows) -> Array:
     """Compute the ceiling of ṡ² over each step: the tip keeps the programmed feed, or a piece its programmed time."""
     path, record = posted.path, curve.record_of_piece
     tip_columns = np.array([i for i, axis in enumerate(posted.machine.axes) if axis in "XYZ"], np.int64)
     free = path.rapid[record]
-    tip_speed = np.where(free | np.isnan(path.feed[record]), np.inf, path.feed[record] / 60.0)
+    feed = path.feed if path.extension is None else path.feed * _compare_tips(path)
+    tip_speed = np.where(free | np.isnan(feed[record]), np.inf, feed[record] / 60.0)
     path_speed = np.full(len(record), np.inf)
     if path.seconds is not None:
         path_speed = np.where(free | np.isnan(path.seconds[record]), np.inf, curve.length / path.seconds[record])

@@ -16,6 +16,7 @@ def find_stops(path: ToolPath) -> tuple[int, ...]:
     """Find the records at which an event stops the tool, ascending."""
     last = len(path) - 1
     records = {min(event.record, last + 1) - 1 for event in path.events if _STOPPING.match(event.text)}
+    records |= {use.record - 1 for use in path.tools if use.changed}
     return tuple(sorted(record for record in records if 0 <= record < last))
 
 

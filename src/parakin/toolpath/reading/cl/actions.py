@@ -2,12 +2,14 @@
 
 import math
 import re
+from collections.abc import Mapping
 from typing import Literal
 
 import numpy as np
 
 from ...path import Event
 from ..text import is_number, parse_number, quote_short, refuse
+from ..tools import ToolLog
 from .arguments import LENGTH_UNITS, parse_feed, parse_numbers, parse_spindle, parse_tool_data
 from .circles import Circle
 from .cycles import DrillCycle, parse_cycle
@@ -40,7 +42,7 @@ class ClActions:
         self.units: Literal["mm", "inch"] = "mm"
         self.units_given = False
         self.inches_noted = False
-        self.tool: dict[str, float | str] = {}
+        self.tools = ToolLog()
         self.finished = False
         self._last_cycle: DrillCycle | None = None
 
@@ -288,38 +290,49 @@ class ClActions:
 
     # tool
 
-    def _set_tool(self, line: int, **data: float | str) -> None:
-        if any(self.tool.get(key, value) != value for key, value in data.items()):
-            self.motion.notes.add(line, "another tool: the path's tool is the first one")
-        for key, value in data.items():
-            self.tool.setdefault(key, value)
+    def _set_tool(self, line: int, data: Mapping[str, float | str], *, loads: bool = False) -> None:
+        if self.tools.tell(self.motion.records.n, line, data, loads=loads):
+            self.motion.notes.add(line, "another tool from here on")
 
     def set_tool_data(self, args: list[str], line: int) -> None:
         """Set kind and lengths of the tool (TLDATA of NX)."""
-        self._set_tool(line, **parse_tool_data(args, self.motion.transform.scale))
+        self._set_tool(line, parse_tool_data(args, self.motion.transform.scale))
 
     def set_cutter(self, args: list[str], line: int) -> None:
         """Set lengths of the tool (CUTTER of APT)."""
         v = parse_numbers(args, range(1, 8), "CUTTER/diameter[,corner radius,e,f,a,b,height]")
         scale = self.motion.transform.scale
-        data = {"diameter": v[0] * scale}
+        data: dict[str, float | str] = {"diameter": v[0] * scale}
         if len(v) > 1:
             data["corner_radius"] = v[1] * scale
         if len(v) == 7:
             data["length"] = v[6] * scale
-        self._set_tool(line, **data)
+        self._set_tool(line, data)
 
     def load_tool(self, args: list[str], line: int) -> None:
-        """Set the tool's number or name (LOADTL, TOOLNO, LOAD, SELECT)."""
+        """Put a tool of a number or name into the spindle, with its length where it is given (LOADTL, TOOLNO, LOAD)."""
         args = args[1:] if args[:1] == ["TOOL"] else args
+        data: dict[str, float | str] = {}
         if args and is_number(args[0]):
-            self._set_tool(line, number=parse_number(args[0]))
+            data["number"] = parse_number(args[0])
         elif args and args[0]:
-            self._set_tool(line, name=args[0])
+            data["name"] = args[0]
+        if "LENGTH" in args:
+            k = args.index("LENGTH")
+            (length,) = parse_numbers(args[k + 1 : k + 2], (1,), "LENGTH,length")
+            data["set_length"] = length * self.motion.transform.scale
+        if data:
+            self._set_tool(line, data, loads=True)
+
+    def select_tool(self, args: list[str], line: int) -> None:
+        """Keep the number of the tool that is made ready (SELECT), where none is known yet."""
+        args = args[1:] if args[:1] == ["TOOL"] else args
+        if args and is_number(args[0]) and not self.motion.records.n and "number" not in self.tools.data:
+            self._set_tool(line, {"number": parse_number(args[0])})
 
     def start_tool_path(self, args: list[str], line: int) -> None:
         """Start a tool path and set its tool's name (TOOL PATH of NX)."""
         self._refuse_in_cycle_or_circle()
         self.motion.axis = (0.0, 0.0, 1.0)
         if "TOOL" in args[1:-1]:
-            self._set_tool(line, name=args[args.index("TOOL", 1) + 1])
+            self._set_tool(line, {"name": args[args.index("TOOL", 1) + 1]})

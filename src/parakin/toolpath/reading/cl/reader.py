@@ -9,6 +9,7 @@ import io
 import math
 import os
 import re
+from collections.abc import Mapping
 from typing import Literal
 
 import numpy as np
@@ -50,6 +51,7 @@ def read_cl(
     *,
     arc_tolerance: float = 0.01,
     frame: Literal["file", "ignore"] = "file",
+    tools: Mapping[int, float] | None = None,
     progress: Progress | None = None,
 ) -> ToolPath:
     """Read a CL file.
@@ -60,6 +62,7 @@ def read_cl(
     arc_tolerance : mm, the largest distance of the straight lines that replace an arc from it
     frame : "file": the path's frame is the file's (MSYS, CSYS, CATIA's matrix); "ignore": it is None. Later frames of
         the file are brought into its first one either way
+    tools : lengths of tools by number, mm, in place of the file's own
     progress : called now and then with the fraction read, 0 to 1
 
     Returns
@@ -76,9 +79,8 @@ def read_cl(
     source = os.fsdecode(path)
     with open_file(path, source) as file, np.errstate(all="ignore"):
         size = os.fstat(file.fileno()).st_size
-        return ClReader(source, size, arc_tolerance, ignore_frame=frame == "ignore").read(
-            file, progress or (lambda fraction: None)
-        )
+        reader = ClReader(source, size, arc_tolerance, ignore_frame=frame == "ignore", tools=tools)
+        return reader.read(file, progress or (lambda fraction: None))
 
 
 class ClReader:
@@ -91,8 +93,17 @@ class ClReader:
     skipped : statements after FINI: the first one's line and their count
     """
 
-    def __init__(self, source: str, size: int, arc_tolerance: float, *, ignore_frame: bool = False):
+    def __init__(
+        self,
+        source: str,
+        size: int,
+        arc_tolerance: float,
+        *,
+        ignore_frame: bool = False,
+        tools: Mapping[int, float] | None = None,
+    ):
         self.source = source
+        self.tools = tools
         self.ignore_frame = ignore_frame
         # columns for as many records as the file may well hold; the system gives memory when it is written to
         self.motion = ClMotion(min(size // _BYTES_PER_RECORD, _MOST_EXPECTED), arc_tolerance)
@@ -183,6 +194,10 @@ class ClReader:
             count, first, worst = motion.off_unit.tolist()
             text = f"a tool axis off unit length, normalised; the worst by {worst:.3g}"
             motion.notes.add(int(first), text, int(count))
+        try:
+            uses = actions.tools.list_uses(self.tools)
+        except InputError as error:
+            raise self._fail(error.message, error.line) from None
         frame = self._take_frame()
         if actions.dialect != "apt":
             motion.notes.add(actions.told_line, f"read as {DIALECTS[actions.dialect].title} writes it")
@@ -202,7 +217,8 @@ class ClReader:
             frame=frame,
             dialect=actions.dialect,
             units=actions.units,
-            tool=actions.tool,
+            tool=dict(uses[0].data) if uses else {},
+            tools=uses,
             events=tuple(motion.events),
             notes=motion.notes.list_notes(),
         )

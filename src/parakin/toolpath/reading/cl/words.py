@@ -68,7 +68,7 @@ WORDS: dict[str, Word] = {
     "LOADTL": Word(ClActions.load_tool, event=True),
     "TOOLNO": Word(ClActions.load_tool, event=True),
     "LOAD": Word(ClActions.load_tool, event=True),
-    "SELECT": Word(ClActions.load_tool, event=True),
+    "SELECT": Word(ClActions.select_tool, event=True),
     "TOOLPATH": Word(ClActions.start_tool_path, event=True),
     # no effect on the motion
     "STOP": _EVENT,

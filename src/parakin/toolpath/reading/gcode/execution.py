@@ -6,6 +6,7 @@ from typing import Literal
 
 from ...path import Event
 from ..text import INCH, refuse
+from ..tools import ToolLog
 from . import codes
 from .block import NO_PROGRAM, Block, round_whole
 from .codes import find_m_group, format_g_code
@@ -40,15 +41,14 @@ class BlockExecutor:
         self.events: list[Event] = []
         self.units: Literal["mm", "inch"] = "mm"
         self.units_given = False
-        self.tool: dict[str, float | str] = {}
+        self.tools = ToolLog()
         self.finished = False
         self._begun = False  # whether there was a block with words
-        self._tools = dict(tools or {})
         self._selected_tool = math.nan
         self._loaded_tool = math.nan
         self._speed = math.nan  # S, rev/min
         self._cycles = CannedCycles(motion, self._add_event, self._turn_spindle)
-        self._offsets = OffsetExecutor(motion, self.parameters, self._add_event, tools)
+        self.offsets = OffsetExecutor(motion, self.parameters, self._add_event, tools)
         add_machine_parameters(self.parameters, motion, self._read_modes())
         for k, letter in enumerate(AXES):
             if reference and letter in reference:
@@ -87,8 +87,8 @@ class BlockExecutor:
         if block.values.pop("D", None) is not None:
             self.motion.notes.add(line, "D, a tool's number for radius compensation, which is off: of no effect")
         # a tool changed in the same block is not yet the one that G43 without H takes
-        self._offsets.execute_length_offset(block, line, math.nan if "tool" in block.m else self._loaded_tool)
-        self._offsets.execute_work_system(block, line)
+        self.offsets.execute_length_offset(block, line, math.nan if "tool" in block.m else self._loaded_tool)
+        self.offsets.execute_work_system(block, line)
         self._execute_path_mode(block, line)
         if "distance" in block.g:
             self.motion.incremental = block.g["distance"] == codes.G91
@@ -96,7 +96,7 @@ class BlockExecutor:
             self.motion.absolute_centres = block.g["centre"] == codes.G90_1
         if "return" in block.g:
             self._cycles.retract_to_r = block.g["return"] == codes.G99
-        self._offsets.execute_once(block, line)
+        self.offsets.execute_once(block, line)
         if moves and self.motion.mode in codes.CYCLES:
             if block.g.get("once") == codes.G53:
                 refuse("G53 expected axis words with G0 or G1")
@@ -156,7 +156,7 @@ class BlockExecutor:
         else:
             motion.add_line(end, line, values)
         if machine:
-            self._offsets.machine_records += 1
+            self.offsets.machine_records += 1
 
     def _check_machine_coordinates(self, moves: bool, named: set[str]) -> None:
         """Refuse G53 where the block does not settle a point of the workpiece."""
@@ -164,7 +164,7 @@ class BlockExecutor:
             refuse("G53 expected axis words with G0 or G1")
         if self.motion.incremental:
             refuse("G53 in G91; expected G90")
-        self._offsets.check_machine_coordinates("G53", [AXES.index(letter) for letter in named])
+        self.offsets.check_machine_coordinates("G53", [AXES.index(letter) for letter in named])
 
     # feeds, spindle, tool
 
@@ -198,7 +198,7 @@ class BlockExecutor:
             self._add_event(line, f"S{self._speed:.10g}")
         if "T" in values:
             self._selected_tool = float(round_whole("T", values.pop("T")))
-            self._name_tool(self._selected_tool)
+            self._tell_tool(self._selected_tool, line, loads=False)
             self._add_event(line, f"T{self._selected_tool:.0f}")
         for group in ("output", "tool", "spindle", "coolant", "override", "other"):
             code = m.get(group)
@@ -226,18 +226,17 @@ class BlockExecutor:
 
     def _change_tool(self, line: int) -> None:
         self._add_event(line, "M6")
-        selected = self._loaded_tool = self._selected_tool
+        self._loaded_tool = self._selected_tool
+        self._tell_tool(self._loaded_tool, line, loads=True)
         if self._cycles.spindle is not None:
             self._cycles.spindle = codes.SPINDLE_OFF  # LinuxCNC stops it for the change
-        if self.tool.get("number", selected) != selected and not math.isnan(selected):
-            self.motion.notes.add(line, "another tool: the path's tool is the first one")
 
-    def _name_tool(self, number: float) -> None:
-        """Keep the number and, where it is known, the length of the first tool."""
-        if "number" not in self.tool:
-            self.tool["number"] = number
-            if number in self._tools:
-                self.tool["length"] = float(self._tools[int(number)])
+    def _tell_tool(self, number: float, line: int, *, loads: bool) -> None:
+        """Keep the number of the tool that is loaded, or of the first one that is selected."""
+        if loads or not self.tools.uses:
+            data: dict[str, float | str] = {"name": "not told"} if math.isnan(number) else {"number": number}
+            if self.tools.tell(self.motion.records.count, line, data, loads=loads):
+                self.motion.notes.add(line, "another tool from here on")
 
     def _pass_through(self, code: int, values: dict[str, float], line: int) -> None:
         """Keep an M code that moves nothing as an event, with its words."""
@@ -253,7 +252,7 @@ class BlockExecutor:
             if len(text) == 1:
                 refuse(f"M{code} without Q; expected the number of the tool")
             self._loaded_tool = self._selected_tool = float(text[1][1:])
-            self._name_tool(self._loaded_tool)
+            self._tell_tool(self._loaded_tool, line, loads=True)
         self._add_event(line, " ".join(text))
 
     # modes

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Callable, Mapping
+from typing import NamedTuple
 
 import numpy as np
 
@@ -20,12 +21,28 @@ _BASE_NOTE = "G10 puts the first work system elsewhere in the machine than the w
 _LOCAL_NOTE = "G92 before the position is known: the path's zero is where G92 puts it"
 
 
+class LengthOffset(NamedTuple):
+    """A tool length offset from a record on.
+
+    length : mm along Z, NaN if not known
+    keeps_tip : whether it is of tool centre point control, where every point is the tool's tip
+    from_table : whether the length is a tool table's
+    """
+
+    record: int
+    line: int
+    length: float
+    keeps_tip: bool
+    from_table: bool
+
+
 class OffsetExecutor:
     """Carry out the codes that move the coordinates.
 
     add_event : takes a line and the text of an event
     tools : the lengths of tools by number, mm; None if there is no table
     machine_records : how many records are given in the machine's own coordinates
+    lengths : the tool length offsets in the order of their lines
     """
 
     def __init__(
@@ -39,6 +56,8 @@ class OffsetExecutor:
         self.systems = motion.systems
         self.parameters = parameters
         self.machine_records = 0
+        self.lengths: list[LengthOffset] = []
+        self._from_file: set[int] = set()  # the tools whose lengths G10 L1 gives
         self._add_event = add_event
         self._tools: dict[int, float] | None = None if tools is None else {int(n): float(v) for n, v in tools.items()}
         self._unknown_length: str | None = None  # the code in force whose length is not known
@@ -103,6 +122,7 @@ class OffsetExecutor:
         if code is None:
             return
         name = text = format_g_code(code)
+        number: float | None = None
         offset: list[float] | None = self.systems.tool.tolist()
         if code == codes.G49:
             offset = [0.0] * 3
@@ -115,9 +135,12 @@ class OffsetExecutor:
             if self._unknown_length is not None and len(shifts) < len("XYZ") and "Z" not in shifts:
                 offset = None
         else:
-            number = round_whole("H", values.pop("H")) if "H" in values else None
-            text = name if number is None else f"{name} H{number}"
-            length = self._find_length(name, loaded if number is None else number)
+            text = name
+            number = loaded
+            if "H" in values:
+                number = float(round_whole("H", values.pop("H")))
+                text = f"{name} H{number:.0f}"
+            length = self._find_length(name, number)
             offset = None if length is None else [0.0, 0.0, length]
             if code == codes.G43_2 and offset is not None:
                 offset = [p + q for p, q in zip(self.systems.tool.tolist(), offset, strict=True)]
@@ -126,7 +149,11 @@ class OffsetExecutor:
         self.motion.set_tip_control(code == codes.G43_4)
         if code == codes.G43_4:
             self.motion.notes.add(line, _TIP_NOTE)
-        self._set_length_offset(name, offset, line, keeps_tip=code == codes.G43_4)
+        from_table = code in (codes.G43, codes.G43_2, codes.G43_4) and number not in self._from_file
+        length = math.nan if offset is None else float(offset[2])
+        keeps_tip = code == codes.G43_4
+        self.lengths.append(LengthOffset(self.motion.records.count, line, length, keeps_tip, from_table))
+        self._set_length_offset(name, offset, line, keeps_tip=keeps_tip)
         self._add_event(line, text)
 
     def _find_length(self, name: str, number: float) -> float | None:
@@ -268,6 +295,7 @@ class OffsetExecutor:
             refuse("G10 L1 expected P, the number of a tool, and Z, its length")
         length = values.pop("Z") * self.motion.scale
         self._tools = {**(self._tools or {}), number: length}
+        self._from_file.add(number)
         self._add_event(line, f"G10 L1 P{number} Z{length:.10g}")
 
     # G92 and G52

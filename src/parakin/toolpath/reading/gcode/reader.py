@@ -25,6 +25,7 @@ from .execution import BlockExecutor
 from .motion import AXES, GcodeMotion
 from .plain_lines import read_plain_lines
 from .records import FEED, LINE, RAPID, SECONDS, SPINDLE, WIDTH
+from .tool_uses import list_tool_uses
 from .work_systems import apply_frames
 
 _MOST_BLOCKS = 1_000_000  # executed again in loops and calls; a long line counts as several
@@ -110,6 +111,7 @@ class GcodeReader:
         reference: Mapping[str, float] | None = None,
     ):
         self.source = source
+        self.tools = tools
         self.size = size
         self.motion = GcodeMotion(arc_tolerance, workpiece)
         self.executor = BlockExecutor(self.motion, tools, reference)
@@ -281,6 +283,10 @@ class GcodeReader:
             motion.notes.add(self.skipped[0], "a line after the program's end, not read", self.skipped[1])
         elif not self.ended:
             motion.notes.add(0, "the program ends without M2, M30 or a second %")
+        try:
+            uses = list_tool_uses(executor.tools, executor.offsets.lengths, self.tools)
+        except InputError as error:
+            raise self._fail(error.message, error.line) from None
         turns = np.radians(np.ascontiguousarray(columns[3:6].T))
         seconds = columns[SECONDS].copy()
         return ToolPath(
@@ -293,7 +299,8 @@ class GcodeReader:
             spindle=columns[SPINDLE].copy(),
             dialect="gcode",
             units=executor.units,
-            tool=executor.tool,
+            tool=dict(uses[0].data) if uses else {},
+            tools=tuple(use._replace(record=max(0, use.record + begun - dropped)) for use in uses),
             events=tuple(Event(max(0, e.record + begun - dropped), e.line, e.text) for e in executor.events),
             notes=motion.notes.list_notes(),
             turns=turns if any(motion.turned) else None,

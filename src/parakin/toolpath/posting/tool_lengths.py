@@ -1,0 +1,199 @@
+"""Fit a tool path to the lengths of its tools: where the tip of the machine's own tool has to be, and tool changes.
+
+A machine's kinematics knows one tool, whose length ends its head. A tool that is longer by some extension has its tip
+that much farther down the tool's axis. So the path of the machine's own tip is the programmed path, moved up the axis
+by the extension; a controller with that kinematics runs it as it is.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Literal, NoReturn, TypeAlias
+
+import numpy as np
+
+from ...arrays import Array, Flags, Indices
+from ...errors import InputError, PoseError
+from ...machine import Machine
+from ..path import Note, ToolPath, ToolUse
+
+ToolLength: TypeAlias = float | Literal["file", "machine"] | None
+_SAME = 1e-3  # mm: lengths that are the same, with the decimals of a file
+_CLEARANCE = 20.0  # mm that the tool is taken out of a cut along its axis before it is changed
+_LONGEST = 1e4  # mm
+
+
+def fit_tool_lengths(machine: Machine, path: ToolPath, length: ToolLength = None) -> ToolPath:
+    """Move a path to where the tip of the machine's own tool has to be, and take the tool out where it is changed.
+
+    Parameters
+    ----------
+    machine : its :attr:`~.machine.Machine.tool_length` is what its kinematics has
+    path : as read; one that is fitted already is returned as it is
+    length : mm of the first tool, in place of the machine's own length; ``file``: all are as long as the file says;
+        ``machine``: all are as long as the machine's own; None: see below
+
+    A tool table's length, and one that the file sets (LOADTL with LENGTH, G10 L1, G43.1), is from the spindle's nose to
+    the tip. The file's may not differ from the machine's unless ``length`` says what counts. The length of a cutter
+    (TLDATA, CUTTER) is without its holder: the first tool is as long as the machine's own, which may not be shorter
+    than the cutter, and others by what their cutters are longer or shorter. A tool of which nothing is known is as long
+    as the machine's own.
+
+    Before a change the tool is withdrawn along its axis, from a cut by 20 mm, and by what the next tool is longer, so
+    that no tool is put in deeper than the one before; from a rapid position the next one goes on from the same point.
+
+    Raises :class:`InputError` with file and line for a length that contradicts the machine's, and :class:`PoseError`
+    for an invalid length or a path fitted to another machine.
+    """
+    own = machine.tool_length
+    if path.fitted_length is not None:
+        if path.fitted_length != own:
+            raise PoseError(f"path: fitted to a tool of {path.fitted_length:g} mm, {machine.name} has one of {own:g}")
+        return path
+    if isinstance(length, str) and length not in ("file", "machine"):
+        raise PoseError(f"tool_length: mm, 'file' or 'machine' expected, not {length!r}")
+    if not isinstance(length, str) and length is not None and not 0.0 <= length <= _LONGEST:
+        raise PoseError(f"tool_length: 0 to {_LONGEST:g} mm expected, not {length:g}")
+    lengths = _choose_lengths(machine, path, length)
+    uses = tuple(use._replace(length=value) for use, value in zip(path.tools, lengths, strict=True))
+    if not uses:
+        uses = (ToolUse(0, 0, {}, length=own if length is None or isinstance(length, str) else float(length)),)
+    extension = np.zeros(len(path))
+    for use in uses:
+        extension[use.record :] = use.length - own
+    path = replace(path, tools=uses, fitted_length=own, notes=(*path.notes, *_note_lengths(path, uses, own)))
+    path, extension = _insert_changes(path, extension)
+    if not extension.any():
+        return path
+    return replace(path, tip=path.tip + extension[:, None] * path.axis, extension=extension)
+
+
+def _choose_lengths(machine: Machine, path: ToolPath, length: ToolLength) -> list[float]:
+    """Choose the lengths of a path's tools, mm."""
+    own = machine.tool_length
+    if length == "machine":
+        return [own] * len(path.tools)
+    first = own if length is None or isinstance(length, str) else float(length)
+    base = next((cutter for cutter in map(_find_cutter_length, path.tools) if cutter == cutter), math.nan)
+    lengths = []
+    for use in path.tools:
+        cutter, told = _find_cutter_length(use), _find_length(use, "set_length")
+        if told == told:
+            if length is None and not use.from_table and abs(told - own) > _SAME:
+                _refuse_length(machine, path, use, f"is {told:g} mm long")
+            lengths.append(told if length is None or length == "file" or use.from_table else first)
+        elif cutter != cutter:
+            lengths.append(first)
+        elif length == "file":
+            lengths.append(cutter)
+        else:
+            lengths.append(first + cutter - base)
+            if length is None and 0.0 < own < cutter - _SAME:
+                _refuse_length(machine, path, use, f"has a cutter of {cutter:g} mm")
+            if lengths[-1] <= 0.0:
+                _refuse_length(machine, path, use, f"is {base - cutter:g} mm shorter than the first tool")
+    return lengths
+
+
+def _refuse_length(machine: Machine, path: ToolPath, use: ToolUse, what: str) -> NoReturn:
+    raise InputError(
+        f"{describe_tool(use)} {what}, the tool of {machine.name} is {machine.tool_length:g} mm long; "
+        "expected MM, file or machine to say which counts, or a tool table",
+        path.source, use.length_line or use.line,
+    )  # fmt: skip
+
+
+def _find_length(use: ToolUse, key: str) -> float:
+    value = use.data.get(key, math.nan)
+    return float(value) if not isinstance(value, str) else math.nan
+
+
+def _find_cutter_length(use: ToolUse) -> float:
+    return _find_length(use, "length")
+
+
+def describe_tool(use: ToolUse) -> str:
+    """Describe a tool by its number and name: ``tool 2 BALL6``."""
+    number, name = use.data.get("number"), use.data.get("name")
+    words = [f"{number:g}" if isinstance(number, float) else "", str(name or "")]
+    return " ".join(["tool", *(word for word in words if word)]) if any(words) else "the tool"
+
+
+def _note_lengths(path: ToolPath, uses: Sequence[ToolUse], own: float) -> list[Note]:
+    """Note the lengths that count where the file's cutters, or tools of unknown length, leave them to the machine's."""
+    notes = []
+    for use in uses:
+        cutter, told = _find_cutter_length(use), _find_length(use, "set_length")
+        line = use.length_line or use.line
+        if told != told and cutter == cutter and abs(cutter - use.length) > _SAME:
+            text = (
+                f"{describe_tool(use)}: a cutter of {cutter:g} mm, taken to be {use.length:g} mm long with its holder"
+            )
+            notes.append(Note(line, text))
+        elif told != told and cutter != cutter and len(uses) > 1:
+            notes.append(Note(line, f"{describe_tool(use)}: no length told, taken to be {use.length:g} mm long"))
+    return notes
+
+
+def _insert_changes(path: ToolPath, extension: Array) -> tuple[ToolPath, Array]:
+    """Insert the motions at tool changes: out along the axis with the old tool, and to where the next one goes on."""
+    source, lift, events_at = list[int](), list[float](), dict[int, int]()
+    added = 0
+    begins = {use.record: use for use in path.tools if use.changed and 0 < use.record < len(path)}
+    for record in sorted(begins):
+        last, longer = record - 1, float(extension[record] - extension[record - 1])
+        from_cut = not path.rapid[last]
+        out = max(0.0, longer) + (_CLEARANCE if from_cut else 0.0)
+        lifts = [(0.0, out), (1.0, out - longer)]  # old tool, new tool: the holder stands still between both
+        if not from_cut:
+            lifts.append((1.0, 0.0))
+        if out == 0.0 and longer == 0.0:
+            lifts = []
+        source += [record] * len(lifts)
+        lift += [value for pair in lifts for value in pair]
+        events_at[record] = added + (1 if lifts else 0)
+        added += len(lifts)
+    if not source:
+        return path, extension
+    at = np.array(source, np.int64)
+    new, height = np.array(lift).reshape(-1, 2).T
+    return _insert_lifts(path, extension, at, new > 0.0, height, events_at)
+
+
+def _insert_lifts(
+    path: ToolPath, extension: Array, at: Indices, new: Flags, height: Array, events_at: dict[int, int]
+) -> tuple[ToolPath, Array]:
+    """Insert rapid records before records ``at``: above the record before, by ``height`` along its axis.
+
+    new : whether with the next tool
+    events_at : by record, how many of all inserted records come before its events
+    """
+    last = at - 1
+    own = np.where(new, at, last)
+
+    def insert(rows: Array, values: Array) -> Array:
+        return np.insert(rows, at, values, axis=0)
+
+    before = np.searchsorted(at, np.arange(len(path) + 1), side="right")
+
+    def move(record: int) -> int:
+        return record + int(events_at.get(record, before[record]))
+
+    tip = path.tip[last] + height[:, None] * path.axis[last]
+    line = np.array([next(use.line for use in path.tools if use.record == r) for r in at.tolist()], np.int64)
+    changed = replace(
+        path,
+        tip=insert(path.tip, tip),
+        axis=insert(path.axis, path.axis[last]),
+        line=np.insert(path.line, at, np.where(line > 0, line, path.line[at])),
+        rapid=np.insert(path.rapid, at, True),
+        feed=insert(path.feed, path.feed[at]),
+        spindle=insert(path.spindle, path.spindle[own]),
+        turns=None if path.turns is None else insert(path.turns, path.turns[last]),
+        seconds=None if path.seconds is None else insert(path.seconds, np.full(len(at), np.nan)),
+        events=tuple(event._replace(record=move(event.record)) for event in path.events),
+        tools=tuple(use._replace(record=move(use.record)) for use in path.tools),
+    )
+    return changed, insert(extension, extension[own])

@@ -206,31 +206,6 @@ def test_rapid_motions_are_kept_to_their_lines():
     assert len(linearise_path(posted, "joints").path) > 20
 
 
-@UNDER
-def test_a_rapid_that_turns_back(under):
-    machine = pk.load("orthoglide5_table")
-    turn = np.linspace(0, 1500, 500)
-    around = np.column_stack([10 * np.cos(np.radians(turn)), 10 * np.sin(np.radians(turn)), 0 * turn])
-    path = replace(path_of(around, axis_of(np.full(500, 12.0), turn)), rapid=np.arange(500) % 90 == 89)
-    posted = post_path(machine, path)
-    assert posted.rewinds and posted.broken_record_count == 0
-    result = linearise_path(posted, under)
-    assert result.broken_record_count == 0
-    if under == "pose":
-        assert result.rewinds == posted.rewinds
-        return
-    assert not result.rewinds and not result.path.notes
-    straight = []
-    for j in range(1, len(result.path)):
-        share = np.linspace(0, 1, 9)[:, None]
-        joints = result.joints[j - 1] + share * (result.joints[j] - result.joints[j - 1])
-        tip = machine.forward(joints, near=result.poses[j]).poses[:, :3]
-        begin, end = (around[result.path.line[j] - 10 - back] for back in (1, 0))
-        at = (tip - begin) @ (end - begin) / ((end - begin) @ (end - begin))
-        straight.append(np.linalg.norm(tip - begin - np.clip(at, 0, 1)[:, None] * (end - begin), axis=1).max())
-    assert max(straight) <= 0.01
-
-
 # What can't be done.
 
 

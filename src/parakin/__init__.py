@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from .toolpath.path import ToolPath
     from .toolpath.placing.placement import Placement, find_placement
     from .toolpath.posting.frames import workpiece
+    from .toolpath.posting.rewinds import Clearance, Rewind, RewoundPath, rewind_path
     from .toolpath.posting.tool_lengths import fit_tool_lengths
     from .toolpath.reading.detect import read_path
     from .toolpath.reading.tool_table import read_tool_table
@@ -42,6 +43,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "Atlas",
+    "Clearance",
     "Components",
     "CrossSection",
     "DescriptionError",
@@ -60,6 +62,8 @@ __all__ = [
     "PolarWorkspace",
     "PoseError",
     "Region",
+    "Rewind",
+    "RewoundPath",
     "SampledField",
     "Solution",
     "Tolerances",
@@ -88,6 +92,7 @@ __all__ = [
     "render_machine_html",
     "render_machine_png",
     "render_report",
+    "rewind_path",
     "sample_field",
     "sample_grid",
     "sweep_drives",
@@ -148,6 +153,10 @@ _LAZY = {
     "SampledField": "workspaces.sampled.distance_field",
     "Solution": "kinematics.forward",
     "Tolerances": "toolpath.job",
+    "Clearance": "toolpath.posting.rewinds",
+    "Rewind": "toolpath.posting.rewinds",
+    "RewoundPath": "toolpath.posting.rewinds",
+    "rewind_path": "toolpath.posting.rewinds",
     "ToolPath": "toolpath.path",
     "Trajectory": "toolpath.timing.trajectory",
     "Workspace": "workspaces.certified.workspace",

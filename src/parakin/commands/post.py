@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from ..arrays import Writer
     from ..export.files import Content
     from ..toolpath.job import Job
+    from ..toolpath.posting.rewinds import Rewind
 
 Part = Annotated[
     Path,
@@ -92,6 +93,24 @@ CornerStyle = Annotated[
     Literal["round", "stop"],
     Parameter(help="Round them within the tolerance, or stop at them."),
 ]
+Retract = Annotated[
+    float | None,
+    Parameter(
+        name="--rewind",
+        help=(
+            "Where a turning joint comes to the end of its range, retract the tool by so many mm along its axis, turn "
+            "the joint back, and return."
+        ),
+    ),
+]
+ClearancePlane = Annotated[
+    float | None,
+    Parameter(
+        name="--clearance",
+        allow_leading_hyphen=True,
+        help="Z of the workpiece, in mm, above which rapid motions are clear: a turning joint may turn back there.",
+    ),
+]
 Rate = Annotated[
     float | None,
     Parameter(help="Write setpoints too, so many a second: PART.setpoints.csv."),
@@ -128,6 +147,8 @@ def post(
     angle_tolerance: AxisTolerance = 0.05,
     arc_tolerance: ArcTolerance = 0.01,
     corners: CornerStyle = "round",
+    rewind: Retract = None,
+    clearance: ClearancePlane = None,
     rate: Rate = None,
     output: Folder = Path(),
     parquet: Parquet = False,
@@ -145,12 +166,14 @@ def post(
     placed = None if workpiece is None else parse_workpiece(workpiece)
     _check_tolerances(tolerance, angle_tolerance, arc_tolerance)
     length = parse_tool_length(tool_length, tools)
+    _check_clearance(rewind, clearance)
     announce_compiling()
     from ..export.files import write_files
     from ..export.json.job import encode_job
     from ..toolpath.job import Tolerances, prepare
     from ..toolpath.placing.placement import find_placement
     from ..toolpath.posting.frames import compose_frames
+    from ..toolpath.posting.rewinds import Clearance, rewind_path
     from .post_summary import summarise_job
 
     with ProgressBar() as progress:
@@ -164,6 +187,10 @@ def post(
             saying = progress.part("placing the part", 0.1, 0.3)
             placement = find_placement(chosen, path, parse_bounds(place), mode=mode, progress=saying)
             placed, mode = placement.workpiece, placement.mode
+        rewinds: tuple[Rewind, ...] = ()
+        if rewind is not None or clearance is not None:
+            rewound = rewind_path(chosen, path, Clearance(rewind, clearance), workpiece=placed, mode=mode)
+            path, rewinds = rewound.path, rewound.rewinds
         job = prepare(
             chosen, path, workpiece=placed, mode=mode, tolerances=Tolerances(tolerance, radians(angle_tolerance)),
             interpolation=load_controller(target).interpolation if target else "pose", corners=corners,
@@ -173,7 +200,7 @@ def post(
         paths = write_files(output, dict(files.values()))
     written = {kind: str(name) for kind, name in zip(files, paths, strict=True)}
     if json:
-        print_json(encode_job(job, placement, missing, written))
+        print_json(encode_job(job, placement, rewinds, missing, written))
     else:
         print_text(summarise_job(job, target, written, placement, missing))
     return 0 if job.runs and not missing else OFF_LIMITS
@@ -185,6 +212,13 @@ def _check_tolerances(tolerance: float, angle_tolerance: float, arc_tolerance: f
         if not (value > 0.0 and isfinite(value)):
             unit = "an angle above zero, in degrees" if "angle" in option else "a length above zero, in mm"
             raise InputError(f"expected {unit}", option)
+
+
+def _check_clearance(rewind: float | None, clearance: float | None) -> None:
+    if rewind is not None and not (rewind > 0.0 and isfinite(rewind)):
+        raise InputError("expected a length above zero, in mm", "--rewind")
+    if clearance is not None and not isfinite(clearance):
+        raise InputError("expected a height, in mm", "--clearance")
 
 
 @dataclass(frozen=True)

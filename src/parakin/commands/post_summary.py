@@ -49,10 +49,6 @@ def summarise_job(
         lines.append(f"{path.source}: {describe_outside(job.outside)}")
     else:
         lines += [format_offence(describe_place(posted, offence), offence, "record") for offence in posted.offences]
-    if posted.rewinds:
-        places = ", ".join(str(int(path.line[record])) for record in posted.rewinds[:_NOTES])
-        more = " ..." if len(posted.rewinds) > _NOTES else ""
-        lines.append(f"{path.source}: note: a turning joint is turned back in rapid to line {places}{more}")
     lines += [f"{_format_place(path.source, note.line)}: note: {note.text}" for note in path.notes[:_NOTES]]
     if len(path.notes) > _NOTES:
         lines.append(f"{len(path.notes) - _NOTES} more notes in the report")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import isfinite
 from typing import NamedTuple
 
@@ -13,10 +13,11 @@ from ..machine import Machine
 from .checking.check import check_path
 from .linearise.deviation import Interpolation
 from .linearise.linearise import linearise_path
-from .path import ToolPath
+from .path import Note, ToolPath
 from .placing.outside import Outside, find_outside
 from .posting.post import post_path
 from .posting.posted import Posted
+from .posting.rewinds import is_wound_up
 from .posting.tool_lengths import fit_tool_lengths
 from .timing import Corners, Trajectory, plan_trajectory
 from .timing.stops import find_stops, sum_dwells
@@ -115,6 +116,8 @@ def prepare(
     half = tolerances.halve()
     path = fit_tool_lengths(machine, path)
     programmed = post_path(machine, path, workpiece=workpiece, mode=mode, progress=report_part(0.0, 0.1))
+    if is_wound_up(programmed):
+        programmed = _note_wound_up(programmed)
     posted, trajectory, unplanned = programmed, None, ""
     # The pose's angles change evenly in either case, as the trajectory has them, and the tip is on its line by
     # then: two steps share the tolerance of the axis.
@@ -136,3 +139,12 @@ def prepare(
     report(1.0)
     outside = find_outside(programmed, path, workpiece)
     return Job(programmed, posted, trajectory, unplanned, sum_dwells(path), half.tip, outside)
+
+
+def _note_wound_up(posted: Posted) -> Posted:
+    """Note that a joint turns farther than its range, and what would help."""
+    wrist, path = posted.machine.wrist, posted.path
+    assert wrist is not None
+    joint = posted.machine.joints[wrist.first]
+    text = f"{joint} turns farther than its range is wide; a rewind takes turns back where a clearance is stated"
+    return replace(posted, path=replace(path, notes=(*path.notes, Note(int(path.line[0]), text))))

@@ -6,8 +6,9 @@ import numpy as np
 
 from ...arrays import Array
 from ...errors import PoseError
-from ...kinematics.wrist import EXACT, PRINTED, TILTED, TURN, Wrist, find_nearest_turn, is_upright, wrap_angle
+from ...kinematics.wrist import EXACT, PRINTED, TILTED, TURN, Wrist, find_nearest_turn, is_upright
 from ...machine import Machine
+from ...toolpath.posting.wrist_poses import find_pose_with_wrist
 from ...toolpath.timing.drive_limits import DriveLimits
 
 _SPEED_SHARE = 0.25  # fraction of the joints' speeds
@@ -16,7 +17,6 @@ _LEAST = 0.5  # s, of a motion
 _SAMPLES = 500  # samples of a motion
 _TURNS = (0, 1, -1, 2, -2)
 _SHARES = (1.0, 0.1, 0.01)  # of the way back home and of TILTED, for the poses that lead to a record beside the pole
-_ROUNDS = 60
 
 
 def plan_approach(machine: Machine, first: Array, joints: Array, mode: str) -> tuple[Array, Array]:
@@ -60,9 +60,8 @@ def _approach_from_aside(machine: Machine, wrist: Wrist, first: Array, joints: A
     own = mode if off_pole < PRINTED or wrist.has_mode(first[None], joints[None], mode)[0] else wrist.other_mode(mode)
     c, way = wrist.direction.c, list[Array]()
     for share in _SHARES:
-        pose = _find_tilted_pose(
-            machine, first + share * (machine.home - first), wrist.tilt(joints, own, share * TILTED)
-        )
+        near = first + share * (machine.home - first)
+        pose = find_pose_with_wrist(machine, near, wrist.tilt(joints, own, share * TILTED), own)
         if pose is None:
             return [first]
         pose[c] = find_nearest_turn(pose[c], way[-1][c] if way else first[c])
@@ -70,24 +69,6 @@ def _approach_from_aside(machine: Machine, wrist: Wrist, first: Array, joints: A
     if is_upright(first[wrist.direction.b], PRINTED):  # C turns there by itself
         way.append(np.where(np.arange(len(first)) == c, way[-1], first))
     return [*way, first]
-
-
-def _find_tilted_pose(machine: Machine, near: Array, joints: Array) -> Array | None:
-    """Find the pose with the tip of a near one in which the wrist stands as in joints; None if there is none."""
-    wrist, pose = machine.wrist, near.copy()
-    assert wrist is not None
-    for _ in range(_ROUNDS):
-        legs = machine.inverse(pose, machine.mode)
-        legs[wrist.pair] = joints[wrist.pair]
-        solution = machine.forward(legs, near=pose)
-        if not solution.converged:
-            return None
-        turned = np.array(solution.poses)[wrist.direction.pair]
-        is_there = np.abs(wrap_angle(turned - pose[wrist.direction.pair])).max() < EXACT
-        pose[wrist.direction.pair] = turned
-        if is_there:
-            return pose
-    return None
 
 
 def _follow_back(machine: Machine, way: list[Array], joints: Array, mode: str) -> Array:

@@ -17,12 +17,17 @@ if TYPE_CHECKING:
     from ...toolpath.path import ToolUse
     from ...toolpath.placing.placement import Placement
     from ...toolpath.posting.posted import Posted
+    from ...toolpath.posting.rewinds import Rewind
 
 
 def encode_job(
-    job: Job, placement: Placement | None, missing: Sequence[str], files: Mapping[str, str]
+    job: Job,
+    placement: Placement | None,
+    rewinds: Sequence[Rewind],
+    missing: Sequence[str],
+    files: Mapping[str, str],
 ) -> dict[str, Any]:
-    """Encode a job, the placement that was found for it, why files are missing, and the files by their kinds."""
+    """Encode a job, its placement and rewinds that were found, why files are missing, and the files by their kinds."""
     posted, trajectory = job.posted, job.trajectory
     path, first, worst = posted.path, posted.first, posted.worst
     return {
@@ -44,7 +49,10 @@ def encode_job(
         "seconds": job.seconds,
         "waits": job.waits,
         "bound_by": {} if trajectory is None else trajectory.shares,
-        "rewinds": list(posted.rewinds),
+        "rewinds": [
+            {"line": rewind.line, "joint": rewind.joint, "turns": rewind.turns, "retract": rewind.retract}
+            for rewind in rewinds
+        ],
         "offences": [encode_offence(offence) for offence in posted.offences],
         "outside": None if job.outside is None else _encode_outside(job.outside),
         "first": None if first is None else encode_offence(first),

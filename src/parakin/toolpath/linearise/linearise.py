@@ -17,7 +17,6 @@ from .path_cuts import PathCuts, PathPositions, find_cuts, select_spans
 from .path_records import insert_records, repost_path
 from .pole_passes import lead_through_poles
 from .pole_swings import note_swings_of_passes
-from .rewinds import insert_rewind_records
 
 _GLANCE: Array = np.array([0.31, 0.67])  # of a motion: neither a bulge nor an S hides from both, nor whole turns
 _EVIDENT = 0.2  # of the tolerance: where no more is measured at _GLANCE, the whole motion keeps to the tolerance
@@ -47,8 +46,7 @@ def linearise_path(
     Rapid motions are kept to their lines too. An inserted record stands on the programmed path, with the line and feed
     of the record that its motion leads to, and is posted again; every motion of the result is then measured anew. A
     motion to or from a record that the machine can't reach is left as it is, for it is an offence already; one that
-    leads out of reach in between gets one record there, an offence of the result. Where a rapid motion turns back by
-    whole turns, the turning itself is kept to under ``joints``.
+    leads out of reach in between gets one record there, an offence of the result.
 
     A pass of the tool's axis over a pole, where a turning axis of head, table or (under ``pose``) C is free, is led
     through the pole itself if the axis misses it by less than the tolerance, and the angle does not swing then: see
@@ -62,7 +60,6 @@ def linearise_path(
     if under not in ("pose", "joints"):
         raise PoseError(f"under: 'pose' or 'joints' expected, not {under!r}")
     report = progress or (lambda fraction: None)
-    posted = insert_rewind_records(posted) if under == "joints" else posted
     deviation = Deviation(posted.machine, ProgrammedPath(posted.path, posted.frame), under, chord, angle)
     led = lead_through_poles(deviation, posted, np.flatnonzero(_find_sound_motions(posted)))
     posted, positions = led.posted, led.positions
@@ -73,7 +70,7 @@ def linearise_path(
         if not len(deviating):
             report(1.0)
             swings = [*led.notes, *note_swings_of_passes(led.passes, posted, positions)]
-            return _add_notes(posted, [*swings, *_note_rewinds(posted, under)])
+            return _add_notes(posted, swings)
         cuts = _cut_motions(deviation, posted, positions, deviating)
         before, posted = posted, repost_path(posted, insert_records(posted.path, cuts.motion, cuts.share))
         positions = positions.insert(cuts.motion, cuts.share)
@@ -119,21 +116,10 @@ def _find_subject(note: Note) -> str:
     return note.text.partition("beside")[2].partition(" swings")[0]
 
 
-def _note_rewinds(posted: Posted, under: Interpolation) -> list[Note]:
-    """Note motions that turn back by whole turns: evenly moved joints lead the tip off its line there."""
-    text = "the rapid motion turns back by whole turns, and the tool's tip leaves its line on it"
-    return [Note(int(posted.path.line[record]), text) for record in posted.rewinds if under == "joints"]
-
-
 def _find_sound_motions(posted: Posted) -> Flags:
-    """Find the motions (n,), by the record they lead to, that can be linearised.
-
-    Both ends are reachable, and the motion does not turn back by whole turns.
-    """
+    """Find the motions (n,), by the record they lead to, both ends of which are reachable."""
     reachable: Flags = np.isfinite(posted.poses.sum(axis=1) + posted.joints.sum(axis=1))
-    sound = np.concatenate([np.zeros(min(len(reachable), 1), np.bool_), reachable[1:] & reachable[:-1]])
-    sound[list(posted.rewinds)] = False
-    return sound
+    return np.concatenate([np.zeros(min(len(reachable), 1), np.bool_), reachable[1:] & reachable[:-1]])
 
 
 def _find_changed_motions(before: Posted, after: Posted, motion: Indices) -> Flags:

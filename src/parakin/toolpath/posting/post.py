@@ -38,8 +38,7 @@ def post_path(
         fewer records break a limit in it, or as many and fewer motions in feed turn a joint by more than 90°
     progress : called now and then with the fraction done, 0 to 1
 
-    Turns of joints are counted, and taken back in rapid motions where they have to be: see
-    :func:`~.working_mode.follow_working_mode`.
+    Turns of joints are counted: see :func:`~.working_mode.follow_working_mode`.
 
     Raises :class:`PoseError` for an invalid workpiece, an unknown mode, or a motion of thousands of turns. A record
     that can't be reached raises nothing: it is an offence of the result.
@@ -69,7 +68,6 @@ def post_path(
     return Posted(
         machine, _note_lost_turns(machine, path), solution.mode, frame, solution.poses, solution.joints,
         judgement.broken, judgement.limits, judgement.offences, judgement.first, judgement.worst,
-        rewinds=solution.rewinds,
     )  # fmt: skip
 
 

@@ -61,7 +61,6 @@ class Posted:
     checked : the motions between the records are checked, too: see :func:`parakin.toolpath.checking.check.check_path`
     broken_motions : (n,) 0 where the motion to a record breaks nothing but what its ends break, else 1 + the index in
         ``limits`` of a limit that it does; None where ``checked`` is not
-    rewinds : records to which a rapid motion leads that turns C, and a joint with it, back by whole turns
     """
 
     machine: Machine
@@ -77,7 +76,6 @@ class Posted:
     worst: Offence | None
     checked: bool = False
     broken_motions: Indices | None = None
-    rewinds: tuple[int, ...] = ()
 
     @property
     def broken_record_count(self) -> int:

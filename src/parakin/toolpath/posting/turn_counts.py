@@ -1,11 +1,9 @@
-"""Whole turns of joints: the counts that bring them into range, each for a stretch of a path."""
+"""Whole turns of joints: the counts that bring them into range along a path."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import pairwise
 
 import numpy as np
 
@@ -15,10 +13,8 @@ from ...machine import Machine
 from ...model.parts import Drive
 from .margin_blocks import split_margins
 
-_MOST_AT_START, _MOST_OFF = 41, 9  # counts of turns that are tried: in a path's first stretch, and where none fits
+_MOST_OFF = 9  # counts of turns that are tried where none fits
 _NEARER = 1e-6  # rad: a smaller gain is rounding
-
-Cost = tuple[int, float, float]  # records off limits, rad turned between the stretches, rad from home
 
 
 def find_turns_in_range(drive: Drive, angles: Array, home: float) -> int | None:
@@ -84,47 +80,11 @@ class TurningJoint:
                     values[part] = margins[:, machine.limits.index(name)]
         return cls(drive, column, joints[:, column].copy(), low, high, is_sound, home)
 
-    def count_off(self, start: int, stop: int, turns: int) -> int:
-        """Count the records from start to stop that break only this joint's range, so many turns on."""
-        part, shift = slice(start, stop), turns * TURN
-        kept = (self.low[part] + shift >= 0.0) & (self.high[part] - shift >= 0.0)
-        return int(np.count_nonzero(self.is_sound[part] & ~kept))
-
-    def split(self, cuts: Sequence[int]) -> list[_Stretch]:
-        """Split the path into stretches at the records ``cuts``."""
-        stretches = []
-        for start, stop in pairwise([0, *cuts, len(self.angles)]):
-            angles = self.angles[start:stop]
-            stretches.append(_Stretch(start, stop, float(np.fmin.reduce(angles)), float(np.fmax.reduce(angles))))
-        return stretches
-
-
-@dataclass(frozen=True)
-class _Stretch:
-    """Records over which the turns stay: from ``start`` to ``stop``, the joint between ``low`` and ``high``."""
-
-    start: int
-    stop: int
-    low: float
-    high: float
-
-    def list_counts(self, joint: TurningJoint, before: Sequence[int]) -> list[int]:
-        """List the counts of turns worth trying, where ``before`` are those of the stretch before."""
-        if math.isnan(self.low):
-            return sorted(before) or [0]
-        ends = _find_fitting_counts(joint.drive, self.low, self.high)
-        if ends[0] > ends[1]:
-            middle = (joint.drive.low + joint.drive.high - self.low - self.high) / (2.0 * TURN)
-            return _list_nearest(ends[1], ends[0], middle, _MOST_OFF)
-        near = (joint.home - 0.5 * (self.low + self.high)) / TURN
-        if not before:
-            return _list_nearest(*ends, near, _MOST_AT_START)
-        return sorted({*ends, _clip_turns(round(near), ends), *(_clip_turns(turns, ends) for turns in before)})
-
-    def measure_cost(self, joint: TurningJoint, turns: int) -> tuple[int, float]:
-        """Measure records off limits and rad from home with a count of turns."""
-        from_home = 0.0 if math.isnan(self.low) else _measure_distance(turns, self.low, self.high, joint.home)
-        return joint.count_off(self.start, self.stop, turns), from_home
+    def count_off(self, turns: int) -> int:
+        """Count the records that break only this joint's range, so many turns on."""
+        shift = turns * TURN
+        kept = (self.low + shift >= 0.0) & (self.high - shift >= 0.0)
+        return int(np.count_nonzero(self.is_sound & ~kept))
 
 
 def _list_nearest(low: int, high: int, middle: float, most: int) -> list[int]:
@@ -135,32 +95,19 @@ def _list_nearest(low: int, high: int, middle: float, most: int) -> list[int]:
     return list(range(low, high + 1))
 
 
-def choose_turns(joint: TurningJoint, cuts: Sequence[int] = ()) -> list[int]:
-    """Choose the count of turns in every stretch between the cuts, by dynamic programming over the stretches.
+def choose_turns(joint: TurningJoint) -> int:
+    """Choose the turns with which a joint breaks its range in the fewest records, then keeps nearest to home."""
+    low, high = float(np.fmin.reduce(joint.angles)), float(np.fmax.reduce(joint.angles))
+    if math.isnan(low):
+        return 0
+    ends = _find_fitting_counts(joint.drive, low, high)
+    if ends[0] > ends[1]:
+        middle = (joint.drive.low + joint.drive.high - low - high) / (2.0 * TURN)
+        counts = _list_nearest(ends[1], ends[0], middle, _MOST_OFF)
+    else:
+        counts = _list_nearest(*ends, (joint.home - 0.5 * (low + high)) / TURN, _MOST_OFF)
 
-    The best counts break the joint's range in the fewest records, then turn the joint least, then keep nearest to home.
-    """
-    costs: dict[int, Cost] = {}  # of the best choice that ends with a count in the stretch before
-    origins: list[dict[int, int]] = []  # by stretch: the count before, by the count there
-    for stretch in joint.split(cuts):
-        new_costs: dict[int, Cost] = {}
-        origin: dict[int, int] = {}
-        step = 0.0 if not stretch.start else float(joint.angles[stretch.start] - joint.angles[stretch.start - 1])
-        step = 0.0 if math.isnan(step) else step
-        for turns in stretch.list_counts(joint, list(costs)):
-            off, from_home = stretch.measure_cost(joint, turns)
-            best: Cost = (off, 0.0, from_home)
-            for last, (off_before, turned, from_home_before) in costs.items():
-                turned = round(turned + abs(step + TURN * (turns - last)), 6)
-                cost = (off + off_before, turned, from_home + from_home_before)
-                if turns not in origin or cost < best:
-                    best, origin[turns] = cost, last
-            new_costs[turns] = best
-        costs = new_costs
-        origins.append(origin)
-    turns = min(costs, key=lambda count: (costs[count], abs(count)))
-    counts = [turns]
-    for origin in reversed(origins[1:]):
-        turns = origin[turns]
-        counts.append(turns)
-    return counts[::-1]
+    def cost(turns: int) -> tuple[int, float, int]:
+        return joint.count_off(turns), _measure_distance(turns, low, high, joint.home), abs(turns)
+
+    return min(counts, key=cost)

@@ -12,7 +12,6 @@ from ...machine import Machine
 from ..path import ToolPath
 from .path_samples import SampledPath
 from .turn_counts import TurningJoint, choose_turns, find_turns_in_range
-from .turn_rewinds import rewind_in_rapids
 from .turn_steps import find_turning_joints
 
 
@@ -21,15 +20,13 @@ class ModeSolution:
     """A path's joints in one working mode.
 
     mode : signs of the legs, and of head and table where the path begins
-    poses, joints : (n, axes) and (n, joints); C and a joint are turned back from each of ``rewinds`` on
-    rewinds : records to which a rapid motion leads that turns back
+    poses, joints : (n, axes) and (n, joints)
     swings : how many motions in feed turn a joint by more than a quarter turn
     """
 
     mode: str
     poses: Array
     joints: Array
-    rewinds: tuple[int, ...]
     swings: int
 
 
@@ -46,29 +43,20 @@ def follow_working_mode(machine: Machine, path: ToolPath, sampled: SampledPath, 
     """Choose the joints for the poses of a path's records in a working mode, with their turns counted.
 
     The turns are those with which the fewest records break a limit, then those by which the joints turn least, then
-    those nearest to home. A turn is taken back only in a rapid motion, where C goes on by whole turns and the joint
-    with it; the motion is followed in small steps for that.
+    those nearest to home. They are the same all along the path; :mod:`~.rewinds` takes turns back.
     """
     poses = sampled.poses[sampled.at_records]
     joints = machine.follow(sampled.poses, mode, PRINTED)[sampled.at_records]
     turning = find_turning_joints(machine)
-    rewinds: tuple[int, ...] = ()
     if not turning or not len(joints):
-        return ModeSolution(mode, poses, joints, rewinds, 0)
-    first = None if machine.wrist is None else machine.wrist.first
+        return ModeSolution(mode, poses, joints, 0)
     home = np.nan_to_num(machine.inverse(machine.home, mode)).tolist()
-    needs_rewinds = False
     for column in turning:
         turns = find_turns_in_range(machine.drives[column], joints[:, column], home[column])
-        if turns is None and column == first:
-            needs_rewinds = True
-            continue
         if turns is None:
-            turns = choose_turns(TurningJoint.of(machine, poses, joints, mode, column, home[column]))[0]
+            turns = choose_turns(TurningJoint.of(machine, poses, joints, mode, column, home[column]))
         joints[:, column] += TURN * turns
-    if needs_rewinds and first is not None:
-        poses, joints, rewinds = rewind_in_rapids(machine, path, poses, joints, mode, home[first])
-    return ModeSolution(mode, poses, joints, rewinds, _count_swings(joints[:, turning], path.rapid))
+    return ModeSolution(mode, poses, joints, _count_swings(joints[:, turning], path.rapid))
 
 
 def _count_swings(angles: Array, rapid: Flags) -> int:

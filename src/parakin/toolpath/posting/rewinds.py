@@ -1,0 +1,312 @@
+"""Rewinds: whole turns of a wrist's first joint taken back on a path, where it comes to an end of its range.
+
+A tool that is inclined sweeps a cone while it turns. So it turns where that is stated to be clear: above a plane in
+rapid motions, or retracted along its own axis by a clearance, from where it returns to the path. Both are records of
+the path like any other.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+
+from ...arguments import check_arguments
+from ...arrays import Array, Flags, Indices
+from ...errors import PoseError
+from ...kinematics.wrist import TURN, find_nearest_direction
+from ...machine import Machine
+from ..path import Note, ToolPath
+from ..programmed_path import compute_tool_axes
+from .post import post_path
+from .posted import Posted
+from .tool_lengths import fit_tool_lengths
+from .wrist_poses import find_pose_with_wrist
+
+_STEP = math.radians(15.0)  # of the joint, from record to record
+_LEAST_TILT = 0.02  # rad off the pole: nearer to it the tool is tilted so far while it turns
+_TRIED = 64  # places for one rewind
+_MOST_TURNS = 64  # either way
+_INSIDE = 1e-6  # rad that the joint keeps off the ends of its range
+
+
+class Clearance(NamedTuple):
+    """Where turns may be taken back.
+
+    retract : mm along the tool's axis by which it is clear of the part; None: it is not retracted
+    plane : mm, Z of the workpiece frame above which rapid motions are clear; None: nowhere
+    """
+
+    retract: float | None = None
+    plane: float | None = None
+
+    def check(self) -> None:
+        """Raise :class:`PoseError` for what is no clearance."""
+        if self.retract is not None and not 0.0 < self.retract < math.inf:
+            raise PoseError(f"retract: more than 0 mm expected, not {self.retract!r}")
+        if self.plane is not None and not math.isfinite(self.plane):
+            raise PoseError(f"plane: a number of mm expected, not {self.plane!r}")
+
+
+@dataclass(frozen=True)
+class Rewind:
+    """Turns of a joint taken back at a record of a path.
+
+    record, line : 0-based, and the source line of the motion that follows
+    joint : its name
+    turns : how many, signed
+    retract : mm along the tool's axis; 0 where it turns above the plane
+    """
+
+    record: int
+    line: int
+    joint: str
+    turns: int
+    retract: float
+
+    def describe(self) -> Note:
+        """Describe it as a note of the path."""
+        way = f"retracted by {self.retract:g} mm along its axis" if self.retract else "above the clearance plane"
+        return Note(self.line, f"rewind: {self.joint} turns by {360 * self.turns}°, the tool {way}")
+
+
+@dataclass(frozen=True, eq=False)
+class RewoundPath:
+    """A path with rewinds.
+
+    path : with their records and notes
+    rewinds : in order
+    """
+
+    path: ToolPath
+    rewinds: tuple[Rewind, ...]
+
+    def __repr__(self) -> str:
+        return f"<parakin rewound path: {len(self.path)} records, {len(self.rewinds)} rewinds>"
+
+
+class _Records(NamedTuple):
+    """m records to insert before one record of a path: tips and axes in W, and whether they are come to in rapid."""
+
+    tip: Array
+    axis: Array
+    rapid: Flags
+
+
+@check_arguments
+def rewind_path(
+    machine: Machine, path: ToolPath, clearance: Clearance, *, workpiece: Array | None = None, mode: str | None = None
+) -> RewoundPath:
+    """Insert the fewest rewinds into a path that keep the wrist's first joint in its range.
+
+    machine, path, workpiece, mode : as :func:`~.post.post_path` takes them; the tools' lengths are fitted first
+
+    Every stretch between two rewinds is as long as can be (greedy, which is optimal for their number). Of the places
+    at which the next stretch may begin, records above the plane come first, then those between rapid motions, then
+    those between a rapid and a cut, then those in a cut; of these the ones from where the path can go on farthest. The
+    first place at which the machine can retract and turn within its limits is taken. Where there is none, the path
+    goes on without, and has a note.
+
+    Raises :class:`PoseError` for an invalid clearance, and as :func:`~.post.post_path` does.
+    """
+    clearance.check()
+    path = fit_tool_lengths(machine, path)
+    posted = post_path(machine, path, workpiece=workpiece, mode=mode)
+    return _RewindBuilder(posted, clearance).build() if is_wound_up(posted) else RewoundPath(path, ())
+
+
+def is_wound_up(posted: Posted) -> bool:
+    """Tell whether a path turns the wrist's first joint farther than its range is wide."""
+    wrist = posted.machine.wrist
+    if wrist is None:
+        return False
+    drive, angles = posted.machine.drives[wrist.first], posted.joints[:, wrist.first]
+    finite = angles[np.isfinite(angles)]
+    return bool(len(finite)) and not drive.low <= finite.min() <= finite.max() <= drive.high
+
+
+class _RewindBuilder:
+    """Builds the rewinds of a posted path; places are records, after which the turn is made."""
+
+    def __init__(self, posted: Posted, clearance: Clearance):
+        wrist = posted.machine.wrist
+        assert wrist is not None
+        self.posted, self.clearance, self.wrist = posted, clearance, wrist
+        self.machine, self.path = posted.machine, posted.path
+        self.drive = self.machine.drives[wrist.first]
+        self.angles = _fill_gaps(posted.joints[:, wrist.first])
+        self.counts = self._list_counts()
+        self.ends = np.stack([self._find_ends(int(count)) for count in self.counts])
+        self.rank = self._rank_places()
+
+    def _list_counts(self) -> Indices:
+        """List the counts of turns that bring any record into the range."""
+        low = math.floor((self.drive.low - self.angles.max()) / TURN)
+        high = math.ceil((self.drive.high - self.angles.min()) / TURN)
+        return np.arange(max(low, -_MOST_TURNS), min(high, _MOST_TURNS) + 1)
+
+    def _find_ends(self, count: int) -> Indices:
+        """Find for each record the first one from there on that a count of turns does not keep in the range, (n,)."""
+        angles = self.angles + count * TURN
+        kept = (angles >= self.drive.low + _INSIDE) & (angles <= self.drive.high - _INSIDE)
+        lost = np.where(kept, len(angles), np.arange(len(angles)))
+        return np.minimum.accumulate(lost[::-1])[::-1]
+
+    def _rank_places(self) -> Indices:
+        """Rank the records as places for a rewind, (n,): 0 the best, -1 where there may be none."""
+        rapid, count = self.path.rapid, len(self.path)
+        before, behind = rapid, np.append(rapid[1:], False)
+        rank = np.full(count, -1, np.int64)
+        if self.clearance.retract is not None:
+            rank[:] = 3 - before.astype(np.int64) - behind
+        if self.clearance.plane is not None:
+            rank[before & (self.path.tip[:, 2] >= self.clearance.plane)] = 0
+        rank[-1:] = -1
+        return rank
+
+    def build(self) -> RewoundPath:
+        """Build all rewinds, and the path with them."""
+        added: list[tuple[int, _Records]] = []
+        rewinds, notes = [], []
+        start = -1  # the last place
+        end = int(self.ends[:, 0].max())
+        before = int(self.counts[self.ends[:, 0].argmax()])
+        while end < len(self.angles):
+            found = self._find_rewind(start, end, before)
+            if found is None:
+                line = int(self.path.line[end])
+                notes.append(Note(line, f"no place for a rewind of {self.drive.name} before this line"))
+                break
+            rewind, records, after = found
+            rewinds.append(rewind)
+            added.append((rewind.record + 1, records))
+            start, before = rewind.record, after
+            end = int(self.ends[after - int(self.counts[0]), start])
+        notes = [*(rewind.describe() for rewind in rewinds), *notes]
+        path = replace(_insert_rows(self.path, added), notes=(*self.path.notes, *notes))
+        return RewoundPath(path, tuple(rewinds))
+
+    def _find_rewind(self, start: int, end: int, before: int) -> tuple[Rewind, _Records, int] | None:
+        """Find the rewind that ends a stretch from ``start``, which can't go on to ``end``, and the turns behind it."""
+        places = np.arange(start + 1, end)
+        places = places[self.rank[places] >= 0]
+        reach = self.ends[:, places]
+        best = reach.argmax(axis=0) if len(places) else np.empty(0, np.int64)
+        farthest = reach[best, np.arange(len(places))]
+        order = np.lexsort((-places, -farthest, self.rank[places]))
+        order = order[farthest[order] > end]
+        for index in order[:: max(1, len(order) // _TRIED)][:_TRIED].tolist():
+            place, after = int(places[index]), int(self.counts[best[index]])
+            retract = 0.0 if self.rank[place] == 0 and self._is_above_plane(place) else self.clearance.retract or 0.0
+            records = self._retract_and_turn(place, before, after, retract)
+            if records is not None:
+                line = int(self.path.line[place + 1])
+                return Rewind(place, line, self.drive.name, after - before, retract), records, after
+        return None
+
+    def _is_above_plane(self, place: int) -> bool:
+        plane = self.clearance.plane
+        return plane is not None and bool(self.path.rapid[place]) and float(self.path.tip[place, 2]) >= plane
+
+    def _retract_and_turn(self, place: int, before: int, after: int, retract: float) -> _Records | None:
+        """Retract the tool at a record, turn it, and return; None where the machine can't do that within its limits."""
+        path, axis = self.path, self.path.axis[place]
+        tip = path.tip[place] + retract * axis
+        axes = self._turn(place, tip, before, after)
+        if axes is None:
+            return None
+        rapid = np.ones(len(axes), np.bool_)
+        if not retract:
+            return _Records(np.tile(tip, (len(axes), 1)), axes, rapid)
+        tips = np.vstack([np.tile(tip, (len(axes) + 2, 1)), path.tip[place]])
+        rapid = np.append(np.ones(len(axes) + 2, np.bool_), path.rapid[place + 1])
+        return _Records(tips, np.vstack([axis, axes, axis, axis]), rapid)
+
+    def _turn(self, place: int, tip: Array, before: int, after: int) -> Array | None:
+        """Turn the first joint at a tip in W, the second one as at a record; return the axes (k, 3) in W, or None."""
+        posted, wrist, frame = self.posted, self.wrist, self.posted.frame
+        joints, pose = posted.joints[place].copy(), posted.poses[place].copy()
+        if not np.isfinite(joints).all():
+            return None
+        modes = posted.mode, wrist.other_mode(posted.mode)
+        mode = modes[0] if wrist.has_mode(pose[None], joints[None], modes[0])[0] else modes[1]
+        is_upright = wrist.find_free(pose[None], _LEAST_TILT)[0]
+        wanted = wrist.tilt(joints, mode, _LEAST_TILT) if is_upright else joints
+        pose[:3] = frame[:, :3] @ tip + frame[:, 3]
+        steps = math.ceil(abs(after - before) * TURN / _STEP)
+        poses, rows = [], []
+        for count in before + (after - before) * np.arange(steps + 1) / steps:
+            row = wanted.copy()
+            row[wrist.first] += TURN * count
+            found = find_pose_with_wrist(self.machine, pose, row, mode)
+            if found is None:
+                return None
+            pose = found
+            legs = self.machine.inverse(pose, mode)
+            legs[wrist.pair] = row[wrist.pair]
+            poses.append(pose)
+            rows.append(legs)
+        if self.machine.check(np.array(poses), np.array(rows), mode).any():
+            return None
+        turns = np.zeros((len(poses), 3))
+        turns[:, 1:] = np.array(poses)[:, wrist.direction.pair]
+        axes: Array = compute_tool_axes(turns) @ frame[:, :3]
+        return axes
+
+
+def _fill_gaps(angles: Array) -> Array:
+    """Replace angles that do not exist by the last one that does, at the start by the first."""
+    finite = np.isfinite(angles)
+    index = np.maximum.accumulate(np.where(finite, np.arange(len(angles)), -1))
+    filled: Array = angles[np.where(index < 0, int(finite.argmax()), index)]
+    return filled
+
+
+def _insert_rows(path: ToolPath, added: list[tuple[int, _Records]]) -> ToolPath:
+    """Insert records into a path, each with the line, the feed and the spindle of the record that it stands before.
+
+    Turns that the path gives go on from those of the record before, and what follows goes on from them.
+    """
+    if not added:
+        return path
+    at = np.concatenate([np.full(len(records.rapid), record) for record, records in added])
+    tip, axis, rapid = (np.concatenate(rows) for rows in zip(*(records for _, records in added), strict=True))
+    seconds = path.seconds
+    feed = path.feed if seconds is None else _fill_feeds(path)
+    shift = np.searchsorted(at, np.arange(len(path) + 1), "right").tolist()
+    return replace(
+        path,
+        tip=np.insert(path.tip, at, tip, axis=0),
+        axis=np.insert(path.axis, at, axis, axis=0),
+        line=np.insert(path.line, at, path.line[at]),
+        rapid=np.insert(path.rapid, at, rapid),
+        feed=np.insert(path.feed, at, np.where(rapid, path.feed[at], feed[at])),
+        spindle=np.insert(path.spindle, at, path.spindle[at]),
+        events=tuple(event._replace(record=event.record + shift[event.record]) for event in path.events),
+        tools=tuple(use._replace(record=use.record + shift[use.record]) for use in path.tools),
+        extension=None if path.extension is None else np.insert(path.extension, at, path.extension[at - 1]),
+        turns=None if path.turns is None else _insert_turns(path.turns, at, axis),
+        seconds=None if seconds is None else np.insert(seconds, at, np.nan),
+    )
+
+
+def _fill_feeds(path: ToolPath) -> Array:
+    """Compute feeds, mm/min, also for the records that give a time."""
+    assert path.seconds is not None
+    length = np.linalg.norm(np.diff(path.tip, axis=0, prepend=path.tip[:1]), axis=1)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        feed: Array = np.where(np.isnan(path.seconds), path.feed, 60.0 * length / path.seconds)
+    return feed
+
+
+def _insert_turns(turns: Array, at: Indices, axis: Array) -> Array:
+    """Insert A = 0, B and C (n, 3) that point along axes; C of what follows goes on by the whole turns made."""
+    inserted = np.insert(turns, at, np.nan, axis=0)
+    new = np.flatnonzero(np.isnan(inserted[:, 0]))
+    for row, direction in zip(new.tolist(), axis, strict=True):
+        inserted[row] = find_nearest_direction(direction[None], inserted[row - 1 : row])[0]
+        if row + 1 < len(inserted) and not np.isnan(inserted[row + 1, 0]):
+            inserted[row + 1 :, 2] += TURN * round(float(inserted[row, 2] - inserted[row + 1, 2]) / TURN)
+    return inserted

@@ -109,7 +109,9 @@ def test_what_the_machine_cannot_retract_is_left_and_said():
 def test_a_path_within_the_range_is_left_alone():
     machine = pk.load("tricept")
     path = winding(machine, turns=1.0)
-    assert pk.rewind_path(machine, path, pk.Clearance(retract=5.0)).path is path
+    rewound = pk.rewind_path(machine, path, pk.Clearance(retract=5.0))
+    assert not rewound.rewinds and not rewound.path.notes
+    np.testing.assert_array_equal(rewound.path.tip, path.tip)
 
 
 def test_events_keep_their_motions():

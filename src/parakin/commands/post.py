@@ -24,13 +24,13 @@ from .part_options import (
     parse_tool_length,
     read_part,
 )
+from .rewinding import check_clearance, rewind_part
 from .workpiece import parse_bounds, parse_workpiece
 
 if TYPE_CHECKING:
-    from ..arrays import Writer
+    from ..arrays import Array, Writer
     from ..export.files import Content
     from ..toolpath.job import Job
-    from ..toolpath.posting.rewinds import Rewind
 
 Part = Annotated[
     Path,
@@ -161,19 +161,16 @@ def post(
     (table and report are written all the same, a program only with --force), 2 for input that can't be read.
     """
     chosen = load_machine(machine, sizes)
-    if place is not None and workpiece is not None:
-        raise InputError("--place finds the workpiece's pose; expected it or --workpiece", "--place")
-    placed = None if workpiece is None else parse_workpiece(workpiece)
+    placed = _parse_workpiece_unless_found(workpiece, place)
     _check_tolerances(tolerance, angle_tolerance, arc_tolerance)
     length = parse_tool_length(tool_length, tools)
-    _check_clearance(rewind, clearance)
+    check_clearance(rewind, clearance)
     announce_compiling()
     from ..export.files import write_files
     from ..export.json.job import encode_job
     from ..toolpath.job import Tolerances, prepare
     from ..toolpath.placing.placement import find_placement
     from ..toolpath.posting.frames import compose_frames
-    from ..toolpath.posting.rewinds import Clearance, rewind_path
     from .post_summary import summarise_job
 
     with ProgressBar() as progress:
@@ -187,10 +184,7 @@ def post(
             saying = progress.part("placing the part", 0.1, 0.3)
             placement = find_placement(chosen, path, parse_bounds(place), mode=mode, progress=saying)
             placed, mode = placement.workpiece, placement.mode
-        rewinds: tuple[Rewind, ...] = ()
-        if rewind is not None or clearance is not None:
-            rewound = rewind_path(chosen, path, Clearance(rewind, clearance), workpiece=placed, mode=mode)
-            path, rewinds = rewound.path, rewound.rewinds
+        path, rewinds = rewind_part(chosen, path, (rewind, clearance), placed, mode)
         job = prepare(
             chosen, path, workpiece=placed, mode=mode, tolerances=Tolerances(tolerance, radians(angle_tolerance)),
             interpolation=load_controller(target).interpolation if target else "pose", corners=corners,
@@ -206,19 +200,18 @@ def post(
     return 0 if job.runs and not missing else OFF_LIMITS
 
 
+def _parse_workpiece_unless_found(workpiece: str | None, place: str | None) -> Array | None:
+    if place is not None and workpiece is not None:
+        raise InputError("--place finds the workpiece's pose; expected it or --workpiece", "--place")
+    return None if workpiece is None else parse_workpiece(workpiece)
+
+
 def _check_tolerances(tolerance: float, angle_tolerance: float, arc_tolerance: float) -> None:
     lengths = {"--tolerance": tolerance, "--angle-tolerance": angle_tolerance, "--arc-tolerance": arc_tolerance}
     for option, value in lengths.items():
         if not (value > 0.0 and isfinite(value)):
             unit = "an angle above zero, in degrees" if "angle" in option else "a length above zero, in mm"
             raise InputError(f"expected {unit}", option)
-
-
-def _check_clearance(rewind: float | None, clearance: float | None) -> None:
-    if rewind is not None and not (rewind > 0.0 and isfinite(rewind)):
-        raise InputError("expected a length above zero, in mm", "--rewind")
-    if clearance is not None and not isfinite(clearance):
-        raise InputError("expected a height, in mm", "--clearance")
 
 
 @dataclass(frozen=True)

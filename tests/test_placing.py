@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import parakin as pk
+from parakin.cli import main
 from parakin.commands.workpiece import parse_bounds
 from parakin.toolpath.path import ToolPath
 from parakin.toolpath.placing.placement import find_placement
@@ -221,3 +222,34 @@ def test_questions_that_make_no_sense():
         find_placement(machine, path_of(np.empty((0, 3))), {"X": (0.0, 1.0)})
     with pytest.raises(pk.PoseError, match="mode"):
         find_placement(machine, path, {"X": (0.0, 1.0)}, mode="?")
+
+
+def test_the_other_maxima_come_after_the_best():
+    machine, path = pk.load("tricept"), scattered(4, 40, [150, 100, 40], 30)
+    bounds = parse_bounds("X=-300:300,Y=-300:300,Z=-2000:-1400")
+    placements = pk.find_placements(machine, path, bounds)
+    margins = [placement.margin for placement in placements]
+    assert len(placements) > 1 and margins == sorted(margins, reverse=True)
+    np.testing.assert_array_equal(placements[0].workpiece, pk.find_placement(machine, path, bounds).workpiece)
+    for placement in placements:
+        assert least(machine, path, placement.workpiece, placement.mode) == pytest.approx(placement.margin, abs=1e-12)
+
+
+def test_the_command_takes_a_placement_at_which_the_whole_job_runs(tmp_path, monkeypatch, capsys):
+    (tmp_path / "a.apt").write_text("UNITS/MM\nFEDRAT/600,MMPM\nGOTO/0,0,0\nGOTO/40,0,0\nFINI\n")
+    found = pk.find_placements(pk.load("tricept"), pk.read_path(tmp_path / "a.apt"), {"Z": (-1600, -1500)})
+    outside = replace(found[0], workpiece=pk.workpiece(Z=500.0))
+    arguments = [
+        "post",
+        str(tmp_path / "a.apt"),
+        "--machine",
+        "tricept",
+        "--place",
+        "Z=-1600:-1500",
+        "-o",
+        str(tmp_path),
+    ]
+    for placements, code in (([outside, found[0]], 0), ([outside], 3)):
+        monkeypatch.setattr("parakin.toolpath.placing.placement.find_placements", lambda *_, p=placements, **__: p)
+        assert main(arguments) == code
+    assert "outside" in capsys.readouterr().out

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from .performance.atlas import Atlas, atlas
     from .toolpath.job import Job, Tolerances, prepare
     from .toolpath.path import ToolPath
-    from .toolpath.placing.placement import Placement, find_placement
+    from .toolpath.placing.placement import Placement, find_placement, find_placements
     from .toolpath.posting.frames import workpiece
     from .toolpath.posting.rewinds import Clearance, Rewind, RewoundPath, rewind_path
     from .toolpath.posting.tool_lengths import fit_tool_lengths
@@ -76,6 +76,7 @@ __all__ = [
     "find_cross_sections",
     "find_largest_box",
     "find_placement",
+    "find_placements",
     "fit_tool_lengths",
     "load",
     "machines",
@@ -165,6 +166,7 @@ _LAZY = {
     "find_cross_sections": "workspaces.sampled.cross_sections",
     "find_largest_box": "workspaces.inscribed.largest_box",
     "find_placement": "toolpath.placing.placement",
+    "find_placements": "toolpath.placing.placement",
     "fit_tool_lengths": "toolpath.posting.tool_lengths",
     "make_joint_program": "controllers.joints.program",
     "make_linuxcnc_configuration": "controllers.linuxcnc.configuration",

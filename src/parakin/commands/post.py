@@ -13,6 +13,7 @@ from ..controllers import Target, load_controller
 from ..errors import InputError, PoseError
 from .console import ProgressBar, announce_compiling, print_json, print_text
 from .options import OFF_LIMITS, Json, Mode, Sizes, complete_machine, load_machine
+from .part_job import JobOptions, check_clearance, prepare_part
 from .part_options import (
     FrameChoice,
     PartOptions,
@@ -24,8 +25,7 @@ from .part_options import (
     parse_tool_length,
     read_part,
 )
-from .rewinding import check_clearance, rewind_part
-from .workpiece import parse_bounds, parse_workpiece
+from .workpiece import parse_workpiece
 
 if TYPE_CHECKING:
     from ..arrays import Array, Writer
@@ -168,8 +168,7 @@ def post(
     announce_compiling()
     from ..export.files import write_files
     from ..export.json.job import encode_job
-    from ..toolpath.job import Tolerances, prepare
-    from ..toolpath.placing.placement import find_placement
+    from ..toolpath.job import Tolerances
     from ..toolpath.posting.frames import compose_frames
     from .post_summary import summarise_job
 
@@ -179,22 +178,17 @@ def post(
             None if place else compose_frames(placed, None), progress.part("reading", 0.0, 0.1),
         )  # fmt: skip
         path = fit_part(chosen, path, length)
-        placement = None
-        if place is not None:
-            saying = progress.part("placing the part", 0.1, 0.3)
-            placement = find_placement(chosen, path, parse_bounds(place), mode=mode, progress=saying)
-            placed, mode = placement.workpiece, placement.mode
-        path, rewinds = rewind_part(chosen, path, (rewind, clearance), placed, mode)
-        job = prepare(
-            chosen, path, workpiece=placed, mode=mode, tolerances=Tolerances(tolerance, radians(angle_tolerance)),
-            interpolation=load_controller(target).interpolation if target else "pose", corners=corners,
-            progress=progress.part("checking and timing", 0.3, 0.7),
+        options = JobOptions(
+            mode, Tolerances(tolerance, radians(angle_tolerance)),
+            load_controller(target).interpolation if target else "pose", corners, rewind, clearance,
         )  # fmt: skip
+        prepared = prepare_part(chosen, path, placed, place, options, progress)
+        job, placement = prepared.job, prepared.placement
         files, missing = _make_files(part.stem, job, _Wanted(target, force, rate, parquet), progress)
         paths = write_files(output, dict(files.values()))
     written = {kind: str(name) for kind, name in zip(files, paths, strict=True)}
     if json:
-        print_json(encode_job(job, placement, rewinds, missing, written))
+        print_json(encode_job(job, placement, prepared.rewinds, missing, written))
     else:
         print_text(summarise_job(job, target, written, placement, missing))
     return 0 if job.runs and not missing else OFF_LIMITS

@@ -16,7 +16,7 @@ from ...machine import Machine
 from ..path import ToolPath
 from ..posting.tool_lengths import fit_tool_lengths
 from ..posting.working_mode import list_candidate_modes
-from .margins import AXES, PlacementMargins
+from .margins import AXES, PlacementMargins, PlacementScore
 from .placement_search import PlacementSearch
 
 AxisRanges: TypeAlias = Mapping[str, Span | Sequence[float | str]]
@@ -62,6 +62,20 @@ def find_placement(
 ) -> Placement:
     """Find the placement within bounds that has the greatest least margin over all records of a path.
 
+    The first of :func:`find_placements`, whose arguments and errors these are.
+    """
+    return find_placements(machine, path, bounds, mode=mode, progress=progress)[0]
+
+
+@check_arguments
+def find_placements(
+    machine: Machine, path: ToolPath, bounds: AxisRanges, *, mode: str | None = None, progress: Progress | None = None
+) -> list[Placement]:
+    """Find the placements within bounds at which the least margin over all records of a path is greatest, best first.
+
+    The first is the best one found; the others are local maxima elsewhere, for where the motions between the records
+    break a limit at the best.
+
     Parameters
     ----------
     machine, path : as :func:`~..posting.post.post_path` takes them
@@ -69,7 +83,7 @@ def find_placement(
     mode : working mode; None: the default one, and head and table's other sign where that allows no placement
     progress : called now and then with the fraction done, 0 to 1
 
-    The same arguments give the same placement. The search (:class:`~.placement_search.PlacementSearch`) finds the
+    The same arguments give the same placements. The search (:class:`~.placement_search.PlacementSearch`) finds the
     greatest, it does not prove it.
 
     Raises :class:`PoseError` for invalid bounds, an unknown mode and a path without records.
@@ -88,16 +102,20 @@ def find_placement(
     axes = tuple(axis for axis in AXES if axis in spans and spans[axis][0] < spans[axis][1])
     fixed = {axis: ends[0] for axis, ends in spans.items() if axis not in axes}
     low_high = np.array([spans[axis] for axis in axes]).reshape(-1, 2)
-    results, tried = [], 0
+    results, tried = list[tuple[Array, PlacementScore, PlacementMargins]](), 0
     for candidate in list_candidate_modes(machine, mode):
         margins = PlacementMargins(machine, path, candidate, axes, low_high[:, 0], low_high[:, 1], fixed)
         search = PlacementSearch(margins, report)
-        results.append((*search.run(), margins))
+        results += [(point, score, margins) for point, score in search.run()]
         tried += search.tried
-        if results[-1][1].margin >= 0.0:
+        if any(score.margin >= 0.0 for _, score, _ in results):
             break
-    point, score, margins = max(results, key=lambda result: result[1].worth)
     report(1.0)
+    results.sort(key=lambda result: -result[1].worth)
+    return [_describe_placement(*result, tried) for result in results]
+
+
+def _describe_placement(point: Array, score: PlacementScore, margins: PlacementMargins, tried: int) -> Placement:
     values = margins.list_values(point)
     values = {axis: values[axis] for axis in AXES if axis in values}
     workpiece = margins.build_workpiece(point)

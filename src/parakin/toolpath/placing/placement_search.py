@@ -39,9 +39,13 @@ class PlacementSearch:
         self.track: Indices | None = None
         self.tried = 0
 
-    def run(self) -> tuple[Array, PlacementScore]:
-        """Find the best point, and its score over the whole path."""
-        return self._settle(self._find_local_maxima(0.0, 0.5))
+    def run(self) -> list[tuple[Array, PlacementScore]]:
+        """Find the best point, and its score over the whole path; then the other local maxima, the best first."""
+        best, others = self._settle(self._find_local_maxima(0.0, 0.5))
+        apart = [point for point in others if len(point) and np.abs(point - best[0]).max() > _APART]
+        scored = [(point, self.margins.score_placement(point)) for point in apart]
+        self.tried += len(scored)
+        return [best, *sorted(scored, key=lambda found: -found[1].worth)]
 
     def _compute_rows(self, points: Array) -> tuple[Array, Array]:
         self.tried += len(points)
@@ -60,8 +64,8 @@ class PlacementSearch:
             self.report(begin + (end - begin) * (0.3 + 0.7 * number / len(starts)))
         return maxima
 
-    def _settle(self, maxima: list[LocalMaximum]) -> tuple[Array, PlacementScore]:
-        """Find the best local maximum over the whole path; add records until the most promising one holds there."""
+    def _settle(self, maxima: list[LocalMaximum]) -> tuple[tuple[Array, PlacementScore], list[Array]]:
+        """Find the best local maximum over the whole path, and all; add records until the most promising one holds."""
         best: tuple[Array, PlacementScore] | None = None
         for attempt in range(_ROUNDS):
             maxima.sort(key=lambda maximum: (-round(maximum.worth, 9), -maximum.rest))
@@ -89,7 +93,7 @@ class PlacementSearch:
             index = max(range(len(maxima)), key=lambda i: maxima[i].worth)
             maxima[index] = find_local_maximum(self._compute_rows, maxima[index].point, _STEPS_AGAIN, _TRUST_AGAIN)
         assert best is not None
-        return best
+        return best, [maximum.point for maximum in maxima]
 
 
 def _spread_points(count: int, d: int) -> Array:

@@ -1,0 +1,101 @@
+"""The job of ``parakin post``: a part placed, rewound where that is allowed, and prepared."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import isfinite
+from typing import TYPE_CHECKING, Literal, NamedTuple
+
+from ..errors import InputError
+from .workpiece import parse_bounds
+
+if TYPE_CHECKING:
+    from ..arrays import Array
+    from ..machine import Machine
+    from ..toolpath.job import Job, Tolerances
+    from ..toolpath.linearise.deviation import Interpolation
+    from ..toolpath.path import ToolPath
+    from ..toolpath.placing.placement import Placement
+    from ..toolpath.posting.rewinds import Rewind
+    from .console import ProgressBar
+
+
+@dataclass(frozen=True)
+class JobOptions:
+    """The options that say how a part is prepared; ``rewind`` and ``clearance`` are mm."""
+
+    mode: str | None
+    tolerances: Tolerances
+    interpolation: Interpolation
+    corners: Literal["round", "stop"]
+    rewind: float | None
+    clearance: float | None
+
+
+class PreparedPart(NamedTuple):
+    """A job with the placement and the rewinds that were found for it."""
+
+    job: Job
+    placement: Placement | None
+    rewinds: tuple[Rewind, ...]
+
+
+def check_clearance(rewind: float | None, clearance: float | None) -> None:
+    """Raise :class:`InputError` for values that are none of their options."""
+    if rewind is not None and not (rewind > 0.0 and isfinite(rewind)):
+        raise InputError("expected a length above zero, in mm", "--rewind")
+    if clearance is not None and not isfinite(clearance):
+        raise InputError("expected a height, in mm", "--clearance")
+
+
+def prepare_part(
+    machine: Machine,
+    path: ToolPath,
+    workpiece: Array | None,
+    place: str | None,
+    options: JobOptions,
+    progress: ProgressBar,
+) -> PreparedPart:
+    """Prepare a part on a workpiece, or at the best placement within bounds ``place`` at which the whole job runs.
+
+    Where it runs at none of the placements found, it is prepared at the best of them.
+    """
+    if place is None:
+        return _prepare_at(machine, path, workpiece, options, progress)
+    from ..toolpath.placing.placement import find_placements
+
+    saying = progress.part("placing the part", 0.1, 0.3)
+    found = find_placements(machine, path, parse_bounds(place), mode=options.mode, progress=saying)
+    prepared = []
+    for placement in found:
+        part = _prepare_at(machine, path, placement.workpiece, options, progress, placement)
+        prepared.append(part)
+        if part.job.runs:
+            return part
+    return prepared[0]
+
+
+def _prepare_at(
+    machine: Machine,
+    path: ToolPath,
+    workpiece: Array | None,
+    options: JobOptions,
+    progress: ProgressBar,
+    placement: Placement | None = None,
+) -> PreparedPart:
+    from ..toolpath.job import prepare
+
+    mode = options.mode if placement is None else placement.mode
+    rewinds: tuple[Rewind, ...] = ()
+    if options.rewind is not None or options.clearance is not None:
+        from ..toolpath.posting.rewinds import Clearance, rewind_path
+
+        clearance = Clearance(options.rewind, options.clearance)
+        rewound = rewind_path(machine, path, clearance, workpiece=workpiece, mode=mode)
+        path, rewinds = rewound.path, rewound.rewinds
+    job = prepare(
+        machine, path, workpiece=workpiece, mode=mode, tolerances=options.tolerances,
+        interpolation=options.interpolation, corners=options.corners,
+        progress=progress.part("checking and timing", 0.3, 0.7),
+    )  # fmt: skip
+    return PreparedPart(job, placement, rewinds)

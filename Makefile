@@ -2,7 +2,7 @@
 PYTHON ?= python3
 BIN := .venv/bin
 
-.PHONY: demo test lint bench pictures clean
+.PHONY: demo test lint bench pages pictures clean
 
 demo: .venv/installed
 	$(BIN)/python examples/turbine_blade.py -o out
@@ -19,6 +19,9 @@ lint: .venv/developing
 
 bench: .venv/developing
 	$(BIN)/python benchmarks/run.py
+
+pages: .venv/installed
+	$(BIN)/python scripts/reading_page.py
 
 pictures: .venv/installed
 	$(BIN)/python examples/pictures.py -o docs/pictures

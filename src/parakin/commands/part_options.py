@@ -89,7 +89,8 @@ def read_part(
     except InputError as error:
         if error.source in _ARGUMENTS:
             raise InputError(error.message, f"--{error.source.replace('_', '-')}") from None
-        raise
+        message = error.message.replace("a stated reference", "--reference").replace("a table of tools", "--tools")
+        raise InputError(message, error.source, error.line) from None
 
 
 def parse_tool_length(text: str | None, tools: Path | None) -> ToolLength:

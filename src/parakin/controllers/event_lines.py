@@ -13,9 +13,10 @@ from .gcode_text import LONGEST_COMMENT, format_comments, make_plain
 # of G-code, carried over as they are: spindle, coolant, stops, dwells, outputs, inputs, the controller's own codes
 _NUMBER = r"[-+\d.eE]+"
 _SAME = re.compile(rf"M\d+(?: [PQREL]{_NUMBER})*|S{_NUMBER}|G4 P{_NUMBER}")
-_COMMENTED = {6, 61}  # M codes of the tool: the change is a stop for the operator, and no tool offset may come of it
+# M codes that become comments: of the tool, whose change is a stop for the operator and may bring no length offset, and
+# those that save and restore modes which the program sets itself
+COMMENTED = frozenset((6, 61, 70, 71, 72, 73))
 _END = re.compile(r"M(?:2|30)")  # the program's own end replaces them
-_UNCARRIED = {70, 71, 72, 73}  # M codes that save and restore modes which the program sets itself
 _MESSAGE = re.compile(r"\(\s*msg\s*,(.*)\)", re.I | re.S)
 _STATEMENT = re.compile(r"([A-Z-]+)\s*(?:/(.*))?", re.S)
 _TURN = re.compile(r"^SPINDL\b.*\b(CC?LW)\b")  # which way the spindle turns; a later ON does not repeat it
@@ -118,7 +119,7 @@ def _keep_word(event: Event, path: ToolPath) -> str | None:
         return None
     code = re.match(r"M(\d+)", event.text)
     number = int(code[1]) if code else 0
-    if number in _COMMENTED | _UNCARRIED:
+    if number in COMMENTED:
         return None
     if number > _LARGEST_CODE:
         raise PoseError(f"{path.source}:{event.line}: M{number} can't be passed on; M0 to M{_LARGEST_CODE} expected")

@@ -92,7 +92,7 @@ WORDS: dict[str, Word] = {
 TEXT_WORDS = ("PPRINT", "PARTNO", "REMARK", "TPRINT", "INSERT", "LETTER", "DISPLY")  # a free text follows; events
 
 # words that move, turn, shift or compensate, by the reason why they cannot be honoured
-_REASONS = {
+REASONS = {
     "a motion along surfaces, which the file does not give as points": (
         "GO GOLFT GORGT GOFWD GOBACK GOUP GODOWN TLLFT TLRGT TLONPS TLOFPS PSIS POCKET PROFIL SCURV ARCSLP"
     ),
@@ -106,7 +106,7 @@ _REASONS = {
     "a motion in step with the spindle": "THREAD PITCH",
     "a motion that ends at a touch": "PROBE",
 }
-REFUSED = {word: reason for reason, words in _REASONS.items() for word in words.split()}
+REFUSED = {word: reason for reason, words in REASONS.items() for word in words.split()}
 _INFORMING = """
     AIR APPLY BARFED BEGIN BREAK CATCHR CHKPTS CHUCK CLAMP CLDATA CLRSRF CONTRL DATE FEATNO FIXTUR GECENT HEAD HEADER
     LEADER LINTOL MATERL MCHFIN MCHTOL MFGNO NOTE OFSTNO OPNAME OPSKIP OPTION OSETNO PENDWN PENUP SAFETY SELCTL SEQNO

@@ -42,6 +42,28 @@ G_GROUPS: dict[str, tuple[int, ...]] = {
     "path": (G61, G61_1, G64),
     "speed": (970,),
 }
+GROUP_TITLES = {  # what a modal group of G or M codes does, for people
+    "motion": "rapid, lines, arcs, and drilling cycles, which are written out as motion",
+    "cancel": "cancels a motion code",
+    "once": "dwell, offsets, reference points, machine coordinates: for one block",
+    "plane": "plane of arcs and cycles",
+    "distance": "absolute, incremental",
+    "centre": "arc centres absolute, incremental",
+    "feed": "feed as inverse time, per minute",
+    "units": "inches, mm",
+    "compensation": "cutter radius compensation off",
+    "length": "tool length offsets; G43.4 is tool centre point control",
+    "return": "way out of a cycle",
+    "system": "work systems",
+    "path": "path modes; they pass through as comments",
+    "speed": "spindle speed in revolutions",
+    "stop": "stops and ends",
+    "tool": "tool change: spindle and coolant off, a stop for the operator",
+    "spindle": "spindle",
+    "coolant": "coolant",
+    "override": "overrides",
+    "output": "outputs and inputs; they pass through",
+}
 M_GROUPS: dict[str, tuple[int, ...]] = {
     "stop": (0, 1, 2, 30, 60),
     "tool": (6,),
@@ -62,7 +84,7 @@ _M_GROUP = {code: group for group, codes in M_GROUPS.items() for code in codes}
 _RADIUS = "cutter radius compensation; expected a path of the tool's tip"
 _SPLINE = "a spline; write it as G1 or arcs"
 _PROBING = "probing; expected a path without it"
-_G_REFUSED = {
+G_REFUSED = {
     50: _SPLINE,
     51: _SPLINE,
     52: _SPLINE,
@@ -82,7 +104,7 @@ _G_REFUSED = {
     950: "a feed per revolution; expected G94 or G93",
     960: "a constant surface speed; expected G97",
 }
-_M_REFUSED = {
+M_REFUSED = {
     72: "it restores modes kept before; expected each mode stated",
     73: "it restores modes kept before; expected each mode stated",
     97: "a subroutine of Haas; expected O words such as sub and call",
@@ -99,7 +121,7 @@ def format_g_code(code: int) -> str:
 def find_g_group(code: int) -> str:
     """Find the modal group of a G code in tenths; refuse a code that is not read."""
     if code not in _G_GROUP:
-        reason = _G_REFUSED.get(code)
+        reason = G_REFUSED.get(code)
         name = format_g_code(code)
         refuse(f"{name}: {reason}" if reason else f"{name} is not a G code this reader knows")
     return _G_GROUP[code]
@@ -107,6 +129,6 @@ def find_g_group(code: int) -> str:
 
 def find_m_group(code: int) -> str:
     """Find the modal group of an M code; "other" for one that passes through. Refuse one that changes the motion."""
-    if code in _M_REFUSED:
-        refuse(f"M{code}: {_M_REFUSED[code]}")
+    if code in M_REFUSED:
+        refuse(f"M{code}: {M_REFUSED[code]}")
     return _M_GROUP.get(code, "other")

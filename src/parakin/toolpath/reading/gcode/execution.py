@@ -233,7 +233,7 @@ class BlockExecutor:
 
     def _tell_tool(self, number: float, line: int, *, loads: bool) -> None:
         """Keep the number of the tool that is loaded, or of the first one that is selected."""
-        if loads or not self.tools.uses:
+        if (loads and self.tools.uses) or (not self.tools.uses and not math.isnan(number)):
             data: dict[str, float | str] = {"name": "not told"} if math.isnan(number) else {"number": number}
             if self.tools.tell(self.motion.records.count, line, data, loads=loads):
                 self.motion.notes.add(line, "another tool from here on")

@@ -275,6 +275,8 @@ class GcodeReader:
             begun, columns = 1, np.concatenate([self._write_start(columns)[:, None], columns], axis=1)
         dropped = self._complete_coordinates(columns)
         columns = columns[:, dropped:]
+        if self.tools is not None and not executor.tools.uses and not executor.offsets.lengths:
+            motion.notes.add(0, "the program names no tool: the tool table is not used")
         if motion.untipped_line:
             motion.notes.add(motion.untipped_line, _ROTARY_NOTE)
         if not executor.units_given:
@@ -299,13 +301,21 @@ class GcodeReader:
             spindle=columns[SPINDLE].copy(),
             dialect="gcode",
             units=executor.units,
-            tool=dict(uses[0].data) if uses else {},
+            tool=self._describe_tool(),
             tools=tuple(use._replace(record=max(0, use.record + begun - dropped)) for use in uses),
             events=tuple(Event(max(0, e.record + begun - dropped), e.line, e.text) for e in executor.events),
             notes=motion.notes.list_notes(),
             turns=turns if any(motion.turned) else None,
             seconds=None if np.isnan(seconds).all() else seconds,
         )
+
+    def _describe_tool(self) -> dict[str, float | str]:
+        """Return the number of the first tool, and its length where the table has it."""
+        data = self.executor.tools.data
+        number = data.get("number")
+        if self.tools is not None and isinstance(number, float) and number in self.tools:
+            data["length"] = float(self.tools[int(number)])
+        return data
 
     def _write_start(self, columns: Array) -> Array:
         """Write the record of the start, (WIDTH,), with the line of the first motion."""

@@ -4,7 +4,6 @@ import math
 from collections.abc import Mapping, Sequence
 
 from ...path import ToolUse
-from ..text import refuse
 from ..tools import ToolLog
 from .offsets import LengthOffset
 
@@ -18,8 +17,6 @@ def list_tool_uses(
     one. Under tool centre point control (G43.4), and where no offset is known, it is the tip of the tool itself, whose
     length the table tells.
     """
-    if table is not None and not log.uses and not offsets:
-        refuse("the program names no tool, whose length a tool table could tell; expected T or G43 H")
     if any(offset.keeps_tip for offset in offsets):
         return tuple(_take_tip_length(use, offsets, table) for use in _list_changes(log))
     known = [offset for offset in offsets if not math.isnan(offset.length)]

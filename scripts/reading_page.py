@@ -47,18 +47,18 @@ tip is on the path; between records too. Summary, report, JSON and the program's
 
 | what is known | what counts |
 |---|---|
-| `--tool-length MM` | the first tool is so long, others by what their cutters are longer or shorter |
+| `--tool-length MM` | the longest tool is so long, others by what their cutters are shorter |
 | `--tool-length file` | the lengths in the file, of cutters too |
 | `--tool-length machine` | the machine's own, for all tools |
 | `--tools FILE` | the Z of LinuxCNC's tool table, by the number of LOADTL, T or G43 H |
 | `LOADTL/n,LENGTH,l`, `G10 L1`, `G43.1` | from nose to tip; refused where it is not the machine's own |
 | `TLDATA`, `CUTTER` with a height | a cutter without holder: refused where longer than the machine's own tool |
-| several cutters | the first as the machine's own, others by what they are longer or shorter |
+| several cutters | the longest as the machine's own tool, others by what they are shorter |
 | nothing | the machine's own |
 
-Before a change of the tool it is withdrawn along its axis: from a cut by 20 mm, and by what the next one is longer.
-Spindle and coolant are stopped (M5, M9) before the stop for the operator (M0), whom a message tells tool and
-length; they start again where the file says so.
+Before a change of the tool it is withdrawn along its axis: from a cut by 20 mm (less where the machine can't), and
+by what the next one is longer. Spindle and coolant are stopped (M5, M9) before the stop for the operator (M0), whom
+a message tells tool and length; they start again where the file says so.
 """
 
 

@@ -50,7 +50,7 @@ ToolLengthText = Annotated[
     str | None,
     Parameter(
         help=(
-            "How long the first tool is from the spindle's nose to its tip, in mm; file: all tools as the file says, "
+            "How long the longest tool is from the spindle's nose to its tip, in mm; file: all tools as the file says, "
             "machine: all as the machine's own. Without it a file that contradicts the machine's own is refused."
         )
     ),
@@ -106,12 +106,12 @@ def parse_tool_length(text: str | None, tools: Path | None) -> ToolLength:
     return parse_value("length", text, "--tool-length", "mm")
 
 
-def fit_part(machine: Machine, path: ToolPath, length: ToolLength) -> ToolPath:
+def fit_part(machine: Machine, path: ToolPath, length: ToolLength, workpiece: Array | None) -> ToolPath:
     """Fit a path to its tools' lengths; errors name the option."""
     from ..toolpath.posting.tool_lengths import fit_tool_lengths
 
     try:
-        return fit_tool_lengths(machine, path, length)
+        return fit_tool_lengths(machine, path, length, workpiece=workpiece)
     except PoseError as error:
         raise InputError(str(error).removeprefix("tool_length: "), "--tool-length") from None
     except InputError as error:

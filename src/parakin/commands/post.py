@@ -177,7 +177,7 @@ def post(
             part, PartOptions(frame, start, reference, tools), arc_tolerance,
             None if place else compose_frames(placed, None), progress.part("reading", 0.0, 0.1),
         )  # fmt: skip
-        path = fit_part(chosen, path, length)
+        path = fit_part(chosen, path, length, placed)
         options = JobOptions(
             mode, Tolerances(tolerance, radians(angle_tolerance)),
             load_controller(target).interpolation if target else "pose", corners, rewind, clearance,

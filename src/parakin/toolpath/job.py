@@ -114,7 +114,7 @@ def prepare(
         return lambda fraction: report(begin + (end - begin) * fraction)
 
     half = tolerances.halve()
-    path = fit_tool_lengths(machine, path)
+    path = fit_tool_lengths(machine, path, workpiece=workpiece)
     programmed = post_path(machine, path, workpiece=workpiece, mode=mode, progress=report_part(0.0, 0.1))
     if is_wound_up(programmed):
         programmed = _note_wound_up(programmed)

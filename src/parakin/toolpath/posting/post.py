@@ -46,7 +46,7 @@ def post_path(
     report = progress or (lambda fraction: None)
     if workpiece is not None and (np.shape(workpiece) != (3, 4) or not np.isfinite(workpiece).all()):
         raise PoseError("workpiece: a transform of shape (3, 4) expected")
-    path = fit_tool_lengths(machine, path)
+    path = fit_tool_lengths(machine, path, workpiece=workpiece)
     frame = compose_frames(workpiece, path.frame)
     poses, path_limits = compute_poses(machine, path.tip, path.axis, frame, path.turns)
     report(0.3)

@@ -18,31 +18,36 @@ from ...arrays import Array, Flags, Indices
 from ...errors import InputError, PoseError
 from ...machine import Machine
 from ..path import Note, ToolPath, ToolUse
+from .frames import compose_frames, compute_poses
 
 ToolLength: TypeAlias = float | Literal["file", "machine"] | None
 _SAME = 1e-3  # mm: lengths that are the same, with the decimals of a file
-_CLEARANCE = 20.0  # mm that the tool is taken out of a cut along its axis before it is changed
+_CLEARANCES = (20.0, 10.0, 5.0, 2.0)  # mm to withdraw from a cut before a change: the first that the machine allows
 _LONGEST = 1e4  # mm
 
 
-def fit_tool_lengths(machine: Machine, path: ToolPath, length: ToolLength = None) -> ToolPath:
+def fit_tool_lengths(
+    machine: Machine, path: ToolPath, length: ToolLength = None, *, workpiece: Array | None = None
+) -> ToolPath:
     """Move a path to where the tip of the machine's own tool has to be, and take the tool out where it is changed.
 
     Parameters
     ----------
     machine : its :attr:`~.machine.Machine.tool_length` is what its kinematics has
     path : as read; one that is fitted already is returned as it is
-    length : mm of the first tool, in place of the machine's own length; ``file``: all are as long as the file says;
+    length : mm of the longest tool, in place of the machine's own length; ``file``: all are as long as the file says;
         ``machine``: all are as long as the machine's own; None: see below
+    workpiece : as the path will be posted with; it tells how far the machine can withdraw the tool
 
     A tool table's length, and one that the file sets (LOADTL with LENGTH, G10 L1, G43.1), is from the spindle's nose to
     the tip. The file's may not differ from the machine's unless ``length`` says what counts. The length of a cutter
-    (TLDATA, CUTTER) is without its holder: the first tool is as long as the machine's own, which may not be shorter
-    than the cutter, and others by what their cutters are longer or shorter. A tool of which nothing is known is as long
-    as the machine's own.
+    (TLDATA, CUTTER) is without its holder: the tool with the longest cutter is as long as the machine's own, which may
+    not be shorter than the cutter, and others by what their cutters are shorter. A tool of which nothing is known is as
+    long as the machine's own.
 
-    Before a change the tool is withdrawn along its axis, from a cut by 20 mm, and by what the next tool is longer, so
-    that no tool is put in deeper than the one before; from a rapid position the next one goes on from the same point.
+    Before a change the tool is withdrawn along its axis, from a cut by 20 mm, or less where the machine can't, and by
+    what the next tool is longer, so that no tool is put in deeper than the one before; from a rapid position the next
+    one goes on from the same point.
 
     Raises :class:`InputError` with file and line for a length that contradicts the machine's, and :class:`PoseError`
     for an invalid length or a path fitted to another machine.
@@ -64,7 +69,7 @@ def fit_tool_lengths(machine: Machine, path: ToolPath, length: ToolLength = None
     for use in uses:
         extension[use.record :] = use.length - own
     path = replace(path, tools=uses, fitted_length=own, notes=(*path.notes, *_note_lengths(path, uses, own)))
-    path, extension = _insert_changes(path, extension)
+    path, extension = _insert_changes(machine, path, extension, workpiece)
     if not extension.any():
         return path
     return replace(path, tip=path.tip + extension[:, None] * path.axis, extension=extension)
@@ -75,25 +80,25 @@ def _choose_lengths(machine: Machine, path: ToolPath, length: ToolLength) -> lis
     own = machine.tool_length
     if length == "machine":
         return [own] * len(path.tools)
-    first = own if length is None or isinstance(length, str) else float(length)
-    base = next((cutter for cutter in map(_find_cutter_length, path.tools) if cutter == cutter), math.nan)
+    longest_tool = own if length is None or isinstance(length, str) else float(length)
+    longest = max((cutter for cutter in map(_find_cutter_length, path.tools) if cutter == cutter), default=math.nan)
     lengths = []
     for use in path.tools:
         cutter, told = _find_cutter_length(use), _find_length(use, "set_length")
         if told == told:
             if length is None and not use.from_table and abs(told - own) > _SAME:
                 _refuse_length(machine, path, use, f"is {told:g} mm long")
-            lengths.append(told if length is None or length == "file" or use.from_table else first)
+            lengths.append(told if length is None or length == "file" or use.from_table else longest_tool)
         elif cutter != cutter:
-            lengths.append(first)
+            lengths.append(longest_tool)
         elif length == "file":
             lengths.append(cutter)
         else:
-            lengths.append(first + cutter - base)
+            lengths.append(longest_tool + cutter - longest)
             if length is None and 0.0 < own < cutter - _SAME:
                 _refuse_length(machine, path, use, f"has a cutter of {cutter:g} mm")
             if lengths[-1] <= 0.0:
-                _refuse_length(machine, path, use, f"is {base - cutter:g} mm shorter than the first tool")
+                _refuse_length(machine, path, use, f"is {longest - cutter:g} mm shorter than the longest tool")
     return lengths
 
 
@@ -137,7 +142,9 @@ def _note_lengths(path: ToolPath, uses: Sequence[ToolUse], own: float) -> list[N
     return notes
 
 
-def _insert_changes(path: ToolPath, extension: Array) -> tuple[ToolPath, Array]:
+def _insert_changes(
+    machine: Machine, path: ToolPath, extension: Array, workpiece: Array | None
+) -> tuple[ToolPath, Array]:
     """Insert the motions at tool changes: out along the axis with the old tool, and to where the next one goes on."""
     source, lift, events_at = list[int](), list[float](), dict[int, int]()
     added = 0
@@ -145,7 +152,9 @@ def _insert_changes(path: ToolPath, extension: Array) -> tuple[ToolPath, Array]:
     for record in sorted(begins):
         last, longer = record - 1, float(extension[record] - extension[record - 1])
         from_cut = not path.rapid[last]
-        out = max(0.0, longer) + (_CLEARANCE if from_cut else 0.0)
+        out = max(0.0, longer)
+        if from_cut:
+            out += _choose_clearance(machine, path, last, out + float(extension[last]), workpiece)
         lifts = [(0.0, out), (1.0, out - longer)]  # old tool, new tool: the holder stands still between both
         if not from_cut:
             lifts.append((1.0, 0.0))
@@ -160,6 +169,17 @@ def _insert_changes(path: ToolPath, extension: Array) -> tuple[ToolPath, Array]:
     at = np.array(source, np.int64)
     new, height = np.array(lift).reshape(-1, 2).T
     return _insert_lifts(path, extension, at, new > 0.0, height, events_at)
+
+
+def _choose_clearance(machine: Machine, path: ToolPath, record: int, height: float, workpiece: Array | None) -> float:
+    """Choose how far to withdraw from a record, mm, beyond a height that is needed in any case."""
+    clearances = np.array(_CLEARANCES)
+    tips = path.tip[record] + (height + clearances)[:, None] * path.axis[record]
+    axes = np.repeat(path.axis[record][None], len(tips), axis=0)
+    turns = None if path.turns is None else np.repeat(path.turns[record][None], len(tips), axis=0)
+    poses = compute_poses(machine, tips, axes, compose_frames(workpiece, path.frame), turns)[0]
+    allowed = np.any([machine.check(poses, mode=mode) == 0 for mode in machine.head_modes(machine.mode)], axis=0)
+    return float(clearances[allowed.argmax()])
 
 
 def _insert_lifts(

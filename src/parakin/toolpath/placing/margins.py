@@ -158,7 +158,8 @@ class PlacementMargins:
 def _select_records(path: ToolPath, records: Indices) -> ToolPath:
     columns = {name: getattr(path, name)[records] for name in ("tip", "axis", "line", "rapid", "feed", "spindle")}
     turns = None if path.turns is None else path.turns[records]
-    return replace(path, **columns, turns=turns, seconds=None, events=(), notes=())
+    extension = None if path.extension is None else path.extension[records]
+    return replace(path, **columns, turns=turns, seconds=None, events=(), notes=(), tools=(), extension=extension)
 
 
 def _list_path_rows(limits: tuple[PathLimit, ...], records: Indices | slice) -> Array:

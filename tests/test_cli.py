@@ -52,11 +52,11 @@ def test_post(part, out, capsys):
     assert main(["post", str(part), "--machine", "tricept", "-o", str(out)]) == 0
     said = capsys.readouterr().out
     assert sorted(path.name for path in out.iterdir()) == ["part.joints.csv", "part.report.html"]
-    assert "3 records, all within the limits" in said
+    assert "3 records and 1 inserted, all within the limits" in said  # beside the pole, where the path begins
     assert said.splitlines()[-1].endswith(str(out / "part.report.html"))
     with (out / "part.joints.csv").open() as file:
         rows = list(csv.DictReader(file))
-    assert [row["line"] for row in rows] == ["3", "4", "5"]
+    assert [row["line"] for row in rows] == ["3", "4", "4", "5"]
     assert float(rows[0]["d1 [mm]"]) == pytest.approx((250**2 + 1200**2) ** 0.5, abs=1e-6)
 
 

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import isfinite
 from typing import TYPE_CHECKING, Literal, NamedTuple
 
+from ..controllers import Target, load_controller
 from ..errors import InputError
 from .workpiece import parse_bounds
 
@@ -13,7 +14,6 @@ if TYPE_CHECKING:
     from ..arrays import Array
     from ..machine import Machine
     from ..toolpath.job import Job, Tolerances
-    from ..toolpath.linearise.deviation import Interpolation
     from ..toolpath.path import ToolPath
     from ..toolpath.placing.placement import Placement
     from ..toolpath.posting.rewinds import Rewind
@@ -26,18 +26,19 @@ class JobOptions:
 
     mode: str | None
     tolerances: Tolerances
-    interpolation: Interpolation
+    target: Target | None
     corners: Literal["round", "stop"]
     rewind: float | None
     clearance: float | None
 
 
 class PreparedPart(NamedTuple):
-    """A job with the placement and the rewinds that were found for it."""
+    """A job with the placement and the rewinds that were found for it, and the s that its controller takes."""
 
     job: Job
     placement: Placement | None
     rewinds: tuple[Rewind, ...]
+    controller_seconds: float | None
 
 
 def check_clearance(rewind: float | None, clearance: float | None) -> None:
@@ -93,9 +94,15 @@ def _prepare_at(
         clearance = Clearance(options.rewind, options.clearance)
         rewound = rewind_path(machine, path, clearance, workpiece=workpiece, mode=mode)
         path, rewinds = rewound.path, rewound.rewinds
+    controller = load_controller(options.target) if options.target else None
     job = prepare(
         machine, path, workpiece=workpiece, mode=mode, tolerances=options.tolerances,
-        interpolation=options.interpolation, corners=options.corners,
+        interpolation=controller.interpolation if controller else "pose", corners=options.corners,
         progress=progress.part("checking and timing", 0.3, 0.7),
     )  # fmt: skip
-    return PreparedPart(job, placement, rewinds)
+    if controller is None or controller.predict_time is None or job.trajectory is None:
+        return PreparedPart(job, placement, rewinds, None)
+    seconds, notes = controller.predict_time(job.trajectory)
+    path = replace(job.posted.path, notes=(*notes, *job.posted.path.notes))
+    job = replace(job, posted=replace(job.posted, path=path))
+    return PreparedPart(job, placement, rewinds, seconds + job.waits)

@@ -178,19 +178,17 @@ def post(
             None if place else compose_frames(placed, None), progress.part("reading", 0.0, 0.1),
         )  # fmt: skip
         path = fit_part(chosen, path, length, placed)
-        options = JobOptions(
-            mode, Tolerances(tolerance, radians(angle_tolerance)),
-            load_controller(target).interpolation if target else "pose", corners, rewind, clearance,
-        )  # fmt: skip
+        tolerances = Tolerances(tolerance, radians(angle_tolerance))
+        options = JobOptions(mode, tolerances, target, corners, rewind, clearance)
         prepared = prepare_part(chosen, path, placed, place, options, progress)
-        job, placement = prepared.job, prepared.placement
+        job = prepared.job
         files, missing = _make_files(part.stem, job, _Wanted(target, force, rate, parquet), progress)
         paths = write_files(output, dict(files.values()))
     written = {kind: str(name) for kind, name in zip(files, paths, strict=True)}
     if json:
-        print_json(encode_job(job, placement, prepared.rewinds, missing, written))
+        print_json(encode_job(*prepared, missing, written))
     else:
-        print_text(summarise_job(job, target, written, placement, missing))
+        print_text(summarise_job(prepared, target, written, missing))
     return 0 if job.runs and not missing else OFF_LIMITS
 
 

@@ -11,24 +11,23 @@ from .console import format_table
 from .offences import format_offence
 
 if TYPE_CHECKING:
-    from ..toolpath.job import Job
     from ..toolpath.placing.placement import Placement
     from ..toolpath.posting.posted import Posted
+    from .part_job import PreparedPart
 
 _NOTES = 5  # remarks on the file that are printed
 _BINDING = 4  # limits that are named of those that bind
 _SHARE = 0.005  # what binds for less than this fraction of the time is not named
 
 
-def summarise_job(
-    job: Job, target: Target | None, written: dict[str, str], placement: Placement | None, missing: list[str]
-) -> str:
+def summarise_job(prepared: PreparedPart, target: Target | None, written: dict[str, str], missing: list[str]) -> str:
     """Summarise a job; the last lines name the files."""
     from ..export.json.job import encode_joint_ranges
     from ..toolpath.placing.outside import describe_outside
     from ..toolpath.posting.offence_texts import describe_place
     from ..toolpath.posting.setup_texts import describe_setup
 
+    job, placement = prepared.job, prepared.placement
     posted = job.posted
     path = posted.path
     count = f"{len(job.programmed.path):,} records"
@@ -42,7 +41,7 @@ def summarise_job(
     lines += [
         format_table([_format_range(joint) for joint in encode_joint_ranges(posted)], header, " rr"),
         "",
-        *_format_times(job, target if "program" in written else None),
+        *_format_times(prepared, target if "program" in written else None),
         "",
     ]
     if job.outside is not None:
@@ -83,8 +82,9 @@ def _format_placement(placement: Placement) -> str:
     )
 
 
-def _format_times(job: Job, target: Target | None) -> list[str]:
+def _format_times(prepared: PreparedPart, target: Target | None) -> list[str]:
     """Format the cycle time, and the controller's time if it differs."""
+    job, seconds = prepared.job, prepared.controller_seconds
     if job.trajectory is None or job.seconds is None:
         return [f"no cycle time: {job.unplanned}"]
     text = f"cycle time {format_duration(job.seconds)}"
@@ -92,11 +92,10 @@ def _format_times(job: Job, target: Target | None) -> list[str]:
         text += f", of which the program waits {job.waits:g} s"
     bound = [f"{name} {share:.0%}" for name, share in job.trajectory.shares.items() if share >= _SHARE][:_BINDING]
     text += f"; bound by {', '.join(bound)}" if bound else ""
-    controller = load_controller(target) if target else None
-    if controller is None or controller.predict_seconds is None:
+    if target is None or seconds is None:
         return [text]
-    seconds = controller.predict_seconds(job.trajectory) + job.waits
-    return [text, f"about {format_duration(seconds)} under {controller.title}, from the first record on"]
+    title = load_controller(target).title
+    return [text, f"about {format_duration(seconds)} under {title}, from the first record on"]
 
 
 def _format_range(joint: dict[str, Any]) -> tuple[str, ...]:

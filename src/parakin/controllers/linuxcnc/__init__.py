@@ -1,7 +1,8 @@
 """LinuxCNC: kinematics in C, the configuration that it starts with, and programs."""
 
 from ..controller import Controller
-from .program import make_linuxcnc_program, predict_linuxcnc_seconds
+from .predicted_time import predict_linuxcnc_time
+from .program import make_linuxcnc_program
 
 CONTROLLER = Controller(
     title="LinuxCNC",
@@ -9,5 +10,5 @@ CONTROLLER = Controller(
     make_program=lambda trajectory, forced, tolerance: make_linuxcnc_program(
         trajectory, forced=forced, tolerance=tolerance
     ),
-    predict_seconds=predict_linuxcnc_seconds,
+    predict_time=predict_linuxcnc_time,
 )

@@ -40,7 +40,8 @@ def make_linuxcnc_program(trajectory: Trajectory, *, forced: str | None = None, 
 
     Every motion is in the machine's own coordinates (G53), whatever offsets are in force, and in inverse time (G93).
     Records at one place are written once; where the trajectory's speed changes points are added on the straight line.
-    The program begins with a slow motion to the first record and takes :func:`predict_linuxcnc_seconds` from there.
+    The program begins with a slow motion to the first record and from there takes
+    :func:`~.predicted_time.predict_linuxcnc_seconds`.
 
     Raises :class:`PoseError` where LinuxCNC's kinematics can't follow: another working mode, or too many turns of C.
     """
@@ -64,12 +65,6 @@ def make_linuxcnc_program(trajectory: Trajectory, *, forced: str | None = None, 
 
 
 @check_arguments
-def predict_linuxcnc_seconds(trajectory: Trajectory) -> float:
-    """Predict LinuxCNC's time for a program from the first record on, s: the trajectory's time and more."""
-    motions = build_straight_motions(trajectory, *choose_axis_rates(trajectory.posted.machine))
-    return float(motions.seconds.sum())
-
-
 def _refuse_turns(machine: Machine, poses: Array) -> None:
     most = TURNS if machine.has_direction else 0.5
     for axis, values in zip(machine.axes, poses.T, strict=True):

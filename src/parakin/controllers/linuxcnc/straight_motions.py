@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...arrays import Array, Flags, Indices
+from ...machine import Machine
 from ...toolpath.timing.drive_limits import DriveLimits
 from ...toolpath.timing.trajectory import Trajectory
 from .joint_utilisation import measure_joint_utilisation
@@ -27,12 +28,16 @@ class StraightMotions:
     seconds : (k,) what each takes, whole cycles
     halt : (k,) whether the tool stands still at its end
     piece : (k,) the piece of the trajectory's curve that it is on, or a part of
+    held_up_by : (k,) what it takes longer for than the trajectory, an index into ``reasons``; 0 where it does not
+    reasons : in words
     """
 
     ends: Array
     seconds: Array
     halt: Flags
     piece: Indices
+    held_up_by: Indices
+    reasons: tuple[str, ...]
 
 
 class _Division(NamedTuple):
@@ -59,22 +64,34 @@ def build_straight_motions(trajectory: Trajectory, speeds: Array, accelerations:
     curve, pieces = trajectory.curve, len(trajectory.curve.length)
     if not pieces:
         nothing = np.empty(0)
-        return StraightMotions(np.empty((0, curve.corner.shape[1])), nothing, nothing > 0.0, nothing.astype(np.int64))
+        none = nothing.astype(np.int64)
+        return StraightMotions(np.empty((0, curve.corner.shape[1])), nothing, nothing > 0.0, none, none, ("",))
     piece, start, end, time, last = _divide_pieces(trajectory, accelerations)
     halt = np.zeros(len(piece), bool)
     if DriveLimits.of(trajectory.posted.machine).bounds_acceleration:
         halt[last] = curve.parted[1:]
     slope, length = np.abs(curve.slope[piece]), end - start
-    cycles = np.maximum(np.diff(np.rint(time / CYCLE), prepend=0.0), 1.0)
-    cycles = np.maximum(cycles, np.ceil((slope / speeds).max(1) * length / CYCLE - _ROUNDING))
+    planned = np.maximum(np.diff(np.rint(time / CYCLE), prepend=0.0), 1.0)
+    by_axis = (slope / speeds) * length[:, None] / CYCLE
+    cycles = np.maximum(planned, np.ceil(by_axis.max(1) - _ROUNDING))
     use = measure_joint_utilisation(trajectory, piece, start, end) / (_USABLE * CYCLE)
     even = ~last[:-1] | (curve.sharpness[piece[1:]] < _EVEN) & ~halt[:-1]
     meet = np.where(even, np.maximum(use[:-1, 1], use[1:, 0]), 0.0)
     use[:-1, 1], use[1:, 0] = np.maximum(use[:-1, 1], meet), np.maximum(use[1:, 0], meet)
     ramp = 2.0 * (slope / accelerations).max(1) * length / CYCLE**2
     ends = np.where(last[:, None], curve.corner[piece + 1], curve.corner[piece] + curve.slope[piece] * end[:, None])
-    seconds = CYCLE * _raise_cycles(cycles, use * length[:, None], ramp, ~halt[:-1])
-    return StraightMotions(ends, seconds, halt, piece)
+    need = use * length[:, None]
+    cycles = _raise_cycles(cycles, need, ramp, ~halt[:-1])
+    bounds = np.column_stack([planned, by_axis, need.max(1), np.sqrt(ramp)])
+    held_up_by = np.where(cycles > 1.2 * planned, bounds[:, 1:].argmax(1) + 1, 0)
+    return StraightMotions(ends, CYCLE * cycles, halt, piece, held_up_by, _name_reasons(trajectory.posted.machine))
+
+
+def _name_reasons(machine: Machine) -> tuple[str, ...]:
+    """Name what holds motions up, in the order of the bounds of their cycles."""
+    axes = [f"{axis} turns, and its axis is no faster" for axis in machine.axes if axis in "ABC"]
+    linear = [f"{axis} is no faster" for axis in machine.axes if axis not in "ABC"]
+    return "", *linear, *axes, "a joint would pass its speed", "motions so short can't be blended faster"
 
 
 def _divide_pieces(trajectory: Trajectory, accelerations: Array) -> _Division:

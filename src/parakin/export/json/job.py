@@ -24,10 +24,14 @@ def encode_job(
     job: Job,
     placement: Placement | None,
     rewinds: Sequence[Rewind],
+    controller_seconds: float | None,
     missing: Sequence[str],
     files: Mapping[str, str],
 ) -> dict[str, Any]:
-    """Encode a job, its placement and rewinds that were found, why files are missing, and the files by their kinds."""
+    """Encode a job, its placement and rewinds that were found, why files are missing, and the files by their kinds.
+
+    controller_seconds : what the program's controller takes, s; None without one that says so
+    """
     posted, trajectory = job.posted, job.trajectory
     path, first, worst = posted.path, posted.first, posted.worst
     return {
@@ -47,6 +51,7 @@ def encode_job(
         "placement": None if placement is None else _encode_placement(placement),
         "joints": encode_joint_ranges(posted),
         "seconds": job.seconds,
+        "controller_seconds": controller_seconds,
         "waits": job.waits,
         "bound_by": {} if trajectory is None else trajectory.shares,
         "rewinds": [

@@ -31,8 +31,10 @@ def note_swings(pole: Pole, path: ToolPath, steps: PoleSteps, led: Sequence[tupl
         way, turn = np.hypot(*(steps.last - steps.first).T), _measure_turns(steps)
     near = np.isfinite(way) & (way < FARTHEST_STEP)
     turn, way = np.where(near, turn, 0.0), np.where(near, way, FARTHEST_STEP)
+    apart = np.ones(len(turn), np.bool_)
     for first, last in led:
         turn[first : last + 1] = 0.0
+        apart[first : last + 1] = False
     travel = np.cumsum(way + np.where(steps.joined, 0.0, _APART))
     angle = np.concatenate([[0.0], np.cumsum(turn)])
     at = np.concatenate([[travel[0] - way[0]], travel])
@@ -42,7 +44,7 @@ def note_swings(pole: Pole, path: ToolPath, steps: PoleSteps, led: Sequence[tupl
         np.abs(np.interp(middle + TRAVEL, at, total) - np.interp(middle - TRAVEL, at, total))
         for total in (angle, to_and_fro)
     )
-    swinging = np.flatnonzero((turned > REPORTED) & (steps.nearest < VICINITY))
+    swinging = np.flatnonzero((turned > REPORTED) & (steps.nearest < VICINITY) & apart)
     notes = []
     for group in np.split(swinging, np.flatnonzero((np.diff(swinging) > 1) | ~steps.joined[swinging[1:]]) + 1):
         if len(group):

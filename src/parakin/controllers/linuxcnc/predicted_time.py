@@ -1,0 +1,53 @@
+"""How long LinuxCNC takes for a trajectory, and which lines make that much longer than the trajectory."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...toolpath.path import Note
+from ...toolpath.timing.trajectory import Trajectory
+from ..controller import ControllerTime
+from .axis_rates import choose_axis_rates
+from .straight_motions import StraightMotions, build_straight_motions
+
+_MUCH = 1.5  # times the trajectory: what takes longer is explained
+_MOST_NOTES = 3
+_SHARE = 0.1  # of what is lost in all: but for the worst, lines that lose less are not named
+
+
+def predict_linuxcnc_seconds(trajectory: Trajectory) -> float:
+    """Predict what LinuxCNC takes for a program from the first record on, s: the trajectory's time and more."""
+    return predict_linuxcnc_time(trajectory).seconds
+
+
+def predict_linuxcnc_time(trajectory: Trajectory) -> ControllerTime:
+    """Predict what LinuxCNC takes, and where it is over 1.5 times the trajectory, note the lines that cost most."""
+    motions = build_straight_motions(trajectory, *choose_axis_rates(trajectory.posted.machine))
+    seconds = float(motions.seconds.sum())
+    if not seconds > _MUCH * trajectory.seconds:
+        return ControllerTime(seconds)
+    return ControllerTime(seconds, tuple(_explain_losses(trajectory, motions)))
+
+
+def _explain_losses(trajectory: Trajectory, motions: StraightMotions) -> list[Note]:
+    """Note the lines that lose most, with what LinuxCNC takes, what the trajectory does, and what holds it up."""
+    path, rows, pieces = trajectory.posted.path, trajectory.joint_path.segment, len(trajectory.curve.length)
+    first = np.append(np.searchsorted(rows, np.arange(pieces)), len(rows) - 1)
+    planned = np.diff(trajectory.profile.row_times[first])
+    taken = np.bincount(motions.piece, motions.seconds, pieces)
+    lines, line_of_piece = np.unique(path.line[trajectory.curve.record_of_piece], return_inverse=True)
+    planned_by_line, taken_by_line = (np.bincount(line_of_piece, values, len(lines)) for values in (planned, taken))
+    lost = taken_by_line - planned_by_line
+    notes = list[Note]()
+    for line in np.argsort(-lost, kind="stable")[:_MOST_NOTES].tolist():
+        if notes and lost[line] < _SHARE * lost.clip(0.0).sum():
+            break
+        held = np.bincount(
+            motions.held_up_by, motions.seconds * (line_of_piece[motions.piece] == line), len(motions.reasons)
+        )
+        reason = motions.reasons[int(held[1:].argmax()) + 1]
+        text = (
+            f"LinuxCNC takes {taken_by_line[line]:.3g} s here, the trajectory {planned_by_line[line]:.3g} s: {reason}"
+        )
+        notes.append(Note(int(lines[line]), text))
+    return notes

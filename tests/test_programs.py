@@ -6,6 +6,7 @@ import io
 import re
 import sys
 from dataclasses import replace
+from importlib.resources import files
 from itertools import pairwise
 from pathlib import Path
 
@@ -20,6 +21,7 @@ from parakin.controllers.linuxcnc.program import split_slow_turns
 from parakin.controllers.linuxcnc.straight_motions import CYCLE, build_straight_motions
 from parakin.toolpath.path import Event, ToolPath
 from parakin.toolpath.posting.post import post_path
+from parakin.toolpath.posting.wrist_poses import find_pose_with_wrist
 from parakin.toolpath.reading.gcode.reader import read_gcode
 from parakin.toolpath.timing import plan_trajectory
 
@@ -406,3 +408,32 @@ def test_forced_it_says_so(trajectories, writer):
     assert "( OFF LIMITS: written with --force: part.cls:214: leg d2 would be 1,533.2 mm, limit 1,520 )" in head
     assert all(line.startswith("( ") and line.endswith(" )") and len(line) < 250 for line in head)
     assert "".join(line[2:-2] for line in head).count("very long") == 60
+
+
+@pytest.mark.parametrize("mode", ["+", "-"])
+@pytest.mark.parametrize("tilt", [0.0, 1e-4, 0.3])
+def test_from_a_tilted_home_the_wrist_comes_to_either_mode(tmp_path, mode, tilt):
+    text = (files("parakin") / "machines" / "tricept.yaml").read_text(encoding="utf-8")
+    (tmp_path / "t.yaml").write_text(text.replace("B: 0 deg, C: 0 deg}", "B: 20 deg, C: 40 deg}"), encoding="utf-8")
+    machine = pk.load(tmp_path / "t.yaml")
+    wrist, mode = machine.wrist, machine.mode[:-1] + mode
+    first = machine.home.copy()
+    first[:2] = [40.0, 25.0]
+    on_pole = machine.inverse(first, mode)
+    on_pole[wrist.second] = 0.0
+    on_pole[wrist.first] += 0.7
+    first = find_pose_with_wrist(machine, first, wrist.tilt(on_pole, mode, tilt), mode)
+    joints = machine.inverse(first, mode)
+    if tilt == 0.0:
+        joints = on_pole
+    poses = plan_approach(machine, first, joints, mode)[0]
+    way = [machine.home, *poses]
+    dense = np.unique(
+        np.concatenate([np.linspace(0, 1, 3000), np.geomspace(1e-7, 1, 600), 1 - np.geomspace(1e-7, 1, 600)])
+    )
+    line = np.concatenate([a + dense[:, None] * (b - a) for a, b in pairwise(way)])
+    rows = machine.follow(line, machine.mode, 2e-6)[:, wrist.first]
+    rows += machine.inverse(machine.home)[wrist.first] - rows[0]
+    assert np.abs(np.diff(rows)).max() < 0.05  # nothing swings
+    if tilt:
+        assert rows[-1] == pytest.approx(joints[wrist.first], abs=1e-5)

@@ -15,6 +15,7 @@ _SPEED_SHARE = 0.25  # fraction of the joints' speeds
 _FROM_ANYWHERE = 4.0  # s, at least: for the motion whose start is not known
 _LEAST = 0.5  # s, of a motion
 _SAMPLES = 500  # samples of a motion
+_SAME = 1e-6  # rad
 _TURNS = (0, 1, -1, 2, -2)
 _SHARES = (1.0, 0.1, 0.01)  # of the way back home and of TILTED, for the poses that lead to a record beside the pole
 
@@ -30,26 +31,73 @@ def plan_approach(machine: Machine, first: Array, joints: Array, mode: str) -> t
     At home the tool may lie along the first axis of a wrist, which then is free: it would have to jump as soon as the
     tool tilts in another direction than that axis stands for. So the tool is put upright above home first, turned,
     which moves no joint there, tilted in the direction the axis stands for, and brought to the record on the turn that
-    it is planned on. A record beside the pole is come to straight from aside, lest the axis swing on the way.
+    it is planned on. From another home it goes straight to the record if it arrives as planned, else over the pole. A
+    record beside the pole is come to straight from aside, lest the axis swing on the way.
 
     Raises :class:`PoseError` where no such way is found.
     """
     wrist = machine.wrist
-    way = [first] if wrist is None else _approach_from_aside(machine, wrist, first, joints, mode)
-    if wrist is not None and wrist.find_free(machine.home[None], EXACT)[0]:
-        aside = joints if len(way) == 1 else _follow_back(machine, way, joints, mode)
-        left = _leave_pole(machine, wrist, way[0], aside, mode)
-        if left is None:
-            name, angle = machine.joints[wrist.first], np.degrees(joints[wrist.first])
-            raise PoseError(f"no way from home to the first record, where {name} is at {angle:.1f}° in mode {mode!r}")
-        way = [*left, *way]
-    elif mode != machine.mode:
+    if wrist is None and mode != machine.mode:
         raise PoseError(f"mode {mode!r}: no way from home, which is in {machine.mode!r}, to the first record")
+    way = [first] if wrist is None else _approach_with_wrist(machine, wrist, first, joints, mode)
     poses = np.array(way)
     starts = np.concatenate([machine.home[None], poses[:-1]])
     seconds = [_choose_seconds(machine, start, end, mode) for start, end in zip(starts, poses, strict=True)]
     seconds[0] = max(seconds[0], _FROM_ANYWHERE)
     return poses, np.array(seconds)
+
+
+def _approach_with_wrist(machine: Machine, wrist: Wrist, first: Array, joints: Array, mode: str) -> list[Array]:
+    """Approach a record in a mode, with the wrist's first joint as it is there; return the poses."""
+    way = _approach_from_aside(machine, wrist, first, joints, mode)
+    goal = float((joints if len(way) == 1 else _follow_back(machine, way, joints, mode))[wrist.first])
+    home, at_home = np.array(machine.home), machine.inverse(machine.home)
+    to_pole = [] if wrist.find_free(home[None], EXACT)[0] else _go_to_pole(machine, wrist, at_home)
+    if to_pole != [] and mode == machine.mode and _turns_by(machine, home, way[0], mode, goal - at_home[wrist.first]):
+        return way
+    if to_pole is not None:
+        pole = to_pole[-1] if to_pole else home
+        aside = at_home.copy()
+        aside[wrist.pair] = goal, _find_second_on_pole(machine, wrist)
+        turned = find_pose_with_wrist(machine, pole, wrist.tilt(aside, mode, TILTED), mode)
+        left = _leave_pole(machine, wrist, pole, way[0], goal, mode)
+        if left is not None:
+            return [*to_pole, *left, *way]
+        if turned is not None:
+            turned[wrist.direction.c] = find_nearest_turn(turned[wrist.direction.c], way[0][wrist.direction.c])
+            left = _leave_pole(machine, wrist, pole, turned, goal, mode)
+            if left is not None and _turns_by(machine, turned, way[0], mode, 0.0):
+                return [*to_pole, *left, turned, *way]
+    name, angle = machine.joints[wrist.first], np.degrees(joints[wrist.first])
+    raise PoseError(f"no way from home to the first record, where {name} is at {angle:.1f}° in mode {mode!r}")
+
+
+def _find_second_on_pole(machine: Machine, wrist: Wrist) -> float:
+    """Find the second joint of a wrist on its pole: amid those of both modes."""
+    here, there = (machine.inverse(machine.home, mode)[wrist.second] for mode in machine.head_modes(machine.mode))
+    return float(0.5 * (here + find_nearest_turn(there, here)))
+
+
+def _go_to_pole(machine: Machine, wrist: Wrist, at_home: Array) -> list[Array] | None:
+    """Go from home to the pole above it, with the first joint as at home; None where there is no such way."""
+    on_pole, poses, near = _find_second_on_pole(machine, wrist), list[Array](), np.array(machine.home)
+    for share in (0.1, 0.01, 0.0):
+        joints = at_home.copy()
+        joints[wrist.second] = on_pole + share * (at_home[wrist.second] - on_pole)
+        pose = find_pose_with_wrist(machine, near, joints, machine.mode)
+        if pose is None:
+            return None
+        poses.append(pose)
+        near = pose
+    return poses if wrist.find_free(poses[-1][None], PRINTED)[0] else None
+
+
+def _turns_by(machine: Machine, begin: Array, end: Array, mode: str, angle: float) -> bool:
+    """Tell whether the first joint turns by an angle on a line of poses, and no limit is broken on it."""
+    assert machine.wrist is not None
+    line = _sample_line(begin, end)
+    rows = machine.follow(line, mode, EXACT)[:, machine.wrist.first]
+    return abs(float(rows[-1] - rows[0]) - angle) < _SAME and not machine.check(line, mode=mode).any()
 
 
 def _approach_from_aside(machine: Machine, wrist: Wrist, first: Array, joints: Array, mode: str) -> list[Array]:
@@ -79,21 +127,22 @@ def _follow_back(machine: Machine, way: list[Array], joints: Array, mode: str) -
     return np.asarray(start)
 
 
-def _leave_pole(machine: Machine, wrist: Wrist, goal: Array, joints: Array, mode: str) -> list[Array] | None:
-    """Leave the pole at home to where a line leads to a pose and its joints; None where no line does."""
-    tilted = machine.forward(wrist.tilt(machine.inverse(machine.home), mode, TILTED), near=machine.home)
-    if not np.all(tilted.converged):
+def _leave_pole(machine: Machine, wrist: Wrist, pole: Array, end: Array, goal: float, mode: str) -> list[Array] | None:
+    """Leave a pole above home to where a line leads to a pose with the first joint at ``goal``; None if none does."""
+    on_pole = machine.inverse(machine.home)
+    on_pole[wrist.second] = _find_second_on_pole(machine, wrist)
+    tilted = find_pose_with_wrist(machine, pole, wrist.tilt(on_pole, mode, TILTED), mode)
+    if tilted is None:
         return None
-    for turns in _TURNS:
-        via = np.array(machine.home)
-        via[wrist.direction.pair] = np.asarray(tilted.poses).reshape(-1)[wrist.direction.pair]
-        via[wrist.direction.c] += TURN * turns
-        line = _sample_line(via, goal)
-        rows = machine.follow(line, mode, EXACT)
-        arrival = rows[-1] - rows[0] + machine.inverse(via, mode)
-        if abs(float((arrival - joints)[wrist.first])) < 1e-6 and not machine.check(line, mode=mode).any():
-            upright = np.array(machine.home)
-            upright[wrist.direction.c] = via[wrist.direction.c]
+    columns, c = wrist.direction.pair, wrist.direction.c
+    can_turn = bool(is_upright(pole[wrist.direction.b]))
+    for turns in _TURNS if can_turn else (0,):
+        via = pole.copy()
+        via[columns] = tilted[columns]
+        via[c] += TURN * turns
+        if _turns_by(machine, via, end, mode, goal - on_pole[wrist.first]):
+            upright = pole.copy()
+            upright[c] = via[c] if can_turn else pole[c]
             return [upright, via]
     return None
 

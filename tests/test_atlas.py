@@ -5,6 +5,7 @@ import json
 
 import numpy as np
 import pytest
+from regions import whole_region
 
 import parakin as pk
 from parakin.cli import main
@@ -15,7 +16,7 @@ from parakin.performance.indices import compute_performance
 @pytest.mark.parametrize(("name", "count"), [("orthoglide", 2), ("hbg80_3d", 2)])
 def test_isotropic_poses_of_the_workspace(name, count):
     m = pk.load(name)
-    found = pk.atlas(pk.region(m))
+    found = pk.atlas(whole_region(m))
     assert found.isolated
     assert len(found.isotropic) == count  # home, and its image beyond a parallel singularity
     assert np.abs(found.isotropic - m.home).max(1).min() < 1e-6

@@ -5,14 +5,15 @@ from math import pi, sqrt
 
 import numpy as np
 import pytest
+from regions import whole_region
 from scipy import ndimage
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 import parakin as pk
+from parakin.workspaces.certified.assembly_mode import expand_determinant
 from parakin.workspaces.certified.subdivision import Subdivision
 from parakin.workspaces.connected.adjacency import find_adjacent_cells, label_components
-from parakin.workspaces.connected.assembly_mode import expand_determinant
 from parakin.workspaces.connected.components import find_components
 from parakin.workspaces.inscribed.largest_box import find_largest_box
 
@@ -152,7 +153,7 @@ def test_every_turn_counts_and_the_parts_shrink():
 
 def test_the_volumes_of_all_parts_are_the_workspace():
     m = pk.load("orthoglide")
-    whole = pk.workspace(pk.region(m), gap=0.005).volume
+    whole = pk.workspace(whole_region(m), gap=0.005).volume
     parts = find_components(pk.region(m)).components
     assert sum(part.volume.inner for part in parts) <= whole.outer
     assert sum(part.volume.outer for part in parts) >= whole.inner

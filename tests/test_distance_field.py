@@ -8,6 +8,7 @@ import meshio
 import numpy as np
 import pytest
 import trimesh
+from regions import whole_region
 
 import parakin as pk
 from parakin.export.workspace.cells import format_cells_csv, format_cells_vtu
@@ -66,7 +67,7 @@ def overlap(radius, distance):
 
 
 def around(machine, gap=0.01, **asked_):
-    found = pk.workspace(pk.region(machine, **asked_), gap)
+    found = pk.workspace(whole_region(machine, **asked_), gap)
     return found, sample_field(found.region, found.box)
 
 
@@ -85,7 +86,7 @@ def test_the_field_of_struts_is_the_distance(lens):
     rng = np.random.default_rng(1)
     places = rng.uniform([-200, -400, -400], [200, 400, 400], (5000, 3))
     gaps = [500.0 - np.linalg.norm(places - [x, 0, 0], axis=1) for x in (-400, 400)]
-    distance = DistanceField(pk.region(lens))
+    distance = DistanceField(whole_region(lens))
     assert np.abs(distance.evaluate(places) - np.minimum(*gaps)).max() < 1e-9
     limits = np.array(distance.region.limits)[distance.find_nearest_limits(places)]
     assert (limits == np.where(gaps[0] < gaps[1], "q0.max", "q1.max")).all()
@@ -94,9 +95,9 @@ def test_the_field_of_struts_is_the_distance(lens):
 @pytest.mark.parametrize("name", pk.machines())
 def test_the_field_is_positive_where_the_machine_is_allowed(name):
     machine = pk.load(name)
-    here = pk.region(machine)
+    here = whole_region(machine)
     rng = np.random.default_rng(2)
-    low, high = pk.workspace(pk.region(machine), gap=0.1).box
+    low, high = pk.workspace(whole_region(machine), gap=0.1).box
     places = rng.uniform(low - 200, high + 200, (20_000, len(low)))
     allowed = machine.check(here.poses(places)) == 0
     assert 0.01 < allowed.mean() < 0.9
@@ -107,12 +108,12 @@ def test_the_field_is_positive_where_the_machine_is_allowed(name):
 def test_the_field_over_turns_asks_all_of_them(kind):
     machine = pk.load("hexapod")
     spans = {"A": (-0.1, 0.1), "B": (-0.05, 0.2)}
-    here = pk.region(machine, **{kind: spans})
+    here = whole_region(machine, **{kind: spans})
     distance = DistanceField(here)
     assert len(distance.orientations) == 4 * 4  # 5 deg steps or less, at least three, both ends
     for i, span in enumerate(spans.values()):
         assert (distance.orientations[:, i].min(), distance.orientations[:, i].max()) == pytest.approx(span)
-    low, high = pk.workspace(pk.region(machine)).box
+    low, high = pk.workspace(whole_region(machine)).box
     places = np.random.default_rng(3).uniform(low, high, (3000, 3))
     verdicts = [
         machine.check(here.poses(places, np.tile(turn, (len(places), 1)))) == 0 for turn in distance.orientations
@@ -125,15 +126,15 @@ def test_the_field_over_turns_asks_all_of_them(kind):
 
 def test_a_narrow_range_has_three_turns_and_a_wide_one_is_thinned():
     machine = pk.load("hexapod")
-    assert len(DistanceField(pk.region(machine, every={"A": (0.0, 0.01)})).orientations) == 3
-    assert len(DistanceField(pk.region(machine, some={"A": (0.2, 0.2)})).orientations) == 1
-    assert len(DistanceField(pk.region(machine, dexterous=True)).orientations) <= 4096
+    assert len(DistanceField(whole_region(machine, every={"A": (0.0, 0.01)})).orientations) == 3
+    assert len(DistanceField(whole_region(machine, some={"A": (0.2, 0.2)})).orientations) == 1
+    assert len(DistanceField(whole_region(machine, dexterous=True)).orientations) <= 4096
 
 
 def test_the_grid_covers_a_thin_region(tmp_path):
     legs = [((0, 0, -5000), NOWHERE, 5000, 5002), (NOWHERE, NOWHERE, 1, 200), LOOSE]  # a bowl, 2 thick
     machine = struts(tmp_path / "bowl.yaml", "tx ty tz", legs, {"X": "50 mm", "Y": "0 mm", "Z": "1 mm"})
-    whole = sample_field(pk.region(machine), (np.array([-205.0, -205.0, -5.0]), np.array([205.0, 205.0, 3.0])))
+    whole = sample_field(whole_region(machine), (np.array([-205.0, -205.0, -5.0]), np.array([205.0, 205.0, 3.0])))
     assert whole.step == pytest.approx([410 / 60, 410 / 60, 8 / 16])
     assert solid(make_mesh(whole)).volume == pytest.approx(pi * 200**2 * 2, rel=0.03)
 
@@ -174,7 +175,7 @@ def test_a_region_in_parts_gives_a_body_each(tmp_path):
     feet = [(round(300 * cos(a), 3), round(300 * sin(a), 3), 0) for a in np.radians([90, 210, 330])]
     legs = [(foot, NOWHERE, 450, 520) for foot in feet]  # above the feet and below them
     home = {"X": "0 mm", "Y": "0 mm", "Z": "380 mm"}
-    found = pk.workspace(pk.region(struts(tmp_path / "parts.yaml", "tx ty tz", legs, home)))
+    found = pk.workspace(whole_region(struts(tmp_path / "parts.yaml", "tx ty tz", legs, home)))
     bodies = solid(make_mesh(sample_field(found.region, found.box, step=5.0))).split()
     assert sorted(np.sign(body.centroid[2]) for body in bodies) == [-1, 1]
     assert bodies[0].volume == pytest.approx(bodies[1].volume, rel=0.01)
@@ -259,7 +260,7 @@ def test_cross_sections_lie_in_the_certified_bracket(name):
     machine = pk.load(name)
     _, whole = around(machine)
     for section in find_cross_sections(whole, values=3):
-        volume = pk.workspace(pk.region(machine, at={"Z": section.value}), gap=0.005).volume
+        volume = pk.workspace(whole_region(machine, at={"Z": section.value}), gap=0.005).volume
         assert volume.inner * 0.998 < section.area < volume.outer * 1.002
 
 
@@ -297,7 +298,7 @@ def test_sections_that_make_no_sense(lens):
 
 @pytest.mark.parametrize("at, kind", [({}, "hexahedron"), ({"Z": 50.0}, "quad"), ({"X": 0.0, "Y": 0.0}, "line")])
 def test_vtu(lens, tmp_path, at, kind):
-    found = pk.workspace(pk.region(lens, at=at))
+    found = pk.workspace(whole_region(lens, at=at))
     (tmp_path / "cells.vtu").write_bytes(format_cells_vtu(found))
     mesh = meshio.read(tmp_path / "cells.vtu")
     (block,) = mesh.cells
@@ -321,7 +322,7 @@ def test_vtu(lens, tmp_path, at, kind):
 
 
 def test_vtu_tells_the_performance_at_the_cells(tmp_path):
-    found = pk.workspace(pk.region(pk.load("orthoglide")), gap=0.1)
+    found = pk.workspace(whole_region(pk.load("orthoglide")), gap=0.1)
     (tmp_path / "cells.vtu").write_bytes(format_cells_vtu(found))
     data = {name: values[0] for name, values in meshio.read(tmp_path / "cells.vtu").cell_data.items()}
     middles = found.cells.low + 0.5 * found.cells.size
@@ -336,7 +337,7 @@ def test_vtu_tells_the_performance_at_the_cells(tmp_path):
 
 
 def test_csv(lens):
-    found = pk.workspace(pk.region(lens))
+    found = pk.workspace(whole_region(lens))
     rows = list(csv.DictReader(StringIO(format_cells_csv(found).decode())))
     assert len(rows) == len(found.cells.low)
     volume = {"inner": 0.0, "outer": 0.0}
@@ -362,7 +363,7 @@ def test_amounts_are_readable():
 
 
 def test_the_bracket_is_rounded_outward(lens):
-    volume = pk.workspace(pk.region(lens)).volume
+    volume = pk.workspace(whole_region(lens)).volume
     low, high = (float(word) for word in format_bracket(volume, 3).split() if word[0].isdigit())
     assert format_bracket(volume, 3).endswith(" litres")
     assert low * 1e6 <= volume.inner < volume.outer <= high * 1e6
@@ -371,8 +372,8 @@ def test_the_bracket_is_rounded_outward(lens):
 
 def test_what_was_asked_is_said():
     machine = pk.load("hexapod")
-    here = pk.region(machine, at={"C": pi / 6, "Z": -900.0}, every={"A": (-0.1, 0.1)}, without=["strut0.*"])
+    here = whole_region(machine, at={"C": pi / 6, "Z": -900.0}, every={"A": (-0.1, 0.1)}, without=["strut0.*"])
     words = describe_region(here)
     assert words.startswith("total orientation, A -5.73° to 5.73°, Z = -900 mm, B = 0°, C = 30°")
     assert "without strut0.min strut0.max" in words
-    assert describe_region(pk.region(machine, without=["*.max"])).endswith("without 6 of the limits")
+    assert describe_region(whole_region(machine, without=["*.max"])).endswith("without 6 of the limits")

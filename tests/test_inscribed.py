@@ -5,6 +5,7 @@ from math import pi, sqrt
 
 import numpy as np
 import pytest
+from regions import whole_region
 
 import parakin as pk
 from parakin.workspaces.certified.containment import MOST, prove_boxes
@@ -82,12 +83,12 @@ def machine(tmp_path, text):
 
 @pytest.fixture
 def disc(tmp_path):
-    return pk.region(machine(tmp_path, DISC.replace("LEAST", "0")))
+    return whole_region(machine(tmp_path, DISC.replace("LEAST", "0")))
 
 
 @pytest.fixture
 def ball(tmp_path):
-    return pk.region(machine(tmp_path, BALL))
+    return whole_region(machine(tmp_path, BALL))
 
 
 def home_of(asked):
@@ -122,7 +123,7 @@ ASKED = {
 @pytest.mark.parametrize("name", ASKED)
 def test_what_is_proved_holds_and_what_is_broken_is(name):
     m, rng = pk.load(name), np.random.default_rng(4)
-    asked = pk.region(m, **ASKED[name])
+    asked = whole_region(m, **ASKED[name])
     d, home = len(asked.free_axes), home_of(asked)
     size = 0.8 * (np.subtract(*asked.extent[::-1]).clip(0, 2000))
     low = home - rng.uniform(0, 0.5, (150, d)) * size * rng.uniform(0, 1, (150, 1))
@@ -146,10 +147,10 @@ def test_what_is_proved_holds_and_what_is_broken_is(name):
 
 def test_one_turn_is_enough_of_an_inclusive_region():
     m, rng = pk.load("hexapod"), np.random.default_rng(5)
-    asked = pk.region(m, some={"A": (-0.3, 0.3)})
+    asked = whole_region(m, some={"A": (-0.3, 0.3)})
     half = np.array([270.0, 230.0, 160.0])
     home = home_of(asked)
-    assert not prove_box(pk.region(m), home - half, home + half)
+    assert not prove_box(whole_region(m), home - half, home + half)
     assert prove_box(asked, home - half, home + half)
     places = rng.uniform(home - half, home + half, (4000, 3))
     allowed = np.zeros(len(places), bool)
@@ -209,7 +210,7 @@ def test_the_largest_box_in_a_ball(ball):
 
 def test_a_hole_is_touched_in_the_middle_of_a_face(tmp_path):
     """In a ring from 50 to 100 mm a rectangle touches the hole with the middle of a side."""
-    ring = pk.region(machine(tmp_path, DISC.replace("LEAST", "50")))
+    ring = whole_region(machine(tmp_path, DISC.replace("LEAST", "50")))
     half = np.linspace(0.0, 86.0, 200_001)
     best = (2.0 * half * (np.sqrt(100.0**2 - half**2) - 50.0)).max()
     box = find_largest_box(ring, tolerance=0.01)
@@ -220,7 +221,7 @@ def test_a_hole_is_touched_in_the_middle_of_a_face(tmp_path):
 @pytest.mark.parametrize("name", ["orthoglide", "hbg80_2d", "tricept", "hexapod"])
 def test_no_face_can_move_and_no_place_is_outside(name):
     rng = np.random.default_rng(6)
-    asked = pk.region(pk.load(name), **ASKED[name])
+    asked = whole_region(pk.load(name), **ASKED[name])
     box = find_largest_box(asked)
     assert not len(broken_in(asked, box.low, box.high, rng, 200_000))
     for axis in range(len(box.low)):
@@ -237,7 +238,7 @@ def test_no_face_can_move_and_no_place_is_outside(name):
 
 
 def test_the_cube_that_the_orthoglide_was_designed_for_is_its_largest():
-    asked = pk.region(pk.load("orthoglide"))
+    asked = whole_region(pk.load("orthoglide"))
     box = find_largest_box(asked, shape=(1, 1, 1), tolerance=1e-3)
     assert box.edges.min() > 200.0 - 2e-3
     assert box.edges.max() <= 200.0 + 1e-9
@@ -250,7 +251,7 @@ def test_the_cube_that_the_orthoglide_was_designed_for_is_its_largest():
 
 @pytest.mark.parametrize("name", ASKED)
 def test_what_is_given_is_what_was_proved(name):
-    asked = pk.region(pk.load(name), **ASKED[name])
+    asked = whole_region(pk.load(name), **ASKED[name])
     d = len(asked.free_axes)
     home = home_of(asked) + 20.0
     for kind in ({"shape": (3.0, 1.0, 2.0)[:d]}, {"around": home}, {"around": home, "shape": (1.0, 2.0, 1.5)[:d]}):
@@ -282,7 +283,7 @@ def rectangle_by_histogram(mask):
 
 @pytest.mark.parametrize("name", ["hbg80_2d", "linear_delta"])
 def test_it_is_as_large_as_the_largest_of_a_fine_grid(name):
-    asked = pk.region(pk.load(name), **ASKED.get(name, {}))
+    asked = whole_region(pk.load(name), **ASKED.get(name, {}))
     box = find_largest_box(asked)
     low, high = asked.extent
     n = 400 if len(low) == 2 else 40
@@ -329,7 +330,7 @@ def test_boxes_of_a_mask():
 
 def test_an_inclusive_region_has_a_larger_box_and_a_line_one_too():
     m = pk.load("orthoglide5_head")
-    line = pk.region(m, at={"Y": 0.0, "Z": -150.0})
+    line = whole_region(m, at={"Y": 0.0, "Z": -150.0})
     box = find_largest_box(line)
     assert box.axes == ("X",)
     assert box.edges > 50.0
@@ -338,7 +339,7 @@ def test_an_inclusive_region_has_a_larger_box_and_a_line_one_too():
         assert prove_box(line, low, high).limit is not None
     hexapod = pk.load("hexapod")
     plane = {"X": 0.0, "A": 0.0, "B": 0.0}
-    fixed, some = pk.region(hexapod, at=plane), pk.region(hexapod, {"X": 0.0, "B": 0.0}, some={"A": (-0.2, 0.2)})
+    fixed, some = whole_region(hexapod, at=plane), whole_region(hexapod, {"X": 0.0, "B": 0.0}, some={"A": (-0.2, 0.2)})
     assert find_largest_box(some, shape=(1, 1)).volume > 1.05 * find_largest_box(fixed, shape=(1, 1)).volume
 
 
@@ -347,7 +348,7 @@ def test_it_tells_enough_to_run_it_again(disc):
     again = {key: box.parameters[key] for key in ("at", "every", "some", "without", "mode")}
     assert box.parameters["machine"] == "disc"
     same = find_largest_box(
-        pk.region(disc.machine, **again), **{key: box.parameters[key] for key in ("shape", "around", "tolerance")}
+        whole_region(disc.machine, **again), **{key: box.parameters[key] for key in ("shape", "around", "tolerance")}
     )
     assert (same.low == box.low).all()
     assert (same.high == box.high).all()
@@ -372,9 +373,9 @@ def test_what_makes_no_sense_is_refused(disc, kind, said):
 
 def test_an_empty_region_and_corners_that_are_none_are_refused(disc):
     with pytest.raises(pk.PoseError, match="empty"):
-        find_largest_box(pk.region(pk.load("tricept"), {"Z": 500.0}))
+        find_largest_box(whole_region(pk.load("tricept"), {"Z": 500.0}))
     with pytest.raises(pk.PoseError, match="empty"):
-        find_largest_box(pk.region(pk.load("hexapod"), every={"A": (-pi / 2, pi / 2)}))
+        find_largest_box(whole_region(pk.load("hexapod"), every={"A": (-pi / 2, pi / 2)}))
     with pytest.raises(pk.PoseError, match="corner"):
         prove_box(disc, [1.0, 0.0], [0.0, 1.0])
     with pytest.raises(pk.PoseError, match="corner"):

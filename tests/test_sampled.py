@@ -4,6 +4,7 @@ from itertools import product
 
 import numpy as np
 import pytest
+from regions import whole_region
 
 import parakin as pk
 from parakin.errors import NoMethodError, PoseError
@@ -65,7 +66,7 @@ def test_a_grid_says_what_check_says(name, rng):
         if unit == "rad"
     }
     for at in ({}, turned):
-        asked = pk.region(machine, at)
+        asked = whole_region(machine, at)
         half = np.where(np.array(machine.axis_units) == "mm", 700.0, 0.0)
         ends = [(machine.home + s * half)[: len(asked.free_axes)] for s in (-1.0, 1.0)]
         grid = sample_grid(asked, 11.0 if len(asked.free_axes) == 3 else 1.0, ends)
@@ -87,7 +88,7 @@ TURNS = [
 @pytest.mark.parametrize(("name", "step", "asked"), TURNS, ids=lambda value: value if isinstance(value, str) else "")
 def test_with_turns_a_grid_looks_at_every_combination(name, step, asked, rng):
     machine = pk.load(name)
-    question = pk.region(machine, **asked)
+    question = whole_region(machine, **asked)
     ends = [machine.home[:3] - 12.0 * step, machine.home[:3] + 12.0 * step]
     grid = sample_grid(question, step, ends, turns_step=8.0 * DEG)
     places, broken = places_of(grid, rng, 4000)
@@ -110,26 +111,26 @@ def test_with_turns_a_grid_looks_at_every_combination(name, step, asked, rng):
 def test_a_grid_finds_the_certified_volume(name, asked, step):
     machine = pk.load(name)
     agrees(
-        lambda h: sample_grid(pk.region(machine, **asked), h),
-        pk.workspace(pk.region(machine, **asked), gap=0.004),
+        lambda h: sample_grid(whole_region(machine, **asked), h),
+        pk.workspace(whole_region(machine, **asked), gap=0.004),
         step,
     )
 
 
 @pytest.fixture(scope="module")
 def total():
-    return pk.workspace(pk.region(pk.load("lambda6"), **SMALL), gap=0.03)
+    return pk.workspace(whole_region(pk.load("lambda6"), **SMALL), gap=0.03)
 
 
 def test_a_grid_finds_the_certified_total_orientation_workspace(total):
-    asked = pk.region(pk.load("lambda6"), **SMALL)
+    asked = whole_region(pk.load("lambda6"), **SMALL)
     agrees(lambda h: sample_grid(asked, h), total, 80.0)
 
 
 def test_what_follows_from_a_grid_is_what_follows_from_the_proof():
     machine = pk.load("tricept")
-    certified = pk.workspace(pk.region(machine, **UPRIGHT), gap=0.01)
-    grid = sample_grid(pk.region(machine, **UPRIGHT), 20.0)
+    certified = pk.workspace(whole_region(machine, **UPRIGHT), gap=0.01)
+    grid = sample_grid(whole_region(machine, **UPRIGHT), 20.0)
     low, high = grid.box
     assert (low + 0.5 * grid.step >= certified.box[0]).all() and (high - 0.5 * grid.step <= certified.box[1]).all()
     assert np.abs(grid.centroid - certified.centroid).max() < 2.0
@@ -145,7 +146,7 @@ def test_what_follows_from_a_grid_is_what_follows_from_the_proof():
 
 
 def test_a_box_cuts_a_part_out_of_the_same_lattice():
-    asked = pk.region(pk.load("orthoglide"))
+    asked = whole_region(pk.load("orthoglide"))
     low, high = (-103.0, 0.0, -50.0), (200.0, 52.4, 400.0)
     whole, part = sample_grid(asked, 5.0), sample_grid(asked, 5.0, (low, high))
     kept = [(x >= a) & (x <= b) for x, a, b in zip(whole.coordinates, low, high, strict=True)]
@@ -160,22 +161,22 @@ def test_a_box_cuts_a_part_out_of_the_same_lattice():
 
 def test_a_line_and_single_cells_are_grids_too():
     machine = pk.load("orthoglide")
-    line = sample_grid(pk.region(machine, {"X": 0.0, "Y": 0.0}), 0.01)
-    certified = pk.workspace(pk.region(machine, {"X": 0.0, "Y": 0.0}), gap=1e-4).volume
+    line = sample_grid(whole_region(machine, {"X": 0.0, "Y": 0.0}), 0.01)
+    certified = pk.workspace(whole_region(machine, {"X": 0.0, "Y": 0.0}), gap=1e-4).volume
     assert line.unit == "mm" and certified.inner - 0.02 <= line.estimate <= certified.outer + 0.02
-    thin = sample_grid(pk.region(machine), 5.0, ([0.0, 0.0, -250.0], [5.0, 5.0, 250.0]))
+    thin = sample_grid(whole_region(machine), 5.0, ([0.0, 0.0, -250.0], [5.0, 5.0, 250.0]))
     assert thin.broken.shape == (1, 1, 100)
-    flat = sample_grid(pk.region(machine), 5.0, ([-250.0, 0.0, 0.0], [250.0, 5.0, 5.0]))
+    flat = sample_grid(whole_region(machine), 5.0, ([-250.0, 0.0, 0.0], [250.0, 5.0, 5.0]))
     assert flat.broken.shape == (100, 1, 1)
     assert thin.estimate == flat.estimate > 0.0
 
 
 def test_a_sweep_can_be_run_again_from_its_parameters():
     machine = pk.load("lambda6")
-    asked = pk.region(machine, some={"C": (0.2, 0.7)}, without=["gap*"])
+    asked = whole_region(machine, some={"C": (0.2, 0.7)}, without=["gap*"])
     grid = sample_grid(asked, 60.0, turns_step=0.1)
     p = grid.parameters
-    same = pk.region(machine, p["at"], p["every"], p["some"], without=p["without"], mode=p["mode"])
+    same = whole_region(machine, p["at"], p["every"], p["some"], without=p["without"], mode=p["mode"])
     again = sample_grid(same, p["step"], p["box"], p["turns_step"])
     assert p["method"] == "grid" and again.estimate == grid.estimate > 0.0
     assert np.array_equal(again.broken, grid.broken)
@@ -183,13 +184,13 @@ def test_a_sweep_can_be_run_again_from_its_parameters():
 
 def test_progress_comes_to_its_end():
     seen = []
-    sample_grid(pk.region(pk.load("lambda6"), every={"C": (0.4, 0.5)}), 8.0, progress=seen.append)
+    sample_grid(whole_region(pk.load("lambda6"), every={"C": (0.4, 0.5)}), 8.0, progress=seen.append)
     assert len(seen) > 1 and seen == sorted(seen) and seen[-1] == 1.0
 
 
 def test_an_empty_region_is_an_empty_grid():
     for at in ({"Z": 5000.0, "B": 0.0, "C": 0.0}, {"Z": -1650.0, "B": 3.0, "C": 0.0}):
-        grid = sample_grid(pk.region(pk.load("tricept"), at), 10.0)
+        grid = sample_grid(whole_region(pk.load("tricept"), at), 10.0)
         assert grid.empty and grid.estimate == 0.0 and grid.box is None and grid.centroid is None
         assert grid.bounded_by == ()
 
@@ -200,25 +201,25 @@ def test_an_empty_region_is_an_empty_grid():
 @pytest.mark.parametrize(("name", "asked", "step"), FLAT, ids=[case[0] for case in FLAT])
 def test_rays_find_the_certified_area(name, asked, step):
     machine = pk.load(name)
-    certified = pk.workspace(pk.region(machine, **asked), gap=0.002)
-    agrees(lambda h: sweep_polar(pk.region(machine, **asked), h, rays=720), certified, step)
+    certified = pk.workspace(whole_region(machine, **asked), gap=0.002)
+    agrees(lambda h: sweep_polar(whole_region(machine, **asked), h, rays=720), certified, step)
 
 
 def test_rays_find_the_certified_volume_of_what_is_star_shaped():
     machine = pk.load("lambda6")
-    certified = pk.workspace(pk.region(machine), gap=0.004)
-    agrees(lambda h: sweep_polar(pk.region(machine), h, rays=180), certified, 80.0)
+    certified = pk.workspace(whole_region(machine), gap=0.004)
+    agrees(lambda h: sweep_polar(whole_region(machine), h, rays=180), certified, 80.0)
 
 
 def test_rays_find_the_certified_total_orientation_workspace(total):
-    asked = pk.region(pk.load("lambda6"), **SMALL)
+    asked = whole_region(pk.load("lambda6"), **SMALL)
     agrees(lambda h: sweep_polar(asked, h, rays=120), total, 80.0)
 
 
 @pytest.mark.parametrize(("name", "asked"), [("tricept", UPRIGHT), ("orthoglide", {}), ("hbg80_3d", {})])
 def test_a_ray_ends_at_the_first_place_not_allowed(name, asked, rng):
     machine = pk.load(name)
-    question = pk.region(machine, **asked)
+    question = whole_region(machine, **asked)
     found = sweep_polar(question, 7.0, planes=31.0, rays=40)
     assert 0.0 < np.isnan(found.radii).mean() < 1.0
     for plane, ray in zip(rng.integers(0, len(found.heights), 60), rng.integers(0, len(found.angles), 60), strict=True):
@@ -234,13 +235,13 @@ def test_a_ray_ends_at_the_first_place_not_allowed(name, asked, rng):
         broken = machine.check(question.poses(places))
         assert not broken[:-1].any() and broken[-1] == found.broken[plane, ray] > 0
     # It sees no more than there is, and says what it can't see.
-    assert found.estimate < pk.workspace(pk.region(machine, **asked), gap=0.05).volume.outer
+    assert found.estimate < pk.workspace(whole_region(machine, **asked), gap=0.05).volume.outer
     assert "not seen" in found.note
 
 
 def test_outlines_are_closed_and_of_the_planes_that_hold_the_axis():
     machine = pk.load("orthoglide")
-    found = sweep_polar(pk.region(machine), 5.0, planes=40.0, rays=36, axis=(-20.0, 10.0))
+    found = sweep_polar(whole_region(machine), 5.0, planes=40.0, rays=36, axis=(-20.0, 10.0))
     held = ~np.isnan(found.radii).any(1)
     assert len(found.outlines) == held.sum() > 2
     for line, height, radii in zip(found.outlines, found.heights[held], found.radii[held], strict=True):
@@ -255,10 +256,10 @@ def test_outlines_are_closed_and_of_the_planes_that_hold_the_axis():
 
 
 def test_a_polar_sweep_is_of_two_or_three_places():
-    flat = sweep_polar(pk.region(pk.load("hbg80_2d")), 10.0)
+    flat = sweep_polar(whole_region(pk.load("hbg80_2d")), 10.0)
     assert flat.heights is None and flat.radii.shape == (1, 72) and flat.outlines[0].shape == (73, 2)
     with pytest.raises(PoseError, match="needs a plane"):
-        sweep_polar(pk.region(pk.load("hbg80_2d"), {"X": 200.0}), 10.0)
+        sweep_polar(whole_region(pk.load("hbg80_2d"), {"X": 200.0}), 10.0)
 
 
 # The sweep of the drives.
@@ -267,14 +268,14 @@ def test_a_polar_sweep_is_of_two_or_three_places():
 @pytest.mark.parametrize("name", TRANSLATING)
 def test_drives_find_the_certified_volume(name):
     machine = pk.load(name)
-    certified = pk.workspace(pk.region(machine), gap=0.004)
+    certified = pk.workspace(whole_region(machine), gap=0.004)
     widest = max(drive.high - drive.low for drive in machine.model.drives)
-    agrees(lambda h: pk.sweep_drives(pk.region(machine), round(widest / h)), certified, widest / 12)
+    agrees(lambda h: pk.sweep_drives(whole_region(machine), round(widest / h)), certified, widest / 12)
 
 
 def test_a_contour_of_the_planar_machine_is_the_circle_it_must_be():
     machine = pk.load("hbg80_2d")
-    found = pk.sweep_drives(pk.region(machine), 50)
+    found = pk.sweep_drives(whole_region(machine), 50)
     names = {image.strategy.name for image in found.contours}
     assert names == {
         f"{run} runs, {stand} at {end}" for run, stand in (("Xhbg", "Yhbg"), ("Yhbg", "Xhbg")) for end in ("min", "max")
@@ -300,7 +301,7 @@ def test_a_contour_of_the_planar_machine_is_the_circle_it_must_be():
 
 def test_the_net_of_the_shell_lies_on_spheres_and_is_the_boundary():
     machine = pk.load("hbg80_3d")
-    found = pk.sweep_drives(pk.region(machine), 24)
+    found = pk.sweep_drives(whole_region(machine), 24)
     assert len({image.strategy.name for image in found.contours}) == 12
     assert len({image.strategy.name for image in found.nets}) == 6
     assert {image.side for image in found.nets} == {"home", "other"}
@@ -326,7 +327,9 @@ def test_the_net_of_the_shell_lies_on_spheres_and_is_the_boundary():
 def test_a_drive_stands_at_its_limit_though_rounding_says_otherwise():
     machine = pk.load("orthoglide")
     image = next(
-        i for i in pk.sweep_drives(pk.region(machine), 8).nets if i.strategy.name == "rho_x and rho_y run, rho_z at max"
+        i
+        for i in pk.sweep_drives(whole_region(machine), 8).nets
+        if i.strategy.name == "rho_x and rho_y run, rho_z at max"
     )
     assert np.isfinite(image.positions).any()
     assert (machine.check(image.positions[np.isfinite(image.positions).all(-1)]) > 0).any()
@@ -337,14 +340,14 @@ def test_a_drive_stands_at_its_limit_though_rounding_says_otherwise():
 )
 def test_other_machines_have_no_sweep_of_the_drives(name, why):
     with pytest.raises(NoMethodError, match=f"{name}.*{why}"):
-        pk.sweep_drives(pk.region(pk.load(name)))
+        pk.sweep_drives(whole_region(pk.load(name)))
 
 
 # Bad input.
 
 
 def test_bad_numbers_are_refused_in_one_line():
-    tricept, lambda6 = pk.region(pk.load("tricept")), pk.region(pk.load("lambda6"), every={"C": (0.4, 0.5)})
+    tricept, lambda6 = whole_region(pk.load("tricept")), whole_region(pk.load("lambda6"), every={"C": (0.4, 0.5)})
     flat = pk.load("hbg80_2d")
     for step in (0.0, -1.0, np.nan, np.inf):
         for sweep in (sample_grid, sweep_polar):
@@ -372,10 +375,10 @@ def test_bad_numbers_are_refused_in_one_line():
             sample_grid(tricept, 1.0, box)
     for cells in (0, -3, 40_000):
         with pytest.raises(PoseError, match=r"^cells: 1 to 31622 parts of each drive expected"):
-            pk.sweep_drives(pk.region(flat), cells)
+            pk.sweep_drives(whole_region(flat), cells)
     for question in ({"at": {"X": 200.0}}, {"without": ["*.max"]}):
         with pytest.raises(PoseError, match=r"^region: a sweep of the drives takes the whole workspace"):
-            pk.sweep_drives(pk.region(flat, **question))
+            pk.sweep_drives(whole_region(flat, **question))
 
 
 @pytest.fixture

@@ -9,6 +9,7 @@ from math import inf, nan, sqrt
 import numpy as np
 import pytest
 from drawn import FAMILIES, draw, machine_of
+from regions import whole_region
 from test_workspace import INSIDE, OUTSIDE, SHIPPED, Raster, known, turns_of
 
 import parakin as pk
@@ -31,7 +32,7 @@ def test_planes_and_lines_through_home(name):
     lengths = [axis for axis in m.axes if axis in "XYZ"]
     for free in (lengths[:1], lengths[-1:], lengths[:2]):
         at = {axis: home[axis] + offset for axis in lengths if axis not in free for offset in [rng.choice([0.0, 13.0])]}
-        found = pk.workspace(pk.region(m, at=at), gap=0.01)
+        found = pk.workspace(whole_region(m, at=at), gap=0.01)
         assert found.axes == tuple(free)
         assert found.stopped == "gap"
         assert found.volume.inner > 0.0
@@ -71,7 +72,9 @@ def test_drawn_machines_of_every_structure(family, tmp_path):
     span = {axis: (home[axis] - 0.02, home[axis] + 0.05) for axis in turning}
     slow = {"at": {"X": home["X"]}} if len(turning) > 1 else {}
     for kind in ("constant", "every", "some")[: 3 if turning else 1]:
-        found = pk.workspace(pk.region(m, **{} if kind == "constant" else {kind: span} | slow), gap=0.05, seconds=0.2)
+        found = pk.workspace(
+            whole_region(m, **{} if kind == "constant" else {kind: span} | slow), gap=0.05, seconds=0.2
+        )
         if kind != "every":
             place = np.array([home[axis] for axis in found.axes])
             low, high = found.box
@@ -96,7 +99,7 @@ def test_what_limits_imply_holds_wherever_they_do(what, tmp_path):
         m = SHIPPED.get(what) or limited(machine_of(draw(what, seed)[0], tmp_path), 200.0, rng)
         home = dict(zip(m.axes, m.home.tolist(), strict=True))
         span = {"B": (home["B"] - 0.3, home["B"] + 0.3), "C": (home["C"] - 3.0, home["C"] + 3.0)}
-        asked = pk.region(m, some=span)
+        asked = whole_region(m, some=span)
         places = m.home[:3] + rng.normal(size=(40_000, 3)) * 10.0 ** rng.uniform(1.0, 3.0, (40_000, 1))
         turns = turns_of(asked, rng, len(places))
         allowed = m.check(asked.poses(places, turns)) == 0
@@ -116,7 +119,7 @@ def test_what_limits_imply_holds_wherever_they_do(what, tmp_path):
 
 def test_cells_lie_side_by_side_to_the_last_digit():
     """No sliver between neighbours, no overlap: the corners of all parts are exact."""
-    found = pk.workspace(pk.region(SHIPPED["orthoglide"]), gap=0.05)
+    found = pk.workspace(whole_region(SHIPPED["orthoglide"]), gap=0.05)
     cells = found.cells
     unit = 2.0**-40
     for corner in (cells.low, cells.size):
@@ -143,12 +146,14 @@ def subdivide_all(low, high, times):
 
 def test_the_extent_holds_the_region_and_little_more():
     for name, m in SHIPPED.items():
-        low, high = pk.region(m).extent
-        box = pk.workspace(pk.region(m), gap=0.02).box
+        low, high = whole_region(m).extent
+        box = pk.workspace(whole_region(m), gap=0.02).box
         assert (low <= box[0]).all(), name
         assert (box[1] <= high).all(), name
         assert (high - low < 2.0 * (box[1] - box[0])).all(), name
-    low, high = pk.region(SHIPPED["tricept"], without=["r?.*"]).extent  # nothing is known on the axis of the first turn
+    low, high = whole_region(
+        SHIPPED["tricept"], without=["r?.*"]
+    ).extent  # nothing is known on the axis of the first turn
     assert (high - low < 10_000.0).all()
 
 
@@ -167,8 +172,8 @@ def assert_true_of(found, m):
 
 def test_the_work_stops_in_time_with_what_it_has():
     m = SHIPPED["hexapod"]
-    exact = pk.workspace(pk.region(m), gap=0.01).volume
-    found = pk.workspace(pk.region(m), gap=1e-5, seconds=0.001)
+    exact = pk.workspace(whole_region(m), gap=0.01).volume
+    found = pk.workspace(whole_region(m), gap=1e-5, seconds=0.001)
     assert found.stopped == "time"
     assert_true_of(found, m)
     assert found.volume.inner <= exact.outer
@@ -176,14 +181,14 @@ def test_the_work_stops_in_time_with_what_it_has():
     spans = dict.fromkeys("ABC", (-0.1, 0.1))
     for kind, most in (("every", 3.0), ("some", 6.0)):
         start = time.monotonic()
-        found = pk.workspace(pk.region(m, **{kind: spans}), gap=1e-4, seconds=1.0)
+        found = pk.workspace(whole_region(m, **{kind: spans}), gap=1e-4, seconds=1.0)
         assert found.stopped == "time"
         assert time.monotonic() - start < most
 
 
 def test_what_is_interrupted_keeps_what_it_has():
     m = SHIPPED["orthoglide"]
-    exact = pk.workspace(pk.region(m), gap=0.005).volume
+    exact = pk.workspace(whole_region(m), gap=0.005).volume
     for after in range(4):
         left = [after]
 
@@ -193,7 +198,7 @@ def test_what_is_interrupted_keeps_what_it_has():
             if left[0] < 0:
                 raise KeyboardInterrupt
 
-        found = pk.workspace(pk.region(m), gap=0.001, progress=stop)
+        found = pk.workspace(whole_region(m), gap=0.001, progress=stop)
         assert found.stopped == "interrupted"
         assert_true_of(found, m)
         assert found.volume.inner <= exact.outer
@@ -202,7 +207,7 @@ def test_what_is_interrupted_keeps_what_it_has():
 
 def test_an_interrupt_in_the_middle_of_a_round_counts_no_cell_twice(monkeypatch):
     m = SHIPPED["orthoglide"]
-    exact = pk.workspace(pk.region(m), gap=0.005).volume
+    exact = pk.workspace(whole_region(m), gap=0.005).volume
     plain, volumes, left = IntervalProgram.__call__, set(), [0]
 
     def stop(self, low, high):
@@ -213,7 +218,7 @@ def test_an_interrupt_in_the_middle_of_a_round_counts_no_cell_twice(monkeypatch)
 
     monkeypatch.setattr(IntervalProgram, "__call__", stop)
     monkeypatch.setattr(subdivide, "AT_ONCE", 100)
-    asked = pk.region(m)
+    asked = whole_region(m)
     asked.extent  # noqa: B018  not to be interrupted
     for after in (60, 150, 300, 700, 1100):
         left[0] = after
@@ -226,9 +231,9 @@ def test_an_interrupt_in_the_middle_of_a_round_counts_no_cell_twice(monkeypatch)
         volumes.add(found.volume)
     assert len(volumes) > 1
     left[0] = 100_000
-    whole = pk.workspace(pk.region(m), gap=0.02)
+    whole = pk.workspace(whole_region(m), gap=0.02)
     left[0] = 100_000 - left[0] - 3  # when the answer is there, and only the box about it is made closer
-    found = pk.workspace(pk.region(m), gap=0.02)
+    found = pk.workspace(whole_region(m), gap=0.02)
     assert left[0] <= 0
     assert found.stopped == "gap"
     assert found.volume.gap <= 0.02
@@ -237,7 +242,7 @@ def test_an_interrupt_in_the_middle_of_a_round_counts_no_cell_twice(monkeypatch)
 
 
 def test_a_gap_out_of_reach_ends_at_the_numbers_resolution():
-    found = pk.workspace(pk.region(known("balls"), at={"Y": 50.0, "Z": -90.0}), gap=1e-15, seconds=None)
+    found = pk.workspace(whole_region(known("balls"), at={"Y": 50.0, "Z": -90.0}), gap=1e-15, seconds=None)
     assert found.stopped == "resolution"
     exact = sqrt(400**2 - 10600) + sqrt(350**2 - 10600) - 300
     assert found.volume.inner <= exact <= found.volume.outer
@@ -260,7 +265,7 @@ def test_regions_proved_empty():
         ("orthoglide5_head", {"every": {"B": (0.0, 2.0)}}),
     ):
         m = SHIPPED[name]
-        found = pk.workspace(pk.region(m, **question), seconds=20.0)
+        found = pk.workspace(whole_region(m, **question), seconds=20.0)
         assert found.empty, (name, question)
         assert found.stopped == "gap"
         assert found.volume == Volume(0.0, 0.0, 0.0)
@@ -268,7 +273,7 @@ def test_regions_proved_empty():
         assert found.box is None
         assert found.centroid is None
         assert found.bounded_by == ()
-        assert pk.region(m, **question).extent is None
+        assert whole_region(m, **question).extent is None
 
 
 def test_what_nothing_bounds_is_refused():
@@ -278,18 +283,18 @@ def test_what_nothing_bounds_is_refused():
     assert not free.limits
     for question in ({}, {"at": {"X": 3.0}}, {"at": {"X": 3.0, "Y": 1.0}}):
         with pytest.raises(PoseError, match=r"do not bound the workspace in [XYZ]"):
-            pk.workspace(pk.region(free, **question))
+            pk.workspace(whole_region(free, **question))
     with pytest.raises(PoseError, match="do not bound the workspace in"):
-        pk.workspace(pk.region(m, without=["*"]))
+        pk.workspace(whole_region(m, without=["*"]))
     with pytest.raises(PoseError, match="do not bound the workspace in Z"):
-        pk.workspace(pk.region(SHIPPED["linear_delta"], without=["*"]))
+        pk.workspace(whole_region(SHIPPED["linear_delta"], without=["*"]))
     with pytest.raises(PoseError, match="do not bound the workspace in Z"):
-        pk.workspace(pk.region(SHIPPED["linear_delta"], at={"X": 0.0, "Y": 0.0}, without=["tower*"]))
+        pk.workspace(whole_region(SHIPPED["linear_delta"], at={"X": 0.0, "Y": 0.0}, without=["tower*"]))
 
 
 def test_legs_must_reach_whatever_is_switched_off():
     with pytest.raises(PoseError, match="can't be switched off"):
-        pk.workspace(pk.region(SHIPPED["lambda6"], without=["l1.reach"]))
-    found = pk.workspace(pk.region(SHIPPED["hbg80_2d"], without=["*"]), gap=0.02)
+        pk.workspace(whole_region(SHIPPED["lambda6"], without=["l1.reach"]))
+    found = pk.workspace(whole_region(SHIPPED["hbg80_2d"], without=["*"]), gap=0.02)
     assert set(found.region.limits) == {"Xhbg.reach", "Yhbg.reach"}
     assert found.volume.inner <= 4 * 400.0**2 <= found.volume.outer  # the common square of two strips

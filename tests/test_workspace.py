@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from regions import whole_region
 
 import parakin as pk
 
@@ -101,7 +102,7 @@ ANSWERS = {
 @pytest.mark.parametrize("aim", [{"gap": 0.5}, {"gap": 0.02}, {"cell": 13.0}], ids=str)
 def test_the_bracket_holds_the_exact_volume(what, aim):
     name, sizes, question, exact = ANSWERS[what]
-    found = pk.workspace(pk.region(known(name, **sizes), **question), **aim, seconds=2.0)
+    found = pk.workspace(whole_region(known(name, **sizes), **question), **aim, seconds=2.0)
     volume = found.volume
     assert volume.inner <= exact <= volume.outer
     assert volume.inner <= volume.estimate <= volume.outer
@@ -131,9 +132,9 @@ def test_a_planar_machine_against_a_grid():
     every, some = margins.min(1), margins.max(1)
     span = {"C": (0.1, 0.6)}
     for found, surely, perhaps in (
-        (pk.workspace(pk.region(m, every=span), gap=0.003), every >= off + between, every >= -off),
-        (pk.workspace(pk.region(m, some=span), gap=0.01), some >= off, some >= -off - between),
-        (pk.workspace(pk.region(m, at={"C": 0.1}), gap=0.003), margins[:, 0] >= off, margins[:, 0] >= -off),
+        (pk.workspace(whole_region(m, every=span), gap=0.003), every >= off + between, every >= -off),
+        (pk.workspace(whole_region(m, some=span), gap=0.01), some >= off, some >= -off - between),
+        (pk.workspace(whole_region(m, at={"C": 0.1}), gap=0.003), margins[:, 0] >= off, margins[:, 0] >= -off),
     ):
         assert found.stopped == "gap"
         least, most = surely.sum() * step**2, perhaps.sum() * step**2
@@ -212,9 +213,9 @@ def swept(m, kind, wide):
 def test_ten_million_places_are_what_their_cells_say(name):
     m = SHIPPED[name]
     rng = np.random.default_rng(61)
-    side = {2: 1000, 3: 100}[len(pk.region(m).free_axes)]
-    extent = pk.region(m).extent
-    found = pk.workspace(pk.region(m), cell=float((extent[1] - extent[0]).max()) / side)
+    side = {2: 1000, 3: 100}[len(whole_region(m).free_axes)]
+    extent = whole_region(m).extent
+    found = pk.workspace(whole_region(m), cell=float((extent[1] - extent[0]).max()) / side)
     assert found.stopped == "cell"
     raster = Raster(found.cells, 2 * side)
     seen = np.zeros(3, int)
@@ -234,7 +235,7 @@ def test_places_and_turns_at_random_are_what_their_cells_say(name, kind):
     """Inside, every turn is allowed (or one is found); outside, none is (or one that is not is found)."""
     m = SHIPPED[name]
     rng = np.random.default_rng(62)
-    found = pk.workspace(pk.region(m, **swept(m, kind, 0.08)), gap=0.15, seconds=2.0)
+    found = pk.workspace(whole_region(m, **swept(m, kind, 0.08)), gap=0.15, seconds=2.0)
     asked, raster = found.region, Raster(found.cells, 64)
     seen = np.zeros(3, int)
     for _ in range(3):
@@ -291,7 +292,7 @@ def test_the_shares_of_cells_are_between_inner_and_outer(name):
         : 3 if name in ("hexapod", "lambda6", "orthoglide5_table", "tricept") else 1
     ]:
         question = {} if kind == "constant" else swept(m, kind, 0.05)
-        found = pk.workspace(pk.region(m, **question), gap=0.05 if kind == "constant" else 0.3, seconds=2.0)
+        found = pk.workspace(whole_region(m, **question), gap=0.05 if kind == "constant" else 0.3, seconds=2.0)
         cells = found.cells.take(~found.cells.inside)
         cells = cells.take(rng.permutation(len(cells.low))[:150])
         d = cells.low.shape[1]

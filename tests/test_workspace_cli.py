@@ -12,6 +12,7 @@ import meshio
 import numpy as np
 import pytest
 import trimesh
+from regions import whole_region
 
 import parakin as pk
 from parakin.cli import main
@@ -53,7 +54,7 @@ def refused(capsys, *arguments):
 
 
 def test_the_account_for_people(ball, capsys):
-    assert main(["workspace", ball]) == 0
+    assert main(["workspace", ball, "--all-parts"]) == 0
     said = capsys.readouterr().out
     lines = dict(line.split(None, 1) for line in said.splitlines() if line[:1].isalpha() and "  " in line)
     low, high = (float(word.replace(",", "")) for word in lines["proved"].split(" mm³")[0].split(" to "))
@@ -66,10 +67,10 @@ def test_the_account_for_people(ball, capsys):
 
 
 def test_json(ball, capsys):
-    said = told(capsys, ball, "--gap", "0.02")
+    said = told(capsys, ball, "--all-parts", "--gap", "0.02")
     assert list(said) == [
         "schema", "machine", "kind", "axes", "unit", "volume", "gap", "stopped", "empty", "box", "centroid",
-        "bounded_by", "surface", "cells", "slices", "parameters", "files",
+        "bounded_by", "surface", "cells", "slices", "elsewhere", "parameters", "files",
     ]  # fmt: skip
     assert (said["schema"], said["machine"], said["kind"]) == ("parakin.workspace/1", "ball", "constant")
     assert (said["axes"], said["unit"], said["stopped"], said["empty"]) == (["X", "Y", "Z"], "mm³", "gap", False)
@@ -105,7 +106,7 @@ def test_parameters_are_enough_to_run_it_again(capsys):
     assert given["every"]["A"] == pytest.approx([-10, np.degrees(0.1)])
     assert given["without"] == ["strut0.min", "strut0.max"]
     again = pk.workspace(
-        pk.region(
+        whole_region(
             pk.load("hexapod"),
             at={axis: np.radians(v) if axis in "ABC" else v for axis, v in given["at"].items()},
             every={axis: tuple(np.radians(span)) for axis, span in given["every"].items()},
@@ -119,7 +120,7 @@ def test_parameters_are_enough_to_run_it_again(capsys):
 
 
 def test_sizes_can_be_set(ball, capsys):
-    said = told(capsys, ball, "--set", "R=400mm")
+    said = told(capsys, ball, "--all-parts", "--set", "R=400mm")
     assert said["volume"]["inner"] < 4 / 3 * pi * (400**3 - 200**3) < said["volume"]["outer"]
     assert said["parameters"]["set"] == ["R=400mm"]
 
@@ -128,7 +129,7 @@ def test_every_file_opens_again(ball, tmp_path, capsys):
     folder = tmp_path / "out"
     kinds = ["stl", "ply", "glb", "vtu", "csv", "png", "json"]
     options = [word for kind in kinds for word in ("-o", str(folder / f"shape.{kind}"))]
-    said = told(capsys, ball, "--gap", "0.05", *options)
+    said = told(capsys, ball, "--all-parts", "--gap", "0.05", *options)
     assert said["files"] == {kind: str(folder / f"shape.{kind}") for kind in kinds}
     assert sorted(path.name for path in folder.iterdir()) == sorted(f"shape.{kind}" for kind in kinds)
     for kind in ("stl", "ply", "glb"):
@@ -148,7 +149,7 @@ def test_every_file_opens_again(ball, tmp_path, capsys):
 def test_the_step_makes_the_mesh(ball, tmp_path):
     sizes = []
     for step in ("60", "3cm"):
-        assert main(["workspace", ball, "--step", step, "-o", str(tmp_path / "s.stl")]) == 0
+        assert main(["workspace", ball, "--all-parts", "--step", step, "-o", str(tmp_path / "s.stl")]) == 0
         sizes.append(len(trimesh.load(tmp_path / "s.stl").faces))
     assert 3 < sizes[1] / sizes[0] < 5
 
@@ -166,7 +167,7 @@ def test_a_planar_machine(tmp_path, capsys):
 
 
 def test_a_line(ball, tmp_path, capsys):
-    said = told(capsys, ball, "--at", "X=0,Y=0", "-o", tmp_path / "a.vtu")
+    said = told(capsys, ball, "--all-parts", "--at", "X=0,Y=0", "-o", tmp_path / "a.vtu")
     assert said["unit"] == "mm"
     assert said["volume"]["inner"] < 600 < said["volume"]["outer"]
     assert said["slices"] == []
@@ -174,11 +175,11 @@ def test_a_line(ball, tmp_path, capsys):
 
 
 def test_nothing_at_all(ball, tmp_path, capsys):
-    assert main(["workspace", ball, "--at", "Z=2000"]) == 0
+    assert main(["workspace", ball, "--all-parts", "--at", "Z=2000"]) == 0
     assert "empty: no pose is allowed, proved" in capsys.readouterr().out
     names = [str(tmp_path / f"e.{kind}") for kind in ("vtu", "png", "csv")]
     options = [word for name in names for word in ("-o", name)]
-    assert main(["workspace", ball, "--at", "Z=2000", *options, "--json"]) == 3
+    assert main(["workspace", ball, "--all-parts", "--at", "Z=2000", *options, "--json"]) == 3
     said = capsys.readouterr()
     content = json.loads(said.out)
     assert content["empty"] is True
@@ -199,7 +200,7 @@ def test_interrupted_it_gives_what_it_has(ball, capsys, monkeypatch):
         return decide(self, *arguments)
 
     monkeypatch.setattr(Subdivision, "_choose_parents", stopped)
-    said = told(capsys, ball, "--gap", "1e-6", "--time", "1e6", code=130)
+    said = told(capsys, ball, "--all-parts", "--gap", "1e-6", "--time", "1e6", code=130)
     assert said["stopped"] == "interrupted"
     assert 0 < said["volume"]["inner"] < VOLUME < said["volume"]["outer"]
     assert len(said["slices"]) == 5

@@ -16,6 +16,7 @@ from .atlas_summary import format_atlas, format_performance, format_proofs
 from .console import ProgressBar, announce_compiling, print_json, print_text
 from .options import OFF_LIMITS, Json, Mode, Name, Sizes, load_machine
 from .region_options import (
+    AllParts,
     At,
     Without,
     parse_axis_ranges,
@@ -45,6 +46,7 @@ def atlas(
     amplification: str | None = None,
     slices: Annotated[list[str] | None, Parameter(name="--slice")] = None,
     without: Without = None,
+    all_parts: AllParts = False,
     step: str | None = None,
     size: Annotated[str | None, Parameter(name="--length")] = None,
     mode: Mode = None,
@@ -77,7 +79,7 @@ def atlas(
         A folder for the maps, PNG and CSV, or one file by its ending.
     """
     machine = load_machine(name, sizes)
-    region = read_region(machine, at, without=without, mode=mode)
+    region = read_region(machine, at, without=without, mode=mode, all_parts=all_parts)
     scale, apart = parse_length(size, "--length"), parse_length(step, "--step")
     spans = parse_axis_ranges(machine, box, "--box")
     bounds = _parse_claim(amplification, bool(spans))

@@ -82,8 +82,7 @@ def format_atlas(atlas: Atlas) -> str:
         pose = _format_pose(machine, extreme.pose, axes)
         rows.append((name, extreme.side, _format_number(extreme.value), pose))
     lines += ["", format_table(rows, ("", "", "", "at [mm]"), "  r"), ""]
-    if atlas.singular:
-        lines.append(f"singular: the workspace meets {', '.join(atlas.singular)}")
+    lines += _format_singularities(atlas)
     several = "" if atlas.isolated else " (samples of a curve of them)"
     for pose_values, margin in zip(atlas.isotropic, atlas.isotropic_margins.tolist(), strict=True):
         beyond = ", beyond a parallel singularity" if margin < 0.0 else ""
@@ -91,6 +90,19 @@ def format_atlas(atlas: Atlas) -> str:
     if not len(atlas.isotropic):
         lines.append("isotropic: nowhere")
     return "\n".join(lines)
+
+
+def _format_singularities(atlas: Atlas) -> list[str]:
+    """Format what is proved of the singularities."""
+    lines = []
+    for singularity in atlas.singularities:
+        if singularity.verdict == "met" and singularity.pose is not None:
+            pose = _format_pose(atlas.machine, singularity.pose, atlas.map.axes)
+            lines.append(f"singular: {singularity.margin}, proved: on the way to {pose} its margin changes sign")
+    for verdict, text in (("none", "not singular: {}, proved"), ("unproved", "unproved: whether {} is met")):
+        names = [singularity.margin for singularity in atlas.singularities if singularity.verdict == verdict]
+        lines += [text.format(", ".join(names))] if names else []
+    return lines
 
 
 def format_proofs(

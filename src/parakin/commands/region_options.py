@@ -29,6 +29,13 @@ Every = Annotated[
 Some = Annotated[
     str | None, Parameter(help="Ranges of turning axes of which one value must be allowed (inclusive orientation).")
 ]
+AllParts = Annotated[
+    bool,
+    Parameter(
+        name="--all-parts",
+        help="Count what home can't reach too, such as the mirror image of the workspace behind the base.",
+    ),
+]
 Without = Annotated[
     list[str] | None,
     Parameter(help="A limit that does not count, with * for any letters: gap*. May be given again."),
@@ -43,6 +50,7 @@ def read_region(
     dexterous: bool = False,
     without: Sequence[str] | None = None,
     mode: str | None = None,
+    all_parts: bool = False,
 ) -> Region:
     """Make the region that the options describe; an error names the option that is invalid."""
     from ..workspaces.certified.region import make_region
@@ -55,7 +63,7 @@ def read_region(
         "mode": mode,
     }
     try:
-        return make_region(machine, dexterous=dexterous, **arguments)
+        return make_region(machine, dexterous=dexterous, part="all" if all_parts else "home", **arguments)
     except PoseError:
         for option, value in arguments.items():
             try:

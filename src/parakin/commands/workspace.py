@@ -13,7 +13,7 @@ from ..errors import InputError, PoseError
 from ..export.json.text import format_json
 from .console import ProgressBar, announce_compiling, print_json, print_remark, print_text
 from .options import OFF_LIMITS, Json, Mode, Name, Sizes, load_machine
-from .region_options import At, Every, Some, Without, parse_length, read_region
+from .region_options import AllParts, At, Every, Some, Without, parse_length, read_region
 from .workspace_inside import InsideOptions, encode_inside, explore_inside, format_inside
 from .workspace_methods import Effort, Method, find_workspace
 from .workspace_summary import format_workspace
@@ -111,6 +111,7 @@ def workspace(
     cell: CellSize = None,
     time: TimeLimit = None,
     step: StepLength = None,
+    all_parts: AllParts = False,
     box: LargestBox = False,
     shape: Proportions = None,
     around: Centre = None,
@@ -126,13 +127,13 @@ def workspace(
     The exit code is 3 if a file has nothing to be filled with, for the workspace is empty.
     """
     machine = load_machine(name, sizes)
-    region = read_region(machine, at, every, some, dexterous, without, mode)
+    region = read_region(machine, at, every, some, dexterous, without, mode, all_parts)
     effort = Effort(gap, parse_length(cell, "--cell"), time, parse_length(step, "--step"))
     files = _sort_files(output or (), method, len(region.free_axes))
     announce_compiling()
     from ..export.json.workspace import encode_workspace
     from ..export.workspace.workspace_files import WorkspaceFiles, prepare_files
-    from ..workspaces.certified.workspace import Workspace
+    from ..workspaces.certified.workspace import Workspace, measure_elsewhere
 
     began = clock.monotonic()
     with ProgressBar() as progress:
@@ -142,7 +143,8 @@ def workspace(
         contents = WorkspaceFiles(found, None, ())
         if is_drawn:
             contents = prepare_files(found, effort.step, progress.part("drawing", 0.6, 1.0))
-        encoded = encode_workspace(found, contents.cross_sections)
+        elsewhere = measure_elsewhere(found) if isinstance(found, Workspace) else None
+        encoded = encode_workspace(found, contents.cross_sections, elsewhere)
         inside = explore_inside(region, InsideOptions(box, shape, around, parts, start))
         encoded.update(encode_inside(inside))
         encoded["parameters"] = {"step": effort.step, **encoded["parameters"], "set": list(sizes or ())}
@@ -150,7 +152,7 @@ def workspace(
     if json:
         print_json({**encoded, "files": written})
     else:
-        print_text(format_workspace(found, seconds) + format_inside(inside))
+        print_text(format_workspace(found, seconds, elsewhere) + format_inside(inside))
         if written:
             print_text("\n" + "\n".join(f"{kind:<5} {path}" for kind, path in written.items()))
     for path, reason in refused.items():

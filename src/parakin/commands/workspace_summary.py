@@ -9,7 +9,7 @@ from ..export.number_format import format_fixed
 from .console import format_table
 
 if TYPE_CHECKING:
-    from ..workspaces.certified.workspace import Workspace
+    from ..workspaces.certified.workspace import Volume, Workspace
     from ..workspaces.sampled.sampling import SampledWorkspace
 
 _STOPPED = {
@@ -22,15 +22,18 @@ _STOPPED = {
 }
 
 
-def format_workspace(workspace: Workspace | SampledWorkspace, seconds: float) -> str:
-    """Format a workspace for people, and the time it took, s."""
+def format_workspace(workspace: Workspace | SampledWorkspace, seconds: float, elsewhere: Volume | None = None) -> str:
+    """Format a workspace for people, the time it took, s, and what the machine reaches besides home's part."""
     from ..export.workspace.describe import describe_workspace
     from ..workspaces.certified.workspace import Workspace
     from ..workspaces.sampled.grid import GridWorkspace
 
     head = describe_workspace(workspace)
     if isinstance(workspace, Workspace) and workspace.empty:
-        return f"{head}\n\nempty: no pose is allowed, proved in {seconds:.1f} s"
+        besides = ""
+        if elsewhere is not None and elsewhere.outer > 0.0:
+            besides = f"\nbesides   {_format_elsewhere(elsewhere, workspace.unit)}"
+        return f"{head}\n\nempty: no pose is allowed, proved in {seconds:.1f} s{besides}"
     rows = _list_certified(workspace) if isinstance(workspace, Workspace) else _list_sampled(workspace)
     limits = []
     if isinstance(workspace, Workspace | GridWorkspace):
@@ -46,11 +49,21 @@ def format_workspace(workspace: Workspace | SampledWorkspace, seconds: float) ->
             (limit.limit, f"{limit.fraction:.1%}", _format_position(workspace.axes, limit.middle))
             for limit in workspace.bounded_by
         ]
+    if elsewhere is not None and elsewhere.outer > 0.0:
+        rows.append(("besides", _format_elsewhere(elsewhere, workspace.unit)))
     rows.append(("time", f"{seconds:.1f} s"))
     lines = [head, "", *(f"{name:<8}  {text}" for name, text in rows)]
     if limits:
         lines += ["", format_table(limits, ("bounded by", "share", "about"), " r")]
     return "\n".join(lines)
+
+
+def _format_elsewhere(elsewhere: Volume, unit: str) -> str:
+    most = f"{elsewhere.outer:,.0f} {unit}"
+    if elsewhere.inner > 0.0:
+        what = f"{elsewhere.estimate:,.0f} {unit} in parts that home can't reach"
+        return f"{what}, {elsewhere.inner:,.0f} to {most}; --all-parts counts them"
+    return f"at most {most} in parts that home can't reach; --all-parts counts them"
 
 
 def _list_certified(workspace: Workspace) -> list[tuple[str, str]]:

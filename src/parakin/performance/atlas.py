@@ -15,7 +15,7 @@ from ..arrays import Array, Flags, Progress
 from ..errors import PoseError
 from ..machine import Machine
 from ..workspaces.certified.region import Region
-from .certified.counterexamples import ZERO
+from .certified.region_singularities import RegionSingularity, judge_singularities
 from .characteristic_length import CharacteristicLength, choose_characteristic_length
 from .extremes import Extreme, ExtremeSide, compute_slack, find_extremes, find_isotropic_poses
 from .indices import Performance, compute_performance
@@ -68,6 +68,8 @@ class Atlas:
 
     extremes : over the allowed positions, found by search from the grid's best
     isotropic : (k, axes) allowed poses at which J is a multiple of a rotation
+    singularities : of each margin, whether the machine's limits keep it from zero all over, whether a path inside them
+        is proved to pass through zero, or neither
     isolated : whether these stand alone; else they are samples of a curve or a surface of them
     """
 
@@ -75,6 +77,7 @@ class Atlas:
     extremes: tuple[Extreme, ...]
     isotropic: Array
     isolated: bool
+    singularities: tuple[RegionSingularity, ...]
 
     @property
     def machine(self) -> Machine:
@@ -82,9 +85,8 @@ class Atlas:
 
     @property
     def singular(self) -> tuple[str, ...]:
-        """Names of the margins that are not positive all over the region: it meets these singularities."""
-        names = self.map.performance.margin_names
-        return tuple(e.quantity for e in self.extremes if e.quantity in names and e.value <= ZERO)
+        """Names of the margins that are proved to change their sign within the limits."""
+        return tuple(singularity.margin for singularity in self.singularities if singularity.verdict == "met")
 
     @cached_property
     def isotropic_margins(self) -> Array:
@@ -135,7 +137,7 @@ def atlas(
     extremes = find_extremes(region, drawn.inside, drawn.step)
     report(0.9)
     poses, isolated = find_isotropic_poses(region, drawn.inside, drawn.step)
-    return Atlas(drawn, extremes, poses, isolated)
+    return Atlas(drawn, extremes, poses, isolated, judge_singularities(region))
 
 
 def map_performance(

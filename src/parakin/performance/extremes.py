@@ -8,10 +8,12 @@ from typing import Literal
 import numpy as np
 
 from ..arrays import Array, Indices
+from ..workspaces.certified.assembly_mode import ZERO
 from ..workspaces.certified.region import Region
 from .indices import Performance, compute_performance
 from .jacobians import compute_scaled_rates
 from .search import find_roots, pick_best_apart, pick_best_of_blocks, search_maxima
+from .singularities import compute_singularity_margins
 
 ExtremeSide = Literal["least", "greatest"]
 SIDES: tuple[ExtremeSide, ExtremeSide] = ("least", "greatest")
@@ -43,10 +45,14 @@ def compute_slack(region: Region, positions: Array) -> Array:
     It is the least margin of the limits that count, each divided by its greatest value here.
     """
     machine = region.machine
-    columns = [machine.limits.index(name) for name in region.limits]
-    if not columns:
+    columns = [machine.limits.index(name) for name in region.limits if name in machine.limits]
+    poses = region.poses(positions)
+    margins = machine.margins(poses, mode=region.mode)[:, columns]
+    if region.part == "home":
+        parallel = compute_singularity_margins(machine, poses, None, region.mode)[:, :1]
+        margins = np.concatenate([margins, parallel - ZERO], 1)
+    if not margins.shape[1]:
         return np.ones(len(positions))
-    margins = machine.margins(region.poses(positions), mode=region.mode)[:, columns]
     size = np.fmax.reduce(np.abs(margins), 0, initial=1e-300)
     least: Array = np.fmin.reduce(margins / size, 1)
     return np.where(np.isnan(margins).any(1), np.fmin(least, -1e-3), least)

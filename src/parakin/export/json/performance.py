@@ -64,6 +64,13 @@ def encode_atlas(atlas: Atlas) -> dict[str, Any]:
             for extreme in atlas.extremes
         ],
         "singular": list(atlas.singular),
+        "singularities": {
+            singularity.margin: {
+                "verdict": singularity.verdict,
+                "pose": None if singularity.pose is None else encode_pose(atlas.machine, singularity.pose),
+            }
+            for singularity in atlas.singularities
+        },
         "isotropic": [
             {"pose": encode_pose(atlas.machine, pose), "parallel": margin}
             for pose, margin in zip(atlas.isotropic, atlas.isotropic_margins.tolist(), strict=True)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -17,12 +18,17 @@ from ..workspace.sweep_curves import build_sweep_curves
 
 if TYPE_CHECKING:
     from ...arrays import Array
-    from ...workspaces.certified.workspace import Workspace
+    from ...workspaces.certified.workspace import Volume, Workspace
     from ...workspaces.sampled.cross_sections import CrossSection
 
 
-def encode_workspace(workspace: AnyWorkspace, cross_sections: Sequence[CrossSection]) -> dict[str, Any]:
-    """Encode a workspace and its cross-sections, but not its cells; null for what a method does not find."""
+def encode_workspace(
+    workspace: AnyWorkspace, cross_sections: Sequence[CrossSection], elsewhere: Volume | None = None
+) -> dict[str, Any]:
+    """Encode a workspace and its cross-sections, but not its cells; null for what a method does not find.
+
+    ``elsewhere`` is what the machine reaches besides home's part.
+    """
     return {
         "schema": "parakin.workspace/1",
         "machine": workspace.machine.name,
@@ -39,6 +45,7 @@ def encode_workspace(workspace: AnyWorkspace, cross_sections: Sequence[CrossSect
             }
             for section in cross_sections
         ],
+        "elsewhere": None if elsewhere is None else asdict(elsewhere),
         "parameters": _encode_parameters(workspace),
     }
 

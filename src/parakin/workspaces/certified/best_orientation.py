@@ -18,10 +18,12 @@ _AROUND = (-0.5, -0.25, 0.0, 0.25, 0.5)  # of that distance
 
 def evaluate_margins(region: Region, positions: Array, orientations: Array, more: Sequence[Constraint] = ()) -> Array:
     """Evaluate margins at positions (N, d) with orientations (N, s): of ``region.limits``, then of ``more``."""
-    columns = [region.machine.limits.index(name) for name in region.limits]
+    names = region.machine.limits
+    columns = [names.index(name) for name in region.limits if name in names]
+    sides = [constraint for constraint in region.constraints if not constraint.implied and constraint.name not in names]
     own = region.machine.margins(region.poses(positions, orientations), mode=region.mode)[:, columns]
     rows = np.concatenate([positions, orientations], 1)
-    others = [0.5 * sum(end[:, 0] for end in constraint.point_program(rows, rows)) for constraint in more]
+    others = [0.5 * sum(end[:, 0] for end in constraint.point_program(rows, rows)) for constraint in (*sides, *more)]
     return np.column_stack([own, *others])
 
 

@@ -16,11 +16,13 @@ from ...arrays import Array, Span
 from ...errors import PoseError
 from ...kernels.elementary import GREATEST_ANGLE
 from ...machine import Machine
+from .assembly_mode import make_side_constraints
 from .constraints import Constraint, TracedPose
 from .inclusive import InclusiveSubdivision
 from .subdivision import Subdivision
 from .total import TotalSubdivision
 
+RegionPart = Literal["home", "all"]
 RegionKind = Literal["constant", "total", "inclusive", "dexterous"]
 
 FAR = 1e6  # mm: no machine reaches farther
@@ -40,6 +42,7 @@ class Region:
     fixed_axes : the axes with one value, mm and rad
     swept_axes : the turning axes with a range, (low, high) rad
     without : names of the limits that do not count
+    part : ``home``, only poses in home's assembly mode, or ``all``, those in any
     """
 
     machine: Machine
@@ -49,6 +52,7 @@ class Region:
     swept_axes: Mapping[str, Span]
     without: tuple[str, ...]
     mode: str
+    part: RegionPart = "home"
 
     @cached_property
     def traced_pose(self) -> TracedPose:
@@ -57,7 +61,12 @@ class Region:
     @cached_property
     def constraints(self) -> list[Constraint]:
         """What must be ≥ 0 for a pose to be allowed, as functions of position and orientation."""
-        return self.traced_pose.build_constraints(self.without)
+        limits = self.traced_pose.build_constraints(self.without)
+        if self.part == "all":
+            return limits
+        side = make_side_constraints(self.traced_pose)[0]
+        first_implied = next((i for i, limit in enumerate(limits) if limit.implied), len(limits))
+        return [*limits[:first_implied], side, *limits[first_implied:]]
 
     @property
     def limits(self) -> tuple[str, ...]:
@@ -93,6 +102,7 @@ class Region:
             "some": {} if self.every_orientation else swept,
             "without": list(self.without),
             "mode": self.mode,
+            "part": self.part,
         }
 
     @check_arguments
@@ -125,8 +135,12 @@ class Region:
     def extent(self) -> tuple[Array, Array] | None:
         """A box proved to hold the whole region, not much larger than it; None for a region proved empty.
 
+        It is that of all parts: the limits bound the machine, and no sign of a determinant does.
+
         Raises :class:`PoseError` if the limits leave it unbounded.
         """
+        if self.part != "all":
+            return replace(self, part="all").extent
         far = np.full(len(self.free_axes), FAR)
         subdivision = self.subdivide(-far, far)
         before = 2.0 * far
@@ -178,6 +192,7 @@ def make_region(
     dexterous: bool = False,
     without: Sequence[str] = (),
     mode: str | None = None,
+    part: RegionPart = "home",
 ) -> Region:
     """Make the region of a workspace or an atlas: check which axes are fixed and swept and which limits count.
 
@@ -191,6 +206,8 @@ def make_region(
     dexterous : the machine must be allowed at every value of every turning axis
     without : names of limits that do not count, with ``*`` for any letters; legs must reach in any case
     mode : working mode
+    part : ``home`` leaves out what the machine could reach in another assembly mode only, beyond a parallel
+        singularity, such as the mirror image of its workspace behind the base; ``all`` counts it
 
     Raises :class:`PoseError`.
     """
@@ -222,6 +239,7 @@ def make_region(
         {axis: swept[axis] for axis in machine.axes if axis in swept},
         _find_ignored_limits(machine, without),
         machine.checked_mode(mode),
+        part,
     )
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Mapping
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import astuple, dataclass, replace
 from functools import cached_property
 from math import inf, isfinite
 from typing import Any
@@ -13,10 +13,12 @@ from typing import Any
 import numpy as np
 
 from ...arguments import check_arguments
-from ...arrays import Array, Progress
+from ...arrays import Array, Flags, Progress
 from ...errors import PoseError
 from ...machine import Machine
+from .assembly_mode import make_side_constraints
 from .region import Region
+from .separation import find_joined_cells
 from .subdivision import Cells, make_empty_cells
 
 ROUNDING = 1e-9  # relative, of the sums of volumes
@@ -39,6 +41,9 @@ class Volume:
         )
 
 
+NOTHING = Volume(0.0, 0.0, 0.0)
+
+
 @dataclass(frozen=True)
 class BoundingLimit:
     """A limit that bounds a region, the fraction of the boundary that it makes, and the middle of that part, mm."""
@@ -55,12 +60,14 @@ class Workspace:
     stopped : why the subdivision ended: ``gap`` reached, ``cell`` size reached, ``time``, ``interrupted``,
         ``resolution`` (of the numbers) or ``memory``
     parameters : enough to run it again
+    apart : volume of the cells that were left out, for they are proved not to hang together with home
     """
 
     region: Region
     cells: Cells
     stopped: str
     parameters: Mapping[str, Any]
+    apart: Volume = NOTHING
 
     @property
     def machine(self) -> Machine:
@@ -78,8 +85,7 @@ class Workspace:
 
     @cached_property
     def volume(self) -> Volume:
-        total = [self.cells.total(part) for part in (self.cells.inner, self.cells.estimate, self.cells.outer)]
-        return Volume(total[0] * (1.0 - ROUNDING), total[1], total[2] * (1.0 + ROUNDING))
+        return _sum_volumes(self.cells)
 
     @property
     def empty(self) -> bool:
@@ -165,4 +171,46 @@ def workspace(
     if stopped == "gap":
         with suppress(KeyboardInterrupt):  # the volume is known; only its box could be closer
             subdivision.tighten(_CLOSE, began + (inf if seconds is None else seconds))
-    return Workspace(region, subdivision.collect_cells(stopped), stopped, parameters)
+    cells = subdivision.collect_cells(stopped)
+    joined = _find_home_cells(region, cells)
+    if joined is None or joined.all():
+        return Workspace(region, cells, stopped, parameters)
+    return Workspace(region, cells.take(joined), stopped, parameters, _sum_volumes(cells.take(~joined)))
+
+
+def _find_home_cells(region: Region, cells: Cells) -> Flags | None:
+    """Find the cells that may hang together with home; None where home does not tell, or all parts count."""
+    machine = region.machine
+    if region.part == "all" or any(axis in region.fixed_axes for axis in "XYZ"):
+        return None  # what is apart in a slice may hang together beyond it
+    home = dict(zip(machine.axes, machine.home.tolist(), strict=True))
+    return find_joined_cells(cells, np.array([home[axis] for axis in region.free_axes]))
+
+
+def measure_elsewhere(workspace: Workspace, gap: float = 0.05, seconds: float | None = 10.0) -> Volume:
+    """Measure what the machine reaches besides home's part: what is apart from it, and other assembly modes.
+
+    Parameters
+    ----------
+    workspace : of ``part="home"``; of all parts there is nothing besides
+    gap, seconds : as for :func:`workspace`, of the other assembly modes
+
+    Raises :class:`PoseError` for a region that no limit bounds in the other assembly modes.
+    """
+    region = workspace.region
+    if region.part == "all":
+        return NOTHING
+    everywhere = replace(region, part="all")
+    own = make_side_constraints(everywhere.traced_pose)[0]
+    other = replace(own, margin=0.0 - own.margin)  # a singularity all over an orientation is no part of home's either
+    extent = everywhere.extent
+    if extent is None:
+        return workspace.apart
+    cells = everywhere.subdivide(*extent, [other]).run(gap, seconds=seconds)
+    beyond = _sum_volumes(cells)
+    return Volume(*(a + b for a, b in zip(astuple(workspace.apart), astuple(beyond), strict=True)))
+
+
+def _sum_volumes(cells: Cells) -> Volume:
+    inner, estimate, outer = (cells.total(part) for part in (cells.inner, cells.estimate, cells.outer))
+    return Volume(inner * (1.0 - ROUNDING), estimate, outer * (1.0 + ROUNDING))

@@ -7,7 +7,7 @@ serial singularities of a working mode; the parallel ones separate components wh
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import isfinite
 from typing import Any
 
@@ -16,13 +16,13 @@ import numpy as np
 from ...arguments import RowsLike, check_arguments
 from ...arrays import Array
 from ...errors import PoseError
+from ..certified.assembly_mode import make_side_constraints
 from ..certified.constraints import Constraint
 from ..certified.containment import prove_boxes
 from ..certified.region import Region
 from ..certified.workspace import ROUNDING, Volume
 from ..inscribed.seeds import find_outline_cells
 from .adjacency import refuse_too_many_cells
-from .assembly_mode import make_side_constraints
 from .cell_components import CellComponent, Resolution, find_cell_components
 
 _FINE = {1: 4096, 2: 512, 3: 128}  # cells along the longest edge, by dimension
@@ -110,7 +110,8 @@ def find_components(
         raise PoseError(f"cell: a size above 0 mm expected, not {cell:g}")
     if seconds is not None and not seconds > 0.0:
         raise PoseError(f"seconds: a time above 0 s expected, not {seconds:g}")
-    sides = dict(zip((1, -1), make_side_constraints(region), strict=True))
+    region = replace(region, part="all")
+    sides = dict(zip((1, -1), make_side_constraints(region.traced_pose), strict=True))
     position, sign = (None, 0) if start is None else _locate_start(region, start, sides)
     outline = find_outline_cells(region)
     low, high = outline.low.min(0), (outline.low + outline.size).max(0)

@@ -90,7 +90,7 @@ def sweep_drives(region: Region, cells: int = 64, progress: Progress | None = No
     """Sample the whole workspace of a machine from its drives: cut their ranges into cells and map these forward.
 
     A pose counts where its own inverse in the working mode gives the same drives back and every limit holds. Both
-    common points of the legs' spheres (circles) are tried.
+    common points of the legs' spheres (circles) are tried where the region has all parts, else home's.
 
     Parameters
     ----------
@@ -111,10 +111,8 @@ def sweep_drives(region: Region, cells: int = 64, progress: Progress | None = No
         raise PoseError(f"cells: 1 to {int(MOST_CELLS ** (1.0 / d) + 1e-9)} parts of each drive expected, not {cells}")
     step = max((drive.high - drive.low) / cells for drive in machine.drives)
     parameters = {**region.parameters, "method": "drives", "cells": cells}
-    volume = _sum_volume(machine, cells, region.mode, progress)
-    contours, nets = (
-        _map_strategies(machine, list_strategies(machine, running), cells, region.mode) for running in (1, 2)
-    )
+    volume = _sum_volume(region, cells, progress)
+    contours, nets = (_map_strategies(region, list_strategies(machine, running), cells) for running in (1, 2))
     return DriveWorkspace(region, "drives", volume, step, parameters, contours, nets)
 
 
@@ -141,14 +139,14 @@ def _find_poses(machine: Machine, joints: Array, side: float, mode: str) -> Arra
     return poses
 
 
-def _list_sides(machine: Machine) -> list[tuple[str, float]]:
-    return [("home", machine.home_side), ("other", -machine.home_side)]
+def _list_sides(region: Region) -> list[tuple[str, float]]:
+    sides = [("home", region.machine.home_side), ("other", -region.machine.home_side)]
+    return sides if region.part == "all" else sides[:1]
 
 
-def _map_strategies(
-    machine: Machine, strategies: Sequence[DriveStrategy], cells: int, mode: str
-) -> tuple[DriveImage, ...]:
-    """Map the drives of each strategy forward, on both sides."""
+def _map_strategies(region: Region, strategies: Sequence[DriveStrategy], cells: int) -> tuple[DriveImage, ...]:
+    """Map the drives of each strategy forward, on the sides that count."""
+    machine, mode = region.machine, region.mode
     images = []
     for strategy in strategies:
         stands = dict(strategy.stands)
@@ -160,15 +158,16 @@ def _map_strategies(
                 columns.append(np.array([drive.low if stands[drive.name] == "min" else drive.high]))
         joints = np.stack(np.meshgrid(*columns, indexing="ij"), -1)
         shape = (*[cells + 1] * len(strategy.runs), len(columns))
-        for name, side in _list_sides(machine):
+        for name, side in _list_sides(region):
             poses = _find_poses(machine, np.ascontiguousarray(joints.reshape(-1, len(columns))), side, mode)
             if not np.isnan(poses).all():
                 images.append(DriveImage(strategy, name, joints.reshape(shape), poses.reshape(shape)))
     return tuple(images)
 
 
-def _sum_volume(machine: Machine, cells: int, mode: str, progress: Progress | None) -> float:
-    """Sum |det J| over the middles of the drives' cells, on both sides."""
+def _sum_volume(region: Region, cells: int, progress: Progress | None) -> float:
+    """Sum |det J| over the middles of the drives' cells, on the sides that count."""
+    machine, mode = region.machine, region.mode
     low, high = (np.array([getattr(drive, end) for drive in machine.drives]) for end in ("low", "high"))
     size, d = (high - low) / cells, len(low)
     total = 0.0
@@ -176,7 +175,7 @@ def _sum_volume(machine: Machine, cells: int, mode: str, progress: Progress | No
         stop = min(start + _AT_ONCE, cells**d)
         index = np.stack(np.unravel_index(np.arange(start, stop), (cells,) * d), 1)
         joints = low + (index + 0.5) * size
-        for _, side in _list_sides(machine):
+        for _, side in _list_sides(region):
             poses = _find_poses(machine, joints, side, mode)
             a, b = machine.jacobians(poses[~np.isnan(poses).any(1)], mode)
             total += float(abs(np.linalg.det(b) / np.linalg.det(a)).sum())

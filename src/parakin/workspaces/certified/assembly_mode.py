@@ -7,39 +7,37 @@ from collections.abc import Sequence
 import numpy as np
 
 from ...algebra import Scalar
-from ..certified.constraints import Constraint
-from ..certified.region import Region
+from .constraints import Constraint, TracedPose
 
 NAME = "parallel singularity"
 ZERO = 1e-12  # determinants up to this fraction of the product of the rows' sizes at home have no sign
 
 
-def make_side_constraints(region: Region) -> tuple[Constraint, Constraint]:
+def make_side_constraints(traced: TracedPose) -> tuple[Constraint, Constraint]:
     """Make the constraints det A > 0 and det A < 0, without unit, the first where the sign is that of home.
 
     A is of the tool's twist, so that free angles of the pose do not count. Of five axes it is the legs' rows against
     the translations, for head and table have no parallel singularity.
     """
-    traced = region.traced_pose
-    d = len(region.free_axes)
-    margin = expand_determinant(_trace_leg_rows(region, traced.pose)) / _scale_at_home(region)
+    d = len(traced.free_axes)
+    margin = expand_determinant(_trace_leg_rows(traced, traced.pose)) / _scale_at_home(traced)
     x, orientation = traced.inputs[:d], traced.inputs[d:]
     return Constraint(NAME, margin - ZERO, x, orientation), Constraint(NAME, -margin - ZERO, x, orientation)
 
 
-def _trace_leg_rows(region: Region, pose: Sequence[Scalar]) -> list[list[Scalar]]:
+def _trace_leg_rows(traced: TracedPose, pose: Sequence[Scalar]) -> list[list[Scalar]]:
     """Trace the square block of A that can become singular."""
-    machine = region.machine
+    machine = traced.machine
     with np.errstate(all="ignore"):  # a pose out of reach gives NaN
-        rates = machine.trace_rates(pose, machine.trace_inverse(pose, region.mode)[0])
+        rates = machine.trace_rates(pose, machine.trace_inverse(pose, traced.mode)[0])
     legs = len(rates.wrench_norms)
     size = legs if len(rates.a) - legs == 2 else len(rates.a)
     return [row[:size] for row in rates.a[:size]]
 
 
-def _scale_at_home(region: Region) -> float:
+def _scale_at_home(traced: TracedPose) -> float:
     """Compute Hadamard's bound of det A at home, with its sign there; 1 where another working mode can't reach home."""
-    rows = np.array(_trace_leg_rows(region, [np.float64(value) for value in region.machine.home]), float)
+    rows = np.array(_trace_leg_rows(traced, [np.float64(value) for value in traced.machine.home]), float)
     most = float(np.prod(np.sqrt((rows**2).sum(1))))
     if not (np.isfinite(most) and most > 0.0):
         return 1.0

@@ -1,0 +1,159 @@
+"""Singularities of a whole region: proved to be met, proved to be nowhere, or neither; no grid decides."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from typing import Literal, NamedTuple
+
+import numpy as np
+
+from ...algebra import Scalar
+from ...arrays import Array, Flags, Indices
+from ...errors import PoseError
+from ...workspaces.certified.assembly_mode import expand_determinant
+from ...workspaces.certified.constraints import Constraint
+from ...workspaces.certified.region import Region
+from ...workspaces.certified.separation import find_joined_cells
+from ...workspaces.certified.subdivision import Cells
+from ...workspaces.connected.adjacency import find_adjacent_cells, label_components
+from ..jacobians import list_leg_joints
+from ..singularities import list_margin_names
+
+SingularityVerdict = Literal["met", "none", "unproved"]
+
+_ALONG = {1: 1024, 2: 256, 3: 96}  # cells along the longest edge in which a change of sign is looked for
+_MOST_COMPARED = 1000  # cells
+_FEW, _ROUNDS = 30_000, 24  # undecided cells, and rounds, with which a proof that there is none is given up
+
+
+@dataclass(frozen=True, eq=False)
+class RegionSingularity:
+    """What is proved of one singularity margin over all positions of a region that the limits allow.
+
+    margin : its name, as in :func:`~..singularities.list_margin_names`
+    verdict : ``met``, its sign changes among positions that hang together inside; ``none``, it is positive all over;
+        ``unproved``, neither is proved, as where it only touches zero
+    pose : (axes,) a pose where it is below zero, of ``met`` alone
+    """
+
+    margin: str
+    verdict: SingularityVerdict
+    pose: Array | None
+
+    def __repr__(self) -> str:
+        return f"<parakin singularity {self.margin}: {self.verdict}>"
+
+
+def judge_singularities(region: Region) -> tuple[RegionSingularity, ...]:
+    """Judge every singularity margin over a region without swept axes, in all of its assembly modes, by intervals.
+
+    A margin is positive all over where no cell of a subdivision can hold an allowed position at which it is not, but
+    for cells that are apart from home's part. It changes its sign where cells proved inside hang together, by faces,
+    and intervals prove both signs among them.
+    """
+    whole = replace(region, part="all")
+    names = list_margin_names(region.machine)
+    extent = whole.extent
+    if extent is None:
+        return tuple(RegionSingularity(name, "none", None) for name in names)
+    traced = whole.traced_pose
+    margins = _trace_margins(whole)
+    verdicts = []
+    about: _RegionCells | None = None
+    for name, margin in zip(names, margins, strict=True):
+        positive = Constraint(name, margin, traced.inputs)
+        negative = Constraint(name, 0.0 - margin, traced.inputs)
+        left = _list_left_cells(whole, negative, extent)
+        if len(left.low):
+            about = about or _label_cells(whole, extent)
+        if about is None or not len(left.low) or _is_apart(left, about.joined):
+            verdicts.append(RegionSingularity(name, "none", None))
+            continue
+        pose = _find_sign_change(whole, positive, about.inside, about.component)
+        verdicts.append(RegionSingularity(name, "unproved" if pose is None else "met", pose))
+    return tuple(verdicts)
+
+
+def _trace_margins(region: Region) -> list[Scalar]:
+    """Trace the margins, each positive at home, in the order of their names; their scale does not matter here."""
+    machine, traced = region.machine, region.traced_pose
+
+    def compute_margins(pose: Sequence[Scalar]) -> list[Scalar]:
+        with np.errstate(all="ignore"):  # a pose out of reach gives NaN
+            rates = machine.trace_rates(pose, machine.trace_inverse(pose, region.mode)[0])
+        legs, n = len(rates.wrench_norms), len(rates.a)
+        size = legs if n - legs == 2 else n
+        margins = [expand_determinant([row[:size] for row in rates.a[:size]])]
+        margins += [rates.b[row][joint] for row, joint in enumerate(list_leg_joints(machine))]
+        if n > legs:
+            margins.append(expand_determinant([row[legs:] for row in rates.b[legs:]]))
+        return margins
+
+    at_home = compute_margins([np.float64(value) for value in machine.home])
+    signs = [-1.0 if float(margin) < 0.0 else 1.0 for margin in at_home]
+    return [margin * sign for margin, sign in zip(compute_margins(traced.pose), signs, strict=True)]
+
+
+def _list_left_cells(region: Region, constraint: Constraint, extent: tuple[Array, Array]) -> Cells:
+    """List the cells that may hold a position at which a constraint is kept, those inside included."""
+    subdivision = region.subdivide(*extent, [constraint])
+    for _ in range(_ROUNDS):
+        count = len(subdivision.open_cells.low)
+        if not count or count > _FEW or any(len(cells.low) for cells in subdivision.decided_cells):
+            break
+        subdivision.refine(np.arange(count))
+    return subdivision.collect_cells("gap")
+
+
+class _RegionCells(NamedTuple):
+    """Cells proved inside, the component (N,) of each, joined by faces, and all cells that may be of home's part."""
+
+    inside: Cells
+    component: Indices
+    joined: Cells
+
+
+def _label_cells(region: Region, extent: tuple[Array, Array]) -> _RegionCells:
+    """Refine a region down to one size of cells, and label those inside."""
+    edge = float((extent[1] - extent[0]).max()) / _ALONG[len(extent[0])]
+    cells = region.subdivide(*extent).run(1e-12, edge)
+    home = dict(zip(region.machine.axes, region.machine.home.tolist(), strict=True))
+    is_slice = any(axis in region.fixed_axes for axis in "XYZ")  # what is apart there may hang together beyond it
+    joined = None if is_slice else find_joined_cells(cells, np.array([home[axis] for axis in region.free_axes]))
+    inside = cells.take(cells.inside)
+    faces = np.zeros((0, 2), np.int64)
+    if len(inside.low):
+        with suppress(PoseError):  # too many cells: none of them is joined to another
+            faces = find_adjacent_cells(inside.low, inside.size)[0]
+    component = label_components(len(inside.low), faces) if len(inside.low) else np.zeros(0, np.int64)
+    return _RegionCells(inside, component, cells if joined is None else cells.take(joined))
+
+
+def _is_apart(left: Cells, joined: Cells) -> bool:
+    """Tell whether no cell touches one of those that may hang together with home."""
+    if len(left.low) > _MOST_COMPARED:
+        return False
+    top = joined.low + joined.size
+    pairs = zip(left.low, left.low + left.size, strict=True)
+    return not any(((low <= top) & (joined.low <= high)).all(1).any() for low, high in pairs)
+
+
+def _find_sign_change(region: Region, positive: Constraint, cells: Cells, component: Indices) -> Array | None:
+    """Find a pose where a margin is proved to be below zero, in the part that holds home or where it changes sign."""
+    if not len(cells.low):
+        return None
+    middle = cells.low + 0.5 * cells.size
+    low, high = (end[:, 0] for end in positive.point_program(middle, middle))
+    above, below = low > 0.0, high < 0.0
+    mixed: Flags = np.isin(component, np.intersect1d(component[above], component[below]))
+    home = dict(zip(region.machine.axes, region.machine.home.tolist(), strict=True))
+    position = np.array([home[axis] for axis in region.free_axes])
+    at_home = ((cells.low <= position) & (position <= cells.low + cells.size)).all(1)
+    if at_home.any():
+        mixed &= component == component[int(at_home.argmax())]
+    found = np.flatnonzero(mixed & below)
+    if not len(found):
+        return None
+    return np.asarray(region.poses(middle[found[[int(high[found].argmin())]]])[0])

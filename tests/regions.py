@@ -1,0 +1,9 @@
+"""Regions of all parts: what the limits alone allow, in every assembly mode."""
+
+from __future__ import annotations
+
+import parakin as pk
+
+
+def whole_region(machine, *arguments, **options):
+    return pk.region(machine, *arguments, **{"part": "all", **options})

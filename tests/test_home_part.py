@@ -1,0 +1,191 @@
+"""The part that hangs together with home, and what is proved of the singularities of a whole region."""
+
+from __future__ import annotations
+
+import json
+from math import pi
+
+import numpy as np
+import pytest
+from regions import whole_region
+
+import parakin as pk
+from parakin.cli import main
+from parakin.performance.certified.region_singularities import judge_singularities
+from parakin.performance.singularities import compute_singularity_margins
+from parakin.workspaces.certified.separation import find_joined_cells
+from parakin.workspaces.certified.subdivision import Cells
+from parakin.workspaces.certified.workspace import measure_elsewhere
+
+# Three struts from one triangle: a ball's part above the base, and its mirror image below.
+STRUTS = """\
+name: struts
+source: Test.
+motion: tx ty tz
+legs:
+  {kind: length, joints: [a, b, c], foot: {circle: 10 mm, at: [0 deg, 120 deg, 240 deg]}, platform: [0, 0, 0],
+   range: [LOW mm, 500 mm]}
+home: {X: 0 mm, Y: 0 mm, Z: 400 mm}
+"""
+ROTARY_DELTA = """\
+name: rotary_delta
+source: Test.
+motion: tx ty tz
+legs:
+  - {kind: crank, joints: [q0], pivot: [100 mm, 0, 0], axis: [0, 1, 0], zero: [1, 0, 0], arm: 200 mm, rod: 400 mm,
+     platform: [40 mm, 0, 0], branch: "+", range: [-90 deg, 90 deg]}
+  - {kind: crank, joints: [q1], pivot: [-50 mm, 86.6025403784 mm, 0], axis: [-0.866025403784, -0.5, 0],
+     zero: [-0.5, 0.866025403784, 0], arm: 200 mm, rod: 400 mm, platform: [-20 mm, 34.6410161514 mm, 0],
+     branch: "+", range: [-90 deg, 90 deg]}
+  - {kind: crank, joints: [q2], pivot: [-50 mm, -86.6025403784 mm, 0], axis: [0.866025403784, -0.5, 0],
+     zero: [-0.5, -0.866025403784, 0], arm: 200 mm, rod: 400 mm, platform: [-20 mm, -34.6410161514 mm, 0],
+     branch: "+", range: [-90 deg, 90 deg]}
+home: {X: 0 mm, Y: 0 mm, Z: -400 mm}
+"""
+
+
+@pytest.fixture
+def load_text(tmp_path):
+    def load(text, **replaced):
+        for word, value in replaced.items():
+            text = text.replace(word, value)
+        path = tmp_path / "m.yaml"
+        path.write_text(text)
+        return pk.load(path)
+
+    return load
+
+
+@pytest.mark.parametrize("low", ["0", "350"])
+def test_the_mirror_image_behind_the_base_is_not_counted(load_text, low):
+    """Whether it touches the part of home or not."""
+    m = load_text(STRUTS, LOW=low)
+    whole, own = pk.workspace(whole_region(m)), pk.workspace(pk.region(m))
+    elsewhere = measure_elsewhere(own)
+    assert own.volume.inner <= 0.5 * whole.volume.outer
+    assert own.volume.outer >= 0.5 * whole.volume.inner
+    assert elsewhere.inner <= 0.5 * whole.volume.outer
+    assert elsewhere.outer >= 0.5 * whole.volume.inner
+    assert own.box[0][2] > -10.0
+    assert measure_elsewhere(whole).outer == 0.0
+    grid = pk.sample_grid(pk.region(m), 20.0)
+    assert grid.estimate == pytest.approx(own.volume.estimate, rel=0.05)
+    assert grid.box[0][2] > -10.0
+    atlas = pk.atlas(pk.region(m), step=50.0)
+    assert (atlas.map.inside.poses[:, 2] > 0.0).all()
+    assert pk.find_largest_box(pk.region(m)).low[2] >= 0.0
+
+
+def make_cells(low, size):
+    low, size = np.array(low, float), np.array(size, float)
+    n = len(low)
+    return Cells(low, size, np.ones(n), np.ones(n), np.ones(n), np.full(n, -1), np.zeros(n))
+
+
+def test_cells_that_do_not_touch_are_apart():
+    """Cells of several sizes: those that hang together with the first by a corner, and two that do not."""
+    low = [[0, 0], [1, 0], [2, 1], [2.5, 2], [6, 0], [6.5, 0.5]]
+    size = [[1, 1], [1, 1], [1, 1], [0.5, 0.5], [0.5, 0.5], [0.5, 0.5]]
+    cells = make_cells(low, size)
+    assert find_joined_cells(cells, np.array([0.5, 0.5])).tolist() == [True] * 4 + [False] * 2
+    assert find_joined_cells(cells, np.array([6.75, 0.75])).tolist() == [False] * 4 + [True] * 2
+    assert find_joined_cells(cells, np.array([5.0, 5.0])) is None
+
+
+@pytest.mark.parametrize("dimension", [1, 2, 3])
+def test_cells_of_a_region_that_hangs_together_are_never_parted(dimension):
+    rng = np.random.default_rng(dimension)
+    for _ in range(20):
+        steps = rng.integers(-1, 2, (200, dimension))
+        low = np.unique(np.cumsum(steps, 0), axis=0)
+        cells = make_cells(low, np.ones_like(low))
+        assert find_joined_cells(cells, cells.low[0] + 0.5).all()
+
+
+def test_the_command_names_what_else_there_is(capsys):
+    assert main(["workspace", "hbg80_2d"]) == 0
+    said = capsys.readouterr().out
+    assert "in parts that home can't reach" in said
+    assert "--all-parts" in said
+    assert main(["workspace", "hbg80_2d", "--json"]) == 0
+    own = json.loads(capsys.readouterr().out)
+    assert main(["workspace", "hbg80_2d", "--all-parts", "--json"]) == 0
+    whole = json.loads(capsys.readouterr().out)
+    assert whole["elsewhere"]["outer"] == 0.0
+    assert own["volume"]["inner"] + own["elsewhere"]["inner"] <= whole["volume"]["outer"]
+    assert own["volume"]["outer"] + own["elsewhere"]["outer"] >= whole["volume"]["inner"]
+    assert main(["workspace", "lambda6", "--at", "Z=1400"]) == 0
+    assert "besides" not in capsys.readouterr().out
+
+
+def test_a_drive_sweep_counts_the_same_parts():
+    for part in ("home", "all"):
+        region = pk.region(pk.load("hbg80_2d"), part=part)
+        volume = pk.workspace(region, gap=0.002).volume
+        assert volume.inner * 0.999 <= pk.sweep_drives(region, 2000).estimate <= volume.outer * 1.001
+
+
+# Singularities.
+
+
+def test_a_singularity_is_proved_or_said_to_be_unproved():
+    verdicts = {
+        name: {s.margin: s.verdict for s in judge_singularities(pk.region(pk.load(name)))}
+        for name in ("hexapod", "linear_delta", "orthoglide", "hbg80_2d", "hbg80_3d", "tricept")
+    }
+    for name in ("hexapod", "linear_delta"):
+        assert set(verdicts[name].values()) == {"none"}
+    for name in ("orthoglide", "hbg80_2d", "hbg80_3d"):
+        assert verdicts[name].pop("parallel") == "met"
+        assert set(verdicts[name].values()) == {"unproved"}  # they touch zero where a leg is stretched
+    assert verdicts["tricept"].pop("theta1-theta2", None) is None
+    assert verdicts["tricept"]["serial theta1-theta2"] == "unproved"  # it touches zero on the wrist's pole
+    assert verdicts["tricept"]["parallel"] == "none"
+
+
+def test_the_verdict_does_not_hang_on_the_step(load_text):
+    m = load_text(ROTARY_DELTA)
+    verdicts = []
+    for step in (100.0, 50.0, 40.0, 31.0):
+        atlas = pk.atlas(pk.region(m), step=step)
+        verdicts.append([(s.margin, s.verdict) for s in atlas.singularities])
+        for singularity in atlas.singularities:
+            if singularity.verdict == "met":
+                margins = compute_singularity_margins(m, singularity.pose)
+                assert margins[atlas.map.performance.margin_names.index(singularity.margin)] < 0.0
+                assert m.check(singularity.pose) == 0
+            if singularity.verdict == "none":
+                assert atlas.extreme(singularity.margin, "least").value > 0.0
+    assert all(verdict == verdicts[0] for verdict in verdicts)
+
+
+def test_nothing_proved_free_is_singular_in_samples():
+    for name in ("hexapod", "linear_delta", "tricept"):
+        region = pk.region(pk.load(name))
+        box, m = pk.workspace(region).box, region.machine
+        positions = np.random.default_rng(3).uniform(*box, (20_000, 3))
+        poses = region.poses(positions)
+        margins = compute_singularity_margins(m, poses[m.check(poses) == 0])
+        for number, singularity in enumerate(judge_singularities(region)):
+            if singularity.verdict == "none":
+                assert (margins[:, number] > 0.0).all(), (name, singularity)
+
+
+def test_the_command_says_what_is_proved(capsys):
+    assert main(["atlas", "orthoglide", "--step", "50"]) == 0
+    said = capsys.readouterr().out
+    assert "singular: parallel, proved" in said
+    assert "unproved: whether serial rho_x" in said
+    assert main(["atlas", "linear_delta", "--step", "50", "--json"]) == 0
+    region = json.loads(capsys.readouterr().out)["region"]
+    assert region["singular"] == []
+    assert {s["verdict"] for s in region["singularities"].values()} == {"none"}
+
+
+def test_a_swept_region_of_home_has_its_assembly_mode(load_text):
+    m = pk.load("hexapod")
+    swept = pk.workspace(pk.region(m, every={"A": (-0.1, 0.1)}), gap=0.1, seconds=20)
+    whole = pk.workspace(whole_region(m, every={"A": (-0.1, 0.1)}), gap=0.1, seconds=20)
+    assert swept.volume.inner <= whole.volume.outer
+    assert swept.volume.outer >= 0.9 * whole.volume.inner
+    assert 0.0 < swept.volume.inner < 4.0 / 3.0 * pi * 1e9

@@ -9,7 +9,7 @@ import numpy as np
 from ...algebra import Scalar
 from .constraints import Constraint, TracedPose
 
-NAME = "parallel singularity"
+PARALLEL_SINGULARITY = "parallel singularity"
 ZERO = 1e-12  # determinants up to this fraction of the product of the rows' sizes at home have no sign
 
 
@@ -22,7 +22,9 @@ def make_side_constraints(traced: TracedPose) -> tuple[Constraint, Constraint]:
     d = len(traced.free_axes)
     margin = expand_determinant(_trace_leg_rows(traced, traced.pose)) / _scale_at_home(traced)
     x, orientation = traced.inputs[:d], traced.inputs[d:]
-    return Constraint(NAME, margin - ZERO, x, orientation), Constraint(NAME, -margin - ZERO, x, orientation)
+    return Constraint(PARALLEL_SINGULARITY, margin - ZERO, x, orientation), Constraint(
+        PARALLEL_SINGULARITY, -margin - ZERO, x, orientation
+    )
 
 
 def _trace_leg_rows(traced: TracedPose, pose: Sequence[Scalar]) -> list[list[Scalar]]:

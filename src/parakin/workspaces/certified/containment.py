@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 
 from ...arrays import Array, Flags, Indices
 from ...errors import PoseError
+from .assembly_mode import PARALLEL_SINGULARITY
 from .best_orientation import find_best_orientations
 from .constraints import Constraint
 from .plane_cuts import CLEARED, EXCLUDED, LinearBounds
@@ -83,20 +84,22 @@ class _BoxBisection:
         names = tuple(constraint.name for constraint in self.constraints)
         return Containment(self.proved, self.limit, self.positions, self.orientations, self.boxes, names)
 
-    def _count_parts(self, box: Indices) -> Flags:
-        """Count parts; returns those of undecided boxes without too many examined parts."""
+    def _count_parts(self, box: Indices, before: Indices) -> Flags:
+        """Count parts; returns those of undecided boxes without too many examined parts since ``before``."""
         self.boxes += np.bincount(box, minlength=len(self.boxes))
-        self.undecided &= self.boxes <= self.most
+        self.undecided &= self.boxes - before <= self.most
         return np.asarray(self.undecided[box])
 
     def prove_constraint(self, number: int, constraint: Constraint) -> None:
         """Prove one constraint at all orientations: parts are boxes of both, bisected where bounds are widest."""
         d = self.d
+        # A determinant's bounds are wider than those of limits, and it gets a budget of its own.
+        before = self.boxes.copy() if constraint.name == PARALLEL_SINGULARITY else np.zeros_like(self.boxes)
         box = np.flatnonzero(self.undecided)
         low = np.concatenate([self.low[box], np.tile(self.first, (len(box), 1))], 1)
         high = np.concatenate([self.high[box], np.tile(self.last, (len(box), 1))], 1)
         for _ in range(_ROUNDS):
-            which = self._count_parts(box)
+            which = self._count_parts(box, before)
             box, low, high = box[which], low[which], high[which]
             if not len(box):
                 return
@@ -122,7 +125,7 @@ class _BoxBisection:
         box, low, high = np.arange(len(self.low)), self.low, self.high
         orientations: Array | None = None
         for _ in range(_ROUNDS):
-            which = self._count_parts(box)
+            which = self._count_parts(box, np.zeros_like(self.boxes))
             if orientations is not None:
                 which[which] = ~self._prove_at_orientations(low[which], high[which], orientations[which])
                 orientations = orientations[which]

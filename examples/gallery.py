@@ -146,7 +146,8 @@ def hbg80(page: Page) -> None:
         f"Each line is one drive that runs while the other stands; dotted, the other assembly. Area of both from "
         f"the drives' side, |det J| over 2,400 parts of each range: {fine_area:,.0f} mm² (over 48 parts "
         f"{two.estimate:,.0f}: det J has no bound where the assemblies meet); "
-        f"{proved(pk.workspace(plane_region))}. Home's assembly alone: {proved(pk.workspace(pk.region(plane_region.machine)))}.",
+        f"{proved(pk.workspace(plane_region))}. Home's assembly alone: "
+        f"{proved(pk.workspace(pk.region(plane_region.machine)))}.",
     )
     figure, (ax,) = plane()
     for net in two.nets:

@@ -8,6 +8,7 @@ from collections.abc import Iterator, Sequence
 from ..errors import PoseError
 from ..toolpath.path import Event, ToolPath, ToolUse
 from ..toolpath.posting.tool_lengths import describe_tool
+from ..toolpath.timing.stops import find_dwell
 from .gcode_text import LONGEST_COMMENT, format_comments, make_plain
 
 # of G-code, carried over as they are: spindle, coolant, stops, dwells, outputs, inputs, the controller's own codes
@@ -20,7 +21,8 @@ _END = re.compile(r"M(?:2|30)")  # the program's own end replaces them
 _MESSAGE = re.compile(r"\(\s*msg\s*,(.*)\)", re.I | re.S)
 _STATEMENT = re.compile(r"([A-Z-]+)\s*(?:/(.*))?", re.S)
 _TURN = re.compile(r"^SPINDL\b.*\b(CC?LW)\b")  # which way the spindle turns; a later ON does not repeat it
-_DWELL = re.compile(r"\d*\.?\d+")
+_INSERTED = re.compile(r"INSERT[\s/,]*[\"']?M(\d{1,3})[\"']?", re.I)  # a word that the file gives the controller itself
+_OWN = COMMENTED | {2, 30, 98, 99}  # M codes that no INSERT and no AUXFUN may give
 _LOADING = re.compile(r"M6$|(?:LOADTL|TOOLNO)\b|LOAD\s*/\s*TOOL\b", re.I)  # statements that change the tool
 _COOLANT = {"ON": "M8", "FLOOD": "M8", "MIST": "M7", "OFF": "M9"}
 _LARGEST_CODE = 199  # of a controller's own M codes
@@ -104,13 +106,15 @@ def _find_word(event: Event, path: ToolPath) -> str | None:
         return "M1"
     if name == "COOLNT":
         return _COOLANT.get(arguments[0])
-    if name in ("DELAY", "DWELL") and len(arguments) == 1 and _DWELL.fullmatch(arguments[0]):
-        return f"G4 P{arguments[0]}"
+    if name in ("DELAY", "DWELL"):
+        seconds = find_dwell(event, path)
+        return None if seconds is None else f"G4 P{seconds:.10g}"
     if name == "SPINDL":
         return _format_spindle(arguments, event, path)
     if name == "AUXFUN":
         return _format_auxiliary(arguments, event, path)
-    return None
+    inserted = _INSERTED.fullmatch(event.text)
+    return None if inserted is None or int(inserted[1]) in _OWN else f"M{int(inserted[1])}"
 
 
 def _keep_word(event: Event, path: ToolPath) -> str | None:
@@ -129,7 +133,7 @@ def _keep_word(event: Event, path: ToolPath) -> str | None:
 def _format_auxiliary(arguments: list[str], event: Event, path: ToolPath) -> str:
     """Switch what the controller calls by an M code (AUXFUN)."""
     number = arguments[0] if len(arguments) == 1 else ""
-    if not number.isascii() or not number.isdigit() or int(number) > _LARGEST_CODE or int(number) in (2, 6, 30, 98, 99):
+    if not number.isascii() or not number.isdigit() or int(number) > _LARGEST_CODE or int(number) in _OWN:
         raise PoseError(
             f"{path.source}:{event.line}: {make_plain(event.text)[:40]} can't be passed on; "
             f"AUXFUN and the number of an M code that moves nothing expected"

@@ -14,7 +14,7 @@ from .poles import Pole
 
 FARTHEST_STEP = 1.0  # in the projection: a step that goes farther does not lie near the pole
 _STEP = 0.02  # rad: motions that turn the axis farther are divided into steps
-_MOST_STEPS = 2000  # of a motion
+_MOST_STEPS, _MOST_IN_ALL = 2000, 4_000_000  # of a motion, and of a path whose motions are kilometres long
 _POLE_TURN = 1.2  # rad that tool axis and a pole on a central leg part by, at most, when the axis turns by one
 
 
@@ -42,6 +42,8 @@ def find_pole_steps(pole: Pole, programmed: ProgrammedPath, posted: Posted, moti
     """Divide the motions that may come near to a pole into steps, and measure how near each comes."""
     motion, turn = _find_motions_near(pole, programmed, posted, motion)
     counts = np.ceil(np.clip(turn / _STEP, 1.0, _MOST_STEPS)).astype(np.int64)
+    if counts.sum() > _MOST_IN_ALL:
+        counts = np.minimum(counts, max(1, _MOST_IN_ALL // len(counts)))
     record = np.repeat(motion, counts)
     number = np.arange(len(record)) - np.repeat(np.cumsum(counts) - counts, counts)
     begin, end = number / counts.repeat(counts), (number + 1) / counts.repeat(counts)

@@ -123,6 +123,10 @@ def describe_outside(outside: Outside) -> str:
         f"{_describe_bounds(outside.workspace)} (mm, in the machine, at home's orientation); {format_option(outside)} "
         "brings its middle to home"
     )
+    larger = np.ptp(outside.path, axis=0) > np.ptp(outside.workspace, axis=0)
+    if larger.any():
+        axes = " and ".join(letter for letter, is_larger in zip("XYZ", larger, strict=True) if is_larger)
+        return f"{text}, but it is larger than the workspace in {axes}"
     if outside.broken is None:
         return text
     return text + (
@@ -133,7 +137,7 @@ def describe_outside(outside: Outside) -> str:
 def format_option(outside: Outside) -> str:
     """Format the suggestion as the option of the command: ``--workpiece X=0,Y=0,Z=-1650``."""
     values = {k: math.degrees(v) if k in "ABC" else v for k, v in outside.workpiece.items()}
-    return "--workpiece " + ",".join(f"{letter}={value:.6g}" for letter, value in values.items())
+    return "--workpiece " + ",".join(f"{letter}={value:.10g}" for letter, value in values.items())
 
 
 def _describe_bounds(bounds: Array) -> str:

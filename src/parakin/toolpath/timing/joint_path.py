@@ -32,6 +32,7 @@ STEPS_PER_RAD = 12.0  # into which half a corner is cut, for each rad (mm/mm) by
 MOST_STEPS, ENOUGH = 8, 2_000_000  # of half a corner, no more than so many, and fewer on paths of so many steps in all
 CLOSE = 3e-4  # greatest error of the splines' acceleration, as a fraction of a joint's limit
 FINE = 1e-3  # greatest error of the splines' joints, as a fraction of the tolerances
+_MOST_ROWS = 20_000_000  # at first: a path of 40 km, for which some GB are needed
 _ROUNDS = 60
 _ANEW = 5  # rounds after which the joints are followed from the start again
 _FINEST = 1e-7  # mm: a step this short is not cut
@@ -106,13 +107,17 @@ def build_joint_path(
 ) -> JointPath:
     """Build the joints along a curve, with steps as short as the splines need them.
 
-    Raises :class:`PoseError` where a leg can't close between two records, or a joint would have to jump.
+    Raises :class:`PoseError` where a leg can't close between two records, a joint would have to jump, or the path has
+    tens of kilometres.
     """
     if not len(curve.length):
         return _build_single_row(posted, curve)
     most = min(MOST_STEPS, ENOUGH // len(curve.length))
     corner_steps = np.ceil(np.minimum(STEPS_PER_RAD * curve.sharpness, most)).astype(np.int64)
     size = place_rows(curve, corner_steps, LONGEST, np.empty(0, np.int64), np.empty(0))
+    if size > _MOST_ROWS:
+        length = 1e-6 * float(curve.length.sum())
+        raise PoseError(f"a path of {length:,.0f} km, too long to be timed")
     segment, offset = np.empty(size, np.int64), np.empty(size)
     place_rows(curve, corner_steps, LONGEST, segment, offset)
     fine = FINE * np.where(np.array(posted.machine.joint_units) == "mm", tolerance, axis_tolerance)

@@ -8,8 +8,9 @@ from math import inf
 from ..path import Event, ToolPath
 
 # What a controller carries out between motions: spindle, coolant, tool, stops. Modes and messages stop nothing.
-_STOPPING = re.compile(r"(?:M\d|G4\b|(?:STOP|OPSTOP|DELAY|DWELL|SPINDL|COOLNT|LOADTL|LOAD/TOOL|TOOLNO|AUXFUN)\b)", re.I)
-_DWELL = re.compile(r"(?:G4 P|(?:DELAY|DWELL)\s*/\s*)([-+\d.eE]+)\s*$", re.I)  # s; DELAY/2,REV waits for turns
+_WORDS = "STOP|OPSTOP|DELAY|DWELL|SPINDL|COOLNT|LOADTL|LOAD/TOOL|TOOLNO|AUXFUN"
+_STOPPING = re.compile(rf"(?:M\d|G4\b|(?:{_WORDS})\b|INSERT[\s/,]*[\"']?M\d)", re.I)
+_DWELL = re.compile(r"(?:G4 P|(?:DELAY|DWELL)\s*/\s*)([-+\d.eE]+)\s*(?:,\s*(REV|SEC)\s*)?", re.I)  # s, or turns
 
 
 def find_stops(path: ToolPath) -> tuple[int, ...]:
@@ -22,14 +23,19 @@ def find_stops(path: ToolPath) -> tuple[int, ...]:
 
 def sum_dwells(path: ToolPath) -> float:
     """Sum the dwells that the program states, s; tool changes and stops for the operator take a time of their own."""
-    return sum(_parse_dwell(event) for event in path.events)
+    return sum(find_dwell(event, path) or 0.0 for event in path.events)
 
 
-def _parse_dwell(event: Event) -> float:
-    """Parse the seconds that an event waits; 0 if it does not, or waits for something else."""
-    match = _DWELL.match(event.text)
+def find_dwell(event: Event, path: ToolPath) -> float | None:
+    """Find the seconds that an event waits; None if it does not, or for turns of a spindle whose speed is not known."""
+    match = _DWELL.fullmatch(event.text)
+    if match is None:
+        return None
     try:
-        seconds = float(match[1]) if match else 0.0
+        value = float(match[1])
     except ValueError:
-        return 0.0
-    return seconds if 0.0 <= seconds < inf else 0.0
+        return None
+    if (match[2] or "").upper() == "REV":
+        speed = float(path.spindle[max(0, min(event.record, len(path)) - 1)]) if len(path) else 0.0
+        value = 60.0 * value / speed if speed > 0.0 else inf
+    return value if 0.0 <= value < inf else None

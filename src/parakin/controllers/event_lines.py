@@ -22,7 +22,7 @@ _MESSAGE = re.compile(r"\(\s*msg\s*,(.*)\)", re.I | re.S)
 _STATEMENT = re.compile(r"([A-Z-]+)\s*(?:/(.*))?", re.S)
 _TURN = re.compile(r"^SPINDL\b.*\b(CC?LW)\b")  # which way the spindle turns; a later ON does not repeat it
 _INSERTED = re.compile(r"INSERT[\s/,]*[\"']?M(\d{1,3})[\"']?", re.I)  # a word that the file gives the controller itself
-_OWN = COMMENTED | {2, 30, 98, 99}  # M codes that no INSERT and no AUXFUN may give
+_KEPT_BACK = COMMENTED | {2, 30, 98, 99}  # M codes that no INSERT and no AUXFUN may give
 _LOADING = re.compile(r"M6$|(?:LOADTL|TOOLNO)\b|LOAD\s*/\s*TOOL\b", re.I)  # statements that change the tool
 _COOLANT = {"ON": "M8", "FLOOD": "M8", "MIST": "M7", "OFF": "M9"}
 _LARGEST_CODE = 199  # of a controller's own M codes
@@ -114,7 +114,7 @@ def _find_word(event: Event, path: ToolPath) -> str | None:
     if name == "AUXFUN":
         return _format_auxiliary(arguments, event, path)
     inserted = _INSERTED.fullmatch(event.text)
-    return None if inserted is None or int(inserted[1]) in _OWN else f"M{int(inserted[1])}"
+    return None if inserted is None or int(inserted[1]) in _KEPT_BACK else f"M{int(inserted[1])}"
 
 
 def _keep_word(event: Event, path: ToolPath) -> str | None:
@@ -133,7 +133,7 @@ def _keep_word(event: Event, path: ToolPath) -> str | None:
 def _format_auxiliary(arguments: list[str], event: Event, path: ToolPath) -> str:
     """Switch what the controller calls by an M code (AUXFUN)."""
     number = arguments[0] if len(arguments) == 1 else ""
-    if not number.isascii() or not number.isdigit() or int(number) > _LARGEST_CODE or int(number) in _OWN:
+    if not number.isascii() or not number.isdigit() or int(number) > _LARGEST_CODE or int(number) in _KEPT_BACK:
         raise PoseError(
             f"{path.source}:{event.line}: {make_plain(event.text)[:40]} can't be passed on; "
             f"AUXFUN and the number of an M code that moves nothing expected"

@@ -83,6 +83,10 @@ def _choose_lengths(machine: Machine, path: ToolPath, length: ToolLength) -> lis
     longest_tool = own if length is None or isinstance(length, str) else float(length)
     longest = max((cutter for cutter in map(_find_cutter_length, path.tools) if cutter == cutter), default=math.nan)
     lengths = []
+    for use in path.tools if length is None and own > 0.0 else ():
+        cutter, told = _find_cutter_length(use), _find_length(use, "set_length")
+        if told != told and cutter > own + _SAME:
+            _refuse_length(machine, path, use, f"has a cutter of {cutter:g} mm")
     for use in path.tools:
         cutter, told = _find_cutter_length(use), _find_length(use, "set_length")
         if told == told:
@@ -95,8 +99,6 @@ def _choose_lengths(machine: Machine, path: ToolPath, length: ToolLength) -> lis
             lengths.append(cutter)
         else:
             lengths.append(longest_tool + cutter - longest)
-            if length is None and 0.0 < own < cutter - _SAME:
-                _refuse_length(machine, path, use, f"has a cutter of {cutter:g} mm")
             if lengths[-1] <= 0.0:
                 _refuse_length(machine, path, use, f"is {longest - cutter:g} mm shorter than the longest tool")
     return lengths

@@ -282,6 +282,13 @@ def test_spindle_and_coolant_stop_before_a_change(text, name, target, write, cap
     assert lines.count("M0") == 1
 
 
+def test_a_spindle_that_is_not_started_again_is_told(write, tricept):
+    text = CHANGE.format(away=AWAY, second=75.0)
+    assert "spindle stands" not in str(pk.fit_tool_lengths(tricept, pk.read_path(write(text))).notes)
+    path = pk.fit_tool_lengths(tricept, pk.read_path(write(text.replace("SPINDL/RPM,9000,CLW\n", ""))))
+    assert [note.line for note in path.notes if "spindle stands" in note.text] == [19]
+
+
 def test_two_tools_have_each_its_own_length(write, capsys):
     said = post(capsys, write(CHANGE.format(away=AWAY, second=50.0)))
     assert [tool["length"] for tool in said["tools"]] == [150.0, 125.0]

@@ -22,6 +22,12 @@ _AXES = "XYZABC"
 _EXAMPLE = "X=0,Y=0,Z=50"
 _ARGUMENTS = {"frame", "start", "reference", "tools", "arc_tolerance"}  # of read_path; options have their names
 
+
+def complete_tool_length(context: Any) -> list[str]:
+    """List the words that ``--tool-length`` takes in place of mm, for the shell's completion."""
+    return [word for word in ("file", "machine") if word.startswith(context.incomplete)]
+
+
 FrameChoice = Annotated[
     Literal["file", "ignore"],
     Parameter(
@@ -49,10 +55,11 @@ ToolTable = Annotated[
 ToolLengthText = Annotated[
     str | None,
     Parameter(
+        completer=complete_tool_length,
         help=(
             "How long the longest tool is from the spindle's nose to its tip, in mm; file: all tools as the file says, "
             "machine: all as the machine's own. Without it a file that contradicts the machine's own is refused."
-        )
+        ),
     ),
 ]
 

@@ -8,6 +8,7 @@ by the extension; a controller with that kinematics runs it as it is.
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import Literal, NoReturn, TypeAlias
@@ -24,6 +25,7 @@ ToolLength: TypeAlias = float | Literal["file", "machine"] | None
 _SAME = 1e-3  # mm: lengths that are the same, with the decimals of a file
 _CLEARANCES = (20.0, 10.0, 5.0, 2.0)  # mm to withdraw from a cut before a change: the first that the machine allows
 _LONGEST = 1e4  # mm
+_STARTS = re.compile(r"M0?[34]\b|SPINDL\b(?!\s*/\s*OFF)", re.I)  # events that start the spindle
 
 
 def fit_tool_lengths(
@@ -70,6 +72,7 @@ def fit_tool_lengths(
         extension[use.record :] = use.length - own
     path = replace(path, tools=uses, fitted_length=own, notes=(*path.notes, *_note_lengths(path, uses, own)))
     path, extension = _insert_changes(machine, path, extension, workpiece)
+    path = replace(path, notes=(*path.notes, *_note_standing_spindle(path)))
     if not extension.any():
         return path
     return replace(path, tip=path.tip + extension[:, None] * path.axis, extension=extension)
@@ -141,6 +144,19 @@ def _note_lengths(path: ToolPath, uses: Sequence[ToolUse], own: float) -> list[N
             notes.append(Note(line, text))
         elif told != told and cutter != cutter and len(uses) > 1:
             notes.append(Note(line, f"{describe_tool(use)}: no length told, taken to be {use.length:g} mm long"))
+    return notes
+
+
+def _note_standing_spindle(path: ToolPath) -> list[Note]:
+    """Note cuts before the file starts the spindle again, which stops for a change of the tool."""
+    started = [(event.record, event.line) for event in path.events if _STARTS.match(event.text)]
+    notes = []
+    for use in path.tools if started else ():
+        cuts = np.flatnonzero(~path.rapid[use.record :]) + use.record
+        if not use.changed or not len(cuts) or any(use.line < line and record <= cuts[0] for record, line in started):
+            continue
+        text = f"a cut while the spindle stands since the change of tool in line {use.line}"
+        notes.append(Note(int(path.line[cuts[0]]), text))
     return notes
 
 

@@ -153,7 +153,8 @@ def test_encodings(both):
         ("", None, ["no motion"]),
         ("\n\n", None, ["no motion"]),
         ("PARTNO X\nFINI\nGOTO/1,2,3\n", None, ["no motion"]),
-        (b"\x7fELF\x01\n\x00\x00\x01", 2, ["NUL"]),
+        (b"\x7fELF\x01\n\x00\x00\x01", 1, ["control character"]),
+        (b"GOTO/1,2,3\n\x00\x00\x01", 2, ["NUL"]),
         ("GOTO/1,2,3\n".encode("utf-16"), 1, ["NUL"]),
         (b"\x93\xfa\xff\x80\n" * 5, None, ["no motion"]),
     ],
@@ -316,7 +317,7 @@ def test_unknown_words_are_grouped(both):
 
 
 def test_notes_and_events_print_in_one_line(both):
-    p = both("\x1b[2J\x07Bad\nPPRINT a   b\nGOTO/1,2,3\n")
+    p = both("Bad\nPPRINT a   b\nGOTO/1,2,3\n")
     assert all(n.text.isprintable() for n in p.notes) and p.events[0].text == "PPRINT a b"
 
 

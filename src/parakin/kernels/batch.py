@@ -107,12 +107,14 @@ class Roots(NamedTuple):
     steps : (N,)
     turned : (N,) the determinant of the last factored matrix times that of the start, or times the side that was
         asked for; negative where the root is on the other side of a singularity
+    first : (N,) the determinant of the start's matrix
     """
 
     rows: Array
     residual: Array
     steps: NDArray[np.int32]
     turned: Array
+    first: Array
 
 
 def solve_by_newton(tapes: NewtonTapes, limits: NewtonSteps, near: Array, joints: Array, side: Array) -> Roots:
@@ -124,7 +126,7 @@ def solve_by_newton(tapes: NewtonTapes, limits: NewtonSteps, near: Array, joints
 
     count = len(joints)
     rows = np.empty((count, tapes.end.outputs))
-    roots = Roots(rows, np.empty(count), np.empty(count, np.int32), np.empty(count))
+    roots = Roots(rows, np.empty(count), np.empty(count, np.int32), np.empty(count), np.empty(count))
     args = (tapes, limits, freeze_rows(near), freeze_rows(joints), side, roots)
     run_in_threads(count, lambda start, stop: solve_newton(*args, start, stop))
     return roots

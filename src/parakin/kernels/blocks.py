@@ -231,15 +231,16 @@ def store_rows(y, row, n, register, r, bad):
                 flat[base + j * width + c] = r[first + c * LANES + j] + bad[j]
 
 
-@njit(nogil=True, cache=True, fastmath=FAST, error_model="numpy")
+@njit(inline="always")
 def _load_inputs(x, z, row, stop, r, bad):
     """Load rows of ``x`` and ``z`` as the inputs of a block, and ask for those of the next; returns how many."""
     n = min(LANES, stop - row)
     bad[:] = 0.0
-    load_rows(x, row, n, 0, r, bad)
-    load_rows(z, row, n, x.shape[1], r, bad)
-    fetch_to_read(x, row + LANES, stop)
-    fetch_to_read(z, row + LANES, stop)
+    register = 0
+    for rows in (x, z):
+        load_rows(rows, row, n, register, r, bad)
+        fetch_to_read(rows, row + LANES, stop)
+        register += rows.shape[1]
     return n
 
 

@@ -24,6 +24,24 @@ FINE = 1e-12  # mm: where the next step is predicted to end, it is the last
 DOUBLE = 0.2  # a new matrix that leaves more than this a step is beside a double root, where each leaves a quarter
 PIVOT = 4.0  # how many times greater an entry must be to become the pivot
 
+# Rows of a block's state, where in it they begin. One array holds them: the compiler sees that they are apart, and so
+# takes the lanes of a loop over several of them side by side.
+WORST, BEFORE, SHRINK, RENEWS, STOPS, STEPS = (LANES * row for row in range(6))
+
+
+class Factors(NamedTuple):
+    """What :func:`factor_matrix` makes of m·m entries a lane.
+
+    matrix, exchanges : (m·m rows) the factored ∂f/∂y, and which lanes exchanged rows
+    exchanged : (m·m,) whether any lane did
+    determinant : (1 row)
+    """
+
+    matrix: Array
+    exchanges: Array
+    exchanged: Flags
+    determinant: Array
+
 
 class NewtonBlock(NamedTuple):
     """The working arrays of one block, rows of LANES numbers, for m coordinates.
@@ -31,53 +49,42 @@ class NewtonBlock(NamedTuple):
     registers : of the tapes
     point : (m + joints rows) the coordinates and the joints
     closures : (m rows) f there, then the step
-    matrix, exchanges : (m·m rows) the factored ∂f/∂y, and which lanes exchanged rows
-    exchanged : (m·m,) whether any lane did
-    determinant, first_determinant : of the last and the first matrix
-    worst, before : the greatest closure of each lane, now and a step before
-    shrink : the part of its step that a lane takes
-    renews, stops : which lanes want a new matrix, and which take no step any more (2) or one (1)
-    steps : that each lane took
-    kept : (2·m·m + 1 rows) matrix, exchanges and determinant of lanes that keep theirs
+    factors, fresh : of the matrix that each lane goes by, and of one that only some lanes take
+    first_determinant : of the first matrix
+    state : (6 rows) of each lane: its greatest closure, now (WORST) and a step before (BEFORE); the part of its step
+        that it takes (SHRINK); whether it wants a new matrix (RENEWS); whether it takes no step any more (STOPS, 2) or
+        one (1); how many it took (STEPS)
     """
 
     registers: Array
     point: Array
     closures: Array
-    matrix: Array
-    exchanges: Array
-    exchanged: Flags
-    determinant: Array
+    factors: Factors
+    fresh: Factors
     first_determinant: Array
-    worst: Array
-    before: Array
-    shrink: Array
-    renews: Array
-    stops: Array
-    steps: Array
-    kept: Array
+    state: Array
 
 
-@njit(nogil=True, cache=True)
+@njit(inline="always")
+def _allocate_factors(m):
+    """Allocate the factors of m·m entries."""
+    exchanged = np.zeros(m * m, np.bool_)
+    return Factors(allocate_lanes(m * m), allocate_lanes(m * m), exchanged, allocate_lanes(1))
+
+
+@njit(inline="always")
 def _allocate_block(tapes, m, joints):
     """Allocate the working arrays for m coordinates."""
     registers = max(
         max(tapes.begin.registers, tapes.closures_and_slopes.registers),
         max(tapes.closures.registers, tapes.end.registers),
     )
-    r, point = allocate_lanes(registers), allocate_lanes(m + joints)
-    matrix, exchanges, closures = allocate_lanes(m * m), allocate_lanes(m * m), allocate_lanes(m)
-    exchanged = np.zeros(m * m, np.bool_)
-    determinant, first, worst, before = allocate_lanes(1), allocate_lanes(1), allocate_lanes(1), allocate_lanes(1)
-    shrink, renews, stops, steps = allocate_lanes(1), allocate_lanes(1), allocate_lanes(1), allocate_lanes(1)
-    kept = allocate_lanes(2 * m * m + 1)
-    return NewtonBlock(
-        r, point, closures, matrix, exchanges, exchanged, determinant, first, worst, before, shrink, renews, stops,
-        steps, kept,
-    )  # fmt: skip
+    r, point, closures = allocate_lanes(registers), allocate_lanes(m + joints), allocate_lanes(m)
+    factors, fresh = _allocate_factors(m), _allocate_factors(m)
+    return NewtonBlock(r, point, closures, factors, fresh, allocate_lanes(1), allocate_lanes(6))
 
 
-@njit(nogil=True, cache=True)
+@njit(inline="always")
 def copy_lanes(a, i, b, j, rows):
     """Copy rows from the i-th of ``a`` to the j-th on of ``b``; a slice would take seconds to compile."""
     s, t = (i & _MASK) * LANES, (j & _MASK) * LANES
@@ -86,13 +93,13 @@ def copy_lanes(a, i, b, j, rows):
 
 
 @njit(nogil=True, cache=True, fastmath=FAST, error_model="numpy")
-def factor_matrix(a, m, exchanges, exchanged, determinant):
-    """Factor ``a`` (m·m·LANES,), row by row, in place: multipliers below, reciprocal pivots on the diagonal.
+def factor_matrix(factors, m):
+    """Factor the matrix of :class:`Factors` by rows, in place: multipliers below, reciprocal pivots on the diagonal.
 
-    ``exchanges`` (m·m·LANES,) is 1 where a lane exchanged rows k and i at k·m + i, ``exchanged`` (m·m,) where any did;
-    ``determinant`` (LANES,) becomes the matrix's.
+    ``exchanges`` becomes 1 where a lane exchanged rows k and i at k·m + i.
     """
     use_widest_vectors()
+    a, exchanges, exchanged, determinant = factors.matrix, factors.exchanges, factors.exchanged, factors.determinant
     determinant[:] = 1.0
     for k in range(m):
         p = ((k * m + k) & _MASK) * LANES
@@ -128,9 +135,10 @@ def factor_matrix(a, m, exchanges, exchanged, determinant):
 
 
 @njit(nogil=True, cache=True, fastmath=FAST, error_model="numpy")
-def solve_factored(a, m, exchanges, exchanged, f):
+def solve_factored(factors, m, f):
     """Solve with the factors of :func:`factor_matrix`: ``f`` (m·LANES,) becomes the solution."""
     use_widest_vectors()
+    a, exchanges, exchanged = factors.matrix, factors.exchanges, factors.exchanged
     for k in range(m):
         fk = (k & _MASK) * LANES
         for i in range(k + 1, m):
@@ -154,112 +162,111 @@ def solve_factored(a, m, exchanges, exchanged, f):
             f[fk + j] *= a[p + j]
 
 
-@njit(nogil=True, cache=True, fastmath=FAST, error_model="numpy")
+@njit(inline="always")
 def evaluate_closures(tape, m, block):
     """Evaluate a tape that gives m closures first, and the greatest of each lane."""
-    r, f, worst = block.registers, block.closures, block.worst
+    r, f, state = block.registers, block.closures, block.state
     copy_lanes(block.point, 0, r, 0, tape.inputs)
     interpret(tape.code, tape.constants, r)
-    worst[:] = 0.0
+    for j in range(LANES):
+        state[WORST + j] = 0.0
     for i in range(m):
         s, t = ((tape.inputs + i) & _MASK) * LANES, (i & _MASK) * LANES
         for j in range(LANES):
             v = r[s + j]
             f[t + j] = v
-            worst[j] = abs(v) if (abs(v) > worst[j]) | (v != v) else worst[j]
+            state[WORST + j] = abs(v) if (abs(v) > state[WORST + j]) | (v != v) else state[WORST + j]
 
 
-@njit(nogil=True, cache=True, fastmath=FAST, error_model="numpy")
+@njit(inline="always")
 def _take_step(m, caps, block):
     """Take the step in ``closures`` from ``point``, shrunk where a coordinate would change by too much."""
-    f, shrink, point, worst, stops = block.closures, block.shrink, block.point, block.worst, block.stops
+    f, point, state = block.closures, block.point, block.state
     for j in range(LANES):
-        shrink[j] = 0.0 if (worst[j] < FINE) | (stops[j] > 1.5) else 1.0
+        state[SHRINK + j] = 0.0 if (state[WORST + j] < FINE) | (state[STOPS + j] > 1.5) else 1.0
     for i in range(m):
         s = (i & _MASK) * LANES
         for j in range(LANES):
-            over = abs(f[s + j]) * shrink[j]
-            shrink[j] = shrink[j] * (caps[i] / over) if over > caps[i] else shrink[j]
+            over = abs(f[s + j]) * state[SHRINK + j]
+            state[SHRINK + j] = state[SHRINK + j] * (caps[i] / over) if over > caps[i] else state[SHRINK + j]
     for i in range(m):
         s = (i & _MASK) * LANES
         for j in range(LANES):
-            point[s + j] -= shrink[j] * f[s + j] if shrink[j] > 0.0 else 0.0
+            point[s + j] -= state[SHRINK + j] * f[s + j] if state[SHRINK + j] > 0.0 else 0.0
 
 
-@njit(nogil=True, cache=True, fastmath=FAST, error_model="numpy")
+@njit(inline="always")
+def _blend_lanes(state, a, b, s):
+    """Copy a row of ``a`` to ``b`` in the lanes that want a new matrix."""
+    for j in range(LANES):
+        x, y = a[s + j], b[s + j]
+        b[s + j] = x if state[RENEWS + j] > 0.0 else y
+
+
+@njit(inline="always")
 def _update_matrix(full, m, block, some):
     """Factor the slopes that the tape left, for the lanes that want it; with ``some`` the others keep their matrix."""
-    matrix, exchanges, exchanged, kept = block.matrix, block.exchanges, block.exchanged, block.kept
-    square = m * m
+    own, fresh, state = block.factors, block.fresh, block.state
+    target = fresh if some else own
+    copy_lanes(block.registers, full.inputs + m, target.matrix, 0, m * m)
+    factor_matrix(target, m)
     if some:
-        copy_lanes(matrix, 0, kept, 0, square)
-        copy_lanes(exchanges, 0, kept, square, square)
-        copy_lanes(block.determinant, 0, kept, 2 * square, 1)
-        before = exchanged.copy()
-    copy_lanes(block.registers, full.inputs + m, matrix, 0, square)
-    factor_matrix(matrix, m, exchanges, exchanged, block.determinant)
-    if some:
-        renews = block.renews
-        for i in range(square):
-            exchanged[i] |= before[i]
-            s, t = (i & _MASK) * LANES, ((square + i) & _MASK) * LANES
-            for j in range(LANES):
-                matrix[s + j] = matrix[s + j] if renews[j] > 0.0 else kept[s + j]
-                exchanges[s + j] = exchanges[s + j] if renews[j] > 0.0 else kept[t + j]
-        s = ((2 * square) & _MASK) * LANES
-        for j in range(LANES):
-            block.determinant[j] = block.determinant[j] if renews[j] > 0.0 else kept[s + j]
+        for i in range(m * m):
+            own.exchanged[i] |= fresh.exchanged[i]
+            s = (i & _MASK) * LANES
+            _blend_lanes(state, fresh.matrix, own.matrix, s)
+            _blend_lanes(state, fresh.exchanges, own.exchanges, s)
+        _blend_lanes(state, fresh.determinant, own.determinant, 0)
 
 
-@njit(nogil=True, cache=True, fastmath=FAST, error_model="numpy")
+@njit(inline="always")
 def _choose_next_matrix(limits, block, n, step):
     """Decide for each lane whether its next matrix is a new one, and whether it stops; returns how many go on.
 
     A lane whose closures are NaN stops. One whose last step did not close the legs goes on.
     """
-    size, closed = limits.size, limits.closed
-    worst, before, renews, stops, steps = block.worst, block.before, block.renews, block.stops, block.steps
+    state, worth, closed = block.state, WORTH * limits.size, limits.closed
     for j in range(LANES):
-        w, ratio = worst[j], worst[j] / before[j]
-        new = renews[j] > 0.0
-        double = (ratio > DOUBLE) & (w > closed)
-        anew = (w * w > WORTH * size) | double if new else ratio > SLOW
-        enough = (w < CLOSE) & (not double) if new else (ratio <= SLOW) & (w * ratio < FINE)
-        going = ((stops[j] < 0.5) | (stops[j] < 1.5) & (w > closed)) & (w == w)
-        steps[j] = step if stops[j] < 1.5 else steps[j]
-        renews[j] = 1.0 if going & anew else 0.0
-        stops[j] = (1.0 if enough else 0.0) if going else 2.0
-        before[j] = w
+        w, before, stops = state[WORST + j], state[BEFORE + j], state[STOPS + j]
+        new = state[RENEWS + j] > 0.0
+        slow, double = w > SLOW * before, (w > DOUBLE * before) & (w > closed)
+        anew = (w * w > worth) | double if new else slow
+        enough = (w < CLOSE) & (not double) if new else (w * w < FINE * before) & (not slow)
+        going = ((stops < 0.5) | ((stops < 1.5) & (w > closed))) & (w == w)
+        state[STEPS + j] = step if stops < 1.5 else state[STEPS + j]
+        state[RENEWS + j] = 1.0 if going & anew else 0.0
+        state[STOPS + j] = (1.0 if enough else 0.0) if going else 2.0
+        state[BEFORE + j] = w
     count = 0
     for j in range(n):
-        count += 1 if stops[j] < 1.5 else 0
+        count += 1 if state[STOPS + j] < 1.5 else 0
     return count
 
 
-@njit(nogil=True, cache=True, fastmath=FAST, error_model="numpy")
+@njit(inline="always")
 def solve_block(tapes, limits, m, block, n):
     """Run Newton's method on one block, from its point to the root."""
-    full, renews = tapes.closures_and_slopes, block.renews
-    renews[:] = 1.0
-    block.before[:] = np.inf
+    full, state = tapes.closures_and_slopes, block.state
     for j in range(LANES):
-        block.stops[j] = 0.0 if j < n else 2.0
+        state[RENEWS + j] = 1.0
+        state[BEFORE + j] = np.inf
+        state[STOPS + j] = 0.0 if j < n else 2.0
     for step in range(limits.most + 1):
         wanted = 0
         for j in range(n):
-            wanted += 1 if renews[j] > 0.0 else 0
+            wanted += 1 if state[RENEWS + j] > 0.0 else 0
         evaluate_closures(full if wanted > 0 else tapes.closures, m, block)
         if wanted > 0:
             _update_matrix(full, m, block, wanted < n)
             if step == 0:
-                copy_lanes(block.determinant, 0, block.first_determinant, 0, 1)
+                copy_lanes(block.factors.determinant, 0, block.first_determinant, 0, 1)
         if _choose_next_matrix(limits, block, n, step) == 0:
             return
-        solve_factored(block.matrix, m, block.exchanges, block.exchanged, block.closures)
+        solve_factored(block.factors, m, block.closures)
         _take_step(m, limits.caps, block)
 
 
-@njit(nogil=True, cache=True, fastmath=FAST, error_model="numpy")
+@njit(inline="always")
 def _load_start(tapes, near, q, row, stop, block, bad):
     """Load the coordinates and joints of a block into its point; returns how many rows it has."""
     r, m, given, joints = block.registers, tapes.begin.outputs, near.shape[1], q.shape[1]
@@ -286,27 +293,31 @@ def solve_newton(tapes, limits, near, q, side, roots, start, stop):
     near : (N or 1, k) starts; side : (N,), (1,) or (0,)
     roots : :class:`~.batch.Roots`, overwritten
     """
+    use_widest_vectors()
     m, joints = limits.caps.shape[0], q.shape[1]
     block, bad = _allocate_block(tapes, m, joints), allocate_lanes(1)
-    r, determinant = block.registers, block.determinant
+    r, point, state, determinant = block.registers, block.point, block.state, block.factors.determinant
+    first, end = block.first_determinant, tapes.end  # fields are taken out once: Numba counts references at each access
+    rows, residual, steps, turned, at_start = roots.rows, roots.residual, roots.steps, roots.turned, roots.first
     for row in range(start, stop, LANES):
         n = _load_start(tapes, near, q, row, stop, block, bad)
-        fetch_to_write(roots.rows, row, stop)
+        fetch_to_write(rows, row, stop)
         interpret(tapes.begin.code, tapes.begin.constants, r)
-        copy_lanes(r, tapes.begin.inputs, block.point, 0, m)
+        copy_lanes(r, tapes.begin.inputs, point, 0, m)
         solve_block(tapes, limits, m, block, n)
         for j in range(n):
-            roots.steps[row + j] = int(block.steps[j])
+            steps[row + j] = int(state[STEPS + j])
+            at_start[row + j] = first[j]
             if side.shape[0] == 0:
-                roots.turned[row + j] = determinant[j] * block.first_determinant[j]
+                turned[row + j] = determinant[j] * first[j]
             else:
-                roots.turned[row + j] = determinant[j] * side[0 if side.shape[0] == 1 else row + j]
-        copy_lanes(block.point, 0, r, 0, m + joints)
-        interpret(tapes.end.code, tapes.end.constants, r)
-        for i in range(tapes.end.outputs):
+                turned[row + j] = determinant[j] * side[0 if side.shape[0] == 1 else row + j]
+        copy_lanes(point, 0, r, 0, m + joints)
+        interpret(end.code, end.constants, r)
+        for i in range(end.outputs):
             s = ((m + joints + i) & _MASK) * LANES
             for j in range(LANES):
                 bad[j] += 0.0 * r[s + j]
-        store_rows(roots.rows, row, n, m + joints, r, bad)
+        store_rows(rows, row, n, m + joints, r, bad)
         for j in range(n):
-            roots.residual[row + j] = block.worst[j] + bad[j]
+            residual[row + j] = state[WORST + j] + bad[j]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from itertools import pairwise, product
 from typing import Any
@@ -10,7 +11,14 @@ import numpy as np
 
 from ..arrays import Array, Flags, Indices
 from ..errors import NoMethodError, PoseError
-from ..kernels.batch import NewtonSteps, Roots, evaluate_tape, evaluate_tape_with_residual, solve_by_newton
+from ..kernels.batch import (
+    NewtonSteps,
+    Roots,
+    evaluate_tape,
+    evaluate_tape_with_residual,
+    find_first_negative,
+    solve_by_newton,
+)
 from ..model.traces import Model
 from .inverse import SINGULAR, solve_inverse
 from .tapes import collect_newton_tapes
@@ -19,11 +27,12 @@ from .wrist import SAME_MODE, TURN, bring_within_poles, flip_mode, is_upright, w
 CLOSED = 1e-9  # greatest closure error of an answer, mm in a machine of a metre
 MOST_STEPS = 24
 WITHIN_A_TURN = 6  # steps of half a radian at most, which can't leave the start's turn
-ARM = 0.2  # of the greatest leg: the length by which angles of turning drives are compared with lengths
 STANDS_IN = 0.5  # of the way to another mode: how near joints must be to tell that a pose's legs stand in a mode
 NEARER = 0.1  # of the way to the answer in the default mode: one in another mode that is nearer is taken instead
 STANDS_AT = 0.1  # of the legs: how near these joints must be
-BESIDE = 0.05  # of the legs: an answer no farther from its start counts in whatever mode, if it has none in the default
+BESIDE = 0.0125  # of the legs: an answer in another mode than the default counts only if it is as near to its start
+SETTLED = 0.0125  # of the legs, and rad: so near to its start an answer in the default mode is taken
+STEADY = 0.2  # by which the determinant may change from start to answer and still tell the start's own side
 FIRST_PART, LEAST_PART = 1.0 / 8.0, 1e-5  # of the way in joints that a step of the continuation takes
 MOST_PARTS = 400  # steps of the continuation
 NEAR_STEPS = 6  # of Newton's method for a step of the continuation; one that needs more is halved
@@ -77,19 +86,7 @@ def solve_forward(
     solve = _METHODS[method]
     solution = solve(model, joints, starts, model.mode if mode is None else mode)
     if mode is None and starts is not None and model.has_modes:
-        for other, rows in _group_by_mode(model, starts, joints, solution.why == ANSWERED).items():
-            found = solve(model, joints[rows], starts[rows], other)
-            own = _take_rows(solution, rows)
-            nearer = _measure_way(model, found, starts[rows]) < NEARER * _measure_way(model, own, starts[rows])
-            better = (found.why == ANSWERED) & (nearer | (own.why != ANSWERED))
-            _put_rows(solution, rows[better], _take_rows(found, better))
-        lost = np.flatnonzero(solution.why != ANSWERED)
-        if len(lost):  # where the start does not tell the mode, an answer next to it counts in any
-            found = solve(model, joints[lost], starts[lost], None)
-            with np.errstate(invalid="ignore"):
-                beside = _measure_way(model, found, starts[lost]) <= BESIDE * max(model.sizes)
-            taken = (found.why == ANSWERED) & beside
-            _put_rows(solution, lost[taken], _take_rows(found, taken))
+        _take_modes_of_starts(model, solution, joints, starts, solve)
     poses, steps = solution.poses, solution.steps
     poses[solution.why != ANSWERED] = np.nan
     direction = model.structure.direction
@@ -101,26 +98,54 @@ def solve_forward(
     return replace(solution, converged=solution.why == ANSWERED)
 
 
-def _group_by_mode(model: Model, poses: Array, joints: Array, answered: Flags) -> dict[str, Indices]:
+def _take_modes_of_starts(
+    model: Model, solution: Solution, joints: Array, starts: Array, solve: Callable[..., Solution]
+) -> None:
+    """Put answers in another mode than the default where the start tells that mode, and the answer is beside it."""
+    beside = BESIDE * max(model.sizes)
+    open_rows = np.flatnonzero(~_is_settled(model, solution, starts))
+    for other, which in _group_by_mode(model, starts[open_rows], joints[open_rows]).items():
+        rows = open_rows[which]
+        found, own = solve(model, joints[rows], starts[rows], other), _take_rows(solution, rows)
+        way = _measure_way(model, found, starts[rows])
+        with np.errstate(invalid="ignore"):
+            nearer = way < NEARER * _measure_way(model, own, starts[rows])
+            better = (found.why == ANSWERED) & (way <= beside) & (nearer | (own.why != ANSWERED))
+        _put_rows(solution, rows[better], _take_rows(found, better))
+    lost = np.flatnonzero(solution.why != ANSWERED)
+    if len(lost):  # where the start does not tell the mode, an answer next to it counts in any
+        found = solve(model, joints[lost], starts[lost], None)
+        with np.errstate(invalid="ignore"):
+            taken = (found.why == ANSWERED) & (_measure_way(model, found, starts[lost]) <= beside)
+        _put_rows(solution, lost[taken], _take_rows(found, taken))
+
+
+def _is_settled(model: Model, solution: Solution, starts: Array) -> Flags:
+    """Tell which rows are answered next to their starts, (N,)."""
+    return _is_beside(model, solution.poses, starts) & (solution.why == ANSWERED)
+
+
+def _is_beside(model: Model, poses: Array, starts: Array) -> Flags:
+    """Tell which poses are next to their starts, (N,): in every coordinate, turns not counted."""
+    return find_first_negative(model.beside_tape(SETTLED), poses, starts) == 0
+
+
+def _group_by_mode(model: Model, poses: Array, joints: Array) -> dict[str, Indices]:
     """Group rows by the working mode other than the default whose joints at the poses are near to the given ones.
 
-    Each leg's joints must be near to the given ones in that mode, and nearer than in any other. Rows that are answered
-    in the default mode, and near to it, are left there.
+    Each leg's joints must be near to the given ones in that mode, and nearer than in any other.
     """
-    near = STANDS_AT * max(model.sizes)
-    in_default = np.abs(_compare_with_mode(model, poses, joints, model.mode)).max(1, initial=0.0) <= near
-    rows = np.flatnonzero(~(in_default & answered))
-    if not len(rows):
+    if not len(poses):
         return {}
-    poses, joints = poses[rows], joints[rows]
+    near = STANDS_AT * max(model.sizes)
     signs = [len(leg.branches) for leg in model.spec.legs]
     columns = np.cumsum([0, *(len(leg.drives) for leg in model.spec.legs)])
-    head, found = model.mode[sum(signs) :], np.full(len(rows), "", dtype=object)
+    head, found = model.mode[sum(signs) :], np.full(len(poses), "", dtype=object)
     choices = ["".join(choice) for choice in product("+-", repeat=max(signs))]
     modes = ["".join(choice[:count] for count in signs) + head for choice in choices]
     off = np.stack([np.abs(_compare_with_mode(model, poses, joints, mode)) for mode in modes])
     off = np.where(np.isfinite(off), off, np.inf)
-    clear = np.ones(len(rows), np.bool_)
+    clear = np.ones(len(poses), np.bool_)
     for (first, last), count in zip(pairwise(columns), signs, strict=True):
         own = off[:: 2 ** (max(signs) - count), :, first:last].max(2)  # choices that differ in this leg's signs
         ordered = np.sort(own, 0)
@@ -131,18 +156,27 @@ def _group_by_mode(model: Model, poses: Array, joints: Array, answered: Flags) -
         found += names[own.argmin(0)]
     groups: dict[str, list[int]] = {}
     for row in np.flatnonzero(clear).tolist():
-        groups.setdefault(found[row] + head, []).append(int(rows[row]))
+        groups.setdefault(found[row] + head, []).append(row)
     groups.pop(model.mode, None)
     return {mode: np.array(members) for mode, members in groups.items()}
 
 
 def _measure_way(model: Model, solution: Solution, starts: Array) -> Array:
     """Measure how far answers lie from their starts, mm, a turn counted as the greatest leg."""
-    turning = [axis in "ABC" for axis in model.axes]
+    turning, direction = np.array([axis in "ABC" for axis in model.axes]), model.structure.direction
     way = solution.poses - starts
-    way[:, turning] = wrap_angle(way[:, turning]) * max(model.sizes)
+    way[:, turning] = wrap_angle(way[:, turning])
+    if direction is not None:  # how far apart the tool's axes point, however B and C are written
+        one, other = (_compute_tool_axis(*poses[:, direction.pair].T) for poses in (solution.poses, starts))
+        way[:, direction.b], way[:, direction.c] = np.linalg.norm(one - other, axis=1), 0.0
+    way[:, turning] *= max(model.sizes)
     length: Array = np.linalg.norm(way, axis=1)
     return length
+
+
+def _compute_tool_axis(b: Array, c: Array) -> Array:
+    """Compute the directions Rz(C)·Ry(B)·z, (N, 3)."""
+    return np.stack([np.sin(b) * np.cos(c), np.sin(b) * np.sin(c), np.cos(b)], -1)
 
 
 def _take_rows(solution: Solution, rows: Indices | Flags) -> Solution:
@@ -208,24 +242,18 @@ def find_in_mode(model: Model, poses: Array, joints: Array, mode: str | None) ->
     """
     if mode is None or not model.has_modes:
         return np.ones(len(poses), np.bool_)
-    off = np.abs(_compare_with_mode(model, poses, joints, mode))
-    return np.asarray((off <= SAME_MODE * max(1.0, max(model.sizes) / 1000.0)).all(1))
+    off = evaluate_tape_with_residual(model.mode_tape(mode), poses, np.empty((len(poses), 0)), joints)
+    return np.asarray(off <= SAME_MODE * max(1.0, max(model.sizes) / 1000.0))
 
 
 def _compare_with_mode(model: Model, poses: Array, joints: Array, mode: str) -> Array:
-    """Subtract the given joints from the legs' joints in a working mode, leg by leg, mm.
-
-    Angles are taken within half a turn, and times an arm of :data:`ARM` of the greatest leg.
-    """
-    off = evaluate_tape(model.mode_tape(mode), poses, np.empty((len(poses), model.leg_count)), joints)
-    turning = [unit == "rad" for leg in model.spec.legs for unit in leg.units]
-    off[:, turning] = wrap_angle(off[:, turning]) * ARM * max(model.sizes)
-    return off
+    """Subtract the given joints from the legs' joints in a working mode, leg by leg, mm."""
+    return evaluate_tape(model.mode_tape(mode), poses, np.empty((len(poses), model.leg_count)), joints)
 
 
 def _judge(model: Model, roots: Roots, joints: Array, mode: str | None) -> Indices:
     """Tell why roots are no answers, as indices of :data:`REASONS`; zero where they are."""
-    turned = roots.turned * _measure_angles(model, roots.rows)
+    turned = roots.turned * _find_angle_signs(model, roots.rows)
     with np.errstate(invalid="ignore"):
         why = np.where(find_in_mode(model, roots.rows, joints, mode), ANSWERED, OTHER_MODE)
         why[~(turned > 0.0)] = ON_ANOTHER_SIDE
@@ -233,11 +261,16 @@ def _judge(model: Model, roots: Roots, joints: Array, mode: str | None) -> Indic
     return why
 
 
-def _measure_angles(model: Model, poses: Array) -> Array | float:
-    """Compute the sign, and size, by which the determinant of the pose's rates differs from the twist's."""
-    if len(model.axes) < 6:
+def _find_angle_signs(model: Model, poses: Array) -> Array | float:
+    """Find the sign by which the determinant of the pose's rates differs from the twist's, at poses or for all."""
+    column = model.structure.middle_turn
+    if column is None:
         return 1.0
-    return evaluate_tape(model.angles_tape(), poses, np.empty((len(poses), 1)))[:, 0]
+    turns = poses[:, column]
+    if np.abs(turns).max(initial=0.0) < 0.5 * np.pi:  # false for NaN
+        return 1.0
+    with np.errstate(invalid="ignore"):
+        return np.sign(np.cos(turns))
 
 
 def _solve_by_spheres(model: Model, joints: Array, starts: Array | None, mode: str | None) -> Solution:
@@ -250,7 +283,14 @@ def _solve_by_spheres(model: Model, joints: Array, starts: Array | None, mode: s
         nothing = np.empty((count, 0))
         residual = evaluate_tape_with_residual(model.spheres_tape(model.home_side), joints, first, nothing)
     else:
-        residual = evaluate_tape_with_residual(model.spheres_tape(None), joints, first, starts)
+        unknown = np.full((count, 1), np.nan)
+        sides = unknown if mode is None else _find_own_sides(model, joints, starts, mode)
+        residual = evaluate_tape_with_residual(model.spheres_on_side_tape(), joints, first, sides)
+        lost = np.flatnonzero(np.isnan(sides[:, 0]))  # such a start has no joints of its own, and no side
+        if len(lost):
+            nearest = second[lost]
+            residual[lost] = evaluate_tape_with_residual(model.spheres_tape(None), joints[lost], nearest, starts[lost])
+            first[lost] = nearest
     why = np.where(residual <= compute_closure_tolerance(model), ANSWERED, OPEN)
     if model.has_modes:
         lost = np.flatnonzero((why == ANSWERED) & ~find_in_mode(model, first, joints, mode))
@@ -263,6 +303,26 @@ def _solve_by_spheres(model: Model, joints: Array, starts: Array | None, mode: s
     return Solution(first, residual, why == ANSWERED, np.zeros(count, np.int32), why)
 
 
+def _find_own_sides(model: Model, joints: Array, starts: Array, mode: str) -> Array:
+    """Find on which side of their own spheres' centres starts lie, (N, 1), by its sign; NaN out of reach."""
+    sides = evaluate_tape(model.own_side_tape(mode), starts, np.empty((len(starts), 1)))
+    if model.structure.branches:
+        some = np.empty_like(starts)  # either common point: head and table alone turn the tool
+        evaluate_tape_with_residual(model.spheres_tape(None), joints, some, starts)
+        nearer = _is_in_other_head_mode(model, some, joints, mode)
+        others = evaluate_tape(model.own_side_tape(flip_mode(mode)), starts, np.empty((len(starts), 1)))
+        sides[nearer] = others[nearer]
+    return sides
+
+
+def _is_in_other_head_mode(model: Model, poses: Array, joints: Array, mode: str) -> Flags:
+    """Tell at which poses head and table's joints are nearer to the given ones in the other of their modes."""
+    serial = slice(model.leg_count, None)
+    own, other = (solve_inverse(model, poses, choice) for choice in (mode, flip_mode(mode)))
+    far = [np.abs(wrap_angle((turned - joints)[:, serial])).max(1, initial=0.0) for turned in (own, other)]
+    return np.asarray(far[1] < far[0])
+
+
 def find_sides(model: Model, poses: Array, mode: str | None = None, joints: Array | None = None) -> Array:
     """Compute the determinant of the twist at poses, (N,), but for its size.
 
@@ -272,16 +332,13 @@ def find_sides(model: Model, poses: Array, mode: str | None = None, joints: Arra
     mode = model.mode if mode is None else mode
     own = solve_inverse(model, poses, mode)
     if joints is not None and model.structure.branches:  # with the head or table as it is given
-        other = solve_inverse(model, poses, flip_mode(mode))
-        serial = slice(model.leg_count, None)
-        far = [np.abs(wrap_angle((turned - joints)[:, serial])).max(1, initial=0.0) for turned in (own, other)]
-        nearer = far[1] < far[0]
-        own[nearer] = other[nearer]
+        nearer = _is_in_other_head_mode(model, poses, joints, mode)
+        own[nearer] = solve_inverse(model, poses[nearer], flip_mode(mode))
     if joints is not None:
         own = np.where(np.isfinite(own).all(1, keepdims=True), own, joints)
     sides = find_roots(model, poses, own, most=0, side=np.ones(1)).turned
     sides[np.abs(sides) <= SINGULAR * _bound_determinant(model)] = 0.0
-    return sides * _measure_angles(model, poses)
+    return sides * _find_angle_signs(model, poses)
 
 
 def _bound_determinant(model: Model) -> float:
@@ -295,19 +352,38 @@ def _bound_determinant(model: Model) -> float:
 
 
 def _solve_by_newton(model: Model, joints: Array, starts: Array | None, mode: str | None) -> Solution:
-    home = np.array(model.home)[None, :]
-    near = home if starts is None else starts
-    if model.has_modes or starts is None:
-        side = find_sides(model, near, mode, None if starts is None else joints)
-        roots = find_roots(model, near, joints, side=side)
+    near = np.array(model.home)[None, :] if starts is None else starts
+    if starts is None:
+        roots = find_roots(model, near, joints, side=find_sides(model, near, mode))
         why = _judge(model, roots, joints, mode)
-    else:  # struts of any length have the same determinant, so the start's need not be known beforehand
+    else:
         roots = find_roots(model, near, joints)
-        roots.turned[roots.turned <= (SINGULAR * _bound_determinant(model)) ** 2] = 0.0
-        why = _judge(model, roots._replace(turned=roots.turned * _measure_angles(model, near)), joints, mode)
+        _take_own_sides(model, roots, near, joints, mode)
+        why = _judge(model, roots, joints, mode)
     if (why != ANSWERED).any():
         _continue_from_starts(model, near, joints, (roots, why), mode)
     return Solution(roots.rows, roots.residual, why == ANSWERED, roots.steps, why)
+
+
+def _take_own_sides(model: Model, roots: Roots, near: Array, joints: Array, mode: str | None) -> None:
+    """Multiply the roots' determinants by those of the starts with their own joints, not with the given ones; in place.
+
+    The determinant of struts of any length is the same. Else it differs little where it differs little from the
+    root's; only where it does not, the starts' own joints are looked for.
+    """
+    roots.turned[:] *= _find_angle_signs(model, near)
+    if not model.has_modes:
+        roots.turned[roots.turned <= (SINGULAR * _bound_determinant(model)) ** 2] = 0.0
+        return
+    tiny = roots.turned <= (SINGULAR * _bound_determinant(model)) ** 2
+    with np.errstate(all="ignore"):
+        steady = (np.abs(roots.turned / roots.first**2 - 1.0) <= STEADY) & _is_beside(model, roots.rows, near)
+    if not steady.all():
+        rows = np.flatnonzero(~steady)
+        starts, given = (np.ascontiguousarray(np.broadcast_to(near, roots.rows.shape)[rows]), joints[rows])
+        sides = find_sides(model, starts, mode, given)
+        roots.turned[rows] = find_roots(model, roots.rows[rows], given, most=0, side=sides).turned
+    roots.turned[tiny & steady] = 0.0
 
 
 def _continue_from_starts(

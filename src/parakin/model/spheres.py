@@ -5,6 +5,7 @@ This is the direct problem, in closed form, of machines that only translate.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 from ..algebra import Scalar, Vec, add, copysign, cross, dot, scale, sqrt, sub
@@ -13,13 +14,13 @@ CENTRES_NEEDED = (2, 3)
 
 
 def find_common_point(
-    centres: Sequence[Vec], radii: Sequence[Scalar], plane: Sequence[int], side: float | None, near: Vec | None
+    centres: Sequence[Vec], radii: Sequence[Scalar], plane: Sequence[int], side: Scalar | None, near: Vec | None
 ) -> Vec:
     """Find the point at ``radii`` from ``centres`` (mm); NaN where there is none.
 
     plane : the coordinates in which the point moves: two for circles, which the plane where the third coordinate is 0
         cuts from the spheres; all three for spheres
-    side : of the two points, the one on this side (±1) of the plane (line) through the centres
+    side : of the two points, the one on this side of the plane (line) through the centres: ±1, or a term of that sign
     near : with ``side`` None, the one on the side of this point
     """
     first = centres[0]
@@ -29,25 +30,35 @@ def find_common_point(
         across: Vec = tuple(1.0 if c == out else 0.0 for c in range(3))
         u: Vec = tuple(0.0 if c == out else x for c, x in enumerate(sub(centres[1], first)))
         normal = cross(across, u)
-        size = dot(normal, normal)
+        size = _avoid_zero(dot(normal, normal))
         first = tuple(0.0 if c == out else x for c, x in enumerate(first))
         squares = [r * r - c[out] * c[out] for r, c in zip(radii, centres, strict=True)]
         foot = scale(u, 0.5 * (squares[0] - squares[1] + size) / size)
     else:
         u, v = sub(centres[1], first), sub(centres[2], first)
         normal = cross(u, v)
-        size = dot(normal, normal)
+        size = _avoid_zero(dot(normal, normal))
         squares = [r * r for r in radii]
         a = 0.5 * (squares[0] - squares[1] + dot(u, u))
         b = 0.5 * (squares[0] - squares[2] + dot(v, v))
         foot = add(scale(cross(v, normal), a / size), scale(cross(normal, u), b / size))
     height = sqrt((squares[0] - dot(foot, foot)) / size)  # in units of the normal
-    height = copysign(height, dot(sub(near, first), normal)) if side is None and near is not None else height * side
+    if side is None and near is not None:
+        side = dot(sub(near, first), normal)
+    height = height * side if isinstance(side, float) else copysign(height, side)
     return add(first, add(foot, scale(normal, height)))
 
 
-def find_side(centres: Sequence[Vec], plane: Sequence[int], point: Vec) -> float:
-    """Find on which side of the centres' plane (line) a point lies: +1 or -1 as :func:`find_common_point` counts."""
+def _avoid_zero(size: Scalar) -> Scalar:
+    """Turn a zero into NaN: centres in one place, or on one line, determine no point."""
+    return math.nan if isinstance(size, int | float) and size == 0.0 else size
+
+
+def measure_side(centres: Sequence[Vec], plane: Sequence[int], point: Vec) -> Scalar:
+    """Measure how far a point is from the centres' plane (line), times its normal's size.
+
+    The sign is the side as :func:`find_common_point` counts it, and that of the rods' determinant.
+    """
     first = centres[0]
     if len(centres) == 2:
         out = 3 - sum(plane)
@@ -55,4 +66,4 @@ def find_side(centres: Sequence[Vec], plane: Sequence[int], point: Vec) -> float
         normal = cross(across, sub(centres[1], first))
     else:
         normal = cross(sub(centres[1], first), sub(centres[2], first))
-    return 1.0 if dot(sub(point, first), normal) >= 0.0 else -1.0
+    return dot(sub(point, first), normal)

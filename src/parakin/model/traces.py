@@ -10,15 +10,33 @@ from functools import cached_property
 
 import numpy as np
 
-from ..algebra import Scalar, Trace, Vec, apply, derivative, evaluate_trace, minimum, norm, scale, sqrt, sub, transpose
+from ..algebra import (
+    Scalar,
+    Trace,
+    Vec,
+    absolute,
+    apply,
+    atan2,
+    derivative,
+    evaluate_trace,
+    minimum,
+    norm,
+    scale,
+    sincos,
+    sqrt,
+    sub,
+    transpose,
+)
 from ..errors import DescriptionError
 from ..kernels.tape import Tape, compile_tape
 from .legs import Inverse
 from .limits import HomeRods, Limit, compute_platform_points, group_joints_by_leg, list_limits
 from .rates import compute_twist_rates
 from .spec import Spec
-from .spheres import CENTRES_NEEDED, find_common_point, find_side
+from .spheres import CENTRES_NEEDED, find_common_point, measure_side
 from .structures import PlatformPlacement, Structure, make_structure
+
+ARM = 0.2  # of the greatest leg: the length by which angles of turning drives are compared with lengths
 
 FAR = 1e12  # mm; more than any pose's coordinate
 
@@ -145,7 +163,7 @@ class Model:
         """The side of the spheres' centres on which the platform is at home."""
         joints, placed, _ = self.invert(self.home, self.mode)
         centres, _, plane = self._spheres(joints)
-        return find_side(centres, plane, placed.origin)
+        return 1.0 if measure_side(centres, plane, placed.origin) >= 0.0 else -1.0
 
     @property
     def leg_count(self) -> int:
@@ -287,7 +305,14 @@ class Model:
         return self._tape(("legs", mode), self._motions, outputs)
 
     def mode_tape(self, mode: str) -> Tape:
-        """Compile pose, joints -> the legs' joints in a working mode, at that platform, less the given ones."""
+        """Compile pose, joints -> the legs' joints in a working mode, at that platform, less the given ones; in mm.
+
+        Angles are taken within half a turn, times an arm of :data:`ARM` of the greatest leg.
+        """
+        arm = ARM * max(self.sizes)
+
+        def compare(unit: str, off: Scalar) -> Scalar:
+            return atan2(*sincos(off)) * arm if unit == "rad" else off
 
         def outputs(trace: Trace) -> list[Scalar]:
             pose, joints = self._pose_and_joints(trace)
@@ -296,16 +321,12 @@ class Model:
             points = compute_platform_points(self.spec, placed.rotation, placed.origin)
             own = group_joints_by_leg(self.spec, joints)
             return [
-                q - given
+                compare(unit, q - given)
                 for leg, point, s, all_given in zip(self.spec.legs, points, signs, own, strict=True)
-                for q, given in zip(leg.inverse(point, s).joints, all_given, strict=True)
+                for unit, q, given in zip(leg.units, leg.inverse(point, s).joints, all_given, strict=True)
             ]
 
         return self._tape(("mode", mode), self._poses + len(self.drives), outputs)
-
-    def angles_tape(self) -> Tape:
-        """Compile pose -> :meth:`~.structures.Structure.measure_angles` there."""
-        return self._tape(("angles",), self._poses, lambda t: [self.structure.measure_angles(t.inputs(self._poses))])
 
     def margins_tape(self, mode: str) -> Tape:
         """Compile pose, joints -> every margin, in the order of :attr:`limits`."""
@@ -362,7 +383,38 @@ class Model:
 
         return self._tape(("spheres", side), len(self.drives) + (self._poses if side is None else 0), outputs)
 
-    def spheres(self, joints: Sequence[Scalar], side: float | None, near: Vec | None = None) -> list[Scalar]:
+    def spheres_on_side_tape(self) -> Tape:
+        """Compile joints, a number -> as :meth:`spheres_tape`, on the side that the number's sign tells."""
+
+        def outputs(trace: Trace) -> list[Scalar]:
+            joints = list(trace.inputs(len(self.drives)))
+            coordinates = self.spheres(joints, trace.input(len(joints)))
+            return self._compute_pose(coordinates, joints) + self.scaled_closures(coordinates, joints)
+
+        return self._tape(("spheres on side",), len(self.drives) + 1, outputs)
+
+    def beside_tape(self, limit: float) -> Tape:
+        """Compile pose, another -> by how much each coordinate differs less than a part of the greatest leg, or rad."""
+        n, size = self._poses, max(self.sizes)
+        bounds = [limit if axis in "ABC" else limit * size for axis in self.axes]
+
+        def outputs(trace: Trace) -> list[Scalar]:
+            pairs = zip(trace.inputs(n), trace.inputs(n, n), bounds, strict=True)
+            return [bound - absolute(one - other) for one, other, bound in pairs]
+
+        return self._tape(("beside", limit), 2 * n, outputs)
+
+    def own_side_tape(self, mode: str) -> Tape:
+        """Compile pose -> the side of the spheres' centres on which it lies, with its own joints in a working mode."""
+
+        def outputs(trace: Trace) -> list[Scalar]:
+            joints, placed, _ = self.invert(trace.inputs(self._poses), mode)
+            centres, _, plane = self._spheres(joints)
+            return [measure_side(centres, plane, placed.origin)]
+
+        return self._tape(("own side", mode), self._poses, outputs)
+
+    def spheres(self, joints: Sequence[Scalar], side: Scalar | None, near: Vec | None = None) -> list[Scalar]:
         """Find the motion's coordinates by the common point of the legs' spheres; ``near`` picks the nearer of two."""
         centres, radii, plane = self._spheres(joints)
         return self.structure.coordinates_at(find_common_point(centres, radii, plane, side, near))

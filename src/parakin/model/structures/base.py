@@ -103,12 +103,10 @@ class Structure(ABC):
         """Find the motion's coordinates for the platform's frame in the base."""
         return self.coordinates_at(origin)
 
-    def measure_angles(self, coordinates: Sequence[Scalar]) -> Scalar:
-        """Compute, but for its size, the determinant that leads from small turns to rates of the coordinates' angles.
-
-        Where it changes its sign the angles are singular, not the machine.
-        """
-        return 1.0
+    @property
+    def middle_turn(self) -> int | None:
+        """The column of a pose's second turn of three: beyond ±90° the angles' rates change sign, not the tool's."""
+        return None
 
     @abstractmethod
     def pose(self, coordinates: Sequence[Scalar], serial: Sequence[Scalar]) -> list[Scalar]:

@@ -66,8 +66,9 @@ class Free(Structure):
         parallel = len(rails) == len(legs) == 3 and all(np.allclose(rail, rails[0], atol=1e-12) for rail in rails)
         return "lambda" if parallel else None
 
-    def measure_angles(self, coordinates: Sequence[Scalar]) -> Scalar:
-        return sincos(coordinates[4])[1] if len(self.axes) == 6 else 1.0
+    @property
+    def middle_turn(self) -> int | None:
+        return 4 if len(self.axes) == 6 else None
 
     @property
     def tool_rotation(self) -> Mat:

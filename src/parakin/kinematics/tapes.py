@@ -6,6 +6,22 @@ from typing import NamedTuple
 
 from ..kernels.tape import NewtonTapes, Tape
 from ..model.traces import Model
+from .wrist import flip_mode
+
+
+class SphereTapes(NamedTuple):
+    """The direct problem in closed form, by the common point of the legs' spheres.
+
+    nearest : joints, near pose -> pose on that pose's side, closures, the square of the height over the centres
+    on_side : joints, a number -> pose on the side that its sign tells, closures
+    own_side : pose -> such a number, for the pose's own joints; NaN out of reach
+    own_side_over : the same in the other mode of head and table, where there is one
+    """
+
+    nearest: Tape
+    on_side: Tape
+    own_side: Tape
+    own_side_over: Tape | None
 
 
 class KinematicTapes(NamedTuple):
@@ -15,7 +31,7 @@ class KinematicTapes(NamedTuple):
     """
 
     inverse: Tape
-    common_point: Tape | None
+    spheres: SphereTapes | None
     newton: NewtonTapes | None
     coordinates: tuple[str, ...]
 
@@ -29,6 +45,12 @@ def collect_newton_tapes(model: Model, poses: bool = True) -> NewtonTapes:
 
 def collect_tapes(model: Model, mode: str) -> KinematicTapes:
     """Compile the tapes of inverse and direct problem in a working mode."""
-    common_point = model.spheres_tape(None) if model.by_spheres else None
+    spheres = _collect_sphere_tapes(model, mode) if model.by_spheres else None
     newton = None if model.by_spheres else collect_newton_tapes(model)
-    return KinematicTapes(model.inverse_tape(mode), common_point, newton, model.structure.coordinates)
+    return KinematicTapes(model.inverse_tape(mode), spheres, newton, model.structure.coordinates)
+
+
+def _collect_sphere_tapes(model: Model, mode: str) -> SphereTapes:
+    """Compile the tapes of the direct problem in closed form."""
+    over = model.own_side_tape(flip_mode(mode)) if model.structure.branches else None
+    return SphereTapes(model.spheres_with_height_tape(), model.spheres_on_side_tape(), model.own_side_tape(mode), over)

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from typing import NamedTuple
 
 from ..algebra import Scalar, Vec, add, copysign, cross, dot, scale, sqrt, sub
 
@@ -23,6 +24,34 @@ def find_common_point(
     side : of the two points, the one on this side of the plane (line) through the centres: ±1, or a term of that sign
     near : with ``side`` None, the one on the side of this point
     """
+    foot = _find_foot(centres, radii, plane)
+    height = sqrt(foot.square / foot.size)  # in units of the normal
+    if side is None and near is not None:
+        side = dot(sub(near, foot.first), foot.normal)
+    height = height * side if isinstance(side, float) else copysign(height, side)
+    return add(foot.first, add(foot.offset, scale(foot.normal, height)))
+
+
+def square_height(centres: Sequence[Vec], radii: Sequence[Scalar], plane: Sequence[int]) -> Scalar:
+    """Compute the square of the common point's distance from the centres' plane (line), mm²."""
+    return _find_foot(centres, radii, plane).square
+
+
+class _Foot(NamedTuple):
+    """Where the common points' middle lies: ``first`` centre + ``offset``; they are off it along the ``normal``.
+
+    size : the normal's square
+    square : of the distance from the middle to either point, mm²
+    """
+
+    first: Vec
+    offset: Vec
+    normal: Vec
+    size: Scalar
+    square: Scalar
+
+
+def _find_foot(centres: Sequence[Vec], radii: Sequence[Scalar], plane: Sequence[int]) -> _Foot:
     first = centres[0]
     if len(centres) == 2:
         i, j = plane
@@ -42,11 +71,7 @@ def find_common_point(
         a = 0.5 * (squares[0] - squares[1] + dot(u, u))
         b = 0.5 * (squares[0] - squares[2] + dot(v, v))
         foot = add(scale(cross(v, normal), a / size), scale(cross(normal, u), b / size))
-    height = sqrt((squares[0] - dot(foot, foot)) / size)  # in units of the normal
-    if side is None and near is not None:
-        side = dot(sub(near, first), normal)
-    height = height * side if isinstance(side, float) else copysign(height, side)
-    return add(first, add(foot, scale(normal, height)))
+    return _Foot(first, foot, normal, size, squares[0] - dot(foot, foot))
 
 
 def _avoid_zero(size: Scalar) -> Scalar:

@@ -33,7 +33,7 @@ from .legs import Inverse
 from .limits import HomeRods, Limit, compute_platform_points, group_joints_by_leg, list_limits
 from .rates import compute_twist_rates
 from .spec import Spec
-from .spheres import CENTRES_NEEDED, find_common_point, measure_side
+from .spheres import CENTRES_NEEDED, find_common_point, measure_side, square_height
 from .structures import PlatformPlacement, Structure, make_structure
 
 ARM = 0.2  # of the greatest leg: the length by which angles of turning drives are compared with lengths
@@ -382,6 +382,18 @@ class Model:
             return self._compute_pose(coordinates, joints) + self.scaled_closures(coordinates, joints)
 
         return self._tape(("spheres", side), len(self.drives) + (self._poses if side is None else 0), outputs)
+
+    def spheres_with_height_tape(self) -> Tape:
+        """Compile joints, near pose -> as :meth:`spheres_tape`, then the square of the height over the centres, mm²."""
+
+        def outputs(trace: Trace) -> list[Scalar]:
+            joints = list(trace.inputs(len(self.drives)))
+            placed = self.structure.place_with_joints(trace.inputs(self._poses, len(joints)), self._serial(joints))
+            coordinates = self.spheres(joints, None, placed.origin)
+            closures = self.scaled_closures(coordinates, joints)
+            return [*self._compute_pose(coordinates, joints), *closures, square_height(*self._spheres(joints))]
+
+        return self._tape(("spheres with height",), len(self.drives) + self._poses, outputs)
 
     def spheres_on_side_tape(self) -> Tape:
         """Compile joints, a number -> as :meth:`spheres_tape`, on the side that the number's sign tells."""

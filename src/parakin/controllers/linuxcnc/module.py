@@ -11,12 +11,14 @@ import numpy as np
 from ...algebra import Trace
 from ...kernels.newton import SLOW, WORTH
 from ...kernels.tape import Tape, compile_tape
-from ...kinematics.forward import MOST_STEPS
+from ...kinematics.forward import MOST_STEPS, SETTLED, STEADY
 from ...kinematics.wrist import EXACT, GAIN, NEAR_MODE, SWING, TURN
 from ...machine import Machine
 from ...model.limits import Limit
 from .tape_to_c import CVector, format_c, write_function, write_test
 
+NO_SIDE = 1e-6  # of home's determinant: less is a singularity, of no side
+TELLS = 0.02  # of a leg: a pose from which the legs are farther off is a guess, and its side says nothing
 _FIELDS = {"X": "tran.x", "Y": "tran.y", "Z": "tran.z", "A": "a", "B": "b", "C": "c"}
 
 _HEADER = """\
@@ -99,12 +101,12 @@ def _write_numbers(machine: Machine, name: str) -> str:
         "/* rad: nearer to a turning axis the tool's tells its angle by rounding only */",
         f"#define TOLERANCE {open_by} /* mm by which the legs of an answer may fail to close */",
         *_write_wrist(machine),
+        *_write_sides(machine),
         *_write_newton(machine),
         _write_array("double", "home", [format_c(value) for value in machine.home]),
         _write_array("int", "turning", [str(int(unit == "rad")) for unit in machine.joint_units]),
     ]
-    if not machine.has_direction:
-        lines.append(_write_array("int", "turning_axis", [str(int(unit == "rad")) for unit in machine.axis_units]))
+    lines.append(_write_array("int", "turning_axis", [str(int(unit == "rad")) for unit in machine.axis_units]))
     return "\n".join(lines) + "\n"
 
 
@@ -125,18 +127,30 @@ def _write_wrist(machine: Machine) -> Iterator[str]:
         yield f"#define SECOND_HIGH {format_c(wrist.drive.high)}"
 
 
+def _write_sides(machine: Machine) -> Iterator[str]:
+    """Write home's side of the singularities, and what tells that a given pose has a side of its own."""
+    determinant = float(machine.sides(machine.home[None, :])[0])
+    side = machine.home_side if machine.has_closed_forward else float(np.sign(determinant))
+    least, most, middle = min(machine.leg_sizes), max(machine.leg_sizes), machine.structure.middle_turn
+    yield f"#define SIZE {format_c(least)} /* of the legs, mm */"
+    yield f"#define LONGEST {format_c(most)}"
+    yield f"#define HOME_SIDE {format_c(side)} /* of the singularities; on the other one is another assembly */"
+    yield f"#define NO_SIDE {format_c(NO_SIDE * abs(determinant))} /* the least determinant that tells a side */"
+    yield f"#define TELLS {format_c(TELLS * least)} /* mm: legs farther off do not stand at a given pose */"
+    yield f"#define SETTLED {format_c(SETTLED * most)} /* mm: an answer as near to a given pose has its side, */"
+    yield f"#define STEADY {format_c(STEADY)} /* where the determinant changes by no more than this part */"
+    yield f"#define MIDDLE_TURN {-1 if middle is None else middle} /* whose ±90° is singular to a pose's angles */"
+
+
 def _write_newton(machine: Machine) -> Iterator[str]:
     tapes = machine.tapes(machine.mode)
     if tapes.newton is not None:
-        least, most = min(machine.leg_sizes), max(machine.leg_sizes)
-        side = float(np.sign(machine.sides(machine.home[None, :])[0]))
+        most = max(machine.leg_sizes)
         yield f"#define FINE {format_c(0.01 * machine.closure_tolerance)} /* mm: where Newton's method has arrived */"
-        yield f"#define SIZE {format_c(least)} /* of the legs, mm */"
         worth = format_c(WORTH)
         yield f"#define WORTH {worth} /* mm: where a step will end no worse than this, the matrix serves on */"
         yield f"#define SLOW {format_c(SLOW)} /* a kept matrix that gains less than this a step is made anew */"
         yield f"#define MOST_STEPS {MOST_STEPS}"
-        yield f"#define HOME_SIDE {format_c(side)} /* of the singularities; on the other one is another assembly */"
         caps = [most / 3.0 if word.startswith("t") else 0.5 for word in tapes.coordinates]
         yield _write_array("double", "caps", [format_c(cap) for cap in caps]) + " /* greatest step */"
 
@@ -185,8 +199,13 @@ def _write_mathematics(machine: Machine) -> Iterator[str]:
         yield write_function("inverse_held", wrist.first_given_tape(machine.mode), [x, first], [q])
         yield write_function("inverse_over", machine.tapes(wrist.other_mode(machine.mode)).inverse, [x], [q])
     yield write_test("allowed", _compile_limits(machine), [x, q])
-    if tapes.common_point is not None:
-        yield write_function("common_point", tapes.common_point, [q, near], [x, f])
+    if tapes.spheres is not None:
+        square, side = CVector("square", 1), CVector("side", 1)
+        yield write_function("common_point", tapes.spheres.nearest, [q, near], [x, f, square])
+        yield write_function("common_point_on", tapes.spheres.on_side, [q, side], [x, f])
+        yield write_function("own_side", tapes.spheres.own_side, [near], [side])
+        if tapes.spheres.own_side_over is not None:
+            yield write_function("own_side_over", tapes.spheres.own_side_over, [near], [side])
     if tapes.newton is not None:
         y, newton = CVector("y", len(tapes.coordinates)), tapes.newton
         yield write_function("begin", newton.begin, [near, q], [y])

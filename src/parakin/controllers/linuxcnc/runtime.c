@@ -68,17 +68,67 @@ int kinematicsInverse(const EmcPose *world, double *joints,
     return 0;
 }
 
-/* The forward: a pose for joints, near a given one. What does not close, or is another assembly, is none. */
+/* The forward: a pose for joints, near a given one. What does not close, or is another assembly, is none.
+
+   The pose lies on the same side of the parallel singularities as the given one with its own joints. Where LinuxCNC's
+   guess says nothing, for its joints are far from the given ones (zeros, at the start), it lies on home's side. */
+
+/* The greatest difference of two poses, mm, an angle counted on the arm of a leg. */
+static double distance_of(const double *x, const double *near)
+{
+    double most = 0.0;
+    for (int i = 0; i < AXES; i++) {
+        const double off = fabs(x[i] - near[i]) * (turning_axis[i] ? SIZE : 1.0);
+        if (!(off <= most))
+            most = off;
+    }
+    return most;
+}
 
 #if SPHERES
-static int pose_near(const double *near, const double *q, double *x)
+static int closes(const double *f)
 {
-    double f[CLOSURES];
-    common_point(q, near, x, f);
     for (int i = 0; i < CLOSURES; i++)
         if (!(fabs(f[i]) <= TOLERANCE))
             return 0;
-    return finite_all(x, AXES);
+    return 1;
+}
+
+/* The given pose's own side by its sign; head and table stand in the mode in which the joints have them. */
+static double side_of(const double *near, const double *x, const double *q)
+{
+    double side[1];
+    own_side(near, side);
+#if WRIST
+    double own[JOINTS], over[JOINTS];
+    inverse(x, own);
+    inverse_over(x, over);
+    double far[2] = {0.0, 0.0};
+    for (int i = CLOSURES; i < JOINTS; i++) {
+        far[0] = fmax(far[0], fabs(within_half_a_turn(own[i] - q[i], 0.0)));
+        far[1] = fmax(far[1], fabs(within_half_a_turn(over[i] - q[i], 0.0)));
+    }
+    if (far[1] < far[0])
+        own_side_over(near, side);
+#else
+    (void)x;
+    (void)q;
+#endif
+    return isfinite(side[0]) ? side[0] : HOME_SIDE;
+}
+
+static int pose_near(const double *near, const double *q, double *x, double *side)
+{
+    double f[CLOSURES], square[1];
+    common_point(q, near, x, f, square);
+    const double far = distance_of(x, near);
+    /* A leg as long as this moves its drive by no more than the root of 2 LONGEST far, where it is at right angles. If
+       that is a quarter of the height over the centres, where there is a singularity, the side is the same. */
+    if (closes(f) && 32.0 * LONGEST * far + 16.0 * far * far < square[0])
+        return finite_all(x, AXES);
+    *side = far <= TELLS ? side_of(near, x, q) : HOME_SIDE;
+    common_point_on(q, side, x, f);
+    return closes(f) && finite_all(x, AXES);
 }
 #else
 /* LU with row exchanges, in place; the determinant. */
@@ -128,11 +178,43 @@ static void substitute(double a[CLOSURES][CLOSURES], const int order[CLOSURES], 
     }
 }
 
-/* Newton's method on the legs' closures in bounded steps. The matrix serves on while it gains enough. */
-static int pose_near(const double *near, const double *q, double *x)
+/* The sign of the rates of a pose's angles against those of the tool. */
+static double angle_sign(const double *x)
 {
-    double y[CLOSURES], f[CLOSURES], a[CLOSURES][CLOSURES], det = 0.0, before = 0.0;
-    int order[CLOSURES], anew = 1, last = 0;
+#if MIDDLE_TURN >= 0
+    return fabs(x[MIDDLE_TURN]) <= 0.25 * TURN || cos(x[MIDDLE_TURN]) > 0.0 ? 1.0 : -1.0;
+#else
+    (void)x;
+    return 1.0;
+#endif
+}
+
+/* The given pose's own side, by its sign. Its determinant with the given joints is at hand, which is its own for struts
+   of any length; of other legs it tells the side where it changes little on the way to the answer. */
+static double side_of(const double *near, double det, int steady)
+{
+#if LEG_MODES
+    if (!steady) {
+        double own[JOINTS], y[CLOSURES], f[CLOSURES], a[CLOSURES][CLOSURES];
+        int order[CLOSURES];
+        inverse(near, own);
+        if (finite_all(own, JOINTS)) {
+            begin(near, own, y);
+            closures_and_slopes(y, own, f, a[0]);
+            det = factor(a, order);
+        }
+    }
+#else
+    (void)steady;
+#endif
+    return fabs(det) > NO_SIDE ? det * angle_sign(near) : HOME_SIDE;
+}
+
+/* Newton's method on the legs' closures in bounded steps. The matrix serves on while it gains enough. */
+static int pose_near(const double *near, const double *q, double *x, double *side)
+{
+    double y[CLOSURES], f[CLOSURES], a[CLOSURES][CLOSURES], det = 0.0, before = 0.0, first = 0.0;
+    int order[CLOSURES], anew = 1, last = 0, closed = 0, tells = 0;
     begin(near, q, y);
     for (int step = 0;; step++) {
         if (anew) {
@@ -146,10 +228,13 @@ static int pose_near(const double *near, const double *q, double *x)
             if (!(fabs(f[i]) <= worst))
                 worst = fabs(f[i]);
         if (!isfinite(worst))
-            return 0;
+            break;
+        if (step == 0) {
+            first = det;
+            tells = worst <= TELLS;
+        }
         if (worst < FINE || (last && worst <= TOLERANCE) || step == MOST_STEPS) {
-            if (worst > TOLERANCE || !(det * HOME_SIDE > 0.0))
-                return 0;
+            closed = worst <= TOLERANCE;
             break;
         }
         const double ratio = anew ? worst / SIZE : worst / before; /* what the next step will leave of it */
@@ -163,8 +248,12 @@ static int pose_near(const double *near, const double *q, double *x)
         for (int i = 0; i < CLOSURES; i++)
             y[i] -= shrink * f[i];
     }
-    end(y, q, x);
-    return finite_all(x, AXES);
+    if (closed)
+        end(y, q, x);
+    closed = closed && finite_all(x, AXES);
+    if (tells)
+        *side = side_of(near, first, closed && fabs(det - first) <= STEADY * fabs(first) && distance_of(x, near) <= SETTLED);
+    return closed && det * angle_sign(x) * *side > 0.0;
 }
 #endif
 
@@ -235,10 +324,13 @@ int kinematicsForward(const double *joints, EmcPose *world,
     read_pose(world, near);
     if (!finite_all(q, JOINTS))
         return -1;
-    if (!finite_all(near, AXES) || !pose_near(near, q, x)) { /* or from home, whose turns LinuxCNC's guess has not */
+    double side = HOME_SIDE;
+    if (!finite_all(near, AXES) || !pose_near(near, q, x, &side)) { /* or from home, whose turns the guess has not */
+        if (!(side * HOME_SIDE > 0.0))
+            return -1;
         for (int i = 0; i < AXES; i++)
             near[i] = home[i];
-        if (!pose_near(near, q, x))
+        if (!pose_near(near, q, x, &side))
             return -1;
     }
     if (!in_mode(x, q))

@@ -32,7 +32,7 @@ def find_common_point(
     return add(foot.first, add(foot.offset, scale(foot.normal, height)))
 
 
-def square_height(centres: Sequence[Vec], radii: Sequence[Scalar], plane: Sequence[int]) -> Scalar:
+def compute_square_height(centres: Sequence[Vec], radii: Sequence[Scalar], plane: Sequence[int]) -> Scalar:
     """Compute the square of the common point's distance from the centres' plane (line), mm²."""
     return _find_foot(centres, radii, plane).square
 
@@ -59,14 +59,14 @@ def _find_foot(centres: Sequence[Vec], radii: Sequence[Scalar], plane: Sequence[
         across: Vec = tuple(1.0 if c == out else 0.0 for c in range(3))
         u: Vec = tuple(0.0 if c == out else x for c, x in enumerate(sub(centres[1], first)))
         normal = cross(across, u)
-        size = _avoid_zero(dot(normal, normal))
+        size = _replace_zero(dot(normal, normal))
         first = tuple(0.0 if c == out else x for c, x in enumerate(first))
         squares = [r * r - c[out] * c[out] for r, c in zip(radii, centres, strict=True)]
         foot = scale(u, 0.5 * (squares[0] - squares[1] + size) / size)
     else:
         u, v = sub(centres[1], first), sub(centres[2], first)
         normal = cross(u, v)
-        size = _avoid_zero(dot(normal, normal))
+        size = _replace_zero(dot(normal, normal))
         squares = [r * r for r in radii]
         a = 0.5 * (squares[0] - squares[1] + dot(u, u))
         b = 0.5 * (squares[0] - squares[2] + dot(v, v))
@@ -74,7 +74,7 @@ def _find_foot(centres: Sequence[Vec], radii: Sequence[Scalar], plane: Sequence[
     return _Foot(first, foot, normal, size, squares[0] - dot(foot, foot))
 
 
-def _avoid_zero(size: Scalar) -> Scalar:
+def _replace_zero(size: Scalar) -> Scalar:
     """Turn a zero into NaN: centres in one place, or on one line, determine no point."""
     return math.nan if isinstance(size, int | float) and size == 0.0 else size
 

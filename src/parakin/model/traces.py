@@ -33,7 +33,7 @@ from .legs import Inverse
 from .limits import HomeRods, Limit, compute_platform_points, group_joints_by_leg, list_limits
 from .rates import compute_twist_rates
 from .spec import Spec
-from .spheres import CENTRES_NEEDED, find_common_point, measure_side, square_height
+from .spheres import CENTRES_NEEDED, find_common_point, measure_side, compute_square_height
 from .structures import PlatformPlacement, Structure, make_structure
 
 ARM = 0.2  # of the greatest leg: the length by which angles of turning drives are compared with lengths
@@ -391,7 +391,7 @@ class Model:
             placed = self.structure.place_with_joints(trace.inputs(self._poses, len(joints)), self._serial(joints))
             coordinates = self.spheres(joints, None, placed.origin)
             closures = self.scaled_closures(coordinates, joints)
-            return [*self._compute_pose(coordinates, joints), *closures, square_height(*self._spheres(joints))]
+            return [*self._compute_pose(coordinates, joints), *closures, compute_square_height(*self._spheres(joints))]
 
         return self._tape(("spheres with height",), len(self.drives) + self._poses, outputs)
 

@@ -33,7 +33,7 @@ from .legs import Inverse
 from .limits import HomeRods, Limit, compute_platform_points, group_joints_by_leg, list_limits
 from .rates import compute_twist_rates
 from .spec import Spec
-from .spheres import CENTRES_NEEDED, find_common_point, measure_side, compute_square_height
+from .spheres import CENTRES_NEEDED, compute_square_height, find_common_point, measure_side
 from .structures import PlatformPlacement, Structure, make_structure
 
 ARM = 0.2  # of the greatest leg: the length by which angles of turning drives are compared with lengths

@@ -314,7 +314,8 @@ def test_no_two_functions_have_one_body():
 
 
 THRESHOLDS = {"EXACT", "PRINTED", "PROVED", "ASIDE", "LEEWAY", "SAME_MODE", "NEAR_MODE", "SWING", "FLIP", "DISTINCT"}
-THRESHOLDS |= {"VICINITY", "TRAVEL", "REPORTED", "TILTED", "OWN", "OTHER", "EITHER"}
+THRESHOLDS |= {"VICINITY", "TRAVEL", "REPORTED", "TILTED", "NEAR_START", "NEAR_TURN", "NEAR_HOLD", "FAR_TILT"}
+THRESHOLDS |= {"OWN", "OTHER", "EITHER"}
 
 
 @pytest.mark.parametrize("module", [m for m in MODULES if m != "kinematics.wrist"])

@@ -6,6 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import parakin as pk
+from parakin.kinematics import turns
 from parakin.kinematics import wrist as w
 
 WRISTS = ["tricept", "orthoglide5_head", "orthoglide5_table"]
@@ -45,7 +46,7 @@ def test_both_modes_point_the_tool_the_same_way(machine):
     back = machine.forward(other, near=poses)
     assert back.converged.all()
     turned = back.poses.copy()
-    turned[:, 4] = w.find_nearest_turn(turned[:, 4], poses[:, 4])
+    turned[:, 4] = turns.find_nearest_turn(turned[:, 4], poses[:, 4])
     np.testing.assert_allclose(turned, poses, atol=1e-6)
     assert machine.wrist.other_mode(machine.wrist.other_mode(mode)) == mode
 
@@ -97,7 +98,7 @@ def test_the_nearest_joints_are_those_of_the_mode_that_a_guess_is_in(machine):
     known = np.full(len(poses), w.OWN, np.int8)
     kept, modes = wrist.solve_nearest(poses, machine.mode, solutions[1], w.PRINTED, known)
     assert (modes == w.OWN).all()
-    np.testing.assert_allclose(w.wrap_angle((kept - solutions[0])[:, wrist.pair]), 0.0, atol=1e-9)
+    np.testing.assert_allclose(turns.wrap_angle((kept - solutions[0])[:, wrist.pair]), 0.0, atol=1e-9)
 
 
 def test_on_the_pole_the_nearest_joints_have_the_guess_s_first(machine):
@@ -112,23 +113,23 @@ def test_on_the_pole_the_nearest_joints_have_the_guess_s_first(machine):
 
 @given(angles, angles)
 def test_the_nearest_turn(angle, near):
-    nearest = w.find_nearest_turn(np.array([angle]), np.array([near]))[0]
+    nearest = turns.find_nearest_turn(np.array([angle]), np.array([near]))[0]
     assert abs(nearest - near) <= np.pi + 1e-9
     assert (nearest - angle) / (2.0 * np.pi) == pytest.approx(round((nearest - angle) / (2.0 * np.pi)), abs=1e-9)
 
 
 def test_unwound_angles_keep_what_does_not_exist():
     walk = np.linspace(0.0, 20.0, 50)
-    wound = w.wrap_angle(walk)
+    wound = turns.wrap_angle(walk)
     wound[7] = np.nan
-    unwound = w.unwind_angles(wound)
+    unwound = turns.unwind_angles(wound)
     assert np.isnan(unwound[7])
     np.testing.assert_allclose(np.delete(unwound, 7), np.delete(walk, 7), atol=1e-12)
 
 
 def test_free_angles_are_their_neighbours():
     free = np.array([True, False, True, True, False, True])
-    np.testing.assert_array_equal(w.fill_free(np.array([9.0, 1.0, 9.0, 9.0, 2.0, 9.0]), free), [1, 1, 1, 1, 2, 2])
+    np.testing.assert_array_equal(turns.fill_free(np.array([9.0, 1.0, 9.0, 9.0, 2.0, 9.0]), free), [1, 1, 1, 1, 2, 2])
 
 
 def rotation(turns):

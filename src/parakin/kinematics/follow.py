@@ -7,7 +7,8 @@ import numpy as np
 from ..arrays import Array
 from ..model.traces import Model
 from .inverse import solve_inverse
-from .wrist import EXACT, fill_free, find_wrist, unwind_angles
+from .turns import fill_free, unwind_angles
+from .wrist import EXACT, find_wrist
 
 
 def follow_path(model: Model, poses: Array, mode: str, free_below: float = EXACT) -> Array:

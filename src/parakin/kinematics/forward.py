@@ -22,7 +22,8 @@ from ..kernels.batch import (
 from ..model.traces import Model
 from .inverse import SINGULAR, solve_inverse
 from .tapes import collect_newton_tapes
-from .wrist import SAME_MODE, TURN, bring_within_poles, flip_mode, is_upright, wrap_angle
+from .turns import TURN, wrap_angle
+from .wrist import SAME_MODE, bring_within_poles, flip_mode, is_upright
 
 CLOSED = 1e-9  # greatest closure error of an answer, mm in a machine of a metre
 MOST_STEPS = 24

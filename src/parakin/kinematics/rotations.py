@@ -9,16 +9,8 @@ from typing import Any
 import numpy as np
 
 from ..arrays import Array, split_rows
-from .wrist import (
-    EXACT,
-    fill_free,
-    find_crossings,
-    find_nearest_turn,
-    flip_rotation,
-    has_swing,
-    unwind_angles,
-    wrap_angle,
-)
+from .turns import fill_free, find_nearest_turn, unwind_angles, wrap_angle
+from .wrist import EXACT, find_crossings, flip_rotation, has_swing
 
 LEVEL = 1e-12  # rounding error of a rotation's entries
 _BLOCK = 1 << 13  # rotations whose many intermediate arrays stay in the cache

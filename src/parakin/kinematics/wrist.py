@@ -31,12 +31,15 @@ VICINITY   0.12         off the pole: a motion that stays farther away does not 
 TRAVEL     0.05         tool axis: its travel before and behind a pass over which a swing is measured
 REPORTED   45°          first angle: a swing that is reported
 TILTED     0.2          second angle at which a tool that starts on the pole is tilted to choose its mode
+NEAR_START 0.1          off the pole: a program comes to a first record that is nearer from aside
+NEAR_TURN  0.02         off the pole: a tool that is nearer is tilted so far while whole turns are taken back
+NEAR_HOLD  1e-5         off the pole: no tool axis is held nearer, or printed digits would turn the first angle
+FAR_TILT   15°          second angle at which a small square about home goes neither round the pole nor through it
 ========== ============ ==============================================================================================
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -50,6 +53,7 @@ from ..model.parts import Drive
 from ..model.structures import DirectionColumns
 from ..model.traces import Model
 from .inverse import solve_inverse
+from .turns import count_nearest_turns, find_nearest_turn, wrap_angle
 
 EXACT = 1e-9
 PRINTED = 2e-6
@@ -65,6 +69,10 @@ VICINITY = 0.12
 TRAVEL = 0.05
 REPORTED = np.radians(45.0)
 TILTED = 0.2
+NEAR_START = 0.5 * TILTED
+NEAR_TURN = 0.02
+NEAR_HOLD = 5.0 * PRINTED
+FAR_TILT = np.pi / 12.0
 
 # Working modes of the wrist along a path: the path's own, its other one, either one (on the pole, or not known).
 OWN, OTHER, EITHER = 0, 1, 2
@@ -76,65 +84,11 @@ EVERY_DIRECTION: dict[str, Span] = {"B": (0.0, np.pi), "C": (-np.pi, np.pi)}
 
 GAIN = 0.25  # of the squared way in the same mode: what the way in the other mode may be, for the path to change
 MODE_LEVER = 100.0  # mm/rad: where the joints of two modes are compared, how far a turn by one rad is
-TURN = 2.0 * np.pi
 
 
 def convert_to_freedom(angle: float) -> float:
     """Convert an angle off the pole to its sin², the measure of :meth:`Wrist.measure_freedom`."""
     return float(np.sin(angle) ** 2)
-
-
-def wrap_angle(angle: Array) -> Array:
-    """Bring angles within half a turn of zero."""
-    wrapped: Array = angle - 2.0 * np.pi * np.round(angle / (2.0 * np.pi))
-    return wrapped
-
-
-def find_nearest_turn(angle: Array, near: Array) -> Array:
-    """Bring angles within half a turn of others by adding the way from these, which is exact where it is short."""
-    nearest: Array = near + wrap_angle(angle - near)
-    return nearest
-
-
-def count_nearest_turns(joints: Array, near: Array, columns: Sequence[int]) -> None:
-    """Count the turns of joints (n, joints) in ``columns`` so that they are within half a turn of others; in place.
-
-    A joint that needs no turn is left bit for bit, and so is one whose neighbour is NaN.
-    """
-    for column in columns:
-        angle = joints[:, column]
-        counted = angle - TURN * np.round((angle - near[:, column]) / TURN)
-        joints[:, column] = np.where(np.isfinite(counted), counted, angle)
-
-
-def unwind_angles(angles: Array) -> Array:
-    """Count the turns of angles along a path (n,), without jumps over ±180°; NaN stays and does not spread."""
-    with np.errstate(invalid="ignore"):
-        if not (np.abs(np.diff(angles)) > np.pi).any() and not np.isnan(angles).any():
-            return angles
-    unwound = angles.copy()
-    finite = np.isfinite(angles)
-    unwound[finite] = np.unwrap(angles[finite])
-    return unwound
-
-
-def fill_free(angles: Array, free: Flags) -> Array:
-    """Replace free angles of a path (n,) by the last that is not free, at the start by the first to come."""
-    index = np.where(free | ~np.isfinite(angles), -1, np.arange(len(angles)))
-    last = np.maximum.accumulate(index)
-    fixed = np.flatnonzero(index >= 0)
-    return angles[np.where(last < 0, fixed[0], last)] if len(fixed) else angles
-
-
-def turn_ahead(angles: Array, free: Flags) -> Array:
-    """Replace free angles of a path (n,) as :func:`fill_free` does, but turn on the last of several free rows.
-
-    So an angle that nothing depends on has turned before it counts again, and not while it begins to.
-    """
-    filled = fill_free(angles, free)
-    last = np.flatnonzero(free[1:-1] & free[:-2] & ~free[2:]) + 1
-    filled[last] = filled[last + 1]
-    return filled
 
 
 def has_swing(pairs: Array) -> bool:
@@ -193,6 +147,11 @@ def cross_direction_pole(turns: Array, at: Indices) -> None:
         there = flip_direction(here[:, 0], here[:, 1])
         across = find_crossings(here, there)
         turns[at[across]] = there[across][:, ::-1]
+
+
+def flip_azimuth(azimuth: float, sense: float = 1.0) -> float:
+    """Return the azimuth about a pole at which the first angle is the same in the other mode, half a turn on."""
+    return azimuth + sense * np.pi
 
 
 def fold_direction(turns: Array) -> tuple[Array, Array]:
@@ -386,6 +345,17 @@ class Wrist:
         """Tell which joints (n, joints), turns apart, are those of poses (n, axes) in a mode, by both joints."""
         off = wrap_angle((solve_inverse(self.model, poses, mode) - joints)[:, sorted(self.pair)])
         return np.asarray((np.abs(off) < SAME_MODE).all(1))
+
+    def find_mode(self, pose: Array, joints: Array, mode: str) -> str:
+        """Find the mode of joints (joints,) at a pose (axes,): the given one, else the other one."""
+        return mode if self.has_mode(pose[None], joints[None], mode)[0] else self.other_mode(mode)
+
+    def has_both_modes(self, poses: Array, mode: str) -> bool:
+        """Tell whether the second joint stays in its range in both modes at all poses (n, axes) that are reached."""
+        both = [solve_inverse(self.model, poses, each)[:, self.second] for each in (mode, self.other_mode(mode))]
+        second = np.concatenate(both)
+        with np.errstate(invalid="ignore"):
+            return not ((second < self.drive.low) | (second > self.drive.high)).any()
 
     def tilt(self, joints: Array, mode: str, angle: float) -> Array:
         """Return joints (joints,) on the pole with the second one turned by ``angle`` the way a mode stands for."""

@@ -6,16 +6,16 @@ import numpy as np
 
 from ...arrays import Array
 from ...errors import PoseError
-from ...kinematics.wrist import EXACT, PRINTED, TILTED, TURN, Wrist, find_nearest_turn, is_upright
+from ...kinematics.turns import TURN, find_nearest_turn
+from ...kinematics.wrist import EXACT, NEAR_START, PRINTED, SAME_MODE, TILTED, Wrist, is_upright
 from ...machine import Machine
 from ...toolpath.posting.wrist_poses import find_pose_with_wrist
 from ...toolpath.timing.drive_limits import DriveLimits
 
-_SPEED_SHARE = 0.25  # fraction of the joints' speeds
+_SPEED_FRACTION = 0.25  # fraction of the joints' speeds
 _FROM_ANYWHERE = 4.0  # s, at least: for the motion whose start is not known
 _LEAST = 0.5  # s, of a motion
 _SAMPLES = 500  # samples of a motion
-_SAME = 1e-6  # rad
 _TURNS = (0, 1, -1, 2, -2)
 _SHARES = (1.0, 0.1, 0.01)  # of the way back home and of TILTED, for the poses that lead to a record beside the pole
 
@@ -97,15 +97,15 @@ def _turns_by(machine: Machine, begin: Array, end: Array, mode: str, angle: floa
     assert machine.wrist is not None
     line = _sample_line(begin, end)
     rows = machine.follow(line, mode, EXACT)[:, machine.wrist.first]
-    return abs(float(rows[-1] - rows[0]) - angle) < _SAME and not machine.check(line, mode=mode).any()
+    return abs(float(rows[-1] - rows[0]) - angle) < SAME_MODE and not machine.check(line, mode=mode).any()
 
 
 def _approach_from_aside(machine: Machine, wrist: Wrist, first: Array, joints: Array, mode: str) -> list[Array]:
     """Approach a record beside the pole straight from home, with the first joint as it is there; return the poses."""
     off_pole = float(np.sqrt(wrist.measure_freedom(first[None])[0]))
-    if off_pole > 0.5 * TILTED:
+    if off_pole > NEAR_START:
         return [first]
-    own = mode if off_pole < PRINTED or wrist.has_mode(first[None], joints[None], mode)[0] else wrist.other_mode(mode)
+    own = mode if off_pole < PRINTED else wrist.find_mode(first, joints, mode)
     c, way = wrist.direction.c, list[Array]()
     for share in _SHARES:
         near = first + share * (machine.home - first)
@@ -155,4 +155,4 @@ def _choose_seconds(machine: Machine, start: Array, end: Array, mode: str) -> fl
     """Choose the s in which the joints run at a share of their speeds."""
     joints = machine.follow(_sample_line(start, end), mode, EXACT)
     rates = np.abs(np.diff(joints, axis=0)) * (_SAMPLES - 1) / DriveLimits.of(machine).speed
-    return max(_LEAST, float(np.nanmax(rates, initial=0.0)) / _SPEED_SHARE)
+    return max(_LEAST, float(np.nanmax(rates, initial=0.0)) / _SPEED_FRACTION)

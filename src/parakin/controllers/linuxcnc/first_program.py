@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from itertools import groupby, product
-from math import pi
 
 import numpy as np
 
 from ...arrays import Array
+from ...kinematics.wrist import FAR_TILT
 from ...machine import Machine
 from ...units import to_display
 from .config import format_number
@@ -15,7 +15,6 @@ from .config import format_number
 _SIDE = 40.0  # mm: the square's side, halved until the machine can go round it
 _LEAST = 0.1  # mm
 _CORNERS = ((0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0), (0.0, 0.0))
-_TILT = pi / 12.0  # rad, of a tool on a wrist, whose pole the square would else go round or through
 _POINTS = 50  # points that are checked on each side
 _FEED = 3000.0  # mm/min
 
@@ -41,7 +40,7 @@ def _find_square(machine: Machine) -> Array:
             corners = np.tile(machine.home, (len(_CORNERS), 1))
             corners[:, :2] += side * np.array(quadrant) * _CORNERS
             if machine.wrist is not None:
-                corners[:, machine.wrist.direction.b] += _TILT
+                corners[:, machine.wrist.direction.b] += FAR_TILT
             poses = np.concatenate([machine.home[None], corners, machine.home[None]])
             if _is_allowed(machine, poses):
                 return poses

@@ -12,7 +12,8 @@ from ...algebra import Trace
 from ...kernels.newton import SLOW, WORTH
 from ...kernels.tape import Tape, compile_tape
 from ...kinematics.forward import MOST_STEPS, SETTLED, STEADY
-from ...kinematics.wrist import EXACT, GAIN, NEAR_MODE, SWING, TURN
+from ...kinematics.turns import TURN
+from ...kinematics.wrist import EXACT, GAIN, NEAR_MODE, SWING
 from ...machine import Machine
 from ...model.limits import Limit
 from .tape_to_c import CVector, format_c, write_function, write_test

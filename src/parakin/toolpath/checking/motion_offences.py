@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from ...kinematics.wrist import TURN
+from ...kinematics.turns import TURN
 from ..posting.offence_texts import describe_broken_limit, format_measure
 from ..posting.offences import SINGULARITY, TURNS, UNDECIDED
 from ..posting.posted import Offence, Posted

@@ -8,7 +8,8 @@ from functools import cached_property
 import numpy as np
 
 from ...arrays import Array, Flags, Indices
-from ...kinematics.wrist import EITHER, OTHER, OWN, PRINTED, WristModes, count_nearest_turns
+from ...kinematics.turns import count_nearest_turns
+from ...kinematics.wrist import EITHER, OTHER, OWN, PRINTED, WristModes
 from ...machine import Machine
 from ...performance.characteristic_length import choose_characteristic_length
 from ...performance.jacobians import list_column_scales

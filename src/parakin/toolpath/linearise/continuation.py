@@ -8,7 +8,8 @@ import numpy as np
 
 from ...arrays import Array, Flags, Indices
 from ...kinematics.rotations import compute_rotations, find_nearest_rotation_turns
-from ...kinematics.wrist import continue_direction, find_nearest_turn
+from ...kinematics.turns import find_nearest_turn
+from ...kinematics.wrist import continue_direction
 from ...machine import Machine
 from ..posting.frames import build_frame_from_angles, compute_poses
 from ..posting.turn_steps import find_turning_columns

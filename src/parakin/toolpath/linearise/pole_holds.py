@@ -16,7 +16,8 @@ from functools import cached_property
 import numpy as np
 
 from ...arrays import Array, Flags, Indices
-from ...kinematics.wrist import EXACT, PRINTED, REPORTED, wrap_angle
+from ...kinematics.turns import wrap_angle
+from ...kinematics.wrist import EXACT, NEAR_HOLD, PRINTED, REPORTED, SWING, flip_azimuth
 from ..path import Note
 from ..posting.frames import compute_poses
 from ..posting.posted import Posted
@@ -29,7 +30,6 @@ from .poles import Pole
 # Shares of the angle tolerance. Their sum is what an axis may be moved; the rest is for rounding.
 NEAR = 0.72  # an axis no farther off the pole is held
 _OFF_POLE = 0.2  # off the pole, where it is held
-_LEAST_ASIDE = 5.0 * PRINTED  # rad: nearer to the pole the printed digits would turn the free angle
 _ARC = np.radians(15.0)  # a turn beside the pole is divided into arcs no longer
 _STRAIGHT = np.radians(1.0)  # what turns less needs no record of its own
 _STILL = 0.95  # of the circle: the middle of an arc comes no nearer
@@ -78,7 +78,7 @@ def find_pole_holds(
 ) -> list[PoleHold]:
     """Find where a path comes within the angle tolerance of a pole without a route through it, and hold it there."""
     aside = 0.0 if pole.joint is None else _OFF_POLE * angle
-    if pole.joint is not None and aside < _LEAST_ASIDE:
+    if pole.joint is not None and aside < NEAR_HOLD:
         return []
     radius = NEAR * angle
     routed = np.zeros(len(steps.record), np.bool_)
@@ -212,16 +212,20 @@ class _HoldBuilder:
         turns between any two records.
         """
         aside, turn = self.aside, float(wrap_angle(np.array(go - come)))
-        over = abs(turn) > 0.5 * np.pi and (not aside or self._can_change_mode)
+        over = abs(turn) > SWING and (not aside or self._can_change_mode)
         if over:
-            come, turn = come + np.pi, float(wrap_angle(np.array(turn - np.pi)))
+            come, turn = flip_azimuth(come), float(wrap_angle(np.array(flip_azimuth(turn, -1.0))))
         count = int(np.ceil(abs(turn) / _ARC)) if abs(turn) > _STRAIGHT else 0
         if not aside:
             points = [np.zeros(2)] * (2 if count else 0)
         else:
             points = [aside * _point_towards(come + turn * k / count) for k in range(count + 1)] if count else []
             if over:
-                points = [aside * _point_towards(come - np.pi), np.zeros(2), *(points or [aside * _point_towards(go)])]
+                points = [
+                    aside * _point_towards(flip_azimuth(come, -1.0)),
+                    np.zeros(2),
+                    *(points or [aside * _point_towards(go)]),
+                ]
         motion, share = place
         projected = np.array(points).reshape(-1, 2)
         return _Points(np.full(len(points), motion, np.int64), np.full(len(points), share), projected), turn
@@ -232,10 +236,7 @@ class _HoldBuilder:
         posted, wrist = self.posted, self.posted.machine.wrist
         if wrist is None or not len(posted.poses):
             return True
-        modes = posted.mode, wrist.other_mode(posted.mode)
-        second = np.concatenate([posted.machine.inverse(posted.poses, mode)[:, wrist.second] for mode in modes])
-        with np.errstate(invalid="ignore"):
-            return not ((second < wrist.drive.low) | (second > wrist.drive.high)).any()
+        return wrist.has_both_modes(posted.poses, posted.mode)
 
 
 def _point_towards(azimuth: float) -> Array:

@@ -7,7 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from ...arrays import Array
-from ...kinematics.wrist import PRINTED, REPORTED, TRAVEL, VICINITY, wrap_angle
+from ...kinematics.turns import wrap_angle
+from ...kinematics.wrist import PRINTED, REPORTED, TRAVEL, VICINITY
 from ..path import Note, ToolPath
 from ..posting.posted import Posted
 from .path_cuts import PathPositions

@@ -9,7 +9,8 @@ from typing import NamedTuple
 import numpy as np
 
 from ...arrays import Array, Flags, Indices
-from ...kinematics.wrist import PRINTED, TURN
+from ...kinematics.turns import TURN
+from ...kinematics.wrist import PRINTED
 from ...machine import Machine
 from ..path import ToolPath
 from ..posting.frames import PathLimit, build_frame_from_angles, compose_frames, compute_poses

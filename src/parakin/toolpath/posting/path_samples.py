@@ -12,7 +12,8 @@ from typing import NamedTuple
 import numpy as np
 
 from ...arrays import Array, Flags, Indices
-from ...kinematics.wrist import PRINTED, fold_direction, wrap_angle
+from ...kinematics.turns import wrap_angle
+from ...kinematics.wrist import PRINTED, fold_direction
 from ...machine import Machine
 from ..path import ToolPath
 from ..programmed_path import ProgrammedPath

@@ -16,7 +16,8 @@ import numpy as np
 from ...arguments import check_arguments
 from ...arrays import Array, Flags, Indices
 from ...errors import PoseError
-from ...kinematics.wrist import TURN, find_nearest_direction
+from ...kinematics.turns import TURN
+from ...kinematics.wrist import NEAR_TURN, find_nearest_direction
 from ...machine import Machine
 from ..path import Note, ToolPath
 from ..programmed_path import compute_tool_axes
@@ -26,7 +27,6 @@ from .tool_lengths import fit_tool_lengths
 from .wrist_poses import find_pose_with_wrist
 
 _STEP = math.radians(15.0)  # of the joint, from record to record
-_LEAST_TILT = 0.02  # rad off the pole: nearer to it the tool is tilted so far while it turns
 _TRIED = 64  # places for one rewind
 _MOST_TURNS = 64  # either way
 _INSIDE = 1e-6  # rad that the joint keeps off the ends of its range
@@ -230,10 +230,9 @@ class _RewindBuilder:
         joints, pose = posted.joints[place].copy(), posted.poses[place].copy()
         if not np.isfinite(joints).all():
             return None
-        modes = posted.mode, wrist.other_mode(posted.mode)
-        mode = modes[0] if wrist.has_mode(pose[None], joints[None], modes[0])[0] else modes[1]
-        is_upright = wrist.find_free(pose[None], _LEAST_TILT)[0]
-        wanted = wrist.tilt(joints, mode, _LEAST_TILT) if is_upright else joints
+        mode = wrist.find_mode(pose, joints, posted.mode)
+        is_upright = wrist.find_free(pose[None], NEAR_TURN)[0]
+        wanted = wrist.tilt(joints, mode, NEAR_TURN) if is_upright else joints
         pose[:3] = frame[:, :3] @ tip + frame[:, 3]
         steps = math.ceil(abs(after - before) * TURN / _STEP)
         poses, rows = [], []

@@ -11,7 +11,8 @@ import numpy as np
 
 from ...arrays import Array, split_rows
 from ...kinematics.rotations import LEVEL
-from ...kinematics.wrist import EXACT, PRINTED, cross_direction_pole, turn_ahead, unwind_angles
+from ...kinematics.turns import turn_ahead, unwind_angles
+from ...kinematics.wrist import EXACT, PRINTED, cross_direction_pole
 from ...machine import Machine
 
 BLOCK = 1 << 13  # records whose many intermediate arrays stay in the cache

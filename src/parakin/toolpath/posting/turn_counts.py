@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...arrays import Array, Flags
-from ...kinematics.wrist import TURN
+from ...kinematics.turns import TURN
 from ...machine import Machine
 from ...model.parts import Drive
 from .margin_blocks import split_margins

@@ -9,7 +9,7 @@ import numpy as np
 
 from ...arrays import Array, Indices
 from ...errors import PoseError
-from ...kinematics.wrist import TURN
+from ...kinematics.turns import TURN
 from ...machine import Machine
 
 TURN_STEP = math.pi / 36.0  # rad: turns that change evenly are followed in steps no longer than this

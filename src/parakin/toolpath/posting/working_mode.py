@@ -7,7 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...arrays import Array, Flags
-from ...kinematics.wrist import PRINTED, SWING, TURN
+from ...kinematics.turns import TURN
+from ...kinematics.wrist import PRINTED, SWING
 from ...machine import Machine
 from ..path import ToolPath
 from .path_samples import SampledPath

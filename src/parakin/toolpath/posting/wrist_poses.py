@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from ...arrays import Array
-from ...kinematics.wrist import EXACT, find_nearest_turn
+from ...kinematics.turns import find_nearest_turn
+from ...kinematics.wrist import EXACT
 from ...machine import Machine
 
 _ROUNDS = 60

@@ -9,7 +9,8 @@ from __future__ import annotations
 import numpy as np
 
 from ...arrays import Array
-from ...kinematics.wrist import EXACT, count_nearest_turns
+from ...kinematics.turns import count_nearest_turns
+from ...kinematics.wrist import EXACT
 from ...machine import Machine
 
 

@@ -576,3 +576,14 @@ def test_mutated_files(read, name):
             assert np.abs((path.axis**2).sum(axis=1) - 1.0).max() < 1e-12
         assert time.perf_counter() - begin < 5.0, text
     assert count > 50
+
+
+def test_a_straight_cut_proves_an_arc_against_a_dialect_that_only_words_tell(read):
+    text = NX_HEADER + "FEDRAT/MMPM,9\nGOTO/-9,20,10\nGOTO/0,20,10\nCIRCLE/0,40,10,0,0,1,20,.1\nGOTO/20,40,10\n"
+    path = read(text)
+    assert turn_about(path.tip[1:], (0.0, 40.0)) == pytest.approx(90.0)
+    assert [note.line for note in path.notes if "straight cut" in note.text] == [7]
+    refused(read, "$$ Siemens NX\n" + text, 8, "way round")  # a header says more
+    refused(read, text.replace("GOTO/20,40,10", "GOTO/-20,40,10"), 7, "way round")  # the proved way is the long one
+    assert len(read(text + "GOTO/20,60,10\n")) == len(path) + 1
+    refused(read, text + "GOTO/20,20,10\n", 7, "way round")  # the line after it proves the dialect's

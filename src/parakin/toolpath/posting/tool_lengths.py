@@ -138,9 +138,8 @@ def _note_lengths(path: ToolPath, uses: Sequence[ToolUse], own: float) -> list[N
         cutter, told = _find_cutter_length(use), _find_length(use, "set_length")
         line = use.length_line or use.line
         if told != told and cutter == cutter and abs(cutter - use.length) > _SAME:
-            text = (
-                f"{describe_tool(use)}: a cutter of {cutter:g} mm, taken to be {use.length:g} mm long with its holder"
-            )
+            holder = " with its holder" if use.length > cutter else ""
+            text = f"{describe_tool(use)}: a cutter of {cutter:g} mm, taken to be {use.length:g} mm long{holder}"
             notes.append(Note(line, text))
         elif told != told and cutter != cutter and len(uses) > 1:
             notes.append(Note(line, f"{describe_tool(use)}: no length told, taken to be {use.length:g} mm long"))

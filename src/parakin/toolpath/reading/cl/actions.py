@@ -36,6 +36,7 @@ class ClActions:
         self.motion = motion
         self.dialect: DialectName = "apt"
         self.told_by_word = False
+        self.told_by_header = False
         self.told_line = 0
         self.compensated = False
         self.informing: dict[str, int] = {}
@@ -58,7 +59,9 @@ class ClActions:
     def read_comment(self, text: str, line: int) -> None:
         """Take the dialect that a comment tells before the first motion."""
         if not self.motion.records.n:
-            self.tell_dialect(find_by_comment(text), line, by_word=False)
+            name = find_by_comment(text)
+            self.told_by_header = self.told_by_header or name is not None
+            self.tell_dialect(name, line, by_word=False)
 
     def read_word(self, word: str, args: list[str], line: int) -> None:
         """Take the dialect that a word tells."""
@@ -164,7 +167,8 @@ class ClActions:
         self._refuse_in_cycle_or_circle()
         axis = np.array(normalise_direction(v[3:6]))
         points = self.dialect == "creo"
-        self.motion.circle = Circle(line, np.array(v[:3]), axis, v[6], hand, sweep, revolutions, points)
+        firm = self.told_by_header or sweep is not None or revolutions is not None
+        self.motion.circle = Circle(line, np.array(v[:3]), axis, v[6], hand, sweep, revolutions, points, firm)
 
     def set_cycle(self, args: list[str], line: int) -> None:
         """Start, repeat or end a drill cycle at the points from here on (CYCLE)."""

@@ -30,6 +30,7 @@ class Circle(NamedTuple):
     sweep : the angle of the arc in rad as stated, or None
     revolutions : the number of turns of TIMES, or None
     points : whether GOTO may go on along the arc, as PTC Creo writes several points on one
+    firm : whether a header tells the hand; words that only one system writes tell it less surely
     """
 
     line: int
@@ -40,6 +41,7 @@ class Circle(NamedTuple):
     sweep: float | None = None
     revolutions: float | None = None
     points: bool = False
+    firm: bool = True
 
 
 class OpenArc(NamedTuple):

@@ -29,6 +29,7 @@ from .records import ClRecords
 
 _HELIX = 0.01  # mm along a circle's axis between an arc's ends; above this the arc is a helix
 _MOST_ARC_POINTS = 5_000_000  # greatest number of points of all arcs of a file: some hundred MB of memory
+_PROVED_NOTE = "an arc that goes the other way round than this dialect has it, as the straight cut into it proves"
 _FAR = 1e3  # the length of a direction that stands for a motion
 
 
@@ -270,11 +271,24 @@ class ClMotion:
             refuse("an arc without a position to start from; expected FROM or GOTO before it")
         start = self.position
         known, turns = settle_sweep(circle, start, tip)
+        if self._is_proved_otherwise(circle, known, start, tip):
+            known = UNKNOWN
+            self.notes.add(circle.line, _PROVED_NOTE)
         self.close_arc(find_tangent(circle, start, known) * _FAR if known != UNKNOWN else None)
         entry = prove_hand(circle, start, self._find_heading(), self.transform.scale)
         hand, circle = known or entry or RIGHT, circle._replace(hand=known)
         self.open_arc = OpenArc(circle, hand, entry, self.records.n, start, tip, (before, self.axis), self.rapid, line)
         self._add_circle(self.open_arc, hand, turns)
+
+    def _is_proved_otherwise(self, circle: Circle, known: int, start: Triple, tip: Triple) -> bool:
+        """Tell whether a straight cut into an arc proves the other way round, the short one, and no header says more.
+
+        Else the tool would turn back on the spot, and go the long way.
+        """
+        if circle.firm or known == UNKNOWN or self.arc_end[0] == self.records.n:
+            return False
+        entry = prove_hand(circle, start, self._find_heading(), self.transform.scale)
+        return entry == -known and measure_turn(circle, start, tip, entry) < math.pi
 
     def _continue_arc(self, tip: Triple, before: Triple, line: int) -> None:
         """Add the records of the last arc from a point on it to the next one."""

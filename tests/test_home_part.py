@@ -13,6 +13,7 @@ import parakin as pk
 from parakin.cli import main
 from parakin.performance.certified.region_singularities import judge_singularities
 from parakin.performance.singularities import compute_singularity_margins
+from parakin.workspaces.certified.best_orientation import find_best_orientations
 from parakin.workspaces.certified.separation import find_joined_cells
 from parakin.workspaces.certified.subdivision import Cells
 from parakin.workspaces.certified.workspace import measure_elsewhere
@@ -189,3 +190,26 @@ def test_a_swept_region_of_home_has_its_assembly_mode(load_text):
     assert swept.volume.inner <= whole.volume.outer
     assert swept.volume.outer >= 0.9 * whole.volume.inner
     assert 0.0 < swept.volume.inner < 4.0 / 3.0 * pi * 1e9
+
+
+# Inclusive regions.
+
+
+@pytest.mark.parametrize("name", ["orthoglide5_table", "tricept"])
+def test_an_inclusive_region_with_wide_ranges_has_a_bracket_and_an_honest_estimate(name):
+    """A table that turns all round bounds the workpiece's positions; wide bounds are no estimate."""
+    region = pk.region(pk.load(name), some={"B": ("0 deg", "50 deg"), "C": (-pi, pi)})
+    found = pk.workspace(region, seconds=3.0)
+    volume, box = found.volume, found.box
+    positions = np.random.default_rng(1).uniform(*box, (1500, 3))
+    allowed = (find_best_orientations(region, positions)[1] >= 0.0).all(1)
+    size = float(np.prod(box[1] - box[0]))
+    error = 4.0 * size * np.sqrt(allowed.mean() / len(positions))
+    assert volume.inner <= size * allowed.mean() + error
+    assert volume.outer >= size * allowed.mean() - error
+    assert abs(volume.estimate - size * allowed.mean()) <= error + 0.2 * volume.estimate
+
+
+def test_a_vague_estimate_is_said_to_be_one(capsys):
+    assert main(["workspace", "tricept", "--some", "B=0:40,C=-180:180", "--time", "1"]) == 0
+    assert "a guess from samples" in capsys.readouterr().out

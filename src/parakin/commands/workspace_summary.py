@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     from ..workspaces.certified.workspace import Volume, Workspace
     from ..workspaces.sampled.sampling import SampledWorkspace
 
+_VAGUE = 0.2  # gap beyond which an estimate tells little
 _STOPPED = {
     "gap": "as asked for",
     "cell": "the cells are as small as asked for",
@@ -74,9 +75,14 @@ def _list_certified(workspace: Workspace) -> list[tuple[str, str]]:
     return [
         (_name_volume(d), f"{volume.estimate:,.0f} {workspace.unit}, {format_volume(volume.estimate, d)}"),
         ("proved", f"{volume.inner:,.0f} to {volume.outer:,.0f} {workspace.unit}, between {format_bracket(volume, d)}"),
-        ("gap", f"{volume.gap:.2%}, {_STOPPED[workspace.stopped]}"),
+        ("gap", f"{volume.gap:.2%}, {_STOPPED[workspace.stopped]}{_warn_of_gap(volume)}"),
         ("cells", f"{inside:,} inside, {len(cells.low) - inside:,} at the boundary"),
     ]
+
+
+def _warn_of_gap(volume: Volume) -> str:
+    """Say that an estimate between bounds far apart is no more than that."""
+    return "; the volume is a guess from samples, only its bounds are proved" if volume.gap > _VAGUE else ""
 
 
 def _list_sampled(workspace: SampledWorkspace) -> list[tuple[str, str]]:

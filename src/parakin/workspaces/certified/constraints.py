@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -10,6 +10,7 @@ import numpy as np
 
 from ... import algebra as alg
 from ...algebra import Scalar, Term, Trace, absolute, derivative, find_dependencies, maximum, minimum, norm, sub
+from ...arrays import Array
 from ...kernels.intervals import IntervalProgram
 from ...machine import Machine
 from ...model.parts import ROTATIONS
@@ -109,18 +110,36 @@ class TracedPose:
         return constraints + [Constraint(name, g, x, orientation, implied=True) for name, g in implied]
 
     def _bound_reach(self, without: Sequence[str]) -> list[tuple[str, Scalar]]:
-        """Bound how far the platform's origin may be from each leg, whatever the orientation.
+        """Bound how far platform and tool may be, whatever the orientation.
 
         With a central leg the rotation follows from the position, and near the axis of its first turn the rotation has
-        no bounds: there this still bounds the machine's reach.
+        no bounds; on a table that turns all round the workpiece's position tells little of the machine's. There this
+        still bounds the machine's reach.
         """
         spec = self.machine.spec
-        if spec.motion[0] not in ROTATIONS:
+        has_central_leg = spec.motion[0] in ROTATIONS
+        is_table_swept = bool(self.swept_axes) and any(step.drive is not None for step in spec.table)
+        if not has_central_leg and not is_table_swept:
             return []
         with np.errstate(all="ignore"):
             _, platform, _ = self.machine.trace_inverse(self.pose, self.mode)
         margins = []
-        for leg in spec.legs:
+        for name, middle, most in self._list_reach_spheres(without):
+            if has_central_leg:
+                margins.append((name, most - norm(sub(platform.origin, middle.tolist()))))
+            if is_table_swept:  # turns keep lengths, and each shift adds at most its own
+                steps = (*spec.mounting, *spec.head, *spec.table)
+                if any(step.drive is not None and step.axis not in ROTATIONS for step in steps):
+                    continue
+                shifts = sum(abs(step.value) for step in steps if step.axis not in ROTATIONS)
+                tip = [value for axis, value in zip(self.machine.axes, self.pose, strict=True) if axis in "XYZ"]
+                farthest = (most + np.linalg.norm(middle) + shifts) * (1.0 + _ROUNDING)
+                margins.append((name, farthest - norm(tip)))
+        return margins
+
+    def _list_reach_spheres(self, without: Sequence[str]) -> Iterator[tuple[str, Array, float]]:
+        """Yield spheres that hold the platform's origin: a joint of their leg, the middle (3,) and the radius, mm."""
+        for leg in self.machine.spec.legs:
             low = [-np.inf if f"{drive.name}.min" in without else drive.low for drive in leg.drives]
             high = [np.inf if f"{drive.name}.max" in without else drive.high for drive in leg.drives]
             trace = Trace()
@@ -134,8 +153,7 @@ class TracedPose:
             if np.isfinite(down[:3]).all() and np.isfinite(up).all():
                 middle, half = 0.5 * (down + up)[:3], 0.5 * (up - down)[:3]
                 most = (up[3] + np.linalg.norm(half) + np.linalg.norm(leg.platform)) * (1.0 + _ROUNDING)
-                margins.append((leg.drives[0].name, most - norm(sub(platform.origin, middle.tolist()))))
-        return margins
+                yield leg.drives[0].name, middle, float(most)
 
 
 def _bound_angle_sizes(margins: Sequence[tuple[str, Scalar]]) -> list[tuple[str, Scalar]]:

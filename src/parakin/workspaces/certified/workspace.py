@@ -13,15 +13,18 @@ from typing import Any
 import numpy as np
 
 from ...arguments import check_arguments
-from ...arrays import Array, Flags, Progress
+from ...arrays import Array, Flags, Progress, split_rows
 from ...errors import PoseError
 from ...machine import Machine
 from .assembly_mode import make_side_constraints
+from .best_orientation import find_best_orientations
 from .region import Region
 from .separation import find_joined_cells
 from .subdivision import Cells, make_empty_cells
 
 ROUNDING = 1e-9  # relative, of the sums of volumes
+_VAGUE = 0.2  # gap from which the estimate of an inclusive region is sampled
+_MOST_SAMPLED, _SAMPLED_AT_ONCE = 20_000, 500  # cells
 _CLOSE = 1.0 / 128.0  # size of the cells at the bounding box's faces, as a fraction of the box
 
 
@@ -172,10 +175,33 @@ def workspace(
         with suppress(KeyboardInterrupt):  # the volume is known; only its box could be closer
             subdivision.tighten(_CLOSE, began + (inf if seconds is None else seconds))
     cells = subdivision.collect_cells(stopped)
+    if not region.every_orientation and cells.gap > _VAGUE:
+        cells = _sample_estimates(region, cells)
     joined = _find_home_cells(region, cells)
     if joined is None or joined.all():
         return Workspace(region, cells, stopped, parameters)
     return Workspace(region, cells.take(joined), stopped, parameters, _sum_volumes(cells.take(~joined)))
+
+
+def _sample_estimates(region: Region, cells: Cells) -> Cells:
+    """Estimate cells at the boundary by whether a position at random in each is allowed at its best orientation.
+
+    Bounds of planes are far apart where orientations are still wide, and say little of what lies between them. Of very
+    many cells some are sampled, the others get these cells' mean.
+    """
+    edge = np.flatnonzero(~cells.inside)
+    rng = np.random.default_rng(0)
+    sampled = edge if len(edge) <= _MOST_SAMPLED else np.sort(rng.choice(edge, _MOST_SAMPLED, replace=False))
+    positions = cells.low[sampled] + rng.random((len(sampled), cells.low.shape[1])) * cells.size[sampled]
+    allowed = np.zeros(len(sampled))
+    for part in split_rows(len(sampled), _SAMPLED_AT_ONCE):
+        margins = find_best_orientations(region, positions[part])[1]
+        allowed[part] = (margins >= 0.0).all(1)
+    volumes = cells.volumes[sampled]
+    estimate = cells.estimate.copy()
+    estimate[edge] = float(allowed @ volumes / volumes.sum())
+    estimate[sampled] = allowed
+    return replace(cells, estimate=np.clip(estimate, cells.inner, cells.outer))
 
 
 def _find_home_cells(region: Region, cells: Cells) -> Flags | None:

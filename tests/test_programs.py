@@ -17,7 +17,7 @@ import parakin as pk
 from parakin.controllers.joints.program import assign_joint_letters
 from parakin.controllers.linuxcnc.approach import plan_approach
 from parakin.controllers.linuxcnc.axis_rates import choose_axis_rates
-from parakin.controllers.linuxcnc.program import split_slow_turns
+from parakin.controllers.linuxcnc.slow_tips import delay_slow_tips
 from parakin.controllers.linuxcnc.straight_motions import CYCLE, build_straight_motions
 from parakin.toolpath.path import Event, ToolPath
 from parakin.toolpath.posting.post import post_path
@@ -96,8 +96,9 @@ def test_what_is_written_for_linuxcnc_is_read_back(trajectories, name, tmp_path)
     assert np.abs(rows[found] - wanted).max() < HALF
     assert len(set(found)) == len(trajectory.curve.corner)
     assert found[-1] == len(rows) - 1
-    assert read.seconds[found[0] + 1 :].sum() == pytest.approx(pk.predict_linuxcnc_seconds(trajectory), abs=1e-6)
-    assert pk.predict_linuxcnc_seconds(trajectory) == pytest.approx(trajectory.seconds, rel=0.05)
+    motions = read.seconds[found[0] + 1 :].sum()  # LinuxCNC begins some of them late
+    assert motions - 1e-6 <= pk.predict_linuxcnc_seconds(trajectory) <= 1.02 * motions
+    assert pk.predict_linuxcnc_seconds(trajectory) == pytest.approx(trajectory.seconds, rel=0.07)
     for begin, end in pairwise(found):  # what was added lies on the straight way
         if end > begin + 1:
             way = rows[end] - rows[begin]
@@ -166,16 +167,19 @@ def test_motions_take_whole_cycles_and_blend_within_the_speeds(trajectories, nam
     assert np.abs(found.ends[-1] - trajectory.posted.poses[-1]).max() < 1e-9
 
 
-def test_a_tip_that_all_but_stands_is_turned_first_and_moved_then():
-    machine = pk.load("tricept")
-    before = np.array([[10.0, 0.0, -1600.0, 20.0, 0.0]])
-    ends = np.array([[10.000001, 0.0, -1600.0, 25.0, 0.0], [11.0, 0.0, -1600.0, 25.0, 0.0]])
-    rows, seconds = split_slow_turns(machine, before, ends, np.array([1.0, 0.5]))
-    assert rows.tolist() == [[10.0, 0.0, -1600.0, 25.0, 0.0], *ends.tolist()]
-    assert seconds[[0, 2]].tolist() == [1.0, 0.5]
-    assert 0.0 < seconds[1] < 0.01
-    same = split_slow_turns(machine, before, ends[1:], np.array([1.5]))
-    assert same[0].tolist() == ends[1:].tolist()
+def test_a_tip_that_all_but_stands_is_held_or_moved_by_itself():
+    linear = np.array([True, True, True, False, False])
+    rows = np.array([[10.0, 0.0, 0.0, 0.2, 0.0]] * 4) + np.outer([0.0, 1e-6, 1.0, 1.0003], [1.0, 0.0, 0.0, 0.0, 0.0])
+    rows[:, 4] = [0.0, 0.1, 0.1, 0.2]
+    seconds, halt = np.array([1.0, 0.5, 1.0]), np.array([False, False, True])
+    ends, motion, times = delay_slow_tips(rows, seconds, halt, linear)
+    assert motion.tolist() == [0, 1, 2, 2]
+    assert ends[0].tolist() == [10.0, *rows[1, 1:]]  # it stays behind, and the next motion makes up for it
+    assert ends[[1, 3]].tolist() == rows[[2, 3]].tolist()
+    assert ends[2].tolist() == [*rows[2, :3], *rows[3, 3:]]  # the turn, and then the tip
+    assert times[:3].tolist() == seconds.tolist()
+    assert 3e-4 / times[3] == pytest.approx(0.11 / 60.0)  # mm/s, just what LinuxCNC obeys
+    assert delay_slow_tips(rows[1:3], seconds[1:2], halt[:1], linear)[0].tolist() == rows[2:3].tolist()
 
 
 def test_where_the_trajectory_stands_still_linuxcnc_does_too():

@@ -23,7 +23,7 @@ def predict_linuxcnc_seconds(trajectory: Trajectory) -> float:
 def predict_linuxcnc_time(trajectory: Trajectory) -> ControllerTime:
     """Predict what LinuxCNC takes, and where it is over 1.5 times the trajectory, note the lines that cost most."""
     motions = build_straight_motions(trajectory, *choose_axis_rates(trajectory.posted.machine))
-    seconds = float(motions.seconds.sum())
+    seconds = motions.total_seconds
     if not seconds > _MUCH * trajectory.seconds:
         return ControllerTime(seconds)
     return ControllerTime(seconds, tuple(_explain_losses(trajectory, motions)))

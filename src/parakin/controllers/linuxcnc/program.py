@@ -23,8 +23,6 @@ from .axis_ranges import TURNS
 from .axis_rates import choose_axis_rates
 from .straight_motions import StraightMotions, build_straight_motions
 
-_SLOWEST = 0.11 / 60.0  # mm/s: what is slower LinuxCNC runs at 0.1 mm/min in inverse time
-_INSTANT = 0.002  # s
 _TURNING = 0.4  # fraction of the tolerance where two motions turn the tool: LinuxCNC blends them less well
 
 
@@ -64,7 +62,6 @@ def make_linuxcnc_program(trajectory: Trajectory, *, forced: str | None = None, 
     return write
 
 
-@check_arguments
 def _refuse_turns(machine: Machine, poses: Array) -> None:
     most = TURNS if machine.has_direction else 0.5
     for axis, values in zip(machine.axes, poses.T, strict=True):
@@ -84,7 +81,7 @@ def _format_program(
     way, times = to_display(approach[0], machine.axis_units), approach[1]
     head = [
         f"{path.source} on {machine.name}, mode {posted.mode}; made by parakin for LinuxCNC",
-        f"{motions.seconds.sum():.3f} s from the first record on; {times.sum():.1f} s to it, from wherever the tool is",
+        f"{motions.total_seconds:.3f} s from the first record on; {times.sum():.1f} s to it, from wherever the tool is",
         f"machine coordinates, {' '.join(machine.axes)} in mm and degrees; F is the inverse of minutes",
         *describe_setup(posted),
         *(f"OFF LIMITS: written with --force: {line}" for line in (forced or "").splitlines()),
@@ -105,34 +102,7 @@ def _format_program(
             yield "G61\n"
         for start in range(begin, end, CHUNK):
             chunk = slice(start, min(start + CHUNK, end))
-            before = ends[start - 1 : start] if start else way[-1:]
-            rows, seconds = split_slow_turns(machine, before, ends[chunk], motions.seconds[chunk])
-            yield format_blocks("G53 G1 ", machine.axes, machine.axis_units, rows, seconds)
+            yield format_blocks("G53 G1 ", machine.axes, machine.axis_units, ends[chunk], motions.seconds[chunk])
         if exact:
             yield blend + "\n"
     yield "M2\n"
-
-
-def split_slow_turns(machine: Machine, before: Array, ends: Array, seconds: Array) -> tuple[Array, Array]:
-    """Split motions in which the tool turns while its tip hardly moves: first the turn, then the tip's motion.
-
-    LinuxCNC goes by the tip's speed, and no slower than 0.1 mm/min; a turn by itself goes by its own.
-
-    Parameters
-    ----------
-    before : (1, axes) the row that the first motion starts from, mm and degrees
-    ends, seconds : (k, axes) and (k,) of the motions
-
-    Returns rows and their times.
-    """
-    linear = np.array([unit == "mm" for unit in machine.axis_units])
-    steps = np.abs(np.diff(ends, axis=0, prepend=before))
-    way = np.sqrt((steps[:, linear] ** 2).sum(1))
-    slow = np.flatnonzero((way > 0.0) & (way < _SLOWEST * seconds) & steps[:, ~linear].any(1))
-    if not len(slow):
-        return ends, seconds
-    turned = ends[slow].copy()
-    turned[:, linear] = np.concatenate([before, ends])[slow][:, linear]
-    rows, times = np.insert(ends, slow, turned, axis=0), np.insert(seconds, slow, seconds[slow])
-    times[slow + np.arange(1, len(slow) + 1)] = _INSTANT
-    return rows, times

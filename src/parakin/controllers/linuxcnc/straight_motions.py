@@ -12,6 +12,8 @@ from ...machine import Machine
 from ...toolpath.timing.drive_limits import DriveLimits
 from ...toolpath.timing.trajectory import Trajectory
 from .joint_utilisation import measure_joint_utilisation
+from .late_starts import measure_late_starts
+from .slow_tips import delay_slow_tips
 from .speed_changes import find_speed_changes
 
 CYCLE = 1e-3  # s: of the controller. Motions that take whole cycles it blends evenly, others with a bump of speed
@@ -30,6 +32,8 @@ class StraightMotions:
     piece : (k,) the piece of the trajectory's curve that it is on, or a part of
     held_up_by : (k,) what it takes longer for than the trajectory, an index into ``reasons``; 0 where it does not
     reasons : in words
+    rise : (k,) s, what it takes to come to its speed, or from it to a stand
+    late : (k,) s, by which the next motion begins later than the motion begins to fall
     """
 
     ends: Array
@@ -38,6 +42,16 @@ class StraightMotions:
     piece: Indices
     held_up_by: Indices
     reasons: tuple[str, ...]
+    rise: Array
+    late: Array
+
+    @property
+    def total_seconds(self) -> float:
+        """What all motions take, s: one begins while the other falls, but for the last one before a stand.
+
+        That one does not blend, and so falls with all of the acceleration.
+        """
+        return float(self.seconds.sum() + self.late.sum() + 0.5 * self.rise[self.halt].sum())
 
 
 class _Division(NamedTuple):
@@ -65,7 +79,8 @@ def build_straight_motions(trajectory: Trajectory, speeds: Array, accelerations:
     if not pieces:
         nothing = np.empty(0)
         none = nothing.astype(np.int64)
-        return StraightMotions(np.empty((0, curve.corner.shape[1])), nothing, nothing > 0.0, none, none, ("",))
+        ends = np.empty((0, curve.corner.shape[1]))
+        return StraightMotions(ends, nothing, nothing > 0.0, none, none, ("",), nothing, nothing)
     piece, start, end, time, last = _divide_pieces(trajectory, accelerations)
     halt = np.zeros(len(piece), bool)
     if DriveLimits.of(trajectory.posted.machine).bounds_acceleration:
@@ -84,7 +99,14 @@ def build_straight_motions(trajectory: Trajectory, speeds: Array, accelerations:
     cycles = _raise_cycles(cycles, need, ramp, ~halt[:-1])
     bounds = np.column_stack([planned, by_axis, need.max(1), np.sqrt(ramp)])
     held_up_by = np.where(cycles > 1.2 * planned, bounds[:, 1:].argmax(1) + 1, 0)
-    return StraightMotions(ends, CYCLE * cycles, halt, piece, held_up_by, _name_reasons(trajectory.posted.machine))
+    linear = np.array([unit == "mm" for unit in trajectory.posted.machine.axis_units])
+    rows, motion, seconds = delay_slow_tips(np.concatenate([curve.corner[:1], ends]), CYCLE * cycles, halt, linear)
+    halts = halt[motion] & np.append(motion[1:] != motion[:-1], True)
+    steps = np.diff(rows, axis=0, prepend=curve.corner[:1])
+    rise = 2.0 * (np.abs(steps) / accelerations).max(1) / seconds
+    late = measure_late_starts(steps, seconds, rise, linear) * ~halts
+    reasons = _name_reasons(trajectory.posted.machine)
+    return StraightMotions(rows, seconds, halts, piece[motion], held_up_by[motion], reasons, rise, late)
 
 
 def _name_reasons(machine: Machine) -> tuple[str, ...]:

@@ -367,3 +367,12 @@ def test_a_file_about_its_own_zero_is_told_where_it_would_fit(name, write, capsy
 def test_a_part_that_is_off_limits_in_part_is_not_outside(write, capsys):
     path = write("G21 G90\nG0 X0 Y0 Z0\nG1 X60 F600\nX2500\nM2\n", "wide.ngc")
     assert post(capsys, path, code=3)["outside"] is None
+
+
+def test_a_part_that_fits_not_at_home_is_looked_for(write, capsys):
+    path = write("G21 G90\nG0 X-800 Y0 Z0\nG1 X800 F6000\nZ700\nM2\n", "large.ngc")
+    assert main(["post", str(path), "-m", "tricept", "-o", str(path.parent / "out"), "--json"]) == 3
+    outside = json.loads(capsys.readouterr().out)["outside"]
+    assert outside["off_limits_there"] > 0 and "--place X=" in outside["text"]
+    option, value = re.search(r"(--place) (\S+)", outside["text"]).groups()
+    assert main(["post", str(path), "-m", "tricept", "-o", str(path.parent / "out"), option, value]) in (0, 3)

@@ -129,15 +129,27 @@ def describe_outside(outside: Outside) -> str:
         return f"{text}, but it is larger than the workspace in {axes}"
     if outside.broken is None:
         return text
-    return text + (
-        ", where it fits" if not outside.broken else f", where {outside.broken:,} records are still off limits"
-    )
+    if not outside.broken:
+        return f"{text}, where every record is allowed"
+    return f"{text}, where {outside.broken:,} records are still off limits; {format_search(outside)} looks for better"
 
 
 def format_option(outside: Outside) -> str:
     """Format the suggestion as the option of the command: ``--workpiece X=0,Y=0,Z=-1650``."""
     values = {k: math.degrees(v) if k in "ABC" else v for k, v in outside.workpiece.items()}
     return "--workpiece " + ",".join(f"{letter}={value:.10g}" for letter, value in values.items())
+
+
+def format_search(outside: Outside) -> str:
+    """Format the option that looks for a place anywhere in the workspace: ``--place X=-500:500,Y=-500:500,Z=-1900``."""
+    half = 0.5 * (np.ptp(outside.workspace, axis=0) - np.ptp(outside.path, axis=0))
+    ranges = []
+    for letter, reach in zip("XYZ", half.tolist(), strict=True):
+        middle = outside.workpiece[letter]
+        ranges.append(
+            f"{letter}={middle - reach:.0f}:{middle + reach:.0f}" if reach > 0.5 else f"{letter}={middle:.10g}"
+        )
+    return "--place " + ",".join(ranges)
 
 
 def _describe_bounds(bounds: Array) -> str:

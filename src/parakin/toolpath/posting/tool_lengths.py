@@ -111,7 +111,7 @@ def _refuse_length(machine: Machine, path: ToolPath, use: ToolUse, what: str) ->
     raise InputError(
         f"{describe_tool(use)} {what}, the tool of {machine.name} is {machine.tool_length:g} mm long; "
         "expected MM, file or machine to say which counts, or a tool table",
-        path.source, use.length_line or use.line,
+        path.source, use.length_line or use.line or None,
     )  # fmt: skip
 
 

@@ -47,7 +47,8 @@ def _take_tip_length(use: ToolUse, offsets: Sequence[LengthOffset], table: Mappi
     own = next((offset for offset in offsets if offset.keeps_tip and offset.record >= use.record), None)
     number = use.data.get("number")
     if own is not None and not math.isnan(own.length):
-        return use._replace(data={**use.data, "set_length": own.length}, from_table=own.from_table)
+        data = {**use.data, "set_length": own.length}
+        return use._replace(data=data, from_table=own.from_table, length_line=own.line)
     if table is not None and isinstance(number, float) and number in table:
         return use._replace(data={**use.data, "set_length": float(table[int(number)])}, from_table=True)
     return use

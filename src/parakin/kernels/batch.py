@@ -12,9 +12,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import Array, Indices
+from ..arrays import Array, Flags, Indices
 from .tape import NewtonTapes, Tape
 
+FEW = 64  # rows for which no kernel of their own is compiled
 SMALL = 4096  # rows below which a second thread costs more than it brings
 
 
@@ -76,12 +77,24 @@ def evaluate_tape_with_residual(tape: Tape, x: Array, out: Array, z: Array) -> A
 
 def find_first_negative(tape: Tape, x: Array, z: Array) -> Indices:
     """Find the first output that is negative or NaN, (N,): 1 + its index, 0 where every output is ≥ 0."""
+    if len(x) <= FEW:
+        margins = evaluate_tape(tape, x, np.empty((len(x), tape.outputs)), z, whole=False)
+        return _find_first_in_rows(margins, np.isfinite(x).all(1) & np.isfinite(z).all(1))
     from .blocks import find_negative
 
     out = np.empty(len(x), np.int64)
     args = (tape, freeze_rows(x), freeze_rows(z), out)
     run_in_threads(len(x), lambda start, stop: find_negative(*args, start, stop))
     return out
+
+
+def _find_first_in_rows(margins: Array, finite: Flags) -> Indices:
+    """Find the first negative or NaN entry of each row as :func:`find_first_negative`; 1 where a row is not finite."""
+    padded = np.column_stack([~(margins >= 0.0), np.ones(len(margins), np.bool_)])
+    first: Indices = padded.argmax(1) + 1
+    first[first > margins.shape[1]] = 0
+    first[~finite & (first == 0)] = 1
+    return first
 
 
 class NewtonSteps(NamedTuple):

@@ -236,11 +236,11 @@ def _load_inputs(x, z, row, stop, r, bad):
     """Load rows of ``x`` and ``z`` as the inputs of a block, and ask for those of the next; returns how many."""
     n = min(LANES, stop - row)
     bad[:] = 0.0
-    register = 0
-    for rows in (x, z):
+    register = x.shape[1] + z.shape[1]  # backwards, for load_rows is compiled once more for a register that is told: 0
+    for rows in (z, x):
+        register -= rows.shape[1]
         load_rows(rows, row, n, register, r, bad)
         fetch_to_read(rows, row + LANES, stop)
-        register += rows.shape[1]
     return n
 
 

@@ -272,16 +272,17 @@ def _load_start(tapes, near, q, row, stop, block, bad):
     r, m, given, joints = block.registers, tapes.begin.outputs, near.shape[1], q.shape[1]
     n = min(LANES, stop - row)
     bad[:] = 0.0
-    if near.shape[0] == 1:
-        for i in range(given):
-            r[i * LANES : (i + 1) * LANES] = near[0, i]
-    else:
-        load_rows(near, row, n, 0, r, bad)
-    load_rows(q, row, n, m, block.point, bad)
-    copy_lanes(block.point, m, r, given, joints)
-    fetch_to_read(q, row + LANES, stop)
-    if near.shape[0] != 1:
-        fetch_to_read(near, row + LANES, stop)
+    register = given + joints  # backwards, for load_rows is compiled once more for a register that is told: 0
+    for number, rows in enumerate((q, near)):
+        register -= rows.shape[1]
+        if (number == 1) & (rows.shape[0] == 1):
+            for i in range(given):
+                for j in range(LANES):
+                    r[i * LANES + j] = rows[0, i]
+        else:
+            load_rows(rows, row, n, register, r, bad)
+            fetch_to_read(rows, row + LANES, stop)
+    copy_lanes(r, given, block.point, m, joints)
     return n
 
 

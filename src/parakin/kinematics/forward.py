@@ -123,12 +123,12 @@ def _take_modes_of_starts(
 
 def _is_settled(model: Model, solution: Solution, starts: Array) -> Flags:
     """Tell which rows are answered next to their starts, (N,)."""
-    return _is_beside(model, solution.poses, starts) & (solution.why == ANSWERED)
+    return np.asarray(_is_beside(model, solution.poses, starts) & (solution.why == ANSWERED))
 
 
 def _is_beside(model: Model, poses: Array, starts: Array) -> Flags:
     """Tell which poses are next to their starts, (N,): in every coordinate, turns not counted."""
-    return find_first_negative(model.beside_tape(SETTLED), poses, starts) == 0
+    return np.asarray(find_first_negative(model.beside_tape(SETTLED), poses, starts) == 0)
 
 
 def _group_by_mode(model: Model, poses: Array, joints: Array) -> dict[str, Indices]:

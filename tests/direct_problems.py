@@ -81,7 +81,8 @@ def try_direct_problems(machine, count, seed=0, **options):
         tally.close_refused += int((close & ~done).sum())
         assert (found.why[~done] > 0).all()
         error = measure_mode_error(machine, found.poses[done], joints[done])
-        tally.other_mode += int((~(error < 1e-5)).sum())
-        turned = measure_sides(machine, found.poses[done]) * measure_sides(machine, starts[done])
+        in_mode = error < 1e-5
+        tally.other_mode += int((~in_mode).sum())
+        turned = measure_sides(machine, found.poses[done][in_mode]) * measure_sides(machine, starts[done][in_mode])
         tally.other_side += int((turned < 0.0).sum())
     return tally

@@ -13,9 +13,10 @@ from ..model.chain import make_rotation_about
 from ..model.legs.lambda_ import Lambda
 from ..model.traces import Model
 from .forward import compute_closure_tolerance, compute_poses, find_roots
-from .planar_rpr import solve_planar_rpr
+from .planar_rpr import CONTINUUM, solve_planar_rpr
 from .root_isolation import isolate_roots
 
+_ON_ONE_LINE = 1e-9  # of the size: nearer to a line, centres are on it
 LONGEST = 1e8  # mm; machine files take lengths up to 1e6
 
 
@@ -48,12 +49,33 @@ def find_assemblies(model: Model, joints: Array) -> Array:
 
 def _find_common_points(model: Model, joints: Array) -> Array:
     """Find both common points of the legs' spheres, as poses."""
+    _refuse_continuum(model, joints)
     poses, residual = np.empty((2, len(model.axes))), np.empty(2)
     for i, side in enumerate((model.home_side, -model.home_side)):
         tape, pose = model.spheres_tape(side), poses[i : i + 1]
         residual[i] = evaluate_tape_with_residual(tape, joints, pose, np.empty((1, 0)))[0]
     poses = poses[residual <= compute_closure_tolerance(model)]
     return poses[:1] if len(poses) == 2 and np.array_equal(poses[0], poses[1]) else poses
+
+
+def _refuse_continuum(model: Model, joints: Array) -> None:
+    """Refuse spheres (circles) with centres on one line (in one place) that share a circle, or more.
+
+    Their radical planes 2·(c - c0)·p = |c - c0|² - r² + r0² meet in a line or a plane then, which cuts a sphere.
+    """
+    centres, radii, plane = model.find_spheres(joints[0].tolist())
+    points, r = np.array(centres, float), np.array(radii, float)
+    out = [i for i in range(3) if i not in plane]
+    squares = r * r - (points[:, out] ** 2).sum(1)
+    normals = points[1:, plane] - points[0, plane]
+    size = max(float(np.abs(points).max()), float(np.abs(r).max()), 1e-300)
+    if not np.isfinite(normals).all() or np.linalg.matrix_rank(normals, tol=_ON_ONE_LINE * size) == len(plane) - 1:
+        return
+    right = 0.5 * ((normals * normals).sum(1) - squares[1:] + squares[0])
+    nearest = np.linalg.lstsq(normals, right, rcond=_ON_ONE_LINE)[0]
+    meets = np.abs(normals @ nearest - right).max() <= _ON_ONE_LINE * size * size
+    if meets and squares[0] - nearest @ nearest > _ON_ONE_LINE * size * size:
+        raise NoMethodError(f"{model.spec.name}: {CONTINUUM}")
 
 
 def _split_by_leg(model: Model, joints: Array) -> list[list[float]]:

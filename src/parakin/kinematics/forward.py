@@ -39,12 +39,13 @@ MOST_PARTS = 400  # steps of the continuation
 NEAR_STEPS = 6  # of Newton's method for a step of the continuation; one that needs more is halved
 
 # Why there is no answer.
-ANSWERED, OPEN, ON_ANOTHER_SIDE, OTHER_MODE = range(4)
+ANSWERED, OPEN, ON_ANOTHER_SIDE, OTHER_MODE, SINGULAR_START = range(5)
 REASONS = (
     "",
     "the legs do not close near the start",
     "a parallel singularity lies between the start and the joints",
     "the legs close in another working mode only",
+    "the start is a parallel singularity, so it lies on no side",
 )
 
 
@@ -88,6 +89,7 @@ def solve_forward(
     solution = solve(model, joints, starts, model.mode if mode is None else mode)
     if mode is None and starts is not None and model.has_modes:
         _take_modes_of_starts(model, solution, joints, starts, solve)
+    _find_singular_starts(model, solution, starts, model.mode if mode is None else mode)
     poses, steps = solution.poses, solution.steps
     poses[solution.why != ANSWERED] = np.nan
     direction = model.structure.direction
@@ -97,6 +99,14 @@ def solve_forward(
     elif steps.max(initial=0) > WITHIN_A_TURN:
         _count_turns(model, poses, np.array(model.home) if starts is None else starts)
     return replace(solution, converged=solution.why == ANSWERED)
+
+
+def _find_singular_starts(model: Model, solution: Solution, starts: Array | None, mode: str) -> None:
+    """Say where there is no answer because the start is a parallel singularity; in place."""
+    rows = np.flatnonzero((solution.why == OPEN) | (solution.why == ON_ANOTHER_SIDE))
+    if len(rows):
+        singular = find_sides(model, np.array(model.home)[None, :] if starts is None else starts[rows], mode) == 0.0
+        solution.why[rows[np.broadcast_to(singular, rows.shape)]] = SINGULAR_START
 
 
 def _take_modes_of_starts(
@@ -118,6 +128,7 @@ def _take_modes_of_starts(
         found = solve(model, joints[lost], starts[lost], None)
         with np.errstate(invalid="ignore"):
             taken = (found.why == ANSWERED) & (_measure_way(model, found, starts[lost]) <= beside)
+        taken &= ~find_in_mode(model, found.poses, joints[lost], model.mode)  # it is refused there: on another side
         _put_rows(solution, lost[taken], _take_rows(found, taken))
 
 
@@ -338,7 +349,8 @@ def find_sides(model: Model, poses: Array, mode: str | None = None, joints: Arra
     if joints is not None:
         own = np.where(np.isfinite(own).all(1, keepdims=True), own, joints)
     sides = find_roots(model, poses, own, most=0, side=np.ones(1)).turned
-    sides[np.abs(sides) <= SINGULAR * _bound_determinant(model)] = 0.0
+    lost = np.isnan(sides) & np.isfinite(own).all(1)  # no pivot was left
+    sides[lost | (np.abs(sides) <= SINGULAR * _bound_determinant(model))] = 0.0
     return sides * _find_angle_signs(model, poses)
 
 
@@ -450,11 +462,13 @@ def _solve_by_constant_jacobian(model: Model, joints: Array, starts: Array | Non
         for _ in range(40):  # on to rounding, uncounted: the verdict is the same for every method
             y += np.einsum("nij,nj->ni", inverse, joints[:, :legs] - both[:, :legs])
             both = evaluate_tape(tape, y, np.empty((len(y), legs + legs * m)))
-    roots = find_roots(model, y, joints, most=0, poses=False)
     poses = compute_poses(model, y, joints)
+    sides = find_sides(model, given, mode, None if starts is None else joints)
+    roots = find_roots(model, y, joints, most=0, poses=False, side=sides)
+    bound = SINGULAR * _bound_determinant(model)
     with np.errstate(invalid="ignore"):
-        why = np.where(find_in_mode(model, poses, joints, mode), ANSWERED, OTHER_MODE)
-        why[~(roots.residual <= compute_closure_tolerance(model))] = OPEN
+        roots.turned[np.abs(roots.first) <= bound] = 0.0
+    why = _judge(model, roots._replace(rows=poses), joints, mode)
     return Solution(poses, roots.residual, why == ANSWERED, steps, why)
 
 

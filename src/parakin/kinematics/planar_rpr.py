@@ -11,6 +11,7 @@ import numpy as np
 from ..arrays import Array
 from ..errors import NoMethodError
 
+CONTINUUM = "the assemblies are a continuum here: the legs leave the platform free to move"
 _SAMPLES = 16  # the polynomial has harmonics up to the fourth (which cancels), so nine would do
 _STEPS, _IDLE = 50, 4
 _SINGULAR, _STRIDE = 1e-6, 1e-3  # of the greatest singular value, and of the size: what tells a continuum
@@ -40,7 +41,7 @@ def solve_planar_rpr(centres: Array, radii: Array, corners: Array) -> Array:
         if error < 1e-11 * size and not any(_is_same(pose, other, size) for other in poses):
             poses.append(pose)
     if any(_is_in_continuum(pose, centres, radii, corners) for pose in poses):
-        raise NoMethodError("the assemblies are a continuum here: the legs leave the platform free to move")
+        raise NoMethodError(CONTINUUM)
     return np.array(sorted(poses, key=lambda p: (p[2], p[0], p[1]))).reshape(-1, 3)
 
 

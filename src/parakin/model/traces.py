@@ -162,7 +162,7 @@ class Model:
     def home_side(self) -> float:
         """The side of the spheres' centres on which the platform is at home."""
         joints, placed, _ = self.invert(self.home, self.mode)
-        centres, _, plane = self._spheres(joints)
+        centres, _, plane = self.find_spheres(joints)
         return 1.0 if measure_side(centres, plane, placed.origin) >= 0.0 else -1.0
 
     @property
@@ -391,7 +391,11 @@ class Model:
             placed = self.structure.place_with_joints(trace.inputs(self._poses, len(joints)), self._serial(joints))
             coordinates = self.spheres(joints, None, placed.origin)
             closures = self.scaled_closures(coordinates, joints)
-            return [*self._compute_pose(coordinates, joints), *closures, compute_square_height(*self._spheres(joints))]
+            return [
+                *self._compute_pose(coordinates, joints),
+                *closures,
+                compute_square_height(*self.find_spheres(joints)),
+            ]
 
         return self._tape(("spheres with height",), len(self.drives) + self._poses, outputs)
 
@@ -421,17 +425,17 @@ class Model:
 
         def outputs(trace: Trace) -> list[Scalar]:
             joints, placed, _ = self.invert(trace.inputs(self._poses), mode)
-            centres, _, plane = self._spheres(joints)
+            centres, _, plane = self.find_spheres(joints)
             return [measure_side(centres, plane, placed.origin)]
 
         return self._tape(("own side", mode), self._poses, outputs)
 
     def spheres(self, joints: Sequence[Scalar], side: Scalar | None, near: Vec | None = None) -> list[Scalar]:
         """Find the motion's coordinates by the common point of the legs' spheres; ``near`` picks the nearer of two."""
-        centres, radii, plane = self._spheres(joints)
+        centres, radii, plane = self.find_spheres(joints)
         return self.structure.coordinates_at(find_common_point(centres, radii, plane, side, near))
 
-    def _spheres(self, joints: Sequence[Scalar]) -> tuple[list[Vec], list[Scalar], list[int]]:
+    def find_spheres(self, joints: Sequence[Scalar]) -> tuple[list[Vec], list[Scalar], list[int]]:
         """Find centres and radii of the spheres that hold the platform's origin, and the coordinates it moves in."""
         centres, radii = [], []
         for leg, q in zip(self.spec.legs, group_joints_by_leg(self.spec, joints), strict=True):

@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from geometry import Description
+from random_paths import PathMaker
 
 import parakin as pk
 from parakin.toolpath.posting.post import post_path
@@ -22,8 +23,9 @@ DIGIT = 5e-7  # half a unit of the last digit that is sampled
 sys.path.insert(0, str(HERE))
 sys.path.insert(0, str(Path(__file__).parents[1] / "examples"))
 import turbine_blade  # noqa: E402
+from motion_model import Model, read_limits, read_program  # noqa: E402
 from simulation import CYCLE, as_programmed, first_line, simulated, trial, why_not  # noqa: E402
-from stub import FIELDS, inward, outward, pose, world  # noqa: E402
+from stub import FIELDS, Stub, inward, outward, pose, world  # noqa: E402
 
 # A move by hand, and moves that must be refused with a word: off a drive's range, off another limit of the machine's.
 # These machines have a program of their own here; the others run the one they come with.
@@ -185,6 +187,44 @@ def test_a_posted_program_keeps_the_joints_speeds_and_its_time(machine, linuxcnc
     ends = world(machine, posted.poses[[0, -1]])
     assert np.abs(run.poses[[part.start, -1]] - ends).max() < 2e-6
     assert aside(run.poses[part][:, :3], world(machine, posted.poses)[:, :3]).max() < 0.005 + 2e-6  # as asked for
+
+
+# Random paths
+
+
+@pytest.fixture(scope="module")
+def model(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("model")
+    return Model(folder), Stub(folder)
+
+
+@pytest.mark.parametrize("machine", ["orthoglide5_head", "orthoglide5_table", "hexapod"], indirect=True)
+def test_random_paths_run_as_the_model_says(machine, model, linuxcnc, tmp_path):
+    planner, stub = model
+    kinematics = stub.built(machine)
+    limits = read_limits(pk.make_linuxcnc_configuration(machine)[f"{machine.name}.ini"])
+    home, at_home = world(machine, machine.home[None])[0], outward(machine, machine.inverse(machine.home))
+    for seed in (0, 20):
+        (tmp_path / "part.cls").write_text(PathMaker(machine, seed).make(), encoding="ascii")
+        job = pk.prepare(machine, pk.read_path(tmp_path / "part.cls"))
+        assert job.runs
+        text = written(job.trajectory)
+        told = planner.simulate(read_program(text, home), limits, home)
+        joints, codes = kinematics.inverse_path(told.poses, at_home)
+        assert not codes.any()
+        run = linuxcnc.run({"program": "part.ngc"}, {"part.ngc": text})
+        assert "told" not in run.seen, run.seen
+        assert shares(machine, run.joints).max() <= 1.0 + noise(machine)
+        first = int(np.flatnonzero((np.diff(run.poses, axis=0) != 0.0).any(1))[0]) + 1
+        moving = int(np.flatnonzero((told.poses != home).any(1))[0])
+        count = min(len(run.poses) - first, len(told.poses) - moving)
+        assert count > len(told.poses) - 10
+        seen, expected = slice(first, first + count), slice(moving, moving + count)
+        assert np.abs(run.poses[seen] - told.poses[expected]).max() < 2e-6
+        assert np.abs(run.joints[seen] - joints[expected]).max() < 1e-3
+        assert (
+            np.abs(shares(machine, run.joints[seen]) - shares(machine, joints[expected])).max() < noise(machine) + 0.01
+        )
 
 
 def aside(points, path):

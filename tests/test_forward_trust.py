@@ -1,13 +1,14 @@
 """The direct problem's promise: the working mode, the start's own side of the singularities, one row at a time."""
 
 import warnings
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 import parakin as pk
 from parakin.errors import SingularHomeWarning
-from parakin.kinematics.forward import ANSWERED, ON_ANOTHER_SIDE, OPEN, OTHER_MODE, REASONS
+from parakin.kinematics.forward import ANSWERED, ON_ANOTHER_SIDE, OPEN, OTHER_MODE, REASONS, SINGULAR_START
 
 RAILS = """\
 name: six_vertical_rails
@@ -211,3 +212,80 @@ def test_shipped_homes_are_no_singularities():
         warnings.simplefilter("error")
         for name in pk.machines():
             pk.load(name)
+
+
+# Truths and starts of a hexapod; the starts' B is near or beyond 90°, where the angles' determinant changes its sign.
+FLIPS = [
+    ([67.823, -151.594, -1040.477, -0.4475, 0.5308, -0.1403], [-186.923, 372.852, -1182.113, -0.158, 1.7116, -0.8268]),
+    ([64.689, 55.217, -936.349, -0.0563, 0.1412, 0.1853], [471.666, -219.043, -591.164, -0.3646, 0.9203, 1.3023]),
+]
+
+
+@pytest.mark.parametrize(("truth", "near"), FLIPS)
+def test_a_start_beyond_a_right_angle_keeps_its_assembly(truth, near):
+    machine = pk.load("hexapod")
+    truth, near = np.array(truth), np.array(near)
+    twin = near + [0.0, 0.0, 0.0, np.pi, 0.0, np.pi]
+    twin[4] = np.pi - near[4]
+    joints = machine.inverse(truth)
+    for start in (near, twin):
+        found = machine.forward(joints, near=start)
+        assert not found.converged or twist_side([found.poses])[0] * twist_side([near])[0] > 0.0
+
+
+def test_beside_a_singularity_lambda6_is_found_from_home():
+    machine = pk.load("lambda6")
+    poses = np.array(
+        [
+            [-268.31694, -126.046312, 1493.387614, -0.17854, 0.372856, -0.011269],
+            [155.374986, -160.397423, 1472.985467, 0.375375, -0.233839, -0.058943],
+            [-207.10782, 291.169798, 1413.448643, -0.116869, 0.388643, -0.046525],
+            [-43.056845, 85.459287, 1405.972218, -0.197918, 0.202377, -0.018491],
+        ]
+    )
+    joints = machine.inverse(poses)
+    found = machine.forward(joints)
+    assert found.converged.all()
+    assert (machine.sides(found.poses) * machine.sides(machine.home[None]) > 0.0).all()
+    assert np.abs(machine.inverse(found.poses) - joints).max() < 1e-8
+
+
+def test_a_tripod_on_one_foot_is_warned_of_and_finds_nothing(load):
+    text = (Path(pk.__file__).parent / "machines" / "tricept.yaml").read_text().replace("R: 350 mm", "R: 1e-300 mm")
+    assert "1e-300" in text
+    with pytest.warns(SingularHomeWarning, match="all poses about it are a parallel singularity"):
+        machine = load(text)
+    poses = machine.home + np.random.default_rng(0).uniform(0.0, 1.0, (100, 5)) * [50.0, 50.0, 50.0, 0.2, 0.2]
+    joints = machine.inverse(poses)
+    for near in (None, poses + 1e-4):
+        found = machine.forward(joints, near=near)
+        assert not found.converged.any()
+        assert (found.why == SINGULAR_START).all()
+
+
+COAXIAL = """\
+name: coaxial
+source: Sizes were chosen.
+motion: tx ty tz
+legs:
+  kind: length
+  joints: [a, b, c]
+  foot: [[{x} mm, 0 mm, 0 mm], [0 mm, 0 mm, 0 mm], [0 mm, 0 mm, 0 mm]]
+  platform: [[0 mm, 0 mm, 0 mm], [0 mm, 0 mm, 0 mm], [0 mm, 0 mm, 0 mm]]
+  range: [10 mm, 3 m]
+home: {{X: 0 mm, Y: 0 mm, Z: -500 mm}}
+"""
+
+
+@pytest.mark.parametrize("x", [0, 100])
+@pytest.mark.filterwarnings("ignore::parakin.errors.SingularHomeWarning")
+def test_spheres_about_one_line_share_a_continuum_or_nothing(load, x):
+    machine = load(COAXIAL.format(x=x))
+    joints = machine.inverse(machine.home)
+    for method in ("closed", "newton", "constant"):
+        for near in (None, machine.home):
+            found = machine.forward(joints, near=near, method=method)
+            assert (found.converged, found.why) == (False, SINGULAR_START)
+    with pytest.raises(pk.NoMethodError, match="continuum"):
+        machine.assemblies(joints)
+    assert len(machine.assemblies(joints + [0.0, 50.0, 0.0])) == 0

@@ -29,6 +29,7 @@ from .model.spec import Spec
 from .model.structures import DirectionColumns, PlatformPlacement, Structure
 from .model.traces import Model
 
+_LEAST_LEG = 1e-3  # mm, of a leg at home: closures are told in parts of it
 _ABOUT = 8  # poses about home that are looked at
 
 
@@ -167,6 +168,8 @@ class Machine:
                 if limit.side == "reach":
                     what = f"{limit.subject} does not reach it"
                 raise DescriptionError("home", f"{what}; home is a pose of the tool in the machine frame")
+        if not min(self.leg_sizes) > _LEAST_LEG:
+            raise DescriptionError("home", "a leg has no length there, so it holds nothing")
         self._warn_of_singular_home()
 
     def _warn_of_singular_home(self) -> None:

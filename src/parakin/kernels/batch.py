@@ -79,7 +79,7 @@ def find_first_negative(tape: Tape, x: Array, z: Array) -> Indices:
     """Find the first output that is negative or NaN, (N,): 1 + its index, 0 where every output is ≥ 0."""
     if len(x) <= FEW:
         margins = evaluate_tape(tape, x, np.empty((len(x), tape.outputs)), z, whole=False)
-        return _find_first_in_rows(margins, np.isfinite(x).all(1) & np.isfinite(z).all(1))
+        return _find_first_in_rows(margins, np.asarray(np.isfinite(x).all(1) & np.isfinite(z).all(1)))
     from .blocks import find_negative
 
     out = np.empty(len(x), np.int64)

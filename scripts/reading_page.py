@@ -56,6 +56,9 @@ tip is on the path; between records too. Summary, report, JSON and the program's
 | several cutters | the longest as the machine's own tool, others by what they are shorter |
 | nothing | the machine's own |
 
+A table of lengths 0 only, as `parakin linuxcnc` writes it, leaves all to the machine's own tool. Where G43 has lengths
+from a table, G53 and G28 tell of the spindle's nose, as on a machine with such a table; else of the own tool's tip.
+
 Before a change of the tool it is withdrawn along its axis: from a cut by 20 mm (less where the machine can't), and
 by what the next one is longer. Spindle and coolant are stopped (M5, M9) before the stop for the operator (M0), whom
 a message tells tool and length; they start again where the file says so.

@@ -237,6 +237,17 @@ def test_a_table_goes_before_the_file(write, capsys):
     assert [tool["length"] for tool in said["tools"]] == [100.0, 160.0]
 
 
+def test_the_table_of_a_configuration_leaves_all_to_the_machine(write, tricept, capsys):
+    own = dict(pk.make_linuxcnc_configuration(tricept))["tricept.tbl"]
+    table = write(own if isinstance(own, str) else own.decode(), "tricept.tbl")
+    assert read_tool_table(table) == {1: 0.0}
+    ngc = write(NGC.replace("T2", "T1").replace("T3 M6\n", "G43 H1\n"), "a.ngc")
+    said = post(capsys, ngc, "--tools", table)
+    assert [tool["length"] for tool in said["tools"]] == [150.0]
+    table.write_text("T1 Z0\nT2 Z80\n")
+    assert refusal(capsys, write(CHANGE.format(away=AWAY, second=50.0)), "--tools", table).count("length 0 in the tool")
+
+
 def test_offsets_of_known_length_count_where_they_are_in_force(write, capsys, tricept):
     table = write("T1 Z100\n", "t.tbl")
     text = "G21 G90\nG0 X0 Y0 Z150\nT1 M6\nG43 H1\nG0 Z50\nG1 X20 F500\nM2\n"
@@ -376,3 +387,19 @@ def test_a_part_that_fits_not_at_home_is_looked_for(write, capsys):
     assert outside["off_limits_there"] > 0 and "--place X=" in outside["text"]
     option, value = re.search(r"(--place) (\S+)", outside["text"]).groups()
     assert main(["post", str(path), "-m", "tricept", "-o", str(path.parent / "out"), option, value]) in (0, 3)
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        {"start": {"Q": 1.0}},
+        {"start": {"X": "5"}},
+        {"tools": {1: "x"}},
+        {"tools": {"a": 1.0}},
+        {"reference": {"X": np.nan}},
+    ],
+)
+def test_mistaken_arguments_of_the_reader(options, write):
+    with pytest.raises(InputError) as caught:
+        pk.read_path(write(NGC, "a.ngc"), **options)
+    assert caught.value.source in options

@@ -120,7 +120,7 @@ def fit_part(machine: Machine, path: ToolPath, length: ToolLength, workpiece: Ar
     try:
         return fit_tool_lengths(machine, path, length, workpiece=workpiece)
     except PoseError as error:
-        raise InputError(str(error).removeprefix("tool_length: "), "--tool-length") from None
+        raise InputError(str(error).removeprefix("length: "), "--tool-length") from None
     except InputError as error:
         raise InputError(
             error.message.replace("expected ", "expected --tool-length ", 1), error.source, error.line

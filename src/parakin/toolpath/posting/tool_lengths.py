@@ -15,6 +15,7 @@ from typing import Literal, NoReturn, TypeAlias
 
 import numpy as np
 
+from ...arguments import check_arguments
 from ...arrays import Array, Flags, Indices
 from ...errors import InputError, PoseError
 from ...machine import Machine
@@ -28,6 +29,7 @@ _LONGEST = 1e4  # mm
 _STARTS = re.compile(r"M0?[34]\b|SPINDL\b(?!\s*/\s*OFF)", re.I)  # events that start the spindle
 
 
+@check_arguments
 def fit_tool_lengths(
     machine: Machine, path: ToolPath, length: ToolLength = None, *, workpiece: Array | None = None
 ) -> ToolPath:
@@ -60,9 +62,9 @@ def fit_tool_lengths(
             raise PoseError(f"path: fitted to a tool of {path.fitted_length:g} mm, {machine.name} has one of {own:g}")
         return path
     if isinstance(length, str) and length not in ("file", "machine"):
-        raise PoseError(f"tool_length: mm, 'file' or 'machine' expected, not {length!r}")
+        raise PoseError(f"length: mm, 'file' or 'machine' expected, not {length!r}")
     if not isinstance(length, str) and length is not None and not 0.0 <= length <= _LONGEST:
-        raise PoseError(f"tool_length: 0 to {_LONGEST:g} mm expected, not {length:g}")
+        raise PoseError(f"length: 0 to {_LONGEST:g} mm expected, not {length:g}")
     lengths = _choose_lengths(machine, path, length)
     uses = tuple(use._replace(length=value) for use, value in zip(path.tools, lengths, strict=True))
     if not uses:

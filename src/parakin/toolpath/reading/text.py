@@ -4,10 +4,13 @@ Errors name no file and no line; the reader that calls adds both.
 """
 
 import io
+import math
 import os
 import re
+from collections.abc import Container, Mapping
+from numbers import Real
 from pathlib import Path
-from typing import NoReturn
+from typing import Any, NoReturn
 
 from ...errors import InputError
 
@@ -33,6 +36,20 @@ def check_arc_tolerance(tolerance: float) -> None:
     """Refuse a chord tolerance (mm) that is not above zero and finite."""
     if not 0.0 < tolerance < float("inf"):
         raise InputError("expected a length above zero, in mm", "arc_tolerance")
+
+
+def check_numbers(values: Mapping[Any, Any] | None, names: Container[Any] | None, name: str, form: str) -> None:
+    """Refuse an argument of numbers by names unless all are finite, and the names are allowed; None allows any."""
+    for key, value in (values or {}).items():
+        is_number = isinstance(value, Real) and math.isfinite(value)
+        if not is_number or (names is not None and key not in names):
+            raise InputError(f"expected {form}", name)
+
+
+def check_tool_lengths(tools: Mapping[int, float] | None) -> None:
+    """Refuse lengths of tools that are not finite, or not by whole numbers."""
+    check_numbers(tools, None, "tools", "lengths in mm by the numbers of tools")
+    check_numbers({key: key for key in tools or ()}, None, "tools", "lengths in mm by the numbers of tools")
 
 
 def decode_line(raw: bytes | bytearray) -> str:

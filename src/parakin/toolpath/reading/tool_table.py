@@ -4,6 +4,7 @@ import os
 import re
 from pathlib import Path
 
+from ...arguments import check_arguments
 from ...errors import InputError
 from .text import BYTE_ORDER_MARK, decode_line, parse_number, quote_short
 
@@ -13,6 +14,7 @@ _LARGEST_FILE = 4_000_000  # bytes
 _FORM = "expected T, the tool's number, P, its pocket, and Z, its length in mm, such as T1 P1 Z+75 D10"
 
 
+@check_arguments
 def read_tool_table(path: str | os.PathLike[str]) -> dict[int, float]:
     """Read the lengths of tools by number, mm: from the spindle's nose to the tip, the table's Z.
 

@@ -56,9 +56,9 @@ class ToolLog:
     def list_uses(self, table: Mapping[int, float] | None) -> tuple[ToolUse, ...]:
         """List the tools, with the lengths of a table in place of the file's.
 
-        Refuses a tool that is not in the table.
+        Refuses a tool that is not in the table, or has no length there while others have.
         """
-        if table is None:
+        if table is None or not any(table.values()):  # as in a machine's own table, whose kinematics knows the length
             return tuple(self.uses)
         uses = []
         for use in self.uses:
@@ -67,5 +67,7 @@ class ToolLog:
                 refuse("a tool without a number, which the tool table can't tell; expected LOADTL/number", use.line)
             if number not in table:
                 refuse(f"tool {number:g} is not in the tool table; expected its length there", use.line)
+            if not table[int(number)]:
+                refuse(f"tool {number:g} has length 0 in the tool table; expected it from the spindle's nose", use.line)
             uses.append(use._replace(data={**use.data, "set_length": float(table[int(number)])}, from_table=True))
         return tuple(uses)

@@ -22,6 +22,7 @@ from ..text import (
     BYTE_ORDER_MARK,
     READ_SIZE,
     check_arc_tolerance,
+    check_tool_lengths,
     decode_line,
     is_number,
     open_file,
@@ -76,6 +77,7 @@ def read_cl(
     check_arc_tolerance(arc_tolerance)
     if frame not in ("file", "ignore"):
         raise InputError('expected "file" or "ignore"', "frame")
+    check_tool_lengths(tools)
     source = os.fsdecode(path)
     with open_file(path, source) as file, np.errstate(all="ignore"):
         size = os.fstat(file.fileno()).st_size

@@ -17,7 +17,15 @@ from ....arrays import Array, Progress
 from ....errors import InputError
 from ...path import Event, ToolPath
 from ...programmed_path import compute_tool_axes
-from ..text import BYTE_ORDER_MARK, READ_SIZE, check_arc_tolerance, decode_line, open_file
+from ..text import (
+    BYTE_ORDER_MARK,
+    READ_SIZE,
+    check_arc_tolerance,
+    check_numbers,
+    check_tool_lengths,
+    decode_line,
+    open_file,
+)
 from .block import LONGEST, VALUES, check_text, parse_block
 from .control_flow import ControlFlow, ControlLine, find_control
 from .controls import name_control, recognise_block
@@ -77,10 +85,8 @@ def read_gcode(
     if workpiece is not None and (np.shape(workpiece) != (3, 4) or not np.isfinite(workpiece).all()):
         raise InputError("expected a transform of shape (3, 4)", "workpiece")
     for name, axes in (("start", start), ("reference", reference)):
-        if axes is not None and not (set(axes) <= set(AXES) and all(map(math.isfinite, axes.values()))):
-            raise InputError("expected numbers for some of X, Y, Z, A, B and C", name)
-    if tools is not None and not all(int(n) == n >= 0 and math.isfinite(v) for n, v in tools.items()):
-        raise InputError("expected lengths in mm by the numbers of tools", "tools")
+        check_numbers(axes, AXES, name, "numbers for some of X, Y, Z, A, B and C")
+    check_tool_lengths(tools)
     source = os.fsdecode(path)
     with open_file(path, source) as file, np.errstate(all="ignore"):
         size = os.fstat(file.fileno()).st_size

@@ -49,6 +49,6 @@ def _take_tip_length(use: ToolUse, offsets: Sequence[LengthOffset], table: Mappi
     if own is not None and not math.isnan(own.length):
         data = {**use.data, "set_length": own.length}
         return use._replace(data=data, from_table=own.from_table, length_line=own.line)
-    if table is not None and isinstance(number, float) and number in table:
+    if table is not None and isinstance(number, float) and table.get(int(number)):
         return use._replace(data={**use.data, "set_length": float(table[int(number)])}, from_table=True)
     return use

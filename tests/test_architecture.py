@@ -194,6 +194,9 @@ def test_a_riddling_file_name_stands_once():
 
 
 COLUMNS = {"kinematics.wrist", "model.structures.five_axis"}  # who may know where B and C stand in a pose
+COLUMNS |= {"kinematics.rotations"}  # A, B and C of a rotation
+COLUMNS |= {"controllers.joints.program"}  # the letters that a program gives to turning joints
+COLUMNS |= {"toolpath.linearise.pole_passes"}  # A of the turns that a program gives
 
 
 def pole_columns(source: str) -> list[int]:
@@ -201,6 +204,8 @@ def pole_columns(source: str) -> list[int]:
     letters, lines = {"'A'", "'B'", "'C'"}, []
     for node in ast.walk(ast.parse(source)):
         names: set[str] = set()
+        if isinstance(node, ast.Constant) and node.value in ("ABC", "AB", "BC"):
+            lines.append(node.lineno)
         if isinstance(node, ast.Subscript):
             many = isinstance(node.slice, ast.Tuple) and bool(node.slice.elts)
             index = node.slice.elts[-1] if many else node.slice
@@ -209,10 +214,15 @@ def pole_columns(source: str) -> list[int]:
             of_pose = any(word in ast.unparse(node.value) for word in ("pose", "home"))
             if of_pose and names & ({"3", "4", "5", "-2", "-1"} if many else {"3", "4", "5", "-2"}):
                 lines.append(node.lineno)
+            of_home, of_turns = (word in ast.unparse(node.value) for word in ("home", "turns"))
+            if (of_home and names == {"-1"}) or (of_turns and many and names & {"0", "1", "2"}):
+                lines.append(node.lineno)
         elif isinstance(node, ast.Call) and ast.unparse(node.func).endswith(".index"):
             names = {ast.unparse(node.args[0])}
         elif isinstance(node, ast.Compare):
-            names = {ast.unparse(side) for side in (node.left, *node.comparators)}
+            sides = [node.left, *node.comparators]
+            sides += [element for side in sides if isinstance(side, ast.Tuple) for element in side.elts]
+            names = set(map(ast.unparse, sides))
         if names & letters:
             lines.append(node.lineno)
     return lines
@@ -223,9 +233,13 @@ def test_the_columns_of_b_and_c_are_the_wrists_matter(module):
     assert not pole_columns(MODULES[module].read_text(encoding="utf-8"))
 
 
-@pytest.mark.parametrize("line", ["poses[:, 4]", "machine.axes.index('C')", "home[3:]", "letter == 'B'", "rates['C']"])
+POLE_LINES = ["poses[:, 4]", "machine.axes.index('C')", "home[3:]", "letter == 'B'", "rates['C']", "machine.home[-1]"]
+POLE_LINES += ["letter in 'ABC'", "turns[:, 2]", "'ABC'.index(x)", "axis in ('B', 'C')", "set(axes) & set('ABC')"]
+
+
+@pytest.mark.parametrize("line", POLE_LINES)
 def test_columns_of_b_and_c_are_seen(line):
-    assert pole_columns(line) == [1]
+    assert set(pole_columns(line)) == {1}
     assert not pole_columns("poses[:, direction.c]; home[:3]; joints[:, 4]; code[i, 4]")
 
 
@@ -326,3 +340,38 @@ def test_pole_thresholds_and_modes_are_the_wrists_matter(module):
             assert not {ast.unparse(target).lstrip("_") for target in node.targets} & THRESHOLDS
         if isinstance(node, ast.Call) and ast.unparse(node.func) in ("np.sin", "sin", "math.sin"):
             assert ast.unparse(node.args[0]) not in THRESHOLDS
+
+
+# Numbers about poles that are no angles off a pole: fractions of the tolerance or of a way, ratios, steps.
+FRACTIONS = {
+    "controllers.linuxcnc.approach._SHARES",
+    "toolpath.linearise.pole_holds.NEAR",
+    "toolpath.linearise.pole_holds._OFF_POLE",
+    "toolpath.linearise.pole_holds._ARC",
+    "toolpath.linearise.pole_holds._OPPOSITE",
+    "toolpath.linearise.pole_passes._LARGE_MISS",
+    "toolpath.linearise.pole_steps.FARTHEST_STEP",
+    "toolpath.linearise.pole_steps._POLE_TURN",
+}
+
+
+def pole_constants(source: str) -> set[str]:
+    """Find the module's constants whose comment, on their line, speaks of a pole."""
+    lines, names = source.splitlines(), set()
+    for node in ast.parse(source).body:
+        if isinstance(node, ast.Assign) and "pole" in lines[node.end_lineno - 1].partition("#")[2]:
+            names |= {ast.unparse(target) for target in node.targets}
+    return names
+
+
+def test_constants_about_poles_are_seen():
+    assert pole_constants("_LEAST = 0.02  # rad off the pole\nOTHER = 1.0  # mm") == {"_LEAST"}
+    assert (
+        set().union(*({f"{m}.{name}" for name in pole_constants(MODULES[m].read_text())} for m in MODULES)) >= FRACTIONS
+    )
+
+
+@pytest.mark.parametrize("module", [m for m in MODULES if m != "kinematics.wrist"])
+def test_numbers_about_poles_are_the_wrists_matter(module):
+    constants = pole_constants(MODULES[module].read_text(encoding="utf-8"))
+    assert not {f"{module}.{name}" for name in constants} - FRACTIONS

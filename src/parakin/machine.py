@@ -28,6 +28,7 @@ from .model.rates import TwistRates, compute_twist_rates
 from .model.spec import Spec
 from .model.structures import DirectionColumns, PlatformPlacement, Structure
 from .model.traces import Model
+from .units import AXIS_UNITS
 
 _LEAST_LEG = 1e-3  # mm, of a leg at home: closures are told in parts of it
 _ABOUT = 8  # poses about home that are looked at
@@ -119,7 +120,17 @@ class Machine:
     @property
     def axis_units(self) -> tuple[str, ...]:
         """``mm`` or ``rad`` for each axis."""
-        return tuple("mm" if axis in "XYZ" else "rad" for axis in self.axes)
+        return tuple(AXIS_UNITS[axis] for axis in self.axes)
+
+    @property
+    def turning_columns(self) -> list[int]:
+        """Columns of a pose that are angles."""
+        return self.model.turning_columns
+
+    @property
+    def turning_joints(self) -> list[int]:
+        """Columns of a joint vector that are angles, legs' too."""
+        return self.model.turning_joints
 
     @cached_property
     def limits(self) -> tuple[str, ...]:

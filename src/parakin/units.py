@@ -14,6 +14,9 @@ from typing import TypeAlias
 
 from .errors import quote, suggest
 
+# Units of a pose's axes and a frame's values, ISO 841.
+AXIS_UNITS = {"X": "mm", "Y": "mm", "Z": "mm", "A": "rad", "B": "rad", "C": "rad"}
+
 Dimension: TypeAlias = tuple[int, int, int]  # powers of length, angle and time
 
 

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 from cyclopts import Parameter
 
 from ..errors import InputError, PoseError, quote, suggest
+from ..units import AXIS_UNITS
 from .values import parse_value
 
 if TYPE_CHECKING:
@@ -18,7 +19,6 @@ if TYPE_CHECKING:
     from ..toolpath.path import ToolPath
     from ..toolpath.posting.tool_lengths import ToolLength
 
-_AXES = "XYZABC"
 _EXAMPLE = "X=0,Y=0,Z=50"
 _ARGUMENTS = {"frame", "start", "reference", "tools", "arc_tolerance"}  # of read_path; options have their names
 
@@ -136,17 +136,17 @@ def parse_point(text: str, option: str) -> dict[str, float]:
     """
     parts = [part.strip() for part in text.split(",")]
     if not any("=" in part for part in parts) and len(parts) in (3, 6):
-        parts = [f"{axis}={part}" for axis, part in zip(_AXES, parts, strict=False)]
+        parts = [f"{axis}={part}" for axis, part in zip(AXIS_UNITS, parts, strict=False)]
     values: dict[str, float] = {}
     for part in parts:
         axis, equals, value = (word.strip() for word in part.partition("="))
         if not (axis and equals and value):
             raise InputError(f"{quote(part)}: expected AXIS=VALUE for each axis, such as {_EXAMPLE}", option)
         axis = axis.upper()
-        if axis not in tuple(_AXES):
-            raise InputError(f"unknown axis {quote(axis)}{suggest(axis, _AXES)}", option)
+        if axis not in AXIS_UNITS:
+            raise InputError(f"unknown axis {quote(axis)}{suggest(axis, AXIS_UNITS)}", option)
         if axis in values:
             raise InputError(f"{axis} is given twice", option)
         number = parse_value(axis, value, option)
-        values[axis] = round(math.degrees(number), 12) if axis in "ABC" else number
+        values[axis] = round(math.degrees(number), 12) if AXIS_UNITS[axis] == "rad" else number
     return values

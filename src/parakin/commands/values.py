@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from ..errors import InputError, quote, suggest
-from ..units import ANGLE, LENGTH, QuantityError, parse_quantity
+from ..units import ANGLE, AXIS_UNITS, LENGTH, QuantityError, parse_quantity
 
 if TYPE_CHECKING:
     from ..arrays import Array
@@ -26,7 +26,7 @@ def parse_value(name: str, text: str, source: str, unit: str | None = None) -> f
     """
     from ..toolpath.reading.text import LARGEST, is_number, parse_number
 
-    angular = name in "ABC" if unit is None else unit == "rad"
+    angular = (AXIS_UNITS.get(name) if unit is None else unit) == "rad"
     try:
         if is_number(text):
             value = parse_number(text)

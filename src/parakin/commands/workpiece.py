@@ -5,12 +5,12 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from ..errors import InputError, quote, suggest
+from ..units import AXIS_UNITS
 from .values import parse_value
 
 if TYPE_CHECKING:
     from ..arrays import Array
 
-_AXES = "XYZABC"
 _WORKPIECE, _PLACE = "--workpiece", "--place"
 _FORM = 'expected x,y,z or x,y,z,a,b,c (mm, degrees), or names as in "X=10,Z=-1400,C=30"'
 _EXAMPLE = "X=-100:100,Z=-1500,C=-90:90"
@@ -35,11 +35,11 @@ def parse_workpiece(text: str) -> Array:
     if all(named):
         pairs = [(name.strip().upper(), value.strip()) for name, _, value in (part.partition("=") for part in parts)]
     else:
-        pairs = list(zip(_AXES, parts, strict=False))
+        pairs = list(zip(AXIS_UNITS, parts, strict=False))
     values: dict[str, float] = {}
     for axis, value in pairs:
-        if axis not in tuple(_AXES):
-            raise InputError(f"unknown axis {quote(axis)}{suggest(axis, _AXES)}", _WORKPIECE)
+        if axis not in AXIS_UNITS:
+            raise InputError(f"unknown axis {quote(axis)}{suggest(axis, AXIS_UNITS)}", _WORKPIECE)
         if axis in values:
             raise InputError(f"{axis} is given twice", _WORKPIECE)
         values[axis] = parse_value(axis, value, _WORKPIECE)
@@ -60,8 +60,8 @@ def parse_bounds(text: str) -> dict[str, tuple[float, float]]:
         if not (axis and equals and value):
             raise InputError(f"{quote(part.strip())}: expected AXIS=LOW:HIGH or AXIS=VALUE, such as {_EXAMPLE}", _PLACE)
         axis = axis.upper()
-        if axis not in tuple(_AXES):
-            raise InputError(f"unknown axis {quote(axis)}{suggest(axis, _AXES)}", _PLACE)
+        if axis not in AXIS_UNITS:
+            raise InputError(f"unknown axis {quote(axis)}{suggest(axis, AXIS_UNITS)}", _PLACE)
         if axis in bounds:
             raise InputError(f"{axis} is given twice", _PLACE)
         low, colon, high = (word.strip() for word in value.partition(":"))

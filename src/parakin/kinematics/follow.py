@@ -24,7 +24,6 @@ def follow_path(model: Model, poses: Array, mode: str, free_below: float = EXACT
             at_home = solve_inverse(model, np.array([model.home]), model.mode)[0, wrist.first]
             first = np.full(len(poses), at_home) if free.all() else fill_free(joints[:, wrist.first], free)
             joints[free] = wrist.solve_with_first(poses[free], mode, first[free])
-    for i, drive in enumerate(model.drives):
-        if drive.unit == "rad":
-            joints[:, i] = unwind_angles(joints[:, i])
+    for i in model.turning_joints:
+        joints[:, i] = unwind_angles(joints[:, i])
     return joints

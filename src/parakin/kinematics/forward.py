@@ -22,7 +22,7 @@ from ..kernels.batch import (
 from ..model.traces import Model
 from .inverse import SINGULAR, solve_inverse
 from .tapes import collect_newton_tapes
-from .turns import TURN, wrap_angle
+from .turns import count_nearest_turns, wrap_angle
 from .wrist import SAME_MODE, bring_within_poles, flip_mode, is_upright
 
 CLOSED = 1e-9  # greatest closure error of an answer, mm in a machine of a metre
@@ -175,7 +175,7 @@ def _group_by_mode(model: Model, poses: Array, joints: Array) -> dict[str, Indic
 
 def _measure_way(model: Model, solution: Solution, starts: Array) -> Array:
     """Measure how far answers lie from their starts, mm, a turn counted as the greatest leg."""
-    turning, direction = np.array([axis in "ABC" for axis in model.axes]), model.structure.direction
+    turning, direction = model.turning_columns, model.structure.direction
     way = solution.poses - starts
     way[:, turning] = wrap_angle(way[:, turning])
     if direction is not None:  # how far apart the tool's axes point, however B and C are written
@@ -206,12 +206,11 @@ def _put_rows(solution: Solution, rows: Indices, other: Solution) -> None:
 
 def _count_turns(model: Model, poses: Array, near: Array) -> None:
     """Bring the angles of a free platform to B within ±90° and within half a turn of those near by; in place."""
-    columns = [i for i, axis in enumerate(model.axes) if axis in "ABC"]
+    columns = model.turning_columns.copy()
     if len(columns) == 3:
         poses[:, columns] = bring_within_poles(poses[:, columns])
         del columns[1]
-    for i in columns:
-        poses[:, i] -= TURN * np.round((poses[:, i] - near[..., i]) / TURN)
+    count_nearest_turns(poses, np.atleast_2d(near), columns)
 
 
 def compute_closure_tolerance(model: Model) -> float:

@@ -12,6 +12,7 @@ from ..arrays import Array, split_rows
 from .turns import fill_free, find_nearest_turn, unwind_angles, wrap_angle
 from .wrist import EXACT, find_crossings, flip_rotation, has_swing
 
+TURNS = "ABC"  # about X, Y and Z
 LEVEL = 1e-12  # rounding error of a rotation's entries
 _BLOCK = 1 << 13  # rotations whose many intermediate arrays stay in the cache
 
@@ -32,6 +33,21 @@ def compute_rotations(turns: Array) -> Array:
     return np.moveaxis(np.array(list_rotation_rows(a, b, c)), 2, 0)
 
 
+def collect_turns(axes: Sequence[str], poses: Array) -> Array:
+    """Collect the turns A, B, C (n, 3) of poses (n, axes); one that is no axis is zero."""
+    turns = np.zeros((len(poses), 3))
+    for column, axis in enumerate(axes):
+        if axis in TURNS:
+            turns[:, TURNS.index(axis)] = poses[:, column]
+    return turns
+
+
+def get_turning_axis(letter: str) -> Array:
+    """Return the axis, a unit vector (3,), about which a turn A, B or C goes."""
+    axis: Array = np.eye(3)[TURNS.index(letter)]
+    return axis
+
+
 def find_turn_about(rotation: Array, letter: str) -> float | None:
     """Find the angle by which a rotation (3, 3) turns about one axis alone; None if it does not."""
     i, j, k = _list_cyclic(letter)
@@ -50,7 +66,7 @@ def find_twist(rotation: Array, letter: str) -> Any:
 
 
 def _list_cyclic(letter: str) -> tuple[int, int, int]:
-    i = "ABC".index(letter)
+    i = TURNS.index(letter)
     return i, (i + 1) % 3, (i + 2) % 3
 
 

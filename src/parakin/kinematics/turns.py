@@ -23,6 +23,12 @@ def find_nearest_turn(angle: Array, near: Array) -> Array:
     return nearest
 
 
+def measure_whole_turns(angle: Array, near: Array) -> Array:
+    """Measure the whole turns, rad, that bring angles within half a turn of others when they are added."""
+    turns: Array = TURN * np.round((near - angle) / TURN)
+    return turns
+
+
 def count_nearest_turns(joints: Array, near: Array, columns: Sequence[int]) -> None:
     """Count the turns of joints (n, joints) in ``columns`` so that they are within half a turn of others; in place.
 
@@ -30,7 +36,7 @@ def count_nearest_turns(joints: Array, near: Array, columns: Sequence[int]) -> N
     """
     for column in columns:
         angle = joints[:, column]
-        counted = angle - TURN * np.round((angle - near[:, column]) / TURN)
+        counted = angle + measure_whole_turns(angle, near[:, column])
         joints[:, column] = np.where(np.isfinite(counted), counted, angle)
 
 

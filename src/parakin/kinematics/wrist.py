@@ -41,7 +41,7 @@ FAR_TILT   15°          second angle at which a small square about home goes ne
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -53,7 +53,7 @@ from ..model.parts import Drive
 from ..model.structures import DirectionColumns
 from ..model.traces import Model
 from .inverse import solve_inverse
-from .turns import count_nearest_turns, find_nearest_turn, wrap_angle
+from .turns import count_nearest_turns, find_nearest_turn, measure_whole_turns, wrap_angle
 
 EXACT = 1e-9
 PRINTED = 2e-6
@@ -129,6 +129,18 @@ def flip_mode(mode: str) -> str:
 # A direction: C is the first angle, B the second.
 
 
+def is_on_pole(square: Any, within: float) -> Any:
+    """Tell where a tool's axis, a unit vector, is on a pole, by the square of its part across the pole."""
+    return square < within * within
+
+
+def solve_direction(k: Array) -> tuple[Array, Array, Flags]:
+    """Solve k = Rz(C)·Ry(B)·z, (n, 3), for B from 0 to 180° and C; tell where C is free, to printed digits."""
+    kx, ky, kz = k.T
+    square = kx * kx + ky * ky
+    return np.arctan2(np.sqrt(square), kz), np.arctan2(ky, kx), is_on_pole(square, PRINTED)
+
+
 def is_upright(b: Array, within: float = EXACT) -> Flags:
     """Tell where a tool at B stands on the pole of B and C, up or down."""
     upright: Flags = np.abs(b - 0.5 * np.pi) > 0.5 * np.pi - within
@@ -152,6 +164,11 @@ def cross_direction_pole(turns: Array, at: Indices) -> None:
 def flip_azimuth(azimuth: float, sense: float = 1.0) -> float:
     """Return the azimuth about a pole at which the first angle is the same in the other mode, half a turn on."""
     return azimuth + sense * np.pi
+
+
+def continue_turns(turns: Array, row: int) -> None:
+    """Let C of the turns A, B, C (n, 3) behind a row go on from that row's by whole turns; in place."""
+    turns[row + 1 :, 2] += measure_whole_turns(turns[row + 1, 2], turns[row, 2])
 
 
 def fold_direction(turns: Array) -> tuple[Array, Array]:
@@ -210,11 +227,6 @@ class Wrist:
     def pair(self) -> list[int]:
         """Both indices, the first axis first."""
         return [self.first, self.second]
-
-    @cached_property
-    def turning(self) -> list[int]:
-        """Indices of all joints that turn, legs' too."""
-        return [i for i, drive in enumerate(self.model.drives) if drive.unit == "rad"]
 
     @property
     def direction(self) -> DirectionColumns:
@@ -280,7 +292,7 @@ class Wrist:
             joints = solve_inverse(self.model, poses, each)
             if len(free):
                 joints[free] = self.solve_with_first(poses[free], each, guess[free, self.first])
-            count_nearest_turns(joints, guess, self.turning)
+            count_nearest_turns(joints, guess, self.model.turning_joints)
             solutions.append(joints)
             ways.append((np.abs(joints - guess) / scale).sum(1))
         own, other = solutions

@@ -29,6 +29,7 @@ from ..algebra import (
 )
 from ..errors import DescriptionError
 from ..kernels.tape import Tape, compile_tape
+from ..units import AXIS_UNITS
 from .legs import Inverse
 from .limits import HomeRods, Limit, compute_platform_points, group_joints_by_leg, list_limits
 from .rates import compute_twist_rates
@@ -152,6 +153,16 @@ class Model:
         turns = any(word.startswith("r") for word in self.spec.motion)
         held = [leg.sphere([0.0] * len(leg.drives)) is not None for leg in self.spec.legs]
         return not turns and all(held) and len(held) in CENTRES_NEEDED
+
+    @cached_property
+    def turning_columns(self) -> list[int]:
+        """Columns of a pose that are angles."""
+        return [column for column, axis in enumerate(self.axes) if AXIS_UNITS[axis] == "rad"]
+
+    @cached_property
+    def turning_joints(self) -> list[int]:
+        """Columns of a joint vector that are angles, legs' too."""
+        return [column for column, drive in enumerate(self.drives) if drive.unit == "rad"]
 
     @property
     def has_modes(self) -> bool:
@@ -412,7 +423,7 @@ class Model:
     def beside_tape(self, limit: float) -> Tape:
         """Compile pose, another -> by how much each coordinate differs less than a part of the greatest leg, or rad."""
         n, size = self._poses, max(self.sizes)
-        bounds = [limit if axis in "ABC" else limit * size for axis in self.axes]
+        bounds = [limit if AXIS_UNITS[axis] == "rad" else limit * size for axis in self.axes]
 
         def outputs(trace: Trace) -> list[Scalar]:
             pairs = zip(trace.inputs(n), trace.inputs(n, n), bounds, strict=True)

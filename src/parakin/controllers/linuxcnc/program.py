@@ -50,7 +50,7 @@ def make_linuxcnc_program(trajectory: Trajectory, *, forced: str | None = None, 
         raise PoseError(f"mode {posted.mode!r}: LinuxCNC's kinematics of {machine.name} has {machine.mode!r} only")
     _refuse_turns(machine, posted.poses)
     motions = build_straight_motions(trajectory, *choose_axis_rates(machine))
-    blend = tolerance * (_TURNING if set(machine.axes) & set("ABC") else 1.0)
+    blend = tolerance * (_TURNING if machine.turning_columns else 1.0)
     approach = plan_approach(machine, trajectory.curve.corner[0], trajectory.joint_path.joints[0], posted.mode)
 
     check_events(posted.path)
@@ -64,12 +64,11 @@ def make_linuxcnc_program(trajectory: Trajectory, *, forced: str | None = None, 
 
 def _refuse_turns(machine: Machine, poses: Array) -> None:
     most = TURNS if machine.has_direction else 0.5
-    for axis, values in zip(machine.axes, poses.T, strict=True):
-        turns = np.abs(values).max(initial=0.0) / (2.0 * np.pi)
-        if axis in "ABC" and turns > most + 1e-9:
-            raise PoseError(
-                f"{axis} would turn {turns:.1f} times, in LinuxCNC's configuration it has {most:g} either way"
-            )
+    for column in machine.turning_columns:
+        turns = np.abs(poses[:, column]).max(initial=0.0) / (2.0 * np.pi)
+        if turns > most + 1e-9:
+            axis, turned = machine.axes[column], f"would turn {turns:.1f} times"
+            raise PoseError(f"{axis} {turned}, in LinuxCNC's configuration it has {most:g} either way")
 
 
 def _format_program(

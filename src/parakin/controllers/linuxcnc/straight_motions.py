@@ -111,8 +111,9 @@ def build_straight_motions(trajectory: Trajectory, speeds: Array, accelerations:
 
 def _name_reasons(machine: Machine) -> tuple[str, ...]:
     """Name what holds motions up, in the order of the bounds of their cycles."""
-    axes = [f"{axis} turns, and its axis is no faster" for axis in machine.axes if axis in "ABC"]
-    linear = [f"{axis} is no faster" for axis in machine.axes if axis not in "ABC"]
+    units = list(zip(machine.axes, machine.axis_units, strict=True))
+    axes = [f"{axis} turns, and its axis is no faster" for axis, unit in units if unit == "rad"]
+    linear = [f"{axis} is no faster" for axis, unit in units if unit == "mm"]
     return "", *linear, *axes, "a joint would pass its speed", "motions so short can't be blended faster"
 
 

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ...arrays import Array
+from ...kinematics.rotations import TURNS
 from ...toolpath.posting.frames import find_frame_angles
 from ...toolpath.posting.setup_texts import describe_tools
 from ...toolpath.reading.cl.dialects import TITLES
@@ -130,6 +131,6 @@ def _measure_steps(path: ToolPath) -> Array:
 def _format_placement(frame: Array) -> str:
     """Format a frame (3, 4) by its origin and its angles, R = Rz(C)·Ry(B)·Rx(A)."""
     parts = [f"{letter} {format_value(float(v), 'mm')}" for letter, v in zip("XYZ", frame[:, 3], strict=True)]
-    angles = zip("ABC", find_frame_angles(frame), strict=True)
+    angles = zip(TURNS, find_frame_angles(frame), strict=True)
     parts += [f"{letter} {format_value(angle, 'rad')}" for letter, angle in angles]
     return ", ".join(parts)

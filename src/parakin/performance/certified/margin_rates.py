@@ -23,7 +23,7 @@ _MOST = 1e300  # stands for no bound, so that times zero it is zero
 class MarginRates:
     """A machine in one working mode, bounded over boxes [low, high] of poses, (N, axes) mm and rad.
 
-    Margins are in the order of :attr:`Machine.limits`; ``turning`` are the joints that are angles. Bounds hold wherever
+    Margins are in the order of :attr:`Machine.limits`; behind them are the joints that are angles. Bounds hold wherever
     in the box the legs close.
 
     Sine and cosine of an angle that jumps at ±180° are taken as quotients, which do not jump. Where the angle is free
@@ -33,15 +33,11 @@ class MarginRates:
     machine: Machine
     mode: str
 
-    @cached_property
-    def turning(self) -> list[int]:
-        return [i for i, unit in enumerate(self.machine.joint_units) if unit == "rad"]
-
     def _compile_rates(self, trace: Trace) -> IntervalProgram:
         pose = trace.inputs(len(self.machine.axes))
         joints = self.machine.trace_inverse(pose, self.mode)[0]
         margins = self.machine.trace_margins(pose, self.mode)
-        values: list[Scalar] = [*margins, *(joints[i] for i in self.turning)]
+        values: list[Scalar] = [*margins, *(joints[i] for i in self.machine.turning_joints)]
         return IntervalProgram(trace, [derivative(value, axis) for value in values for axis in pose])
 
     @cached_property

@@ -169,7 +169,7 @@ class MotionProver:
         On the pole the pose does not tell the first joint, on which everything else depends with a table.
         """
         machine, wrist = self.motions.machine, self.motions.wrist
-        turns = [i for i, unit in enumerate(machine.axis_units) if unit == "rad"]
+        turns = machine.turning_columns
         rows = np.flatnonzero(still & (low[:, turns] == high[:, turns]).all(1))
         if wrist is None or not len(rows):
             return _Boxes(low, high, wrist_modes, rows[:0])

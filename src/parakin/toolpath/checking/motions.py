@@ -53,7 +53,7 @@ class PathMotions:
         self.posted, self.machine = posted, posted.machine
         self.wrist = self.machine.wrist
         self.wrist_joints = [] if self.wrist is None else sorted(self.wrist.pair)
-        self.turning_joints = [i for i, unit in enumerate(self.machine.joint_units) if unit == "rad"]
+        self.turning_joints = self.machine.turning_joints
         self.modes = [posted.mode] if self.wrist is None else [posted.mode, self.wrist.other_mode(posted.mode)]
         ends = [f"{self.machine.joints[i]}.{side}" for i in self.wrist_joints for side in ("min", "max")]
         self.wrist_limits = np.array([name in ends for name in self.machine.limits], bool)

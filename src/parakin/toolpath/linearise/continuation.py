@@ -7,12 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...arrays import Array, Flags, Indices
-from ...kinematics.rotations import compute_rotations, find_nearest_rotation_turns
+from ...kinematics.rotations import collect_turns, compute_rotations, find_nearest_rotation_turns
 from ...kinematics.turns import find_nearest_turn
 from ...kinematics.wrist import continue_direction
 from ...machine import Machine
 from ..posting.frames import build_frame_from_angles, compute_poses
-from ..posting.turn_steps import find_turning_columns
 
 MACHINE_FRAME = build_frame_from_angles(0, 0, 0, 0, 0, 0)
 _MATCHING = 1e-9  # of a rotation: what is rounding
@@ -51,7 +50,7 @@ def continue_turned_points(
     even : (m, axes) the poses to take where they are given, and not NaN
     """
     poses = _point_tool(machine, tip, np.ascontiguousarray(rotation[:, :, 2]), before)
-    columns = find_turning_columns(machine)
+    columns = machine.turning_columns
     if len(columns) == 3:
         poses[:, columns] = find_nearest_rotation_turns(rotation, before.poses[:, columns])
     poses = np.where(np.isfinite(even), even, poses)
@@ -60,11 +59,8 @@ def continue_turned_points(
 
 def find_matching_poses(machine: Machine, poses: Array, rotation: Array) -> Flags:
     """Find poses (m, axes) that turn the tool as rotations (m, 3, 3) in M do, as far as the machine can."""
-    columns = find_turning_columns(machine)
-    turns = np.zeros((len(poses), 3))
-    turns[:, ["ABC".index(machine.axes[column]) for column in columns]] = poses[:, columns]
-    off = rotation - compute_rotations(turns)
-    matching: Flags = np.abs(off if len(columns) == 3 else off[:, :, 2:]).max(axis=(1, 2)) < _MATCHING
+    off = rotation - compute_rotations(collect_turns(machine.axes, poses))
+    matching: Flags = np.abs(off if len(machine.turning_columns) == 3 else off[:, :, 2:]).max(axis=(1, 2)) < _MATCHING
     return matching
 
 
@@ -74,8 +70,8 @@ def _point_tool(machine: Machine, tip: Array, axis: Array, before: PosedPoints) 
     if machine.direction is not None:
         continue_direction(poses[:, machine.direction.pair], before.poses[:, machine.direction.pair])
     else:
-        for column in find_turning_columns(machine):
-            poses[:, column] = find_nearest_turn(poses[:, column], before.poses[:, column])
+        turning = machine.turning_columns
+        poses[:, turning] = find_nearest_turn(poses[:, turning], before.poses[:, turning])
     return poses
 
 
@@ -85,7 +81,6 @@ def _solve_joints(machine: Machine, mode: str, poses: Array, before: PosedPoints
         joints = machine.inverse(poses, mode)
     else:
         joints = machine.wrist.continue_joints(poses, mode, (before.poses, before.joints))
-    for column, unit in enumerate(machine.joint_units):
-        if unit == "rad":
-            joints[:, column] = find_nearest_turn(joints[:, column], before.joints[:, column])
+    turning = machine.turning_joints
+    joints[:, turning] = find_nearest_turn(joints[:, turning], before.joints[:, turning])
     return joints

@@ -9,6 +9,7 @@ from typing import Literal, TypeAlias
 import numpy as np
 
 from ...arrays import Array, Indices
+from ...kinematics.rotations import collect_turns
 from ...machine import Machine
 from ..posting.frames import compute_poses
 from ..programmed_path import ProgrammedPath, compute_norms, compute_tool_axes
@@ -89,7 +90,7 @@ class Deviation:
                 ahead = np.einsum("ij,ij->i", tip[by_tip] - point[by_tip], way)
                 nearest = np.clip(share[by_tip] + np.where(np.isfinite(ahead), ahead, 0.0), 0.0, 1.0)
                 point[by_tip], k[by_tip] = self.programmed.interpolate(motion, nearest)
-        if self._turning_axes < 2:  # the machine points the tool as it can
+        if len(self.machine.turning_columns) < 2:  # the machine points the tool as it can
             k = self._compute_axes(compute_poses(self.machine, point, k, MACHINE_FRAME)[0])
         reached = self._compute_axes(poses)
         extension = self.programmed.interpolate_extension(record, share)
@@ -106,11 +107,6 @@ class Deviation:
             poses = self.machine.forward(joints, near=poses).poses
         return poses
 
-    @property
-    def _turning_axes(self) -> int:
-        """How many of A, B and C the machine has."""
-        return sum(letter in "ABC" for letter in self.machine.axes)
-
     @cached_property
     def _upright(self) -> Array:
         """The tool's axis at A, B, C = 0."""
@@ -118,11 +114,8 @@ class Deviation:
 
     def _compute_axes(self, poses: Array) -> Array:
         """Compute the tool axes (m, 3) of poses."""
-        turns = np.zeros((len(poses), 3))
-        for column, letter in enumerate(self.machine.axes):
-            if letter in "ABC":
-                turns[:, "ABC".index(letter)] = poses[:, column]
-        if self._turning_axes >= 2:
+        turns = collect_turns(self.machine.axes, poses)
+        if len(self.machine.turning_columns) >= 2:
             return compute_tool_axes(turns)
         x, y, z = self._upright
         (sa, sb, sc), (ca, cb, cc) = np.sin(turns.T), np.cos(turns.T)

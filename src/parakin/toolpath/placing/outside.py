@@ -6,14 +6,15 @@ limits then, and the limits that they break say little.
 
 from __future__ import annotations
 
-import math
 from typing import NamedTuple
 
 import numpy as np
 
 from ...arrays import Array
 from ...errors import PoseError
+from ...kinematics.rotations import TURNS
 from ...machine import Machine
+from ...units import AXIS_UNITS, to_display
 from ..path import ToolPath
 from ..posting.frames import compose_frames, find_frame_angles
 from ..posting.post import post_path
@@ -67,7 +68,7 @@ def find_outside(posted: Posted, path: ToolPath, workpiece: Array | None) -> Out
     placed = compose_frames(workpiece, None).copy()
     placed[:, 3] = np.round(placed[:, 3] + shift, _ROUNDED) + 0.0
     values = dict(zip("XYZ", placed[:, 3].tolist(), strict=True))
-    turns = dict(zip("ABC", find_frame_angles(placed), strict=True))
+    turns = dict(zip(TURNS, find_frame_angles(placed), strict=True))
     values |= {letter: angle for letter, angle in turns.items() if angle}
     broken = None
     if len(path) <= _MOST_RECORDS:
@@ -136,7 +137,7 @@ def describe_outside(outside: Outside) -> str:
 
 def format_option(outside: Outside) -> str:
     """Format the suggestion as the option of the command: ``--workpiece X=0,Y=0,Z=-1650``."""
-    values = {k: math.degrees(v) if k in "ABC" else v for k, v in outside.workpiece.items()}
+    values = {axis: to_display(value, AXIS_UNITS[axis]) for axis, value in outside.workpiece.items()}
     return "--workpiece " + ",".join(f"{letter}={value:.10g}" for letter, value in values.items())
 
 

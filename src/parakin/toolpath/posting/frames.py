@@ -13,6 +13,7 @@ from ...arrays import Array, Flags, split_rows
 from ...errors import PoseError
 from ...kinematics.rotations import compute_rotations, list_rotation_rows
 from ...machine import Machine
+from ...units import AXIS_UNITS
 from .programmed_angles import find_programmed_angles
 from .tool_orientation import BLOCK, find_tool_orientation
 from .turn_steps import add_turn_steps
@@ -35,7 +36,7 @@ def workpiece(
     Numbers are mm and rad; texts carry their unit, ``B="30 deg"``.
     """
     values = {"X": X, "Y": Y, "Z": Z, "A": A, "B": B, "C": C}
-    numbers = [parse_coordinate(axis, value, "mm" if axis in "XYZ" else "rad") for axis, value in values.items()]
+    numbers = [parse_coordinate(axis, value, AXIS_UNITS[axis]) for axis, value in values.items()]
     if not all(map(math.isfinite, numbers)):
         raise PoseError(f"workpiece: finite numbers expected, not {' '.join(f'{number:g}' for number in numbers)}")
     return build_frame_from_angles(*numbers)

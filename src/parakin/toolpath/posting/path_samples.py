@@ -13,7 +13,7 @@ import numpy as np
 
 from ...arrays import Array, Flags, Indices
 from ...kinematics.turns import wrap_angle
-from ...kinematics.wrist import PRINTED, fold_direction
+from ...kinematics.wrist import PRINTED, fold_direction, is_upright
 from ...machine import Machine
 from ..path import ToolPath
 from ..programmed_path import ProgrammedPath
@@ -96,7 +96,7 @@ def _find_wide_steps(machine: Machine, poses: Array, mode: str, has_free_directi
     wide = np.zeros(len(poses) - 1, np.bool_)
     if machine.direction is not None and has_free_direction:
         b, c = fold_direction(poses[:, machine.direction.pair])
-        wide |= _turns_far(c, np.abs(np.sin(b)) < PRINTED)
+        wide |= _turns_far(c, is_upright(b, PRINTED))
     if machine.wrist is not None:
         first = machine.inverse(poses, mode)[:, machine.wrist.first]
         wide |= _turns_far(first, machine.wrist.find_free(poses, PRINTED))

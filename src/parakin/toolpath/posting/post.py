@@ -15,7 +15,6 @@ from .offences import judge_path
 from .path_samples import sample_path
 from .posted import Posted
 from .tool_lengths import fit_tool_lengths
-from .turn_steps import find_turning_columns
 from .working_mode import follow_working_mode, list_candidate_modes
 
 
@@ -73,7 +72,7 @@ def post_path(
 
 def _note_lost_turns(machine: Machine, path: ToolPath) -> ToolPath:
     """Add a note to a path that turns the tool about its own axis if the machine has no turn to do so."""
-    if path.turns is None or find_turning_columns(machine):
+    if path.turns is None or machine.turning_columns:
         return path
     turned = np.flatnonzero(np.abs(np.diff(path.turns, axis=0)).max(1, initial=0.0) > 0.0)
     text = f"A, B or C turns the tool, and {machine.name} can't: left out where it turns about the tool's own axis"

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 
 from ...arrays import Array
-from ...kinematics.rotations import LEVEL, find_turn_about, find_twist, follow_rotations, follow_twists
+from ...kinematics.rotations import LEVEL, TURNS, find_turn_about, find_twist, follow_rotations, follow_twists
+from ...kinematics.turns import measure_whole_turns
 from .tool_orientation import ToolOrientation
 from .turn_steps import add_turn_steps
 
@@ -24,7 +23,7 @@ def find_programmed_angles(orientation: ToolOrientation, turns: Array, frame: Ar
         return None
     rotation = frame[:, :3]
     yaw = find_turn_about(rotation, last)
-    own = [letter in letters for letter in "ABC"]
+    own = [letter in letters for letter in TURNS]
     upright = orientation.tool is None or np.abs(orientation.tool - np.eye(3)).max() < LEVEL
     if yaw is not None and upright and not turns[:, [not letter for letter in own]].any():
         angles = turns[:, own]
@@ -39,6 +38,6 @@ def find_programmed_angles(orientation: ToolOrientation, turns: Array, frame: Ar
         angles = follow_twists(steps, rotation, orientation.tool, last)[:, None]
     else:
         angles = follow_rotations(steps, rotation, start)
-    angles += 2.0 * math.pi * np.round((start - angles[0]) / (2.0 * math.pi))
+    angles += measure_whole_turns(angles[0], start)
     at_given: Array = angles[at_records]
     return at_given

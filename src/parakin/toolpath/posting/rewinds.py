@@ -16,8 +16,9 @@ import numpy as np
 from ...arguments import check_arguments
 from ...arrays import Array, Flags, Indices
 from ...errors import PoseError
+from ...kinematics.rotations import collect_turns
 from ...kinematics.turns import TURN
-from ...kinematics.wrist import NEAR_TURN, find_nearest_direction
+from ...kinematics.wrist import NEAR_TURN, continue_turns, find_nearest_direction
 from ...machine import Machine
 from ..path import Note, ToolPath
 from ..programmed_path import compute_tool_axes
@@ -249,9 +250,7 @@ class _RewindBuilder:
             rows.append(legs)
         if self.machine.check(np.array(poses), np.array(rows), mode).any():
             return None
-        turns = np.zeros((len(poses), 3))
-        turns[:, 1:] = np.array(poses)[:, wrist.direction.pair]
-        axes: Array = compute_tool_axes(turns) @ frame[:, :3]
+        axes: Array = compute_tool_axes(collect_turns(self.machine.axes, np.array(poses))) @ frame[:, :3]
         return axes
 
 
@@ -307,5 +306,5 @@ def _insert_turns(turns: Array, at: Indices, axis: Array) -> Array:
     for row, direction in zip(new.tolist(), axis, strict=True):
         inserted[row] = find_nearest_direction(direction[None], inserted[row - 1 : row])[0]
         if row + 1 < len(inserted) and not np.isnan(inserted[row + 1, 0]):
-            inserted[row + 1 :, 2] += TURN * round(float(inserted[row, 2] - inserted[row + 1, 2]) / TURN)
+            continue_turns(inserted, row)
     return inserted

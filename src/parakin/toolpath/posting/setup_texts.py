@@ -6,6 +6,7 @@ import math
 from collections.abc import Iterator
 
 from ...arrays import Array
+from ...kinematics.rotations import TURNS
 from ..path import ToolPath
 from .frames import find_frame_angles
 from .posted import Posted
@@ -25,7 +26,7 @@ def describe_frame(frame: Array) -> str:
     words = [f"{letter} {float(value):.6g}" for letter, value in zip("XYZ", frame[:, 3] + 0.0, strict=True)]
     degrees = [round(math.degrees(angle), 9) + 0.0 for angle in find_frame_angles(frame)]
     if any(degrees):
-        words += [f"{letter} {value:.6g}°" for letter, value in zip("ABC", degrees, strict=True)]
+        words += [f"{letter} {value:.6g}°" for letter, value in zip(TURNS, degrees, strict=True)]
     return " ".join(words)
 
 

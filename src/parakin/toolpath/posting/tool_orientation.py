@@ -10,9 +10,9 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from ...arrays import Array, split_rows
-from ...kinematics.rotations import LEVEL
+from ...kinematics.rotations import LEVEL, get_turning_axis
 from ...kinematics.turns import turn_ahead, unwind_angles
-from ...kinematics.wrist import EXACT, PRINTED, cross_direction_pole
+from ...kinematics.wrist import EXACT, PRINTED, cross_direction_pole, is_on_pole, solve_direction
 from ...machine import Machine
 
 BLOCK = 1 << 13  # records whose many intermediate arrays stay in the cache
@@ -65,17 +65,17 @@ class ToolOrientation:
 
 def find_tool_orientation(machine: Machine) -> ToolOrientation:
     """Find how a machine points its tool: by A, B, C, by a direction's B and C, by one turn, or not at all."""
-    letters = "".join(letter for letter in machine.axes if letter in "ABC")
+    letters = "".join(machine.axes[column] for column in machine.turning_columns)
     if len(letters) == 3:
-        home_c = float(machine.home[-1])  # C is free, and the machine is made for its home
+        home_c = float(machine.home[machine.turning_columns[-1]])  # C is free, and the machine is made for its home
         return ToolOrientation(letters, lambda k: _solve_three_turns(k, home_c), "B")
     if machine.has_direction:
         return ToolOrientation(letters, _solve_direction, "C", has_direction=True)
     tool = np.array(machine.structure.tool_rotation, dtype=np.float64)
     at_home = np.array(machine.structure.tool_axis, dtype=np.float64)
-    turning = np.eye(3)["ABC".index(letters[0])] if letters else at_home
+    turning = get_turning_axis(letters[0]) if letters else at_home
     cosine = float(turning @ at_home)
-    if 1.0 - cosine * cosine < EXACT * EXACT:  # no turn, or one about the tool's own axis, which changes nothing
+    if is_on_pole(1.0 - cosine * cosine, EXACT):  # no turn, or one about the tool's own axis, which changes nothing
         restriction = "keeps it upright" if abs(at_home[2] - 1.0) < LEVEL else "keeps its direction"
 
         def solve_no_turn(k: Array) -> TurnSolution:
@@ -89,9 +89,8 @@ def find_tool_orientation(machine: Machine) -> ToolOrientation:
 
 def _solve_direction(k: Array) -> TurnSolution:
     """Solve k = Rz(C)·Ry(B)·z for B from 0 to 180° and C."""
-    kx, ky, kz = k.T
-    square = kx * kx + ky * ky
-    return [np.arctan2(np.sqrt(square), kz), np.arctan2(ky, kx)], square < PRINTED * PRINTED, None
+    b, c, free = solve_direction(k)
+    return [b, c], free, None
 
 
 def _solve_three_turns(k: Array, c: float) -> TurnSolution:
@@ -99,7 +98,7 @@ def _solve_three_turns(k: Array, c: float) -> TurnSolution:
     cos, sin = math.cos(c), math.sin(c)
     kx, ky, kz = cos * k[:, 0] + sin * k[:, 1], cos * k[:, 1] - sin * k[:, 0], k[:, 2]
     square = kx * kx + kz * kz
-    return [np.arctan2(-ky, np.sqrt(square)), np.arctan2(kx, kz), np.full(len(k), c)], square < PRINTED * PRINTED, None
+    return [np.arctan2(-ky, np.sqrt(square)), np.arctan2(kx, kz), np.full(len(k), c)], is_on_pole(square, PRINTED), None
 
 
 def _solve_one_turn(k: Array, turning: Array, at_home: Array, cosine: float) -> TurnSolution:
@@ -110,7 +109,7 @@ def _solve_one_turn(k: Array, turning: Array, at_home: Array, cosine: float) -> 
     along = k @ turning
     across = np.sqrt(np.maximum(0.0, 1.0 - along * along))
     angle = np.arctan2(k @ np.cross(turning, at_home), k @ at_home - cosine * along)
-    return [angle], across * across < PRINTED * PRINTED, np.abs(np.arctan2(along, across) - math.asin(cosine))
+    return [angle], is_on_pole(across * across, PRINTED), np.abs(np.arctan2(along, across) - math.asin(cosine))
 
 
 def _measure_angle(k: Array, fixed: Array) -> Array:

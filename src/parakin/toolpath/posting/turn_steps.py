@@ -10,21 +10,10 @@ import numpy as np
 from ...arrays import Array, Indices
 from ...errors import PoseError
 from ...kinematics.turns import TURN
-from ...machine import Machine
 
 TURN_STEP = math.pi / 36.0  # rad: turns that change evenly are followed in steps no longer than this
 _MOST_STEPS = 1 << 16  # in a motion
 WIDE = math.pi / 3.0  # rad a joint may turn from step to step
-
-
-def find_turning_columns(machine: Machine) -> list[int]:
-    """Find the columns of a pose that are angles."""
-    return [column for column, letter in enumerate(machine.axes) if letter in "ABC"]
-
-
-def find_turning_joints(machine: Machine) -> list[int]:
-    """Find the columns of a joint vector that are angles."""
-    return [column for column, unit in enumerate(machine.joint_units) if unit == "rad"]
 
 
 def count_steps(turned: Array) -> Indices:

@@ -13,7 +13,6 @@ from ...machine import Machine
 from ..path import ToolPath
 from .path_samples import SampledPath
 from .turn_counts import TurningJoint, choose_turns, find_turns_in_range
-from .turn_steps import find_turning_joints
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,7 +47,7 @@ def follow_working_mode(machine: Machine, path: ToolPath, sampled: SampledPath, 
     """
     poses = sampled.poses[sampled.at_records]
     joints = machine.follow(sampled.poses, mode, PRINTED)[sampled.at_records]
-    turning = find_turning_joints(machine)
+    turning = machine.turning_joints
     if not turning or not len(joints):
         return ModeSolution(mode, poses, joints, 0)
     home = np.nan_to_num(machine.inverse(machine.home, mode)).tolist()

@@ -72,7 +72,7 @@ def round_corners(
     smooth : whether corners are rounded at all; if not, the curve is parted at every corner
     """
     poses = posted.poses
-    angles = np.array([axis in "ABC" for axis in posted.machine.axes])
+    angles = np.array(posted.machine.axis_units) == "rad"
     scale = np.where(angles, LEVER, 1.0)
     lengths = _compute_norms(np.diff(poses, axis=0) * scale)
     moved = np.concatenate([[True], lengths > _SAME])
@@ -122,7 +122,7 @@ def _bound_axis_turn(machine: Machine, corner: Array, turn: Array) -> Array:
 
     The axis turns no faster than all angles together. A turn of C moves it by sin B only, where A does not turn it.
     """
-    columns = [i for i, unit in enumerate(machine.axis_units) if unit == "rad"]
+    columns = machine.turning_columns
     rates = {i: np.abs(turn[:, i]) for i in columns}
     direction = machine.direction
     if direction is not None:

@@ -31,7 +31,7 @@ def find_nearest_joints(machine: Machine, mode: str, poses: Array, guess: Array)
     if machine.wrist is not None:
         return machine.wrist.solve_nearest(poses, mode, guess, EXACT)[0]
     joints = machine.inverse(poses, mode)
-    count_nearest_turns(joints, guess, [i for i, unit in enumerate(machine.joint_units) if unit == "rad"])
+    count_nearest_turns(joints, guess, machine.turning_joints)
     return joints
 
 

@@ -9,6 +9,7 @@ import numpy as np
 from ...arrays import Array, Flags, Indices
 from ...errors import PoseError
 from ...kernels.batch import run_in_threads
+from ...kinematics.turns import measure_whole_turns
 from ..path import ToolPath
 from ..posting.posted import Posted
 from .corners import Curve
@@ -202,10 +203,10 @@ def _follow_rows(posted: Posted, curve: Curve, segment: Indices, offset: Array) 
     """Follow the joints from the first row to the last, and fit splines through them."""
     length = np.append(0.0, np.cumsum(curve.length))[segment] + offset
     joints = follow_curve(posted.machine, posted.mode, curve.poses(segment, offset), length)
-    turns = np.round((posted.joints[0] - joints[0]) / (2.0 * np.pi))
-    turns[np.array(posted.machine.joint_units) == "mm"] = 0.0
-    if (turns != 0.0).any():
-        joints += turns * (2.0 * np.pi)
+    turning = posted.machine.turning_joints
+    turns = measure_whole_turns(joints[0, turning], posted.joints[0, turning])
+    if turns.any():
+        joints[:, turning] += turns
     return _fit_rows(posted, curve, segment, offset, joints)
 
 

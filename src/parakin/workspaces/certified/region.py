@@ -250,7 +250,7 @@ def parse_coordinates(machine: Machine, values: Mapping[str, float | str]) -> di
 
 
 def _list_turning_axes(machine: Machine) -> list[str]:
-    return [axis for axis, unit in zip(machine.axes, machine.axis_units, strict=True) if unit == "rad"]
+    return [machine.axes[column] for column in machine.turning_columns]
 
 
 def _refuse_unknown_axes(machine: Machine, axes: Iterable[str]) -> None:

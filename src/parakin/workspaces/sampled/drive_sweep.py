@@ -118,7 +118,7 @@ def sweep_drives(region: Region, cells: int = 64, progress: Progress | None = No
 
 def _refuse_others(machine: Machine) -> None:
     why = ""
-    if any(unit == "rad" for unit in machine.axis_units):
+    if machine.turning_columns:
         why = "its tool turns"
     elif not machine.has_closed_forward or len(machine.joints) != len(machine.axes):
         why = "it has not one rod for each axis"

@@ -126,7 +126,7 @@ def test_a_path_is_followed_cycle_by_cycle(m, modules):
 
 
 @everyone
-def test_end_points_to_come_are_asked_with_joints_at_nought(m, modules):
+def test_end_points_to_come_are_asked_with_joints_at_zero(m, modules):
     poses = poses_about(m, 20_000, seed=3)
     found, codes = modules(m).inverse(world(m, poses), np.zeros((len(poses), len(m.joints))))
     good = codes == 0

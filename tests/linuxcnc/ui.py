@@ -48,7 +48,7 @@ class Machine:
         return list(self.status.position)
 
     def switch_on(self, joints):
-        self.wait(lambda s: s.joints == joints)  # the first answers are nought
+        self.wait(lambda s: s.joints == joints)  # the first answers are zero
         self.tell("state", linuxcnc.STATE_ESTOP_RESET)
         self.tell("state", linuxcnc.STATE_ON)
         self.wait(lambda s: s.task_state == linuxcnc.STATE_ON)

@@ -92,7 +92,7 @@ def prepare(
     corners: Corners = "round",
     progress: Progress | None = None,
 ) -> Job:
-    """Post a tool path, insert the points its target needs, check it everywhere, and plan its trajectory.
+    """Post a tool path, insert the points that its controller needs, check it everywhere, and plan its trajectory.
 
     Parameters
     ----------

@@ -2,7 +2,7 @@
 
    Both functions keep nothing from one call to the next: LinuxCNC hands the last joints to the inverse and the last
    pose to the forward, and that is what they stay near to. It asks the inverse for the end points of moves to come as
-   well, with joints of nought, which would spoil a memory. Nothing allocates, and every loop has an end. */
+   well, with joints at zero, which would spoil a memory. Nothing allocates, and every loop has an end. */
 
 static double within_half_a_turn(double angle, double near)
 {
@@ -291,7 +291,8 @@ static int in_mode(const double *x, const double *q)
 #define in_mode(x, q) 1
 #endif
 
-/* Of the ways to write an orientation the one nearest to the last. */
+/* Of the ways to write an orientation the one nearest to the last: B and C by the sum of their ways, where
+   find_nearest_direction of kinematics/wrist.py takes the sum of squares. */
 static void settle(double *x, const double *near)
 {
 #if TOOL_AXIS

@@ -9,7 +9,6 @@ straight over the pole, to the direction in which the path leaves, while the tip
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -24,7 +23,7 @@ from ..posting.posted import Posted
 from ..programmed_path import ProgrammedPath
 from .continuation import MACHINE_FRAME
 from .pole_routing import PolePass, PoleRoute
-from .pole_steps import PoleSteps
+from .pole_steps import PoleSteps, meet_circle
 from .poles import Pole
 
 # Shares of the angle tolerance. Their sum is what an axis may be moved; the rest is for rounding.
@@ -115,8 +114,8 @@ class _HoldBuilder:
     def build(self, run: tuple[int, int]) -> PoleHold | None:
         """Build the hold of a run of steps; None where nothing is to be moved."""
         steps, (first, last) = self.steps, run
-        entry = _meet_circle(steps.first[first], steps.last[first], self.radius)
-        leave = _meet_circle(steps.last[last], steps.first[last], self.radius)
+        entry = meet_circle(steps.first[first], steps.last[first], self.radius)
+        leave = meet_circle(steps.last[last], steps.first[last], self.radius)
         record, number, distance = self._list_records(run)
         if entry is None and leave is None and (not len(record) or distance.max() < 0.5 * EXACT):
             return None
@@ -241,16 +240,6 @@ class _HoldBuilder:
 
 def _point_towards(azimuth: float) -> Array:
     return np.array([np.cos(azimuth), np.sin(azimuth)])
-
-
-def _meet_circle(outside: Array, inside: Array, radius: float) -> Array | None:
-    """Find where a step from outside enters a circle about the pole, at whatever point it leaves it; None if inside."""
-    if np.hypot(*outside) < radius:
-        return None
-    way = inside - outside
-    p, q, r = float(way @ way), float(outside @ way), float(outside @ outside) - radius * radius
-    part = (-q - math.sqrt(max(q * q - p * r, 0.0))) / p
-    return outside + min(1.0, max(0.0, part)) * way
 
 
 def _place_end(steps: PoleSteps, step: int, point: Array | None) -> _Points:

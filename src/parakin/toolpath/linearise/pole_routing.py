@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,13 +10,11 @@ from ...arrays import Array, Indices
 from ...kinematics.wrist import PRINTED
 from ..path import ToolPath
 from ..programmed_path import ProgrammedPath
-from .pole_steps import PoleSteps
+from .pole_steps import PoleSteps, meet_circle
 from .poles import Pole
 
 _MOST_MOVED = 0.98  # of the angle tolerance: what an axis may be moved; the rest is for rounding
-_BENT = np.sin(
-    np.radians(20.0)
-)  # off the line through the pole on the circle, over the radius: what bends more is held
+_BENT = np.sin(np.radians(20.0))  # of the circle, off the line through the pole: what bends more is held
 
 
 @dataclass(frozen=True, eq=False)
@@ -120,7 +117,7 @@ def _route_through_pole(
     normal = np.array([-line[1], line[0]])
     a, b = x @ line, x @ normal
     weight = np.where(np.hypot(a, b) < radius, 1.0 - (a / radius) ** 2, 0.0)
-    entries = _meet_circle(x[0], x[1], radius), _meet_circle(x[-1], x[-2], radius)
+    entries = _enter_circle(x[0], x[1], radius), _enter_circle(x[-1], x[-2], radius)
     # What is left to move where the path enters and leaves the circle.
     offsets = [abs(float(entry @ normal)) for entry in entries if entry is not None]
     edge = [offset**3 / radius**2 for offset in offsets]
@@ -156,13 +153,9 @@ def _find_line(begin: Array, end: Array, radius: float) -> Array:
     return np.array(total / size if size > 0.0 else [1.0, 0.0], dtype=np.float64)
 
 
-def _meet_circle(outside: Array, inside: Array, radius: float) -> Array | None:
-    """Find where the way from outside to inside enters the circle of a radius about the pole."""
-    if np.hypot(*outside) < radius or np.hypot(*inside) >= radius:
-        return None
-    way = inside - outside
-    p, q, r = float(way @ way), float(outside @ way), float(outside @ outside) - radius * radius
-    return outside + way * ((-q - math.sqrt(max(q * q - p * r, 0.0))) / p)
+def _enter_circle(outside: Array, inside: Array, radius: float) -> Array | None:
+    """Find where a step that ends within the circle of a radius about the pole enters it; None for other steps."""
+    return None if np.hypot(*inside) >= radius else meet_circle(outside, inside, radius)
 
 
 def _find_inner_ends(steps: PoleSteps, window: tuple[int, int], crossing: int, radius: float) -> tuple[float, ...]:
@@ -170,7 +163,7 @@ def _find_inner_ends(steps: PoleSteps, window: tuple[int, int], crossing: int, r
     ends = []
     first, last = window
     for step, outside, inside in ((first, steps.first, steps.last), (last, steps.last, steps.first)):
-        entry = _meet_circle(outside[step], inside[step], radius)
+        entry = _enter_circle(outside[step], inside[step], radius)
         if entry is None or steps.record[step] != steps.record[crossing]:
             continue
         part = np.hypot(*(entry - steps.first[step])) / np.hypot(*(steps.last[step] - steps.first[step]))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -73,3 +74,13 @@ def _find_motions_near(
         turn = _POLE_TURN * turn + 2.0 * length / min(machine.leg_sizes)
     near = 0.5 * (off_pole[motion] + off_pole[motion - 1] - turn) < VICINITY
     return motion[near], turn[near]
+
+
+def meet_circle(outside: Array, inside: Array, radius: float) -> Array | None:
+    """Find where a step from outside enters a circle about the pole, at whatever point it leaves it; None if inside."""
+    if np.hypot(*outside) < radius:
+        return None
+    way = inside - outside
+    p, q, r = float(way @ way), float(outside @ way), float(outside @ outside) - radius * radius
+    part = (-q - math.sqrt(max(q * q - p * r, 0.0))) / p
+    return outside + min(1.0, max(0.0, part)) * way

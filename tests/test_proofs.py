@@ -17,7 +17,7 @@ from parakin.performance.singularities import compute_singularity_margins
 
 
 def cube(m, low, high):
-    return make_pose_box(m, dict.fromkeys(m.axes, (low, high)))
+    return make_pose_box(pk.region(m), dict.fromkeys(m.axes, (low, high)))
 
 
 BOXES = {
@@ -35,7 +35,7 @@ BOXES = {
 
 @everyone
 def test_bounds_over_boxes_hold_the_rates_at_their_samples(m):
-    box = make_pose_box(m, BOXES[m.name])
+    box = make_pose_box(pk.region(m), BOXES[m.name])
     points = np.random.default_rng(6).uniform(box.low, box.high, (500, len(box.spans)))
     scale = box.length.factor
     turns = len(m.structure.turns)
@@ -54,7 +54,7 @@ def test_bounds_over_boxes_hold_the_rates_at_their_samples(m):
 
 @everyone
 def test_brackets_hold_the_amplification_of_every_sample(m):
-    box = make_pose_box(m, BOXES[m.name])
+    box = make_pose_box(pk.region(m), BOXES[m.name])
     found = bracket_extremes(box, tolerance=1e-3, boxes=6_000)
     points = np.random.default_rng(6).uniform(box.low, box.high, (5000, len(box.spans)))
     told = compute_performance(m, box.poses(points))
@@ -76,7 +76,7 @@ def test_brackets_hold_the_amplification_of_every_sample(m):
 
 @everyone
 def test_boxes_are_proved_free_of_singularities(m):
-    box = make_pose_box(m, BOXES[m.name])
+    box = make_pose_box(pk.region(m), BOXES[m.name])
     for kind in ("parallel", "serial"):
         assert prove_no_singularity(box, kind).verdict == "proved"
 
@@ -115,13 +115,13 @@ def test_singularities_are_met():
     assert proof.verdict == "refuted"
     assert compute_performance(m, proof.counterexample).greatest > 1e6
     m = pk.load("lambda6")
-    for box in (make_pose_box(m, {"C": (-0.1, 0.3)}), make_pose_box(m, {}, at={"C": 0.0})):
+    for box in (make_pose_box(pk.region(m), {"C": (-0.1, 0.3)}), make_pose_box(pk.region(m, at={"C": 0.0}), {})):
         proof = prove_no_singularity(box, "parallel")
         assert proof.verdict == "refuted"
         assert abs(proof.counterexample[5]) < 1e-9
         assert prove_no_singularity(box, "serial").verdict == "proved"
     m = pk.load("tricept")
-    box = make_pose_box(m, {"X": (-110, 90), "Y": (-130, 70), "Z": (-1650, -1500)})
+    box = make_pose_box(pk.region(m), {"X": (-110, 90), "Y": (-130, 70), "Z": (-1650, -1500)})
     proof = prove_no_singularity(box, "serial")
     assert proof.verdict == "refuted"
     assert np.abs(proof.counterexample[:2]).max() < 1e-5  # the wrist stands straight
@@ -147,11 +147,11 @@ def test_boxes_that_are_none():
     wrong = [{"Q": (0, 1)}, {"X": (1, 0)}, {"X": (0, np.inf)}]
     for spans in wrong:
         with pytest.raises(pk.PoseError):
-            make_pose_box(m, spans)
+            make_pose_box(pk.region(m), spans)
     for at in ({"X": 0.0}, {"Y": np.nan}, {"Q": 0.0}):
         with pytest.raises(pk.PoseError):
-            make_pose_box(m, {"X": (0, 1)}, at)
-    box = make_pose_box(m, {"X": (0, 1)})
+            make_pose_box(pk.region(m, at=at), {"X": (0, 1)})
+    box = make_pose_box(pk.region(m), {"X": (0, 1)})
     for bounds in ((-1, 2), (2, 1), (0, np.inf)):
         with pytest.raises(pk.PoseError):
             prove_amplification(box, *bounds)

@@ -20,7 +20,6 @@ from .region_options import (
     At,
     Without,
     parse_axis_ranges,
-    parse_axis_values,
     parse_length,
     read_region,
     split_axes,
@@ -94,7 +93,7 @@ def atlas(
         if one_pose is not None:
             results.examine_pose(one_pose)
         if spans:
-            results.prove_box(spans, parse_axis_values(machine, at, "--at"), bounds, progress)
+            results.prove_box(spans, bounds, progress)
         if files is not None or not (spans or pose):
             results.compute_atlas(apart, progress)
         written = {}
@@ -171,9 +170,7 @@ class _AtlasResults:
         broken = int(self.machine.check(pose, mode=self.region.mode))
         self.broken_limit = self.machine.limits[broken - 1] if broken else ""
 
-    def prove_box(
-        self, spans: dict[str, Span], at: dict[str, float], bounds: Span | None, progress: ProgressBar
-    ) -> None:
+    def prove_box(self, spans: dict[str, Span], bounds: Span | None, progress: ProgressBar) -> None:
         """Prove a box free of singularities, and its amplification within bounds, or bracket it if there are none."""
         from ..performance.certified.proofs import (
             bracket_extremes,
@@ -183,7 +180,7 @@ class _AtlasResults:
         )
 
         self.spans = spans
-        box = make_pose_box(self.machine, spans, at, self.length, self.region.mode)
+        box = make_pose_box(self.region, spans, self.length)
         self.proofs = [prove_no_singularity(box, "parallel"), prove_no_singularity(box, "serial")]
         report = progress.part("proving", 0.0, 1.0)
         if bounds is not None:

@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from cyclopts import Parameter
 
-from ..errors import InputError, PoseError, quote, suggest
+from ..errors import InputError, PoseError
 from ..units import AXIS_UNITS
-from .values import parse_value
+from .values import parse_value, split_assignments
 
 if TYPE_CHECKING:
     from ..arrays import Array, Progress
@@ -138,15 +138,8 @@ def parse_point(text: str, option: str) -> dict[str, float]:
     if not any("=" in part for part in parts) and len(parts) in (3, 6):
         parts = [f"{axis}={part}" for axis, part in zip(AXIS_UNITS, parts, strict=False)]
     values: dict[str, float] = {}
-    for part in parts:
-        axis, equals, value = (word.strip() for word in part.partition("="))
-        if not (axis and equals and value):
-            raise InputError(f"{quote(part)}: expected AXIS=VALUE for each axis, such as {_EXAMPLE}", option)
-        axis = axis.upper()
-        if axis not in AXIS_UNITS:
-            raise InputError(f"unknown axis {quote(axis)}{suggest(axis, AXIS_UNITS)}", option)
-        if axis in values:
-            raise InputError(f"{axis} is given twice", option)
+    form = f"AXIS=VALUE for each axis, such as {_EXAMPLE}"
+    for axis, value in split_assignments(",".join(parts), AXIS_UNITS, option, form):
         number = parse_value(axis, value, option)
         values[axis] = round(math.degrees(number), 12) if AXIS_UNITS[axis] == "rad" else number
     return values

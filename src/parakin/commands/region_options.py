@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 from cyclopts import Parameter
 
 from ..errors import InputError, PoseError
-from .values import parse_value
+from .values import parse_value, split_assignments
 
 if TYPE_CHECKING:
     from ..machine import Machine
@@ -96,20 +96,9 @@ def parse_axis_ranges(machine: Machine, text: str | None, source: str) -> dict[s
 
 def split_axes(machine: Machine, text: str | None, source: str, example: str) -> dict[str, str]:
     """Split ``AXIS=TEXT,AXIS=TEXT`` into the text of each axis."""
-    from ..errors import quote, suggest
-
-    texts: dict[str, str] = {}
-    for part in text.split(",") if text is not None else ():
-        axis, equals, value = (word.strip() for word in part.partition("="))
-        if not (axis and equals and value):
-            raise InputError(f"{quote(part.strip())}: expected AXIS=VALUE, such as {example}", source)
-        axis = axis.upper()
-        if axis not in machine.axes:
-            raise InputError(f"unknown axis {quote(axis)}{suggest(axis, machine.axes)}", source)
-        if axis in texts:
-            raise InputError(f"{axis} is given twice", source)
-        texts[axis] = value
-    return texts
+    if text is None:
+        return {}
+    return dict(split_assignments(text, machine.axes, source, f"AXIS=VALUE, such as {example}"))
 
 
 def parse_length(text: str | None, source: str) -> float | None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from typing import TYPE_CHECKING
 
 from ..errors import InputError, quote, suggest
@@ -38,6 +38,39 @@ def parse_value(name: str, text: str, source: str, unit: str | None = None) -> f
     if abs(value) > LARGEST:
         raise InputError(f"{name}: {quote(text)} is out of range", source)
     return value
+
+
+def split_assignments(text: str, axes: Collection[str], source: str, form: str) -> Iterator[tuple[str, str]]:
+    """Split ``AXIS=TEXT,AXIS=TEXT`` into each axis and its text.
+
+    axes : those that may be named, each once
+    source : the option's name, for messages; ``form`` says what is expected
+
+    Raises :class:`InputError`.
+    """
+    return check_assignments((split_assignment(part, source, form) for part in text.split(",")), axes, source)
+
+
+def split_assignment(part: str, source: str, form: str) -> tuple[str, str]:
+    """Split ``AXIS=TEXT``; raises :class:`InputError` for anything else."""
+    axis, equals, value = (word.strip() for word in part.partition("="))
+    if not (axis and equals and value):
+        raise InputError(f"{quote(part.strip())}: expected {form}", source)
+    return axis.upper(), value
+
+
+def check_assignments(
+    pairs: Iterable[tuple[str, str]], axes: Collection[str], source: str
+) -> Iterator[tuple[str, str]]:
+    """Check one after the other that each of some pairs names an axis that is known and not named before."""
+    seen: set[str] = set()
+    for axis, value in pairs:
+        if axis not in axes:
+            raise InputError(f"unknown axis {quote(axis)}{suggest(axis, axes)}", source)
+        if axis in seen:
+            raise InputError(f"{axis} is given twice", source)
+        seen.add(axis)
+        yield axis, value
 
 
 def parse_row(

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from ..errors import InputError, quote, suggest
+from ..errors import InputError, quote
 from ..units import AXIS_UNITS
-from .values import parse_value
+from .values import check_assignments, parse_value, split_assignments
 
 if TYPE_CHECKING:
     from ..arrays import Array
@@ -37,11 +37,7 @@ def parse_workpiece(text: str) -> Array:
     else:
         pairs = list(zip(AXIS_UNITS, parts, strict=False))
     values: dict[str, float] = {}
-    for axis, value in pairs:
-        if axis not in AXIS_UNITS:
-            raise InputError(f"unknown axis {quote(axis)}{suggest(axis, AXIS_UNITS)}", _WORKPIECE)
-        if axis in values:
-            raise InputError(f"{axis} is given twice", _WORKPIECE)
+    for axis, value in check_assignments(pairs, AXIS_UNITS, _WORKPIECE):
         values[axis] = parse_value(axis, value, _WORKPIECE)
     return workpiece(**values)
 
@@ -55,15 +51,8 @@ def parse_bounds(text: str) -> dict[str, tuple[float, float]]:
     Raises :class:`InputError`.
     """
     bounds: dict[str, tuple[float, float]] = {}
-    for part in text.split(","):
-        axis, equals, value = (word.strip() for word in part.partition("="))
-        if not (axis and equals and value):
-            raise InputError(f"{quote(part.strip())}: expected AXIS=LOW:HIGH or AXIS=VALUE, such as {_EXAMPLE}", _PLACE)
-        axis = axis.upper()
-        if axis not in AXIS_UNITS:
-            raise InputError(f"unknown axis {quote(axis)}{suggest(axis, AXIS_UNITS)}", _PLACE)
-        if axis in bounds:
-            raise InputError(f"{axis} is given twice", _PLACE)
+    form = f"AXIS=LOW:HIGH or AXIS=VALUE, such as {_EXAMPLE}"
+    for axis, value in split_assignments(text, AXIS_UNITS, _PLACE, form):
         low, colon, high = (word.strip() for word in value.partition(":"))
         if colon and not (low and high):
             raise InputError(f"{axis}: expected a range LOW:HIGH, such as -100:100", _PLACE)

@@ -13,7 +13,7 @@ from ..machine import Machine
 from ..model.legs.slider import Slider
 from ..model.parts import Direction, Drive, Point, Signs, Size
 from ..model.spec import Spec
-from ..workspaces.certified.region import FAR
+from ..workspaces.certified.region import FAR, make_region
 from .certified.proofs import Proof, make_pose_box, prove_amplification
 
 SMALLEST = 0.001  # mm, of a cube
@@ -73,7 +73,7 @@ def design_orthoglide(cube: float, amplification: float) -> Design:
 
 
 def _prove_cube(machine: Machine, low: float, high: float, bound: float) -> Proof:
-    box = make_pose_box(machine, dict.fromkeys(machine.axes, (low, high)))
+    box = make_pose_box(make_region(machine), dict.fromkeys(machine.axes, (low, high)))
     proof = prove_amplification(box, 1.0 / bound, bound)
     if proof.verdict != "proved":
         raise NoMethodError(f"amplification {bound:g}: the closed form does not hold all over the cube, {proof.reason}")

@@ -105,9 +105,10 @@ def format_joint_rows(
 
     form : of poses, joints and feed
     """
-    lines, poses, joints, feed, rapid, broken = columns
-    scales, digits = form
-    text, starts = names
+    lines, poses, joints, feed = columns.lines, columns.poses, columns.joints, columns.feed
+    rapid, broken = columns.rapid, columns.broken
+    scales, digits = form.scales, form.digits
+    text, starts = names.text, names.starts
     at = 0
     axes = poses.shape[1]
     moving = axes + joints.shape[1]

@@ -16,7 +16,7 @@ import numpy as np
 
 from ...arrays import Array, Progress, Span
 from ...errors import PoseError
-from ...machine import Machine
+from ...workspaces.certified.region import Region
 from ..characteristic_length import choose_characteristic_length
 from ..extremes import SIDES
 from .amplification import UNBOUNDED, Bracket, bracket_amplification
@@ -47,34 +47,28 @@ class Proof:
     tolerance: float = 0.0
 
 
-def make_pose_box(
-    machine: Machine,
-    spans: Mapping[str, Span],
-    at: Mapping[str, float] | None = None,
-    length: float | None = None,
-    mode: str | None = None,
-) -> PoseBox:
-    """Make a box of poses: axes in ``spans`` from low to high, those in ``at`` fixed, others as at home; mm and rad.
+def make_pose_box(region: Region, ranges: Mapping[str, Span], length: float | None = None) -> PoseBox:
+    """Make a box of poses in a region's mode: axes in ``ranges`` from low to high, others as fixed, or as at home.
+
+    ranges : mm and rad
+    length : the characteristic length, mm; by default the machine's own
 
     Raises :class:`PoseError` for an invalid box.
     """
-    fixed = dict(zip(machine.axes, machine.home.tolist(), strict=True))
-    for axis in (*spans, *(at or {})):
+    machine = region.machine
+    fixed = dict(zip(machine.axes, machine.home.tolist(), strict=True)) | dict(region.fixed_axes)
+    for axis in ranges:
         if axis not in machine.axes:
             raise PoseError(f"unknown axis {axis}, {machine.name} has {' '.join(machine.axes)}")
-    for axis, value in (at or {}).items():
-        if axis in spans:
+        if axis in region.stated_axes:
             raise PoseError(f"{axis} is held and a side of the box")
-        if not isfinite(value):
-            raise PoseError(f"{axis}: {value} is no place to hold it")
-        fixed[axis] = float(value)
-    for axis, (low, high) in spans.items():
+    for axis, (low, high) in ranges.items():
         if not (isfinite(low) and isfinite(high) and low <= high):
             raise PoseError(f"the box's side along {axis} is empty: {low:g} to {high:g}")
         fixed[axis] = float(low)
-    wide = {axis: (float(spans[axis][0]), float(spans[axis][1])) for axis in machine.axes if axis in spans}
-    wide = {axis: span for axis, span in wide.items() if span[0] < span[1]}
-    return PoseBox(machine, wide, fixed, machine.checked_mode(mode), choose_characteristic_length(machine, length))
+    wide = {axis: (float(ranges[axis][0]), float(ranges[axis][1])) for axis in machine.axes if axis in ranges}
+    wide = {axis: ends for axis, ends in wide.items() if ends[0] < ends[1]}
+    return PoseBox(machine, wide, fixed, region.mode, choose_characteristic_length(machine, length))
 
 
 def prove_no_singularity(

@@ -87,12 +87,21 @@ def _plan_profile(
 def _allocate_scratch(rows: int) -> JerkScratch:
     """Allocate the arrays for planning so many rows, in two pieces a step."""
     bounds = StepBounds(*(np.empty(rows) for _ in range(3)))
-    x, u, controllable, rising_x, rising_u, braking_x, braking_u, acceleration = (np.empty(rows) for _ in range(8))
-    allowance, totals, widths = (np.empty(rows) for _ in range(3))
-    pools = Pools(allowance, totals, widths, np.empty(rows, np.int64))
-    touched, moved, changed = (np.empty(rows, bool) for _ in range(3))
-    use = Utilisation(np.empty((2 * rows, 4)), np.zeros(rows, np.int64), changed)
+    pools = Pools(np.empty(rows), np.empty(rows), np.empty(rows), np.empty(rows, np.int64))
+    use = Utilisation(np.empty((2 * rows, 4)), np.zeros(rows, np.int64), np.empty(rows, bool))
     return JerkScratch(
-        bounds, x, u, controllable, rising_x, rising_u, braking_x, braking_u, acceleration, pools, use,
-        touched, moved, np.ones(rows - 1),
-    )  # fmt: skip
+        bounds=bounds,
+        x=np.empty(rows),
+        u=np.empty(rows),
+        controllable=np.empty(rows),
+        rising_x=np.empty(rows),
+        rising_u=np.empty(rows),
+        braking_x=np.empty(rows),
+        braking_u=np.empty(rows),
+        acceleration=np.empty(rows),
+        pools=pools,
+        use=use,
+        touched=np.empty(rows, bool),
+        moved=np.empty(rows, bool),
+        least_kept=np.ones(rows - 1),
+    )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
@@ -179,9 +180,12 @@ def _find_coarse_steps(joint_path: JointPath, tolerances: SplineTolerances, cand
         rounding = np.full(joints.shape, _NOISE)
         if wrist is not None:
             rounding[:, wrist.first] *= blur
-        args = (joint_path.rows, steps, Midpoints(joints, splined, rounding), tolerances, np.empty(len(steps), bool))
-        run_in_threads(len(steps), lambda start, stop: mark_coarse_steps(*args, start, stop))  # noqa: B023
-        blocks.append(steps[args[-1]])
+        coarse = np.empty(len(steps), bool)
+        mark = partial(
+            mark_coarse_steps, joint_path.rows, steps, Midpoints(joints, splined, rounding), tolerances, coarse
+        )
+        run_in_threads(len(steps), mark)
+        blocks.append(steps[coarse])
     return np.concatenate(blocks)
 
 

@@ -43,6 +43,7 @@ class Region:
     swept_axes : the turning axes with a range, (low, high) rad
     without : names of the limits that do not count
     part : ``home``, only poses in home's assembly mode, or ``all``, those in any
+    stated_axes : those of the fixed axes that are stated; the others are turning axes that keep their value at home
     """
 
     machine: Machine
@@ -53,6 +54,7 @@ class Region:
     without: tuple[str, ...]
     mode: str
     part: RegionPart = "home"
+    stated_axes: tuple[str, ...] = ()
 
     @cached_property
     def traced_pose(self) -> TracedPose:
@@ -124,6 +126,7 @@ class Region:
             free_axes=tuple(axis for axis in self.free_axes if axis not in values),
             fixed_axes={axis: float(fixed[axis]) for axis in self.machine.axes if axis in fixed},
             swept_axes=swept,
+            stated_axes=(*self.stated_axes, *values),
         )
 
     def subdivide(self, low: Array, high: Array, more: Sequence[Constraint] = ()) -> Subdivision:
@@ -240,6 +243,7 @@ def make_region(
         _find_ignored_limits(machine, without),
         machine.checked_mode(mode),
         part,
+        tuple(at or {}),
     )
 
 

@@ -184,7 +184,7 @@ def test_the_name_of_a_class_or_type_occurs_once():
     for module in MODULES:
         for name in type_names(module):
             owners.setdefault(name, []).append(module)
-    assert {"Array", "Span", "Machine", "RegionKind"} <= set(owners)
+    assert {"Array", "AxisRange", "Machine", "RegionKind"} <= set(owners)
     assert not {name: modules for name, modules in owners.items() if len(modules) > 1}
 
 

@@ -191,7 +191,7 @@ def test_what_makes_no_sense_is_refused(tmp_path):
     m = pk.load("hexapod")
     with pytest.raises(pk.PoseError, match="some"):
         find_components(pk.region(m, some={"A": (-0.1, 0.1)}))
-    with pytest.raises(pk.PoseError, match=r"A is 0\.2, but held at 0 here"):
+    with pytest.raises(pk.PoseError, match=r"A is 0\.2, but fixed at 0 here"):
         find_components(pk.region(m), start=[0, 0, m.home[2], 0.2, 0, 0])
     with pytest.raises(pk.PoseError, match="beyond its range"):
         find_components(pk.region(m, every={"A": (-0.1, 0.1)}), start=[0, 0, m.home[2], 0.2, 0, 0])

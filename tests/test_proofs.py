@@ -36,7 +36,7 @@ BOXES = {
 @everyone
 def test_bounds_over_boxes_hold_the_rates_at_their_samples(m):
     box = make_pose_box(pk.region(m), BOXES[m.name])
-    points = np.random.default_rng(6).uniform(box.low, box.high, (500, len(box.spans)))
+    points = np.random.default_rng(6).uniform(box.low, box.high, (500, len(box.ranges)))
     scale = box.length.factor
     turns = len(m.structure.turns)
     columns = {
@@ -56,7 +56,7 @@ def test_bounds_over_boxes_hold_the_rates_at_their_samples(m):
 def test_brackets_hold_the_amplification_of_every_sample(m):
     box = make_pose_box(pk.region(m), BOXES[m.name])
     found = bracket_extremes(box, tolerance=1e-3, boxes=6_000)
-    points = np.random.default_rng(6).uniform(box.low, box.high, (5000, len(box.spans)))
+    points = np.random.default_rng(6).uniform(box.low, box.high, (5000, len(box.ranges)))
     told = compute_performance(m, box.poses(points))
     least, greatest = found.brackets
     assert told.greatest.max() <= greatest.high
@@ -69,7 +69,7 @@ def test_brackets_hold_the_amplification_of_every_sample(m):
         assert greatest.closed
         assert greatest.high <= greatest.low * 1.001
     for bracket in found.brackets:
-        inside = [bracket.pose[m.axes.index(axis)] for axis in box.spans]
+        inside = [bracket.pose[m.axes.index(axis)] for axis in box.ranges]
         assert (inside >= box.low).all()
         assert (inside <= box.high).all()
 
@@ -145,9 +145,9 @@ def test_a_box_out_of_reach_is_refuted_and_one_out_of_time_is_left_open():
 def test_boxes_that_are_none():
     m = pk.load("tricept")
     wrong = [{"Q": (0, 1)}, {"X": (1, 0)}, {"X": (0, np.inf)}]
-    for spans in wrong:
+    for ranges in wrong:
         with pytest.raises(pk.PoseError):
-            make_pose_box(pk.region(m), spans)
+            make_pose_box(pk.region(m), ranges)
     for at in ({"X": 0.0}, {"Y": np.nan}, {"Q": 0.0}):
         with pytest.raises(pk.PoseError):
             make_pose_box(pk.region(m, at=at), {"X": (0, 1)})

@@ -218,7 +218,7 @@ def _convert_number(name: str, value: Any) -> float:
         raise PoseError(f"{name}: a number that is out of range") from None
 
 
-def parse_span(name: str, value: object, unit: str) -> tuple[float, float]:
+def parse_range(name: str, value: object, unit: str) -> tuple[float, float]:
     """Return the range of an axis, a pair of values as :func:`parse_coordinate` takes them."""
     if isinstance(value, (str, bytes)) or not isinstance(value, (Sequence, np.ndarray)) or len(value) != 2:
         raise PoseError(f"{name}: a pair (low, high) expected, not {describe_value(value)}")

@@ -12,7 +12,7 @@ Array: TypeAlias = NDArray[np.float64]  # lengths in mm, angles in rad, unless a
 Indices: TypeAlias = NDArray[np.int64]  # zero-based numbers of rows or columns
 Flags: TypeAlias = NDArray[np.bool_]  # one truth a row
 Progress: TypeAlias = Callable[[float], None]  # called now and then with the fraction done, 0 to 1
-Span: TypeAlias = tuple[float, float]  # of an axis: low and high, mm or rad
+AxisRange: TypeAlias = tuple[float, float]  # of an axis: low and high, mm or rad
 Writer: TypeAlias = Callable[[BinaryIO], None]  # writes a file's content
 
 

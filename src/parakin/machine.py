@@ -12,7 +12,7 @@ import numpy as np
 
 from .algebra import Scalar
 from .arguments import RowsLike, bound_angles, describe_value, read_rows, warn_of_wide_angles
-from .arrays import Array, Span
+from .arrays import Array, AxisRange
 from .errors import DescriptionError, NoMethodError, PoseError, SingularHomeWarning
 from .kernels.batch import evaluate_tape, evaluate_tape_with_residual, find_first_negative
 from .kinematics.assemblies import find_assemblies
@@ -75,7 +75,7 @@ class Machine:
         return self.structure.direction
 
     @property
-    def orientation_ranges(self) -> dict[str, Span]:
+    def orientation_ranges(self) -> dict[str, AxisRange]:
         """Ranges of the turning axes, rad, that hold every orientation once."""
         ranges = EVERY_DIRECTION if self.has_direction else EVERY_ROTATION
         return {axis: ranges[axis] for axis in self.axes if axis in ranges}

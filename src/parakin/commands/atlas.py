@@ -27,7 +27,7 @@ from .region_options import (
 from .values import parse_row, parse_value
 
 if TYPE_CHECKING:
-    from ..arrays import Array, Span
+    from ..arrays import Array, AxisRange
     from ..performance.atlas import Atlas, PerformanceMap
     from ..performance.certified.amplification import Bracket
     from ..performance.certified.proofs import Proof
@@ -80,8 +80,8 @@ def atlas(
     machine = load_machine(name, sizes)
     region = read_region(machine, at, without=without, mode=mode, all_parts=all_parts)
     scale, apart = parse_length(size, "--length"), parse_length(step, "--step")
-    spans = parse_axis_ranges(machine, box, "--box")
-    bounds = _parse_claim(amplification, bool(spans))
+    ranges = parse_axis_ranges(machine, box, "--box")
+    bounds = _parse_claim(amplification, bool(ranges))
     cuts = _cut_region(region, slices or ())
     if slices and output is None:
         raise InputError("a map is a file, name it or its folder with -o", "--slice")
@@ -92,9 +92,9 @@ def atlas(
     with ProgressBar() as progress:
         if one_pose is not None:
             results.examine_pose(one_pose)
-        if spans:
-            results.prove_box(spans, bounds, progress)
-        if files is not None or not (spans or pose):
+        if ranges:
+            results.prove_box(ranges, bounds, progress)
+        if files is not None or not (ranges or pose):
             results.compute_atlas(apart, progress)
         written = {}
         if files is not None and results.atlas is not None:
@@ -158,7 +158,7 @@ class _AtlasResults:
         self.machine, self.region, self.length = region.machine, region, length
         self.performance: Performance | None = None
         self.broken_limit = ""
-        self.spans: dict[str, Span] = {}
+        self.ranges: dict[str, AxisRange] = {}
         self.proofs: list[Proof] = []
         self.brackets: Sequence[Bracket] = ()
         self.atlas: Atlas | None = None
@@ -170,7 +170,7 @@ class _AtlasResults:
         broken = int(self.machine.check(pose, mode=self.region.mode))
         self.broken_limit = self.machine.limits[broken - 1] if broken else ""
 
-    def prove_box(self, spans: dict[str, Span], bounds: Span | None, progress: ProgressBar) -> None:
+    def prove_box(self, ranges: dict[str, AxisRange], bounds: AxisRange | None, progress: ProgressBar) -> None:
         """Prove a box free of singularities, and its amplification within bounds, or bracket it if there are none."""
         from ..performance.certified.proofs import (
             bracket_extremes,
@@ -179,8 +179,8 @@ class _AtlasResults:
             prove_no_singularity,
         )
 
-        self.spans = spans
-        box = make_pose_box(self.region, spans, self.length)
+        self.ranges = ranges
+        box = make_pose_box(self.region, ranges, self.length)
         self.proofs = [prove_no_singularity(box, "parallel"), prove_no_singularity(box, "serial")]
         report = progress.part("proving", 0.0, 1.0)
         if bounds is not None:
@@ -226,8 +226,8 @@ class _AtlasResults:
         parts = []
         if self.performance is not None:
             parts.append(format_performance(self.performance, self.broken_limit))
-        if self.spans:
-            parts.append(format_proofs(self.machine, self.spans, self.proofs, self.brackets))
+        if self.ranges:
+            parts.append(format_proofs(self.machine, self.ranges, self.proofs, self.brackets))
         if self.atlas is not None:
             parts.append(format_atlas(self.atlas))
         if written:
@@ -237,7 +237,7 @@ class _AtlasResults:
     def _encode(self, written: dict[str, str]) -> dict[str, Any]:
         machine, fixed = self.machine, self.region.fixed_axes
         units = dict(zip(machine.axes, machine.axis_units, strict=True))
-        proofs = encode_proofs(machine, self.spans, self.proofs, self.brackets) if self.spans else None
+        proofs = encode_proofs(machine, self.ranges, self.proofs, self.brackets) if self.ranges else None
         return {
             "schema": "parakin.atlas/1",
             "machine": machine.name,

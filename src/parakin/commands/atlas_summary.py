@@ -107,14 +107,14 @@ def _format_singularities(atlas: Atlas) -> list[str]:
 
 def format_proofs(
     machine: Machine,
-    spans: Mapping[str, tuple[float, float]],
+    ranges: Mapping[str, tuple[float, float]],
     proofs: Sequence[Proof],
     brackets: Sequence[Bracket],
 ) -> str:
-    """Format proofs over the box of ``spans``, and brackets of the amplification there."""
+    """Format proofs over the box of ``ranges``, and brackets of the amplification there."""
     units = dict(zip(machine.axes, machine.axis_units, strict=True))
     sides = []
-    for axis, (low, high) in spans.items():
+    for axis, (low, high) in ranges.items():
         unit = units[axis]
         ends = f"{_format_axis_value(low, unit)} to {_format_axis_value(high, unit)}"
         sides.append(f"{axis} {ends} {name_display_unit(unit)}")

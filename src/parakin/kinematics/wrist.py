@@ -46,7 +46,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import Array, Flags, Indices, Span
+from ..arrays import Array, AxisRange, Flags, Indices
 from ..kernels.batch import evaluate_tape
 from ..kernels.tape import Tape
 from ..model.parts import Drive
@@ -79,8 +79,8 @@ OWN, OTHER, EITHER = 0, 1, 2
 WristModes = NDArray[np.int8]
 
 # Ranges of the turning axes that hold every rotation, and every direction, once.
-EVERY_ROTATION: dict[str, Span] = {"A": (-np.pi, np.pi), "B": (-np.pi / 2, np.pi / 2), "C": (-np.pi, np.pi)}
-EVERY_DIRECTION: dict[str, Span] = {"B": (0.0, np.pi), "C": (-np.pi, np.pi)}
+EVERY_ROTATION: dict[str, AxisRange] = {"A": (-np.pi, np.pi), "B": (-np.pi / 2, np.pi / 2), "C": (-np.pi, np.pi)}
+EVERY_DIRECTION: dict[str, AxisRange] = {"B": (0.0, np.pi), "C": (-np.pi, np.pi)}
 
 GAIN = 0.25  # of the squared way in the same mode: what the way in the other mode may be, for the path to change
 MODE_LEVER = 100.0  # mm/rad: where the joints of two modes are compared, how far a turn by one rad is

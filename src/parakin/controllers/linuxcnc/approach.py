@@ -152,7 +152,7 @@ def _sample_line(start: Array, end: Array) -> Array:
 
 
 def _choose_seconds(machine: Machine, start: Array, end: Array, mode: str) -> float:
-    """Choose the s in which the joints run at a share of their speeds."""
+    """Choose the s in which the joints run at a fraction of their speeds."""
     joints = machine.follow(_sample_line(start, end), mode, EXACT)
     rates = np.abs(np.diff(joints, axis=0)) * (_SAMPLES - 1) / DriveLimits.of(machine).speed
     return max(_LEAST, float(np.nanmax(rates, initial=0.0)) / _SPEED_FRACTION)

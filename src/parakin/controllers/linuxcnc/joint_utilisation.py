@@ -14,7 +14,7 @@ _NEAR = 1e-9  # mm: a row of the trajectory no farther from another sample adds 
 
 
 def measure_joint_utilisation(trajectory: Trajectory, piece: Indices, start: Array, end: Array) -> Array:
-    """Measure the greatest share of its speed that a joint needs per mm/s of path speed, in both halves of k motions.
+    """Measure the greatest utilisation of a joint's speed per mm/s of path speed, in both halves of k motions.
 
     Parameters
     ----------
@@ -41,8 +41,8 @@ def _measure_block(trajectory: Trajectory, piece: Indices, start: Array, end: Ar
     change = np.abs(np.diff(slope, axis=0)) * (segment[1:-1] == segment[:-2])[:, None]
     nothing = np.zeros((1, slope.shape[1]))
     before, behind = np.concatenate([nothing, change]), np.concatenate([change, nothing])
-    share = (np.abs(slope) + 0.5 * np.maximum(before, behind)).max(1)
-    return np.maximum.reduceat(share, np.flatnonzero(half[:-1])).reshape(-1, 2)
+    greatest = (np.abs(slope) + 0.5 * np.maximum(before, behind)).max(1)
+    return np.maximum.reduceat(greatest, np.flatnonzero(half[:-1])).reshape(-1, 2)
 
 
 def _place_samples(trajectory: Trajectory, piece: Indices, start: Array, end: Array) -> tuple[Indices, Array, Flags]:

@@ -81,14 +81,14 @@ def encode_atlas(atlas: Atlas) -> dict[str, Any]:
 
 def encode_proofs(
     machine: Machine,
-    spans: Mapping[str, tuple[float, float]],
+    ranges: Mapping[str, tuple[float, float]],
     proofs: Sequence[Proof],
     brackets: Sequence[Bracket],
 ) -> dict[str, Any]:
-    """Encode proofs over the box of ``spans``, and brackets of the amplification there."""
+    """Encode proofs over the box of ``ranges``, and brackets of the amplification there."""
     units = dict(zip(machine.axes, machine.axis_units, strict=True))
     return {
-        "spans": {axis: [to_display(end, units[axis]) for end in span] for axis, span in spans.items()},
+        "spans": {axis: [to_display(end, units[axis]) for end in ends] for axis, ends in ranges.items()},
         "claims": [
             {
                 "claim": proof.claim,

@@ -38,10 +38,10 @@ class Carried(FiveAxis):
 
     def place(self, pose: Sequence[Scalar], branch: str, first: Scalar | None = None) -> PlatformPlacement:
         k, _, _ = turn_tool_axis(pose)
-        found = self.pointing.solve(k, branch, first)
-        serial = [found.joints[self.serial_order.index(i)] for i in range(2)]
+        turns = self.pointing.solve(k, branch, first)
+        serial = [turns.joints[self.serial_order.index(i)] for i in range(2)]
         origin = self._origin(pose, serial)
-        return PlatformPlacement(IDENTITY, origin, list(origin), serial, found.reach, found.freedom)
+        return PlatformPlacement(IDENTITY, origin, list(origin), serial, turns.reach, turns.freedom)
 
     def place_with_joints(self, pose: Sequence[Scalar], serial: Sequence[Scalar]) -> PlatformPlacement:
         origin = self._origin(pose, serial)

@@ -63,9 +63,9 @@ class CentralLeg(FiveAxis):
         self.sign = 1.0
         home = tuple(float(spec.home.get(letter, 0.0)) for letter in self.axes)
         self.sign = 1.0 if self._centre(home[:3], turn_tool_axis(home)[0])[2] > 0.0 else -1.0
-        swing = [Step(turns[0], drive=spec.legs[0].drives[0]), Step(turns[1], drive=spec.legs[0].drives[0])]
-        self.swing = Pointing.from_steps(swing, "motion")
-        self.swing = Pointing(self.swing.first, self.swing.second, (0.0, 0.0, self.sign))
+        steps = [Step(turns[0], drive=spec.legs[0].drives[0]), Step(turns[1], drive=spec.legs[0].drives[0])]
+        self.passive_turns = Pointing.from_steps(steps, "motion")
+        self.passive_turns = Pointing(self.passive_turns.first, self.passive_turns.second, (0.0, 0.0, self.sign))
 
     def _find_wrist_centre(self) -> tuple[float, float]:
         """Find (h, l): the point (0, 0, h) of the platform lies at the tip + l·k in every position of the head."""
@@ -92,31 +92,31 @@ class CentralLeg(FiveAxis):
         origin = move_along(centre, direction, -self.sign * self.above)  # not by the rotation: bounds stay narrow
         return direction, origin, self.sign * distance - self.above
 
-    def _solve_swing(self, tip: Sequence[Scalar], k: Vec) -> tuple[Mat, Vec, Scalar, list[Scalar]]:
+    def _solve_passive_turns(self, tip: Sequence[Scalar], k: Vec) -> tuple[Mat, Vec, Scalar, list[Scalar]]:
         """Find the rotation of the central leg's two turns, the platform's origin, tz, and both turns' angles."""
         direction, origin, tz = self._aim_central_leg(tip, k)
-        found = self.swing.solve(direction, "+")
+        turns = self.passive_turns.solve(direction, "+")
         rotation = IDENTITY
-        axes = self.swing.first, self.swing.second
+        axes = self.passive_turns.first, self.passive_turns.second
         if self.roll:  # hanging along the first axis its turn is free, and 0 then: no quotient may stand in the way
-            for axis, angle in zip(axes, found.joints, strict=True):
+            for axis, angle in zip(axes, turns.joints, strict=True):
                 rotation = product(rotation, make_rotation_about(axis, *sincos(angle)))
         else:
-            scales = 1.0 / found.freedom, 1.0 / found.second_size
-            for axis, (s, c), size in zip(axes, found.turns, scales, strict=True):
+            scales = 1.0 / turns.freedom, 1.0 / turns.second_size
+            for axis, (s, c), size in zip(axes, turns.turns, scales, strict=True):
                 rotation = product(rotation, make_rotation_about(axis, s * size, c * size))
-        return rotation, origin, tz, list(found.joints)
+        return rotation, origin, tz, list(turns.joints)
 
     def place(self, pose: Sequence[Scalar], branch: str, first: Scalar | None = None) -> PlatformPlacement:
         k, _, _ = turn_tool_axis(pose)
-        rotation, origin, tz, angles = self._solve_swing(pose[:3], k)
-        found = self.pointing.solve(apply(transpose(rotation), apply(transpose(self.mount), k)), branch, first)
-        serial = list(found.joints)
+        rotation, origin, tz, angles = self._solve_passive_turns(pose[:3], k)
+        wrist = self.pointing.solve(apply(transpose(rotation), apply(transpose(self.mount), k)), branch, first)
+        serial = list(wrist.joints)
         if self.roll:
             spin = serial.pop(0)
             rotation = product(rotation, make_axis_rotation("rz", *sincos(spin)))
             angles.append(spin)
-        return PlatformPlacement(rotation, origin, [*angles, tz], serial, found.reach, found.freedom)
+        return PlatformPlacement(rotation, origin, [*angles, tz], serial, wrist.reach, wrist.freedom)
 
     def turn_first_axis(self, pose: Sequence[Scalar]) -> Mat:
         return product(self.mount, self.place(pose, self.branches).rotation)
@@ -143,13 +143,13 @@ class CentralLeg(FiveAxis):
         yield self.sign * (coordinates[-1] + self.above)
         if not self.roll:
             s, c = sincos(coordinates[1])
-            yield c if self.swing.level else s
+            yield c if self.passive_turns.level else s
 
     def place_with_joints(self, pose: Sequence[Scalar], serial: Sequence[Scalar]) -> PlatformPlacement:
         if not self.roll:
             return super().place_with_joints(pose, serial)
         k, _, _ = turn_tool_axis(pose)
-        rotation, origin, tz, angles = self._solve_swing(pose[:3], k)
+        rotation, origin, tz, angles = self._solve_passive_turns(pose[:3], k)
         v = apply(transpose(rotation), apply(transpose(self.mount), k))
         w = apply(compose_chain(self.spec.head, serial)[0], UNIT["tz"])  # turned onto v by the platform's own turn
         spin = atan2(w[0] * v[1] - w[1] * v[0], w[0] * v[0] + w[1] * v[1])
@@ -163,7 +163,7 @@ class CentralLeg(FiveAxis):
         k, _, _ = turn_tool_axis(pose, turn)
         if self.roll:
             return self._roll_platform(pose[:3], k, apply(turned, UNIT["tz"]))
-        rotation, origin, _, _ = self._solve_swing(pose[:3], k)
+        rotation, origin, _, _ = self._solve_passive_turns(pose[:3], k)
         pointed = apply(self.mount, apply(rotation, apply(turned, UNIT["tz"])))
         return rotation, origin, self._tilt_rows(pose, turn, pointed)
 

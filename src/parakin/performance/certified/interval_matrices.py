@@ -53,39 +53,39 @@ class JumpFreeTrace(Trace):
 
 @dataclass(frozen=True, eq=False)
 class PoseBox:
-    """A box of poses of a machine: the axes in ``spans`` vary, ``fixed_axes`` have one value; mm and rad."""
+    """A box of poses of a machine: the axes in ``ranges`` vary, ``fixed_axes`` have one value; mm and rad."""
 
     machine: Machine
-    spans: Mapping[str, tuple[float, float]]
+    ranges: Mapping[str, tuple[float, float]]
     fixed_axes: Mapping[str, float]
     mode: str
     length: CharacteristicLength
 
     @cached_property
     def low(self) -> Array:
-        return np.array([span[0] for span in self.spans.values()], float)
+        return np.array([ends[0] for ends in self.ranges.values()], float)
 
     @cached_property
     def high(self) -> Array:
-        return np.array([span[1] for span in self.spans.values()], float)
+        return np.array([ends[1] for ends in self.ranges.values()], float)
 
     @cached_property
     def samples(self) -> Array:
         """Points (N, d) of a lattice all over the box, its corners among them."""
-        d = len(self.spans)
-        lines = [np.linspace(*span, _SAMPLES.get(d, 3)) for span in self.spans.values()]
+        d = len(self.ranges)
+        lines = [np.linspace(*ends, _SAMPLES.get(d, 3)) for ends in self.ranges.values()]
         return np.stack(np.meshgrid(*lines, indexing="ij"), -1).reshape(-1, d) if d else np.zeros((1, 0))
 
     def poses(self, points: Array) -> Array:
         """Compute whole poses (N, axes) at points (N, d) of the box."""
         rows = np.empty((len(points), len(self.machine.axes)))
         for i, axis in enumerate(self.machine.axes):
-            rows[:, i] = points[:, list(self.spans).index(axis)] if axis in self.spans else self.fixed_axes[axis]
+            rows[:, i] = points[:, list(self.ranges).index(axis)] if axis in self.ranges else self.fixed_axes[axis]
         return rows
 
     @cached_property
     def inputs(self) -> list[Term]:
-        return JumpFreeTrace().inputs(len(self.spans))
+        return JumpFreeTrace().inputs(len(self.ranges))
 
     @cached_property
     def trace(self) -> Trace:
@@ -93,7 +93,7 @@ class PoseBox:
 
     @cached_property
     def _pose(self) -> list[Scalar]:
-        varied = dict(zip(self.spans, self.inputs, strict=True))
+        varied = dict(zip(self.ranges, self.inputs, strict=True))
         return [varied[axis] if axis in varied else np.float64(self.fixed_axes[axis]) for axis in self.machine.axes]
 
     @cached_property

@@ -105,7 +105,7 @@ class _PlainPoseBox(PoseBox):
 
     @cached_property
     def inputs(self) -> list[Term]:
-        return Trace().inputs(len(self.spans))
+        return Trace().inputs(len(self.ranges))
 
 
 class _EntryBounds(MatrixBounds):

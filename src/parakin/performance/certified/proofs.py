@@ -14,7 +14,7 @@ from typing import Literal
 
 import numpy as np
 
-from ...arrays import Array, Progress, Span
+from ...arrays import Array, AxisRange, Progress
 from ...errors import PoseError
 from ...workspaces.certified.region import Region
 from ..characteristic_length import choose_characteristic_length
@@ -47,7 +47,7 @@ class Proof:
     tolerance: float = 0.0
 
 
-def make_pose_box(region: Region, ranges: Mapping[str, Span], length: float | None = None) -> PoseBox:
+def make_pose_box(region: Region, ranges: Mapping[str, AxisRange], length: float | None = None) -> PoseBox:
     """Make a box of poses in a region's mode: axes in ``ranges`` from low to high, others as fixed, or as at home.
 
     ranges : mm and rad
@@ -61,7 +61,7 @@ def make_pose_box(region: Region, ranges: Mapping[str, Span], length: float | No
         if axis not in machine.axes:
             raise PoseError(f"unknown axis {axis}, {machine.name} has {' '.join(machine.axes)}")
         if axis in region.stated_axes:
-            raise PoseError(f"{axis} is held and a side of the box")
+            raise PoseError(f"{axis} is fixed and a side of the box")
     for axis, (low, high) in ranges.items():
         if not (isfinite(low) and isfinite(high) and low <= high):
             raise PoseError(f"the box's side along {axis} is empty: {low:g} to {high:g}")

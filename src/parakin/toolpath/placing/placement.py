@@ -9,8 +9,8 @@ from typing import TypeAlias
 
 import numpy as np
 
-from ...arguments import check_arguments, parse_span
-from ...arrays import Array, Progress, Span
+from ...arguments import check_arguments, parse_range
+from ...arrays import Array, AxisRange, Progress
 from ...errors import PoseError, quote
 from ...machine import Machine
 from ..path import ToolPath
@@ -19,7 +19,7 @@ from ..posting.working_mode import list_candidate_modes
 from .margins import AXES, PlacementMargins, PlacementScore
 from .placement_search import PlacementSearch
 
-AxisRanges: TypeAlias = Mapping[str, Span | Sequence[float | str]]
+AxisRanges: TypeAlias = Mapping[str, AxisRange | Sequence[float | str]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,17 +91,17 @@ def find_placements(
     for axis in bounds:
         if axis not in tuple(AXES):
             raise PoseError(f"bounds: unknown axis {quote(axis)}, an axis of X Y Z A B C and low <= high expected")
-    spans = {axis: parse_span(axis, span, "mm" if axis in "XYZ" else "rad") for axis, span in bounds.items()}
-    for axis, (low, high) in spans.items():
+    ranges = {axis: parse_range(axis, ends, "mm" if axis in "XYZ" else "rad") for axis, ends in bounds.items()}
+    for axis, (low, high) in ranges.items():
         if not -math.inf < low <= high < math.inf:
             raise PoseError(f"bounds: {axis} from {low} to {high}; an axis of X Y Z A B C and low <= high expected")
     if not len(path):
         raise PoseError("path: no records to place")
     path = fit_tool_lengths(machine, path)
     report = progress or (lambda fraction: None)
-    axes = tuple(axis for axis in AXES if axis in spans and spans[axis][0] < spans[axis][1])
-    fixed = {axis: ends[0] for axis, ends in spans.items() if axis not in axes}
-    low_high = np.array([spans[axis] for axis in axes]).reshape(-1, 2)
+    axes = tuple(axis for axis in AXES if axis in ranges and ranges[axis][0] < ranges[axis][1])
+    fixed = {axis: ends[0] for axis, ends in ranges.items() if axis not in axes}
+    low_high = np.array([ranges[axis] for axis in axes]).reshape(-1, 2)
     results, tried = list[tuple[Array, PlacementScore, PlacementMargins]](), 0
     for candidate in list_candidate_modes(machine, mode):
         margins = PlacementMargins(machine, path, candidate, axes, low_high[:, 0], low_high[:, 1], fixed)

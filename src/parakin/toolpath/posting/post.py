@@ -56,7 +56,7 @@ def post_path(
         solution = follow_working_mode(machine, path, sampled, candidate)
         report(0.7)
         judgement = judge_path(machine, solution.poses, solution.joints, path.line, candidate, path_limits)
-        faults = (int(np.count_nonzero(judgement.broken)), solution.swings)
+        faults = (int(np.count_nonzero(judgement.broken)), solution.wide_turns)
         if best is None or faults < fewest:
             best, fewest = (solution, judgement), faults
         if faults == (0, 0):

@@ -175,12 +175,12 @@ class _RewindBuilder:
         end = int(self.ends[:, 0].max())
         before = int(self.counts[self.ends[:, 0].argmax()])
         while end < len(self.angles):
-            found = self._find_rewind(start, end, before)
-            if found is None:
+            choice = self._find_rewind(start, end, before)
+            if choice is None:
                 line = int(self.path.line[end])
                 notes.append(Note(line, f"no place for a rewind of {self.drive.name} before this line"))
                 break
-            rewind, records, after = found
+            rewind, records, after = choice
             rewinds.append(rewind)
             added.append((rewind.record + 1, records))
             start, before = rewind.record, after
@@ -240,10 +240,10 @@ class _RewindBuilder:
         for count in before + (after - before) * np.arange(steps + 1) / steps:
             row = wanted.copy()
             row[wrist.first] += TURN * count
-            found = find_pose_with_wrist(self.machine, pose, row, mode)
-            if found is None:
+            turned = find_pose_with_wrist(self.machine, pose, row, mode)
+            if turned is None:
                 return None
-            pose = found
+            pose = turned
             legs = self.machine.inverse(pose, mode)
             legs[wrist.pair] = row[wrist.pair]
             poses.append(pose)

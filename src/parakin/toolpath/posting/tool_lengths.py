@@ -89,15 +89,15 @@ def _choose_lengths(machine: Machine, path: ToolPath, length: ToolLength) -> lis
     longest = max((cutter for cutter in map(_find_cutter_length, path.tools) if cutter == cutter), default=math.nan)
     lengths = []
     for use in path.tools if length is None and own > 0.0 else ():
-        cutter, told = _find_cutter_length(use), _find_length(use, "set_length")
-        if told != told and cutter > own + _SAME:
+        cutter, stated = _find_cutter_length(use), _find_length(use, "set_length")
+        if stated != stated and cutter > own + _SAME:
             _refuse_length(machine, path, use, f"has a cutter of {cutter:g} mm")
     for use in path.tools:
-        cutter, told = _find_cutter_length(use), _find_length(use, "set_length")
-        if told == told:
-            if length is None and not use.from_table and abs(told - own) > _SAME:
-                _refuse_length(machine, path, use, f"is {told:g} mm long")
-            lengths.append(told if length is None or length == "file" or use.from_table else longest_tool)
+        cutter, stated = _find_cutter_length(use), _find_length(use, "set_length")
+        if stated == stated:
+            if length is None and not use.from_table and abs(stated - own) > _SAME:
+                _refuse_length(machine, path, use, f"is {stated:g} mm long")
+            lengths.append(stated if length is None or length == "file" or use.from_table else longest_tool)
         elif cutter != cutter:
             lengths.append(longest_tool)
         elif length == "file":
@@ -137,13 +137,13 @@ def _note_lengths(path: ToolPath, uses: Sequence[ToolUse], own: float) -> list[N
     """Note the lengths that count where the file's cutters, or tools of unknown length, leave them to the machine's."""
     notes = []
     for use in uses:
-        cutter, told = _find_cutter_length(use), _find_length(use, "set_length")
+        cutter, stated = _find_cutter_length(use), _find_length(use, "set_length")
         line = use.length_line or use.line
-        if told != told and cutter == cutter and abs(cutter - use.length) > _SAME:
+        if stated != stated and cutter == cutter and abs(cutter - use.length) > _SAME:
             holder = " with its holder" if use.length > cutter else ""
             text = f"{describe_tool(use)}: a cutter of {cutter:g} mm, taken to be {use.length:g} mm long{holder}"
             notes.append(Note(line, text))
-        elif told != told and cutter != cutter and len(uses) > 1:
+        elif stated != stated and cutter != cutter and len(uses) > 1:
             notes.append(Note(line, f"{describe_tool(use)}: no length told, taken to be {use.length:g} mm long"))
     return notes
 

@@ -21,13 +21,13 @@ class ModeSolution:
 
     mode : signs of the legs, and of head and table where the path begins
     poses, joints : (n, axes) and (n, joints)
-    swings : how many motions in feed turn a joint by more than a quarter turn
+    wide_turns : how many motions in feed turn a joint by more than a quarter turn
     """
 
     mode: str
     poses: Array
     joints: Array
-    swings: int
+    wide_turns: int
 
 
 def list_candidate_modes(machine: Machine, mode: str | None) -> list[str]:
@@ -56,10 +56,10 @@ def follow_working_mode(machine: Machine, path: ToolPath, sampled: SampledPath, 
         if turns is None:
             turns = choose_turns(TurningJoint.of(machine, poses, joints, mode, column, home[column]))
         joints[:, column] += TURN * turns
-    return ModeSolution(mode, poses, joints, _count_swings(joints[:, turning], path.rapid))
+    return ModeSolution(mode, poses, joints, _count_wide_turns(joints[:, turning], path.rapid))
 
 
-def _count_swings(angles: Array, rapid: Flags) -> int:
+def _count_wide_turns(angles: Array, rapid: Flags) -> int:
     with np.errstate(invalid="ignore"):
-        swings = (np.abs(np.diff(angles, axis=0)) > SWING).any(axis=1)
-    return int(np.count_nonzero(swings & ~rapid[1:]))
+        wide_turns = (np.abs(np.diff(angles, axis=0)) > SWING).any(axis=1)
+    return int(np.count_nonzero(wide_turns & ~rapid[1:]))

@@ -11,8 +11,8 @@ from typing import Any, Literal
 
 import numpy as np
 
-from ...arguments import check_arguments, parse_coordinate, parse_span
-from ...arrays import Array, Span
+from ...arguments import check_arguments, parse_coordinate, parse_range
+from ...arrays import Array, AxisRange
 from ...errors import PoseError
 from ...kernels.elementary import GREATEST_ANGLE
 from ...machine import Machine
@@ -50,7 +50,7 @@ class Region:
     kind: RegionKind
     free_axes: tuple[str, ...]
     fixed_axes: Mapping[str, float]
-    swept_axes: Mapping[str, Span]
+    swept_axes: Mapping[str, AxisRange]
     without: tuple[str, ...]
     mode: str
     part: RegionPart = "home"
@@ -88,13 +88,13 @@ class Region:
     @cached_property
     def swept_bounds(self) -> tuple[Array, Array]:
         """Lower and upper ends of the swept ranges, (s,) rad each."""
-        low, high = (np.array([span[i] for span in self.swept_axes.values()], float) for i in (0, 1))
+        low, high = (np.array([ends[i] for ends in self.swept_axes.values()], float) for i in (0, 1))
         return low, high
 
     @property
     def parameters(self) -> dict[str, Any]:
         """What :func:`make_region` needs to make the same region of the same machine, and what follows; mm and rad."""
-        swept = {axis: list(span) for axis, span in self.swept_axes.items()}
+        swept = {axis: list(ends) for axis, ends in self.swept_axes.items()}
         return {
             "machine": self.machine.name,
             "kind": self.kind,
@@ -119,7 +119,7 @@ class Region:
         for axis, value in values.items():
             _refuse_bad_value(axis, value, turning)
         fixed = {**self.fixed_axes, **values}
-        swept = {axis: span for axis, span in self.swept_axes.items() if axis not in values}
+        swept = {axis: ends for axis, ends in self.swept_axes.items() if axis not in values}
         return replace(
             self,
             kind=self.kind if swept else "constant",
@@ -217,23 +217,23 @@ def make_region(
     _refuse_unknown_axes(machine, (*(at or {}), *(every or {}), *(some or {})))
     fixed = parse_coordinates(machine, at or {})
     units = dict(zip(machine.axes, machine.axis_units, strict=True))
-    spans = {**(every or {}), **(some or {})}
-    swept = {axis: parse_span(axis, span, units[axis]) for axis, span in spans.items()}
+    ranges = {**(every or {}), **(some or {})}
+    swept = {axis: parse_range(axis, ends, units[axis]) for axis, ends in ranges.items()}
     turning = _list_turning_axes(machine)
     if sum((bool(every), bool(some), dexterous)) > 1:
         raise PoseError("one of every, some and dexterous can be asked at a time")
     if dexterous:
         swept = machine.orientation_ranges
     kind: RegionKind = "dexterous" if dexterous else "total" if every else "inclusive" if some else "constant"
-    for axis, span in swept.items():
-        _refuse_bad_span(axis, span, turning, fixed)
+    for axis, ends in swept.items():
+        _refuse_bad_range(axis, ends, turning, fixed)
     for axis, value in fixed.items():
         _refuse_bad_value(axis, value, turning)
     home = dict(zip(machine.axes, machine.home.tolist(), strict=True))
     fixed |= {axis: home[axis] for axis in turning if axis not in fixed and axis not in swept}
     free = tuple(axis for axis in machine.axes if axis not in turning and axis not in fixed)
     if not free:
-        raise PoseError(f"every axis is held; leave at least one of {' '.join('XYZ')} free")
+        raise PoseError(f"every axis is fixed; leave at least one of {' '.join('XYZ')} free")
     return Region(
         machine,
         kind,
@@ -263,15 +263,15 @@ def _refuse_unknown_axes(machine: Machine, axes: Iterable[str]) -> None:
             raise PoseError(f"unknown axis {axis}, {machine.name} has {' '.join(machine.axes)}")
 
 
-def _refuse_bad_span(axis: str, span: Span, turning: Sequence[str], fixed: Mapping[str, float]) -> None:
+def _refuse_bad_range(axis: str, ends: AxisRange, turning: Sequence[str], fixed: Mapping[str, float]) -> None:
     if axis not in turning:
         raise PoseError(f"{axis} is no turning axis, only {' '.join(turning) or 'none here'} can be swept")
     if axis in fixed:
-        raise PoseError(f"{axis} is held and swept")
-    if not all(map(isfinite, span)) or span[0] > span[1]:
-        raise PoseError(f"the range of {axis} is empty: {span[0]:g} to {span[1]:g}")
-    if max(map(abs, span)) > GREATEST_ANGLE:
-        raise PoseError(f"the range of {axis} is beyond what can be computed: {span[0]:g} to {span[1]:g}")
+        raise PoseError(f"{axis} is fixed and swept")
+    if not all(map(isfinite, ends)) or ends[0] > ends[1]:
+        raise PoseError(f"the range of {axis} is empty: {ends[0]:g} to {ends[1]:g}")
+    if max(map(abs, ends)) > GREATEST_ANGLE:
+        raise PoseError(f"the range of {axis} is beyond what can be computed: {ends[0]:g} to {ends[1]:g}")
 
 
 def _refuse_bad_value(axis: str, value: float, turning: Sequence[str]) -> None:

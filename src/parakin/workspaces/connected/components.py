@@ -153,7 +153,7 @@ def _locate_start(region: Region, start: RowsLike, sides: Mapping[int, Constrain
     pose = dict(zip(machine.axes, rows[0].tolist(), strict=True))
     for axis, value in region.fixed_axes.items():
         if not abs(pose[axis] - value) <= 1e-9 * max(1.0, abs(value)):
-            raise PoseError(f"start: {axis} is {pose[axis]:g}, but held at {value:g} here")
+            raise PoseError(f"start: {axis} is {pose[axis]:g}, but fixed at {value:g} here")
     for axis, (first, last) in region.swept_axes.items():
         if not first <= pose[axis] <= last:
             raise PoseError(f"start: {axis} is {pose[axis]:g}, beyond its range {first:g} to {last:g}")

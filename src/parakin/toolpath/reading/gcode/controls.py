@@ -73,8 +73,8 @@ def recognise_block(text: str) -> str | None:
 
 def name_control(message: str, name: str | None, text: str) -> str:
     """Add a control's name to the message of an error in line ``text``."""
-    found = recognise_block(text)
-    where, found = ("the line", found) if found else ("the file", name)
-    if found is None:
+    control = recognise_block(text)
+    where, control = ("the line", control) if control else ("the file", name)
+    if control is None:
         return message
-    return f"{message}; {where} is of a program for {found}, expected RS274/NGC as LinuxCNC reads it"
+    return f"{message}; {where} is of a program for {control}, expected RS274/NGC as LinuxCNC reads it"

@@ -155,6 +155,16 @@ def test_nobody_above_the_machine_asks_its_model(module):
     assert not asked
 
 
+DESCRIBED = {"title", "source"}  # what a machine's description says in words
+
+
+@pytest.mark.parametrize("module", [m for m in ABOVE if m != "export.json.machine"])  # that one writes the description
+def test_nobody_above_the_machine_reads_its_description(module):
+    nodes = list(ast.walk(ast.parse(MODULES[module].read_text(encoding="utf-8"))))
+    words = {id(n.value) for n in nodes if isinstance(n, ast.Attribute) and n.attr in DESCRIBED}
+    assert not [n.lineno for n in nodes if isinstance(n, ast.Attribute) and n.attr == "spec" and id(n) not in words]
+
+
 @pytest.mark.parametrize("module", [m for m in MODULES if room_of(m) != "model"])
 def test_structures_are_asked_for_behaviour_not_for_their_type(module):
     tree = ast.parse(MODULES[module].read_text(encoding="utf-8"))

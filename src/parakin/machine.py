@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from .algebra import Scalar
+from .algebra import Scalar, Vec
 from .arguments import RowsLike, bound_angles, describe_value, read_rows, warn_of_wide_angles
 from .arrays import Array, AxisRange
 from .errors import DescriptionError, NoMethodError, PoseError, SingularHomeWarning
@@ -21,10 +21,10 @@ from .kinematics.forward import Solution, compute_closure_tolerance, find_sides,
 from .kinematics.inverse import SINGULAR, measure_regularity, solve_inverse
 from .kinematics.tapes import KinematicTapes, collect_tapes
 from .kinematics.wrist import EVERY_DIRECTION, EVERY_ROTATION, EXACT, Wrist, find_wrist, flip_mode
-from .model.legs import Inverse
-from .model.limits import Limit
+from .model.legs import Inverse, Leg
+from .model.limits import Limit, compute_platform_points, group_joints_by_leg
 from .model.parts import Drive
-from .model.rates import TwistRates, compute_twist_rates
+from .model.rates import TwistRates, compute_twist_rates, list_closure_joints
 from .model.spec import Spec
 from .model.structures import DirectionColumns, PlatformPlacement, Structure
 from .model.traces import Model
@@ -84,6 +84,20 @@ class Machine:
     def drives(self) -> tuple[Drive, ...]:
         """What can be driven, one for each joint."""
         return self.model.drives
+
+    @property
+    def legs(self) -> tuple[Leg, ...]:
+        """The legs, each with its drives and what follows from their joints."""
+        return self.spec.legs
+
+    @property
+    def closure_joints(self) -> list[int]:
+        """The joint of each leg's closure, as an index in the joint vector."""
+        return list_closure_joints(self.spec)
+
+    def group_joints(self, joints: Sequence[Scalar]) -> list[list[Scalar]]:
+        """Group a joint vector by leg; it may go on with the joints of head and table."""
+        return group_joints_by_leg(self.spec, joints)
 
     @property
     def leg_count(self) -> int:
@@ -392,6 +406,10 @@ class Machine:
             if joints is None:
                 return self.structure.place(list(pose), self.model.split_mode(mode)[1])
             return self.structure.place_with_joints(list(pose), list(joints[self.leg_count :]))
+
+    def place_leg_joints(self, placement: PlatformPlacement) -> list[Vec]:
+        """Compute the platform's joint of every leg in the base frame, mm, with the platform placed."""
+        return compute_platform_points(self.spec, placement.rotation, placement.origin)
 
     # The same on scalars of any kind (:mod:`parakin.algebra`), for interpreters such as intervals.
 

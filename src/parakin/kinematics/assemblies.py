@@ -10,7 +10,6 @@ from ..errors import NoMethodError
 from ..kernels.batch import evaluate_tape_with_residual
 from ..kernels.intervals import IntervalProgram
 from ..model.chain import make_rotation_about
-from ..model.legs.lambda_ import Lambda
 from ..model.traces import Model
 from .forward import compute_closure_tolerance, compute_poses, find_roots
 from .planar_rpr import CONTINUUM, solve_planar_rpr
@@ -144,7 +143,7 @@ def _solve_planar(model: Model, joints: Array) -> Array:
 def _solve_lambdas(model: Model, joints: Array) -> Array:
     """Solve three Lambda legs on parallel shafts: the heights give the tilt, the distances a planar 3-RPR."""
     structure = model.structure
-    legs = [leg for leg in model.spec.legs if isinstance(leg, Lambda)]
+    legs = structure.lambda_legs
     axis = np.array(legs[0].rail)
     side = np.linalg.svd(axis[None, :])[2][1:]
     if np.dot(np.cross(side[0], side[1]), axis) < 0.0:

@@ -12,8 +12,6 @@ from ..algebra import Trace, derivative, evaluate_trace, norm
 from ..arrays import Array
 from ..errors import PoseError
 from ..machine import Machine
-from ..model.chain import compose_chain
-from ..model.limits import group_joints_by_leg
 
 _ZERO = 1e-9  # mm; a length no greater counts as zero
 
@@ -64,14 +62,12 @@ def _compute_rms(lengths: Sequence[float] | Array) -> float:
 
 
 def _measure_tool_reach(machine: Machine) -> float:
-    head = machine.spec.head
-    last = max((i for i, step in enumerate(head) if step.drive is not None), default=-1)
-    return float(norm(compose_chain(head[last + 1 :], ())[1]))
+    return machine.structure.measure_tool_reach()
 
 
 def _measure_platform_radius(machine: Machine) -> float:
     turns = machine.structure.turns
-    joints = np.array([leg.platform for leg in machine.spec.legs])
+    joints = np.array([leg.platform for leg in machine.legs])
     if len(turns) == 1:  # along the axis of its only turn nothing moves
         joints[:, "xyz".index(turns[0][1])] = 0.0
     return _compute_rms(np.linalg.norm(joints - joints.mean(0), axis=1))
@@ -79,9 +75,9 @@ def _measure_platform_radius(machine: Machine) -> float:
 
 def _measure_arms(machine: Machine) -> float:
     """Measure the arms of turning drives at home: how fast their feet move, mm/rad."""
-    at_home = group_joints_by_leg(machine.spec, machine.inverse(machine.home).tolist())
+    at_home = machine.group_joints(machine.inverse(machine.home).tolist())
     lengths = []
-    for leg, given in zip(machine.spec.legs, at_home, strict=True):
+    for leg, given in zip(machine.legs, at_home, strict=True):
         trace = Trace()
         q = trace.inputs(len(given))
         foot, _ = leg.struts(leg.platform, list(q))[0]

@@ -8,7 +8,6 @@ import numpy as np
 
 from ..arrays import Array
 from ..machine import Machine
-from ..model.rates import list_closure_joints
 from .characteristic_length import CharacteristicLength
 
 
@@ -51,8 +50,3 @@ def list_column_scales(machine: Machine, length: CharacteristicLength) -> tuple[
     turns = len(machine.structure.turns)
     a = np.array([1.0] * (len(machine.axes) - turns) + [small] * turns)
     return a, np.array([small if unit == "rad" else 1.0 for unit in machine.joint_units])
-
-
-def list_leg_joints(machine: Machine) -> list[int]:
-    """List the joint of each leg's row, as an index in the joint vector."""
-    return list_closure_joints(machine.spec)

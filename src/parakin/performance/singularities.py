@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike
 from ..arrays import Array
 from ..machine import Machine
 from .characteristic_length import CharacteristicLength, choose_characteristic_length
-from .jacobians import ScaledRates, compute_scaled_rates, list_leg_joints
+from .jacobians import ScaledRates, compute_scaled_rates
 
 PARALLEL = "parallel"
 _ZERO = 1e-12  # a margin no greater has no sign
@@ -16,7 +16,7 @@ _ZERO = 1e-12  # a margin no greater has no sign
 
 def list_margin_names(machine: Machine) -> tuple[str, ...]:
     """List the margins: ``parallel``, ``serial JOINT`` for each joint of the legs, ``serial JOINT-JOINT``."""
-    order = list_leg_joints(machine)
+    order = machine.closure_joints
     serial = machine.joints[len(order) :]
     names = [PARALLEL, *(f"serial {machine.joints[i]}" for i in order)]
     return (*names, f"serial {'-'.join(serial)}") if serial else tuple(names)
@@ -65,7 +65,7 @@ def _compute_determinants(machine: Machine, rates: ScaledRates) -> Array:
     block = legs if n - legs == 2 else n
     with np.errstate(invalid="ignore"):
         columns = [np.linalg.det(rates.a[:, :block, :block])]
-        columns += [rates.b[:, row, joint] for row, joint in enumerate(list_leg_joints(machine))]
+        columns += [rates.b[:, row, joint] for row, joint in enumerate(machine.closure_joints)]
         if n > legs:
             columns.append(np.abs(np.linalg.det(rates.b[:, legs:, legs:])))
     return np.stack(columns, 1)

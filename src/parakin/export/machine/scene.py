@@ -18,7 +18,6 @@ from ...arguments import RowsLike
 from ...machine import Machine
 from ...model.chain import UNIT, compose_chain
 from ...model.legs import Leg
-from ...model.limits import compute_platform_points, group_joints_by_leg
 from ...model.parts import Step
 from ...model.structures import PlatformPlacement
 
@@ -96,7 +95,7 @@ def build_scene(
     parts = tuple(part for part in builder.parts if np.isfinite(part.points).all())
     labels = _join_labels([label for label in builder.labels if np.isfinite(label[1]).all()])
     missing = [letter for letter in "XYZ" if letter not in machine.axes]
-    normal = builder.mount[:, "XYZ".index(missing[0])] if missing and not machine.spec.table else None
+    normal = builder.mount[:, "XYZ".index(missing[0])] if missing and not machine.structure.table else None
     return Scene(parts, labels, builder.frames, normal)
 
 
@@ -104,7 +103,7 @@ class _SceneBuilder:
     """Gather the parts of one scene in the base frame and put them into M."""
 
     def __init__(self, machine: Machine, placement: PlatformPlacement, joints: Points):
-        self.spec, self.structure = machine.spec, machine.structure
+        self.machine, self.structure = machine, machine.structure
         self.placement, self.joints = placement, joints
         self.mount = np.array(self.structure.mount, float)
         self.base = np.array(self.structure.base, float)
@@ -117,7 +116,7 @@ class _SceneBuilder:
         self._add_legs()
         self._add_platform()
         self._add_head()
-        if self.spec.table:
+        if self.structure.table:
             self._add_table()
 
     def _to_machine(self, points: ArrayLike) -> Points:
@@ -129,9 +128,9 @@ class _SceneBuilder:
         self.parts.append(ScenePart(kind, name, self._to_machine(points).reshape(-1, 3), closed))
 
     def _add_legs(self) -> None:
-        spec, anchors = self.spec, []
-        points = compute_platform_points(spec, self.placement.rotation, self.placement.origin)
-        for leg, point, q in zip(spec.legs, points, group_joints_by_leg(spec, self.joints.tolist()), strict=True):
+        legs, anchors = self.machine.legs, []
+        points = self.machine.place_leg_joints(self.placement)
+        for leg, point, q in zip(legs, points, self.machine.group_joints(self.joints.tolist()), strict=True):
             struts = [np.array(ends, float) for ends in leg.struts(point, q)]
             moved: dict[int, list[str]] = {}
             for number, (drive, feet) in enumerate(zip(leg.drives, _sweep_feet(leg, point, q, struts[0]), strict=True)):
@@ -157,14 +156,14 @@ class _SceneBuilder:
             self._add("base", "base", ring, len(ring) > 2)
 
     def _add_platform(self) -> None:
-        ring = order_polygon(np.array([leg.platform for leg in self.spec.legs], float))
+        ring = order_polygon(np.array([leg.platform for leg in self.machine.legs], float))
         self._add("platform", "platform", ring @ self.rotation.T + self.origin, len(ring) > 2)
         middle = ring.mean(axis=0) @ self.rotation.T + self.origin
         if not _coincide(middle, self.origin) and not self.structure.has_central_leg:
             self._add("head", "platform", [middle, self.origin])
 
     def _add_head(self) -> None:
-        head = self.spec.head
+        head = self.structure.head
         serial = list(self.placement.serial)[: self.structure.head_joints]
         chain = list(_compose_steps(head, serial))
         links = _remove_duplicates([np.zeros(3), *[origin for _, origin in chain]])
@@ -182,7 +181,7 @@ class _SceneBuilder:
 
     def _add_table(self) -> None:
         """Add a disc at the workpiece's frame, and the axes that turn it; these are in M, whatever the mounting."""
-        table = self.spec.table
+        table = self.structure.table
         serial = list(self.placement.serial)[self.structure.head_joints :]
         chain = list(_compose_steps(table, serial))
         rotation, origin = chain[-1]

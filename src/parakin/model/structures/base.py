@@ -10,10 +10,13 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from math import inf
 from typing import Literal, NamedTuple
 
-from ...algebra import IDENTITY, ORIGIN, Mat, Scalar, Vec
+from ...algebra import IDENTITY, ORIGIN, Mat, Scalar, Vec, norm
 from ..chain import UNIT, Pointing, compose_chain
+from ..legs.lambda_ import Lambda
+from ..parts import TRANSLATIONS
 from ..spec import Spec
 
 # Axis letters of a pose, ISO 841, by the elementary transforms that move along and about them.
@@ -61,8 +64,30 @@ class Structure(ABC):
     def __init__(self, spec: Spec):
         self.spec = spec
         self.mount, self.base = compose_chain(spec.mounting, ())
+        self.head, self.table = spec.head, spec.table
         self.coordinates = spec.motion
         self.head_joints = sum(step.drive is not None for step in spec.head)
+
+    @property
+    def has_turning_table(self) -> bool:
+        """Whether drives turn the table."""
+        return any(step.drive is not None for step in self.spec.table)
+
+    @property
+    def lambda_legs(self) -> list[Lambda]:
+        """The legs that are Lambdas."""
+        return [leg for leg in self.spec.legs if isinstance(leg, Lambda)]
+
+    def measure_tool_reach(self) -> float:
+        """Measure how far the tip is from the last driven axis of the head, or from the platform, mm."""
+        head = self.spec.head
+        last = max((i for i, step in enumerate(head) if step.drive is not None), default=-1)
+        return float(norm(compose_chain(head[last + 1 :], ())[1]))
+
+    def bound_shift(self) -> float:
+        """Bound how far mounting, head and table together shift a point, mm; infinite where a drive shifts it."""
+        steps = [step for step in (*self.spec.mounting, *self.spec.head, *self.spec.table) if step.axis in TRANSLATIONS]
+        return inf if any(step.drive is not None for step in steps) else sum(abs(step.value) for step in steps)
 
     @property
     def has_direction(self) -> bool:

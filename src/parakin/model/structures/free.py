@@ -11,7 +11,6 @@ from ...algebra import IDENTITY, Mat, Scalar, Vec, add, apply, atan2, product, s
 from ...algebra import make_axis_rotation as turned
 from ...errors import DescriptionError
 from ..chain import UNIT, compose_chain, transform_to_local
-from ..legs.lambda_ import Lambda
 from ..parts import ROTATIONS, TRANSLATIONS
 from ..spec import Spec
 from .base import LETTERS, PlatformPlacement, Structure
@@ -62,7 +61,7 @@ class Free(Structure):
         in_plane = len(self.coordinates) == 3 and len(turns) == 1 and f"t{turns[0][1]}" not in self.coordinates
         if in_plane and all(leg.sphere([0.0] * len(leg.drives)) is not None for leg in legs):
             return "planar"
-        rails = [np.array(leg.rail) for leg in legs if isinstance(leg, Lambda)]
+        rails = [np.array(leg.rail) for leg in self.lambda_legs]
         parallel = len(rails) == len(legs) == 3 and all(np.allclose(rail, rails[0], atol=1e-12) for rail in rails)
         return "lambda" if parallel else None
 

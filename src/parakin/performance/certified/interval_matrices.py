@@ -15,7 +15,7 @@ from ...kernels.intervals import IntervalProgram
 from ...machine import Machine
 from ...model.rates import TwistRates
 from ..characteristic_length import CharacteristicLength
-from ..jacobians import list_column_scales, list_leg_joints
+from ..jacobians import list_column_scales
 
 Matrix = Sequence[Sequence[Scalar]]
 
@@ -134,7 +134,7 @@ class PoseBox:
     def serial(self) -> Matrix:
         """The matrix that is singular at serial singularities: the determinants of B's blocks on a diagonal."""
         b = self._rates[0].b
-        blocks = [b[row][joint] for row, joint in enumerate(list_leg_joints(self.machine))]
+        blocks = [b[row][joint] for row, joint in enumerate(self.machine.closure_joints)]
         turns = [row[len(blocks) :] for row in b[len(blocks) :]]
         if len(turns) == 1:
             blocks.append(turns[0][0])

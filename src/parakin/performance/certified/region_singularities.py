@@ -18,7 +18,6 @@ from ...workspaces.certified.region import Region
 from ...workspaces.certified.separation import find_joined_cells
 from ...workspaces.certified.subdivision import Cells
 from ...workspaces.connected.adjacency import find_adjacent_cells, label_components
-from ..jacobians import list_leg_joints
 from ..singularities import list_margin_names
 
 SingularityVerdict = Literal["met", "none", "unproved"]
@@ -86,7 +85,7 @@ def _trace_margins(region: Region) -> list[Scalar]:
         legs, n = len(rates.wrench_norms), len(rates.a)
         size = legs if n - legs == 2 else n
         margins = [expand_determinant([row[:size] for row in rates.a[:size]])]
-        margins += [rates.b[row][joint] for row, joint in enumerate(list_leg_joints(machine))]
+        margins += [rates.b[row][joint] for row, joint in enumerate(machine.closure_joints)]
         if n > legs:
             margins.append(expand_determinant([row[legs:] for row in rates.b[legs:]]))
         return margins

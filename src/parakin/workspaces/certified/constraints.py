@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from math import isfinite
 
 import numpy as np
 
@@ -13,7 +14,6 @@ from ...algebra import Scalar, Term, Trace, absolute, derivative, find_dependenc
 from ...arrays import Array
 from ...kernels.intervals import IntervalProgram
 from ...machine import Machine
-from ...model.parts import ROTATIONS
 
 _ROUNDING = 1e-12  # relative, of bounds that limits imply
 
@@ -116,22 +116,17 @@ class TracedPose:
         no bounds; on a table that turns all round the workpiece's position tells little of the machine's. There this
         still bounds the machine's reach.
         """
-        spec = self.machine.spec
-        has_central_leg = spec.motion[0] in ROTATIONS
-        is_table_swept = bool(self.swept_axes) and any(step.drive is not None for step in spec.table)
-        if not has_central_leg and not is_table_swept:
+        structure = self.machine.structure
+        is_table_swept = bool(self.swept_axes) and structure.has_turning_table
+        if not structure.has_central_leg and not is_table_swept:
             return []
         with np.errstate(all="ignore"):
             _, platform, _ = self.machine.trace_inverse(self.pose, self.mode)
-        margins = []
+        margins, shifts = [], structure.bound_shift()
         for name, middle, most in self._list_reach_spheres(without):
-            if has_central_leg:
+            if structure.has_central_leg:
                 margins.append((name, most - norm(sub(platform.origin, middle.tolist()))))
-            if is_table_swept:  # turns keep lengths, and each shift adds at most its own
-                steps = (*spec.mounting, *spec.head, *spec.table)
-                if any(step.drive is not None and step.axis not in ROTATIONS for step in steps):
-                    continue
-                shifts = sum(abs(step.value) for step in steps if step.axis not in ROTATIONS)
+            if is_table_swept and isfinite(shifts):  # turns keep lengths, and each shift adds at most its own
                 tip = [value for axis, value in zip(self.machine.axes, self.pose, strict=True) if axis in "XYZ"]
                 farthest = (most + np.linalg.norm(middle) + shifts) * (1.0 + _ROUNDING)
                 margins.append((name, farthest - norm(tip)))
@@ -139,7 +134,7 @@ class TracedPose:
 
     def _list_reach_spheres(self, without: Sequence[str]) -> Iterator[tuple[str, Array, float]]:
         """Yield spheres that hold the platform's origin: a joint of their leg, the middle (3,) and the radius, mm."""
-        for leg in self.machine.spec.legs:
+        for leg in self.machine.legs:
             low = [-np.inf if f"{drive.name}.min" in without else drive.low for drive in leg.drives]
             high = [np.inf if f"{drive.name}.max" in without else drive.high for drive in leg.drives]
             trace = Trace()

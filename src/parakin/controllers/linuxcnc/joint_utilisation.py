@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ...arrays import Array, Flags, Indices
-from ...kinematics.wrist import EXACT
+from ...kinematics.wrist import PRINTED
 from ...toolpath.timing.drive_limits import DriveLimits
 from ...toolpath.timing.trajectory import Trajectory
 
@@ -35,7 +35,7 @@ def _measure_block(trajectory: Trajectory, piece: Indices, start: Array, end: Ar
     segment, offset, half = _place_samples(trajectory, piece, start, end)
     curve, machine = trajectory.curve, trajectory.posted.machine
     poses = curve.corner[segment] + curve.slope[segment] * offset[:, None]
-    joints = machine.follow(poses, trajectory.posted.mode, EXACT)
+    joints = machine.follow(poses, trajectory.posted.mode, PRINTED)
     gaps = _measure_gaps(trajectory, segment, offset)
     slope = np.diff(joints, axis=0) / gaps[:, None] / DriveLimits.of(machine).speed
     change = np.abs(np.diff(slope, axis=0)) * (segment[1:-1] == segment[:-2])[:, None]

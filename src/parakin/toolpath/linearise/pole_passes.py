@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ...arrays import Indices
-from ...kinematics.wrist import PRINTED, REPORTED
+from ...kinematics.wrist import EXACT, PRINTED, REPORTED
 from ..path import Note
 from ..posting.posted import Posted
 from ..programmed_path import ProgrammedPath
@@ -106,7 +106,8 @@ def _lead_unless_refused(
     for pole in find_poles(posted.machine, deviation.interpolation, turns is not None):
         steps = find_pole_steps(pole, programmed, posted, motion)
         routes = []
-        for route in find_pole_routes(pole, programmed, steps, deviation.angle):
+        bends = deviation.interpolation == "pose" and not pole.is_upright
+        for route in find_pole_routes(pole, programmed, steps, deviation.angle, bends):
             if (axis[route.record] != programmed.axis[route.record]).any():
                 continue  # led through another pole already
             pole_pass = locate_pass(pole, posted.path, steps, route)
@@ -115,7 +116,7 @@ def _lead_unless_refused(
             axis[route.record] = route.axis
             routes.append(route)
             led.passes.append(pole_pass)
-        crossings += [_Crossing(pole, steps, route) for route in routes if route.crossing >= 0]
+        crossings += [_Crossing(pole, steps, route) for route in routes if route.crossing >= 0 or route.rays]
         held: list[PoleHold] = []
         if not inclined:
             for hold in find_pole_holds(pole, posted, programmed, steps, routes, deviation.angle):
@@ -147,10 +148,16 @@ def _insert_records_at_poles(deviation: Deviation, led: PolePasses, crossings: l
         row for hold in led.holds for row in zip(hold.motion.tolist(), hold.share.tolist(), hold.added, strict=True)
     ]
     for crossing in crossings:
-        pole, route, motion = crossing.pole, crossing.route, crossing.motion
+        pole, route = crossing.pole, crossing.route
+        for ray_motion, share, projected in route.rays:
+            at = np.array([ray_motion]), np.array([share])
+            added.append((ray_motion, share, pole.find_axes(*path.interpolate(*at), projected[None])[0]))
+        if route.crossing < 0:
+            continue
+        motion = crossing.motion
         tip, axis = path.interpolate(motion, np.array([route.share]))
         miss = float(np.hypot(*pole.project_axes(tip, axis)[0]))
-        if miss <= PRINTED or _crosses_by_itself(deviation, led, pole, motion):
+        if miss <= (EXACT if route.rays else PRINTED) or _crosses_by_itself(deviation, led, pole, motion):
             continue
         added.append((int(motion[0]), route.share, pole.find_axes(tip, axis, np.zeros((1, 2)))[0]))
         if miss > _LARGE_MISS * deviation.angle:

@@ -3,18 +3,22 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
 from ...arrays import Array, Indices
-from ...kinematics.wrist import PRINTED
+from ...kinematics.wrist import EXACT, PRINTED
 from ..path import ToolPath
 from ..programmed_path import ProgrammedPath
 from .pole_steps import PoleSteps, meet_circle
 from .poles import Pole
 
 _MOST_MOVED = 0.98  # of the angle tolerance: what an axis may be moved; the rest is for rounding
-_BENT = np.sin(np.radians(20.0))  # of the circle, off the line through the pole: what bends more is held
+_BENT = 0.342  # sine of 20°, of the way into the circle off the line through the pole: what bends more is held
+_SNAPPED = 0.2  # fraction of the angle tolerance: a record so near to the pole is moved onto it
+_GROWTH, _OUTERMOST = 4.0, 0.7  # of the radii at which records keep a way straight, and the last in the circle's radius
+_EDGE = 1e-9  # of a motion: what is rounding
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,6 +31,7 @@ class PoleRoute:
     crossing : the step on which the pole is passed, -1 if none
     share : where on its motion
     ends : shares of that motion at which the way to the pole begins and ends, where that is within it
+    rays : motions, shares and projections (2,) of records that keep the way straight towards the pole
     """
 
     steps: tuple[int, int]
@@ -36,6 +41,7 @@ class PoleRoute:
     crossing: int
     share: float
     ends: tuple[float, ...]
+    rays: tuple[tuple[int, float, Array], ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,8 +73,13 @@ def locate_pass(pole: Pole, path: ToolPath, steps: PoleSteps, route: PoleRoute) 
     return PolePass(pole, route.miss, float(begin), float(end), int(path.line[steps.record[nearest]]))
 
 
-def find_pole_routes(pole: Pole, programmed: ProgrammedPath, steps: PoleSteps, angle: float) -> list[PoleRoute]:
+def find_pole_routes(
+    pole: Pole, programmed: ProgrammedPath, steps: PoleSteps, angle: float, bends: bool
+) -> list[PoleRoute]:
     """Find routes of the passes that can be led through a pole with no axis moved by ``angle`` rad or more.
+
+    bends : whether the interpolation bends what is straight in the projection. Then a record near the pole is moved
+        onto it, and more records are put on the way, the nearer to the pole the closer.
 
     Around each pass circles about the pole are tried, the largest first, each half as large as the one before.
     """
@@ -84,7 +95,7 @@ def find_pole_routes(pole: Pole, programmed: ProgrammedPath, steps: PoleSteps, a
             continue
         for (first, last), radius in zip(windows, radii.tolist(), strict=True):
             window = int(first[number]), int(last[number])
-            route = _route_through_pole(pole, programmed, steps, window, radius, angle)
+            route = _route_through_pole(pole, programmed, steps, window, _Squeeze(radius, angle, bends))
             if route is not None:
                 routes.append(route)
                 break
@@ -100,14 +111,23 @@ def _find_windows(steps: PoleSteps, starts: Indices, stops: Indices, radius: flo
     return begins[np.searchsorted(begins, starts, "right") - 1], ends[np.searchsorted(ends, stops)]
 
 
+class _Squeeze(NamedTuple):
+    """The circle about a pole within which a path is squeezed, the angle tolerance, and whether straight ways bend."""
+
+    radius: float
+    angle: float
+    bends: bool
+
+
 def _route_through_pole(
-    pole: Pole, programmed: ProgrammedPath, steps: PoleSteps, window: tuple[int, int], radius: float, angle: float
+    pole: Pole, programmed: ProgrammedPath, steps: PoleSteps, window: tuple[int, int], squeeze: _Squeeze
 ) -> PoleRoute | None:
     """Route the steps of a window over the pole by squeezing them; None if that moves an axis too far.
 
     In the projection about the pole the path is squeezed towards a line through it: an offset b from the line, after a
     on it, becomes b·(a/radius)². So the free angle turns evenly, by no more than it must, and without a swing.
     """
+    radius, angle, bends = squeeze
     first, last = window
     inside_window = slice(first, last + 1)
     x = np.concatenate([steps.first[first : first + 1], steps.last[inside_window]])
@@ -130,8 +150,17 @@ def _route_through_pole(
         return None
     records = np.concatenate([[steps.record[first] - (steps.begin[first] == 0.0)], steps.record[inside_window]])
     at_record = np.concatenate([[steps.begin[first] == 0.0], steps.end[inside_window] == 1.0])
-    moved = at_record & (np.abs(weight * b) > PRINTED)
-    projected = np.outer(a, line) + np.outer((1.0 - weight) * b, normal)
+    moved = at_record & (np.abs(weight * b) > (EXACT if bends else PRINTED))
+    squeezed = (1.0 - weight) * b
+    if bends:
+        nearest = int(np.where(at_record, np.hypot(a, b), np.inf).argmin())
+        if np.hypot(a[nearest], b[nearest]) < _SNAPPED * angle:
+            a, moved[nearest], squeezed[nearest] = np.where(np.arange(len(a)) == nearest, 0.0, a), True, 0.0
+            crossings = np.flatnonzero(a[:-1] * a[1:] < 0.0)
+            part = a[crossings] / (a[crossings] - a[crossings + 1])
+            if len(crossings):
+                return None
+    projected = np.outer(a, line) + np.outer(squeezed, normal)
     record = records[moved]
     axis = pole.find_axes(programmed.tip[record], programmed.axis[record], projected[moved])
     share, crossing = 0.0, -1
@@ -140,7 +169,31 @@ def _route_through_pole(
         crossing = first + int(crossings[0])
         share = float(steps.begin[crossing] + part[0] * (steps.end[crossing] - steps.begin[crossing]))
         ends = _find_inner_ends(steps, window, crossing, radius)
-    return PoleRoute(window, float(steps.nearest[inside_window].min()), record, axis, crossing, share, ends)
+    rays = _place_rays(steps, window, np.column_stack([a, b]), (line, normal), squeeze) if bends else ()
+    miss = float(steps.nearest[inside_window].min())
+    return PoleRoute(window, miss, record, axis, crossing, share, () if bends else ends, rays)
+
+
+def _place_rays(
+    steps: PoleSteps, window: tuple[int, int], way: Array, axes: tuple[Array, Array], squeeze: _Squeeze
+) -> tuple[tuple[int, float, Array], ...]:
+    """Place records on a squeezed way at places along the line through the pole that grow by a factor.
+
+    way : (m + 1, 2) along the line and off it, as programmed
+    axes : directions along the line and across, (2,) each
+    """
+    a, rays = way[:, 0], []
+    radius = _SNAPPED * squeeze.angle
+    while radius < _OUTERMOST * squeeze.radius:
+        for at in (-radius, radius):
+            for index in np.flatnonzero((a[:-1] - at) * (a[1:] - at) < 0.0)[:1].tolist():
+                step, part = window[0] + index, (at - a[index]) / (a[index + 1] - a[index])
+                share = float(steps.begin[step] + part * (steps.end[step] - steps.begin[step]))
+                across = (way[index, 1] + part * (way[index + 1, 1] - way[index, 1])) * (at / squeeze.radius) ** 2
+                if _EDGE < share < 1.0 - _EDGE:
+                    rays.append((int(steps.record[step]), share, at * axes[0] + across * axes[1]))
+        radius *= _GROWTH
+    return tuple(rays)
 
 
 def _find_line(begin: Array, end: Array, radius: float) -> Array:

@@ -9,6 +9,7 @@ import numpy as np
 from ...arrays import Array, Flags, Indices
 from ...errors import PoseError
 from ...kernels.batch import run_in_threads
+from ...kinematics.wrist import PRINTED
 from ...machine import Machine
 from ..posting.posted import Posted
 from .kernels.rounded_corners import SLIVER, blend_poses
@@ -20,6 +21,7 @@ CORNER = np.deg2rad(1.0)  # a path that turns by no more is not stopped at
 _SAME = 1e-6  # mm: records no farther apart are one corner
 _TIGHT = 1e-5  # mm of reach for each rad (mm/mm) of turn: a corner passed so slowly is as well stopped at
 _BESIDE = 0.05  # a rounding ends at a piece's end, or at least this fraction of the piece from it
+_BENT = 1e-9  # rad/mm and mm/mm: what is rounding
 _KEPT = 0.995  # fraction of the tolerances that corners use; the rest is for the error of the joints' splines
 
 
@@ -97,9 +99,24 @@ def round_corners(
     with np.errstate(divide="ignore"):
         reach = _KEPT * np.minimum(6.0 * tolerance / tip_turn, 6.0 * axis_tolerance / axis_turn)
     reach[1:-1] = _clear_short_rests(np.minimum(reach[1:-1], np.minimum(length[:-1], length[1:])), length)
-    parted |= reach < _TIGHT * sharpness
+    parted |= (reach < _TIGHT * sharpness) | _find_bends_on_pole(posted.machine, corner, turn)
     turn[parted] = sharpness[parted] = reach[parted] = 0.0
     return Curve(corner, length, slope, turn, sharpness, reach, parted, corner_of_record, record_of_piece)
+
+
+def _find_bends_on_pole(machine: Machine, corner: Array, turn: Array) -> Flags:
+    """Find corners (c,) on a wrist's pole that, if they were rounded, would lead the tool beside it, with a swing.
+
+    The tool goes on over the pole of B and C as long as C does not change; a central leg's pole moves with the tip.
+    """
+    wrist = machine.wrist
+    if wrist is None:
+        return np.zeros(len(corner), np.bool_)
+    moving = np.abs(turn[:, wrist.direction.c])
+    if machine.structure.has_central_leg:
+        moving = np.maximum(moving, np.abs(turn).max(1))
+    bends: Flags = wrist.find_free(corner, PRINTED) & (moving > _BENT)
+    return bends
 
 
 def _clear_short_rests(reach: Array, length: Array) -> Array:

@@ -56,6 +56,11 @@ class PoleHold:
     turn: float
     aside: float
 
+    @property
+    def key(self) -> tuple[str, float]:
+        """What tells it from other holds, and from passes."""
+        return f"beside {self.located.pole.text}", self.located.begin
+
     def describe(self) -> Note:
         """Describe the turn as a note of the path."""
         pole, tilt = self.located.pole, np.degrees(self.aside)

@@ -82,7 +82,8 @@ def _find_moved_too_far(deviation: Deviation, led: PolePasses) -> set[tuple[str,
         return too_far
     path, positions = ProgrammedPath(led.posted.path, led.posted.frame), led.positions
     passed = positions.passed
-    for pole_pass in (*led.passes, *(hold.located for hold in led.holds)):
+    keys = [pole_pass.key for pole_pass in led.passes] + [hold.key for hold in led.holds]
+    for key, pole_pass in zip(keys, (*led.passes, *(hold.located for hold in led.holds)), strict=True):
         first, last = np.searchsorted(passed, [pole_pass.begin - 1.0, pole_pass.end + 1.0])
         motion = np.arange(max(int(first), 1), min(int(last) + 1, len(passed))).repeat(len(SHARES))
         share = np.resize(SHARES, len(motion))
@@ -90,7 +91,7 @@ def _find_moved_too_far(deviation: Deviation, led: PolePasses) -> set[tuple[str,
         programmed_axis = deviation.programmed.interpolate(positions.record[motion], programmed_share)[1]
         off = path.interpolate(motion, share)[1] - programmed_axis
         if np.sqrt((off * off).sum(1).max(initial=0.0)) > _MOST_BETWEEN * deviation.angle:
-            too_far.add(pole_pass.key)
+            too_far.add(key)
     return too_far
 
 
@@ -106,8 +107,8 @@ def _lead_unless_refused(
     for pole in find_poles(posted.machine, deviation.interpolation, turns is not None):
         steps = find_pole_steps(pole, programmed, posted, motion)
         routes = []
-        bends = deviation.interpolation == "pose" and not pole.is_upright
-        for route in find_pole_routes(pole, programmed, steps, deviation.angle, bends):
+        is_pose = deviation.interpolation == "pose"
+        for route in find_pole_routes(pole, programmed, steps, deviation.angle, is_pose):
             if (axis[route.record] != programmed.axis[route.record]).any():
                 continue  # led through another pole already
             pole_pass = locate_pass(pole, posted.path, steps, route)
@@ -122,7 +123,7 @@ def _lead_unless_refused(
             for hold in find_pole_holds(pole, posted, programmed, steps, routes, deviation.angle):
                 is_free = (axis[hold.record] == programmed.axis[hold.record]).all()
                 others = [*led.passes, *(other.located for other in led.holds)]
-                if hold.located.key not in refused and is_free and is_apart(hold, others):
+                if hold.key not in refused and is_free and is_apart(hold, others):
                     axis[hold.record] = hold.axis
                     held.append(hold)
         led.holds += held

@@ -16,6 +16,8 @@ from .poles import Pole
 
 _MOST_MOVED = 0.98  # of the angle tolerance: what an axis may be moved; the rest is for rounding
 _BENT = 0.342  # sine of 20°, of the way into the circle off the line through the pole: what bends more is held
+_WIDEST = 0.385  # greatest t·(1 - t²): the most by which a straight way is squeezed, of its offset on the circle
+_STRAIGHT = 5e-4  # the same: what bends less turns by so little on the pole that any controller takes it
 _SNAPPED = 0.2  # fraction of the angle tolerance: a record so near to the pole is moved onto it
 _GROWTH, _OUTERMOST = 4.0, 0.7  # of the radii at which records keep a way straight, and the last in the circle's radius
 _EDGE = 1e-9  # of a motion: what is rounding
@@ -74,12 +76,13 @@ def locate_pass(pole: Pole, path: ToolPath, steps: PoleSteps, route: PoleRoute) 
 
 
 def find_pole_routes(
-    pole: Pole, programmed: ProgrammedPath, steps: PoleSteps, angle: float, bends: bool
+    pole: Pole, programmed: ProgrammedPath, steps: PoleSteps, angle: float, is_pose: bool
 ) -> list[PoleRoute]:
     """Find routes of the passes that can be led through a pole with no axis moved by ``angle`` rad or more.
 
-    bends : whether the interpolation bends what is straight in the projection. Then a record near the pole is moved
-        onto it, and more records are put on the way, the nearer to the pole the closer.
+    is_pose : whether the pose's coordinates go evenly from record to record. Then what is squeezed would turn on the
+        pole itself, and what is straight in the projection bends but at B = 0. So a record near the pole is moved onto
+        it, and more records are put on the way, the nearer to the pole the closer.
 
     Around each pass circles about the pole are tried, the largest first, each half as large as the one before.
     """
@@ -95,7 +98,7 @@ def find_pole_routes(
             continue
         for (first, last), radius in zip(windows, radii.tolist(), strict=True):
             window = int(first[number]), int(last[number])
-            route = _route_through_pole(pole, programmed, steps, window, _Squeeze(radius, angle, bends))
+            route = _route_through_pole(pole, programmed, steps, window, _Squeeze(radius, angle, is_pose))
             if route is not None:
                 routes.append(route)
                 break
@@ -112,11 +115,11 @@ def _find_windows(steps: PoleSteps, starts: Indices, stops: Indices, radius: flo
 
 
 class _Squeeze(NamedTuple):
-    """The circle about a pole within which a path is squeezed, the angle tolerance, and whether straight ways bend."""
+    """The circle about a pole within which a path is squeezed, the angle tolerance, and whether poses go evenly."""
 
     radius: float
     angle: float
-    bends: bool
+    is_pose: bool
 
 
 def _route_through_pole(
@@ -127,7 +130,7 @@ def _route_through_pole(
     In the projection about the pole the path is squeezed towards a line through it: an offset b from the line, after a
     on it, becomes b·(a/radius)². So the free angle turns evenly, by no more than it must, and without a swing.
     """
-    radius, angle, bends = squeeze
+    radius, angle = squeeze.radius, squeeze.angle
     first, last = window
     inside_window = slice(first, last + 1)
     x = np.concatenate([steps.first[first : first + 1], steps.last[inside_window]])
@@ -141,10 +144,12 @@ def _route_through_pole(
     # What is left to move where the path enters and leaves the circle.
     offsets = [abs(float(entry @ normal)) for entry in entries if entry is not None]
     edge = [offset**3 / radius**2 for offset in offsets]
+    bends = squeeze.is_pose and (not pole.is_upright or max(offsets, default=0.0) > _STRAIGHT * radius)
     crossings = np.flatnonzero(a[:-1] * a[1:] < 0.0)
     part = a[crossings] / (a[crossings] - a[crossings + 1])
     miss_line = np.abs(b[crossings] + part * (b[crossings + 1] - b[crossings]))
-    if not max(0.0, np.abs(weight * b).max(), *miss_line, *edge) <= _MOST_MOVED * angle:
+    between = _WIDEST * max(offsets, default=0.0)  # where the way to the pole is straight
+    if not max(between, np.abs(weight * b).max(), *miss_line, *edge) <= _MOST_MOVED * angle:
         return None
     if len(crossings) > 1 or max(offsets, default=0.0) > _BENT * radius:
         return None
@@ -186,7 +191,8 @@ def _place_rays(
     radius = _SNAPPED * squeeze.angle
     while radius < _OUTERMOST * squeeze.radius:
         for at in (-radius, radius):
-            for index in np.flatnonzero((a[:-1] - at) * (a[1:] - at) < 0.0)[:1].tolist():
+            places = np.flatnonzero((a[:-1] - at) * (a[1:] - at) < 0.0)
+            for index in sorted({*places[:1].tolist(), *places[-1:].tolist()}):  # in and out again where it turns back
                 step, part = window[0] + index, (at - a[index]) / (a[index + 1] - a[index])
                 share = float(steps.begin[step] + part * (steps.end[step] - steps.begin[step]))
                 across = (way[index, 1] + part * (way[index + 1, 1] - way[index, 1])) * (at / squeeze.radius) ** 2

@@ -370,6 +370,8 @@ FRACTIONS = {
     "toolpath.linearise.pole_holds._OPPOSITE",
     "toolpath.linearise.pole_passes._LARGE_MISS",
     "toolpath.linearise.pole_routing._BENT",
+    "toolpath.linearise.pole_routing._SNAPPED",
+    "toolpath.linearise.pole_routing._STRAIGHT",
     "toolpath.linearise.pole_steps.FARTHEST_STEP",
     "toolpath.linearise.pole_steps._POLE_TURN",
 }

@@ -298,7 +298,7 @@ static void settle(double *x, const double *near)
 #if TOOL_AXIS
     double *b = &x[AXES - 2], *c = &x[AXES - 1];
     const double last_b = near[AXES - 2], last_c = near[AXES - 1];
-    if (*b < FREE || *b > 0.5 * TURN - FREE) { /* upright: C is free */
+    if (*b < UPRIGHT || *b > 0.5 * TURN - UPRIGHT) { /* upright: C is free */
         *c = last_c;
     } else {
         const double over = within_half_a_turn(*c + 0.5 * TURN, last_c);

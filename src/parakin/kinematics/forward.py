@@ -117,19 +117,19 @@ def _take_modes_of_starts(
     open_rows = np.flatnonzero(~_is_settled(model, solution, starts))
     for other, which in _group_by_mode(model, starts[open_rows], joints[open_rows]).items():
         rows = open_rows[which]
-        found, own = solve(model, joints[rows], starts[rows], other), _take_rows(solution, rows)
-        way = _measure_way(model, found, starts[rows])
+        answers, own = solve(model, joints[rows], starts[rows], other), _take_rows(solution, rows)
+        way = _measure_way(model, answers, starts[rows])
         with np.errstate(invalid="ignore"):
             nearer = way < NEARER * _measure_way(model, own, starts[rows])
-            better = (found.why == ANSWERED) & (way <= beside) & (nearer | (own.why != ANSWERED))
-        _put_rows(solution, rows[better], _take_rows(found, better))
+            better = (answers.why == ANSWERED) & (way <= beside) & (nearer | (own.why != ANSWERED))
+        _put_rows(solution, rows[better], _take_rows(answers, better))
     lost = np.flatnonzero(solution.why != ANSWERED)
     if len(lost):  # where the start does not tell the mode, an answer next to it counts in any
-        found = solve(model, joints[lost], starts[lost], None)
+        answers = solve(model, joints[lost], starts[lost], None)
         with np.errstate(invalid="ignore"):
-            taken = (found.why == ANSWERED) & (_measure_way(model, found, starts[lost]) <= beside)
-        taken &= ~find_in_mode(model, found.poses, joints[lost], model.mode)  # it is refused there: on another side
-        _put_rows(solution, lost[taken], _take_rows(found, taken))
+            taken = (answers.why == ANSWERED) & (_measure_way(model, answers, starts[lost]) <= beside)
+        taken &= ~find_in_mode(model, answers.poses, joints[lost], model.mode)  # it is refused there: on another side
+        _put_rows(solution, lost[taken], _take_rows(answers, taken))
 
 
 def _is_settled(model: Model, solution: Solution, starts: Array) -> Flags:
@@ -152,7 +152,7 @@ def _group_by_mode(model: Model, poses: Array, joints: Array) -> dict[str, Indic
     near = STANDS_AT * max(model.sizes)
     signs = [len(leg.branches) for leg in model.spec.legs]
     columns = np.cumsum([0, *(len(leg.drives) for leg in model.spec.legs)])
-    head, found = model.mode[sum(signs) :], np.full(len(poses), "", dtype=object)
+    head, row_signs = model.mode[sum(signs) :], np.full(len(poses), "", dtype=object)
     choices = ["".join(choice) for choice in product("+-", repeat=max(signs))]
     modes = ["".join(choice[:count] for count in signs) + head for choice in choices]
     off = np.stack([np.abs(_compare_with_mode(model, poses, joints, mode)) for mode in modes])
@@ -165,10 +165,10 @@ def _group_by_mode(model: Model, poses: Array, joints: Array) -> dict[str, Indic
         if count:
             clear &= ordered[0] <= STANDS_IN * ordered[1]
         names = np.array([choice[:count] for choice in choices[:: 2 ** (max(signs) - count)]], dtype=object)
-        found += names[own.argmin(0)]
+        row_signs += names[own.argmin(0)]
     groups: dict[str, list[int]] = {}
     for row in np.flatnonzero(clear).tolist():
-        groups.setdefault(found[row] + head, []).append(row)
+        groups.setdefault(row_signs[row] + head, []).append(row)
     groups.pop(model.mode, None)
     return {mode: np.array(members) for mode, members in groups.items()}
 

@@ -17,7 +17,7 @@ _FROM_ANYWHERE = 4.0  # s, at least: for the motion whose start is not known
 _LEAST = 0.5  # s, of a motion
 _SAMPLES = 500  # samples of a motion
 _TURNS = (0, 1, -1, 2, -2)
-_SHARES = (1.0, 0.1, 0.01)  # of the way back home and of TILTED, for the poses that lead to a record beside the pole
+_FRACTIONS = (1.0, 0.1, 0.01)  # of the way back home and of TILTED, for the poses that lead to a record beside the pole
 
 
 def plan_approach(machine: Machine, first: Array, joints: Array, mode: str) -> tuple[Array, Array]:
@@ -81,9 +81,9 @@ def _find_second_on_pole(machine: Machine, wrist: Wrist) -> float:
 def _go_to_pole(machine: Machine, wrist: Wrist, at_home: Array) -> list[Array] | None:
     """Go from home to the pole above it, with the first joint as at home; None where there is no such way."""
     on_pole, poses, near = _find_second_on_pole(machine, wrist), list[Array](), np.array(machine.home)
-    for share in (0.1, 0.01, 0.0):
+    for fraction in (0.1, 0.01, 0.0):
         joints = at_home.copy()
-        joints[wrist.second] = on_pole + share * (at_home[wrist.second] - on_pole)
+        joints[wrist.second] = on_pole + fraction * (at_home[wrist.second] - on_pole)
         pose = find_pose_with_wrist(machine, near, joints, machine.mode)
         if pose is None:
             return None
@@ -107,9 +107,9 @@ def _approach_from_aside(machine: Machine, wrist: Wrist, first: Array, joints: A
         return [first]
     own = mode if off_pole < PRINTED else wrist.find_mode(first, joints, mode)
     c, way = wrist.direction.c, list[Array]()
-    for share in _SHARES:
-        near = first + share * (machine.home - first)
-        pose = find_pose_with_wrist(machine, near, wrist.tilt(joints, own, share * TILTED), own)
+    for fraction in _FRACTIONS:
+        near = first + fraction * (machine.home - first)
+        pose = find_pose_with_wrist(machine, near, wrist.tilt(joints, own, fraction * TILTED), own)
         if pose is None:
             return [first]
         pose[c] = find_nearest_turn(pose[c], way[-1][c] if way else first[c])

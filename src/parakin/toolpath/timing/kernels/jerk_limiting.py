@@ -1,6 +1,6 @@
 """Kernels that limit jerk: plan each stretch, measure it, and lower the bounds of steps where a limit does not hold.
 
-A joint's jerk is q'·s⃛ + 3q''·ṡ·s̈ + q'''·ṡ³. The last two terms are bounded to shares of the limit beforehand. What
+A joint's jerk is q'·s⃛ + 3q''·ṡ·s̈ + q'''·ṡ³. The last two terms are bounded to fractions of the limit beforehand. What
 remains beyond a limit in the end is so little that the trajectory is stretched in time as a whole; see
 :mod:`.utilisation`.
 """
@@ -16,7 +16,7 @@ from ....kernels.compiling import njit
 from .jerk_passes import Pools, StepBounds, Stretch, flatten_peaks, limit_braking, limit_rise, update_controllable
 from .utilisation import Utilisation, measure_utilisation
 
-_ACROSS, _BOTH = 0.5, 0.3  # shares of a jerk limit that q'''·ṡ³ and 3q''·ṡ·s̈ may take
+_ACROSS, _BOTH = 0.5, 0.3  # fractions of a jerk limit that q'''·ṡ³ and 3q''·ṡ·s̈ may take
 _CLOSE = 1e-3  # beyond a limit: less is left to stretching, and after many rounds more from round to round
 _PATIENT, _ROUNDS = 20, 60
 _SAME = 1e-6  # smaller changes, relative to a piece's speed and jerk, count as none
@@ -100,7 +100,7 @@ def _write_pieces(stretch, x, row_acceleration, profile, first, changed):
 
 @njit(nogil=True, cache=True, error_model="numpy")
 def _bound_by_jerk(stretch, x, most):
-    """Bound s̈ so that its share in the joints' jerks is bounded at speeds as great as x has them: ``most`` (steps,)."""
+    """Bound s̈ so that its part in the joints' jerks is bounded at speeds as great as x has them: ``most`` (steps,)."""
     bend, jerk = stretch.rows.curvature, stretch.limits.jerk
     for i in range(stretch.start, stretch.stop):
         v, most[i] = np.sqrt(max(x[i], x[i + 1])), np.inf

@@ -57,18 +57,18 @@ class Midpoints(NamedTuple):
 
 
 class SplineTolerances(NamedTuple):
-    """How far splines may be off: ``joints`` (joints,), and ``share`` of the limits ``acceleration`` (joints,)."""
+    """How far splines may be off: ``joints`` (joints,), and ``fraction`` of the limits ``acceleration`` (joints,)."""
 
     joints: Array
     acceleration: Array
-    share: float
+    fraction: float
 
 
 @njit(nogil=True, cache=True, error_model="numpy")
 def fit_splines(step, joints, curvature, pivots):
     """Fit a cubic spline to each stretch: write its second derivatives at the rows to ``curvature`` (rows, joints).
 
-    At a stretch's ends the first two and the last two steps share one cubic. ``pivots`` (rows,) is overwritten.
+    At a stretch's ends the first two and the last two steps fraction one cubic. ``pivots`` (rows,) is overwritten.
     """
     count, m = joints.shape
     start = np.int64(0)
@@ -154,7 +154,7 @@ def mark_coarse_steps(rows, steps, middle, tolerances, coarse, start, stop):
             off = abs(middle.joints[k, j] - middle.splined[k, j])
             if off > middle.rounding[k, j] * max(1.0, abs(middle.splined[k, j])):
                 # a spline off in the middle is off 32/h² times as much in its second derivative
-                harder = limit[j] < np.inf and 32.0 * off / rows.step[i] ** 2 * x > tolerances.share * limit[j]
+                harder = limit[j] < np.inf and 32.0 * off / rows.step[i] ** 2 * x > tolerances.fraction * limit[j]
                 coarse[k] |= off > tolerances.joints[j] or harder
             elif off != off:
                 coarse[k] = True

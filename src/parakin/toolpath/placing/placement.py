@@ -13,6 +13,7 @@ from ...arguments import check_arguments, parse_range
 from ...arrays import Array, AxisRange, Progress
 from ...errors import PoseError, quote
 from ...machine import Machine
+from ...units import AXIS_UNITS
 from ..path import ToolPath
 from ..posting.tool_lengths import fit_tool_lengths
 from ..posting.working_mode import list_candidate_modes
@@ -91,7 +92,7 @@ def find_placements(
     for axis in bounds:
         if axis not in tuple(AXES):
             raise PoseError(f"bounds: unknown axis {quote(axis)}, an axis of X Y Z A B C and low <= high expected")
-    ranges = {axis: parse_range(axis, ends, "mm" if axis in "XYZ" else "rad") for axis, ends in bounds.items()}
+    ranges = {axis: parse_range(axis, ends, AXIS_UNITS[axis]) for axis, ends in bounds.items()}
     for axis, (low, high) in ranges.items():
         if not -math.inf < low <= high < math.inf:
             raise PoseError(f"bounds: {axis} from {low} to {high}; an axis of X Y Z A B C and low <= high expected")

@@ -367,6 +367,7 @@ FRACTIONS = {
     "toolpath.linearise.pole_holds.NEAR",
     "toolpath.linearise.pole_holds._OFF_POLE",
     "toolpath.linearise.pole_holds._ARC",
+    "toolpath.linearise.pole_holds._CLOSE",
     "toolpath.linearise.pole_holds._OPPOSITE",
     "toolpath.linearise.pole_passes._LARGE_MISS",
     "toolpath.linearise.pole_routing._BENT",

@@ -33,6 +33,7 @@ REPORTED   45°          first angle: a swing that is reported
 TILTED     0.2          second angle at which a tool that starts on the pole is tilted to choose its mode
 NEAR_START 0.1          off the pole: a program comes to a first record that is nearer from aside
 NEAR_TURN  0.02         off the pole: a tool that is nearer is tilted so far while whole turns are taken back
+STANDING   8e-6         off the pole: nearer, a controller's first joint stands still, whatever the rounded pose says
 NEAR_HOLD  1e-5         off the pole: no tool axis is held nearer, or printed digits would turn the first angle
 FAR_TILT   15°          second angle at which a small square about home goes neither round the pole nor through it
 ========== ============ ==============================================================================================
@@ -71,6 +72,7 @@ REPORTED = np.radians(45.0)
 TILTED = 0.2
 NEAR_START = 0.5 * TILTED
 NEAR_TURN = 0.02
+STANDING = 8e-6
 NEAR_HOLD = 5.0 * PRINTED
 FAR_TILT = np.pi / 12.0
 

@@ -13,7 +13,7 @@ from ...kernels.newton import SLOW, WORTH
 from ...kernels.tape import Tape, compile_tape
 from ...kinematics.forward import MOST_STEPS, SETTLED, STEADY
 from ...kinematics.turns import TURN
-from ...kinematics.wrist import EXACT, GAIN, NEAR_MODE, PRINTED, SWING
+from ...kinematics.wrist import EXACT, GAIN, NEAR_MODE, STANDING, SWING
 from ...machine import Machine
 from ...model.limits import Limit
 from .tape_to_c import CVector, format_c, write_function, write_test
@@ -98,8 +98,8 @@ def _write_numbers(machine: Machine, name: str) -> str:
         f"#define SAME {format_c(NEAR_MODE)} /* mm or rad: joints nearer to each other stand in one working mode */",
         f"#define TURN {format_c(TURN)}",
         f"#define DEGREE {format_c(np.pi / 180.0)}",
-        f"#define FREE {format_c(PRINTED)} "
-        "/* rad: nearer to a turning axis the digits of a program tell no angle, and it stands still */",
+        f"#define FREE {format_c(STANDING)} "
+        "/* rad: nearer to a turning axis the tool's tells no angle in a program's digits: it stands still */",
         f"#define UPRIGHT {format_c(EXACT)} /* rad: nearer to upright C is told by rounding only */",
         f"#define TOLERANCE {open_by} /* mm by which the legs of an answer may fail to close */",
         *_write_wrist(machine),

@@ -31,6 +31,7 @@ NEAR = 0.72  # an axis no farther off the pole is held
 _OFF_POLE = 0.2  # off the pole, where it is held
 _ARC = np.radians(15.0)  # a turn beside the pole is divided into arcs no longer
 _STRAIGHT = np.radians(1.0)  # what turns less needs no record of its own
+_CLOSE = 0.1  # fraction of the circle: records so close keep the way over the pole straight
 _STILL = 0.95  # of the circle: the middle of an arc comes no nearer
 _OPPOSITE = 1.0 - 1e-6  # cosine between the ways to the pole and from it
 _EDGE = 1e-9  # of a motion: what is rounding
@@ -225,11 +226,9 @@ class _HoldBuilder:
         else:
             points = [aside * _point_towards(come + turn * k / count) for k in range(count + 1)] if count else []
             if over:
-                points = [
-                    aside * _point_towards(flip_azimuth(come, -1.0)),
-                    np.zeros(2),
-                    *(points or [aside * _point_towards(go)]),
-                ]
+                back, ahead = _point_towards(flip_azimuth(come, -1.0)), _point_towards(come)
+                way = [aside * back, _CLOSE * aside * back, np.zeros(2), _CLOSE * aside * ahead]
+                points = [*way, *(points or [aside * _point_towards(go)])]
         motion, share = place
         projected = np.array(points).reshape(-1, 2)
         return _Points(np.full(len(points), motion, np.int64), np.full(len(points), share), projected), turn

@@ -19,7 +19,8 @@ _BENT = 0.342  # sine of 20°, of the way into the circle off the line through t
 _WIDEST = 0.385  # greatest t·(1 - t²): the most by which a straight way is squeezed, of its offset on the circle
 _STRAIGHT = 5e-4  # the same: what bends less turns by so little on the pole that any controller takes it
 _SNAPPED = 0.2  # fraction of the angle tolerance: a record so near to the pole is moved onto it
-_GROWTH, _OUTERMOST = 4.0, 0.7  # of the radii at which records keep a way straight, and the last in the circle's radius
+_INNERMOST = 0.02  # fraction of the angle tolerance: the first radius at which records keep a way straight
+_GROWTH, _OUTERMOST = 4.0, 0.7  # of these radii, and the last one as a fraction of the circle's
 _EDGE = 1e-9  # of a motion: what is rounding
 
 
@@ -188,7 +189,7 @@ def _place_rays(
     axes : directions along the line and across, (2,) each
     """
     a, rays = way[:, 0], []
-    radius = _SNAPPED * squeeze.angle
+    radius = _INNERMOST * squeeze.angle
     while radius < _OUTERMOST * squeeze.radius:
         for at in (-radius, radius):
             places = np.flatnonzero((a[:-1] - at) * (a[1:] - at) < 0.0)

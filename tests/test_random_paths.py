@@ -59,10 +59,7 @@ def built(tmp_path_factory):
     return Stub(folder), Model(folder)
 
 
-_SWINGS = (
-    "at the pole of a Tricept's wrist, which no printed pose meets, the trajectory turns theta1 where LinuxCNC can't"
-)
-MACHINES = [pytest.param(name, marks=pytest.mark.xfail(reason=_SWINGS) if name == "tricept" else ()) for name in REACH]
+MACHINES = list(REACH)
 
 
 @pytest.fixture(params=MACHINES)

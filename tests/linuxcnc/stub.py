@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import ctypes
 import subprocess
-from functools import cached_property
 from pathlib import Path
 
 import numpy as np
@@ -17,6 +16,7 @@ HEADERS = ("rtapi.h", "rtapi_app.h", "rtapi_math.h", "rtapi_string.h", "hal.h", 
 FLAGS = ["-Os", "-fno-fast-math", "-mieee-fp", "-fno-unsafe-math-optimizations", "-fno-builtin-sincos"]
 FLAGS += ["-fno-builtin-sin", "-fno-builtin-cos", "-D_GNU_SOURCE", "-DRTAPI", "-fPIC"]
 FIELDS = "XYZABCUVW"
+LOADED: list[ctypes.CDLL] = []
 
 
 def _pointer(array):
@@ -71,10 +71,13 @@ class Stub:
         for name in HEADERS:
             (self.folder / name).write_text('#include "stub_hal.h"\n')
 
-    @cached_property
+    @property
     def library(self):
-        self._gcc([HERE / "stub_hal.c"], self.folder / "stub_hal.so")
-        return ctypes.CDLL(str(self.folder / "stub_hal.so"), mode=ctypes.RTLD_GLOBAL)
+        """The one library of this process: modules find the first that was loaded."""
+        if not LOADED:
+            self._gcc([HERE / "stub_hal.c"], self.folder / "stub_hal.so")
+            LOADED.append(ctypes.CDLL(str(self.folder / "stub_hal.so"), mode=ctypes.RTLD_GLOBAL))
+        return LOADED[0]
 
     def _gcc(self, sources, target):
         warnings = ["-Wall", "-Wextra", "-Werror", "-Wframe-larger-than=2560"]

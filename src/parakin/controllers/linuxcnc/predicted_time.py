@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from ...arguments import check_arguments
 from ...toolpath.path import Note
 from ...toolpath.timing.trajectory import Trajectory
 from ..controller import ControllerTime
@@ -15,6 +16,7 @@ _MOST_NOTES = 3
 _SHARE = 0.1  # of what is lost in all: but for the worst, lines that lose less are not named
 
 
+@check_arguments
 def predict_linuxcnc_seconds(trajectory: Trajectory) -> float:
     """Predict what LinuxCNC takes for a program from the first record on, s: the trajectory's time and more."""
     return predict_linuxcnc_time(trajectory).seconds

@@ -8,7 +8,7 @@ from ...arrays import Array, Flags, Indices
 
 _SLOWEST = 0.11 / 60.0  # mm/s: what is slower LinuxCNC runs at 0.1 mm/min in inverse time; it goes by the tip
 _SLOW = 0.02  # mm/s: slower tips are held where that keeps them within _HELD
-_HELD = 1e-5  # mm that a tip may stay behind: beside a pole that moves with it, more would turn a joint
+_HELD = 1e-5  # mm that a tip may stay behind: more would turn the first joint of a wrist on a moving leg
 _NOTHING = 5e-7  # mm: less is not printed
 _LEAST = 0.002  # s, of the tip's own motion
 

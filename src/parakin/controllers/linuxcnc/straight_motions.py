@@ -19,6 +19,8 @@ from .speed_changes import find_speed_changes
 CYCLE = 1e-3  # s: of the controller. Motions that take whole cycles it blends evenly, others with a bump of speed
 _USABLE = 0.997  # fraction of the joints' speeds; the rest is for the way between samples and for rounding
 _EVEN = 0.1  # mm/mm: corners sharper than this turn the joints elsewhere
+_SHARP = 1.0  # mm/mm: a tip whose way turns by more, some 60°, all but reverses
+_TURNING = 1e-6  # rad/mm: what is rounding
 _ROUNDING = 1e-6  # cycles
 
 
@@ -84,7 +86,7 @@ def build_straight_motions(trajectory: Trajectory, speeds: Array, accelerations:
     piece, start, end, time, last = _divide_pieces(trajectory, accelerations)
     halt = np.zeros(len(piece), bool)
     if DriveLimits.of(trajectory.posted.machine).bounds_acceleration:
-        halt[last] = curve.parted[1:]
+        halt[last] = curve.parted[1:] | _find_reversals(trajectory)
     slope, length = np.abs(curve.slope[piece]), end - start
     planned = np.maximum(np.diff(np.rint(time / CYCLE), prepend=0.0), 1.0)
     by_axis = (slope / speeds) * length[:, None] / CYCLE
@@ -107,6 +109,20 @@ def build_straight_motions(trajectory: Trajectory, speeds: Array, accelerations:
     late = measure_late_starts(steps, seconds, rise, linear) * ~halts
     reasons = _name_reasons(trajectory.posted.machine)
     return StraightMotions(rows, seconds, halts, piece[motion], held_up_by[motion], reasons, rise, late)
+
+
+def _find_reversals(trajectory: Trajectory) -> Flags:
+    """Find the pieces (k,) at whose end the tip turns sharply while the tool turns.
+
+    LinuxCNC begins the next motion within the cycle in which the speed falls below that of the blend; with the
+    acceleration of its turning axes that one cycle may be more than the tolerance.
+    """
+    curve, units = trajectory.curve, trajectory.posted.machine.axis_units
+    linear = np.array([unit == "mm" for unit in units])
+    turns: Flags = np.abs(curve.slope[:, ~linear]).max(axis=1, initial=0.0) > _TURNING
+    sharp = np.sqrt((curve.turn[1:, linear] ** 2).sum(axis=1)) > _SHARP
+    reversals: Flags = sharp & (turns | np.append(turns[1:], False))
+    return reversals
 
 
 def _name_reasons(machine: Machine) -> tuple[str, ...]:

@@ -15,12 +15,12 @@ from functools import cached_property
 import numpy as np
 
 from ...arrays import Array, Flags, Indices
-from ...kinematics.turns import wrap_angle
+from ...kinematics.turns import find_nearest_turn, wrap_angle
 from ...kinematics.wrist import EXACT, NEAR_HOLD, PRINTED, REPORTED, SWING, flip_azimuth
 from ..path import Note
 from ..posting.frames import compute_poses
 from ..posting.posted import Posted
-from ..programmed_path import ProgrammedPath
+from ..programmed_path import ProgrammedPath, compute_tool_axes
 from .continuation import MACHINE_FRAME
 from .pole_routing import PolePass, PoleRoute
 from .pole_steps import PoleSteps, meet_circle
@@ -31,6 +31,8 @@ NEAR = 0.72  # an axis no farther off the pole is held
 _OFF_POLE = 0.2  # off the pole, where it is held
 _ARC = np.radians(15.0)  # a turn beside the pole is divided into arcs no longer
 _STRAIGHT = np.radians(1.0)  # what turns less needs no record of its own
+_WANDER = 0.2  # fraction of the circle: what even poses may leave it by between two records
+_MOST_BETWEEN = 64  # records into which a motion is divided for that
 _CLOSE = 0.1  # fraction of the circle: records so close keep the way over the pole straight
 _STILL = 0.95  # of the circle: the middle of an arc comes no nearer
 _OPPOSITE = 1.0 - 1e-6  # cosine between the ways to the pole and from it
@@ -141,7 +143,8 @@ class _HoldBuilder:
             turned = _Points(turned.motion[:-1], turned.share[:-1], turned.projected[:-1])
         if len(record) > 1 and not self.aside:
             turned = _NOTHING
-        points = _join(_place_end(steps, first, entry), turned, _place_end(steps, last, leave))
+        between = self._keep_between(record, moved)
+        points = _join(_place_end(steps, first, entry), between, turned, _place_end(steps, last, leave))
         if not len(record) and not len(points.motion):
             return None
         tip, axis = self.programmed.interpolate(points.motion, points.share)
@@ -149,6 +152,33 @@ class _HoldBuilder:
         axes = self.pole.find_axes(self.programmed.tip[record], self.programmed.axis[record], moved)
         located = self._locate(run)
         return PoleHold(located, record, axes, points.motion, points.share, added, abs(turn), self.aside)
+
+    def _keep_between(self, record: Indices, moved: Array) -> _Points:
+        """Place records between those held beside a pole that moves, where even poses would come nearer to it.
+
+        The way by which even poses leave the straight one falls with the square of a motion's length.
+
+        record, moved : (k,) held, and where to in the projection, (k, 2)
+        """
+        after = np.flatnonzero((np.diff(record) == 1) & (moved[1:] == moved[:-1]).all(axis=1)) + 1
+        if not (self.pole.moves and self.aside and len(after)):
+            return _NOTHING
+        machine, pole, motion = self.posted.machine, self.pole, record[after]
+        direction = machine.direction
+        assert direction is not None
+        poses = []
+        for at in (motion - 1, motion):
+            tip = self.programmed.tip[at]
+            axis = pole.find_axes(tip, self.programmed.axis[at], moved[after])
+            poses.append(compute_poses(machine, tip, axis, MACHINE_FRAME)[0])
+        poses[1][:, direction.c] = find_nearest_turn(poses[1][:, direction.c], poses[0][:, direction.c])
+        middle = 0.5 * (poses[0] + poses[1])
+        turns = np.column_stack([np.zeros(len(middle)), middle[:, direction.pair]])
+        off = pole.project_axes(middle[:, :3], compute_tool_axes(turns)) - moved[after]
+        counts = np.ceil(np.sqrt(np.hypot(*off.T) / (_WANDER * self.aside))).astype(np.int64).clip(1, _MOST_BETWEEN)
+        at, row = np.repeat(motion, counts - 1), np.repeat(np.arange(len(motion)), counts - 1)
+        number = np.arange(len(row)) - np.repeat(np.cumsum(counts - 1) - (counts - 1), counts - 1) + 1
+        return _Points(at, number / counts[row], moved[after][row])
 
     def _is_held_already(self, run: tuple[int, int], distance: Array) -> bool:
         """Tell whether a run stands on the circle of a hold, and where it does not, goes straight over the pole.

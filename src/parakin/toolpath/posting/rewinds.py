@@ -17,7 +17,7 @@ from ...arguments import check_arguments
 from ...arrays import Array, Flags, Indices
 from ...errors import PoseError
 from ...kinematics.rotations import collect_turns
-from ...kinematics.turns import TURN
+from ...kinematics.turns import TURN, fill_free
 from ...kinematics.wrist import NEAR_TURN, continue_turns, find_nearest_direction
 from ...machine import Machine
 from ..path import Note, ToolPath
@@ -137,7 +137,8 @@ class _RewindBuilder:
         self.posted, self.clearance, self.wrist = posted, clearance, wrist
         self.machine, self.path = posted.machine, posted.path
         self.drive = self.machine.drives[wrist.first]
-        self.angles = _fill_gaps(posted.joints[:, wrist.first])
+        angles = posted.joints[:, wrist.first]
+        self.angles = fill_free(angles, ~np.isfinite(angles))
         self.counts = self._list_counts()
         self.ends = np.stack([self._find_ends(int(count)) for count in self.counts])
         self.rank = self._rank_places()
@@ -156,7 +157,7 @@ class _RewindBuilder:
         return np.minimum.accumulate(lost[::-1])[::-1]
 
     def _rank_places(self) -> Indices:
-        """Rank the records as places for a rewind, (n,): 0 the best, -1 where there may be none."""
+        """Rank the records as places for a rewind, (n,): 0 above the plane, the best; -1 where there may be none."""
         rapid, count = self.path.rapid, len(self.path)
         before, behind = rapid, np.append(rapid[1:], False)
         rank = np.full(count, -1, np.int64)
@@ -200,16 +201,12 @@ class _RewindBuilder:
         order = order[farthest[order] > end]
         for index in order[:: max(1, len(order) // _TRIED)][:_TRIED].tolist():
             place, after = int(places[index]), int(self.counts[best[index]])
-            retract = 0.0 if self.rank[place] == 0 and self._is_above_plane(place) else self.clearance.retract or 0.0
+            retract = self.clearance.retract if self.rank[place] > 0 and self.clearance.retract else 0.0
             records = self._retract_and_turn(place, before, after, retract)
             if records is not None:
                 line = int(self.path.line[place + 1])
                 return Rewind(place, line, self.drive.name, after - before, retract), records, after
         return None
-
-    def _is_above_plane(self, place: int) -> bool:
-        plane = self.clearance.plane
-        return plane is not None and bool(self.path.rapid[place]) and float(self.path.tip[place, 2]) >= plane
 
     def _retract_and_turn(self, place: int, before: int, after: int, retract: float) -> _Records | None:
         """Retract the tool at a record, turn it, and return; None where the machine can't do that within its limits."""
@@ -218,9 +215,8 @@ class _RewindBuilder:
         axes = self._turn(place, tip, before, after)
         if axes is None:
             return None
-        rapid = np.ones(len(axes), np.bool_)
         if not retract:
-            return _Records(np.tile(tip, (len(axes), 1)), axes, rapid)
+            return _Records(np.tile(tip, (len(axes), 1)), axes, np.ones(len(axes), np.bool_))
         tips = np.vstack([np.tile(tip, (len(axes) + 2, 1)), path.tip[place]])
         rapid = np.append(np.ones(len(axes) + 2, np.bool_), path.rapid[place + 1])
         return _Records(tips, np.vstack([axis, axes, axis, axis]), rapid)
@@ -252,14 +248,6 @@ class _RewindBuilder:
             return None
         axes: Array = compute_tool_axes(collect_turns(self.machine.axes, np.array(poses))) @ frame[:, :3]
         return axes
-
-
-def _fill_gaps(angles: Array) -> Array:
-    """Replace angles that do not exist by the last one that does, at the start by the first."""
-    finite = np.isfinite(angles)
-    index = np.maximum.accumulate(np.where(finite, np.arange(len(angles)), -1))
-    filled: Array = angles[np.where(index < 0, int(finite.argmax()), index)]
-    return filled
 
 
 def _insert_rows(path: ToolPath, added: list[tuple[int, _Records]]) -> ToolPath:

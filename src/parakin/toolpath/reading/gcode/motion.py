@@ -1,6 +1,7 @@
 """The modal state of a G-code program's motion and the records that follow from it: lines, arcs, feeds."""
 
 import math
+from collections.abc import Iterator
 
 import numpy as np
 
@@ -76,23 +77,22 @@ class GcodeMotion:
         if machine:
             return self._take_machine_end(values, line)
         end = list(self.here)
-        for k, letter in enumerate(AXES):
-            value = values.pop(letter, None)
-            if value is None:
-                continue
-            if k < 3:
-                value *= self.scale
-            else:
-                self._give_turn(k - 3, value, line)
+        for k, value in self._take_words(values, line):
             if self.incremental:
                 if end[k] != end[k]:
-                    refuse(f"G91 while {letter} is not known; expected {letter} once in G90 before")
+                    refuse(f"G91 while {AXES[k]} is not known; expected {AXES[k]} once in G90 before")
                 value += end[k]
             end[k] = value
         return end
 
     def _take_machine_end(self, values: dict[str, float], line: int) -> list[float]:
         point = self.systems.to_work(self.here)
+        for k, value in self._take_words(values, line):
+            point[k] = value - self.systems.offset_in_machine(k)
+        return self.systems.from_work(point)
+
+    def _take_words(self, values: dict[str, float], line: int) -> Iterator[tuple[int, float]]:
+        """Take axis words out of a block's values one by one: their columns, and the values in mm and degrees."""
         for k, letter in enumerate(AXES):
             value = values.pop(letter, None)
             if value is None:
@@ -101,8 +101,7 @@ class GcodeMotion:
                 value *= self.scale
             else:
                 self._give_turn(k - 3, value, line)
-            point[k] = value - self.systems.offset_in_machine(k)
-        return self.systems.from_work(point)
+            yield k, value
 
     def _give_turn(self, k: int, value: float, line: int) -> None:
         """Note that A, B or C (``k``) is given."""

@@ -22,6 +22,7 @@ import parakin as pk
 from parakin.cli import main
 from parakin.controllers.linuxcnc.module import write_module
 from parakin.kinematics.forward import find_roots
+from parakin.performance.singularities import compute_singularity_margins, list_margin_names
 
 sys.path.insert(0, str(Path(__file__).parent / "linuxcnc"))
 from stub import Stub, inward, outward, pose, world
@@ -268,6 +269,61 @@ def test_drawn_machines(family, modules, tmp_path):
     assert tilt.max() < 1e-9
 
 
+# The model that all modules share
+
+
+@pytest.fixture(scope="module")
+def probes(tmp_path_factory):
+    """The model of every machine, built when asked for."""
+    if not shutil.which("gcc"):
+        pytest.skip("there is no gcc")
+    stub, known = Stub(tmp_path_factory.mktemp("models")), {}
+
+    def probe_of(machine):
+        if machine.name not in known:
+            known[machine.name] = stub.probe(machine)
+        return known[machine.name]
+
+    return probe_of
+
+
+@everyone
+def test_the_models_joint_rates_are_the_slopes_of_the_inverse(m, probes):
+    poses = allowed(m.name)[:2000]
+    joints, step = m.inverse(poses), 1e-5
+    rates, regular = probes(m).rates(poses, joints)
+    serial = compute_singularity_margins(m, poses)[:, 1:]
+    safe = (np.abs(serial).min(1, initial=1.0) > 0.05) & regular
+    assert safe.mean() > 0.5
+    for k in range(len(m.axes)):
+        ahead, behind = poses.copy(), poses.copy()
+        ahead[:, k] += step
+        behind[:, k] -= step
+        slopes = (m.inverse(ahead) - m.inverse(behind)) / (2.0 * step)
+        turned = np.abs(slopes) > 1e4  # an angle's turn between the two
+        error = np.abs(rates[..., k] - slopes) / (1.0 + np.abs(slopes))
+        assert error[safe & ~turned.any(1)].max() < 1e-4
+
+
+@everyone
+def test_the_models_singularity_margins_are_the_atlas(m, probes):
+    poses = allowed(m.name)[:2000]
+    margins = probes(m).singularities(poses, m.inverse(poses))
+    assert np.abs(margins - compute_singularity_margins(m, poses)).max() < 1e-9
+
+
+@everyone
+def test_the_models_distance_to_limits_is_zero_where_one_is_reached(m, probes):
+    poses = poses_about(m, 20_000, seed=5)
+    joints = m.inverse(poses)
+    distances, names = probes(m).distances(poses, joints)
+    margins, broken = compute_singularity_margins(m, poses), m.check(poses)
+    least = margins[:, 0] / compute_singularity_margins(m, m.home)[0] < 0.02
+    least |= (margins[:, 1 : 1 + m.leg_count] < 0.02).any(1) | ~np.isfinite(joints).all(1)
+    assert np.array_equal(distances < 0.0, (broken != 0) | least)
+    assert set(names) <= {*m.limits, *(f"singularity, {name}" for name in list_margin_names(m))}
+
+
 # The configuration
 
 
@@ -285,7 +341,9 @@ def numbers(text):
 @everyone
 def test_the_ini_says_what_the_machine_says(m):
     files = pk.make_linuxcnc_configuration(m)
-    assert sorted(files) == sorted(f"{m.name}{end}" for end in ("_kins.c", ".ini", ".hal", ".tbl", ".ngc", ".md"))
+    assert sorted(files) == sorted(
+        f"{m.name}{end}" for end in ("_kins.c", "_model.h", ".ini", ".hal", ".tbl", ".ngc", ".md")
+    )
     ini = sections(files[f"{m.name}.ini"])
     assert ini["KINS"]["KINEMATICS"] == f"{m.name}_kins"
     assert int(ini["KINS"]["JOINTS"]) == len(m.joints)
@@ -354,13 +412,16 @@ def test_what_a_description_leaves_open_is_chosen_and_said(tmp_path):
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_the_module_is_under_the_gpl_and_names_itself(name):
-    text = pk.make_linuxcnc_configuration(pk.load(name))[f"{name}_kins.c"]
-    assert "GNU General Public" in text.split("*/")[0]
-    assert 'MODULE_LICENSE("GPL")' in text
-    assert f'#define MODULE "{name}_kins"' in text
-    assert not re.search(r"\b(inf|nan)\b", text)
-    assert text.count("{") == text.count("}")
+def test_the_c_is_under_the_gpl_and_names_itself(name):
+    files = pk.make_linuxcnc_configuration(pk.load(name))
+    sources = [text for file, text in files.items() if file.endswith((".c", ".h"))]
+    assert len(sources) >= 2
+    for text in sources:
+        assert "GNU General Public" in text.split("*/")[0]
+        assert not re.search(r"\b(inf|nan)\b", text)
+        assert text.count("{") == text.count("}")
+    assert 'MODULE_LICENSE("GPL")' in files[f"{name}_kins.c"]
+    assert f'#define MODULE "{name}_kins"' in files[f"{name}_kins.c"]
 
 
 def test_a_module_of_another_making_is_not_loaded(modules):
@@ -396,7 +457,7 @@ def test_the_commands_folder_json_and_sizes(tmp_path, monkeypatch, capsys):
     said = json.loads(capsys.readouterr().out)
     assert said["schema"] == "parakin.linuxcnc/1"
     assert all(Path(path).parent == Path("hbg80_2d") and Path(path).is_file() for path in said["files"])
-    assert repr(410.0**2) in Path("hbg80_2d/hbg80_2d_kins.c").read_text()
+    assert repr(410.0**2) in Path("hbg80_2d/hbg80_2d_model.h").read_text()
 
 
 @pytest.mark.parametrize("arguments", [["nothing"], ["hexapod", "--set", "tool=1"], ["hexapod", "-o", "/dev/null/x"]])

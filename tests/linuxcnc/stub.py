@@ -8,7 +8,9 @@ from pathlib import Path
 
 import numpy as np
 
+from parakin.controllers.linuxcnc.model_header import name_model, write_model
 from parakin.controllers.linuxcnc.module import name_kinematics, write_module
+from parakin.performance.singularities import list_margin_names
 
 HERE = Path(__file__).parent
 HEADERS = ("rtapi.h", "rtapi_app.h", "rtapi_math.h", "rtapi_string.h", "hal.h", "kinematics.h")
@@ -89,8 +91,46 @@ class Stub:
         stub, name = self.library, name_kinematics(machine)
         source = self.folder / f"{name}.c"
         source.write_text(write_module(machine))
+        (self.folder / name_model(machine)).write_text(write_model(machine))
         self._gcc([source], self.folder / f"{name}.so")
         return Kinematics(stub, self.folder / f"{name}.so", len(machine.joints))
+
+    def probe(self, machine):
+        """The functions of a machine's model that all modules share, in mm and rad."""
+        (self.folder / name_model(machine)).write_text(write_model(machine))
+        path = self.folder / f"{machine.name}_probe.so"
+        self._gcc([f'-DMODEL_HEADER="{name_model(machine)}"', HERE / "model_probe.c"], path)
+        return ModelProbe(ctypes.CDLL(str(path)), machine)
+
+
+class ModelProbe:
+    """The model's functions over rows of poses (n, axes) and joints (n, joints), mm and rad."""
+
+    def __init__(self, library, machine):
+        self.library, self.sizes = library, (len(machine.joints), len(machine.axes))
+        self.names = [*machine.limits, *(f"singularity, {name}" for name in list_margin_names(machine))]
+
+    def rates(self, poses, joints):
+        """dq/dx (n, joints, axes), and whether the machine is not singular there (n,)."""
+        rates, codes = np.empty((len(poses), *self.sizes)), np.empty(len(poses), np.int32)
+        self._call("probe_rates", poses, joints, rates, codes)
+        return rates, codes != 0
+
+    def singularities(self, poses, joints):
+        """The singularity margins (n, margins)."""
+        margins = np.empty((len(poses), sum(name.startswith("singularity") for name in self.names)))
+        self._call("probe_singularities", poses, joints, margins)
+        return margins
+
+    def distances(self, poses, joints):
+        """The distance to the nearest limit (n,), and its names."""
+        distances, nearest = np.empty(len(poses)), np.empty(len(poses), np.int32)
+        self._call("probe_distances", poses, joints, distances, nearest)
+        return distances, [self.names[i] for i in nearest]
+
+    def _call(self, name, poses, joints, *arrays):
+        given = [np.ascontiguousarray(rows, float) for rows in (poses, joints)]
+        getattr(self.library, name)(ctypes.c_long(len(poses)), *map(_pointer, [*given, *arrays]))
 
 
 def world(machine, poses):

@@ -27,10 +27,12 @@ class SphereTapes(NamedTuple):
 class KinematicTapes(NamedTuple):
     """The inverse in a working mode, and the direct problem: the common point of spheres, or Newton's method.
 
+    jacobians : pose, joints -> A (n·n) and B (n·n) with A x' = B q'
     coordinates : names of the motion's coordinates, which Newton's method solves for
     """
 
     inverse: Tape
+    jacobians: Tape
     spheres: SphereTapes | None
     newton: NewtonTapes | None
     coordinates: tuple[str, ...]
@@ -47,7 +49,7 @@ def collect_tapes(model: Model, mode: str) -> KinematicTapes:
     """Compile the tapes of inverse and direct problem in a working mode."""
     spheres = _collect_sphere_tapes(model, mode) if model.by_spheres else None
     newton = None if model.by_spheres else collect_newton_tapes(model)
-    return KinematicTapes(model.inverse_tape(mode), spheres, newton, model.structure.coordinates)
+    return KinematicTapes(model.inverse_tape(mode), model.jacobian_tape(), spheres, newton, model.structure.coordinates)
 
 
 def _collect_sphere_tapes(model: Model, mode: str) -> SphereTapes:

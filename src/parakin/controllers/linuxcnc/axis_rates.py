@@ -8,6 +8,7 @@ import numpy as np
 
 from ...arrays import Array
 from ...machine import Machine
+from ...model.parts import Drive
 
 # Speed and acceleration where a machine's description leaves them open, by the drive's unit; mm, rad and s.
 SPEED = {"mm": 200.0, "rad": pi / 3.0}
@@ -26,6 +27,12 @@ def find_slowest_drive(machine: Machine, unit: str) -> tuple[float, float]:
     speeds = [drive.speed for drive in drives if isfinite(drive.speed)] or [SPEED[unit]]
     accelerations = [drive.acceleration for drive in drives if isfinite(drive.acceleration)] or [ACCELERATION[unit]]
     return min(speeds), min(accelerations)
+
+
+def choose_drive_rates(drive: Drive) -> tuple[float, float]:
+    """Take a drive's speed and acceleration, or choose them where the description leaves them open; mm, rad and s."""
+    speed = drive.speed if isfinite(drive.speed) else SPEED[drive.unit]
+    return speed, drive.acceleration if isfinite(drive.acceleration) else ACCELERATION[drive.unit]
 
 
 def choose_unit_rates(machine: Machine, unit: str) -> tuple[float, float]:

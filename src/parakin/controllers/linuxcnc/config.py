@@ -9,7 +9,7 @@ from ...machine import Machine
 from ...model.parts import Drive
 from ...units import to_display
 from .axis_ranges import estimate_axis_ranges
-from .axis_rates import ACCELERATION, SPEED, choose_unit_rates, find_slowest_drive
+from .axis_rates import choose_drive_rates, choose_unit_rates, find_slowest_drive
 from .module import hash_kinematics, name_kinematics
 
 _LAG = 0.01  # s: following error allowed, as time at full speed; the simulation lags by 0.001 s or two
@@ -149,8 +149,7 @@ def _format_rates(speed: float, acceleration: float, unit: str) -> Iterator[str]
 def _format_joint(index: int, drive: Drive, home: float) -> str:
     unit = drive.unit
     missing = [what for what in ("speed", "acceleration") if not isfinite(getattr(drive, what))]
-    speed = drive.speed if isfinite(drive.speed) else SPEED[unit]
-    acceleration = drive.acceleration if isfinite(drive.acceleration) else ACCELERATION[unit]
+    speed, acceleration = choose_drive_rates(drive)
     lag = to_display(_LAG * speed, unit)
     lines = [
         f"# {drive.name}",

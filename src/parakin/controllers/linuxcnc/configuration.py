@@ -6,6 +6,7 @@ from ...arguments import check_arguments
 from ...machine import Machine
 from .config import write_hal, write_ini, write_tool_table
 from .first_program import write_first_program
+from .model_header import name_model, write_model
 from .module import name_kinematics, write_module
 from .page import write_page
 from .stamp import stamp_file
@@ -15,12 +16,14 @@ from .stamp import stamp_file
 def make_linuxcnc_configuration(machine: Machine) -> dict[str, str]:
     """Make a configuration for LinuxCNC 2.9 that runs as a simulation: {file: text}.
 
-    The files are the kinematics module (C, built by LinuxCNC's ``halcompile --install``), the ini and HAL files, the
-    tool table, a first program and a page that tells how to start, all named after the machine. The last line of each
+    The files are the kinematics module (C, built by LinuxCNC's ``halcompile --install``) and the header that it
+    includes, the ini and HAL files, the tool table, a first program and a page that tells how to start, all named after
+    the machine. The last line of each
     tells by a hash whether the file was edited since.
     """
     texts = {
         f"{name_kinematics(machine)}.c": write_module(machine),
+        name_model(machine): write_model(machine),
         f"{machine.name}.ini": write_ini(machine),
         f"{machine.name}.hal": write_hal(machine),
         f"{machine.name}.tbl": write_tool_table(machine),

@@ -17,6 +17,7 @@ For LinuxCNC 2.9, as a simulation without hardware.
 | file | what it is |
 |---|---|
 | `{kinematics}.c` | the kinematics: {joints} from {axes} and back |
+| `{name}_model.h` | the machine's mathematics, which the kinematics includes |
 | `{name}.ini` | ranges, speeds and home |
 | `{name}.hal` | loops in the place of drives |
 | `{name}.tbl` | the tool |

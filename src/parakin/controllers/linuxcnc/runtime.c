@@ -1,42 +1,10 @@
-/* What every machine shares. Above stand its numbers and its mathematics; here is how LinuxCNC asks for them.
+/* How LinuxCNC asks for the model.
 
    Both functions keep nothing from one call to the next: LinuxCNC hands the last joints to the inverse and the last
    pose to the forward, and that is what they stay near to. It asks the inverse for the end points of moves to come as
    well, with joints at zero, which would spoil a memory. Nothing allocates, and every loop has an end. */
 
-static double within_half_a_turn(double angle, double near)
-{
-    return angle + TURN * rint((near - angle) / TURN);
-}
-
-static int finite_all(const double *x, int count)
-{
-    for (int i = 0; i < count; i++)
-        if (!isfinite(x[i]))
-            return 0;
-    return 1;
-}
-
 /* The inverse: joints for a pose, the wrist's and all turning ones near the last. */
-
-#if WRIST
-/* Over the wrist's pole its other solution spares a swing: as parakin's Machine.follow goes on there. */
-static void go_over_the_pole(const double *x, const double *last, double *q)
-{
-    double other[JOINTS];
-    const double stay[2] = {within_half_a_turn(q[FIRST] - last[FIRST], 0.0),
-                            within_half_a_turn(q[SECOND] - last[SECOND], 0.0)};
-    if (!(fabs(stay[0]) > @SWING@ * TURN))
-        return;
-    inverse_over(x, other);
-    const double cross[2] = {within_half_a_turn(other[FIRST] - last[FIRST], 0.0),
-                             within_half_a_turn(other[SECOND] - last[SECOND], 0.0)};
-    if (cross[0] * cross[0] + cross[1] * cross[1] < @GAIN@ * (stay[0] * stay[0] + stay[1] * stay[1])
-        && other[SECOND] >= SECOND_LOW && other[SECOND] <= SECOND_HIGH && finite_all(other, JOINTS))
-        for (int i = 0; i < JOINTS; i++)
-            q[i] = other[i];
-}
-#endif
 
 int kinematicsInverse(const EmcPose *world, double *joints,
                       const KINEMATICS_INVERSE_FLAGS *iflags, KINEMATICS_FORWARD_FLAGS *fflags)
@@ -48,21 +16,7 @@ int kinematicsInverse(const EmcPose *world, double *joints,
     read_joints(joints, last);
     if (!finite_all(x, AXES) || !finite_all(last, JOINTS))
         return -1;
-    inverse(x, q);
-    if (!finite_all(q, JOINTS))
-        return -1;
-#if WRIST
-    double lean[1];
-    freedom(x, lean);
-    if (lean[0] < FREE * FREE)
-        inverse_held(x, &last[FIRST], q);
-    else
-        go_over_the_pole(x, last, q);
-#endif
-    for (int i = 0; i < JOINTS; i++)
-        if (turning[i])
-            q[i] = within_half_a_turn(q[i], last[i]);
-    if (!finite_all(q, JOINTS) || !allowed(x, q))
+    if (!find_joints(x, last, q) || !allowed(x, q))
         return -1;
     write_joints(q, joints);
     return 0;
@@ -131,53 +85,6 @@ static int pose_near(const double *near, const double *q, double *x, double *sid
     return closes(f) && finite_all(x, AXES);
 }
 #else
-/* LU with row exchanges, in place; the determinant. */
-static double factor(double a[CLOSURES][CLOSURES], int order[CLOSURES])
-{
-    double det = 1.0;
-    for (int k = 0; k < CLOSURES; k++) {
-        int best = k;
-        for (int i = k + 1; i < CLOSURES; i++)
-            if (fabs(a[i][k]) > fabs(a[best][k]))
-                best = i;
-        order[k] = best;
-        if (best != k) {
-            det = -det;
-            for (int j = 0; j < CLOSURES; j++) {
-                const double swap = a[k][j];
-                a[k][j] = a[best][j];
-                a[best][j] = swap;
-            }
-        }
-        det *= a[k][k];
-        const double pivot = 1.0 / a[k][k];
-        a[k][k] = pivot;
-        for (int i = k + 1; i < CLOSURES; i++) {
-            const double share = a[i][k] *= pivot;
-            for (int j = k + 1; j < CLOSURES; j++)
-                a[i][j] -= share * a[k][j];
-        }
-    }
-    return det;
-}
-
-static void substitute(double a[CLOSURES][CLOSURES], const int order[CLOSURES], double f[CLOSURES])
-{
-    for (int k = 0; k < CLOSURES; k++) {
-        const double swap = f[order[k]];
-        f[order[k]] = f[k];
-        f[k] = swap;
-    }
-    for (int k = 1; k < CLOSURES; k++)
-        for (int j = 0; j < k; j++)
-            f[k] -= a[k][j] * f[j];
-    for (int k = CLOSURES - 1; k >= 0; k--) {
-        for (int j = k + 1; j < CLOSURES; j++)
-            f[k] -= a[k][j] * f[j];
-        f[k] *= a[k][k];
-    }
-}
-
 /* The sign of the rates of a pose's angles against those of the tool. */
 static double angle_sign(const double *x)
 {
@@ -201,7 +108,7 @@ static double side_of(const double *near, double det, int steady)
         if (finite_all(own, JOINTS)) {
             begin(near, own, y);
             closures_and_slopes(y, own, f, a[0]);
-            det = factor(a, order);
+            det = factor(CLOSURES, a, order);
         }
     }
 #else
@@ -219,7 +126,7 @@ static int pose_near(const double *near, const double *q, double *x, double *sid
     for (int step = 0;; step++) {
         if (anew) {
             closures_and_slopes(y, q, f, a[0]);
-            det = factor(a, order);
+            det = factor(CLOSURES, a, order);
         } else {
             closures(y, q, f);
         }
@@ -241,7 +148,7 @@ static int pose_near(const double *near, const double *q, double *x, double *sid
         last = ratio * worst < FINE;
         anew = anew ? worst * worst > WORTH * SIZE : ratio > SLOW;
         before = worst;
-        substitute(a, order, f);
+        substitute(CLOSURES, a, order, f);
         for (int i = 0; i < CLOSURES; i++)
             if (fabs(f[i]) * shrink > caps[i])
                 shrink = caps[i] / fabs(f[i]);

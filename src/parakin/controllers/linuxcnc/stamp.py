@@ -10,6 +10,7 @@ from pathlib import Path
 
 _COMMENTS = {
     ".c": "/* {} */",
+    ".h": "/* {} */",
     ".ini": "# {}",
     ".hal": "# {}",
     ".tbl": "; {}",

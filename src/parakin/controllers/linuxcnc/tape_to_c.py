@@ -34,22 +34,20 @@ class CVector:
 
 
 def write_function(name: str, tape: Tape, inputs: Sequence[CVector], outputs: Sequence[CVector]) -> str:
-    """Write ``static void name(const double *..., double *...)``, which computes the tape's outputs from its inputs."""
+    """Write ``void name(const double *..., double *...)``, which computes the tape's outputs from its inputs."""
     lines, results = _write_statements(tape, inputs)
     into = [f"{vector.name}[{i}]" for vector in outputs for i in range(vector.length)]
     lines += [f"    {place} = {value};" for place, value in zip(into, results, strict=True)]
     arguments = [f"const double *{vector.name}" for vector in inputs] + [f"double *{vector.name}" for vector in outputs]
-    return _write_definition(f"static void {name}({', '.join(arguments)})", lines, inputs)
+    return _write_definition(f"MODEL void {name}({', '.join(arguments)})", lines, inputs)
 
 
 def write_test(name: str, tape: Tape, inputs: Sequence[CVector]) -> str:
-    """Write ``static int name(const double *...)``: whether all outputs of the tape are ≥ 0; NaN is not."""
+    """Write ``int name(const double *...)``: whether all outputs of the tape are ≥ 0; NaN is not."""
     lines, results = _write_statements(tape, inputs)
     conditions = [f"{value} >= 0.0" for value in results] or ["1"]
     lines.append("    return " + "\n        && ".join(conditions) + ";")
-    return _write_definition(
-        f"static int {name}({', '.join(f'const double *{v.name}' for v in inputs)})", lines, inputs
-    )
+    return _write_definition(f"MODEL int {name}({', '.join(f'const double *{v.name}' for v in inputs)})", lines, inputs)
 
 
 def format_c(value: float) -> str:

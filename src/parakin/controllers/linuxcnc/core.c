@@ -1,0 +1,186 @@
+/* What every machine shares. Above stand its numbers and its mathematics, all in mm and rad; here is what is asked of
+   them. No function keeps anything from one call to the next, nothing allocates, and every loop has an end. */
+
+MODEL double within_half_a_turn(double angle, double near)
+{
+    return angle + TURN * rint((near - angle) / TURN);
+}
+
+MODEL int finite_all(const double *x, int count)
+{
+    for (int i = 0; i < count; i++)
+        if (!isfinite(x[i]))
+            return 0;
+    return 1;
+}
+
+/* Joints for a pose. */
+
+#if WRIST
+/* Over the wrist's pole its other solution spares a swing: as parakin's Machine.follow goes on there. */
+MODEL void go_over_the_pole(const double *x, const double *last, double *q)
+{
+    double other[JOINTS];
+    const double stay[2] = {within_half_a_turn(q[FIRST] - last[FIRST], 0.0),
+                            within_half_a_turn(q[SECOND] - last[SECOND], 0.0)};
+    if (!(fabs(stay[0]) > @SWING@ * TURN))
+        return;
+    inverse_over(x, other);
+    const double cross[2] = {within_half_a_turn(other[FIRST] - last[FIRST], 0.0),
+                             within_half_a_turn(other[SECOND] - last[SECOND], 0.0)};
+    if (cross[0] * cross[0] + cross[1] * cross[1] < @GAIN@ * (stay[0] * stay[0] + stay[1] * stay[1])
+        && other[SECOND] >= SECOND_LOW && other[SECOND] <= SECOND_HIGH && finite_all(other, JOINTS))
+        for (int i = 0; i < JOINTS; i++)
+            q[i] = other[i];
+}
+#endif
+
+/* The joints of a pose x near the last ones: of a wrist's two modes the one that spares a swing over the pole, its first
+   joint as it is where it is free, turning joints on the nearest turn. 0 where a leg can't reach the pose; limits are
+   not looked at. */
+MODEL int find_joints(const double *x, const double *last, double *q)
+{
+    inverse(x, q);
+    if (!finite_all(q, JOINTS))
+        return 0;
+#if WRIST
+    double lean[1];
+    freedom(x, lean);
+    if (lean[0] < FREE * FREE)
+        inverse_held(x, &last[FIRST], q);
+    else
+        go_over_the_pole(x, last, q);
+#endif
+    for (int i = 0; i < JOINTS; i++)
+        if (turning[i])
+            q[i] = within_half_a_turn(q[i], last[i]);
+    return finite_all(q, JOINTS);
+}
+
+/* LU with row exchanges, in place; the determinant. */
+MODEL inline double factor(int n, double a[n][n], int order[n])
+{
+    double det = 1.0;
+    for (int k = 0; k < n; k++) {
+        int best = k;
+        for (int i = k + 1; i < n; i++)
+            if (fabs(a[i][k]) > fabs(a[best][k]))
+                best = i;
+        order[k] = best;
+        if (best != k) {
+            det = -det;
+            for (int j = 0; j < n; j++) {
+                const double swap = a[k][j];
+                a[k][j] = a[best][j];
+                a[best][j] = swap;
+            }
+        }
+        det *= a[k][k];
+        const double pivot = 1.0 / a[k][k];
+        a[k][k] = pivot;
+        for (int i = k + 1; i < n; i++) {
+            const double share = a[i][k] *= pivot;
+            for (int j = k + 1; j < n; j++)
+                a[i][j] -= share * a[k][j];
+        }
+    }
+    return det;
+}
+
+MODEL inline void substitute(int n, double a[n][n], const int order[n], double f[n])
+{
+    for (int k = 0; k < n; k++) {
+        const double swap = f[order[k]];
+        f[order[k]] = f[k];
+        f[k] = swap;
+    }
+    for (int k = 1; k < n; k++)
+        for (int j = 0; j < k; j++)
+            f[k] -= a[k][j] * f[j];
+    for (int k = n - 1; k >= 0; k--) {
+        for (int j = k + 1; j < n; j++)
+            f[k] -= a[k][j] * f[j];
+        f[k] *= a[k][k];
+    }
+}
+
+
+/* Rates, and how far a pose is from what it must not reach. */
+
+/* The joints' rates by the pose's coordinates, dq/dx; 0 where the machine is singular. A x' = B q', where head and
+   table's rows of B hang on their own joints only. */
+MODEL int joint_rates(const double *x, const double *q, double rates[JOINTS][AXES])
+{
+    double a[JOINTS * AXES], b[JOINTS * JOINTS], legs[CLOSURES][CLOSURES], column[JOINTS];
+    int order[JOINTS];
+    jacobians(x, q, a, b);
+    for (int i = 0; i < CLOSURES; i++)
+        for (int j = 0; j < CLOSURES; j++)
+            legs[i][j] = b[i * JOINTS + j];
+    if (!(fabs(factor(CLOSURES, legs, order)) > 0.0))
+        return 0;
+#if SERIAL
+    double turns[SERIAL][SERIAL];
+    int turns_order[SERIAL];
+    for (int i = 0; i < SERIAL; i++)
+        for (int j = 0; j < SERIAL; j++)
+            turns[i][j] = b[(CLOSURES + i) * JOINTS + CLOSURES + j];
+    factor(SERIAL, turns, turns_order);
+#endif
+    for (int k = 0; k < AXES; k++) {
+        for (int i = 0; i < JOINTS; i++)
+            column[i] = a[i * AXES + k];
+#if SERIAL
+        substitute(SERIAL, turns, turns_order, &column[CLOSURES]);
+        for (int i = 0; i < CLOSURES; i++)
+            for (int j = CLOSURES; j < JOINTS; j++)
+                column[i] -= b[i * JOINTS + j] * column[j];
+#endif
+        substitute(CLOSURES, legs, order, column);
+        for (int i = 0; i < JOINTS; i++)
+            rates[i][k] = column[i];
+    }
+    return finite_all(rates[0], JOINTS * AXES);
+}
+
+/* The singularity margins, positive on home's side, zero at a singularity: first the parallel one, whose sign is the
+   side that the machine works on; then the serial ones. Their names follow the limits' in limit_names. */
+MODEL void measure_singularities(const double *x, const double *q, double *margins)
+{
+    double w[WRENCHES][WRENCHES];
+    int order[WRENCHES];
+    wrenches(x, q, w[0], &margins[1]);
+    margins[0] = factor(WRENCHES, w, order);
+}
+
+/* Whether a pose keeps its distance to every singularity, on home's side of them. */
+MODEL int regular(const double *x, const double *q)
+{
+    double margins[SINGULARITIES];
+    measure_singularities(x, q, margins);
+    for (int i = 0; i < SINGULARITIES; i++)
+        if (!(margins[i] >= least_singularity[i]))
+            return 0;
+    return 1;
+}
+
+/* How far a pose is from its nearest limit or singularity, and which of limit_names that is: 0 where it is reached, 1
+   where jogs stop. */
+MODEL double distance_to_limits(const double *x, const double *q, int *nearest)
+{
+    double limits[LIMITS + 1], margins[SINGULARITIES], least = HUGE_VAL;
+    *nearest = 0;
+    measure_limits(x, q, limits);
+    measure_singularities(x, q, margins);
+    for (int i = 0; i < LIMITS + SINGULARITIES; i++) {
+        const int j = i - LIMITS;
+        if (j >= 0 && !(least_singularity[j] > 0.0))
+            continue;
+        const double distance = j < 0 ? limits[i] / near_limit[i] : margins[j] / least_singularity[j] - 1.0;
+        if (distance < least || isnan(distance)) {
+            least = isnan(distance) ? -HUGE_VAL : distance;
+            *nearest = i;
+        }
+    }
+    return least;
+}

@@ -8,7 +8,7 @@ import pytest
 
 import parakin as pk
 from parakin.errors import SingularHomeWarning
-from parakin.kinematics.forward import ANSWERED, ON_ANOTHER_SIDE, OPEN, OTHER_MODE, REASONS, SINGULAR_START
+from parakin.kinematics.solution import ANSWERED, ON_ANOTHER_SIDE, OPEN, OTHER_MODE, REASONS, SINGULAR_START
 
 RAILS = """\
 name: six_vertical_rails

@@ -21,7 +21,7 @@ from test_forward import CLOSE, allowed, garbage, legs_regularity, nudged
 import parakin as pk
 from parakin.cli import main
 from parakin.controllers.linuxcnc.module import write_module
-from parakin.kinematics.forward import find_roots
+from parakin.kinematics.closure_roots import find_roots
 from parakin.performance.singularities import compute_singularity_margins, list_margin_names
 
 sys.path.insert(0, str(Path(__file__).parent / "linuxcnc"))

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from .export.machine.picture import render_machine_html, render_machine_png
     from .export.report.report import render_report
     from .export.workspace.meshes import Mesh, make_mesh
-    from .kinematics.forward import Solution
+    from .kinematics.solution import Solution
     from .machine import Machine
     from .performance.atlas import Atlas, atlas
     from .toolpath.job import Job, Tolerances, prepare
@@ -153,7 +153,7 @@ _LAZY = {
     "PolarWorkspace": "workspaces.sampled.polar_sweep",
     "Region": "workspaces.certified.region",
     "SampledField": "workspaces.sampled.distance_field",
-    "Solution": "kinematics.forward",
+    "Solution": "kinematics.solution",
     "Tolerances": "toolpath.job",
     "Clearance": "toolpath.posting.rewinds",
     "Rewind": "toolpath.posting.rewinds",

@@ -16,9 +16,12 @@ from .arrays import Array, AxisRange
 from .errors import DescriptionError, NoMethodError, PoseError, SingularHomeWarning
 from .kernels.batch import evaluate_tape, evaluate_tape_with_residual, find_first_negative
 from .kinematics.assemblies import find_assemblies
+from .kinematics.assembly_side import find_sides
+from .kinematics.closure_roots import compute_closure_tolerance
 from .kinematics.follow import follow_path
-from .kinematics.forward import Solution, compute_closure_tolerance, find_sides, solve_forward
+from .kinematics.forward import solve_forward
 from .kinematics.inverse import SINGULAR, measure_regularity, solve_inverse
+from .kinematics.solution import Solution
 from .kinematics.tapes import KinematicTapes, collect_tapes
 from .kinematics.wrist import EVERY_DIRECTION, EVERY_ROTATION, EXACT, Wrist, find_wrist, flip_mode
 from .model.legs import Inverse, Leg
@@ -294,7 +297,7 @@ class Machine:
         method: str | None = None,
         mode: str | None = None,
     ) -> Solution:
-        """Compute poses for joints, (..., joints) -> :class:`~.kinematics.forward.Solution`, with residual and verdict.
+        """Compute poses for joints, (..., joints) -> :class:`~.kinematics.solution.Solution`: residual and verdict too.
 
         Parameters
         ----------

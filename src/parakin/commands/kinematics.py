@@ -21,7 +21,7 @@ from .values import parse_row
 
 if TYPE_CHECKING:
     from ..arrays import Array, Indices
-    from ..kinematics.forward import Solution
+    from ..kinematics.solution import Solution
     from ..machine import Machine
     from ..toolpath.posting.offences import Judgement
     from ..toolpath.posting.posted import Offence

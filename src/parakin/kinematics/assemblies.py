@@ -11,7 +11,7 @@ from ..kernels.batch import evaluate_tape_with_residual
 from ..kernels.intervals import IntervalProgram
 from ..model.chain import make_rotation_about
 from ..model.traces import Model
-from .forward import compute_closure_tolerance, compute_poses, find_roots
+from .closure_roots import compute_closure_tolerance, compute_poses, find_roots
 from .planar_rpr import CONTINUUM, solve_planar_rpr
 from .root_isolation import isolate_roots
 

@@ -11,7 +11,9 @@ from ...algebra import Scalar, Trace, absolute
 from ...arrays import Array
 from ...kernels.newton import SLOW, WORTH
 from ...kernels.tape import Tape, compile_tape
-from ...kinematics.forward import MOST_STEPS, SETTLED, STEADY
+from ...kinematics.closure_roots import MOST_STEPS
+from ...kinematics.forward import STEADY
+from ...kinematics.start_modes import SETTLED
 from ...kinematics.turns import TURN
 from ...kinematics.wrist import EXACT, GAIN, NEAR_MODE, STANDING, SWING
 from ...machine import Machine

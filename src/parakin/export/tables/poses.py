@@ -11,7 +11,7 @@ from ..number_format import format_fixed
 
 if TYPE_CHECKING:
     from ...arrays import Array
-    from ...kinematics.forward import Solution
+    from ...kinematics.solution import Solution
     from ...machine import Machine
 
 ColumnGroup: TypeAlias = Literal["pose", "joints"]

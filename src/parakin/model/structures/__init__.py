@@ -8,9 +8,19 @@ from ..spec import Spec
 from .base import DirectionColumns, PlatformPlacement, Structure
 from .carried import Carried
 from .central_leg import CentralLeg
+from .five_axis import compute_tool_axis
 from .free import Free
 
-__all__ = ["Carried", "CentralLeg", "DirectionColumns", "Free", "PlatformPlacement", "Structure", "structure_of"]
+__all__ = [
+    "Carried",
+    "CentralLeg",
+    "DirectionColumns",
+    "Free",
+    "PlatformPlacement",
+    "Structure",
+    "compute_tool_axis",
+    "make_structure",
+]
 
 
 def make_structure(spec: Spec) -> Structure:

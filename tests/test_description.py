@@ -12,8 +12,8 @@ from machine_texts import GOOD, RPR3, errors_of, write
 
 from parakin.description import read_machine
 from parakin.errors import InputError, InputErrors
+from parakin.model.elements import Cone, Drive, Gap, Range, Step
 from parakin.model.legs import KINDS
-from parakin.model.parts import Cone, Drive, Gap, Range, Step
 
 # What is read.
 

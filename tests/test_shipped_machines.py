@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from parakin.description import list_shipped_machines, read_machine
-from parakin.model.parts import Range
+from parakin.model.elements import Range
 
 # The shipped machines.
 

@@ -24,9 +24,9 @@ from .kinematics.inverse import SINGULAR, measure_regularity, solve_inverse
 from .kinematics.solution import Solution
 from .kinematics.tapes import KinematicTapes, collect_tapes
 from .kinematics.wrist import EVERY_DIRECTION, EVERY_ROTATION, EXACT, Wrist, find_wrist, flip_mode
+from .model.elements import Drive
 from .model.legs import Inverse, Leg
 from .model.limits import Limit, compute_platform_points, group_joints_by_leg
-from .model.parts import Drive
 from .model.rates import TwistRates, compute_twist_rates, list_closure_joints
 from .model.spec import Spec
 from .model.structures import DirectionColumns, PlatformPlacement, Structure

@@ -12,6 +12,7 @@ from .workpiece import parse_bounds
 
 if TYPE_CHECKING:
     from ..arrays import Array
+    from ..controllers.controller import ControllerRun
     from ..machine import Machine
     from ..toolpath.job import Job, Tolerances
     from ..toolpath.path import ToolPath
@@ -33,12 +34,18 @@ class JobOptions:
 
 
 class PreparedPart(NamedTuple):
-    """A job with the placement and the rewinds that were found for it, and the s that its controller takes."""
+    """A job with the placement and the rewinds that were found for it, and how its controller runs it."""
 
     job: Job
     placement: Placement | None
     rewinds: tuple[Rewind, ...]
-    controller_seconds: float | None
+    run: ControllerRun | None
+
+    @property
+    def controller_seconds(self) -> float | None:
+        """What the controller takes with the program's waits, s; None where it takes as long as the trajectory."""
+        seconds = None if self.run is None else self.run.seconds
+        return None if seconds is None else seconds + self.job.waits
 
 
 def check_clearance(rewind: float | None, clearance: float | None) -> None:
@@ -100,9 +107,9 @@ def _prepare_at(
         interpolation=controller.interpolation if controller else "pose", corners=options.corners,
         progress=progress.part("checking and timing", 0.3, 0.7),
     )  # fmt: skip
-    if controller is None or controller.predict_time is None or job.trajectory is None:
+    if controller is None or job.trajectory is None:
         return PreparedPart(job, placement, rewinds, None)
-    seconds, notes = controller.predict_time(job.trajectory)
-    path = replace(job.posted.path, notes=(*notes, *job.posted.path.notes))
+    run = controller.build_run(job.trajectory)
+    path = replace(job.posted.path, notes=(*run.notes, *job.posted.path.notes))
     job = replace(job, posted=replace(job.posted, path=path))
-    return PreparedPart(job, placement, rewinds, seconds + job.waits)
+    return PreparedPart(job, placement, rewinds, run)

@@ -30,7 +30,7 @@ from .workpiece import parse_workpiece
 if TYPE_CHECKING:
     from ..arrays import Array, Writer
     from ..export.files import Content
-    from ..toolpath.job import Job
+    from .part_job import PreparedPart
 
 Part = Annotated[
     Path,
@@ -182,11 +182,11 @@ def post(
         options = JobOptions(mode, tolerances, target, corners, rewind, clearance)
         prepared = prepare_part(chosen, path, placed, place, options, progress)
         job = prepared.job
-        files, missing = _make_files(part.stem, job, _Wanted(target, force, rate, parquet), progress)
+        files, missing = _make_files(part.stem, prepared, _Wanted(target, force, rate, parquet), progress)
         paths = write_files(output, dict(files.values()))
     written = {kind: str(name) for kind, name in zip(files, paths, strict=True)}
     if json:
-        print_json(encode_job(*prepared, missing, written))
+        print_json(encode_job(job, prepared.placement, prepared.rewinds, prepared.controller_seconds, missing, written))
     else:
         print_text(summarise_job(prepared, target, written, missing))
     return 0 if job.runs and not missing else OFF_LIMITS
@@ -217,14 +217,15 @@ class _Wanted:
 
 
 def _make_files(
-    stem: str, job: Job, wanted: _Wanted, progress: ProgressBar
+    stem: str, prepared: PreparedPart, wanted: _Wanted, progress: ProgressBar
 ) -> tuple[dict[str, tuple[str, Content]], list[str]]:
     """Make the requested files, named by kind, and give the reasons for those that can't be made."""
     from ..export.report.report import render_report
     from ..export.tables import joints as joint_table
     from ..export.tables import setpoints as setpoint_table
 
-    posted, trajectory, missing = job.posted, job.trajectory, list[str]()
+    job, missing = prepared.job, list[str]()
+    posted, trajectory = job.posted, job.trajectory
     saying = progress.part("writing the tables", 0.7, 0.9)
     files: dict[str, tuple[str, Content]] = {
         "table": (f"{stem}.joints.csv", joint_table.make_joint_csv(posted, saying))
@@ -244,20 +245,21 @@ def _make_files(
     if wanted.target is not None:
         suffix = load_controller(wanted.target).suffix
         try:
-            files["program"] = (f"{stem}.{wanted.target}{suffix}", _make_program(job, wanted.target, wanted.force))
+            files["program"] = (f"{stem}.{wanted.target}{suffix}", _make_program(prepared, wanted.force))
         except PoseError as error:
             missing.append(f"no program: {error}")
     files["report"] = (f"{stem}.report.html", render_report(posted, trajectory, job.unplanned, job.waits, job.outside))
     return files, missing
 
 
-def _make_program(job: Job, target: Target, force: bool) -> Writer:
+def _make_program(prepared: PreparedPart, force: bool) -> Writer:
     from ..toolpath.posting.offence_texts import describe_place
 
+    job, run = prepared.job, prepared.run
     posted = job.posted
     if posted.first is not None and not force:
         raise PoseError("the path is off limits; --force writes it all the same")
-    if job.trajectory is None:
+    if run is None:
         raise PoseError(job.unplanned)
     broken = "\n".join(f"{describe_place(posted, offence)}: {offence.text}" for offence in posted.offences)
-    return load_controller(target).make_program(job.trajectory, broken or None, job.corner_tolerance)
+    return run.make_program(broken or None, job.corner_tolerance)

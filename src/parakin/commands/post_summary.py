@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..controllers import Target, load_controller
 from ..export.number_format import format_duration, format_fixed
-from ..units import to_display
+from ..units import AXIS_UNITS, to_display
 from .console import format_table
 from .offences import format_offence
 
@@ -71,9 +71,7 @@ def _format_verdict(posted: Posted) -> str:
 
 
 def _format_placement(placement: Placement) -> str:
-    values = ",".join(
-        f"{axis}={to_display(value, 'mm' if axis in 'XYZ' else 'rad'):.6g}" for axis, value in placement.values.items()
-    )
+    values = ",".join(f"{axis}={to_display(value, AXIS_UNITS[axis]):.6g}" for axis, value in placement.values.items())
     if placement.allowed:
         return f"best placement --workpiece {values}: {placement.margin:.1%} of half a range left to {placement.limit}"
     return (

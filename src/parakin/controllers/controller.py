@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from ..arrays import Writer
@@ -13,14 +13,19 @@ if TYPE_CHECKING:
     from ..toolpath.timing.trajectory import Trajectory
 
 
-class ControllerTime(NamedTuple):
-    """What a controller takes for a trajectory.
+@dataclass(frozen=True)
+class ControllerRun:
+    """A trajectory as a controller runs it.
 
-    seconds : from the first record on
+    make_program : from what of it is off limits (a line each, None: nothing), and how far (mm) the controller may cut
+        corners, the writer of the program; raises :class:`parakin.PoseError` for a trajectory that the controller
+        can't run
+    seconds : what it takes from the first record on; None: as long as the trajectory
     notes : by line, why that is much longer than the trajectory; none where it is not
     """
 
-    seconds: float
+    make_program: Callable[[str | None, float], Writer]
+    seconds: float | None = None
     notes: tuple[Note, ...] = ()
 
 
@@ -30,15 +35,11 @@ class Controller:
 
     title : its name for people
     interpolation : what it moves evenly between two records, the tool's ``pose`` or the ``joints``
-    make_program : from a trajectory, what of it is off limits (a line each, None: nothing), and how far (mm) the
-        controller may cut corners, the writer of the program; raises :class:`parakin.PoseError` for a trajectory that
-        the controller can't run
-    predict_time : how long the controller takes from the first record on; None: as long as the trajectory
+    build_run : from a trajectory, how the controller runs it
     suffix : of a program's file
     """
 
     title: str
     interpolation: Interpolation
-    make_program: Callable[[Trajectory, str | None, float], Writer]
-    predict_time: Callable[[Trajectory], ControllerTime] | None = None
+    build_run: Callable[[Trajectory], ControllerRun]
     suffix: str = ".ngc"

@@ -17,8 +17,8 @@ from pydantic import (
 )
 
 from ..errors import suggest
+from ..model.elements import Direction, Drive, Point, Signs, Size
 from ..model.legs import KINDS, Leg
-from ..model.parts import Direction, Drive, Point, Signs, Size
 from .document import YamlList, YamlMap, YamlText
 from .sections import CirclePoints, FileSection
 from .values import DRIVE_TYPES, DirectionValue, Extent, PlacedError, PointValue, WordValue, describe_value, get_context

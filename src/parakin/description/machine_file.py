@@ -13,7 +13,7 @@ from typing import Annotated, Any
 from pydantic import PlainValidator, ValidationError, ValidationInfo
 
 from ..errors import InputError, InputErrors, quote, suggest
-from ..model.parts import Limits
+from ..model.elements import Limits
 from ..model.spec import Spec
 from .document import YamlMap, YamlText, read_document
 from .groups import Legs

@@ -17,7 +17,20 @@ from pydantic import (
 )
 
 from ..errors import quote, suggest
-from ..model.parts import ROTATIONS, TRANSLATIONS, Cone, Direction, Drive, Gap, Limits, Range, Step, Unit, Vector
+from ..model.elements import (
+    MOTION_UNITS,
+    ROTATIONS,
+    TRANSLATIONS,
+    Cone,
+    Direction,
+    Drive,
+    Gap,
+    Limits,
+    Range,
+    Step,
+    Unit,
+    Vector,
+)
 from ..units import ANGLE, LENGTH
 from .document import YamlList, YamlMap, YamlText
 from .values import (
@@ -124,7 +137,7 @@ def _read_step(value: object, info: ValidationInfo) -> Step:
     ((axis, content),) = value.items()
     if axis not in TRANSFORMS:
         raise PlacedError(f"unknown transform {quote(axis)}{suggest(axis, TRANSFORMS)}", axis.line)
-    unit: Unit = "mm" if axis in TRANSLATIONS else "rad"
+    unit = MOTION_UNITS[axis]
     if not isinstance(content, YamlMap):
         return Step(str(axis), read_quantity(content, LENGTH if unit == "mm" else ANGLE, info))
     joint = content.get("joint")

@@ -18,7 +18,7 @@ from pydantic import (
 )
 
 from ..errors import InputError, quote, suggest
-from ..model.parts import Unit, Vector
+from ..model.elements import Unit, Vector
 from ..units import (
     ACCELERATION,
     ANGLE,

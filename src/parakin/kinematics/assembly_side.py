@@ -6,6 +6,7 @@ import numpy as np
 
 from ..arrays import Array, Flags
 from ..kernels.batch import evaluate_tape, evaluate_tape_with_residual
+from ..model.elements import MOTION_UNITS
 from ..model.traces import Model
 from .closure_roots import find_roots
 from .inverse import SINGULAR, solve_inverse
@@ -50,7 +51,9 @@ def bound_determinant(model: Model) -> float:
     joints, count = solve_inverse(model, home, model.mode), len(model.structure.coordinates)
     coordinates = evaluate_tape(model.begin_tape(), home, np.empty((1, count)), joints)
     slopes = evaluate_tape(tape, coordinates, np.empty((1, tape.outputs)), joints)[0, model.leg_count :]
-    scales = np.array([max(model.sizes) if word.startswith("r") else 1.0 for word in model.structure.coordinates])
+    scales = np.array(
+        [max(model.sizes) if MOTION_UNITS[word] == "rad" else 1.0 for word in model.structure.coordinates]
+    )
     return float(np.linalg.norm(slopes.reshape(-1, count) / scales, axis=1).prod() * scales.prod())
 
 

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from ..arrays import Array, Flags
 from ..kernels.batch import NewtonSteps, Roots, evaluate_tape, evaluate_tape_with_residual, solve_by_newton
+from ..model.elements import MOTION_UNITS
 from ..model.traces import Model
 from .tapes import collect_newton_tapes
 from .wrist import SAME_MODE
@@ -24,6 +27,11 @@ def compute_poses(model: Model, coordinates: Array, joints: Array) -> Array:
     return evaluate_tape(model.end_tape(), coordinates, np.empty((len(joints), len(model.axes))), joints)
 
 
+def list_step_caps(coordinates: Sequence[str], size: float) -> list[float]:
+    """List how far one of Newton's steps may go: a third of the greatest leg's size in mm, or half a radian."""
+    return [size / 3.0 if MOTION_UNITS[word] == "mm" else 0.5 for word in coordinates]
+
+
 def find_roots(
     model: Model,
     near: Array,
@@ -39,9 +47,7 @@ def find_roots(
     most : steps; zero only evaluates the start
     side : of the singularities to end on, as :func:`find_sides` gives it; by default that of the start
     """
-    size = max(model.sizes)
-    # A step goes at most a third of the legs' size or half a radian.
-    caps = np.array([size / 3.0 if word.startswith("t") else 0.5 for word in model.structure.coordinates])
+    caps = np.array(list_step_caps(model.structure.coordinates, max(model.sizes)))
     tapes = collect_newton_tapes(model, poses)
     steps = NewtonSteps(caps, min(model.sizes), most, compute_closure_tolerance(model))
     return solve_by_newton(tapes, steps, np.ascontiguousarray(near), joints, np.empty(0) if side is None else side)

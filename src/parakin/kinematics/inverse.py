@@ -6,6 +6,7 @@ import numpy as np
 
 from ..arrays import Array
 from ..kernels.batch import evaluate_tape
+from ..model.elements import MOTION_UNITS
 from ..model.traces import Model
 
 SINGULAR = 1e-9  # of the greatest determinant that rows of the same sizes can have: what is less is rounding
@@ -29,7 +30,7 @@ def measure_regularity(model: Model, poses: Array) -> dict[str, Array]:
     tape, jacobians = model.newton_tape(True), model.jacobian_tape()
     slopes = evaluate_tape(tape, coordinates, np.empty((len(poses), tape.outputs)), joints)
     a = slopes[:, legs:].reshape(-1, legs, count)
-    a = a / np.where([word.startswith("r") for word in model.structure.coordinates], max(model.sizes), 1.0)
+    a = a / np.where([MOTION_UNITS[word] == "rad" for word in model.structure.coordinates], max(model.sizes), 1.0)
     both = evaluate_tape(jacobians, poses, np.empty((len(poses), jacobians.outputs)), joints)
     b = both[:, n * n :].reshape(len(poses), n, -1)[:, :legs, :legs]
     return {"parallel": _compare_determinant(a), "serial": _compare_determinant(b)}

@@ -9,11 +9,11 @@ import numpy as np
 
 from ..arrays import Array, Flags, Indices
 from ..kernels.batch import find_first_negative
-from ..model.structures import compute_tool_axis
 from ..model.traces import Model
 from .closure_roots import compare_with_mode, find_in_mode
 from .solution import ANSWERED, Solution, put_rows, take_rows
 from .turns import wrap_angle
+from .wrist import point_direction
 
 STANDS_IN = 0.5  # of the way to another mode: how near joints must be to tell that a pose's legs stand in a mode
 NEARER = 0.1  # of the way to the answer in the default mode: one in another mode that is nearer is taken instead
@@ -92,8 +92,8 @@ def _measure_way(model: Model, solution: Solution, starts: Array) -> Array:
     way = solution.poses - starts
     way[:, turning] = wrap_angle(way[:, turning])
     if direction is not None:  # how far apart the tool's axes point, however B and C are written
-        one, other = (np.stack(compute_tool_axis(*poses[:, direction.pair].T)[0]) for poses in (solution.poses, starts))
-        way[:, direction.b], way[:, direction.c] = np.linalg.norm(one - other, axis=0), 0.0
+        one, other = (point_direction(*poses[:, direction.pair].T) for poses in (solution.poses, starts))
+        way[:, direction.b], way[:, direction.c] = np.linalg.norm(one - other, axis=1), 0.0
     way[:, turning] *= max(model.sizes)
     length: Array = np.linalg.norm(way, axis=1)
     return length

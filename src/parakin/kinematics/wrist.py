@@ -50,8 +50,8 @@ from numpy.typing import NDArray
 from ..arrays import Array, AxisRange, Flags, Indices
 from ..kernels.batch import evaluate_tape
 from ..kernels.tape import Tape
-from ..model.parts import Drive
-from ..model.structures import DirectionColumns
+from ..model.elements import Drive
+from ..model.structures import DirectionColumns, compute_axis_angles, compute_tool_axis
 from ..model.traces import Model
 from .inverse import solve_inverse
 from .turns import count_nearest_turns, find_nearest_turn, measure_whole_turns, wrap_angle
@@ -138,9 +138,13 @@ def is_on_pole(square: Any, within: float) -> Any:
 
 def solve_direction(k: Array) -> tuple[Array, Array, Flags]:
     """Solve k = Rz(C)·Ry(B)·z, (n, 3), for B from 0 to 180° and C; tell where C is free, to printed digits."""
-    kx, ky, kz = k.T
-    square = kx * kx + ky * ky
-    return np.arctan2(np.sqrt(square), kz), np.arctan2(ky, kx), is_on_pole(square, PRINTED)
+    b, c = compute_axis_angles(list(k.T))
+    return b, c, is_on_pole(k[:, 0] * k[:, 0] + k[:, 1] * k[:, 1], PRINTED)
+
+
+def point_direction(b: Array, c: Array) -> Array:
+    """Compute the tool axes k = Rz(C)·Ry(B)·z, unit vectors (n, 3)."""
+    return np.stack(compute_tool_axis(b, c)[0], axis=-1)
 
 
 def is_upright(b: Array, within: float = EXACT) -> Flags:
@@ -191,7 +195,7 @@ def continue_direction(turns: Array, before: Array) -> None:
 
 def find_nearest_direction(axis: Array, near: Array) -> Array:
     """Find A = 0, B and C (m, 3) that point a tool along ``axis`` (m, 3), of both modes those nearest to others."""
-    b, c = np.arctan2(np.hypot(axis[:, 0], axis[:, 1]), axis[:, 2]), np.arctan2(axis[:, 1], axis[:, 0])
+    b, c = compute_axis_angles(list(axis.T))
     c = np.where(np.sin(b) < EXACT, near[:, 2], c)
     other = flip_direction(c, b)
     modes = [

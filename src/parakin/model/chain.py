@@ -28,7 +28,7 @@ from ..algebra import (
     transpose,
 )
 from ..errors import DescriptionError
-from .parts import ROTATIONS, TRANSLATIONS, Step
+from .elements import ROTATIONS, TRANSLATIONS, Step
 
 UNIT: dict[str, Vec] = {
     word: tuple(1.0 if word[1] == letter else 0.0 for letter in "xyz") for word in (*TRANSLATIONS, *ROTATIONS)

@@ -12,8 +12,8 @@ from math import isfinite
 from typing import Literal
 
 from ..algebra import Mat, Scalar, Vec, add, apply, atan2, cross, dot, maximum, minimum, norm, scale, stop_gradient, sub
+from .elements import MOTION_UNITS, Cone
 from .legs import Leg, Reach
-from .parts import Cone
 from .spec import Spec
 from .structures import PlatformPlacement
 
@@ -113,7 +113,7 @@ def _list_drive_limits(spec: Spec, joints: Sequence[Scalar]) -> Iterator[tuple[L
 
 def _list_passive_limits(spec: Spec, coordinates: Mapping[str, Scalar]) -> Iterator[tuple[Limit, Scalar]]:
     for bound in spec.limits.passive:
-        unit: Literal["mm", "rad"] = "mm" if bound.name.startswith("t") else "rad"
+        unit = MOTION_UNITS[bound.name]
         yield from _list_bounds(
             bound.name, f"passive {bound.name}", unit, coordinates[bound.name], bound.low, bound.high
         )

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
+from .elements import Drive, Limits, Step
 from .legs import Leg
-from .parts import Drive, Limits, Step
 
 
 @dataclass(frozen=True)

@@ -30,6 +30,7 @@ from ..algebra import (
 from ..errors import DescriptionError
 from ..kernels.tape import Tape, compile_tape
 from ..units import AXIS_UNITS
+from .elements import ROTATIONS
 from .legs import Inverse
 from .limits import HomeRods, Limit, compute_platform_points, group_joints_by_leg, list_limits
 from .rates import compute_twist_rates
@@ -150,7 +151,7 @@ class Model:
     @cached_property
     def by_spheres(self) -> bool:
         """True where the direct problem is the common point of spheres or circles: no turns, one rod a leg."""
-        turns = any(word.startswith("r") for word in self.spec.motion)
+        turns = any(word in ROTATIONS for word in self.spec.motion)
         held = [leg.sphere([0.0] * len(leg.drives)) is not None for leg in self.spec.legs]
         return not turns and all(held) and len(held) in CENTRES_NEEDED
 

@@ -10,8 +10,8 @@ import numpy as np
 
 from ..errors import NoMethodError, PoseError
 from ..machine import Machine
+from ..model.elements import Direction, Drive, Point, Signs, Size
 from ..model.legs.slider import Slider
-from ..model.parts import Direction, Drive, Point, Signs, Size
 from ..model.spec import Spec
 from ..workspaces.certified.region import FAR, make_region
 from .certified.proofs import Proof, make_pose_box, prove_amplification

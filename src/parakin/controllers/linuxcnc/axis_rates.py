@@ -8,7 +8,7 @@ import numpy as np
 
 from ...arrays import Array
 from ...machine import Machine
-from ...model.parts import Drive
+from ...model.elements import Drive
 
 # Speed and acceleration where a machine's description leaves them open, by the drive's unit; mm, rad and s.
 SPEED = {"mm": 200.0, "rad": pi / 3.0}

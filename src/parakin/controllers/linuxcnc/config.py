@@ -6,7 +6,7 @@ from collections.abc import Iterable, Iterator
 from math import isfinite
 
 from ...machine import Machine
-from ...model.parts import Drive
+from ...model.elements import Drive
 from ...units import to_display
 from .axis_ranges import estimate_axis_ranges
 from .axis_rates import choose_drive_rates, choose_unit_rates, find_slowest_drive

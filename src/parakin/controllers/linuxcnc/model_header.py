@@ -11,7 +11,7 @@ from ...algebra import Scalar, Trace, absolute
 from ...arrays import Array
 from ...kernels.newton import SLOW, WORTH
 from ...kernels.tape import Tape, compile_tape
-from ...kinematics.closure_roots import MOST_STEPS
+from ...kinematics.closure_roots import MOST_STEPS, list_step_caps
 from ...kinematics.forward import STEADY
 from ...kinematics.start_modes import SETTLED
 from ...kinematics.turns import TURN
@@ -179,13 +179,12 @@ def _scale_reach(limit: Limit) -> float:
 def _write_newton(machine: Machine) -> Iterator[str]:
     tapes = machine.tapes(machine.mode)
     if tapes.newton is not None:
-        most = max(machine.leg_sizes)
         yield f"#define FINE {format_c(0.01 * machine.closure_tolerance)} /* mm: where Newton's method has arrived */"
         worth = format_c(WORTH)
         yield f"#define WORTH {worth} /* mm: where a step will end no worse than this, the matrix serves on */"
         yield f"#define SLOW {format_c(SLOW)} /* a kept matrix that gains less than this a step is made anew */"
         yield f"#define MOST_STEPS {MOST_STEPS}"
-        caps = [most / 3.0 if word.startswith("t") else 0.5 for word in tapes.coordinates]
+        caps = list_step_caps(tapes.coordinates, max(machine.leg_sizes))
         yield _write_array("double", "caps", [format_c(cap) for cap in caps]) + " /* greatest step */"
 
 

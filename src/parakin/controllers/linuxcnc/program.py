@@ -16,11 +16,13 @@ from ...machine import Machine
 from ...toolpath.posting.setup_texts import describe_setup
 from ...toolpath.timing.corners import check_tolerance
 from ...toolpath.timing.trajectory import Trajectory
+from ..controller import ControllerRun
 from ..event_lines import check_events, format_events
 from ..gcode_text import CHUNK, format_blocks, format_comments, join_lines, to_display
 from .approach import plan_approach
 from .axis_ranges import TURNS
 from .axis_rates import choose_axis_rates
+from .lost_time import note_lost_time
 from .straight_motions import StraightMotions, build_straight_motions
 
 _TURNING = 0.4  # fraction of the tolerance where two motions turn the tool: LinuxCNC blends them less well
@@ -39,17 +41,40 @@ def make_linuxcnc_program(trajectory: Trajectory, *, forced: str | None = None, 
     Every motion is in the machine's own coordinates (G53), whatever offsets are in force, and in inverse time (G93).
     Records at one place are written once; where the trajectory's speed changes points are added on the straight line.
     The program begins with a slow motion to the first record and from there takes
-    :func:`~.predicted_time.predict_linuxcnc_seconds`.
+    :func:`predict_linuxcnc_seconds`.
 
     Raises :class:`PoseError` where LinuxCNC's kinematics can't follow: another working mode, or too many turns of C.
     """
+    return _make_program(trajectory, _build_motions(trajectory), forced, tolerance)
+
+
+@check_arguments
+def predict_linuxcnc_seconds(trajectory: Trajectory) -> float:
+    """Predict what LinuxCNC takes for a program from the first record on, s: the trajectory's time and more."""
+    return _build_motions(trajectory).total_seconds
+
+
+def build_linuxcnc_run(trajectory: Trajectory) -> ControllerRun:
+    """Build LinuxCNC's motions for a trajectory once, for the time that they take and for the program."""
+    motions = _build_motions(trajectory)
+    return ControllerRun(
+        lambda forced, tolerance: _make_program(trajectory, motions, forced, tolerance),
+        motions.total_seconds,
+        tuple(note_lost_time(trajectory, motions)),
+    )
+
+
+def _build_motions(trajectory: Trajectory) -> StraightMotions:
+    return build_straight_motions(trajectory, *choose_axis_rates(trajectory.posted.machine))
+
+
+def _make_program(trajectory: Trajectory, motions: StraightMotions, forced: str | None, tolerance: float) -> Writer:
     machine, posted = trajectory.posted.machine, trajectory.posted
     check_tolerance(tolerance, "tolerance")
     legs = posted.mode if machine.wrist is None else get_leg_signs(posted.mode)  # a wrist goes on in either mode
     if not machine.mode.startswith(legs):
         raise PoseError(f"mode {posted.mode!r}: LinuxCNC's kinematics of {machine.name} has {machine.mode!r} only")
     _refuse_turns(machine, posted.poses)
-    motions = build_straight_motions(trajectory, *choose_axis_rates(machine))
     blend = tolerance * (_TURNING if machine.turning_columns else 1.0)
     approach = plan_approach(machine, trajectory.curve.corner[0], trajectory.joint_path.joints[0], posted.mode)
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ...toolpath.placing.outside import Outside, describe_outside, format_option
-from ...units import name_display_unit, to_display
+from ...units import AXIS_UNITS, name_display_unit, to_display
 from .offence import encode_offence
 
 if TYPE_CHECKING:
@@ -74,7 +74,7 @@ def _encode_outside(outside: Outside) -> dict[str, Any]:
     def encode_bounds(bounds: Array) -> dict[str, list[float]]:
         return {letter: ends.tolist() for letter, ends in zip("XYZ", bounds.T, strict=True) if ends[0] == ends[0]}
 
-    values = {axis: to_display(value, "mm" if axis in "XYZ" else "rad") for axis, value in outside.workpiece.items()}
+    values = {axis: to_display(value, AXIS_UNITS[axis]) for axis, value in outside.workpiece.items()}
     return {
         "text": describe_outside(outside),
         "path": encode_bounds(outside.path),
@@ -113,9 +113,7 @@ def encode_joint_ranges(posted: Posted) -> list[dict[str, Any]]:
 
 def _encode_placement(placement: Placement) -> dict[str, Any]:
     return {
-        "workpiece": {
-            axis: to_display(value, "mm" if axis in "XYZ" else "rad") for axis, value in placement.values.items()
-        },
+        "workpiece": {axis: to_display(value, AXIS_UNITS[axis]) for axis, value in placement.values.items()},
         "margin": placement.margin,
         "limit": placement.limit,
         "record": placement.record,

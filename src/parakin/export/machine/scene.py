@@ -17,8 +17,8 @@ from numpy.typing import ArrayLike, NDArray
 from ...arguments import RowsLike
 from ...machine import Machine
 from ...model.chain import UNIT, compose_chain
+from ...model.elements import Step
 from ...model.legs import Leg
-from ...model.parts import Step
 from ...model.structures import PlatformPlacement
 
 Points = NDArray[np.float64]

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ...arrays import Array, Flags, Indices
+from ...kinematics.wrist import point_direction, solve_direction
 from ...machine import Machine
 from ...toolpath.posting.range_use import compute_relative_margin
 from ..machine.figures import (
@@ -237,6 +238,6 @@ def _average_pose(machine: Machine, poses: Array) -> Array:
             pose[machine.axes.index(letter)] = 0.5 * (column.min() + column.max())
     if machine.direction is not None:
         b, c = real[:, machine.direction.pair].T
-        k = np.array([(np.sin(b) * np.cos(c)).mean(), (np.sin(b) * np.sin(c)).mean(), np.cos(b).mean()])
-        pose[machine.direction.pair] = np.arctan2(np.hypot(k[0], k[1]), k[2]), np.arctan2(k[1], k[0])
+        k = point_direction(b, c).mean(axis=0)
+        pose[machine.direction.pair] = np.concatenate(solve_direction(k[None])[:2])
     return pose

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from ...algebra import Scalar, Vec, dot, sub
-from ..parts import Drive, Point, Unit
+from ..elements import Drive, Point, Unit
 
 
 @dataclass(frozen=True)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from ...algebra import Scalar, Vec, atan2, sincos, sqrt
-from ..parts import Signs, Size
+from ..elements import Signs, Size
 from .base import Inverse, Leg, Reach
 
 

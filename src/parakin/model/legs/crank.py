@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from ...algebra import Scalar, Vec, add, atan2, cross, dot, scale, sincos, sqrt, sub
-from ..parts import Direction, Point, Signs, Size
+from ..elements import Direction, Point, Signs, Size
 from .base import Inverse, Leg, Reach, close_rod
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from ...algebra import Scalar, Vec, norm, sub
-from ..parts import Point
+from ..elements import Point
 from .base import Inverse, Leg, close_rod
 
 

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from ...errors import DescriptionError
-from ..parts import ROTATIONS, TRANSLATIONS
+from ..elements import ROTATIONS, TRANSLATIONS
 from ..spec import Spec
 from .base import DirectionColumns, PlatformPlacement, Structure
 from .carried import Carried
 from .central_leg import CentralLeg
-from .five_axis import compute_tool_axis
+from .five_axis import compute_axis_angles, compute_tool_axis
 from .free import Free
 
 __all__ = [
@@ -18,6 +18,7 @@ __all__ = [
     "Free",
     "PlatformPlacement",
     "Structure",
+    "compute_axis_angles",
     "compute_tool_axis",
     "make_structure",
 ]

@@ -15,8 +15,8 @@ from typing import Literal, NamedTuple
 
 from ...algebra import IDENTITY, ORIGIN, Mat, Scalar, Vec, norm
 from ..chain import UNIT, Pointing, compose_chain
+from ..elements import TRANSLATIONS
 from ..legs.lambda_ import Lambda
-from ..parts import TRANSLATIONS
 from ..spec import Spec
 
 # Axis letters of a pose, ISO 841, by the elementary transforms that move along and about them.

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from ...algebra import IDENTITY, Mat, Scalar, Vec, add, apply, sub, transpose
 from ..chain import UNIT, Pointing, compose_chain, invert_rotations, transform_to_local
-from ..parts import TRANSLATIONS
+from ..elements import TRANSLATIONS
 from ..spec import Spec
 from .base import PlatformPlacement
 from .five_axis import FiveAxis, compute_axis_angles, turn_tool_axis

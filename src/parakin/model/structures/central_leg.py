@@ -28,7 +28,7 @@ from ...algebra import (
 )
 from ...errors import DescriptionError
 from ..chain import UNIT, Pointing, compose_chain, make_rotation_about, transform_to_local
-from ..parts import ROTATIONS, Step
+from ..elements import ROTATIONS, Step
 from ..spec import Spec
 from .base import PlatformPlacement
 from .five_axis import FiveAxis, compute_axis_angles, turn_tool_axis

@@ -11,7 +11,7 @@ from ...algebra import IDENTITY, Mat, Scalar, Vec, add, apply, atan2, product, s
 from ...algebra import make_axis_rotation as turned
 from ...errors import DescriptionError
 from ..chain import UNIT, compose_chain, transform_to_local
-from ..parts import ROTATIONS, TRANSLATIONS
+from ..elements import ROTATIONS, TRANSLATIONS
 from ..spec import Spec
 from .base import LETTERS, PlatformPlacement, Structure
 

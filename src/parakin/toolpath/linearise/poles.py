@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...arrays import Array
+from ...kinematics.wrist import solve_direction
 from ...machine import Machine
 from ..posting.posted import Posted
 from .deviation import Interpolation
@@ -92,11 +93,10 @@ class Pole:
         """Compute the rotations (m, 3, 3) in M of the frame that carries the pole."""
         if not self.moves:
             return np.broadcast_to(np.eye(3), (len(tip), 3, 3))
-        kx, ky, kz = axis.T
-        pose = [*tip.T, np.arctan2(np.hypot(kx, ky), kz), np.arctan2(ky, kx)]
+        pose = [*tip.T, *solve_direction(axis)[:2]]
         with np.errstate(divide="ignore", invalid="ignore"):
             rotation = self.machine.structure.turn_first_axis(pose)
-        return np.stack([np.stack(np.broadcast_arrays(*row, kx)[:3], axis=-1) for row in rotation], axis=-2)
+        return np.stack([np.stack(np.broadcast_arrays(*row, axis[:, 0])[:3], axis=-1) for row in rotation], axis=-2)
 
 
 def find_poles(machine: Machine, interpolation: Interpolation, has_turns: bool) -> list[Pole]:

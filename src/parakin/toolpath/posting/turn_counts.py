@@ -10,7 +10,7 @@ import numpy as np
 from ...arrays import Array, Flags
 from ...kinematics.turns import TURN
 from ...machine import Machine
-from ...model.parts import Drive
+from ...model.elements import Drive
 from .margin_blocks import split_margins
 
 _MOST_OFF = 9  # counts of turns that are tried where none fits

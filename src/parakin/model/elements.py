@@ -1,4 +1,4 @@
-"""The parts a machine is made of, as plain frozen data: drives, elementary transforms, limits.
+"""The elements of a machine, as plain frozen data: drives, elementary transforms, limits.
 
 Lengths are mm, angles rad, speeds mm/s or rad/s, accelerations mm/s² or rad/s², jerks mm/s³ or rad/s³. Machine files
 are read into these by :mod:`parakin.description`; nothing here knows a file.
@@ -21,6 +21,7 @@ Signs = NewType("Signs", str)  # a working mode: one of "+" and "-" for each cho
 
 TRANSLATIONS = ("tx", "ty", "tz")
 ROTATIONS = ("rx", "ry", "rz")
+MOTION_UNITS: dict[str, Unit] = {**dict.fromkeys(TRANSLATIONS, "mm"), **dict.fromkeys(ROTATIONS, "rad")}
 
 
 @dataclass(frozen=True)

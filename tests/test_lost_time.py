@@ -7,7 +7,7 @@ import pytest
 
 import parakin as pk
 from parakin.cli import main
-from parakin.controllers.linuxcnc.predicted_time import predict_linuxcnc_time
+from parakin.controllers import load_controller
 from parakin.toolpath.path import ToolPath
 
 
@@ -21,7 +21,7 @@ def path_of(tip, axis=None):
 def test_no_words_where_the_times_agree():
     machine = pk.load("linear_delta")
     job = pk.prepare(machine, path_of([[0, 0, 280], [60, 0, 280], [60, 60, 280]]))
-    told = predict_linuxcnc_time(job.trajectory)
+    told = load_controller("linuxcnc").build_run(job.trajectory)
     assert told.seconds == pk.predict_linuxcnc_seconds(job.trajectory) < 1.5 * job.trajectory.seconds
     assert told.notes == ()
 
@@ -33,7 +33,7 @@ def test_the_line_that_costs_the_time_is_named_with_its_reason():
     turned = np.radians([0.0, 0.0, 90.0, 90.0])
     axis = np.column_stack([np.sin(tilt) * np.cos(turned), np.sin(tilt) * np.sin(turned), np.cos(tilt)])
     job = pk.prepare(machine, path_of(begin + np.outer([0, 100, 102, 202], [1.0, 0.0, 0.0]), axis))
-    told = predict_linuxcnc_time(job.trajectory)
+    told = load_controller("linuxcnc").build_run(job.trajectory)
     if told.seconds <= 1.5 * job.trajectory.seconds:
         assert not told.notes
         return

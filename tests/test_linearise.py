@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 
 import parakin as pk
 from parakin.toolpath.linearise.linearise import linearise_path
-from parakin.toolpath.linearise.path_records import insert_records
+from parakin.toolpath.linearise.path_records import divide_motions
 from parakin.toolpath.path import Event
 from parakin.toolpath.posting.post import post_path
 from parakin.toolpath.programmed_path import ProgrammedPath
@@ -88,7 +88,7 @@ def test_no_point_can_be_spared(name, under):
     assert count > 1
     for j in range(1, count + 1):
         assert within(posted, without(posted, result, j), under, chord, angle) > 1.0
-    even = insert_records(posted.path, np.ones(count - 1, int), np.arange(1, count) / count)
+    even = divide_motions(posted.path, np.ones(count - 1, int), np.arange(1, count) / count)
     assert within(posted, post_path(machine, even), under, chord, angle) > 1.0
 
 

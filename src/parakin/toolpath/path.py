@@ -1,9 +1,11 @@
-"""The neutral tool path: every reader returns one, and all further work starts from it."""
+"""The neutral tool path: every reader returns one, all further work starts from it, and records are inserted here."""
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Literal, NamedTuple
+
+import numpy as np
 
 from ..arrays import Array, Flags, Indices
 from ..errors import quote
@@ -102,3 +104,38 @@ class ToolPath:
 
     def __repr__(self) -> str:
         return f"<parakin tool path {quote(self.source)}: {len(self)} records, {self.dialect}>"
+
+
+# What stands in a path once a record: its columns.
+_COLUMNS = ("tip", "axis", "line", "rapid", "feed", "spindle", "turns", "seconds", "extension")
+
+
+def insert_records(
+    path: ToolPath, at: Indices, values: Mapping[str, Array | Indices | Flags | None], ahead: Indices | None = None
+) -> ToolPath:
+    """Insert m records into a path of n, before its records ``at`` (m,), ascending.
+
+    Parameters
+    ----------
+    values : by name, columns of the new records, m rows each; None for one that the path does not have. In a column
+        that is not named they are like the record they stand before, but no time is known of the motion to them
+    ahead : (n + 1,) how many of the new records stand ahead of the events and tools at each old record, and at the
+        end; by default all that are inserted before it
+    """
+    columns = {name: getattr(path, name) for name in _COLUMNS if getattr(path, name) is not None}
+    new = {name: column[at] for name, column in columns.items()} | {"seconds": np.full(len(at), np.nan)} | dict(values)
+    if ahead is None:
+        ahead = np.searchsorted(at, np.arange(len(path) + 1), side="right")
+    places = (np.arange(len(path) + 1) + ahead).tolist()
+    return replace(
+        path,
+        **{name: np.insert(column, at, new[name], axis=0) for name, column in columns.items()},
+        events=tuple(event._replace(record=places[event.record]) for event in path.events),
+        tools=tuple(use._replace(record=places[use.record]) for use in path.tools),
+    )
+
+
+def select_records(path: ToolPath, records: Indices) -> ToolPath:
+    """Select records of a path as positions: without the motions between them, their times, events, tools and notes."""
+    columns = {name: getattr(path, name)[records] for name in _COLUMNS if getattr(path, name) is not None}
+    return replace(path, **(columns | {"seconds": None}), events=(), notes=(), tools=())

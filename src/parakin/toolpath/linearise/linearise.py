@@ -14,7 +14,7 @@ from ..programmed_path import ProgrammedPath
 from ..timing.corners import check_tolerance
 from .deviation import ALLOWED, SHARES, Deviation, Interpolation
 from .path_cuts import PathCuts, PathPositions, find_cuts, select_spans
-from .path_records import insert_records, repost_path
+from .path_records import divide_motions, repost_path
 from .pole_passes import lead_through_poles
 from .pole_swings import note_swings_of_passes
 
@@ -72,7 +72,7 @@ def linearise_path(
             swings = [*led.notes, *note_swings_of_passes(led.passes, posted, positions)]
             return _add_notes(posted, swings)
         cuts = _cut_motions(deviation, posted, positions, deviating)
-        before, posted = posted, repost_path(posted, insert_records(posted.path, cuts.motion, cuts.share))
+        before, posted = posted, repost_path(posted, divide_motions(posted.path, cuts.motion, cuts.share))
         positions = positions.insert(cuts.motion, cuts.share)
         doubtful = _find_changed_motions(before, posted, cuts.motion) & _find_sound_motions(posted)
     raise _make_hopeless_error(posted.path, int(deviating[0]))

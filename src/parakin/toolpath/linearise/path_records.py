@@ -1,4 +1,4 @@
-"""Change the records of a tool path: insert records, replace tool axes, and post the changed path."""
+"""Change a tool path between posts: divide its motions, replace tool axes, and post the changed path."""
 
 from __future__ import annotations
 
@@ -6,16 +6,16 @@ from dataclasses import replace
 
 import numpy as np
 
-from ...arrays import Array, Flags, Indices
+from ...arrays import Array, Indices
 from ...kinematics.wrist import find_nearest_direction
-from ..path import ToolPath
+from ..path import ToolPath, insert_records
 from ..posting.post import post_path
 from ..posting.posted import Posted
 from ..programmed_path import ProgrammedPath
 
 
-def insert_records(path: ToolPath, motion: Indices, share: Array) -> ToolPath:
-    """Insert records into motions of a path, each with the line, the feed and the rest of its motion's record.
+def divide_motions(path: ToolPath, motion: Indices, share: Array) -> ToolPath:
+    """Divide motions of a path by records, each with the line, the feed and the rest of its motion's record.
 
     Parameters
     ----------
@@ -23,37 +23,25 @@ def insert_records(path: ToolPath, motion: Indices, share: Array) -> ToolPath:
     motion, share : (m,) where: motions in ascending order, by the record they lead to, and shares of them in ascending
         order within each
 
-    The time of a motion is divided in proportion; a part of no length has none. Events keep their place before the
+    The time of a motion is divided in proportion; a section of no length has none. Events keep their place before the
     motion.
     """
     if not len(motion):
         return path
     programmed = ProgrammedPath(path)
     tip, axis = programmed.interpolate(motion, share)
-    turns = programmed.interpolate_turns(motion, share)
-    source = np.insert(np.arange(len(path)), motion, motion)
-    added = np.insert(np.zeros(len(path), bool), motion, True)
-    before = np.cumsum(np.bincount(motion, minlength=len(path) + 1))  # new records ahead of each old one
-    first = np.arange(len(path) + 1) + np.concatenate([[0], before[:-1]])  # where the motion to a record begins
-    seconds = path.seconds
-    if seconds is not None:
-        end = np.insert(np.ones(len(path)), motion, share)
-        begin = np.where(np.append(False, source[1:] == source[:-1]), np.append(0.0, end[:-1]), 0.0)
-        seconds = np.where(end > begin, seconds[source] * (end - begin), np.nan)
-    return replace(
-        path,
-        tip=_insert_rows(path.tip, source, added, tip),
-        axis=_insert_rows(path.axis, source, added, axis),
-        line=path.line[source],
-        rapid=path.rapid[source],
-        feed=path.feed[source],
-        spindle=path.spindle[source],
-        events=tuple(event._replace(record=int(first[event.record])) for event in path.events),
-        turns=None if path.turns is None or turns is None else _insert_rows(path.turns, source, added, turns),
-        seconds=seconds,
-        tools=tuple(use._replace(record=int(first[use.record])) for use in path.tools),
-        extension=_insert_extension(programmed, motion, share, source, added),
-    )
+    extension = programmed.interpolate_extension(motion, share)
+    values = {"tip": tip, "axis": axis, "turns": programmed.interpolate_turns(motion, share), "extension": extension}
+    ahead = np.searchsorted(motion, np.arange(len(path) + 1))
+    divided = insert_records(path, motion, values, ahead)
+    return divided if path.seconds is None else replace(divided, seconds=_divide_seconds(path.seconds, motion, share))
+
+
+def _divide_seconds(seconds: Array, motion: Indices, share: Array) -> Array:
+    source = np.insert(np.arange(len(seconds)), motion, motion)
+    end = np.insert(np.ones(len(seconds)), motion, share)
+    begin = np.where(np.append(False, source[1:] == source[:-1]), np.append(0.0, end[:-1]), 0.0)
+    return np.where(end > begin, seconds[source] * (end - begin), np.nan)
 
 
 def replace_axes(path: ToolPath, record: Indices, axis: Array) -> ToolPath:
@@ -75,20 +63,3 @@ def replace_axes(path: ToolPath, record: Indices, axis: Array) -> ToolPath:
 def repost_path(posted: Posted, path: ToolPath) -> Posted:
     """Post another path in the frame and mode of a posted one."""
     return post_path(posted.machine, replace(path, frame=None), workpiece=posted.frame, mode=posted.mode)
-
-
-def _insert_extension(
-    programmed: ProgrammedPath, motion: Indices, share: Array, source: Indices, added: Flags
-) -> Array | None:
-    if programmed.extension is None:
-        return None
-    spread = programmed.extension[source]
-    spread[added] = programmed.interpolate_extension(motion, share)
-    return spread
-
-
-def _insert_rows(rows: Array, source: Indices, added: Flags, new: Array) -> Array:
-    """Spread rows as ``source`` says, with the new ones where records are added."""
-    spread = rows[source]
-    spread[added] = new
-    return spread

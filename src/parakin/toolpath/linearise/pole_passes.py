@@ -13,7 +13,7 @@ from ..posting.posted import Posted
 from ..programmed_path import ProgrammedPath
 from .deviation import ALLOWED, SHARES, Deviation
 from .path_cuts import PathPositions, select_spans
-from .path_records import insert_records, replace_axes, repost_path
+from .path_records import divide_motions, replace_axes, repost_path
 from .pole_holds import PoleHold, find_held_steps, find_pole_holds, is_apart, note_holds
 from .pole_routing import PolePass, PoleRoute, find_pole_routes, locate_pass
 from .pole_steps import PoleSteps, find_pole_steps
@@ -169,7 +169,7 @@ def _insert_records_at_poles(deviation: Deviation, led: PolePasses, crossings: l
         motions, shares = np.array([record[0] for record in added]), np.array([record[1] for record in added])
         axes = np.array([record[2] for record in added]) @ path.rotation
         led.positions = led.positions.insert(motions, shares)
-        denser_path = insert_records(posted.path, motions, shares)
+        denser_path = divide_motions(posted.path, motions, shares)
         led.posted = repost_path(posted, replace_axes(denser_path, motions + np.arange(len(motions)), axes))
 
 

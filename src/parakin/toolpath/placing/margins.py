@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
 
@@ -12,7 +12,7 @@ from ...arrays import Array, Flags, Indices
 from ...kinematics.turns import TURN
 from ...kinematics.wrist import PRINTED
 from ...machine import Machine
-from ..path import ToolPath
+from ..path import ToolPath, select_records
 from ..posting.frames import PathLimit, build_frame_from_angles, compose_frames, compute_poses
 from ..posting.margin_blocks import split_margins
 from ..posting.path_samples import SampledPath, sample_path
@@ -76,7 +76,7 @@ class PlacementMargins:
         track : records along which the joints go on, these ``records`` among them; None: they go on from each of these
             records to the next, and turning joints are brought to the middle of their ranges
         """
-        path = _select_records(self.path, records if track is None else track)
+        path = select_records(self.path, records if track is None else track)
         rows = slice(None) if track is None else np.searchsorted(track, records)
         all_poses, all_joints, path_rows = [], [], []
         for point in points:
@@ -154,13 +154,6 @@ class PlacementMargins:
                 turned = TURN * np.round((margins[:, high] - margins[:, low]) / (2.0 * TURN))
                 margins[:, low] += turned
                 margins[:, high] -= turned
-
-
-def _select_records(path: ToolPath, records: Indices) -> ToolPath:
-    columns = {name: getattr(path, name)[records] for name in ("tip", "axis", "line", "rapid", "feed", "spindle")}
-    turns = None if path.turns is None else path.turns[records]
-    extension = None if path.extension is None else path.extension[records]
-    return replace(path, **columns, turns=turns, seconds=None, events=(), notes=(), tools=(), extension=extension)
 
 
 def _list_path_rows(limits: tuple[PathLimit, ...], records: Indices | slice) -> Array:

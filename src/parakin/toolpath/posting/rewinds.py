@@ -20,7 +20,7 @@ from ...kinematics.rotations import collect_turns
 from ...kinematics.turns import TURN, fill_free
 from ...kinematics.wrist import NEAR_TURN, continue_turns, find_nearest_direction
 from ...machine import Machine
-from ..path import Note, ToolPath
+from ..path import Note, ToolPath, insert_records
 from ..programmed_path import compute_tool_axes
 from .post import post_path
 from .posted import Posted
@@ -187,7 +187,7 @@ class _RewindBuilder:
             start, before = rewind.record, after
             end = int(self.ends[after - int(self.counts[0]), start])
         notes = [*(rewind.describe() for rewind in rewinds), *notes]
-        path = replace(_insert_rows(self.path, added), notes=(*self.path.notes, *notes))
+        path = replace(_insert_rewinds(self.path, added), notes=(*self.path.notes, *notes))
         return RewoundPath(path, tuple(rewinds))
 
     def _find_rewind(self, start: int, end: int, before: int) -> tuple[Rewind, _Records, int] | None:
@@ -250,7 +250,7 @@ class _RewindBuilder:
         return axes
 
 
-def _insert_rows(path: ToolPath, added: list[tuple[int, _Records]]) -> ToolPath:
+def _insert_rewinds(path: ToolPath, added: list[tuple[int, _Records]]) -> ToolPath:
     """Insert records into a path, each with the line, the feed and the spindle of the record that it stands before.
 
     Turns that the path gives go on from those of the record before, and what follows goes on from them.
@@ -259,23 +259,18 @@ def _insert_rows(path: ToolPath, added: list[tuple[int, _Records]]) -> ToolPath:
         return path
     at = np.concatenate([np.full(len(records.rapid), record) for record, records in added])
     tip, axis, rapid = (np.concatenate(rows) for rows in zip(*(records for _, records in added), strict=True))
-    seconds = path.seconds
-    feed = path.feed if seconds is None else _fill_feeds(path)
-    shift = np.searchsorted(at, np.arange(len(path) + 1), "right").tolist()
-    return replace(
-        path,
-        tip=np.insert(path.tip, at, tip, axis=0),
-        axis=np.insert(path.axis, at, axis, axis=0),
-        line=np.insert(path.line, at, path.line[at]),
-        rapid=np.insert(path.rapid, at, rapid),
-        feed=np.insert(path.feed, at, np.where(rapid, path.feed[at], feed[at])),
-        spindle=np.insert(path.spindle, at, path.spindle[at]),
-        events=tuple(event._replace(record=event.record + shift[event.record]) for event in path.events),
-        tools=tuple(use._replace(record=use.record + shift[use.record]) for use in path.tools),
-        extension=None if path.extension is None else np.insert(path.extension, at, path.extension[at - 1]),
-        turns=None if path.turns is None else _insert_turns(path.turns, at, axis),
-        seconds=None if seconds is None else np.insert(seconds, at, np.nan),
-    )
+    feed = path.feed if path.seconds is None else _fill_feeds(path)
+    values = {
+        "tip": tip,
+        "axis": axis,
+        "rapid": rapid,
+        "feed": np.where(rapid, path.feed[at], feed[at]),
+        "extension": None if path.extension is None else path.extension[at - 1],
+    }
+    if path.turns is None:
+        return insert_records(path, at, values)
+    turns = _insert_turns(path.turns, at, axis)
+    return replace(insert_records(path, at, values), turns=turns)
 
 
 def _fill_feeds(path: ToolPath) -> Array:

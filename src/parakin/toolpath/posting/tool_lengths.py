@@ -19,7 +19,7 @@ from ...arguments import check_arguments
 from ...arrays import Array, Flags, Indices
 from ...errors import InputError, PoseError
 from ...machine import Machine
-from ..path import Note, ToolPath, ToolUse
+from ..path import Note, ToolPath, ToolUse, insert_records
 from .frames import compose_frames, compute_poses
 
 ToolLength: TypeAlias = float | Literal["file", "machine"] | None
@@ -72,12 +72,12 @@ def fit_tool_lengths(
     extension = np.zeros(len(path))
     for use in uses:
         extension[use.record :] = use.length - own
-    path = replace(path, tools=uses, fitted_length=own, notes=(*path.notes, *_note_lengths(path, uses, own)))
-    path, extension = _insert_changes(machine, path, extension, workpiece)
+    notes = (*path.notes, *_note_lengths(path, uses, own))
+    path = _insert_changes(machine, replace(path, tools=uses, fitted_length=own, notes=notes), extension, workpiece)
     path = replace(path, notes=(*path.notes, *_note_standing_spindle(path)))
-    if not extension.any():
-        return path
-    return replace(path, tip=path.tip + extension[:, None] * path.axis, extension=extension)
+    if path.extension is None or not path.extension.any():
+        return replace(path, extension=None)
+    return replace(path, tip=path.tip + path.extension[:, None] * path.axis)
 
 
 def _choose_lengths(machine: Machine, path: ToolPath, length: ToolLength) -> list[float]:
@@ -161,10 +161,11 @@ def _note_standing_spindle(path: ToolPath) -> list[Note]:
     return notes
 
 
-def _insert_changes(
-    machine: Machine, path: ToolPath, extension: Array, workpiece: Array | None
-) -> tuple[ToolPath, Array]:
-    """Insert the motions at tool changes: out along the axis with the old tool, and to where the next one goes on."""
+def _insert_changes(machine: Machine, path: ToolPath, extension: Array, workpiece: Array | None) -> ToolPath:
+    """Insert the motions at tool changes: out along the axis with the old tool, and to where the next one goes on.
+
+    extension : (n,) of the tools, mm; the path that is returned has them, its tips are not moved by them
+    """
     source, lift, events_at = list[int](), list[float](), dict[int, int]()
     added = 0
     begins = {use.record: use for use in path.tools if use.changed and 0 < use.record < len(path)}
@@ -183,11 +184,9 @@ def _insert_changes(
         lift += [value for pair in lifts for value in pair]
         events_at[record] = added + (1 if lifts else 0)
         added += len(lifts)
-    if not source:
-        return path, extension
     at = np.array(source, np.int64)
     new, height = np.array(lift).reshape(-1, 2).T
-    return _insert_lifts(path, extension, at, new > 0.0, height, events_at)
+    return _insert_lifts(replace(path, extension=extension), at, new > 0.0, height, events_at)
 
 
 def _choose_clearance(machine: Machine, path: ToolPath, record: int, height: float, workpiece: Array | None) -> float:
@@ -201,38 +200,24 @@ def _choose_clearance(machine: Machine, path: ToolPath, record: int, height: flo
     return float(clearances[allowed.argmax()])
 
 
-def _insert_lifts(
-    path: ToolPath, extension: Array, at: Indices, new: Flags, height: Array, events_at: dict[int, int]
-) -> tuple[ToolPath, Array]:
+def _insert_lifts(path: ToolPath, at: Indices, new: Flags, height: Array, events_at: dict[int, int]) -> ToolPath:
     """Insert rapid records before records ``at``: above the record before, by ``height`` along its axis.
 
     new : whether with the next tool
     events_at : by record, how many of all inserted records come before its events
     """
     last = at - 1
-    own = np.where(new, at, last)
-
-    def insert(rows: Array, values: Array) -> Array:
-        return np.insert(rows, at, values, axis=0)
-
-    before = np.searchsorted(at, np.arange(len(path) + 1), side="right")
-
-    def move(record: int) -> int:
-        return record + int(events_at.get(record, before[record]))
-
-    tip = path.tip[last] + height[:, None] * path.axis[last]
+    own = np.where(new, at, last)  # the record that has the tool
     line = np.array([next(use.line for use in path.tools if use.record == r) for r in at.tolist()], np.int64)
-    changed = replace(
-        path,
-        tip=insert(path.tip, tip),
-        axis=insert(path.axis, path.axis[last]),
-        line=np.insert(path.line, at, np.where(line > 0, line, path.line[at])),
-        rapid=np.insert(path.rapid, at, True),
-        feed=insert(path.feed, path.feed[at]),
-        spindle=insert(path.spindle, path.spindle[own]),
-        turns=None if path.turns is None else insert(path.turns, path.turns[last]),
-        seconds=None if path.seconds is None else insert(path.seconds, np.full(len(at), np.nan)),
-        events=tuple(event._replace(record=move(event.record)) for event in path.events),
-        tools=tuple(use._replace(record=move(use.record)) for use in path.tools),
-    )
-    return changed, insert(extension, extension[own])
+    values = {
+        "tip": path.tip[last] + height[:, None] * path.axis[last],
+        "axis": path.axis[last],
+        "line": np.where(line > 0, line, path.line[at]),
+        "rapid": np.ones(len(at), np.bool_),
+        "spindle": path.spindle[own],
+        "turns": None if path.turns is None else path.turns[last],
+        "extension": None if path.extension is None else path.extension[own],
+    }
+    ahead = np.searchsorted(at, np.arange(len(path) + 1), side="right")
+    ahead[list(events_at)] = list(events_at.values())
+    return insert_records(path, at, values, ahead)

@@ -15,7 +15,7 @@ ROOT = Path(parakin.__file__).parent
 # From the ground up. What stands on one line knows nothing of each other.
 FLOORS = [
     ["errors", "arrays", "version"],
-    ["units", "algebra"],
+    ["units", "algebra", "budget"],
     ["arguments"],
     ["kernels"],
     ["model"],
@@ -46,7 +46,7 @@ FLOORS = [
     ["cli"],
 ]
 HEIGHT = {room: height for height, floor in enumerate(FLOORS) for room in floor}
-CORE = ["arrays", "algebra", "kernels", "model", "kinematics", "machine", "workspaces", "performance"]
+CORE = ["arrays", "algebra", "budget", "kernels", "model", "kinematics", "machine", "workspaces", "performance"]
 RIM = {"pathlib", "json", "io", "tempfile", "shutil", "plotly", "matplotlib", "pyarrow", "rich", "cyclopts"}
 RIM |= {"pydantic", "ruamel", "http", "socket", "subprocess"}
 NO_PATH_NEEDS = {"plotly", "matplotlib", "rich", "cyclopts"}

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
 
+from ..budget import SECONDS
 from ..errors import InputError, PoseError, quote
 from ..export.json.performance import encode_atlas, encode_performance, encode_proofs
 from ..units import NUMBER, QuantityError, parse_quantity, to_display
@@ -18,9 +19,11 @@ from .options import OFF_LIMITS, Json, Mode, Name, Sizes, load_machine
 from .region_options import (
     AllParts,
     At,
+    Time,
     Without,
     parse_axis_ranges,
     parse_length,
+    parse_time,
     read_region,
     split_axes,
 )
@@ -30,6 +33,7 @@ if TYPE_CHECKING:
     from ..arrays import Array, AxisRange
     from ..performance.atlas import Atlas, PerformanceMap
     from ..performance.certified.amplification import Bracket
+    from ..performance.certified.counterexamples import SingularityKind
     from ..performance.certified.proofs import Proof
     from ..performance.indices import Performance
     from ..workspaces.certified.region import Region
@@ -48,6 +52,7 @@ def atlas(
     all_parts: AllParts = False,
     step: str | None = None,
     size: Annotated[str | None, Parameter(name="--length")] = None,
+    time: Time = None,
     mode: Mode = None,
     output: Annotated[Path | None, Parameter(name=["--output", "-o"])] = None,
     json: Json = False,
@@ -80,6 +85,8 @@ def atlas(
     machine = load_machine(name, sizes)
     region = read_region(machine, at, without=without, mode=mode, all_parts=all_parts)
     scale, apart = parse_length(size, "--length"), parse_length(step, "--step")
+    given = parse_time(time)
+    seconds = SECONDS if given is None else given
     ranges = parse_axis_ranges(machine, box, "--box")
     bounds = _parse_claim(amplification, bool(ranges))
     cuts = _cut_region(region, slices or ())
@@ -88,7 +95,7 @@ def atlas(
     files = AtlasFiles(machine.name, output, len(cuts)) if output is not None else None
     one_pose = None if pose is None else _parse_pose(region, pose)
     announce_compiling()
-    results = _AtlasResults(region, scale)
+    results = _AtlasResults(region, scale, seconds)
     with ProgressBar() as progress:
         if one_pose is not None:
             results.examine_pose(one_pose)
@@ -152,10 +159,11 @@ class _AtlasResults:
     """All results of a run of the command, and how they are printed.
 
     length : the characteristic length, mm, or None for the machine's own
+    seconds : for each proof, and for the workspace
     """
 
-    def __init__(self, region: Region, length: float | None):
-        self.machine, self.region, self.length = region.machine, region, length
+    def __init__(self, region: Region, length: float | None, seconds: float):
+        self.machine, self.region, self.length, self.seconds = region.machine, region, length, seconds
         self.performance: Performance | None = None
         self.broken_limit = ""
         self.ranges: dict[str, AxisRange] = {}
@@ -181,19 +189,20 @@ class _AtlasResults:
 
         self.ranges = ranges
         box = make_pose_box(self.region, ranges, self.length)
-        self.proofs = [prove_no_singularity(box, "parallel"), prove_no_singularity(box, "serial")]
+        kinds: tuple[SingularityKind, ...] = ("parallel", "serial")
+        self.proofs = [prove_no_singularity(box, kind, seconds=self.seconds) for kind in kinds]
         report = progress.part("proving", 0.0, 1.0)
         if bounds is not None:
-            self.proofs.append(prove_amplification(box, *bounds, progress=report))
+            self.proofs.append(prove_amplification(box, *bounds, seconds=self.seconds, progress=report))
             self.brackets = self.proofs[-1].brackets
         elif all(proof.verdict == "proved" for proof in self.proofs):
-            self.brackets = bracket_extremes(box, progress=report).brackets
+            self.brackets = bracket_extremes(box, seconds=self.seconds, progress=report).brackets
 
     def compute_atlas(self, step: float | None, progress: ProgressBar) -> None:
         from ..performance.atlas import atlas
 
         report = progress.part("looking at the workspace", 0.0, 1.0)
-        self.atlas = atlas(self.region, step, self.length, report)
+        self.atlas = atlas(self.region, step, self.length, report, self.seconds)
 
     def map_slice(self, cut: Region, step: float | None) -> PerformanceMap:
         from ..performance.atlas import map_performance

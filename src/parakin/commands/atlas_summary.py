@@ -98,10 +98,14 @@ def _format_singularities(atlas: Atlas) -> list[str]:
     for singularity in atlas.singularities:
         if singularity.verdict == "met" and singularity.pose is not None:
             pose = _format_pose(atlas.machine, singularity.pose, atlas.map.axes)
-            lines.append(f"singular: {singularity.margin}, proved: on the way to {pose} its margin changes sign")
-    for verdict, text in (("none", "not singular: {}, proved"), ("unproved", "unproved: whether {} is met")):
-        names = [singularity.margin for singularity in atlas.singularities if singularity.verdict == verdict]
-        lines += [text.format(", ".join(names))] if names else []
+            lines.append(f"singular: {singularity.margin}, proved: at {pose}; {singularity.reason}")
+    names = [singularity.margin for singularity in atlas.singularities if singularity.verdict == "none"]
+    lines += [f"not singular: {', '.join(names)}, proved"] if names else []
+    for singularity in atlas.singularities:
+        if singularity.verdict == "unproved":
+            least = atlas.extreme(singularity.margin, "least")
+            where = f"{_format_number(least.value)} at {_format_pose(atlas.machine, least.pose, atlas.map.axes)}"
+            lines.append(f"unproved: {singularity.margin}; {singularity.reason}, the least found is {where}")
     return lines
 
 

@@ -36,6 +36,12 @@ AllParts = Annotated[
         help="Count what home can't reach too, such as the mirror image of the workspace behind the base.",
     ),
 ]
+Time = Annotated[
+    float | None,
+    Parameter(
+        help="Answer after this time with what is proved by then, s; 60 by default, for each of several questions."
+    ),
+]
 Without = Annotated[
     list[str] | None,
     Parameter(help="A limit that does not count, with * for any letters: gap*. May be given again."),
@@ -99,6 +105,13 @@ def split_axes(machine: Machine, text: str | None, source: str, example: str) ->
     if text is None:
         return {}
     return dict(split_assignments(text, machine.axes, source, f"AXIS=VALUE, such as {example}"))
+
+
+def parse_time(seconds: float | None) -> float | None:
+    """Return the time that --time gives, s; refuse one that is not above 0."""
+    if seconds is not None and not seconds > 0.0:
+        raise InputError("expected a time above 0, in s", "--time")
+    return seconds
 
 
 def parse_length(text: str | None, source: str) -> float | None:

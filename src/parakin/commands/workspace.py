@@ -13,7 +13,7 @@ from ..errors import InputError, PoseError
 from ..export.json.text import format_json
 from .console import ProgressBar, announce_compiling, print_json, print_remark, print_text
 from .options import OFF_LIMITS, Json, Mode, Name, Sizes, load_machine
-from .region_options import AllParts, At, Every, Some, Without, parse_length, read_region
+from .region_options import AllParts, At, Every, Some, Time, Without, parse_length, parse_time, read_region
 from .workspace_inside import InsideOptions, encode_inside, explore_inside, format_inside
 from .workspace_methods import Effort, Method, find_workspace
 from .workspace_summary import format_workspace
@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from ..export.workspace.workspace_files import WorkspaceFiles
 
 _INTERRUPTED = 130  # exit code
+_ELSEWHERE = 10.0  # s, at most, for what home can't reach
 
 MachineArgument = Annotated[
     Name,
@@ -48,10 +49,6 @@ VolumeGap = Annotated[
 CellSize = Annotated[
     str | None,
     Parameter(help="Refine the whole boundary to cells of this size instead, mm."),
-]
-TimeLimit = Annotated[
-    float | None,
-    Parameter(help="Stop after this time with what there is, s; 60 by default."),
 ]
 StepLength = Annotated[
     str | None,
@@ -109,7 +106,7 @@ def workspace(
     method: MethodName = "certified",
     gap: VolumeGap = None,
     cell: CellSize = None,
-    time: TimeLimit = None,
+    time: Time = None,
     step: StepLength = None,
     all_parts: AllParts = False,
     box: LargestBox = False,
@@ -124,11 +121,11 @@ def workspace(
 ) -> int:
     """Where a machine is allowed: the volume, proved to lie between two numbers, what bounds it, and its shape.
 
-    The exit code is 3 if a file has nothing to be filled with, for the workspace is empty.
+    The exit code is 3 if a file has nothing to be filled with, for the workspace is empty, or if no box is proved.
     """
     machine = load_machine(name, sizes)
     region = read_region(machine, at, every, some, dexterous, without, mode, all_parts)
-    effort = Effort(gap, parse_length(cell, "--cell"), time, parse_length(step, "--step"))
+    effort = Effort(gap, parse_length(cell, "--cell"), parse_time(time), parse_length(step, "--step"))
     files = _sort_files(output or (), method, len(region.free_axes))
     announce_compiling()
     from ..export.json.workspace import encode_workspace
@@ -143,9 +140,11 @@ def workspace(
         contents = WorkspaceFiles(found, None, ())
         if is_drawn:
             contents = prepare_files(found, effort.step, progress.part("drawing", 0.6, 1.0))
-        elsewhere = measure_elsewhere(found) if isinstance(found, Workspace) else None
+        elsewhere = None
+        if isinstance(found, Workspace):
+            elsewhere = measure_elsewhere(found, seconds=min(_ELSEWHERE, effort.seconds))
         encoded = encode_workspace(found, contents.cross_sections, elsewhere)
-        inside = explore_inside(region, InsideOptions(box, shape, around, parts, start))
+        inside = explore_inside(region, InsideOptions(box, shape, around, parts, start, effort.seconds), progress)
         encoded.update(encode_inside(inside))
         encoded["parameters"] = {"step": effort.step, **encoded["parameters"], "set": list(sizes or ())}
         written, refused = _write_files(files, contents, encoded)
@@ -159,7 +158,7 @@ def workspace(
         print_remark(f"{path}: not written, {reason}")
     if isinstance(found, Workspace) and found.stopped == "interrupted":
         return _INTERRUPTED
-    return OFF_LIMITS if refused else 0
+    return OFF_LIMITS if refused or inside.no_box else 0
 
 
 def _sort_files(paths: Sequence[Path], method: str, dimension: int) -> dict[str, Path]:

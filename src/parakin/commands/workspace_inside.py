@@ -6,15 +6,18 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+from ..budget import SECONDS
 from ..errors import InputError, PoseError
 from ..export.json.workspace_inside import encode_box, encode_components
 from ..export.number_format import format_fixed
 from .region_options import parse_axis_values
 
 if TYPE_CHECKING:
+    from ..arrays import Progress
     from ..workspaces.certified.region import Region
     from ..workspaces.connected.components import Components
     from ..workspaces.inscribed.largest_box import InscribedBox
+    from .console import ProgressBar
 
 
 @dataclass(frozen=True)
@@ -26,6 +29,7 @@ class InsideOptions:
     around: str | None = None
     parts: bool = False
     start: str | None = None
+    seconds: float = SECONDS
 
 
 @dataclass(frozen=True)
@@ -33,32 +37,40 @@ class Inside:
     """The largest box and the connected components; None for what was not requested."""
 
     box: InscribedBox | None = None
+    no_box: str = ""  # why there is none
     components: Components | None = None
 
 
-def explore_inside(region: Region, options: InsideOptions) -> Inside:
+def explore_inside(region: Region, options: InsideOptions, progress: ProgressBar) -> Inside:
     """Find the box and the components that the options want."""
-    box, components = None, None
+    box, no_box, components = None, "", None
     if options.box or options.shape is not None or options.around is not None:
-        box = _find_box(region, options)
+        from ..workspaces.inscribed.largest_box import NoBoxError
+
+        try:
+            box = _find_box(region, options, progress.part("looking for the box", 0.0, 1.0))
+        except NoBoxError as error:
+            no_box = str(error)
     if options.parts or options.start is not None:
-        components = _find_components(region, options)
-    return Inside(box, components)
+        components = _find_components(region, options, progress.part("looking for the parts", 0.0, 1.0))
+    return Inside(box, no_box, components)
 
 
-def _find_box(region: Region, options: InsideOptions) -> InscribedBox:
-    from ..workspaces.inscribed.largest_box import find_largest_box
+def _find_box(region: Region, options: InsideOptions, progress: Progress) -> InscribedBox:
+    from ..workspaces.inscribed.largest_box import NoBoxError, find_largest_box
 
     shape = None if options.shape is None else _parse_shape(options.shape)
     around = None if options.around is None else _parse_position(region, options.around)
     try:
-        return find_largest_box(region, shape, around)
+        return find_largest_box(region, shape, around, seconds=options.seconds, progress=progress)
+    except NoBoxError:
+        raise
     except PoseError as error:
         source = "--around" if around is not None else "--shape" if shape is not None else "--box"
         raise InputError(_strip_argument(error), source) from None
 
 
-def _find_components(region: Region, options: InsideOptions) -> Components:
+def _find_components(region: Region, options: InsideOptions, progress: Progress) -> Components:
     from ..workspaces.connected.components import find_components
 
     machine, start = region.machine, None
@@ -67,7 +79,7 @@ def _find_components(region: Region, options: InsideOptions) -> Components:
         home = zip(machine.axes, machine.home.tolist(), strict=True)
         start = list(({**dict(home), **region.fixed_axes, **given}).values())
     try:
-        return find_components(region, start)
+        return find_components(region, start, seconds=options.seconds, progress=progress)
     except PoseError as error:
         raise InputError(_strip_argument(error), "--parts" if start is None else "--start") from None
 
@@ -99,6 +111,8 @@ def encode_inside(inside: Inside) -> Mapping[str, Any]:
     content: dict[str, Any] = {}
     if inside.box is not None:
         content["box_inside"] = encode_box(inside.box)
+    elif inside.no_box:
+        content["box_inside"] = {"proved": False, "reason": inside.no_box}
     if inside.components is not None:
         content["parts"] = encode_components(inside.components)
     return content
@@ -109,6 +123,8 @@ def format_inside(inside: Inside) -> str:
     lines: list[str] = []
     if inside.box is not None:
         lines += _format_box(inside.box)
+    elif inside.no_box:
+        lines += ["", f"box inside  {inside.no_box}"]
     if inside.components is not None:
         lines += _format_components(inside.components)
     return "".join(f"\n{line}" for line in lines)
@@ -123,6 +139,8 @@ def _format_box(box: InscribedBox) -> list[str]:
     for axis, low, high, first, last in ends:
         stops = f"stopped by {first.limit or '-'} and {last.limit or '-'}"
         lines.append(f"            {axis} {format_fixed(low, 1)} to {format_fixed(high, 1)} mm, {stops}")
+    if box.stopped == "time":
+        lines.append("            the time was up before its faces were moved as far as they go; --time gives more")
     return lines
 
 
@@ -136,6 +154,8 @@ def _format_components(found: Components) -> list[str]:
         here = ", holds the start" if number == found.start else ""
         size = format_volume(component.volume.estimate, d)
         lines.append(f"            {size}, between {format_bracket(component.volume, d)}, {sign}{here}")
+    if found.stopped == "time":
+        lines.append("            the time was up before the cells were as small as they should be; --time gives more")
     if found.undecided >= 0.005:
         lines.append(f"            undecided {format_volume(found.undecided, d)}")
     return lines

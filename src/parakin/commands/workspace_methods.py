@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from math import ceil
 from typing import TYPE_CHECKING, Literal
 
+from ..budget import SECONDS
 from ..errors import InputError
 
 if TYPE_CHECKING:
@@ -16,7 +17,7 @@ if TYPE_CHECKING:
 
 Method = Literal["certified", "grid", "polar", "drives"]
 
-GAP, SECONDS = 0.01, 60.0
+GAP = 0.01
 _STEPS = {"grid": {1: 10_000, 2: 1000, 3: 200}, "polar": {2: 1000, 3: 400}}  # along the longest edge, by dimension
 _PLANES = 50  # planes of a polar sweep along the longest edge
 _CELLS = {2: 512, 3: 64}  # cells of each drive's range, by the number of drives
@@ -30,6 +31,11 @@ class Effort:
     cell: float | None
     time: float | None
     step: float | None
+
+    @property
+    def seconds(self) -> float:
+        """The time, s, for each question."""
+        return SECONDS if self.time is None else self.time
 
 
 def find_workspace(method: Method, region: Region, effort: Effort, progress: Progress) -> Workspace | SampledWorkspace:
@@ -47,12 +53,10 @@ def find_workspace(method: Method, region: Region, effort: Effort, progress: Pro
 def _certify_workspace(region: Region, effort: Effort, progress: Progress) -> Workspace:
     from ..workspaces.certified.workspace import workspace
 
-    gap, seconds = GAP if effort.gap is None else effort.gap, SECONDS if effort.time is None else effort.time
+    gap = GAP if effort.gap is None else effort.gap
     if not 0.0 < gap < float("inf"):
         raise InputError("expected a number above 0", "--gap")
-    if not seconds > 0.0:
-        raise InputError("expected a time above 0, in s", "--time")
-    return workspace(region, gap, effort.cell, seconds, progress)
+    return workspace(region, gap, effort.cell, effort.seconds, progress)
 
 
 def _sample_positions(method: Method, region: Region, step: float | None, progress: Progress) -> SampledWorkspace:

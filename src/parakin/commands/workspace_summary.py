@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     from ..workspaces.certified.workspace import Volume, Workspace
     from ..workspaces.sampled.sampling import SampledWorkspace
 
+_HUGE = 1e3  # gap beyond which it is no number
 _VAGUE = 0.2  # gap beyond which an estimate tells little
 _STOPPED = {
     "gap": "as asked for",
@@ -75,9 +76,13 @@ def _list_certified(workspace: Workspace) -> list[tuple[str, str]]:
     return [
         (_name_volume(d), f"{volume.estimate:,.0f} {workspace.unit}, {format_volume(volume.estimate, d)}"),
         ("proved", f"{volume.inner:,.0f} to {volume.outer:,.0f} {workspace.unit}, between {format_bracket(volume, d)}"),
-        ("gap", f"{volume.gap:.2%}, {_STOPPED[workspace.stopped]}{_warn_of_gap(volume)}"),
+        ("gap", f"{_format_gap(volume)}, {_STOPPED[workspace.stopped]}{_warn_of_gap(volume)}"),
         ("cells", f"{inside:,} inside, {len(cells.low) - inside:,} at the boundary"),
     ]
+
+
+def _format_gap(volume: Volume) -> str:
+    return f"{volume.gap:.2%}" if volume.gap < _HUGE else "no volume is proved yet"
 
 
 def _warn_of_gap(volume: Volume) -> str:

@@ -12,6 +12,7 @@ import numpy as np
 
 from ..arguments import check_arguments
 from ..arrays import Array, Flags, Progress
+from ..budget import SECONDS, Budget
 from ..errors import PoseError
 from ..machine import Machine
 from ..workspaces.certified.region import Region
@@ -25,7 +26,7 @@ MOST = 4_000_000  # positions of a grid
 _ALONG = {1: 400, 2: 120, 3: 36}  # positions along the longest side, at most, if no step is given
 _AT_ONCE = 1 << 15
 _ON = 1e-3  # a pose nearer than this fraction of a grid's step lies on the slice
-_ROUGH, _SECONDS = 0.1, 10.0  # gap and time of the workspace by which the grid is placed
+_ROUGH, _SHARE = 0.1, 0.2  # gap, and share of the time, of the workspace by which the grid is placed
 
 
 @dataclass(frozen=True, eq=False)
@@ -118,6 +119,7 @@ def atlas(
     step: float | None = None,
     length: float | None = None,
     progress: Progress | None = None,
+    seconds: float | None = SECONDS,
 ) -> Atlas:
     """Compute the performance over a region at one orientation: on a grid, and its extremes by search between.
 
@@ -127,17 +129,20 @@ def atlas(
     step : between positions of the grid, mm; the grid stands on its multiples
     length : characteristic length, mm; see :func:`~.characteristic_length.choose_characteristic_length`
     progress : called with the fraction done
+    seconds : of the work that has no end of its own: the proofs, which then leave singularities unproved
 
     Raises :class:`PoseError` for invalid numbers, and for a region that is swept, unbounded or empty.
     """
     if region.swept_axes:
         raise PoseError(f"region: an atlas is of one orientation, {' '.join(region.swept_axes)} must not be swept")
-    report = progress or (lambda fraction: None)
-    drawn = map_performance(region, step, length, lambda fraction: report(0.4 * fraction))
+    budget, report = Budget(seconds), progress or (lambda fraction: None)
+    outline = budget.take_share(_SHARE)
+    drawn = map_performance(region, step, length, lambda fraction: report(0.4 * fraction), outline)
     extremes = find_extremes(region, drawn.inside, drawn.step)
-    report(0.9)
+    report(0.6)
     poses, isolated = find_isotropic_poses(region, drawn.inside, drawn.step)
-    return Atlas(drawn, extremes, poses, isolated, judge_singularities(region))
+    report(0.7)
+    return Atlas(drawn, extremes, poses, isolated, judge_singularities(region, budget))
 
 
 def map_performance(
@@ -145,12 +150,13 @@ def map_performance(
     step: float | None = None,
     length: float | None = None,
     progress: Progress | None = None,
+    budget: Budget | None = None,
 ) -> PerformanceMap:
     """Compute the map alone, over a region without swept axes; parameters and errors as of :func:`atlas`."""
     scale = choose_characteristic_length(region.machine, length)
     if step is not None and not (isfinite(step) and step > 0.0):
         raise PoseError(f"step: a length above 0 mm expected, not {step:g}")
-    low, high = _find_bounds(region)
+    low, high = _find_bounds(region, budget or Budget(_SHARE * SECONDS))
     step = _round_up(float((high - low).max()) / _ALONG[len(region.free_axes)]) if step is None else float(step)
     counts = [(b - a) / step + 1.0 for a, b in zip(low, high, strict=True)]
     if prod(counts) > MOST:
@@ -167,11 +173,11 @@ def map_performance(
     return PerformanceMap(region, step, grid, (slack >= 0.0).reshape(shape), slack.reshape(shape), on_grid)
 
 
-def _find_bounds(region: Region) -> tuple[Array, Array]:
+def _find_bounds(region: Region, budget: Budget) -> tuple[Array, Array]:
     """Find a box that holds the region, close enough for a grid."""
-    extent = region.extent
+    extent = region.find_extent(budget)
     if extent is not None:
-        cells = region.subdivide(*extent).run(_ROUGH, seconds=_SECONDS)
+        cells = region.subdivide(*extent).run(_ROUGH, budget=budget)
         if len(cells.low):
             return cells.low.min(0), (cells.low + cells.size).max(0)
     raise PoseError("the machine is allowed nowhere there")

@@ -68,6 +68,7 @@ def encode_atlas(atlas: Atlas) -> dict[str, Any]:
             singularity.margin: {
                 "verdict": singularity.verdict,
                 "pose": None if singularity.pose is None else encode_pose(atlas.machine, singularity.pose),
+                "reason": singularity.reason,
             }
             for singularity in atlas.singularities
         },

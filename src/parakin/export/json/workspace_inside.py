@@ -19,6 +19,7 @@ def encode_box(box: InscribedBox) -> dict[str, Any]:
         "volume": box.volume,
         "proved": box.proved,
         "tolerance": box.tolerance,
+        "stopped": box.stopped,
         "stops": [{"face": stop.face, "limit": stop.limit} for stop in box.stops],
         "shape": box.parameters["shape"],
         "around": box.parameters["around"],

@@ -8,10 +8,11 @@ from itertools import product
 import numpy as np
 
 from ...arrays import Array, Indices, Progress
+from ...budget import Budget
 from ..extremes import ExtremeSide
 from ..indices import compute_performance
 from ..search import pick_best_of_blocks, search_maxima_in_box
-from .bisection import AT_ONCE, Budget, bisect_inputs, bound_inverse_error, find_widest_inputs, invert_middles
+from .bisection import AT_ONCE, bisect_inputs, bound_inverse_error, find_widest_inputs, invert_middles
 from .interval_matrices import LinearMatrices, MatrixBounds, PoseBox
 
 _ROUNDING = 1e-12  # relative, of products and singular values of small matrices
@@ -61,7 +62,7 @@ def bracket_amplification(
     search = _AmplificationSearch(box, side)
     search.climb()
     if search.best > bound if side == "greatest" else search.best * bound > 1.0:
-        budget.boxes = min(budget.boxes, budget.used + _EXCEEDED)
+        budget.parts = min(budget.parts, budget.used + _EXCEEDED)
     low, high = box.low[None], box.high[None]
     upper, axis = search.bound_boxes(low, high)
     top = -np.inf  # of what was decided

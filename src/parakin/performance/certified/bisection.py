@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable
-from dataclasses import dataclass, field
 from math import inf
 
 import numpy as np
 
 from ...arrays import Array, Flags, Indices
+from ...budget import Budget
 from .interval_matrices import LinearMatrices, MatrixBounds
 
 AT_ONCE = 512  # boxes
@@ -17,20 +16,6 @@ _FINEST = 1e-13  # smallest box as a fraction of the first: below this no digits
 _ROUNDING = 1e-12  # relative, of products and singular values of small matrices
 
 Decided = tuple[Flags, Indices]  # which boxes are decided, and across which input to bisect the others
-
-
-@dataclass
-class Budget:
-    """How many boxes and how long, s; ``used`` counts on over all that is proved with it."""
-
-    boxes: int
-    seconds: float | None
-    used: int = 0
-    _began: float = field(default_factory=time.monotonic)
-
-    def is_spent(self) -> bool:
-        late = inf if self.seconds is None else self._began + self.seconds
-        return self.used >= self.boxes or time.monotonic() > late
 
 
 def bisect_inputs(low: Array, high: Array, axis: Indices) -> tuple[Array, Array]:

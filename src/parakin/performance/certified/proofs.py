@@ -15,12 +15,13 @@ from typing import Literal
 import numpy as np
 
 from ...arrays import Array, AxisRange, Progress
+from ...budget import SECONDS, Budget
 from ...errors import PoseError
 from ...workspaces.certified.region import Region
 from ..characteristic_length import choose_characteristic_length
 from ..extremes import SIDES
 from .amplification import UNBOUNDED, Bracket, bracket_amplification
-from .bisection import Budget, decide_nonnegative, decide_regular, find_undecided_part
+from .bisection import decide_nonnegative, decide_regular, find_undecided_part
 from .counterexamples import SingularityKind, find_singular_pose
 from .interval_matrices import MatrixBounds, PoseBox
 
@@ -75,7 +76,7 @@ def prove_no_singularity(
     box: PoseBox,
     kind: SingularityKind,
     boxes: int = 200_000,
-    seconds: float | None = 60.0,
+    seconds: float | None = SECONDS,
 ) -> Proof:
     """Prove that a box of poses (see :func:`make_pose_box`) has no parallel or no serial singularities.
 
@@ -83,7 +84,7 @@ def prove_no_singularity(
     a pose whose margin is zero, found by bisection between two poses with margins of opposite signs, or by a search.
     Undecided when ``boxes`` or ``seconds`` are spent.
     """
-    claim, budget = f"no {kind} singularity", Budget(boxes, seconds)
+    claim, budget = f"no {kind} singularity", Budget(seconds, boxes)
     failure = _prove_reach(box, claim, budget)
     if failure is not None:
         return failure
@@ -107,7 +108,7 @@ def prove_amplification(
     high: float,
     tolerance: float = 1e-6,
     boxes: int = 200_000,
-    seconds: float | None = 60.0,
+    seconds: float | None = SECONDS,
     progress: Progress | None = None,
 ) -> Proof:
     """Prove low ≤ psi ≤ high for every velocity amplification psi over a box of poses (see :func:`make_pose_box`).
@@ -121,14 +122,14 @@ def prove_amplification(
         raise PoseError(f"amplification: bounds 0 <= low <= high expected, not {low:g} and {high:g}")
     if not 0.0 < tolerance < 1.0:
         raise PoseError(f"tolerance: a share between 0 and 1 expected, not {tolerance:g}")
-    claim, budget = f"{low:.9g} <= psi <= {high:.9g}", Budget(boxes, seconds)
+    claim, budget = f"{low:.9g} <= psi <= {high:.9g}", Budget(seconds, boxes)
     failure = _prove_reach(box, claim, budget)
     if failure is not None:
         return failure
     low, high = low * (1.0 - tolerance), high * (1.0 + tolerance)
-    both = bracket_extremes(box, 0.25 * tolerance, boxes, seconds, progress, (low, high))
+    both = _share_brackets(box, 0.25 * tolerance, budget, progress, (low, high))
     verdict, pose, reason = _judge_brackets(*both.brackets, low, high)
-    return Proof(claim, verdict, pose, reason, both.brackets, budget.used + both.boxes, tolerance)
+    return Proof(claim, verdict, pose, reason, both.brackets, budget.used, tolerance)
 
 
 @dataclass(frozen=True, eq=False)
@@ -143,7 +144,7 @@ def bracket_extremes(
     box: PoseBox,
     tolerance: float = 1e-6,
     boxes: int = 200_000,
-    seconds: float | None = 60.0,
+    seconds: float | None = SECONDS,
     progress: Progress | None = None,
     bounds: tuple[float, float] = (0.0, inf),
 ) -> AmplificationBrackets:
@@ -151,6 +152,13 @@ def bracket_extremes(
 
     ``boxes`` and ``seconds`` are shared evenly by the two; little is spent on one that is beyond its ``bounds``.
     """
+    return _share_brackets(box, tolerance, Budget(seconds, boxes), progress, bounds)
+
+
+def _share_brackets(
+    box: PoseBox, tolerance: float, budget: Budget, progress: Progress | None, bounds: tuple[float, float]
+) -> AmplificationBrackets:
+    """Bracket both extremes, each within half of the budget."""
     report = progress or (lambda fraction: None)
     brackets: list[Bracket] = []
     used = 0
@@ -160,10 +168,11 @@ def bracket_extremes(
             value = 0.0 if side == "least" else inf
             brackets.append(Bracket(side, value, value, singular[0], True))
             continue
-        budget = Budget(boxes // 2, None if seconds is None else 0.5 * seconds)
+        half = budget.take_share(1.0 / (len(SIDES) - number))
         report_half = partial(_report_half, report, 0.5 * number)
-        brackets.append(bracket_amplification(box, side, tolerance, budget, bound, report_half))
-        used += budget.used
+        brackets.append(bracket_amplification(box, side, tolerance, half, bound, report_half))
+        budget.used += half.used
+        used += half.used
     return AmplificationBrackets((brackets[0], brackets[1]), used)
 
 

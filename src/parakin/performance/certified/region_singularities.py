@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Literal, NamedTuple
 
 import numpy as np
 
-from ...algebra import Scalar
+from ...algebra import Scalar, Term
 from ...arrays import Array, Flags, Indices
+from ...budget import Budget
 from ...errors import PoseError
 from ...workspaces.certified.assembly_mode import expand_determinant
 from ...workspaces.certified.constraints import Constraint
@@ -18,12 +19,14 @@ from ...workspaces.certified.region import Region
 from ...workspaces.certified.separation import find_joined_cells
 from ...workspaces.certified.subdivision import Cells
 from ...workspaces.connected.adjacency import find_adjacent_cells, label_components
-from ..singularities import list_margin_names
+from ..singularities import PARALLEL, list_margin_names
 
 SingularityVerdict = Literal["met", "none", "unproved"]
 
 _ALONG = {1: 1024, 2: 256, 3: 96}  # cells along the longest edge in which a change of sign is looked for
 _MOST_COMPARED = 1000  # cells
+_SHARE = 0.5  # of the budget, for the proofs that there is none, and of the rest for the region's own cells
+_ZERO = 1e-12  # a margin no greater is zero
 _FEW, _ROUNDS = 30_000, 24  # undecided cells, and rounds, with which a proof that there is none is given up
 
 
@@ -34,45 +37,66 @@ class RegionSingularity:
     margin : its name, as in :func:`~..singularities.list_margin_names`
     verdict : ``met``, its sign changes among positions that hang together inside; ``none``, it is positive all over;
         ``unproved``, neither is proved, as where it only touches zero
-    pose : (axes,) a pose where it is below zero, of ``met`` alone
+    pose : (axes,) a pose where it is not above zero, of ``met`` alone
+    reason : what the verdict rests on, for people; empty for ``none``
     """
 
     margin: str
     verdict: SingularityVerdict
     pose: Array | None
+    reason: str = ""
 
     def __repr__(self) -> str:
         return f"<parakin singularity {self.margin}: {self.verdict}>"
 
 
-def judge_singularities(region: Region) -> tuple[RegionSingularity, ...]:
-    """Judge every singularity margin over a region without swept axes, in all of its assembly modes, by intervals.
+def judge_singularities(region: Region, budget: Budget | None = None) -> tuple[RegionSingularity, ...]:
+    """Judge every singularity margin over a region without swept axes, by intervals.
+
+    The parallel one is judged in all assembly modes, for it is what separates them; the serial ones in the region's.
 
     A margin is positive all over where no cell of a subdivision can hold an allowed position at which it is not, but
     for cells that are apart from home's part. It changes its sign where cells proved inside hang together, by faces,
-    and intervals prove both signs among them.
+    and intervals prove both signs among them. What the budget leaves open is unproved.
     """
-    whole = replace(region, part="all")
-    names = list_margin_names(region.machine)
-    extent = whole.extent
+    names, budget = list_margin_names(region.machine), budget or Budget()
+    extent, whole = region.find_extent(budget), region.include_all_parts()
     if extent is None:
         return tuple(RegionSingularity(name, "none", None) for name in names)
-    traced = whole.traced_pose
-    margins = _trace_margins(whole)
-    verdicts = []
-    about: _RegionCells | None = None
-    for name, margin in zip(names, margins, strict=True):
-        positive = Constraint(name, margin, traced.inputs)
-        negative = Constraint(name, 0.0 - margin, traced.inputs)
-        left = _list_left_cells(whole, negative, extent)
-        if len(left.low):
-            about = about or _label_cells(whole, extent)
-        if about is None or not len(left.low) or _is_apart(left, about.joined):
+    verdicts, labelled = [], {}
+    for number, name in enumerate(names):
+        own = whole if name == PARALLEL else region
+        margin, inputs = _trace_margins(own)[number], own.traced_pose.inputs
+        if not isinstance(margin, Term):
+            verdicts.append(_judge_constant(own, name, float(margin)))
+            continue
+        positive, negative = Constraint(name, margin, inputs), Constraint(name, 0.0 - margin, inputs)
+        left = _list_left_cells(own, negative, extent, budget.take_share(_SHARE / (len(names) - number)))
+        if len(left.low) and own not in labelled:
+            labelled[own] = _label_cells(own, extent, budget.take_share(_SHARE))
+        if not len(left.low) or _is_apart(left, labelled[own].joined):
             verdicts.append(RegionSingularity(name, "none", None))
             continue
-        pose = _find_sign_change(whole, positive, about.inside, about.component)
-        verdicts.append(RegionSingularity(name, "unproved" if pose is None else "met", pose))
+        pose = _find_sign_change(own, positive, labelled[own].inside, labelled[own].component)
+        if pose is not None:
+            verdicts.append(RegionSingularity(name, "met", pose, "its margin changes sign on the way to it"))
+        else:
+            verdicts.append(RegionSingularity(name, "unproved", None, _describe_left(budget)))
     return tuple(verdicts)
+
+
+def _judge_constant(region: Region, name: str, margin: float) -> RegionSingularity:
+    """Judge a margin that has one value at this orientation."""
+    if margin > _ZERO:
+        return RegionSingularity(name, "none", None)
+    home = dict(zip(region.machine.axes, region.machine.home.tolist(), strict=True))
+    pose = region.poses(np.array([[home[axis] for axis in region.free_axes]]))[0]
+    return RegionSingularity(name, "met", pose, "its margin is zero at every position of this orientation")
+
+
+def _describe_left(budget: Budget) -> str:
+    open_ends = " in the time given" if budget.is_spent() else ""
+    return f"it is neither proved to reach zero nor to stay above it{open_ends}"
 
 
 def _trace_margins(region: Region) -> list[Scalar]:
@@ -95,14 +119,16 @@ def _trace_margins(region: Region) -> list[Scalar]:
     return [margin * sign for margin, sign in zip(compute_margins(traced.pose), signs, strict=True)]
 
 
-def _list_left_cells(region: Region, constraint: Constraint, extent: tuple[Array, Array]) -> Cells:
+def _list_left_cells(region: Region, constraint: Constraint, extent: tuple[Array, Array], budget: Budget) -> Cells:
     """List the cells that may hold a position at which a constraint is kept, those inside included."""
     subdivision = region.subdivide(*extent, [constraint])
     for _ in range(_ROUNDS):
         count = len(subdivision.open_cells.low)
         if not count or count > _FEW or any(len(cells.low) for cells in subdivision.decided_cells):
             break
-        subdivision.refine(np.arange(count))
+        if budget.is_spent():
+            break
+        subdivision.refine(np.arange(count), budget)
     return subdivision.collect_cells("gap")
 
 
@@ -114,10 +140,10 @@ class _RegionCells(NamedTuple):
     joined: Cells
 
 
-def _label_cells(region: Region, extent: tuple[Array, Array]) -> _RegionCells:
+def _label_cells(region: Region, extent: tuple[Array, Array], budget: Budget) -> _RegionCells:
     """Refine a region down to one size of cells, and label those inside."""
     edge = float((extent[1] - extent[0]).max()) / _ALONG[len(extent[0])]
-    cells = region.subdivide(*extent).run(1e-12, edge)
+    cells = region.subdivide(*extent).run(1e-12, edge, budget)
     home = dict(zip(region.machine.axes, region.machine.home.tolist(), strict=True))
     is_slice = any(axis in region.fixed_axes for axis in "XYZ")  # what is apart there may hang together beyond it
     joined = None if is_slice else find_joined_cells(cells, np.array([home[axis] for axis in region.free_axes]))

@@ -8,7 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...arrays import Array, Flags, Indices
+from ...arrays import Array, Flags, Indices, split_rows
+from ...budget import Budget
 from ...errors import PoseError
 from .assembly_mode import PARALLEL_SINGULARITY
 from .best_orientation import find_best_orientations
@@ -20,6 +21,7 @@ from .subdivision import OrientationBoxes, bound_margin
 MOST = 4096  # parts of a box to be examined before it is left undecided
 _ROUNDS = 60  # bisected more often, a part's numbers have no digits left
 _ULP = 2.3e-16
+_AT_ONCE = 512  # parts whose best orientations are searched for together
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,13 +44,20 @@ class Containment:
 
 
 def prove_boxes(
-    region: Region, low: ArrayLike, high: ArrayLike, more: Sequence[Constraint] = (), most: int = MOST
+    region: Region,
+    low: ArrayLike,
+    high: ArrayLike,
+    more: Sequence[Constraint] = (),
+    most: int = MOST,
+    budget: Budget | None = None,
 ) -> Containment:
     """Prove by interval bisection that all positions of boxes [low, high], (N, d) mm, are in a region.
 
     Many boxes at once cost little more than one.
 
-    more : further constraints to be kept; most : parts of a box examined before it is left undecided
+    more : further constraints to be kept
+    most : parts of a box examined before it is left undecided
+    budget : for all boxes, those not decided when it is spent are left so too; None for no end
 
     Raises :class:`PoseError` for invalid corners.
     """
@@ -57,7 +66,7 @@ def prove_boxes(
         raise PoseError(f"two corners of {' '.join(region.free_axes)} expected of a box")
     if not (np.isfinite(bottom).all() and np.isfinite(top).all() and (bottom <= top).all()):
         raise PoseError("two finite corners expected of a box, the lower one first")
-    bisection = _BoxBisection(region, bottom, top, more, most)
+    bisection = _BoxBisection(region, bottom, top, more, most, budget or Budget(None))
     if region.every_orientation or not bisection.constraints:
         for number, constraint in enumerate(bisection.constraints):
             bisection.prove_constraint(number, constraint)
@@ -70,8 +79,9 @@ def prove_boxes(
 class _BoxBisection:
     """N boxes in parts; ``undecided`` are those whose parts are all proved so far or can still be."""
 
-    def __init__(self, region: Region, low: Array, high: Array, more: Sequence[Constraint], most: int):
-        self.region, self.low, self.high, self.more, self.most = region, low, high, more, most
+    def __init__(self, region: Region, low: Array, high: Array, more: Sequence[Constraint], most: int, budget: Budget):
+        self.region, self.low, self.high, self.more = region, low, high, more
+        self.most, self.budget = most, budget
         self.constraints = [*(c for c in region.constraints if not c.implied), *more]
         n, self.d = low.shape
         self.first, self.last = region.swept_bounds
@@ -88,6 +98,8 @@ class _BoxBisection:
         """Count parts; returns those of undecided boxes without too many examined parts since ``before``."""
         self.boxes += np.bincount(box, minlength=len(self.boxes))
         self.undecided &= self.boxes - before <= self.most
+        if self.budget.is_spent():
+            self.undecided[box] = False
         return np.asarray(self.undecided[box])
 
     def prove_constraint(self, number: int, constraint: Constraint) -> None:
@@ -133,7 +145,9 @@ class _BoxBisection:
             if not len(box):
                 break
             middle = 0.5 * (low + high)
-            orientations, margins = find_best_orientations(self.region, middle, self.more)
+            orientations, margins = self._find_best_orientations(middle)
+            if self.budget.is_spent():
+                break
             broken = ~(margins >= 0.0).all(1)
             if broken.any():
                 first = (~(margins[broken] >= 0.0)).argmax(1)
@@ -145,6 +159,17 @@ class _BoxBisection:
             box, orientations = box[number], orientations[number]
         self.undecided[box] = False
         self.proved[:] = self.undecided
+
+    def _find_best_orientations(self, positions: Array) -> tuple[Array, Array]:
+        """Find the best orientation at each position, and the margins there; NaN where the budget does not allow it."""
+        names = [*self.region.limits, *(constraint.name for constraint in self.more)]
+        orientations = np.full((len(positions), len(self.first)), np.nan)
+        margins = np.full((len(positions), len(names)), np.nan)
+        for part in split_rows(len(positions), _AT_ONCE):
+            if self.budget.is_spent():
+                break
+            orientations[part], margins[part] = find_best_orientations(self.region, positions[part], self.more)
+        return orientations, margins
 
     def _prove_at_orientations(self, low: Array, high: Array, orientations: Array) -> Flags:
         """Prove that all limits are kept all over boxes, each at one orientation."""

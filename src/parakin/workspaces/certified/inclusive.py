@@ -23,6 +23,7 @@ from .subdivision import Cells, OrientationBoxes, Subdivision, add_cuts, bisect_
 
 LOOKS = 4  # tries at narrowed orientations in a round
 MOST = 128  # boxes of orientations that a cell may have
+POINTS = 3  # orientations at which a cell is tried, the middles of its best leaves
 _SPREAD = 0.25  # boxes whose margins change more with orientation than this × their change with position are bisected
 
 
@@ -72,7 +73,26 @@ class InclusiveSubdivision(Subdivision):
         columns = zip(*(part for _, part, _ in finished), strict=True)
         fractions = CellFractions(*(np.concatenate(column) for column in columns))
         planes = np.concatenate([part for _, _, part in finished])
-        return self._sort_out(low, size, _merge_leaves(leaves.cell, fractions, planes, inside), [leaves])
+        at_points = self._prove_at_points(low, size, leaves, fractions.estimate)
+        inside |= at_points >= 1.0
+        merged = _merge_leaves(leaves.cell, fractions, planes, inside)
+        merged = merged._replace(inner=np.maximum(merged.inner, at_points))
+        return self._sort_out(low, size, merged, [leaves])
+
+    def _prove_at_points(self, low: Array, size: Array, leaves: OrientationBoxes, estimate: Array) -> Array:
+        """Prove what the middle orientations of each cell's best leaves hold of it alone: inner fractions (cells,).
+
+        Bounds over a leaf are wide as long as it is; those at one orientation are not.
+        """
+        inner = np.zeros(len(low))
+        order = np.lexsort((-estimate, leaves.cell))
+        cell = leaves.cell[order]
+        rank = np.arange(len(cell)) - np.searchsorted(cell, cell)
+        best = leaves.take(order[rank < POINTS])
+        middle = 0.5 * (best.low + best.high)
+        points, bounds = self._bound_leaves(low, size, replace(best, low=middle, high=middle))
+        np.maximum.at(inner, points.cell, bounds.fractions.inner)
+        return inner
 
     def _bound_leaves(self, low: Array, size: Array, leaves: OrientationBoxes) -> tuple[OrientationBoxes, LeafBounds]:
         """Bound all constraints over leaves; returns those that may hold an allowed orientation, and their bounds."""

@@ -12,7 +12,8 @@ from typing import Any, Literal
 import numpy as np
 
 from ...arguments import check_arguments, parse_coordinate, parse_range
-from ...arrays import Array, AxisRange
+from ...arrays import Array, AxisRange, Flags
+from ...budget import Budget
 from ...errors import PoseError
 from ...kernels.elementary import GREATEST_ANGLE
 from ...machine import Machine
@@ -134,38 +135,36 @@ class Region:
         subdivision = TotalSubdivision if self.every_orientation else InclusiveSubdivision
         return subdivision([*self.constraints, *more], low, high, self.swept_bounds)
 
+    def include_all_parts(self) -> Region:
+        """Make the same region of all assembly modes, which has the same extent."""
+        if self.part == "all":
+            return self
+        whole = replace(self, part="all")
+        if "extent" in self.__dict__:
+            whole.__dict__["extent"] = self.extent
+        return whole
+
     @cached_property
     def extent(self) -> tuple[Array, Array] | None:
-        """A box proved to hold the whole region, not much larger than it; None for a region proved empty.
+        """The box that :meth:`find_extent` finds in its own time."""
+        return self.find_extent()
 
-        It is that of all parts: the limits bound the machine, and no sign of a determinant does.
+    def find_extent(self, budget: Budget | None = None) -> tuple[Array, Array] | None:
+        """Find a box proved to hold the whole region, not much larger than it; None for a region proved empty.
 
-        Raises :class:`PoseError` if the limits leave it unbounded.
+        It is that of all parts: the limits bound the machine, and no sign of a determinant does. Where the budget (by
+        default 60 s) ends before, the box is larger than need be, else it is kept.
+
+        Raises :class:`PoseError` if the limits leave it unbounded, or are not proved to bound it.
         """
-        if self.part != "all":
-            return replace(self, part="all").extent
-        far = np.full(len(self.free_axes), FAR)
-        subdivision = self.subdivide(-far, far)
-        before = 2.0 * far
-        while True:
-            cells = subdivision.collect_cells("gap")
-            if not len(cells.low):
-                return None
-            low, high = cells.low.min(0), (cells.low + cells.size).max(0)
-            far_out = (low <= -FAR) | (high >= FAR)
-            inside = cells.take(cells.inside)
-            for_good = ((inside.low <= -FAR) | (inside.low + inside.size >= FAR)).any(0)
-            count = len(subdivision.open_cells.low)
-            done = not count or count > _MANY or subdivision.open_cells.size.max() < _TINY
-            if for_good.any() or (far_out.any() and done):
-                axis = self.free_axes[int((for_good if for_good.any() else far_out).argmax())]
-                raise PoseError(f"the limits that count do not bound the workspace in {axis}")
-            fine = ((high - low) >= 6.0 * cells.size.min(0)).any() or cells.size.max() < _TINY
-            still = ((high - low) > _SHRINKING * before).all() or count > _MANY
-            if not count or (fine and still and not far_out.any()):
-                return low, high
-            before = high - low
-            subdivision.refine(np.arange(count))
+        known: dict[str, Any] = self.__dict__
+        if "extent" in known:
+            return self.extent
+        budget = budget or Budget()
+        box = _search_extent(self.include_all_parts(), budget)
+        if not budget.is_spent():
+            known["extent"] = box
+        return box
 
     def poses(self, positions: Array, orientations: Array | None = None) -> Array:
         """Compute whole poses (N, axes) at positions (N, d) with values of the swept axes (N, s), in their order."""
@@ -184,6 +183,39 @@ class Region:
         return (
             f"<parakin region of {self.machine.name}: {' '.join(self.free_axes)}, {self.kind}{fixed and ' at '}{fixed}>"
         )
+
+
+def _search_extent(region: Region, budget: Budget) -> tuple[Array, Array] | None:
+    """Search for a box that holds a region by ever smaller cells; None for a region proved empty."""
+    far = np.full(len(region.free_axes), FAR)
+    subdivision = region.subdivide(-far, far)
+    before = 2.0 * far
+    while True:
+        cells = subdivision.collect_cells("gap")
+        if not len(cells.low):
+            return None
+        low, high = cells.low.min(0), (cells.low + cells.size).max(0)
+        far_out: Flags = np.asarray((low <= -FAR) | (high >= FAR))
+        inside = cells.take(cells.inside)
+        for_good: Flags = np.asarray(((inside.low <= -FAR) | (inside.low + inside.size >= FAR)).any(0))
+        count = len(subdivision.open_cells.low)
+        spent = budget.is_spent()
+        done = not count or count > _MANY or subdivision.open_cells.size.max() < _TINY or spent
+        if for_good.any():
+            raise PoseError(f"the limits that count do not bound the workspace in {_name_first(region, for_good)}")
+        if far_out.any() and done:
+            axis = _name_first(region, far_out)
+            raise PoseError(f"the limits that count are not proved to bound the workspace in {axis}")
+        fine = ((high - low) >= 6.0 * cells.size.min(0)).any() or cells.size.max() < _TINY
+        still = ((high - low) > _SHRINKING * before).all() or count > _MANY
+        if not count or (fine and still and not far_out.any()) or spent:
+            return low, high
+        before = high - low
+        subdivision.refine(np.arange(count), budget)
+
+
+def _name_first(region: Region, flags: Flags) -> str:
+    return region.free_axes[int(flags.argmax())]
 
 
 @check_arguments

@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 
 from ...arrays import Array, Flags, Indices, Progress
+from ...budget import Budget
 from ...kernels.batch import run_in_threads
 from .constraints import Constraint
 from .plane_cuts import CellFractions, LinearBounds, PlaneCuts, TaylorBounds, accumulate_cuts, bound_linearly
@@ -217,8 +218,8 @@ class Subdivision(ABC):
         new[undecided] = np.arange(len(undecided))
         return cells.take(undecided), [part.renumber(new) for part in boxes]
 
-    def refine(self, parents: Indices, deadline: float = inf) -> None:
-        """Divide open cells into 2^d parts each, the first ones first, as many as the time allows.
+    def refine(self, parents: Indices, budget: Budget | None = None) -> None:
+        """Divide open cells into 2^d parts each, the first ones first, as many as the budget's time allows.
 
         Interrupted, it leaves the cells as they were.
         """
@@ -230,9 +231,10 @@ class Subdivision(ABC):
         start = 0
         while start < len(parents):
             began = time.monotonic()
-            if start and began > deadline:
+            left = inf if budget is None else budget.seconds_left
+            if start and not left > 0.0:
                 break
-            count = AT_ONCE if deadline == inf else int(min(AT_ONCE, 0.5 * (deadline - began) / self._seconds_per_cell))
+            count = int(min(AT_ONCE, 0.5 * left / self._seconds_per_cell))
             batch = np.sort(parents[start : start + max(_FEW, count)])
             start += len(batch)
             is_cut[batch] = True
@@ -258,10 +260,11 @@ class Subdivision(ABC):
         """Put all cells together, with the reason why the subdivision stopped."""
         return replace(concatenate_cells([*self.decided_cells, self.open_cells]), stopped=stopped, rounds=self.rounds)
 
-    def tighten(self, fraction: float, deadline: float = inf) -> tuple[Array, Array] | None:
+    def tighten(self, fraction: float, budget: Budget | None = None) -> tuple[Array, Array] | None:
         """Refine the outermost cells until none is larger than a fraction of the box about all cells.
 
-        Returns that box, or None if there are no cells. Faces along which very many cells lie are left as they are.
+        Returns that box, or None if there are no cells. Faces along which very many cells lie are left as they are,
+        and so are all where the budget is spent.
         """
         while True:
             cells, open_cells = self.collect_cells("gap"), self.open_cells
@@ -271,33 +274,32 @@ class Subdivision(ABC):
             slack = 1e-9 * (high - low)
             outermost = (open_cells.low <= low + slack) | (open_cells.low + open_cells.size >= high - slack)
             coarse = np.flatnonzero(outermost.any(1) & (open_cells.size.max(1) > (high - low).max() * fraction))
-            if not len(coarse) or len(coarse) > OUTERMOST or time.monotonic() > deadline:
+            if not len(coarse) or len(coarse) > OUTERMOST or (budget is not None and budget.is_spent()):
                 return low, high
-            self.refine(coarse)
+            self.refine(coarse, budget)
 
     def run(
         self,
         gap: float,
         cell: float | None = None,
-        seconds: float | None = None,
+        budget: Budget | None = None,
         progress: Progress | None = None,
     ) -> Cells:
-        """Refine until the relative gap, the cells' size (mm) or the time (s) is reached.
+        """Refine until the relative gap or the cells' size (mm) is reached, or until the budget is spent.
 
         Interrupted, it returns the cells it has.
         """
-        deadline = inf if seconds is None else time.monotonic() + seconds
         try:
             while True:
                 cells = self.collect_cells("gap")
                 stopped, parents = self._choose_parents(cells, gap, cell)
-                if not stopped and time.monotonic() > deadline:
+                if not stopped and budget is not None and budget.is_spent():
                     stopped = "time"
                 if stopped:
                     return replace(cells, stopped=stopped)
                 if progress:
                     progress(min(1.0, gap / cells.gap) if cells.gap > 0 else 1.0)
-                self.refine(parents, deadline)
+                self.refine(parents, budget)
         except KeyboardInterrupt:
             return self.collect_cells("interrupted")
 

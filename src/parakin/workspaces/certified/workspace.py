@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import astuple, dataclass, replace
 from functools import cached_property
-from math import inf, isfinite
+from math import isfinite
 from typing import Any
 
 import numpy as np
 
 from ...arguments import check_arguments
 from ...arrays import Array, Flags, Progress, split_rows
+from ...budget import SECONDS, Budget
 from ...errors import PoseError
 from ...machine import Machine
 from .assembly_mode import make_side_constraints
@@ -25,6 +25,7 @@ from .subdivision import Cells, make_empty_cells
 ROUNDING = 1e-9  # relative, of the sums of volumes
 _VAGUE = 0.2  # gap from which the estimate of an inclusive region is sampled
 _MOST_SAMPLED, _SAMPLED_AT_ONCE = 20_000, 500  # cells
+_PROVING = 0.8  # share of the time for the bounds of an inclusive region; the rest is for its estimate
 _CLOSE = 1.0 / 128.0  # size of the cells at the bounding box's faces, as a fraction of the box
 
 
@@ -142,7 +143,7 @@ def workspace(
     region: Region,
     gap: float = 0.01,
     cell: float | None = None,
-    seconds: float | None = 60.0,
+    seconds: float | None = SECONDS,
     progress: Progress | None = None,
 ) -> Workspace:
     """Find the workspace of a region by adaptive subdivision, its volume proved to lie between two numbers.
@@ -161,42 +162,47 @@ def workspace(
         raise PoseError(f"gap: a number above 0 expected, not {gap:g}")
     if cell is not None and not (isfinite(cell) and cell > 0.0):
         raise PoseError(f"cell: a size above 0 mm expected, not {cell:g}")
-    if seconds is not None and not seconds > 0.0:
-        raise PoseError(f"seconds: a time above 0 s expected, not {seconds:g}")
+    budget = Budget(seconds)
     parameters = {**region.parameters, "method": "certified", "gap": gap, "cell": cell, "seconds": seconds}
-    began = time.monotonic()
-    extent = region.extent
+    extent = region.find_extent(budget)
     if extent is None:
         return Workspace(region, make_empty_cells(len(region.free_axes)), "gap", parameters)
-    rest = None if seconds is None else seconds - (time.monotonic() - began)
     subdivision = region.subdivide(*extent)
-    stopped = subdivision.run(gap, cell, rest, progress).stopped
+    stopped = subdivision.run(
+        gap, cell, budget.take_share(1.0 if region.every_orientation else _PROVING), progress
+    ).stopped
     if stopped == "gap":
         with suppress(KeyboardInterrupt):  # the volume is known; only its box could be closer
-            subdivision.tighten(_CLOSE, began + (inf if seconds is None else seconds))
+            subdivision.tighten(_CLOSE, budget)
     cells = subdivision.collect_cells(stopped)
     if not region.every_orientation and cells.gap > _VAGUE:
-        cells = _sample_estimates(region, cells)
+        cells = _sample_estimates(region, cells, budget)
     joined = _find_home_cells(region, cells)
     if joined is None or joined.all():
         return Workspace(region, cells, stopped, parameters)
     return Workspace(region, cells.take(joined), stopped, parameters, _sum_volumes(cells.take(~joined)))
 
 
-def _sample_estimates(region: Region, cells: Cells) -> Cells:
+def _sample_estimates(region: Region, cells: Cells, budget: Budget) -> Cells:
     """Estimate cells at the boundary by whether a position at random in each is allowed at its best orientation.
 
     Bounds of planes are far apart where orientations are still wide, and say little of what lies between them. Of very
-    many cells some are sampled, the others get these cells' mean.
+    many cells, or within little time, some are sampled, the others get these cells' mean.
     """
     edge = np.flatnonzero(~cells.inside)
     rng = np.random.default_rng(0)
-    sampled = edge if len(edge) <= _MOST_SAMPLED else np.sort(rng.choice(edge, _MOST_SAMPLED, replace=False))
+    sampled = edge if len(edge) <= _MOST_SAMPLED else rng.choice(edge, _MOST_SAMPLED, replace=False)
+    sampled = rng.permutation(sampled)
     positions = cells.low[sampled] + rng.random((len(sampled), cells.low.shape[1])) * cells.size[sampled]
     allowed = np.zeros(len(sampled))
+    done = 0
     for part in split_rows(len(sampled), _SAMPLED_AT_ONCE):
+        if done and budget.is_spent():
+            break
         margins = find_best_orientations(region, positions[part])[1]
         allowed[part] = (margins >= 0.0).all(1)
+        done = min(part.stop, len(sampled))
+    sampled, allowed = sampled[:done], allowed[:done]
     volumes = cells.volumes[sampled]
     estimate = cells.estimate.copy()
     estimate[edge] = float(allowed @ volumes / volumes.sum())
@@ -226,13 +232,13 @@ def measure_elsewhere(workspace: Workspace, gap: float = 0.05, seconds: float | 
     region = workspace.region
     if region.part == "all":
         return NOTHING
-    everywhere = replace(region, part="all")
-    own = make_side_constraints(everywhere.traced_pose)[0]
-    other = replace(own, margin=0.0 - own.margin)  # a singularity all over an orientation is no part of home's either
-    extent = everywhere.extent
+    budget = Budget(seconds)
+    extent, everywhere = region.find_extent(budget), region.include_all_parts()
     if extent is None:
         return workspace.apart
-    cells = everywhere.subdivide(*extent, [other]).run(gap, seconds=seconds)
+    own = make_side_constraints(everywhere.traced_pose)[0]
+    other = replace(own, margin=0.0 - own.margin)  # a singularity all over an orientation is no part of home's either
+    cells = everywhere.subdivide(*extent, [other]).run(gap, budget=budget)
     beyond = _sum_volumes(cells)
     return Volume(*(a + b for a, b in zip(astuple(workspace.apart), astuple(beyond), strict=True)))
 

@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...arrays import Array, Flags, Indices
+from ...budget import Budget
 from ..certified.constraints import Constraint
 from ..certified.containment import prove_boxes
 from ..certified.region import Region
@@ -55,10 +56,10 @@ class CellComponents:
 
 
 class Resolution(NamedTuple):
-    """How finely a region is subdivided: the cells' edge, mm, the time, s, and how often again more finely."""
+    """How finely a region is subdivided: the cells' edge, mm, within a budget, and how often again more finely."""
 
     cell: float
-    seconds: float | None
+    budget: Budget
     deeper: int = _DEEPER
 
 
@@ -78,12 +79,12 @@ def find_cell_components(
     Cells that share a point, undecided ones included, form groups; no path leads from one group to another.
     """
     subdivision = region.subdivide(low, high, [constraint])
-    cells = refuse_interrupted(subdivision.run(_GAP, resolution.cell, resolution.seconds))
+    cells = refuse_interrupted(subdivision.run(_GAP, resolution.cell, resolution.budget))
     if not len(cells.low):
         return CellComponents([], 0, 0.0, cells.stopped)
     faces, points = find_adjacent_cells(cells.low, cells.size)
     group = label_components(len(cells.low), points)
-    component = _join_cells(region, constraint, cells, faces, points)
+    component = _join_cells(region, constraint, cells, (faces, points), resolution.budget)
     labelled = _LabelledCells(cells, component, _spread_owners(component, cells.inside, points))
     components, at_least, undecided = [], 0, 0.0
     for number in np.unique(group):
@@ -132,20 +133,26 @@ def _refine_group(
     """Find the components of a group of undecided cells by finer ones, if no other cell is in their box."""
     low, high = cells.low[members].min(0), (cells.low + cells.size)[members].max(0)
     others = ~members & (cells.low < high).all(1) & (cells.low + cells.size > low).all(1)
-    if not resolution.deeper or others.any():
+    if not resolution.deeper or others.any() or resolution.budget.is_spent():
         return CellComponents([], 0, _sum_volumes(cells, cells.outer, members), cells.stopped)
-    finer = Resolution(resolution.cell / _FINER, resolution.seconds, resolution.deeper - 1)
+    finer = Resolution(resolution.cell / _FINER, resolution.budget, resolution.deeper - 1)
     return find_cell_components(region, constraint, low, high, finer)
 
 
-def _join_cells(region: Region, constraint: Constraint, cells: Cells, faces: Indices, points: Indices) -> Indices:
-    """Label cells inside that hang together: by faces, or by thin boxes that are proved inside."""
+def _join_cells(
+    region: Region, constraint: Constraint, cells: Cells, adjacency: tuple[Indices, Indices], budget: Budget
+) -> Indices:
+    """Label cells inside that hang together: by faces, or by thin boxes that are proved inside.
+
+    adjacency : pairs of cells that share a face, and that share a point, as of :func:`find_adjacent_cells`
+    """
+    faces, points = adjacency
     inside, count = cells.inside, len(cells.low)
     pairs = faces[inside[faces].all(1)]
     component = label_components(count, pairs)
     for _ in range(_ROUNDS):
         links = _list_links(component, inside, points)
-        proved = _prove_links(region, constraint, cells, links)
+        proved = _prove_links(region, constraint, cells, links, budget)
         if not proved.any():
             break
         pairs = np.concatenate([pairs, links[proved]])
@@ -165,7 +172,7 @@ def _list_links(component: Indices, inside: Flags, points: Indices) -> Indices:
     return links[:: max(1, -(-len(links) // _LINKS))]
 
 
-def _prove_links(region: Region, constraint: Constraint, cells: Cells, links: Indices) -> Flags:
+def _prove_links(region: Region, constraint: Constraint, cells: Cells, links: Indices, budget: Budget) -> Flags:
     """Prove that a thin box from cell to cell is inside, for each of the links."""
     proved = np.zeros(len(links), np.bool_)
     top = cells.low + cells.size
@@ -180,7 +187,7 @@ def _prove_links(region: Region, constraint: Constraint, cells: Cells, links: In
         middle = low[left] + np.array(along) * (high[left] - low[left])
         box_low = np.where(apart[left], low[left], middle - thin)
         box_high = np.where(apart[left], high[left], middle + thin)
-        proved[left] = prove_boxes(region, box_low, box_high, [constraint], _PARTS).proved
+        proved[left] = prove_boxes(region, box_low, box_high, [constraint], _PARTS, budget).proved
     return proved
 
 

@@ -7,14 +7,15 @@ serial singularities of a working mode; the parallel ones separate components wh
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from math import isfinite
 from typing import Any
 
 import numpy as np
 
 from ...arguments import RowsLike, check_arguments
-from ...arrays import Array
+from ...arrays import Array, Progress
+from ...budget import SECONDS, Budget
 from ...errors import PoseError
 from ..certified.assembly_mode import make_side_constraints
 from ..certified.constraints import Constraint
@@ -26,6 +27,7 @@ from .adjacency import refuse_too_many_cells
 from .cell_components import CellComponent, Resolution, find_cell_components
 
 _FINE = {1: 4096, 2: 512, 3: 128}  # cells along the longest edge, by dimension
+_OUTLINE = 0.2  # share of the time for the outline
 _NEAR = 32  # cells of a component from which a path to a position is looked for
 
 _Pair = tuple["Component", CellComponent]
@@ -89,7 +91,8 @@ def find_components(
     region: Region,
     start: RowsLike | None = None,
     cell: float | None = None,
-    seconds: float | None = 60.0,
+    seconds: float | None = SECONDS,
+    progress: Progress | None = None,
 ) -> Components:
     """Find the connected components of a region under singularities and the working mode, by certified cells.
 
@@ -100,7 +103,8 @@ def find_components(
     ----------
     start : a pose, mm and rad, whose component is wanted
     cell : edge to which the boundary is refined, mm; 1/128 of the region's extent if not given (1/512 in the plane)
-    seconds : stop refining cells after this time, for each sign of det A; None for no end
+    seconds : stop refining cells after this time; None for no end
+    progress : called with the fraction done
 
     Raises :class:`PoseError` for an inclusive region, a start outside it, or one that is too near to the boundary.
     """
@@ -108,19 +112,21 @@ def find_components(
         raise PoseError("some: of one turn for each place nothing is known of the turns between; hold or sweep them")
     if cell is not None and not (isfinite(cell) and cell > 0.0):
         raise PoseError(f"cell: a size above 0 mm expected, not {cell:g}")
-    if seconds is not None and not seconds > 0.0:
-        raise PoseError(f"seconds: a time above 0 s expected, not {seconds:g}")
-    region = replace(region, part="all")
+    budget, report = Budget(seconds), progress or (lambda fraction: None)
+    region = region.include_all_parts()
     sides = dict(zip((1, -1), make_side_constraints(region.traced_pose), strict=True))
     position, sign = (None, 0) if start is None else _locate_start(region, start, sides)
-    outline = find_outline_cells(region)
+    outline = find_outline_cells(region, budget.take_share(_OUTLINE))
     low, high = outline.low.min(0), (outline.low + outline.size).max(0)
     edge = float((high - low).max()) / _FINE[len(low)] if cell is None else cell
     refuse_too_many_cells(np.ceil((high - low) / edge), edge)
     pairs: list[_Pair] = []
     at_least, undecided, stopped = 0, 0.0, "cell"
-    for own_sign, constraint in sides.items():
-        one_side = find_cell_components(region, constraint, low, high, Resolution(edge, seconds))
+    for done, (own_sign, constraint) in enumerate(sides.items()):
+        report((1.0 + done) / (1.0 + len(sides)))
+        one_side = find_cell_components(
+            region, constraint, low, high, Resolution(edge, budget.take_share(1.0 / (len(sides) - done)))
+        )
         pairs += [(_describe_component(own_sign, cells), cells) for cells in one_side.components]
         at_least += one_side.at_least
         undecided += one_side.undecided

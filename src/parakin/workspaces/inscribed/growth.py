@@ -9,6 +9,7 @@ from itertools import product
 import numpy as np
 
 from ...arrays import Array
+from ...budget import Budget
 from ..certified.best_orientation import evaluate_margins, find_best_orientations
 from ..certified.containment import prove_boxes
 from ..certified.region import Region
@@ -64,7 +65,7 @@ class BoxFamily:
         """Make the corners (..., 2, d) of the boxes z (..., k)."""
         return np.asarray(self.base + np.einsum("cdk,...k->...cd", self.by, z))
 
-    def prove_volumes(self, region: Region, z: Array, most: int) -> tuple[Array, Array]:
+    def prove_volumes(self, region: Region, z: Array, most: int, budget: Budget) -> tuple[Array, Array]:
         """Prove boxes z (n, k); returns their volumes, zero where not proved, and points where a limit is broken.
 
         The points (m, d + s) are fractions of the box and of the swept ranges.
@@ -73,7 +74,7 @@ class BoxFamily:
         edges = boxes[:, 1] - boxes[:, 0]
         volumes = np.where((edges > 0.0).all(1), edges.prod(1), 0.0)
         solid = np.flatnonzero(volumes > 0.0)
-        containment = prove_boxes(region, boxes[solid, 0], boxes[solid, 1], most=most)
+        containment = prove_boxes(region, boxes[solid, 0], boxes[solid, 1], most=most, budget=budget)
         volumes[solid[~containment.proved]] = 0.0
         is_broken = containment.limit >= 0
         broken = solid[is_broken]
@@ -82,15 +83,18 @@ class BoxFamily:
         return volumes, np.hstack([positions, (containment.orientations[is_broken] - low) / wide])
 
 
-def climb_volume(region: Region, family: BoxFamily, z: Array, tolerance: float) -> Array:
-    """Maximise the volume by sequential linearisation of the limits, starting from a proved box of the family."""
+def climb_volume(region: Region, family: BoxFamily, z: Array, tolerance: float, budget: Budget) -> Array:
+    """Maximise the volume by sequential linearisation of the limits, starting from a proved box of the family.
+
+    A budget that is spent ends it with the best box proved so far.
+    """
     volume = float((family.make_boxes(z)[1] - family.make_boxes(z)[0]).prod())
     nodes, broken = _list_nodes(region), np.zeros((0, len(region.free_axes) + len(region.swept_axes)))
     trust = _FIRST
     for _ in range(_STEPS):
         low, high = family.make_boxes(z)
         edges = high - low
-        if trust * edges.max() < tolerance:
+        if trust * edges.max() < tolerance or budget.is_spent():
             break
         rows, slack = _linearise_limits(region, family, low, high, np.vstack([nodes, broken]))
         reach = trust * np.array([edges[np.abs(family.by[:, :, j]).sum(0) > 0.0].min() for j in range(len(z))])
@@ -99,7 +103,7 @@ def climb_volume(region: Region, family: BoxFamily, z: Array, tolerance: float) 
         if length < 0.1 * tolerance:
             break
         tries = np.array([z + t * step + back * t * length * family.inward for t in _LENGTHS for back in _BACK])
-        volumes, now_broken = family.prove_volumes(region, tries, MOST)
+        volumes, now_broken = family.prove_volumes(region, tries, MOST, budget)
         broken = np.vstack([broken, now_broken])[-_REMEMBERED:]
         best = int(volumes.argmax())
         gain = volumes[best] / volume - 1.0
@@ -115,19 +119,19 @@ def climb_volume(region: Region, family: BoxFamily, z: Array, tolerance: float) 
     return z
 
 
-def grow_faces(region: Region, family: BoxFamily, z: Array, tolerance: float) -> Array:
+def grow_faces(region: Region, family: BoxFamily, z: Array, tolerance: float, budget: Budget) -> Array:
     """Move the faces outward, each until a move by more than a quarter of the tolerance is not proved.
 
-    One search for each is enough: where a box can't grow, a larger one can't.
+    One search for each is enough: where a box can't grow, a larger one can't. A budget that is spent ends it before.
     """
-    extent = region.extent
+    extent = region.find_extent(budget)
     assert extent is not None
     most = 8 * MOST if region.every_orientation else 2 * MOST
     for direction in family.outward:
         low, high = 0.0, float((extent[1] - extent[0]).max())
         lengths = 0.25 * tolerance * (4.0 * high / tolerance) ** np.linspace(0.0, 1.0, _TRIED)
-        while True:
-            volumes, _ = family.prove_volumes(region, z + lengths[:, None] * direction, most)
+        while not budget.is_spent():
+            volumes, _ = family.prove_volumes(region, z + lengths[:, None] * direction, most, budget)
             good = int((volumes > 0.0).cumprod().sum())
             low, high = (lengths[good - 1] if good else low), (lengths[good] if good < len(lengths) else high)
             if high - low <= 0.25 * tolerance:

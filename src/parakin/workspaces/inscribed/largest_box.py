@@ -4,22 +4,27 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import partial
 from typing import Any
 
 import numpy as np
 
 from ...arguments import RowsLike, check_arguments, read_vector
-from ...arrays import Array
+from ...arrays import Array, Progress
+from ...budget import SECONDS, Budget
 from ...errors import PoseError
 from ..certified.containment import prove_boxes
 from ..certified.region import Region
 from .growth import BoxFamily, climb_volume, grow_faces
-from .seeds import find_outline_cells, find_seeds
+from .seeds import COUNT, find_outline_cells, find_seeds
 
 TOLERANCE = 1e-4  # fraction of the region's extent
 _SLIGHTLY_SMALLER = 1.0 - np.array([1e-14, 1e-12, 1e-9, 1e-6])
+_SEARCH, _OUTLINE, _FINAL = 0.7, 0.3, 0.7  # shares of the time: for the search, the outline in it, the last proof
 _OUTSIDE = 2.0 ** np.arange(6)  # tolerances by which a face is moved to find what stops it
+
+
+class NoBoxError(PoseError):
+    """No box was proved to be inside: the region is too thin, or the time too short."""
 
 
 @dataclass(frozen=True)
@@ -40,6 +45,7 @@ class InscribedBox:
 
     stops : what stops each face, the lower and the upper one of each axis in turn
     tolerance : mm; by so much no face (of a box of given proportions or centre: not the box) could be proved to grow
+    stopped : why the search ended: ``tolerance``, or ``time``; then the faces may have room to grow
     parameters : enough to run it again
     proved : always true
     """
@@ -50,6 +56,7 @@ class InscribedBox:
     stops: tuple[FaceStop, ...]
     tolerance: float
     parameters: Mapping[str, Any]
+    stopped: str = "tolerance"
     proved: bool = True
 
     @property
@@ -88,6 +95,8 @@ def find_largest_box(
     shape: Sequence[float] | None = None,
     around: RowsLike | None = None,
     tolerance: float | None = None,
+    seconds: float | None = SECONDS,
+    progress: Progress | None = None,
 ) -> InscribedBox:
     """Find a large axis-parallel box inside a region, by growth from several seeds.
 
@@ -99,45 +108,60 @@ def find_largest_box(
     shape : proportions of its edges, one for each axis of a position; without them its volume is made greatest
     around : its centre, mm, one number for each axis of a position
     tolerance : mm; 1e-4 of the region's greatest extent if not given
+    seconds : stop after this time with the largest box proved so far; None for no end
+    progress : called with the fraction done
 
-    Raises :class:`PoseError` for a region in which no box is proved inside, a centre outside, or an invalid shape.
+    Raises :class:`PoseError` for a region in which no box is proved inside (in that time), a centre outside, or an
+    invalid shape.
     """
     proportions = None if shape is None else _check_shape(region, shape)
     centre = None if around is None else _check_centre(region, around)
     if tolerance is not None and not (np.isfinite(tolerance) and tolerance > 0.0):
         raise PoseError(f"tolerance: a length above 0 mm expected, not {tolerance:g}")
-    outline = find_outline_cells(region)
+    budget = Budget(seconds)
+    search = budget.take_share(_SEARCH)
+    outline = find_outline_cells(region, search.take_share(_OUTLINE))
     low, high = outline.low.min(0), (outline.low + outline.size).max(0)
     smallest = TOLERANCE * float((high - low).max()) if tolerance is None else float(tolerance)
     boxes: list[Array] = []
-    for seed_low, seed_high in find_seeds(region, outline, proportions, centre):
+    for seed_low, seed_high in find_seeds(region, outline, proportions, centre, search):
+        if progress:
+            progress((1.0 + len(boxes)) / (COUNT + 2.0))
         family = BoxFamily.start_from(seed_low, seed_high, proportions, centre)
         z = family.first
         if proportions is None or centre is None:
-            z = climb_volume(region, family, z, smallest)
-        z = grow_faces(region, family, z, smallest)
-        boxes.append(family.make_boxes(z))
-    boxes.sort(key=lambda box: -float((box[1] - box[0]).prod()))
-    proved = next((box for box in map(partial(_prove_final_box, region), boxes) if box is not None), None)
-    if proved is None:
-        what = "around the place" if centre is not None else "in the region"
-        raise PoseError(f"no box {what} could be proved to be inside")
-    first, last = proved
+            z = climb_volume(region, family, z, smallest, search)
+        boxes.append(family.make_boxes(grow_faces(region, family, z, smallest, search)))
+    stopped = "time" if search.is_spent() else "tolerance"
+    first, last = _prove_largest(region, boxes, budget.take_share(_FINAL), centre is not None, stopped)
     parameters = {
         **region.parameters,
         "shape": None if shape is None else [float(part) for part in shape],
         "around": None if centre is None else centre.tolist(),
         "tolerance": smallest,
+        "seconds": seconds,
     }
-    return InscribedBox(region, first, last, _find_stops(region, first, last, smallest), smallest, parameters)
+    stops = _find_stops(region, first, last, smallest, budget)
+    return InscribedBox(region, first, last, stops, smallest, parameters, stopped)
 
 
-def _prove_final_box(region: Region, box: Array) -> Array | None:
+def _prove_largest(region: Region, boxes: list[Array], budget: Budget, is_centred: bool, stopped: str) -> Array:
+    """Prove the largest box (2, d) that can be proved as it will be given."""
+    for box in sorted(boxes, key=lambda box: -float((box[1] - box[0]).prod())):
+        proved = _prove_final_box(region, box, budget)
+        if proved is not None:
+            return proved
+    what = "around the place" if is_centred else "in the region"
+    within = " in the time given" if stopped == "time" else ""
+    raise NoBoxError(f"no box {what} could be proved to be inside{within}")
+
+
+def _prove_final_box(region: Region, box: Array, budget: Budget) -> Array | None:
     """Prove the box as it will be given, to the last digit, or a slightly smaller one."""
     middle, half = box.mean(0), 0.5 * (box[1] - box[0])
     smaller = (np.array([middle - scale * half, middle + scale * half]) for scale in _SLIGHTLY_SMALLER)
     tries = np.array([box, *smaller])
-    proved = prove_boxes(region, tries[:, 0], tries[:, 1]).proved
+    proved = prove_boxes(region, tries[:, 0], tries[:, 1], budget=budget).proved
     return np.asarray(tries[proved.argmax()]) if proved.any() else None
 
 
@@ -158,15 +182,16 @@ def _check_centre(region: Region, around: RowsLike) -> Array:
     return centre
 
 
-def _find_stops(region: Region, low: Array, high: Array, tolerance: float) -> tuple[FaceStop, ...]:
+def _find_stops(region: Region, low: Array, high: Array, tolerance: float, budget: Budget) -> tuple[FaceStop, ...]:
     """Find a broken limit just outside each face, by layers ever thicker."""
-    stops = []
+    stops: list[FaceStop] = []
     for axis, name in enumerate(region.free_axes):
         for side, sign in enumerate("-+"):
             layers = np.tile(np.array([low, high]), (len(_OUTSIDE), 1, 1))
             layers[:, 1 - side, axis] = (low, high)[side][axis]
             layers[:, side, axis] += (2 * side - 1) * tolerance * _OUTSIDE
-            containment = prove_boxes(region, layers[:, 0], layers[:, 1])
+            share = budget.take_share(1.0 / (2 * len(low) - len(stops)))
+            containment = prove_boxes(region, layers[:, 0], layers[:, 1], budget=share)
             broken = np.flatnonzero(containment.limit >= 0)
             if containment.proved[0] or not len(broken):
                 stops.append(FaceStop(sign + name, None, None))

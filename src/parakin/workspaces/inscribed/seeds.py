@@ -7,6 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from ...arrays import Array, Flags, Indices
+from ...budget import Budget
 from ...errors import PoseError
 from ..certified.containment import prove_boxes
 from ..certified.region import Region
@@ -16,19 +17,18 @@ from .mask_boxes import find_blocks, find_corner_boxes, find_largest_boxes
 GRID = 32  # cells along the longest edge
 COUNT = 4  # seeds; half as many where the best orientation must be searched for
 _GAP = 0.5  # the region is first subdivided to this relative gap
-_SECONDS = 30.0
 _SHRUNK = (1.0, 1.0 - 1e-6, 0.99, 0.9, 0.5, 0.2, 0.05)  # sizes of a box, of which the first proved one is taken
 _SMALL = 0.5 ** np.arange(1, 24)  # sizes of a box, as fractions of the room about its centre
 _LEAST = 0.02  # seeds smaller than this fraction of the largest one's volume are dropped
 
 
-def find_outline_cells(region: Region) -> Cells:
+def find_outline_cells(region: Region, budget: Budget) -> Cells:
     """Find cells that hold the whole region, to a coarse gap.
 
     Raises :class:`PoseError` for an empty one.
     """
-    extent = region.extent
-    cells = None if extent is None else refuse_interrupted(region.subdivide(*extent).run(_GAP, seconds=_SECONDS))
+    extent = region.find_extent(budget)
+    cells = None if extent is None else refuse_interrupted(region.subdivide(*extent).run(_GAP, budget=budget))
     if cells is None or not len(cells.low):
         raise PoseError("the region is empty")
     return cells
@@ -42,14 +42,17 @@ def refuse_interrupted(cells: Cells) -> Cells:
 
 
 def find_seeds(
-    region: Region, outline: Cells, shape: Array | None, centre: Array | None
+    region: Region, outline: Cells, shape: Array | None, centre: Array | None, budget: Budget
 ) -> Iterator[tuple[Array, Array]]:
-    """Find boxes proved inside, that differ: of the given ``shape`` and about the ``centre`` where these are given."""
+    """Find boxes proved inside, that differ: of the given ``shape`` and about the ``centre`` where these are given.
+
+    A budget that is spent ends it.
+    """
     low, high = outline.low.min(0), (outline.low + outline.size).max(0)
     if centre is None:
-        boxes = np.concatenate([_find_grid_boxes(region, low, high, shape), _list_largest_cells(outline)])
+        boxes = np.concatenate([_find_grid_boxes(region, low, high, shape, budget), _list_largest_cells(outline)])
     else:
-        boxes = _find_centred_boxes(region, centre, np.minimum(centre - low, high - centre))
+        boxes = _find_centred_boxes(region, centre, np.minimum(centre - low, high - centre), budget)
     middle, edges = boxes.mean(1), boxes[:, 1] - boxes[:, 0]
     if shape is not None:
         edges = (edges / shape).min(1, keepdims=True) * shape
@@ -59,7 +62,7 @@ def find_seeds(
         if volume[which] < _LEAST * volume.max() and count:
             return
         half = 0.5 * np.multiply.outer(_SHRUNK, edges[which])
-        proved = prove_boxes(region, middle[which] - half, middle[which] + half).proved
+        proved = prove_boxes(region, middle[which] - half, middle[which] + half, budget=budget).proved
         if proved.any():
             best = half[proved.argmax()]
             yield middle[which] - best, middle[which] + best
@@ -68,10 +71,10 @@ def find_seeds(
             return
 
 
-def _prove_grid(region: Region, low: Array, high: Array) -> tuple[Flags, Array]:
+def _prove_grid(region: Region, low: Array, high: Array, budget: Budget) -> tuple[Flags, Array]:
     """Find which cells of a grid over [low, high] are proved inside; returns the mask, and the cells' edges."""
     edge = float((high - low).max()) / GRID
-    cells = refuse_interrupted(region.subdivide(low, high).run(_GAP, edge, _SECONDS))
+    cells = refuse_interrupted(region.subdivide(low, high).run(_GAP, edge, budget.take_share(0.5)))
     if not len(cells.low):
         return np.zeros((1,) * len(low), np.bool_), high - low
     size = cells.size.min(0)
@@ -83,8 +86,8 @@ def _prove_grid(region: Region, low: Array, high: Array) -> tuple[Flags, Array]:
     return mask, size
 
 
-def _find_grid_boxes(region: Region, low: Array, high: Array, shape: Array | None) -> Array:
-    mask, size = _prove_grid(region, low, high)
+def _find_grid_boxes(region: Region, low: Array, high: Array, shape: Array | None, budget: Budget) -> Array:
+    mask, size = _prove_grid(region, low, high, budget)
     boxes = _find_any_boxes(mask) if shape is None else _find_shaped_boxes(mask, shape / size)
     return np.asarray(low + boxes * size)
 
@@ -116,10 +119,10 @@ def _list_largest_cells(outline: Cells) -> Array:
     return np.stack([inside.low, inside.low + inside.size], 1)
 
 
-def _find_centred_boxes(region: Region, centre: Array, half: Array) -> Array:
+def _find_centred_boxes(region: Region, centre: Array, half: Array, budget: Budget) -> Array:
     """Find boxes about a centre: of a grid that is the same on both sides, and ever smaller ones."""
     small = np.multiply.outer(_SMALL, half)
-    mask, size = _prove_grid(region, centre - half, centre + half)
+    mask, size = _prove_grid(region, centre - half, centre + half, budget)
     for axis in range(mask.ndim):
         mask = mask & np.flip(mask, axis)
     middle = np.array(mask.shape) // 2

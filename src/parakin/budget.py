@@ -1,0 +1,43 @@
+"""The budget of a search: the time and the work that it may take before it answers with what it has."""
+
+from __future__ import annotations
+
+import time
+from math import inf
+
+from .errors import PoseError
+
+SECONDS = 60.0  # of a search, if nothing else is said
+
+
+class Budget:
+    """The time, s, and the number of parts that a search may still examine; None for time without end.
+
+    A search asks :meth:`is_spent` between its steps and then answers with what is proved so far. ``used`` counts the
+    parts that it has examined.
+
+    Raises :class:`PoseError` for a time that is not above 0.
+    """
+
+    def __init__(self, seconds: float | None = SECONDS, parts: float = inf):
+        if seconds is not None and not seconds > 0.0:
+            raise PoseError(f"seconds: a time above 0 s expected, not {seconds:g}")
+        self.parts, self.used = parts, 0
+        self._deadline = inf if seconds is None else time.monotonic() + seconds
+
+    @property
+    def seconds_left(self) -> float:
+        """The time that is left, s, at least zero."""
+        return max(0.0, self._deadline - time.monotonic())
+
+    def is_spent(self) -> bool:
+        return self.used >= self.parts or time.monotonic() > self._deadline
+
+    def take_share(self, fraction: float) -> Budget:
+        """Make a budget of a fraction of what is left, for one step of several."""
+        share = Budget(None, max(0.0, self.parts - self.used) * fraction)
+        share._deadline = self._deadline if self._deadline == inf else time.monotonic() + fraction * self.seconds_left
+        return share
+
+    def __repr__(self) -> str:
+        return f"<parakin budget: {self.seconds_left:.3g} s left>"

@@ -1,0 +1,107 @@
+"""Every search ends: in its time, with what is proved by then, and it says so."""
+
+import json
+import time
+
+import numpy as np
+import pytest
+
+import parakin as pk
+from parakin.budget import Budget
+from parakin.cli import main
+from parakin.errors import PoseError
+from parakin.performance.certified.region_singularities import judge_singularities
+from parakin.workspaces.certified.containment import prove_boxes
+from parakin.workspaces.inscribed.largest_box import NoBoxError
+
+LATE = 20.0  # s beyond the time given: the step that runs when it is up, on a busy computer
+ALL_ROUND = {"A": ("-180 deg", "180 deg"), "B": ("-180 deg", "180 deg"), "C": ("-180 deg", "180 deg")}
+
+
+def test_a_share_is_of_what_is_left():
+    budget = Budget(100.0, 1000)
+    budget.used = 400
+    share = budget.take_share(0.5)
+    assert share.parts == 300
+    assert 40.0 < share.seconds_left <= 50.0
+    assert not budget.is_spent()
+    share.used = 300
+    assert share.is_spent()
+    assert Budget(None).take_share(0.1).seconds_left == float("inf")
+    assert Budget(1e-9).take_share(1.0).seconds_left == 0.0
+
+
+@pytest.mark.parametrize("seconds", [0.0, -1.0, float("nan")])
+def test_no_time_is_refused(seconds):
+    region = pk.region(pk.load("orthoglide"))
+    for ask in (pk.workspace, pk.find_largest_box, pk.find_components, pk.atlas):
+        with pytest.raises(PoseError, match="seconds: a time above 0 s expected"):
+            ask(region, seconds=seconds)
+
+
+def test_a_workspace_that_is_out_of_time_holds_its_volume():
+    truth = pk.workspace(pk.region(pk.load("hbg80_2d")), gap=1e-3).volume
+    began = time.monotonic()
+    hasty = pk.workspace(pk.region(pk.load("hbg80_2d")), gap=1e-9, seconds=1e-6)
+    assert time.monotonic() - began < LATE
+    assert hasty.stopped == "time"
+    assert hasty.volume.inner <= truth.outer
+    assert hasty.volume.outer >= truth.inner
+
+
+def test_a_box_out_of_time_is_proved_all_the_same():
+    region = pk.region(pk.load("hbg80_2d"))
+    began = time.monotonic()
+    try:
+        box = pk.find_largest_box(region, seconds=0.3)
+    except NoBoxError as error:
+        assert "in the time given" in str(error)
+    else:
+        assert box.stopped in ("time", "tolerance")
+        samples = np.random.default_rng(0).uniform(box.low, box.high, (1000, 2))
+        assert (region.machine.check(region.poses(samples)) == 0).all()
+    assert time.monotonic() - began < LATE
+    assert pk.find_largest_box(region).stopped == "tolerance"
+
+
+def test_boxes_out_of_time_are_undecided():
+    region = pk.region(pk.load("hbg80_2d"))
+    budget = Budget(1e-9)
+    low = region.machine.home[:2] - 1.0
+    found = prove_boxes(region, [low], [low + 2.0], budget=budget)
+    assert not found.proved.any()
+    assert (found.limit == -1).all()
+    assert prove_boxes(region, [low], [low + 2.0]).proved.all()
+
+
+def test_singularities_out_of_time_are_unproved():
+    verdicts = judge_singularities(pk.region(pk.load("hexapod")), Budget(1e-6))
+    assert {verdict.verdict for verdict in verdicts} <= {"unproved", "none"}
+    assert any("in the time given" in verdict.reason for verdict in verdicts)
+
+
+def test_an_extent_out_of_time_is_larger_and_not_kept():
+    region = pk.region(pk.load("hexapod"), some=ALL_ROUND)
+    began = time.monotonic()
+    hasty = region.find_extent(Budget(1e-9))
+    assert time.monotonic() - began < LATE
+    low, high = region.find_extent()
+    assert (hasty[0] <= low).all()
+    assert (hasty[1] >= high).all()
+    assert (hasty[1] - hasty[0] > high - low).any()
+
+
+def test_the_command_ends_and_tells_what_is_proved(capsys):
+    began = time.monotonic()
+    assert main(["workspace", "hbg80_2d", "--time", "0.001", "--gap", "1e-9", "--parts", "--json"]) == 0
+    assert time.monotonic() - began < 5 * LATE
+    told = json.loads(capsys.readouterr().out)
+    assert told["stopped"] == "time"
+    assert told["volume"]["inner"] <= told["volume"]["outer"]
+
+
+def test_a_box_that_is_not_found_does_not_hide_the_volume(capsys):
+    assert main(["workspace", "orthoglide", "--box", "--time", "0.0001"]) == 3
+    told = capsys.readouterr().out
+    assert "volume" in told
+    assert "box inside  no box in the region could be proved to be inside in the time given" in told

@@ -32,8 +32,8 @@ HEAD = """\
 # Files that parakin reads
 
 `parakin post PART` reads CL files (APT, and what CAM systems make of it) and G-code (RS274/NGC, as LinuxCNC reads
-it). The suffixes `.ngc .nc .gcode .tap .cnc` are G-code; of other files the first line that only one of the two can
-have decides. What moves, turns, shifts or compensates is honoured, or refused in one line with file and line
+it). The suffixes `.ngc .nc .gcode .tap .cnc` are G-code, `.apt .aptsource .cl .cls .ncl` are CL files; of other
+files the first line that only one of the two can have decides. What moves, turns, shifts or compensates is honoured, or refused in one line with file and line
 number; what only informs is listed once. This page is written by `scripts/reading_page.py` from the tables that the
 readers go by.
 """
@@ -51,10 +51,13 @@ tip is on the path; between records too. Summary, report, JSON and the program's
 | `--tool-length file` | the lengths in the file, of cutters too |
 | `--tool-length machine` | the machine's own, for all tools |
 | `--tools FILE` | the Z of LinuxCNC's tool table, by the number of LOADTL, T or G43 H |
-| `LOADTL/n,LENGTH,l`, `G10 L1`, `G43.1` | from nose to tip; refused where it is not the machine's own |
-| `TLDATA`, `CUTTER` with a height | a cutter without holder: refused where longer than the machine's own tool |
+| `LOADTL/n,LENGTH,l` (`LOADTL/n,l` of SolidWorks CAM), `G10 L1`, `G43.1` | from nose to tip; refused where it is not the machine's own |
+| `TLDATA`, `CUTTER` with a height, `LOADTL/n,pocket,l` of Autodesk | what sticks out of the holder: refused where longer than the machine's own tool, else noted |
 | several cutters | the longest as the machine's own tool, others by what they are shorter |
 | nothing | the machine's own |
+
+One rule is behind it: without an option nothing runs that contradicts the machine's own tool. A length from the nose
+to the tip contradicts it where it differs; what sticks out of a holder of unknown length only where it is longer.
 
 A table of lengths 0 only, as `parakin linuxcnc` writes it, leaves all to the machine's own tool. Where G43 has lengths
 from a table, G53 and G28 tell of the spindle's nose, as on a machine with such a table; else of the own tool's tip.

@@ -338,6 +338,73 @@ def test_gohome_is_a_rapid_motion(read):
     assert path.rapid.tolist() == [False, True, False]
 
 
+WORK_PLANE = "MCS/1,0,0,$\n0,0,1,$\n0,-1,0,$\n10,20,30\n"  # directions of X, Y and Z, then the origin: Autodesk's posts
+
+
+def test_the_work_plane_of_an_operation_is_its_frame(read):
+    path = read("UNITS/MM\n" + WORK_PLANE + "MCS2/1,0,0,0,0,1,0,-1,0\nFEDRAT/9\nGOTO/1,2,3\n")
+    np.testing.assert_array_equal(path.frame, [[1, 0, 0, 10], [0, 0, -1, 20], [0, 1, 0, 30]])
+    assert path.dialect == "camplete"
+    # the same point, told in the machine's directions first and in the work plane's then
+    path = read("MCS/1,0,0,0,1,0,0,0,1,0,0,0\nFEDRAT/9\nGOTO/11,17,32\n" + WORK_PLANE + "GOTO/1,2,3\n")
+    np.testing.assert_allclose(path.tip, [[11, 17, 32]] * 2, atol=1e-12)
+    np.testing.assert_allclose(path.axis, [[0, 0, 1], [0, -1, 0]], atol=1e-12)
+    refused(read, "MCS2/1,0,0,0,0,1,0,-1,0\nRAPID\nGOTO/1,2,3\n", 1, "MCS")
+
+
+def test_circles_of_autodesks_post_for_camplete(read):
+    # its onCircular: the plane's normal for a clockwise arc, the other way for a counterclockwise one
+    start = "CSI_TOOL_PATH/A\nFEDRAT/9\nGOTO/20,0,0\nCIRCLE/0,0,0,0,0,{},20,90,0,0,0\nGOTO/0,{},0\n"
+    for normal, end in ((-1, 20), (1, -20)):
+        path = read(start.format(normal, end))
+        angles = np.unwrap(np.arctan2(path.tip[:, 1], path.tip[:, 0]))
+        assert np.degrees(angles[-1]) == pytest.approx(-90 * normal)
+
+
+@pytest.mark.parametrize(
+    ("header", "word", "data"),
+    [
+        ("UNIT/MM\n", "LOADTL/5,125.", {"number": 5.0, "set_length": 125.0}),
+        ("UNIT/INCH\n", "LOADTL/5,5.", {"number": 5.0, "set_length": 127.0}),
+        ("$$ AUTODESK\n", "LOADTL/5, 0, 50.0, 5", {"number": 5.0, "body_length": 50.0}),
+        ("$$ CATIA APT VERSION 1.0\n", "LOADTL/5,1,1", {"number": 5.0}),
+        (NX_HEADER, "LOAD/TOOL,5,ADJUST,7", {"number": 5.0}),
+        ("", "TLDATA/DRILL,MILL,8.,0.,80.,118.,35.",
+         {"type": "DRILL,MILL", "diameter": 8.0, "corner_radius": 0.0, "length": 80.0}),
+    ],
+)  # fmt: skip
+def test_lengths_by_position(read, header, word, data):
+    path = read(f"{header}{word}\nFEDRAT/9\nGOTO/0,0,0\n")
+    assert data.items() <= path.tool.items() and not {"set_length", "body_length"} & (path.tool.keys() - data.keys())
+    assert not any("behind the tool's number" in note.text for note in path.notes)
+
+
+def test_values_behind_the_tools_number_that_no_header_tells(read):
+    path = read("LOADTL/5,125\nFEDRAT/9\nGOTO/0,0,0\n")
+    assert path.tool == {"number": 5.0} and [(n.line, n.text[:30]) for n in path.notes] == [
+        (1, "values behind the tool's numbe")
+    ]
+
+
+def test_a_tool_with_a_body_and_a_cutter_stays_the_same_tool(read):
+    tool = "CUTTER/10,0,5,0,0,0,30\nLOADTL/1,0,50,1\nSPINDL/900,RPM\n"
+    path = read("$$ AUTODESK\nFEDRAT/9\n" + tool + "GOTO/0,0,0\n" + tool + "GOTO/1,0,0\n")
+    assert len(path.tools) == 1 and not path.tools[0].changed
+
+
+@pytest.mark.parametrize(
+    "statement",
+    ["SET/MODE,INCR", "NURBS/KNOT,0,0,1,1", "MOVETO/1,2,3", "PLUNGE/5", "THICK/2", "ZSURF/3", "COUPLE/AUTO", "ZERO/2"],
+)
+def test_other_words_that_move_or_shift_are_refused(read, statement):
+    refused(read, f"ZERO/1\nFEDRAT/9\nGOTO/0,0,0\n{statement}\nGOTO/1,0,0\n", 4, statement.partition("/")[0])
+
+
+def test_settings_that_change_nothing(read):
+    path = read("ZERO/1\nSET/MODE,ABSOL\nSET/ADJUST,1\nSELECTL/3\nFEDRAT/9\nGOTO/0,0,0\nZERO/1\nGOTO/1,0,0\n")
+    assert len(path) == 2 and [note.text for note in path.notes] == ["words that only inform: SET"]
+
+
 # units and feeds
 
 
@@ -366,9 +433,14 @@ def test_no_feed_is_no_cut(read, text, line):
     refused(read, text, line, "feed")
 
 
+@pytest.mark.parametrize("feed", ["FEDRAT/0,MMPM", "SPINDL/OFF\nFEDRAT/0.2,MMPR", "SPINDL/0,RPM\nFEDRAT/1,IPR"])
+def test_a_feed_of_zero_is_no_cut(read, feed):
+    refused(read, feed + "\nRAPID\nGOTO/0,0,0\nGOTO/1,0,0\n", feed.count("\n") + 4, "feed of zero")
+
+
 def test_no_feed_in_a_large_file(tmp_path):
     path = tmp_path / "big.cl"
-    for start, line in (("", 2), ("RAPID\n", 3), ("FROM/0,0,0\nRAPID\n", 4), ("FEDRAT/1,MMPR\n", 3)):
+    for start, line in (("", 2), ("RAPID\n", 3), ("FROM/0,0,0\nRAPID\n", 4), ("FEDRAT/1,MMPR\n", 3), ("FEDRAT/0\n", 3)):
         path.write_text(start + "GOTO/1,2,3\n" * 60_000)
         with pytest.raises(InputError, match=rf":{line}: GOTO: .*feed"):
             read_cl(path)

@@ -11,6 +11,7 @@ from parakin.toolpath.reading.detect import detect_format, read_path
         *[(f"a{suffix}", "GOTO/1,2,3\n", "gcode") for suffix in (".ngc", ".nc", ".NC", ".gcode", ".tap", ".cnc")],
         ("a.cls", "TOOL PATH/A,TOOL,B\n", "cl"),
         ("a.apt", "PARTNO X\n", "cl"),
+        *[(f"a{suffix}", "P1=POINT/0,0,0\n", "cl") for suffix in (".apt", ".aptsource", ".CLS", ".cl", ".ncl")],
         ("a", "$$ -----\n$$ (text)\n", "cl"),
         ("a.txt", "\n\n  goto/ 1,2,3\n", "cl"),
         ("a.txt", "UNITS / MM\n", "cl"),

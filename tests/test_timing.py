@@ -236,7 +236,7 @@ def test_without_accelerations_only_the_feed_counts():
     assert np.diff(trajectory.times) == pytest.approx([3.0, 2.0, 0.0, 1.0], abs=1e-9)
     assert trajectory.shares == {"feed": pytest.approx(1.0)}
     assert trajectory.at([1.5, 4.0]).poses == pytest.approx(np.array([[15.0, 0.0, 0.0], [30.0, 20.0, 0.0]]), abs=1e-9)
-    with pytest.raises(PoseError, match=r"between records 0 and 1 \(line 2\) nothing limits the motion: no feed"):
+    with pytest.raises(PoseError, match=r":2, record 1: on the way to it nothing limits the motion: no feed"):
         plan_trajectory(posted(limited(pk.load("orthoglide")), tip, feed=np.nan))
 
 
@@ -355,9 +355,9 @@ def test_what_is_refused(how, message):
 def test_a_path_that_the_machine_cannot_follow_is_refused_with_its_place():
     machine = limited(pk.load("orthoglide"), mm=(INF, 2000.0, INF))
     tip = np.array([[0, 0, 0], [0, 400, 0], [0, 0, 0]], float)
-    with pytest.raises(PoseError, match=r"record 1 \(line 2\): the machine can't take this pose"):
+    with pytest.raises(PoseError, match=r"part.apt:2, record 1: the machine can't take this pose"):
         plan_trajectory(posted(machine, tip))
-    with pytest.raises(PoseError, match=r"record 1 \(line 2\): more than 0 expected for the feed"):
+    with pytest.raises(PoseError, match=r"part.apt:2, record 1: more than 0 expected for the feed"):
         plan_trajectory(posted(machine, tip / 10.0, feed=[100.0, 0.0, 100.0]))
     with pytest.raises(PoseError, match="rate: more than 0 expected, not 0"):
         plan_trajectory(posted(machine, tip / 10.0)).sample(0)

@@ -63,11 +63,11 @@ class ToolPath:
     feed : (n,) mm/min, the programmed feed in force, also on rapid records; NaN if there is none or it is unknown
     spindle : (n,) rev/min, NaN if unknown, 0 if switched off
     frame : (3, 4) rotation and origin (mm) of W in the machine frame M as the file gives it, or None
-    dialect : the CAM system that a CL file tells, "catia", "nx" (Siemens NX), "creo", "solidworks", "autodesk" or
-        "mastercam"; "apt" where it tells none; "gcode" (RS274/NGC)
+    dialect : the CAM system that a CL file tells, "catia", "nx" (Siemens NX), "creo", "solidworks", "autodesk",
+        "camplete" or "mastercam"; "apt" where it tells none; "gcode" (RS274/NGC)
     units : the file's own length unit; all lengths here are in mm
-    tool : the known data of the first tool; lengths in mm: diameter, corner_radius, length of the cutter, set_length
-        from the spindle's nose to the tip; name, number, type ...
+    tool : the known data of the first tool; lengths in mm: diameter, corner_radius, length of the cutter,
+        body_length below the holder, set_length from the spindle's nose to the tip; name, number, type ...
     events : statements without motion, in file order
     notes : remarks for the user, by line
     turns : (n, 3) rad, A, B, C as programmed, R = Rz(C)·Ry(B)·Rx(A) and axis = R·z; None if the file programs none
@@ -88,7 +88,7 @@ class ToolPath:
     feed: Array
     spindle: Array
     frame: Array | None = None
-    dialect: Literal["apt", "catia", "nx", "creo", "solidworks", "autodesk", "mastercam", "gcode"] = "apt"
+    dialect: Literal["apt", "catia", "nx", "creo", "solidworks", "autodesk", "camplete", "mastercam", "gcode"] = "apt"
     units: Literal["mm", "inch"] = "mm"
     tool: dict[str, float | str] = field(default_factory=dict)
     events: tuple[Event, ...] = ()
@@ -101,6 +101,10 @@ class ToolPath:
 
     def __len__(self) -> int:
         return len(self.line)
+
+    def locate(self, record: int) -> str:
+        """Name the place of a record for messages: ``part.cls:12, record 3``."""
+        return f"{self.source}:{int(self.line[record])}, record {record}"
 
     def __repr__(self) -> str:
         return f"<parakin tool path {quote(self.source)}: {len(self)} records, {self.dialect}>"

@@ -123,7 +123,8 @@ def _find_length(use: ToolUse, key: str) -> float:
 
 
 def _find_cutter_length(use: ToolUse) -> float:
-    return _find_length(use, "length")
+    """Find how much of a tool its file tells below the holder, mm: the longer of cutter and body; NaN if nothing."""
+    return float(np.fmax(_find_length(use, "length"), _find_length(use, "body_length")))
 
 
 def describe_tool(use: ToolUse) -> str:

@@ -15,6 +15,7 @@ from .gcode.reader import read_gcode
 from .text import BYTE_ORDER_MARK, open_file
 
 _GCODE_SUFFIXES = frozenset((".ngc", ".nc", ".gcode", ".tap", ".cnc"))
+_CL_SUFFIXES = frozenset((".apt", ".aptsource", ".cl", ".cls", ".ncl"))
 _LOOKED_AT = 1 << 16  # bytes
 _JOINTS = b"joints, made by parakin )"  # stands in the head of a program of joint positions
 # beginnings of lines that only one of the two formats can have
@@ -59,14 +60,17 @@ def read_path(
 
 
 def detect_format(path: str | os.PathLike[str]) -> Literal["cl", "gcode"]:
-    """Tell the format of a file by its suffix (.ngc .nc .gcode .tap .cnc), else by the first line that decides.
+    """Tell the format of a file by its suffix (.ngc .nc .gcode .tap .cnc, .apt .aptsource .cl .cls .ncl), else by the first line that decides.
 
     Raises :class:`InputError` if the file cannot be opened.
     """
-    if PurePath(os.fsdecode(path)).suffix.lower() in _GCODE_SUFFIXES:
+    suffix = PurePath(os.fsdecode(path)).suffix.lower()
+    if suffix in _GCODE_SUFFIXES:
         return "gcode"
     source = os.fsdecode(path)
     with open_file(path, source) as file:
+        if suffix in _CL_SUFFIXES:
+            return "cl"
         try:
             start = file.read(_LOOKED_AT) or b""
         except OSError as error:

@@ -31,7 +31,7 @@ class ToolLog:
         if record != self._group_record:
             self._group, self._group_record, self._group_line = {}, record, 0
         self._group |= data
-        told_at = line if {"length", "set_length"} & data.keys() else 0
+        told_at = line if {"length", "body_length", "set_length"} & data.keys() else 0
         self._group_line = told_at or self._group_line
         if not self.uses:
             self.uses.append(ToolUse(record, line, dict(data), changed=loads and record > 0, length_line=told_at))

@@ -70,9 +70,9 @@ class JointPath:
         return self.rows.joints
 
     def describe_step(self, row: int) -> str:
-        """Describe where the step after a row is, by the records before and behind it."""
+        """Describe where the step after a row is, by the record that its motion leads to."""
         record = int(self.curve.record_of_piece[self.segment[row]])
-        return f"between records {record - 1} and {record} (line {int(self.posted.path.line[record])})"
+        return f"{self.posted.path.locate(record)}: on the way to it"
 
     def find_ends(self) -> Indices:
         """Find the rows at which stretches begin and end."""

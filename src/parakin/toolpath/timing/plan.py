@@ -83,19 +83,13 @@ def _flag_stops(posted: Posted, stops: Sequence[int]) -> Flags:
         raise PoseError("the path has no records")
     lost = ~np.isfinite(posted.joints.sum(axis=1))
     if lost.any():
-        raise PoseError(f"{_name_record(posted, lost)}: the machine can't take this pose")
+        raise PoseError(f"{posted.path.locate(int(lost.argmax()))}: the machine can't take this pose")
     idle = ~posted.path.rapid & (posted.path.feed <= 0.0)
     if idle.any():
-        raise PoseError(f"{_name_record(posted, idle)}: more than 0 expected for the feed")
+        raise PoseError(f"{posted.path.locate(int(idle.argmax()))}: more than 0 expected for the feed")
     flags = np.zeros(count, bool)
     for stop in stops:
         if not 0 <= stop < count:
             raise PoseError(f"stops: records from 0 to {count - 1} expected, not {stop}")
         flags[stop] = True
     return flags
-
-
-def _name_record(posted: Posted, flags: Flags) -> str:
-    """Name the first flagged record and its line."""
-    record = int(flags.argmax())
-    return f"record {record} (line {int(posted.path.line[record])})"

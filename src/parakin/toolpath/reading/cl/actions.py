@@ -3,6 +3,7 @@
 import math
 import re
 from collections.abc import Mapping
+from itertools import takewhile
 from typing import Literal
 
 import numpy as np
@@ -15,7 +16,7 @@ from .circles import Circle
 from .cycles import DrillCycle, parse_cycle
 from .dialects import DIALECTS, RIGHT, UNKNOWN, DialectName, find_by_comment, find_by_word
 from .drilling import drill_hole
-from .frames import build_frame, build_frame_from_matrix, normalise_direction
+from .frames import AXIS_TOLERANCE, build_frame, build_frame_from_matrix, normalise_direction
 from .motion import ClMotion
 
 _ARC = re.compile(r"TLON,GOFWD/\(?CIRCLE/([^()/]*?)\)?,ON,(?:\d+,INTOF,)?\(?LINE/([^()/]*)\)?", re.ASCII)
@@ -46,6 +47,7 @@ class ClActions:
         self.tools = ToolLog()
         self.finished = False
         self._last_cycle: DrillCycle | None = None
+        self._work_system: list[str] | None = None
 
     # dialects
 
@@ -268,6 +270,26 @@ class ClActions:
         self._refuse_in_cycle_or_circle()
         self.motion.change_frame(line, frame=build_frame_from_matrix([v[0:4], v[4:8], v[8:12]], "CSYS"))
 
+    def set_work_plane(self, args: list[str], line: int) -> None:
+        """Set the workpiece's frame by the directions of X, Y and Z and the origin (MCS)."""
+        v = parse_numbers(args, (12,), "the directions of X, Y and Z and an origin: twelve numbers")
+        self._refuse_in_cycle_or_circle()
+        rows = np.array(v).reshape(4, 3).T.tolist()
+        self.motion.change_frame(line, frame=build_frame_from_matrix(rows, "MCS"))
+
+    def check_work_plane(self, args: list[str], line: int) -> None:
+        """Refuse other directions of X, Y and Z than those of MCS (MCS2)."""
+        v = parse_numbers(args, (9,), "the directions of X, Y and Z: nine numbers")
+        rotation = np.eye(3) if self.motion.frame is None else self.motion.frame.rotation
+        if np.abs(np.array(v).reshape(3, 3).T - rotation).max() > AXIS_TOLERANCE:
+            refuse("a frame without its origin; expected MCS with the same directions before it")
+
+    def check_work_system(self, args: list[str], line: int) -> None:
+        """Refuse a change of the control's work system, whose offset the file does not tell (ZERO)."""
+        if self._work_system not in (None, args) and self.motion.records.n:
+            refuse("another work system, whose place the file does not tell; expected one throughout")
+        self._work_system = args
+
     # modes that are honoured where they change nothing
 
     def check_compensation(self, args: list[str], line: int) -> None:
@@ -285,7 +307,14 @@ class ClActions:
     def check_mode(self, args: list[str], line: int) -> None:
         """Refuse modes other than milling in absolute coordinates (MODE)."""
         if args not in (["MILL"], ["ABSOL"]):
-            refuse(f"{quote_short(','.join(args))}; expected MODE/MILL or absolute coordinates")
+            refuse(f"{quote_short(','.join(args))}; expected MILL or ABSOL")
+
+    def check_setting(self, args: list[str], line: int) -> None:
+        """Refuse a setting of modes other than milling in absolute coordinates (SET/MODE of NX)."""
+        if args[:1] == ["MODE"]:
+            self.check_mode(args[1:], line)
+        else:
+            self.informing.setdefault("SET", line)
 
     def check_off(self, args: list[str], line: int) -> None:
         """Refuse a transformation that is not taken off (TRACUT/NOMORE)."""
@@ -321,12 +350,25 @@ class ClActions:
             data["number"] = parse_number(args[0])
         elif args and args[0]:
             data["name"] = args[0]
+        data |= self._read_tool_values(list(takewhile(is_number, args[1:])) if data else [], line)
         if "LENGTH" in args:
             k = args.index("LENGTH")
             (length,) = parse_numbers(args[k + 1 : k + 2], (1,), "LENGTH,length")
             data["set_length"] = length * self.motion.transform.scale
         if data:
             self._set_tool(line, data, loads=True)
+
+    def _read_tool_values(self, values: list[str], line: int) -> dict[str, float | str]:
+        """Read the lengths among the values behind a tool's number, whose order is the dialect's."""
+        names = DIALECTS[self.dialect].tool_values
+        if names is None:
+            if values:
+                text = "values behind the tool's number, whose meaning no header tells: not taken for a length"
+                self.motion.notes.add(line, text)
+            return {}
+        scale = self.motion.transform.scale
+        pairs = zip(names, values, strict=False)
+        return {name: parse_number(value) * scale for name, value in pairs if name.endswith("length")}
 
     def select_tool(self, args: list[str], line: int) -> None:
         """Keep the number of the tool that is made ready (SELECT), where none is known yet."""

@@ -85,6 +85,8 @@ def parse_tool_data(args: Sequence[str], scale: float) -> dict[str, float | str]
     if not words or not values or (words == ["MILL"] and len(values) < 5):
         refuse(f"expected {form}, got {len(values)} number{'' if len(values) == 1 else 's'}")
     tool: dict[str, float | str] = {"type": ",".join(words), "diameter": values[0] * scale}
+    if words[-1] == "MILL" and words[0] in ("MILL", "DRILL") and len(values) > 2:
+        tool |= {"corner_radius": values[1] * scale, "length": values[2] * scale}
     if words == ["MILL"]:
-        tool |= {"corner_radius": values[1] * scale, "length": values[2] * scale, "taper": values[3], "tip": values[4]}
+        tool |= {"taper": values[3], "tip": values[4]}
     return tool

@@ -1,13 +1,14 @@
 """The table of CL dialects: how a file tells its dialect, and what the words mean that differ between them.
 
 Sources: PTC, CL data file formats (CIRCLE, CYCLE, CSYS); Siemens, CLSF manual (CIRCLE is left-handed, checked against
-tangents of real files); Autodesk, ISO 4343 APT post processors (MOVARC is right-handed); ISO 4343:2000.
+tangents of real files); Autodesk, ISO 4343 APT post processors (MOVARC is right-handed; that for CAMplete gives CIRCLE the other axis) and their
+LOADTL (pocket, body length, offset); ISO 4343:2000.
 """
 
 import re
 from typing import Literal, NamedTuple
 
-DialectName = Literal["apt", "catia", "nx", "creo", "solidworks", "autodesk", "mastercam", "gcode"]
+DialectName = Literal["apt", "catia", "nx", "creo", "solidworks", "autodesk", "camplete", "mastercam", "gcode"]
 
 RIGHT, LEFT, UNKNOWN = 1, -1, 0  # hands: how a motion turns about the axis that its statement gives
 SIGNED, BELOW = "signed", "below"  # FEDTO: along the tool axis, or a distance below the hole's point
@@ -21,6 +22,8 @@ class Dialect(NamedTuple):
     fedto : the sense of FEDTO in a cycle; None: a negative one is below the point, a positive one is refused
     header : a comment ($$, PPRINT, REMARK) before the first motion that tells the dialect
     words : words that only this dialect has
+    tool_values : what the values behind the number of LOADTL are, by position: ``set_length`` from the spindle's nose to
+        the tip, ``body_length`` below the holder, or something that is no length; None: not known
     """
 
     title: str
@@ -28,15 +31,23 @@ class Dialect(NamedTuple):
     fedto: str | None = None
     header: str | None = None
     words: tuple[str, ...] = ()
+    tool_values: tuple[str, ...] | None = None
 
 
 DIALECTS: dict[DialectName, Dialect] = {
     "apt": Dialect("APT"),
     "creo": Dialect("PTC Creo", RIGHT, BELOW, r"\$\$\*\s*PRO/CLFILE|\$\$->|\bPRO/NC\b"),
-    "catia": Dialect("CATIA V5", UNKNOWN, None, r"\$\$\*\s*CATIA|\bCATIA APT\b"),
-    "solidworks": Dialect("SolidWorks CAM", RIGHT, BELOW, r"\bSOLID ?WORKS\b|\bCAMWORKS\b", ("UNIT",)),
+    "catia": Dialect("CATIA V5", UNKNOWN, None, r"\$\$\*\s*CATIA|\bCATIA APT\b", (), ("offset", "offset")),
+    "solidworks": Dialect(
+        "SolidWorks CAM", RIGHT, BELOW, r"\bSOLID ?WORKS\b|\bCAMWORKS\b", ("UNIT",), ("set_length",)
+    ),
     "autodesk": Dialect(
-        "Autodesk APT", RIGHT, None, r"\bAUTODESK\b|\bHSMWORKS\b|\bFUSION ?360\b|\bINVENTOR CAM\b", ("MOVARC",)
+        "Autodesk APT", RIGHT, None, r"\bAUTODESK\b|\bHSMWORKS\b|\bFUSION ?360\b|\bINVENTOR CAM\b", ("MOVARC",),
+        ("pocket", "body_length", "offset", "offset"),
+    ),
+    "camplete": Dialect(
+        "Autodesk's post for CAMplete", LEFT, BELOW, r"\bCAMPLETE\b|\bMANUSNC\b", ("MCS", "CSI_TOOL_PATH"),
+        ("pocket", "body_length", "offset", "offset"),
     ),
     "mastercam": Dialect("Mastercam", UNKNOWN, None, r"\bMASTERCAM\b"),
     "nx": Dialect(

@@ -119,12 +119,14 @@ class ClMotion:
         self.feed = self.convert_feed(self.feed_value, self.feed_unit)
 
     def require_feed(self, line: int, feed: float, value: float) -> None:
-        """Refuse a cut without a feed; a file's first point is where it starts, not a cut.
+        """Refuse a cut without a feed or at a feed of zero; a file's first point is where it starts, not a cut.
 
         value : of the cycle's own feed as programmed, NaN if it has none
         """
-        if not math.isnan(feed) or not self.records.n:
+        if feed > 0.0 or not self.records.n:
             return
+        if feed == 0.0:
+            refuse("a cut at a feed of zero; expected a feed or a running spindle before it", line)
         if math.isnan(value) and math.isnan(self.feed_value):
             refuse("a cut without a feed; expected FEDRAT before it", line)
         refuse("a feed per revolution while the spindle speed is not known; expected SPINDL/n,RPM before it", line)

@@ -293,7 +293,7 @@ class ClReader:
         start = records.n
         if end > start:
             records.feed[start:end] = motion.feed
-            if motion.feed != motion.feed:
+            if not motion.feed > 0.0:
                 cuts = start + int(motion.rapid or not start)
                 if cuts < end:
                     self._refuse_feed(int(records.line[cuts]))

@@ -56,10 +56,14 @@ WORDS: dict[str, Word] = {
     "ORIGIN": Word(ClActions.set_origin),
     "MSYS": Word(ClActions.set_frame, slash=True),
     "CSYS": Word(ClActions.set_csys, slash=True),
+    "MCS": Word(ClActions.set_work_plane, slash=True),
+    "MCS2": Word(ClActions.check_work_plane, slash=True),
+    "ZERO": Word(ClActions.check_work_system, event=True),
     # modes that are honoured where they change nothing
     "CUTCOM": Word(ClActions.check_compensation),
     "CUTCOM_GEOMETRY_TYPE": Word(ClActions.set_compensation_type),
     "MODE": Word(ClActions.check_mode),
+    "SET": Word(ClActions.check_setting),
     "TRACUT": Word(ClActions.check_off),
     "TRANS": Word(ClActions.check_off),
     # tool
@@ -69,6 +73,7 @@ WORDS: dict[str, Word] = {
     "TOOLNO": Word(ClActions.load_tool, event=True),
     "LOAD": Word(ClActions.load_tool, event=True),
     "SELECT": Word(ClActions.select_tool, event=True),
+    "SELECTL": Word(ClActions.select_tool, event=True),
     "TOOLPATH": Word(ClActions.start_tool_path, event=True),
     # no effect on the motion
     "STOP": _EVENT,
@@ -96,6 +101,9 @@ REASONS = {
     "a motion along surfaces, which the file does not give as points": (
         "GO GOLFT GORGT GOFWD GOBACK GOUP GODOWN TLLFT TLRGT TLONPS TLOFPS PSIS POCKET PROFIL SCURV ARCSLP"
     ),
+    "a motion along a curve, which the file does not give as points": "NURBS SPLINE BSPLIN PSPLIN ELLIPS HELIX PARSRF",
+    "a motion to a place that the file does not state": "MOVETO PLUNGE POSITN SAFPOS TANSPT",
+    "it shifts the tool or its axis along a surface": "THICK ZSURF VTLAXS OFFSET",
     "a statement of the APT language that repeats or leads to others": (
         "CALL MACRO TERMAC LOOPST LOOPND JUMPTO TRANTO IF DO UNTIL SUBR ENDSUB INDEX"
     ),
@@ -103,13 +111,14 @@ REASONS = {
     "it turns an axis of the machine that wrote the file": "ROTATE ROTABL ROTHED ROTREF POSMAP TURRET",
     "it retracts to a place that the file does not state": "RETRCT RETRACT",
     "it gives the controller a G-code": "PREFUN",
-    "a motion in step with the spindle": "THREAD PITCH",
+    "a motion in step with the spindle": "THREAD PITCH COUPLE",
     "a motion that ends at a touch": "PROBE",
 }
 REFUSED = {word: reason for reason, words in REASONS.items() for word in words.split()}
 _INFORMING = """
-    AIR APPLY BARFED BEGIN BREAK CATCHR CHKPTS CHUCK CLAMP CLDATA CLRSRF CONTRL DATE FEATNO FIXTUR GECENT HEAD HEADER
-    LEADER LINTOL MATERL MCHFIN MCHTOL MFGNO NOTE OFSTNO OPNAME OPSKIP OPTION OSETNO PENDWN PENUP SAFETY SELCTL SEQNO
-    SETSTL TCP TCPCTL TLSTCK TMARK VERSION
+    AIR APPLY BARFED BEGIN BREAK CATCHR CHKPTS CHUCK CLAMP CLDATA CLRSRF CONTRL CSI_SET_EXTENSION_LENGTH
+    CSI_SET_PATH_PARAM CSI_TOOL_PATH DATE FEATNO FIXTUR GECENT HEAD HEADER LEADER LINTOL MATERL MCHFIN MCHTOL MFGNO NOTE
+    OFSTNO OPERATION OPNAME OPSKIP OPTION OSETNO PENDWN PENUP REWIND SAFETY SELCTL SEQNO SETSTL START SWITCH TCP TCPCTL
+    TLSTCK TMARK UNLOAD VERSION
 """
 INFORMING = frozenset(_INFORMING.split())

@@ -60,7 +60,9 @@ def read_path(
 
 
 def detect_format(path: str | os.PathLike[str]) -> Literal["cl", "gcode"]:
-    """Tell the format of a file by its suffix (.ngc .nc .gcode .tap .cnc, .apt .aptsource .cl .cls .ncl), else by the first line that decides.
+    """Tell the format of a file by its suffix, else by the first line that decides.
+
+    G-code: .ngc .nc .gcode .tap .cnc; CL: .apt .aptsource .cl .cls .ncl.
 
     Raises :class:`InputError` if the file cannot be opened.
     """

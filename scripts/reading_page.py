@@ -51,8 +51,10 @@ tip is on the path; between records too. Summary, report, JSON and the program's
 | `--tool-length file` | the lengths in the file, of cutters too |
 | `--tool-length machine` | the machine's own, for all tools |
 | `--tools FILE` | the Z of LinuxCNC's tool table, by the number of LOADTL, T or G43 H |
-| `LOADTL/n,LENGTH,l` (`LOADTL/n,l` of SolidWorks CAM), `G10 L1`, `G43.1` | from nose to tip; refused where it is not the machine's own |
-| `TLDATA`, `CUTTER` with a height, `LOADTL/n,pocket,l` of Autodesk | what sticks out of the holder: refused where longer than the machine's own tool, else noted |
+| `LOADTL/n,LENGTH,l`, `G10 L1`, `G43.1` | from nose to tip; refused where it is not the machine's own |
+| `LOADTL/n,l` | the same of SolidWorks CAM; in a dialect that no header tells it is noted and not taken |
+| `TLDATA`, `CUTTER` with a height | what sticks out of the holder: refused where longer than the own tool |
+| `LOADTL/n,pocket,l` | the same of Autodesk |
 | several cutters | the longest as the machine's own tool, others by what they are shorter |
 | nothing | the machine's own |
 

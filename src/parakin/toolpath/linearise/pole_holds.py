@@ -297,19 +297,24 @@ def _join(*parts: _Points) -> _Points:
 
 def find_held_steps(steps: PoleSteps, holds: list[PoleHold]) -> list[tuple[int, int]]:
     """Find the first and the last of the steps on each hold, also of another pole."""
-    held = []
-    for hold in holds:
-        within = (steps.record - 1 + steps.end > hold.located.begin) & (
-            steps.record - 1 + steps.begin < hold.located.end
-        )
-        number = np.flatnonzero(within)
-        held += [(int(number[0]), int(number[-1]))] if len(number) else []
-    return held
+    begins, ends = steps.record - 1 + steps.begin, steps.record - 1 + steps.end  # both rise
+    first = np.searchsorted(ends, [hold.located.begin for hold in holds], side="right")
+    last = np.searchsorted(begins, [hold.located.end for hold in holds]) - 1
+    return [(a, b) for a, b in zip(first.tolist(), last.tolist(), strict=True) if a <= b]
 
 
-def is_apart(hold: PoleHold, others: list[PolePass]) -> bool:
-    """Tell whether a hold shares no stretch of the path with others."""
-    return all(hold.located.end <= other.begin or hold.located.begin >= other.end for other in others)
+class Stretches:
+    """Stretches of a path, and which of them others meet."""
+
+    def __init__(self, passes: list[PolePass]):
+        ends = sorted((located.begin, located.end) for located in passes)
+        self.begins = np.array([begin for begin, _ in ends])
+        self.latest_ends = np.maximum.accumulate([end for _, end in ends]) if ends else self.begins
+
+    def is_apart(self, located: PolePass) -> bool:
+        """Tell whether a stretch shares nothing with any of these."""
+        before = int(np.searchsorted(self.begins, located.end))  # those begin before it ends
+        return before == 0 or bool(self.latest_ends[before - 1] <= located.begin)
 
 
 def note_holds(holds: list[PoleHold]) -> list[Note]:

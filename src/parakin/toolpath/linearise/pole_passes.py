@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 
-from ...arrays import Indices
+from ...arrays import Array, Flags, Indices
 from ...kinematics.wrist import EXACT, PRINTED, REPORTED
 from ..path import Note
 from ..posting.posted import Posted
@@ -14,7 +15,7 @@ from ..programmed_path import ProgrammedPath
 from .deviation import ALLOWED, SHARES, Deviation
 from .path_cuts import PathPositions, select_spans
 from .path_records import divide_motions, replace_axes, repost_path
-from .pole_holds import PoleHold, find_held_steps, find_pole_holds, is_apart, note_holds
+from .pole_holds import PoleHold, Stretches, find_held_steps, find_pole_holds, note_holds
 from .pole_routing import PolePass, PoleRoute, find_pole_routes, locate_pass
 from .pole_steps import PoleSteps, find_pole_steps
 from .pole_swings import note_swings
@@ -43,18 +44,12 @@ class PolePasses:
     notes: list[Note] = field(default_factory=list)
 
 
-@dataclass(frozen=True, eq=False)
-class _Crossing:
-    """A pole that a motion crosses on a route."""
+class _Crossings(NamedTuple):
+    """The routes on which a path crosses a pole."""
 
     pole: Pole
     steps: PoleSteps
-    route: PoleRoute
-
-    @property
-    def motion(self) -> Indices:
-        """The motion, by the record it leads to, (1,)."""
-        return self.steps.record[self.route.crossing : self.route.crossing + 1]
+    routes: list[PoleRoute]
 
 
 def lead_through_poles(deviation: Deviation, posted: Posted, motion: Indices) -> PolePasses:
@@ -102,7 +97,7 @@ def _lead_unless_refused(
     led = PolePasses(posted, PathPositions.at_records(len(posted.path)))
     programmed, turns = deviation.programmed, posted.path.turns
     axis = programmed.axis.copy()
-    crossings: list[_Crossing] = []
+    crossings: list[_Crossings] = []
     inclined = turns is not None and bool(turns[:, 0].any())  # with A no turns are found for other axes
     for pole in find_poles(posted.machine, deviation.interpolation, turns is not None):
         steps = find_pole_steps(pole, programmed, posted, motion)
@@ -117,13 +112,13 @@ def _lead_unless_refused(
             axis[route.record] = route.axis
             routes.append(route)
             led.passes.append(pole_pass)
-        crossings += [_Crossing(pole, steps, route) for route in routes if route.crossing >= 0 or route.rays]
+        crossings.append(_Crossings(pole, steps, [route for route in routes if route.crossing >= 0 or route.rays]))
         held: list[PoleHold] = []
         if not inclined:
+            taken_stretches = Stretches([*led.passes, *(hold.located for hold in led.holds)])
             for hold in find_pole_holds(pole, posted, programmed, steps, routes, deviation.angle):
                 is_free = (axis[hold.record] == programmed.axis[hold.record]).all()
-                others = [*led.passes, *(other.located for other in led.holds)]
-                if hold.key not in refused and is_free and is_apart(hold, others):
+                if hold.key not in refused and is_free and taken_stretches.is_apart(hold.located):
                     axis[hold.record] = hold.axis
                     held.append(hold)
         led.holds += held
@@ -136,12 +131,12 @@ def _lead_unless_refused(
     return led
 
 
-def _insert_records_at_poles(deviation: Deviation, led: PolePasses, crossings: list[_Crossing]) -> None:
+def _insert_records_at_poles(deviation: Deviation, led: PolePasses, crossings: list[_Crossings]) -> None:
     """Insert the records of holds, and those on the poles where motions cross them.
 
     None is inserted where the interpolation passes over the pole by itself.
     """
-    if not crossings and not led.holds:
+    if not any(crossing.routes for crossing in crossings) and not led.holds:
         return
     posted = led.posted
     path = ProgrammedPath(posted.path, posted.frame)
@@ -149,21 +144,7 @@ def _insert_records_at_poles(deviation: Deviation, led: PolePasses, crossings: l
         row for hold in led.holds for row in zip(hold.motion.tolist(), hold.share.tolist(), hold.added, strict=True)
     ]
     for crossing in crossings:
-        pole, route = crossing.pole, crossing.route
-        for ray_motion, share, projected in route.rays:
-            at = np.array([ray_motion]), np.array([share])
-            added.append((ray_motion, share, pole.find_axes(*path.interpolate(*at), projected[None])[0]))
-        if route.crossing < 0:
-            continue
-        motion = crossing.motion
-        tip, axis = path.interpolate(motion, np.array([route.share]))
-        miss = float(np.hypot(*pole.project_axes(tip, axis)[0]))
-        if miss <= (EXACT if route.rays else PRINTED) or _crosses_by_itself(deviation, led, pole, motion):
-            continue
-        added.append((int(motion[0]), route.share, pole.find_axes(tip, axis, np.zeros((1, 2)))[0]))
-        if miss > _LARGE_MISS * deviation.angle:
-            for share in route.ends:
-                added.append((int(motion[0]), share, path.interpolate(motion, np.array([share]))[1][0]))
+        added += _list_crossing_records(deviation, led, path, crossing)
     if added:
         added.sort(key=lambda record: record[:2])
         motions, shares = np.array([record[0] for record in added]), np.array([record[1] for record in added])
@@ -173,11 +154,39 @@ def _insert_records_at_poles(deviation: Deviation, led: PolePasses, crossings: l
         led.posted = repost_path(posted, replace_axes(denser_path, motions + np.arange(len(motions)), axes))
 
 
-def _crosses_by_itself(deviation: Deviation, led: PolePasses, pole: Pole, motion: Indices) -> bool:
-    """Tell whether what goes evenly is the angle that the pole frees, and the motion is within tolerance as it is."""
+def _list_crossing_records(
+    deviation: Deviation, led: PolePasses, path: ProgrammedPath, crossings: _Crossings
+) -> list[tuple[int, float, Array]]:
+    """List the records that the routes through a pole need: motion, share, and axis (3,)."""
+    pole = crossings.pole
+    rays = [ray for route in crossings.routes for ray in route.rays]
+    routes = [route for route in crossings.routes if route.crossing >= 0]
+    motion = crossings.steps.record[np.array([route.crossing for route in routes], np.int64)]
+    share = np.array([route.share for route in routes])
+    miss = np.hypot(*pole.project_axes(*path.interpolate(motion, share)).T)
+    needed = miss > np.array([EXACT if route.rays else PRINTED for route in routes])
+    needed[needed] = ~_cross_by_themselves(deviation, led, pole, motion[needed])
+    ends = [
+        (int(at), end)
+        for at, route, is_far in zip(motion, routes, needed & (miss > _LARGE_MISS * deviation.angle), strict=True)
+        if is_far
+        for end in route.ends
+    ]
+    at = np.array([ray[0] for ray in rays] + motion[needed].tolist(), np.int64)
+    shares = np.array([ray[1] for ray in rays] + share[needed].tolist())
+    projected = np.array([ray[2] for ray in rays] + [np.zeros(2)] * int(needed.sum())).reshape(-1, 2)
+    axes = pole.find_axes(*path.interpolate(at, shares), projected)
+    added = list(zip(at.tolist(), shares.tolist(), axes, strict=True))
+    end_motion, end_share = np.array([end[0] for end in ends], np.int64), np.array([end[1] for end in ends])
+    end_axes = path.interpolate(end_motion, end_share)[1]
+    return added + list(zip(end_motion.tolist(), end_share.tolist(), end_axes, strict=True))
+
+
+def _cross_by_themselves(deviation: Deviation, led: PolePasses, pole: Pole, motion: Indices) -> Flags:
+    """Tell of which motions (m,) the angle that the pole frees goes evenly, and that keep the tolerance as they are."""
     if deviation.interpolation == "pose" and not pole.is_upright:
-        return False
+        return np.zeros(len(motion), np.bool_)
     angle = pole.get_angles(led.posted)
-    swing = abs(float(angle[motion[0]] - angle[motion[0] - 1]))
+    swing = np.abs(angle[motion] - angle[motion - 1])
     spans = select_spans(led.posted, led.positions, motion)
-    return swing < REPORTED and bool(deviation.measure_spans(spans, SHARES)[0] <= ALLOWED)
+    return np.asarray((swing < REPORTED) & (deviation.measure_spans(spans, SHARES) <= ALLOWED))

@@ -1,8 +1,8 @@
 """The table of CL dialects: how a file tells its dialect, and what the words mean that differ between them.
 
 Sources: PTC, CL data file formats (CIRCLE, CYCLE, CSYS); Siemens, CLSF manual (CIRCLE is left-handed, checked against
-tangents of real files); Autodesk, ISO 4343 APT post processors (MOVARC is right-handed; that for CAMplete gives CIRCLE the other axis) and their
-LOADTL (pocket, body length, offset); ISO 4343:2000.
+tangents of real files); Autodesk, ISO 4343 APT post processors (MOVARC is right-handed; that for CAMplete gives CIRCLE
+the other axis) and their LOADTL (pocket, body length, offset); ISO 4343:2000.
 """
 
 import re
@@ -22,8 +22,8 @@ class Dialect(NamedTuple):
     fedto : the sense of FEDTO in a cycle; None: a negative one is below the point, a positive one is refused
     header : a comment ($$, PPRINT, REMARK) before the first motion that tells the dialect
     words : words that only this dialect has
-    tool_values : what the values behind the number of LOADTL are, by position: ``set_length`` from the spindle's nose to
-        the tip, ``body_length`` below the holder, or something that is no length; None: not known
+    tool_values : what the values behind the number of LOADTL are, by position: ``set_length`` from the spindle's nose
+        to the tip, ``body_length`` below the holder, or something that is no length; None: not known
     """
 
     title: str

@@ -32,10 +32,10 @@ HEAD = """\
 # Files that parakin reads
 
 `parakin post PART` reads CL files (APT, and what CAM systems make of it) and G-code (RS274/NGC, as LinuxCNC reads
-it). The suffixes `.ngc .nc .gcode .tap .cnc` are G-code, `.apt .aptsource .cl .cls .ncl` are CL files; of other
-files the first line that only one of the two can have decides. What moves, turns, shifts or compensates is honoured, or refused in one line with file and line
-number; what only informs is listed once. This page is written by `scripts/reading_page.py` from the tables that the
-readers go by.
+it). The suffixes `.ngc .nc .gcode .tap .cnc` are G-code, `.apt .aptsource .cl .cls .ncl` are CL files; of other files
+the first line that only one of the two can have decides. What moves, turns, shifts or compensates is honoured, or
+refused in one line with file and line number; what only informs is listed once. This page is written by
+`scripts/reading_page.py` from the tables that the readers go by.
 """
 
 TOOLS = """\

@@ -128,7 +128,8 @@ def tricept(page: Page) -> None:
 
 def hbg80(page: Page) -> None:
     page.paper("HBG80: Parallel kinematic machines (about 2000)", "hbg80_2d", "hbg80_3d")
-    plane_region, space_region = (pk.region(pk.load(f"hbg80_{n}d"), part="all") for n in (2, 3))  # both assemblies
+    # Both assemblies count.
+    plane_region, space_region = (pk.region(pk.load(f"hbg80_{n}d"), components="all") for n in (2, 3))
     two, three = pk.sweep_drives(plane_region, cells=48), pk.sweep_drives(space_region, cells=24)
     # |det J| grows without end where both assemblies meet: sums over few cells are off by more than the proved bounds.
     fine_area, fine_volume = pk.sweep_drives(plane_region, 2400).estimate, pk.sweep_drives(space_region, 240).estimate
@@ -188,7 +189,7 @@ def lambda6(page: Page) -> None:
     page.paper("Lambda: IJEEC 6 (2022)", "lambda6")
     machine = pk.load("lambda6")
     level = {"A": 0.0, "B": 0.0, "C": 0.0}
-    one = pk.sweep_polar(pk.region(machine, at={**level, "Z": 1400.0}, part="all"), step=10.0, rays=72)
+    one = pk.sweep_polar(pk.region(machine, at={**level, "Z": 1400.0}, components="all"), step=10.0, rays=72)
     figure, (ax,) = plane()
     for angle, radius in zip(one.angles, one.radii[0], strict=True):
         ax.plot(*np.outer([np.cos(angle), np.sin(angle)], [0.0, radius]), color=GREY, linewidth=0.5)
@@ -201,7 +202,8 @@ def lambda6(page: Page) -> None:
         "With the sizes chosen the machine is singular all over C = 0, the paper's orientation; its figures are of "
         "what the limits allow there.",
     )
-    swept = pk.sweep_polar(pk.region(machine, at=level, part="all"), step=10.0, planes=50.0)
+    whole = pk.region(machine, at=level, components="all")
+    swept = pk.sweep_polar(whole, step=10.0, planes=50.0)
     figure, (ax,) = space()
     stacked(ax, swept, BLUE)
     page.add(
@@ -209,21 +211,21 @@ def lambda6(page: Page) -> None:
         "Figure 10: the achievable workspace",
         figure,
         f"Planes 50 mm apart: {swept.estimate:,.0f} mm³. "
-        f"Certified, it need not be star-shaped: {proved(pk.workspace(pk.region(machine, at=level, part='all')))}.",
+        f"Certified, it need not be star-shaped: {proved(pk.workspace(whole))}.",
     )
     cases = [("a) strokes", ("gap *",)), ("b) and least gaps", ("gap *.max",)), ("c) and greatest gaps", ())]
     figure, axes = space(3, 12.0, 5.2)
     numbers = []
     for ax, (title, without) in zip(axes, cases, strict=True):
-        found = pk.workspace(pk.region(machine, at=level, without=without, part="all"))
+        found = pk.workspace(pk.region(machine, at=level, without=without, components="all"))
         shape = meshed(found, 25.0)
         solid(ax, shape, BLUE, 0.75)
         frame(ax, np.array([-500.0, -500.0, 800.0]), np.array([500.0, 500.0, 2100.0]), found.axes)
         ax.set_title(title, fontsize=10)
         numbers.append(f"{title}: {proved(found)}")
     page.add("lambda_11", "Figure 11: the limits, one after the other", figure, "; ".join(numbers) + ".")
-    total = pk.workspace(pk.region(machine, every=TOTAL, part="all"), gap=0.05)
-    achievable = pk.workspace(pk.region(machine, at=level, part="all"))
+    total = pk.workspace(pk.region(machine, every=TOTAL, components="all"), gap=0.05)
+    achievable = pk.workspace(pk.region(machine, at=level, components="all"))
     figure, (ax,) = space()
     solid(ax, meshed(achievable, 25.0), BLUE, 0.13)
     solid(ax, meshed(total, 25.0), ORANGE, 0.9)
@@ -257,7 +259,7 @@ def stacked(ax: Any, swept: pk.PolarWorkspace, colour: str) -> None:
 
 def orthoglide(page: Page) -> None:
     page.paper("Orthoglide: Chablat and Wenger, Chemnitz (2000)", "orthoglide")
-    found = pk.workspace(pk.region(pk.load("orthoglide"), part="all"), cell=14.0)
+    found = pk.workspace(pk.region(pk.load("orthoglide"), components="all"), cell=14.0)
     cells = found.cells
     assert found.box is not None
     figure, (ax,) = space()

@@ -2,7 +2,7 @@
 
 The path is the first passes of the turbine blade's finishing, at 10 m/min in the cut, on the Tricept. Both programs run
 headless from the machine's home, in the same configuration. Every servo cycle's joints are written down; the picture
-shows their speeds as shares of what the joints are allowed, and the cycle times. On the hexapod, and with the tool
+shows their speeds over what the joints are allowed, and the cycle times. On the hexapod, and with the tool
 upright on the linear delta, the posted program runs too.
 
     python linuxcnc_comparison.py [-o PICTURE]
@@ -48,7 +48,7 @@ def part(folder, upright=False):
 
 
 def measured(machine, simulation, text, start):
-    """Speeds of the joints as shares of their limits, (cycles, joints), and the program's line, (cycles,)."""
+    """Speeds of the joints over their limits, (cycles, joints), and the program's line, (cycles,)."""
     run = simulation.run({"program": "part.ngc"}, {"part.ngc": text})
     if "told" in run.seen:
         sys.exit(f"LinuxCNC says: {run.seen['told']}")
@@ -57,27 +57,27 @@ def measured(machine, simulation, text, start):
     return np.abs(np.diff(run.joints[shown], axis=0)) / CYCLE / limits, run.line[shown][1:]
 
 
-def accelerations(machine, shares):
-    """The greatest acceleration as a share of its limit, and for how much of the time one is beyond it."""
+def accelerations(machine, utilisation):
+    """The greatest acceleration over its limit, and for how much of the time one is beyond it."""
     drives = machine.drives
     rates = np.array([drive.speed / drive.acceleration for drive in drives])
-    found = (np.abs(np.diff(shares, axis=0)) / CYCLE * rates).max(1)
+    found = (np.abs(np.diff(utilisation, axis=0)) / CYCLE * rates).max(1)
     return found.max(), (found > 1.05).mean()
 
 
 def picture(target, machine, runs):
-    """Joint speeds over time, one panel a run; ``runs`` are (title, shares, ...)."""
+    """Joint speeds over time, one panel a run; ``runs`` are (title, utilisation, ...)."""
     import matplotlib
 
     matplotlib.use("Agg")
     import matplotlib.pyplot as plt
 
-    longest = max(len(shares) for _, shares in runs) * CYCLE
-    highest = max(shares.max() for _, shares in runs)
+    longest = max(len(utilisation) for _, utilisation in runs) * CYCLE
+    highest = max(utilisation.max() for _, utilisation in runs)
     figure, panels = plt.subplots(2, 1, figsize=(10.0, 6.6), sharex=True, sharey=True, layout="constrained")
-    for panel, (title, shares) in zip(panels, runs, strict=True):
-        times = np.arange(len(shares)) * CYCLE
-        for name, colour, values in zip(machine.joints, COLOURS, shares.T, strict=True):
+    for panel, (title, utilisation) in zip(panels, runs, strict=True):
+        times = np.arange(len(utilisation)) * CYCLE
+        for name, colour, values in zip(machine.joints, COLOURS, utilisation.T, strict=True):
             strong = name == machine.joints[int(runs[0][1].max(0).argmax())]
             panel.plot(times, 100.0 * values, color=colour, lw=1.7 if strong else 1.1, label=NAMES[name])
             panel.fill_between(times, 100.0, 100.0 * values, where=values > 1.0, color=colour, alpha=0.35, lw=0.0)
@@ -89,7 +89,7 @@ def picture(target, machine, runs):
         panel.grid(axis="y", color="#e6e6e6", lw=0.7)
         panel.set_axisbelow(True)
         panel.annotate(
-            f"{len(shares) * CYCLE:.2f} s", (times[-1], 100.0 * highest), xytext=(-5, -2), ha="right", va="top",
+            f"{len(utilisation) * CYCLE:.2f} s", (times[-1], 100.0 * highest), xytext=(-5, -2), ha="right", va="top",
             textcoords="offset points", fontsize=11, color="#333333",
         )  # fmt: skip
     panels[1].set_xlabel("time, s")
@@ -133,8 +133,8 @@ def compare(folder, target):
     print(f"tricept, as programmed: {len(plain) * CYCLE:.3f} s; {worst} at {plain[~cutting].max():.2f} of its speed in")
     print(f"  rapid and {plain[cutting].max():.2f} in the cut, beyond it for {over:.2f} s")
     print(f"tricept, {told(job, texts[1], ours)}")
-    for way, shares in ("as programmed", plain), ("posted", ours):
-        most, often = accelerations(machine, shares)
+    for way, utilisation in ("as programmed", plain), ("posted", ours):
+        most, often = accelerations(machine, utilisation)
         print(f"  accelerations {way}: up to {most:.1f} times the limit, beyond it in {often:.0%} of the cycles")
     titles = (
         f"Feed as programmed: {NAMES[worst]} at {plain.max():.0%} of its limit",

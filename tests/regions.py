@@ -1,4 +1,4 @@
-"""Regions of all parts: what the limits alone allow, in every assembly mode."""
+"""Regions of all components: what the limits alone allow, in every assembly mode."""
 
 from __future__ import annotations
 
@@ -6,4 +6,4 @@ import parakin as pk
 
 
 def whole_region(machine, *arguments, **options):
-    return pk.region(machine, *arguments, **{"part": "all", **options})
+    return pk.region(machine, *arguments, **{"components": "all", **options})

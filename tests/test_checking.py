@@ -32,7 +32,7 @@ def test_offences_are_those_of_a_dense_sample(name):
     found = {offence.limit: offence for offence in checked.offences}
     at_records = machine.margins(poses, posted.joints, posted.mode) < 0.0
     assert broken.any()
-    for limit, part in enumerate(machine.limit_parts):
+    for limit, part in enumerate(machine.limit_definitions):
         count = int(at_records[:, limit].sum() + broken[:, limit].sum())
         unsure = int(doubtful[:, limit].sum())
         told = found[part.name].count if part.name in found else 0
@@ -58,7 +58,7 @@ def test_worst_values_and_first_places_are_those_of_a_dense_sample(name):
     records = machine.margins(poses, posted.joints, posted.mode)
     looked = 0
     for offence in checked.offences:
-        if offence.limit not in columns or machine.limit_parts[columns[offence.limit]].side == "reach":
+        if offence.limit not in columns or machine.limit_definitions[columns[offence.limit]].side == "reach":
             continue
         limit = columns[offence.limit]
         order = np.argsort(margins[:, :, limit].min(0))[:3]
@@ -167,7 +167,7 @@ def test_cones_and_clearances_are_passed_between_two_records(kind):
     ends, column = bulging(machine, kind)
     sampled = Sampled(posted_on(machine, ends), 400)
     least, at_ends = sampled.least(0, column), float(min(sampled.margins[[0, -1], 0, column]))
-    part = machine.limit_parts[column]
+    part = machine.limit_definitions[column]
     assert at_ends - least > (1e-3 if part.unit == "rad" else 0.1)
     shift = 0.5 * (least + at_ends)  # the new bound: half way
     limits, home = machine.spec.limits, machine.spec.home

@@ -177,7 +177,7 @@ def test_check_is_the_first_broken_margin(m):
         assert (verdict[~closes] > 0).all()
     assert m.check(m.home) == 0
     assert len(set(m.limits)) == len(m.limits) == m.margins(m.home).shape[-1]
-    assert [limit.name for limit in m.limit_parts] == list(m.limits)
+    assert [limit.name for limit in m.limit_definitions] == list(m.limits)
     with pytest.raises(pk.PoseError):
         m.check(poses, joints=m.inverse(poses[:1]))
 

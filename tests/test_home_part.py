@@ -120,8 +120,8 @@ def test_the_command_names_what_else_there_is(capsys):
 
 
 def test_a_drive_sweep_counts_the_same_parts():
-    for part in ("home", "all"):
-        region = pk.region(pk.load("hbg80_2d"), part=part)
+    for components in ("home", "all"):
+        region = pk.region(pk.load("hbg80_2d"), components=components)
         volume = pk.workspace(region, gap=0.002).volume
         assert volume.inner * 0.999 <= pk.sweep_drives(region, 2000).estimate <= volume.outer * 1.001
 

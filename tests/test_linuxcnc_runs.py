@@ -158,14 +158,14 @@ def written(trajectory, **options):
     return file.getvalue().decode("ascii")
 
 
-def shares(machine, joints):
-    """Speeds of the joints as shares of their limits, every cycle."""
+def utilisation(machine, joints):
+    """Speeds of the joints over their limits, every cycle."""
     limits = outward(machine, np.array([[drive.speed for drive in machine.model.drives]]))
     return np.abs(np.diff(joints, axis=0)) / CYCLE / limits
 
 
 def noise(machine):
-    """What the sampler's digits make of a speed, as a share of its limit."""
+    """What the sampler's digits make of a speed, over its limit."""
     limits = outward(machine, np.array([[drive.speed for drive in machine.model.drives]]))
     return 2.0 * DIGIT / CYCLE / limits.min()
 
@@ -179,9 +179,9 @@ def test_a_posted_program_keeps_the_joints_speeds_and_its_time(machine, linuxcnc
     run = linuxcnc.run({"program": "part.ngc", "override": 1.5}, {"part.ngc": text})
     assert "told" not in run.seen, run.seen
     check_joints(machine, run.poses, run.joints)
-    assert shares(machine, run.joints).max() <= 1.0 + noise(machine)  # from home on
+    assert utilisation(machine, run.joints).max() <= 1.0 + noise(machine)  # from home on
     part = run.part(first_line(text), world(machine, posted.poses[:1])[0])
-    assert shares(machine, run.joints[part]).max() > 0.6  # it is not just slow
+    assert utilisation(machine, run.joints[part]).max() > 0.6  # it is not just slow
     assert (part.stop - part.start - 1) * CYCLE == pytest.approx(trajectory.seconds, rel=0.05)
     assert (part.stop - part.start - 1) * CYCLE == pytest.approx(pk.predict_linuxcnc_seconds(trajectory), rel=0.02)
     ends = world(machine, posted.poses[[0, -1]])
@@ -214,7 +214,7 @@ def test_random_paths_run_as_the_model_says(machine, model, linuxcnc, tmp_path):
         assert not codes.any()
         run = linuxcnc.run({"program": "part.ngc"}, {"part.ngc": text})
         assert "told" not in run.seen, run.seen
-        assert shares(machine, run.joints).max() <= 1.0 + noise(machine)
+        assert utilisation(machine, run.joints).max() <= 1.0 + noise(machine)
         first = int(np.flatnonzero((np.diff(run.poses, axis=0) != 0.0).any(1))[0]) + 1
         moving = int(np.flatnonzero((told.poses != home).any(1))[0])
         count = min(len(run.poses) - first, len(told.poses) - moving)
@@ -223,7 +223,8 @@ def test_random_paths_run_as_the_model_says(machine, model, linuxcnc, tmp_path):
         assert np.abs(run.poses[seen] - told.poses[expected]).max() < 1e-3  # rounding may shift a motion by a cycle
         assert np.abs(run.joints[seen] - joints[expected]).max() < 2e-2
         assert (
-            np.abs(shares(machine, run.joints[seen]) - shares(machine, joints[expected])).max() < noise(machine) + 0.01
+            np.abs(utilisation(machine, run.joints[seen]) - utilisation(machine, joints[expected])).max()
+            < noise(machine) + 0.01
         )
 
 
@@ -243,7 +244,7 @@ def test_with_the_programmed_feed_a_joint_passes_its_speed(machine, linuxcnc, tm
     run = linuxcnc.run({"program": "part.ngc"}, {"part.ngc": text})
     assert "told" not in run.seen, run.seen
     part = run.part(first_line(text), world(machine, posted.poses[:1])[0])
-    over = shares(machine, run.joints[part]).max(1) > 1.1
+    over = utilisation(machine, run.joints[part]).max(1) > 1.1
     record = run.line[part][1:] - first_line(text) + 1
     cutting = ~posted.path.rapid[np.clip(record, 0, len(posted.path) - 1)]
     assert (over & cutting).any()
@@ -257,7 +258,7 @@ def test_a_wrist_goes_on_in_its_other_mode_and_stops_are_kept(machine, linuxcnc,
     text = written(trajectory)
     run = linuxcnc.run({"program": "part.ngc"}, {"part.ngc": text})
     assert "told" not in run.seen, run.seen
-    assert shares(machine, run.joints).max() <= 1.0 + noise(machine)
+    assert utilisation(machine, run.joints).max() <= 1.0 + noise(machine)
     part = run.part(first_line(text), world(machine, posted.poses[:1])[0])
     assert np.abs(run.joints[part][-1] - outward(machine, posted.joints[-1:])[0]).max() < 2e-6
     halts = trajectory.curve.corner[1:-1][trajectory.curve.parted[1:-1]]

@@ -43,7 +43,7 @@ def least(machine, path, workpiece, mode=None):
     if any(offence.limit in ("tilt", "X", "Y", "Z") for offence in posted.offences):
         return math.nan
     margins = machine.margins(posted.poses, posted.joints, posted.mode).min(axis=0)
-    by_name = dict(zip(machine.limits, machine.limit_parts, strict=True))
+    by_name = dict(zip(machine.limits, machine.limit_definitions, strict=True))
     found = []
     for (name, limit), margin in zip(by_name.items(), margins, strict=True):
         if limit.side == "reach":

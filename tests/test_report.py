@@ -91,12 +91,12 @@ def test_verdict_names_the_cycle_time(trajectory, html):
 
 
 def test_shares_are_those_of_dense_samples(trajectory, html, figures):
-    assert len(trajectory.shares) > 4
+    assert len(trajectory.binding_fractions) > 4
     times, passed = (np.arange(100_000) + 0.5) * trajectory.seconds / 100_000, trajectory.profile.row_times
     behind = np.searchsorted(passed, times)
     nearest = behind - (times - passed[behind - 1] < passed[behind] - times)
     counts = np.bincount(trajectory.binding[nearest], minlength=len(trajectory.names)) / 100_000
-    for name, share in trajectory.shares.items():
+    for name, share in trajectory.binding_fractions.items():
         trace = next(t for t in figures["time"]["data"] if t["type"] == "bar" and t["name"] == name)
         shown = sum(trace["y"]) * trace["width"] / trajectory.seconds
         assert shown == pytest.approx(share, abs=1e-4)
@@ -137,7 +137,7 @@ def test_what_binds_is_coloured(trajectory, figures):
         scale = 180.0 / np.pi if drive[j].unit == "rad" else 1.0
         for kind in ("speed", "acceleration"):
             traces = traces_of(figures["time"], f"{name} {kind}")
-            assert (len(traces) == 2) == (f"{name}.{kind}" in trajectory.shares)
+            assert (len(traces) == 2) == (f"{name}.{kind}" in trajectory.binding_fractions)
             for trace in traces[1:]:
                 _, y = xy(trace)
                 assert trace["line"]["color"] != traces[0]["line"]["color"]
@@ -192,7 +192,7 @@ def test_feed_is_seen_among_many_short_rapids():
 
 def test_path_is_coloured_by_what_binds(trajectory, figures):
     names = [trace["name"] for trace in figures["binding"]["data"]]
-    assert set(names) == set(trajectory.shares)
+    assert set(names) == set(trajectory.binding_fractions)
     colours = {trace["name"]: trace["line"]["color"] for trace in figures["binding"]["data"]}
     assert len(set(colours.values())) == len(colours)
     assert {t["name"]: t["marker"]["color"] for t in figures["time"]["data"] if t["type"] == "bar"} == colours

@@ -137,7 +137,7 @@ def hold(trajectory, rate=1000.0):
     for speeds in (points.speeds[0], trajectory.at(trajectory.seconds).speeds[0]):
         assert np.abs(speeds).max() < 1e-6
     assert np.abs(points.joints[-1] - trajectory.at(trajectory.seconds).joints[0]).max() < 1e-9
-    assert sum(trajectory.shares.values()) == pytest.approx(1.0 if trajectory.seconds else 0.0)
+    assert sum(trajectory.binding_fractions.values()) == pytest.approx(1.0 if trajectory.seconds else 0.0)
 
 
 @everyone
@@ -220,12 +220,12 @@ def test_a_circle_at_the_feed_that_its_centripetal_acceleration_allows():
     middle = np.linspace(0.2, 0.8, 100) * slow.seconds
     speed = np.linalg.norm(slow.at(middle).speeds, axis=1)
     assert speed == pytest.approx(0.8 * np.sqrt(a * radius), rel=1e-3)
-    assert slow.shares["feed"] > 0.8
+    assert slow.binding_fractions["feed"] > 0.8
     fast = plan_trajectory(posted(cartesian(mm=(INF, a, INF)), circle(radius), feed=1e6))
     crossing = fast.times[[180, 360, 540]]  # where the path runs along one of the axes, the other one only turns it
     speed = np.linalg.norm(fast.at(crossing).speeds, axis=1)
     assert speed == pytest.approx(np.sqrt(a * radius), rel=1e-2)
-    assert fast.shares.get("feed", 0.0) < 0.01
+    assert fast.binding_fractions.get("feed", 0.0) < 0.01
     hold(slow), hold(fast)
 
 
@@ -234,7 +234,7 @@ def test_without_accelerations_only_the_feed_counts():
     feed = np.array([100.0, 600.0, 1200.0, 1.0, 3000.0])
     trajectory = plan_trajectory(posted(limited(pk.load("orthoglide")), tip, feed=feed))
     assert np.diff(trajectory.times) == pytest.approx([3.0, 2.0, 0.0, 1.0], abs=1e-9)
-    assert trajectory.shares == {"feed": pytest.approx(1.0)}
+    assert trajectory.binding_fractions == {"feed": pytest.approx(1.0)}
     assert trajectory.at([1.5, 4.0]).poses == pytest.approx(np.array([[15.0, 0.0, 0.0], [30.0, 20.0, 0.0]]), abs=1e-9)
     with pytest.raises(PoseError, match=r":2, record 1: on the way to it nothing limits the motion: no feed"):
         plan_trajectory(posted(limited(pk.load("orthoglide")), tip, feed=np.nan))
@@ -248,7 +248,7 @@ def test_rapid_and_seconds():
         posted(machine, tip, feed=[600, 600, np.nan, 600], rapid=[False, True, False, False], seconds=seconds)
     )
     assert np.diff(trajectory.times) == pytest.approx([0.2, 4.0, 1.0])
-    assert set(trajectory.shares) == {"feed", "tower_a.speed"}
+    assert set(trajectory.binding_fractions) == {"feed", "tower_a.speed"}
 
 
 # Corners.
@@ -333,7 +333,7 @@ def test_setpoints_are_a_table():
 
 def test_one_place_takes_no_time():
     trajectory = plan_trajectory(posted(pk.load("linear_delta"), [[0, 0, 280]] * 3))
-    assert trajectory.seconds == 0.0 and trajectory.times.tolist() == [0.0] * 3 and trajectory.shares == {}
+    assert trajectory.seconds == 0.0 and trajectory.times.tolist() == [0.0] * 3 and trajectory.binding_fractions == {}
     assert trajectory.sample(1000.0).joints == pytest.approx(trajectory.posted.joints[:1])
 
 

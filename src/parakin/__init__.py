@@ -133,7 +133,7 @@ def load(name: str | PathLike[str], parameters: Mapping[str, float | str] | None
     try:
         return Machine(spec)
     except DescriptionError as error:
-        raise InputError(str(error), fspath(path), find_key_line(path, error.part)) from None
+        raise InputError(str(error), fspath(path), find_key_line(path, error.key)) from None
 
 
 # The public names that are loaded when they are first used: the module, and the name there if it is another.

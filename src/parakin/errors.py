@@ -43,11 +43,11 @@ class InputErrors(InputError):
 
 
 class DescriptionError(ParakinError):
-    """A description that is well-formed but is no machine that works; ``part`` is the key at fault."""
+    """A description that is well-formed but is no machine that works; ``key`` is the one at fault."""
 
-    def __init__(self, part: str, message: str):
-        self.part = part
-        super().__init__(f"{part}: {message}")
+    def __init__(self, key: str, message: str):
+        self.key = key
+        super().__init__(f"{key}: {message}")
 
 
 class PoseError(ParakinError):

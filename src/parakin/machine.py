@@ -152,10 +152,10 @@ class Machine:
     @cached_property
     def limits(self) -> tuple[str, ...]:
         """Names of all limits, in the order of :meth:`margins`."""
-        return tuple(limit.name for limit in self.limit_parts)
+        return tuple(limit.name for limit in self.limit_definitions)
 
     @property
-    def limit_parts(self) -> tuple[Limit, ...]:
+    def limit_definitions(self) -> tuple[Limit, ...]:
         """All limits, with name, subject, unit, side and bound."""
         return self.model.limits
 
@@ -438,7 +438,7 @@ class Machine:
         return rows
 
     def margins(self, poses: RowsLike, joints: RowsLike | None = None, mode: str | None = None) -> Array:
-        """Compute every limit's margin, (..., limits), ≥ 0 where it holds; units as in :attr:`limit_parts`.
+        """Compute every limit's margin, (..., limits), ≥ 0 where it holds; units as in :attr:`limit_definitions`.
 
         ``joints`` may give those that a path really takes (turns counted, free angles held), else they are the
         inverse's. Margins that do not exist where a leg can't close are NaN.

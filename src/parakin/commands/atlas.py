@@ -191,7 +191,7 @@ class _AtlasResults:
         box = make_pose_box(self.region, ranges, self.length)
         kinds: tuple[SingularityKind, ...] = ("parallel", "serial")
         self.proofs = [prove_no_singularity(box, kind, seconds=self.seconds) for kind in kinds]
-        report = progress.part("proving", 0.0, 1.0)
+        report = progress.stage("proving", 0.0, 1.0)
         if bounds is not None:
             self.proofs.append(prove_amplification(box, *bounds, seconds=self.seconds, progress=report))
             self.brackets = self.proofs[-1].brackets
@@ -201,7 +201,7 @@ class _AtlasResults:
     def compute_atlas(self, step: float | None, progress: ProgressBar) -> None:
         from ..performance.atlas import atlas
 
-        report = progress.part("looking at the workspace", 0.0, 1.0)
+        report = progress.stage("looking at the workspace", 0.0, 1.0)
         self.atlas = atlas(self.region, step, self.length, report, self.seconds)
 
     def map_slice(self, cut: Region, step: float | None) -> PerformanceMap:

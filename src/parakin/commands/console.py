@@ -81,8 +81,8 @@ class ProgressBar(AbstractContextManager["ProgressBar"]):
         if self.bar is not None:
             self.bar.stop()
 
-    def part(self, what: str, begin: float, end: float) -> Callable[[float], None]:
-        """Make the function to call with the fraction done of a part, from ``begin`` to ``end`` of the whole work."""
+    def stage(self, what: str, begin: float, end: float) -> Callable[[float], None]:
+        """Make the function to call with the fraction done of a stage, from ``begin`` to ``end`` of the whole work."""
         return lambda fraction: self._show(what, begin + (end - begin) * fraction)
 
     def _show(self, what: str, fraction: float) -> None:

@@ -72,7 +72,7 @@ def prepare_part(
         return _prepare_at(machine, path, workpiece, options, progress)
     from ..toolpath.placing.placement import find_placements
 
-    saying = progress.part("placing the part", 0.1, 0.3)
+    saying = progress.stage("placing the part", 0.1, 0.3)
     found = find_placements(machine, path, parse_bounds(place), mode=options.mode, progress=saying)
     prepared = []
     for placement in found:
@@ -105,7 +105,7 @@ def _prepare_at(
     job = prepare(
         machine, path, workpiece=workpiece, mode=mode, tolerances=options.tolerances,
         interpolation=controller.interpolation if controller else "pose", corners=options.corners,
-        progress=progress.part("checking and timing", 0.3, 0.7),
+        progress=progress.stage("checking and timing", 0.3, 0.7),
     )  # fmt: skip
     if controller is None or job.trajectory is None:
         return PreparedPart(job, placement, rewinds, None)

@@ -175,7 +175,7 @@ def post(
     with ProgressBar() as progress:
         path = read_part(
             part, PartOptions(frame, start, reference, tools), arc_tolerance,
-            None if place else compose_frames(placed, None), progress.part("reading", 0.0, 0.1),
+            None if place else compose_frames(placed, None), progress.stage("reading", 0.0, 0.1),
         )  # fmt: skip
         path = fit_part(chosen, path, length, placed)
         tolerances = Tolerances(tolerance, radians(angle_tolerance))
@@ -226,7 +226,7 @@ def _make_files(
 
     job, missing = prepared.job, list[str]()
     posted, trajectory = job.posted, job.trajectory
-    saying = progress.part("writing the tables", 0.7, 0.9)
+    saying = progress.stage("writing the tables", 0.7, 0.9)
     files: dict[str, tuple[str, Content]] = {
         "table": (f"{stem}.joints.csv", joint_table.make_joint_csv(posted, saying))
     }
@@ -236,7 +236,7 @@ def _make_files(
         if trajectory is None:
             missing.append(f"no setpoints: {job.unplanned}")
         else:
-            saying = progress.part("writing the setpoints", 0.9, 1.0)
+            saying = progress.stage("writing the setpoints", 0.9, 1.0)
             content = setpoint_table.make_setpoint_csv(trajectory, wanted.rate, saying)
             files["setpoints"] = (f"{stem}.setpoints.csv", content)
             if wanted.parquet:

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 _NOTES = 5  # remarks on the file that are printed
 _BINDING = 4  # limits that are named of those that bind
-_SHARE = 0.005  # what binds for less than this fraction of the time is not named
+_LEAST_FRACTION = 0.005  # what binds for less than this fraction of the time is not named
 
 
 def summarise_job(prepared: PreparedPart, target: Target | None, written: dict[str, str], missing: list[str]) -> str:
@@ -88,7 +88,8 @@ def _format_times(prepared: PreparedPart, target: Target | None) -> list[str]:
     text = f"cycle time {format_duration(job.seconds)}"
     if job.waits:
         text += f", of which the program waits {job.waits:g} s"
-    bound = [f"{name} {share:.0%}" for name, share in job.trajectory.shares.items() if share >= _SHARE][:_BINDING]
+    fractions = job.trajectory.binding_fractions.items()
+    bound = [f"{name} {fraction:.0%}" for name, fraction in fractions if fraction >= _LEAST_FRACTION][:_BINDING]
     text += f"; bound by {', '.join(bound)}" if bound else ""
     if target is None or seconds is None:
         return [text]

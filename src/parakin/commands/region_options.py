@@ -69,7 +69,7 @@ def read_region(
         "mode": mode,
     }
     try:
-        return make_region(machine, dexterous=dexterous, part="all" if all_parts else "home", **arguments)
+        return make_region(machine, dexterous=dexterous, components="all" if all_parts else "home", **arguments)
     except PoseError:
         for option, value in arguments.items():
             try:

@@ -135,11 +135,11 @@ def workspace(
     began = clock.monotonic()
     with ProgressBar() as progress:
         is_drawn = json or bool(set(files) - {".vtu", ".csv"})
-        found = find_workspace(method, region, effort, progress.part("looking for it", 0.0, 0.6 if is_drawn else 1.0))
+        found = find_workspace(method, region, effort, progress.stage("looking for it", 0.0, 0.6 if is_drawn else 1.0))
         seconds = clock.monotonic() - began
         contents = WorkspaceFiles(found, None, ())
         if is_drawn:
-            contents = prepare_files(found, effort.step, progress.part("drawing", 0.6, 1.0))
+            contents = prepare_files(found, effort.step, progress.stage("drawing", 0.6, 1.0))
         elsewhere = None
         if isinstance(found, Workspace):
             elsewhere = measure_elsewhere(found, seconds=min(_ELSEWHERE, effort.seconds))

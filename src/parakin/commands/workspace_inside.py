@@ -48,11 +48,11 @@ def explore_inside(region: Region, options: InsideOptions, progress: ProgressBar
         from ..workspaces.inscribed.largest_box import NoBoxError
 
         try:
-            box = _find_box(region, options, progress.part("looking for the box", 0.0, 1.0))
+            box = _find_box(region, options, progress.stage("looking for the box", 0.0, 1.0))
         except NoBoxError as error:
             no_box = str(error)
     if options.parts or options.start is not None:
-        components = _find_components(region, options, progress.part("looking for the parts", 0.0, 1.0))
+        components = _find_components(region, options, progress.stage("looking for the parts", 0.0, 1.0))
     return Inside(box, no_box, components)
 
 

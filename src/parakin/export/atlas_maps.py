@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 _GREY, _OUTLINE = "#607d8b", "#37474f"
 _LEVELS = 24
-_SHARE = 98.0  # percent of the positions that have colours of their own: near a singularity numbers grow without end
+_COLOURED = 98.0  # percent of the positions that have colours of their own: near a singularity numbers grow without end
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,7 +89,7 @@ def _draw_panel(figure: Figure, axes: Any, map_: PerformanceMap, panel: _MapPane
     axes.set_aspect("equal")
     if len(x) < 2 or len(y) < 2 or not len(inside):
         return
-    low, high = float(inside.min()), float(np.percentile(inside, _SHARE) if panel.endless else inside.max())
+    low, high = float(inside.min()), float(np.percentile(inside, _COLOURED) if panel.endless else inside.max())
     if not high > low:
         low, high = low - 0.5 * abs(low) - 1e-6, high + 0.5 * abs(high) + 1e-6
     crossed = low < 0.0 < high

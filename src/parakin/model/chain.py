@@ -86,10 +86,10 @@ class Pointing:
     signs: tuple[float, float] = (1.0, 1.0)
 
     @classmethod
-    def from_steps(cls, steps: Iterable[Step], part: str) -> Pointing:
+    def from_steps(cls, steps: Iterable[Step], key: str) -> Pointing:
         """Build it from the rotations of a chain, two of them driven, which act on +z of its last frame.
 
-        ``part`` is the chain's name in errors.
+        ``key`` is the chain's name in errors.
         """
         rotation, axes, signs = IDENTITY, [], []
         for step in steps:
@@ -100,12 +100,12 @@ class Pointing:
                 signs.append(step.sign)
             rotation = product(rotation, make_axis_rotation(step.axis, *compute_exact_sincos(step.value)))
         if len(axes) != 2:
-            raise DescriptionError(part, f"{len(axes)} driven turns point the tool, two are needed")
+            raise DescriptionError(key, f"{len(axes)} driven turns point the tool, two are needed")
         pointing = cls(axes[0], axes[1], apply(rotation, UNIT["tz"]), (signs[0], signs[1]))
         if norm(cross(axes[0], axes[1])) < _PARALLEL:
-            raise DescriptionError(part, "its two axes are parallel and can't point the tool")
+            raise DescriptionError(key, "its two axes are parallel and can't point the tool")
         if norm(cross(pointing.second, pointing.start)) < _PARALLEL:
-            raise DescriptionError(part, "its second axis lies along the tool and can't point it")
+            raise DescriptionError(key, "its second axis lies along the tool and can't point it")
         return pointing
 
     @property

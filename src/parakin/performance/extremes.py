@@ -48,7 +48,7 @@ def compute_slack(region: Region, positions: Array) -> Array:
     columns = [machine.limits.index(name) for name in region.limits if name in machine.limits]
     poses = region.poses(positions)
     margins = machine.margins(poses, mode=region.mode)[:, columns]
-    if region.part == "home":
+    if region.components == "home":
         parallel = compute_singularity_margins(machine, poses, None, region.mode)[:, :1]
         margins = np.concatenate([margins, parallel - ZERO], 1)
     if not margins.shape[1]:

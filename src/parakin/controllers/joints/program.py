@@ -19,7 +19,7 @@ from ..event_lines import check_events, format_events
 from ..gcode_text import CHUNK, format_blocks, format_comments, join_lines, to_display
 
 LINEAR, TURNING = "XYZUVW", "ABC"
-_APPROACH_SHARE = 0.25  # fraction of the joints' speeds that is used on the way to the first record
+_APPROACH_SPEED = 0.25  # fraction of the joints' speeds that is used on the way to the first record
 _APPROACH_LEAST = 4.0  # s, for that way
 _SHORTEST = 1e-3  # s
 
@@ -74,7 +74,7 @@ def _format_program(trajectory: Trajectory, letters: tuple[str, ...], forced: st
     least = (np.abs(np.diff(joints, axis=0)) / speeds).max(1, initial=0.0)
     seconds = np.maximum(np.diff(trajectory.times[kept]), np.maximum(least, _SHORTEST))
     from_home = float((np.abs(joints[0] - machine.inverse(machine.home)) / speeds).max())
-    approach = max(_APPROACH_LEAST, from_home / _APPROACH_SHARE)
+    approach = max(_APPROACH_LEAST, from_home / _APPROACH_SPEED)
     rows = to_display(joints, machine.joint_units)
     names = zip(letters, machine.joints, machine.joint_units, strict=True)
     head = [

@@ -148,7 +148,7 @@ def _write_sides(machine: Machine) -> Iterator[str]:
 def _write_limits(machine: Machine) -> Iterator[str]:
     """Write the limits' and singularities' names, and how near to one a jog stops."""
     names = [*machine.limits, *(f"singularity, {name}" for name in list_margin_names(machine))]
-    near = [NEAR_LIMIT[limit.unit] * _scale_reach(limit) for limit in machine.limit_parts]
+    near = [NEAR_LIMIT[limit.unit] * _scale_reach(limit) for limit in machine.limit_definitions]
     least = find_least_margins(machine)
     rates = np.array([choose_drive_rates(drive) for drive in machine.drives])
     yield _write_array("char *const", "limit_names", [f'"{name}"' for name in names])
@@ -262,7 +262,7 @@ def _compile_limits(machine: Machine, drives: bool) -> Tape:
     trace = Trace()
     pose = trace.inputs(len(machine.axes))
     joints = trace.inputs(len(machine.joints), len(machine.axes))
-    margins = zip(machine.limit_parts, machine.trace_margins(pose, machine.mode, joints), strict=True)
+    margins = zip(machine.limit_definitions, machine.trace_margins(pose, machine.mode, joints), strict=True)
     watched = [margin for limit, margin in margins if drives or not bounds_drive(machine, limit)]
     return compile_tape(trace, watched, len(pose) + len(joints))
 

@@ -53,7 +53,7 @@ def encode_job(
         "seconds": job.seconds,
         "controller_seconds": controller_seconds,
         "waits": job.waits,
-        "bound_by": {} if trajectory is None else trajectory.shares,
+        "bound_by": {} if trajectory is None else trajectory.binding_fractions,
         "rewinds": [
             {"line": rewind.line, "joint": rewind.joint, "turns": rewind.turns, "retract": rewind.retract}
             for rewind in rewinds

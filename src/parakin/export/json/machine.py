@@ -57,7 +57,7 @@ def encode_details(machine: Machine) -> dict[str, Any]:
             "bound": None if limit.side == "reach" else to_display(limit.bound, limit.unit),
             "unit": name_display_unit(limit.unit),
         }
-        for limit in machine.limit_parts
+        for limit in machine.limit_definitions
     ]
     home = zip(machine.axes, machine.home.tolist(), machine.axis_units, strict=True)
     return {

@@ -66,7 +66,7 @@ def stack_panels(rows: Sequence[Sequence[Panel]], title: str) -> tuple[Figure, i
 
 
 def _split_width(count: int) -> list[tuple[float, float]]:
-    """Split the figure's width into columns; return their ends as shares of it."""
+    """Split the figure's width into columns; return their ends as fractions of it."""
     width = (1.0 - (count - 1) * _BETWEEN) / count
     return [(c * (width + _BETWEEN), c * (width + _BETWEEN) + width) for c in range(count)]
 

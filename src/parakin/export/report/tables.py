@@ -64,15 +64,15 @@ def render_offence_card(posted: Posted) -> str:
 
 def _render_offence(offence: Offence, text: dict[int, str], count: bool) -> str:
     beyond, reads = format_value(offence.excess, offence.unit), escape(text.get(offence.line, ""))
-    place = f"{offence.line}<br><small>{format_share(offence)}</small>" if offence.share < 1.0 else str(offence.line)
+    place = f"{offence.line}<br><small>{describe_share(offence)}</small>" if offence.share < 1.0 else str(offence.line)
     return (
         f"<tr><td>{place}</td><td>{escape(offence.text)}</td><td class=n>{beyond}</td>"
         f"<td class=n>{f'{offence.count:,}' if count else ''}</td><td><code>{reads}</code></td></tr>\n"
     )
 
 
-def format_share(offence: Offence) -> str:
-    """Format where between two records an offence is."""
+def describe_share(offence: Offence) -> str:
+    """Describe where between two records an offence is."""
     return f"on the way, {100.0 * offence.share:.0f} %"
 
 

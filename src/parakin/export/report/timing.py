@@ -8,7 +8,7 @@ import numpy as np
 
 from ..machine.figures import embed_figure
 from ..number_format import format_duration, format_value
-from .binding_limits import build_bound_path, choose_colours, render_share_bars
+from .binding_limits import build_bound_path, choose_colours, render_binding_bars
 from .cards import make_card
 from .path_view import PathView
 from .tables import sum_programmed_time
@@ -43,7 +43,7 @@ def render_timing_card(trajectory: Trajectory, view: PathView) -> str:
     path = embed_figure("binding", build_bound_path(trajectory, view, shades), "560px")
     figure, height = draw_timing_curves(trajectory, shades)
     body = (
-        f"<div class=two><div><h3>What sets the pace</h3>{render_share_bars(trajectory, shades)}</div>"
+        f"<div class=two><div><h3>What sets the pace</h3>{render_binding_bars(trajectory, shades)}</div>"
         f"<div>{path}<p class=sub>The tool tip’s path, "
         "coloured by the limit that sets the pace. Rapid motions are thin.</p></div></div>"
         f"<h3>Over the cycle</h3><div class=wide>{embed_figure('time', figure, f'{height}px')}</div>"

@@ -12,7 +12,7 @@ from ...arrays import Flags
 from ...toolpath.posting.range_use import RangeUse
 from ..machine.figures import Figure, PlotTrace, round_numbers
 from ..number_format import format_bound
-from .binding_limits import build_share_traces
+from .binding_limits import build_binding_traces
 from .joint_curves import build_panel, format_heading
 from .panels import Panel, stack_panels
 from .timing_samples import ThinnedCurve, thin_curves
@@ -36,7 +36,7 @@ def draw_timing_curves(trajectory: Trajectory, shades: dict[str, str]) -> tuple[
     machine = trajectory.posted.machine
     kinds = [kind for kind in _KINDS if kind != "jerk" or any(d.jerk < inf for d in machine.drives)]
     curves = thin_curves(trajectory, min(_MOST, _ALL // (len(machine.joints) * (1 + len(kinds)) + 2)))
-    binds = Panel(format_heading("what sets the pace", "share of the time", ""), build_share_traces(trajectory, shades),
+    binds = Panel(format_heading("what sets the pace", "share of the time", ""), build_binding_traces(trajectory, shades),
                   [0.0, 1.0], ticks=".0%")  # fmt: skip
     rows = [[_build_feed_panel(trajectory, curves)], [binds]]
     for number in range(len(machine.joints)):

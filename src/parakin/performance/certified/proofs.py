@@ -201,7 +201,7 @@ def _prove_reach(box: PoseBox, claim: str, budget: Budget) -> Proof | None:
     if lost.any():
         pose = poses[int(lost.argmax())]
         broken = int(box.machine.check(pose, mode=box.mode))
-        subject = box.machine.limit_parts[broken - 1].subject if broken else "the machine"
+        subject = box.machine.limit_definitions[broken - 1].subject if broken else "the machine"
         return Proof(claim, "refuted", pose, f"{subject} does not reach it", boxes=budget.used)
     if not box.reach:
         return None

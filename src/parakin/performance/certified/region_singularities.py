@@ -60,7 +60,7 @@ def judge_singularities(region: Region, budget: Budget | None = None) -> tuple[R
     and intervals prove both signs among them. What the budget leaves open is unproved.
     """
     names, budget = list_margin_names(region.machine), budget or Budget()
-    extent, whole = region.find_extent(budget), region.include_all_parts()
+    extent, whole = region.find_extent(budget), region.include_all_components()
     if extent is None:
         return tuple(RegionSingularity(name, "none", None) for name in names)
     verdicts, labelled = [], {}

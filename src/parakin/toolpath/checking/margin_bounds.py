@@ -75,8 +75,8 @@ class MotionProver:
         size = measure_machine_size(machine)
         sizes = {"mm": size, "rad": 1.0, "1": 1.0, "mm²": size * size}
         self._size = size
-        self._aside = 2.0 * ASIDE * np.array([sizes[limit.unit] for limit in machine.limit_parts])
-        self.tolerance = KEPT * np.array([sizes[limit.unit] for limit in machine.limit_parts])
+        self._aside = 2.0 * ASIDE * np.array([sizes[limit.unit] for limit in machine.limit_definitions])
+        self.tolerance = KEPT * np.array([sizes[limit.unit] for limit in machine.limit_definitions])
         self.boxes = 0
 
     def bound_sections(self, sections: Sections) -> MarginBounds:

@@ -14,7 +14,7 @@ from .motion_bisection import MotionBisection
 
 def make_limit_offence(posted: Posted, column: int, worst: WorstMargin, begins: float, count: int) -> Offence:
     """Make the offence of a limit of the machine, by its worst margin on a motion."""
-    limit = posted.machine.limit_parts[column]
+    limit = posted.machine.limit_definitions[column]
     described = describe_broken_limit(limit, -worst.margin)
     line = int(posted.path.line[worst.motion])
     return Offence(limit.name, described.text, worst.motion, line, *described.numbers, count, worst.share, begins)

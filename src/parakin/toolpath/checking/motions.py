@@ -140,5 +140,5 @@ def merge_wrist_modes(one: WristModes, two: WristModes) -> WristModes:
 
 def measure_machine_size(machine: Machine) -> float:
     """Return the greatest length that a limit names, mm; at least 1."""
-    sizes = [abs(limit.bound) for limit in machine.limit_parts if limit.unit != "rad"]
+    sizes = [abs(limit.bound) for limit in machine.limit_definitions if limit.unit != "rad"]
     return max([1.0, *sizes])

@@ -131,7 +131,7 @@ class PlacementMargins:
         uses, quantities = list_ranges(self.machine)
         spans = [
             uses[i].span if i >= 0 else max(limit.bound, 1.0) ** (2 if limit.unit == "mm²" else 1)
-            for i, limit in zip(quantities.tolist(), self.machine.limit_parts, strict=True)
+            for i, limit in zip(quantities.tolist(), self.machine.limit_definitions, strict=True)
         ]
         return quantities < 0, np.array(spans)
 

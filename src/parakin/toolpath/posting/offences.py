@@ -69,7 +69,7 @@ def judge_path(
     mode : working mode of the joints
     path_limits : the path's own; they go before the machine's, for there the pose isn't the one asked for
     """
-    machine_limits = machine.limit_parts
+    machine_limits = machine.limit_definitions
     broken: Indices = np.atleast_1d(machine.check(poses, joints, mode))
     limits = (*machine.limits, *(limit.name for limit in path_limits))
     tallies = [_Tally() for _ in limits]
@@ -124,7 +124,7 @@ def find_gravest(machine: Machine, offences: Sequence[Offence]) -> Offence:
 
 def _rate_gravity(machine: Machine, offence: Offence) -> tuple[bool, float]:
     """Rate an offence: what can't be reached at all is worse than what only lies out of range."""
-    limits = {limit.name: limit for limit in machine.limit_parts}
+    limits = {limit.name: limit for limit in machine.limit_definitions}
     limit = limits.get(offence.limit)
     if offence.limit == TURNS:
         return False, offence.excess

@@ -69,7 +69,7 @@ def list_ranges(machine: Machine) -> tuple[list[RangeUse], Indices]:
     uses = [RangeUse(name, name, unit) for name, unit in zip(machine.joints, machine.joint_units, strict=True)]
     index = {use.name: i for i, use in enumerate(uses)}
     quantities = np.full(len(machine.limits), -1)
-    for number, limit in enumerate(machine.limit_parts):
+    for number, limit in enumerate(machine.limit_definitions):
         if limit.side == "reach":
             continue
         name = limit.name.removesuffix(f".{limit.side}")
@@ -111,7 +111,7 @@ def measure_range_use(posted: Posted) -> tuple[list[RangeUse], Array]:
         relative[part] = compute_relative_margin(machine, margins)
         for use, q in zip(uses, posted.joints[part].T, strict=False):
             use.widen(q)
-        for number, limit in enumerate(machine.limit_parts):
+        for number, limit in enumerate(machine.limit_definitions):
             if quantities[number] >= 0:
                 uses[quantities[number]].add_margins(limit, margins[:, number], part.start)
     return uses, relative

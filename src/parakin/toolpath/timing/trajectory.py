@@ -79,8 +79,8 @@ class Trajectory:
         return corner_times[self.curve.corner_of_record]
 
     @cached_property
-    def shares(self) -> dict[str, float]:
-        """The share of the cycle time in which each limit binds, the greatest first; without limits that never bind."""
+    def binding_fractions(self) -> dict[str, float]:
+        """The fraction of the cycle time in which each limit binds, the greatest first; without limits that never bind."""
         spans = np.diff(self.profile.row_times)
         near = 0.5 * (np.append(spans, 0.0) + np.append(0.0, spans))
         sums = np.bincount(self.binding, near, len(self.names)) / (self.seconds or 1.0)

@@ -23,7 +23,7 @@ from .inclusive import InclusiveSubdivision
 from .subdivision import Subdivision
 from .total import TotalSubdivision
 
-RegionPart = Literal["home", "all"]
+CountedComponents = Literal["home", "all"]
 RegionKind = Literal["constant", "total", "inclusive", "dexterous"]
 
 FAR = 1e6  # mm: no machine reaches farther
@@ -43,7 +43,7 @@ class Region:
     fixed_axes : the axes with one value, mm and rad
     swept_axes : the turning axes with a range, (low, high) rad
     without : names of the limits that do not count
-    part : ``home``, only poses in home's assembly mode, or ``all``, those in any
+    components : ``home``, only the component in which home lies, in its assembly mode, or ``all``
     stated_axes : those of the fixed axes that are stated; the others are turning axes that keep their value at home
     """
 
@@ -54,7 +54,7 @@ class Region:
     swept_axes: Mapping[str, AxisRange]
     without: tuple[str, ...]
     mode: str
-    part: RegionPart = "home"
+    components: CountedComponents = "home"
     stated_axes: tuple[str, ...] = ()
 
     @cached_property
@@ -65,7 +65,7 @@ class Region:
     def constraints(self) -> list[Constraint]:
         """What must be ≥ 0 for a pose to be allowed, as functions of position and orientation."""
         limits = self.traced_pose.build_constraints(self.without)
-        if self.part == "all":
+        if self.components == "all":
             return limits
         side = make_side_constraints(self.traced_pose)[0]
         first_implied = next((i for i, limit in enumerate(limits) if limit.implied), len(limits))
@@ -105,7 +105,7 @@ class Region:
             "some": {} if self.every_orientation else swept,
             "without": list(self.without),
             "mode": self.mode,
-            "part": self.part,
+            "components": self.components,
         }
 
     @check_arguments
@@ -135,11 +135,11 @@ class Region:
         subdivision = TotalSubdivision if self.every_orientation else InclusiveSubdivision
         return subdivision([*self.constraints, *more], low, high, self.swept_bounds)
 
-    def include_all_parts(self) -> Region:
+    def include_all_components(self) -> Region:
         """Make the same region of all assembly modes, which has the same extent."""
-        if self.part == "all":
+        if self.components == "all":
             return self
-        whole = replace(self, part="all")
+        whole = replace(self, components="all")
         if "extent" in self.__dict__:
             whole.__dict__["extent"] = self.extent
         return whole
@@ -152,7 +152,7 @@ class Region:
     def find_extent(self, budget: Budget | None = None) -> tuple[Array, Array] | None:
         """Find a box proved to hold the whole region, not much larger than it; None for a region proved empty.
 
-        It is that of all parts: the limits bound the machine, and no sign of a determinant does. Where the budget (by
+        It is that of all components: the limits bound the machine, and no sign of a determinant does. Where the budget (by
         default 60 s) ends before, the box is larger than need be, else it is kept.
 
         Raises :class:`PoseError` if the limits leave it unbounded, or are not proved to bound it.
@@ -161,7 +161,7 @@ class Region:
         if "extent" in known:
             return self.extent
         budget = budget or Budget()
-        box = _search_extent(self.include_all_parts(), budget)
+        box = _search_extent(self.include_all_components(), budget)
         if not budget.is_spent():
             known["extent"] = box
         return box
@@ -227,7 +227,7 @@ def make_region(
     dexterous: bool = False,
     without: Sequence[str] = (),
     mode: str | None = None,
-    part: RegionPart = "home",
+    components: CountedComponents = "home",
 ) -> Region:
     """Make the region of a workspace or an atlas: check which axes are fixed and swept and which limits count.
 
@@ -241,7 +241,7 @@ def make_region(
     dexterous : the machine must be allowed at every value of every turning axis
     without : names of limits that do not count, with ``*`` for any letters; legs must reach in any case
     mode : working mode
-    part : ``home`` leaves out what the machine could reach in another assembly mode only, beyond a parallel
+    components : ``home`` leaves out what the machine could reach in another assembly mode only, beyond a parallel
         singularity, such as the mirror image of its workspace behind the base; ``all`` counts it
 
     Raises :class:`PoseError`.
@@ -274,7 +274,7 @@ def make_region(
         {axis: swept[axis] for axis in machine.axes if axis in swept},
         _find_ignored_limits(machine, without),
         machine.checked_mode(mode),
-        part,
+        components,
         tuple(at or {}),
     )
 
@@ -320,7 +320,7 @@ def _find_ignored_limits(machine: Machine, patterns: Sequence[str]) -> tuple[str
         matching = [name for name in machine.limits if fnmatchcase(name, pattern)]
         if not matching:
             raise PoseError(f"no limit {pattern}, {machine.name} has {', '.join(machine.limits)}")
-        reach = [limit.name for limit in machine.limit_parts if limit.side == "reach" and limit.name in matching]
+        reach = [limit.name for limit in machine.limit_definitions if limit.side == "reach" and limit.name in matching]
         if reach and reach == matching:
             raise PoseError(f"{pattern} can't be switched off: where it fails, the legs don't close")
         ignored += [name for name in matching if name not in reach and name not in ignored]

@@ -213,7 +213,7 @@ def _sample_estimates(region: Region, cells: Cells, budget: Budget) -> Cells:
 def _find_home_cells(region: Region, cells: Cells) -> Flags | None:
     """Find the cells that may hang together with home; None where home does not tell, or all parts count."""
     machine = region.machine
-    if region.part == "all" or any(axis in region.fixed_axes for axis in "XYZ"):
+    if region.components == "all" or any(axis in region.fixed_axes for axis in "XYZ"):
         return None  # what is apart in a slice may hang together beyond it
     home = dict(zip(machine.axes, machine.home.tolist(), strict=True))
     return find_joined_cells(cells, np.array([home[axis] for axis in region.free_axes]))
@@ -224,16 +224,16 @@ def measure_elsewhere(workspace: Workspace, gap: float = 0.05, seconds: float | 
 
     Parameters
     ----------
-    workspace : of ``part="home"``; of all parts there is nothing besides
+    workspace : of ``components="home"``; of all of them there is nothing besides
     gap, seconds : as for :func:`workspace`, of the other assembly modes
 
     Raises :class:`PoseError` for a region that no limit bounds in the other assembly modes.
     """
     region = workspace.region
-    if region.part == "all":
+    if region.components == "all":
         return NOTHING
     budget = Budget(seconds)
-    extent, everywhere = region.find_extent(budget), region.include_all_parts()
+    extent, everywhere = region.find_extent(budget), region.include_all_components()
     if extent is None:
         return workspace.apart
     own = make_side_constraints(everywhere.traced_pose)[0]

@@ -113,7 +113,7 @@ def find_components(
     if cell is not None and not (isfinite(cell) and cell > 0.0):
         raise PoseError(f"cell: a size above 0 mm expected, not {cell:g}")
     budget, report = Budget(seconds), progress or (lambda fraction: None)
-    region = region.include_all_parts()
+    region = region.include_all_components()
     sides = dict(zip((1, -1), make_side_constraints(region.traced_pose), strict=True))
     position, sign = (None, 0) if start is None else _locate_start(region, start, sides)
     outline = find_outline_cells(region, budget.take_share(_OUTLINE))

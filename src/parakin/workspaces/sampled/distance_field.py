@@ -59,7 +59,7 @@ class DistanceField:
 
     @cached_property
     def _reach_tape(self) -> Tape:
-        reach = {limit.name for limit in self.region.machine.limit_parts if limit.side == "reach"}
+        reach = {limit.name for limit in self.region.machine.limit_definitions if limit.side == "reach"}
         return self._compile([_derive_distance(own) for own in self._constraints if own.name in reach])
 
     @cached_property

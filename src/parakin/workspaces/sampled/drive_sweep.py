@@ -141,7 +141,7 @@ def _find_poses(machine: Machine, joints: Array, side: float, mode: str) -> Arra
 
 def _list_sides(region: Region) -> list[tuple[str, float]]:
     sides = [("home", region.machine.home_side), ("other", -region.machine.home_side)]
-    return sides if region.part == "all" else sides[:1]
+    return sides if region.components == "all" else sides[:1]
 
 
 def _map_strategies(region: Region, strategies: Sequence[DriveStrategy], cells: int) -> tuple[DriveImage, ...]:

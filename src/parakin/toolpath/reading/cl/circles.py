@@ -19,7 +19,7 @@ _TANGENT = 0.99  # cosine of the angle to a neighbour that joins the arc tangent
 _SHORTEST = 0.01  # mm: the direction of a shorter neighbour is too rounded to tell
 _IN_PLANE = 0.5  # least fraction of a neighbour in the arc's plane; a steeper neighbour proves nothing
 _ANGLE = 2e-3  # rad between an angle as stated and as the arc's ends have it
-_SAME_STEP = 0.02  # share of a step by which the steps between points of one arc may differ
+_SAME_STEP = 0.02  # fraction of a step by which the steps between points of one arc may differ
 _WIDEST_STEP = math.radians(150)  # between points of one arc
 
 

@@ -37,8 +37,8 @@ def render_binding_bars(trajectory: Trajectory, shades: dict[str, str]) -> str:
     return "".join(
         f"<div class='bar pace'><div><b>{_allow_breaks(name)}</b></div><div class=scale>"
         f"<i style='left:0;width:{100.0 * fraction:.2f}%;background:{shades[name]}'></i></div>"
-        f"<div class=slack>{format_percent(fraction)} <small>{_format_brief(fraction * trajectory.seconds)}</small></div>"
-        "</div>\n"
+        f"<div class=slack>{format_percent(fraction)} <small>{_format_brief(fraction * trajectory.seconds)}</small>"
+        "</div></div>\n"
         for name, fraction in trajectory.binding_fractions.items()
     )
 

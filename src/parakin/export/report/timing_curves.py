@@ -36,8 +36,8 @@ def draw_timing_curves(trajectory: Trajectory, shades: dict[str, str]) -> tuple[
     machine = trajectory.posted.machine
     kinds = [kind for kind in _KINDS if kind != "jerk" or any(d.jerk < inf for d in machine.drives)]
     curves = thin_curves(trajectory, min(_MOST, _ALL // (len(machine.joints) * (1 + len(kinds)) + 2)))
-    binds = Panel(format_heading("what sets the pace", "share of the time", ""), build_binding_traces(trajectory, shades),
-                  [0.0, 1.0], ticks=".0%")  # fmt: skip
+    heading = format_heading("what sets the pace", "share of the time", "")
+    binds = Panel(heading, build_binding_traces(trajectory, shades), [0.0, 1.0], ticks=".0%")
     rows = [[_build_feed_panel(trajectory, curves)], [binds]]
     for number in range(len(machine.joints)):
         rates = [_build_rate_panel(trajectory, curves, number, kind) for kind in kinds]

@@ -83,7 +83,7 @@ def test_struts_have_their_lengths(machine, at_home):
     pose = machine.home if at_home else near_home(machine)
     joints = dict(zip(machine.joints, machine.inverse(pose), strict=True))
     drawn = build_scene(machine, pose)
-    lengths = {(part.kind, part.name): np.linalg.norm(np.diff(part.points, axis=0)) for part in drawn.parts}
+    lengths = {(item.kind, item.name): np.linalg.norm(np.diff(item.points, axis=0)) for item in drawn.items}
     for leg in machine.spec.legs:
         first, last = leg.drives[0].name, leg.drives[-1].name
         if leg.kind == "length":
@@ -101,8 +101,8 @@ def test_the_tool_stands_at_the_pose(machine):
     drawn = build_scene(machine, pose)
     tip = drawn.workpiece[:, :3] @ tip_of(machine, pose) + drawn.workpiece[:, 3]
     np.testing.assert_allclose(drawn.frames["tool"][:, 3], tip, atol=1e-9)
-    for part in drawn.of("tool"):
-        np.testing.assert_allclose(part.points[-1], tip, atol=1e-9)
+    for item in drawn.of("tool"):
+        np.testing.assert_allclose(item.points[-1], tip, atol=1e-9)
     if "B" in machine.axes:
         np.testing.assert_allclose(
             drawn.frames["tool"][:, 2], drawn.workpiece[:, :3] @ axis_of(machine, pose), atol=1e-9
@@ -114,12 +114,12 @@ def test_rails_cover_the_range_and_carry_the_feet(machine):
     drawn = build_scene(machine)
     for leg in machine.spec.legs:
         for drive, unit in zip(leg.drives, leg.units, strict=True):
-            rails = [part for part in drawn.of("rail") if part.name == drive.name]
+            rails = [item for item in drawn.of("rail") if item.name == drive.name]
             assert len(rails) == (leg.kind in ("slider", "lambda", "column"))
             if rails and unit == "mm":
                 a, b = rails[0].points
                 assert np.linalg.norm(b - a) == pytest.approx(drive.high - drive.low)
-                feet = [part.points[0] for part in drawn.of("rod", "arm") if part.name == drive.name]
+                feet = [item.points[0] for item in drawn.of("rod", "arm") if item.name == drive.name]
                 assert np.linalg.norm(feet[0] - a) + np.linalg.norm(feet[0] - b) == pytest.approx(
                     drive.high - drive.low
                 )
@@ -141,7 +141,7 @@ def test_out_of_reach_leaves_what_has_a_place():
     drawn = build_scene(machine, [9000.0, 0.0, 0.0])
     assert not drawn.of("rod")
     assert drawn.of("platform")
-    assert all(np.isfinite(part.points).all() for part in drawn.parts)
+    assert all(np.isfinite(item.points).all() for item in drawn.items)
 
 
 def test_a_free_angle_is_the_paths():

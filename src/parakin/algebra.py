@@ -123,9 +123,9 @@ def _add_multiple(x: Term, y: Scalar, sign: float) -> Scalar:
     """Add sign·y to x in as few operations as possible; equal terms are joined."""
     if not isinstance(y, Term | float | int | np.floating):
         return NotImplemented
-    kx, parts = _split_linear(x)
+    kx, summands = _split_linear(x)
     ky, more = _split_linear(y)
-    const, total = kx + sign * ky, {a.index: (k, a) for k, a in parts}
+    const, total = kx + sign * ky, {a.index: (k, a) for k, a in summands}
     for k, a in more:
         total[a.index] = (total.get(a.index, (0.0, a))[0] + sign * k, a)
     terms = [(k, a) for k, a in total.values() if k != 0.0]
@@ -311,10 +311,10 @@ def _differentiate_node(y: Term, x: Term, known: dict[int, Scalar]) -> Scalar:
         return 1.0
     a = y.args
     d = [known[arg.index] for arg in a]
-    if not any(isinstance(part, Term) or part != 0.0 for part in d):
+    if not any(isinstance(slope, Term) or slope != 0.0 for slope in d):
         return 0.0
     if y.op == LIN:
-        return sum((k * part for k, part in zip(y.k[1:], d, strict=True)), 0.0)
+        return sum((k * slope for k, slope in zip(y.k[1:], d, strict=True)), 0.0)
     if y.op in (QUAD, FMA):
         pairs = 1 if y.op == FMA else len(y.k)
         total: Scalar = y.k[1] * d[2] if y.op == FMA else 0.0

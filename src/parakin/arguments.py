@@ -84,7 +84,7 @@ def _accept_value(value: object, hint: Any) -> bool:
     """Tell whether a value is of the kind that an annotation tells; of unknown annotations all are."""
     if isinstance(hint, str):
         names = {kind.__name__ for kind in type(value).__mro__} | ({"None"} if value is None else set())
-        return not names.isdisjoint(part.strip() for part in hint.split("|"))
+        return not names.isdisjoint(name.strip() for name in hint.split("|"))
     origin = get_origin(hint)
     if hint is Any or hint == ArrayLike or isinstance(hint, TypeVar):
         return True
@@ -134,10 +134,10 @@ def _accept_elements(value: object, hint: Any) -> bool:
     """Tell whether a list or tuple has the elements that its annotation tells."""
     if isinstance(value, (str, bytes)) or not isinstance(value, (Sequence, np.ndarray)) or _count(value) is None:
         return False
-    elements, parts = list(value), get_args(hint)
-    if get_origin(hint) is tuple and Ellipsis not in parts:
-        return len(elements) == len(parts) and all(map(_accept_value, elements, parts))
-    return all(_accept_value(element, parts[0]) for element in elements) if parts else True
+    elements, hints = list(value), get_args(hint)
+    if get_origin(hint) is tuple and Ellipsis not in hints:
+        return len(elements) == len(hints) and all(map(_accept_value, elements, hints))
+    return all(_accept_value(element, hints[0]) for element in elements) if hints else True
 
 
 def _is_numeric(value: object) -> bool:

@@ -12,7 +12,9 @@ class ParakinError(Exception):
     """Anything parakin refuses; ``str()`` is one line fit for a terminal."""
 
     def __init__(self, *arguments: object):
-        super().__init__(*(make_printable(part) if isinstance(part, str) else part for part in arguments))
+        super().__init__(
+            *(make_printable(argument) if isinstance(argument, str) else argument for argument in arguments)
+        )
 
 
 class InputError(ParakinError):

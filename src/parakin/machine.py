@@ -33,7 +33,7 @@ from .model.structures import DirectionColumns, PlatformPlacement, Structure
 from .model.traces import Model
 from .units import AXIS_UNITS
 
-_LEAST_LEG = 1e-3  # mm, of a leg at home: closures are told in parts of it
+_LEAST_LEG = 1e-3  # mm, of a leg at home: closures are measured in fractions of it
 _ABOUT = 8  # poses about home that are looked at
 
 

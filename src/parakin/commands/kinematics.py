@@ -95,8 +95,8 @@ def forward(
     joints, lines = _read_values(machine, "joints", values, csv, machine.inverse(machine.home))
     start = None
     if near is not None:
-        parts = [part.strip() for part in near.split(",")]
-        start = parse_row(parts, machine.axes, machine.axis_units, machine.home, "--near")
+        words = [word.strip() for word in near.split(",")]
+        start = parse_row(words, machine.axes, machine.axis_units, machine.home, "--near")
     from ..toolpath.posting.offences import judge_path
 
     solution = machine.forward(joints, start)

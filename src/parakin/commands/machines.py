@@ -109,7 +109,7 @@ def _summarise_machine(machine: Machine) -> str:
         for limit in details["limits"]
     ]
     sizes = [(name, _format_number(value)) for name, value in details["sizes"].items()]
-    sections = [
+    paragraphs = [
         f"{machine.name}: {machine.spec.title}\n{' '.join(machine.spec.source.split())}",
         f"axes    {' '.join(machine.axes)}\njoints  {' '.join(machine.joints)}"
         + (f"\nmode    {machine.mode}, of {len(machine.modes)}" if machine.mode else ""),
@@ -124,4 +124,4 @@ def _summarise_machine(machine: Machine) -> str:
             ("home", "", ""), " r",
         ),
     ]  # fmt: skip
-    return "\n\n".join(section for section in sections if section)
+    return "\n\n".join(paragraph for paragraph in paragraphs if paragraph)

@@ -38,7 +38,7 @@ def load_machine(name: str, sizes: Sequence[str] | None = None) -> Machine:
 
     parameters: dict[str, str] = {}
     for text in sizes or ():
-        size, equals, value = (part.strip() for part in text.partition("="))
+        size, equals, value = (word.strip() for word in text.partition("="))
         if not (size and equals and value):
             raise InputError(f'"{text}": expected NAME=VALUE, such as R=360mm', "--set")
         if size in parameters:

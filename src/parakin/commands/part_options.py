@@ -134,12 +134,12 @@ def parse_point(text: str, option: str) -> dict[str, float]:
 
     Raises :class:`InputError`.
     """
-    parts = [part.strip() for part in text.split(",")]
-    if not any("=" in part for part in parts) and len(parts) in (3, 6):
-        parts = [f"{axis}={part}" for axis, part in zip(AXIS_UNITS, parts, strict=False)]
+    words = [word.strip() for word in text.split(",")]
+    if not any("=" in word for word in words) and len(words) in (3, 6):
+        words = [f"{axis}={word}" for axis, word in zip(AXIS_UNITS, words, strict=False)]
     values: dict[str, float] = {}
     form = f"AXIS=VALUE for each axis, such as {_EXAMPLE}"
-    for axis, value in split_assignments(",".join(parts), AXIS_UNITS, option, form):
+    for axis, value in split_assignments(",".join(words), AXIS_UNITS, option, form):
         number = parse_value(axis, value, option)
         values[axis] = round(math.degrees(number), 12) if AXIS_UNITS[axis] == "rad" else number
     return values

@@ -48,14 +48,14 @@ def split_assignments(text: str, axes: Collection[str], source: str, form: str) 
 
     Raises :class:`InputError`.
     """
-    return check_assignments((split_assignment(part, source, form) for part in text.split(",")), axes, source)
+    return check_assignments((split_assignment(one, source, form) for one in text.split(",")), axes, source)
 
 
-def split_assignment(part: str, source: str, form: str) -> tuple[str, str]:
+def split_assignment(assignment: str, source: str, form: str) -> tuple[str, str]:
     """Split ``AXIS=TEXT``; raises :class:`InputError` for anything else."""
-    axis, equals, value = (word.strip() for word in part.partition("="))
+    axis, equals, value = (word.strip() for word in assignment.partition("="))
     if not (axis and equals and value):
-        raise InputError(f"{quote(part.strip())}: expected {form}", source)
+        raise InputError(f"{quote(assignment.strip())}: expected {form}", source)
     return axis.upper(), value
 
 

@@ -26,16 +26,16 @@ def parse_workpiece(text: str) -> Array:
     """
     from .. import workpiece
 
-    parts = [part.strip() for part in text.split(",")]
-    named = ["=" in part for part in parts]
+    words = [word.strip() for word in text.split(",")]
+    named = ["=" in word for word in words]
     if any(named) and not all(named):
         raise InputError(f"{quote(text)} has values with a name and without one; {_FORM}", _WORKPIECE)
-    if not all(named) and len(parts) not in (3, 6):
-        raise InputError(f"{quote(text)} has {len(parts)} value{'s' * (len(parts) != 1)}; {_FORM}", _WORKPIECE)
+    if not all(named) and len(words) not in (3, 6):
+        raise InputError(f"{quote(text)} has {len(words)} value{'s' * (len(words) != 1)}; {_FORM}", _WORKPIECE)
     if all(named):
-        pairs = [(name.strip().upper(), value.strip()) for name, _, value in (part.partition("=") for part in parts)]
+        pairs = [(name.strip().upper(), value.strip()) for name, _, value in (word.partition("=") for word in words)]
     else:
-        pairs = list(zip(AXIS_UNITS, parts, strict=False))
+        pairs = list(zip(AXIS_UNITS, words, strict=False))
     values: dict[str, float] = {}
     for axis, value in check_assignments(pairs, AXIS_UNITS, _WORKPIECE):
         values[axis] = parse_value(axis, value, _WORKPIECE)

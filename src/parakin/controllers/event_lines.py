@@ -99,7 +99,7 @@ def _find_word(event: Event, path: ToolPath) -> str | None:
         return _keep_word(event, path)
     statement = _STATEMENT.fullmatch(event.text.upper())
     name, rest = (statement[1], statement[2] or "") if statement else ("", "")
-    arguments = [part.strip() for part in rest.split(",")]
+    arguments = [word.strip() for word in rest.split(",")]
     if name == "STOP":
         return "M0"
     if name == "OPSTOP":

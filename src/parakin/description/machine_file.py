@@ -126,7 +126,7 @@ class _MachineSection(FileSection):
 
 def _convert_error(details: Any, source: str) -> InputError:
     """Convert pydantic's account of one error, with the line of the value it was found in."""
-    names = [part for part in details["loc"] if isinstance(part, str)]
+    names = [key for key in details["loc"] if isinstance(key, str)]
     line = getattr(details["input"], "line", 1)
     if details["type"] == "missing":
         where = f" in {names[-2]}" if len(names) > 1 else ""

@@ -132,7 +132,7 @@ def _format_lines(map_: PerformanceMap, factors: Array) -> Iterator[str]:
     columns = [performance.poses * factors, map_.allowed[..., None]]
     columns += [getattr(performance, name)[..., None] for name in ("condition", "greatest", "least", "manipulability")]
     columns.append(performance.margins)
-    for part in zip(*(column.reshape(-1, 1, column.shape[-1]) for column in columns), strict=True):
-        row = np.concatenate(part, 1)[0].tolist()
+    for columns_of_row in zip(*(column.reshape(-1, 1, column.shape[-1]) for column in columns), strict=True):
+        row = np.concatenate(columns_of_row, 1)[0].tolist()
         if row[n + 2] == row[n + 2]:
             yield ",".join(f"{value + 0.0:.9g}" for value in row) + "\n"

@@ -422,7 +422,7 @@ class Model:
         return self._tape(("spheres on side",), len(self.drives) + 1, outputs)
 
     def beside_tape(self, limit: float) -> Tape:
-        """Compile pose, another -> by how much each coordinate differs less than a part of the greatest leg, or rad."""
+        """Compile two poses -> by how much each coordinate differs less than a fraction of the longest leg, or rad."""
         n, size = self._poses, max(self.sizes)
         bounds = [limit if AXIS_UNITS[axis] == "rad" else limit * size for axis in self.axes]
 

@@ -141,7 +141,7 @@ def _write_sides(machine: Machine) -> Iterator[str]:
     yield f"#define NO_SIDE {format_c(NO_SIDE * abs(determinant))} /* the least determinant that tells a side */"
     yield f"#define TELLS {format_c(TELLS * least)} /* mm: legs farther off do not stand at a given pose */"
     yield f"#define SETTLED {format_c(SETTLED * most)} /* mm: an answer as near to a given pose has its side, */"
-    yield f"#define STEADY {format_c(STEADY)} /* where the determinant changes by no more than this part */"
+    yield f"#define STEADY {format_c(STEADY)} /* where the determinant changes by no more than this fraction */"
     yield f"#define MIDDLE_TURN {-1 if middle is None else middle} /* whose ±90° is singular to a pose's angles */"
 
 
@@ -161,7 +161,7 @@ def _write_limits(machine: Machine) -> Iterator[str]:
 
 
 def find_least_margins(machine: Machine) -> Array:
-    """Find the least singularity margin (margins,) that a pose may have: a part of home's, or of 1 for a leg's drive.
+    """Find the least singularity margin (margins,) of a pose: a fraction of home's, or of 1 for a leg's drive.
 
     Wrists have none: on their pole nothing is lost but the first joint's angle.
     """

@@ -7,16 +7,16 @@ import numpy as np
 from ...arrays import Array, Indices
 from ...toolpath.timing.trajectory import Trajectory
 
-_STEP = 0.05  # of a motion's greatest speed: the trajectory's speed changes by as much within a part of it
-_SHORTEST = 0.008  # s: no part takes less
+_STEP = 0.05  # of a motion's greatest speed: the trajectory's speed changes by as much within a stretch of it
+_SHORTEST = 0.008  # s: no stretch takes less
 _SAMPLING = 0.001  # s, between the samples of the trajectory's speed
 _MOST_SAMPLES = 100_000  # of a piece at that distance; a step of a longer one has a hundredth of them at most
 
 
 def find_speed_changes(trajectory: Trajectory, accelerations: Array) -> tuple[Indices, Array, Array]:
-    """Find where to divide the pieces of a trajectory's curve so that each part needs one speed only.
+    """Find where to divide the pieces of a trajectory's curve so that each stretch needs one speed only.
 
-    accelerations : (axes,) mm, rad and s; no part is so short that the controller could not stand still at both ends
+    accelerations : (axes,) mm, rad and s; no stretch is so short that the controller could not stand still at both ends
 
     Returns for c divisions (c,) each: the piece, mm from its start, and the time, s.
     """

@@ -31,7 +31,7 @@ class StraightMotions:
     ends : (k, axes) the pose that each leads to
     seconds : (k,) what each takes, whole cycles
     halt : (k,) whether the tool stands still at its end
-    piece : (k,) the piece of the trajectory's curve that it is on, or a part of
+    piece : (k,) the piece of the trajectory's curve that it is on, or a stretch of
     held_up_by : (k,) what it takes longer for than the trajectory, an index into ``reasons``; 0 where it does not
     reasons : in words
     rise : (k,) s, what it takes to come to its speed, or from it to a stand
@@ -57,7 +57,7 @@ class StraightMotions:
 
 
 class _Division(NamedTuple):
-    """The curve's pieces and parts of these, k in the path's order.
+    """The curve's pieces and stretches of these, k in the path's order.
 
     piece : (k,)
     start, end : (k,) mm from the piece's start
@@ -73,7 +73,7 @@ class _Division(NamedTuple):
 
 
 def build_straight_motions(trajectory: Trajectory, speeds: Array, accelerations: Array) -> StraightMotions:
-    """Divide a trajectory where its speed changes, and slow the parts until no joint passes its speed.
+    """Divide a trajectory where its speed changes, and slow the stretches until no joint passes its speed.
 
     speeds, accelerations : (axes,) what the controller gives each axis; mm, rad and s
     """

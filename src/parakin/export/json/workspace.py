@@ -38,12 +38,12 @@ def encode_workspace(
         **(_encode_sampled(workspace) if isinstance(workspace, SampledWorkspace) else _encode_certified(workspace)),
         "slices": [
             {
-                "axis": section.axis,
-                "value": section.value,
-                "area": section.area,
-                "outlines": [_round_points(outline) for outline in section.outlines],
+                "axis": cut.axis,
+                "value": cut.value,
+                "area": cut.area,
+                "outlines": [_round_points(outline) for outline in cut.outlines],
             }
-            for section in cross_sections
+            for cut in cross_sections
         ],
         "elsewhere": None if elsewhere is None else asdict(elsewhere),
         "parameters": _encode_parameters(workspace),

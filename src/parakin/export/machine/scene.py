@@ -29,7 +29,7 @@ _DISC = np.linspace(0.0, 2.0 * pi, 33)[:-1]
 
 
 @dataclass(frozen=True, eq=False)
-class ScenePart:
+class SceneItem:
     """One thing to draw: ``points`` (k, 3) in order, a polygon if ``closed``; a single point is a joint."""
 
     kind: SceneKind
@@ -42,25 +42,25 @@ class ScenePart:
 class Scene:
     """A machine at a pose.
 
-    parts : what to draw, without what has no place at a pose out of reach
+    items : what to draw, without what has no place at a pose out of reach
     labels : names of the drives and where to write them
     frames : (3, 4) of the machine (its origin), the tool and, on a machine with a table, the workpiece
     normal : of the plane of a planar machine, else None
     """
 
-    parts: tuple[ScenePart, ...]
+    items: tuple[SceneItem, ...]
     labels: tuple[tuple[str, Points], ...]
     frames: dict[str, Points]
     normal: Points | None
 
-    def of(self, *kinds: SceneKind) -> tuple[ScenePart, ...]:
-        """List the parts of these kinds."""
-        return tuple(part for part in self.parts if part.kind in kinds)
+    def of(self, *kinds: SceneKind) -> tuple[SceneItem, ...]:
+        """List the items of these kinds."""
+        return tuple(item for item in self.items if item.kind in kinds)
 
     @property
     def box(self) -> Points:
-        """(2, 3): least and greatest coordinates of all parts."""
-        points = np.vstack([part.points for part in self.parts])
+        """(2, 3): least and greatest coordinates of all items."""
+        points = np.vstack([item.points for item in self.items])
         return np.array([points.min(0), points.max(0)])
 
     @property
@@ -92,15 +92,15 @@ def build_scene(
         placement = machine.place_platform(row, mode, None if joints is None else q)
         builder = _SceneBuilder(machine, placement, q)
         builder.build()
-    parts = tuple(part for part in builder.parts if np.isfinite(part.points).all())
+    items = tuple(item for item in builder.items if np.isfinite(item.points).all())
     labels = _join_labels([label for label in builder.labels if np.isfinite(label[1]).all()])
     missing = [letter for letter in "XYZ" if letter not in machine.axes]
     normal = builder.mount[:, "XYZ".index(missing[0])] if missing and not machine.structure.table else None
-    return Scene(parts, labels, builder.frames, normal)
+    return Scene(items, labels, builder.frames, normal)
 
 
 class _SceneBuilder:
-    """Gather the parts of one scene in the base frame and put them into M."""
+    """Gather the items of one scene in the base frame and put them into M."""
 
     def __init__(self, machine: Machine, placement: PlatformPlacement, joints: Points):
         self.machine, self.structure = machine, machine.structure
@@ -108,7 +108,7 @@ class _SceneBuilder:
         self.mount = np.array(self.structure.mount, float)
         self.base = np.array(self.structure.base, float)
         self.rotation, self.origin = np.array(placement.rotation, float), np.array(placement.origin, float)
-        self.parts: list[ScenePart] = []
+        self.items: list[SceneItem] = []
         self.labels: list[tuple[str, Points]] = []
         self.frames = {"machine": np.eye(3, 4)}
 
@@ -125,7 +125,7 @@ class _SceneBuilder:
         return points_in_m
 
     def _add(self, kind: SceneKind, name: str, points: ArrayLike, closed: bool = False) -> None:
-        self.parts.append(ScenePart(kind, name, self._to_machine(points).reshape(-1, 3), closed))
+        self.items.append(SceneItem(kind, name, self._to_machine(points).reshape(-1, 3), closed))
 
     def _add_legs(self) -> None:
         legs, anchors = self.machine.legs, []
@@ -186,9 +186,9 @@ class _SceneBuilder:
         chain = list(_compose_steps(table, serial))
         rotation, origin = chain[-1]
         self.frames["workpiece"] = np.column_stack([rotation, origin])
-        radius = 0.12 * float(np.linalg.norm(np.ptp(np.vstack([part.points for part in self.parts]), axis=0)))
+        radius = 0.12 * float(np.linalg.norm(np.ptp(np.vstack([item.points for item in self.items]), axis=0)))
         disc = np.column_stack([np.cos(_DISC), np.sin(_DISC), 0.0 * _DISC]) * radius
-        self.parts.append(ScenePart("table", "table", disc @ rotation.T + origin, True))
+        self.items.append(SceneItem("table", "table", disc @ rotation.T + origin, True))
         for step, (turned, pivot) in zip(table, chain, strict=True):
             if step.drive is None:
                 continue
@@ -197,7 +197,7 @@ class _SceneBuilder:
             upright = abs(float(axis @ rotation[:, 2])) > 0.999
             reach = 1.3 * radius * axis
             ends = [origin, origin - 0.5 * radius * rotation[:, 2]] if upright else [pivot - reach, pivot + reach]
-            self.parts.append(ScenePart("axis", step.drive.name, np.array(ends)))
+            self.items.append(SceneItem("axis", step.drive.name, np.array(ends)))
             self.labels.append((step.drive.name, ends[1]))
 
 

@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...arrays import Indices
-from .scene import Points, Scene, SceneKind, ScenePart
+from .scene import Points, Scene, SceneItem, SceneKind
 
 _SIDES = 14
 
@@ -25,7 +25,7 @@ class Solid(NamedTuple):
 
 
 class Look(NamedTuple):
-    """How a kind of part is drawn: colour, and thickness (a bar's radius, a plate's half) over the scene's size."""
+    """How a kind of item is drawn: colour, and thickness (a bar's radius, a plate's half) over the scene's size."""
 
     colour: str
     radius: float
@@ -58,29 +58,29 @@ def build_solids(scene: Scene, scale: float | None = None, piece: float = inf) -
     piece : bars are cut into lengths of at most this, mm, for a renderer that sorts faces by their middles
     """
     size = scene.size if scale is None else scale
-    for part in scene.parts:
-        yield from _build_part(part, size, piece)
+    for item in scene.items:
+        yield from _build_item(item, size, piece)
 
 
-def _build_part(part: ScenePart, size: float, piece: float) -> Iterator[Solid]:
-    radius = LOOKS[part.kind].radius * size
-    points = part.points
-    if part.kind in ("platform", "table") and part.closed:
-        yield _build_plate(part.kind, part.name, points, radius)
+def _build_item(item: SceneItem, size: float, piece: float) -> Iterator[Solid]:
+    radius = LOOKS[item.kind].radius * size
+    points = item.points
+    if item.kind in ("platform", "table") and item.closed:
+        yield _build_plate(item.kind, item.name, points, radius)
     elif len(points) == 1:
-        yield _build_ball(part.kind, part.name, points[0], 2.0 * radius)
+        yield _build_ball(item.kind, item.name, points[0], 2.0 * radius)
     else:
-        ends = np.vstack([points, points[:1]]) if part.closed else points
+        ends = np.vstack([points, points[:1]]) if item.closed else points
         bars = list(pairwise(ends))
         for a, b in bars:
-            yield from _build_link(part.kind, part.name, a, b, size, piece)
-        if len(bars) > 1 and part.kind != "rail":
+            yield from _build_link(item.kind, item.name, a, b, size, piece)
+        if len(bars) > 1 and item.kind != "rail":
             for corner in points:
-                yield _build_ball(part.kind, part.name, corner, radius)
-    if part.kind in ("telescope", "rod", "arm"):
-        foot: SceneKind | str = "carriage" if part.kind != "telescope" else "joint"
-        yield _build_ball(foot, part.name, points[0], LOOKS[foot].radius * size)
-        yield _build_ball("joint", part.name, points[1], LOOKS["joint"].radius * size)
+                yield _build_ball(item.kind, item.name, corner, radius)
+    if item.kind in ("telescope", "rod", "arm"):
+        foot: SceneKind | str = "carriage" if item.kind != "telescope" else "joint"
+        yield _build_ball(foot, item.name, points[0], LOOKS[foot].radius * size)
+        yield _build_ball("joint", item.name, points[1], LOOKS["joint"].radius * size)
 
 
 def _build_link(kind: str, name: str, a: Points, b: Points, size: float, piece: float) -> Iterator[Solid]:

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from ...toolpath.timing import Trajectory
 
 _POINTS = 12_000  # points drawn on the path
-_BINS = 300  # parts of the cycle
+_BINS = 300  # equal spans of the cycle
 _FEED, _REST = "#9fb3c0", "#546e7a"
 _COLOURS = (
     "#d32f2f", "#f57c00", "#7b1fa2", "#00838f", "#c2185b", "#558b2f", "#5d4037", "#fbc02d",

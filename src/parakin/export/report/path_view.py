@@ -114,10 +114,10 @@ def choose_points(values: Sequence[Array], turns: Indices, most: int) -> Indices
     """Choose points of a path to draw: every value's extremes, and those around ``turns`` unless too many."""
     if len(values[0]) <= most:
         return np.arange(len(values[0]))
-    parts = [pick_extremes(column, most // len(values)) for column in values]
+    picks = [pick_extremes(column, most // len(values)) for column in values]
     if 2 * len(turns) <= most:
-        parts += [turns, turns + 1]
-    return np.unique(np.concatenate(parts))
+        picks += [turns, turns + 1]
+    return np.unique(np.concatenate(picks))
 
 
 def _build_motions(

@@ -47,17 +47,17 @@ def render_report(
     path, machine = posted.path, posted.machine
     name = Path(path.source).name or path.source
     title = f"{name} on {machine.spec.title or machine.name}"
-    parts = [
+    cards = [
         f"<header><h1>{escape(title)}</h1><p class=sub>{escape(path.source)}</p></header>\n",
         _render_verdict(posted, trajectory, _Remarks(unplanned, waits, outside)),
     ]
     if len(path):
         uses, relative = measure_range_use(posted)
         view = build_path_view(posted, relative)
-        parts += [render_range_card(posted, uses), _render_space(posted, view), _render_curves(posted, uses)]
-        parts += [] if trajectory is None else [render_timing_card(trajectory, view)]
-    parts += [render_offence_card(posted), render_note_card(path), render_fact_card(posted)]
-    return render_page(title, "".join(parts))
+        cards += [render_range_card(posted, uses), _render_space(posted, view), _render_curves(posted, uses)]
+        cards += [] if trajectory is None else [render_timing_card(trajectory, view)]
+    cards += [render_offence_card(posted), render_note_card(path), render_fact_card(posted)]
+    return render_page(title, "".join(cards))
 
 
 class _Remarks(NamedTuple):

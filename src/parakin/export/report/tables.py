@@ -130,7 +130,7 @@ def _measure_steps(path: ToolPath) -> Array:
 
 def _format_placement(frame: Array) -> str:
     """Format a frame (3, 4) by its origin and its angles, R = Rz(C)·Ry(B)·Rx(A)."""
-    parts = [f"{letter} {format_value(float(v), 'mm')}" for letter, v in zip("XYZ", frame[:, 3], strict=True)]
+    words = [f"{letter} {format_value(float(v), 'mm')}" for letter, v in zip("XYZ", frame[:, 3], strict=True)]
     angles = zip(TURNS, find_frame_angles(frame), strict=True)
-    parts += [f"{letter} {format_value(angle, 'rad')}" for letter, angle in angles]
-    return ", ".join(parts)
+    words += [f"{letter} {format_value(angle, 'rad')}" for letter, angle in angles]
+    return ", ".join(words)

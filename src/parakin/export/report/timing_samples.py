@@ -44,7 +44,7 @@ def thin_curves(trajectory: Trajectory, most: int) -> dict[str, ThinnedCurve]:
     each curve keeps the least and the greatest in every stretch. Stretches are short where pieces are, yet none is
     much longer than the others.
     """
-    parts: dict[str, list[ThinnedCurve]] = defaultdict(list)
+    blocks_by_name: dict[str, list[ThinnedCurve]] = defaultdict(list)
     total, done = 3 * len(trajectory.profile.row), 0
     stretches = most // 3 if total > most else total
     for times, binding, record, curves in _sample_blocks(trajectory):
@@ -56,8 +56,8 @@ def thin_curves(trajectory: Trajectory, most: int) -> dict[str, ThinnedCurve]:
                 kept = _drop_short_gaps(times, values, trajectory.seconds / stretches)
                 starts = np.flatnonzero(np.diff(np.floor(along[kept] * stretches), prepend=-1.0))
                 kept = kept[pick_extremes_within(values[kept], starts)]
-            parts[name].append(ThinnedCurve(times[kept], values[kept], binding[kept], record[kept]))
-    return {name: _join_blocks(blocks) for name, blocks in parts.items()}
+            blocks_by_name[name].append(ThinnedCurve(times[kept], values[kept], binding[kept], record[kept]))
+    return {name: _join_blocks(blocks) for name, blocks in blocks_by_name.items()}
 
 
 def _join_blocks(blocks: list[ThinnedCurve]) -> ThinnedCurve:

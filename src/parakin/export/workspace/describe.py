@@ -50,19 +50,19 @@ def find_note(workspace: SampledWorkspace) -> str:
 
 def describe_region(region: Region) -> str:
     """Describe a region: ``total orientation, A -15° to 15°, C = 30°``, and the limits that do not count."""
-    parts = [_KINDS[region.kind]]
+    phrases = [_KINDS[region.kind]]
     if region.kind != "dexterous":
         spans = region.swept_axes.items()
-        parts += [f"{axis} {format_bound(low, 'rad')} to {format_bound(high, 'rad')}" for axis, (low, high) in spans]
+        phrases += [f"{axis} {format_bound(low, 'rad')} to {format_bound(high, 'rad')}" for axis, (low, high) in spans]
     units = dict(zip(region.machine.axes, region.machine.axis_units, strict=True))
     for axis, value in region.fixed_axes.items():
-        parts.append(f"{axis} = {format_bound(value, units[axis])}{' mm' * (units[axis] == 'mm')}")
+        phrases.append(f"{axis} = {format_bound(value, units[axis])}{' mm' * (units[axis] == 'mm')}")
     if region.without:
         few = len(region.without) <= _FEW
-        parts.append(f"without {' '.join(region.without) if few else f'{len(region.without)} of the limits'}")
+        phrases.append(f"without {' '.join(region.without) if few else f'{len(region.without)} of the limits'}")
     if region.mode != region.machine.mode:
-        parts.append(f"mode {region.mode}")
-    return ", ".join(parts)
+        phrases.append(f"mode {region.mode}")
+    return ", ".join(phrases)
 
 
 def format_volume(value: float, dimension: int) -> str:

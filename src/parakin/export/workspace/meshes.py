@@ -14,7 +14,7 @@ from ...workspaces.sampled.distance_field import SampledField
 
 @dataclass(frozen=True, eq=False)
 class Mesh:
-    """Triangles of a closed surface, a body for each part of the region, counterclockwise from outside.
+    """Triangles of a closed surface, a body for each component of the region, counterclockwise from outside.
 
     vertices : (V, 3) mm
     faces : (F, 3) indices of vertices

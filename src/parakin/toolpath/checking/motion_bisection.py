@@ -66,8 +66,8 @@ class MotionBisection:
     def compute_inner_points(self, sections: Sections, share: Array) -> MotionPoints:
         """Compute points within sections, at shares of their motions; joints go on from those at the ends."""
         q0, q1 = sections.first.joints, sections.last.joints
-        part = ((share - sections.begin) / (sections.end - sections.begin))[:, None]
-        guess = np.where(np.isfinite(q1), q0 + part * (q1 - q0), q0)
+        fraction = ((share - sections.begin) / (sections.end - sections.begin))[:, None]
+        guess = np.where(np.isfinite(q1), q0 + fraction * (q1 - q0), q0)
         wrist_modes = merge_wrist_modes(sections.first.wrist_modes, sections.last.wrist_modes)
         return self.motions.compute_points(sections.motion, share, guess, wrist_modes)
 

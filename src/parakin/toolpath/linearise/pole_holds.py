@@ -282,17 +282,17 @@ def _place_end(steps: PoleSteps, step: int, point: Array | None) -> _Points:
     share = 0.0
     if point is not None:
         begin, end = steps.first[step], steps.last[step]
-        part = float(np.hypot(*(point - begin)) / np.hypot(*(end - begin)))
-        share = float(steps.begin[step] + part * (steps.end[step] - steps.begin[step]))
+        fraction = float(np.hypot(*(point - begin)) / np.hypot(*(end - begin)))
+        share = float(steps.begin[step] + fraction * (steps.end[step] - steps.begin[step]))
         count = int(_EDGE < share < 1.0 - _EDGE)
     motion = np.full(count, steps.record[step], np.int64)
     projected = np.zeros((count, 2)) if point is None else np.tile(point, (count, 1))
     return _Points(motion, np.full(count, share), projected)
 
 
-def _join(*parts: _Points) -> _Points:
-    motion, share = (np.concatenate([getattr(part, name) for part in parts]) for name in ("motion", "share"))
-    return _Points(motion, share, np.concatenate([part.projected for part in parts]))
+def _join(*pieces: _Points) -> _Points:
+    motion, share = (np.concatenate([getattr(points, name) for points in pieces]) for name in ("motion", "share"))
+    return _Points(motion, share, np.concatenate([points.projected for points in pieces]))
 
 
 def find_held_steps(steps: PoleSteps, holds: list[PoleHold]) -> list[tuple[int, int]]:

@@ -147,8 +147,8 @@ def _route_through_pole(
     edge = [offset**3 / radius**2 for offset in offsets]
     bends = squeeze.is_pose and (not pole.is_upright or max(offsets, default=0.0) > _STRAIGHT * radius)
     crossings = np.flatnonzero(a[:-1] * a[1:] < 0.0)
-    part = a[crossings] / (a[crossings] - a[crossings + 1])
-    miss_line = np.abs(b[crossings] + part * (b[crossings + 1] - b[crossings]))
+    fraction = a[crossings] / (a[crossings] - a[crossings + 1])
+    miss_line = np.abs(b[crossings] + fraction * (b[crossings + 1] - b[crossings]))
     between = _WIDEST * max(offsets, default=0.0)  # where the way to the pole is straight
     if not max(between, np.abs(weight * b).max(), *miss_line, *edge) <= _MOST_MOVED * angle:
         return None
@@ -163,7 +163,7 @@ def _route_through_pole(
         if np.hypot(a[nearest], b[nearest]) < _SNAPPED * angle:
             a, moved[nearest], squeezed[nearest] = np.where(np.arange(len(a)) == nearest, 0.0, a), True, 0.0
             crossings = np.flatnonzero(a[:-1] * a[1:] < 0.0)
-            part = a[crossings] / (a[crossings] - a[crossings + 1])
+            fraction = a[crossings] / (a[crossings] - a[crossings + 1])
             if len(crossings):
                 return None
     projected = np.outer(a, line) + np.outer(squeezed, normal)
@@ -173,7 +173,7 @@ def _route_through_pole(
     ends: tuple[float, ...] = ()
     if len(crossings):
         crossing = first + int(crossings[0])
-        share = float(steps.begin[crossing] + part[0] * (steps.end[crossing] - steps.begin[crossing]))
+        share = float(steps.begin[crossing] + fraction[0] * (steps.end[crossing] - steps.begin[crossing]))
         ends = _find_inner_ends(steps, window, crossing, radius)
     rays = _place_rays(steps, window, np.column_stack([a, b]), (line, normal), squeeze) if bends else ()
     miss = float(steps.nearest[inside_window].min())
@@ -194,9 +194,9 @@ def _place_rays(
         for at in (-radius, radius):
             places = np.flatnonzero((a[:-1] - at) * (a[1:] - at) < 0.0)
             for index in sorted({*places[:1].tolist(), *places[-1:].tolist()}):  # in and out again where it turns back
-                step, part = window[0] + index, (at - a[index]) / (a[index + 1] - a[index])
-                share = float(steps.begin[step] + part * (steps.end[step] - steps.begin[step]))
-                across = (way[index, 1] + part * (way[index + 1, 1] - way[index, 1])) * (at / squeeze.radius) ** 2
+                step, fraction = window[0] + index, (at - a[index]) / (a[index + 1] - a[index])
+                share = float(steps.begin[step] + fraction * (steps.end[step] - steps.begin[step]))
+                across = (way[index, 1] + fraction * (way[index + 1, 1] - way[index, 1])) * (at / squeeze.radius) ** 2
                 if _EDGE < share < 1.0 - _EDGE:
                     rays.append((int(steps.record[step]), share, at * axes[0] + across * axes[1]))
         radius *= _GROWTH
@@ -226,8 +226,8 @@ def _find_inner_ends(steps: PoleSteps, window: tuple[int, int], crossing: int, r
         entry = _enter_circle(outside[step], inside[step], radius)
         if entry is None or steps.record[step] != steps.record[crossing]:
             continue
-        part = np.hypot(*(entry - steps.first[step])) / np.hypot(*(steps.last[step] - steps.first[step]))
-        share = float(steps.begin[step] + part * (steps.end[step] - steps.begin[step]))
+        fraction = np.hypot(*(entry - steps.first[step])) / np.hypot(*(steps.last[step] - steps.first[step]))
+        share = float(steps.begin[step] + fraction * (steps.end[step] - steps.begin[step]))
         if 0.0 < share < 1.0:
             ends.append(share)
     return tuple(ends)

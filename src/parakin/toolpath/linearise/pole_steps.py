@@ -51,12 +51,12 @@ def find_pole_steps(pole: Pole, programmed: ProgrammedPath, posted: Posted, moti
     first, last = (pole.project_axes(*programmed.interpolate(record, share)) for share in (begin, end))
     way = last - first
     with np.errstate(divide="ignore", invalid="ignore"):
-        part = np.clip(-(first * way).sum(1) / (way * way).sum(1), 0.0, 1.0)
-    part = np.where(np.isfinite(part), part, 0.0)
-    nearest = np.hypot(*(first + part[:, None] * way).T)
+        fraction = np.clip(-(first * way).sum(1) / (way * way).sum(1), 0.0, 1.0)
+    fraction = np.where(np.isfinite(fraction), fraction, 0.0)
+    nearest = np.hypot(*(first + fraction[:, None] * way).T)
     nearest = np.where(np.isfinite(nearest) & (np.hypot(*way.T) < FARTHEST_STEP), nearest, np.inf)
     joined = np.concatenate([[False], np.where(record[1:] == record[:-1], True, record[1:] == record[:-1] + 1)])
-    return PoleSteps(record, begin, end, first, last, joined[: len(record)], nearest, begin + part * (end - begin))
+    return PoleSteps(record, begin, end, first, last, joined[: len(record)], nearest, begin + fraction * (end - begin))
 
 
 def _find_motions_near(
@@ -82,5 +82,5 @@ def meet_circle(outside: Array, inside: Array, radius: float) -> Array | None:
         return None
     way = inside - outside
     p, q, r = float(way @ way), float(outside @ way), float(outside @ outside) - radius * radius
-    part = (-q - math.sqrt(max(q * q - p * r, 0.0))) / p
-    return outside + min(1.0, max(0.0, part)) * way
+    fraction = (-q - math.sqrt(max(q * q - p * r, 0.0))) / p
+    return outside + min(1.0, max(0.0, fraction)) * way

@@ -104,12 +104,12 @@ class PlacementMargins:
         is_reach, spans = self._spans
         names, is_hard = list(self.machine.limits), is_reach
         least, records = np.full(len(names), np.inf), np.zeros(len(names), np.int64)
-        for part, margins in split_margins(self.machine, solution.poses, solution.joints, self.mode):
+        for block, margins in split_margins(self.machine, solution.poses, solution.joints, self.mode):
             margins = margins / spans
             margins = np.where(np.isnan(margins), np.where(is_reach, -1.0, np.inf), margins)
             tightest = margins.argmin(axis=0)
             here = margins[tightest, np.arange(len(names))]
-            records = np.where(here < least, part.start + tightest, records)
+            records = np.where(here < least, block.start + tightest, records)
             least = np.minimum(here, least)
         for limit in path_limits:
             size = np.abs(limit.values)

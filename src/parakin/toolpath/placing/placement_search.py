@@ -55,8 +55,8 @@ class PlacementSearch:
         """Find local maxima over the records looked at; ``begin`` and ``end`` are of the progress."""
         d = len(self.margins.axes)
         points = _spread_points(_SPREAD, d) if d else np.empty((1, 0))
-        parts = np.array_split(points, range(32, len(points), 32))
-        worths = np.concatenate([score_rows(*self._compute_rows(part)) for part in parts])
+        batches = np.array_split(points, range(32, len(points), 32))
+        worths = np.concatenate([score_rows(*self._compute_rows(batch)) for batch in batches])
         starts = pick_best_apart(points, worths, _STARTS, np.full(d, _APART)) if d else np.zeros(1, np.int64)
         maxima = []
         for number, start in enumerate(starts.tolist(), 1):

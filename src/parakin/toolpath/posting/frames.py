@@ -111,9 +111,9 @@ def compute_poses(
     off_plane = {letter: np.empty(len(tip)) for letter in "XYZ" if letter not in machine.axes}
     columns = [off_plane[c] if c in off_plane else poses[:, machine.axes.index(c)] for c in "XYZ"]
     to_machine = np.ascontiguousarray(rotation.T)
-    for part in split_rows(len(tip), BLOCK):
-        for column, values in zip(columns, (tip[part] @ to_machine + frame[:, 3]).T, strict=True):
-            column[part] = values
+    for block in split_rows(len(tip), BLOCK):
+        for column, values in zip(columns, (tip[block] @ to_machine + frame[:, 3]).T, strict=True):
+            column[block] = values
     angles = None if turns is None else find_programmed_angles(orientation, turns, frame)
     if angles is None or orientation.restriction:
         pointed, lean = orientation.point_along(axis, rotation)

@@ -12,5 +12,5 @@ BLOCK = 1 << 16  # records whose margins are in memory at once
 
 def split_margins(machine: Machine, poses: Array, joints: Array, mode: str) -> Iterator[tuple[slice, Array]]:
     """Compute the margins (records, limits) of each block of poses (n, axes) and joints (n, joints), with its slice."""
-    for part in split_rows(len(joints), BLOCK):
-        yield part, machine.margins(poses[part], joints[part], mode)
+    for block in split_rows(len(joints), BLOCK):
+        yield block, machine.margins(poses[block], joints[block], mode)

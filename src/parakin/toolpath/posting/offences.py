@@ -106,8 +106,8 @@ def _tally_margins(
 ) -> None:
     """Tally the machine's limits at the records that break one, in place; ``broken`` (n,) is the machine's check."""
     off = np.flatnonzero(broken)
-    for part in split_rows(len(off), BLOCK):
-        records = off[part]
+    for block in split_rows(len(off), BLOCK):
+        records = off[block]
         margins = machine.margins(poses[records], joints[records], mode)
         beyond = margins < 0.0
         undefined = np.flatnonzero(~beyond.any(axis=1))  # the margin that the check found broken is not a number

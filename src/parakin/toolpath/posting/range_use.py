@@ -107,11 +107,11 @@ def measure_range_use(posted: Posted) -> tuple[list[RangeUse], Array]:
     machine = posted.machine
     uses, quantities = list_ranges(machine)
     relative = np.empty(len(posted.poses))
-    for part, margins in split_margins(machine, posted.poses, posted.joints, posted.mode):
-        relative[part] = compute_relative_margin(machine, margins)
-        for use, q in zip(uses, posted.joints[part].T, strict=False):
+    for block, margins in split_margins(machine, posted.poses, posted.joints, posted.mode):
+        relative[block] = compute_relative_margin(machine, margins)
+        for use, q in zip(uses, posted.joints[block].T, strict=False):
             use.widen(q)
         for number, limit in enumerate(machine.limit_definitions):
             if quantities[number] >= 0:
-                uses[quantities[number]].add_margins(limit, margins[:, number], part.start)
+                uses[quantities[number]].add_margins(limit, margins[:, number], block.start)
     return uses, relative

@@ -49,12 +49,12 @@ class ToolOrientation:
         turns, lean = np.empty((count, len(self.letters))), np.zeros(count)
         free: Any = np.zeros(count, bool)
         to_machine = np.ascontiguousarray(rotation.T)
-        for part in split_rows(count, BLOCK):
-            angles, free[part], leaning = self.solve(axis[part] @ to_machine)
+        for block in split_rows(count, BLOCK):
+            angles, free[block], leaning = self.solve(axis[block] @ to_machine)
             for column, values in enumerate(angles):
-                turns[part, column] = values
+                turns[block, column] = values
             if self.restriction:
-                lean[part] = leaning
+                lean[block] = leaning
         if self.has_direction:
             cross_direction_pole(turns, np.flatnonzero(~free))
         if self.continuous is not None:

@@ -73,11 +73,11 @@ class TurningJoint:
         low, high, is_sound = np.full(count, np.inf), np.full(count, np.inf), np.empty(count, bool)
         own = {f"{drive.name}.min": low, f"{drive.name}.max": high}
         others = np.array([name not in own for name in machine.limits])
-        for part, margins in split_margins(machine, poses, joints, mode):
-            is_sound[part] = (margins[:, others] >= 0.0).all(axis=1) & np.isfinite(joints[part]).all(axis=1)
+        for block, margins in split_margins(machine, poses, joints, mode):
+            is_sound[block] = (margins[:, others] >= 0.0).all(axis=1) & np.isfinite(joints[block]).all(axis=1)
             for name, values in own.items():
                 if name in machine.limits:
-                    values[part] = margins[:, machine.limits.index(name)]
+                    values[block] = margins[:, machine.limits.index(name)]
         return cls(drive, column, joints[:, column].copy(), low, high, is_sound, home)
 
     def count_off(self, turns: int) -> int:

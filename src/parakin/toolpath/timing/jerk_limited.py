@@ -25,8 +25,8 @@ def limit_jerk(
 
     x : (rows,) ṡ² of the quickest profile; ceiling : (steps,) of ṡ²
     """
-    steps, parts = _grade_stops(joint_path, limits)
-    joint_path, x, ceiling = _add_rows(joint_path, steps, parts, x, ceiling)
+    steps, fractions = _grade_stops(joint_path, limits)
+    joint_path, x, ceiling = _add_rows(joint_path, steps, fractions, x, ceiling)
     for _ in range(_TRIES):
         rough = _plan_profile(joint_path, limits, x, ceiling, 1)[2] < _ROUGH
         rough[1:-1] |= rough[2:] | rough[:-2]
@@ -50,27 +50,27 @@ def _grade_stops(joint_path: JointPath, limits: DriveLimits) -> tuple[Indices, A
             acceleration = np.min(limits.acceleration / slope, axis=1)
         with np.errstate(invalid="ignore", over="ignore"):
             way = np.fmin(acceleration**3 / (6.0 * jerk**2), length[:, 0])
-        part = np.maximum(_FIRST * way, _LEAST) / length[:, 0]
-        while (part < _LAST).any():
-            near = part < _LAST
-            cuts.append((steps[near], 1.0 - part[near] if back else part[near]))
-            part = 2.0 * part
+        fraction = np.maximum(_FIRST * way, _LEAST) / length[:, 0]
+        while (fraction < _LAST).any():
+            near = fraction < _LAST
+            cuts.append((steps[near], 1.0 - fraction[near] if back else fraction[near]))
+            fraction = 2.0 * fraction
     if not cuts:
         return gaps[:0], np.empty(0)
-    steps, parts = (np.concatenate(column) for column in zip(*cuts, strict=True))
-    order = np.lexsort((parts, steps))
-    return steps[order], parts[order]
+    steps, fractions = (np.concatenate(column) for column in zip(*cuts, strict=True))
+    order = np.lexsort((fractions, steps))
+    return steps[order], fractions[order]
 
 
 def _add_rows(
-    joint_path: JointPath, steps: Indices, parts: Array, x: Array, ceiling: Array
+    joint_path: JointPath, steps: Indices, fractions: Array, x: Array, ceiling: Array
 ) -> tuple[JointPath, Array, Array]:
     """Add rows as :func:`~.joint_path.refine_joint_path` does, and interpolate ṡ² and its ceiling there."""
     if not len(steps):
         return joint_path, x, ceiling
-    between = x[steps] + parts * (x[steps + 1] - x[steps])
+    between = x[steps] + fractions * (x[steps + 1] - x[steps])
     x, ceiling = np.insert(x, steps + 1, between), np.insert(ceiling, steps, ceiling[steps])
-    return refine_joint_path(joint_path, steps, parts), x, ceiling
+    return refine_joint_path(joint_path, steps, fractions), x, ceiling
 
 
 def _plan_profile(

@@ -48,12 +48,12 @@ def find_quickest(joint_path: JointPath, limits: DriveLimits) -> tuple[JointPath
         args = (rows, bounds, ceilings, x, switches)
         run_in_threads(count, lambda start, stop: lost.append(find_switches(*args, start, stop)))  # noqa: B023
         refuse_unbound(joint_path, np.maximum(x[:-1], x[1:]))
-        steps = np.concatenate([np.flatnonzero(fractions) for fractions in switches])
+        steps = np.concatenate([np.flatnonzero(where) for where in switches])
         if attempt == _ROUNDS - 1 or sum(lost) <= WORTH * _compute_spans(joint_path, x).sum() or not len(steps):
             break
-        parts = np.concatenate([fractions[fractions > 0.0] for fractions in switches])
-        order = np.lexsort((parts, steps))
-        joint_path = refine_joint_path(joint_path, steps[order], parts[order])
+        fractions = np.concatenate([where[where > 0.0] for where in switches])
+        order = np.lexsort((fractions, steps))
+        joint_path = refine_joint_path(joint_path, steps[order], fractions[order])
     return joint_path, x, u
 
 

@@ -80,7 +80,7 @@ class Trajectory:
 
     @cached_property
     def binding_fractions(self) -> dict[str, float]:
-        """The fraction of the cycle time in which each limit binds, the greatest first; none for one that never binds."""
+        """The fraction of the cycle time in which each limit binds, the greatest first; but for one that never does."""
         spans = np.diff(self.profile.row_times)
         near = 0.5 * (np.append(spans, 0.0) + np.append(0.0, spans))
         sums = np.bincount(self.binding, near, len(self.names)) / (self.seconds or 1.0)

@@ -190,7 +190,7 @@ class SampledField:
 
 
 def choose_steps(low: Array, high: Array, step: float | None) -> Array:
-    """Choose the grid's step along each axis: ``step`` mm or a part of the longest edge, shorter along a short edge.
+    """Choose the grid's step along each axis: ``step`` mm or a fraction of the longest edge, less along a short edge.
 
     Raises :class:`PoseError` for an invalid step.
     """

@@ -90,7 +90,7 @@ def sweep_drives(region: Region, cells: int = 64, progress: Progress | None = No
     """Sample the whole workspace of a machine from its drives: cut their ranges into cells and map these forward.
 
     A pose counts where its own inverse in the working mode gives the same drives back and every limit holds. Both
-    common points of the legs' spheres (circles) are tried where the region has all parts, else home's.
+    common points of the legs' spheres (circles) are tried where all components count, else home's.
 
     Parameters
     ----------

@@ -132,8 +132,8 @@ def apply_frames(columns: Array, frames: list[tuple[int, SystemFrame]]) -> None:
         last = frames[k + 1][0] if k + 1 < len(frames) else columns.shape[1]
         if last <= first or (frame.rotation == 0.0 and not any(frame.shift)):
             continue
-        part = columns[:6, first:last]
+        block = columns[:6, first:last]
         if frame.rotation != 0.0:
             sine, cosine = math.sin(math.radians(frame.rotation)), math.cos(math.radians(frame.rotation))
-            part[:2] = cosine * part[0] - sine * part[1], sine * part[0] + cosine * part[1]
-        part += np.array(frame.shift)[:, None]
+            block[:2] = cosine * block[0] - sine * block[1], sine * block[0] + cosine * block[1]
+        block += np.array(frame.shift)[:, None]

@@ -63,8 +63,8 @@ def _smooth_acceleration(stretch, x, u, acceleration):
         h, g = step[i - 1], step[i]
         most = np.inf  # with more of it a step could not be passed at the mean speed of its ends
         for n in range(i - 1, i + 1):
-            part = 0.7 if n == start or n == stop - 1 else 0.35
-            most = min(most, part * (np.sqrt(x[n]) + np.sqrt(x[n + 1])) ** 2 / step[n])
+            fraction = 0.7 if n == start or n == stop - 1 else 0.35
+            most = min(most, fraction * (np.sqrt(x[n]) + np.sqrt(x[n + 1])) ** 2 / step[n])
         acceleration[i] = min(max((u[i - 1] * g + u[i] * h) / (h + g), -most), most)
 
 

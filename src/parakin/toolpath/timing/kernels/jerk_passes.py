@@ -123,8 +123,8 @@ def limit_rise(stretch, bounds, touched, controllable, moved, x, u):
             if i == start:
                 most = 0.5 * _start_from_rest(h, jerk) / h
             else:
-                part = 0.5 if u[i - 1] > 0.0 else 0.25  # a lowest place has two sides
-                most = before + part * (step[i - 1] + h) * jerk / v
+                fraction = 0.5 if u[i - 1] > 0.0 else 0.25  # a lowest place has two sides
+                most = before + fraction * (step[i - 1] + h) * jerk / v
             rise = find_acceleration(i, x[i], controllable[i + 1], most, stretch.rows, limits, lines)
             after = min(max(x[i] + 2.0 * h * rise, 0.0), controllable[i + 1])
             moved[i + 1], changed = after != x[i + 1], after != x[i + 1] or rise != u[i]
@@ -152,8 +152,8 @@ def limit_braking(stretch, bounds, touched, ceiling, moved, x, u):
             if i == stop - 1:
                 most = _start_from_rest(h, jerk)
             else:
-                part = 0.5 if u[i + 1] < 0.0 else 0.25
-                most = x[i + 1] + 2.0 * h * (after + part * (h + step[i + 1]) * jerk / v)
+                fraction = 0.5 if u[i + 1] < 0.0 else 0.25
+                most = x[i + 1] + 2.0 * h * (after + fraction * (h + step[i + 1]) * jerk / v)
             greatest = find_controllable(i, min(ceiling[i], most), x[i + 1], stretch.rows, limits, lines)
             rise = 0.5 * (x[i + 1] - greatest) / h
             changed = greatest != x[i] or rise != u[i]

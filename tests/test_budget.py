@@ -21,14 +21,14 @@ ALL_ROUND = {"A": ("-180 deg", "180 deg"), "B": ("-180 deg", "180 deg"), "C": ("
 def test_a_share_is_of_what_is_left():
     budget = Budget(100.0, 1000)
     budget.used = 400
-    share = budget.take_share(0.5)
-    assert share.parts == 300
-    assert 40.0 < share.seconds_left <= 50.0
+    step = budget.take_fraction(0.5)
+    assert step.boxes == 300
+    assert 40.0 < step.seconds_left <= 50.0
     assert not budget.is_spent()
-    share.used = 300
-    assert share.is_spent()
-    assert Budget(None).take_share(0.1).seconds_left == float("inf")
-    assert Budget(1e-9).take_share(1.0).seconds_left == 0.0
+    step.used = 300
+    assert step.is_spent()
+    assert Budget(None).take_fraction(0.1).seconds_left == float("inf")
+    assert Budget(1e-9).take_fraction(1.0).seconds_left == 0.0
 
 
 @pytest.mark.parametrize("seconds", [0.0, -1.0, float("nan")])

@@ -11,18 +11,18 @@ SECONDS = 60.0  # of a search, if nothing else is said
 
 
 class Budget:
-    """The time, s, and the number of parts that a search may still examine; None for time without end.
+    """The time, s, and the number of boxes that a search may still examine; None for time without end.
 
     A search asks :meth:`is_spent` between its steps and then answers with what is proved so far. ``used`` counts the
-    parts that it has examined.
+    boxes that it has examined.
 
     Raises :class:`PoseError` for a time that is not above 0.
     """
 
-    def __init__(self, seconds: float | None = SECONDS, parts: float = inf):
+    def __init__(self, seconds: float | None = SECONDS, boxes: float = inf):
         if seconds is not None and not seconds > 0.0:
             raise PoseError(f"seconds: a time above 0 s expected, not {seconds:g}")
-        self.parts, self.used = parts, 0
+        self.boxes, self.used = boxes, 0
         self._deadline = inf if seconds is None else time.monotonic() + seconds
 
     @property
@@ -31,13 +31,13 @@ class Budget:
         return max(0.0, self._deadline - time.monotonic())
 
     def is_spent(self) -> bool:
-        return self.used >= self.parts or time.monotonic() > self._deadline
+        return self.used >= self.boxes or time.monotonic() > self._deadline
 
-    def take_share(self, fraction: float) -> Budget:
+    def take_fraction(self, fraction: float) -> Budget:
         """Make a budget of a fraction of what is left, for one step of several."""
-        share = Budget(None, max(0.0, self.parts - self.used) * fraction)
-        share._deadline = self._deadline if self._deadline == inf else time.monotonic() + fraction * self.seconds_left
-        return share
+        step = Budget(None, max(0.0, self.boxes - self.used) * fraction)
+        step._deadline = self._deadline if self._deadline == inf else time.monotonic() + fraction * self.seconds_left
+        return step
 
     def __repr__(self) -> str:
         return f"<parakin budget: {self.seconds_left:.3g} s left>"

@@ -26,7 +26,7 @@ MOST = 4_000_000  # positions of a grid
 _ALONG = {1: 400, 2: 120, 3: 36}  # positions along the longest side, at most, if no step is given
 _AT_ONCE = 1 << 15
 _ON = 1e-3  # a pose nearer than this fraction of a grid's step lies on the slice
-_ROUGH, _SHARE = 0.1, 0.2  # gap, and share of the time, of the workspace by which the grid is placed
+_ROUGH, _OUTLINE = 0.1, 0.2  # gap, and fraction of the time, of the workspace by which the grid is placed
 
 
 @dataclass(frozen=True, eq=False)
@@ -136,7 +136,7 @@ def atlas(
     if region.swept_axes:
         raise PoseError(f"region: an atlas is of one orientation, {' '.join(region.swept_axes)} must not be swept")
     budget, report = Budget(seconds), progress or (lambda fraction: None)
-    outline = budget.take_share(_SHARE)
+    outline = budget.take_fraction(_OUTLINE)
     drawn = map_performance(region, step, length, lambda fraction: report(0.4 * fraction), outline)
     extremes = find_extremes(region, drawn.inside, drawn.step)
     report(0.6)
@@ -156,7 +156,7 @@ def map_performance(
     scale = choose_characteristic_length(region.machine, length)
     if step is not None and not (isfinite(step) and step > 0.0):
         raise PoseError(f"step: a length above 0 mm expected, not {step:g}")
-    low, high = _find_bounds(region, budget or Budget(_SHARE * SECONDS))
+    low, high = _find_bounds(region, budget or Budget(_OUTLINE * SECONDS))
     step = _round_up(float((high - low).max()) / _ALONG[len(region.free_axes)]) if step is None else float(step)
     counts = [(b - a) / step + 1.0 for a, b in zip(low, high, strict=True)]
     if prod(counts) > MOST:

@@ -62,7 +62,7 @@ def bracket_amplification(
     search = _AmplificationSearch(box, side)
     search.climb()
     if search.best > bound if side == "greatest" else search.best * bound > 1.0:
-        budget.parts = min(budget.parts, budget.used + _EXCEEDED)
+        budget.boxes = min(budget.boxes, budget.used + _EXCEEDED)
     low, high = box.low[None], box.high[None]
     upper, axis = search.bound_boxes(low, high)
     top = -np.inf  # of what was decided

@@ -168,7 +168,7 @@ def _share_brackets(
             value = 0.0 if side == "least" else inf
             brackets.append(Bracket(side, value, value, singular[0], True))
             continue
-        half = budget.take_share(1.0 / (len(SIDES) - number))
+        half = budget.take_fraction(1.0 / (len(SIDES) - number))
         report_half = partial(_report_half, report, 0.5 * number)
         brackets.append(bracket_amplification(box, side, tolerance, half, bound, report_half))
         budget.used += half.used

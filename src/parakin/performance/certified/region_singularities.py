@@ -25,7 +25,7 @@ SingularityVerdict = Literal["met", "none", "unproved"]
 
 _ALONG = {1: 1024, 2: 256, 3: 96}  # cells along the longest edge in which a change of sign is looked for
 _MOST_COMPARED = 1000  # cells
-_SHARE = 0.5  # of the budget, for the proofs that there is none, and of the rest for the region's own cells
+_PROVING = 0.5  # of the budget, for the proofs that there is none, and of the rest for the region's own cells
 _ZERO = 1e-12  # a margin no greater is zero
 _FEW, _ROUNDS = 30_000, 24  # undecided cells, and rounds, with which a proof that there is none is given up
 
@@ -71,9 +71,9 @@ def judge_singularities(region: Region, budget: Budget | None = None) -> tuple[R
             verdicts.append(_judge_constant(own, name, float(margin)))
             continue
         positive, negative = Constraint(name, margin, inputs), Constraint(name, 0.0 - margin, inputs)
-        left = _list_left_cells(own, negative, extent, budget.take_share(_SHARE / (len(names) - number)))
+        left = _list_left_cells(own, negative, extent, budget.take_fraction(_PROVING / (len(names) - number)))
         if len(left.low) and own not in labelled:
-            labelled[own] = _label_cells(own, extent, budget.take_share(_SHARE))
+            labelled[own] = _label_cells(own, extent, budget.take_fraction(_PROVING))
         if not len(left.low) or _is_apart(left, labelled[own].joined):
             verdicts.append(RegionSingularity(name, "none", None))
             continue

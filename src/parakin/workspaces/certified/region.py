@@ -152,8 +152,8 @@ class Region:
     def find_extent(self, budget: Budget | None = None) -> tuple[Array, Array] | None:
         """Find a box proved to hold the whole region, not much larger than it; None for a region proved empty.
 
-        It is that of all components: the limits bound the machine, and no sign of a determinant does. Where the budget (by
-        default 60 s) ends before, the box is larger than need be, else it is kept.
+        It is that of all components: the limits bound the machine, and no sign of a determinant does. Where the budget,
+        by default 60 s, ends before, the box is larger than need be, else it is kept.
 
         Raises :class:`PoseError` if the limits leave it unbounded, or are not proved to bound it.
         """

@@ -25,7 +25,7 @@ from .subdivision import Cells, make_empty_cells
 ROUNDING = 1e-9  # relative, of the sums of volumes
 _VAGUE = 0.2  # gap from which the estimate of an inclusive region is sampled
 _MOST_SAMPLED, _SAMPLED_AT_ONCE = 20_000, 500  # cells
-_PROVING = 0.8  # share of the time for the bounds of an inclusive region; the rest is for its estimate
+_PROVING = 0.8  # fraction of the time for the bounds of an inclusive region; the rest is for its estimate
 _CLOSE = 1.0 / 128.0  # size of the cells at the bounding box's faces, as a fraction of the box
 
 
@@ -169,7 +169,7 @@ def workspace(
         return Workspace(region, make_empty_cells(len(region.free_axes)), "gap", parameters)
     subdivision = region.subdivide(*extent)
     stopped = subdivision.run(
-        gap, cell, budget.take_share(1.0 if region.every_orientation else _PROVING), progress
+        gap, cell, budget.take_fraction(1.0 if region.every_orientation else _PROVING), progress
     ).stopped
     if stopped == "gap":
         with suppress(KeyboardInterrupt):  # the volume is known; only its box could be closer

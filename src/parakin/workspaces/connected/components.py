@@ -27,7 +27,7 @@ from .adjacency import refuse_too_many_cells
 from .cell_components import CellComponent, Resolution, find_cell_components
 
 _FINE = {1: 4096, 2: 512, 3: 128}  # cells along the longest edge, by dimension
-_OUTLINE = 0.2  # share of the time for the outline
+_OUTLINE = 0.2  # fraction of the time for the outline
 _NEAR = 32  # cells of a component from which a path to a position is looked for
 
 _Pair = tuple["Component", CellComponent]
@@ -116,7 +116,7 @@ def find_components(
     region = region.include_all_components()
     sides = dict(zip((1, -1), make_side_constraints(region.traced_pose), strict=True))
     position, sign = (None, 0) if start is None else _locate_start(region, start, sides)
-    outline = find_outline_cells(region, budget.take_share(_OUTLINE))
+    outline = find_outline_cells(region, budget.take_fraction(_OUTLINE))
     low, high = outline.low.min(0), (outline.low + outline.size).max(0)
     edge = float((high - low).max()) / _FINE[len(low)] if cell is None else cell
     refuse_too_many_cells(np.ceil((high - low) / edge), edge)
@@ -125,7 +125,7 @@ def find_components(
     for done, (own_sign, constraint) in enumerate(sides.items()):
         report((1.0 + done) / (1.0 + len(sides)))
         one_side = find_cell_components(
-            region, constraint, low, high, Resolution(edge, budget.take_share(1.0 / (len(sides) - done)))
+            region, constraint, low, high, Resolution(edge, budget.take_fraction(1.0 / (len(sides) - done)))
         )
         pairs += [(_describe_component(own_sign, cells), cells) for cells in one_side.components]
         at_least += one_side.at_least

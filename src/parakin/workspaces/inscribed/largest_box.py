@@ -119,8 +119,8 @@ def find_largest_box(
     if tolerance is not None and not (np.isfinite(tolerance) and tolerance > 0.0):
         raise PoseError(f"tolerance: a length above 0 mm expected, not {tolerance:g}")
     budget = Budget(seconds)
-    search = budget.take_share(_SEARCH)
-    outline = find_outline_cells(region, search.take_share(_OUTLINE))
+    search = budget.take_fraction(_SEARCH)
+    outline = find_outline_cells(region, search.take_fraction(_OUTLINE))
     low, high = outline.low.min(0), (outline.low + outline.size).max(0)
     smallest = TOLERANCE * float((high - low).max()) if tolerance is None else float(tolerance)
     boxes: list[Array] = []
@@ -133,7 +133,7 @@ def find_largest_box(
             z = climb_volume(region, family, z, smallest, search)
         boxes.append(family.make_boxes(grow_faces(region, family, z, smallest, search)))
     stopped = "time" if search.is_spent() else "tolerance"
-    first, last = _prove_largest(region, boxes, budget.take_share(_FINAL), centre is not None, stopped)
+    first, last = _prove_largest(region, boxes, budget.take_fraction(_FINAL), centre is not None, stopped)
     parameters = {
         **region.parameters,
         "shape": None if shape is None else [float(part) for part in shape],
@@ -190,8 +190,8 @@ def _find_stops(region: Region, low: Array, high: Array, tolerance: float, budge
             layers = np.tile(np.array([low, high]), (len(_OUTSIDE), 1, 1))
             layers[:, 1 - side, axis] = (low, high)[side][axis]
             layers[:, side, axis] += (2 * side - 1) * tolerance * _OUTSIDE
-            share = budget.take_share(1.0 / (2 * len(low) - len(stops)))
-            containment = prove_boxes(region, layers[:, 0], layers[:, 1], budget=share)
+            own = budget.take_fraction(1.0 / (2 * len(low) - len(stops)))
+            containment = prove_boxes(region, layers[:, 0], layers[:, 1], budget=own)
             broken = np.flatnonzero(containment.limit >= 0)
             if containment.proved[0] or not len(broken):
                 stops.append(FaceStop(sign + name, None, None))

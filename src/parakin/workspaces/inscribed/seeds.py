@@ -74,7 +74,7 @@ def find_seeds(
 def _prove_grid(region: Region, low: Array, high: Array, budget: Budget) -> tuple[Flags, Array]:
     """Find which cells of a grid over [low, high] are proved inside; returns the mask, and the cells' edges."""
     edge = float((high - low).max()) / GRID
-    cells = refuse_interrupted(region.subdivide(low, high).run(_GAP, edge, budget.take_share(0.5)))
+    cells = refuse_interrupted(region.subdivide(low, high).run(_GAP, edge, budget.take_fraction(0.5)))
     if not len(cells.low):
         return np.zeros((1,) * len(low), np.bool_), high - low
     size = cells.size.min(0)

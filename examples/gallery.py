@@ -17,6 +17,7 @@ from matplotlib.figure import Figure
 from mpl_toolkits.mplot3d.art3d import Line3DCollection, Poly3DCollection
 
 import parakin as pk
+from parakin.units import name_display_unit, to_display
 
 BLUE, ORANGE, GREEN, GREY = "#1565c0", "#ef6c00", "#2e7d32", "#90a4ae"
 TILT = np.deg2rad(15.0)
@@ -28,7 +29,7 @@ class Page:
 
     def __init__(self) -> None:
         self.files: dict[str, bytes] = {}
-        self.sizes: list[str] = []
+        self.machine = ""
         self.text = [
             "# Gallery",
             "",
@@ -36,17 +37,30 @@ class Page:
             "",
         ]
 
-    def paper(self, title: str, *machines: str) -> None:
+    def paper(self, title: str, machine: str) -> None:
         self.text += [f"## {title}", ""]
-        self.sizes = [f"Sizes of `{name}`: {' '.join(pk.load(name).spec.source.split())}" for name in machines]
+        self.machine = machine
 
-    def add(self, name: str, title: str, figure: Figure, numbers: str) -> None:
-        """Add a figure with its numbers, and which sizes of the paper's machines were published and which chosen."""
+    def add(self, name: str, title: str, figure: Figure, numbers: str, machine: str | None = None) -> None:
+        """Add a figure with its numbers, and the machine's sizes: which were published and which chosen."""
         canvas, data = FigureCanvasAgg(figure), BytesIO()
         canvas.print_png(data)
         self.files[f"{name}.png"] = data.getvalue()
         self.text += [f"### {title}", "", f"![{title}](gallery/{name}.png)", "", numbers, ""]
-        self.text += [line for size in self.sizes for line in (size, "")]
+        self.text += [sizes(machine or self.machine), ""]
+
+
+def sizes(name: str) -> str:
+    """Tell a machine's sizes and its drives' ranges, and where they come from."""
+    machine = pk.load(name)
+    lengths = [f"{size} {value:g} mm" for size, value in machine.spec.sizes.items()]
+    drives = [
+        f"{drive.name} {to_display(drive.low, drive.unit):g} to {to_display(drive.high, drive.unit):g}"
+        f" {name_display_unit(drive.unit)}"
+        for drive in machine.drives
+    ]
+    source = " ".join(machine.spec.source.split())
+    return f"Sizes of `{name}`: {', '.join([*lengths, *drives])}. {source}"
 
 
 def plane(width: float = 6.4, height: float = 6.0, count: int = 1) -> tuple[Figure, list[Any]]:
@@ -127,7 +141,7 @@ def tricept(page: Page) -> None:
 
 
 def hbg80(page: Page) -> None:
-    page.paper("HBG80: Parallel kinematic machines (about 2000)", "hbg80_2d", "hbg80_3d")
+    page.paper("HBG80: Parallel kinematic machines (about 2000)", "hbg80_2d")
     # Both assemblies count.
     plane_region, space_region = (pk.region(pk.load(f"hbg80_{n}d"), components="all") for n in (2, 3))
     two, three = pk.sweep_drives(plane_region, cells=48), pk.sweep_drives(space_region, cells=24)
@@ -168,6 +182,7 @@ def hbg80(page: Page) -> None:
         "Figure 3.3: contours of the three-axis machine's workspace",
         figure,
         "One drive runs, two stand at their limits.",
+        "hbg80_3d",
     )
     figure, (ax,) = space()
     for net in three.nets:
@@ -182,6 +197,7 @@ def hbg80(page: Page) -> None:
         f"Two drives run, one stands. Volume of both assemblies from the drives' side, over 240 parts of each range: "
         f"{fine_volume:,.0f} mm³; {proved(whole)}. Home's assembly alone: "
         f"{proved(pk.workspace(pk.region(space_region.machine)))}.",
+        "hbg80_3d",
     )
 
 

@@ -44,6 +44,7 @@ FLOORS = [
     ["__init__"],  # the public names
     ["commands"],
     ["cli"],
+    ["__main__"],
 ]
 HEIGHT = {room: height for height, floor in enumerate(FLOORS) for room in floor}
 CORE = ["arrays", "algebra", "budget", "kernels", "model", "kinematics", "machine", "workspaces", "performance"]

@@ -200,6 +200,32 @@ def test_what_a_kill_leaves_is_swept_by_the_next_run(tmp_path, exists):
     assert not list(tmp_path.rglob("*.part"))
 
 
+KILLED_BETWEEN = """
+import os, signal, sys
+import parakin as pk
+replace = os.replace
+def once(*arguments):
+    replace(*arguments)
+    os.kill(os.getpid(), signal.SIGKILL)
+os.replace = once
+pk.write_files(sys.argv[1], {"a": "new", "b": "new"})
+"""
+
+
+@POSIX
+def test_a_set_torn_by_a_kill_says_so_until_it_is_complete(tmp_path):
+    pk.write_files(tmp_path, {"a": "old", "b": "old"})
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["a", "b"]
+    subprocess.run([sys.executable, "-c", KILLED_BETWEEN, str(tmp_path)], check=False, timeout=120)
+    assert [(tmp_path / name).read_text() for name in "ab"] == ["new", "old"]
+    (note,) = tmp_path.glob("parakin-incomplete-*.txt")
+    assert note.read_text().splitlines()[1:] == ["a", "b"]
+    pk.write_files(tmp_path, {"a": "newer", "c": "new"})  # b is still the old one
+    assert note.exists()
+    pk.write_files(tmp_path, {"a": "newest", "b": "newest"})
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["a", "b", "c"]
+
+
 def test_a_set_is_not_torn_by_an_interruption(tmp_path, monkeypatch):
     replace = os.replace
 

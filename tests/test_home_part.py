@@ -217,3 +217,39 @@ def test_an_inclusive_region_with_wide_ranges_has_a_bracket_and_an_honest_estima
 def test_a_vague_estimate_is_said_to_be_one(capsys):
     assert main(["workspace", "tricept", "--some", "B=0:40,C=-180:180", "--time", "1"]) == 0
     assert "a guess from samples" in capsys.readouterr().out
+
+
+PLANAR = """
+name: planar
+source: a test's own
+motion: {motion}
+legs:
+  - {{kind: length, joints: [d1], foot: {feet[0]}, platform: {corners[0]}, range: [10 mm, 2 m]}}
+  - {{kind: length, joints: [d2], foot: {feet[1]}, platform: {corners[1]}, range: [10 mm, 2 m]}}
+  - {{kind: length, joints: [d3], foot: {feet[2]}, platform: {corners[2]}, range: [10 mm, 2 m]}}
+home: {{{home}}}
+"""
+
+
+def test_a_single_turn_is_swept_all_round_about_any_axis(load_text):
+    feet, corners = [(0, 0), (900, 0), (450, 780)], [(0, 0), (100, 0), (50, 90)]
+
+    def write(points, axes):
+        """Write points whose two coordinates are along two of the axes."""
+        return [
+            "[{}]".format(", ".join(f"{dict(zip(axes, p, strict=True)).get(a, 0)} mm" for a in "xyz")) for p in points
+        ]
+
+    volumes = []
+    # right-handed pairs: about Z from X to Y, about Y from Z to X
+    for motion, axes, home in (
+        ("tx ty rz", "xy", "X: 400 mm, Y: 200 mm, C: 20 deg"),
+        ("tz tx ry", "zx", "Z: 400 mm, X: 200 mm, B: 20 deg"),
+    ):
+        text = PLANAR.format(motion=motion, feet=write(feet, axes), corners=write(corners, axes), home=home)
+        machine = load_text(text)
+        (ends,) = machine.orientation_ranges.values()
+        assert ends == (-np.pi, np.pi)
+        volumes.append(pk.workspace(pk.region(machine, dexterous=True, components="all"), gap=0.05).volume)
+    assert volumes[0].inner <= volumes[1].outer
+    assert volumes[1].inner <= volumes[0].outer

@@ -23,7 +23,7 @@ from .kinematics.forward import solve_forward
 from .kinematics.inverse import SINGULAR, measure_regularity, solve_inverse
 from .kinematics.solution import Solution
 from .kinematics.tapes import KinematicTapes, collect_tapes
-from .kinematics.wrist import EVERY_DIRECTION, EVERY_ROTATION, EXACT, Wrist, find_wrist, flip_mode
+from .kinematics.wrist import EVERY_DIRECTION, EVERY_ROTATION, EVERY_TURN, EXACT, Wrist, find_wrist, flip_mode
 from .model.elements import Drive
 from .model.legs import Inverse, Leg
 from .model.limits import Limit, compute_platform_points, group_joints_by_leg
@@ -79,9 +79,10 @@ class Machine:
 
     @property
     def orientation_ranges(self) -> dict[str, AxisRange]:
-        """Ranges of the turning axes, rad, that hold every orientation once."""
+        """Ranges of the turning axes, rad, that hold every orientation once; a single one turns all round."""
         ranges = EVERY_DIRECTION if self.has_direction else EVERY_ROTATION
-        return {axis: ranges[axis] for axis in self.axes if axis in ranges}
+        turning = [axis for axis in self.axes if axis in ranges]
+        return {axis: ranges[axis] if len(turning) > 1 else EVERY_TURN for axis in turning}
 
     @property
     def drives(self) -> tuple[Drive, ...]:

@@ -8,7 +8,7 @@ import shutil
 import signal
 import tempfile
 import threading
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import BinaryIO
 
@@ -24,6 +24,8 @@ except ImportError:  # no locks on this system: leftovers stay
 Content = bytes | str | Writer
 
 _BEGIN, _END = ".parakin-", ".part"  # of the name of a folder of files that are not complete yet
+_NOTE = "parakin-incomplete-"  # begin of the name of a note on files that do not belong together yet
+_NOTE_TEXT = "These files were being replaced together, and may be old and new ones; run the command again."
 _TRIES = 3  # attempts to make such a folder and lock it before another process sweeps it
 _SIGNALS = (signal.SIGINT, signal.SIGTERM)
 
@@ -39,7 +41,8 @@ def write_files(folder: str | os.PathLike[str], files: Mapping[str, Content]) ->
 
     All are written into a hidden folder first and move when every one is complete, so that a full disk or an
     interruption leaves what was there before. A folder that is missing appears with all of them at once. What a killed
-    process has left behind is removed.
+    process has left behind is removed. Where several files replace others one after the other, a note stands beside
+    them meanwhile: should it stay, the process was killed, and old and new files may be mixed.
 
     Raises :class:`InputError` if the folder can't be made or a file can't be written.
     """
@@ -66,7 +69,7 @@ def write_files(folder: str | os.PathLike[str], files: Mapping[str, Content]) ->
             if is_new and _rename_folder(stage, base):
                 return targets
             base.mkdir(exist_ok=True)
-            with _delay_signals():
+            with _delay_signals(), _note_incomplete(base, stage.name, files):
                 for target in targets:
                     current = str(target)
                     os.replace(stage / target.name, target)  # noqa: PTH105
@@ -114,6 +117,22 @@ def _sweep_leftovers(base: Path) -> None:
         if lock is not None:
             shutil.rmtree(folder, ignore_errors=True)
             os.close(lock)
+
+
+@contextlib.contextmanager
+def _note_incomplete(base: Path, token: str, names: Iterable[str]) -> Iterator[None]:
+    """Keep a note in a folder while files of a set appear there; then also remove the notes of sets they complete."""
+    names = sorted(names)
+    if len(names) < 2:
+        yield
+        return
+    note = base / f"{_NOTE}{token.removeprefix(_BEGIN).removesuffix(_END)}.txt"
+    note.write_text("\n".join([_NOTE_TEXT, *names, ""]), encoding="utf-8", errors="backslashreplace")
+    yield
+    for other in base.glob(f"{_NOTE}*.txt"):
+        listed = other.read_text(encoding="utf-8", errors="replace").splitlines()
+        if listed[:1] == [_NOTE_TEXT] and set(listed[1:]) <= set(names):
+            other.unlink(missing_ok=True)
 
 
 def _rename_folder(stage: Path, base: Path) -> bool:

@@ -80,8 +80,9 @@ FAR_TILT = np.pi / 12.0
 OWN, OTHER, EITHER = 0, 1, 2
 WristModes = NDArray[np.int8]
 
-# Ranges of the turning axes that hold every rotation, and every direction, once.
+# Ranges of the turning axes that hold every rotation, every turn about one axis, and every direction, once.
 EVERY_ROTATION: dict[str, AxisRange] = {"A": (-np.pi, np.pi), "B": (-np.pi / 2, np.pi / 2), "C": (-np.pi, np.pi)}
+EVERY_TURN: AxisRange = (-np.pi, np.pi)
 EVERY_DIRECTION: dict[str, AxisRange] = {"B": (0.0, np.pi), "C": (-np.pi, np.pi)}
 
 GAIN = 0.25  # of the squared way in the same mode: what the way in the other mode may be, for the path to change

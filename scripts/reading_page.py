@@ -11,7 +11,7 @@ import sys
 from pathlib import Path
 
 from parakin.commands import part_options
-from parakin.controllers.event_lines import COMMENTED
+from parakin.controllers.event_commands import COMMENTED
 from parakin.toolpath.reading.cl.cycles import CYCLES
 from parakin.toolpath.reading.cl.dialects import BELOW, DIALECTS, LEFT, RIGHT, Dialect
 from parakin.toolpath.reading.cl.words import INFORMING, REASONS, TEXT_WORDS, WORDS

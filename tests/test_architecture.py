@@ -37,9 +37,11 @@ FLOORS = [
     ["toolpath.job"],
     ["toolpath"],
     ["controllers.controller", "controllers.gcode_text", "export.files", "export.number_format"],
-    ["controllers.event_lines", "export.machine", "export.tables"],
+    ["controllers.event_commands", "export.machine", "export.tables"],
+    ["controllers.event_lines"],
     ["controllers.joints", "controllers.linuxcnc", "export.report", "export.workspace"],
-    ["export.json"],
+    ["controllers.grbl", "controllers.siemens", "controllers.fanuc", "controllers.beckhoff", "export.json"],
+    ["controllers.fluidnc", "controllers.heidenhain"],
     ["controllers", "export"],
     ["__init__"],  # the public names
     ["commands"],
@@ -215,7 +217,7 @@ def test_a_riddling_file_name_stands_once():
 
 COLUMNS = {"kinematics.wrist", "model.structures.five_axis"}  # who may know where B and C stand in a pose
 COLUMNS |= {"kinematics.rotations"}  # A, B and C of a rotation
-COLUMNS |= {"controllers.joints.program"}  # the letters that a program gives to turning joints
+COLUMNS |= {"controllers.joints.letters"}  # the letters that a program gives to turning joints
 COLUMNS |= {"toolpath.linearise.pole_passes"}  # A of the turns that a program gives
 
 

@@ -125,7 +125,7 @@ def test_forced_where_the_tool_can_go(part, out, capsys):
         (["--place", "Q=1:2"], "--place: "),
         (["--rate", "0"], "--rate: "),
         (["--rate", "inf"], "--rate: "),
-        (["--target", "fanuc"], "--target"),
+        (["--target", "mazak"], "--target"),
         (["--corners", "cut"], "--corners"),
     ],
 )

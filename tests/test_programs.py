@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 import parakin as pk
-from parakin.controllers.joints.program import assign_joint_letters
+from parakin.controllers.joints.letters import assign_joint_letters
 from parakin.controllers.linuxcnc.approach import plan_approach
 from parakin.controllers.linuxcnc.axis_rates import choose_axis_rates
 from parakin.controllers.linuxcnc.slow_tips import delay_slow_tips

@@ -65,8 +65,8 @@ TargetName = Annotated[
     Target | None,
     Parameter(
         help=(
-            "Write a program too: linuxcnc, which moves the tool straight (PART.linuxcnc.ngc), or joints, for "
-            "controllers that know no kinematics (PART.joints.ngc)."
+            "Write a program too: linuxcnc, which moves the tool straight (PART.linuxcnc.ngc); joints, for controllers "
+            "that know no kinematics (PART.joints.ngc), or one of these by its name, in its own words."
         )
     ),
 ]

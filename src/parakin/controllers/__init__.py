@@ -1,8 +1,9 @@
-"""Controllers, a folder each: the programs that they run.
+"""Controllers, a file or a folder each: the programs that they run.
 
-A folder describes its controller by ``CONTROLLER``, a :class:`~.controller.Controller`, in its ``__init__.py``. The
-folder's name stands in :data:`Target` below, where ``parakin post --target NAME`` finds it. ``gcode_text.py`` and
-``event_lines.py`` write what all G-code has in common.
+Each describes its controller by ``CONTROLLER``, a :class:`~.controller.Controller`. The name of the file or folder
+stands in :data:`Target` below, where ``parakin post --target NAME`` finds it. ``gcode_text.py`` and
+``event_lines.py`` write what all G-code has in common; ``joints/`` is what controls without kinematics have in
+common.
 """
 
 from __future__ import annotations
@@ -13,10 +14,10 @@ from typing import TYPE_CHECKING, Literal, TypeAlias
 if TYPE_CHECKING:
     from .controller import Controller
 
-Target: TypeAlias = Literal["linuxcnc", "joints"]  # the folders
+Target: TypeAlias = Literal["linuxcnc", "joints", "grbl", "fluidnc", "siemens", "heidenhain", "fanuc", "beckhoff"]
 
 
 def load_controller(target: Target) -> Controller:
-    """Import a controller's folder and return its description."""
+    """Import a controller's file or folder and return its description."""
     controller: Controller = import_module(f".{target}", __name__).CONTROLLER
     return controller

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 
 import numpy as np
 
@@ -17,11 +17,11 @@ CHUNK = 1 << 16  # motions written at a time
 _ROWS = 1 << 14  # formatted at a time
 
 
-def to_display(values: Array, units: Sequence[str]) -> Array:
+def to_display(values: Array, units: Sequence[str], digits: Mapping[str, int] = DIGITS) -> Array:
     """Convert rows from mm and rad to mm and degrees, rounded to the digits that are printed."""
     scale = np.where(np.array(units) == "rad", 180.0 / np.pi, 1.0)
     columns = zip((values * scale).T, units, strict=True)
-    return np.stack([np.round(column, DIGITS[unit]) for column, unit in columns], axis=-1) + 0.0
+    return np.stack([np.round(column, digits[unit]) for column, unit in columns], axis=-1) + 0.0
 
 
 def format_blocks(lead: str, letters: Sequence[str], units: Sequence[str], rows: Array, seconds: Array) -> str:
@@ -38,9 +38,12 @@ def format_blocks(lead: str, letters: Sequence[str], units: Sequence[str], rows:
 
 def format_comments(text: str) -> Iterator[str]:
     """Split a remark into comments that fit on a line and that no controller acts upon."""
-    plain = make_plain(text)
-    for begin in range(0, max(len(plain), 1), LONGEST_COMMENT):
-        yield f"( {plain[begin : begin + LONGEST_COMMENT]} )"
+    yield from (f"( {piece} )" for piece in split_text(make_plain(text), LONGEST_COMMENT))
+
+
+def split_text(text: str, longest: int) -> list[str]:
+    """Split a text into pieces of at most so many characters; an empty text is one piece."""
+    return [text[begin : begin + longest] for begin in range(0, max(len(text), 1), longest)]
 
 
 def make_plain(text: str) -> str:

@@ -1,10 +1,12 @@
-"""Controllers without kinematics: every joint is an axis, and every block moves the joints."""
+"""Controllers without kinematics: every joint is an axis, and every block moves the joints.
 
-from ..controller import Controller, ControllerRun
-from .program import make_joint_program
+``joint_motions.py`` is the common model of their programs, ``dialect.py`` how a control is told one. This folder's own
+dialect is plain G-code; the others are files beside it, as ``fanuc.py``.
+"""
 
-CONTROLLER = Controller(
-    title="a controller without kinematics",
-    interpolation="joints",
-    build_run=lambda trajectory: ControllerRun(lambda forced, tolerance: make_joint_program(trajectory, forced=forced)),
-)
+from dataclasses import replace
+
+from .gcode import GCODE
+from .program import describe_joint_control
+
+CONTROLLER = describe_joint_control(replace(GCODE, title="a controller without kinematics"), ".ngc")

@@ -1,43 +1,63 @@
-"""A trajectory as G-code for controllers without kinematics: every joint is an axis."""
+"""A trajectory as a program for a control without kinematics: every joint is an axis."""
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
+from dataclasses import dataclass, replace
 from itertools import pairwise
+from pathlib import PurePath
 from typing import BinaryIO
 
 import numpy as np
 
 from ...arguments import check_arguments
-from ...arrays import Writer
-from ...errors import PoseError
-from ...machine import Machine
+from ...arrays import Array, Writer
+from ...toolpath.path import Note
 from ...toolpath.posting.setup_texts import describe_setup
 from ...toolpath.timing.drive_limits import DriveLimits
 from ...toolpath.timing.trajectory import Trajectory
-from ..event_lines import check_events, format_events
-from ..gcode_text import CHUNK, format_blocks, format_comments, join_lines, to_display
+from ..controller import Controller, ControllerRun
+from ..event_commands import Command
+from ..gcode_text import CHUNK, join_lines, to_display
+from .dialect import JointDialect
+from .feeds import Feed
+from .gcode import GCODE
+from .joint_motions import FIRST, JointMotions, build_joint_motions
+from .letters import assign_joint_letters, describe_letters
+from .look_ahead import find_halts, predict_planned_seconds, stretch_for_buffer
 
-LINEAR, TURNING = "XYZUVW", "ABC"
-_APPROACH_SPEED = 0.25  # fraction of the joints' speeds that is used on the way to the first record
-_APPROACH_LEAST = 4.0  # s, for that way
-_SHORTEST = 1e-3  # s
+_ROWS = 1 << 14  # blocks formatted at a time
+_LONGER = 1.2  # times the trajectory's time, from which on a control's is noted
 
 
-def assign_joint_letters(machine: Machine) -> tuple[str, ...]:
-    """Assign a letter to each joint: linear ones X Y Z U V W, turning ones A B C, in their order.
+@dataclass(frozen=True, eq=False)
+class _Program:
+    """A joint program before it is written.
 
-    Raises :class:`PoseError` where there are more joints than letters.
+    pattern : of a block
+    values : (k,) of the blocks' feed words, and ``approach`` that of the way to the first row
+    exact : numbers of the blocks at whose end the joints stand still
     """
-    free = {"mm": iter(LINEAR), "rad": iter(TURNING)}
-    letters = [next(free[unit], "") for unit in machine.joint_units]
-    if "" in letters:
-        linear = machine.joint_units.count("mm")
-        raise PoseError(
-            f"{machine.name} has {linear} linear and {len(letters) - linear} turning joints; "
-            f"G-code has letters for {len(LINEAR)} and {len(TURNING)}"
-        )
-    return tuple(letters)
+
+    trajectory: Trajectory
+    dialect: JointDialect
+    letters: tuple[str, ...]
+    motions: JointMotions
+    feed: Feed
+    pattern: str
+    values: Array
+    approach: float
+
+    @property
+    def seconds(self) -> float:
+        """What the control is told to take from the first record on."""
+        return float(self.feed.compute_seconds(self.motions.lengths, self.values).sum())
+
+
+def describe_joint_control(dialect: JointDialect, suffix: str) -> Controller:
+    """Describe a control that runs joint programs in a dialect."""
+    return Controller(dialect.title, "joints", lambda trajectory: build_joint_run(trajectory, dialect), suffix)
 
 
 @check_arguments
@@ -54,46 +74,108 @@ def make_joint_program(trajectory: Trajectory, *, forced: str | None = None) -> 
 
     Raises :class:`PoseError` where there are more joints than letters.
     """
-    letters = assign_joint_letters(trajectory.posted.machine)
+    return _make_writer(_build_program(trajectory, GCODE), forced)
 
-    check_events(trajectory.posted.path)
 
+def build_joint_run(trajectory: Trajectory, dialect: JointDialect) -> ControllerRun:
+    """Build how a control runs a trajectory as straight motions of the joints.
+
+    Raises :class:`PoseError` for more joints than axes, and for what the control has no word for.
+    """
+    program = _build_program(trajectory, dialect)
+    seconds, notes = program.seconds, list[Note]()
+    if dialect.buffer > 1:
+        seconds = _predict_seconds(program)
+        if seconds > _LONGER * trajectory.seconds:
+            text = f"{dialect.title} takes {seconds:.1f} s for {trajectory.seconds:.1f} s: its planner holds few lines"
+            notes.append(Note(0, text))
+    return ControllerRun(lambda forced, tolerance: _make_writer(program, forced), seconds, tuple(notes))
+
+
+def _build_program(trajectory: Trajectory, dialect: JointDialect) -> _Program:
+    machine, path = trajectory.posted.machine, trajectory.posted.path
+    letters = assign_joint_letters(machine, dialect.axes, dialect.title)
+    motions = build_joint_motions(trajectory, dialect.digits)
+    stretched = stretch_for_buffer(motions.seconds, dialect.buffer, dialect.line_seconds)
+    motions = replace(motions, seconds=stretched)
+    for commands in motions.commands.values():
+        for command in commands:
+            dialect.format_command(command, path.source)  # raises for what there is no word for
+    feed = dialect.choose_feed(machine)
+    values = feed.compute_values(motions.lengths, motions.seconds)
+    way = np.array([motions.approach])
+    approach = float(feed.compute_values(motions.slow_speed * way, way)[0])
+    return _Program(
+        trajectory, dialect, letters, motions, feed, dialect.make_pattern(letters, machine), values, approach
+    )
+
+
+def _predict_seconds(program: _Program) -> float:
+    machine, motions = program.trajectory.posted.machine, program.motions
+    limits = DriveLimits.of(machine).acceleration[None]
+    accelerations = to_display(limits, machine.joint_units, {"mm": 9, "rad": 9})[0]
+    halt = find_halts(len(motions.seconds), motions.commands)
+    told = program.feed.compute_seconds(motions.lengths, program.values)
+    return predict_planned_seconds(motions.steps, told, halt, accelerations, program.dialect.buffer)
+
+
+def _make_writer(program: _Program, forced: str | None) -> Writer:
     def write(file: BinaryIO) -> None:
-        for text in _format_program(trajectory, letters, forced):
+        texts = _format_program(program, forced)
+        for text in _number_lines(texts) if program.dialect.numbered else texts:
             file.write(text.encode("ascii"))
 
     return write
 
 
-def _format_program(trajectory: Trajectory, letters: tuple[str, ...], forced: str | None) -> Iterator[str]:
-    posted, path, machine = trajectory.posted, trajectory.posted.path, trajectory.posted.machine
-    corner = trajectory.curve.corner_of_record
-    kept = np.flatnonzero(np.diff(corner, prepend=-1))
-    speeds = DriveLimits.of(machine).speed
-    joints = posted.joints[kept]
-    least = (np.abs(np.diff(joints, axis=0)) / speeds).max(1, initial=0.0)
-    seconds = np.maximum(np.diff(trajectory.times[kept]), np.maximum(least, _SHORTEST))
-    from_home = float((np.abs(joints[0] - machine.inverse(machine.home)) / speeds).max())
-    approach = max(_APPROACH_LEAST, from_home / _APPROACH_SPEED)
-    rows = to_display(joints, machine.joint_units)
-    names = zip(letters, machine.joints, machine.joint_units, strict=True)
-    head = [
-        f"{path.source} on {machine.name}, mode {posted.mode}; joints, made by parakin",
-        ", ".join(f"{letter} is {name} in {'deg' if unit == 'rad' else 'mm'}" for letter, name, unit in names),
-        f"{seconds.sum():.3f} s from the first record on; {approach:.1f} s to it; F is the inverse of minutes",
-        "work and tool offsets have to be zero",
+def _number_lines(texts: Iterator[str]) -> Iterator[str]:
+    """Put the numbers of lines before them, from 0 on."""
+    first = 0
+    for text in texts:
+        lines = text.splitlines()
+        yield join_lines(f"{number} {line}" for number, line in enumerate(lines, first))
+        first += len(lines)
+
+
+def _format_program(program: _Program, forced: str | None) -> Iterator[str]:
+    dialect, motions, source = program.dialect, program.motions, program.trajectory.posted.path.source
+    name = re.sub(r"\W", "_", PurePath(source).stem, flags=re.ASCII)[:24].upper()
+
+    def format_commands(commands: list[Command]) -> str:
+        return join_lines(line for command in commands for line in dialect.format_command(command, source))
+
+    yield join_lines(line.format(name=name) for line in dialect.begin)
+    yield join_lines(line for remark in _describe(program, forced) for line in dialect.format_remark(remark))
+    yield join_lines(dialect.modes)
+    yield format_commands(motions.commands.get(FIRST, []))
+    yield join_lines(dialect.start)
+    yield program.pattern % (*motions.rows[0].tolist(), program.approach)
+    exact = set(np.flatnonzero(motions.halt).tolist()) if dialect.exact else set[int]()
+    places = {place for place in motions.commands if place != FIRST}
+    count = len(motions.seconds)
+    breaks = sorted({0, count} | places | exact | {place + 1 for place in exact})
+    for begin, end in pairwise([*breaks, count]):
+        yield format_commands(motions.commands.get(begin, []))
+        for start in range(begin, end, CHUNK):
+            yield (dialect.exact if begin in exact else "") + _format_blocks(program, start, min(start + CHUNK, end))
+    yield join_lines(line.format(name=name) for line in dialect.end)
+
+
+def _format_blocks(program: _Program, begin: int, end: int) -> str:
+    table = np.column_stack([program.motions.rows[1:][begin:end], program.values[begin:end]])
+    chunks = [table[start : start + _ROWS] for start in range(0, len(table), _ROWS)]
+    return "".join(program.pattern * len(chunk) % tuple(chunk.ravel().tolist()) for chunk in chunks)
+
+
+def _describe(program: _Program, forced: str | None) -> list[str]:
+    """Describe the program for its head, a remark each."""
+    posted, dialect = program.trajectory.posted, program.dialect
+    return [
+        f"{posted.path.source} on {posted.machine.name}, mode {posted.mode}; joints, made by parakin",
+        describe_letters(program.letters, posted.machine),
+        f"{program.seconds:.3f} s from the first record on; {program.motions.approach:.1f} s to it",
+        program.feed.text,
+        *dialect.notes,
         *describe_setup(posted),
         *(f"OFF LIMITS: written with --force: {line}" for line in (forced or "").splitlines()),
     ]
-    yield join_lines(line for remark in head for line in format_comments(remark))
-    yield "G21 G90 G17 G40 G49\n"
-    events = format_events(path, [int(corner[event.record - 1]) if event.record else -1 for event in path.events])
-    yield join_lines(events.pop(-1, []))
-    yield "G93\n" + format_blocks("G1 ", letters, machine.joint_units, rows[:1], np.array([approach]))
-    breaks = sorted({0, len(seconds), *events})
-    for start, end in pairwise([*breaks, len(seconds)]):
-        yield join_lines(events.get(start, []))
-        for first in range(start, end, CHUNK):
-            chunk = slice(first, min(first + CHUNK, end))
-            yield format_blocks("G1 ", letters, machine.joint_units, rows[1:][chunk], seconds[chunk])
-    yield "M2\n"

@@ -13,7 +13,7 @@ from ...arrays import Array, Indices
 from ...errors import InputError
 from ...toolpath.reading.gcode.block import VALUES, Block, parse_block
 from ...toolpath.reading.gcode.codes import format_g_code
-from .program import LINEAR, TURNING
+from .letters import LINEAR, TURNING
 
 _LETTERS = LINEAR + TURNING
 _MODES = {"units": 210, "distance": 900, "feed": 930, "plane": 170, "compensation": 400, "length": 490}

@@ -17,7 +17,8 @@ from ...toolpath.posting.setup_texts import describe_setup
 from ...toolpath.timing.corners import check_tolerance
 from ...toolpath.timing.trajectory import Trajectory
 from ..controller import ControllerRun
-from ..event_lines import check_events, format_events
+from ..event_commands import check_events
+from ..event_lines import format_events
 from ..gcode_text import CHUNK, format_blocks, format_comments, join_lines, to_display
 from .approach import plan_approach
 from .axis_ranges import TURNS

@@ -17,7 +17,7 @@ from .text import BYTE_ORDER_MARK, open_file
 _GCODE_SUFFIXES = frozenset((".ngc", ".nc", ".gcode", ".tap", ".cnc"))
 _CL_SUFFIXES = frozenset((".apt", ".aptsource", ".cl", ".cls", ".ncl"))
 _LOOKED_AT = 1 << 16  # bytes
-_JOINTS = b"joints, made by parakin )"  # stands in the head of a program of joint positions
+_JOINTS = b"joints, made by parakin"  # stands in the head of a program of joint positions
 # beginnings of lines that only one of the two formats can have
 _CL = re.compile(
     rb"\s*(?:\$\$|(?:PARTNO|PPRINT|GOTO|GODLTA|FROM|UNITS|UNIT|TOOL\s+PATH|TLDATA|MSYS|CUTTER|LOADTL|LOAD|SELECT|FEDRAT|SPINDL|"
@@ -44,11 +44,11 @@ def read_path(
     ``workpiece`` is for G53 in G-code; it does not place the path. ``frame`` is for CL files, ``start`` and
     ``reference`` are for G-code. ``tools``, lengths by number as from :func:`parakin.read_tool_table`, is for both.
     """
+    source = os.fsdecode(path)
+    with open_file(path, source) as file:
+        if _JOINTS in (file.read(_LOOKED_AT) or b"").lower():
+            raise InputError("a program of joint positions; expected the tool path that it was made from", source)
     if detect_format(path) == "gcode":
-        source = os.fsdecode(path)
-        with open_file(path, source) as file:
-            if _JOINTS in (file.read(_LOOKED_AT) or b""):
-                raise InputError("a program of joint positions; expected the tool path that it was made from", source)
         return read_gcode(
             path, arc_tolerance=arc_tolerance, workpiece=workpiece, start=start, tools=tools, reference=reference,
             progress=progress,

@@ -1,0 +1,25 @@
+( part.ngc on linear_delta, mode +++, joints, made by parakin )
+( X is tower_a in mm, Y is tower_b in mm, Z is tower_c in mm )
+( 0.306 s from the first record on, 4.0 s to it )
+( F is the inverse of minutes )
+( $110 to $112 and $120 to $122: speeds and accelerations of the joints, $32  )
+( is 0 )
+( part zero at X 0 Y 0 Z 0 in the machine )
+( the tool: 80 mm from the spindle's nose to its tip, the machine's own lengt )
+( h )
+G21G90G17G40G49
+G94
+S9000
+M3
+G93
+G53G1X997.1028Y997.1028Z997.1028F15.000
+M8
+G53G1X997.0832Y995.1091Z999.0512F588.054
+( half way )
+G4P0.5
+G53G1X999.3356Y993.9468Z997.8961F586.735
+M9
+M0
+G53G1X999.3551Y995.9442Z995.9442F588.165
+M5
+M2

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Sequence
 from functools import cached_property
 from itertools import product
@@ -13,14 +12,16 @@ import numpy as np
 from .algebra import Scalar, Vec
 from .arguments import RowsLike, bound_angles, describe_value, read_rows, warn_of_wide_angles
 from .arrays import Array, AxisRange
-from .errors import DescriptionError, NoMethodError, PoseError, SingularHomeWarning
-from .kernels.batch import evaluate_tape, evaluate_tape_with_residual, find_first_negative
+from .errors import NoMethodError, PoseError
+from .kernels.batch import evaluate_tape, evaluate_tape_with_residual
 from .kinematics.assemblies import find_assemblies
 from .kinematics.assembly_side import find_sides
 from .kinematics.closure_roots import compute_closure_tolerance
 from .kinematics.follow import follow_path
 from .kinematics.forward import solve_forward
-from .kinematics.inverse import SINGULAR, measure_regularity, solve_inverse
+from .kinematics.home import check_home
+from .kinematics.inverse import solve_inverse
+from .kinematics.limit_margins import compute_margins, find_broken_limits
 from .kinematics.solution import Solution
 from .kinematics.tapes import KinematicTapes, collect_tapes
 from .kinematics.wrist import EVERY_DIRECTION, EVERY_ROTATION, EVERY_TURN, EXACT, Wrist, find_wrist, flip_mode
@@ -32,9 +33,6 @@ from .model.spec import Spec
 from .model.structures import DirectionColumns, PlatformPlacement, Structure
 from .model.traces import Model
 from .units import AXIS_UNITS
-
-_LEAST_LEG = 1e-3  # mm, of a leg at home: closures are measured in fractions of it
-_ABOUT = 8  # poses about home that are looked at
 
 
 class Machine:
@@ -48,7 +46,7 @@ class Machine:
     def __init__(self, spec: Spec):
         self.spec = spec
         self.model = Model(spec)
-        self._refuse_bad_home()
+        check_home(self.model)
 
     def __repr__(self) -> str:
         return f"<parakin machine {self.name}: axes {' '.join(self.axes)}, joints {' '.join(self.joints)}>"
@@ -181,37 +179,6 @@ class Machine:
     def head_modes(self, mode: str) -> list[str]:
         """Return a working mode, and the one with the other sign of head and table, if these have a choice."""
         return [mode, flip_mode(mode)] if self.structure.branches else [mode]
-
-    def _refuse_bad_home(self) -> None:
-        for letter in self.spec.home:
-            if letter not in self.axes:
-                raise DescriptionError("home", f"unknown axis {letter}, this machine has {' '.join(self.axes)}")
-        with np.errstate(invalid="ignore", divide="ignore"):  # a home out of reach is told below
-            margins = self.model.own_margins(self.model.home, self.mode)
-            self.model.limits  # noqa: B018  refuses names that stand twice
-        for limit, margin in margins:
-            if not margin >= 0.0:
-                scale, unit = (180.0 / np.pi, "deg") if limit.unit == "rad" else (1.0, limit.unit)
-                value, bound = scale * limit.value(float(margin)), scale * limit.bound
-                what = f"{limit.subject} would be {value:,.6g} {unit}, limit {bound:,.6g}"
-                if limit.side == "reach":
-                    what = f"{limit.subject} does not reach it"
-                raise DescriptionError("home", f"{what}; home is a pose of the tool in the machine frame")
-        if not min(self.leg_sizes) > _LEAST_LEG:
-            raise DescriptionError("home", "a leg has no length there, so it holds nothing")
-        self._warn_of_singular_home()
-
-    def _warn_of_singular_home(self) -> None:
-        """Warn of a machine that is singular at home, and perhaps everywhere."""
-        rng = np.random.default_rng(0)
-        about = np.array([0.01 * max(self.leg_sizes) if unit == "mm" else 0.1 for unit in self.axis_units])
-        poses = self.home + np.vstack([np.zeros(len(about)), rng.uniform(-1.0, 1.0, (_ABOUT, len(about))) * about])
-        for kind, regularity in measure_regularity(self.model, poses).items():
-            singular = regularity[np.isfinite(regularity)] <= SINGULAR
-            if singular.any() and singular[0]:
-                where = "and all poses about it are" if singular.all() else "is"
-                text = f"{self.name}: home {where} a {kind} singularity (margin {regularity[0]:.1g} of 1)"
-                warnings.warn(f"{text}: forward finds no pose from there", SingularHomeWarning, stacklevel=4)
 
     # Input at the boundary.
 
@@ -445,20 +412,8 @@ class Machine:
         inverse's. Margins that do not exist where a leg can't close are NaN.
         """
         rows, lead = self.rows(poses, self.axes, "poses")
-        own, count = self.model.check_tape(self.checked_mode(mode)), len(self.limits)
-        if joints is None:
-            out = evaluate_tape(own, rows, np.empty((len(rows), count)), whole=False)
-        else:
-            q = self._joints_of(joints, len(rows))
-            out = evaluate_tape(
-                self.model.margins_tape(self.checked_mode(mode)), rows, np.empty((len(rows), count)), q, whole=False
-            )
-            lost = ~np.isfinite(q).all(1)
-            if lost.any():  # where joints do not exist, the pose tells which leg can't close
-                at_lost = np.ascontiguousarray(rows[lost])
-                out[lost] = evaluate_tape(own, at_lost, np.empty((len(at_lost), count)), whole=False)
-                out[lost & (out >= 0.0).all(1), :1] = np.nan
-        return out.reshape(*lead, count)
+        given = None if joints is None else self._joints_of(joints, len(rows))
+        return compute_margins(self.model, rows, given, self.checked_mode(mode)).reshape(*lead, len(self.limits))
 
     def check(self, poses: RowsLike, joints: RowsLike | None = None, mode: str | None = None) -> Any:
         """Return 0 where a pose is allowed, else 1 + the index in :attr:`limits` of the first one broken, (...,) int.
@@ -466,15 +421,5 @@ class Machine:
         A pose that is not a number breaks the first limit. ``joints`` as in :meth:`margins`.
         """
         rows, lead = self.rows(poses, self.axes, "poses")
-        if not self.limits:
-            return np.zeros(lead, np.int64)[()]
-        own, nothing = self.model.check_tape(self.checked_mode(mode)), np.empty((len(rows), 0))
-        if joints is None:
-            return find_first_negative(own, rows, nothing).reshape(lead)[()]
-        q = self._joints_of(joints, len(rows))
-        broken = find_first_negative(self.model.margins_tape(self.checked_mode(mode)), rows, q)
-        lost = ~np.isfinite(q).all(1)
-        if lost.any():
-            of_pose = find_first_negative(own, np.ascontiguousarray(rows[lost]), nothing[lost])
-            broken[lost] = np.where(of_pose == 0, 1, of_pose)
-        return broken.reshape(lead)[()]
+        given = None if joints is None else self._joints_of(joints, len(rows))
+        return find_broken_limits(self.model, rows, given, self.checked_mode(mode)).reshape(lead)[()]

@@ -105,3 +105,27 @@ def test_a_box_that_is_not_found_does_not_hide_the_volume(capsys):
     told = capsys.readouterr().out
     assert "volume" in told
     assert "box inside  no box in the region could be proved to be inside in the time given" in told
+
+
+def test_sampling_that_does_not_end_in_its_time_is_refused(capsys):
+    region = pk.region(pk.load("hexapod"), every=ALL_ROUND)
+    began = time.monotonic()
+    for sample in (pk.sample_grid, pk.sweep_polar):
+        with pytest.raises(PoseError, match="the time is up before all places are sampled"):
+            sample(region, 1.0 if sample is pk.sweep_polar else 5.0, seconds=1e-6)
+    with pytest.raises(PoseError, match="the time is up"):
+        pk.sweep_drives(pk.region(pk.load("hbg80_2d")), seconds=1e-6)
+    assert time.monotonic() - began < 3 * LATE
+    assert main(["workspace", "hbg80_2d", "--method", "grid", "--time", "1e-6"]) == 2
+    assert capsys.readouterr().err.startswith("--time: the time is up")
+
+
+def test_what_can_not_be_answered_is_refused_before_the_work(capsys):
+    for option in ("--parts", "--start", "--around", "--shape"):
+        value = {"--start": "X=0", "--around": "X=0", "--shape": "a:b"}.get(option)
+        began = time.monotonic()
+        swept = ["--some", "A=-180:180,B=-90:90,C=-180:180"]
+        code = main(["workspace", "lambda6", *swept, option, *([value] if value else [])])
+        assert code == 2
+        assert capsys.readouterr().err.startswith(f"{option}: ")
+        assert time.monotonic() - began < LATE

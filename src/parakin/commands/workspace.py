@@ -14,7 +14,7 @@ from ..export.json.text import format_json
 from .console import ProgressBar, announce_compiling, print_json, print_remark, print_text
 from .options import OFF_LIMITS, Json, Mode, Name, Sizes, load_machine
 from .region_options import AllParts, At, Every, Some, Time, Without, parse_length, parse_time, read_region
-from .workspace_inside import InsideOptions, encode_inside, explore_inside, format_inside
+from .workspace_inside import InsideOptions, check_inside, encode_inside, explore_inside, format_inside
 from .workspace_methods import Effort, Method, find_workspace
 from .workspace_summary import format_workspace
 
@@ -126,6 +126,8 @@ def workspace(
     machine = load_machine(name, sizes)
     region = read_region(machine, at, every, some, dexterous, without, mode, all_parts)
     effort = Effort(gap, parse_length(cell, "--cell"), parse_time(time), parse_length(step, "--step"))
+    options = InsideOptions(box, shape, around, parts, start, effort.seconds)
+    check_inside(region, options)
     files = _sort_files(output or (), method, len(region.free_axes))
     announce_compiling()
     from ..export.json.workspace import encode_workspace
@@ -144,7 +146,7 @@ def workspace(
         if isinstance(found, Workspace):
             elsewhere = measure_elsewhere(found, seconds=min(_ELSEWHERE, effort.seconds))
         encoded = encode_workspace(found, contents.cross_sections, elsewhere)
-        inside = explore_inside(region, InsideOptions(box, shape, around, parts, start, effort.seconds), progress)
+        inside = explore_inside(region, options, progress)
         encoded.update(encode_inside(inside))
         encoded["parameters"] = {"step": effort.step, **encoded["parameters"], "set": list(sizes or ())}
         written, refused = _write_files(files, contents, encoded)

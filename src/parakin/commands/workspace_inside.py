@@ -41,6 +41,20 @@ class Inside:
     components: Components | None = None
 
 
+def check_inside(region: Region, options: InsideOptions) -> None:
+    """Refuse options that can't be answered before the workspace is looked for."""
+    if options.shape is not None:
+        _parse_shape(options.shape)
+    if options.around is not None:
+        _parse_position(region, options.around)
+    if options.start is not None:
+        parse_axis_values(region.machine, options.start, "--start")
+    if (options.parts or options.start is not None) and not region.every_orientation:
+        from ..workspaces.connected.components import ONE_ORIENTATION
+
+        raise InputError(f"some: {ONE_ORIENTATION}", "--parts" if options.start is None else "--start")
+
+
 def explore_inside(region: Region, options: InsideOptions, progress: ProgressBar) -> Inside:
     """Find the box and the components that the options want."""
     box, no_box, components = None, "", None

@@ -7,7 +7,7 @@ from math import ceil
 from typing import TYPE_CHECKING, Literal
 
 from ..budget import SECONDS
-from ..errors import InputError
+from ..errors import InputError, PoseError
 
 if TYPE_CHECKING:
     from ..arrays import Progress
@@ -42,12 +42,18 @@ def find_workspace(method: Method, region: Region, effort: Effort, progress: Pro
     """Find the workspace of a region by a method; refuse options that the method does not take."""
     if method == "certified":
         return _certify_workspace(region, effort, progress)
-    for option in ("gap", "cell", "time"):
+    for option in ("gap", "cell"):
         if getattr(effort, option) is not None:
             raise InputError(f"--method {method} has none, only certified has", f"--{option}")
-    if method == "drives":
-        return _sweep_drives(region, effort.step, progress)
-    return _sample_positions(method, region, effort.step, progress)
+    try:
+        if method == "drives":
+            return _sweep_drives(region, effort, progress)
+        return _sample_positions(method, region, effort, progress)
+    except PoseError as error:
+        name, colon, rest = str(error).partition(": ")
+        if colon and name == "seconds":
+            raise InputError(rest, "--time") from None
+        raise
 
 
 def _certify_workspace(region: Region, effort: Effort, progress: Progress) -> Workspace:
@@ -59,27 +65,27 @@ def _certify_workspace(region: Region, effort: Effort, progress: Progress) -> Wo
     return workspace(region, gap, effort.cell, effort.seconds, progress)
 
 
-def _sample_positions(method: Method, region: Region, step: float | None, progress: Progress) -> SampledWorkspace:
+def _sample_positions(method: Method, region: Region, effort: Effort, progress: Progress) -> SampledWorkspace:
     from ..workspaces.sampled.grid import sample_grid
     from ..workspaces.sampled.polar_sweep import sweep_polar
     from ..workspaces.sampled.sampling import find_bounding_box
 
     box = find_bounding_box(region)
     edge = 1.0 if box is None else float((box[1] - box[0]).max())
-    size = edge / _STEPS[method].get(len(region.free_axes), 1) if step is None else step
+    size = edge / _STEPS[method].get(len(region.free_axes), 1) if effort.step is None else effort.step
     if method == "grid":
-        return sample_grid(region, size, progress=progress)
-    return sweep_polar(region, size, planes=max(size, edge / _PLANES), progress=progress)
+        return sample_grid(region, size, progress=progress, seconds=effort.seconds)
+    return sweep_polar(region, size, planes=max(size, edge / _PLANES), progress=progress, seconds=effort.seconds)
 
 
-def _sweep_drives(region: Region, step: float | None, progress: Progress) -> SampledWorkspace:
+def _sweep_drives(region: Region, effort: Effort, progress: Progress) -> SampledWorkspace:
     from ..workspaces.sampled.drive_sweep import sweep_drives
 
     machine = region.machine
     if region.kind != "constant" or region.without or any(axis in region.fixed_axes for axis in "XYZ"):
         raise InputError("drives sweeps the whole workspace: no --at, --every, --some or --without", "--method")
-    if step is None:
+    if effort.step is None:
         cells = _CELLS.get(len(machine.joints), 1)
     else:
-        cells = max(1, *(ceil((drive.high - drive.low) / step) for drive in machine.drives))
-    return sweep_drives(region, cells, progress)
+        cells = max(1, *(ceil((drive.high - drive.low) / effort.step) for drive in machine.drives))
+    return sweep_drives(region, cells, progress, effort.seconds)

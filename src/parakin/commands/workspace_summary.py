@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from ..workspaces.sampled.sampling import SampledWorkspace
 
 _HUGE = 1e3  # gap beyond which it is no number
+_NEGLIGIBLE = 0.5  # mm³ (mm², mm): less is shown as zero
 _VAGUE = 0.2  # gap beyond which an estimate tells little
 _STOPPED = {
     "gap": "as asked for",
@@ -33,7 +34,7 @@ def format_workspace(workspace: Workspace | SampledWorkspace, seconds: float, el
     head = describe_workspace(workspace)
     if isinstance(workspace, Workspace) and workspace.empty:
         besides = ""
-        if elsewhere is not None and elsewhere.outer > 0.0:
+        if elsewhere is not None and elsewhere.outer >= _NEGLIGIBLE:
             besides = f"\nbesides   {_format_elsewhere(elsewhere, workspace.unit)}"
         return f"{head}\n\nempty: no pose is allowed, proved in {seconds:.1f} s{besides}"
     rows = _list_certified(workspace) if isinstance(workspace, Workspace) else _list_sampled(workspace)
@@ -51,7 +52,7 @@ def format_workspace(workspace: Workspace | SampledWorkspace, seconds: float, el
             (limit.limit, f"{limit.fraction:.1%}", _format_position(workspace.axes, limit.middle))
             for limit in workspace.bounded_by
         ]
-    if elsewhere is not None and elsewhere.outer > 0.0:
+    if elsewhere is not None and elsewhere.outer >= _NEGLIGIBLE:
         rows.append(("besides", _format_elsewhere(elsewhere, workspace.unit)))
     rows.append(("time", f"{seconds:.1f} s"))
     lines = [head, "", *(f"{name:<8}  {text}" for name, text in rows)]

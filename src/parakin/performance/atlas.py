@@ -168,6 +168,10 @@ def map_performance(
     performance = _compute_in_blocks(region, positions, scale, progress)
     slack = compute_slack(region, positions)
     if not (slack >= 0.0).any():
+        if (compute_slack(region.include_all_components(), positions) >= 0.0).any():
+            raise PoseError(
+                f"step: no place of a grid of {step:g} mm lies on home's side of the parallel singularities"
+            )
         raise PoseError(f"step: no place of a grid of {step:g} mm is allowed, choose a finer one")
     on_grid = _change_columns(performance, lambda column: column.reshape(*shape, *column.shape[1:]))
     return PerformanceMap(region, step, grid, (slack >= 0.0).reshape(shape), slack.reshape(shape), on_grid)

@@ -30,6 +30,8 @@ _FINE = {1: 4096, 2: 512, 3: 128}  # cells along the longest edge, by dimension
 _OUTLINE = 0.2  # fraction of the time for the outline
 _NEAR = 32  # cells of a component from which a path to a position is looked for
 
+ONE_ORIENTATION = "of one turn for each place nothing is known of the turns between; hold or sweep them"
+
 _Pair = tuple["Component", CellComponent]
 
 
@@ -109,7 +111,7 @@ def find_components(
     Raises :class:`PoseError` for an inclusive region, a start outside it, or one that is too near to the boundary.
     """
     if not region.every_orientation:
-        raise PoseError("some: of one turn for each place nothing is known of the turns between; hold or sweep them")
+        raise PoseError(f"some: {ONE_ORIENTATION}")
     if cell is not None and not (isfinite(cell) and cell > 0.0):
         raise PoseError(f"cell: a size above 0 mm expected, not {cell:g}")
     budget, report = Budget(seconds), progress or (lambda fraction: None)

@@ -17,6 +17,7 @@ from ..certified.region import Region
 from .growth import BoxFamily, climb_volume, grow_faces
 from .seeds import COUNT, find_outline_cells, find_seeds
 
+_THINNEST = 1e6  # greatest proportion of a box's edges
 TOLERANCE = 1e-4  # fraction of the region's extent
 _SLIGHTLY_SMALLER = 1.0 - np.array([1e-14, 1e-12, 1e-9, 1e-6])
 _SEARCH, _OUTLINE, _FINAL = 0.7, 0.3, 0.7  # shares of the time: for the search, the outline in it, the last proof
@@ -169,6 +170,8 @@ def _check_shape(region: Region, shape: Sequence[float]) -> Array:
     given = read_vector("shape", shape, region.free_axes, "numbers above 0")
     if not (given > 0.0).all():
         raise PoseError(f"shape: {len(region.free_axes)} numbers above 0 expected, for {' '.join(region.free_axes)}")
+    if given.max() > _THINNEST * given.min():
+        raise PoseError(f"shape: no proportion more than {_THINNEST:,.0f} times another expected")
     return np.asarray(given / given.max())
 
 

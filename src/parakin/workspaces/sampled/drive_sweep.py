@@ -14,10 +14,11 @@ import numpy as np
 
 from ...arguments import check_arguments
 from ...arrays import Array, Progress
+from ...budget import SECONDS, Budget
 from ...errors import NoMethodError, PoseError
 from ...machine import Machine
 from ..certified.region import Region
-from .sampling import SampledWorkspace
+from .sampling import TOO_SLOW, SampledWorkspace
 
 NOTE = (
     "contours and nets show what the drives' limits bound; where another limit does (reach, cones, clearance) they "
@@ -86,7 +87,9 @@ def list_strategies(machine: Machine, running: int) -> list[DriveStrategy]:
 
 
 @check_arguments
-def sweep_drives(region: Region, cells: int = 64, progress: Progress | None = None) -> DriveWorkspace:
+def sweep_drives(
+    region: Region, cells: int = 64, progress: Progress | None = None, seconds: float | None = SECONDS
+) -> DriveWorkspace:
     """Sample the whole workspace of a machine from its drives: cut their ranges into cells and map these forward.
 
     A pose counts where its own inverse in the working mode gives the same drives back and every limit holds. Both
@@ -98,6 +101,7 @@ def sweep_drives(region: Region, cells: int = 64, progress: Progress | None = No
         no axis is fixed, all limits count
     cells : into so many equal parts each drive's range is cut; the volume is summed over their middles
     progress : called with the fraction done
+    seconds : the time in which all must be sampled; None for no end
 
     Raises :class:`NoMethodError` for other machines and drives without limits, :class:`PoseError` for other regions
     and invalid numbers.
@@ -111,7 +115,7 @@ def sweep_drives(region: Region, cells: int = 64, progress: Progress | None = No
         raise PoseError(f"cells: 1 to {int(MOST_CELLS ** (1.0 / d) + 1e-9)} parts of each drive expected, not {cells}")
     step = max((drive.high - drive.low) / cells for drive in machine.drives)
     parameters = {**region.parameters, "method": "drives", "cells": cells}
-    volume = _sum_volume(region, cells, progress)
+    volume = _sum_volume(region, cells, progress, Budget(seconds))
     contours, nets = (_map_strategies(region, list_strategies(machine, running), cells) for running in (1, 2))
     return DriveWorkspace(region, "drives", volume, step, parameters, contours, nets)
 
@@ -165,13 +169,15 @@ def _map_strategies(region: Region, strategies: Sequence[DriveStrategy], cells: 
     return tuple(images)
 
 
-def _sum_volume(region: Region, cells: int, progress: Progress | None) -> float:
+def _sum_volume(region: Region, cells: int, progress: Progress | None, budget: Budget) -> float:
     """Sum |det J| over the middles of the drives' cells, on the sides that count."""
     machine, mode = region.machine, region.mode
     low, high = (np.array([getattr(drive, end) for drive in machine.drives]) for end in ("low", "high"))
     size, d = (high - low) / cells, len(low)
     total = 0.0
     for start in range(0, cells**d, _AT_ONCE):
+        if budget.is_spent():
+            raise PoseError(TOO_SLOW)
         stop = min(start + _AT_ONCE, cells**d)
         index = np.stack(np.unravel_index(np.arange(start, stop), (cells,) * d), 1)
         joints = low + (index + 0.5) * size

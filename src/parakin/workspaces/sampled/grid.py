@@ -11,6 +11,7 @@ import numpy as np
 
 from ...arguments import check_arguments, check_positive, read_corners
 from ...arrays import Array, Flags, Indices, Progress
+from ...budget import SECONDS, Budget
 from ...errors import PoseError
 from ..certified.region import Region
 from ..certified.workspace import BoundingLimit
@@ -104,6 +105,7 @@ def sample_grid(
     box: tuple[Sequence[float], Sequence[float]] | None = None,
     turns_step: float | None = None,
     progress: Progress | None = None,
+    seconds: float | None = SECONDS,
 ) -> GridWorkspace:
     """Sample a region in the middle of every cell of a regular lattice.
 
@@ -114,12 +116,15 @@ def sample_grid(
     box : lower and upper corner, mm, of the cells' middles; by default a box that holds the region
     turns_step : between samples of the swept axes at most, rad, both ends of each range included; 5° by default
     progress : called with the fraction done
+    seconds : the time in which all must be sampled; None for no end
 
-    Raises :class:`PoseError` for invalid numbers, more than 5e8 cells, or a region that neither limits nor a box bound.
+    Raises :class:`PoseError` for invalid numbers, more than 5e8 cells, too little time, or a region that neither limits
+    nor a box bound.
     """
     check_positive("step", step, "mm")
-    finder = BrokenLimitFinder(region, turns_step)
-    bounds = find_bounding_box(region) if box is None else read_corners("box", box, region.free_axes)
+    budget = Budget(seconds)
+    finder = BrokenLimitFinder(region, turns_step, budget)
+    bounds = find_bounding_box(region, budget) if box is None else read_corners("box", box, region.free_axes)
     parameters = {
         **region.parameters,
         "method": "grid",

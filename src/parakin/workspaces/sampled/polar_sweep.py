@@ -9,6 +9,7 @@ import numpy as np
 
 from ...arguments import check_arguments, check_positive, read_vector
 from ...arrays import Array, Progress
+from ...budget import SECONDS, Budget
 from ...errors import PoseError
 from ..certified.region import Region
 from .sampling import (
@@ -72,6 +73,7 @@ def sweep_polar(
     axis: Sequence[float] | None = None,
     turns_step: float | None = None,
     progress: Progress | None = None,
+    seconds: float | None = SECONDS,
 ) -> PolarWorkspace:
     """Sample a region along rays from an axis, in planes of z: ρ grows until the first position that is not allowed.
 
@@ -87,8 +89,10 @@ def sweep_polar(
     axis : the two coordinates of the axis, mm; home's by default
     turns_step : as in :func:`parakin.workspaces.sampled.grid.sample_grid`
     progress : called with the fraction done
+    seconds : the time in which all must be sampled; None for no end
 
-    Raises :class:`PoseError` for invalid numbers, too many rays or steps, or a region that no limit bounds.
+    Raises :class:`PoseError` for invalid numbers, too many rays or steps, too little time, or a region that no limit
+    bounds.
     """
     check_positive("step", step, "mm")
     distance = step if planes is None else check_positive("planes", planes, "mm")
@@ -101,8 +105,9 @@ def sweep_polar(
     home = dict(zip(region.machine.axes, region.machine.home.tolist(), strict=True))
     names = region.free_axes[:2]
     middle = np.array([home[name] for name in names]) if axis is None else read_vector("axis", axis, names)
-    finder = BrokenLimitFinder(region, turns_step)
-    box = find_bounding_box(region)
+    budget = Budget(seconds)
+    finder = BrokenLimitFinder(region, turns_step, budget)
+    box = find_bounding_box(region, budget)
     heights = None
     if len(region.free_axes) == 3:
         heights = np.zeros(0) if box is None else _list_heights(*box, distance, rays)

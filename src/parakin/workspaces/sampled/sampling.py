@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from ...arguments import check_positive
 from ...arrays import Array, Progress
+from ...budget import Budget
 from ...errors import PoseError
 from ...kernels.batch import evaluate_tape, freeze_rows, run_in_threads
 from ...kernels.staged import stage_margins
@@ -27,6 +28,8 @@ LimitCodes = NDArray[Any]  # unsigned: 0 allowed, else 1 + the index in Region.l
 TURNS_STEP = np.deg2rad(5.0)  # between samples of a swept axis, rad
 MOST_TURNS = 1_000_000  # samples of all swept axes together
 _FINE = 16  # cells along the longest side of the box about a region
+_TESTS = 1 << 26  # positions times orientations that are tested at a time
+TOO_SLOW = "seconds: the time is up before all places are sampled; a coarser step or more time is needed"
 _AT_ONCE, _AT_ONCE_SWEPT = 1 << 24, 1 << 18  # positions of a grid, without and with swept axes
 
 
@@ -83,17 +86,20 @@ def sample_orientations(region: Region, step: float | None) -> Array:
     return np.asarray(rows[np.argsort(-off if region.every_orientation else off, kind="stable")])
 
 
-def find_bounding_box(region: Region) -> tuple[Array, Array] | None:
+def find_bounding_box(region: Region, budget: Budget | None = None) -> tuple[Array, Array] | None:
     """Find a box that holds the region closely, (d,) mm each corner; None for a region proved empty.
 
-    Raises :class:`PoseError` if the limits leave it unbounded.
+    Raises :class:`PoseError` if the limits leave it unbounded, or if the budget is spent.
     """
     if region.swept_axes and region.every_orientation:  # what every orientation allows, the middle one does
         region = region.fix({axis: 0.5 * (low + high) for axis, (low, high) in region.swept_axes.items()})
-    box = region.extent
+    box = region.find_extent(budget)
     if box is None:
         return None
-    return region.subdivide(*box).tighten(1.0 / _FINE)
+    closer = region.subdivide(*box).tighten(1.0 / _FINE, budget)
+    if budget is not None and budget.is_spent():
+        raise PoseError(TOO_SLOW)
+    return closer
 
 
 def list_cell_middles(low: float, high: float, step: float) -> Array:
@@ -107,10 +113,12 @@ class BrokenLimitFinder:
 
     If all orientations count, it is the first one broken at the first sampled orientation that breaks one; if one is
     enough and all samples break one, it is that of the sample nearest the middle.
+
+    Raises :class:`PoseError` where the budget is spent before all is sampled, for the rest is not known.
     """
 
-    def __init__(self, region: Region, turns_step: float | None = None):
-        self.region = region
+    def __init__(self, region: Region, turns_step: float | None = None, budget: Budget | None = None):
+        self.region, self.budget = region, budget or Budget(None)
         self.orientations = sample_orientations(region, turns_step)
         margins = [constraint.margin for constraint in region.constraints if not constraint.implied]
         trace = region.traced_pose.inputs[0].trace
@@ -128,7 +136,9 @@ class BrokenLimitFinder:
         codes, every = np.zeros(len(positions), self._type), True
         undecided, start = np.arange(len(positions)), 0
         while start < len(self.orientations) and len(undecided):
-            stop = 4 * start or 1
+            if self.budget.is_spent():
+                raise PoseError(TOO_SLOW)
+            stop = min(4 * start or 1, start + max(1, _TESTS // len(undecided)))
             rows, own_codes = np.ascontiguousarray(positions[undecided]), codes[undecided]
             args = (self._program, freeze_rows(rows), freeze_rows(self._fixed[start:stop]), every, own_codes)
             run_in_threads(len(rows), lambda a, b: sweep_turns(*args, a, b))  # noqa: B023  done within the loop's turn
@@ -147,6 +157,8 @@ class BrokenLimitFinder:
         grid = (np.concatenate(coordinates), np.array(shape))
         at_once = _AT_ONCE if not self.region.swept_axes else _AT_ONCE_SWEPT
         for start, stop in pairwise([*range(0, len(flat), at_once), len(flat)]):
+            if self.budget.is_spent():
+                raise PoseError(TOO_SLOW)
             if self.region.swept_axes:
                 index = np.unravel_index(np.arange(start, stop), shape)
                 flat[start:stop] = self.find_at(np.stack([x[i] for x, i in zip(coordinates, index, strict=True)], 1))

@@ -7,6 +7,7 @@ import math
 import os
 import random
 import re
+import resource
 import shutil
 import subprocess
 from dataclasses import dataclass, field
@@ -23,6 +24,7 @@ pytestmark = pytest.mark.skipif(shutil.which("rs274") is None, reason="LinuxCNC'
 COUNT = int(os.environ.get("PARAKIN_PROGRAMS", "1500"))
 TOOLS = {1: 12.5, 2: 40.0, 3: 101.6, 7: 0.5}
 INCH = 25.4
+SECONDS = 3  # of the processor for a program; a few never end
 _CALL = re.compile(r"N\.*\s*\d*\s*([A-Z_0-9]+)\((.*)\)")
 # what is refused here and read there, or has no value there that this file tells
 HOME, OTHER_HOME = (3.0, -7.0, 60.0, 0.0, 0.0, 0.0), (-5.0, 8.0, 70.0, 10.0, 20.0, -30.0)
@@ -51,17 +53,21 @@ def set_homes(text, unit):
     return text.replace(HOMES, " ".join(words))
 
 
+def limit_time():
+    """Limit a process to seconds of the processor, however busy the computer is."""
+    resource.setrlimit(resource.RLIMIT_CPU, (SECONDS, SECONDS))
+
+
 def run_rs274(text, folder):
     text = set_homes(text, INCH)
     (folder / "part.ngc").write_text(text)
     (folder / "tool.tbl").write_text("".join(f"T{n} P{n} Z{z / INCH:.8f} D0\n" for n, z in TOOLS.items()))
     with (folder / "canon").open("w+") as output:
-        try:
-            run = subprocess.run(
-                ["rs274", "-g", "-t", "tool.tbl", "part.ngc"], cwd=folder, env={**os.environ, "HOME": str(folder)},
-                stdout=output, stderr=subprocess.PIPE, text=True, timeout=3, stdin=subprocess.DEVNULL,
-            )  # fmt: skip
-        except subprocess.TimeoutExpired:
+        run = subprocess.run(
+            ["rs274", "-g", "-t", "tool.tbl", "part.ngc"], cwd=folder, env={**os.environ, "HOME": str(folder)},
+            stdout=output, stderr=subprocess.PIPE, text=True, stdin=subprocess.DEVNULL, preexec_fn=limit_time,
+        )  # fmt: skip
+        if run.returncode < 0:
             return Canon(error="it never ends")
         output.seek(0)
         lines = output.readlines()

@@ -127,7 +127,7 @@ def test_loops_of_plain_lines_are_read_fast(read):
 @pytest.mark.parametrize(
     ("text", "line", "words"),
     [
-        ("o1 while [1]\no1 endwhile\n", 3, ["50000 blocks"]),
+        ("o1 while [1]\n#1=2\no1 endwhile\n", 2, ["50000 blocks"]),
         ("o1 repeat [99999999]\nX1\nX2\no1 endrepeat\n", 3, ["50000 blocks"]),
         ("o1 sub\no1 call\no1 endsub\no1 call\n", 3, ["9 deep"]),
         ("o1 call\n", 2, ["O1 call", "not in this file"]),
@@ -370,3 +370,31 @@ RIGHT = [
 def test_small_files(tmp_path, name, text, end):
     (tmp_path / f"{name}.nc").write_text(text)
     np.testing.assert_allclose(read_gcode(tmp_path / f"{name}.nc", arc_tolerance=0.1).tip[-1], end, atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    "loop",
+    [
+        "o1 while [#1 GT 3]\nX1\no1 endwhile",
+        "o1 do\nX1\no1 while [1]",
+        "o1 while [1]\no2 if [#1 LT 9]\no1 continue\no2 endif\no1 endwhile",
+    ],
+)
+def test_a_loop_that_sets_nothing_never_ends(read, loop):
+    start = time.process_time()
+    with pytest.raises(InputError, match="never ends"):
+        read("G0 X0 Y0 Z0\n#1=5\n" + loop + "\nM2\n")
+    assert time.process_time() - start < 1.0
+
+
+@pytest.mark.parametrize(
+    ("loop", "count"),
+    [
+        ("o1 repeat [3]\no2 while [1]\nX1\no2 break\no2 endwhile\no1 endrepeat", 4),
+        ("o1 repeat [3]\no2 do\nX1\no2 break\no2 while [1]\no1 endrepeat", 4),
+        ("G91\no1 while [#5420 LT 3]\nX1\no1 endwhile", 4),
+        ("o1 repeat [3]\no2 while [0]\nX1\no2 endwhile\nX2\no1 endrepeat", 4),
+    ],
+)
+def test_loops_that_end_without_setting_a_parameter(read, loop, count):
+    assert len(read("G0 X0 Y0 Z0\n" + loop + "\nM2\n")) == count

@@ -22,6 +22,8 @@ from .posting.tool_lengths import fit_tool_lengths
 from .timing import Corners, Trajectory, plan_trajectory
 from .timing.stops import find_stops, sum_dwells
 
+_MOST_TIMED = 50_000  # records of a path that is off limits: no program is made of it, and its time would take minutes
+
 
 class Tolerances(NamedTuple):
     """How far the tool may be off the programmed path: its tip, mm, and its axis, rad."""
@@ -129,6 +131,8 @@ def prepare(
     except PoseError as error:
         unplanned = str(error)
     posted = check_path(posted, progress=report_part(0.4, 0.6))
+    if posted.first is not None and len(posted.path) > _MOST_TIMED:
+        unplanned = unplanned or f"off limits, and more than {_MOST_TIMED:,} records"
     if not unplanned:
         try:
             trajectory = plan_trajectory(

@@ -105,13 +105,13 @@ class ClActions:
         self.motion.move_to((x + v[0], y + v[1], z + v[2]), v[3:], line)
 
     def start_from(self, args: list[str], line: int) -> None:
-        """Start at a point (FROM)."""
+        """Start at a point; one that is not the file's first is reached in rapid (FROM)."""
         v = parse_numbers(args, (3, 6), _POINT_FORM)
         self._refuse_in_cycle_or_circle()
         if v[3:]:
             self.motion.axis = self.motion.normalize_axis(v[3:], line)
         self.motion.close_arc(None)
-        self.motion.add_record((v[0], v[1], v[2]), line, rapid=False)
+        self.motion.add_record((v[0], v[1], v[2]), line, rapid=self.motion.records.n > 0)
         self.motion.tangent = None
 
     def set_rapid(self, args: list[str], line: int) -> None:

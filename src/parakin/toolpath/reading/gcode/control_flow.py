@@ -38,11 +38,17 @@ class ControlLine:
 
 @dataclass
 class Label:
-    """Where an O word with a label stands that others refer to: its word and line's index, and repeats left."""
+    """Where an O word with a label stands that others refer to.
+
+    word, index : its word and its line's index
+    repeats : how many are left
+    changes : of parameters, when a while was last true in a loop that goes on; -1 outside of it
+    """
 
     word: str
     index: int
     repeats: int = -1
+    changes: int = -1
 
 
 def find_control(text: str, parameters: Parameters) -> ControlLine | None:
@@ -181,6 +187,11 @@ class ControlFlow:
 
     def _test_while(self, known: Label | None, label: str, index: int, value: float) -> int:
         self.skipping = None
+        if known is not None:
+            goes_on = value != 0.0 and not self._breaking
+            if goes_on and known.changes == self.parameters.changes:
+                refuse("a loop that never ends: nothing in it sets a parameter")
+            known.changes = self.parameters.changes if goes_on else -1
         if known is not None and known.word == "do":
             if value != 0.0 and not self._breaking:
                 return known.index
@@ -203,7 +214,10 @@ class ControlFlow:
 
     def _end_loop(self, known: Label | None, label: str, index: int, value: float) -> int:
         skipped, self.skipping = self.skipping is not None, None
-        if known is None or (skipped and not self._continuing):
+        if known is None:
+            return index + 1
+        if skipped and not self._continuing:
+            known.changes = -1
             return index + 1
         if skipped:
             self._continuing = False

@@ -24,6 +24,7 @@ class Parameters:
     def __init__(self, notes: NoteBook):
         self.readers: dict[Key, Callable[[], float]] = {}
         self.line = 0  # the line being read, for the notes
+        self.changes = 0  # how often a parameter was set, or one read that changes by itself
         self._notes = notes
         self._numbered: dict[int, float] = {}
         self._global: dict[str, float] = {}
@@ -34,6 +35,7 @@ class Parameters:
         """Return a parameter's value; a number never set is zero, a name never set is refused."""
         reader = self.readers.get(key)
         if reader is not None:
+            self.changes += 1
             value = reader()
             if math.isnan(value):
                 refuse(f"{_write_key(key)} is read, but its value is not known from this file")
@@ -56,6 +58,7 @@ class Parameters:
 
     def assign(self, key: Key, value: float) -> None:
         """Set a parameter; refuse those that the control alone sets."""
+        self.changes += 1
         if isinstance(key, int):
             self._check_number(key)
             if key in self.readers or (key >= _KEPT_FROM and key not in _SETTABLE):
@@ -75,6 +78,7 @@ class Parameters:
 
     def enter(self, arguments: list[float]) -> None:
         """Begin a subroutine: parameters 1 to 30 are its arguments, and its names are its own."""
+        self.changes += 1
         if len(self._saved) >= DEEPEST_CALLS - 1:
             refuse(f"subroutines that call one another more than {DEEPEST_CALLS - 1} deep")
         self._saved.append([self._numbered.get(k) for k in range(1, ARGUMENTS + 1)])

@@ -14,6 +14,7 @@ import pytest
 import parakin as pk
 from parakin.cli import main
 from parakin.controllers import load_controller
+from parakin.controllers.joints.feeds import Feed, invert_minutes, keep_seconds, measure_speed
 from parakin.controllers.joints.look_ahead import predict_planned_seconds, stretch_for_buffer
 from parakin.toolpath.path import Event, ToolPath
 from parakin.toolpath.posting.post import post_path
@@ -298,6 +299,45 @@ def test_forced_its_head_says_so(target):
 def test_more_joints_than_axes(jobs):
     with pytest.raises(pk.PoseError, match="tricept has 3 linear and 2 turning joints; grbl has letters for 3 in all"):
         text_of(jobs("tricept").trajectory, "grbl")
+
+
+@pytest.mark.parametrize(
+    ("source", "name"),
+    [("a/teil 7.cls", "TEIL_7"), ("7.cls", "P_7"), ("ä" * 40, "P_" + 24 * "_")],
+)
+def test_programs_have_names_that_controls_take(source, name):
+    trajectory = square([])
+    path = replace(trajectory.posted.path, source=source)
+    named = replace(trajectory, posted=replace(trajectory.posted, path=path))
+    assert text_of(named, "siemens").startswith(f"%_N_{name}_MPF\n")
+    assert text_of(named, "heidenhain").endswith(f"END PGM {name} MM\n")
+    assert f"O0001 ({name.replace('_', ' ')})" in text_of(named, "fanuc").replace("_", " ")
+
+
+def test_what_can_not_be_a_program_still_has_a_table_and_a_report(tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    Path("part.ngc").write_text(GOLDEN, encoding="ascii")
+    for machine, target, why in (
+        ("linear_delta", "beckhoff", "part.ngc:9: a table of positions has no place for M9 on the way"),
+        ("tricept", "grbl", "tricept has 3 linear and 2 turning joints; grbl has letters for 3 in all"),
+    ):
+        place = ["--workpiece", "0,0,-1880"] if machine == "tricept" else []
+        assert main(["post", "part.ngc", "-m", machine, "-o", machine, "--target", target, *place]) == 3
+        assert f"no program: {why}" in capsys.readouterr().out
+        assert sorted(path.name for path in Path(machine).iterdir()) == ["part.joints.csv", "part.report.html"]
+
+
+def test_a_motion_that_is_slower_than_a_word_can_say():
+    slow = Feed("FT", keep_seconds, 3, 999.999, "", grows=True)
+    assert slow.compute_values(np.ones(3), np.array([0.0012, 999.999, 2.0])).tolist() == [0.002, 999.999, 2.0]
+    with pytest.raises(pk.PoseError, match="takes 1000 s, which is slower than FT can say"):
+        slow.compute_values(np.ones(2), np.array([1.0, 1000.0]))
+    inverse = Feed("F", invert_minutes, 3, 9999.999, "")
+    assert inverse.compute_values(np.ones(3), np.array([4.0, 0.001, 7.0])).tolist() == [15.0, 9999.999, 8.571]
+    with pytest.raises(pk.PoseError, match="slower than F can say"):
+        inverse.compute_values(np.ones(1), np.array([70000.0]))
+    speed = Feed("F", measure_speed, 3, 99999.0, "")
+    assert speed.compute_values(np.array([1.0, 2.0]), np.array([0.07, 0.001])).tolist() == [857.142, 99999.0]
 
 
 # Buffers and planners

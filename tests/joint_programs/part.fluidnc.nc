@@ -3,6 +3,7 @@
 ( 0.306 s from the first record on, 4.0 s to it )
 ( F is the inverse of minutes )
 ( max_rate_mm_per_min and acceleration_mm_per_sec2: speeds and accelerations of the joints, mm or degrees )
+( M7 and M8 act only where coolant is configured, M4 only where the spindle can be reversed )
 ( part zero at X 0 Y 0 Z 0 in the machine )
 ( the tool: 80 mm from the spindle's nose to its tip, the machine's own length )
 G21G90G17G40G49

@@ -19,7 +19,7 @@ from ..arrays import Array, Writer
 from ..errors import PoseError
 from ..toolpath.posting.setup_texts import describe_setup
 from ..toolpath.timing.trajectory import Trajectory
-from .controller import Controller, ControllerRun
+from .controller import Controller, ControllerRun, refuse_run
 from .event_commands import Command, list_commands
 from .gcode_text import DIGITS, make_plain, to_display
 
@@ -28,10 +28,20 @@ _CHUNK = 1 << 14  # lines written at a time
 
 
 def _build_run(trajectory: Trajectory) -> ControllerRun:
-    """Build how TwinCAT runs a trajectory; refuse what would have to be switched on the way."""
-    path = trajectory.posted.path
-    commands = list_commands(path, [event.record for event in path.events])
-    parted, corner = trajectory.curve.parted, trajectory.curve.corner_of_record
+    """Build how TwinCAT runs a trajectory; there is no table for what would have to be switched on the way."""
+    try:
+        commands = _list_commands(trajectory)
+    except PoseError as error:
+        return refuse_run(error)
+    return ControllerRun(lambda forced, tolerance: _make_writer(trajectory, commands, forced))
+
+
+def _list_commands(trajectory: Trajectory) -> dict[int, list[Command]]:
+    """List what the path says besides motion, by the number of records before it; 0 and all at the table's ends."""
+    path, parted, corner = trajectory.posted.path, trajectory.curve.parted, trajectory.curve.corner_of_record
+    reached = [int(corner[event.record - 1]) if event.record else -1 for event in path.events]
+    ends = {-1: 0, 0: 0, int(corner[-1]): len(path)}
+    commands = list_commands(path, [ends.get(at, e.record) for at, e in zip(reached, path.events, strict=True)])
     for place in sorted(set(commands) & set(range(1, len(path)))):
         for command in commands[place]:
             where = f"{path.source}:{command.line}"
@@ -39,7 +49,7 @@ def _build_run(trajectory: Trajectory) -> ControllerRun:
                 raise PoseError(f"{where}: a table of positions has no place for {command.text} on the way")
             if command.kind == "dwell" and not parted[corner[place - 1]]:
                 raise PoseError(f"{where}: the trajectory does not stand still where the program waits")
-    return ControllerRun(lambda forced, tolerance: _make_writer(trajectory, commands, forced))
+    return commands
 
 
 def _make_writer(trajectory: Trajectory, commands: dict[int, list[Command]], forced: str | None) -> Writer:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from ..arrays import Writer
+    from ..errors import PoseError
     from ..toolpath.linearise.deviation import Interpolation
     from ..toolpath.path import Note
     from ..toolpath.timing.trajectory import Trajectory
@@ -27,6 +28,15 @@ class ControllerRun:
     make_program: Callable[[str | None, float], Writer]
     seconds: float | None = None
     notes: tuple[Note, ...] = ()
+
+
+def refuse_run(error: PoseError) -> ControllerRun:
+    """Return the run of a trajectory that a controller can't run: its program is refused for a reason."""
+
+    def make_program(forced: str | None, tolerance: float) -> Writer:
+        raise error
+
+    return ControllerRun(make_program)
 
 
 @dataclass(frozen=True)

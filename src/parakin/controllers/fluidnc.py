@@ -20,7 +20,10 @@ _LINE_SECONDS = 0.008  # 92 characters of ten bits at 115,200 baud
 DIALECT = replace(
     grbl.DIALECT,
     title="FluidNC",
-    notes=("max_rate_mm_per_min and acceleration_mm_per_sec2: speeds and accelerations of the joints, mm or degrees",),
+    notes=(
+        "max_rate_mm_per_min and acceleration_mm_per_sec2: speeds and accelerations of the joints, mm or degrees",
+        "M7 and M8 act only where coolant is configured, M4 only where the spindle can be reversed",
+    ),
     axes=AxisLetters("XYZABC", "XYZABC"),
     longest=254,
     message="(MSG,{})",

@@ -17,7 +17,7 @@ from .siemens import replace_quotes
 DIALECT = JointDialect(
     title="Heidenhain TNC",
     feed=Feed("F", measure_speed, 3, 99999.0, "F is mm or degrees a minute"),
-    mixed_feed=Feed("FT", keep_seconds, 3, 999.999, "FT is seconds, a word of the iTNC 530"),
+    mixed_feed=Feed("FT", keep_seconds, 3, 999.999, "FT is seconds, a word of the iTNC 530", grows=True),
     begin=("BEGIN PGM {name} MM",),
     motion="L {axes} R0 {feed} M91",
     end=("M30", "END PGM {name} MM"),

@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...arrays import Array
+from ...errors import PoseError
 
 
 class Feed(NamedTuple):
@@ -18,6 +19,7 @@ class Feed(NamedTuple):
     digits : after the point
     most : the greatest value that the control takes
     text : what it is, for the program's head
+    grows : whether the value grows with the time, not with the speed
     """
 
     word: str
@@ -25,16 +27,22 @@ class Feed(NamedTuple):
     digits: int
     most: float
     text: str
+    grows: bool = False
 
     def compute_values(self, lengths: Array, seconds: Array) -> Array:
-        """Compute the values as they are printed, rounded so that no block becomes faster."""
+        """Compute the values as they are printed, rounded so that no block becomes faster.
+
+        Raises :class:`PoseError` for a block that is slower than the word can say.
+        """
         scale = 10.0**self.digits
         exact = self.convert(lengths, seconds)
-        near = np.rint(exact * scale) / scale
-        printed = np.abs(near - exact) < 1e-9 * exact  # 15.0 is told as 15.000, not as 14.999
-        faster_up = self.convert(lengths, exact * 1.01) < self.convert(lengths, exact)
-        rounded = np.where(faster_up, np.floor(exact * scale), np.ceil(exact * scale)) / scale
-        return np.minimum(np.where(printed, near, rounded), self.most)
+        near = np.rint(exact * scale) / scale  # 15.0 is told as 15.000, not as 14.999
+        slower = (np.ceil if self.grows else np.floor)(exact * scale) / scale
+        values: Array = np.where(np.abs(near - exact) < 1e-9 * exact, near, slower)
+        unsaid = values > self.most if self.grows else values <= 0.0
+        if unsaid.any():
+            raise PoseError(f"a motion takes {seconds[unsaid].max():.6g} s, which is slower than {self.word} can say")
+        return np.minimum(values, self.most)
 
     def compute_seconds(self, lengths: Array, values: Array) -> Array:
         """Compute what blocks take whose words have these values."""

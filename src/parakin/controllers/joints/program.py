@@ -13,11 +13,12 @@ import numpy as np
 
 from ...arguments import check_arguments
 from ...arrays import Array, Writer
+from ...errors import PoseError
 from ...toolpath.path import Note
 from ...toolpath.posting.setup_texts import describe_setup
 from ...toolpath.timing.drive_limits import DriveLimits
 from ...toolpath.timing.trajectory import Trajectory
-from ..controller import Controller, ControllerRun
+from ..controller import Controller, ControllerRun, refuse_run
 from ..event_commands import Command
 from ..gcode_text import CHUNK, join_lines, to_display
 from .dialect import JointDialect
@@ -80,9 +81,12 @@ def make_joint_program(trajectory: Trajectory, *, forced: str | None = None) -> 
 def build_joint_run(trajectory: Trajectory, dialect: JointDialect) -> ControllerRun:
     """Build how a control runs a trajectory as straight motions of the joints.
 
-    Raises :class:`PoseError` for more joints than axes, and for what the control has no word for.
+    There is no program for more joints than axes, and for what the control has no word for.
     """
-    program = _build_program(trajectory, dialect)
+    try:
+        program = _build_program(trajectory, dialect)
+    except PoseError as error:
+        return refuse_run(error)
     seconds, notes = program.seconds, list[Note]()
     if dialect.buffer > 1:
         seconds = _predict_seconds(program)
@@ -139,7 +143,7 @@ def _number_lines(texts: Iterator[str]) -> Iterator[str]:
 
 def _format_program(program: _Program, forced: str | None) -> Iterator[str]:
     dialect, motions, source = program.dialect, program.motions, program.trajectory.posted.path.source
-    name = re.sub(r"\W", "_", PurePath(source).stem, flags=re.ASCII)[:24].upper()
+    name = _name_program(source)
 
     def format_commands(commands: list[Command]) -> str:
         return join_lines(line for command in commands for line in dialect.format_command(command, source))
@@ -159,6 +163,12 @@ def _format_program(program: _Program, forced: str | None) -> Iterator[str]:
         for start in range(begin, end, CHUNK):
             yield (dialect.exact if begin in exact else "") + _format_blocks(program, start, min(start + CHUNK, end))
     yield join_lines(line.format(name=name) for line in dialect.end)
+
+
+def _name_program(source: str) -> str:
+    """Name a program after its file: capitals, digits and underscores, two letters first."""
+    name = re.sub(r"\W", "_", PurePath(source).stem, flags=re.ASCII)[:24].upper()
+    return name if re.match("[A-Z]{2}", name) else f"P_{name}"
 
 
 def _format_blocks(program: _Program, begin: int, end: int) -> str:

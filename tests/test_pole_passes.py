@@ -9,6 +9,9 @@ from scipy.spatial.transform import Rotation
 
 import parakin as pk
 from parakin.toolpath.linearise.linearise import linearise_path
+from parakin.toolpath.linearise.pole_steps import PoleSteps
+from parakin.toolpath.linearise.pole_swings import note_swings
+from parakin.toolpath.linearise.poles import find_poles
 from parakin.toolpath.posting.post import post_path
 
 
@@ -105,3 +108,14 @@ def test_a_corner_on_the_pole_is_told():
     assert [note.text for note in result.path.notes] == [
         "theta1 turns by 90° at the head's pole, the tool held 0.011° beside it; the tip stands still"
     ]
+
+
+def test_a_step_longer_than_the_travel_over_which_a_swing_is_measured():
+    pole = find_poles(pk.load("tricept"), "pose", False)[0]
+    first, last = np.array([[-0.15, 0.005]]), np.array([[0.15, 0.005]])
+    zero, one = np.zeros(1), np.ones(1)
+    steps = PoleSteps(np.array([1]), zero, one, first, last, np.array([False]), 0.005 * one, 0.5 * one)
+    path = path_of(np.zeros((2, 3)), np.tile([0.0, 0.0, 1.0], (2, 1)))
+    (note,) = note_swings(pole, path, steps, [])
+    turn = 2.0 * math.degrees(math.atan(0.15 / 0.005))  # over 0.3 of travel, of which 0.1 counts
+    assert f"theta1 swings {turn / 3.0:.0f}°" in note.text

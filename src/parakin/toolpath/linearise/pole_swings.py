@@ -50,8 +50,10 @@ def note_swings(pole: Pole, path: ToolPath, steps: PoleSteps, led: Sequence[tupl
     for group in np.split(swinging, np.flatnonzero((np.diff(swinging) > 1) | ~steps.joined[swinging[1:]]) + 1):
         if len(group):
             nearest = group[steps.nearest[group].argmin()]
-            window = slice(*np.searchsorted(at, [middle[nearest] - TRAVEL, middle[nearest] + TRAVEL]))
-            most = max(float(swing[group].max()), float(np.ptp(angle[window])))
+            first, last = np.searchsorted(at, [middle[nearest] - TRAVEL, middle[nearest] + TRAVEL])
+            most = float(swing[group].max())
+            if first < last:  # a single step may be longer
+                most = max(most, float(np.ptp(angle[first:last])))
             if most > REPORTED:
                 line = int(path.line[steps.record[nearest]])
                 notes.append(_describe_swing(pole, line, float(steps.nearest[nearest]), most))
@@ -79,7 +81,7 @@ def note_swings_of_passes(passes: Sequence[PolePass], posted: Posted, positions:
     notes, passed = [], positions.passed
     for pole_pass in passes:
         begin, end = pole_pass.begin, pole_pass.end
-        rows = np.flatnonzero((passed >= begin - _SAME_PLACE) & (passed <= end + _SAME_PLACE))
+        rows = np.arange(*np.searchsorted(passed, [begin - _SAME_PLACE, np.nextafter(end + _SAME_PLACE, np.inf)]))
         if len(rows) < 3:
             first, last = np.searchsorted(passed, [begin, end])
             rows = np.arange(max(first - 1, 0), min(last + 1, len(passed)))

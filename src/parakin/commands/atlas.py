@@ -130,18 +130,18 @@ def _parse_pose(region: Region, text: str) -> Array:
     """Parse a pose; axes that are not named are as in the region, else as at home."""
     machine = region.machine
     home = machine.home[[machine.axes.index(axis) for axis in region.free_axes]]
-    parts = [part.strip() for part in text.split(",")]
-    return parse_row(parts, machine.axes, machine.axis_units, region.poses(home[None])[0], "--pose")
+    words = [word.strip() for word in text.split(",")]
+    return parse_row(words, machine.axes, machine.axis_units, region.poses(home[None])[0], "--pose")
 
 
 def _cut_region(region: Region, slices: Sequence[str]) -> list[Region]:
     """Cut the slices to map: those of --slice, else one through home, or all of a region that is flat already."""
     machine, cuts = region.machine, []
     for text in slices:
-        parts = split_axes(machine, text, "--slice", "Z=-100")
-        if len(parts) != 1:
+        values = split_axes(machine, text, "--slice", "Z=-100")
+        if len(values) != 1:
             raise InputError(f"{quote(text)}: one axis and its value expected", "--slice")
-        ((axis, value),) = parts.items()
+        ((axis, value),) = values.items()
         if axis not in region.free_axes or len(region.free_axes) < 2:
             raise InputError(f"{axis} is no place to cut at, {' '.join(region.free_axes)} are left", "--slice")
         cuts.append((axis, parse_value(axis, value, "--slice")))
@@ -232,16 +232,16 @@ class _AtlasResults:
         if json:
             print_json(self._encode(written))
             return
-        parts = []
+        paragraphs = []
         if self.performance is not None:
-            parts.append(format_performance(self.performance, self.broken_limit))
+            paragraphs.append(format_performance(self.performance, self.broken_limit))
         if self.ranges:
-            parts.append(format_proofs(self.machine, self.ranges, self.proofs, self.brackets))
+            paragraphs.append(format_proofs(self.machine, self.ranges, self.proofs, self.brackets))
         if self.atlas is not None:
-            parts.append(format_atlas(self.atlas))
+            paragraphs.append(format_atlas(self.atlas))
         if written:
-            parts.append("\n".join(f"{kind:<7} {path}" for kind, path in written.items()))
-        print_text("\n\n".join(parts))
+            paragraphs.append("\n".join(f"{kind:<7} {path}" for kind, path in written.items()))
+        print_text("\n\n".join(paragraphs))
 
     def _encode(self, written: dict[str, str]) -> dict[str, Any]:
         machine, fixed = self.machine, self.region.fixed_axes

@@ -73,13 +73,13 @@ def prepare_part(
     from ..toolpath.placing.placement import find_placements
 
     saying = progress.stage("placing the part", 0.1, 0.3)
-    found = find_placements(machine, path, parse_bounds(place), mode=options.mode, progress=saying)
+    placements = find_placements(machine, path, parse_bounds(place), mode=options.mode, progress=saying)
     prepared = []
-    for placement in found:
-        part = _prepare_at(machine, path, placement.workpiece, options, progress, placement)
-        prepared.append(part)
-        if part.job.runs:
-            return part
+    for placement in placements:
+        prepared_part = _prepare_at(machine, path, placement.workpiece, options, progress, placement)
+        prepared.append(prepared_part)
+        if prepared_part.job.runs:
+            return prepared_part
     return prepared[0]
 
 

@@ -91,7 +91,7 @@ def parse_axis_ranges(machine: Machine, text: str | None, source: str) -> dict[s
 
     ranges = {}
     for axis, value in split_axes(machine, text, source, "A=-15:15,B=-15:15").items():
-        low, colon, high = (part.strip() for part in value.partition(":"))
+        low, colon, high = (word.strip() for word in value.partition(":"))
         if not (low and colon and high):
             raise InputError(f"{axis}: expected a range LOW:HIGH, such as -15:15", source)
         ranges[axis] = (parse_value(axis, low, source), parse_value(axis, high, source))

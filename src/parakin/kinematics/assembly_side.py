@@ -61,9 +61,9 @@ def find_own_sides(model: Model, joints: Array, starts: Array, mode: str) -> Arr
     """Find on which side of their own spheres' centres starts lie, (N, 1), by its sign; NaN out of reach."""
     sides = evaluate_tape(model.own_side_tape(mode), starts, np.empty((len(starts), 1)))
     if model.structure.branches:
-        some = np.empty_like(starts)  # either common point: head and table alone turn the tool
-        evaluate_tape_with_residual(model.spheres_tape(None), joints, some, starts)
-        nearer = _is_in_other_head_mode(model, some, joints, mode)
+        common = np.empty_like(starts)  # either common point: head and table alone turn the tool
+        evaluate_tape_with_residual(model.spheres_tape(None), joints, common, starts)
+        nearer = _is_in_other_head_mode(model, common, joints, mode)
         others = evaluate_tape(model.own_side_tape(flip_mode(mode)), starts, np.empty((len(starts), 1)))
         sides[nearer] = others[nearer]
     return sides

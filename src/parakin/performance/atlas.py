@@ -211,11 +211,11 @@ def _compute_in_blocks(
     region: Region, positions: Array, length: CharacteristicLength, progress: Progress | None
 ) -> Performance:
     """Compute the performance at positions (N, d), a block at a time."""
-    parts = []
+    blocks = []
     for start in range(0, len(positions), _AT_ONCE):
         poses = region.poses(positions[start : start + _AT_ONCE])
-        parts.append(compute_performance(region.machine, poses, length.value, region.mode))
+        blocks.append(compute_performance(region.machine, poses, length.value, region.mode))
         if progress:
             progress(min(1.0, (start + len(poses)) / len(positions)))
-    columns: dict[str, Any] = {name: np.concatenate([getattr(part, name) for part in parts]) for name in _COLUMNS}
-    return replace(parts[0], length=length, **columns)
+    columns: dict[str, Any] = {name: np.concatenate([getattr(block, name) for block in blocks]) for name in _COLUMNS}
+    return replace(blocks[0], length=length, **columns)

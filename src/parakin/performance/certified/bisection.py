@@ -77,11 +77,11 @@ def decide_regular(bounds: MatrixBounds, first: Array) -> Callable[[Array, Array
         matrices = bounds(low, high)
         decided, axis = np.zeros(len(low), np.bool_), find_widest_inputs(low, high, first)
         inverse, good = invert_middles(matrices)
-        part = matrices.take(good).multiply_left(inverse)
-        off = bound_inverse_error(part, matrices.take(good), inverse)
-        decided[good] = _bound_spectral_radius(off + part.linear_change + part.rest) < 1.0 - _ROUNDING
+        scaled = matrices.take(good).multiply_left(inverse)
+        off = bound_inverse_error(scaled, matrices.take(good), inverse)
+        decided[good] = _bound_spectral_radius(off + scaled.linear_change + scaled.rest) < 1.0 - _ROUNDING
         if len(first):
-            axis[good] = part.widest
+            axis[good] = scaled.widest
         return decided, axis
 
     return decide

@@ -186,7 +186,7 @@ class LinearMatrices:
     @property
     def widest(self) -> Indices:
         """The input that changes the matrix most, (N,)."""
-        sizes = (np.sqrt(np.square(part).sum((2, 3))) for part in (self.slopes, self.spread))
+        sizes = (np.sqrt(np.square(changes).sum((2, 3))) for changes in (self.slopes, self.spread))
         return np.asarray((self.half * sum(sizes)).argmax(1))
 
 

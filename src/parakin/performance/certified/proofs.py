@@ -35,7 +35,7 @@ class Proof:
     counterexample : (axes,) a pose at which a refuted claim fails; of an undecided one the middle of an undecided part
     reason : why it is not proved, in a line
     brackets : of the least and the greatest amplification, if the claim is on them
-    boxes : how many parts of the box were examined
+    boxes : how many sub-boxes of the box were examined
     tolerance : relative; a bound is kept if it is not exceeded by more
     """
 

@@ -56,8 +56,8 @@ def judge_singularities(region: Region, budget: Budget | None = None) -> tuple[R
     The parallel one is judged in all assembly modes, for it is what separates them; the serial ones in the region's.
 
     A margin is positive all over where no cell of a subdivision can hold an allowed position at which it is not, but
-    for cells that are apart from home's part. It changes its sign where cells proved inside hang together, by faces,
-    and intervals prove both signs among them. What the budget leaves open is unproved.
+    for cells that are apart from home's component. It changes its sign where cells proved inside hang together, by
+    faces, and intervals prove both signs among them. What the budget leaves open is unproved.
     """
     names, budget = list_margin_names(region.machine), budget or Budget()
     extent, whole = region.find_extent(budget), region.include_all_components()
@@ -166,7 +166,7 @@ def _is_apart(left: Cells, joined: Cells) -> bool:
 
 
 def _find_sign_change(region: Region, positive: Constraint, cells: Cells, component: Indices) -> Array | None:
-    """Find a pose where a margin is proved to be below zero, in the part that holds home or where it changes sign."""
+    """Find a pose with a margin proved to be below zero, in the component that holds home or where it changes sign."""
     if not len(cells.low):
         return None
     middle = cells.low + 0.5 * cells.size

@@ -113,17 +113,17 @@ def _lead_unless_refused(
             routes.append(route)
             led.passes.append(pole_pass)
         crossings.append(_Crossings(pole, steps, [route for route in routes if route.crossing >= 0 or route.rays]))
-        held: list[PoleHold] = []
+        holds: list[PoleHold] = []
         if not inclined:
             taken_stretches = Stretches([*led.passes, *(hold.located for hold in led.holds)])
             for hold in find_pole_holds(pole, posted, programmed, steps, routes, deviation.angle):
                 is_free = (axis[hold.record] == programmed.axis[hold.record]).all()
                 if hold.key not in refused and is_free and taken_stretches.is_apart(hold.located):
                     axis[hold.record] = hold.axis
-                    held.append(hold)
-        led.holds += held
-        taken = [*(route.steps for route in routes), *find_held_steps(steps, led.holds)]
-        led.notes += [*note_swings(pole, posted.path, steps, taken), *note_holds(held)]
+                    holds.append(hold)
+        led.holds += holds
+        routed_steps = [*(route.steps for route in routes), *find_held_steps(steps, led.holds)]
+        led.notes += [*note_swings(pole, posted.path, steps, routed_steps), *note_holds(holds)]
     moved = np.flatnonzero((axis != programmed.axis).any(1))
     if len(moved):
         led.posted = repost_path(posted, replace_axes(posted.path, moved, axis[moved] @ programmed.rotation))

@@ -132,11 +132,11 @@ def build_joint_path(
             return joint_path
         if joint_path.step[coarse].min() < _FINEST:
             break
-        steps, parts = _divide_steps(coarse, joint_path.step)
+        steps, fractions = _divide_steps(coarse, joint_path.step)
         # The joints of new rows are those nearest to the splines. Beside a pole rows too far apart may have led over
         # it; only following all rows from the start shows that.
         anew = attempt % _ANEW == 0
-        joint_path = refine_joint_path(joint_path, steps, parts, anew)
+        joint_path = refine_joint_path(joint_path, steps, fractions, anew)
         doubtful[:] = anew
         doubtful[steps] = True
         doubtful = _widen_flags(np.insert(doubtful, steps + 1, True))
@@ -157,9 +157,9 @@ def _divide_steps(coarse: Indices, step: Array) -> tuple[Indices, Array]:
     beside = beside[(beside >= 0) & (beside < len(step))]
     beside = beside[step[beside] > 0.0]
     steps = np.concatenate([np.repeat(coarse, 3), beside])
-    parts = np.concatenate([np.tile([0.25, 0.5, 0.75], len(coarse)), np.full(len(beside), 0.5)])
-    order = np.lexsort((parts, steps))
-    return steps[order], parts[order]
+    fractions = np.concatenate([np.tile([0.25, 0.5, 0.75], len(coarse)), np.full(len(beside), 0.5)])
+    order = np.lexsort((fractions, steps))
+    return steps[order], fractions[order]
 
 
 def _widen_flags(flags: Flags) -> Flags:
@@ -189,12 +189,12 @@ def _find_coarse_steps(joint_path: JointPath, tolerances: SplineTolerances, cand
     return np.concatenate(blocks)
 
 
-def refine_joint_path(joint_path: JointPath, steps: Indices, parts: Array, anew: bool = False) -> JointPath:
+def refine_joint_path(joint_path: JointPath, steps: Indices, fractions: Array, anew: bool = False) -> JointPath:
     """Add rows in steps, ascending, after ``parts`` of them.
 
     The joints at the new rows are those nearest to the old splines; with ``anew`` all are followed from the start.
     """
-    shift = parts * joint_path.step[steps]
+    shift = fractions * joint_path.step[steps]
     segment = np.insert(joint_path.segment, steps + 1, joint_path.segment[steps])
     offset = np.insert(joint_path.offset, steps + 1, joint_path.offset[steps] + shift)
     if anew:

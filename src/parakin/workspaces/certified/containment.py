@@ -18,10 +18,10 @@ from .plane_cuts import CLEARED, EXCLUDED, LinearBounds
 from .region import Region
 from .subdivision import OrientationBoxes, bound_margin
 
-MOST = 4096  # parts of a box to be examined before it is left undecided
-_ROUNDS = 60  # bisected more often, a part's numbers have no digits left
+MOST = 4096  # sub-boxes of a box to be examined before it is left undecided
+_ROUNDS = 60  # bisected more often, a sub-box's numbers have no digits left
 _ULP = 2.3e-16
-_AT_ONCE = 512  # parts whose best orientations are searched for together
+_AT_ONCE = 512  # sub-boxes whose best orientations are searched for together
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,7 +32,7 @@ class Containment:
     limit : (N,) index in ``names`` of a limit that is broken in the box, -1 where none was found
     positions, orientations : (N, d), (N, s) where that is, else NaN; of an inclusive region no sampled orientation is
         allowed there, which is not proved of all orientations
-    boxes : (N,) parts examined
+    boxes : (N,) sub-boxes examined
     """
 
     proved: Flags
@@ -56,7 +56,7 @@ def prove_boxes(
     Many boxes at once cost little more than one.
 
     more : further constraints to be kept
-    most : parts of a box examined before it is left undecided
+    most : sub-boxes of a box examined before it is left undecided
     budget : for all boxes, those not decided when it is spent are left so too; None for no end
 
     Raises :class:`PoseError` for invalid corners.
@@ -77,7 +77,7 @@ def prove_boxes(
 
 
 class _BoxBisection:
-    """N boxes in parts; ``undecided`` are those whose parts are all proved so far or can still be."""
+    """N boxes in sub-boxes; ``undecided`` are those whose sub-boxes are all proved so far or can still be."""
 
     def __init__(self, region: Region, low: Array, high: Array, more: Sequence[Constraint], most: int, budget: Budget):
         self.region, self.low, self.high, self.more = region, low, high, more
@@ -95,7 +95,7 @@ class _BoxBisection:
         return Containment(self.proved, self.limit, self.positions, self.orientations, self.boxes, names)
 
     def _count_parts(self, box: Indices, before: Indices) -> Flags:
-        """Count parts; returns those of undecided boxes without too many examined parts since ``before``."""
+        """Count sub-boxes; returns those of undecided boxes without too many examined ones since ``before``."""
         self.boxes += np.bincount(box, minlength=len(self.boxes))
         self.undecided &= self.boxes - before <= self.most
         if self.budget.is_spent():
@@ -103,7 +103,7 @@ class _BoxBisection:
         return np.asarray(self.undecided[box])
 
     def prove_constraint(self, number: int, constraint: Constraint) -> None:
-        """Prove one constraint at all orientations: parts are boxes of both, bisected where bounds are widest."""
+        """Prove one constraint at all orientations: sub-boxes are boxes of both, bisected where bounds are widest."""
         d = self.d
         # A determinant's bounds are wider than those of limits, and it gets a budget of its own.
         before = self.boxes.copy() if constraint.name == PARALLEL_SINGULARITY else np.zeros_like(self.boxes)
@@ -133,7 +133,7 @@ class _BoxBisection:
         self.undecided[box] = False
 
     def prove_at_best_orientations(self) -> None:
-        """Prove each part by one orientation allowed all over it: the one of its whole, or the best at its middle."""
+        """Prove each sub-box by one orientation allowed all over it: that of its whole, or the best at its middle."""
         box, low, high = np.arange(len(self.low)), self.low, self.high
         orientations: Array | None = None
         for _ in range(_ROUNDS):
@@ -165,10 +165,10 @@ class _BoxBisection:
         names = [*self.region.limits, *(constraint.name for constraint in self.more)]
         orientations = np.full((len(positions), len(self.first)), np.nan)
         margins = np.full((len(positions), len(names)), np.nan)
-        for part in split_rows(len(positions), _AT_ONCE):
+        for block in split_rows(len(positions), _AT_ONCE):
             if self.budget.is_spent():
                 break
-            orientations[part], margins[part] = find_best_orientations(self.region, positions[part], self.more)
+            orientations[block], margins[block] = find_best_orientations(self.region, positions[block], self.more)
         return orientations, margins
 
     def _prove_at_orientations(self, low: Array, high: Array, orientations: Array) -> Flags:
@@ -219,7 +219,7 @@ def _measure_spread(constraint: Constraint, low: Array, high: Array, d: int) -> 
 
 
 def _bisect_parts(box: Indices, low: Array, high: Array, spread: Array) -> tuple[Indices, Array, Array]:
-    """Bisect parts across every axis whose spread is nearly that of the worst one."""
+    """Bisect sub-boxes across every axis whose spread is nearly that of the worst one."""
     cut = (spread >= 0.5 * spread.max(1, keepdims=True)) & (high > low)
     for axis in range(low.shape[1]):
         own = np.flatnonzero(cut[:, axis])

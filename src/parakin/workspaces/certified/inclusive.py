@@ -69,10 +69,10 @@ class InclusiveSubdivision(Subdivision):
             if not again.any():
                 break
             leaves = _narrow_leaves(leaves.take(again), bounds.best_at[again], bounds.spread[again])
-        leaves = concatenate_boxes([part for part, _, _ in finished])
-        columns = zip(*(part for _, part, _ in finished), strict=True)
+        leaves = concatenate_boxes([group for group, _, _ in finished])
+        columns = zip(*(group for _, group, _ in finished), strict=True)
         fractions = CellFractions(*(np.concatenate(column) for column in columns))
-        planes = np.concatenate([part for _, _, part in finished])
+        planes = np.concatenate([group for _, _, group in finished])
         at_points = self._prove_at_points(low, size, leaves, fractions.estimate)
         inside |= at_points >= 1.0
         merged = _merge_leaves(leaves.cell, fractions, planes, inside)

@@ -67,7 +67,7 @@ class Cells:
     @property
     def gap(self) -> float:
         """(outer - inner)/estimate; 0 if both are zero."""
-        outer, inner, estimate = (self.total(part) for part in (self.outer, self.inner, self.estimate))
+        outer, inner, estimate = (self.total(fractions) for fractions in (self.outer, self.inner, self.estimate))
         return (outer - inner) / estimate if estimate > 0.0 else (np.inf if outer > 0.0 else 0.0)
 
     def take(self, which: Flags | Indices) -> Cells:
@@ -82,10 +82,10 @@ class Cells:
 _COLUMNS = ("low", "size", "inner", "outer", "estimate", "limit", "area")
 
 
-def concatenate_cells(parts: Sequence[Cells]) -> Cells:
-    """Put cells together; how the work ended is taken from the first part."""
-    columns: dict[str, Any] = {name: np.concatenate([getattr(part, name) for part in parts]) for name in _COLUMNS}
-    return replace(parts[0], **columns)
+def concatenate_cells(groups: Sequence[Cells]) -> Cells:
+    """Put cells together; how the work ended is taken from the first group."""
+    columns: dict[str, Any] = {name: np.concatenate([getattr(group, name) for group in groups]) for name in _COLUMNS}
+    return replace(groups[0], **columns)
 
 
 def make_empty_cells(dimension: int) -> Cells:
@@ -120,16 +120,16 @@ class OrientationBoxes:
         """Add an offset to the cells' numbers."""
         return replace(self, cell=self.cell + offset)
 
-    def repeat_for_parts(self, count: int) -> OrientationBoxes:
-        """Repeat the boxes for each of the ``count`` parts of their cells."""
+    def repeat_for_children(self, count: int) -> OrientationBoxes:
+        """Repeat the boxes for each of the ``count`` children of their cells."""
         cell = (self.cell[:, None] * count + np.arange(count)).reshape(-1)
         return replace(self.take(np.repeat(np.arange(len(self.cell)), count)), cell=cell)
 
 
-def concatenate_boxes(parts: Sequence[OrientationBoxes]) -> OrientationBoxes:
+def concatenate_boxes(groups: Sequence[OrientationBoxes]) -> OrientationBoxes:
     """Put boxes of orientations together."""
     names = ("cell", "low", "high", "needs")
-    return OrientationBoxes(*(np.concatenate([getattr(part, name) for part in parts]) for name in names))
+    return OrientationBoxes(*(np.concatenate([getattr(group, name) for group in groups]) for name in names))
 
 
 def bisect_boxes(boxes: OrientationBoxes, which: Flags, spread: Array) -> OrientationBoxes:
@@ -216,10 +216,10 @@ class Subdivision(ABC):
         undecided = np.flatnonzero(~outside & (limit >= 0))
         new = np.full(len(low), -1)
         new[undecided] = np.arange(len(undecided))
-        return cells.take(undecided), [part.renumber(new) for part in boxes]
+        return cells.take(undecided), [group.renumber(new) for group in boxes]
 
     def refine(self, parents: Indices, budget: Budget | None = None) -> None:
-        """Divide open cells into 2^d parts each, the first ones first, as many as the budget's time allows.
+        """Divide open cells into 2^d children each, the first ones first, as many as the budget's time allows.
 
         Interrupted, it leaves the cells as they were.
         """
@@ -242,16 +242,16 @@ class Subdivision(ABC):
             low = (self.open_cells.low[batch][:, None] + corners * half[:, None]).reshape(-1, d)
             new = np.full(len(is_cut), -1)
             new[batch] = np.arange(len(batch))
-            children = [part.renumber(new).repeat_for_parts(len(corners)) for part in self.open_boxes]
+            children = [group.renumber(new).repeat_for_children(len(corners)) for group in self.open_boxes]
             examined.append(self._examine(low, np.repeat(half, len(corners), 0), children))
             self._seconds_per_cell = (time.monotonic() - began + 1e-9) / len(batch)
         new = np.cumsum(~is_cut) - 1
         new[is_cut] = -1
-        cells = [self.open_cells.take(~is_cut), *[part for part, _ in examined]]
-        offsets = np.cumsum([len(part.low) for part in cells])
-        lists = [[part.renumber(new) for part in self.open_boxes]]
-        lists += [[part.shift(n) for part in boxes] for n, (_, boxes) in zip(offsets, examined, strict=False)]
-        boxes, undecided = [concatenate_boxes(parts) for parts in zip(*lists, strict=True)], concatenate_cells(cells)
+        cells = [self.open_cells.take(~is_cut), *[group for group, _ in examined]]
+        offsets = np.cumsum([len(group.low) for group in cells])
+        lists = [[group.renumber(new) for group in self.open_boxes]]
+        lists += [[group.shift(n) for group in boxes] for n, (_, boxes) in zip(offsets, examined, strict=False)]
+        boxes, undecided = [concatenate_boxes(groups) for groups in zip(*lists, strict=True)], concatenate_cells(cells)
         self.open_cells, self.open_boxes = undecided, boxes
         self.decided_cells = [*self.decided_cells, *self._decided]
         self.rounds += 1
@@ -311,7 +311,7 @@ class Subdivision(ABC):
             return "gap", np.zeros(0, np.int64)
         if not large.any():
             return ("resolution" if cell is None else "cell"), np.zeros(0, np.int64)
-        if len(open_cells.low) > MOST or sum(len(part.cell) for part in self.open_boxes) > 4 * MOST:
+        if len(open_cells.low) > MOST or sum(len(group.cell) for group in self.open_boxes) > 4 * MOST:
             return "memory", np.zeros(0, np.int64)
         undecided = np.where(large, (open_cells.outer - open_cells.inner) * open_cells.volumes, -1.0)
         order = np.argsort(-undecided, kind="stable")
@@ -325,7 +325,7 @@ class Subdivision(ABC):
 def _snap_to_grid(low: Array, high: Array, counts: Indices) -> tuple[Array, Array]:
     """Compute lower corner and size of ``counts`` cells that hold a box.
 
-    Both have so few digits that the corners of all parts of parts are exact: adjacent cells leave no gap between them.
+    Both have so few digits that the corners of children at any depth are exact: adjacent cells leave no gap.
     """
     _, exponent = np.frexp(np.maximum(np.abs(low), np.abs(high)))
     unit = np.ldexp(1.0, exponent - _DIGITS)

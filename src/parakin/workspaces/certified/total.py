@@ -79,9 +79,9 @@ def _narrow_boxes(boxes: OrientationBoxes, bounds: LinearBounds) -> OrientationB
     return bisect_boxes(replace(boxes, low=low, high=high), ~(bounds.least_at != 0).any(1), bounds.spread)
 
 
-def _sort_by_cell(parts: Sequence[tuple[OrientationBoxes, LinearBounds]]) -> tuple[OrientationBoxes, LinearBounds]:
-    """Put all parts together, sorted by cell."""
-    boxes = concatenate_boxes([part for part, _ in parts])
-    bounds = LinearBounds(*(np.concatenate(columns) for columns in zip(*(part for _, part in parts), strict=True)))
+def _sort_by_cell(groups: Sequence[tuple[OrientationBoxes, LinearBounds]]) -> tuple[OrientationBoxes, LinearBounds]:
+    """Put all groups together, sorted by cell."""
+    boxes = concatenate_boxes([group for group, _ in groups])
+    bounds = LinearBounds(*(np.concatenate(columns) for columns in zip(*(group for _, group in groups), strict=True)))
     order = np.argsort(boxes.cell, kind="stable")
     return boxes.take(order), bounds.take(order)

@@ -196,12 +196,12 @@ def _sample_estimates(region: Region, cells: Cells, budget: Budget) -> Cells:
     positions = cells.low[sampled] + rng.random((len(sampled), cells.low.shape[1])) * cells.size[sampled]
     allowed = np.zeros(len(sampled))
     done = 0
-    for part in split_rows(len(sampled), _SAMPLED_AT_ONCE):
+    for block in split_rows(len(sampled), _SAMPLED_AT_ONCE):
         if done and budget.is_spent():
             break
-        margins = find_best_orientations(region, positions[part])[1]
-        allowed[part] = (margins >= 0.0).all(1)
-        done = min(part.stop, len(sampled))
+        margins = find_best_orientations(region, positions[block])[1]
+        allowed[block] = (margins >= 0.0).all(1)
+        done = min(block.stop, len(sampled))
     sampled, allowed = sampled[:done], allowed[:done]
     volumes = cells.volumes[sampled]
     estimate = cells.estimate.copy()
@@ -211,7 +211,7 @@ def _sample_estimates(region: Region, cells: Cells, budget: Budget) -> Cells:
 
 
 def _find_home_cells(region: Region, cells: Cells) -> Flags | None:
-    """Find the cells that may hang together with home; None where home does not tell, or all parts count."""
+    """Find the cells that may hang together with home; None where home does not tell, or all components count."""
     machine = region.machine
     if region.components == "all" or any(axis in region.fixed_axes for axis in "XYZ"):
         return None  # what is apart in a slice may hang together beyond it
@@ -220,7 +220,7 @@ def _find_home_cells(region: Region, cells: Cells) -> Flags | None:
 
 
 def measure_elsewhere(workspace: Workspace, gap: float = 0.05, seconds: float | None = 10.0) -> Volume:
-    """Measure what the machine reaches besides home's part: what is apart from it, and other assembly modes.
+    """Measure what the machine reaches besides home's component: what is apart from it, and other assembly modes.
 
     Parameters
     ----------
@@ -244,5 +244,5 @@ def measure_elsewhere(workspace: Workspace, gap: float = 0.05, seconds: float | 
 
 
 def _sum_volumes(cells: Cells) -> Volume:
-    inner, estimate, outer = (cells.total(part) for part in (cells.inner, cells.estimate, cells.outer))
+    inner, estimate, outer = (cells.total(fractions) for fractions in (cells.inner, cells.estimate, cells.outer))
     return Volume(inner * (1.0 - ROUNDING), estimate, outer * (1.0 + ROUNDING))

@@ -20,9 +20,9 @@ from .adjacency import find_adjacent_cells, label_components
 _GAP = 1e-9  # never reached: the cells' size ends the subdivision
 _FINER, _DEEPER = 8, 2  # how much finer, and how often, an undecided group of cells is subdivided
 _ROUNDS = 4  # rounds of the search for boxes that join cells
-_ALONG = (0.5, 0.02, 0.98)  # where across the common part of two cells a joining box may run
+_ALONG = (0.5, 0.02, 0.98)  # where across what two cells have in common a joining box may run
 _THIN = 1e-3  # half width of a joining box, as a fraction of a cell
-_PARTS = 64  # greatest number of parts of a joining box that are examined
+_MOST_BOXES = 64  # greatest number of sub-boxes of a joining box that are examined
 _LINKS = 4096  # examined in a round
 _FEW = 8  # cells: fewer that nothing joins nor separates are no component of their own
 
@@ -115,11 +115,11 @@ def _measure_components(labelled: _LabelledCells, members: Flags, own: list[int]
     box = cells.low[members].min(0), (cells.low + cells.size)[members].max(0)
     components = []
     for which in own:
-        part = cells.take(inside & (component == which))
-        inner = float(part.volumes.sum())
+        proved = cells.take(inside & (component == which))
+        inner = float(proved.volumes.sum())
         estimate = inner + _sum_volumes(cells, cells.estimate, ~inside & (owner == which))
         outer = inner + vague.total(vague.outer) + lost_volume
-        components.append(CellComponent(part.low, part.size, inner, estimate, outer, box, len(own) == 1))
+        components.append(CellComponent(proved.low, proved.size, inner, estimate, outer, box, len(own) == 1))
     return components, lost_volume
 
 
@@ -187,7 +187,7 @@ def _prove_links(region: Region, constraint: Constraint, cells: Cells, links: In
         middle = low[left] + np.array(along) * (high[left] - low[left])
         box_low = np.where(apart[left], low[left], middle - thin)
         box_high = np.where(apart[left], high[left], middle + thin)
-        proved[left] = prove_boxes(region, box_low, box_high, [constraint], _PARTS, budget).proved
+        proved[left] = prove_boxes(region, box_low, box_high, [constraint], _MOST_BOXES, budget).proved
     return proved
 
 

@@ -14,7 +14,7 @@ from ..certified.best_orientation import evaluate_margins, find_best_orientation
 from ..certified.containment import prove_boxes
 from ..certified.region import Region
 
-MOST = 512  # parts of a box examined on the way; the last boxes get more
+MOST = 512  # sub-boxes of a box examined on the way; the last boxes get more
 _STEPS = 40
 _FIRST = 0.25  # trust region of the first step, as a fraction of the edges
 _LENGTHS = (4.0, 2.0, 1.0, 0.6, 0.3, 0.1)  # tried fractions of a step; where orientations adapt it may go farther

@@ -137,7 +137,7 @@ def find_largest_box(
     first, last = _prove_largest(region, boxes, budget.take_fraction(_FINAL), centre is not None, stopped)
     parameters = {
         **region.parameters,
-        "shape": None if shape is None else [float(part) for part in shape],
+        "shape": None if shape is None else [float(proportion) for proportion in shape],
         "around": None if centre is None else centre.tolist(),
         "tolerance": smallest,
         "seconds": seconds,

@@ -99,7 +99,7 @@ def _find_any_boxes(mask: Flags) -> Indices:
 
 def _find_shaped_boxes(mask: Flags, shape: Array) -> Indices:
     """Find, by bisection of the size, the largest blocks that are no smaller than a box of a shape, given in cells."""
-    scales = np.unique(np.concatenate([np.arange(1, n + 1) / part for n, part in zip(mask.shape, shape, strict=True)]))
+    scales = np.unique(np.concatenate([np.arange(1, n + 1) / edge for n, edge in zip(mask.shape, shape, strict=True)]))
     largest = np.zeros((0, 2, mask.ndim), np.int64)
     low, high = 0, len(scales)
     while low < high:

@@ -25,6 +25,15 @@ KINEMATICS_TYPE kinematicsType(void);
 int kinematicsSwitchable(void);
 int kinematicsSwitch(int type);
 
+typedef double hal_float_t;
+typedef char hal_bit_t;
+typedef uint32_t hal_u32_t;
+enum { HAL_IN = 16, HAL_OUT = 32 };
+void *hal_malloc(long size);
+int hal_pin_float_newf(int dir, double **data, int component, const char *format, ...);
+int hal_pin_bit_newf(int dir, char **data, int component, const char *format, ...);
+int hal_pin_u32_newf(int dir, uint32_t **data, int component, const char *format, ...);
+
 int rtapi_app_main(void);
 void rtapi_app_exit(void);
 int hal_init(const char *name);

@@ -90,6 +90,12 @@ addf motion-controller servo-thread
 
 {loops}
 
+# What the kinematics has to know: where the joints are told to be, the tool's length, and who moves the machine.
+{told}
+net tool-offset motion.tooloffset.z => {kinematics}.tool-offset
+net teleop motion.teleop-mode => {kinematics}.teleop-mode
+net coordinated motion.coord-mode => {kinematics}.coord-mode
+
 net estop iocontrol.0.user-enable-out => iocontrol.0.emc-enable-in
 net tool-prepare iocontrol.0.tool-prepare => iocontrol.0.tool-prepared
 net tool-change iocontrol.0.tool-change => iocontrol.0.tool-changed
@@ -174,7 +180,15 @@ def write_hal(machine: Machine) -> str:
         f"net joint-{i} joint.{i}.motor-pos-cmd => joint.{i}.motor-pos-fb  # {name}"
         for i, name in enumerate(machine.joints)
     ]
-    return _HAL.format(name=machine.name, made=hash_kinematics(machine), loops="\n".join(loops))
+    kinematics = name_kinematics(machine)
+    told = [f"net told-{i} joint.{i}.pos-cmd => {kinematics}.joint-{i}" for i in range(len(machine.joints))]
+    return _HAL.format(
+        name=machine.name,
+        made=hash_kinematics(machine),
+        loops="\n".join(loops),
+        told="\n".join(told),
+        kinematics=kinematics,
+    )
 
 
 def write_tool_table(machine: Machine) -> str:

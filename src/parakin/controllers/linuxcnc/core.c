@@ -14,6 +14,30 @@ MODEL int finite_all(const double *x, int count)
     return 1;
 }
 
+/* The pose of the machine's own tip for that of a tool longer by ``length`` mm, with the shift along Z that LinuxCNC has
+   added to it taken off: the tool's axis Rz(C) Ry(B) Rx(A) z leads from the tip into the holder. */
+MODEL void shift_tip(double *x, double length)
+{
+#if TILTS
+    double k[3] = {0.0, 0.0, 1.0}; /* turned about X, then Y, then Z */
+    for (int i = 0; i < 3; i++)
+        if (turn_columns[i] >= 0) {
+            const double s = sin(x[turn_columns[i]]), c = cos(x[turn_columns[i]]);
+            double *u = &k[(i + 1) % 3], *v = &k[(i + 2) % 3];
+            const double turned = c * *u - s * *v;
+            *v = s * *u + c * *v;
+            *u = turned;
+        }
+    k[2] -= 1.0;
+    for (int i = 0; i < 3; i++)
+        if (place_columns[i] >= 0)
+            x[place_columns[i]] += length * k[i];
+#else
+    (void)x;
+    (void)length;
+#endif
+}
+
 /* Joints for a pose. */
 
 #if WRIST

@@ -29,6 +29,9 @@ TELLS = 0.02  # of a leg: a pose from which the legs are farther off is a guess,
 LEAST_REGULARITY = (
     0.02  # of home's singularity margin (of 1 for a leg's serial one): no pose is nearer to a singularity
 )
+CYCLE = 0.001  # s
+STEP_FACTOR = 2.0  # of a joint's speed: LinuxCNC's own planner exceeds it for moments in foreign programs
+COMMAND_LAG = 3.0  # cycles by which LinuxCNC's interpolation trails, and one more
 _FIELDS = {"X": "tran.x", "Y": "tran.y", "Z": "tran.z", "A": "a", "B": "b", "C": "c"}
 
 # How near to a limit jogs stop, by the limit's unit. A reach in mm² is brought to mm by twice the rod.
@@ -106,9 +109,16 @@ def _write_numbers(machine: Machine) -> str:
         *_write_sides(machine),
         *_write_newton(machine),
         *_write_limits(machine),
+        f"#define CYCLE {format_c(CYCLE)} /* s: the servo period */",
+        f"#define STEP_FACTOR {format_c(STEP_FACTOR)} /* a joint's step beyond so much of its speed is refused */",
+        f"#define COMMAND_LAG {format_c(COMMAND_LAG)} /* steps by which a commanded joint may trail */",
+        f"#define TILTS {int(not set(machine.axes).isdisjoint('AB'))} /* the tool tilts against Z */",
         _write_array("double", "home", [format_c(value) for value in machine.home]),
         _write_array("int", "turning", [str(int(unit == "rad")) for unit in machine.joint_units]),
     ]
+    for name, letters in (("place_columns", "XYZ"), ("turn_columns", "ABC")):
+        columns = [machine.axes.index(letter) if letter in machine.axes else -1 for letter in letters]
+        lines.append(_write_array("int", name, [str(column) for column in columns]))
     lines.append(_write_array("int", "turning_axis", [str(int(unit == "rad")) for unit in machine.axis_units]))
     return "\n".join(lines) + "\n"
 

@@ -4,7 +4,34 @@
    pose to the forward, and that is what they stay near to. It asks the inverse for the end points of moves to come as
    well, with joints at zero, which would spoil a memory. Nothing allocates, and every loop has an end. */
 
+/* What the kinematics is told through HAL. */
+typedef struct {
+    hal_float_t *tool_offset;      /* what the tool is longer than the machine's own, mm: motion.tooloffset.z */
+    hal_float_t *joint[JOINTS];    /* where the joints are commanded to be: joint.N.pos-cmd */
+    hal_bit_t *teleop, *coordinated; /* motion.teleop-mode, motion.coord-mode */
+} Pins;
+
+static Pins *pins;
+
 /* The inverse: joints for a pose, the wrist's and all turning ones near the last. */
+
+/* Whether joints can go from the last ones, or from where they are commanded to be, to these in a cycle. After a stop
+   LinuxCNC's last joints may be old; all at zero they say nothing, for then it asks for the end of a move to come. */
+static int can_step(const double *q, const double *last)
+{
+    double commanded[JOINTS];
+    int far_from_last = 0, far_from_commanded = 0, known = 0;
+    for (int i = 0; i < JOINTS; i++)
+        commanded[i] = *pins->joint[i];
+    read_joints(commanded, commanded);
+    for (int i = 0; i < JOINTS; i++) {
+        const double step = STEP_FACTOR * CYCLE * joint_speed[i];
+        known |= last[i] != 0.0;
+        far_from_last |= !(fabs(q[i] - last[i]) <= step);
+        far_from_commanded |= !(fabs(q[i] - commanded[i]) <= COMMAND_LAG * step);
+    }
+    return !known || !far_from_last || !far_from_commanded;
+}
 
 int kinematicsInverse(const EmcPose *world, double *joints,
                       const KINEMATICS_INVERSE_FLAGS *iflags, KINEMATICS_FORWARD_FLAGS *fflags)
@@ -16,7 +43,8 @@ int kinematicsInverse(const EmcPose *world, double *joints,
     read_joints(joints, last);
     if (!finite_all(x, AXES) || !finite_all(last, JOINTS))
         return -1;
-    if (!find_joints(x, last, q) || !allowed(x, q))
+    shift_tip(x, *pins->tool_offset);
+    if (!find_joints(x, last, q) || !allowed(x, q) || !regular(x, q) || !can_step(q, last))
         return -1;
     write_joints(q, joints);
     return 0;
@@ -25,7 +53,8 @@ int kinematicsInverse(const EmcPose *world, double *joints,
 /* The forward: a pose for joints, near a given one. What does not close, or is another assembly, is none.
 
    The pose lies on the same side of the parallel singularities as the given one with its own joints. Where LinuxCNC's
-   guess says nothing, for its joints are far from the given ones (zeros, at the start), it lies on home's side. */
+   guess says nothing, for its joints are far from the given ones (zeros, at the start), it lies on home's side; and in
+   coordinated motion such a guess is refused, for it would show another pose with the same joints. */
 
 /* The greatest difference of two poses, mm, an angle counted on the arm of a leg. */
 static double distance_of(const double *x, const double *near)
@@ -71,16 +100,17 @@ static double side_of(const double *near, const double *x, const double *q)
     return isfinite(side[0]) ? side[0] : HOME_SIDE;
 }
 
-static int pose_near(const double *near, const double *q, double *x, double *side)
+static int pose_near(const double *near, const double *q, double *x, double *side, int *tells)
 {
     double f[CLOSURES], square[1];
     common_point(q, near, x, f, square);
     const double far = distance_of(x, near);
+    *tells = far <= TELLS;
     /* A leg as long as this moves its drive by no more than the root of 2 LONGEST far, where it is at right angles. If
        that is a quarter of the height over the centres, where there is a singularity, the side is the same. */
     if (closes(f) && 32.0 * LONGEST * far + 16.0 * far * far < square[0])
         return finite_all(x, AXES);
-    *side = far <= TELLS ? side_of(near, x, q) : HOME_SIDE;
+    *side = *tells ? side_of(near, x, q) : HOME_SIDE;
     common_point_on(q, side, x, f);
     return closes(f) && finite_all(x, AXES);
 }
@@ -118,10 +148,11 @@ static double side_of(const double *near, double det, int steady)
 }
 
 /* Newton's method on the legs' closures in bounded steps. The matrix serves on while it gains enough. */
-static int pose_near(const double *near, const double *q, double *x, double *side)
+static int pose_near(const double *near, const double *q, double *x, double *side, int *tells)
 {
     double y[CLOSURES], f[CLOSURES], a[CLOSURES][CLOSURES], det = 0.0, before = 0.0, first = 0.0;
-    int order[CLOSURES], anew = 1, last = 0, closed = 0, tells = 0;
+    int order[CLOSURES], anew = 1, last = 0, closed = 0;
+    *tells = 0;
     begin(near, q, y);
     for (int step = 0;; step++) {
         if (anew) {
@@ -138,7 +169,7 @@ static int pose_near(const double *near, const double *q, double *x, double *sid
             break;
         if (step == 0) {
             first = det;
-            tells = worst <= TELLS;
+            *tells = worst <= TELLS;
         }
         if (worst < FINE || (last && worst <= TOLERANCE) || step == MOST_STEPS) {
             closed = worst <= TOLERANCE;
@@ -158,7 +189,7 @@ static int pose_near(const double *near, const double *q, double *x, double *sid
     if (closed)
         end(y, q, x);
     closed = closed && finite_all(x, AXES);
-    if (tells)
+    if (*tells)
         *side = side_of(near, first, closed && fabs(det - first) <= STEADY * fabs(first) && distance_of(x, near) <= SETTLED);
     return closed && det * angle_sign(x) * *side > 0.0;
 }
@@ -232,18 +263,25 @@ int kinematicsForward(const double *joints, EmcPose *world,
     read_pose(world, near);
     if (!finite_all(q, JOINTS))
         return -1;
+    shift_tip(near, *pins->tool_offset);
     double side = HOME_SIDE;
-    if (!finite_all(near, AXES) || !pose_near(near, q, x, &side)) { /* or from home, whose turns the guess has not */
+    int tells = 0;
+    const int found = finite_all(near, AXES) && pose_near(near, q, x, &side, &tells);
+    if (*pins->teleop || *pins->coordinated) {
+        if (!found || !tells)
+            return -1;
+    } else if (!found) { /* for homing: from home, whose turns the guess has not */
         if (!(side * HOME_SIDE > 0.0))
             return -1;
         for (int i = 0; i < AXES; i++)
             near[i] = home[i];
-        if (!pose_near(near, q, x, &side))
+        if (!pose_near(near, q, x, &side, &tells))
             return -1;
     }
     if (!in_mode(x, q))
         return -1;
     settle(x, near);
+    shift_tip(x, -*pins->tool_offset);
     write_pose(x, world);
     return 0;
 }
@@ -265,6 +303,18 @@ static int component;
 static char *made = "";
 RTAPI_MP_STRING(made, "the making of the configuration that loads this");
 
+static int make_pins(void)
+{
+    pins = hal_malloc(sizeof *pins);
+    if (!pins)
+        return -1;
+    int failed = hal_pin_float_newf(HAL_IN, &pins->tool_offset, component, MODULE ".tool-offset");
+    for (int i = 0; i < JOINTS; i++)
+        failed |= hal_pin_float_newf(HAL_IN, &pins->joint[i], component, MODULE ".joint-%d", i);
+    failed |= hal_pin_bit_newf(HAL_IN, &pins->teleop, component, MODULE ".teleop-mode");
+    return failed | hal_pin_bit_newf(HAL_IN, &pins->coordinated, component, MODULE ".coord-mode");
+}
+
 int rtapi_app_main(void)
 {
     if (*made && strcmp(made, MADE) != 0) {
@@ -275,6 +325,10 @@ int rtapi_app_main(void)
     component = hal_init(MODULE);
     if (component < 0)
         return component;
+    if (make_pins()) {
+        hal_exit(component);
+        return -1;
+    }
     hal_ready(component);
     return 0;
 }

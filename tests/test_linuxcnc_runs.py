@@ -14,6 +14,7 @@ from geometry import Description
 from random_paths import PathMaker
 
 import parakin as pk
+from parakin.controllers.linuxcnc.home_pose import find_home_pose
 from parakin.toolpath.posting.post import post_path
 from parakin.toolpath.timing import plan_trajectory
 
@@ -104,7 +105,7 @@ def words(block):
 
 def away(machine):
     """A block that moves 20 mm and turns 10 degrees away from home along all axes."""
-    home = world(machine, machine.home[None])[0]
+    home = world(machine, find_home_pose(machine)[None])[0]
     words = [f"{axis}{home[FIELDS.index(axis)] + (20.0 if axis in 'XYZ' else 10.0):.6f}" for axis in machine.axes]
     return " ".join(["G1", *words, "F9000"])
 
@@ -119,7 +120,7 @@ def test_it_starts_homes_and_moves(machine, linuxcnc):
     seen, poses, joints = run.seen, run.poses, run.joints
     assert "told" not in seen, seen
     assert run.done.returncode == 0
-    home = world(machine, machine.home[None])[0]
+    home = world(machine, find_home_pose(machine)[None])[0]
     assert np.abs(np.array(seen["home"]) - home).max() < 1e-6
     for letter, value in words(by_hand).items():
         assert abs(seen["by hand"][FIELDS.index(letter)] - value) < 1e-6
@@ -203,7 +204,10 @@ def test_random_paths_run_as_the_model_says(machine, model, linuxcnc, tmp_path):
     planner, stub = model
     kinematics = stub.built(machine)
     limits = read_limits(pk.make_linuxcnc_configuration(machine)[f"{machine.name}.ini"])
-    home, at_home = world(machine, machine.home[None])[0], outward(machine, machine.inverse(machine.home))
+    home, at_home = (
+        world(machine, find_home_pose(machine)[None])[0],
+        outward(machine, machine.inverse(find_home_pose(machine))),
+    )
     for seed in (0, 20):
         (tmp_path / "part.cls").write_text(PathMaker(machine, seed).make(), encoding="ascii")
         job = pk.prepare(machine, pk.read_path(tmp_path / "part.cls"))

@@ -60,14 +60,14 @@ class Motion(NamedTuple):
 
 
 def read_limits(ini):
-    """Read the axes' limits from the text of an ini file."""
+    """Read the axes' limits for programs from the text of an ini file."""
     file = configparser.ConfigParser(strict=True, interpolation=None)
     file.optionxform = str
     file.read_string(ini)
     rates = np.zeros((2, 9))
     for axis in file["TRAJ"]["COORDINATES"].split():
         section = file[f"AXIS_{axis}"]
-        rates[:, FIELDS.index(axis)] = float(section["MAX_VELOCITY"]), float(section["MAX_ACCELERATION"])
+        rates[:, FIELDS.index(axis)] = [float(section[f"PROGRAM_MAX_{what}"]) for what in ("VELOCITY", "ACCELERATION")]
     return AxisLimits(*rates, float(file["TRAJ"]["MAX_LINEAR_VELOCITY"]))
 
 

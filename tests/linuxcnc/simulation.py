@@ -143,21 +143,23 @@ def simulated(machine):
         for file, text in (files | {"sampler.hal": sampler(machine)}).items():
             (folder / file).write_text(text, encoding="utf-8")
         shutil.copy(HERE / "ui.py", folder)
-        kinematics = f"{machine.name}_kins"
+        modules = [Path(file).stem for file in files if file.endswith(".c")]
         try:
-            subprocess.run(["halcompile", "--install", f"{kinematics}.c"], cwd=folder, check=True, capture_output=True)
+            for module in modules:
+                subprocess.run(["halcompile", "--install", f"{module}.c"], cwd=folder, check=True, capture_output=True)
             for path in (folder, *folder.iterdir()):
                 os.chown(path, NOBODY, NOBODY)
             yield Simulation(machine, folder)
         finally:
-            (MODULES / f"{kinematics}.so").unlink(missing_ok=True)
+            for module in modules:
+                (MODULES / f"{module}.so").unlink(missing_ok=True)
 
 
 def sampler(machine):
     """HAL that writes down, every cycle, whether the move is coordinated, the program's line, the axes, the joints."""
-    pins = ["motion.coord-mode", "motion.program-line"]
-    pins += [f"axis.{axis.lower()}.pos-cmd" for axis in machine.axes]
-    pins += [f"joint.{i}.coarse-pos-cmd" for i in range(len(machine.joints))]
-    lines = [f"loadrt sampler depth=16000 cfg=bs{'f' * (len(pins) - 2)}", "addf sampler.0 servo-thread"]
-    lines += [f"net sample-{i} {pin} => sampler.0.pin.{i}" for i, pin in enumerate(pins)]
+    signals = {"motion.coord-mode": "coordinated", "motion.program-line": "program-line"}  # the first has one already
+    signals |= {f"axis.{letter}.pos-cmd": f"{letter}-position" for letter in "".join(machine.axes).lower()}
+    signals |= {f"joint.{i}.coarse-pos-cmd": f"coarse-{i}" for i in range(len(machine.joints))}
+    lines = [f"loadrt sampler depth=16000 cfg=bs{'f' * (len(signals) - 2)}", "addf sampler.0 servo-thread"]
+    lines += [f"net {name} {pin} => sampler.0.pin.{i}" for i, (pin, name) in enumerate(signals.items())]
     return "\n".join([*lines, ""])

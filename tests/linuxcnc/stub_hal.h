@@ -30,6 +30,8 @@ typedef char hal_bit_t;
 typedef uint32_t hal_u32_t;
 enum { HAL_IN = 16, HAL_OUT = 32 };
 void *hal_malloc(long size);
+typedef void StubFunction(void *, long);
+int hal_export_funct(const char *name, StubFunction *function, void *arg, int fp, int reentrant, int component);
 int hal_pin_float_newf(int dir, double **data, int component, const char *format, ...);
 int hal_pin_bit_newf(int dir, char **data, int component, const char *format, ...);
 int hal_pin_u32_newf(int dir, uint32_t **data, int component, const char *format, ...);

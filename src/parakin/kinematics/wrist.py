@@ -35,7 +35,7 @@ NEAR_START 0.1          off the pole: a program comes to a first record that is 
 NEAR_TURN  0.02         off the pole: a tool that is nearer is tilted so far while whole turns are taken back
 STANDING   8e-6         off the pole: nearer, a controller's first joint stands still, whatever the rounded pose says
 NEAR_HOLD  1e-5         off the pole: no tool axis is held nearer, or printed digits would turn the first angle
-FAR_TILT   15°          second angle at which a small square about home goes neither round the pole nor through it
+FAR_TILT   30°          second angle at home of a controller: moves about it go neither round the pole nor through it
 ========== ============ ==============================================================================================
 """
 
@@ -74,7 +74,7 @@ NEAR_START = 0.5 * TILTED
 NEAR_TURN = 0.02
 STANDING = 8e-6
 NEAR_HOLD = 5.0 * PRINTED
-FAR_TILT = np.pi / 12.0
+FAR_TILT = np.pi / 6.0
 
 # Working modes of the wrist along a path: the path's own, its other one, either one (on the pole, or not known).
 OWN, OTHER, EITHER = 0, 1, 2

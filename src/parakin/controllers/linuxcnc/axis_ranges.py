@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
 from math import pi
 
 import numpy as np
@@ -16,6 +17,7 @@ _GREATEST_TURN = pi
 TURNS = 100  # turns of C to either side of a machine that poses only the tool's axis
 
 
+@lru_cache(maxsize=32)
 def estimate_axis_ranges(machine: Machine) -> tuple[Array, Array]:
     """Estimate the range of every axis by growing a box from home; return its ends, (axes,) each, mm and rad.
 
@@ -39,4 +41,7 @@ def estimate_axis_ranges(machine: Machine) -> tuple[Array, Array]:
     if direction is not None:  # B may have either sign, and C go on turning
         b = max(-low[direction.b], high[direction.b])
         low[direction.pair], high[direction.pair] = [-b, -2.0 * pi * TURNS], [b, 2.0 * pi * TURNS]
-    return np.floor(low / units) * units, np.ceil(high / units) * units
+    ends = np.floor(low / units) * units, np.ceil(high / units) * units
+    for end in ends:
+        end.flags.writeable = False
+    return ends

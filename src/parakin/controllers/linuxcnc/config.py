@@ -3,16 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from math import isfinite
+from math import ceil, isfinite, pi
 
 from ...machine import Machine
 from ...model.elements import Drive
 from ...units import to_display
 from .axis_ranges import estimate_axis_ranges
 from .axis_rates import choose_drive_rates, choose_unit_rates, find_slowest_drive
+from .guard import name_guard
+from .hand_box import HandBox, find_hand_box
+from .home_pose import find_home_pose
 from .module import hash_kinematics, name_kinematics
 
+_JOG = 0.25  # of the speed of moves by hand: what the screen begins with
+_END_DIGIT = 0.01  # mm and degrees
 _LAG = 0.01  # s: following error allowed, as time at full speed; the simulation lags by 0.001 s or two
+
+# The guard's pins for an axis, and the keys of the ini file that they have their values from.
+_KEYS = {"min": "MIN_LIMIT", "max": "MAX_LIMIT", "velocity": "MAX_VELOCITY", "acceleration": "MAX_ACCELERATION"}
 
 _INI = """\
 # {title}, for LinuxCNC 2.9. Made by parakin from the machine's description.
@@ -31,9 +39,9 @@ PROGRAM_PREFIX = .
 OPEN_FILE = ./{name}.ngc
 GEOMETRY = {letters}
 DEFAULT_LINEAR_VELOCITY = {jog}
-MAX_LINEAR_VELOCITY = {fast}
+MAX_LINEAR_VELOCITY = {by_hand}
 DEFAULT_ANGULAR_VELOCITY = {turn_jog}
-MAX_ANGULAR_VELOCITY = {turn_fast}
+MAX_ANGULAR_VELOCITY = {turn_by_hand}
 # Faster than programmed the joints would pass their speeds.
 MAX_FEED_OVERRIDE = 1.0
 
@@ -43,6 +51,8 @@ CYCLE_TIME = 0.010
 
 [RS274NGC]
 PARAMETER_FILE = {name}.var
+# The guard may slow the feed.
+RS274NGC_STARTUP_CODE = M52 P1
 
 [EMCMOT]
 EMCMOT = motmod
@@ -56,6 +66,7 @@ TOOL_TABLE = {name}.tbl
 
 [HAL]
 HALFILE = {name}.hal
+HALCMD = source {name}_rates.hal
 
 [KINS]
 KINEMATICS = {kinematics}
@@ -71,11 +82,9 @@ MAX_LINEAR_ACCELERATION = {acceleration}
 # X Y Z of the pose that belongs to the joints' HOME; LinuxCNC reads no more, the kinematics knows its turns.
 HOME = {home}
 
-# The axes bound the end points of moves. Their ranges hold all poses that the machine can take; whether it can take a
-# certain one the kinematics decides, and the joints' limits. Their accelerations are more than the drives' own, and so
-# are the speeds of turning axes: LinuxCNC begins and ends every motion that turns the tool as if it stood still there,
-# and could not keep up with a program of short motions otherwise. Programs of parakin post bring speeds that the joints
-# can take; those by hand should go slowly.
+# MIN_LIMIT, MAX_LIMIT and the rates of an axis are for moves by hand: in that box every pose is proved to be allowed,
+# and all axes at once keep every joint within its speed. Programs have the PROGRAM_ values, which {guard}
+# puts in force: the machine's true ranges, and rates with which LinuxCNC keeps up with short motions.
 """
 
 
@@ -86,7 +95,9 @@ _HAL = """\
 loadrt [KINS]KINEMATICS made={made}
 loadrt [EMCMOT]EMCMOT servo_period_nsec=[EMCMOT]SERVO_PERIOD num_joints=[KINS]JOINTS
 addf motion-command-handler servo-thread
+addf {kinematics}.begin-steps servo-thread
 addf motion-controller servo-thread
+addf {kinematics}.end-steps servo-thread
 
 {loops}
 
@@ -96,16 +107,41 @@ net tool-offset motion.tooloffset.z => {kinematics}.tool-offset
 net teleop motion.teleop-mode => {kinematics}.teleop-mode
 net coordinated motion.coord-mode => {kinematics}.coord-mode
 
+# The guard: it stops jogs before a limit, slows and halts programs that would break one, and gives the axes' rates.
+loadrt {guard}
+addf {guard} servo-thread
+net tool-offset => {guard}.tool-offset
+net teleop => {guard}.teleop-mode
+net coordinated => {guard}.coord-mode
+net homed motion.is-all-homed => {guard}.homed
+net enabled motion.motion-enabled => {guard}.enabled
+net in-position motion.in-position => {guard}.in-position
+net jog-stop {guard}.jog-stop => motion.jog-stop
+net guarded-feed {guard}.feed => motion.adaptive-feed
+net feed-inhibit {guard}.feed-inhibit => motion.feed-inhibit
+{watched}
 net estop iocontrol.0.user-enable-out => iocontrol.0.emc-enable-in
 net tool-prepare iocontrol.0.tool-prepare => iocontrol.0.tool-prepared
 net tool-change iocontrol.0.tool-change => iocontrol.0.tool-changed
 """
 
 
+_RATES_HAL = """\
+# {name}: limits and rates of the axes, from the guard. The pins ini.* appear once LinuxCNC's task has started, for
+# which the threads must run: sleep only stands for a program to wait with.
+
+start
+loadusr -Wn inihal sleep 60
+
+{nets}
+"""
+
+
 def write_ini(machine: Machine) -> str:
     """Write the ini file."""
-    (fast, acceleration), turning = choose_unit_rates(machine, "mm"), find_slowest_drive(machine, "rad")[0]
-    home = dict(zip(machine.axes, machine.home.tolist(), strict=True))
+    (fast, acceleration), pose = choose_unit_rates(machine, "mm"), find_home_pose(machine)
+    home, box = dict(zip(machine.axes, pose.tolist(), strict=True)), find_hand_box(machine)
+    by_hand = _find_unit_speeds(machine, box)
     head = _INI.format(
         title=" ".join(machine.spec.title.split()),
         name=machine.name,
@@ -113,23 +149,45 @@ def write_ini(machine: Machine) -> str:
         letters="".join(machine.axes),
         joints=len(machine.joints),
         kinematics=name_kinematics(machine),
+        guard=name_guard(machine),
         home=" ".join(format_number(home.get(axis, 0.0)) for axis in "XYZ"),
-        jog=format_number(0.25 * fast),
+        jog=format_number(_JOG * by_hand["mm"]),
+        by_hand=format_number(by_hand["mm"]),
         fast=format_number(fast),
-        turn_jog=format_number(to_display(0.25 * turning, "rad")),
-        turn_fast=format_number(to_display(turning, "rad")),
+        turn_jog=format_number(to_display(_JOG * by_hand["rad"], "rad")),
+        turn_by_hand=format_number(to_display(by_hand["rad"], "rad")),
         acceleration=format_number(acceleration),
     )
-    low, high = (ends.tolist() for ends in estimate_axis_ranges(machine))
-    axes = [
-        _format_section(
-            f"AXIS_{axis}", [*_format_range(a, b, unit), *_format_rates(*choose_unit_rates(machine, unit), unit)]
-        )
-        for axis, unit, a, b in zip(machine.axes, machine.axis_units, low, high, strict=True)
-    ]
-    at_home = machine.inverse(machine.home).tolist()
+    axes = [_format_axis(machine, box, column) for column in range(len(machine.axes))]
+    at_home = machine.inverse(pose).tolist()
     joints = [_format_joint(i, drive, q) for i, (drive, q) in enumerate(zip(machine.drives, at_home, strict=True))]
     return "\n".join([head, *axes, *joints])
+
+
+def _find_unit_speeds(machine: Machine, box: HandBox) -> dict[str, float]:
+    """Find the speed of moves by hand for each unit; a machine without one has that of the slowest drive."""
+    speeds = {unit: find_slowest_drive(machine, unit)[0] for unit in ("mm", "rad")}
+    return speeds | {unit: float(speed) for unit, speed in zip(machine.axis_units, box.speed, strict=True)}
+
+
+def _format_axis(machine: Machine, box: HandBox, column: int) -> str:
+    """Format an axis: its ends and rates for moves by hand, then those for programs."""
+    unit = machine.axis_units[column]
+    speed, acceleration = choose_unit_rates(machine, unit)
+    low, high = estimate_axis_ranges(machine)
+    lines = [
+        *_format_range(_round_inward(box.low[column], unit, 1.0), _round_inward(box.high[column], unit, -1.0), unit),
+        *_format_rates(float(box.speed[column]), float(box.acceleration[column]), unit),
+        *(f"PROGRAM_{line}" for line in _format_range(float(low[column]), float(high[column]), unit)),
+        *(f"PROGRAM_{line}" for line in _format_rates(speed, acceleration, unit)),
+    ]
+    return _format_section(f"AXIS_{machine.axes[column]}", lines)
+
+
+def _round_inward(end: float, unit: str, sign: float) -> float:
+    """Round an end of the box inward to a hundredth of a mm or degree; ``sign`` is 1 for the low end, else -1."""
+    digit = _END_DIGIT if unit == "mm" else _END_DIGIT * pi / 180.0
+    return sign * ceil(sign * float(end) / digit) * digit
 
 
 def format_number(value: float) -> str:
@@ -181,6 +239,15 @@ def write_hal(machine: Machine) -> str:
         for i, name in enumerate(machine.joints)
     ]
     kinematics = name_kinematics(machine)
+    guard = name_guard(machine)
+    watched = [f"net told-{i} => {guard}.joint-{i}" for i in range(len(machine.joints))]
+    for axis in machine.axes:
+        letter = axis.lower()
+        watched.append(f"net {letter}-position axis.{letter}.pos-cmd => {guard}.{letter}.position")
+        for whose, section in (("hand", ""), ("program", "PROGRAM_")):
+            watched += [
+                f"setp {guard}.{letter}.{whose}-{pin} [AXIS_{axis}]{section}{key}" for pin, key in _KEYS.items()
+            ]
     told = [f"net told-{i} joint.{i}.pos-cmd => {kinematics}.joint-{i}" for i in range(len(machine.joints))]
     return _HAL.format(
         name=machine.name,
@@ -188,7 +255,20 @@ def write_hal(machine: Machine) -> str:
         loops="\n".join(loops),
         told="\n".join(told),
         kinematics=kinematics,
+        guard=guard,
+        watched="\n".join([*watched, ""]),
     )
+
+
+def write_rates_hal(machine: Machine) -> str:
+    """Write the HAL file that puts the guard's limits and rates of the axes in force, for LinuxCNC's task to read."""
+    letters = [axis.lower() for axis in machine.axes]
+    nets = [
+        f"net {letter}-{pin} {name_guard(machine)}.{letter}.{pin} => ini.{letter}.{pin.replace('-', '_')}"
+        for letter in letters
+        for pin in ("min-limit", "max-limit", "max-velocity", "max-acceleration")
+    ]
+    return _RATES_HAL.format(name=machine.name, nets="\n".join(nets))
 
 
 def write_tool_table(machine: Machine) -> str:

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from ...arguments import check_arguments
 from ...machine import Machine
-from .config import write_hal, write_ini, write_tool_table
+from .config import write_hal, write_ini, write_rates_hal, write_tool_table
 from .first_program import write_first_program
+from .guard import name_guard, write_guard
 from .model_header import name_model, write_model
 from .module import name_kinematics, write_module
 from .page import write_page
@@ -16,16 +17,17 @@ from .stamp import stamp_file
 def make_linuxcnc_configuration(machine: Machine) -> dict[str, str]:
     """Make a configuration for LinuxCNC 2.9 that runs as a simulation: {file: text}.
 
-    The files are the kinematics module (C, built by LinuxCNC's ``halcompile --install``) and the header that it
-    includes, the ini and HAL files, the tool table, a first program and a page that tells how to start, all named after
-    the machine. The last line of each
-    tells by a hash whether the file was edited since.
+    The files are the kinematics module and the guard (C, built by LinuxCNC's ``halcompile --install``) with the header
+    that both include, the ini and HAL files, the tool table, a first program and a page that tells how to start, all
+    named after the machine. The last line of each tells by a hash whether the file was edited since.
     """
     texts = {
         f"{name_kinematics(machine)}.c": write_module(machine),
+        f"{name_guard(machine)}.c": write_guard(machine),
         name_model(machine): write_model(machine),
         f"{machine.name}.ini": write_ini(machine),
         f"{machine.name}.hal": write_hal(machine),
+        f"{machine.name}_rates.hal": write_rates_hal(machine),
         f"{machine.name}.tbl": write_tool_table(machine),
         f"{machine.name}.ngc": write_first_program(machine),
         f"{machine.name}.md": write_page(machine),

@@ -7,10 +7,10 @@ from itertools import groupby, product
 import numpy as np
 
 from ...arrays import Array
-from ...kinematics.wrist import FAR_TILT
 from ...machine import Machine
 from ...units import to_display
 from .config import format_number
+from .home_pose import find_home_pose
 
 _SIDE = 40.0  # mm: the square's side, halved until the machine can go round it
 _LEAST = 0.1  # mm
@@ -33,19 +33,16 @@ def write_first_program(machine: Machine) -> str:
 
 
 def _find_square(machine: Machine) -> Array:
-    """Find the largest square with a corner at home; return home, its corners, and home, (n, axes), or home alone."""
-    side = _SIDE
+    """Find the largest square with a corner at LinuxCNC's home; return its corners from home to home, or home alone."""
+    side, home = _SIDE, find_home_pose(machine)
     while side >= _LEAST:
         for quadrant in product((1.0, -1.0), repeat=2):
-            corners = np.tile(machine.home, (len(_CORNERS), 1))
-            corners[:, :2] += side * np.array(quadrant) * _CORNERS
-            if machine.wrist is not None:
-                corners[:, machine.wrist.direction.b] += FAR_TILT
-            poses = np.concatenate([machine.home[None], corners, machine.home[None]])
+            poses = np.tile(home, (len(_CORNERS), 1))
+            poses[:, :2] += side * np.array(quadrant) * _CORNERS
             if _is_allowed(machine, poses):
                 return poses
         side *= 0.5
-    return machine.home[None, :]
+    return home[None, :]
 
 
 def _is_allowed(machine: Machine, poses: Array) -> bool:

@@ -22,6 +22,7 @@ from ...performance.characteristic_length import choose_characteristic_length
 from ...performance.jacobians import list_column_scales
 from ...performance.singularities import compute_singularity_margins, find_home_signs, list_margin_names
 from .axis_rates import choose_drive_rates
+from .home_pose import find_home_pose
 from .tape_to_c import CVector, format_c, write_function, write_test
 
 NO_SIDE = 1e-6  # of home's determinant: less is a singularity, of no side
@@ -113,7 +114,7 @@ def _write_numbers(machine: Machine) -> str:
         f"#define STEP_FACTOR {format_c(STEP_FACTOR)} /* a joint's step beyond so much of its speed is refused */",
         f"#define COMMAND_LAG {format_c(COMMAND_LAG)} /* steps by which a commanded joint may trail */",
         f"#define TILTS {int(not set(machine.axes).isdisjoint('AB'))} /* the tool tilts against Z */",
-        _write_array("double", "home", [format_c(value) for value in machine.home]),
+        _write_array("double", "home", [format_c(value) for value in find_home_pose(machine).tolist()]),
         _write_array("int", "turning", [str(int(unit == "rad")) for unit in machine.joint_units]),
     ]
     for name, letters in (("place_columns", "XYZ"), ("turn_columns", "ABC")):

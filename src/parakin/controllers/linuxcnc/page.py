@@ -7,6 +7,7 @@ from html import escape
 from ...machine import Machine
 from ...units import to_display
 from .config import format_number
+from .home_pose import find_home_pose
 from .module import name_kinematics
 
 _PAGE = """\
@@ -68,7 +69,7 @@ _PLACE = "the axes are those of the machine's frame"
 
 def write_page(machine: Machine) -> str:
     """Write the page, Markdown."""
-    home = zip(machine.axes, machine.home.tolist(), machine.axis_units, strict=True)
+    home = zip(machine.axes, find_home_pose(machine).tolist(), machine.axis_units, strict=True)
     words = [f"{axis} {format_number(to_display(value, unit))}" for axis, value, unit in home]
     return _PAGE.format(
         title=escape(" ".join(machine.spec.title.split()), quote=False),

@@ -2,7 +2,7 @@
 
    Both functions keep nothing from one call to the next: LinuxCNC hands the last joints to the inverse and the last
    pose to the forward, and that is what they stay near to. It asks the inverse for the end points of moves to come as
-   well, with joints at zero, which would spoil a memory. Nothing allocates, and every loop has an end. */
+   well, which would spoil a memory. Nothing allocates, and every loop has an end. */
 
 /* What the kinematics is told through HAL. */
 typedef struct {
@@ -13,24 +13,29 @@ typedef struct {
 
 static Pins *pins;
 
+/* The motion controller stands between these two functions in the thread: what it asks for, the joints must do in one
+   cycle. Other questions are about the ends of moves to come. */
+static int steps_are_watched;
+static void begin_steps(void *arg, long period) { (void)arg, (void)period, steps_are_watched = 1; }
+static void end_steps(void *arg, long period) { (void)arg, (void)period, steps_are_watched = 0; }
+
 /* The inverse: joints for a pose, the wrist's and all turning ones near the last. */
 
-/* Whether joints can go from the last ones, or from where they are commanded to be, to these in a cycle. After a stop
-   LinuxCNC's last joints may be old; all at zero they say nothing, for then it asks for the end of a move to come. */
+/* Whether joints can go from the last ones, or from where they are commanded to be, to these in a cycle; after a stop
+   LinuxCNC's last joints may be old. */
 static int can_step(const double *q, const double *last)
 {
     double commanded[JOINTS];
-    int far_from_last = 0, far_from_commanded = 0, known = 0;
+    int far_from_last = 0, far_from_commanded = 0;
     for (int i = 0; i < JOINTS; i++)
         commanded[i] = *pins->joint[i];
     read_joints(commanded, commanded);
     for (int i = 0; i < JOINTS; i++) {
         const double step = STEP_FACTOR * CYCLE * joint_speed[i];
-        known |= last[i] != 0.0;
         far_from_last |= !(fabs(q[i] - last[i]) <= step);
         far_from_commanded |= !(fabs(q[i] - commanded[i]) <= COMMAND_LAG * step);
     }
-    return !known || !far_from_last || !far_from_commanded;
+    return !far_from_last || !far_from_commanded;
 }
 
 int kinematicsInverse(const EmcPose *world, double *joints,
@@ -44,7 +49,9 @@ int kinematicsInverse(const EmcPose *world, double *joints,
     if (!finite_all(x, AXES) || !finite_all(last, JOINTS))
         return -1;
     shift_tip(x, *pins->tool_offset);
-    if (!find_joints(x, last, q) || !allowed(x, q) || !regular(x, q) || !can_step(q, last))
+    if (!find_joints(x, last, q) || !allowed(x, q) || !regular(x, q))
+        return -1;
+    if (steps_are_watched && !can_step(q, last))
         return -1;
     write_joints(q, joints);
     return 0;
@@ -312,7 +319,9 @@ static int make_pins(void)
     for (int i = 0; i < JOINTS; i++)
         failed |= hal_pin_float_newf(HAL_IN, &pins->joint[i], component, MODULE ".joint-%d", i);
     failed |= hal_pin_bit_newf(HAL_IN, &pins->teleop, component, MODULE ".teleop-mode");
-    return failed | hal_pin_bit_newf(HAL_IN, &pins->coordinated, component, MODULE ".coord-mode");
+    failed |= hal_pin_bit_newf(HAL_IN, &pins->coordinated, component, MODULE ".coord-mode");
+    failed |= hal_export_funct(MODULE ".begin-steps", begin_steps, NULL, 0, 0, component);
+    return failed | hal_export_funct(MODULE ".end-steps", end_steps, NULL, 0, 0, component);
 }
 
 int rtapi_app_main(void)

@@ -1,0 +1,234 @@
+/* A watch over the machine, once a servo cycle after the motion controller.
+
+   It tells how far the machine is from its nearest limit and which that is; it lets jogs stop softly before one is
+   reached, at the end of the box for moves by hand, or where a joint would pass its speed; it slows programs that are
+   about to break a limit, and halts them where they go on. And it gives the axes their low rates while they are moved
+   by hand, and their high ones in coordinated motion. It keeps the last pose, and whether a program was halted, which
+   ends with the program. */
+
+typedef struct {
+    hal_float_t *position;                          /* axis.L.pos-cmd */
+    hal_float_t *hand_min, *hand_max;               /* the box for moves by hand */
+    hal_float_t *hand_velocity, *hand_acceleration; /* rates for moves by hand */
+    hal_float_t *program_min, *program_max, *program_velocity, *program_acceleration;
+    hal_float_t *min_limit, *max_limit, *max_velocity, *max_acceleration; /* to ini.L. */
+} Axis;
+
+typedef struct {
+    Axis axis[AXES];
+    hal_float_t *joint[JOINTS]; /* joint.N.pos-cmd */
+    hal_float_t *tool_offset;   /* motion.tooloffset.z */
+    hal_bit_t *homed, *enabled, *teleop, *coordinated, *in_position; /* motion. */
+    hal_u32_t *nearest;         /* index of the nearest limit: NAME_model.h and NAME.md have the names */
+    hal_float_t *distance;      /* to it: 0 where it is reached, 1 where jogs stop */
+    hal_bit_t *jog_stop;        /* to motion.jog-stop */
+    hal_float_t *feed;          /* to motion.adaptive-feed */
+    hal_bit_t *feed_inhibit;    /* to motion.feed-inhibit */
+} Pins;
+
+static Pins *pins;
+static double last_pose[AXES], last_joints[JOINTS];
+static int knows_last; /* the two are those of the cycle before */
+
+/* What the machine does in this cycle; mm, rad, s. */
+typedef struct {
+    double pose[AXES], joints[JOINTS], pose_rates[AXES], joint_rates[JOINTS];
+} Motion;
+
+static int read_motion(Motion *m)
+{
+    double world[AXES], joints[JOINTS], own[JOINTS];
+    for (int i = 0; i < AXES; i++)
+        world[i] = *pins->axis[i].position * (turning_axis[i] ? DEGREE : 1.0);
+    for (int i = 0; i < JOINTS; i++)
+        joints[i] = *pins->joint[i];
+    read_joints(joints, m->joints);
+    if (!finite_all(world, AXES) || !finite_all(m->joints, JOINTS))
+        return 0;
+    for (int i = 0; i < AXES; i++)
+        m->pose[i] = world[i];
+    shift_tip(m->pose, *pins->tool_offset);
+    const int known = knows_last;
+    for (int i = 0; i < AXES; i++) {
+        m->pose_rates[i] = known ? (m->pose[i] - last_pose[i]) / CYCLE : 0.0;
+        last_pose[i] = m->pose[i];
+    }
+    for (int i = 0; i < JOINTS; i++) {
+        m->joint_rates[i] = known ? (m->joints[i] - last_joints[i]) / CYCLE : 0.0;
+        last_joints[i] = m->joints[i];
+    }
+    knows_last = 1;
+    if (!find_joints(m->pose, m->joints, own))
+        return 0;
+    for (int i = 0; i < JOINTS; i++) /* the interpolated joints trail the pose by some cycles */
+        if (!(fabs(own[i] - m->joints[i]) <= TRAILS * CYCLE * joint_speed[i]))
+            return 0;
+    return 1;
+}
+
+/* Where the machine comes to rest if it is stopped now: every axis by itself in a jog, all in step else. */
+static void predict_stop(const Motion *m, double *pose)
+{
+    double seconds = 0.0;
+    for (int i = 0; i < JOINTS; i++)
+        seconds = fmax(seconds, fabs(m->joint_rates[i]) / joint_acceleration[i]);
+    for (int i = 0; i < AXES; i++) {
+        const double unit = turning_axis[i] ? DEGREE : 1.0, rate = m->pose_rates[i];
+        if (*pins->teleop)
+            seconds = fabs(rate) / (*pins->axis[i].hand_acceleration * unit);
+        pose[i] = m->pose[i] + rate * (0.5 * seconds + LATENCY * CYCLE);
+    }
+}
+
+/* The distance to the nearest limit where the machine would be; below zero too where it can't be at all. */
+static double distance_at(const double *pose, const double *near, double *joints)
+{
+    int nearest;
+    return find_joints(pose, near, joints) ? distance_to_limits(pose, joints, &nearest) : -1.0;
+}
+
+static int leaves_the_box(const Motion *m, const double *stop)
+{
+    for (int i = 0; i < AXES; i++) {
+        const double unit = turning_axis[i] ? DEGREE : 1.0;
+        const Axis *axis = &pins->axis[i];
+        if ((m->pose_rates[i] > 0.0 && stop[i] > *axis->hand_max * unit)
+            || (m->pose_rates[i] < 0.0 && stop[i] < *axis->hand_min * unit))
+            return 1;
+    }
+    return 0;
+}
+
+/* Whether a joint would pass its speed on the way to where the machine stops. */
+static int swings(const Motion *m, const double *stop)
+{
+    double here[JOINTS], there[JOINTS], ahead[AXES];
+    for (int part = 0; part <= PARTS; part++) {
+        for (int i = 0; i < AXES; i++)
+            ahead[i] = m->pose[i] + part * (stop[i] - m->pose[i]) / PARTS;
+        if (!find_joints(ahead, m->joints, here))
+            return 1;
+        for (int i = 0; i < AXES; i++)
+            ahead[i] += m->pose_rates[i] * CYCLE;
+        if (!find_joints(ahead, here, there))
+            return 1;
+        for (int i = 0; i < JOINTS; i++)
+            if (!(fabs(there[i] - here[i]) <= SWINGS * CYCLE * joint_speed[i]))
+                return 1;
+    }
+    return 0;
+}
+
+static void give_rates(void)
+{
+    const int program = *pins->coordinated;
+    for (int i = 0; i < AXES; i++) {
+        const Axis *axis = &pins->axis[i];
+        *axis->min_limit = *axis->program_min;
+        *axis->max_limit = *axis->program_max;
+        *axis->max_velocity = program ? *axis->program_velocity : *axis->hand_velocity;
+        *axis->max_acceleration = program ? *axis->program_acceleration : *axis->hand_acceleration;
+    }
+}
+
+static void watch(void *arg, long period)
+{
+    Motion m;
+    double stop[AXES], joints[JOINTS];
+    int nearest = 0, is_known, moves = 0;
+    (void)arg;
+    (void)period;
+    give_rates();
+    if (!*pins->homed || !*pins->enabled)
+        knows_last = 0;
+    is_known = *pins->homed && *pins->enabled && read_motion(&m);
+    if (!*pins->coordinated || *pins->in_position)
+        *pins->feed_inhibit = 0;
+    if (!is_known) { /* not homed, switched off, or driven out of a singularity joint by joint */
+        *pins->distance = 0.0;
+        *pins->jog_stop = 0;
+        *pins->feed = 1.0;
+        return;
+    }
+    const double distance = distance_to_limits(m.pose, m.joints, &nearest);
+    *pins->distance = distance;
+    *pins->nearest = nearest;
+    for (int i = 0; i < AXES; i++)
+        moves |= m.pose_rates[i] != 0.0;
+    predict_stop(&m, stop);
+    const double ahead = moves ? distance_at(stop, m.joints, joints) : distance;
+    if (*pins->coordinated) {
+        *pins->jog_stop = 0;
+        *pins->feed = ahead > 0.0 || ahead >= distance ? 1.0 : SLOW_FEED;
+        for (int i = 0; i < AXES; i++)
+            stop[i] = m.pose[i] + IMMINENT * CYCLE * m.pose_rates[i];
+        if (*pins->feed < 1.0 && !(distance_at(stop, m.joints, joints) > 0.0))
+            *pins->feed_inhibit = 1;
+        return;
+    }
+    const int is_near = ahead < 1.0 && ahead < distance;
+    *pins->jog_stop = moves && (is_near || (*pins->teleop && (leaves_the_box(&m, stop) || swings(&m, stop))));
+    *pins->feed = 1.0;
+}
+
+static int component;
+
+/* A float pin of an axis, by its letter. */
+static int axis_pin(hal_pin_dir_t dir, hal_float_t **pin, int i, const char *name)
+{
+    return hal_pin_float_newf(dir, pin, component, MODULE ".%c.%s", axis_letters[i], name);
+}
+
+static int make_pins(void)
+{
+    int bad = 0;
+    for (int i = 0; i < AXES; i++) {
+        Axis *axis = &pins->axis[i];
+        bad |= axis_pin(HAL_IN, &axis->position, i, "position");
+        bad |= axis_pin(HAL_IN, &axis->hand_min, i, "hand-min");
+        bad |= axis_pin(HAL_IN, &axis->hand_max, i, "hand-max");
+        bad |= axis_pin(HAL_IN, &axis->hand_velocity, i, "hand-velocity");
+        bad |= axis_pin(HAL_IN, &axis->hand_acceleration, i, "hand-acceleration");
+        bad |= axis_pin(HAL_IN, &axis->program_min, i, "program-min");
+        bad |= axis_pin(HAL_IN, &axis->program_max, i, "program-max");
+        bad |= axis_pin(HAL_IN, &axis->program_velocity, i, "program-velocity");
+        bad |= axis_pin(HAL_IN, &axis->program_acceleration, i, "program-acceleration");
+        bad |= axis_pin(HAL_OUT, &axis->min_limit, i, "min-limit");
+        bad |= axis_pin(HAL_OUT, &axis->max_limit, i, "max-limit");
+        bad |= axis_pin(HAL_OUT, &axis->max_velocity, i, "max-velocity");
+        bad |= axis_pin(HAL_OUT, &axis->max_acceleration, i, "max-acceleration");
+    }
+    for (int i = 0; i < JOINTS; i++)
+        bad |= hal_pin_float_newf(HAL_IN, &pins->joint[i], component, MODULE ".joint-%d", i);
+    bad |= hal_pin_float_newf(HAL_IN, &pins->tool_offset, component, MODULE ".tool-offset");
+    bad |= hal_pin_bit_newf(HAL_IN, &pins->homed, component, MODULE ".homed");
+    bad |= hal_pin_bit_newf(HAL_IN, &pins->enabled, component, MODULE ".enabled");
+    bad |= hal_pin_bit_newf(HAL_IN, &pins->teleop, component, MODULE ".teleop-mode");
+    bad |= hal_pin_bit_newf(HAL_IN, &pins->coordinated, component, MODULE ".coord-mode");
+    bad |= hal_pin_bit_newf(HAL_IN, &pins->in_position, component, MODULE ".in-position");
+    bad |= hal_pin_u32_newf(HAL_OUT, &pins->nearest, component, MODULE ".nearest");
+    bad |= hal_pin_float_newf(HAL_OUT, &pins->distance, component, MODULE ".distance");
+    bad |= hal_pin_bit_newf(HAL_OUT, &pins->jog_stop, component, MODULE ".jog-stop");
+    bad |= hal_pin_float_newf(HAL_OUT, &pins->feed, component, MODULE ".feed");
+    bad |= hal_pin_bit_newf(HAL_OUT, &pins->feed_inhibit, component, MODULE ".feed-inhibit");
+    return bad;
+}
+
+int rtapi_app_main(void)
+{
+    component = hal_init(MODULE);
+    if (component < 0)
+        return component;
+    pins = hal_malloc(sizeof *pins);
+    if (!pins || make_pins() || hal_export_funct(MODULE, watch, NULL, 1, 0, component)) {
+        hal_exit(component);
+        return -1;
+    }
+    *pins->feed = 1.0;
+    hal_ready(component);
+    return 0;
+}
+
+void rtapi_app_exit(void) { hal_exit(component); }
+
+MODULE_LICENSE("GPL");

@@ -106,7 +106,8 @@ def programs(machine, folder, place, upright):
     job = pk.prepare(machine, part(folder, upright), workpiece=place)
     file = io.BytesIO()
     pk.make_linuxcnc_program(job.trajectory)(file)
-    return job, as_programmed(job.posted), file.getvalue().decode("ascii")
+    text = file.getvalue().decode("ascii")
+    return job, as_programmed(job.posted, text), text
 
 
 def told(job, text, ours):

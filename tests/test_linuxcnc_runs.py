@@ -33,7 +33,7 @@ from stub import FIELDS, Stub, inward, outward, pose, world  # noqa: E402
 TASKS = {
     "linear_delta": ("G1 X50 Y-30 Z320 F30000", {"G0 Z600": "joint", "G0 X350 Y-330 Z100": "kinematicsInverse"}),
     "hexapod": ("G1 X30 Y20 Z-900 A5 B-5 C8 F9000", {"G0 X350 Z-1200": "joint", "G0 Z-1000 A60": "kinematicsInverse"}),
-    "tricept": ("G1 X50 Y60 Z-1630 B15 C20 F9000", {"G0 Z-2090": "joint", "G0 X1500 Z-400": "kinematicsInverse"}),
+    "tricept": ("G1 X50 Y60 Z-1630 B-15 C20 F9000", {"G0 Z-2090": "joint", "G0 X1500 Z-400": "kinematicsInverse"}),
 }
 # Where the example part lies, on top of its own frame, and whether its tool stays upright.
 PLACES = {
@@ -243,8 +243,8 @@ def aside(points, path):
 
 @pytest.mark.parametrize("machine", ["tricept"], indirect=True)
 def test_with_the_programmed_feed_a_joint_passes_its_speed(machine, linuxcnc, tmp_path):
-    posted = first_passes(machine, tmp_path).posted
-    text = as_programmed(posted)
+    job = first_passes(machine, tmp_path)
+    posted, text = job.posted, as_programmed(job.posted, written(job.trajectory))
     run = linuxcnc.run({"program": "part.ngc"}, {"part.ngc": text})
     assert "told" not in run.seen, run.seen
     part = run.part(first_line(text), world(machine, posted.poses[:1])[0])

@@ -71,21 +71,19 @@ class Run:
         return slice(int(np.abs(self.poses[:told] - start).max(1).argmin()), int(moving[-1]) + 2)
 
 
-def as_programmed(posted):
-    """A posted path as G-code, as a plain post writes it: its own feeds, and rapids at the axes' speeds."""
+def as_programmed(posted, text):
+    """A posted path as G-code, as a plain post writes it: its own feeds, and rapids at the axes' speeds.
+
+    Its first record is come to as in the text of its program, which parakin made: on a wrist not every way leads there.
+    """
     machine = posted.machine
     rows = np.where(np.array(machine.axis_units) == "rad", np.degrees(posted.poses), posted.poses).tolist()
-    lines = ["G21 G90 G17 G40 G49 G94"]
+    lines = [*text.split("\n")[: first_line(text) - 2], "G94"]
     for row, rapid, feed in zip(rows, posted.path.rapid.tolist(), posted.path.feed.tolist(), strict=True):
         words = " ".join(f"{axis}{value:.6f}" for axis, value in zip(machine.axes, row, strict=True))
         lines.append(f"G53 G0 {words}" if rapid else f"G53 G1 {words} F{feed:g}")
-    return "\n".join([lines[0], *approached(lines[1]), "G64 P0.005 Q0", *lines[2:], "M2", ""])
-
-
-def approached(first):
-    """To a program's first point in four seconds, and a halt there."""
-    words = " ".join(word for word in first.split() if word[0] in FIELDS)
-    return ["G93 G61", f"G53 G1 {words} F15", "G94"]
+    begin = first_line(text) - 1  # where the first record is repeated, and the program goes on
+    return "\n".join([*lines[: begin + 1], "G64 P0.005 Q0", *lines[begin + 1 :], "M2", ""])
 
 
 def first_line(text):
@@ -115,7 +113,23 @@ class Simulation:
                 break
         return run
 
-    def _done(self, seconds):
+    def operate(self, steps, programs=None, seconds=300):
+        """Do an operator's steps (see operator_ui.py); return what was seen, and every cycle's samples.
+
+        The samples are whether the move is coordinated, the program's line, the axes, the joints.
+        """
+        for name, text in (programs or {}).items():
+            (self.folder / name).write_text(text, encoding="utf-8")
+            os.chown(self.folder / name, NOBODY, NOBODY)
+        task = {"joints": len(self.machine.joints), "steps": steps}
+        (self.folder / "task.json").write_text(json.dumps(task))
+        shutil.copy(HERE / "operator_ui.py", self.folder / "ui.py")
+        seen, rows, done = self._start(seconds)
+        assert "hung" not in seen, json.dumps(seen, indent=1)
+        assert done.returncode == 0, done.stdout + done.stderr
+        return seen["steps"], rows
+
+    def _start(self, seconds):
         (self.folder / "seen.json").unlink(missing_ok=True)
         command = [*ALONE, *AS_NOBODY, f"HOME={self.folder}", "linuxcnc", "-r"]
         command.append(str(self.folder / f"{self.machine.name}.ini"))
@@ -125,7 +139,10 @@ class Simulation:
         assert (self.folder / "seen.json").exists(), done.stdout + done.stderr
         seen = json.loads((self.folder / "seen.json").read_text())
         assert "overrun" not in (self.folder / "samples.txt").read_text(), "cycles are missing"
-        rows = np.loadtxt(self.folder / "samples.txt")
+        return seen, np.loadtxt(self.folder / "samples.txt"), done
+
+    def _done(self, seconds):
+        seen, rows, done = self._start(seconds)
         rows = rows[rows[:, 0] != 0][:, 1:]
         axes = len(self.machine.axes)
         poses = np.zeros((len(rows), 9))

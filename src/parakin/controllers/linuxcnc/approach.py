@@ -11,6 +11,7 @@ from ...kinematics.wrist import EXACT, NEAR_START, PRINTED, SAME_MODE, TILTED, W
 from ...machine import Machine
 from ...toolpath.posting.wrist_poses import find_pose_with_wrist
 from ...toolpath.timing.drive_limits import DriveLimits
+from .home_pose import find_home_pose
 
 _SPEED_FRACTION = 0.25  # fraction of the joints' speeds
 _FROM_ANYWHERE = 4.0  # s, at least: for the motion whose start is not known
@@ -40,11 +41,22 @@ def plan_approach(machine: Machine, first: Array, joints: Array, mode: str) -> t
     if wrist is None and mode != machine.mode:
         raise PoseError(f"mode {mode!r}: no way from home, which is in {machine.mode!r}, to the first record")
     way = [first] if wrist is None else _approach_with_wrist(machine, wrist, first, joints, mode)
+    home = find_home_pose(machine)
+    if wrist is not None and (home != machine.home).any():  # straight to the pole above it, where the way begins
+        way = [_put_upright(machine, wrist, home), *way]
     poses = np.array(way)
-    starts = np.concatenate([machine.home[None], poses[:-1]])
+    starts = np.concatenate([home[None], poses[:-1]])
     seconds = [_choose_seconds(machine, start, end, mode) for start, end in zip(starts, poses, strict=True)]
     seconds[0] = max(seconds[0], _FROM_ANYWHERE)
     return poses, np.array(seconds)
+
+
+def _put_upright(machine: Machine, wrist: Wrist, home: Array) -> Array:
+    """Put the tool at LinuxCNC's home on the pole, without a turn of C where it is free there."""
+    pole = np.array(machine.home)
+    if is_upright(pole[wrist.direction.b]):
+        pole[wrist.direction.c] = home[wrist.direction.c]
+    return pole
 
 
 def _approach_with_wrist(machine: Machine, wrist: Wrist, first: Array, joints: Array, mode: str) -> list[Array]:

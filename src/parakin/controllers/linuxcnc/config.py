@@ -95,30 +95,30 @@ _HAL = """\
 loadrt [KINS]KINEMATICS made={made}
 loadrt [EMCMOT]EMCMOT servo_period_nsec=[EMCMOT]SERVO_PERIOD num_joints=[KINS]JOINTS
 addf motion-command-handler servo-thread
-addf {kinematics}.begin-steps servo-thread
+addf kins.begin-steps servo-thread
 addf motion-controller servo-thread
-addf {kinematics}.end-steps servo-thread
+addf kins.end-steps servo-thread
 
 {loops}
 
 # What the kinematics has to know: where the joints are told to be, the tool's length, and who moves the machine.
 {told}
-net tool-offset motion.tooloffset.z => {kinematics}.tool-offset
-net teleop motion.teleop-mode => {kinematics}.teleop-mode
-net coordinated motion.coord-mode => {kinematics}.coord-mode
+net tool-offset motion.tooloffset.z => kins.tool-offset
+net teleop motion.teleop-mode => kins.teleop-mode
+net coordinated motion.coord-mode => kins.coord-mode
 
 # The guard: it stops jogs before a limit, slows and halts programs that would break one, and gives the axes' rates.
 loadrt {guard}
-addf {guard} servo-thread
-net tool-offset => {guard}.tool-offset
-net teleop => {guard}.teleop-mode
-net coordinated => {guard}.coord-mode
-net homed motion.is-all-homed => {guard}.homed
-net enabled motion.motion-enabled => {guard}.enabled
-net in-position motion.in-position => {guard}.in-position
-net jog-stop {guard}.jog-stop => motion.jog-stop
-net guarded-feed {guard}.feed => motion.adaptive-feed
-net feed-inhibit {guard}.feed-inhibit => motion.feed-inhibit
+addf guard.watch servo-thread
+net tool-offset => guard.tool-offset
+net teleop => guard.teleop-mode
+net coordinated => guard.coord-mode
+net homed motion.is-all-homed => guard.homed
+net enabled motion.motion-enabled => guard.enabled
+net in-position motion.in-position => guard.in-position
+net jog-stop guard.jog-stop => motion.jog-stop
+net guarded-feed guard.feed => motion.adaptive-feed
+net feed-inhibit guard.feed-inhibit => motion.feed-inhibit
 {watched}
 net estop iocontrol.0.user-enable-out => iocontrol.0.emc-enable-in
 net tool-prepare iocontrol.0.tool-prepare => iocontrol.0.tool-prepared
@@ -240,15 +240,13 @@ def write_hal(machine: Machine) -> str:
     ]
     kinematics = name_kinematics(machine)
     guard = name_guard(machine)
-    watched = [f"net told-{i} => {guard}.joint-{i}" for i in range(len(machine.joints))]
+    watched = [f"net told-{i} => guard.joint-{i}" for i in range(len(machine.joints))]
     for axis in machine.axes:
         letter = axis.lower()
-        watched.append(f"net {letter}-position axis.{letter}.pos-cmd => {guard}.{letter}.position")
+        watched.append(f"net {letter}-position axis.{letter}.pos-cmd => guard.{letter}.position")
         for whose, section in (("hand", ""), ("program", "PROGRAM_")):
-            watched += [
-                f"setp {guard}.{letter}.{whose}-{pin} [AXIS_{axis}]{section}{key}" for pin, key in _KEYS.items()
-            ]
-    told = [f"net told-{i} joint.{i}.pos-cmd => {kinematics}.joint-{i}" for i in range(len(machine.joints))]
+            watched += [f"setp guard.{letter}.{whose}-{pin} [AXIS_{axis}]{section}{key}" for pin, key in _KEYS.items()]
+    told = [f"net told-{i} joint.{i}.pos-cmd => kins.joint-{i}" for i in range(len(machine.joints))]
     return _HAL.format(
         name=machine.name,
         made=hash_kinematics(machine),
@@ -264,7 +262,7 @@ def write_rates_hal(machine: Machine) -> str:
     """Write the HAL file that puts the guard's limits and rates of the axes in force, for LinuxCNC's task to read."""
     letters = [axis.lower() for axis in machine.axes]
     nets = [
-        f"net {letter}-{pin} {name_guard(machine)}.{letter}.{pin} => ini.{letter}.{pin.replace('-', '_')}"
+        f"net {letter}-{pin} guard.{letter}.{pin} => ini.{letter}.{pin.replace('-', '_')}"
         for letter in letters
         for pin in ("min-limit", "max-limit", "max-velocity", "max-acceleration")
     ]

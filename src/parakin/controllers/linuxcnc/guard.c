@@ -176,7 +176,7 @@ static int component;
 /* A float pin of an axis, by its letter. */
 static int axis_pin(hal_pin_dir_t dir, hal_float_t **pin, int i, const char *name)
 {
-    return hal_pin_float_newf(dir, pin, component, MODULE ".%c.%s", axis_letters[i], name);
+    return hal_pin_float_newf(dir, pin, component, "guard.%c.%s", axis_letters[i], name);
 }
 
 static int make_pins(void)
@@ -199,18 +199,18 @@ static int make_pins(void)
         bad |= axis_pin(HAL_OUT, &axis->max_acceleration, i, "max-acceleration");
     }
     for (int i = 0; i < JOINTS; i++)
-        bad |= hal_pin_float_newf(HAL_IN, &pins->joint[i], component, MODULE ".joint-%d", i);
-    bad |= hal_pin_float_newf(HAL_IN, &pins->tool_offset, component, MODULE ".tool-offset");
-    bad |= hal_pin_bit_newf(HAL_IN, &pins->homed, component, MODULE ".homed");
-    bad |= hal_pin_bit_newf(HAL_IN, &pins->enabled, component, MODULE ".enabled");
-    bad |= hal_pin_bit_newf(HAL_IN, &pins->teleop, component, MODULE ".teleop-mode");
-    bad |= hal_pin_bit_newf(HAL_IN, &pins->coordinated, component, MODULE ".coord-mode");
-    bad |= hal_pin_bit_newf(HAL_IN, &pins->in_position, component, MODULE ".in-position");
-    bad |= hal_pin_u32_newf(HAL_OUT, &pins->nearest, component, MODULE ".nearest");
-    bad |= hal_pin_float_newf(HAL_OUT, &pins->distance, component, MODULE ".distance");
-    bad |= hal_pin_bit_newf(HAL_OUT, &pins->jog_stop, component, MODULE ".jog-stop");
-    bad |= hal_pin_float_newf(HAL_OUT, &pins->feed, component, MODULE ".feed");
-    bad |= hal_pin_bit_newf(HAL_OUT, &pins->feed_inhibit, component, MODULE ".feed-inhibit");
+        bad |= hal_pin_float_newf(HAL_IN, &pins->joint[i], component, "guard.joint-%d", i);
+    bad |= hal_pin_float_newf(HAL_IN, &pins->tool_offset, component, "guard.tool-offset");
+    bad |= hal_pin_bit_newf(HAL_IN, &pins->homed, component, "guard.homed");
+    bad |= hal_pin_bit_newf(HAL_IN, &pins->enabled, component, "guard.enabled");
+    bad |= hal_pin_bit_newf(HAL_IN, &pins->teleop, component, "guard.teleop-mode");
+    bad |= hal_pin_bit_newf(HAL_IN, &pins->coordinated, component, "guard.coord-mode");
+    bad |= hal_pin_bit_newf(HAL_IN, &pins->in_position, component, "guard.in-position");
+    bad |= hal_pin_u32_newf(HAL_OUT, &pins->nearest, component, "guard.nearest");
+    bad |= hal_pin_float_newf(HAL_OUT, &pins->distance, component, "guard.distance");
+    bad |= hal_pin_bit_newf(HAL_OUT, &pins->jog_stop, component, "guard.jog-stop");
+    bad |= hal_pin_float_newf(HAL_OUT, &pins->feed, component, "guard.feed");
+    bad |= hal_pin_bit_newf(HAL_OUT, &pins->feed_inhibit, component, "guard.feed-inhibit");
     return bad;
 }
 
@@ -220,7 +220,7 @@ int rtapi_app_main(void)
     if (component < 0)
         return component;
     pins = hal_malloc(sizeof *pins);
-    if (!pins || make_pins() || hal_export_funct(MODULE, watch, NULL, 1, 0, component)) {
+    if (!pins || make_pins() || hal_export_funct("guard.watch", watch, NULL, 1, 0, component)) {
         hal_exit(component);
         return -1;
     }

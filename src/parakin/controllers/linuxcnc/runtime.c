@@ -315,13 +315,13 @@ static int make_pins(void)
     pins = hal_malloc(sizeof *pins);
     if (!pins)
         return -1;
-    int failed = hal_pin_float_newf(HAL_IN, &pins->tool_offset, component, MODULE ".tool-offset");
+    int failed = hal_pin_float_newf(HAL_IN, &pins->tool_offset, component, "kins.tool-offset");
     for (int i = 0; i < JOINTS; i++)
-        failed |= hal_pin_float_newf(HAL_IN, &pins->joint[i], component, MODULE ".joint-%d", i);
-    failed |= hal_pin_bit_newf(HAL_IN, &pins->teleop, component, MODULE ".teleop-mode");
-    failed |= hal_pin_bit_newf(HAL_IN, &pins->coordinated, component, MODULE ".coord-mode");
-    failed |= hal_export_funct(MODULE ".begin-steps", begin_steps, NULL, 0, 0, component);
-    return failed | hal_export_funct(MODULE ".end-steps", end_steps, NULL, 0, 0, component);
+        failed |= hal_pin_float_newf(HAL_IN, &pins->joint[i], component, "kins.joint-%d", i);
+    failed |= hal_pin_bit_newf(HAL_IN, &pins->teleop, component, "kins.teleop-mode");
+    failed |= hal_pin_bit_newf(HAL_IN, &pins->coordinated, component, "kins.coord-mode");
+    failed |= hal_export_funct("kins.begin-steps", begin_steps, NULL, 0, 0, component);
+    return failed | hal_export_funct("kins.end-steps", end_steps, NULL, 0, 0, component);
 }
 
 int rtapi_app_main(void)

@@ -1,0 +1,184 @@
+#!/usr/bin/python3
+"""LinuxCNC's user interface in a test, for an operator's session: one step after the other, whatever LinuxCNC says.
+
+LinuxCNC starts this in the folder of its ini file, with its own Python. task.json has the steps, each a word and
+its arguments; seen.json tells for every step what LinuxCNC said and how the machine stood after it. A step that does
+not come to rest in time ends the session, with the whole state.
+"""
+
+import json
+import subprocess
+import time
+from pathlib import Path
+
+import linuxcnc
+
+MOST = 60.0  # s for a step
+REST = 0.15  # s for which the machine must stand
+DRAINING = 0.3  # s for the sampler's last rows
+PLAIN = (int, float, str, bool, tuple, list)
+
+
+class Operator:
+    def __init__(self, joints):
+        self.command, self.status, self.errors = linuxcnc.command(), linuxcnc.stat(), linuxcnc.error_channel()
+        self.joints, self.said = joints, []
+
+    def wait(self, ready):
+        end = time.monotonic() + MOST
+        while time.monotonic() < end:
+            self.status.poll()
+            self.listen()
+            if ready(self.status):
+                return
+            time.sleep(0.01)
+        raise TimeoutError
+
+    def listen(self):
+        told = self.errors.poll()
+        while told:
+            self.said.append(told[1].strip())
+            told = self.errors.poll()
+
+    def tell(self, word, *arguments):
+        getattr(self.command, word)(*arguments)
+        self.command.wait_complete()
+
+    def switch_on(self):
+        self.wait(lambda s: s.joints == self.joints)
+        self.tell("state", linuxcnc.STATE_ESTOP_RESET)
+        self.tell("state", linuxcnc.STATE_ON)
+        self.wait(lambda s: s.task_state == linuxcnc.STATE_ON)
+
+    def home(self):
+        self.joint_mode()
+        self.tell("home", -1)
+        self.wait(lambda s: all(s.homed[: self.joints]))
+
+    def joint_mode(self):
+        self.tell("mode", linuxcnc.MODE_MANUAL)
+        self.wait(lambda s: s.task_mode == linuxcnc.MODE_MANUAL)
+        self.tell("teleop_enable", 0)
+        self.wait(lambda s: s.motion_mode == linuxcnc.TRAJ_MODE_FREE)
+
+    def world_mode(self):
+        self.tell("mode", linuxcnc.MODE_MANUAL)
+        self.wait(lambda s: s.task_mode == linuxcnc.MODE_MANUAL)
+        self.tell("teleop_enable", 1)
+        self.wait(lambda s: s.motion_mode == linuxcnc.TRAJ_MODE_TELEOP or s.task_state != linuxcnc.STATE_ON)
+
+    def jog(self, axis, speed, seconds):
+        """Jog an axis by its number, mm/s or degrees/s."""
+        self.world_mode()
+        self._jog(0, axis, speed, seconds)
+
+    def jog_joint(self, joint, speed, seconds):
+        self.joint_mode()
+        self._jog(1, joint, speed, seconds)
+
+    def _jog(self, is_joint, number, speed, seconds):
+        self.command.jog(linuxcnc.JOG_CONTINUOUS, is_joint, number, speed)
+        time.sleep(seconds)
+        self.command.jog(linuxcnc.JOG_STOP, is_joint, number)
+
+    def mdi(self, block, seconds=None):
+        """Run a block; with seconds abort it after these."""
+        self.tell("mode", linuxcnc.MODE_MDI)
+        self.wait(lambda s: s.task_mode == linuxcnc.MODE_MDI)
+        self.command.mdi(block)
+        self._run_out(seconds)
+
+    def program(self, name, seconds=None):
+        path = str(Path(name).resolve())
+        self.tell("mode", linuxcnc.MODE_AUTO)
+        self.wait(lambda s: s.task_mode == linuxcnc.MODE_AUTO)
+        self.tell("program_open", path)
+        self.wait(lambda s: s.file == path)
+        self.command.auto(linuxcnc.AUTO_RUN, 0)
+        self._run_out(seconds)
+
+    def _run_out(self, seconds):
+        time.sleep(0.1 if seconds is None else seconds)
+        if seconds is not None:
+            self.abort()
+
+    def abort(self):
+        self.tell("abort")
+
+    def override(self, share):
+        self.tell("feedrate", share)
+
+    def stop_at_once(self, seconds):
+        """Press the emergency stop in the middle of a step, and switch on again."""
+        self.tell("state", linuxcnc.STATE_ESTOP)
+        time.sleep(seconds)
+        self.switch_on()
+
+    def is_off(self):
+        self.status.poll()
+        return self.status.task_state != linuxcnc.STATE_ON
+
+    def stands(self):
+        """Wait until the machine stands, or is off."""
+        since, last = time.monotonic(), None
+        end = since + MOST
+        while time.monotonic() < end:
+            self.status.poll()
+            self.listen()
+            here = (self.status.position, self.status.joint_position)
+            if here != last or (self.status.interp_state != linuxcnc.INTERP_IDLE and not self.is_off()):
+                since, last = time.monotonic(), here
+            if time.monotonic() > since + REST:
+                return
+            time.sleep(0.01)
+        raise TimeoutError
+
+    def describe(self):
+        s = self.status
+        s.poll()
+        return {
+            "on": s.task_state == linuxcnc.STATE_ON,
+            "position": list(s.position),
+            "shown": list(s.actual_position),
+            "joints": list(s.joint_position[: self.joints]),
+            "told": [joint["output"] for joint in s.joint[: self.joints]],
+            "said": self.said,
+        }
+
+
+def dump(status):
+    status.poll()
+    names = [name for name in dir(status) if not name.startswith("_")]
+    return {name: repr(getattr(status, name)) for name in names if isinstance(getattr(status, name), PLAIN)}
+
+
+def work(task, seen):
+    operator = Operator(task["joints"])
+    operator.switch_on()
+    operator.home()
+    for step in task["steps"]:
+        operator.said = []
+        try:
+            getattr(operator, step[0])(*step[1:])
+            operator.stands()
+        except TimeoutError:
+            seen["hung"] = {"step": step, "state": dump(operator.status)}
+            return
+        seen["steps"].append({"step": step} | operator.describe())
+        if operator.is_off():
+            operator.switch_on()
+            operator.world_mode() if task.get("goes on by hand") else None
+
+
+def main():
+    task, seen = json.loads(Path("task.json").read_text()), {"steps": []}
+    with Path("samples.txt").open("w") as file, subprocess.Popen(["halsampler"], stdout=file) as sampler:
+        try:
+            work(task, seen)
+        finally:
+            time.sleep(DRAINING)
+            sampler.terminate()
+            Path("seen.json").write_text(json.dumps(seen))
+
+
+main()

@@ -8,9 +8,8 @@ from pathlib import Path
 
 import numpy as np
 
-from parakin.controllers.linuxcnc.model_header import name_model, write_model
+from parakin.controllers.linuxcnc.model_header import list_limit_names, name_model, write_model
 from parakin.controllers.linuxcnc.module import name_kinematics, write_module
-from parakin.performance.singularities import list_margin_names
 
 HERE = Path(__file__).parent
 HEADERS = ("rtapi.h", "rtapi_app.h", "rtapi_math.h", "rtapi_string.h", "hal.h", "kinematics.h")
@@ -113,7 +112,7 @@ class ModelProbe:
 
     def __init__(self, library, machine):
         self.library, self.sizes = library, (len(machine.joints), len(machine.axes))
-        self.names = [*machine.limits, *(f"singularity, {name}" for name in list_margin_names(machine))]
+        self.names = list_limit_names(machine)
 
     def rates(self, poses, joints):
         """dq/dx (n, joints, axes), and whether the machine is not singular there (n,)."""

@@ -158,17 +158,21 @@ def _write_sides(machine: Machine) -> Iterator[str]:
 
 def _write_limits(machine: Machine) -> Iterator[str]:
     """Write the limits' and singularities' names, and how near to one a jog stops."""
-    names = [*machine.limits, *(f"singularity, {name}" for name in list_margin_names(machine))]
     near = [NEAR_LIMIT[limit.unit] * _scale_reach(limit) for limit in machine.limit_definitions]
     least = find_least_margins(machine)
     rates = np.array([choose_drive_rates(drive) for drive in machine.drives])
-    yield _write_array("char *const", "limit_names", [f'"{name}"' for name in names])
+    yield _write_array("char *const", "limit_names", [f'"{name}"' for name in list_limit_names(machine)])
     yield _write_array("double", "near_limit", [format_c(value) for value in near] or ["0.0"]) + " /* mm, rad */"
     yield _write_array("double", "least_singularity", [format_c(value) for value in least])
     for name, values in (("joint_speed", rates[:, 0]), ("joint_acceleration", rates[:, 1])):
         yield _write_array("double", name, [format_c(value) for value in values]) + " /* of the drives, mm, rad, s */"
     for name, ends in (("joint_low", "low"), ("joint_high", "high")):
         yield _write_array("double", name, [format_c(getattr(drive, ends)) for drive in machine.drives])
+
+
+def list_limit_names(machine: Machine) -> list[str]:
+    """List the names of limits and singularities, in the order in which the C counts them."""
+    return [*machine.limits, *(f"singularity, {name}" for name in list_margin_names(machine))]
 
 
 def find_least_margins(machine: Machine) -> Array:

@@ -7,7 +7,9 @@ from html import escape
 from ...machine import Machine
 from ...units import to_display
 from .config import format_number
+from .guard import name_guard
 from .home_pose import find_home_pose
+from .model_header import LEAST_REGULARITY, list_limit_names
 from .module import name_kinematics
 
 _PAGE = """\
@@ -18,21 +20,23 @@ For LinuxCNC 2.9, as a simulation without hardware.
 | file | what it is |
 |---|---|
 | `{kinematics}.c` | the kinematics: {joints} from {axes} and back |
-| `{name}_model.h` | the machine's mathematics, which the kinematics includes |
+| `{guard}.c` | the guard: it keeps moves by hand within the limits |
+| `{name}_model.h` | the machine's mathematics, which both include |
 | `{name}.ini` | ranges, speeds and home |
-| `{name}.hal` | loops in the place of drives |
+| `{name}.hal`, `{name}_rates.hal` | loops in the place of drives, the guard, the axes' rates |
 | `{name}.tbl` | the tool |
 | `{name}.ngc` | a first program: a square at home |
 
-Install the kinematics once and start:
+Install the kinematics and the guard once and start:
 
 ```
 sudo apt-get install linuxcnc-uspace linuxcnc-uspace-dev
 sudo halcompile --install {kinematics}.c
+sudo halcompile --install {guard}.c
 linuxcnc {name}.ini
 ```
 
-`halcompile` needs a folder whose path has no blanks. Once the description has changed, install the kinematics anew:
+`halcompile` needs a folder whose path has no blanks. Once the description has changed, install both anew:
 with one of an older making LinuxCNC does not start, and says so.
 
 Switch the machine on and home it: it then stands at {home}.
@@ -40,17 +44,29 @@ Programs are in millimetres and degrees; {frame}.
 
 ## What to know
 
-- A pose that a leg can't reach, or that a limit of the machine's description forbids, is refused by the kinematics
-  ("fails kinematicsInverse"); the drives' ranges LinuxCNC watches itself.
-- Before a move LinuxCNC looks at its end point only; in between it stops where a limit is met.
+- A pose that a leg can't reach, that a limit of the machine's description forbids, or that is nearer to a singularity
+  than {least} % of home's margin, is refused by the kinematics ("fails kinematicsInverse"); so is a step of a joint
+  beyond twice its speed in a cycle. The drives' ranges LinuxCNC watches itself.
+- Jogs are for the box of `{name}.ini` (MIN_LIMIT, MAX_LIMIT of the axes): in it every pose is allowed, and all axes
+  at once keep every joint within its speed and acceleration. The guard stops a jog softly at the box's end, before a
+  limit, and where a joint would pass its speed; what leads back goes on. Outside of the box, after a program, jogs
+  lead inward.
+- Programs and MDI have the machine's whole range and the drives' rates (PROGRAM_ in `{name}.ini`), which the guard
+  puts in force in coordinated motion. The screen may ask whether to run a program beyond the box: that is no fault of
+  it.
+- The guard slows a program that is about to break a limit to a tenth, and halts it where it goes on
+  (`motion.feed-inhibit`); abort it then, and jog back. `M52 P0` in a program takes the slowing off. `guard.distance`
+  tells how far the nearest limit is (0 where it is reached, 1 where jogs stop), `guard.nearest` which one:
+
+{limits}
+
+- Before a move LinuxCNC looks at its end point only.
 - In coordinated moves LinuxCNC bounds the speeds of the axes, not those of the joints. Near a singularity joints run
-  faster than the tool: the program has to carry feeds that keep them within their speeds. `parakin post PART --machine
-  {name} --target linuxcnc` writes such programs; run them from home.
-- The axes' accelerations in `{name}.ini` are more than the drives' own, or LinuxCNC could not keep up with short
-  motions that turn the tool. These programs need them; moves by hand should be slow. The feed can't be overridden to
-  more than 100 %.
-{pole}- The tool's length is part of the machine's description. Leave tool length offsets (G43) at 0: LinuxCNC adds them
-  along Z, wherever the tool points.
+  faster than the tool: the program has to carry feeds that keep them within their speeds. `parakin post PART
+  --machine {name} --target linuxcnc` writes such programs; run them from home. The feed can't be overridden to more
+  than 100 %.
+{pole}- A tool length offset (G43) counts along the tool: what the tool is longer than the machine's own. Switch it on
+  and off with the tool along Z, for else the joints would have to jump, and the machine is switched off.
 - Speeds and accelerations that the description does not say were chosen, and are marked so in the ini file.
 
 The kinematics is compiled against LinuxCNC's headers and loaded into its programs, which are under the GNU General
@@ -59,7 +75,8 @@ Public License; therefore `{kinematics}.c` is, too.
 
 _POLE = """\
 - Where the tool lies along the wrist's first axis, that axis is free and stays where it is. From there a tilt in
-  another direction makes it turn at once: begin a program with the tool tilted the way it goes on.
+  another direction makes it turn at once, which is refused; so home lies aside. Begin a program with the tool tilted
+  the way it goes on.
 """
 
 _DIRECTION = "the tool's axis is Rz(C)·Ry(B)·z, from the tip into the holder"
@@ -75,9 +92,12 @@ def write_page(machine: Machine) -> str:
         title=escape(" ".join(machine.spec.title.split()), quote=False),
         name=machine.name,
         kinematics=name_kinematics(machine),
+        guard=name_guard(machine),
         joints=" ".join(machine.joints),
         axes=" ".join(machine.axes),
         home=", ".join(words),
         frame=_DIRECTION if machine.has_direction else _ORIENTATION if len(machine.axes) == 6 else _PLACE,
         pole=_POLE if machine.wrist is not None else "",
+        least=format_number(100.0 * LEAST_REGULARITY),
+        limits="\n".join(f"  - {i}: {escape(name, quote=False)}" for i, name in enumerate(list_limit_names(machine))),
     )

@@ -104,9 +104,12 @@ def words(block):
 
 
 def away(machine):
-    """A block that moves 20 mm and turns 10 degrees away from home along all axes."""
-    home = world(machine, find_home_pose(machine)[None])[0]
-    words = [f"{axis}{home[FIELDS.index(axis)] + (20.0 if axis in 'XYZ' else 10.0):.6f}" for axis in machine.axes]
+    """A block that moves 20 mm and turns 10 degrees away from home along all axes, where it is allowed."""
+    step = np.where(np.array(machine.axis_units) == "mm", 20.0, np.radians(10.0))
+    home = find_home_pose(machine)
+    end = next(home + sign * step for sign in (1.0, -1.0) if machine.check(home + sign * step) == 0)
+    row = world(machine, end[None])[0]
+    words = [f"{axis}{row[FIELDS.index(axis)]:.6f}" for axis in machine.axes]
     return " ".join(["G1", *words, "F9000"])
 
 

@@ -13,6 +13,7 @@ from pathlib import Path
 import linuxcnc
 
 MOST = 45.0  # s for a step
+REST = 0.05  # s
 DRAINING = 0.3  # s for the sampler's last rows
 
 
@@ -43,9 +44,20 @@ class Machine:
         self.command.wait_complete()
 
     def position(self):
-        """Where it has come to rest."""
-        self.wait(lambda s: s.interp_state == linuxcnc.INTERP_IDLE and s.inpos and not s.queue)
+        """Where it has come to rest: for a moment there is nothing more to do."""
+        since = 0.0
+        while time.monotonic() < since + REST or not since:
+            self.wait(self.is_idle)
+            since = since or time.monotonic()
+            time.sleep(0.005)
+            self.status.poll()
+            if not self.is_idle(self.status):
+                since = 0.0
         return list(self.status.position)
+
+    @staticmethod
+    def is_idle(status):
+        return status.interp_state == linuxcnc.INTERP_IDLE and status.inpos and not status.queue
 
     def switch_on(self, joints):
         self.wait(lambda s: s.joints == joints)  # the first answers are zero

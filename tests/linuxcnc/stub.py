@@ -32,11 +32,11 @@ class Kinematics:
         self.library = ctypes.CDLL(str(path))
         assert self.library.rtapi_app_main() == 0
         assert ctypes.c_int.in_dll(stub, "stub_ready").value == 1
-        self.name = path.stem
+        self.exported = stub.stub_count()  # its functions are the last
 
     def watch_steps(self, watched):
         """Let the inverse refuse steps that no drive can follow, as within a servo cycle, or not."""
-        assert self.stub.stub_run(f"{self.name}.{'begin' if watched else 'end'}-steps".encode())
+        assert self.stub.stub_run(b"kins.begin-steps" if watched else b"kins.end-steps", self.exported)
 
     def _call(self, name, function, count, *arrays):
         codes = np.full(count, 99, np.int32)

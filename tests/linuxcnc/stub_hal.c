@@ -22,7 +22,7 @@ void *hal_malloc(long size) { return calloc(1, size); }
 void rtapi_print(const char *format, ...) { (void)format; }
 void rtapi_print_msg(int level, const char *format, ...) { (void)level, (void)format; }
 
-/* The functions that modules export, by their names: the last of a name counts. */
+/* The functions that modules export, by their names, which different modules may share. */
 enum { MOST_FUNCTIONS = 256 };
 static struct { char name[64]; StubFunction *function; } functions[MOST_FUNCTIONS];
 static int function_count;
@@ -37,10 +37,12 @@ int hal_export_funct(const char *name, StubFunction *function, void *arg, int fp
     return 0;
 }
 
-/* Run an exported function once; whether there is one. */
-int stub_run(const char *name)
+int stub_count(void) { return function_count; }
+
+/* Run a function once that was exported among the first ``before``, the last of that name; whether there is one. */
+int stub_run(const char *name, int before)
 {
-    for (int i = function_count; i-- > 0;)
+    for (int i = before; i-- > 0;)
         if (!strcmp(functions[i].name, name))
             return functions[i].function(NULL, 1000000), 1;
     return 0;

@@ -18,7 +18,6 @@ MODEL int finite_all(const double *x, int count)
    added to it taken off: the tool's axis Rz(C) Ry(B) Rx(A) z leads from the tip into the holder. */
 MODEL void shift_tip(double *x, double length)
 {
-#if TILTS
     double k[3] = {0.0, 0.0, 1.0}; /* turned about X, then Y, then Z */
     for (int i = 0; i < 3; i++)
         if (turn_columns[i] >= 0) {
@@ -32,10 +31,6 @@ MODEL void shift_tip(double *x, double length)
     for (int i = 0; i < 3; i++)
         if (place_columns[i] >= 0)
             x[place_columns[i]] += length * k[i];
-#else
-    (void)x;
-    (void)length;
-#endif
 }
 
 /* Joints for a pose. */

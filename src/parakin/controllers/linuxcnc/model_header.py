@@ -113,13 +113,13 @@ def _write_numbers(machine: Machine) -> str:
         f"#define CYCLE {format_c(CYCLE)} /* s: the servo period */",
         f"#define STEP_FACTOR {format_c(STEP_FACTOR)} /* a joint's step beyond so much of its speed is refused */",
         f"#define COMMAND_LAG {format_c(COMMAND_LAG)} /* steps by which a commanded joint may trail */",
-        f"#define TILTS {int(not set(machine.axes).isdisjoint('AB'))} /* the tool tilts against Z */",
         _write_array("double", "home", [format_c(value) for value in find_home_pose(machine).tolist()]),
         _write_array("int", "turning", [str(int(unit == "rad")) for unit in machine.joint_units]),
     ]
-    for name, letters in (("place_columns", "XYZ"), ("turn_columns", "ABC")):
-        columns = [machine.axes.index(letter) if letter in machine.axes else -1 for letter in letters]
-        lines.append(_write_array("int", name, [str(column) for column in columns]))
+    columns = {axis: column for column, axis in enumerate(machine.axes)}
+    places_and_turns = [str(columns.get(axis, -1)) for axis in _FIELDS]
+    lines.append(_write_array("int", "place_columns", places_and_turns[:3]))
+    lines.append(_write_array("int", "turn_columns", places_and_turns[3:]))
     lines.append(_write_array("int", "turning_axis", [str(int(unit == "rad")) for unit in machine.axis_units]))
     return "\n".join(lines) + "\n"
 

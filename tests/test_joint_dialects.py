@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import io
+import re
+import shutil
+import subprocess
 import sys
 from dataclasses import replace
 from itertools import pairwise
@@ -156,6 +159,27 @@ def distances(points, corners):
         share = np.clip((points - a) @ u / max(u @ u, 1e-30), 0.0, 1.0)
         best = np.minimum(best, np.linalg.norm(points - a - share[:, None] * u, axis=1))
     return best
+
+
+READ = [("linear_delta", "grbl"), ("linear_delta", "joints"), ("tricept", "fluidnc")]
+
+
+@pytest.mark.skipif(shutil.which("rs274") is None, reason="LinuxCNC's interpreter is not installed")
+@pytest.mark.parametrize(("name", "target"), READ)
+def test_the_interpreter_of_linuxcnc_reads_the_same(jobs, name, target, tmp_path):
+    """LinuxCNC's own, whose language grbl and FluidNC take: places, and times as its feeds along X, Y and Z."""
+    trajectory = jobs(name).trajectory
+    (tmp_path / "part.ngc").write_text(text_of(trajectory, target), encoding="ascii")
+    made = subprocess.run(["rs274", "-g", str(tmp_path / "part.ngc")], capture_output=True, text=True, check=True)
+    pattern = r"SET_FEED_RATE\(([\d.]+)\)\s+\d+ N\.+\s+STRAIGHT_FEED\((.*)\)"
+    feeds, rows = zip(*re.findall(pattern, made.stdout), strict=True)
+    rows = np.array([[float(value) for value in row.split(",")] for row in rows])
+    shown = degrees(trajectory.posted.joints[kept_records(trajectory)], trajectory.posted.machine)
+    found = match_rows(rows[:, : shown.shape[1]], shown, 1.1e-4)
+    assert found[-1] == len(rows) - 1
+    if name == "linear_delta":
+        seconds = 60.0 * np.linalg.norm(np.diff(rows, axis=0), axis=1) / np.array(feeds[1:], float)
+        assert trajectory.seconds < seconds.sum() < 1.05 * trajectory.seconds
 
 
 # TwinCAT

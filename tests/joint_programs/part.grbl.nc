@@ -5,8 +5,8 @@
 ( $110 to $112 and $120 to $122: speeds and accelerations of the joints, $32  )
 ( is 0 )
 ( part zero at X 0 Y 0 Z 0 in the machine )
-( the tool: 80 mm from the spindle's nose to its tip, the machine's own lengt )
-( h )
+( the tool: 80 mm from the spindle's nose to its tip, the machine's own  )
+( length )
 G21G90G17G40G49
 G94
 S9000

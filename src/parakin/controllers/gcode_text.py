@@ -42,8 +42,13 @@ def format_comments(text: str) -> Iterator[str]:
 
 
 def split_text(text: str, longest: int) -> list[str]:
-    """Split a text into pieces of at most so many characters; an empty text is one piece."""
-    return [text[begin : begin + longest] for begin in range(0, max(len(text), 1), longest)]
+    """Split a text into pieces of at most so many characters, after blanks where it has some; none is one piece."""
+    pieces = list[str]()
+    while len(text) > longest:
+        end = text.rfind(" ", 0, longest) + 1 or longest
+        pieces.append(text[:end])
+        text = text[end:]
+    return [*pieces, text]
 
 
 def make_plain(text: str) -> str:

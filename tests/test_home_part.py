@@ -139,9 +139,27 @@ def test_a_singularity_is_proved_or_said_to_be_unproved():
     for name in ("hexapod", "linear_delta", "orthoglide", "hbg80_3d"):
         assert set(verdicts[name].values()) == {"none"}
     assert set(verdicts["hbg80_2d"].values()) == {"unproved"}  # they touch zero where a leg is stretched
-    assert verdicts["tricept"].pop("theta1-theta2", None) is None
-    assert verdicts["tricept"]["serial theta1-theta2"] == "unproved"  # it touches zero on the wrist's pole
+    assert verdicts["tricept"]["serial theta1-theta2"] == "met"  # it touches zero on the wrist's pole
     assert verdicts["tricept"]["parallel"] == "none"
+
+
+@pytest.mark.parametrize(("b", "c"), [(0.0, 0.0), (0.3, 0.7), (0.2, -2.0)])
+def test_a_pole_that_a_region_meets_is_proved(b, c):
+    # The platform of a Tricept hangs along the line from its centre, the origin, to the wrist: on the pole the tip is
+    # on the line through the origin along the tool's axis k.
+    m = pk.load("tricept")
+    verdict = judge_singularities(pk.region(m, at={"B": b, "C": c}))[-1]
+    assert verdict.verdict == "met"
+    k = np.array([np.sin(b) * np.cos(c), np.sin(b) * np.sin(c), np.cos(b)])
+    tip = verdict.pose[:3]
+    assert np.linalg.norm(tip - (tip @ k) * k) < 1.0
+    assert m.check(verdict.pose) == 0
+
+
+def test_a_pole_that_is_nowhere_or_everywhere_is_told():
+    m = pk.load("orthoglide5_head")  # its platform does not turn
+    assert judge_singularities(pk.region(m))[-1].verdict == "met"
+    assert judge_singularities(pk.region(m, at={"B": 0.2, "C": 0.1}))[-1].verdict == "none"
 
 
 def test_the_verdict_does_not_hang_on_the_step(load_text):

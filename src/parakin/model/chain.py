@@ -67,6 +67,7 @@ class PointingAngles:
 
     joints: tuple[Scalar, Scalar]
     freedom: Scalar  # 0 where the first angle is free
+    off_axis: Vec  # first axis × direction, whose square is ``freedom``
     reach: tuple[Scalar, ...]  # negative where the axes can't point so
     turns: tuple[tuple[Scalar, Scalar], tuple[Scalar, Scalar]]  # sine and cosine: times freedom, times ``second_size``
     second_size: float
@@ -150,7 +151,7 @@ class Pointing:
         )
         angles = [sign * atan2(s, c) for sign, (s, c) in zip(self.signs, turns, strict=True)]
         joints = (angles[0] if first is None else first, angles[1])
-        return PointingAngles(joints, freedom, reach, turns, 1.0 - beta * beta)
+        return PointingAngles(joints, freedom, around, reach, turns, 1.0 - beta * beta)
 
 
 def make_rotation_about(axis: Vec, s: Scalar, c: Scalar) -> Mat:

@@ -33,6 +33,7 @@ class PlatformPlacement:
     serial: list[Scalar]  # joints of head and table
     reach: tuple[Scalar, ...] = ()  # negative where head or table can't point the tool there
     freedom: Scalar | None = None  # 0 where the first joint of head or table is free
+    off_axis: Vec | None = None  # the vector whose square that is
 
 
 class DirectionColumns(NamedTuple):

@@ -41,7 +41,7 @@ class Carried(FiveAxis):
         turns = self.pointing.solve(k, branch, first)
         serial = [turns.joints[self.serial_order.index(i)] for i in range(2)]
         origin = self._origin(pose, serial)
-        return PlatformPlacement(IDENTITY, origin, list(origin), serial, turns.reach, turns.freedom)
+        return PlatformPlacement(IDENTITY, origin, list(origin), serial, turns.reach, turns.freedom, turns.off_axis)
 
     def place_with_joints(self, pose: Sequence[Scalar], serial: Sequence[Scalar]) -> PlatformPlacement:
         origin = self._origin(pose, serial)

@@ -116,7 +116,8 @@ class CentralLeg(FiveAxis):
             spin = serial.pop(0)
             rotation = product(rotation, make_axis_rotation("rz", *sincos(spin)))
             angles.append(spin)
-        return PlatformPlacement(rotation, origin, [*angles, tz], serial, wrist.reach, wrist.freedom)
+        placed = rotation, origin, [*angles, tz], serial
+        return PlatformPlacement(*placed, wrist.reach, wrist.freedom, wrist.off_axis)
 
     def turn_first_axis(self, pose: Sequence[Scalar]) -> Mat:
         return product(self.mount, self.place(pose, self.branches).rotation)

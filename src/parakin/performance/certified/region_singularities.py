@@ -9,7 +9,7 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from ...algebra import Scalar, Term
+from ...algebra import Scalar, Term, absolute
 from ...arrays import Array, Flags, Indices
 from ...budget import Budget
 from ...errors import PoseError
@@ -20,12 +20,14 @@ from ...workspaces.certified.separation import find_joined_cells
 from ...workspaces.certified.subdivision import Cells
 from ...workspaces.connected.adjacency import find_adjacent_cells, label_components
 from ..singularities import PARALLEL, list_margin_names
+from .free_angles import prove_free_angle
 
 SingularityVerdict = Literal["met", "none", "unproved"]
 
 _ALONG = {1: 1024, 2: 256, 3: 96}  # cells along the longest edge in which a change of sign is looked for
 _MOST_COMPARED = 1000  # cells
 _PROVING = 0.5  # of the budget, for the proofs that there is none, and of the rest for the region's own cells
+_STARTS = 64  # cells from which a free angle is looked for
 _ZERO = 1e-12  # a margin no greater is zero
 _FEW, _ROUNDS = 30_000, 24  # undecided cells, and rounds, with which a proof that there is none is given up
 
@@ -37,7 +39,7 @@ class RegionSingularity:
     margin : its name, as in :func:`~..singularities.list_margin_names`
     verdict : ``met``, its sign changes among positions that hang together inside; ``none``, it is positive all over;
         ``unproved``, neither is proved, as where it only touches zero
-    pose : (axes,) a pose where it is not above zero, of ``met`` alone
+    pose : (axes,) a pose where it is not above zero (where it only touches zero, at most 1 mm beside), of ``met`` alone
     reason : what the verdict rests on, for people; empty for ``none``
     """
 
@@ -80,9 +82,32 @@ def judge_singularities(region: Region, budget: Budget | None = None) -> tuple[R
         pose = _find_sign_change(own, positive, labelled[own].inside, labelled[own].component)
         if pose is not None:
             verdicts.append(RegionSingularity(name, "met", pose, "its margin changes sign on the way to it"))
+            continue
+        if name == names[-1]:  # of head and table: its margin never changes its sign
+            pose = _find_free_angle(own, positive, labelled[own])
+        if pose is not None:
+            verdicts.append(RegionSingularity(name, "met", pose, "its margin falls to zero there, to a mm"))
         else:
             verdicts.append(RegionSingularity(name, "unproved", None, _describe_left(budget)))
     return tuple(verdicts)
+
+
+def _find_free_angle(region: Region, positive: Constraint, about: _RegionCells) -> Array | None:
+    """Find a pose beside which an angle of head or table is proved free, in the part that holds home."""
+    middle = about.inside.low + 0.5 * about.inside.size
+    margin = positive.point_program(middle, middle)[0][:, 0]
+    starts = middle[np.argsort(np.where(np.isfinite(margin), margin, np.inf), kind="stable")[:_STARTS]]
+    position = prove_free_angle(region, starts)
+    if position is None:
+        return None
+    home = dict(zip(region.machine.axes, region.machine.home.tolist(), strict=True))
+    at_home, at_root = (
+        about.component[((about.inside.low <= at) & (at <= about.inside.low + about.inside.size)).all(1)]
+        for at in (np.array([home[axis] for axis in region.free_axes]), position)
+    )
+    if not len(at_root) or (len(at_home) and not np.isin(at_root, at_home).any()):
+        return None
+    return np.asarray(region.poses(position[None])[0])
 
 
 def _judge_constant(region: Region, name: str, margin: float) -> RegionSingularity:
@@ -111,7 +136,7 @@ def _trace_margins(region: Region) -> list[Scalar]:
         margins = [expand_determinant([row[:size] for row in rates.a[:size]])]
         margins += [rates.b[row][joint] for row, joint in enumerate(machine.closure_joints)]
         if n > legs:
-            margins.append(expand_determinant([row[legs:] for row in rates.b[legs:]]))
+            margins.append(absolute(expand_determinant([row[legs:] for row in rates.b[legs:]])))
         return margins
 
     at_home = compute_margins([np.float64(value) for value in machine.home])

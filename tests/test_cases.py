@@ -39,6 +39,8 @@ REFUSED = [
     ("G21 G90\nG54\nG0 X0 Y0 Z0\nG55\nG0 X1\nM2\n", "nc", 4, "G55 after G54"),
     ("G21 G90\nG0 X0 Y0 Z0\nM98 P100\nM2\n", "nc", 3, "Fanuc"),
     ("G21 G90\nG0 X0 Y0 Z0\nG187 P1\nM2\n", "nc", 3, "Haas"),
+    ("%\nO1234 (FANUC 31I)\nG28 G91 Z0\nM30\n%\n", "nc", 3, "Fanuc"),
+    ("%\nO1 (HAAS VF2)\nG21 G91\nG28 Z0\nM30\n%\n", "nc", 4, "Haas"),
     ("0 BEGIN PGM A MM\n1 L X+0 Y+0 FMAX\n", "nc", 1, "Heidenhain"),
     ("G21 G90\nG0 X0 Y0 Z0\nR1=5\nM2\n", "nc", 3, "Siemens"),
     ("$H\nG21\n", "nc", 1, "grbl"),

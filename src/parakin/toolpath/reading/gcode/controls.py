@@ -37,7 +37,7 @@ CONTROLS = (
     ),
     OtherControl(
         "Haas",
-        _compile_pattern(r"\s*\(.*\bHaas\b"),
+        _compile_pattern(r"\s*(?:O\d+\s*)?\(.*\bHaas\b"),
         _compile_pattern(r"[^(;]*\b(?:G187|G15[34]\s*P|M97\s*P|G234|G254|G47|G1[23]\s*[IQD]|G150)(?!\d)"),
     ),
     OtherControl(
@@ -53,7 +53,7 @@ CONTROLS = (
     OtherControl("grbl", _compile_pattern(r"\s*[(;]\s*grbl\b"), _compile_pattern(r"\s*\$")),
     OtherControl(
         "Fanuc",
-        _compile_pattern(r"\s*\(.*\bFanuc\b"),
+        _compile_pattern(r"\s*(?:O\d+\s*)?\(.*\bFanuc\b"),
         _compile_pattern(
             r"[^(;]*(?:\bG0?5(?:\.1\s*Q|\s*P)|\bG54\.1\s*P|\bG6(?:5|6|8(?:\.[23])?|9)(?!\d)|\bM0?9[89](?!\d)|\bG10\.6|\bG0?8\s*P"
             r"|\bG43\.5|\bG53\.1|\bG15(?!\d)|\bG16(?!\d)|\bG5[01](?:\.1)?(?!\d))"

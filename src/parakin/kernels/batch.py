@@ -67,12 +67,20 @@ def evaluate_tape(tape: Tape, x: Array, out: Array, z: Array | None = None, whol
 
 def evaluate_tape_with_residual(tape: Tape, x: Array, out: Array, z: Array) -> Array:
     """Evaluate a tape that ends with closures, all else into ``out``; returns the greatest closure, (N,) mm."""
+    return settle_by_tape(tape, tape.outputs - out.shape[1], 0.0, x, out, z)[0]
+
+
+def settle_by_tape(tape: Tape, closures: int, closed: float, x: Array, out: Array, z: Array) -> tuple[Array, Flags]:
+    """Evaluate a tape of rows into ``out``, then some closures, then margins.
+
+    Returns the greatest closure, (N,) mm, and where it is ``closed`` at most while all margins are positive, (N,).
+    """
     from .blocks import evaluate_with_residual
 
-    residual = np.empty(len(x))
-    args = (tape, freeze_rows(x), freeze_rows(z), out, residual)
+    residual, settled = np.empty(len(x)), np.empty(len(x), np.bool_)
+    args = (tape, closures, closed, freeze_rows(x), freeze_rows(z), out, residual, settled)
     run_in_threads(len(x), lambda start, stop: evaluate_with_residual(*args, start, stop))
-    return residual
+    return residual, settled
 
 
 def find_first_negative(tape: Tape, x: Array, z: Array) -> Indices:
@@ -112,6 +120,22 @@ class NewtonSteps(NamedTuple):
     closed: float
 
 
+class Settling(NamedTuple):
+    """Bounds within which a root needs no second look, besides the last tape's margins, which are positive there.
+
+    turned : what the product of the determinants exceeds
+    steady : the greatest change of the determinant from the start's to the root's, relative to it
+    steps : of Newton's method
+    """
+
+    turned: float = np.inf
+    steady: float = np.inf
+    steps: int = 0
+
+
+NEVER = Settling()  # every root needs one
+
+
 class Roots(NamedTuple):
     """The results of Newton's method, a row for each problem.
 
@@ -121,6 +145,7 @@ class Roots(NamedTuple):
     turned : (N,) the determinant of the last factored matrix times that of the start, or times the side that was
         asked for; negative where the root is on the other side of a singularity
     first : (N,) the determinant of the start's matrix
+    settled : (N,) where a root is closed and needs no second look, by :class:`Settling`
     """
 
     rows: Array
@@ -128,9 +153,12 @@ class Roots(NamedTuple):
     steps: NDArray[np.int32]
     turned: Array
     first: Array
+    settled: Flags
 
 
-def solve_by_newton(tapes: NewtonTapes, limits: NewtonSteps, near: Array, joints: Array, side: Array) -> Roots:
+def solve_by_newton(
+    tapes: NewtonTapes, limits: NewtonSteps, settling: Settling, near: Array, joints: Array, side: Array
+) -> Roots:
     """Solve the closures by Newton's method from ``near`` (1 or N rows) for every row of joints.
 
     side : the sign of the determinant to end with, one a row or one for all; none for that of the start
@@ -138,8 +166,8 @@ def solve_by_newton(tapes: NewtonTapes, limits: NewtonSteps, near: Array, joints
     from .newton import solve_newton
 
     count = len(joints)
-    rows = np.empty((count, tapes.end.outputs))
-    roots = Roots(rows, np.empty(count), np.empty(count, np.int32), np.empty(count), np.empty(count))
-    args = (tapes, limits, freeze_rows(near), freeze_rows(joints), side, roots)
+    rows, settled = np.empty((count, near.shape[1])), np.empty(count, np.bool_)
+    roots = Roots(rows, np.empty(count), np.empty(count, np.int32), np.empty(count), np.empty(count), settled)
+    args = (tapes, limits, settling, freeze_rows(near), freeze_rows(joints), side, roots)
     run_in_threads(count, lambda start, stop: solve_newton(*args, start, stop))
     return roots

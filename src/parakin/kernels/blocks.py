@@ -56,21 +56,21 @@ def interpret(code, constants, r):
         a = (code[i, 2] & _MASK) * LANES
         b = (code[i, 3] & _MASK) * LANES
         c = (code[i, 4] & _MASK) * LANES
-        k0, k1 = constants[i, 0], constants[i, 1]
+        k0, k1, k3 = constants[i, 0], constants[i, 1], constants[i, 3]
         if op == QUAD1:
             for j in range(LANES):
-                r[d + j] = k0 * r[a + j] * r[b + j]
+                r[d + j] = k0 * r[a + j] * r[b + j] + k3
         elif op == QUAD2:
             e = (code[i, 5] & _MASK) * LANES
             for j in range(LANES):
-                r[d + j] = k0 * r[a + j] * r[b + j] + k1 * r[c + j] * r[e + j]
+                r[d + j] = k0 * r[a + j] * r[b + j] + (k1 * r[c + j] * r[e + j] + k3)
         elif op == QUAD3:
             e = (code[i, 5] & _MASK) * LANES
             f = (code[i, 6] & _MASK) * LANES
             g = (code[i, 7] & _MASK) * LANES
             k2 = constants[i, 2]
             for j in range(LANES):
-                r[d + j] = k0 * r[a + j] * r[b + j] + k1 * r[c + j] * r[e + j] + k2 * r[f + j] * r[g + j]
+                r[d + j] = k0 * r[a + j] * r[b + j] + k1 * r[c + j] * r[e + j] + (k2 * r[f + j] * r[g + j] + k3)
         elif op == FMA:
             k2 = constants[i, 2]
             for j in range(LANES):
@@ -84,7 +84,6 @@ def interpret(code, constants, r):
                 r[d + j] = k0 + k1 * r[a + j] + k2 * r[b + j]
         elif op == LIN3:
             k2 = constants[i, 2]
-            k3 = constants[i, 3]
             for j in range(LANES):
                 r[d + j] = k0 + k1 * r[a + j] + k2 * r[b + j] + k3 * r[c + j]
         elif op == SQRT:
@@ -266,30 +265,46 @@ def evaluate_rows(tape, whole, x, z, y, start, stop):
         store_rows(y, row, n, tape.inputs, r, bad)
 
 
-@njit(nogil=True, cache=True, fastmath=FAST, error_model="numpy")
-def evaluate_with_residual(tape, x, z, y, residual, start, stop):
-    """Evaluate a tape: its first outputs to the rows of ``y``, the greatest size of the others to ``residual`` (N,).
+@njit(inline="always")
+def find_positive(r, first, stop, holds):
+    """Find the lanes in which registers ``first`` to ``stop`` are all positive: 1 in ``holds`` (LANES,), else 0."""
+    holds[:] = 1.0
+    for o in range(first, stop):
+        d = (o & _MASK) * LANES
+        for j in range(LANES):
+            holds[j] = holds[j] if r[d + j] > 0.0 else 0.0  # false for NaN
 
-    Both are NaN where an input or output is not finite.
+
+@njit(nogil=True, cache=True, fastmath=FAST, error_model="numpy")
+def evaluate_with_residual(tape, closures, closed, x, z, y, residual, settled, start, stop):
+    """Evaluate a tape: its first outputs to the rows of ``y``, the greatest size of the closures to ``residual`` (N,).
+
+    Both are NaN where an input, or one of these outputs, is not finite. The outputs behind the closures are margins:
+    ``settled`` (N,) tells where all of them are positive and the residual is ``closed`` at most.
     """
     r = allocate_lanes(tape.registers)
     bad = allocate_lanes(1)
     most = allocate_lanes(1)
+    holds = allocate_lanes(1)
+    first = tape.inputs + y.shape[1]
     for row in range(start, stop, LANES):
         n = _load_inputs(x, z, row, stop, r, bad)
         fetch_to_write(y, row, stop)
         interpret(tape.code, tape.constants, r)
         most[:] = 0.0
-        for o in range(tape.inputs, tape.inputs + tape.outputs):
+        for o in range(tape.inputs, first + closures):
             d = (o & _MASK) * LANES
-            closure = o >= tape.inputs + y.shape[1]
+            closure = o >= first
             for j in range(LANES):
                 v = r[d + j]
                 bad[j] += 0.0 * v
                 most[j] = abs(v) if closure & (abs(v) > most[j]) else most[j]
+        find_positive(r, first + closures, tape.inputs + tape.outputs, holds)
         store_rows(y, row, n, tape.inputs, r, bad)
         for j in range(n):
-            residual[row + j] = most[j] + bad[j]
+            worst = most[j] + bad[j]
+            residual[row + j] = worst
+            settled[row + j] = (holds[j] > 0.0) & (worst <= closed)
 
 
 @njit(nogil=True, cache=True, fastmath=FAST, error_model="numpy")

@@ -126,23 +126,24 @@ def interpret(code, constants, r):
         if op == QUAD1:
             for j in range(LANES):
                 low, high = _bound_product(k0, r[a + j], r[a + LANES + j], r[b + j], r[b + LANES + j], ab)
-                r[d + j] = _round_down(low, abs(low))
-                r[d + LANES + j] = _round_up(high, abs(high))
+                size = _magnitude(low, high) + abs(k3)
+                r[d + j] = _round_down(low + k3, size)
+                r[d + LANES + j] = _round_up(high + k3, size)
         elif op == QUAD2:
             for j in range(LANES):
                 low, high = _bound_product(k0, r[a + j], r[a + LANES + j], r[b + j], r[b + LANES + j], ab)
                 l2, h2 = _bound_product(k1, r[c + j], r[c + LANES + j], r[e + j], r[e + LANES + j], ce)
-                size = _magnitude(low, high) + _magnitude(l2, h2)
-                r[d + j] = _round_down(low + l2, size)
-                r[d + LANES + j] = _round_up(high + h2, size)
+                size = _magnitude(low, high) + _magnitude(l2, h2) + abs(k3)
+                r[d + j] = _round_down(low + l2 + k3, size)
+                r[d + LANES + j] = _round_up(high + h2 + k3, size)
         elif op == QUAD3:
             for j in range(LANES):
                 low, high = _bound_product(k0, r[a + j], r[a + LANES + j], r[b + j], r[b + LANES + j], ab)
                 l2, h2 = _bound_product(k1, r[c + j], r[c + LANES + j], r[e + j], r[e + LANES + j], ce)
                 l3, h3 = _bound_product(k2, r[f + j], r[f + LANES + j], r[g + j], r[g + LANES + j], fg)
-                size = _magnitude(low, high) + _magnitude(l2, h2) + _magnitude(l3, h3)
-                r[d + j] = _round_down(low + l2 + l3, size)
-                r[d + LANES + j] = _round_up(high + h2 + h3, size)
+                size = _magnitude(low, high) + _magnitude(l2, h2) + _magnitude(l3, h3) + abs(k3)
+                r[d + j] = _round_down(low + l2 + l3 + k3, size)
+                r[d + LANES + j] = _round_up(high + h2 + h3 + k3, size)
         elif op == FMA:
             for j in range(LANES):
                 low, high = _bound_product(k0, r[a + j], r[a + LANES + j], r[b + j], r[b + LANES + j], ab)

@@ -13,7 +13,17 @@ from typing import NamedTuple
 import numpy as np
 
 from ..arrays import Array, Flags
-from .blocks import _MASK, LANES, allocate_lanes, fetch_to_read, fetch_to_write, interpret, load_rows, store_rows
+from .blocks import (
+    _MASK,
+    LANES,
+    allocate_lanes,
+    fetch_to_read,
+    fetch_to_write,
+    find_positive,
+    interpret,
+    load_rows,
+    store_rows,
+)
 from .compiling import njit
 from .elementary import FAST, use_widest_vectors
 
@@ -48,6 +58,7 @@ class NewtonBlock(NamedTuple):
 
     registers : of the tapes
     point : (m + joints rows) the coordinates and the joints
+    near : the rows to start from
     closures : (m rows) f there, then the step
     factors, fresh : of the matrix that each lane goes by, and of one that only some lanes take
     first_determinant : of the first matrix
@@ -58,6 +69,7 @@ class NewtonBlock(NamedTuple):
 
     registers: Array
     point: Array
+    near: Array
     closures: Array
     factors: Factors
     fresh: Factors
@@ -73,15 +85,17 @@ def _allocate_factors(m):
 
 
 @njit(inline="always")
-def _allocate_block(tapes, m, joints):
-    """Allocate the working arrays for m coordinates."""
+def _allocate_block(tapes, m, joints, given):
+    """Allocate the working arrays for m coordinates, from starts of ``given`` numbers."""
     registers = max(
         max(tapes.begin.registers, tapes.closures_and_slopes.registers),
         max(tapes.closures.registers, tapes.end.registers),
     )
-    r, point, closures = allocate_lanes(registers), allocate_lanes(m + joints), allocate_lanes(m)
+    r, point, near, closures = (
+        allocate_lanes(registers), allocate_lanes(m + joints), allocate_lanes(given), allocate_lanes(m),
+    )  # fmt: skip
     factors, fresh = _allocate_factors(m), _allocate_factors(m)
-    return NewtonBlock(r, point, closures, factors, fresh, allocate_lanes(1), allocate_lanes(6))
+    return NewtonBlock(r, point, near, closures, factors, fresh, allocate_lanes(1), allocate_lanes(6))
 
 
 @njit(inline="always")
@@ -283,23 +297,39 @@ def _load_start(tapes, near, q, row, stop, block, bad):
             load_rows(rows, row, n, register, r, bad)
             fetch_to_read(rows, row + LANES, stop)
     copy_lanes(r, given, block.point, m, joints)
+    copy_lanes(r, 0, block.near, 0, given)
     return n
 
 
+@njit(inline="always")
+def _evaluate_end(end, m, width, block, bad):
+    """Evaluate the last tape: ``width`` outputs of the answer, then margins; returns the first output's register."""
+    r, point, joints = block.registers, block.point, block.point.shape[0] // LANES - m
+    copy_lanes(point, 0, r, 0, m + joints)
+    copy_lanes(block.near, 0, r, m + joints, end.inputs - m - joints)
+    interpret(end.code, end.constants, r)
+    for i in range(end.inputs, end.inputs + width):
+        s = (i & _MASK) * LANES
+        for j in range(LANES):
+            bad[j] += 0.0 * r[s + j]
+    return end.inputs
+
+
 @njit(nogil=True, cache=True, fastmath=FAST, error_model="numpy")
-def solve_newton(tapes, limits, near, q, side, roots, start, stop):
+def solve_newton(tapes, limits, settling, near, q, side, roots, start, stop):
     """Solve f(y, q) = 0 for rows start ≤ i < stop of ``q``; see :func:`~.batch.solve_by_newton`.
 
-    tapes : :class:`~.tape.NewtonTapes`; limits : :class:`~.batch.NewtonSteps`
+    tapes : :class:`~.tape.NewtonTapes`; limits : :class:`~.batch.NewtonSteps`; settling : :class:`~.batch.Settling`
     near : (N or 1, k) starts; side : (N,), (1,) or (0,)
     roots : :class:`~.batch.Roots`, overwritten
     """
     use_widest_vectors()
     m, joints = limits.caps.shape[0], q.shape[1]
-    block, bad = _allocate_block(tapes, m, joints), allocate_lanes(1)
+    block, bad, holds = _allocate_block(tapes, m, joints, near.shape[1]), allocate_lanes(1), allocate_lanes(1)
     r, point, state, determinant = block.registers, block.point, block.state, block.factors.determinant
     first, end = block.first_determinant, tapes.end  # fields are taken out once: Numba counts references at each access
     rows, residual, steps, turned, at_start = roots.rows, roots.residual, roots.steps, roots.turned, roots.first
+    settled = roots.settled
     for row in range(start, stop, LANES):
         n = _load_start(tapes, near, q, row, stop, block, bad)
         fetch_to_write(rows, row, stop)
@@ -313,12 +343,16 @@ def solve_newton(tapes, limits, near, q, side, roots, start, stop):
                 turned[row + j] = determinant[j] * first[j]
             else:
                 turned[row + j] = determinant[j] * side[0 if side.shape[0] == 1 else row + j]
-        copy_lanes(point, 0, r, 0, m + joints)
-        interpret(end.code, end.constants, r)
-        for i in range(end.outputs):
-            s = ((m + joints + i) & _MASK) * LANES
-            for j in range(LANES):
-                bad[j] += 0.0 * r[s + j]
-        store_rows(rows, row, n, m + joints, r, bad)
+        output = _evaluate_end(end, m, rows.shape[1], block, bad)
+        store_rows(rows, row, n, output, r, bad)
+        find_positive(r, output + rows.shape[1], output + end.outputs, holds)
         for j in range(n):
-            residual[row + j] = state[WORST + j] + bad[j]
+            worst, change = state[WORST + j] + bad[j], abs(determinant[j] - first[j])
+            residual[row + j] = worst
+            settled[row + j] = (
+                (holds[j] > 0.0)
+                & (worst <= limits.closed)
+                & (turned[row + j] > settling.turned)
+                & (change <= settling.steady * abs(first[j]))
+                & (state[STEPS + j] <= settling.steps)
+            )

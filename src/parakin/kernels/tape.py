@@ -34,7 +34,7 @@ class Tape(NamedTuple):
     """A compiled trace.
 
     code : (n, 8) opcode, destination, up to six operand registers (SINCOS: sine, cosine, argument)
-    constants : (n, 4) of each operation
+    constants : (n, 4) of each operation; of QUAD the factors, and last what is added
     inputs, outputs : how many there are; the inputs stand in the first registers, in their order, the outputs in the
         next
     registers : how many there are in all
@@ -53,7 +53,7 @@ class NewtonTapes(NamedTuple):
     begin : takes a start and q to y
     closures : takes y and q to f
     closures_and_slopes : takes y and q to f and then ∂f/∂y, row by row
-    end : takes y and q to a row of the answer
+    end : takes y and q, and the start where it has inputs for it, to a row of the answer and then to margins
     """
 
     begin: Tape
@@ -69,7 +69,7 @@ def _find_opcode(term: Term) -> int:
     if term.op == alg.STOP_GRADIENT:
         return LIN1
     if term.op == alg.QUAD:
-        return QUAD1 + len(term.k) - 1
+        return QUAD1 + len(term.args) // 2 - 1
     return _SAME[term.op]
 
 
@@ -119,12 +119,48 @@ def _separate_outputs(trace: Trace, outputs: Sequence[Scalar]) -> list[Term]:
     return results
 
 
+def _fold_lines(order: Sequence[Term], results: Sequence[Term]) -> list[Term]:
+    """Compute k0 + k1·product from the product's operands: one operation instead of two where that is not used besides.
+
+    It is so wherever such a line stands: a value has the same bits in every tape that computes it. A QUAD of the answer
+    may have one more constant than products: what is added to them.
+    """
+    folded = [_fold_line(term) for term in order]
+    wanted = {term.index for term in results}
+    for term in reversed(folded):
+        if term.index in wanted:
+            wanted.update(arg.index for arg in term.args)
+    return [term for term in folded if term.index in wanted]
+
+
+def _fold_line(term: Term) -> Term:
+    """Return k0 + k1·product as one operation, any other term as it is."""
+    if term.op != alg.LIN or len(term.args) != 1 or term.args[0].op not in (alg.QUAD, alg.FMA):
+        return term
+    (product,) = term.args
+    k = [term.k[1] * factor for factor in product.k]
+    if product.op == alg.QUAD:
+        k.append(term.k[0])
+    else:
+        k[2] += term.k[0]
+    return Term(term.trace, product.op, product.args, tuple(k), term.index)
+
+
+def _list_constants(term: Term) -> list[float]:
+    """List the four constants of an operation; the last of QUAD is what is added to its products."""
+    k = (0.0, 1.0) if term.op == alg.STOP_GRADIENT else term.k
+    if term.op == alg.QUAD:
+        products = len(term.args) // 2
+        k = (*k[:products], *[0.0] * (3 - products), *k[products:])
+    return [*k, *[0.0] * (4 - len(k))]
+
+
 def compile_tape(trace: Trace, outputs: Sequence[Scalar], inputs: int) -> Tape:
     """Compile the tape of ``outputs`` (terms of ``trace``, or numbers) from the trace's first ``inputs`` inputs."""
     results = _separate_outputs(trace, outputs)
     copies = [term for term in results if term.index < 0]
     within = [term for term in results if term.index >= 0] + [arg for term in copies for arg in term.args]
-    order = [trace.nodes[i] for i in alg.find_dependencies(within)] + copies
+    order = _fold_lines([trace.nodes[i] for i in alg.find_dependencies(within)] + copies, results)
     last_use = {arg.index: position for position, term in enumerate(order) for arg in term.args}
     registers = _Registers(inputs, results)
     code: list[list[int]] = []
@@ -146,8 +182,7 @@ def compile_tape(trace: Trace, outputs: Sequence[Scalar], inputs: int) -> Tape:
         else:  # the destination is never an operand's register: rows that don't overlap vectorise
             row = [_find_opcode(term), registers.take(term), *[registers[arg] for arg in term.args]]
             code.append(row + [0] * (8 - len(row)))
-            k = (0.0, 1.0) if term.op == alg.STOP_GRADIENT else term.k
-            constants.append([*k, *[0.0] * (4 - len(k))])
+            constants.append(_list_constants(term))
         for index in {arg.index for arg in term.args}:
             if last_use[index] == position:
                 registers.release(index)

@@ -7,7 +7,16 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..arrays import Array, Flags
-from ..kernels.batch import NewtonSteps, Roots, evaluate_tape, evaluate_tape_with_residual, solve_by_newton
+from ..kernels.batch import (
+    NEVER,
+    NewtonSteps,
+    Roots,
+    Settling,
+    evaluate_tape,
+    evaluate_tape_with_residual,
+    solve_by_newton,
+)
+from ..kernels.tape import Tape
 from ..model.elements import MOTION_UNITS
 from ..model.traces import Model
 from .tapes import collect_newton_tapes
@@ -20,6 +29,11 @@ MOST_STEPS = 24
 def compute_closure_tolerance(model: Model) -> float:
     """Return the greatest closure error of an answer, mm: rounding grows with the machine."""
     return CLOSED * max(1.0, max(model.sizes) / 1000.0)
+
+
+def compute_mode_tolerance(model: Model) -> float:
+    """Return by how much legs' joints may differ from those of the working mode that they stand in, mm."""
+    return SAME_MODE * max(1.0, max(model.sizes) / 1000.0)
 
 
 def compute_poses(model: Model, coordinates: Array, joints: Array) -> Array:
@@ -40,17 +54,23 @@ def find_roots(
     most: int = MOST_STEPS,
     poses: bool = True,
     side: Array | None = None,
+    end: Tape | None = None,
+    settling: Settling = NEVER,
 ) -> Roots:
     """Solve the closures by Newton's method from ``near`` (1 or N rows), and return what kind of rows it was given.
 
     poses : ``near`` and the roots are poses, else the motion's coordinates
     most : steps; zero only evaluates the start
     side : of the singularities to end on, as :func:`find_sides` gives it; by default that of the start
+    end, settling : what settles a root, see :mod:`.settling`; by default none is settled
     """
     caps = np.array(list_step_caps(model.structure.coordinates, max(model.sizes)))
     tapes = collect_newton_tapes(model, poses)
+    if end is not None:
+        tapes = tapes._replace(end=end)
     steps = NewtonSteps(caps, min(model.sizes), most, compute_closure_tolerance(model))
-    return solve_by_newton(tapes, steps, np.ascontiguousarray(near), joints, np.empty(0) if side is None else side)
+    sides = np.empty(0) if side is None else side
+    return solve_by_newton(tapes, steps, settling, np.ascontiguousarray(near), joints, sides)
 
 
 def find_in_mode(model: Model, poses: Array, joints: Array, mode: str | None) -> Flags:
@@ -61,7 +81,7 @@ def find_in_mode(model: Model, poses: Array, joints: Array, mode: str | None) ->
     if mode is None or not model.has_modes:
         return np.ones(len(poses), np.bool_)
     off = evaluate_tape_with_residual(model.mode_tape(mode), poses, np.empty((len(poses), 0)), joints)
-    return np.asarray(off <= SAME_MODE * max(1.0, max(model.sizes) / 1000.0))
+    return np.asarray(off <= compute_mode_tolerance(model))
 
 
 def compare_with_mode(model: Model, poses: Array, joints: Array, mode: str) -> Array:

@@ -2,18 +2,28 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
+from numpy.typing import NDArray
 
-from ..arrays import Array, Indices
+from ..arrays import Array
 from ..errors import NoMethodError, PoseError
-from ..kernels.batch import Roots, evaluate_tape, evaluate_tape_with_residual
+from ..kernels.batch import Roots, Settling, evaluate_tape, evaluate_tape_with_residual, settle_by_tape
 from ..model.traces import Model
 from .assembly_side import bound_determinant, find_angle_signs, find_own_sides, find_sides
 from .closure_roots import compute_closure_tolerance, compute_poses, find_in_mode, find_roots
 from .inverse import SINGULAR, solve_inverse
-from .solution import ANSWERED, ON_ANOTHER_SIDE, OPEN, OTHER_MODE, SINGULAR_START, Solution
+from .settling import compile_settling_end, compile_settling_spheres
+from .solution import (
+    ANSWERED,
+    ON_ANOTHER_SIDE,
+    OPEN,
+    OTHER_MODE,
+    SINGULAR_START,
+    Answers,
+    Solution,
+    put_rows,
+    take_rows,
+)
 from .start_modes import is_beside, take_modes_of_starts
 from .turns import count_nearest_turns
 from .wrist import bring_within_poles, is_upright
@@ -41,27 +51,36 @@ def solve_forward(
     if method not in _METHODS:
         raise PoseError(f'method {method!r}: "closed", "newton" or "constant" expected')
     solve = _METHODS[method]
-    solution = solve(model, joints, starts, model.mode if mode is None else mode)
-    if mode is None and starts is not None and model.has_modes:
-        take_modes_of_starts(model, solution, joints, starts, solve)
-    _find_singular_starts(model, solution, starts, model.mode if mode is None else mode)
-    poses, steps = solution.poses, solution.steps
-    poses[solution.why != ANSWERED] = np.nan
-    direction = model.structure.direction
+    answers = solve(model, joints, starts, model.mode if mode is None else mode)
+    rest = np.flatnonzero(~answers.settled)
+    if len(rest):
+        looked_at = take_rows(answers, rest)
+        own_starts = None if starts is None else starts[rest]
+        if mode is None and own_starts is not None and model.has_modes:
+            take_modes_of_starts(model, looked_at, joints[rest], own_starts, solve)
+        _find_singular_starts(model, looked_at, own_starts, model.mode if mode is None else mode)
+        _finish_poses(model, looked_at, own_starts)
+        put_rows(answers, rest, looked_at)
+    return Solution(answers.poses, answers.residual, answers.why == ANSWERED, answers.steps, answers.why)
+
+
+def _find_singular_starts(model: Model, answers: Answers, starts: Array | None, mode: str) -> None:
+    """Say where there is no answer because the start is a parallel singularity; in place."""
+    rows = np.flatnonzero((answers.why == OPEN) | (answers.why == ON_ANOTHER_SIDE))
+    if len(rows):
+        singular = find_sides(model, np.array(model.home)[None, :] if starts is None else starts[rows], mode) == 0.0
+        answers.why[rows[np.broadcast_to(singular, rows.shape)]] = SINGULAR_START
+
+
+def _finish_poses(model: Model, answers: Answers, starts: Array | None) -> None:
+    """Write NaN where there is no answer, and of several ways to write an orientation the start's; in place."""
+    poses, direction = answers.poses, model.structure.direction
+    poses[answers.why != ANSWERED] = np.nan
     if direction is not None:
         along_z = is_upright(poses[:, direction.b])
         poses[along_z, direction.c] = 0.0 if starts is None else starts[along_z, direction.c]
-    elif steps.max(initial=0) > WITHIN_A_TURN:
+    elif answers.steps.max(initial=0) > WITHIN_A_TURN:
         _count_turns(model, poses, np.array(model.home) if starts is None else starts)
-    return replace(solution, converged=solution.why == ANSWERED)
-
-
-def _find_singular_starts(model: Model, solution: Solution, starts: Array | None, mode: str) -> None:
-    """Say where there is no answer because the start is a parallel singularity; in place."""
-    rows = np.flatnonzero((solution.why == OPEN) | (solution.why == ON_ANOTHER_SIDE))
-    if len(rows):
-        singular = find_sides(model, np.array(model.home)[None, :] if starts is None else starts[rows], mode) == 0.0
-        solution.why[rows[np.broadcast_to(singular, rows.shape)]] = SINGULAR_START
 
 
 def _count_turns(model: Model, poses: Array, near: Array) -> None:
@@ -73,20 +92,40 @@ def _count_turns(model: Model, poses: Array, near: Array) -> None:
     count_nearest_turns(poses, np.atleast_2d(near), columns)
 
 
-def _judge(model: Model, roots: Roots, joints: Array, mode: str | None) -> Indices:
+def _judge(model: Model, roots: Roots, joints: Array, mode: str | None) -> NDArray[np.int8]:
     """Tell why roots are no answers, as indices of :data:`REASONS`; zero where they are."""
     turned = roots.turned * find_angle_signs(model, roots.rows)
     with np.errstate(invalid="ignore"):
-        why = np.where(find_in_mode(model, roots.rows, joints, mode), ANSWERED, OTHER_MODE)
+        why = np.where(find_in_mode(model, roots.rows, joints, mode), ANSWERED, OTHER_MODE).astype(np.int8)
         why[~(turned > 0.0)] = ON_ANOTHER_SIDE
         why[~(roots.residual <= compute_closure_tolerance(model))] = OPEN
     return why
 
 
-def _solve_by_spheres(model: Model, joints: Array, starts: Array | None, mode: str | None) -> Solution:
-    """Take, of both common points, the one in the working mode that is nearer to the start, or on home's side."""
+def _solve_by_spheres(model: Model, joints: Array, starts: Array | None, mode: str | None) -> Answers:
+    """Take, of both common points, the one in the working mode on the start's own side, or on home's side."""
     if not model.by_spheres:
         raise NoMethodError(f"{model.spec.name}: no closed form of the direct problem; use method='newton'")
+    count = len(joints)
+    if mode is None:
+        return _choose_common_points(model, joints, starts, mode)
+    tape, poses = compile_settling_spheres(model, mode, starts is not None), np.empty((count, len(model.axes)))
+    given = np.empty((count, 0)) if starts is None else starts
+    closed = compute_closure_tolerance(model)
+    residual, settled = settle_by_tape(tape, model.leg_count, closed, joints, poses, given)
+    answers = Answers(poses, residual, np.zeros(count, np.int32), np.zeros(count, np.int8), settled)
+    rest = np.flatnonzero(~settled)
+    if len(rest):
+        own_starts = None if starts is None else starts[rest]
+        put_rows(answers, rest, _choose_common_points(model, joints[rest], own_starts, mode))
+    return answers
+
+
+def _choose_common_points(model: Model, joints: Array, starts: Array | None, mode: str | None) -> Answers:
+    """Take, of both common points, the one in the working mode on the start's own side, or on home's side.
+
+    On the start's side where that has no joints of its own, or the mode is open. Nothing of it counts as settled.
+    """
     count = len(joints)
     first, second = np.empty((count, len(model.axes))), np.empty((count, len(model.axes)))
     if starts is None:
@@ -101,7 +140,7 @@ def _solve_by_spheres(model: Model, joints: Array, starts: Array | None, mode: s
             nearest = second[lost]
             residual[lost] = evaluate_tape_with_residual(model.spheres_tape(None), joints[lost], nearest, starts[lost])
             first[lost] = nearest
-    why = np.where(residual <= compute_closure_tolerance(model), ANSWERED, OPEN)
+    why = np.where(residual <= compute_closure_tolerance(model), ANSWERED, OPEN).astype(np.int8)
     if model.has_modes:
         lost = np.flatnonzero((why == ANSWERED) & ~find_in_mode(model, first, joints, mode))
         why[lost] = OTHER_MODE
@@ -110,21 +149,32 @@ def _solve_by_spheres(model: Model, joints: Array, starts: Array | None, mode: s
             open_by = evaluate_tape_with_residual(tape, given, others, np.empty((len(lost), 0)))
             fit = (open_by <= compute_closure_tolerance(model)) & find_in_mode(model, others, given, mode)
             first[lost[fit]], residual[lost[fit]], why[lost[fit]] = others[fit], open_by[fit], ANSWERED
-    return Solution(first, residual, why == ANSWERED, np.zeros(count, np.int32), why)
+    return Answers(first, residual, np.zeros(count, np.int32), why, np.zeros(count, np.bool_))
 
 
-def _solve_by_newton(model: Model, joints: Array, starts: Array | None, mode: str | None) -> Solution:
+def _solve_by_newton(model: Model, joints: Array, starts: Array | None, mode: str | None) -> Answers:
+    """Solve the closures from the starts; what that does not settle is judged, and continued where it failed."""
     near = np.array(model.home)[None, :] if starts is None else starts
+    end = compile_settling_end(model, mode, starts is not None)
     if starts is None:
-        roots = find_roots(model, near, joints, side=find_sides(model, near, mode))
-        why = _judge(model, roots, joints, mode)
+        settling = Settling(0.0, np.inf, WITHIN_A_TURN)
+        roots = find_roots(model, near, joints, side=find_sides(model, near, mode), end=end, settling=settling)
     else:
-        roots = find_roots(model, near, joints)
-        _take_own_sides(model, roots, near, joints, mode)
-        why = _judge(model, roots, joints, mode)
-    if (why != ANSWERED).any():
-        _continue_from_starts(model, near, joints, (roots, why), mode)
-    return Solution(roots.rows, roots.residual, why == ANSWERED, roots.steps, why)
+        least = (SINGULAR * bound_determinant(model)) ** 2
+        settling = Settling(least, STEADY if model.has_modes else np.inf, WITHIN_A_TURN)
+        roots = find_roots(model, near, joints, end=end, settling=settling)
+    answers = Answers(roots.rows, roots.residual, roots.steps, np.zeros(len(joints), np.int8), roots.settled)
+    rest = np.flatnonzero(~roots.settled)
+    if len(rest):
+        own = Roots._make(field[rest] for field in roots)
+        own_starts = near if starts is None else starts[rest]
+        if starts is not None:
+            _take_own_sides(model, own, own_starts, joints[rest], mode)
+        why = _judge(model, own, joints[rest], mode)
+        if (why != ANSWERED).any():
+            _continue_from_starts(model, own_starts, joints[rest], (own, why), mode)
+        put_rows(answers, rest, Answers(own.rows, own.residual, own.steps, why, own.settled))
+    return answers
 
 
 def _take_own_sides(model: Model, roots: Roots, near: Array, joints: Array, mode: str | None) -> None:
@@ -149,7 +199,7 @@ def _take_own_sides(model: Model, roots: Roots, near: Array, joints: Array, mode
 
 
 def _continue_from_starts(
-    model: Model, near: Array, joints: Array, into: tuple[Roots, Indices], mode: str | None
+    model: Model, near: Array, joints: Array, into: tuple[Roots, NDArray[np.int8]], mode: str | None
 ) -> None:
     """Continue along the joints' straight line from the start where Newton's method in one go failed; in place.
 
@@ -186,7 +236,7 @@ def _continue_from_starts(
     why[rows[gone < 1.0]] = np.where(why[rows[gone < 1.0]] == ANSWERED, OPEN, why[rows[gone < 1.0]])
 
 
-def _solve_by_constant_jacobian(model: Model, joints: Array, starts: Array | None, mode: str | None) -> Solution:
+def _solve_by_constant_jacobian(model: Model, joints: Array, starts: Array | None, mode: str | None) -> Answers:
     """Iterate x ← x + J⁻¹·(d - d(x)) with the start's Jacobian, to 1 µm in every leg; FME Transactions 41, (31)."""
     legs, m = model.leg_count, len(model.structure.coordinates)
     tape = model.legs_tape(model.mode)
@@ -218,7 +268,7 @@ def _solve_by_constant_jacobian(model: Model, joints: Array, starts: Array | Non
     with np.errstate(invalid="ignore"):
         roots.turned[np.abs(roots.first) <= bound] = 0.0
     why = _judge(model, roots._replace(rows=poses), joints, mode)
-    return Solution(poses, roots.residual, why == ANSWERED, steps, why)
+    return Answers(poses, roots.residual, steps, why, np.zeros(len(why), np.bool_))
 
 
 _METHODS = {"closed": _solve_by_spheres, "newton": _solve_by_newton, "constant": _solve_by_constant_jacobian}

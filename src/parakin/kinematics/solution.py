@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..arrays import Array, Flags, Indices
 
@@ -41,14 +42,25 @@ class Solution:
         return f"<parakin solution: {np.count_nonzero(self.converged)} of {np.size(self.converged)} poses found>"
 
 
-def take_rows(solution: Solution, rows: Indices | Flags) -> Solution:
-    return Solution(
-        solution.poses[rows], solution.residual[rows], solution.converged[rows], solution.steps[rows],
-        solution.why[rows],
-    )  # fmt: skip
+class Answers(NamedTuple):
+    """Rows of a solution while it is sought.
+
+    settled : (N,) where a row is answered and needs no second look, see :mod:`.settling`
+    """
+
+    poses: Array
+    residual: Array
+    steps: NDArray[np.int32]
+    why: NDArray[np.int8]
+    settled: Flags
 
 
-def put_rows(solution: Solution, rows: Indices, other: Solution) -> None:
-    """Put another solution in place of some rows of one."""
-    for name in ("poses", "residual", "steps", "why"):
-        getattr(solution, name)[rows] = getattr(other, name)
+def take_rows(answers: Answers, rows: Indices | Flags) -> Answers:
+    """Copy some rows."""
+    return Answers._make(field[rows] for field in answers)
+
+
+def put_rows(answers: Answers, rows: Indices, others: Answers) -> None:
+    """Put other answers in place of some rows."""
+    for name in Answers._fields:
+        getattr(answers, name)[rows] = getattr(others, name)

@@ -11,7 +11,7 @@ from ..arrays import Array, Flags, Indices
 from ..kernels.batch import find_first_negative
 from ..model.traces import Model
 from .closure_roots import compare_with_mode, find_in_mode
-from .solution import ANSWERED, Solution, put_rows, take_rows
+from .solution import ANSWERED, Answers, put_rows, take_rows
 from .turns import wrap_angle
 from .wrist import point_direction
 
@@ -23,7 +23,7 @@ SETTLED = 0.0125  # of the legs, and rad: so near to its start an answer in the 
 
 
 def take_modes_of_starts(
-    model: Model, solution: Solution, joints: Array, starts: Array, solve: Callable[..., Solution]
+    model: Model, solution: Answers, joints: Array, starts: Array, solve: Callable[..., Answers]
 ) -> None:
     """Put answers in another mode than the default where the start tells that mode, and the answer is beside it."""
     beside = BESIDE * max(model.sizes)
@@ -45,7 +45,7 @@ def take_modes_of_starts(
         put_rows(solution, lost[taken], take_rows(answers, taken))
 
 
-def _is_settled(model: Model, solution: Solution, starts: Array) -> Flags:
+def _is_settled(model: Model, solution: Answers, starts: Array) -> Flags:
     """Tell which rows are answered next to their starts, (N,)."""
     return np.asarray(is_beside(model, solution.poses, starts) & (solution.why == ANSWERED))
 
@@ -86,7 +86,7 @@ def _group_by_mode(model: Model, poses: Array, joints: Array) -> dict[str, Indic
     return {mode: np.array(members) for mode, members in groups.items()}
 
 
-def _measure_way(model: Model, solution: Solution, starts: Array) -> Array:
+def _measure_way(model: Model, solution: Answers, starts: Array) -> Array:
     """Measure how far answers lie from their starts, mm, a turn counted as the greatest leg."""
     turning, direction = model.turning_columns, model.structure.direction
     way = solution.poses - starts

@@ -6,7 +6,7 @@ Inputs are numbered: first the pose (or the motion's coordinates), then the join
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from functools import cached_property
+from functools import cached_property, reduce
 
 import numpy as np
 
@@ -190,7 +190,8 @@ class Model:
 
     # Tapes.
 
-    def _tape(self, key: tuple[object, ...], inputs: int, outputs: Callable[[Trace], list[Scalar]]) -> Tape:
+    def keep_tape(self, key: tuple[object, ...], inputs: int, outputs: Callable[[Trace], list[Scalar]]) -> Tape:
+        """Compile the tape of a trace's outputs, or return the one that is kept under the key."""
         tape = self._tapes.get(key)
         if tape is None:
             trace = Trace()
@@ -216,12 +217,14 @@ class Model:
 
     def inverse_tape(self, mode: str) -> Tape:
         """Compile pose -> joints."""
-        return self._tape(("inverse", mode), self._poses, lambda t: self.invert(t.inputs(self._poses), mode)[0])
+        return self.keep_tape(("inverse", mode), self._poses, lambda t: self.invert(t.inputs(self._poses), mode)[0])
 
     def inverse_with_first_tape(self, mode: str) -> Tape:
         """Compile pose, first joint of the wrist -> joints, for poses where that joint is free."""
         n = self._poses
-        return self._tape(("inverse with first", mode), n + 1, lambda t: self.invert(t.inputs(n), mode, t.input(n))[0])
+        return self.keep_tape(
+            ("inverse with first", mode), n + 1, lambda t: self.invert(t.inputs(n), mode, t.input(n))[0]
+        )
 
     def freedom_tape(self) -> Tape:
         """Compile pose -> sin² of the tool axis against the first axis of head and table; 1 where there is none."""
@@ -230,7 +233,7 @@ class Model:
             placed = self.structure.place(trace.inputs(self._poses), self.structure.branches)
             return [1.0 if placed.freedom is None else placed.freedom]
 
-        return self._tape(("freedom",), self._poses, outputs)
+        return self.keep_tape(("freedom",), self._poses, outputs)
 
     def begin_tape(self, from_poses: bool = True) -> Tape:
         """Compile pose (or coordinates as they are), joints -> the motion's coordinates to start from."""
@@ -242,24 +245,27 @@ class Model:
                 self.structure.place_with_joints(given, self._serial(joints)).coordinates if from_poses else list(given)
             )
 
-        return self._tape(("begin", from_poses), width + len(self.drives), outputs)
+        return self.keep_tape(("begin", from_poses), width + len(self.drives), outputs)
 
     def end_tape(self, to_poses: bool = True) -> Tape:
         """Compile coordinates, joints -> pose (or coordinates as they are)."""
 
         def outputs(trace: Trace) -> list[Scalar]:
             coordinates, joints = self._coordinates_and_joints(trace)
-            return self._compute_pose(coordinates, joints) if to_poses else coordinates
+            return self.compute_pose(coordinates, joints) if to_poses else coordinates
 
-        return self._tape(("end", to_poses), self._motions + len(self.drives), outputs)
+        return self.keep_tape(("end", to_poses), self._motions + len(self.drives), outputs)
 
-    def _compute_pose(self, coordinates: Sequence[Scalar], joints: Sequence[Scalar]) -> list[Scalar]:
+    def compute_pose(self, coordinates: Sequence[Scalar], joints: Sequence[Scalar]) -> list[Scalar]:
         """Compute the pose; NaN where a leg closes otherwise than it is built, as a strut of negative length does."""
         first, *others = self.structure.pose(coordinates, self._serial(joints))
         points = compute_platform_points(self.spec, *self.structure.frame(coordinates))
-        for leg, point, q in zip(self.spec.legs, points, group_joints_by_leg(self.spec, joints), strict=True):
-            for margin in leg.assembly_margins(point, q):
-                first = minimum(first, FAR + sqrt(margin))
+        given = group_joints_by_leg(self.spec, joints)
+        margins = [
+            m for leg, p, q in zip(self.spec.legs, points, given, strict=True) for m in leg.assembly_margins(p, q)
+        ]
+        if margins:
+            first = minimum(first, FAR + sqrt(reduce(minimum, margins)))
         return [first, *others]
 
     def newton_tape(self, derivatives: bool) -> Tape:
@@ -274,7 +280,7 @@ class Model:
             f = [f[i] for i in self.closure_order]
             return f + [derivative(row, y) for row in f for y in coordinates] if derivatives else f
 
-        return self._tape(("newton", derivatives), self._motions + len(self.drives), outputs)
+        return self.keep_tape(("newton", derivatives), self._motions + len(self.drives), outputs)
 
     def scaled_closures(self, coordinates: Sequence[Scalar], joints: Sequence[Scalar]) -> list[Scalar]:
         """Compute every leg's closure in mm, from the motion's coordinates."""
@@ -314,10 +320,15 @@ class Model:
             legs = [joints[drive.name] for drive in self.drives[: len(self.drives) - self.serial]]
             return legs + [derivative(q, y) for q in legs for y in coordinates]
 
-        return self._tape(("legs", mode), self._motions, outputs)
+        return self.keep_tape(("legs", mode), self._motions, outputs)
 
     def mode_tape(self, mode: str) -> Tape:
-        """Compile pose, joints -> the legs' joints in a working mode, at that platform, less the given ones; in mm.
+        """Compile pose, joints -> how far the joints are from those of a working mode; see :meth:`compare_mode`."""
+        width = self._poses + len(self.drives)
+        return self.keep_tape(("mode", mode), width, lambda t: self.compare_mode(*self._pose_and_joints(t), mode))
+
+    def compare_mode(self, pose: Sequence[Scalar], joints: Sequence[Scalar], mode: str) -> list[Scalar]:
+        """Subtract given joints from the legs' joints in a working mode at a pose, its platform as they place it; mm.
 
         Angles are taken within half a turn, times an arm of :data:`ARM` of the greatest leg.
         """
@@ -326,19 +337,15 @@ class Model:
         def compare(unit: str, off: Scalar) -> Scalar:
             return atan2(*sincos(off)) * arm if unit == "rad" else off
 
-        def outputs(trace: Trace) -> list[Scalar]:
-            pose, joints = self._pose_and_joints(trace)
-            placed = self.structure.place_with_joints(pose, self._serial(joints))
-            signs, _ = self.split_mode(mode)
-            points = compute_platform_points(self.spec, placed.rotation, placed.origin)
-            own = group_joints_by_leg(self.spec, joints)
-            return [
-                compare(unit, q - given)
-                for leg, point, s, all_given in zip(self.spec.legs, points, signs, own, strict=True)
-                for unit, q, given in zip(leg.units, leg.inverse(point, s).joints, all_given, strict=True)
-            ]
-
-        return self._tape(("mode", mode), self._poses + len(self.drives), outputs)
+        placed = self.structure.place_with_joints(pose, self._serial(joints))
+        signs, _ = self.split_mode(mode)
+        points = compute_platform_points(self.spec, placed.rotation, placed.origin)
+        own = group_joints_by_leg(self.spec, joints)
+        return [
+            compare(unit, q - given)
+            for leg, point, s, all_given in zip(self.spec.legs, points, signs, own, strict=True)
+            for unit, q, given in zip(leg.units, leg.inverse(point, s).joints, all_given, strict=True)
+        ]
 
     def margins_tape(self, mode: str) -> Tape:
         """Compile pose, joints -> every margin, in the order of :attr:`limits`."""
@@ -347,7 +354,7 @@ class Model:
             pose, joints = self._pose_and_joints(trace)
             return [margin for _, margin in self.margins(pose, joints, mode)]
 
-        return self._tape(("margins", mode), self._poses + len(self.drives), outputs)
+        return self.keep_tape(("margins", mode), self._poses + len(self.drives), outputs)
 
     def check_tape(self, mode: str) -> Tape:
         """Compile pose -> every margin, with the inverse in between."""
@@ -355,7 +362,7 @@ class Model:
         def outputs(trace: Trace) -> list[Scalar]:
             return [margin for _, margin in self.own_margins(trace.inputs(self._poses), mode)]
 
-        return self._tape(("check", mode), self._poses, outputs)
+        return self.keep_tape(("check", mode), self._poses, outputs)
 
     def jacobian_tape(self) -> Tape:
         """Compile pose, joints -> A (n·n) and B (n·n) with A x' = B q'."""
@@ -367,7 +374,7 @@ class Model:
             a = [derivative(row, x) for row in f for x in pose]
             return a + [-derivative(row, q) for row in f for q in joints]
 
-        return self._tape(("jacobian",), self._poses + len(self.drives), outputs)
+        return self.keep_tape(("jacobian",), self._poses + len(self.drives), outputs)
 
     def rates_tape(self) -> Tape:
         """Compile pose, joints -> A (n·n), B (n·n) and the legs' wrench norms: see :mod:`parakin.model.rates`."""
@@ -376,7 +383,7 @@ class Model:
             twist = compute_twist_rates(self.spec, self.structure, *self._pose_and_joints(trace))
             return [scalar for row in (*twist.a, *twist.b, twist.wrench_norms) for scalar in row]
 
-        return self._tape(("rates",), self._poses + len(self.drives), outputs)
+        return self.keep_tape(("rates",), self._poses + len(self.drives), outputs)
 
     def spheres_tape(self, side: float | None) -> Tape:
         """Compile joints -> pose, on the given side of the centres' plane, then the closures there, mm.
@@ -391,9 +398,9 @@ class Model:
                 pose = trace.inputs(self._poses, len(joints))
                 near = self.structure.place_with_joints(pose, self._serial(joints)).origin
             coordinates = self.spheres(joints, side, near)
-            return self._compute_pose(coordinates, joints) + self.scaled_closures(coordinates, joints)
+            return self.compute_pose(coordinates, joints) + self.scaled_closures(coordinates, joints)
 
-        return self._tape(("spheres", side), len(self.drives) + (self._poses if side is None else 0), outputs)
+        return self.keep_tape(("spheres", side), len(self.drives) + (self._poses if side is None else 0), outputs)
 
     def spheres_with_height_tape(self) -> Tape:
         """Compile joints, near pose -> as :meth:`spheres_tape`, then the square of the height over the centres, mm²."""
@@ -404,12 +411,12 @@ class Model:
             coordinates = self.spheres(joints, None, placed.origin)
             closures = self.scaled_closures(coordinates, joints)
             return [
-                *self._compute_pose(coordinates, joints),
+                *self.compute_pose(coordinates, joints),
                 *closures,
                 compute_square_height(*self.find_spheres(joints)),
             ]
 
-        return self._tape(("spheres with height",), len(self.drives) + self._poses, outputs)
+        return self.keep_tape(("spheres with height",), len(self.drives) + self._poses, outputs)
 
     def spheres_on_side_tape(self) -> Tape:
         """Compile joints, a number -> as :meth:`spheres_tape`, on the side that the number's sign tells."""
@@ -417,9 +424,9 @@ class Model:
         def outputs(trace: Trace) -> list[Scalar]:
             joints = list(trace.inputs(len(self.drives)))
             coordinates = self.spheres(joints, trace.input(len(joints)))
-            return self._compute_pose(coordinates, joints) + self.scaled_closures(coordinates, joints)
+            return self.compute_pose(coordinates, joints) + self.scaled_closures(coordinates, joints)
 
-        return self._tape(("spheres on side",), len(self.drives) + 1, outputs)
+        return self.keep_tape(("spheres on side",), len(self.drives) + 1, outputs)
 
     def beside_tape(self, limit: float) -> Tape:
         """Compile two poses -> by how much each coordinate differs less than a fraction of the longest leg, or rad."""
@@ -430,17 +437,20 @@ class Model:
             pairs = zip(trace.inputs(n), trace.inputs(n, n), bounds, strict=True)
             return [bound - absolute(one - other) for one, other, bound in pairs]
 
-        return self._tape(("beside", limit), 2 * n, outputs)
+        return self.keep_tape(("beside", limit), 2 * n, outputs)
 
     def own_side_tape(self, mode: str) -> Tape:
         """Compile pose -> the side of the spheres' centres on which it lies, with its own joints in a working mode."""
 
-        def outputs(trace: Trace) -> list[Scalar]:
-            joints, placed, _ = self.invert(trace.inputs(self._poses), mode)
-            centres, _, plane = self.find_spheres(joints)
-            return [measure_side(centres, plane, placed.origin)]
+        return self.keep_tape(
+            ("own side", mode), self._poses, lambda t: [self.measure_own_side(t.inputs(self._poses), mode)]
+        )
 
-        return self._tape(("own side", mode), self._poses, outputs)
+    def measure_own_side(self, pose: Sequence[Scalar], mode: str) -> Scalar:
+        """Measure on which side of the spheres' centres a pose lies with its own joints; NaN out of reach."""
+        joints, placed, _ = self.invert(pose, mode)
+        centres, _, plane = self.find_spheres(joints)
+        return measure_side(centres, plane, placed.origin)
 
     def spheres(self, joints: Sequence[Scalar], side: Scalar | None, near: Vec | None = None) -> list[Scalar]:
         """Find the motion's coordinates by the common point of the legs' spheres; ``near`` picks the nearer of two."""

@@ -97,7 +97,8 @@ def _write_expression(operation: int, a: Sequence[str], k: Sequence[float]) -> s
         return _write_sum([format_c(k[0]), *terms] if k[0] != 0.0 or not terms else terms)
     if operation in _PRODUCTS:
         pairs = [f"{a[2 * i]} * {a[2 * i + 1]}" for i in range(_PRODUCTS[operation])]
-        return _write_sum([_write_product(factor, pair) for factor, pair in zip(k, pairs, strict=False)])
+        terms = [_write_product(factor, pair) for factor, pair in zip(k, pairs, strict=False)]
+        return _write_sum([*terms, format_c(k[3])] if k[3] != 0.0 else terms)
     if operation == t.FMA:
         terms = [_write_product(k[0], f"{a[0]} * {a[1]}"), _write_product(k[1], a[2])]
         return _write_sum([*terms, format_c(k[2])] if k[2] != 0.0 else terms)

@@ -1,0 +1,84 @@
+"""Answers of the direct problem that are settled in the pass that finds them: tapes that end with margins for it.
+
+Where all margins are positive, the answer passes every check of :mod:`.forward`; the others are looked at again there.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from math import pi
+
+from ..algebra import Scalar, Trace, absolute, dot
+from ..kernels.tape import Tape
+from ..model.traces import Model
+from ..units import AXIS_UNITS
+from .closure_roots import compute_mode_tolerance
+from .start_modes import SETTLED
+from .wrist import EXACT, flip_mode
+
+
+def compile_settling_end(model: Model, mode: str | None, from_start: bool) -> Tape:
+    """Compile coordinates, joints, near pose -> pose, then the margins of :func:`_list_margins`."""
+    motions, drives, poses = len(model.structure.coordinates), len(model.drives), len(model.axes)
+
+    def outputs(trace: Trace) -> list[Scalar]:
+        joints = trace.inputs(drives, motions)
+        near = trace.inputs(poses, motions + drives) if from_start else None
+        pose = model.compute_pose(trace.inputs(motions), joints)
+        return [*pose, *_list_margins(model, pose, joints, near, mode)]
+
+    inputs = motions + drives + (poses if from_start else 0)
+    return model.keep_tape(("settling end", mode, from_start), inputs, outputs)
+
+
+def compile_settling_spheres(model: Model, mode: str, from_start: bool) -> Tape:
+    """Compile joints, near pose -> pose, closures in mm, then the margins of :func:`_list_margins`.
+
+    The pose is the legs' common point on the near pose's side, which that has with its own joints in the working mode;
+    with a head or table one more margin tells that it is the same in both of their modes. Without a near pose it is
+    the common point on home's side.
+    """
+    drives, poses = len(model.drives), len(model.axes)
+
+    def outputs(trace: Trace) -> list[Scalar]:
+        joints = trace.inputs(drives)
+        near = trace.inputs(poses, drives) if from_start else None
+        side: Scalar = model.home_side
+        margins: list[Scalar] = []
+        if near is not None:
+            side = model.measure_own_side(near, mode)
+            if model.structure.branches:
+                margins.append(side * model.measure_own_side(near, flip_mode(mode)))
+        coordinates = model.spheres(joints, side)
+        pose = model.compute_pose(coordinates, joints)
+        margins += _list_margins(model, pose, joints, near, mode)
+        return [*pose, *model.scaled_closures(coordinates, joints), *margins]
+
+    inputs = drives + (poses if from_start else 0)
+    return model.keep_tape(("settling spheres", mode, from_start), inputs, outputs)
+
+
+def _list_margins(
+    model: Model, pose: Sequence[Scalar], joints: Sequence[Scalar], near: Sequence[Scalar] | None, mode: str | None
+) -> list[Scalar]:
+    """List margins that are positive where an answer needs no second look.
+
+    The legs stand in the working mode (None: in any). If they have several, the answer is beside the near pose, where
+    no other mode's answer is nearer. A tool whose axis B and C tell is not upright, and the second turn of three is
+    within ±90°, where the determinant's sign is that of the twist.
+    """
+    margins: list[Scalar] = []
+    if model.has_modes and mode is not None:
+        off = model.compare_mode(pose, joints, mode)
+        margins.append(compute_mode_tolerance(model) ** 2 - dot(off, off))
+    if model.has_modes and near is not None:
+        ways = [one - other for one, other in zip(pose, near, strict=True)]
+        lengths = [way for way, axis in zip(ways, model.axes, strict=True) if AXIS_UNITS[axis] == "mm"]
+        margins.append((SETTLED * max(model.sizes)) ** 2 - dot(lengths, lengths))
+        margins += [SETTLED - absolute(ways[column]) for column in model.turning_columns]
+    direction, middle = model.structure.direction, model.structure.middle_turn
+    if direction is not None:
+        margins.append(0.5 * pi - EXACT - absolute(pose[direction.b] - 0.5 * pi))
+    if middle is not None:
+        margins += [0.5 * pi - absolute(each[middle]) for each in (pose, near) if each is not None]
+    return margins

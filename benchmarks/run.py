@@ -5,10 +5,11 @@ from __future__ import annotations
 import feed
 import kinematics
 import linuxcnc
+import many_direct_problems
 import post
 import startup
 import workspace
 
 if __name__ == "__main__":
-    for benchmark in (kinematics, post, startup, workspace, feed, linuxcnc):
+    for benchmark in (kinematics, many_direct_problems, post, startup, workspace, feed, linuxcnc):
         print(benchmark.main(), flush=True)

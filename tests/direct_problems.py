@@ -7,6 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from test_conformance import poses_about
 
+from parakin.kinematics.solution import ON_ANOTHER_SIDE
+
 BATCH = 100_000
 OFFSETS = [(0.0, 0.0), (1.0, 0.5), (10.0, 3.0), (50.0, 10.0), (200.0, 30.0), (600.0, 80.0)]  # mm and degrees
 
@@ -21,6 +23,7 @@ class Tally:
     other_side: int = 0
     close: int = 0  # problems with a start 1 mm and 0.5° off at most
     close_refused: int = 0
+    close_across: int = 0  # of these, with a start that lies on another side by its own determinant, and said so
 
 
 def draw_poses(machine, count, rng):
@@ -78,7 +81,10 @@ def try_direct_problems(machine, count, seed=0, **options):
         tally.count += len(poses)
         tally.refused += int((~done).sum())
         tally.close += int(close.sum())
-        tally.close_refused += int((close & ~done).sum())
+        lost = close & ~done
+        tally.close_refused += int(lost.sum())
+        across = measure_sides(machine, poses[lost]) * measure_sides(machine, starts[lost]) < 0.0
+        tally.close_across += int((across & (found.why[lost] == ON_ANOTHER_SIDE)).sum())
         assert (found.why[~done] > 0).all()
         error = measure_mode_error(machine, found.poses[done], joints[done])
         in_mode = error < 1e-5

@@ -10,8 +10,7 @@ from test_forward import allowed
 import parakin as pk
 
 COUNT = int(os.environ.get("PARAKIN_DIRECT_PROBLEMS", "5000"))
-# Starts 1 mm and 0.5° off may lie beyond a singularity, where an allowed pose is next to one.
-CLOSE_REFUSED = {"hbg80_2d": 3e-3}
+CLOSE_REFUSED = 1e-5  # of starts 1 mm and 0.5° off, but for those across a singular line beside an allowed pose
 
 
 @everyone
@@ -20,7 +19,7 @@ def test_no_answer_is_in_another_mode_or_on_another_side(m):
     assert tally.count == COUNT
     assert tally.other_mode == 0
     assert tally.other_side == 0
-    assert tally.close_refused <= CLOSE_REFUSED.get(m.name, 1e-5) * tally.close + 1e-9
+    assert tally.close_refused - tally.close_across <= CLOSE_REFUSED * tally.close
     assert tally.refused < 0.1 * tally.count
 
 

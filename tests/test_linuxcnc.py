@@ -23,6 +23,7 @@ from parakin.cli import main
 from parakin.controllers.linuxcnc.home_pose import find_home_pose
 from parakin.controllers.linuxcnc.module import write_module
 from parakin.kinematics.closure_roots import find_roots
+from parakin.kinematics.wrist import find_nearest_direction
 from parakin.performance.singularities import compute_singularity_margins, list_margin_names
 
 sys.path.insert(0, str(Path(__file__).parent / "linuxcnc"))
@@ -269,6 +270,27 @@ def test_an_upright_tool_keeps_its_last_c(name, modules):
     rows, codes = modules(m).forward(outward(m, m.inverse(m.home))[None], start)
     assert codes[0] == 0
     assert np.abs(rows - start).max() < 1e-7
+
+
+@pytest.mark.parametrize("name", ["tricept", "orthoglide5_head", "orthoglide5_table"])
+def test_b_and_c_of_a_direction_are_written_as_the_library_writes_them(name, modules):
+    """Of both ways to write it the one nearest to the last pose, ties within a millionth of a radian too."""
+    m, rng, count = pk.load(name), np.random.default_rng(4), 4000
+    poses = np.tile(m.home, (count, 1))
+    poses[:, 3], poses[:, 4] = rng.uniform(0.02, 0.5, count), rng.uniform(-3.0, 3.0, count)
+    near = poses.copy()
+    near[:, 3], near[:, 4] = rng.uniform(-0.6, 0.6, count), rng.uniform(-9.0, 9.0, count)
+    tied = np.arange(count) % 2 == 1  # (b + last)² + (π - way)² = (b - last)² + way²
+    way = 0.5 * np.pi + 2.0 * poses[tied, 3] * near[tied, 3] / np.pi
+    near[tied, 4] = poses[tied, 4] + way + rng.choice([-1e-6, 1e-6], tied.sum())
+    found, codes = modules(m).forward(outward(m, m.inverse(poses)), world(m, near))
+    assert (codes == 0).mean() > 0.5
+    done = codes == 0
+    written, turns = pose(m, found)[done, 3:], np.column_stack([np.zeros(done.sum()), near[done, 3:]])
+    expected = find_nearest_direction(directions(m, poses)[done, :, 0], turns)[:, 1:]
+    np.testing.assert_allclose(written, expected, atol=1e-8)
+    flipped = written[:, 0] < 0.0
+    assert flipped[tied[done]].any() and (~flipped)[tied[done]].any()
 
 
 @pytest.mark.parametrize("family", sorted(FAMILIES))

@@ -65,22 +65,39 @@ def evaluate_tape(tape: Tape, x: Array, out: Array, z: Array | None = None, whol
     return out
 
 
-def evaluate_tape_with_residual(tape: Tape, x: Array, out: Array, z: Array) -> Array:
-    """Evaluate a tape that ends with closures, all else into ``out``; returns the greatest closure, (N,) mm."""
-    return settle_by_tape(tape, tape.outputs - out.shape[1], 0.0, x, out, z)[0]
+class ClosureLimits(NamedTuple):
+    """How many of a tape's outputs, behind those of a row, are closures, and their greatest size where a leg closes."""
+
+    closures: int
+    closed: float  # mm
 
 
-def settle_by_tape(tape: Tape, closures: int, closed: float, x: Array, out: Array, z: Array) -> tuple[Array, Flags]:
-    """Evaluate a tape of rows into ``out``, then some closures, then margins.
+class ClosedRows(NamedTuple):
+    """Rows of a tape that ends with closures and margins.
 
-    Returns the greatest closure, (N,) mm, and where it is ``closed`` at most while all margins are positive, (N,).
+    rows : (N, k) its first outputs
+    residual : (N,) the greatest closure, mm
+    settled : (N,) where the residual is within its limit and all margins are positive
     """
+
+    rows: Array
+    residual: Array
+    settled: Flags
+
+
+def evaluate_closed_rows(tape: Tape, limits: ClosureLimits, x: Array, z: Array, rows: Array) -> ClosedRows:
+    """Evaluate a tape of a row, closures and margins for rows of ``x`` and ``z``, the first into ``rows``."""
     from .blocks import evaluate_with_residual
 
-    residual, settled = np.empty(len(x)), np.empty(len(x), np.bool_)
-    args = (tape, closures, closed, freeze_rows(x), freeze_rows(z), out, residual, settled)
+    results = ClosedRows(rows, np.empty(len(x)), np.empty(len(x), np.bool_))
+    args = (tape, limits, freeze_rows(x), freeze_rows(z), results)
     run_in_threads(len(x), lambda start, stop: evaluate_with_residual(*args, start, stop))
-    return residual, settled
+    return results
+
+
+def evaluate_tape_with_residual(tape: Tape, x: Array, out: Array, z: Array) -> Array:
+    """Evaluate a tape that ends with closures, all else into ``out``; returns the greatest closure, (N,) mm."""
+    return evaluate_closed_rows(tape, ClosureLimits(tape.outputs - out.shape[1], 0.0), x, z, out).residual
 
 
 def find_first_negative(tape: Tape, x: Array, z: Array) -> Indices:
@@ -105,21 +122,6 @@ def _find_first_in_rows(margins: Array, finite: Flags) -> Indices:
     return first
 
 
-class NewtonSteps(NamedTuple):
-    """Bounds of Newton's steps.
-
-    caps : (m,) the greatest change of each coordinate in one step
-    size : the legs' length, mm
-    most : steps; zero only evaluates the start
-    closed : mm, the greatest closure of a root
-    """
-
-    caps: Array
-    size: float
-    most: int
-    closed: float
-
-
 class Settling(NamedTuple):
     """Bounds within which a root needs no second look, besides the last tape's margins, which are positive there.
 
@@ -136,6 +138,22 @@ class Settling(NamedTuple):
 NEVER = Settling()  # every root needs one
 
 
+class NewtonSteps(NamedTuple):
+    """Bounds of Newton's steps.
+
+    caps : (m,) the greatest change of each coordinate in one step
+    size : the legs' length, mm
+    most : steps; zero only evaluates the start
+    closed : mm, the greatest closure of a root
+    """
+
+    caps: Array
+    size: float
+    most: int
+    closed: float
+    settling: Settling
+
+
 class Roots(NamedTuple):
     """The results of Newton's method, a row for each problem.
 
@@ -144,7 +162,6 @@ class Roots(NamedTuple):
     steps : (N,)
     turned : (N,) the determinant of the last factored matrix times that of the start, or times the side that was
         asked for; negative where the root is on the other side of a singularity
-    first : (N,) the determinant of the start's matrix
     settled : (N,) where a root is closed and needs no second look, by :class:`Settling`
     """
 
@@ -152,13 +169,10 @@ class Roots(NamedTuple):
     residual: Array
     steps: NDArray[np.int32]
     turned: Array
-    first: Array
     settled: Flags
 
 
-def solve_by_newton(
-    tapes: NewtonTapes, limits: NewtonSteps, settling: Settling, near: Array, joints: Array, side: Array
-) -> Roots:
+def solve_by_newton(tapes: NewtonTapes, limits: NewtonSteps, near: Array, joints: Array, side: Array) -> Roots:
     """Solve the closures by Newton's method from ``near`` (1 or N rows) for every row of joints.
 
     side : the sign of the determinant to end with, one a row or one for all; none for that of the start
@@ -167,7 +181,7 @@ def solve_by_newton(
 
     count = len(joints)
     rows, settled = np.empty((count, near.shape[1])), np.empty(count, np.bool_)
-    roots = Roots(rows, np.empty(count), np.empty(count, np.int32), np.empty(count), np.empty(count), settled)
-    args = (tapes, limits, settling, freeze_rows(near), freeze_rows(joints), side, roots)
+    roots = Roots(rows, np.empty(count), np.empty(count, np.int32), np.empty(count), settled)
+    args = (tapes, limits, freeze_rows(near), freeze_rows(joints), side, roots)
     run_in_threads(count, lambda start, stop: solve_newton(*args, start, stop))
     return roots

@@ -276,30 +276,36 @@ def find_positive(r, first, stop, holds):
 
 
 @njit(nogil=True, cache=True, fastmath=FAST, error_model="numpy")
-def evaluate_with_residual(tape, closures, closed, x, z, y, residual, settled, start, stop):
-    """Evaluate a tape: its first outputs to the rows of ``y``, the greatest size of the closures to ``residual`` (N,).
+def evaluate_with_residual(tape, limits, x, z, results, start, stop):
+    """Evaluate a tape: its first outputs are rows, the next closures, the others margins.
 
-    Both are NaN where an input, or one of these outputs, is not finite. The outputs behind the closures are margins:
-    ``settled`` (N,) tells where all of them are positive and the residual is ``closed`` at most.
+    limits : :class:`~.batch.ClosureLimits`
+    results : :class:`~.batch.ClosedRows`, overwritten; NaN where an input, an output of the row or a closure is not
+        finite
     """
+    y, residual, settled, closed = results.rows, results.residual, results.settled, limits.closed
     r = allocate_lanes(tape.registers)
     bad = allocate_lanes(1)
     most = allocate_lanes(1)
     holds = allocate_lanes(1)
-    first = tape.inputs + y.shape[1]
+    closures = tape.inputs + y.shape[1]
+    margins = closures + limits.closures
     for row in range(start, stop, LANES):
         n = _load_inputs(x, z, row, stop, r, bad)
         fetch_to_write(y, row, stop)
         interpret(tape.code, tape.constants, r)
-        most[:] = 0.0
-        for o in range(tape.inputs, first + closures):
+        for o in range(tape.inputs, closures):
             d = (o & _MASK) * LANES
-            closure = o >= first
+            for j in range(LANES):
+                bad[j] += 0.0 * r[d + j]
+        most[:] = 0.0
+        for o in range(closures, margins):
+            d = (o & _MASK) * LANES
             for j in range(LANES):
                 v = r[d + j]
                 bad[j] += 0.0 * v
-                most[j] = abs(v) if closure & (abs(v) > most[j]) else most[j]
-        find_positive(r, first + closures, tape.inputs + tape.outputs, holds)
+                most[j] = abs(v) if abs(v) > most[j] else most[j]
+        find_positive(r, margins, tape.inputs + tape.outputs, holds)
         store_rows(y, row, n, tape.inputs, r, bad)
         for j in range(n):
             worst = most[j] + bad[j]

@@ -316,10 +316,10 @@ def _evaluate_end(end, m, width, block, bad):
 
 
 @njit(nogil=True, cache=True, fastmath=FAST, error_model="numpy")
-def solve_newton(tapes, limits, settling, near, q, side, roots, start, stop):
+def solve_newton(tapes, limits, near, q, side, roots, start, stop):
     """Solve f(y, q) = 0 for rows start ≤ i < stop of ``q``; see :func:`~.batch.solve_by_newton`.
 
-    tapes : :class:`~.tape.NewtonTapes`; limits : :class:`~.batch.NewtonSteps`; settling : :class:`~.batch.Settling`
+    tapes : :class:`~.tape.NewtonTapes`; limits : :class:`~.batch.NewtonSteps`
     near : (N or 1, k) starts; side : (N,), (1,) or (0,)
     roots : :class:`~.batch.Roots`, overwritten
     """
@@ -328,8 +328,8 @@ def solve_newton(tapes, limits, settling, near, q, side, roots, start, stop):
     block, bad, holds = _allocate_block(tapes, m, joints, near.shape[1]), allocate_lanes(1), allocate_lanes(1)
     r, point, state, determinant = block.registers, block.point, block.state, block.factors.determinant
     first, end = block.first_determinant, tapes.end  # fields are taken out once: Numba counts references at each access
-    rows, residual, steps, turned, at_start = roots.rows, roots.residual, roots.steps, roots.turned, roots.first
-    settled = roots.settled
+    rows, residual, steps, turned, settled = roots.rows, roots.residual, roots.steps, roots.turned, roots.settled
+    settling, closed = limits.settling, limits.closed
     for row in range(start, stop, LANES):
         n = _load_start(tapes, near, q, row, stop, block, bad)
         fetch_to_write(rows, row, stop)
@@ -338,7 +338,6 @@ def solve_newton(tapes, limits, settling, near, q, side, roots, start, stop):
         solve_block(tapes, limits, m, block, n)
         for j in range(n):
             steps[row + j] = int(state[STEPS + j])
-            at_start[row + j] = first[j]
             if side.shape[0] == 0:
                 turned[row + j] = determinant[j] * first[j]
             else:
@@ -351,7 +350,7 @@ def solve_newton(tapes, limits, settling, near, q, side, roots, start, stop):
             residual[row + j] = worst
             settled[row + j] = (
                 (holds[j] > 0.0)
-                & (worst <= limits.closed)
+                & (worst <= closed)
                 & (turned[row + j] > settling.turned)
                 & (change <= settling.steady * abs(first[j]))
                 & (state[STEPS + j] <= settling.steps)

@@ -68,9 +68,9 @@ def find_roots(
     tapes = collect_newton_tapes(model, poses)
     if end is not None:
         tapes = tapes._replace(end=end)
-    steps = NewtonSteps(caps, min(model.sizes), most, compute_closure_tolerance(model))
+    steps = NewtonSteps(caps, min(model.sizes), most, compute_closure_tolerance(model), settling)
     sides = np.empty(0) if side is None else side
-    return solve_by_newton(tapes, steps, settling, np.ascontiguousarray(near), joints, sides)
+    return solve_by_newton(tapes, steps, np.ascontiguousarray(near), joints, sides)
 
 
 def find_in_mode(model: Model, poses: Array, joints: Array, mode: str | None) -> Flags:

@@ -7,10 +7,17 @@ from numpy.typing import NDArray
 
 from ..arrays import Array
 from ..errors import NoMethodError, PoseError
-from ..kernels.batch import Roots, Settling, evaluate_tape, evaluate_tape_with_residual, settle_by_tape
+from ..kernels.batch import (
+    ClosureLimits,
+    Roots,
+    Settling,
+    evaluate_closed_rows,
+    evaluate_tape,
+    evaluate_tape_with_residual,
+)
 from ..model.traces import Model
 from .assembly_side import bound_determinant, find_angle_signs, find_own_sides, find_sides
-from .closure_roots import compute_closure_tolerance, compute_poses, find_in_mode, find_roots
+from .closure_roots import MOST_STEPS, compute_closure_tolerance, compute_poses, find_in_mode, find_roots
 from .inverse import SINGULAR, solve_inverse
 from .settling import compile_settling_end, compile_settling_spheres
 from .solution import (
@@ -111,10 +118,10 @@ def _solve_by_spheres(model: Model, joints: Array, starts: Array | None, mode: s
         return _choose_common_points(model, joints, starts, mode)
     tape, poses = compile_settling_spheres(model, mode, starts is not None), np.empty((count, len(model.axes)))
     given = np.empty((count, 0)) if starts is None else starts
-    closed = compute_closure_tolerance(model)
-    residual, settled = settle_by_tape(tape, model.leg_count, closed, joints, poses, given)
-    answers = Answers(poses, residual, np.zeros(count, np.int32), np.zeros(count, np.int8), settled)
-    rest = np.flatnonzero(~settled)
+    limits = ClosureLimits(model.leg_count, compute_closure_tolerance(model))
+    closed = evaluate_closed_rows(tape, limits, joints, given, poses)
+    answers = Answers(poses, closed.residual, np.zeros(count, np.int32), np.zeros(count, np.int8), closed.settled)
+    rest = np.flatnonzero(~closed.settled)
     if len(rest):
         own_starts = None if starts is None else starts[rest]
         put_rows(answers, rest, _choose_common_points(model, joints[rest], own_starts, mode))
@@ -144,11 +151,14 @@ def _choose_common_points(model: Model, joints: Array, starts: Array | None, mod
     if model.has_modes:
         lost = np.flatnonzero((why == ANSWERED) & ~find_in_mode(model, first, joints, mode))
         why[lost] = OTHER_MODE
-        if starts is None and len(lost):
-            given, others, tape = joints[lost], second[lost], model.spheres_tape(-model.home_side)
+        for side in (model.home_side, -model.home_side) if len(lost) else ():
+            given, others, tape = joints[lost], second[lost], model.spheres_tape(side)
             open_by = evaluate_tape_with_residual(tape, given, others, np.empty((len(lost), 0)))
             fit = (open_by <= compute_closure_tolerance(model)) & find_in_mode(model, others, given, mode)
-            first[lost[fit]], residual[lost[fit]], why[lost[fit]] = others[fit], open_by[fit], ANSWERED
+            if starts is None:
+                first[lost[fit]], residual[lost[fit]], why[lost[fit]] = others[fit], open_by[fit], ANSWERED
+            else:  # the common point in the mode is not the one on the start's side
+                why[lost[fit]] = ON_ANOTHER_SIDE
     return Answers(first, residual, np.zeros(count, np.int32), why, np.zeros(count, np.bool_))
 
 
@@ -157,7 +167,7 @@ def _solve_by_newton(model: Model, joints: Array, starts: Array | None, mode: st
     near = np.array(model.home)[None, :] if starts is None else starts
     end = compile_settling_end(model, mode, starts is not None)
     if starts is None:
-        settling = Settling(0.0, np.inf, WITHIN_A_TURN)
+        settling = Settling(0.0, np.inf, MOST_STEPS)
         roots = find_roots(model, near, joints, side=find_sides(model, near, mode), end=end, settling=settling)
     else:
         least = (SINGULAR * bound_determinant(model)) ** 2
@@ -188,8 +198,9 @@ def _take_own_sides(model: Model, roots: Roots, near: Array, joints: Array, mode
         roots.turned[roots.turned <= (SINGULAR * bound_determinant(model)) ** 2] = 0.0
         return
     tiny = roots.turned <= (SINGULAR * bound_determinant(model)) ** 2
+    at_start = find_roots(model, near, joints, most=0, side=np.ones(1)).turned
     with np.errstate(all="ignore"):
-        steady = (np.abs(roots.turned / roots.first**2 - 1.0) <= STEADY) & is_beside(model, roots.rows, near)
+        steady = (np.abs(roots.turned / at_start**2 - 1.0) <= STEADY) & is_beside(model, roots.rows, near)
     if not steady.all():
         rows = np.flatnonzero(~steady)
         starts, given = (np.ascontiguousarray(np.broadcast_to(near, roots.rows.shape)[rows]), joints[rows])
@@ -263,10 +274,10 @@ def _solve_by_constant_jacobian(model: Model, joints: Array, starts: Array | Non
             both = evaluate_tape(tape, y, np.empty((len(y), legs + legs * m)))
     poses = compute_poses(model, y, joints)
     sides = find_sides(model, given, mode, None if starts is None else joints)
-    roots = find_roots(model, y, joints, most=0, poses=False, side=sides)
-    bound = SINGULAR * bound_determinant(model)
+    roots = find_roots(model, y, joints, most=0, poses=False, side=np.ones(1))
     with np.errstate(invalid="ignore"):
-        roots.turned[np.abs(roots.first) <= bound] = 0.0
+        roots.turned[np.abs(roots.turned) <= SINGULAR * bound_determinant(model)] = 0.0
+    roots.turned[:] *= sides
     why = _judge(model, roots._replace(rows=poses), joints, mode)
     return Answers(poses, roots.residual, steps, why, np.zeros(len(why), np.bool_))
 

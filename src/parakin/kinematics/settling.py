@@ -16,6 +16,8 @@ from .closure_roots import compute_mode_tolerance
 from .start_modes import SETTLED
 from .wrist import EXACT, flip_mode
 
+CLEAR = 0.01  # of the greatest leg: joints of legs that close are so far from another mode's, a hundred tolerances
+
 
 def compile_settling_end(model: Model, mode: str | None, from_start: bool) -> Tape:
     """Compile coordinates, joints, near pose -> pose, then the margins of :func:`_list_margins`."""
@@ -65,12 +67,17 @@ def _list_margins(
 
     The legs stand in the working mode (None: in any). If they have several, the answer is beside the near pose, where
     no other mode's answer is nearer. A tool whose axis B and C tell is not upright, and the second turn of three is
-    within ±90°, where the determinant's sign is that of the twist.
+    within ±90°, where the determinant's sign is that of the twist. The turns from home are within half a turn; from a
+    near pose Newton's method leaves none in a few steps.
     """
     margins: list[Scalar] = []
     if model.has_modes and mode is not None:
-        off = model.compare_mode(pose, joints, mode)
-        margins.append(compute_mode_tolerance(model) ** 2 - dot(off, off))
+        clear = model.list_branch_margins(pose, joints, mode)
+        if clear is not None:
+            margins += [margin - CLEAR * max(model.sizes) for margin in clear]
+        else:
+            off = model.compare_mode(pose, joints, mode)
+            margins.append(compute_mode_tolerance(model) ** 2 - dot(off, off))
     if model.has_modes and near is not None:
         ways = [one - other for one, other in zip(pose, near, strict=True)]
         lengths = [way for way, axis in zip(ways, model.axes, strict=True) if AXIS_UNITS[axis] == "mm"]
@@ -81,4 +88,6 @@ def _list_margins(
         margins.append(0.5 * pi - EXACT - absolute(pose[direction.b] - 0.5 * pi))
     if middle is not None:
         margins += [0.5 * pi - absolute(each[middle]) for each in (pose, near) if each is not None]
+    if direction is None and near is None:
+        margins += [pi - absolute(pose[column] - model.home[column]) for column in model.turning_columns]
     return margins

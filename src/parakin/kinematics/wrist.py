@@ -41,15 +41,17 @@ FAR_TILT   30°          second angle at home of a controller: moves about it go
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..algebra import Scalar, Trace, dot
 from ..arrays import Array, AxisRange, Flags, Indices
 from ..kernels.batch import evaluate_tape
-from ..kernels.tape import Tape
+from ..kernels.tape import Tape, compile_tape
 from ..model.elements import Drive
 from ..model.structures import DirectionColumns, compute_axis_angles, compute_tool_axis
 from ..model.traces import Model
@@ -194,6 +196,17 @@ def continue_direction(turns: Array, before: Array) -> None:
     turns[:, 1] = find_nearest_turn(np.where(free, before[:, 1], np.where(flipped, c + np.pi, c)), before[:, 1])
 
 
+def compare_ways(stay: Sequence[Scalar], flip: Sequence[Scalar]) -> Scalar:
+    """Compare the ways of angles from others in two modes: negative where the second way is shorter, by its square."""
+    return dot(flip, flip) - dot(stay, stay)
+
+
+def compile_way_comparison() -> Tape:
+    """Compile the ways of B and C, then those of the other B and C -> :func:`compare_ways`, for other interpreters."""
+    trace = Trace()
+    return compile_tape(trace, [compare_ways(trace.inputs(2), trace.inputs(2, 2))], 4)
+
+
 def find_nearest_direction(axis: Array, near: Array) -> Array:
     """Find A = 0, B and C (m, 3) that point a tool along ``axis`` (m, 3), of both modes those nearest to others."""
     b, c = compute_axis_angles(list(axis.T))
@@ -202,8 +215,9 @@ def find_nearest_direction(axis: Array, near: Array) -> Array:
     modes = [
         find_nearest_turn(np.column_stack([0.0 * b, *pair]), near) for pair in ((b, c), (other[:, 1], other[:, 0]))
     ]
-    off = [((turns - near) ** 2).sum(1) for turns in modes]
-    return np.where((off[1] < off[0])[:, None], modes[1], modes[0])
+    stay, flip = (list((turns - near)[:, 1:].T) for turns in modes)
+    flipped = compare_ways(stay, flip) < 0.0
+    return np.where(flipped[:, None], modes[1], modes[0])
 
 
 def flip_rotation(turns: Array) -> Array:

@@ -25,7 +25,7 @@ def find_common_point(
     near : with ``side`` None, the one on the side of this point
     """
     foot = _find_foot(centres, radii, plane)
-    height = sqrt(foot.square / foot.size)  # in units of the normal
+    height = sqrt(foot.square * foot.inverse)  # in units of the normal
     if side is None and near is not None:
         side = dot(sub(near, foot.first), foot.normal)
     height = height * side if isinstance(side, float) else copysign(height, side)
@@ -40,14 +40,14 @@ def compute_square_height(centres: Sequence[Vec], radii: Sequence[Scalar], plane
 class _Foot(NamedTuple):
     """Where the common points' middle lies: ``first`` centre + ``offset``; they are off it along the ``normal``.
 
-    size : the normal's square
+    inverse : 1 over the normal's square; the only quotient, for that costs as much as six products
     square : of the distance from the middle to either point, mm²
     """
 
     first: Vec
     offset: Vec
     normal: Vec
-    size: Scalar
+    inverse: Scalar
     square: Scalar
 
 
@@ -60,18 +60,19 @@ def _find_foot(centres: Sequence[Vec], radii: Sequence[Scalar], plane: Sequence[
         u: Vec = tuple(0.0 if c == out else x for c, x in enumerate(sub(centres[1], first)))
         normal = cross(across, u)
         size = _replace_zero(dot(normal, normal))
+        inverse = 1.0 / size
         first = tuple(0.0 if c == out else x for c, x in enumerate(first))
         squares = [r * r - c[out] * c[out] for r, c in zip(radii, centres, strict=True)]
-        foot = scale(u, 0.5 * (squares[0] - squares[1] + size) / size)
+        foot = scale(u, 0.5 * (squares[0] - squares[1] + size) * inverse)
     else:
         u, v = sub(centres[1], first), sub(centres[2], first)
         normal = cross(u, v)
-        size = _replace_zero(dot(normal, normal))
+        inverse = 1.0 / _replace_zero(dot(normal, normal))
         squares = [r * r for r in radii]
         a = 0.5 * (squares[0] - squares[1] + dot(u, u))
         b = 0.5 * (squares[0] - squares[2] + dot(v, v))
-        foot = add(scale(cross(v, normal), a / size), scale(cross(normal, u), b / size))
-    return _Foot(first, foot, normal, size, squares[0] - dot(foot, foot))
+        foot = add(scale(cross(v, normal), a * inverse), scale(cross(normal, u), b * inverse))
+    return _Foot(first, foot, normal, inverse, squares[0] - dot(foot, foot))
 
 
 def _replace_zero(size: Scalar) -> Scalar:

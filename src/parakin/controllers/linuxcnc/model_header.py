@@ -15,7 +15,7 @@ from ...kinematics.closure_roots import MOST_STEPS, list_step_caps
 from ...kinematics.forward import STEADY
 from ...kinematics.start_modes import SETTLED
 from ...kinematics.turns import TURN
-from ...kinematics.wrist import EXACT, GAIN, NEAR_MODE, STANDING, SWING
+from ...kinematics.wrist import EXACT, GAIN, NEAR_MODE, STANDING, SWING, compile_way_comparison
 from ...machine import Machine
 from ...model.limits import Limit
 from ...performance.characteristic_length import choose_characteristic_length
@@ -246,6 +246,9 @@ def _write_mathematics(machine: Machine) -> Iterator[str]:
         yield write_function("freedom", wrist.freedom_tape(), [x], [CVector("lean", 1)])
         yield write_function("inverse_held", wrist.first_given_tape(machine.mode), [x, first], [q])
         yield write_function("inverse_over", machine.tapes(wrist.other_mode(machine.mode)).inverse, [x], [q])
+    if machine.has_direction:
+        ways = [CVector("stay", 2), CVector("flip", 2)]
+        yield write_function("compare_ways", compile_way_comparison(), ways, [CVector("excess", 1)])
     yield write_test("allowed", _compile_limits(machine, False), [x, q])
     yield write_function(
         "measure_limits", _compile_limits(machine, True), [x, q], [CVector("margins", len(machine.limits))]

@@ -236,23 +236,22 @@ static int in_mode(const double *x, const double *q)
 #define in_mode(x, q) 1
 #endif
 
-/* Of the ways to write an orientation the one nearest to the last: B and C by the sum of their ways, where
-   find_nearest_direction of kinematics/wrist.py takes the sum of squares. */
-static void settle(double *x, const double *near)
+/* Of the ways to write an orientation the one nearest to the last, as find_nearest_direction of parakin. */
+static void write_near(double *x, const double *near)
 {
 #if TOOL_AXIS
-    double *b = &x[AXES - 2], *c = &x[AXES - 1];
-    const double last_b = near[AXES - 2], last_c = near[AXES - 1];
-    if (*b < UPRIGHT || *b > 0.5 * TURN - UPRIGHT) { /* upright: C is free */
-        *c = last_c;
-    } else {
-        const double over = within_half_a_turn(*c + 0.5 * TURN, last_c);
-        *c = within_half_a_turn(*c, last_c);
-        if (fabs(-*b - last_b) + fabs(over - last_c) < fabs(*b - last_b) + fabs(*c - last_c)) {
-            *b = -*b;
-            *c = over;
-        }
+    double *turns = &x[AXES - 2]; /* B and C */
+    const double *last = &near[AXES - 2];
+    const int upright = turns[0] < UPRIGHT || turns[0] > 0.5 * TURN - UPRIGHT; /* C is free */
+    const double own[2] = {turns[0], upright ? last[1] : turns[1]}, other[2] = {-own[0], own[1] + 0.5 * TURN};
+    double stay[2], flip[2], excess[1];
+    for (int i = 0; i < 2; i++) {
+        stay[i] = within_half_a_turn(own[i], last[i]) - last[i];
+        flip[i] = within_half_a_turn(other[i], last[i]) - last[i];
     }
+    compare_ways(stay, flip, excess);
+    for (int i = 0; i < 2; i++)
+        turns[i] = within_half_a_turn(excess[0] < 0.0 ? other[i] : own[i], last[i]);
 #else
     for (int i = 0; i < AXES; i++)
         if (turning_axis[i])
@@ -287,8 +286,12 @@ int kinematicsForward(const double *joints, EmcPose *world,
     }
     if (!in_mode(x, q))
         return -1;
+<<<<<<< HEAD
     settle(x, near);
     shift_tip(x, -*pins->tool_offset);
+=======
+    write_near(x, near);
+>>>>>>> df6780a (Direct problems settle in one pass without loose arguments; B and C for LinuxCNC by the wrist's own rule; a benchmark of a million direct problems; the closed form says when the answer is across)
     write_pose(x, world);
     return 0;
 }

@@ -66,6 +66,13 @@ class Leg(ABC):
         """Return margins ≥ 0 where a leg closes as it is built; its closures may be zero elsewhere too."""
         return ()
 
+    def branch_margins(self, point: Vec, joints: list[Scalar], signs: str) -> list[Scalar] | None:
+        """Measure, mm, how clear of the other branches joints that close the leg are; positive in the branches' own.
+
+        It spares the inverse. None where only the inverse tells it.
+        """
+        return None
+
     def fixed_foot(self) -> Vec | None:
         """Return the foot of a leg if it does not move; no clearance is kept between legs that share it."""
         return None

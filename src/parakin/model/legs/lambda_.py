@@ -53,6 +53,12 @@ class Lambda(Leg):
             (Reach(reach, self.long), Reach(hinge_reach)),
         )
 
+    def branch_margins(self, point: Vec, joints: list[Scalar], signs: str) -> list[Scalar]:
+        first, second = joints
+        rise = dot(sub(point, self.foot), self.rail) - first
+        past = second - first - (self._lower / self.long) * rise  # the hinge
+        return [rise if signs[0] == "-" else -rise, past if signs[1] == "+" else -past]
+
     def struts(self, point: Vec, joints: list[Scalar]) -> list[tuple[Vec, Vec]]:
         start = move_along(self.foot, self.rail, joints[0])
         rod = scale(sub(point, start), self._lower / self.long)

@@ -37,6 +37,10 @@ class Slider(Leg):
         root = sqrt(reach)
         return Inverse([s - root if signs == "-" else s + root], (Reach(reach, self.rod),))
 
+    def branch_margins(self, point: Vec, joints: list[Scalar], signs: str) -> list[Scalar]:
+        ahead = joints[0] - dot(sub(point, self.foot), self.rail)
+        return [-ahead if signs == "-" else ahead]
+
     def struts(self, point: Vec, joints: list[Scalar]) -> list[tuple[Vec, Vec]]:
         return [(self._foot(joints[0]), point)]
 

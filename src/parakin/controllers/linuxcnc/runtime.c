@@ -286,12 +286,8 @@ int kinematicsForward(const double *joints, EmcPose *world,
     }
     if (!in_mode(x, q))
         return -1;
-<<<<<<< HEAD
-    settle(x, near);
-    shift_tip(x, -*pins->tool_offset);
-=======
     write_near(x, near);
->>>>>>> df6780a (Direct problems settle in one pass without loose arguments; B and C for LinuxCNC by the wrist's own rule; a benchmark of a million direct problems; the closed form says when the answer is across)
+    shift_tip(x, -*pins->tool_offset);
     write_pose(x, world);
     return 0;
 }

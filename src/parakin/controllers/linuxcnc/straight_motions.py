@@ -154,16 +154,34 @@ def _raise_cycles(cycles: Array, need: Array, ramp: Array, blended: Flags) -> Ar
     need : (k, 2) cycles at which a joint has all of its speed, in a motion's halves
     ramp : (k,) a motion of n cycles rises and falls in ramp/n cycles
     blended : (k - 1,) whether the next motion begins to rise when a motion begins to fall, and does not fall itself
-        before that one is over. Each changes at its own rate, so together they may be faster than each of them alone.
+        before that one is over. Each changes at its own rate, so together they may be faster than each of them alone,
+        and for some cycles they are: see :func:`_measure_bumps`.
     """
     cycles = np.maximum(cycles, np.ceil(np.maximum(need.max(1), np.sqrt(ramp)) - _ROUNDING))
     while True:  # it ends, for speeds only fall, and slow motions have room
         ramps = ramp / cycles
+        bumps = _measure_bumps(ramps)
         both = need[:-1, 1] / cycles[:-1] * np.maximum(1.0 - ramps[1:] / ramps[:-1], 0.0) + need[1:, 0] / cycles[1:]
-        over = np.maximum(both * blended, 1.0)
+        over = np.maximum(both * (1.0 + np.maximum(bumps[:-1], bumps[1:])) * blended, 1.0)
         least = cycles * np.maximum(np.append(over, 1.0), np.append(1.0, over))
         least = np.maximum(least, np.append(0.0, ramps[:-1] * blended))
         slower = np.ceil(least - _ROUNDING)
         if not (slower > cycles).any():
             return cycles
         cycles = np.maximum(cycles, slower)
+
+
+def _measure_bumps(ramps: Array) -> Array:
+    """Measure the bumps of speed, as fractions of it, where one motion falls and an equal one rises; (k,).
+
+    ramps : (k,) cycles in which a motion rises, and falls
+
+    LinuxCNC changes a speed by whole steps of a cycle, but for the last one of a rise. In n whole cycles and a
+    part f that costs a little more than an even rise would, and so much of the way is left for the fall: its first
+    step leads from n + f to sqrt((n - 1/2)^2 + 2nf) - 1/2, where n + f - 1 would go with the rise of the next motion.
+    From then on both change by whole steps. In the first cycle the bump is half of what it is later.
+    """
+    whole = np.floor(ramps)
+    excess = np.sqrt((whole - 0.5) ** 2 + 2.0 * whole * (ramps - whole)) + 0.5 - ramps
+    bumps: Array = np.where(whole > 1.0, excess, 0.5 * excess) / np.maximum(ramps, 1.0)
+    return np.where(whole > 0.0, bumps, 0.0)

@@ -52,6 +52,10 @@ class ProgrammedPath:
         extension: Array = begin + share * (self.extension[record] - begin)
         return extension
 
+    def get_extension(self, record: Indices) -> Array:
+        """Return how much longer the tool is than the machine's own at ``record`` (m,), mm."""
+        return np.zeros(len(record)) if self.extension is None else self.extension[record]
+
     def interpolate_turns(self, record: Indices, share: Array) -> Array | None:
         """Interpolate A, B, C (m, 3), rad, of a path that gives them; None for another."""
         turns = self.path.turns

@@ -148,8 +148,9 @@ class _HoldBuilder:
         if not len(record) and not len(points.motion):
             return None
         tip, axis = self.programmed.interpolate(points.motion, points.share)
-        added = self.pole.find_axes(tip, axis, points.projected)
-        axes = self.pole.find_axes(self.programmed.tip[record], self.programmed.axis[record], moved)
+        extension = self.programmed.interpolate_extension(points.motion, points.share)
+        added = self.pole.find_axes(tip, axis, points.projected, extension)
+        axes = self._find_axes_at(record, moved)
         located = self._locate(run)
         return PoleHold(located, record, axes, points.motion, points.share, added, abs(turn), self.aside)
 
@@ -168,8 +169,8 @@ class _HoldBuilder:
         assert direction is not None
         poses = []
         for at in (motion - 1, motion):
-            tip = self.programmed.tip[at]
-            axis = pole.find_axes(tip, self.programmed.axis[at], moved[after])
+            axis = self._find_axes_at(at, moved[after])
+            tip = self.programmed.tip[at] + self.programmed.get_extension(at)[:, None] * (axis - self.programmed.axis[at])
             poses.append(compute_poses(machine, tip, axis, MACHINE_FRAME)[0])
         poses[1][:, direction.c] = find_nearest_turn(poses[1][:, direction.c], poses[0][:, direction.c])
         middle = 0.5 * (poses[0] + poses[1])
@@ -179,6 +180,12 @@ class _HoldBuilder:
         at, row = np.repeat(motion, counts - 1), np.repeat(np.arange(len(motion)), counts - 1)
         number = np.arange(len(row)) - np.repeat(np.cumsum(counts - 1) - (counts - 1), counts - 1) + 1
         return _Points(at, number / counts[row], moved[after][row])
+
+    def _find_axes_at(self, record: Indices, projected: Array) -> Array:
+        """Find the axes (k, 3) of records (k,) at points (k, 2) of the projection."""
+        programmed = self.programmed
+        extension = programmed.get_extension(record)
+        return self.pole.find_axes(programmed.tip[record], programmed.axis[record], projected, extension)
 
     def _is_held_already(self, run: tuple[int, int], distance: Array) -> bool:
         """Tell whether a run stands on the circle of a hold, and where it does not, goes straight over the pole.
@@ -217,9 +224,9 @@ class _HoldBuilder:
         """Find the direction in which the free joint stands as at home, for a path that never leaves the pole."""
         machine = self.posted.machine
         assert machine.wrist is not None
-        tip, axis = self.programmed.tip[[record, record]], self.programmed.axis[[record, record]]
-        axes = self.pole.find_axes(tip, axis, self.aside * np.eye(2))
-        poses = compute_poses(machine, tip, axes, MACHINE_FRAME)[0]
+        records = np.array([record, record])
+        axes = self._find_axes_at(records, self.aside * np.eye(2))
+        poses = compute_poses(machine, self.programmed.tip[records], axes, MACHINE_FRAME)[0]
         first = machine.inverse(poses, self.posted.mode)[:, machine.wrist.first]
         at_home = machine.inverse(machine.home)[machine.wrist.first]
         sense = 1.0 if wrap_angle(first[1] - first[0]) > 0.0 else -1.0

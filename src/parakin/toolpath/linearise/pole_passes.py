@@ -175,7 +175,7 @@ def _list_crossing_records(
     at = np.array([ray[0] for ray in rays] + motion[needed].tolist(), np.int64)
     shares = np.array([ray[1] for ray in rays] + share[needed].tolist())
     projected = np.array([ray[2] for ray in rays] + [np.zeros(2)] * int(needed.sum())).reshape(-1, 2)
-    axes = pole.find_axes(*path.interpolate(at, shares), projected)
+    axes = pole.find_axes(*path.interpolate(at, shares), projected, path.interpolate_extension(at, shares))
     added = list(zip(at.tolist(), shares.tolist(), axes, strict=True))
     end_motion, end_share = np.array([end[0] for end in ends], np.int64), np.array([end[1] for end in ends])
     end_axes = path.interpolate(end_motion, end_share)[1]

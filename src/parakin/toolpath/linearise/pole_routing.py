@@ -168,7 +168,8 @@ def _route_through_pole(
                 return None
     projected = np.outer(a, line) + np.outer(squeezed, normal)
     record = records[moved]
-    axis = pole.find_axes(programmed.tip[record], programmed.axis[record], projected[moved])
+    at_records = programmed.tip[record], programmed.axis[record]
+    axis = pole.find_axes(*at_records, projected[moved], programmed.get_extension(record))
     share, crossing = 0.0, -1
     ends: tuple[float, ...] = ()
     if len(crossings):

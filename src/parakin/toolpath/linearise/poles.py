@@ -65,11 +65,15 @@ class Pole:
                 projected[block] = (carried @ self._across.T) / (carried @ self.first)[:, None]
         return projected
 
-    def find_axes(self, tip: Array, axis: Array, projected: Array) -> Array:
+    def find_axes(self, tip: Array, axis: Array, projected: Array, extension: Array) -> Array:
         """Find the tool axes (m, 3) at points (m, 2) of the projection, on the side of the pole on which ``axis`` are.
 
-        Turning the tool about its tip turns the central leg a little too, so the axes are found by iteration.
+        tip, axis : (m, 3) of the machine's own tool; extension : (m,) mm by which the path's tool is longer
+
+        Turning the tool about its tip turns the central leg a little too, so the axes are found by iteration. It is
+        the tip of the longer tool that stays.
         """
+        held_tip = tip - extension[:, None] * axis
         first = self.first
         carried = first + projected @ self._across
         carried /= np.linalg.norm(carried, axis=1)[:, None]
@@ -77,7 +81,8 @@ class Pole:
         carried = np.where(along[:, None] < 0.0, -carried, carried)
         for _ in range(_ROUNDS):
             before = axis
-            axis = np.einsum("mij,mj->mi", self._compute_rotations(tip, before), carried)
+            rotations = self._compute_rotations(held_tip + extension[:, None] * before, before)
+            axis = np.einsum("mij,mj->mi", rotations, carried)
             if np.abs(axis - before).max(initial=0.0) < _CONVERGED:
                 break
         return axis

@@ -118,8 +118,6 @@ def prepare(
     half = tolerances.halve()
     path = fit_tool_lengths(machine, path, workpiece=workpiece)
     programmed = post_path(machine, path, workpiece=workpiece, mode=mode, progress=report_part(0.0, 0.1))
-    if is_wound_up(programmed):
-        programmed = _note_wound_up(programmed)
     posted, trajectory, unplanned = programmed, None, ""
     # The pose's angles change evenly in either case, as the trajectory has them, and the tip is on its line by
     # then: two steps share the tolerance of the axis.
@@ -130,6 +128,8 @@ def prepare(
             posted = linearise_path(posted, "joints", chord=half.tip, angle=lean, progress=report_part(0.2, 0.4))
     except PoseError as error:
         unplanned = str(error)
+    if is_wound_up(posted):
+        posted = _note_wound_up(posted)
     posted = check_path(posted, progress=report_part(0.4, 0.6))
     if posted.first is not None and len(posted.path) > _MOST_TIMED:
         unplanned = unplanned or f"off limits, and more than {_MOST_TIMED:,} records"

@@ -170,3 +170,17 @@ def test_the_command_rewinds(tmp_path, monkeypatch, capsys):
     for option, value in [("--rewind", "0"), ("--rewind", "nan"), ("--clearance", "inf")]:
         assert main([*arguments, option, value]) == 2
         assert option in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("name", WRISTS)
+def test_turns_within_tolerance_of_the_pole_need_no_rewind(name):
+    """Four turns of an axis that is 1e-5 rad off the first turning axis: held beside it, the joint stands still."""
+    machine = pk.load(name)
+    path = winding(machine, tilt=np.degrees(1e-5), count=80, radius=1e-3)
+    assert np.ptp(np.unwrap(first_angles(post_path(machine, path)))) > 3.0 * TURN
+    rewound = pk.rewind_path(machine, path, pk.Clearance(retract=5.0))
+    assert rewound.rewinds == ()
+    job = pk.prepare(machine, rewound.path)
+    assert job.runs, (job.posted.first, job.unplanned)
+    assert np.ptp(first_angles(job.posted)) < np.radians(1.0)
+    assert not any("clearance" in note.text for note in job.posted.path.notes)

@@ -22,10 +22,10 @@ if TYPE_CHECKING:
     from .machine import Machine
     from .performance.atlas import Atlas, atlas
     from .toolpath.job import Job, Tolerances, prepare
+    from .toolpath.linearise.rewinds import Clearance, Rewind, RewoundPath, rewind_path
     from .toolpath.path import ToolPath
     from .toolpath.placing.placement import Placement, find_placement, find_placements
     from .toolpath.posting.frames import workpiece
-    from .toolpath.posting.rewinds import Clearance, Rewind, RewoundPath, rewind_path
     from .toolpath.posting.tool_lengths import fit_tool_lengths
     from .toolpath.reading.detect import read_path
     from .toolpath.reading.tool_table import read_tool_table
@@ -154,10 +154,10 @@ _LAZY = {
     "SampledField": "workspaces.sampled.distance_field",
     "Solution": "kinematics.solution",
     "Tolerances": "toolpath.job",
-    "Clearance": "toolpath.posting.rewinds",
-    "Rewind": "toolpath.posting.rewinds",
-    "RewoundPath": "toolpath.posting.rewinds",
-    "rewind_path": "toolpath.posting.rewinds",
+    "Clearance": "toolpath.linearise.rewinds",
+    "Rewind": "toolpath.linearise.rewinds",
+    "RewoundPath": "toolpath.linearise.rewinds",
+    "rewind_path": "toolpath.linearise.rewinds",
     "ToolPath": "toolpath.path",
     "Trajectory": "toolpath.timing.trajectory",
     "Workspace": "workspaces.certified.workspace",

@@ -15,9 +15,9 @@ if TYPE_CHECKING:
     from ..controllers.controller import ControllerRun
     from ..machine import Machine
     from ..toolpath.job import Job, Tolerances
+    from ..toolpath.linearise.rewinds import Rewind
     from ..toolpath.path import ToolPath
     from ..toolpath.placing.placement import Placement
-    from ..toolpath.posting.rewinds import Rewind
     from .console import ProgressBar
 
 
@@ -94,17 +94,19 @@ def _prepare_at(
     from ..toolpath.job import prepare
 
     mode = options.mode if placement is None else placement.mode
+    controller = load_controller(options.target) if options.target else None
+    interpolation = controller.interpolation if controller else "pose"
     rewinds: tuple[Rewind, ...] = ()
     if options.rewind is not None or options.clearance is not None:
-        from ..toolpath.posting.rewinds import Clearance, rewind_path
+        from ..toolpath.linearise.rewinds import Clearance, rewind_path
 
         clearance = Clearance(options.rewind, options.clearance)
-        rewound = rewind_path(machine, path, clearance, workpiece=workpiece, mode=mode)
+        lean = options.tolerances.allow_lean(interpolation)
+        rewound = rewind_path(machine, path, clearance, workpiece=workpiece, mode=mode, angle=lean)
         path, rewinds = rewound.path, rewound.rewinds
-    controller = load_controller(options.target) if options.target else None
     job = prepare(
         machine, path, workpiece=workpiece, mode=mode, tolerances=options.tolerances,
-        interpolation=controller.interpolation if controller else "pose", corners=options.corners,
+        interpolation=interpolation, corners=options.corners,
         progress=progress.stage("checking and timing", 0.3, 0.7),
     )  # fmt: skip
     if controller is None or job.trajectory is None:

@@ -13,11 +13,11 @@ from ..machine import Machine
 from .checking.check import check_path
 from .linearise.deviation import Interpolation
 from .linearise.linearise import linearise_path
+from .linearise.rewinds import is_wound_up
 from .path import Note, ToolPath
 from .placing.outside import Outside, find_outside
 from .posting.post import post_path
 from .posting.posted import Posted
-from .posting.rewinds import is_wound_up
 from .posting.tool_lengths import fit_tool_lengths
 from .timing import Corners, Trajectory, plan_trajectory
 from .timing.stops import find_stops, sum_dwells
@@ -34,6 +34,14 @@ class Tolerances(NamedTuple):
     def halve(self) -> Tolerances:
         """Return half of both: one half is for the controller's interpolation, the other for rounding corners."""
         return Tolerances(0.5 * self.tip, 0.5 * self.axis)
+
+    def allow_lean(self, interpolation: Interpolation) -> float:
+        """Return what each step of linearising may take the tool's axis off, rad.
+
+        The pose's angles change evenly in either case, as the trajectory has them, and the tip is on its line by then:
+        where the joints go evenly, two steps share the tolerance of the axis.
+        """
+        return self.halve().axis / (1 if interpolation == "pose" else 2)
 
 
 @dataclass(frozen=True, eq=False)
@@ -119,9 +127,7 @@ def prepare(
     path = fit_tool_lengths(machine, path, workpiece=workpiece)
     programmed = post_path(machine, path, workpiece=workpiece, mode=mode, progress=report_part(0.0, 0.1))
     posted, trajectory, unplanned = programmed, None, ""
-    # The pose's angles change evenly in either case, as the trajectory has them, and the tip is on its line by
-    # then: two steps share the tolerance of the axis.
-    lean = half.axis / (1 if interpolation == "pose" else 2)
+    lean = tolerances.allow_lean(interpolation)
     try:
         posted = linearise_path(posted, "pose", chord=half.tip, angle=lean, progress=report_part(0.1, 0.2))
         if interpolation == "joints":

@@ -14,10 +14,10 @@ from .offence import encode_offence
 if TYPE_CHECKING:
     from ...arrays import Array
     from ...toolpath.job import Job
+    from ...toolpath.linearise.rewinds import Rewind
     from ...toolpath.path import ToolUse
     from ...toolpath.placing.placement import Placement
     from ...toolpath.posting.posted import Posted
-    from ...toolpath.posting.rewinds import Rewind
 
 
 def encode_job(

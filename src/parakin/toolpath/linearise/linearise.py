@@ -61,9 +61,9 @@ def linearise_path(
         raise PoseError(f"under: 'pose' or 'joints' expected, not {under!r}")
     report = progress or (lambda fraction: None)
     deviation = Deviation(posted.machine, ProgrammedPath(posted.path, posted.frame), under, chord, angle)
-    led = lead_through_poles(deviation, posted, np.flatnonzero(_find_sound_motions(posted)))
+    led = lead_through_poles(deviation, posted, np.flatnonzero(find_sound_motions(posted)))
     posted, positions = led.posted, led.positions
-    doubtful = _find_sound_motions(posted)
+    doubtful = find_sound_motions(posted)
     for attempt in range(_ROUNDS):
         deviating = find_deviating_motions(deviation, posted, positions, np.flatnonzero(doubtful))
         report(1.0 - 0.5 ** (attempt + 1))
@@ -74,7 +74,7 @@ def linearise_path(
         cuts = _cut_motions(deviation, posted, positions, deviating)
         before, posted = posted, repost_path(posted, divide_motions(posted.path, cuts.motion, cuts.share))
         positions = positions.insert(cuts.motion, cuts.share)
-        doubtful = _find_changed_motions(before, posted, cuts.motion) & _find_sound_motions(posted)
+        doubtful = _find_changed_motions(before, posted, cuts.motion) & find_sound_motions(posted)
     raise _make_hopeless_error(posted.path, int(deviating[0]))
 
 
@@ -116,7 +116,7 @@ def _find_subject(note: Note) -> str:
     return note.text.partition("beside")[2].partition(" swings")[0]
 
 
-def _find_sound_motions(posted: Posted) -> Flags:
+def find_sound_motions(posted: Posted) -> Flags:
     """Find the motions (n,), by the record they lead to, both ends of which are reachable."""
     reachable: Flags = np.isfinite(posted.poses.sum(axis=1) + posted.joints.sum(axis=1))
     return np.concatenate([np.zeros(min(len(reachable), 1), np.bool_), reachable[1:] & reachable[:-1]])

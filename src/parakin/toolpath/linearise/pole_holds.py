@@ -169,8 +169,8 @@ class _HoldBuilder:
         assert direction is not None
         poses = []
         for at in (motion - 1, motion):
-            axis = self._find_axes_at(at, moved[after])
-            tip = self.programmed.tip[at] + self.programmed.get_extension(at)[:, None] * (axis - self.programmed.axis[at])
+            axis, extension = self._find_axes_at(at, moved[after]), self.programmed.get_extension(at)
+            tip = self.programmed.tip[at] + extension[:, None] * (axis - self.programmed.axis[at])
             poses.append(compute_poses(machine, tip, axis, MACHINE_FRAME)[0])
         poses[1][:, direction.c] = find_nearest_turn(poses[1][:, direction.c], poses[0][:, direction.c])
         middle = 0.5 * (poses[0] + poses[1])

@@ -21,15 +21,19 @@ from ...kinematics.turns import TURN, fill_free
 from ...kinematics.wrist import NEAR_TURN, continue_turns, find_nearest_direction
 from ...machine import Machine
 from ..path import Note, ToolPath, insert_records
-from ..programmed_path import compute_tool_axes
-from .post import post_path
-from .posted import Posted
-from .tool_lengths import fit_tool_lengths
-from .wrist_poses import find_pose_with_wrist
+from ..posting.post import post_path
+from ..posting.posted import Posted
+from ..posting.tool_lengths import fit_tool_lengths
+from ..posting.wrist_poses import find_pose_with_wrist
+from ..programmed_path import ProgrammedPath, compute_tool_axes
+from .deviation import Deviation
+from .linearise import find_sound_motions
+from .pole_passes import lead_through_poles
 
 _STEP = math.radians(15.0)  # of the joint, from record to record
 _TRIED = 64  # places for one rewind
 _MOST_TURNS = 64  # either way
+_ROUNDING = 1e-9  # of a motion
 _INSIDE = 1e-6  # rad that the joint keeps off the ends of its range
 
 
@@ -98,11 +102,19 @@ class _Records(NamedTuple):
 
 @check_arguments
 def rewind_path(
-    machine: Machine, path: ToolPath, clearance: Clearance, *, workpiece: Array | None = None, mode: str | None = None
+    machine: Machine,
+    path: ToolPath,
+    clearance: Clearance,
+    *,
+    workpiece: Array | None = None,
+    mode: str | None = None,
+    angle: float = 5e-4,
 ) -> RewoundPath:
     """Insert the fewest rewinds into a path that keep the wrist's first joint in its range.
 
-    machine, path, workpiece, mode : as :func:`~.post.post_path` takes them; the tools' lengths are fitted first
+    machine, path, workpiece, mode : as :func:`~..posting.post.post_path` takes them; the tools' lengths are fitted first
+    angle : rad, as :func:`~.linearise.linearise_path` takes it: the joint is counted as it will turn when the path is
+        led through its poles, or held beside them
 
     Every stretch between two rewinds is as long as can be (greedy, which is optimal for their number). Of the places
     at which the next stretch may begin, records above the plane come first, then those between rapid motions, then
@@ -110,12 +122,34 @@ def rewind_path(
     first place at which the machine can retract and turn within its limits is taken. Where there is none, the path
     goes on without, and has a note.
 
-    Raises :class:`PoseError` for an invalid clearance, and as :func:`~.post.post_path` does.
+    Raises :class:`PoseError` for an invalid clearance, and as :func:`~..posting.post.post_path` does.
     """
     clearance.check()
     path = fit_tool_lengths(machine, path)
     posted = post_path(machine, path, workpiece=workpiece, mode=mode)
-    return _RewindBuilder(posted, clearance).build() if is_wound_up(posted) else RewoundPath(path, ())
+    if not is_wound_up(posted):
+        return RewoundPath(path, ())
+    led = _lead_through_poles(posted, angle)
+    return _RewindBuilder(led, clearance).build() if is_wound_up(led.posted) else RewoundPath(path, ())
+
+
+class _LedPath(NamedTuple):
+    """A path led through its poles: as ``posted``, and the record (n,) of that at which each programmed one stands."""
+
+    programmed: ToolPath
+    posted: Posted
+    record: Indices
+
+
+def _lead_through_poles(posted: Posted, angle: float) -> _LedPath:
+    """Lead a posted path through its poles, or hold it beside them, as the controller will run it."""
+    deviation = Deviation(posted.machine, ProgrammedPath(posted.path, posted.frame), "pose", 1.0, angle)
+    try:
+        led = lead_through_poles(deviation, posted, np.flatnonzero(find_sound_motions(posted)))
+    except PoseError:  # no path leads from one record to the next, which the check will tell
+        return _LedPath(posted.path, posted, np.arange(len(posted.path)))
+    record = np.searchsorted(led.positions.passed, np.arange(len(posted.path)) + _ROUNDING) - 1
+    return _LedPath(posted.path, led.posted, record)
 
 
 def is_wound_up(posted: Posted) -> bool:
@@ -131,29 +165,32 @@ def is_wound_up(posted: Posted) -> bool:
 class _RewindBuilder:
     """Builds the rewinds of a posted path; places are records, after which the turn is made."""
 
-    def __init__(self, posted: Posted, clearance: Clearance):
-        wrist = posted.machine.wrist
+    def __init__(self, led: _LedPath, clearance: Clearance):
+        posted, wrist = led.posted, led.posted.machine.wrist
         assert wrist is not None
-        self.posted, self.clearance, self.wrist = posted, clearance, wrist
-        self.machine, self.path = posted.machine, posted.path
+        self.clearance, self.wrist, self.frame, self.mode = clearance, wrist, posted.frame, posted.mode
+        self.machine, self.path = posted.machine, led.programmed
+        self.poses, self.joints = posted.poses[led.record], posted.joints[led.record]
         self.drive = self.machine.drives[wrist.first]
         angles = posted.joints[:, wrist.first]
-        self.angles = fill_free(angles, ~np.isfinite(angles))
+        angles = fill_free(angles, ~np.isfinite(angles))
+        after = np.append(0, led.record[:-1] + 1)  # the records on the way to each programmed one
+        self.least, self.greatest = np.minimum.reduceat(angles, after), np.maximum.reduceat(angles, after)
         self.counts = self._list_counts()
         self.ends = np.stack([self._find_ends(int(count)) for count in self.counts])
         self.rank = self._rank_places()
 
     def _list_counts(self) -> Indices:
         """List the counts of turns that bring any record into the range."""
-        low = math.floor((self.drive.low - self.angles.max()) / TURN)
-        high = math.ceil((self.drive.high - self.angles.min()) / TURN)
+        low = math.floor((self.drive.low - self.greatest.max()) / TURN)
+        high = math.ceil((self.drive.high - self.least.min()) / TURN)
         return np.arange(max(low, -_MOST_TURNS), min(high, _MOST_TURNS) + 1)
 
     def _find_ends(self, count: int) -> Indices:
         """Find for each record the first one from there on that a count of turns does not keep in the range, (n,)."""
-        angles = self.angles + count * TURN
-        kept = (angles >= self.drive.low + _INSIDE) & (angles <= self.drive.high - _INSIDE)
-        lost = np.where(kept, len(angles), np.arange(len(angles)))
+        least, greatest = self.least + count * TURN, self.greatest + count * TURN
+        kept = (least >= self.drive.low + _INSIDE) & (greatest <= self.drive.high - _INSIDE)
+        lost = np.where(kept, len(kept), np.arange(len(kept)))
         return np.minimum.accumulate(lost[::-1])[::-1]
 
     def _rank_places(self) -> Indices:
@@ -175,7 +212,7 @@ class _RewindBuilder:
         start = -1  # the last place
         end = int(self.ends[:, 0].max())
         before = int(self.counts[self.ends[:, 0].argmax()])
-        while end < len(self.angles):
+        while end < len(self.path):
             choice = self._find_rewind(start, end, before)
             if choice is None:
                 line = int(self.path.line[end])
@@ -223,11 +260,11 @@ class _RewindBuilder:
 
     def _turn(self, place: int, tip: Array, before: int, after: int) -> Array | None:
         """Turn the first joint at a tip in W, the second one as at a record; return the axes (k, 3) in W, or None."""
-        posted, wrist, frame = self.posted, self.wrist, self.posted.frame
-        joints, pose = posted.joints[place].copy(), posted.poses[place].copy()
+        wrist, frame = self.wrist, self.frame
+        joints, pose = self.joints[place].copy(), self.poses[place].copy()
         if not np.isfinite(joints).all():
             return None
-        mode = wrist.find_mode(pose, joints, posted.mode)
+        mode = wrist.find_mode(pose, joints, self.mode)
         is_upright = wrist.find_free(pose[None], NEAR_TURN)[0]
         wanted = wrist.tilt(joints, mode, NEAR_TURN) if is_upright else joints
         pose[:3] = frame[:, :3] @ tip + frame[:, 3]

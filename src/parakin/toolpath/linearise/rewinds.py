@@ -112,7 +112,7 @@ def rewind_path(
 ) -> RewoundPath:
     """Insert the fewest rewinds into a path that keep the wrist's first joint in its range.
 
-    machine, path, workpiece, mode : as :func:`~..posting.post.post_path` takes them; the tools' lengths are fitted first
+    machine, path, workpiece, mode : as :func:`~..posting.post.post_path` takes them; lengths of tools are fitted first
     angle : rad, as :func:`~.linearise.linearise_path` takes it: the joint is counted as it will turn when the path is
         led through its poles, or held beside them
 

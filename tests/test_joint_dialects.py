@@ -367,21 +367,44 @@ def test_a_motion_that_is_slower_than_a_word_can_say():
 # Buffers and planners
 
 
-def test_grbl_is_not_told_more_than_its_line_carries():
-    fine = square([], scale=1.0)
-    corners = np.linspace([0.0, 0.0, 280.0], [5.0, 0.0, 280.0], 2000)
+def dense(tip, feed=6000.0):
+    count = len(tip)
     path = replace(
-        fine.posted.path, tip=corners, axis=np.tile([0.0, 0.0, 1.0], (2000, 1)), line=np.arange(1, 2001),
-        rapid=np.zeros(2000, bool), feed=np.full(2000, 6000.0), spindle=np.full(2000, np.nan),
+        square([]).posted.path, tip=tip, axis=np.tile([0.0, 0.0, 1.0], (count, 1)), line=np.arange(1, count + 1),
+        rapid=np.zeros(count, bool), feed=np.full(count, feed), spindle=np.full(count, np.nan),
     )  # fmt: skip
-    trajectory = plan_trajectory(post_path(pk.load("linear_delta"), path))
-    assert trajectory.seconds < 0.2
+    return plan_trajectory(post_path(pk.load("linear_delta"), path))
+
+
+@pytest.mark.parametrize(("target", "shortest"), [("grbl", 0.005), ("fluidnc", 0.008), ("fanuc", 0.006)])
+def test_records_closer_than_a_control_takes_blocks_become_fewer(target, shortest):
+    """On a circle, 75 µm apart: all records lie within 0.5 µm of the even motions, by linear interpolation in time."""
+    angle = np.linspace(0.0, 2.0, 1600)
+    trajectory = dense(np.column_stack([60.0 * np.cos(angle), 60.0 * np.sin(angle), np.full(1600, 300.0)]), 3000.0)
+    ran, posted = run(trajectory, target), trajectory.posted.joints
+    apart = np.abs(ran.rows[:, None] - posted).max(axis=2)
+    records = apart.argmin(axis=1)
+    assert (np.diff(records) > 0).all() and records[0] == 0 and records[-1] == 1599
+    assert apart.min(axis=1).max() < 0.51 * DIGIT[target] + 1e-4
+    between = [np.interp(trajectory.times, trajectory.times[records], posted[records, i]) for i in range(3)]
+    assert np.abs(np.column_stack(between) - posted).max() < 5.0001e-4
+    assert np.median(ran.seconds) > 0.9 * shortest
+    assert trajectory.seconds - 1e-3 < ran.seconds[1:].sum() < 1.1 * trajectory.seconds
+    assert len(run(trajectory, "siemens").rows) == 1600
+
+
+def test_grbl_is_not_told_more_than_its_line_carries():
+    zigzag = (
+        np.linspace([0.0, 0.0, 280.0], [5.0, 0.0, 280.0], 2000) + [0.0, 0.003, 0.0] * (np.arange(2000) % 2)[:, None]
+    )
+    trajectory = dense(zigzag)
     for target, line_seconds in (("grbl", 0.005), ("fluidnc", 0.008)):
         seconds = run(trajectory, target).seconds[1:]
+        assert len(seconds) > 1990
         assert np.convolve(seconds, np.ones(15), "valid").min() > 15 * line_seconds * 0.999
         controlled = load_controller(target).build_run(trajectory)
-        assert controlled.seconds > 1999 * line_seconds
-        assert "its planner holds few lines" in controlled.notes[0].text
+        assert controlled.seconds > 1990 * line_seconds
+        assert trajectory.seconds > 5.0 or "its planner holds few lines" in controlled.notes[0].text
 
 
 def test_a_buffer_stretches_only_what_would_run_it_dry():

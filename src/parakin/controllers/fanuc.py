@@ -30,6 +30,7 @@ DIALECT = JointDialect(
     motion="G1 {axes} {feed}",
     exact="G9 ",
     end=("G94", "M30", "%"),
+    shortest=0.006,
     notes=(
         "G54, external and tool offsets have to be zero",
         "turning axes count on beyond 360 deg",

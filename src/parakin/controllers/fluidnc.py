@@ -29,6 +29,7 @@ DIALECT = replace(
     message="(MSG,{})",
     codes=name_codes(0, 3, 4, 5, 7, 8, 9) | {1: ""},
     parameter_codes=range(62, 69),
+    shortest=_LINE_SECONDS,
     line_seconds=_LINE_SECONDS,
 )
 CONTROLLER = describe_joint_control(DIALECT, ".nc")

@@ -38,6 +38,7 @@ DIALECT = JointDialect(
     clean=replace_realtime_characters,
     dwell=("G4P{:.10g}",),
     codes=name_codes(0, 3, 4, 5, 8, 9) | {1: ""},
+    shortest=_LINE_SECONDS,
     line_seconds=_LINE_SECONDS,
     buffer=15,
 )

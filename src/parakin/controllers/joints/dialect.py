@@ -42,6 +42,7 @@ class JointDialect:
     codes : what the M codes of G-code are here; an empty text is said as a comment
     own_codes : M codes of the machine's own that may be passed on: those that the control itself does not act upon
     parameter_codes : M codes of outputs and inputs that are as in G-code, with their parameters
+    shortest : s that a block takes at least: fewer ones are written where they would be shorter
     line_seconds, buffer : what a line takes on its way to the planner, and how many the planner holds
     numbered : whether lines have their numbers from 0 on
     """
@@ -70,6 +71,7 @@ class JointDialect:
     codes: Mapping[int, str] = field(default_factory=lambda: name_codes(0, 1, 3, 4, 5, 7, 8, 9))
     own_codes: Container[int] = ()
     parameter_codes: Container[int] = ()
+    shortest: float = 0.0
     line_seconds: float = 0.0
     buffer: int = 1
     numbered: bool = False

@@ -12,10 +12,12 @@ from ...toolpath.timing.drive_limits import DriveLimits
 from ...toolpath.timing.trajectory import Trajectory
 from ..event_commands import Command, list_commands
 from ..gcode_text import to_display
+from .thinning import thin_rows
 
 _APPROACH_SPEED = 0.25  # fraction of the joints' speeds that is used on the way to the first record
 _APPROACH_LEAST = 4.0  # s, for that way
 _SHORTEST = 1e-3  # s: no motion is shorter
+_EXACT = {"mm": 12, "rad": 12}  # digits that round nothing
 FIRST = -1  # the place of commands before the way to the first row
 
 
@@ -50,28 +52,39 @@ class JointMotions:
         return lengths
 
 
-def build_joint_motions(trajectory: Trajectory, digits: Mapping[str, int]) -> JointMotions:
+def build_joint_motions(trajectory: Trajectory, digits: Mapping[str, int], shortest: float = 0.0) -> JointMotions:
     """Build the motions from record to record, each as slow as the trajectory or as the speeds of the joints ask for.
 
     Records at one place are one row, and so are those whose joints are printed alike; the time between them goes to the
-    next motion.
+    next motion. Where motions are shorter than the control takes they are fewer, as :func:`.thin_rows` has it.
 
     digits : after the point, for ``mm`` and for ``rad`` (printed as degrees)
+    shortest : s that the control takes for a motion
     """
     posted, path, machine = trajectory.posted, trajectory.posted.path, trajectory.posted.machine
     corner = trajectory.curve.corner_of_record
-    kept = np.flatnonzero(np.diff(corner, prepend=-1))
-    rows = to_display(posted.joints[kept], machine.joint_units, digits)
-    moved = np.append(True, np.diff(rows, axis=0).any(axis=1))
-    speeds = DriveLimits.of(machine).speed
-    shown = to_display(speeds[None], machine.joint_units, {"mm": 12, "rad": 12})[0]
-    least = (np.abs(np.diff(rows[moved], axis=0)) / shown).max(axis=1, initial=0.0)
-    seconds = np.maximum(np.diff(trajectory.times[kept][moved]), np.maximum(least, _SHORTEST))
-    parted = trajectory.curve.parted & DriveLimits.of(machine).bounds_acceleration
-    halt = np.logical_or.reduceat(parted, np.flatnonzero(moved)) if len(parted) else parted
-    from_home = float((np.abs(posted.joints[0] - machine.inverse(machine.home)) / speeds).max())
-    reached = np.cumsum(moved) - 1  # how many motions lead to each corner
+    limits = DriveLimits.of(machine)
+    records = np.flatnonzero(np.diff(corner, prepend=-1))
+    rows = to_display(posted.joints[records], machine.joint_units, digits)
+    moved = np.flatnonzero(np.append(True, np.diff(rows, axis=0).any(axis=1)))
+    halt = np.logical_or.reduceat(trajectory.curve.parted & limits.bounds_acceleration, moved)
+    reached = np.searchsorted(moved, np.arange(len(rows)), side="right") - 1  # the row of each corner
     places = [int(reached[corner[event.record - 1]]) if event.record else FIRST for event in path.events]
-    approach = max(_APPROACH_LEAST, from_home / _APPROACH_SPEED)
-    slow = _APPROACH_SPEED * float(shown.min())
-    return JointMotions(rows[moved], seconds, halt[1:], approach, slow, list_commands(path, places))
+    fixed = halt.copy()
+    fixed[[place for place in places if place != FIRST]] = True
+    exact = to_display(posted.joints[records][moved], machine.joint_units, _EXACT)
+    kept = thin_rows(exact, trajectory.times[records][moved], fixed, shortest)
+    rows, times = rows[moved][kept], trajectory.times[records][moved][kept]
+    speeds = to_display(limits.speed[None], machine.joint_units, _EXACT)[0]
+    least = (np.abs(np.diff(rows, axis=0)) / speeds).max(axis=1, initial=0.0)
+    seconds = np.maximum(np.diff(times), np.maximum(least, _SHORTEST))
+    from_home = float((np.abs(posted.joints[0] - machine.inverse(machine.home)) / limits.speed).max())
+    places = [place if place == FIRST else int(np.searchsorted(kept, place)) for place in places]
+    return JointMotions(
+        rows,
+        seconds,
+        halt[kept][1:],
+        max(_APPROACH_LEAST, from_home / _APPROACH_SPEED),
+        _APPROACH_SPEED * float(speeds.min()),
+        list_commands(path, places),
+    )

@@ -99,7 +99,7 @@ def build_joint_run(trajectory: Trajectory, dialect: JointDialect) -> Controller
 def _build_program(trajectory: Trajectory, dialect: JointDialect) -> _Program:
     machine, path = trajectory.posted.machine, trajectory.posted.path
     letters = assign_joint_letters(machine, dialect.axes, dialect.title)
-    motions = build_joint_motions(trajectory, dialect.digits)
+    motions = build_joint_motions(trajectory, dialect.digits, dialect.shortest)
     stretched = stretch_for_buffer(motions.seconds, dialect.buffer, dialect.line_seconds)
     motions = replace(motions, seconds=stretched)
     for commands in motions.commands.values():

@@ -17,7 +17,7 @@ from .thinning import thin_rows
 _APPROACH_SPEED = 0.25  # fraction of the joints' speeds that is used on the way to the first record
 _APPROACH_LEAST = 4.0  # s, for that way
 _SHORTEST = 1e-3  # s: no motion is shorter
-_EXACT = {"mm": 12, "rad": 12}  # digits that round nothing
+_UNROUNDED = {"mm": 12, "rad": 12}  # digits
 FIRST = -1  # the place of commands before the way to the first row
 
 
@@ -72,10 +72,10 @@ def build_joint_motions(trajectory: Trajectory, digits: Mapping[str, int], short
     places = [int(reached[corner[event.record - 1]]) if event.record else FIRST for event in path.events]
     fixed = halt.copy()
     fixed[[place for place in places if place != FIRST]] = True
-    exact = to_display(posted.joints[records][moved], machine.joint_units, _EXACT)
+    exact = to_display(posted.joints[records][moved], machine.joint_units, _UNROUNDED)
     kept = thin_rows(exact, trajectory.times[records][moved], fixed, shortest)
     rows, times = rows[moved][kept], trajectory.times[records][moved][kept]
-    speeds = to_display(limits.speed[None], machine.joint_units, _EXACT)[0]
+    speeds = to_display(limits.speed[None], machine.joint_units, _UNROUNDED)[0]
     least = (np.abs(np.diff(rows, axis=0)) / speeds).max(axis=1, initial=0.0)
     seconds = np.maximum(np.diff(times), np.maximum(least, _SHORTEST))
     from_home = float((np.abs(posted.joints[0] - machine.inverse(machine.home)) / limits.speed).max())

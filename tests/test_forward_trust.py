@@ -289,3 +289,18 @@ def test_spheres_about_one_line_share_a_continuum_or_nothing(load, x):
     with pytest.raises(pk.NoMethodError, match="continuum"):
         machine.assemblies(joints)
     assert len(machine.assemblies(joints + [0.0, 50.0, 0.0])) == 0
+
+
+@pytest.mark.parametrize("name", ["linear_delta", "orthoglide", "lambda6", "orthoglide5_table"])
+def test_a_pose_in_another_mode_than_the_machines_says_so(name):
+    """The joints of the first leg's other solution lead back to the pose near by, and the answer says in which mode."""
+    machine = pk.load(name)
+    pose = machine.home + 0.1
+    other = ("-" if machine.mode[0] == "+" else "+") + machine.mode[1:]
+    joints = np.stack([machine.inverse(pose, mode) for mode in (machine.mode, other)])
+    solution = machine.forward(joints, near=pose)
+    assert solution.converged.all()
+    assert solution.in_other_mode.tolist() == [False, True]
+    assert "another working mode" in repr(solution)
+    np.testing.assert_allclose(machine.inverse(solution.poses[1], other), joints[1], atol=1e-6)
+    assert not machine.forward(joints[1], near=pose, mode=machine.mode).in_other_mode

@@ -275,7 +275,8 @@ class Machine:
         method : ``"closed"`` (three spheres, two circles), ``"newton"``, or ``"constant"`` (the Jacobian of the start
             kept throughout: FME Transactions 41, (31)); by default the closed form where there is one, else Newton
         mode : working mode that the legs stand in, head and table may stand in either of theirs; by default the
-            machine's, but where a near pose tells by its own joints that the legs stand in another one
+            machine's, but where a near pose tells by its own joints that the legs stand in another one, which
+            ``in_other_mode`` of the solution says
         """
         rows, lead = self.rows(joints, self.joints, "joints")
         if not isinstance(method, str | None):
@@ -288,6 +289,7 @@ class Machine:
             solution.converged.reshape(lead)[()],
             solution.steps.reshape(lead)[()],
             solution.why.reshape(lead)[()],
+            solution.in_other_mode.reshape(lead)[()],
         )
 
     def _starts(self, near: RowsLike, lead: tuple[int, ...]) -> Array:

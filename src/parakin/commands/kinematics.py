@@ -109,7 +109,18 @@ def forward(
     table = PoseTable(machine, solution.poses, joints, broken, solution)
     _show_table(table, _Request("forward", "pose", csv, output, json), offences)
     _report_lost(machine, solution, csv, lines)
+    _report_other_modes(machine, solution)
     return OFF_LIMITS if len(solved) < len(joints) or offences else 0
+
+
+def _report_other_modes(machine: Machine, solution: Solution) -> None:
+    """Say where the legs stand in another working mode than the machine's."""
+    import numpy as np
+
+    count = int(np.count_nonzero(solution.in_other_mode))
+    if count:
+        rows = "the pose has" if len(solution.in_other_mode) == 1 else f"{count:,} rows have"
+        print_remark(f"{rows} the joints in another working mode than the machine's {machine.mode}, as --near has them")
 
 
 def _report_lost(machine: Machine, solution: Solution, csv: Path | None, lines: Indices) -> None:

@@ -59,16 +59,17 @@ def solve_forward(
         raise PoseError(f'method {method!r}: "closed", "newton" or "constant" expected')
     solve = _METHODS[method]
     answers = solve(model, joints, starts, model.mode if mode is None else mode)
-    rest = np.flatnonzero(~answers.settled)
+    rest, in_other_mode = np.flatnonzero(~answers.settled), np.zeros(len(joints), np.bool_)
     if len(rest):
         looked_at = take_rows(answers, rest)
         own_starts = None if starts is None else starts[rest]
         if mode is None and own_starts is not None and model.has_modes:
-            take_modes_of_starts(model, looked_at, joints[rest], own_starts, solve)
+            in_other_mode[rest] = take_modes_of_starts(model, looked_at, joints[rest], own_starts, solve)
         _find_singular_starts(model, looked_at, own_starts, model.mode if mode is None else mode)
         _finish_poses(model, looked_at, own_starts)
         put_rows(answers, rest, looked_at)
-    return Solution(answers.poses, answers.residual, answers.why == ANSWERED, answers.steps, answers.why)
+    converged = answers.why == ANSWERED
+    return Solution(answers.poses, answers.residual, converged, answers.steps, answers.why, in_other_mode)
 
 
 def _find_singular_starts(model: Model, answers: Answers, starts: Array | None, mode: str) -> None:

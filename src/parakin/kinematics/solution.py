@@ -30,6 +30,8 @@ class Solution:
     converged : (...,) True where the legs close, in the working mode asked for and the start's assembly mode
     steps : (...,) Newton's steps; 0 in closed form
     why : (...,) why there is no answer, an index of :data:`REASONS`; 0 where there is one
+    in_other_mode : (...,) True where no mode was asked for and the legs stand in another one than the machine's, as the
+        near pose tells
     """
 
     poses: Array
@@ -37,9 +39,14 @@ class Solution:
     converged: Any
     steps: Any
     why: Any
+    in_other_mode: Any
 
     def __repr__(self) -> str:
-        return f"<parakin solution: {np.count_nonzero(self.converged)} of {np.size(self.converged)} poses found>"
+        others = np.count_nonzero(self.in_other_mode)
+        remark = f", {others} of them in another working mode" if others else ""
+        return (
+            f"<parakin solution: {np.count_nonzero(self.converged)} of {np.size(self.converged)} poses found{remark}>"
+        )
 
 
 class Answers(NamedTuple):

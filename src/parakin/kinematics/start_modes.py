@@ -24,8 +24,12 @@ SETTLED = 0.0125  # of the legs, and rad: so near to its start an answer in the 
 
 def take_modes_of_starts(
     model: Model, solution: Answers, joints: Array, starts: Array, solve: Callable[..., Answers]
-) -> None:
-    """Put answers in another mode than the default where the start tells that mode, and the answer is beside it."""
+) -> Flags:
+    """Put answers in another mode than the default where the start tells that mode, and the answer is beside it.
+
+    Returns which rows (N,) are answered in another mode.
+    """
+    in_other_mode = np.zeros(len(joints), np.bool_)
     beside = BESIDE * max(model.sizes)
     open_rows = np.flatnonzero(~_is_settled(model, solution, starts))
     for other, which in _group_by_mode(model, starts[open_rows], joints[open_rows]).items():
@@ -36,6 +40,7 @@ def take_modes_of_starts(
             nearer = way < NEARER * _measure_way(model, own, starts[rows])
             better = (answers.why == ANSWERED) & (way <= beside) & (nearer | (own.why != ANSWERED))
         put_rows(solution, rows[better], take_rows(answers, better))
+        in_other_mode[rows[better]] = True
     lost = np.flatnonzero(solution.why != ANSWERED)
     if len(lost):  # where the start does not tell the mode, an answer next to it counts in any
         answers = solve(model, joints[lost], starts[lost], None)
@@ -43,6 +48,8 @@ def take_modes_of_starts(
             taken = (answers.why == ANSWERED) & (_measure_way(model, answers, starts[lost]) <= beside)
         taken &= ~find_in_mode(model, answers.poses, joints[lost], model.mode)  # it is refused there: on another side
         put_rows(solution, lost[taken], take_rows(answers, taken))
+        in_other_mode[lost[taken]] = True
+    return in_other_mode
 
 
 def _is_settled(model: Model, solution: Answers, starts: Array) -> Flags:

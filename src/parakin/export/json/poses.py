@@ -35,9 +35,10 @@ def _encode_rows(table: PoseTable) -> list[dict[str, Any]]:
         )
     ]
     if table.solution is not None:
-        verdicts = zip(table.solution.residual.tolist(), table.solution.converged.tolist(), strict=True)
-        for row, (residual, converged) in zip(rows, verdicts, strict=True):
-            row |= {"residual": residual, "converged": converged}
+        solution = table.solution
+        columns = {name: getattr(solution, name).tolist() for name in ("residual", "converged", "in_other_mode")}
+        for row, *verdicts in zip(rows, *columns.values(), strict=True):
+            row |= dict(zip(columns, verdicts, strict=True))
     return rows
 
 

@@ -25,7 +25,7 @@ def limit_jerk(
 
     x : (rows,) ṡ² of the quickest profile; ceiling : (steps,) of ṡ²
     """
-    steps, fractions = _grade_stops(joint_path, limits)
+    steps, fractions = _grade_stops(joint_path, limits, ceiling)
     joint_path, x, ceiling = _add_rows(joint_path, steps, fractions, x, ceiling)
     for _ in range(_TRIES):
         rough = _plan_profile(joint_path, limits, x, ceiling, 1)[2] < _ROUGH
@@ -35,7 +35,7 @@ def limit_jerk(
     return joint_path, *_plan_profile(joint_path, limits, x, ceiling)[:2]
 
 
-def _grade_stops(joint_path: JointPath, limits: DriveLimits) -> tuple[Indices, Array]:
+def _grade_stops(joint_path: JointPath, limits: DriveLimits, ceiling: Array) -> tuple[Indices, Array]:
     """Find the steps at stops, ascending, and the parts after which rows are missing: each twice as far as the last."""
     gaps = np.flatnonzero(joint_path.step == 0.0)
     cuts: list[tuple[Indices, Array]] = []
@@ -49,7 +49,8 @@ def _grade_stops(joint_path: JointPath, limits: DriveLimits) -> tuple[Indices, A
             jerk = np.min(limits.jerk / slope, axis=1)
             acceleration = np.min(limits.acceleration / slope, axis=1)
         with np.errstate(invalid="ignore", over="ignore"):
-            way = np.fmin(acceleration**3 / (6.0 * jerk**2), length[:, 0])
+            way = np.fmin(acceleration**3 / (6.0 * jerk**2), np.sqrt(ceiling[steps] ** 1.5 / jerk))
+            way = np.fmin(way, length[:, 0])
         fraction = np.maximum(_FIRST * way, _LEAST) / length[:, 0]
         while (fraction < _LAST).any():
             near = fraction < _LAST

@@ -143,6 +143,10 @@ def find_switches(rows, limits, ceilings, x, switches, start, stop):
             # A row may be as near to an existing one as rows are on its other side; at a stop there is none.
             near = min(_CLEAR * h, 0.2 * rows.step[i - 1]) if here > 0.0 else _BESIDE * h
             far = h - (min(_CLEAR * h, 0.2 * rows.step[i + 1]) if after > 0.0 else _BESIDE * h)
+            if here == 0.0 and rise <= near:  # a slow feed is reached at once: the row next to the stop does
+                rise = 1.001 * near
+            if after == 0.0 and fall >= far:
+                fall = h - 1.001 * (h - far)
             if near < rise < far:
                 switches.rise_end[i] = rise / h
             if near < fall < far and (switches.rise_end[i] == 0.0 or fall - rise > _CLEAR * h):

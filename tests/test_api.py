@@ -30,6 +30,7 @@ def things(tmp_path_factory, tricept):
     (program,) = pk.write_files(folder, {"j.ngc": pk.make_joint_program(job.trajectory)})
     field = pk.sample_field(plane, found.box)
     space = pk.region(pk.load("orthoglide"))
+    hexapod, below = pk.load("hexapod"), pk.workpiece(Z=-950)
     body = pk.sample_field(space, pk.workspace(space, gap=0.5).box, step=20)
     return {
         "Machine": tricept,
@@ -55,6 +56,8 @@ def things(tmp_path_factory, tricept):
         "Clearance": pk.Clearance(),
         "Rewind": pk.Rewind(3, 12, "theta1", -1, 20.0),
         "RewoundPath": pk.rewind_path(tricept, path, pk.Clearance(20.0), workpiece=pk.workpiece(Z=-1400)),
+        "ToolTurn": pk.choose_tool_turn(hexapod, path, workpiece=below),
+        "TurnedJob": pk.prepare_turned(hexapod, path, workpiece=below),
         "setpoints": job.trajectory.sample(10),
         "cells": found.cells,
         "spec": tricept.spec,

@@ -30,6 +30,8 @@ if TYPE_CHECKING:
     from .toolpath.reading.detect import read_path
     from .toolpath.reading.tool_table import read_tool_table
     from .toolpath.timing.trajectory import Trajectory
+    from .toolpath.tool_turn.choice import ToolTurn, choose_tool_turn
+    from .toolpath.turned_job import TurnedJob, prepare_turned
     from .workspaces.certified.region import Region
     from .workspaces.certified.region import make_region as region
     from .workspaces.certified.workspace import Workspace, workspace
@@ -68,10 +70,13 @@ __all__ = [
     "Solution",
     "Tolerances",
     "ToolPath",
+    "ToolTurn",
     "Trajectory",
+    "TurnedJob",
     "Workspace",
     "__version__",
     "atlas",
+    "choose_tool_turn",
     "find_components",
     "find_cross_sections",
     "find_largest_box",
@@ -86,6 +91,7 @@ __all__ = [
     "make_mesh",
     "predict_linuxcnc_seconds",
     "prepare",
+    "prepare_turned",
     "read_joint_program",
     "read_path",
     "read_tool_table",
@@ -159,9 +165,12 @@ _LAZY = {
     "RewoundPath": "toolpath.linearise.rewinds",
     "rewind_path": "toolpath.linearise.rewinds",
     "ToolPath": "toolpath.path",
+    "ToolTurn": "toolpath.tool_turn.choice",
     "Trajectory": "toolpath.timing.trajectory",
+    "TurnedJob": "toolpath.turned_job",
     "Workspace": "workspaces.certified.workspace",
     "atlas": "performance.atlas",
+    "choose_tool_turn": "toolpath.tool_turn.choice",
     "find_components": "workspaces.connected.components",
     "find_cross_sections": "workspaces.sampled.cross_sections",
     "find_largest_box": "workspaces.inscribed.largest_box",
@@ -174,6 +183,7 @@ _LAZY = {
     "make_mesh": "export.workspace.meshes",
     "predict_linuxcnc_seconds": "controllers.linuxcnc.program",
     "prepare": "toolpath.job",
+    "prepare_turned": "toolpath.turned_job",
     "read_joint_program": "controllers.joints.reader",
     "read_path": "toolpath.reading.detect",
     "read_tool_table": "toolpath.reading.tool_table",

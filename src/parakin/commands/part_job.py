@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import partial
 from math import isfinite
 from typing import TYPE_CHECKING, Literal, NamedTuple
 
@@ -18,6 +19,7 @@ if TYPE_CHECKING:
     from ..toolpath.linearise.rewinds import Rewind
     from ..toolpath.path import ToolPath
     from ..toolpath.placing.placement import Placement
+    from ..toolpath.turned_job import TurnedJob
     from .console import ProgressBar
 
 
@@ -31,15 +33,17 @@ class JobOptions:
     corners: Literal["round", "stop"]
     rewind: float | None
     clearance: float | None
+    turn: Literal["home", "free"] = "home"
 
 
 class PreparedPart(NamedTuple):
-    """A job with the placement and the rewinds that were found for it, and how its controller runs it."""
+    """A job with the placement, rewinds and turn that were found for it, and how its controller runs it."""
 
     job: Job
     placement: Placement | None
     rewinds: tuple[Rewind, ...]
     run: ControllerRun | None
+    turned: TurnedJob | None = None
 
     @property
     def controller_seconds(self) -> float | None:
@@ -54,6 +58,15 @@ def check_clearance(rewind: float | None, clearance: float | None) -> None:
         raise InputError("expected a length above zero, in mm", "--rewind")
     if clearance is not None and not isfinite(clearance):
         raise InputError("expected a height, in mm", "--clearance")
+
+
+def check_turn(machine: Machine, path: ToolPath, turn: Literal["home", "free"]) -> None:
+    """Raise :class:`InputError` where the turn about the tool's axis is not free and should be chosen."""
+    from ..toolpath.tool_turn.choice import find_refusal
+
+    refusal = find_refusal(machine, path) if turn == "free" else ""
+    if refusal:
+        raise InputError(refusal, "--turn")
 
 
 def prepare_part(
@@ -91,7 +104,8 @@ def _prepare_at(
     progress: ProgressBar,
     placement: Placement | None = None,
 ) -> PreparedPart:
-    from ..toolpath.job import prepare
+    from ..toolpath.job import Job, prepare
+    from ..toolpath.turned_job import prepare_turned
 
     mode = options.mode if placement is None else placement.mode
     controller = load_controller(options.target) if options.target else None
@@ -104,14 +118,16 @@ def _prepare_at(
         lean = options.tolerances.allow_lean(interpolation)
         rewound = rewind_path(machine, path, clearance, workpiece=workpiece, mode=mode, angle=lean)
         path, rewinds = rewound.path, rewound.rewinds
-    job = prepare(
-        machine, path, workpiece=workpiece, mode=mode, tolerances=options.tolerances,
-        interpolation=interpolation, corners=options.corners,
+    prepare_job = partial(
+        prepare_turned if options.turn == "free" else prepare, machine, path, workpiece=workpiece, mode=mode,
+        tolerances=options.tolerances, interpolation=interpolation, corners=options.corners,
         progress=progress.stage("checking and timing", 0.3, 0.7),
     )  # fmt: skip
+    prepared = prepare_job()
+    job, turned = (prepared, None) if isinstance(prepared, Job) else (prepared.job, prepared)
     if controller is None or job.trajectory is None:
-        return PreparedPart(job, placement, rewinds, None)
+        return PreparedPart(job, placement, rewinds, None, turned)
     run = controller.build_run(job.trajectory)
     path = replace(job.posted.path, notes=(*run.notes, *job.posted.path.notes))
     job = replace(job, posted=replace(job.posted, path=path))
-    return PreparedPart(job, placement, rewinds, run)
+    return PreparedPart(job, placement, rewinds, run, turned)

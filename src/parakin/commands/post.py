@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from math import isfinite, radians
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from cyclopts import Parameter
 
@@ -13,7 +13,7 @@ from ..controllers import Target, load_controller
 from ..errors import InputError, PoseError
 from .console import ProgressBar, announce_compiling, print_json, print_text
 from .options import OFF_LIMITS, Json, Mode, Sizes, complete_machine, load_machine
-from .part_job import JobOptions, check_clearance, prepare_part
+from .part_job import JobOptions, check_clearance, check_turn, prepare_part
 from .part_options import (
     FrameChoice,
     PartOptions,
@@ -93,6 +93,15 @@ CornerStyle = Annotated[
     Literal["round", "stop"],
     Parameter(help="Round them within the tolerance, or stop at them."),
 ]
+TurnChoice = Annotated[
+    Literal["home", "free"],
+    Parameter(
+        help=(
+            "On a machine with six axes, the turn about the tool's axis: C as at home, or free, chosen along the whole "
+            "path for the most margin and then the least time."
+        )
+    ),
+]
 Retract = Annotated[
     float | None,
     Parameter(
@@ -147,6 +156,7 @@ def post(
     angle_tolerance: AxisTolerance = 0.05,
     arc_tolerance: ArcTolerance = 0.01,
     corners: CornerStyle = "round",
+    turn: TurnChoice = "home",
     rewind: Retract = None,
     clearance: ClearancePlane = None,
     rate: Rate = None,
@@ -167,7 +177,6 @@ def post(
     check_clearance(rewind, clearance)
     announce_compiling()
     from ..export.files import write_files
-    from ..export.json.job import encode_job
     from ..toolpath.job import Tolerances
     from ..toolpath.posting.frames import compose_frames
     from .post_summary import summarise_job
@@ -177,19 +186,27 @@ def post(
             part, PartOptions(frame, start, reference, tools), arc_tolerance,
             None if place else compose_frames(placed, None), progress.stage("reading", 0.0, 0.1),
         )  # fmt: skip
+        check_turn(chosen, path, turn)
         path = fit_part(chosen, path, length, placed)
         tolerances = Tolerances(tolerance, radians(angle_tolerance))
-        options = JobOptions(mode, tolerances, target, corners, rewind, clearance)
+        options = JobOptions(mode, tolerances, target, corners, rewind, clearance, turn)
         prepared = prepare_part(chosen, path, placed, place, options, progress)
         job = prepared.job
         files, missing = _make_files(part.stem, prepared, _Wanted(target, force, rate, parquet), progress)
         paths = write_files(output, dict(files.values()))
     written = {kind: str(name) for kind, name in zip(files, paths, strict=True)}
     if json:
-        print_json(encode_job(job, prepared.placement, prepared.rewinds, prepared.controller_seconds, missing, written))
+        print_json(_encode(prepared, missing, written))
     else:
         print_text(summarise_job(prepared, target, written, missing))
     return 0 if job.runs and not missing else OFF_LIMITS
+
+
+def _encode(prepared: PreparedPart, missing: list[str], written: dict[str, str]) -> dict[str, Any]:
+    from ..export.json.job import encode_job
+
+    found = prepared.placement, prepared.rewinds, prepared.turned
+    return encode_job(prepared.job, *found, prepared.controller_seconds, missing, written)
 
 
 def _parse_workpiece_unless_found(workpiece: str | None, place: str | None) -> Array | None:

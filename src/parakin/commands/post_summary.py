@@ -11,8 +11,10 @@ from .console import format_table
 from .offences import format_offence
 
 if TYPE_CHECKING:
+    from ..toolpath.job import Job
     from ..toolpath.placing.placement import Placement
     from ..toolpath.posting.posted import Posted
+    from ..toolpath.turned_job import TurnedJob
     from .part_job import PreparedPart
 
 _NOTES = 5  # remarks on the file that are printed
@@ -37,6 +39,8 @@ def summarise_job(prepared: PreparedPart, target: Target | None, written: dict[s
     if placement is not None:
         lines += [_format_placement(placement), ""]
     lines += [*describe_setup(posted), ""]
+    if prepared.turned is not None:
+        lines += [_format_turn(prepared.turned), ""]
     header = ("joint", "from", "to", "", "limits")
     lines += [
         format_table([_format_range(joint) for joint in encode_joint_ranges(posted)], header, " rr"),
@@ -78,6 +82,21 @@ def _format_placement(placement: Placement) -> str:
         f"no placement within these bounds is allowed; the nearest is --workpiece {values}: "
         f"{-placement.margin:.1%} of half a range beyond {placement.limit}"
     )
+
+
+def _format_turn(turned: TurnedJob) -> str:
+    """Format the range of C that was chosen, and what it gained against C as at home."""
+    if not turned.is_chosen:
+        better = "leaves more margin or takes less time" if turned.home.runs else "keeps the limits"
+        return f"turn about the tool: C as at home, for no other was found that {better}"
+    low, high = (to_display(end, "rad") for end in (turned.low, turned.high))
+
+    def describe(job: Job, margin: float) -> str:
+        left = f"{margin:.1%} of half a range left" if margin >= 0.0 else "off limits"
+        return left if job.seconds is None or not job.runs else f"{left} in {format_duration(job.seconds)}"
+
+    chosen, home = describe(turned.job, turned.margin), describe(turned.home, turned.home_margin)
+    return f"turn about the tool chosen, C from {low:.1f} to {high:.1f}°: {chosen}; with C as at home: {home}"
 
 
 def _format_times(prepared: PreparedPart, target: Target | None) -> list[str]:

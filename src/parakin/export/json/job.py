@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from math import isfinite
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -18,17 +19,19 @@ if TYPE_CHECKING:
     from ...toolpath.path import ToolUse
     from ...toolpath.placing.placement import Placement
     from ...toolpath.posting.posted import Posted
+    from ...toolpath.turned_job import TurnedJob
 
 
 def encode_job(
     job: Job,
     placement: Placement | None,
     rewinds: Sequence[Rewind],
+    turned: TurnedJob | None,
     controller_seconds: float | None,
     missing: Sequence[str],
     files: Mapping[str, str],
 ) -> dict[str, Any]:
-    """Encode a job, its placement and rewinds that were found, why files are missing, and the files by their kinds.
+    """Encode a job, its placement, rewinds and turn that were found, why files are missing, and files by their kinds.
 
     controller_seconds : what the program's controller takes, s; None without one that says so
     """
@@ -58,6 +61,7 @@ def encode_job(
             {"line": rewind.line, "joint": rewind.joint, "turns": rewind.turns, "retract": rewind.retract}
             for rewind in rewinds
         ],
+        "turn": None if turned is None else _encode_turn(turned),
         "offences": [encode_offence(offence) for offence in posted.offences],
         "outside": None if job.outside is None else _encode_outside(job.outside),
         "first": None if first is None else encode_offence(first),
@@ -66,6 +70,23 @@ def encode_job(
         "missing": list(missing),
         "files": dict(files),
     }
+
+
+def _encode_turn(turned: TurnedJob) -> dict[str, Any]:
+    """Encode whether the turn about the tool's axis was chosen, C's range, and what it gained against C as at home."""
+    home = turned.home
+    return {
+        "chosen": turned.is_chosen,
+        "C": [to_display(end, "rad") for end in (turned.low, turned.high)],
+        "margin": _encode_finite(turned.margin),
+        "home_margin": _encode_finite(turned.home_margin),
+        "home_seconds": home.seconds,
+        "home_runs": home.runs,
+    }
+
+
+def _encode_finite(number: float) -> float | None:
+    return number if isfinite(number) else None
 
 
 def _encode_outside(outside: Outside) -> dict[str, Any]:

@@ -68,7 +68,7 @@ def find_tool_orientation(machine: Machine) -> ToolOrientation:
     letters = "".join(machine.axes[column] for column in machine.turning_columns)
     if len(letters) == 3:
         home_c = float(machine.home[machine.turning_columns[-1]])  # C is free, and the machine is made for its home
-        return ToolOrientation(letters, lambda k: _solve_three_turns(k, home_c), "B")
+        return ToolOrientation(letters, lambda k: solve_three_turns(k, home_c), "B")
     if machine.has_direction:
         return ToolOrientation(letters, _solve_direction, "C", has_direction=True)
     tool = np.array(machine.structure.tool_rotation, dtype=np.float64)
@@ -93,9 +93,12 @@ def _solve_direction(k: Array) -> TurnSolution:
     return [b, c], free, None
 
 
-def _solve_three_turns(k: Array, c: float) -> TurnSolution:
-    """Solve for A and B with C given: turned back by C, k is Ry(B)·Rx(A)·z = (sin B cos A, -sin A, cos B cos A)."""
-    cos, sin = math.cos(c), math.sin(c)
+def solve_three_turns(k: Array, c: Any) -> TurnSolution:
+    """Solve for A and B with C given, one for all or (n,).
+
+    Turned back by C, k is Ry(B)·Rx(A)·z = (sin B cos A, -sin A, cos B cos A).
+    """
+    cos, sin = np.cos(c), np.sin(c)
     kx, ky, kz = cos * k[:, 0] + sin * k[:, 1], cos * k[:, 1] - sin * k[:, 0], k[:, 2]
     square = kx * kx + kz * kz
     return [np.arctan2(-ky, np.sqrt(square)), np.arctan2(kx, kz), np.full(len(k), c)], is_on_pole(square, PRINTED), None

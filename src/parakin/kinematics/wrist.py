@@ -151,8 +151,8 @@ def point_direction(b: Array, c: Array) -> Array:
 
 
 def is_upright(b: Array, within: float = EXACT) -> Flags:
-    """Tell where a tool at B stands on the pole of B and C, up or down."""
-    upright: Flags = np.abs(b - 0.5 * np.pi) > 0.5 * np.pi - within
+    """Tell where a tool at B, within half a turn, stands on the pole of B and C, up or down."""
+    upright: Flags = np.abs(np.abs(b) - 0.5 * np.pi) > 0.5 * np.pi - within
     return upright
 
 

@@ -15,8 +15,8 @@ from functools import cached_property
 import numpy as np
 
 from ...arrays import Array, Flags, Indices
-from ...kinematics.turns import find_nearest_turn, wrap_angle
-from ...kinematics.wrist import EXACT, NEAR_HOLD, PRINTED, REPORTED, SWING, flip_azimuth
+from ...kinematics.turns import wrap_angle
+from ...kinematics.wrist import EXACT, NEAR_HOLD, PRINTED, REPORTED, SWING, find_nearest_direction, flip_azimuth
 from ..path import Note
 from ..posting.frames import compute_poses
 from ..posting.posted import Posted
@@ -164,18 +164,15 @@ class _HoldBuilder:
         after = np.flatnonzero((np.diff(record) == 1) & (moved[1:] == moved[:-1]).all(axis=1)) + 1
         if not (self.pole.moves and self.aside and len(after)):
             return _NOTHING
-        machine, pole, motion = self.posted.machine, self.pole, record[after]
-        direction = machine.direction
-        assert direction is not None
-        poses = []
+        motion, ends = record[after], []
+        turns = np.zeros((len(after), 3))
         for at in (motion - 1, motion):
             axis, extension = self._find_axes_at(at, moved[after]), self.programmed.get_extension(at)
             tip = self.programmed.tip[at] + extension[:, None] * (axis - self.programmed.axis[at])
-            poses.append(compute_poses(machine, tip, axis, MACHINE_FRAME)[0])
-        poses[1][:, direction.c] = find_nearest_turn(poses[1][:, direction.c], poses[0][:, direction.c])
-        middle = 0.5 * (poses[0] + poses[1])
-        turns = np.column_stack([np.zeros(len(middle)), middle[:, direction.pair]])
-        off = pole.project_axes(middle[:, :3], compute_tool_axes(turns)) - moved[after]
+            turns = find_nearest_direction(axis, turns)
+            ends.append((tip, turns))
+        tip, turns = (0.5 * (first + last) for first, last in zip(*ends, strict=True))
+        off = self.pole.project_axes(tip, compute_tool_axes(turns)) - moved[after]
         counts = np.ceil(np.sqrt(np.hypot(*off.T) / (_WANDER * self.aside))).astype(np.int64).clip(1, _MOST_BETWEEN)
         at, row = np.repeat(motion, counts - 1), np.repeat(np.arange(len(motion)), counts - 1)
         number = np.arange(len(row)) - np.repeat(np.cumsum(counts - 1) - (counts - 1), counts - 1) + 1

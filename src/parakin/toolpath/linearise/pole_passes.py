@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...arrays import Array, Flags, Indices
-from ...kinematics.wrist import EXACT, PRINTED, REPORTED
+from ...kinematics.wrist import EXACT, PRINTED, REPORTED, is_upright
 from ..path import Note
 from ..posting.posted import Posted
 from ..programmed_path import ProgrammedPath
@@ -25,6 +25,7 @@ from .poles import Pole, find_poles
 _MOST_BETWEEN = 0.99  # what an axis may be moved between records, for the farthest point may lie between SHARES
 _LARGE_MISS = 0.25  # for a smaller miss the way to the pole begins with the motion, and no further record is needed
 _TRIES = 8
+_UNTURNED = 1e-4  # rad of C: a tool that turns by less goes straight
 
 
 @dataclass
@@ -102,9 +103,10 @@ def _lead_unless_refused(
     for pole in find_poles(posted.machine, deviation.interpolation, turns is not None):
         steps = find_pole_steps(pole, programmed, posted, motion)
         routes = []
-        is_pose = deviation.interpolation == "pose"
-        for route in find_pole_routes(pole, programmed, steps, deviation.angle, is_pose):
-            if (axis[route.record] != programmed.axis[route.record]).any():
+        found = find_pole_routes(pole, programmed, steps, deviation.angle, deviation.interpolation == "pose")
+        shared = _find_shared_routes(deviation, steps, found, led.passes)
+        for route, is_shared in zip(found, shared, strict=True):
+            if is_shared or (axis[route.record] != programmed.axis[route.record]).any():
                 continue  # led through another pole already
             pole_pass = locate_pass(pole, posted.path, steps, route)
             if pole_pass.key in refused or (inclined and (len(route.record) or route.miss > PRINTED)):
@@ -122,13 +124,40 @@ def _lead_unless_refused(
                     axis[hold.record] = hold.axis
                     holds.append(hold)
         led.holds += holds
-        routed_steps = [*(route.steps for route in routes), *find_held_steps(steps, led.holds)]
+        shared_steps = [route.steps for route, is_shared in zip(found, shared, strict=True) if is_shared]
+        routed_steps = [*(route.steps for route in routes), *shared_steps, *find_held_steps(steps, led.holds)]
         led.notes += [*note_swings(pole, posted.path, steps, routed_steps), *note_holds(holds)]
     moved = np.flatnonzero((axis != programmed.axis).any(1))
     if len(moved):
         led.posted = repost_path(posted, replace_axes(posted.path, moved, axis[moved] @ programmed.rotation))
     _insert_records_at_poles(deviation, led, crossings)
+    if deviation.interpolation == "pose" and turns is None:
+        _turn_upright_tools(led)
     return led
+
+
+def _find_shared_routes(
+    deviation: Deviation, steps: PoleSteps, routes: list[PoleRoute], passes: list[PolePass]
+) -> list[bool]:
+    """Find the routes that lie on passes through other poles which are one with theirs there.
+
+    Two ways through one place that differ by little would make the path zigzag between their records.
+    """
+    if not passes or not routes:
+        return [False] * len(routes)
+    nearest = np.array(
+        [first + int(steps.nearest[first : last + 1].argmin()) for first, last in (route.steps for route in routes)]
+    )
+    tip, axis = deviation.programmed.interpolate(steps.record[nearest], steps.share[nearest])
+    at = steps.record[nearest] - 1 + steps.share[nearest]
+    shared = np.zeros(len(routes), np.bool_)
+    for pole in {id(located.pole): located.pole for located in passes}.values():
+        own = [located for located in passes if located.pole is pole]
+        begins, ends = (np.array([getattr(located, name) for located in own]) for name in ("begin", "end"))
+        number = np.searchsorted(begins, at, "right") - 1
+        is_on_pass = (number >= 0) & (at <= ends[number])
+        shared |= is_on_pass & (np.hypot(*pole.project_axes(tip, axis).T) < deviation.angle)
+    return [bool(flag) for flag in shared]
 
 
 def _insert_records_at_poles(deviation: Deviation, led: PolePasses, crossings: list[_Crossings]) -> None:
@@ -152,6 +181,24 @@ def _insert_records_at_poles(deviation: Deviation, led: PolePasses, crossings: l
         led.positions = led.positions.insert(motions, shares)
         denser_path = divide_motions(posted.path, motions, shares)
         led.posted = repost_path(posted, replace_axes(denser_path, motions + np.arange(len(motions)), axes))
+
+
+def _turn_upright_tools(led: PolePasses) -> None:
+    """Repeat the records on routes and holds at which an upright tool leaves with another C than it comes with.
+
+    C turns between the two, where nothing depends on it: from the record on it would turn the tool's axis on its way
+    out, and the free joint with it.
+    """
+    direction, poses = led.posted.machine.direction, led.posted.poses
+    if direction is None or not (led.passes or led.holds) or len(poses) < 3:
+        return
+    upright, turn = is_upright(poses[:, direction.b]), np.abs(np.diff(poses[:, direction.c]))
+    alone = upright[1:-1] & ~upright[:-2] & ~upright[2:]
+    motion = np.flatnonzero(alone & (turn[1:] > _UNTURNED)) + 2  # those that lead away
+    if len(motion):
+        share = np.zeros(len(motion))
+        led.positions = led.positions.insert(motion, share)
+        led.posted = repost_path(led.posted, divide_motions(led.posted.path, motion, share))
 
 
 def _list_crossing_records(

@@ -141,7 +141,7 @@ def _route_through_pole(
     normal = np.array([-line[1], line[0]])
     a, b = x @ line, x @ normal
     weight = np.where(np.hypot(a, b) < radius, 1.0 - (a / radius) ** 2, 0.0)
-    entries = _enter_circle(x[0], x[1], radius), _enter_circle(x[-1], x[-2], radius)
+    entries = meet_circle(x[0], x[1], radius), meet_circle(x[-1], x[-2], radius)
     # What is left to move where the path enters and leaves the circle.
     offsets = [abs(float(entry @ normal)) for entry in entries if entry is not None]
     edge = [offset**3 / radius**2 for offset in offsets]
@@ -190,7 +190,7 @@ def _place_rays(
     axes : directions along the line and across, (2,) each
     """
     a, rays = way[:, 0], []
-    radius = _INNERMOST * squeeze.angle
+    radius = innermost = _INNERMOST * squeeze.angle
     while radius < _OUTERMOST * squeeze.radius:
         for at in (-radius, radius):
             places = np.flatnonzero((a[:-1] - at) * (a[1:] - at) < 0.0)
@@ -198,6 +198,7 @@ def _place_rays(
                 step, fraction = window[0] + index, (at - a[index]) / (a[index + 1] - a[index])
                 share = float(steps.begin[step] + fraction * (steps.end[step] - steps.begin[step]))
                 across = (way[index, 1] + fraction * (way[index + 1, 1] - way[index, 1])) * (at / squeeze.radius) ** 2
+                across *= radius > innermost  # straight there: the free angle is the same before the pole and behind
                 if _EDGE < share < 1.0 - _EDGE:
                     rays.append((int(steps.record[step]), share, at * axes[0] + across * axes[1]))
         radius *= _GROWTH
@@ -214,17 +215,12 @@ def _find_line(begin: Array, end: Array, radius: float) -> Array:
     return np.array(total / size if size > 0.0 else [1.0, 0.0], dtype=np.float64)
 
 
-def _enter_circle(outside: Array, inside: Array, radius: float) -> Array | None:
-    """Find where a step that ends within the circle of a radius about the pole enters it; None for other steps."""
-    return None if np.hypot(*inside) >= radius else meet_circle(outside, inside, radius)
-
-
 def _find_inner_ends(steps: PoleSteps, window: tuple[int, int], crossing: int, radius: float) -> tuple[float, ...]:
     """Find the shares of the motion that crosses the pole at which it enters the circle and leaves it again."""
     ends = []
     first, last = window
     for step, outside, inside in ((first, steps.first, steps.last), (last, steps.last, steps.first)):
-        entry = _enter_circle(outside[step], inside[step], radius)
+        entry = meet_circle(outside[step], inside[step], radius)
         if entry is None or steps.record[step] != steps.record[crossing]:
             continue
         fraction = np.hypot(*(entry - steps.first[step])) / np.hypot(*(steps.last[step] - steps.first[step]))

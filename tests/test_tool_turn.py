@@ -34,12 +34,14 @@ def test_the_search_finds_the_best_of_all_ways(seed):
     assert find_widest_margin(margins, STEEPEST) == widest
 
     def cost(way):
-        moves = np.abs(np.diff(joints[row, way], axis=0)).max(axis=1)
+        moves = np.diff(joints[row, way], axis=0)
+        moves[:, 2] -= 1.5 * np.round(moves[:, 2] / 1.5)
+        moves = np.abs(moves).max(axis=1)
         return np.maximum(moves, seconds).sum() + 0.05 * (np.diff(way) ** 2).sum()
 
     level = 0.8 * widest
     least = min(cost(way) for way in every if margins[row, way].min() >= level)
-    found = find_quickest_way(margins >= level, StepCosts(seconds, joints, 0.05), STEEPEST)
+    found = find_quickest_way(margins >= level, StepCosts(seconds, joints, np.array([0.0, 0.0, 1.5]), 0.05), STEEPEST)
     assert margins[row, found].min() >= level and np.abs(np.diff(found)).max() <= STEEPEST
     assert cost(found) == pytest.approx(least, abs=1e-12)
 
@@ -155,6 +157,24 @@ def test_short_paths(count):
     path = path_of(machine.home[:3] + np.arange(count)[:, None] * [0.0, 0.0, 0.0])
     turned = pk.prepare_turned(machine, path)
     assert turned.job.runs
+
+
+def test_axes_that_turn_to_their_opposites():
+    machine = pk.load("hexapod")
+    path = path_of(np.tile(machine.home[:3], (2, 1)), [[0.0, 0.0, 1.0], [0.0, 0.0, -1.0]])
+    assert pk.choose_tool_turn(machine, path) is None
+    assert "opposite" in pk.prepare_turned(machine, path).job.unplanned
+
+
+def test_a_longer_tool_keeps_its_own_tip():
+    machine = pk.load("hexapod")
+    path = wave(machine, OFFSETS["hexapod"])
+    longer = pk.fit_tool_lengths(machine, path, 170.0)
+    posted = pk.prepare(machine, pk.choose_tool_turn(machine, longer).path).posted
+    tools = Rotation.from_euler("xyz", posted.poses[:, 3:]).apply([0.0, 0.0, 1.0])
+    tips = dense(path.tip, 400)
+    own = posted.poses[:, :3] - 20.0 * tools  # 170 mm are 20 mm more than the machine's own tool
+    assert max(np.linalg.norm(tips - tip, axis=1).min() for tip in own) < 0.05
 
 
 def test_where_no_turn_is_free():

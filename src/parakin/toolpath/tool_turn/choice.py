@@ -9,6 +9,7 @@ import numpy as np
 from ...arguments import check_arguments, check_positive
 from ...arrays import Array, Flags, Indices, Progress
 from ...errors import PoseError
+from ...kinematics.turns import TURN
 from ...machine import Machine
 from ..path import Note, ToolPath
 from ..posting.frames import compose_frames
@@ -63,7 +64,9 @@ def choose_tool_turn(
     lean: float = 1e-5,
     progress: Progress | None = None,
 ) -> ToolTurn | None:
-    """Choose the turn of the tool about its own axis along a path, by dynamic programming; None where none is better.
+    """Choose the turn of the tool about its own axis along a path, by dynamic programming.
+
+    None where it finds none that keeps the limits and leaves as much margin, or tool axes turn to their opposites.
 
     Of all turns that change evenly, those are found whose least margin is greatest. Of those that keep 95 % of
     it, and no less than C as at home does, one is taken that takes the joints the least time. Nothing in it is random:
@@ -76,7 +79,7 @@ def choose_tool_turn(
     progress : called now and then with the fraction done, 0 to 1
 
     Raises :class:`PoseError` where the turn is not free: the machine does not turn three ways, or has a wrist, or the
-    path gives A, B and C itself; and for a motion between opposite tool axes.
+    path gives A, B and C itself.
     """
     check_positive("lean", lean, "rad")
     refusal = find_refusal(machine, path)
@@ -84,7 +87,7 @@ def choose_tool_turn(
         raise PoseError(f"turn: {refusal}")
     report = progress or (lambda fraction: None)
     path = fit_tool_lengths(machine, path, workpiece=workpiece)
-    if len(path) < 2:
+    if len(path) < 2 or ProgrammedPath(path).find_opposite(np.arange(1, len(path))).any():
         return None
     held = post_path(machine, path, workpiece=workpiece, mode=mode)
     frame = compose_frames(workpiece, path.frame)
@@ -132,11 +135,11 @@ def _search_lattice(machine: Machine, path: ToolPath, stations: Stations, lattic
     level = max(_KEPT * widest, min(widest, float(lattice.margins[:, lattice.home].min())))
     usable = lattice.margins >= level
     speed = DriveLimits.of(machine).speed
-    joint_seconds = lattice.joints / speed
-    for joint in machine.turning_joints:
-        joint_seconds[:, :, joint] = np.unwrap(lattice.joints[:, :, joint], axis=1) / speed[joint]
+    whole_turns = np.zeros(len(speed))
+    whole_turns[machine.turning_joints] = TURN / speed[machine.turning_joints]
     seconds = np.diff(stations.interpolate(_sum_feed_seconds(path)))
-    way = find_quickest_way(usable, StepCosts(seconds, joint_seconds, _TURN_WEIGHT), _STEEPEST)
+    costs = StepCosts(seconds, lattice.joints / speed, whole_turns, _TURN_WEIGHT)
+    way = find_quickest_way(usable, costs, _STEEPEST)
     return _smooth_way(lattice, usable, way)
 
 

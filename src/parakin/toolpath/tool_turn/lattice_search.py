@@ -15,11 +15,13 @@ class StepCosts(NamedTuple):
 
     seconds : (m - 1,) that the feed takes, 0 where the drives are the only limit
     joint_seconds : (m, t, joints) where the joints are, each in seconds of its greatest speed
+    whole_turns : (joints,) seconds that a whole turn takes, by which a turning joint counts on; 0 for another
     turn_weight : s for the square of a step by one turn, so that the turn changes evenly
     """
 
     seconds: Array
     joint_seconds: Array
+    whole_turns: Array
     turn_weight: float
 
 
@@ -46,7 +48,7 @@ def find_quickest_way(usable: Flags, steps: StepCosts, steepest: int) -> Indices
     """
     stations, turns = usable.shape
     seconds, joint_seconds = steps.seconds, steps.joint_seconds
-    turn_weight = steps.turn_weight
+    whole_turns, turn_weight = steps.whole_turns, steps.turn_weight
     joints = joint_seconds.shape[2]
     back = np.zeros((stations, turns), np.int16)
     cost = np.where(usable[0], 0.0, np.inf)
@@ -61,7 +63,10 @@ def find_quickest_way(usable: Flags, steps: StepCosts, steepest: int) -> Indices
                     continue
                 time = seconds[j - 1]
                 for joint in range(joints):
-                    time = max(time, abs(joint_seconds[j, k, joint] - joint_seconds[j - 1, i, joint]))
+                    move = joint_seconds[j, k, joint] - joint_seconds[j - 1, i, joint]
+                    if whole_turns[joint] > 0.0:
+                        move -= whole_turns[joint] * round(move / whole_turns[joint])
+                    time = max(time, abs(move))
                 step = time + turn_weight * (k - i) ** 2
                 if before[i] + step < cost[k]:
                     cost[k], back[j, k] = before[i] + step, i

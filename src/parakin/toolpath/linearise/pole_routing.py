@@ -156,6 +156,8 @@ def _route_through_pole(
         return None
     records = np.concatenate([[steps.record[first] - (steps.begin[first] == 0.0)], steps.record[inside_window]])
     at_record = np.concatenate([[steps.begin[first] == 0.0], steps.end[inside_window] == 1.0])
+    if pole.moves and np.count_nonzero(at_record & (np.hypot(a, b) < _SNAPPED * angle)) > 1:
+        return None  # even poses bow out beside a pole that goes along with them, in a direction of their own
     moved = at_record & (np.abs(weight * b) > (EXACT if bends else PRINTED))
     squeezed = (1.0 - weight) * b
     if bends:

@@ -6,7 +6,7 @@ no drive moves is a telescope, and so on. Nothing here knows a machine or a leg 
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from math import isfinite, pi
 from typing import Literal
@@ -14,6 +14,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ...algebra import Scalar
 from ...arguments import RowsLike
 from ...machine import Machine
 from ...model.chain import UNIT, compose_chain
@@ -90,25 +91,73 @@ def build_scene(
     q = machine.inverse(row, mode) if joints is None else machine.rows(joints, machine.joints, "joints")[0][0]
     with np.errstate(invalid="ignore", divide="ignore"):
         placement = machine.place_platform(row, mode, None if joints is None else q)
-        builder = _SceneBuilder(machine, placement, q)
+        builder = _SceneBuilder(_Stance(machine, placement, q.tolist()))
         builder.build()
     items = tuple(item for item in builder.items if np.isfinite(item.points).all())
     labels = _join_labels([label for label in builder.labels if np.isfinite(label[1]).all()])
     missing = [letter for letter in "XYZ" if letter not in machine.axes]
-    normal = builder.mount[:, "XYZ".index(missing[0])] if missing and not machine.structure.table else None
-    return Scene(items, labels, builder.frames, normal)
+    normal: Points | None = np.array(machine.structure.mount)[:, "XYZ".index(missing[0])] if missing else None
+    return Scene(items, labels, builder.frames, None if machine.structure.table else normal)
+
+
+def trace_scene(machine: Machine, pose: Sequence[Scalar], joints: Sequence[Scalar]) -> list[NDArray[np.object_]]:
+    """Trace the points, (k, 3) each, of the items of home's scene, at another pose on scalars of any kind.
+
+    ``joints`` are those of the pose. Rails and the base stand where they are at home.
+    """
+    home = machine.home
+    with np.errstate(invalid="ignore", divide="ignore"):
+        builder = _SceneBuilder(
+            _Stance(machine, machine.place_platform(home, machine.mode), list(machine.inverse(home)))
+        )
+        builder.build()
+        placement = machine.structure.place_with_joints(list(pose), list(joints[machine.leg_count :]))
+    stance = _Stance(machine, placement, list(joints))
+    return [np.asarray(place(stance), dtype=object) for place in builder.places]
+
+
+class _Stance:
+    """Where a machine's bodies are, on scalars of any kind: all points that a scene has, in the base frame or in M."""
+
+    def __init__(self, machine: Machine, placement: PlatformPlacement, joints: Sequence[Scalar]):
+        self.machine, self.structure, self.joints = machine, machine.structure, list(joints)
+        self.placement = placement
+        self.rotation: Points = np.array(placement.rotation)
+        self.origin: Points = np.array(placement.origin)
+        self.points = machine.place_leg_joints(placement)
+        self.leg_joints = machine.group_joints(self.joints)
+
+    def locate_struts(self, leg: int) -> list[Points]:
+        """Locate both ends (2, 3) of a leg's struts, base frame."""
+        return [np.array(ends) for ends in self.machine.legs[leg].struts(self.points[leg], self.leg_joints[leg])]
+
+    def locate_on_platform(self, points: Points) -> Points:
+        """Locate points of the platform's frame in the base frame."""
+        located: Points = points @ self.rotation.T + self.origin
+        return located
+
+    def list_head_frames(self) -> list[tuple[Points, Points]]:
+        """List rotation and origin after every step of the head, in the platform's frame."""
+        return list(_compose_steps(self.structure.head, list(self.placement.serial)[: self.structure.head_joints]))
+
+    def list_table_frames(self) -> list[tuple[Points, Points]]:
+        """List rotation and origin after every step of the table, in M."""
+        return list(_compose_steps(self.structure.table, list(self.placement.serial)[self.structure.head_joints :]))
+
+    def to_machine(self, points: ArrayLike) -> Points:
+        """Transform points of the base frame into M."""
+        mount, base = np.array(self.structure.mount, float), np.array(self.structure.base, float)
+        points_in_m: Points = np.asarray(points).reshape(-1, 3) @ mount.T + base
+        return points_in_m
 
 
 class _SceneBuilder:
-    """Gather the items of one scene in the base frame and put them into M."""
+    """Choose the items of one scene; each has a rule that places its points, in M, for any stance."""
 
-    def __init__(self, machine: Machine, placement: PlatformPlacement, joints: Points):
-        self.machine, self.structure = machine, machine.structure
-        self.placement, self.joints = placement, joints
-        self.mount = np.array(self.structure.mount, float)
-        self.base = np.array(self.structure.base, float)
-        self.rotation, self.origin = np.array(placement.rotation, float), np.array(placement.origin, float)
+    def __init__(self, stance: _Stance):
+        self.stance, self.machine, self.structure = stance, stance.machine, stance.structure
         self.items: list[SceneItem] = []
+        self.places: list[Callable[[_Stance], Points]] = []
         self.labels: list[tuple[str, Points]] = []
         self.frames = {"machine": np.eye(3, 4)}
 
@@ -119,86 +168,120 @@ class _SceneBuilder:
         if self.structure.table:
             self._add_table()
 
-    def _to_machine(self, points: ArrayLike) -> Points:
-        """Transform points of the base frame into M."""
-        points_in_m: Points = np.asarray(points, float) @ self.mount.T + self.base
-        return points_in_m
+    def _add(self, kind: SceneKind, name: str, place: Callable[[_Stance], Points], closed: bool = False) -> None:
+        """Add an item whose points are placed in M."""
+        self.items.append(SceneItem(kind, name, np.asarray(place(self.stance), float), closed))
+        self.places.append(place)
 
-    def _add(self, kind: SceneKind, name: str, points: ArrayLike, closed: bool = False) -> None:
-        self.items.append(SceneItem(kind, name, self._to_machine(points).reshape(-1, 3), closed))
+    def _add_fixed(self, kind: SceneKind, name: str, points: Points, closed: bool = False) -> None:
+        """Add an item that does not move, with its points in the base frame."""
+        self._add(kind, name, lambda at: at.to_machine(points), closed)
 
     def _add_legs(self) -> None:
-        legs, anchors = self.machine.legs, []
-        points = self.machine.place_leg_joints(self.placement)
-        for leg, point, q in zip(legs, points, self.machine.group_joints(self.joints.tolist()), strict=True):
-            struts = [np.array(ends, float) for ends in leg.struts(point, q)]
-            moved: dict[int, list[str]] = {}
-            for number, (drive, feet) in enumerate(zip(leg.drives, _sweep_feet(leg, point, q, struts[0]), strict=True)):
-                for strut in np.flatnonzero(np.ptp(feet, axis=0).max(axis=-1) > _NEAR):
-                    moved.setdefault(int(strut), []).append(drive.name)
-                    # An arm that ends at the foot is what moves it; there is no rail then.
-                    if not any(_coincide(other[1], struts[strut][0]) for other in struts):
-                        rail = feet[[0, -1], strut] if leg.units[number] == "mm" else feet[:, strut]
-                        self._add("rail", drive.name, rail)
-            for number, ends in enumerate(struts):
-                first: SceneKind = "rod" if moved.get(0) else "telescope"
-                self._add(first if number == 0 else "arm", leg.drives[min(number, len(leg.drives) - 1)].name, ends)
-                if number not in moved:
-                    anchors.append(ends[0])
-            for number, names in moved.items():
-                self.labels.append((", ".join(names), self._to_machine(struts[number][0])))
-            if not moved:
-                self.labels.append((leg.drives[0].name, self._to_machine(struts[0].mean(axis=0))))
+        anchors: list[Points] = []
+        for leg in range(len(self.machine.legs)):
+            anchors += self._add_leg(leg)
         if self.structure.has_central_leg:
-            self._add("central", "central leg", [np.zeros(3), self.origin])
+            self._add("central", "central leg", lambda at: at.to_machine([np.zeros(3), at.origin]))
         if anchors:
             ring = order_polygon(np.array(anchors))
-            self._add("base", "base", ring, len(ring) > 2)
+            self._add_fixed("base", "base", ring, len(ring) > 2)
+
+    def _add_leg(self, number: int) -> list[Points]:
+        """Add a leg's rails and struts, and labels; return the feet that no drive moves."""
+        at, leg, anchors = self.stance, self.machine.legs[number], []
+        struts = at.locate_struts(number)
+        moved: dict[int, list[str]] = {}
+        sweeps = _sweep_feet(leg, at.points[number], at.leg_joints[number], struts[0])
+        for drive, unit, feet in zip(leg.drives, leg.units, sweeps, strict=True):
+            for strut in np.flatnonzero(np.ptp(feet, axis=0).max(axis=-1) > _NEAR).tolist():
+                moved.setdefault(strut, []).append(drive.name)
+                # An arm that ends at the foot is what moves it; there is no rail then.
+                if not any(_coincide(other[1], struts[strut][0]) for other in struts):
+                    self._add_fixed("rail", drive.name, feet[[0, -1], strut] if unit == "mm" else feet[:, strut])
+        for strut, ends in enumerate(struts):
+            first: SceneKind = "rod" if moved.get(0) else "telescope"
+            name = leg.drives[min(strut, len(leg.drives) - 1)].name
+            self._add(first if strut == 0 else "arm", name, _place_strut(number, strut))
+            if strut not in moved:
+                anchors.append(ends[0])
+        for strut, names in moved.items():
+            self.labels.append((", ".join(names), at.to_machine(struts[strut][0])[0]))
+        if not moved:
+            self.labels.append((leg.drives[0].name, at.to_machine(struts[0].mean(axis=0))[0]))
+        return anchors
 
     def _add_platform(self) -> None:
         ring = order_polygon(np.array([leg.platform for leg in self.machine.legs], float))
-        self._add("platform", "platform", ring @ self.rotation.T + self.origin, len(ring) > 2)
-        middle = ring.mean(axis=0) @ self.rotation.T + self.origin
-        if not _coincide(middle, self.origin) and not self.structure.has_central_leg:
-            self._add("head", "platform", [middle, self.origin])
+        self._add("platform", "platform", lambda at: at.to_machine(at.locate_on_platform(ring)), len(ring) > 2)
+        middle = ring.mean(axis=0)
+        origin = self.stance.origin
+        if not _coincide(self.stance.locate_on_platform(middle), origin) and not self.structure.has_central_leg:
+            link = np.array([middle, np.zeros(3)])
+            self._add("head", "platform", lambda at: at.to_machine(at.locate_on_platform(link)))
 
     def _add_head(self) -> None:
-        head = self.structure.head
-        serial = list(self.placement.serial)[: self.structure.head_joints]
-        chain = list(_compose_steps(head, serial))
-        links = _remove_duplicates([np.zeros(3), *[origin for _, origin in chain]])
-        rotation, tip = chain[-1] if chain else (np.eye(3), np.zeros(3))
-        at = np.array(links) @ self.rotation.T + self.origin
-        if len(at) > 2:
-            self._add("head", "head", at[:-1])
-        if len(at) > 1:
-            self._add("tool", "tool", at[-2:])
-        for step, (_, origin) in zip(head, chain, strict=True):
+        at, chain = self.stance, self.stance.list_head_frames()
+        # Joints of the links, the platform's origin first; those at one place count once.
+        kept = _find_distinct([np.zeros(3), *[origin for _, origin in chain]])
+
+        def place_links(at: _Stance, first: int, last: int) -> Points:
+            origins = [np.zeros(3), *[origin for _, origin in at.list_head_frames()]]
+            return at.to_machine(at.locate_on_platform(np.array([origins[i] for i in kept[first:last]])))
+
+        if len(kept) > 2:
+            self._add("head", "head", lambda at: place_links(at, 0, len(kept) - 1))
+        if len(kept) > 1:
+            self._add("tool", "tool", lambda at: place_links(at, len(kept) - 2, len(kept)))
+        for step, (_, origin) in zip(self.structure.head, chain, strict=True):
             if step.drive is not None:
-                self.labels.append((step.drive.name, self._to_machine(self.rotation @ origin + self.origin)))
-        place = self._to_machine(self.rotation @ tip + self.origin)
-        self.frames["tool"] = np.column_stack([self.mount @ self.rotation @ rotation, place])
+                self.labels.append((step.drive.name, at.to_machine(at.locate_on_platform(origin))[0]))
+        rotation, tip = chain[-1] if chain else (np.eye(3), np.zeros(3))
+        place = at.to_machine(at.locate_on_platform(tip))[0]
+        mount = np.array(self.structure.mount, float)
+        self.frames["tool"] = np.column_stack([mount @ at.rotation @ rotation, place])
 
     def _add_table(self) -> None:
         """Add a disc at the workpiece's frame, and the axes that turn it; these are in M, whatever the mounting."""
-        table = self.structure.table
-        serial = list(self.placement.serial)[self.structure.head_joints :]
-        chain = list(_compose_steps(table, serial))
+        chain = self.stance.list_table_frames()
         rotation, origin = chain[-1]
         self.frames["workpiece"] = np.column_stack([rotation, origin])
         radius = 0.12 * float(np.linalg.norm(np.ptp(np.vstack([item.points for item in self.items]), axis=0)))
         disc = np.column_stack([np.cos(_DISC), np.sin(_DISC), 0.0 * _DISC]) * radius
-        self.items.append(SceneItem("table", "table", disc @ rotation.T + origin, True))
-        for step, (turned, pivot) in zip(table, chain, strict=True):
+        self._add("table", "table", lambda at: _place_on_table(at, disc), True)
+        for number, (step, (turned, _)) in enumerate(zip(self.structure.table, chain, strict=True)):
             if step.drive is None:
                 continue
-            axis = turned @ np.array(UNIT[step.axis])
+            unit = np.array(UNIT[step.axis], float)
             # An axis at right angles to the disc carries it from below; another one passes by on both sides.
-            upright = abs(float(axis @ rotation[:, 2])) > 0.999
-            reach = 1.3 * radius * axis
-            ends = [origin, origin - 0.5 * radius * rotation[:, 2]] if upright else [pivot - reach, pivot + reach]
-            self.items.append(SceneItem("axis", step.drive.name, np.array(ends)))
-            self.labels.append((step.drive.name, ends[1]))
+            if abs(float((turned @ unit) @ rotation[:, 2])) > 0.999:
+                stem = np.array([[0.0, 0.0, 0.0], [0.0, 0.0, -0.5 * radius]])
+                self._add("axis", step.drive.name, lambda at, stem=stem: _place_on_table(at, stem))  # type: ignore[misc]
+            else:
+                self._add("axis", step.drive.name, _place_axis(number, 1.3 * radius * unit))
+            self.labels.append((step.drive.name, self.items[-1].points[1]))
+
+
+def _place_strut(leg: int, strut: int) -> Callable[[_Stance], Points]:
+    """Make the rule that places a leg's strut."""
+    return lambda at: at.to_machine(at.locate_struts(leg)[strut])
+
+
+def _place_on_table(at: _Stance, points: Points) -> Points:
+    """Place points of the workpiece's frame."""
+    rotation, origin = at.list_table_frames()[-1]
+    placed: Points = points @ rotation.T + origin
+    return placed
+
+
+def _place_axis(step: int, half: Points) -> Callable[[_Stance], Points]:
+    """Make the rule that places the axis of a table's step, by half of its length to both sides."""
+
+    def place(at: _Stance) -> Points:
+        turned, pivot = at.list_table_frames()[step]
+        return np.array([pivot - turned @ half, pivot + turned @ half])
+
+    return place
 
 
 def _join_labels(labels: list[tuple[str, Points]]) -> tuple[tuple[str, Points], ...]:
@@ -219,7 +302,7 @@ def _compose_steps(steps: Sequence[Step], joints: Sequence[float]) -> Iterator[t
     for count, step in enumerate(steps, start=1):
         driven += step.drive is not None
         rotation, origin = compose_chain(steps[:count], joints[:driven])
-        yield np.array(rotation, float), np.array(origin, float)
+        yield np.array(rotation), np.array(origin)
 
 
 def _sweep_feet(leg: Leg, point: Sequence[float], joints: list[float], strut: Points) -> Iterator[Points]:
@@ -243,7 +326,7 @@ def _cut_range(low: float, high: float, q: float, unit: str, length: float) -> t
 
 def order_polygon(points: Points) -> Points:
     """Order the distinct points round their middle in their own plane; of a line return the ends."""
-    points = np.array(_remove_duplicates(list(points)))
+    points = points[_find_distinct(list(points))]
     if len(points) < 3:
         return points
     off = points - points.mean(axis=0)
@@ -254,11 +337,12 @@ def order_polygon(points: Points) -> Points:
     return points[np.argsort(np.arctan2(off @ axes[1], off @ axes[0]))]
 
 
-def _remove_duplicates(points: list[Points]) -> list[Points]:
-    kept: list[Points] = []
-    for point in points:
-        if not any(_coincide(point, other) for other in kept):
-            kept.append(point)
+def _find_distinct(points: list[Points]) -> list[int]:
+    """Find the first point of each place."""
+    kept: list[int] = []
+    for number, point in enumerate(points):
+        if not any(_coincide(point, points[other]) for other in kept):
+            kept.append(number)
     return kept
 
 

@@ -181,4 +181,5 @@ def main():
             Path("seen.json").write_text(json.dumps(seen))
 
 
-main()
+if __name__ == "__main__":
+    main()

@@ -129,6 +129,24 @@ class Simulation:
         assert done.returncode == 0, done.stdout + done.stderr
         return seen["steps"], rows
 
+    def show(self, steps, programs=None, seconds=300):
+        """Do an operator's steps on a screen (see screen_ui.py), pictures too; return what was seen."""
+        for name, text in (programs or {}).items():
+            (self.folder / name).write_text(text, encoding="utf-8")
+        task = {"machine": self.machine.name, "joints": len(self.machine.joints), "steps": steps, "ini": "screen.ini"}
+        (self.folder / "task.json").write_text(json.dumps(task))
+        ini = pk.make_linuxcnc_configuration(self.machine)[f"{self.machine.name}.ini"]
+        (self.folder / "screen.ini").write_text(ini, encoding="utf-8")
+        for file in ("operator_ui.py", "screen_ui.py"):
+            shutil.copy(HERE / file, self.folder)
+        for path in self.folder.iterdir():
+            os.chown(path, NOBODY, NOBODY)
+        command = [*ALONE, *AS_NOBODY, f"HOME={self.folder}", "python3", "screen_ui.py"]
+        done = subprocess.run(command, cwd=self.folder, capture_output=True, text=True, timeout=seconds)
+        log = (self.folder / "linuxcnc.log").read_text(errors="replace")
+        assert done.returncode == 0, done.stdout + done.stderr + log
+        return json.loads((self.folder / "seen.json").read_text())
+
     def _start(self, seconds):
         (self.folder / "seen.json").unlink(missing_ok=True)
         command = [*ALONE, *AS_NOBODY, f"HOME={self.folder}", "linuxcnc", "-r"]

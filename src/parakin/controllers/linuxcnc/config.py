@@ -37,6 +37,7 @@ POSITION_OFFSET = RELATIVE
 POSITION_FEEDBACK = ACTUAL
 PROGRAM_PREFIX = .
 OPEN_FILE = ./{name}.ngc
+USER_COMMAND_FILE = {name}_axis.py
 GEOMETRY = {letters}
 DEFAULT_LINEAR_VELOCITY = {jog}
 MAX_LINEAR_VELOCITY = {by_hand}
@@ -66,6 +67,7 @@ TOOL_TABLE = {name}.tbl
 
 [HAL]
 HALFILE = {name}.hal
+HALFILE = {name}_screen.hal
 HALCMD = source {name}_rates.hal
 
 [KINS]

@@ -10,6 +10,7 @@ from .guard import name_guard, write_guard
 from .model_header import name_model, write_model
 from .module import name_kinematics, write_module
 from .page import write_page
+from .screen import name_screen, write_axis_settings, write_screen, write_screen_hal
 from .stamp import stamp_file
 
 
@@ -18,7 +19,8 @@ def make_linuxcnc_configuration(machine: Machine) -> dict[str, str]:
     """Make a configuration for LinuxCNC 2.9 that runs as a simulation: {file: text}.
 
     The files are the kinematics module and the guard (C, built by LinuxCNC's ``halcompile --install``) with the header
-    that both include, the ini and HAL files, the tool table, a first program and a page that tells how to start, all
+    that both include, the ini and HAL files, the window that
+    shows the machine, the tool table, a first program and a page that tells how to start, all
     named after the machine. The last line of each tells by a hash whether the file was edited since.
     """
     texts = {
@@ -28,6 +30,9 @@ def make_linuxcnc_configuration(machine: Machine) -> dict[str, str]:
         f"{machine.name}.ini": write_ini(machine),
         f"{machine.name}.hal": write_hal(machine),
         f"{machine.name}_rates.hal": write_rates_hal(machine),
+        f"{name_screen(machine)}.py": write_screen(machine),
+        f"{name_screen(machine)}.hal": write_screen_hal(machine),
+        f"{machine.name}_axis.py": write_axis_settings(machine),
         f"{machine.name}.tbl": write_tool_table(machine),
         f"{machine.name}.ngc": write_first_program(machine),
         f"{machine.name}.md": write_page(machine),

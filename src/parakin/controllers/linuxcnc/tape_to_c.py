@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from math import isinf
 
@@ -11,7 +11,7 @@ from ...kernels import tape as t
 from ...kernels.tape import Tape
 
 # The operations with one result and no constants; the runtime defines what C lacks.
-_CALLS = {
+CALLS = {
     t.DIV: "{0} / {1}",
     t.SQRT: "sqrt({0})",
     t.ATAN2: "angle_of({0}, {1})",
@@ -64,9 +64,18 @@ def _write_definition(head: str, lines: Sequence[str], inputs: Sequence[CVector]
 
 
 def _write_statements(tape: Tape, inputs: Sequence[CVector]) -> tuple[list[str], list[str]]:
-    """Write one statement for each operation, with a name of its own; return them and the names of the outputs.
+    """Write the statements of C; return them and the names of the outputs."""
+    statements, results = list_statements(tape, inputs)
+    return [f"    const double {name} = {value};" for name, value in statements], results
 
-    A tape reuses its registers; the names are not reused, so that the compiler sees what depends on what.
+
+def list_statements(
+    tape: Tape, inputs: Sequence[CVector], calls: Mapping[int, str] = CALLS
+) -> tuple[list[tuple[str, str]], list[str]]:
+    """List names and expressions, one for each operation; return them and the names of the outputs.
+
+    A tape reuses its registers; the names are not reused, so that the compiler sees what depends on what. ``calls`` are
+    the operations that another language writes in another way.
     """
     names = dict(enumerate(f"{vector.name}[{i}]" for vector in inputs for i in range(vector.length)))
     values: dict[str, str] = {}
@@ -82,16 +91,17 @@ def _write_statements(tape: Tape, inputs: Sequence[CVector]) -> tuple[list[str],
             let(target, f"sin({argument})")
             let(operands[0], f"cos({argument})")
         else:
-            let(target, _write_expression(operation, [names.get(operand, "") for operand in operands], constants))
+            operand_names = [names.get(operand, "") for operand in operands]
+            let(target, _write_expression(operation, operand_names, constants, calls))
     results = [names[tape.inputs + i] for i in range(tape.outputs)]
     wanted = set(results)  # a sine or a cosine may be computed in vain
     for name, value in reversed(values.items()):
         if name in wanted:
             wanted.update(re.findall(r"\bt\d+\b", value))
-    return [f"    const double {name} = {value};" for name, value in values.items() if name in wanted], results
+    return [(name, value) for name, value in values.items() if name in wanted], results
 
 
-def _write_expression(operation: int, a: Sequence[str], k: Sequence[float]) -> str:
+def _write_expression(operation: int, a: Sequence[str], k: Sequence[float], calls: Mapping[int, str]) -> str:
     if operation in _SUMS:
         terms = [_write_product(factor, name) for factor, name in zip(k[1:], a[: _SUMS[operation]], strict=False)]
         return _write_sum([format_c(k[0]), *terms] if k[0] != 0.0 or not terms else terms)
@@ -102,7 +112,7 @@ def _write_expression(operation: int, a: Sequence[str], k: Sequence[float]) -> s
     if operation == t.FMA:
         terms = [_write_product(k[0], f"{a[0]} * {a[1]}"), _write_product(k[1], a[2])]
         return _write_sum([*terms, format_c(k[2])] if k[2] != 0.0 else terms)
-    return _CALLS[operation].format(*a)
+    return calls[operation].format(*a)
 
 
 def _write_product(factor: float, name: str) -> str:

@@ -100,10 +100,13 @@ def build_scene(
     return Scene(items, labels, builder.frames, None if machine.structure.table else normal)
 
 
-def trace_scene(machine: Machine, pose: Sequence[Scalar], joints: Sequence[Scalar]) -> list[NDArray[np.object_]]:
+def trace_scene(
+    machine: Machine, pose: Sequence[Scalar], joints: Sequence[Scalar]
+) -> tuple[list[NDArray[np.object_]], NDArray[np.object_]]:
     """Trace the points, (k, 3) each, of the items of home's scene, at another pose on scalars of any kind.
 
-    ``joints`` are those of the pose. Rails and the base stand where they are at home.
+    Also the frame (3, 4) in which poses are given. ``joints`` are those of the pose. Rails and the base stand where
+    they are at home.
     """
     home = machine.home
     with np.errstate(invalid="ignore", divide="ignore"):
@@ -113,7 +116,9 @@ def trace_scene(machine: Machine, pose: Sequence[Scalar], joints: Sequence[Scala
         builder.build()
         placement = machine.structure.place_with_joints(list(pose), list(joints[machine.leg_count :]))
     stance = _Stance(machine, placement, list(joints))
-    return [np.asarray(place(stance), dtype=object) for place in builder.places]
+    rotation, origin = [(np.eye(3), np.zeros(3)), *stance.list_table_frames()][-1]
+    points = [np.asarray(place(stance), dtype=object) for place in builder.places]
+    return points, np.column_stack([rotation, origin])
 
 
 class _Stance:

@@ -111,10 +111,10 @@ def _build_bar(
     circle = np.outer(np.cos(turn), across) + np.outer(np.sin(turn), other)
     radii = np.linspace(radius, radius if end is None else end, pieces + 1)
     rings = [a + t * along + r * circle for t, r in zip(np.linspace(0.0, 1.0, pieces + 1), radii, strict=True)]
-    return Solid(kind, name, np.vstack([*rings, a[None], b[None]]), _build_skin(pieces + 1, _SIDES))
+    return Solid(kind, name, np.vstack([*rings, a[None], b[None]]), build_skin(pieces + 1, _SIDES))
 
 
-def _build_skin(rings: int, sides: int) -> Indices:
+def build_skin(rings: int, sides: int) -> Indices:
     """Build triangles, facing outward, over rings of vertices and the fans to the two poles that follow them."""
     i = np.arange(sides)
     j = (i + 1) % sides
@@ -136,7 +136,7 @@ def _build_plate(kind: str, name: str, ring: Points, half: float) -> Solid:
         normal = -normal
     up = half * normal
     middle = ring.mean(axis=0)
-    return Solid(kind, name, np.vstack([ring - up, ring + up, middle - up, middle + up]), _build_skin(2, len(ring)))
+    return Solid(kind, name, np.vstack([ring - up, ring + up, middle - up, middle + up]), build_skin(2, len(ring)))
 
 
 def _build_ball(kind: str, name: str, centre: Points, radius: float) -> Solid:
@@ -147,4 +147,4 @@ def _build_ball(kind: str, name: str, centre: Points, radius: float) -> Solid:
         flat = np.column_stack([np.cos(around), np.sin(around), 0.0 * around]) * np.cos(tilt)
         layers.append(flat + np.array([0.0, 0.0, np.sin(tilt)]))
     unit = np.vstack([*layers, [[0.0, 0.0, -1.0], [0.0, 0.0, 1.0]]])
-    return Solid(kind, name, centre + radius * unit, _build_skin(rings, sides))
+    return Solid(kind, name, centre + radius * unit, build_skin(rings, sides))

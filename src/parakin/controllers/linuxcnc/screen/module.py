@@ -1,0 +1,142 @@
+"""Write the window that shows the moving machine beside LinuxCNC's own screen, in Python with OpenGL and Tk."""
+
+from __future__ import annotations
+
+from importlib.resources import files
+from math import isfinite
+from pprint import pformat
+from typing import Any
+
+import numpy as np
+
+from ....export.machine.scene import Scene, build_scene
+from ....export.machine.solids import LOOKS
+from ....machine import Machine
+from ....units import to_display
+from ..home_pose import find_home_pose
+from ..model_header import format_title
+from .hull import find_workspace_hull
+from .limit_words import describe_limits
+from .placement import write_placement
+
+_HEADER = '''\
+#!/usr/bin/python3
+"""{name}: {machine}, {title}, on LinuxCNC's screen.
+
+Made by parakin from the machine's description; make it anew rather than edit it. LinuxCNC starts it from
+{machine}_screen.hal, with its own Python. Where there is no display it only waits. It uses modules of LinuxCNC that
+are under the GNU General Public License, and so is this file: you may redistribute and modify it under that licence,
+version 2 or, at your option, any later one. It comes WITHOUT ANY WARRANTY.
+"""
+
+import signal
+import sys
+import time
+from math import atan2, copysign, cos, degrees, fabs, pi, sin, sqrt
+
+import hal
+
+'''
+
+_HAL = """\
+# {machine}: the window that shows the machine. Without a display it waits and does nothing.
+
+loadusr -Wn {name} /usr/bin/python3 {name}.py
+{nets}
+"""
+
+_AXIS = """\
+# AXIS reads this once it has started. The numbers that it writes over its picture stand in the tab DRO as well, and in
+# the window of {machine}: they don't cover the path here.
+
+o.enable_dro = False
+o.show_overlay = False
+if root_window.winfo_screenwidth() >= 1800:
+    root_window.tk.call("wm", "geometry", ".", "%dx%d+0+0" % (root_window.winfo_screenwidth() // 2 - 20, 820))
+"""
+
+
+def name_screen(machine: Machine) -> str:
+    """Name the window's program, and its component in HAL."""
+    return f"{machine.name}_screen"
+
+
+def write_screen(machine: Machine) -> str:
+    """Write the program of the window: what the machine is as data, how it moves as a function, and the viewer."""
+    head = _HEADER.format(
+        name=name_screen(machine), machine=machine.name, title=format_title(machine).replace('"', "'")
+    )
+    data = "".join(f"{name} = {_format_data(value)}\n" for name, value in _collect_data(machine).items())
+    viewer = files(__package__).joinpath("viewer.txt").read_text(encoding="utf-8")
+    return f"{head}{data}\n\n{write_placement(machine)}\n\n{viewer}"
+
+
+def _format_data(value: Any) -> str:
+    return pformat(value, width=118, compact=True)
+
+
+def _collect_data(machine: Machine) -> dict[str, Any]:
+    """Collect the constants of the viewer, in mm and degrees."""
+    home = find_home_pose(machine)
+    scene, at_home = build_scene(machine, home), machine.inverse(home)
+    hull, triangles = find_workspace_hull(machine, home, scene)
+    size = build_scene(machine).size
+    return {
+        "MACHINE": machine.name,
+        "TITLE": " ".join((machine.spec.title or machine.name).split()),
+        "COMPONENT": name_screen(machine),
+        "AXES": [_name_unit(axis, unit) for axis, unit in zip(machine.axes, machine.axis_units, strict=True)],
+        "JOINTS": [
+            (*_name_unit(drive.name, drive.unit), _find_end(drive.low, drive.unit), _find_end(drive.high, drive.unit))
+            for drive in machine.drives
+        ],
+        "HOME_POSE": _round_display(home, machine.axis_units),
+        "HOME_JOINTS": _round_display(at_home, machine.joint_units),
+        "LIMITS": describe_limits(machine),
+        "LOOKS": {kind: _describe_look(kind, size) for kind in LOOKS},
+        "ITEMS": [(item.kind, len(item.points), item.closed) for item in scene.items],
+        "HULL": np.round(hull, 1).tolist(),
+        "HULL_FACES": triangles.tolist(),
+        "BOX": _find_box(scene, hull).round(1).tolist(),
+        "NORMAL": None if scene.normal is None else scene.normal.tolist(),
+    }
+
+
+def _name_unit(name: str, unit: str) -> tuple[str, str]:
+    return name, "deg" if unit == "rad" else unit
+
+
+def _find_end(value: float, unit: str) -> float | None:
+    return round(to_display(value, unit), 6) if isfinite(value) else None
+
+
+def _round_display(values: Any, units: tuple[str, ...]) -> list[float]:
+    return [round(to_display(value, unit), 9) for value, unit in zip(values.tolist(), units, strict=True)]
+
+
+def _describe_look(kind: str, size: float) -> tuple[float, float, float, float]:
+    """Describe colour, red, green and blue of 1, and thickness in mm."""
+    look = LOOKS[kind]
+    red, green, blue = (round(int(look.colour[i : i + 2], 16) / 255.0, 3) for i in (1, 3, 5))
+    return red, green, blue, round(look.radius * size, 3)
+
+
+def _find_box(scene: Scene, hull: Any) -> Any:
+    """Find the box (2, 3) around the machine and what it reaches."""
+    points = np.vstack([scene.box, hull])
+    return np.array([points.min(0), points.max(0)])
+
+
+def write_screen_hal(machine: Machine) -> str:
+    """Write the HAL file that starts the window and brings it what moves; it comes after the machine's own."""
+    name = name_screen(machine)
+    nets = [f"net {axis.lower()}-position => {name}.{axis.lower()}" for axis in machine.axes]
+    nets += [f"net told-{i} => {name}.joint-{i}" for i in range(len(machine.joints))]
+    nets += [f"net {signal} => {name}.{signal}" for signal in ("tool-offset", "homed", "enabled", "jog-stop")]
+    nets += [f"net {pin} guard.{pin} => {name}.{pin}" for pin in ("distance", "nearest")]
+    return _HAL.format(machine=machine.name, name=name, nets="\n".join(nets))
+
+
+def write_axis_settings(machine: Machine) -> str:
+    """Write what LinuxCNC's screen AXIS runs at its start: the numbers do not cover its picture."""
+    return _AXIS.format(machine=machine.name)

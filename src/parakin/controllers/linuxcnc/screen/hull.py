@@ -37,6 +37,20 @@ def find_workspace_hull(machine: Machine, home: Array, scene: Scene) -> tuple[Ar
     return places if frame is None else places @ frame[:, :3].T + frame[:, 3], triangles
 
 
+def list_hull_lines(count: int) -> list[list[int]]:
+    """List the lines on the surface of :func:`find_workspace_hull`, each by its vertices: parallels and meridians.
+
+    ``count`` is how many axes move the tip; in a plane there is one line, the outline.
+    """
+    circle = [*range(_SIDES), 0]
+    if count < 3:
+        return [circle]
+    parallels = [[ring * _SIDES + side for side in circle] for ring in range(0, _RINGS, 2)]
+    first, last = _RINGS * _SIDES, _RINGS * _SIDES + 1
+    meridians = [[first, *[ring * _SIDES + side for ring in range(_RINGS)], last] for side in range(0, _SIDES, 2)]
+    return parallels + meridians
+
+
 def _is_allowed(machine: Machine, home: Array, poses: Array) -> Flags:
     """Tell where poses (n, axes) keep all limits, in home's assembly mode: (n,)."""
     same_side: Flags = machine.sides(poses) * machine.sides(home[None]) > 0.0

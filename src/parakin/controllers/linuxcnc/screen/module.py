@@ -15,7 +15,7 @@ from ....machine import Machine
 from ....units import to_display
 from ..home_pose import find_home_pose
 from ..model_header import format_title
-from .hull import find_workspace_hull
+from .hull import find_workspace_hull, list_hull_lines
 from .limit_words import describe_limits
 from .placement import write_placement
 
@@ -97,6 +97,7 @@ def _collect_data(machine: Machine) -> dict[str, Any]:
         "ITEMS": [(item.kind, len(item.points), item.closed) for item in scene.items],
         "HULL": np.round(hull, 1).tolist(),
         "HULL_FACES": triangles.tolist(),
+        "HULL_LINES": list_hull_lines(machine.axis_units.count("mm")),
         "BOX": _find_box(scene, hull).round(1).tolist(),
         "NORMAL": None if scene.normal is None else scene.normal.tolist(),
     }

@@ -39,8 +39,8 @@ def write_placement(machine: Machine) -> str:
     """
     trace, axes, joints = Trace(), len(machine.axes), len(machine.joints)
     given = trace.inputs(axes + joints + 1)
-    pose = _to_radians(given[:axes], machine.axis_units)
-    q = _to_radians(given[axes:-1], machine.joint_units)
+    pose = _convert_to_radians(given[:axes], machine.axis_units)
+    q = _convert_to_radians(given[axes:-1], machine.joint_units)
     points, frame = trace_scene(machine, shift_tip(machine, pose, given[-1]), q)
     results = [value for item in points for value in item.ravel().tolist()]
     results += [*frame[:, :3].ravel().tolist(), *frame[:, 3].tolist()]
@@ -69,5 +69,5 @@ def shift_tip(machine: Machine, pose: Sequence[Scalar], length: Scalar) -> list[
     ]
 
 
-def _to_radians(values: Sequence[Scalar], units: Sequence[str]) -> list[Scalar]:
+def _convert_to_radians(values: Sequence[Scalar], units: Sequence[str]) -> list[Scalar]:
     return [value * _DEGREE if unit == "rad" else value for value, unit in zip(values, units, strict=True)]

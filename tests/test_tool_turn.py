@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -13,6 +14,7 @@ from scipy.spatial.transform import Rotation
 import parakin as pk
 from parakin.cli import main
 from parakin.toolpath.tool_turn.lattice_search import StepCosts, find_quickest_way, find_widest_margin
+from parakin.toolpath.tool_turn.placement import find_turned_placements
 
 STEEPEST = 2
 
@@ -177,6 +179,16 @@ def test_a_longer_tool_keeps_its_own_tip():
     assert max(np.linalg.norm(tips - tip, axis=1).min() for tip in own) < 0.05
 
 
+def test_a_programs_own_turns_with_a_longer_tool_need_few_records():
+    machine = pk.load("hexapod")
+    path = wave(machine, OFFSETS["hexapod"])
+    k = path.axis
+    turns = np.column_stack([np.arcsin(-k[:, 1]), np.arctan2(k[:, 0], k[:, 2]), np.zeros(len(k))])
+    job = pk.prepare(machine, pk.fit_tool_lengths(machine, replace(path, turns=turns), 170.0))
+    # 20 mm more, and 2.9 deg a motion: an arc of 20 mm * 0.05**2 / 8 = 0.006 mm off its chord, a quarter of it off two
+    assert job.runs and job.inserted == len(path) - 1
+
+
 def test_where_no_turn_is_free():
     machine = pk.load("tricept")
     path = path_of(np.tile(machine.home[:3], (2, 1)))
@@ -192,6 +204,48 @@ def test_where_no_turn_keeps_the_limits():
     machine = pk.load("hexapod")
     turned = pk.prepare_turned(machine, path_of(machine.home[:3] + np.array([[0.0, 0.0, 0.0], [0.0, 0.0, 5000.0]])))
     assert not turned.is_chosen and not turned.job.runs
+
+
+def hexa(shift):
+    """Six arms that turn: their angles are counted from a direction ``shift`` rad before the radial one."""
+    lines = ["name: hexa", "title: Hexa", "source: test", "motion: tx ty tz rz ry rx", "legs:"]
+    for number in range(6):
+        pair, side = np.radians(120 * (number // 2)), 2 * (number % 2) - 1
+        pivot, platform = pair + side * np.radians(12), pair + side * np.radians(50)
+        radial = np.array([np.cos(pair), np.sin(pair), 0.0])
+        zero = np.cos(shift) * radial + np.sin(shift) * np.array([0.0, 0.0, 1.0])  # 0 0 1 is radial x axis
+        lines += [
+            f"  - {{kind: crank, joints: [q{number}], arm: 200 mm, rod: 600 mm,",
+            f"     pivot: [{300 * np.cos(pivot):.9f} mm, {300 * np.sin(pivot):.9f} mm, 0],",
+            f"     platform: [{150 * np.cos(platform):.9f} mm, {150 * np.sin(platform):.9f} mm, 0],",
+            f"     axis: [{-radial[1]:.15f}, {radial[0]:.15f}, 0], zero: [{', '.join(f'{v:.15f}' for v in zero)}],",
+            f"     range: [{np.degrees(shift) - 90:.9f} deg, {np.degrees(shift) + 90:.9f} deg],",
+            "     speed: 200 deg/s, acceleration: 2000 deg/s2}",
+        ]
+    return "\n".join([*lines, "home: {X: 0 mm, Y: 0 mm, Z: -550 mm, A: 0 deg, B: 0 deg, C: 0 deg}\n"])
+
+
+def test_arms_that_turn_over_half_a_turn(tmp_path):
+    turns = []
+    for shift in (0.0, 150.0):  # the arms' angles begin at 26 and at 176 degrees
+        (tmp_path / "hexa.yaml").write_text(hexa(np.radians(shift)))
+        machine = pk.load(tmp_path / "hexa.yaml")
+        turned = pk.prepare_turned(machine, wave(machine, [120.0, 100.0, -40.0], tilt=10.0))
+        assert turned.is_chosen and turned.job.runs
+        turns.append(turned)
+    assert turns[0].margin == pytest.approx(turns[1].margin, abs=1e-6)
+    assert turns[0].job.seconds == pytest.approx(turns[1].job.seconds, abs=1e-4)
+
+
+def test_a_placement_with_its_turn_leaves_more_margin():
+    machine = pk.load("lambda6")
+    path = wave(machine, [0.0, 0.0, 60.0], count=20)
+    bounds = {"X": (-60.0, 60.0), "Y": (-60.0, 60.0), "Z": (-100.0, 100.0)}
+    placements = find_turned_placements(machine, path, bounds)
+    home = pk.find_placement(machine, path, bounds)
+    turned = pk.prepare_turned(machine, path, workpiece=placements[0].workpiece)
+    assert turned.job.runs and turned.margin > 1.1 * home.margin
+    assert home.values in [placement.values for placement in placements]
 
 
 def run(capsys, *arguments, code=0):

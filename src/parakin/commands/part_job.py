@@ -84,9 +84,11 @@ def prepare_part(
     if place is None:
         return _prepare_at(machine, path, workpiece, options, progress)
     from ..toolpath.placing.placement import find_placements
+    from ..toolpath.tool_turn.placement import find_turned_placements
 
     saying = progress.stage("placing the part", 0.1, 0.3)
-    placements = find_placements(machine, path, parse_bounds(place), mode=options.mode, progress=saying)
+    find = find_turned_placements if options.turn == "free" else find_placements
+    placements = find(machine, path, parse_bounds(place), mode=options.mode, progress=saying)
     prepared = []
     for placement in placements:
         prepared_part = _prepare_at(machine, path, placement.workpiece, options, progress, placement)

@@ -47,13 +47,13 @@ def continue_turned_points(
 ) -> PosedPoints:
     """Pose tips (m, 3) and rotations (m, 3, 3) of the tool in M as :func:`continue_points` does tips and axes.
 
-    even : (m, axes) the poses to take where they are given, and not NaN
+    even : (m, axes) the poses whose angles to take where they are not NaN; the tip of a longer tool goes another way
     """
     poses = _point_tool(machine, tip, np.ascontiguousarray(rotation[:, :, 2]), before)
     columns = machine.turning_columns
     if len(columns) == 3:
         poses[:, columns] = find_nearest_rotation_turns(rotation, before.poses[:, columns])
-    poses = np.where(np.isfinite(even), even, poses)
+    poses[:, columns] = np.where(np.isfinite(even[:, columns]), even[:, columns], poses[:, columns])
     return PosedPoints(poses, _solve_joints(machine, mode, poses, before))
 
 

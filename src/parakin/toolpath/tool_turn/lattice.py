@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...arrays import Array, Flags, Progress, split_rows
+from ...kinematics.turns import find_nearest_turn
 from ...kinematics.wrist import is_on_pole
 from ...machine import Machine
 from ...performance.singularities import compute_singularity_margins
@@ -65,7 +66,8 @@ def build_lattice(machine: Machine, tip: Array, axis: Array, mode: str, progress
             machine, np.repeat(tip[block], count, axis=0), np.repeat(axis[block], count, axis=0), np.tile(turns, size)
         )
         solved = machine.inverse(poses, mode)
-        relative = compute_relative_margin(machine, machine.margins(poses, mode=mode))
+        _turn_into_range(machine, solved)
+        relative = compute_relative_margin(machine, machine.margins(poses, solved, mode))
         relative[beside_pole | ~np.isfinite(relative)] = -np.inf
         sound = np.flatnonzero(relative >= 0.0)
         singular = compute_singularity_margins(machine, poses[sound], mode=mode)
@@ -73,6 +75,14 @@ def build_lattice(machine: Machine, tip: Array, axis: Array, mode: str, progress
         joints[block], margins[block] = solved.reshape(size, count, -1), relative.reshape(size, count)
         progress(block.stop / len(tip))
     return Lattice(turns, joints, margins)
+
+
+def _turn_into_range(machine: Machine, joints: Array) -> None:
+    """Turn turning joints (n, joints) by the whole turns that bring them nearest to their ranges' middles, in place."""
+    for column in machine.turning_joints:
+        middle = 0.5 * (machine.drives[column].low + machine.drives[column].high)
+        if np.isfinite(middle):
+            joints[:, column] = find_nearest_turn(joints[:, column], np.array(middle))
 
 
 def _find_least_singularity_margins(machine: Machine, tip: Array, axis: Array, mode: str, home_c: float) -> Array:

@@ -14,7 +14,7 @@ import time
 from pathlib import Path
 
 DISPLAY = ":77"
-SIZE = "1920x1080x24"
+SIZE = "1920x850x24"
 SETTLED = 2.0  # s for the windows to be drawn
 
 

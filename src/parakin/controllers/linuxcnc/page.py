@@ -24,6 +24,8 @@ For LinuxCNC 2.9, as a simulation without hardware.
 | `{name}_model.h` | the machine's mathematics, which both include |
 | `{name}.ini` | ranges, speeds and home |
 | `{name}.hal`, `{name}_rates.hal` | loops in the place of drives, the guard, the axes' rates |
+| `{name}_screen.py`, `{name}_screen.hal` | the window that shows the machine, and what brings it the joints |
+| `{name}_axis.py` | what LinuxCNC's screen AXIS does at its start |
 | `{name}.tbl` | the tool |
 | `{name}.ngc` | a first program: a square at home |
 
@@ -41,6 +43,11 @@ with one of an older making LinuxCNC does not start, and says so.
 
 Switch the machine on and home it: it then stands at {home}.
 Programs are in millimetres and degrees; {frame}.
+
+A window beside LinuxCNC's own screen shows the machine as it moves, with position, joints, and the nearest limit in
+words; drag turns it, the right button moves it, the wheel zooms, a double click goes back. Pale blue is what is reached
+straight from home with home's orientation. Without a display, or once it is closed, the machine runs as well. To do
+without it take the line with `{name}_screen.hal` out of `{name}.ini`.
 
 ## What to know
 

@@ -99,6 +99,7 @@ def _collect_data(machine: Machine) -> dict[str, Any]:
         "HULL_FACES": triangles.tolist(),
         "HULL_LINES": list_hull_lines(machine.axis_units.count("mm")),
         "BOX": _find_box(scene, hull).round(1).tolist(),
+        "FLOOR": round(float(min(scene.box[0, 2], hull[:, 2].min())), 1),
         "NORMAL": None if scene.normal is None else scene.normal.tolist(),
     }
 
@@ -123,9 +124,9 @@ def _describe_look(kind: str, size: float) -> tuple[float, float, float, float]:
 
 
 def _find_box(scene: Scene, hull: Any) -> Any:
-    """Find the box (2, 3) around the machine and what it reaches."""
+    """Find the box (2, 3) that the first view shows: the machine, and half of what lies around it."""
     points = np.vstack([scene.box, hull])
-    return np.array([points.min(0), points.max(0)])
+    return 0.5 * (scene.box + [points.min(0), points.max(0)])
 
 
 def write_screen_hal(machine: Machine) -> str:

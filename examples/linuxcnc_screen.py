@@ -1,0 +1,67 @@
+"""Pictures of LinuxCNC's screen with a machine of parakin's beside it, as an operator sees them.
+
+LinuxCNC runs with its screen AXIS on a display of its own (Xvfb). On the Tricept the first passes of the turbine blade
+are cut, at 10 m/min; other machines run the first program of their configuration.
+
+    python linuxcnc_screen.py [-o FOLDER]
+
+It needs LinuxCNC 2.9 with its development files, Xvfb, xdotool, ImageMagick, and root for installing the kinematics for
+the time of the run.
+"""
+
+import argparse
+import io
+import shutil
+import sys
+import tempfile
+from pathlib import Path
+
+from linuxcnc_comparison import part
+
+import parakin as pk
+
+HERE = Path(__file__).resolve().parent
+sys.path.insert(0, str(HERE.parent / "tests" / "linuxcnc"))
+from simulation import MODULES, simulated, why_not  # noqa: E402
+
+OTHERS = ("hexapod", "lambda6", "orthoglide5_table")
+ON = [["switch_on"], ["home"], ["wait", 1.0]]
+
+
+def show_part(folder):
+    """The whole screen while the Tricept cuts."""
+    machine = pk.load("tricept")
+    file = io.BytesIO()
+    pk.make_linuxcnc_program(pk.prepare(machine, part(folder)).trajectory)(file)
+    with simulated(machine) as simulation:
+        steps = [*ON, ["start", "part.ngc"], ["wait", 15.0], ["picture", "screen.png"], ["abort"]]
+        simulation.show(steps, {"part.ngc": file.getvalue().decode("ascii")})
+        shutil.copy(simulation.folder / "screen.png", folder / "linuxcnc_screen.png")
+
+
+def show_machine(name, folder):
+    """A machine's window once its first program has run."""
+    with simulated(pk.load(name)) as simulation:
+        simulation.show([*ON, ["start", f"{name}.ngc"], ["wait", 4.0], ["window", "window.png"]])
+        shutil.copy(simulation.folder / "window.png", folder / f"linuxcnc_{name}.png")
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("-o", "--output", type=Path, default=HERE.parent / "docs" / "pictures", help="folder")
+    output = parser.parse_args().output
+    installed = [name for name in ("tricept", *OTHERS) if (MODULES / f"{name}_kins.so").exists()]
+    if why_not() or installed:
+        sys.exit(why_not() or f"{installed[0]}: its kinematics is installed here; a run would replace it")
+    with tempfile.TemporaryDirectory() as scratch:
+        folder = Path(scratch)
+        show_part(folder)
+        for name in OTHERS:
+            show_machine(name, folder)
+        for picture in folder.glob("linuxcnc_*.png"):
+            shutil.copy(picture, output)
+            print(output / picture.name)
+
+
+if __name__ == "__main__":
+    main()

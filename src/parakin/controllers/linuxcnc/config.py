@@ -67,7 +67,6 @@ TOOL_TABLE = {name}.tbl
 
 [HAL]
 HALFILE = {name}.hal
-HALFILE = {name}_screen.hal
 HALCMD = source {name}_rates.hal
 
 [KINS]
@@ -125,6 +124,9 @@ net feed-inhibit guard.feed-inhibit => motion.feed-inhibit
 net estop iocontrol.0.user-enable-out => iocontrol.0.emc-enable-in
 net tool-prepare iocontrol.0.tool-prepare => iocontrol.0.tool-prepared
 net tool-change iocontrol.0.tool-change => iocontrol.0.tool-changed
+
+# The window that shows the machine.
+source {name}_screen.hal
 """
 
 

@@ -47,7 +47,7 @@ Programs are in millimetres and degrees; {frame}.
 A window beside LinuxCNC's own screen shows the machine as it moves, with position, joints, and the nearest limit in
 words; drag turns it, the right button moves it, the wheel zooms, a double click goes back. Pale blue is what is reached
 straight from home with home's orientation. Without a display, or once it is closed, the machine runs as well. To do
-without it take the line with `{name}_screen.hal` out of `{name}.ini`.
+without it take the line with `{name}_screen.hal` out of `{name}.hal`.
 
 ## What to know
 

@@ -11,7 +11,6 @@ from ...errors import PoseError
 from ..posting.posted import Posted
 from .corners import Corners, check_tolerance, round_corners
 from .drive_limits import DriveLimits
-from .jerk_by_passes import limit_jerk_by_passes
 from .jerk_limited import limit_jerk
 from .joint_path import build_joint_path
 from .speed_profile import SpeedProfile
@@ -22,8 +21,6 @@ from .time_optimal import (
     find_quickest,
 )
 from .trajectory import Trajectory, name_limits
-
-MANY = 200_000  # rows beyond which jerks are limited by passes, in less time, and the trajectory is some percent longer
 
 
 def plan_trajectory(
@@ -46,8 +43,8 @@ def plan_trajectory(
 
     Between records the tip moves straight and the pose's angles evenly. The feed is that of the record that the motion
     leads to; in rapid, and where none is programmed, drives are the only limit. Where no drive has an acceleration or a
-    jerk, corners are neither rounded nor stopped at, and speeds change at once. With jerks the trajectory is the
-    quickest but for less than a percent, on paths of more than MANY rows near it.
+    jerk, corners are neither rounded nor stopped at, and speeds change at once. With jerks the trajectory is near the
+    quickest.
 
     Raises
     ------
@@ -71,11 +68,8 @@ def plan_trajectory(
         return Trajectory(posted, curve, joint_path, profile, binding, names)
     joint_path, x, u = find_quickest(joint_path, limits)
     if np.isfinite(limits.jerk).any():
-        if len(x) <= MANY:
-            joint_path, profile, binding = limit_jerk(joint_path, limits, x)
-        else:
-            ceiling = np.minimum(*compute_ceilings(joint_path, limits))
-            joint_path, profile, binding = limit_jerk_by_passes(joint_path, limits, x, ceiling)
+        ceiling = np.minimum(*compute_ceilings(joint_path, limits))
+        joint_path, profile, binding = limit_jerk(joint_path, limits, x, ceiling)
     else:
         profile, binding = build_accelerated_profile(joint_path, limits, x, u)
     binding[joint_path.find_ends()] = len(names) - 1

@@ -30,7 +30,18 @@ sys.path.insert(0, str(Path(__file__).parent / "linuxcnc"))
 from stub import Stub, inward, outward, pose, world
 
 COUNT = 100_000
-ENDS = ("_guard.c", "_kins.c", "_model.h", "_rates.hal", "_screen.hal", "_screen.py", "_axis.py", ".ini", ".hal")
+ENDS = (
+    "_guard.c",
+    "_tp.c",
+    "_kins.c",
+    "_model.h",
+    "_rates.hal",
+    "_screen.hal",
+    "_screen.py",
+    "_axis.py",
+    ".ini",
+    ".hal",
+)
 ENDS += (".tbl", ".ngc", ".md")
 
 

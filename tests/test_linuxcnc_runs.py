@@ -1,4 +1,7 @@
-"""The real LinuxCNC, headless: it starts, homes and moves, its joints are the library's, and it runs what is posted."""
+"""The real LinuxCNC, headless: it starts, homes and moves, its joints are the library's, and it runs what is posted.
+
+Its drives follow within their own limits, with 2 % to spare: what they could not follow would be a following error.
+"""
 
 from __future__ import annotations
 
@@ -19,14 +22,15 @@ from parakin.toolpath.posting.post import post_path
 from parakin.toolpath.timing import plan_trajectory
 
 HERE = Path(__file__).parent / "linuxcnc"
+RATES = ("speed", "acceleration")
 DIGIT = 5e-7  # half a unit of the last digit that is sampled
 
 sys.path.insert(0, str(HERE))
 sys.path.insert(0, str(Path(__file__).parents[1] / "examples"))
 import turbine_blade  # noqa: E402
-from motion_model import Model, read_limits, read_program  # noqa: E402
+from planner import Planner, read_program  # noqa: E402
 from simulation import CYCLE, as_programmed, first_line, simulated, trial, why_not  # noqa: E402
-from stub import FIELDS, Stub, inward, outward, pose, world  # noqa: E402
+from stub import FIELDS, inward, outward, pose, world  # noqa: E402
 
 # A move by hand, and moves that must be refused with a word: off a drive's range, off another limit of the machine's.
 # These machines have a program of their own here; the others run the one they come with.
@@ -41,6 +45,8 @@ PLACES = {
     "hexapod": (pk.workpiece(X=-60, Y=20, Z=710), False),
     "linear_delta": (pk.workpiece(X=-60, Y=45, Z=1920), True),
 }
+RESERVE = 0.02  # of the drives' speeds and accelerations
+SPEED, RISE = 1.02, 1.05  # of a joint's limits, in any cycle
 FEED = 10_000.0  # mm/min, in the cut: ball mill of 10 mm, four teeth, aluminium
 
 WHY_NOT = why_not()
@@ -55,7 +61,7 @@ def machine(request, tmp_path):
 
 @pytest.fixture
 def linuxcnc(machine):
-    with simulated(machine) as simulation:
+    with simulated(machine, reserve=RESERVE) as simulation:
         yield simulation
 
 
@@ -163,19 +169,17 @@ def written(trajectory, **options):
 
 
 def utilisation(machine, joints):
-    """Speeds of the joints over their limits, every cycle."""
-    limits = outward(machine, np.array([[drive.speed for drive in machine.model.drives]]))
-    return np.abs(np.diff(joints, axis=0)) / CYCLE / limits
-
-
-def noise(machine):
-    """What the sampler's digits make of a speed, over its limit."""
-    limits = outward(machine, np.array([[drive.speed for drive in machine.model.drives]]))
-    return 2.0 * DIGIT / CYCLE / limits.min()
+    """The joints' greatest speed and acceleration over their limits, in the cycles apart from a wrist's pole."""
+    limits = [outward(machine, np.array([[getattr(d, rate) for d in machine.drives]])) for rate in RATES]
+    read = 2.0 * DIGIT / CYCLE / limits[0].min(), 4.0 * DIGIT / CYCLE**2 / limits[1].min()  # what the digits make of it
+    apart = ~near_the_pole(machine, joints)
+    rises = np.abs(np.diff(joints, 2, axis=0)) / CYCLE**2 / limits[1]
+    speed = (np.abs(np.diff(joints, axis=0)) / CYCLE / limits[0]).max()
+    return speed - read[0], rises[apart[:-2] & apart[1:-1] & apart[2:]].max() - read[1]
 
 
 @pytest.mark.parametrize("machine", PLACES, indirect=True)
-def test_a_posted_program_keeps_the_joints_speeds_and_its_time(machine, linuxcnc, tmp_path):
+def test_a_posted_program_keeps_the_joints_limits_and_its_time(machine, linuxcnc, tmp_path):
     job = first_passes(machine, tmp_path)
     assert job.runs
     posted, trajectory = job.posted, job.trajectory
@@ -183,56 +187,80 @@ def test_a_posted_program_keeps_the_joints_speeds_and_its_time(machine, linuxcnc
     run = linuxcnc.run({"program": "part.ngc", "override": 1.5}, {"part.ngc": text})
     assert "told" not in run.seen, run.seen
     check_joints(machine, run.poses, run.joints)
-    assert utilisation(machine, run.joints).max() <= 1.0 + noise(machine)  # from home on
+    speed, rise = utilisation(machine, run.joints)  # from home on
+    assert 0.6 < speed <= SPEED and 0.9 < rise <= RISE
     part = run.part(first_line(text), world(machine, posted.poses[:1])[0])
-    assert utilisation(machine, run.joints[part]).max() > 0.6  # it is not just slow
-    assert (part.stop - part.start - 1) * CYCLE == pytest.approx(trajectory.seconds, rel=0.05)
-    assert (part.stop - part.start - 1) * CYCLE == pytest.approx(pk.predict_linuxcnc_seconds(trajectory), rel=0.02)
+    assert (part.stop - part.start - 1) * CYCLE == pytest.approx(trajectory.seconds, rel=0.01)
     ends = world(machine, posted.poses[[0, -1]])
-    assert np.abs(run.poses[[part.start, -1]] - ends).max() < 2e-6
-    assert aside(run.poses[part][:, :3], world(machine, posted.poses)[:, :3]).max() < 0.005 + 2e-6  # as asked for
+    assert np.abs(run.poses[-1] - ends[1]).max() < 2e-6
+    assert np.abs(run.poses[part.start] - ends[0]).max() < 1e-4  # it stands there for less than a cycle
+    assert aside(run.poses[part][:, :3], world(machine, posted.poses)[:, :3]).max() < 0.005 + 2e-3  # as asked for
+
+
+@pytest.mark.parametrize("machine", ["tricept"], indirect=True)
+def test_overrides_and_pauses_keep_the_joints_limits(machine, linuxcnc, tmp_path):
+    job = first_passes(machine, tmp_path)
+    text = written(job.trajectory)
+    before = float(read_program(text).seconds[~read_program(text).timed].sum())
+    changes = [
+        [1.0, "feedrate", 0.3],
+        [2.5, "feedrate", 1.0],
+        [3.0, "auto", "AUTO_PAUSE"],
+        [3.5, "auto", "AUTO_RESUME"],
+    ]
+    changes += [
+        [4.0, "feedrate", 0.0],
+        [4.4, "feedrate", 1.0],
+        [4.8, "auto", "AUTO_PAUSE"],
+        [5.2, "auto", "AUTO_RESUME"],
+    ]
+    during = [[before + at, *rest] for at, *rest in changes]
+    run = linuxcnc.run({"program": "part.ngc", "during": during}, {"part.ngc": text})
+    assert "told" not in run.seen, run.seen
+    speed, rise = utilisation(machine, run.joints)
+    assert speed <= SPEED and rise <= RISE
+    part = run.part(first_line(text), world(machine, job.posted.poses[:1])[0])
+    assert (part.stop - part.start - 1) * CYCLE > job.trajectory.seconds + 2.0
+    assert np.abs(run.poses[-1] - world(machine, job.posted.poses[-1:])[0]).max() < 2e-6
+
+
+@pytest.mark.parametrize("machine", ["tricept"], indirect=True)
+def test_a_foreign_program_is_slowed_where_a_joint_would_pass_its_limits(machine, linuxcnc, tmp_path):
+    """With the programmed feeds and rapids, which nobody has fitted to the machine."""
+    job = first_passes(machine, tmp_path)
+    text = as_programmed(job.posted, written(job.trajectory))
+    run = linuxcnc.run({"program": "part.ngc"}, {"part.ngc": text})
+    assert "told" not in run.seen, run.seen
+    speed, rise = utilisation(machine, run.joints)
+    assert 0.95 < speed <= SPEED and 0.95 < rise <= RISE
+    check_joints(machine, run.poses, run.joints)
+    part = run.part(first_line(text), world(machine, job.posted.poses[:1])[0])
+    path = world(machine, job.posted.poses)[:, :3]
+    assert aside(run.poses[part][:, :3], path).max() < 0.005 + 1e-4
+    assert np.abs(run.poses[-1] - world(machine, job.posted.poses[-1:])[0]).max() < 2e-6
 
 
 # Random paths
 
 
-@pytest.fixture(scope="module")
-def model(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("model")
-    return Model(folder), Stub(folder)
-
-
 @pytest.mark.parametrize("machine", ["orthoglide5_head", "orthoglide5_table", "hexapod"], indirect=True)
-def test_random_paths_run_as_the_model_says(machine, model, linuxcnc, tmp_path):
-    planner, stub = model
-    kinematics = stub.built(machine)
-    limits = read_limits(pk.make_linuxcnc_configuration(machine)[f"{machine.name}.ini"])
-    home, at_home = (
-        world(machine, find_home_pose(machine)[None])[0],
-        outward(machine, machine.inverse(find_home_pose(machine))),
-    )
+def test_random_paths_run_as_the_planner_does_alone(machine, linuxcnc, tmp_path):
+    """Cycle by cycle the poses that the same planner commands without LinuxCNC, from which its time is told."""
+    planner = Planner(machine, tmp_path)
     for seed in (0, 20):
         (tmp_path / "part.cls").write_text(PathMaker(machine, seed).make(), encoding="ascii")
         job = pk.prepare(machine, pk.read_path(tmp_path / "part.cls"))
         assert job.runs
         text = written(job.trajectory)
-        told = planner.simulate(read_program(text, home), limits, home)
-        joints, codes = kinematics.inverse_path(told.poses, at_home)
-        assert not codes.any()
         run = linuxcnc.run({"program": "part.ngc"}, {"part.ngc": text})
         assert "told" not in run.seen, run.seen
-        assert utilisation(machine, run.joints).max() <= 1.0 + noise(machine)
-        first = int(np.flatnonzero((np.diff(run.poses, axis=0) != 0.0).any(1))[0]) + 1
-        moving = int(np.flatnonzero((told.poses != home).any(1))[0])
-        count = min(len(run.poses) - first, len(told.poses) - moving)
-        assert count > len(told.poses) - 10
-        seen, expected = slice(first, first + count), slice(moving, moving + count)
-        assert np.abs(run.poses[seen] - told.poses[expected]).max() < 1e-3  # rounding may shift a motion by a cycle
-        assert np.abs(run.joints[seen] - joints[expected]).max() < 2e-2
-        assert (
-            np.abs(utilisation(machine, run.joints[seen]) - utilisation(machine, joints[expected])).max()
-            < noise(machine) + 0.01
-        )
+        assert utilisation(machine, run.joints)[0] <= SPEED
+        planner.start(find_home_pose(machine))
+        alone = world(machine, planner.run_program(read_program(text)).poses)
+        first, moving = (int(np.flatnonzero((np.diff(p, axis=0) != 0.0).any(1))[0]) for p in (run.poses, alone))
+        count = min(len(run.poses) - first, len(alone) - moving)
+        assert count > len(alone) - moving - 10
+        assert np.abs(run.poses[first : first + count] - alone[moving : moving + count]).max() < 1e-3
 
 
 def aside(points, path):
@@ -245,30 +273,17 @@ def aside(points, path):
 
 
 @pytest.mark.parametrize("machine", ["tricept"], indirect=True)
-def test_with_the_programmed_feed_a_joint_passes_its_speed(machine, linuxcnc, tmp_path):
-    job = first_passes(machine, tmp_path)
-    posted, text = job.posted, as_programmed(job.posted, written(job.trajectory))
-    run = linuxcnc.run({"program": "part.ngc"}, {"part.ngc": text})
-    assert "told" not in run.seen, run.seen
-    part = run.part(first_line(text), world(machine, posted.poses[:1])[0])
-    over = utilisation(machine, run.joints[part]).max(1) > 1.1
-    record = run.line[part][1:] - first_line(text) + 1
-    cutting = ~posted.path.rapid[np.clip(record, 0, len(posted.path) - 1)]
-    assert (over & cutting).any()
-    check_joints(machine, run.poses[part], run.joints[part])
-
-
-@pytest.mark.parametrize("machine", ["tricept"], indirect=True)
 def test_a_wrist_goes_on_in_its_other_mode_and_stops_are_kept(machine, linuxcnc, tmp_path):
     posted = post_path(machine, first_passes(machine, tmp_path, feed=2500.0, count=25).programmed.path, mode="-")
     trajectory = plan_trajectory(posted, corners="stop")
     text = written(trajectory)
     run = linuxcnc.run({"program": "part.ngc"}, {"part.ngc": text})
     assert "told" not in run.seen, run.seen
-    assert utilisation(machine, run.joints).max() <= 1.0 + noise(machine)
+    speed, rise = utilisation(machine, run.joints)
+    assert speed <= SPEED and rise <= RISE
     part = run.part(first_line(text), world(machine, posted.poses[:1])[0])
     assert np.abs(run.joints[part][-1] - outward(machine, posted.joints[-1:])[0]).max() < 2e-6
     halts = trajectory.curve.corner[1:-1][trajectory.curve.parted[1:-1]]
     assert len(halts) > 2
     for row in world(machine, halts):
-        assert np.abs(run.poses - row).max(1).min() < 2e-6
+        assert np.abs(run.poses - row).max(1).min() < 1e-4  # it stands there for less than a cycle

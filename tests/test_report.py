@@ -3,6 +3,7 @@
 import json
 import re
 from dataclasses import replace
+from importlib.resources import files
 
 import numpy as np
 import pytest
@@ -38,8 +39,21 @@ def spiral(n):
 
 
 @pytest.fixture(scope="module")
-def trajectory():
-    return plan_trajectory(post_path(pk.load("tricept"), spiral(600)))
+def without_jerk(tmp_path_factory):
+    """A shipped machine, by its name, whose drives have no limits of jerk: their accelerations are used fully."""
+
+    def load(name):
+        text = (files("parakin") / "machines" / f"{name}.yaml").read_text(encoding="utf-8")
+        file = tmp_path_factory.mktemp(name) / "machine.yaml"
+        file.write_text(re.sub(r"\n *jerk:.*|, jerk: [^,}]*", "", text), encoding="utf-8")
+        return pk.load(file)
+
+    return load
+
+
+@pytest.fixture(scope="module")
+def trajectory(without_jerk):
+    return plan_trajectory(post_path(without_jerk("tricept"), spiral(600)))
 
 
 @pytest.fixture(scope="module")
@@ -177,10 +191,11 @@ def test_feed_reached_beside_the_programmed(trajectory, figures, dense):
     assert x.max() < trajectory.times[np.flatnonzero(~trajectory.posted.path.rapid)[-1]] + 0.1
 
 
-def test_feed_is_seen_among_many_short_rapids():
+def test_feed_is_seen_among_many_short_rapids(without_jerk):
     turn = np.linspace(0.0, 200.0, 4000)
     tip = np.stack([80 * np.cos(turn), 80 * np.sin(turn), 280 + 0 * turn], axis=1)
-    trajectory = plan_trajectory(post_path(pk.load("linear_delta"), path_of(tip, rapid=np.arange(4000) % 10 < 2)))
+    path = path_of(tip, rapid=np.arange(4000) % 10 < 2)
+    trajectory = plan_trajectory(post_path(without_jerk("linear_delta"), path))
     figure = figures_of(render_report(trajectory.posted, trajectory))["time"]
     assert 3 * len(trajectory.profile.row) > 9000
     for name in ("programmed feed", "set by the feed"):

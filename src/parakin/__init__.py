@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from .controllers.joints.program import make_joint_program
     from .controllers.joints.reader import JointProgram, read_joint_program
     from .controllers.linuxcnc.configuration import make_linuxcnc_configuration
-    from .controllers.linuxcnc.program import make_linuxcnc_program, predict_linuxcnc_seconds
+    from .controllers.linuxcnc.program import make_linuxcnc_program
     from .export.files import write_files
     from .export.machine.picture import render_machine_html, render_machine_png
     from .export.report.report import render_report
@@ -89,7 +89,6 @@ __all__ = [
     "make_linuxcnc_configuration",
     "make_linuxcnc_program",
     "make_mesh",
-    "predict_linuxcnc_seconds",
     "prepare",
     "prepare_turned",
     "read_joint_program",
@@ -181,7 +180,6 @@ _LAZY = {
     "make_linuxcnc_configuration": "controllers.linuxcnc.configuration",
     "make_linuxcnc_program": "controllers.linuxcnc.program",
     "make_mesh": "export.workspace.meshes",
-    "predict_linuxcnc_seconds": "controllers.linuxcnc.program",
     "prepare": "toolpath.job",
     "prepare_turned": "toolpath.turned_job",
     "read_joint_program": "controllers.joints.reader",

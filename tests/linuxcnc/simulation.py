@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import shutil
 import subprocess
 import tempfile
@@ -78,17 +79,16 @@ def as_programmed(posted, text):
     """
     machine = posted.machine
     rows = np.where(np.array(machine.axis_units) == "rad", np.degrees(posted.poses), posted.poses).tolist()
-    lines = [*text.split("\n")[: first_line(text) - 2], "G94"]
+    lines = [*text.split("\nM67")[0].splitlines(), "G94", "G64 P0.005 Q0"]
     for row, rapid, feed in zip(rows, posted.path.rapid.tolist(), posted.path.feed.tolist(), strict=True):
         words = " ".join(f"{axis}{value:.6f}" for axis, value in zip(machine.axes, row, strict=True))
         lines.append(f"G53 G0 {words}" if rapid else f"G53 G1 {words} F{feed:g}")
-    begin = first_line(text) - 1  # where the first record is repeated, and the program goes on
-    return "\n".join([*lines[: begin + 1], "G64 P0.005 Q0", *lines[begin + 1 :], "M2", ""])
+    return "\n".join([*lines, "M2", ""])
 
 
 def first_line(text):
     """The line (1-based) of a program with which the motion behind its first record begins."""
-    return next(i for i, line in enumerate(text.split("\n"), 1) if line.startswith("G64")) + 1
+    return next(i for i, line in enumerate(text.split("\n"), 1) if line.startswith(("M67", "G64"))) + 1
 
 
 class Simulation:
@@ -171,11 +171,18 @@ class Simulation:
 
 
 @contextmanager
-def simulated(machine):
-    """A :class:`Simulation`; the kinematics is built and installed, and removed at the end."""
+def simulated(machine, reserve=None, stock=False):
+    """A :class:`Simulation`; kinematics and planner are built and installed, and removed at the end.
+
+    reserve : by which the drives' limits are above the description's; None: drives without limits
+    stock : with LinuxCNC's own planner, which knows the axes' limits only
+    """
     with tempfile.TemporaryDirectory(dir="/var/tmp") as name:  # pytest's own folders are closed to others
         folder, files = Path(name), pk.make_linuxcnc_configuration(machine)
-        ini = files[f"{machine.name}.ini"].replace("DISPLAY = axis", "DISPLAY = ./ui.py")
+        if reserve is not None:
+            files[f"{machine.name}.hal"] = limit_drives(machine, files[f"{machine.name}.hal"], 1.0 + reserve)
+        ini = files[f"{machine.name}.ini"]
+        ini = (use_stock_planner(machine, ini) if stock else ini).replace("DISPLAY = axis", "DISPLAY = ./ui.py")
         files[f"{machine.name}.ini"] = ini.replace("[KINS]", "HALFILE = sampler.hal\n\n[KINS]")
         for file, text in (files | {"sampler.hal": sampler(machine)}).items():
             (folder / file).write_text(text, encoding="utf-8")
@@ -190,6 +197,37 @@ def simulated(machine):
         finally:
             for module in modules:
                 (MODULES / f"{module}.so").unlink(missing_ok=True)
+
+
+# What LinuxCNC's own planner gets of the drives' least rates, or it would crawl: it begins and ends every motion that
+# turns the tool with half of its acceleration, as if it stood still there.
+STOCK = {"VELOCITY": {"mm": 1.0, "rad": 4.0}, "ACCELERATION": {"mm": 6.0, "rad": 12.0}}
+
+
+def use_stock_planner(machine, ini):
+    """An ini file without the planner, with rates of the axes that LinuxCNC's own one can work with."""
+    ini = re.sub(r"\nTPMOD = .*", "", ini)
+    for axis, unit in zip(machine.axes, machine.axis_units, strict=True):
+        head, section = ini.split(f"[AXIS_{axis}]")
+        for rate, factors in STOCK.items():
+            drives = [getattr(d, rate.lower().replace("velocity", "speed")) for d in machine.drives if d.unit == unit]
+            value = factors[unit] * min(drives) * (180.0 / np.pi if unit == "rad" else 1.0)
+            section = re.sub(rf"PROGRAM_MAX_{rate} = .*", f"PROGRAM_MAX_{rate} = {value:.6f}", section, count=1)
+        ini = f"{head}[AXIS_{axis}]{section}"
+    return ini
+
+
+def limit_drives(machine, hal, factor):
+    """HAL in which every joint's loop is a drive that follows within so much of its speed and acceleration."""
+    lines = [line for line in hal.split("\n") if not line.startswith("net joint-")]
+    lines.append(f"loadrt limit3 count={len(machine.joints)}")
+    for i, drive in enumerate(machine.drives):
+        scale = 180.0 / np.pi if drive.unit == "rad" else 1.0
+        lines += [f"addf limit3.{i} servo-thread", f"setp limit3.{i}.maxv {factor * drive.speed * scale:.9f}"]
+        lines += [f"setp limit3.{i}.maxa {factor * drive.acceleration * scale:.9f}"]
+        lines += [f"net command-{i} joint.{i}.motor-pos-cmd => limit3.{i}.in"]
+        lines += [f"net joint-{i} limit3.{i}.out => joint.{i}.motor-pos-fb"]
+    return "\n".join([*lines, ""])
 
 
 def sampler(machine):

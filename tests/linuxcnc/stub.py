@@ -81,11 +81,12 @@ class Stub:
     def library(self):
         """The one library of this process: modules find the first that was loaded."""
         if not LOADED:
-            self._gcc([HERE / "stub_hal.c"], self.folder / "stub_hal.so")
+            self.compile([HERE / "stub_hal.c"], self.folder / "stub_hal.so")
             LOADED.append(ctypes.CDLL(str(self.folder / "stub_hal.so"), mode=ctypes.RTLD_GLOBAL))
         return LOADED[0]
 
-    def _gcc(self, sources, target):
+    def compile(self, sources, target):
+        """Compile sources, and options for them, to a library; a warning is an error."""
         warnings = ["-Wall", "-Wextra", "-Werror", "-Wframe-larger-than=2560"]
         command = ["gcc", *FLAGS, *warnings, f"-I{HERE}", f"-I{self.folder}", "-shared", "-o", target, *sources, "-lm"]
         subprocess.run(command, check=True)
@@ -96,14 +97,14 @@ class Stub:
         source = self.folder / f"{name}.c"
         source.write_text(write_module(machine))
         (self.folder / name_model(machine)).write_text(write_model(machine))
-        self._gcc([source], self.folder / f"{name}.so")
+        self.compile([source], self.folder / f"{name}.so")
         return Kinematics(stub, self.folder / f"{name}.so", len(machine.joints))
 
     def probe(self, machine):
         """The functions of a machine's model that all modules share, in mm and rad."""
         (self.folder / name_model(machine)).write_text(write_model(machine))
         path = self.folder / f"{machine.name}_probe.so"
-        self._gcc([f'-DMODEL_HEADER="{name_model(machine)}"', HERE / "model_probe.c"], path)
+        self.compile([f'-DMODEL_HEADER="{name_model(machine)}"', HERE / "model_probe.c"], path)
         return ModelProbe(ctypes.CDLL(str(path)), machine)
 
 

@@ -77,7 +77,8 @@ class Machine:
         self.tell("mdi", block)
         return self.position()
 
-    def program(self, name):
+    def program(self, name, during=()):
+        """Run a program; ``during`` it, at times in s, words to LinuxCNC with their arguments."""
         path = str(Path(name).resolve())
         self.tell("mode", linuxcnc.MODE_AUTO)
         self.wait(lambda s: s.task_mode == linuxcnc.MODE_AUTO)
@@ -85,6 +86,12 @@ class Machine:
         self.wait(lambda s: s.file == path)  # on a busy computer wait_complete may give up before
         self.command.auto(linuxcnc.AUTO_RUN, 0)
         self.wait(lambda s: s.interp_state != linuxcnc.INTERP_IDLE)
+        start = time.monotonic()
+        for at, word, *arguments in during:
+            while time.monotonic() < start + at:
+                self.wait(lambda s: True)
+                time.sleep(0.002)
+            getattr(self.command, word)(*(getattr(linuxcnc, a) if isinstance(a, str) else a for a in arguments))
         return self.position()
 
     def refusal(self, block):
@@ -108,7 +115,7 @@ def work(task, seen):
     if "by hand" in task:
         seen["by hand"] = machine.by_hand(task["by hand"])
     machine.tell("feedrate", task.get("override", 1.0))
-    seen["program"] = machine.program(task["program"])
+    seen["program"] = machine.program(task["program"], task.get("during", ()))
     seen["refused"] = {block: machine.refusal(block) for block in task.get("refused", ())}
     seen["at last"] = machine.position()
 

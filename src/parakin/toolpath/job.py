@@ -144,6 +144,9 @@ def prepare(
             trajectory = plan_trajectory(
                 posted, corners=corners, tolerance=half.tip, axis_tolerance=half.axis, stops=find_stops(posted.path)
             )
+            if not trajectory.keeps_jerk:
+                posted = _note(posted, "the limits of jerk are not kept: with them it would take many times as long")
+                trajectory = replace(trajectory, posted=posted)
         except PoseError as error:
             unplanned = str(error)
     report(1.0)
@@ -153,8 +156,14 @@ def prepare(
 
 def _note_wound_up(posted: Posted) -> Posted:
     """Note that a joint turns farther than its range, and what would help."""
-    wrist, path = posted.machine.wrist, posted.path
+    wrist = posted.machine.wrist
     assert wrist is not None
     joint = posted.machine.joints[wrist.first]
     text = f"{joint} turns farther than its range is wide; a rewind takes turns back where a clearance is stated"
+    return _note(posted, text)
+
+
+def _note(posted: Posted, text: str) -> Posted:
+    """Add a note about the whole path, at its first line."""
+    path = posted.path
     return replace(posted, path=replace(path, notes=(*path.notes, Note(int(path.line[0]), text))))

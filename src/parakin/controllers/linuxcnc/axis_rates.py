@@ -1,12 +1,9 @@
-"""How fast LinuxCNC's axes may be, so that it can follow a trajectory."""
+"""How fast LinuxCNC's drives and axes may be."""
 
 from __future__ import annotations
 
 from math import isfinite, pi
 
-import numpy as np
-
-from ...arrays import Array
 from ...machine import Machine
 from ...model.elements import Drive
 
@@ -14,11 +11,9 @@ from ...model.elements import Drive
 SPEED = {"mm": 200.0, "rad": pi / 3.0}
 ACCELERATION = {"mm": 2000.0, "rad": 10.0 * pi / 3.0}
 
-# Factors on the slowest drive's. LinuxCNC begins and ends a motion that turns the tool with half of this acceleration,
-# as if it stood still there; so it must be more than the drives' own, or paths of short motions would crawl. And where
-# the tool is nearly upright C turns fast, though no drive does.
-_SPEED_FACTOR = {"mm": 1.0, "rad": 4.0}
-_ACCELERATION_FACTOR = {"mm": 6.0, "rad": 12.0}
+# Of the slowest drive's rates, for the axes of programs, which must bind nothing: the planner keeps the joints within
+# theirs. Beside the pole C turns as fast as one likes, though no drive does.
+_FACTOR = {"mm": 100.0, "rad": 1e6}
 
 
 def find_slowest_drive(machine: Machine, unit: str) -> tuple[float, float]:
@@ -36,12 +31,6 @@ def choose_drive_rates(drive: Drive) -> tuple[float, float]:
 
 
 def choose_unit_rates(machine: Machine, unit: str) -> tuple[float, float]:
-    """Choose speed and acceleration of the axes of a unit; mm, rad and s."""
+    """Choose speed and acceleration of the axes of a unit in programs; mm, rad and s."""
     speed, acceleration = find_slowest_drive(machine, unit)
-    return _SPEED_FACTOR[unit] * speed, _ACCELERATION_FACTOR[unit] * acceleration
-
-
-def choose_axis_rates(machine: Machine) -> tuple[Array, Array]:
-    """Choose speeds and accelerations of all axes, (axes,) each; mm, rad and s."""
-    rates = np.array([choose_unit_rates(machine, unit) for unit in machine.axis_units])
-    return rates[:, 0], rates[:, 1]
+    return _FACTOR[unit] * speed, _FACTOR[unit] * acceleration

@@ -14,6 +14,7 @@ from .guard import name_guard
 from .hand_box import HandBox, find_hand_box
 from .home_pose import find_home_pose
 from .module import hash_kinematics, name_kinematics
+from .planner import hash_planner, name_planner
 
 _JOG = 0.25  # of the speed of moves by hand: what the screen begins with
 _END_DIGIT = 0.01  # mm and degrees
@@ -48,12 +49,10 @@ MAX_FEED_OVERRIDE = 1.0
 
 [TASK]
 TASK = milltask
-CYCLE_TIME = 0.010
+CYCLE_TIME = 0.001
 
 [RS274NGC]
 PARAMETER_FILE = {name}.var
-# The guard may slow the feed.
-RS274NGC_STARTUP_CODE = M52 P1
 
 [EMCMOT]
 EMCMOT = motmod
@@ -74,6 +73,8 @@ KINEMATICS = {kinematics}
 JOINTS = {joints}
 
 [TRAJ]
+# It keeps the joints' limits in programs and MDI. LinuxCNC's own planner would not: never run without this line.
+TPMOD = {planner} made={planner_made}
 COORDINATES = {axes}
 LINEAR_UNITS = mm
 ANGULAR_UNITS = degree
@@ -85,7 +86,7 @@ HOME = {home}
 
 # MIN_LIMIT, MAX_LIMIT and the rates of an axis are for moves by hand: in that box every pose is proved to be allowed,
 # and all axes at once keep every joint within its speed. Programs have the PROGRAM_ values, which {guard}
-# puts in force: the machine's true ranges, and rates with which LinuxCNC keeps up with short motions.
+# puts in force: the machine's true ranges, and rates that bind nothing, for {planner} keeps the joints within theirs.
 """
 
 
@@ -108,7 +109,7 @@ net tool-offset motion.tooloffset.z => kins.tool-offset
 net teleop motion.teleop-mode => kins.teleop-mode
 net coordinated motion.coord-mode => kins.coord-mode
 
-# The guard: it stops jogs before a limit, slows and halts programs that would break one, and gives the axes' rates.
+# The guard: it stops jogs before a limit, and gives the axes' rates.
 loadrt {guard}
 addf guard.watch servo-thread
 net tool-offset => guard.tool-offset
@@ -116,10 +117,7 @@ net teleop => guard.teleop-mode
 net coordinated => guard.coord-mode
 net homed motion.is-all-homed => guard.homed
 net enabled motion.motion-enabled => guard.enabled
-net in-position motion.in-position => guard.in-position
 net jog-stop guard.jog-stop => motion.jog-stop
-net guarded-feed guard.feed => motion.adaptive-feed
-net feed-inhibit guard.feed-inhibit => motion.feed-inhibit
 {watched}
 net estop iocontrol.0.user-enable-out => iocontrol.0.emc-enable-in
 net tool-prepare iocontrol.0.tool-prepare => iocontrol.0.tool-prepared
@@ -154,6 +152,8 @@ def write_ini(machine: Machine) -> str:
         joints=len(machine.joints),
         kinematics=name_kinematics(machine),
         guard=name_guard(machine),
+        planner=name_planner(machine),
+        planner_made=hash_planner(machine),
         home=" ".join(format_number(home.get(axis, 0.0)) for axis in "XYZ"),
         jog=format_number(_JOG * by_hand["mm"]),
         by_hand=format_number(by_hand["mm"]),

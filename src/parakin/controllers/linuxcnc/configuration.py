@@ -10,6 +10,7 @@ from .guard import name_guard, write_guard
 from .model_header import name_model, write_model
 from .module import name_kinematics, write_module
 from .page import write_page
+from .planner import name_planner, write_planner
 from .screen import name_screen, write_axis_settings, write_screen, write_screen_hal
 from .stamp import stamp_file
 
@@ -18,14 +19,14 @@ from .stamp import stamp_file
 def make_linuxcnc_configuration(machine: Machine) -> dict[str, str]:
     """Make a configuration for LinuxCNC 2.9 that runs as a simulation: {file: text}.
 
-    The files are the kinematics module and the guard (C, built by LinuxCNC's ``halcompile --install``) with the header
-    that both include, the ini and HAL files, the window that
-    shows the machine, the tool table, a first program and a page that tells how to start, all
-    named after the machine. The last line of each tells by a hash whether the file was edited since.
+    The files are kinematics, trajectory planner and guard (C, built by LinuxCNC's ``halcompile --install``), the header
+    that all include, the ini and HAL files, the window that shows the machine, the tool table, a first program and a
+    page that tells how to start, all named after the machine. The last line of each tells by a hash whether it was edited.
     """
     texts = {
         f"{name_kinematics(machine)}.c": write_module(machine),
         f"{name_guard(machine)}.c": write_guard(machine),
+        f"{name_planner(machine)}.c": write_planner(machine),
         name_model(machine): write_model(machine),
         f"{machine.name}.ini": write_ini(machine),
         f"{machine.name}.hal": write_hal(machine),

@@ -1,10 +1,9 @@
 /* A watch over the machine, once a servo cycle after the motion controller.
 
    It tells how far the machine is from its nearest limit and which that is; it lets jogs stop softly before one is
-   reached, at the end of the box for moves by hand, or where a joint would pass its speed; it slows programs that are
-   about to break a limit, and halts them where they go on. And it gives the axes their low rates while they are moved
-   by hand, and their high ones in coordinated motion. It keeps the last pose, and whether a program was halted, which
-   ends with the program. */
+   reached, at the end of the box for moves by hand, or where a joint would pass its speed. And it gives the axes their
+   low rates while they are moved by hand, and their high ones in coordinated motion, which the trajectory planner keeps
+   within the limits. It keeps the last pose. */
 
 typedef struct {
     hal_float_t *position;                          /* axis.L.pos-cmd */
@@ -18,12 +17,10 @@ typedef struct {
     Axis axis[AXES];
     hal_float_t *joint[JOINTS]; /* joint.N.pos-cmd */
     hal_float_t *tool_offset;   /* motion.tooloffset.z */
-    hal_bit_t *homed, *enabled, *teleop, *coordinated, *in_position; /* motion. */
+    hal_bit_t *homed, *enabled, *teleop, *coordinated; /* motion. */
     hal_u32_t *nearest;         /* index of the nearest limit: NAME_model.h and NAME.md have the names */
     hal_float_t *distance;      /* to it: 0 where it is reached, 1 where jogs stop */
     hal_bit_t *jog_stop;        /* to motion.jog-stop */
-    hal_float_t *feed;          /* to motion.adaptive-feed */
-    hal_bit_t *feed_inhibit;    /* to motion.feed-inhibit */
 } Pins;
 
 static Pins *pins;
@@ -142,12 +139,9 @@ static void watch(void *arg, long period)
     if (!*pins->homed || !*pins->enabled)
         knows_last = 0;
     is_known = *pins->homed && *pins->enabled && read_motion(&m);
-    if (!*pins->coordinated || *pins->in_position)
-        *pins->feed_inhibit = 0;
     if (!is_known) { /* not homed, switched off, or driven out of a singularity joint by joint */
         *pins->distance = 0.0;
         *pins->jog_stop = 0;
-        *pins->feed = 1.0;
         return;
     }
     const double distance = distance_to_limits(m.pose, m.joints, &nearest);
@@ -159,16 +153,10 @@ static void watch(void *arg, long period)
     const double ahead = moves ? distance_at(stop, m.joints, joints) : distance;
     if (*pins->coordinated) {
         *pins->jog_stop = 0;
-        *pins->feed = ahead > 0.0 || ahead >= distance ? 1.0 : SLOW_FEED;
-        for (int i = 0; i < AXES; i++)
-            stop[i] = m.pose[i] + IMMINENT * CYCLE * m.pose_rates[i];
-        if (*pins->feed < 1.0 && !(distance_at(stop, m.joints, joints) > 0.0))
-            *pins->feed_inhibit = 1;
         return;
     }
     const int is_near = ahead < 1.0 && ahead < distance;
     *pins->jog_stop = moves && (is_near || (*pins->teleop && (leaves_the_box(&m, stop) || swings(&m, stop))));
-    *pins->feed = 1.0;
 }
 
 static int component;
@@ -205,12 +193,9 @@ static int make_pins(void)
     bad |= hal_pin_bit_newf(HAL_IN, &pins->enabled, component, "guard.enabled");
     bad |= hal_pin_bit_newf(HAL_IN, &pins->teleop, component, "guard.teleop-mode");
     bad |= hal_pin_bit_newf(HAL_IN, &pins->coordinated, component, "guard.coord-mode");
-    bad |= hal_pin_bit_newf(HAL_IN, &pins->in_position, component, "guard.in-position");
     bad |= hal_pin_u32_newf(HAL_OUT, &pins->nearest, component, "guard.nearest");
     bad |= hal_pin_float_newf(HAL_OUT, &pins->distance, component, "guard.distance");
     bad |= hal_pin_bit_newf(HAL_OUT, &pins->jog_stop, component, "guard.jog-stop");
-    bad |= hal_pin_float_newf(HAL_OUT, &pins->feed, component, "guard.feed");
-    bad |= hal_pin_bit_newf(HAL_OUT, &pins->feed_inhibit, component, "guard.feed-inhibit");
     return bad;
 }
 
@@ -224,7 +209,6 @@ int rtapi_app_main(void)
         hal_exit(component);
         return -1;
     }
-    *pins->feed = 1.0;
     hal_ready(component);
     return 0;
 }

@@ -38,8 +38,6 @@ _NUMBERS = {
     "LATENCY": (4.0, "cycles from a command to the axes' answer"),
     "PARTS": (4, "of the way to where the machine stops, at whose ends joints' speeds are looked at"),
     "SWINGS": (1.0, "of a joint's speed: the most that a jog may ask for"),
-    "IMMINENT": (8.0, "cycles before a limit would be broken in which a slowed program is halted"),
-    "SLOW_FEED": (0.1, "of the feed, for programs that are about to break a limit"),
 }
 
 

@@ -11,6 +11,7 @@ from .guard import name_guard
 from .home_pose import find_home_pose
 from .model_header import LEAST_REGULARITY, list_limit_names
 from .module import name_kinematics
+from .planner import NO_TOLERANCE, name_planner
 
 _PAGE = """\
 # {title} under LinuxCNC
@@ -21,7 +22,8 @@ For LinuxCNC 2.9, as a simulation without hardware.
 |---|---|
 | `{kinematics}.c` | the kinematics: {joints} from {axes} and back |
 | `{guard}.c` | the guard: it keeps moves by hand within the limits |
-| `{name}_model.h` | the machine's mathematics, which both include |
+| `{name}_model.h` | the machine's mathematics, which all include |
+| `{planner}.c` | the trajectory planner, which keeps the joints' limits |
 | `{name}.ini` | ranges, speeds and home |
 | `{name}.hal`, `{name}_rates.hal` | loops in the place of drives, the guard, the axes' rates |
 | `{name}_screen.py`, `{name}_screen.hal` | the window that shows the machine, and what brings it the joints |
@@ -29,16 +31,17 @@ For LinuxCNC 2.9, as a simulation without hardware.
 | `{name}.tbl` | the tool |
 | `{name}.ngc` | a first program: a square at home |
 
-Install the kinematics and the guard once and start:
+Install the three modules once and start:
 
 ```
 sudo apt-get install linuxcnc-uspace linuxcnc-uspace-dev
 sudo halcompile --install {kinematics}.c
 sudo halcompile --install {guard}.c
+sudo halcompile --install {planner}.c
 linuxcnc {name}.ini
 ```
 
-`halcompile` needs a folder whose path has no blanks. Once the description has changed, install both anew:
+`halcompile` needs a folder whose path has no blanks. Once the description has changed, install them anew:
 with one of an older making LinuxCNC does not start, and says so.
 
 Switch the machine on and home it: it then stands at {home}.
@@ -58,20 +61,18 @@ without it take the line with `{name}_screen.hal` out of `{name}.hal`.
   at once keep every joint within its speed and acceleration. The guard stops a jog softly at the box's end, before a
   limit, and where a joint would pass its speed; what leads back goes on. Outside of the box, after a program, jogs
   lead inward.
-- Programs and MDI have the machine's whole range and the drives' rates (PROGRAM_ in `{name}.ini`), which the guard
-  puts in force in coordinated motion. The screen may ask whether to run a program beyond the box: that is no fault of
-  it.
-- The guard slows a program that is about to break a limit to a tenth, and halts it where it goes on
-  (`motion.feed-inhibit`); abort it then, and jog back. `M52 P0` in a program takes the slowing off. `guard.distance`
-  tells how far the nearest limit is (0 where it is reached, 1 where jogs stop), `guard.nearest` which one:
+- Programs and MDI have the machine's whole range (PROGRAM_ in `{name}.ini`, which the guard puts in force in
+  coordinated motion). The planner `{planner}` looks ahead along the path and keeps every joint within its speed, its
+  acceleration and its range: in programs from anywhere, at any override, in a pause and in a stop. A motion that leaves
+  the workspace, or that a joint would have to jump in, is refused with its line before it begins. The screen may ask
+  whether to run a program beyond the box: that is no fault of it.
+- `parakin post PART --machine {name} --target linuxcnc` writes programs with times, which the planner keeps exactly;
+  other programs it runs as fast as joints and feed allow. Corners are cut within the tolerance of G64 P; without a P by
+  {no_tolerance} mm. Turning motions count a degree as a millimetre.
+- `guard.distance` tells how far the nearest limit is (0 where it is reached, 1 where jogs stop), `guard.nearest` which:
 
 {limits}
 
-- Before a move LinuxCNC looks at its end point only.
-- In coordinated moves LinuxCNC bounds the speeds of the axes, not those of the joints. Near a singularity joints run
-  faster than the tool: the program has to carry feeds that keep them within their speeds. `parakin post PART
-  --machine {name} --target linuxcnc` writes such programs; run them from home. The feed can't be overridden to more
-  than 100 %.
 {pole}- A tool length offset (G43) counts along the tool: what the tool is longer than the machine's own. Switch it on
   and off with the tool along Z, for else the joints would have to jump, and the machine is switched off.
 - Speeds and accelerations that the description does not say were chosen, and are marked so in the ini file.
@@ -100,6 +101,8 @@ def write_page(machine: Machine) -> str:
         name=machine.name,
         kinematics=name_kinematics(machine),
         guard=name_guard(machine),
+        planner=name_planner(machine),
+        no_tolerance=format_number(NO_TOLERANCE),
         joints=" ".join(machine.joints),
         axes=" ".join(machine.axes),
         home=", ".join(words),

@@ -1,88 +1,66 @@
-"""A trajectory as G-code for LinuxCNC with the kinematics that parakin makes for it."""
+"""A trajectory as G-code for LinuxCNC with the kinematics and the planner that parakin makes for it."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from itertools import pairwise
-from typing import BinaryIO
+from typing import BinaryIO, NamedTuple
 
 import numpy as np
 
 from ...arguments import check_arguments
-from ...arrays import Array, Writer
+from ...arrays import Array, Indices, Writer
 from ...errors import PoseError
 from ...kinematics.wrist import get_leg_signs
 from ...machine import Machine
 from ...toolpath.posting.setup_texts import describe_setup
-from ...toolpath.timing.corners import check_tolerance
 from ...toolpath.timing.trajectory import Trajectory
-from ..controller import ControllerRun
 from ..event_commands import check_events
 from ..event_lines import format_events
 from ..gcode_text import CHUNK, format_blocks, format_comments, join_lines, to_display
 from .approach import plan_approach
 from .axis_ranges import TURNS
-from .axis_rates import choose_axis_rates
-from .lost_time import note_lost_time
-from .straight_motions import StraightMotions, build_straight_motions
+from .knots import Knots, choose_knots
+from .planner import SIGNAL, name_planner
 
-_TURNING = 0.4  # fraction of the tolerance where two motions turn the tool: LinuxCNC blends them less well
+_ROUNDING = 1e-9  # s
+
+
+class _Approach(NamedTuple):
+    """The motions that lead to the first record: poses (k, axes), mm and rad, and the s (k,) that each takes."""
+
+    poses: Array
+    seconds: Array
 
 
 @check_arguments
-def make_linuxcnc_program(trajectory: Trajectory, *, forced: str | None = None, tolerance: float = 0.005) -> Writer:
+def make_linuxcnc_program(trajectory: Trajectory, *, forced: str | None = None) -> Writer:
     """Make the writer of a trajectory as a program for LinuxCNC 2.9 with :func:`parakin.make_linuxcnc_configuration`.
 
     Parameters
     ----------
     trajectory : of a path whose poses go straight from record to record
     forced : what is off limits, a line each, where the program is written all the same; its header says so
-    tolerance : mm that LinuxCNC may cut corners by
 
-    Every motion is in the machine's own coordinates (G53), whatever offsets are in force, and in inverse time (G93).
-    Records at one place are written once; where the trajectory's speed changes points are added on the straight line.
-    The program begins with a slow motion to the first record and from there takes
-    :func:`predict_linuxcnc_seconds`.
+    Every motion is in the machine's own coordinates (G53), whatever offsets are in force, in inverse time (G93). The
+    program begins with a slow motion to the first record. From there its points are knots of the trajectory, and
+    ``M67 E63 Q1`` tells the configuration's planner to join them by a spline in the times that are given: it takes as
+    long as the trajectory, and follows it within 1 µm.
 
     Raises :class:`PoseError` where LinuxCNC's kinematics can't follow: another working mode, or too many turns of C.
     """
-    return _make_program(trajectory, _build_motions(trajectory), forced, tolerance)
-
-
-@check_arguments
-def predict_linuxcnc_seconds(trajectory: Trajectory) -> float:
-    """Predict what LinuxCNC takes for a program from the first record on, s: the trajectory's time and more."""
-    return _build_motions(trajectory).total_seconds
-
-
-def build_linuxcnc_run(trajectory: Trajectory) -> ControllerRun:
-    """Build LinuxCNC's motions for a trajectory once, for the time that they take and for the program."""
-    motions = _build_motions(trajectory)
-    return ControllerRun(
-        lambda forced, tolerance: _make_program(trajectory, motions, forced, tolerance),
-        motions.total_seconds,
-        tuple(note_lost_time(trajectory, motions)),
-    )
-
-
-def _build_motions(trajectory: Trajectory) -> StraightMotions:
-    return build_straight_motions(trajectory, *choose_axis_rates(trajectory.posted.machine))
-
-
-def _make_program(trajectory: Trajectory, motions: StraightMotions, forced: str | None, tolerance: float) -> Writer:
     machine, posted = trajectory.posted.machine, trajectory.posted
-    check_tolerance(tolerance, "tolerance")
     legs = posted.mode if machine.wrist is None else get_leg_signs(posted.mode)  # a wrist goes on in either mode
     if not machine.mode.startswith(legs):
         raise PoseError(f"mode {posted.mode!r}: LinuxCNC's kinematics of {machine.name} has {machine.mode!r} only")
     _refuse_turns(machine, posted.poses)
-    blend = tolerance * (_TURNING if machine.turning_columns else 1.0)
-    approach = plan_approach(machine, trajectory.curve.corner[0], trajectory.joint_path.joints[0], posted.mode)
-
+    first = trajectory.curve.corner[0], trajectory.joint_path.joints[0]
+    approach = _Approach(*plan_approach(machine, *first, posted.mode))
+    knots = choose_knots(trajectory)
     check_events(posted.path)
 
     def write(file: BinaryIO) -> None:
-        for text in _format_program(trajectory, motions, approach, forced, f"G64 P{blend:g} Q0"):
+        for text in _format_program(trajectory, knots, approach, forced):
             file.write(text.encode("ascii"))
 
     return write
@@ -97,37 +75,49 @@ def _refuse_turns(machine: Machine, poses: Array) -> None:
             raise PoseError(f"{axis} {turned}, in LinuxCNC's configuration it has {most:g} either way")
 
 
-def _format_program(
-    trajectory: Trajectory, motions: StraightMotions, approach: tuple[Array, Array], forced: str | None, blend: str
-) -> Iterator[str]:
-    posted, path = trajectory.posted, trajectory.posted.path
+def _format_program(trajectory: Trajectory, knots: Knots, approach: _Approach, forced: str | None) -> Iterator[str]:
+    machine, path = trajectory.posted.machine, trajectory.posted.path
+    yield _format_head(trajectory, approach, forced)
+    yield "G21 G90 G17 G40 G49\n"
+    places = _place_records(trajectory, knots)
+    events = format_events(path, [int(places[event.record - 1]) if event.record else -1 for event in path.events])
+    yield join_lines(events.pop(-1, []))
+    way = to_display(approach.poses, machine.axis_units)
+    yield "G93 G61.1\n" + format_blocks("G53 G1 ", machine.axes, machine.axis_units, way, approach.seconds)
+    yield f"M67 E{SIGNAL} Q1\nG61\n"
+    yield from _format_motions(machine, knots, events)
+    yield f"M67 E{SIGNAL} Q0\nM2\n"
+
+
+def _format_head(trajectory: Trajectory, approach: _Approach, forced: str | None) -> str:
+    posted = trajectory.posted
     machine = posted.machine
-    ends = to_display(motions.ends, machine.axis_units)
-    way, times = to_display(approach[0], machine.axis_units), approach[1]
-    head = [
-        f"{path.source} on {machine.name}, mode {posted.mode}; made by parakin for LinuxCNC",
-        f"{motions.total_seconds:.3f} s from the first record on; {times.sum():.1f} s to it, from wherever the tool is",
+    remarks = [
+        f"{posted.path.source} on {machine.name}, mode {posted.mode}; made by parakin for LinuxCNC",
+        f"{trajectory.seconds:.3f} s from the first record on; "
+        f"{approach.seconds.sum():.1f} s to it, from wherever the tool is",
         f"machine coordinates, {' '.join(machine.axes)} in mm and degrees; F is the inverse of minutes",
+        f"for the planner {name_planner(machine)}, which takes the times from M67 E{SIGNAL} Q1 on as they are",
         *describe_setup(posted),
         *(f"OFF LIMITS: written with --force: {line}" for line in (forced or "").splitlines()),
     ]
-    yield join_lines(line for remark in head for line in format_comments(remark))
-    yield "G21 G90 G17 G40 G49\n"
-    reached = np.searchsorted(motions.piece, trajectory.curve.corner_of_record)  # how many motions lead to each record
-    events = format_events(path, [int(reached[event.record - 1]) if event.record else -1 for event in path.events])
-    yield join_lines(events.pop(-1, []))
-    yield "G93 G61\n" + format_blocks("G53 G1 ", machine.axes, machine.axis_units, way, times) + blend + "\n"
-    stops = np.flatnonzero(motions.halt[:-1]).tolist()
-    halting = set(stops)
-    breaks = sorted({0, len(ends), *events, *stops, *(at + 1 for at in stops)})
-    for begin, end in pairwise([*breaks, len(ends)]):
+    return join_lines(line for remark in remarks for line in format_comments(remark))
+
+
+def _place_records(trajectory: Trajectory, knots: Knots) -> Indices:
+    """Count the motions that lead to each record (n,)."""
+    return np.searchsorted(knots.times, trajectory.times - _ROUNDING, "left")
+
+
+def _format_motions(machine: Machine, knots: Knots, events: dict[int, list[str]]) -> Iterator[str]:
+    """Yield the motions from knot to knot, the events before each by their number, and exact stops where it stands."""
+    rows, seconds = to_display(knots.poses[1:], machine.axis_units), np.diff(knots.times)
+    standing = set(np.flatnonzero(knots.stands[1:]).tolist())
+    breaks = sorted({0, len(rows), *events, *standing, *(at + 1 for at in standing)})
+    for begin, end in pairwise([*breaks, len(rows)]):
         yield join_lines(events.get(begin, []))
-        exact = begin in halting
-        if exact:
-            yield "G61\n"
+        yield "G61.1\n" if begin in standing else ""
         for start in range(begin, end, CHUNK):
             chunk = slice(start, min(start + CHUNK, end))
-            yield format_blocks("G53 G1 ", machine.axes, machine.axis_units, ends[chunk], motions.seconds[chunk])
-        if exact:
-            yield blend + "\n"
-    yield "M2\n"
+            yield format_blocks("G53 G1 ", machine.axes, machine.axis_units, rows[chunk], seconds[chunk])
+        yield "G61\n" if begin in standing and end < len(rows) else ""

@@ -22,6 +22,10 @@ from .time_optimal import (
 )
 from .trajectory import Trajectory, name_limits
 
+# A trajectory with jerks that takes longer than one without them by this factor and by so many s is not used: a wrist's
+# noise on its pole asks for it, and no motion that a machine should make.
+_MOST_LONGER, _AT_LEAST = 10.0, 1.0
+
 
 def plan_trajectory(
     posted: Posted,
@@ -44,7 +48,7 @@ def plan_trajectory(
     Between records the tip moves straight and the pose's angles evenly. The feed is that of the record that the motion
     leads to; in rapid, and where none is programmed, drives are the only limit. Where no drive has an acceleration or a
     jerk, corners are neither rounded nor stopped at, and speeds change at once. With jerks the trajectory is near the
-    quickest.
+    quickest; where they would make it longer many times over, as a wrist's noise on its pole may, it is without them.
 
     Raises
     ------
@@ -67,11 +71,12 @@ def plan_trajectory(
         profile, binding = build_uniform_profile(joint_path, limits)
         return Trajectory(posted, curve, joint_path, profile, binding, names)
     joint_path, x, u = find_quickest(joint_path, limits)
+    profile, binding = build_accelerated_profile(joint_path, limits, x, u)
     if np.isfinite(limits.jerk).any():
         ceiling = np.minimum(*compute_ceilings(joint_path, limits))
-        joint_path, profile, binding = limit_jerk(joint_path, limits, x, ceiling)
-    else:
-        profile, binding = build_accelerated_profile(joint_path, limits, x, u)
+        softened = limit_jerk(joint_path, limits, x, ceiling)
+        if softened[1].time[-1] <= _MOST_LONGER * profile.time[-1] + _AT_LEAST:
+            joint_path, profile, binding = softened
     binding[joint_path.find_ends()] = len(names) - 1
     return Trajectory(posted, curve, joint_path, profile, binding, names)
 

@@ -1,0 +1,144 @@
+"""Choose the points of a trajectory between which the planner's splines run."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+
+from ...arrays import Array, Flags
+from ...toolpath.timing.drive_limits import DriveLimits
+from ...toolpath.timing.trajectory import Trajectory
+
+LONGEST = 0.128  # s between knots at first; halved where the spline is too far off
+SHORTEST = 1e-3  # s: a cycle
+WINDOW = 30.0  # s of a trajectory that are looked at together
+CYCLE = 1e-3  # s: of the controller
+_NEAR = 1e-3  # mm, angles on an arm of 100 mm: how far the spline may be from the trajectory
+_ARM = 100.0  # mm
+_LATE = 1e-4  # s: how far a joint may be off, as time at its full speed
+_LIMIT = 1.005  # of a joint's acceleration that the spline may need
+_STANDING = 1e-9  # mm/s of path speed: rounding
+_FEWEST = 4  # intervals between two stands
+_APART = 2e-6  # mm, angles on an arm of 100 mm: nearer knots could be one in a program
+_SLOWEST = 0.11 / 60.0  # mm/s of the tip: just what LinuxCNC obeys
+_SHORT = 1e-4  # s, for the speed of a pose by differences
+
+
+class Knots(NamedTuple):
+    """k points of a trajectory, the first at its start.
+
+    times : (k,) s
+    poses : (k, axes) mm and rad
+    stands : (k,) whether the tool stands still there
+    """
+
+    times: Array
+    poses: Array
+    stands: Flags
+
+
+def choose_knots(trajectory: Trajectory) -> Knots:
+    """Choose knots so that a cubic spline through them is the trajectory, and needs no more of the joints than it.
+
+    Between two stands the knots are first even; intervals in which the spline is off are halved, down to a cycle.
+    """
+    stands = find_stands(trajectory)
+    parts = [_split_evenly(*span) for span in pairwise(stands.tolist())]
+    bounds = np.concatenate([stands[:1], *parts])
+    rates = np.array([_measure_rate(trajectory, time) for time in bounds.tolist()])
+    rates[np.isin(bounds, stands)] = 0.0
+    times = [np.zeros(1)]
+    for window, ends in zip(pairwise(bounds.tolist()), pairwise(rates), strict=True):
+        times.append(_divide_window(trajectory, window, ends)[1:])
+    all_times = np.concatenate(times)
+    poses, standing = trajectory.at(all_times).poses, np.isin(all_times, stands)
+    linear = np.array([unit == "mm" for unit in trajectory.posted.machine.axis_units])
+    return _drop_creeping(Knots(all_times, poses, standing), linear)
+
+
+def _split_evenly(start: float, end: float) -> Array:
+    """Split a time into windows; return their ends."""
+    return np.linspace(start, end, max(int(np.ceil((end - start) / WINDOW)), 1) + 1)[1:]
+
+
+def _weigh_axes(trajectory: Trajectory) -> Array:
+    """Weigh the axes (axes,): an angle counts on an arm of 100 mm."""
+    return np.where(np.array(trajectory.posted.machine.axis_units) == "rad", _ARM, 1.0)
+
+
+def _drop_creeping(knots: Knots, linear: Flags) -> Knots:
+    """Drop knots that are not apart from the one before, but for those of stands, and hold tips that creep.
+
+    LinuxCNC obeys no feed below a tenth of a mm a minute, by which it measures a motion whose tip moves, however the
+    tool turns: a tip that moves by less stays where it was, and makes up for it in a later motion.
+    """
+    poses, weights = knots.poses.copy(), np.where(linear, 1.0, _ARM)
+    seconds = np.diff(knots.times)
+    steps = np.linalg.norm(np.diff(poses[:, linear], axis=0), axis=1)
+    if (steps >= _SLOWEST * seconds).all():
+        return knots
+    kept = [0]
+    for i in range(1, len(poses)):
+        last = kept[-1]
+        tip = np.linalg.norm(poses[i, linear] - poses[last, linear])
+        if tip < _SLOWEST * (knots.times[i] - knots.times[last]):
+            poses[i, linear] = poses[last, linear]
+        apart = (np.abs(poses[i] - poses[last]) * weights).max() >= _APART
+        if apart or (knots.stands[last] and knots.stands[i]):
+            kept.append(i)
+        elif knots.stands[i]:
+            kept[-1] = i
+    return Knots(knots.times[kept], poses[kept], knots.stands[kept])
+
+
+def find_stands(trajectory: Trajectory) -> Array:
+    """Find the times (k,) at which the tool stands still: the start, the end, and the halts between; s."""
+    profile = trajectory.profile
+    still = profile.time[:-1][profile.speed <= _STANDING]
+    times: Array = np.unique(np.concatenate([[0.0], still, [trajectory.seconds]]))
+    stands: Array = times[np.append(True, np.diff(times) > 1e-9)]
+    return stands
+
+
+def _measure_rate(trajectory: Trajectory, time: float) -> Array:
+    """Measure the change of the pose (axes,) a second, by differences."""
+    before, after = trajectory.at([time - _SHORT, time + _SHORT]).poses
+    rate: Array = (after - before) / (2.0 * _SHORT)
+    return rate
+
+
+def _divide_window(trajectory: Trajectory, window: tuple[float, float], rates: tuple[Array, Array]) -> Array:
+    """Divide a time in which the tool does not stand still; return the knots' times with both ends.
+
+    rates : of the pose at both ends, (axes,) each
+    """
+    start, end = window
+    count = max(_FEWEST, int(np.ceil((end - start) / LONGEST)))
+    knots = np.linspace(start, end, count + 1)
+    cycles = np.linspace(start, end, max(int(np.ceil((end - start) / CYCLE)), 2 * count) + 1)
+    planned = trajectory.at(cycles).poses
+    while True:
+        spline = CubicSpline(knots, trajectory.at(knots).poses, bc_type=((1, rates[0]), (1, rates[1])))
+        off = _find_deviations(trajectory, cycles, planned, spline(cycles))
+        bad = np.searchsorted(knots, cycles[off], "right") - 1
+        bad = np.unique(np.concatenate([bad, bad - 1]))  # beside a knot either side may be at fault
+        bad = bad[(bad >= 0) & (bad < len(knots) - 1)]
+        bad = bad[knots[bad + 1] - knots[bad] >= 2.0 * SHORTEST]
+        if not len(bad):
+            return knots
+        knots = np.sort(np.concatenate([knots, 0.5 * (knots[bad] + knots[bad + 1])]))
+
+
+def _find_deviations(trajectory: Trajectory, cycles: Array, planned: Array, poses: Array) -> Flags:
+    """Find the cycles (k,) in which the spline's pose, a joint, or a joint's acceleration is off."""
+    machine, mode = trajectory.posted.machine, trajectory.posted.mode
+    limits, step = DriveLimits.of(machine), cycles[1] - cycles[0]
+    off: Flags = (np.abs(poses - planned) * _weigh_axes(trajectory)).max(axis=1) > _NEAR
+    joints, planned_joints = machine.follow(poses, mode), machine.follow(planned, mode)
+    off |= (np.abs(joints - planned_joints) > _LATE * limits.speed).any(axis=1)
+    rises, planned_rises = (np.abs(np.diff(rows, 2, axis=0)) / step**2 for rows in (joints, planned_joints))
+    off[1:-1] |= (rises > _LIMIT * np.maximum(limits.acceleration, planned_rises)).any(axis=1)
+    return off

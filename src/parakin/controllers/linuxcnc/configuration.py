@@ -21,8 +21,8 @@ def make_linuxcnc_configuration(machine: Machine) -> dict[str, str]:
 
     The files are kinematics, trajectory planner and guard (C, built by LinuxCNC's ``halcompile --install``), the header
     that all include, the ini and HAL files, the window that shows the machine, the tool table, a first program and a
-    page that tells how to start, all named after the machine. The last line of each tells by a hash whether the file was
-    edited since.
+    page that tells how to start, all named after the machine. The last line of each tells by a hash whether the file
+    was edited since.
     """
     texts = {
         f"{name_kinematics(machine)}.c": write_module(machine),

@@ -24,6 +24,7 @@ HERE = Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE.parent / "tests" / "linuxcnc"))
 from simulation import MODULES, simulated, why_not  # noqa: E402
 
+FEED = 10_000.0  # mm/min in the cut
 OTHERS = ("hexapod", "lambda6", "orthoglide5_table")
 ON = [["switch_on"], ["home"], ["wait", 1.0]]
 
@@ -32,7 +33,7 @@ def show_part(folder):
     """The whole screen while the Tricept cuts."""
     machine = pk.load("tricept")
     file = io.BytesIO()
-    pk.make_linuxcnc_program(pk.prepare(machine, part(folder)).trajectory)(file)
+    pk.make_linuxcnc_program(pk.prepare(machine, part(folder, upright=False, feed=FEED)).trajectory)(file)
     with simulated(machine) as simulation:
         steps = [*ON, ["start", "part.ngc"], ["wait", 15.0], ["picture", "screen.png"], ["abort"]]
         simulation.show(steps, {"part.ngc": file.getvalue().decode("ascii")})

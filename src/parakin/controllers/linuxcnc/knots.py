@@ -40,6 +40,14 @@ class Knots(NamedTuple):
     stands: Flags
 
 
+class _Cycles(NamedTuple):
+    """Poses (k, axes) and joints (k, joints) in k cycles, and between them the accelerations (k - 2, joints)."""
+
+    poses: Array
+    joints: Array
+    rises: Array
+
+
 def choose_knots(trajectory: Trajectory) -> Knots:
     """Choose knots so that a cubic spline through them is the trajectory, and needs no more of the joints than it.
 
@@ -119,10 +127,10 @@ def _divide_window(trajectory: Trajectory, window: tuple[float, float], rates: t
     count = max(_FEWEST, int(np.ceil((end - start) / LONGEST)))
     knots = np.linspace(start, end, count + 1)
     cycles = np.linspace(start, end, max(int(np.ceil((end - start) / CYCLE)), 2 * count) + 1)
-    planned = trajectory.at(cycles).poses
+    planned = _follow_cycles(trajectory, cycles, trajectory.at(cycles).poses)
     while True:
         spline = CubicSpline(knots, trajectory.at(knots).poses, bc_type=((1, rates[0]), (1, rates[1])))
-        off = _find_deviations(trajectory, cycles, planned, spline(cycles))
+        off = _find_deviations(trajectory, planned, _follow_cycles(trajectory, cycles, spline(cycles)))
         bad = np.searchsorted(knots, cycles[off], "right") - 1
         bad = np.unique(np.concatenate([bad, bad - 1]))  # beside a knot either side may be at fault
         bad = bad[(bad >= 0) & (bad < len(knots) - 1)]
@@ -132,13 +140,16 @@ def _divide_window(trajectory: Trajectory, window: tuple[float, float], rates: t
         knots = np.sort(np.concatenate([knots, 0.5 * (knots[bad] + knots[bad + 1])]))
 
 
-def _find_deviations(trajectory: Trajectory, cycles: Array, planned: Array, poses: Array) -> Flags:
+def _follow_cycles(trajectory: Trajectory, cycles: Array, poses: Array) -> _Cycles:
+    """Follow poses at evenly timed cycles with the joints."""
+    joints = trajectory.posted.machine.follow(poses, trajectory.posted.mode)
+    return _Cycles(poses, joints, np.abs(np.diff(joints, 2, axis=0)) / (cycles[1] - cycles[0]) ** 2)
+
+
+def _find_deviations(trajectory: Trajectory, planned: _Cycles, splined: _Cycles) -> Flags:
     """Find the cycles (k,) in which the spline's pose, a joint, or a joint's acceleration is off."""
-    machine, mode = trajectory.posted.machine, trajectory.posted.mode
-    limits, step = DriveLimits.of(machine), cycles[1] - cycles[0]
-    off: Flags = (np.abs(poses - planned) * _weigh_axes(trajectory)).max(axis=1) > _NEAR
-    joints, planned_joints = machine.follow(poses, mode), machine.follow(planned, mode)
-    off |= (np.abs(joints - planned_joints) > _LATE * limits.speed).any(axis=1)
-    rises, planned_rises = (np.abs(np.diff(rows, 2, axis=0)) / step**2 for rows in (joints, planned_joints))
-    off[1:-1] |= (rises > _LIMIT * np.maximum(limits.acceleration, planned_rises)).any(axis=1)
+    limits = DriveLimits.of(trajectory.posted.machine)
+    off: Flags = (np.abs(splined.poses - planned.poses) * _weigh_axes(trajectory)).max(axis=1) > _NEAR
+    off |= (np.abs(splined.joints - planned.joints) > _LATE * limits.speed).any(axis=1)
+    off[1:-1] |= (splined.rises > _LIMIT * np.maximum(limits.acceleration, planned.rises)).any(axis=1)
     return off

@@ -387,7 +387,7 @@ def test_the_models_distance_to_limits_is_zero_where_one_is_reached(m, probes):
 
 
 def sections(text):
-    found = configparser.ConfigParser(strict=False, interpolation=None)  # HALFILE may stand twice
+    found = configparser.ConfigParser(strict=True, interpolation=None)
     found.optionxform = str
     found.read_string(text)
     return found

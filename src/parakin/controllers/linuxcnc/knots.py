@@ -24,6 +24,8 @@ _STANDING = 1e-9  # mm/s of path speed: rounding
 _FEWEST = 4  # intervals between two stands
 _APART = 2e-6  # mm, angles on an arm of 100 mm: nearer knots could be one in a program
 _SLOWEST = 0.11 / 60.0  # mm/s of the tip: just what LinuxCNC obeys
+_SLOW = 1.0  # mm/s: a slower tool is looked at less often than in every cycle, once in 1 µm,
+_MOST_SLOW = 1e4  # or so many cycles
 _SHORT = 1e-4  # s, for the speed of a pose by differences
 
 
@@ -54,7 +56,7 @@ def choose_knots(trajectory: Trajectory) -> Knots:
     Between two stands the knots are first even; intervals in which the spline is off are halved, down to a cycle.
     """
     stands = find_stands(trajectory)
-    parts = [_split_evenly(*span) for span in pairwise(stands.tolist())]
+    parts = [_split_evenly(trajectory, span) for span in pairwise(stands.tolist())]
     bounds = np.concatenate([stands[:1], *parts])
     rates = np.array([_measure_rate(trajectory, time) for time in bounds.tolist()])
     rates[np.isin(bounds, stands)] = 0.0
@@ -67,9 +69,10 @@ def choose_knots(trajectory: Trajectory) -> Knots:
     return _drop_creeping(Knots(all_times, poses, standing), linear)
 
 
-def _split_evenly(start: float, end: float) -> Array:
+def _split_evenly(trajectory: Trajectory, span: tuple[float, float]) -> Array:
     """Split a time into windows; return their ends."""
-    return np.linspace(start, end, max(int(np.ceil((end - start) / WINDOW)), 1) + 1)[1:]
+    window = WINDOW * _SLOW / _find_fastest(trajectory, span)
+    return np.linspace(*span, max(int(np.ceil((span[1] - span[0]) / window)), 1) + 1)[1:]
 
 
 def _weigh_axes(trajectory: Trajectory) -> Array:
@@ -92,7 +95,7 @@ def _drop_creeping(knots: Knots, linear: Flags) -> Knots:
     for i in range(1, len(poses)):
         last = kept[-1]
         tip = np.linalg.norm(poses[i, linear] - poses[last, linear])
-        if tip < _SLOWEST * (knots.times[i] - knots.times[last]):
+        if tip < min(_SLOWEST * (knots.times[i] - knots.times[last]), _NEAR):
             poses[i, linear] = poses[last, linear]
         apart = (np.abs(poses[i] - poses[last]) * weights).max() >= _APART
         if apart or (knots.stands[last] and knots.stands[i]):
@@ -124,9 +127,10 @@ def _divide_window(trajectory: Trajectory, window: tuple[float, float], rates: t
     rates : of the pose at both ends, (axes,) each
     """
     start, end = window
-    count = max(_FEWEST, int(np.ceil((end - start) / LONGEST)))
+    slow = _SLOW / _find_fastest(trajectory, window)
+    count = max(_FEWEST, int(np.ceil((end - start) / (LONGEST * slow))))
     knots = np.linspace(start, end, count + 1)
-    cycles = np.linspace(start, end, max(int(np.ceil((end - start) / CYCLE)), 2 * count) + 1)
+    cycles = np.linspace(start, end, max(int(np.ceil((end - start) / (CYCLE * slow))), 2 * count) + 1)
     planned = _follow_cycles(trajectory, cycles, trajectory.at(cycles).poses)
     while True:
         spline = CubicSpline(knots, trajectory.at(knots).poses, bc_type=((1, rates[0]), (1, rates[1])))
@@ -138,6 +142,13 @@ def _divide_window(trajectory: Trajectory, window: tuple[float, float], rates: t
         if not len(bad):
             return knots
         knots = np.sort(np.concatenate([knots, 0.5 * (knots[bad] + knots[bad + 1])]))
+
+
+def _find_fastest(trajectory: Trajectory, window: tuple[float, float]) -> float:
+    """Find the greatest speed of the path in a time, no less than what a tool makes _SLOW of: mm/s."""
+    profile = trajectory.profile
+    first, last = np.searchsorted(profile.time, window)
+    return float(np.clip(profile.speed[max(first - 1, 0) : last + 1].max(initial=0.0), _SLOW / _MOST_SLOW, _SLOW))
 
 
 def _follow_cycles(trajectory: Trajectory, cycles: Array, poses: Array) -> _Cycles:

@@ -65,8 +65,7 @@ def choose_knots(trajectory: Trajectory) -> Knots:
         times.append(_divide_window(trajectory, window, ends)[1:])
     all_times = np.concatenate(times)
     poses, standing = trajectory.at(all_times).poses, np.isin(all_times, stands)
-    linear = np.array([unit == "mm" for unit in trajectory.posted.machine.axis_units])
-    return _drop_creeping(Knots(all_times, poses, standing), linear)
+    return _drop_creeping(trajectory, Knots(all_times, poses, standing))
 
 
 def _split_evenly(trajectory: Trajectory, span: tuple[float, float]) -> Array:
@@ -80,13 +79,14 @@ def _weigh_axes(trajectory: Trajectory) -> Array:
     return np.where(np.array(trajectory.posted.machine.axis_units) == "rad", _ARM, 1.0)
 
 
-def _drop_creeping(knots: Knots, linear: Flags) -> Knots:
+def _drop_creeping(trajectory: Trajectory, knots: Knots) -> Knots:
     """Drop knots that are not apart from the one before, but for those of stands, and hold tips that creep.
 
     LinuxCNC obeys no feed below a tenth of a mm a minute, by which it measures a motion whose tip moves, however the
     tool turns: a tip that moves by less stays where it was, and makes up for it in a later motion.
     """
-    poses, weights = knots.poses.copy(), np.where(linear, 1.0, _ARM)
+    poses, weights = knots.poses.copy(), _weigh_axes(trajectory)
+    linear = np.array([unit == "mm" for unit in trajectory.posted.machine.axis_units])
     seconds = np.diff(knots.times)
     steps = np.linalg.norm(np.diff(poses[:, linear], axis=0), axis=1)
     if (steps >= _SLOWEST * seconds).all():

@@ -209,13 +209,14 @@ static int cut_step(void)
     while (!try_step(p, length, middle, end)) {
         length *= 0.5;
         if (length < LEAST_STEP) {
-            path_refused = !take_jump(p, cut_at + length);
+            path_refused = cut_jumped || !take_jump(p, cut_at + length); /* one jump must be enough */
             return 0;
         }
     }
-    if (length > 0.5 * rest && length < rest) { /* two equal ones rather than a long and a short one */
-        length = 0.5 * rest;
-        if (!try_step(p, length, middle, end))
+    if (length > 0.5 * rest && length < rest) { /* two equal ones rather than a long and a short one, if they do */
+        if (try_step(p, 0.5 * rest, middle, end))
+            length = 0.5 * rest;
+        else if (!try_step(p, length, middle, end))
             return 0;
     }
     s->piece = cut_piece;

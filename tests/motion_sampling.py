@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import parakin as pk
-from parakin.kinematics.wrist import PRINTED
+from parakin.kinematics.wrist.pole_thresholds import PRINTED
 from parakin.machine import Machine
 from parakin.toolpath.path import ToolPath
 from parakin.toolpath.posting.offences import judge_path

@@ -7,7 +7,9 @@ from hypothesis import strategies as st
 
 import parakin as pk
 from parakin.kinematics import turns
-from parakin.kinematics import wrist as w
+from parakin.kinematics.wrist.pole_crossing import EITHER, OWN
+from parakin.kinematics.wrist.pole_thresholds import EXACT, PRINTED
+from parakin.kinematics.wrist.pose_angles import find_nearest_direction, flip_direction, flip_rotation
 
 WRISTS = ["tricept", "orthoglide5_head", "orthoglide5_table"]
 angles = st.floats(-50.0, 50.0)
@@ -60,8 +62,8 @@ def test_freedom_is_the_sine_squared_of_the_angle_off_the_pole(machine):
 
 def test_the_pole_is_where_both_modes_meet(machine):
     wrist, on = machine.wrist, upright(machine)
-    assert wrist.find_free(on, w.EXACT).all()
-    assert not wrist.find_free(tilted(machine, np.array([0.01])), w.PRINTED).any()
+    assert wrist.find_free(on, EXACT).all()
+    assert not wrist.find_free(tilted(machine, np.array([0.01])), PRINTED).any()
     second = [machine.inverse(on, mode)[0, wrist.second] for mode in machine.head_modes(machine.mode)]
     assert second[0] == pytest.approx(second[1], abs=1e-9)
 
@@ -90,14 +92,14 @@ def test_the_nearest_joints_are_those_of_the_mode_that_a_guess_is_in(machine):
     for number, joints in enumerate(solutions):
         guess = joints + 0.01
         guess[:, wrist.pair] += 4.0 * np.pi
-        nearest, modes = wrist.solve_nearest(poses, machine.mode, guess, w.PRINTED)
+        nearest, modes = wrist.solve_nearest(poses, machine.mode, guess, PRINTED)
         assert (modes == number).all()
         off = np.zeros(joints.shape[1])
         off[wrist.pair] = 4.0 * np.pi
         np.testing.assert_allclose(nearest - joints, np.tile(off, (len(joints), 1)), atol=1e-9)
-    known = np.full(len(poses), w.OWN, np.int8)
-    kept, modes = wrist.solve_nearest(poses, machine.mode, solutions[1], w.PRINTED, known)
-    assert (modes == w.OWN).all()
+    known = np.full(len(poses), OWN, np.int8)
+    kept, modes = wrist.solve_nearest(poses, machine.mode, solutions[1], PRINTED, known)
+    assert (modes == OWN).all()
     np.testing.assert_allclose(turns.wrap_angle((kept - solutions[0])[:, wrist.pair]), 0.0, atol=1e-9)
 
 
@@ -105,8 +107,8 @@ def test_on_the_pole_the_nearest_joints_have_the_guess_s_first(machine):
     poses = upright(machine, 5)
     guess = machine.inverse(poses)
     guess[:, machine.wrist.first] = np.linspace(-1.0, 1.0, 5)
-    joints, modes = machine.wrist.solve_nearest(poses, machine.mode, guess, w.PRINTED)
-    assert (modes == w.EITHER).all()
+    joints, modes = machine.wrist.solve_nearest(poses, machine.mode, guess, PRINTED)
+    assert (modes == EITHER).all()
     np.testing.assert_array_equal(joints[:, machine.wrist.first], guess[:, machine.wrist.first])
     assert machine.wrist.measure_blur(poses).min() > 1e6
 
@@ -142,13 +144,13 @@ def rotation(turns):
 
 @given(angles, angles, angles)
 def test_the_other_turns_are_of_the_same_rotation(a, b, c):
-    other = w.flip_rotation(np.array([[a, b, c]]))[0]
+    other = flip_rotation(np.array([[a, b, c]]))[0]
     np.testing.assert_allclose(rotation(other), rotation(np.array([a, b, c])), atol=1e-12)
 
 
 @given(angles, angles)
 def test_the_other_direction_is_the_same(b, c):
-    other_c, other_b = w.flip_direction(np.array([c]), np.array([b]))[0]
+    other_c, other_b = flip_direction(np.array([c]), np.array([b]))[0]
     np.testing.assert_allclose(
         rotation(np.array([0.0, other_b, other_c]))[:, 2], rotation(np.array([0.0, b, c]))[:, 2], atol=1e-12
     )
@@ -159,7 +161,7 @@ def test_the_nearest_direction_points_along_the_axis():
     axis = rng.normal(size=(200, 3))
     axis /= np.linalg.norm(axis, axis=1)[:, None]
     near = rng.uniform(-6.0, 6.0, (200, 3)) * [0, 1, 1]
-    turns = w.find_nearest_direction(axis, near)
+    turns = find_nearest_direction(axis, near)
     np.testing.assert_allclose([rotation(row)[:, 2] for row in turns], axis, atol=1e-12)
     assert (turns[:, 0] == 0.0).all()
     assert np.abs(turns[:, 2] - near[:, 2]).max() <= np.pi + 1e-9

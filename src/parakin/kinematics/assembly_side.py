@@ -11,7 +11,7 @@ from ..model.traces import Model
 from .closure_roots import find_roots
 from .inverse import SINGULAR, solve_inverse
 from .turns import wrap_angle
-from .wrist import flip_mode
+from .wrist.pole_crossing import flip_mode
 
 
 def find_sides(model: Model, poses: Array, mode: str | None = None, joints: Array | None = None) -> Array:

@@ -20,7 +20,7 @@ from ..kernels.tape import Tape
 from ..model.elements import MOTION_UNITS
 from ..model.traces import Model
 from .tapes import collect_newton_tapes
-from .wrist import SAME_MODE
+from .wrist.pole_thresholds import SAME_MODE
 
 CLOSED = 1e-9  # greatest closure error of an answer, mm in a machine of a metre
 MOST_STEPS = 24

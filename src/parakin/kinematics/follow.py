@@ -8,7 +8,8 @@ from ..arrays import Array
 from ..model.traces import Model
 from .inverse import solve_inverse
 from .turns import fill_free, unwind_angles
-from .wrist import EXACT, find_wrist
+from .wrist.pole_thresholds import EXACT
+from .wrist.turning_joints import find_wrist
 
 
 def follow_path(model: Model, poses: Array, mode: str, free_below: float = EXACT) -> Array:

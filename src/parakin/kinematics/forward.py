@@ -33,7 +33,8 @@ from .solution import (
 )
 from .start_modes import is_beside, take_modes_of_starts
 from .turns import count_nearest_turns
-from .wrist import bring_within_poles, is_upright
+from .wrist.pole_thresholds import is_upright
+from .wrist.pose_angles import bring_within_poles
 
 WITHIN_A_TURN = 6  # steps of half a radian at most, which can't leave the start's turn
 STEADY = 0.2  # by which the determinant may change from start to answer and still tell the start's own side

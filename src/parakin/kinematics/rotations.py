@@ -10,7 +10,9 @@ import numpy as np
 
 from ..arrays import Array, split_rows
 from .turns import fill_free, find_nearest_turn, unwind_angles, wrap_angle
-from .wrist import EXACT, find_crossings, flip_rotation, has_swing
+from .wrist.pole_crossing import find_crossings, has_swing
+from .wrist.pole_thresholds import EXACT
+from .wrist.pose_angles import flip_rotation
 
 TURNS = "ABC"  # about X, Y and Z
 LEVEL = 1e-12  # rounding error of a rotation's entries

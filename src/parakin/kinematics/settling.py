@@ -14,7 +14,8 @@ from ..model.traces import Model
 from ..units import AXIS_UNITS
 from .closure_roots import compute_mode_tolerance
 from .start_modes import SETTLED
-from .wrist import EXACT, flip_mode
+from .wrist.pole_crossing import flip_mode
+from .wrist.pole_thresholds import EXACT
 
 CLEAR = 0.01  # of the greatest leg: joints of legs that close are so far from another mode's, a hundred tolerances
 

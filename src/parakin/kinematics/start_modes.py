@@ -13,7 +13,7 @@ from ..model.traces import Model
 from .closure_roots import compare_with_mode, find_in_mode
 from .solution import ANSWERED, Answers, put_rows, take_rows
 from .turns import wrap_angle
-from .wrist import point_direction
+from .wrist.pose_angles import point_direction
 
 STANDS_IN = 0.5  # of the way to another mode: how near joints must be to tell that a pose's legs stand in a mode
 NEARER = 0.1  # of the way to the answer in the default mode: one in another mode that is nearer is taken instead

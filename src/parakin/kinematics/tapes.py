@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 from ..kernels.tape import NewtonTapes, Tape
 from ..model.traces import Model
-from .wrist import flip_mode
+from .wrist.pole_crossing import flip_mode
 
 
 class SphereTapes(NamedTuple):

@@ -7,7 +7,8 @@ import numpy as np
 from ...arrays import Array
 from ...errors import PoseError
 from ...kinematics.turns import TURN, find_nearest_turn
-from ...kinematics.wrist import EXACT, NEAR_START, PRINTED, SAME_MODE, TILTED, Wrist, is_upright
+from ...kinematics.wrist.pole_thresholds import EXACT, NEAR_START, PRINTED, SAME_MODE, TILTED, is_upright
+from ...kinematics.wrist.turning_joints import Wrist
 from ...machine import Machine
 from ...toolpath.posting.wrist_poses import find_pose_with_wrist
 from ...toolpath.timing.drive_limits import DriveLimits

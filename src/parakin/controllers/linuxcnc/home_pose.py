@@ -6,7 +6,9 @@ import numpy as np
 
 from ...arrays import Array
 from ...kinematics.turns import find_nearest_turn
-from ...kinematics.wrist import FAR_TILT, Wrist, flip_direction
+from ...kinematics.wrist.pole_thresholds import FAR_TILT
+from ...kinematics.wrist.pose_angles import flip_direction
+from ...kinematics.wrist.turning_joints import Wrist
 from ...machine import Machine
 from ...toolpath.posting.wrist_poses import find_pose_with_wrist
 

@@ -15,7 +15,8 @@ from ...kinematics.closure_roots import MOST_STEPS, list_step_caps
 from ...kinematics.forward import STEADY
 from ...kinematics.start_modes import SETTLED
 from ...kinematics.turns import TURN
-from ...kinematics.wrist import EXACT, GAIN, NEAR_MODE, STANDING, SWING, compile_way_comparison
+from ...kinematics.wrist.pole_crossing import GAIN, compile_way_comparison
+from ...kinematics.wrist.pole_thresholds import EXACT, NEAR_MODE, STANDING, SWING
 from ...machine import Machine
 from ...model.limits import Limit
 from ...performance.characteristic_length import choose_characteristic_length

@@ -11,7 +11,7 @@ import numpy as np
 from ...arguments import check_arguments
 from ...arrays import Array, Indices, Writer
 from ...errors import PoseError
-from ...kinematics.wrist import get_leg_signs
+from ...kinematics.wrist.pole_crossing import get_leg_signs
 from ...machine import Machine
 from ...toolpath.posting.setup_texts import describe_setup
 from ...toolpath.timing.trajectory import Trajectory

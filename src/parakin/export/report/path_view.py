@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ...arrays import Array, Flags, Indices
-from ...kinematics.wrist import point_direction, solve_direction
+from ...kinematics.wrist.pose_angles import point_direction, solve_direction
 from ...machine import Machine
 from ...toolpath.posting.range_use import compute_relative_margin
 from ..machine.figures import (

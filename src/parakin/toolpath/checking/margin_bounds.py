@@ -12,7 +12,8 @@ from typing import NamedTuple
 import numpy as np
 
 from ...arrays import Array, Flags, Indices
-from ...kinematics.wrist import ASIDE, EITHER, LEEWAY, OTHER, OWN, PROVED, WristModes, convert_to_freedom
+from ...kinematics.wrist.pole_crossing import EITHER, OTHER, OWN, WristModes
+from ...kinematics.wrist.pole_thresholds import ASIDE, LEEWAY, PROVED, convert_to_freedom
 from ...performance.certified.margin_rates import MarginRates
 from .motion_sections import Sections
 from .motions import (

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ...arrays import Array, Flags, Indices, Progress
-from ...kinematics.wrist import FLIP
+from ...kinematics.wrist.pole_thresholds import FLIP
 from ..posting.posted import Posted
 from .ledger import Jump, Ledger, Tally
 from .margin_bounds import MotionProver

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from ...arrays import Array, Flags, Indices
-from ...kinematics.wrist import EITHER, OTHER, OWN
+from ...kinematics.wrist.pole_crossing import EITHER, OTHER, OWN
 from .margin_bounds import MotionProver
 
 RUN = 64  # motions bounded at once

@@ -9,7 +9,8 @@ import numpy as np
 
 from ...arrays import Array, Flags, Indices
 from ...kinematics.turns import count_nearest_turns
-from ...kinematics.wrist import EITHER, OTHER, OWN, PRINTED, WristModes
+from ...kinematics.wrist.pole_crossing import EITHER, OTHER, OWN, WristModes
+from ...kinematics.wrist.pole_thresholds import PRINTED
 from ...machine import Machine
 from ...performance.characteristic_length import choose_characteristic_length
 from ...performance.jacobians import list_column_scales

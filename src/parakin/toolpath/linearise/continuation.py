@@ -9,7 +9,7 @@ import numpy as np
 from ...arrays import Array, Flags, Indices
 from ...kinematics.rotations import collect_turns, compute_rotations, find_nearest_rotation_turns
 from ...kinematics.turns import find_nearest_turn
-from ...kinematics.wrist import continue_direction
+from ...kinematics.wrist.pose_angles import continue_direction
 from ...machine import Machine
 from ..posting.frames import build_frame_from_angles, compute_poses
 

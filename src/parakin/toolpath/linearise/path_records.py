@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from ...arrays import Array, Indices
-from ...kinematics.wrist import find_nearest_direction
+from ...kinematics.wrist.pose_angles import find_nearest_direction
 from ..path import ToolPath, insert_records
 from ..posting.post import post_path
 from ..posting.posted import Posted

@@ -16,7 +16,8 @@ import numpy as np
 
 from ...arrays import Array, Flags, Indices
 from ...kinematics.turns import wrap_angle
-from ...kinematics.wrist import EXACT, NEAR_HOLD, PRINTED, REPORTED, SWING, find_nearest_direction, flip_azimuth
+from ...kinematics.wrist.pole_thresholds import EXACT, NEAR_HOLD, PRINTED, REPORTED, SWING
+from ...kinematics.wrist.pose_angles import find_nearest_direction, flip_azimuth
 from ..path import Note
 from ..posting.frames import compute_poses
 from ..posting.posted import Posted

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...arrays import Array, Flags, Indices
-from ...kinematics.wrist import EXACT, PRINTED, REPORTED, is_upright
+from ...kinematics.wrist.pole_thresholds import EXACT, PRINTED, REPORTED, is_upright
 from ..path import Note
 from ..posting.posted import Posted
 from ..programmed_path import ProgrammedPath

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...arrays import Array, Indices
-from ...kinematics.wrist import EXACT, PRINTED
+from ...kinematics.wrist.pole_thresholds import EXACT, PRINTED
 from ..path import ToolPath
 from ..programmed_path import ProgrammedPath
 from .pole_steps import PoleSteps, meet_circle

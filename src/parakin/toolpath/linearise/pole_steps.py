@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...arrays import Array, Flags, Indices
-from ...kinematics.wrist import VICINITY
+from ...kinematics.wrist.pole_thresholds import VICINITY
 from ..posting.posted import Posted
 from ..programmed_path import ProgrammedPath
 from .poles import Pole

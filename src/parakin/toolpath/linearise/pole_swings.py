@@ -8,7 +8,7 @@ import numpy as np
 
 from ...arrays import Array
 from ...kinematics.turns import wrap_angle
-from ...kinematics.wrist import PRINTED, REPORTED, TRAVEL, VICINITY
+from ...kinematics.wrist.pole_thresholds import PRINTED, REPORTED, TRAVEL, VICINITY
 from ..path import Note, ToolPath
 from ..posting.posted import Posted
 from .path_cuts import PathPositions

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...arrays import Array
-from ...kinematics.wrist import solve_direction
+from ...kinematics.wrist.pose_angles import solve_direction
 from ...machine import Machine
 from ..posting.posted import Posted
 from .deviation import Interpolation

@@ -18,7 +18,8 @@ from ...arrays import Array, Flags, Indices
 from ...errors import PoseError
 from ...kinematics.rotations import collect_turns
 from ...kinematics.turns import TURN, fill_free
-from ...kinematics.wrist import NEAR_TURN, continue_turns, find_nearest_direction
+from ...kinematics.wrist.pole_thresholds import NEAR_TURN
+from ...kinematics.wrist.pose_angles import continue_turns, find_nearest_direction
 from ...machine import Machine
 from ..path import Note, ToolPath, insert_records
 from ..posting.post import post_path

@@ -10,7 +10,7 @@ import numpy as np
 
 from ...arrays import Array, Flags, Indices
 from ...kinematics.turns import TURN
-from ...kinematics.wrist import PRINTED
+from ...kinematics.wrist.pole_thresholds import PRINTED
 from ...machine import Machine
 from ..path import ToolPath, select_records
 from ..posting.frames import PathLimit, build_frame_from_angles, compose_frames, compute_poses

@@ -13,7 +13,8 @@ import numpy as np
 
 from ...arrays import Array, Flags, Indices
 from ...kinematics.turns import wrap_angle
-from ...kinematics.wrist import PRINTED, fold_direction, is_upright
+from ...kinematics.wrist.pole_thresholds import PRINTED, is_upright
+from ...kinematics.wrist.pose_angles import fold_direction
 from ...machine import Machine
 from ..path import ToolPath
 from ..programmed_path import ProgrammedPath

@@ -12,7 +12,8 @@ import numpy as np
 from ...arrays import Array, split_rows
 from ...kinematics.rotations import LEVEL, get_turning_axis
 from ...kinematics.turns import turn_ahead, unwind_angles
-from ...kinematics.wrist import EXACT, PRINTED, cross_direction_pole, is_on_pole, solve_direction
+from ...kinematics.wrist.pole_thresholds import EXACT, PRINTED, is_on_pole
+from ...kinematics.wrist.pose_angles import cross_direction_pole, solve_direction
 from ...machine import Machine
 
 BLOCK = 1 << 13  # records whose many intermediate arrays stay in the cache

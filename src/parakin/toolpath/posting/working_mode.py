@@ -8,7 +8,7 @@ import numpy as np
 
 from ...arrays import Array, Flags
 from ...kinematics.turns import TURN
-from ...kinematics.wrist import PRINTED, SWING
+from ...kinematics.wrist.pole_thresholds import PRINTED, SWING
 from ...machine import Machine
 from ..path import ToolPath
 from .path_samples import SampledPath

@@ -6,7 +6,7 @@ import numpy as np
 
 from ...arrays import Array
 from ...kinematics.turns import find_nearest_turn
-from ...kinematics.wrist import EXACT
+from ...kinematics.wrist.pole_thresholds import EXACT
 from ...machine import Machine
 
 _ROUNDS = 60

@@ -9,7 +9,7 @@ import numpy as np
 from ...arrays import Array, Flags, Indices
 from ...errors import PoseError
 from ...kernels.batch import run_in_threads
-from ...kinematics.wrist import PRINTED
+from ...kinematics.wrist.pole_thresholds import PRINTED
 from ...machine import Machine
 from ..posting.posted import Posted
 from .kernels.rounded_corners import SLIVER, blend_poses

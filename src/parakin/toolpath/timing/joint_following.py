@@ -10,7 +10,7 @@ import numpy as np
 
 from ...arrays import Array
 from ...kinematics.turns import count_nearest_turns
-from ...kinematics.wrist import EXACT
+from ...kinematics.wrist.pole_thresholds import EXACT
 from ...machine import Machine
 
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from ...arrays import Array, Flags, Progress, split_rows
 from ...kinematics.turns import find_nearest_turn
-from ...kinematics.wrist import is_on_pole
+from ...kinematics.wrist.pole_thresholds import is_on_pole
 from ...machine import Machine
 from ...performance.singularities import compute_singularity_margins
 from ..posting.range_use import compute_relative_margin

@@ -1,0 +1,181 @@
+"""What a machine is: names and units of axes and joints, drives and legs, limits, home, working modes, wrist."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import cached_property
+from itertools import product
+
+import numpy as np
+
+from .algebra import Scalar
+from .arrays import Array, AxisRange
+from .kinematics.closure_roots import compute_closure_tolerance
+from .kinematics.home import check_home
+from .kinematics.wrist.pole_crossing import flip_mode
+from .kinematics.wrist.pose_angles import EVERY_DIRECTION, EVERY_ROTATION, EVERY_TURN
+from .kinematics.wrist.turning_joints import Wrist, find_wrist
+from .model.elements import Drive
+from .model.legs import Leg
+from .model.limits import Limit, group_joints_by_leg
+from .model.rates import list_closure_joints
+from .model.spec import Spec
+from .model.structures import DirectionColumns, Structure
+from .model.traces import Model
+from .units import AXIS_UNITS
+
+
+class MachineProperties:
+    """A machine's properties. Nothing of it changes once it is made."""
+
+    def __init__(self, spec: Spec):
+        self.spec = spec
+        self.model = Model(spec)
+        check_home(self.model)
+
+    def __repr__(self) -> str:
+        return f"<parakin machine {self.name}: axes {' '.join(self.axes)}, joints {' '.join(self.joints)}>"
+
+    @property
+    def name(self) -> str:
+        return self.spec.name
+
+    @property
+    def axes(self) -> tuple[str, ...]:
+        """Names of a pose's coordinates, ISO 841."""
+        return self.model.axes
+
+    @property
+    def structure(self) -> Structure:
+        """What motion, head and table make together."""
+        return self.model.structure
+
+    @property
+    def has_direction(self) -> bool:
+        """Whether B and C of a pose tell the tool's axis, and a turn about it does not count."""
+        return self.structure.has_direction
+
+    @property
+    def direction(self) -> DirectionColumns | None:
+        """The columns of B and C in a pose where these tell the tool's axis; None where a turn about it counts too."""
+        return self.structure.direction
+
+    @property
+    def orientation_ranges(self) -> dict[str, AxisRange]:
+        """Ranges of the turning axes, rad, that hold every orientation once; a single one turns all round."""
+        ranges = EVERY_DIRECTION if self.has_direction else EVERY_ROTATION
+        turning = [axis for axis in self.axes if axis in ranges]
+        return {axis: ranges[axis] if len(turning) > 1 else EVERY_TURN for axis in turning}
+
+    @property
+    def drives(self) -> tuple[Drive, ...]:
+        """What can be driven, one for each joint."""
+        return self.model.drives
+
+    @property
+    def legs(self) -> tuple[Leg, ...]:
+        """The legs, each with its drives and what follows from their joints."""
+        return self.spec.legs
+
+    @property
+    def closure_joints(self) -> list[int]:
+        """The joint of each leg's closure, as an index in the joint vector."""
+        return list_closure_joints(self.spec)
+
+    def group_joints(self, joints: Sequence[Scalar]) -> list[list[Scalar]]:
+        """Group a joint vector by leg; it may go on with the joints of head and table."""
+        return group_joints_by_leg(self.spec, joints)
+
+    @property
+    def leg_count(self) -> int:
+        """How many of the joints are the legs'; those of head and table follow."""
+        return self.model.leg_count
+
+    @property
+    def leg_sizes(self) -> list[float]:
+        """The length of the leg of each closure at home, mm."""
+        return self.model.sizes
+
+    @property
+    def tool_length(self) -> float:
+        """The length of the machine's own tool, mm: the shift along the tool's axis with which the head ends, or 0."""
+        last = self.spec.head[-1] if self.spec.head else None
+        fixed = last is not None and last.axis == "tz" and last.drive is None
+        return max(0.0, -last.value) if last is not None and fixed else 0.0
+
+    @cached_property
+    def wrist(self) -> Wrist | None:
+        """The two turning joints of head and table that point the tool; None where there are no two."""
+        return find_wrist(self.model)
+
+    @cached_property
+    def joints(self) -> tuple[str, ...]:
+        """Names of the joint vector's entries: the legs', then head's and table's."""
+        return tuple(drive.name for drive in self.model.drives)
+
+    @cached_property
+    def joint_units(self) -> tuple[str, ...]:
+        """``mm`` or ``rad`` for each joint."""
+        return tuple(drive.unit for drive in self.model.drives)
+
+    @property
+    def axis_units(self) -> tuple[str, ...]:
+        """``mm`` or ``rad`` for each axis."""
+        return tuple(AXIS_UNITS[axis] for axis in self.axes)
+
+    @property
+    def turning_columns(self) -> list[int]:
+        """Columns of a pose that are angles."""
+        return self.model.turning_columns
+
+    @property
+    def turning_joints(self) -> list[int]:
+        """Columns of a joint vector that are angles, legs' too."""
+        return self.model.turning_joints
+
+    @cached_property
+    def limits(self) -> tuple[str, ...]:
+        """Names of all limits, in the order of :meth:`margins`."""
+        return tuple(limit.name for limit in self.limit_definitions)
+
+    @property
+    def limit_definitions(self) -> tuple[Limit, ...]:
+        """All limits, with name, subject, unit, side and bound."""
+        return self.model.limits
+
+    @cached_property
+    def home(self) -> Array:
+        """A pose in the middle of the workspace, (axes,)."""
+        home = np.array(self.model.home)
+        home.flags.writeable = False
+        return home
+
+    @property
+    def mode(self) -> str:
+        """The default working mode: a sign for each choice of the inverse, legs first, then head and table."""
+        return self.model.mode
+
+    @cached_property
+    def modes(self) -> tuple[str, ...]:
+        """All working modes, the default one first."""
+        every = ["".join(signs) for signs in product("+-", repeat=len(self.mode))]
+        return (self.mode, *[mode for mode in every if mode != self.mode])
+
+    def head_modes(self, mode: str) -> list[str]:
+        """Return a working mode, and the one with the other sign of head and table, if these have a choice."""
+        return [mode, flip_mode(mode)] if self.structure.branches else [mode]
+
+    @property
+    def closure_tolerance(self) -> float:
+        """The greatest distance by which a leg may fail to close in an answer of :meth:`forward`, mm."""
+        return compute_closure_tolerance(self.model)
+
+    @property
+    def has_closed_forward(self) -> bool:
+        """Whether the direct problem is the common point of spheres or circles."""
+        return self.model.by_spheres
+
+    @property
+    def home_side(self) -> float:
+        """The side of the spheres' centres on which the platform is at home, 1 or -1."""
+        return self.model.home_side

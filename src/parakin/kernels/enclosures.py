@@ -9,9 +9,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from .blocks import LANES, allocate_lanes
 from .compiling import njit
 from .elementary import GREATEST_ANGLE, atan2, sincos, use_widest_vectors
+from .lanes import LANES, allocate_lanes
 from .tape import (
     ABS,
     ATAN2,

@@ -13,19 +13,10 @@ from typing import NamedTuple
 import numpy as np
 
 from ..arrays import Array, Flags
-from .blocks import (
-    _MASK,
-    LANES,
-    allocate_lanes,
-    fetch_to_read,
-    fetch_to_write,
-    find_positive,
-    interpret,
-    load_rows,
-    store_rows,
-)
+from .blocks import find_positive, interpret
 from .compiling import njit
 from .elementary import FAST, use_widest_vectors
+from .lanes import LANES, MASK, allocate_lanes, fetch_to_read, fetch_to_write, load_rows, store_rows
 
 CLOSE = 1e-6  # mm: from a closure this good one more step ends below rounding
 WORTH = 1e-4  # mm: where a step will end no worse than this, the matrix at hand serves on
@@ -101,7 +92,7 @@ def _allocate_block(tapes, m, joints, given):
 @njit(inline="always")
 def copy_lanes(a, i, b, j, rows):
     """Copy rows from the i-th of ``a`` to the j-th on of ``b``; a slice would take seconds to compile."""
-    s, t = (i & _MASK) * LANES, (j & _MASK) * LANES
+    s, t = (i & MASK) * LANES, (j & MASK) * LANES
     for c in range(rows * LANES):
         b[t + c] = a[s + c]
 
@@ -116,10 +107,10 @@ def factor_matrix(factors, m):
     a, exchanges, exchanged, determinant = factors.matrix, factors.exchanges, factors.exchanged, factors.determinant
     determinant[:] = 1.0
     for k in range(m):
-        p = ((k * m + k) & _MASK) * LANES
+        p = ((k * m + k) & MASK) * LANES
         for i in range(k + 1, m):
-            q = ((i * m + k) & _MASK) * LANES
-            w = ((k * m + i) & _MASK) * LANES
+            q = ((i * m + k) & MASK) * LANES
+            w = ((k * m + i) & MASK) * LANES
             count = 0.0
             for j in range(LANES):
                 swap = 1.0 if abs(a[q + j]) > PIVOT * abs(a[p + j]) else 0.0
@@ -130,7 +121,7 @@ def factor_matrix(factors, m):
                 for j in range(LANES):
                     determinant[j] = -determinant[j] if exchanges[w + j] > 0.0 else determinant[j]
                 for c in range(k, m):
-                    s, t = ((k * m + c) & _MASK) * LANES, ((i * m + c) & _MASK) * LANES
+                    s, t = ((k * m + c) & MASK) * LANES, ((i * m + c) & MASK) * LANES
                     for j in range(LANES):
                         x, y = a[s + j], a[t + j]
                         a[s + j] = y if exchanges[w + j] > 0.0 else x
@@ -139,11 +130,11 @@ def factor_matrix(factors, m):
             determinant[j] *= a[p + j]
             a[p + j] = 1.0 / a[p + j]
         for i in range(k + 1, m):
-            q = ((i * m + k) & _MASK) * LANES
+            q = ((i * m + k) & MASK) * LANES
             for j in range(LANES):
                 a[q + j] *= a[p + j]
             for c in range(k + 1, m):
-                s, t = ((k * m + c) & _MASK) * LANES, ((i * m + c) & _MASK) * LANES
+                s, t = ((k * m + c) & MASK) * LANES, ((i * m + c) & MASK) * LANES
                 for j in range(LANES):
                     a[t + j] -= a[q + j] * a[s + j]
 
@@ -154,22 +145,22 @@ def solve_factored(factors, m, f):
     use_widest_vectors()
     a, exchanges, exchanged = factors.matrix, factors.exchanges, factors.exchanged
     for k in range(m):
-        fk = (k & _MASK) * LANES
+        fk = (k & MASK) * LANES
         for i in range(k + 1, m):
             if exchanged[k * m + i]:
-                fi, w = (i & _MASK) * LANES, ((k * m + i) & _MASK) * LANES
+                fi, w = (i & MASK) * LANES, ((k * m + i) & MASK) * LANES
                 for j in range(LANES):
                     x, y = f[fk + j], f[fi + j]
                     f[fk + j] = y if exchanges[w + j] > 0.0 else x
                     f[fi + j] = x if exchanges[w + j] > 0.0 else y
         for i in range(k + 1, m):
-            fi, q = (i & _MASK) * LANES, ((i * m + k) & _MASK) * LANES
+            fi, q = (i & MASK) * LANES, ((i * m + k) & MASK) * LANES
             for j in range(LANES):
                 f[fi + j] -= a[q + j] * f[fk + j]
     for k in range(m - 1, -1, -1):
-        fk, p = (k & _MASK) * LANES, ((k * m + k) & _MASK) * LANES
+        fk, p = (k & MASK) * LANES, ((k * m + k) & MASK) * LANES
         for c in range(k + 1, m):
-            s, fc = ((k * m + c) & _MASK) * LANES, (c & _MASK) * LANES
+            s, fc = ((k * m + c) & MASK) * LANES, (c & MASK) * LANES
             for j in range(LANES):
                 f[fk + j] -= a[s + j] * f[fc + j]
         for j in range(LANES):
@@ -185,7 +176,7 @@ def evaluate_closures(tape, m, block):
     for j in range(LANES):
         state[WORST + j] = 0.0
     for i in range(m):
-        s, t = ((tape.inputs + i) & _MASK) * LANES, (i & _MASK) * LANES
+        s, t = ((tape.inputs + i) & MASK) * LANES, (i & MASK) * LANES
         for j in range(LANES):
             v = r[s + j]
             f[t + j] = v
@@ -199,12 +190,12 @@ def _take_step(m, caps, block):
     for j in range(LANES):
         state[SHRINK + j] = 0.0 if (state[WORST + j] < FINE) | (state[STOPS + j] > 1.5) else 1.0
     for i in range(m):
-        s = (i & _MASK) * LANES
+        s = (i & MASK) * LANES
         for j in range(LANES):
             over = abs(f[s + j]) * state[SHRINK + j]
             state[SHRINK + j] = state[SHRINK + j] * (caps[i] / over) if over > caps[i] else state[SHRINK + j]
     for i in range(m):
-        s = (i & _MASK) * LANES
+        s = (i & MASK) * LANES
         for j in range(LANES):
             point[s + j] -= state[SHRINK + j] * f[s + j] if state[SHRINK + j] > 0.0 else 0.0
 
@@ -227,7 +218,7 @@ def _update_matrix(full, m, block, some):
     if some:
         for i in range(m * m):
             own.exchanged[i] |= fresh.exchanged[i]
-            s = (i & _MASK) * LANES
+            s = (i & MASK) * LANES
             _blend_lanes(state, fresh.matrix, own.matrix, s)
             _blend_lanes(state, fresh.exchanges, own.exchanges, s)
         _blend_lanes(state, fresh.determinant, own.determinant, 0)
@@ -281,22 +272,24 @@ def solve_block(tapes, limits, m, block, n):
 
 
 @njit(inline="always")
-def _load_start(tapes, near, q, row, stop, block, bad):
-    """Load the coordinates and joints of a block into its point; returns how many rows it has."""
-    r, m, given, joints = block.registers, tapes.begin.outputs, near.shape[1], q.shape[1]
+def _load_start(starts, joints, widths, row, stop, block, bad):
+    """Load the starts and joints of a block, flat rows of ``widths``; returns how many rows it has.
+
+    A single start counts for all rows.
+    """
+    r, (given, drives) = block.registers, widths
     n = min(LANES, stop - row)
     bad[:] = 0.0
-    register = given + joints  # backwards, for load_rows is compiled once more for a register that is told: 0
-    for number, rows in enumerate((q, near)):
-        register -= rows.shape[1]
-        if (number == 1) & (rows.shape[0] == 1):
-            for i in range(given):
-                for j in range(LANES):
-                    r[i * LANES + j] = rows[0, i]
-        else:
-            load_rows(rows, row, n, register, r, bad)
-            fetch_to_read(rows, row + LANES, stop)
-    copy_lanes(r, given, block.point, m, joints)
+    if starts.shape[0] == given:
+        for i in range(given):
+            for j in range(LANES):
+                r[i * LANES + j] = starts[i]
+    else:
+        load_rows(starts, given, row, n, given, r, bad)
+        fetch_to_read(starts, given, row + LANES, stop)
+    load_rows(joints, drives, row, n, given + drives, r, bad)
+    fetch_to_read(joints, drives, row + LANES, stop)
+    copy_lanes(r, given, block.point, block.point.shape[0] // LANES - drives, drives)
     copy_lanes(r, 0, block.near, 0, given)
     return n
 
@@ -309,7 +302,7 @@ def _evaluate_end(end, m, width, block, bad):
     copy_lanes(block.near, 0, r, m + joints, end.inputs - m - joints)
     interpret(end.code, end.constants, r)
     for i in range(end.inputs, end.inputs + width):
-        s = (i & _MASK) * LANES
+        s = (i & MASK) * LANES
         for j in range(LANES):
             bad[j] += 0.0 * r[s + j]
     return end.inputs
@@ -330,9 +323,11 @@ def solve_newton(tapes, limits, near, q, side, roots, start, stop):
     first, end = block.first_determinant, tapes.end  # fields are taken out once: Numba counts references at each access
     rows, residual, steps, turned, settled = roots.rows, roots.residual, roots.steps, roots.turned, roots.settled
     settling, closed = limits.settling, limits.closed
+    starts, given, answers, width = near.reshape(-1), q.reshape(-1), rows.reshape(-1), rows.shape[1]
+    widths = near.shape[1], joints
     for row in range(start, stop, LANES):
-        n = _load_start(tapes, near, q, row, stop, block, bad)
-        fetch_to_write(rows, row, stop)
+        n = _load_start(starts, given, widths, row, stop, block, bad)
+        fetch_to_write(answers, width, row, stop)
         interpret(tapes.begin.code, tapes.begin.constants, r)
         copy_lanes(r, tapes.begin.inputs, point, 0, m)
         solve_block(tapes, limits, m, block, n)
@@ -342,9 +337,9 @@ def solve_newton(tapes, limits, near, q, side, roots, start, stop):
                 turned[row + j] = determinant[j] * first[j]
             else:
                 turned[row + j] = determinant[j] * side[0 if side.shape[0] == 1 else row + j]
-        output = _evaluate_end(end, m, rows.shape[1], block, bad)
-        store_rows(rows, row, n, output, r, bad)
-        find_positive(r, output + rows.shape[1], output + end.outputs, holds)
+        output = _evaluate_end(end, m, width, block, bad)
+        store_rows(answers, width, row, n, output, r, bad)
+        find_positive(r, output + width, output + end.outputs, holds)
         for j in range(n):
             worst, change = state[WORST + j] + bad[j], abs(determinant[j] - first[j])
             residual[row + j] = worst

@@ -8,11 +8,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from .blocks import LANES, allocate_lanes, interpret
+from .blocks import interpret
 from .compiling import njit
 from .elementary import FAST, use_widest_vectors
-
-_MASK = (1 << 40) - 1  # tells the compiler that a register's number is not negative
+from .lanes import LANES, MASK, allocate_lanes
 
 
 @njit(nogil=True, cache=True, fastmath=FAST, error_model="numpy")
@@ -24,7 +23,7 @@ def _test_block(program, r, broken):
     for p in range(len(stages)):
         interpret(code[stages[p, 0] : stages[p, 1]], constants[stages[p, 0] : stages[p, 1]], r)
         for t in range(stages[p, 2], stages[p, 3]):
-            a = (tests[t, 0] & _MASK) * LANES
+            a = (tests[t, 0] & MASK) * LANES
             first, second = tests[t, 1] + 1.0, tests[t, 2] + 1.0
             k0, k1, l0, l1 = lines[t, 0], lines[t, 1], lines[t, 2], lines[t, 3]
             for j in range(LANES):
@@ -52,9 +51,9 @@ def _fill_places(axes, counts, row, n, r):
         rest, end = line, len(axes)
         for a in range(d - 1, -1, -1):
             end -= counts[a]
-            first = (a * LANES + j) & _MASK
+            first = (a * LANES + j) & MASK
             if a == d - 1:
-                start = (end + k) & _MASK
+                start = (end + k) & MASK
                 for q in range(m):
                     r[first + q] = axes[start + q]
             else:
@@ -117,7 +116,7 @@ def sweep_turns(program, places, fixed, every, out, start, stop):
             for i in range(d * LANES):
                 r[i] = x[i]
             for u in range(fixed.shape[1]):
-                first = ((d + u) & _MASK) * LANES
+                first = ((d + u) & MASK) * LANES
                 for j in range(LANES):
                     r[first + j] = fixed[s, u]
             _test_block(program, r, broken)

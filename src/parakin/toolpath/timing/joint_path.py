@@ -32,6 +32,10 @@ from .kernels.splines import (
 LONGEST = 2.0  # mm of the path's length: no step is longer
 STEPS_PER_RAD = 12.0  # into which half a corner is cut, for each rad (mm/mm) by which the path turns there
 MOST_STEPS, ENOUGH = 8, 2_000_000  # of half a corner, no more than so many, and fewer on paths of so many steps in all
+_EACH, _SPANS = (
+    2,
+    2,
+)  # steps of each span between two knots, and spans of a piece; one step on paths of that many in all
 CLOSE = 3e-4  # greatest error of the splines' acceleration, as a fraction of a joint's limit
 FINE = 1e-3  # greatest error of the splines' joints, as a fraction of the tolerances
 _MOST_ROWS = 20_000_000  # at first: a path of 40 km, for which some GB are needed
@@ -116,12 +120,13 @@ def build_joint_path(
         return _build_single_row(posted, curve)
     most = min(MOST_STEPS, ENOUGH // len(curve.length))
     corner_steps = np.ceil(np.minimum(STEPS_PER_RAD * curve.sharpness, most)).astype(np.int64)
-    size = place_rows(curve, corner_steps, LONGEST, np.empty(0, np.int64), np.empty(0))
+    each = _EACH if _EACH * _SPANS * len(curve.length) <= ENOUGH else 1
+    size = place_rows(curve, corner_steps, each, LONGEST, np.empty(0, np.int64), np.empty(0))
     if size > _MOST_ROWS:
         length = 1e-6 * float(curve.length.sum())
         raise PoseError(f"a path of {length:,.0f} km, too long to be timed")
     segment, offset = np.empty(size, np.int64), np.empty(size)
-    place_rows(curve, corner_steps, LONGEST, segment, offset)
+    place_rows(curve, corner_steps, each, LONGEST, segment, offset)
     fine = FINE * np.where(np.array(posted.machine.joint_units) == "mm", tolerance, axis_tolerance)
     tolerances = SplineTolerances(fine, limits.acceleration, CLOSE)
     joint_path = _follow_rows(posted, curve, segment, offset)

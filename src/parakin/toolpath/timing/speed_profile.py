@@ -43,6 +43,8 @@ class SpeedProfile(NamedTuple):
 
     def stretch(self, factor: float) -> SpeedProfile:
         """Stretch the profile in time: speeds are divided by the factor, accelerations by its square; for s⃛ = 0."""
+        if factor == 1.0:
+            return self
         speed, acceleration = self.speed / factor, self.acceleration / factor**2
         return self._replace(
             time=factor * self.time, speed=speed, acceleration=acceleration, row_times=factor * self.row_times

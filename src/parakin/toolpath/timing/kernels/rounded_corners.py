@@ -38,11 +38,11 @@ def _find_knots(curve, piece, knots):
 
 
 @njit(nogil=True, cache=True)
-def place_rows(curve, corner_steps, longest, segment, offset):
+def place_rows(curve, corner_steps, each, longest, segment, offset):
     """Place the rows of a path: fill ``segment`` and ``offset``, as far as they reach; returns how many rows there are.
 
     corner_steps : (corners,) the least number of steps between two knots where a corner is rounded
-    longest : no step is longer
+    each : the least number of steps between any two knots; longest : no step is longer
     """
     knots = np.empty(4)
     row = 0
@@ -50,7 +50,7 @@ def place_rows(curve, corner_steps, longest, segment, offset):
         count = _find_knots(curve, piece, knots)
         for i in range(count - 1):
             span = knots[i + 1] - knots[i]
-            steps = max(2, int(np.ceil(span / longest)))
+            steps = max(each, int(np.ceil(span / longest)))
             if knots[i] + 0.5 * span < curve.reach[piece]:
                 steps = max(steps, corner_steps[piece])
             if knots[i + 1] - 0.5 * span > curve.length[piece] - curve.reach[piece + 1]:

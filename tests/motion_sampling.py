@@ -59,7 +59,7 @@ def ranged(machine, ranges):
 
 def modes_of(posted):
     mode = posted.mode
-    pair = posted.machine.model.serial == 2
+    pair = posted.machine.leg_count == len(posted.machine.joints) - 2
     return [mode, mode[:-1] + ("-" if mode[-1] == "+" else "+")] if pair else [mode]
 
 

@@ -213,8 +213,8 @@ def test_a_forward_is_never_silently_wrong(m, modules):
     assert set(codes.tolist()) <= {0, -1}
     assert not (done & ~library.converged)[mad:].any()
     with np.errstate(all="ignore"):  # joints of another working mode are refused
-        legs = slice(len(m.joints) - m.model.serial)
-        modes = [m.mode[:-1] + sign for sign in "+-"] if m.model.serial else [m.mode]
+        legs = slice(m.leg_count)
+        modes = [m.mode[:-1] + sign for sign in "+-"] if m.leg_count < len(m.joints) else [m.mode]
         off = np.fmin.reduce([np.abs(m.inverse(library.poses, mode) - joints)[:, legs].max(1) for mode in modes])
     assert (done == (library.converged & (off <= 0.01))).mean() > 0.999  # where joints are none rounding decides
     miss, tilt = Description.of(m.spec).misses(found[done], joints[done])

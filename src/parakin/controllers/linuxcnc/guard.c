@@ -159,8 +159,6 @@ static void watch(void *arg, long period)
     *pins->jog_stop = moves && (is_near || (*pins->teleop && (leaves_the_box(&m, stop) || swings(&m, stop))));
 }
 
-static int component;
-
 /* A float pin of an axis, by its letter. */
 static int axis_pin(hal_pin_dir_t dir, hal_float_t **pin, int i, const char *name)
 {
@@ -199,20 +197,8 @@ static int make_pins(void)
     return bad;
 }
 
-int rtapi_app_main(void)
+static int set_up(void)
 {
-    component = hal_init(MODULE);
-    if (component < 0)
-        return component;
     pins = hal_malloc(sizeof *pins);
-    if (!pins || make_pins() || hal_export_funct("guard.watch", watch, NULL, 1, 0, component)) {
-        hal_exit(component);
-        return -1;
-    }
-    hal_ready(component);
-    return 0;
+    return !pins || make_pins() || hal_export_funct("guard.watch", watch, NULL, 1, 0, component);
 }
-
-void rtapi_app_exit(void) { hal_exit(component); }
-
-MODULE_LICENSE("GPL");

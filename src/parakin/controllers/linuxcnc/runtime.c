@@ -303,13 +303,8 @@ EXPORT_SYMBOL(kinematicsForward);
 EXPORT_SYMBOL(kinematicsType);
 EXPORT_SYMBOL(kinematicsSwitchable);
 EXPORT_SYMBOL(kinematicsSwitch);
-MODULE_LICENSE("GPL");
 
-static int component;
-static char *made = "";
-RTAPI_MP_STRING(made, "the making of the configuration that loads this");
-
-static int make_pins(void)
+static int set_up(void)
 {
     pins = hal_malloc(sizeof *pins);
     if (!pins)
@@ -322,23 +317,3 @@ static int make_pins(void)
     failed |= hal_export_funct("kins.begin-steps", begin_steps, NULL, 0, 0, component);
     return failed | hal_export_funct("kins.end-steps", end_steps, NULL, 0, 0, component);
 }
-
-int rtapi_app_main(void)
-{
-    if (*made && strcmp(made, MADE) != 0) {
-        rtapi_print_msg(RTAPI_MSG_ERR, MODULE " was made from another description than the configuration: install its "
-                        "file with sudo halcompile --install " MODULE ".c\n");
-        return -1;
-    }
-    component = hal_init(MODULE);
-    if (component < 0)
-        return component;
-    if (make_pins()) {
-        hal_exit(component);
-        return -1;
-    }
-    hal_ready(component);
-    return 0;
-}
-
-void rtapi_app_exit(void) { hal_exit(component); }

@@ -140,7 +140,7 @@ static Motion *prepare_motion(const EmcPose *end, int canon_type, double asked, 
     if (aborting || queue_length() >= QUEUE - 1)
         return 0;
     if (synchronized) {
-        rtapi_print_msg(RTAPI_MSG_ERR, PLANNER ": motions in step with the spindle (G33, G76, G95) are not planned\n");
+        rtapi_print_msg(RTAPI_MSG_ERR, MODULE ": motions in step with the spindle (G33, G76, G95) are not planned\n");
         return 0;
     }
     Motion *m = motion_at(next_motion);
@@ -174,14 +174,14 @@ static int is_reachable(const Motion *m)
         compute_pose(m, k * m->length / count, x);
         memcpy(last, q, sizeof q);
         if (!solve_inverse(x, last, q)) {
-            rtapi_print_msg(RTAPI_MSG_ERR, PLANNER ": line %d leaves the workspace, %d %% of the way on\n",
+            rtapi_print_msg(RTAPI_MSG_ERR, MODULE ": line %d leaves the workspace, %d %% of the way on\n",
                             m->tag.fields[GM_FIELD_LINE_NUMBER], 100 * k / count);
             return 0;
         }
         const int beyond = find_joint_beyond(q);
         if (beyond >= 0) {
             const emcmot_joint_status_t *joint = &emcmotStatus->joint_status[beyond];
-            rtapi_print_msg(RTAPI_MSG_ERR, PLANNER ": line %d would bring joint %d to %.3f, its limits are %.3f and %.3f\n",
+            rtapi_print_msg(RTAPI_MSG_ERR, MODULE ": line %d would bring joint %d to %.3f, its limits are %.3f and %.3f\n",
                             m->tag.fields[GM_FIELD_LINE_NUMBER], beyond, q[beyond] / (turning[beyond] ? DEGREE : 1.0),
                             joint->min_pos_limit, joint->max_pos_limit);
             return 0;
@@ -245,7 +245,7 @@ int tpAddRigidTap(TP_STRUCT *tp, EmcPose end, double asked, double most, double 
     (void)acceleration;
     (void)enables;
     (void)scale;
-    rtapi_print_msg(RTAPI_MSG_ERR, PLANNER ": line %d: rigid tapping is not planned\n", tag.fields[GM_FIELD_LINE_NUMBER]);
+    rtapi_print_msg(RTAPI_MSG_ERR, MODULE ": line %d: rigid tapping is not planned\n", tag.fields[GM_FIELD_LINE_NUMBER]);
     return -1;
 }
 
@@ -295,7 +295,7 @@ struct state_tag_t tpGetExecTag(TP_STRUCT *tp)
 /* The joints can't go on: LinuxCNC is told so and aborts the program. */
 static void refuse_path(void)
 {
-    rtapi_print_msg(RTAPI_MSG_ERR, PLANNER ": line %d: %s\n",
+    rtapi_print_msg(RTAPI_MSG_ERR, MODULE ": line %d: %s\n",
                     motion_at(piece_at(cut_piece)->motion)->tag.fields[GM_FIELD_LINE_NUMBER], obstacle);
     emcmotStatus->motionFlag |= EMCMOT_MOTION_ERROR_BIT;
     clear_path();

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -15,19 +15,23 @@ from ...budget import Budget
 from ...errors import PoseError
 from ...workspaces.certified.assembly_mode import expand_determinant
 from ...workspaces.certified.constraints import Constraint
+from ...workspaces.certified.plane_cuts import CLEARED
 from ...workspaces.certified.region import Region
 from ...workspaces.certified.separation import find_joined_cells
-from ...workspaces.certified.subdivision import Cells
+from ...workspaces.certified.subdivision import Cells, OrientationBoxes, bound_margin
 from ...workspaces.connected.adjacency import find_adjacent_cells, label_components
+from ..search import pick_best_of_blocks
 from ..singularities import PARALLEL, list_margin_names
 from .free_angles import prove_free_angle
+from .margin_zeros import prove_sign_change, prove_stretched_leg
 
 SingularityVerdict = Literal["met", "none", "unproved"]
 
 _ALONG = {1: 1024, 2: 256, 3: 96}  # cells along the longest edge in which a change of sign is looked for
 _MOST_COMPARED = 1000  # cells
 _PROVING = 0.5  # of the budget, for the proofs that there is none, and of the rest for the region's own cells
-_STARTS = 64  # cells from which a free angle is looked for
+_STARTS = 64  # cells from which a zero that is only touched is looked for
+_ABOVE = 1e-9  # of a margin's greatest value: what is proved to be no less is above zero
 _ZERO = 1e-12  # a margin no greater is zero
 _FEW, _ROUNDS = 30_000, 24  # undecided cells, and rounds, with which a proof that there is none is given up
 
@@ -65,7 +69,8 @@ def judge_singularities(region: Region, budget: Budget | None = None) -> tuple[R
     extent, whole = region.find_extent(budget), region.include_all_components()
     if extent is None:
         return tuple(RegionSingularity(name, "none", None) for name in names)
-    verdicts, labelled = [], {}
+    verdicts: list[RegionSingularity] = []
+    labelled: dict[Region, _RegionCells] = {}
     for number, name in enumerate(names):
         own = whole if name == PARALLEL else region
         margin, inputs = _trace_margins(own)[number], own.traced_pose.inputs
@@ -76,46 +81,48 @@ def judge_singularities(region: Region, budget: Budget | None = None) -> tuple[R
         left = _list_left_cells(own, negative, extent, budget.take_fraction(_PROVING / (len(names) - number)))
         if len(left.low) and own not in labelled:
             labelled[own] = _label_cells(own, extent, budget.take_fraction(_PROVING))
-        if not len(left.low) or _is_apart(left, labelled[own].joined):
+        if not len(left.low) or _is_clear(positive, left, labelled[own].joined):
             verdicts.append(RegionSingularity(name, "none", None))
-            continue
-        pose = _find_sign_change(own, positive, labelled[own].inside, labelled[own].component)
-        if pose is not None:
-            verdicts.append(RegionSingularity(name, "met", pose, "its margin changes sign on the way to it"))
-            continue
-        if name == names[-1]:  # of head and table: its margin never changes its sign
-            pose = _find_free_angle(own, positive, labelled[own])
-        if pose is not None:
-            verdicts.append(RegionSingularity(name, "met", pose, "its margin falls to zero there, to a mm"))
         else:
-            verdicts.append(RegionSingularity(name, "unproved", None, _describe_left(budget)))
+            verdicts.append(_judge_left(own, number, positive, labelled[own], budget))
     return tuple(verdicts)
 
 
-def _find_free_angle(region: Region, positive: Constraint, about: _RegionCells) -> Array | None:
-    """Find a pose beside which an angle of head or table is proved free, in the part that holds home."""
-    middle = about.inside.low + 0.5 * about.inside.size
-    margin = positive.point_program(middle, middle)[0][:, 0]
-    starts = middle[np.argsort(np.where(np.isfinite(margin), margin, np.inf), kind="stable")[:_STARTS]]
-    position = prove_free_angle(region, starts)
-    if position is None:
-        return None
-    home = dict(zip(region.machine.axes, region.machine.home.tolist(), strict=True))
-    at_home, at_root = (
-        about.component[((about.inside.low <= at) & (at <= about.inside.low + about.inside.size)).all(1)]
-        for at in (np.array([home[axis] for axis in region.free_axes]), position)
-    )
-    if not len(at_root) or (len(at_home) and not np.isin(at_root, at_home).any()):
-        return None
-    return np.asarray(region.poses(position[None])[0])
+def _judge_left(
+    region: Region, number: int, positive: Constraint, about: _RegionCells, budget: Budget
+) -> RegionSingularity:
+    """Judge a margin that is not proved to be positive all over: it changes its sign, touches zero, or neither."""
+    name, legs = positive.name, len(region.machine.closure_joints)
+    pose = _find_sign_change(region, positive, about.inside, about.component)
+    starts = about.pick_starts(region, positive)
+    if pose is None and positive.is_smooth:
+        pose = _pose_at(region, prove_sign_change(region, positive, starts, budget.take_fraction(_PROVING)))
+    if pose is not None:
+        return RegionSingularity(name, "met", pose, "its margin changes sign on the way to it")
+    if 1 <= number <= legs:
+        margins = _trace_margins(region)[1 : legs + 1]
+        position = prove_stretched_leg(region, margins, number - 1, starts, budget.take_fraction(_PROVING))
+    elif number > legs:  # of head and table
+        position = prove_free_angle(region, starts)
+        if position is not None and not np.isin(about.find_components(position), about.find_home(region)).any():
+            position = None
+    else:
+        position = None
+    if position is not None:
+        return RegionSingularity(name, "met", _pose_at(region, position), "its margin falls to zero there, to a mm")
+    return RegionSingularity(name, "unproved", None, _describe_left(budget))
+
+
+def _pose_at(region: Region, position: Array | None) -> Array | None:
+    """Return the pose (axes,) at a position (d,), None for none."""
+    return None if position is None else np.asarray(region.poses(position[None])[0])
 
 
 def _judge_constant(region: Region, name: str, margin: float) -> RegionSingularity:
     """Judge a margin that has one value at this orientation."""
     if margin > _ZERO:
         return RegionSingularity(name, "none", None)
-    home = dict(zip(region.machine.axes, region.machine.home.tolist(), strict=True))
-    pose = region.poses(np.array([[home[axis] for axis in region.free_axes]]))[0]
+    pose = region.poses(region.home_position[None])[0]
     return RegionSingularity(name, "met", pose, "its margin is zero at every position of this orientation")
 
 
@@ -164,14 +171,34 @@ class _RegionCells(NamedTuple):
     component: Indices
     joined: Cells
 
+    def find_components(self, position: Array) -> Indices:
+        """Find the components of the cells that hold a position (d,)."""
+        held = ((self.inside.low <= position) & (position <= self.inside.low + self.inside.size)).all(1)
+        return self.component[held]
+
+    def find_home(self, region: Region) -> Indices:
+        """Find the components that hold home; all where no cell inside holds it, as in a slice beside it."""
+        own = self.find_components(region.home_position)
+        return own if len(own) else np.unique(self.component)
+
+    def pick_starts(self, region: Region, positive: Constraint) -> Array:
+        """Pick positions (k, d) of home's component at which a margin is above zero, but least or least about there."""
+        own = np.isin(self.component, self.find_home(region))
+        middle = self.inside.low[own] + 0.5 * self.inside.size[own]
+        margin = positive.point_program(middle, middle)[0][:, 0]
+        middle, margin = middle[margin > 0.0], margin[margin > 0.0]
+        if not len(middle):
+            return middle
+        least = np.argsort(margin, kind="stable")[:_STARTS]
+        return np.asarray(middle[np.union1d(least, pick_best_of_blocks(middle, -margin, _STARTS))])
+
 
 def _label_cells(region: Region, extent: tuple[Array, Array], budget: Budget) -> _RegionCells:
     """Refine a region down to one size of cells, and label those inside."""
     edge = float((extent[1] - extent[0]).max()) / _ALONG[len(extent[0])]
     cells = region.subdivide(*extent).run(1e-12, edge, budget)
-    home = dict(zip(region.machine.axes, region.machine.home.tolist(), strict=True))
     is_slice = any(axis in region.fixed_axes for axis in "XYZ")  # what is apart there may hang together beyond it
-    joined = None if is_slice else find_joined_cells(cells, np.array([home[axis] for axis in region.free_axes]))
+    joined = None if is_slice else find_joined_cells(cells, region.home_position)
     inside = cells.take(cells.inside)
     faces = np.zeros((0, 2), np.int64)
     if len(inside.low):
@@ -179,6 +206,18 @@ def _label_cells(region: Region, extent: tuple[Array, Array], budget: Budget) ->
             faces = find_adjacent_cells(inside.low, inside.size)[0]
     component = label_components(len(inside.low), faces) if len(inside.low) else np.zeros(0, np.int64)
     return _RegionCells(inside, component, cells if joined is None else cells.take(joined))
+
+
+def _is_clear(positive: Constraint, left: Cells, joined: Cells) -> bool:
+    """Tell whether a margin is above zero in all cells that may hang together with home, or those left are apart."""
+    if _is_apart(left, joined):
+        return True
+    n, middle = len(joined.low), joined.low + 0.5 * joined.size
+    greatest = np.nanmax(np.abs(positive.point_program(middle, middle)[0][:, 0]), initial=0.0)
+    above = replace(positive, margin=positive.margin - _ABOVE * greatest)  # bounds are proved to be ≥ 0, not > 0
+    none = np.zeros((n, 0))
+    boxes = OrientationBoxes(np.arange(n), none, none, none.astype(np.bool_))
+    return bool((bound_margin(above, joined.low, joined.size, boxes, every=True).state == CLEARED).all())
 
 
 def _is_apart(left: Cells, joined: Cells) -> bool:
@@ -198,8 +237,7 @@ def _find_sign_change(region: Region, positive: Constraint, cells: Cells, compon
     low, high = (end[:, 0] for end in positive.point_program(middle, middle))
     above, below = low > 0.0, high < 0.0
     mixed: Flags = np.isin(component, np.intersect1d(component[above], component[below]))
-    home = dict(zip(region.machine.axes, region.machine.home.tolist(), strict=True))
-    position = np.array([home[axis] for axis in region.free_axes])
+    position = region.home_position
     at_home = ((cells.low <= position) & (position <= cells.low + cells.size)).all(1)
     if at_home.any():
         mixed &= component == component[int(at_home.argmax())]

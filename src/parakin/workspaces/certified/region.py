@@ -77,6 +77,11 @@ class Region:
         return tuple(constraint.name for constraint in self.constraints if not constraint.implied)
 
     @property
+    def home_position(self) -> Array:
+        """The position of home, (d,) mm."""
+        return self.machine.home[[self.machine.axes.index(axis) for axis in self.free_axes]]
+
+    @property
     def volume_unit(self) -> str:
         """Unit of a volume of positions: mm³, in the plane mm², along a line mm."""
         return ("mm", "mm²", "mm³")[len(self.free_axes) - 1]

@@ -212,11 +212,9 @@ def _sample_estimates(region: Region, cells: Cells, budget: Budget) -> Cells:
 
 def _find_home_cells(region: Region, cells: Cells) -> Flags | None:
     """Find the cells that may hang together with home; None where home does not tell, or all components count."""
-    machine = region.machine
     if region.components == "all" or any(axis in region.fixed_axes for axis in "XYZ"):
         return None  # what is apart in a slice may hang together beyond it
-    home = dict(zip(machine.axes, machine.home.tolist(), strict=True))
-    return find_joined_cells(cells, np.array([home[axis] for axis in region.free_axes]))
+    return find_joined_cells(cells, region.home_position)
 
 
 def measure_elsewhere(workspace: Workspace, gap: float = 0.05, seconds: float | None = 10.0) -> Volume:

@@ -13,7 +13,7 @@ from pathlib import Path
 from parakin.commands import part_options
 from parakin.controllers.event_commands import COMMENTED
 from parakin.toolpath.reading.cl.cycles import CYCLES
-from parakin.toolpath.reading.cl.dialects import BELOW, DIALECTS, LEFT, RIGHT, Dialect
+from parakin.toolpath.reading.cl.dialects import BELOW, DIALECTS, DOWN, HEIGHT, LEFT, RIGHT, SAME, Dialect
 from parakin.toolpath.reading.cl.words import INFORMING, REASONS, TEXT_WORDS, WORDS
 from parakin.toolpath.reading.gcode.codes import (
     G_GROUPS,
@@ -88,7 +88,12 @@ def list_dialects() -> list[str]:
         "notes name it.\nA motion that joins an arc tangentially proves which way round it goes; one that contradicts "
         "the dialect is refused.\n"
     )
-    return [text, make_table(("dialect", "told by", "CIRCLE turns", "FEDTO of a cycle"), rows)]
+    senses = {SAME: "another is refused", DOWN: "counts down from CLEAR", HEIGHT: "CLEAR is a height, RAPTO a distance"}
+    reasons = [f"- {dialect.title}: {dialect.cycle_values}" for dialect in DIALECTS.values()]
+    cycles = ["Values of a `CYCLE` by position are refused:\n", *reasons, ""]
+    rows = [(*row, senses[dialect.clear]) for row, dialect in zip(rows, DIALECTS.values(), strict=True)]
+    titles = ("dialect", "told by", "CIRCLE turns", "FEDTO of a cycle", "RAPTO beside CLEAR")
+    return [text, make_table(titles, rows), *cycles]
 
 
 def describe_signs(dialect: Dialect) -> str:
@@ -123,7 +128,7 @@ def list_words() -> list[str]:
         make_table(
             ("words", "what becomes of them"),
             [
-                (join_names(CYCLES), "kinds of `CYCLE`, written out as motion; values by position are refused"),
+                (join_names(CYCLES), "kinds of `CYCLE`, written out as motion"),
                 (join_names(passed), "kept in order; what a controller has a code for is passed on"),
                 (join_names(TEXT_WORDS), "texts, kept in order as comments"),
                 (join_names(silent), "no effect"),

@@ -367,6 +367,7 @@ def test_circles_of_autodesks_post_for_camplete(read):
         ("UNIT/MM\n", "LOADTL/5,125.", {"number": 5.0, "set_length": 125.0}),
         ("UNIT/INCH\n", "LOADTL/5,5.", {"number": 5.0, "set_length": 127.0}),
         ("$$ AUTODESK\n", "LOADTL/5, 0, 50.0, 5", {"number": 5.0, "body_length": 50.0}),
+        ("$$ AUTODESK\n", "LOADTL/5, IN, 0, LENGTH, 50.0, OSETNO, 5", {"number": 5.0, "body_length": 50.0}),
         ("$$ CATIA APT VERSION 1.0\n", "LOADTL/5,1,1", {"number": 5.0}),
         (NX_HEADER, "LOAD/TOOL,5,ADJUST,7", {"number": 5.0}),
         ("", "TLDATA/DRILL,MILL,8.,0.,80.,118.,35.",
@@ -457,6 +458,7 @@ def test_feed_per_revolution(read):
 
 TOP = "SPINDL/RPM,1200,CLW\nRAPID\nGOTO/0,0,50\n{}\nGOTO/0,0,0\nCYCLE/OFF\nRAPID\nGOTO/0,0,50\n"
 NAN = float("nan")
+CAMPLETE = "CSI_TOOL_PATH/A\n"
 
 
 @pytest.mark.parametrize(
@@ -468,6 +470,7 @@ NAN = float("nan")
         ("UNIT/MM\n", "CYCLE/DRILL,FEDTO,20.,MMPM,100.,RAPTO,3."),
         (NX_HEADER, "CYCLE/DRILL,RAPTO,3,FEDTO,-20,RTRCTO,3,MMPM,100"),
         (NX_HEADER, "CYCLE/CSINK,RAPTO,3,FEDTO,-20,MMPM,100"),
+        (NX_HEADER, "CYCLE/DRILL,RAPTO,3,CLEAR,3,FEDTO,-20,MMPM,100"),
     ],
 )
 def test_the_depth_is_the_dialects(read, header, cycle):
@@ -475,6 +478,21 @@ def test_the_depth_is_the_dialects(read, header, cycle):
     heights = path.tip[:, 2].tolist()
     assert heights == [50, 50, 3, -20, 3, 50]
     assert path.rapid.tolist() == [True, True, True, False, True, True] and path.feed[3] == 100.0
+
+
+@pytest.mark.parametrize(
+    ("header", "cycle", "heights"),
+    [
+        # PTC: RAPTO is a further rapid advance, from CLEAR towards the point
+        (CREO_HEADER, "CYCLE / DRILL, DEPTH, 20, MMPM, 100, CLEAR, 5, RAPTO, 2", [3, -20, 5]),
+        (CREO_HEADER, "CYCLE / DRILL, DEPTH, 20, MMPM, 100, CLEAR, 5, RAPTO, 2, RETURN, 9", [3, -20, 9]),
+        # Autodesk's post: clearance 55, retract plane 43, stock 40
+        (CAMPLETE, "CYCLE/DRILL, FEDTO, 20, MMPM, 100, CLEAR, 55, RTRCTO, 15, RETURN, 15, RAPTO, 3", [3, -20, 15]),
+        (CAMPLETE, "CYCLE/DRILL, FEDTO, 20, MMPM, 100, CLEAR, 55, RTRCTO,15", [15, -20, 15]),
+    ],
+)
+def test_clearances_are_the_dialects(read, header, cycle, heights):
+    assert read(header + TOP.format(cycle)).tip[2:-1, 2].tolist() == heights
 
 
 @pytest.mark.parametrize(("cycle", "back"), [("RETURN,30", 30), ("INIT", 50), ("RTRCTO,AUTO", 50), ("RTRCTO,25.", 25)])
@@ -550,6 +568,9 @@ def test_dwell(read):
         ("", "CYCLE/BORE,DEPTH,20,CLEAR,3,ORIENT,90"),
         ("", "CYCLE/BORE,NODRAG,DEPTH,20,CLEAR,3"),
         ("", "CYCLE/THREAD,DEPTH,20,CLEAR,3"),
+        ("", "CYCLE/DRILL,DEPTH,20,CLEAR,5,RAPTO,2"),
+        (CREO_HEADER, "CYCLE / DRILL, 20.0, 100.0, MMPM, 3.0"),
+        (CAMPLETE, "CYCLE/REAM, FEDTO, 20, MMPM, 100, CLEAR, 55, RAPTO, 12"),
     ],
 )
 def test_cycles_refused(read, header, cycle):

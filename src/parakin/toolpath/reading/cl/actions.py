@@ -354,7 +354,10 @@ class ClActions:
         if "LENGTH" in args:
             k = args.index("LENGTH")
             (length,) = parse_numbers(args[k + 1 : k + 2], (1,), "LENGTH,length")
-            data["set_length"] = length * self.motion.transform.scale
+            of_body = "body_length" in (
+                DIALECTS[self.dialect].tool_values or ()
+            )  # what it is by position it is by name
+            data["body_length" if of_body else "set_length"] = length * self.motion.transform.scale
         if data:
             self._set_tool(line, data, loads=True)
 

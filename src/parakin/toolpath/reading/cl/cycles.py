@@ -3,12 +3,13 @@
 Pure functions of the text. Errors name no file and no line; the reader adds both.
 """
 
+import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
 from ..text import is_number, parse_number, quote_short, refuse
 from .arguments import FEED_UNITS, parse_numbers
-from .dialects import BELOW, Dialect
+from .dialects import BELOW, DOWN, HEIGHT, Dialect
 
 # name of a cycle: how its motion goes
 CYCLES = {
@@ -31,7 +32,7 @@ _VALUES = {
     "DEPTH": "DEPTH",
     "FEDTO": "FEDTO",
     "CLEAR": "CLEAR",
-    "RAPTO": "CLEAR",
+    "RAPTO": "RAPTO",
     "RETURN": "RETURN",
     "RTRCTO": "RETURN",
     "STEP": "STEP",
@@ -80,14 +81,14 @@ def parse_cycle(args: Sequence[str], dialect: Dialect) -> DrillCycle:
     while rest and (rest[0] in ("DEEP", "BRKCHP") or (kind == "bore" and rest[0] == "DRAG")):
         kind = CYCLES.get(rest.pop(0), kind)
     if rest and is_number(rest[0]):
-        refuse(f"a cycle with values by position: they mean other things in each post processor; expected {_FORM}")
+        refuse(f"a cycle with values by position: {dialect.cycle_values}; expected {_FORM}")
     options = _parse_options(rest)
     values = options.values
-    if "CLEAR" not in values or ("DEPTH" in values) == ("FEDTO" in values):
+    if not {"CLEAR", "RAPTO"} & values.keys() or ("DEPTH" in values) == ("FEDTO" in values):
         refuse(f"a cycle without a clearance (CLEAR, RAPTO) and one depth (DEPTH, FEDTO); expected {_FORM}")
-    clear = values["CLEAR"]
+    clear, out = _find_clearance(values, dialect)
     depth = -_parse_depth(values, dialect)
-    retract = None if options.initial else values.get("RETURN", clear)
+    retract = None if options.initial else out
     step = values.get("STEP", 0.0)
     if not depth < clear or (retract is not None and retract < clear) or clear < 0.0:
         refuse(f"expected a depth below the clearance and a return not below it in {_FORM}")
@@ -103,6 +104,22 @@ def parse_cycle(args: Sequence[str], dialect: Dialect) -> DrillCycle:
         if dwell[0] < 0.0:
             refuse("a dwell below zero")
     return DrillCycle(clear, depth, retract, options.feed, kind, step, dwell)
+
+
+def _find_clearance(values: dict[str, float], dialect: Dialect) -> tuple[float, float]:
+    """Find where above the hole rapid ends, and where the tool withdraws to, by the dialect's sense of CLEAR."""
+    if dialect.clear == HEIGHT and "CLEAR" in values:
+        if "RETURN" not in values:
+            refuse(f"CLEAR, a height in the part in a file of {dialect.title}, without RTRCTO; expected {_FORM}")
+        return values.get("RAPTO", values["RETURN"]), values["RETURN"]
+    clear, rapid = values.get("CLEAR", math.nan), values.get("RAPTO", math.nan)
+    if clear == clear and rapid == rapid:
+        if dialect.clear == DOWN:
+            return clear - rapid, values.get("RETURN", clear)
+        if clear != rapid:
+            refuse(f"RAPTO beside another CLEAR, whose sense no header tells; expected one of both in {_FORM}")
+    clear = clear if clear == clear else rapid
+    return clear, values.get("RETURN", clear)
 
 
 def _parse_depth(values: dict[str, float], dialect: Dialect) -> float:
@@ -146,9 +163,9 @@ def _parse_options(words: list[str]) -> _Options:
         name = _VALUES.get(word)
         if (name is None and word not in FEED_UNITS) or not rest:
             refuse(f"{quote_short(word)} in a cycle that cannot be turned into motion; expected {_FORM}")
-        if name in values:
-            refuse(f"{word} beside another word of its meaning; expected {_FORM}")
         (value,) = parse_numbers([rest.pop(0)], (1,), _FORM)
+        if name is not None and values.get(name, value) != value:
+            refuse(f"{word} beside another word of its meaning; expected {_FORM}")
         if name is not None:
             values[name] = value
         elif value < 0.0:

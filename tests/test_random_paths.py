@@ -175,10 +175,21 @@ def test_jitter_on_a_pole_that_moves_needs_no_records_between(tmp_path):
 
 @pytest.mark.parametrize(
     ("name", "seed"),
-    [("tricept", 46), ("tricept", 51), ("tricept", 344), ("orthoglide5_table", 8), ("orthoglide5_table", 276)],
+    [
+        ("tricept", 46),
+        ("tricept", 51),
+        ("tricept", 344),
+        ("orthoglide5_table", 8),
+        ("orthoglide5_table", 276),
+        ("tricept", 30049),
+        ("tricept", 30185),
+    ],
 )
 def test_random_paths_that_were_hard(tmp_path, name, seed):
-    """Blends in one cycle or two, two records on a pole that moves, a single motion through the circle about a pole."""
+    """What went wrong once: blends in a cycle or two, a moving pole with two records on it, motions through its circle.
+
+    Also a step of the planner whose half jumps, and a way from home beside a moving pole that leaves a joint's range.
+    """
     controller = build_controller(name, tmp_path)
     machine = controller.machine
     (tmp_path / "part.cls").write_text(PathMaker(machine, seed).make(), encoding="ascii")

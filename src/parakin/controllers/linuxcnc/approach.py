@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 
 from ...arrays import Array
@@ -19,7 +21,8 @@ _FROM_ANYWHERE = 4.0  # s, at least: for the motion whose start is not known
 _LEAST = 0.5  # s, of a motion
 _SAMPLES = 500  # samples of a motion
 _TURNS = (0, 1, -1, 2, -2)
-_FRACTIONS = (1.0, 0.1, 0.01)  # of the way back home and of TILTED, for the poses that lead to a record beside the pole
+_COUNTS = (3, 5, 9, 17)  # poses that lead to a record beside the pole from aside,
+_NEAREST = 0.01  # the nearest of them by this fraction of the way back home and of TILTED
 
 
 def plan_approach(machine: Machine, first: Array, joints: Array, mode: str) -> tuple[Array, Array]:
@@ -66,7 +69,7 @@ def _approach_with_wrist(machine: Machine, wrist: Wrist, first: Array, joints: A
     goal = float((joints if len(way) == 1 else _follow_back(machine, way, joints, mode))[wrist.first])
     home, at_home = np.array(machine.home), machine.inverse(machine.home)
     to_pole = [] if wrist.find_free(home[None], EXACT)[0] else _go_to_pole(machine, wrist, at_home)
-    if to_pole != [] and mode == machine.mode and _turns_by(machine, home, way[0], mode, goal - at_home[wrist.first]):
+    if to_pole != [] and mode == machine.mode and _turns_to(machine, home, way[0], mode, (at_home[wrist.first], goal)):
         return way
     if to_pole is not None:
         pole = to_pole[-1] if to_pole else home
@@ -79,7 +82,7 @@ def _approach_with_wrist(machine: Machine, wrist: Wrist, first: Array, joints: A
         if turned is not None:
             turned[wrist.direction.c] = find_nearest_turn(turned[wrist.direction.c], way[0][wrist.direction.c])
             left = _leave_pole(machine, wrist, pole, turned, goal, mode)
-            if left is not None and _turns_by(machine, turned, way[0], mode, 0.0):
+            if left is not None and _turns_to(machine, turned, way[0], mode, (goal, goal)):
                 return [*to_pole, *left, turned, *way]
     name, angle = machine.joints[wrist.first], np.degrees(joints[wrist.first])
     raise PoseError(f"no way from home to the first record, where {name} is at {angle:.1f}° in mode {mode!r}")
@@ -105,24 +108,52 @@ def _go_to_pole(machine: Machine, wrist: Wrist, at_home: Array) -> list[Array] |
     return poses if wrist.find_free(poses[-1][None], PRINTED)[0] else None
 
 
-def _turns_by(machine: Machine, begin: Array, end: Array, mode: str, angle: float) -> bool:
-    """Tell whether the first joint turns by an angle on a line of poses, and no limit is broken on it."""
+def _turns_to(machine: Machine, begin: Array, end: Array, mode: str, angles: tuple[float, float]) -> bool:
+    """Tell whether the first joint turns from one angle to another on a line of poses, and no limit is broken on it."""
+    first, last = angles
+    turn, keeps_limits = _follow_line(machine, begin, end, mode, first)
+    return abs(turn - (last - first)) < SAME_MODE and keeps_limits
+
+
+def _follow_line(machine: Machine, begin: Array, end: Array, mode: str, first: float) -> tuple[float, bool]:
+    """Follow a line of poses; return by how much the first joint turns, from ``first`` on, and if limits are kept.
+
+    A path that is off limits at its first record is come to all the same.
+    """
     assert machine.wrist is not None
-    line = _sample_line(begin, end)
-    rows = machine.follow(line, mode, EXACT)[:, machine.wrist.first]
-    return abs(float(rows[-1] - rows[0]) - angle) < SAME_MODE and not machine.check(line, mode=mode).any()
+    line, column = _sample_line(begin, end), machine.wrist.first
+    joints = machine.follow(line, mode, EXACT)
+    turn = float(joints[-1, column] - joints[0, column])
+    joints[:, column] += first - joints[0, column]
+    broken = machine.check(line, joints, mode)
+    return turn, bool(broken[-1]) or not broken.any()
 
 
 def _approach_from_aside(machine: Machine, wrist: Wrist, first: Array, joints: Array, mode: str) -> list[Array]:
-    """Approach a record beside the pole straight from home, with the first joint as it is there; return the poses."""
+    """Approach a record beside the pole straight from home, with the first joint as it is there; return the poses.
+
+    The pole of a central leg moves with the tip: where the joint would leave its range between the poses, there are
+    more of them.
+    """
     off_pole = float(np.sqrt(wrist.measure_freedom(first[None])[0]))
     if off_pole > NEAR_START:
         return [first]
     own = mode if off_pole < PRINTED else wrist.find_mode(first, joints, mode)
+    way = list[Array]()
+    for count in _COUNTS:
+        way = _lead_back(machine, wrist, first, joints, own, count)
+        lines = pairwise(way)
+        if all(_follow_line(machine, *line, mode, float(joints[wrist.first]))[1] for line in lines):
+            break
+    return way
+
+
+def _lead_back(machine: Machine, wrist: Wrist, first: Array, joints: Array, mode: str, count: int) -> list[Array]:
+    """Lead from a record back home in so many poses, the tool tilted; return the way, or the record alone."""
     c, way = wrist.direction.c, list[Array]()
-    for fraction in _FRACTIONS:
+    for fraction in np.geomspace(1.0, _NEAREST, count).tolist():
         near = first + fraction * (machine.home - first)
-        pose = find_pose_with_wrist(machine, near, wrist.tilt(joints, own, fraction * TILTED), own)
+        pose = find_pose_with_wrist(machine, near, wrist.tilt(joints, mode, fraction * TILTED), mode)
         if pose is None:
             return [first]
         pose[c] = find_nearest_turn(pose[c], way[-1][c] if way else first[c])
@@ -153,7 +184,7 @@ def _leave_pole(machine: Machine, wrist: Wrist, pole: Array, end: Array, goal: f
         via = pole.copy()
         via[columns] = tilted[columns]
         via[c] += TURN * turns
-        if _turns_by(machine, via, end, mode, goal - on_pole[wrist.first]):
+        if _turns_to(machine, via, end, mode, (on_pole[wrist.first], goal)):
             upright = pole.copy()
             upright[c] = via[c] if can_turn else pole[c]
             return [upright, via]

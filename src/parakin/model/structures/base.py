@@ -60,7 +60,7 @@ class Structure(ABC):
     has_central_leg: bool = False
     sign: float = 1.0  # of the central leg's length
     tip: Vec = ORIGIN  # of a fixed tool, in the platform's frame
-    assembly_method: Literal["planar", "lambda", "central leg"] | None = None  # of the complete direct problem
+    assembly_method: Literal["planar", "lambda"] | None = None  # closed form of the complete direct problem
 
     def __init__(self, spec: Spec):
         self.spec = spec

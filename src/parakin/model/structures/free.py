@@ -95,9 +95,14 @@ class Free(Structure):
         return rotation, tuple(o if letter in given else 0.0 for o, letter in zip(origin, "XYZ", strict=True))
 
     def coordinates_of(self, rotation: Mat, origin: Vec) -> list[Scalar]:
-        """Compute the pose X Y Z A B C of a platform's frame; B in [-90°, 90°]."""
-        r = product(product(self.mount, rotation), self.tool)
+        """Compute the pose of a platform's frame; of three turns B is in [-90°, 90°]."""
         tip = add(apply(self.mount, add(origin, apply(rotation, self.tip))), self.base)
+        if len(self.turns) < 3:
+            return [tip["XYZ".index(letter)] for letter in self.axes if letter in "XYZ"] + [
+                atan2(rotation[(i + 2) % 3][(i + 1) % 3], rotation[(i + 1) % 3][(i + 1) % 3])
+                for i in ("xyz".index(turn[1]) for turn in self.turns)
+            ]
+        r = product(product(self.mount, rotation), self.tool)
         b = atan2(-r[2][0], sqrt(r[0][0] * r[0][0] + r[1][0] * r[1][0]))
         return [*tip, atan2(r[2][1], r[2][2]), b, atan2(r[1][0], r[0][0])]
 

@@ -12,7 +12,7 @@ from ..assembly_side import bound_determinant, find_angle_signs
 from ..closure_roots import compute_closure_tolerance, compute_poses, find_roots
 from ..inverse import SINGULAR
 from ..limit_margins import find_broken_limits
-from ..wrist import is_upright
+from ..wrist.pole_thresholds import is_upright
 from .closed_forms import LONGEST, find_closed_form, solve_closed_form
 from .continuation import find_coordinates, find_real_roots
 from .machine_quadrics import make_machine_quadrics

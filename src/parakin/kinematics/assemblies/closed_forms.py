@@ -31,14 +31,15 @@ def solve_closed_form(model: Model, method: ClosedForm, joints: Array) -> Array:
     Raises :class:`NoMethodError` for a continuum of poses.
     """
     methods = {"spheres": _find_common_points, "planar": _solve_planar, "lambda": _solve_lambdas}
-    return methods[method](model, joints)
+    coordinates: Array = methods[method](model, joints)
+    return coordinates
 
 
 def _find_common_points(model: Model, joints: Array) -> Array:
     """Find both common points of the legs' spheres."""
     _refuse_continuum(model, joints)
     given = joints[0].tolist()
-    points = np.array([model.spheres(given, side) for side in (model.home_side, -model.home_side)], float)
+    points: Array = np.array([model.spheres(given, side) for side in (model.home_side, -model.home_side)], float)
     points = points[np.isfinite(points).all(1)]
     return points[:1] if len(points) == 2 and np.array_equal(points[0], points[1]) else points
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 
@@ -20,6 +20,9 @@ _REAL = 1e-4  # imaginary part, for a point of length one, from which Newton's m
 _CLOSED = 1e-12  # of a quadric at a point of length one: it is a root
 _STRIDE, _SAME_PLACE = 1e-3, 1e-5  # along the null direction of a double root, and what is next to it
 _STEPS = 60  # of Newton's method at a double root, where each halves the distance
+
+
+Points = TypeVar("Points", Array, Complex)
 
 
 class RealRoots(NamedTuple):
@@ -76,15 +79,17 @@ def _turn_to_real(points: Complex) -> Complex:
     """Multiply points by a phase so that those with a real representative are real."""
     squares = (points * points).sum(1)
     phase = np.sqrt(squares / np.maximum(np.abs(squares), 1e-300))
-    return points * phase.conj()[:, None]
+    turned: Complex = points * phase.conj()[:, None]
+    return turned
 
 
 def _measure_closures(system: Array, points: Array) -> Array:
     """Measure the greatest quadric at points (k, n): (k,)."""
-    return np.abs(np.einsum("ki,rij,kj->kr", points, system, points)).max(1, initial=0.0)
+    values: Array = np.abs(np.einsum("ki,rij,kj->kr", points, system, points))
+    return values.max(1, initial=0.0)  # type: ignore[no-any-return]
 
 
-def _polish_points(system: Array | Complex, points: Array | Complex, steps: int) -> Array:
+def _polish_points(system: Points, points: Points, steps: int) -> Points:
     """Take Newton steps of least length from points (k, n), and scale them to length one."""
     for _ in range(steps):
         halves = np.einsum("rij,kj->kri", system, points)

@@ -8,11 +8,12 @@ last closure's parallel slices lie (Leykin, Rodriguez and Sottile, Trace test, 2
 from __future__ import annotations
 
 from functools import cache
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
 
-from .path_tracking import align_members, track_members
+from .path_tracking import track_members
 from .quadric_family import Complex, QuadricFamily, draw_complex, make_family
 
 _SEED = 2
@@ -65,7 +66,7 @@ def _go_round(family: QuadricFamily, system: Complex, roots: Complex, rng: np.ra
     """Track roots along a triangle of members, and join those that come back to those that left."""
     corners = [system, _draw_member(family, rng), _draw_member(family, rng), system]
     points = roots
-    for first, last in zip(corners[:-1], corners[1:], strict=True):
+    for first, last in pairwise(corners):
         ends = track_members(first[None], last[None], points)
         points = ends.points[0][ends.reached[0] == 1.0]
     for point in points:

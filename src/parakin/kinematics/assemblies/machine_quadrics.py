@@ -9,7 +9,6 @@ import numpy as np
 
 from ...algebra import Trace, derivative, evaluate_trace
 from ...arrays import Array
-from ...errors import NoMethodError
 from ...model.traces import Model
 from .generic_member import GenericMember, find_generic_member
 from .path_tracking import align_members, track_members
@@ -51,7 +50,8 @@ class MachineQuadrics(NamedTuple):
     def combine(self, numbers: Array | Complex) -> Complex:
         """Combine the matrices by the closures' numbers (N, closures, 5): (N, closures, n, n), each of length one."""
         quadrics = np.einsum("ncf,cfij->ncij", numbers, self.matrices)
-        return quadrics / np.linalg.norm(quadrics, axis=(2, 3), keepdims=True)
+        scaled: Complex = quadrics / np.linalg.norm(quadrics, axis=(2, 3), keepdims=True)
+        return scaled
 
 
 @lru_cache(maxsize=32)
@@ -63,7 +63,7 @@ def make_machine_quadrics(model: Model) -> MachineQuadrics:
     matrices = family.hull @ np.array([make_closure_quadrics(p / size) for p in platforms]) @ family.hull.T
     made = MachineQuadrics(family, matrices, trace, numbers, size, generic)
     system = family.make_member(made.combine(_draw_numbers(made.compute_numbers(_sample_joints(model)))))
-    first, last = align_members(generic.system, system[None] if system.ndim == 3 else system, len(family.fixed))
+    first, last = align_members(generic.system, system, len(family.fixed))
     ends = track_members(first, last, generic.roots)
     regular = (ends.reached[0] == 1.0) & (np.linalg.norm(ends.points[0] @ family.hull[:, :4], axis=1) > _AT_INFINITY)
     return made._replace(member=GenericMember(last[0], ends.points[0][regular]))
@@ -96,7 +96,7 @@ def _sample_joints(model: Model) -> Array:
 def _draw_numbers(samples: Array) -> Complex:
     """Draw generic complex numbers, (1, closures, 5), from the affine span of samples of each closure's."""
     rng = np.random.default_rng(_SEED)
-    drawn = samples.mean(0)[None].astype(np.complex128)
+    drawn: Complex = samples.mean(0)[None].astype(np.complex128)
     for closure in range(samples.shape[1]):
         _, values, basis = np.linalg.svd(samples[:, closure] - samples[:, closure].mean(0), full_matrices=False)
         own = values > _VARIES * max(np.abs(samples[:, closure]).max(), 1e-300)

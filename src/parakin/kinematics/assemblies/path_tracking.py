@@ -45,9 +45,7 @@ def track_members(first: Complex, last: Complex, starts: Complex, tolerance: flo
     shape = (len(last), *starts.shape)
     ends = PathEnds(np.empty(shape, np.complex128), np.empty(shape[:2]))
     ends.points[:] = starts
-    run_in_threads(
-        shape[0] * shape[1], lambda a, b: track_paths(first, last, tolerance, ends, a, b), _PATHS_A_THREAD
-    )
+    run_in_threads(shape[0] * shape[1], lambda a, b: track_paths(first, last, tolerance, ends, a, b), _PATHS_A_THREAD)
     if tolerance > STRICT:
         for system in np.flatnonzero(find_meetings(ends).any(1)):
             again = track_members(first[system : system + 1], last[system : system + 1], starts, STRICT)

@@ -50,7 +50,8 @@ class QuadricFamily(NamedTuple):
 
 def draw_complex(rng: np.random.Generator, *shape: int) -> Complex:
     """Draw complex numbers, normally distributed with variance one."""
-    return (rng.normal(size=shape) + 1j * rng.normal(size=shape)) / np.sqrt(2.0)
+    drawn: Complex = (rng.normal(size=shape) + 1j * rng.normal(size=shape)) / np.sqrt(2.0)
+    return drawn
 
 
 def make_family(motion: Sequence[str], seed: int = 1) -> QuadricFamily:
@@ -63,7 +64,7 @@ def make_family(motion: Sequence[str], seed: int = 1) -> QuadricFamily:
     points = compute_study_points(np.array([f[0] for f in frames], float), np.array([f[1] for f in frames], float))
     hull = _find_span(points)
     inside = points @ hull.T
-    own = _find_quadrics(inside)
+    own: Array | Complex = _find_quadrics(inside)
     n, freedoms = len(hull), len(motion)
     count = n - 1 - freedoms
     if len(own) > count:  # more than are independent along the motion: combinations cut it out near every point of it
@@ -73,9 +74,7 @@ def make_family(motion: Sequence[str], seed: int = 1) -> QuadricFamily:
     if len(own):
         held = np.linalg.qr(_find_quadrics(inside).reshape(-1, n * n).T)[0]
         closures = closures - closures @ held @ held.T
-    return QuadricFamily(
-        hull, own.astype(np.complex128), _find_span(closures).reshape(-1, n, n), inside[0], freedoms
-    )
+    return QuadricFamily(hull, own.astype(np.complex128), _find_span(closures).reshape(-1, n, n), inside[0], freedoms)
 
 
 def _find_span(rows: Array) -> Array:

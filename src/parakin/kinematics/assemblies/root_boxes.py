@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...arrays import Array
+from ...arrays import Array, Flags
 
 _UNIT = 2.0**-53  # of rounding
 _COEFFICIENTS = 64.0 * _UNIT  # by how much a quadric's entries may be off, of their size: what their making rounds
@@ -49,11 +49,13 @@ def prove_roots(systems: Array, points: Array) -> Array:
     return np.where(proved, radius, np.nan)
 
 
-def _invert_matrices(matrices: Array) -> tuple[Array, Array]:
+def _invert_matrices(matrices: Array) -> tuple[Array, Flags]:
     """Invert matrices (k, n, n), and tell which were regular; the others' inverses are zero."""
+    regular = np.ones(len(matrices), np.bool_)
     try:
-        return np.linalg.inv(matrices), np.ones(len(matrices), np.bool_)
+        inverses: Array = np.linalg.inv(matrices).astype(np.float64, copy=False)
     except np.linalg.LinAlgError:
-        inverses, regular = np.zeros_like(matrices), np.linalg.matrix_rank(matrices) == matrices.shape[1]
+        regular = np.asarray(np.linalg.matrix_rank(matrices) == matrices.shape[1])
+        inverses = np.zeros_like(matrices)
         inverses[regular] = np.linalg.inv(matrices[regular])
-        return inverses, regular
+    return inverses, regular

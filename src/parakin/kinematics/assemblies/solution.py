@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -75,13 +75,15 @@ def find_assemblies(model: Model, joints: Array) -> Assemblies:
         return _describe(model, joints, solve_closed_form(model, method, joints), CLOSED_FORM)
     roots = find_real_roots(model, joints)
     complete = NOT_COMPLETE if roots.lost_count else ALL_PATHS
-    counts = (roots.complex_count, roots.infinite_count, roots.lost_count)
-    return _describe(model, joints, find_coordinates(model, roots.points), complete, counts)
+    return replace(
+        _describe(model, joints, find_coordinates(model, roots.points), complete),
+        complex_count=roots.complex_count,
+        infinite_count=roots.infinite_count,
+        lost_count=roots.lost_count,
+    )
 
 
-def _describe(
-    model: Model, joints: Array, coordinates: Array, complete: str, counts: tuple[int | None, ...] = (None, None, None)
-) -> Assemblies:
+def _describe(model: Model, joints: Array, coordinates: Array, complete: str) -> Assemblies:
     """Polish coordinates (k, m) of solutions, and tell all that is known of them."""
     given = np.ascontiguousarray(np.broadcast_to(joints, (len(coordinates), joints.shape[1])))
     roots = find_roots(model, np.ascontiguousarray(coordinates), given, poses=False)
@@ -102,8 +104,7 @@ def _describe(
         _find_signs(model, poses, given),
         find_broken_limits(model, poses, given, model.mode) == 0,
         complete if closed.all() or complete == CLOSED_FORM else NOT_COMPLETE,
-        *counts,
-        int((closed & ~told).sum()),
+        untold_count=int((closed & ~told).sum()),
     )
 
 

@@ -1,8 +1,8 @@
 """Study's eight parameters of a rigid motion, and the legs' closures in them as quadrics.
 
-A motion is a point x = (e, g) of projective space: the unit quaternion e turns, and 2·g·e*/|e|² moves. Its points lie on
-Study's quadric e·g = 0 (Husty, An algorithm for solving the direct kinematics of general Stewart-Gough platforms, 1996).
-Quaternions have their real part first.
+A motion is a point x = (e, g) of projective space: the quaternion e turns, and 2·g·e*/|e|² moves. Its points lie on
+Study's quadric e·g = 0 (Husty, An algorithm for solving the direct kinematics of general Stewart-Gough platforms,
+1996). Quaternions have their real part first.
 """
 
 from __future__ import annotations

@@ -132,7 +132,7 @@ def _apply_quadrics(quadrics, x, out):
 
 
 @njit(nogil=True, cache=True, fastmath=_FAST, error_model="numpy")
-def _mix_quadrics(first, last, t, out):
+def _blend_quadrics(first, last, t, out):
     """Compute the quadrics of the homotopy at t."""
     m, n = out.shape[0], out.shape[1]
     for r in range(m):
@@ -239,7 +239,7 @@ def _track_path(work, first, last, change, x, tolerance):
     t = 0.0
     for _ in range(MOST_STEPS):
         _scale_to_one(x)
-        _mix_quadrics(first, last, t, work.quadrics)
+        _blend_quadrics(first, last, t, work.quadrics)
         if not _expand_path(work, change, x):
             return t
         step = min(_choose_step(work.series, tolerance), 1.0 - t)
@@ -252,7 +252,7 @@ def _track_path(work, first, last, change, x, tolerance):
                 for k in range(ORDER - 1, -1, -1):
                     total = total * (ahead - t) + work.series[k, i]
                 work.point[i] = total
-            _mix_quadrics(first, last, ahead, work.quadrics)
+            _blend_quadrics(first, last, ahead, work.quadrics)
             if _correct_point(work, x, work.point):
                 break
             step = 0.5 * min(step, 1.0 - t)

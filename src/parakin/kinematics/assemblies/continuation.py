@@ -22,7 +22,7 @@ _STRIDE, _SAME_PLACE = 1e-3, 1e-5  # along the null direction of a double root, 
 _STEPS = 60  # of Newton's method at a double root, where each halves the distance
 
 
-Points = TypeVar("Points", Array, Complex)
+AnyPoints = TypeVar("AnyPoints", Array, Complex)
 
 
 class RealRoots(NamedTuple):
@@ -89,7 +89,7 @@ def _measure_closures(system: Array, points: Array) -> Array:
     return values.max(1, initial=0.0)  # type: ignore[no-any-return]
 
 
-def _polish_points(system: Points, points: Points, steps: int) -> Points:
+def _polish_points(system: AnyPoints, points: AnyPoints, steps: int) -> AnyPoints:
     """Take Newton steps of least length from points (k, n), and scale them to length one."""
     for _ in range(steps):
         halves = np.einsum("rij,kj->kri", system, points)

@@ -90,6 +90,13 @@ class Structure(ABC):
         steps = [step for step in (*self.spec.mounting, *self.spec.head, *self.spec.table) if step.axis in TRANSLATIONS]
         return inf if any(step.drive is not None for step in steps) else sum(abs(step.value) for step in steps)
 
+    def bound_platform_way(self, ways: Sequence[Scalar]) -> Scalar | None:
+        """Bound the squared distance, mm², between the platform's origins at two poses, from the poses' difference.
+
+        Head and table may stand in any of their modes. None where such a bound is not known.
+        """
+        return None
+
     @property
     def has_direction(self) -> bool:
         """Whether of the orientation the tool's axis counts only, and B and C tell it."""

@@ -7,7 +7,7 @@ from typing import Literal
 
 import numpy as np
 
-from ...algebra import IDENTITY, Mat, Scalar, Vec, add, apply, atan2, product, sincos, sqrt, sub, transpose
+from ...algebra import IDENTITY, Mat, Scalar, Vec, add, apply, atan2, dot, product, sincos, sqrt, sub, transpose
 from ...algebra import make_axis_rotation as turned
 from ...errors import DescriptionError
 from ..chain import UNIT, compose_chain, transform_to_local
@@ -51,6 +51,9 @@ class Free(Structure):
         self.turns = tuple(f"w{word[1]}" for word in self.coordinates if word in ROTATIONS)
         self.tool, self.tip = compose_chain(spec.head, ())
         self.assembly_method = self._assembly_method()
+
+    def bound_platform_way(self, ways: Sequence[Scalar]) -> Scalar | None:
+        return None if self.turns else dot(ways, ways)
 
     def place(self, pose: Sequence[Scalar], branch: str, first: Scalar | None = None) -> PlatformPlacement:
         rotation, origin = self.frame(pose)

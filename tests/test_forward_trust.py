@@ -8,7 +8,15 @@ import pytest
 
 import parakin as pk
 from parakin.errors import SingularHomeWarning
-from parakin.kinematics.solution import ANSWERED, ON_ANOTHER_SIDE, OPEN, OTHER_MODE, REASONS, SINGULAR_START
+from parakin.kinematics.solution import (
+    ANSWERED,
+    ON_ANOTHER_SIDE,
+    OPEN,
+    OTHER_MODE,
+    REASONS,
+    SINGULAR_ANSWER,
+    SINGULAR_START,
+)
 
 RAILS = """\
 name: six_vertical_rails
@@ -196,6 +204,24 @@ def test_a_continuum_is_named(load):
     with pytest.raises(pk.NoMethodError, match="continuum"):
         machine.assemblies([150.0, 150.0, 150.0])
     assert 0 < len(machine.assemblies([150.0, 150.0, 151.0])) <= 6
+
+
+def test_one_pose_of_a_continuum_is_no_answer(load):
+    """Struts of one length let a congruent triangle go round a circle without a turn: no start tells where it is."""
+    machine = load(CONGRUENT)
+    angles = np.random.default_rng(0).uniform(-np.pi, np.pi, 200)
+    poses = np.stack([150.0 * np.cos(angles), 150.0 * np.sin(angles), np.zeros(200)], 1)
+    joints = machine.inverse(poses)
+    assert joints == pytest.approx(150.0)
+    starts = poses + np.random.default_rng(1).normal(size=poses.shape) * [10.0, 10.0, 0.1]
+    for method in ("newton", "constant"):
+        found = machine.forward(joints, near=starts, method=method)
+        assert not found.converged.any()
+        assert np.isin(found.why, (SINGULAR_ANSWER, ON_ANOTHER_SIDE, OPEN)).all()
+    found = machine.forward(joints, near=starts)
+    assert (found.why == SINGULAR_ANSWER).mean() > 0.9
+    beside = machine.forward(machine.inverse(poses + [0.0, 0.0, 0.05]), near=poses + [0.0, 0.0, 0.1])
+    assert beside.converged.all()
 
 
 def test_a_machine_singular_everywhere_is_warned_of_and_finds_nothing(load):

@@ -25,6 +25,7 @@ from .solution import (
     ON_ANOTHER_SIDE,
     OPEN,
     OTHER_MODE,
+    SINGULAR_ANSWER,
     SINGULAR_START,
     Answers,
     Solution,
@@ -38,6 +39,7 @@ from .wrist.pose_angles import bring_within_poles
 
 WITHIN_A_TURN = 6  # steps of half a radian at most, which can't leave the start's turn
 STEADY = 0.2  # by which the determinant may change from start to answer and still tell the start's own side
+NOT_FALLEN = 0.999  # by which it may change before the answer may be a singularity itself
 FIRST_STRIDE, LEAST_STRIDE = 1.0 / 8.0, 1e-5  # of the way in joints that a step of the continuation takes
 MOST_STRIDES = 400  # steps of the continuation
 NEAR_STEPS = 6  # of Newton's method for a step of the continuation; one that needs more is halved
@@ -169,11 +171,11 @@ def _solve_by_newton(model: Model, joints: Array, starts: Array | None, mode: st
     near = np.array(model.home)[None, :] if starts is None else starts
     end = compile_settling_end(model, mode, starts is not None)
     if starts is None:
-        settling = Settling(0.0, np.inf, MOST_STEPS)
+        settling = Settling(0.0, NOT_FALLEN, MOST_STEPS)
         roots = find_roots(model, near, joints, side=find_sides(model, near, mode), end=end, settling=settling)
     else:
         least = (SINGULAR * bound_determinant(model)) ** 2
-        settling = Settling(least, STEADY if model.has_modes else np.inf, WITHIN_A_TURN)
+        settling = Settling(least, STEADY if model.has_modes else NOT_FALLEN, WITHIN_A_TURN)
         roots = find_roots(model, near, joints, end=end, settling=settling)
     answers = Answers(roots.rows, roots.residual, roots.steps, np.zeros(len(joints), np.int8), roots.settled)
     rest = np.flatnonzero(~roots.settled)
@@ -185,8 +187,22 @@ def _solve_by_newton(model: Model, joints: Array, starts: Array | None, mode: st
         why = _judge(model, own, joints[rest], mode)
         if (why != ANSWERED).any():
             _continue_from_starts(model, own_starts, joints[rest], (own, why), mode)
+        _refuse_singular_answers(model, own, joints[rest], why, mode)
         put_rows(answers, rest, Answers(own.rows, own.residual, own.steps, why, own.settled))
     return answers
+
+
+def _refuse_singular_answers(
+    model: Model, roots: Roots, joints: Array, why: NDArray[np.int8], mode: str | None
+) -> None:
+    """Refuse roots that are parallel singularities themselves, one pose of a continuum of them; in place.
+
+    Newton's method ends before a singularity where two roots meet, but not before one where the platform is free. The
+    determinant that it leaves is that of a step before.
+    """
+    rows = np.flatnonzero(why == ANSWERED)
+    if len(rows):
+        why[rows[find_sides(model, roots.rows[rows], mode, joints[rows]) == 0.0]] = SINGULAR_ANSWER
 
 
 def _take_own_sides(model: Model, roots: Roots, near: Array, joints: Array, mode: str | None) -> None:
@@ -281,6 +297,7 @@ def _solve_by_constant_jacobian(model: Model, joints: Array, starts: Array | Non
         roots.turned[np.abs(roots.turned) <= SINGULAR * bound_determinant(model)] = 0.0
     roots.turned[:] *= sides
     why = _judge(model, roots._replace(rows=poses), joints, mode)
+    _refuse_singular_answers(model, roots._replace(rows=poses), joints, why, mode)
     return Answers(poses, roots.residual, steps, why, np.zeros(len(why), np.bool_))
 
 

@@ -11,13 +11,14 @@ from numpy.typing import NDArray
 from ..arrays import Array, Flags, Indices
 
 # Why there is no answer.
-ANSWERED, OPEN, ON_ANOTHER_SIDE, OTHER_MODE, SINGULAR_START = range(5)
+ANSWERED, OPEN, ON_ANOTHER_SIDE, OTHER_MODE, SINGULAR_START, SINGULAR_ANSWER = range(6)
 REASONS = (
     "",
     "the legs do not close near the start",
     "a parallel singularity lies between the start and the joints",
     "the legs close in another working mode only",
     "the start is a parallel singularity, so it lies on no side",
+    "the legs close in a parallel singularity, where they leave the platform free to move",
 )
 
 
@@ -27,7 +28,8 @@ class Solution:
 
     poses : (..., axes), NaN where not converged; C of an upright tool is the near pose's, else 0
     residual : (...,) the greatest distance by which a leg fails to close there, mm
-    converged : (...,) True where the legs close, in the working mode asked for and the start's assembly mode
+    converged : (...,) True where the legs close, in the working mode asked for and the start's assembly mode; in closed
+        form without a start also in the other one, if that alone has a pose in the working mode
     steps : (...,) Newton's steps; 0 in closed form
     why : (...,) why there is no answer, an index of :data:`REASONS`; 0 where there is one
     in_other_mode : (...,) True where no mode was asked for and the legs stand in another one than the machine's, as the

@@ -270,13 +270,13 @@ def test_columns_of_b_and_c_are_seen(line):
 
 # A line for each first letter.
 WORDS = """
-accept accumulate act add advance align allocate allow announce append apply approach assign average
+accept accumulate act add advance align allocate allow announce append apply approach arrange assign average
 begin bind bisect blend bore bound box bracket bring build
 cancel centre certify change check choose clamp clear climb clip clone close coincide collect combine compare compile
 complete compose compute concatenate confirm continue convert copy correct count cross cut
 decide decode decompose delay derive describe design detect differentiate discard divide draw drill drop
-ease embed enclose encode end enter erase estimate evaluate exclude execute exit expand explain explore extend extract
-factor fail fetch fill filter find finish fit fix flag flatten flip fold follow forbid format free freeze
+ease embed enclose encode end enter equip erase estimate evaluate exclude execute exit expand explain explore extend
+extract factor fail fetch fill filter find finish fit fix flag flatten flip fold follow forbid format free freeze
 gather get give go grade group grow guess
 halve hash
 ignore import insert integrate interpolate interpret intersect invert is isolate iterate
@@ -286,7 +286,7 @@ label lay lead leave let limit linearise list load locate lock lower
 make map march mark match maximise measure meet merge minimise move multiply
 name narrow normalise note number
 open order
-paint parse peel pick place plan point polish pose post predict prepare print project prove put
+pace paint parse peel pick place plan point polish pose post predict prepare print project prove put
 quote
 raise rank rate read rebuild recognise record redirect reduce refine refuse reject relate release remove rename render
 renumber reorder repeat replace report repost require reserve reset resize resolve restore restrict retract retry return
@@ -307,7 +307,7 @@ QUESTIONS = {"begins", "bounds", "changes", "crosses", "ends", "has", "is", "spa
 MATHEMATICS = {"absolute", "atan2", "copysign", "cross", "derivative", "dot", "magnitude", "maximum", "minimum", "norm"}
 MATHEMATICS |= {"njit", "product", "sincos", "sqrt", "sub"}
 # What people type: a command has its function's name, and so do a few words of `pk`.
-COMMANDS = {"assemblies", "atlas", "design", "forward", "inverse", "linuxcnc", "machines", "post", "show", "workspace"}
+COMMANDS = {"atlas", "design", "forward", "inverse", "linuxcnc", "machines", "post", "show", "workspace"}
 TYPED = COMMANDS | {"main", "to_display", "workpiece"}
 
 

@@ -7,6 +7,7 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
+from ..controllers import Hardware
 from ..errors import InputError
 from .console import announce_compiling, print_json, print_text
 from .options import Json, Name, Sizes, load_machine
@@ -17,13 +18,15 @@ def linuxcnc(
     /,
     *,
     output: Annotated[Path | None, Parameter(name=["--output", "-o"])] = None,
+    hardware: Hardware | None = None,
     force: bool = False,
     json: Json = False,
     sizes: Sizes = None,
 ) -> int:
     """A LinuxCNC configuration that starts: kinematics in C, ini and HAL files, tool table.
 
-    It runs as a simulation without hardware; its page, NAME.md, says how to install and start it.
+    It runs as a simulation without hardware, or is a template for a card; its page, NAME.md, says how to install and
+    start it, and what is left to the hand.
 
     Parameters
     ----------
@@ -31,6 +34,8 @@ def linuxcnc(
         A shipped machine's name or a YAML file.
     output
         Folder for the files; by default one of the machine's name.
+    hardware
+        The card that drives the machine; by default none, a simulation.
     force
         Overwrite files that were edited since parakin wrote them.
     """
@@ -41,7 +46,7 @@ def linuxcnc(
     from ..export.files import write_files
 
     folder = Path(machine.name) if output is None else output
-    files = make_linuxcnc_configuration(machine)
+    files = make_linuxcnc_configuration(machine, hardware)
     edited = [] if force else find_edited_files(folder, files)
     if edited:
         more = f" (and {', '.join(path.name for path in edited[1:])})" if edited[1:] else ""

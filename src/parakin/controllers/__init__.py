@@ -16,6 +16,9 @@ if TYPE_CHECKING:
 
 Target: TypeAlias = Literal["linuxcnc", "joints", "grbl", "fluidnc", "siemens", "heidenhain", "fanuc", "beckhoff"]
 
+# Cards that a LinuxCNC configuration may be for, the names of `linuxcnc/hardware/cards.py`.
+Hardware: TypeAlias = Literal["mesa-7i96s", "mesa-7i76e", "parport", "ethercat"]
+
 
 def load_controller(target: Target) -> Controller:
     """Import a controller's file or folder and return its description."""

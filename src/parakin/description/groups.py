@@ -36,6 +36,9 @@ class LegGroup(FileSection):
     speed: Any = None
     acceleration: Any = None
     jerk: Any = None
+    counts: Any = None
+    lead: Any = None
+    homing: Any = None
 
     def build_legs(self) -> list[Leg]:
         """Build the legs with their drives."""
@@ -44,7 +47,7 @@ class LegGroup(FileSection):
             drives = []
             for j, unit in enumerate(self.leg.units):
                 drive = Drive(str(names[j]), unit, *self.range[i][j])
-                for what in ("speed", "acceleration", "jerk"):
+                for what in ("speed", "acceleration", "jerk", "counts", "lead", "homing"):
                     rows = getattr(self, what)
                     drive = drive if rows is None else replace(drive, **{what: rows[i][j]})
                 drives.append(drive)
@@ -174,6 +177,9 @@ def _build_group_model(kind: str) -> type[LegGroup]:
         speed=(_make_rows_type(tuple(d.speed for d in drives), 0), None),
         acceleration=(_make_rows_type(tuple(d.acceleration for d in drives), 0), None),
         jerk=(_make_rows_type(tuple(d.jerk for d in drives), 0), None),
+        counts=(_make_rows_type(tuple(d.counts for d in drives), 0), None),
+        lead=(_make_rows_type(tuple(d.lead for d in drives), 0), None),
+        homing=(_make_rows_type(tuple(d.homing for d in drives), 0), None),
         **own,
     )
     model.leg = leg

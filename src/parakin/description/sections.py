@@ -109,9 +109,13 @@ class _DrivenStep(FileSection):
     speed: float = inf
     acceleration: float = inf
     jerk: float = inf
+    counts: float | None = None
+    lead: float | None = None
+    homing: Any = None
 
     def build_step(self, axis: str, unit: Unit) -> Step:
-        drive = Drive(str(self.joint), unit, *self.range, self.speed, self.acceleration, self.jerk)
+        rates = self.speed, self.acceleration, self.jerk
+        drive = Drive(str(self.joint), unit, *self.range, *rates, self.counts, self.lead, self.homing)
         return Step(axis, self.offset, drive, -1.0 if self.reverse else 1.0)
 
 
@@ -125,6 +129,9 @@ def _build_driven_model(unit: Unit) -> type[_DrivenStep]:
         speed=(types.speed, inf),
         acceleration=(types.acceleration, inf),
         jerk=(types.jerk, inf),
+        counts=(types.counts | None, None),
+        lead=(types.lead | None, None),
+        homing=(types.homing | None, None),
     )
 
 

@@ -18,7 +18,7 @@ from pydantic import (
 )
 
 from ..errors import InputError, quote, suggest
-from ..model.elements import Unit, Vector
+from ..model.elements import ABSOLUTE, Unit, Vector
 from ..units import (
     ACCELERATION,
     ANGLE,
@@ -219,15 +219,36 @@ class DriveTypes:
     speed: Any
     acceleration: Any
     jerk: Any
+    counts: Any
+    lead: Any
+    homing: Any
+
+
+def _refuse_zero(value: float) -> float:
+    if value == 0.0:
+        raise ValueError("zero, expected what the joint moves while the motor turns once")
+    return value
+
+
+def _accept_homing(kind: QuantityKind) -> PlainValidator:
+    """Make a validator that accepts where a home switch is, or the word for an encoder that needs none."""
+
+    def read(value: object, info: ValidationInfo) -> float | str:
+        return ABSOLUTE if value == ABSOLUTE else read_quantity(value, kind, info)
+
+    return PlainValidator(read)
+
+
+def _build_drive_types(value: Any, pair: Any, kind: QuantityKind, rates: tuple[QuantityKind, ...]) -> DriveTypes:
+    """Build the types of a drive's values from those of a position and of a range, and from the kinds of quantities."""
+    speed, acceleration, jerk = (Annotated[float, accept_quantity(rate)] for rate in rates)
+    counts = Annotated[float, accept_quantity(NUMBER, (0.0, 1e9, "more than 0, at most 1e9"))]
+    lead = Annotated[float, accept_quantity(kind), AfterValidator(_refuse_zero)]
+    homing = Annotated[float | str, _accept_homing(kind)]
+    return DriveTypes(value, pair, speed, acceleration, jerk, counts, lead, homing)
 
 
 DRIVE_TYPES: dict[Unit, DriveTypes] = {
-    "mm": DriveTypes(
-        LengthValue, LengthPair, *(Annotated[float, accept_quantity(kind)] for kind in (SPEED, ACCELERATION, JERK))
-    ),
-    "rad": DriveTypes(
-        AngleValue,
-        AnglePair,
-        *(Annotated[float, accept_quantity(kind)] for kind in (ANGULAR_SPEED, ANGULAR_ACCELERATION, ANGULAR_JERK)),
-    ),
+    "mm": _build_drive_types(LengthValue, LengthPair, LENGTH, (SPEED, ACCELERATION, JERK)),
+    "rad": _build_drive_types(AngleValue, AnglePair, ANGLE, (ANGULAR_SPEED, ANGULAR_ACCELERATION, ANGULAR_JERK)),
 }

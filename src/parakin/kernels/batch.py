@@ -41,12 +41,9 @@ def freeze_rows(rows: Array) -> Array:
     return view
 
 
-def run_in_threads(count: int, work: Callable[[int, int], None], small: int = SMALL) -> None:
-    """Run ``work(start, stop)`` over all rows, a part in each thread; the kernels release the interpreter's lock.
-
-    small : rows that are worth a thread
-    """
-    parts = min(count_cores(), count // small)
+def run_in_threads(count: int, work: Callable[[int, int], None]) -> None:
+    """Run ``work(start, stop)`` over all rows, a part in each thread; the kernels release the interpreter's lock."""
+    parts = min(count_cores(), count // SMALL)
     if parts < 2:
         work(0, count)
         return

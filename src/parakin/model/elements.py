@@ -8,7 +8,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from math import inf
-from typing import Literal, NewType
+from typing import Final, Literal, NewType
+
+ABSOLUTE: Final = "absolute"  # of a drive's homing: its encoder knows where it is
 
 Unit = Literal["mm", "rad"]
 Vector = tuple[float, float, float]
@@ -26,7 +28,12 @@ MOTION_UNITS: dict[str, Unit] = {**dict.fromkeys(TRANSLATIONS, "mm"), **dict.fro
 
 @dataclass(frozen=True)
 class Drive:
-    """One actuated joint: its name, its unit, its range and its greatest rates."""
+    """One actuated joint: its name, its unit, its range, its greatest rates, and how a controller drives it.
+
+    counts, lead : steps or encoder counts of a motor's turn, and what the joint moves meanwhile, negative where the
+        motor turns the other way; None: not said
+    homing : where the home switch trips, or ``absolute`` for an encoder that needs none; None: not said
+    """
 
     name: str
     unit: Unit
@@ -35,6 +42,9 @@ class Drive:
     speed: float = inf
     acceleration: float = inf
     jerk: float = inf
+    counts: float | None = None
+    lead: float | None = None
+    homing: float | Literal["absolute"] | None = None
 
 
 @dataclass(frozen=True)

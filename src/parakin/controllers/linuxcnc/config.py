@@ -1,4 +1,4 @@
-"""Write the files that describe a machine to LinuxCNC: ini, HAL for a simulation, tool table."""
+"""Write the files that describe a machine to LinuxCNC: ini, HAL for a simulation or a card, tool table."""
 
 from __future__ import annotations
 
@@ -12,8 +12,10 @@ from .axis_ranges import estimate_axis_ranges
 from .axis_rates import choose_drive_rates, choose_unit_rates, find_slowest_drive
 from .guard import name_guard
 from .hand_box import HandBox, find_hand_box
+from .hardware import Equipment, wiring
 from .home_pose import find_home_pose
 from .module import hash_kinematics, name_kinematics
+from .number_text import format_number
 from .planner import hash_planner, name_planner
 
 _JOG = 0.25  # of the speed of moves by hand: what the screen begins with
@@ -25,7 +27,7 @@ _KEYS = {"min": "MIN_LIMIT", "max": "MAX_LIMIT", "velocity": "MAX_VELOCITY", "ac
 
 _INI = """\
 # {title}, for LinuxCNC 2.9. Made by parakin from the machine's description.
-# It runs as a simulation; for a machine of your own change {name}.hal and the homing of the joints.
+# {purpose}
 
 [EMC]
 VERSION = 1.1
@@ -58,7 +60,7 @@ PARAMETER_FILE = {name}.var
 EMCMOT = motmod
 COMM_TIMEOUT = 1.0
 SERVO_PERIOD = 1000000
-
+{base_period}
 [EMCIO]
 EMCIO = io
 CYCLE_TIME = 0.100
@@ -83,20 +85,28 @@ MAX_LINEAR_VELOCITY = {fast}
 MAX_LINEAR_ACCELERATION = {acceleration}
 # X Y Z of the pose that belongs to the joints' HOME; LinuxCNC reads no more, the kinematics knows its turns.
 HOME = {home}
-
+{spindle}
 # MIN_LIMIT, MAX_LIMIT and the rates of an axis are for moves by hand: in that box every pose is proved to be allowed,
 # and all axes at once keep every joint within its speed. Programs have the PROGRAM_ values, which {guard}
 # puts in force: the machine's true ranges, and rates that bind nothing, for {planner} keeps the joints within theirs.
 """
 
 
-_HAL = """\
+_SIMULATION = """\
 # {name} as a simulation: every joint is at once where it is sent.
-# For a machine of your own put its drives in the place of these loops.
+# For a machine of your own put its drives in the place of these loops, or write it for a card (--hardware).
+"""
 
+_REAL = """\
+# {name} on {card}. {name}.md says what is left to the hand.
+# Pins as documented in {source}.
+"""
+
+_HAL = """\
+{head}
 loadrt [KINS]KINEMATICS made={made}
-loadrt [EMCMOT]EMCMOT servo_period_nsec=[EMCMOT]SERVO_PERIOD num_joints=[KINS]JOINTS
-addf motion-command-handler servo-thread
+loadrt [EMCMOT]EMCMOT {base_period}servo_period_nsec=[EMCMOT]SERVO_PERIOD num_joints=[KINS]JOINTS
+{loading}addf motion-command-handler servo-thread
 addf kins.begin-steps servo-thread
 addf motion-controller servo-thread
 addf kins.end-steps servo-thread
@@ -119,13 +129,16 @@ net homed motion.is-all-homed => guard.homed
 net enabled motion.motion-enabled => guard.enabled
 net jog-stop guard.jog-stop => motion.jog-stop
 {watched}
-net estop iocontrol.0.user-enable-out => iocontrol.0.emc-enable-in
-net tool-prepare iocontrol.0.tool-prepare => iocontrol.0.tool-prepared
-net tool-change iocontrol.0.tool-change => iocontrol.0.tool-changed
+{signals}
 
 # The window that shows the machine.
 source {name}_screen.hal
 """
+
+_LOOPBACKS = """\
+net estop iocontrol.0.user-enable-out => iocontrol.0.emc-enable-in
+net tool-prepare iocontrol.0.tool-prepare => iocontrol.0.tool-prepared
+net tool-change iocontrol.0.tool-change => iocontrol.0.tool-changed"""
 
 
 _RATES_HAL = """\
@@ -139,13 +152,16 @@ loadusr -Wn inihal sleep 60
 """
 
 
-def write_ini(machine: Machine) -> str:
-    """Write the ini file."""
+def write_ini(machine: Machine, equipment: Equipment | None = None) -> str:
+    """Write the ini file, for a simulation or for what drives the machine."""
     (fast, acceleration), pose = choose_unit_rates(machine, "mm"), find_home_pose(machine)
     home, box = dict(zip(machine.axes, pose.tolist(), strict=True)), find_hand_box(machine)
     by_hand = _find_unit_speeds(machine, box)
     head = _INI.format(
         title=" ".join(machine.spec.title.split()),
+        purpose=_describe_purpose(machine, equipment),
+        base_period=f"BASE_PERIOD = {equipment.card.period}\n" if equipment and equipment.card.period else "",
+        spindle=wiring.SPINDLE_INI if equipment else "",
         name=machine.name,
         axes=" ".join(machine.axes),
         letters="".join(machine.axes),
@@ -164,8 +180,19 @@ def write_ini(machine: Machine) -> str:
     )
     axes = [_format_axis(machine, box, column) for column in range(len(machine.axes))]
     at_home = machine.inverse(pose).tolist()
-    joints = [_format_joint(i, drive, q) for i, (drive, q) in enumerate(zip(machine.drives, at_home, strict=True))]
+    homing = [
+        _list_immediate_homing(drive, q) if equipment is None else wiring.list_joint_keys(machine, equipment, i)
+        for i, (drive, q) in enumerate(zip(machine.drives, at_home, strict=True))
+    ]
+    joints = [_format_joint(i, drive, homing[i]) for i, drive in enumerate(machine.drives)]
     return "\n".join([head, *axes, *joints])
+
+
+def _describe_purpose(machine: Machine, equipment: Equipment | None) -> str:
+    if equipment is None:
+        change = f"change {machine.name}.hal and the homing of the joints"
+        return f"It runs as a simulation; for a machine of your own {change}."
+    return f"It drives the machine by {equipment.card.title}; {machine.name}.md says what is left to the hand."
 
 
 def _find_unit_speeds(machine: Machine, box: HandBox) -> dict[str, float]:
@@ -194,12 +221,6 @@ def _round_inward(end: float, unit: str, sign: float) -> float:
     return sign * ceil(sign * float(end) / digit) * digit
 
 
-def format_number(value: float) -> str:
-    """Format with nine digits after the point at most, a thousandth of a nanometre."""
-    text = f"{value:.9f}".rstrip("0").rstrip(".")
-    return "0" if text == "-0" else text
-
-
 def _format_section(name: str, lines: Iterable[str]) -> str:
     return "\n".join([f"[{name}]", *lines, ""])
 
@@ -214,7 +235,14 @@ def _format_rates(speed: float, acceleration: float, unit: str) -> Iterator[str]
     yield f"MAX_ACCELERATION = {format_number(to_display(acceleration, unit))}"
 
 
-def _format_joint(index: int, drive: Drive, home: float) -> str:
+def _list_immediate_homing(drive: Drive, home: float) -> Iterator[str]:
+    """List the keys of homing of a simulation: a joint is at home at once."""
+    yield f"HOME = {format_number(to_display(home, drive.unit))}"
+    yield f"HOME_OFFSET = {format_number(to_display(home, drive.unit))}"
+    yield from ("HOME_SEARCH_VEL = 0", "HOME_LATCH_VEL = 0", "HOME_SEQUENCE = 0")
+
+
+def _format_joint(index: int, drive: Drive, homing: Iterable[str]) -> str:
     unit = drive.unit
     missing = [what for what in ("speed", "acceleration") if not isfinite(getattr(drive, what))]
     speed, acceleration = choose_drive_rates(drive)
@@ -227,23 +255,25 @@ def _format_joint(index: int, drive: Drive, home: float) -> str:
         *_format_rates(speed, acceleration, unit),
         f"FERROR = {format_number(lag)}",
         f"MIN_FERROR = {format_number(0.1 * lag)}",
-        f"HOME = {format_number(to_display(home, unit))}",
-        f"HOME_OFFSET = {format_number(to_display(home, unit))}",
-        "HOME_SEARCH_VEL = 0",
-        "HOME_LATCH_VEL = 0",
-        "HOME_SEQUENCE = 0",
+        *homing,
     ]
     return _format_section(f"JOINT_{index}", lines)
 
 
-def write_hal(machine: Machine) -> str:
-    """Write the HAL file of a simulation: every joint is at once where it is sent."""
-    loops = [
-        f"net joint-{i} joint.{i}.motor-pos-cmd => joint.{i}.motor-pos-fb  # {name}"
-        for i, name in enumerate(machine.joints)
-    ]
-    kinematics = name_kinematics(machine)
-    guard = name_guard(machine)
+def write_hal(machine: Machine, equipment: Equipment | None = None) -> str:
+    """Write the HAL file: of a simulation, where every joint is at once where it is sent, or of a card."""
+    if equipment is None:
+        head = _SIMULATION.format(name=machine.name)
+        loading, signals = [""], [_LOOPBACKS]
+        loops = [
+            f"net joint-{i} joint.{i}.motor-pos-cmd => joint.{i}.motor-pos-fb  # {name}"
+            for i, name in enumerate(machine.joints)
+        ]
+    else:
+        head = _REAL.format(name=machine.name, card=equipment.card.title, source=equipment.card.source)
+        loading = [*wiring.list_loading(equipment), ""]
+        loops = list(wiring.list_loops(machine, equipment))[:-1]
+        signals = [*wiring.list_signals(equipment), "", *wiring.list_writing(equipment)]
     watched = [f"net told-{i} => guard.joint-{i}" for i in range(len(machine.joints))]
     for axis in machine.axes:
         letter = axis.lower()
@@ -254,10 +284,13 @@ def write_hal(machine: Machine) -> str:
     return _HAL.format(
         name=machine.name,
         made=hash_kinematics(machine),
+        head=head,
+        base_period="base_period_nsec=[EMCMOT]BASE_PERIOD " if equipment and equipment.card.period else "",
+        loading="\n".join(loading),
+        signals="\n".join(signals),
         loops="\n".join(loops),
         told="\n".join(told),
-        kinematics=kinematics,
-        guard=guard,
+        guard=name_guard(machine),
         watched="\n".join([*watched, ""]),
     )
 

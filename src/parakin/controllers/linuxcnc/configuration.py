@@ -7,6 +7,7 @@ from ...machine import Machine
 from .config import write_hal, write_ini, write_rates_hal, write_tool_table
 from .first_program import write_first_program
 from .guard import name_guard, write_guard
+from .hardware import equip_machine
 from .model_header import name_model, write_model
 from .module import name_kinematics, write_module
 from .page import write_page
@@ -16,27 +17,31 @@ from .stamp import stamp_file
 
 
 @check_arguments
-def make_linuxcnc_configuration(machine: Machine) -> dict[str, str]:
-    """Make a configuration for LinuxCNC 2.9 that runs as a simulation: {file: text}.
+def make_linuxcnc_configuration(machine: Machine, hardware: str | None = None) -> dict[str, str]:
+    """Make a configuration for LinuxCNC 2.9, {file: text}: a simulation, or a template for a card of a real machine.
 
     The files are kinematics, trajectory planner and guard (C, built by LinuxCNC's ``halcompile --install``), the header
     that all include, the ini and HAL files, the window that shows the machine, the tool table, a first program and a
     page that tells how to start, all named after the machine. The last line of each tells by a hash whether the file
     was edited since.
+
+    hardware : ``mesa-7i96s``, ``mesa-7i76e``, ``parport`` or ``ethercat``; None: a simulation
     """
+    equipment = None if hardware is None else equip_machine(machine, hardware)
     texts = {
         f"{name_kinematics(machine)}.c": write_module(machine),
         f"{name_guard(machine)}.c": write_guard(machine),
         f"{name_planner(machine)}.c": write_planner(machine),
         name_model(machine): write_model(machine),
-        f"{machine.name}.ini": write_ini(machine),
-        f"{machine.name}.hal": write_hal(machine),
+        f"{machine.name}.ini": write_ini(machine, equipment),
+        f"{machine.name}.hal": write_hal(machine, equipment),
         f"{machine.name}_rates.hal": write_rates_hal(machine),
         f"{name_screen(machine)}.py": write_screen(machine),
         f"{name_screen(machine)}.hal": write_screen_hal(machine),
         f"{machine.name}_axis.py": write_axis_settings(machine),
         f"{machine.name}.tbl": write_tool_table(machine),
         f"{machine.name}.ngc": write_first_program(machine),
-        f"{machine.name}.md": write_page(machine),
+        f"{machine.name}.md": write_page(machine, equipment),
+        **(equipment.layout.files if equipment else {}),
     }
     return {name: stamp_file(name, text) for name, text in texts.items()}

@@ -9,8 +9,8 @@ import numpy as np
 from ...arrays import Array
 from ...machine import Machine
 from ...units import to_display
-from .config import format_number
 from .home_pose import find_home_pose
+from .number_text import format_number
 
 _SIDE = 40.0  # mm: the square's side, halved until the machine can go round it
 _LEAST = 0.1  # mm

@@ -6,17 +6,19 @@ from html import escape
 
 from ...machine import Machine
 from ...units import to_display
-from .config import format_number
 from .guard import name_guard
+from .hardware import Equipment
+from .hardware.page import describe_equipment, list_files
 from .home_pose import find_home_pose
 from .model_header import LEAST_REGULARITY, list_limit_names
 from .module import name_kinematics
+from .number_text import format_number
 from .planner import NO_TOLERANCE, name_planner
 
 _PAGE = """\
 # {title} under LinuxCNC
 
-For LinuxCNC 2.9, as a simulation without hardware.
+For LinuxCNC 2.9, {purpose}.
 
 | file | what it is |
 |---|---|
@@ -25,8 +27,8 @@ For LinuxCNC 2.9, as a simulation without hardware.
 | `{name}_model.h` | the machine's mathematics, which all include |
 | `{planner}.c` | the trajectory planner, which keeps the joints' limits |
 | `{name}.ini` | ranges, speeds and home |
-| `{name}.hal`, `{name}_rates.hal` | loops in the place of drives, the guard, the axes' rates |
-| `{name}_screen.py`, `{name}_screen.hal` | the window that shows the machine, and what brings it the joints |
+| `{name}.hal`, `{name}_rates.hal` | {drives}, the guard, the axes' rates |
+{files}| `{name}_screen.py`, `{name}_screen.hal` | the window that shows the machine, and what brings it the joints |
 | `{name}_axis.py` | what LinuxCNC's screen AXIS does at its start |
 | `{name}.tbl` | the tool |
 | `{name}.ngc` | a first program: a square at home |
@@ -44,7 +46,7 @@ linuxcnc {name}.ini
 `halcompile` needs a folder whose path has no blanks. Once the description has changed, install them anew:
 with one of an older making LinuxCNC does not start, and says so.
 
-Switch the machine on and home it: it then stands at {home}.
+Switch the machine on and home it: {standing}{home}.
 Programs are in millimetres and degrees; {frame}.
 
 A window beside LinuxCNC's own screen shows the machine as it moves, with position, joints, and the nearest limit in
@@ -52,7 +54,7 @@ words; drag turns it, the right button moves it, the wheel zooms, a double click
 straight from home with home's orientation. Without a display, or once it is closed, the machine runs as well. To do
 without it take the line with `{name}_screen.hal` out of `{name}.hal`.
 
-## What to know
+{equipment}## What to know
 
 - A pose that a leg can't reach, that a limit of the machine's description forbids, or that is nearer to a singularity
   than {least} % of home's margin, is refused by the kinematics ("fails kinematicsInverse"); so is a step of a joint
@@ -92,7 +94,7 @@ _ORIENTATION = "the tool's frame is Rz(C)·Ry(B)·Rx(A)"
 _PLACE = "the axes are those of the machine's frame"
 
 
-def write_page(machine: Machine) -> str:
+def write_page(machine: Machine, equipment: Equipment | None = None) -> str:
     """Write the page, Markdown."""
     home = zip(machine.axes, find_home_pose(machine).tolist(), machine.axis_units, strict=True)
     words = [f"{axis} {format_number(to_display(value, unit))}" for axis, value, unit in home]
@@ -106,6 +108,11 @@ def write_page(machine: Machine) -> str:
         joints=" ".join(machine.joints),
         axes=" ".join(machine.axes),
         home=", ".join(words),
+        purpose=f"on {equipment.card.title}" if equipment else "as a simulation without hardware",
+        drives="the card's drives and signals" if equipment else "loops in the place of drives",
+        files=list_files(equipment) if equipment else "",
+        standing="joints with home switches are then at home, " if equipment else "it then stands at ",
+        equipment=describe_equipment(machine, equipment) if equipment else "",
         frame=_DIRECTION if machine.has_direction else _ORIENTATION if len(machine.axes) == 6 else _PLACE,
         pole=_POLE if machine.wrist is not None else "",
         least=format_number(100.0 * LEAST_REGULARITY),

@@ -17,6 +17,7 @@ _COMMENTS = {
     ".tbl": "; {}",
     ".ngc": "({})",
     ".md": "<!-- {} -->",
+    ".xml": "<!-- {} -->",
 }
 _TEXT = "as parakin wrote it: {}"
 _STAMP = re.compile(rb"\n[^\n]*as parakin wrote it: ([0-9a-f]{16})[^\n]*\n?\Z")

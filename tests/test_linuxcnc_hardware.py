@@ -1,0 +1,188 @@
+"""Templates for cards: every pin exists in the driver's documents, HAL takes them, scales and homing are right."""
+
+from __future__ import annotations
+
+import configparser
+import re
+import subprocess
+import sys
+from functools import cache
+from pathlib import Path
+
+import pytest
+
+import parakin as pk
+from parakin.cli import main
+from parakin.controllers import Hardware
+from parakin.controllers.linuxcnc.config import write_hal, write_ini
+from parakin.controllers.linuxcnc.hardware import CARDS, equip_machine
+from parakin.controllers.linuxcnc.page import write_page
+
+sys.path.insert(0, str(Path(__file__).parent / "linuxcnc"))
+from cards import check_wiring, exports_of, merge, programs, write_mock
+from simulation import ALONE, AS_NOBODY, simulated, trial, why_not
+
+NAMES = pk.machines()
+EACH = [(name, card) for name in NAMES for card in CARDS]
+PROGRAMS = ("loadusr", "source")
+WHY_NOT = why_not()
+real = pytest.mark.skipif(bool(WHY_NOT), reason=WHY_NOT)
+
+
+@cache
+def machine_of(name):
+    return pk.load(name)
+
+
+@cache
+def configuration(name, card):
+    """The files that a card changes; making all of them takes long."""
+    machine = machine_of(name)
+    equipment = equip_machine(machine, card)
+    texts = {f"{name}.ini": write_ini(machine, equipment), f"{name}.hal": write_hal(machine, equipment)}
+    return texts | {f"{name}.md": write_page(machine, equipment)} | dict(equipment.layout.files)
+
+
+def read_ini(text):
+    ini = configparser.ConfigParser(inline_comment_prefixes=None)
+    ini.optionxform = str
+    ini.read_string(text)
+    return ini
+
+
+def test_the_command_knows_the_cards():
+    assert set(CARDS) == set(Hardware.__args__)
+
+
+@pytest.mark.parametrize(("name", "card"), EACH)
+def test_pins_are_the_drivers(name, card):
+    files = configuration(name, card)
+    exports, hal = exports_of(files, name), files[f"{name}.hal"]
+    joined = check_wiring(hal, exports)
+    joints = len(machine_of(name).joints)
+    if card.startswith("mesa"):
+        assert sum(pin.endswith(".velocity-cmd") for pin in joined) == joints
+    if card == "parport":
+        assert sum(signal.endswith(("-step", "-direction")) for signal in joined.values()) == 2 * joints
+    if card == "ethercat":
+        assert sum(pin.endswith(".srv-target-position") for pin in joined) == joints
+    for signal in ("estop-open", "probe", "enabled", "spindle-on"):
+        assert signal in joined.values()
+    switches = sum(section.get("HOME_SEARCH_VEL", "0") != "0" for section in joint_sections(files, name))
+    assert sum(bool(re.fullmatch(r"joint-\d+-home", signal)) for signal in joined.values()) == switches
+
+
+def joint_sections(files, name):
+    ini = read_ini(files[f"{name}.ini"])
+    return [dict(ini[section]) for section in ini.sections() if section.startswith("JOINT_")]
+
+
+@pytest.mark.parametrize(("name", "card"), EACH)
+def test_functions_run_in_order(name, card):
+    """What is read comes before the motion controller, what is written behind it, the card last."""
+    files = configuration(name, card)
+    hal, ini = files[f"{name}.hal"], read_ini(files[f"{name}.ini"])
+    order = re.findall(r"^addf (\S+) servo-thread", hal, re.MULTILINE)
+    motion = order.index("motion-controller")
+    read = [i for i, function in enumerate(order) if re.search(r"\.read|read-all|capture-position", function)]
+    write = [i for i, function in enumerate(order) if re.search(r"\.write|write-all|update-freq|do-pid", function)]
+    assert read and max(read) < order.index("motion-command-handler") < motion < min(write)
+    for section, key in re.findall(r"\[(\w+)\](\w+)", hal):
+        assert key in ini[section]
+
+
+@pytest.mark.parametrize(("name", "card"), EACH)
+def test_no_card_is_asked_for_more_than_it_can(name, card):
+    """Steps a second at full speed and a quarter more; a step with its pause lasts no longer than its period."""
+    files = configuration(name, card)
+    for section in joint_sections(files, name):
+        rate = 1.25 * float(section["MAX_VELOCITY"]) * abs(float(section["SCALE"]))
+        if card == "parport":
+            period = float(read_ini(files[f"{name}.ini"])["EMCMOT"]["BASE_PERIOD"])
+            assert rate <= 1e9 / period * (1.0 + 1e-9)
+        elif card.startswith("mesa"):
+            assert rate * (float(section["STEPLEN"]) + float(section["STEPSPACE"])) <= 1e9 * (1.0 + 1e-6)
+
+
+MOTORS = """\
+  counts: 2000
+  lead: [10 mm, -10 mm, 5 mm]
+"""
+
+
+def with_motors(tmp_path, name="linear_delta", motors=MOTORS):
+    text = (Path(pk.__file__).parent / "machines" / f"{name}.yaml").read_text(encoding="utf-8")
+    path = tmp_path / f"{name}.yaml"
+    path.write_text(text.replace("  jerk: ", f"{motors}  jerk: ", 1), encoding="utf-8")
+    return path
+
+
+def test_scales_are_counts_by_lead(tmp_path):
+    machine = pk.load(with_motors(tmp_path))
+    files = pk.make_linuxcnc_configuration(machine, "ethercat")
+    assert [float(s["SCALE"]) for s in joint_sections(files, "linear_delta")] == [200.0, -200.0, 400.0]
+    assert "is a guess" not in files["linear_delta.md"]
+    turning = (Path(pk.__file__).parent / "machines" / "tricept.yaml").read_text(encoding="utf-8")
+    turning = turning.replace("joint: theta2,", "joint: theta2, counts: 131072, lead: 3.6 deg, homing: 118 deg,")
+    (tmp_path / "tricept.yaml").write_text(turning, encoding="utf-8")
+    last = joint_sections(pk.make_linuxcnc_configuration(pk.load(tmp_path / "tricept.yaml"), "ethercat"), "tricept")[-1]
+    assert float(last["SCALE"]) == pytest.approx(131072 / 3.6)
+    assert float(last["HOME_OFFSET"]) == 118.0
+    assert float(last["HOME_SEARCH_VEL"]) > 0.0 > float(last["HOME_LATCH_VEL"])
+
+
+def test_what_a_card_cannot_drive_is_refused(tmp_path, capsys):
+    fast = with_motors(tmp_path)
+    assert main(["linuxcnc", str(fast), "--hardware", "parport", "-o", str(tmp_path / "out")]) == 2
+    assert "250000 steps a second" in capsys.readouterr().err  # 1000 mm/s at 200 steps a mm, and a quarter
+    assert not (tmp_path / "out").exists()
+    alone = with_motors(tmp_path, motors="  counts: 2000\n")
+    assert main(["linuxcnc", str(alone), "--hardware", "ethercat", "-o", str(tmp_path / "out")]) == 2
+    assert "joint tower_a has no lead" in capsys.readouterr().err
+    with pytest.raises(pk.ParakinError, match='unknown card "mesa"'):
+        pk.make_linuxcnc_configuration(pk.load("tricept"), "mesa")
+
+
+def test_the_command_writes_a_template(tmp_path, capsys):
+    out = tmp_path / "cnc"
+    assert main(["linuxcnc", "tricept", "--hardware", "ethercat", "-o", str(out)]) == 0
+    assert "tricept_ethercat.xml" in capsys.readouterr().out
+    page = (out / "tricept.md").read_text(encoding="utf-8")
+    for word in ("What is left to the hand", "emergency stop", "home switch of d1", "Samples are no proof"):
+        assert word in page
+
+
+@real
+@pytest.mark.parametrize("card", CARDS)
+@pytest.mark.parametrize("name", ["tricept", "hexapod"])
+def test_hal_takes_it(name, card, tmp_path):
+    """The real halcmd joins all pins: of the real motion controller, loops and ports, and of the driver's documents."""
+    machine = trial(name, tmp_path)
+    files = pk.make_linuxcnc_configuration(machine, card)
+    exports = merge(exports_of(files, machine.name), programs())
+    if card == "parport":
+        exports = programs()
+    for joint in machine.joints:
+        exports.pins[f"ENCODER-{joint}"] = ("float", "OUT")
+    hal = ["loadrt trial_card"]
+    for line in files[f"{machine.name}.hal"].split("\n"):
+        if not line.startswith(
+            ("loadrt hostmot2", "loadrt hm2_eth", "loadrt lcec", "loadrt cia402", "loadusr", "source")
+        ):
+            ports = line.count(" out") + line.count(" in")
+            names = ",".join(f"parport.{i}" for i in range(ports))
+            hal.append(f"loadrt sim_parport names={names}" if line.startswith("loadrt hal_parport") else line)
+    with simulated(machine) as simulation:
+        folder = simulation.folder
+        (folder / "trial_card.c").write_text(write_mock("trial_card", exports), encoding="utf-8")
+        (folder / "card.ini").write_text(files[f"{machine.name}.ini"], encoding="utf-8")
+        (folder / "card.hal").write_text("\n".join(hal), encoding="utf-8")
+        start = "realtime start && halcmd -i card.ini -f card.hal && halcmd show thread"
+        try:
+            subprocess.run(["halcompile", "--install", "trial_card.c"], cwd=folder, check=True, capture_output=True)
+            command = [*ALONE, *AS_NOBODY, f"HOME={folder}", "sh", "-c", f"{start}; code=$?; halrun -U; exit $code"]
+            done = subprocess.run(command, cwd=folder, capture_output=True, text=True, timeout=60)
+        finally:
+            Path("/usr/lib/linuxcnc/modules/trial_card.so").unlink(missing_ok=True)
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert "servo-thread" in done.stdout

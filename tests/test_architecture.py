@@ -268,10 +268,9 @@ def test_columns_of_b_and_c_are_seen(line):
     assert not pole_columns("poses[:, direction.c]; home[:3]; joints[:, 4]; code[i, 4]")
 
 
-# A line for each first letter.
 WORDS = """
-accept accumulate act add advance align allocate allow announce append apply approach arrange assign average
-begin bind bisect blend bore bound box bracket bring build
+accept accumulate act add advance align allocate allow announce answer append apply approach arrange assign
+average begin bind bisect blend bore bound box bracket bring build
 cancel centre certify change check choose clamp clear climb clip clone close coincide collect combine compare compile
 complete compose compute concatenate confirm continue convert copy correct count cross cut
 decide decode decompose delay derive describe design detect differentiate discard divide draw drill drop

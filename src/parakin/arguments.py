@@ -330,12 +330,12 @@ def warn_of_wide_angles(value: object, rows: Array, names: Sequence[str], bounds
     """
     if isinstance(value, np.ndarray) and value.ndim > 1:
         return
-    some = rows[:_ROWS_LOOKED_AT]
+    first = rows[:_ROWS_LOOKED_AT]
     with np.errstate(invalid="ignore"):
-        wide = (np.abs(some) > bounds) & np.isfinite(some)
+        wide = (np.abs(first) > bounds) & np.isfinite(first)
     if wide.any():
         row, column = np.argwhere(wide)[0].tolist()
-        warn_of_degrees(f"{what} {names[column]}", float(some[row, column]))
+        warn_of_degrees(f"{what} {names[column]}", float(first[row, column]))
 
 
 def warn_of_degrees(name: str, value: float) -> None:

@@ -205,8 +205,15 @@ def post(
 def _encode(prepared: PreparedPart, missing: list[str], written: dict[str, str]) -> dict[str, Any]:
     from ..export.json.job import encode_job
 
-    found = prepared.placement, prepared.rewinds, prepared.turned
-    return encode_job(prepared.job, *found, prepared.controller_seconds, missing, written)
+    return encode_job(
+        prepared.job,
+        prepared.placement,
+        prepared.rewinds,
+        prepared.turned,
+        prepared.controller_seconds,
+        missing,
+        written,
+    )
 
 
 def _parse_workpiece_unless_found(workpiece: str | None, place: str | None) -> Array | None:

@@ -137,15 +137,15 @@ def workspace(
     began = clock.monotonic()
     with ProgressBar() as progress:
         is_drawn = json or bool(set(files) - {".vtu", ".csv"})
-        found = find_workspace(method, region, effort, progress.stage("looking for it", 0.0, 0.6 if is_drawn else 1.0))
+        result = find_workspace(method, region, effort, progress.stage("looking for it", 0.0, 0.6 if is_drawn else 1.0))
         seconds = clock.monotonic() - began
-        contents = WorkspaceFiles(found, None, ())
+        contents = WorkspaceFiles(result, None, ())
         if is_drawn:
-            contents = prepare_files(found, effort.step, progress.stage("drawing", 0.6, 1.0))
+            contents = prepare_files(result, effort.step, progress.stage("drawing", 0.6, 1.0))
         elsewhere = None
-        if isinstance(found, Workspace):
-            elsewhere = measure_elsewhere(found, seconds=min(_ELSEWHERE, effort.seconds))
-        encoded = encode_workspace(found, contents.cross_sections, elsewhere)
+        if isinstance(result, Workspace):
+            elsewhere = measure_elsewhere(result, seconds=min(_ELSEWHERE, effort.seconds))
+        encoded = encode_workspace(result, contents.cross_sections, elsewhere)
         inside = explore_inside(region, options, progress)
         encoded.update(encode_inside(inside))
         encoded["parameters"] = {"step": effort.step, **encoded["parameters"], "set": list(sizes or ())}
@@ -153,12 +153,12 @@ def workspace(
     if json:
         print_json({**encoded, "files": written})
     else:
-        print_text(format_workspace(found, seconds, elsewhere) + format_inside(inside))
+        print_text(format_workspace(result, seconds, elsewhere) + format_inside(inside))
         if written:
             print_text("\n" + "\n".join(f"{kind:<5} {path}" for kind, path in written.items()))
     for path, reason in refused.items():
         print_remark(f"{path}: not written, {reason}")
-    if isinstance(found, Workspace) and found.stopped == "interrupted":
+    if isinstance(result, Workspace) and result.stopped == "interrupted":
         return _INTERRUPTED
     return OFF_LIMITS if refused or inside.no_box else 0
 

@@ -108,7 +108,7 @@ def _parse_shape(text: str) -> list[float]:
     from ..errors import quote
 
     try:
-        return [float(part) for part in text.split(":")]
+        return [float(side) for side in text.split(":")]
     except ValueError:
         raise InputError(f"{quote(text)}: expected proportions such as 3:3:1", "--shape") from None
 
@@ -158,18 +158,21 @@ def _format_box(box: InscribedBox) -> list[str]:
     return lines
 
 
-def _format_components(found: Components) -> list[str]:
+def _format_components(components: Components) -> list[str]:
     from ..export.workspace.describe import format_bracket, format_volume
 
-    d = len(found.region.free_axes)
-    lines = ["", f"parts that a path can't leave  {len(found)}, at least {found.at_least} proved to be different"]
-    for number, component in enumerate(found.components):
+    d = len(components.region.free_axes)
+    lines = [
+        "",
+        f"parts that a path can't leave  {len(components)}, at least {components.at_least} proved to be different",
+    ]
+    for number, component in enumerate(components.components):
         sign = "as at home" if component.sign > 0 else "the other assembly"
-        here = ", holds the start" if number == found.start else ""
+        here = ", holds the start" if number == components.start else ""
         size = format_volume(component.volume.estimate, d)
         lines.append(f"            {size}, between {format_bracket(component.volume, d)}, {sign}{here}")
-    if found.stopped == "time":
+    if components.stopped == "time":
         lines.append("            the time was up before the cells were as small as they should be; --time gives more")
-    if found.undecided >= 0.005:
-        lines.append(f"            undecided {format_volume(found.undecided, d)}")
+    if components.undecided >= 0.005:
+        lines.append(f"            undecided {format_volume(components.undecided, d)}")
     return lines

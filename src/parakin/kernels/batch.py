@@ -42,12 +42,12 @@ def freeze_rows(rows: Array) -> Array:
 
 
 def run_in_threads(count: int, work: Callable[[int, int], None]) -> None:
-    """Run ``work(start, stop)`` over all rows, a part in each thread; the kernels release the interpreter's lock."""
-    parts = min(count_cores(), count // SMALL)
-    if parts < 2:
+    """Run ``work(start, stop)`` over all rows, some in each thread; the kernels release the interpreter's lock."""
+    threads = min(count_cores(), count // SMALL)
+    if threads < 2:
         work(0, count)
         return
-    edges = [count * i // parts for i in range(parts + 1)]
+    edges = [count * i // threads for i in range(threads + 1)]
     for future in [_make_pool().submit(work, a, b) for a, b in pairwise(edges)]:
         future.result()
 

@@ -173,12 +173,12 @@ def compile_tape(trace: Trace, outputs: Sequence[Scalar], inputs: int) -> Tape:
         elif term.op in (alg.SIN, alg.COS):
             argument = term.args[0]
             pair = [trace.node(op, (argument,), ()) for op in (alg.SIN, alg.COS)]
-            sine, cosine = (registers.take(part) for part in pair)
+            sine, cosine = (registers.take(term) for term in pair)
             code.append([SINCOS, sine, cosine, registers[argument], 0, 0, 0, 0])
             constants.append([0.0] * 4)
-            for part in pair:
-                if part.index not in last_use:  # one of the two may not be wanted
-                    registers.release(part.index)
+            for one in pair:
+                if one.index not in last_use:  # one of the two may not be wanted
+                    registers.release(one.index)
         else:  # the destination is never an operand's register: rows that don't overlap vectorise
             row = [_find_opcode(term), registers.take(term), *[registers[arg] for arg in term.args]]
             code.append(row + [0] * (8 - len(row)))

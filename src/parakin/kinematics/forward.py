@@ -32,7 +32,7 @@ from .solution import (
     put_rows,
     take_rows,
 )
-from .start_modes import is_beside, take_modes_of_starts
+from .start_modes import answer_in_modes_of_starts, is_beside
 from .turns import count_nearest_turns
 from .wrist.pole_thresholds import is_upright
 from .wrist.pose_angles import bring_within_poles
@@ -67,7 +67,7 @@ def solve_forward(
         looked_at = take_rows(answers, rest)
         own_starts = None if starts is None else starts[rest]
         if mode is None and own_starts is not None and model.has_modes:
-            in_other_mode[rest] = take_modes_of_starts(model, looked_at, joints[rest], own_starts, solve)
+            in_other_mode[rest] = answer_in_modes_of_starts(model, looked_at, joints[rest], own_starts, solve)
         _find_singular_starts(model, looked_at, own_starts, model.mode if mode is None else mode)
         _finish_poses(model, looked_at, own_starts)
         put_rows(answers, rest, looked_at)

@@ -19,10 +19,10 @@ STANDS_IN = 0.5  # of the way to another mode: how near joints must be to tell t
 NEARER = 0.1  # of the way to the answer in the default mode: one in another mode that is nearer is taken instead
 STANDS_AT = 0.1  # of the legs: how near these joints must be
 BESIDE = 0.0125  # of the legs: an answer in another mode than the default counts only if it is as near to its start
-SETTLED = 0.0125  # of the legs, and rad: so near to its start an answer in the default mode is taken
+SETTLED = 0.0125  # of the legs, and rad: so near to its start an answer in the default mode is accepted
 
 
-def take_modes_of_starts(
+def answer_in_modes_of_starts(
     model: Model, solution: Answers, joints: Array, starts: Array, solve: Callable[..., Answers]
 ) -> Flags:
     """Put answers in another mode than the default where the start tells that mode, and the answer is beside it.
@@ -45,10 +45,10 @@ def take_modes_of_starts(
     if len(lost):  # where the start does not tell the mode, an answer next to it counts in any
         answers = solve(model, joints[lost], starts[lost], None)
         with np.errstate(invalid="ignore"):
-            taken = (answers.why == ANSWERED) & (_measure_way(model, answers, starts[lost]) <= beside)
-        taken &= ~find_in_mode(model, answers.poses, joints[lost], model.mode)  # it is refused there: on another side
-        put_rows(solution, lost[taken], take_rows(answers, taken))
-        in_other_mode[lost[taken]] = True
+            accepted = (answers.why == ANSWERED) & (_measure_way(model, answers, starts[lost]) <= beside)
+        accepted &= ~find_in_mode(model, answers.poses, joints[lost], model.mode)  # refused there: another side
+        put_rows(solution, lost[accepted], take_rows(answers, accepted))
+        in_other_mode[lost[accepted]] = True
     return in_other_mode
 
 

@@ -209,8 +209,8 @@ class Equations:
     def by_spheres(self) -> bool:
         """True where the direct problem is the common point of spheres or circles: no turns, one rod a leg."""
         turns = any(word in ROTATIONS for word in self.spec.motion)
-        held = [leg.sphere([0.0] * len(leg.drives)) is not None for leg in self.spec.legs]
-        return not turns and all(held) and len(held) in CENTRES_NEEDED
+        on_spheres = [leg.sphere([0.0] * len(leg.drives)) is not None for leg in self.spec.legs]
+        return not turns and all(on_spheres) and len(on_spheres) in CENTRES_NEEDED
 
     def find_spheres(self, joints: Sequence[Scalar]) -> tuple[list[Vec], list[Scalar], list[int]]:
         """Find centres and radii of the spheres that hold the platform's origin, and the coordinates it moves in."""

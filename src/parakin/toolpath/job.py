@@ -120,23 +120,23 @@ def prepare(
         check_positive(f"tolerances.{name}", value, unit)
     report = progress or (lambda fraction: None)
 
-    def report_part(begin: float, end: float) -> Progress:
+    def report_stage(begin: float, end: float) -> Progress:
         return lambda fraction: report(begin + (end - begin) * fraction)
 
     half = tolerances.halve()
     path = fit_tool_lengths(machine, path, workpiece=workpiece)
-    programmed = post_path(machine, path, workpiece=workpiece, mode=mode, progress=report_part(0.0, 0.1))
+    programmed = post_path(machine, path, workpiece=workpiece, mode=mode, progress=report_stage(0.0, 0.1))
     posted, trajectory, unplanned = programmed, None, ""
     lean = tolerances.allow_lean(interpolation)
     try:
-        posted = linearise_path(posted, "pose", chord=half.tip, angle=lean, progress=report_part(0.1, 0.2))
+        posted = linearise_path(posted, "pose", chord=half.tip, angle=lean, progress=report_stage(0.1, 0.2))
         if interpolation == "joints":
-            posted = linearise_path(posted, "joints", chord=half.tip, angle=lean, progress=report_part(0.2, 0.4))
+            posted = linearise_path(posted, "joints", chord=half.tip, angle=lean, progress=report_stage(0.2, 0.4))
     except PoseError as error:
         unplanned = str(error)
     if is_wound_up(posted):
         posted = _note_wound_up(posted)
-    posted = check_path(posted, progress=report_part(0.4, 0.6))
+    posted = check_path(posted, progress=report_stage(0.4, 0.6))
     if posted.first is not None and len(posted.path) > _MOST_TIMED:
         unplanned = unplanned or f"off limits, and more than {_MOST_TIMED:,} records"
     if not unplanned:

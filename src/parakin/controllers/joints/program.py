@@ -119,8 +119,8 @@ def _predict_seconds(program: _Program) -> float:
     limits = DriveLimits.of(machine).acceleration[None]
     accelerations = to_display(limits, machine.joint_units, {"mm": 9, "rad": 9})[0]
     halt = find_halts(len(motions.seconds), motions.commands)
-    told = program.feed.compute_seconds(motions.lengths, program.values)
-    return predict_planned_seconds(motions.steps, told, halt, accelerations, program.dialect.buffer)
+    seconds = program.feed.compute_seconds(motions.lengths, program.values)
+    return predict_planned_seconds(motions.steps, seconds, halt, accelerations, program.dialect.buffer)
 
 
 def _make_writer(program: _Program, forced: str | None) -> Writer:

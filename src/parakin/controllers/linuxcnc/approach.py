@@ -37,7 +37,7 @@ def plan_approach(machine: Machine, first: Array, joints: Array, mode: str) -> t
     tool tilts in another direction than that axis stands for. So the tool is put upright above home first, turned,
     which moves no joint there, tilted in the direction the axis stands for, and brought to the record on the turn that
     it is planned on. From another home it goes straight to the record if it arrives as planned, else over the pole. A
-    record beside the pole is come to straight from aside, lest the axis swing on the way.
+    record beside the pole is come to straight from aside, or the axis would swing on the way.
 
     Raises :class:`PoseError` where no such way is found.
     """

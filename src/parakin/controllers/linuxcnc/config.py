@@ -280,7 +280,7 @@ def write_hal(machine: Machine, equipment: Equipment | None = None) -> str:
         watched.append(f"net {letter}-position axis.{letter}.pos-cmd => guard.{letter}.position")
         for whose, section in (("hand", ""), ("program", "PROGRAM_")):
             watched += [f"setp guard.{letter}.{whose}-{pin} [AXIS_{axis}]{section}{key}" for pin, key in _KEYS.items()]
-    told = [f"net told-{i} joint.{i}.pos-cmd => kins.joint-{i}" for i in range(len(machine.joints))]
+    commanded = [f"net told-{i} joint.{i}.pos-cmd => kins.joint-{i}" for i in range(len(machine.joints))]
     return _HAL.format(
         name=machine.name,
         made=hash_kinematics(machine),
@@ -289,7 +289,7 @@ def write_hal(machine: Machine, equipment: Equipment | None = None) -> str:
         loading="\n".join(loading),
         signals="\n".join(signals),
         loops="\n".join(loops),
-        told="\n".join(told),
+        told="\n".join(commanded),
         guard=name_guard(machine),
         watched="\n".join([*watched, ""]),
     )

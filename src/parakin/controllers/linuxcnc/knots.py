@@ -56,8 +56,8 @@ def choose_knots(trajectory: Trajectory) -> Knots:
     Between two stands the knots are first even; intervals in which the spline is off are halved, down to a cycle.
     """
     stands = find_stands(trajectory)
-    parts = [_split_evenly(trajectory, span) for span in pairwise(stands.tolist())]
-    bounds = np.concatenate([stands[:1], *parts])
+    windows = [_split_evenly(trajectory, span) for span in pairwise(stands.tolist())]
+    bounds = np.concatenate([stands[:1], *windows])
     rates = np.array([_measure_rate(trajectory, time) for time in bounds.tolist()])
     rates[np.isin(bounds, stands)] = 0.0
     times = [np.zeros(1)]

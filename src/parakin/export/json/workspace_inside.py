@@ -26,16 +26,16 @@ def encode_box(box: InscribedBox) -> dict[str, Any]:
     }
 
 
-def encode_components(found: Components) -> dict[str, Any]:
+def encode_components(components: Components) -> dict[str, Any]:
     """Encode the connected components of a region."""
-    start, units = found.parameters["start"], found.region.machine.axis_units
+    start, units = components.parameters["start"], components.region.machine.axis_units
     return {
-        "count": len(found),
-        "at_least": found.at_least,
-        "undecided": found.undecided,
-        "cell": found.cell,
-        "stopped": found.stopped,
-        "holds_start": found.start,
+        "count": len(components),
+        "at_least": components.at_least,
+        "undecided": components.undecided,
+        "cell": components.cell,
+        "stopped": components.stopped,
+        "holds_start": components.start,
         "start": start and [to_display(value, unit) for value, unit in zip(start, units, strict=True)],
         "each": [
             {
@@ -49,6 +49,6 @@ def encode_components(found: Components) -> dict[str, Any]:
                 "box": {"low": component.low.tolist(), "high": component.high.tolist()},
                 "apart": component.apart,
             }
-            for component in found.components
+            for component in components.components
         ],
     }

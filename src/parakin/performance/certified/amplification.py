@@ -164,14 +164,14 @@ def _bound_quotient(divisor: LinearMatrices, dividend: LinearMatrices, axis: Ind
     linear = LinearMatrices(n.middle, n.own, n.slopes - m.slopes @ n.middle[:, None], spread, n.half)
     rest = n.rest + off @ n_size + m.linear_change @ (n.linear_change + n.rest)
     beyond = np.where(g < 1.0, g * g / np.where(g < 1.0, 1.0 - g, 1.0), np.inf)
-    most, corner[good] = _bound_linear_part(linear)
+    most, corner[good] = _bound_linear_terms(linear)
     upper[good] = (most + _compute_norm(rest) + beyond * _compute_norm(n_size)) * (1.0 + _ROUNDING)
     if d:
         axis[good] = linear.widest
     return upper, corner
 
 
-def _bound_linear_part(matrices: LinearMatrices) -> tuple[Array, Array]:
+def _bound_linear_terms(matrices: LinearMatrices) -> tuple[Array, Array]:
     """Bound the greatest singular value of middle + Σ slopes·δ, by its corners; returns the corner's signs too.
 
     With many inputs it is bounded by the norm of the change, and the signs are 0: the middle.

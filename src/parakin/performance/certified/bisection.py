@@ -1,4 +1,4 @@
-"""Interval bisection: boxes of poses are halved until a claim is proved of every part, within a budget."""
+"""Interval bisection: boxes of poses are halved until a claim is proved of each, within a budget."""
 
 from __future__ import annotations
 
@@ -34,10 +34,10 @@ def find_widest_inputs(low: Array, high: Array, first: Array) -> Indices:
     return np.asarray(((high - low) / first).argmax(1))
 
 
-def find_undecided_part(
+def find_undecided_box(
     decide: Callable[[Array, Array], Decided], low: Array, high: Array, budget: Budget
 ) -> Array | None:
-    """Bisect the box [low, high] until all parts are decided: None, else the middle of a part left undecided."""
+    """Bisect the box [low, high] until all of it is decided: None, else the middle of a box left undecided."""
     first = high - low
     bottom, top = low[None], high[None]
     while len(bottom):

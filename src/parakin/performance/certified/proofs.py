@@ -21,7 +21,7 @@ from ...workspaces.certified.region import Region
 from ..characteristic_length import choose_characteristic_length
 from ..extremes import SIDES
 from .amplification import UNBOUNDED, Bracket, bracket_amplification
-from .bisection import decide_nonnegative, decide_regular, find_undecided_part
+from .bisection import decide_nonnegative, decide_regular, find_undecided_box
 from .counterexamples import SingularityKind, find_singular_pose
 from .interval_matrices import MatrixBounds, PoseBox
 
@@ -32,7 +32,7 @@ Verdict = Literal["proved", "refuted", "undecided"]
 class Proof:
     """A claim on all poses of a box, with the verdict.
 
-    counterexample : (axes,) a pose at which a refuted claim fails; of an undecided one the middle of an undecided part
+    counterexample : (axes,) a pose at which a refuted claim fails; of an undecided one the middle of an undecided box
     reason : why it is not proved, in a line
     brackets : of the least and the greatest amplification, if the claim is on them
     boxes : how many sub-boxes of the box were examined
@@ -94,7 +94,7 @@ def prove_no_singularity(
         return Proof(claim, "refuted", pose, f"{name} is singular there", boxes=budget.used)
     matrix = box.parallel if kind == "parallel" else box.serial
     decide = decide_regular(MatrixBounds(matrix, box.inputs, box.trace), box.high - box.low)
-    undecided = find_undecided_part(decide, box.low, box.high, budget)
+    undecided = find_undecided_box(decide, box.low, box.high, budget)
     if undecided is None:
         return Proof(claim, "proved", boxes=budget.used)
     return Proof(
@@ -206,7 +206,7 @@ def _prove_reach(box: PoseBox, claim: str, budget: Budget) -> Proof | None:
     if not box.reach:
         return None
     decide = decide_nonnegative(MatrixBounds([box.reach], box.inputs, box.trace), box.high - box.low)
-    undecided = find_undecided_part(decide, box.low, box.high, budget)
+    undecided = find_undecided_box(decide, box.low, box.high, budget)
     if undecided is None:
         return None
     pose = box.poses(undecided[None])[0]

@@ -163,22 +163,22 @@ class _HoldBuilder:
         record, moved : (k,) held, and where to in the projection, (k, 2)
         """
         after = np.flatnonzero(np.diff(record) == 1) + 1
-        held = moved[after - 1]  # also on the way to the record at which the axis turns
+        points = moved[after - 1]  # also on the way to the record at which the axis turns
         if not (self.pole.moves and self.aside and len(after)):
             return _NOTHING
         motion, ends = record[after], []
         turns = np.zeros((len(after), 3))
         for at in (motion - 1, motion):
-            axis, extension = self._find_axes_at(at, held), self.programmed.get_extension(at)
+            axis, extension = self._find_axes_at(at, points), self.programmed.get_extension(at)
             tip = self.programmed.tip[at] + extension[:, None] * (axis - self.programmed.axis[at])
             turns = find_nearest_direction(axis, turns)
             ends.append((tip, turns))
         tip, turns = (0.5 * (first + last) for first, last in zip(*ends, strict=True))
-        off = self.pole.project_axes(tip, compute_tool_axes(turns)) - held
+        off = self.pole.project_axes(tip, compute_tool_axes(turns)) - points
         counts = np.ceil(np.sqrt(np.hypot(*off.T) / (_WANDER * self.aside))).astype(np.int64).clip(1, _MOST_BETWEEN)
         at, row = np.repeat(motion, counts - 1), np.repeat(np.arange(len(motion)), counts - 1)
         number = np.arange(len(row)) - np.repeat(np.cumsum(counts - 1) - (counts - 1), counts - 1) + 1
-        return _Points(at, number / counts[row], held[row])
+        return _Points(at, number / counts[row], points[row])
 
     def _find_axes_at(self, record: Indices, projected: Array) -> Array:
         """Find the axes (k, 3) of records (k,) at points (k, 2) of the projection."""

@@ -103,9 +103,9 @@ def _lead_unless_refused(
     for pole in find_poles(posted.machine, deviation.interpolation, turns is not None):
         steps = find_pole_steps(pole, programmed, posted, motion)
         routes = []
-        found = find_pole_routes(pole, programmed, steps, deviation.angle, deviation.interpolation == "pose")
-        shared = _find_shared_routes(deviation, steps, found, led.passes)
-        for route, is_shared in zip(found, shared, strict=True):
+        candidates = find_pole_routes(pole, programmed, steps, deviation.angle, deviation.interpolation == "pose")
+        shared = _find_shared_routes(deviation, steps, candidates, led.passes)
+        for route, is_shared in zip(candidates, shared, strict=True):
             if is_shared or (axis[route.record] != programmed.axis[route.record]).any():
                 continue  # led through another pole already
             pole_pass = locate_pass(pole, posted.path, steps, route)
@@ -117,14 +117,14 @@ def _lead_unless_refused(
         crossings.append(_Crossings(pole, steps, [route for route in routes if route.crossing >= 0 or route.rays]))
         holds: list[PoleHold] = []
         if not inclined:
-            taken_stretches = Stretches([*led.passes, *(hold.located for hold in led.holds)])
+            led_stretches = Stretches([*led.passes, *(hold.located for hold in led.holds)])
             for hold in find_pole_holds(pole, posted, programmed, steps, routes, deviation.angle):
                 is_free = (axis[hold.record] == programmed.axis[hold.record]).all()
-                if hold.key not in refused and is_free and taken_stretches.is_apart(hold.located):
+                if hold.key not in refused and is_free and led_stretches.is_apart(hold.located):
                     axis[hold.record] = hold.axis
                     holds.append(hold)
         led.holds += holds
-        shared_steps = [route.steps for route, is_shared in zip(found, shared, strict=True) if is_shared]
+        shared_steps = [route.steps for route, is_shared in zip(candidates, shared, strict=True) if is_shared]
         routed_steps = [*(route.steps for route in routes), *shared_steps, *find_held_steps(steps, led.holds)]
         led.notes += [*note_swings(pole, posted.path, steps, routed_steps), *note_holds(holds)]
     moved = np.flatnonzero((axis != programmed.axis).any(1))

@@ -45,7 +45,7 @@ class PlacementSearch:
         apart = [point for point in others if len(point) and np.abs(point - best[0]).max() > _APART]
         scored = [(point, self.margins.score_placement(point)) for point in apart]
         self.tried += len(scored)
-        return [best, *sorted(scored, key=lambda found: -found[1].worth)]
+        return [best, *sorted(scored, key=lambda pair: -pair[1].worth)]
 
     def _compute_rows(self, points: Array) -> tuple[Array, Array]:
         self.tried += len(points)

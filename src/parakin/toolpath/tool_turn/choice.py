@@ -89,11 +89,11 @@ def choose_tool_turn(
     path = fit_tool_lengths(machine, path, workpiece=workpiece)
     if len(path) < 2 or ProgrammedPath(path).find_opposite(np.arange(1, len(path))).any():
         return None
-    held = post_path(machine, path, workpiece=workpiece, mode=mode)
+    at_home = post_path(machine, path, workpiece=workpiece, mode=mode)
     frame = compose_frames(workpiece, path.frame)
     stations = place_stations(path)
     tip, axis = ProgrammedPath(path, frame).interpolate(stations.motion, stations.share)
-    lattice = build_lattice(machine, tip, axis, held.mode, lambda fraction: report(0.7 * fraction))
+    lattice = build_lattice(machine, tip, axis, at_home.mode, lambda fraction: report(0.7 * fraction))
     values = _search_lattice(machine, path, stations, lattice)
     report(0.8)
     if values is None:
@@ -104,8 +104,8 @@ def choose_tool_turn(
         return curve.evaluate(stations.locate(motion, share))
 
     turned = turn_path(machine, path, frame, find_c, lean)
-    posted = post_path(machine, turned, workpiece=workpiece, mode=held.mode)
-    margin, home_margin = (float(measure_range_use(one)[1].min()) for one in (posted, held))
+    posted = post_path(machine, turned, workpiece=workpiece, mode=at_home.mode)
+    margin, home_margin = (float(measure_range_use(one)[1].min()) for one in (posted, at_home))
     report(1.0)
     if posted.broken_record_count or margin < _SAME * home_margin:
         return None

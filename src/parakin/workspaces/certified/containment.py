@@ -94,7 +94,7 @@ class _BoxBisection:
         names = tuple(constraint.name for constraint in self.constraints)
         return Containment(self.proved, self.limit, self.positions, self.orientations, self.boxes, names)
 
-    def _count_parts(self, box: Indices, before: Indices) -> Flags:
+    def _count_sub_boxes(self, box: Indices, before: Indices) -> Flags:
         """Count sub-boxes; returns those of undecided boxes without too many examined ones since ``before``."""
         self.boxes += np.bincount(box, minlength=len(self.boxes))
         self.undecided &= self.boxes - before <= self.most
@@ -111,11 +111,11 @@ class _BoxBisection:
         low = np.concatenate([self.low[box], np.tile(self.first, (len(box), 1))], 1)
         high = np.concatenate([self.high[box], np.tile(self.last, (len(box), 1))], 1)
         for _ in range(_ROUNDS):
-            which = self._count_parts(box, before)
+            which = self._count_sub_boxes(box, before)
             box, low, high = box[which], low[which], high[which]
             if not len(box):
                 return
-            bounds = _bound_parts(constraint, low[:, :d], high[:, :d], low[:, d:], high[:, d:])
+            bounds = _bound_sub_boxes(constraint, low[:, :d], high[:, :d], low[:, d:], high[:, d:])
             which = bounds.state != CLEARED
             box, low, high, bounds = box[which], low[which], high[which], bounds.take(which)
             if not len(box):
@@ -129,7 +129,7 @@ class _BoxBisection:
                 box, low, high, bounds = box[which], low[which], high[which], bounds.take(which)
             low[:, d:] = np.where(bounds.least_at > 0, high[:, d:], low[:, d:])
             high[:, d:] = np.where(bounds.least_at < 0, low[:, d:], high[:, d:])
-            box, low, high = _bisect_parts(box, low, high, _measure_spread(constraint, low, high, d))
+            box, low, high = _bisect_sub_boxes(box, low, high, _measure_spread(constraint, low, high, d))
         self.undecided[box] = False
 
     def prove_at_best_orientations(self) -> None:
@@ -137,7 +137,7 @@ class _BoxBisection:
         box, low, high = np.arange(len(self.low)), self.low, self.high
         orientations: Array | None = None
         for _ in range(_ROUNDS):
-            which = self._count_parts(box, np.zeros_like(self.boxes))
+            which = self._count_sub_boxes(box, np.zeros_like(self.boxes))
             if orientations is not None:
                 which[which] = ~self._prove_at_orientations(low[which], high[which], orientations[which])
                 orientations = orientations[which]
@@ -155,7 +155,7 @@ class _BoxBisection:
                 self.positions[box[broken]], self.orientations[box[broken]] = middle[broken], orientations[broken]
             left = self.undecided[box]
             left[left] = ~self._prove_at_orientations(low[left], high[left], orientations[left])
-            number, low, high = _bisect_parts(np.flatnonzero(left), low[left], high[left], (high - low)[left])
+            number, low, high = _bisect_sub_boxes(np.flatnonzero(left), low[left], high[left], (high - low)[left])
             box, orientations = box[number], orientations[number]
         self.undecided[box] = False
         self.proved[:] = self.undecided
@@ -176,12 +176,12 @@ class _BoxBisection:
         proved = np.ones(len(low), np.bool_)
         for constraint in self.constraints:
             which = np.flatnonzero(proved)
-            bounds = _bound_parts(constraint, low[which], high[which], orientations[which], orientations[which])
+            bounds = _bound_sub_boxes(constraint, low[which], high[which], orientations[which], orientations[which])
             proved[which] = bounds.state == CLEARED
         return proved
 
 
-def _bound_parts(constraint: Constraint, low: Array, high: Array, first: Array, last: Array) -> LinearBounds:
+def _bound_sub_boxes(constraint: Constraint, low: Array, high: Array, first: Array, last: Array) -> LinearBounds:
     """Bound a margin over positions [low, high] and orientations [first, last], the last ulp included."""
     size = np.where(high > low, high - low + _ULP * np.maximum(np.abs(low), np.abs(high)), 0.0)
     boxes = OrientationBoxes(np.arange(len(low)), first, last, np.zeros((len(low), 0), np.bool_))
@@ -218,7 +218,7 @@ def _measure_spread(constraint: Constraint, low: Array, high: Array, d: int) -> 
     return spread
 
 
-def _bisect_parts(box: Indices, low: Array, high: Array, spread: Array) -> tuple[Indices, Array, Array]:
+def _bisect_sub_boxes(box: Indices, low: Array, high: Array, spread: Array) -> tuple[Indices, Array, Array]:
     """Bisect sub-boxes across every axis whose spread is nearly that of the worst one."""
     cut = (spread >= 0.5 * spread.max(1, keepdims=True)) & (high > low)
     for axis in range(low.shape[1]):

@@ -68,7 +68,7 @@ class SplineTolerances(NamedTuple):
 def fit_splines(step, joints, curvature, pivots):
     """Fit a cubic spline to each stretch: write its second derivatives at the rows to ``curvature`` (rows, joints).
 
-    At a stretch's ends the first two and the last two steps fraction one cubic. ``pivots`` (rows,) is overwritten.
+    At a stretch's ends the first two and the last two steps share one cubic. ``pivots`` (rows,) is overwritten.
     """
     count, m = joints.shape
     start = np.int64(0)

@@ -102,7 +102,7 @@ def test_degenerate_machines_do_no_harm(part, tmp_path):
                     assert np.abs(back).max(initial=0.0) < 1e-5, text
             for row in joints[:3]:
                 try:
-                    listed = machine.assemblies(row)
+                    listed = machine.assemblies(row).poses
                 except pk.NoMethodError:
                     continue
                 miss, _ = Description.of(machine.spec).misses(listed, np.tile(row, (len(listed), 1)))

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from .export.machine.picture import render_machine_html, render_machine_png
     from .export.report.report import render_report
     from .export.workspace.meshes import Mesh, make_mesh
+    from .kinematics.assemblies import Assemblies
     from .kinematics.solution import Solution
     from .machine import Machine
     from .performance.atlas import Atlas, atlas
@@ -44,6 +45,7 @@ if TYPE_CHECKING:
     from .workspaces.sampled.polar_sweep import PolarWorkspace, sweep_polar
 
 __all__ = [
+    "Assemblies",
     "Atlas",
     "Clearance",
     "Components",
@@ -157,6 +159,7 @@ _LAZY = {
     "PolarWorkspace": "workspaces.sampled.polar_sweep",
     "Region": "workspaces.certified.region",
     "SampledField": "workspaces.sampled.distance_field",
+    "Assemblies": "kinematics.assemblies",
     "Solution": "kinematics.solution",
     "Tolerances": "toolpath.job",
     "Clearance": "toolpath.linearise.rewinds",

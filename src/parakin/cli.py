@@ -13,6 +13,7 @@ from contextlib import suppress
 
 from cyclopts import App, CycloptsError, Parameter
 
+from .commands.assemblies import assemblies
 from .commands.atlas import atlas
 from .commands.console import print_remark
 from .commands.design import design
@@ -35,7 +36,7 @@ app = App(
     default_parameter=Parameter(negative=""),
     suppress_keyboard_interrupt=False,  # main says so in one line
 )
-for command in (post, inverse, forward, linuxcnc, machines, show, workspace, atlas, design):
+for command in (post, inverse, forward, assemblies, linuxcnc, machines, show, workspace, atlas, design):
     app.command(command)
 app.register_install_completion_command()
 

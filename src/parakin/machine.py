@@ -13,7 +13,7 @@ from .arguments import RowsLike, bound_angles, describe_value, read_rows, warn_o
 from .arrays import Array
 from .errors import NoMethodError, PoseError
 from .kernels.batch import evaluate_tape, evaluate_tape_with_residual
-from .kinematics.assemblies import find_assemblies
+from .kinematics.assemblies import Assemblies, find_assemblies
 from .kinematics.assembly_side import find_sides
 from .kinematics.follow import follow_path
 from .kinematics.forward import solve_forward
@@ -162,8 +162,8 @@ class Machine(MachineProperties):
             ) from None
         return np.ascontiguousarray(wide.reshape(-1, len(self.axes)))
 
-    def assemblies(self, joints: RowsLike) -> Array:
-        """Find every real pose of one joint vector, (k, axes); see :func:`~.kinematics.assemblies.find_assemblies`."""
+    def assemblies(self, joints: RowsLike) -> Assemblies:
+        """Find every real pose of one joint vector; see :class:`~.kinematics.assemblies.Assemblies`."""
         rows, lead = self.rows(joints, self.joints, "joints")
         if lead != ():
             raise PoseError(f"joints: one vector ({len(self.joints)},) expected, not {(*lead, len(self.joints))}")

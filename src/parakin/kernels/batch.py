@@ -41,9 +41,12 @@ def freeze_rows(rows: Array) -> Array:
     return view
 
 
-def run_in_threads(count: int, work: Callable[[int, int], None]) -> None:
-    """Run ``work(start, stop)`` over all rows, some in each thread; the kernels release the interpreter's lock."""
-    threads = min(count_cores(), count // SMALL)
+def run_in_threads(count: int, work: Callable[[int, int], None], small: int = SMALL) -> None:
+    """Run ``work(start, stop)`` over all rows, some in each thread; the kernels release the interpreter's lock.
+
+    small : rows that are worth a thread
+    """
+    threads = min(count_cores(), count // small)
     if threads < 2:
         work(0, count)
         return

@@ -6,8 +6,9 @@ outputs are C-ordered (N, k) arrays of float64. Nothing here allocates but one b
 
 from __future__ import annotations
 
-import numpy as np
+from typing import NamedTuple
 
+from ..arrays import Array
 from .compiling import njit
 from .elementary import FAST, atan2, sincos, sqrt, use_widest_vectors
 from .lanes import LANES, MASK, allocate_lanes, fetch_to_read, fetch_to_write, load_rows, store_rows
@@ -32,7 +33,7 @@ from .tape import (
 )
 
 
-@njit(nogil=True, cache=True, fastmath=FAST, error_model="numpy")
+@njit(allocates=False, nogil=True, cache=True, fastmath=FAST, error_model="numpy")
 def interpret(code, constants, r):
     """Run a tape once over the registers ``r``, (registers · LANES,)."""
     use_widest_vectors()
@@ -109,15 +110,36 @@ def interpret(code, constants, r):
                 r[d + j] = k0
 
 
+class BlockLanes(NamedTuple):
+    """The working arrays of one block.
+
+    registers : of the tape
+    bad : what turns NaN in the lanes where a number is not finite
+    most, holds : of each lane, the greatest closure, and 1 where all margins are positive
+    """
+
+    registers: Array
+    bad: Array
+    most: Array
+    holds: Array
+
+
 @njit(inline="always")
-def _load_inputs(x, x_width, z, z_width, row, stop, r, bad):
-    """Load rows of ``x`` and ``z``, flat, as the inputs of a block, and ask for those of the next; returns how many."""
+def _allocate_block(tape):
+    """Allocate the working arrays for a tape; its kernel takes them, so that it allocates nothing itself."""
+    return BlockLanes(allocate_lanes(tape.registers), allocate_lanes(1), allocate_lanes(1), allocate_lanes(1))
+
+
+@njit(inline="always")
+def _load_inputs(x, z, row, stop, r, bad):
+    """Load rows of ``x`` and ``z`` as the inputs of a block, and ask for those of the next; returns how many."""
     n = min(LANES, stop - row)
     bad[:] = 0.0
-    load_rows(x, x_width, row, n, x_width, r, bad)
-    load_rows(z, z_width, row, n, x_width + z_width, r, bad)
-    fetch_to_read(x, x_width, row + LANES, stop)
-    fetch_to_read(z, z_width, row + LANES, stop)
+    first, second = x.shape[1], z.shape[1]
+    load_rows(x, row, n, first, r, bad)
+    load_rows(z, row, n, first + second, r, bad)
+    fetch_to_read(x, row + LANES, stop)
+    fetch_to_read(z, row + LANES, stop)
     return n
 
 
@@ -127,22 +149,24 @@ def evaluate_rows(tape, whole, x, z, y, start, stop):
 
     With ``whole`` a row is NaN where an input or output is not finite; else that spoils only what follows from it.
     """
-    code, constants, inputs, outputs, registers = tape  # taken out once: Numba counts references at every access
-    r = allocate_lanes(registers)
-    bad = allocate_lanes(1)
-    xs, zs, ys = x.reshape(-1), z.reshape(-1), y.reshape(-1)
+    _evaluate_rows(tape, whole, x, z, y, _allocate_block(tape), start, stop)
+
+
+@njit(allocates=False, nogil=True, cache=True, fastmath=FAST, error_model="numpy")
+def _evaluate_rows(tape, whole, x, z, y, block, start, stop):
+    r, bad = block.registers, block.bad
     for row in range(start, stop, LANES):
-        n = _load_inputs(xs, x.shape[1], zs, z.shape[1], row, stop, r, bad)
-        fetch_to_write(ys, y.shape[1], row, stop)
-        interpret(code, constants, r)
+        n = _load_inputs(x, z, row, stop, r, bad)
+        fetch_to_write(y, row, stop)
+        interpret(tape.code, tape.constants, r)
         if whole:
-            for o in range(inputs, inputs + outputs):
+            for o in range(tape.inputs, tape.inputs + tape.outputs):
                 d = (o & MASK) * LANES
                 for j in range(LANES):
                     bad[j] += 0.0 * r[d + j]
         else:
             bad[:] = 0.0
-        store_rows(ys, y.shape[1], row, n, inputs, r, bad)
+        store_rows(y, row, n, tape.inputs, r, bad)
 
 
 @njit(inline="always")
@@ -163,20 +187,20 @@ def evaluate_with_residual(tape, limits, x, z, results, start, stop):
     results : :class:`~.batch.ClosedRows`, overwritten; NaN where an input, an output of the row or a closure is not
         finite
     """
-    code, constants, inputs, outputs, registers = tape
-    y, residual, settled = results
-    r = allocate_lanes(registers)
-    bad = allocate_lanes(1)
-    most = allocate_lanes(1)
-    holds = allocate_lanes(1)
-    closures = inputs + y.shape[1]
-    margins = closures + limits.closures
-    xs, zs, ys = x.reshape(-1), z.reshape(-1), y.reshape(-1)
+    _evaluate_with_residual(tape, limits, x, z, results, _allocate_block(tape), start, stop)
+
+
+@njit(allocates=False, nogil=True, cache=True, fastmath=FAST, error_model="numpy")
+def _evaluate_with_residual(tape, limits, x, z, results, block, start, stop):
+    y, residual, settled = results.rows, results.residual, results.settled
+    r, bad, most, holds = block.registers, block.bad, block.most, block.holds
+    closures = tape.inputs + y.shape[1]
+    margins, closed = closures + limits.closures, limits.closed
     for row in range(start, stop, LANES):
-        n = _load_inputs(xs, x.shape[1], zs, z.shape[1], row, stop, r, bad)
-        fetch_to_write(ys, y.shape[1], row, stop)
-        interpret(code, constants, r)
-        for o in range(inputs, closures):
+        n = _load_inputs(x, z, row, stop, r, bad)
+        fetch_to_write(y, row, stop)
+        interpret(tape.code, tape.constants, r)
+        for o in range(tape.inputs, closures):
             d = (o & MASK) * LANES
             for j in range(LANES):
                 bad[j] += 0.0 * r[d + j]
@@ -187,29 +211,32 @@ def evaluate_with_residual(tape, limits, x, z, results, start, stop):
                 v = r[d + j]
                 bad[j] += 0.0 * v
                 most[j] = abs(v) if abs(v) > most[j] else most[j]
-        find_positive(r, margins, inputs + outputs, holds)
-        store_rows(ys, y.shape[1], row, n, inputs, r, bad)
+        find_positive(r, margins, tape.inputs + tape.outputs, holds)
+        store_rows(y, row, n, tape.inputs, r, bad)
+        base = row & MASK
         for j in range(n):
             worst = most[j] + bad[j]
-            residual[row + j] = worst
-            settled[row + j] = (holds[j] > 0.0) & (worst <= limits.closed)
+            residual[base + j] = worst
+            settled[base + j] = (holds[j] > 0.0) & (worst <= closed)
 
 
 @njit(nogil=True, cache=True, fastmath=FAST, error_model="numpy")
 def find_negative(tape, x, z, y, start, stop):
     """Find y[i] = 0 where all outputs are ≥ 0, else 1 + the first that is not; NaN is not."""
-    code, constants, inputs, outputs, registers = tape
-    r = allocate_lanes(registers)
-    bad = allocate_lanes(1)
-    first = np.empty(LANES, np.int64)
-    xs, zs = x.reshape(-1), z.reshape(-1)
+    _find_negative(tape, x, z, y, _allocate_block(tape), start, stop)
+
+
+@njit(allocates=False, nogil=True, cache=True, fastmath=FAST, error_model="numpy")
+def _find_negative(tape, x, z, y, block, start, stop):
+    r, bad, first = block.registers, block.bad, block.most
     for row in range(start, stop, LANES):
-        n = _load_inputs(xs, x.shape[1], zs, z.shape[1], row, stop, r, bad)
-        interpret(code, constants, r)
-        first[:] = 0
-        for o in range(outputs - 1, -1, -1):
-            d = ((inputs + o) & MASK) * LANES
+        n = _load_inputs(x, z, row, stop, r, bad)
+        interpret(tape.code, tape.constants, r)
+        first[:] = 0.0
+        for o in range(tape.outputs - 1, -1, -1):
+            d, number = ((tape.inputs + o) & MASK) * LANES, o + 1.0
             for j in range(LANES):
-                first[j] = first[j] if r[d + j] >= 0.0 else o + 1
+                first[j] = first[j] if r[d + j] >= 0.0 else number
+        base = row & MASK
         for j in range(n):
-            y[row + j] = first[j] if (bad[j] == 0.0) | (first[j] > 0) else 1
+            y[base + j] = int(first[j]) if (bad[j] == 0.0) | (first[j] > 0.0) else 1

@@ -48,8 +48,9 @@ def _make_prefetch(write):
 
         return types.void(array, types.int64), generate
 
-    @njit(nogil=True, cache=True)
-    def fetch(flat, width, row, stop):
+    @njit(allocates=False, nogil=True, cache=True)
+    def fetch(x, row, stop):
+        width, flat = x.shape[1], x.reshape(-1)
         for i in range(row * width, min(row + LANES, stop) * width, 8):
             prefetch(flat, i)
 
@@ -131,14 +132,14 @@ def _store_columns(builder, width, point):
 _load_block, _store_block = _make_transposer(_load_columns), _make_transposer(_store_columns)
 
 
-@njit(nogil=True, cache=True, fastmath=FAST, error_model="numpy")
-def load_rows(flat, width, row, n, end, r, bad):
-    """Load n rows from ``row`` on into the registers up to ``end``, a column each, padded with zeros.
+@njit(allocates=False, nogil=True, cache=True, fastmath=FAST, error_model="numpy")
+def load_rows(x, row, n, end, r, bad):
+    """Load n rows of ``x`` from ``row`` on into the registers up to ``end``, a column each, padded with zeros.
 
-    flat : rows of ``width`` numbers one after the other; who calls flattens them once, for that takes 40 ns
     bad : (LANES,) turns NaN where a number is not finite
     """
     use_widest_vectors()
+    width, flat = x.shape[1], x.reshape(-1)
     base = (row * width) & MASK
     first = ((end - width) & MASK) * LANES
     if (n == LANES) & (width <= WIDEST):
@@ -153,10 +154,11 @@ def load_rows(flat, width, row, n, end, r, bad):
                 r[first + c * LANES + j] = 0.0
 
 
-@njit(nogil=True, cache=True, fastmath=FAST, error_model="numpy")
-def store_rows(flat, width, row, n, register, r, bad):
-    """Store registers from ``register`` on, plus ``bad``, to n rows from ``row`` on, as :func:`load_rows` has them."""
+@njit(allocates=False, nogil=True, cache=True, fastmath=FAST, error_model="numpy")
+def store_rows(y, row, n, register, r, bad):
+    """Store registers from ``register`` on, plus ``bad``, to n rows of ``y`` from ``row`` on."""
     use_widest_vectors()
+    width, flat = y.shape[1], y.reshape(-1)
     base = (row * width) & MASK
     first = (register & MASK) * LANES
     if (n == LANES) & (width <= WIDEST):

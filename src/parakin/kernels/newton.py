@@ -53,6 +53,7 @@ class NewtonBlock(NamedTuple):
     closures : (m rows) f there, then the step
     factors, fresh : of the matrix that each lane goes by, and of one that only some lanes take
     first_determinant : of the first matrix
+    bad, holds : what turns NaN in the lanes where a number is not finite, and 1 where all margins are positive
     state : (6 rows) of each lane: its greatest closure, now (WORST) and a step before (BEFORE); the part of its step
         that it takes (SHRINK); whether it wants a new matrix (RENEWS); whether it takes no step any more (STOPS, 2) or
         one (1); how many it took (STEPS)
@@ -65,7 +66,17 @@ class NewtonBlock(NamedTuple):
     factors: Factors
     fresh: Factors
     first_determinant: Array
+    bad: Array
+    holds: Array
     state: Array
+
+
+class NewtonProblems(NamedTuple):
+    """What is given, as :func:`~.batch.solve_by_newton` has it."""
+
+    near: Array
+    joints: Array
+    side: Array
 
 
 @njit(inline="always")
@@ -86,7 +97,8 @@ def _allocate_block(tapes, m, joints, given):
         allocate_lanes(registers), allocate_lanes(m + joints), allocate_lanes(given), allocate_lanes(m),
     )  # fmt: skip
     factors, fresh = _allocate_factors(m), _allocate_factors(m)
-    return NewtonBlock(r, point, near, closures, factors, fresh, allocate_lanes(1), allocate_lanes(6))
+    first, bad, holds, state = allocate_lanes(1), allocate_lanes(1), allocate_lanes(1), allocate_lanes(6)
+    return NewtonBlock(r, point, near, closures, factors, fresh, first, bad, holds, state)
 
 
 @njit(inline="always")
@@ -97,7 +109,7 @@ def copy_lanes(a, i, b, j, rows):
         b[t + c] = a[s + c]
 
 
-@njit(nogil=True, cache=True, fastmath=FAST, error_model="numpy")
+@njit(allocates=False, nogil=True, cache=True, fastmath=FAST, error_model="numpy")
 def factor_matrix(factors, m):
     """Factor the matrix of :class:`Factors` by rows, in place: multipliers below, reciprocal pivots on the diagonal.
 
@@ -139,7 +151,7 @@ def factor_matrix(factors, m):
                     a[t + j] -= a[q + j] * a[s + j]
 
 
-@njit(nogil=True, cache=True, fastmath=FAST, error_model="numpy")
+@njit(allocates=False, nogil=True, cache=True, fastmath=FAST, error_model="numpy")
 def solve_factored(factors, m, f):
     """Solve with the factors of :func:`factor_matrix`: ``f`` (m·LANES,) becomes the solution."""
     use_widest_vectors()
@@ -272,32 +284,29 @@ def solve_block(tapes, limits, m, block, n):
 
 
 @njit(inline="always")
-def _load_start(starts, joints, widths, row, stop, block, bad):
-    """Load the starts and joints of a block, flat rows of ``widths``; returns how many rows it has.
-
-    A single start counts for all rows.
-    """
-    r, (given, drives) = block.registers, widths
+def _load_start(m, near, q, row, stop, block):
+    """Load the starts and joints ``q`` of a block; returns how many rows it has. A single start counts for all."""
+    r, bad, given, joints = block.registers, block.bad, near.shape[1], q.shape[1]
     n = min(LANES, stop - row)
     bad[:] = 0.0
-    if starts.shape[0] == given:
+    if near.shape[0] == 1:
         for i in range(given):
             for j in range(LANES):
-                r[i * LANES + j] = starts[i]
+                r[i * LANES + j] = near[0, i]
     else:
-        load_rows(starts, given, row, n, given, r, bad)
-        fetch_to_read(starts, given, row + LANES, stop)
-    load_rows(joints, drives, row, n, given + drives, r, bad)
-    fetch_to_read(joints, drives, row + LANES, stop)
-    copy_lanes(r, given, block.point, block.point.shape[0] // LANES - drives, drives)
+        load_rows(near, row, n, given, r, bad)
+        fetch_to_read(near, row + LANES, stop)
+    load_rows(q, row, n, given + joints, r, bad)
+    fetch_to_read(q, row + LANES, stop)
+    copy_lanes(r, given, block.point, m, joints)
     copy_lanes(r, 0, block.near, 0, given)
     return n
 
 
 @njit(inline="always")
-def _evaluate_end(end, m, width, block, bad):
-    """Evaluate the last tape: ``width`` outputs of the answer, then margins; returns the first output's register."""
-    r, point, joints = block.registers, block.point, block.point.shape[0] // LANES - m
+def _evaluate_end(end, m, width, block):
+    """Evaluate the last tape: ``width`` outputs of the answer, then margins."""
+    r, bad, point, joints = block.registers, block.bad, block.point, block.point.shape[0] // LANES - m
     copy_lanes(point, 0, r, 0, m + joints)
     copy_lanes(block.near, 0, r, m + joints, end.inputs - m - joints)
     interpret(end.code, end.constants, r)
@@ -305,7 +314,26 @@ def _evaluate_end(end, m, width, block, bad):
         s = (i & MASK) * LANES
         for j in range(LANES):
             bad[j] += 0.0 * r[s + j]
-    return end.inputs
+    find_positive(r, end.inputs + width, end.inputs + end.outputs, block.holds)
+
+
+@njit(inline="always")
+def _store_roots(settling, closed, side, block, roots, row, n):
+    """Store what is known of a block's roots besides their rows."""
+    residual, steps, turned, settled = roots.residual, roots.steps, roots.turned, roots.settled
+    bad, holds, state = block.bad, block.holds, block.state
+    first, determinant = block.first_determinant, block.factors.determinant
+    for j in range(n):
+        start = first[j] if side.shape[0] == 0 else side[0 if side.shape[0] == 1 else row + j]
+        worst, change, product = state[WORST + j] + bad[j], abs(determinant[j] - first[j]), determinant[j] * start
+        steps[row + j], turned[row + j], residual[row + j] = int(state[STEPS + j]), product, worst
+        settled[row + j] = (
+            (holds[j] > 0.0)
+            & (worst <= closed)
+            & (product > settling.turned)
+            & (change <= settling.steady * abs(first[j]))
+            & (state[STEPS + j] <= settling.steps)
+        )
 
 
 @njit(nogil=True, cache=True, fastmath=FAST, error_model="numpy")
@@ -316,37 +344,22 @@ def solve_newton(tapes, limits, near, q, side, roots, start, stop):
     near : (N or 1, k) starts; side : (N,), (1,) or (0,)
     roots : :class:`~.batch.Roots`, overwritten
     """
-    use_widest_vectors()
-    m, joints = limits.caps.shape[0], q.shape[1]
-    block, bad, holds = _allocate_block(tapes, m, joints, near.shape[1]), allocate_lanes(1), allocate_lanes(1)
-    r, point, state, determinant = block.registers, block.point, block.state, block.factors.determinant
-    first, end = block.first_determinant, tapes.end  # fields are taken out once: Numba counts references at each access
-    rows, residual, steps, turned, settled = roots.rows, roots.residual, roots.steps, roots.turned, roots.settled
-    settling, closed = limits.settling, limits.closed
-    starts, given, answers, width = near.reshape(-1), q.reshape(-1), rows.reshape(-1), rows.shape[1]
-    widths = near.shape[1], joints
+    block = _allocate_block(tapes, limits.caps.shape[0], q.shape[1], near.shape[1])
+    problems = NewtonProblems(near, q, side)
     for row in range(start, stop, LANES):
-        n = _load_start(starts, given, widths, row, stop, block, bad)
-        fetch_to_write(answers, width, row, stop)
-        interpret(tapes.begin.code, tapes.begin.constants, r)
-        copy_lanes(r, tapes.begin.inputs, point, 0, m)
-        solve_block(tapes, limits, m, block, n)
-        for j in range(n):
-            steps[row + j] = int(state[STEPS + j])
-            if side.shape[0] == 0:
-                turned[row + j] = determinant[j] * first[j]
-            else:
-                turned[row + j] = determinant[j] * side[0 if side.shape[0] == 1 else row + j]
-        output = _evaluate_end(end, m, width, block, bad)
-        store_rows(answers, width, row, n, output, r, bad)
-        find_positive(r, output + width, output + end.outputs, holds)
-        for j in range(n):
-            worst, change = state[WORST + j] + bad[j], abs(determinant[j] - first[j])
-            residual[row + j] = worst
-            settled[row + j] = (
-                (holds[j] > 0.0)
-                & (worst <= closed)
-                & (turned[row + j] > settling.turned)
-                & (change <= settling.steady * abs(first[j]))
-                & (state[STEPS + j] <= settling.steps)
-            )
+        _solve_rows(tapes, limits, problems, roots, block, row, stop)
+
+
+@njit(allocates=False, nogil=True, cache=True, fastmath=FAST, error_model="numpy")
+def _solve_rows(tapes, limits, problems, roots, block, row, stop):
+    """Solve one block of rows, from ``row`` on."""
+    use_widest_vectors()
+    m, begin, end = limits.caps.shape[0], tapes.begin, tapes.end
+    n = _load_start(m, problems.near, problems.joints, row, stop, block)
+    fetch_to_write(roots.rows, row, stop)
+    interpret(begin.code, begin.constants, block.registers)
+    copy_lanes(block.registers, begin.inputs, block.point, 0, m)
+    solve_block(tapes, limits, m, block, n)
+    _evaluate_end(end, m, roots.rows.shape[1], block)
+    store_rows(roots.rows, row, n, end.inputs, block.registers, block.bad)
+    _store_roots(limits.settling, limits.closed, problems.side, block, roots, row, n)

@@ -6,10 +6,12 @@ Where all margins are positive, the answer passes every check of :mod:`.forward`
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import reduce
 from math import pi
 
-from ..algebra import Scalar, Trace, absolute, dot
+from ..algebra import Scalar, Trace, absolute, dot, minimum
 from ..kernels.tape import Tape
+from ..model.spheres import compute_square_determinant
 from ..model.traces import Model
 from ..units import AXIS_UNITS
 from .closure_roots import compute_mode_tolerance
@@ -27,8 +29,9 @@ def compile_settling_end(model: Model, mode: str | None, from_start: bool) -> Ta
     def outputs(trace: Trace) -> list[Scalar]:
         joints = trace.inputs(drives, motions)
         near = trace.inputs(poses, motions + drives) if from_start else None
-        pose = model.compute_pose(trace.inputs(motions), joints)
-        return [*pose, *_list_margins(model, pose, joints, near, mode)]
+        coordinates = trace.inputs(motions)
+        pose = model.compute_pose(coordinates, joints)
+        return [*pose, *_list_margins(model, coordinates, joints, near, mode)]
 
     inputs = motions + drives + (poses if from_start else 0)
     return model.keep_tape(("settling end", mode, from_start), inputs, outputs)
@@ -38,31 +41,65 @@ def compile_settling_spheres(model: Model, mode: str, from_start: bool) -> Tape:
     """Compile joints, near pose -> pose, closures in mm, then the margins of :func:`_list_margins`.
 
     The pose is the legs' common point on the near pose's side, which that has with its own joints in the working mode;
-    with a head or table one more margin tells that it is the same in both of their modes. Without a near pose it is
-    the common point on home's side.
+    one more margin tells that this side is sure. Without a near pose it is the common point on home's side.
     """
     drives, poses = len(model.drives), len(model.axes)
 
     def outputs(trace: Trace) -> list[Scalar]:
         joints = trace.inputs(drives)
         near = trace.inputs(poses, drives) if from_start else None
-        side: Scalar = model.home_side
-        margins: list[Scalar] = []
-        if near is not None:
-            side = model.measure_own_side(near, mode)
-            if model.structure.branches:
-                margins.append(side * model.measure_own_side(near, flip_mode(mode)))
-        coordinates = model.spheres(joints, side)
-        pose = model.compute_pose(coordinates, joints)
-        margins += _list_margins(model, pose, joints, near, mode)
-        return [*pose, *model.scaled_closures(coordinates, joints), *margins]
+        if near is None:
+            coordinates, margins = model.spheres(joints, model.home_side), list[Scalar]()
+        else:
+            coordinates, margins = _find_on_side(model, joints, near, mode)
+        margins += _list_margins(model, coordinates, joints, near, mode)
+        return [*model.compute_pose(coordinates, joints), *model.scaled_closures(coordinates, joints), *margins]
 
     inputs = drives + (poses if from_start else 0)
     return model.keep_tape(("settling spheres", mode, from_start), inputs, outputs)
 
 
+def _find_on_side(
+    model: Model, joints: Sequence[Scalar], near: Sequence[Scalar], mode: str
+) -> tuple[list[Scalar], list[Scalar]]:
+    """Find the coordinates of the common point on a start's own side, and margins: positive where that side is sure."""
+    placed = model.structure.place_with_joints(near, joints[model.leg_count :])
+    coordinates = model.spheres(joints, None, placed.origin)
+    steady = _measure_steadiness(model, coordinates, joints, near, mode)
+    if steady is not None:
+        return coordinates, [steady]
+    side, margins = model.measure_own_side(near, mode), []
+    if model.structure.branches:  # the same in both modes of head and table
+        margins.append(side * model.measure_own_side(near, flip_mode(mode)))
+    return model.spheres(joints, side), margins
+
+
+def _measure_steadiness(
+    model: Model, coordinates: Sequence[Scalar], joints: Sequence[Scalar], near: Sequence[Scalar], mode: str
+) -> Scalar | None:
+    """Measure what is positive where a start with its own joints surely lies on the answer's side; None if unknown.
+
+    The platform's origin is d or less from the answer to the start. There each rod, of a length L at most, differs from
+    the answer's by less than e = sway·L·d / m, with the least branch margin m. So the determinant D of n rods differs
+    by less than n·e·Lⁿ⁻¹, and keeps its sign where D²·m² > (n·sway·Lⁿ·d)². It spares the start's inverse.
+    """
+    sways = [leg.sway for leg in model.spec.legs if leg.sway is not None]
+    clear = model.list_branch_margins(coordinates, joints, mode)
+    pose = model.compute_pose(coordinates, joints)
+    way = model.structure.bound_platform_way([one - other for one, other in zip(pose, near, strict=True)])
+    if way is None or clear is None or len(sways) < len(model.spec.legs):
+        return None
+    least, square = reduce(minimum, clear), compute_square_determinant(*model.find_spheres(joints))
+    count, size = len(sways), max(model.sizes)
+    return square * least * least - (count * max(sways) * size**count) ** 2 * way
+
+
 def _list_margins(
-    model: Model, pose: Sequence[Scalar], joints: Sequence[Scalar], near: Sequence[Scalar] | None, mode: str | None
+    model: Model,
+    coordinates: Sequence[Scalar],
+    joints: Sequence[Scalar],
+    near: Sequence[Scalar] | None,
+    mode: str | None,
 ) -> list[Scalar]:
     """List margins that are positive where an answer needs no second look.
 
@@ -71,11 +108,11 @@ def _list_margins(
     within ±90°, where the determinant's sign is that of the twist. The turns from home are within half a turn; from a
     near pose Newton's method leaves none in a few steps.
     """
-    margins: list[Scalar] = []
+    pose, margins = model.compute_pose(coordinates, joints), list[Scalar]()
     if model.has_modes and mode is not None:
-        clear = model.list_branch_margins(pose, joints, mode)
+        clear = model.list_branch_margins(coordinates, joints, mode)
         if clear is not None:
-            margins += [margin - CLEAR * max(model.sizes) for margin in clear]
+            margins.append(reduce(minimum, clear) - CLEAR * max(model.sizes))
         else:
             off = model.compare_mode(pose, joints, mode)
             margins.append(compute_mode_tolerance(model) ** 2 - dot(off, off))

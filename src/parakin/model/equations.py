@@ -87,11 +87,12 @@ class Equations:
             for unit, q, given in zip(leg.units, leg.inverse(point, s).joints, all_given, strict=True)
         ]
 
-    def list_branch_margins(self, pose: Sequence[Scalar], joints: Sequence[Scalar], mode: str) -> list[Scalar] | None:
-        """List how clear of other working modes the legs' joints are at a pose, mm; None where a leg can't tell it."""
-        placed = self.structure.place_with_joints(pose, self._serial(joints))
+    def list_branch_margins(
+        self, coordinates: Sequence[Scalar], joints: Sequence[Scalar], mode: str
+    ) -> list[Scalar] | None:
+        """List how clear of other working modes the legs' joints are, mm; None where a leg can't tell it."""
         signs, _ = self.split_mode(mode)
-        points = compute_platform_points(self.spec, placed.rotation, placed.origin)
+        points = compute_platform_points(self.spec, *self.structure.frame(coordinates))
         given = group_joints_by_leg(self.spec, joints)
         margins: list[Scalar] = []
         for leg, point, q, s in zip(self.spec.legs, points, given, signs, strict=True):

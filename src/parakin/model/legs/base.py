@@ -43,6 +43,9 @@ class Leg(ABC):
     kind: ClassVar[str]
     units: ClassVar[tuple[Unit, ...]]  # of the joints, in order
     branches: ClassVar[str] = ""  # the working mode if the file names none: a sign for each choice of the inverse
+    # Where the platform's joint moves by d, less than a fifth of the rod's length L, the rod's vector changes by less
+    # than sway·L·d / (branch margin); None where that is not known.
+    sway: ClassVar[float | None] = None
 
     drives: tuple[Drive, ...]
     platform: Point

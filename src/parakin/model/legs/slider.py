@@ -17,6 +17,9 @@ class Slider(Leg):
     kind = "slider"
     units = ("mm",)
     branches = "-"
+    # The branch margin is r, with r² = L² - s². The rod changes by d across the rail, and along it by |r' - r|, less
+    # than (2·s·d + d²) / r; and r + 2·s ≤ √5·L.
+    sway = 2.5
 
     foot: Point  # at q = 0
     rail: Direction  # q counts along it

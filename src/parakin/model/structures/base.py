@@ -60,7 +60,7 @@ class Structure(ABC):
     has_central_leg: bool = False
     sign: float = 1.0  # of the central leg's length
     tip: Vec = ORIGIN  # of a fixed tool, in the platform's frame
-    assembly_method: Literal["planar", "lambda", "central leg"] | None = None  # of the complete direct problem
+    assembly_method: Literal["planar", "lambda"] | None = None  # closed form of the complete direct problem
 
     def __init__(self, spec: Spec):
         self.spec = spec
@@ -89,6 +89,13 @@ class Structure(ABC):
         """Bound how far mounting, head and table together shift a point, mm; infinite where a drive shifts it."""
         steps = [step for step in (*self.spec.mounting, *self.spec.head, *self.spec.table) if step.axis in TRANSLATIONS]
         return inf if any(step.drive is not None for step in steps) else sum(abs(step.value) for step in steps)
+
+    def bound_platform_way(self, ways: Sequence[Scalar]) -> Scalar | None:
+        """Bound the squared distance, mm², between the platform's origins at two poses, from the poses' difference.
+
+        Head and table may stand in any of their modes. None where such a bound is not known.
+        """
+        return None
 
     @property
     def has_direction(self) -> bool:

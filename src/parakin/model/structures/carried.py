@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from ...algebra import IDENTITY, Mat, Scalar, Vec, add, apply, sub, transpose
+from ...algebra import IDENTITY, Mat, Scalar, Vec, add, apply, cross, dot, sub, transpose
 from ..chain import UNIT, Pointing, compose_chain, invert_rotations, transform_to_local
 from ..elements import TRANSLATIONS
 from ..spec import Spec
@@ -25,6 +25,23 @@ class Carried(FiveAxis):
         # The turning axes as they follow on each other: the table's, inverted, then the head's.
         drives = [step.drive for step in spec.head if step.drive] + [step.drive for step in spec.table if step.drive]
         self.serial_order = tuple(drives.index(step.drive) for step in chain if step.drive is not None)
+
+    @property
+    def _has_wrist_centre(self) -> bool:
+        """Whether both axes and the tool's axis meet: then the tool's axis alone shifts the tip."""
+        head = self.spec.head
+        driven = [i for i, step in enumerate(head) if step.drive is not None]
+        if self.has_turning_table or len(driven) < 2:
+            return False
+        arm = compose_chain(head[driven[0] + 1 : driven[1]], ())[1]
+        rotation, tool = compose_chain(head[driven[1] + 1 :], ())
+        return not any(arm) and not any(cross(tool, apply(rotation, UNIT["tz"])))
+
+    def bound_platform_way(self, ways: Sequence[Scalar]) -> Scalar | None:
+        if not self._has_wrist_centre:
+            return None
+        tip, (b, c) = ways[:3], ways[self.direction.pair]
+        return 2.0 * (dot(tip, tip) + self.measure_tool_reach() ** 2 * (b * b + c * c))
 
     def _split(self, serial: Sequence[Scalar]) -> tuple[Sequence[Scalar], Sequence[Scalar]]:
         return serial[: self.head_joints], serial[self.head_joints :]

@@ -58,7 +58,6 @@ class CentralLeg(FiveAxis):
         spin = [Step("rz", drive=spec.legs[0].drives[0])] if self.roll else []
         self.pointing = Pointing.from_steps([*spin, *spec.head], "head")
         self.serial_order = () if self.roll else (0, 1)
-        self.assembly_method = None if self.roll else "central leg"
         self.above, self.reach = self._find_wrist_centre()
         self.sign = 1.0
         home = tuple(float(spec.home.get(letter, 0.0)) for letter in self.axes)
@@ -127,6 +126,22 @@ class CentralLeg(FiveAxis):
         for word, angle in zip(self.coordinates, coordinates[:-1], strict=False):
             rotation = product(rotation, make_axis_rotation(word, *sincos(angle)))
         return rotation, scale([row[2] for row in rotation], coordinates[-1])
+
+    def coordinates_of(self, rotation: Mat, origin: Vec) -> list[Scalar]:
+        axis = [row[2] for row in rotation]
+        if self.roll:
+            angles = list(self.passive_turns.solve(scale(axis, self.sign), "+").joints)
+            turned = IDENTITY
+            for word, angle in zip(self.coordinates, angles, strict=False):
+                turned = product(turned, make_axis_rotation(word, *sincos(angle)))
+            spin = product(transpose(turned), rotation)
+            angles.append(atan2(spin[1][0], spin[0][0]))
+        else:
+            first, second = (UNIT[word] for word in self.coordinates[:2])
+            third = cross(first, second)
+            swung, seen = apply(rotation, second), apply(transpose(rotation), first)
+            angles = [atan2(dot(swung, third), dot(swung, second)), atan2(dot(seen, third), dot(seen, first))]
+        return [*angles, dot(origin, axis)]
 
     def pose(self, coordinates: Sequence[Scalar], serial: Sequence[Scalar]) -> list[Scalar]:
         rotation, origin = self.frame(coordinates)

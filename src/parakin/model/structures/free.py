@@ -7,7 +7,7 @@ from typing import Literal
 
 import numpy as np
 
-from ...algebra import IDENTITY, Mat, Scalar, Vec, add, apply, atan2, product, sincos, sqrt, sub, transpose
+from ...algebra import IDENTITY, Mat, Scalar, Vec, add, apply, atan2, dot, product, sincos, sqrt, sub, transpose
 from ...algebra import make_axis_rotation as turned
 from ...errors import DescriptionError
 from ..chain import UNIT, compose_chain, transform_to_local
@@ -52,6 +52,9 @@ class Free(Structure):
         self.tool, self.tip = compose_chain(spec.head, ())
         self.assembly_method = self._assembly_method()
 
+    def bound_platform_way(self, ways: Sequence[Scalar]) -> Scalar | None:
+        return None if self.turns else dot(ways, ways)
+
     def place(self, pose: Sequence[Scalar], branch: str, first: Scalar | None = None) -> PlatformPlacement:
         rotation, origin = self.frame(pose)
         return PlatformPlacement(rotation, origin, list(pose), [])
@@ -95,9 +98,14 @@ class Free(Structure):
         return rotation, tuple(o if letter in given else 0.0 for o, letter in zip(origin, "XYZ", strict=True))
 
     def coordinates_of(self, rotation: Mat, origin: Vec) -> list[Scalar]:
-        """Compute the pose X Y Z A B C of a platform's frame; B in [-90°, 90°]."""
-        r = product(product(self.mount, rotation), self.tool)
+        """Compute the pose of a platform's frame; of three turns B is in [-90°, 90°]."""
         tip = add(apply(self.mount, add(origin, apply(rotation, self.tip))), self.base)
+        if len(self.turns) < 3:
+            return [tip["XYZ".index(letter)] for letter in self.axes if letter in "XYZ"] + [
+                atan2(rotation[(i + 2) % 3][(i + 1) % 3], rotation[(i + 1) % 3][(i + 1) % 3])
+                for i in ("xyz".index(turn[1]) for turn in self.turns)
+            ]
+        r = product(product(self.mount, rotation), self.tool)
         b = atan2(-r[2][0], sqrt(r[0][0] * r[0][0] + r[1][0] * r[1][0]))
         return [*tip, atan2(r[2][1], r[2][2]), b, atan2(r[1][0], r[0][0])]
 

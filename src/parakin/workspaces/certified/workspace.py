@@ -15,10 +15,10 @@ from ...arguments import check_arguments
 from ...arrays import Array, Flags, Progress, split_rows
 from ...budget import SECONDS, Budget
 from ...errors import PoseError
-from ...machine import Machine
 from .assembly_mode import make_side_constraints
 from .best_orientation import find_best_orientations
 from .region import Region
+from .region_result import RegionResult
 from .separation import find_joined_cells
 from .subdivision import Cells, make_empty_cells
 
@@ -58,7 +58,7 @@ class BoundingLimit:
 
 
 @dataclass(frozen=True, eq=False)
-class Workspace:
+class Workspace(RegionResult):
     """A region with its proved volume, and the cells that prove it.
 
     stopped : why the subdivision ended: ``gap`` reached, ``cell`` size reached, ``time``, ``interrupted``,
@@ -67,25 +67,10 @@ class Workspace:
     apart : volume of the cells that were left out, for they are proved not to hang together with home
     """
 
-    region: Region
     cells: Cells
     stopped: str
     parameters: Mapping[str, Any]
     apart: Volume = NOTHING
-
-    @property
-    def machine(self) -> Machine:
-        return self.region.machine
-
-    @property
-    def axes(self) -> tuple[str, ...]:
-        """The axes of a position."""
-        return self.region.free_axes
-
-    @property
-    def unit(self) -> str:
-        """Of the volume."""
-        return self.region.volume_unit
 
     @cached_property
     def volume(self) -> Volume:

@@ -14,6 +14,7 @@ from ...budget import SECONDS, Budget
 from ...errors import PoseError
 from ..certified.containment import prove_boxes
 from ..certified.region import Region
+from ..certified.region_result import RegionResult
 from .growth import BoxFamily, climb_volume, grow_faces
 from .seeds import COUNT, find_outline_cells, find_seeds
 
@@ -41,7 +42,7 @@ class FaceStop:
 
 
 @dataclass(frozen=True, eq=False)
-class InscribedBox:
+class InscribedBox(RegionResult):
     """A box [low, high] of positions, mm, all of them proved to be in the region.
 
     stops : what stops each face, the lower and the upper one of each axis in turn
@@ -51,7 +52,6 @@ class InscribedBox:
     proved : always true
     """
 
-    region: Region
     low: Array
     high: Array
     stops: tuple[FaceStop, ...]
@@ -59,16 +59,6 @@ class InscribedBox:
     parameters: Mapping[str, Any]
     stopped: str = "tolerance"
     proved: bool = True
-
-    @property
-    def axes(self) -> tuple[str, ...]:
-        """The axes of a position."""
-        return self.region.free_axes
-
-    @property
-    def unit(self) -> str:
-        """Of the volume."""
-        return self.region.volume_unit
 
     @property
     def edges(self) -> Array:

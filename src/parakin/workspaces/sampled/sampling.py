@@ -20,8 +20,8 @@ from ...budget import Budget
 from ...errors import PoseError
 from ...kernels.batch import evaluate_tape, freeze_rows, run_in_threads
 from ...kernels.staged import stage_margins
-from ...machine import Machine
 from ..certified.region import Region
+from ..certified.region_result import RegionResult
 
 LimitCodes = NDArray[Any]  # unsigned: 0 allowed, else 1 + the index in Region.limits of the first limit broken
 
@@ -34,7 +34,7 @@ _AT_ONCE, _AT_ONCE_SWEPT = 1 << 24, 1 << 18  # positions of a grid, without and 
 
 
 @dataclass(frozen=True, eq=False)
-class SampledWorkspace:
+class SampledWorkspace(RegionResult):
     """A region, estimated by samples of its positions.
 
     estimate : of its volume, mm³ (in the plane mm²)
@@ -42,25 +42,10 @@ class SampledWorkspace:
     parameters : enough to run it again
     """
 
-    region: Region
     method: str
     estimate: float
     step: float
     parameters: Mapping[str, Any]
-
-    @property
-    def machine(self) -> Machine:
-        return self.region.machine
-
-    @property
-    def axes(self) -> tuple[str, ...]:
-        """The axes of a position."""
-        return self.region.free_axes
-
-    @property
-    def unit(self) -> str:
-        """Of the volume."""
-        return self.region.volume_unit
 
     def __repr__(self) -> str:
         return (

@@ -1,14 +1,13 @@
 """Read CL files, in the dialects of :mod:`.dialects`.
 
 Bytes are read a block at a time. Runs of plain GOTO lines, nearly all of a large file, go through compiled code
-(:mod:`.plain_lines`); every other line, and every line that code is not sure of, goes through the line reader, which
-gives the same records. The words are in the table of :mod:`.words`.
+(:mod:`.plain_lines`); every other line, and every line that code is not sure of, goes through :mod:`.line_reader`,
+which gives the same records. The words are in the table of :mod:`.words`.
 """
 
 import io
 import math
 import os
-import re
 from collections.abc import Mapping
 from typing import Literal
 
@@ -16,34 +15,27 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ....arrays import Array, Progress
-from ....errors import CONTROL_CHARACTER, InputError
+from ....errors import InputError
 from ...path import ToolPath
 from ..text import (
     BYTE_ORDER_MARK,
     READ_SIZE,
     check_arc_tolerance,
     check_tool_lengths,
-    decode_line,
-    is_number,
     open_file,
-    parse_number,
     quote_short,
 )
 from .actions import ClActions
 from .dialects import DIALECTS
+from .line_reader import LONGEST, LineReader
 from .motion import ClMotion
-from .statements import HIDDEN, ends_text, execute_statement
 
 _BLOCK = READ_SIZE  # bytes read at a time, into the same buffer: it stays in the cache
-_LONGEST = 4_000_000  # characters in one statement
 _BULK_FROM = 1 << 18  # bytes of a file; loading the compiled code doesn't pay below
 _PLAIN_STARTS = (b"G", b"g", b" ", b"\t", b"\n")  # first bytes of lines that are worth a call of the compiled code
-_END_OF_FILE = "\x1a"  # the sign that DOS ends a text with
 _MODAL_LINES = 4096  # FEDRAT, RAPID and PAINT lines in one call of it
 _BYTES_PER_RECORD = 48  # bytes a record takes in a usual file
 _MOST_EXPECTED = 1 << 26  # records to reserve room for at first
-_HEADER = re.compile(r"\$\$\s*\*\s*CATIA0\b", re.IGNORECASE)
-_HIDDEN = re.compile(r"\$\$\s*->")  # a statement that Creo hides in a comment
 _MOST_LISTED = 20  # words that only inform
 
 
@@ -86,13 +78,10 @@ def read_cl(
 
 
 class ClReader:
-    """Split a file into lines and lines into statements, and build the tool path.
+    """Split a file into lines, read runs of plain ones by compiled code, and build the tool path.
 
     buffer : bytes of the file; the first ``kept`` of them are an unfinished line
     line : lines completed
-    continued : the parts of a statement that $ continues, from line ``continued_from`` on
-    matrix : rows read so far of the matrix after $$*CATIA0 in line ``matrix_from``; None outside it
-    skipped : statements after FINI: the first one's line and their count
     """
 
     def __init__(
@@ -110,17 +99,12 @@ class ClReader:
         # columns for as many records as the file may well hold; the system gives memory when it is written to
         self.motion = ClMotion(min(size // _BYTES_PER_RECORD, _MOST_EXPECTED), arc_tolerance)
         self.actions = ClActions(self.motion)
+        self.lines = LineReader(source, self.actions)
         self.bulk = size >= _BULK_FROM
         self.size = size
         self.buffer = bytearray(_BLOCK)
         self.kept = 0
         self.line = 0
-        self.continued: list[str] = []
-        self.continued_from = 0
-        self.continued_length = 0
-        self.matrix: list[list[float]] | None = None
-        self.matrix_from = 0
-        self.skipped = [0, 0]
         self.known_lines: dict[bytes, tuple[str, float, str | None]] = {}  # of runs: word, feed and its unit
         self.modal_lines = np.empty((_MODAL_LINES if self.bulk else 1, 4), np.int64)
 
@@ -160,8 +144,8 @@ class ClReader:
     def _keep_unfinished_line(self, begin: int, end: int) -> None:
         """Move the start of an unfinished line to the front, and make room for the rest of it."""
         self.kept = end - begin
-        if self.kept > _LONGEST:
-            raise self._fail(f"a line of more than {_LONGEST} characters; expected a CL statement", self.line + 1)
+        if self.kept > LONGEST:
+            raise self._fail(f"a line of more than {LONGEST} characters; expected a CL statement", self.line + 1)
         rest = self.buffer[begin:end]
         if len(self.buffer) < 2 * self.kept:
             self.buffer = bytearray(4 * self.kept)
@@ -171,12 +155,7 @@ class ClReader:
 
     def _check_end(self) -> None:
         """Refuse a file that ends within a statement, a matrix or an arc, or without motion."""
-        if self.continued:
-            raise self._fail(
-                "continued by $, but the file ends; expected the statement's next line", self.continued_from
-            )
-        if self.matrix is not None:
-            raise self._fail("expected three rows of four numbers after $$*CATIA0", self.matrix_from)
+        self.lines.check_end()
         if self.motion.circle is not None:
             raise self._fail("CIRCLE: the file ends; expected the GOTO that ends the arc", self.motion.circle.line)
         try:
@@ -190,8 +169,9 @@ class ClReader:
         motion, actions, records = self.motion, self.actions, self.motion.records
         motion.place_records()
         records.trim()
-        if self.skipped[1]:
-            motion.notes.add(self.skipped[0], "a statement after FINI, not read", self.skipped[1])
+        first_skipped, skipped = self.lines.skipped
+        if skipped:
+            motion.notes.add(first_skipped, "a statement after FINI, not read", skipped)
         if motion.off_unit[0]:
             count, first, worst = motion.off_unit.tolist()
             text = f"a tool axis off unit length, normalised; the worst by {worst:.3g}"
@@ -251,13 +231,13 @@ class ClReader:
                     return
             end = text.find(b"\n", at)
             self.line += 1
-            self._read_line(text[at:end], self.line)
+            self.lines.read_line(text[at:end], self.line)
             at = end + 1
 
     def _may_read_plain_lines(self) -> bool:
         """Tell whether the next line depends on no line before it."""
         motion = self.motion
-        within = self.continued or self.matrix is not None or motion.circle or motion.cycle or motion.open_arc
+        within = self.lines.is_open or motion.circle or motion.cycle or motion.open_arc
         return not (within or self.actions.finished)
 
     def _read_plain_lines(self, buffer: NDArray[np.uint8], at: int) -> int:
@@ -313,7 +293,7 @@ class ClReader:
         """Read a FEDRAT, RAPID or PAINT line within a run; equal lines are parsed once."""
         known = self.known_lines.get(text)
         if known is None:
-            word = self._read_line(text, line)
+            word = self.lines.read_line(text, line)
             if len(self.known_lines) < _MODAL_LINES and word in ("FEDRAT", "RAPID", "PAINT"):
                 unit = self.motion.feed_unit if b"," in text else None
                 self.known_lines[text] = word, self.motion.feed_value, unit
@@ -323,82 +303,3 @@ class ClReader:
             self.motion.set_feed(value, unit)
         elif word == "RAPID":
             self.motion.rapid = True
-
-    # line by line
-
-    def _read_line(self, raw: bytes | bytearray, line: int) -> str:
-        """Read one line; return the word of the statement it completes, or nothing."""
-        text = decode_line(raw).strip()
-        control = CONTROL_CHARACTER.search(text.strip(_END_OF_FILE))
-        if control is not None:
-            raise self._fail(f"a control character ({ord(control[0])}); expected plain text", line)
-        text = text.rstrip(_END_OF_FILE)
-        if self.matrix is not None:
-            self._read_matrix_row(text, line)
-            return ""
-        if "$" in text:
-            if _HEADER.match(text):
-                self.matrix, self.matrix_from = [], line
-            self.actions.read_comment(text, line)
-            if self.matrix is not None:
-                return ""
-            text = self._strip_comment(text, line)
-        if not text:
-            return ""
-        if self.continued and ends_text(self.continued[0], text):
-            self._execute(*self._take_continued())
-        if text.endswith("$"):
-            self._continue_statement(text[:-1], line)
-            return ""
-        if self.continued:
-            self._continue_statement(text, line)
-            text, line = self._take_continued()
-        return self._execute(text, line)
-
-    def _strip_comment(self, text: str, line: int) -> str:
-        """Return a line without its comment; a statement hidden in one is marked."""
-        hidden = _HIDDEN.match(text)
-        if hidden is None:
-            return text.partition("$$")[0].rstrip()
-        if self.continued:
-            raise self._fail("a $$-> statement within a continued one; expected the rest of that", line)
-        return HIDDEN + text[hidden.end() :].partition("$$")[0].strip()
-
-    def _execute(self, text: str, line: int) -> str:
-        """Act on a whole statement; return its word."""
-        if self.actions.finished:
-            self.skipped = [self.skipped[0] or line, self.skipped[1] + 1]
-            return ""
-        try:
-            return execute_statement(self.actions, text, line)
-        except InputError as error:
-            raise self._fail(error.message, error.line or line) from error
-
-    def _continue_statement(self, text: str, line: int) -> None:
-        if not self.continued:
-            self.continued_from = line
-        self.continued.append(text)
-        self.continued_length += len(text)
-        if self.continued_length > _LONGEST:
-            raise self._fail(f"a statement of more than {_LONGEST} characters", self.continued_from)
-
-    def _take_continued(self) -> tuple[str, int]:
-        """Join the parts of a continued statement; return it with its first line."""
-        text = "".join(self.continued)
-        self.continued, self.continued_length = [], 0
-        return text, self.continued_from
-
-    def _read_matrix_row(self, text: str, line: int) -> None:
-        """Read a row of the matrix after $$*CATIA0. Comments, such as the axis system's name, may come before it."""
-        assert self.matrix is not None
-        fields = text.removeprefix("$$").replace(",", " ").split()
-        if len(fields) == 4 and all(is_number(f) for f in fields):
-            try:
-                self.matrix.append([parse_number(f) for f in fields])
-                if len(self.matrix) == 3:
-                    rows, self.matrix = self.matrix, None
-                    self.actions.set_frame_matrix(rows, self.matrix_from)
-            except InputError as error:
-                raise self._fail(error.message, line) from error
-        elif self.matrix or not (text.startswith("$$") or not text):
-            raise self._fail(f"{quote_short(text)}; expected a row of four numbers of the matrix after $$*CATIA0", line)

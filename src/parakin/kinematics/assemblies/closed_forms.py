@@ -1,60 +1,47 @@
-"""All assembly modes of one joint vector, by complete methods."""
+"""All assembly modes of one joint vector in closed form, for machines that have one."""
 
 from __future__ import annotations
 
+from typing import Literal
+
 import numpy as np
 
-from ..algebra import Trace, derivative
-from ..arrays import Array
-from ..errors import NoMethodError
-from ..kernels.batch import evaluate_tape_with_residual
-from ..kernels.intervals import IntervalProgram
-from ..model.chain import make_rotation_about
-from ..model.traces import Model
-from .closure_roots import compute_closure_tolerance, compute_poses, find_roots
-from .planar_rpr import CONTINUUM, solve_planar_rpr
-from .root_isolation import isolate_roots
+from ...arrays import Array
+from ...errors import NoMethodError
+from ...model.chain import make_rotation_about
+from ...model.traces import Model
+from ..planar_rpr import CONTINUUM, solve_planar_rpr
 
 _ON_ONE_LINE = 1e-9  # of the size: nearer to a line, centres are on it
 LONGEST = 1e8  # mm; machine files take lengths up to 1e6
 
+ClosedForm = Literal["spheres", "planar", "lambda"]
 
-def find_assemblies(model: Model, joints: Array) -> Array:
-    """Find every real pose of one row of joints (1, joints), as rows (k, axes); k may be zero.
 
-    Machines that only translate on three (two) rods have two: the common points of spheres (circles). Three rods in a
-    plane have up to six. With three Lambda legs on parallel shafts the heights give the platform's tilt, face up or
-    face down, and each leaves the planar problem: up to twelve, face up first. A passive central leg is solved by
-    bisection within the limits of its passive joints.
+def find_closed_form(model: Model) -> ClosedForm | None:
+    """Find the closed form of a machine's direct problem, if there is one."""
+    return "spheres" if model.by_spheres else model.structure.assembly_method
 
-    Raises :class:`NoMethodError` for other machines: they have no complete method here.
+
+def solve_closed_form(model: Model, method: ClosedForm, joints: Array) -> Array:
+    """Find the motion's coordinates (k, m) of all poses of one row of joints (1, joints); k may be zero.
+
+    Some may close no better than a double root's rounding allows.
+
+    Raises :class:`NoMethodError` for a continuum of poses.
     """
-    if not (np.abs(joints) < LONGEST).all():
-        return np.empty((0, len(model.axes)))
-    if model.by_spheres:
-        return _find_common_points(model, joints)
-    methods = {"central leg": _solve_central_leg, "planar": _solve_planar, "lambda": _solve_lambdas}
-    if model.structure.assembly_method is None:
-        raise NoMethodError(
-            f"{model.spec.name}: no complete method for all its assemblies; forward(near=...) finds single ones"
-        )
-    coordinates = methods[model.structure.assembly_method](model, joints)
-    given = np.ascontiguousarray(np.broadcast_to(joints, (len(coordinates), joints.shape[1])))
-    good = find_roots(model, coordinates, given, most=0, poses=False).residual <= compute_closure_tolerance(model)
-    coordinates, given = coordinates[good], given[good]
-    poses = compute_poses(model, np.ascontiguousarray(coordinates), given)
-    return poses[np.isfinite(poses).all(1)]
+    methods = {"spheres": _find_common_points, "planar": _solve_planar, "lambda": _solve_lambdas}
+    coordinates: Array = methods[method](model, joints)
+    return coordinates
 
 
 def _find_common_points(model: Model, joints: Array) -> Array:
-    """Find both common points of the legs' spheres, as poses."""
+    """Find both common points of the legs' spheres."""
     _refuse_continuum(model, joints)
-    poses, residual = np.empty((2, len(model.axes))), np.empty(2)
-    for i, side in enumerate((model.home_side, -model.home_side)):
-        tape, pose = model.spheres_tape(side), poses[i : i + 1]
-        residual[i] = evaluate_tape_with_residual(tape, joints, pose, np.empty((1, 0)))[0]
-    poses = poses[residual <= compute_closure_tolerance(model)]
-    return poses[:1] if len(poses) == 2 and np.array_equal(poses[0], poses[1]) else poses
+    given = joints[0].tolist()
+    points: Array = np.array([model.spheres(given, side) for side in (model.home_side, -model.home_side)], float)
+    points = points[np.isfinite(points).all(1)]
+    return points[:1] if len(points) == 2 and np.array_equal(points[0], points[1]) else points
 
 
 def _refuse_continuum(model: Model, joints: Array) -> None:
@@ -81,41 +68,6 @@ def _split_by_leg(model: Model, joints: Array) -> list[list[float]]:
     """Split one row of joints into each leg's own."""
     by_name = dict(zip([drive.name for drive in model.drives], joints[0].tolist(), strict=True))
     return [[by_name[drive.name] for drive in leg.drives] for leg in model.spec.legs]
-
-
-def _solve_central_leg(model: Model, joints: Array) -> Array:
-    """Isolate all roots within the passive joints' limits by bisection, and polish them."""
-    words = model.structure.coordinates
-    bounds = {bound.name: (bound.low, bound.high) for bound in model.spec.limits.passive}
-    far = 0.0
-    for leg, q in zip(model.spec.legs, _split_by_leg(model, joints), strict=True):
-        sphere = leg.sphere(q)
-        if sphere is None:
-            raise NoMethodError(f"{model.spec.name}: no complete method for all assemblies of legs of kind {leg.kind}")
-        far = max(far, float(np.linalg.norm(np.array(sphere[0])) + abs(sphere[1]) + np.linalg.norm(leg.platform)))
-    slide = (0.0, far) if model.structure.sign > 0 else (-far, 0.0)
-    box = [bounds.get(word, slide if word == "tz" else (-np.pi / 2, np.pi / 2)) for word in words]
-    low, high = (np.array([side[i] for side in box]) for i in (0, 1))
-    low = np.where(np.isfinite(low), low, [-np.pi / 2, -np.pi / 2, slide[0]])
-    high = np.where(np.isfinite(high), high, [np.pi / 2, np.pi / 2, slide[1]])
-    trace = Trace()
-    inputs = trace.inputs(len(words))
-    f = model.scaled_closures(inputs, joints[0].tolist())
-    starts = isolate_roots(IntervalProgram(trace, f + [derivative(row, y) for row in f for y in inputs]), low, high)
-    return _polish_roots(model, joints, starts, low, high)
-
-
-def _polish_roots(model: Model, joints: Array, starts: Array, low: Array, high: Array) -> Array:
-    """Polish starts by Newton's method, and keep the distinct roots within the box."""
-    given = np.ascontiguousarray(np.broadcast_to(joints, (len(starts), joints.shape[1])))
-    roots = find_roots(model, starts, given, poses=False)
-    y, slack = roots.rows, 1e-9 * (high - low)
-    good = (roots.residual <= compute_closure_tolerance(model)) & (y >= low - slack).all(1) & (y <= high + slack).all(1)
-    kept: list[Array] = []
-    for root in y[good]:
-        if not any((np.abs(root - other) <= 1e-6 * (high - low)).all() for other in kept):
-            kept.append(root)
-    return np.array(kept).reshape(-1, y.shape[1])
 
 
 def _solve_planar(model: Model, joints: Array) -> Array:

@@ -1,0 +1,77 @@
+"""``parakin assemblies``: every pose of one joint vector."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from ..errors import InputError
+from ..export.number_format import format_fixed
+from ..units import name_display_unit, to_display
+from .console import announce_compiling, format_table, print_json, print_remark, print_text
+from .options import OFF_LIMITS, Json, Name, Sizes, load_machine
+from .values import parse_row
+
+if TYPE_CHECKING:
+    from ..kinematics.assemblies import Assemblies
+    from ..machine import Machine
+
+_SIDES = {1: "det A > 0", -1: "det A < 0", 0: "singular"}
+
+
+def assemblies(name: Name, /, *values: str, json: Json = False, sizes: Sizes = None) -> int:
+    """Every pose of one joint vector, with the side of the singularities on which it lies.
+
+    The exit code is 3 if there is none, or if it is not known whether there are more.
+
+    Parameters
+    ----------
+    name
+        A shipped machine's name or a YAML file.
+    values
+        Joints in mm and degrees, in their order or by name: d1=1200 d2=1250; the rest is home's.
+    """
+    machine = load_machine(name, sizes)
+    if not values:
+        raise InputError(f"no values, expected {' '.join(machine.joints)}", "joints")
+    announce_compiling()
+    home = machine.inverse(machine.home)
+    joints = parse_row(values, machine.joints, machine.joint_units, home, "joints")
+    found = machine.assemblies(joints)
+    if json:
+        from ..export.json.assemblies import encode_assemblies
+
+        print_json(encode_assemblies(machine, joints, found))
+    else:
+        if len(found):
+            print_text(_format_poses(machine, found))
+        print_text(_format_summary(found))
+    if found.lost_count:
+        print_remark(f"{found.lost_count} paths could not be followed: there may be more poses")
+    return OFF_LIMITS if not len(found) or found.lost_count else 0
+
+
+def _format_poses(machine: Machine, found: Assemblies) -> str:
+    """Format a line for each pose."""
+    header = [*(f"{axis} {name_display_unit(u)}" for axis, u in zip(machine.axes, machine.axis_units, strict=True))]
+    rows = [
+        [
+            *(format_fixed(to_display(v, u), 6) for v, u in zip(pose.tolist(), machine.axis_units, strict=True)),
+            _SIDES[int(side)],
+            "yes" if within else "no",
+            f"{radius:.1e}" if radius == radius else "not proved",
+        ]
+        for pose, side, within, radius in zip(
+            found.poses, found.sides, found.within_limits, found.radii[:, 0].tolist(), strict=True
+        )
+    ]
+    return format_table(rows, [*header, "side", "within limits", "proved within mm"], "r" * len(header) + "llr")
+
+
+def _format_summary(found: Assemblies) -> str:
+    """Say how many there are, and how that is known."""
+    text = f"{len(found)} pose{'s' * (len(found) != 1)}: {found.complete}"
+    if found.complex_count is not None:
+        text += f"; {found.complex_count} more solutions are complex, {found.infinite_count} at infinity"
+    if found.untold_count:
+        text += f"; {found.untold_count} more are real, but no pose tells them"
+    return text

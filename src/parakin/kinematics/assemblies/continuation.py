@@ -1,0 +1,165 @@
+"""The complete direct problem by homotopy continuation: every real root of a machine's quadrics."""
+
+from __future__ import annotations
+
+from typing import NamedTuple, TypeVar
+
+import numpy as np
+
+from ...arrays import Array, Flags
+from ...errors import NoMethodError
+from ...model.traces import Model
+from ..planar_rpr import CONTINUUM
+from .machine_quadrics import MachineQuadrics, make_machine_quadrics
+from .path_tracking import align_members, find_meetings, track_members
+from .quadric_family import Complex
+from .study import compute_frames
+
+_AT_INFINITY = 1e-5  # |e·e| of a singular end: its translation is infinite
+_REAL = 1e-4  # imaginary part, for a point of length one, from which Newton's method may find a real root
+_CLOSED = 1e-12  # of a quadric at a point of length one: it is a root
+_STRIDE, _SAME_PLACE = 1e-3, 1e-5  # along the null direction of a double root, and what is next to it
+_STEPS = 60  # of Newton's method at a double root, where each halves the distance
+
+
+AnyPoints = TypeVar("AnyPoints", Array, Complex)
+
+
+class RealRoots(NamedTuple):
+    """The real roots of one system, and what became of all paths.
+
+    points : (k, n) of length one
+    double : (k,) where the derivative is singular
+    complex_count, infinite_count : how many paths ended at complex roots, and at infinity
+    lost_count : how many could not be followed
+    """
+
+    points: Array
+    double: Flags
+    complex_count: int
+    infinite_count: int
+    lost_count: int
+
+
+def find_real_roots(model: Model, joints: Array) -> RealRoots:
+    """Find all real roots of a machine's quadrics for one row of joints (1, joints).
+
+    Raises :class:`NoMethodError` for a continuum of roots.
+    """
+    quadrics = make_machine_quadrics(model)
+    systems = quadrics.make_systems(joints)
+    if not len(quadrics.member.roots):
+        raise NoMethodError(f"{model.spec.name}: {CONTINUUM}, or do not close, whatever the joints are")
+    first, last = align_members(quadrics.member.system, systems, len(quadrics.family.fixed))
+    ends = track_members(first, last, quadrics.member.roots)
+    points, regular = _turn_to_real(ends.points[0]), ends.reached[0] == 1.0
+    met = int(find_meetings(ends).sum())
+    near_real = np.abs(points.imag).max(1) < _REAL
+    single = _polish_points(systems[0].real, points[regular & near_real].real, 4)
+    turned_real = _measure_closures(systems[0].real, single) < _CLOSED
+    ends_singular = _refine_singular(systems[0], points[~regular])
+    kinds = _sort_singular(quadrics, systems[0], ends_singular)
+    doubles = _join_same(_turn_to_real(ends_singular[kinds == _DOUBLE]).real)
+    if any(_is_in_continuum(systems[0].real, point) for point in doubles):
+        raise NoMethodError(f"{model.spec.name}: {CONTINUUM}")
+    real = _join_same(single[turned_real])
+    return RealRoots(
+        np.concatenate([real, doubles]),
+        np.arange(len(real) + len(doubles)) >= len(real),
+        int((regular & ~near_real).sum() + (~turned_real).sum() + (kinds == _COMPLEX).sum()),
+        int((kinds == _INFINITE).sum()),
+        int((kinds == _LOST).sum()) + met,
+    )
+
+
+_DOUBLE, _COMPLEX, _INFINITE, _LOST = range(4)
+
+
+def _turn_to_real(points: Complex) -> Complex:
+    """Multiply points by a phase so that those with a real representative are real."""
+    squares = (points * points).sum(1)
+    phase = np.sqrt(squares / np.maximum(np.abs(squares), 1e-300))
+    turned: Complex = points * phase.conj()[:, None]
+    return turned
+
+
+def _measure_closures(system: Array, points: Array) -> Array:
+    """Measure the greatest quadric at points (k, n): (k,)."""
+    values: Array = np.abs(np.einsum("ki,rij,kj->kr", points, system, points))
+    return values.max(1, initial=0.0)  # type: ignore[no-any-return]
+
+
+def _polish_points(system: AnyPoints, points: AnyPoints, steps: int) -> AnyPoints:
+    """Take Newton steps of least length from points (k, n), and scale them to length one."""
+    for _ in range(steps):
+        halves = np.einsum("rij,kj->kri", system, points)
+        values = np.einsum("kri,ki->kr", halves, points)
+        matrix = np.concatenate([2.0 * halves, points.conj()[:, None, :]], 1)
+        right = np.concatenate([values, np.zeros((len(points), 1))], 1)
+        try:
+            move = np.linalg.solve(matrix, right[..., None])[..., 0]
+        except np.linalg.LinAlgError:
+            break
+        points = points - move
+        points = points / np.linalg.norm(points, axis=1, keepdims=True)
+    return points
+
+
+def _refine_singular(system: Complex, points: Complex) -> Complex:
+    """Bring points close to singular roots onto them by Newton's method, which halves the distance each time."""
+    refined = points.copy()
+    for row, point in enumerate(points):
+        x = point[None]
+        for _ in range(_STEPS):
+            ahead = _polish_points(system, x, 1)
+            if not np.isfinite(ahead).all() or np.linalg.norm(ahead - x) > 0.1:
+                break
+            moved = float(np.linalg.norm(ahead - x))
+            x = ahead
+            if moved < 1e-9:
+                break
+        refined[row] = x[0]
+    return refined
+
+
+def _sort_singular(quadrics: MachineQuadrics, system: Complex, points: Complex) -> Array:
+    """Tell real double roots, complex ones, ends at infinity, and what is no root."""
+    kinds = np.full(len(points), _LOST)
+    if not len(points):
+        return kinds
+    turned = _turn_to_real(points)
+    e = points @ quadrics.family.hull[:, :4]
+    closed = np.abs(np.einsum("ki,rij,kj->kr", points, system, points)).max(1) < 1e-9
+    kinds[closed & (np.abs(turned.imag).max(1) < _REAL)] = _DOUBLE
+    kinds[closed & (np.abs(turned.imag).max(1) >= _REAL)] = _COMPLEX
+    kinds[np.abs((e * e).sum(1)) < _AT_INFINITY] = _INFINITE
+    return kinds
+
+
+def _join_same(points: Array) -> Array:
+    """Keep one of points that are the same but for their sign."""
+    same = np.abs(points @ points.T) > 1.0 - _SAME_PLACE**2
+    return points[~np.tril(same, -1).any(1)]
+
+
+def _is_in_continuum(system: Array, point: Array) -> bool:
+    """Tell whether a step along the null direction of a singular root can be closed again there."""
+    matrix = np.vstack([2.0 * np.einsum("rij,j->ri", system, point), point])
+    start = point + _STRIDE * np.linalg.svd(matrix)[2][-1]
+    x = start / np.linalg.norm(start)
+    for _ in range(20):
+        half = np.einsum("rij,j->ri", system, x)
+        x = x - np.linalg.lstsq(np.vstack([2.0 * half, x]), np.append(half @ x, 0.0), rcond=1e-6)[0]
+        x = x / np.linalg.norm(x)
+    closes = _measure_closures(system, x[None])[0] < _CLOSED
+    return bool(closes and np.linalg.norm(x - point) > 0.3 * _STRIDE)
+
+
+def find_coordinates(model: Model, points: Array) -> Array:
+    """Compute the motion's coordinates (k, m) of real points (k, n) of a machine's family."""
+    quadrics = make_machine_quadrics(model)
+    rotations, origins = compute_frames(points @ quadrics.family.hull)
+    columns = model.structure.coordinates_of(
+        [[rotations[:, i, j] for j in range(3)] for i in range(3)], list((origins * quadrics.size).T)
+    )
+    return np.ascontiguousarray(np.stack(np.broadcast_arrays(*columns), 1))

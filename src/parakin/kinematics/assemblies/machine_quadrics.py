@@ -1,0 +1,105 @@
+"""A machine's closures as quadrics, and its own generic member."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from typing import NamedTuple
+
+import numpy as np
+
+from ...algebra import Trace, derivative, evaluate_trace
+from ...arrays import Array
+from ...model.traces import Model
+from .generic_member import GenericMember, find_generic_member
+from .path_tracking import align_members, track_members
+from .quadric_family import Complex, QuadricFamily, draw_complex
+from .study import make_closure_quadrics
+
+_SEED = 3
+_SAMPLES = 60  # of joints
+_VARIES = 1e-9  # of the greatest singular value: a number that depends on the joints
+_AT_INFINITY = 1e-6  # |e| of a point of length one, in the machine's size
+_FORM = 1e-9  # a closure is a sphere or a plane within this, of its size
+
+
+class MachineQuadrics(NamedTuple):
+    """What turns joints into a system of quadrics, lengths in ``size``.
+
+    matrices : (closures, 5, n, n) of |p|², p's coordinates and 1 for each closure's platform point
+    trace, numbers : the five numbers of every closure, from zeros for the point and the joints
+    member : with the machine's own platform and feet and generic complex numbers for what depends on the joints
+    """
+
+    family: QuadricFamily
+    matrices: Array
+    trace: Trace
+    numbers: list[object]
+    size: float
+    member: GenericMember
+
+    def make_systems(self, joints: Array) -> Complex:
+        """Make the systems (N, n - 1, n, n) of rows of joints (N, joints)."""
+        return self.family.make_member(self.combine(self.compute_numbers(joints)))
+
+    def compute_numbers(self, joints: Array) -> Array:
+        """Compute the closures' numbers, (N, closures, 5): factors of |p|², of p's coordinates, and the rest."""
+        values = evaluate_trace(self.trace, self.numbers, [0.0, 0.0, 0.0, *joints.T])
+        columns = np.stack([np.broadcast_to(np.asarray(v, float), (len(joints),)) for v in values], 1)
+        return columns.reshape(len(joints), -1, 5) / self.size ** np.array([0.0, 1.0, 1.0, 1.0, 2.0])
+
+    def combine(self, numbers: Array | Complex) -> Complex:
+        """Combine the matrices by the closures' numbers (N, closures, 5): (N, closures, n, n), each of length one."""
+        quadrics = np.einsum("ncf,cfij->ncij", numbers, self.matrices)
+        scaled: Complex = quadrics / np.linalg.norm(quadrics, axis=(2, 3), keepdims=True)
+        return scaled
+
+
+@lru_cache(maxsize=32)
+def make_machine_quadrics(model: Model) -> MachineQuadrics:
+    """Make a machine's quadrics, and track the roots of its family's generic member to its own."""
+    family, generic = find_generic_member(tuple(model.spec.motion))
+    trace, numbers, platforms = _list_closure_numbers(model)
+    size = max(model.sizes)
+    matrices = family.hull @ np.array([make_closure_quadrics(p / size) for p in platforms]) @ family.hull.T
+    made = MachineQuadrics(family, matrices, trace, numbers, size, generic)
+    system = family.make_member(made.combine(_draw_numbers(made.compute_numbers(_sample_joints(model)))))
+    first, last = align_members(generic.system, system, len(family.fixed))
+    ends = track_members(first, last, generic.roots)
+    regular = (ends.reached[0] == 1.0) & (np.linalg.norm(ends.points[0] @ family.hull[:, :4], axis=1) > _AT_INFINITY)
+    return made._replace(member=GenericMember(last[0], ends.points[0][regular]))
+
+
+def _list_closure_numbers(model: Model) -> tuple[Trace, list[object], list[Array]]:
+    """List the five numbers of every closure as a trace, and the platform point of each."""
+    trace = Trace()
+    point, joints = list(trace.inputs(3)), trace.inputs(len(model.drives), 3)
+    by_name = {drive.name: q for drive, q in zip(model.drives, joints, strict=True)}
+    numbers: list[object] = []
+    platforms = []
+    for leg in model.spec.legs:
+        for closure in leg.closures(tuple(point), [by_name[drive.name] for drive in leg.drives]):
+            slopes = [derivative(closure, x) for x in point]
+            numbers += [0.5 * derivative(slopes[0], point[0]), *slopes, closure]
+            platforms.append(np.array(leg.platform, float))
+    return trace, numbers, platforms
+
+
+def _sample_joints(model: Model) -> Array:
+    """Sample joints within their ranges."""
+    rng = np.random.default_rng(_SEED)
+    size = max(model.sizes)
+    low = np.array([drive.low if np.isfinite(drive.low) else -size for drive in model.drives])
+    high = np.array([drive.high if np.isfinite(drive.high) else size for drive in model.drives])
+    return rng.uniform(low, high, (_SAMPLES, len(low)))
+
+
+def _draw_numbers(samples: Array) -> Complex:
+    """Draw generic complex numbers, (1, closures, 5), from the affine span of samples of each closure's."""
+    rng = np.random.default_rng(_SEED)
+    drawn: Complex = samples.mean(0)[None].astype(np.complex128)
+    for closure in range(samples.shape[1]):
+        _, values, basis = np.linalg.svd(samples[:, closure] - samples[:, closure].mean(0), full_matrices=False)
+        own = values > _VARIES * max(np.abs(samples[:, closure]).max(), 1e-300)
+        spread = values[own] / np.sqrt(len(samples))
+        drawn[0, closure] += (draw_complex(rng, int(own.sum())) * spread * 2.0) @ basis[own]
+    return drawn

@@ -1,0 +1,61 @@
+"""Homotopies between members of a family, and where their paths end."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...arrays import Flags
+from ...kernels.batch import run_in_threads
+from ...kernels.homotopy import LENIENT, STRICT, PathEnds
+from .quadric_family import Complex
+
+_SAME = 1e-8  # 1 - cos of the angle of two points of projective space that are the same
+_PATHS_A_THREAD = 16
+
+
+def align_members(first: Complex, last: Complex, fixed: int) -> tuple[Complex, Complex]:
+    """Combine the closures of both systems so that they differ little: the same roots, and shorter paths.
+
+    Each system's closures become orthonormal; the first one's are turned onto the last one's (Procrustes).
+
+    first : (n - 1, n, n); last : (systems, n - 1, n, n)
+    fixed : how many quadrics of each come first and stay as they are
+    """
+    count, n = last.shape[1] - fixed, last.shape[2]
+    rows = np.linalg.qr(first[fixed:].reshape(count, -1).T)[0].T
+    goal = np.linalg.qr(last[:, fixed:].reshape(len(last), count, -1).swapaxes(1, 2))[0].swapaxes(1, 2)
+    left, _, right = np.linalg.svd(goal @ rows.conj().T)
+    begin, end = np.empty_like(last), np.empty_like(last)
+    begin[:, :fixed], end[:, :fixed] = first[:fixed], last[:, :fixed]
+    begin[:, fixed:] = ((left @ right) @ rows).reshape(-1, count, n, n)
+    end[:, fixed:] = goal.reshape(-1, count, n, n)
+    return begin, end
+
+
+def track_members(first: Complex, last: Complex, starts: Complex, tolerance: float = LENIENT) -> PathEnds:
+    """Track all paths from the roots ``starts`` (paths, n) of ``first`` to ``last`` (systems, n - 1, n, n).
+
+    first : (systems, n - 1, n, n)
+
+    Where two paths of a system end in one regular root, one has jumped onto the other; both are tracked once more in
+    shorter steps.
+    """
+    from ...kernels.homotopy import track_paths
+
+    shape = (len(last), *starts.shape)
+    ends = PathEnds(np.empty(shape, np.complex128), np.empty(shape[:2]))
+    ends.points[:] = starts
+    run_in_threads(shape[0] * shape[1], lambda a, b: track_paths(first, last, tolerance, ends, a, b), _PATHS_A_THREAD)
+    if tolerance > STRICT:
+        for system in np.flatnonzero(find_meetings(ends).any(1)):
+            again = track_members(first[system : system + 1], last[system : system + 1], starts, STRICT)
+            ends.points[system], ends.reached[system] = again.points[0], again.reached[0]
+    return ends
+
+
+def find_meetings(ends: PathEnds) -> Flags:
+    """Find paths (systems, paths) that end in the same regular root as another one of their system."""
+    products = np.abs(ends.points.conj() @ ends.points.swapaxes(1, 2)) >= 1.0 - _SAME
+    regular = ends.reached == 1.0
+    products &= regular[:, :, None] & regular[:, None, :]
+    return np.asarray(products.sum(2) > 1)

@@ -1,0 +1,138 @@
+"""What is answered of all assemblies of one joint vector."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ...arrays import Array, Flags
+from ...model.traces import Model
+from ..assembly_side import bound_determinant, find_angle_signs
+from ..closure_roots import compute_closure_tolerance, compute_poses, find_roots
+from ..inverse import SINGULAR
+from ..limit_margins import find_broken_limits
+from ..wrist.pole_thresholds import is_upright
+from .closed_forms import LONGEST, find_closed_form, solve_closed_form
+from .continuation import find_coordinates, find_real_roots
+from .machine_quadrics import make_machine_quadrics
+from .root_boxes import prove_roots
+from .study import compute_study_points
+
+CLOSED_FORM = "proved (closed form)"
+ALL_PATHS = "all paths accounted for"
+NOT_COMPLETE = "not complete"
+
+
+@dataclass(frozen=True)
+class Assemblies:
+    """Every real pose of one joint vector.
+
+    poses : (k, axes)
+    residuals : (k,) the greatest closure, mm
+    radii : (k, 2) within what distance of its pose's the exact platform's origin lies, mm, and its turn, rad, by
+        Krawczyk's test; NaN where there is no proof, as at a singularity, where two poses meet
+    sides : (k,) the sign of det A, 0 at a singularity
+    within_limits : (k,) where the pose keeps every limit
+    complete : :data:`CLOSED_FORM`, :data:`ALL_PATHS` of a homotopy, or :data:`NOT_COMPLETE`
+    complex_count : solutions that are not real; None of a closed form
+    infinite_count : paths that ended at infinity; None of a closed form
+    lost_count : paths that could not be followed; None of a closed form
+    untold_count : real solutions that no pose of this machine tells: its platform hangs there the other way round
+    """
+
+    poses: Array
+    residuals: Array
+    radii: Array
+    sides: Array
+    within_limits: Flags
+    complete: str
+    complex_count: int | None = None
+    infinite_count: int | None = None
+    lost_count: int | None = None
+    untold_count: int = 0
+
+    def __len__(self) -> int:
+        return len(self.poses)
+
+    def __repr__(self) -> str:
+        return f"<{len(self)} assemblies, {self.complete}>"
+
+
+def find_assemblies(model: Model, joints: Array) -> Assemblies:
+    """Find every real pose of one row of joints (1, joints).
+
+    Machines that only translate on three (two) rods have two: the common points of spheres (circles). Three rods in a
+    plane have up to six, three Lambda legs on parallel shafts up to twelve. All others are systems of quadrics in
+    Study's parameters, whose roots are those of a generic one, tracked to it.
+
+    Raises :class:`NoMethodError` for a continuum of poses.
+    """
+    method = find_closed_form(model)
+    if not (np.abs(joints) < LONGEST).all():
+        return _describe(model, joints, np.empty((0, len(model.structure.coordinates))), CLOSED_FORM)
+    if method is not None:
+        return _describe(model, joints, solve_closed_form(model, method, joints), CLOSED_FORM)
+    roots = find_real_roots(model, joints)
+    complete = NOT_COMPLETE if roots.lost_count else ALL_PATHS
+    return replace(
+        _describe(model, joints, find_coordinates(model, roots.points), complete),
+        complex_count=roots.complex_count,
+        infinite_count=roots.infinite_count,
+        lost_count=roots.lost_count,
+    )
+
+
+def _describe(model: Model, joints: Array, coordinates: Array, complete: str) -> Assemblies:
+    """Polish coordinates (k, m) of solutions, and tell all that is known of them."""
+    given = np.ascontiguousarray(np.broadcast_to(joints, (len(coordinates), joints.shape[1])))
+    roots = find_roots(model, np.ascontiguousarray(coordinates), given, poses=False)
+    residuals = roots.residual
+    closed = residuals <= compute_closure_tolerance(model)
+    poses = compute_poses(model, np.ascontiguousarray(roots.rows), given)
+    told = np.isfinite(poses).all(1)
+    direction = model.structure.direction
+    if direction is not None:
+        poses[is_upright(poses[:, direction.b]), direction.c] = 0.0
+    kept = np.flatnonzero(closed & told)
+    kept = kept[np.lexsort(poses[kept].T[::-1])]
+    poses, given = np.ascontiguousarray(poses[kept]), given[: len(kept)]
+    return Assemblies(
+        poses,
+        residuals[kept],
+        _prove_poses(model, joints, roots.rows[kept]),
+        _find_signs(model, poses, given),
+        find_broken_limits(model, poses, given, model.mode) == 0,
+        complete if closed.all() or complete == CLOSED_FORM else NOT_COMPLETE,
+        untold_count=int((closed & ~told).sum()),
+    )
+
+
+def _find_signs(model: Model, poses: Array, joints: Array) -> Array:
+    """Find the sign of det A at poses with these joints, 0 at a singularity."""
+    determinants = find_roots(model, poses, joints, most=0, side=np.ones(1)).turned
+    determinants[~(np.abs(determinants) > SINGULAR * bound_determinant(model))] = 0.0
+    return np.sign(determinants * find_angle_signs(model, poses))
+
+
+def _prove_poses(model: Model, joints: Array, coordinates: Array) -> Array:
+    """Bound how far poses of the motion's coordinates (k, m) are from exact ones, as :attr:`Assemblies.radii`."""
+    quadrics = make_machine_quadrics(model)
+    if not len(coordinates):
+        return np.empty((0, 2))
+    rotation, origin = model.structure.frame(list(coordinates.T))
+    entries = np.stack(
+        np.broadcast_arrays(*(entry for row in rotation for entry in row), *origin, coordinates[:, 0]), 1
+    )
+    rotations, origins = entries[:, :9].reshape(-1, 3, 3), entries[:, 9:12]
+    points = compute_study_points(rotations, origins / quadrics.size) @ quadrics.family.hull.T
+    points /= np.linalg.norm(points, axis=1, keepdims=True)
+    system = quadrics.make_systems(joints)[0].real
+    width = prove_roots(np.broadcast_to(system, (len(points), *system.shape)), points) * np.sqrt(points.shape[1])
+    x = points @ quadrics.family.hull
+    e, g = np.linalg.norm(x[:, :4], axis=1), np.linalg.norm(x[:, 4:], axis=1)
+    with np.errstate(invalid="ignore"):
+        least = e - width
+        turn = np.where(least > 0.0, 4.0 * width / least, np.nan)
+        move = np.where(least > 0.0, 2.0 * width / least * (1.0 + 2.0 * (g + width) / least), np.nan)
+    return np.stack([move * quadrics.size, turn], 1)

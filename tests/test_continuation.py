@@ -1,0 +1,218 @@
+"""All assemblies by homotopy: against closed forms, published counts, other programs, and roots in longer numbers."""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+import subprocess
+
+import numpy as np
+import pytest
+
+import parakin as pk
+from parakin.kinematics.assemblies.continuation import find_coordinates, find_real_roots
+from parakin.kinematics.assemblies.generic_member import find_generic_member, measure_trace
+from parakin.kinematics.assemblies.machine_quadrics import make_machine_quadrics
+from parakin.kinematics.assemblies.root_boxes import prove_roots
+
+# P. Dietmaier, The Stewart-Gough platform of general geometry can have 40 real postures (1998): feet, platform, lengths
+# in m, and all forty solutions are real.
+FEET = [
+    [0.0, 0.0, 0.0],
+    [1.107915, 0.0, 0.0],
+    [0.549094, 0.756063, 0.0],
+    [0.735077, -0.223935, 0.525991],
+    [0.514188, -0.526063, -0.368418],
+    [0.590473, 0.094733, -0.205018],
+]
+CORNERS = [
+    [0.0, 0.0, 0.0],
+    [0.542805, 0.0, 0.0],
+    [0.956919, -0.528915, 0.0],
+    [0.665885, -0.353482, 1.402538],
+    [0.478359, 1.158742, 0.107672],
+    [-0.137087, -0.235121, 0.353913],
+]
+LENGTHS = [1000.0, 645.275, 1086.284, 1503.439, 1281.933, 771.071]
+
+
+def platform(folder, feet, corners, home=(0.0, 0.0, 0.9, 0.3, 0.2, 0.1)):
+    """Write a general six-strut platform, sizes in m, and load it."""
+    lists = ["[" + ", ".join("[" + ", ".join(f"{v!r} m" for v in p) + "]" for p in points) + "]" for points in
+             (np.asarray(feet).tolist(), np.asarray(corners).tolist())]  # fmt: skip
+    values = ", ".join(f"{a}: {v} {'m' if a in 'XYZ' else 'rad'}" for a, v in zip("XYZABC", home, strict=True))
+    path = folder / "platform.yaml"
+    path.write_text(
+        "name: platform\nsource: drawn\nmotion: tx ty tz rz ry rx\nlegs:\n  kind: length\n"
+        f"  joints: [a, b, c, d, e, f]\n  foot: {lists[0]}\n  platform: {lists[1]}\n  range: [1 mm, 9 m]\n"
+        f"home: {{{values}}}\n"
+    )
+    return pk.load(path)
+
+
+def draw_platform(rng):
+    return rng.uniform(-1.0, 1.0, (6, 3)), rng.uniform(-1.0, 1.0, (6, 3))
+
+
+def test_the_published_platform_has_forty_real_poses(tmp_path):
+    found = platform(tmp_path, FEET, CORNERS).assemblies(LENGTHS)
+    assert (len(found), found.complex_count, found.infinite_count, found.lost_count) == (40, 0, 0, 0)
+    assert found.complete == "all paths accounted for"
+    assert np.isfinite(found.radii).all()
+    assert found.radii[:, 0].max() < 1e-4
+
+
+@pytest.mark.parametrize(
+    ("motion", "count"),
+    [
+        ("tx ty rz", 6),  # Gosselin, Sefrioui and Richard, 1992
+        ("tx ty tz", 2),  # three spheres
+        ("rz ry rx", 8),  # Innocenti and Parenti-Castelli, 1993
+        ("tx ty tz rz ry rx", 40),  # Ronga and Vust, 1992
+    ],
+)
+def test_families_have_as_many_solutions_as_is_published(motion, count):
+    family, member = find_generic_member(tuple(motion.split()))
+    assert len(member.roots) == count
+    rng = np.random.default_rng(5)
+    assert measure_trace(family, member, rng) < 1e-9
+    assert measure_trace(family, member._replace(roots=member.roots[1:]), rng) > 1e-4
+
+
+def test_general_platforms_have_forty_and_the_true_pose_is_among_them(tmp_path):
+    rng = np.random.default_rng(6)
+    for _ in range(12):
+        pose = np.append(rng.uniform(-0.5, 0.5, 2), [rng.uniform(0.8, 2.0), *rng.uniform(-0.6, 0.6, 3)])
+        machine = platform(tmp_path, *draw_platform(rng), home=pose)
+        found = machine.assemblies(machine.inverse(machine.home))
+        assert len(found) + found.complex_count == 40
+        assert (found.infinite_count, found.lost_count, len(found) % 2) == (0, 0, 0)
+        assert np.abs(found.poses - machine.home).max(1).min() < 1e-6
+        assert np.isfinite(found.radii).all()
+
+
+@pytest.mark.parametrize("name", [name for name in pk.machines() if name not in ("hexapod", "tricept")])
+def test_closed_forms_find_the_same(name):
+    machine = pk.load(name)
+    rng = np.random.default_rng(7)
+    spread = np.where(np.array(machine.axis_units) == "mm", 60.0, 0.15)
+    for pose in machine.home + rng.uniform(-1.0, 1.0, (8, len(machine.axes))) * spread:
+        joints = machine.inverse(pose)
+        if not np.isfinite(joints).all():
+            continue
+        roots = find_real_roots(machine.model, joints[None])
+        assert roots.lost_count == 0
+        frames = [machine.model.structure.frame(c) for c in find_coordinates(machine.model, roots.points).tolist()]
+        origins = np.array([np.asarray(origin, float) for _, origin in frames])
+        closed = machine.assemblies(joints)
+        assert len(closed) + closed.untold_count == len(origins)
+        own = [machine.model.structure.place_with_joints(list(p), joints[machine.model.leg_count :]).origin
+               for p in closed.poses.tolist()]  # fmt: skip
+        for origin in np.array(own, float):
+            assert np.linalg.norm(origins - origin, axis=1).min() < 1e-6
+
+
+def test_boxes_hold_the_root_in_longer_numbers(tmp_path):
+    machine = platform(tmp_path, FEET, CORNERS)
+    quadrics = make_machine_quadrics(machine.model)
+    roots = find_real_roots(machine.model, np.array([LENGTHS])).points
+    system = quadrics.make_systems(np.array([LENGTHS]))[0].real
+    widths = prove_roots(np.broadcast_to(system, (len(roots), *system.shape)), roots)
+    assert np.isfinite(widths).all()
+    long = system.astype(np.longdouble)
+    for root, width in zip(roots, widths, strict=True):
+        x, inverse = root.astype(np.longdouble), np.linalg.inv(np.vstack([2.0 * system @ root, root]))
+        for _ in range(30):  # Newton's method with a kept matrix: the residual alone has to be exact
+            value = np.append((long @ x) @ x, np.longdouble(root @ root) - np.longdouble(1.0) + 0.0)
+            value[-1] = (x - root.astype(np.longdouble)) @ root
+            x = x - inverse.astype(np.longdouble) @ value
+        assert np.abs(x - root).max() <= width
+        moved = root + 20.0 * width * np.linalg.svd(np.vstack([2.0 * system @ root, root]))[2][-1]
+        assert not prove_roots(system[None], moved[None])[0] <= 5.0 * width  # a point beside it is no root to rounding
+
+
+def test_joints_at_a_singularity_have_a_double_root(tmp_path):
+    """Two rods and a strut in a plane, and a pose on the curve det A = 0, found by bisection."""
+    machine = platform(tmp_path, FEET, CORNERS)
+    poses = machine.assemblies(LENGTHS).poses
+    sides = machine.sides(poses)
+    low, high = poses[np.argmax(sides > 0.0)], poses[np.argmax(sides < 0.0)]
+    for _ in range(60):
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if machine.sides(middle[None])[0] > 0.0 else (low, middle)
+    found = machine.assemblies(machine.inverse(low))
+    near = np.abs(found.poses - low).max(1) < 1.0
+    assert near.any()
+    assert len(found) + found.complex_count + found.lost_count + found.infinite_count >= 38
+
+
+def test_an_architecture_that_is_singular_everywhere_is_named(tmp_path):
+    angles = np.radians([0, 60, 120, 180, 240, 300])
+    feet = np.column_stack([np.cos(angles), np.sin(angles), np.zeros(6)])
+    with pytest.warns(pk.errors.SingularHomeWarning):
+        machine = platform(tmp_path, feet, 0.5 * feet)
+    with pytest.raises(pk.NoMethodError, match="continuum"):
+        machine.assemblies(machine.inverse(machine.home))
+
+
+PHC = shutil.which("phc")
+
+
+def write_phc_system(feet, corners, lengths):
+    """Write a platform's equations for PHCpack in Study's parameters s + u·i + v·j + w·k and d + x·i + y·j + z·k.
+
+    Of the point c in the frame of the platform and the foot a: 4|d, x, y, z|² + ... as Husty (1996) has them.
+    """
+    square = "(s^2+u^2+v^2+w^2)"
+    turn = [
+        ["(s^2+u^2-v^2-w^2)", "(2*u*v-2*s*w)", "(2*u*w+2*s*v)"],
+        ["(2*u*v+2*s*w)", "(s^2-u^2+v^2-w^2)", "(2*v*w-2*s*u)"],
+        ["(2*u*w-2*s*v)", "(2*v*w+2*s*u)", "(s^2-u^2-v^2+w^2)"],
+    ]
+    moved = ["(s*x-u*d+v*z-w*y)", "(s*y-v*d+w*x-u*z)", "(s*z-w*d+u*y-v*x)"]  # half the place, times the square
+    turned = ["(s*x-u*d-v*z+w*y)", "(s*y-v*d-w*x+u*z)", "(s*z-w*d-u*y+v*x)"]  # the same in the platform's frame
+    lines = ["s*d+u*x+v*y+w*z;", "0.31*s-0.57*u+0.83*v+0.42*w+0.29*d-0.61*x+0.74*y-0.38*z-1;"]
+    for a, c, length in zip(np.asarray(feet), np.asarray(corners), lengths, strict=True):
+        terms = [f"4*(d^2+x^2+y^2+z^2){a @ a + c @ c - length**2:+.17g}*{square}"]
+        terms += [f"{-4.0 * a[i]:+.17g}*{moved[i]}{4.0 * c[i]:+.17g}*{turned[i]}" for i in range(3)]
+        terms += [f"{-2.0 * a[i] * c[j]:+.17g}*{turn[i][j]}" for i in range(3) for j in range(3)]
+        lines.append("".join(terms) + ";")
+    return "8\n" + "\n".join(lines) + "\n"
+
+
+def read_phc_places(text):
+    """Read all finite solutions' places, 2·g·e*/|e|², (k, 3) complex, each once."""
+    points, places = [], []
+    for block in text[text.rindex("THE SOLUTIONS") :].split("the solution for t :")[1:]:
+        numbers = re.findall(r"^ (\w) : +(\S+) +(\S+)", block, re.M)[:8]
+        values = {name: complex(float(real), float(imaginary)) for name, real, imaginary in numbers}
+        x = np.array([values[name] for name in "suvwdxyz"])
+        x = x / np.linalg.norm(x)
+        if abs(x[:4] @ x[:4]) > 1e-4 and not any(abs(np.vdot(x, y)) > 1.0 - 1e-9 for y in points):
+            points.append(x)
+            s, u, v, w, d, a, b, c = x
+            moved = [s * a - u * d + v * c - w * b, s * b - v * d + w * a - u * c, s * c - w * d + u * b - v * a]
+            places.append(2.0 * np.array(moved) / (x[:4] @ x[:4]))
+    return np.array(places)
+
+
+@pytest.mark.skipif(PHC is None, reason="PHCpack is not installed")
+def test_phcpack_finds_the_same_poses(tmp_path):
+    """PARAKIN_PLATFORMS says how many platforms are compared. PHCpack loses a solution now and then."""
+    rng = np.random.default_rng(8)
+    for number in range(int(os.environ.get("PARAKIN_PLATFORMS", "1"))):
+        pose = np.append(rng.uniform(-0.5, 0.5, 2), [rng.uniform(0.8, 2.0), *rng.uniform(-0.6, 0.6, 3)])
+        feet, corners = draw_platform(rng)
+        machine = platform(tmp_path, feet, corners, home=pose)
+        lengths = machine.inverse(machine.home)
+        system, out = tmp_path / f"{number}.in", tmp_path / f"{number}.out"
+        system.write_text(write_phc_system(feet, corners, lengths / 1000.0))
+        subprocess.run([PHC, "-b", system, out], check=True, capture_output=True, timeout=300)
+        theirs = read_phc_places(out.read_text())
+        real = theirs[np.abs(theirs.imag).max(1) < 1e-6].real
+        found = machine.assemblies(lengths)
+        apart = np.linalg.norm(found.poses[:, None, :3] / 1000.0 - real, axis=2)
+        assert len(theirs) <= 40
+        assert (apart.min(0) < 1e-6).all()  # none that we do not know
+        assert len(real) == len(found) or len(theirs) < 40

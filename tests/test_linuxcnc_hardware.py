@@ -9,6 +9,7 @@ import sys
 from functools import cache
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import parakin as pk
@@ -16,15 +17,21 @@ from parakin.cli import main
 from parakin.controllers import Hardware
 from parakin.controllers.linuxcnc.config import write_hal, write_ini
 from parakin.controllers.linuxcnc.hardware import CARDS, equip_machine
+from parakin.controllers.linuxcnc.home_pose import find_home_pose
+from parakin.controllers.linuxcnc.homing import find_homing
+from parakin.controllers.linuxcnc.homing.starts import compute_other_margins, compute_regularity, sample_starts
+from parakin.controllers.linuxcnc.model_header import LEAST_REGULARITY
 from parakin.controllers.linuxcnc.page import write_page
 
 sys.path.insert(0, str(Path(__file__).parent / "linuxcnc"))
 from cards import check_wiring, exports_of, merge, programs, write_mock
-from simulation import ALONE, AS_NOBODY, simulated, trial, why_not
+from parport_machine import driven_by_parport
+from simulation import ALONE, AS_NOBODY, FIELDS, MODULES, simulated, trial, why_not
 
 NAMES = pk.machines()
 EACH = [(name, card) for name in NAMES for card in CARDS]
 PROGRAMS = ("loadusr", "source")
+REALTIME = "/usr/lib/linuxcnc/realtime"
 WHY_NOT = why_not()
 real = pytest.mark.skipif(bool(WHY_NOT), reason=WHY_NOT)
 
@@ -152,37 +159,101 @@ def test_the_command_writes_a_template(tmp_path, capsys):
         assert word in page
 
 
+def replace_drivers(machine, hal):
+    """The template without what needs a card or a program of LinuxCNC's; trial_card exports in their place."""
+    lines = ["loadrt homemod", "loadrt tpmod", "loadrt trial_card"]  # the first two by LinuxCNC itself
+    for line in hal.split("\n"):
+        if line.startswith("loadrt hal_parport"):
+            names = ",".join(f"parport.{i}" for i in range(line.count(" out") + line.count(" in")))
+            lines.append(f"loadrt sim_parport names={names}")
+        elif not line.startswith(("loadrt hostmot2", "loadrt hm2_eth", "loadrt lcec", "loadrt cia402", *PROGRAMS)):
+            lines.append(line)
+    return "\n".join(lines)
+
+
+def load_hal(machine, card, folder):
+    """Load a card's HAL file with the real halcmd; return the process."""
+    files = pk.make_linuxcnc_configuration(machine, card)
+    exports = programs() if card == "parport" else merge(exports_of(files, machine.name), programs())
+    exports.pins |= {f"ENCODER-{joint}": ("float", "OUT") for joint in machine.joints}
+    (folder / "trial_card.c").write_text(write_mock("trial_card", exports), encoding="utf-8")
+    (folder / "card.ini").write_text(files[f"{machine.name}.ini"], encoding="utf-8")
+    (folder / "card.hal").write_text(replace_drivers(machine, files[f"{machine.name}.hal"]), encoding="utf-8")
+    load = f"{REALTIME} start && halcmd -i card.ini -f card.hal && halcmd show thread"
+    try:
+        subprocess.run(["halcompile", "--install", "trial_card.c"], cwd=folder, check=True, capture_output=True)
+        command = [*ALONE, *AS_NOBODY, f"HOME={folder}", "sh", "-c", f"{load}; code=$?; halrun -U; exit $code"]
+        return subprocess.run(command, cwd=folder, capture_output=True, text=True, timeout=60)
+    finally:
+        (MODULES / "trial_card.so").unlink(missing_ok=True)
+
+
 @real
-@pytest.mark.parametrize("card", CARDS)
 @pytest.mark.parametrize("name", ["tricept", "hexapod"])
-def test_hal_takes_it(name, card, tmp_path):
+def test_hal_takes_every_card(name, tmp_path):
     """The real halcmd joins all pins: of the real motion controller, loops and ports, and of the driver's documents."""
     machine = trial(name, tmp_path)
-    files = pk.make_linuxcnc_configuration(machine, card)
-    exports = merge(exports_of(files, machine.name), programs())
-    if card == "parport":
-        exports = programs()
-    for joint in machine.joints:
-        exports.pins[f"ENCODER-{joint}"] = ("float", "OUT")
-    hal = ["loadrt trial_card"]
-    for line in files[f"{machine.name}.hal"].split("\n"):
-        if not line.startswith(
-            ("loadrt hostmot2", "loadrt hm2_eth", "loadrt lcec", "loadrt cia402", "loadusr", "source")
-        ):
-            ports = line.count(" out") + line.count(" in")
-            names = ",".join(f"parport.{i}" for i in range(ports))
-            hal.append(f"loadrt sim_parport names={names}" if line.startswith("loadrt hal_parport") else line)
     with simulated(machine) as simulation:
-        folder = simulation.folder
-        (folder / "trial_card.c").write_text(write_mock("trial_card", exports), encoding="utf-8")
-        (folder / "card.ini").write_text(files[f"{machine.name}.ini"], encoding="utf-8")
-        (folder / "card.hal").write_text("\n".join(hal), encoding="utf-8")
-        start = "realtime start && halcmd -i card.ini -f card.hal && halcmd show thread"
-        try:
-            subprocess.run(["halcompile", "--install", "trial_card.c"], cwd=folder, check=True, capture_output=True)
-            command = [*ALONE, *AS_NOBODY, f"HOME={folder}", "sh", "-c", f"{start}; code=$?; halrun -U; exit $code"]
-            done = subprocess.run(command, cwd=folder, capture_output=True, text=True, timeout=60)
-        finally:
-            Path("/usr/lib/linuxcnc/modules/trial_card.so").unlink(missing_ok=True)
-    assert done.returncode == 0, done.stdout + done.stderr
-    assert "servo-thread" in done.stdout
+        for card in CARDS:
+            done = load_hal(machine, card, simulation.folder)
+            assert done.returncode == 0, card + done.stdout + done.stderr
+            assert "motion-controller" in done.stdout
+
+
+def choose_start(machine):
+    """Joints from which homing is tried: tilted or aside, with little way to the switches, in far corners else."""
+    starts, plan = sample_starts(machine), find_homing(machine)
+    switched = [i for i, joint in enumerate(plan.joints) if joint.switch is not None]
+    if not switched:
+        return starts.joints[0], starts.poses[0]
+    travel = [drive.high - drive.low for drive in machine.drives]
+    far = np.abs(starts.joints - [joint.switch or 0.0 for joint in plan.joints]) / travel
+    spread = np.ptp(starts.joints[:, : machine.leg_count], axis=1) / max(travel)
+    best = int((spread - 2.0 * far[:, switched].max(1)).argmax())
+    return starts.joints[best], starts.poses[best]
+
+
+def follow(machine, rows, pose):
+    """The poses (n, axes) that joints (n, joints) pull the machine to, from one on; every step must close."""
+    poses = []
+    for joints in rows:
+        solution = machine.forward(joints, near=pose)
+        assert solution.converged, joints
+        pose = solution.poses
+        poses.append(pose)
+    return np.array(poses)
+
+
+@real
+@pytest.mark.parametrize("name", ["linear_delta", "tricept", "hexapod"])
+def test_homing_keeps_off_singularities(name, tmp_path):
+    """LinuxCNC homes the template: the joints go home on home's side of all singularities, and it knows the pose."""
+    machine = trial(name, tmp_path)
+    joints, pose = choose_start(machine)
+    plan, home = find_homing(machine), machine.inverse(find_home_pose(machine))
+    turning = np.array(machine.joint_units) == "rad"
+    switched = np.array([joint.switch is not None for joint in plan.joints])
+    with driven_by_parport(machine, joints) as simulation:
+        (seen,), rows = simulation.operate([["mdi", "G21 G90"]])
+    places = np.where(turning, np.radians(rows[:, 1:]), rows[:, 1:])
+    assert np.abs(places[0] - joints).max() < 1e-5
+    assert rows[-1, 0] == 1.0
+    expected = np.where(switched, home, joints)
+    assert np.abs(places[-1] - expected)[~turning].max() < 0.06  # a step, and a cycle of looking for the switch
+    assert np.abs(places[-1] - expected)[turning].max(initial=0.0) < np.radians(0.06)
+    told = np.where(turning, np.radians(seen["joints"]), seen["joints"])
+    assert np.abs(told - places[-1])[~turning].max() < 0.06
+    if switched[: machine.leg_count].any():
+        assert np.abs(places - joints)[:, : machine.leg_count].max() > 50.0  # it did go
+    else:
+        assert np.abs(places - joints).max() < 1e-5
+    moved = np.flatnonzero(np.abs(np.diff(places, axis=0)).max(1) > 0.0)
+    thinned = places[np.unique([0, *moved[::20], len(places) - 1])]
+    poses = follow(machine, thinned, pose)
+    assert np.sign(machine.sides(poses)) == pytest.approx(np.sign(machine.sides(machine.home[None])[0]))
+    assert compute_regularity(machine, poses).min() > LEAST_REGULARITY
+    assert compute_other_margins(machine, poses, thinned).min() >= 0.0
+    shown = [seen["position"][FIELDS.index(axis)] for axis in machine.axes]
+    units = np.where(np.array(machine.axis_units) == "rad", np.pi / 180.0, 1.0)
+    straight = np.array(machine.axis_units) == "mm"
+    assert np.abs(np.array(shown) * units - poses[-1])[straight].max() < 0.3

@@ -136,4 +136,4 @@ def _list_homing(machine: Machine, equipment: Equipment, index: int, homing: Joi
     yield sequence
     if equipment.card.has_steps:
         yield "# steps that were not made while the drive was off are lost"
-        yield "VOLATILE_HOME = YES"
+        yield "VOLATILE_HOME = 1"

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import re
+import time
+import warnings
 from math import isfinite
 
 import pytest
@@ -144,7 +146,7 @@ def test_several_errors_in_line_order(tmp_path):
         (b"a: 1\n\x00\n", "m.yaml:2: holds a character that YAML does not allow, expected text"),
         (b"a: 1\n---\nb: 2\n", "m.yaml:2: not valid YAML: but found another document"),
         (b"a: &x [*x]\n", "m.yaml:1: nested too deeply (does an alias hold itself?)"),
-        (b"[" * 3000, "m.yaml: nested too deeply"),
+        (b"[" * 3000, "m.yaml:1: nested too deeply"),
         (b"x" * 200_000, "m.yaml: longer than 100000 bytes, expected a YAML file of some twenty lines"),
         (
             b"".join(b"%c: &%c [%s]\n" % (c, c, b"*%c,1," % (c - 1) * 8 if c > 97 else b"1") for c in b"abcdef"),
@@ -231,3 +233,28 @@ def test_binary(tmp_path, content):
     path = tmp_path / "f.yaml"
     path.write_bytes(content)
     read_or_refuse(path)
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        "[" * 90_000,
+        "sizes: " + "[" * 5000 + "]" * 5000,
+        "\n".join(f"a{i}: &a{i} [{','.join([f'*a{i - 1}'] * 9) if i else ''}]" for i in range(12)),
+        GOOD.replace("motion: ", "motion: " + "tx " * 20_000),
+        "sizes: {" + ", ".join(f"s{i}: s{i - 1}*1" for i in range(3000, 0, -1)) + "}",
+        "sizes: {a: &x 1 mm, b: &x 2 mm}",
+    ],
+)
+def test_long_and_deep_files_are_refused_shortly_and_soon(tmp_path, content):
+    path = tmp_path / "f.yaml"
+    path.write_text(content)
+    began = time.process_time()
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        with pytest.raises(InputError) as caught:
+            read_machine(path)
+    assert time.process_time() - began < 20.0
+    lines = str(caught.value).split("\n")
+    assert len(lines) <= 31
+    assert all(re.match(r".*\.yaml:\d+: \S", line) and len(line) < 600 for line in lines)

@@ -4,8 +4,12 @@ Each error carries its place and prints as one line: ``place: what is wrong, and
 """
 
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from difflib import get_close_matches
+
+_LONGEST = 400  # letters of a message
+_MOST_LINES = 30  # of a file's mistakes are told
+_MOST_WORDS = 40  # of those that could be meant are told and compared
 
 
 class ParakinError(Exception):
@@ -28,6 +32,7 @@ class InputError(ParakinError):
     """
 
     def __init__(self, message: str, source: str | None = None, line: int | None = None):
+        message = _cut_middle(message)
         self.message, self.source, self.line = message, source, line
         place = source or ""
         if line is not None:
@@ -35,13 +40,22 @@ class InputError(ParakinError):
         super().__init__(f"{place}: {message}" if place else message)
 
 
+def _cut_middle(message: str) -> str:
+    """Cut the middle of a long line, which repeats what is wrong; its end says what was expected."""
+    return message if len(message) <= _LONGEST else f"{message[: _LONGEST // 2]} ... {message[-_LONGEST // 3 :]}"
+
+
 class InputErrors(InputError):
-    """Several input errors found in one pass; ``str()`` is one line each."""
+    """Several input errors found in one pass; ``str()`` is one line each, of many the first ones."""
 
     def __init__(self, errors: list[InputError]):
         self.errors = errors
         super().__init__(errors[0].message, errors[0].source, errors[0].line)
-        self.args = ("\n".join(str(e) for e in errors),)
+        lines = [str(error) for error in errors[:_MOST_LINES]]
+        if len(errors) > _MOST_LINES:
+            last = errors[_MOST_LINES]
+            lines.append(str(InputError(f"and {len(errors) - _MOST_LINES} more mistakes", last.source, last.line)))
+        self.args = ("\n".join(lines),)
 
 
 class DescriptionError(ParakinError):
@@ -83,11 +97,17 @@ def suggest(word: str, known: Iterable[str], others: str = "") -> str:
     """
     words = list(known)
     # Long words are cut: difflib's time grows with the square, and nobody misspells forty letters.
-    close = [w for w in words if w.lower() == word.lower()] or get_close_matches(word[:40], words, 1)
+    close = [w for w in words if w.lower() == word.lower()] or get_close_matches(word[:40], words[:_MOST_WORDS], 1)
     if close:
         return f', did you mean "{close[0]}"?'
-    others = others or (words[0] if len(words) == 1 else "one of " + ", ".join(words) if words else "")
+    others = others or (words[0] if len(words) == 1 else "one of " + join_words(words) if words else "")
     return f", expected {others}" if others else ""
+
+
+def join_words(words: Sequence[str]) -> str:
+    """Join words with commas, of many the first ones."""
+    end = f", ... ({len(words)} in all)" if len(words) > _MOST_WORDS else ""
+    return ", ".join(words[:_MOST_WORDS]) + end
 
 
 class SingularHomeWarning(UserWarning):

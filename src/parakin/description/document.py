@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any, TypeAlias
 
 from ruamel.yaml import YAML
+from ruamel.yaml.composer import Composer
 from ruamel.yaml.error import MarkedYAMLError, YAMLError
 from ruamel.yaml.nodes import MappingNode, ScalarNode, SequenceNode
 from ruamel.yaml.reader import ReaderError
@@ -76,8 +77,12 @@ def read_document(path: Path, source: str) -> tuple[Value, list[InputError]]:
 
 def parse_document(text: str, source: str) -> tuple[Value, list[InputError]]:
     """Parse the text of a YAML file; as :func:`read_document`."""
+    reader = YAML(typ="safe", pure=True)
+    reader.Composer = _BoundedComposer
     try:
-        node = YAML(typ="safe", pure=True).compose(text)
+        node = reader.compose(text)
+    except _NestingError as error:
+        raise InputError("nested too deeply", source, error.line) from None
     except ReaderError as error:
         line = text.count("\n", 0, error.position) + 1
         raise InputError("holds a character that YAML does not allow, expected text", source, line) from None
@@ -85,8 +90,6 @@ def parse_document(text: str, source: str) -> tuple[Value, list[InputError]]:
         mark = error.problem_mark or error.context_mark
         problem = " ".join(str(error.problem or error.context or "syntax error").split())
         raise InputError(f"not valid YAML: {problem}", source, mark.line + 1 if mark else None) from None
-    except RecursionError:
-        raise InputError("nested too deeply", source) from None
     # ruamel raises errors of its own code on some malformed directives and escapes.
     except (YAMLError, ValueError, LookupError, TypeError, AttributeError, AssertionError, OverflowError):
         raise InputError("not valid YAML", source) from None
@@ -94,6 +97,31 @@ def parse_document(text: str, source: str) -> tuple[Value, list[InputError]]:
         raise InputError("empty, expected a machine's description", source, 1)
     builder = _DocumentBuilder(source)
     return builder.build(node, node.start_mark.line + 1, 0), builder.errors
+
+
+class _NestingError(Exception):
+    """A node is nested too deeply, in a line."""
+
+    def __init__(self, line: int):
+        super().__init__(line)
+        self.line = line
+
+
+class _BoundedComposer(Composer):
+    """A composer of nodes that are not nested too deeply, so that a page of brackets takes no time."""
+
+    def __init__(self, loader: Any = None):
+        super().__init__(loader)
+        self.warn_double_anchors = False  # YAML lets an anchor be set anew
+        self._nesting = 0
+
+    def compose_node(self, parent: Any, index: Any) -> Any:
+        if self._nesting > _DEEPEST:
+            raise _NestingError(self.parser.peek_event().start_mark.line + 1)
+        self._nesting += 1
+        node = super().compose_node(parent, index)
+        self._nesting -= 1
+        return node
 
 
 class _DocumentBuilder:

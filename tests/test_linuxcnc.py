@@ -21,7 +21,7 @@ from test_forward import CLOSE, allowed, garbage, legs_regularity, nudged
 import parakin as pk
 from parakin.cli import main
 from parakin.controllers.linuxcnc.home_pose import find_home_pose
-from parakin.controllers.linuxcnc.module import write_module
+from parakin.controllers.linuxcnc.kinematics_module import write_module
 from parakin.kinematics.closure_roots import find_roots
 from parakin.kinematics.wrist.pose_angles import find_nearest_direction
 from parakin.performance.singularities import compute_singularity_margins, list_margin_names

@@ -14,7 +14,7 @@ from scipy.spatial.transform import Rotation
 import parakin as pk
 from parakin.cli import main
 from parakin.toolpath.tool_turn.lattice_search import StepCosts, find_quickest_way, find_widest_margin
-from parakin.toolpath.tool_turn.placement import find_turned_placements
+from parakin.toolpath.tool_turn.turned_placement import find_turned_placements
 
 STEEPEST = 2
 

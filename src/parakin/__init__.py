@@ -11,7 +11,7 @@ from .version import __version__
 
 if TYPE_CHECKING:
     from .controllers.joints.program import make_joint_program
-    from .controllers.joints.reader import JointProgram, read_joint_program
+    from .controllers.joints.program_reader import JointProgram, read_joint_program
     from .controllers.linuxcnc.configuration import make_linuxcnc_configuration
     from .controllers.linuxcnc.program import make_linuxcnc_program
     from .export.files import write_files
@@ -152,7 +152,7 @@ _LAZY = {
     "GridWorkspace": "workspaces.sampled.grid",
     "InscribedBox": "workspaces.inscribed.largest_box",
     "Job": "toolpath.job",
-    "JointProgram": "controllers.joints.reader",
+    "JointProgram": "controllers.joints.program_reader",
     "Machine": "machine",
     "Mesh": "export.workspace.meshes",
     "Placement": "toolpath.placing.placement",
@@ -185,7 +185,7 @@ _LAZY = {
     "make_mesh": "export.workspace.meshes",
     "prepare": "toolpath.job",
     "prepare_turned": "toolpath.turned_job",
-    "read_joint_program": "controllers.joints.reader",
+    "read_joint_program": "controllers.joints.program_reader",
     "read_path": "toolpath.reading.detect",
     "read_tool_table": "toolpath.reading.tool_table",
     "region": "workspaces.certified.region:make_region",

@@ -8,8 +8,8 @@ from pathlib import Path
 
 import numpy as np
 
+from parakin.controllers.linuxcnc.kinematics_module import name_kinematics, write_module
 from parakin.controllers.linuxcnc.model_header import list_limit_names, name_model, write_model
-from parakin.controllers.linuxcnc.module import name_kinematics, write_module
 
 HERE = Path(__file__).parent
 HEADERS = ("rtapi.h", "rtapi_app.h", "rtapi_math.h", "rtapi_string.h", "hal.h", "kinematics.h")

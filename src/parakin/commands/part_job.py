@@ -84,7 +84,7 @@ def prepare_part(
     if place is None:
         return _prepare_at(machine, path, workpiece, options, progress)
     from ..toolpath.placing.placement import find_placements
-    from ..toolpath.tool_turn.placement import find_turned_placements
+    from ..toolpath.tool_turn.turned_placement import find_turned_placements
 
     saying = progress.stage("placing the part", 0.1, 0.3)
     find = find_turned_placements if options.turn == "free" else find_placements

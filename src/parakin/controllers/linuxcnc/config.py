@@ -14,7 +14,7 @@ from .guard import name_guard
 from .hand_box import HandBox, find_hand_box
 from .hardware import Equipment, wiring
 from .home_pose import find_home_pose
-from .module import hash_kinematics, name_kinematics
+from .kinematics_module import hash_kinematics, name_kinematics
 from .number_text import format_number
 from .planner import hash_planner, name_planner
 

@@ -8,8 +8,8 @@ from .config import write_hal, write_ini, write_rates_hal, write_tool_table
 from .first_program import write_first_program
 from .guard import name_guard, write_guard
 from .hardware import equip_machine
+from .kinematics_module import name_kinematics, write_module
 from .model_header import name_model, write_model
-from .module import name_kinematics, write_module
 from .page import write_page
 from .planner import name_planner, write_planner
 from .screen import name_screen, write_axis_settings, write_screen, write_screen_hal

@@ -8,10 +8,10 @@ from ...machine import Machine
 from ...units import to_display
 from .guard import name_guard
 from .hardware import Equipment
-from .hardware.page import describe_equipment, list_files
+from .hardware.hardware_page import describe_equipment, list_files
 from .home_pose import find_home_pose
+from .kinematics_module import name_kinematics
 from .model_header import LEAST_REGULARITY, list_limit_names
-from .module import name_kinematics
 from .number_text import format_number
 from .planner import NO_TOLERANCE, name_planner
 

@@ -9,7 +9,7 @@ from ....units import name_display_unit, to_display
 from ..axis_rates import choose_drive_rates
 from ..home_pose import find_home_pose
 from ..homing import JointHoming
-from ..homing.plan import SEARCH, pace_return
+from ..homing.homing_plan import SEARCH, pace_return
 from ..number_text import format_number
 from . import absolute
 from .equipment import ESTOP, PROBE, Equipment

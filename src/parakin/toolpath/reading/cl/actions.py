@@ -11,13 +11,13 @@ import numpy as np
 from ...path import Event
 from ..text import is_number, parse_number, quote_short, refuse
 from ..tools import ToolLog
-from .arguments import LENGTH_UNITS, parse_feed, parse_numbers, parse_spindle, parse_tool_data
 from .circles import Circle
 from .cycles import DrillCycle, parse_cycle
 from .dialects import DIALECTS, RIGHT, UNKNOWN, DialectName, find_by_comment, find_by_word
 from .drilling import drill_hole
-from .frames import AXIS_TOLERANCE, build_frame, build_frame_from_matrix, normalise_direction
+from .file_frames import AXIS_TOLERANCE, build_frame, build_frame_from_matrix, normalise_direction
 from .motion import ClMotion
+from .word_arguments import LENGTH_UNITS, parse_feed, parse_numbers, parse_spindle, parse_tool_data
 
 _ARC = re.compile(r"TLON,GOFWD/\(?CIRCLE/([^()/]*?)\)?,ON,(?:\d+,INTOF,)?\(?LINE/([^()/]*)\)?", re.ASCII)
 _ARC_FORM = "TLON,GOFWD/(CIRCLE/x,y,z,r),ON,2,INTOF,(LINE/x,y,z,x,y,z)"

@@ -13,7 +13,7 @@ from ....arrays import Array
 from ..arcs import ON_CIRCLE
 from ..text import refuse
 from .dialects import LEFT, RIGHT, UNKNOWN
-from .frames import Triple
+from .file_frames import Triple
 
 _TANGENT = 0.99  # cosine of the angle to a neighbour that joins the arc tangentially
 _SHORTEST = 0.01  # mm: the direction of a shorter neighbour is too rounded to tell

@@ -8,8 +8,8 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from ..text import is_number, parse_number, quote_short, refuse
-from .arguments import FEED_UNITS, parse_numbers
 from .dialects import BELOW, DOWN, HEIGHT, Dialect
+from .word_arguments import FEED_UNITS, parse_numbers
 
 # name of a cycle: how its motion goes
 CYCLES = {

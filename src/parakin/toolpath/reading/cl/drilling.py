@@ -5,7 +5,7 @@ import math
 from ...path import Event
 from ..text import refuse
 from .cycles import DrillCycle
-from .frames import Triple
+from .file_frames import Triple
 from .motion import ClMotion
 
 _SAME_AXIS = 1e-9  # components of two tool axes that are equal

@@ -11,7 +11,6 @@ from ...path import Event
 from ..arcs import find_arc_normal, interpolate_arc, interpolate_axis
 from ..notes import NoteBook
 from ..text import refuse
-from .arguments import FEED_UNITS
 from .circles import (
     Circle,
     OpenArc,
@@ -24,8 +23,9 @@ from .circles import (
 )
 from .cycles import DrillCycle
 from .dialects import RIGHT, UNKNOWN
-from .frames import AXIS_TOLERANCE, MACHINE, SMALLEST_SQUARE, FileTransform, Frame, Triple
+from .file_frames import AXIS_TOLERANCE, MACHINE, SMALLEST_SQUARE, FileTransform, Frame, Triple
 from .records import ClRecords
+from .word_arguments import FEED_UNITS
 
 _HELIX = 0.01  # mm along a circle's axis between an arc's ends; above this the arc is a helix
 _MOST_ARC_POINTS = 5_000_000  # greatest number of points of all arcs of a file: some hundred MB of memory

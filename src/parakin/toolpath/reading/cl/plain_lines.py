@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from ....arrays import Array, Indices
 from ....kernels.compiling import njit
 from ..text import LARGEST
-from .frames import AXIS_TOLERANCE, SMALLEST_SQUARE
+from .file_frames import AXIS_TOLERANCE, SMALLEST_SQUARE
 
 # 10**22 is the last power of ten a double holds exactly. A mantissa up to 2**53 is exact too, so that one division
 # of the two rounds correctly: the result is the one float() gives.

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from .frames import FileTransform
+from .file_frames import FileTransform
 
 _BLOCK = 65536  # rows transformed at a time, so that turning a long path needs no second copy of it
 _FIRST = 1024

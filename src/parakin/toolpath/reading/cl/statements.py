@@ -5,7 +5,7 @@ import re
 from ....errors import InputError
 from ..text import quote_short, refuse
 from .actions import ClActions
-from .arguments import remove_blanks
+from .word_arguments import remove_blanks
 from .words import INFORMING, REFUSED, TEXT_WORDS, WORDS
 
 _TEXT = re.compile(rf"\s*({'|'.join(TEXT_WORDS)})(?![A-Z0-9])", re.IGNORECASE | re.ASCII)

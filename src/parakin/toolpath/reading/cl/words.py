@@ -1,9 +1,9 @@
 """The tables of CL words, of all dialects; what differs between dialects is in :mod:`.dialects`.
 
 To read a new word, add its row to WORDS. If it acts on motion, state or tool, write its method in :mod:`.actions`, with
-the parser of its arguments in :mod:`.arguments`. A word that moves, turns, shifts or compensates and cannot be honoured
-is a row of REFUSED; one that only informs is in INFORMING. Words without a row earn a note and do nothing, but those
-that begin with GO or are one letter off a word that acts are refused.
+the parser of its arguments in :mod:`.word_arguments`. A word that moves, turns, shifts or compensates and cannot be
+honoured is a row of REFUSED; one that only informs is in INFORMING. Words without a row earn a note and do nothing, but
+those that begin with GO or are one letter off a word that acts are refused.
 """
 
 from collections.abc import Callable

@@ -4,7 +4,7 @@ import math
 from collections.abc import Callable
 
 from ..text import INCH, refuse
-from .arcs import PLANES
+from .arc_motion import PLANES
 from .block import round_whole
 from .codes import CYCLES, G17, format_g_code
 from .motion import AXES, CENTRES, GcodeMotion

@@ -8,7 +8,7 @@ import numpy as np
 from ....arrays import Array
 from ..notes import NoteBook
 from ..text import refuse
-from .arcs import PLANES, ArcMotion, Flat, find_arc_centre, interpolate_g_arc
+from .arc_motion import PLANES, ArcMotion, Flat, find_arc_centre, interpolate_g_arc
 from .block import round_whole
 from .codes import G0, G2, G17, format_g_code
 from .records import FEED, LINE, RAPID, SECONDS, SPINDLE, WIDTH, GcodeRecords

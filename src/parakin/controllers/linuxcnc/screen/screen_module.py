@@ -17,7 +17,7 @@ from ..home_pose import find_home_pose
 from ..model_header import format_title
 from .hull import find_workspace_hull, list_hull_lines
 from .limit_words import describe_limits
-from .placement import write_placement
+from .placement_code import write_placement
 
 _HEADER = '''\
 #!/usr/bin/python3

@@ -15,7 +15,7 @@ from .errors import NoMethodError, PoseError
 from .kernels.batch import evaluate_tape, evaluate_tape_with_residual
 from .kinematics.assemblies import Assemblies, find_assemblies
 from .kinematics.assembly_side import find_sides
-from .kinematics.follow import follow_path
+from .kinematics.follow import follow_path, make_continuous
 from .kinematics.forward import solve_forward
 from .kinematics.inverse import solve_inverse
 from .kinematics.limit_margins import compute_margins, find_broken_limits
@@ -114,6 +114,10 @@ class Machine(MachineProperties):
         if len(lead) != 1:
             raise PoseError(f"poses: a path of shape (N, {len(self.axes)}) expected")
         return follow_path(self.model, rows, self.checked_mode(mode), free_below)
+
+    def make_continuous(self, poses: Array, joints: Array, mode: str, free_below: float = EXACT) -> None:
+        """Make joints (n, joints) continuous that :meth:`inverse` gives along a path, as :meth:`follow`; in place."""
+        make_continuous(self.model, poses, joints, mode, free_below)
 
     def forward(
         self,

@@ -13,11 +13,18 @@ from .wrist.turning_joints import find_wrist
 
 
 def follow_path(model: Model, poses: Array, mode: str, free_below: float = EXACT) -> Array:
-    """Solve the inverse problem along a path (n, axes); see :meth:`parakin.Machine.follow`.
+    """Solve the inverse problem along a path (n, axes); see :meth:`parakin.Machine.follow`."""
+    joints = solve_inverse(model, poses, mode)
+    make_continuous(model, poses, joints, mode, free_below)
+    return joints
+
+
+def make_continuous(model: Model, poses: Array, joints: Array, mode: str, free_below: float = EXACT) -> None:
+    """Make joints (n, joints) continuous that the inverse gives along a path (n, axes); in place.
 
     On a path that never leaves the pole the first joint stands as at home.
     """
-    joints, wrist = solve_inverse(model, poses, mode), find_wrist(model)
+    wrist = find_wrist(model)
     if wrist is not None:
         free = wrist.find_free(poses, free_below)
         wrist.cross_pole(poses, mode, joints, ~free)
@@ -27,4 +34,3 @@ def follow_path(model: Model, poses: Array, mode: str, free_below: float = EXACT
             joints[free] = wrist.solve_with_first(poses[free], mode, first[free])
     for i in model.turning_joints:
         joints[:, i] = unwind_angles(joints[:, i])
-    return joints

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..arrays import Array, Indices
+from ..arrays import Array, Indices, find_finite_rows
 from ..kernels.batch import evaluate_tape, find_first_negative
 from ..model.traces import Model
 
@@ -18,7 +18,7 @@ def compute_margins(model: Model, poses: Array, joints: Array | None, mode: str)
     if joints is None:
         return evaluate_tape(own, poses, np.empty((len(poses), count)), whole=False)
     margins = evaluate_tape(model.margins_tape(mode), poses, np.empty((len(poses), count)), joints, whole=False)
-    lost = ~np.isfinite(joints).all(1)
+    lost = ~find_finite_rows(joints)
     if lost.any():  # where joints do not exist, the pose tells which leg can't close
         at_lost = np.ascontiguousarray(poses[lost])
         margins[lost] = evaluate_tape(own, at_lost, np.empty((len(at_lost), count)), whole=False)
@@ -37,7 +37,7 @@ def find_broken_limits(model: Model, poses: Array, joints: Array | None, mode: s
     if joints is None:
         return find_first_negative(own, poses, nothing)
     broken = find_first_negative(model.margins_tape(mode), poses, joints)
-    lost = ~np.isfinite(joints).all(1)
+    lost = ~find_finite_rows(joints)
     if lost.any():
         of_pose = find_first_negative(own, np.ascontiguousarray(poses[lost]), nothing[lost])
         broken[lost] = np.where(of_pose == 0, 1, of_pose)

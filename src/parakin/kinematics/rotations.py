@@ -106,7 +106,7 @@ def follow_rotations(turns: Array, rotation: Array, near: Array) -> Array:
     free = cosine < EXACT
     regular = np.flatnonzero(~free)
     across = np.zeros(count, bool)
-    if has_swing(here[regular]):
+    if has_swing(here[regular, 0]):
         across[regular] = find_crossings(here[regular], there[regular])
     if len(regular):
         first = regular[0]

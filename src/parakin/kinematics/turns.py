@@ -46,8 +46,12 @@ def unwind_angles(angles: Array) -> Array:
         if not (np.abs(np.diff(angles)) > np.pi).any() and not np.isnan(angles).any():
             return angles
     unwound = angles.copy()
-    finite = np.isfinite(angles)
-    unwound[finite] = np.unwrap(angles[finite])
+    finite = np.flatnonzero(np.isfinite(angles))
+    turned = np.diff(angles[finite])
+    jumps = np.flatnonzero(np.abs(turned) > np.pi)
+    turns = np.zeros(len(finite))
+    turns[jumps + 1] = TURN * np.round(turned[jumps] / TURN)
+    unwound[finite] -= np.cumsum(turns)
     return unwound
 
 

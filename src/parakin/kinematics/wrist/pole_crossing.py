@@ -30,9 +30,10 @@ def flip_mode(mode: str) -> str:
     return mode[:-1] + ("-" if mode[-1] == "+" else "+")
 
 
-def has_swing(pairs: Array) -> bool:
-    """Tell whether first angles of neighbours on a path (n, 2 or more; first, second) swing."""
-    return bool((np.abs(wrap_angle(np.diff(pairs[:, 0]))) > SWING).any())
+def has_swing(first: Array) -> bool:
+    """Tell whether first angles of neighbours on a path (n,) swing."""
+    turned = np.abs(np.diff(first))
+    return bool((np.abs(wrap_angle(turned[turned > SWING])) > SWING).any())
 
 
 def spares_swing(before: Array, here: Array, there: Array) -> Flags:

@@ -37,8 +37,8 @@ def flip_direction(c: Array, b: Array) -> Array:
 
 def cross_direction_pole(turns: Array, at: Indices) -> None:
     """Let B and C along a path (n, 2) go on over their pole at the regular rows ``at``; in place."""
-    here = turns[at][:, ::-1]
-    if has_swing(here):
+    if has_swing(turns[at, 1]):
+        here = turns[at][:, ::-1]
         there = flip_direction(here[:, 0], here[:, 1])
         across = find_crossings(here, there)
         turns[at[across]] = there[across][:, ::-1]
@@ -56,7 +56,9 @@ def continue_turns(turns: Array, row: int) -> None:
 
 def fold_direction(turns: Array) -> tuple[Array, Array]:
     """Return B ≥ 0 and C, (n,) each, that point the tool as B and C (n, 2) do."""
-    return np.abs(turns[:, 0]), np.where(turns[:, 0] < 0.0, turns[:, 1] + np.pi, turns[:, 1])
+    b, c = np.abs(turns[:, 0]), turns[:, 1].copy()
+    c[turns[:, 0] < 0.0] += np.pi
+    return b, c
 
 
 def continue_direction(turns: Array, before: Array) -> None:

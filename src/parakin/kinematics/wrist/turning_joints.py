@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...arrays import Array, Flags
+from ...arrays import Array, Flags, find_finite_rows
 from ...kernels.batch import evaluate_tape
 from ...kernels.tape import Tape
 from ...model.elements import Drive
@@ -122,7 +122,7 @@ class Wrist:
     def find_reachable(self, joints: Array) -> Flags:
         """Find rows of joints (n, joints) that exist and whose second joint is within its range."""
         second = joints[:, self.second]
-        reachable: Flags = np.isfinite(joints).all(1) & (second >= self.drive.low) & (second <= self.drive.high)
+        reachable: Flags = find_finite_rows(joints) & (second >= self.drive.low) & (second <= self.drive.high)
         return reachable
 
     def cross_pole(self, poses: Array, mode: str, joints: Array, regular: Flags) -> None:
@@ -132,10 +132,11 @@ class Wrist:
 
         regular : (n,) rows off the pole
         """
-        at = np.flatnonzero(regular & np.isfinite(joints[:, self.first]))
-        here = joints[at][:, self.pair]
-        if not has_swing(here):
+        first = joints[:, self.first]
+        at = np.flatnonzero(regular & np.isfinite(first))
+        if not has_swing(first[at]):
             return
+        here = joints[at][:, self.pair]
         other = solve_inverse(self.model, poses[at], self.other_mode(mode))
         across = find_crossings(here, other[:, self.pair])
         stretch = np.cumsum(np.diff(across, prepend=False))  # numbered; the odd ones are across

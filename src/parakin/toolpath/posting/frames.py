@@ -112,8 +112,8 @@ def compute_poses(
     columns = [off_plane[c] if c in off_plane else poses[:, machine.axes.index(c)] for c in "XYZ"]
     to_machine = np.ascontiguousarray(rotation.T)
     for block in split_rows(len(tip), BLOCK):
-        for column, values in zip(columns, (tip[block] @ to_machine + frame[:, 3]).T, strict=True):
-            column[block] = values
+        for column, values, shift in zip(columns, (tip[block] @ to_machine).T, frame[:, 3], strict=True):
+            np.add(values, shift, out=column[block])
     angles = None if turns is None else find_programmed_angles(orientation, turns, frame)
     if angles is None or orientation.restriction:
         pointed, lean = orientation.point_along(axis, rotation)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...arrays import Array, Indices, split_rows
+from ...arrays import Array, Indices, find_finite_rows, split_rows
 from ...machine import Machine
 from .frames import PathLimit
 from .margin_blocks import BLOCK
@@ -78,7 +78,7 @@ def judge_path(
         records = np.flatnonzero(limit.broken)
         broken[records] = 1 + index
         tallies[index].add(records, np.abs(limit.values[records]))
-    lost = np.flatnonzero((broken == 0) & ~np.isfinite(joints).all(axis=1))
+    lost = np.flatnonzero((broken == 0) & ~find_finite_rows(joints))
     if len(lost):
         limits, tallies = (*limits, _NO_JOINTS), [*tallies, _Tally()]
         broken[lost] = len(limits)

@@ -26,10 +26,17 @@ _MOST_SAMPLES, _MOST_PER_RECORD = 50_000, 2  # what is added in all
 
 
 class SampledPath(NamedTuple):
-    """Poses (m, axes) along a tool path, and where its n records are among them, (n,) or all."""
+    """Poses (m, axes) along a tool path, and where its n records are among them, (n,) or all.
+
+    mode : in which it was sampled
+    joints : (m, joints) the inverse's in that mode, for who follows the path in it to overwrite; None where they were
+        not needed
+    """
 
     poses: Array
     at_records: Indices | slice
+    mode: str
+    joints: Array | None = None
 
 
 class _Samples(NamedTuple):
@@ -48,33 +55,33 @@ def sample_path(machine: Machine, path: ToolPath, frame: Array, mode: str, poses
 
     Raises :class:`PoseError` for a motion of thousands of turns.
     """
-    whole = SampledPath(poses, slice(None))
     if len(path) < 2 or (machine.wrist is None and not machine.has_direction):
-        return whole
+        return SampledPath(poses, slice(None), mode)
     programmed = ProgrammedPath(path)
     samples = _place_samples(path)
     rows = poses if len(samples.record) == len(path) else _compute_rows(machine, programmed, frame, samples)
-    can_divide = np.append(False, ~programmed.find_opposite(np.arange(1, len(path))))
     room = _MOST_SAMPLES + _MOST_PER_RECORD * len(path)
     for _ in range(_HALVINGS):
-        wide = _find_wide_steps(machine, rows, mode, path.turns is None)
-        wide = wide[can_divide[samples.record[wide + 1]]]
+        joints = None if machine.wrist is None else machine.inverse(rows, mode)
+        wide = _find_wide_steps(machine, rows, joints, path.turns is None)
+        wide = wide[~programmed.find_opposite(samples.record[wide + 1])]
         if not len(wide) or len(samples.record) + len(wide) > room:
             break
         begin = np.where(samples.record[wide] == samples.record[wide + 1], samples.share[wide], 0.0)
         added = _Samples(samples.record[wide + 1], 0.5 * (begin + samples.share[wide + 1]))
         samples = _Samples(*(np.insert(old, wide + 1, new) for old, new in zip(samples, added, strict=True)))
-        rows = _compute_rows(machine, programmed, frame, samples)
+        rows, joints = _compute_rows(machine, programmed, frame, samples), None
     if len(samples.record) == len(path):
-        return whole
-    return SampledPath(rows, np.flatnonzero(samples.share == 1.0))
+        return SampledPath(poses, slice(None), mode, joints)
+    return SampledPath(rows, np.flatnonzero(samples.share == 1.0), mode, joints)
 
 
 def _place_samples(path: ToolPath) -> _Samples:
     """Place samples at the records, and between them where the program's turns go far."""
+    if path.turns is None:
+        return _Samples(np.arange(len(path)), np.ones(len(path)))
     count = np.ones(len(path), np.int64)
-    if path.turns is not None:
-        count[1:] = count_steps(np.abs(np.diff(path.turns, axis=0)).max(axis=1))
+    count[1:] = count_steps(np.abs(np.diff(path.turns, axis=0)).max(axis=1))
     record = np.repeat(np.arange(len(path)), count)
     number = np.arange(len(record)) - np.repeat(np.cumsum(count) - count, count)
     return _Samples(record, (number + 1) / count[record])
@@ -92,19 +99,20 @@ def _compute_rows(machine: Machine, programmed: ProgrammedPath, frame: Array, sa
     return compute_poses(machine, tip, axis, frame, turns)[0]
 
 
-def _find_wide_steps(machine: Machine, poses: Array, mode: str, has_free_direction: bool) -> Indices:
+def _find_wide_steps(machine: Machine, poses: Array, joints: Array | None, has_free_direction: bool) -> Indices:
     """Find the steps between rows off a pole on which C or the wrist's first joint turns too far, by the row before."""
     wide = np.zeros(len(poses) - 1, np.bool_)
     if machine.direction is not None and has_free_direction:
         b, c = fold_direction(poses[:, machine.direction.pair])
         wide |= _turns_far(c, is_upright(b, PRINTED))
-    if machine.wrist is not None:
-        first = machine.inverse(poses, mode)[:, machine.wrist.first]
-        wide |= _turns_far(first, machine.wrist.find_free(poses, PRINTED))
+    if machine.wrist is not None and joints is not None:
+        wide |= _turns_far(joints[:, machine.wrist.first], machine.wrist.find_free(poses, PRINTED))
     return np.flatnonzero(wide)
 
 
 def _turns_far(angle: Array, free: Flags) -> Flags:
-    with np.errstate(invalid="ignore"):
-        far: Flags = np.abs(wrap_angle(np.diff(angle))) > WIDE
-    return far & ~free[1:] & ~free[:-1]
+    turned = np.diff(angle)
+    far: Flags = (np.abs(turned) > WIDE) & ~free[1:] & ~free[:-1]
+    at = np.flatnonzero(far)
+    far[at] = np.abs(wrap_angle(turned[at])) > WIDE
+    return far

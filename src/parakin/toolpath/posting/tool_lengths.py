@@ -185,9 +185,12 @@ def _insert_changes(machine: Machine, path: ToolPath, extension: Array, workpiec
         lift += [value for pair in lifts for value in pair]
         events_at[record] = added + (1 if lifts else 0)
         added += len(lifts)
+    path = replace(path, extension=extension)
+    if not source:
+        return path
     at = np.array(source, np.int64)
     new, height = np.array(lift).reshape(-1, 2).T
-    return _insert_lifts(replace(path, extension=extension), at, new > 0.0, height, events_at)
+    return _insert_lifts(path, at, new > 0.0, height, events_at)
 
 
 def _choose_clearance(machine: Machine, path: ToolPath, record: int, height: float, workpiece: Array | None) -> float:

@@ -47,7 +47,7 @@ class ToolOrientation:
     def point_along(self, axis: Array, rotation: Array) -> tuple[Array, Array]:
         """Find angles (n, letters) without jumps for tool axes (n, 3), and the lean (n,); ``rotation`` leads into M."""
         count = len(axis)
-        turns, lean = np.empty((count, len(self.letters))), np.zeros(count)
+        turns, lean = np.empty((count, len(self.letters)), order="F"), np.zeros(count)  # worked on by columns
         free: Any = np.zeros(count, bool)
         to_machine = np.ascontiguousarray(rotation.T)
         for block in split_rows(count, BLOCK):

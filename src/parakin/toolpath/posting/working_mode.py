@@ -46,7 +46,10 @@ def follow_working_mode(machine: Machine, path: ToolPath, sampled: SampledPath, 
     those nearest to home. They are the same all along the path; :mod:`~.rewinds` takes turns back.
     """
     poses = sampled.poses[sampled.at_records]
-    joints = machine.follow(sampled.poses, mode, PRINTED)[sampled.at_records]
+    known = sampled.joints if sampled.mode == mode else None
+    along = machine.inverse(sampled.poses, mode) if known is None else known
+    machine.make_continuous(sampled.poses, along, mode, PRINTED)
+    joints = along[sampled.at_records]
     turning = machine.turning_joints
     if not turning or not len(joints):
         return ModeSolution(mode, poses, joints, 0)

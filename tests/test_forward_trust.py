@@ -330,3 +330,16 @@ def test_a_pose_in_another_mode_than_the_machines_says_so(name):
     assert "another working mode" in repr(solution)
     np.testing.assert_allclose(machine.inverse(solution.poses[1], other), joints[1], atol=1e-6)
     assert not machine.forward(joints[1], near=pose, mode=machine.mode).in_other_mode
+
+
+@pytest.mark.parametrize("name", ["linear_delta", "hbg80_2d", "hbg80_3d", "orthoglide5_head", "orthoglide5_table"])
+def test_closed_forms_answer_on_the_side_of_starts_at_any_distance(name):
+    """The side by the determinant of the twist, with the start's own joints; poses up to the rim of reach."""
+    machine, rng = pk.load(name), np.random.default_rng(7)
+    spread = np.where(np.array(machine.axis_units) == "mm", max(machine.leg_sizes), 0.5)
+    poses = machine.home + rng.uniform(-1.0, 1.0, (30_000, len(spread))) * spread
+    starts = poses + spread * rng.normal(size=poses.shape) * 10.0 ** rng.uniform(-4.0, 0.0, (len(poses), 1))
+    found = machine.forward(machine.inverse(poses), near=starts, mode=machine.mode)
+    told = found.converged & np.isfinite(machine.inverse(starts)).all(1)
+    assert told.sum() > 8000
+    assert (machine.sides(starts[told]) * machine.sides(found.poses[told]) > 0.0).all()

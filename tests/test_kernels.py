@@ -227,6 +227,21 @@ def test_bounds_at_the_edges_of_definition(what, low):
     assert (up[0, 0] >= value).all()
 
 
+@pytest.mark.parametrize("widths", [(1, 0), (2, 9), (3, 1), (4, 10), (5, 2), (6, 7), (7, 8), (8, 3), (9, 4), (10, 5)])
+def test_rows_of_any_width_go_to_their_registers_and_back(widths):
+    first, second = widths
+    trace = alg.Trace()
+    tape = compile_tape(trace, [2.0 * x for x in trace.inputs(first + second)], first + second)
+    rows = np.random.default_rng(35).uniform(-1.0, 1.0, (300, first + second))
+    out = np.empty_like(rows)
+    evaluate_tape(tape, rows[:, :first].copy(), out, rows[:, first:].copy())
+    assert np.array_equal(out, 2.0 * rows)
+    for column in range(first + second):  # in whole blocks and in the last one
+        rows[17 + column, column] = rows[270 + column, column] = np.nan
+    evaluate_tape(tape, rows[:, :first].copy(), out, rows[:, first:].copy())
+    assert np.array_equal(np.isnan(out), np.repeat(np.isnan(rows).any(1)[:, None], first + second, axis=1))
+
+
 def test_blocks_of_any_length_and_rows_that_are_not_numbers():
     trace = alg.Trace()
     x, y = trace.inputs(2)

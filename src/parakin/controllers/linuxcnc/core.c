@@ -18,6 +18,8 @@ MODEL int finite_all(const double *x, int count)
    added to it taken off: the tool's axis Rz(C) Ry(B) Rx(A) z leads from the tip into the holder. */
 MODEL void shift_tip(double *x, double length)
 {
+    if (length == 0.0)
+        return;
     double k[3] = {0.0, 0.0, 1.0}; /* turned about X, then Y, then Z */
     for (int i = 0; i < 3; i++)
         if (turn_columns[i] >= 0) {

@@ -111,13 +111,13 @@ def _describe_homing(machine: Machine, equipment: Equipment) -> list[str]:
     """Describe the homing, and what is known of it."""
     plan = equipment.homing
     legs = range(machine.leg_count)
-    stages = sorted({plan.joints[i].stage for i in legs if plan.joints[i].switch is not None})
+    sequences = sorted({plan.joints[i].sequence for i in legs if plan.joints[i].switch is not None})
     lines = []
-    for stage in stages:
-        words = [_describe_search(machine, equipment, i) for i in legs if plan.joints[i].stage == stage]
-        first = "Homing moves" if stage == stages[0] else "Then it moves"
+    for sequence in sequences:
+        words = [_describe_search(machine, equipment, i) for i in legs if plan.joints[i].sequence == sequence]
+        first = "Homing moves" if sequence == sequences[0] else "Then it moves"
         lines.append(f"{first} {', '.join(word for word in words if word)}, all together, and then together to home.")
-    if stages:
+    if sequences:
         lines.append(_FOLLOWED.format(starts=plan.starts, least=f"{plan.least:.2f}"))
     else:
         lines.append("Homing moves no leg: their encoders are absolute.")

@@ -120,7 +120,7 @@ def _list_homing(machine: Machine, equipment: Equipment, index: int, homing: Joi
     """List the keys of homing; a negative sequence forbids moving legs one by one before they are homed."""
     drive = machine.drives[index]
     legs = index < machine.leg_count
-    sequence = f"HOME_SEQUENCE = {'-' if legs else ''}{homing.stage}"
+    sequence = f"HOME_SEQUENCE = {'-' if legs else ''}{homing.sequence}"
     if homing.switch is None:
         yield "# added to what the encoder reads: set it so that the joint reads right"
         yield from ("HOME_OFFSET = 0", "HOME_SEARCH_VEL = 0", "HOME_LATCH_VEL = 0")

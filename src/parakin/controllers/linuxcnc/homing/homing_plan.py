@@ -31,12 +31,12 @@ class JointHoming:
 
     switch : where its home switch trips, mm or rad; None: an absolute encoder, nothing moves
     direction : in which it looks for the switch, 1 or -1
-    stage : joints of one stage move together, 1 is the first
+    sequence : joints of one sequence move together, 1 is the first
     """
 
     switch: float | None
     direction: float = 1.0
-    stage: int = 1
+    sequence: int = 1
 
 
 @dataclass(frozen=True)
@@ -58,9 +58,9 @@ class HomingPlan:
 
 @dataclass(frozen=True)
 class _LegOrder:
-    """Stages of legs' joints with their ends."""
+    """Sequences of legs' joints with their ends."""
 
-    stages: tuple[dict[int, float], ...]
+    sequences: tuple[dict[int, float], ...]
 
 
 @lru_cache(maxsize=32)
@@ -83,16 +83,16 @@ def find_homing(machine: Machine) -> HomingPlan:
             f"comes to a singularity, in every order tried; expected absolute encoders (homing: {ABSOLUTE})"
         )
     legs = _describe_legs(machine, choice[0] if choice else None)
-    joints = (*legs, *_describe_serial_joints(machine, 1 + max((leg.stage for leg in legs), default=0)))
+    joints = (*legs, *_describe_serial_joints(machine, 1 + max((leg.sequence for leg in legs), default=0)))
     least = float(choice[1].least.min()) if choice else 1.0
     return HomingPlan(joints, len(starts.poses), least, unsafe, 0.0 if choice else _find_ambiguity(machine, starts))
 
 
 def pace_return(machine: Machine, plan: HomingPlan) -> Array:
-    """Pace the joints from their switches to home, so that those of one stage arrive together: speeds (joints,)."""
+    """Pace the joints from their switches to home, so that those of one sequence arrive together: speeds (joints,)."""
     speeds, home = _choose_search_speeds(machine), machine.inverse(find_home_pose(machine))
-    for stage in {joint.stage for joint in plan.joints}:
-        ends = {i: j.switch for i, j in enumerate(plan.joints) if j.stage == stage and j.switch is not None}
+    for sequence in {joint.sequence for joint in plan.joints}:
+        ends = {i: j.switch for i, j in enumerate(plan.joints) if j.sequence == sequence and j.switch is not None}
         if ends:
             speeds = _return_home(ends, home, speeds)[1]
     return speeds
@@ -104,14 +104,14 @@ def _choose_search_speeds(machine: Machine) -> Array:
 
 def _describe_legs(machine: Machine, order: _LegOrder | None) -> list[JointHoming]:
     result = [JointHoming(None)] * machine.leg_count
-    for stage, ends in enumerate(order.stages if order else (), 1):
+    for sequence, ends in enumerate(order.sequences if order else (), 1):
         for joint, end in ends.items():
             drive = machine.drives[joint]
-            result[joint] = JointHoming(end, -1.0 if end < 0.5 * (drive.low + drive.high) else 1.0, stage)
+            result[joint] = JointHoming(end, -1.0 if end < 0.5 * (drive.low + drive.high) else 1.0, sequence)
     return result
 
 
-def _describe_serial_joints(machine: Machine, stage: int) -> Iterator[JointHoming]:
+def _describe_serial_joints(machine: Machine, sequence: int) -> Iterator[JointHoming]:
     """Describe the homing of head and table: after the legs, one after the other; they move no leg.
 
     A switch on a joint that turns farther than once round can't tell the turn, so such a joint needs an encoder that
@@ -120,11 +120,11 @@ def _describe_serial_joints(machine: Machine, stage: int) -> Iterator[JointHomin
     for drive in machine.drives[machine.leg_count :]:
         turns_on = drive.unit == "rad" and drive.high - drive.low > 2.0 * pi
         if drive.homing == ABSOLUTE or (drive.homing is None and turns_on):
-            yield JointHoming(None, 1.0, stage)
+            yield JointHoming(None, 1.0, sequence)
             continue
         switch = drive.low if drive.homing is None else float(drive.homing)
-        yield JointHoming(switch, -1.0 if switch < 0.5 * (drive.low + drive.high) else 1.0, stage)
-        stage += 1
+        yield JointHoming(switch, -1.0 if switch < 0.5 * (drive.low + drive.high) else 1.0, sequence)
+        sequence += 1
 
 
 def _choose_order(machine: Machine, starts: HomingStarts, looking: list[int]) -> tuple[_LegOrder, HomingWalk] | None:
@@ -153,23 +153,26 @@ def _list_orders(machine: Machine, looking: list[int]) -> Iterator[list[_LegOrde
     """List the orders, the preferred first; those of one list differ only in their directions."""
     slots = _group_by_slot(machine, looking)
     alike = [_choose_ends(machine, slots, signs) for signs in product((-1, 1), repeat=len(slots))]
-    yield _remove_twins([_LegOrder(({**_merge(ends)},)) for ends in alike])
-    for sequence in permutations(range(len(slots))) if len(slots) > 1 else ():
-        yield _remove_twins([_LegOrder(tuple(ends[i] for i in sequence)) for ends in alike])
-    every = [[joint] for joint in looking]
-    if len(looking) <= _MOST_PERMUTED:
-        each = [_choose_ends(machine, every, signs) for signs in product((-1, 1), repeat=len(looking))]
-        yield _remove_twins([_LegOrder(({**_merge(ends)},)) for ends in each])
-    else:
-        each = [_choose_ends(machine, every, (sign,) * len(looking)) for sign in (-1, 1)]
+    yield _order_together(alike)
+    if len(slots) > 1:
+        yield from (_order_in_turn(alike, turns) for turns in permutations(range(len(slots))))
+    legs, few = [[joint] for joint in looking], len(looking) <= _MOST_PERMUTED
+    signs_of_legs = product((-1, 1), repeat=len(looking)) if few else [(sign,) * len(looking) for sign in (-1, 1)]
+    each = [_choose_ends(machine, legs, signs) for signs in signs_of_legs]
+    if few:
+        yield _order_together(each)
     own = tuple(range(len(looking)))
-    sequences = list(permutations(own)) if len(looking) <= _MOST_PERMUTED else [own]
-    for sequence in sequences:
-        yield _remove_twins([_LegOrder(tuple(ends[i] for i in sequence)) for ends in each])
+    yield from (_order_in_turn(each, turns) for turns in (permutations(own) if few else [own]))
 
 
-def _merge(stages: list[dict[int, float]]) -> dict[int, float]:
-    return {joint: end for ends in stages for joint, end in ends.items()}
+def _order_together(choices: list[list[dict[int, float]]]) -> list[_LegOrder]:
+    """Make orders in which all groups move at once, one for each choice of their ends."""
+    return _remove_twins([_LegOrder(({i: end for ends in groups for i, end in ends.items()},)) for groups in choices])
+
+
+def _order_in_turn(choices: list[list[dict[int, float]]], turns: tuple[int, ...]) -> list[_LegOrder]:
+    """Make orders in which the groups move one after the other, one for each choice of their ends."""
+    return _remove_twins([_LegOrder(tuple(groups[i] for i in turns)) for groups in choices])
 
 
 def _remove_twins(orders: list[_LegOrder]) -> list[_LegOrder]:
@@ -201,20 +204,20 @@ def _choose_ends(machine: Machine, groups: list[list[int]], signs: tuple[int, ..
 def _walk_order(
     machine: Machine, starts: HomingStarts, order: _LegOrder, patient: bool = False
 ) -> tuple[HomingWalk, HomingWalk]:
-    """Follow an order from the starts, each stage to its switches and from there to LinuxCNC's home.
+    """Follow an order from the starts, each sequence to its switches and from there to LinuxCNC's home.
 
     Return where all are at last, and where the last switches were found. Unless ``patient`` the first harm ends it.
     """
     speeds, home = _choose_search_speeds(machine), machine.inverse(find_home_pose(machine))
     walk = searched = begin_walk(machine, starts)
-    for ends in order.stages:
+    for ends in order.sequences:
         searched = walk_joints(machine, walk, ends, speeds, patient)
         walk = walk_joints(machine, searched, *_return_home(ends, home, speeds), patient)
     return walk, searched
 
 
 def _return_home(ends: dict[int, float], home: Array, speeds: Array) -> tuple[dict[int, float], Array]:
-    """Choose where a stage's joints go from their switches, and speeds with which they arrive together."""
+    """Choose where a sequence's joints go from their switches, and speeds with which they arrive together."""
     goals = {joint: float(home[joint]) for joint in ends}
     way = {joint: abs(goals[joint] - end) for joint, end in ends.items()}
     seconds = max(way[joint] / speeds[joint] for joint in ends)

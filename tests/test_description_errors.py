@@ -28,6 +28,22 @@ MISTAKES = [
     ("[200 mm,", "[200,", ['m.yaml:12: range: "200" needs a unit: mm, cm, m, in']),
     ("[200 mm,", "[200 deg,", ['m.yaml:12: range: "200 deg" is an angle, expected a length (mm, cm, m, in)']),
     ("[200 mm,", "[700 mm,", ["m.yaml:12: range: [700 mm, 650 mm] is empty, expected [low, high] with low < high"]),
+    (
+        "650 mm]",
+        "650 mm]\n  lead: 0 mm",
+        ["m.yaml:13: lead: zero, expected what the joint moves while the motor turns once"],
+    ),
+    ("650 mm]", "650 mm]\n  counts: 0", ['m.yaml:13: counts: "0" is out of range, expected more than 0, at most 1e9']),
+    (
+        "650 mm]",
+        "650 mm]\n  homing: absolut",
+        ['m.yaml:13: homing: "absolut": undefined size "absolut", expected one of R, r, or the word absolute'],
+    ),
+    (
+        "650 mm]",
+        "650 mm]\n  homing: [absolute, 2 deg, 20 mm]",
+        ['m.yaml:13: homing: "2 deg" is an angle, expected a length (mm, cm, m, in), or the word absolute'],
+    ),
     ("[200 mm, 650 mm]", "[200 mm]", ["m.yaml:12: range: expected a pair [low, high], got 1 value"]),
     ("[200 mm, 650 mm]", "650 mm", ['m.yaml:12: range: expected a pair [low, high], got "650 mm"']),
     ("[200 mm,", "[.nan,", ['m.yaml:12: range: ".nan": can\'t read "."']),

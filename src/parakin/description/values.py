@@ -234,7 +234,12 @@ def _accept_homing(kind: QuantityKind) -> PlainValidator:
     """Make a validator that accepts where a home switch is, or the word for an encoder that needs none."""
 
     def read(value: object, info: ValidationInfo) -> float | str:
-        return ABSOLUTE if value == ABSOLUTE else read_quantity(value, kind, info)
+        if value == ABSOLUTE:
+            return ABSOLUTE
+        try:
+            return read_quantity(value, kind, info)
+        except ValueError as error:
+            raise ValueError(f"{error}, or the word {ABSOLUTE}") from None
 
     return PlainValidator(read)
 

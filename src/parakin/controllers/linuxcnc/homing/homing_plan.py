@@ -15,12 +15,14 @@ from ....errors import InputError
 from ....kinematics.rotations import collect_turns, compute_rotations
 from ....machine import Machine
 from ....model.elements import ABSOLUTE, Drive
+from ....units import name_display_unit, to_display
 from ..axis_rates import choose_drive_rates
 from ..home_pose import find_home_pose
 from .starts import HomingStarts, sample_starts
 from .walk import HomingWalk, begin_walk, walk_joints
 
 SEARCH = 0.05  # of a joint's speed: towards its switch
+_BEYOND = 0.1  # of a joint's range: how far outside of it a switch may be
 _FEW = 50  # starts that are tried before all of them
 _MOST_PERMUTED = 3  # legs that are tried in every order and all directions; more only in their own order, all alike
 
@@ -73,6 +75,7 @@ def find_homing(machine: Machine) -> HomingPlan:
 
     Raises :class:`InputError` for switches with which homing can do harm.
     """
+    _refuse_far_switches(machine)
     starts = sample_starts(machine)
     looking = [i for i in range(machine.leg_count) if machine.drives[i].homing != ABSOLUTE]
     choice = _choose_order(machine, starts, looking) if looking else None
@@ -86,6 +89,18 @@ def find_homing(machine: Machine) -> HomingPlan:
     joints = (*legs, *_describe_serial_joints(machine, 1 + max((leg.sequence for leg in legs), default=0)))
     least = float(choice[1].least.min()) if choice else 1.0
     return HomingPlan(joints, len(starts.poses), least, unsafe, 0.0 if choice else _find_ambiguity(machine, starts))
+
+
+def _refuse_far_switches(machine: Machine) -> None:
+    for drive in machine.drives:
+        beyond = _BEYOND * (drive.high - drive.low)
+        if isinstance(drive.homing, float) and not drive.low - beyond <= drive.homing <= drive.high + beyond:
+            place, low, high = (to_display(value, drive.unit) for value in (drive.homing, drive.low, drive.high))
+            unit = name_display_unit(drive.unit)
+            raise InputError(
+                f"homing: the switch of joint {drive.name} at {place:g} {unit} is far outside of its range, "
+                f"expected one in {low:g} to {high:g} {unit} or just beside"
+            )
 
 
 def pace_return(machine: Machine, plan: HomingPlan) -> Array:

@@ -1,0 +1,116 @@
+"""Homing: directions and orders that keep a machine whole, against geometry; what can't be homed so is refused."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from math import sqrt
+from pathlib import Path
+
+import numpy as np
+import pytest
+from geometry import Description
+
+import parakin as pk
+from parakin.controllers.linuxcnc.homing import find_homing
+from parakin.controllers.linuxcnc.homing.homing_plan import pace_return
+from parakin.controllers.linuxcnc.homing.starts import compute_regularity, sample_starts
+from parakin.controllers.linuxcnc.homing.walk import begin_walk, walk_joints
+from parakin.controllers.linuxcnc.model_header import LEAST_REGULARITY
+
+
+def changed(tmp_path, name, old, new):
+    """A shipped machine with a line of its file changed."""
+    text = (Path(pk.__file__).parent / "machines" / f"{name}.yaml").read_text(encoding="utf-8")
+    assert old in text
+    path = tmp_path / f"{name}.yaml"
+    path.write_text(text.replace(old, new, 1), encoding="utf-8")
+    return pk.load(path)
+
+
+def test_starts_are_whole_machines():
+    m = pk.load("hexapod")
+    starts = sample_starts(m)
+    assert len(starts.poses) == 1000
+    assert (m.check(starts.poses) == 0).all()
+    miss, _ = Description.of(m.spec).misses(starts.poses, starts.joints)
+    assert miss.max() < 1e-9
+    assert np.ptp(starts.poses, axis=0)[:3].min() > 200.0
+    assert compute_regularity(m, starts.poses).min() >= 2.0 * LEAST_REGULARITY
+    assert compute_regularity(m, m.home[None]) == pytest.approx(1.0)
+
+
+def test_the_tricept_pulls_its_struts_in():
+    """Up is away from the work: the platform hangs below, and all struts are shortest at 934 mm."""
+    plan = find_homing(pk.load("tricept"))
+    assert [(j.switch, j.direction, j.sequence) for j in plan.joints[:3]] == [(934.0, -1.0, 1)] * 3
+    assert plan.unsafe is None
+    assert 0.3 < plan.least < 1.0
+    theta1, theta2 = plan.joints[3:]
+    assert theta1.switch is None  # two turns: a switch can't tell which
+    assert (theta2.switch, theta2.sequence) == (pytest.approx(-2.0 * np.pi / 3.0), 2)
+
+
+def test_joints_of_a_sequence_arrive_together():
+    m = pk.load("tricept")
+    plan, home = find_homing(m), m.inverse(m.home)
+    speeds = pace_return(m, plan)
+    seconds = [abs(home[i] - plan.joints[i].switch) / speeds[i] for i in range(3)]
+    assert max(seconds) == pytest.approx(min(seconds), rel=0.2)  # LinuxCNC's home lies off the wrist's pole
+    assert speeds[:3].max() == pytest.approx(0.05 * 500.0)
+
+
+def test_the_orthoglide_goes_where_its_rods_meet():
+    """With all slides at their high ends the rods can't meet: those ends lie on a circle wider than a rod is long."""
+    m = pk.load("orthoglide")
+    rod = m.spec.sizes["L"]
+    high = m.drives[0].high
+    assert high * sqrt(2.0 / 3.0) > rod
+    plan = find_homing(m)
+    assert [j.direction for j in plan.joints] == [-1.0] * 3
+    starts = sample_starts(m)
+    walk = walk_joints(m, begin_walk(m, starts), dict.fromkeys(range(3), high), np.full(3, 50.0), patient=True)
+    assert not walk.kept.any()
+
+
+def test_a_walk_that_loses_no_leg_stays_closed():
+    m = pk.load("linear_delta")
+    starts = sample_starts(m)
+    ends = {0: 1300.0, 1: 1300.0, 2: 1300.0}
+    walk = walk_joints(m, begin_walk(m, starts), ends, np.full(3, 50.0), patient=False)
+    assert walk.kept.all()
+    assert np.array_equal(walk.joints, np.full_like(walk.joints, 1300.0))
+    # All carriages level: the platform is on the axis of the towers.
+    assert np.abs(walk.poses - walk.poses[0]).max() < 1e-6
+    assert np.abs(walk.poses[:, :2]).max() < 1e-6
+    reach = sqrt(700.0**2 - (350.0 - 60.0) ** 2)
+    assert walk.poses[0, 2] == pytest.approx(1300.0 - reach - 80.0)
+
+
+@pytest.mark.parametrize("name", ["hexapod", "hbg80_2d"])
+def test_no_switches_where_homing_can_do_harm(name):
+    plan = find_homing(pk.load(name))
+    assert all(joint.switch is None for joint in plan.joints)
+    assert 0.0 < plan.unsafe < 0.1
+    assert plan.ambiguous == 0.0
+
+
+def test_harmful_switches_are_refused(tmp_path):
+    m = changed(tmp_path, "hexapod", "  jerk: 250 m/s3", "  jerk: 250 m/s3\n  homing: 660 mm")
+    with pytest.raises(pk.InputError, match="expected absolute encoders"):
+        find_homing(m)
+
+
+def test_switches_are_where_the_file_says(tmp_path):
+    m = changed(tmp_path, "linear_delta", "  jerk: 500 m/s3", "  jerk: 500 m/s3\n  homing: [690 mm, 690 mm, 700 mm]")
+    plan = find_homing(m)
+    assert [(j.switch, j.direction) for j in plan.joints] == [(690.0, -1.0), (690.0, -1.0), (700.0, -1.0)]
+    m = changed(tmp_path, "linear_delta", "  jerk: 500 m/s3", "  jerk: 500 m/s3\n  homing: absolute")
+    assert all(joint.switch is None for joint in find_homing(m).joints)
+    m = changed(tmp_path, "linear_delta", "  jerk: 500 m/s3", "  jerk: 500 m/s3\n  homing: 6900 mm")
+    with pytest.raises(pk.InputError, match="far outside of its range, expected one in 700 to 1300 mm"):
+        find_homing(m)
+
+
+def test_the_same_in_every_run():
+    one, two = (find_homing(pk.load("linear_delta")) for _ in range(2))
+    assert replace(one) == two

@@ -15,6 +15,7 @@ import linuxcnc
 
 MOST = 60.0  # s for a step
 REST = 0.15  # s for which the machine must stand
+FLICKER = 1e-8  # mm and degrees: in joint mode the position is found anew in every cycle, and its last digits change
 DRAINING = 0.3  # s for the sampler's last rows
 PLAIN = (int, float, str, bool, tuple, list)
 
@@ -22,7 +23,7 @@ PLAIN = (int, float, str, bool, tuple, list)
 class Operator:
     def __init__(self, joints):
         self.command, self.status, self.errors = linuxcnc.command(), linuxcnc.stat(), linuxcnc.error_channel()
-        self.joints, self.said = joints, []
+        self.joints, self.said, self.pressing = joints, [], None
 
     def wait(self, ready):
         end = time.monotonic() + MOST
@@ -98,6 +99,10 @@ class Operator:
         self._run_out(seconds)
 
     def _run_out(self, seconds):
+        if self.pressing is not None:
+            time.sleep(self.pressing)
+            self.stop_at_once(0.2)
+            return
         time.sleep(0.1 if seconds is None else seconds)
         if seconds is not None:
             self.abort()
@@ -114,6 +119,21 @@ class Operator:
         time.sleep(seconds)
         self.switch_on()
 
+    def stop_amid(self, word, *arguments):
+        """Begin a move, press the emergency stop amid it, and switch on again."""
+        *given, seconds = arguments
+        self.pressing = seconds
+        getattr(self, word)(*given)
+        self.pressing = None
+
+    def pause_amid(self, name, seconds, pause):
+        """Run a program with a pause."""
+        self.program(name)
+        time.sleep(seconds)
+        self.command.auto(linuxcnc.AUTO_PAUSE)
+        time.sleep(pause)
+        self.command.auto(linuxcnc.AUTO_RESUME)
+
     def is_off(self):
         self.status.poll()
         return self.status.task_state != linuxcnc.STATE_ON
@@ -125,8 +145,9 @@ class Operator:
         while time.monotonic() < end:
             self.status.poll()
             self.listen()
-            here = (self.status.position, self.status.joint_position)
-            if here != last or (self.status.interp_state != linuxcnc.INTERP_IDLE and not self.is_off()):
+            here = (*self.status.position, *self.status.joint_position)
+            moved = last is None or max(abs(a - b) for a, b in zip(here, last, strict=True)) > FLICKER
+            if moved or (self.status.interp_state != linuxcnc.INTERP_IDLE and not self.is_off()):
                 since, last = time.monotonic(), here
             if time.monotonic() > since + REST:
                 return
@@ -143,7 +164,14 @@ class Operator:
             "joints": list(s.joint_position[: self.joints]),
             "told": [joint["output"] for joint in s.joint[: self.joints]],
             "said": self.said,
+            "tool": s.tool_offset[2],
+            "identity": read_pin("kins.identity") == "TRUE",
         }
+
+
+def read_pin(name):
+    """Read a pin of HAL."""
+    return subprocess.run(["halcmd", "getp", name], capture_output=True, text=True).stdout.strip()
 
 
 def dump(status):
@@ -161,13 +189,13 @@ def work(task, seen):
         try:
             getattr(operator, step[0])(*step[1:])
             operator.stands()
+            seen["steps"].append({"step": step} | operator.describe())
+            if operator.is_off():
+                step = ["switch on"]
+                operator.switch_on()
         except TimeoutError:
-            seen["hung"] = {"step": step, "state": dump(operator.status)}
+            seen["hung"] = {"step": step, "said": operator.said, "state": dump(operator.status)}
             return
-        seen["steps"].append({"step": step} | operator.describe())
-        if operator.is_off():
-            operator.switch_on()
-            operator.world_mode() if task.get("goes on by hand") else None
 
 
 def main():

@@ -20,6 +20,17 @@ void rtapi_print_msg(int level, const char *format, ...)
 int hal_init(const char *name) { (void)name; return 1; }
 int hal_ready(int id) { (void)id; return 0; }
 int hal_exit(int id) { (void)id; return 0; }
+void *hal_malloc(long size) { return calloc(1, size); }
+int hal_pin_float_newf(int dir, double **data, int id, const char *format, ...)
+{
+    (void)dir, (void)id, (void)format;
+    return *data = calloc(1, sizeof **data), 0;
+}
+int hal_pin_bit_newf(int dir, char **data, int id, const char *format, ...)
+{
+    (void)dir, (void)id, (void)format;
+    return *data = calloc(1, sizeof **data), 0;
+}
 
 static void note_digital(int index, char value) { written[0] = 100 * index + value; }
 static void note_analog(int index, double value) { written[1] = 100 * index + (int)value; }
@@ -32,7 +43,7 @@ static EmcPose take_pose(const double *v)
 
 static struct state_tag_t tag_line(int line)
 {
-    struct state_tag_t tag = {{0}};
+    struct state_tag_t tag = {.packed_flags = 1UL << GM_FLAG_DISTANCE_MODE};
     tag.fields[GM_FIELD_LINE_NUMBER] = line;
     tpSetId(0, line);
     return tag;
@@ -43,6 +54,10 @@ void start(const double *pose9, const double *joints, const double *low, const d
 {
     const EmcPose pose9_ = take_pose(pose9);
     memset(&status, 0, sizeof status);
+    if (!pins)
+        set_up();
+    *pins->tool_offset = 0.0;
+    *pins->identity = 0;
     tpMotFunctions(note_digital, note_analog, 0, 0, 0, 0);
     tpMotData(&status, &config);
     config.numSpindles = 1;

@@ -125,7 +125,9 @@ class Simulation:
         (self.folder / "task.json").write_text(json.dumps(task))
         shutil.copy(HERE / "operator_ui.py", self.folder / "ui.py")
         seen, rows, done = self._start(seconds)
-        assert "hung" not in seen, json.dumps(seen, indent=1)
+        if "hung" in seen:
+            (Path(tempfile.gettempdir()) / f"{self.machine.name}_hung.json").write_text(json.dumps(seen, indent=1))
+            raise AssertionError(f"hung in step {len(seen['steps'])}, {seen['hung']['step']}: {seen['hung']}")
         assert done.returncode == 0, done.stdout + done.stderr
         return seen["steps"], rows
 

@@ -12,6 +12,8 @@ typedef struct EmcPose { PmCartesian tran; double a, b, c, u, v, w; } EmcPose;
 typedef enum { KINEMATICS_IDENTITY = 1, KINEMATICS_FORWARD_ONLY, KINEMATICS_INVERSE_ONLY, KINEMATICS_BOTH } KINEMATICS_TYPE;
 typedef unsigned long KINEMATICS_FORWARD_FLAGS, KINEMATICS_INVERSE_FLAGS;
 
+#define EMCMOT_MAX_JOINTS 16
+#define EMCMOT_MAX_AXIS 9
 #define EXPORT_SYMBOL(name) extern int stub_exported_##name
 #define RTAPI_MSG_ERR 1
 #define RTAPI_MP_STRING(name, text) char **stub_string_##name = &name

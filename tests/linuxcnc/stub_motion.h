@@ -10,7 +10,8 @@
 #define ZERO_EMC_POSE(pose) memset(&(pose), 0, sizeof(EmcPose))
 
 enum { GM_FIELD_LINE_NUMBER, GM_FIELDS = 8 };
-struct state_tag_t { int fields[GM_FIELDS]; };
+enum { GM_FLAG_DISTANCE_MODE = 1 };
+struct state_tag_t { int fields[GM_FIELDS]; unsigned long packed_flags; };
 
 typedef enum { TC_TERM_COND_STOP, TC_TERM_COND_EXACT, TC_TERM_COND_PARABOLIC, TC_TERM_COND_TANGENT } tc_term_cond_t;
 typedef enum { TC_DIR_FORWARD, TC_DIR_REVERSE } tc_direction_t;

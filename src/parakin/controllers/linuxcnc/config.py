@@ -15,6 +15,7 @@ from .hand_box import HandBox, find_hand_box
 from .hardware import Equipment, wiring
 from .home_pose import find_home_pose
 from .kinematics_module import hash_kinematics, name_kinematics
+from .kinematics_switch import list_remaps
 from .number_text import format_number
 from .planner import hash_planner, name_planner
 
@@ -55,6 +56,7 @@ CYCLE_TIME = 0.001
 
 [RS274NGC]
 PARAMETER_FILE = {name}.var
+{remaps}
 
 [EMCMOT]
 EMCMOT = motmod
@@ -118,14 +120,23 @@ addf kins.end-steps servo-thread
 net tool-offset motion.tooloffset.z => kins.tool-offset
 net teleop motion.teleop-mode => kins.teleop-mode
 net coordinated motion.coord-mode => kins.coord-mode
+net homed motion.is-all-homed => kins.homed
+net in-position motion.in-position => kins.in-position
+
+# M428 and M429 choose the kinematics: 0 the machine's, 1 every axis moves the joint of its number.
+net kinematics-type motion.analog-out-03 => motion.switchkins-type
+net identity kins.identity => planner.identity
+net tool-offset => planner.tool-offset
 
 # The guard: it stops jogs before a limit, and gives the axes' rates.
 loadrt {guard}
 addf guard.watch servo-thread
 net tool-offset => guard.tool-offset
+net identity => guard.identity
+net pose-known kins.pose-known => guard.pose-known
 net teleop => guard.teleop-mode
 net coordinated => guard.coord-mode
-net homed motion.is-all-homed => guard.homed
+net homed => guard.homed
 net enabled motion.motion-enabled => guard.enabled
 net jog-stop guard.jog-stop => motion.jog-stop
 {watched}
@@ -177,6 +188,7 @@ def write_ini(machine: Machine, equipment: Equipment | None = None) -> str:
         turn_jog=format_number(to_display(_JOG * by_hand["rad"], "rad")),
         turn_by_hand=format_number(to_display(by_hand["rad"], "rad")),
         acceleration=format_number(acceleration),
+        remaps=list_remaps(machine),
     )
     axes = [_format_axis(machine, box, column) for column in range(len(machine.axes))]
     at_home = machine.inverse(pose).tolist()
@@ -277,6 +289,7 @@ def write_hal(machine: Machine, equipment: Equipment | None = None) -> str:
     watched = [f"net told-{i} => guard.joint-{i}" for i in range(len(machine.joints))]
     for axis in machine.axes:
         letter = axis.lower()
+        watched.append(f"net {letter}-pose kins.{letter} => guard.{letter}.pose")
         watched.append(f"net {letter}-position axis.{letter}.pos-cmd => guard.{letter}.position")
         for whose, section in (("hand", ""), ("program", "PROGRAM_")):
             watched += [f"setp guard.{letter}.{whose}-{pin} [AXIS_{axis}]{section}{key}" for pin, key in _KEYS.items()]

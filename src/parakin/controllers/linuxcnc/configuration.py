@@ -9,6 +9,7 @@ from .first_program import write_first_program
 from .guard import name_guard, write_guard
 from .hardware import equip_machine
 from .kinematics_module import name_kinematics, write_module
+from .kinematics_switch import write_switch_programs
 from .model_header import name_model, write_model
 from .page import write_page
 from .planner import name_planner, write_planner
@@ -42,6 +43,7 @@ def make_linuxcnc_configuration(machine: Machine, hardware: str | None = None) -
         f"{machine.name}.tbl": write_tool_table(machine),
         f"{machine.name}.ngc": write_first_program(machine),
         f"{machine.name}.md": write_page(machine, equipment),
+        **write_switch_programs(machine),
         **(equipment.layout.files if equipment else {}),
     }
     return {name: stamp_file(name, text) for name, text in texts.items()}

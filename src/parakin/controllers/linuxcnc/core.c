@@ -14,14 +14,12 @@ MODEL int finite_all(const double *x, int count)
     return 1;
 }
 
-/* The pose of the machine's own tip for that of a tool longer by ``length`` mm, with the shift along Z that LinuxCNC has
-   added to it taken off: the tool's axis Rz(C) Ry(B) Rx(A) z leads from the tip into the holder. */
-MODEL void shift_tip(double *x, double length)
+/* The tool's axis Rz(C) Ry(B) Rx(A) z, from the tip into the holder. */
+MODEL void find_tool_axis(const double *x, double *k)
 {
-    if (length == 0.0)
-        return;
-    double k[3] = {0.0, 0.0, 1.0}; /* turned about X, then Y, then Z */
-    for (int i = 0; i < 3; i++)
+    k[0] = k[1] = 0.0;
+    k[2] = 1.0;
+    for (int i = 0; i < 3; i++) /* turned about X, then Y, then Z */
         if (turn_columns[i] >= 0) {
             const double s = sin(x[turn_columns[i]]), c = cos(x[turn_columns[i]]);
             double *u = &k[(i + 1) % 3], *v = &k[(i + 2) % 3];
@@ -29,10 +27,34 @@ MODEL void shift_tip(double *x, double length)
             *v = s * *u + c * *v;
             *u = turned;
         }
+}
+
+/* The pose of the machine's own tip for that of a tool longer by ``length`` mm, with the shift along Z that LinuxCNC has
+   added to it taken off. */
+MODEL void shift_tip(double *x, double length)
+{
+    double k[3];
+    if (length == 0.0)
+        return;
+    find_tool_axis(x, k);
     k[2] -= 1.0;
     for (int i = 0; i < 3; i++)
         if (place_columns[i] >= 0)
             x[place_columns[i]] += length * k[i];
+}
+
+/* Kinematics without any: every axis moves the joint of its number. The axes' letters say mm or degrees, whatever the
+   joints are; LinuxCNC's numbers are the same on both sides. */
+MODEL void take_axes_as_joints(const double *x, double *q)
+{
+    for (int i = 0; i < JOINTS; i++)
+        q[i] = x[i] / (turning_axis[i] ? DEGREE : 1.0) * (turning[i] ? DEGREE : 1.0);
+}
+
+MODEL void take_joints_as_axes(const double *q, double *x)
+{
+    for (int i = 0; i < AXES; i++)
+        x[i] = q[i] / (turning[i] ? DEGREE : 1.0) * (turning_axis[i] ? DEGREE : 1.0);
 }
 
 /* Joints for a pose. */

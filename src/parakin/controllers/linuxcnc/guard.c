@@ -3,10 +3,11 @@
    It tells how far the machine is from its nearest limit and which that is; it lets jogs stop softly before one is
    reached, at the end of the box for moves by hand, or where a joint would pass its speed. And it gives the axes their
    low rates while they are moved by hand, and their high ones in coordinated motion, which the trajectory planner keeps
-   within the limits. It keeps the last pose. */
+   within the limits; where every axis moves one joint, that joint's range and rates. It keeps the last pose. */
 
 typedef struct {
     hal_float_t *position;                          /* axis.L.pos-cmd */
+    hal_float_t *pose;                              /* kins.L */
     hal_float_t *hand_min, *hand_max;               /* the box for moves by hand */
     hal_float_t *hand_velocity, *hand_acceleration; /* rates for moves by hand */
     hal_float_t *program_min, *program_max, *program_velocity, *program_acceleration;
@@ -18,14 +19,16 @@ typedef struct {
     hal_float_t *joint[JOINTS]; /* joint.N.pos-cmd */
     hal_float_t *tool_offset;   /* motion.tooloffset.z */
     hal_bit_t *homed, *enabled, *teleop, *coordinated; /* motion. */
+    hal_bit_t *identity, *pose_known; /* kins.: every axis moves the joint of its number; the pose is known all the same */
     hal_u32_t *nearest;         /* index of the nearest limit: NAME_model.h and NAME.md have the names */
     hal_float_t *distance;      /* to it: 0 where it is reached, 1 where jogs stop */
     hal_bit_t *jog_stop;        /* to motion.jog-stop */
 } Pins;
 
 static Pins *pins;
-static double last_pose[AXES], last_joints[JOINTS];
-static int knows_last; /* the two are those of the cycle before */
+static double last_pose[AXES], last_joints[JOINTS], last_margin;
+static int knows_last, knows_margin; /* they are those of the cycle before */
+static double motion_offset, told_offset; /* of the tool: with which motion has made this cycle's pose, and the one told last */
 
 /* What the machine does in this cycle; mm, rad, s. */
 typedef struct {
@@ -35,8 +38,10 @@ typedef struct {
 static int read_motion(Motion *m)
 {
     double world[AXES], joints[JOINTS], own[JOINTS];
+    if (*pins->identity && !*pins->pose_known)
+        return 0;
     for (int i = 0; i < AXES; i++)
-        world[i] = *pins->axis[i].position * (turning_axis[i] ? DEGREE : 1.0);
+        world[i] = *(*pins->identity ? pins->axis[i].pose : pins->axis[i].position) * (turning_axis[i] ? DEGREE : 1.0);
     for (int i = 0; i < JOINTS; i++)
         joints[i] = *pins->joint[i];
     read_joints(joints, m->joints);
@@ -44,7 +49,7 @@ static int read_motion(Motion *m)
         return 0;
     for (int i = 0; i < AXES; i++)
         m->pose[i] = world[i];
-    shift_tip(m->pose, *pins->tool_offset);
+    shift_tip(m->pose, motion_offset);
     const int known = knows_last;
     for (int i = 0; i < AXES; i++) {
         m->pose_rates[i] = known ? (m->pose[i] - last_pose[i]) / CYCLE : 0.0;
@@ -63,18 +68,42 @@ static int read_motion(Motion *m)
     return 1;
 }
 
-/* Where the machine comes to rest if it is stopped now: every axis by itself in a jog, all in step else. */
-static void predict_stop(const Motion *m, double *pose)
+/* The time in which the machine comes to rest if it is stopped now, as time at its speed: every axis or joint by itself. */
+static double find_stop_time(int by_axis, int i, double rate)
 {
-    double seconds = 0.0;
+    const double unit = turning_axis[i] ? DEGREE : 1.0;
+    const double slowing = by_axis ? *pins->axis[i].hand_acceleration * unit : joint_acceleration[i];
+    return 0.5 * fabs(rate) / slowing + LATENCY * CYCLE;
+}
+
+static double find_joints_stop_time(const Motion *m)
+{
+    double most = 0.0;
     for (int i = 0; i < JOINTS; i++)
-        seconds = fmax(seconds, fabs(m->joint_rates[i]) / joint_acceleration[i]);
+        most = fmax(most, find_stop_time(0, i, m->joint_rates[i]));
+    return most;
+}
+
+/* Where the machine comes to rest if it is stopped now: every axis by itself in a jog, all in step else. */
+static void predict_stop(const Motion *m, int by_axes, double *pose)
+{
+    const double together = find_joints_stop_time(m);
     for (int i = 0; i < AXES; i++) {
-        const double unit = turning_axis[i] ? DEGREE : 1.0, rate = m->pose_rates[i];
-        if (*pins->teleop)
-            seconds = fabs(rate) / (*pins->axis[i].hand_acceleration * unit);
-        pose[i] = m->pose[i] + rate * (0.5 * seconds + LATENCY * CYCLE);
+        const double rate = m->pose_rates[i];
+        pose[i] = m->pose[i] + rate * (by_axes ? find_stop_time(1, i, rate) : together);
     }
+}
+
+/* Whether joints that move by themselves would take the machine too near to a parallel singularity before they stand. On
+   the way to one the pose moves faster and faster: the margin's square, not the margin, falls evenly with the joints. */
+static int runs_into_singularity(const Motion *m)
+{
+    double margins[SINGULARITIES];
+    measure_singularities(m->pose, m->joints, margins);
+    const double least = least_singularity[0], rate = knows_margin ? (margins[0] - last_margin) / CYCLE : 0.0;
+    last_margin = margins[0];
+    knows_margin = 1;
+    return rate < 0.0 && margins[0] * (margins[0] + 2.0 * FOR_CURVES * rate * find_joints_stop_time(m)) < least * least;
 }
 
 /* The distance to the nearest limit where the machine would be; below zero too where it can't be at all. */
@@ -121,6 +150,14 @@ static void give_rates(void)
     const int program = *pins->coordinated;
     for (int i = 0; i < AXES; i++) {
         const Axis *axis = &pins->axis[i];
+        const double unit = turning[i] ? DEGREE : 1.0;
+        if (*pins->identity) {
+            *axis->min_limit = joint_low[i] / unit;
+            *axis->max_limit = joint_high[i] / unit;
+            *axis->max_velocity = joint_speed[i] / unit;
+            *axis->max_acceleration = joint_acceleration[i] / unit;
+            continue;
+        }
         *axis->min_limit = *axis->program_min;
         *axis->max_limit = *axis->program_max;
         *axis->max_velocity = program ? *axis->program_velocity : *axis->hand_velocity;
@@ -136,8 +173,12 @@ static void watch(void *arg, long period)
     (void)arg;
     (void)period;
     give_rates();
+    motion_offset = told_offset;
+    told_offset = *pins->tool_offset;
     if (!*pins->homed || !*pins->enabled)
         knows_last = 0;
+    if (!knows_last)
+        knows_margin = 0;
     is_known = *pins->homed && *pins->enabled && read_motion(&m);
     if (!is_known) { /* not homed, switched off, or driven out of a singularity joint by joint */
         *pins->distance = 0.0;
@@ -149,14 +190,16 @@ static void watch(void *arg, long period)
     *pins->nearest = nearest;
     for (int i = 0; i < AXES; i++)
         moves |= m.pose_rates[i] != 0.0;
-    predict_stop(&m, stop);
+    const int by_axes = *pins->teleop && !*pins->identity;
+    predict_stop(&m, by_axes, stop);
     const double ahead = moves ? distance_at(stop, m.joints, joints) : distance;
     if (*pins->coordinated) {
         *pins->jog_stop = 0;
         return;
     }
     const int is_near = ahead < 1.0 && ahead < distance;
-    *pins->jog_stop = moves && (is_near || (*pins->teleop && (leaves_the_box(&m, stop) || swings(&m, stop))));
+    *pins->jog_stop = moves && (is_near || (by_axes ? leaves_the_box(&m, stop) || swings(&m, stop)
+                                                    : runs_into_singularity(&m)));
 }
 
 /* A float pin of an axis, by its letter. */
@@ -171,6 +214,7 @@ static int make_pins(void)
     for (int i = 0; i < AXES; i++) {
         Axis *axis = &pins->axis[i];
         bad |= axis_pin(HAL_IN, &axis->position, i, "position");
+        bad |= axis_pin(HAL_IN, &axis->pose, i, "pose");
         bad |= axis_pin(HAL_IN, &axis->hand_min, i, "hand-min");
         bad |= axis_pin(HAL_IN, &axis->hand_max, i, "hand-max");
         bad |= axis_pin(HAL_IN, &axis->hand_velocity, i, "hand-velocity");
@@ -191,6 +235,8 @@ static int make_pins(void)
     bad |= hal_pin_bit_newf(HAL_IN, &pins->enabled, component, "guard.enabled");
     bad |= hal_pin_bit_newf(HAL_IN, &pins->teleop, component, "guard.teleop-mode");
     bad |= hal_pin_bit_newf(HAL_IN, &pins->coordinated, component, "guard.coord-mode");
+    bad |= hal_pin_bit_newf(HAL_IN, &pins->identity, component, "guard.identity");
+    bad |= hal_pin_bit_newf(HAL_IN, &pins->pose_known, component, "guard.pose-known");
     bad |= hal_pin_u32_newf(HAL_OUT, &pins->nearest, component, "guard.nearest");
     bad |= hal_pin_float_newf(HAL_OUT, &pins->distance, component, "guard.distance");
     bad |= hal_pin_bit_newf(HAL_OUT, &pins->jog_stop, component, "guard.jog-stop");

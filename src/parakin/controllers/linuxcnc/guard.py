@@ -9,6 +9,7 @@ _NUMBERS = {
     "TRAILS": ("10.0", "cycles at full speed by which interpolated joints may be behind the pose"),
     "LATENCY": ("4.0", "cycles from a command to the axes' answer"),
     "PARTS": ("4", "of the way to where the machine stops, at whose ends joints' speeds are looked at"),
+    "FOR_CURVES": ("2.0", "times the way to a singularity that a stop takes: the law of its margin holds nearby only"),
     "SWINGS": ("1.0", "of a joint's speed: the most that a jog may ask for"),
 }
 
@@ -21,8 +22,7 @@ def name_guard(machine: Machine) -> str:
 def write_guard(machine: Machine) -> str:
     """Write the C source of a machine's guard."""
     numbers = [f"#define {name} {value} /* {why} */" for name, (value, why) in _NUMBERS.items()]
-    letters = f'static const char axis_letters[] = "{"".join(machine.axes).lower()}";'
-    body = "\n".join([*numbers, letters, "", read_source(__package__, "guard.c")])
+    body = "\n".join([*numbers, "", read_source(__package__, "guard.c")])
     return write_realtime_module(
         machine, RealtimeModule(name_guard(machine), "keeps moves by hand within the limits of", body)
     )

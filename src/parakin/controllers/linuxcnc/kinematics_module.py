@@ -5,6 +5,8 @@ from __future__ import annotations
 from ...machine import Machine
 from .realtime_module import RealtimeModule, hash_realtime_module, read_source, write_realtime_module
 
+_FILES = ("state.c", "inverse.c", "forward.c", "switch.c", "jacobian.c", "set_up.c")
+
 
 def name_kinematics(machine: Machine) -> str:
     """Name the kinematics module; of LinuxCNC's own only ``xyzab_tdr_kins`` is built likewise."""
@@ -22,4 +24,5 @@ def hash_kinematics(machine: Machine) -> str:
 
 
 def _make_module(machine: Machine) -> RealtimeModule:
-    return RealtimeModule(name_kinematics(machine), "LinuxCNC's kinematics of", read_source(__package__, "runtime.c"))
+    sources = read_source(f"{__package__}.kins", *_FILES)
+    return RealtimeModule(name_kinematics(machine), "LinuxCNC's kinematics of", sources, ("emcmotcfg.h",))

@@ -16,7 +16,7 @@ from ...kinematics.forward import STEADY
 from ...kinematics.start_modes import SETTLED
 from ...kinematics.turns import TURN
 from ...kinematics.wrist.pole_crossing import GAIN, compile_way_comparison
-from ...kinematics.wrist.pole_thresholds import EXACT, NEAR_MODE, STANDING, SWING
+from ...kinematics.wrist.pole_thresholds import EXACT, NEAR_MODE, SAME_AXIS, STANDING, SWING
 from ...machine import Machine
 from ...model.limits import Limit
 from ...performance.characteristic_length import choose_characteristic_length
@@ -106,6 +106,7 @@ def _write_numbers(machine: Machine) -> str:
         f"#define FREE {format_c(STANDING)} "
         "/* rad: nearer to a turning axis the tool's tells no angle in a program's digits: it stands still */",
         f"#define UPRIGHT {format_c(EXACT)} /* rad: nearer to upright C is told by rounding only */",
+        f"#define SAME_AXIS {format_c(SAME_AXIS)} /* what a tool's axis may be off another one by rounding */",
         f"#define TOLERANCE {open_by} /* mm by which the legs of an answer may fail to close */",
         *_write_wrist(machine),
         *_write_sides(machine),
@@ -118,6 +119,8 @@ def _write_numbers(machine: Machine) -> str:
         _write_array("int", "turning", [str(int(unit == "rad")) for unit in machine.joint_units]),
     ]
     columns = {axis: column for column, axis in enumerate(machine.axes)}
+    lines.append(f'MODEL const char axis_letters[] = "{"".join(machine.axes).lower()}";')
+    lines.append(_write_array("int", "axis_numbers", [str(list(_FIELDS).index(axis)) for axis in machine.axes]))
     places_and_turns = [str(columns.get(axis, -1)) for axis in _FIELDS]
     lines.append(_write_array("int", "place_columns", places_and_turns[:3]))
     lines.append(_write_array("int", "turn_columns", places_and_turns[3:]))

@@ -31,6 +31,7 @@ For LinuxCNC 2.9, {purpose}.
 {files}| `{name}_screen.py`, `{name}_screen.hal` | the window that shows the machine, and what brings it the joints |
 | `{name}_axis.py` | what LinuxCNC's screen AXIS does at its start |
 | `{name}.tbl` | the tool |
+| `{switches}_m428.ngc` to `m430` | M428 and M429, which choose the kinematics |
 | `{name}.ngc` | a first program: a square at home |
 
 Install the three modules once and start:
@@ -75,8 +76,14 @@ without it take the line with `{name}_screen.hal` out of `{name}.hal`.
 
 {limits}
 
-{pole}- A tool length offset (G43) counts along the tool: what the tool is longer than the machine's own. Switch it on
-  and off with the tool along Z, for else the joints would have to jump, and the machine is switched off.
+{pole}- A tool length offset (G43) counts along the tool: what the tool is longer than the machine's own. As it is
+  switched on or off the joints stay and the position follows, of a tilted tool X and Y too. A program's next motion
+  that takes a coordinate from before is refused: name X Y Z in it, or put `M66 E0 L0` behind G43.
+- M429 has every axis move the joint of its number (X the first joint), by MDI, programs and jogs, so that a machine
+  which stands at a singularity or a limit can be driven out joint by joint; give places with G53. M428 goes back to
+  the machine's kinematics. It is refused while the joints are beyond a singularity or a limit, and, until the machine
+  is homed again, once they have been so near to a singularity that they don't tell the pose. The window shows the true
+  pose meanwhile, and the guard stops jogs.
 - Speeds and accelerations that the description does not say were chosen, and are marked so in the ini file.
 
 The kinematics is compiled against LinuxCNC's headers and loaded into its programs, which are under the GNU General
@@ -101,6 +108,7 @@ def write_page(machine: Machine, equipment: Equipment | None = None) -> str:
     return _PAGE.format(
         title=escape(" ".join(machine.spec.title.split()), quote=False),
         name=machine.name,
+        switches=machine.name.lower(),
         kinematics=name_kinematics(machine),
         guard=name_guard(machine),
         planner=name_planner(machine),

@@ -9,6 +9,6 @@ the other mode, so that the first angle need not turn by half a turn; the second
 ``pole_crossing.py`` tells where that is so, for both pairs. Who asks it: a path of poses in :mod:`~..follow`; one point
 after the other in ``toolpath/linearise/continuation.py``; a tool path is led through the pole in
 ``toolpath/linearise/pole_passes.py``; ``toolpath/checking/motions.py`` proves that nothing else happens;
-``controllers/linuxcnc/runtime.c`` does the same as ``follow`` in the controller. All thresholds at poles stand in
+``controllers/linuxcnc/core.c`` does the same as ``follow`` in the controller. All thresholds at poles stand in
 ``pole_thresholds.py``.
 """

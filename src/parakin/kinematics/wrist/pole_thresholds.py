@@ -6,6 +6,7 @@ Angles are rad; those "off the pole" are between the tool's axis and the first a
 name       value, rad   reason
 ========== ============ ==============================================================================================
 EXACT      1e-9         off the pole: nearer, float64 tells the first angle by rounding only
+SAME_AXIS  1e-7         tool axis: nearer to the commanded one, a controller shows the commanded angles
 PRINTED    2e-6         off the pole: nearer, the six decimals of a CL file tell no first angle
 PROVED     4e-6         off the pole: a box of poses proved to be nearer counts as on it
 ASIDE      8e-6         second angle by which a pose is moved off the pole to have its rates bounded
@@ -36,6 +37,7 @@ import numpy as np
 from ...arrays import Array, Flags
 
 EXACT = 1e-9
+SAME_AXIS = 1e-7
 PRINTED = 2e-6
 PROVED = 2.0 * PRINTED
 ASIDE = 8e-6

@@ -12,7 +12,7 @@ TIMED_SLACK = 1.02
 NO_TOLERANCE = 0.1  # mm by which corners are cut where a program says G64 without a tolerance
 CHECKS = 16  # places in which a motion is looked at before it is taken
 SIGNAL = 63  # the analog output by which a program says that its motions have given times
-_FILES = ("state.c", "queue.c", "path.c", "profile.c", "execution.c", "interface.c")
+_FILES = ("state.c", "queue.c", "path.c", "profile.c", "execution.c", "tool.c", "admission.c", "interface.c")
 _NOTE = """\
 It keeps every joint's speed and acceleration, in programs, MDI and probing, at any feed override and in every pause.
    The ini file names it: [TRAJ] TPMOD.

@@ -132,7 +132,7 @@ def _find_box(scene: Scene, hull: Any) -> Any:
 def write_screen_hal(machine: Machine) -> str:
     """Write the HAL file that starts the window and brings it what moves; it comes after the machine's own."""
     name = name_screen(machine)
-    nets = [f"net {axis.lower()}-position => {name}.{axis.lower()}" for axis in machine.axes]
+    nets = [f"net {axis.lower()}-pose => {name}.{axis.lower()}" for axis in machine.axes]
     nets += [f"net told-{i} => {name}.joint-{i}" for i in range(len(machine.joints))]
     nets += [f"net {signal} => {name}.{signal}" for signal in ("tool-offset", "homed", "enabled", "jog-stop")]
     nets += [f"net {pin} guard.{pin} => {name}.{pin}" for pin in ("distance", "nearest")]

@@ -1,62 +1,3 @@
-/* How LinuxCNC asks for the model.
-
-   Both functions keep nothing from one call to the next: LinuxCNC hands the last joints to the inverse and the last
-   pose to the forward, and that is what they stay near to. It asks the inverse for the end points of moves to come as
-   well, which would spoil a memory. Nothing allocates, and every loop has an end. */
-
-/* What the kinematics is told through HAL. */
-typedef struct {
-    hal_float_t *tool_offset;      /* what the tool is longer than the machine's own, mm: motion.tooloffset.z */
-    hal_float_t *joint[JOINTS];    /* where the joints are commanded to be: joint.N.pos-cmd */
-    hal_bit_t *teleop, *coordinated; /* motion.teleop-mode, motion.coord-mode */
-} Pins;
-
-static Pins *pins;
-
-/* The motion controller stands between these two functions in the thread: what it asks for, the joints must do in one
-   cycle. Other questions are about the ends of moves to come. */
-static int steps_are_watched;
-static void begin_steps(void *arg, long period) { (void)arg, (void)period, steps_are_watched = 1; }
-static void end_steps(void *arg, long period) { (void)arg, (void)period, steps_are_watched = 0; }
-
-/* The inverse: joints for a pose, the wrist's and all turning ones near the last. */
-
-/* Whether joints can go from the last ones, or from where they are commanded to be, to these in a cycle; after a stop
-   LinuxCNC's last joints may be old. */
-static int can_step(const double *q, const double *last)
-{
-    double commanded[JOINTS];
-    int far_from_last = 0, far_from_commanded = 0;
-    for (int i = 0; i < JOINTS; i++)
-        commanded[i] = *pins->joint[i];
-    read_joints(commanded, commanded);
-    for (int i = 0; i < JOINTS; i++) {
-        const double step = STEP_FACTOR * CYCLE * joint_speed[i];
-        far_from_last |= !(fabs(q[i] - last[i]) <= step);
-        far_from_commanded |= !(fabs(q[i] - commanded[i]) <= COMMAND_LAG * step);
-    }
-    return !far_from_last || !far_from_commanded;
-}
-
-int kinematicsInverse(const EmcPose *world, double *joints,
-                      const KINEMATICS_INVERSE_FLAGS *iflags, KINEMATICS_FORWARD_FLAGS *fflags)
-{
-    double x[AXES], q[JOINTS], last[JOINTS];
-    (void)iflags;
-    (void)fflags;
-    read_pose(world, x);
-    read_joints(joints, last);
-    if (!finite_all(x, AXES) || !finite_all(last, JOINTS))
-        return -1;
-    shift_tip(x, *pins->tool_offset);
-    if (!find_joints(x, last, q) || !allowed(x, q) || !regular(x, q))
-        return -1;
-    if (steps_are_watched && !can_step(q, last))
-        return -1;
-    write_joints(q, joints);
-    return 0;
-}
-
 /* The forward: a pose for joints, near a given one. What does not close, or is another assembly, is none.
 
    The pose lies on the same side of the parallel singularities as the given one with its own joints. Where LinuxCNC's
@@ -259,6 +200,55 @@ static void write_near(double *x, const double *near)
 #endif
 }
 
+/* Write an orientation as it is commanded where the tool's axis is the commanded one within rounding: upright it tells no
+   C, and nearly so none that is worth showing. */
+static void write_as_commanded(double *x)
+{
+#if TOOL_AXIS
+    double k[3], commanded[3];
+    find_tool_axis(x, k);
+    find_tool_axis(commanded_pose, commanded);
+    for (int i = 0; i < 3; i++)
+        if (!(fabs(k[i] - commanded[i]) <= SAME_AXIS))
+            return;
+    for (int i = AXES - 2; i < AXES; i++)
+        x[i] = commanded_pose[i];
+#else
+    (void)x;
+#endif
+}
+
+/* The pose of joints near a given one, not on another side of the singularities than that; 0 where there is none. */
+static int find_pose_near(const double *near, const double *q, double *x)
+{
+    double side = HOME_SIDE;
+    int tells;
+    return finite_all(near, AXES) && pose_near(near, q, x, &side, &tells) && tells;
+}
+
+/* The pose of joints for homing, where LinuxCNC's guess may say nothing: then from home, whose turns it has not. */
+static int find_pose_for_homing(double *near, const double *q, double *x)
+{
+    double side = HOME_SIDE;
+    int tells;
+    if (finite_all(near, AXES) && pose_near(near, q, x, &side, &tells))
+        return 1;
+    if (!(side * HOME_SIDE > 0.0))
+        return 0;
+    memcpy(near, home, AXES * sizeof *near);
+    return pose_near(near, q, x, &side, &tells);
+}
+
+/* The pose of joints while LinuxCNC moves the pose. Its guess says nothing where the tool's length has changed; then the
+   last answer is the guess. */
+static int find_pose_in_motion(double *near, const double *q, double *x)
+{
+    if (find_pose_near(near, q, x))
+        return 1;
+    memcpy(near, own_pose, sizeof own_pose);
+    return pose_known && find_pose_near(near, q, x);
+}
+
 int kinematicsForward(const double *joints, EmcPose *world,
                       const KINEMATICS_FORWARD_FLAGS *fflags, KINEMATICS_INVERSE_FLAGS *iflags)
 {
@@ -266,54 +256,27 @@ int kinematicsForward(const double *joints, EmcPose *world,
     (void)fflags;
     (void)iflags;
     read_joints(joints, q);
-    read_pose(world, near);
     if (!finite_all(q, JOINTS))
         return -1;
-    shift_tip(near, *pins->tool_offset);
-    double side = HOME_SIDE;
-    int tells = 0;
-    const int found = finite_all(near, AXES) && pose_near(near, q, x, &side, &tells);
-    if (*pins->teleop || *pins->coordinated) {
-        if (!found || !tells)
-            return -1;
-    } else if (!found) { /* for homing: from home, whose turns the guess has not */
-        if (!(side * HOME_SIDE > 0.0))
-            return -1;
-        for (int i = 0; i < AXES; i++)
-            near[i] = home[i];
-        if (!pose_near(near, q, x, &side, &tells))
-            return -1;
+    if (*pins->identity) {
+        take_joints_as_axes(q, x);
+        write_pose(x, world);
+        return 0;
     }
+    read_pose(world, near);
+    shift_tip(near, *pins->tool_offset);
+    if (guess_is_old)
+        memcpy(near, own_pose, sizeof near);
+    const int in_motion = *pins->teleop || *pins->coordinated;
+    if (!(in_motion ? find_pose_in_motion(near, q, x) : find_pose_for_homing(near, q, x)))
+        return -1;
     if (!in_mode(x, q))
         return -1;
     write_near(x, near);
+    if (in_motion)
+        write_as_commanded(x);
+    keep_pose(x);
     shift_tip(x, -*pins->tool_offset);
     write_pose(x, world);
     return 0;
-}
-
-/* LinuxCNC's side. */
-
-KINEMATICS_TYPE kinematicsType(void) { return KINEMATICS_BOTH; }
-int kinematicsSwitchable(void) { return 0; }
-int kinematicsSwitch(int type) { (void)type; return 0; }
-
-EXPORT_SYMBOL(kinematicsInverse);
-EXPORT_SYMBOL(kinematicsForward);
-EXPORT_SYMBOL(kinematicsType);
-EXPORT_SYMBOL(kinematicsSwitchable);
-EXPORT_SYMBOL(kinematicsSwitch);
-
-static int set_up(void)
-{
-    pins = hal_malloc(sizeof *pins);
-    if (!pins)
-        return -1;
-    int failed = hal_pin_float_newf(HAL_IN, &pins->tool_offset, component, "kins.tool-offset");
-    for (int i = 0; i < JOINTS; i++)
-        failed |= hal_pin_float_newf(HAL_IN, &pins->joint[i], component, "kins.joint-%d", i);
-    failed |= hal_pin_bit_newf(HAL_IN, &pins->teleop, component, "kins.teleop-mode");
-    failed |= hal_pin_bit_newf(HAL_IN, &pins->coordinated, component, "kins.coord-mode");
-    failed |= hal_export_funct("kins.begin-steps", begin_steps, NULL, 0, 0, component);
-    return failed | hal_export_funct("kins.end-steps", end_steps, NULL, 0, 0, component);
 }

@@ -1,0 +1,45 @@
+/* The inverse: joints for a pose, the wrist's and all turning ones near the last. */
+
+/* The motion controller stands between two functions in the thread, which set and clear this: what it asks for, the
+   joints must do in one cycle. Other questions are about the ends of moves to come. */
+static int steps_are_watched;
+
+/* Whether joints can go from the last ones, or from where they are commanded to be, to these in a cycle; after a stop
+   LinuxCNC's last joints may be old. */
+static int can_step(const double *q, const double *last)
+{
+    double commanded[JOINTS];
+    int far_from_last = 0, far_from_commanded = !read_commanded_joints(commanded);
+    for (int i = 0; i < JOINTS; i++) {
+        const double step = STEP_FACTOR * CYCLE * joint_speed[i];
+        far_from_last |= !(fabs(q[i] - last[i]) <= step);
+        far_from_commanded |= !(fabs(q[i] - commanded[i]) <= COMMAND_LAG * step);
+    }
+    return !far_from_last || !far_from_commanded;
+}
+
+int kinematicsInverse(const EmcPose *world, double *joints,
+                      const KINEMATICS_INVERSE_FLAGS *iflags, KINEMATICS_FORWARD_FLAGS *fflags)
+{
+    double x[AXES], q[JOINTS], last[JOINTS];
+    (void)iflags;
+    (void)fflags;
+    read_pose(world, x);
+    read_joints(joints, last);
+    if (!finite_all(x, AXES) || !finite_all(last, JOINTS))
+        return -1;
+    if (*pins->identity) {
+        take_axes_as_joints(x, q);
+    } else {
+        shift_tip(x, *pins->tool_offset);
+        if (!find_joints(x, last, q) || !allowed(x, q) || !regular(x, q))
+            return -1;
+    }
+    if (steps_are_watched) {
+        if (!can_step(q, last))
+            return -1;
+        read_pose(world, commanded_pose);
+    }
+    write_joints(q, joints);
+    return 0;
+}

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import configparser
 import ctypes
 import json
 import re
@@ -27,6 +26,7 @@ from parakin.kinematics.wrist.pose_angles import find_nearest_direction
 from parakin.performance.singularities import compute_singularity_margins, list_margin_names
 
 sys.path.insert(0, str(Path(__file__).parent / "linuxcnc"))
+from ini_file import read_ini
 from stub import Stub, inward, outward, pose, world
 
 COUNT = 100_000
@@ -386,13 +386,6 @@ def test_the_models_distance_to_limits_is_zero_where_one_is_reached(m, probes):
 # The configuration
 
 
-def sections(text):
-    found = configparser.ConfigParser(strict=True, interpolation=None)
-    found.optionxform = str
-    found.read_string(re.sub(r"\nREMAP = (M\d+)", r"\nREMAP \1 =", text))  # the one key that comes more than once
-    return found
-
-
 def numbers(text):
     return np.array([float(word) for word in text.split()])
 
@@ -401,7 +394,7 @@ def numbers(text):
 def test_the_ini_says_what_the_machine_says(m):
     files = pk.make_linuxcnc_configuration(m)
     assert sorted(files) == sorted(f"{m.name}{end}" for end in ENDS)
-    ini = sections(files[f"{m.name}.ini"])
+    ini = read_ini(files[f"{m.name}.ini"])
     assert ini["KINS"]["KINEMATICS"] == f"{m.name}_kins"
     assert int(ini["KINS"]["JOINTS"]) == len(m.joints)
     assert ini["TRAJ"]["COORDINATES"].split() == list(m.axes)
@@ -423,7 +416,7 @@ def test_the_ini_says_what_the_machine_says(m):
 
 @everyone
 def test_the_axes_hold_the_poses_that_the_machine_can_take(m):
-    ini = sections(pk.make_linuxcnc_configuration(m)[f"{m.name}.ini"])
+    ini = read_ini(pk.make_linuxcnc_configuration(m)[f"{m.name}.ini"])
     ends = [[float(ini[f"AXIS_{axis}"][f"PROGRAM_{end}_LIMIT"]) for axis in m.axes] for end in ("MIN", "MAX")]
     scale = np.where(np.array(m.axis_units) == "rad", np.degrees(1.0), 1.0)
     low, high = np.array(ends) / scale
@@ -437,7 +430,7 @@ def test_the_axes_hold_the_poses_that_the_machine_can_take(m):
 
 @everyone
 def test_by_hand_an_axis_box_keeps_all_limits_and_all_axes_at_once_keep_the_joints_rates(m):
-    ini = sections(pk.make_linuxcnc_configuration(m)[f"{m.name}.ini"])
+    ini = read_ini(pk.make_linuxcnc_configuration(m)[f"{m.name}.ini"])
     keys = ("MIN_LIMIT", "MAX_LIMIT", "MAX_VELOCITY", "MAX_ACCELERATION")
     scale = np.where(np.array(m.axis_units) == "rad", np.degrees(1.0), 1.0)
     low, high, speed, acceleration = (np.array([float(ini[f"AXIS_{a}"][key]) for a in m.axes]) / scale for key in keys)

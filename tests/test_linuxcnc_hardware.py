@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import configparser
 import re
 import subprocess
 import sys
@@ -25,6 +24,7 @@ from parakin.controllers.linuxcnc.page import write_page
 
 sys.path.insert(0, str(Path(__file__).parent / "linuxcnc"))
 from cards import check_wiring, exports_of, merge, programs, write_mock
+from ini_file import read_ini
 from parport_machine import driven_by_parport
 from simulation import ALONE, AS_NOBODY, FIELDS, MODULES, simulated, trial, why_not
 
@@ -49,13 +49,6 @@ def configuration(name, card):
     equipment = equip_machine(machine, card)
     texts = {f"{name}.ini": write_ini(machine, equipment), f"{name}.hal": write_hal(machine, equipment)}
     return texts | {f"{name}.md": write_page(machine, equipment)} | dict(equipment.layout.files)
-
-
-def read_ini(text):
-    ini = configparser.ConfigParser(inline_comment_prefixes=None)
-    ini.optionxform = str
-    ini.read_string(text)
-    return ini
 
 
 def test_the_command_knows_the_cards():

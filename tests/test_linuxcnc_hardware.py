@@ -155,7 +155,7 @@ def test_the_command_writes_a_template(tmp_path, capsys):
 
 def replace_drivers(machine, hal):
     """The template without what needs a card or a program of LinuxCNC's; trial_card exports in their place."""
-    lines = ["loadrt homemod", "loadrt tpmod", "loadrt trial_card"]  # the first two by LinuxCNC itself
+    lines = ["loadrt homemod", "loadrt [TRAJ]TPMOD", "loadrt trial_card"]  # the first two by LinuxCNC itself
     for line in hal.split("\n"):
         if line.startswith("loadrt hal_parport"):
             names = ",".join(f"parport.{i}" for i in range(line.count(" out") + line.count(" in")))

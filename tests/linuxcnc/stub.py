@@ -32,11 +32,19 @@ class Kinematics:
         self.library = ctypes.CDLL(str(path))
         assert self.library.rtapi_app_main() == 0
         assert ctypes.c_int.in_dll(stub, "stub_ready").value == 1
+        self.tool_offset = ctypes.POINTER(ctypes.c_double).in_dll(stub, "stub_tool_offset").contents  # mm
         self.exported = stub.stub_count()  # its functions are the last
 
     def watch_steps(self, watched):
         """Let the inverse refuse steps that no drive can follow, as within a servo cycle, or not."""
         assert self.stub.stub_run(b"kins.begin-steps" if watched else b"kins.end-steps", self.exported)
+
+    def jacobian(self, joints, pose):
+        """The joints' rates by the pose's coordinates, (width, 9) in LinuxCNC's units, and the code."""
+        rates, flags = np.full((16, 9), np.nan), ctypes.c_ulong(0)
+        given = [np.ascontiguousarray(row, float) for row in (joints, pose)]
+        code = self.library.kinematicsJacobian(*map(_pointer, [*given, rates]), ctypes.byref(flags))
+        return rates[: self.width], code
 
     def _call(self, name, function, count, *arrays):
         codes = np.full(count, 99, np.int32)

@@ -50,10 +50,16 @@ int stub_run(const char *name, int before)
 
 static void *pin(size_t size) { return calloc(1, size); }
 
+/* The last module's length of the tool, which a test may set. */
+double *stub_tool_offset;
+
 int hal_pin_float_newf(int dir, double **data, int component, const char *format, ...)
 {
-    (void)dir, (void)component, (void)format;
-    return *data = pin(sizeof **data), 0;
+    (void)dir, (void)component;
+    *data = pin(sizeof **data);
+    if (!strcmp(format, "kins.tool-offset"))
+        stub_tool_offset = *data;
+    return 0;
 }
 
 int hal_pin_bit_newf(int dir, char **data, int component, const char *format, ...)

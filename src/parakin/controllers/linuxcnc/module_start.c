@@ -5,6 +5,9 @@ MODULE_LICENSE("GPL");
 static char *made = "";
 RTAPI_MP_STRING(made, "the making of the configuration that loads this");
 
+int rtapi_app_main(void); /* not every LinuxCNC declares them */
+void rtapi_app_exit(void);
+
 int rtapi_app_main(void)
 {
     if (*made && strcmp(made, MADE) != 0) {

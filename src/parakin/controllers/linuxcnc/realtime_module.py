@@ -18,7 +18,9 @@ _HEAD = """\
    Build and install:  sudo halcompile --install {name}.c
    {model} must lie beside it. */
 
+#ifndef __clang__ /* which knows no such pragma */
 #pragma GCC optimize ("O3")
+#endif
 
 {headers}
 

@@ -78,16 +78,16 @@ static double choose_blend(const Motion *m, const Motion *next)
 {
     if (m->kind != LINE || next->kind != LINE || !(m->tolerance > 0.0) || next->waits_for_spindle || m->stops)
         return 0.0;
-    double linear = 0.0, turning = 0.0, most = 0.5 * fmin(m->length, next->length);
+    double linear = 0.0, rotary = 0.0, most = 0.5 * fmin(m->length, next->length);
     for (int i = 0; i < AXES; i++) {
         const double change = (next->end[i] - next->start[i]) / next->length - (m->end[i] - m->start[i]) / m->length;
         if (turning_axis[i])
-            turning += change / DEGREE * (change / DEGREE);
+            rotary += change / DEGREE * (change / DEGREE);
         else
             linear += change * change;
     }
     /* The parabola passes the corner by a quarter of this change times the distance; a degree counts as a mm. */
-    const double change = sqrt(fmax(linear, turning));
+    const double change = sqrt(fmax(linear, rotary));
     return change * most > 4.0 * m->tolerance ? 4.0 * m->tolerance / change : most;
 }
 

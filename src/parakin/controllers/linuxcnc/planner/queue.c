@@ -58,16 +58,16 @@ static void compute_pose(const Motion *m, double at, double *x)
 /* Measure the way between two poses as LinuxCNC does: mm, or degrees where X Y Z stand still. */
 static double measure_way(const double *from, const double *to, int *turns_only)
 {
-    double linear = 0.0, turning = 0.0;
+    double linear = 0.0, rotary = 0.0;
     for (int i = 0; i < AXES; i++) {
         const double way = to[i] - from[i];
         if (turning_axis[i])
-            turning += way / DEGREE * (way / DEGREE);
+            rotary += way / DEGREE * (way / DEGREE);
         else
             linear += way * way;
     }
     *turns_only = !(linear > STILL * STILL);
-    return sqrt(*turns_only ? turning : linear);
+    return sqrt(*turns_only ? rotary : linear);
 }
 
 /* Describe the arc of a motion whose start and end are known; 0 where it is none. */

@@ -14,6 +14,7 @@ from pathlib import Path
 import linuxcnc
 
 MOST = 60.0  # s for a step
+LATE = 1.0  # s for the feedback to come to the command
 REST = 0.15  # s for which the machine must stand
 FLICKER = 1e-8  # mm and degrees: in joint mode the position is found anew in every cycle, and its last digits change
 DRAINING = 0.3  # s for the sampler's last rows
@@ -155,8 +156,14 @@ class Operator:
         raise TimeoutError
 
     def describe(self):
-        s = self.status
+        s, end = self.status, time.monotonic() + LATE
         s.poll()
+        while (
+            time.monotonic() < end
+            and max(abs(a - b) for a, b in zip(s.position, s.actual_position, strict=True)) > 1e-7
+        ):
+            time.sleep(0.01)  # on a busy computer the status may have been older than the rest that was waited for
+            s.poll()
         return {
             "on": s.task_state == linuxcnc.STATE_ON,
             "position": list(s.position),

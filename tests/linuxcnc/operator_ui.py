@@ -14,6 +14,7 @@ from pathlib import Path
 import linuxcnc
 
 MOST = 60.0  # s for a step
+TRAILS = 1e-7  # mm and degrees
 LATE = 1.0  # s for the feedback to come to the command
 REST = 0.15  # s for which the machine must stand
 FLICKER = 1e-8  # mm and degrees: in joint mode the position is found anew in every cycle, and its last digits change
@@ -154,6 +155,11 @@ class Operator:
                 return
             time.sleep(0.01)
         raise TimeoutError
+
+    def trails(self):
+        """Whether the position by the feedback is not the commanded one."""
+        pairs = zip(self.status.position, self.status.actual_position, strict=True)
+        return max(abs(a - b) for a, b in pairs) > TRAILS
 
     def describe(self):
         s, end = self.status, time.monotonic() + LATE

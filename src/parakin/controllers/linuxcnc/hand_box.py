@@ -24,9 +24,11 @@ _GROWTH = 0.1  # of a face's distance to the estimated range, by which it is mov
 _GROWTH_AGAIN = 0.3  # of a step that could not be proved, for the next one
 _LEAST_GROWTH = 0.02
 _CELLS = 2000  # cells of one proof
+_BOUND_CELLS = 20000  # that are bisected for the speeds
 _SAMPLES = 2000
 _STEP = 1e-4  # mm and rad, of second differences
 _FOR_CURVES = 0.5  # of the joints' accelerations, for the bend of axes in joints at full speed
+_MOST_BOUND = 2.0  # of the most use, for its bound over a cell: intervals give some twice of what there is
 _MOST_USE = 2.0  # of home's: how much faster joints may have to be in the box, for the same speeds of the axes
 _ROUNDS = 24  # bisections of the cells whose bound is far above what is seen
 _NEAR_ENOUGH = 1.15  # of what is seen: a bound that is no greater is not made better
@@ -146,7 +148,7 @@ class _BoxProof:
         slack = self.machine.margins(0.5 * (low + high)) - change.sum(2)
         slack = np.fmax(slack, self.rates.bound_margins(low, high)[0])
         use = self._use_rates(down, up, self.slowest[:, 0], self.drives[:, 0])
-        decided = (slack >= 0.0).all(1) & (use <= self.most_use) & self.rates.prove_regular(low, high)
+        decided = (slack >= 0.0).all(1) & (use <= _MOST_BOUND * self.most_use) & self.rates.prove_regular(low, high)
         worst = np.take_along_axis(change, slack.argmin(1)[:, None, None], 1)[:, 0]
         return decided, np.where((slack < 0.0).any(1), worst.argmax(1), (half / self.whole).argmax(1))
 
@@ -161,7 +163,7 @@ class _BoxProof:
             seen = max(seen, float(self._measure_use(middles, middles, speed, most).max()))
             use = self._measure_use(*cells, speed, most)
             wide = use > _NEAR_ENOUGH * seen
-            if not wide.any() or wide.sum() > _CELLS:
+            if not wide.any() or wide.sum() > _BOUND_CELLS:
                 break
             cells = _bisect(cells[0][wide], cells[1][wide], np.full(wide.sum(), number % len(low)))
         return max(_NEAR_ENOUGH * seen, float(use.max()))

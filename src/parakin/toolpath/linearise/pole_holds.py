@@ -193,7 +193,10 @@ class _HoldBuilder:
         """
         steps, (first, last) = self.steps, run
         on_circle = np.abs(distance - self.aside) < (1.0 - _STILL) * self.aside
-        if not self.aside or not (on_circle | (distance < PRINTED) | (distance > _STILL * self.radius)).all():
+        at_end = np.zeros(len(distance), np.bool_)
+        at_end[[0, -1][: len(distance)]] = True
+        at_end &= distance > _STILL * self.radius
+        if not self.aside or not (on_circle | (distance < PRINTED) | at_end).all():
             return False
         near = first + np.flatnonzero(steps.nearest[first : last + 1] < _STILL * self.aside)
         ends_there = np.hypot(*steps.last[near].T) < PRINTED

@@ -106,7 +106,7 @@ def test_a_corner_on_the_pole_is_told():
     result = linearise_path(posted, "joints", chord=0.05)
     assert within(posted, result, "joints", 0.05, 1e-3) <= 1.0
     assert [note.text for note in result.path.notes] == [
-        "theta1 turns by 90° at the head's pole, the tool held 0.011° beside it; the tip stands still"
+        "theta1 turns by 90° at the head's pole, the tool held 0.0069° beside it; the tip stands still"
     ]
 
 

@@ -117,7 +117,7 @@ def _prepare_at(
         from ..toolpath.linearise.rewinds import Clearance, rewind_path
 
         clearance = Clearance(options.rewind, options.clearance)
-        lean = options.tolerances.allow_lean(interpolation)
+        lean = options.tolerances.share_with_interpolation(interpolation).axis
         rewound = rewind_path(machine, path, clearance, workpiece=workpiece, mode=mode, angle=lean)
         path, rewinds = rewound.path, rewound.rewinds
     prepare_job = partial(

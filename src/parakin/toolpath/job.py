@@ -22,26 +22,31 @@ from .posting.tool_lengths import fit_tool_lengths
 from .timing import Corners, Trajectory, plan_trajectory
 from .timing.stops import find_stops, sum_dwells
 
+_INTERPOLATED = 0.85  # of the axis's tolerance: what the controller's interpolation may take
 _MOST_TIMED = 50_000  # records of a path that is off limits: no program is made of it, and its time would take minutes
 
 
 class Tolerances(NamedTuple):
-    """How far the tool may be off the programmed path: its tip, mm, and its axis, rad."""
+    """How far the tool may be off the programmed path: its tip, mm, and its axis, rad.
+
+    Of both a part is for the controller's interpolation and the rest for rounding corners. Most of the axis's is for
+    the first, in which the path is led through poles: what it allows there no joint has to turn for.
+    """
 
     tip: float = 0.01
     axis: float = 1e-3
 
-    def halve(self) -> Tolerances:
-        """Return half of both: one half is for the controller's interpolation, the other for rounding corners."""
-        return Tolerances(0.5 * self.tip, 0.5 * self.axis)
-
-    def allow_lean(self, interpolation: Interpolation) -> float:
-        """Return what each step of linearising may take the tool's axis off, rad.
+    def share_with_interpolation(self, interpolation: Interpolation) -> Tolerances:
+        """Return the part of both that each step of linearising may take.
 
         The pose's angles change evenly in either case, as the trajectory has them, and the tip is on its line by then:
         where the joints go evenly, two steps share the tolerance of the axis.
         """
-        return self.halve().axis / (1 if interpolation == "pose" else 2)
+        return Tolerances(0.5 * self.tip, _INTERPOLATED * self.axis / (1 if interpolation == "pose" else 2))
+
+    def share_with_corners(self) -> Tolerances:
+        """Return the part of both that rounding corners may take."""
+        return Tolerances(0.5 * self.tip, (1.0 - _INTERPOLATED) * self.axis)
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,8 +113,8 @@ def prepare(
     ----------
     machine, path, workpiece, mode : as for :func:`~.posting.post.post_path`
     interpolation : what the controller moves evenly between two records, the tool's ``pose`` or the ``joints``
-    tolerances : of tip and axis about the programmed path; half of each is for the controller's interpolation, half for
-        rounding corners
+    tolerances : of tip and axis about the programmed path, for the controller's interpolation and for rounded corners
+        together
     corners : ``round`` or ``stop``, as for :func:`~.timing.plan.plan_trajectory`
     progress : called now and then with the fraction done, 0 to 1
 
@@ -123,15 +128,14 @@ def prepare(
     def report_stage(begin: float, end: float) -> Progress:
         return lambda fraction: report(begin + (end - begin) * fraction)
 
-    half = tolerances.halve()
+    (tip, lean), rounded = tolerances.share_with_interpolation(interpolation), tolerances.share_with_corners()
     path = fit_tool_lengths(machine, path, workpiece=workpiece)
     programmed = post_path(machine, path, workpiece=workpiece, mode=mode, progress=report_stage(0.0, 0.1))
     posted, trajectory, unplanned = programmed, None, ""
-    lean = tolerances.allow_lean(interpolation)
     try:
-        posted = linearise_path(posted, "pose", chord=half.tip, angle=lean, progress=report_stage(0.1, 0.2))
+        posted = linearise_path(posted, "pose", chord=tip, angle=lean, progress=report_stage(0.1, 0.2))
         if interpolation == "joints":
-            posted = linearise_path(posted, "joints", chord=half.tip, angle=lean, progress=report_stage(0.2, 0.4))
+            posted = linearise_path(posted, "joints", chord=tip, angle=lean, progress=report_stage(0.2, 0.4))
     except PoseError as error:
         unplanned = str(error)
     if is_wound_up(posted):
@@ -142,7 +146,11 @@ def prepare(
     if not unplanned:
         try:
             trajectory = plan_trajectory(
-                posted, corners=corners, tolerance=half.tip, axis_tolerance=half.axis, stops=find_stops(posted.path)
+                posted,
+                corners=corners,
+                tolerance=rounded.tip,
+                axis_tolerance=rounded.axis,
+                stops=find_stops(posted.path),
             )
             if not trajectory.keeps_jerk:
                 posted = _note(posted, "the limits of jerk are not kept: with them it would take many times as long")
@@ -151,7 +159,7 @@ def prepare(
             unplanned = str(error)
     report(1.0)
     outside = find_outside(programmed, path, workpiece)
-    return Job(programmed, posted, trajectory, unplanned, sum_dwells(path), half.tip, outside)
+    return Job(programmed, posted, trajectory, unplanned, sum_dwells(path), rounded.tip, outside)
 
 
 def _note_wound_up(posted: Posted) -> Posted:

@@ -28,11 +28,11 @@ from .pole_steps import PoleSteps, meet_circle
 from .poles import Pole
 
 # Shares of the angle tolerance. Their sum is what an axis may be moved; the rest is for rounding.
-NEAR = 0.72  # an axis no farther off the pole is held
-_OFF_POLE = 0.2  # off the pole, where it is held
+NEAR = 0.8  # an axis no farther off the pole is held
+_OFF_POLE = 0.12  # off the pole, where it is held
 _ARC = np.radians(15.0)  # a turn beside the pole is divided into arcs no longer
 _STRAIGHT = np.radians(1.0)  # what turns less needs no record of its own
-_WANDER = 0.2  # fraction of the circle: what even poses may leave it by between two records
+_WANDER = 0.3  # fraction of the circle: what even poses may leave it by between two records
 _MOST_BETWEEN = 64  # records into which a motion is divided for that
 _CLOSE = 0.1  # fraction of the circle: records so close keep the way over the pole straight
 _STILL = 0.95  # of the circle: the middle of an arc comes no nearer

@@ -369,7 +369,7 @@ def test_pole_thresholds_and_modes_are_the_wrists_matter(module):
 # Numbers about poles that are no angles off a pole: fractions of the tolerance or of a way, ratios, steps.
 FRACTIONS = {
     "controllers.linuxcnc.approach._COUNTS",
-    "toolpath.linearise.pole_holds.NEAR",
+    "toolpath.posting.working_mode.HELD",
     "toolpath.linearise.pole_holds._OFF_POLE",
     "toolpath.linearise.pole_holds._ARC",
     "toolpath.linearise.pole_holds._CLOSE",

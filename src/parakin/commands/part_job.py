@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from ..controllers.controller import ControllerRun
     from ..machine import Machine
     from ..toolpath.job import Job, Tolerances
+    from ..toolpath.linearise.deviation import Interpolation
     from ..toolpath.linearise.rewinds import Rewind
     from ..toolpath.path import ToolPath
     from ..toolpath.placing.placement import Placement
@@ -34,6 +35,21 @@ class JobOptions:
     rewind: float | None
     clearance: float | None
     turn: Literal["home", "free"] = "home"
+
+    @property
+    def interpolation(self) -> Interpolation:
+        """What the controller moves evenly."""
+        return load_controller(self.target).interpolation if self.target else "pose"
+
+    @property
+    def lean(self) -> float:
+        """The rad by which the path's axis may be moved when it is led through poles."""
+        return self.tolerances.share_with_interpolation(self.interpolation).axis
+
+    @property
+    def rewinds(self) -> bool:
+        """Whether turns of a joint may be taken back."""
+        return self.rewind is not None or self.clearance is not None
 
 
 class PreparedPart(NamedTuple):
@@ -79,57 +95,75 @@ def prepare_part(
 ) -> PreparedPart:
     """Prepare a part on a workpiece, or at the best placement within bounds ``place`` at which the whole job runs.
 
-    Where it runs at none of the placements found, it is prepared at the best of them.
+    Placements in the mode with head and table's other sign are searched where it runs at none of those found first.
+    Where it runs nowhere, it is prepared at the best of all.
     """
     if place is None:
-        return _prepare_at(machine, path, workpiece, options, progress)
+        return _prepare_in_modes(machine, path, workpiece, options, progress)
     from ..toolpath.placing.placement import find_placements
     from ..toolpath.tool_turn.turned_placement import find_turned_placements
 
     saying = progress.stage("placing the part", 0.1, 0.3)
-    find = find_turned_placements if options.turn == "free" else find_placements
-    placements = find(machine, path, parse_bounds(place), mode=options.mode, progress=saying)
-    prepared = []
-    for placement in placements:
-        prepared_part = _prepare_at(machine, path, placement.workpiece, options, progress, placement)
-        prepared.append(prepared_part)
-        if prepared_part.job.runs:
-            return prepared_part
+    find = find_turned_placements
+    if options.turn == "home":
+        find = partial(find_placements, rewinds=options.rewinds, angle=options.lean)
+    prepared, modes = list[PreparedPart](), [options.mode]
+    while modes:
+        mode = modes.pop()
+        placements = find(machine, path, parse_bounds(place), mode=mode, progress=saying)
+        for placement in placements:
+            prepared_part = _prepare_at(machine, path, placement.workpiece, placement.mode, options, progress)
+            prepared_part = prepared_part._replace(placement=placement)
+            if prepared_part.job.runs:
+                return prepared_part._replace(placement=placement.measure(prepared_part.job.posted))
+            prepared.append(prepared_part)
+        if mode is None:
+            searched = {placement.mode for placement in placements}
+            modes = [other for other in machine.head_modes(machine.mode) if other not in searched]
     return prepared[0]
+
+
+def _prepare_in_modes(
+    machine: Machine, path: ToolPath, workpiece: Array | None, options: JobOptions, progress: ProgressBar
+) -> PreparedPart:
+    """Prepare a part in the mode asked for; without one, if it is rewound and does not run, in the other one, too."""
+    prepared = _prepare_at(machine, path, workpiece, options.mode, options, progress)
+    others = machine.head_modes(prepared.job.posted.mode)[1:] if options.mode is None and options.rewinds else []
+    if prepared.job.runs or prepared.job.outside is not None or not others:
+        return prepared
+    in_other_mode = _prepare_at(machine, path, workpiece, others[0], options, progress)
+    return in_other_mode if in_other_mode.job.runs else prepared
 
 
 def _prepare_at(
     machine: Machine,
     path: ToolPath,
     workpiece: Array | None,
+    mode: str | None,
     options: JobOptions,
     progress: ProgressBar,
-    placement: Placement | None = None,
 ) -> PreparedPart:
     from ..toolpath.job import Job, prepare
     from ..toolpath.turned_job import prepare_turned
 
-    mode = options.mode if placement is None else placement.mode
     controller = load_controller(options.target) if options.target else None
-    interpolation = controller.interpolation if controller else "pose"
     rewinds: tuple[Rewind, ...] = ()
-    if options.rewind is not None or options.clearance is not None:
+    if options.rewinds:
         from ..toolpath.linearise.rewinds import Clearance, rewind_path
 
         clearance = Clearance(options.rewind, options.clearance)
-        lean = options.tolerances.share_with_interpolation(interpolation).axis
-        rewound = rewind_path(machine, path, clearance, workpiece=workpiece, mode=mode, angle=lean)
-        path, rewinds = rewound.path, rewound.rewinds
+        rewound = rewind_path(machine, path, clearance, workpiece=workpiece, mode=mode, angle=options.lean)
+        path, rewinds, mode = rewound.path, rewound.rewinds, rewound.mode
     prepare_job = partial(
         prepare_turned if options.turn == "free" else prepare, machine, path, workpiece=workpiece, mode=mode,
-        tolerances=options.tolerances, interpolation=interpolation, corners=options.corners,
+        tolerances=options.tolerances, interpolation=options.interpolation, corners=options.corners,
         progress=progress.stage("checking and timing", 0.3, 0.7),
     )  # fmt: skip
     prepared = prepare_job()
     job, turned = (prepared, None) if isinstance(prepared, Job) else (prepared.job, prepared)
     if controller is None or job.trajectory is None:
-        return PreparedPart(job, placement, rewinds, None, turned)
+        return PreparedPart(job, None, rewinds, None, turned)
     run = controller.build_run(job.trajectory)
     path = replace(job.posted.path, notes=(*run.notes, *job.posted.path.notes))
     job = replace(job, posted=replace(job.posted, path=path))
-    return PreparedPart(job, placement, rewinds, run, turned)
+    return PreparedPart(job, None, rewinds, run, turned)

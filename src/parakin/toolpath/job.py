@@ -118,12 +118,38 @@ def prepare(
     corners : ``round`` or ``stop``, as for :func:`~.timing.plan.plan_trajectory`
     progress : called now and then with the fraction done, 0 to 1
 
+    Where no mode is given and the job does not run in the one that the records suggest, it is prepared with head and
+    table's other sign, too, which is taken if it runs there.
+
     Raises :class:`PoseError` or :class:`InputError` for invalid arguments. What the machine can't do raises nothing: it
     is an offence of :attr:`Job.posted` or the reason in :attr:`Job.unplanned`.
     """
     for name, value, unit in zip(tolerances._fields, tolerances, ("mm", "rad"), strict=True):
         check_positive(f"tolerances.{name}", value, unit)
     report = progress or (lambda fraction: None)
+
+    def prepare_in(mode: str | None) -> Job:
+        return _prepare_in(machine, path, workpiece, mode, interpolation, tolerances, corners, report)
+
+    job = prepare_in(mode)
+    others = machine.head_modes(job.posted.mode)[1:] if mode is None else []
+    if job.runs or job.outside is not None or not others:
+        return job
+    in_other_mode = prepare_in(others[0])
+    return in_other_mode if in_other_mode.runs else job
+
+
+def _prepare_in(
+    machine: Machine,
+    path: ToolPath,
+    workpiece: Array | None,
+    mode: str | None,
+    interpolation: Interpolation,
+    tolerances: Tolerances,
+    corners: Corners,
+    report: Progress,
+) -> Job:
+    """Prepare a job in a mode, or in the one that the records suggest."""
 
     def report_stage(begin: float, end: float) -> Progress:
         return lambda fraction: report(begin + (end - begin) * fraction)

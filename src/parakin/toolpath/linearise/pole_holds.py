@@ -21,14 +21,14 @@ from ...kinematics.wrist.pose_angles import find_nearest_direction, flip_azimuth
 from ..path import Note
 from ..posting.frames import compute_poses
 from ..posting.posted import Posted
+from ..posting.working_mode import HELD
 from ..programmed_path import ProgrammedPath, compute_tool_axes
 from .continuation import MACHINE_FRAME
 from .pole_routing import PolePass, PoleRoute
 from .pole_steps import PoleSteps, meet_circle
 from .poles import Pole
 
-# Shares of the angle tolerance. Their sum is what an axis may be moved; the rest is for rounding.
-NEAR = 0.8  # an axis no farther off the pole is held
+# Share of the angle tolerance. The sum of this and HELD is what an axis may be moved; the rest is for rounding.
 _OFF_POLE = 0.12  # off the pole, where it is held
 _ARC = np.radians(15.0)  # a turn beside the pole is divided into arcs no longer
 _STRAIGHT = np.radians(1.0)  # what turns less needs no record of its own
@@ -88,7 +88,7 @@ def find_pole_holds(
     aside = 0.0 if pole.joint is None else _OFF_POLE * angle
     if pole.joint is not None and aside < NEAR_HOLD:
         return []
-    radius = NEAR * angle
+    radius = HELD * angle
     routed = np.zeros(len(steps.record), np.bool_)
     for route in routes:
         routed[route.steps[0] : route.steps[1] + 1] = True

@@ -84,10 +84,12 @@ class RewoundPath:
 
     path : with their records and notes
     rewinds : in order
+    mode : the working mode for which they are
     """
 
     path: ToolPath
     rewinds: tuple[Rewind, ...]
+    mode: str
 
     def __repr__(self) -> str:
         return f"<parakin rewound path: {len(self.path)} records, {len(self.rewinds)} rewinds>"
@@ -129,9 +131,9 @@ def rewind_path(
     path = fit_tool_lengths(machine, path)
     posted = post_path(machine, path, workpiece=workpiece, mode=mode)
     if not is_wound_up(posted):
-        return RewoundPath(path, ())
+        return RewoundPath(path, (), posted.mode)
     led = _lead_through_poles(posted, angle)
-    return _RewindBuilder(led, clearance).build() if is_wound_up(led.posted) else RewoundPath(path, ())
+    return _RewindBuilder(led, clearance).build() if is_wound_up(led.posted) else RewoundPath(path, (), posted.mode)
 
 
 class _LedPath(NamedTuple):
@@ -226,7 +228,7 @@ class _RewindBuilder:
             end = int(self.ends[after - int(self.counts[0]), start])
         notes = [*(rewind.describe() for rewind in rewinds), *notes]
         path = replace(_insert_rewinds(self.path, added), notes=(*self.path.notes, *notes))
-        return RewoundPath(path, tuple(rewinds))
+        return RewoundPath(path, tuple(rewinds), self.mode)
 
     def _find_rewind(self, start: int, end: int, before: int) -> tuple[Rewind, _Records, int] | None:
         """Find the rewind that ends a stretch from ``start``, which can't go on to ``end``, and the turns behind it."""

@@ -10,7 +10,6 @@ import numpy as np
 
 from ...arrays import Array, Flags, Indices
 from ...kinematics.turns import TURN
-from ...kinematics.wrist.pole_thresholds import PRINTED
 from ...machine import Machine
 from ..path import ToolPath, select_records
 from ..posting.frames import PathLimit, build_frame_from_angles, compose_frames, compute_poses
@@ -41,6 +40,19 @@ class PlacementScore(NamedTuple):
     margins: Array
 
 
+class Steering(NamedTuple):
+    """How a path is followed at a placement.
+
+    mode : working mode
+    held : rad off a wrist's pole: nearer, the tool is held, and the first joint stands still
+    rewinds : the first joint's turns are taken back, and the ends of its range do not count
+    """
+
+    mode: str
+    held: float
+    rewinds: bool
+
+
 @dataclass(frozen=True, eq=False)
 class PlacementMargins:
     """The margins that placements leave; these are points (d,) of the unit box, between the bounds of ``axes``.
@@ -54,7 +66,7 @@ class PlacementMargins:
 
     machine: Machine
     path: ToolPath
-    mode: str
+    steering: Steering
     axes: tuple[str, ...]
     low: Array
     high: Array
@@ -78,21 +90,23 @@ class PlacementMargins:
         """
         path = select_records(self.path, records if track is None else track)
         rows = slice(None) if track is None else np.searchsorted(track, records)
-        all_poses, all_joints, path_rows = [], [], []
+        all_poses, all_joints, path_rows, mode = [], [], [], self.steering.mode
         for point in points:
             poses, path_limits = self._compute_poses(point, path)
             if track is None:
-                joints = self.machine.follow(poses, self.mode, PRINTED)
+                joints = self.machine.follow(poses, mode, self.steering.held)
             else:
-                solution = follow_working_mode(self.machine, path, self._sample(point, path, poses), self.mode)
+                sampled = self._sample(point, path, poses)
+                solution = follow_working_mode(self.machine, path, sampled, mode, self.steering.held)
                 poses, joints = solution.poses[rows], solution.joints[rows]
             all_poses.append(poses)
             all_joints.append(joints)
             path_rows.append(_list_path_rows(path_limits, rows))
-        margins = self.machine.margins(np.concatenate(all_poses), np.concatenate(all_joints), self.mode)
+        margins = self.machine.margins(np.concatenate(all_poses), np.concatenate(all_joints), mode)
         if track is None:
             self._turn_to_middle(margins)
         is_reach, spans = self._spans
+        margins[:, self._rewound] = spans[self._rewound]
         margins = (margins / spans).reshape(len(points), len(records), -1)
         hard = np.concatenate([margins[:, :, is_reach].reshape(len(points), -1), np.array(path_rows)], axis=1)
         return hard, margins[:, :, ~is_reach].reshape(len(points), -1)
@@ -100,12 +114,14 @@ class PlacementMargins:
     def score_placement(self, point: Array) -> PlacementScore:
         """Score the placement at a point over the whole path."""
         poses, path_limits = self._compute_poses(point, self.path)
-        solution = follow_working_mode(self.machine, self.path, self._sample(point, self.path, poses), self.mode)
+        sampled, mode = self._sample(point, self.path, poses), self.steering.mode
+        solution = follow_working_mode(self.machine, self.path, sampled, mode, self.steering.held)
         is_reach, spans = self._spans
         names, is_hard = list(self.machine.limits), is_reach
         least, records = np.full(len(names), np.inf), np.zeros(len(names), np.int64)
-        for block, margins in split_margins(self.machine, solution.poses, solution.joints, self.mode):
+        for block, margins in split_margins(self.machine, solution.poses, solution.joints, mode):
             margins = margins / spans
+            margins[:, self._rewound] = 1.0
             margins = np.where(np.isnan(margins), np.where(is_reach, -1.0, np.inf), margins)
             tightest = margins.argmin(axis=0)
             here = margins[tightest, np.arange(len(names))]
@@ -126,6 +142,15 @@ class PlacementMargins:
         return PlacementScore(worth, float(counted[index]), names[index], int(records[index]), records, least)
 
     @cached_property
+    def _rewound(self) -> Indices:
+        """The limits that rewinds keep; their margins count as half the range."""
+        machine, wrist = self.machine, self.machine.wrist
+        if wrist is None or not self.steering.rewinds:
+            return np.empty(0, np.int64)
+        name = machine.joints[wrist.first]
+        return np.array([i for i, limit in enumerate(machine.limits) if limit in (f"{name}.min", f"{name}.max")])
+
+    @cached_property
     def _spans(self) -> tuple[Flags, Array]:
         """Which limits are a mere reach, and what each limit's margin is relative to, (limits,)."""
         uses, quantities = list_ranges(self.machine)
@@ -139,7 +164,7 @@ class PlacementMargins:
         return compute_poses(self.machine, path.tip, path.axis, self._compose_frame(point, path), path.turns)
 
     def _sample(self, point: Array, path: ToolPath, poses: Array) -> SampledPath:
-        return sample_path(self.machine, path, self._compose_frame(point, path), self.mode, poses)
+        return sample_path(self.machine, path, self._compose_frame(point, path), self.steering.mode, poses)
 
     def _compose_frame(self, point: Array, path: ToolPath) -> Array:
         return compose_frames(self.build_workpiece(point), path.frame)

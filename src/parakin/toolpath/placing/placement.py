@@ -4,20 +4,22 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TypeAlias
 
 import numpy as np
 
-from ...arguments import check_arguments, parse_range
+from ...arguments import check_arguments, check_positive, parse_range
 from ...arrays import Array, AxisRange, Progress
 from ...errors import PoseError, quote
 from ...machine import Machine
 from ...units import AXIS_UNITS
 from ..path import ToolPath
+from ..posting.posted import Posted
+from ..posting.range_use import find_tightest_limit, measure_range_use
 from ..posting.tool_lengths import fit_tool_lengths
-from ..posting.working_mode import list_candidate_modes
-from .margins import AXES, PlacementMargins, PlacementScore
+from ..posting.working_mode import HELD, list_candidate_modes
+from .margins import AXES, PlacementMargins, PlacementScore, Steering
 from .placement_search import PlacementSearch
 
 AxisRanges: TypeAlias = Mapping[str, AxisRange | Sequence[float | str]]
@@ -45,6 +47,18 @@ class Placement:
     record: int
     tried: int
 
+    def measure(self, posted: Posted) -> Placement:
+        """Return it with the margin that a posted path leaves there, where its own records break a limit.
+
+        The path may be led through poles and rewound; ``record`` is then one of its records.
+        """
+        if self.allowed:
+            return self
+        relative = measure_range_use(posted)[1]
+        record = int(relative.argmin())
+        limit = find_tightest_limit(posted, record)
+        return replace(self, margin=float(relative[record]), limit=limit, record=record)
+
     @property
     def allowed(self) -> bool:
         """Whether the machine can follow the whole path there."""
@@ -59,18 +73,32 @@ class Placement:
 
 @check_arguments
 def find_placement(
-    machine: Machine, path: ToolPath, bounds: AxisRanges, *, mode: str | None = None, progress: Progress | None = None
+    machine: Machine,
+    path: ToolPath,
+    bounds: AxisRanges,
+    *,
+    mode: str | None = None,
+    rewinds: bool = False,
+    angle: float = 5e-4,
+    progress: Progress | None = None,
 ) -> Placement:
     """Find the placement within bounds that has the greatest least margin over all records of a path.
 
     The first of :func:`find_placements`, whose arguments and errors these are.
     """
-    return find_placements(machine, path, bounds, mode=mode, progress=progress)[0]
+    return find_placements(machine, path, bounds, mode=mode, rewinds=rewinds, angle=angle, progress=progress)[0]
 
 
 @check_arguments
 def find_placements(
-    machine: Machine, path: ToolPath, bounds: AxisRanges, *, mode: str | None = None, progress: Progress | None = None
+    machine: Machine,
+    path: ToolPath,
+    bounds: AxisRanges,
+    *,
+    mode: str | None = None,
+    rewinds: bool = False,
+    angle: float = 5e-4,
+    progress: Progress | None = None,
 ) -> list[Placement]:
     """Find the placements within bounds at which the least margin over all records of a path is greatest, best first.
 
@@ -82,6 +110,9 @@ def find_placements(
     machine, path : as :func:`~..posting.post.post_path` takes them
     bounds : by axis the least and the greatest value, mm and rad or texts with their unit
     mode : working mode; None: the default one, and head and table's other sign where that allows no placement
+    rewinds : the turns of a wrist's first joint are taken back, so that the ends of its range do not count
+    angle : rad, as :func:`~..linearise.linearise.linearise_path` takes it: a tool's axis so near to a wrist's pole that
+        it will be held there turns no joint
     progress : called now and then with the fraction done, 0 to 1
 
     The same arguments give the same placements. The search (:class:`~.placement_search.PlacementSearch`) finds the
@@ -105,7 +136,8 @@ def find_placements(
     low_high = np.array([ranges[axis] for axis in axes]).reshape(-1, 2)
     results, tried = list[tuple[Array, PlacementScore, PlacementMargins]](), 0
     for candidate in list_candidate_modes(machine, mode):
-        margins = PlacementMargins(machine, path, candidate, axes, low_high[:, 0], low_high[:, 1], fixed)
+        way = Steering(candidate, HELD * check_positive("angle", angle, "rad"), rewinds)
+        margins = PlacementMargins(machine, path, way, axes, low_high[:, 0], low_high[:, 1], fixed)
         search = PlacementSearch(margins, report)
         results += [(point, score, margins) for point, score in search.run()]
         tried += search.tried
@@ -120,4 +152,4 @@ def _describe_placement(point: Array, score: PlacementScore, margins: PlacementM
     values = margins.list_values(point)
     values = {axis: values[axis] for axis in AXES if axis in values}
     workpiece = margins.build_workpiece(point)
-    return Placement(workpiece, values, margins.mode, score.margin, score.limit, score.record, tried)
+    return Placement(workpiece, values, margins.steering.mode, score.margin, score.limit, score.record, tried)

@@ -115,3 +115,12 @@ def measure_range_use(posted: Posted) -> tuple[list[RangeUse], Array]:
             if quantities[number] >= 0:
                 uses[quantities[number]].add_margins(limit, margins[:, number], block.start)
     return uses, relative
+
+
+def find_tightest_limit(posted: Posted, record: int) -> str:
+    """Find the limit with the least relative margin at a record of a path that the machine can reach."""
+    machine = posted.machine
+    uses, quantities = list_ranges(machine)
+    margins = machine.margins(posted.poses[record], posted.joints[record], posted.mode)
+    relative = [margin / uses[i].span if i >= 0 else inf for i, margin in zip(quantities, margins, strict=True)]
+    return machine.limits[int(np.argmin(relative))] if relative else ""

@@ -14,6 +14,8 @@ from ..path import ToolPath
 from .path_samples import SampledPath
 from .turn_counts import TurningJoint, choose_turns, find_turns_in_range
 
+HELD = 0.8  # fraction of the angle tolerance: an axis no farther off a pole is held beside it
+
 
 @dataclass(frozen=True, eq=False)
 class ModeSolution:
@@ -39,8 +41,12 @@ def list_candidate_modes(machine: Machine, mode: str | None) -> list[str]:
     return machine.head_modes(checked) if mode is None else [checked]
 
 
-def follow_working_mode(machine: Machine, path: ToolPath, sampled: SampledPath, mode: str) -> ModeSolution:
+def follow_working_mode(
+    machine: Machine, path: ToolPath, sampled: SampledPath, mode: str, held: float = PRINTED
+) -> ModeSolution:
     """Choose the joints for the poses of a path's records in a working mode, with their turns counted.
+
+    held : rad off a wrist's pole: nearer, its first joint stands still
 
     The turns are those with which the fewest records break a limit, then those by which the joints turn least, then
     those nearest to home. They are the same all along the path; :mod:`~.rewinds` takes turns back.
@@ -48,7 +54,7 @@ def follow_working_mode(machine: Machine, path: ToolPath, sampled: SampledPath, 
     poses = sampled.poses[sampled.at_records]
     known = sampled.joints if sampled.mode == mode else None
     along = machine.inverse(sampled.poses, mode) if known is None else known
-    machine.make_continuous(sampled.poses, along, mode, PRINTED)
+    machine.make_continuous(sampled.poses, along, mode, held)
     joints = along[sampled.at_records]
     turning = machine.turning_joints
     if not turning or not len(joints):

@@ -15,7 +15,12 @@ _GAIN = 1.02  # of the margin: what a further round has to gain
 
 @check_arguments
 def find_turned_placements(
-    machine: Machine, path: ToolPath, bounds: AxisRanges, *, mode: str | None = None, progress: Progress | None = None
+    machine: Machine,
+    path: ToolPath,
+    bounds: AxisRanges,
+    *,
+    mode: str | None = None,
+    progress: Progress | None = None,
 ) -> list[Placement]:
     """Find placements for a path whose turn about the tool's axis is chosen there, by coordinate ascent.
 

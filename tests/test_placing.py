@@ -253,3 +253,20 @@ def test_the_command_takes_a_placement_at_which_the_whole_job_runs(tmp_path, mon
         monkeypatch.setattr("parakin.toolpath.placing.placement.find_placements", lambda *_, p=placements, **__: p)
         assert main(arguments) == code
     assert "outside" in capsys.readouterr().out
+
+
+def test_turns_that_the_job_does_not_make_do_not_count():
+    """Three turns about the pole: within the angle tolerance the joint stands still, farther off it is rewound."""
+    machine, azimuth = pk.load("orthoglide5_head"), np.linspace(0.1, 6.0 * np.pi + 0.1, 61)
+    tip = np.column_stack([5.0 * np.cos(azimuth), 5.0 * np.sin(azimuth), np.full(61, -100.0)])
+    bounds = parse_bounds("X=-5:5,Y=-5:5")
+    path = path_of(tip, axis_of(np.full(61, 0.02), np.degrees(azimuth)))
+    found = find_placement(machine, path, bounds)
+    assert found.allowed
+    assert pk.prepare(machine, path, workpiece=found.workpiece, mode=found.mode).runs
+    path = path_of(tip, axis_of(np.full(61, 2.0), np.degrees(azimuth)))
+    assert not find_placement(machine, path, bounds).allowed
+    found = find_placement(machine, path, bounds, rewinds=True)
+    assert found.allowed
+    rewound = pk.rewind_path(machine, path, pk.Clearance(retract=20.0), workpiece=found.workpiece, mode=found.mode)
+    assert pk.prepare(machine, rewound.path, workpiece=found.workpiece, mode=found.mode).runs

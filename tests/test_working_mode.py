@@ -5,6 +5,7 @@ from importlib.resources import files
 
 import numpy as np
 import pytest
+from random_paths import PathMaker
 
 import parakin as pk
 from parakin.toolpath.path import ToolPath
@@ -195,3 +196,15 @@ def test_legs_keep_their_modes():
     posted = post_path(machine, path)
     assert posted.mode == machine.mode
     assert posted.broken_record_count == 3
+
+
+def test_a_job_that_runs_in_one_mode_only_is_prepared_in_that(tmp_path):
+    machine = pk.load("tricept")
+    maker = PathMaker(machine, 106)
+    maker.widest *= 2.5
+    (tmp_path / "part.cls").write_text(maker.make(), encoding="ascii")
+    path = pk.read_path(tmp_path / "part.cls")
+    assert post_path(machine, path).mode == "+"
+    assert not pk.prepare(machine, path, mode="+").runs
+    assert pk.prepare(machine, path, mode="-").runs
+    assert pk.prepare(machine, path).runs

@@ -23,6 +23,8 @@ TILTED     0.2          second angle at which a tool that starts on the pole is 
 NEAR_START 0.1          off the pole: a program comes to a first record that is nearer from aside
 NEAR_TURN  0.02         off the pole: a tool that is nearer is tilted so far while whole turns are taken back
 STANDING   8e-6         off the pole: nearer, a controller's first joint stands still, whatever the rounded pose says
+RIM        8.024e-6     off the pole: just where that begins; a record there tells the first joint on either side
+RIM_WIDTH  8e-8         off the pole: a record no farther from there is there
 NEAR_HOLD  1e-5         off the pole: no tool axis is held nearer, or printed digits would turn the first angle
 FAR_TILT   30°          second angle at home of a controller: moves about it go neither round the pole nor through it
 ========== ============ ==============================================================================================
@@ -54,6 +56,8 @@ TILTED = 0.2
 NEAR_START = 0.5 * TILTED
 NEAR_TURN = 0.02
 STANDING = 8e-6
+RIM = 1.003 * STANDING
+RIM_WIDTH = 0.01 * STANDING
 NEAR_HOLD = 5.0 * PRINTED
 FAR_TILT = np.pi / 6.0
 

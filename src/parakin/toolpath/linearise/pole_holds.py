@@ -265,12 +265,19 @@ class _HoldBuilder:
         else:
             points = [aside * _point_towards(come + turn * k / count) for k in range(count + 1)] if count else []
             if over:
+                inner = self.pole.list_inner_radii(self._get_axis(place), 0.5 * aside) or [_CLOSE * aside]
                 back, ahead = _point_towards(flip_azimuth(come, -1.0)), _point_towards(come)
-                way = [aside * back, _CLOSE * aside * back, np.zeros(2), _CLOSE * aside * ahead]
+                way = [radius * back for radius in [aside, *inner, 0.0]] + [radius * ahead for radius in inner[::-1]]
                 points = [*way, *(points or [aside * _point_towards(go)])]
         motion, share = place
         projected = np.array(points).reshape(-1, 2)
         return _Points(np.full(len(points), motion, np.int64), np.full(len(points), share), projected), turn
+
+    def _get_axis(self, place: tuple[int, float]) -> Array:
+        """Return the programmed axis (3,) in M at a motion and a share of it."""
+        motion, share = max(place[0], 1), place[1] if place[0] else 0.0
+        axis: Array = self.programmed.interpolate(np.array([motion]), np.array([share]))[1][0]
+        return axis
 
     @cached_property
     def _can_change_mode(self) -> bool:

@@ -178,22 +178,33 @@ def _route_through_pole(
         crossing = first + int(crossings[0])
         share = float(steps.begin[crossing] + fraction[0] * (steps.end[crossing] - steps.begin[crossing]))
         ends = _find_inner_ends(steps, window, crossing, radius)
-    rays = _place_rays(steps, window, np.column_stack([a, b]), (line, normal), squeeze) if bends else ()
-    miss = float(steps.nearest[inside_window].min())
+    nearest_step = first + int(steps.nearest[inside_window].argmin())
+    miss, rays = float(steps.nearest[nearest_step]), tuple[tuple[int, float, Array], ...]()
+    if bends:
+        at_pole = steps.record[[nearest_step]], steps.share[[nearest_step]]
+        inner = pole.list_inner_radii(programmed.interpolate(*at_pole)[1][0], _INNERMOST * angle)
+        rays = _place_rays(steps, window, np.column_stack([a, b]), (line, normal), squeeze, inner)
     return PoleRoute(window, miss, record, axis, crossing, share, () if bends else ends, rays)
 
 
 def _place_rays(
-    steps: PoleSteps, window: tuple[int, int], way: Array, axes: tuple[Array, Array], squeeze: _Squeeze
+    steps: PoleSteps,
+    window: tuple[int, int],
+    way: Array,
+    axes: tuple[Array, Array],
+    squeeze: _Squeeze,
+    inner: list[float],
 ) -> tuple[tuple[int, float, Array], ...]:
     """Place records on a squeezed way at places along the line through the pole that grow by a factor.
 
     way : (m + 1, 2) along the line and off it, as programmed
     axes : directions along the line and across, (2,) each
+    inner : further places between the innermost and the pole
     """
     a, rays = way[:, 0], []
-    radius = innermost = _INNERMOST * squeeze.angle
-    while radius < _OUTERMOST * squeeze.radius:
+    innermost = _INNERMOST * squeeze.angle
+    count = max(0, int(np.ceil(np.log(_OUTERMOST * squeeze.radius / innermost) / np.log(_GROWTH))))
+    for radius in [*inner, *(innermost * _GROWTH ** np.arange(count)).tolist()]:
         for at in (-radius, radius):
             places = np.flatnonzero((a[:-1] - at) * (a[1:] - at) < 0.0)
             for index in sorted({*places[:1].tolist(), *places[-1:].tolist()}):  # in and out again where it turns back
@@ -203,7 +214,6 @@ def _place_rays(
                 across *= radius > innermost  # straight there: the free angle is the same before the pole and behind
                 if _EDGE < share < 1.0 - _EDGE:
                     rays.append((int(steps.record[step]), share, at * axes[0] + across * axes[1]))
-        radius *= _GROWTH
     return tuple(rays)
 
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...arrays import Array
+from ...kinematics.wrist.pole_thresholds import RIM
 from ...kinematics.wrist.pose_angles import solve_direction
 from ...machine import Machine
 from ..posting.posted import Posted
@@ -16,6 +17,8 @@ _PARALLEL = 1e-12  # sine of the angle between two axes of a machine: below this
 _CONVERGED = 1e-15  # of a unit vector
 _ROUNDS = 60
 _POINTS_AT_ONCE = 1 << 12
+_BENDING = 0.1  # sine of B: where C turns as much as for a tool more upright, even poses are not straight
+_RATIOS = (4.0, 2.0, 1.0)  # of RIM
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,6 +46,18 @@ class Pole:
     def is_upright(self) -> bool:
         """Whether the pole is that of B = 0, or lies on the same axis."""
         return not self.moves and bool(np.abs(np.cross(self.first, [0.0, 0.0, 1.0])).max() < _PARALLEL)
+
+    def list_inner_radii(self, axis: Array, radius: float) -> list[float]:
+        """List the radii within ``radius``, descending, at which records keep even poses straight to this pole.
+
+        axis : (3,) of the tool there, in M
+
+        Where the tool is nearly upright C turns on the way, so that even poses bend: both sides of the pole would tell
+        another free angle, and the joint would jump when a controller lets go of it. Corners there are not rounded.
+        """
+        if self.is_upright or np.hypot(axis[0], axis[1]) > _BENDING:
+            return []
+        return [ratio * RIM for ratio in _RATIOS if ratio * RIM < radius]
 
     def get_angles(self, posted: Posted) -> Array:
         """Return the angle that the pole frees along a posted path, (n,) rad."""

@@ -9,7 +9,7 @@ import numpy as np
 from ...arrays import Array, Flags, Indices
 from ...errors import PoseError
 from ...kernels.batch import run_in_threads
-from ...kinematics.wrist.pole_thresholds import PRINTED
+from ...kinematics.wrist.pole_thresholds import PRINTED, RIM, RIM_WIDTH
 from ...machine import Machine
 from ..posting.posted import Posted
 from .kernels.rounded_corners import SLIVER, blend_poses
@@ -107,7 +107,8 @@ def round_corners(
 def _find_bends_on_pole(machine: Machine, corner: Array, turn: Array) -> Flags:
     """Find corners (c,) on a wrist's pole that, if they were rounded, would lead the tool beside it, with a swing.
 
-    The tool goes on over the pole of B and C as long as C does not change; a central leg's pole moves with the tip.
+    Also those where a controller begins to let the first joint stand still, or ends to. The tool goes on over the pole
+    of B and C as long as C does not change; a central leg's pole moves with the tip.
     """
     wrist = machine.wrist
     if wrist is None:
@@ -115,7 +116,8 @@ def _find_bends_on_pole(machine: Machine, corner: Array, turn: Array) -> Flags:
     moving = np.abs(turn[:, wrist.direction.c])
     if machine.structure.has_central_leg:
         moving = np.maximum(moving, np.abs(turn).max(1))
-    bends: Flags = wrist.find_free(corner, PRINTED) & (moving > _BENT)
+    on_rim = wrist.find_free(corner, RIM + RIM_WIDTH) & ~wrist.find_free(corner, RIM - RIM_WIDTH)
+    bends: Flags = (wrist.find_free(corner, PRINTED) | on_rim) & (moving > _BENT)
     return bends
 
 

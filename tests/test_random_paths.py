@@ -93,7 +93,7 @@ def find_fault(controller, job):
         return f"stops in cycle {len(run.lines)}: {planner.told}"
     joints = controller.follow(run.poses)
     speed, rise = run.measure_shares(joints, apart=find_apart(machine, run.poses))
-    if speed > _FASTEST or (rise > _STRONGEST and job.trajectory.keeps_jerk):  # else accelerations have steps
+    if speed > _FASTEST or rise > _STRONGEST:
         return f"a joint at {speed:.3f} of its speed or {rise:.3f} of its acceleration"
     ends = [np.array([getattr(drive, end) for drive in machine.drives]) for end in ("low", "high")]
     if (joints < ends[0] - 1e-6).any() or (joints > ends[1] + 1e-6).any():

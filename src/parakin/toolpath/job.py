@@ -178,9 +178,6 @@ def _prepare_in(
                 axis_tolerance=rounded.axis,
                 stops=find_stops(posted.path),
             )
-            if not trajectory.keeps_jerk:
-                posted = _note(posted, "the limits of jerk are not kept: with them it would take many times as long")
-                trajectory = replace(trajectory, posted=posted)
         except PoseError as error:
             unplanned = str(error)
     report(1.0)

@@ -1,108 +1,279 @@
-"""A speed profile with limited jerk, on a joint path with the rows that it needs."""
+"""The quickest speed profile with limited jerk: slowed down to keep all limits, then by an interior point method."""
 
 from __future__ import annotations
+
+from typing import NamedTuple
 
 import numpy as np
 
 from ...arrays import Array, Indices
+from ...kernels.batch import run_in_threads
 from .drive_limits import DriveLimits
-from .joint_path import JointPath, refine_joint_path
-from .kernels.jerk_limiting import JerkScratch, plan_jerk_limited
-from .kernels.jerk_passes import Pools, StepBounds
-from .kernels.utilisation import Utilisation
+from .joint_path import JointPath, divide_joint_path
+from .kernels.acceleration_limits import AccelerationLimits
+from .kernels.grading import bound_sizes, cut_steps
+from .kernels.interior_point import Sweep, allocate_newton, shorten_windows
+from .kernels.reachability import compute_controllable, compute_reachable
+from .kernels.slowing import allocate_scratch, slow_down, smooth_speeds
+from .kernels.step_limits import StepLimits, locate_times, measure_steps, stretch_pieces, tighten_steps, write_pieces
+from .kernels.utilisation import Utilisation, measure_utilisation
 from .speed_profile import SpeedProfile
+from .time_optimal import RAMP, compute_ceilings, compute_spans
 
-_FIRST, _LEAST = 1.0 / 32.0, 1e-4  # of the way in which s̈ is built up, and mm: the first row behind a stop
-_LAST = 0.6  # no new row is put beyond this fraction of a step
-_TRIES = 2  # rounds of planning, to find the steps over which s⃛ would have to change
-_ROUGH, _SHORT = 0.6, 2e-3  # the kept fraction of s⃛ below which a step is cut, and mm: one that is not
+_FIRST, _LEAST = 1.0 / 16.0, 1e-6  # of the way in which s̈ is built up, and mm: the first step behind a stop
+_QUARTER = 0.25  # of a stretch: no first step is longer
+_ACROSS = 0.5  # fraction of a jerk limit that q'''·ṡ³ may take at first
+_FASTER = 50.0  # × the path's mean speed at the joints' speeds: nothing is faster, also where all joints turn back
+_PARTS, _PER_RAMP, _ACTIVE = 8, 6.0, 0.5  # a step is cut into as many parts, so many a ramp, where jerk is taken so far
+_WINDOWS = 256, 32  # rows of windows, about: in short ones a place where little is gained holds few others up
+_BARRIERS, _ROUGH = (0.01, 1e-3, 1e-4), 1  # weights, and how many of them come before rows are added
+_STEPS, _SWEEPS = 12, 6  # of Newton's in each window and sweep, and sweeps of each cut into windows, at most
+_WORK = 4_000_000  # steps of the path that Newton's method expands in all, at most: some 5 s on two cores
+_ENOUGH = 6  # of Newton's steps for each of the path's are left to a weight, if the next one has to go without
+_WORTH = 1e-3  # a window is left as it is where the last sweep saved less than this fraction of the time
+_PLACES = 4  # places on each piece where utilisation is measured
+_OVER = 1.0005  # a step whose pieces take more of a limit is cut into _MORE_PARTS, or tightened
+_MEASUREMENTS, _REFINEMENTS, _MORE_PARTS = 6, 2, 4  # how often pieces are measured at most, and steps cut for it
+_SURE = 1.0001  # a profile is slowed by this × the worst utilisation, which is measured at some places only
 
 
-def limit_jerk(
-    joint_path: JointPath, limits: DriveLimits, x: Array, ceiling: Array
-) -> tuple[JointPath, SpeedProfile, Indices]:
+class _Plan(NamedTuple):
+    """A profile that is being planned, by rows.
+
+    joint_path, edges : the joints, and first and last row of each stretch (k, 2)
+    problem : its limits
+    x, a : (rows,) ṡ² and s̈, changed in place
+    least : (steps,) s that each step takes at least
+    where : (steps,) infinite where the profile may still be shortened, else 0
+    """
+
+    joint_path: JointPath
+    edges: Indices
+    problem: StepLimits
+    x: Array
+    a: Array
+    least: Array
+    where: Array
+
+
+def limit_jerk(joint_path: JointPath, limits: DriveLimits, x: Array) -> tuple[JointPath, SpeedProfile, Indices]:
     """Limit the jerk of the quickest profile; return the joint path, its profile, and the limit that binds at each row.
 
-    x : (rows,) ṡ² of the quickest profile; ceiling : (steps,) of ṡ²
+    x : (rows,) ṡ² of the quickest profile
     """
-    steps, fractions = _grade_stops(joint_path, limits, ceiling)
-    joint_path, x, ceiling = _add_rows(joint_path, steps, fractions, x, ceiling)
-    for _ in range(_TRIES):
-        rough = _plan_profile(joint_path, limits, x, ceiling, 1)[2] < _ROUGH
-        rough[1:-1] |= rough[2:] | rough[:-2]
-        steps = np.flatnonzero(rough & (joint_path.step > _SHORT))
-        joint_path, x, ceiling = _add_rows(joint_path, steps, np.full(len(steps), 0.5), x, ceiling)
-    return joint_path, *_plan_profile(joint_path, limits, x, ceiling)[:2]
+    ramp = _find_ramp(limits)
+    joint_path, x = _grade_steps(joint_path, limits, ramp, x)
+    least, count = compute_spans(joint_path, x), len(joint_path.step)
+    problem = _pose_problem(joint_path, limits)
+    x, a = _find_start(joint_path, limits, problem, ramp)
+    plan = _Plan(joint_path, joint_path.find_stretches(), problem, x, a, least, np.full(count, np.inf))
+    rough = max(_WORK * _ROUGH // len(_BARRIERS), min(_ENOUGH * count, _WORK))
+    work = _WORK - rough + _shorten(plan, _BARRIERS[:_ROUGH], rough)
+    if work >= count:
+        plan = _cut_steps(plan, limits, ramp, _count_parts(plan, ramp))
+    work = _shorten(plan, _BARRIERS[_ROUGH:], work)
+    profile, use = _write_profile(plan, limits)
+    for again in range(_MEASUREMENTS):
+        over = use.kept[:, 3] > _OVER
+        if not over.any():
+            break
+        parts = np.ones(len(plan.x) - 1, np.int64)
+        plan = plan._replace(where=np.zeros(len(parts)))
+        if again < _REFINEMENTS and work >= len(parts):
+            parts[profile.row[over]] = _MORE_PARTS
+            plan = _cut_steps(plan, limits, ramp, parts)
+        else:
+            plan = _tighten_steps(plan, ramp, profile.row[over], _SURE * use.kept[over, 3])
+        if again < _MEASUREMENTS - 1:
+            work = _shorten(plan, _BARRIERS[_ROUGH:], work)
+        profile, use = _write_profile(plan, limits)
+    pieces = 2 * (plan.edges[:, 1] - plan.edges[:, 0])
+    worst = np.maximum.reduceat(use.kept[:, 3], np.cumsum(pieces) - pieces)
+    stretch_pieces(plan.edges, profile, np.where(worst > 1.0, _SURE * worst, 1.0))
+    return plan.joint_path, profile, use.binding
 
 
-def _grade_stops(joint_path: JointPath, limits: DriveLimits, ceiling: Array) -> tuple[Indices, Array]:
-    """Find the steps at stops, ascending, and the parts after which rows are missing: each twice as far as the last."""
-    gaps = np.flatnonzero(joint_path.step == 0.0)
-    cuts: list[tuple[Indices, Array]] = []
-    for steps, row, back in (
-        (np.append(0, gaps + 1), np.append(0, gaps + 1), False),
-        (np.append(gaps - 1, len(joint_path.step) - 1), np.append(gaps, len(joint_path.step)), True),
-    ):
-        length, other = joint_path.step[steps][:, None], row + (-1 if back else 1)
-        slope = np.abs(joint_path.joints[row] - joint_path.joints[other]) / length
-        with np.errstate(divide="ignore"):
-            jerk = np.min(limits.jerk / slope, axis=1)
-            acceleration = np.min(limits.acceleration / slope, axis=1)
-        with np.errstate(invalid="ignore", over="ignore"):
-            way = np.fmin(acceleration**3 / (6.0 * jerk**2), np.sqrt(ceiling[steps] ** 1.5 / jerk))
-            way = np.fmin(way, length[:, 0])
-        fraction = np.maximum(_FIRST * way, _LEAST) / length[:, 0]
-        while (fraction < _LAST).any():
-            near = fraction < _LAST
-            cuts.append((steps[near], 1.0 - fraction[near] if back else fraction[near]))
-            fraction = 2.0 * fraction
-    if not cuts:
-        return gaps[:0], np.empty(0)
-    steps, fractions = (np.concatenate(column) for column in zip(*cuts, strict=True))
-    order = np.lexsort((fractions, steps))
-    return steps[order], fractions[order]
+def _find_ramp(limits: DriveLimits) -> float:
+    """Find the least time in which a drive builds its acceleration up, s."""
+    finite = np.isfinite(limits.jerk)
+    return min(RAMP, float(np.min(limits.acceleration[finite] / limits.jerk[finite])))
 
 
-def _add_rows(
-    joint_path: JointPath, steps: Indices, fractions: Array, x: Array, ceiling: Array
-) -> tuple[JointPath, Array, Array]:
-    """Add rows as :func:`~.joint_path.refine_joint_path` does, and interpolate ṡ² and its ceiling there."""
-    if not len(steps):
-        return joint_path, x, ceiling
-    between = x[steps] + fractions * (x[steps + 1] - x[steps])
-    x, ceiling = np.insert(x, steps + 1, between), np.insert(ceiling, steps, ceiling[steps])
-    return refine_joint_path(joint_path, steps, fractions), x, ceiling
+def _grade_steps(joint_path: JointPath, limits: DriveLimits, ramp: float, x: Array) -> tuple[JointPath, Array]:
+    """Grade the steps, short ones at stops; ṡ² goes straight between the rows."""
+    edges, size = joint_path.find_stretches(), np.full(len(x), np.inf)
+    starts, stops = edges.T
+    length = np.append(0.0, np.cumsum(joint_path.step))
+    quarter = _QUARTER * (length[stops] - length[starts])
+    ceiling = np.minimum(*compute_ceilings(joint_path, limits))
+    for row, step, other in ((starts, starts, starts + 1), (stops, stops - 1, stops - 1)):
+        slope = np.abs(joint_path.joints[row] - joint_path.joints[other]) / joint_path.step[step][:, None]
+        with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+            jerk, acceleration = (np.min(each / slope, axis=1) for each in (limits.jerk, limits.acceleration))
+            way = np.fmin(acceleration**3 / (6.0 * jerk**2), (4.0 * ceiling[step]) ** 0.75 / (6.0 * np.sqrt(jerk)))
+        way = np.where((way > 0.0) & np.isfinite(way), _FIRST * way, np.inf)
+        size[row] = np.minimum(np.maximum(way, _LEAST), quarter)
+    bound_sizes(joint_path.step, size)
+    size = np.maximum(size, np.sqrt(x) * (ramp / _PER_RAMP))
+    count = cut_steps(joint_path.step, size, np.empty(0, np.int64), np.empty(0))
+    if not count:
+        return joint_path, x
+    steps, parts = np.empty(count, np.int64), np.empty(count)
+    cut_steps(joint_path.step, size, steps, parts)
+    x = np.insert(x, steps + 1, x[steps] + parts * (x[steps + 1] - x[steps]))
+    return divide_joint_path(joint_path, steps, parts), x
 
 
-def _plan_profile(
-    joint_path: JointPath, limits: DriveLimits, x: Array, ceiling: Array, rounds: int = 0
-) -> tuple[SpeedProfile, Indices, Array]:
-    """Plan a profile; return it, the limit that binds at each row, and the least kept fraction of s⃛ on each step."""
-    rows = len(joint_path.segment)
-    profile, scratch = SpeedProfile.allocate(2 * rows, rows), _allocate_scratch(rows)
-    scratch.x[:] = x
-    count = plan_jerk_limited(joint_path.rows, limits, ceiling, profile, scratch, rounds)
-    return profile.cut(count), scratch.use.binding, scratch.least_kept
+def _pose_problem(joint_path: JointPath, limits: DriveLimits) -> StepLimits:
+    """Pose the problem for the interior point method."""
+    rows, h = joint_path.rows, joint_path.step[:, None]
+    bend, ceilings = rows.curvature, compute_ceilings(joint_path, limits)
+    acceleration = np.minimum(limits.acceleration, RAMP * limits.jerk)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        slope = np.diff(rows.joints, axis=0) / h - h * (2.0 * bend[:-1] + bend[1:]) / 6.0
+        pace = np.max(np.abs(slope) / np.minimum(limits.speed, RAMP * acceleration), axis=1)
+    mean = float((pace * rows.step)[rows.step > 0.0].sum() / rows.step.sum())
+    top = (_FASTER / mean) ** 2 if mean > 0.0 else np.inf
+    start, end = (np.minimum(ceiling, top) for ceiling in ceilings)
+    even = np.ones(len(start))
+    return StepLimits(rows.step, slope, bend, start, end, 1.0 / limits.acceleration, 1.0 / limits.jerk, even)
 
 
-def _allocate_scratch(rows: int) -> JerkScratch:
-    """Allocate the arrays for planning so many rows, in two pieces a step."""
-    bounds = StepBounds(*(np.empty(rows) for _ in range(3)))
-    pools = Pools(np.empty(rows), np.empty(rows), np.empty(rows), np.empty(rows, np.int64))
-    use = Utilisation(np.empty((2 * rows, 4)), np.zeros(rows, np.int64), np.empty(rows, bool))
-    return JerkScratch(
-        bounds=bounds,
-        x=np.empty(rows),
-        u=np.empty(rows),
-        controllable=np.empty(rows),
-        rising_x=np.empty(rows),
-        rising_u=np.empty(rows),
-        braking_x=np.empty(rows),
-        braking_u=np.empty(rows),
-        acceleration=np.empty(rows),
-        pools=pools,
-        use=use,
-        touched=np.empty(rows, bool),
-        moved=np.empty(rows, bool),
-        least_kept=np.ones(rows - 1),
+def _find_start(joint_path: JointPath, limits: DriveLimits, problem: StepLimits, ramp: float) -> tuple[Array, Array]:
+    """Find ṡ² and s̈ of a profile that keeps all limits: reachable with q'''·ṡ³ bounded, smoothed, and slowed down."""
+    rows, count = joint_path.rows, len(joint_path.step)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        third = np.abs(np.diff(rows.curvature, axis=0)) / rows.step[:, None]
+        ceiling = np.min((_ACROSS * limits.jerk / third) ** (2.0 / 3.0), axis=1)
+    ceiling = np.fmin(ceiling, np.minimum(problem.ceiling_start, problem.ceiling_end))
+    ceiling = np.minimum(np.append(ceiling, 0.0), np.append(0.0, ceiling))
+    ceiling[joint_path.find_ends()] = 0.0
+    bounds = AccelerationLimits(np.minimum(limits.acceleration, RAMP * limits.jerk), np.full(count, np.inf))
+    controllable, x, u, a = np.empty(count + 1), np.empty(count + 1), np.empty(count), np.zeros(count + 1)
+    compute_controllable(rows, bounds, ceiling, controllable, 0, count)
+    compute_reachable(rows, bounds, controllable, x, u, 0, count)
+    edges, scratch = joint_path.find_stretches(), allocate_scratch(count + 1)
+    for first, last in edges:
+        smooth_speeds(first, last, rows.step, ramp, x, a, scratch)
+    _slow_stretches(problem, edges, ramp, x, a)
+    return x, a
+
+
+def _slow_stretches(problem: StepLimits, edges: Indices, ramp: float, x: Array, a: Array) -> None:
+    """Slow each stretch down where it breaks a limit."""
+    scratch = allocate_scratch(len(x))
+    for first, last in edges:
+        slow_down(first, last, problem, ramp, x, a, scratch)
+
+
+def _cut_windows(edges: Indices, rows: int, odd: int) -> Indices:
+    """Cut stretches into windows (k, 2) of rows; with ``odd`` = 1 the cuts lie amid those with 0."""
+    length = edges[:, 1] - edges[:, 0]
+    count = np.maximum(1, length // rows)
+    if odd:
+        count = np.where(count > 1, count + 1, 1)
+    of = np.repeat(np.arange(len(edges)), count)
+    k = np.arange(len(of)) - np.repeat(np.cumsum(count) - count, count)
+    shift = 0.5 * odd
+    span = length[of] / np.maximum(count[of] - odd, 1)
+    first = np.where(k == 0, 0, np.round((k - shift) * span).astype(np.int64))
+    last = np.where(k == count[of] - 1, length[of], np.round((k + 1 - shift) * span).astype(np.int64))
+    windows = edges[of, 0][:, None] + np.column_stack([first, last])
+    several: Indices = windows[windows[:, 1] - windows[:, 0] > 1]
+    return several
+
+
+def _shorten(plan: _Plan, barriers: tuple[float, ...], work: int) -> int:
+    """Shorten a profile that keeps all limits, in sweeps of windows for each weight; return the rest of the work."""
+    count = len(plan.least)
+    cuts = [_cut_windows(plan.edges, rows, odd) for rows in _WINDOWS for odd in (0, 1)]
+    widest = max(int((windows[:, 1] - windows[:, 0]).max(initial=1)) for windows in cuts)
+    for k, weight in enumerate(barriers):
+        share, gains = min(work, max(work // (len(barriers) - k), _ENOUGH * count)), plan.where.copy()
+        for sweep in range(_SWEEPS * len(cuts)):
+            steps = min(share // count, _STEPS)
+            if not steps:
+                break
+            args = Sweep(plan.problem, plan.x, plan.a, plan.least, gains, weight, steps, _WORTH)
+            done = _sweep_windows(cuts[sweep % len(cuts)], args, count, widest)
+            share, work = share - done, work - done
+            if not done:
+                break
+    return work
+
+
+def _sweep_windows(windows: Indices, sweep: Sweep, count: int, widest: int) -> int:
+    """Shorten all windows, in threads; return the number of steps that were expanded."""
+    work = list[int]()
+
+    def shorten(start: int, stop: int) -> None:
+        part = slice(*np.searchsorted(windows[:, 0], (start, stop)))
+        work.append(shorten_windows(windows[part], sweep, allocate_newton(widest + 1)))
+
+    run_in_threads(count, shorten)
+    return sum(work)
+
+
+def _measure_steps(problem: StepLimits, x: Array, a: Array) -> tuple[Array, Array]:
+    """Measure the time of each step, and how much of the most used jerk limit it takes."""
+    time, use = np.empty(len(problem.step)), np.empty(len(problem.step))
+    run_in_threads(len(time), lambda start, stop: measure_steps(problem, x, a, time, use, start, stop))
+    return time, use
+
+
+def _count_parts(plan: _Plan, ramp: float) -> Indices:
+    """Count the parts, even in time, into which to cut steps over which s̈ changes much."""
+    time, use = _measure_steps(plan.problem, plan.x, plan.a)
+    parts: Indices = np.where(use > _ACTIVE, np.clip(np.ceil(time * (_PER_RAMP / ramp)), 1, _PARTS), 1).astype(np.int64)
+    return parts
+
+
+def _cut_steps(plan: _Plan, limits: DriveLimits, ramp: float, parts: Indices) -> _Plan:
+    """Cut each step into so many parts, even in time; the motion stays as it is, but where it breaks a limit now."""
+    if not (parts > 1).any():
+        return plan
+    time, whole = _measure_steps(plan.problem, plan.x, plan.a)[0], plan.problem.step
+    steps = np.repeat(np.arange(len(parts)), parts - 1)
+    k = 1 + np.arange(len(steps)) - np.repeat(np.cumsum(parts - 1) - (parts - 1), parts - 1)
+    states = np.empty((len(steps), 3))
+    locate_times(plan.problem, plan.x, plan.a, steps, k / parts[steps] * time[steps], states)
+    joint_path = divide_joint_path(plan.joint_path, steps, states[:, 0] / whole[steps])
+    x, a = np.insert(plan.x, steps + 1, states[:, 1]), np.insert(plan.a, steps + 1, states[:, 2])
+    per_mm = np.divide(plan.least, whole, out=np.zeros(len(parts)), where=whole > 0.0)
+    where = np.repeat(np.where(parts > 1, np.inf, plan.where), parts)
+    problem = _pose_problem(joint_path, limits)
+    cut = _Plan(
+        joint_path, joint_path.find_stretches(), problem, x, a, np.repeat(per_mm, parts) * joint_path.step, where
     )
+    _slow_plan(cut, ramp)
+    return cut
+
+
+def _tighten_steps(plan: _Plan, ramp: float, steps: Indices, factors: Array) -> _Plan:
+    """Tighten the limits of steps that take ``factors`` of them, and slow the profile down there."""
+    problem, tighter = plan.problem, np.ones(len(plan.least))
+    tighten_steps(steps, factors, problem, plan.x, plan.a, tighter)
+    ceilings = problem.ceiling_start / tighter**2, problem.ceiling_end / tighter**2
+    tightening = problem.tightening * tighter
+    problem = problem._replace(ceiling_start=ceilings[0], ceiling_end=ceilings[1], tightening=tightening)
+    plan = plan._replace(problem=problem)
+    _slow_plan(plan, ramp)
+    return plan
+
+
+def _slow_plan(plan: _Plan, ramp: float) -> None:
+    """Slow a profile down where it breaks a limit, and mark where that changed it."""
+    before = plan.x.copy()
+    _slow_stretches(plan.problem, plan.edges, ramp, plan.x, plan.a)
+    plan.where[(plan.x != before)[:-1]] = np.inf
+
+
+def _write_profile(plan: _Plan, limits: DriveLimits) -> tuple[SpeedProfile, Utilisation]:
+    """Write a profile in two pieces a step, each stretch from time 0 on, and measure it."""
+    rows, pieces = len(plan.x), 2 * int((plan.edges[:, 1] - plan.edges[:, 0]).sum())
+    profile = SpeedProfile.allocate(pieces, rows)
+    use = Utilisation(np.empty((pieces, 4)), np.zeros(rows, np.int64), np.ones(rows - 1, bool))
+    write_pieces(plan.edges, plan.problem, plan.x, plan.a, profile)
+    args = (plan.joint_path.rows, limits, profile, use, _PLACES)
+    run_in_threads(pieces // 2, lambda first, last: measure_utilisation(*args, 2 * first, 2 * last))
+    return profile, use

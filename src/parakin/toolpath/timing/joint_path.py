@@ -78,10 +78,14 @@ class JointPath:
         record = int(self.curve.record_of_piece[self.segment[row]])
         return f"{self.posted.path.locate(record)}: on the way to it"
 
+    def find_stretches(self) -> Indices:
+        """Find the first and the last row of each stretch, (k, 2)."""
+        gaps = np.flatnonzero(self.step == 0.0)
+        return np.column_stack([np.append(0, gaps + 1), np.append(gaps, len(self.step))])
+
     def find_ends(self) -> Indices:
         """Find the rows at which stretches begin and end."""
-        gaps = np.flatnonzero(self.step == 0.0)
-        return np.concatenate([[0, len(self.step)], gaps, gaps + 1])
+        return self.find_stretches().ravel()
 
     def poses(self, row: Indices, shift: Array) -> Array:
         """Compute the poses ``shift`` mm after rows (k,)."""
@@ -206,6 +210,34 @@ def refine_joint_path(joint_path: JointPath, steps: Indices, fractions: Array, a
         return _follow_rows(joint_path.posted, joint_path.curve, segment, offset)
     joints = np.insert(joint_path.joints, steps + 1, joint_path.joints_at(steps, shift)[0], axis=0)
     return _fit_rows(joint_path.posted, joint_path.curve, segment, offset, joints)
+
+
+def divide_joint_path(joint_path: JointPath, steps: Indices, parts: Array) -> JointPath:
+    """Add rows in steps, ascending, after ``parts`` of them, on the splines: these stay as they are."""
+    rows, shift = joint_path.rows, parts * joint_path.step[steps]
+    still = np.zeros(len(steps))
+    joints = joint_path.evaluate(PathState(steps, shift, still, still)).joints
+    bend = rows.curvature[steps]
+    bend += parts[:, None] * (rows.curvature[steps + 1] - bend)
+    segment = np.insert(joint_path.segment, steps + 1, joint_path.segment[steps])
+    offset = np.insert(joint_path.offset, steps + 1, joint_path.offset[steps] + shift)
+    step = np.insert(rows.step, steps, 0.0)
+    places = steps + np.arange(len(steps))  # of the new steps, each before what is left of the old one
+    last = np.append(steps[1:] != steps[:-1], True)
+    step[places] = shift - np.where(np.append(True, last[:-1]), 0.0, np.append(0.0, shift[:-1]))
+    step[places[last] + 1] = (rows.step[steps] - shift)[last]
+    return JointPath(
+        joint_path.posted,
+        joint_path.curve,
+        segment,
+        offset,
+        JointRows(
+            step,
+            np.insert(rows.joints, steps + 1, joints, axis=0),
+            np.insert(rows.curvature, steps + 1, bend, axis=0),
+            np.insert(rows.feed_ceiling, steps, rows.feed_ceiling[steps]),
+        ),
+    )
 
 
 def _follow_rows(posted: Posted, curve: Curve, segment: Indices, offset: Array) -> JointPath:

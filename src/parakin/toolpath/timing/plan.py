@@ -17,14 +17,9 @@ from .speed_profile import SpeedProfile
 from .time_optimal import (
     build_accelerated_profile,
     build_uniform_profile,
-    compute_ceilings,
     find_quickest,
 )
 from .trajectory import Trajectory, name_limits
-
-# A trajectory with jerks that takes longer than one without them by this factor and by so many s is not used: a wrist's
-# noise on its pole asks for it, and no motion that a machine should make.
-_MOST_LONGER, _AT_LEAST = 10.0, 1.0
 
 
 def plan_trajectory(
@@ -47,8 +42,8 @@ def plan_trajectory(
 
     Between records the tip moves straight and the pose's angles evenly. The feed is that of the record that the motion
     leads to; in rapid, and where none is programmed, drives are the only limit. Where no drive has an acceleration or a
-    jerk, corners are neither rounded nor stopped at, and speeds change at once. With jerks the trajectory is near the
-    quickest; where they would make it longer many times over, as a wrist's noise on its pole may, it is without them.
+    jerk, corners are neither rounded nor stopped at, and speeds change at once. With jerks the trajectory is the
+    quickest but for less than 0.5 %, on paths of more than 100,000 rows for less than 10 %.
 
     Raises
     ------
@@ -71,12 +66,10 @@ def plan_trajectory(
         profile, binding = build_uniform_profile(joint_path, limits)
         return Trajectory(posted, curve, joint_path, profile, binding, names)
     joint_path, x, u = find_quickest(joint_path, limits)
-    profile, binding = build_accelerated_profile(joint_path, limits, x, u)
     if np.isfinite(limits.jerk).any():
-        ceiling = np.minimum(*compute_ceilings(joint_path, limits))
-        softened = limit_jerk(joint_path, limits, x, ceiling)
-        if softened[1].time[-1] <= _MOST_LONGER * profile.time[-1] + _AT_LEAST:
-            joint_path, profile, binding = softened
+        joint_path, profile, binding = limit_jerk(joint_path, limits, x)
+    else:
+        profile, binding = build_accelerated_profile(joint_path, limits, x, u)
     binding[joint_path.find_ends()] = len(names) - 1
     return Trajectory(posted, curve, joint_path, profile, binding, names)
 

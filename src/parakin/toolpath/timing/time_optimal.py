@@ -18,7 +18,7 @@ from .speed_profile import SpeedProfile
 UNBOUND = 1e12  # mm²/s², of ṡ²: nothing is as fast
 WORTH = 5e-4  # least fraction of the cycle time that more rows must save
 _ROUNDS = 4
-_RAMP = 0.1  # s in which a drive is assumed to reach its acceleration where only a jerk is given
+RAMP = 0.1  # s in which a drive is assumed to reach its acceleration where only a jerk is given
 _ROUNDING = 1e-8
 _PLACES = 5  # places on each step where utilisation is measured
 
@@ -39,7 +39,7 @@ def find_quickest(joint_path: JointPath, limits: DriveLimits) -> tuple[JointPath
         ceilings = compute_ceilings(joint_path, limits)
         ceiling = np.minimum(np.append(ceilings.start, 0.0), np.append(0.0, ceilings.end))
         ceiling[joint_path.find_ends()] = 0.0
-        acceleration = np.minimum(limits.acceleration, _RAMP * limits.jerk)
+        acceleration = np.minimum(limits.acceleration, RAMP * limits.jerk)
         bounds = AccelerationLimits(acceleration, np.full(count, np.inf))
         x, u, controllable = np.empty(count + 1), np.empty(count), np.empty(count + 1)
         compute_controllable(rows, bounds, ceiling, controllable, 0, count)
@@ -49,7 +49,7 @@ def find_quickest(joint_path: JointPath, limits: DriveLimits) -> tuple[JointPath
         run_in_threads(count, lambda start, stop: lost.append(find_switches(*args, start, stop)))  # noqa: B023
         refuse_unbound(joint_path, np.maximum(x[:-1], x[1:]))
         steps = np.concatenate([np.flatnonzero(where) for where in switches])
-        if attempt == _ROUNDS - 1 or sum(lost) <= WORTH * _compute_spans(joint_path, x).sum() or not len(steps):
+        if attempt == _ROUNDS - 1 or sum(lost) <= WORTH * compute_spans(joint_path, x).sum() or not len(steps):
             break
         fractions = np.concatenate([where[where > 0.0] for where in switches])
         order = np.lexsort((fractions, steps))
@@ -67,7 +67,7 @@ def refuse_unbound(joint_path: JointPath, x: Array) -> None:
             raise PoseError(f"{joint_path.describe_step(int(step))} nothing limits the motion: {text}")
 
 
-def _compute_spans(joint_path: JointPath, x: Array) -> Array:
+def compute_spans(joint_path: JointPath, x: Array) -> Array:
     """Compute the time of each step, s, from ṡ² at the rows."""
     speed, moving = np.sqrt(x), joint_path.step > 0.0
     time, total = np.zeros(len(moving)), speed[:-1] + speed[1:]
@@ -79,7 +79,7 @@ def build_accelerated_profile(
     joint_path: JointPath, limits: DriveLimits, x: Array, u: Array
 ) -> tuple[SpeedProfile, Indices]:
     """Build the profile of constant s̈ over each step, and what binds it at each row."""
-    return _write_steps(joint_path, limits, np.sqrt(x)[:-1], u, _compute_spans(joint_path, x))
+    return _write_steps(joint_path, limits, np.sqrt(x)[:-1], u, compute_spans(joint_path, x))
 
 
 def build_uniform_profile(joint_path: JointPath, limits: DriveLimits) -> tuple[SpeedProfile, Indices]:

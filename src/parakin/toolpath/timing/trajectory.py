@@ -14,7 +14,6 @@ from ...arrays import Array, Indices
 from ...errors import PoseError
 from ..posting.posted import Posted
 from .corners import Curve, check_tolerance
-from .drive_limits import DriveLimits
 from .joint_path import JointPath
 from .kernels.splines import PathState
 from .speed_profile import SpeedProfile
@@ -71,12 +70,6 @@ class Trajectory:
     def seconds(self) -> float:
         """The cycle time."""
         return float(self.profile.time[-1])
-
-    @property
-    def keeps_jerk(self) -> bool:
-        """Whether the limits of jerk are kept; where they would take many times as long they are not."""
-        limits = DriveLimits.of(self.posted.machine)
-        return not np.isfinite(limits.jerk).any() or bool(self.profile.jerk.any()) or not len(self.profile.row)
 
     @cached_property
     def times(self) -> Array:

@@ -8,8 +8,9 @@ import linuxcnc
 import many_direct_problems
 import post
 import startup
+import trajectory
 import workspace
 
 if __name__ == "__main__":
-    for benchmark in (kinematics, many_direct_problems, post, startup, workspace, feed, linuxcnc):
+    for benchmark in (kinematics, many_direct_problems, post, startup, workspace, feed, trajectory, linuxcnc):
         print(benchmark.main(), flush=True)

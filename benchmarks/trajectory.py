@@ -2,68 +2,20 @@
 
 from __future__ import annotations
 
+import sys
 from importlib.util import find_spec
+from pathlib import Path
 from time import perf_counter
-from typing import Any, NamedTuple
 
 import numpy as np
 from measure import table
 
+sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
+from seeded_rows import Sines, build_smooth, draw_smooth, plan_rows
+
 from parakin.toolpath.timing.drive_limits import DriveLimits
-from parakin.toolpath.timing.jerk_limited import limit_jerk
-from parakin.toolpath.timing.joint_path import JointPath
-from parakin.toolpath.timing.kernels.acceleration_limits import AccelerationLimits
-from parakin.toolpath.timing.kernels.reachability import compute_controllable, compute_reachable
-from parakin.toolpath.timing.kernels.splines import JointRows, fit_splines
-from parakin.toolpath.timing.time_optimal import compute_ceilings
 
 ROWS, STATIONS, ROUNDS, SETTLED = 2000, 500, 10, 5e-4
-UNBOUND = 1e12
-
-
-class Sines(NamedTuple):
-    """A smooth path of joints: amplitude·sin(frequency·s + phase), each (joints,), over a length s, mm."""
-
-    amplitude: np.ndarray
-    frequency: np.ndarray
-    phase: np.ndarray
-    length: float
-
-    def derive(self, s: np.ndarray, order: int) -> np.ndarray:
-        """The derivatives of the joints by s, (n, joints)."""
-        angle = s[:, None] * self.frequency + self.phase + 0.5 * np.pi * order
-        return self.amplitude * self.frequency**order * np.sin(angle)
-
-
-def draw(seed: int) -> tuple[str, Sines, DriveLimits]:
-    """A path and its limits: ramps of 0.02 to 0.1 s."""
-    rng = np.random.default_rng(seed)
-    joints = int(rng.integers(2, 7))
-    length = 10.0 ** rng.uniform(1.3, 3.0)
-    waves = rng.uniform(0.2, 4.0, joints)
-    path = Sines(rng.uniform(5.0, 60.0, joints), 2.0 * np.pi * waves / length, rng.uniform(0.0, 6.0, joints), length)
-    acceleration = 10.0 ** rng.uniform(3.0, 4.0, joints)
-    limits = DriveLimits(rng.uniform(100.0, 600.0, joints), acceleration, acceleration / rng.uniform(0.02, 0.1))
-    return f"{joints} joints, {length:.0f} mm, seed {seed}", path, limits
-
-
-def plan(path: Sines, limits: DriveLimits) -> float:
-    """Our cycle time."""
-    s = np.linspace(0.0, path.length, ROWS + 1)
-    q = path.derive(s, 0)
-    curvature = np.empty_like(q)
-    step = np.diff(s)
-    fit_splines(step, q, curvature, np.empty(len(s)))
-    rows = JointRows(step, q, curvature, np.full(ROWS, UNBOUND))
-    nothing: Any = None  # the planner asks the rows alone
-    joint_path = JointPath(nothing, nothing, np.zeros(len(s), np.int64), s, rows)
-    ceilings = compute_ceilings(joint_path, limits)
-    ceiling = np.minimum(np.append(ceilings.start, 0.0), np.append(0.0, ceilings.end))
-    bounds = AccelerationLimits(limits.acceleration, np.full(ROWS, np.inf))
-    controllable, x, u = np.empty(ROWS + 1), np.empty(ROWS + 1), np.empty(ROWS)
-    compute_controllable(rows, bounds, ceiling, controllable, 0, ROWS)
-    compute_reachable(rows, bounds, controllable, x, u, 0, ROWS)
-    return float(limit_jerk(joint_path, limits, x)[1].time[-1])
 
 
 def solve(path: Sines, limits: DriveLimits) -> tuple[float, str]:
@@ -109,14 +61,15 @@ def solve(path: Sines, limits: DriveLimits) -> tuple[float, str]:
 
 def main() -> str:
     rows, yardstick = [], bool(find_spec("copp_py"))
-    plan(*draw(0)[1:])
+    plan_rows(build_smooth(draw_smooth(0)[0], ROWS), draw_smooth(0)[1])
     for seed in range(8):
-        name, path, limits = draw(seed)
+        path, limits = draw_smooth(seed)
         begin = perf_counter()
-        ours = plan(path, limits)
+        ours = float(plan_rows(build_smooth(path, ROWS), limits)[1].time[-1])
         seconds = perf_counter() - begin
         theirs, remark = solve(path, limits) if yardstick else (np.nan, "copp-py is not installed")
         ratio = remark or f"{ours / theirs:.4f}"
+        name = f"{len(limits.speed)} joints, {path.length:.0f} mm, seed {seed}"
         rows.append([name, f"{ours:.4f}", f"{theirs:.4f}", ratio, "≤ 1.005", f"{seconds:.2f}"])
     columns = ["path", "cycle time, s", "copp-py", "ratio", "bound", "planned in, s"]
     return table(f"Jerk-limited trajectories, {ROWS:,} rows", columns, rows)

@@ -291,7 +291,7 @@ raise rank rate read rebuild recognise record redirect reduce refine refuse reje
 renumber reorder repeat replace report repost require reserve reset resize resolve restore restrict retract retry return
 reuse reverse rewind rotate round route run
 sample save say scale score search select separate set settle share shift shorten show shrink skip smooth snap solve
-sort space split spread square stack stage stamp start stop store stretch strip subtract suggest sum summarise swap
+slow sort space split spread square stack stage stamp start stop store stretch strip subtract suggest sum summarise swap
 sweep switch
 tabulate take tally tell test thin tighten trace track transform translate transpose trap trim turn
 undo unwind update use

@@ -10,15 +10,14 @@ from ...arrays import Array, Indices
 from ...kernels.batch import run_in_threads
 from .drive_limits import DriveLimits
 from .joint_path import JointPath, divide_joint_path
-from .kernels.acceleration_limits import AccelerationLimits
 from .kernels.grading import bound_sizes, cut_steps
 from .kernels.interior_point import Sweep, allocate_newton, shorten_windows
-from .kernels.reachability import compute_controllable, compute_reachable
 from .kernels.slowing import allocate_scratch, slow_down, smooth_speeds
+from .kernels.speed_ceilings import StepCeilings
 from .kernels.step_limits import StepLimits, locate_times, measure_steps, stretch_pieces, tighten_steps, write_pieces
 from .kernels.utilisation import Utilisation, measure_utilisation
 from .speed_profile import SpeedProfile
-from .time_optimal import RAMP, compute_ceilings, compute_spans
+from .time_optimal import RAMP, compute_ceilings, find_reachable
 
 _FIRST, _LEAST = 1.0 / 16.0, 1e-6  # of the way in which s̈ is built up, and mm: the first step behind a stop
 _QUARTER = 0.25  # of a stretch: no first step is longer
@@ -31,7 +30,7 @@ _STEPS, _SWEEPS = 12, 6  # of Newton's in each window and sweep, and sweeps of e
 _WORK = 4_000_000  # steps of the path that Newton's method expands in all, at most: some 5 s on two cores
 _ENOUGH = 6  # of Newton's steps for each of the path's are left to a weight, if the next one has to go without
 _WORTH = 1e-3  # a window is left as it is where the last sweep saved less than this fraction of the time
-_PLACES = 4  # places on each piece where utilisation is measured
+_PLACES = 9  # places on each piece where utilisation is measured
 _OVER = 1.0005  # a step whose pieces take more of a limit is cut into _MORE_PARTS, or tightened
 _MEASUREMENTS, _REFINEMENTS, _MORE_PARTS = 6, 2, 4  # how often pieces are measured at most, and steps cut for it
 _SURE = 1.0001  # a profile is slowed by this × the worst utilisation, which is measured at some places only
@@ -43,7 +42,6 @@ class _Plan(NamedTuple):
     joint_path, edges : the joints, and first and last row of each stretch (k, 2)
     problem : its limits
     x, a : (rows,) ṡ² and s̈, changed in place
-    least : (steps,) s that each step takes at least
     where : (steps,) infinite where the profile may still be shortened, else 0
     """
 
@@ -52,7 +50,6 @@ class _Plan(NamedTuple):
     problem: StepLimits
     x: Array
     a: Array
-    least: Array
     where: Array
 
 
@@ -63,30 +60,32 @@ def limit_jerk(joint_path: JointPath, limits: DriveLimits, x: Array) -> tuple[Jo
     """
     ramp = _find_ramp(limits)
     joint_path, x = _grade_steps(joint_path, limits, ramp, x)
-    least, count = compute_spans(joint_path, x), len(joint_path.step)
+    count = len(joint_path.step)
     problem = _pose_problem(joint_path, limits)
     x, a = _find_start(joint_path, limits, problem, ramp)
-    plan = _Plan(joint_path, joint_path.find_stretches(), problem, x, a, least, np.full(count, np.inf))
+    plan = _Plan(joint_path, joint_path.find_stretches(), problem, x, a, np.full(count, np.inf))
     rough = max(_WORK * _ROUGH // len(_BARRIERS), min(_ENOUGH * count, _WORK))
     work = _WORK - rough + _shorten(plan, _BARRIERS[:_ROUGH], rough)
     if work >= count:
         plan = _cut_steps(plan, limits, ramp, _count_parts(plan, ramp))
     work = _shorten(plan, _BARRIERS[_ROUGH:], work)
-    profile, use = _write_profile(plan, limits)
+    profile, use = _write_profile(plan, limits, None)
     for again in range(_MEASUREMENTS):
         over = use.kept[:, 3] > _OVER
         if not over.any():
             break
+        known: tuple[Utilisation, Array, Array] | None
         parts = np.ones(len(plan.x) - 1, np.int64)
         plan = plan._replace(where=np.zeros(len(parts)))
         if again < _REFINEMENTS and work >= len(parts):
             parts[profile.row[over]] = _MORE_PARTS
-            plan = _cut_steps(plan, limits, ramp, parts)
+            plan, known = _cut_steps(plan, limits, ramp, parts), None
         else:
+            known = use, plan.x.copy(), plan.a.copy()
             plan = _tighten_steps(plan, ramp, profile.row[over], _SURE * use.kept[over, 3])
         if again < _MEASUREMENTS - 1:
             work = _shorten(plan, _BARRIERS[_ROUGH:], work)
-        profile, use = _write_profile(plan, limits)
+        profile, use = _write_profile(plan, limits, known)
     pieces = 2 * (plan.edges[:, 1] - plan.edges[:, 0])
     worst = np.maximum.reduceat(use.kept[:, 3], np.cumsum(pieces) - pieces)
     stretch_pieces(plan.edges, profile, np.where(worst > 1.0, _SURE * worst, 1.0))
@@ -146,12 +145,7 @@ def _find_start(joint_path: JointPath, limits: DriveLimits, problem: StepLimits,
         third = np.abs(np.diff(rows.curvature, axis=0)) / rows.step[:, None]
         ceiling = np.min((_ACROSS * limits.jerk / third) ** (2.0 / 3.0), axis=1)
     ceiling = np.fmin(ceiling, np.minimum(problem.ceiling_start, problem.ceiling_end))
-    ceiling = np.minimum(np.append(ceiling, 0.0), np.append(0.0, ceiling))
-    ceiling[joint_path.find_ends()] = 0.0
-    bounds = AccelerationLimits(np.minimum(limits.acceleration, RAMP * limits.jerk), np.full(count, np.inf))
-    controllable, x, u, a = np.empty(count + 1), np.empty(count + 1), np.empty(count), np.zeros(count + 1)
-    compute_controllable(rows, bounds, ceiling, controllable, 0, count)
-    compute_reachable(rows, bounds, controllable, x, u, 0, count)
+    x, a = find_reachable(joint_path, limits, StepCeilings(ceiling, ceiling))[0], np.zeros(count + 1)
     edges, scratch = joint_path.find_stretches(), allocate_scratch(count + 1)
     for first, last in edges:
         smooth_speeds(first, last, rows.step, ramp, x, a, scratch)
@@ -185,7 +179,7 @@ def _cut_windows(edges: Indices, rows: int, odd: int) -> Indices:
 
 def _shorten(plan: _Plan, barriers: tuple[float, ...], work: int) -> int:
     """Shorten a profile that keeps all limits, in sweeps of windows for each weight; return the rest of the work."""
-    count = len(plan.least)
+    count = len(plan.where)
     cuts = [_cut_windows(plan.edges, rows, odd) for rows in _WINDOWS for odd in (0, 1)]
     widest = max(int((windows[:, 1] - windows[:, 0]).max(initial=1)) for windows in cuts)
     for k, weight in enumerate(barriers):
@@ -194,7 +188,7 @@ def _shorten(plan: _Plan, barriers: tuple[float, ...], work: int) -> int:
             steps = min(share // count, _STEPS)
             if not steps:
                 break
-            args = Sweep(plan.problem, plan.x, plan.a, plan.least, gains, weight, steps, _WORTH)
+            args = Sweep(plan.problem, plan.x, plan.a, gains, weight, steps, _WORTH)
             done = _sweep_windows(cuts[sweep % len(cuts)], args, count, widest)
             share, work = share - done, work - done
             if not done:
@@ -239,19 +233,16 @@ def _cut_steps(plan: _Plan, limits: DriveLimits, ramp: float, parts: Indices) ->
     locate_times(plan.problem, plan.x, plan.a, steps, k / parts[steps] * time[steps], states)
     joint_path = divide_joint_path(plan.joint_path, steps, states[:, 0] / whole[steps])
     x, a = np.insert(plan.x, steps + 1, states[:, 1]), np.insert(plan.a, steps + 1, states[:, 2])
-    per_mm = np.divide(plan.least, whole, out=np.zeros(len(parts)), where=whole > 0.0)
     where = np.repeat(np.where(parts > 1, np.inf, plan.where), parts)
     problem = _pose_problem(joint_path, limits)
-    cut = _Plan(
-        joint_path, joint_path.find_stretches(), problem, x, a, np.repeat(per_mm, parts) * joint_path.step, where
-    )
+    cut = _Plan(joint_path, joint_path.find_stretches(), problem, x, a, where)
     _slow_plan(cut, ramp)
     return cut
 
 
 def _tighten_steps(plan: _Plan, ramp: float, steps: Indices, factors: Array) -> _Plan:
     """Tighten the limits of steps that take ``factors`` of them, and slow the profile down there."""
-    problem, tighter = plan.problem, np.ones(len(plan.least))
+    problem, tighter = plan.problem, np.ones(len(plan.where))
     tighten_steps(steps, factors, problem, plan.x, plan.a, tighter)
     ceilings = problem.ceiling_start / tighter**2, problem.ceiling_end / tighter**2
     tightening = problem.tightening * tighter
@@ -268,11 +259,20 @@ def _slow_plan(plan: _Plan, ramp: float) -> None:
     plan.where[(plan.x != before)[:-1]] = np.inf
 
 
-def _write_profile(plan: _Plan, limits: DriveLimits) -> tuple[SpeedProfile, Utilisation]:
-    """Write a profile in two pieces a step, each stretch from time 0 on, and measure it."""
+def _write_profile(
+    plan: _Plan, limits: DriveLimits, known: tuple[Utilisation, Array, Array] | None
+) -> tuple[SpeedProfile, Utilisation]:
+    """Write a profile in two pieces a step, each stretch from time 0 on, and measure its utilisation.
+
+    known : the utilisation of the same rows with other ṡ² and s̈ (rows,); it is measured anew where they changed
+    """
     rows, pieces = len(plan.x), 2 * int((plan.edges[:, 1] - plan.edges[:, 0]).sum())
     profile = SpeedProfile.allocate(pieces, rows)
-    use = Utilisation(np.empty((pieces, 4)), np.zeros(rows, np.int64), np.ones(rows - 1, bool))
+    if known is None:
+        use = Utilisation(np.empty((pieces, 4)), np.zeros(rows, np.int64), np.ones(rows - 1, bool))
+    else:
+        rows_changed = (known[1] != plan.x) | (known[2] != plan.a)
+        use = known[0]._replace(changed=rows_changed[:-1] | rows_changed[1:])
     write_pieces(plan.edges, plan.problem, plan.x, plan.a, profile)
     args = (plan.joint_path.rows, limits, profile, use, _PLACES)
     run_in_threads(pieces // 2, lambda first, last: measure_utilisation(*args, 2 * first, 2 * last))

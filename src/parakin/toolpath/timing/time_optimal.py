@@ -32,18 +32,25 @@ def compute_ceilings(joint_path: JointPath, limits: DriveLimits) -> StepCeilings
     return ceilings
 
 
+def find_reachable(joint_path: JointPath, limits: DriveLimits, ceilings: StepCeilings) -> tuple[Array, Array]:
+    """Find the greatest ṡ² (rows,) below ceilings that is controllable and reachable, and its s̈ (steps,)."""
+    count = len(joint_path.step)
+    ceiling = np.minimum(np.append(ceilings.start, 0.0), np.append(0.0, ceilings.end))
+    ceiling[joint_path.find_ends()] = 0.0
+    bounds = AccelerationLimits(np.minimum(limits.acceleration, RAMP * limits.jerk), np.full(count, np.inf))
+    x, u, controllable = np.empty(count + 1), np.empty(count), np.empty(count + 1)
+    compute_controllable(joint_path.rows, bounds, ceiling, controllable, 0, count)
+    compute_reachable(joint_path.rows, bounds, controllable, x, u, 0, count)
+    return x, u
+
+
 def find_quickest(joint_path: JointPath, limits: DriveLimits) -> tuple[JointPath, Array, Array]:
     """Find ṡ² (rows,) and s̈ (steps,) of the quickest profile without jerks, with rows where it switches."""
     for attempt in range(_ROUNDS):
         rows, count = joint_path.rows, len(joint_path.step)
         ceilings = compute_ceilings(joint_path, limits)
-        ceiling = np.minimum(np.append(ceilings.start, 0.0), np.append(0.0, ceilings.end))
-        ceiling[joint_path.find_ends()] = 0.0
-        acceleration = np.minimum(limits.acceleration, RAMP * limits.jerk)
-        bounds = AccelerationLimits(acceleration, np.full(count, np.inf))
-        x, u, controllable = np.empty(count + 1), np.empty(count), np.empty(count + 1)
-        compute_controllable(rows, bounds, ceiling, controllable, 0, count)
-        compute_reachable(rows, bounds, controllable, x, u, 0, count)
+        x, u = find_reachable(joint_path, limits, ceilings)
+        bounds = AccelerationLimits(np.minimum(limits.acceleration, RAMP * limits.jerk), np.full(count, np.inf))
         switches, lost = Switches(np.empty(count), np.empty(count)), list[float]()
         args = (rows, bounds, ceilings, x, switches)
         run_in_threads(count, lambda start, stop: lost.append(find_switches(*args, start, stop)))  # noqa: B023

@@ -30,7 +30,6 @@ class Sweep(NamedTuple):
     """What a sweep over windows works on.
 
     limits : the problem; x, a : (rows,) the profile, which is shortened
-    least : (steps,) s that each step takes at least; a window that is near that is left as it is
     gains : (steps,) the fraction of time that the last sweep saved around each step, overwritten
     weight : of the barriers; steps : of Newton's in each window, at most
     worth : a window is left as it is where no gain is as much
@@ -39,7 +38,6 @@ class Sweep(NamedTuple):
     limits: StepLimits
     x: Array
     a: Array
-    least: Array
     gains: Array
     weight: float
     steps: int
@@ -197,6 +195,15 @@ def _measure_time(first, last, limits, x, a):
 
 
 @njit(nogil=True, cache=True, error_model="numpy")
+def _bound_time(first, last, limits):
+    """Bound the time of a window from below, by its ceilings."""
+    time = 0.0
+    for i in range(first, last):
+        time += limits.step[i] / np.sqrt(max(limits.ceiling_start[i], limits.ceiling_end[i]))
+    return time
+
+
+@njit(nogil=True, cache=True, error_model="numpy")
 def shorten_windows(windows, sweep, newton):
     """Shorten the time of windows (k, 2) of first and last row, whose ends stay; returns the steps expanded."""
     limits, x, a, gains = sweep.limits, sweep.x, sweep.a, sweep.gains
@@ -204,7 +211,7 @@ def shorten_windows(windows, sweep, newton):
     for k in range(len(windows)):
         first, last = windows[k, 0], windows[k, 1]
         time = _measure_time(first, last, limits, x, a)
-        if time <= _NEAR * sweep.least[first:last].sum() or gains[first:last].max() < sweep.worth:
+        if time <= _NEAR * _bound_time(first, last, limits) or gains[first:last].max() < sweep.worth:
             continue
         damping = _RIDGE
         for _ in range(sweep.steps):

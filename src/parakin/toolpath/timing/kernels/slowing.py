@@ -2,8 +2,8 @@
 
 First the speed is lowered to the least within a ramp's time and averaged (a grey erosion and a box filter): that bounds
 how fast s̈ changes. Then the profile is slowed by exp(-L), L ≥ 0 a smooth function of time: x = ṡ² becomes x·exp(-2L),
-and s̈ follows. L is as high as a broken step needs it, everywhere within a span of time around the step. Where that is not
-enough the span is doubled, at last to the whole stretch between two stops, and slowing a whole stretch keeps any limit.
+and s̈ follows. L is as high as a broken step needs it, everywhere within a span of time around the step. Where that is
+not enough the span is doubled, at last to the whole stretch between two stops; slowing that down keeps any limit.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 ( part.ngc on linear_delta, mode +++, joints, made by parakin )
 ( X is tower_a in mm, Y is tower_b in mm, Z is tower_c in mm )
-( 0.367 s from the first record on, 4.0 s to it )
+( 0.339 s from the first record on, 4.0 s to it )
 ( F is the inverse of minutes )
 ( $110 to $112 and $120 to $122: speeds and accelerations of the joints, $32  )
 ( is 0 )
@@ -14,12 +14,12 @@ M3
 G93
 G53G1X997.1028Y997.1028Z997.1028F15.000
 M8
-G53G1X997.0832Y995.1091Z999.0512F485.330
+G53G1X997.0832Y995.1091Z999.0512F532.338
 ( half way )
 G4P0.5
-G53G1X999.3356Y993.9468Z997.8961F500.586
+G53G1X999.3356Y993.9468Z997.8961F528.700
 M9
 M0
-G53G1X999.3551Y995.9442Z995.9442F485.327
+G53G1X999.3551Y995.9442Z995.9442F532.273
 M5
 M2

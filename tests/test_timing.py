@@ -161,7 +161,7 @@ def test_every_limit_holds_with_jerks(name):
         free = limited(result.machine, mm=(*drive_of(drives, result.machine, "mm"), INF),
                        rad=(*drive_of(drives, result.machine, "rad"), INF))  # fmt: skip
         without = plan_trajectory(replace(result, machine=free), corners=("round", "stop")[seed % 2])
-        assert trajectory.seconds > 0.998 * without.seconds  # each is the quickest but for a thousandth
+        assert trajectory.seconds > 0.99 * without.seconds  # which is the quickest of constant s̈ over each step
 
 
 def drive_of(drives, machine, unit):
@@ -189,7 +189,7 @@ def test_a_straight_motion_takes_the_time_of_its_trapezoid(way, feed):
 
 
 @pytest.mark.parametrize(("way", "feed"), [(100.0, 6000.0), (2.0, 6000.0), (0.01, 6000.0), (0.5, 0.01)])
-def test_with_jerks_a_straight_motion_is_no_quicker_than_can_be_and_not_much_slower(way, feed):
+def test_with_jerks_a_straight_motion_takes_the_time_of_its_s_curve(way, feed):
     v, a, j = feed / 60.0, 2000.0, 50_000.0
     machine = limited(pk.load("linear_delta"), mm=(INF, a, j))
     trajectory = plan_trajectory(posted(machine, [[0, 0, 280], [0, 0, 280 + way]], feed=feed))
@@ -201,7 +201,7 @@ def test_with_jerks_a_straight_motion_is_no_quicker_than_can_be_and_not_much_slo
         least = a / j + np.sqrt((a / j) ** 2 + 4.0 * way / a)
     else:
         least = 4.0 * np.cbrt(way / (2.0 * j))
-    assert least < trajectory.seconds < 1.25 * least
+    assert least < trajectory.seconds < 1.005 * least
 
 
 def cartesian(**limits):

@@ -20,7 +20,7 @@ from .speed_profile import SpeedProfile
 from .time_optimal import RAMP, compute_ceilings, find_reachable
 
 _FIRST, _LEAST = 1.0 / 16.0, 1e-6  # of the way in which s̈ is built up, and mm: the first step behind a stop
-_QUARTER = 0.25  # of a stretch: no first step is longer
+_START = 1.0 / 64.0  # of a stretch: no first step is longer
 _ACROSS = 0.5  # fraction of a jerk limit that q'''·ṡ³ may take at first
 _FASTER = 50.0  # × the path's mean speed at the joints' speeds: nothing is faster, also where all joints turn back
 _PARTS, _PER_RAMP, _ACTIVE = 8, 6.0, 0.5  # a step is cut into as many parts, so many a ramp, where jerk is taken so far
@@ -103,7 +103,7 @@ def _grade_steps(joint_path: JointPath, limits: DriveLimits, ramp: float, x: Arr
     edges, size = joint_path.find_stretches(), np.full(len(x), np.inf)
     starts, stops = edges.T
     length = np.append(0.0, np.cumsum(joint_path.step))
-    quarter = _QUARTER * (length[stops] - length[starts])
+    greatest = _START * (length[stops] - length[starts])
     ceiling = np.minimum(*compute_ceilings(joint_path, limits))
     for row, step, other in ((starts, starts, starts + 1), (stops, stops - 1, stops - 1)):
         slope = np.abs(joint_path.joints[row] - joint_path.joints[other]) / joint_path.step[step][:, None]
@@ -111,7 +111,7 @@ def _grade_steps(joint_path: JointPath, limits: DriveLimits, ramp: float, x: Arr
             jerk, acceleration = (np.min(each / slope, axis=1) for each in (limits.jerk, limits.acceleration))
             way = np.fmin(acceleration**3 / (6.0 * jerk**2), (4.0 * ceiling[step]) ** 0.75 / (6.0 * np.sqrt(jerk)))
         way = np.where((way > 0.0) & np.isfinite(way), _FIRST * way, np.inf)
-        size[row] = np.minimum(np.maximum(way, _LEAST), quarter)
+        size[row] = np.minimum(np.maximum(way, _LEAST), greatest)
     bound_sizes(joint_path.step, size)
     size = np.maximum(size, np.sqrt(x) * (ramp / _PER_RAMP))
     count = cut_steps(joint_path.step, size, np.empty(0, np.int64), np.empty(0))

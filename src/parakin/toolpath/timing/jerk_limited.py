@@ -30,7 +30,7 @@ _STEPS, _SWEEPS = 12, 6  # of Newton's in each window and sweep, and sweeps of e
 _WORK = 4_000_000  # steps of the path that Newton's method expands in all, at most: some 5 s on two cores
 _ENOUGH = 6  # of Newton's steps for each of the path's are left to a weight, if the next one has to go without
 _WORTH = 1e-3  # a window is left as it is where the last sweep saved less than this fraction of the time
-_PLACES = 9  # places on each piece where utilisation is measured
+_PLACES, _FEWER, _LONG = 33, 9, 200_000  # on each piece where utilisation is measured, and on paths of more rows
 _OVER = 1.0005  # a step whose pieces take more of a limit is cut into _MORE_PARTS, or tightened
 _MEASUREMENTS, _REFINEMENTS, _MORE_PARTS = 6, 2, 4  # how often pieces are measured at most, and steps cut for it
 _SURE = 1.0001  # a profile is slowed by this × the worst utilisation, which is measured at some places only
@@ -274,6 +274,6 @@ def _write_profile(
         rows_changed = (known[1] != plan.x) | (known[2] != plan.a)
         use = known[0]._replace(changed=rows_changed[:-1] | rows_changed[1:])
     write_pieces(plan.edges, plan.problem, plan.x, plan.a, profile)
-    args = (plan.joint_path.rows, limits, profile, use, _PLACES)
+    args = (plan.joint_path.rows, limits, profile, use, _PLACES if rows <= _LONG else _FEWER)
     run_in_threads(pieces // 2, lambda first, last: measure_utilisation(*args, 2 * first, 2 * last))
     return profile, use

@@ -9,6 +9,7 @@ import pytest
 import parakin as pk
 from parakin.budget import Budget
 from parakin.cli import main
+from parakin.commands.options import OFF_LIMITS
 from parakin.errors import PoseError
 from parakin.performance.certified.region_singularities import judge_singularities
 from parakin.workspaces.certified.containment import prove_boxes
@@ -129,3 +130,22 @@ def test_what_can_not_be_answered_is_refused_before_the_work(capsys):
         assert code == 2
         assert capsys.readouterr().err.startswith(f"{option}: ")
         assert time.monotonic() - began < LATE
+
+
+def test_drawing_ends_in_its_time_and_says_so(tmp_path, capsys):
+    picture = tmp_path / "o.png"
+    began = time.monotonic()
+    given = ["--some", "A=-180:180,B=-90:90,C=-180:180", "--time", "1", "-o", str(picture)]
+    assert main(["workspace", "hexapod", *given]) == OFF_LIMITS
+    assert time.monotonic() - began < 10 * LATE
+    said = capsys.readouterr()
+    assert "proved" in said.out
+    assert f"{picture}: not written, seconds: the time is up" in said.err
+    assert not picture.exists()
+
+
+def test_a_grid_of_the_atlas_that_is_not_done_is_refused():
+    region = pk.region(pk.load("lambda6"))
+    region.find_extent()
+    with pytest.raises(pk.PoseError, match="the time is up"):
+        pk.atlas(region, step=20.0, seconds=0.01)

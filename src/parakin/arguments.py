@@ -11,7 +11,7 @@ import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import wraps
 from inspect import signature
-from math import inf, pi
+from math import inf, isfinite, pi
 from numbers import Integral, Real
 from os import PathLike
 from typing import Any, Literal, TypeAlias, TypeVar, Union, cast, get_args, get_origin
@@ -28,6 +28,7 @@ RowsLike: TypeAlias = ArrayLike | Coordinates
 F = TypeVar("F", bound=Callable[..., Any])
 
 TURN = 2.0 * pi * (1.0 + 1e-9)  # rad; more is hardly meant
+_LEAST, _GREATEST = 1e-60, 1e60  # of a number's size: its powers do not overflow
 _ROWS_LOOKED_AT = 1000  # for angles that look like degrees
 _PACKAGE = __name__.partition(".")[0]
 _NAMES = {
@@ -63,9 +64,13 @@ def check_arguments(function: F) -> F:
         except TypeError:
             return function(*arguments, **options)  # Python's own error, with the function's name
         for name, value in bound.arguments.items():
-            if name in hints and not _accept_value(value, hints[name]):
+            if name not in hints:
+                continue
+            if not _accept_value(value, hints[name]):
                 raise PoseError(f"{name}: {_describe_hint(hints[name])} expected, not {describe_value(value)}")
-        return function(*arguments, **options)
+            if isinstance(value, Real) and _wants_float(hints[name]):
+                bound.arguments[name] = _check_size(name, float(value))
+        return function(*bound.args, **bound.kwargs)
 
     return cast(F, call)
 
@@ -111,6 +116,19 @@ def _accept_value(value: object, hint: Any) -> bool:
         keys = get_args(hint)[:1]
         return isinstance(value, Mapping) and all(_accept_value(key, kind) for kind in keys for key in value)
     return isinstance(value, kind) if isinstance(kind, type) else callable(value) if kind is Callable else True
+
+
+def _wants_float(hint: Any) -> bool:
+    """Tell whether an annotation asks for a number, and not for a whole one or for other things too."""
+    options = set(get_args(hint)) if get_origin(hint) in (Union, types.UnionType) else {hint}
+    return float in options and options <= {float, type(None)}
+
+
+def _check_size(name: str, value: float) -> float:
+    """Return a number; those so small or great that sums and quotients of them overflow are refused."""
+    if value != 0.0 and not _LEAST < abs(value) < _GREATEST and isfinite(value):
+        raise PoseError(f"{name}: {value:g} is out of range")
+    return value
 
 
 def _is_float(value: Any) -> bool:
@@ -189,6 +207,13 @@ def check_positive(name: str, value: float, unit: str = "") -> float:
     if not (isinstance(value, Real) and not isinstance(value, bool) and 0.0 < value < np.inf):
         raise PoseError(f"{name}: a number above 0{unit and ' '}{unit} expected, not {describe_value(value)}")
     return float(value)
+
+
+def check_range(name: str, value: float, low: float, high: float, unit: str = "") -> None:
+    """Refuse what is no number from low to high with a :class:`PoseError`."""
+    if not (isinstance(value, Real) and not isinstance(value, bool) and low <= value <= high):
+        ends = f"{low:g} to {high:.6g}{unit and ' '}{unit}"
+        raise PoseError(f"{name}: a number from {ends} expected, not {describe_value(value)}")
 
 
 def parse_coordinate(name: str, value: object, unit: str) -> float:

@@ -7,7 +7,7 @@ import re
 from collections.abc import Iterable, Sequence
 from difflib import get_close_matches
 
-_LONGEST = 400  # letters of a message
+_LONGEST = 600  # letters of a message's line
 _MOST_LINES = 30  # of a file's mistakes are told
 _MOST_WORDS = 40  # of those that could be meant are told and compared
 
@@ -17,7 +17,7 @@ class ParakinError(Exception):
 
     def __init__(self, *arguments: object):
         super().__init__(
-            *(make_printable(argument) if isinstance(argument, str) else argument for argument in arguments)
+            *(_tidy_message(argument) if isinstance(argument, str) else argument for argument in arguments)
         )
 
 
@@ -32,7 +32,6 @@ class InputError(ParakinError):
     """
 
     def __init__(self, message: str, source: str | None = None, line: int | None = None):
-        message = _cut_middle(message)
         self.message, self.source, self.line = message, source, line
         place = source or ""
         if line is not None:
@@ -40,9 +39,13 @@ class InputError(ParakinError):
         super().__init__(f"{place}: {message}" if place else message)
 
 
-def _cut_middle(message: str) -> str:
-    """Cut the middle of a long line, which repeats what is wrong; its end says what was expected."""
-    return message if len(message) <= _LONGEST else f"{message[: _LONGEST // 2]} ... {message[-_LONGEST // 3 :]}"
+def _tidy_message(text: str) -> str:
+    """Make a message printable, and cut the middle of long lines: their ends say what was expected."""
+    return "\n".join(_cut_middle(line) for line in make_printable(text).split("\n"))
+
+
+def _cut_middle(line: str) -> str:
+    return line if len(line) <= _LONGEST else f"{line[: _LONGEST // 2]} ... {line[-_LONGEST // 3 :]}"
 
 
 class InputErrors(InputError):
@@ -81,7 +84,7 @@ def quote(text: object) -> str:
     return f'"{line}"' if len(line) <= 60 else f'"{line[:57]}..."'
 
 
-CONTROL_CHARACTER = re.compile("[\x00-\x08\x0a-\x1f\x7f-\x9f\u2028-\u202e\u2066-\u2069]")
+CONTROL_CHARACTER = re.compile("[\x00-\x08\x0a-\x1f\x7f-\x9f\u2028-\u202e\u2066-\u2069\ud800-\udfff]")
 """What a text of one line never holds: control characters but for tabs, and signs that turn or break the line."""
 
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from .algebra import Scalar, Vec
-from .arguments import RowsLike, bound_angles, describe_value, read_rows, warn_of_wide_angles
+from .arguments import RowsLike, bound_angles, check_range, describe_value, read_rows, warn_of_wide_angles
 from .arrays import Array
 from .errors import NoMethodError, PoseError
 from .kernels.batch import evaluate_tape, evaluate_tape_with_residual
@@ -113,6 +113,7 @@ class Machine(MachineProperties):
         rows, lead = self.rows(poses, self.axes, "poses")
         if len(lead) != 1:
             raise PoseError(f"poses: a path of shape (N, {len(self.axes)}) expected")
+        check_range("free_below", free_below, 0.0, 0.5 * np.pi, "rad")
         return follow_path(self.model, rows, self.checked_mode(mode), free_below)
 
     def make_continuous(self, poses: Array, joints: Array, mode: str, free_below: float = EXACT) -> None:
@@ -173,11 +174,11 @@ class Machine(MachineProperties):
             raise PoseError(f"joints: one vector ({len(self.joints)},) expected, not {(*lead, len(self.joints))}")
         return find_assemblies(self.model, rows)
 
-    def sides(self, poses: Array) -> Array:
+    def sides(self, poses: RowsLike) -> Array:
         """Compute the determinant whose sign tells the assembly mode, at rows of poses (n, axes): (n,)."""
-        return find_sides(self.model, poses, self.mode)
+        return find_sides(self.model, self.rows(poses, self.axes, "poses")[0], self.mode)
 
-    def common_points(self, joints: Array, side: float) -> tuple[Array, Array]:
+    def common_points(self, joints: RowsLike, side: float) -> tuple[Array, Array]:
         """Compute poses (n, axes) where the legs' spheres meet, on one side of their centres, for rows of joints.
 
         Also what the legs fail to close there, mm.
@@ -186,8 +187,10 @@ class Machine(MachineProperties):
         """
         if not self.has_closed_forward:
             raise NoMethodError(f"{self.name}: no closed form of the direct problem")
-        poses = np.empty((len(joints), len(self.axes)))
-        residual = evaluate_tape_with_residual(self.model.spheres_tape(side), joints, poses, np.empty((len(joints), 0)))
+        check_range("side", side, -1.0, 1.0)
+        rows = self.rows(joints, self.joints, "joints")[0]
+        poses = np.empty((len(rows), len(self.axes)))
+        residual = evaluate_tape_with_residual(self.model.spheres_tape(side), rows, poses, np.empty((len(rows), 0)))
         return poses, residual
 
     def tapes(self, mode: str) -> KinematicTapes:
@@ -207,20 +210,21 @@ class Machine(MachineProperties):
         both = evaluate_tape(self.model.jacobian_tape(), rows, np.empty((len(rows), n * n + n * m)), joints)
         return both[:, : n * n].reshape(*lead, n, n), both[:, n * n :].reshape(*lead, n, m)
 
-    def twist_rates(self, poses: Array, joints: Array, whole: bool = True) -> tuple[Array, Array, Array]:
+    def twist_rates(self, poses: RowsLike, joints: RowsLike, whole: bool = True) -> tuple[Array, Array, Array]:
         """Compute A and B (n, m, m) with A t' = B q' for the tool's twist t', and the legs' wrench norms (n, legs), mm.
 
         Poses and joints are rows; see :class:`parakin.model.rates.TwistRates`. With ``whole`` a row is NaN if a number
         of it is not finite.
         """
-        m = len(self.axes)
+        m, rows = len(self.axes), self.rows(poses, self.axes, "poses")[0]
         tape = self.model.rates_tape()
-        both = evaluate_tape(tape, poses, np.empty((len(poses), tape.outputs)), joints, whole)
+        both = evaluate_tape(tape, rows, np.empty((len(rows), tape.outputs)), self._joints_of(joints, len(rows)), whole)
         a, b = (both[:, i * m * m : (i + 1) * m * m].reshape(-1, m, m) for i in (0, 1))
         return a, b, both[:, 2 * m * m :]
 
     def place_platform(self, pose: Array, mode: str, joints: Array | None = None) -> PlatformPlacement:
         """Find the platform's frame for a pose (axes,), in a working mode or for the joints that a path takes there."""
+        mode = self.checked_mode(mode)
         with np.errstate(invalid="ignore", divide="ignore"):
             if joints is None:
                 return self.structure.place(list(pose), self.model.split_mode(mode)[1])

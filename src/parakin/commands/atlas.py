@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
 
-from ..budget import SECONDS
+from ..budget import SECONDS, Budget
 from ..errors import InputError, PoseError, quote
 from ..export.json.performance import encode_atlas, encode_performance, encode_proofs
 from ..units import NUMBER, QuantityError, parse_quantity, to_display
@@ -211,7 +211,7 @@ class _AtlasResults:
         if cut is self.region:
             return self.atlas.map
         try:
-            return map_performance(cut, step, self.length)
+            return map_performance(cut, step, self.length, budget=Budget(self.seconds))
         except PoseError as error:
             axis = next(axis for axis in self.region.free_axes if axis in cut.fixed_axes)
             raise InputError(f"{axis}={cut.fixed_axes[axis]:g}: {error}", "--slice") from None

@@ -141,7 +141,7 @@ def workspace(
         seconds = clock.monotonic() - began
         contents = WorkspaceFiles(result, None, ())
         if is_drawn:
-            contents = prepare_files(result, effort.step, progress.stage("drawing", 0.6, 1.0))
+            contents = prepare_files(result, effort.step, progress.stage("drawing", 0.6, 1.0), effort.seconds)
         elsewhere = None
         if isinstance(result, Workspace):
             elsewhere = measure_elsewhere(result, seconds=min(_ELSEWHERE, effort.seconds))
@@ -156,6 +156,8 @@ def workspace(
         print_text(format_workspace(result, seconds, elsewhere) + format_inside(inside))
         if written:
             print_text("\n" + "\n".join(f"{kind:<5} {path}" for kind, path in written.items()))
+    if contents.undrawn and json:
+        print_remark(f"no cross-sections, {contents.undrawn}")
     for path, reason in refused.items():
         print_remark(f"{path}: not written, {reason}")
     if isinstance(result, Workspace) and result.stopped == "interrupted":

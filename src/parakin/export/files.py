@@ -75,6 +75,8 @@ def write_files(folder: str | os.PathLike[str], files: Mapping[str, Content]) ->
                     os.replace(stage / target.name, target)  # noqa: PTH105
     except OSError as error:
         raise InputError(f"can't be written: {error.strerror or error}", current) from error
+    except ValueError as error:  # a name that is no text, or with a zero character
+        raise InputError(f"can't be written: {error}", current) from error
     return targets
 
 

@@ -16,6 +16,7 @@ from ..budget import SECONDS, Budget
 from ..errors import PoseError
 from ..machine import Machine
 from ..workspaces.certified.region import Region
+from ..workspaces.sampled.sampling import TOO_SLOW
 from .certified.region_singularities import RegionSingularity, judge_singularities
 from .characteristic_length import CharacteristicLength, choose_characteristic_length
 from .extremes import Extreme, ExtremeSide, compute_slack, find_extremes, find_isotropic_poses
@@ -27,6 +28,7 @@ _ALONG = {1: 400, 2: 120, 3: 36}  # positions along the longest side, at most, i
 _AT_ONCE = 1 << 15
 _ON = 1e-3  # a pose nearer than this fraction of a grid's step lies on the slice
 _ROUGH, _OUTLINE = 0.1, 0.2  # gap, and fraction of the time, of the workspace by which the grid is placed
+_SEARCH = 0.4  # of the time that is left, for the extremes, and then for isotropic poses
 
 
 @dataclass(frozen=True, eq=False)
@@ -129,18 +131,18 @@ def atlas(
     step : between positions of the grid, mm; the grid stands on its multiples
     length : characteristic length, mm; see :func:`~.characteristic_length.choose_characteristic_length`
     progress : called with the fraction done
-    seconds : of the work that has no end of its own: the proofs, which then leave singularities unproved
+    seconds : of all the work; singularities that are not proved by then are unproved, extremes the best found by then
 
-    Raises :class:`PoseError` for invalid numbers, and for a region that is swept, unbounded or empty.
+    Raises :class:`PoseError` for invalid numbers, for a region that is swept, unbounded or empty, and where the time is
+    up before the grid is done.
     """
     if region.swept_axes:
         raise PoseError(f"region: an atlas is of one orientation, {' '.join(region.swept_axes)} must not be swept")
     budget, report = Budget(seconds), progress or (lambda fraction: None)
-    outline = budget.take_fraction(_OUTLINE)
-    drawn = map_performance(region, step, length, lambda fraction: report(0.4 * fraction), outline)
-    extremes = find_extremes(region, drawn.inside, drawn.step)
+    drawn = map_performance(region, step, length, lambda fraction: report(0.4 * fraction), budget)
+    extremes = find_extremes(region, drawn.inside, drawn.step, budget.take_fraction(_SEARCH))
     report(0.6)
-    poses, isolated = find_isotropic_poses(region, drawn.inside, drawn.step)
+    poses, isolated = find_isotropic_poses(region, drawn.inside, drawn.step, budget.take_fraction(_SEARCH))
     report(0.7)
     return Atlas(drawn, extremes, poses, isolated, judge_singularities(region, budget))
 
@@ -153,19 +155,23 @@ def map_performance(
     budget: Budget | None = None,
 ) -> PerformanceMap:
     """Compute the map alone, over a region without swept axes; parameters and errors as of :func:`atlas`."""
+    budget = budget or Budget()
     scale = choose_characteristic_length(region.machine, length)
     if step is not None and not (isfinite(step) and step > 0.0):
         raise PoseError(f"step: a length above 0 mm expected, not {step:g}")
-    low, high = _find_bounds(region, budget or Budget(_OUTLINE * SECONDS))
+    outline = budget.take_fraction(_OUTLINE)
+    low, high = _find_bounds(region, outline)
     step = _round_up(float((high - low).max()) / _ALONG[len(region.free_axes)]) if step is None else float(step)
     counts = [(b - a) / step + 1.0 for a, b in zip(low, high, strict=True)]
     if prod(counts) > MOST:
+        if outline.is_spent():  # the bounds are wider than need be
+            raise PoseError(TOO_SLOW)
         size = " x ".join(f"{count:,.0f}" for count in counts)
         raise PoseError(f"step: {step:g} mm makes {size} places, at most {MOST:,} are possible")
     grid = tuple(_list_multiples(a, b, step) for a, b in zip(low, high, strict=True))
     positions = np.stack(np.meshgrid(*grid, indexing="ij"), -1).reshape(-1, len(grid))
     shape = tuple(len(line) for line in grid)
-    performance = _compute_in_blocks(region, positions, scale, progress)
+    performance = _compute_in_blocks(region, positions, scale, budget, progress)
     slack = compute_slack(region, positions)
     if not (slack >= 0.0).any():
         if (compute_slack(region.include_all_components(), positions) >= 0.0).any():
@@ -208,11 +214,13 @@ def _change_columns(performance: Performance, change: Callable[[Array], Array]) 
 
 
 def _compute_in_blocks(
-    region: Region, positions: Array, length: CharacteristicLength, progress: Progress | None
+    region: Region, positions: Array, length: CharacteristicLength, budget: Budget, progress: Progress | None
 ) -> Performance:
-    """Compute the performance at positions (N, d), a block at a time."""
+    """Compute the performance at positions (N, d), a block at a time; raises :class:`PoseError` where time is up."""
     blocks = []
     for start in range(0, len(positions), _AT_ONCE):
+        if start and budget.is_spent():
+            raise PoseError(TOO_SLOW)
         poses = region.poses(positions[start : start + _AT_ONCE])
         blocks.append(compute_performance(region.machine, poses, length.value, region.mode))
         if progress:

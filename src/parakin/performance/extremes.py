@@ -8,6 +8,7 @@ from typing import Literal
 import numpy as np
 
 from ..arrays import Array, Indices
+from ..budget import Budget
 from ..workspaces.certified.assembly_mode import ZERO
 from ..workspaces.certified.region import Region
 from .indices import Performance, compute_performance
@@ -70,8 +71,8 @@ def _list_positions(region: Region, performance: Performance) -> Array:
 class _ExtremeSearch:
     """The search for the extremes of quantities (m,), greatest where their signs are 1 and least where they are -1."""
 
-    def __init__(self, region: Region, inside: Performance, kinds: Indices, signs: Array, apart: float):
-        self.region, self.inside, self.kinds, self.signs = region, inside, kinds, signs
+    def __init__(self, region: Region, inside: Performance, kinds: Indices, signs: Array, apart: float, budget: Budget):
+        self.region, self.inside, self.kinds, self.signs, self.budget = region, inside, kinds, signs, budget
         self.step = np.full(len(region.free_axes), apart)
 
     def climb(self, starts: list[Array], finest: float) -> list[tuple[Array, Array]]:
@@ -86,11 +87,13 @@ class _ExtremeSearch:
             values = self.signs[which] * table[np.arange(len(points)), self.kinds[which]]
             return np.where(compute_slack(self.region, points) >= 0.0, values, np.nan)
 
-        points, best = search_maxima(evaluate, np.concatenate(starts), self.step, finest)
+        points, best = search_maxima(evaluate, np.concatenate(starts), self.step, finest, self.budget)
         return [(points[owner == number], best[owner == number]) for number in range(len(starts))]
 
 
-def find_extremes(region: Region, inside: Performance, apart: float) -> tuple[Extreme, ...]:
+def find_extremes(
+    region: Region, inside: Performance, apart: float, budget: Budget | None = None
+) -> tuple[Extreme, ...]:
     """Find extremes over a region by search, from the performance at allowed positions of a grid of step ``apart``, mm.
 
     Measures have a least and a greatest value; margins are of interest where they are least.
@@ -102,7 +105,7 @@ def find_extremes(region: Region, inside: Performance, apart: float) -> tuple[Ex
     values = _tabulate_quantities(inside)
     columns, signs = np.array(wanted).T
     kinds = columns.astype(int)
-    search = _ExtremeSearch(region, inside, kinds, signs, apart)
+    search = _ExtremeSearch(region, inside, kinds, signs, apart, budget or Budget())
     first = [
         positions[pick_best_of_blocks(positions, sign * values[:, kind], _STARTS)]
         for kind, sign in zip(kinds, signs, strict=True)
@@ -119,7 +122,9 @@ def find_extremes(region: Region, inside: Performance, apart: float) -> tuple[Ex
     return tuple(extremes)
 
 
-def find_isotropic_poses(region: Region, inside: Performance, apart: float) -> tuple[Array, bool]:
+def find_isotropic_poses(
+    region: Region, inside: Performance, apart: float, budget: Budget | None = None
+) -> tuple[Array, bool]:
     """Find allowed poses (k, axes) where J⁻¹J⁻ᵀ is a multiple of 1 to 1e-9, and whether each stands alone.
 
     The starts are the best conditioned of the positions ``inside``, at least ``apart`` (mm) from each other.
@@ -142,7 +147,7 @@ def find_isotropic_poses(region: Region, inside: Performance, apart: float) -> t
     first = pick_best_apart(positions, -inside.condition, _ROOTS, 2.0 * step)
     if not len(first):
         return inside.poses[:0], True
-    points, worst, deficiency = find_roots(compute_residuals, positions[first], step)
+    points, worst, deficiency = find_roots(compute_residuals, positions[first], step, budget or Budget())
     good = (worst < _ISOTROPIC) & (compute_slack(region, points) >= 0.0)
     isolated = bool((deficiency[good] > _DEFICIENT).all())
     distance = np.full(len(step), 1e-5 * apart if isolated else apart)

@@ -7,6 +7,7 @@ from collections.abc import Callable
 import numpy as np
 
 from ..arrays import Array, Indices
+from ..budget import Budget
 
 # Points (N, d), the search each belongs to (N,) -> values (N,); NaN: not allowed.
 Objective = Callable[[Array, Indices], Array]
@@ -16,11 +17,13 @@ _FINEST = 1e-10  # last step as a fraction of the first
 _RANDOM = 3  # directions at random, and near the last one that led on, for each axis: edges of the region slant
 
 
-def search_maxima(objective: Objective, starts: Array, step: Array, finest: float = _FINEST) -> tuple[Array, Array]:
+def search_maxima(
+    objective: Objective, starts: Array, step: Array, finest: float = _FINEST, budget: Budget | None = None
+) -> tuple[Array, Array]:
     """Find local maxima (m, d) of an objective and its values (m,) there, from starts (m, d), by compass search.
 
     ``step`` (d,) is the first step, ``finest`` times that the last. All searches go on side by side, in the same
-    directions every time.
+    directions every time, until the budget is spent.
     """
     rng = np.random.default_rng(7)
     count, d = starts.shape
@@ -29,7 +32,7 @@ def search_maxima(objective: Objective, starts: Array, step: Array, finest: floa
     width, axes = np.ones(count), np.vstack([np.eye(d), -np.eye(d)])
     for _ in range(_ROUNDS):
         alive = np.flatnonzero((width > finest) & np.isfinite(best))
-        if not len(alive):
+        if not len(alive) or (budget is not None and budget.is_spent()):
             break
         random = rng.normal(size=(2, _RANDOM * d, d))
         led = lead[alive, None] + random[1] * np.geomspace(1.0, 0.01, _RANDOM * d)[:, None]
@@ -89,7 +92,9 @@ def pick_best_apart(points: Array, values: Array, count: int, apart: Array) -> I
     return np.array(picked, np.int64)
 
 
-def find_roots(residuals: Callable[[Array], Array], starts: Array, step: Array) -> tuple[Array, Array, Array]:
+def find_roots(
+    residuals: Callable[[Array], Array], starts: Array, step: Array, budget: Budget | None = None
+) -> tuple[Array, Array, Array]:
     """Find points (m, d) where residuals (m, k) are least by squares, from starts (m, d), by Levenberg and Marquardt.
 
     Returns the points, the greatest residual there (m,), and the rank deficiency (m,): the least singular value of the
@@ -100,6 +105,8 @@ def find_roots(residuals: Callable[[Array], Array], starts: Array, step: Array) 
     points, damping = starts.copy(), np.full(count, 1e-3)
     r = residuals(points)
     for _ in range(60):
+        if budget is not None and budget.is_spent():
+            break
         slopes = _estimate_derivatives(residuals, points, step)
         normal = slopes.swapaxes(1, 2) @ slopes
         size = np.einsum("nii->n", normal)[:, None, None] + 1e-300

@@ -55,6 +55,8 @@ def read_joint_program(path: str | os.PathLike[str]) -> JointProgram:
         raise InputError(f"cannot be read: {error.strerror}", source) from error
     except UnicodeDecodeError as error:
         raise InputError("expected plain text", source) from error
+    except ValueError as error:  # a name that is no text, or with a zero character
+        raise InputError(f"cannot be read: {error}", source) from error
     reader = _JointProgramReader()
     for number, line in enumerate(text.split("\n"), 1):
         try:

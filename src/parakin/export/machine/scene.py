@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ...algebra import Scalar
 from ...arguments import RowsLike
+from ...errors import PoseError
 from ...machine import Machine
 from ...model.chain import UNIT, compose_chain
 from ...model.elements import Step
@@ -86,10 +87,12 @@ def build_scene(
     joints : (joints,) those that a path really takes there, if they are known; they decide an angle that is free
     mode : working mode
     """
-    row = machine.rows(machine.home if pose is None else pose, machine.axes, "pose")[0][0]
-    mode = mode or machine.mode
+    rows = machine.rows(machine.home if pose is None else pose, machine.axes, "pose")[0]
+    if len(rows) != 1:
+        raise PoseError(f"pose: one pose of {' '.join(machine.axes)} expected, not {len(rows)}")
+    row, mode = rows[0], mode or machine.mode
     q = machine.inverse(row, mode) if joints is None else machine.rows(joints, machine.joints, "joints")[0][0]
-    with np.errstate(invalid="ignore", divide="ignore"):
+    with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
         placement = machine.place_platform(row, mode, None if joints is None else q)
         builder = _SceneBuilder(_Stance(machine, placement, q.tolist()))
         builder.build()

@@ -8,13 +8,14 @@ from functools import cached_property
 import numpy as np
 
 from ...arrays import Array, Progress
+from ...budget import SECONDS, Budget
 from ...errors import PoseError
 from ...workspaces.certified.workspace import Workspace
 from ...workspaces.sampled.cross_sections import CrossSection, find_cross_sections
 from ...workspaces.sampled.distance_field import SampledField, sample_field
 from ...workspaces.sampled.drive_sweep import DriveWorkspace
 from ...workspaces.sampled.polar_sweep import PolarWorkspace
-from ...workspaces.sampled.sampling import SampledWorkspace, find_bounding_box
+from ...workspaces.sampled.sampling import TOO_SLOW, SampledWorkspace, find_bounding_box
 from .cells import format_cells_csv, format_cells_vtu
 from .describe import AnyWorkspace
 from .meshes import Mesh, format_mesh, make_mesh
@@ -38,11 +39,16 @@ def explain_unfit(suffix: str, method: str, dimension: int) -> str | None:
 
 @dataclass(frozen=True, eq=False)
 class WorkspaceFiles:
-    """A workspace with its field (None if it is empty) and its cross-sections, from which its files are made."""
+    """A workspace with its field and its cross-sections, from which its files are made.
+
+    field : None if the workspace is empty, or is not drawn
+    undrawn : why it is not drawn, or ""
+    """
 
     workspace: AnyWorkspace
     field: SampledField | None
     cross_sections: tuple[CrossSection, ...]
+    undrawn: str = ""
 
     @cached_property
     def mesh(self) -> Mesh:
@@ -51,7 +57,7 @@ class WorkspaceFiles:
     @property
     def _filled_field(self) -> SampledField:
         if self.field is None:
-            raise PoseError("the workspace is empty")
+            raise PoseError(self.undrawn or "the workspace is empty")
         if not len(self.field.inside):
             raise PoseError(f"steps of {self.field.step.min():g} mm miss the workspace")
         return self.field
@@ -73,26 +79,55 @@ class WorkspaceFiles:
         return render_plane_png(self.workspace, self._filled_field, self.cross_sections)
 
 
-def prepare_files(workspace: AnyWorkspace, step: float | None, progress: Progress) -> WorkspaceFiles:
-    """Sample the field and find the cross-sections of a workspace; ``step`` as for ``sample_field``."""
-    box = _bound_region(workspace)
+def prepare_files(
+    workspace: AnyWorkspace, step: float | None, progress: Progress, seconds: float | None = SECONDS
+) -> WorkspaceFiles:
+    """Sample the field and find the cross-sections of a workspace, in the time given; ``step`` as for ``sample_field``.
+
+    What is not drawn by then is not drawn at all.
+    """
+    try:
+        return _draw_workspace(workspace, step, progress, Budget(seconds))
+    except PoseError as error:
+        if str(error) != TOO_SLOW:
+            raise
+        return WorkspaceFiles(workspace, None, (), TOO_SLOW)
+
+
+def _draw_workspace(workspace: AnyWorkspace, step: float | None, progress: Progress, budget: Budget) -> WorkspaceFiles:
+    """Sample the field and find the cross-sections; raises :class:`PoseError` where the budget is spent."""
+    box = _bound_region(workspace, budget)
     if box is None:
         return WorkspaceFiles(workspace, None, ())
     in_space = len(workspace.axes) == 3
-    field = sample_field(workspace.region, box, step, progress=lambda done: progress(0.5 * done if in_space else done))
+    shown = _scale_progress(progress, 0.0, 0.5 if in_space else 1.0)
+    field = sample_field(workspace.region, box, step, progress=shown, seconds=_take_rest(budget))
     cross_sections: tuple[CrossSection, ...] = ()
     if len(workspace.axes) > 1:
-        cross_sections = find_cross_sections(field, step=step, progress=lambda done: progress(0.5 + 0.5 * done))
+        shown = _scale_progress(progress, 0.5, 0.5)
+        cross_sections = find_cross_sections(field, step=step, progress=shown, seconds=_take_rest(budget))
     return WorkspaceFiles(workspace, field, cross_sections)
 
 
-def _bound_region(workspace: AnyWorkspace) -> tuple[Array, Array] | None:
+def _scale_progress(progress: Progress, begin: float, width: float) -> Progress:
+    """Make the progress of a stage that is ``width`` of the whole and begins at ``begin``."""
+    return lambda done: progress(begin + width * done)
+
+
+def _take_rest(budget: Budget) -> float:
+    """Return the time that is left, s; raises :class:`PoseError` for none."""
+    if budget.is_spent():
+        raise PoseError(TOO_SLOW)
+    return budget.seconds_left
+
+
+def _bound_region(workspace: AnyWorkspace, budget: Budget) -> tuple[Array, Array] | None:
     """Find a box proved to hold the region; None if it is empty."""
     if isinstance(workspace, SampledWorkspace):
-        return find_bounding_box(workspace.region)
+        return find_bounding_box(workspace.region, budget)
     if workspace.box is None or workspace.stopped != "gap" or not workspace.region.every_orientation:
         return workspace.box  # a search that was stopped early, or is slow, is not followed by a long one
-    box = find_bounding_box(workspace.region)
+    box = find_bounding_box(workspace.region, budget)
     if box is None:
         return None
     low, high = np.maximum(box[0], workspace.box[0]), np.minimum(box[1], workspace.box[1])

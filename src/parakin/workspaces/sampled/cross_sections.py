@@ -9,8 +9,10 @@ import numpy as np
 
 from ...arguments import check_arguments, check_positive
 from ...arrays import Array, Progress
+from ...budget import SECONDS, Budget
 from ...errors import PoseError
 from .distance_field import SampledField, sample_field
+from .sampling import TOO_SLOW
 
 COUNT = 5  # evenly spaced cross-sections
 
@@ -52,6 +54,7 @@ def find_cross_sections(
     values: Sequence[float] | int = COUNT,
     step: float | None = None,
     progress: Progress | None = None,
+    seconds: float | None = SECONDS,
 ) -> tuple[CrossSection, ...]:
     """Find cross-sections of a region in space; of one in a plane its own outline alone.
 
@@ -62,10 +65,12 @@ def find_cross_sections(
     values : of that axis, mm; or how many, in the middle of layers of one thickness
     step : of the cross-sections' grids, mm at most; by default a 240th of the box's longest edge
     progress : called with the fraction done
+    seconds : the time in which all must be sampled; None for no end
 
-    Raises :class:`PoseError` for a region along a line, an axis that is not the region's, or an invalid step.
+    Raises :class:`PoseError` for a region along a line, an axis that is not the region's, an invalid step, and where
+    the time is up.
     """
-    region = field.region
+    region, budget = field.region, Budget(seconds)
     if step is not None:
         check_positive("step", step, "mm")
     if len(region.free_axes) == 1:
@@ -85,7 +90,10 @@ def find_cross_sections(
     sections = []
     for number, value in enumerate(heights):
         cut = region.fix({axis: value})
-        plane = sample_field(cut, (low, high), step, field.distance.turns_step)
+        if budget.is_spent():
+            raise PoseError(TOO_SLOW)
+        left = None if seconds is None else budget.seconds_left
+        plane = sample_field(cut, (low, high), step, field.distance.turns_step, seconds=left)
         sections.append(CrossSection(axis, value, cut.free_axes, trace_outlines(plane)))
         if progress:
             progress((number + 1) / len(heights))

@@ -15,12 +15,13 @@ import numpy as np
 from ... import algebra as alg
 from ...arguments import check_arguments, check_positive, read_corners
 from ...arrays import Array, Indices, Progress
+from ...budget import SECONDS, Budget
 from ...errors import PoseError
 from ...kernels.batch import evaluate_tape
 from ...kernels.tape import Tape, compile_tape
 from ..certified.constraints import Constraint
 from ..certified.region import Region
-from .sampling import TURNS_STEP, sample_orientations
+from .sampling import TOO_SLOW, TURNS_STEP, sample_orientations
 
 FINE = {1: 1000, 2: 240, 3: 60}  # steps along the longest edge of a region's box, by its dimension
 _LEAST = 16  # steps along a short edge, so that a thin region is not missed
@@ -36,10 +37,14 @@ _HALVINGS = 4  # bisections of a grid's edge, to find where the boundary crosses
 
 @dataclass(frozen=True, eq=False)
 class DistanceField:
-    """The distance to a region's boundary at any position, about; swept axes are sampled ``turns_step`` rad apart."""
+    """The distance to a region's boundary at any position, about; swept axes are sampled ``turns_step`` rad apart.
+
+    Its methods raise :class:`PoseError` where they are not done in ``seconds`` each; None for no end.
+    """
 
     region: Region
     turns_step: float = TURNS_STEP
+    seconds: float | None = SECONDS
 
     @cached_property
     def _constraints(self) -> list[Constraint]:
@@ -75,14 +80,17 @@ class DistanceField:
             step *= 1.25
         return sample_orientations(self.region, step)
 
-    def evaluate(self, positions: Array, enough: float = np.inf) -> Array:
+    def evaluate(self, positions: Array, enough: float = np.inf, budget: Budget | None = None) -> Array:
         """Evaluate it at positions (N, d) mm -> (N,) mm; a sign settled by more than ``enough`` ends the samples."""
+        budget = budget or Budget(self.seconds)
         d, sign = positions.shape[1], 1.0 if self.region.every_orientation else -1.0
         distance = np.full(len(positions), np.inf)
         live: Indices = np.arange(len(positions))
         rows = np.empty((len(positions), d + len(self.region.swept_axes)))
         rows[:, :d] = positions
         for orientation in self.orientations:
+            if budget.is_spent():
+                raise PoseError(TOO_SLOW)
             rows[:, d:] = orientation
             distance[live] = np.minimum(distance[live], sign * self._evaluate_rows(rows))
             unsettled = distance[live] > -enough
@@ -96,7 +104,10 @@ class DistanceField:
         distance, limit = np.full(len(positions), np.inf), np.zeros(len(positions), np.int64)
         rows = np.empty((len(positions), d + len(self.region.swept_axes)))
         rows[:, :d] = positions
+        budget = Budget(self.seconds)
         for orientation in self.orientations:
+            if budget.is_spent():
+                raise PoseError(TOO_SLOW)
             rows[:, d:] = orientation
             each = evaluate_tape(self._each_tape, rows, np.empty((len(rows), self._each_tape.outputs)), whole=False)
             each = np.where(np.isnan(each), np.inf, each)
@@ -167,12 +178,12 @@ class SampledField:
         ends[0][rows, axis] = np.floor(crossings[rows, axis])
         ends[1][rows, axis] = np.floor(crossings[rows, axis]) + 1.0
         known = [self.values[tuple(end.astype(np.int64).T)] for end in ends]
-        flip = known[0] > known[1]
+        flip, budget = known[0] > known[1], Budget(self.distance.seconds)
         outer, inner = np.where(flip[:, None], ends[1], ends[0]), np.where(flip[:, None], ends[0], ends[1])
         f_outer, f_inner = np.minimum(*known), np.maximum(*known)
         for _ in range(_HALVINGS):
             middle = 0.5 * (outer + inner)
-            f = self.distance.evaluate(self.low + middle * self.step, enough=_CUT * float(self.step.max()))
+            f = self.distance.evaluate(self.low + middle * self.step, _CUT * float(self.step.max()), budget)
             f = np.clip(f, self.values.min(), self.values.max())
             up = f > 0.0
             inner[up], f_inner[up] = middle[up], f[up]
@@ -208,6 +219,7 @@ def sample_field(
     step: float | None = None,
     turns_step: float = TURNS_STEP,
     progress: Progress | None = None,
+    seconds: float | None = SECONDS,
 ) -> SampledField:
     """Sample the distance field of a region on a grid over a box that holds it, mm, and one step around.
 
@@ -217,9 +229,11 @@ def sample_field(
     step : mm at most; by default a 60th of the box's longest edge, in a plane a 240th
     turns_step : rad between samples of the swept axes, at most, unless they would be too many
     progress : called with the fraction done
+    seconds : the time in which all must be sampled; None for no end
 
-    Raises :class:`PoseError` for a step that makes too many nodes.
+    Raises :class:`PoseError` for a step that makes too many nodes, and where the time is up.
     """
+    budget = Budget(seconds)
     check_positive("turns_step", turns_step, "rad")
     low, high = read_corners("box", box, region.free_axes)
     size = choose_steps(low, high, step)
@@ -230,13 +244,13 @@ def sample_field(
         )
     first = 0.5 * (low + high - inner * size) - size
     axes = [start + s * np.arange(int(n) + 3) for start, s, n in zip(first, size, inner, strict=True)]
-    distance = DistanceField(region, turns_step)
+    distance = DistanceField(region, turns_step, seconds)
     shape = tuple(len(axis) for axis in axes)
     values = np.empty(int(np.prod(shape)))
     for begin in range(0, len(values), _BLOCK):
         nodes = np.unravel_index(np.arange(begin, min(begin + _BLOCK, len(values))), shape)
         positions = np.column_stack([axis[index] for axis, index in zip(axes, nodes, strict=True)])
-        values[begin : begin + _BLOCK] = distance.evaluate(positions, enough=_CUT * float(size.max()))
+        values[begin : begin + _BLOCK] = distance.evaluate(positions, _CUT * float(size.max()), budget)
         if progress:
             progress(min(1.0, (begin + _BLOCK) / len(values)))
     values = values.reshape(shape)

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import inspect
 import warnings
+from decimal import Decimal
+from fractions import Fraction
 
 import numpy as np
 import pytest
@@ -51,6 +53,7 @@ def things(tmp_path_factory, tricept):
         "DriveWorkspace": pk.sweep_drives(plane, 8),
         "Atlas": pk.atlas(plane, step=50),
         "Placement": pk.find_placement(tricept, path, {"Z": (-1500, -1400)}),
+        "Assemblies": tricept.assemblies(tricept.inverse(tricept.home)),
         "Solution": tricept.forward(tricept.inverse(tricept.home)),
         "Tolerances": pk.Tolerances(),
         "Clearance": pk.Clearance(),
@@ -160,6 +163,8 @@ NONSENSE = (
     *([], [None], [[1.0], [1.0, 2.0]], (1,), (1, 2), {}, {"X": float("nan")}, {"Q": 1}, {1: 1}, {"X": (1, 2, 3)}),
     *({"X": ("a", "b")}, {"B": (3.0, 1.0)}, set(), object(), len, int, ValueError("x"), np.float64("nan")),
     *(np.zeros(0), np.zeros(3), np.zeros((2, 3)), np.array(["a"]), np.array(None)),
+    *(Fraction(1, 3), Decimal(1), 5e-324, 2**63, "\ud800", "a" * 10_000, np.full(5, 1e308), np.zeros((0, 5))),
+    *(np.full((1, 5), np.nan), np.ma.masked_array(np.ones(5), mask=[1, 0, 0, 0, 0])),
 )
 
 
@@ -195,7 +200,12 @@ def cheap_calls(things):
         (pk.write_files, {"folder": "/proc/nothing", "files": {"a": b""}}),
         (m.inverse, {"poses": pose, "mode": "+", "out": None}),
         (m.forward, {"joints": m.inverse(m.home), "near": pose, "method": None}),
-        (m.follow, {"poses": [pose], "mode": "+"}),
+        (m.follow, {"poses": [pose], "mode": "+", "free_below": 0.1}),
+        (m.sides, {"poses": [pose]}),
+        (m.head_modes, {"mode": "+"}),
+        (m.place_platform, {"pose": pose, "mode": "+", "joints": m.inverse(m.home)}),
+        (m.twist_rates, {"poses": [pose], "joints": [m.inverse(m.home)], "whole": True}),
+        (pk.load("linear_delta").common_points, {"joints": [pk.load("linear_delta").inverse([0, 0, 0])], "side": 1.0}),
         (m.assemblies, {"joints": m.inverse(m.home)}),
         (m.jacobians, {"poses": pose, "mode": "+"}),
         (m.margins, {"poses": pose, "joints": m.inverse(m.home), "mode": "+"}),
@@ -217,8 +227,15 @@ def test_mistaken_arguments_are_refused_in_one_line(things, tmp_path, monkeypatc
                 except pk.ParakinError as error:
                     assert len(str(error).splitlines()) == 1, (function, name, value)
                     assert str(error).isprintable(), (function, name, value)
+                    assert len(str(error)) < 700, (function, name, value)
                 except Exception as error:
                     raise AssertionError(f"{function.__name__}({name}={value!r})") from error
+
+
+def test_what_is_masked_is_no_number(tricept):
+    poses = np.ma.masked_array([tricept.home, tricept.home], mask=[[False] * 5, [False, True, False, False, False]])
+    assert np.isfinite(tricept.inverse(poses)).all(1).tolist() == [True, False]
+    assert (tricept.check(poses) != 0).tolist() == [False, True]
 
 
 def test_a_number_that_is_none_is_refused(things):

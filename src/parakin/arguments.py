@@ -308,7 +308,12 @@ def stack_named(values: Mapping[Any, Any], names: Sequence[str], units: Sequence
 
 
 def _parse_cells(value: object, names: Sequence[str], units: Sequence[str], what: str) -> Array:
-    """Parse numbers, or texts with units, in any shape; of several names the last dimension has one for each."""
+    """Parse numbers, or texts with units, in any shape; of several names the last dimension has one for each.
+
+    What is masked is no number.
+    """
+    if isinstance(value, np.ma.MaskedArray) and value.dtype.kind in "biuf":
+        value = np.ma.filled(value.astype(np.float64), np.nan)
     try:
         array = np.asarray(value)
         if array.dtype.kind in "biuf":

@@ -21,6 +21,7 @@ from .kinematics.inverse import solve_inverse
 from .kinematics.limit_margins import compute_margins, find_broken_limits
 from .kinematics.solution import Solution
 from .kinematics.tapes import KinematicTapes, collect_tapes
+from .kinematics.wrist.pole_crossing import flip_mode
 from .kinematics.wrist.pole_thresholds import EXACT
 from .machine_properties import MachineProperties
 from .model.legs import Inverse
@@ -60,6 +61,11 @@ class Machine(MachineProperties):
         """Bounds (axes,) of a pose and (joints,) of joints, beyond which a number may be meant in degrees."""
         reach = [max(abs(drive.low), abs(drive.high)) for drive in self.drives]
         return bound_angles(self.axis_units, [0.0] * len(self.axes)), bound_angles(self.joint_units, reach)
+
+    def head_modes(self, mode: str) -> list[str]:
+        """Return a working mode, and the one with the other sign of head and table, if these have a choice."""
+        mode = self.checked_mode(mode)
+        return [mode, flip_mode(mode)] if self.structure.branches else [mode]
 
     def checked_mode(self, mode: str | None) -> str:
         """Check a working mode and return it, the default one for None; an invalid one raises :class:`PoseError`."""
@@ -114,7 +120,7 @@ class Machine(MachineProperties):
         if len(lead) != 1:
             raise PoseError(f"poses: a path of shape (N, {len(self.axes)}) expected")
         check_range("free_below", free_below, 0.0, 0.5 * np.pi, "rad")
-        return follow_path(self.model, rows, self.checked_mode(mode), free_below)
+        return follow_path(self.model, rows, self.checked_mode(mode), float(free_below))
 
     def make_continuous(self, poses: Array, joints: Array, mode: str, free_below: float = EXACT) -> None:
         """Make joints (n, joints) continuous that :meth:`inverse` gives along a path, as :meth:`follow`; in place."""
@@ -217,18 +223,28 @@ class Machine(MachineProperties):
         of it is not finite.
         """
         m, rows = len(self.axes), self.rows(poses, self.axes, "poses")[0]
+        if not isinstance(whole, bool):
+            raise PoseError(f"whole: True or False expected, not {describe_value(whole)}")
         tape = self.model.rates_tape()
         both = evaluate_tape(tape, rows, np.empty((len(rows), tape.outputs)), self._joints_of(joints, len(rows)), whole)
         a, b = (both[:, i * m * m : (i + 1) * m * m].reshape(-1, m, m) for i in (0, 1))
         return a, b, both[:, 2 * m * m :]
 
-    def place_platform(self, pose: Array, mode: str, joints: Array | None = None) -> PlatformPlacement:
+    def place_platform(self, pose: RowsLike, mode: str, joints: RowsLike | None = None) -> PlatformPlacement:
         """Find the platform's frame for a pose (axes,), in a working mode or for the joints that a path takes there."""
-        mode = self.checked_mode(mode)
-        with np.errstate(invalid="ignore", divide="ignore"):
+        row, mode = self._read_one(pose, self.axes, "pose"), self.checked_mode(mode)
+        with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
             if joints is None:
-                return self.structure.place(list(pose), self.model.split_mode(mode)[1])
-            return self.structure.place_with_joints(list(pose), list(joints[self.leg_count :]))
+                return self.structure.place(list(row), self.model.split_mode(mode)[1])
+            own = self._read_one(joints, self.joints, "joints")
+            return self.structure.place_with_joints(list(row), list(own[self.leg_count :]))
+
+    def _read_one(self, values: RowsLike, names: tuple[str, ...], what: str) -> Array:
+        """Read one row (names,) of poses or joints."""
+        rows, lead = self.rows(values, names, what)
+        if lead:
+            raise PoseError(f"{what}: one of {' '.join(names)} expected, not {len(rows)}")
+        return np.asarray(rows[0])
 
     def place_leg_joints(self, placement: PlatformPlacement) -> list[Vec]:
         """Compute the platform's joint of every leg in the base frame, mm, with the platform placed."""

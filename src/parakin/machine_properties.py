@@ -12,7 +12,6 @@ from .algebra import Scalar
 from .arrays import Array, AxisRange
 from .kinematics.closure_roots import compute_closure_tolerance
 from .kinematics.home import check_home
-from .kinematics.wrist.pole_crossing import flip_mode
 from .kinematics.wrist.pose_angles import EVERY_DIRECTION, EVERY_ROTATION, EVERY_TURN
 from .kinematics.wrist.turning_joints import Wrist, find_wrist
 from .model.elements import Drive
@@ -160,10 +159,6 @@ class MachineProperties:
         """All working modes, the default one first."""
         every = ["".join(signs) for signs in product("+-", repeat=len(self.mode))]
         return (self.mode, *[mode for mode in every if mode != self.mode])
-
-    def head_modes(self, mode: str) -> list[str]:
-        """Return a working mode, and the one with the other sign of head and table, if these have a choice."""
-        return [mode, flip_mode(mode)] if self.structure.branches else [mode]
 
     @property
     def closure_tolerance(self) -> float:

@@ -30,6 +30,9 @@ _NEAR = 1e-6  # mm; points nearer than this are one
 _DISC = np.linspace(0.0, 2.0 * pi, 33)[:-1]
 
 
+_FARTHEST = 1e9  # mm, of what can be drawn
+
+
 @dataclass(frozen=True, eq=False)
 class SceneItem:
     """One thing to draw: ``points`` (k, 3) in order, a polygon if ``closed``; a single point is a joint."""
@@ -90,6 +93,8 @@ def build_scene(
     rows = machine.rows(machine.home if pose is None else pose, machine.axes, "pose")[0]
     if len(rows) != 1:
         raise PoseError(f"pose: one pose of {' '.join(machine.axes)} expected, not {len(rows)}")
+    if (np.abs(rows) > _FARTHEST).any():
+        raise PoseError(f"pose: beyond what can be drawn, {_FARTHEST:g} mm")
     row, mode = rows[0], mode or machine.mode
     q = machine.inverse(row, mode) if joints is None else machine.rows(joints, machine.joints, "joints")[0][0]
     with np.errstate(invalid="ignore", divide="ignore", over="ignore"):

@@ -68,7 +68,7 @@ def check_arguments(function: F) -> F:
                 continue
             if not _accept_value(value, hints[name]):
                 raise PoseError(f"{name}: {_describe_hint(hints[name])} expected, not {describe_value(value)}")
-            if isinstance(value, Real) and _wants_float(hints[name]):
+            if isinstance(value, Real) and _is_number_hint(hints[name]):
                 bound.arguments[name] = _check_size(name, float(value))
         return function(*bound.args, **bound.kwargs)
 
@@ -118,7 +118,7 @@ def _accept_value(value: object, hint: Any) -> bool:
     return isinstance(value, kind) if isinstance(kind, type) else callable(value) if kind is Callable else True
 
 
-def _wants_float(hint: Any) -> bool:
+def _is_number_hint(hint: Any) -> bool:
     """Tell whether an annotation asks for a number, and not for a whole one or for other things too."""
     options = set(get_args(hint)) if get_origin(hint) in (Union, types.UnionType) else {hint}
     return float in options and options <= {float, type(None)}

@@ -17,7 +17,7 @@ class ParakinError(Exception):
 
     def __init__(self, *arguments: object):
         super().__init__(
-            *(_tidy_message(argument) if isinstance(argument, str) else argument for argument in arguments)
+            *(_shorten_message(argument) if isinstance(argument, str) else argument for argument in arguments)
         )
 
 
@@ -39,7 +39,7 @@ class InputError(ParakinError):
         super().__init__(f"{place}: {message}" if place else message)
 
 
-def _tidy_message(text: str) -> str:
+def _shorten_message(text: str) -> str:
     """Make a message printable, and cut the middle of long lines: their ends say what was expected."""
     return "\n".join(_cut_middle(line) for line in make_printable(text).split("\n"))
 

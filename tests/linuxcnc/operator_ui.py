@@ -13,7 +13,7 @@ from pathlib import Path
 
 import linuxcnc
 
-MOST = 60.0  # s for a step
+MOST = 200.0  # s for a step: a program may be slowed by the override
 TRAILS = 1e-7  # mm and degrees
 LATE = 1.0  # s for the feedback to come to the command
 REST = 0.15  # s for which the machine must stand
@@ -190,7 +190,21 @@ def read_pin(name):
 def dump(status):
     status.poll()
     names = [name for name in dir(status) if not name.startswith("_")]
-    return {name: repr(getattr(status, name)) for name in names if isinstance(getattr(status, name), PLAIN)}
+    state = {name: repr(getattr(status, name)) for name in names if isinstance(getattr(status, name), PLAIN)}
+    return state | {"processes": list_processes()}
+
+
+def list_processes():
+    """List this run's processes: name, state, and where each thread of theirs waits."""
+    processes = {}
+    for folder in Path("/proc").glob("[0-9]*/task/[0-9]*"):
+        try:
+            words = [(folder / name).read_text().strip() for name in ("comm", "wchan", "syscall")]
+            state = next(line for line in (folder / "status").read_text().splitlines() if line.startswith("State"))
+        except OSError:
+            continue
+        processes[str(folder)] = " ".join([*words, state])
+    return processes
 
 
 def work(task, seen):
@@ -207,7 +221,8 @@ def work(task, seen):
                 step = ["switch on"]
                 operator.switch_on()
         except TimeoutError:
-            seen["hung"] = {"step": step, "said": operator.said, "state": dump(operator.status)}
+            seen["hung"] = {"step": step, "said": operator.said, "sent": operator.command.serial}
+            seen["hung"]["state"] = dump(operator.status)
             return
 
 

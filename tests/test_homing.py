@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import shutil
+import sys
 from dataclasses import replace
 from math import sqrt
 from pathlib import Path
@@ -16,6 +18,9 @@ from parakin.controllers.linuxcnc.homing.homing_plan import pace_return
 from parakin.controllers.linuxcnc.homing.starts import compute_regularity, sample_starts
 from parakin.controllers.linuxcnc.homing.walk import begin_walk, walk_joints
 from parakin.controllers.linuxcnc.model_header import LEAST_REGULARITY
+
+sys.path.insert(0, str(Path(__file__).parent / "linuxcnc"))
+from stub import Stub, outward, pose
 
 
 def changed(tmp_path, name, old, new):
@@ -92,6 +97,20 @@ def test_no_switches_where_homing_can_do_harm(name):
     assert all(joint.switch is None for joint in plan.joints)
     assert 0.0 < plan.unsafe < 0.1
     assert plan.ambiguous == 0.0
+
+
+@pytest.mark.skipif(not shutil.which("gcc"), reason="there is no gcc to build a kinematics module with")
+@pytest.mark.parametrize("name", ["hexapod", "lambda6", "hbg80_2d"])
+def test_linuxcnc_finds_the_pose_that_encoders_tell(name, tmp_path):
+    """Where nothing moves to home, the kinematics has joints of any pose, and a guess of zeros."""
+    m = pk.load(name)
+    starts = sample_starts(m)
+    rows, codes = Stub(tmp_path).built(m).forward(outward(m, starts.joints), np.zeros((len(starts.poses), 9)))
+    assert (codes == 0).all()
+    turns = np.where(np.array(m.axis_units) == "rad", 2.0 * np.pi, np.inf)
+    off = pose(m, rows) - starts.poses
+    off = np.where(np.isfinite(turns), off - np.round(off / turns) * np.where(np.isfinite(turns), turns, 0.0), off)
+    assert np.abs(off).max() < 1e-6
 
 
 def test_harmful_switches_are_refused(tmp_path):

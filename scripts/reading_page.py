@@ -59,7 +59,9 @@ tip is on the path; between records too. Summary, report, JSON and the program's
 | nothing | the machine's own |
 
 One rule is behind it: without an option nothing runs that contradicts the machine's own tool. A length from the nose
-to the tip contradicts it where it differs; what sticks out of a holder of unknown length only where it is longer.
+to the tip contradicts it where it differs; what sticks out of a holder of unknown length only where it is longer. CAM
+systems write the cutter's length (often one that nobody set, as the 75 mm of NX) and not the holder's: a shorter cutter
+is told beside the length that counts, wherever that is told, and `--tool-length file` takes it for the whole tool.
 
 A table of lengths 0 only, as `parakin linuxcnc` writes it, leaves all to the machine's own tool. Where G43 has lengths
 from a table, G53 and G28 tell of the spindle's nose, as on a machine with such a table; else of the own tool's tip.
@@ -163,9 +165,9 @@ def list_codes() -> list[str]:
     for code, reason in M_REFUSED.items():
         refused.setdefault(reason, []).append(f"M{code}")
     return [
-        "## G-code\n\nAlso read: expressions and functions, `#` parameters by number and name, O words\n"
-        "(`sub call if while do repeat`) within the file, `%`, comments and `(MSG, ...)`, N, and `/`, whose blocks are "
-        "executed.\n",
+        "## G-code\n\nAlso read: expressions and functions, polar `@` and `^`, `#` parameters by number and name, O "
+        "words\n(`sub call if while do repeat`) within the file, `%`, comments and `(MSG, ...)`, N, and `/`, whose "
+        "blocks are executed.\n",
         make_table(("codes", "what they do"), rows),
         "Refused with their line:\n",
         make_table(("codes", "why"), [(join_names(codes), reason) for reason, codes in refused.items()]),

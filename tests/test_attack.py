@@ -121,6 +121,14 @@ def test_a_file_name_that_is_no_text(tmp_path):
         assert done.returncode == 0, done.stderr
 
 
+@POSIX
+def test_a_pipe_is_no_part(tmp_path, capsys):
+    os.mkfifo(tmp_path / "pipe.apt")
+    for part in (tmp_path / "pipe.apt", "/dev/null"):
+        assert main(["post", str(part), "-m", "tricept"]) == 2
+        assert capsys.readouterr().err == f"{part}: cannot be read: a pipe or a device; expected a plain file\n"
+
+
 # The cache of compiled kernels.
 
 

@@ -170,3 +170,30 @@ def test_stops_dwells_coolant_and_messages_pass_in_order(write, capsys):
 def test_far_out_of_reach_is_told_in_seconds(text, write, capsys):
     said = post(capsys, write("G21 G90\n" + text + "M2\n", "ngc"), code=3)
     assert said["first"]["line"] >= 2
+
+
+def test_far_records_by_the_ten_thousand_end_soon(write, monkeypatch):
+    """A path that is off limits all over is told so at once; what lies between its records changes nothing."""
+    rng = np.random.default_rng(0)
+    axes = rng.normal(0.0, 0.1, (30, 3)) + [0.0, 0.0, 1.0]
+    axes /= np.linalg.norm(axes, axis=1)[:, None]
+    rows = np.column_stack([rng.uniform(-1.0, 1.0, (30, 3)) + [5000.0, 0.0, 0.0], axes])
+    text = "UNITS/MM\nFEDRAT/500,MMPM\n" + "".join(f"GOTO/{','.join(f'{v:.6f}' for v in row)}\n" for row in rows)
+    path = pk.read_path(write(text, "apt"))
+    monkeypatch.setattr("parakin.toolpath.job._MOST_BROKEN", 20)
+    job = pk.prepare(pk.load("tricept"), path)
+    assert job.inserted == 0 and job.posted.broken_record_count == 30 and not job.runs
+    assert job.unplanned.startswith("off limits at more than 20 records")
+
+
+def test_nearly_full_circles_upright_run_with_a_program(write, capsys):
+    """An upright tool on a wrist's pole, on circles that end where they start, or a little beside."""
+    arcs = ["G3 X0 Y0.001 I20 J0 F100", "G3 X0 Y-0.001 I20 J0", "G3 I30 J0", "G2 X0 Y0.00001 I20 J0"]
+    text = "G21 G90\n" + "".join(f"G0 X0 Y0 Z0\n{arc}\n" for arc in arcs) + "M2\n"
+    path = write(text, "ngc")
+    said = post(capsys, path, "--workpiece", "0,0,-1400", "--target", "linuxcnc")
+    assert said["verdict"] == "ok" and "program" in said["files"]
+    read = pk.read_path(path)
+    length = np.linalg.norm(np.diff(read.tip, axis=0), axis=1).sum()
+    # at the circle's left G3 goes down and G2 up: the first and the third go all round, the others are that short
+    assert length == pytest.approx(2 * np.pi * (20 + 30), rel=1e-3)

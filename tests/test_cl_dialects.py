@@ -486,6 +486,8 @@ def test_the_depth_is_the_dialects(read, header, cycle):
         # PTC: RAPTO is a further rapid advance, from CLEAR towards the point
         (CREO_HEADER, "CYCLE / DRILL, DEPTH, 20, MMPM, 100, CLEAR, 5, RAPTO, 2", [3, -20, 5]),
         (CREO_HEADER, "CYCLE / DRILL, DEPTH, 20, MMPM, 100, CLEAR, 5, RAPTO, 2, RETURN, 9", [3, -20, 9]),
+        # PTC: RETURN of 0 is the retract plane, from which the tool comes
+        (CREO_HEADER, "CYCLE / DRILL, DEPTH, 20, MMPM, 100, CLEAR, 3, RETURN, 0", [3, -20, 50]),
         # Autodesk's post: clearance 55, retract plane 43, stock 40
         (CAMPLETE, "CYCLE/DRILL, FEDTO, 20, MMPM, 100, CLEAR, 55, RTRCTO, 15, RETURN, 15, RAPTO, 3", [3, -20, 15]),
         (CAMPLETE, "CYCLE/DRILL, FEDTO, 20, MMPM, 100, CLEAR, 55, RTRCTO,15", [15, -20, 15]),
@@ -569,6 +571,7 @@ def test_dwell(read):
         ("", "CYCLE/BORE,NODRAG,DEPTH,20,CLEAR,3"),
         ("", "CYCLE/THREAD,DEPTH,20,CLEAR,3"),
         ("", "CYCLE/DRILL,DEPTH,20,CLEAR,5,RAPTO,2"),
+        ("", "CYCLE/DRILL,DEPTH,20,CLEAR,5,RETURN,0"),
         (CREO_HEADER, "CYCLE / DRILL, 20.0, 100.0, MMPM, 3.0"),
         (CAMPLETE, "CYCLE/REAM, FEDTO, 20, MMPM, 100, CLEAR, 55, RAPTO, 12"),
     ],

@@ -221,6 +221,11 @@ class Maker:
 
     def straight(self, depth):
         code = self.rng.choice(["G0 ", "G1 ", "G1 ", "", "G1 F150 "])
+        if self.rng.random() < 0.1:
+            self.lines.append(
+                f"{code}{self.rng.choice(['@{0}', '^{1}', '@{0} ^{1}'])}".format(self.value(), self.number(400))
+            )
+            return
         self.lines.append(code + self.axes(self.rng.choice(["XYZ", "XYZ", "XYZABC"])))
 
     def arc(self, depth):

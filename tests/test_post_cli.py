@@ -103,6 +103,17 @@ def test_no_program_off_limits_but_by_force(part, out, capsys):
     ran(capsys, part, "-m", "linear_delta", "-o", out, "--target", "linuxcnc", "--force", code=3)
 
 
+def test_a_program_of_an_earlier_run_is_told(part, out, capsys):
+    told(capsys, part, "-m", "linear_delta", "-o", out, "--target", "linuxcnc", "--rate", 10)
+    part.write_text(SQUARE.replace("X40", "X4000"))
+    said = told(capsys, part, "-m", "linear_delta", "-o", out, "--target", "linuxcnc", "--rate", 10, code=3)
+    (program,) = (reason for reason in said["missing"] if reason.startswith("no program"))
+    assert program.endswith("; square.linuxcnc.ngc in the folder is of an earlier run")
+    out.joinpath("square.linuxcnc.ngc").unlink()
+    said = told(capsys, part, "-m", "linear_delta", "-o", out, "--target", "linuxcnc", code=3)
+    assert "earlier" not in said["missing"][0]
+
+
 def test_a_program_never_replaces_its_source(part, capsys):
     ran(capsys, part, "-m", "linear_delta", "-o", part.parent, "--target", "linuxcnc")
     assert part.read_text() == SQUARE

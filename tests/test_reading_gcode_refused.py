@@ -171,7 +171,7 @@ def both(tmp_path, monkeypatch):
         ("G0 X1*5\n", 1, ["'*5'"]),
         ("G0 X٣\n", 1, ["X without"]),
         ("G0 Xé\n", 1, ["X without"]),
-        ("G0 @5 ^3\n", 1, ["'@5 ^3'"]),
+        ("G0 &5 ^3\n", 1, ["'&5 ^3'"]),
         ("$\n", 1, ["'$'"]),
         ("hello\n", 1, ["'hello'", "names"]),
         *[(f"G0 X1\n{c}1\n", 2, [f"{c}1", "knows"]) for c in "UVW"],

@@ -190,6 +190,10 @@ def test_lengths_are_told_in_summary_report_and_program(write, capsys):
     program = (out / "part.linuxcnc.ngc").read_text()
     assert f"( {said} )" in program and "( part zero at X 0 Y 0 Z -1450 in the machine )" in program
     assert said.replace("'", "&#x27;") in (out / "part.report.html").read_text()
+    # without a word the machine's own tool counts, and the cutter is told wherever the length is
+    assert main(["post", str(path), *options[:-2]]) == 0
+    said = "150 mm from the spindle's nose to its tip, the machine's own length, 75 mm of it the file's cutter"
+    assert said in capsys.readouterr().out and said in (out / "part.linuxcnc.ngc").read_text()
 
 
 @pytest.mark.parametrize(

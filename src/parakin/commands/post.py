@@ -192,7 +192,7 @@ def post(
         options = JobOptions(mode, tolerances, target, corners, rewind, clearance, turn)
         prepared = prepare_part(chosen, path, placed, place, options, progress)
         job = prepared.job
-        files, missing = _make_files(part.stem, prepared, _Wanted(target, force, rate, parquet), progress)
+        files, missing = _make_files(part.stem, prepared, _Wanted(target, force, rate, parquet, output), progress)
         paths = write_files(output, dict(files.values()))
     written = {kind: str(name) for kind, name in zip(files, paths, strict=True)}
     if json:
@@ -238,6 +238,12 @@ class _Wanted:
     force: bool
     rate: float | None
     parquet: bool
+    folder: Path
+
+    def explain_missing(self, kind: str, reason: str, name: str) -> str:
+        """Say why a file can't be made, and that one of an earlier run stays in its place."""
+        older = f"; {name} in the folder is of an earlier run" if (self.folder / name).exists() else ""
+        return f"no {kind}: {reason}{older}"
 
 
 def _make_files(
@@ -258,7 +264,7 @@ def _make_files(
         files["parquet"] = (f"{stem}.joints.parquet", joint_table.make_joint_parquet(posted, saying))
     if wanted.rate is not None:
         if trajectory is None:
-            missing.append(f"no setpoints: {job.unplanned}")
+            missing.append(wanted.explain_missing("setpoints", job.unplanned, f"{stem}.setpoints.csv"))
         else:
             saying = progress.stage("writing the setpoints", 0.9, 1.0)
             content = setpoint_table.make_setpoint_csv(trajectory, wanted.rate, saying)
@@ -267,11 +273,11 @@ def _make_files(
                 content = setpoint_table.make_setpoint_parquet(trajectory, wanted.rate, saying)
                 files["setpoints-parquet"] = (f"{stem}.setpoints.parquet", content)
     if wanted.target is not None:
-        suffix = load_controller(wanted.target).suffix
+        name = f"{stem}.{wanted.target}{load_controller(wanted.target).suffix}"
         try:
-            files["program"] = (f"{stem}.{wanted.target}{suffix}", _make_program(prepared, wanted.force))
+            files["program"] = (name, _make_program(prepared, wanted.force))
         except PoseError as error:
-            missing.append(f"no program: {error}")
+            missing.append(wanted.explain_missing("program", str(error), name))
     files["report"] = (f"{stem}.report.html", render_report(posted, trajectory, job.unplanned, job.waits, job.outside))
     return files, missing
 

@@ -23,6 +23,7 @@ from .timing import Corners, Trajectory, plan_trajectory
 from .timing.stops import find_stops, sum_dwells
 
 _INTERPOLATED = 0.85  # of the axis's tolerance: what the controller's interpolation may take
+_MOST_BROKEN = 10_000  # programmed records off limits: what lies between them changes nothing, and takes minutes
 _MOST_TIMED = 50_000  # records of a path that is off limits: no program is made of it, and its time would take minutes
 
 
@@ -157,16 +158,14 @@ def _prepare_in(
     (tip, lean), rounded = tolerances.share_with_interpolation(interpolation), tolerances.share_with_corners()
     path = fit_tool_lengths(machine, path, workpiece=workpiece)
     programmed = post_path(machine, path, workpiece=workpiece, mode=mode, progress=report_stage(0.0, 0.1))
-    posted, trajectory, unplanned = programmed, None, ""
-    try:
-        posted = linearise_path(posted, "pose", chord=tip, angle=lean, progress=report_stage(0.1, 0.2))
-        if interpolation == "joints":
-            posted = linearise_path(posted, "joints", chord=tip, angle=lean, progress=report_stage(0.2, 0.4))
-    except PoseError as error:
-        unplanned = str(error)
-    if is_wound_up(posted):
-        posted = _note_wound_up(posted)
-    posted = check_path(posted, progress=report_stage(0.4, 0.6))
+    posted, trajectory = programmed, None
+    if programmed.broken_record_count > _MOST_BROKEN:
+        unplanned = f"off limits at more than {_MOST_BROKEN:,} records, and not looked at between them"
+    else:
+        posted, unplanned = _linearise(programmed, interpolation, tip, lean, report_stage(0.1, 0.4))
+        if is_wound_up(posted):
+            posted = _note_wound_up(posted)
+        posted = check_path(posted, progress=report_stage(0.4, 0.6))
     if posted.first is not None and len(posted.path) > _MOST_TIMED:
         unplanned = unplanned or f"off limits, and more than {_MOST_TIMED:,} records"
     if not unplanned:
@@ -183,6 +182,28 @@ def _prepare_in(
     report(1.0)
     outside = find_outside(programmed, path, workpiece)
     return Job(programmed, posted, trajectory, unplanned, sum_dwells(path), rounded.tip, outside)
+
+
+def _linearise(
+    programmed: Posted, interpolation: Interpolation, chord: float, lean: float, progress: Progress
+) -> tuple[Posted, str]:
+    """Insert the points that the controller needs; return the path with them, or as it is and the reason."""
+    posted = programmed
+    try:
+        posted = linearise_path(
+            posted, "pose", chord=chord, angle=lean, progress=lambda fraction: progress(fraction / 3.0)
+        )
+        if interpolation == "joints":
+            posted = linearise_path(
+                posted,
+                "joints",
+                chord=chord,
+                angle=lean,
+                progress=lambda fraction: progress((1.0 + 2.0 * fraction) / 3.0),
+            )
+    except PoseError as error:
+        return posted, str(error)
+    return posted, ""
 
 
 def _note_wound_up(posted: Posted) -> Posted:

@@ -10,7 +10,7 @@ from ...kinematics.rotations import TURNS
 from ..path import ToolPath
 from .frames import find_frame_angles
 from .posted import Posted
-from .tool_lengths import describe_tool
+from .tool_lengths import describe_tool, find_cutter_length
 
 _SAME = 1e-6  # mm: lengths that are shown as the same
 _MOST = 50  # tools that are told
@@ -46,4 +46,6 @@ def _describe_lengths(path: ToolPath, own: float) -> Iterator[str]:
     for use in path.tools:
         since = f" from line {use.line} on" if use.record > 0 and use.line else ""
         whose = "the machine's own length" if abs(use.length - own) <= _SAME else f"the machine's own is {own:g}"
-        yield f"{describe_tool(use)}{since}: {use.length:.6g} mm from the spindle's nose to its tip, {whose}"
+        cutter = find_cutter_length(use)
+        of_it = f", {cutter:.6g} mm of it the file's cutter" if cutter < use.length - _SAME else ""
+        yield f"{describe_tool(use)}{since}: {use.length:.6g} mm from the spindle's nose to its tip, {whose}{of_it}"

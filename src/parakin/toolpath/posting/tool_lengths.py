@@ -86,14 +86,14 @@ def _choose_lengths(machine: Machine, path: ToolPath, length: ToolLength) -> lis
     if length == "machine":
         return [own] * len(path.tools)
     longest_tool = own if length is None or isinstance(length, str) else float(length)
-    longest = max((cutter for cutter in map(_find_cutter_length, path.tools) if cutter == cutter), default=math.nan)
+    longest = max((cutter for cutter in map(find_cutter_length, path.tools) if cutter == cutter), default=math.nan)
     lengths = []
     for use in path.tools if length is None and own > 0.0 else ():
-        cutter, stated = _find_cutter_length(use), _find_length(use, "set_length")
+        cutter, stated = find_cutter_length(use), _find_length(use, "set_length")
         if stated != stated and cutter > own + _SAME:
             _refuse_length(machine, path, use, f"has a cutter of {cutter:g} mm")
     for use in path.tools:
-        cutter, stated = _find_cutter_length(use), _find_length(use, "set_length")
+        cutter, stated = find_cutter_length(use), _find_length(use, "set_length")
         if stated == stated:
             if length is None and not use.from_table and abs(stated - own) > _SAME:
                 _refuse_length(machine, path, use, f"is {stated:g} mm long")
@@ -122,7 +122,7 @@ def _find_length(use: ToolUse, key: str) -> float:
     return float(value) if not isinstance(value, str) else math.nan
 
 
-def _find_cutter_length(use: ToolUse) -> float:
+def find_cutter_length(use: ToolUse) -> float:
     """Find how much of a tool its file tells below the holder, mm: the longer of cutter and body; NaN if nothing."""
     return float(np.fmax(_find_length(use, "length"), _find_length(use, "body_length")))
 
@@ -138,7 +138,7 @@ def _note_lengths(path: ToolPath, uses: Sequence[ToolUse], own: float) -> list[N
     """Note the lengths that count where the file's cutters, or tools of unknown length, leave them to the machine's."""
     notes = []
     for use in uses:
-        cutter, stated = _find_cutter_length(use), _find_length(use, "set_length")
+        cutter, stated = find_cutter_length(use), _find_length(use, "set_length")
         line = use.length_line or use.line
         if stated != stated and cutter == cutter and abs(cutter - use.length) > _SAME:
             holder = " with its holder" if use.length > cutter else ""

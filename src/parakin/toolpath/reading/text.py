@@ -7,6 +7,7 @@ import io
 import math
 import os
 import re
+import stat
 from collections.abc import Container, Mapping
 from numbers import Real
 from pathlib import Path
@@ -23,8 +24,14 @@ _LONGEST_EXPONENT = 6  # characters; keeps float() fast on hostile input
 
 
 def open_file(path: str | os.PathLike[str], source: str) -> io.FileIO:
-    """Open a file for reading without a buffer; ``source`` is its name in the InputError if that fails."""
+    """Open a file for reading without a buffer; ``source`` is its name in the InputError if that fails.
+
+    A pipe is refused: its format is looked for before it is read, and what is read of it once is gone.
+    """
     try:
+        mode = Path(path).stat().st_mode
+        if not stat.S_ISREG(mode) and not stat.S_ISDIR(mode):
+            raise InputError("cannot be read: a pipe or a device; expected a plain file", source)
         return Path(path).open("rb", buffering=0)
     except OSError as error:
         raise InputError(f"cannot be read: {error.strerror}", source) from error
@@ -50,6 +57,15 @@ def check_tool_lengths(tools: Mapping[int, float] | None) -> None:
     """Refuse lengths of tools that are not finite, or not by whole numbers."""
     check_numbers(tools, None, "tools", "lengths in mm by the numbers of tools")
     check_numbers({key: key for key in tools or ()}, None, "tools", "lengths in mm by the numbers of tools")
+
+
+def describe_control(character: str) -> str:
+    """Describe a control character, which no line of text may hold."""
+    described = {
+        "\0": "a NUL byte: a binary or UTF-16 file; expected plain text",
+        "\r": "a carriage return within a line; expected lines that end in LF or CR LF",
+    }
+    return described.get(character, f"a control character ({ord(character)}); expected plain text")
 
 
 def decode_line(raw: bytes | bytearray) -> str:

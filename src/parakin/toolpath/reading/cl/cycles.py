@@ -3,7 +3,6 @@
 Pure functions of the text. Errors name no file and no line; the reader adds both.
 """
 
-import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -106,20 +105,24 @@ def parse_cycle(args: Sequence[str], dialect: Dialect) -> DrillCycle:
     return DrillCycle(clear, depth, retract, options.feed, kind, step, dwell)
 
 
-def _find_clearance(values: dict[str, float], dialect: Dialect) -> tuple[float, float]:
-    """Find where above the hole rapid ends, and where the tool withdraws to, by the dialect's sense of CLEAR."""
-    if dialect.clear == HEIGHT and "CLEAR" in values:
+def _find_clearance(values: dict[str, float], dialect: Dialect) -> tuple[float, float | None]:
+    """Find where above the hole rapid ends, and where the tool withdraws to, by the dialect's sense of CLEAR.
+
+    None stands for the height it came from; Creo writes RETURN,0 for its retract plane.
+    """
+    clear, rapid = values.get("CLEAR"), values.get("RAPTO")
+    if dialect.clear == HEIGHT and clear is not None:
         if "RETURN" not in values:
             refuse(f"CLEAR, a height in the part in a file of {dialect.title}, without RTRCTO; expected {_FORM}")
-        return values.get("RAPTO", values["RETURN"]), values["RETURN"]
-    clear, rapid = values.get("CLEAR", math.nan), values.get("RAPTO", math.nan)
-    if clear == clear and rapid == rapid:
-        if dialect.clear == DOWN:
-            return clear - rapid, values.get("RETURN", clear)
-        if clear != rapid:
-            refuse(f"RAPTO beside another CLEAR, whose sense no header tells; expected one of both in {_FORM}")
-    clear = clear if clear == clear else rapid
-    return clear, values.get("RETURN", clear)
+        return values["RETURN"] if rapid is None else rapid, values["RETURN"]
+    start = out = rapid if clear is None else clear
+    assert start is not None
+    if clear is not None and rapid is not None and dialect.clear == DOWN:
+        start = clear - rapid
+    elif clear is not None and rapid not in (None, clear):
+        refuse(f"RAPTO beside another CLEAR, whose sense no header tells; expected one of both in {_FORM}")
+    out = values.get("RETURN", out)
+    return start, None if dialect.clear == DOWN and values.get("RETURN") == 0.0 else out
 
 
 def _parse_depth(values: dict[str, float], dialect: Dialect) -> float:

@@ -3,7 +3,7 @@
 import re
 
 from ....errors import CONTROL_CHARACTER, InputError
-from ..text import decode_line, is_number, parse_number, quote_short
+from ..text import decode_line, describe_control, is_number, parse_number, quote_short
 from .actions import ClActions
 from .statements import HIDDEN, ends_text, execute_statement
 
@@ -53,7 +53,7 @@ class LineReader:
         text = decode_line(raw).strip()
         control = CONTROL_CHARACTER.search(text.strip(_END_OF_FILE))
         if control is not None:
-            raise self._fail(f"a control character ({ord(control[0])}); expected plain text", line)
+            raise self._fail(describe_control(control[0]), line)
         text = text.rstrip(_END_OF_FILE)
         if self.matrix is not None:
             self._read_matrix_row(text, line)

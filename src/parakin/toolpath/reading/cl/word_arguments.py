@@ -20,6 +20,7 @@ FEED_UNITS: dict[str, tuple[float | None, bool]] = {
     "PERREV": (None, True),
 }
 LENGTH_UNITS = {"MM": 1.0, "INCHES": INCH, "INCH": INCH, "IN": INCH}  # mm
+_GEARS = ("RANGE", "MAXRPM")  # of SPINDL: the gear and the most revolutions, each with its value
 _BLANKS = re.compile(r"(?<![\d.])\s+|\s+(?![\d.])", re.ASCII)
 
 
@@ -63,6 +64,7 @@ def parse_spindle(args: Sequence[str]) -> SpindleSpeed:
     """Parse SPINDL: value and words in any order."""
     form = "SPINDL/value,RPM|SFM|SMM,CLW|CCLW in any order, or SPINDL/ON|OFF"
     words = {"RPM", "SFM", "SMM", "CLW", "CCLW", "ON", "OFF"}
+    args = [a for k, a in enumerate(args) if a not in _GEARS and (k == 0 or args[k - 1] not in _GEARS)]
     values = [a for a in args if a not in words]
     if len(values) > 1 or not args:
         refuse(f"expected {form}")

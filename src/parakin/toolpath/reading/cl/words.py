@@ -105,8 +105,9 @@ REASONS = {
     "a motion to a place that the file does not state": "MOVETO PLUNGE POSITN SAFPOS TANSPT",
     "it shifts the tool or its axis along a surface": "THICK ZSURF VTLAXS OFFSET",
     "a statement of the APT language that repeats or leads to others": (
-        "CALL MACRO TERMAC LOOPST LOOPND JUMPTO TRANTO IF DO UNTIL SUBR ENDSUB INDEX"
+        "CALL CALSUB INCLUD SYN MACRO TERMAC LOOPST LOOPND JUMPTO TRANTO IF DO UNTIL SUBR ENDSUB INDEX"
     ),
+    "it leaves out the motions that follow": "DNTCUT CUT",
     "it moves or copies the points that follow": "COPY MATRIX REFSYS MCSYS TRANSL MIRROR",
     "it turns an axis of the machine that wrote the file": "ROTATE ROTABL ROTHED ROTREF POSMAP TURRET",
     "it retracts to a place that the file does not state": "RETRCT RETRACT",

@@ -5,12 +5,13 @@ from dataclasses import dataclass, field
 from typing import NoReturn
 
 from ....errors import CONTROL_CHARACTER
-from ..text import LARGEST, quote_short, refuse
+from ..text import LARGEST, describe_control, quote_short, refuse
 from .codes import G43_4, find_g_group, find_m_group, format_g_code
 from .expressions import Key, ParameterStore, read_key, read_value, skip_blanks
 
 LONGEST = 4000  # characters in one line; RS274/NGC allows 256, but files have longer comments
-VALUES = "ABCDEFHIJKLPQRSTXYZ"  # letters of words with a value
+POLAR = "@^"  # distance from the zero of X and Y, and angle from X, in place of X and Y
+VALUES = "ABCDEFHIJKLPQRSTXYZ" + POLAR  # letters of words with a value
 NO_PROGRAM = (
     "O words without sub, call, if, while and the like are not read; "
     "expected O and a program number alone in the first block"
@@ -20,7 +21,7 @@ _BLANKS = " \t"
 # The blanks within a number can't be told from those behind it, so neither part of it is tried twice.
 _TOKEN = re.compile(
     r"(?P<name>(?i:TRAORI))(?![A-Za-z0-9])"
-    r"|(?P<letter>[A-Za-z])[ \t]*(?P<number>[+-]?[ \t]*(?:\d[\d \t]*(?:\.[\d \t]*)?|\.[ \t]*\d[\d \t]*))"
+    r"|(?P<letter>[A-Za-z@^])[ \t]*(?P<number>[+-]?[ \t]*(?:\d[\d \t]*(?:\.[\d \t]*)?|\.[ \t]*\d[\d \t]*))"
     r"|\((?P<comment>[^()]*)\)|;(?P<rest>.*)|[ \t]+",
     re.ASCII,
 )
@@ -32,10 +33,6 @@ _WHOLE = 1e-3  # so far off a whole number may be
 _TENTH = 1e-6  # so far off a tenth may a G code be, in tenths
 _MESSAGE = re.compile(r"\s*msg\s*,", re.IGNORECASE)
 _PYTHON = re.compile(r"\s*py\s*,", re.IGNORECASE)
-_CONTROLS = {
-    "\0": "a NUL byte: a binary or UTF-16 file; expected plain text",
-    "\r": "a carriage return within a line; expected lines that end in LF or CR LF",
-}
 _REFUSED_SIGNS = {
     "#": "parameters (#) are not read here; expected plain numbers",
     "[": "an expression without a letter before it",
@@ -113,7 +110,7 @@ def check_text(text: str) -> None:
         refuse(f"a line of more than {LONGEST} characters; expected a block of G-code")
     control = CONTROL_CHARACTER.search(text)
     if control is not None:
-        refuse(_CONTROLS.get(control[0], f"a control character ({ord(control[0])}); expected plain text"))
+        refuse(describe_control(control[0]))
 
 
 def round_whole(letter: str, value: float) -> int:
@@ -137,7 +134,7 @@ def _add_computed(block: Block, text: str, at: int, first: bool, letters: str, s
             refuse(NO_PROGRAM)
         block.assignments.append((key, value))
         return at
-    if store is None or not (sign.isascii() and sign.isalpha()) or not _COMPUTED.match(text, behind):
+    if store is None or not (sign in POLAR or (sign.isascii() and sign.isalpha())) or not _COMPUTED.match(text, behind):
         _refuse_text(text, at)
     value, at = read_value(text, behind, store)
     _add_word(

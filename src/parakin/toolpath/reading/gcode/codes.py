@@ -33,6 +33,7 @@ G_GROUPS: dict[str, tuple[int, ...]] = {
     "plane": (G17, G18, G19),
     "distance": (G90, G91),
     "centre": (G90_1, G91_1),
+    "radius": (80,),
     "feed": (G93, G94),
     "units": (G20, G21),
     "compensation": (400,),
@@ -49,6 +50,7 @@ GROUP_TITLES = {  # what a modal group of G or M codes does, for people
     "plane": "plane of arcs and cycles",
     "distance": "absolute, incremental",
     "centre": "arc centres absolute, incremental",
+    "radius": "X as a radius, which it is anyway",
     "feed": "feed as inverse time, per minute",
     "units": "inches, mm",
     "compensation": "cutter radius compensation off",
@@ -85,6 +87,7 @@ _RADIUS = "cutter radius compensation; expected a path of the tool's tip"
 _SPLINE = "a spline; write it as G1 or arcs"
 _PROBING = "probing; expected a path without it"
 G_REFUSED = {
+    70: "X as a diameter, for lathes; expected G8",
     50: _SPLINE,
     51: _SPLINE,
     52: _SPLINE,

@@ -47,7 +47,7 @@ CONTROLS = (
             r"|Sliced\s+by)|.*\bSET_VELOCITY_LIMIT\b"
         ),
         _compile_pattern(
-            r"[^(;]*(?:(?<![A-Z0-9.])E[-+]?[\d.]|\bM(?:8[23]|10[4679]|109|140|190|20[1-5]|221|420)(?!\d))|\s*[A-Z]{3,}_[A-Z_]+"
+            r"(?![^(;]*\bM6[678](?!\d))[^(;]*(?:(?<![A-Z0-9.])E[-+]?[\d.]|\bM(?:8[23]|10[4679]|109|140|190|20[1-5]|221|420)(?!\d))|\s*[A-Z]{3,}_[A-Z_]+"
         ),
     ),
     OtherControl("grbl", _compile_pattern(r"\s*[(;]\s*grbl\b"), _compile_pattern(r"\s*\$")),

@@ -8,7 +8,7 @@ from ...path import Event
 from ..text import INCH, refuse
 from ..tools import ToolLog
 from . import codes
-from .block import NO_PROGRAM, Block, round_whole
+from .block import NO_PROGRAM, POLAR, Block, round_whole
 from .codes import find_m_group, format_g_code
 from .cycles import CannedCycles
 from .expressions import Key
@@ -58,6 +58,7 @@ class BlockExecutor:
         """Name the parameters that this executor knows."""
         return {
             5400: lambda: self._loaded_tool,
+            **{5401 + k: lambda k=k: self.offsets.read_tool_offset(self._loaded_tool)[k] for k in range(3)},  # type: ignore[misc]
             "_current_tool": lambda: self._loaded_tool,
             "_selected_tool": lambda: self._selected_tool,
             "_rpm": lambda: self._speed,
@@ -77,6 +78,7 @@ class BlockExecutor:
             self._add_event(line, "(" + "".join(c if c.isprintable() else "?" for c in message) + ")")
         self._execute_program_number(block, line)
         named = {letter for letter in AXES if letter in block.values}
+        named |= {"X", "Y"} if any(letter in block.values for letter in POLAR) else set()
         previous = self.motion.mode
         moves = self._set_motion_code(block, named)
         self._execute_feed(block, line, moves)

@@ -8,7 +8,7 @@ from .motion import AXES, GcodeMotion
 from .parameters import Parameters
 from .work_systems import COUNT
 
-_LOCAL, _SYSTEM, _ORIGINS, _TOOL, _POSITION = 5211, 5220, 5221, 5401, 5420
+_LOCAL, _SYSTEM, _ORIGINS, _POSITION = 5211, 5220, 5221, 5420
 _ROTATION = 9  # offset of a work system's rotation from its first number; each has twenty numbers
 _PER_SYSTEM = 20
 
@@ -46,8 +46,6 @@ def add_machine_parameters(parameters: Parameters, motion: GcodeMotion, others: 
             readers[_ORIGINS + _PER_SYSTEM * (number - 1) + k] = (
                 lambda k=k, number=number: float(systems.origin[number, k])  # type: ignore[misc]
             )
-    for k in range(3):
-        readers[_TOOL + k] = lambda k=k: float(systems.tool[k])  # type: ignore[misc]
     for number in range(1, COUNT + 1):
         readers[_ORIGINS + _PER_SYSTEM * (number - 1) + _ROTATION] = (
             lambda number=number: float(systems.rotation[number])  # type: ignore[misc]

@@ -9,7 +9,7 @@ from ....arrays import Array
 from ..notes import NoteBook
 from ..text import refuse
 from .arc_motion import PLANES, ArcMotion, Flat, find_arc_centre, interpolate_g_arc
-from .block import round_whole
+from .block import POLAR, round_whole
 from .codes import G0, G2, G17, format_g_code
 from .records import FEED, LINE, RAPID, SECONDS, SPINDLE, WIDTH, GcodeRecords
 from .work_systems import WorkSystems
@@ -83,7 +83,22 @@ class GcodeMotion:
                     refuse(f"G91 while {AXES[k]} is not known; expected {AXES[k]} once in G90 before")
                 value += end[k]
             end[k] = value
+        if any(letter in values for letter in POLAR):
+            self._turn_polar(end, values)
         return end
+
+    def _turn_polar(self, end: list[float], values: dict[str, float]) -> None:
+        """Set X and Y of an end by polar words, a distance from the zero in force and an angle; G91: steps of them."""
+        radius, angle = values.pop("@", None), values.pop("^", None)
+        if end[:2] != self.here[:2]:
+            refuse("X or Y beside polar words (@, ^); expected one of both")
+        out, turn = math.hypot(*end[:2]), math.degrees(math.atan2(end[1], end[0]))
+        if (radius is None and out != out) or ((angle is None or self.incremental) and not out > 0.0):
+            refuse("a polar word from the zero of X and Y, or from an unknown place; expected both @ and ^ in G90")
+        step_out, step_turn = (out, turn) if self.incremental else (0.0, 0.0)
+        out = out if radius is None else step_out + radius * self.scale
+        turn = math.radians(turn if angle is None else step_turn + angle)
+        end[0], end[1] = out * math.cos(turn), out * math.sin(turn)
 
     def _take_machine_end(self, values: dict[str, float], line: int) -> list[float]:
         point = self.systems.to_work(self.here)

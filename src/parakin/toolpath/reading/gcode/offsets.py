@@ -166,6 +166,11 @@ class OffsetExecutor:
             refuse(f"{name} for tool {number:.0f}, which is not in the table of tools; expected its length there")
         return self._tools[int(number)]
 
+    def read_tool_offset(self, number: float) -> tuple[float, float, float]:
+        """Return X, Y and Z of a tool in the table, whether they are in force or not; NaN where they are not known."""
+        known = self._tools is not None and number in self._tools
+        return (0.0, 0.0, self._tools[int(number)]) if known and self._tools else (math.nan,) * 3
+
     def _set_length_offset(self, name: str, offset: list[float] | None, line: int, *, keeps_tip: bool) -> None:
         self._check_length_unit(name)
         was_known = self._unknown_length is None

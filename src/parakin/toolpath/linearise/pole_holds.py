@@ -24,7 +24,7 @@ from ..posting.posted import Posted
 from ..posting.working_mode import HELD
 from ..programmed_path import ProgrammedPath, compute_tool_axes
 from .continuation import MACHINE_FRAME
-from .pole_routing import PolePass, PoleRoute
+from .pole_routing import PolePass
 from .pole_steps import PoleSteps, meet_circle
 from .poles import Pole
 
@@ -82,18 +82,28 @@ class _Points:
 
 
 def find_pole_holds(
-    pole: Pole, posted: Posted, programmed: ProgrammedPath, steps: PoleSteps, routes: list[PoleRoute], angle: float
+    pole: Pole,
+    posted: Posted,
+    programmed: ProgrammedPath,
+    steps: PoleSteps,
+    led_steps: list[tuple[int, int]],
+    moved: Flags,
+    angle: float,
 ) -> list[PoleHold]:
-    """Find where a path comes within the angle tolerance of a pole without a route through it, and hold it there."""
+    """Find where a path comes within the angle tolerance of a pole without a route through it, and hold it there.
+
+    led_steps : first and last of the steps that are led through a pole or held beside one already
+    moved : (n,) records whose axes are moved already
+    """
     aside = 0.0 if pole.joint is None else _OFF_POLE * angle
     if pole.joint is not None and aside < NEAR_HOLD:
         return []
     radius = HELD * angle
-    routed = np.zeros(len(steps.record), np.bool_)
-    for route in routes:
-        routed[route.steps[0] : route.steps[1] + 1] = True
-    runs = _find_runs(steps, (steps.nearest < radius) & ~routed, radius)
-    builder = _HoldBuilder(pole, posted, programmed, steps, radius, aside)
+    is_led = np.zeros(len(steps.record), np.bool_)
+    for first, last in led_steps:
+        is_led[first : last + 1] = True
+    runs = _find_runs(steps, (steps.nearest < radius) & ~is_led, radius)
+    builder = _HoldBuilder(pole, posted, programmed, steps, moved, radius, aside)
     return [hold for run in runs if (hold := builder.build(run)) is not None]
 
 
@@ -111,12 +121,16 @@ _NOTHING = _Points(np.empty(0, np.int64), np.empty(0), np.empty((0, 2)))
 
 @dataclass(frozen=True, eq=False)
 class _HoldBuilder:
-    """Builds the holds of a path beside a pole: within ``radius`` of it the axis is held ``aside`` of it, rad."""
+    """Builds the holds of a path beside a pole: within ``radius`` of it the axis is held ``aside`` of it, rad.
+
+    moved : (n,) records that stay where they have been moved to
+    """
 
     pole: Pole
     posted: Posted
     programmed: ProgrammedPath
     steps: PoleSteps
+    moved: Flags
     radius: float
     aside: float
 
@@ -247,7 +261,8 @@ class _HoldBuilder:
         if start < self.radius and steps.begin[first] == 0.0:
             record, number = np.append(steps.record[first] - 1, record), np.append(-1, number)
             distance = np.append(start, distance)
-        return record, number, distance
+        free = ~self.moved[record]
+        return record[free], number[free], distance[free]
 
     def _turn(self, place: tuple[int, float], come: float, go: float) -> tuple[_Points, float]:
         """Turn the axis about the pole from one direction to another at a place, and measure the free angle's turn.
@@ -311,11 +326,11 @@ def _join(*pieces: _Points) -> _Points:
     return _Points(motion, share, np.concatenate([points.projected for points in pieces]))
 
 
-def find_held_steps(steps: PoleSteps, holds: list[PoleHold]) -> list[tuple[int, int]]:
-    """Find the first and the last of the steps on each hold, also of another pole."""
+def find_steps_on(steps: PoleSteps, stretches: list[PolePass]) -> list[tuple[int, int]]:
+    """Find the first and the last of the steps on each of some stretches, also those about another pole."""
     begins, ends = steps.record - 1 + steps.begin, steps.record - 1 + steps.end  # both rise
-    first = np.searchsorted(ends, [hold.located.begin for hold in holds], side="right")
-    last = np.searchsorted(begins, [hold.located.end for hold in holds]) - 1
+    first = np.searchsorted(ends, [located.begin for located in stretches], side="right")
+    last = np.searchsorted(begins, [located.end for located in stretches]) - 1
     return [(a, b) for a, b in zip(first.tolist(), last.tolist(), strict=True) if a <= b]
 
 

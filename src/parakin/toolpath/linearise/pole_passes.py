@@ -15,7 +15,7 @@ from ..programmed_path import ProgrammedPath
 from .deviation import ALLOWED, SHARES, Deviation
 from .path_cuts import PathPositions, select_spans
 from .path_records import divide_motions, replace_axes, repost_path
-from .pole_holds import PoleHold, Stretches, find_held_steps, find_pole_holds, note_holds
+from .pole_holds import PoleHold, Stretches, find_pole_holds, find_steps_on, note_holds
 from .pole_routing import PolePass, PoleRoute, find_pole_routes, locate_pass
 from .pole_steps import PoleSteps, find_pole_steps
 from .pole_swings import note_swings
@@ -117,15 +117,20 @@ def _lead_unless_refused(
         crossings.append(_Crossings(pole, steps, [route for route in routes if route.crossing >= 0 or route.rays]))
         holds: list[PoleHold] = []
         if not inclined:
-            led_stretches = Stretches([*led.passes, *(hold.located for hold in led.holds)])
-            for hold in find_pole_holds(pole, posted, programmed, steps, routes, deviation.angle):
-                is_free = (axis[hold.record] == programmed.axis[hold.record]).all()
-                if hold.key not in refused and is_free and led_stretches.is_apart(hold.located):
+            passes = [*led.passes, *(hold.located for hold in led.holds)]
+            stretches, is_moved = Stretches(passes), (axis != programmed.axis).any(1)
+            led_steps = find_steps_on(steps, passes)
+            for hold in find_pole_holds(pole, posted, programmed, steps, led_steps, is_moved, deviation.angle):
+                if hold.key not in refused and stretches.is_apart(hold.located):
                     axis[hold.record] = hold.axis
                     holds.append(hold)
         led.holds += holds
         shared_steps = [route.steps for route, is_shared in zip(candidates, shared, strict=True) if is_shared]
-        routed_steps = [*(route.steps for route in routes), *shared_steps, *find_held_steps(steps, led.holds)]
+        routed_steps = [
+            *(route.steps for route in routes),
+            *shared_steps,
+            *find_steps_on(steps, [hold.located for hold in led.holds]),
+        ]
         led.notes += [*note_swings(pole, posted.path, steps, routed_steps), *note_holds(holds)]
     moved = np.flatnonzero((axis != programmed.axis).any(1))
     if len(moved):

@@ -251,7 +251,7 @@ def test_inverse_off_limits_and_out_of_reach(capsys):
 
 def test_forward_without_a_pose(capsys):
     assert main(["forward", "hexapod", "strut0=100"]) == 3
-    assert "no pose found" in capsys.readouterr().err
+    assert "no pose found, the legs do not close near the start" in capsys.readouterr().err
 
 
 def test_forward_of_several_rows(tmp_path, capsys):
@@ -262,6 +262,7 @@ def test_forward_of_several_rows(tmp_path, capsys):
     result = json.loads(said.out, parse_constant=pytest.fail)
     assert [row["broken"] for row in result["rows"]] == ["not converged", None, "d1.max"]
     assert result["rows"][0]["pose"]["X"] is None
+    assert [bool(row["reason"]) for row in result["rows"]] == [True, False, False]
     assert [(offence["record"], offence["line"]) for offence in result["offences"]] == [(2, 4)] * 3
     assert f"{rows}:2: no pose found" in said.err
 

@@ -127,12 +127,13 @@ def _report_lost(machine: Machine, solution: Solution, csv: Path | None, lines: 
     """Print the rows without a pose, some of them by their line."""
     import numpy as np
 
-    lost = np.flatnonzero(~solution.converged).tolist()
+    lost, reasons = np.flatnonzero(~solution.converged).tolist(), solution.reasons
     for row in lost[:_LOST]:
         place = f"{csv}:{lines[row]}" if csv else "joints"
         residual = solution.residual[row]
         closes = np.isnan(residual) or residual <= machine.closure_tolerance
-        print_remark(f"{place}: no pose found" + ("" if closes else f" (the legs fail to close by {residual:.3g} mm)"))
+        gap = "" if closes else f" (they fail to close by {residual:.3g} mm)"
+        print_remark(f"{place}: no pose found, {reasons[row]}{gap}")
     if len(lost) > _LOST:
         print_remark(f"{csv}: no pose found for {len(lost) - _LOST:,} more rows")
 

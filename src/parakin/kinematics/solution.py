@@ -43,6 +43,11 @@ class Solution:
     why: Any
     in_other_mode: Any
 
+    @property
+    def reasons(self) -> Any:
+        """Why there is no answer, in words: texts (...,), "" where there is one."""
+        return np.array(REASONS)[self.why]
+
     def __repr__(self) -> str:
         others = np.count_nonzero(self.in_other_mode)
         remark = f", {others} of them in another working mode" if others else ""

@@ -37,6 +37,7 @@ def _encode_rows(table: PoseTable) -> list[dict[str, Any]]:
     if table.solution is not None:
         solution = table.solution
         columns = {name: getattr(solution, name).tolist() for name in ("residual", "converged", "in_other_mode")}
+        columns["reason"] = [reason or None for reason in solution.reasons.tolist()]
         for row, *verdicts in zip(rows, *columns.values(), strict=True):
             row |= dict(zip(columns, verdicts, strict=True))
     return rows

@@ -13,7 +13,7 @@ from .elementary import FAST, use_widest_vectors
 
 LANES = 128
 MASK = (1 << 40) - 1  # tells the compiler that a register's number is not negative
-WIDEST = 8  # numbers of a row that are transposed with shuffles
+WIDEST = 6  # numbers of a row that are transposed with shuffles: each more takes longer to compile
 
 _GROUP = 8  # rows that are transposed at once
 _WORD, _INDEX = ir.IntType(32), ir.IntType(64)

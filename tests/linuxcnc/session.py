@@ -62,7 +62,7 @@ class Session:
     def write_move(self, word="G1"):
         row = world(self.machine, self.rng.uniform(self.box.low, self.box.high)[None])[0]
         places = " ".join(f"{FIELDS[column]}{row[column]:.4f}" for column in self.columns)
-        return f"{word} {places} F{self.rng.uniform(500.0, 6000.0):.0f}"
+        return f"{word} {places} F{self.rng.uniform(3000.0, 9000.0):.0f}"
 
     def move(self):
         return [["mdi", self.write_move(str(self.rng.choice(["G0", "G1"])))]]
@@ -92,7 +92,7 @@ class Session:
         return [["pause_amid", self.write_program(), self.pick_time(1.5), self.pick_time(0.5)]]
 
     def override(self):
-        return [["override", round(float(self.rng.uniform(0.3, 1.0)), 2)]]
+        return [["override", round(float(self.rng.uniform(0.4, 1.0)), 2)]]
 
     def stop(self):
         return [["stop_at_once", 0.2]]

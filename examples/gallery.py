@@ -105,7 +105,7 @@ def edges(low: np.ndarray, high: np.ndarray) -> list[list[np.ndarray]]:
 
 def meshed(found: pk.Workspace, step: float) -> pk.Mesh:
     assert found.box is not None
-    return pk.make_mesh(pk.sample_field(found.region, found.box, step))
+    return pk.make_mesh(pk.sample_field(found.region, found.box, step, seconds=None))
 
 
 def proved(found: pk.Workspace) -> str:
@@ -290,7 +290,9 @@ def orthoglide(page: Page) -> None:
         f"smallest {cells.size.min():.1f} mm. {proved(found)}. The thin end is in the other assembly mode.",
     )
     figure, (ax,) = plane()
-    cut = pk.find_cross_sections(pk.sample_field(found.region, found.box, 4.0), "Z", [0.0])[0]
+    cut = pk.find_cross_sections(pk.sample_field(found.region, found.box, 4.0, seconds=None), "Z", [0.0], seconds=None)[
+        0
+    ]
     for outline in cut.outlines:
         ax.fill(*outline.T, facecolor="#bbdefb", edgecolor=BLUE, linewidth=1.5)
     cube = np.array([[-123.336, -123.336], [76.664, 76.664]])

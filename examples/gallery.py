@@ -290,9 +290,8 @@ def orthoglide(page: Page) -> None:
         f"smallest {cells.size.min():.1f} mm. {proved(found)}. The thin end is in the other assembly mode.",
     )
     figure, (ax,) = plane()
-    cut = pk.find_cross_sections(pk.sample_field(found.region, found.box, 4.0, seconds=None), "Z", [0.0], seconds=None)[
-        0
-    ]
+    field = pk.sample_field(found.region, found.box, 4.0, seconds=None)
+    (cut,) = pk.find_cross_sections(field, "Z", [0.0], seconds=None)
     for outline in cut.outlines:
         ax.fill(*outline.T, facecolor="#bbdefb", edgecolor=BLUE, linewidth=1.5)
     cube = np.array([[-123.336, -123.336], [76.664, 76.664]])

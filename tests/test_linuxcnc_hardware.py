@@ -221,17 +221,22 @@ def follow(machine, rows, pose):
 @real
 @pytest.mark.parametrize("name", ["linear_delta", "tricept", "hexapod"])
 def test_homing_keeps_off_singularities(name, tmp_path):
-    """LinuxCNC homes the template: the joints go home on home's side of all singularities, and it knows the pose."""
+    """LinuxCNC homes the template: the joints go home on home's side of all singularities, and it knows the pose.
+
+    Then the emergency stop's contact opens: the machine is off at once, and can be switched on again.
+    """
     machine = trial(name, tmp_path)
     joints, pose = choose_start(machine)
     plan, home = find_homing(machine), machine.inverse(find_home_pose(machine))
     turning = np.array(machine.joint_units) == "rad"
     switched = np.array([joint.switch is not None for joint in plan.joints])
     with driven_by_parport(machine, joints) as simulation:
-        (seen,), rows = simulation.operate([["mdi", "G21 G90"]])
+        (seen, stopped), rows = simulation.operate([["mdi", "G21 G90"], ["interrupt", "parport.0.pin-10-in-fake"]])
+    assert seen["on"]
+    assert not stopped["on"]
     places = np.where(turning, np.radians(rows[:, 1:]), rows[:, 1:])
     assert np.abs(places[0] - joints).max() < 1e-5
-    assert rows[-1, 0] == 1.0
+    assert rows[:, 0].max() == 1.0
     expected = np.where(switched, home, joints)
     assert np.abs(places[-1] - expected)[~turning].max() < LATE
     assert np.abs(places[-1] - expected)[turning].max(initial=0.0) < np.radians(LATE)

@@ -136,6 +136,12 @@ class Operator:
         time.sleep(pause)
         self.command.auto(linuxcnc.AUTO_RESUME)
 
+    def interrupt(self, pin):
+        """Open the emergency stop's contact, a HAL pin, until LinuxCNC has stopped, and close it again."""
+        subprocess.run(["halcmd", "setp", pin, "0"], check=True)
+        self.wait(lambda s: s.task_state == linuxcnc.STATE_ESTOP)
+        subprocess.run(["halcmd", "setp", pin, "1"], check=True)
+
     def is_off(self):
         self.status.poll()
         return self.status.task_state != linuxcnc.STATE_ON

@@ -18,7 +18,7 @@ _MOST_MOVED = 0.98  # of the angle tolerance: what an axis may be moved; the res
 _BENT = 0.342  # sine of 20°, of the way into the circle off the line through the pole: what bends more is held
 _WIDEST = 0.385  # greatest t·(1 - t²): the most by which a straight way is squeezed, of its offset on the circle
 _STRAIGHT = 5e-4  # the same: what bends less turns by so little on the pole that any controller takes it
-_SNAPPED = 0.2  # fraction of the angle tolerance: a record so near to the pole is moved onto it
+_SNAPPED = 0.2  # fraction of the angle tolerance: a record that would be led so near to the pole is put onto it
 _INNERMOST = 0.02  # fraction of the angle tolerance: the first radius at which records keep a way straight
 _GROWTH, _OUTERMOST = 4.0, 0.7  # of these radii, and the last one as a fraction of the circle's
 _EDGE = 1e-9  # of a motion: what is rounding
@@ -156,13 +156,15 @@ def _route_through_pole(
         return None
     records = np.concatenate([[steps.record[first] - (steps.begin[first] == 0.0)], steps.record[inside_window]])
     at_record = np.concatenate([[steps.begin[first] == 0.0], steps.end[inside_window] == 1.0])
-    if pole.moves and np.count_nonzero(at_record & (np.hypot(a, b) < _SNAPPED * angle)) > 1:
+    if pole.moves and np.count_nonzero(at_record & (np.hypot(a, (1.0 - weight) * b) < _SNAPPED * angle)) > 1:
         return None  # even poses bow out beside a pole that goes along with them, in a direction of their own
     moved = at_record & (np.abs(weight * b) > (EXACT if bends else PRINTED))
     squeezed = (1.0 - weight) * b
     if bends:
-        nearest = int(np.where(at_record, np.hypot(a, b), np.inf).argmin())
-        if np.hypot(a[nearest], b[nearest]) < _SNAPPED * angle:
+        nearest = int(np.where(at_record, np.hypot(a, squeezed), np.inf).argmin())
+        if np.hypot(a[nearest], squeezed[nearest]) < _SNAPPED * angle:
+            if np.hypot(a[nearest], b[nearest]) > _MOST_MOVED * angle:
+                return None
             a, moved[nearest], squeezed[nearest] = np.where(np.arange(len(a)) == nearest, 0.0, a), True, 0.0
             crossings = np.flatnonzero(a[:-1] * a[1:] < 0.0)
             fraction = a[crossings] / (a[crossings] - a[crossings + 1])

@@ -4,13 +4,9 @@ import ast
 import subprocess
 import sys
 from graphlib import CycleError, TopologicalSorter
-from pathlib import Path
 
 import pytest
-
-import parakin
-
-ROOT = Path(parakin.__file__).parent
+from sources import MODULES, TREES, functions
 
 # From the ground up. What stands on one line knows nothing of each other.
 FLOORS = [
@@ -56,14 +52,6 @@ CORE += ["workspaces", "performance"]
 RIM = {"pathlib", "json", "io", "tempfile", "shutil", "plotly", "matplotlib", "pyarrow", "rich", "cyclopts"}
 RIM |= {"pydantic", "ruamel", "http", "socket", "subprocess"}
 NO_PATH_NEEDS = {"plotly", "matplotlib", "rich", "cyclopts"}
-
-
-def module_of(path: Path) -> str:
-    parts = path.relative_to(ROOT).with_suffix("").parts
-    return ".".join(parts[:-1] if parts[-1] == "__init__" and len(parts) > 1 else parts)
-
-
-MODULES = {module_of(path): path for path in sorted(ROOT.rglob("*.py"))}
 
 
 def imports(module: str) -> tuple[set[str], set[str]]:
@@ -141,11 +129,6 @@ def test_starting_imports_nothing_heavy(module):
     assert not heavy & set(loaded)
 
 
-def functions(module: str) -> list[ast.FunctionDef]:
-    tree = ast.parse(MODULES[module].read_text(encoding="utf-8"))
-    return [node for node in ast.walk(tree) if isinstance(node, ast.FunctionDef)]
-
-
 def parameters(function: ast.FunctionDef) -> int:
     names = [*function.args.posonlyargs, *function.args.args, *function.args.kwonlyargs]
     return len([name for name in names if name.arg not in ("self", "cls")])
@@ -156,7 +139,7 @@ ABOVE = [m for m in MODULES if room_of(m) is not None and HEIGHT[room_of(m)] > H
 
 @pytest.mark.parametrize("module", ABOVE)
 def test_nobody_above_the_machine_asks_its_model(module):
-    tree = ast.parse(MODULES[module].read_text(encoding="utf-8"))
+    tree = TREES[module]
     asked = [n.lineno for n in ast.walk(tree) if isinstance(n, ast.Attribute) and n.attr == "model"]
     assert not asked
 
@@ -166,14 +149,14 @@ DESCRIBED = {"title", "source"}  # what a machine's description says in words
 
 @pytest.mark.parametrize("module", [m for m in ABOVE if m != "export.json.machine"])  # that one writes the description
 def test_nobody_above_the_machine_reads_its_description(module):
-    nodes = list(ast.walk(ast.parse(MODULES[module].read_text(encoding="utf-8"))))
+    nodes = list(ast.walk(TREES[module]))
     words = {id(n.value) for n in nodes if isinstance(n, ast.Attribute) and n.attr in DESCRIBED}
     assert not [n.lineno for n in nodes if isinstance(n, ast.Attribute) and n.attr == "spec" and id(n) not in words]
 
 
 @pytest.mark.parametrize("module", [m for m in MODULES if room_of(m) != "model"])
 def test_structures_are_asked_for_behaviour_not_for_their_type(module):
-    tree = ast.parse(MODULES[module].read_text(encoding="utf-8"))
+    tree = TREES[module]
     calls = [n for n in ast.walk(tree) if isinstance(n, ast.Call) and ast.unparse(n.func) == "isinstance"]
     assert not [call.lineno for call in calls if "structure" in ast.unparse(call.args[0])]
 
@@ -194,7 +177,7 @@ def test_no_function_is_longer_than_seventy_lines(module):
 
 def type_names(module: str) -> list[str]:
     """Classes, and names that a file gives to types: those that begin with a capital but are no constants."""
-    tree, names = ast.parse(MODULES[module].read_text(encoding="utf-8")), []
+    tree, names = TREES[module], []
     for node in ast.walk(tree):
         if isinstance(node, ast.ClassDef):
             names.append(node.name)
@@ -312,7 +295,7 @@ TYPED = COMMANDS | {"main", "to_display", "workpiece"}
 
 @pytest.mark.parametrize("module", MODULES)
 def test_a_function_is_named_by_a_verb(module):
-    for node in ast.parse(MODULES[module].read_text(encoding="utf-8")).body:
+    for node in TREES[module].body:
         if isinstance(node, ast.FunctionDef) and not node.name.startswith("__"):
             name = node.name.removeprefix("_")
             known = name in MATHEMATICS or name in TYPED or name.split("_")[0] in VERBS | QUESTIONS
@@ -359,7 +342,7 @@ THRESHOLDS |= {"OWN", "OTHER", "EITHER"}
 @pytest.mark.parametrize("module", [m for m in MODULES if not m.startswith("kinematics.wrist.pole_")])
 def test_pole_thresholds_and_modes_are_the_wrists_matter(module):
     """No other file has a threshold or a mode of the same name, or turns one into sin²."""
-    for node in ast.walk(ast.parse(MODULES[module].read_text(encoding="utf-8"))):
+    for node in ast.walk(TREES[module]):
         if isinstance(node, ast.Assign):
             assert not {ast.unparse(target).lstrip("_") for target in node.targets} & THRESHOLDS
         if isinstance(node, ast.Call) and ast.unparse(node.func) in ("np.sin", "sin", "math.sin"):

@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 import parakin as pk
-from parakin.kinematics.assemblies.continuation import find_coordinates, find_real_roots
 from parakin.kinematics.assemblies.generic_member import find_generic_member, measure_trace
+from parakin.kinematics.assemblies.homotopy_roots import find_coordinates, find_real_roots
 from parakin.kinematics.assemblies.machine_quadrics import make_machine_quadrics
 from parakin.kinematics.assemblies.root_boxes import prove_roots
 

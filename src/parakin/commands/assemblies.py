@@ -36,21 +36,21 @@ def assemblies(name: Name, /, *values: str, json: Json = False, sizes: Sizes = N
     announce_compiling()
     home = machine.inverse(machine.home)
     joints = parse_row(values, machine.joints, machine.joint_units, home, "joints")
-    found = machine.assemblies(joints)
+    answer = machine.assemblies(joints)
     if json:
         from ..export.json.assemblies import encode_assemblies
 
-        print_json(encode_assemblies(machine, joints, found))
+        print_json(encode_assemblies(machine, joints, answer))
     else:
-        if len(found):
-            print_text(_format_poses(machine, found))
-        print_text(_format_summary(found))
-    if found.lost_count:
-        print_remark(f"{found.lost_count} paths could not be followed: there may be more poses")
-    return OFF_LIMITS if not len(found) or found.lost_count else 0
+        if len(answer):
+            print_text(_format_poses(machine, answer))
+        print_text(_format_summary(answer))
+    if answer.lost_count:
+        print_remark(f"{answer.lost_count} paths could not be followed: there may be more poses")
+    return OFF_LIMITS if not len(answer) or answer.lost_count else 0
 
 
-def _format_poses(machine: Machine, found: Assemblies) -> str:
+def _format_poses(machine: Machine, answer: Assemblies) -> str:
     """Format a line for each pose."""
     header = [*(f"{axis} {name_display_unit(u)}" for axis, u in zip(machine.axes, machine.axis_units, strict=True))]
     rows = [
@@ -61,17 +61,21 @@ def _format_poses(machine: Machine, found: Assemblies) -> str:
             f"{radius:.1e}" if radius == radius else "not proved",
         ]
         for pose, side, within, radius in zip(
-            found.poses, found.sides, found.within_limits, found.radii[:, 0].tolist(), strict=True
+            answer.poses,
+            answer.sides,
+            answer.within_limits,
+            answer.radii[:, 0].tolist(),
+            strict=True,
         )
     ]
     return format_table(rows, [*header, "side", "within limits", "proved within mm"], "r" * len(header) + "llr")
 
 
-def _format_summary(found: Assemblies) -> str:
+def _format_summary(answer: Assemblies) -> str:
     """Say how many there are, and how that is known."""
-    text = f"{len(found)} pose{'s' * (len(found) != 1)}: {found.complete}"
-    if found.complex_count is not None:
-        text += f"; {found.complex_count} more solutions are complex, {found.infinite_count} at infinity"
-    if found.untold_count:
-        text += f"; {found.untold_count} more are real, but no pose tells them"
+    text = f"{len(answer)} pose{'s' * (len(answer) != 1)}: {answer.complete}"
+    if answer.complex_count is not None:
+        text += f"; {answer.complex_count} more solutions are complex, {answer.infinite_count} at infinity"
+    if answer.untold_count:
+        text += f"; {answer.untold_count} more are real, but no pose tells them"
     return text

@@ -14,17 +14,17 @@ if TYPE_CHECKING:
     from ...machine import Machine
 
 
-def encode_assemblies(machine: Machine, joints: Array, found: Assemblies) -> dict[str, Any]:
+def encode_assemblies(machine: Machine, joints: Array, assemblies: Assemblies) -> dict[str, Any]:
     """Encode the assemblies of one joint vector (joints,); bounds that are not proved are None."""
     return {
         "schema": "parakin.assemblies/1",
         "machine": machine.name,
         "joints": _encode_row(joints, machine.joints, machine.joint_units),
-        "complete": found.complete,
-        "complex": found.complex_count,
-        "at_infinity": found.infinite_count,
-        "lost": found.lost_count,
-        "untold": found.untold_count,
+        "complete": assemblies.complete,
+        "complex": assemblies.complex_count,
+        "at_infinity": assemblies.infinite_count,
+        "lost": assemblies.lost_count,
+        "untold": assemblies.untold_count,
         "assemblies": [
             {
                 "pose": _encode_row(pose, machine.axes, machine.axis_units),
@@ -35,7 +35,12 @@ def encode_assemblies(machine: Machine, joints: Array, found: Assemblies) -> dic
                 "proved_within_deg": _encode_bound(np.degrees(radii[1])),
             }
             for pose, side, within, residual, radii in zip(
-                found.poses, found.sides, found.within_limits, found.residuals, found.radii, strict=True
+                assemblies.poses,
+                assemblies.sides,
+                assemblies.within_limits,
+                assemblies.residuals,
+                assemblies.radii,
+                strict=True,
             )
         ],
     }

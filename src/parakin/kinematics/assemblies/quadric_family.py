@@ -72,8 +72,8 @@ def make_family(motion: Sequence[str], seed: int = 1) -> QuadricFamily:
     legs = np.concatenate([make_closure_quadrics(p) for p in rng.uniform(-1.0, 1.0, (12, 3))])
     closures = (hull @ legs @ hull.T).reshape(-1, n * n)
     if len(own):
-        held = np.linalg.qr(_find_quadrics(inside).reshape(-1, n * n).T)[0]
-        closures = closures - closures @ held @ held.T
+        basis = np.linalg.qr(_find_quadrics(inside).reshape(-1, n * n).T)[0]
+        closures = closures - closures @ basis @ basis.T
     return QuadricFamily(hull, own.astype(np.complex128), _find_span(closures).reshape(-1, n, n), inside[0], freedoms)
 
 

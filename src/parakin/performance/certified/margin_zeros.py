@@ -105,8 +105,8 @@ def _find_zeros(constraint: Constraint, starts: Array) -> tuple[Array, Indices]:
             points = points - (value / (slopes**2).sum(1))[:, None] * slopes
     value, slopes = _evaluate(constraint, points)
     with np.errstate(all="ignore"):
-        found = np.flatnonzero(np.abs(value) / np.linalg.norm(slopes, axis=1) < _NEAR * _HALF_WIDTHS[-1])
-    order = found[np.argsort(np.linalg.norm(points[found] - starts[found], axis=1), kind="stable")]
+        near = np.flatnonzero(np.abs(value) / np.linalg.norm(slopes, axis=1) < _NEAR * _HALF_WIDTHS[-1])
+    order = near[np.argsort(np.linalg.norm(points[near] - starts[near], axis=1), kind="stable")]
     return points[order], order
 
 
@@ -116,11 +116,6 @@ def _evaluate(constraint: Constraint, points: Array) -> tuple[Array, Array]:
     with np.errstate(invalid="ignore"):  # intervals without bounds
         middle = 0.5 * (bottom + top)
     return middle[:, 0], middle[:, 1:]
-
-
-def _is_below_zero(constraint: Constraint, position: Array) -> bool:
-    """Prove that a constraint is broken at a position (d,)."""
-    return bool(constraint.point_program(position[None], position[None])[1][0, 0] < 0.0)
 
 
 def _point_along(start: Array, end: Array) -> Array:

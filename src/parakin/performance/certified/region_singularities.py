@@ -173,8 +173,8 @@ class _RegionCells(NamedTuple):
 
     def find_components(self, position: Array) -> Indices:
         """Find the components of the cells that hold a position (d,)."""
-        held = ((self.inside.low <= position) & (position <= self.inside.low + self.inside.size)).all(1)
-        return self.component[held]
+        holds = ((self.inside.low <= position) & (position <= self.inside.low + self.inside.size)).all(1)
+        return self.component[holds]
 
     def find_home(self, region: Region) -> Indices:
         """Find the components that hold home; all where no cell inside holds it, as in a slice beside it."""
@@ -241,7 +241,7 @@ def _find_sign_change(region: Region, positive: Constraint, cells: Cells, compon
     at_home = ((cells.low <= position) & (position <= cells.low + cells.size)).all(1)
     if at_home.any():
         mixed &= component == component[int(at_home.argmax())]
-    found = np.flatnonzero(mixed & below)
-    if not len(found):
+    broken = np.flatnonzero(mixed & below)
+    if not len(broken):
         return None
-    return np.asarray(region.poses(middle[found[[int(high[found].argmin())]]])[0])
+    return np.asarray(region.poses(middle[broken[[int(high[broken].argmin())]]])[0])

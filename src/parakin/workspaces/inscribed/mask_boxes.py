@@ -6,7 +6,6 @@ import numpy as np
 
 from ...arrays import Flags, Indices
 
-WORD = 64  # cells along a mask's first axis: the bits of a word
 _EXAMINED = 20_000  # boxes of a mask, the largest ones
 _ALIKE = 0.6  # fraction of the smaller of two boxes that both have, from which on they count as one
 

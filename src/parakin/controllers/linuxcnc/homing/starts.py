@@ -40,15 +40,15 @@ def sample_starts(machine: Machine) -> HomingStarts:
     low, high = (end.copy() for end in estimate_axis_ranges(machine))
     turning = np.array(machine.axis_units) == "rad"
     low[turning], high[turning] = np.maximum(low, -pi)[turning], np.minimum(high, pi)[turning]
-    found = np.empty((0, len(low)))
+    starts = np.empty((0, len(low)))
     for _ in range(_ROUNDS):
         poses = rng.uniform(low, high, (_SAMPLES, len(low)))
         poses = poses[_is_a_start(machine, poses)]
-        found = np.concatenate([found, poses[_is_reached_straight(machine, poses)]])
-        if len(found) >= STARTS:
+        starts = np.concatenate([starts, poses[_is_reached_straight(machine, poses)]])
+        if len(starts) >= STARTS:
             break
-    found = found[:STARTS]
-    return HomingStarts(found, machine.inverse(found))
+    starts = starts[:STARTS]
+    return HomingStarts(starts, machine.inverse(starts))
 
 
 def _is_a_start(machine: Machine, poses: Array) -> Flags:

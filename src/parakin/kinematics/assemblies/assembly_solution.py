@@ -14,7 +14,7 @@ from ..inverse import SINGULAR
 from ..limit_margins import find_broken_limits
 from ..wrist.pole_thresholds import is_upright
 from .closed_forms import LONGEST, find_closed_form, solve_closed_form
-from .continuation import find_coordinates, find_real_roots
+from .homotopy_roots import find_coordinates, find_real_roots
 from .machine_quadrics import make_machine_quadrics
 from .root_boxes import prove_roots
 from .study import compute_study_points
@@ -90,11 +90,11 @@ def _describe(model: Model, joints: Array, coordinates: Array, complete: str) ->
     residuals = roots.residual
     closed = residuals <= compute_closure_tolerance(model)
     poses = compute_poses(model, np.ascontiguousarray(roots.rows), given)
-    told = np.isfinite(poses).all(1)
+    has_pose = np.isfinite(poses).all(1)
     direction = model.structure.direction
     if direction is not None:
         poses[is_upright(poses[:, direction.b]), direction.c] = 0.0
-    kept = np.flatnonzero(closed & told)
+    kept = np.flatnonzero(closed & has_pose)
     kept = kept[np.lexsort(poses[kept].T[::-1])]
     poses, given = np.ascontiguousarray(poses[kept]), given[: len(kept)]
     return Assemblies(
@@ -104,7 +104,7 @@ def _describe(model: Model, joints: Array, coordinates: Array, complete: str) ->
         _find_signs(model, poses, given),
         find_broken_limits(model, poses, given, model.mode) == 0,
         complete if closed.all() or complete == CLOSED_FORM else NOT_COMPLETE,
-        untold_count=int((closed & ~told).sum()),
+        untold_count=int((closed & ~has_pose).sum()),
     )
 
 

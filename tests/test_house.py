@@ -1,0 +1,105 @@
+"""The house rules that a reader can see: sizes of files, names of files and locals, plain words, no dead code."""
+
+import ast
+import re
+from collections import Counter
+
+import pytest
+from sources import MODULES, ROOT, TREES, functions
+
+SOURCES = sorted([*ROOT.rglob("*.py"), *ROOT.rglob("*.c")])
+
+
+@pytest.mark.parametrize("path", SOURCES, ids=lambda path: str(path.relative_to(ROOT)))
+def test_no_file_is_longer_than_400_lines(path):
+    assert len(path.read_text(encoding="utf-8").splitlines()) <= 400
+
+
+def test_a_file_name_stands_once():
+    """But in folders side by side, which do the same for two things; a command or export may be named as its room."""
+    places = {}
+    for path in SOURCES:
+        place = path.relative_to(ROOT)
+        if path.stem != "__init__" and place.parts[0] not in ("commands", "export"):
+            places.setdefault(path.name, set()).add(place.parent)
+    assert not [name for name, folders in places.items() if len(folders) > 1 and len({f.parent for f in folders}) > 1]
+
+
+# Words that say nothing of what a name holds; options have them where people type or read them.
+EMPTY = {"asked", "found", "held", "part", "parts", "some", "stuff", "taken", "thing", "things", "told"}
+# Words that the glossary of docs/design.md replaced.
+REPLACED = {
+    "course",
+    "gentle",
+    "island",
+    "islands",
+    "law",
+    "neighbours",
+    "pace",
+    "strays",
+    "swiftness",
+    "tube",
+    "uphill",
+}
+OPTIONS = {("workspaces.certified.region", "some")}
+# Names that are left to be changed.
+LEFT = {("kernels.newton", "some"), ("toolpath.placing.margins", "held"), ("toolpath.posting.working_mode", "held")}
+LEFT |= {("toolpath.timing.jerk_limited", "part"), ("toolpath.timing.jerk_limited", "parts")}
+LEFT |= {("toolpath.timing.joint_path", "parts"), ("toolpath.timing.kernels.grading", "parts")}
+LEFT |= {("toolpath.timing.kernels.interior_point", "part"), ("toolpath.timing.kernels.interior_point", "taken")}
+
+
+def names_given(tree: ast.AST) -> set[str]:
+    """Names that a file gives to parameters, locals, functions and classes."""
+    names = {n.id for n in ast.walk(tree) if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Store)}
+    names |= {n.arg for n in ast.walk(tree) if isinstance(n, ast.arg)}
+    return names | {n.name for n in ast.walk(tree) if isinstance(n, (ast.FunctionDef, ast.ClassDef))}
+
+
+@pytest.mark.parametrize("module", [m for m in MODULES if not m.startswith("commands.")])
+def test_names_say_what_they_hold(module):
+    names = names_given(TREES[module])
+    assert not {name for name in names & (EMPTY | REPLACED) if (module, name) not in OPTIONS | LEFT}
+
+
+def test_names_given_are_seen():
+    tree = ast.parse("def told(part):\n    for held in part:\n        found, x = held\n")
+    assert names_given(tree) == {"told", "part", "held", "found", "x"}
+
+
+ARCHAIC = re.compile(
+    r"\b(albeit|hitherto|lest|noughts?|that is none|thence|thereof|whence|wherein|whilst)\b", re.IGNORECASE
+)
+
+
+@pytest.mark.parametrize("path", SOURCES, ids=lambda path: str(path.relative_to(ROOT)))
+def test_words_are_plain(path):
+    assert not ARCHAIC.findall(path.read_text(encoding="utf-8"))
+
+
+def definitions(module: str) -> list[str]:
+    """What a file defines and calls by name: functions and classes without a decorator, and constants."""
+    tree = TREES[module]
+    nodes = [n for n in ast.walk(tree) if isinstance(n, (ast.FunctionDef, ast.ClassDef))]
+    names = [n.name for n in nodes if not any("validator" in ast.unparse(d) for d in n.decorator_list)]
+    for node in tree.body:
+        if isinstance(node, ast.Assign):
+            names += [target.id for target in node.targets if isinstance(target, ast.Name)]
+    return [name for name in names if not name.startswith("__")]
+
+
+# Called by others: Python, Numba, a terminal's key bindings; found by their folder; for the page of scripts/.
+FROM_OUTSIDE = {"_load_data", "_save_data", "on_end", "on_start", "GROUP_TITLES"}
+
+
+def test_nothing_stands_for_the_tests_alone():
+    words = Counter()
+    for path in SOURCES:
+        words.update(re.findall(r"\w+", path.read_text(encoding="utf-8")))
+    names = {name for module in MODULES if not module.startswith("model.legs.") for name in definitions(module)}
+    assert len(names) > 1000
+    assert not {name for name in names if words[name] == 1} - FROM_OUTSIDE
+
+
+def test_functions_are_seen():
+    assert {"solve_inverse"} == {function.name for function in functions("kinematics.inverse")}

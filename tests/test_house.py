@@ -35,7 +35,6 @@ REPLACED = {
     "islands",
     "law",
     "neighbours",
-    "pace",
     "strays",
     "swiftness",
     "tube",

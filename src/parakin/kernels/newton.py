@@ -221,13 +221,13 @@ def _blend_lanes(state, a, b, s):
 
 
 @njit(inline="always")
-def _update_matrix(full, m, block, some):
-    """Factor the slopes that the tape left, for the lanes that want it; with ``some`` the others keep their matrix."""
+def _update_matrix(full, m, block, apart):
+    """Factor the slopes that the tape left, for the lanes that want it; with ``apart`` the others keep their matrix."""
     own, fresh, state = block.factors, block.fresh, block.state
-    target = fresh if some else own
+    target = fresh if apart else own
     copy_lanes(block.registers, full.inputs + m, target.matrix, 0, m * m)
     factor_matrix(target, m)
-    if some:
+    if apart:
         for i in range(m * m):
             own.exchanged[i] |= fresh.exchanged[i]
             s = (i & MASK) * LANES

@@ -44,12 +44,12 @@ class Steering(NamedTuple):
     """How a path is followed at a placement.
 
     mode : working mode
-    held : rad off a wrist's pole: nearer, the tool is held, and the first joint stands still
+    pole_zone : rad off a wrist's pole: nearer, the tool is held, and the first joint stands still
     rewinds : the first joint's turns are taken back, and the ends of its range do not count
     """
 
     mode: str
-    held: float
+    pole_zone: float
     rewinds: bool
 
 
@@ -94,10 +94,10 @@ class PlacementMargins:
         for point in points:
             poses, path_limits = self._compute_poses(point, path)
             if track is None:
-                joints = self.machine.follow(poses, mode, self.steering.held)
+                joints = self.machine.follow(poses, mode, self.steering.pole_zone)
             else:
                 sampled = self._sample(point, path, poses)
-                solution = follow_working_mode(self.machine, path, sampled, mode, self.steering.held)
+                solution = follow_working_mode(self.machine, path, sampled, mode, self.steering.pole_zone)
                 poses, joints = solution.poses[rows], solution.joints[rows]
             all_poses.append(poses)
             all_joints.append(joints)
@@ -115,7 +115,7 @@ class PlacementMargins:
         """Score the placement at a point over the whole path."""
         poses, path_limits = self._compute_poses(point, self.path)
         sampled, mode = self._sample(point, self.path, poses), self.steering.mode
-        solution = follow_working_mode(self.machine, self.path, sampled, mode, self.steering.held)
+        solution = follow_working_mode(self.machine, self.path, sampled, mode, self.steering.pole_zone)
         is_reach, spans = self._spans
         names, is_hard = list(self.machine.limits), is_reach
         least, records = np.full(len(names), np.inf), np.zeros(len(names), np.int64)

@@ -42,11 +42,11 @@ def list_candidate_modes(machine: Machine, mode: str | None) -> list[str]:
 
 
 def follow_working_mode(
-    machine: Machine, path: ToolPath, sampled: SampledPath, mode: str, held: float = PRINTED
+    machine: Machine, path: ToolPath, sampled: SampledPath, mode: str, pole_zone: float = PRINTED
 ) -> ModeSolution:
     """Choose the joints for the poses of a path's records in a working mode, with their turns counted.
 
-    held : rad off a wrist's pole: nearer, its first joint stands still
+    pole_zone : rad off a wrist's pole: nearer, its first joint stands still
 
     The turns are those with which the fewest records break a limit, then those by which the joints turn least, then
     those nearest to home. They are the same all along the path; :mod:`~.rewinds` takes turns back.
@@ -54,7 +54,7 @@ def follow_working_mode(
     poses = sampled.poses[sampled.at_records]
     known = sampled.joints if sampled.mode == mode else None
     along = machine.inverse(sampled.poses, mode) if known is None else known
-    machine.make_continuous(sampled.poses, along, mode, held)
+    machine.make_continuous(sampled.poses, along, mode, pole_zone)
     joints = along[sampled.at_records]
     turning = machine.turning_joints
     if not turning or not len(joints):

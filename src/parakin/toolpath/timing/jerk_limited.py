@@ -23,7 +23,11 @@ _FIRST, _LEAST = 1.0 / 16.0, 1e-6  # of the way in which s̈ is built up, and mm
 _START = 1.0 / 64.0  # of a stretch: no first step is longer
 _ACROSS = 0.5  # fraction of a jerk limit that q'''·ṡ³ may take at first
 _FASTER = 50.0  # × the path's mean speed at the joints' speeds: nothing is faster, also where all joints turn back
-_PARTS, _PER_RAMP, _ACTIVE = 8, 6.0, 0.5  # a step is cut into as many parts, so many a ramp, where jerk is taken so far
+_PIECES, _PER_RAMP, _ACTIVE = (
+    8,
+    6.0,
+    0.5,
+)  # a step is cut into as many pieces, so many a ramp, where jerk is taken so far
 _WINDOWS = 256, 32  # rows of windows, about: in short ones a place where little is gained holds few others up
 _BARRIERS, _ROUGH = (0.01, 1e-3, 1e-4), 1  # weights, and how many of them come before rows are added
 _STEPS, _SWEEPS = 12, 6  # of Newton's in each window and sweep, and sweeps of each cut into windows, at most
@@ -31,8 +35,8 @@ _WORK = 4_000_000  # steps of the path that Newton's method expands in all, at m
 _ENOUGH = 6  # of Newton's steps for each of the path's are left to a weight, if the next one has to go without
 _WORTH = 1e-3  # a window is left as it is where the last sweep saved less than this fraction of the time
 _PLACES, _FEWER, _LONG = 33, 9, 200_000  # on each piece where utilisation is measured, and on paths of more rows
-_OVER = 1.0005  # a step whose pieces take more of a limit is cut into _MORE_PARTS, or tightened
-_MEASUREMENTS, _REFINEMENTS, _MORE_PARTS = 6, 2, 4  # how often pieces are measured at most, and steps cut for it
+_OVER = 1.0005  # a step whose pieces take more of a limit is cut into _MORE_PIECES, or tightened
+_MEASUREMENTS, _REFINEMENTS, _MORE_PIECES = 6, 2, 4  # how often pieces are measured at most, and steps cut for it
 _SURE = 1.0001  # a profile is slowed by this × the worst utilisation, which is measured at some places only
 
 
@@ -75,11 +79,11 @@ def limit_jerk(joint_path: JointPath, limits: DriveLimits, x: Array) -> tuple[Jo
         if not over.any():
             break
         known: tuple[Utilisation, Array, Array] | None
-        parts = np.ones(len(plan.x) - 1, np.int64)
-        plan = plan._replace(where=np.zeros(len(parts)))
-        if again < _REFINEMENTS and work >= len(parts):
-            parts[profile.row[over]] = _MORE_PARTS
-            plan, known = _cut_steps(plan, limits, ramp, parts), None
+        pieces = np.ones(len(plan.x) - 1, np.int64)
+        plan = plan._replace(where=np.zeros(len(pieces)))
+        if again < _REFINEMENTS and work >= len(pieces):
+            pieces[profile.row[over]] = _MORE_PIECES
+            plan, known = _cut_steps(plan, limits, ramp, pieces), None
         else:
             known = use, plan.x.copy(), plan.a.copy()
             plan = _tighten_steps(plan, ramp, profile.row[over], _SURE * use.kept[over, 3])
@@ -117,10 +121,10 @@ def _grade_steps(joint_path: JointPath, limits: DriveLimits, ramp: float, x: Arr
     count = cut_steps(joint_path.step, size, np.empty(0, np.int64), np.empty(0))
     if not count:
         return joint_path, x
-    steps, parts = np.empty(count, np.int64), np.empty(count)
-    cut_steps(joint_path.step, size, steps, parts)
-    x = np.insert(x, steps + 1, x[steps] + parts * (x[steps + 1] - x[steps]))
-    return divide_joint_path(joint_path, steps, parts), x
+    steps, fractions = np.empty(count, np.int64), np.empty(count)
+    cut_steps(joint_path.step, size, steps, fractions)
+    x = np.insert(x, steps + 1, x[steps] + fractions * (x[steps + 1] - x[steps]))
+    return divide_joint_path(joint_path, steps, fractions), x
 
 
 def _pose_problem(joint_path: JointPath, limits: DriveLimits) -> StepLimits:
@@ -201,8 +205,8 @@ def _sweep_windows(windows: Indices, sweep: Sweep, count: int, widest: int) -> i
     work = list[int]()
 
     def shorten(start: int, stop: int) -> None:
-        part = slice(*np.searchsorted(windows[:, 0], (start, stop)))
-        work.append(shorten_windows(windows[part], sweep, allocate_newton(widest + 1)))
+        stretch = slice(*np.searchsorted(windows[:, 0], (start, stop)))
+        work.append(shorten_windows(windows[stretch], sweep, allocate_newton(widest + 1)))
 
     run_in_threads(count, shorten)
     return sum(work)
@@ -216,24 +220,26 @@ def _measure_steps(problem: StepLimits, x: Array, a: Array) -> tuple[Array, Arra
 
 
 def _count_parts(plan: _Plan, ramp: float) -> Indices:
-    """Count the parts, even in time, into which to cut steps over which s̈ changes much."""
+    """Count the pieces, even in time, into which to cut steps over which s̈ changes much."""
     time, use = _measure_steps(plan.problem, plan.x, plan.a)
-    parts: Indices = np.where(use > _ACTIVE, np.clip(np.ceil(time * (_PER_RAMP / ramp)), 1, _PARTS), 1).astype(np.int64)
-    return parts
+    pieces: Indices = np.where(use > _ACTIVE, np.clip(np.ceil(time * (_PER_RAMP / ramp)), 1, _PIECES), 1).astype(
+        np.int64
+    )
+    return pieces
 
 
-def _cut_steps(plan: _Plan, limits: DriveLimits, ramp: float, parts: Indices) -> _Plan:
-    """Cut each step into so many parts, even in time; the motion stays as it is, but where it breaks a limit now."""
-    if not (parts > 1).any():
+def _cut_steps(plan: _Plan, limits: DriveLimits, ramp: float, pieces: Indices) -> _Plan:
+    """Cut each step into so many pieces, even in time; the motion stays as it is, but where it breaks a limit now."""
+    if not (pieces > 1).any():
         return plan
     time, whole = _measure_steps(plan.problem, plan.x, plan.a)[0], plan.problem.step
-    steps = np.repeat(np.arange(len(parts)), parts - 1)
-    k = 1 + np.arange(len(steps)) - np.repeat(np.cumsum(parts - 1) - (parts - 1), parts - 1)
+    steps = np.repeat(np.arange(len(pieces)), pieces - 1)
+    k = 1 + np.arange(len(steps)) - np.repeat(np.cumsum(pieces - 1) - (pieces - 1), pieces - 1)
     states = np.empty((len(steps), 3))
-    locate_times(plan.problem, plan.x, plan.a, steps, k / parts[steps] * time[steps], states)
+    locate_times(plan.problem, plan.x, plan.a, steps, k / pieces[steps] * time[steps], states)
     joint_path = divide_joint_path(plan.joint_path, steps, states[:, 0] / whole[steps])
     x, a = np.insert(plan.x, steps + 1, states[:, 1]), np.insert(plan.a, steps + 1, states[:, 2])
-    where = np.repeat(np.where(parts > 1, np.inf, plan.where), parts)
+    where = np.repeat(np.where(pieces > 1, np.inf, plan.where), pieces)
     problem = _pose_problem(joint_path, limits)
     cut = _Plan(joint_path, joint_path.find_stretches(), problem, x, a, where)
     _slow_plan(cut, ramp)

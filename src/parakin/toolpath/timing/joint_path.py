@@ -161,7 +161,7 @@ def _build_single_row(posted: Posted, curve: Curve) -> JointPath:
 
 
 def _divide_steps(coarse: Indices, step: Array) -> tuple[Indices, Array]:
-    """List the steps to cut, ascending, and after which parts: coarse ones are quartered, their neighbours halved."""
+    """List the steps to cut, ascending, and at which fractions: coarse ones are quartered, their neighbours halved."""
     beside = np.setdiff1d(np.concatenate([coarse - 1, coarse + 1]), coarse)
     beside = beside[(beside >= 0) & (beside < len(step))]
     beside = beside[step[beside] > 0.0]
@@ -199,7 +199,7 @@ def _find_coarse_steps(joint_path: JointPath, tolerances: SplineTolerances, cand
 
 
 def refine_joint_path(joint_path: JointPath, steps: Indices, fractions: Array, anew: bool = False) -> JointPath:
-    """Add rows in steps, ascending, after ``parts`` of them.
+    """Add rows in steps, ascending, after ``fractions`` of them.
 
     The joints at the new rows are those nearest to the old splines; with ``anew`` all are followed from the start.
     """
@@ -212,13 +212,13 @@ def refine_joint_path(joint_path: JointPath, steps: Indices, fractions: Array, a
     return _fit_rows(joint_path.posted, joint_path.curve, segment, offset, joints)
 
 
-def divide_joint_path(joint_path: JointPath, steps: Indices, parts: Array) -> JointPath:
-    """Add rows in steps, ascending, after ``parts`` of them, on the splines: these stay as they are."""
-    rows, shift = joint_path.rows, parts * joint_path.step[steps]
+def divide_joint_path(joint_path: JointPath, steps: Indices, fractions: Array) -> JointPath:
+    """Add rows in steps, ascending, after ``fractions`` of them, on the splines: these stay as they are."""
+    rows, shift = joint_path.rows, fractions * joint_path.step[steps]
     still = np.zeros(len(steps))
     joints = joint_path.evaluate(PathState(steps, shift, still, still)).joints
     bend = rows.curvature[steps]
-    bend += parts[:, None] * (rows.curvature[steps + 1] - bend)
+    bend += fractions[:, None] * (rows.curvature[steps + 1] - bend)
     segment = np.insert(joint_path.segment, steps + 1, joint_path.segment[steps])
     offset = np.insert(joint_path.offset, steps + 1, joint_path.offset[steps] + shift)
     step = np.insert(rows.step, steps, 0.0)

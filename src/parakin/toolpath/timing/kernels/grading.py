@@ -30,10 +30,10 @@ def bound_sizes(step, size):
 
 
 @njit(nogil=True, cache=True, error_model="numpy")
-def cut_steps(step, size, steps, parts):
-    """Cut steps that are too long: fill ``steps`` and ``parts``, as far as they reach; returns how many cuts there are.
+def cut_steps(step, size, steps, fractions):
+    """Cut steps that are too long: fill ``steps`` and ``fractions`` as far as they reach; return the number of cuts.
 
-    Parts are fractions of a step, ascending.
+    Fractions of a step ascend.
     """
     n = 0
     for i in range(len(step)):
@@ -45,8 +45,8 @@ def cut_steps(step, size, steps, parts):
             else:
                 right, great, cut = right - great, _GROWTH * great, right - great
             if n < len(steps):
-                steps[n], parts[n] = i, cut / step[i]
+                steps[n], fractions[n] = i, cut / step[i]
             n += 1
         if n - first > 1 and n <= len(steps):
-            parts[first:n] = np.sort(parts[first:n])
+            fractions[first:n] = np.sort(fractions[first:n])
     return n

@@ -144,20 +144,20 @@ def _measure_window(first, last, limits, x, a, at, weight):
 @njit(nogil=True, cache=True, error_model="numpy")
 def _search_line(first, last, limits, x, a, now, slope, newton):
     """Take as much of Newton's step as lowers time and barriers; returns how much, 0 for none."""
-    part = 1.0
+    fraction = 1.0
     for _ in range(_HALVINGS):
         fits = True
         for k in range(last - first + 1):
-            newton.x[k] = x[first + k] + part * newton.direction[k, 0]
-            newton.a[k] = a[first + k] + part * newton.direction[k, 1]
+            newton.x[k] = x[first + k] + fraction * newton.direction[k, 0]
+            newton.a[k] = a[first + k] + fraction * newton.direction[k, 1]
             fits &= newton.x[k] > 0.0 or k == 0 or k == last - first
         if fits:
             time, barrier = _measure_window(first, last, limits, newton.x, newton.a, first, newton.weight)
-            if time + barrier <= now + _ARMIJO * part * slope:
+            if time + barrier <= now + _ARMIJO * fraction * slope:
                 for k in range(last - first + 1):
                     x[first + k], a[first + k] = newton.x[k], newton.a[k]
-                return part
-        part *= 0.5
+                return fraction
+        fraction *= 0.5
     return 0.0
 
 
@@ -176,10 +176,10 @@ def _take_step(first, last, limits, x, a, mu, damping, newton):
         slope = _solve_window(last - first, damping, newton)
         if not -slope > worth:
             break
-        part = _search_line(first, last, limits, x, a, time + barrier, slope, newton)
-        if part > 0.3:
+        fraction = _search_line(first, last, limits, x, a, time + barrier, slope, newton)
+        if fraction > 0.3:
             return True, max(_RIDGE, 0.1 * damping)
-        if part > 0.0:
+        if fraction > 0.0:
             return True, damping
         damping = max(10.0 * damping, _DAMPED)
     return False, _RIDGE
@@ -215,9 +215,9 @@ def shorten_windows(windows, sweep, newton):
             continue
         damping = _RIDGE
         for _ in range(sweep.steps):
-            taken, damping = _take_step(first, last, limits, x, a, sweep.weight, damping, newton)
+            advanced, damping = _take_step(first, last, limits, x, a, sweep.weight, damping, newton)
             work += last - first
-            if not taken:
+            if not advanced:
                 break
         gains[first:last] = abs(1.0 - _measure_time(first, last, limits, x, a) / time)
     return work

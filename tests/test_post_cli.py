@@ -77,6 +77,14 @@ def test_placed(part, out, capsys):
     assert "best placement --workpiece X=" in text
 
 
+def test_placed_where_no_job_runs(tmp_path, out, capsys):
+    """Both records are within theta2's 100 degrees, but the short way between them turns the tool upside down."""
+    part = tmp_path / "over.apt"
+    part.write_text("UNITS/MM\nFEDRAT/600,MMPM\nGOTO/0,0,0,0.9962,0,-0.0872\nGOTO/10,0,0,-0.9962,0,-0.0872\nFINI\n")
+    text = ran(capsys, part, "-m", "orthoglide5_head", "-o", out, "--place", "X=-9:9,Z=-100:0", code=3)
+    assert "no placement was found at which the path runs" in text and "best placement" not in text
+
+
 def test_nowhere_to_place(part, out, capsys):
     said = told(capsys, part, "-m", "linear_delta", "-o", out, "--place", "X=900:1000", code=3)
     assert said["placement"]["margin"] < 0

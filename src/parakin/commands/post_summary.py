@@ -37,7 +37,7 @@ def summarise_job(prepared: PreparedPart, target: Target | None, written: dict[s
         count += f" and {job.inserted:,} inserted"
     lines = [f"{path.source} on {posted.machine.name}: {count}, {_format_verdict(posted)}", ""]
     if placement is not None:
-        lines += [_format_placement(placement, prepared.turned is not None), ""]
+        lines += [_format_placement(placement, prepared.turned is not None, job.runs), ""]
     lines += [*describe_setup(posted), ""]
     if prepared.turned is not None:
         lines += [_format_turn(prepared.turned), ""]
@@ -74,9 +74,11 @@ def _format_verdict(posted: Posted) -> str:
     return f"{verdict}, the first in line {posted.first.line}"
 
 
-def _format_placement(placement: Placement, is_turned: bool) -> str:
+def _format_placement(placement: Placement, is_turned: bool, runs: bool) -> str:
     """Format a placement with its margin, or without where the turn, which has a line of its own, tells another."""
     values = ",".join(f"{axis}={to_display(value, AXIS_UNITS[axis]):.6g}" for axis, value in placement.values.items())
+    if placement.allowed and not runs:
+        return f"no placement was found at which the path runs; best for its records alone is --workpiece {values}"
     if is_turned:
         return f"best placement --workpiece {values}"
     if placement.allowed:

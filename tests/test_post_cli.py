@@ -83,6 +83,7 @@ def test_placed_where_no_job_runs(tmp_path, out, capsys):
     part.write_text("UNITS/MM\nFEDRAT/600,MMPM\nGOTO/0,0,0,0.9962,0,-0.0872\nGOTO/10,0,0,-0.9962,0,-0.0872\nFINI\n")
     text = ran(capsys, part, "-m", "orthoglide5_head", "-o", out, "--place", "X=-9:9,Z=-100:0", code=3)
     assert "no placement was found at which the path runs" in text and "best placement" not in text
+    assert "but it does not run" in text.splitlines()[0]
 
 
 def test_nowhere_to_place(part, out, capsys):

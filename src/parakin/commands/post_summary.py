@@ -13,7 +13,6 @@ from .offences import format_offence
 if TYPE_CHECKING:
     from ..toolpath.job import Job
     from ..toolpath.placing.placement import Placement
-    from ..toolpath.posting.posted import Posted
     from ..toolpath.turned_job import TurnedJob
     from .part_job import PreparedPart
 
@@ -35,7 +34,7 @@ def summarise_job(prepared: PreparedPart, target: Target | None, written: dict[s
     count = f"{len(job.programmed.path):,} records"
     if job.inserted:
         count += f" and {job.inserted:,} inserted"
-    lines = [f"{path.source} on {posted.machine.name}: {count}, {_format_verdict(posted)}", ""]
+    lines = [f"{path.source} on {posted.machine.name}: {count}, {_format_verdict(job)}", ""]
     if placement is not None:
         lines += [_format_placement(placement, prepared.turned is not None, job.runs), ""]
     lines += [*describe_setup(posted), ""]
@@ -66,9 +65,10 @@ def _format_place(source: str, line: int) -> str:
     return f"{source}:{line}" if line else source
 
 
-def _format_verdict(posted: Posted) -> str:
+def _format_verdict(job: Job) -> str:
+    posted = job.posted
     if posted.first is None:
-        return "all within the limits, and between them"
+        return "all within the limits, and between them" + ("" if job.runs else ", but it does not run")
     counts = [(posted.broken_record_count, "off limits"), (posted.broken_motion_count, "off limits on the way there")]
     verdict = " and ".join(f"{count:,} {what}" for count, what in counts if count)
     return f"{verdict}, the first in line {posted.first.line}"

@@ -245,7 +245,10 @@ def test_a_foreign_program_is_slowed_where_a_joint_would_pass_its_limits(machine
 
 @pytest.mark.parametrize("machine", ["orthoglide5_head", "orthoglide5_table", "hexapod"], indirect=True)
 def test_random_paths_run_as_the_planner_does_alone(machine, linuxcnc, tmp_path):
-    """Cycle by cycle the poses that the same planner commands without LinuxCNC, from which its time is told."""
+    """The poses that the same planner commands without LinuxCNC, from which its time is told, but for a few cycles.
+
+    Where points follow each other closely LinuxCNC hands them over later; the planner sees less ahead, and is slower.
+    """
     planner = Planner(machine, tmp_path)
     for seed in (0, 20):
         (tmp_path / "part.cls").write_text(PathMaker(machine, seed).make(), encoding="ascii")
@@ -260,7 +263,18 @@ def test_random_paths_run_as_the_planner_does_alone(machine, linuxcnc, tmp_path)
         first, moving = (int(np.flatnonzero((np.diff(p, axis=0) != 0.0).any(1))[0]) for p in (run.poses, alone))
         count = min(len(run.poses) - first, len(alone) - moving)
         assert count > len(alone) - moving - 10
-        assert np.abs(run.poses[first : first + count] - alone[moving : moving + count]).max() < 1e-3
+        assert lag(run.poses[first : first + count], alone[moving : moving + count]).max() < 1e-3
+
+
+def lag(poses, alone, cycles=8):
+    """How far poses (n, axes) are from a polyline (n, axes) as it runs a few cycles before and after, (n,)."""
+    least = np.full(len(poses), np.inf)
+    for shift in range(-cycles, cycles + 1):
+        cycle = np.clip(np.arange(len(poses)) + shift, 0, len(alone) - 2)
+        start, step = alone[cycle], alone[cycle + 1] - alone[cycle]
+        share = np.clip(((poses - start) * step).sum(1) / np.maximum((step * step).sum(1), 1e-300), 0.0, 1.0)
+        least = np.minimum(least, np.abs(poses - start - share[:, None] * step).max(1))
+    return least
 
 
 def aside(points, path):

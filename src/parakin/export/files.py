@@ -47,7 +47,9 @@ def write_files(folder: str | os.PathLike[str], files: Mapping[str, Content]) ->
     Raises :class:`InputError` if the folder can't be made or a file can't be written.
     """
     base = Path(folder)
+    _check_path(str(base), "folder")
     for name in files:
+        _check_path(name, "files")
         if not name or Path(name).name != name:
             raise InputError(f"{quote(name)} is no file name, expected one without a folder", "files")
     targets = [base / name for name in files]
@@ -75,9 +77,17 @@ def write_files(folder: str | os.PathLike[str], files: Mapping[str, Content]) ->
                     os.replace(stage / target.name, target)  # noqa: PTH105
     except OSError as error:
         raise InputError(f"can't be written: {error.strerror or error}", current) from error
-    except ValueError as error:  # a name that is no text, or with a zero character
-        raise InputError(f"can't be written: {error}", current) from error
     return targets
+
+
+def _check_path(path: str, source: str) -> None:
+    """Refuse a path that no file can have: one with a zero character, or that is no text of the file system."""
+    try:
+        encoded = os.fsencode(path)
+    except UnicodeEncodeError:
+        encoded = b"\0"
+    if b"\0" in encoded:
+        raise InputError(f"{quote(path)} is no path", source)
 
 
 @contextlib.contextmanager

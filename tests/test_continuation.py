@@ -9,12 +9,15 @@ import subprocess
 
 import numpy as np
 import pytest
+from independent import orientation
 
 import parakin as pk
 from parakin.kinematics.assemblies.generic_member import find_generic_member, measure_trace
 from parakin.kinematics.assemblies.homotopy_roots import find_coordinates, find_real_roots
 from parakin.kinematics.assemblies.machine_quadrics import make_machine_quadrics
+from parakin.kinematics.assemblies.quadric_family import make_family
 from parakin.kinematics.assemblies.root_boxes import prove_roots
+from parakin.model.legs.column import Column
 
 # P. Dietmaier, The Stewart-Gough platform of general geometry can have 40 real postures (1998): feet, platform, lengths
 # in m, and all forty solutions are real.
@@ -73,7 +76,7 @@ def test_the_published_platform_has_forty_real_poses(tmp_path):
     ],
 )
 def test_families_have_as_many_solutions_as_is_published(motion, count):
-    family, member = find_generic_member(tuple(motion.split()))
+    family, member = make_family(tuple(motion.split())), find_generic_member(tuple(motion.split()))
     assert len(member.roots) == count
     rng = np.random.default_rng(5)
     assert measure_trace(family, member, rng) < 1e-9
@@ -111,6 +114,48 @@ def test_closed_forms_find_the_same(name):
                for p in closed.poses.tolist()]  # fmt: skip
         for origin in np.array(own, float):
             assert np.linalg.norm(origins - origin, axis=1).min() < 1e-6
+
+
+COLUMNS = """\
+name: columns
+source: drawn
+motion: tx ty tz rz ry rx
+legs:
+  kind: column
+  joints: [[a, h], [b, i], [c, j]]
+  radius: 500 mm
+  rod: 450 mm
+  branch: "-"
+  platform: {circle: 150 mm, at: [90 deg, 210 deg, 330 deg]}
+  range: [[-720 deg, 720 deg], [-1 m, 2 m]]
+home: {X: 10 mm, Y: 20 mm, Z: 600 mm, A: 5 deg, B: 4 deg, C: 10 deg}
+"""
+
+
+def test_columns_on_a_ring_close_there(tmp_path):
+    """Every pose's joints lie in the columns' radial planes, a rod's length from the slides; home is one of them."""
+    (tmp_path / "columns.yaml").write_text(COLUMNS)
+    machine = pk.load(tmp_path / "columns.yaml")
+    joints = machine.inverse(machine.home)
+    found = machine.assemblies(joints)
+    assert found.complete == "all paths accounted for"
+    assert np.isfinite(found.radii).all()
+    assert np.abs(found.poses - machine.home).max(1).min() < 1e-8
+    at = np.radians([90.0, 210.0, 330.0])
+    corners = 150.0 * np.column_stack([np.cos(at), np.sin(at), np.zeros(3)])
+    points = found.poses[:, None, :3] + np.einsum("nij,kj->nki", orientation(*found.poses[:, 3:].T), corners)
+    radial = points[..., 0] * np.cos(joints[:3]) + points[..., 1] * np.sin(joints[:3])
+    across = points[..., 1] * np.cos(joints[:3]) - points[..., 0] * np.sin(joints[:3])
+    assert np.abs(across).max() < 1e-8
+    assert np.abs(np.hypot(500.0 - radial, points[..., 2] - joints[3:]) - 450.0).max() < 1e-8
+
+
+def test_a_leg_that_closes_on_another_surface_has_no_method(tmp_path, monkeypatch):
+    (tmp_path / "columns.yaml").write_text(COLUMNS)
+    machine = pk.load(tmp_path / "columns.yaml")
+    monkeypatch.setattr(Column, "closures", lambda leg, p, q: [p[0] * p[1] - q[0], p[0] * p[0] - q[1]])
+    with pytest.raises(pk.NoMethodError, match="no sphere and no plane"):
+        machine.assemblies(machine.inverse(machine.home))
 
 
 def test_boxes_hold_the_root_in_longer_numbers(tmp_path):

@@ -35,8 +35,8 @@ class GenericMember(NamedTuple):
 
 
 @cache
-def find_generic_member(motion: tuple[str, ...]) -> tuple[QuadricFamily, GenericMember]:
-    """Find the family of a motion, and one member of it with all its roots."""
+def find_generic_member(motion: tuple[str, ...]) -> GenericMember:
+    """Find one member of a motion's family with all its roots."""
     family = make_family(motion)
     rng = np.random.default_rng(_SEED)
     root = family.sample.astype(np.complex128)
@@ -51,7 +51,7 @@ def find_generic_member(motion: tuple[str, ...]) -> tuple[QuadricFamily, Generic
         quiet = quiet + 1 if len(more) == len(roots) else 0
         roots = more
         if quiet >= _QUIET_LOOPS and measure_trace(family, GenericMember(system, roots), rng) < _LINEAR:
-            return family, GenericMember(system, roots)
+            return GenericMember(system, roots)
     raise ArithmeticError(f"{' '.join(motion)}: monodromy found {len(roots)} roots, and the trace test fails")
 
 

@@ -6,11 +6,11 @@ from typing import NamedTuple, TypeVar
 
 import numpy as np
 
-from ...arrays import Array, Flags
+from ...arrays import Array
 from ...errors import NoMethodError
 from ...model.traces import Model
 from ..planar_rpr import CONTINUUM
-from .machine_quadrics import MachineQuadrics, make_machine_quadrics
+from .machine_quadrics import MachineQuadrics, find_own_member, make_machine_quadrics
 from .path_tracking import align_members, find_meetings, track_members
 from .quadric_family import Complex
 from .study import compute_frames
@@ -28,14 +28,12 @@ AnyPoints = TypeVar("AnyPoints", Array, Complex)
 class RealRoots(NamedTuple):
     """The real roots of one system, and what became of all paths.
 
-    points : (k, n) of length one
-    double : (k,) where the derivative is singular
+    points : (k, n) of length one, the single ones first
     complex_count, infinite_count : how many paths ended at complex roots, and at infinity
     lost_count : how many could not be followed
     """
 
     points: Array
-    double: Flags
     complex_count: int
     infinite_count: int
     lost_count: int
@@ -46,12 +44,12 @@ def find_real_roots(model: Model, joints: Array) -> RealRoots:
 
     Raises :class:`NoMethodError` for a continuum of roots.
     """
-    quadrics = make_machine_quadrics(model)
+    quadrics, own = make_machine_quadrics(model), find_own_member(model)
     systems = quadrics.make_systems(joints)
-    if not len(quadrics.member.roots):
+    if not len(own.roots):
         raise NoMethodError(f"{model.spec.name}: {CONTINUUM}, or do not close, whatever the joints are")
-    first, last = align_members(quadrics.member.system, systems, len(quadrics.family.fixed))
-    ends = track_members(first, last, quadrics.member.roots)
+    first, last = align_members(own.system, systems, len(quadrics.family.fixed))
+    ends = track_members(first, last, own.roots)
     points, regular = _turn_to_real(ends.points[0]), ends.reached[0] == 1.0
     met = int(find_meetings(ends).sum())
     near_real = np.abs(points.imag).max(1) < _REAL
@@ -62,10 +60,8 @@ def find_real_roots(model: Model, joints: Array) -> RealRoots:
     doubles = _join_same(_turn_to_real(ends_singular[kinds == _DOUBLE]).real)
     if any(_is_in_continuum(systems[0].real, point) for point in doubles):
         raise NoMethodError(f"{model.spec.name}: {CONTINUUM}")
-    real = _join_same(single[turned_real])
     return RealRoots(
-        np.concatenate([real, doubles]),
-        np.arange(len(real) + len(doubles)) >= len(real),
+        np.concatenate([_join_same(single[turned_real]), doubles]),
         int((regular & ~near_real).sum() + (~turned_real).sum() + (kinds == _COMPLEX).sum()),
         int((kinds == _INFINITE).sum()),
         int((kinds == _LOST).sum()) + met,

@@ -7,19 +7,19 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...algebra import Trace, derivative, evaluate_trace
+from ...algebra import Scalar, Term, Trace, derivative, evaluate_trace
 from ...arrays import Array
+from ...errors import NoMethodError
 from ...model.traces import Model
 from .generic_member import GenericMember, find_generic_member
 from .path_tracking import align_members, track_members
-from .quadric_family import Complex, QuadricFamily, draw_complex
+from .quadric_family import Complex, QuadricFamily, draw_complex, make_family
 from .study import make_closure_quadrics
 
 _SEED = 3
 _SAMPLES = 60  # of joints
 _VARIES = 1e-9  # of the greatest singular value: a number that depends on the joints
 _AT_INFINITY = 1e-6  # |e| of a point of length one, in the machine's size
-_FORM = 1e-9  # a closure is a sphere or a plane within this, of its size
 
 
 class MachineQuadrics(NamedTuple):
@@ -27,15 +27,13 @@ class MachineQuadrics(NamedTuple):
 
     matrices : (closures, 5, n, n) of |p|², p's coordinates and 1 for each closure's platform point
     trace, numbers : the five numbers of every closure, from zeros for the point and the joints
-    member : with the machine's own platform and feet and generic complex numbers for what depends on the joints
     """
 
     family: QuadricFamily
     matrices: Array
     trace: Trace
-    numbers: list[object]
+    numbers: list[Scalar]
     size: float
-    member: GenericMember
 
     def make_systems(self, joints: Array) -> Complex:
         """Make the systems (N, n - 1, n, n) of rows of joints (N, joints)."""
@@ -56,32 +54,54 @@ class MachineQuadrics(NamedTuple):
 
 @lru_cache(maxsize=32)
 def make_machine_quadrics(model: Model) -> MachineQuadrics:
-    """Make a machine's quadrics, and track the roots of its family's generic member to its own."""
-    family, generic = find_generic_member(tuple(model.spec.motion))
+    """Make a machine's quadrics.
+
+    Raises :class:`NoMethodError` where a leg's closure puts its platform point on no sphere and no plane.
+    """
+    family = make_family(tuple(model.spec.motion))
     trace, numbers, platforms = _list_closure_numbers(model)
     size = max(model.sizes)
     matrices = family.hull @ np.array([make_closure_quadrics(p / size) for p in platforms]) @ family.hull.T
-    made = MachineQuadrics(family, matrices, trace, numbers, size, generic)
-    system = family.make_member(made.combine(_draw_numbers(made.compute_numbers(_sample_joints(model)))))
+    return MachineQuadrics(family, matrices, trace, numbers, size)
+
+
+@lru_cache(maxsize=32)
+def find_own_member(model: Model) -> GenericMember:
+    """Track the roots of a family's generic member to one of a machine's own.
+
+    It has the machine's platform and feet, and generic complex numbers for what depends on the joints.
+    """
+    quadrics, generic = make_machine_quadrics(model), find_generic_member(tuple(model.spec.motion))
+    family = quadrics.family
+    system = family.make_member(quadrics.combine(_draw_numbers(quadrics.compute_numbers(_sample_joints(model)))))
     first, last = align_members(generic.system, system, len(family.fixed))
     ends = track_members(first, last, generic.roots)
     regular = (ends.reached[0] == 1.0) & (np.linalg.norm(ends.points[0] @ family.hull[:, :4], axis=1) > _AT_INFINITY)
-    return made._replace(member=GenericMember(last[0], ends.points[0][regular]))
+    return GenericMember(last[0], ends.points[0][regular])
 
 
-def _list_closure_numbers(model: Model) -> tuple[Trace, list[object], list[Array]]:
+def _list_closure_numbers(model: Model) -> tuple[Trace, list[Scalar], list[Array]]:
     """List the five numbers of every closure as a trace, and the platform point of each."""
     trace = Trace()
     point, joints = list(trace.inputs(3)), trace.inputs(len(model.drives), 3)
     by_name = {drive.name: q for drive, q in zip(model.drives, joints, strict=True)}
-    numbers: list[object] = []
+    numbers: list[Scalar] = []
     platforms = []
     for leg in model.spec.legs:
         for closure in leg.closures(tuple(point), [by_name[drive.name] for drive in leg.drives]):
             slopes = [derivative(closure, x) for x in point]
+            _check_form(model, slopes, point)
             numbers += [0.5 * derivative(slopes[0], point[0]), *slopes, closure]
             platforms.append(np.array(leg.platform, float))
     return trace, numbers, platforms
+
+
+def _check_form(model: Model, slopes: list[Scalar], point: list[Term]) -> None:
+    """Refuse a closure that is no sphere and no plane: its second derivatives are one number, and zeros."""
+    bends = [[derivative(slope, x) for x in point] for slope in slopes]
+    unequal = [bends[i][j] - (bends[0][0] if i == j else 0.0) for i in range(3) for j in range(3)]
+    if any(isinstance(bend, Term) or bend != 0.0 for bend in unequal):
+        raise NoMethodError(f"{model.spec.name}: a leg's closure is no sphere and no plane")
 
 
 def _sample_joints(model: Model) -> Array:

@@ -8,7 +8,7 @@ motion's own quadrics with as many closures as the motion has freedoms.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from functools import cache
 from typing import NamedTuple
 
 import numpy as np
@@ -21,6 +21,7 @@ from .study import compute_study_points, make_closure_quadrics
 
 Complex = NDArray[np.complex128]
 
+_SEED = 1
 _SAMPLES = 150  # more than the 36 products of eight coordinates
 _WIDE = 1.5  # sampled turns, rad, and translations, in the machine's size
 _INDEPENDENT = 1e-9  # of the greatest singular value
@@ -54,9 +55,10 @@ def draw_complex(rng: np.random.Generator, *shape: int) -> Complex:
     return drawn
 
 
-def make_family(motion: Sequence[str], seed: int = 1) -> QuadricFamily:
+@cache
+def make_family(motion: tuple[str, ...]) -> QuadricFamily:
     """Make the family of a motion, given by its words in order."""
-    rng = np.random.default_rng(seed)
+    rng = np.random.default_rng(_SEED)
     frames = [
         compose_chain([Step(word, value) for word, value in zip(motion, values, strict=True)], ())
         for values in rng.uniform(-_WIDE, _WIDE, (_SAMPLES, len(motion))).tolist()

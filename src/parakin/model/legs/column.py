@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from ...algebra import Scalar, Vec, atan2, sincos, sqrt
 from ..elements import Signs, Size
-from .base import Inverse, Leg, Reach
+from .base import Inverse, Leg, Reach, close_rod
 
 
 @dataclass(frozen=True)
@@ -23,11 +23,9 @@ class Column(Leg):
 
     def closures(self, point: Vec, joints: list[Scalar]) -> list[Scalar]:
         s, c = sincos(joints[0])
-        x, y, z = point
-        out = self.radius - (x * c + y * s)
-        up = z - joints[1]
+        foot = (self.radius * c, self.radius * s, joints[1])
         # The link's revolute joint keeps the platform's joint in the radial plane.
-        return [self.radius * (y * c - x * s), 0.5 * (out * out + up * up - self.rod**2)]
+        return [self.radius * (point[1] * c - point[0] * s), close_rod(foot, point, self.rod**2)]
 
     def assembly_margins(self, point: Vec, joints: list[Scalar]) -> tuple[Scalar, ...]:
         s, c = sincos(joints[0])

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from s_curves import s_curve_time
 from seeded_rows import build_rows, build_smooth, draw_smooth, draw_wild, measure_pieces, plan_rows
 
 from parakin.kernels import batch
@@ -37,12 +38,7 @@ def test_a_straight_motion_takes_the_time_of_its_s_curve(way, rows):
     limits = DriveLimits(np.array([v]), np.array([a]), np.array([j]))
     s = np.linspace(0.0, way, rows + 1)
     profile = plan_rows(build_rows(np.diff(s), s[:, None], np.full(rows, 1e12)), limits)[1]
-    if way >= v * (v / a + a / j):
-        least = way / v + v / a + a / j
-    elif way >= 2.0 * a**3 / j**2:
-        least = a / j + np.sqrt((a / j) ** 2 + 4.0 * way / a)
-    else:
-        least = 4.0 * np.cbrt(way / (2.0 * j))
+    least = s_curve_time(way, v, a, j)
     assert least * (1.0 - 1e-9) < profile.time[-1] < 1.005 * least
 
 

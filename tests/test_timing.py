@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from s_curves import s_curve_time
 
 import parakin as pk
 from parakin.errors import InputError, PoseError
@@ -193,14 +194,7 @@ def test_with_jerks_a_straight_motion_takes_the_time_of_its_s_curve(way, feed):
     v, a, j = feed / 60.0, 2000.0, 50_000.0
     machine = limited(pk.load("linear_delta"), mm=(INF, a, j))
     trajectory = plan_trajectory(posted(machine, [[0, 0, 280], [0, 0, 280 + way]], feed=feed))
-    if v < a**2 / j and way >= 2.0 * v * np.sqrt(v / j):
-        least = way / v + 2.0 * np.sqrt(v / j)
-    elif way >= v * (v / a + a / j):
-        least = way / v + v / a + a / j
-    elif way >= 2.0 * a**3 / j**2:
-        least = a / j + np.sqrt((a / j) ** 2 + 4.0 * way / a)
-    else:
-        least = 4.0 * np.cbrt(way / (2.0 * j))
+    least = s_curve_time(way, v, a, j)
     assert least < trajectory.seconds < 1.005 * least
 
 

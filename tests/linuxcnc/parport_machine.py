@@ -6,16 +6,13 @@ added up from where it stood at the start; home switches trip and absolute encod
 
 from __future__ import annotations
 
-import os
 import re
-import shutil
-import subprocess
 import tempfile
 from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
-from simulation import HERE, MODULES, NOBODY, Simulation
+from simulation import HERE, Simulation, installed
 
 import parakin as pk
 from parakin.controllers.linuxcnc.hardware import equip_machine
@@ -92,16 +89,5 @@ def driven_by_parport(machine, start):
         folder, files = Path(name), pk.make_linuxcnc_configuration(machine, "parport")
         files[f"{machine.name}.hal"] = adapt_hal(machine, files[f"{machine.name}.hal"], start)
         files[f"{machine.name}.ini"] = adapt_ini(files[f"{machine.name}.ini"])
-        for file, text in (files | {"sampler.hal": write_sampler(machine)}).items():
-            (folder / file).write_text(text, encoding="utf-8")
-        shutil.copy(HERE / "operator_ui.py", folder / "ui.py")
-        modules = [Path(file).stem for file in files if file.endswith(".c")]
-        try:
-            for module in modules:
-                subprocess.run(["halcompile", "--install", f"{module}.c"], cwd=folder, check=True, capture_output=True)
-            for path in (folder, *folder.iterdir()):
-                os.chown(path, NOBODY, NOBODY)
+        with installed(folder, files | {"sampler.hal": write_sampler(machine)}, HERE / "operator_ui.py"):
             yield Simulation(machine, folder)
-        finally:
-            for module in modules:
-                (MODULES / f"{module}.so").unlink(missing_ok=True)

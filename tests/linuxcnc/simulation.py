@@ -186,19 +186,26 @@ def simulated(machine, reserve=None, stock=False):
         ini = files[f"{machine.name}.ini"]
         ini = (use_stock_planner(machine, ini) if stock else ini).replace("DISPLAY = axis", "DISPLAY = ./ui.py")
         files[f"{machine.name}.ini"] = ini.replace("[KINS]", "HALFILE = sampler.hal\n\n[KINS]")
-        for file, text in (files | {"sampler.hal": sampler(machine)}).items():
-            (folder / file).write_text(text, encoding="utf-8")
-        shutil.copy(HERE / "ui.py", folder)
-        modules = [Path(file).stem for file in files if file.endswith(".c")]
-        try:
-            for module in modules:
-                subprocess.run(["halcompile", "--install", f"{module}.c"], cwd=folder, check=True, capture_output=True)
-            for path in (folder, *folder.iterdir()):
-                os.chown(path, NOBODY, NOBODY)
+        with installed(folder, files | {"sampler.hal": sampler(machine)}, HERE / "ui.py"):
             yield Simulation(machine, folder)
-        finally:
-            for module in modules:
-                (MODULES / f"{module}.so").unlink(missing_ok=True)
+
+
+@contextmanager
+def installed(folder, files, ui):
+    """Files in a folder that LinuxCNC reads as nobody, and a user interface, ui.py; C modules are installed meanwhile."""
+    for file, text in files.items():
+        (folder / file).write_text(text, encoding="utf-8")
+    shutil.copy(ui, folder / "ui.py")
+    modules = [Path(file).stem for file in files if file.endswith(".c")]
+    try:
+        for module in modules:
+            subprocess.run(["halcompile", "--install", f"{module}.c"], cwd=folder, check=True, capture_output=True)
+        for path in (folder, *folder.iterdir()):
+            os.chown(path, NOBODY, NOBODY)
+        yield
+    finally:
+        for module in modules:
+            (MODULES / f"{module}.so").unlink(missing_ok=True)
 
 
 # What LinuxCNC's own planner gets of the drives' least rates, or it would crawl: it begins and ends every motion that

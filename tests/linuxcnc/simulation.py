@@ -192,7 +192,7 @@ def simulated(machine, reserve=None, stock=False):
 
 @contextmanager
 def installed(folder, files, ui):
-    """Files in a folder that LinuxCNC reads as nobody, and a user interface, ui.py; C modules are installed meanwhile."""
+    """Files that LinuxCNC reads as nobody, and its user interface, in a folder; C modules are installed meanwhile."""
     for file, text in files.items():
         (folder / file).write_text(text, encoding="utf-8")
     shutil.copy(ui, folder / "ui.py")

@@ -24,20 +24,6 @@ FIRST_CORRECTION = 1e-3  # greatest first Newton step after a prediction; the se
 CONVERGED = 1e-11  # a Newton step so small is the last
 TOO_FAR = 1e-6  # greatest second Newton step
 
-LENIENT = 1e-4  # tolerances of a series' last term: usual, and where paths met
-STRICT = 1e-9
-
-
-class PathEnds(NamedTuple):
-    """Where paths ended.
-
-    points : (systems, paths, n) complex, of length one
-    reached : (systems, paths) the last t; 1 at a regular root of the last system
-    """
-
-    points: np.ndarray
-    reached: np.ndarray
-
 
 class _Work(NamedTuple):
     """The working arrays of one path in n coordinates.
@@ -270,6 +256,7 @@ def track_paths(first, last, tolerance, ends, begin, end):
 
     first, last : (systems, n - 1, n, n) symmetric, complex
     tolerance : of the series' last terms
+    ends : ``points`` (systems, paths, n) hold the starts, then the ends; ``reached`` (systems, paths) the last t
     """
     count = ends.points.shape[1]
     work = _allocate_work(first.shape[3])

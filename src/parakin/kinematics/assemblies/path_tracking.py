@@ -2,15 +2,30 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
-from ...arrays import Flags
+from ...arrays import Array, Flags
 from ...kernels.batch import run_in_threads
-from ...kernels.homotopy import LENIENT, STRICT, PathEnds
 from .quadric_family import Complex
 
 _SAME = 1e-8  # 1 - cos of the angle of two points of projective space that are the same
 _PATHS_A_THREAD = 16
+
+LENIENT = 1e-4  # tolerances of the last terms of a path's series: usual, and where paths met
+STRICT = 1e-9
+
+
+class PathEnds(NamedTuple):
+    """Where paths ended.
+
+    points : (systems, paths, n) complex, of length one
+    reached : (systems, paths) the last t; 1 at a regular root of the last system
+    """
+
+    points: Complex
+    reached: Array
 
 
 def align_members(first: Complex, last: Complex, fixed: int) -> tuple[Complex, Complex]:

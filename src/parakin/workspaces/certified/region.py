@@ -29,6 +29,7 @@ RegionKind = Literal["constant", "total", "inclusive", "dexterous"]
 FAR = 1e6  # mm: no machine reaches farther
 _MANY = 20_000  # cells after which a bounded region has left the farthest ones
 _TINY = 1e-3  # mm: cells so small end the search for the extent
+_OF_ALL_COMPONENTS = ("traced_pose", "limit_constraints", "side_constraints", "extent")  # the components do not count
 _SHRINKING = 0.6  # ratio of a cell's edge to that of the round before, while cells are much larger than the region
 
 
@@ -62,12 +63,22 @@ class Region:
         return TracedPose(self.machine, self.free_axes, tuple(self.swept_axes), self.fixed_axes, self.mode)
 
     @cached_property
+    def limit_constraints(self) -> list[Constraint]:
+        """What the limits alone ask of a pose, in every assembly mode."""
+        return self.traced_pose.build_constraints(self.without)
+
+    @cached_property
+    def side_constraints(self) -> tuple[Constraint, Constraint]:
+        """The sign of det A as at home, and the other one."""
+        return make_side_constraints(self.traced_pose)
+
+    @cached_property
     def constraints(self) -> list[Constraint]:
         """What must be ≥ 0 for a pose to be allowed, as functions of position and orientation."""
-        limits = self.traced_pose.build_constraints(self.without)
+        limits = self.limit_constraints
         if self.components == "all":
             return limits
-        side = make_side_constraints(self.traced_pose)[0]
+        side = self.side_constraints[0]
         first_implied = next((i for i, limit in enumerate(limits) if limit.implied), len(limits))
         return [*limits[:first_implied], side, *limits[first_implied:]]
 
@@ -137,16 +148,23 @@ class Region:
 
     def subdivide(self, low: Array, high: Array, more: Sequence[Constraint] = ()) -> Subdivision:
         """Begin the subdivision of a box of positions, (d,) mm, under ``more`` constraints besides."""
+        return self._subdivide_under([*self.constraints, *more], low, high)
+
+    def _subdivide_under(self, constraints: Sequence[Constraint], low: Array, high: Array) -> Subdivision:
         subdivision = TotalSubdivision if self.every_orientation else InclusiveSubdivision
-        return subdivision([*self.constraints, *more], low, high, self.swept_bounds)
+        return subdivision(constraints, low, high, self.swept_bounds)
+
+    def subdivide_all_components(self, low: Array, high: Array) -> Subdivision:
+        """Begin the subdivision of a box of positions, (d,) mm, under the limits alone."""
+        return self._subdivide_under(self.limit_constraints, low, high)
 
     def include_all_components(self) -> Region:
         """Make the same region of all assembly modes, which has the same extent."""
         if self.components == "all":
             return self
         whole = replace(self, components="all")
-        if "extent" in self.__dict__:
-            whole.__dict__["extent"] = self.extent
+        computed = self.__dict__
+        whole.__dict__.update({name: computed[name] for name in _OF_ALL_COMPONENTS if name in computed})
         return whole
 
     @cached_property
@@ -166,7 +184,7 @@ class Region:
         if "extent" in known:
             return self.extent
         budget = budget or Budget()
-        box = _search_extent(self.include_all_components(), budget)
+        box = _search_extent(self, budget)
         if not budget.is_spent():
             known["extent"] = box
         return box
@@ -193,7 +211,7 @@ class Region:
 def _search_extent(region: Region, budget: Budget) -> tuple[Array, Array] | None:
     """Search for a box that holds a region by ever smaller cells; None for a region proved empty."""
     far = np.full(len(region.free_axes), FAR)
-    subdivision = region.subdivide(-far, far)
+    subdivision = region.subdivide_all_components(-far, far)
     before = 2.0 * far
     while True:
         cells = subdivision.collect_cells("gap")

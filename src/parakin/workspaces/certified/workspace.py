@@ -15,7 +15,6 @@ from ...arguments import check_arguments
 from ...arrays import Array, Flags, Progress, split_rows
 from ...budget import SECONDS, Budget
 from ...errors import PoseError
-from .assembly_mode import make_side_constraints
 from .best_orientation import find_best_orientations
 from .region import Region
 from .region_result import RegionResult
@@ -219,7 +218,7 @@ def measure_elsewhere(workspace: Workspace, gap: float = 0.05, seconds: float | 
     extent, everywhere = region.find_extent(budget), region.include_all_components()
     if extent is None:
         return workspace.apart
-    own = make_side_constraints(everywhere.traced_pose)[0]
+    own = everywhere.side_constraints[0]
     other = replace(own, margin=0.0 - own.margin)  # a singularity all over an orientation is no part of home's either
     cells = everywhere.subdivide(*extent, [other]).run(gap, budget=budget)
     beyond = _sum_volumes(cells)

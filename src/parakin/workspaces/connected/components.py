@@ -17,7 +17,6 @@ from ...arguments import RowsLike, check_arguments
 from ...arrays import Array, Progress
 from ...budget import SECONDS, Budget
 from ...errors import PoseError
-from ..certified.assembly_mode import make_side_constraints
 from ..certified.constraints import Constraint
 from ..certified.containment import prove_boxes
 from ..certified.region import Region
@@ -116,7 +115,7 @@ def find_components(
         raise PoseError(f"cell: a size above 0 mm expected, not {cell:g}")
     budget, report = Budget(seconds), progress or (lambda fraction: None)
     region = region.include_all_components()
-    sides = dict(zip((1, -1), make_side_constraints(region.traced_pose), strict=True))
+    sides = dict(zip((1, -1), region.side_constraints, strict=True))
     position, sign = (None, 0) if start is None else _locate_start(region, start, sides)
     outline = find_outline_cells(region, budget.take_fraction(_OUTLINE))
     low, high = outline.low.min(0), (outline.low + outline.size).max(0)

@@ -289,7 +289,19 @@ QUESTIONS = {"begins", "bounds", "changes", "crosses", "ends", "has", "is", "spa
 MATHEMATICS = {"absolute", "atan2", "copysign", "cross", "derivative", "dot", "magnitude", "maximum", "minimum", "norm"}
 MATHEMATICS |= {"njit", "product", "sincos", "sqrt", "sub"}
 # What people type: a command has its function's name, and so do a few words of `pk`.
-COMMANDS = {"assemblies", "atlas", "design", "forward", "inverse", "linuxcnc", "machines", "post", "show", "workspace"}
+COMMANDS = {
+    "assemblies",
+    "atlas",
+    "design",
+    "export",
+    "forward",
+    "inverse",
+    "linuxcnc",
+    "machines",
+    "post",
+    "show",
+    "workspace",
+}
 TYPED = COMMANDS | {"main", "to_display", "workpiece"}
 
 

@@ -17,6 +17,7 @@ from .commands.assemblies import assemblies
 from .commands.atlas import atlas
 from .commands.console import print_remark
 from .commands.design import design
+from .commands.export import export
 from .commands.kinematics import forward, inverse
 from .commands.linuxcnc import linuxcnc
 from .commands.machines import machines, show
@@ -36,7 +37,7 @@ app = App(
     default_parameter=Parameter(negative=""),
     suppress_keyboard_interrupt=False,  # main says so in one line
 )
-for command in (post, inverse, forward, assemblies, linuxcnc, machines, show, workspace, atlas, design):
+for command in (post, inverse, forward, assemblies, linuxcnc, machines, show, workspace, atlas, design, export):
     app.command(command)
 app.register_install_completion_command()
 

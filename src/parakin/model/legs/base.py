@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import ClassVar, Literal
 
 from ...algebra import Scalar, Vec, dot, sub
+from ...errors import NoMethodError
 from ..elements import Drive, Point, Unit
 
 
@@ -24,6 +25,27 @@ class Inverse:
 
     joints: list[Scalar]
     reach: tuple[Reach, ...] = ()
+
+
+@dataclass(frozen=True)
+class Link:
+    """A rigid part of a leg, in the base frame, where it is at one position of the leg's joints.
+
+    joint : what joins it, at ``start``, to the link that carries it: it slides along ``axis``, turns about it, or turns
+        about the point
+    end : where it ends; a carriage ends where it starts
+    drive : which of the leg's drives moves it; None: what the leg's closure leaves it
+    carrier : the link that carries it, by its number in the leg; None: the base
+    meets : what a ball joint holds its end to: the platform's joint, or a link of the leg
+    """
+
+    joint: Literal["slide", "hinge", "ball"]
+    start: Vec
+    end: Vec
+    axis: Vec | None = None
+    drive: int | None = None
+    carrier: int | None = None
+    meets: Literal["platform"] | int | None = None
 
 
 def close_rod(foot: Vec, point: Vec, square: Scalar) -> Scalar:
@@ -64,6 +86,13 @@ class Leg(ABC):
     @abstractmethod
     def struts(self, point: Vec, joints: list[Scalar]) -> list[tuple[Vec, Vec]]:
         """Return both ends of each strut, base frame, the foot's end first; the strut to the platform comes first."""
+
+    def links(self, point: Vec, joints: list[Scalar]) -> list[Link]:
+        """Return the leg's rigid parts where they are for these joints, carriers first.
+
+        Raises :class:`NoMethodError` for a kind that tells none.
+        """
+        raise NoMethodError(f"legs of kind {self.kind} tell nothing of their bodies")
 
     def assembly_margins(self, point: Vec, joints: list[Scalar]) -> tuple[Scalar, ...]:
         """Return margins ≥ 0 where a leg closes as it is built; its closures may be zero elsewhere too."""

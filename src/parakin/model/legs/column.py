@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from ...algebra import Scalar, Vec, atan2, sincos, sqrt
+from ...algebra import ORIGIN, Scalar, Vec, atan2, sincos, sqrt
 from ..elements import Signs, Size
-from .base import Inverse, Leg, Reach, close_rod
+from .base import Inverse, Leg, Link, Reach, close_rod
+
+_UP: Vec = (0.0, 0.0, 1.0)
 
 
 @dataclass(frozen=True)
@@ -41,3 +43,12 @@ class Column(Leg):
     def struts(self, point: Vec, joints: list[Scalar]) -> list[tuple[Vec, Vec]]:
         s, c = sincos(joints[0])
         return [((self.radius * c, self.radius * s, joints[1]), point)]
+
+    def links(self, point: Vec, joints: list[Scalar]) -> list[Link]:
+        s, c = sincos(joints[0])
+        foot = (self.radius * c, self.radius * s, joints[1])
+        return [
+            Link("hinge", ORIGIN, (self.radius * c, self.radius * s, 0.0), _UP, drive=0),
+            Link("slide", foot, foot, _UP, drive=1, carrier=0),
+            Link("hinge", foot, point, (-s, c, 0.0), carrier=1, meets="platform"),
+        ]

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from ...algebra import Scalar, Vec, add, atan2, cross, dot, scale, sincos, sqrt, sub
 from ..elements import Direction, Point, Signs, Size
-from .base import Inverse, Leg, Reach, close_rod
+from .base import Inverse, Leg, Link, Reach, close_rod
 
 
 @dataclass(frozen=True)
@@ -42,6 +42,13 @@ class Crank(Leg):
     def struts(self, point: Vec, joints: list[Scalar]) -> list[tuple[Vec, Vec]]:
         foot = self._foot(joints[0])
         return [(foot, point), (self.pivot, foot)]
+
+    def links(self, point: Vec, joints: list[Scalar]) -> list[Link]:
+        foot = self._foot(joints[0])
+        return [
+            Link("hinge", self.pivot, foot, self.axis, drive=0),
+            Link("ball", foot, point, carrier=0, meets="platform"),
+        ]
 
     def sphere(self, joints: list[Scalar]) -> tuple[Vec, Scalar]:
         return self._foot(joints[0]), self.rod

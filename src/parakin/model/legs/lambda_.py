@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from ...algebra import Scalar, Vec, dot, move_along, scale, sqrt, sub
 from ..elements import Direction, Point, Signs, Size
-from .base import Inverse, Leg, Reach
+from .base import Inverse, Leg, Link, Reach
 
 
 @dataclass(frozen=True)
@@ -64,6 +64,15 @@ class Lambda(Leg):
         rod = scale(sub(point, start), self._lower / self.long)
         hinge = (start[0] + rod[0], start[1] + rod[1], start[2] + rod[2])
         return [(start, point), (move_along(self.foot, self.rail, joints[1]), hinge)]
+
+    def links(self, point: Vec, joints: list[Scalar]) -> list[Link]:
+        (first, _), (second, hinge) = self.struts(point, joints)
+        return [
+            Link("slide", first, first, self.rail, drive=0),
+            Link("ball", first, point, carrier=0, meets="platform"),
+            Link("slide", second, second, self.rail, drive=1),
+            Link("ball", second, hinge, carrier=2, meets=1),
+        ]
 
     def height_and_distance(self, joints: list[Scalar]) -> tuple[Scalar, Scalar]:
         """Compute how far the platform's joint is along the rail and from it, mm: the direct problem in closed form.

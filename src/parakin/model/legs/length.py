@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from ...algebra import Scalar, Vec, norm, sub
+from ...algebra import Scalar, Vec, norm, scale, sub
 from ..elements import Point
-from .base import Inverse, Leg, close_rod
+from .base import Inverse, Leg, Link, close_rod
 
 
 @dataclass(frozen=True)
@@ -24,6 +24,13 @@ class Length(Leg):
 
     def struts(self, point: Vec, joints: list[Scalar]) -> list[tuple[Vec, Vec]]:
         return [(self.foot, point)]
+
+    def links(self, point: Vec, joints: list[Scalar]) -> list[Link]:
+        along = scale(sub(point, self.foot), 1.0 / norm(sub(point, self.foot)))
+        return [
+            Link("ball", self.foot, self.foot),
+            Link("slide", self.foot, point, along, drive=0, carrier=0, meets="platform"),
+        ]
 
     def assembly_margins(self, point: Vec, joints: list[Scalar]) -> tuple[Scalar, ...]:
         return (joints[0],)

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 from ...algebra import Scalar, Vec, dot, move_along, sqrt, sub
 from ..elements import Direction, Point, Signs, Size
-from .base import Inverse, Leg, Reach, close_rod
+from .base import Inverse, Leg, Link, Reach, close_rod
 
 
 @dataclass(frozen=True)
@@ -46,6 +46,13 @@ class Slider(Leg):
 
     def struts(self, point: Vec, joints: list[Scalar]) -> list[tuple[Vec, Vec]]:
         return [(self._foot(joints[0]), point)]
+
+    def links(self, point: Vec, joints: list[Scalar]) -> list[Link]:
+        foot = self._foot(joints[0])
+        return [
+            Link("slide", foot, foot, self.rail, drive=0),
+            Link("ball", foot, point, carrier=0, meets="platform"),
+        ]
 
     def sphere(self, joints: list[Scalar]) -> tuple[Vec, Scalar]:
         return self._foot(joints[0]), self.rod

@@ -1,0 +1,212 @@
+"""A machine as rigid bodies and joints: a tree that reaches from the base to every body, and loops that close it.
+
+It is what simulators of mechanisms take. All stands as at home; lengths are mm, angles rad.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from math import inf
+from typing import Literal
+
+import numpy as np
+
+from ...arrays import Array
+from ...machine import Machine
+from ...model.chain import UNIT, compose_chain
+from ...model.elements import ROTATIONS, Drive, Step
+from ...model.structures import PlatformPlacement
+from .scene import Points, order_polygon
+
+WORLD = "world"
+BASE = "base"
+PLATFORM: str = "platform"
+
+_NEAR = 1e-9  # mm; a body that ends nearer to its joint than this is a ball
+_FREE = 6  # coordinates of a motion that any pose has
+
+
+@dataclass(frozen=True, eq=False)
+class BodyJoint:
+    """What joins a body to the one that carries it.
+
+    axis, pivot : (3,) in the body's frame; it slides along the axis, turns about it, or turns about the pivot
+    value : of the coordinate at home, mm or rad; a ball has none
+    low, high : the range of the coordinate
+    """
+
+    name: str
+    kind: Literal["slide", "hinge", "ball", "free"]
+    axis: Points
+    pivot: Points
+    value: float = 0.0
+    low: float = -inf
+    high: float = inf
+    drive: Drive | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Body:
+    """A rigid body: where its frame is in its carrier's at home, its joints in their order, and what is seen of it.
+
+    bars : (2, 3) each, in the body's frame; both ends at one place are a ball
+    """
+
+    name: str
+    kind: str
+    carrier: str
+    rotation: Array
+    origin: Points
+    joints: tuple[BodyJoint, ...] = ()
+    bars: tuple[Points, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class Loop:
+    """A ball joint that closes a loop: a point of one body stays at a point of another, each in its body's frame."""
+
+    name: str
+    bodies: tuple[str, str]
+    points: tuple[Points, Points]
+
+
+@dataclass(frozen=True, eq=False)
+class Multibody:
+    """A machine's bodies, carriers first, its loops, and the frames between which a pose is measured.
+
+    frames : body, rotation and origin in it, of ``tool`` and ``workpiece``
+    drives : names of the joints that are driven, in the order of the joint vector
+    """
+
+    bodies: tuple[Body, ...]
+    loops: tuple[Loop, ...]
+    frames: dict[str, tuple[str, Array, Points]]
+    drives: tuple[str, ...]
+
+
+def build_multibody(machine: Machine) -> Multibody:
+    """Build a machine's bodies and loops.
+
+    Raises :class:`NoMethodError` where a leg's kind tells nothing of its bodies.
+    """
+    home = machine.home
+    placement = machine.place_platform(home, machine.mode)
+    joints = machine.inverse(home).tolist()
+    structure = machine.structure
+    serial = [float(angle) for angle in placement.serial]
+    count = structure.head_joints
+    head, tool = _build_chain("head", structure.head, serial[:count], PLATFORM)
+    table, workpiece = _build_chain("table", structure.table, serial[count:], WORLD)
+    base = Body(BASE, "base", WORLD, np.array(structure.mount, float), np.array(structure.base, float))
+    platform = _build_platform(machine, placement, head[0].origin if head else tool[2])
+    bodies, loops = [base, platform], []
+    points = machine.place_leg_joints(placement)
+    for number, own in enumerate(machine.group_joints(joints)):
+        leg_bodies, leg_loops = _build_leg(machine, number, np.array(points[number], float), own)
+        bodies += leg_bodies
+        loops += leg_loops
+    frames = {"tool": tool, "workpiece": workpiece}
+    return Multibody((*bodies, *head, *table), tuple(loops), frames, machine.joints)
+
+
+def _build_platform(machine: Machine, placement: PlatformPlacement, head: Points) -> Body:
+    """Build the platform with the joints of its motion, a passive leg's or what the legs leave it.
+
+    head : (3,) where it carries the next body, or the tool's tip, in its frame
+    """
+    structure = machine.structure
+    rotation, origin = np.array(placement.rotation, float), np.array(placement.origin, float)
+    ring = order_polygon(np.array([leg.platform for leg in machine.legs], float))
+    corners = [*ring, ring[0]] if len(ring) != 2 else list(ring)
+    bars = [np.array(pair) for pair in pairwise(corners)]
+    if structure.has_central_leg:
+        bars.append(np.array([np.zeros(3), -rotation.T @ origin]))
+    if np.linalg.norm(head - ring.mean(axis=0)) > _NEAR:
+        bars.append(np.array([ring.mean(axis=0), head]))
+    bounds = {limit.name: limit.bound for limit in machine.limit_definitions}
+    joints = []
+    if len(structure.coordinates) == _FREE:
+        joints.append(BodyJoint(PLATFORM, "free", np.zeros(3), np.zeros(3)))
+        mount, base = np.array(structure.mount, float), np.array(structure.base, float)
+        placed = mount @ rotation, mount @ origin + base
+        return Body(PLATFORM, "platform", WORLD, *placed, tuple(joints), tuple(bars))
+    before: list[Step] = []
+    for word, value in zip(structure.coordinates, placement.coordinates, strict=True):
+        turned, pivot = compose_chain(before, ())
+        turns, place = word in ROTATIONS, np.array(pivot if structure.has_central_leg else placement.origin, float)
+        joints.append(
+            BodyJoint(
+                f"{PLATFORM}_{word}",
+                "hinge" if turns else "slide",
+                rotation.T @ np.array(turned, float) @ np.array(UNIT[word], float),
+                rotation.T @ (place - origin),
+                float(value),
+                bounds.get(f"{word}.min", -inf),
+                bounds.get(f"{word}.max", inf),
+            )
+        )
+        before.append(Step(word, float(value)))
+    return Body(PLATFORM, "platform", BASE, rotation, origin, tuple(joints), tuple(bars))
+
+
+def _build_leg(machine: Machine, number: int, point: Points, joints: list[float]) -> tuple[list[Body], list[Loop]]:
+    """Build a leg's bodies, which stand parallel to the base at home, and the loops that it closes."""
+    leg = machine.legs[number]
+    links = leg.links(tuple(point.tolist()), joints)
+    names = [f"{leg.drives[0].name}_{i}" for i in range(len(links))]
+    starts = [np.array(link.start, float) for link in links]
+    bodies, loops = [], []
+    for name, link, start in zip(names, links, starts, strict=True):
+        end = np.array(link.end, float)
+        carrier = BASE if link.carrier is None else names[link.carrier]
+        origin = start if link.carrier is None else start - starts[link.carrier]
+        axis = np.zeros(3) if link.axis is None else np.array(link.axis, float)
+        if link.drive is None:
+            joint = BodyJoint(name, link.joint, axis, np.zeros(3))
+        else:
+            drive = leg.drives[link.drive]
+            value = joints[link.drive]
+            joint = BodyJoint(drive.name, link.joint, axis, np.zeros(3), value, drive.low, drive.high, drive)
+        is_carriage = np.linalg.norm(end - start) < _NEAR
+        bar = np.array([np.zeros(3), end - start])
+        bodies.append(Body(name, "carriage" if is_carriage else "rod", carrier, np.eye(3), origin, (joint,), (bar,)))
+        if link.meets is None:
+            continue
+        if isinstance(link.meets, int):
+            met, place = names[link.meets], end - starts[link.meets]
+        else:
+            met, place = PLATFORM, np.array(leg.platform, float)
+        loops.append(Loop(f"{name}_{met}", (name, met), (end - start, place)))
+    return bodies, loops
+
+
+def _build_chain(
+    kind: str, steps: Sequence[Step], joints: Sequence[float], carrier: str
+) -> tuple[list[Body], tuple[str, Array, Points]]:
+    """Build a body for every driven step of a serial chain, and the frame at its end."""
+    bodies: list[Body] = []
+    fixed: list[Step] = []
+    values = iter(joints)
+    for step in steps:
+        if step.drive is None:
+            fixed.append(step)
+            continue
+        value = next(values)
+        rotation, origin = _compose([*fixed, Step(step.axis, step.value + step.sign * value)])
+        axis = step.sign * np.array(UNIT[step.axis], float)
+        name = step.drive.name
+        joint = BodyJoint(name, "hinge", axis, np.zeros(3), value, step.drive.low, step.drive.high, step.drive)
+        bodies.append(Body(f"{name}_body", kind, carrier, rotation, origin, (joint,)))
+        carrier, fixed = bodies[-1].name, []
+    rotation, origin = _compose(fixed)
+    ends = [body.origin for body in bodies[1:]] + [origin]
+    spans = [(np.array([np.zeros(3), end]),) for end in ends]
+    seen = [replace(body, bars=bars) for body, bars in zip(bodies, spans, strict=False)]
+    return seen, (carrier, rotation, origin)
+
+
+def _compose(steps: Sequence[Step]) -> tuple[Array, Points]:
+    rotation, origin = compose_chain(steps, ())
+    return np.array(rotation, float), np.array(origin, float)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import assemblies
 import feed
 import kinematics
 import linuxcnc
@@ -12,5 +13,7 @@ import trajectory
 import workspace
 
 if __name__ == "__main__":
-    for benchmark in (kinematics, many_direct_problems, post, startup, workspace, feed, trajectory, linuxcnc):
+    for benchmark in (
+        kinematics, many_direct_problems, assemblies, post, startup, workspace, feed, trajectory, linuxcnc,
+    ):  # fmt: skip
         print(benchmark.main(), flush=True)

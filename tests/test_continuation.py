@@ -12,9 +12,16 @@ import pytest
 from independent import orientation
 
 import parakin as pk
-from parakin.kinematics.assemblies.generic_member import find_generic_member, measure_trace
+from parakin.kinematics.assemblies import generic_member
+from parakin.kinematics.assemblies.generic_member import (
+    find_generic_member,
+    measure_trace,
+    read_stored_member,
+    search_generic_member,
+)
 from parakin.kinematics.assemblies.homotopy_roots import find_coordinates, find_real_roots
 from parakin.kinematics.assemblies.machine_quadrics import make_machine_quadrics
+from parakin.kinematics.assemblies.path_tracking import PathEnds, find_meetings
 from parakin.kinematics.assemblies.quadric_family import make_family
 from parakin.kinematics.assemblies.root_boxes import prove_roots
 from parakin.model.legs.column import Column
@@ -75,12 +82,49 @@ def test_the_published_platform_has_forty_real_poses(tmp_path):
         ("tx ty tz rz ry rx", 40),  # Ronga and Vust, 1992
     ],
 )
-def test_families_have_as_many_solutions_as_is_published(motion, count):
-    family, member = make_family(tuple(motion.split())), find_generic_member(tuple(motion.split()))
+@pytest.mark.parametrize("find", [find_generic_member, search_generic_member])
+def test_families_have_as_many_solutions_as_is_published(motion, count, find):
+    family, member = make_family(tuple(motion.split())), find(tuple(motion.split()))
     assert len(member.roots) == count
     rng = np.random.default_rng(5)
     assert measure_trace(family, member, rng) < 1e-9
     assert measure_trace(family, member._replace(roots=member.roots[1:]), rng) > 1e-4
+
+
+def test_a_stored_member_is_taken_only_for_its_own_family(monkeypatch):
+    free = ("tx", "ty", "tz", "rz", "ry", "rx")
+    family, member = make_family(free), read_stored_member(free)
+    values = np.einsum("ki,rij,kj->kr", member.roots, member.system, member.roots)
+    assert np.abs(values).max() < 1e-12
+    turned = family._replace(fixed=np.roll(family.fixed, 1, axis=2))
+    monkeypatch.setattr(generic_member, "make_family", lambda motion: turned)
+    assert read_stored_member(free) is None
+    assert read_stored_member(("tx", "tz", "rx")) is None
+
+
+def test_roots_close_to_a_singularity_are_told_apart():
+    """Two points a ten thousandth of a radian apart are two roots; to the eleventh figure the same they are one."""
+    rng = np.random.default_rng(3)
+    point, aside = np.linalg.qr(rng.normal(size=(8, 2)))[0].T.astype(complex)
+    for angle, meet in ((1e-4, False), (1e-11, True)):
+        other = 1j * (np.cos(angle) * point + np.sin(angle) * aside)
+        ends = PathEnds(np.stack([point, other])[None], np.ones((1, 2)))
+        assert find_meetings(ends).tolist() == [[meet, meet]]
+
+
+def test_a_batch_has_the_answers_of_its_rows():
+    machine = pk.load("hexapod")
+    joints = machine.inverse(machine.home) + np.random.default_rng(4).uniform(-20.0, 20.0, (5, 6))
+    joints[3] = np.nan
+    answers = machine.list_assemblies(joints)
+    assert [len(answer) for answer in answers] == [len(machine.assemblies(row)) for row in joints]
+    for row, answer in zip(joints, answers, strict=True):
+        np.testing.assert_array_equal(answer.poses, machine.assemblies(row).poses)
+        if len(answer):
+            np.testing.assert_allclose(machine.inverse(answer.poses), np.tile(row, (len(answer), 1)), atol=1e-6)
+    assert machine.list_assemblies(np.empty((0, 6))) == []
+    with pytest.raises(pk.PoseError, match="rows of shape"):
+        machine.list_assemblies(joints[0])
 
 
 def test_general_platforms_have_forty_and_the_true_pose_is_among_them(tmp_path):
@@ -104,7 +148,7 @@ def test_closed_forms_find_the_same(name):
         joints = machine.inverse(pose)
         if not np.isfinite(joints).all():
             continue
-        roots = find_real_roots(machine.model, joints[None])
+        roots = find_real_roots(machine.model, joints[None])[0]
         assert roots.lost_count == 0
         frames = [machine.model.structure.frame(c) for c in find_coordinates(machine.model, roots.points).tolist()]
         origins = np.array([np.asarray(origin, float) for _, origin in frames])
@@ -161,7 +205,7 @@ def test_a_leg_that_closes_on_another_surface_has_no_method(tmp_path, monkeypatc
 def test_boxes_hold_the_root_in_longer_numbers(tmp_path):
     machine = platform(tmp_path, FEET, CORNERS)
     quadrics = make_machine_quadrics(machine.model)
-    roots = find_real_roots(machine.model, np.array([LENGTHS])).points
+    roots = find_real_roots(machine.model, np.array([LENGTHS]))[0].points
     system = quadrics.make_systems(np.array([LENGTHS]))[0].real
     widths = prove_roots(np.broadcast_to(system, (len(roots), *system.shape)), roots)
     assert np.isfinite(widths).all()

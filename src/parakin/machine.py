@@ -178,7 +178,14 @@ class Machine(MachineProperties):
         rows, lead = self.rows(joints, self.joints, "joints")
         if lead != ():
             raise PoseError(f"joints: one vector ({len(self.joints)},) expected, not {(*lead, len(self.joints))}")
-        return find_assemblies(self.model, rows)
+        return self.list_assemblies(rows)[0]
+
+    def list_assemblies(self, joints: RowsLike) -> list[Assemblies]:
+        """Find every real pose of each row of joints (N, joints), on all cores; see :meth:`assemblies`."""
+        rows, lead = self.rows(joints, self.joints, "joints")
+        if len(lead) != 1:
+            raise PoseError(f"joints: rows of shape (N, {len(self.joints)}) expected, not {(*lead, len(self.joints))}")
+        return find_assemblies(self.model, rows) if len(rows) else []
 
     def sides(self, poses: RowsLike) -> Array:
         """Compute the determinant whose sign tells the assembly mode, at rows of poses (n, axes): (n,)."""

@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ...arrays import Array, Flags
+from ...arrays import Array, Flags, Indices
 from ...model.traces import Model
 from ..assembly_side import bound_determinant, find_angle_signs
 from ..closure_roots import compute_closure_tolerance, compute_poses, find_roots
 from ..inverse import SINGULAR
 from ..limit_margins import find_broken_limits
 from ..wrist.pole_thresholds import is_upright
-from .closed_forms import LONGEST, find_closed_form, solve_closed_form
+from .closed_forms import LONGEST, ClosedForm, find_closed_form, solve_closed_form
 from .homotopy_roots import find_coordinates, find_real_roots
 from .machine_quadrics import make_machine_quadrics
 from .root_boxes import prove_roots
@@ -59,8 +60,8 @@ class Assemblies:
         return f"<{len(self)} assemblies, {self.complete}>"
 
 
-def find_assemblies(model: Model, joints: Array) -> Assemblies:
-    """Find every real pose of one row of joints (1, joints).
+def find_assemblies(model: Model, joints: Array) -> list[Assemblies]:
+    """Find every real pose of each row of joints (N, joints).
 
     Machines that only translate on three (two) rods have two: the common points of spheres (circles). Three rods in a
     plane have up to six, three Lambda legs on parallel shafts up to twelve. All others are systems of quadrics in
@@ -69,24 +70,42 @@ def find_assemblies(model: Model, joints: Array) -> Assemblies:
     Raises :class:`NoMethodError` for a continuum of poses.
     """
     method = find_closed_form(model)
-    if not (np.abs(joints) < LONGEST).all():
-        return _describe(model, joints, np.empty((0, len(model.structure.coordinates))), CLOSED_FORM)
+    near = np.asarray((np.abs(joints) < LONGEST).all(1))
     if method is not None:
-        return _describe(model, joints, solve_closed_form(model, method, joints), CLOSED_FORM)
-    roots = find_real_roots(model, joints)
-    complete = NOT_COMPLETE if roots.lost_count else ALL_PATHS
-    return replace(
-        _describe(model, joints, find_coordinates(model, roots.points), complete),
-        complex_count=roots.complex_count,
-        infinite_count=roots.infinite_count,
-        lost_count=roots.lost_count,
+        return _describe(model, joints, [_solve_near(model, method, row[None]) for row in joints], CLOSED_FORM)
+    answers = _describe(model, joints, [_make_empty_coordinates(model)] * len(joints), CLOSED_FORM)
+    rows = np.flatnonzero(near)
+    roots = find_real_roots(model, joints[rows])
+    described = _describe(model, joints[rows], [find_coordinates(model, own.points) for own in roots], ALL_PATHS)
+    for row, own, answer in zip(rows.tolist(), roots, described, strict=True):
+        answers[row] = replace(
+            answer,
+            complete=NOT_COMPLETE if own.lost_count else answer.complete,
+            complex_count=own.complex_count,
+            infinite_count=own.infinite_count,
+            lost_count=own.lost_count,
+        )
+    return answers
+
+
+def _make_empty_coordinates(model: Model) -> Array:
+    return np.empty((0, len(model.structure.coordinates)))
+
+
+def _solve_near(model: Model, method: ClosedForm, joints: Array) -> Array:
+    """Solve one row of joints (1, joints) in closed form; farther than any machine reaches there is no pose."""
+    if not (np.abs(joints) < LONGEST).all():
+        return _make_empty_coordinates(model)
+    return solve_closed_form(model, method, joints)
+
+
+def _describe(model: Model, joints: Array, coordinates: Sequence[Array], complete: str) -> list[Assemblies]:
+    """Polish coordinates (k, m) of every row's solutions, and tell all that is known of them."""
+    owners = np.repeat(np.arange(len(joints)), [len(own) for own in coordinates])
+    given = np.ascontiguousarray(joints[owners])
+    roots = find_roots(
+        model, np.ascontiguousarray(np.concatenate([_make_empty_coordinates(model), *coordinates])), given, poses=False
     )
-
-
-def _describe(model: Model, joints: Array, coordinates: Array, complete: str) -> Assemblies:
-    """Polish coordinates (k, m) of solutions, and tell all that is known of them."""
-    given = np.ascontiguousarray(np.broadcast_to(joints, (len(coordinates), joints.shape[1])))
-    roots = find_roots(model, np.ascontiguousarray(coordinates), given, poses=False)
     residuals = roots.residual
     closed = residuals <= compute_closure_tolerance(model)
     poses = compute_poses(model, np.ascontiguousarray(roots.rows), given)
@@ -95,17 +114,28 @@ def _describe(model: Model, joints: Array, coordinates: Array, complete: str) ->
     if direction is not None:
         poses[is_upright(poses[:, direction.b]), direction.c] = 0.0
     kept = np.flatnonzero(closed & has_pose)
-    kept = kept[np.lexsort(poses[kept].T[::-1])]
-    poses, given = np.ascontiguousarray(poses[kept]), given[: len(kept)]
-    return Assemblies(
-        poses,
-        residuals[kept],
-        _prove_poses(model, joints, roots.rows[kept]),
-        _find_signs(model, poses, given),
-        find_broken_limits(model, poses, given, model.mode) == 0,
-        complete if closed.all() or complete == CLOSED_FORM else NOT_COMPLETE,
-        untold_count=int((closed & ~has_pose).sum()),
-    )
+    kept = kept[np.lexsort((*poses[kept].T[::-1], owners[kept]))]
+    poses, given = np.ascontiguousarray(poses[kept]), np.ascontiguousarray(given[kept])
+    radii = _prove_poses(model, joints, roots.rows[kept], owners[kept])
+    sides = _find_signs(model, poses, given)
+    within_limits = find_broken_limits(model, poses, given, model.mode) == 0
+    open_rows = np.unique(owners[~closed])
+    answers = []
+    for row in range(len(joints)):
+        of_row = np.flatnonzero(owners[kept] == row)
+        known = complete == CLOSED_FORM or row not in open_rows
+        answers.append(
+            Assemblies(
+                poses[of_row],
+                residuals[kept][of_row],
+                radii[of_row],
+                sides[of_row],
+                within_limits[of_row],
+                complete if known else NOT_COMPLETE,
+                untold_count=int((closed & ~has_pose & (owners == row)).sum()),
+            )
+        )
+    return answers
 
 
 def _find_signs(model: Model, poses: Array, joints: Array) -> Array:
@@ -115,8 +145,11 @@ def _find_signs(model: Model, poses: Array, joints: Array) -> Array:
     return np.sign(determinants * find_angle_signs(model, poses))
 
 
-def _prove_poses(model: Model, joints: Array, coordinates: Array) -> Array:
-    """Bound how far poses of the motion's coordinates (k, m) are from exact ones, as :attr:`Assemblies.radii`."""
+def _prove_poses(model: Model, joints: Array, coordinates: Array, owners: Indices) -> Array:
+    """Bound how far poses of the motion's coordinates (k, m) are from exact ones, as :attr:`Assemblies.radii`.
+
+    owners : (k,) the row of joints (N, joints) of each
+    """
     quadrics = make_machine_quadrics(model)
     if not len(coordinates):
         return np.empty((0, 2))
@@ -127,8 +160,7 @@ def _prove_poses(model: Model, joints: Array, coordinates: Array) -> Array:
     rotations, origins = entries[:, :9].reshape(-1, 3, 3), entries[:, 9:12]
     points = compute_study_points(rotations, origins / quadrics.size) @ quadrics.family.hull.T
     points /= np.linalg.norm(points, axis=1, keepdims=True)
-    system = quadrics.make_systems(joints)[0].real
-    width = prove_roots(np.broadcast_to(system, (len(points), *system.shape)), points) * np.sqrt(points.shape[1])
+    width = prove_roots(quadrics.make_systems(joints).real[owners], points) * np.sqrt(points.shape[1])
     x = points @ quadrics.family.hull
     e, g = np.linalg.norm(x[:, :4], axis=1), np.linalg.norm(x[:, 4:], axis=1)
     with np.errstate(invalid="ignore"):

@@ -3,11 +3,14 @@
 Along a loop in the space of members the roots of one come back in another order, so that from one root all others of an
 irreducible family are reached. They are all there when the sum of a closure over them depends linearly on where the
 last closure's parallel slices lie (Leykin, Rodriguez and Sottile, Trace test, 2018).
+
+The members of the shipped machines' motions are stored, in Study's coordinates, by ``scripts/generic_members.py``.
 """
 
 from __future__ import annotations
 
 from functools import cache
+from importlib.resources import files
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -21,6 +24,8 @@ _QUIET_LOOPS = 4  # without a new root, before the trace test
 _MOST_LOOPS = 60
 _LINEAR = 1e-8  # of the trace's size
 _SAME = 1e-8
+_STORED = "generic_members.npz"
+_ROUNDING = 1e-10  # by how much a stored member may differ from one of the family computed here
 
 
 class GenericMember(NamedTuple):
@@ -36,7 +41,35 @@ class GenericMember(NamedTuple):
 
 @cache
 def find_generic_member(motion: tuple[str, ...]) -> GenericMember:
-    """Find one member of a motion's family with all its roots."""
+    """Find one member of a motion's family with all its roots, the stored one or by monodromy."""
+    return read_stored_member(motion) or search_generic_member(motion)
+
+
+def read_stored_member(motion: tuple[str, ...]) -> GenericMember | None:
+    """Read the stored member of a motion's family; None where there is none, or none of the family made here.
+
+    A motion's quadrics are combined from a basis that other versions of LAPACK choose otherwise.
+    """
+    family, name = make_family(motion), "_".join(motion)
+    with (files(__package__) / _STORED).open("rb") as file, np.load(file) as stored:
+        if name not in stored:
+            return None
+        quadrics, points = stored[name], stored[f"{name}_roots"]
+    system, roots = family.hull @ quadrics @ family.hull.T, points @ family.hull.T
+    count, n = len(family.fixed), len(family.hull)
+    fixed, closures = system[:count].reshape(-1, n * n), system[count:].reshape(-1, n * n)
+    own, basis = family.fixed.reshape(-1, n * n), family.closures.reshape(-1, n * n)
+    aligned = np.abs((fixed.conj() * own).sum(1))
+    differs = aligned < (1.0 - _ROUNDING) * np.linalg.norm(fixed, axis=1) * np.linalg.norm(own, axis=1)
+    outside = np.abs(closures - closures @ basis.conj().T @ basis).max()
+    if differs.any() or outside > _ROUNDING:
+        return None
+    system[:count] = family.fixed
+    return GenericMember(np.ascontiguousarray(system), np.ascontiguousarray(roots))
+
+
+def search_generic_member(motion: tuple[str, ...]) -> GenericMember:
+    """Find one member of a motion's family with all its roots by monodromy."""
     family = make_family(motion)
     rng = np.random.default_rng(_SEED)
     root = family.sample.astype(np.complex128)

@@ -6,19 +6,21 @@ from typing import NamedTuple, TypeVar
 
 import numpy as np
 
-from ...arrays import Array
+from ...arrays import Array, Flags, split_rows
 from ...errors import NoMethodError
 from ...model.traces import Model
 from ..planar_rpr import CONTINUUM
 from .machine_quadrics import MachineQuadrics, find_own_member, make_machine_quadrics
-from .path_tracking import align_members, find_meetings, track_members
+from .path_tracking import align_members, find_meetings, measure_angles, track_members
 from .quadric_family import Complex
 from .study import compute_frames
 
 _AT_INFINITY = 1e-5  # |e·e| of a singular end: its translation is infinite
 _REAL = 1e-4  # imaginary part, for a point of length one, from which Newton's method may find a real root
 _CLOSED = 1e-12  # of a quadric at a point of length one: it is a root
-_STRIDE, _SAME_PLACE = 1e-3, 1e-5  # along the null direction of a double root, and what is next to it
+_STRIDE = 1e-3  # along the null direction of a double root
+_SAME_SINGLE, _SAME_DOUBLE = 1e-7, 1e-5  # rad: between points of the same root, regular and double
+_SYSTEMS_AT_ONCE = 256
 _STEPS = 60  # of Newton's method at a double root, where each halves the distance
 
 
@@ -39,29 +41,38 @@ class RealRoots(NamedTuple):
     lost_count: int
 
 
-def find_real_roots(model: Model, joints: Array) -> RealRoots:
-    """Find all real roots of a machine's quadrics for one row of joints (1, joints).
+def find_real_roots(model: Model, joints: Array) -> list[RealRoots]:
+    """Find all real roots of a machine's quadrics for each row of joints (N, joints).
 
     Raises :class:`NoMethodError` for a continuum of roots.
     """
     quadrics, own = make_machine_quadrics(model), find_own_member(model)
-    systems = quadrics.make_systems(joints)
     if not len(own.roots):
         raise NoMethodError(f"{model.spec.name}: {CONTINUUM}, or do not close, whatever the joints are")
-    first, last = align_members(own.system, systems, len(quadrics.family.fixed))
-    ends = track_members(first, last, own.roots)
-    points, regular = _turn_to_real(ends.points[0]), ends.reached[0] == 1.0
-    met = int(find_meetings(ends).sum())
+    roots = []
+    for block in split_rows(len(joints), _SYSTEMS_AT_ONCE):
+        systems = quadrics.make_systems(joints[block])
+        first, last = align_members(own.system, systems, len(quadrics.family.fixed))
+        ends = track_members(first, last, own.roots)
+        met = find_meetings(ends).sum(1)
+        for row, system in enumerate(systems):
+            roots.append(_sort_ends(model, system, ends.points[row], ends.reached[row] == 1.0, int(met[row])))
+    return roots
+
+
+def _sort_ends(model: Model, system: Complex, points: Complex, regular: Flags, met: int) -> RealRoots:
+    """Sort the ends of all paths (paths, n) of one system, of which ``met`` ended where another one did."""
+    points = _turn_to_real(points)
     near_real = np.abs(points.imag).max(1) < _REAL
-    single = _polish_points(systems[0].real, points[regular & near_real].real, 4)
-    turned_real = _measure_closures(systems[0].real, single) < _CLOSED
-    ends_singular = _refine_singular(systems[0], points[~regular])
-    kinds = _sort_singular(quadrics, systems[0], ends_singular)
-    doubles = _join_same(_turn_to_real(ends_singular[kinds == _DOUBLE]).real)
-    if any(_is_in_continuum(systems[0].real, point) for point in doubles):
+    single = _polish_points(system.real, points[regular & near_real].real, 4)
+    turned_real = _measure_closures(system.real, single) < _CLOSED
+    ends_singular = _refine_singular(system, points[~regular])
+    kinds = _sort_singular(make_machine_quadrics(model), system, ends_singular)
+    doubles = _join_same(_turn_to_real(ends_singular[kinds == _DOUBLE]).real, _SAME_DOUBLE)
+    if any(_is_in_continuum(system.real, point) for point in doubles):
         raise NoMethodError(f"{model.spec.name}: {CONTINUUM}")
     return RealRoots(
-        np.concatenate([_join_same(single[turned_real]), doubles]),
+        np.concatenate([_join_same(single[turned_real], _SAME_SINGLE), doubles]),
         int((regular & ~near_real).sum() + (~turned_real).sum() + (kinds == _COMPLEX).sum()),
         int((kinds == _INFINITE).sum()),
         int((kinds == _LOST).sum()) + met,
@@ -132,10 +143,13 @@ def _sort_singular(quadrics: MachineQuadrics, system: Complex, points: Complex) 
     return kinds
 
 
-def _join_same(points: Array) -> Array:
-    """Keep one of points that are the same but for their sign."""
-    same = np.abs(points @ points.T) > 1.0 - _SAME_PLACE**2
-    return points[~np.tril(same, -1).any(1)]
+def _join_same(points: Array, angle: float) -> Array:
+    """Keep one of points (k, n) that are the same but for their sign, within an angle, rad."""
+    one, other = np.tril_indices(len(points), -1)
+    same = measure_angles(points[one], points[other]) < angle
+    kept = np.ones(len(points), np.bool_)
+    kept[one[same]] = False
+    return points[kept]
 
 
 def _is_in_continuum(system: Array, point: Array) -> bool:

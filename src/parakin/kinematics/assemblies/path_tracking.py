@@ -10,7 +10,8 @@ from ...arrays import Array, Flags
 from ...kernels.batch import run_in_threads
 from .quadric_family import Complex
 
-_SAME = 1e-8  # 1 - cos of the angle of two points of projective space that are the same
+_CLOSE = 1e-8  # 1 - cos of the angle of two points of projective space that may be the same
+_SAME = 1e-7  # rad: a regular root is known better than this, and two that are farther apart are two
 _PATHS_A_THREAD = 16
 
 LENIENT = 1e-4  # tolerances of the last terms of a path's series: usual, and where paths met
@@ -70,7 +71,17 @@ def track_members(first: Complex, last: Complex, starts: Complex, tolerance: flo
 
 def find_meetings(ends: PathEnds) -> Flags:
     """Find paths (systems, paths) that end in the same regular root as another one of their system."""
-    products = np.abs(ends.points.conj() @ ends.points.swapaxes(1, 2)) >= 1.0 - _SAME
+    close = np.abs(ends.points.conj() @ ends.points.swapaxes(1, 2)) >= 1.0 - _CLOSE
     regular = ends.reached == 1.0
-    products &= regular[:, :, None] & regular[:, None, :]
-    return np.asarray(products.sum(2) > 1)
+    close &= regular[:, :, None] & regular[:, None, :]
+    system, one, other = np.nonzero(np.triu(close, 1))
+    same = measure_angles(ends.points[system, one], ends.points[system, other]) < _SAME
+    meetings = np.zeros(regular.shape, np.bool_)
+    meetings[system[same], one[same]] = meetings[system[same], other[same]] = True
+    return meetings
+
+
+def measure_angles(points: Array | Complex, others: Array | Complex) -> Array:
+    """Measure small angles between points (k, n) of length one and others, whatever their phases: (k,) rad."""
+    along = (others.conj() * points).sum(1, keepdims=True)
+    return np.asarray(np.linalg.norm(points - along * others, axis=1))

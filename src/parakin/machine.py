@@ -19,6 +19,7 @@ from .kinematics.follow import follow_path, make_continuous
 from .kinematics.forward import solve_forward
 from .kinematics.inverse import solve_inverse
 from .kinematics.limit_margins import compute_margins, find_broken_limits
+from .kinematics.path_modes import PathMode, find_path_modes
 from .kinematics.solution import Solution
 from .kinematics.tapes import KinematicTapes, collect_tapes
 from .kinematics.wrist.pole_crossing import flip_mode
@@ -121,6 +122,17 @@ class Machine(MachineProperties):
             raise PoseError(f"poses: a path of shape (N, {len(self.axes)}) expected")
         check_range("free_below", free_below, 0.0, 0.5 * np.pi, "rad")
         return follow_path(self.model, rows, self.checked_mode(mode), float(free_below))
+
+    def find_path_modes(self, poses: RowsLike) -> list[PathMode]:
+        """Find which working modes carry a path (N, axes) whole, and whether it stays in its assembly mode.
+
+        One :class:`~.kinematics.path_modes.PathMode` for each of :attr:`modes`. What lies between the poses is not
+        looked at: :func:`parakin.prepare` does that in one mode.
+        """
+        rows, lead = self.rows(poses, self.axes, "poses")
+        if len(lead) != 1 or not len(rows):
+            raise PoseError(f"poses: a path of shape (N, {len(self.axes)}) expected")
+        return find_path_modes(self.model, rows, self.modes)
 
     def make_continuous(self, poses: Array, joints: Array, mode: str, free_below: float = EXACT) -> None:
         """Make joints (n, joints) continuous that :meth:`inverse` gives along a path, as :meth:`follow`; in place."""

@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from shipped import REPRESENTATIVES
 
 import parakin as pk
 from parakin.kinematics.wrist.pole_thresholds import PRINTED
@@ -15,7 +16,7 @@ from parakin.toolpath.posting.posted import Posted
 
 TURN = 2.0 * math.pi
 SEEN = 1e-5  # a margin this far below 0 in a dense sample is an offence
-everyone = pytest.mark.parametrize("name", sorted(pk.machines()))
+everyone = pytest.mark.parametrize("name", REPRESENTATIVES)
 
 
 def posted_on(machine, poses, mode=None, turns=None):
@@ -140,7 +141,7 @@ REACH = {"X": 130.0, "Y": 130.0, "Z": 90.0, "A": 0.25, "B": 0.25, "C": 0.9}
 def drawn(name, count, seed=0):
     """A machine whose joints have ranges that motions bulge out of, and random poses, long ways apart."""
     machine = pk.load(name)
-    rng = np.random.default_rng([seed, sorted(pk.machines()).index(name)])
+    rng = np.random.default_rng([seed, REPRESENTATIVES.index(name)])
     size = 0.4 if name.startswith("ortho") else 1.0
     half = np.array([REACH[axis] * (size if axis in "XYZ" else 1.0) for axis in machine.axes])
     poses = machine.home + rng.uniform(-1.0, 1.0, (count, len(half))) * half

@@ -144,7 +144,7 @@ def test_nobody_above_the_machine_asks_its_model(module):
     assert not asked
 
 
-DESCRIBED = {"title", "source"}  # what a machine's description says in words
+DESCRIBED = {"family", "title", "source"}  # what a machine's description says in words
 
 
 @pytest.mark.parametrize("module", [m for m in ABOVE if m != "export.json.machine"])  # that one writes the description

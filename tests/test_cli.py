@@ -7,6 +7,7 @@ import subprocess
 import sys
 
 import pytest
+from shipped import REPRESENTATIVES
 
 import parakin as pk
 from parakin.cli import main
@@ -97,7 +98,7 @@ def test_post_workpiece_and_sizes(part, out):
     assert main([*arguments, "--workpiece=-10,0,0,0,0,90", "--mode", "-"]) == 0
 
 
-@pytest.mark.parametrize("name", pk.machines())
+@pytest.mark.parametrize("name", REPRESENTATIVES)
 def test_post_on_every_machine(name, part, out, capsys):
     code = main(["post", str(part), "-m", name, "-o", str(out)])
     assert code in (0, 3)
@@ -191,6 +192,11 @@ def test_machines(capsys):
     assert main(["machines"]) == 0
     said = capsys.readouterr().out
     assert all(name in said for name in pk.machines())
+    families = [paragraph.splitlines() for paragraph in said.strip().split("\n\n")]
+    assert [lines[0] for lines in families] == sorted({pk.load(name).spec.family for name in pk.machines()})
+    of = {line.split()[0]: lines[0] for lines in families for line in lines[2:]}
+    assert of["hexaglide"] == of["linear_delta"] == "rods on straight slides"
+    assert of["tricept"] == of["g500"] == "struts of variable length on fixed feet"
     assert main(["machines", "--json"]) == 0
     assert [machine["name"] for machine in json.loads(capsys.readouterr().out)["machines"]] == pk.machines()
 
@@ -368,4 +374,5 @@ def test_machine_names_are_completed():
 
     from parakin.cli import app
 
-    assert [found.value for found in compute_completions(app, ["show", "tri"])] == ["tricept"]
+    names = [found.value for found in compute_completions(app, ["show", "tri"])]
+    assert names == ["tricept", "tricept_805", "triglide"]

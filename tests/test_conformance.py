@@ -8,22 +8,47 @@ from drawn import FAMILIES, draw, machine_of, text_of
 from geometry import Description
 from hypothesis import event, given
 from hypothesis import strategies as st
-from independent import INVERSES
+from independent import INVERSES as PAPERS
+from independent_field import INVERSES as FIELD
+from shipped import NAMES, REPRESENTATIVES, list_features
 
 import parakin as pk
 from parakin.model.legs import KINDS
 
-NAMES = pk.machines()
+INVERSES = PAPERS | FIELD
 SPREAD = {  # about home, mm and rad: the allowed workspace and a margin beyond
+    "cmw_300": [250, 250, 250, 0.5, 0.5, 0.5],
+    "eclipse": [120, 110, 300, 0.35, 0.35, 0.5],
+    "five_bar": [330, 230],
+    "five_bar_slides": [500, 200],
+    "g500": [250, 250, 250, 0.5, 0.5, 0.5],
+    "george_v": [400, 400, 400, 1.9, 3.3],
     "hbg80_2d": [230, 230],
     "hbg80_3d": [230, 230, 230],
+    "hexaglide": [300, 140, 160, 0.5, 0.35, 0.5],
+    "hexam": [250, 250, 250, 0.5, 0.5, 0.5],
     "hexapod": [300, 300, 250, 0.6, 0.6, 0.6],
     "lambda6": [350, 350, 400, 0.5, 0.5, 0.6],
+    "linapod3": [350, 350, 400],
+    "linapod6": [150, 150, 300, 0.3, 0.3, 0.4],
     "linear_delta": [260, 260, 300],
+    "mikromat_6x": [250, 250, 250, 0.4, 0.4, 0.4],
+    "okuma_hexapod": [300, 300, 250, 0.6, 0.6, 0.6],
     "orthoglide": [160, 160, 160],
     "orthoglide5_head": [200, 200, 200, 1.9, 3.3],
     "orthoglide5_table": [220, 220, 220, 1.7, 3.3],
+    "prr3": [130, 130, 0.45],
+    "quickstep": [280, 300, 350],
+    "rotary_delta": [200, 200, 200],
+    "rpr3": [200, 200, 0.75],
+    "rrr3": [200, 200, 0.45],
+    "rus6": [180, 180, 150, 0.4, 0.4, 0.5],
+    "tornado_2000": [300, 300, 250, 0.6, 0.6, 0.6],
     "tricept": [1200, 1200, 500, 1.8, 3.3],
+    "tricept_805": [1400, 1400, 600, 1.8, 3.3],
+    "triglide": [500, 260, 250],
+    "urane_sx": [260, 280, 330],
+    "variax": [350, 350, 300, 0.5, 0.5, 0.6],
 }
 everyone = pytest.mark.parametrize("m", [pk.load(name) for name in NAMES], ids=NAMES)
 families = pytest.mark.parametrize("family", sorted(FAMILIES))
@@ -45,8 +70,13 @@ def test_every_machine_has_a_second_inverse_and_every_leg_kind_is_drawn():
     assert {kind for _, kinds in FAMILIES.values() for kind in kinds} == set(KINDS)
 
 
+def test_what_machines_have_is_represented():
+    of = {name: list_features(pk.load(name)) for name in NAMES}
+    assert set().union(*of.values()) == set().union(*(of[name] for name in REPRESENTATIVES))
+
+
 @everyone
-def test_the_inverse_is_that_of_the_papers(m):
+def test_the_inverse_is_the_second_one(m):
     poses = poses_about(m, 100_000)
     joints, expected = m.inverse(poses), INVERSES[m.name](m.spec.sizes, poses)
     closing = np.isfinite(expected).all(1)
@@ -54,7 +84,10 @@ def test_the_inverse_is_that_of_the_papers(m):
     assert np.isnan(joints[~closing]).all()
     assert (m.check(poses) == 0).mean() > 0.1  # the draw does cover the workspace
     off, turning = np.abs(signed(m, joints[closing], expected[closing])), np.array(m.joint_units) == "rad"
-    assert off[:, ~turning].max() < 1e-9
+    assert off[:, ~turning].max(initial=0.0) < 1e-9
+    arms = turning & (np.arange(len(turning)) < m.leg_count)
+    assert off[:, arms].max(initial=0.0) < 1e-11  # near an arm and rod in line a root of a small difference
+    turning &= ~arms
     if turning.any():  # θ1 is worth less the nearer the tool's axis is to the axis it turns about
         first, second = (expected[closing][:, i] for i in np.flatnonzero(turning))
         free = np.abs(np.sin(second)) < 1e-3
@@ -79,7 +112,10 @@ def test_every_working_mode_closes_and_leads_back(m):
         found.append(joints)
         back = m.forward(joints[good], near=poses[good])
         assert back.converged.all()
-        assert np.abs(m.inverse(back.poses, mode=mode) - joints[good])[:, np.array(m.joint_units) == "mm"].max() < 1e-9
+        assert (
+            np.abs(m.inverse(back.poses, mode=mode) - joints[good])[:, np.array(m.joint_units) == "mm"].max(initial=0)
+            < 1e-9
+        )
     rows = np.stack(found, 1)
     rows = rows[np.isfinite(rows).all((1, 2))]
     assert len(rows) > 20

@@ -10,6 +10,7 @@ import subprocess
 import numpy as np
 import pytest
 from independent import orientation
+from shipped import REPRESENTATIVES
 
 import parakin as pk
 from parakin.kinematics.assemblies import generic_member
@@ -139,7 +140,7 @@ def test_general_platforms_have_forty_and_the_true_pose_is_among_them(tmp_path):
         assert np.isfinite(found.radii).all()
 
 
-@pytest.mark.parametrize("name", [name for name in pk.machines() if name not in ("hexapod", "tricept")])
+@pytest.mark.parametrize("name", [name for name in REPRESENTATIVES if name not in ("hexapod", "tricept")])
 def test_closed_forms_find_the_same(name):
     machine = pk.load(name)
     rng = np.random.default_rng(7)

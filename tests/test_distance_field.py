@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 import trimesh
 from regions import whole_region
+from shipped import REPRESENTATIVES
 
 import parakin as pk
 from parakin.export.workspace.cells import format_cells_csv, format_cells_vtu
@@ -18,7 +19,7 @@ from parakin.performance.indices import compute_performance
 from parakin.workspaces.sampled.cross_sections import compute_signed_area, find_cross_sections
 from parakin.workspaces.sampled.distance_field import DistanceField, sample_field
 
-SPACE = [name for name in pk.machines() if "Z" in pk.load(name).axes]
+SPACE = [name for name in REPRESENTATIVES if "Z" in pk.load(name).axes]
 
 
 def struts(path, motion, legs, home):
@@ -92,7 +93,7 @@ def test_the_field_of_struts_is_the_distance(lens):
     assert (limits == np.where(gaps[0] < gaps[1], "q0.max", "q1.max")).all()
 
 
-@pytest.mark.parametrize("name", pk.machines())
+@pytest.mark.parametrize("name", REPRESENTATIVES)
 def test_the_field_is_positive_where_the_machine_is_allowed(name):
     machine = pk.load(name)
     here = whole_region(machine)

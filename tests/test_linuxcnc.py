@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 from drawn import FAMILIES, draw, machine_of
 from geometry import Description
+from shipped import REPRESENTATIVES
 from test_conformance import NAMES, SPREAD, everyone, poses_about
 from test_forward import CLOSE, allowed, garbage, legs_regularity, nudged
 
@@ -30,6 +31,7 @@ from ini_file import read_ini
 from stub import Stub, inward, outward, pose, world
 
 COUNT = 100_000
+representatives = pytest.mark.parametrize("m", [pk.load(name) for name in REPRESENTATIVES], ids=REPRESENTATIVES)
 ENDS = (
     "_guard.c",
     "_tp.c",
@@ -133,7 +135,7 @@ def winding_path(m, count=20_000):
     return poses
 
 
-@everyone
+@representatives
 def test_a_path_is_followed_cycle_by_cycle(m, modules):
     poses = winding_path(m)
     free = slice(4000, 4100)
@@ -160,7 +162,7 @@ def test_a_path_is_followed_cycle_by_cycle(m, modules):
         assert np.abs(found - outward(m, expected)).max() < 1e-7
 
 
-@everyone
+@representatives
 def test_end_points_to_come_are_asked_with_joints_at_zero(m, modules):
     poses = poses_about(m, 20_000, seed=3)
     found, codes = modules(m).inverse(world(m, poses), np.zeros((len(poses), len(m.joints))))
@@ -201,7 +203,7 @@ def test_the_forward_undoes_the_inverse_and_is_the_librarys(m, modules):
     assert (rows[~done] == world(m, starts)[~done]).all()  # refused, it leaves the pose as it was
 
 
-@everyone
+@representatives
 def test_a_forward_is_never_silently_wrong(m, modules):
     mad = 10_000
     joints = np.vstack([garbage(m, mad), m.inverse(allowed(m.name))])
@@ -226,7 +228,7 @@ def test_a_forward_is_never_silently_wrong(m, modules):
         assert (sides * m.sides(m.home[None]) > 0.0).all()
 
 
-@everyone
+@representatives
 def test_joints_and_poses_of_nothing_do_no_harm(m, modules):
     kinematics = modules(m)
     place = find_home_pose(m)
@@ -250,7 +252,7 @@ def test_joints_and_poses_of_nothing_do_no_harm(m, modules):
     assert set(codes.tolist()) <= {0, -1}
 
 
-@everyone
+@representatives
 def test_linuxcncs_own_home_has_no_turns(m, modules):
     home = find_home_pose(m)
     guess = world(m, home[None])
@@ -262,7 +264,7 @@ def test_linuxcncs_own_home_has_no_turns(m, modules):
     assert turned.max() < 1e-9
 
 
-@everyone
+@representatives
 def test_a_path_of_poses_comes_back_as_it_was_written(m, modules):
     poses = winding_path(m)
     joints = m.follow(poses)
@@ -346,7 +348,7 @@ def probes(tmp_path_factory):
     return probe_of
 
 
-@everyone
+@representatives
 def test_the_models_joint_rates_are_the_slopes_of_the_inverse(m, probes):
     poses = allowed(m.name)[:2000]
     joints, step = m.inverse(poses), 1e-5
@@ -364,14 +366,14 @@ def test_the_models_joint_rates_are_the_slopes_of_the_inverse(m, probes):
         assert error[safe & ~turned.any(1)].max() < 1e-4
 
 
-@everyone
+@representatives
 def test_the_models_singularity_margins_are_the_atlas(m, probes):
     poses = allowed(m.name)[:2000]
     margins = probes(m).singularities(poses, m.inverse(poses))
     assert np.abs(margins - compute_singularity_margins(m, poses)).max() < 1e-9
 
 
-@everyone
+@representatives
 def test_the_models_distance_to_limits_is_zero_where_one_is_reached(m, probes):
     poses = poses_about(m, 20_000, seed=5)
     joints = m.inverse(poses)
@@ -390,7 +392,7 @@ def numbers(text):
     return np.array([float(word) for word in text.split()])
 
 
-@everyone
+@representatives
 def test_the_ini_says_what_the_machine_says(m):
     files = pk.make_linuxcnc_configuration(m)
     assert sorted(files) == sorted(f"{m.name}{end}" for end in ENDS)
@@ -414,7 +416,7 @@ def test_the_ini_says_what_the_machine_says(m):
             assert not np.isfinite(value) or float(joint[key]) == pytest.approx(value * factor)
 
 
-@everyone
+@representatives
 def test_the_axes_hold_the_poses_that_the_machine_can_take(m):
     ini = read_ini(pk.make_linuxcnc_configuration(m)[f"{m.name}.ini"])
     ends = [[float(ini[f"AXIS_{axis}"][f"PROGRAM_{end}_LIMIT"]) for axis in m.axes] for end in ("MIN", "MAX")]
@@ -428,7 +430,7 @@ def test_the_axes_hold_the_poses_that_the_machine_can_take(m):
     assert (m.check(np.random.default_rng(4).uniform(low, high, (200_000, len(low)))) == 0).any()
 
 
-@everyone
+@representatives
 def test_by_hand_an_axis_box_keeps_all_limits_and_all_axes_at_once_keep_the_joints_rates(m):
     ini = read_ini(pk.make_linuxcnc_configuration(m)[f"{m.name}.ini"])
     keys = ("MIN_LIMIT", "MAX_LIMIT", "MAX_VELOCITY", "MAX_ACCELERATION")
@@ -453,7 +455,7 @@ def test_by_hand_an_axis_box_keeps_all_limits_and_all_axes_at_once_keep_the_join
     assert (np.abs(pulled) + np.abs(bend) <= drives[:, 1] * 1.05).all()
 
 
-@everyone
+@representatives
 def test_the_first_program_stays_inside(m):
     text = pk.make_linuxcnc_configuration(m)[f"{m.name}.ngc"]
     blocks = [re.findall(r"([XYZABC])(\S+)", line) for line in text.splitlines() if line.startswith("G1")]

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from shipped import REPRESENTATIVES
 
 import parakin as pk
 from parakin.cli import main
@@ -28,7 +29,7 @@ from ini_file import read_ini
 from parport_machine import driven_by_parport
 from simulation import ALONE, AS_NOBODY, FIELDS, MODULES, simulated, trial, why_not
 
-NAMES = pk.machines()
+NAMES = REPRESENTATIVES
 EACH = [(name, card) for name in NAMES for card in CARDS]
 PROGRAMS = ("loadusr", "source")
 LATE = 1.0  # mm or degrees by which a switch may be found late: on a busy computer steps come late

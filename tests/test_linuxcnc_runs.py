@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 from geometry import Description
 from random_paths import PathMaker
+from shipped import REPRESENTATIVES
 
 import parakin as pk
 from parakin.controllers.linuxcnc.home_pose import find_home_pose
@@ -119,7 +120,7 @@ def away(machine):
     return " ".join(["G1", *words, "F9000"])
 
 
-@pytest.mark.parametrize("machine", pk.machines(), indirect=True)
+@pytest.mark.parametrize("machine", REPRESENTATIVES, indirect=True)
 def test_it_starts_homes_and_moves(machine, linuxcnc):
     name = machine.name.removeprefix("trial_")
     by_hand, refused = TASKS.get(name, (away(machine), {}))

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from shipped import REPRESENTATIVES
 
 import parakin as pk
 from parakin.controllers.linuxcnc.home_pose import find_home_pose
@@ -21,7 +22,7 @@ sys.path.insert(0, str(Path(__file__).parent / "linuxcnc"))
 from simulation import simulated, trial, why_not
 from stub import inward, outward, world
 
-everyone = pytest.mark.parametrize("name", pk.machines())
+everyone = pytest.mark.parametrize("name", REPRESENTATIVES)
 LETTERS = "XYZABCUVW"
 
 

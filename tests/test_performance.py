@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from drawn import draw, machine_of
 from scipy.spatial.transform import Rotation
+from shipped import REPRESENTATIVES
 
 import parakin as pk
 from parakin.performance.characteristic_length import choose_characteristic_length
@@ -11,7 +12,7 @@ from parakin.performance.indices import compute_performance
 from parakin.performance.jacobians import list_twist_names
 from parakin.performance.singularities import compute_singularity_margins, list_margin_names
 
-NAMES = pk.machines()
+NAMES = REPRESENTATIVES
 everyone = pytest.mark.parametrize("m", [pk.load(name) for name in NAMES], ids=NAMES)
 
 

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from shipped import REPRESENTATIVES
 
 import parakin as pk
 from parakin.export.machine.picture import render_machine_html, render_machine_png
@@ -21,7 +22,7 @@ from parakin.toolpath.posting.range_use import measure_range_use
 from parakin.toolpath.reading.cl.reader import read_cl
 
 OWN = Path(__file__).parent / "machines" / "rpr3.yaml"
-MACHINES = [*pk.machines(), str(OWN)]
+MACHINES = [*REPRESENTATIVES, str(OWN)]
 LOADED = {name: pk.load(name) for name in MACHINES}
 machines = pytest.mark.parametrize("machine", LOADED.values(), ids=lambda machine: machine.name)
 

@@ -11,6 +11,7 @@ from decimal import ROUND_HALF_EVEN, Decimal
 import numpy as np
 import pyarrow.parquet as pq
 import pytest
+from shipped import NAMES
 
 import parakin as pk
 from parakin.export.tables import joints as table
@@ -204,7 +205,7 @@ def test_upright_planar_machine_tilts_in_its_plane(tmp_path):
     assert posted.first.value == pytest.approx(15 * DEGREE)
 
 
-@pytest.mark.parametrize("name", pk.machines())
+@pytest.mark.parametrize("name", NAMES)
 def test_every_machine_takes_a_small_part(name):
     machine = pk.load(name)
     path = small_part(machine)
@@ -218,7 +219,7 @@ def test_every_machine_takes_a_small_part(name):
     assert check.getvalue().count(b"\n") == len(path) + 1
 
 
-@pytest.mark.parametrize("name", pk.machines())
+@pytest.mark.parametrize("name", NAMES)
 def test_no_machine_is_silent_about_what_it_cant_do(name):
     machine = pk.load(name)
     posted = post_path(machine, path_of([[5000, 5000, 9000]] * 3, axis_of(150.0, [0, 50, 100])))

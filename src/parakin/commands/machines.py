@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -21,7 +22,7 @@ _HEADERS = dict(zip(RATES, ("speed /s", "acceleration /s2", "jerk /s3"), strict=
 
 
 def machines(*, json: Json = False) -> int:
-    """The machines that come with parakin."""
+    """The machines that come with parakin, by families."""
     from .. import load
     from .. import machines as shipped
 
@@ -29,11 +30,16 @@ def machines(*, json: Json = False) -> int:
     if json:
         print_json(encode_machines(known))
         return 0
-    rows = [
-        (m.name, " ".join(m.axes), " ".join(m.joints), m.spec.title, _shorten_text(m.spec.source, 60)) for m in known
-    ]
-    print_text(format_table(rows, ("name", "axes", "joints", "title", "source")))
+    print_text("\n\n".join(_list_families(known)))
     return 0
+
+
+def _list_families(machines: list[Machine]) -> Iterator[str]:
+    """List the machines of each family, those of few axes first."""
+    for family in sorted({m.spec.family for m in machines}):
+        members = sorted((m for m in machines if m.spec.family == family), key=lambda m: (len(m.axes), m.name))
+        rows = [(m.name, " ".join(m.axes), m.spec.title, _shorten_text(m.spec.source, 60)) for m in members]
+        yield f"{family}\n{format_table(rows, ('name', 'axes', 'title', 'source'))}"
 
 
 def _shorten_text(text: str, most: int) -> str:

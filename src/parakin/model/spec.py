@@ -38,5 +38,10 @@ class Spec:
         serial = [step.drive for step in (*self.head, *self.table) if step.drive is not None]
         return (*legs, *serial)
 
+    @property
+    def family(self) -> str:
+        """The families of its legs in words."""
+        return ", ".join(dict.fromkeys(leg.family for leg in self.legs))
+
     def __repr__(self) -> str:
         return f"<parakin description of {self.name}: {len(self.legs)} legs>"

@@ -33,6 +33,7 @@ def _encode_head(machine: Machine) -> dict[str, Any]:
     return {
         "name": spec.name,
         "title": spec.title,
+        "family": spec.family,
         "axes": list(machine.axes),
         "joints": list(machine.joints),
         "source": " ".join(spec.source.split()),

@@ -63,6 +63,7 @@ class Leg(ABC):
     """
 
     kind: ClassVar[str]
+    family: ClassVar[str]  # of machines with such legs
     units: ClassVar[tuple[Unit, ...]]  # of the joints, in order
     branches: ClassVar[str] = ""  # the working mode if the file names none: a sign for each choice of the inverse
     # Where the platform's joint moves by d, less than a fifth of the rod's length L, the rod's vector changes by less

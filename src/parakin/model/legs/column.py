@@ -16,6 +16,7 @@ class Column(Leg):
     """Joints: the carriage's angle on the rail, then the slide's height. The rail's axis is the base frame's Z."""
 
     kind = "column"
+    family = "columns on a circular rail"
     units = ("rad", "mm")
     branches = "-"
 

@@ -12,6 +12,7 @@ from .base import Inverse, Leg, Link, Reach, close_rod
 @dataclass(frozen=True)
 class Crank(Leg):
     kind = "crank"
+    family = "rods on arms that turn"
     units = ("rad",)
     branches = "+"
 

@@ -14,6 +14,7 @@ class Lambda(Leg):
     """Joints: the long rod's slider, then the short rod's (IJEEC 6, 2022, equations (6) to (11), rederived)."""
 
     kind = "lambda"
+    family = "two slides on a rail for each leg"
     units = ("mm", "mm")
     branches = "-+"
 

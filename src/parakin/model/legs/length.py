@@ -12,6 +12,7 @@ from .base import Inverse, Leg, Link, close_rod
 @dataclass(frozen=True)
 class Length(Leg):
     kind = "length"
+    family = "struts of variable length on fixed feet"
     units = ("mm",)
 
     foot: Point

@@ -15,6 +15,7 @@ from .base import Inverse, Leg, Link, Reach, close_rod
 @dataclass(frozen=True)
 class Slider(Leg):
     kind = "slider"
+    family = "rods on straight slides"
     units = ("mm",)
     branches = "-"
     # The branch margin is r, with r² = L² - s². The rod changes by d across the rail, and along it by |r' - r|, less

@@ -1,0 +1,29 @@
+"""The shipped machines that tests run over: all of them, or, where a test takes long, those that stand for the rest.
+
+The conformance suite and all that is quick run over every machine. Of every set of axes, structure and leg kind there
+is a machine among the representatives, which the conformance suite tests.
+"""
+
+from __future__ import annotations
+
+import parakin as pk
+
+NAMES = pk.machines()
+REPRESENTATIVES = [
+    "hbg80_2d",
+    "hbg80_3d",
+    "hexapod",
+    "lambda6",
+    "linear_delta",
+    "orthoglide",
+    "orthoglide5_head",
+    "orthoglide5_table",
+    "tricept",
+    "eclipse",
+    "rrr3",
+]
+
+
+def list_features(machine):
+    """What a machine has that a representative must have too: its axes with its structure, and its kinds of legs."""
+    return {(machine.axes, type(machine.structure).__name__), *(leg.kind for leg in machine.legs)}

@@ -11,6 +11,7 @@ from decimal import ROUND_HALF_EVEN, Decimal
 import numpy as np
 import pyarrow.parquet as pq
 import pytest
+from independent import transform
 from shipped import NAMES
 
 import parakin as pk
@@ -41,7 +42,11 @@ def home_of(machine):
     """Tool tip and axis at home."""
     home = dict(zip(machine.axes, machine.home.tolist(), strict=True))
     a, b, c = (home.get(letter, 0.0) for letter in "ABC")
-    return np.array([home.get(letter, 0.0) for letter in "XYZ"]), build_frame_from_angles(0, 0, 0, a, b, c)[:, 2]
+    axis = build_frame_from_angles(0, 0, 0, a, b, c)[:, 2]
+    if not {"A", "B", "C"} & set(machine.axes):  # such a machine may lie down
+        for step in reversed(machine.spec.mounting):
+            axis = transform(step.axis, step.value)[0, :3, :3] @ axis
+    return np.array([home.get(letter, 0.0) for letter in "XYZ"]), axis
 
 
 def small_part(machine):

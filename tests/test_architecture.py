@@ -289,19 +289,8 @@ QUESTIONS = {"begins", "bounds", "changes", "crosses", "ends", "has", "is", "spa
 MATHEMATICS = {"absolute", "atan2", "copysign", "cross", "derivative", "dot", "magnitude", "maximum", "minimum", "norm"}
 MATHEMATICS |= {"njit", "product", "sincos", "sqrt", "sub"}
 # What people type: a command has its function's name, and so do a few words of `pk`.
-COMMANDS = {
-    "assemblies",
-    "atlas",
-    "design",
-    "export",
-    "forward",
-    "inverse",
-    "linuxcnc",
-    "machines",
-    "post",
-    "show",
-    "workspace",
-}
+COMMANDS = {"assemblies", "atlas", "design", "forward", "inverse", "linuxcnc", "machines", "post", "show", "workspace"}
+COMMANDS |= {"export", "reach"}
 TYPED = COMMANDS | {"main", "to_display", "workpiece"}
 
 
@@ -364,6 +353,7 @@ def test_pole_thresholds_and_modes_are_the_wrists_matter(module):
 # Numbers about poles that are no angles off a pole: fractions of the tolerance or of a way, ratios, steps.
 FRACTIONS = {
     "controllers.linuxcnc.approach._COUNTS",
+    "kinematics.travel._HOP",
     "toolpath.posting.working_mode.HELD",
     "toolpath.linearise.pole_holds._OFF_POLE",
     "toolpath.linearise.pole_holds._ARC",

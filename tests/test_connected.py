@@ -11,7 +11,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 import parakin as pk
-from parakin.workspaces.certified.assembly_mode import expand_determinant
+from parakin.model.rates import expand_determinant
 from parakin.workspaces.certified.subdivision import Subdivision
 from parakin.workspaces.connected.adjacency import find_adjacent_cells, label_components
 from parakin.workspaces.connected.components import find_components

@@ -22,6 +22,7 @@ from .commands.kinematics import forward, inverse
 from .commands.linuxcnc import linuxcnc
 from .commands.machines import machines, show
 from .commands.post import post
+from .commands.reach import reach
 from .commands.workspace import workspace
 from .errors import ParakinError
 from .version import __version__
@@ -37,7 +38,7 @@ app = App(
     default_parameter=Parameter(negative=""),
     suppress_keyboard_interrupt=False,  # main says so in one line
 )
-for command in (post, inverse, forward, assemblies, linuxcnc, machines, show, workspace, atlas, design, export):
+for command in (post, inverse, forward, assemblies, reach, linuxcnc, machines, show, workspace, atlas, design, export):
     app.command(command)
 app.register_install_completion_command()
 

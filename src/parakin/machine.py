@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import cached_property
 from typing import Any
 
@@ -11,7 +11,7 @@ import numpy as np
 from .algebra import Scalar, Vec
 from .arguments import RowsLike, bound_angles, check_range, describe_value, read_rows, warn_of_wide_angles
 from .arrays import Array
-from .errors import NoMethodError, PoseError
+from .errors import NoMethodError, PoseError, suggest
 from .kernels.batch import evaluate_tape, evaluate_tape_with_residual
 from .kinematics.assemblies import Assemblies, find_assemblies
 from .kinematics.assembly_side import find_sides
@@ -22,6 +22,7 @@ from .kinematics.limit_margins import compute_margins, find_broken_limits
 from .kinematics.path_modes import PathMode, find_path_modes
 from .kinematics.solution import Solution
 from .kinematics.tapes import KinematicTapes, collect_tapes
+from .kinematics.travel import Travel, find_travel
 from .kinematics.wrist.pole_crossing import flip_mode
 from .kinematics.wrist.pole_thresholds import EXACT
 from .machine_properties import MachineProperties
@@ -198,6 +199,34 @@ class Machine(MachineProperties):
         if len(lead) != 1:
             raise PoseError(f"joints: rows of shape (N, {len(self.joints)}) expected, not {(*lead, len(self.joints))}")
         return find_assemblies(self.model, rows) if len(rows) else []
+
+    def travel(self, pose: RowsLike, axis: str | RowsLike, mode: str | None = None) -> Travel:
+        """Prove the travel left from a pose (axes,) along an axis or a direction, both ways, and what ends it.
+
+        Parameters
+        ----------
+        axis : name of an axis, or a direction (axes,) in mm and rad, or by names, of which travel is a multiple
+        mode : working mode at the pose
+
+        Every pose on the way keeps every limit, with the joints that a path takes along it, turns counted, and no
+        parallel singularity is met; see :class:`~.kinematics.travel.Travel`.
+        """
+        start, mode = self._read_one(pose, self.axes, "pose"), self.checked_mode(mode)
+        if not np.isfinite(start).all():
+            raise PoseError("pose: numbers expected")
+        return find_travel(self.model, start, self._read_direction(axis), mode)
+
+    def _read_direction(self, axis: str | RowsLike) -> Array:
+        """Read a direction (axes,): the name of an axis, values by names, or all values."""
+        if isinstance(axis, str):
+            if axis not in self.axes:
+                raise PoseError(f"axis {axis!r}: one of {' '.join(self.axes)} expected{suggest(axis, self.axes)}")
+            axis = {axis: 1.0}
+        nothing = dict.fromkeys(self.axes, 0.0)
+        direction = self._read_one({**nothing, **axis} if isinstance(axis, Mapping) else axis, self.axes, "axis")
+        if not (np.isfinite(direction).all() and direction.any()):
+            raise PoseError("axis: a direction that is not zero expected")
+        return direction
 
     def sides(self, poses: RowsLike) -> Array:
         """Compute the determinant whose sign tells the assembly mode, at rows of poses (n, axes): (n,)."""

@@ -66,3 +66,18 @@ def compute_twist_rates(
     ]
     a_rows, b_rows = [a[i : i + n] for i in range(0, n * n, n)], [b[i : i + m] for i in range(0, n * m, m)]
     return TwistRates(a_rows, b_rows, wrench_norms)
+
+
+def expand_determinant(rows: Sequence[Sequence[Scalar]]) -> Scalar:
+    """Expand a determinant of scalars of any kind, without quotients, by all minors of the first rows."""
+    minors: dict[tuple[int, ...], Scalar] = {(): 1.0}
+    for row in rows:
+        longer: dict[tuple[int, ...], Scalar] = {}
+        for columns, minor in minors.items():
+            for j, entry in enumerate(row):
+                if j not in columns:
+                    wider = tuple(sorted((*columns, j)))
+                    sign = -1.0 if (len(columns) - wider.index(j)) % 2 else 1.0
+                    longer[wider] = minor * entry * sign + longer.get(wider, 0.0)
+        minors = longer
+    return minors[tuple(range(len(rows)))]

@@ -8,10 +8,9 @@ from functools import cached_property
 
 import numpy as np
 
-from ... import algebra as alg
-from ...algebra import Scalar, Term, Trace, derivative, norm
+from ...algebra import Scalar, Term, Trace, derivative
 from ...arrays import Array, Flags, Indices
-from ...kernels.intervals import IntervalProgram
+from ...kernels.intervals import IntervalProgram, JumpFreeTrace
 from ...machine import Machine
 from ...model.rates import TwistRates
 from ..characteristic_length import CharacteristicLength
@@ -20,35 +19,6 @@ from ..jacobians import list_column_scales
 Matrix = Sequence[Sequence[Scalar]]
 
 _SAMPLES = {0: 1, 1: 65, 2: 17, 3: 9, 4: 5}  # along each input of a box; 3 of more than these
-
-
-class JumpFreeTrace(Trace):
-    """A trace in which the sine and cosine of an arc tangent are quotients: their bounds have no jump at ±180°."""
-
-    def node(self, op: int, args: tuple[Term, ...], k: tuple[float, ...]) -> Term:
-        if op in (alg.SIN, alg.COS):
-            both = self._derive_sincos(args[0])
-            if both is not None:
-                sine, cosine = both
-                result: Term = sine if op == alg.SIN else cosine
-                return result
-        return super().node(op, args, k)
-
-    @staticmethod
-    def _derive_sincos(angle: Term) -> tuple[Scalar, Scalar] | None:
-        """Derive sine and cosine of ±atan2(y, x) + offset as quotients; None for other angles."""
-        offset, sign, inner = 0.0, 1.0, angle
-        if angle.op == alg.LIN and len(angle.args) == 1 and abs(angle.k[1]) == 1.0:
-            (offset, sign), inner = angle.k, angle.args[0]
-        if inner.op != alg.ATAN2:
-            return None
-        y, x = inner.args
-        size = norm((x, y))
-        s, c = sign * y / size, x / size
-        if offset == 0.0:
-            return s, c
-        so, co = np.sin(offset), np.cos(offset)
-        return co * s + so * c, co * c - so * s
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,11 +10,11 @@ import numpy as np
 
 from ...algebra import Scalar, Term, Trace, derivative
 from ...arrays import Array, Flags
-from ...kernels.intervals import IntervalProgram
+from ...kernels.intervals import IntervalProgram, JumpFreeTrace
 from ...machine import Machine
 from ..characteristic_length import choose_characteristic_length
 from .bisection import Decided, decide_regular
-from .interval_matrices import JumpFreeTrace, LinearMatrices, MatrixBounds, PoseBox
+from .interval_matrices import LinearMatrices, MatrixBounds, PoseBox
 
 _MOST = 1e300  # stands for no bound, so that times zero it is zero
 

@@ -13,7 +13,7 @@ from ...algebra import Scalar, Term, absolute
 from ...arrays import Array, Flags, Indices
 from ...budget import Budget
 from ...errors import PoseError
-from ...workspaces.certified.assembly_mode import expand_determinant
+from ...model.rates import expand_determinant
 from ...workspaces.certified.constraints import Constraint
 from ...workspaces.certified.plane_cuts import CLEARED
 from ...workspaces.certified.region import Region

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from ...algebra import Scalar
+from ...model.rates import expand_determinant
 from .constraints import Constraint, TracedPose
 
 PARALLEL_SINGULARITY = "parallel singularity"
@@ -44,18 +45,3 @@ def _scale_at_home(traced: TracedPose) -> float:
     if not (np.isfinite(most) and most > 0.0):
         return 1.0
     return -most if np.linalg.det(rows) < 0.0 else most
-
-
-def expand_determinant(rows: Sequence[Sequence[Scalar]]) -> Scalar:
-    """Expand a determinant of scalars of any kind, without quotients, by all minors of the first rows."""
-    minors: dict[tuple[int, ...], Scalar] = {(): 1.0}
-    for row in rows:
-        longer: dict[tuple[int, ...], Scalar] = {}
-        for columns, minor in minors.items():
-            for j, entry in enumerate(row):
-                if j not in columns:
-                    wider = tuple(sorted((*columns, j)))
-                    sign = -1.0 if (len(columns) - wider.index(j)) % 2 else 1.0
-                    longer[wider] = minor * entry * sign + longer.get(wider, 0.0)
-        minors = longer
-    return minors[tuple(range(len(rows)))]

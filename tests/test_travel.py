@@ -1,0 +1,174 @@
+"""The travel left along a line: never more than dense samples of it allow, and no less but for a tolerance."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import parakin as pk
+from parakin.cli import main
+from parakin.errors import PoseError
+from parakin.kinematics.travel import FARTHEST, SINGULARITY
+
+OWN = [str(Path(__file__).parent / "machines" / f"{name}.yaml") for name in ("hexaglide", "swing", "arm", "balls")]
+SAMPLES = 2000
+WITHIN = {"mm": 1e-5, "rad": 1e-7}
+
+
+def draw_poses(machine, count, seed):
+    """Random poses within all limits, on home's side of the singularities."""
+    rng = np.random.default_rng(seed)
+    size = 0.35 * np.median(machine.leg_sizes)
+    spread = np.array([size if unit == "mm" else 0.7 for unit in machine.axis_units])
+    poses = machine.home + rng.uniform(-1.0, 1.0, (40 * count, len(spread))) * spread * rng.random((40 * count, 1))
+    poses = poses[machine.check(poses) == 0]
+    same = np.sign(machine.sides(poses)) == np.sign(machine.sides(machine.home[None]))
+    return poses[same][:count]
+
+
+def find_first_broken(machine, poses):
+    """The first pose of a path that is off limits, and its limit, or beyond a singularity; None where there is none."""
+    joints = machine.follow(poses)
+    broken = machine.check(poses, joints)
+    sides = np.sign(np.linalg.det(leg_rows(machine, poses, joints)))
+    beyond = np.flatnonzero((broken > 0) | (sides != sides[0]))
+    if not len(beyond):
+        return None
+    return beyond[0], machine.limits[broken[beyond[0]] - 1] if broken[beyond[0]] else SINGULARITY
+
+
+def leg_rows(machine, poses, joints):
+    a, _, wrench_norms = machine.twist_rates(poses, joints, whole=False)
+    size = wrench_norms.shape[1] if a.shape[1] - wrench_norms.shape[1] == 2 else a.shape[1]
+    return a[:, :size, :size]
+
+
+def find_end(machine, pose, direction, far):
+    """The first share of a line that is off limits, by samples that close in on it, and what is broken there."""
+    coarse = shares = np.linspace(0.0, far, SAMPLES)
+    name = None
+    for _ in range(4):
+        found = find_first_broken(machine, pose + shares[:, None] * direction)
+        if found is None:
+            break
+        row, name = found
+        if row == 0:
+            return 0.0, name
+        low, high = shares[[row - 1, row]]
+        shares = np.concatenate([coarse[coarse < low], np.linspace(low, high, SAMPLES // 4)])
+    return (np.inf, None) if name is None else (high, name)
+
+
+@pytest.mark.parametrize("name", [*pk.machines(), *OWN], ids=lambda name: Path(name).stem)
+def test_travel_is_what_samples_allow(name):
+    machine = pk.load(name)
+    reached = 0
+    for pose in draw_poses(machine, 6, 3):
+        for axis, unit in zip(machine.axes, machine.axis_units, strict=True):
+            travel = machine.travel(pose, axis)
+            direction = np.array([float(axis == other) for other in machine.axes])
+            for end, sign in ((travel.ahead, 1.0), (travel.back, -1.0)):
+                far = min(1.02 * end.distance + 10.0 * WITHIN[unit], FARTHEST[unit])
+                sampled, name = find_end(machine, pose, sign * direction, far)
+                assert end.distance <= sampled
+                assert end.pose == pytest.approx(pose + sign * end.distance * direction, abs=1e-9)
+                if end.limit == SINGULARITY:  # it keeps off by 1e-4 of home's determinant
+                    rows = np.array([end.pose, machine.home])
+                    size = np.abs(np.linalg.det(leg_rows(machine, rows, machine.inverse(rows))))
+                    assert size[0] < 1.001e-4 * size[1]
+                elif end.limit is not None:
+                    assert sampled - end.distance < WITHIN[unit]
+                    assert end.limit.split(".")[0] == name.split(".")[0]  # over a pole either side may come first
+                reached += end.limit is not None
+    assert reached > 10
+
+
+def test_ends_in_closed_form():
+    """The hexapod's platform goes down until its struts, all alike there, are 1310 mm long."""
+    machine = pk.load("hexapod")
+    travel = machine.travel(machine.home, "Z")
+    feet = np.array([[-22.95, 13.25], [22.95, 13.25], [0.0, -26.5]]) * 25.4
+    joints = np.array([[-1.0, 11.5], [10.459, -4.884], [9.459, -6.616]]) * 25.4
+    flat = np.array([np.linalg.norm(feet[i] - joints[j]) for i, j in ((0, 0), (1, 1), (2, 2))])
+    assert travel.back.distance == pytest.approx(np.sqrt(1310.0**2 - flat**2).min() - 800.0, abs=1e-6)
+    assert travel.ahead.distance == pytest.approx(800.0 - np.sqrt(660.0**2 - flat**2).max(), abs=1e-6)
+
+
+def test_any_direction_and_turns_are_counted():
+    machine = pk.load("tricept")
+    pose = machine.home + np.array([0.0, 0.0, 0.0, 0.5, 0.0])
+    travel = machine.travel(pose, [0.0, 0.0, 0.0, 0.0, 1.0])
+    assert [travel.ahead.limit, travel.back.limit] == ["theta1.max", "theta1.min"]
+    # theta1 stands at 180° of ±360°, and turns as C does where the tool's tip is below the central leg
+    assert travel.ahead.distance == pytest.approx(np.pi, abs=1e-8)
+    assert travel.back.distance == pytest.approx(3.0 * np.pi, abs=1e-8)
+    one, both = machine.travel(pose, "X"), machine.travel(pose, {"X": 2.0})
+    assert both.ahead.distance == pytest.approx(one.ahead.distance / 2.0, abs=1e-6)
+    assert both.ahead.limit == one.ahead.limit
+
+
+def test_a_way_over_the_pole_goes_on():
+    """Through the wrist's pole, where its first joint is free, the strut that ends the way is met."""
+    machine = pk.load("tricept")
+    pose = machine.home - np.array([100.0, 0.0, 0.0, 0.0, 0.0])
+    travel = machine.travel(pose, "X")
+    at_home = machine.travel(machine.home, "X")
+    assert travel.ahead.limit == at_home.ahead.limit == "d2.max"
+    assert travel.ahead.distance == pytest.approx(at_home.ahead.distance + 100.0, abs=1e-5)
+
+
+def test_off_limits_and_on_a_limit():
+    machine = pk.load("orthoglide")
+    off = machine.travel([200.0, 0.0, 0.0], "X")
+    assert off.ahead.distance == off.back.distance == 0.0
+    assert off.ahead.limit == "rho_x.max"
+    end = machine.travel(machine.home, "X").ahead
+    back = machine.travel(end.pose, "X")
+    assert back.ahead.distance < 1e-6
+    assert back.back.distance > 200.0
+
+
+@pytest.mark.parametrize("axis", ["Q", "", [1.0, 2.0], [0.0] * 6, {"X": 0.0}, None, [np.nan] * 6, 3])
+def test_bad_directions(axis):
+    with pytest.raises(PoseError) as error:
+        pk.load("hexapod").travel(pk.load("hexapod").home, axis)
+    assert len(str(error.value).splitlines()) == 1
+
+
+@pytest.mark.parametrize("name", ["hexapod", "orthoglide5_table"])
+def test_directions_at_random(name):
+    machine = pk.load(name)
+    rng = np.random.default_rng(8)
+    spread = np.array([1.0 if unit == "mm" else 0.002 for unit in machine.axis_units])
+    for pose in draw_poses(machine, 8, 4):
+        direction = rng.normal(size=len(spread)) * spread
+        end = machine.travel(pose, direction).ahead
+        sampled, name = find_end(machine, pose, direction, 1.02 * end.distance)
+        assert end.distance <= sampled < end.distance + 1e-5
+        assert end.limit == name
+
+
+def run(capsys, *words):
+    code = main(["reach", *words])
+    return code, *capsys.readouterr()
+
+
+def test_command(capsys):
+    code, out, err = run(capsys, "orthoglide", "--at", "X=10", "--json")
+    answer = json.loads(out)
+    assert (code, err, answer["schema"]) == (0, "", "parakin.reach/1")
+    assert [line["along"] for line in answer["travel"]] == ["X", "Y", "Z"]
+    ahead = pk.load("orthoglide").travel([10.0, 0.0, 0.0], "X").ahead
+    assert answer["travel"][0]["ahead"] == {
+        "distance": ahead.distance, "limit": "rho_x.max", "pose": {"X": ahead.pose[0], "Y": 0.0, "Z": 0.0},
+    }  # fmt: skip
+    code, out, _ = run(capsys, "orthoglide", "--at", "10,0,0")
+    told = float(out.splitlines()[1].split()[4])
+    assert ahead.distance - 1e-4 < told <= ahead.distance
+    code, out, _ = run(capsys, "hexapod", "--along", "X=1,C=1")
+    assert (code, len(out.splitlines())) == (0, 2)
+    assert run(capsys, "orthoglide", "--at", "X=200")[0] == 3
+    for words in (["--at", "Q=1"], ["--at", "1,2"], ["--along", "X"], ["--along", "X=0"], ["--mode", "?"]):
+        code, out, err = run(capsys, "orthoglide", *words)
+        assert (code, out, len(err.splitlines())) == (2, "", 1)

@@ -2,8 +2,9 @@
 
 The path is the first passes of the turbine blade's finishing, at 10 m/min in the cut, on the Tricept. The programs run
 headless from the machine's home, in the same configuration but for the planner. Every servo cycle's joints are written
-down; the picture shows their speeds as fractions of what the joints are allowed, and the cycle times. On other machines
-the posted program runs too, at 10 and at 2 m/min, with drives that follow within 2 % of their own limits.
+down; the picture shows their speeds as fractions of what the joints are allowed, and the cycle times. The table has the
+same of four machines, at 10 and at 2 m/min, with ideal drives and with drives that follow within 2 % of their own
+limits, as programmed, as posted, and as posted with pauses and overrides amid it.
 
     python linuxcnc_comparison.py [-o PICTURE]
 
@@ -25,58 +26,89 @@ import parakin as pk
 
 HERE = Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE.parent / "tests" / "linuxcnc"))
+from planner import read_program  # noqa: E402
 from simulation import CYCLE, as_programmed, first_line, simulated, trial, why_not  # noqa: E402
 from stub import outward, world  # noqa: E402
 
 RECORDS, SHOWN = 2000, 130  # of the whole operation, and of it here
 FEED, SLOW = 10_000.0, 2_000.0  # mm/min in the cut
 RESERVE = 0.02  # of the drives, over the limits of the machine's description
-MACHINES = (  # where the part lies there, and whether its tool is upright
-    ("tricept", None, False),
-    ("hexapod", pk.workpiece(X=-60, Y=20, Z=710), False),
-    ("linear_delta", pk.workpiece(X=-60, Y=45, Z=1920), True),
-)
+CHANGES = [  # s after the first record's turn has come; what the operator does then
+    [1.0, "feedrate", 0.3],
+    [2.5, "feedrate", 1.0],
+    [3.0, "auto", "AUTO_PAUSE"],
+    [3.5, "auto", "AUTO_RESUME"],
+    [4.0, "feedrate", 0.0],
+    [4.4, "feedrate", 1.0],
+    [4.8, "auto", "AUTO_PAUSE"],
+    [5.2, "auto", "AUTO_RESUME"],
+]
 NAMES = {"d1": "strut d1", "d2": "strut d2", "d3": "strut d3", "theta1": "wrist θ1", "theta2": "wrist θ2"}
 COLOURS = ("#9db4c9", "#6c8fb0", "#3f6d99", "#c8442f", "#d9a441")
 
 
-def part(folder, upright, feed):
+class Place(NamedTuple):
+    """Where the part lies on a machine: on top of the file's frame or without it, the tool tilted or upright."""
+
+    name: str
+    workpiece: np.ndarray | None = None
+    frame: str = "file"
+    upright: bool = False
+
+
+PLACES = (
+    Place("tricept"),
+    Place("hexapod", pk.workpiece(X=-60, Y=20, Z=710)),
+    Place("linear_delta", pk.workpiece(X=-60, Y=45, Z=1920), upright=True),
+    Place("orthoglide5_table", pk.workpiece(X=-97, Y=13), frame="ignore"),
+)
+
+
+def part(folder, place, feed):
     """The first passes of the blade, as a CL file tells them."""
-    path = turbine_blade.tool_path(RECORDS, upright)
+    path = turbine_blade.tool_path(RECORDS, place.upright)
     file = Path(folder) / "turbine_blade.cls"
     lines = turbine_blade.nx_lines(path, turbine_blade.FEEDS | {"cut": feed})
     file.write_text("\n".join(lines) + "\n", encoding="ascii")
-    whole, shown = pk.read_path(file), slice(SHOWN)
+    whole, shown = pk.read_path(file, frame=place.frame), slice(SHOWN)
     arrays = {name: getattr(whole, name)[shown] for name in ("tip", "axis", "line", "rapid", "feed", "spindle")}
     return replace(whole, events=tuple(e for e in whole.events if e.record < SHOWN), **arrays)
 
 
 class Measured(NamedTuple):
-    """What a run did: speeds and accelerations of the joints over their limits, (cycles, joints) each."""
+    """What a run did: speeds and accelerations of the joints over their limits, (cycles, joints) each; what it told."""
 
     speeds: np.ndarray
     accelerations: np.ndarray
+    told: str
 
     @property
     def seconds(self):
         return len(self.speeds) * CYCLE
 
     def describe(self):
-        """A row of a table."""
+        """Cells of a table."""
+        if self.told:
+            return f"{self.told} after {self.seconds:.3f} s | | |"
         over = (self.accelerations > 1.05).any(axis=1).mean()
         return f"{self.seconds:.3f} s | {self.speeds.max():.3f} | {self.accelerations.max():.2f} | {over:.1%}"
 
 
-def measure(machine, simulation, text, start):
-    """Run a program from home; what it does from its first record on."""
-    run = simulation.run({"program": "part.ngc"}, {"part.ngc": text})
-    if "told" in run.seen:
-        sys.exit(f"LinuxCNC says: {run.seen['told']}")
-    joints = run.joints[run.part(first_line(text), start)]
+def measure(machine, simulation, job, text, changes=()):
+    """Run a program from home, with changes amid it; what it does from its first record on."""
+    program = read_program(text)
+    before = float(program.seconds[~program.timed].sum())
+    during = [[before + at, *words] for at, *words in changes]
+    run = simulation.run({"program": "part.ngc", "during": during}, {"part.ngc": text})
+    told = run.seen.get("told", "")
+    shown = slice(None) if told else run.part(first_line(text), world(machine, job.posted.poses[:1])[0])
+    joints = run.joints[shown]
     rows = (np.array([[getattr(d, rate) for d in machine.drives]]) for rate in ("speed", "acceleration"))
     speed, acceleration = (outward(machine, row) for row in rows)
     return Measured(
-        np.abs(np.diff(joints, axis=0)) / CYCLE / speed, np.abs(np.diff(joints, 2, axis=0)) / CYCLE**2 / acceleration
+        np.abs(np.diff(joints, axis=0)) / CYCLE / speed,
+        np.abs(np.diff(joints, 2, axis=0)) / CYCLE**2 / acceleration,
+        told,
     )
 
 
@@ -116,56 +148,63 @@ def picture(target, machine, runs):
     figure.savefig(target, dpi=110)
 
 
-def prepare(machine, folder, place, upright, feed):
+def prepare(machine, folder, place, feed):
     """The job, its program as posted, and the same path as a plain post writes it."""
-    job = pk.prepare(machine, part(folder, upright, feed), workpiece=place)
+    job = pk.prepare(machine, part(folder, place, feed), workpiece=place.workpiece)
     file = io.BytesIO()
     pk.make_linuxcnc_program(job.trajectory)(file)
     text = file.getvalue().decode("ascii")
     return job, text, as_programmed(job.posted, text)
 
 
-def compare(folder, target):
-    """The Tricept: as programmed and as posted, with both planners."""
-    machine = trial("tricept", folder)
-    job, posted, plain = prepare(machine, folder, None, False, FEED)
-    start = world(machine, job.posted.poses[:1])[0]
-    with simulated(machine, stock=True) as simulation:
-        runs = [measure(machine, simulation, text, start) for text in (plain, posted)]
-    with simulated(machine, reserve=RESERVE) as simulation:
-        runs += [measure(machine, simulation, text, start) for text in (plain, posted)]
-    names = [
-        f"{what}, {whose} planner" for whose in ("LinuxCNC's", "parakin's") for what in ("as programmed", "posted")
-    ]
-    for name, run in zip(names, runs, strict=True):
-        print(f"| tricept, {name} | {run.describe()} |")
-    print(f"the trajectory takes {job.trajectory.seconds:.3f} s")
-    shown = [(f"{names[i]}: {runs[i].speeds.max():.0%} of a joint's speed", runs[i].speeds) for i in (0, 3)]
-    picture(target, machine, shown)
+def compare(folder, place, feed):
+    """A machine, as programmed and as posted, with both planners: rows of the table, and what ran by their titles."""
+    machine = trial(place.name, folder)
+    job, posted, plain = prepare(machine, folder, place, feed)
+    texts = {"as programmed": plain, "posted": posted}
+    runs = {}
+    for drives, reserve in (("ideal", None), ("limited", RESERVE)):
+        for planner in ("LinuxCNC's", "parakin's"):
+            with simulated(machine, reserve=reserve, stock=planner == "LinuxCNC's") as simulation:
+                for what, text in texts.items():
+                    runs[drives, what, planner] = measure(machine, simulation, job, text)
+                if planner == "parakin's":
+                    what = "posted, overrides and pauses"
+                    runs[drives, what, planner] = measure(machine, simulation, job, posted, CHANGES)
+    for (drives, what, planner), run in runs.items():
+        told = f"{job.trajectory.seconds:.3f} s" if what == "posted" else ""
+        name = f"{place.name}, {feed / 1000:g} m/min"
+        print(f"| {name} | {drives} | {what} | {planner} | {told} | {run.describe()} |", flush=True)
+    return machine, runs
 
 
-def run_posted(folder, name, place, upright, feed):
-    """A posted program on another machine."""
-    machine = trial(name, folder)
-    job, text, _ = prepare(machine, folder, place, upright, feed)
-    with simulated(machine, reserve=RESERVE) as simulation:
-        run = measure(machine, simulation, text, world(machine, job.posted.poses[:1])[0])
-    print(f"| {name}, posted, {feed / 1000:g} m/min | {run.describe()} | told {job.trajectory.seconds:.3f} s |")
+def show(target, machine, runs):
+    """The picture: as programmed with LinuxCNC's planner, and as posted with parakin's."""
+    chosen = [("ideal", "as programmed", "LinuxCNC's"), ("limited", "posted", "parakin's")]
+    titles = [f"{what}, {planner} planner" for _, what, planner in chosen]
+    speeds = [runs[key].speeds for key in chosen]
+    picture(
+        target,
+        machine,
+        [(f"{t}: {s.max():.0%} of a joint's speed", s) for t, s in zip(titles, speeds, strict=True)],
+    )
 
 
 def main():
     parser = argparse.ArgumentParser(description="Run a tool path under LinuxCNC as programmed and as posted.")
-    place = HERE.parent / "docs" / "pictures" / "linuxcnc.png"
-    parser.add_argument("-o", "--output", type=Path, default=place, metavar="PICTURE", help=f"default: {place.name}")
+    target = HERE.parent / "docs" / "pictures" / "linuxcnc.png"
+    parser.add_argument("-o", "--output", type=Path, default=target, metavar="PICTURE", help=f"default: {target.name}")
     options = parser.parse_args()
     missing = why_not()
     if missing:
         sys.exit(missing)
+    print("| machine | drives | program | planner | told | cycle time | speed | acceleration | beyond 1.05 |")
     with tempfile.TemporaryDirectory() as folder:
-        compare(folder, options.output)
-        for feed in (FEED, SLOW):
-            for name, place, upright in MACHINES:
-                run_posted(folder, name, place, upright, feed)
+        for place in PLACES:
+            for feed in (FEED, SLOW):
+                machine, runs = compare(folder, place, feed)
+                if (place.name, feed) == ("tricept", FEED):
+                    show(options.output, machine, runs)
     print(options.output)
 
 

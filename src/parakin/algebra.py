@@ -8,6 +8,7 @@ of rows.
 from __future__ import annotations
 
 from collections.abc import Container, Sequence
+from itertools import combinations
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -269,6 +270,20 @@ def apply(m: Mat, v: Vec) -> Vec:
 def product(m: Mat, n: Mat) -> Mat:
     columns = transpose(n)
     return tuple(tuple(dot(row, column) for column in columns) for row in m)
+
+
+def expand_determinant(rows: Sequence[Vec]) -> Scalar:
+    """Expand the determinant of n rows of n, row after row, by the minors of the rows before it: n 2ⁿ⁻¹ products."""
+    minors: dict[tuple[int, ...], Scalar] = {(): 1.0}
+    for size, row in enumerate(rows, 1):
+        minors = {
+            columns: dot(
+                [row[column] if (size - 1 - i) % 2 == 0 else -row[column] for i, column in enumerate(columns)],
+                [minors[columns[:i] + columns[i + 1 :]] for i in range(size)],
+            )
+            for columns in combinations(range(len(rows)), size)
+        }
+    return minors[tuple(range(len(rows)))]
 
 
 def make_axis_rotation(axis: str, s: Scalar, c: Scalar) -> Mat:

@@ -183,8 +183,9 @@ def simulated(machine, reserve=None, stock=False):
         folder, files = Path(name), pk.make_linuxcnc_configuration(machine)
         if reserve is not None:
             files[f"{machine.name}.hal"] = limit_drives(machine, files[f"{machine.name}.hal"], 1.0 + reserve)
-        ini = files[f"{machine.name}.ini"]
-        ini = (use_stock_planner(machine, ini) if stock else ini).replace("DISPLAY = axis", "DISPLAY = ./ui.py")
+        if stock:
+            use_stock_planner(machine, files)
+        ini = files[f"{machine.name}.ini"].replace("DISPLAY = axis", "DISPLAY = ./ui.py")
         files[f"{machine.name}.ini"] = ini.replace("[KINS]", "HALFILE = sampler.hal\n\n[KINS]")
         with installed(folder, files | {"sampler.hal": sampler(machine)}, HERE / "ui.py"):
             yield Simulation(machine, folder)
@@ -213,17 +214,20 @@ def installed(folder, files, ui):
 STOCK = {"VELOCITY": {"mm": 1.0, "rad": 4.0}, "ACCELERATION": {"mm": 6.0, "rad": 12.0}}
 
 
-def use_stock_planner(machine, ini):
-    """An ini file without the planner, with rates of the axes that LinuxCNC's own one can work with."""
-    ini = re.sub(r"\nTPMOD = .*", "", ini)
+def use_stock_planner(machine, files):
+    """Take the planner out of a configuration, and give the axes rates that LinuxCNC's own one can work with."""
+    hal, ini = f"{machine.name}.hal", re.sub(r"\nTPMOD = .*", "", files[f"{machine.name}.ini"])
+    files[hal] = re.sub(r"\nnet \S+(?=\n)", "", re.sub(r" => planner\.\S+", "", files[hal]))
     for axis, unit in zip(machine.axes, machine.axis_units, strict=True):
         head, section = ini.split(f"[AXIS_{axis}]")
         for rate, factors in STOCK.items():
             drives = [getattr(d, rate.lower().replace("velocity", "speed")) for d in machine.drives if d.unit == unit]
+            if not drives:
+                continue  # where struts turn the tool the axes have no drives of their own
             value = factors[unit] * min(drives) * (180.0 / np.pi if unit == "rad" else 1.0)
             section = re.sub(rf"PROGRAM_MAX_{rate} = .*", f"PROGRAM_MAX_{rate} = {value:.6f}", section, count=1)
         ini = f"{head}[AXIS_{axis}]{section}"
-    return ini
+    files[f"{machine.name}.ini"] = ini
 
 
 def limit_drives(machine, hal, factor):

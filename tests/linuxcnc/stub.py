@@ -32,7 +32,8 @@ class Kinematics:
         self.library = ctypes.CDLL(str(path))
         assert self.library.rtapi_app_main() == 0
         assert ctypes.c_int.in_dll(stub, "stub_ready").value == 1
-        self.tool_offset = ctypes.POINTER(ctypes.c_double).in_dll(stub, "stub_tool_offset").contents  # mm
+        offset = ctypes.POINTER(ctypes.c_double).in_dll(stub, "stub_tool_offset")
+        self.tool_offset = offset.contents if offset else None  # mm; LinuxCNC's own modules have none of this name
         self.exported = stub.stub_count()  # its functions are the last
 
     def watch_steps(self, watched):

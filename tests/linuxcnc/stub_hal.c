@@ -6,6 +6,7 @@
 #include <stdio.h>
 #include <string.h>
 
+double *stub_tool_offset; /* the last module's length of the tool, which a test may set */
 char stub_name[64];
 int stub_ready;
 
@@ -13,6 +14,7 @@ int hal_init(const char *name)
 {
     snprintf(stub_name, sizeof stub_name, "%s", name);
     stub_ready = 0;
+    stub_tool_offset = NULL;
     return 1;
 }
 
@@ -50,9 +52,6 @@ int stub_run(const char *name, int before)
 
 static void *pin(size_t size) { return calloc(1, size); }
 
-/* The last module's length of the tool, which a test may set. */
-double *stub_tool_offset;
-
 int hal_pin_float_newf(int dir, double **data, int component, const char *format, ...)
 {
     (void)dir, (void)component;
@@ -60,6 +59,17 @@ int hal_pin_float_newf(int dir, double **data, int component, const char *format
     if (!strcmp(format, "kins.tool-offset"))
         stub_tool_offset = *data;
     return 0;
+}
+
+int hal_pin_float_new(const char *name, int dir, double **data, int component)
+{
+    return (void)name, hal_pin_float_newf(dir, data, component, "");
+}
+
+int hal_param_float_newf(int dir, double *data, int component, const char *format, ...)
+{
+    (void)dir, (void)component, (void)format;
+    return *data = 0.0, 0;
 }
 
 int hal_pin_bit_newf(int dir, char **data, int component, const char *format, ...)

@@ -186,16 +186,6 @@ MODEL int joint_rates(const double *x, const double *q, double rates[JOINTS][AXE
     return finite_all(rates[0], JOINTS * AXES);
 }
 
-/* The singularity margins, positive on home's side, zero at a singularity: first the parallel one, whose sign is the
-   side that the machine works on; then the serial ones. Their names follow the limits' in limit_names. */
-MODEL void measure_singularities(const double *x, const double *q, double *margins)
-{
-    double w[WRENCHES][WRENCHES];
-    int order[WRENCHES];
-    wrenches(x, q, w[0], &margins[1]);
-    margins[0] = factor(WRENCHES, w, order);
-}
-
 /* Whether a pose keeps its distance to every singularity, on home's side of them. */
 MODEL int regular(const double *x, const double *q)
 {

@@ -7,7 +7,7 @@ from importlib.resources import files
 
 import numpy as np
 
-from ...algebra import Scalar, Trace, absolute
+from ...algebra import Trace, absolute, expand_determinant
 from ...arrays import Array
 from ...kernels.newton import SLOW, WORTH
 from ...kernels.tape import Tape, compile_tape
@@ -24,6 +24,7 @@ from ...performance.jacobians import list_column_scales
 from ...performance.singularities import compute_singularity_margins, find_home_signs, list_margin_names
 from .axis_rates import choose_drive_rates
 from .home_pose import find_home_pose
+from .margin_signs import find_cheap_sign
 from .tape_to_c import CVector, format_c, write_function, write_test
 
 NO_SIDE = 1e-6  # of home's determinant: less is a singularity, of no side
@@ -57,10 +58,14 @@ _HEADER = """\
 
 _ELEMENTARY = """\
 /* As in parakin: NaN goes through, and no direction has the angle 0. */
-MODEL double lesser(double x, double y) { return x < y || x != x ? x : y; }
-MODEL double greater(double x, double y) { return x > y || x != x ? x : y; }
+MODEL double lesser(double x, double y) { return y != y ? y : y < x ? y : x; }
+MODEL double greater(double x, double y) { return y != y ? y : y > x ? y : x; }
 MODEL double with_sign(double x, double y) { return (y < 0.0 ? -fabs(x) : fabs(x)) + 0.0 * y; }
 MODEL double angle_of(double y, double x) { return atan2(y + 0.0, x + 0.0); }
+
+/* The same sine is computed once in a function, and in those that are compiled into it. */
+MODEL __attribute__((const, noinline)) double sine(double x) { return sin(x); }
+MODEL __attribute__((const, noinline)) double cosine(double x) { return cos(x); }
 """
 
 
@@ -93,7 +98,6 @@ def _write_numbers(machine: Machine) -> str:
         f"#define JOINTS {len(machine.joints)}",
         f"#define CLOSURES {machine.leg_count}",
         f"#define SERIAL {len(machine.joints) - machine.leg_count} /* joints of head and table */",
-        f"#define WRENCHES {_count_wrenches(machine)} /* rows whose determinant tells a parallel singularity */",
         f"#define LIMITS {len(machine.limits)} /* of the machine's description */",
         f"#define SINGULARITIES {len(list_margin_names(machine))}",
         f"#define SPHERES {by_spheres} /* the forward in closed form: the common point of spheres */",
@@ -257,9 +261,9 @@ def _write_mathematics(machine: Machine) -> Iterator[str]:
     yield write_function(
         "measure_limits", _compile_limits(machine, True), [x, q], [CVector("margins", len(machine.limits))]
     )
-    rows, count = _count_wrenches(machine), len(machine.joints)
-    serial = CVector("serial", len(list_margin_names(machine)) - 1)
-    yield write_function("wrenches", _compile_wrenches(machine), [x, q], [CVector("w", rows * rows), serial])
+    count = len(machine.joints)
+    singularities = CVector("margins", len(list_margin_names(machine)))
+    yield write_function("measure_singularities", _compile_singularities(machine), [x, q], [singularities])
     jacobians = [CVector("a", count * len(machine.axes)), CVector("b", count * count)]
     yield write_function("jacobians", tapes.jacobians, [x, q], jacobians)
     if tapes.spheres is not None:
@@ -280,13 +284,13 @@ def _write_mathematics(machine: Machine) -> Iterator[str]:
 
 
 def _compile_limits(machine: Machine, drives: bool) -> Tape:
-    """Compile pose, joints -> every margin, or all but those of the drives' ranges, which LinuxCNC watches itself."""
+    """Compile pose, joints -> every margin, or the signs of all but the drives' ranges, which LinuxCNC watches."""
     trace = Trace()
     pose = trace.inputs(len(machine.axes))
     joints = trace.inputs(len(machine.joints), len(machine.axes))
     margins = zip(machine.limit_definitions, machine.trace_margins(pose, machine.mode, joints), strict=True)
     watched = [margin for limit, margin in margins if drives or not bounds_drive(machine, limit)]
-    return compile_tape(trace, watched, len(pose) + len(joints))
+    return compile_tape(trace, watched if drives else [find_cheap_sign(m) for m in watched], len(pose) + len(joints))
 
 
 def _count_wrenches(machine: Machine) -> int:
@@ -294,11 +298,10 @@ def _count_wrenches(machine: Machine) -> int:
     return machine.leg_count if machine.wrist is not None else len(machine.axes)
 
 
-def _compile_wrenches(machine: Machine) -> Tape:
-    """Compile pose, joints -> unit wrenches (rows, rows) and the serial singularity margins.
+def _compile_singularities(machine: Machine) -> Tape:
+    """Compile pose, joints -> the parallel and the serial singularity margins, positive at home.
 
-    The determinant of the wrenches is the parallel margin, and all are positive at home, as of
-    :func:`~...performance.singularities.compute_singularity_margins`.
+    They are those of :func:`~...performance.singularities.compute_singularity_margins`.
     """
     trace, legs, n = Trace(), machine.leg_count, len(machine.axes)
     rates = machine.trace_rates(trace.inputs(n), trace.inputs(len(machine.joints), n))
@@ -306,10 +309,8 @@ def _compile_wrenches(machine: Machine) -> Tape:
     columns_a, columns_b = (scales.tolist() for scales in list_column_scales(machine, length))
     signs = find_home_signs(machine, length, machine.mode).tolist()
     factors = [*(1.0 / norm for norm in rates.wrench_norms), *[length.factor] * (n - legs)]
-    outputs: list[Scalar] = []
-    for number in range(rows):
-        sign = signs[0] if number == 0 else 1.0
-        outputs += [rates.a[number][i] * factors[number] * (sign * columns_a[i]) for i in range(rows)]
+    wrenches = [[rates.a[row][i] * factors[row] * columns_a[i] for i in range(rows)] for row in range(rows)]
+    outputs = [signs[0] * expand_determinant(wrenches)]
     for number, joint in enumerate(machine.closure_joints):
         outputs.append(rates.b[number][joint] * factors[number] * (signs[1 + number] * columns_b[joint]))
     if n > legs:

@@ -10,8 +10,9 @@ from math import isinf
 from ...kernels import tape as t
 from ...kernels.tape import Tape
 
-# The operations with one result and no constants; the runtime defines what C lacks.
+# The operations without constants; the runtime defines what C lacks. A sine and a cosine are two results, by two words.
 CALLS = {
+    t.SINCOS: "sine({0}) cosine({0})",
     t.DIV: "{0} / {1}",
     t.SQRT: "sqrt({0})",
     t.ATAN2: "angle_of({0}, {1})",
@@ -87,9 +88,9 @@ def list_statements(
     for row, constants in zip(tape.code.tolist(), tape.constants.tolist(), strict=True):
         operation, target, *operands = row
         if operation == t.SINCOS:
-            argument = names[operands[1]]
-            let(target, f"sin({argument})")
-            let(operands[0], f"cos({argument})")
+            sine, cosine = calls[operation].format(names[operands[1]]).split()
+            let(target, sine)
+            let(operands[0], cosine)
         else:
             operand_names = [names.get(operand, "") for operand in operands]
             let(target, _write_expression(operation, operand_names, constants, calls))

@@ -18,9 +18,9 @@ static int can_step(const double *q, const double *last)
     return !far_from_last || !far_from_commanded;
 }
 
-int kinematicsInverse(const EmcPose *world, double *joints,
+__attribute__((flatten)) int kinematicsInverse(const EmcPose *world, double *joints,
                       const KINEMATICS_INVERSE_FLAGS *iflags, KINEMATICS_FORWARD_FLAGS *fflags)
-{
+{ /* flattened: what joints, limits and singularities have in common is computed once */
     double x[AXES], q[JOINTS], last[JOINTS];
     (void)iflags;
     (void)fflags;

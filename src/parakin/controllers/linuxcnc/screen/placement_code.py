@@ -15,6 +15,7 @@ from ....model.chain import UNIT
 from ..tape_to_c import CALLS, CVector, list_statements
 
 _PYTHON = CALLS | {
+    t.SINCOS: "sin({0}) cos({0})",
     t.ATAN2: "atan2({0} + 0.0, {1} + 0.0)",
     t.MIN: "min({0}, {1})",
     t.MAX: "max({0}, {1})",

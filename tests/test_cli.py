@@ -5,6 +5,7 @@ import json
 import os
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 from shipped import REPRESENTATIVES
@@ -212,6 +213,21 @@ def test_show(name, capsys, tmp_path, monkeypatch):
     assert main(["show", name, "--json"]) == 0
     assert not list(tmp_path.iterdir())
     assert json.loads(capsys.readouterr().out, parse_constant=pytest.fail)["name"] == name
+
+
+def test_show_how_a_joint_is_driven(tmp_path, capsys):
+    text = (Path(pk.__file__).parent / "machines" / "tricept.yaml").read_text(encoding="utf-8")
+    keys = "joints: [d1, d2, d3]\n  counts: 10000\n  lead: 10 mm\n  homing: absolute"
+    (tmp_path / "driven.yaml").write_text(text.replace("joints: [d1, d2, d3]", keys), encoding="utf-8")
+    assert main(["show", str(tmp_path / "driven.yaml"), "-o", str(tmp_path / "picture.html")]) == 0
+    (row,) = [line.split() for line in capsys.readouterr().out.splitlines() if line.startswith("d2 ")]
+    assert row == ["d2", "934", "1,520", "mm", "500", "5,000", "250,000", "10,000", "10", "absolute"]
+    assert main(["show", str(tmp_path / "driven.yaml"), "--json"]) == 0
+    drives = json.loads(capsys.readouterr().out)["drives"]
+    assert [[drives[i][key] for key in ("counts", "lead", "homing")] for i in (0, 4)] == [
+        [10000.0, 10.0, "absolute"],
+        [None, None, None],
+    ]
 
 
 def test_show_picture(tmp_path, capsys):

@@ -15,6 +15,7 @@ import linuxcnc
 
 MOST = 200.0  # s for a step: a program may be slowed by the override
 TRAILS = 1e-7  # mm and degrees
+PATIENCE = 1.0  # s for a mode to be in force
 LATE = 1.0  # s for the feedback to come to the command
 REST = 0.15  # s for which the machine must stand
 FLICKER = 1e-8  # mm and degrees: in joint mode the position is found anew in every cycle, and its last digits change
@@ -27,15 +28,19 @@ class Operator:
         self.command, self.status, self.errors = linuxcnc.command(), linuxcnc.stat(), linuxcnc.error_channel()
         self.joints, self.said, self.pressing = joints, [], None
 
-    def wait(self, ready):
-        end = time.monotonic() + MOST
-        while time.monotonic() < end:
+    def sees(self, ready, seconds):
+        """Whether the status is ``ready`` within a time."""
+        end = time.monotonic() + seconds
+        while True:
             self.status.poll()
             self.listen()
-            if ready(self.status):
-                return
+            if ready(self.status) or time.monotonic() > end:
+                return ready(self.status)
             time.sleep(0.01)
-        raise TimeoutError
+
+    def wait(self, ready):
+        if not self.sees(ready, MOST):
+            raise TimeoutError
 
     def listen(self):
         told = self.errors.poll()
@@ -46,6 +51,21 @@ class Operator:
     def tell(self, word, *arguments):
         getattr(self.command, word)(*arguments)
         self.command.wait_complete()
+
+    def ask(self, ready, word, *arguments):
+        """Ask for a mode until it is in force: while anything moves LinuxCNC's motion does not take it, without a word.
+
+        On a busy computer the status that shows a machine at rest may be older than that.
+        """
+        end = time.monotonic() + MOST
+        while time.monotonic() < end:
+            self.tell(word, *arguments)
+            if self.sees(ready, PATIENCE):
+                return
+        raise TimeoutError
+
+    def take_mode(self, mode):
+        self.ask(lambda s: s.task_mode == mode, "mode", mode)
 
     def switch_on(self):
         self.wait(lambda s: s.joints == self.joints)
@@ -59,16 +79,16 @@ class Operator:
         self.wait(lambda s: all(s.homed[: self.joints]))
 
     def joint_mode(self):
-        self.tell("mode", linuxcnc.MODE_MANUAL)
-        self.wait(lambda s: s.task_mode == linuxcnc.MODE_MANUAL)
-        self.tell("teleop_enable", 0)
-        self.wait(lambda s: s.motion_mode == linuxcnc.TRAJ_MODE_FREE)
+        self.take_mode(linuxcnc.MODE_MANUAL)
+        self.ask(lambda s: s.motion_mode == linuxcnc.TRAJ_MODE_FREE, "teleop_enable", 0)
 
     def world_mode(self):
-        self.tell("mode", linuxcnc.MODE_MANUAL)
-        self.wait(lambda s: s.task_mode == linuxcnc.MODE_MANUAL)
-        self.tell("teleop_enable", 1)
-        self.wait(lambda s: s.motion_mode == linuxcnc.TRAJ_MODE_TELEOP or s.task_state != linuxcnc.STATE_ON)
+        self.take_mode(linuxcnc.MODE_MANUAL)
+        self.ask(
+            lambda s: s.motion_mode == linuxcnc.TRAJ_MODE_TELEOP or s.task_state != linuxcnc.STATE_ON,
+            "teleop_enable",
+            1,
+        )
 
     def jog(self, axis, speed, seconds):
         """Jog an axis by its number, mm/s or degrees/s."""
@@ -86,15 +106,13 @@ class Operator:
 
     def mdi(self, block, seconds=None):
         """Run a block; with seconds abort it after these."""
-        self.tell("mode", linuxcnc.MODE_MDI)
-        self.wait(lambda s: s.task_mode == linuxcnc.MODE_MDI)
+        self.take_mode(linuxcnc.MODE_MDI)
         self.command.mdi(block)
         self._run_out(seconds)
 
     def program(self, name, seconds=None):
         path = str(Path(name).resolve())
-        self.tell("mode", linuxcnc.MODE_AUTO)
-        self.wait(lambda s: s.task_mode == linuxcnc.MODE_AUTO)
+        self.take_mode(linuxcnc.MODE_AUTO)
         self.tell("program_open", path)
         self.wait(lambda s: s.file == path)
         self.command.auto(linuxcnc.AUTO_RUN, 0)
@@ -155,7 +173,8 @@ class Operator:
             self.listen()
             here = (*self.status.position, *self.status.joint_position)
             moved = last is None or max(abs(a - b) for a, b in zip(here, last, strict=True)) > FLICKER
-            if moved or (self.status.interp_state != linuxcnc.INTERP_IDLE and not self.is_off()):
+            busy = self.status.interp_state != linuxcnc.INTERP_IDLE or not self.status.inpos
+            if moved or (busy and not self.is_off()):
                 since, last = time.monotonic(), here
             if time.monotonic() > since + REST:
                 return

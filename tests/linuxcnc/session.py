@@ -9,6 +9,7 @@ import sys
 import tempfile
 from collections import Counter
 from pathlib import Path
+from time import perf_counter
 
 import numpy as np
 from simulation import CYCLE, simulated, trial
@@ -22,6 +23,7 @@ LIMITED = 0.02  # drives' limits above the description's
 AGREE = 1e-6  # mm and degrees
 HELD = 1e-2  # the same nearer to a wrist's pole than 8e-6 rad, where a joint is held
 STEP = 2.0  # of a joint's speed: the most in a cycle
+FEEDS = 6e3, 6e4  # mm/min: the planner is to keep the joints' limits
 STOPS = ("stop_at_once", "stop_amid")
 
 
@@ -62,7 +64,7 @@ class Session:
     def write_move(self, word="G1"):
         row = world(self.machine, self.rng.uniform(self.box.low, self.box.high)[None])[0]
         places = " ".join(f"{FIELDS[column]}{row[column]:.4f}" for column in self.columns)
-        return f"{word} {places} F{self.rng.uniform(3000.0, 9000.0):.0f}"
+        return f"{word} {places} F{self.rng.uniform(*FEEDS):.0f}"
 
     def move(self):
         return [["mdi", self.write_move(str(self.rng.choice(["G0", "G1"])))]]
@@ -151,12 +153,13 @@ def check_joints(machine, joints, steps):
 
 
 def main():
-    name, count, seed = sys.argv[1], int(sys.argv[2]), int(sys.argv[3])
+    name, count, seed, begin = sys.argv[1], int(sys.argv[2]), int(sys.argv[3]), perf_counter()
     with tempfile.TemporaryDirectory() as folder:
         machine = pk.load(name) if name.endswith(".yaml") else trial(name, folder)
         seen, joints, wrong = run_session(machine, count, seed)
     said = Counter(" ".join(step["said"])[:90] for step in seen)
-    print(f"{Path(name).stem}, seed {seed}: {len(seen)} steps, {len(joints)} cycles, {len(wrong)} wrong")
+    took = f"{perf_counter() - begin:.0f} s"
+    print(f"{Path(name).stem}, seed {seed}: {len(seen)} steps, {len(joints)} cycles, {len(wrong)} wrong, {took}")
     print("\n".join([*wrong, *(f"{count:5d} x {words}" for words, count in said.most_common(12))]))
 
 

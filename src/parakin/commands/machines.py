@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 from cyclopts import Parameter
 
 from ..errors import InputError
-from ..export.json.machine import RATES, encode_details, encode_machine, encode_machines
+from ..export.json.machine import MOTOR, RATES, encode_details, encode_machine, encode_machines
 from ..export.number_format import format_fixed
 from ..units import name_display_unit
 from .console import format_table, print_json, print_text
@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from ..machine import Machine
 
 _HEADERS = dict(zip(RATES, ("speed /s", "acceleration /s2", "jerk /s3"), strict=True))
+_HEADERS |= dict(zip(MOTOR, ("counts a turn", "lead", "homing"), strict=True))
 
 
 def machines(*, json: Json = False) -> int:
@@ -91,7 +92,9 @@ def _write_picture(machine: Machine, output: Path) -> None:
     write_files(output.parent, {output.name: render(machine)})
 
 
-def _format_number(value: float | None) -> str:
+def _format_number(value: float | str | None) -> str:
+    if isinstance(value, str):
+        return value
     if value is None or not abs(value) < float("inf"):
         return "-"
     return format_fixed(value, 4).rstrip("0").rstrip(".")
@@ -103,10 +106,12 @@ def _format_bound(value: float | None, unit: str) -> tuple[str, str]:
 
 def _summarise_machine(machine: Machine) -> str:
     details = encode_details(machine)
-    rates = [key for key in RATES if any(d[key] < float("inf") for d in details["drives"])]
+    columns = [key for key in RATES if any(d[key] < float("inf") for d in details["drives"])]
+    columns += [key for key in MOTOR if any(d[key] is not None for d in details["drives"])]
+    headers = [_HEADERS[key] for key in columns]
     drives = [
         (d["joint"], *(_format_number(d[key]) for key in ("low", "high")), d["unit"],
-         *(_format_number(d[key]) for key in rates))
+         *(_format_number(d[key]) for key in columns))
         for d in details["drives"]
     ]  # fmt: skip
     signs = {"min": "at least", "max": "at most", "reach": "must close"}
@@ -120,7 +125,7 @@ def _summarise_machine(machine: Machine) -> str:
         f"axes    {' '.join(machine.axes)}\njoints  {' '.join(machine.joints)}"
         + (f"\nmode    {machine.mode}, of {len(machine.modes)}" if machine.mode else ""),
         format_table(sizes, ("size", "mm, rad"), " r") if sizes else "",
-        format_table(drives, ("drive", "from", "to", "", *(_HEADERS[key] for key in rates)), " rr " + "r" * len(rates)),
+        format_table(drives, ("drive", "from", "to", "", *headers), " rr " + "r" * len(headers)),
         format_table(limits, ("limit", "of", "", "bound", ""), "   r"),
         format_table(
             [

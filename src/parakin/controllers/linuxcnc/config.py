@@ -10,7 +10,7 @@ from ...model.elements import Drive
 from ...units import to_display
 from .axis_ranges import estimate_axis_ranges
 from .axis_rates import choose_drive_rates, choose_unit_rates, find_slowest_drive
-from .guard import name_guard
+from .guard import hash_guard, name_guard
 from .hand_box import HandBox, find_hand_box
 from .hardware import Equipment, wiring
 from .home_pose import find_home_pose
@@ -129,7 +129,7 @@ net identity kins.identity => planner.identity
 net tool-offset => planner.tool-offset
 
 # The guard: it stops jogs before a limit, and gives the axes' rates.
-loadrt {guard}
+loadrt {guard} made={guard_made}
 addf guard.watch servo-thread
 net tool-offset => guard.tool-offset
 net identity => guard.identity
@@ -304,6 +304,7 @@ def write_hal(machine: Machine, equipment: Equipment | None = None) -> str:
         loops="\n".join(loops),
         told="\n".join(commanded),
         guard=name_guard(machine),
+        guard_made=hash_guard(machine),
         watched="\n".join([*watched, ""]),
     )
 

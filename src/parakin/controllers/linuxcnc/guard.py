@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from ...machine import Machine
-from .realtime_module import RealtimeModule, read_source, write_realtime_module
+from .realtime_module import RealtimeModule, hash_realtime_module, read_source, write_realtime_module
 
 _NUMBERS = {
     "TRAILS": ("10.0", "cycles at full speed by which interpolated joints may be behind the pose"),
@@ -21,8 +21,15 @@ def name_guard(machine: Machine) -> str:
 
 def write_guard(machine: Machine) -> str:
     """Write the C source of a machine's guard."""
+    return write_realtime_module(machine, _make_module(machine))
+
+
+def hash_guard(machine: Machine) -> str:
+    """Hash a machine's guard, so that a module of an older description is recognised."""
+    return hash_realtime_module(machine, _make_module(machine))
+
+
+def _make_module(machine: Machine) -> RealtimeModule:
     numbers = [f"#define {name} {value} /* {why} */" for name, (value, why) in _NUMBERS.items()]
     body = "\n".join([*numbers, "", read_source(__package__, "guard.c")])
-    return write_realtime_module(
-        machine, RealtimeModule(name_guard(machine), "keeps moves by hand within the limits of", body)
-    )
+    return RealtimeModule(name_guard(machine), "keeps moves by hand within the limits of", body)

@@ -9,8 +9,10 @@ from ...units import name_display_unit, to_display
 
 if TYPE_CHECKING:
     from ...machine import Machine
+    from ...model.elements import Drive
 
 RATES = ("speed", "acceleration", "jerk")
+MOTOR = ("counts", "lead", "homing")
 
 
 def encode_machines(machines: Iterable[Machine]) -> dict[str, Any]:
@@ -47,6 +49,7 @@ def encode_details(machine: Machine) -> dict[str, Any]:
             "joint": drive.name,
             "unit": name_display_unit(drive.unit),
             **{key: to_display(getattr(drive, key), drive.unit) for key in ("low", "high", *RATES)},
+            **_encode_motor(drive),
         }
         for drive in machine.drives
     ]
@@ -68,4 +71,13 @@ def encode_details(machine: Machine) -> dict[str, Any]:
         "drives": drives,
         "limits": limits,
         "home": {axis: to_display(value, unit) for axis, value, unit in home},
+    }
+
+
+def _encode_motor(drive: Drive) -> dict[str, Any]:
+    """Encode how a controller drives a joint: counts of a motor's turn, the joint's way meanwhile, its home switch."""
+    said = {key: getattr(drive, key) for key in MOTOR}
+    return {
+        key: to_display(value, drive.unit) if isinstance(value, float) and key != "counts" else value
+        for key, value in said.items()
     }

@@ -42,7 +42,7 @@ SPREAD = {  # about home, mm and rad: the allowed workspace and a margin beyond
     "rotary_delta": [200, 200, 200],
     "rpr3": [200, 200, 0.75],
     "rrr3": [200, 200, 0.45],
-    "rus6": [180, 180, 150, 0.4, 0.4, 0.5],
+    "rus6": [150, 150, 120, 0.3, 0.3, 0.4],
     "tornado_2000": [300, 300, 250, 0.6, 0.6, 0.6],
     "tricept": [1200, 1200, 500, 1.8, 3.3],
     "tricept_805": [1400, 1400, 600, 1.8, 3.3],

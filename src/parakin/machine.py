@@ -22,7 +22,7 @@ from .kinematics.limit_margins import compute_margins, find_broken_limits
 from .kinematics.path_modes import PathMode, find_path_modes
 from .kinematics.solution import Solution
 from .kinematics.tapes import KinematicTapes, collect_tapes
-from .kinematics.travel import Travel, find_travel
+from .kinematics.travel import LineTapes, Travel, compile_line_tapes, find_travel
 from .kinematics.wrist.pole_crossing import flip_mode
 from .kinematics.wrist.pole_thresholds import EXACT
 from .machine_properties import MachineProperties
@@ -250,6 +250,12 @@ class Machine(MachineProperties):
     def tapes(self, mode: str) -> KinematicTapes:
         """Compile the kinematics in a working mode for other interpreters, such as the C of a controller."""
         return collect_tapes(self.model, mode)
+
+    def line_tapes(self, mode: str) -> LineTapes:
+        """Compile the margins along a line of poses for other interpreters of intervals; only without a wrist."""
+        if self.wrist is not None:
+            raise NoMethodError(f"{self.name}: margins along a line are compiled for machines without a wrist only")
+        return compile_line_tapes(self.model, self.checked_mode(mode))
 
     def jacobians(self, poses: RowsLike, mode: str | None = None) -> tuple[Array, Array]:
         """Compute A and B, each (..., n, n), with A x' = B q' for the rates of pose and joints.

@@ -15,9 +15,9 @@ if TYPE_CHECKING:
     from ..export.files import Content
     from ..machine import Machine
 
-ENDINGS = {"mjcf": ".xml"}  # of the files, by what can be written
+ENDINGS = {"mjcf": ".xml", "check-move": ".h"}  # of the files, by what can be written
 
-To = Annotated[Literal["mjcf"], Parameter(name="--to")]
+To = Annotated[Literal["mjcf", "check-move"], Parameter(name="--to")]
 
 
 def export(
@@ -36,7 +36,8 @@ def export(
     name
         A shipped machine's name or a YAML file.
     to
-        What to write: mjcf, a MuJoCo model with closed loops, limits, masses and a servo for each drive.
+        What to write: mjcf, a MuJoCo model with closed loops, limits, masses and a servo for each drive; check-move, a
+        small C function for firmware that proves a straight move inside the machine's limits.
     output
         The file; by default the machine's name in this folder.
     """
@@ -56,6 +57,10 @@ def export(
 
 
 def _render(machine: Machine, to: str) -> Content:
+    if to == "check-move":
+        from ..controllers.move_check.move_check import render_move_check
+
+        return render_move_check(machine)
     from ..export.machine.mjcf import render_mjcf
 
-    return {"mjcf": render_mjcf}[to](machine)
+    return render_mjcf(machine)

@@ -10,12 +10,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import lru_cache
 from math import inf, pi
+from typing import NamedTuple
 
 import numpy as np
 
 from ..algebra import Scalar, Trace, derivative
 from ..arrays import Array, Flags
 from ..kernels.intervals import IntervalProgram, JumpFreeTrace
+from ..kernels.tape import Tape
 from ..model.rates import compute_twist_rates, expand_determinant
 from ..model.traces import Model
 from ..units import AXIS_UNITS
@@ -59,6 +61,20 @@ class Travel:
     back: TravelEnd
 
 
+class LineTapes(NamedTuple):
+    """Margins along a line of poses, for other interpreters of intervals.
+
+    values : takes start, direction and share t to the margins, det A and more
+    rates : takes them to the derivatives of margins and det A by t, and more
+    sign, floor : of det A at home, and what det A times it has to stay above
+    """
+
+    values: Tape
+    rates: Tape
+    sign: float
+    floor: float
+
+
 class _LineBounds:
     """Bounds of margins, det A and wrist over spans [a, b] of lines of poses, in one working mode.
 
@@ -92,6 +108,11 @@ class _LineBounds:
         share = trace.input(2 * self.width)
         return IntervalProgram(trace, [derivative(value, share) for value in (*margins, determinant, *turning)])
 
+    @property
+    def tapes(self) -> tuple[Tape, Tape]:
+        """The tapes of values and rates."""
+        return self._values.tape, self._rates[0].tape
+
     def bound_values(self, line: Array, begin: Array, end: Array) -> tuple[Array, Array]:
         """Bound margins, det A and freedom over spans (k,) of a line: (k, margins + 2) each.
 
@@ -121,6 +142,14 @@ def _stack_boxes(line: Array, begin: Array, end: Array) -> tuple[Array, Array]:
 def find_travel(model: Model, pose: Array, direction: Array, mode: str) -> Travel:
     """Find the travel left from a pose (axes,) along a direction (axes,), mm and rad, both ways."""
     return Travel(*(_Way(model, pose, sign * direction, mode).prove() for sign in (1.0, -1.0)))
+
+
+def compile_line_tapes(model: Model, mode: str) -> LineTapes:
+    """Compile the margins along a line of poses, and their rates, of a machine without a wrist."""
+    bounds, at = _compile_line(model, mode), np.zeros(1)
+    down, _ = bounds.bound_values(np.concatenate([model.home, np.zeros(len(model.axes) + 1)]), at, at)
+    sign = -1.0 if down[0, len(model.limits)] < 0.0 else 1.0
+    return LineTapes(*bounds.tapes, sign, _find_least_determinant(model))
 
 
 def _find_least_determinant(model: Model) -> float:

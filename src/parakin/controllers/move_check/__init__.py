@@ -1,0 +1,1 @@
+"""A small C function for firmware that proves a straight move inside a machine's limits."""

@@ -18,6 +18,7 @@ from .commands.atlas import atlas
 from .commands.console import print_remark
 from .commands.design import design
 from .commands.export import export
+from .commands.import_ import import_machine
 from .commands.kinematics import forward, inverse
 from .commands.linuxcnc import linuxcnc
 from .commands.machines import machines, show
@@ -40,6 +41,7 @@ app = App(
 )
 for command in (post, inverse, forward, assemblies, reach, linuxcnc, machines, show, workspace, atlas, design, export):
     app.command(command)
+app.command(import_machine, name="import")
 app.register_install_completion_command()
 
 

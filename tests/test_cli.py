@@ -230,6 +230,16 @@ def test_show_how_a_joint_is_driven(tmp_path, capsys):
     ]
 
 
+def test_show_yaml(capsys, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert main(["show", "tricept", "--yaml", "--set", "R=360mm"]) == 0
+    (tmp_path / "mine.yaml").write_text(capsys.readouterr().out, encoding="utf-8")
+    assert [path.name for path in tmp_path.iterdir()] == ["mine.yaml"]
+    here = pk.load("tricept").home
+    assert (pk.load("mine.yaml").inverse(here) == pk.load("tricept", parameters={"R": "360 mm"}).inverse(here)).all()
+    assert "--yaml" in refused(capsys, "show", "tricept", "--yaml", "--json")
+
+
 def test_show_picture(tmp_path, capsys):
     for suffix, start in (("html", b"<!doctype html"), ("png", b"\x89PNG")):
         target = tmp_path / f"picture.{suffix}"

@@ -120,7 +120,8 @@ def test_rails_cover_the_range_and_carry_the_feet(machine):
             if rails and unit == "mm":
                 a, b = rails[0].points
                 assert np.linalg.norm(b - a) == pytest.approx(drive.high - drive.low)
-                feet = [item.points[0] for item in drawn.of("rod", "arm") if item.name == drive.name]
+                carried = leg.drives[0] if leg.kind == "column" else drive  # one rod on carriage and slide
+                feet = [item.points[0] for item in drawn.of("rod", "arm") if item.name == carried.name]
                 assert np.linalg.norm(feet[0] - a) + np.linalg.norm(feet[0] - b) == pytest.approx(
                     drive.high - drive.low
                 )

@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import subprocess
 import sys
+from dataclasses import replace
 from itertools import product
 from math import cos, hypot, isfinite, pi, radians, sin, sqrt
 
 import numpy as np
 import pytest
 
+import parakin as pk
 from parakin.description import list_shipped_machines, read_machine
+from parakin.description.writing import format_spec
 from parakin.model.elements import Range
 
 # The shipped machines.
@@ -176,6 +179,59 @@ def test_linear_delta():
         for leg in spec.legs:
             rod = np.array([leg.foot[0] - leg.platform[0] - x, leg.foot[1] - leg.platform[1] - y])
             assert 300 < sqrt(spec.sizes["rod"] ** 2 - rod @ rod) < 700
+
+
+@pytest.mark.parametrize("name", list_shipped_machines())
+def test_a_machine_written_with_every_number_is_the_same_machine(name, tmp_path):
+    machine, file = pk.load(name), tmp_path / "written.yaml"
+    file.write_text(machine.format_yaml(), encoding="utf-8")
+    written = pk.load(file)
+    poses = machine.home + np.random.default_rng(1).uniform(-0.3, 0.3, (1000, len(machine.axes))) * [
+        1.0 if unit == "rad" else 500.0 for unit in machine.axis_units
+    ]
+    joints = machine.inverse(poses)
+    assert np.array_equal(written.inverse(poses), joints, equal_nan=True)
+    assert np.array_equal(written.margins(poses), machine.margins(poses), equal_nan=True)
+    assert written.drives == machine.drives
+    assert (written.limits, written.mode, written.home.tolist()) == (
+        machine.limits,
+        machine.mode,
+        machine.home.tolist(),
+    )
+    assert len(written.legs) == file.read_text(encoding="utf-8").count("  - kind: ")
+
+
+def test_a_written_machine_keeps_controllers_numbers_and_odd_titles(tmp_path):
+    text = """\
+name: odd
+title: '"quoted" \\ and # more: [x]'
+source: "Sizes were chosen, no: - nothing ~ \u00b5"
+sizes: {R: 500 mm}
+mounting: inclined 30 deg
+motion: tx ty tz
+legs:
+  - {kind: slider, joints: [a], foot: [R, 0, 0], rail: [0, 0.1, 1], rod: 700 mm, branch: "+", platform: [1 in, 0, 0],
+     range: [-2 m, 2 m], counts: 10000, lead: -5 mm, homing: 915 mm}
+  - {kind: slider, joints: [b], foot: [-R / 2, R * sqrt(3) / 2, 0], rail: [0, 0, 1], rod: 710 mm, branch: "+",
+     platform: [0, 0, 0], range: [-2 m, 2 m], homing: absolute}
+  - {kind: crank, joints: [c], pivot: [-R / 2, -R, 400 mm], axis: [1, 0, 0], zero: [0, 1, 0], arm: 300 mm, rod: 800 mm,
+     branch: "-", platform: [0, 0, 0], range: [-720 deg, 720 deg], speed: 10 rpm}
+head:
+  - rz: {joint: h1, range: [-1 rad, 1 rad], reverse: true, offset: 0.1 deg, jerk: 5 rad/s3, homing: 3 deg}
+  - ry: {joint: h2, range: [-1 rad, 1 rad]}
+  - tz: -100 mm
+limits:
+  gaps: [{between: [a, b], range: [-3 m, 3 m]}]
+  cones: [{at: foot, angle: 170 deg, axis: [0, 0, -1]}, {at: platform, angle: 170 deg}]
+  clearance: 1 mm
+home: {X: 10 mm, Y: 200 mm, Z: -200 mm, B: 40 deg, C: 10 deg}
+"""
+    (tmp_path / "odd.yaml").write_text(text, encoding="utf-8")
+    spec = read_machine(tmp_path / "odd.yaml")
+    (tmp_path / "again.yaml").write_text(format_spec(spec), encoding="utf-8")
+    again = read_machine(tmp_path / "again.yaml")
+    assert again == replace(spec, sizes={})
+    assert format_spec(again) == format_spec(spec)
 
 
 def test_quick():

@@ -39,6 +39,12 @@ class MachineProperties:
     def name(self) -> str:
         return self.spec.name
 
+    def format_yaml(self) -> str:
+        """Format the machine as a machine file with every number explicit; reading it gives the same numbers."""
+        from .description.writing import format_spec
+
+        return format_spec(self.spec)
+
     @property
     def axes(self) -> tuple[str, ...]:
         """Names of a pose's coordinates, ISO 841."""

@@ -53,6 +53,7 @@ def show(
     /,
     *,
     output: Annotated[Path | None, Parameter(name=["--output", "-o"])] = None,
+    yaml: bool = False,
     json: Json = False,
     sizes: Sizes = None,
 ) -> int:
@@ -64,16 +65,24 @@ def show(
         A shipped machine's name or a YAML file.
     output
         Where to put the picture of the machine at home: an .html to turn and look at, or a .png. By default NAME.html
-        in this folder; with --json none.
+        in this folder; with --json or --yaml none.
+    yaml
+        Print a machine file with every number explicit, a group for each leg: to write the numbers of a calibrated
+        machine into, or to keep those of --set. Reading it gives the same machine, bit for bit.
     """
+    if yaml and json:
+        raise InputError("only one of --yaml and --json, expected what to print", "--yaml")
     machine = load_machine(name, sizes)
-    if output is None and not json:
+    if output is None and not (json or yaml):
         output = Path(f"{machine.name}.html")
     if output is not None:
         _write_picture(machine, output)
     if json:
         files = {} if output is None else {"picture": str(output)}
         print_json(encode_machine(machine, files))
+        return 0
+    if yaml:
+        print_text(machine.format_yaml().rstrip())
         return 0
     print_text(_summarise_machine(machine))
     print()

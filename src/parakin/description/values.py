@@ -189,10 +189,15 @@ def _check_rising(value: Any, handler: ValidatorFunctionWrapHandler) -> tuple[fl
     return low, high
 
 
+_ROUNDING = 1e-15  # by which the length of a unit vector, printed with all its digits, may miss 1
+
+
 def _normalise_vector(value: Vector) -> Vector:
     length = hypot(*value)
     if length < 1e-9:
         raise ValueError("the zero vector, expected a direction")
+    if abs(length - 1.0) < _ROUNDING:
+        return value  # bit for bit what it was
     return (value[0] / length, value[1] / length, value[2] / length)
 
 

@@ -52,7 +52,7 @@ def find_real_roots(model: Model, joints: Array) -> list[RealRoots]:
     roots = []
     for block in split_rows(len(joints), _SYSTEMS_AT_ONCE):
         systems = quadrics.make_systems(joints[block])
-        first, last = align_members(own.system, systems, len(quadrics.family.fixed))
+        first, last = align_members(own.system, systems, len(quadrics.family.fixed), quadrics.groups)
         ends = track_members(first, last, own.roots)
         met = find_meetings(ends).sum(1)
         for row, system in enumerate(systems):

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...algebra import Scalar, Term, Trace, derivative, evaluate_trace
-from ...arrays import Array
+from ...arrays import Array, Indices
 from ...errors import NoMethodError
 from ...model.traces import Model
 from .generic_member import GenericMember, find_generic_member
@@ -27,6 +27,8 @@ class MachineQuadrics(NamedTuple):
 
     matrices : (closures, 5, n, n) of |p|², p's coordinates and 1 for each closure's platform point
     trace, numbers : the five numbers of every closure, from zeros for the point and the joints
+    groups : the closures of each platform point. Combined with each other they are those of some machine with this
+        platform; combined with another point's they need not be, and have roots that no such machine has
     """
 
     family: QuadricFamily
@@ -34,6 +36,7 @@ class MachineQuadrics(NamedTuple):
     trace: Trace
     numbers: list[Scalar]
     size: float
+    groups: list[Indices]
 
     def make_systems(self, joints: Array) -> Complex:
         """Make the systems (N, n - 1, n, n) of rows of joints (N, joints)."""
@@ -62,7 +65,9 @@ def make_machine_quadrics(model: Model) -> MachineQuadrics:
     trace, numbers, platforms = _list_closure_numbers(model)
     size = max(model.sizes)
     matrices = family.hull @ np.array([make_closure_quadrics(p / size) for p in platforms]) @ family.hull.T
-    return MachineQuadrics(family, matrices, trace, numbers, size)
+    _, of_point = np.unique(np.array(platforms), axis=0, return_inverse=True)
+    groups = [np.flatnonzero(of_point == point) for point in range(of_point.max() + 1)]
+    return MachineQuadrics(family, matrices, trace, numbers, size, groups)
 
 
 @lru_cache(maxsize=32)
@@ -77,7 +82,7 @@ def find_own_member(model: Model) -> GenericMember:
     first, last = align_members(generic.system, system, len(family.fixed))
     ends = track_members(first, last, generic.roots)
     regular = (ends.reached[0] == 1.0) & (np.linalg.norm(ends.points[0] @ family.hull[:, :4], axis=1) > _AT_INFINITY)
-    return GenericMember(last[0], ends.points[0][regular])
+    return GenericMember(system[0], ends.points[0][regular])
 
 
 def _list_closure_numbers(model: Model) -> tuple[Trace, list[Scalar], list[Array]]:

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 
-from ...arrays import Array, Flags
+from ...arrays import Array, Flags, Indices
 from ...kernels.batch import run_in_threads
 from .quadric_family import Complex
 
@@ -29,22 +30,27 @@ class PathEnds(NamedTuple):
     reached: Array
 
 
-def align_members(first: Complex, last: Complex, fixed: int) -> tuple[Complex, Complex]:
+def align_members(
+    first: Complex, last: Complex, fixed: int, groups: Sequence[Indices] | None = None
+) -> tuple[Complex, Complex]:
     """Combine the closures of both systems so that they differ little: the same roots, and shorter paths.
 
     Each system's closures become orthonormal; the first one's are turned onto the last one's (Procrustes).
 
     first : (n - 1, n, n); last : (systems, n - 1, n, n)
     fixed : how many quadrics of each come first and stay as they are
+    groups : the closures, numbered without the fixed ones, that may be combined with each other; None: all
     """
-    count, n = last.shape[1] - fixed, last.shape[2]
-    rows = np.linalg.qr(first[fixed:].reshape(count, -1).T)[0].T
-    goal = np.linalg.qr(last[:, fixed:].reshape(len(last), count, -1).swapaxes(1, 2))[0].swapaxes(1, 2)
-    left, _, right = np.linalg.svd(goal @ rows.conj().T)
+    n = last.shape[2]
     begin, end = np.empty_like(last), np.empty_like(last)
     begin[:, :fixed], end[:, :fixed] = first[:fixed], last[:, :fixed]
-    begin[:, fixed:] = ((left @ right) @ rows).reshape(-1, count, n, n)
-    end[:, fixed:] = goal.reshape(-1, count, n, n)
+    for group in [np.arange(last.shape[1] - fixed)] if groups is None else groups:
+        count, those = len(group), fixed + group
+        rows = np.linalg.qr(first[those].reshape(count, -1).T)[0].T
+        goal = np.linalg.qr(last[:, those].reshape(len(last), count, -1).swapaxes(1, 2))[0].swapaxes(1, 2)
+        left, _, right = np.linalg.svd(goal @ rows.conj().T)
+        begin[:, those] = ((left @ right) @ rows).reshape(-1, count, n, n)
+        end[:, those] = goal.reshape(-1, count, n, n)
     return begin, end
 
 

@@ -50,9 +50,11 @@ def _warn_of_singular_home(model: Model) -> None:
     for kind, regularity in _measure_regularity(model, poses).items():
         singular = regularity[np.isfinite(regularity)] <= SINGULAR
         if singular.any() and singular[0]:
-            where = "and all poses about it are" if singular.all() else "is"
+            where, then = "is", "forward finds no pose from there"
+            if singular.all():
+                where, then = "and all poses about it are", f"the machine is architecturally singular, and {then}"
             text = f"{model.spec.name}: home {where} a {kind} singularity (margin {regularity[0]:.1g} of 1)"
-            warnings.warn(f"{text}: forward finds no pose from there", SingularHomeWarning, stacklevel=4)
+            warnings.warn(f"{text}: {then}", SingularHomeWarning, stacklevel=4)
 
 
 def _measure_regularity(model: Model, poses: Array) -> dict[str, Array]:

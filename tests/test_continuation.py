@@ -13,7 +13,7 @@ from independent import orientation
 from shipped import REPRESENTATIVES
 
 import parakin as pk
-from parakin.kinematics.assemblies import generic_member
+from parakin.kinematics.assemblies import generic_member, homotopy_roots, path_tracking
 from parakin.kinematics.assemblies.generic_member import (
     find_generic_member,
     measure_trace,
@@ -101,6 +101,45 @@ def test_a_stored_member_is_taken_only_for_its_own_family(monkeypatch):
     monkeypatch.setattr(generic_member, "make_family", lambda motion: turned)
     assert read_stored_member(free) is None
     assert read_stored_member(("tx", "tz", "rx")) is None
+
+
+@pytest.mark.parametrize("name", pk.machines())
+def test_every_shipped_machine_finds_the_pose_that_it_stands_in(name):
+    """No root of a machine's own generic member may be missing, nor lie on paths through more general systems."""
+    machine = pk.load(name)
+    poses = machine.home + np.random.default_rng(2).uniform(-1.0, 1.0, (60, len(machine.axes))) * np.where(
+        np.array(machine.axis_units) == "mm", 60.0, 0.15
+    )
+    poses = poses[(machine.check(poses) == 0) & (machine.sides(poses) * machine.sides(machine.home[None]) > 0.0)][:6]
+    assert len(poses) > 2
+    joints = machine.inverse(poses)
+    for pose, row, answer in zip(poses, joints, machine.list_assemblies(joints), strict=True):
+        assert answer.complete != "not complete"
+        back = machine.forward(row, near=pose)
+        assert back.converged
+        nearest = np.abs(answer.poses - back.poses).max(1).min()
+        assert nearest < 1e-6
+
+
+def test_a_lost_path_is_tracked_once_more_another_way(tmp_path, monkeypatch):
+    machine = platform(tmp_path, *draw_platform(np.random.default_rng(9)))
+    joints = machine.inverse(machine.home)
+    expected = machine.assemblies(joints)
+    starts = []
+
+    def lose_one(first, last, points, tolerance=path_tracking.LENIENT):
+        ends = path_tracking.track_members(first, last, points, tolerance)
+        if not starts:
+            ends.reached[0, 7] = 0.9
+            ends.points[0, 7] = points[7]
+        starts.append(first)
+        return ends
+
+    monkeypatch.setattr(homotopy_roots, "track_members", lose_one)
+    found = machine.assemblies(joints)
+    assert found.lost_count == 0 and found.complete == "all paths accounted for"
+    np.testing.assert_allclose(found.poses, expected.poses, atol=1e-9)
+    assert len(starts) == 2 and np.abs(starts[0] - starts[1]).max() > 0.1
 
 
 def test_roots_close_to_a_singularity_are_told_apart():

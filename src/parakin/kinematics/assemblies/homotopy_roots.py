@@ -6,12 +6,13 @@ from typing import NamedTuple, TypeVar
 
 import numpy as np
 
-from ...arrays import Array, Flags, split_rows
+from ...arrays import Array, split_rows
 from ...errors import NoMethodError
 from ...model.traces import Model
 from ..planar_rpr import CONTINUUM
+from .generic_member import GenericMember
 from .machine_quadrics import MachineQuadrics, find_own_member, make_machine_quadrics
-from .path_tracking import align_members, find_meetings, measure_angles, track_members
+from .path_tracking import LENIENT, STRICT, align_closures, find_meetings, measure_angles, track_members
 from .quadric_family import Complex
 from .study import compute_frames
 
@@ -21,6 +22,8 @@ _CLOSED = 1e-12  # of a quadric at a point of length one: it is a root
 _STRIDE = 1e-3  # along the null direction of a double root
 _SAME_SINGLE, _SAME_DOUBLE = 1e-7, 1e-5  # rad: between points of the same root, regular and double
 _SYSTEMS_AT_ONCE = 256
+_AT_END = 0.99  # t from which on a path ends at a singular root: one that stops before is lost
+_PHASE = np.exp(1j)  # of the paths that are tracked where one of the first was lost
 _STEPS = 60  # of Newton's method at a double root, where each halves the distance
 
 
@@ -52,21 +55,42 @@ def find_real_roots(model: Model, joints: Array) -> list[RealRoots]:
     roots = []
     for block in split_rows(len(joints), _SYSTEMS_AT_ONCE):
         systems = quadrics.make_systems(joints[block])
-        first, last = align_members(own.system, systems, len(quadrics.family.fixed), quadrics.groups)
-        ends = track_members(first, last, own.roots)
-        met = find_meetings(ends).sum(1)
-        for row, system in enumerate(systems):
-            roots.append(_sort_ends(model, system, ends.points[row], ends.reached[row] == 1.0, int(met[row])))
+        sorted_ends = _track_and_sort(model, systems, own)
+        for row in [row for row, own_roots in enumerate(sorted_ends) if own_roots.lost_count]:
+            sorted_ends[row] = _track_and_sort(model, systems[row : row + 1], own, _PHASE, STRICT)[0]
+        roots += sorted_ends
     return roots
 
 
-def _sort_ends(model: Model, system: Complex, points: Complex, regular: Flags, met: int) -> RealRoots:
-    """Sort the ends of all paths (paths, n) of one system, of which ``met`` ended where another one did."""
+def _track_and_sort(
+    model: Model, systems: Complex, own: GenericMember, phase: complex = 1.0, tolerance: float = LENIENT
+) -> list[RealRoots]:
+    """Track a member's roots to systems (N, n - 1, n, n), and sort each one's ends.
+
+    phase : the member's closures are multiplied by it, which leaves their roots and leads along other paths
+    """
+    fixed = len(make_machine_quadrics(model).family.fixed)
+    first, last = align_closures(own.system, systems, fixed)
+    first[:, fixed:] *= phase
+    ends = track_members(first, last, own.roots, tolerance)
+    met = find_meetings(ends).sum(1)
+    return [
+        _sort_ends(model, system, ends.points[row], ends.reached[row], int(met[row]))
+        for row, system in enumerate(systems)
+    ]
+
+
+def _sort_ends(model: Model, system: Complex, points: Complex, reached: Array, met: int) -> RealRoots:
+    """Sort the ends of all paths (paths, n) of one system, of which ``met`` ended where another one did.
+
+    reached : (paths,) the last t of each
+    """
+    regular, lost = reached == 1.0, reached < _AT_END
     points = _turn_to_real(points)
     near_real = np.abs(points.imag).max(1) < _REAL
     single = _polish_points(system.real, points[regular & near_real].real, 4)
     turned_real = _measure_closures(system.real, single) < _CLOSED
-    ends_singular = _refine_singular(system, points[~regular])
+    ends_singular = _refine_singular(system, points[~regular & ~lost])
     kinds = _sort_singular(make_machine_quadrics(model), system, ends_singular)
     doubles = _join_same(_turn_to_real(ends_singular[kinds == _DOUBLE]).real, _SAME_DOUBLE)
     if any(_is_in_continuum(system.real, point) for point in doubles):
@@ -75,7 +99,7 @@ def _sort_ends(model: Model, system: Complex, points: Complex, regular: Flags, m
         np.concatenate([_join_same(single[turned_real], _SAME_SINGLE), doubles]),
         int((regular & ~near_real).sum() + (~turned_real).sum() + (kinds == _COMPLEX).sum()),
         int((kinds == _INFINITE).sum()),
-        int((kinds == _LOST).sum()) + met,
+        int((kinds == _LOST).sum() + lost.sum()) + met,
     )
 
 

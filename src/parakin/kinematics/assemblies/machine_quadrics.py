@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...algebra import Scalar, Term, Trace, derivative, evaluate_trace
-from ...arrays import Array, Indices
+from ...arrays import Array
 from ...errors import NoMethodError
 from ...model.traces import Model
 from .generic_member import GenericMember, find_generic_member
@@ -27,8 +27,6 @@ class MachineQuadrics(NamedTuple):
 
     matrices : (closures, 5, n, n) of |p|², p's coordinates and 1 for each closure's platform point
     trace, numbers : the five numbers of every closure, from zeros for the point and the joints
-    groups : the closures of each platform point. Combined with each other they are those of some machine with this
-        platform; combined with another point's they need not be, and have roots that no such machine has
     """
 
     family: QuadricFamily
@@ -36,7 +34,6 @@ class MachineQuadrics(NamedTuple):
     trace: Trace
     numbers: list[Scalar]
     size: float
-    groups: list[Indices]
 
     def make_systems(self, joints: Array) -> Complex:
         """Make the systems (N, n - 1, n, n) of rows of joints (N, joints)."""
@@ -65,9 +62,7 @@ def make_machine_quadrics(model: Model) -> MachineQuadrics:
     trace, numbers, platforms = _list_closure_numbers(model)
     size = max(model.sizes)
     matrices = family.hull @ np.array([make_closure_quadrics(p / size) for p in platforms]) @ family.hull.T
-    _, of_point = np.unique(np.array(platforms), axis=0, return_inverse=True)
-    groups = [np.flatnonzero(of_point == point) for point in range(of_point.max() + 1)]
-    return MachineQuadrics(family, matrices, trace, numbers, size, groups)
+    return MachineQuadrics(family, matrices, trace, numbers, size)
 
 
 @lru_cache(maxsize=32)

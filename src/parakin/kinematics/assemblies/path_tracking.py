@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 
-from ...arrays import Array, Flags, Indices
+from ...arrays import Array, Flags
 from ...kernels.batch import run_in_threads
 from .quadric_family import Complex
 
@@ -30,28 +29,38 @@ class PathEnds(NamedTuple):
     reached: Array
 
 
-def align_members(
-    first: Complex, last: Complex, fixed: int, groups: Sequence[Indices] | None = None
-) -> tuple[Complex, Complex]:
+def align_members(first: Complex, last: Complex, fixed: int) -> tuple[Complex, Complex]:
     """Combine the closures of both systems so that they differ little: the same roots, and shorter paths.
 
-    Each system's closures become orthonormal; the first one's are turned onto the last one's (Procrustes).
+    Each system's closures become orthonormal; the first one's are turned onto the last one's (Procrustes). The systems
+    between are members of the whole family, so ``first`` must have as many roots as a generic one.
 
     first : (n - 1, n, n); last : (systems, n - 1, n, n)
     fixed : how many quadrics of each come first and stay as they are
-    groups : the closures, numbered without the fixed ones, that may be combined with each other; None: all
     """
-    n = last.shape[2]
+    count, n = last.shape[1] - fixed, last.shape[2]
+    rows = np.linalg.qr(first[fixed:].reshape(count, -1).T)[0].T
+    goal = np.linalg.qr(last[:, fixed:].reshape(len(last), count, -1).swapaxes(1, 2))[0].swapaxes(1, 2)
+    left, _, right = np.linalg.svd(goal @ rows.conj().T)
     begin, end = np.empty_like(last), np.empty_like(last)
     begin[:, :fixed], end[:, :fixed] = first[:fixed], last[:, :fixed]
-    for group in [np.arange(last.shape[1] - fixed)] if groups is None else groups:
-        count, those = len(group), fixed + group
-        rows = np.linalg.qr(first[those].reshape(count, -1).T)[0].T
-        goal = np.linalg.qr(last[:, those].reshape(len(last), count, -1).swapaxes(1, 2))[0].swapaxes(1, 2)
-        left, _, right = np.linalg.svd(goal @ rows.conj().T)
-        begin[:, those] = ((left @ right) @ rows).reshape(-1, count, n, n)
-        end[:, those] = goal.reshape(-1, count, n, n)
+    begin[:, fixed:] = ((left @ right) @ rows).reshape(-1, count, n, n)
+    end[:, fixed:] = goal.reshape(-1, count, n, n)
     return begin, end
+
+
+def align_closures(first: Complex, last: Complex, fixed: int) -> tuple[Complex, Complex]:
+    """Scale each closure of ``first`` so that it differs little from that of ``last``: the same roots, shorter paths.
+
+    Every closure between is one of the same leg, so that ``first`` may be generic among one machine's systems alone.
+
+    first : (n - 1, n, n); last : (systems, n - 1, n, n), both with closures of length one
+    fixed : how many quadrics of each come first and stay as they are
+    """
+    products = np.einsum("rij,srij->sr", first.conj(), last)
+    phases = products / np.maximum(np.abs(products), 1e-300)
+    phases[:, :fixed] = 1.0
+    return phases[..., None, None] * first, last
 
 
 def track_members(first: Complex, last: Complex, starts: Complex, tolerance: float = LENIENT) -> PathEnds:

@@ -355,6 +355,7 @@ FRACTIONS = {
     "controllers.linuxcnc.approach._COUNTS",
     "kinematics.travel._HOP",
     "toolpath.posting.working_mode.HELD",
+    "toolpath.linearise.crossed_poles._TOGETHER",
     "toolpath.linearise.pole_holds._OFF_POLE",
     "toolpath.linearise.pole_holds._ARC",
     "toolpath.linearise.pole_holds._CLOSE",

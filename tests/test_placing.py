@@ -160,7 +160,10 @@ def test_turns_of_the_path_as_a_whole_count():
 def test_none_where_the_part_is_too_large():
     machine = pk.load("linear_delta")
     path = path_of([[x, y, 0.0] for x in (-400, 400) for y in (-400, 400)])
-    found = find_placement(machine, path, parse_bounds("X=-100:100,Y=-100:100,Z=0:500"))
+    bounds = parse_bounds("X=-100:100,Y=-100:100,Z=0:500")
+    with pytest.raises(pk.PoseError, match="no placement within these bounds is allowed; the nearest is X="):
+        find_placement(machine, path, bounds)
+    found = pk.find_placements(machine, path, bounds)[0]
     assert not found.allowed
     assert found.margin < 0.0
     posted = post_path(machine, path, workpiece=found.workpiece, mode=found.mode)
@@ -170,7 +173,7 @@ def test_none_where_the_part_is_too_large():
 
 def test_none_where_the_tool_would_have_to_lean():
     path = path_of([[0, 0, 0], [20, 0, 0]], axis_of([0.0, 10.0], [0.0, 0.0]))
-    found = find_placement(pk.load("linear_delta"), path, parse_bounds("X=-50:50,Z=250:300"))
+    found = pk.find_placements(pk.load("linear_delta"), path, parse_bounds("X=-50:50,Z=250:300"))[0]
     assert (found.limit, found.record) == ("tilt", 1)
     assert found.margin == pytest.approx(1e-4 - 10 * DEGREE, abs=1e-9)
 
@@ -201,7 +204,7 @@ def test_the_other_mode_where_the_default_allows_none(tmp_path):
     found = find_placement(machine, path, bounds)
     assert found.allowed
     assert found.mode == machine.mode[:-1] + "-"
-    assert not find_placement(machine, path, bounds, mode=machine.mode).allowed
+    assert not pk.find_placements(machine, path, bounds, mode=machine.mode)[0].allowed
 
 
 def test_progress():
@@ -265,7 +268,7 @@ def test_turns_that_the_job_does_not_make_do_not_count():
     assert found.allowed
     assert pk.prepare(machine, path, workpiece=found.workpiece, mode=found.mode).runs
     path = path_of(tip, axis_of(np.full(61, 2.0), np.degrees(azimuth)))
-    assert not find_placement(machine, path, bounds).allowed
+    assert not pk.find_placements(machine, path, bounds)[0].allowed
     found = find_placement(machine, path, bounds, rewinds=True)
     assert found.allowed
     rewound = pk.rewind_path(machine, path, pk.Clearance(retract=20.0), workpiece=found.workpiece, mode=found.mode)

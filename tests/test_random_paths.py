@@ -173,6 +173,36 @@ def test_jitter_on_a_pole_that_moves_needs_no_records_between(tmp_path):
     assert not find_fault(controller, job)
 
 
+@pytest.mark.parametrize("kind", ["noise", "beside", "tilting"])
+@pytest.mark.parametrize("off", [1e-4, 3e-3, 0.3])
+def test_a_tool_beside_the_middle_needs_no_turn(tmp_path, kind, off):
+    """The wrist's pole passes a tool that is on Z, where C is free, or tilts over it: both poles within some µrad.
+
+    The first joint turns by no more than the straight way past the pole asks for within the axis's tolerance, and C
+    does not follow the noise of the last digit; so the time is that of the feed and of the joints' acceleration.
+    """
+    controller = build_controller("tricept", tmp_path)
+    machine = controller.machine
+    rng, lines = np.random.default_rng(5), ["TOOL PATH/MIDDLE", "FEDRAT/2000.0,MMPM"]
+    for s in np.linspace(-1.0, 1.0, 2 if kind == "tilting" else 21):
+        tip, axis = np.array([15.0 * s, off, -1655.0]), np.zeros(2)
+        if kind == "noise":
+            tip[:2] += 1e-4 * rng.integers(-1, 2, 2)
+            axis = 1e-4 * rng.integers(-1, 2, 2)
+        if kind == "tilting":
+            axis = np.array([0.02 * s, 0.0])
+        words = [*tip, *axis, np.sqrt(1.0 - axis @ axis)]
+        lines.append("GOTO/" + ",".join(f"{value:.7f}" for value in words))
+    (tmp_path / "part.cls").write_text("\n".join([*lines, "FINI", ""]), encoding="ascii")
+    job = pk.prepare(machine, pk.read_path(tmp_path / "part.cls"))
+    assert job.runs
+    assert not find_fault(controller, job)
+    if kind != "tilting":
+        assert not any("swings" in note.text for note in job.posted.path.notes)
+        assert np.ptp(job.posted.joints[:, machine.wrist.first]) < np.radians(10.0)
+        assert job.seconds < 1.5 * 0.9  # s of the feed
+
+
 @pytest.mark.parametrize(
     ("name", "seed"),
     [

@@ -375,3 +375,20 @@ home: {X: 0 mm, Y: 0 mm, C: 0 deg}
     file.write_text(text.replace("2 m/s³", "2 m/s2"), encoding="utf-8")
     with pytest.raises(InputError, match=r':9: jerk: "2 m/s2" is an acceleration, expected a jerk'):
         pk.load(file)
+
+
+def test_a_time_far_over_the_feeds_is_explained_at_its_line(tmp_path):
+    """The second cut turns the wrist by half a turn on 1 mm: 90 deg/s take two seconds, its feed asks for 6 ms."""
+    words = ["GOTO/0.0,0.0,-1650.0,0.5,0.0,0.8660254", "GOTO/200.0,0.0,-1650.0,0.5,0.0,0.8660254"]
+    turned = [
+        f"GOTO/{200.0 + 0.05 * k:.3f},0.0,-1650.0,{0.5 * np.cos(a):.7f},{0.5 * np.sin(a):.7f},0.8660254"
+        for k, a in enumerate(np.radians(np.arange(0.0, 181.0, 9.0)))
+    ]
+    (tmp_path / "part.apt").write_text("\n".join(["UNITS/MM", "FEDRAT/10000,MMPM", *words, *turned, "FINI", ""]))
+    job = pk.prepare(pk.load("tricept"), pk.read_path(tmp_path / "part.apt"))
+    assert job.seconds > 3.0
+    note = next(note for note in job.posted.path.notes if "its feeds ask for" in note.text)
+    assert note.line > 4 and "theta1" in note.text
+    (tmp_path / "part.apt").write_text("\n".join(["UNITS/MM", "FEDRAT/600,MMPM", *words, "FINI", ""]))
+    job = pk.prepare(pk.load("tricept"), pk.read_path(tmp_path / "part.apt"))
+    assert not any("its feeds ask for" in note.text for note in job.posted.path.notes)

@@ -123,7 +123,8 @@ class Pointing:
 
         branch : "+" is the solution with the greater second joint, or, where :attr:`level` (a fork that turns about X,
             then Y), the one whose second turn is nearer to rest
-        first : the first joint where it is free
+        first : the first joint where it is free: the second one then turns in its plane, over the pole too, whatever
+            the branch
         """
         a1, a2, w = self.first, self.second, self.start
         a, beta, alpha = float(dot(a1, a2)), float(dot(w, a2)), dot(v, a1)
@@ -143,6 +144,10 @@ class Pointing:
         greater = float(dot(w, normal) if self.level else dot(a2, cross(w, normal)) * self.signs[1])
         if (greater < 0.0) == (branch == "+"):
             nu = -nu
+        if first is not None:
+            sine, cosine = sincos(first)
+            back = make_rotation_about(a1, -self.signs[0] * sine, cosine)
+            nu = dot(apply(back, v), normal) / n2
         middle = add(add(scale(a1, lam), scale(a2, mu)), scale(normal, nu))  # v before the first turn
         off = add(add(scale(a1, lam - alpha), scale(a2, mu)), scale(normal, nu))  # its part at right angles to a1
         turns = (

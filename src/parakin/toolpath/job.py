@@ -13,13 +13,14 @@ from ..machine import Machine
 from .checking.check import check_path
 from .linearise.deviation import Interpolation
 from .linearise.linearise import linearise_path
-from .linearise.rewinds import is_wound_up
+from .linearise.rewinds import has_room_for_rewind
 from .path import Note, ToolPath
 from .placing.outside import Outside, find_outside
 from .posting.post import post_path
 from .posting.posted import Posted
 from .posting.tool_lengths import fit_tool_lengths
 from .timing import Corners, Trajectory, plan_trajectory
+from .timing.lost_time import explain_lost_time
 from .timing.stops import find_stops, sum_dwells
 
 _INTERPOLATED = 0.85  # of the axis's tolerance: what the controller's interpolation may take
@@ -163,7 +164,7 @@ def _prepare_in(
         unplanned = f"off limits at more than {_MOST_BROKEN:,} records, and not looked at between them"
     else:
         posted, unplanned = _linearise(programmed, interpolation, tip, lean, report_stage(0.1, 0.4))
-        if is_wound_up(posted):
+        if has_room_for_rewind(posted):
             posted = _note_wound_up(posted)
         posted = check_path(posted, progress=report_stage(0.4, 0.6))
     if posted.first is not None and len(posted.path) > _MOST_TIMED:
@@ -179,6 +180,9 @@ def _prepare_in(
             )
         except PoseError as error:
             unplanned = str(error)
+    explained = None if trajectory is None else explain_lost_time(trajectory)
+    if explained is not None:
+        posted = _add_note(posted, explained)
     report(1.0)
     outside = find_outside(programmed, path, workpiece)
     return Job(programmed, posted, trajectory, unplanned, sum_dwells(path), rounded.tip, outside)
@@ -207,15 +211,15 @@ def _linearise(
 
 
 def _note_wound_up(posted: Posted) -> Posted:
-    """Note that a joint turns farther than its range, and what would help."""
+    """Note that a joint turns beyond its range, and what would help."""
     wrist = posted.machine.wrist
     assert wrist is not None
     joint = posted.machine.joints[wrist.first]
-    text = f"{joint} turns farther than its range is wide; a rewind takes turns back where a clearance is stated"
-    return _note(posted, text)
+    text = f"{joint} turns beyond its range; a rewind takes whole turns back where a clearance is stated"
+    return _add_note(posted, Note(int(posted.path.line[0]), text))
 
 
-def _note(posted: Posted, text: str) -> Posted:
-    """Add a note about the whole path, at its first line."""
+def _add_note(posted: Posted, note: Note) -> Posted:
+    """Add a note to a posted path, before those that it has."""
     path = posted.path
-    return replace(posted, path=replace(path, notes=(*path.notes, Note(int(path.line[0]), text))))
+    return replace(posted, path=replace(path, notes=(note, *path.notes)))

@@ -29,8 +29,8 @@ def stretch_for_buffer(seconds: Array, buffer: int, line_seconds: float) -> Arra
     return stretched
 
 
-def predict_planned_seconds(steps: Array, seconds: Array, halt: Flags, accelerations: Array, buffer: int) -> float:
-    """Predict what motions take whose speed changes with bounded acceleration, each junction passed as grbl does.
+def predict_planned_seconds(steps: Array, seconds: Array, halt: Flags, accelerations: Array, buffer: int) -> Array:
+    """Predict what motions (k,) take whose speed changes with bounded acceleration, each junction passed as grbl does.
 
     A planner that holds ``buffer`` motions has to be able to stop at the last of them. After grbl 1.1, ``planner.c``.
 
@@ -41,7 +41,7 @@ def predict_planned_seconds(steps: Array, seconds: Array, halt: Flags, accelerat
     """
     length = np.sqrt((steps**2).sum(axis=1))
     if not len(length) or not np.isfinite(accelerations).any():
-        return float(seconds.sum())
+        return seconds
     unit = steps / length[:, None]
     speed = length / seconds
     acceleration = _limit(accelerations, unit)
@@ -64,7 +64,8 @@ def predict_planned_seconds(steps: Array, seconds: Array, halt: Flags, accelerat
     first, last, top = np.sqrt(entry[:-1]), np.sqrt(entry[1:]), np.sqrt(peak)
     ramps = (2.0 * top - first - last) / acceleration
     even = length - (2.0 * peak - entry[:-1] - entry[1:]) / (2.0 * acceleration)
-    return float((ramps + np.maximum(even, 0.0) / top).sum())
+    planned: Array = ramps + np.maximum(even, 0.0) / top
+    return planned
 
 
 def _limit(limits: Array, unit: Array) -> Array:

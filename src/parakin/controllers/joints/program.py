@@ -29,6 +29,7 @@ from .letters import assign_joint_letters, describe_letters
 from .look_ahead import find_halts, predict_planned_seconds, stretch_for_buffer
 
 _ROWS = 1 << 14  # blocks formatted at a time
+_ROUNDING = 1e-9  # s
 _LONGER = 1.2  # times the trajectory's time, from which on a control's is noted
 
 
@@ -38,7 +39,7 @@ class _Program:
 
     pattern : of a block
     values : (k,) of the blocks' feed words, and ``approach`` that of the way to the first row
-    exact : numbers of the blocks at whose end the joints stand still
+    times : (k,) s, when the trajectory is at each block's end
     """
 
     trajectory: Trajectory
@@ -49,6 +50,7 @@ class _Program:
     pattern: str
     values: Array
     approach: float
+    times: Array
 
     @property
     def seconds(self) -> float:
@@ -88,11 +90,14 @@ def build_joint_run(trajectory: Trajectory, dialect: JointDialect) -> Controller
     except PoseError as error:
         return refuse_run(error)
     seconds, notes = program.seconds, list[Note]()
+    each = program.feed.compute_seconds(program.motions.lengths, program.values)
     if dialect.buffer > 1:
-        seconds = _predict_seconds(program)
-        if seconds > _LONGER * trajectory.seconds:
-            text = f"{dialect.title} takes {seconds:.1f} s for {trajectory.seconds:.1f} s: its planner holds few lines"
-            notes.append(Note(0, text))
+        each = _predict_seconds(program, each)
+        seconds = float(each.sum())
+    if seconds > _LONGER * trajectory.seconds:
+        why = "its planner holds few lines" if dialect.buffer > 1 else "its blocks can't be shorter"
+        text = f"{dialect.title} takes {seconds:.1f} s for {trajectory.seconds:.1f} s: {why}; most of it is lost here"
+        notes.append(Note(_find_slowest_line(program, each), text))
     return ControllerRun(lambda forced, tolerance: _make_writer(program, forced), seconds, tuple(notes))
 
 
@@ -100,6 +105,7 @@ def _build_program(trajectory: Trajectory, dialect: JointDialect) -> _Program:
     machine, path = trajectory.posted.machine, trajectory.posted.path
     letters = assign_joint_letters(machine, dialect.axes, dialect.title)
     motions = build_joint_motions(trajectory, dialect.digits, dialect.shortest)
+    times = np.cumsum(motions.seconds)
     stretched = stretch_for_buffer(motions.seconds, dialect.buffer, dialect.line_seconds)
     motions = replace(motions, seconds=stretched)
     for commands in motions.commands.values():
@@ -109,17 +115,25 @@ def _build_program(trajectory: Trajectory, dialect: JointDialect) -> _Program:
     values = feed.compute_values(motions.lengths, motions.seconds)
     way = np.array([motions.approach])
     approach = float(feed.compute_values(motions.slow_speed * way, way)[0])
-    return _Program(
-        trajectory, dialect, letters, motions, feed, dialect.make_pattern(letters, machine), values, approach
-    )
+    pattern = dialect.make_pattern(letters, machine)
+    return _Program(trajectory, dialect, letters, motions, feed, pattern, values, approach, times)
 
 
-def _predict_seconds(program: _Program) -> float:
+def _find_slowest_line(program: _Program, seconds: Array) -> int:
+    """Find the line of the part on which blocks that take so many seconds (k,) lose most against the trajectory."""
+    trajectory = program.trajectory
+    lost = seconds - np.diff(program.times, prepend=0.0)
+    record = np.searchsorted(trajectory.times, program.times - _ROUNDING).clip(0, len(trajectory.times) - 1)
+    lines, number = np.unique(trajectory.posted.path.line[record], return_inverse=True)
+    return int(lines[np.bincount(number, lost).argmax()])
+
+
+def _predict_seconds(program: _Program, seconds: Array) -> Array:
+    """Predict what the control takes for blocks that are told to take so many seconds (k,)."""
     machine, motions = program.trajectory.posted.machine, program.motions
     limits = DriveLimits.of(machine).acceleration[None]
     accelerations = to_display(limits, machine.joint_units, {"mm": 9, "rad": 9})[0]
     halt = find_halts(len(motions.seconds), motions.commands)
-    seconds = program.feed.compute_seconds(motions.lengths, program.values)
     return predict_planned_seconds(motions.steps, seconds, halt, accelerations, program.dialect.buffer)
 
 

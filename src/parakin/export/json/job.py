@@ -42,7 +42,7 @@ def encode_job(
         "part": path.source,
         "machine": posted.machine.name,
         "mode": posted.mode,
-        "verdict": "ok" if job.runs else "off limits" if first is not None else "no law",
+        "verdict": "ok" if job.runs else "off limits" if first is not None else "no trajectory",
         "records": len(path),
         "inserted": job.inserted,
         "off_limits": posted.broken_record_count,
@@ -51,7 +51,7 @@ def encode_job(
         "file_frame": None if job.programmed.path.frame is None else job.programmed.path.frame.tolist(),
         "tool_length": path.fitted_length,
         "tools": [_encode_tool(use) for use in path.tools],
-        "placement": None if placement is None else _encode_placement(placement),
+        "placement": None if placement is None else _encode_placement(placement, job.runs),
         "joints": encode_joint_ranges(posted),
         "seconds": job.seconds,
         "controller_seconds": controller_seconds,
@@ -132,8 +132,11 @@ def encode_joint_ranges(posted: Posted) -> list[dict[str, Any]]:
     return rows
 
 
-def _encode_placement(placement: Placement) -> dict[str, Any]:
+def _encode_placement(placement: Placement, runs: bool) -> dict[str, Any]:
+    """Encode a placement, whether its records keep the limits there, and whether the whole job runs there."""
     return {
+        "runs": runs,
+        "allowed": placement.allowed,
         "workpiece": {axis: to_display(value, AXIS_UNITS[axis]) for axis, value in placement.values.items()},
         "margin": placement.margin,
         "limit": placement.limit,

@@ -25,6 +25,7 @@ NEAR_TURN  0.02         off the pole: a tool that is nearer is tilted so far whi
 STANDING   8e-6         off the pole: nearer, a controller's first joint stands still, whatever the rounded pose says
 RIM        8.024e-6     off the pole: just where that begins; a record there tells the first joint on either side
 RIM_WIDTH  8e-8         off the pole: a record no farther from there is there
+NEAR_Z     1e-4         B: on a wrist's pole so near to Z, C turns far while the tool passes over the pole
 NEAR_HOLD  1e-5         off the pole: no tool axis is held nearer, or printed digits would turn the first angle
 FAR_TILT   30°          second angle at home of a controller: moves about it go neither round the pole nor through it
 ========== ============ ==============================================================================================
@@ -58,6 +59,7 @@ NEAR_TURN = 0.02
 STANDING = 8e-6
 RIM = 1.003 * STANDING
 RIM_WIDTH = 0.01 * STANDING
+NEAR_Z = 1e-4
 NEAR_HOLD = 5.0 * PRINTED
 FAR_TILT = np.pi / 6.0
 

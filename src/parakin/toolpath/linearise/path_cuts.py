@@ -53,6 +53,16 @@ class PathPositions:
         begin = np.concatenate([[0.0], np.where(record[1:] == record[:-1], end[:-1], 0.0)])
         return PathPositions(record, begin, end)
 
+    def compose(self, inner: PathPositions) -> PathPositions:
+        """Return where records stand whose ``inner`` positions are told on the path whose positions these are."""
+        at = inner.record
+        begin, width = self.begin[at], self.end[at] - self.begin[at]
+        return PathPositions(self.record[at], begin + inner.begin * width, begin + inner.end * width)
+
+    def find_passed(self, inner: float) -> float:
+        """Find how many programmed motions lie behind a place on the path whose positions these are."""
+        return float(np.interp(inner, np.arange(len(self.record)), self.passed))
+
 
 def select_spans(posted: Posted, positions: PathPositions, motion: Indices) -> MotionSpans:
     """Return whole motions of a posted path as spans."""

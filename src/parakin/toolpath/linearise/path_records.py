@@ -12,6 +12,10 @@ from ..path import ToolPath, insert_records
 from ..posting.post import post_path
 from ..posting.posted import Posted
 from ..programmed_path import ProgrammedPath
+from .path_cuts import PathPositions
+
+# A motion, a share of it, and the tool axis (3,) in M of a record that is inserted there.
+AddedRecord = tuple[int, float, Array]
 
 
 def divide_motions(path: ToolPath, motion: Indices, share: Array) -> ToolPath:
@@ -58,6 +62,18 @@ def replace_axes(path: ToolPath, record: Indices, axis: Array) -> ToolPath:
         turns = turns.copy()
         turns[record] = find_nearest_direction(axis, turns[record])
     return replace(path, tip=tip, axis=axes, turns=turns)
+
+
+def insert_axes(posted: Posted, positions: PathPositions, added: list[AddedRecord]) -> tuple[Posted, PathPositions]:
+    """Insert records with their own tool axes into a posted path, and post it again."""
+    if not added:
+        return posted, positions
+    added = sorted(added, key=lambda record: record[:2])
+    motions, shares = np.array([record[0] for record in added]), np.array([record[1] for record in added])
+    axes = np.array([record[2] for record in added]) @ posted.frame[:, :3]
+    path = divide_motions(posted.path, motions, shares)
+    path = replace_axes(path, motions + np.arange(len(motions)), axes)
+    return repost_path(posted, path), positions.insert(motions, shares)
 
 
 def repost_path(posted: Posted, path: ToolPath) -> Posted:

@@ -24,6 +24,7 @@ from ..posting.posted import Posted
 from ..posting.working_mode import HELD
 from ..programmed_path import ProgrammedPath, compute_tool_axes
 from .continuation import MACHINE_FRAME
+from .path_records import AddedRecord
 from .pole_routing import PolePass
 from .pole_steps import PoleSteps, meet_circle
 from .poles import Pole
@@ -64,6 +65,10 @@ class PoleHold:
     def key(self) -> tuple[str, float]:
         """What tells it from other holds, and from passes."""
         return f"beside {self.located.pole.text}", self.located.begin
+
+    def list_added(self) -> list[AddedRecord]:
+        """List the records that are inserted."""
+        return list(zip(self.motion.tolist(), self.share.tolist(), self.added, strict=True))
 
     def describe(self) -> Note:
         """Describe the turn as a note of the path."""

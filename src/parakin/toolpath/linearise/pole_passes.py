@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 import numpy as np
 
-from ...arrays import Array, Flags, Indices
+from ...arrays import Flags, Indices
 from ...kinematics.wrist.pole_thresholds import EXACT, PRINTED, REPORTED, is_upright
 from ..path import Note
 from ..posting.posted import Posted
 from ..programmed_path import ProgrammedPath
+from .crossed_poles import HeldPath, keep_on_crossed_pole
 from .deviation import ALLOWED, SHARES, Deviation
 from .path_cuts import PathPositions, select_spans
-from .path_records import divide_motions, replace_axes, repost_path
+from .path_records import AddedRecord, divide_motions, insert_axes, replace_axes, repost_path
 from .pole_holds import PoleHold, Stretches, find_pole_holds, find_steps_on, note_holds
 from .pole_routing import PolePass, PoleRoute, find_pole_routes, locate_pass
 from .pole_steps import PoleSteps, find_pole_steps
@@ -61,9 +62,36 @@ def lead_through_poles(deviation: Deviation, posted: Posted, motion: Indices) ->
     starts, ends or jitters there, its axis is held beside the pole: see :mod:`~.pole_holds`. A pass is left as it is
     where that takes the axis out of tolerance between two records.
     """
+    poles = find_poles(posted.machine, deviation.interpolation, posted.path.turns is not None)
+    held_path = keep_on_crossed_pole(deviation, poles, posted, motion)
+    if held_path is not None:
+        led = _lead_held_path(deviation, poles, held_path, motion)
+        if not _find_moved_too_far(deviation, led):
+            return led
+    return _lead_within_tolerance(deviation, posted, [(pole, motion) for pole in poles])
+
+
+def _lead_held_path(deviation: Deviation, poles: list[Pole], path: HeldPath, motion: Indices) -> PolePasses:
+    """Lead a path that is held on Z through the wrist's pole, and through Z where it is not path."""
+    on_held = replace(deviation, programmed=ProgrammedPath(path.posted.path, path.posted.frame))
+    sound = np.isin(path.positions.record, motion)
+    near = [(poles[0], np.flatnonzero(sound)), (poles[1], np.flatnonzero(sound & ~path.find_held_motions()))]
+    led = _lead_within_tolerance(on_held, path.posted, near)
+    passes = [path.locate_on_programmed(pole_pass) for pole_pass in led.passes]
+    holds = [replace(hold, located=path.locate_on_programmed(hold.located)) for hold in led.holds]
+    positions = path.positions.compose(led.positions)
+    return PolePasses(led.posted, positions, passes, [*path.holds, *holds], [*path.notes, *led.notes])
+
+
+# The motions on which each pole is looked for.
+_MotionsNear = list[tuple[Pole, Indices]]
+
+
+def _lead_within_tolerance(deviation: Deviation, posted: Posted, near: _MotionsNear) -> PolePasses:
+    """Lead a path through poles on all passes on which it keeps within the angle tolerance."""
     refused: set[tuple[str, float]] = set()
     for _ in range(_TRIES):
-        led = _lead_unless_refused(deviation, posted, motion, refused)
+        led = _lead_unless_refused(deviation, posted, near, refused)
         too_far = _find_moved_too_far(deviation, led)
         if not too_far:
             break
@@ -92,7 +120,7 @@ def _find_moved_too_far(deviation: Deviation, led: PolePasses) -> set[tuple[str,
 
 
 def _lead_unless_refused(
-    deviation: Deviation, posted: Posted, motion: Indices, refused: set[tuple[str, float]]
+    deviation: Deviation, posted: Posted, near: _MotionsNear, refused: set[tuple[str, float]]
 ) -> PolePasses:
     """Lead a path through its poles on all passes but the refused ones; note the passes on which an angle swings."""
     led = PolePasses(posted, PathPositions.at_records(len(posted.path)))
@@ -100,7 +128,7 @@ def _lead_unless_refused(
     axis = programmed.axis.copy()
     crossings: list[_Crossings] = []
     inclined = turns is not None and bool(turns[:, 0].any())  # with A no turns are found for other axes
-    for pole in find_poles(posted.machine, deviation.interpolation, turns is not None):
+    for pole, motion in near:
         steps = find_pole_steps(pole, programmed, posted, motion)
         routes = []
         candidates = find_pole_routes(pole, programmed, steps, deviation.angle, deviation.interpolation == "pose")
@@ -174,18 +202,10 @@ def _insert_records_at_poles(deviation: Deviation, led: PolePasses, crossings: l
         return
     posted = led.posted
     path = ProgrammedPath(posted.path, posted.frame)
-    added = [
-        row for hold in led.holds for row in zip(hold.motion.tolist(), hold.share.tolist(), hold.added, strict=True)
-    ]
+    added = [record for hold in led.holds for record in hold.list_added()]
     for crossing in crossings:
         added += _list_crossing_records(deviation, led, path, crossing)
-    if added:
-        added.sort(key=lambda record: record[:2])
-        motions, shares = np.array([record[0] for record in added]), np.array([record[1] for record in added])
-        axes = np.array([record[2] for record in added]) @ path.rotation
-        led.positions = led.positions.insert(motions, shares)
-        denser_path = divide_motions(posted.path, motions, shares)
-        led.posted = repost_path(posted, replace_axes(denser_path, motions + np.arange(len(motions)), axes))
+    led.posted, led.positions = insert_axes(posted, led.positions, added)
 
 
 def _turn_upright_tools(led: PolePasses) -> None:
@@ -208,7 +228,7 @@ def _turn_upright_tools(led: PolePasses) -> None:
 
 def _list_crossing_records(
     deviation: Deviation, led: PolePasses, path: ProgrammedPath, crossings: _Crossings
-) -> list[tuple[int, float, Array]]:
+) -> list[AddedRecord]:
     """List the records that the routes through a pole need: motion, share, and axis (3,)."""
     pole = crossings.pole
     rays = [ray for route in crossings.routes for ray in route.rays]

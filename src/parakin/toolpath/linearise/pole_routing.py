@@ -21,6 +21,9 @@ _STRAIGHT = 5e-4  # the same: what bends less turns by so little on the pole tha
 _SNAPPED = 0.2  # fraction of the angle tolerance: a record that would be led so near to the pole is put onto it
 _INNERMOST = 0.02  # fraction of the angle tolerance: the first radius at which records keep a way straight
 _GROWTH, _OUTERMOST = 4.0, 0.7  # of these radii, and the last one as a fraction of the circle's
+_SHIFT = 4.0 * PRINTED  # rad, by which an axis leans ahead so that C is told, whatever the rest of its lean
+_UNTOLD = 1.1 * PRINTED  # rad off Z: such a lean may be lost, for it tells no C
+_EXACT_LEAN = 1e-12  # rad: what is rounding
 _EDGE = 1e-9  # of a motion: what is rounding
 
 
@@ -146,6 +149,8 @@ def _route_through_pole(
     offsets = [abs(float(entry @ normal)) for entry in entries if entry is not None]
     edge = [offset**3 / radius**2 for offset in offsets]
     bends = squeeze.is_pose and (not pole.is_upright or max(offsets, default=0.0) > _STRAIGHT * radius)
+    shift = _find_shift(pole, programmed, steps, window) if bends else 0.0
+    a = a + np.where(weight > 0.0, shift, 0.0)
     crossings = np.flatnonzero(a[:-1] * a[1:] < 0.0)
     fraction = a[crossings] / (a[crossings] - a[crossings + 1])
     miss_line = np.abs(b[crossings] + fraction * (b[crossings + 1] - b[crossings]))
@@ -158,9 +163,9 @@ def _route_through_pole(
     at_record = np.concatenate([[steps.begin[first] == 0.0], steps.end[inside_window] == 1.0])
     if pole.moves and np.count_nonzero(at_record & (np.hypot(a, (1.0 - weight) * b) < _SNAPPED * angle)) > 1:
         return None  # even poses bow out beside a pole that goes along with them, in a direction of their own
-    moved = at_record & (np.abs(weight * b) > (EXACT if bends else PRINTED))
+    moved = at_record & (weight * np.maximum(np.abs(b), shift) > (EXACT if bends else PRINTED))
     squeezed = (1.0 - weight) * b
-    if bends:
+    if bends and not shift:
         nearest = int(np.where(at_record, np.hypot(a, squeezed), np.inf).argmin())
         if np.hypot(a[nearest], squeezed[nearest]) < _SNAPPED * angle:
             if np.hypot(a[nearest], b[nearest]) > _MOST_MOVED * angle:
@@ -184,9 +189,23 @@ def _route_through_pole(
     miss, rays = float(steps.nearest[nearest_step]), tuple[tuple[int, float, Array], ...]()
     if bends:
         at_pole = steps.record[[nearest_step]], steps.share[[nearest_step]]
-        inner = pole.list_inner_radii(programmed.interpolate(*at_pole)[1][0], _INNERMOST * angle)
+        inner = pole.list_inner_radii(programmed.interpolate(*at_pole)[1][0], _OUTERMOST * radius)
         rays = _place_rays(steps, window, np.column_stack([a, b]), (line, normal), squeeze, inner)
     return PoleRoute(window, miss, record, axis, crossing, share, () if bends else ends, rays)
+
+
+def _find_shift(pole: Pole, programmed: ProgrammedPath, steps: PoleSteps, window: tuple[int, int]) -> float:
+    """Find how far ahead along its way the axis has to lean for a pose to tell exactly where it points, rad.
+
+    Where a pole that moves is passed so near to Z that C is free to printed digits, but is not on Z, the small lean
+    that leads over it would be lost, and the free angle be another one behind the pole.
+    """
+    if not pole.moves:
+        return 0.0
+    nearest = window[0] + int(steps.nearest[window[0] : window[1] + 1].argmin())
+    at = steps.record[[nearest]], steps.share[[nearest]]
+    on_pole = pole.find_axes(*programmed.interpolate(*at), np.zeros((1, 2)), programmed.interpolate_extension(*at))
+    return _SHIFT if _EXACT_LEAN < np.hypot(*on_pole[0, :2]) < _UNTOLD else 0.0
 
 
 def _place_rays(
@@ -206,7 +225,9 @@ def _place_rays(
     a, rays = way[:, 0], []
     innermost = _INNERMOST * squeeze.angle
     count = max(0, int(np.ceil(np.log(_OUTERMOST * squeeze.radius / innermost) / np.log(_GROWTH))))
-    for radius in [*inner, *(innermost * _GROWTH ** np.arange(count)).tolist()]:
+    outer = (innermost * _GROWTH ** np.arange(count)).tolist()
+    closest = max(inner, default=0.0)
+    for radius in [*inner, *(radius for radius in outer if radius > closest)]:
         for at in (-radius, radius):
             places = np.flatnonzero((a[:-1] - at) * (a[1:] - at) < 0.0)
             for index in sorted({*places[:1].tolist(), *places[-1:].tolist()}):  # in and out again where it turns back

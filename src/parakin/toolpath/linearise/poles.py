@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...arrays import Array
-from ...kinematics.wrist.pole_thresholds import RIM
+from ...kinematics.wrist.pole_thresholds import NEAR_Z, RIM
 from ...kinematics.wrist.pose_angles import solve_direction
 from ...machine import Machine
 from ..posting.posted import Posted
@@ -19,6 +19,7 @@ _ROUNDS = 60
 _POINTS_AT_ONCE = 1 << 12
 _BENDING = 0.1  # sine of B: where C turns as much as for a tool more upright, even poses are not straight
 _RATIOS = (4.0, 2.0, 1.0)  # of RIM
+_CLOSE_RATIOS = tuple(2.0 ** (0.5 * k) for k in range(12, -1, -1))  # of RIM, where the tool is NEAR_Z
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,9 +56,11 @@ class Pole:
         Where the tool is nearly upright C turns on the way, so that even poses bend: both sides of the pole would tell
         another free angle, and the joint would jump when a controller lets go of it. Corners there are not rounded.
         """
-        if self.is_upright or np.hypot(axis[0], axis[1]) > _BENDING:
+        lean = np.hypot(axis[0], axis[1])
+        if self.is_upright or lean > _BENDING:
             return []
-        return [ratio * RIM for ratio in _RATIOS if ratio * RIM < radius]
+        ratios = _CLOSE_RATIOS if lean < NEAR_Z else _RATIOS  # C turns far where both poles are in one place
+        return [ratio * RIM for ratio in ratios if ratio * RIM < radius]
 
     def get_angles(self, posted: Posted) -> Array:
         """Return the angle that the pole frees along a posted path, (n,) rad."""

@@ -155,8 +155,19 @@ def _lead_through_poles(posted: Posted, angle: float) -> _LedPath:
     return _LedPath(posted.path, led.posted, record)
 
 
+def has_room_for_rewind(posted: Posted) -> bool:
+    """Tell whether a rewind might help a path that has none: it leaves a range that is a whole turn wide."""
+    wrist = posted.machine.wrist
+    if wrist is None or not is_wound_up(posted):
+        return False
+    drive, angles = posted.machine.drives[wrist.first], posted.joints[:, wrist.first]
+    tried = any("rewind" in note.text for note in posted.path.notes)
+    within = (angles >= drive.low) & (angles <= drive.high)
+    return not tried and bool(drive.high - drive.low >= TURN and within.any())
+
+
 def is_wound_up(posted: Posted) -> bool:
-    """Tell whether a path turns the wrist's first joint farther than its range is wide."""
+    """Tell whether a path turns the wrist's first joint beyond its range."""
     wrist = posted.machine.wrist
     if wrist is None:
         return False

@@ -13,7 +13,7 @@ from ...arguments import check_arguments, check_positive, parse_range
 from ...arrays import Array, AxisRange, Progress
 from ...errors import PoseError, quote
 from ...machine import Machine
-from ...units import AXIS_UNITS
+from ...units import AXIS_UNITS, to_display
 from ..path import ToolPath
 from ..posting.posted import Posted
 from ..posting.range_use import find_tightest_limit, measure_range_use
@@ -59,6 +59,14 @@ class Placement:
         limit = find_tightest_limit(posted, record)
         return replace(self, margin=float(relative[record]), limit=limit, record=record)
 
+    def describe_refusal(self) -> str:
+        """Describe, of a placement that is not allowed, where it is and what it breaks."""
+        values = ",".join(f"{axis}={to_display(value, AXIS_UNITS[axis]):.6g}" for axis, value in self.values.items())
+        return (
+            f"no placement within these bounds is allowed; the nearest is {values or 'the only one'}: "
+            f"{-self.margin:.1%} of half a range beyond {self.limit}"
+        )
+
     @property
     def allowed(self) -> bool:
         """Whether the machine can follow the whole path there."""
@@ -84,9 +92,15 @@ def find_placement(
 ) -> Placement:
     """Find the placement within bounds that has the greatest least margin over all records of a path.
 
-    The first of :func:`find_placements`, whose arguments and errors these are.
+    The first of :func:`find_placements`, whose arguments and errors these are. Between the records a limit may be
+    broken all the same, which :func:`parakin.prepare` tells.
+
+    Raises :class:`PoseError` also where no placement within the bounds keeps the limits at all records.
     """
-    return find_placements(machine, path, bounds, mode=mode, rewinds=rewinds, angle=angle, progress=progress)[0]
+    placements = find_placements(machine, path, bounds, mode=mode, rewinds=rewinds, angle=angle, progress=progress)
+    if not placements[0].allowed:
+        raise PoseError(f"bounds: {placements[0].describe_refusal()}")
+    return placements[0]
 
 
 @check_arguments

@@ -10,15 +10,15 @@ import numpy as np
 
 from ...arrays import Array
 from ...kinematics.turns import count_nearest_turns
-from ...kinematics.wrist.pole_thresholds import EXACT
+from ...kinematics.wrist.pole_thresholds import STANDING
 from ...machine import Machine
 
 
 def follow_curve(machine: Machine, mode: str, poses: Array, length: Array) -> Array:
     """Follow the joints continuously along poses (rows, axes); ``length`` (rows,) is each one's place on the curve."""
-    joints, wrist = machine.follow(poses, mode, EXACT), machine.wrist
+    joints, wrist = machine.follow(poses, mode, STANDING), machine.wrist
     if wrist is not None:
-        free = wrist.find_free(poses, EXACT)
+        free = wrist.find_free(poses, STANDING)
         if free.any() and not free.all():
             guess = np.stack([np.interp(length[free], length[~free], column) for column in joints[~free].T], axis=1)
             guess[:, wrist.first] = _ease_angles(length[free], length[~free], joints[~free, wrist.first])
@@ -29,7 +29,7 @@ def follow_curve(machine: Machine, mode: str, poses: Array, length: Array) -> Ar
 def find_nearest_joints(machine: Machine, mode: str, poses: Array, guess: Array) -> Array:
     """Find the joints of poses that are nearest to a guess (rows, joints), in either mode of the wrist."""
     if machine.wrist is not None:
-        return machine.wrist.solve_nearest(poses, mode, guess, EXACT)[0]
+        return machine.wrist.solve_nearest(poses, mode, guess, STANDING)[0]
     joints = machine.inverse(poses, mode)
     count_nearest_turns(joints, guess, machine.turning_joints)
     return joints

@@ -6,7 +6,7 @@ from ...arguments import check_arguments
 from ...arrays import Progress
 from ...machine import Machine
 from ..path import ToolPath
-from ..placing.placement import AxisRanges, Placement, find_placement, find_placements
+from ..placing.placement import AxisRanges, Placement, find_placements
 from .choice import choose_tool_turn
 
 _ROUNDS = 3
@@ -36,7 +36,7 @@ def find_turned_placements(
         turn = choose_tool_turn(machine, path, workpiece=best.workpiece, mode=best.mode)
         if turn is None:
             break
-        placed = find_placement(machine, turn.path, bounds, mode=best.mode)
+        placed = find_placements(machine, turn.path, bounds, mode=best.mode)[0]
         report(0.4 + 0.6 * (number + 1) / _ROUNDS)
         if not placed.margin > _GAIN * best.margin:
             break

@@ -1,0 +1,48 @@
+"""Explain a cycle time that is far longer than the programmed feeds ask for, at the line that costs most of it."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...arrays import Array
+from ..path import Note
+from .trajectory import Trajectory
+
+_LONGER = 1.5  # times what feeds and rapids ask for, from which on it is explained,
+_LEAST = 1.0  # s: if it is so much longer
+
+
+def explain_lost_time(trajectory: Trajectory) -> Note | None:
+    """Explain at its line what costs most, where a trajectory takes over 1.5 times what the feeds ask for."""
+    seconds, feed_seconds = np.diff(trajectory.times, prepend=0.0), _measure_feed_times(trajectory)
+    if not seconds.sum() > max(_LONGER * feed_seconds.sum(), feed_seconds.sum() + _LEAST):
+        return None
+    lines, number = np.unique(trajectory.posted.path.line, return_inverse=True)
+    times_by_line, feed_times_by_line = (np.bincount(number, each) for each in (seconds, feed_seconds))
+    worst = int((times_by_line - feed_times_by_line).argmax())
+    spans = np.diff(trajectory.profile.row_times, append=trajectory.seconds)
+    record = np.searchsorted(trajectory.times, trajectory.profile.row_times).clip(0, len(number) - 1)
+    on_line = number[record] == worst
+    times = np.bincount(trajectory.binding[on_line], spans[on_line], len(trajectory.names))
+    limit = trajectory.names[int(times.argmax())]
+    text = (
+        f"the path takes {seconds.sum():.3g} s, its feeds ask for {feed_seconds.sum():.3g} s; most is lost here, "
+        f"{times_by_line[worst]:.2g} s for {feed_times_by_line[worst]:.2g} s, bound by {limit}"
+    )
+    return Note(int(lines[worst]), text)
+
+
+def _measure_feed_times(trajectory: Trajectory) -> Array:
+    """Measure what the motions to the records (n,) would take by their feeds or programmed times, s.
+
+    Rapid motions ask for what they take.
+    """
+    path = trajectory.posted.path
+    seconds = np.diff(trajectory.times, prepend=0.0)
+    tip = path.tip if path.extension is None else path.tip - path.extension[:, None] * path.axis
+    length = np.linalg.norm(np.diff(tip, axis=0, prepend=tip[:1]), axis=1)
+    feed_seconds = np.where(np.isnan(path.feed), seconds, length / path.feed * 60.0)
+    if path.seconds is not None:
+        feed_seconds = np.where(np.isnan(path.seconds), feed_seconds, path.seconds)
+    feed_seconds[path.rapid] = seconds[path.rapid]
+    return np.minimum(feed_seconds, seconds)

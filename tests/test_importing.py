@@ -1,9 +1,12 @@
 """Machines of other programs: their inverse is that program's own, by the formulas of its source."""
 
 import json
+import shutil
+from pathlib import Path
 
 import numpy as np
 import pytest
+from linuxcnc.stub import Kinematics, Stub
 
 import parakin as pk
 from parakin.cli import main
@@ -156,7 +159,7 @@ def genhexkins(poses):
 
 
 def rotarydeltakins(poses):
-    """rotarydeltakins-common.h, with its own sizes in inches; degrees there."""
+    """rotarydeltakins-common.h of LinuxCNC 2.9, with its own sizes in inches; degrees there."""
     pfr, tl, sl, fr = 10.0, 10.0, 14.0, 6.0
 
     def invert(x, y, z):
@@ -164,11 +167,11 @@ def rotarydeltakins(poses):
         b = (fr - pfr - y) / z
         with np.errstate(invalid="ignore"):
             knee_y = (pfr + a * b + np.sqrt(tl**2 * (b**2 + 1) - (a - b * pfr) ** 2)) / (b**2 + 1)
-        return np.arctan2(a - b * knee_y, knee_y - pfr)
+        return np.arctan2(b * knee_y - a, knee_y - pfr)
 
     x, y, z = poses.T / INCH
     columns = []
-    for angle in (0.0, 2.0 * np.pi / 3.0, -2.0 * np.pi / 3.0):
+    for angle in (0.0, -2.0 * np.pi / 3.0, 2.0 * np.pi / 3.0):
         c, s = np.cos(angle), np.sin(angle)
         columns.append(invert(x * c - y * s, x * s + y * c, z))
     return np.column_stack(columns)
@@ -217,6 +220,28 @@ def test_the_inverse_is_the_programs_own(name, tmp_path):
     assert np.nanmax(np.abs(ours - theirs)) < 1e-8
     assert machine.check(machine.home) == 0
     assert machine.forward(theirs[np.isfinite(theirs).all(1)][:200], near=machine.home).converged.mean() > 0.9
+
+
+MODULES = Path("/usr/lib/linuxcnc/modules")
+
+
+@pytest.mark.skipif(not (MODULES.exists() and shutil.which("gcc")), reason="no modules of LinuxCNC, or no gcc")
+@pytest.mark.parametrize("name", ["genhexkins", "lineardeltakins", "rotarydeltakins", "tripodkins"])
+def test_the_inverse_is_that_of_linuxcncs_own_module(name, tmp_path):
+    """Modules with their own sizes, in mm; called as LinuxCNC calls them."""
+    machine = import_text(tmp_path, "own.hal", f"loadrt {name}\n", "--units", "mm")
+    kinematics = Kinematics(Stub(tmp_path).library, MODULES / f"{name}.so", 6 if name == "genhexkins" else 9)
+    rng = np.random.default_rng(4)
+    spread = np.array([0.1 * np.abs(machine.home).max() if unit == "mm" else 0.3 for unit in machine.axis_units])
+    poses = machine.home + rng.uniform(-1.0, 1.0, (POSES, len(spread))) * spread
+    given = np.zeros((POSES, 9))
+    given[:, : len(spread)] = np.where(np.array(machine.axis_units) == "mm", poses, np.degrees(poses))
+    joints, codes = kinematics.inverse(given, np.zeros((POSES, kinematics.width)))
+    theirs = joints[:, : len(machine.joints)]
+    if name == "rotarydeltakins":
+        theirs = np.radians(theirs)
+    assert np.abs(machine.inverse(poses) - theirs)[codes == 0].max() < 1e-9
+    assert (codes == 0).mean() > 0.9
 
 
 def test_limits_are_the_configurations(tmp_path):

@@ -3,14 +3,23 @@
 from __future__ import annotations
 
 from math import radians
+from typing import NamedTuple
 
 from ...model.chain import compute_exact_sincos
-from ...model.elements import Direction, Drive, Point, Signs, Size
+from ...model.elements import Direction, Drive, Point, Signs, Size, Vector
 from ...model.legs.crank import Crank
 from ...model.legs.slider import Slider
 
 _UP = Direction((0.0, 0.0, 1.0))
 _MIDDLE = Point((0.0, 0.0, 0.0))
+
+
+class ArmSizes(NamedTuple):
+    """Sizes of a rotary delta's leg, mm; ``foot`` is from the platform's middle to its joint."""
+
+    arm: float
+    rod: float
+    foot: float
 
 
 def build_tower(drive: Drive, radius: float, angle: float, rod: float, offset: float = 0.0) -> Slider:
@@ -20,16 +29,14 @@ def build_tower(drive: Drive, radius: float, angle: float, rod: float, offset: f
     return Slider((drive,), _MIDDLE, foot, _UP, Size(rod), Signs("+"))
 
 
-def build_arm(drive: Drive, shoulder: Point, angle: float, arm: float, rod: float, foot: float, side: int) -> Crank:
-    """Build an arm that swings outward, upward for positive joints; ``angle`` is in degrees.
+def build_arm(drive: Drive, pivot: Vector, angle: float, sizes: ArmSizes, rises: bool, platform_above: bool) -> Crank:
+    """Build an arm that points outward where its joint is zero, and whose knee stays outside.
 
-    foot : the radius of the platform's joint
-    side : where the platform is, 1 above the shoulders, -1 below
+    pivot : of an arm in the plane of X and Z; it is turned about Z by ``angle``, in degrees
+    rises : positive joints raise the knee, else they lower it
     """
     s, c = compute_exact_sincos(radians(angle))
-    pivot = Point((shoulder[0] * c, shoulder[0] * s, shoulder[2]))
-    platform = Point((foot * c, foot * s, 0.0))
-    branch = Signs("+" if side > 0 else "-")
-    return Crank(
-        (drive,), platform, pivot, Direction((s, -c, 0.0)), Direction((c, s, 0.0)), Size(arm), Size(rod), branch
-    )
+    place, platform = Point((pivot[0] * c, pivot[0] * s, pivot[2])), Point((sizes.foot * c, sizes.foot * s, 0.0))
+    axis = Direction((s, -c, 0.0) if rises else (-s, c, 0.0))
+    branch = Signs("+" if rises == platform_above else "-")
+    return Crank((drive,), platform, place, axis, Direction((c, s, 0.0)), Size(sizes.arm), Size(sizes.rod), branch)

@@ -5,8 +5,8 @@ from __future__ import annotations
 from math import atan2, inf, sqrt
 
 from ...errors import InputError, quote
-from ...model.elements import Drive, Point
-from .deltas import build_arm, build_tower
+from ...model.elements import Drive
+from .deltas import ArmSizes, build_arm, build_tower
 from .foreign_machine import ForeignMachine
 
 _TOWERS = (210.0, 330.0, 90.0)  # deg, where the file gives no angle
@@ -99,7 +99,8 @@ def _build_rotary_delta(sections: _Sections) -> ForeignMachine:
         angle = sections.get_number(section, "angle", usual)
         top = sections.get_number(section, "position_endstop", top_a)
         drive = Drive(section, "rad", -inf, _find_elbow_angle(-radius, top - height, upper, lower, sections.source))
-        legs.append(build_arm(drive, Point((radius, 0.0, height)), angle, upper, lower, 0.0, side=-1))
+        sizes = ArmSizes(upper, lower, 0.0)
+        legs.append(build_arm(drive, (radius, 0.0, height), angle, sizes, rises=True, platform_above=False))
     return ForeignMachine("Klipper", "rotary_delta", sections.source, "tx ty tz", tuple(legs), side=1)
 
 

@@ -11,7 +11,7 @@ from pathlib import Path
 from ...errors import InputError, quote
 from ...model.elements import Drive, Point
 from ...model.legs.length import Length
-from .deltas import build_arm, build_tower
+from .deltas import ArmSizes, build_arm, build_tower
 from .foreign_machine import ForeignMachine
 
 INCH = 25.4
@@ -175,11 +175,12 @@ def _build_lineardeltakins(given: _Configuration) -> ForeignMachine:
 def _build_rotarydeltakins(given: _Configuration) -> ForeignMachine:
     names = (("platformradius", 10.0), ("thighlength", 10.0), ("shinlength", 14.0), ("footradius", 6.0))
     radius, thigh, shin, foot = (given.unit * given.get_pin(f"rotarydeltakins.{name}", own) for name, own in names)
+    sizes, hip = ArmSizes(thigh, shin, foot), (radius, 0.0, 0.0)
     legs = tuple(
-        build_arm(given.make_drive(i, "deg"), Point((radius, 0.0, 0.0)), angle, thigh, shin, foot, side=1)
-        for i, angle in enumerate((270.0, 150.0, 30.0))
+        build_arm(given.make_drive(i, "deg"), hip, angle, sizes, rises=False, platform_above=False)
+        for i, angle in enumerate((270.0, 30.0, 150.0))
     )
-    return ForeignMachine("LinuxCNC", "rotarydeltakins", given.source, "tx ty tz", legs, side=1)
+    return ForeignMachine("LinuxCNC", "rotarydeltakins", given.source, "tx ty tz", legs, side=-1)
 
 
 _MODULES: dict[str, Callable[[_Configuration], ForeignMachine]] = {

@@ -101,6 +101,58 @@ def test_wrists_are_refused(name):
         render_move_check(pk.load(name))
 
 
+class Printer:
+    """What the module asks of Klipper: toolhead.py calls the kinematics' check_move with every move."""
+
+    def __init__(self, home):
+        self.home_position, self.seen = home, []
+
+    def get_printer(self):
+        return self
+
+    def register_event_handler(self, event, handler):
+        assert event == "klippy:connect"
+        self.start = handler
+
+    def lookup_object(self, name):
+        assert name == "toolhead"
+        return self
+
+    def get_kinematics(self):
+        return self
+
+    def check_move(self, move):
+        self.seen.append(move)
+
+
+class Move:
+    def __init__(self, start, end):
+        self.start_pos, self.end_pos = (*start, 0.0), (*end, 5.0)  # with the extruder's
+
+    def move_error(self, text):
+        return ValueError(text)
+
+
+def test_the_module_for_klipper_refuses_moves(tmp_path):
+    machine = pk.load("linear_delta")
+    output = tmp_path / "parakin_check_move.py"
+    assert main(["export", "linear_delta", "--to", "check-move-klipper", "-o", str(output)]) == 0
+    namespace = {}
+    exec(compile(output.read_text(), str(output), "exec"), namespace)
+    top = machine.travel(machine.home, "Z").ahead.distance
+    home = (0.0, 0.0, 280.0 + top)  # carriages at their endstops, which are the limits
+    printer = Printer(home)
+    namespace["load_config"](printer)
+    printer.start()
+    for end in ([50.0, 0.0, 280.0], [-30.0, 40.0, 300.0]):
+        printer.check_move(Move(machine.home, end))
+    printer.check_move(Move((0.0, 0.0, -900.0), home))  # homing
+    printer.check_move(Move(home, machine.home))
+    with pytest.raises(ValueError, match="limits"):
+        printer.check_move(Move(machine.home, [0.0, 0.0, 281.0 + top]))
+    assert len(printer.seen) == 5
+
+
 def test_command(tmp_path, capsys):
     output = tmp_path / "check_move.h"
     assert main(["export", "linear_delta", "--to", "check-move", "-o", str(output)]) == 0

@@ -10,21 +10,33 @@ from cyclopts import Parameter
 from ..errors import InputError
 from .console import print_json, print_text
 from .options import Json, Name, Sizes, load_machine
+from .values import parse_row
 
 if TYPE_CHECKING:
+    from ..arrays import Array
     from ..export.files import Content
     from ..machine import Machine
 
-ENDINGS = {"mjcf": ".xml", "check-move": ".h"}  # of the files, by what can be written
+ExportFormat = Literal["mjcf", "glb", "stl", "klipper", "reprapfirmware", "check-move", "check-move-klipper"]
 
-To = Annotated[Literal["mjcf", "check-move"], Parameter(name="--to")]
+_ENDINGS: dict[ExportFormat, str] = {
+    "mjcf": ".xml",
+    "glb": ".glb",
+    "stl": ".stl",
+    "klipper": ".cfg",
+    "reprapfirmware": ".g",
+    "check-move": ".h",
+    "check-move-klipper": ".py",
+}
+_POSED = ("glb", "stl")
 
 
 def export(
     name: Name,
     /,
     *,
-    to: To,
+    to: Annotated[ExportFormat, Parameter(name="--to")],
+    at: Annotated[str | None, Parameter(allow_leading_hyphen=True)] = None,
     output: Annotated[Path | None, Parameter(name=["--output", "-o"])] = None,
     json: Json = False,
     sizes: Sizes = None,
@@ -36,19 +48,26 @@ def export(
     name
         A shipped machine's name or a YAML file.
     to
-        What to write: mjcf, a MuJoCo model with closed loops, limits, masses and a servo for each drive; check-move, a
-        small C function for firmware that proves a straight move inside the machine's limits.
+        What to write: mjcf, a MuJoCo model with closed loops, limits, masses and a servo for each drive; glb and stl,
+        a mesh of its parts at a pose; klipper and reprapfirmware, a delta's sizes in that firmware's words;
+        check-move, a small C function for firmware that proves a straight move inside the machine's limits, and
+        check-move-klipper, a module for Klipper with it.
+    at
+        The pose of a mesh: X=10,Z=-1400 or all values in order, mm and degrees; the rest is home's. By default home.
     output
         The file; by default the machine's name in this folder.
     """
     machine = load_machine(name, sizes)
-    ending = ENDINGS[to]
+    ending = _ENDINGS[to]
     output = Path(f"{machine.name}{ending}") if output is None else output
     if output.suffix.lower() != ending:
         raise InputError(f'"{output}": expected a file name that ends in {ending}', "--output")
+    if at is not None and to not in _POSED:
+        raise InputError(f"{to} has no pose, only {' and '.join(_POSED)} have one", "--at")
+    pose = None if at is None else parse_row(at.split(","), machine.axes, machine.axis_units, machine.home, "--at")
     from ..export.files import write_files
 
-    write_files(output.parent, {output.name: _render(machine, to)})
+    write_files(output.parent, {output.name: _render(machine, to, pose)})
     if json:
         print_json({"schema": "parakin.export/1", "machine": machine.name, "to": to, "files": {to: str(output)}})
     else:
@@ -56,11 +75,19 @@ def export(
     return 0
 
 
-def _render(machine: Machine, to: str) -> Content:
-    if to == "check-move":
-        from ..controllers.move_check.move_check import render_move_check
+def _render(machine: Machine, to: ExportFormat, pose: Array | None) -> Content:
+    from ..controllers.move_check import move_check
+    from ..export.machine import firmware, mjcf, posed_mesh
 
-        return render_move_check(machine)
-    from ..export.machine.mjcf import render_mjcf
-
-    return render_mjcf(machine)
+    if to == "glb":
+        return posed_mesh.render_glb(machine, pose)
+    if to == "stl":
+        return posed_mesh.render_stl(machine, pose)
+    render = {
+        "mjcf": mjcf.render_mjcf,
+        "klipper": firmware.render_klipper,
+        "reprapfirmware": firmware.render_reprapfirmware,
+        "check-move": move_check.render_move_check,
+        "check-move-klipper": move_check.render_klipper_check,
+    }
+    return render[to](machine)

@@ -23,6 +23,10 @@
 #define CHECK_MOVE_SPANS 400 /* spans of a move that are tried before it is given up */
 #endif
 
+#ifndef CHECK_MOVE_SLACK
+#define CHECK_MOVE_SLACK 0.0 /* mm, rad and the like: a limit that is exceeded by no more counts as kept */
+#endif
+
 #define CM_AXES %(axes)d
 #define CM_MARGINS %(margins)d
 #define CM_SIGN %(sign)s /* of det A at home */
@@ -213,7 +217,7 @@ static int cm_bound(const double *start, const double *end, double first, double
     cm_run(cm_values_code, cm_values_constants, CM_VALUES);
     for (i = 0; i <= CM_MARGINS; i++) {
         const cm_interval y = i < CM_MARGINS ? outputs[i] : cm_scale(CM_SIGN, outputs[i]);
-        const double floor_ = i < CM_MARGINS ? 0.0 : CM_FLOOR;
+        const double floor_ = i < CM_MARGINS ? -(CHECK_MOVE_SLACK) : CM_FLOOR;
         least[i] = y.low - floor_;
         if (!(least[i] >= 0.0) && verdict == 1) verdict = 0;
         if (y.high < floor_) verdict = -1;

@@ -42,6 +42,18 @@ def render_move_check(machine: Machine) -> str:
     }
 
 
+def render_klipper_check(machine: Machine) -> str:
+    """Render a module for Klipper's ``klippy/extras`` that refuses moves which ``check_move`` does not prove.
+
+    Raises :class:`NoMethodError` for a machine whose axes are not X, Y and Z.
+    """
+    if machine.axes != ("X", "Y", "Z"):
+        raise NoMethodError(f"{machine.name}: Klipper moves X, Y and Z, not {' '.join(machine.axes)}")
+    template = files(__package__).joinpath("klipper.txt").read_text(encoding="utf-8")
+    title = _format_comment(f"{machine.name} ({machine.spec.title})")
+    return template % {"version": __version__, "title": title, "header": render_move_check(machine)}
+
+
 def _render_tape(name: str, tape: Tape) -> str:
     """Render a tape as tables of its operations and their constants."""
     count = len(tape.code)
@@ -57,5 +69,5 @@ def _render_tape(name: str, tape: Tape) -> str:
 
 
 def _format_comment(text: str) -> str:
-    """Format a text that stays in a comment."""
-    return " ".join(text.split()).replace("*/", "* /")
+    """Format a text that stays in a comment, and in a string of Python."""
+    return " ".join(text.split()).replace("*/", "* /").replace('"', "'")

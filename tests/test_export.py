@@ -1,0 +1,84 @@
+"""Machines for other programs: meshes stand where the scene does, and firmwares' words come back as the machine."""
+
+import numpy as np
+import pytest
+import trimesh
+
+import parakin as pk
+from parakin.cli import main
+from parakin.export.machine.scene import build_scene
+
+DELTAS = ["linear_delta", "linapod3"]
+
+
+@pytest.mark.parametrize("name", ["hexapod", "tricept", "orthoglide5_table"])
+def test_meshes_stand_at_the_pose(name, tmp_path):
+    machine = pk.load(name)
+    pose = machine.home.copy()
+    pose[:2] += [20.0, -10.0]
+    at = ",".join(f"{value}" for value in pose[:3])
+    at += "".join(f",{np.degrees(value)}" for value in pose[3:])
+    for kind in ("stl", "glb"):
+        assert main(["export", name, "--to", kind, "--at", at, "-o", str(tmp_path / f"m.{kind}")]) == 0
+    scene = build_scene(machine, pose)
+    stl, glb = trimesh.load(tmp_path / "m.stl"), trimesh.load(tmp_path / "m.glb")
+    low, high = scene.box
+    thick = 0.03 * scene.size
+    assert (np.abs(stl.bounds - scene.box) < thick).all()
+    assert stl.volume > 0.0  # facing outward
+    # glTF: metres, Y up
+    y_up = np.array([[low[0], low[2], -high[1]], [high[0], high[2], -low[1]]])
+    assert glb.bounds == pytest.approx(1e-3 * y_up, abs=1e-3 * thick)  # glTF counts in metres
+    assert len(glb.geometry) > 10
+
+
+@pytest.mark.parametrize("to", ["klipper", "reprapfirmware"])
+@pytest.mark.parametrize("name", DELTAS)
+def test_a_delta_comes_back(name, to, tmp_path):
+    """Written for a firmware and imported again, the inverse is the same but for where joints count from."""
+    file = tmp_path / {"klipper": "printer.cfg", "reprapfirmware": "config.g"}[to]
+    machine = pk.load(name)
+    assert main(["export", name, "--to", to, "-o", str(file)]) == 0
+    assert main(["import", str(file), "-o", str(tmp_path / "again.yaml")]) == 0
+    again = pk.load(tmp_path / "again.yaml")
+    rng = np.random.default_rng(6)
+    poses = machine.home + rng.uniform(-80.0, 80.0, (1000, 3))
+    ours, theirs = machine.inverse(poses), again.inverse(poses)
+    # the firmware's tower X is at 210°, Klipper's steppers are in the order of the joints
+    order = [0, 1, 2] if to == "klipper" else [1, 2, 0]
+    offsets = theirs - ours[:, order]
+    assert np.ptp(offsets, axis=0).max() < 1e-7
+    tool = machine.tool_length
+    assert offsets[0] == pytest.approx(-tool, abs=1e-7)
+    tops = np.array([drive.high for drive in machine.drives])[order] - tool
+    assert [drive.high for drive in again.drives] == pytest.approx(tops, abs=1e-6)
+
+
+def test_calibrated_deltas_come_back(tmp_path):
+    """Three rods, turned towers and uneven endstops."""
+    text = "M669 K3\nM665 R131.5 L290.8:290.9:291 H300.2 X0.3 Y-0.2 Z0.1\nM666 X0.5 Y-0.3 Z-0.2\n"
+    (tmp_path / "config.g").write_text(text)
+    assert main(["import", str(tmp_path / "config.g"), "-o", str(tmp_path / "one.yaml")]) == 0
+    assert main(["export", str(tmp_path / "one.yaml"), "--to", "reprapfirmware", "-o", str(tmp_path / "two.g")]) == 0
+    again = (tmp_path / "two.g").read_text()
+    assert "M665 R131.5 L290.8:290.9:291 H300.2 X0.3 Y-0.2 Z0.1" in again
+    assert "M666 X0.5 Y-0.3 Z-0.2" in again
+
+
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        (["hexapod", "--to", "klipper"], "three towers"),
+        (["orthoglide", "--to", "reprapfirmware"], "no tower"),
+        (["hexapod", "--to", "check-move-klipper"], "X, Y and Z"),
+        (["hexapod", "--to", "mjcf", "--at", "X=1"], "no pose"),
+        (["hexapod", "--to", "stl", "--at", "X=a"], "X"),
+    ],
+)
+def test_what_can_not_be_written_is_refused(words, told, tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert main(["export", *words]) == 2
+    error = capsys.readouterr().err
+    assert told in error
+    assert len(error.splitlines()) == 1
+    assert not list(tmp_path.iterdir())

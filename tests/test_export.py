@@ -1,5 +1,7 @@
 """Machines for other programs: meshes stand where the scene does, and firmwares' words come back as the machine."""
 
+import json
+
 import numpy as np
 import pytest
 import trimesh
@@ -82,3 +84,39 @@ def test_what_can_not_be_written_is_refused(words, told, tmp_path, capsys, monke
     assert told in error
     assert len(error.splitlines()) == 1
     assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("name", ["hexapod", "tricept", "lambda6", "orthoglide5_table", "hbg80_2d", "eclipse"])
+def test_a_urdf_stands_as_at_home(name, tmp_path):
+    """Read by MuJoCo with its joints at home's values, the tool is at home's pose, and the loops close."""
+    mujoco = pytest.importorskip("mujoco")
+    machine = pk.load(name)
+    output = tmp_path / "m.urdf"
+    assert main(["export", name, "--to", "urdf", "-o", str(output)]) == 0
+    loops = json.loads((tmp_path / "m_loops.json").read_text())
+    text = output.read_text().replace("<link", '<mujoco><compiler fusestatic="false"/></mujoco><link', 1)
+    model = mujoco.MjModel.from_xml_string(text)
+    data = mujoco.MjData(model)
+    for joint, value in loops["home"].items():
+        data.qpos[model.joint(joint).qposadr[0]] = value
+    mujoco.mj_kinematics(model, data)
+    for loop in loops["loops"]:
+        ends = [
+            data.body(link).xpos + data.body(link).xmat.reshape(3, 3) @ np.array(point)
+            for link, point in zip(loop["links"], loop["points"], strict=True)
+        ]
+        assert ends[0] == pytest.approx(ends[1], abs=1e-9)
+    tool, workpiece = data.body("tool"), data.body("workpiece")
+    tip = 1e3 * workpiece.xmat.reshape(3, 3).T @ (tool.xpos - workpiece.xpos)
+    wanted = dict(zip(machine.axes, machine.home, strict=True))
+    assert [tip["XYZ".index(axis)] for axis in wanted if axis in "XYZ"] == pytest.approx(
+        [wanted[axis] for axis in wanted if axis in "XYZ"], abs=1e-6
+    )
+    assert loops["drives"] == list(machine.joints)
+    assert np.array([loops["home"][joint] for joint in machine.joints]) * np.where(
+        np.array(machine.joint_units) == "mm", 1e3, 1.0
+    ) == pytest.approx(machine.inverse(machine.home), abs=1e-9)
+    low, high = (
+        1e-3 * end if machine.drives[0].unit == "mm" else end for end in (machine.drives[0].low, machine.drives[0].high)
+    )
+    assert model.joint(machine.joints[0]).range == pytest.approx([low, high])

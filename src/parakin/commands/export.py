@@ -17,10 +17,11 @@ if TYPE_CHECKING:
     from ..export.files import Content
     from ..machine import Machine
 
-ExportFormat = Literal["mjcf", "glb", "stl", "klipper", "reprapfirmware", "check-move", "check-move-klipper"]
+ExportFormat = Literal["mjcf", "urdf", "glb", "stl", "klipper", "reprapfirmware", "check-move", "check-move-klipper"]
 
 _ENDINGS: dict[ExportFormat, str] = {
     "mjcf": ".xml",
+    "urdf": ".urdf",
     "glb": ".glb",
     "stl": ".stl",
     "klipper": ".cfg",
@@ -48,10 +49,10 @@ def export(
     name
         A shipped machine's name or a YAML file.
     to
-        What to write: mjcf, a MuJoCo model with closed loops, limits, masses and a servo for each drive; glb and stl,
-        a mesh of its parts at a pose; klipper and reprapfirmware, a delta's sizes in that firmware's words;
-        check-move, a small C function for firmware that proves a straight move inside the machine's limits, and
-        check-move-klipper, a module for Klipper with it.
+        What to write: mjcf, a MuJoCo model with closed loops, limits, masses and a servo for each drive; urdf, its
+        tree, and its loops in a JSON file beside it; glb and stl, a mesh of its parts at a pose; klipper and
+        reprapfirmware, a delta's sizes in that firmware's words; check-move, a small C function for firmware that
+        proves a straight move inside the machine's limits, and check-move-klipper, a module for Klipper with it.
     at
         The pose of a mesh: X=10,Z=-1400 or all values in order, mm and degrees; the rest is home's. By default home.
     output
@@ -67,22 +68,28 @@ def export(
     pose = None if at is None else parse_row(at.split(","), machine.axes, machine.axis_units, machine.home, "--at")
     from ..export.files import write_files
 
-    write_files(output.parent, {output.name: _render(machine, to, pose)})
+    files = _render(machine, to, output, pose)
+    write_files(output.parent, files)
+    written = {"loops" if name != output.name else to: str(output.parent / name) for name in files}
     if json:
-        print_json({"schema": "parakin.export/1", "machine": machine.name, "to": to, "files": {to: str(output)}})
+        print_json({"schema": "parakin.export/1", "machine": machine.name, "to": to, "files": written})
     else:
-        print_text(f"{to}  {output}")
+        print_text("\n".join(f"{kind}  {name}" for kind, name in written.items()))
     return 0
 
 
-def _render(machine: Machine, to: ExportFormat, pose: Array | None) -> Content:
+def _render(machine: Machine, to: ExportFormat, output: Path, pose: Array | None) -> dict[str, Content]:
+    """Render the files by their names; the output's own comes first."""
     from ..controllers.move_check import move_check
-    from ..export.machine import firmware, mjcf, posed_mesh
+    from ..export.machine import firmware, mjcf, posed_mesh, urdf
 
+    if to == "urdf":
+        tree, loops = urdf.render_urdf(machine)
+        return {output.name: tree, f"{output.stem}_loops.json": loops}
     if to == "glb":
-        return posed_mesh.render_glb(machine, pose)
+        return {output.name: posed_mesh.render_glb(machine, pose)}
     if to == "stl":
-        return posed_mesh.render_stl(machine, pose)
+        return {output.name: posed_mesh.render_stl(machine, pose)}
     render = {
         "mjcf": mjcf.render_mjcf,
         "klipper": firmware.render_klipper,
@@ -90,4 +97,4 @@ def _render(machine: Machine, to: ExportFormat, pose: Array | None) -> Content:
         "check-move": move_check.render_move_check,
         "check-move-klipper": move_check.render_klipper_check,
     }
-    return render[to](machine)
+    return {output.name: render[to](machine)}

@@ -15,14 +15,10 @@ import numpy as np
 from ...arrays import Array
 from ...machine import Machine
 from ...version import __version__
-from .multibody import WORLD, Body, BodyJoint, Multibody, build_multibody
+from .multibody import DENSITIES, METRE, WORLD, Body, BodyJoint, Multibody, build_multibody
 from .scene import Points, build_scene
 from .solids import LOOKS
 
-# Densities of what is drawn, kg/m³: rods and carriages of steel, what they carry of aluminium.
-DENSITIES = {"rod": 7850.0, "carriage": 7850.0, "platform": 2700.0, "head": 2700.0, "table": 2700.0}
-
-_METRE = 1e-3
 _TIME_STEP = "0.0005"  # s
 _STIFF = {"solref": "0.001 1", "solimp": "0.999 0.9999 0.001 0.5 2"}  # of loops: two time steps, nearly rigid
 _SERVO = {"slide": 1e6, "hinge": 1e5}  # N/m and N m/rad of a drive: far stiffer than these weights ask for
@@ -41,12 +37,12 @@ def render_mjcf(machine: Machine) -> str:
     SubElement(root, "option", timestep=_TIME_STEP, integrator="implicitfast", iterations="200", tolerance="1e-12")
     _add_defaults(root)
     world = SubElement(root, "worldbody")
-    SubElement(world, "light", pos=_format(np.array([0.0, 0.0, 2.0 * size * _METRE])), directional="true")
+    SubElement(world, "light", pos=_format(np.array([0.0, 0.0, 2.0 * size * METRE])), directional="true")
     elements = {WORLD: world}
     for body in multibody.bodies:
         elements[body.name] = _add_body(elements[body.carrier], body, size)
     for name, (carrier, rotation, origin) in multibody.frames.items():
-        SubElement(elements[carrier], "site", name=name, pos=_format(origin * _METRE), quat=_format_turn(rotation))
+        SubElement(elements[carrier], "site", name=name, pos=_format(origin * METRE), quat=_format_turn(rotation))
     _add_table_disc(elements, multibody, size)
     _add_loops(root, elements, multibody)
     _add_drives(root, multibody)
@@ -65,7 +61,7 @@ def _add_defaults(root: Element) -> None:
 
 
 def _add_body(carrier: Element, body: Body, size: float) -> Element:
-    placed = {"pos": _format(body.origin * _METRE), "quat": _format_turn(body.rotation)}
+    placed = {"pos": _format(body.origin * METRE), "quat": _format_turn(body.rotation)}
     element = SubElement(carrier, "body", {"name": body.name, **placed})
     for joint in body.joints:
         _add_joint(element, joint)
@@ -73,10 +69,10 @@ def _add_body(carrier: Element, body: Body, size: float) -> Element:
     for start, end in body.bars:
         look = {"class": body.kind}
         if np.linalg.norm(end - start) < radius:
-            SubElement(element, "geom", look, type="sphere", size=f"{radius * _METRE:.6g}", pos=_format(start * _METRE))
+            SubElement(element, "geom", look, type="sphere", size=f"{radius * METRE:.6g}", pos=_format(start * METRE))
         else:
-            ends = _format(np.concatenate([start, end]) * _METRE)
-            SubElement(element, "geom", look, type="capsule", size=f"{radius * _METRE:.6g}", fromto=ends)
+            ends = _format(np.concatenate([start, end]) * METRE)
+            SubElement(element, "geom", look, type="capsule", size=f"{radius * METRE:.6g}", fromto=ends)
     return element
 
 
@@ -87,10 +83,10 @@ def _add_joint(body: Element, joint: BodyJoint) -> None:
     given = {"name": joint.name, "type": joint.kind}
     given |= {"damping": _DAMPING[joint.kind]} if joint.drive is None else {"armature": _ARMATURE[joint.kind]}
     if joint.kind != "ball":
-        unit = _METRE if joint.kind == "slide" else 1.0
+        unit = METRE if joint.kind == "slide" else 1.0
         given |= {
             "axis": _format(joint.axis),
-            "pos": _format(joint.pivot * _METRE),
+            "pos": _format(joint.pivot * METRE),
             "ref": f"{joint.value * unit:.16g}",
         }
         if isfinite(joint.low) and isfinite(joint.high):
@@ -102,9 +98,9 @@ def _add_table_disc(elements: dict[str, Element], multibody: Multibody, size: fl
     body, rotation, origin = multibody.frames["workpiece"]
     if body == WORLD:
         return
-    half = LOOKS["table"].radius * size * _METRE
-    place = {"pos": _format(origin * _METRE - rotation[:, 2] * half), "quat": _format_turn(rotation)}
-    disc = f"{_DISC * size * _METRE:.6g} {half:.6g}"
+    half = LOOKS["table"].radius * size * METRE
+    place = {"pos": _format(origin * METRE - rotation[:, 2] * half), "quat": _format_turn(rotation)}
+    disc = f"{_DISC * size * METRE:.6g} {half:.6g}"
     SubElement(elements[body], "geom", {"class": "table", "type": "cylinder", "size": disc, **place})
 
 
@@ -113,7 +109,7 @@ def _add_loops(root: Element, elements: dict[str, Element], multibody: Multibody
     for loop in multibody.loops:
         sites = [f"{loop.name}_a", f"{loop.name}_b"]
         for body, site, point in zip(loop.bodies, sites, loop.points, strict=True):
-            SubElement(elements[body], "site", name=site, pos=_format(point * _METRE), size="0.001")
+            SubElement(elements[body], "site", name=site, pos=_format(point * METRE), size="0.001")
         SubElement(equality, "connect", name=loop.name, site1=sites[0], site2=sites[1])
 
 
@@ -127,7 +123,7 @@ def _add_drives(root: Element, multibody: Multibody) -> None:
         if isfinite(joint.low) and isfinite(joint.high):
             given["inheritrange"] = "1"
         SubElement(actuator, "position", given)
-        home.append(joint.value * (_METRE if joint.kind == "slide" else 1.0))
+        home.append(joint.value * (METRE if joint.kind == "slide" else 1.0))
     sensor = SubElement(root, "sensor")
     frame = {"objtype": "site", "objname": "tool", "reftype": "site", "refname": "workpiece"}
     SubElement(sensor, "framepos", {"name": "tool_position", **frame})

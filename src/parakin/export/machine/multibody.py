@@ -24,6 +24,10 @@ WORLD = "world"
 BASE = "base"
 PLATFORM: str = "platform"
 
+# Densities of what is drawn, kg/m³: rods and carriages of steel, what they carry of aluminium.
+DENSITIES = {"rod": 7850.0, "carriage": 7850.0, "platform": 2700.0, "head": 2700.0, "table": 2700.0}
+METRE = 1e-3  # of a millimetre: simulators count in metres
+
 _NEAR = 1e-9  # mm; a body that ends nearer to its joint than this is a ball
 _FREE = 6  # coordinates of a motion that any pose has
 

@@ -6,10 +6,10 @@ import numpy as np
 
 from ...arrays import Array
 from ...machine import Machine
+from .multibody import METRE
 from .scene import build_scene
 from .solids import LOOKS, build_solids
 
-_METRE = 1e-3
 _Y_UP = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])  # Z up to Y up
 
 
@@ -32,7 +32,7 @@ def render_glb(machine: Machine, pose: Array | None = None) -> bytes:
     for number, solid in enumerate(build_solids(build_scene(machine, pose))):
         colour = [int(LOOKS[solid.kind].colour[i : i + 2], 16) / 255.0 for i in (1, 3, 5)]
         material = PBRMaterial(baseColorFactor=[*colour, 1.0], metallicFactor=0.1, roughnessFactor=0.7)
-        vertices = solid.vertices @ _Y_UP.T * _METRE
+        vertices = solid.vertices @ _Y_UP.T * METRE
         visual = TextureVisuals(material=material)
         scene.add_geometry(
             Trimesh(vertices, solid.triangles, process=False, visual=visual), geom_name=f"{solid.name} {number}"

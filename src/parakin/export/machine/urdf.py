@@ -144,7 +144,7 @@ def _add_link(root: Element, name: str, body: Body | None, size: float) -> None:
             spin, swing = 0.5 * own * radius**2, own * (3.0 * radius**2 + length**2) / 12.0
             shape, sizes = "cylinder", {"radius": f"{radius:.6g}", "length": f"{length:.9g}"}
         middle = 0.5 * (a + b)
-        SubElement(visual, "origin", {"xyz": _format(middle), "rpy": _format(_aim(along))})
+        SubElement(visual, "origin", {"xyz": _format(middle), "rpy": _format(_find_angles(along))})
         SubElement(SubElement(visual, "geometry"), shape, sizes)
         about = swing * np.eye(3) + (spin - swing) * np.outer(along, along)
         inertia += about + own * (middle @ middle * np.eye(3) - np.outer(middle, middle))
@@ -160,7 +160,7 @@ def _add_link(root: Element, name: str, body: Body | None, size: float) -> None:
     SubElement(element, "inertia", {key: f"{inertia[pair]:.9g}" for key, pair in pairs.items()})
 
 
-def _aim(along: Points) -> Points:
+def _find_angles(along: Points) -> Points:
     """Find roll, pitch and yaw that turn Z along a unit vector."""
     return np.array([0.0, np.arccos(np.clip(along[2], -1.0, 1.0)), np.arctan2(along[1], along[0])])
 

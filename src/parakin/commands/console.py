@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..errors import make_printable
 from ..export.json.text import format_json
+from ..kernels.compile_notice import call_at_first_compilation
 
 if TYPE_CHECKING:
     from rich.progress import Progress as Bar
@@ -52,20 +53,9 @@ def print_json(content: Mapping[str, Any]) -> None:
 @cache
 def announce_compiling() -> None:
     """Say once that kernels are being compiled, if their cache is empty or out of date."""
-    from numba.core import event
-
-    class Announcement(event.Listener):  # type: ignore[misc]
-        said = False
-
-        def on_start(self, event: object) -> None:
-            if not self.said:
-                self.said = True
-                print_remark("compiling the kernels, once for each kind of work; some seconds ...")
-
-        def on_end(self, event: object) -> None:
-            pass
-
-    event.register("numba:compile", Announcement())
+    call_at_first_compilation(
+        lambda: print_remark("compiling the kernels, once for each kind of work; some seconds ...")
+    )
 
 
 class ProgressBar(AbstractContextManager["ProgressBar"]):

@@ -13,9 +13,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Array, Flags, Indices
+from .kernel import find_kernel
+from .newton import NewtonShape, write_newton
 from .tape import NewtonTapes, Tape
+from .tape_rows import write_closed_rows, write_first_negative, write_rows
 
-FEW = 64  # rows for which no kernel of their own is compiled
 SMALL = 4096  # rows below which a second thread costs more than it brings
 
 
@@ -34,13 +36,6 @@ if hasattr(os, "register_at_fork"):  # a forked child has the pool but none of i
     os.register_at_fork(after_in_child=_make_pool.cache_clear)
 
 
-def freeze_rows(rows: Array) -> Array:
-    """Return a read-only view; Numba compiles the kernels for read-only arrays alone."""
-    view = rows.view()
-    view.flags.writeable = False
-    return view
-
-
 def run_in_threads(count: int, work: Callable[[int, int], None], small: int = SMALL) -> None:
     """Run ``work(start, stop)`` over all rows, some in each thread; the kernels release the interpreter's lock.
 
@@ -55,16 +50,24 @@ def run_in_threads(count: int, work: Callable[[int, int], None], small: int = SM
         future.result()
 
 
+def run_here(count: int, work: Callable[[int, int], None]) -> None:
+    """Run ``work(start, stop)`` over all rows in the calling thread."""
+    work(0, count)
+
+
+def _list_arrays(x: Array, z: Array | None) -> tuple[list[Array], tuple[int, ...]]:
+    """List the arrays of a tape's inputs that have columns, and how many."""
+    arrays = [array for array in (x, z) if array is not None and array.shape[1]]
+    return arrays, tuple(array.shape[1] for array in arrays)
+
+
 def evaluate_tape(tape: Tape, x: Array, out: Array, z: Array | None = None, whole: bool = True) -> Array:
     """Evaluate a tape for rows of ``x`` (N, i), each followed by its row of ``z``, into ``out`` (N, o).
 
     With ``whole`` a row of the answer is NaN as soon as one number of it, or of its inputs, is not finite.
     """
-    from .blocks import evaluate_rows
-
-    rest = np.empty((len(x), 0)) if z is None else z
-    args = (tape, whole, freeze_rows(x), freeze_rows(rest), out)
-    run_in_threads(len(x), lambda start, stop: evaluate_rows(*args, start, stop))
+    arrays, widths = _list_arrays(x, z)
+    find_kernel(write_rows, tape, widths, whole).run(arrays, [out], run_in_threads)
     return out
 
 
@@ -90,11 +93,10 @@ class ClosedRows(NamedTuple):
 
 def evaluate_closed_rows(tape: Tape, limits: ClosureLimits, x: Array, z: Array, rows: Array) -> ClosedRows:
     """Evaluate a tape of a row, closures and margins for rows of ``x`` and ``z``, the first into ``rows``."""
-    from .blocks import evaluate_with_residual
-
     results = ClosedRows(rows, np.empty(len(x)), np.empty(len(x), np.bool_))
-    args = (tape, limits, freeze_rows(x), freeze_rows(z), results)
-    run_in_threads(len(x), lambda start, stop: evaluate_with_residual(*args, start, stop))
+    arrays, widths = _list_arrays(x, z)
+    kernel = find_kernel(write_closed_rows, tape, widths, rows.shape[1], limits.closures)
+    kernel.run([*arrays, np.array([[limits.closed]])], results, run_in_threads)
     return results
 
 
@@ -105,24 +107,10 @@ def evaluate_tape_with_residual(tape: Tape, x: Array, out: Array, z: Array) -> A
 
 def find_first_negative(tape: Tape, x: Array, z: Array) -> Indices:
     """Find the first output that is negative or NaN, (N,): 1 + its index, 0 where every output is ≥ 0."""
-    if len(x) <= FEW:
-        margins = evaluate_tape(tape, x, np.empty((len(x), tape.outputs)), z, whole=False)
-        return _find_first_in_rows(margins, np.asarray(np.isfinite(x).all(1) & np.isfinite(z).all(1)))
-    from .blocks import find_negative
-
     out = np.empty(len(x), np.int64)
-    args = (tape, freeze_rows(x), freeze_rows(z), out)
-    run_in_threads(len(x), lambda start, stop: find_negative(*args, start, stop))
+    arrays, widths = _list_arrays(x, z)
+    find_kernel(write_first_negative, tape, widths).run(arrays, [out], run_in_threads)
     return out
-
-
-def _find_first_in_rows(margins: Array, finite: Flags) -> Indices:
-    """Find the first negative or NaN entry of each row as :func:`find_first_negative`; 1 where a row is not finite."""
-    padded = np.column_stack([~(margins >= 0.0), np.ones(len(margins), np.bool_)])
-    first: Indices = padded.argmax(1) + 1
-    first[first > margins.shape[1]] = 0
-    first[~finite & (first == 0)] = 1
-    return first
 
 
 class Settling(NamedTuple):
@@ -180,11 +168,20 @@ def solve_by_newton(tapes: NewtonTapes, limits: NewtonSteps, near: Array, joints
 
     side : the sign of the determinant to end with, one a row or one for all; none for that of the start
     """
-    from .newton import solve_newton
-
-    count = len(joints)
-    rows, settled = np.empty((count, near.shape[1])), np.empty(count, np.bool_)
-    roots = Roots(rows, np.empty(count), np.empty(count, np.int32), np.empty(count), settled)
-    args = (tapes, limits, freeze_rows(near), freeze_rows(joints), side, roots)
-    run_in_threads(count, lambda start, stop: solve_newton(*args, start, stop))
+    count, answer = len(joints), near.shape[1]
+    roots = Roots(
+        np.empty((count, answer)),
+        np.empty(count),
+        np.empty(count, np.int32),
+        np.empty(count),
+        np.empty(count, np.bool_),
+    )
+    sides = "start" if not len(side) else "shared" if len(side) == 1 else "rows"
+    shape = NewtonShape(
+        len(limits.caps), joints.shape[1], answer, answer, "shared" if len(near) == 1 else "rows", sides
+    )
+    settling = limits.settling
+    numbers = [limits.size, limits.most, limits.closed, settling.turned, settling.steady, settling.steps, *limits.caps]
+    arrays = [near, joints, np.array([numbers], np.float64)] + ([] if sides == "start" else [side.reshape(-1, 1)])
+    find_kernel(write_newton, tapes, shape).run(arrays, roots, run_in_threads)
     return roots

@@ -13,9 +13,25 @@ from functools import cache
 from typing import Any
 
 import numba
+from numba.core import event
 from numba.core.caching import FunctionCache, IndexDataCacheFile
 
+from .compile_notice import report_compilation
+
 _CHECKSUM = 4  # bytes
+
+
+class _Listener(event.Listener):  # type: ignore[misc]
+    """Passes on that Numba compiles."""
+
+    def on_start(self, event: object) -> None:
+        report_compilation()
+
+    def on_end(self, event: object) -> None:
+        pass
+
+
+event.register("numba:compile", _Listener())
 
 
 class DamagedCacheError(Exception):
@@ -69,14 +85,8 @@ class _TolerantCache(FunctionCache):  # type: ignore[misc]
             self.disable()
 
 
-def njit(*, cache: bool = False, allocates: bool = True, **options: Any) -> Callable[[Callable[..., Any]], Any]:
-    """Compile a function as ``numba.njit`` does, but never fail because of the cache.
-
-    allocates : False for a function that makes no arrays. Then Numba does not count references to those that it is
-        given, which costs 5 ns wherever one is passed on or taken out of a tuple.
-    """
-    if not allocates:
-        options["_nrt"] = False
+def njit(*, cache: bool = False, **options: Any) -> Callable[[Callable[..., Any]], Any]:
+    """Compile a function as ``numba.njit`` does, but never fail because of the cache."""
 
     def compile_function(function: Callable[..., Any]) -> Any:
         kernel = numba.njit(**options)(function)

@@ -10,8 +10,8 @@ from __future__ import annotations
 import numpy as np
 
 from .compiling import njit
-from .elementary import GREATEST_ANGLE, atan2, sincos, use_widest_vectors
-from .lanes import LANES, allocate_lanes
+from .elementary import GREATEST_ANGLE
+from .numba_turns import atan2, sincos, use_widest_vectors
 from .tape import (
     ABS,
     ATAN2,
@@ -32,12 +32,21 @@ from .tape import (
     SQRT,
 )
 
+LANES = 128  # boxes of a block: its registers stay in the first-level cache
 _WIDER = 2.0**-50  # eight units of roundoff
 _TINY = 1e-300  # where numbers vanish: bounds hold to within it
 _HUGE = 1e300  # where sums of sizes may overflow
 _OFF = 2e-15  # sincos and atan2 are within 4e-16 of libm's, which is within 2e-16
 _MASK = (1 << 40) - 1
 FAST = {"contract"}
+
+
+@njit(nogil=True, cache=True)
+def allocate_lanes(rows):
+    """Allocate rows of LANES numbers that start on a cache line: vectors that cross lines take twice as long."""
+    room = np.empty(rows * LANES + 8)
+    skip = (-(room.ctypes.data // 8)) % 8
+    return room[skip : skip + rows * LANES]
 
 
 @njit(inline="always", fastmath=FAST)

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from .compiling import njit
-from .elementary import FAST
+from .numba_turns import FAST
 
 _FAST = {*FAST, "reassoc"}  # sums in any order; NaN and infinity keep their meaning
 

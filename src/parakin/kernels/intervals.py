@@ -11,7 +11,7 @@ import numpy as np
 from .. import algebra as alg
 from ..algebra import Scalar, Term, Trace, norm
 from ..arrays import Array
-from .batch import freeze_rows, run_in_threads
+from .batch import run_in_threads
 from .tape import Tape, compile_tape
 
 Bounds = tuple[Array, Array]
@@ -46,6 +46,13 @@ class JumpFreeTrace(Trace):
         return co * s + so * c, co * c - so * s
 
 
+def freeze_rows(rows: Array) -> Array:
+    """Return a read-only view in C order; Numba compiles the kernel for read-only arrays alone."""
+    view = np.ascontiguousarray(rows).view()
+    view.flags.writeable = False
+    return view
+
+
 @dataclass(frozen=True, eq=False)
 class IntervalProgram:
     """The outputs of a trace, to be evaluated over boxes."""
@@ -73,6 +80,6 @@ class IntervalProgram:
         from .enclosures import enclose_outputs
 
         down, up = np.empty((len(low), len(self.outputs))), np.empty((len(low), len(self.outputs)))
-        args = (self.tape, freeze_rows(np.ascontiguousarray(low)), freeze_rows(np.ascontiguousarray(high)), down, up)
+        args = (self.tape, freeze_rows(low), freeze_rows(high), down, up)
         run_in_threads(len(low), lambda start, stop: enclose_outputs(*args, start, stop))
         return down, up

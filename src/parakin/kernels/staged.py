@@ -9,7 +9,6 @@ import numpy as np
 
 from .. import algebra as alg
 from ..algebra import Scalar, Term, Trace, find_dependencies
-from ..arrays import Array, Indices
 from .tape import SINCOS, Tape, compile_tape
 
 _LONG = 8  # operations: a stage as long is worth a look at whether any lane is left
@@ -19,15 +18,15 @@ class StagedProgram(NamedTuple):
     """Margins, to be computed one after the other until one is broken.
 
     tape : takes the places, and what is the same for all places
-    stages : (P, 4) where in the code each stage begins and ends, and the tests that follow it, from and to
-    tests : (T, 3) a register r and the indices of two limits; one limit alone stands twice
-    lines : (T, 4) their lines k0 + k1·r, which must be ≥ 0
+    stages : of each, where in the code each stage begins and ends, and the tests that follow it, from and to
+    tests : a register r and the indices of two limits; one limit alone stands twice
+    lines : their lines k0 + k1·r, which must be ≥ 0
     """
 
     tape: Tape
-    stages: Indices
-    tests: Indices
-    lines: Array
+    stages: tuple[tuple[int, ...], ...]
+    tests: tuple[tuple[int, ...], ...]
+    lines: tuple[tuple[float, ...], ...]
 
 
 class StagedMargins(NamedTuple):
@@ -61,9 +60,9 @@ def stage_margins(trace: Trace, margins: Sequence[Scalar], places: int, turns: i
         stages[-1][1], stages[-1][3] = ready, k + 1
     program = StagedProgram(
         tape,
-        np.array(stages, np.int64),
-        np.array(tests, np.int64).reshape(-1, 3),
-        np.array(lines, float).reshape(-1, 4),
+        tuple(map(tuple, stages)),
+        tuple(map(tuple, tests)),
+        tuple(map(tuple, lines)),
     )
     return StagedMargins(program, compile_tape(trace, [trace.nodes[i] for i in fixed], places + turns))
 

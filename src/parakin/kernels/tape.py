@@ -7,6 +7,7 @@ in the first-level cache.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -30,8 +31,16 @@ _SAME = {
 }
 
 
-class Tape(NamedTuple):
-    """A compiled trace.
+class _TapeFields(NamedTuple):
+    code: Indices
+    constants: Array
+    inputs: int
+    outputs: int
+    registers: int
+
+
+class Tape(_TapeFields):
+    """A compiled trace; tapes of the same content are equal.
 
     code : (n, 8) opcode, destination, up to six operand registers (SINCOS: sine, cosine, argument)
     constants : (n, 4) of each operation; of QUAD the factors, and last what is added
@@ -40,11 +49,18 @@ class Tape(NamedTuple):
     registers : how many there are in all
     """
 
-    code: Indices
-    constants: Array
-    inputs: int
-    outputs: int
-    registers: int
+    @cached_property
+    def content(self) -> tuple[bytes, int, int]:
+        return self.code.tobytes() + self.constants.tobytes(), self.inputs, self.outputs
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Tape) and self.content == other.content
+
+    def __ne__(self, other: object) -> bool:
+        return not self == other
+
+    def __hash__(self) -> int:
+        return hash(self.content)
 
 
 class NewtonTapes(NamedTuple):

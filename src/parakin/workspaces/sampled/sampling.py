@@ -18,8 +18,9 @@ from ...arguments import check_positive
 from ...arrays import Array, Progress
 from ...budget import Budget
 from ...errors import PoseError
-from ...kernels.batch import evaluate_tape, freeze_rows, run_in_threads
+from ...kernels.batch import evaluate_tape
 from ...kernels.staged import stage_margins
+from ...kernels.sweep import sweep_grid, sweep_turns
 from ..certified.region import Region
 from ..certified.region_result import RegionResult
 
@@ -116,30 +117,23 @@ class BrokenLimitFinder:
 
     def find_at(self, positions: Array) -> LimitCodes:
         """Find it at positions (N, d) -> (N,)."""
-        from ...kernels.sweep import sweep_turns
-
         codes, every = np.zeros(len(positions), self._type), True
         undecided, start = np.arange(len(positions)), 0
         while start < len(self.orientations) and len(undecided):
             if self.budget.is_spent():
                 raise PoseError(TOO_SLOW)
             stop = min(4 * start or 1, start + max(1, _TESTS // len(undecided)))
-            rows, own_codes = np.ascontiguousarray(positions[undecided]), codes[undecided]
-            args = (self._program, freeze_rows(rows), freeze_rows(self._fixed[start:stop]), every, own_codes)
-            run_in_threads(len(rows), lambda a, b: sweep_turns(*args, a, b))  # noqa: B023  done within the loop's turn
-            codes[undecided] = own_codes
+            turns = self._fixed[start:stop]
+            codes[undecided] = sweep_turns(self._program, positions[undecided], turns, every, codes[undecided])
             every, start = self.region.every_orientation, stop
             undecided = np.flatnonzero((codes == 0) == every)
         return codes
 
     def find_on_grid(self, coordinates: Sequence[Array], progress: Progress | None = None) -> LimitCodes:
         """Find it at every position of a grid, given each axis's coordinates -> (n, ...) as many as axes."""
-        from ...kernels.sweep import sweep_grid
-
         shape = tuple(len(column) for column in coordinates)
         codes = np.empty(shape, self._type)
         flat = codes.reshape(-1)
-        grid = (np.concatenate(coordinates), np.array(shape))
         at_once = _AT_ONCE if not self.region.swept_axes else _AT_ONCE_SWEPT
         for start, stop in pairwise([*range(0, len(flat), at_once), len(flat)]):
             if self.budget.is_spent():
@@ -148,8 +142,7 @@ class BrokenLimitFinder:
                 index = np.unravel_index(np.arange(start, stop), shape)
                 flat[start:stop] = self.find_at(np.stack([x[i] for x, i in zip(coordinates, index, strict=True)], 1))
             else:
-                args = (self._program, *grid, flat)
-                run_in_threads(stop - start, lambda a, b: sweep_grid(*args, start + a, start + b))  # noqa: B023
+                sweep_grid(self._program, coordinates, flat[start:stop], start)
             if progress:
                 progress(stop / len(flat))
         return codes

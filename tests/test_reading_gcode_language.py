@@ -416,3 +416,12 @@ def test_a_loop_that_sets_nothing_never_ends(read, loop):
 )
 def test_loops_that_end_without_setting_a_parameter(read, loop, count):
     assert len(read("G0 X0 Y0 Z0\n" + loop + "\nM2\n")) == count
+
+
+def test_a_program_that_never_ends_is_refused_soon():
+    """Bounded by a count of blocks, so that a file has one answer; the count is some seconds of work."""
+    lines = ["G21 G90 F100", "#1=0", "o1 while [1]", "#1=[#1+1]", "G1 X[#1] Y0 Z0", "o1 endwhile", "M2"]
+    data, begun = "\n".join(lines).encode(), time.process_time()
+    with pytest.raises(InputError, match="expected a program that ends"):
+        reader.GcodeReader("f", len(data), 0.5).read(io.BytesIO(data), lambda fraction: None)
+    assert time.process_time() - begun < 15.0  # some 4 of an idle processor

@@ -16,7 +16,7 @@ import sys
 import tempfile
 from pathlib import Path
 
-from linuxcnc_comparison import part
+from linuxcnc_comparison import PLACES, part
 
 import parakin as pk
 
@@ -33,11 +33,19 @@ def show_part(folder):
     """The whole screen while the Tricept cuts."""
     machine = pk.load("tricept")
     file = io.BytesIO()
-    pk.make_linuxcnc_program(pk.prepare(machine, part(folder, upright=False, feed=FEED)).trajectory)(file)
+    pk.make_linuxcnc_program(pk.prepare(machine, part(folder, PLACES[0], FEED)).trajectory)(file)
     with simulated(machine) as simulation:
         steps = [*ON, ["start", "part.ngc"], ["wait", 15.0], ["picture", "screen.png"], ["abort"]]
         simulation.show(steps, {"part.ngc": file.getvalue().decode("ascii")})
         shutil.copy(simulation.folder / "screen.png", folder / "linuxcnc_screen.png")
+
+
+def show_gmoccapy(folder):
+    """The whole screen with gmoccapy in AXIS' place, once the Tricept has run its first program."""
+    with simulated(pk.load("tricept")) as simulation:
+        steps = [["wait", 15.0], *ON, ["start", "tricept.ngc"], ["wait", 8.0], ["picture", "screen.png"]]
+        simulation.show(steps, screen="gmoccapy")
+        shutil.copy(simulation.folder / "screen.png", folder / "linuxcnc_gmoccapy.png")
 
 
 def show_machine(name, folder):
@@ -57,6 +65,7 @@ def main():
     with tempfile.TemporaryDirectory() as scratch:
         folder = Path(scratch)
         show_part(folder)
+        show_gmoccapy(folder)
         for name in OTHERS:
             show_machine(name, folder)
         for picture in folder.glob("linuxcnc_*.png"):

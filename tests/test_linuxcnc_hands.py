@@ -71,11 +71,15 @@ def test_a_program_that_takes_a_place_from_before_the_length_changed_is_refused(
     programs = {"stale.ngc": f"{first}G1 X10\nM2\n", "named.ngc": f"{first}G1 X10 Y10 Z-1640\nG1 X0\nM2\n"}
     programs |= {"waits.ngc": f"{first}M66 E0 L0\nG1 X10\nM2\n", "relative.ngc": f"{first}G91 G1 X1 Y1 Z1\nG90\nM2\n"}
     steps = [step for name in programs for step in (["program", name], ["mdi", "G49"])]
-    seen, _ = operate(trial("tricept", tmp_path), steps, programs)
+    programs["after.ngc"] = "G21 G91\nG1 X1 Y2 Z3 F3000\nG90\nM2\n"
+    steps += [["mdi", "G1 B20 C30 F3000"], ["mdi", "G43.1 Z50"], ["program", "after.ngc"]]
+    (*seen, told, moved), _ = operate(trial("tricept", tmp_path), steps, programs)
     said = [" ".join(step["said"]) for step in seen[::2]]
     assert "line 4 goes on from where the tool was" in said[0] and not said[1] and not said[2]
     assert "line 4 goes on from where the tool was" in said[3]
     assert seen[2]["position"][:3] == pytest.approx([0.0, 10.0, -1640.0 + 50.0], abs=1e-6)
+    assert not moved["said"]  # from the hands, before a program, the new place is known
+    assert np.subtract(moved["position"], told["position"])[:3] == pytest.approx([1.0, 2.0, 3.0], abs=1e-6)
 
 
 def test_joints_are_moved_one_by_one_and_the_pose_is_right_after(tmp_path):

@@ -61,6 +61,23 @@ def measure_distance(points, corners):
     return np.linalg.norm(points[:, None] - nearest, axis=-1).min(axis=1)
 
 
+@pytest.mark.parametrize("aside", [0.0, 5e-9, 1.5e-8, 1e-7, 1e-5, 1e-2])
+@pytest.mark.parametrize("name", ["tricept", "hexapod", "orthoglide5_table"])
+def test_a_turn_about_a_tip_that_hardly_moves_takes_its_time(planners, name, aside):
+    """LinuxCNC tells mm/s from 1e-8 mm in X, Y or Z on (CART_FUZZ in its posemath.h), degrees/s below."""
+    planner = planners(name)
+    start = scatter(planner.machine, 1)[0]
+    end = start + np.eye(len(start))[0] * aside
+    end[4] += np.radians(6.0)
+    planner.start(start)
+    told = aside if aside >= 1e-8 else 6.0
+    run = planner.run([lambda: planner.line_to(end, told / 2.0)], most=20_000)  # in 2 s, and the ramps
+    assert run.left == 0 and 2.0 < run.seconds < 2.5
+    np.testing.assert_allclose(run.poses[-1], end, atol=1e-9)
+    speed, rise = run.measure_shares(follow(run))
+    assert speed <= SPEED and rise <= RISE
+
+
 @pytest.mark.parametrize("name", MACHINES)
 @pytest.mark.parametrize(("stops", "tolerance"), [(True, 0.0), (False, 0.0), (False, 0.01), (False, 5.0)])
 def test_lines_keep_every_joint_within_its_limits(planners, name, stops, tolerance):

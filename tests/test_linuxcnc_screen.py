@@ -24,6 +24,7 @@ from stub import inward, outward, world
 
 everyone = pytest.mark.parametrize("name", REPRESENTATIVES)
 LETTERS = "XYZABCUVW"
+SCREENS = ("axis", "gmoccapy")
 
 
 @pytest.fixture(scope="module")
@@ -174,6 +175,18 @@ def test_all_files_of_the_screen_are_python_and_hal(name):
     for line in nets:
         words = line.split()
         assert len(words) == 5 or f"net {words[1]} " in own  # a signal that the machine's own file has
+
+
+def test_gmoccapy_has_no_settings_of_axis():
+    machine = pk.load("orthoglide")
+    axis, other = (pk.make_linuxcnc_configuration(machine, None, screen)["orthoglide.ini"] for screen in SCREENS)
+    assert "\nDISPLAY = axis\n" in axis and "\nUSER_COMMAND_FILE = orthoglide_axis.py\n" in axis
+    kept = [
+        line for line in axis.splitlines() if not line.startswith(("DISPLAY = ", "USER_COMMAND_FILE", "# as parakin"))
+    ]
+    assert [line for line in other.splitlines() if not line.startswith("# as parakin")] == [
+        *kept[: kept.index("[DISPLAY]") + 1], "DISPLAY = gmoccapy", *kept[kept.index("[DISPLAY]") + 1 :],
+    ]  # fmt: skip
 
 
 def why_no_screen():

@@ -52,26 +52,27 @@ class Operator:
         getattr(self.command, word)(*arguments)
         self.command.wait_complete()
 
-    def ask(self, ready, word, *arguments):
-        """Ask for a mode until it is in force: while anything moves LinuxCNC's motion does not take it, without a word.
+    def ask(self, ready, *commands):
+        """Ask for a mode or state until it is in force, as an operator does who sees that it is not.
 
-        On a busy computer the status that shows a machine at rest may be older than that.
+        While anything moves LinuxCNC's motion takes no other mode, and before its task has seen that the emergency
+        stop is reset, it is not switched on; neither is said. On a busy computer the status may be older than that.
         """
         end = time.monotonic() + MOST
         while time.monotonic() < end:
-            self.tell(word, *arguments)
+            for word, argument in commands:
+                self.tell(word, argument)
             if self.sees(ready, PATIENCE):
                 return
         raise TimeoutError
 
     def take_mode(self, mode):
-        self.ask(lambda s: s.task_mode == mode, "mode", mode)
+        self.ask(lambda s: s.task_mode == mode, ("mode", mode))
 
     def switch_on(self):
         self.wait(lambda s: s.joints == self.joints)
-        self.tell("state", linuxcnc.STATE_ESTOP_RESET)
-        self.tell("state", linuxcnc.STATE_ON)
-        self.wait(lambda s: s.task_state == linuxcnc.STATE_ON)
+        states = [("state", linuxcnc.STATE_ESTOP_RESET), ("state", linuxcnc.STATE_ON)]
+        self.ask(lambda s: s.task_state == linuxcnc.STATE_ON, *states)
 
     def home(self):
         self.joint_mode()
@@ -80,14 +81,13 @@ class Operator:
 
     def joint_mode(self):
         self.take_mode(linuxcnc.MODE_MANUAL)
-        self.ask(lambda s: s.motion_mode == linuxcnc.TRAJ_MODE_FREE, "teleop_enable", 0)
+        self.ask(lambda s: s.motion_mode == linuxcnc.TRAJ_MODE_FREE, ("teleop_enable", 0))
 
     def world_mode(self):
         self.take_mode(linuxcnc.MODE_MANUAL)
         self.ask(
             lambda s: s.motion_mode == linuxcnc.TRAJ_MODE_TELEOP or s.task_state != linuxcnc.STATE_ON,
-            "teleop_enable",
-            1,
+            ("teleop_enable", 1),
         )
 
     def jog(self, axis, speed, seconds):

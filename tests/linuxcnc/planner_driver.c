@@ -74,6 +74,8 @@ void start(const double *pose9, const double *joints, const double *low, const d
     tpSetCycleTime(0, 0.001);
 }
 
+void set_identity(int on) { *pins->identity = (char)on; }
+
 void set_corners(int stops, double tolerance)
 {
     tpSetTermCond(0, stops ? TC_TERM_COND_STOP : tolerance > 0.0 ? TC_TERM_COND_PARABOLIC : TC_TERM_COND_EXACT, tolerance);
@@ -116,7 +118,7 @@ int run_cycle(double feed_scale, double *pose9)
     read_pose(&p, x);
     for (int j = 0; j < JOINTS; j++)
         near[j] = status.joint_status[j].pos_cmd * (turning[j] ? DEGREE : 1.0);
-    if (!find_joints(x, near, q))
+    if (!reach_pose(x, near, q))
         return -1;
     for (int j = 0; j < JOINTS; j++)
         status.joint_status[j].pos_cmd = q[j] / (turning[j] ? DEGREE : 1.0);

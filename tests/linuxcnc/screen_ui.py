@@ -15,6 +15,7 @@ from pathlib import Path
 
 DISPLAY = ":77"
 SIZE = "1920x850x24"
+TITLES = {"axis": "AXIS|axis", "gmoccapy": "gmoccapy"}
 SETTLED = 2.0  # s for the windows to be drawn
 
 
@@ -46,7 +47,7 @@ def work(task, seen):
 
     title = f"{task['machine']}: the machine"
     wait(lambda: find_window(title), 60, "the machine's window")
-    wait(lambda: find_window("AXIS|axis"), 60, "AXIS")
+    wait(lambda: find_window(TITLES[task["screen"]]), 60, task["screen"])
     time.sleep(SETTLED)
     operator = Operator(task["joints"])
     for word, *arguments in task["steps"]:

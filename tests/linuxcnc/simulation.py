@@ -131,14 +131,15 @@ class Simulation:
         assert done.returncode == 0, done.stdout + done.stderr
         return seen["steps"], rows
 
-    def show(self, steps, programs=None, seconds=300):
-        """Do an operator's steps on a screen (see screen_ui.py), pictures too; AXIS opens the last of the programs."""
+    def show(self, steps, programs=None, seconds=300, screen="axis"):
+        """Do an operator's steps on a screen (see screen_ui.py), pictures too; it opens the last of the programs."""
         opened = f"{self.machine.name}.ngc"
         for opened, text in (programs or {}).items():
             (self.folder / opened).write_text(text, encoding="utf-8")
-        task = {"machine": self.machine.name, "joints": len(self.machine.joints), "steps": steps, "ini": "screen.ini"}
+        task = {"machine": self.machine.name, "joints": len(self.machine.joints), "steps": steps}
+        task |= {"ini": "screen.ini", "screen": screen}
         (self.folder / "task.json").write_text(json.dumps(task))
-        ini = pk.make_linuxcnc_configuration(self.machine)[f"{self.machine.name}.ini"]
+        ini = pk.make_linuxcnc_configuration(self.machine, None, screen)[f"{self.machine.name}.ini"]
         ini = ini.replace(f"OPEN_FILE = ./{self.machine.name}.ngc", f"OPEN_FILE = ./{opened}")
         (self.folder / "screen.ini").write_text(ini, encoding="utf-8")
         for file in ("operator_ui.py", "screen_ui.py"):

@@ -7,7 +7,7 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from ..controllers import Hardware
+from ..controllers import Hardware, Screen
 from ..errors import InputError
 from .console import announce_compiling, print_json, print_text
 from .options import Json, Name, Sizes, load_machine
@@ -19,6 +19,7 @@ def linuxcnc(
     *,
     output: Annotated[Path | None, Parameter(name=["--output", "-o"])] = None,
     hardware: Hardware | None = None,
+    screen: Screen = "axis",
     force: bool = False,
     json: Json = False,
     sizes: Sizes = None,
@@ -36,6 +37,8 @@ def linuxcnc(
         Folder for the files; by default one of the machine's name.
     hardware
         The card that drives the machine; by default none, a simulation.
+    screen
+        LinuxCNC's screen, beside the window that shows the machine.
     force
         Overwrite files that were edited since parakin wrote them.
     """
@@ -46,7 +49,7 @@ def linuxcnc(
     from ..export.files import write_files
 
     folder = Path(machine.name) if output is None else output
-    files = make_linuxcnc_configuration(machine, hardware)
+    files = make_linuxcnc_configuration(machine, hardware, screen)
     edited = [] if force else find_edited_files(folder, files)
     if edited:
         more = f" (and {', '.join(path.name for path in edited[1:])})" if edited[1:] else ""

@@ -19,6 +19,9 @@ Target: TypeAlias = Literal["linuxcnc", "joints", "grbl", "fluidnc", "siemens", 
 # Cards that a LinuxCNC configuration may be for, the names of `linuxcnc/hardware/cards.py`.
 Hardware: TypeAlias = Literal["mesa-7i96s", "mesa-7i76e", "parport", "ethercat"]
 
+# Screens that a LinuxCNC configuration may start.
+Screen: TypeAlias = Literal["axis", "gmoccapy"]
+
 
 def load_controller(target: Target) -> Controller:
     """Import a controller's file or folder and return its description."""

@@ -8,6 +8,7 @@ from math import ceil, isfinite, pi
 from ...machine import Machine
 from ...model.elements import Drive
 from ...units import to_display
+from .. import Screen
 from .axis_ranges import estimate_axis_ranges
 from .axis_rates import choose_drive_rates, choose_unit_rates, find_slowest_drive
 from .guard import hash_guard, name_guard
@@ -35,14 +36,13 @@ VERSION = 1.1
 MACHINE = {name}
 
 [DISPLAY]
-DISPLAY = axis
+DISPLAY = {screen}
 CYCLE_TIME = 0.1
 POSITION_OFFSET = RELATIVE
 POSITION_FEEDBACK = ACTUAL
 PROGRAM_PREFIX = .
 OPEN_FILE = ./{name}.ngc
-USER_COMMAND_FILE = {name}_axis.py
-GEOMETRY = {letters}
+{settings}GEOMETRY = {letters}
 DEFAULT_LINEAR_VELOCITY = {jog}
 MAX_LINEAR_VELOCITY = {by_hand}
 DEFAULT_ANGULAR_VELOCITY = {turn_jog}
@@ -163,8 +163,8 @@ loadusr -Wn inihal sleep 60
 """
 
 
-def write_ini(machine: Machine, equipment: Equipment | None = None) -> str:
-    """Write the ini file, for a simulation or for what drives the machine."""
+def write_ini(machine: Machine, equipment: Equipment | None = None, screen: Screen = "axis") -> str:
+    """Write the ini file, for a simulation or for what drives the machine, with a screen."""
     (fast, acceleration), pose = choose_unit_rates(machine, "mm"), find_home_pose(machine)
     home, box = dict(zip(machine.axes, pose.tolist(), strict=True)), find_hand_box(machine)
     by_hand = _find_unit_speeds(machine, box)
@@ -174,6 +174,8 @@ def write_ini(machine: Machine, equipment: Equipment | None = None) -> str:
         base_period=f"BASE_PERIOD = {equipment.card.period}\n" if equipment and equipment.card.period else "",
         spindle=wiring.SPINDLE_INI if equipment else "",
         name=machine.name,
+        screen=screen,
+        settings=f"USER_COMMAND_FILE = {machine.name}_axis.py\n" if screen == "axis" else "",
         axes=" ".join(machine.axes),
         letters="".join(machine.axes),
         joints=len(machine.joints),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from ...arguments import check_arguments
 from ...machine import Machine
+from .. import Screen
 from .config import write_hal, write_ini, write_rates_hal, write_tool_table
 from .first_program import write_first_program
 from .guard import name_guard, write_guard
@@ -18,7 +19,9 @@ from .stamp import stamp_file
 
 
 @check_arguments
-def make_linuxcnc_configuration(machine: Machine, hardware: str | None = None) -> dict[str, str]:
+def make_linuxcnc_configuration(
+    machine: Machine, hardware: str | None = None, screen: Screen = "axis"
+) -> dict[str, str]:
     """Make a configuration for LinuxCNC 2.9, {file: text}: a simulation, or a template for a card of a real machine.
 
     The files are kinematics, trajectory planner and guard (C, built by LinuxCNC's ``halcompile --install``), the header
@@ -27,6 +30,7 @@ def make_linuxcnc_configuration(machine: Machine, hardware: str | None = None) -
     was edited since.
 
     hardware : ``mesa-7i96s``, ``mesa-7i76e``, ``parport`` or ``ethercat``; None: a simulation
+    screen : ``axis`` or ``gmoccapy``, LinuxCNC's own, beside the window that shows the machine
     """
     equipment = None if hardware is None else equip_machine(machine, hardware)
     texts = {
@@ -34,7 +38,7 @@ def make_linuxcnc_configuration(machine: Machine, hardware: str | None = None) -
         f"{name_guard(machine)}.c": write_guard(machine),
         f"{name_planner(machine)}.c": write_planner(machine),
         name_model(machine): write_model(machine),
-        f"{machine.name}.ini": write_ini(machine, equipment),
+        f"{machine.name}.ini": write_ini(machine, equipment, screen),
         f"{machine.name}.hal": write_hal(machine, equipment),
         f"{machine.name}_rates.hal": write_rates_hal(machine),
         f"{name_screen(machine)}.py": write_screen(machine),

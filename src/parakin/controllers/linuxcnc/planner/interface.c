@@ -107,12 +107,11 @@ int tpAddLine(TP_STRUCT *tp, EmcPose end, int canon_type, double asked, double m
     Motion *m = prepare_motion(&end, canon_type, asked, most, enables, at_speed, tag);
     if (!m || indexer >= 0)
         return -1;
-    m->length = measure_way(m->start, m->end, &m->turns_only);
-    if (!(m->length > STILL))
-        return 1; /* nowhere to go: LinuxCNC takes it for done */
+    if (!measure_line(m))
+        return 1; /* LinuxCNC takes it for done */
     if (timed) {
         m->kind = TIMED;
-        m->length /= asked; /* s */
+        m->length /= m->speed; /* s */
         m->speed = m->most_speed = 1.0;
     }
     return add_motion(m);
@@ -128,7 +127,7 @@ int tpAddCircle(TP_STRUCT *tp, EmcPose end, PmCartesian centre, PmCartesian norm
     if (!m || !describe_arc(m, &centre, &normal, turns))
         return -1;
     m->kind = ARC;
-    m->turns_only = 0;
+    m->tip_slope = 1.0;
     return add_motion(m);
 }
 
@@ -202,13 +201,13 @@ static void report_status(void)
 {
     const Motion *m = motion_at(first_motion);
     double left[AXES];
-    int turns_only;
     for (int i = 0; i < AXES; i++)
         left[i] = m->end[i] - pose[i];
     write_pose(left, &emcmotStatus->dtg);
-    emcmotStatus->distance_to_go = measure_way(pose, m->end, &turns_only);
+    emcmotStatus->distance_to_go = measure_way(pose, m->end).told;
     emcmotStatus->enables_queued = m->enables;
-    emcmotStatus->requested_vel = m->kind == TIMED ? tool_speed : m->speed;
+    const double slope = m->tip_slope > 0.0 ? m->tip_slope : 1.0;
+    emcmotStatus->requested_vel = m->kind == TIMED ? tool_speed : m->speed * slope;
     emcmotStatus->current_vel = tool_speed;
     emcmotStatus->tcqlen = queue_length();
 }
@@ -230,13 +229,12 @@ int tpRunCycle(TP_STRUCT *tp, long period)
     motion_at(next_motion - 1)->age++;
     look_ahead();
     double before[AXES];
-    int turns_only;
     memcpy(before, pose, sizeof pose);
     if (next_step != 0) {
         advance(cycle_seconds);
         locate_tool(pose);
     }
-    tool_speed = measure_way(before, pose, &turns_only) / cycle_seconds;
+    tool_speed = measure_way(before, pose).told / cycle_seconds;
     if (first_step == next_step)
         speed = 0.0;
     report_status();

@@ -47,7 +47,7 @@ static void locate(const Piece *p, double at, double *x)
 static double measure_tip_slope(const Piece *p, double at)
 {
     if (p->shape != SPLINE)
-        return motion_at(p->motion)->turns_only ? 0.0 : 1.0;
+        return motion_at(p->motion)->tip_slope;
     double square = 0.0;
     for (int i = 0; i < AXES; i++) {
         const double rate = p->c[1][i] + at * (2.0 * p->c[2][i] + at * 3.0 * p->c[3][i]);

@@ -2,7 +2,9 @@
 
 #define QUEUE 2048 /* motions, a power of two */
 #define MARGIN 16  /* LinuxCNC sends a few more before it reads that the queue is full */
-#define STILL 1e-7 /* mm or degrees: shorter ways are none, as in LinuxCNC's canon */
+#define STILL 1e-8     /* mm: X Y Z stand where each moves less, says LinuxCNC's canon, and gives degrees a second */
+#define SHORTEST 1e-7  /* mm or degrees: shorter ways are none */
+#define MOST_TURN 1e3  /* degrees a mm: where the tool turns by more, the path's units are degrees */
 
 enum kind { LINE, ARC, TIMED };
 
@@ -16,8 +18,8 @@ typedef struct {
     int stops;             /* at its end */
     double tolerance;      /* mm by which the corner at its end may be cut; 0: not at all */
     double start[AXES], end[AXES];
-    int turns_only;          /* X Y Z stand still */
-    double length;           /* of the path: mm; degrees where X Y Z stand still; s of a timed motion */
+    double length;           /* of the path: mm; degrees where X Y Z hardly move; s of a timed motion */
+    double tip_slope;        /* the way of the tip a unit of the path, mm; 0 where X Y Z stand still */
     double speed;            /* asked for, in the path's units a second */
     double most_speed;       /* under any feed override */
     double centre[3];        /* of an arc, mm */
@@ -55,19 +57,40 @@ static void compute_pose(const Motion *m, double at, double *x)
         bend(m, share, x);
 }
 
-/* Measure the way between two poses as LinuxCNC does: mm, or degrees where X Y Z stand still. */
-static double measure_way(const double *from, const double *to, int *turns_only)
+typedef struct {
+    double linear, rotary; /* mm, degrees */
+    double told;           /* that of them whose speed LinuxCNC tells */
+    int stands;            /* whether X Y Z do */
+} Way;
+
+static Way measure_way(const double *from, const double *to)
 {
     double linear = 0.0, rotary = 0.0;
+    int stands = 1;
     for (int i = 0; i < AXES; i++) {
         const double way = to[i] - from[i];
-        if (turning_axis[i])
+        if (turning_axis[i]) {
             rotary += way / DEGREE * (way / DEGREE);
-        else
+        } else {
             linear += way * way;
+            stands &= fabs(way) < STILL;
+        }
     }
-    *turns_only = !(linear > STILL * STILL);
-    return sqrt(*turns_only ? rotary : linear);
+    const Way way = {sqrt(linear), sqrt(rotary), sqrt(stands ? rotary : linear), stands};
+    return way;
+}
+
+/* Measure a straight motion, whose speeds are told by LinuxCNC's way; 0 where there is nowhere to go. */
+static int measure_line(Motion *m)
+{
+    const Way way = measure_way(m->start, m->end);
+    if (!(way.linear > SHORTEST || way.rotary > SHORTEST))
+        return 0;
+    m->length = way.linear > SHORTEST && way.rotary <= MOST_TURN * way.linear ? way.linear : way.rotary;
+    m->tip_slope = way.stands ? 0.0 : way.linear / m->length;
+    m->speed *= m->length / way.told;
+    m->most_speed *= m->length / way.told;
+    return 1;
 }
 
 /* Describe the arc of a motion whose start and end are known; 0 where it is none. */
@@ -98,7 +121,7 @@ static int describe_arc(Motion *m, const PmCartesian *centre, const PmCartesian 
         last += to[k] * to[k];
     }
     rise = high - low;
-    if (!(first > STILL * STILL && last > STILL * STILL))
+    if (!(first > SHORTEST * SHORTEST && last > SHORTEST * SHORTEST))
         return 0;
     for (int k = 0; k < 3; k++) {
         m->plane[0][k] = from[k];

@@ -19,7 +19,7 @@ Target: TypeAlias = Literal["linuxcnc", "joints", "grbl", "fluidnc", "siemens", 
 # Cards that a LinuxCNC configuration may be for, the names of `linuxcnc/hardware/cards.py`.
 Hardware: TypeAlias = Literal["mesa-7i96s", "mesa-7i76e", "parport", "ethercat"]
 
-# Screens that a LinuxCNC configuration may start.
+# Screens that a LinuxCNC configuration may start, the names of `linuxcnc/config.py`.
 Screen: TypeAlias = Literal["axis", "gmoccapy"]
 
 

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from math import ceil, isfinite, pi
+from typing import Literal, TypeAlias
 
 from ...machine import Machine
 from ...model.elements import Drive
 from ...units import to_display
-from .. import Screen
 from .axis_ranges import estimate_axis_ranges
 from .axis_rates import choose_drive_rates, choose_unit_rates, find_slowest_drive
 from .guard import hash_guard, name_guard
@@ -23,6 +23,8 @@ from .planner import hash_planner, name_planner
 _JOG = 0.25  # of the speed of moves by hand: what the screen begins with
 _END_DIGIT = 0.01  # mm and degrees
 _LAG = 0.01  # s: following error allowed, as time at full speed; the simulation lags by 0.001 s or two
+
+Screen: TypeAlias = Literal["axis", "gmoccapy"]
 
 # The guard's pins for an axis, and the keys of the ini file that they have their values from.
 _KEYS = {"min": "MIN_LIMIT", "max": "MAX_LIMIT", "velocity": "MAX_VELOCITY", "acceleration": "MAX_ACCELERATION"}

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from ...arguments import check_arguments
 from ...machine import Machine
-from .. import Screen
-from .config import write_hal, write_ini, write_rates_hal, write_tool_table
+from .config import Screen, write_hal, write_ini, write_rates_hal, write_tool_table
 from .first_program import write_first_program
 from .guard import name_guard, write_guard
 from .hardware import equip_machine

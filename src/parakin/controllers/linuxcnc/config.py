@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from math import ceil, isfinite, pi
-from typing import Literal, TypeAlias
+from typing import Literal
 
 from ...machine import Machine
 from ...model.elements import Drive
@@ -23,8 +23,6 @@ from .planner import hash_planner, name_planner
 _JOG = 0.25  # of the speed of moves by hand: what the screen begins with
 _END_DIGIT = 0.01  # mm and degrees
 _LAG = 0.01  # s: following error allowed, as time at full speed; the simulation lags by 0.001 s or two
-
-Screen: TypeAlias = Literal["axis", "gmoccapy"]
 
 # The guard's pins for an axis, and the keys of the ini file that they have their values from.
 _KEYS = {"min": "MIN_LIMIT", "max": "MAX_LIMIT", "velocity": "MAX_VELOCITY", "acceleration": "MAX_ACCELERATION"}
@@ -165,7 +163,9 @@ loadusr -Wn inihal sleep 60
 """
 
 
-def write_ini(machine: Machine, equipment: Equipment | None = None, screen: Screen = "axis") -> str:
+def write_ini(
+    machine: Machine, equipment: Equipment | None = None, screen: Literal["axis", "gmoccapy"] = "axis"
+) -> str:
     """Write the ini file, for a simulation or for what drives the machine, with a screen."""
     (fast, acceleration), pose = choose_unit_rates(machine, "mm"), find_home_pose(machine)
     home, box = dict(zip(machine.axes, pose.tolist(), strict=True)), find_hand_box(machine)

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from typing import Literal
+
 from ...arguments import check_arguments
 from ...machine import Machine
-from .config import Screen, write_hal, write_ini, write_rates_hal, write_tool_table
+from .config import write_hal, write_ini, write_rates_hal, write_tool_table
 from .first_program import write_first_program
 from .guard import name_guard, write_guard
 from .hardware import equip_machine
@@ -19,7 +21,7 @@ from .stamp import stamp_file
 
 @check_arguments
 def make_linuxcnc_configuration(
-    machine: Machine, hardware: str | None = None, screen: Screen = "axis"
+    machine: Machine, hardware: str | None = None, screen: Literal["axis", "gmoccapy"] = "axis"
 ) -> dict[str, str]:
     """Make a configuration for LinuxCNC 2.9, {file: text}: a simulation, or a template for a card of a real machine.
 

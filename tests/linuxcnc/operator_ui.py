@@ -19,6 +19,7 @@ PATIENCE = 1.0  # s for a mode to be in force
 LATE = 1.0  # s for the feedback to come to the command
 REST = 0.15  # s for which the machine must stand
 FLICKER = 1e-8  # mm and degrees: in joint mode the position is found anew in every cycle, and its last digits change
+WATCHED = 0.5  # s between two looks at the threads of a run that hangs
 DRAINING = 0.3  # s for the sampler's last rows
 PLAIN = (int, float, str, bool, tuple, list)
 
@@ -216,20 +217,30 @@ def dump(status):
     status.poll()
     names = [name for name in dir(status) if not name.startswith("_")]
     state = {name: repr(getattr(status, name)) for name in names if isinstance(getattr(status, name), PLAIN)}
-    return state | {"processes": list_processes()}
+    before = list_processes()
+    time.sleep(WATCHED)
+    return state | {"processes": before, "processes later": list_processes()}
 
 
 def list_processes():
-    """List this run's processes: name, state, and where each thread of theirs waits."""
+    """List this run's threads: name, where each waits, its state, and how often it has been switched to.
+
+    Of the realtime threads, which belong to root, name, state and switches can be read.
+    """
     processes = {}
     for folder in Path("/proc").glob("[0-9]*/task/[0-9]*"):
-        try:
-            words = [(folder / name).read_text().strip() for name in ("comm", "wchan", "syscall")]
-            state = next(line for line in (folder / "status").read_text().splitlines() if line.startswith("State"))
-        except OSError:
-            continue
-        processes[str(folder)] = " ".join([*words, state])
+        lines = [read(folder / name) for name in ("comm", "wchan", "syscall")]
+        kept = [line for line in read(folder / "status").splitlines() if line.startswith(("State", "voluntary"))]
+        processes[str(folder)] = " ".join([*lines, *kept])
     return processes
+
+
+def read(path):
+    """Read what is there to be read."""
+    try:
+        return path.read_text().strip()
+    except OSError:
+        return "?"
 
 
 def work(task, seen):

@@ -140,7 +140,7 @@ def crank_angles(arm, rod, out, along, side, sign):
 
 def rotary_delta(s, poses):
     joints = []
-    for angle in np.radians([270.0, 150.0, 30.0]):
+    for angle in np.radians([270.0, 30.0, 150.0]):
         c, d = np.cos(angle), np.sin(angle)
         out = poses[:, 0] * c + poses[:, 1] * d + s["r"] - s["R"]
         joints.append(crank_angles(s["arm"], s["rod"], out, -poses[:, 2], poses[:, 1] * c - poses[:, 0] * d, -1))

@@ -297,3 +297,11 @@ def test_bad_configurations(name, text, told, tmp_path, capsys):
 def test_missing_file(tmp_path, capsys):
     assert main(["import", str(tmp_path / "none.ini")]) == 2
     assert len(capsys.readouterr().err.splitlines()) == 1
+
+
+def test_the_rotary_delta_has_the_joints_of_linuxcnc():
+    machine = pk.load("rotary_delta")
+    poses = machine.home + np.random.default_rng(1).uniform(-100.0, 100.0, (2000, 3))
+    poses = poses[machine.check(poses) == 0]
+    assert len(poses) > 100
+    np.testing.assert_allclose(machine.inverse(poses), rotarydeltakins(poses), atol=1e-12)

@@ -54,7 +54,9 @@ def test_worst_values_and_first_places_are_those_of_a_dense_sample(name):
     wrist_limits = MotionBisection(posted).motions.wrist_limits
     columns = {limit: i for i, limit in enumerate(machine.limits)}
     margins = np.where(np.isnan(sampled.margins), np.inf, sampled.margins)
-    margins[:, ~sampled.followed] = np.where(wrist_limits, np.inf, margins[:, ~sampled.followed])
+    of_turning_legs = [limit.unit == "rad" and limit.subject.startswith("leg ") for limit in machine.limit_definitions]
+    turning = wrist_limits | np.array(of_turning_legs)  # where these can't be followed they go round either way
+    margins[:, ~sampled.followed] = np.where(turning, np.inf, margins[:, ~sampled.followed])
     records = machine.margins(poses, posted.joints, posted.mode)
     looked = 0
     for offence in checked.offences:

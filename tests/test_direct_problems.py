@@ -20,13 +20,13 @@ def test_no_answer_is_in_another_mode_or_on_another_side(m):
     assert tally.other_mode == 0
     assert tally.other_side == 0
     assert tally.close_refused - tally.close_across <= CLOSE_REFUSED * tally.close
-    assert tally.refused < 0.1 * tally.count
+    assert tally.refused < 0.25 * tally.count  # of small machines most starts 600 mm off are beyond reach
 
 
 @everyone
 def test_without_a_mode_only_starts_that_stand_in_another_one_lead_there(m):
     tally = try_direct_problems(m, COUNT)
-    assert tally.other_mode <= 1e-4 * COUNT
+    assert tally.other_mode <= 1e-4 * COUNT + 1  # and says so
     assert tally.other_side == 0
 
 

@@ -2,14 +2,17 @@
 
 import json
 import shutil
+import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
-from linuxcnc.stub import Kinematics, Stub
 
 import parakin as pk
 from parakin.cli import main
+
+sys.path.insert(0, str(Path(__file__).parent / "linuxcnc"))
+from stub import Kinematics, Stub
 
 POSES = 10_000
 KLIPPER_DELTA = """\

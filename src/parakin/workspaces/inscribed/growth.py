@@ -204,7 +204,10 @@ def _solve_barrier_step(edges: Array, by: Array, rows: Array, slack: Array, reac
             gradient = rows.T @ (weight / inside) - 2.0 * barrier * z / room
             hessian = (rows.T * (weight / inside**2)) @ rows
             hessian += np.diag(barrier * 2.0 * (reach**2 + z**2) / room**2)
-            step = np.linalg.solve(hessian, gradient)
+            try:
+                step = np.linalg.solve(hessian, gradient)
+            except np.linalg.LinAlgError:  # a wall so near that all else is rounding
+                return z
             gain = float(gradient @ step)
             if gain < 1e-3 * barrier:
                 break

@@ -174,3 +174,8 @@ def test_command(capsys):
     for words in (["--at", "Q=1"], ["--at", "1,2"], ["--along", "X"], ["--along", "X=0"], ["--mode", "?"]):
         code, out, err = run(capsys, "orthoglide", *words)
         assert (code, out, len(err.splitlines())) == (2, "", 1)
+
+
+def test_a_direction_of_zeros_is_refused_by_its_option(capsys):
+    assert main(["reach", "tricept", "--along", "X=0"]) == 2
+    assert capsys.readouterr().err == '--along: "X=0": a direction that is not zero expected\n'

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
+from ..errors import InputError
 from ..export.number_format import format_fixed
 from ..units import name_display_unit, to_display
 from .console import announce_compiling, format_table, print_json, print_text
@@ -53,7 +54,7 @@ def reach(
         pose = parse_row(at.split(","), machine.axes, machine.axis_units, machine.home, "--at")
     directions: dict[str, str | dict[str, float]] = {axis: axis for axis in machine.axes}
     if along is not None:
-        directions = {text: parse_axis_values(machine, text, "--along") for text in along}
+        directions = {text: _parse_direction(machine, text) for text in along}
     announce_compiling()
     travels = {text: machine.travel(pose, direction, mode) for text, direction in directions.items()}
     if json:
@@ -63,6 +64,13 @@ def reach(
     else:
         print_text(_format_travels(machine, pose, travels))
     return OFF_LIMITS if machine.check(pose, mode=mode) else 0
+
+
+def _parse_direction(machine: Machine, text: str) -> dict[str, float]:
+    direction = parse_axis_values(machine, text, "--along")
+    if not any(direction.values()):
+        raise InputError(f'"{text}": a direction that is not zero expected', "--along")
+    return direction
 
 
 def _format_travels(machine: Machine, pose: Array, travels: dict[str, Travel]) -> str:

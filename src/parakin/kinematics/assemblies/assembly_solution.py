@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 
-from ...arrays import Array, Flags, Indices
+from ...arrays import Array, Flags, Indices, split_rows
 from ...model.traces import Model
 from ..assembly_side import bound_determinant, find_angle_signs
 from ..closure_roots import compute_closure_tolerance, compute_poses, find_roots
@@ -20,6 +21,7 @@ from .machine_quadrics import make_machine_quadrics
 from .root_boxes import prove_roots
 from .study import compute_study_points
 
+_AT_ONCE = 256  # rows of joints: some thousands of solutions
 CLOSED_FORM = "proved (closed form)"
 ALL_PATHS = "all paths accounted for"
 NOT_COMPLETE = "not complete"
@@ -69,6 +71,11 @@ def find_assemblies(model: Model, joints: Array) -> list[Assemblies]:
 
     Raises :class:`NoMethodError` for a continuum of poses.
     """
+    return [answer for rows in split_rows(len(joints), _AT_ONCE) for answer in _find_in_block(model, joints[rows])]
+
+
+def _find_in_block(model: Model, joints: Array) -> list[Assemblies]:
+    """Find every real pose of some rows of joints, whose systems and solutions are in memory together."""
     method = find_closed_form(model)
     near = np.asarray((np.abs(joints) < LONGEST).all(1))
     if method is not None:
@@ -119,11 +126,13 @@ def _describe(model: Model, joints: Array, coordinates: Sequence[Array], complet
     radii = _prove_poses(model, joints, roots.rows[kept], owners[kept])
     sides = _find_signs(model, poses, given)
     within_limits = find_broken_limits(model, poses, given, model.mode) == 0
-    open_rows = np.unique(owners[~closed])
+    open_counts = np.bincount(owners[~closed], minlength=len(joints))
+    untold_counts = np.bincount(owners[closed & ~has_pose], minlength=len(joints))
+    bounds = np.searchsorted(owners[kept], np.arange(len(joints) + 1))
     answers = []
-    for row in range(len(joints)):
-        of_row = np.flatnonzero(owners[kept] == row)
-        known = complete == CLOSED_FORM or row not in open_rows
+    for row, (first, last) in enumerate(pairwise(bounds.tolist())):
+        of_row = slice(first, last)
+        known = complete == CLOSED_FORM or not open_counts[row]
         answers.append(
             Assemblies(
                 poses[of_row],
@@ -132,7 +141,7 @@ def _describe(model: Model, joints: Array, coordinates: Sequence[Array], complet
                 sides[of_row],
                 within_limits[of_row],
                 complete if known else NOT_COMPLETE,
-                untold_count=int((closed & ~has_pose & (owners == row)).sum()),
+                untold_count=int(untold_counts[row]),
             )
         )
     return answers

@@ -6,7 +6,7 @@ from typing import NamedTuple, TypeVar
 
 import numpy as np
 
-from ...arrays import Array, split_rows
+from ...arrays import Array
 from ...errors import NoMethodError
 from ...model.traces import Model
 from ..planar_rpr import CONTINUUM
@@ -21,7 +21,6 @@ _REAL = 1e-4  # imaginary part, for a point of length one, from which Newton's m
 _CLOSED = 1e-12  # of a quadric at a point of length one: it is a root
 _STRIDE = 1e-3  # along the null direction of a double root
 _SAME_SINGLE, _SAME_DOUBLE = 1e-7, 1e-5  # rad: between points of the same root, regular and double
-_SYSTEMS_AT_ONCE = 256
 _AT_END = 0.99  # t from which on a path ends at a singular root: one that stops before is lost
 _PHASE = np.exp(1j)  # of the paths that are tracked where one of the first was lost
 _STEPS = 60  # of Newton's method at a double root, where each halves the distance
@@ -52,13 +51,10 @@ def find_real_roots(model: Model, joints: Array) -> list[RealRoots]:
     quadrics, own = make_machine_quadrics(model), find_own_member(model)
     if not len(own.roots):
         raise NoMethodError(f"{model.spec.name}: {CONTINUUM}, or do not close, whatever the joints are")
-    roots = []
-    for block in split_rows(len(joints), _SYSTEMS_AT_ONCE):
-        systems = quadrics.make_systems(joints[block])
-        sorted_ends = _track_and_sort(model, systems, own)
-        for row in [row for row, own_roots in enumerate(sorted_ends) if own_roots.lost_count]:
-            sorted_ends[row] = _track_and_sort(model, systems[row : row + 1], own, _PHASE, STRICT)[0]
-        roots += sorted_ends
+    systems = quadrics.make_systems(joints)
+    roots = _track_and_sort(model, systems, own)
+    for row in [row for row, own_roots in enumerate(roots) if own_roots.lost_count]:
+        roots[row] = _track_and_sort(model, systems[row : row + 1], own, _PHASE, STRICT)[0]
     return roots
 
 

@@ -43,7 +43,7 @@ class MachineQuadrics(NamedTuple):
         """Compute the closures' numbers, (N, closures, 5): factors of |p|², of p's coordinates, and the rest."""
         values = evaluate_trace(self.trace, self.numbers, [0.0, 0.0, 0.0, *joints.T])
         columns = np.stack([np.broadcast_to(np.asarray(v, float), (len(joints),)) for v in values], 1)
-        return columns.reshape(len(joints), -1, 5) / self.size ** np.array([0.0, 1.0, 1.0, 1.0, 2.0])
+        return columns.reshape(len(joints), len(values) // 5, 5) / self.size ** np.array([0.0, 1.0, 1.0, 1.0, 2.0])
 
     def combine(self, numbers: Array | Complex) -> Complex:
         """Combine the matrices by the closures' numbers (N, closures, 5): (N, closures, n, n), each of length one."""

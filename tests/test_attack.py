@@ -245,8 +245,12 @@ def test_a_set_is_not_torn_by_an_interruption(tmp_path, monkeypatch):
     monkeypatch.setattr("parakin.export.files.os.replace", interrupted)
     (tmp_path / "a").write_text("old")
     (tmp_path / "b").write_text("old")
-    with pytest.raises(KeyboardInterrupt):
-        pk.write_files(tmp_path, {"a": "new", "b": "new"})
+    inherited = signal.signal(signal.SIGINT, signal.default_int_handler)  # in a shell's background it is ignored
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            pk.write_files(tmp_path, {"a": "new", "b": "new"})
+    finally:
+        signal.signal(signal.SIGINT, inherited)
     assert [(tmp_path / name).read_text() for name in "ab"] == ["new", "new"]
 
 

@@ -150,7 +150,8 @@ def picture(target, machine, runs):
 
 def prepare(machine, folder, place, feed):
     """The job, its program as posted, and the same path as a plain post writes it."""
-    job = pk.prepare(machine, part(folder, place, feed), workpiece=place.workpiece)
+    path = pk.fit_tool_lengths(machine, part(folder, place, feed), "machine")
+    job = pk.prepare(machine, path, workpiece=place.workpiece)
     file = io.BytesIO()
     pk.make_linuxcnc_program(job.trajectory)(file)
     text = file.getvalue().decode("ascii")

@@ -37,6 +37,7 @@ FILLET_LENGTH, FILLET_HEIGHT = 18.0, 6.0
 
 # The operation
 BALL = 5.0
+TOOL = 150.0  # from the spindle's nose to its tip, the own tool of the machines that run it
 START, END = 5.5, SPAN  # along the span; nearer to the platform the ball would touch it
 EDGES = (0.055, 0.975)  # along the chord
 LEAD, TILT = np.radians(7.0), np.radians(-3.0)  # in the feed; sideways, toward the leading edge
@@ -224,7 +225,7 @@ def nx_lines(path, feeds=FEEDS):
     head = [
         "$$ Turbine blade, suction side; MSYS is turned by 16.26 deg about the machine's Z",
         "TOOL PATH/SUCTION_SIDE_FINISH,TOOL,BALL_MILL_D10",
-        f"TLDATA/MILL,{2 * BALL:.4f},{BALL:.4f},80.0000,0.0000,0.0000",
+        f"TLDATA/MILL,{2 * BALL:.4f},{BALL:.4f},{TOOL:.4f},0.0000,0.0000",
         "MSYS/" + ",".join(msys),
         "$$ centerline data",
         "PAINT/PATH",

@@ -53,7 +53,8 @@ tip is on the path; between records too. Summary, report, JSON and the program's
 | `--tools FILE` | the Z of LinuxCNC's tool table, by the number of LOADTL, T or G43 H |
 | `LOADTL/n,LENGTH,l`, `G10 L1`, `G43.1` | from nose to tip; refused where it is not the machine's own |
 | `LOADTL/n,l` | the same of SolidWorks CAM; in a dialect that no header tells it is noted and not taken |
-| `TLDATA`, `CUTTER` with a height | what sticks out of the holder: refused where longer than the own tool |
+| `TLDATA` of a tool that is loaded by number and tilts | refused where it is not the own tool's |
+| other `TLDATA`, `CUTTER` with a height | what sticks out of the holder: refused where longer than the own tool |
 | `LOADTL/n,pocket,l` | the same of Autodesk |
 | several cutters | the longest as the machine's own tool, others by what they are shorter |
 | nothing | the machine's own |
@@ -62,6 +63,9 @@ One rule is behind it: without an option nothing runs that contradicts the machi
 to the tip contradicts it where it differs; what sticks out of a holder of unknown length only where it is longer. CAM
 systems write the cutter's length (often one that nobody set, as the 75 mm of NX) and not the holder's: a shorter cutter
 is told beside the length that counts, wherever that is told, and `--tool-length file` takes it for the whole tool.
+TLDATA may mean either. Along the part's Z a wrong length is a shift of the zero, which is set with the tool in the
+spindle; once the tool tilts, nothing on the machine takes it away. So TLDATA of a tool that is loaded by number and
+tilts has to be as long as the machine's own tool, or an option says what counts.
 
 A table of lengths 0 only, as `parakin linuxcnc` writes it, leaves all to the machine's own tool. Where G43 has lengths
 from a table, G53 and G28 tell of the spindle's nose, as on a machine with such a table; else of the own tool's tip.

@@ -60,8 +60,9 @@ def jobs(tmp_path_factory):
             place, upright = PLACES[name]
             lines = turbine_blade.nx_lines(turbine_blade.tool_path(150, upright), turbine_blade.FEEDS | {"cut": 1e4})
             (folder / "part.cls").write_text("\n".join(lines) + "\n", encoding="ascii")
-            path = pk.read_path(folder / "part.cls")
-            known[name, interpolation] = pk.prepare(pk.load(name), path, workpiece=place, interpolation=interpolation)
+            machine = pk.load(name)
+            path = pk.fit_tool_lengths(machine, pk.read_path(folder / "part.cls"), "machine")
+            known[name, interpolation] = pk.prepare(machine, path, workpiece=place, interpolation=interpolation)
         return known[name, interpolation]
 
     return job_of

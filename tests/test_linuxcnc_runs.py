@@ -160,7 +160,8 @@ def first_passes(machine, folder, feed=FEED, count=130):
     read, part = pk.read_path(file), slice(count)
     events = tuple(event for event in read.events if event.record < count)
     arrays = {name: getattr(read, name)[part] for name in ("tip", "axis", "line", "rapid", "feed", "spindle")}
-    return pk.prepare(machine, replace(read, events=events, **arrays), workpiece=place)
+    path = pk.fit_tool_lengths(machine, replace(read, events=events, **arrays), "machine")
+    return pk.prepare(machine, path, workpiece=place)
 
 
 def written(trajectory, **options):

@@ -46,7 +46,9 @@ def trajectories(tmp_path_factory):
             place, upright = PLACES[name]
             lines = turbine_blade.nx_lines(turbine_blade.tool_path(400, upright), turbine_blade.FEEDS | {"cut": 1e4})
             (folder / "part.cls").write_text("\n".join(lines) + "\n", encoding="ascii")
-            known[name] = plan_trajectory(post_path(pk.load(name), pk.read_path(folder / "part.cls"), workpiece=place))
+            machine = pk.load(name)
+            path = pk.fit_tool_lengths(machine, pk.read_path(folder / "part.cls"), "machine")
+            known[name] = plan_trajectory(post_path(machine, path, workpiece=place))
         return known[name]
 
     return trajectory_of

@@ -158,6 +158,30 @@ def test_a_length_that_contradicts_the_machine_is_refused(write, capsys):
         assert said["tools"][-1]["length"] == 150.0 and said["tool_length"] == 150.0
 
 
+UPRIGHT = re.sub(r"(GOTO/-?\d+,\d+,\d+),.*", r"\1", NX)
+
+
+@pytest.mark.parametrize(
+    ("text", "refused"),
+    [
+        (NX, True),
+        (NX.replace("LOAD/TOOL,1\n", ""), False),  # a cutter; which tool holds it is the operator's affair
+        (UPRIGHT, False),
+        (UPRIGHT.replace("0,50\nFEDRAT", "0,50,0,0.01,0.99995\nFEDRAT"), True),
+        (UPRIGHT.replace("END-OF-PATH", "TOOL PATH/B,TOOL,BALL\nRAPID\nGOTO/0,0,60,0.1,0,0.99498744"), True),
+    ],
+)
+def test_the_length_of_a_loaded_tool_that_tilts_has_to_be_the_machines(text, refused, write, capsys):
+    path = write(text.format(length=75.0))
+    if refused:
+        said = f"{path}:2: tool 1 BALL is 75 mm long by TLDATA and tilts, the tool of tricept is 150 mm long"
+        assert refusal(capsys, path).startswith(said)
+    else:
+        assert post(capsys, path)["tools"][0]["length"] == 150.0
+    assert post(capsys, path, "--tool-length", "machine")["tools"][0]["length"] == 150.0
+    assert post(capsys, write(text.format(length=150.0)))["verdict"] == "ok"
+
+
 def test_joints_hang_on_the_length(write, capsys):
     joints = {}
     for options in ("75", "150", "machine", "file"):
@@ -190,7 +214,8 @@ def test_lengths_are_told_in_summary_report_and_program(write, capsys):
     program = (out / "part.linuxcnc.ngc").read_text()
     assert f"( {said} )" in program and "( part zero at X 0 Y 0 Z -1450 in the machine )" in program
     assert said.replace("'", "&#x27;") in (out / "part.report.html").read_text()
-    # without a word the machine's own tool counts, and the cutter is told wherever the length is
+    # of a tool that the file does not load the machine's own counts, and the cutter is told wherever the length is
+    write(NX.format(length=75.0).replace("LOAD/TOOL,1\n", ""))
     assert main(["post", str(path), *options[:-2]]) == 0
     said = "150 mm from the spindle's nose to its tip, the machine's own length, 75 mm of it the file's cutter"
     assert said in capsys.readouterr().out and said in (out / "part.linuxcnc.ngc").read_text()
@@ -348,7 +373,7 @@ def test_the_start_and_the_reference_point(write, capsys):
 
 def test_the_files_frame_is_taken_or_ignored(write, capsys):
     msys = "MSYS/10,20,-30,0,1,0,-1,0,0\n"
-    path = write(NX.format(length=75.0).replace("LOAD", msys + "LOAD"))
+    path = write(NX.format(length=150.0).replace("LOAD", msys + "LOAD"))
     said = post(capsys, path)
     assert np.allclose(np.array(said["frame"])[:, 3], [10.0, 20.0, -1480.0]) and said["file_frame"] is not None
     assert any("the file's frame: origin 10, 20, -30 mm" in note["text"] for note in said["notes"])

@@ -26,6 +26,7 @@ ToolLength: TypeAlias = float | Literal["file", "machine"] | None
 _SAME = 1e-3  # mm: lengths that are the same, with the decimals of a file
 _CLEARANCES = (20.0, 10.0, 5.0, 2.0)  # mm to withdraw from a cut before a change: the first that the machine allows
 _LONGEST = 1e4  # mm
+_UPRIGHT = 1e-4  # rad: 0.1 um at a tip that is 1 m off
 _STARTS = re.compile(r"M0?[34]\b|SPINDL\b(?!\s*/\s*OFF)", re.I)  # events that start the spindle
 
 
@@ -44,10 +45,11 @@ def fit_tool_lengths(
     workpiece : as the path will be posted with; it tells how far the machine can withdraw the tool
 
     A tool table's length, and one that the file sets (LOADTL with LENGTH, G10 L1, G43.1), is from the spindle's nose to
-    the tip. The file's may not differ from the machine's unless ``length`` says what counts. The length of a cutter
-    (TLDATA, CUTTER) is without its holder: the tool with the longest cutter is as long as the machine's own, which may
-    not be shorter than the cutter, and others by what their cutters are shorter. A tool of which nothing is known is as
-    long as the machine's own.
+    the tip. The file's may not differ from the machine's unless ``length`` says what counts, and neither may TLDATA's
+    length of a tool that the file loads by its number and tilts. Else the length of a cutter (TLDATA, CUTTER) is
+    without its holder: the tool with the longest cutter is as long as the machine's own, which may not be shorter than
+    the cutter, and others by what their cutters are shorter. A tool of which nothing is known is as long as the
+    machine's own.
 
     Before a change the tool is withdrawn along its axis, from a cut by 20 mm, or less where the machine can't, and by
     what the next tool is longer, so that no tool is put in deeper than the one before; from a rapid position the next
@@ -88,10 +90,14 @@ def _choose_lengths(machine: Machine, path: ToolPath, length: ToolLength) -> lis
     longest_tool = own if length is None or isinstance(length, str) else float(length)
     longest = max((cutter for cutter in map(find_cutter_length, path.tools) if cutter == cutter), default=math.nan)
     lengths = []
-    for use in path.tools if length is None and own > 0.0 else ():
+    for k, use in enumerate(path.tools if length is None and own > 0.0 else ()):
         cutter, stated = find_cutter_length(use), _find_length(use, "set_length")
-        if stated != stated and cutter > own + _SAME:
+        if stated == stated or cutter != cutter:
+            continue
+        if cutter > own + _SAME:
             _refuse_length(machine, path, use, f"has a cutter of {cutter:g} mm")
+        if abs(cutter - own) > _SAME and "type" in use.data and "number" in use.data and _is_tilted(path, k):
+            _refuse_length(machine, path, use, f"is {cutter:g} mm long by TLDATA and tilts")
     for use in path.tools:
         cutter, stated = find_cutter_length(use), _find_length(use, "set_length")
         if stated == stated:
@@ -107,6 +113,13 @@ def _choose_lengths(machine: Machine, path: ToolPath, length: ToolLength) -> lis
             if lengths[-1] <= 0.0:
                 _refuse_length(machine, path, use, f"is {longest - cutter:g} mm shorter than the longest tool")
     return lengths
+
+
+def _is_tilted(path: ToolPath, number: int) -> bool:
+    """Tell whether a tool ever leaves the part's Z, where a wrong length is more than a shift of the zero."""
+    begin, *rest = [use.record for use in path.tools[number:]]
+    axes = path.axis[begin : rest[0] if rest else None]
+    return bool((axes[:, 2] < math.cos(_UPRIGHT)).any())
 
 
 def _refuse_length(machine: Machine, path: ToolPath, use: ToolUse, what: str) -> NoReturn:

@@ -145,7 +145,7 @@ def _pose_problem(joint_path: JointPath, limits: DriveLimits) -> StepLimits:
 def _find_start(joint_path: JointPath, limits: DriveLimits, problem: StepLimits, ramp: float) -> tuple[Array, Array]:
     """Find ṡ² and s̈ of a profile that keeps all limits: reachable with q'''·ṡ³ bounded, smoothed, and slowed down."""
     rows, count = joint_path.rows, len(joint_path.step)
-    with np.errstate(divide="ignore", invalid="ignore"):
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         third = np.abs(np.diff(rows.curvature, axis=0)) / rows.step[:, None]
         ceiling = np.min((_ACROSS * limits.jerk / third) ** (2.0 / 3.0), axis=1)
     ceiling = np.fmin(ceiling, np.minimum(problem.ceiling_start, problem.ceiling_end))

@@ -49,9 +49,10 @@ def test_the_commands_of_the_page_work(machine_file, tmp_path, monkeypatch, caps
     monkeypatch.chdir(tmp_path)
     Path("part.apt").write_text("UNITS/MM\nFEDRAT/900,MMPM\nRAPID\nGOTO/0,0,0\nGOTO/40,10,0\nGOTO/40,-30,0\nFINI\n")
     commands = [line for line in PAGE.read_text(encoding="utf-8").splitlines() if line.startswith("parakin ")]
-    assert len(commands) == 4
+    assert len(commands) == 5
     for command in commands:
         assert main(command.split()[1:]) == 0, command
+    assert Path("linuxcnc/rpr3_kins.c").is_file()  # its box for moves by hand is the whole of what is tried
     assert Path("rpr3.html").stat().st_size > 1e5
     assert {p.name for p in Path("out").iterdir()} == {"part.joints.csv", "part.report.html"}
     capsys.readouterr()

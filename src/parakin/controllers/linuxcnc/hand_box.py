@@ -23,6 +23,7 @@ _FIRST_TURNS = (0.2, 0.1, 0.03, 0.01)  # of the widest turns, for the first box
 _GROWTH = 0.1  # of a face's distance to the estimated range, by which it is moved outward
 _GROWTH_AGAIN = 0.3  # of a step that could not be proved, for the next one
 _LEAST_GROWTH = 0.02
+_AT_THE_END = 0.01  # of the way from home to the estimated range: a face that is nearer to it stays
 _CELLS = 2000  # cells of one proof
 _BOUND_CELLS = 20000  # that are bisected for the speeds
 _SAMPLES = 2000
@@ -85,6 +86,7 @@ def _choose_widest(machine: Machine, home: Array) -> tuple[Array, Array]:
 def _grow_faces(proof: _BoxProof, box: tuple[Array, Array], low: Array, high: Array) -> tuple[Array, Array]:
     """Move the faces outward in turn, each as long as the box is proved, in smaller steps where it is not."""
     ends, most = [end.copy() for end in box], (low, high)
+    near = [_AT_THE_END * np.abs(end - proof.home) for end in most]
     steps = {(side, axis): _GROWTH for axis in range(len(low)) for side in (0, 1)}
     while steps:
         for (side, axis), step in tuple(steps.items()):
@@ -94,7 +96,12 @@ def _grow_faces(proof: _BoxProof, box: tuple[Array, Array], low: Array, high: Ar
                 ends = tried
             else:
                 steps[side, axis] *= _GROWTH_AGAIN
-        steps = {face: step for face, step in steps.items() if step > _LEAST_GROWTH}
+        left = [np.abs(most[side] - ends[side]) for side in (0, 1)]
+        steps = {
+            (side, axis): step
+            for (side, axis), step in steps.items()
+            if step > _LEAST_GROWTH and left[side][axis] > near[side][axis]
+        }
     return ends[0], ends[1]
 
 
@@ -102,7 +109,7 @@ class _BoxProof:
     """Proofs over boxes of poses [low, high], by bisection of what is undecided."""
 
     def __init__(self, machine: Machine, home: Array):
-        self.machine, self.rates = machine, MarginRates(machine, machine.mode)
+        self.machine, self.home, self.rates = machine, home, MarginRates(machine, machine.mode)
         self.least = find_least_margins(machine)[: 1 + machine.leg_count]
         self.slowest = np.array([find_slowest_drive(machine, unit) for unit in machine.axis_units])
         self.drives = np.array([choose_drive_rates(drive) for drive in machine.drives])

@@ -61,6 +61,8 @@ def things(tmp_path_factory, tricept):
         "RewoundPath": pk.rewind_path(tricept, path, pk.Clearance(20.0), workpiece=pk.workpiece(Z=-1400)),
         "ToolTurn": pk.choose_tool_turn(hexapod, path, workpiece=below),
         "TurnedJob": pk.prepare_turned(hexapod, path, workpiece=below),
+        "Family": pk.family(tricept, ["feet"]),
+        "Parameter": tricept.parameters[0],
         "setpoints": job.trajectory.sample(10),
         "cells": found.cells,
         "spec": tricept.spec,

@@ -18,6 +18,7 @@ FLOORS = [
     ["kinematics", "description"],
     ["machine_properties"],
     ["machine"],
+    ["families"],
     ["workspaces.certified"],
     ["workspaces.inscribed", "workspaces.sampled"],
     ["workspaces.connected"],
@@ -48,7 +49,7 @@ FLOORS = [
 ]
 HEIGHT = {room: height for height, floor in enumerate(FLOORS) for room in floor}
 CORE = ["arrays", "algebra", "budget", "kernels", "model", "kinematics", "machine_properties", "machine"]
-CORE += ["workspaces", "performance"]
+CORE += ["families", "workspaces", "performance"]
 RIM = {"pathlib", "json", "io", "tempfile", "shutil", "plotly", "matplotlib", "pyarrow", "rich", "cyclopts"}
 RIM |= {"pydantic", "ruamel", "http", "socket", "subprocess"}
 NO_PATH_NEEDS = {"plotly", "matplotlib", "rich", "cyclopts"}
@@ -254,15 +255,15 @@ def test_columns_of_b_and_c_are_seen(line):
 WORDS = """
 accept accumulate act add advance align allocate allow announce answer append apply approach arrange assign
 average begin bind bisect blend bore bound box bracket bring build call
-cancel centre certify change check choose clamp clear climb clip clone close coincide collect combine compare compile
-complete compose compute concatenate confirm continue convert copy correct count cross cut
+calibrate cancel centre certify change check choose clamp clear climb clip clone close coincide collect combine compare
+compile complete compose compute concatenate confirm continue convert copy correct count cross cut
 decide decode decompose delay define derive describe design detect differentiate discard divide draw drill drop
 ease embed enclose encode end enter equip erase estimate evaluate exclude execute exit expand expect explain explore
 extend
 extract factor fail fetch fill filter find finish fit fix flag flatten flip fold follow forbid format free freeze
 gather get give go grade group grow guess
 halve hash
-ignore import insert integrate interpolate interpret intersect invert is isolate iterate
+identify ignore import insert integrate interpolate interpret intersect invert is isolate iterate
 join judge
 keep
 label lay lead leave let limit linearise list load locate lock lower
@@ -275,9 +276,9 @@ raise rank rate read rebuild recognise record redirect reduce refine refuse reje
 renumber reorder repeat replace report repost require reserve reset resize resolve restore restrict retract retry return
 reuse reverse rewind rotate round route run
 sample save say scale score search select separate set settle share shift shorten show shrink skip smooth snap solve
-slow sort space split spread square stack stage stamp start stop store stretch strip subtract suggest sum summarise swap
-sweep switch
-tabulate take tally tell test thin tighten trace track transform translate transpose trap trim turn
+simulate slow sort space split spread square stack stage stamp start stop store stretch strip subtract suggest sum
+summarise swap sweep switch
+tabulate take tally tell test thin tighten tilt trace track transform translate transpose trap trim turn
 undo unwind update use
 validate verify
 wait walk warn warp weigh widen wrap write

@@ -18,9 +18,12 @@ if TYPE_CHECKING:
     from .export.machine.picture import render_machine_html, render_machine_png
     from .export.report.report import render_report
     from .export.workspace.meshes import Mesh, make_mesh
+    from .families.family import Family
+    from .families.family import make_family as family
     from .kinematics.assemblies import Assemblies
     from .kinematics.solution import Solution
     from .machine import Machine
+    from .model.geometric_parameters import Parameter
     from .performance.atlas import Atlas, atlas
     from .toolpath.job import Job, Tolerances, prepare
     from .toolpath.linearise.rewinds import Clearance, Rewind, RewoundPath, rewind_path
@@ -52,6 +55,7 @@ __all__ = [
     "CrossSection",
     "DescriptionError",
     "DriveWorkspace",
+    "Family",
     "GridWorkspace",
     "InputError",
     "InputErrors",
@@ -62,6 +66,7 @@ __all__ = [
     "Mesh",
     "NoMethodError",
     "ParakinError",
+    "Parameter",
     "Placement",
     "PolarWorkspace",
     "PoseError",
@@ -79,6 +84,7 @@ __all__ = [
     "__version__",
     "atlas",
     "choose_tool_turn",
+    "family",
     "find_components",
     "find_cross_sections",
     "find_largest_box",
@@ -149,12 +155,14 @@ _LAZY = {
     "Components": "workspaces.connected.components",
     "CrossSection": "workspaces.sampled.cross_sections",
     "DriveWorkspace": "workspaces.sampled.drive_sweep",
+    "Family": "families.family",
     "GridWorkspace": "workspaces.sampled.grid",
     "InscribedBox": "workspaces.inscribed.largest_box",
     "Job": "toolpath.job",
     "JointProgram": "controllers.joints.program_reader",
     "Machine": "machine",
     "Mesh": "export.workspace.meshes",
+    "Parameter": "model.geometric_parameters",
     "Placement": "toolpath.placing.placement",
     "PolarWorkspace": "workspaces.sampled.polar_sweep",
     "Region": "workspaces.certified.region",
@@ -173,6 +181,7 @@ _LAZY = {
     "Workspace": "workspaces.certified.workspace",
     "atlas": "performance.atlas",
     "choose_tool_turn": "toolpath.tool_turn.choice",
+    "family": "families.family:make_family",
     "find_components": "workspaces.connected.components",
     "find_cross_sections": "workspaces.sampled.cross_sections",
     "find_largest_box": "workspaces.inscribed.largest_box",

@@ -50,6 +50,9 @@ class Term:
 
     __rmul__ = __mul__
 
+    def __pow__(self, exponent: int) -> Scalar:
+        return self * self if exponent == 2 else NotImplemented
+
     def __truediv__(self, other: Scalar) -> Scalar:
         if not isinstance(other, Term):
             return _multiply_constant(self, 1.0 / float(other))

@@ -11,7 +11,7 @@ import numpy as np
 from .algebra import Scalar, Vec
 from .arguments import RowsLike, bound_angles, check_range, describe_value, read_rows, warn_of_wide_angles
 from .arrays import Array
-from .errors import NoMethodError, PoseError, suggest
+from .errors import NoMethodError, PoseError, quote, suggest
 from .kernels.batch import evaluate_tape, evaluate_tape_with_residual
 from .kinematics.assemblies import Assemblies, find_assemblies
 from .kinematics.assembly_side import find_sides
@@ -26,6 +26,7 @@ from .kinematics.travel import LineTapes, Travel, compile_line_tapes, find_trave
 from .kinematics.wrist.pole_crossing import flip_mode
 from .kinematics.wrist.pole_thresholds import EXACT
 from .machine_properties import MachineProperties
+from .model.geometric_parameters import replace_parameters, settle_offsets
 from .model.legs import Inverse
 from .model.limits import compute_platform_points
 from .model.rates import TwistRates, compute_twist_rates
@@ -39,6 +40,17 @@ class Machine(MachineProperties):
     joints are rows of ``joints``. Any leading shape goes, ``()`` included, and is kept. A pose that is not a number or
     out of reach gives a row of NaN and leaves its neighbours alone.
     """
+
+    def replace_parameters(self, values: Mapping[str, float]) -> Machine:
+        """Make the machine with other numbers, mm and rad, by the names of :attr:`parameters`.
+
+        Raises :class:`DescriptionError` where they are no machine that works.
+        """
+        known = [parameter.name for parameter in self.parameters]
+        for name in values:
+            if name not in known:
+                raise PoseError(f"parameters: unknown {quote(name)}{suggest(name, known)}")
+        return Machine(settle_offsets(replace_parameters(self.spec, values)))
 
     # Input at the boundary.
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import cached_property
 from itertools import product
 
@@ -15,6 +15,8 @@ from .kinematics.home import check_home
 from .kinematics.wrist.pose_angles import EVERY_DIRECTION, EVERY_ROTATION, EVERY_TURN
 from .kinematics.wrist.turning_joints import Wrist, find_wrist
 from .model.elements import Drive
+from .model.equations import Equations
+from .model.geometric_parameters import Parameter, list_parameters, replace_parameters
 from .model.legs import Leg
 from .model.limits import Limit, group_joints_by_leg
 from .model.rates import list_closure_joints
@@ -107,6 +109,15 @@ class MachineProperties:
         last = self.spec.head[-1] if self.spec.head else None
         fixed = last is not None and last.axis == "tz" and last.drive is None
         return max(0.0, -last.value) if last is not None and fixed else 0.0
+
+    @cached_property
+    def parameters(self) -> tuple[Parameter, ...]:
+        """Every geometric number, with its name, unit, value and group."""
+        return list_parameters(self.spec)
+
+    def trace_equations(self, values: Mapping[str, Scalar]) -> Equations:
+        """Trace the machine's equations with scalars of any kind in place of some of its :attr:`parameters`."""
+        return Equations(replace_parameters(self.spec, values))
 
     @cached_property
     def wrist(self) -> Wrist | None:

@@ -39,6 +39,7 @@ class LegGroup(FileSection):
     counts: Any = None
     lead: Any = None
     homing: Any = None
+    offset: Any = None
 
     def build_legs(self) -> list[Leg]:
         """Build the legs with their drives."""
@@ -47,7 +48,7 @@ class LegGroup(FileSection):
             drives = []
             for j, unit in enumerate(self.leg.units):
                 drive = Drive(str(names[j]), unit, *self.range[i][j])
-                for what in ("speed", "acceleration", "jerk", "counts", "lead", "homing"):
+                for what in ("speed", "acceleration", "jerk", "counts", "lead", "homing", "offset"):
                     rows = getattr(self, what)
                     drive = drive if rows is None else replace(drive, **{what: rows[i][j]})
                 drives.append(drive)
@@ -180,6 +181,7 @@ def _build_group_model(kind: str) -> type[LegGroup]:
         counts=(_make_rows_type(tuple(d.counts for d in drives), 0), None),
         lead=(_make_rows_type(tuple(d.lead for d in drives), 0), None),
         homing=(_make_rows_type(tuple(d.homing for d in drives), 0), None),
+        offset=(_make_rows_type(tuple(d.value for d in drives), 0), None),
         **own,
     )
     model.leg = leg

@@ -71,6 +71,9 @@ def _list_leg(leg: Leg) -> Iterator[str]:
         if spec.name != "drives":
             yield f"    {spec.name}: {_format_leg_value(getattr(leg, spec.name), hints[spec.name])}"
     values = [dict(_list_drive_values(drive)) for drive in leg.drives]
+    if any(drive.offset for drive in leg.drives):
+        for drive, of_drive in zip(leg.drives, values, strict=True):
+            of_drive["offset"] = _format_quantity(drive.offset, drive.unit)
     for key in dict.fromkeys(key for of_drive in values for key in of_drive):
         row = [of_drive[key] for of_drive in values if key in of_drive]
         yield f"    {key}: {row[0] if len(row) == 1 else '[' + ', '.join(row) + ']'}"

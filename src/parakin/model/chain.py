@@ -12,6 +12,7 @@ from ..algebra import (
     ORIGIN,
     Mat,
     Scalar,
+    Term,
     Vec,
     add,
     apply,
@@ -33,11 +34,14 @@ from .elements import ROTATIONS, TRANSLATIONS, Step
 UNIT: dict[str, Vec] = {
     word: tuple(1.0 if word[1] == letter else 0.0 for letter in "xyz") for word in (*TRANSLATIONS, *ROTATIONS)
 }
+_ROUNDING = 1e-15  # cosine of the angle between two axes; below this they are at right angles
 _PARALLEL = 1e-6  # sine of the angle between two axes; below this they are parallel
 
 
-def compute_exact_sincos(angle: float) -> tuple[float, float]:
+def compute_exact_sincos(angle: Scalar) -> tuple[Scalar, Scalar]:
     """Compute sine and cosine of a fixed angle, exact where they are 0, ±1/2 or ±1 (multiples of 30° and 90°)."""
+    if isinstance(angle, Term):
+        return sincos(angle)
     s, c = float(np.sin(angle)), float(np.cos(angle))
     return tuple(round(2.0 * v) / 2.0 if abs(2.0 * v - round(2.0 * v)) < 1e-15 else v for v in (s, c))  # type: ignore[return-value]
 
@@ -127,7 +131,8 @@ class Pointing:
             the branch
         """
         a1, a2, w = self.first, self.second, self.start
-        a, beta, alpha = float(dot(a1, a2)), float(dot(w, a2)), dot(v, a1)
+        a, beta = (x if abs(x) > _ROUNDING else 0.0 for x in (float(dot(a1, a2)), float(dot(w, a2))))
+        alpha = dot(v, a1)
         normal = cross(a1, a2)
         n2 = float(dot(normal, normal))
         around = cross(a1, v)

@@ -33,6 +33,7 @@ class Drive:
     counts, lead : steps or encoder counts of a motor's turn, and what the joint moves meanwhile, negative where the
         motor turns the other way; None: not said
     homing : where the home switch trips, or ``absolute`` for an encoder that needs none; None: not said
+    offset : what a leg's joint is more than the drive says, mm or rad; ranges and homing are what the drive says
     """
 
     name: str
@@ -45,6 +46,7 @@ class Drive:
     counts: float | None = None
     lead: float | None = None
     homing: float | Literal["absolute"] | None = None
+    offset: float = 0.0
 
 
 @dataclass(frozen=True)

@@ -11,6 +11,7 @@ from ..units import AXIS_UNITS
 from .elements import ROTATIONS
 from .legs import Inverse
 from .limits import HomeRods, Limit, compute_platform_points, group_joints_by_leg, list_limits
+from .nominal_values import find_nominal_value
 from .spec import Spec
 from .spheres import CENTRES_NEEDED, find_common_point, measure_side
 from .structures import PlatformPlacement, Structure, make_structure
@@ -77,7 +78,7 @@ class Equations:
         def compare(unit: str, off: Scalar) -> Scalar:
             return atan2(*sincos(off)) * arm if unit == "rad" else off
 
-        placed = self.structure.place_with_joints(pose, self._serial(joints))
+        placed = self.structure.place_with_joints(pose, self.list_serial(joints))
         signs, _ = self.split_mode(mode)
         points = compute_platform_points(self.spec, placed.rotation, placed.origin)
         own = group_joints_by_leg(self.spec, joints)
@@ -110,13 +111,18 @@ class Equations:
         """Compute the joint vector, placement and each leg's inverse for a pose."""
         placed = self.structure.place(pose, self.split_mode(mode)[1], first)
         legs = self.invert_legs(placed.rotation, placed.origin, mode)
+        serial = self.drives[self.leg_count :]
+        of_serial = [q - drive.offset for drive, q in zip(serial, placed.serial, strict=True)]
+        return [*self.list_leg_joints(legs), *of_serial], placed, legs
+
+    def list_leg_joints(self, inverses: Sequence[Inverse]) -> list[Scalar]:
+        """List what the legs' drives say, in the order of the joint vector, for each leg's joints."""
         by_name = {
-            drive.name: q
-            for leg, inverse in zip(self.spec.legs, legs, strict=True)
+            drive.name: q - drive.offset
+            for leg, inverse in zip(self.spec.legs, inverses, strict=True)
             for drive, q in zip(leg.drives, inverse.joints, strict=True)
         }
-        by_name.update(zip((d.name for d in self.drives[len(by_name) :]), placed.serial, strict=True))
-        return [by_name[drive.name] for drive in self.drives], placed, legs
+        return [by_name[drive.name] for drive in self.drives[: self.leg_count]]
 
     def invert_legs(self, rotation: Sequence[Vec], origin: Vec, mode: str) -> list[Inverse]:
         """Compute each leg's inverse with the platform placed."""
@@ -136,7 +142,7 @@ class Equations:
 
     def compute_pose(self, coordinates: Sequence[Scalar], joints: Sequence[Scalar]) -> list[Scalar]:
         """Compute the pose; NaN where a leg closes otherwise than it is built, as a strut of negative length does."""
-        first, *others = self.structure.pose(coordinates, self._serial(joints))
+        first, *others = self.structure.pose(coordinates, self.list_serial(joints))
         points = compute_platform_points(self.spec, *self.structure.frame(coordinates))
         given = group_joints_by_leg(self.spec, joints)
         margins = [
@@ -148,7 +154,7 @@ class Equations:
 
     def margins(self, pose: Sequence[Scalar], joints: Sequence[Scalar], mode: str) -> list[tuple[Limit, Scalar]]:
         """List every limit with its margin, for a pose and the joints that a path takes there."""
-        placed = self.structure.place_with_joints(pose, self._serial(joints))
+        placed = self.structure.place_with_joints(pose, self.list_serial(joints))
         return self._margins(placed, joints, self.invert_legs(placed.rotation, placed.origin, mode))
 
     def own_margins(self, pose: Sequence[Scalar], mode: str) -> list[tuple[Limit, Scalar]]:
@@ -172,14 +178,16 @@ class Equations:
                 raise DescriptionError("limits", f"two are called {name}; rename the joint or join the limits")
         return limits
 
-    def _serial(self, joints: Sequence[Scalar]) -> list[Scalar]:
-        return list(joints[self.leg_count :])
+    def list_serial(self, joints: Sequence[Scalar]) -> list[Scalar]:
+        """List the angles of head and table in a joint vector, offsets added."""
+        serial = self.drives[self.leg_count :]
+        return [q + drive.offset for drive, q in zip(serial, joints[self.leg_count :], strict=True)]
 
     # Home.
 
     @cached_property
     def home(self) -> list[float]:
-        return [float(self.spec.home.get(letter, 0.0)) for letter in self.axes]
+        return [0.0 + self.spec.home.get(letter, 0.0) for letter in self.axes]
 
     def _find_rods(self, placed: PlatformPlacement, joints: Sequence[Scalar]) -> list[tuple[Vec, Vec]]:
         """Find foot and end of each leg's first strut."""
@@ -201,7 +209,7 @@ class Equations:
         joints, placed, _ = self.invert(self.home, self.mode)
         sizes = []
         for leg, (foot, end) in zip(self.spec.legs, self._find_rods(placed, joints), strict=True):
-            sizes += [leg.size(float(norm(sub(end, foot))))] * len(leg.drives)
+            sizes += [leg.size(find_nominal_value(norm(sub(end, foot))))] * len(leg.drives)
         return sizes
 
     # The direct problem in closed form.

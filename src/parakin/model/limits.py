@@ -8,14 +8,32 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations
-from math import isfinite
+from math import inf
 from typing import Literal
 
-from ..algebra import Mat, Scalar, Vec, add, apply, atan2, cross, dot, maximum, minimum, norm, scale, stop_gradient, sub
+from ..algebra import (
+    Mat,
+    Scalar,
+    Vec,
+    add,
+    apply,
+    atan2,
+    cross,
+    dot,
+    maximum,
+    minimum,
+    norm,
+    scale,
+    stop_gradient,
+    sub,
+)
 from .elements import MOTION_UNITS, Cone
 from .legs import Leg, Reach
+from .nominal_values import find_nominal_value
 from .spec import Spec
 from .structures import PlatformPlacement
+
+_ONE_JOINT = 1.0  # mm; nearer points of two legs are one joint
 
 
 @dataclass(frozen=True)
@@ -75,9 +93,9 @@ class HomeRods:
 
 
 def group_joints_by_leg(spec: Spec, joints: Sequence[Scalar]) -> list[list[Scalar]]:
-    """Group the joint vector by leg; ``joints`` may go on with those of head and table."""
+    """Group the joint vector by leg, offsets added; ``joints`` may go on with those of head and table."""
     index = {drive.name: i for i, drive in enumerate(spec.drives)}
-    return [[joints[index[drive.name]] for drive in leg.drives] for leg in spec.legs]
+    return [[joints[index[drive.name]] + drive.offset for drive in leg.drives] for leg in spec.legs]
 
 
 def compute_platform_points(spec: Spec, rotation: Mat, origin: Vec) -> list[Vec]:
@@ -88,9 +106,9 @@ def compute_platform_points(spec: Spec, rotation: Mat, origin: Vec) -> list[Vec]
 def _list_bounds(
     name: str, subject: str, unit: Literal["mm", "rad"], value: Scalar, low: float, high: float
 ) -> Iterator[tuple[Limit, Scalar]]:
-    if isfinite(low):
+    if low != -inf:
         yield Limit(f"{name}.min", subject, unit, "min", low), value - low
-    if isfinite(high):
+    if high != inf:
         yield Limit(f"{name}.max", subject, unit, "max", high), high - value
 
 
@@ -176,7 +194,10 @@ def _list_clearances(
 
 
 def _share_joint(one: Leg, two: Leg) -> bool:
-    return one.platform == two.platform or (one.fixed_foot() is not None and one.fixed_foot() == two.fixed_foot())
+    """Tell whether two legs meet in a joint, in a calibrated machine too: two bearings have no room there."""
+    pairs = [(one.platform, two.platform), (one.fixed_foot(), two.fixed_foot())]
+    gaps = [sub(a, b) for a, b in pairs if a is not None and b is not None]
+    return any(norm([find_nominal_value(x) for x in gap]) < _ONE_JOINT for gap in gaps)
 
 
 def compute_segment_distance(a: tuple[Vec, Vec], b: tuple[Vec, Vec]) -> Scalar:

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from ..algebra import Scalar, Trace, derivative, evaluate_trace, norm
-from .limits import compute_platform_points
+from .limits import compute_platform_points, group_joints_by_leg
 from .spec import Spec
 from .structures import Structure
 
@@ -46,10 +46,9 @@ def compute_twist_rates(
     free = [trace.inputs(3, n + m + len(turn) + 3 * i) for i in range(legs)]  # the platform's joints as variables
     serial = q[m - sum(step.drive is not None for step in (*spec.head, *spec.table)) :]
     rotation, origin, tilts = structure.closure(x, serial, turn)
-    index = {drive.name: i for i, drive in enumerate(spec.drives)}
 
     def closures(points: Sequence[Sequence[Scalar]]) -> list[list[Scalar]]:
-        own = [[q[index[drive.name]] for drive in leg.drives] for leg in spec.legs]
+        own = group_joints_by_leg(spec, q)
         return [leg.closures(p, given) for leg, p, given in zip(spec.legs, points, own, strict=True)]
 
     points = compute_platform_points(spec, rotation, origin)

@@ -76,12 +76,7 @@ class Model(Equations):
         def outputs(trace: Trace) -> list[Scalar]:
             coordinates = list(trace.inputs(self._motions))
             inverses = self.invert_legs(*self.structure.frame(coordinates), mode)
-            joints = {
-                drive.name: q
-                for leg, inverse in zip(self.spec.legs, inverses, strict=True)
-                for drive, q in zip(leg.drives, inverse.joints, strict=True)
-            }
-            legs = [joints[drive.name] for drive in self.drives[: self.leg_count]]
+            legs = self.list_leg_joints(inverses)
             return legs + [derivative(q, y) for q in legs for y in coordinates]
 
         return self.keep_tape(("legs", mode), self._motions, outputs)
@@ -113,7 +108,7 @@ class Model(Equations):
 
         def outputs(trace: Trace) -> list[Scalar]:
             pose, joints = self._pose_and_joints(trace)
-            rotation, origin, rows = self.structure.closure(pose, self._serial(joints))
+            rotation, origin, rows = self.structure.closure(pose, self.list_serial(joints))
             f = [*self.closures(rotation, origin, joints), *rows]
             a = [derivative(row, x) for row in f for x in pose]
             return a + [-derivative(row, q) for row in f for q in joints]
@@ -138,7 +133,9 @@ class Model(Equations):
         def outputs(trace: Trace) -> list[Scalar]:
             given, joints = trace.inputs(width), trace.inputs(len(self.drives), width)
             return (
-                self.structure.place_with_joints(given, self._serial(joints)).coordinates if from_poses else list(given)
+                self.structure.place_with_joints(given, self.list_serial(joints)).coordinates
+                if from_poses
+                else list(given)
             )
 
         return self.keep_tape(("begin", from_poses), width + len(self.drives), outputs)
@@ -197,7 +194,7 @@ class Model(Equations):
             near = None
             if side is None:
                 pose = trace.inputs(self._poses, len(joints))
-                near = self.structure.place_with_joints(pose, self._serial(joints)).origin
+                near = self.structure.place_with_joints(pose, self.list_serial(joints)).origin
             coordinates = self.spheres(joints, side, near)
             return self.compute_pose(coordinates, joints) + self.scaled_closures(coordinates, joints)
 
@@ -208,7 +205,7 @@ class Model(Equations):
 
         def outputs(trace: Trace) -> list[Scalar]:
             joints = list(trace.inputs(len(self.drives)))
-            placed = self.structure.place_with_joints(trace.inputs(self._poses, len(joints)), self._serial(joints))
+            placed = self.structure.place_with_joints(trace.inputs(self._poses, len(joints)), self.list_serial(joints))
             coordinates = self.spheres(joints, None, placed.origin)
             closures = self.scaled_closures(coordinates, joints)
             return [

@@ -171,7 +171,7 @@ def _build_leg(machine: Machine, number: int, point: Points, joints: list[float]
             joint = BodyJoint(name, link.joint, axis, np.zeros(3))
         else:
             drive = leg.drives[link.drive]
-            value = joints[link.drive]
+            value = joints[link.drive] - drive.offset
             joint = BodyJoint(drive.name, link.joint, axis, np.zeros(3), value, drive.low, drive.high, drive)
         is_carriage = np.linalg.norm(end - start) < _NEAR
         bar = np.array([np.zeros(3), end - start])

@@ -9,6 +9,7 @@ import numpy as np
 from ...arrays import Array
 from ...errors import NoMethodError
 from ...model.chain import make_rotation_about
+from ...model.limits import group_joints_by_leg
 from ...model.traces import Model
 from ..planar_rpr import CONTINUUM, solve_planar_rpr
 
@@ -64,12 +65,6 @@ def _refuse_continuum(model: Model, joints: Array) -> None:
         raise NoMethodError(f"{model.spec.name}: {CONTINUUM}")
 
 
-def _split_by_leg(model: Model, joints: Array) -> list[list[float]]:
-    """Split one row of joints into each leg's own."""
-    by_name = dict(zip([drive.name for drive in model.drives], joints[0].tolist(), strict=True))
-    return [[by_name[drive.name] for drive in leg.drives] for leg in model.spec.legs]
-
-
 def _solve_planar(model: Model, joints: Array) -> Array:
     """Solve a platform on three rods that moves in a plane as a planar 3-RPR."""
     words = model.structure.coordinates
@@ -77,7 +72,7 @@ def _solve_planar(model: Model, joints: Array) -> Array:
     plane = {"rz": [0, 1], "ry": [2, 0], "rx": [1, 2]}[words[2]]
     out = 3 - sum(plane)
     centres, radii = [], []
-    for leg, q in zip(model.spec.legs, _split_by_leg(model, joints), strict=True):
+    for leg, q in zip(model.spec.legs, group_joints_by_leg(model.spec, joints[0].tolist()), strict=True):
         sphere = leg.sphere(q)
         assert sphere is not None
         height = sphere[0][out] - leg.platform[out]
@@ -103,7 +98,8 @@ def _solve_lambdas(model: Model, joints: Array) -> Array:
     feet = np.array([leg.foot for leg in legs])
     corners = np.array([leg.platform for leg in legs])
     with np.errstate(invalid="ignore", divide="ignore"):
-        given = np.array(_split_by_leg(model, joints))  # NumPy's numbers: where both sliders meet, a gap of 0 gives NaN
+        # NumPy's numbers: where both sliders meet, a gap of 0 gives NaN
+        given: Array = np.array(group_joints_by_leg(model.spec, joints[0].tolist()))
         measures = np.array([leg.height_and_distance(list(q)) for leg, q in zip(legs, given, strict=True)])
     if not np.isfinite(measures).all():
         return np.empty((0, 6))

@@ -10,6 +10,7 @@ import numpy as np
 from ...algebra import Scalar, Term, Trace, derivative, evaluate_trace
 from ...arrays import Array
 from ...errors import NoMethodError
+from ...model.limits import group_joints_by_leg
 from ...model.traces import Model
 from .generic_member import GenericMember, find_generic_member
 from .path_tracking import align_members, track_members
@@ -84,11 +85,10 @@ def _list_closure_numbers(model: Model) -> tuple[Trace, list[Scalar], list[Array
     """List the five numbers of every closure as a trace, and the platform point of each."""
     trace = Trace()
     point, joints = list(trace.inputs(3)), trace.inputs(len(model.drives), 3)
-    by_name = {drive.name: q for drive, q in zip(model.drives, joints, strict=True)}
     numbers: list[Scalar] = []
     platforms = []
-    for leg in model.spec.legs:
-        for closure in leg.closures(tuple(point), [by_name[drive.name] for drive in leg.drives]):
+    for leg, own in zip(model.spec.legs, group_joints_by_leg(model.spec, joints), strict=True):
+        for closure in leg.closures(tuple(point), own):
             slopes = [derivative(closure, x) for x in point]
             _check_form(model, slopes, point)
             numbers += [0.5 * derivative(slopes[0], point[0]), *slopes, closure]

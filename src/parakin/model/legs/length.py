@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 from ...algebra import Scalar, Vec, norm, scale, sub
 from ..elements import Point
+from ..nominal_values import find_nominal_value
 from .base import Inverse, Leg, Link, close_rod
 
 
@@ -40,7 +41,7 @@ class Length(Leg):
         return self.foot
 
     def size(self, at_home: float) -> float:
-        return max(0.25 * at_home, min(self.drives[0].low, at_home))
+        return max(0.25 * at_home, min(find_nominal_value(self.drives[0].low), at_home))
 
     def sphere(self, joints: list[Scalar]) -> tuple[Vec, Scalar]:
         return self.foot, joints[0]

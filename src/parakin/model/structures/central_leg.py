@@ -29,6 +29,7 @@ from ...algebra import (
 from ...errors import DescriptionError
 from ..chain import UNIT, Pointing, compose_chain, make_rotation_about, transform_to_local
 from ..elements import ROTATIONS, Step
+from ..nominal_values import find_nominal_value
 from ..spec import Spec
 from .base import PlatformPlacement
 from .five_axis import FiveAxis, compute_axis_angles, turn_tool_axis
@@ -60,25 +61,26 @@ class CentralLeg(FiveAxis):
         self.serial_order = () if self.roll else (0, 1)
         self.above, self.reach = self._find_wrist_centre()
         self.sign = 1.0
-        home = tuple(float(spec.home.get(letter, 0.0)) for letter in self.axes)
-        self.sign = 1.0 if self._centre(home[:3], turn_tool_axis(home)[0])[2] > 0.0 else -1.0
+        home = tuple(spec.home.get(letter, 0.0) for letter in self.axes)
+        self.sign = 1.0 if find_nominal_value(self._centre(home[:3], turn_tool_axis(home)[0])[2]) > 0.0 else -1.0
         steps = [Step(turns[0], drive=spec.legs[0].drives[0]), Step(turns[1], drive=spec.legs[0].drives[0])]
         self.passive_turns = Pointing.from_steps(steps, "motion")
         self.passive_turns = Pointing(self.passive_turns.first, self.passive_turns.second, (0.0, 0.0, self.sign))
 
-    def _find_wrist_centre(self) -> tuple[float, float]:
+    def _find_wrist_centre(self) -> tuple[Scalar, Scalar]:
         """Find (h, l): the point (0, 0, h) of the platform lies at the tip + l·k in every position of the head."""
         poses = [(0.0, 0.0), (0.7, 0.4), (-1.1, 0.9), (0.3, -1.3)]
         frames = [compose_chain(self.spec.head, angles[2 - self.head_joints :]) for angles in poses]
         tips = [tip for _, tip in frames]
         axes = [apply(rotation, UNIT["tz"]) for rotation, _ in frames]
         change = sub(axes[1], axes[0])
-        length = -float(dot(sub(tips[1], tips[0]), change) / dot(change, change))
+        length = -dot(sub(tips[1], tips[0]), change) / dot(change, change)
         centres = [move_along(tip, k, length) for tip, k in zip(tips, axes, strict=True)]
         height = centres[0][2]
-        if max(norm(sub(c, (0.0, 0.0, height))) for c in centres) > 1e-9 * (1.0 + abs(length) + abs(height)):
+        off = [norm([find_nominal_value(x) for x in sub(c, (0.0, 0.0, height))]) for c in centres]
+        if max(off) > 1e-9 * (1.0 + abs(find_nominal_value(length)) + abs(find_nominal_value(height))):
             raise DescriptionError("head", "its axes must meet in one point of the central leg, on the tool's axis")
-        return float(height), length
+        return height, length
 
     def _centre(self, tip: Sequence[Scalar], k: Vec) -> Vec:
         return transform_to_local(self.mount, self.base, move_along(tuple(tip), k, self.reach))

@@ -7,11 +7,26 @@ from typing import Literal
 
 import numpy as np
 
-from ...algebra import IDENTITY, Mat, Scalar, Vec, add, apply, atan2, dot, product, sincos, sqrt, sub, transpose
+from ...algebra import (
+    IDENTITY,
+    Mat,
+    Scalar,
+    Vec,
+    add,
+    apply,
+    atan2,
+    dot,
+    product,
+    sincos,
+    sqrt,
+    sub,
+    transpose,
+)
 from ...algebra import make_axis_rotation as turned
 from ...errors import DescriptionError
 from ..chain import UNIT, compose_chain, transform_to_local
 from ..elements import ROTATIONS, TRANSLATIONS
+from ..nominal_values import find_nominal_value
 from ..spec import Spec
 from .base import LETTERS, PlatformPlacement, Structure
 
@@ -64,7 +79,7 @@ class Free(Structure):
         in_plane = len(self.coordinates) == 3 and len(turns) == 1 and f"t{turns[0][1]}" not in self.coordinates
         if in_plane and all(leg.sphere([0.0] * len(leg.drives)) is not None for leg in legs):
             return "planar"
-        rails = [np.array(leg.rail) for leg in self.lambda_legs]
+        rails = [np.array([find_nominal_value(x) for x in leg.rail]) for leg in self.lambda_legs]
         parallel = len(rails) == len(legs) == 3 and all(np.allclose(rail, rails[0], atol=1e-12) for rail in rails)
         return "lambda" if parallel else None
 

@@ -198,10 +198,11 @@ def _remove_twins(orders: list[_LegOrder]) -> list[_LegOrder]:
 def _group_by_slot(machine: Machine, looking: list[int]) -> list[list[int]]:
     """Group joints by their place in a leg, first joints of all legs together."""
     slots: dict[int, list[int]] = {}
-    for leg in machine.group_joints(list(range(len(machine.joints)))):
-        for slot, joint in enumerate(leg):
+    for leg in machine.legs:
+        for slot, drive in enumerate(leg.drives):
+            joint = machine.joints.index(drive.name)
             if joint in looking:
-                slots.setdefault(slot, []).append(int(joint))
+                slots.setdefault(slot, []).append(joint)
     return [slots[slot] for slot in sorted(slots)]
 
 

@@ -1,0 +1,1 @@
+"""Machines of one kind whose sizes are inputs, beside pose and joints."""

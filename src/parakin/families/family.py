@@ -1,0 +1,254 @@
+"""A family of machines: chosen geometric numbers are inputs of every tape, so a batch may have a machine a row."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from fnmatch import fnmatchcase
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ..algebra import Scalar, derivative
+from ..arguments import RowsLike, check_arguments, read_rows
+from ..arrays import Array
+from ..errors import PoseError, quote, suggest
+from ..kernels.batch import NEVER, NewtonSteps, evaluate_tape, solve_by_newton
+from ..kernels.tape import NewtonTapes, Tape, compile_tape
+from ..kinematics.closure_roots import MOST_STEPS, list_step_caps
+from ..machine import Machine
+from ..model.equations import Equations
+from ..model.geometric_parameters import Parameter
+from ..model.nominal_values import SizedTrace
+
+_OTHER_MODE = 1e-4  # of the greatest leg: by which joints of another working mode differ
+
+
+class FamilyRates(NamedTuple):
+    """The closures f and their derivatives at poses: A x' + C s' = B q' for the rates of pose, sizes and joints.
+
+    closures : (N, n), zero where the legs close; of legs mm², of head and table 1
+    a : (N, n, n); b : (N, n, m); c : (N, n, k) = ∂f/∂s
+    """
+
+    closures: Array
+    a: Array
+    b: Array
+    c: Array
+
+
+@dataclass(frozen=True, eq=False)
+class FamilySolution:
+    """Poses of a family's machines for joints.
+
+    poses : (..., axes), NaN where not converged
+    residual : (...,) the greatest distance by which a leg fails to close there, mm
+    converged : (...,) True where the legs close in the working mode, on the start's side of the singularities
+    """
+
+    poses: Array
+    residual: Array
+    converged: Any
+
+    def __repr__(self) -> str:
+        return f"<parakin family solution: {np.count_nonzero(self.converged)} of {np.size(self.converged)} poses found>"
+
+
+@check_arguments
+def make_family(machine: Machine, free: Sequence[str]) -> Family:
+    """Make the family of a machine in which some of its numbers are free.
+
+    free : names of :attr:`Machine.parameters`, or patterns such as ``legs.*.foot.*``
+
+    Raises :class:`PoseError` for a name that no parameter has.
+    """
+    return Family(machine, select_parameters(machine, free))
+
+
+def select_parameters(machine: Machine, patterns: Sequence[str]) -> tuple[Parameter, ...]:
+    """Select a machine's parameters by names, patterns, or names of groups, in the machine's order."""
+    known = machine.parameters
+    chosen: set[str] = set()
+    for pattern in patterns:
+        names = {p.name for p in known if fnmatchcase(p.name, pattern) or p.group == pattern}
+        if not names:
+            words = [p.name for p in known] + sorted({p.group for p in known})
+            raise PoseError(f"free: unknown {quote(pattern)}{suggest(pattern, words)}")
+        chosen |= names
+    return tuple(p for p in known if p.name in chosen)
+
+
+class Family:
+    """Machines that differ in some of their numbers; every call takes poses or joints, and sizes, of any batch.
+
+    Poses and joints are as of :class:`Machine`; sizes are rows of :attr:`names` (mm, rad), or a dict of some of them.
+    Leading shapes broadcast. Nothing is traced or compiled for a machine of its own.
+    """
+
+    def __init__(self, machine: Machine, parameters: Sequence[Parameter]):
+        self.machine, self.parameters = machine, tuple(parameters)
+        self.names = tuple(parameter.name for parameter in self.parameters)
+        self.nominal: Array = np.array([parameter.value for parameter in self.parameters], np.float64)
+        self._tapes: dict[tuple[object, ...], Tape] = {}
+
+    def __repr__(self) -> str:
+        return f"<parakin family of {self.machine.name}: {len(self.names)} free numbers>"
+
+    # Input.
+
+    def _rows(self, given: Sequence[tuple[RowsLike, tuple[str, ...], str]], sizes: RowsLike) -> tuple[Any, ...]:
+        """Check rows of poses and joints, and sizes; returns the leading shape, the rows beside each other, N rows."""
+        arrays = [self._read(values, names, what) for values, names, what in given]
+        units = [parameter.unit for parameter in self.parameters]
+        own = read_rows(sizes, self.names, units, lambda: self.nominal, "sizes") if self.names else np.empty(0)
+        arrays.append(own)
+        try:
+            lead = np.broadcast_shapes(*(array.shape[:-1] for array in arrays))
+        except ValueError:
+            shapes = " and ".join(str(array.shape) for array in arrays)
+            raise PoseError(f"sizes: shapes {shapes} do not fit") from None
+        return lead, [np.broadcast_to(array, (*lead, array.shape[-1])).reshape(-1, array.shape[-1]) for array in arrays]
+
+    def _read(self, values: RowsLike, names: tuple[str, ...], what: str) -> Array:
+        rows, lead = self.machine.rows(values, names, what)
+        return rows.reshape(*lead, len(names))
+
+    # Tapes: the inputs are columns of what is given, then the sizes.
+
+    def _keep(
+        self, key: tuple[object, ...], width: int, outputs: Callable[[Equations, list[Scalar]], list[Scalar]]
+    ) -> Tape:
+        tape = self._tapes.get(key)
+        if tape is None:
+            trace = SizedTrace(width, self.nominal.tolist())
+            equations = self.machine.trace_equations(dict(zip(self.names, trace.sizes, strict=True)))
+            made = outputs(equations, trace.inputs(width))
+            tape = self._tapes[key] = compile_tape(trace, made, width + len(self.names))
+        return tape
+
+    @property
+    def _counts(self) -> tuple[int, int]:
+        return len(self.machine.axes), len(self.machine.joints)
+
+    # Answers.
+
+    def at(self, sizes: RowsLike) -> Machine:
+        """Make the machine of given sizes (k,).
+
+        Raises :class:`DescriptionError` where they are no machine that works.
+        """
+        lead, (rows,) = self._rows([], sizes)
+        if lead != ():
+            raise PoseError(f"sizes: one machine's expected, not {lead}")
+        return self.machine.replace_parameters(dict(zip(self.names, rows[0].tolist(), strict=True)))
+
+    def inverse(self, poses: RowsLike, sizes: RowsLike, mode: str | None = None) -> Array:
+        """Compute joints for poses, (..., axes) and (..., k) -> (..., joints); NaN where the legs can't close."""
+        mode, (n, m) = self.machine.checked_mode(mode), self._counts
+        lead, rows = self._rows([(poses, self.machine.axes, "poses")], sizes)
+        tape = self._keep(("inverse", mode), n, lambda e, x: e.invert(x, mode)[0])
+        return self._evaluate(tape, rows, m).reshape(*lead, m)
+
+    def margins(self, poses: RowsLike, sizes: RowsLike, mode: str | None = None) -> Array:
+        """Compute every limit's margin for poses with their own joints, (..., limits); as :meth:`Machine.margins`."""
+        mode, (n, _) = self.machine.checked_mode(mode), self._counts
+        lead, rows = self._rows([(poses, self.machine.axes, "poses")], sizes)
+        tape = self._keep(("margins", mode), n, lambda e, x: [g for _, g in e.own_margins(x, mode)])
+        margins = evaluate_tape(tape, rows[0], np.empty((len(rows[0]), tape.outputs)), rows[1], whole=False)
+        return margins.reshape(*lead, tape.outputs)
+
+    def jacobians(self, poses: RowsLike, sizes: RowsLike, mode: str | None = None) -> tuple[Array, Array, Array]:
+        """Compute A (..., n, n), B (..., n, m) and C (..., n, k) with A x' + C s' = B q' at poses with their joints.
+
+        A and B are those of :meth:`Machine.jacobians`, C has the closures' derivatives by the sizes.
+        """
+        lead, rows = self._rows([(poses, self.machine.axes, "poses")], sizes)
+        rates = self._differentiate("pose", rows[0], self.inverse(rows[0], rows[1], mode), rows[1])
+        return tuple(array.reshape(*lead, *array.shape[1:]) for array in rates[1:])  # type: ignore[return-value]
+
+    def twist_rates(self, poses: RowsLike, joints: RowsLike, sizes: RowsLike) -> FamilyRates:
+        """Compute closures, A, B and C for rows of poses, joints and sizes; x' is the tool's twist.
+
+        The twist is the tip's velocity along the machine's translations and its small turns, which are regular where
+        a pose's angles are not.
+        """
+        return self._differentiate("twist", poses, joints, sizes)
+
+    def _differentiate(self, by: str, poses: RowsLike, joints: RowsLike, sizes: RowsLike) -> FamilyRates:
+        (n, m), k = self._counts, len(self.names)
+        machine = self.machine
+        _, rows = self._rows([(poses, machine.axes, "poses"), (joints, machine.joints, "joints")], sizes)
+        turns = len(machine.structure.turns) if by == "twist" else 0
+
+        def outputs(e: Equations, x: list[Scalar]) -> list[Scalar]:
+            pose, turn, given = x[:n], x[n : n + turns], x[n + turns :]
+            rotation, origin, tilts = e.structure.closure(pose, e.list_serial(given), turn)
+            f = [*e.closures(rotation, origin, given), *tilts]
+            tip = [term for term, axis in zip(pose, e.axes, strict=True) if axis in "XYZ"]
+            moved = [*tip, *turn] if by == "twist" else pose
+            a, c = ([derivative(row, y) for row in f for y in terms] for terms in (moved, x[0].trace.sizes))
+            return [*f, *a, *(-derivative(row, q) for row in f for q in given), *c]
+
+        tape = self._keep((by,), n + turns + m, outputs)
+        at_rest = np.zeros((len(rows[0]), turns))
+        values = self._evaluate(tape, [rows[0], at_rest, *rows[1:]], n + n * n + n * m + n * k)
+        f, a, b, c = np.split(values, np.cumsum([n, n * n, n * m]), axis=1)
+        return FamilyRates(f, a.reshape(-1, n, n), b.reshape(-1, n, m), c.reshape(-1, n, k))
+
+    def _evaluate(self, tape: Tape, rows: Sequence[Array], width: int) -> Array:
+        first = np.hstack(rows[:-1]) if len(rows) > 2 else np.ascontiguousarray(rows[0])
+        return evaluate_tape(tape, first, np.empty((len(first), width)), np.ascontiguousarray(rows[-1]))
+
+    def forward(
+        self, joints: RowsLike, sizes: RowsLike, near: RowsLike | None = None, mode: str | None = None
+    ) -> FamilySolution:
+        """Compute poses for joints by Newton's method, (..., joints) and (..., k) -> :class:`FamilySolution`.
+
+        near : poses (axes,) or (..., axes) to start from; by default home. The answer lies on the side of the parallel
+            singularities on which the start lies with the given joints and sizes, and in the working mode.
+        """
+        machine, mode = self.machine, self.machine.checked_mode(mode)
+        starts = machine.home if near is None else near
+        given = [(starts, machine.axes, "near"), (joints, machine.joints, "joints")]
+        lead, (near_rows, joint_rows, size_rows) = self._rows(given, sizes)
+        closed, leg_sizes = machine.closure_tolerance, machine.leg_sizes
+        coordinates = machine.structure.coordinates
+        caps = np.array(list_step_caps(coordinates, max(leg_sizes)))
+        steps = NewtonSteps(caps, min(leg_sizes), MOST_STEPS, closed, NEVER)
+        inputs = np.ascontiguousarray(np.hstack([joint_rows, size_rows]))
+        roots = solve_by_newton(self._newton_tapes, steps, np.ascontiguousarray(near_rows), inputs, np.empty(0))
+        with np.errstate(invalid="ignore"):
+            converged = (roots.residual <= closed) & (roots.turned > 0.0)
+            own = self.inverse(roots.rows, size_rows, mode) - joint_rows
+            own[:, machine.turning_joints] = np.remainder(own[:, machine.turning_joints] + np.pi, 2.0 * np.pi) - np.pi
+            off = np.abs(own[:, : machine.leg_count])
+            units = np.array(machine.joint_units[: machine.leg_count])
+            tolerance = np.where(units == "rad", _OTHER_MODE, _OTHER_MODE * max(leg_sizes))
+            converged &= (off <= tolerance).all(1)
+        roots.rows[~converged] = np.nan
+        n = len(machine.axes)
+        return FamilySolution(
+            roots.rows.reshape(*lead, n), roots.residual.reshape(lead)[()], converged.reshape(lead)[()]
+        )
+
+    @property
+    def _newton_tapes(self) -> NewtonTapes:
+        n, m = self._counts
+        w = len(self.machine.structure.coordinates)
+
+        def begin(e: Equations, x: list[Scalar]) -> list[Scalar]:
+            return e.structure.place_with_joints(x[:n], e.list_serial(x[n:])).coordinates
+
+        def close(e: Equations, x: list[Scalar]) -> list[Scalar]:
+            return e.scaled_closures(x[:w], x[w:])
+
+        def close_with_slopes(e: Equations, x: list[Scalar]) -> list[Scalar]:
+            f = close(e, x)
+            return [*f, *(derivative(row, y) for row in f for y in x[:w])]
+
+        return NewtonTapes(
+            self._keep(("begin",), n + m, begin),
+            self._keep(("closures",), w + m, close),
+            self._keep(("slopes",), w + m, close_with_slopes),
+            self._keep(("end",), w + m, lambda e, x: e.compute_pose(x[:w], x[w:])),
+        )

@@ -1,0 +1,166 @@
+"""Families against machines made one by one: by replaced numbers, by machine files, and by differences."""
+
+import tempfile
+import time
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import parakin as pk
+from parakin.errors import PoseError
+from parakin.machine import Machine
+from parakin.model.elements import Point, Size
+
+SHIPPED = pk.machines()
+FEW = ["tricept", "hexapod", "orthoglide", "lambda6", "rotary_delta", "orthoglide5_table", "eclipse", "rpr3"]
+
+
+def draw(machine, seed=0, size=0.1, count=None):
+    """Draw sizes of a family of all numbers, one row or count rows."""
+    family = pk.family(machine, ["*"])
+    shape = (len(family.names),) if count is None else (count, len(family.names))
+    scales = [size if p.unit == "mm" else size * 2e-3 for p in family.parameters]
+    return family, family.nominal + np.random.default_rng(seed).uniform(-1.0, 1.0, shape) * scales
+
+
+def draw_poses(machine, count, seed=1):
+    ways = np.array([3.0 if unit == "mm" else 0.02 for unit in machine.axis_units])
+    poses = machine.home + np.random.default_rng(seed).uniform(-1.0, 1.0, (count, len(ways))) * ways
+    if machine.has_direction:
+        poses[:, machine.direction.b] = 0.1 + np.abs(poses[:, machine.direction.b])  # clear of the tool upright
+    return poses
+
+
+@pytest.mark.parametrize("name", SHIPPED)
+def test_a_family_is_the_machines_of_its_sizes(name):
+    machine = pk.load(name)
+    family, sizes = draw(machine)
+    one, poses = family.at(sizes), draw_poses(machine, 20)
+    joints = one.inverse(poses)
+    assert np.isfinite(joints).all()
+    assert np.abs(family.inverse(poses, sizes) - joints).max() < 1e-9
+    if family.margins(poses, sizes).shape == one.margins(poses).shape:
+        assert np.nanmax(np.abs(family.margins(poses, sizes) - one.margins(poses))) < 1e-8
+    a, b, c = family.jacobians(poses, sizes)
+    for ours, theirs in zip((a, b), one.jacobians(poses), strict=True):
+        assert np.abs(ours - theirs).max() < 1e-11 * np.abs(theirs).max()
+    assert c.shape == (20, len(machine.axes), len(family.names))
+    solution = family.forward(joints, sizes, near=machine.home)
+    theirs = one.forward(joints, near=poses)
+    assert solution.converged.all() and theirs.converged.all()
+    assert np.abs(solution.poses - theirs.poses).max() < 1e-9
+
+
+@pytest.mark.parametrize("name", FEW)
+def test_sizes_move_the_pose_as_differences_say(name):
+    machine = pk.load(name)
+    family, sizes = draw(machine, 2)
+    poses = draw_poses(machine, 5, 3)
+    joints = family.inverse(poses, sizes)
+    a, _, c = family.jacobians(poses, sizes)
+    moves = -np.linalg.solve(a, c)
+    for i, parameter in enumerate(family.parameters):
+        step = np.zeros(len(sizes))
+        step[i] = 1e-3 if parameter.unit == "mm" else 1e-5
+        ends = [family.forward(joints, sizes + sign * step, near=poses).poses for sign in (1.0, -1.0)]
+        differences = (ends[0] - ends[1]) / (2.0 * step[i])
+        scale = np.abs(moves[:, :, i]).max() + 1e-3
+        assert np.abs(differences - moves[:, :, i]).max() < 2e-5 * scale, parameter.name
+
+
+def test_a_number_replaced_by_hand_is_the_same():
+    machine = pk.load("linear_delta")
+    spec = machine.spec
+    x, y, z = spec.legs[0].foot
+    leg = replace(spec.legs[0], foot=Point((x + 0.3, y, z)), rod=Size(spec.legs[0].rod - 0.2))
+    other = Machine(replace(spec, legs=(leg, *spec.legs[1:])))
+    family = pk.family(machine, ["legs.tower_a.foot.x", "legs.tower_a.rod"])
+    poses = draw_poses(machine, 10)
+    sizes = {"legs.tower_a.foot.x": x + 0.3, "legs.tower_a.rod": f"{spec.legs[0].rod - 0.2!r} mm"}
+    assert np.abs(family.inverse(poses, sizes) - other.inverse(poses)).max() < 1e-12
+
+
+@pytest.mark.parametrize("name", FEW)
+def test_a_file_of_the_sizes_reads_back(name):
+    family, sizes = draw(pk.load(name), 4)
+    one = family.at(sizes)
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder, "own.yaml")
+        path.write_text(one.format_yaml(), encoding="utf-8")
+        read = pk.load(path)
+    poses = draw_poses(one, 10)
+    assert np.array_equal(read.inverse(poses), one.inverse(poses))
+    assert np.array_equal(read.margins(poses), one.margins(poses))
+
+
+@pytest.mark.parametrize("name", FEW)
+def test_an_offset_shifts_what_the_drives_say(name):
+    machine = pk.load(name)
+    offsets = {f"joints.{joint}.offset": 0.01 * (i + 1) for i, joint in enumerate(machine.joints)}
+    other = machine.replace_parameters(offsets)
+    poses = draw_poses(machine, 10)
+    shift = machine.inverse(poses) - other.inverse(poses)
+    shift -= 2.0 * np.pi * np.round(shift / (2.0 * np.pi)) * (np.array(machine.joint_units) == "rad")
+    assert np.abs(shift - list(offsets.values())).max() < 1e-9
+    assert other.forward(other.inverse(poses), near=poses).converged.all()
+    if name in ("orthoglide", "rpr3"):
+        poses_found = np.array(other.assemblies(other.inverse(poses[0])).poses)
+        assert np.abs(poses_found - poses[0]).max(1).min() < 1e-6
+
+
+def test_batches_of_machines_and_poses_broadcast():
+    machine = pk.load("hexapod")
+    family, sizes = draw(machine, 5, count=7)
+    poses = draw_poses(machine, 4)
+    joints = family.inverse(poses[:, None], sizes)
+    assert joints.shape == (4, 7, 6)
+    for i in range(7):
+        assert np.abs(joints[:, i] - family.at(sizes[i]).inverse(poses)).max() < 1e-11
+    back = family.forward(joints, sizes, near=poses[:, None])
+    assert back.converged.all()
+    assert np.abs(back.poses - poses[:, None]).max() < 1e-10
+
+
+def test_a_machine_a_row_costs_no_trace():
+    machine = pk.load("hexapod")
+    family = pk.family(machine, ["feet", "platform"])
+    count = 200_000
+    sizes = family.nominal + np.random.default_rng(0).uniform(-0.1, 0.1, (count, len(family.names)))
+    poses = np.broadcast_to(machine.home, (count, 6))
+    family.inverse(poses, sizes)
+    start = time.perf_counter()
+    family.inverse(poses, sizes)
+    assert time.perf_counter() - start < 1.0  # some 0.2 s; a trace alone takes 3 ms a machine
+
+
+def test_struts_of_a_joint_may_differ_a_little():
+    """Two struts of one joint keep no clearance, in a calibrated machine neither."""
+    machine = pk.load("hexapod")
+    other = machine.replace_parameters({"legs.strut0.foot.x": machine.legs[0].foot[0] + 0.05})
+    assert other.limits == machine.limits
+
+
+@pytest.mark.parametrize(
+    ("call", "message"),
+    [
+        (lambda m: pk.family(m, ["legs.d9.foot.x"]), 'free: unknown "legs.d9.foot.x", did you mean "legs.d'),
+        (lambda m: pk.family(m, "feet"), "free: a list of a text expected"),
+        (lambda m: pk.family(m, ["feet"]).inverse(m.home, [1.0]), "sizes: shape (..., 9)"),
+        (lambda m: pk.family(m, ["feet"]).inverse(m.home, {"legs.d1.foot.x": "3"}), "needs a unit"),
+        (lambda m: pk.family(m, ["feet"]).inverse(m.home, {"foot": 3.0}), 'sizes: unknown "foot"'),
+        (lambda m: pk.family(m, ["feet"]).at(np.zeros((2, 9))), "one machine's expected"),
+        (lambda m: m.replace_parameters({"rods": 3.0}), 'parameters: unknown "rods"'),
+    ],
+)
+def test_what_is_mistaken_is_said(call, message):
+    with pytest.raises(PoseError) as error:
+        call(pk.load("tricept"))
+    assert message in str(error.value)
+
+
+def test_sizes_that_break_the_machine_are_refused():
+    machine = pk.load("tricept")
+    with pytest.raises(pk.DescriptionError, match="home"):
+        pk.family(machine, ["legs.d1.foot.x"]).at([5000.0])

@@ -198,6 +198,7 @@ def cheap_calls(things):
         (pk.make_linuxcnc_configuration, {"machine": pk.load("linear_delta")}),
         (pk.read_joint_program, {"path": "/nonexistent"}),
         (pk.render_machine_html, {"machine": m, "pose": pose}),
+        (pk.render_machine_page, {"machine": m}),
         (pk.render_report, {"posted": things["Posted"], "trajectory": trajectory, "unplanned": "", "waits": 0.0}),
         (pk.write_files, {"folder": "/proc/nothing", "files": {"a": b""}}),
         (m.inverse, {"poses": pose, "mode": "+", "out": None}),

@@ -37,7 +37,7 @@ FLOORS = [
     ["toolpath"],
     ["controllers.controller", "controllers.gcode_text", "export.files", "export.number_format"],
     ["controllers.event_commands", "export.machine", "export.tables"],
-    ["controllers.event_lines"],
+    ["controllers.event_lines", "export.page"],
     ["controllers.joints", "controllers.linuxcnc", "export.report", "export.workspace"],
     ["controllers.grbl", "controllers.siemens", "controllers.fanuc", "controllers.beckhoff", "export.json"],
     ["controllers.fluidnc", "controllers.heidenhain"],
@@ -292,7 +292,7 @@ MATHEMATICS = {"absolute", "atan2", "copysign", "cross", "derivative", "dot", "m
 MATHEMATICS |= {"njit", "product", "sincos", "sqrt", "sub"}
 # What people type: a command has its function's name, and so do a few words of `pk`.
 COMMANDS = {"assemblies", "atlas", "design", "forward", "inverse", "linuxcnc", "machines", "post", "show", "workspace"}
-COMMANDS |= {"export", "reach"}
+COMMANDS |= {"export", "page", "reach"}
 TYPED = COMMANDS | {"main", "to_display", "workpiece"}
 
 

@@ -7,7 +7,7 @@ from collections import Counter
 import pytest
 from sources import MODULES, ROOT, TREES, functions
 
-SOURCES = sorted([*ROOT.rglob("*.py"), *ROOT.rglob("*.c")])
+SOURCES = sorted(path for ending in ("py", "c", "js", "css") for path in ROOT.rglob(f"*.{ending}"))
 
 
 @pytest.mark.parametrize("path", SOURCES, ids=lambda path: str(path.relative_to(ROOT)))

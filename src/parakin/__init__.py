@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from .controllers.linuxcnc.program import make_linuxcnc_program
     from .export.files import write_files
     from .export.machine.picture import render_machine_html, render_machine_png
+    from .export.page.page import render_machine_page
     from .export.report.report import render_report
     from .export.workspace.meshes import Mesh, make_mesh
     from .families.family import Family
@@ -104,6 +105,7 @@ __all__ = [
     "read_tool_table",
     "region",
     "render_machine_html",
+    "render_machine_page",
     "render_machine_png",
     "render_report",
     "rewind_path",
@@ -199,6 +201,7 @@ _LAZY = {
     "read_tool_table": "toolpath.reading.tool_table",
     "region": "workspaces.certified.region:make_region",
     "render_machine_html": "export.machine.picture",
+    "render_machine_page": "export.page.page",
     "render_machine_png": "export.machine.picture",
     "render_report": "export.report.report",
     "sample_field": "workspaces.sampled.distance_field",

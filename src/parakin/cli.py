@@ -22,6 +22,7 @@ from .commands.import_ import import_machine
 from .commands.kinematics import forward, inverse
 from .commands.linuxcnc import linuxcnc
 from .commands.machines import machines, show
+from .commands.page import page
 from .commands.post import post
 from .commands.reach import reach
 from .commands.workspace import workspace
@@ -39,7 +40,8 @@ app = App(
     default_parameter=Parameter(negative=""),
     suppress_keyboard_interrupt=False,  # main says so in one line
 )
-for command in (post, inverse, forward, assemblies, reach, linuxcnc, machines, show, workspace, atlas, design, export):
+COMMANDS = (post, inverse, forward, assemblies, reach, linuxcnc, machines, show, page, workspace, atlas, design, export)
+for command in COMMANDS:
     app.command(command)
 app.command(import_machine, name="import")
 app.register_install_completion_command()

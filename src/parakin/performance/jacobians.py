@@ -6,8 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..algebra import Scalar
 from ..arrays import Array
 from ..machine import Machine
+from ..model.rates import TwistRates
 from .characteristic_length import CharacteristicLength
 
 
@@ -42,6 +44,18 @@ def compute_scaled_rates(machine: Machine, rows: Array, length: CharacteristicLe
         tilt_factors = np.full((len(a), a.shape[1] - legs), length.factor)
         factors = np.concatenate([1.0 / wrench_norms, tilt_factors], 1)[:, :, None]
         return ScaledRates(a * columns_a * factors, b * columns_b * factors, legs)
+
+
+def trace_unit_wrenches(machine: Machine, rates: TwistRates, length: CharacteristicLength) -> list[list[Scalar]]:
+    """Trace the rows of A in one unit that tell parallel singularities: where their determinant is zero.
+
+    Each of a leg is a unit wrench. They are the legs' alone where head and table never matter, and their columns then
+    the translations.
+    """
+    count = machine.leg_count if machine.wrist is not None else len(machine.axes)
+    factors = [*(1.0 / norm for norm in rates.wrench_norms), *[length.factor] * (len(machine.axes) - machine.leg_count)]
+    scales = list_column_scales(machine, length)[0].tolist()
+    return [[rates.a[row][i] * factors[row] * scales[i] for i in range(count)] for row in range(count)]
 
 
 def list_column_scales(machine: Machine, length: CharacteristicLength) -> tuple[Array, Array]:

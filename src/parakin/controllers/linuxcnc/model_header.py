@@ -11,6 +11,7 @@ from ...algebra import Trace, absolute, expand_determinant
 from ...arrays import Array
 from ...kernels.newton import SLOW, WORTH
 from ...kernels.tape import Tape, compile_tape
+from ...kernels.tape_text import InputVector
 from ...kinematics.closure_roots import MOST_STEPS, list_step_caps
 from ...kinematics.forward import STEADY
 from ...kinematics.start_modes import SETTLED
@@ -20,12 +21,12 @@ from ...kinematics.wrist.pole_thresholds import EXACT, NEAR_MODE, SAME_AXIS, STA
 from ...machine import Machine
 from ...model.limits import Limit
 from ...performance.characteristic_length import choose_characteristic_length
-from ...performance.jacobians import list_column_scales
+from ...performance.jacobians import list_column_scales, trace_unit_wrenches
 from ...performance.singularities import compute_singularity_margins, find_home_signs, list_margin_names
 from .axis_rates import choose_drive_rates
 from .home_pose import find_home_pose
 from .margin_signs import find_cheap_sign
-from .tape_to_c import CVector, format_c, write_function, write_test
+from .tape_to_c import format_c, write_function, write_test
 
 NO_SIDE = 1e-6  # of home's determinant: less is a singularity, of no side
 TELLS = 0.02  # of a leg: a pose from which the legs are farther off is a guess, and its side says nothing
@@ -246,39 +247,39 @@ def _scale_outward(unit: str) -> str:
 def _write_mathematics(machine: Machine) -> Iterator[str]:
     """Yield the machine's tapes as functions, in the order of their use."""
     tapes, wrist = machine.tapes(machine.mode), machine.wrist
-    x, q = CVector("x", len(machine.axes)), CVector("q", len(machine.joints))
-    near, first = CVector("near", len(machine.axes)), CVector("first", 1)
-    f = CVector("f", machine.leg_count)
+    x, q = InputVector("x", len(machine.axes)), InputVector("q", len(machine.joints))
+    near, first = InputVector("near", len(machine.axes)), InputVector("first", 1)
+    f = InputVector("f", machine.leg_count)
     yield write_function("inverse", tapes.inverse, [x], [q])
     if wrist is not None:
-        yield write_function("freedom", wrist.freedom_tape(), [x], [CVector("lean", 1)])
+        yield write_function("freedom", wrist.freedom_tape(), [x], [InputVector("lean", 1)])
         yield write_function("inverse_held", wrist.first_given_tape(machine.mode), [x, first], [q])
         yield write_function("inverse_over", machine.tapes(wrist.other_mode(machine.mode)).inverse, [x], [q])
     if machine.has_direction:
-        ways = [CVector("stay", 2), CVector("flip", 2)]
-        yield write_function("compare_ways", compile_way_comparison(), ways, [CVector("excess", 1)])
+        ways = [InputVector("stay", 2), InputVector("flip", 2)]
+        yield write_function("compare_ways", compile_way_comparison(), ways, [InputVector("excess", 1)])
     yield write_test("allowed", _compile_limits(machine, False), [x, q])
     yield write_function(
-        "measure_limits", _compile_limits(machine, True), [x, q], [CVector("margins", len(machine.limits))]
+        "measure_limits", _compile_limits(machine, True), [x, q], [InputVector("margins", len(machine.limits))]
     )
     count = len(machine.joints)
-    singularities = CVector("margins", len(list_margin_names(machine)))
+    singularities = InputVector("margins", len(list_margin_names(machine)))
     yield write_function("measure_singularities", _compile_singularities(machine), [x, q], [singularities])
-    jacobians = [CVector("a", count * len(machine.axes)), CVector("b", count * count)]
+    jacobians = [InputVector("a", count * len(machine.axes)), InputVector("b", count * count)]
     yield write_function("jacobians", tapes.jacobians, [x, q], jacobians)
     if tapes.spheres is not None:
-        square, side = CVector("square", 1), CVector("side", 1)
+        square, side = InputVector("square", 1), InputVector("side", 1)
         yield write_function("common_point", tapes.spheres.nearest, [q, near], [x, f, square])
         yield write_function("common_point_on", tapes.spheres.on_side, [q, side], [x, f])
         yield write_function("own_side", tapes.spheres.own_side, [near], [side])
         if tapes.spheres.own_side_over is not None:
             yield write_function("own_side_over", tapes.spheres.own_side_over, [near], [side])
     if tapes.newton is not None:
-        y, newton = CVector("y", len(tapes.coordinates)), tapes.newton
+        y, newton = InputVector("y", len(tapes.coordinates)), tapes.newton
         yield write_function("begin", newton.begin, [near, q], [y])
         yield write_function("closures", newton.closures, [y, q], [f])
         yield write_function(
-            "closures_and_slopes", newton.closures_and_slopes, [y, q], [f, CVector("a", f.length * y.length)]
+            "closures_and_slopes", newton.closures_and_slopes, [y, q], [f, InputVector("a", f.length * y.length)]
         )
         yield write_function("end", newton.end, [y, q], [x])
 
@@ -293,11 +294,6 @@ def _compile_limits(machine: Machine, drives: bool) -> Tape:
     return compile_tape(trace, watched if drives else [find_cheap_sign(m) for m in watched], len(pose) + len(joints))
 
 
-def _count_wrenches(machine: Machine) -> int:
-    """Count the rows of A that tell parallel singularities: the legs' alone where head and table never matter."""
-    return machine.leg_count if machine.wrist is not None else len(machine.axes)
-
-
 def _compile_singularities(machine: Machine) -> Tape:
     """Compile pose, joints -> the parallel and the serial singularity margins, positive at home.
 
@@ -305,12 +301,11 @@ def _compile_singularities(machine: Machine) -> Tape:
     """
     trace, legs, n = Trace(), machine.leg_count, len(machine.axes)
     rates = machine.trace_rates(trace.inputs(n), trace.inputs(len(machine.joints), n))
-    length, rows = choose_characteristic_length(machine), _count_wrenches(machine)
-    columns_a, columns_b = (scales.tolist() for scales in list_column_scales(machine, length))
+    length = choose_characteristic_length(machine)
+    columns_b = list_column_scales(machine, length)[1].tolist()
     signs = find_home_signs(machine, length, machine.mode).tolist()
     factors = [*(1.0 / norm for norm in rates.wrench_norms), *[length.factor] * (n - legs)]
-    wrenches = [[rates.a[row][i] * factors[row] * columns_a[i] for i in range(rows)] for row in range(rows)]
-    outputs = [signs[0] * expand_determinant(wrenches)]
+    outputs = [signs[0] * expand_determinant(trace_unit_wrenches(machine, rates, length))]
     for number, joint in enumerate(machine.closure_joints):
         outputs.append(rates.b[number][joint] * factors[number] * (signs[1 + number] * columns_b[joint]))
     if n > legs:

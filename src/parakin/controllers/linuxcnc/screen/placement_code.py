@@ -9,19 +9,25 @@ from ....algebra import Mat, Scalar, Trace, Vec, apply, make_axis_rotation, sinc
 from ....export.machine.scene import trace_scene
 from ....kernels import tape as t
 from ....kernels.tape import compile_tape
+from ....kernels.tape_text import InputVector, Language, list_statements
 from ....kinematics.rotations import TURNS
 from ....machine import Machine
 from ....model.chain import UNIT
-from ..tape_to_c import CALLS, CVector, list_statements
 
-_PYTHON = CALLS | {
-    t.SINCOS: "sin({0}) cos({0})",
-    t.ATAN2: "atan2({0} + 0.0, {1} + 0.0)",
-    t.MIN: "min({0}, {1})",
-    t.MAX: "max({0}, {1})",
-    t.COPYSIGN: "copysign({0}, {1})",
-    t.SELECT: "{2} if {0} < {1} else {3}",
-}
+_PYTHON = Language(
+    {
+        t.SINCOS: "sin({0}) cos({0})",
+        t.DIV: "{0} / {1}",
+        t.SQRT: "sqrt({0})",
+        t.ATAN2: "atan2({0} + 0.0, {1} + 0.0)",
+        t.MIN: "min({0}, {1})",
+        t.MAX: "max({0}, {1})",
+        t.ABS: "fabs({0})",
+        t.COPYSIGN: "copysign({0}, {1})",
+        t.SELECT: "{2} if {0} < {1} else {3}",
+    },
+    "1e999",
+)
 _FUNCTION = '''\
 def place_points(pose, joints, tool):
     """Place all points of the machine: pose, joints and tool length as LinuxCNC has them, mm and degrees."""
@@ -45,7 +51,7 @@ def write_placement(machine: Machine) -> str:
     points, frame = trace_scene(machine, shift_tip(machine, pose, given[-1]), q)
     results = [value for item in points for value in item.ravel().tolist()]
     results += [*frame[:, :3].ravel().tolist(), *frame[:, 3].tolist()]
-    inputs = [CVector("pose", axes), CVector("joints", joints), CVector("tool", 1)]
+    inputs = [InputVector("pose", axes), InputVector("joints", joints), InputVector("tool", 1)]
     statements, names = list_statements(compile_tape(trace, results, axes + joints + 1), inputs, _PYTHON)
     lines = [f"    {name} = {value}".replace("tool[0]", "tool") for name, value in statements]
     return _FUNCTION.format(

@@ -1,0 +1,68 @@
+// All together: each change of the state is one picture.
+
+let pictureRequested = false;
+
+function requestPicture() {
+  if (pictureRequested) return;
+  pictureRequested = true;
+  requestAnimationFrame(() => {
+    pictureRequested = false;
+    render();
+    placeLabels();
+  });
+}
+
+function update() {
+  const margins = marginsAt(current);
+  placeMachine(current);
+  updateFreeMotion(current);
+  updatePanel(margins);
+  requestPicture();
+}
+
+function fitCanvas() {
+  const {clientWidth: width, clientHeight: height} = canvas.parentElement;
+  if (renderer) renderer.setSize(width, height, false);
+  camera.aspect = width / max(1, height);
+  camera.updateProjectionMatrix();
+  placeCamera();
+  requestPicture();
+}
+
+const onClick = (id, act) => document.getElementById(id).addEventListener("click", act);
+onClick("home", () => goHome());
+onClick("view", () => { resetOrbit(); requestPicture(); });
+onClick("labels", () => requestPicture());
+onClick("stops", event => { options.stops = event.target.checked; });
+onClick("theme", () => { document.documentElement.classList.toggle("dark"); requestPicture(); });
+if (window.matchMedia("(prefers-color-scheme: dark)").matches) document.documentElement.classList.add("dark");
+document.addEventListener("keydown", event => {
+  if (event.target.matches("input, select, button") || event.ctrlKey || event.metaKey || event.altKey) return;
+  if (event.key === "h" || event.key === "H") goHome();
+  if (event.key === "v" || event.key === "V") { resetOrbit(); requestPicture(); }
+});
+
+listeners.push(update);
+new ResizeObserver(fitCanvas).observe(canvas.parentElement);
+fitCanvas();
+resetOrbit();
+update();
+
+// Where the picture shows the tip, and the middle of a drive's strut, in pixels of the window.
+function findInPicture(place) {
+  const box = canvas.getBoundingClientRect(), seen = place.clone().project(camera);
+  return [box.left + (0.5 + 0.5 * seen.x) * box.width, box.top + (0.5 - 0.5 * seen.y) * box.height];
+}
+
+function findStrut(drive) {
+  const kinds = ["telescope", "rod", "arm"], name = machine.joints[drive].name;
+  const points = itemPoints[machine.items.findIndex(item => item.name === name && kinds.includes(item.kind))];
+  return points[0].clone().lerp(points[1], 0.4);
+}
+
+window.parakin = {
+  machine, model, options, singularity, stateAtPose, followJoints, marginsAt, findRoot, measureSide, findFreeMotion,
+  moveToPose, moveToJoints, switchSign, showNextAssembly, searchAssemblies, goHome,
+  tipInPicture: () => findInPicture(handle.position), strutInPicture: drive => findInPicture(findStrut(drive)),
+  get state() { return current; }, get stoppedBy() { return stoppedBy; },
+};

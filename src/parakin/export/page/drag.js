@@ -1,0 +1,127 @@
+// Dragging: the tool by its handle, a drive by its strut, else the camera.
+
+const raycaster = new THREE.Raycaster(), pointer = new THREE.Vector2();
+const pointers = new Map(); // those that are down, by their identity
+let grip = null; // what is dragged
+
+function aimRay(event) {
+  const box = canvas.getBoundingClientRect();
+  pointer.set(2 * (event.clientX - box.left) / box.width - 1, 1 - 2 * (event.clientY - box.top) / box.height);
+  raycaster.setFromCamera(pointer, camera);
+}
+
+function findGrip(event) {
+  aimRay(event);
+  scene.updateMatrixWorld();
+  const near = raycaster.ray.distanceToPoint(handle.position) < 2.2 * handle.scale.x;
+  if (near) return {kind: "tool", offset: null};
+  const hits = raycaster.intersectObjects(machineGroup.children);
+  const hit = hits.find(({object}) => object.userData.drive >= 0 && object.visible);
+  return hit ? {kind: "drive", drive: hit.object.userData.drive, point: hit.point.clone(), mesh: hit.object} : null;
+}
+
+// Where the pointer is in the plane through the tip: the machine's own, or that which faces the camera.
+function locatePointer(event) {
+  aimRay(event);
+  const normal = machine.normal ? new THREE.Vector3(...machine.normal) : camera.getWorldDirection(new THREE.Vector3());
+  const plane = new THREE.Plane().setFromNormalAndCoplanarPoint(normal, handle.position);
+  return raycaster.ray.intersectPlane(plane, new THREE.Vector3());
+}
+
+function dragTool(event) {
+  if (event.shiftKey) return turnTool(event);
+  const place = locatePointer(event);
+  if (!place) return;
+  if (!grip.offset) grip.offset = handle.position.clone().sub(place);
+  place.add(grip.offset).applyMatrix4(frame.clone().invert());
+  const pose = [...current.pose];
+  machine.axes.forEach((axis, i) => { if ("XYZ".includes(axis.name)) pose[i] = place.getComponent("XYZ".indexOf(axis.name)); });
+  moveToPose(pose);
+}
+
+function turnTool(event) {
+  const turning = axisNumbers.filter(i => machine.axes[i].unit === "rad"), pose = [...current.pose];
+  const [right, up] = [event.clientX - grip.x, event.clientY - grip.y].map(pixels => 0.006 * pixels);
+  if (!turning.length) return;
+  const [across, upright] = turning.length === 1 ? [turning[0], turning[0]] : [turning[turning.length - 1], turning[turning.length - 2]];
+  pose[across] += right;
+  if (upright !== across) pose[upright] += up;
+  grip.offset = null;
+  moveToPose(pose);
+}
+
+// Move a drive so that the place of its strut that was taken follows the pointer, as the picture shows it.
+function dragDrive(event) {
+  const step = machine.joints[grip.drive].unit === "rad" ? 1e-3 : 1e-3 * size, before = seeGrip(current);
+  const ahead = followJoints(current, current.joints.map((q, i) => i === grip.drive ? q + step : q));
+  const after = seeGrip(ahead.state);
+  const g = [(after[0] - before[0]) / step, (after[1] - before[1]) / step], square = g[0] * g[0] + g[1] * g[1];
+  placeMachine(current);
+  if (!ahead.complete || square * step * step < 1e-12) return;
+  const way = [event.clientX - grip.x, event.clientY - grip.y];
+  const most = machine.joints[grip.drive].unit === "rad" ? 0.2 : 0.1 * size;
+  const change = max(-most, min(most, (way[0] * g[0] + way[1] * g[1]) / square));
+  moveToJoints(current.joints.map((q, i) => i === grip.drive ? q + change : q));
+}
+
+// Where the picture shows the place that was taken, in pixels, for a state.
+function seeGrip(state) {
+  placeMachine(state);
+  grip.mesh.updateMatrixWorld();
+  const place = grip.local.clone().applyMatrix4(grip.mesh.matrixWorld).project(camera);
+  return [0.5 * place.x * canvas.clientWidth, -0.5 * place.y * canvas.clientHeight];
+}
+
+canvas.addEventListener("pointerdown", event => {
+  canvas.setPointerCapture(event.pointerId);
+  pointers.set(event.pointerId, event);
+  grip = event.button === 0 && pointers.size === 1 ? findGrip(event) : null;
+  if (grip) Object.assign(grip, {x: event.clientX, y: event.clientY});
+  if (grip?.mesh) grip.local = grip.mesh.worldToLocal(grip.point.clone());
+});
+
+canvas.addEventListener("pointermove", event => {
+  const before = pointers.get(event.pointerId);
+  if (!before) {
+    canvas.style.cursor = findGrip(event) ? "grab" : "";
+    return;
+  }
+  if (pointers.size === 2) pinch(event, before);
+  else if (grip?.kind === "tool") dragTool(event);
+  else if (grip?.kind === "drive") dragDrive(event);
+  else if (event.buttons & 2 || event.shiftKey) shiftCamera(event.clientX - before.clientX, event.clientY - before.clientY);
+  else turnCamera(0.006 * (event.clientX - before.clientX), 0.006 * (event.clientY - before.clientY));
+  if (grip) Object.assign(grip, {x: event.clientX, y: event.clientY});
+  pointers.set(event.pointerId, event);
+  requestPicture();
+});
+
+function pinch(event, before) {
+  const other = [...pointers.values()].find(one => one.pointerId !== event.pointerId);
+  const [was, is] = [before, event].map(one => hypot(one.clientX - other.clientX, one.clientY - other.clientY));
+  if (was > 0 && is > 0) zoomCamera(was / is);
+  shiftCamera(0.5 * (event.clientX - before.clientX), 0.5 * (event.clientY - before.clientY));
+}
+
+for (const end of ["pointerup", "pointercancel"]) canvas.addEventListener(end, event => {
+  pointers.delete(event.pointerId);
+  grip = null;
+});
+canvas.addEventListener("contextmenu", event => event.preventDefault());
+canvas.addEventListener("wheel", event => {
+  event.preventDefault();
+  zoomCamera(Math.exp(0.0012 * max(-400, min(400, event.deltaY))));
+  requestPicture();
+}, {passive: false});
+
+const VIEW_KEYS = {
+  ArrowLeft: () => turnCamera(0.08, 0), ArrowRight: () => turnCamera(-0.08, 0), ArrowUp: () => turnCamera(0, 0.08),
+  ArrowDown: () => turnCamera(0, -0.08), "+": () => zoomCamera(0.9), "-": () => zoomCamera(1.1),
+};
+canvas.addEventListener("keydown", event => {
+  const act = VIEW_KEYS[event.key];
+  if (!act || event.ctrlKey || event.metaKey || event.altKey) return;
+  event.preventDefault();
+  act();
+  requestPicture();
+});

@@ -1,0 +1,45 @@
+// Names in the picture: drives at their struts, and the axes of the frame in which poses are given.
+
+const AXIS_COLOURS = ["#d13a34", "#2f8f3a", "#2a6fd0"], labels = [];
+
+function addLabel(text, place, colour = null) {
+  const span = document.createElement("span");
+  span.textContent = text;
+  if (colour) {
+    span.className = "axis";
+    span.style.color = colour;
+  }
+  overlay.append(span);
+  labels.push({span, place, axis: colour !== null});
+}
+
+machine.joints.forEach(joint => {
+  const number = machine.items.findIndex(item => item.name === joint.name && item.kind !== "rail");
+  if (number < 0) return;
+  const points = itemPoints[number], share = machine.items[number].kind === "telescope" ? 0.5 : 0;
+  addLabel(joint.name, into => into.lerpVectors(points[0], points[points.length - 1], share));
+});
+
+const triad = new THREE.Group();
+["X", "Y", "Z"].forEach((letter, i) => {
+  const unit = new THREE.Vector3().setComponent(i, 1);
+  if (machine.normal && abs(machine.normal[i]) > 0.999) return;
+  const arrow = new THREE.ArrowHelper(unit, new THREE.Vector3(), 0.085 * size, AXIS_COLOURS[i], 0.02 * size, 0.011 * size);
+  triad.add(arrow);
+  addLabel(letter, into => into.copy(unit).multiplyScalar(0.1 * size).applyMatrix4(frame), AXIS_COLOURS[i]);
+});
+workGroup.add(triad);
+
+const labelPlace = new THREE.Vector3();
+
+function placeLabels() {
+  const shown = document.getElementById("labels").checked, {clientWidth: width, clientHeight: height} = canvas;
+  for (const {span, place, axis} of labels) {
+    place(labelPlace).project(camera);
+    const seen = (shown || axis) && labelPlace.z < 1 && abs(labelPlace.x) < 1 && abs(labelPlace.y) < 1;
+    span.style.display = seen ? "" : "none";
+    if (!seen) continue;
+    const x = (0.5 + 0.5 * labelPlace.x) * width + (axis ? -5 : 9), y = (0.5 - 0.5 * labelPlace.y) * height - (axis ? 9 : 20);
+    span.style.transform = `translate(${x.toFixed(1)}px, ${y.toFixed(1)}px)`;
+  }
+}

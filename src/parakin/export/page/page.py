@@ -1,0 +1,66 @@
+"""Render a machine's page: one HTML file that needs no server and no network."""
+
+from __future__ import annotations
+
+import json
+from html import escape
+from importlib.resources import files
+from pathlib import Path
+from string import Template
+
+from ...arguments import check_arguments
+from ...machine import Machine
+from .machine_data import encode_page_machine
+from .model_script import write_model
+from .three_script import read_three_script
+
+CORE = ("linear_algebra", "kinematics")
+APP = ("motion", "view", "orbit", "labels", "drag", "free_motion", "panel", "app")
+
+
+_MARK = '<meta name="generator" content="parakin">'
+
+
+def is_page(path: Path) -> bool:
+    """Tell whether a file is a page that was rendered here."""
+    try:
+        with path.open("rb") as file:
+            return _MARK.encode() in file.read(2000)
+    except OSError:
+        return False
+
+
+@check_arguments
+def render_machine_page(machine: Machine) -> str:
+    """Render a self-contained HTML page on which a machine moves: by its tool, its joints and its modes."""
+    title = " ".join(machine.spec.title.split()) or machine.name
+    what = f"{machine.name}: axes {' '.join(machine.axes)}, joints {' '.join(machine.joints)}"
+    return Template(_read_text("page.html")).substitute(
+        mark=_MARK,
+        title=escape(title),
+        subtitle=escape(what),
+        style=_read_text("page.css"),
+        three=read_three_script(),
+        core=_quote_script(write_core(machine)),
+        worker="",
+        script=f'(() => {{\n"use strict";\n{_join_scripts(APP)}}})();',
+    )
+
+
+def write_core(machine: Machine) -> str:
+    """Write the script of a machine's data and mathematics, which needs no document."""
+    data = json.dumps(encode_page_machine(machine), separators=(",", ":"), allow_nan=False)
+    return f"const machine = {data};\n{_read_text('elementary.js')}{write_model(machine)}{_join_scripts(CORE)}"
+
+
+def _join_scripts(names: tuple[str, ...]) -> str:
+    return "".join(_read_text(f"{name}.js") for name in names)
+
+
+def _read_text(name: str) -> str:
+    return files(__package__).joinpath(name).read_text("utf-8")
+
+
+def _quote_script(script: str) -> str:
+    """Quote what could end or open an element within a script; in JavaScript that is in texts only."""
+    return script.replace("</", "<\\/").replace("<!--", "<\\!--")

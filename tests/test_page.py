@@ -1,0 +1,240 @@
+"""The page of a machine in Chromium: its numbers are the library's, and it does what is clicked and dragged."""
+
+import zipfile
+
+import numpy as np
+import pytest
+from browser import needs_chromium, open_browser, open_tab
+from shipped import NAMES
+
+import parakin as pk
+from parakin.cli import main
+from parakin.errors import NoMethodError
+from parakin.export.page import three_script
+from parakin.export.page.page import render_machine_page, write_core
+from parakin.kinematics.turns import wrap_angle
+from parakin.performance.singularities import compute_singularity_margins
+
+AGREE = 1e-9  # mm, rad
+POSES = 12
+MODES = 3
+
+# For each pose: joints and margins in each mode; the wrenches; the pose again, from home, of the joints.
+EVALUATE = """([poses, modes, joints]) => {
+  const plain = values => values.map(value => Number.isFinite(value) ? value : null);
+  const begin = {pose: machine.axes.map(axis => axis.home), signs: machine.mode};
+  begin.joints = model.inverse(begin.pose, begin.signs);
+  return {
+    inverse: modes.map(signs => poses.map(pose => plain(model.inverse(pose, signs)))),
+    margins: modes.map(signs => poses.map(pose => plain(model.margins(pose, model.inverse(pose, signs), signs)))),
+    sides: poses.map((pose, i) => measureSide({pose, joints: joints[i]})),
+    home: measureSide(begin),
+    forward: joints.map(q => { const way = followJoints(begin, q); return way.complete ? way.state.pose : null; }),
+  };
+}"""
+
+
+@pytest.fixture(scope="module")
+def browser():
+    with open_browser() as opened:
+        yield opened
+
+
+def seeded_poses(machine, seed):
+    rng = np.random.default_rng(seed)
+    size = max(machine.leg_sizes)
+    reach = np.array([0.12 * size if unit == "mm" else 0.25 for unit in machine.axis_units])
+    return machine.home + rng.uniform(-1.0, 1.0, (POSES, len(machine.axes))) * reach
+
+
+def as_numbers(rows):
+    return np.array(rows, float)  # None becomes NaN
+
+
+@needs_chromium
+@pytest.mark.parametrize("name", NAMES)
+def test_a_page_computes_as_the_library(name, browser):
+    machine = pk.load(name)
+    poses = seeded_poses(machine, 7)
+    modes = machine.modes[:MODES]
+    joints = machine.inverse(poses)
+    closing = np.isfinite(joints).all(1)
+    assert closing.sum() >= POSES // 3
+    with open_tab(browser) as tab:
+        tab.add_script_tag(content=write_core(machine))
+        signs = [[1 if sign == "+" else -1 for sign in mode] for mode in modes]
+        given = [poses.tolist(), signs, np.where(closing[:, None], joints, 0.0).tolist()]
+        page = tab.evaluate(EVALUATE, given)
+    for mode, own, margins in zip(modes, page["inverse"], page["margins"], strict=True):
+        expected = machine.inverse(poses, mode)
+        reached = np.isfinite(expected).all(1)
+        assert (np.isfinite(as_numbers(own)).all(1) == reached).all()
+        assert as_numbers(own)[reached] == pytest.approx(expected[reached], abs=AGREE)
+        expected = machine.margins(poses[reached], mode=mode)
+        assert as_numbers(margins)[reached] == pytest.approx(expected, abs=AGREE, rel=AGREE)
+        assert not (as_numbers(margins)[~reached] >= 0.0).all(1).any()
+    shares = as_numbers(page["sides"])[closing] / page["home"]
+    parallel = compute_singularity_margins(machine, np.vstack([machine.home, poses[closing]]))[:, 0]
+    assert shares == pytest.approx(parallel[1:] / parallel[0], abs=AGREE)
+    solved = machine.forward(joints[closing], near=machine.home)
+    both = [
+        row is not None and ok
+        for row, ok in zip(np.array(page["forward"], object)[closing], solved.converged, strict=True)
+    ]
+    assert sum(both) >= 0.8 * closing.sum()
+    ours = np.array(
+        [row for row, ok in zip(np.array(page["forward"], object)[closing], both, strict=True) if ok], float
+    )
+    off = ours - solved.poses[both]
+    off[:, machine.turning_columns] = wrap_angle(off[:, machine.turning_columns])
+    assert np.abs(off).max() < AGREE
+
+
+@pytest.fixture(scope="module")
+def pages(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("pages")
+
+    def write(name):
+        file = folder / f"{name}.html"
+        if not file.exists():
+            file.write_text(render_machine_page(pk.load(name)), encoding="utf-8")
+        return file.as_uri()
+
+    return write
+
+
+@needs_chromium
+def test_a_page_is_one_small_file_without_a_network(pages, browser):
+    assert len(render_machine_page(pk.load("hexapod")).encode()) < 1_000_000
+    with open_tab(browser) as tab:
+        requests = []
+        tab.on("request", lambda request: requests.append(request.url))
+        tab.goto(pages("hexapod"))
+        tab.wait_for_timeout(200)
+        assert {url.split(":")[0] for url in requests} <= {"file", "blob"} and len(requests) <= 2
+
+
+@needs_chromium
+def test_a_page_opens_from_a_disk_and_moves(pages, browser):
+    with open_tab(browser) as tab:
+        tab.goto(pages("tricept"))
+        before = tab.locator("#stage").screenshot()
+        number = tab.get_by_label("X, mm").nth(1)
+        number.fill("150")
+        number.press("Enter")
+        assert tab.evaluate("parakin.state.pose[0]") == pytest.approx(150.0, abs=1e-9)
+        machine = pk.load("tricept")
+        expected = machine.inverse({"X": 150.0})
+        assert tab.evaluate("parakin.state.joints") == pytest.approx(expected, abs=AGREE)
+        assert tab.locator("#verdict").inner_text() == "Allowed"
+        tab.wait_for_timeout(100)
+        assert tab.locator("#stage").screenshot() != before
+
+
+@needs_chromium
+def test_a_limit_that_stops_a_move_is_named(pages, browser):
+    machine = pk.load("tricept")
+    with open_tab(browser) as tab:
+        tab.goto(pages("tricept"))
+        tab.evaluate("parakin.moveToPose([0, 0, -2100, 0, 0])")
+        assert tab.locator("#verdict").inner_text().startswith("Stopped: d")
+        reached = np.array(tab.evaluate("parakin.state.pose"))
+        assert machine.check(reached) == 0
+        assert machine.check(reached - [0, 0, 0.01, 0, 0]) != 0
+        tab.get_by_label("stop at limits").uncheck()
+        tab.evaluate("parakin.moveToPose([0, 0, -1990, 0, 0])")
+        assert tab.locator("#verdict").inner_text().startswith("Off limits: d")
+        assert tab.locator(".gauge.bad").first.is_visible()
+
+
+@needs_chromium
+@pytest.mark.parametrize(("name", "place"), [("tricept", (500, 700)), ("five_bar", (300, 200))])
+def test_the_tool_and_a_strut_are_dragged(name, place, pages, browser):
+    with open_tab(browser) as tab:
+        tab.goto(pages(name))
+        for aim in ("parakin.tipInPicture()", "parakin.strutInPicture(0)"):
+            before = tab.evaluate("parakin.state")
+            x, y = tab.evaluate(aim)
+            tab.mouse.move(x, y)
+            tab.mouse.down()
+            tab.mouse.move(x + 14, y - 9, steps=3)
+            tab.mouse.up()
+            after = tab.evaluate("parakin.state")
+            assert np.abs(np.subtract(after["pose"], before["pose"])).max() > 1.0
+            if aim.startswith("parakin.strut"):
+                moved = np.abs(np.subtract(after["joints"], before["joints"])) > 1e-9
+                assert moved[0] and not moved[1]
+
+
+@needs_chromium
+def test_modes_are_switched(pages, browser):
+    machine = pk.load("five_bar")
+    with open_tab(browser) as tab:
+        tab.goto(pages("five_bar"))
+        tab.get_by_role("button", name=f"{machine.joints[0]} −").click()
+        state = tab.evaluate("parakin.state")
+        assert state["signs"] == [1, 1]
+        assert state["joints"] == pytest.approx(machine.inverse(machine.home, "++"), abs=AGREE)
+        tab.get_by_role("button", name="Home").click()
+        tab.get_by_role("button", name="Next assembly").click()
+        pose = tab.evaluate("parakin.state.pose")
+        known = machine.assemblies(machine.inverse(machine.home)).poses
+        assert min(np.abs(known - pose).max(1)) < 1e-6
+        assert np.abs(np.array(pose) - machine.home).max() > 1.0
+        assert tab.evaluate("parakin.singularity.share") < 0.0
+
+
+@needs_chromium
+def test_a_free_motion_is_the_null_space_of_a(pages, browser):
+    """Next to a singularity a step along the arrow changes the struts least."""
+    machine = pk.load("hexapod")
+    with open_tab(browser) as tab:
+        tab.goto(pages("hexapod"))
+        tab.evaluate("() => { parakin.options.stops = false; parakin.moveToPose([0, 0, -950, 0, 0, 1.5]); }")
+        assert abs(tab.evaluate("parakin.singularity.share")) < 0.1
+        motion = tab.evaluate("parakin.findFreeMotion(parakin.state)")
+        pose, length = np.array(tab.evaluate("parakin.state.pose")), tab.evaluate("parakin.machine.length")
+    a, _, norms = machine.twist_rates(pose[None], machine.inverse(pose)[None])
+    scaled = a[0] / norms[0][:, None] * np.repeat([1.0, 1.0 / length], 3)
+    _, _, directions = np.linalg.svd(scaled)
+    vector = np.array(motion["velocity"] + motion["turn"])
+    assert abs(vector @ directions[-1]) == pytest.approx(1.0, abs=1e-7)
+
+
+@needs_chromium
+@pytest.mark.parametrize("name", ["hbg80_2d", "rotary_delta", "eclipse", "orthoglide5_table", "lambda6"])
+def test_pages_of_every_kind_open(name, pages, browser):
+    with open_tab(browser, 820, 1100) as tab:
+        tab.goto(pages(name))
+        assert tab.locator("#verdict").inner_text().startswith("Allowed")
+        assert tab.evaluate("document.documentElement.scrollWidth <= innerWidth")
+
+
+def test_the_command_writes_a_page_and_spares_other_files(tmp_path, capsys):
+    target = tmp_path / "machine.html"
+    assert main(["page", "orthoglide", "-o", str(target)]) == 0
+    assert main(["page", "tricept", "-o", str(target)]) == 0  # its own page is replaced
+    assert "tricept" in target.read_text(encoding="utf-8")
+    target.write_text("mine", encoding="utf-8")
+    assert main(["page", "tricept", "-o", str(target)]) == 2
+    assert "--force" in capsys.readouterr().err
+    assert target.read_text(encoding="utf-8") == "mine"
+    assert main(["page", "tricept", "-o", str(target), "--force"]) == 0
+    assert main(["page", "tricept", "-o", str(tmp_path / "machine.png")]) == 2
+
+
+def test_a_trimesh_without_three_js_is_told(tmp_path, monkeypatch):
+    folder = tmp_path / "resources" / "templates"
+    folder.mkdir(parents=True)
+    monkeypatch.setattr(three_script, "files", lambda package: tmp_path)
+    with pytest.raises(NoMethodError, match=r"three\.js r140"):
+        three_script.read_three_script()
+    with zipfile.ZipFile(folder / "viewer.zip", "w") as archive:
+        archive.writestr("viewer.html.template", "<script>another</script>")
+    with pytest.raises(NoMethodError, match=r"three\.js r140"):
+        three_script.read_three_script()
+
+
+def test_three_js_is_as_known():
+    script = three_script.read_three_script()
+    assert 600_000 < len(script) < 640_000 and "SPDX-License-Identifier: MIT" in script[:120]

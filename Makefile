@@ -2,7 +2,7 @@
 PYTHON ?= python3
 BIN := .venv/bin
 
-.PHONY: demo test lint bench pages pictures clean
+.PHONY: demo test lint docs bench pages pictures clean
 
 demo: .venv/installed
 	$(BIN)/python examples/turbine_blade.py -o out
@@ -17,6 +17,10 @@ lint: .venv/developing
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 
+docs: .venv/developing
+	$(BIN)/sphinx-build -W --keep-going -q -b html docs build/docs
+	@echo "build/docs/index.html"
+
 bench: .venv/developing
 	$(BIN)/python benchmarks/run.py
 
@@ -26,6 +30,7 @@ pages: .venv/installed
 pictures: .venv/installed
 	$(BIN)/python examples/pictures.py -o docs/pictures
 	$(BIN)/python examples/gallery.py -o docs
+	$(BIN)/python examples/leg_figures.py -o docs/pictures/legs
 
 .venv/installed: pyproject.toml
 	$(PYTHON) -c "import sys; sys.exit('parakin needs Python 3.11 to 3.13, not ' + sys.version.split()[0]) if not (3, 11) <= sys.version_info[:2] <= (3, 13) else None"

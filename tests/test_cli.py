@@ -193,6 +193,7 @@ def test_machines(capsys):
     assert main(["machines"]) == 0
     said = capsys.readouterr().out
     assert all(name in said for name in pk.machines())
+    assert max(len(line) for line in said.splitlines()) <= 80
     families = [paragraph.splitlines() for paragraph in said.strip().split("\n\n")]
     assert [lines[0] for lines in families] == sorted({pk.load(name).spec.family for name in pk.machines()})
     of = {line.split()[0]: lines[0] for lines in families for line in lines[2:]}

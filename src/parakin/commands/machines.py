@@ -18,6 +18,8 @@ from .options import Json, Name, Sizes, load_machine
 if TYPE_CHECKING:
     from ..machine import Machine
 
+_LONGEST_TITLE = 48  # characters: a line of the list then has 80 at most
+
 _HEADERS = dict(zip(RATES, ("speed /s", "acceleration /s2", "jerk /s3"), strict=True))
 _HEADERS |= dict(zip(MOTOR, ("counts a turn", "lead", "homing"), strict=True))
 
@@ -39,8 +41,8 @@ def _list_families(machines: list[Machine]) -> Iterator[str]:
     """List the machines of each family, those of few axes first."""
     for family in sorted({m.spec.family for m in machines}):
         members = sorted((m for m in machines if m.spec.family == family), key=lambda m: (len(m.axes), m.name))
-        rows = [(m.name, " ".join(m.axes), m.spec.title, _shorten_text(m.spec.source, 60)) for m in members]
-        yield f"{family}\n{format_table(rows, ('name', 'axes', 'title', 'source'))}"
+        rows = [(m.name, " ".join(m.axes), _shorten_text(m.spec.title, _LONGEST_TITLE)) for m in members]
+        yield f"{family}\n{format_table(rows, ('name', 'axes', 'title'))}"
 
 
 def _shorten_text(text: str, most: int) -> str:

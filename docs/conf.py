@@ -1,0 +1,49 @@
+"""How Sphinx makes the pages of this folder: ``make docs``."""
+
+import re
+
+from parakin import __version__
+
+project = "parakin"
+author = "the authors of parakin"
+release = version = __version__
+html_title = f"parakin {__version__}"
+extensions = ["myst_parser", "sphinx.ext.autodoc", "cyclopts.ext.sphinx"]
+source_suffix = {".md": "markdown"}
+myst_heading_anchors = 3
+html_theme = "furo"
+html_show_copyright = False
+autodoc_member_order = "bysource"
+autodoc_typehints = "none"  # the docstrings say it, with shapes and units
+autodoc_default_options = {"members": True, "undoc-members": True}
+suppress_warnings = ["ref.python"]  # attributes of one name in several classes
+
+FIELD = re.compile(r"^([A-Za-z_][\w, ]*?) : (.*)")
+UNDERLINE = re.compile(r"^-{3,}$")
+
+
+def write_fields_as_lists(app, what, name, obj, options, lines):
+    """Write a docstring's lines of names, ``name : what it is``, as a list, and its headings as rubrics."""
+    written = []
+    for number, line in enumerate(lines):
+        field = FIELD.match(line)
+        following = lines[number + 1] if number + 1 < len(lines) else ""
+        if UNDERLINE.match(line):
+            written.append("")
+        elif UNDERLINE.match(following):
+            written += ["", f".. rubric:: {line}"]
+        elif field:
+            in_list = bool(written) and written[-1].startswith(("* ", "  "))
+            written += [*([] if in_list else [""]), f"* ``{field[1]}``: {field[2]}"]
+        elif line.startswith("    ") and written and written[-1].startswith(("* ", "  ")):
+            written.append(f"  {line.strip()}")
+        else:
+            if line and written and written[-1].startswith(("* ", "  ")):
+                written.append("")
+            written.append(line)
+    lines[:] = [re.sub(r"\|(?=\w+ \w|\w+\|)", r"\\|", line) for line in written]
+
+
+def setup(app):
+    """Connect what this page adds to Sphinx."""
+    app.connect("autodoc-process-docstring", write_fields_as_lists)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from itertools import pairwise
 
 import numpy as np
@@ -9,7 +10,7 @@ import numpy as np
 from ...arrays import Array
 from ...errors import PoseError
 from ...kinematics.turns import TURN, find_nearest_turn
-from ...kinematics.wrist.pole_thresholds import EXACT, NEAR_START, PRINTED, SAME_MODE, TILTED, is_upright
+from ...kinematics.wrist.pole_thresholds import EXACT, NEAR_START, PRINTED, SAME_MODE, STANDING, TILTED, is_upright
 from ...kinematics.wrist.turning_joints import Wrist
 from ...machine import Machine
 from ...toolpath.posting.wrist_poses import find_pose_with_wrist
@@ -21,8 +22,11 @@ _FROM_ANYWHERE = 4.0  # s, at least: for the motion whose start is not known
 _LEAST = 0.5  # s, of a motion
 _SAMPLES = 500  # samples of a motion
 _TURNS = (0, 1, -1, 2, -2)
-_COUNTS = (3, 5, 9, 17)  # poses that lead to a record beside the pole from aside,
-_NEAREST = 0.01  # the nearest of them by this fraction of the way back home and of TILTED
+_LEADS = (1.0, 0.1, 0.01)  # poses that lead to a record beside the pole: fractions of the way home, and of TILTED
+_MOST_LEADS = 40
+_NEARER = 0.25  # a pose between the nearest of them and the record: its fraction, of the nearest one's
+_NEAREST = 0.1 * STANDING / TILTED
+_SWUNG = np.radians(0.5)  # by which the first joint may turn on a line of them
 
 
 def plan_approach(machine: Machine, first: Array, joints: Array, mode: str) -> tuple[Array, Array]:
@@ -132,26 +136,42 @@ def _follow_line(machine: Machine, begin: Array, end: Array, mode: str, first: f
 def _approach_from_aside(machine: Machine, wrist: Wrist, first: Array, joints: Array, mode: str) -> list[Array]:
     """Approach a record beside the pole straight from home, with the first joint as it is there; return the poses.
 
-    The pole of a central leg moves with the tip: where the joint would leave its range between the poses, there are
-    more of them.
+    The pole of a central leg moves with the tip, and C turns far beside B = 0: where the joint would leave its range
+    between the poses, or swing to and fro, there are more of them.
     """
     off_pole = float(np.sqrt(wrist.measure_freedom(first[None])[0]))
     if off_pole > NEAR_START:
         return [first]
     own = mode if off_pole < PRINTED else wrist.find_mode(first, joints, mode)
-    way = list[Array]()
-    for count in _COUNTS:
-        way = _lead_back(machine, wrist, first, joints, own, count)
-        lines = pairwise(way)
-        if all(_follow_line(machine, *line, mode, float(joints[wrist.first]))[1] for line in lines):
-            break
-    return way
+    fractions = list(_LEADS)
+    while True:
+        way = _lead_back(machine, wrist, first, joints, own, fractions)
+        straight = [_is_straight(machine, *line, mode, float(joints[wrist.first])) for line in pairwise(way)]
+        behind = [*fractions[1:], max(_NEARER * fractions[-1], _NEAREST)]
+        between = [
+            float(np.sqrt(f * nearer)) if k + 1 < len(fractions) else nearer
+            for k, (f, nearer) in enumerate(zip(fractions, behind, strict=True))
+            if k < len(straight) and not straight[k]
+        ]
+        more = sorted({*fractions, *between}, reverse=True)
+        if len(more) == len(fractions) or len(more) > _MOST_LEADS:
+            return way
+        fractions = more
 
 
-def _lead_back(machine: Machine, wrist: Wrist, first: Array, joints: Array, mode: str, count: int) -> list[Array]:
-    """Lead from a record back home in so many poses, the tool tilted; return the way, or the record alone."""
+def _is_straight(machine: Machine, begin: Array, end: Array, mode: str, first: float) -> bool:
+    """Tell whether the first joint hardly turns on a line of poses, and no limit is broken on it."""
+    assert machine.wrist is not None
+    turns = np.diff(machine.follow(_sample_line(begin, end), mode, STANDING)[:, machine.wrist.first])
+    return bool(np.abs(turns).sum() < _SWUNG) and _follow_line(machine, begin, end, mode, first)[1]
+
+
+def _lead_back(
+    machine: Machine, wrist: Wrist, first: Array, joints: Array, mode: str, fractions: Sequence[float]
+) -> list[Array]:
+    """Lead from a record back home by fractions of the way, the tool tilted; return the way, or the record alone."""
     c, way = wrist.direction.c, list[Array]()
-    for fraction in np.geomspace(1.0, _NEAREST, count).tolist():
+    for fraction in fractions:
         near = first + fraction * (machine.home - first)
         pose = find_pose_with_wrist(machine, near, wrist.tilt(joints, mode, fraction * TILTED), mode)
         if pose is None:
@@ -197,6 +217,6 @@ def _sample_line(start: Array, end: Array) -> Array:
 
 def _choose_seconds(machine: Machine, start: Array, end: Array, mode: str) -> float:
     """Choose the s in which the joints run at a fraction of their speeds."""
-    joints = machine.follow(_sample_line(start, end), mode, EXACT)
+    joints = machine.follow(_sample_line(start, end), mode, STANDING)
     rates = np.abs(np.diff(joints, axis=0)) * (_SAMPLES - 1) / DriveLimits.of(machine).speed
     return max(_LEAST, float(np.nanmax(rates, initial=0.0)) / _SPEED_FRACTION)

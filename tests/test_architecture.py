@@ -354,7 +354,7 @@ def test_pole_thresholds_and_modes_are_the_wrists_matter(module):
 
 # Numbers about poles that are no angles off a pole: fractions of the tolerance or of a way, ratios, steps.
 FRACTIONS = {
-    "controllers.linuxcnc.approach._COUNTS",
+    "controllers.linuxcnc.approach._LEADS",
     "kinematics.travel._HOP",
     "toolpath.posting.working_mode.HELD",
     "toolpath.linearise.crossed_poles._TOGETHER",

@@ -20,7 +20,7 @@ WORTH = 5e-4  # least fraction of the cycle time that more rows must save
 _ROUNDS = 4
 RAMP = 0.1  # s in which a drive is assumed to reach its acceleration where only a jerk is given
 _ROUNDING = 1e-8
-_PLACES = 5  # places on each step where utilisation is measured
+_PLACES = 6  # on each step where utilisation is measured, the start twice
 
 
 def compute_ceilings(joint_path: JointPath, limits: DriveLimits) -> StepCeilings:

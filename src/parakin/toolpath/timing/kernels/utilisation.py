@@ -93,13 +93,16 @@ def _find_binding(k, feed_use, places, joints):
 
 @njit(nogil=True, cache=True, error_model="numpy")
 def _write_motion(piece, profile, length, motion):
-    """Write the motion at places of a piece, both ends among them: mm after the row, ``length`` at most, ṡ, s̈, s⃛."""
+    """Write the motion at places of a piece: mm after the row, ``length`` at most, ṡ, s̈, s⃛.
+
+    The second place is where ṡ is least or greatest; the others are even in time, both ends among them.
+    """
     dt = profile.time[piece + 1] - profile.time[piece]
     v, a, e = profile.speed[piece], profile.acceleration[piece], profile.jerk[piece]
     for k in range(len(motion)):
-        t = k * dt / (len(motion) - 1)
+        t = max(k - 1, 0) * dt / (len(motion) - 2)
         if k == 1 and 0.0 < -a / e < dt:
-            t = -a / e  # where ṡ is least or greatest
+            t = -a / e
         motion[k, 0] = min(profile.shift[piece] + t * (v + t * (0.5 * a + t * e / 6.0)), length)
         motion[k, 1], motion[k, 2], motion[k, 3] = max(0.0, v + t * (a + 0.5 * t * e)), a + t * e, e
 

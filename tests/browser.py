@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shutil
+import time
 from contextlib import contextmanager
 
 import pytest
@@ -34,3 +35,11 @@ def open_tab(browser, width=1280, height=800):
         assert not errors
     finally:
         tab.close()
+
+
+def wait_until(tab, expression, seconds=20.0):
+    """Wait for an expression of the page; its content policy forbids Playwright's own way."""
+    end = time.monotonic() + seconds
+    while not tab.evaluate(expression):
+        assert time.monotonic() < end, expression
+        tab.wait_for_timeout(30)

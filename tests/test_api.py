@@ -199,6 +199,7 @@ def cheap_calls(things):
         (pk.read_joint_program, {"path": "/nonexistent"}),
         (pk.render_machine_html, {"machine": m, "pose": pose}),
         (pk.render_machine_page, {"machine": m}),
+        (pk.render_path_page, {"posted": things["Posted"], "trajectory": trajectory}),
         (pk.render_report, {"posted": things["Posted"], "trajectory": trajectory, "unplanned": "", "waits": 0.0}),
         (pk.write_files, {"folder": "/proc/nothing", "files": {"a": b""}}),
         (m.inverse, {"poses": pose, "mode": "+", "out": None}),

@@ -4,7 +4,7 @@ import zipfile
 
 import numpy as np
 import pytest
-from browser import needs_chromium, open_browser, open_tab
+from browser import needs_chromium, open_browser, open_tab, wait_until
 from shipped import NAMES
 
 import parakin as pk
@@ -238,3 +238,70 @@ def test_a_trimesh_without_three_js_is_told(tmp_path, monkeypatch):
 def test_three_js_is_as_known():
     script = three_script.read_three_script()
     assert 600_000 < len(script) < 640_000 and "SPDX-License-Identifier: MIT" in script[:120]
+
+
+SQUARE = "G90 G21\nG0 X-40 Y-40 Z300\nG1 X40 F3000\nG1 Y40\nG1 X-40\nG1 Y-40\n"
+
+
+@needs_chromium
+def test_a_part_is_played(tmp_path, browser):
+    part = tmp_path / "square.ngc"
+    part.write_text(SQUARE)
+    assert main(["page", str(part), "-m", "linear_delta", "-o", str(tmp_path / "square.html")]) == 0
+    machine = pk.load("linear_delta")
+    job = pk.prepare(machine, pk.read_path(part))
+    with open_tab(browser) as tab:
+        tab.goto((tmp_path / "square.html").as_uri())
+        for share in (0.0, 0.37, 1.0):
+            time = share * job.seconds
+            tab.evaluate(f"parakin.seek({time})")
+            state, expected = tab.evaluate("parakin.state"), job.trajectory.at([time])
+            assert state["pose"] == pytest.approx(expected.poses[0], abs=0.05)
+            assert state["joints"] == pytest.approx(expected.joints[0], abs=0.05)
+        assert tab.evaluate("parakin.path.end") == pytest.approx(job.seconds)
+        tab.get_by_role("button", name="Play").click()
+        wait_until(tab, "parakin.player.time > 0.2 && parakin.player.time < parakin.path.end")
+        tab.get_by_role("button", name="Pause").click()
+        for colours in ("feed", "pace", "motion", "margin"):
+            tab.locator("#colours").select_option(colours)
+        tab.get_by_role("button", name="Path", exact=True).click()
+        assert "mm/min" in tab.locator("#clock").inner_text()
+        tab.locator("#curves").click(position={"x": 10, "y": 40})
+        assert tab.evaluate("parakin.player.time") < 0.05 * job.seconds
+
+
+@needs_chromium
+def test_an_offence_is_clicked(tmp_path, browser):
+    part = tmp_path / "long.ngc"
+    part.write_text(SQUARE.replace("Y40", "Y700"))
+    assert main(["post", str(part), "-m", "linear_delta", "-o", str(tmp_path), "--page"]) == 3
+    assert main(["page", str(part), "-m", "linear_delta", "-o", str(tmp_path / "long.html")]) == 3
+    assert (tmp_path / "long.page.html").exists()
+    with open_tab(browser) as tab:
+        tab.goto((tmp_path / "long.html").as_uri())
+        offence = tab.locator(".offence").first
+        assert "long.ngc:4: leg tower_b can't close" in offence.inner_text()
+        offence.click()
+        assert tab.locator("#verdict").get_attribute("class") == "bad"
+
+
+def test_options_of_a_part_ask_for_a_machine(tmp_path, capsys):
+    assert main(["page", "tricept", "--workpiece", "0,0,0"]) == 2
+    assert "--machine" in capsys.readouterr().err
+    empty = tmp_path / "empty.ngc"
+    empty.write_text("M2\n")
+    assert main(["page", str(empty), "-m", "tricept", "-o", str(tmp_path / "empty.html")]) == 2
+    assert not (tmp_path / "empty.html").exists()
+
+
+@needs_chromium
+def test_the_workspace_is_drawn_in_a_worker(pages, browser):
+    machine = pk.load("hbg80_2d")
+    with open_tab(browser) as tab:
+        tab.goto(pages("hbg80_2d"))
+        tab.get_by_label("its surface at this orientation").check()
+        wait_until(tab, "parakin.surface.last")
+        volume = tab.evaluate("parakin.surface.volume")
+    x, y = (np.linspace(-700.0, 700.0, 701) for _ in range(2))
+    lattice = np.stack(np.meshgrid(x, y, indexing="ij"), -1).reshape(-1, 2)
+    assert volume == pytest.approx(4.0 * (machine.check(lattice) == 0).sum(), rel=0.02)

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from .controllers.linuxcnc.program import make_linuxcnc_program
     from .export.files import write_files
     from .export.machine.picture import render_machine_html, render_machine_png
-    from .export.page.page import render_machine_page
+    from .export.page.page import render_machine_page, render_path_page
     from .export.report.report import render_report
     from .export.workspace.meshes import Mesh, make_mesh
     from .families.family import Family
@@ -106,6 +106,7 @@ __all__ = [
     "region",
     "render_machine_html",
     "render_machine_page",
+    "render_path_page",
     "render_machine_png",
     "render_report",
     "rewind_path",
@@ -202,6 +203,7 @@ _LAZY = {
     "region": "workspaces.certified.region:make_region",
     "render_machine_html": "export.machine.picture",
     "render_machine_page": "export.page.page",
+    "render_path_page": "export.page.page",
     "render_machine_png": "export.machine.picture",
     "render_report": "export.report.report",
     "sample_field": "workspaces.sampled.distance_field",

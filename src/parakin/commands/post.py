@@ -135,6 +135,10 @@ Parquet = Annotated[
     bool,
     Parameter(help="Write the tables as .parquet too."),
 ]
+PlayedPage = Annotated[
+    bool,
+    Parameter(help="Write PART.page.html too, on which the machine moves along the path."),
+]
 
 
 def post(
@@ -162,6 +166,7 @@ def post(
     rate: Rate = None,
     output: Folder = Path(),
     parquet: Parquet = False,
+    page: PlayedPage = False,
     json: Json = False,
     sizes: Sizes = None,
 ) -> int:
@@ -192,7 +197,7 @@ def post(
         options = JobOptions(mode, tolerances, target, corners, rewind, clearance, turn)
         prepared = prepare_part(chosen, path, placed, place, options, progress)
         job = prepared.job
-        files, missing = _make_files(part.stem, prepared, _Wanted(target, force, rate, parquet, output), progress)
+        files, missing = _make_files(part.stem, prepared, _Wanted(target, force, rate, parquet, page, output), progress)
         paths = write_files(output, dict(files.values()))
     written = {kind: str(name) for kind, name in zip(files, paths, strict=True)}
     if json:
@@ -238,6 +243,7 @@ class _Wanted:
     force: bool
     rate: float | None
     parquet: bool
+    page: bool
     folder: Path
 
     def explain_missing(self, kind: str, reason: str, name: str) -> str:
@@ -278,6 +284,13 @@ def _make_files(
             files["program"] = (name, _make_program(prepared, wanted.force))
         except PoseError as error:
             missing.append(wanted.explain_missing("program", str(error), name))
+    if wanted.page:
+        from ..export.page.page import render_path_page
+
+        if len(posted.path):
+            files["page"] = (f"{stem}.page.html", render_path_page(posted, trajectory))
+        else:
+            missing.append(wanted.explain_missing("page", "the file has no motion", f"{stem}.page.html"))
     files["report"] = (f"{stem}.report.html", render_report(posted, trajectory, job.unplanned, job.waits, job.outside))
     return files, missing
 

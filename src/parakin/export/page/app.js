@@ -1,17 +1,5 @@
 // All together: each change of the state is one picture.
 
-let pictureRequested = false;
-
-function requestPicture() {
-  if (pictureRequested) return;
-  pictureRequested = true;
-  requestAnimationFrame(() => {
-    pictureRequested = false;
-    render();
-    placeLabels();
-  });
-}
-
 function update() {
   const margins = marginsAt(current);
   placeMachine(current);
@@ -61,7 +49,7 @@ function findStrut(drive) {
 }
 
 window.parakin = {
-  machine, model, options, singularity, stateAtPose, followJoints, marginsAt, findRoot, measureSide, findFreeMotion,
+  machine, model, path, player, options, singularity, surface, seek, stateAtTime, stateAtPose, followJoints, marginsAt, findRoot, measureSide, findFreeMotion,
   moveToPose, moveToJoints, switchSign, showNextAssembly, searchAssemblies, goHome,
   tipInPicture: () => findInPicture(handle.position), strutInPicture: drive => findInPicture(findStrut(drive)),
   get state() { return current; }, get stoppedBy() { return stoppedBy; },

@@ -1,7 +1,7 @@
 // Both problems on the machine's equations, the limits, and the singularities. A state is {pose, joints, signs}.
 
 const TURN = 2 * PI, MOST_STEPS = 24, LEAST_STRIDE = 1e-4;
-const axisNumbers = [...machine.axes.keys()], jointNumbers = [...machine.joints.keys()];
+const axisNumbers = [...machine.axes.keys()];
 const isTurning = machine.joints.map(joint => joint.unit === "rad");
 
 const isFinitePose = values => values.every(Number.isFinite);

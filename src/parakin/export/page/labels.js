@@ -43,3 +43,16 @@ function placeLabels() {
     span.style.transform = `translate(${x.toFixed(1)}px, ${y.toFixed(1)}px)`;
   }
 }
+
+let pictureRequested = false;
+
+// Draw the picture anew, once for all that changes before it.
+function requestPicture() {
+  if (pictureRequested) return;
+  pictureRequested = true;
+  requestAnimationFrame(() => {
+    pictureRequested = false;
+    render();
+    placeLabels();
+  });
+}

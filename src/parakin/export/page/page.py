@@ -7,15 +7,23 @@ from html import escape
 from importlib.resources import files
 from pathlib import Path
 from string import Template
+from typing import TYPE_CHECKING, Any
 
 from ...arguments import check_arguments
+from ...errors import PoseError
 from ...machine import Machine
 from .machine_data import encode_page_machine
 from .model_script import write_model
+from .path_data import encode_page_path
 from .three_script import read_three_script
 
+if TYPE_CHECKING:
+    from ...toolpath.posting.posted import Posted
+    from ...toolpath.timing import Trajectory
+
 CORE = ("linear_algebra", "kinematics")
-APP = ("motion", "view", "orbit", "labels", "drag", "free_motion", "panel", "app")
+APP = ("motion", "view", "orbit", "labels", "drag", "free_motion", "panel", "workspace", "path", "player", "app")
+WORKER = ("surface_worker",)
 
 
 _MARK = '<meta name="generator" content="parakin">'
@@ -33,8 +41,25 @@ def is_page(path: Path) -> bool:
 @check_arguments
 def render_machine_page(machine: Machine) -> str:
     """Render a self-contained HTML page on which a machine moves: by its tool, its joints and its modes."""
-    title = " ".join(machine.spec.title.split()) or machine.name
+    return _render_page(machine, " ".join(machine.spec.title.split()) or machine.name, None)
+
+
+@check_arguments
+def render_path_page(posted: Posted, trajectory: Trajectory | None = None) -> str:
+    """Render such a page with the tool path of a posted part, which can be played.
+
+    Raises :class:`PoseError` for a path without records.
+    """
+    if not len(posted.path):
+        raise PoseError("posted: a path with records expected, this one has no motion")
+    path = encode_page_path(posted, trajectory)
+    title = f"{path['source']} on {' '.join(posted.machine.spec.title.split()) or posted.machine.name}"
+    return _render_page(posted.machine, title, path)
+
+
+def _render_page(machine: Machine, title: str, path: dict[str, Any] | None) -> str:
     what = f"{machine.name}: axes {' '.join(machine.axes)}, joints {' '.join(machine.joints)}"
+    data = f"const path = {json.dumps(path, separators=(',', ':'), allow_nan=False)};\n"
     return Template(_read_text("page.html")).substitute(
         mark=_MARK,
         title=escape(title),
@@ -42,8 +67,8 @@ def render_machine_page(machine: Machine) -> str:
         style=_read_text("page.css"),
         three=read_three_script(),
         core=_quote_script(write_core(machine)),
-        worker="",
-        script=f'(() => {{\n"use strict";\n{_join_scripts(APP)}}})();',
+        worker=_join_scripts(WORKER),
+        script=f'(() => {{\n"use strict";\n{_quote_script(data)}{_join_scripts(APP)}}})();',
     )
 
 

@@ -12,7 +12,6 @@ from ...arrays import Indices
 from ..machine.figures import Figure, PlotTrace, build_scene_layout, round_numbers
 from ..number_format import format_duration
 from .path_view import PathView, build_stroke, choose_points, find_tips
-from .timing_samples import find_switches
 
 if TYPE_CHECKING:
     from ...toolpath.timing import Trajectory
@@ -58,7 +57,7 @@ def _allow_breaks(name: str) -> str:
 def build_binding_traces(trajectory: Trajectory, shades: dict[str, str]) -> list[PlotTrace]:
     """Build for each limit the fraction of short spans of the cycle in which it binds; they sum to 1."""
     ends = np.linspace(0.0, trajectory.seconds, _BINS + 1)
-    bounds = np.concatenate([[0.0], find_switches(trajectory), [trajectory.seconds]])
+    bounds = np.concatenate([[0.0], trajectory.switches, [trajectory.seconds]])
     spans = np.diff(bounds)
     traces = []
     for name, shade in shades.items():

@@ -79,7 +79,6 @@ def _drop_short_gaps(times: Array, values: Array, shortest: float) -> Indices:
 def _sample_blocks(trajectory: Trajectory) -> Iterator[tuple[Array, Indices, Indices, dict[str, Array]]]:
     """Yield times, binding limits, records, and curves by name, for some pieces at a time."""
     profile, joint_path, machine = trajectory.profile, trajectory.joint_path, trajectory.posted.machine
-    edges = find_switches(trajectory)
     tip = [i for i, axis in enumerate(machine.axes) if axis in "XYZ"]
     jerky = [i for i, drive in enumerate(machine.drives) if drive.jerk < np.inf]
     pieces = np.flatnonzero(np.diff(profile.time) > _SHORTEST)
@@ -98,14 +97,8 @@ def _sample_blocks(trajectory: Trajectory) -> Iterator[tuple[Array, Indices, Ind
             curves[f"{name}.acceleration"] = at.accelerations[:, j]
             if j in jerky:
                 curves[f"{name}.jerk"] = jerks[:, jerky.index(j)]
-        binding = trajectory.binding[np.searchsorted(edges, at.times, "right")]
+        binding = trajectory.find_binding(at.times)
         yield at.times, binding, record, curves
-
-
-def find_switches(trajectory: Trajectory) -> Array:
-    """Find the times when the binding limit of one row of the joint path gives way to the next row's, (rows - 1,) s."""
-    passed = trajectory.profile.row_times
-    return 0.5 * (passed[1:] + passed[:-1])
 
 
 def _differentiate_parabolas(values: Array, times: Array) -> Array:

@@ -86,6 +86,16 @@ class Trajectory:
         sums = np.bincount(self.binding, near, len(self.names)) / (self.seconds or 1.0)
         return {self.names[i]: float(sums[i]) for i in np.argsort(-sums, kind="stable") if sums[i] > 0.0}
 
+    @cached_property
+    def switches(self) -> Array:
+        """(rows - 1,) s: when the binding limit of one row of the joint path gives way to the next row's."""
+        passed = self.profile.row_times
+        return 0.5 * (passed[1:] + passed[:-1])
+
+    def find_binding(self, times: Array) -> Indices:
+        """Find the limit that bounds the speed at times (k,), an index into :attr:`names`."""
+        return self.binding[np.searchsorted(self.switches, times, "right")]
+
     def at(self, times: ArrayLike) -> Setpoints:
         """Compute the setpoints at times (k,); before the start and after the end the machine stands still."""
         times = read_numbers("times", times)

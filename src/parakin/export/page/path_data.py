@@ -1,0 +1,116 @@
+"""A posted path as data of a page: samples over time, or by records where it has no times, and its offences."""
+
+from __future__ import annotations
+
+from base64 import b64encode
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ...arrays import Array, Indices
+from ...toolpath.posting.offence_texts import describe_place
+from ...toolpath.posting.range_use import compute_relative_margin
+
+if TYPE_CHECKING:
+    from ...toolpath.posting.posted import Posted
+    from ...toolpath.timing import Trajectory
+
+_NUMBERS = 30_000  # in all samples: some 160 kB of text
+_MOST_SAMPLES = 4000
+_MOST_OFFENCES = 200
+_SPAN = 2e-4  # s
+_GAPS = 1e-3  # s or records: samples no farther apart show nothing more
+
+
+def encode_page_path(posted: Posted, trajectory: Trajectory | None) -> dict[str, Any]:
+    """Encode a path of one record or more: columns of float32 in base64, mm, rad, s and mm/min.
+
+    With a trajectory they are samples at even times and at every record as far as there is room, of what the machine
+    does; else the records themselves, with their number in place of the time.
+    """
+    columns = _sample_records(posted) if trajectory is None else _sample_trajectory(posted, trajectory)
+    names = () if trajectory is None else trajectory.names
+    signs = [1 if sign == "+" else -1 for sign in posted.mode]
+    return {
+        "source": Path(posted.path.source).name or posted.path.source,
+        "timed": trajectory is not None,
+        "end": float(columns["times"][-1]),
+        "signs": signs,
+        "samples": len(columns["times"]),
+        "columns": {name: _encode_column(values) for name, values in columns.items()},
+        "bindings": list(names),
+        "offences": [_encode_offence(posted, columns, offence) for offence in posted.offences[:_MOST_OFFENCES]],
+        "records": len(posted.path),
+    }
+
+
+def _encode_column(values: Array) -> str:
+    return b64encode(np.ascontiguousarray(values, "<f4").tobytes()).decode("ascii")
+
+
+def _encode_offence(posted: Posted, columns: dict[str, Array], offence: Any) -> dict[str, Any]:
+    nearest = int(np.abs(columns["records"] - (offence.record - 1.0 + offence.share)).argmin())
+    return {"text": f"{describe_place(posted, offence)}: {offence.text}", "limit": offence.limit, "sample": nearest}
+
+
+def _count_samples(posted: Posted) -> int:
+    return min(_MOST_SAMPLES, _NUMBERS // (len(posted.machine.axes) + len(posted.machine.joints) + 6))
+
+
+def _thin_evenly(places: Indices, most: int) -> Indices:
+    return places if len(places) <= most else places[np.linspace(0, len(places) - 1, most).astype(np.int64)]
+
+
+def _sample_records(posted: Posted) -> dict[str, Array]:
+    count = len(posted.path)
+    worst = [offence.record for offence in posted.offences]
+    chosen = np.unique([*_thin_evenly(np.arange(count), _count_samples(posted)), *worst[:_MOST_OFFENCES]])
+    columns = _list_columns(posted, posted.poses[chosen], posted.joints[chosen])
+    nothing = np.full(len(chosen), np.nan)
+    return {
+        "times": chosen.astype(np.float64),
+        **columns,
+        "feed": np.where(posted.path.rapid, np.nan, posted.path.feed)[chosen],
+        "binding": nothing,
+        "rapid": posted.path.rapid[chosen].astype(np.float64),
+        "lines": posted.path.line[chosen].astype(np.float64),
+        "records": chosen.astype(np.float64),
+    }
+
+
+def _sample_trajectory(posted: Posted, trajectory: Trajectory) -> dict[str, Array]:
+    most, end = _count_samples(posted), trajectory.seconds
+    at_records = trajectory.times[_thin_evenly(np.arange(len(posted.path)), most // 2)]
+    times = np.unique(np.concatenate([np.linspace(0.0, end, most // 2), at_records]))
+    times = times[np.append(True, np.diff(times) > _GAPS)] if end > 1.0 else times
+    points, rows = trajectory.at(times), trajectory.profile.at(times)[0]
+    to = trajectory.curve.record_of_piece[trajectory.joint_path.segment[rows]]
+    return {
+        "times": times,
+        **_list_columns(posted, points.poses, points.joints),
+        "feed": _measure_feed(trajectory, times),
+        "binding": trajectory.find_binding(times).astype(np.float64),
+        "rapid": posted.path.rapid[to].astype(np.float64),
+        "lines": posted.path.line[to].astype(np.float64),
+        "records": to.astype(np.float64),
+    }
+
+
+def _measure_feed(trajectory: Trajectory, times: Array) -> Array:
+    """Measure the tip's speed, mm/min, over a short span about each time."""
+    places = [i for i, axis in enumerate(trajectory.posted.machine.axes) if axis in "XYZ"]
+    begin, end = np.maximum(times - _SPAN, 0.0), np.minimum(times + _SPAN, trajectory.seconds)
+    way = (trajectory.at(end).poses - trajectory.at(begin).poses)[:, places]
+    feed: Array = 60.0 * np.linalg.norm(way, axis=1) / np.maximum(end - begin, _SPAN)
+    return feed
+
+
+def _list_columns(posted: Posted, poses: Array, joints: Array) -> dict[str, Array]:
+    """List poses and joints, and the least margin of all limits, over half of each one's range."""
+    margins = posted.machine.margins(poses, joints, posted.mode)
+    return {
+        "poses": poses.ravel(),
+        "joints": joints.ravel(),
+        "margins": compute_relative_margin(posted.machine, margins),
+    }

@@ -1,0 +1,146 @@
+// The workspace's surface at one orientation, in a worker: a lattice of the least margin, refined from coarse to fine,
+// and marching tetrahedra (in the plane, triangles). What a lattice steps over is not seen.
+
+const places = [...machine.axes.keys()].filter(i => machine.axes[i].unit === "mm");
+const LEVELS = places.length === 3 ? [14, 26, 50] : [40, 160], BORDER = 1.35;
+const FOLLOW = places.length === 3 ? [[0, 1, 3, 7], [0, 1, 5, 7], [0, 2, 3, 7], [0, 2, 6, 7], [0, 4, 5, 7], [0, 4, 6, 7]] : [[0, 1, 3], [0, 2, 3]];
+let wanted = null; // the request in force
+
+// Of each drive's range: the joint, its sign and bound, and home's margin.
+const driveLimits = machine.limits.flatMap(limit => {
+  const joint = machine.joints.findIndex(({name}) => limit.name === `${name}.${limit.side}`);
+  return joint < 0 ? [] : [[joint, limit.side === "max" ? -1 : 1, limit.bound, limit.atHome]];
+});
+const FAR_OUTSIDE = -0.5; // of home's margin: where a drive is so far off its range the other limits are not looked at
+
+// Over home's: the least of all margins, negative where a limit is broken or a leg can't close.
+function measureLeastMargin(pose, signs) {
+  const joints = model.inverse(pose, signs);
+  let far = 0;
+  for (const [joint, sign, bound, atHome] of driveLimits) far = min(far, sign * (joints[joint] - bound) / atHome);
+  if (far < FAR_OUTSIDE) return far;
+  const margins = model.margins(pose, joints, signs);
+  let least = Infinity;
+  for (let i = 0; i < margins.length; i++) {
+    const share = margins[i] / machine.limits[i].atHome;
+    if (share === share) least = share < least ? share : least;
+    else least = min(least, -1e-3);
+  }
+  return least;
+}
+
+function makeLattice(low, high, count) {
+  const d = places.length, step = low.map((value, k) => (high[k] - value) / (count - 1));
+  return {low, step, count, values: new Float64Array(count ** d), d};
+}
+
+// Fill one layer of the lattice; what lies on its border counts as outside, so that the surface is closed.
+function fillLayer(lattice, layer, request) {
+  const {low, step, count, values, d} = lattice, pose = [...request.pose], width = count ** (d - 1);
+  for (let cell = 0; cell < width; cell++) {
+    const index = d === 3 ? [layer, Math.floor(cell / count), cell % count] : [layer, cell];
+    places.forEach((axis, k) => { pose[axis] = low[k] + step[k] * index[k]; });
+    const value = measureLeastMargin(pose, request.signs);
+    values[layer * width + cell] = index.some(i => i === 0 || i === count - 1) ? min(value, -1e-6) : value;
+  }
+}
+
+// The box of what is allowed, wider by one step; null where nothing is.
+function findInside({low, step, count, values, d}) {
+  const least = low.map(() => Infinity), greatest = low.map(() => -Infinity);
+  values.forEach((value, number) => {
+    if (!(value >= 0)) return;
+    for (let k = d - 1, rest = number; k >= 0; k--, rest = Math.floor(rest / count)) {
+      const i = rest % count;
+      least[k] = min(least[k], i - 1.5);
+      greatest[k] = max(greatest[k], i + 1.5);
+    }
+  });
+  if (least[0] === Infinity) return null;
+  return [least, greatest].map(ends => ends.map((i, k) => low[k] + step[k] * i));
+}
+
+// Triangles of the surface with normals (in the plane: of the area itself), and the volume inside.
+function marchLattice(lattice) {
+  const {low, step, count, values, d} = lattice, corners = 2 ** d, strides = d === 3 ? [count * count, count, 1] : [count, 1];
+  const offsets = Array.from({length: corners}, (_, c) => strides.reduce((sum, stride, k) => sum + ((c >> (d - 1 - k)) & 1) * stride, 0));
+  const positions = [], normals = [], locate = number => strides.map((stride, k) => low[k] + step[k] * (Math.floor(number / stride) % count));
+  const cellVolume = step.reduce((product, length) => product * length, 1);
+  let inside = 0;
+  const slope = (number, k) => (values[number + strides[k]] - values[number - strides[k]]) / step[k];
+  const cross = (a, b) => {
+    const share = values[a] / (values[a] - values[b]), [p, q] = [locate(a), locate(b)];
+    return {at: p.map((x, k) => x + share * (q[k] - x)), ends: [[a, 1 - share], [b, share]]};
+  };
+  const isInner = number => strides.every(stride => { const i = Math.floor(number / stride) % count; return i > 0 && i < count - 1; });
+  const put = vertices => vertices.forEach(({at, ends}) => {
+    positions.push(...at);
+    if (d !== 3) return;
+    const inner = ends.filter(([number]) => isInner(number));
+    const g = strides.map((_, k) => -inner.reduce((sum, [number, weight]) => sum + weight * slope(number, k), 0)), length = hypot(...g) || 1;
+    normals.push(...g.map(x => x / length));
+  });
+  const cells = count - 1;
+  for (let number = 0; number < values.length; number++) {
+    if (strides.some(stride => Math.floor(number / stride) % count === cells)) continue;
+    let within = 0;
+    for (let c = 0; c < corners; c++) within += values[number + offsets[c]] >= 0;
+    inside += within / corners;
+    if (within === 0 || d === 3 && within === corners) continue;
+    for (const simplex of FOLLOW) {
+      const all = simplex.map(c => number + offsets[c]), ins = all.filter(n => values[n] >= 0), outs = all.filter(n => !(values[n] >= 0));
+      if (d === 3) marchTetrahedron(ins, outs, cross, put);
+      else fillTriangle(ins, outs, cross, put, locate);
+    }
+  }
+  return {positions, normals, volume: inside * cellVolume};
+}
+
+function marchTetrahedron(ins, outs, cross, put) {
+  if (ins.length === 1) put(outs.map(out => cross(ins[0], out)));
+  else if (ins.length === 3) put(ins.map(n => cross(n, outs[0])));
+  else if (ins.length === 2) {
+    const [a, b, c, d] = [cross(ins[0], outs[0]), cross(ins[0], outs[1]), cross(ins[1], outs[1]), cross(ins[1], outs[0])];
+    put([a, b, c]);
+    put([a, c, d]);
+  }
+}
+
+function fillTriangle(ins, outs, cross, put, locate) {
+  const corners = ins.map(n => ({at: locate(n), ends: [[n, 1]]}));
+  if (ins.length === 3) put(corners);
+  else if (ins.length === 1) put([corners[0], cross(ins[0], outs[0]), cross(ins[0], outs[1])]);
+  else if (ins.length === 2) {
+    const [a, b] = ins.map(n => cross(n, outs[0]));
+    put([corners[0], corners[1], b]);
+    put([corners[0], b, a]);
+  }
+}
+
+const rest = () => new Promise(resolve => setTimeout(resolve, 0));
+
+async function refineSurface(request) {
+  const ranges = places.map(i => machine.axes[i]), middle = ranges.map(axis => 0.5 * (axis.low + axis.high));
+  let ends = [-1, 1].map(side => ranges.map((axis, k) => middle[k] + side * BORDER * 0.5 * (axis.high - axis.low)));
+  for (const [level, count] of LEVELS.entries()) {
+    const lattice = makeLattice(ends[0], ends[1], count);
+    let begin = performance.now();
+    for (let layer = 0; layer < count; layer++) {
+      fillLayer(lattice, layer, request);
+      if (performance.now() - begin < 12) continue;
+      await rest(); // a newer request may have come
+      if (wanted !== request) return;
+      begin = performance.now();
+    }
+    const {positions, normals, volume} = marchLattice(lattice);
+    const surface = {id: request.id, level, last: level === LEVELS.length - 1, volume, positions: new Float32Array(positions), normals: new Float32Array(normals)};
+    postMessage(surface, [surface.positions.buffer, surface.normals.buffer]);
+    ends = findInside(lattice);
+    if (ends === null) return;
+  }
+}
+
+onmessage = event => {
+  wanted = event.data;
+  refineSurface(wanted);
+};

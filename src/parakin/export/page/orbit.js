@@ -22,6 +22,7 @@ function placeCamera() {
   camera.position.set(cos(elevation) * cos(azimuth), cos(elevation) * sin(azimuth), sin(elevation)).multiplyScalar(distance).add(target);
   camera.lookAt(target);
   camera.updateMatrixWorld();
+  handle.scale.setScalar(0.026 * distance * Math.tan(0.5 * camera.fov * PI / 180)); // of one size in the picture
 }
 
 function turnCamera(right, up) {

@@ -26,7 +26,7 @@ _GAPS = 1e-3  # s or records: samples no farther apart show nothing more
 def encode_page_path(posted: Posted, trajectory: Trajectory | None) -> dict[str, Any]:
     """Encode a path of one record or more: columns of float32 in base64, mm, rad, s and mm/min.
 
-    With a trajectory they are samples at even times and at every record as far as there is room, of what the machine
+    With a trajectory they are samples at even times and at the corners as far as there is room, of what the machine
     does; else the records themselves, with their number in place of the time.
     """
     columns = _sample_records(posted) if trajectory is None else _sample_trajectory(posted, trajectory)
@@ -58,14 +58,22 @@ def _count_samples(posted: Posted) -> int:
     return min(_MOST_SAMPLES, _NUMBERS // (len(posted.machine.axes) + len(posted.machine.joints) + 6))
 
 
-def _thin_evenly(places: Indices, most: int) -> Indices:
-    return places if len(places) <= most else places[np.linspace(0, len(places) - 1, most).astype(np.int64)]
+def _choose_corners(posted: Posted, most: int) -> Indices:
+    """Choose the records, ``most`` of them, where the tip is farthest off the line between its neighbours."""
+    places = [i for i, axis in enumerate(posted.machine.axes) if axis in "XYZ"]
+    tips = posted.poses[:, places]
+    if len(tips) <= most:
+        return np.arange(len(tips))
+    back, ahead = tips[1:-1] - tips[:-2], tips[2:] - tips[1:-1]
+    across, lengths = ahead - back, np.linalg.norm(ahead, axis=1) + np.linalg.norm(back, axis=1)
+    off = np.linalg.norm(across, axis=1) * lengths
+    return np.sort(np.argsort(-np.nan_to_num(off), kind="stable")[:most]) + 1
 
 
 def _sample_records(posted: Posted) -> dict[str, Array]:
     count = len(posted.path)
     worst = [offence.record for offence in posted.offences]
-    chosen = np.unique([*_thin_evenly(np.arange(count), _count_samples(posted)), *worst[:_MOST_OFFENCES]])
+    chosen = np.unique([*_choose_corners(posted, _count_samples(posted)), *worst[:_MOST_OFFENCES], count - 1])
     columns = _list_columns(posted, posted.poses[chosen], posted.joints[chosen])
     nothing = np.full(len(chosen), np.nan)
     return {
@@ -81,7 +89,7 @@ def _sample_records(posted: Posted) -> dict[str, Array]:
 
 def _sample_trajectory(posted: Posted, trajectory: Trajectory) -> dict[str, Array]:
     most, end = _count_samples(posted), trajectory.seconds
-    at_records = trajectory.times[_thin_evenly(np.arange(len(posted.path)), most // 2)]
+    at_records = trajectory.times[_choose_corners(posted, most // 2)]
     times = np.unique(np.concatenate([np.linspace(0.0, end, most // 2), at_records]))
     times = times[np.append(True, np.diff(times) > _GAPS)] if end > 1.0 else times
     points, rows = trajectory.at(times), trajectory.profile.at(times)[0]

@@ -132,7 +132,6 @@ const frame = new THREE.Matrix4();
 
 // The handle by which the tool is dragged, at its tip.
 const handle = new THREE.Mesh(ball, new THREE.MeshStandardMaterial({color: 0xd81b60, transparent: true, opacity: 0.55, roughness: 0.3}));
-handle.scale.setScalar(0.016 * size);
 handle.userData = {drive: -1, kind: "handle"};
 scene.add(handle);
 

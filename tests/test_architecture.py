@@ -35,7 +35,7 @@ FLOORS = [
     ["toolpath.tool_turn", "toolpath.job"],
     ["toolpath.turned_job"],
     ["toolpath"],
-    ["controllers.controller", "controllers.gcode_text", "export.files", "export.number_format"],
+    ["controllers.controller", "controllers.gcode_text", "export.files", "export.number_format", "export.figure_file"],
     ["controllers.event_commands", "export.machine", "export.tables"],
     ["controllers.event_lines", "export.page"],
     ["controllers.joints", "controllers.linuxcnc", "export.report", "export.workspace"],

@@ -156,7 +156,7 @@ def test_the_command_proves_and_refutes(capsys):
         ("orthoglide", "--slice", "X=0", "--slice", "Z=0", "-o", "map.png"),
         ("orthoglide", "--slice", "Z=500", "-o", "map.png"),
         ("orthoglide", "--at", "X=900"),
-        ("orthoglide", "-o", "map.pdf"),
+        ("orthoglide", "-o", "map.bmp"),
         ("orthoglide", "--mode", "?"),
     ],
 )

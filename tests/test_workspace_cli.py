@@ -267,7 +267,7 @@ def test_curves_of_the_sweeps(capsys):
         (["--cell", "3deg"], "--cell"),
         (["--step", "0"], "--step"),
         (["--step", "0.01", "-o", "a.stl"], "step: 0.01 mm makes"),
-        (["-o", "a.obj"], '"a.obj": expected a file name that ends in .stl, .ply, .glb, .vtu, .csv, .png, .json'),
+        (["-o", "a.obj"], '"a.obj": expected a file name that ends in .stl, .ply, .glb, .vtu, .csv, .png, .pdf, .svg'),
         (["-o", "a.stl", "-o", "b.stl"], '"b.stl": a second .stl'),
         (["--set", "R=3"], "--set"),
     ],

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..errors import InputError
+from ..export.figure_file import PICTURES
 
 if TYPE_CHECKING:
     from ..performance.atlas import Atlas, PerformanceMap
@@ -26,14 +27,16 @@ class AtlasFiles:
     maps: int
 
     def __post_init__(self) -> None:
-        if self.path.suffix.lower() == ".png" and self.maps > 1:
+        if self.path.suffix.lower() in PICTURES and self.maps > 1:
             raise InputError(f'"{self.path}": several slices are several pictures, name a folder', "--output")
-        if self.path.suffix and self.path.suffix.lower() not in (".png", ".csv") and not self.path.is_dir():
-            raise InputError(f'"{self.path}": expected a folder, or a file that ends in .png or .csv', "--output")
+        if self.path.suffix and self.path.suffix.lower() not in (*PICTURES, ".csv") and not self.path.is_dir():
+            raise InputError(
+                f'"{self.path}": expected a folder, or a file that ends in .png, .pdf, .svg or .csv', "--output"
+            )
 
     def write(self, atlas: Atlas, maps: Sequence[PerformanceMap]) -> dict[str, str]:
         """Write the maps' pictures and their table; returns the paths."""
-        from ..export.atlas_maps import make_map_csv, render_map_png
+        from ..export.atlas_maps import make_map_csv, render_map
         from ..export.files import Content, write_files
 
         kind = "" if self.path.is_dir() else self.path.suffix.lower()
@@ -44,8 +47,8 @@ class AtlasFiles:
                 key = "map" if self.maps == 1 else f"map {number + 1}"
                 position = _format_slice_position(drawn.region, atlas.map.region)
                 names[key] = self.path.name if kind else f"{self.name}.atlas{position}.png"
-                contents[names[key]] = render_map_png(drawn, atlas.isotropic_on(drawn))
-        if kind != ".png":
+                contents[names[key]] = render_map(drawn, atlas.isotropic_on(drawn), kind or ".png")
+        if kind not in PICTURES:
             names["table"] = self.path.name if kind else f"{self.name}.atlas.csv"
             contents[names["table"]] = make_map_csv(maps)
         folder = self.path.parent if kind else self.path

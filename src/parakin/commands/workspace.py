@@ -89,7 +89,10 @@ Files = Annotated[
     list[Path] | None,
     Parameter(
         name=["--output", "-o"],
-        help=("A file, by its ending: .stl .ply .glb (mesh, mm), .vtu .csv (cells), .png, .json. May be given again."),
+        help=(
+            "A file, by its ending: .stl .ply .glb (mesh, mm), .vtu .csv (cells), .png, .pdf .svg (for a page), .json. "
+            "May be given again."
+        ),
     ),
 ]
 

@@ -1,10 +1,9 @@
-"""Maps of performance: a PNG of a slice's numbers, and a CSV of all of them."""
+"""Maps of performance: a picture of a slice's numbers, and a CSV of all of them."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from io import BytesIO
 from typing import TYPE_CHECKING, Any, BinaryIO
 
 import numpy as np
@@ -12,6 +11,7 @@ import numpy as np
 from ..arrays import Array, Writer
 from ..performance.atlas import PerformanceMap
 from ..performance.singularities import PARALLEL
+from .figure_file import render_figure
 from .machine.figures import FAINT, INK
 from .workspace.describe import describe_region
 
@@ -28,35 +28,42 @@ class _MapPanel:
     title: str
     values: Array
     colours: str
-    endless: bool = False  # it grows without end near a singularity: the greatest values share one colour
+    endless: bool = False  # it grows without end near a singularity: on a log scale, the greatest values of one colour
 
 
-def render_map_png(map_: PerformanceMap, marks: Array) -> bytes:
+def render_map(map_: PerformanceMap, marks: Array, suffix: str) -> bytes:
     """Render a map over one or two axes: condition number, greatest and least amplification, parallel margin.
 
     ``marks`` (k, axes) are poses to mark by a cross. Outside the region's outline nothing is drawn.
     """
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
+    return render_figure(
+        (10.4, 9.2), lambda figure: _draw_map(figure, map_, marks), lambda figure: _add_heading(figure, map_), suffix
+    )
 
-    figure = Figure(figsize=(10.4, 9.2), dpi=150, facecolor="white")
-    canvas = FigureCanvasAgg(figure)
+
+def _draw_map(figure: Figure, map_: PerformanceMap, marks: Array) -> None:
     panels = figure.subplots(2, 2)
-    figure.subplots_adjust(left=0.08, right=0.97, bottom=0.06, top=0.86, hspace=0.24, wspace=0.16)
+    figure.subplots_adjust(left=0.08, right=0.97, bottom=0.06, top=0.86, hspace=0.28, wspace=0.28)
     for axes, panel in zip(panels.flat, _list_panels(map_), strict=True):
         axes.set_title(panel.title, color=INK, fontsize=11, loc="left")
         axes.tick_params(labelsize=8, colors=_GREY)
         axes.grid(color=FAINT, linewidth=0.6)
         axes.set_axisbelow(True)
+        axes.locator_params(axis="x", nbins=6)
         axes.set_xlabel(f"{map_.axes[0]} [mm]", color=_GREY, fontsize=9)
         if len(map_.axes) == 1:
             values = np.where(map_.allowed & np.isfinite(panel.values), panel.values, np.nan)
             axes.plot(map_.grid[0], values, color="#1565c0")
+            if panel.endless:
+                axes.set_yscale("log")
             continue
         axes.set_ylabel(f"{map_.axes[1]} [mm]", color=_GREY, fontsize=9)
         _draw_panel(figure, axes, map_, panel)
         columns = [map_.region.machine.axes.index(axis) for axis in map_.axes]
         axes.plot(*marks[:, columns].T, "+", color="#d50000", markersize=9, markeredgewidth=1.6, linestyle="none")
+
+
+def _add_heading(figure: Figure, map_: PerformanceMap) -> None:
     machine = map_.region.machine
     figure.text(
         0.03, 0.955, machine.spec.title or machine.name, color=INK, fontsize=15, weight="bold", parse_math=False
@@ -65,9 +72,6 @@ def render_map_png(map_: PerformanceMap, marks: Array) -> bytes:
     if map_.performance.length.value is not None:
         what += f"; characteristic length {map_.performance.length.value:.6g} mm"
     figure.text(0.03, 0.92, what, color=_GREY, fontsize=10.5, parse_math=False)
-    data = BytesIO()
-    canvas.print_png(data)  # type: ignore[no-untyped-call]
-    return data.getvalue()
 
 
 def _list_panels(map_: PerformanceMap) -> list[_MapPanel]:
@@ -82,7 +86,7 @@ def _list_panels(map_: PerformanceMap) -> list[_MapPanel]:
 
 
 def _draw_panel(figure: Figure, axes: Any, map_: PerformanceMap, panel: _MapPanel) -> None:
-    from matplotlib.colors import TwoSlopeNorm
+    from matplotlib.colors import LogNorm, TwoSlopeNorm
 
     x, y = map_.grid
     inside = panel.values[map_.allowed & np.isfinite(panel.values)]
@@ -94,9 +98,11 @@ def _draw_panel(figure: Figure, axes: Any, map_: PerformanceMap, panel: _MapPane
         low, high = low - 0.5 * abs(low) - 1e-6, high + 0.5 * abs(high) + 1e-6
     crossed = low < 0.0 < high
     colours: dict[str, Any] = {"cmap": panel.colours}
-    if crossed:
-        colours = {"cmap": "RdYlGn", "norm": TwoSlopeNorm(0.0, low, high)}
     levels = np.linspace(low, high, _LEVELS + 1)
+    if crossed:
+        colours = {"cmap": "PuOr", "norm": TwoSlopeNorm(0.0, low, high)}
+    elif panel.endless:
+        colours["norm"], levels = LogNorm(low, high), np.geomspace(low, high, _LEVELS + 1)
     values = np.ma.masked_invalid(np.where(np.isinf(panel.values), high, panel.values).T)
     filled = axes.contourf(x, y, values, levels=levels, extend="max" if panel.endless else "neither", **colours)
     room = np.nan_to_num(map_.slack, nan=-1.0).T
@@ -106,6 +112,10 @@ def _draw_panel(figure: Figure, axes: Any, map_: PerformanceMap, panel: _MapPane
     if crossed:
         axes.contour(x, y, np.ma.masked_where(room < 0.0, values), levels=[0.0], colors="#b71c1c", linewidths=1.2)
     bar = figure.colorbar(filled, ax=axes, shrink=0.9, pad=0.02)
+    if panel.endless:
+        ticks = levels[:: _LEVELS // 6].tolist()
+        bar.set_ticks(ticks, labels=[f"{tick:.3g}" for tick in ticks], minor=False)
+        bar.minorticks_off()
     bar.ax.tick_params(labelsize=8, colors=_GREY)
 
 

@@ -1,9 +1,8 @@
-"""A workspace's picture, a PNG: its shaded surface and cross-sections, in the plane its area by what binds."""
+"""A workspace's picture: its shaded surface and cross-sections, in the plane its area by what binds."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from io import BytesIO
 from textwrap import fill
 from typing import TYPE_CHECKING, Any
 
@@ -12,6 +11,7 @@ import numpy as np
 from ...arrays import Array
 from ...workspaces.sampled.distance_field import SampledField
 from ...workspaces.sampled.sampling import SampledWorkspace
+from ..figure_file import render_figure
 from ..machine.figures import FAINT, INK
 from .describe import AnyWorkspace, describe_size, describe_workspace, format_volume
 from .meshes import Mesh
@@ -26,40 +26,39 @@ _GREY = "#607d8b"
 _VIEW = {"elev": 22.0, "azim": -56.0}  # from the front right, degrees
 _LIGHT = np.array([0.30, -0.55, 0.78]) / np.linalg.norm([0.30, -0.55, 0.78])
 _LEGEND = {"frameon": False, "fontsize": 9, "labelcolor": INK, "alignment": "left"}
+_IN_SPACE, _IN_PLANE = (12.0, 6.6), (9.6, 7.2)  # inches
 _WIDE = 96  # letters of a heading's line
+_FILLED = 0.13  # opacity of a cross-section's inside
+# P. Tol's muted scheme, told apart by colour-blind people too.
+_COLOURS = ("#88ccee", "#cc6677", "#ddcc77", "#117733", "#332288", "#aa4499", "#44aa99", "#999933", "#882255")
 _PIXELS = 2  # along a step of a planar field
 
 
-def render_space_png(workspace: AnyWorkspace, mesh: Mesh, slices: Sequence[CrossSection]) -> bytes:
+def render_space(workspace: AnyWorkspace, mesh: Mesh, slices: Sequence[CrossSection], suffix: str) -> bytes:
     """Render a workspace in space: its shaded surface, coloured by height, and beside it its cross-sections."""
-    return _render_png(workspace, (12.0, 6.6), lambda figure: _draw_space(figure, workspace, mesh, slices))
+    return _render(workspace, _IN_SPACE, suffix, lambda figure: _draw_space(figure, workspace, mesh, slices))
 
 
-def render_plane_png(workspace: AnyWorkspace, field: SampledField, slices: Sequence[CrossSection]) -> bytes:
+def render_plane(workspace: AnyWorkspace, field: SampledField, slices: Sequence[CrossSection], suffix: str) -> bytes:
     """Render a workspace in a plane: its area, a colour for each limit where that is nearest."""
-    return _render_png(workspace, (9.6, 7.2), lambda figure: _draw_plane(figure, workspace, field, slices))
+    return _render(workspace, _IN_PLANE, suffix, lambda figure: _draw_plane(figure, workspace, field, slices))
 
 
-def render_curves_png(
-    workspace: SampledWorkspace, field: SampledField, groups: Sequence[CurveGroup], slices: Sequence[CrossSection]
+def render_curves(
+    workspace: SampledWorkspace,
+    field: SampledField,
+    groups: Sequence[CurveGroup],
+    slices: Sequence[CrossSection],
+    suffix: str,
 ) -> bytes:
     """Render the curves of a sweep; a workspace in space with its cross-sections beside them."""
     if len(workspace.axes) == 3:
-        return _render_png(workspace, (12.0, 6.6), lambda figure: _draw_net(figure, workspace, field, groups, slices))
-    return _render_png(workspace, (9.6, 7.2), lambda figure: _draw_flat_net(figure, workspace, groups))
+        return _render(workspace, _IN_SPACE, suffix, lambda figure: _draw_net(figure, workspace, field, groups, slices))
+    return _render(workspace, _IN_PLANE, suffix, lambda figure: _draw_flat_net(figure, workspace, groups))
 
 
-def _render_png(workspace: AnyWorkspace, inches: tuple[float, float], draw: Callable[[Figure], None]) -> bytes:
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=inches, dpi=150, facecolor="white")
-    canvas = FigureCanvasAgg(figure)
-    draw(figure)
-    _add_title(figure, workspace)
-    data = BytesIO()
-    canvas.print_png(data)  # type: ignore[no-untyped-call]
-    return data.getvalue()
+def _render(workspace: AnyWorkspace, inches: tuple[float, float], suffix: str, draw: Callable[[Figure], None]) -> bytes:
+    return render_figure(inches, draw, lambda figure: _add_title(figure, workspace), suffix)
 
 
 def _add_title(figure: Figure, workspace: AnyWorkspace) -> None:
@@ -110,10 +109,7 @@ def _add_faces(axes: Any, mesh: Mesh, colours: Array) -> None:
     """Add the faces that look at the viewer, lit from above."""
     from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
-    corners = mesh.vertices[mesh.faces]
-    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    lengths = np.linalg.norm(normals, axis=1, keepdims=True)
-    normals = normals / np.where(lengths > 0.0, lengths, 1.0)
+    corners, normals = mesh.vertices[mesh.faces], _smooth_normals(mesh)
     up, round_ = np.radians(_VIEW["elev"]), np.radians(_VIEW["azim"])
     eye = np.array([np.cos(up) * np.cos(round_), np.cos(up) * np.sin(round_), np.sin(up)])
     front = normals @ eye > -0.35  # the view is in perspective, so a little more than half
@@ -123,11 +119,25 @@ def _add_faces(axes: Any, mesh: Mesh, colours: Array) -> None:
     axes.add_collection3d(Poly3DCollection(corners[front], facecolors=lit, edgecolors=lit, linewidths=0.4))
 
 
+def _smooth_normals(mesh: Mesh) -> Array:
+    """Compute a normal for each face, the mean of those at its corners, so that the surface looks smooth."""
+    corners = mesh.vertices[mesh.faces]
+    areas = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    at_vertices = np.zeros_like(mesh.vertices)
+    for corner in mesh.faces.T:
+        np.add.at(at_vertices, corner, areas)
+    normals = at_vertices[mesh.faces].sum(1)
+    lengths = np.linalg.norm(normals, axis=1, keepdims=True)
+    smooth: Array = normals / np.where(lengths > 0.0, lengths, 1.0)
+    return smooth
+
+
 def _draw_sections(figure: Figure, slices: Sequence[CrossSection], colour: Any) -> None:
-    axes: Any = figure.add_axes((0.645, 0.12, 0.325, 0.60))
+    axes: Any = figure.add_axes((0.66, 0.12, 0.315, 0.60))
     for section in slices:
         label = f"{section.axis} = {section.value:,.1f} mm   {format_volume(section.area, 2)}"
         for number, outline in enumerate(section.outlines):
+            axes.fill(*outline.T, color=colour(section.value), alpha=_FILLED, linewidth=0.0)
             axes.plot(*outline.T, color=colour(section.value), linewidth=1.6, label="" if number else label)
         if not section.outlines:
             axes.plot([], [], color=colour(section.value), linewidth=1.6, label=label)
@@ -139,6 +149,7 @@ def _draw_sections(figure: Figure, slices: Sequence[CrossSection], colour: Any) 
 
 def _set_plane(axes: Any, names: Sequence[str]) -> None:
     axes.set_aspect("equal", adjustable="datalim")
+    axes.locator_params(nbins=6)
     axes.set_xlabel(f"{names[0]} [mm]", color=_GREY, fontsize=9)
     axes.set_ylabel(f"{names[1]} [mm]", color=_GREY, fontsize=9)
     axes.grid(color=FAINT, linewidth=0.7)
@@ -152,7 +163,6 @@ def _set_plane(axes: Any, names: Sequence[str]) -> None:
 
 
 def _draw_plane(figure: Figure, workspace: AnyWorkspace, field: SampledField, slices: Sequence[CrossSection]) -> None:
-    from matplotlib import colormaps
     from matplotlib.patches import Patch, PathPatch
     from matplotlib.path import Path
 
@@ -165,11 +175,10 @@ def _draw_plane(figure: Figure, workspace: AnyWorkspace, field: SampledField, sl
     limit = np.full(tuple(fine), -1)
     limit[near] = nearest
     count = np.bincount(nearest, minlength=len(workspace.region.limits))
-    palette: Any = colormaps["tab20"]
     image = np.zeros((*limit.shape, 4))
     patches = []
     for place, number in enumerate(np.argsort(-count, kind="stable")[: int((count > 0).sum())].tolist()):
-        colour = palette((2 * place + 1 + place // 10) % 20)
+        colour = _choose_colour(place)
         image[limit == number] = colour
         label = f"{workspace.region.limits[number]}   {count[number] / len(nearest):.1%}"
         patches.append(Patch(facecolor=colour, label=label))
@@ -182,6 +191,15 @@ def _draw_plane(figure: Figure, workspace: AnyWorkspace, field: SampledField, sl
     _set_plane(axes, workspace.axes)
     axes.legend(handles=patches, loc="upper left", bbox_to_anchor=(1.02, 1.0), **_LEGEND,
                 title="nearest limit, share of the area").get_title().set_color(INK)  # fmt: skip
+
+
+def _choose_colour(place: int) -> tuple[float, float, float, float]:
+    """Choose the colour of a limit by its place in the order of their shares; paler once all colours are used."""
+    from matplotlib.colors import to_rgb
+
+    pale = 1.0 - 0.45 * (place // len(_COLOURS) % 2)
+    red, green, blue = (1.0 - pale * (1.0 - channel) for channel in to_rgb(_COLOURS[place % len(_COLOURS)]))
+    return red, green, blue, 1.0
 
 
 # CurveGroup of a sweep.

@@ -16,14 +16,15 @@ from ...workspaces.sampled.distance_field import SampledField, sample_field
 from ...workspaces.sampled.drive_sweep import DriveWorkspace
 from ...workspaces.sampled.polar_sweep import PolarWorkspace
 from ...workspaces.sampled.sampling import TOO_SLOW, SampledWorkspace, find_bounding_box
+from ..figure_file import PICTURES
 from .cells import format_cells_csv, format_cells_vtu
 from .describe import AnyWorkspace
 from .meshes import Mesh, format_mesh, make_mesh
-from .picture import render_curves_png, render_plane_png, render_space_png
+from .picture import render_curves, render_plane, render_space
 from .sweep_curves import build_sweep_curves
 
 MESHES = (".stl", ".ply", ".glb")
-SUFFIXES = (*MESHES, ".vtu", ".csv", ".png", ".json")
+SUFFIXES = (*MESHES, ".vtu", ".csv", *PICTURES, ".json")
 
 
 def explain_unfit(suffix: str, method: str, dimension: int) -> str | None:
@@ -31,8 +32,8 @@ def explain_unfit(suffix: str, method: str, dimension: int) -> str | None:
     if suffix in (".vtu", ".csv") and method != "certified":
         return "only the method certified has cells"
     if suffix in MESHES and dimension != 3:
-        return "a mesh needs a volume, this workspace is flat; .png goes, and .vtu and .csv of the method certified"
-    if suffix == ".png" and dimension == 1:
+        return "a mesh needs a volume, this workspace is flat; .png .pdf .svg go, and .vtu .csv of the method certified"
+    if suffix in PICTURES and dimension == 1:
         return "a picture needs an area, this workspace is a line; .vtu and .csv go, of the method certified"
     return None
 
@@ -73,10 +74,10 @@ class WorkspaceFiles:
             return format_mesh(self.mesh, suffix)
         if isinstance(self.workspace, PolarWorkspace | DriveWorkspace):
             curves = build_sweep_curves(self.workspace)
-            return render_curves_png(self.workspace, self._filled_field, curves, self.cross_sections)
+            return render_curves(self.workspace, self._filled_field, curves, self.cross_sections, suffix)
         if len(self.workspace.axes) == 3:
-            return render_space_png(self.workspace, self.mesh, self.cross_sections)
-        return render_plane_png(self.workspace, self._filled_field, self.cross_sections)
+            return render_space(self.workspace, self.mesh, self.cross_sections, suffix)
+        return render_plane(self.workspace, self._filled_field, self.cross_sections, suffix)
 
 
 def prepare_files(

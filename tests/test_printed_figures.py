@@ -1,0 +1,46 @@
+"""Figures for a printed page: vectors with their text, of one size and width, without a heading."""
+
+import re
+from xml.etree import ElementTree
+
+import pytest
+
+from parakin.cli import main
+
+COMMANDS = {
+    "plane": ("workspace", "hbg80_2d", "--gap", "0.05"),
+    "space": ("workspace", "linear_delta", "--gap", "0.2", "--step", "40"),
+    "curves": ("workspace", "hbg80_2d", "--method", "drives"),
+    "map": ("atlas", "hbg80_2d", "--step", "40"),
+}
+SVG = "{http://www.w3.org/2000/svg}"
+
+
+@pytest.mark.parametrize("command", COMMANDS.values(), ids=COMMANDS)
+def test_a_figure_for_a_page(command, tmp_path, capsys):
+    path = tmp_path / "figure.svg"
+    assert main([*command, "-o", str(path)]) == 0
+    capsys.readouterr()
+    root = ElementTree.parse(path).getroot()
+    assert 60.0 < float(root.get("width").removesuffix("pt")) / 72.0 * 25.4 <= 200.0  # mm, of a page
+    texts = list(root.iter(f"{SVG}text"))
+    assert {"X [mm]", "Y [mm]"} <= {text.text for text in texts}
+    sizes = {re.search(r"([\d.]+)px", text.get("style"))[1] for text in texts}
+    assert sizes == {"7"}
+    assert path.stat().st_size < 1_500_000
+    first = path.read_bytes()
+    assert main([*command, "-o", str(path)]) == 0
+    assert path.read_bytes() == first  # no date, no random names
+
+
+def test_a_pdf_and_a_heading_on_the_screen_only(tmp_path, capsys):
+    assert main(["workspace", "hbg80_2d", "--gap", "0.05", "-o", str(tmp_path / "a.pdf")]) == 0
+    data = (tmp_path / "a.pdf").read_bytes()
+    assert data.startswith(b"%PDF-1.")
+    assert b"CreationDate" not in data
+
+
+def test_several_slices_need_a_folder(tmp_path, capsys):
+    words = ["atlas", "orthoglide", "--slice", "Z=0", "--slice", "Z=-20", "-o", str(tmp_path / "a.pdf")]
+    assert main(words) == 2
+    assert "several slices are several pictures" in capsys.readouterr().err

@@ -32,6 +32,9 @@ def things(tmp_path_factory, tricept):
     (program,) = pk.write_files(folder, {"j.ngc": pk.make_joint_program(job.trajectory)})
     field = pk.sample_field(plane, found.box)
     space = pk.region(pk.load("orthoglide"))
+    orthoglide = pk.load("orthoglide")
+    poses = np.random.default_rng(0).uniform(-50.0, 50.0, (6, 3))
+    measured = pk.make_measurements(orthoglide, orthoglide.inverse(poses), poses)
     hexapod, below = pk.load("hexapod"), pk.workpiece(Z=-950)
     body = pk.sample_field(space, pk.workspace(space, gap=0.5).box, step=20)
     return {
@@ -62,6 +65,10 @@ def things(tmp_path_factory, tricept):
         "ToolTurn": pk.choose_tool_turn(hexapod, path, workpiece=below),
         "TurnedJob": pk.prepare_turned(hexapod, path, workpiece=below),
         "Family": pk.family(tricept, ["feet"]),
+        "Measurements": measured,
+        "Calibration": pk.calibrate(orthoglide, measured, ["encoders"]),
+        "MeasurementPlan": pk.plan_measurements(orthoglide, 4, ["encoders"]),
+        "Noise": pk.Noise(),
         "Parameter": tricept.parameters[0],
         "setpoints": job.trajectory.sample(10),
         "cells": found.cells,

@@ -24,6 +24,7 @@ FLOORS = [
     ["workspaces.connected"],
     ["workspaces"],
     ["performance"],
+    ["calibration"],
     ["toolpath.path"],
     ["toolpath.programmed_path"],
     ["toolpath.reading"],
@@ -49,7 +50,7 @@ FLOORS = [
 ]
 HEIGHT = {room: height for height, floor in enumerate(FLOORS) for room in floor}
 CORE = ["arrays", "algebra", "budget", "kernels", "model", "kinematics", "machine_properties", "machine"]
-CORE += ["families", "workspaces", "performance"]
+CORE += ["families", "workspaces", "performance", "calibration"]
 RIM = {"pathlib", "json", "io", "tempfile", "shutil", "plotly", "matplotlib", "pyarrow", "rich", "cyclopts"}
 RIM |= {"pydantic", "ruamel", "http", "socket", "subprocess"}
 NO_PATH_NEEDS = {"plotly", "matplotlib", "rich", "cyclopts"}
@@ -292,7 +293,7 @@ MATHEMATICS = {"absolute", "atan2", "copysign", "cross", "derivative", "dot", "m
 MATHEMATICS |= {"njit", "product", "sincos", "sqrt", "sub"}
 # What people type: a command has its function's name, and so do a few words of `pk`.
 COMMANDS = {"assemblies", "atlas", "design", "forward", "inverse", "linuxcnc", "machines", "post", "show", "workspace"}
-COMMANDS |= {"export", "page", "reach"}
+COMMANDS |= {"export", "page", "reach", "calibrate"}
 TYPED = COMMANDS | {"main", "to_display", "workpiece"}
 
 

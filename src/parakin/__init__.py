@@ -10,10 +10,15 @@ from .errors import DescriptionError, InputError, InputErrors, NoMethodError, Pa
 from .version import __version__
 
 if TYPE_CHECKING:
+    from .calibration.calibration import Calibration, calibrate
+    from .calibration.identifiability import UnidentifiableError
+    from .calibration.measurements import Measurements, Noise, make_measurements
+    from .calibration.plan import MeasurementPlan, plan_measurements
     from .controllers.joints.program import make_joint_program
     from .controllers.joints.program_reader import JointProgram, read_joint_program
     from .controllers.linuxcnc.configuration import make_linuxcnc_configuration
     from .controllers.linuxcnc.program import make_linuxcnc_program
+    from .export.calibration import format_calibrated_yaml, render_residuals_png
     from .export.files import write_files
     from .export.machine.picture import render_machine_html, render_machine_png
     from .export.page.page import render_machine_page, render_path_page
@@ -51,6 +56,7 @@ if TYPE_CHECKING:
 __all__ = [
     "Assemblies",
     "Atlas",
+    "Calibration",
     "Clearance",
     "Components",
     "CrossSection",
@@ -64,8 +70,11 @@ __all__ = [
     "Job",
     "JointProgram",
     "Machine",
+    "MeasurementPlan",
+    "Measurements",
     "Mesh",
     "NoMethodError",
+    "Noise",
     "ParakinError",
     "Parameter",
     "Placement",
@@ -81,9 +90,11 @@ __all__ = [
     "ToolTurn",
     "Trajectory",
     "TurnedJob",
+    "UnidentifiableError",
     "Workspace",
     "__version__",
     "atlas",
+    "calibrate",
     "choose_tool_turn",
     "family",
     "find_components",
@@ -92,12 +103,15 @@ __all__ = [
     "find_placement",
     "find_placements",
     "fit_tool_lengths",
+    "format_calibrated_yaml",
     "load",
     "machines",
     "make_joint_program",
     "make_linuxcnc_configuration",
     "make_linuxcnc_program",
+    "make_measurements",
     "make_mesh",
+    "plan_measurements",
     "prepare",
     "prepare_turned",
     "read_joint_program",
@@ -109,6 +123,7 @@ __all__ = [
     "render_machine_png",
     "render_path_page",
     "render_report",
+    "render_residuals_png",
     "rewind_path",
     "sample_field",
     "sample_grid",
@@ -155,6 +170,7 @@ def load(name: str | PathLike[str], parameters: Mapping[str, float | str] | None
 # The public names that are loaded when they are first used: the module, and the name there if it is another.
 _LAZY = {
     "Atlas": "performance.atlas",
+    "Calibration": "calibration.calibration",
     "Components": "workspaces.connected.components",
     "CrossSection": "workspaces.sampled.cross_sections",
     "DriveWorkspace": "workspaces.sampled.drive_sweep",
@@ -164,7 +180,10 @@ _LAZY = {
     "Job": "toolpath.job",
     "JointProgram": "controllers.joints.program_reader",
     "Machine": "machine",
+    "MeasurementPlan": "calibration.plan",
+    "Measurements": "calibration.measurements",
     "Mesh": "export.workspace.meshes",
+    "Noise": "calibration.measurements",
     "Parameter": "model.geometric_parameters",
     "Placement": "toolpath.placing.placement",
     "PolarWorkspace": "workspaces.sampled.polar_sweep",
@@ -181,8 +200,10 @@ _LAZY = {
     "ToolTurn": "toolpath.tool_turn.choice",
     "Trajectory": "toolpath.timing.trajectory",
     "TurnedJob": "toolpath.turned_job",
+    "UnidentifiableError": "calibration.identifiability",
     "Workspace": "workspaces.certified.workspace",
     "atlas": "performance.atlas",
+    "calibrate": "calibration.calibration",
     "choose_tool_turn": "toolpath.tool_turn.choice",
     "family": "families.family:make_family",
     "find_components": "workspaces.connected.components",
@@ -191,10 +212,13 @@ _LAZY = {
     "find_placement": "toolpath.placing.placement",
     "find_placements": "toolpath.placing.placement",
     "fit_tool_lengths": "toolpath.posting.tool_lengths",
+    "format_calibrated_yaml": "export.calibration",
     "make_joint_program": "controllers.joints.program",
     "make_linuxcnc_configuration": "controllers.linuxcnc.configuration",
     "make_linuxcnc_program": "controllers.linuxcnc.program",
+    "make_measurements": "calibration.measurements",
     "make_mesh": "export.workspace.meshes",
+    "plan_measurements": "calibration.plan",
     "prepare": "toolpath.job",
     "prepare_turned": "toolpath.turned_job",
     "read_joint_program": "controllers.joints.program_reader",
@@ -206,6 +230,7 @@ _LAZY = {
     "render_path_page": "export.page.page",
     "render_machine_png": "export.machine.picture",
     "render_report": "export.report.report",
+    "render_residuals_png": "export.calibration",
     "sample_field": "workspaces.sampled.distance_field",
     "sample_grid": "workspaces.sampled.grid",
     "sweep_drives": "workspaces.sampled.drive_sweep",

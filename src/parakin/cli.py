@@ -15,6 +15,7 @@ from cyclopts import App, CycloptsError, Parameter
 
 from .commands.assemblies import assemblies
 from .commands.atlas import atlas
+from .commands.calibrate import calibrate
 from .commands.console import print_remark
 from .commands.design import design
 from .commands.export import export
@@ -40,8 +41,8 @@ app = App(
     default_parameter=Parameter(negative=""),
     suppress_keyboard_interrupt=False,  # main says so in one line
 )
-COMMANDS = (post, inverse, forward, assemblies, reach, linuxcnc, machines, show, page, workspace, atlas, design, export)
-for command in COMMANDS:
+ANALYSES = (assemblies, reach, workspace, atlas, calibrate, design)
+for command in (post, inverse, forward, *ANALYSES, linuxcnc, machines, show, page, export):
     app.command(command)
 app.command(import_machine, name="import")
 app.register_install_completion_command()

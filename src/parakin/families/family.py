@@ -36,6 +36,23 @@ class FamilyRates(NamedTuple):
     b: Array
     c: Array
 
+    def compute_size_rates(self) -> Array:
+        """Compute how the pose moves with each size while the joints stand, (N, n, k)."""
+        return -solve_each(self.a, self.c)
+
+    def compute_joint_rates(self) -> Array:
+        """Compute how the pose moves with each joint, (N, n, m)."""
+        return solve_each(self.a, self.b)
+
+
+def solve_each(matrices: Array, right: Array) -> Array:
+    """Solve a linear system for each matrix; NaN where it is singular or not a number."""
+    good = np.flatnonzero(np.isfinite(matrices).all((1, 2)))
+    good = good[np.abs(np.linalg.det(matrices[good])) > 0.0]
+    result: Array = np.full(right.shape, np.nan)
+    result[good] = np.linalg.solve(matrices[good], right[good])
+    return result
+
 
 @dataclass(frozen=True, eq=False)
 class FamilySolution:

@@ -1,0 +1,1 @@
+"""Calibration: the numbers of a machine from measurements of where its tool is."""

@@ -1,0 +1,258 @@
+"""``parakin calibrate``: the numbers of a machine from measurements, or a plan of what to measure."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+from cyclopts import Parameter
+
+from ..errors import InputError, PoseError, quote
+from ..export.number_format import format_fixed
+from ..units import ANGLE, LENGTH, QuantityError, QuantityKind, name_display_unit, parse_quantity, to_display
+from .console import announce_compiling, format_table, print_json, print_text
+from .options import Json, Name, Sizes, load_machine
+
+if TYPE_CHECKING:
+    from ..calibration.calibration import Calibration
+    from ..calibration.measurements import Measurements, Noise
+    from ..calibration.plan import MeasurementPlan
+    from ..export.files import Content
+    from ..machine import Machine
+
+_DISTANCE = "distance"
+_LENGTH_DIGITS, _ANGLE_DIGITS = 4, 5
+_MOST_NAMED = 8
+
+
+def calibrate(
+    name: Name,
+    measured: Path | None = None,
+    /,
+    *,
+    free: Annotated[list[str] | None, Parameter(negative="")] = None,
+    noise: str | None = None,
+    angle_noise: str | None = None,
+    encoders: str | None = None,
+    angle_encoders: str | None = None,
+    centre: Annotated[str | None, Parameter(allow_leading_hyphen=True)] = None,
+    plain: bool = False,
+    plan: int | None = None,
+    measure: str | None = None,
+    output: Annotated[Path | None, Parameter(name=["--output", "-o"])] = None,
+    picture: Path | None = None,
+    json: Json = False,
+    sizes: Sizes = None,
+) -> int:
+    """The numbers of a machine that explain measurements best, or a plan of what to measure.
+
+    Parameters
+    ----------
+    name
+        A shipped machine's name or a YAML file.
+    measured
+        A CSV file with a header: a column for each joint, and what was measured there in the machine's frame: all axes
+        of the pose, some of X, Y and Z, or the tip's distance from a fixed point (distance); mm and degrees, or with a
+        unit: X [in].
+    free
+        A number that may change: its name, a pattern such as legs.*.foot.*, or a group (feet, platform, rods, rails,
+        encoders, mounting, head, table). May be given again; by default all that measurements of poses tell.
+    noise
+        The standard deviation of a measured length; by default 10um.
+    angle_noise
+        That of a measured angle; by default 0.001deg.
+    encoders
+        That of what a drive that slides says; by default 0um.
+    angle_encoders
+        That of what a drive that turns says; by default 0deg.
+    centre
+        The point of the distances, X,Y,Z in mm; by default it is found with the rest.
+    plain
+        Plain least squares; by default outliers pull no harder than three standard deviations do.
+    plan
+        Choose so many poses to measure, inside all limits, instead; -o writes them as CSV.
+    measure
+        What a plan will measure: "X Y Z" or "Z"; by default all axes.
+    output
+        A machine file to write, .yaml; of a plan a table, .csv.
+    picture
+        A picture of the residuals to write, .png.
+    """
+    machine = load_machine(name, sizes)
+    _check_outputs(plan, output, picture)
+    stated = _parse_noise(noise, angle_noise, encoders, angle_encoders)
+    if plan is not None:
+        if measured is not None:
+            raise InputError("a plan needs no measurements", "--plan")
+        return _plan(machine, plan, free, measure, stated, output, json)
+    if measured is None:
+        raise InputError("a CSV file of measurements expected, or --plan", "calibrate")
+    if measure is not None:
+        raise InputError("goes with --plan; the columns of a file of measurements tell what was measured", "--measure")
+    announce_compiling()
+    from ..calibration.calibration import calibrate as calibrate_machine
+    from ..export.calibration import format_calibrated_yaml, render_residuals_png
+
+    rows = read_measurements(machine, measured, centre, stated)
+    result = calibrate_machine(machine, rows, free, "linear" if plain else "soft_l1")
+    contents: dict[str, tuple[Path | None, Content]] = {}
+    if output is not None:
+        contents["machine"] = output, format_calibrated_yaml(result)
+    if picture is not None:
+        contents["picture"] = picture, render_residuals_png(result)
+    files = _write(contents)
+    if json:
+        from ..export.json.calibration import encode_calibration
+
+        print_json(encode_calibration(result, files))
+    else:
+        print_text("\n".join([_format_calibration(result), *(f"{kind}  {path}" for kind, path in files.items())]))
+    return 0
+
+
+def _check_outputs(plan: int | None, output: Path | None, picture: Path | None) -> None:
+    ending = ".yaml" if plan is None else ".csv"
+    if output is not None and output.suffix.lower() != ending:
+        raise InputError(f"{quote(output)}: expected a file name that ends in {ending}", "--output")
+    if picture is not None and (plan is not None or picture.suffix.lower() != ".png"):
+        what = "a plan has none" if plan is not None else f"{quote(picture)}: expected a file name that ends in .png"
+        raise InputError(what, "--picture")
+
+
+def _write(contents: dict[str, tuple[Path | None, Content]]) -> dict[str, str]:
+    from ..export.files import write_files
+
+    files = {}
+    for kind, (path, content) in contents.items():
+        assert path is not None
+        write_files(path.parent, {path.name: content})
+        files[kind] = str(path)
+    return files
+
+
+def _parse_noise(length: str | None, angle: str | None, slide: str | None, turn: str | None) -> Noise:
+    from ..calibration.measurements import Noise, check_noise
+
+    def parse(text: str, option: str, kind: QuantityKind) -> float:
+        try:
+            return parse_quantity(text, kind)
+        except QuantityError as error:
+            raise InputError(str(error), option) from None
+
+    result = Noise()
+    for field, text, option, kind in (
+        ("length", length, "--noise", LENGTH),
+        ("angle", angle or "0.001deg", "--angle-noise", ANGLE),
+        ("slide", slide, "--encoders", LENGTH),
+        ("turn", turn, "--angle-encoders", ANGLE),
+    ):
+        if text is not None:
+            result = replace(result, **{field: parse(text, option, kind)})
+            try:
+                check_noise(result)
+            except PoseError as error:
+                raise InputError(str(error), option) from None
+    return result
+
+
+def read_measurements(machine: Machine, path: Path, centre: str | None, noise: Noise) -> Measurements:
+    """Read a file of measurements; its header tells what was measured.
+
+    Raises :class:`InputError` with file and line.
+    """
+    from ..calibration.measurements import make_measurements
+    from .rows import read_rows
+    from .values import parse_row
+
+    try:
+        with path.open(encoding="utf-8-sig") as file:
+            header = file.readline()
+    except OSError as error:
+        raise InputError(f"cannot be read: {error.strerror}", str(path)) from error
+    except UnicodeDecodeError:
+        raise InputError("not a text file in UTF-8", str(path)) from None
+    words = [cell.partition("[")[0].strip().strip('"').lower() for cell in header.split(",")]
+    axes = [axis for axis in machine.axes if axis.lower() in words]
+    names, units = [*machine.joints, *axes], [*machine.joint_units]
+    units += [unit for axis, unit in zip(machine.axes, machine.axis_units, strict=True) if axis in axes]
+    has_distance = _DISTANCE in words
+    if not axes and not has_distance:
+        wanted = ", ".join((*machine.joints, *machine.axes))
+        raise InputError(f"its header names nothing measured, expected {wanted} (or {_DISTANCE})", str(path), 1)
+    if has_distance:
+        names, units = [*names, _DISTANCE], [*units, "mm"]
+    elif centre is not None:
+        raise InputError(f"goes with a column {_DISTANCE}", "--centre")
+    values, _ = read_rows(path, names, units)
+    point = None if centre is None else parse_row(centre.split(","), ("X", "Y", "Z"), ("mm",) * 3, None, "--centre")
+    count = len(machine.joints)
+    coordinates = values[:, count : count + len(axes)] if axes else None
+    distances = values[:, -1:] if has_distance else None
+    try:
+        return make_measurements(
+            machine, values[:, :count], coordinates, " ".join(axes) or None, distances, point, noise
+        )
+    except PoseError as error:
+        raise InputError(str(error), str(path)) from None
+
+
+def _plan(
+    machine: Machine,
+    count: int,
+    free: list[str] | None,
+    measure: str | None,
+    noise: Noise,
+    output: Path | None,
+    json: bool,
+) -> int:
+    announce_compiling()
+    from ..calibration.plan import plan_measurements
+    from ..export.tables.poses import PoseTable, format_pose_csv
+
+    result = plan_measurements(machine, count, free, measure, noise)
+    table = format_pose_csv(PoseTable(machine, result.poses, result.joints, [""] * len(result.poses)))
+    files = {} if output is None else _write({"plan": (output, table)})
+    if json:
+        from ..export.json.calibration import encode_plan
+
+        print_json(encode_plan(result, files))
+    elif output is None:
+        print_text(table.rstrip("\n"))
+    else:
+        print_text("\n".join([_format_plan(result), *(f"{kind}  {path}" for kind, path in files.items())]))
+    return 0
+
+
+def _format_plan(plan: MeasurementPlan) -> str:
+    return (
+        f"{plan.machine.name}: {len(plan.poses)} poses to measure {' '.join(plan.axes)}; the tool's error after the "
+        f"calibration, root mean square: {1e3 * plan.error:.3g} um"
+    )
+
+
+def _format_calibration(calibration: Calibration) -> str:
+    measured, name = calibration.measured, calibration.family.machine.name
+    what = " ".join([*measured.axes, *([_DISTANCE] if measured.distances is not None else [])])
+    lines = [f"{name}: {len(calibration.sizes)} numbers from {len(measured.joints)} measurements of {what}\n"]
+    rows = []
+    for before, found in zip(calibration.family.parameters, calibration.parameters, strict=True):
+        digits = _LENGTH_DIGITS if found.unit == "mm" else _ANGLE_DIGITS
+        numbers = before.value, found.value, found.value - before.value, found.deviation or 0.0
+        texts = [format_fixed(to_display(number, found.unit), digits) for number in numbers]
+        rows.append((found.name, *texts, name_display_unit(found.unit)))
+    lines.append(format_table(rows, ("number", "was", "is", "change", "deviation", ""), " rrrr"))
+    lines.append("")
+    if calibration.fixed:
+        more = f" and {len(calibration.fixed) - _MOST_NAMED} more" if len(calibration.fixed) > _MOST_NAMED else ""
+        lines.append(f"kept, for others replace them: {' '.join(calibration.fixed[:_MOST_NAMED])}{more}")
+    if calibration.centre.size:
+        lines.append("distances from " + ", ".join(format_fixed(x, _LENGTH_DIGITS) for x in calibration.centre) + " mm")
+    if calibration.outliers:
+        rows_told = " ".join(str(row + 1) for row in calibration.outliers[:_MOST_NAMED])
+        lines.append(f"outliers: measurement{'s' * (len(calibration.outliers) > 1)} {rows_told}")
+    lines.append(
+        f"weighed residual {calibration.fit:.3g} (1: what the stated noise explains), "
+        f"{calibration.held_out:.3g} of measurements that the fit did not know"
+    )
+    return "\n".join(lines)

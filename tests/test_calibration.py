@@ -12,7 +12,7 @@ import pytest
 
 import parakin as pk
 from parakin.calibration.calibration import choose_family
-from parakin.calibration.plan import choose_rows
+from parakin.calibration.measurement_plan import choose_rows
 from parakin.calibration.poses import sample_allowed_poses
 from parakin.cli import main
 from parakin.errors import PoseError

@@ -12,8 +12,8 @@ from .version import __version__
 if TYPE_CHECKING:
     from .calibration.calibration import Calibration, calibrate
     from .calibration.identifiability import UnidentifiableError
+    from .calibration.measurement_plan import MeasurementPlan, plan_measurements
     from .calibration.measurements import Measurements, Noise, make_measurements
-    from .calibration.plan import MeasurementPlan, plan_measurements
     from .controllers.joints.program import make_joint_program
     from .controllers.joints.program_reader import JointProgram, read_joint_program
     from .controllers.linuxcnc.configuration import make_linuxcnc_configuration
@@ -180,7 +180,7 @@ _LAZY = {
     "Job": "toolpath.job",
     "JointProgram": "controllers.joints.program_reader",
     "Machine": "machine",
-    "MeasurementPlan": "calibration.plan",
+    "MeasurementPlan": "calibration.measurement_plan",
     "Measurements": "calibration.measurements",
     "Mesh": "export.workspace.meshes",
     "Noise": "calibration.measurements",
@@ -218,7 +218,7 @@ _LAZY = {
     "make_linuxcnc_program": "controllers.linuxcnc.program",
     "make_measurements": "calibration.measurements",
     "make_mesh": "export.workspace.meshes",
-    "plan_measurements": "calibration.plan",
+    "plan_measurements": "calibration.measurement_plan",
     "prepare": "toolpath.job",
     "prepare_turned": "toolpath.turned_job",
     "read_joint_program": "controllers.joints.program_reader",

@@ -80,6 +80,13 @@ class Calibration:
         """The calibrated machine."""
         return self.family.at(self.sizes)
 
+    @cached_property
+    def error(self) -> float:
+        """The tip's error that the covariance predicts over the workspace, root mean square, mm."""
+        poses = sample_allowed_poses(self.family.machine, _STRUCTURAL, _SEED)
+        tip = sum(axis in "XYZ" for axis in self.family.machine.axes)
+        return float(np.sqrt((self.predict_deviations(poses)[:, :tip] ** 2).sum(1).mean()))
+
     @property
     def parameters(self) -> tuple[Parameter, ...]:
         """The numbers found, with their standard deviations."""
@@ -270,7 +277,8 @@ class CalibrationProblem:
 
         def compute_slopes(x: Array) -> Array:
             at = locate(x)
-            return np.asarray(np.nan_to_num(-np.hstack([self.weigh_slopes(at), self.weigh_centre(at)]) * scales), np.float64)
+            slopes: Array = -np.hstack([self.weigh_slopes(at), self.weigh_centre(at)]) * scales
+            return np.asarray(np.nan_to_num(slopes), np.float64)
 
         result = least_squares(
             compute_residuals, np.zeros(len(begin)), compute_slopes, loss=loss, f_scale=_OUTLIER, xtol=1e-11, ftol=1e-11

@@ -79,7 +79,7 @@ class MeasuredFamily:
         tip_axes = [axis for axis in axes if axis in _TIP]
         rows = [tip_axes.index(axis) for axis in measured.axes]
         columns = [axes.index(axis) for axis in measured.axes]
-        parts = [measured.values - poses[:, columns]]
+        differences = [measured.values - poses[:, columns]]
         slopes, of_joints = [by_sizes[:, rows]], [by_joints[:, rows]]
         of_centre = np.zeros((count, len(rows), centre.size))
         if measured.distances is not None:
@@ -89,11 +89,11 @@ class MeasuredFamily:
             lengths = np.linalg.norm(tips - point, axis=1)
             along = (tips - point) / lengths[:, None]
             own = along[:, [_TIP.index(axis) for axis in tip_axes]]
-            parts.append((measured.distances - lengths)[:, None])
+            differences.append((measured.distances - lengths)[:, None])
             slopes.append(np.einsum("ni,nik->nk", own, by_sizes[:, : len(tip_axes)])[:, None])
             of_joints.append(np.einsum("ni,nik->nk", own, by_joints[:, : len(tip_axes)])[:, None])
             of_centre = np.concatenate([of_centre, -along[:, None, : centre.size]], 1)
-        joined = (np.concatenate(pieces, 1) for pieces in (parts, slopes, of_joints))
+        joined = (np.concatenate(pieces, 1) for pieces in (differences, slopes, of_joints))
         residuals, by_size, by_joint = joined
         return Linearised(residuals, by_size, of_centre, by_joint)
 

@@ -16,8 +16,8 @@ from .options import Json, Name, Sizes, load_machine
 
 if TYPE_CHECKING:
     from ..calibration.calibration import Calibration
+    from ..calibration.measurement_plan import MeasurementPlan
     from ..calibration.measurements import Measurements, Noise
-    from ..calibration.plan import MeasurementPlan
     from ..export.files import Content
     from ..machine import Machine
 
@@ -82,9 +82,9 @@ def calibrate(
     machine = load_machine(name, sizes)
     _check_outputs(plan, output, picture)
     stated = _parse_noise(noise, angle_noise, encoders, angle_encoders)
+    if plan is not None and measured is not None:
+        raise InputError("a plan needs no measurements", "--plan")
     if plan is not None:
-        if measured is not None:
-            raise InputError("a plan needs no measurements", "--plan")
         return _plan(machine, plan, free, measure, stated, output, json)
     if measured is None:
         raise InputError("a CSV file of measurements expected, or --plan", "calibrate")
@@ -92,23 +92,28 @@ def calibrate(
         raise InputError("goes with --plan; the columns of a file of measurements tell what was measured", "--measure")
     announce_compiling()
     from ..calibration.calibration import calibrate as calibrate_machine
-    from ..export.calibration import format_calibrated_yaml, render_residuals_png
 
     rows = read_measurements(machine, measured, centre, stated)
-    result = calibrate_machine(machine, rows, free, "linear" if plain else "soft_l1")
-    contents: dict[str, tuple[Path | None, Content]] = {}
+    _show(calibrate_machine(machine, rows, free, "linear" if plain else "soft_l1"), output, picture, json)
+    return 0
+
+
+def _show(calibration: Calibration, output: Path | None, picture: Path | None, json: bool) -> None:
+    """Write the files of a calibration, and print it."""
+    from ..export.calibration import format_calibrated_yaml, render_residuals_png
+
+    contents: dict[str, tuple[Path, Content]] = {}
     if output is not None:
-        contents["machine"] = output, format_calibrated_yaml(result)
+        contents["machine"] = output, format_calibrated_yaml(calibration)
     if picture is not None:
-        contents["picture"] = picture, render_residuals_png(result)
+        contents["picture"] = picture, render_residuals_png(calibration)
     files = _write(contents)
     if json:
         from ..export.json.calibration import encode_calibration
 
-        print_json(encode_calibration(result, files))
+        print_json(encode_calibration(calibration, files))
     else:
-        print_text("\n".join([_format_calibration(result), *(f"{kind}  {path}" for kind, path in files.items())]))
-    return 0
+        print_text("\n".join([_format_calibration(calibration), *(f"{kind}  {path}" for kind, path in files.items())]))
 
 
 def _check_outputs(plan: int | None, output: Path | None, picture: Path | None) -> None:
@@ -120,12 +125,11 @@ def _check_outputs(plan: int | None, output: Path | None, picture: Path | None) 
         raise InputError(what, "--picture")
 
 
-def _write(contents: dict[str, tuple[Path | None, Content]]) -> dict[str, str]:
+def _write(contents: dict[str, tuple[Path, Content]]) -> dict[str, str]:
     from ..export.files import write_files
 
     files = {}
     for kind, (path, content) in contents.items():
-        assert path is not None
         write_files(path.parent, {path.name: content})
         files[kind] = str(path)
     return files
@@ -207,7 +211,7 @@ def _plan(
     json: bool,
 ) -> int:
     announce_compiling()
-    from ..calibration.plan import plan_measurements
+    from ..calibration.measurement_plan import plan_measurements
     from ..export.tables.poses import PoseTable, format_pose_csv
 
     result = plan_measurements(machine, count, free, measure, noise)
@@ -255,4 +259,5 @@ def _format_calibration(calibration: Calibration) -> str:
         f"weighed residual {calibration.fit:.3g} (1: what the stated noise explains), "
         f"{calibration.held_out:.3g} of measurements that the fit did not know"
     )
+    lines.append(f"the tip is known to {1e3 * calibration.error:.3g} um over the workspace, root mean square")
     return "\n".join(lines)

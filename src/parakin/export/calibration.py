@@ -21,11 +21,13 @@ def format_calibrated_yaml(calibration: Calibration) -> str:
     lines = [
         f"# Calibrated from {len(calibration.measured.joints)} measurements; weighed residual {calibration.fit:.3g}, "
         f"{calibration.held_out:.3g} of measurements that the fit did not know.",
-        "# Numbers found, with their standard deviations:",
+        "# Numbers parameter, with their standard deviations:",
     ]
-    for found in calibration.parameters:
-        value, deviation = (to_display(number, found.unit) for number in (found.value, found.deviation or 0.0))
-        lines.append(f"# {found.name}: {value:.9g} +- {deviation:.2g} {name_display_unit(found.unit)}")
+    for parameter in calibration.parameters:
+        value, deviation = (
+            to_display(number, parameter.unit) for number in (parameter.value, parameter.deviation or 0.0)
+        )
+        lines.append(f"# {parameter.name}: {value:.9g} +- {deviation:.2g} {name_display_unit(parameter.unit)}")
     if calibration.fixed:
         lines.append(f"# Kept, for others replace them: {' '.join(calibration.fixed)}")
     return "\n".join([*lines, calibration.machine.format_yaml()])

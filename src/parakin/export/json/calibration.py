@@ -11,7 +11,7 @@ from .performance import encode_pose
 if TYPE_CHECKING:
     from ...calibration.calibration import Calibration
     from ...calibration.identifiability import Combination
-    from ...calibration.plan import MeasurementPlan
+    from ...calibration.measurement_plan import MeasurementPlan
 
 
 def encode_calibration(calibration: Calibration, files: Mapping[str, str]) -> dict[str, Any]:
@@ -24,16 +24,17 @@ def encode_calibration(calibration: Calibration, files: Mapping[str, str]) -> di
         "measured": [*measured.axes, *(["distance"] if measured.distances is not None else [])],
         "parameters": [
             {
-                "name": found.name,
-                "unit": name_display_unit(found.unit),
-                "was": to_display(before.value, found.unit),
-                "value": to_display(found.value, found.unit),
-                "deviation": to_display(found.deviation or 0.0, found.unit),
+                "name": parameter.name,
+                "unit": name_display_unit(parameter.unit),
+                "was": to_display(before.value, parameter.unit),
+                "value": to_display(parameter.value, parameter.unit),
+                "deviation": to_display(parameter.deviation or 0.0, parameter.unit),
             }
-            for before, found in zip(calibration.family.parameters, calibration.parameters, strict=True)
+            for before, parameter in zip(calibration.family.parameters, calibration.parameters, strict=True)
         ],
         "fixed": list(calibration.fixed),
         "centre": calibration.centre.tolist() or None,
+        "error": calibration.error,
         "residual": {"fit": calibration.fit, "held_out": calibration.held_out},
         "residuals": calibration.residuals.tolist(),
         "outliers": [row + 1 for row in calibration.outliers],

@@ -18,6 +18,8 @@ function addSection(title) {
   return section;
 }
 
+const FARTHEST = 4; // of a slider's length: beyond its ends no number is taken
+
 // A slider with its number, in the unit that people read; calls change with the value in mm or rad.
 function addSlider(section, {name, unit, low, high}, change) {
   const factor = factorOf(unit), dot = makeElement("i"), step = unit === "rad" ? 0.01 : 0.001;
@@ -26,8 +28,9 @@ function addSlider(section, {name, unit, low, high}, change) {
   for (const input of [range, number]) {
     input.setAttribute("aria-label", `${name}, ${unit === "rad" ? "degrees" : unit}`);
     input.addEventListener(input === range ? "input" : "change", () => {
-      if (Number.isFinite(input.valueAsNumber)) change(input.valueAsNumber / factor);
-      else announce();
+      const value = input.valueAsNumber / factor, farthest = FARTHEST * (high - low);
+      if (value > low - farthest && value < high + farthest) change(value);
+      else setState(current, `${name}: ${Number.isFinite(value) ? "beyond what is shown" : "a number expected"}`);
     });
   }
   section.append(makeElement("div", {className: "row"}, makeElement("b", {title: name}, dot, name), range, number,

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from .controllers.linuxcnc.program import make_linuxcnc_program
     from .export.calibration import format_calibrated_yaml, render_residuals_png
     from .export.files import write_files
-    from .export.machine.picture import render_machine_html, render_machine_png
+    from .export.machine.picture import render_machine_png
     from .export.page.page import render_machine_page, render_path_page
     from .export.report.report import render_report
     from .export.workspace.meshes import Mesh, make_mesh
@@ -118,7 +118,6 @@ __all__ = [
     "read_path",
     "read_tool_table",
     "region",
-    "render_machine_html",
     "render_machine_page",
     "render_machine_png",
     "render_path_page",
@@ -225,7 +224,6 @@ _LAZY = {
     "read_path": "toolpath.reading.detect",
     "read_tool_table": "toolpath.reading.tool_table",
     "region": "workspaces.certified.region:make_region",
-    "render_machine_html": "export.machine.picture",
     "render_machine_page": "export.page.page",
     "render_path_page": "export.page.page",
     "render_machine_png": "export.machine.picture",

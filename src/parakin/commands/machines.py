@@ -14,6 +14,7 @@ from ..export.number_format import format_fixed
 from ..units import name_display_unit
 from .console import format_table, print_json, print_text
 from .options import Json, Name, Sizes, load_machine
+from .page import spare_foreign_file
 
 if TYPE_CHECKING:
     from ..machine import Machine
@@ -56,6 +57,7 @@ def show(
     *,
     output: Annotated[Path | None, Parameter(name=["--output", "-o"])] = None,
     yaml: bool = False,
+    force: bool = False,
     json: Json = False,
     sizes: Sizes = None,
 ) -> int:
@@ -66,11 +68,13 @@ def show(
     name
         A shipped machine's name or a YAML file.
     output
-        Where to put the picture of the machine at home: an .html to turn and look at, or a .png. By default NAME.html
-        in this folder; with --json or --yaml none.
+        Where to put the picture of the machine at home: an .html on which it moves (see parakin page), or a .png. By
+        default NAME.html in this folder; with --json or --yaml none.
     yaml
         Print a machine file with every number explicit, a group for each leg: to write the numbers of a calibrated
         machine into, or to keep those of --set. Reading it gives the same machine, bit for bit.
+    force
+        Overwrite an .html that parakin did not write.
     """
     if yaml and json:
         raise InputError("only one of --yaml and --json, expected what to print", "--yaml")
@@ -78,7 +82,7 @@ def show(
     if output is None and not (json or yaml):
         output = Path(f"{machine.name}.html")
     if output is not None:
-        _write_picture(machine, output)
+        _write_picture(machine, output, force)
     if json:
         files = {} if output is None else {"picture": str(output)}
         print_json(encode_machine(machine, files))
@@ -92,15 +96,18 @@ def show(
     return 0
 
 
-def _write_picture(machine: Machine, output: Path) -> None:
+def _write_picture(machine: Machine, output: Path, force: bool) -> None:
     kind = output.suffix.lower()
     if kind not in (".html", ".png"):
         raise InputError(f'"{output}": expected a file name that ends in .html or .png', "--output")
     from ..export.files import write_files
-    from ..export.machine.picture import render_machine_html, render_machine_png
+    from ..export.machine.picture import render_machine_png
+    from ..export.page.page import render_machine_page
 
-    render = render_machine_html if kind == ".html" else render_machine_png
-    write_files(output.parent, {output.name: render(machine)})
+    if kind == ".html":
+        spare_foreign_file(output, force)
+    content = render_machine_page(machine) if kind == ".html" else render_machine_png(machine)
+    write_files(output.parent, {output.name: content})
 
 
 def _format_number(value: float | str | None) -> str:

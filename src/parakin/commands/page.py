@@ -59,11 +59,10 @@ def page(
     output = Path(f"{chosen.name if machine is None else Path(name).stem}.html") if output is None else output
     if output.suffix.lower() != ".html":
         raise InputError(f'"{output}": expected a file name that ends in .html', "--output")
+    spare_foreign_file(output, force)
     from ..export.files import write_files
-    from ..export.page.page import is_page, render_machine_page, render_path_page
+    from ..export.page.page import render_machine_page, render_path_page
 
-    if not force and output.exists() and not is_page(output):
-        raise InputError("no page that parakin wrote; nothing is written, --force overwrites it", str(output))
     if machine is None:
         content, runs = render_machine_page(chosen), True
     else:
@@ -76,6 +75,14 @@ def page(
     else:
         print_text(f"page  {output}{'' if runs else '  (off limits)'}")
     return 0 if runs else OFF_LIMITS
+
+
+def spare_foreign_file(output: Path, force: bool) -> None:
+    """Raise :class:`InputError` where a file stands that parakin did not write as a page."""
+    from ..export.page.page import is_page
+
+    if not force and output.exists() and not is_page(output):
+        raise InputError("no page that parakin wrote; nothing is written, --force overwrites it", str(output))
 
 
 def _prepare(machine: Machine, part: Path, workpiece: str | None, tool_length: str | None, mode: str | None) -> Job:

@@ -77,26 +77,6 @@ def build_machine_traces(scene: Scene, name: str, scale: float, colour: str | No
     return traces
 
 
-def build_label_trace(scene: Scene, name: str) -> PlotTrace:
-    """Build the drives' names at their places."""
-    places = np.array([place for _, place in scene.labels])
-    trace: PlotTrace = {"type": "scatter3d", "mode": "text", **split_coordinates(places, 1)}
-    trace |= {"text": [escape(text) for text, _ in scene.labels], "textfont": {"size": 13, "color": INK}}
-    return trace | {"textposition": "top right", "hoverinfo": "skip", "legendgroup": name, "showlegend": False}
-
-
-def build_frame_traces(frame: Points, size: float, text: str, group: str) -> list[PlotTrace]:
-    """Build the axes of a frame: X red, Y green, Z blue, with their letters; ``text`` names the frame at its origin."""
-    traces = []
-    for letter, axis, colour in zip("XYZ", frame[:, :3].T, ("#c62828", "#2e7d32", "#1565c0"), strict=True):
-        ends = np.array([frame[:, 3], frame[:, 3] + size * axis])
-        trace: PlotTrace = {"type": "scatter3d", "mode": "lines+text", **split_coordinates(ends, 1)}
-        trace |= {"text": [text if letter == "X" else "", letter], "textfont": {"size": 12, "color": colour}}
-        trace |= {"line": {"color": colour, "width": 4}, "hoverinfo": "skip", "showlegend": False, "legendgroup": group}
-        traces.append(trace)
-    return traces
-
-
 def build_scene_layout(boxes: Iterable[Points], normal: Points | None) -> Figure:
     """Lay out a 3D figure around (2, 3) boxes, with equal scales; a planar machine is seen straight on."""
     corners = np.vstack(list(boxes))

@@ -1,8 +1,7 @@
-"""A machine's picture: an interactive page, or a PNG."""
+"""A machine's picture: a PNG."""
 
 from __future__ import annotations
 
-from html import escape
 from io import BytesIO
 from typing import Any
 
@@ -10,53 +9,11 @@ import numpy as np
 
 from ...arguments import RowsLike, check_arguments
 from ...machine import Machine
-from ..number_format import format_value
-from .figures import (
-    INK,
-    build_frame_traces,
-    build_label_trace,
-    build_machine_traces,
-    build_scene_layout,
-    embed_figure,
-    render_page,
-)
+from .figures import INK
 from .scene import Points, Scene, build_scene
 from .solids import LOOKS, build_solids
 
 _LIGHT = np.array([0.35, -0.65, 0.70]) / np.linalg.norm([0.35, -0.65, 0.70])
-
-
-@check_arguments
-def render_machine_html(machine: Machine, pose: RowsLike | None = None) -> str:
-    """Render a self-contained HTML page with the machine at a pose, (axes,) mm and rad, home by default."""
-    drawn = build_scene(machine, pose)
-    size = drawn.size
-    traces = build_machine_traces(drawn, "machine", size)
-    if drawn.labels:
-        traces.append(build_label_trace(drawn, "machine"))
-    for name, frame in drawn.frames.items():
-        traces += build_frame_traces(frame, 0.09 * size, "", name)
-    layout = build_scene_layout([drawn.box], drawn.normal)
-    layout["showlegend"] = False
-    at = machine.home if pose is None else machine.rows(pose, machine.axes, "pose")[0][0]
-    rows = "".join(
-        f"<tr><td>{escape(name)}</td><td class=n>{format_value(value, unit)}</td></tr>"
-        for names, units, values in (
-            (machine.axes, machine.axis_units, at),
-            (machine.joints, machine.joint_units, machine.inverse(at)),
-        )
-        for name, unit, value in zip(names, units, values, strict=True)
-    )
-    what = "Home" if pose is None else "Pose"
-    body = (
-        f"<header><h1>{escape(machine.spec.title or machine.name)}</h1>"
-        f"<p class=sub>{escape(machine.name)}: axes {escape(' '.join(machine.axes))}, "
-        f"joints {escape(' '.join(machine.joints))}</p></header>\n"
-        f"<section class=card>{embed_figure('machine', {'data': traces, 'layout': layout}, '720px')}</section>\n"
-        f"<section class=card><h2>{what} and joints</h2><table class=narrow>{rows}</table>"
-        f"<p class=sub>{escape(machine.spec.source)}</p></section>\n"
-    )
-    return render_page(machine.spec.title or machine.name, body)
 
 
 @check_arguments

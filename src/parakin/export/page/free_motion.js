@@ -12,7 +12,7 @@ scene.add(freeMotion);
 const singularity = {share: 1}; // det A over home's
 
 function updateFreeMotion(state) {
-  singularity.share = homeSide === 0 ? 0 : measureSide(state) / homeSide;
+  singularity.share = measureSide(state) / (abs(homeSide) > 1e-9 ? homeSide : 1); // of one where home itself is singular
   const nearness = 1 - abs(singularity.share) / NEAR_SINGULAR;
   freeMotion.visible = nearness > 0;
   if (!freeMotion.visible) return;

@@ -9,7 +9,9 @@ from pathlib import Path
 from string import Template
 from typing import TYPE_CHECKING, Any
 
-from ...arguments import check_arguments
+import numpy as np
+
+from ...arguments import RowsLike, check_arguments
 from ...errors import PoseError
 from ...machine import Machine
 from .machine_data import encode_page_machine
@@ -39,9 +41,17 @@ def is_page(path: Path) -> bool:
 
 
 @check_arguments
-def render_machine_page(machine: Machine) -> str:
-    """Render a self-contained HTML page on which a machine moves: by its tool, its joints and its modes."""
-    return _render_page(machine, " ".join(machine.spec.title.split()) or machine.name, None)
+def render_machine_page(machine: Machine, pose: RowsLike | None = None) -> str:
+    """Render a self-contained HTML page on which a machine moves: by its tool, its joints and its modes.
+
+    pose : (axes,) mm and rad, at which it stands at first; home by default
+
+    Raises :class:`PoseError` for a pose out of reach.
+    """
+    begin = machine.home if pose is None else machine.rows(pose, machine.axes, "pose")[0]
+    if not np.isfinite(machine.inverse(begin)).all():
+        raise PoseError("pose: one within reach expected")
+    return _render_page(machine, " ".join(machine.spec.title.split()) or machine.name, begin.ravel().tolist(), None)
 
 
 @check_arguments
@@ -54,12 +64,13 @@ def render_path_page(posted: Posted, trajectory: Trajectory | None = None) -> st
         raise PoseError("posted: a path with records expected, this one has no motion")
     path = encode_page_path(posted, trajectory)
     title = f"{path['source']} on {' '.join(posted.machine.spec.title.split()) or posted.machine.name}"
-    return _render_page(posted.machine, title, path)
+    return _render_page(posted.machine, title, posted.machine.home.tolist(), path)
 
 
-def _render_page(machine: Machine, title: str, path: dict[str, Any] | None) -> str:
+def _render_page(machine: Machine, title: str, begin: list[float], path: dict[str, Any] | None) -> str:
     what = f"{machine.name}: axes {' '.join(machine.axes)}, joints {' '.join(machine.joints)}"
-    data = f"const path = {json.dumps(path, separators=(',', ':'), allow_nan=False)};\n"
+    given = {"begin": begin, "path": path}
+    data = f"const {{begin, path}} = {json.dumps(given, separators=(',', ':'), allow_nan=False)};\n"
     return Template(_read_text("page.html")).substitute(
         mark=_MARK,
         title=escape(title),

@@ -14,7 +14,7 @@ from ..export.number_format import format_fixed
 from ..units import name_display_unit
 from .console import format_table, print_json, print_text
 from .options import Json, Name, Sizes, load_machine
-from .page import spare_foreign_file
+from .page import refuse_foreign_file
 
 if TYPE_CHECKING:
     from ..machine import Machine
@@ -105,7 +105,7 @@ def _write_picture(machine: Machine, output: Path, force: bool) -> None:
     from ..export.page.page import render_machine_page
 
     if kind == ".html":
-        spare_foreign_file(output, force)
+        refuse_foreign_file(output, force)
     content = render_machine_page(machine) if kind == ".html" else render_machine_png(machine)
     write_files(output.parent, {output.name: content})
 

@@ -59,7 +59,7 @@ def page(
     output = Path(f"{chosen.name if machine is None else Path(name).stem}.html") if output is None else output
     if output.suffix.lower() != ".html":
         raise InputError(f'"{output}": expected a file name that ends in .html', "--output")
-    spare_foreign_file(output, force)
+    refuse_foreign_file(output, force)
     from ..export.files import write_files
     from ..export.page.page import render_machine_page, render_path_page
 
@@ -77,7 +77,7 @@ def page(
     return 0 if runs else OFF_LIMITS
 
 
-def spare_foreign_file(output: Path, force: bool) -> None:
+def refuse_foreign_file(output: Path, force: bool) -> None:
     """Raise :class:`InputError` where a file stands that parakin did not write as a page."""
     from ..export.page.page import is_page
 

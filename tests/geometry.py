@@ -21,6 +21,8 @@ class Description:
     mounting: list[tuple] = field(default_factory=list)
     limits: str = ""
     home: np.ndarray | None = None  # pose, in the order of axes
+    start: np.ndarray = field(default_factory=lambda: np.eye(3))
+    constraints: list[dict] = field(default_factory=list)  # points in planes, with their platform, foot and normal
 
     @classmethod
     def of(cls, spec):
@@ -34,7 +36,7 @@ class Description:
             [(s.axis, s.value, s.drive and s.drive.name, s.sign) for s in part]
             for part in (spec.head, spec.table, spec.mounting)
         ]
-        return cls(tuple(spec.motion), legs, *steps)
+        return cls(tuple(spec.motion), legs, *steps, constraints=[vars(each) for each in spec.constraints])
 
     @property
     def serial(self):
@@ -96,13 +98,45 @@ class Description:
             rotation = mount[:, :3, :3].transpose(0, 2, 1) @ rotation @ head[:, :3, :3].transpose(0, 2, 1)
         elif self.serial:
             k = np.einsum("nji,njk,nk->ni", mount[:, :3, :3], table[:, :3, :3], tool_axis(given["B"], given["C"]))
-            rotation, missed = self._led(tip, k, head)
+            rotation, missed = self._guided(tip, k, head) if self.constraints else self._led(tip, k, head)
         frame[:, :3, :3] = rotation
         frame[:, :3, 3] = tip - np.einsum("nij,nj->ni", rotation, head[:, :3, 3])
+        if self.constraints:
+            return frame, missed
         planar = [i for i, word in enumerate(("tx", "ty", "tz")) if word not in self.motion]
         if self.motion[0][0] == "t":
             frame[:, planar, 3] = 0.0
         return frame, missed
+
+    def open_planes(self, rotation, origin):
+        """How far the constraints' points are from their planes, (N, constraints), mm."""
+        far = []
+        for each in self.constraints:
+            span = origin + rotation @ np.array(each["platform"]) - np.array(each["foot"])
+            normal = np.broadcast_to(np.array(each["normal"]), span.shape)
+            if each["plane_of"] == "platform":
+                normal = np.einsum("nij,nj->ni", rotation, normal)
+            far.append((span * normal).sum(1))
+        return np.stack(far, 1)
+
+    def _guided(self, tip, k, head):
+        """Platform's rotation that keeps the constraints and points the tool, by Gauss and Newton from a start."""
+        rotation = np.broadcast_to(self.start, (len(k), 3, 3))
+
+        def measure(rotation):
+            origin = tip - np.einsum("nij,nj->ni", rotation, head[:, :3, 3])
+            aside = np.einsum("nij,nj->ni", rotation, head[:, :3, 2]) - k
+            return np.concatenate([self.open_planes(rotation, origin), 300.0 * aside], 1)
+
+        for _ in range(16):
+            here = measure(rotation)
+            turned = [rotation @ transform(word, 1e-6)[:, :3, :3] for word in ("rx", "ry", "rz")]
+            slopes = np.stack([(measure(r) - here) / 1e-6 for r in turned], 2)
+            step = -np.einsum("nij,nj->ni", np.linalg.pinv(slopes), here)
+            step *= np.minimum(1.0, 0.3 / np.maximum(np.linalg.norm(step, axis=1), 1e-300))[:, None]
+            for word, angle in zip(("rx", "ry", "rz"), step.T, strict=True):
+                rotation = rotation @ transform(word, angle)[:, :3, :3]
+        return rotation, np.linalg.norm(measure(rotation)[:, len(self.constraints) :], axis=1) / 300.0
 
     def _led(self, tip, k, head):
         """Platform's rotation under a driven head: none, or that of the central leg through the wrist's centre."""
@@ -127,10 +161,26 @@ class Description:
         return r, np.linalg.norm(seen - along, axis=1)
 
     def misses(self, poses, joints):
-        """The greatest distance, mm, by which a rod or a hinge misses its place, and the axis' error, both (N,)."""
+        """The greatest distance, mm, by which a rod or a hinge misses its place, and the axis' error, both (N,).
+
+        Constraints hold the platform in several ways: of these the one in which the rods miss least.
+        """
+        if not self.constraints:
+            return self._misses(poses, joints)
+        found = []
+        for turns in ([1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]):
+            self.start = np.diag(np.array(turns, float))
+            found.append(self._misses(poses, joints))
+        miss, tilt = (np.array(each) for each in zip(*found, strict=True))
+        best = (miss + 300.0 * tilt).argmin(0), np.arange(len(poses))
+        return miss[best], tilt[best]
+
+    def _misses(self, poses, joints):
         frame, missed = self.platform(poses, joints)
         tube = np.cross(frame[:, :3, 3], frame[:, :3, 2])  # a central leg's slides along the platform's z
         worst = [np.linalg.norm(tube, axis=1) * (self.motion[0][0] == "r")]
+        if self.constraints:
+            worst += list(np.abs(self.open_planes(frame[:, :3, :3], frame[:, :3, 3])).T)
         for leg in self.legs:
             end = frame[:, :3, 3] + frame[:, :3, :3] @ np.array(leg["platform"])
             worst += leg_misses(leg, end, [joints[:, self.joints.index(name)] for name in leg["joints"]])

@@ -9,7 +9,7 @@ from __future__ import annotations
 from itertools import repeat
 
 import numpy as np
-from independent import leg_of, orientation, tool_axis, transform, tricept
+from independent import leg_of, orientation, rotation, tool_axis, transform, tricept
 
 SIDES = [90.0, 210.0, 330.0]
 
@@ -207,6 +207,36 @@ def eclipse(s, poses):
     return np.stack([*angles, *heights], -1)
 
 
+def sprint_z3(s, poses):
+    """The 3-PRS turns without torsion, and its middle moves aside by r/2·(1 - cos B): Carretero and others (2000)."""
+    k, b, c = tool_axis(poses[:, 3], poses[:, 4]), poses[:, 3], poses[:, 4]
+    turn = rotation("z", c) @ rotation("y", b) @ rotation("z", -c)
+    aside = s["r"] * np.sin(b / 2.0) ** 2  # r/2·(1 - cos B)
+    ahead = c - np.pi / 2.0  # from the first rail
+    x, y = -aside * np.cos(2.0 * ahead), aside * np.sin(2.0 * ahead)
+    middle = np.stack([-y, x, poses[:, 2] - s["drop"] + s["tool"] * np.cos(b)], -1)
+    rails = []
+    for corner, angle in zip(on_circle(s["r"], SIDES), np.radians(SIDES), strict=True):
+        end = middle + turn @ corner
+        rails.append(end[:, 2] + leg_of(s["rod"], s["R"] - end @ [np.cos(angle), np.sin(angle), 0.0]))
+    return np.stack([*rails, *(middle - s["tool"] * k - poses[:, :3])[:, :2].T], -1)
+
+
+def exechon(s, poses):
+    """The platform turns by Rx(alpha)·Ry(beta): Bi and Jin (2011)."""
+    k = tool_axis(poses[:, 3], poses[:, 4])
+    centre = poses[:, :3] + s["tool"] * k
+    alpha = np.arctan2(centre[:, 1], -centre[:, 2])  # the plane of both struts holds the centre
+    x, y, z = (np.array([0.0, s["c"], 0.0]) - centre).T
+    beta = np.arctan2(x, np.cos(alpha) * z - np.sin(alpha) * y)  # and that of the third one too
+    turn = rotation("x", alpha) @ rotation("y", beta)
+    feet = np.array([[-s["a"], 0.0, 0.0], [s["a"], 0.0, 0.0], [0.0, s["c"], 0.0]])
+    corners = np.array([[-s["p"], 0.0, s["arm"]], [s["p"], 0.0, s["arm"]], [0.0, s["o"], s["arm"]]])
+    struts = strut_lengths(feet, [centre + turn @ corner for corner in corners])
+    kx, ky, kz = np.einsum("nji,nj->in", turn, k)
+    return np.concatenate([struts, np.stack([np.arctan2(ky, kx), np.arctan2(np.hypot(kx, ky), kz)], -1)], 1)
+
+
 PAIRS, SPREAD = [80, 100, 200, 220, 320, 340], [30, 150, 150, 270, 270, 30]
 INVERSES = {
     "variax": hexapod_of(PAIRS, [45, 135, 165, 255, 285, 15]),
@@ -235,5 +265,7 @@ INVERSES = {
         rrr3,
         prr3,
         eclipse,
+        sprint_z3,
+        exechon,
     )
 }

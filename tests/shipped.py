@@ -21,6 +21,8 @@ REPRESENTATIVES = [
     "tricept",
     "eclipse",
     "rrr3",
+    "sprint_z3",
+    "exechon",
 ]
 
 

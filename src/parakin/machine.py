@@ -301,6 +301,17 @@ class Machine(MachineProperties):
         a, b = (both[:, i * m * m : (i + 1) * m * m].reshape(-1, m, m) for i in (0, 1))
         return a, b, both[:, 2 * m * m :]
 
+    def constraint_rates(self, poses: RowsLike) -> Array:
+        """Compute the constraints' rates (n, c, c) by the parasitic motions, at rows of poses; NaN out of reach.
+
+        Columns are the parasitic translations, 1, then turns, mm; without constraints c is 0. See
+        :meth:`~.model.structures.Structure.list_constraint_rates`.
+        """
+        rows = self.rows(poses, self.axes, "poses")[0]
+        c = len(self.spec.constraints)
+        rates = np.empty((len(rows), c * c))
+        return (evaluate_tape(self.model.constraint_rates_tape(), rows, rates) if c else rates).reshape(len(rows), c, c)
+
     def place_platform(self, pose: RowsLike, mode: str, joints: RowsLike | None = None) -> PlatformPlacement:
         """Find the platform's frame for a pose (axes,), in a working mode or for the joints that a path takes there."""
         row, mode = self._read_one(pose, self.axes, "pose"), self.checked_mode(mode)
@@ -340,6 +351,10 @@ class Machine(MachineProperties):
     def trace_rates(self, pose: Sequence[Scalar], joints: Sequence[Scalar]) -> TwistRates:
         """Trace A and B of the tool's twist, and the legs' wrench norms."""
         return compute_twist_rates(self.spec, self.structure, pose, joints)
+
+    def trace_constraint_rates(self, pose: Sequence[Scalar]) -> list[list[Scalar]]:
+        """Trace the rates of the constraints, as :meth:`constraint_rates`."""
+        return self.model.trace_constraint_rates(pose)
 
     # Limits.
 

@@ -14,7 +14,7 @@ from .kinematics.closure_roots import compute_closure_tolerance
 from .kinematics.home import check_home
 from .kinematics.wrist.pose_angles import EVERY_DIRECTION, EVERY_ROTATION, EVERY_TURN
 from .kinematics.wrist.turning_joints import Wrist, find_wrist
-from .model.elements import Drive
+from .model.elements import Drive, PlaneConstraint
 from .model.equations import Equations
 from .model.geometric_parameters import Parameter, list_parameters, replace_parameters
 from .model.legs import Leg
@@ -85,6 +85,11 @@ class MachineProperties:
         return self.spec.legs
 
     @property
+    def constraints(self) -> tuple[PlaneConstraint, ...]:
+        """The closures without a drive."""
+        return self.spec.constraints
+
+    @property
     def closure_joints(self) -> list[int]:
         """The joint of each leg's closure, as an index in the joint vector."""
         return list_closure_joints(self.spec)
@@ -97,6 +102,11 @@ class MachineProperties:
     def leg_count(self) -> int:
         """How many of the joints are the legs'; those of head and table follow."""
         return self.model.leg_count
+
+    @property
+    def parallel_size(self) -> int:
+        """How many rows and columns of A tell parallel singularities."""
+        return self.model.parallel_size
 
     @property
     def leg_sizes(self) -> list[float]:

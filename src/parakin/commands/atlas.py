@@ -189,7 +189,9 @@ class _AtlasResults:
 
         self.ranges = ranges
         box = make_pose_box(self.region, ranges, self.length)
-        kinds: tuple[SingularityKind, ...] = ("parallel", "serial")
+        kinds: list[SingularityKind] = ["parallel", "serial"]
+        if self.region.machine.constraints:
+            kinds.append("constraint")
         self.proofs = [prove_no_singularity(box, kind, seconds=self.seconds) for kind in kinds]
         report = progress.stage("proving", 0.0, 1.0)
         if bounds is not None:

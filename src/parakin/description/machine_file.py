@@ -17,7 +17,16 @@ from ..model.elements import Limits
 from ..model.spec import Spec
 from .document import YamlMap, YamlText, read_document
 from .groups import Legs
-from .sections import TRANSFORMS, FileSection, HomeSection, LimitsSection, Mounting, Steps
+from .sections import (
+    TRANSFORMS,
+    ConstraintSection,
+    FileSection,
+    HomeSection,
+    LimitsSection,
+    ListOf,
+    Mounting,
+    Steps,
+)
 from .sizes import read_sizes
 from .values import Prose, ReadingContext, WordValue, describe_value, get_context, is_word
 
@@ -94,18 +103,33 @@ def read_machine(path: str | PathLike[str], parameters: Mapping[str, float | str
         head=machine.head,
         table=machine.table,
         limits=machine.limits.build_limits() if machine.limits else Limits(),
+        parasitic=machine.parasitic,
+        constraints=tuple(constraint.build() for constraint in machine.constraints),
     )
 
 
-def _read_motion(value: object, info: ValidationInfo) -> tuple[str, ...]:
+def _read_words(value: object) -> tuple[str, ...]:
     words = value.split() if isinstance(value, YamlText) else []
     if not words:
         raise ValueError(f"expected words such as tx ty rz, got {describe_value(value)}")
     for word in words:
         if word not in TRANSFORMS:
             raise ValueError(f"unknown word {quote(word)}{suggest(word, TRANSFORMS)}")
-    get_context(info).motion = tuple(words)
     return tuple(words)
+
+
+def _read_motion(value: object, info: ValidationInfo) -> tuple[str, ...]:
+    get_context(info).motion = _read_words(value)
+    return _read_words(value)
+
+
+def _read_parasitic(value: object, info: ValidationInfo) -> tuple[str, ...]:
+    words, context = _read_words(value), get_context(info)
+    for word in words:
+        if context.motion is not None and word not in context.motion:
+            raise ValueError(f"{quote(word)} is not in the motion {' '.join(context.motion)}")
+    context.parasitic = words
+    return words
 
 
 class _MachineSection(FileSection):
@@ -117,6 +141,8 @@ class _MachineSection(FileSection):
     sizes: Any = None  # read beforehand: all other values may use them
     mounting: Mounting = ()
     motion: Annotated[tuple[str, ...], PlainValidator(_read_motion)]
+    parasitic: Annotated[tuple[str, ...], PlainValidator(_read_parasitic)] = ()
+    constraints: Annotated[tuple[ConstraintSection, ...], ListOf] = ()
     legs: Legs
     head: Steps = ()
     table: Steps = ()

@@ -26,6 +26,8 @@ from ..model.elements import (
     Drive,
     Gap,
     Limits,
+    PlaneConstraint,
+    Point,
     Range,
     Step,
     Unit,
@@ -44,6 +46,7 @@ from .values import (
     LengthValue,
     Opening,
     PlacedError,
+    PointValue,
     WordValue,
     accept_words,
     describe_value,
@@ -262,6 +265,20 @@ class LimitsSection(FileSection):
             tuple(Cone(c.at, c.angle, Direction(c.axis) if c.axis else None) for c in self.cones),
             self.clearance,
         )
+
+
+class ConstraintSection(FileSection):
+    """A point of one body that stays in a plane of the other."""
+
+    where: ClassVar[str] = " in constraints"
+
+    plane_of: Annotated[Any, accept_words("body that carries the plane", "base", "platform")]
+    platform: PointValue
+    foot: PointValue
+    normal: DirectionValue
+
+    def build(self) -> PlaneConstraint:
+        return PlaneConstraint(self.plane_of, Point(self.platform), Point(self.foot), Direction(self.normal))
 
 
 class HomeSection(FileSection):

@@ -47,6 +47,7 @@ class ReadingContext:
     errors : those that leave the rest of a section readable
     joints : line and unit of each joint, by name
     motion : the words of the motion; None: not read, or not readable
+    parasitic : those of them that follow from the others
     legs_read : whether all joints of legs are known
     """
 
@@ -55,6 +56,7 @@ class ReadingContext:
     errors: list[InputError] = field(default_factory=list)
     joints: dict[str, tuple[int, Unit]] = field(default_factory=dict)
     motion: tuple[str, ...] | None = None
+    parasitic: tuple[str, ...] = ()
     legs_read: bool = False
 
     def report(self, message: str, line: int) -> None:

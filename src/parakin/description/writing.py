@@ -26,6 +26,7 @@ def format_spec(spec: Spec) -> str:
         f"source: {json.dumps(' '.join(spec.source.split()), ensure_ascii=False)}",
         *_list_steps("mounting", spec.mounting),
         f"motion: {' '.join(spec.motion)}",
+        *_list_constraints(spec),
         "legs:",
     ]
     for leg in spec.legs:
@@ -88,6 +89,17 @@ def _format_leg_value(value: Any, hint: Any) -> str:
         return _format_quantity(value, "mm")
     assert hint is Signs
     return f'"{value}"'
+
+
+def _list_constraints(spec: Spec) -> Iterator[str]:
+    if spec.constraints:
+        yield f"parasitic: {' '.join(spec.parasitic)}"
+        yield "constraints:"
+    for constraint in spec.constraints:
+        yield f"  - plane_of: {constraint.plane_of}"
+        yield f"    platform: {_format_pair(constraint.platform, 'mm')}"
+        yield f"    foot: {_format_pair(constraint.foot, 'mm')}"
+        yield f"    normal: {_format_direction(constraint.normal)}"
 
 
 def _list_steps(key: str, steps: Sequence[Step]) -> Iterator[str]:

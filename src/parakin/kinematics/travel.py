@@ -97,8 +97,7 @@ class _LineBounds:
         joints, placed, _ = model.invert(pose, self._mode, trace.input(2 * n + 1) if self._first_given else None)
         listed = model.margins(pose, joints, self._mode) if self._first_given else model.own_margins(pose, self._mode)
         rates = compute_twist_rates(model.spec, model.structure, pose, joints)
-        legs = len(rates.wrench_norms)
-        size = legs if n - legs == 2 else n  # of five axes head and table have no parallel singularity
+        size = model.parallel_size
         determinant = expand_determinant([row[:size] for row in rates.a[:size]])
         turning = [joints[i] for i in model.turning_joints]
         return [m for _, m in listed], determinant, turning, 1.0 if placed.freedom is None else placed.freedom

@@ -92,6 +92,21 @@ class Cone:
 
 
 @dataclass(frozen=True)
+class PlaneConstraint:
+    """A closure without a drive: a point of one body stays in a plane of the other, g(platform's frame) = 0, mm.
+
+    plane_of : which body carries the plane; the point is of the other one
+    platform, foot : in the frames of platform and base: the point, and the point through which the plane goes
+    normal : the plane's, in the frame of the body that carries it
+    """
+
+    plane_of: Literal["base", "platform"]
+    platform: Point
+    foot: Point
+    normal: Direction
+
+
+@dataclass(frozen=True)
 class Limits:
     """The limits of a machine besides its drives' ranges."""
 

@@ -47,6 +47,11 @@ class Equations:
         order = self.structure.serial_order
         return (self.leg_count + order[0], self.leg_count + order[1]) if order else None
 
+    @property
+    def parallel_size(self) -> int:
+        """How many rows and columns of A tell parallel singularities: the legs' alone where a wrist never matters."""
+        return len(self.axes) if self.wrist_joints is None else self.leg_count
+
     # Working modes: the signs of every leg's choices, then head and table's.
 
     @property
@@ -182,6 +187,11 @@ class Equations:
         """List the angles of head and table in a joint vector, offsets added."""
         serial = self.drives[self.leg_count :]
         return [q + drive.offset for drive, q in zip(serial, joints[self.leg_count :], strict=True)]
+
+    def trace_constraint_rates(self, pose: Sequence[Scalar]) -> list[list[Scalar]]:
+        """Compute the rates of the constraints at a pose; see :meth:`~.structures.Structure.list_constraint_rates`."""
+        placed = self.structure.place(pose, self.structure.branches)
+        return self.structure.list_constraint_rates(pose, placed.rotation, placed.origin)
 
     # Home.
 

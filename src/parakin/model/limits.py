@@ -115,6 +115,9 @@ def _list_bounds(
 def _list_reach(
     spec: Spec, placement: PlatformPlacement, reaches: Sequence[tuple[Reach, ...]]
 ) -> Iterator[tuple[Limit, Scalar]]:
+    for number, margin in enumerate(placement.constraint_reach):
+        which = f" {number + 1}" if len(placement.constraint_reach) > 1 else ""
+        yield Limit(f"constraints{which}.reach", f"the platform's constraints{which}", "1", "reach"), margin
     for margin in placement.reach:
         yield Limit("tool.reach", "the tool's axis", "1", "reach"), margin
     for leg, margins in zip(spec.legs, reaches, strict=True):

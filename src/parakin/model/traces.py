@@ -124,6 +124,14 @@ class Model(Equations):
 
         return self.keep_tape(("rates",), self._poses + len(self.drives), outputs)
 
+    def constraint_rates_tape(self) -> Tape:
+        """Compile pose -> the rates of the constraints; see :meth:`~.structures.Structure.list_constraint_rates`."""
+        return self.keep_tape(
+            ("constraint rates",),
+            self._poses,
+            lambda t: [rate for row in self.trace_constraint_rates(t.inputs(self._poses)) for rate in row],
+        )
+
     # Newton's method on the closures, in the motion's coordinates.
 
     def begin_tape(self, from_poses: bool = True) -> Tape:

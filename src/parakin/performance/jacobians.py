@@ -24,26 +24,42 @@ def list_twist_names(machine: Machine) -> tuple[str, ...]:
 
 @dataclass(frozen=True, eq=False)
 class ScaledRates:
-    """A and B (N, n, n) of :func:`compute_scaled_rates`, and how many of their first rows are the legs'."""
+    """A and B (N, n, n) of :func:`compute_scaled_rates`, and how many of their first rows are the legs'.
+
+    constraints : (N, c, c) the rates of the constraints with the parasitic motions; c is 0 without constraints
+    """
 
     a: Array
     b: Array
     legs: int
+    constraints: Array
 
 
 def compute_scaled_rates(machine: Machine, rows: Array, length: CharacteristicLength, mode: str | None) -> ScaledRates:
     """Compute A and B in one unit: angles times the length, legs' rows divided by their rods' lengths.
 
     A leg's row of A is a unit wrench, of B the part of each drive's motion that reaches the platform's joint; the rows
-    of head and table are 1/mm times the length. NaN out of reach.
+    of turning heads and tables are 1/mm times the length. NaN out of reach.
     """
     a, b, wrench_norms = machine.twist_rates(rows, machine.inverse(rows, mode))
     columns_a, columns_b = list_column_scales(machine, length)
     legs = wrench_norms.shape[1]
     with np.errstate(divide="ignore", invalid="ignore"):
-        tilt_factors = np.full((len(a), a.shape[1] - legs), length.factor)
-        factors = np.concatenate([1.0 / wrench_norms, tilt_factors], 1)[:, :, None]
-        return ScaledRates(a * columns_a * factors, b * columns_b * factors, legs)
+        serial_factors = np.full((len(a), a.shape[1] - legs), get_serial_factor(machine, length))
+        factors = np.concatenate([1.0 / wrench_norms, serial_factors], 1)[:, :, None]
+        constraints = machine.constraint_rates(rows) * list_constraint_scales(machine, length)
+        return ScaledRates(a * columns_a * factors, b * columns_b * factors, legs, constraints)
+
+
+def get_serial_factor(machine: Machine, length: CharacteristicLength) -> float:
+    """Return the factor of head and table's rows that brings them to mm: slides' are that already."""
+    return 1.0 if machine.structure.has_slides else length.factor
+
+
+def list_constraint_scales(machine: Machine, length: CharacteristicLength) -> Array:
+    """List the factors of the columns of the constraints' rates that leave them without unit."""
+    turns = machine.structure.parasitic_turns
+    return np.array([1.0] * (len(machine.constraints) - turns) + [1.0 / length.factor] * turns)
 
 
 def trace_unit_wrenches(machine: Machine, rates: TwistRates, length: CharacteristicLength) -> list[list[Scalar]]:
@@ -52,8 +68,8 @@ def trace_unit_wrenches(machine: Machine, rates: TwistRates, length: Characteris
     Each of a leg is a unit wrench. They are the legs' alone where head and table never matter, and their columns then
     the translations.
     """
-    count = machine.leg_count if machine.wrist is not None else len(machine.axes)
-    factors = [*(1.0 / norm for norm in rates.wrench_norms), *[length.factor] * (len(machine.axes) - machine.leg_count)]
+    count, others = machine.parallel_size, len(machine.axes) - machine.leg_count
+    factors = [*(1.0 / norm for norm in rates.wrench_norms), *[get_serial_factor(machine, length)] * others]
     scales = list_column_scales(machine, length)[0].tolist()
     return [[rates.a[row][i] * factors[row] * scales[i] for i in range(count)] for row in range(count)]
 

@@ -1,4 +1,4 @@
-"""Singularity margins: how far a machine is from its parallel and serial singularities, without unit, zero at them."""
+"""Singularity margins: how far a machine is from parallel, serial and constraint singularities; zero at them."""
 
 from __future__ import annotations
 
@@ -11,15 +11,25 @@ from .characteristic_length import CharacteristicLength, choose_characteristic_l
 from .jacobians import ScaledRates, compute_scaled_rates
 
 PARALLEL = "parallel"
+CONSTRAINT = "constraint"
 _ZERO = 1e-12  # a margin no greater has no sign
 
 
 def list_margin_names(machine: Machine) -> tuple[str, ...]:
-    """List the margins: ``parallel``, ``serial JOINT`` for each joint of the legs, ``serial JOINT-JOINT``."""
+    """List the margins: ``parallel``, ``serial JOINT`` for each joint of the legs, and what else the machine has.
+
+    ``serial JOINT-JOINT`` is of turning heads and tables, ``constraint`` of machines with constraints.
+    """
     order = machine.closure_joints
-    serial = machine.joints[len(order) :]
     names = [PARALLEL, *(f"serial {machine.joints[i]}" for i in order)]
-    return (*names, f"serial {'-'.join(serial)}") if serial else tuple(names)
+    if has_serial_turns(machine):
+        names.append(f"serial {'-'.join(machine.joints[len(order) :])}")
+    return (*names, CONSTRAINT) if machine.constraints else tuple(names)
+
+
+def has_serial_turns(machine: Machine) -> bool:
+    """Tell whether head and table have turning drives, and a serial margin of their own."""
+    return len(machine.joints) > machine.leg_count and not machine.structure.has_slides
 
 
 def compute_singularity_margins(
@@ -35,6 +45,9 @@ def compute_singularity_margins(
       joint need not.
     - serial, of head and table: |(a1 × a2)·k| of their turning axes and the tool's; of axes at right angles the sine of
       the angle between the tool and the first one.
+    - constraint: the determinant of the constraints' wrenches against the parasitic motions (angles times the
+      characteristic length), positive as at home. Where it is zero the platform moves though all independent
+      coordinates stand.
 
     Parameters
     ----------
@@ -61,11 +74,13 @@ def derive_margins(machine: Machine, rates: ScaledRates, signs: Array) -> Array:
 
 
 def _compute_determinants(machine: Machine, rates: ScaledRates) -> Array:
-    legs, n = rates.legs, rates.a.shape[1]
-    block = legs if n - legs == 2 else n
+    legs = rates.legs
+    block = machine.parallel_size
     with np.errstate(invalid="ignore"):
         columns = [np.linalg.det(rates.a[:, :block, :block])]
         columns += [rates.b[:, row, joint] for row, joint in enumerate(machine.closure_joints)]
-        if n > legs:
+        if has_serial_turns(machine):
             columns.append(np.abs(np.linalg.det(rates.b[:, legs:, legs:])))
+        if machine.constraints:
+            columns.append(np.linalg.det(rates.constraints))
     return np.stack(columns, 1)

@@ -110,7 +110,7 @@ class _BoxProof:
 
     def __init__(self, machine: Machine, home: Array):
         self.machine, self.home, self.rates = machine, home, MarginRates(machine, machine.mode)
-        self.least = find_least_margins(machine)[: 1 + machine.leg_count]
+        self.least = find_least_margins(machine)
         self.slowest = np.array([find_slowest_drive(machine, unit) for unit in machine.axis_units])
         self.drives = np.array([choose_drive_rates(drive) for drive in machine.drives])
         at_home, wrist = home[None], machine.wrist

@@ -21,8 +21,19 @@ from ...kinematics.wrist.pole_thresholds import EXACT, NEAR_MODE, SAME_AXIS, STA
 from ...machine import Machine
 from ...model.limits import Limit
 from ...performance.characteristic_length import choose_characteristic_length
-from ...performance.jacobians import list_column_scales, trace_unit_wrenches
-from ...performance.singularities import compute_singularity_margins, find_home_signs, list_margin_names
+from ...performance.jacobians import (
+    get_serial_factor,
+    list_column_scales,
+    list_constraint_scales,
+    trace_unit_wrenches,
+)
+from ...performance.singularities import (
+    CONSTRAINT,
+    compute_singularity_margins,
+    find_home_signs,
+    has_serial_turns,
+    list_margin_names,
+)
 from .axis_rates import choose_drive_rates
 from .home_pose import find_home_pose
 from .margin_signs import find_cheap_sign
@@ -192,7 +203,11 @@ def find_least_margins(machine: Machine) -> Array:
     home = compute_singularity_margins(machine, machine.home)
     least = np.full(len(home), LEAST_REGULARITY)
     least[0] *= abs(home[0])
-    least[1 + machine.leg_count :] = -1.0
+    names = list_margin_names(machine)
+    if CONSTRAINT in names:
+        least[names.index(CONSTRAINT)] *= abs(home[names.index(CONSTRAINT)])
+    if has_serial_turns(machine):
+        least[1 + machine.leg_count] = -1.0
     return least
 
 
@@ -304,15 +319,20 @@ def _compile_singularities(machine: Machine) -> Tape:
     length = choose_characteristic_length(machine)
     columns_b = list_column_scales(machine, length)[1].tolist()
     signs = find_home_signs(machine, length, machine.mode).tolist()
-    factors = [*(1.0 / norm for norm in rates.wrench_norms), *[length.factor] * (n - legs)]
+    factors = [*(1.0 / norm for norm in rates.wrench_norms), *[get_serial_factor(machine, length)] * (n - legs)]
     outputs = [signs[0] * expand_determinant(trace_unit_wrenches(machine, rates, length))]
     for number, joint in enumerate(machine.closure_joints):
         outputs.append(rates.b[number][joint] * factors[number] * (signs[1 + number] * columns_b[joint]))
-    if n > legs:
+    if has_serial_turns(machine):
         scale = float(np.prod(columns_b[legs:])) * length.factor ** (n - legs)
         serial = [row[legs:] for row in rates.b[legs:]]
         first, last = serial[0], serial[-1]
         outputs.append(absolute(first[0] * last[1] - first[1] * last[0] if n - legs == 2 else first[0]) * scale)
+    if machine.constraints:
+        scales = list_constraint_scales(machine, length).tolist()
+        constraints = machine.trace_constraint_rates(trace.inputs(n))
+        scaled = [[rate * k for rate, k in zip(row, scales, strict=True)] for row in constraints]
+        outputs.append(signs[-1] * expand_determinant(scaled))
     return compile_tape(trace, outputs, n + len(machine.joints))
 
 

@@ -16,7 +16,7 @@ import numpy as np
 from ...arrays import Array
 from ...machine import Machine
 from ...model.chain import UNIT, compose_chain
-from ...model.elements import ROTATIONS, Drive, Step
+from ...model.elements import ROTATIONS, Drive, PlaneConstraint, Step
 from ...model.structures import PlatformPlacement
 from .scene import Points, order_polygon
 
@@ -111,6 +111,10 @@ def build_multibody(machine: Machine) -> Multibody:
         leg_bodies, leg_loops = _build_leg(machine, number, np.array(points[number], float), own)
         bodies += leg_bodies
         loops += leg_loops
+    for number, constraint in enumerate(machine.constraints, 1):
+        body, loop = _build_plane(f"constraint{number}", constraint, placement)
+        bodies.append(body)
+        loops.append(loop)
     frames = {"tool": tool, "workpiece": workpiece}
     return Multibody((*bodies, *head, *table), tuple(loops), frames, machine.joints)
 
@@ -131,7 +135,7 @@ def _build_platform(machine: Machine, placement: PlatformPlacement, head: Points
         bars.append(np.array([ring.mean(axis=0), head]))
     bounds = {limit.name: limit.bound for limit in machine.limit_definitions}
     joints = []
-    if len(structure.coordinates) == _FREE:
+    if len(structure.coordinates) == _FREE or machine.constraints:
         joints.append(BodyJoint(PLATFORM, "free", np.zeros(3), np.zeros(3)))
         mount, base = np.array(structure.mount, float), np.array(structure.base, float)
         placed = mount @ rotation, mount @ origin + base
@@ -186,6 +190,23 @@ def _build_leg(machine: Machine, number: int, point: Points, joints: list[float]
     return bodies, loops
 
 
+def _build_plane(name: str, constraint: PlaneConstraint, placement: PlatformPlacement) -> tuple[Body, Loop]:
+    """Build a puck that slides in a constraint's plane, and the ball joint that holds it to the other body's point."""
+    rotation, origin = np.array(placement.rotation, float), np.array(placement.origin, float)
+    foot, platform = np.array(constraint.foot, float), np.array(constraint.platform, float)
+    if constraint.plane_of == "base":
+        carrier, other, place, point = BASE, PLATFORM, origin + rotation @ platform, platform
+    else:
+        carrier, other, place, point = PLATFORM, BASE, rotation.T @ (foot - origin), foot
+    in_plane = np.linalg.svd(np.array(constraint.normal, float)[None])[2][1:]
+    nowhere = np.zeros(3)
+    joints = tuple(
+        BodyJoint(f"{name}_{letter}", "slide", axis, nowhere) for letter, axis in zip("uv", in_plane, strict=True)
+    )
+    puck = Body(name, "carriage", carrier, np.eye(3), place, joints, (np.zeros((2, 3)),))
+    return puck, Loop(name, (name, other), (nowhere, point))
+
+
 def _build_chain(
     kind: str, steps: Sequence[Step], joints: Sequence[float], carrier: str
 ) -> tuple[list[Body], tuple[str, Array, Points]]:
@@ -201,7 +222,8 @@ def _build_chain(
         rotation, origin = _compose([*fixed, Step(step.axis, step.value + step.sign * value)])
         axis = step.sign * np.array(UNIT[step.axis], float)
         name = step.drive.name
-        joint = BodyJoint(name, "hinge", axis, np.zeros(3), value, step.drive.low, step.drive.high, step.drive)
+        way: Literal["slide", "hinge"] = "hinge" if step.axis in ROTATIONS else "slide"
+        joint = BodyJoint(name, way, axis, np.zeros(3), value, step.drive.low, step.drive.high, step.drive)
         bodies.append(Body(f"{name}_body", kind, carrier, rotation, origin, (joint,)))
         carrier, fixed = bodies[-1].name, []
     rotation, origin = _compose(fixed)

@@ -8,7 +8,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from ...arrays import Array, Flags, Indices, split_rows
+from ...arrays import Array, Flags, Indices, find_finite_rows, split_rows
 from ...model.traces import Model
 from ..assembly_side import bound_determinant, find_angle_signs
 from ..closure_roots import compute_closure_tolerance, compute_poses, find_roots
@@ -41,7 +41,8 @@ class Assemblies:
     complex_count : solutions that are not real; None of a closed form
     infinite_count : paths that ended at infinity; None of a closed form
     lost_count : paths that could not be followed; None of a closed form
-    untold_count : real solutions that no pose of this machine tells: its platform hangs there the other way round
+    untold_count : real solutions that no pose of this machine tells: its platform hangs there the other way round, or
+        its constraints hold it in another of their own solutions
     """
 
     poses: Array
@@ -83,14 +84,18 @@ def _find_in_block(model: Model, joints: Array) -> list[Assemblies]:
     answers = _describe(model, joints, [_make_empty_coordinates(model)] * len(joints), CLOSED_FORM)
     rows = np.flatnonzero(near)
     roots = find_real_roots(model, joints[rows])
-    described = _describe(model, joints[rows], [find_coordinates(model, own.points) for own in roots], ALL_PATHS)
-    for row, own, answer in zip(rows.tolist(), roots, described, strict=True):
+    coordinates = [find_coordinates(model, own.points) for own in roots]
+    with_pose = [find_finite_rows(own) for own in coordinates]
+    kept = [own[has_pose] for own, has_pose in zip(coordinates, with_pose, strict=True)]
+    described = _describe(model, joints[rows], kept, ALL_PATHS)
+    for row, own, has_pose, answer in zip(rows.tolist(), roots, with_pose, described, strict=True):
         answers[row] = replace(
             answer,
             complete=NOT_COMPLETE if own.lost_count else answer.complete,
             complex_count=own.complex_count,
             infinite_count=own.infinite_count,
             lost_count=own.lost_count,
+            untold_count=answer.untold_count + int((~has_pose).sum()),
         )
     return answers
 

@@ -23,6 +23,7 @@ _STRIDE = 1e-3  # along the null direction of a double root
 _SAME_SINGLE, _SAME_DOUBLE = 1e-7, 1e-5  # rad: between points of the same root, regular and double
 _AT_END = 0.99  # t from which on a path ends at a singular root: one that stops before is lost
 _PHASE = np.exp(1j)  # of the paths that are tracked where one of the first was lost
+_SAME_FRAME = 1e-4  # of a rotation's entries, and of the machine's size: a root's frame is the one that a pose tells
 _STEPS = 60  # of Newton's method at a double root, where each halves the distance
 
 
@@ -186,10 +187,20 @@ def _is_in_continuum(system: Array, point: Array) -> bool:
 
 
 def find_coordinates(model: Model, points: Array) -> Array:
-    """Compute the motion's coordinates (k, m) of real points (k, n) of a machine's family."""
+    """Compute the motion's coordinates (k, m) of real points (k, n) of a machine's family.
+
+    A row is NaN where constraints hold the platform as no pose tells it, in another of their solutions.
+    """
     quadrics = make_machine_quadrics(model)
     rotations, origins = compute_frames(points @ quadrics.family.hull)
     columns = model.structure.coordinates_of(
         [[rotations[:, i, j] for j in range(3)] for i in range(3)], list((origins * quadrics.size).T)
     )
-    return np.ascontiguousarray(np.stack(np.broadcast_arrays(*columns), 1))
+    coordinates = np.ascontiguousarray(np.stack(np.broadcast_arrays(*columns), 1))
+    if model.spec.constraints and len(coordinates):
+        with np.errstate(invalid="ignore", divide="ignore"):
+            turned, place = model.structure.frame(list(coordinates.T))
+        off = [np.abs(turned[i][j] - rotations[:, i, j]) for i in range(3) for j in range(3)]
+        off += [np.abs(place[i] / quadrics.size - origins[:, i]) for i in range(3)]
+        coordinates[~(np.max(np.broadcast_arrays(*off), 0) < _SAME_FRAME)] = np.nan
+    return coordinates

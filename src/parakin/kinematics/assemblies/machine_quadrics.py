@@ -15,9 +15,10 @@ from ...model.traces import Model
 from .generic_member import GenericMember, find_generic_member
 from .path_tracking import align_members, track_members
 from .quadric_family import Complex, QuadricFamily, draw_complex, make_family
-from .study import make_closure_quadrics
+from .study import make_closure_quadrics, make_inverse_closure_quadrics
 
 _SEED = 3
+_RIGID = ("tx", "ty", "tz", "rz", "ry", "rx")
 _SAMPLES = 60  # of joints
 _VARIES = 1e-9  # of the greatest singular value: a number that depends on the joints
 _AT_INFINITY = 1e-6  # |e| of a point of length one, in the machine's size
@@ -26,7 +27,8 @@ _AT_INFINITY = 1e-6  # |e| of a point of length one, in the machine's size
 class MachineQuadrics(NamedTuple):
     """What turns joints into a system of quadrics, lengths in ``size``.
 
-    matrices : (closures, 5, n, n) of |p|², p's coordinates and 1 for each closure's platform point
+    matrices : (closures, 5, n, n) of |p|², p's coordinates and 1 for each closure's platform point, and each
+        constraint's point
     trace, numbers : the five numbers of every closure, from zeros for the point and the joints
     """
 
@@ -59,10 +61,18 @@ def make_machine_quadrics(model: Model) -> MachineQuadrics:
 
     Raises :class:`NoMethodError` where a leg's closure puts its platform point on no sphere and no plane.
     """
-    family = make_family(tuple(model.spec.motion))
+    family = make_family(_name_family(model))
     trace, numbers, platforms = _list_closure_numbers(model)
     size = max(model.sizes)
-    matrices = family.hull @ np.array([make_closure_quadrics(p / size) for p in platforms]) @ family.hull.T
+    quadrics = [make_closure_quadrics(p / size) for p in platforms]
+    for constraint in model.spec.constraints:
+        foot, platform = np.array(constraint.foot, float), np.array(constraint.platform, float)
+        of_base = constraint.plane_of == "base"
+        quadrics.append(
+            make_closure_quadrics(platform / size) if of_base else make_inverse_closure_quadrics(foot / size)
+        )
+        numbers += [0.0, *constraint.normal, -float(np.dot(constraint.normal, foot if of_base else platform))]
+    matrices = family.hull @ np.array(quadrics) @ family.hull.T
     return MachineQuadrics(family, matrices, trace, numbers, size)
 
 
@@ -72,13 +82,19 @@ def find_own_member(model: Model) -> GenericMember:
 
     It has the machine's platform and feet, and generic complex numbers for what depends on the joints.
     """
-    quadrics, generic = make_machine_quadrics(model), find_generic_member(tuple(model.spec.motion))
+    quadrics, generic = make_machine_quadrics(model), find_generic_member(_name_family(model))
     family = quadrics.family
     system = family.make_member(quadrics.combine(_draw_numbers(quadrics.compute_numbers(_sample_joints(model)))))
     first, last = align_members(generic.system, system, len(family.fixed))
     ends = track_members(first, last, generic.roots)
     regular = (ends.reached[0] == 1.0) & (np.linalg.norm(ends.points[0] @ family.hull[:, :4], axis=1) > _AT_INFINITY)
     return GenericMember(system[0], ends.points[0][regular])
+
+
+def _name_family(model: Model) -> tuple[str, ...]:
+    """Name a motion's family by its words; all six in any order make every rigid motion, and one family."""
+    motion = tuple(model.spec.motion)
+    return _RIGID if sorted(motion) == sorted(_RIGID) else motion
 
 
 def _list_closure_numbers(model: Model) -> tuple[Trace, list[Scalar], list[Array]]:

@@ -79,6 +79,13 @@ def make_closure_quadrics(platform: Array) -> Array:
     return np.concatenate([square[None], coordinates, one[None]])
 
 
+def make_inverse_closure_quadrics(foot: Array) -> Array:
+    """Make the quadrics of :func:`make_closure_quadrics` for a point of the base, ``foot`` (3,), in the platform."""
+    inverse = np.array([1.0, -1.0, -1.0, -1.0] * 2)  # the inverse motion: both quaternions conjugated
+    quadrics: Array = make_closure_quadrics(foot) * inverse[:, None] * inverse
+    return quadrics
+
+
 def _add_mixed(quadric: Array, mixed: Array) -> None:
     """Add gᵀ·mixed·e to a symmetric quadric, in place."""
     quadric[4:, :4] += 0.5 * mixed

@@ -1,4 +1,4 @@
-"""The three ways in which a platform, a head and a table make a machine."""
+"""The ways in which a platform, a head and a table make a machine."""
 
 from __future__ import annotations
 
@@ -10,14 +10,21 @@ from .carried import Carried
 from .central_leg import CentralLeg
 from .five_axis import compute_axis_angles, compute_tool_axis
 from .free import Free
+from .guided import Guided
+from .guided_wrist import WristOnGuidedPlatform
+from .parasitic import check_parasitic_words
+from .sliding_table import SlidingTable
 
 __all__ = [
     "Carried",
     "CentralLeg",
     "DirectionColumns",
     "Free",
+    "Guided",
     "PlatformPlacement",
+    "SlidingTable",
     "Structure",
+    "WristOnGuidedPlatform",
     "compute_axis_angles",
     "compute_tool_axis",
     "make_structure",
@@ -29,6 +36,8 @@ def make_structure(spec: Spec) -> Structure:
     twice = [bound.name for bound in spec.limits.passive if spec.motion.count(bound.name) > 1]
     if twice:
         raise DescriptionError("limits", f"passive {twice[0]} stands twice in the motion, so it is not one coordinate")
+    if spec.constraints or spec.parasitic:
+        return _make_guided_structure(spec)
     drives = [(step.axis, step.drive.name) for step in (*spec.head, *spec.table) if step.drive is not None]
     for axis, name in drives:
         if axis in TRANSLATIONS:
@@ -46,3 +55,14 @@ def make_structure(spec: Spec) -> Structure:
             f"{' '.join(spec.motion)}: with a driven head or table it is tx ty tz, or a central leg (rx ry tz)",
         )
     return Carried(spec)
+
+
+def _make_guided_structure(spec: Spec) -> Structure:
+    """Find the structure of a machine whose constraints leave parasitic motions."""
+    check_parasitic_words(spec.motion, spec.parasitic, len(spec.constraints))
+    parasitic = [bound.name for bound in spec.limits.passive if bound.name in spec.parasitic]
+    if parasitic:
+        raise DescriptionError("limits", f"passive {parasitic[0]} is parasitic, and follows from the other coordinates")
+    if any(step.drive is not None for step in spec.head):
+        return WristOnGuidedPlatform(spec)
+    return SlidingTable(spec) if spec.table else Guided(spec)

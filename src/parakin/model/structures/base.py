@@ -15,7 +15,7 @@ from typing import Literal, NamedTuple
 
 from ...algebra import IDENTITY, ORIGIN, Mat, Scalar, Vec, norm
 from ..chain import UNIT, Pointing, compose_chain
-from ..elements import TRANSLATIONS
+from ..elements import ROTATIONS, TRANSLATIONS
 from ..legs.lambda_ import Lambda
 from ..spec import Spec
 
@@ -34,6 +34,7 @@ class PlatformPlacement:
     reach: tuple[Scalar, ...] = ()  # negative where head or table can't point the tool there
     freedom: Scalar | None = None  # 0 where the first joint of head or table is free
     off_axis: Vec | None = None  # the vector whose square that is
+    constraint_reach: tuple[Scalar, ...] = ()  # without unit, negative where the constraints can't be kept
 
 
 class DirectionColumns(NamedTuple):
@@ -58,6 +59,8 @@ class Structure(ABC):
     serial_order: tuple[int, ...] = ()  # the serial joints that turn them, in that order
     direction: DirectionColumns | None = None  # where of the orientation the tool's axis counts only
     has_central_leg: bool = False
+    carries_pole: bool = False  # the pose turns the platform, and with it the first axis of ``pointing``
+    has_slides: bool = False  # the table's drives slide it
     sign: float = 1.0  # of the central leg's length
     tip: Vec = ORIGIN  # of a fixed tool, in the platform's frame
     assembly_method: Literal["planar", "lambda"] | None = None  # closed form of the complete direct problem
@@ -72,7 +75,7 @@ class Structure(ABC):
     @property
     def has_turning_table(self) -> bool:
         """Whether drives turn the table."""
-        return any(step.drive is not None for step in self.spec.table)
+        return any(step.drive is not None and step.axis in ROTATIONS for step in self.spec.table)
 
     @property
     def lambda_legs(self) -> list[Lambda]:
@@ -96,6 +99,19 @@ class Structure(ABC):
         Head and table may stand in any of their modes. None where such a bound is not known.
         """
         return None
+
+    def list_constraint_rates(self, pose: Sequence[Scalar], rotation: Mat, origin: Vec) -> list[list[Scalar]]:
+        """List how fast each constraint changes with each parasitic motion, for the platform's frame at a pose.
+
+        A square matrix, translations first, then turns (mm); it is singular where the constraints fail to hold the
+        platform. Empty for a machine without constraints.
+        """
+        return []
+
+    @property
+    def parasitic_turns(self) -> int:
+        """How many of the parasitic motions are turns."""
+        return sum(word in ROTATIONS for word in self.spec.parasitic)
 
     @property
     def has_direction(self) -> bool:

@@ -33,6 +33,7 @@ from ..nominal_values import find_nominal_value
 from ..spec import Spec
 from .base import PlatformPlacement
 from .five_axis import FiveAxis, compute_axis_angles, turn_tool_axis
+from .wrist_centre import find_wrist_centre
 
 
 class CentralLeg(FiveAxis):
@@ -43,6 +44,7 @@ class CentralLeg(FiveAxis):
 
     pointing: Pointing
     has_central_leg = True
+    carries_pole = True
 
     def __init__(self, spec: Spec):
         super().__init__(spec)
@@ -69,18 +71,11 @@ class CentralLeg(FiveAxis):
 
     def _find_wrist_centre(self) -> tuple[Scalar, Scalar]:
         """Find (h, l): the point (0, 0, h) of the platform lies at the tip + l·k in every position of the head."""
-        poses = [(0.0, 0.0), (0.7, 0.4), (-1.1, 0.9), (0.3, -1.3)]
-        frames = [compose_chain(self.spec.head, angles[2 - self.head_joints :]) for angles in poses]
-        tips = [tip for _, tip in frames]
-        axes = [apply(rotation, UNIT["tz"]) for rotation, _ in frames]
-        change = sub(axes[1], axes[0])
-        length = -dot(sub(tips[1], tips[0]), change) / dot(change, change)
-        centres = [move_along(tip, k, length) for tip, k in zip(tips, axes, strict=True)]
-        height = centres[0][2]
-        off = [norm([find_nominal_value(x) for x in sub(c, (0.0, 0.0, height))]) for c in centres]
-        if max(off) > 1e-9 * (1.0 + abs(find_nominal_value(length)) + abs(find_nominal_value(height))):
+        centre, length = find_wrist_centre(self.spec.head)
+        height, *aside = (abs(find_nominal_value(x)) for x in (centre[2], centre[0], centre[1]))
+        if max(aside) > 1e-9 * (1.0 + abs(find_nominal_value(length)) + height):
             raise DescriptionError("head", "its axes must meet in one point of the central leg, on the tool's axis")
-        return height, length
+        return centre[2], length
 
     def _centre(self, tip: Sequence[Scalar], k: Vec) -> Vec:
         return transform_to_local(self.mount, self.base, move_along(tuple(tip), k, self.reach))

@@ -10,10 +10,10 @@ import numpy as np
 
 from ...arrays import Array
 from ..search import search_maxima_in_box
-from ..singularities import PARALLEL, compute_singularity_margins, list_margin_names
+from ..singularities import CONSTRAINT, PARALLEL, compute_singularity_margins, list_margin_names
 from .interval_matrices import PoseBox
 
-SingularityKind = Literal["parallel", "serial"]
+SingularityKind = Literal["parallel", "serial", "constraint"]
 
 ZERO = 1e-9  # a singularity margin no greater is a singularity
 
@@ -36,7 +36,8 @@ def find_singular_pose(box: PoseBox, kind: SingularityKind) -> tuple[Array, str]
 
 
 def _is_of_kind(name: str, kind: SingularityKind) -> bool:
-    return (name == PARALLEL) == (kind == "parallel")
+    of_kind = {PARALLEL: "parallel", CONSTRAINT: "constraint"}.get(name, "serial")
+    return of_kind == kind
 
 
 def _compute_margins(box: PoseBox, kind: SingularityKind, points: Array) -> Array:

@@ -14,7 +14,8 @@ from ...kernels.intervals import IntervalProgram, JumpFreeTrace
 from ...machine import Machine
 from ...model.rates import TwistRates
 from ..characteristic_length import CharacteristicLength
-from ..jacobians import list_column_scales
+from ..jacobians import list_column_scales, list_constraint_scales
+from ..singularities import has_serial_turns
 
 Matrix = Sequence[Sequence[Scalar]]
 
@@ -75,7 +76,7 @@ class PoseBox:
         columns_a, columns_b = list_column_scales(machine, self.length)
         a = [[x * float(k) for x, k in zip(row, columns_a, strict=True)] for row in rates.a]
         b = [[x * float(k) for x, k in zip(row, columns_b, strict=True)] for row in rates.b]
-        reach = [*platform.reach, *(reach.margin for leg in legs for reach in leg.reach)]
+        reach = [*platform.constraint_reach, *platform.reach, *(reach.margin for leg in legs for reach in leg.reach)]
         return TwistRates(a, b, rates.wrench_norms), reach
 
     @property
@@ -96,8 +97,7 @@ class PoseBox:
     @cached_property
     def parallel(self) -> Matrix:
         """The matrix that is singular at parallel singularities: A, of five axes the legs' rows by the translations."""
-        a, legs = self._rates[0].a, len(self._rates[0].wrench_norms)
-        size = legs if len(a) - legs == 2 else len(a)
+        a, size = self._rates[0].a, self.machine.parallel_size
         return [row[:size] for row in a[:size]]
 
     @cached_property
@@ -105,12 +105,26 @@ class PoseBox:
         """The matrix that is singular at serial singularities: the determinants of B's blocks on a diagonal."""
         b = self._rates[0].b
         blocks = [b[row][joint] for row, joint in enumerate(self.machine.closure_joints)]
+        if not has_serial_turns(self.machine):
+            return _put_on_diagonal(blocks)
         turns = [row[len(blocks) :] for row in b[len(blocks) :]]
         if len(turns) == 1:
             blocks.append(turns[0][0])
         elif turns:
             blocks.append(turns[0][0] * turns[1][1] - turns[0][1] * turns[1][0])
-        return [[blocks[i] if i == j else 0.0 for j in range(len(blocks))] for i in range(len(blocks))]
+        return _put_on_diagonal(blocks)
+
+    @cached_property
+    def constraint(self) -> Matrix:
+        """The matrix that is singular at constraint singularities: the constraints' rates, angles times the length."""
+        scales = list_constraint_scales(self.machine, self.length)
+        with np.errstate(all="ignore"):
+            rates = self.machine.trace_constraint_rates(self._pose)
+        return [[rate * float(k) for rate, k in zip(row, scales, strict=True)] for row in rates]
+
+
+def _put_on_diagonal(blocks: Sequence[Scalar]) -> Matrix:
+    return [[block if i == j else 0.0 for j in range(len(blocks))] for i, block in enumerate(blocks)]
 
 
 @dataclass(frozen=True, eq=False)

@@ -78,10 +78,11 @@ def prove_no_singularity(
     boxes: int = 200_000,
     seconds: float | None = SECONDS,
 ) -> Proof:
-    """Prove that a box of poses (see :func:`make_pose_box`) has no parallel or no serial singularities.
+    """Prove that a box of poses (see :func:`make_pose_box`) has no parallel, serial or constraint singularities.
 
-    Proved by interval regularity of A (of the diagonal of B) in parts of the box, each as large as possible; refuted by
-    a pose whose margin is zero, found by bisection between two poses with margins of opposite signs, or by a search.
+    Proved by interval regularity of A (of the diagonal of B, of the constraints' rates) in parts of the box, each as
+    large as possible; refuted by a pose whose margin is zero, found by bisection between two poses with margins of
+    opposite signs, or by a search.
     Undecided when ``boxes`` or ``seconds`` are spent.
     """
     claim, budget = f"no {kind} singularity", Budget(seconds, boxes)
@@ -92,7 +93,8 @@ def prove_no_singularity(
     if singular is not None:
         pose, name = singular
         return Proof(claim, "refuted", pose, f"{name} is singular there", boxes=budget.used)
-    matrix = box.parallel if kind == "parallel" else box.serial
+    matrices = {"parallel": lambda: box.parallel, "serial": lambda: box.serial, "constraint": lambda: box.constraint}
+    matrix = matrices[kind]()
     decide = decide_regular(MatrixBounds(matrix, box.inputs, box.trace), box.high - box.low)
     undecided = find_undecided_box(decide, box.low, box.high, budget)
     if undecided is None:

@@ -21,7 +21,7 @@ from ...workspaces.certified.separation import find_joined_cells
 from ...workspaces.certified.subdivision import Cells, OrientationBoxes, bound_margin
 from ...workspaces.connected.adjacency import find_adjacent_cells, label_components
 from ..search import pick_best_of_blocks
-from ..singularities import PARALLEL, list_margin_names
+from ..singularities import PARALLEL, has_serial_turns, list_margin_names
 from .free_angles import prove_free_angle
 from .margin_zeros import prove_sign_change, prove_stretched_leg
 
@@ -102,7 +102,7 @@ def _judge_left(
     if 1 <= number <= legs:
         margins = _trace_margins(region)[1 : legs + 1]
         position = prove_stretched_leg(region, margins, number - 1, starts, budget.take_fraction(_PROVING))
-    elif number > legs:  # of head and table
+    elif number == legs + 1 and region.machine.wrist is not None:
         position = prove_free_angle(region, starts)
         if position is not None and not np.isin(about.find_components(position), about.find_home(region)).any():
             position = None
@@ -138,12 +138,14 @@ def _trace_margins(region: Region) -> list[Scalar]:
     def compute_margins(pose: Sequence[Scalar]) -> list[Scalar]:
         with np.errstate(all="ignore"):  # a pose out of reach gives NaN
             rates = machine.trace_rates(pose, machine.trace_inverse(pose, region.mode)[0])
-        legs, n = len(rates.wrench_norms), len(rates.a)
-        size = legs if n - legs == 2 else n
+        legs, size = machine.leg_count, machine.parallel_size
         margins = [expand_determinant([row[:size] for row in rates.a[:size]])]
         margins += [rates.b[row][joint] for row, joint in enumerate(machine.closure_joints)]
-        if n > legs:
+        if has_serial_turns(machine):
             margins.append(absolute(expand_determinant([row[legs:] for row in rates.b[legs:]])))
+        if machine.constraints:
+            with np.errstate(all="ignore"):
+                margins.append(expand_determinant(machine.trace_constraint_rates(pose)))
         return margins
 
     at_home = compute_margins([np.float64(value) for value in machine.home])

@@ -101,10 +101,9 @@ class PathMotions:
 
     def compute_determinants(self, points: MotionPoints) -> Array:
         """Compute det A of unit wrenches, (n,): its sign changes where a motion passes a parallel singularity."""
-        a_scale, _, n = self._scales
+        a_scale, size = self._scales[0], self.machine.parallel_size
         a, _, wrench_norms = self.machine.twist_rates(points.poses, points.joints)
-        a, legs = a * a_scale, wrench_norms.shape[1]
-        size = legs if n - legs == 2 else n  # five axes: head and table never matter
+        a = a * a_scale
         with np.errstate(all="ignore"):
             determinants: Array = np.linalg.det(a[:, :size, :size]) / wrench_norms.prod(1)
         return determinants

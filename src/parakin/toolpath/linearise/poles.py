@@ -41,7 +41,7 @@ class Pole:
     @property
     def moves(self) -> bool:
         """Whether the pose turns the pole: a central leg carries it."""
-        return self.joint is not None and self.machine.structure.has_central_leg
+        return self.joint is not None and self.machine.structure.carries_pole
 
     @property
     def is_upright(self) -> bool:

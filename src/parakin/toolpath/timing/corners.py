@@ -114,7 +114,7 @@ def _find_bends_on_pole(machine: Machine, corner: Array, turn: Array) -> Flags:
     if wrist is None:
         return np.zeros(len(corner), np.bool_)
     moving = np.abs(turn[:, wrist.direction.c])
-    if machine.structure.has_central_leg:
+    if machine.structure.carries_pole:
         moving = np.maximum(moving, np.abs(turn).max(1))
     on_rim = wrist.find_free(corner, RIM + RIM_WIDTH) & ~wrist.find_free(corner, RIM - RIM_WIDTH)
     bends: Flags = (wrist.find_free(corner, PRINTED) | on_rim) & (moving > _BENT)

@@ -33,8 +33,7 @@ def _trace_leg_rows(traced: TracedPose, pose: Sequence[Scalar]) -> list[list[Sca
     machine = traced.machine
     with np.errstate(all="ignore"):  # a pose out of reach gives NaN
         rates = machine.trace_rates(pose, machine.trace_inverse(pose, traced.mode)[0])
-    legs = len(rates.wrench_norms)
-    size = legs if len(rates.a) - legs == 2 else len(rates.a)
+    size = machine.parallel_size
     return [row[:size] for row in rates.a[:size]]
 
 

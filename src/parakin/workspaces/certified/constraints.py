@@ -118,13 +118,13 @@ class TracedPose:
         """
         structure = self.machine.structure
         is_table_swept = bool(self.swept_axes) and structure.has_turning_table
-        if not structure.has_central_leg and not is_table_swept:
+        if not structure.carries_pole and not is_table_swept:
             return []
         with np.errstate(all="ignore"):
             _, platform, _ = self.machine.trace_inverse(self.pose, self.mode)
         margins, shifts = [], structure.bound_shift()
         for name, middle, most in self._list_reach_spheres(without):
-            if structure.has_central_leg:
+            if structure.carries_pole:
                 margins.append((name, most - norm(sub(platform.origin, middle.tolist()))))
             if is_table_swept and isfinite(shifts):  # turns keep lengths, and each shift adds at most its own
                 tip = [value for axis, value in zip(self.machine.axes, self.pose, strict=True) if axis in "XYZ"]

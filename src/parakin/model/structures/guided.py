@@ -1,0 +1,114 @@
+"""The motion's independent coordinates are the pose, and constraints tell the others."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from ...algebra import IDENTITY, Mat, Scalar, Vec, add, apply, atan2, product, sincos, sqrt, sub
+from ...algebra import make_axis_rotation as turned
+from ...errors import DescriptionError
+from ..chain import UNIT, compose_chain
+from ..elements import ROTATIONS, TRANSLATIONS
+from ..nominal_values import find_nominal_value
+from ..spec import Spec
+from .base import LETTERS, PlatformPlacement, Structure
+from .parasitic import (
+    FoundFrame,
+    TurnedByPlanes,
+    TurnInBasePlanes,
+    choose_branch,
+    has_planes_of,
+    list_independent_words,
+    list_rates,
+)
+
+
+class Guided(Structure):
+    """The pose is the motion's independent coordinates, and the others follow; tool and head are fixed frames.
+
+    Planes of the platform tell all three turns (axes X Y Z), or planes of the base tell the first turn of the motion,
+    rz, and some translations. Small turns are about the machine frame's axes.
+    """
+
+    def __init__(self, spec: Spec):
+        super().__init__(spec)
+        self.coordinates = list_independent_words(spec)
+        self.axes = tuple(LETTERS[word] for word in self.coordinates)
+        self.turns = tuple(f"w{word[1]}" for word in self.coordinates if word in ROTATIONS)
+        turn_words = tuple(word for word in spec.motion if word in ROTATIONS)
+        if turn_words != ("rz", "ry", "rx"):
+            raise DescriptionError(
+                "motion", f"{' '.join(spec.motion)}: its three turns go rz ry rx, as C, B and A of a pose do"
+            )
+        if any(step.axis in ROTATIONS and step.value for step in (*spec.mounting, *spec.head)):
+            raise DescriptionError(
+                "head", "a guided platform without a drive in head or table turns neither it nor its mounting"
+            )
+        _, self.tip = compose_chain(spec.head, ())
+        home = [float(spec.home.get(letter, 0.0)) for letter in self.axes]
+        self.turned: TurnedByPlanes | None = None
+        self.planes: TurnInBasePlanes | None = None
+        self.branch = 1.0
+        if self.coordinates == TRANSLATIONS and has_planes_of(spec, "platform"):
+            if any(find_nominal_value(x) for x in self.tip):
+                raise DescriptionError(
+                    "head", "planes of the platform tell its turns for the platform's origin: no head"
+                )
+            self.turned = TurnedByPlanes(spec)
+            self.turned.choose_branches(sub(home, self.base))
+        elif "rz" in spec.parasitic and self.parasitic_turns == 1 and has_planes_of(spec, "base"):
+            words = [word for word in TRANSLATIONS if word in spec.parasitic]
+            self.planes = TurnInBasePlanes(spec.constraints, words, self.tip)
+            self.branch = choose_branch(self._solve(home, ()).rotation[0][0])
+        else:
+            raise DescriptionError(
+                "constraints",
+                "no closed form is known: planes of the base tell rz and translations, planes of the platform rz ry rx",
+            )
+
+    @property
+    def middle_turn(self) -> int | None:
+        return self.coordinates.index("ry") if "ry" in self.coordinates else None
+
+    def _solve(self, pose: Sequence[Scalar], turn: Sequence[Scalar]) -> FoundFrame:
+        given = dict(zip(self.coordinates, pose, strict=True))
+        known = tuple(given.get(word, 0.0) - shift for word, shift in zip(TRANSLATIONS, self.base, strict=True))
+        if self.turned is not None:
+            return self.turned.find_frame(known)
+        assert self.planes is not None
+        before = IDENTITY
+        for word in ("ry", "rx"):
+            before = product(before, turned(word, *sincos(given[word])))
+        small = dict(zip(self.turns, turn, strict=False))
+        x, y = small.get("wx", 0.0), small.get("wy", 0.0)
+        guided = self.planes.solve(((1.0, 0.0, y), (0.0, 1.0, -x), (-y, x, 1.0)), "rz", known, self.branch, before)
+        return FoundFrame(guided.rotation, sub(guided.origin, apply(guided.rotation, self.tip)), guided.reach)
+
+    def place(self, pose: Sequence[Scalar], branch: str, first: Scalar | None = None) -> PlatformPlacement:
+        guided = self._solve(pose, ())
+        return PlatformPlacement(guided.rotation, guided.origin, list(pose), [], constraint_reach=guided.reach)
+
+    def frame(self, coordinates: Sequence[Scalar]) -> tuple[Mat, Vec]:
+        guided = self._solve(coordinates, ())
+        return guided.rotation, guided.origin
+
+    def coordinates_of(self, rotation: Mat, origin: Vec) -> list[Scalar]:
+        b = atan2(-rotation[2][0], sqrt(rotation[0][0] * rotation[0][0] + rotation[1][0] * rotation[1][0]))
+        tip = add(add(origin, apply(rotation, self.tip)), self.base)
+        angles = atan2(rotation[2][1], rotation[2][2]), b, atan2(rotation[1][0], rotation[0][0])
+        given = dict(zip((*TRANSLATIONS, *ROTATIONS), (*tip, *angles), strict=True))
+        return [given[word] for word in self.coordinates]
+
+    def pose(self, coordinates: Sequence[Scalar], serial: Sequence[Scalar]) -> list[Scalar]:
+        return list(coordinates)
+
+    def closure(
+        self, pose: Sequence[Scalar], serial: Sequence[Scalar], turn: Sequence[Scalar] = ()
+    ) -> tuple[Mat, Vec, list[Scalar]]:
+        guided = self._solve(pose, turn)
+        return guided.rotation, guided.origin, []
+
+    def list_constraint_rates(self, pose: Sequence[Scalar], rotation: Mat, origin: Vec) -> list[list[Scalar]]:
+        if self.turned is not None:
+            return self.turned.list_rates(rotation, origin)
+        return list_rates(self.spec, rotation, origin, [UNIT["tz"]])

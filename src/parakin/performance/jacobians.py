@@ -26,7 +26,7 @@ def list_twist_names(machine: Machine) -> tuple[str, ...]:
 class ScaledRates:
     """A and B (N, n, n) of :func:`compute_scaled_rates`, and how many of their first rows are the legs'.
 
-    constraints : (N, c, c) the rates of the constraints with the parasitic motions; c is 0 without constraints
+    constraints : (N, c, c) the constraints' unit wrenches against the parasitic motions; c is 0 without constraints
     """
 
     a: Array
@@ -48,6 +48,7 @@ def compute_scaled_rates(machine: Machine, rows: Array, length: CharacteristicLe
         serial_factors = np.full((len(a), a.shape[1] - legs), get_serial_factor(machine, length))
         factors = np.concatenate([1.0 / wrench_norms, serial_factors], 1)[:, :, None]
         constraints = machine.constraint_rates(rows) * list_constraint_scales(machine, length)
+        constraints /= np.linalg.norm(constraints, axis=2, keepdims=True)
         return ScaledRates(a * columns_a * factors, b * columns_b * factors, legs, constraints)
 
 

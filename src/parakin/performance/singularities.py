@@ -45,7 +45,7 @@ def compute_singularity_margins(
       joint need not.
     - serial, of head and table: |(a1 × a2)·k| of their turning axes and the tool's; of axes at right angles the sine of
       the angle between the tool and the first one.
-    - constraint: the determinant of the constraints' wrenches against the parasitic motions (angles times the
+    - constraint: the determinant of the constraints' unit wrenches against the parasitic motions (angles times the
       characteristic length), positive as at home. Where it is zero the platform moves though all independent
       coordinates stand.
 

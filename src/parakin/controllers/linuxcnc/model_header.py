@@ -7,7 +7,7 @@ from importlib.resources import files
 
 import numpy as np
 
-from ...algebra import Trace, absolute, expand_determinant
+from ...algebra import Trace, absolute, expand_determinant, norm
 from ...arrays import Array
 from ...kernels.newton import SLOW, WORTH
 from ...kernels.tape import Tape, compile_tape
@@ -319,7 +319,7 @@ def _compile_singularities(machine: Machine) -> Tape:
     length = choose_characteristic_length(machine)
     columns_b = list_column_scales(machine, length)[1].tolist()
     signs = find_home_signs(machine, length, machine.mode).tolist()
-    factors = [*(1.0 / norm for norm in rates.wrench_norms), *[get_serial_factor(machine, length)] * (n - legs)]
+    factors = [*(1.0 / size for size in rates.wrench_norms), *[get_serial_factor(machine, length)] * (n - legs)]
     outputs = [signs[0] * expand_determinant(trace_unit_wrenches(machine, rates, length))]
     for number, joint in enumerate(machine.closure_joints):
         outputs.append(rates.b[number][joint] * factors[number] * (signs[1 + number] * columns_b[joint]))
@@ -332,7 +332,8 @@ def _compile_singularities(machine: Machine) -> Tape:
         scales = list_constraint_scales(machine, length).tolist()
         constraints = machine.trace_constraint_rates(trace.inputs(n))
         scaled = [[rate * k for rate, k in zip(row, scales, strict=True)] for row in constraints]
-        outputs.append(signs[-1] * expand_determinant(scaled))
+        wrenches = [[rate * (1.0 / norm(row)) for rate in row] for row in scaled]
+        outputs.append(signs[-1] * expand_determinant(wrenches))
     return compile_tape(trace, outputs, n + len(machine.joints))
 
 

@@ -4,7 +4,8 @@ The path is the first passes of the turbine blade's finishing, at 10 m/min in th
 headless from the machine's home, in the same configuration but for the planner. Every servo cycle's joints are written
 down; the picture shows their speeds as fractions of what the joints are allowed, and the cycle times. The table has the
 same of four machines, at 10 and at 2 m/min, with ideal drives and with drives that follow within 2 % of their own
-limits, as programmed, as posted, and as posted with pauses and overrides amid it.
+limits, as programmed, as posted, and as posted with pauses and overrides amid it; and moves by MDI all over their
+workspaces.
 
     python linuxcnc_comparison.py [-o PICTURE]
 
@@ -23,15 +24,18 @@ import numpy as np
 import turbine_blade
 
 import parakin as pk
+from parakin.controllers.linuxcnc.axis_ranges import estimate_axis_ranges
+from parakin.controllers.linuxcnc.home_pose import find_home_pose
 
 HERE = Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE.parent / "tests" / "linuxcnc"))
-from planner import read_program  # noqa: E402
+from planner import Planner, read_program  # noqa: E402
 from simulation import CYCLE, as_programmed, first_line, simulated, trial, why_not  # noqa: E402
-from stub import outward, world  # noqa: E402
+from stub import FIELDS, outward, world  # noqa: E402
 
 RECORDS, SHOWN = 2000, 130  # of the whole operation, and of it here
 FEED, SLOW = 10_000.0, 2_000.0  # mm/min in the cut
+MOVES, FASTEST = 24, 1e6  # by MDI, mm/min
 RESERVE = 0.02  # of the drives, over the limits of the machine's description
 CHANGES = [  # s after the first record's turn has come; what the operator does then
     [1.0, "feedrate", 0.3],
@@ -102,7 +106,20 @@ def measure(machine, simulation, job, text, changes=()):
     run = simulation.run({"program": "part.ngc", "during": during}, {"part.ngc": text})
     told = run.seen.get("told", "")
     shown = slice(None) if told else run.part(first_line(text), world(machine, job.posted.poses[:1])[0])
-    joints = run.joints[shown]
+    return weigh(machine, run.joints[shown], told)
+
+
+def measure_moves(machine, simulation, blocks):
+    """Run blocks by MDI from home, one after the other; what the joints do, without the cycles in which all stand."""
+    run = simulation.run({"by hand": blocks}, seconds=400)
+    moves = (np.diff(run.joints, axis=0) != 0.0).any(axis=1)
+    near = moves | np.roll(moves, 1) | np.roll(moves, -1)
+    measured = weigh(machine, run.joints, run.seen.get("told", ""))
+    return measured._replace(speeds=measured.speeds[near])
+
+
+def weigh(machine, joints, told):
+    """Joints (cycles, joints) as shares of what they can do."""
     rows = (np.array([[getattr(d, rate) for d in machine.drives]]) for rate in ("speed", "acceleration"))
     speed, acceleration = (outward(machine, row) for row in rows)
     return Measured(
@@ -179,6 +196,39 @@ def compare(folder, place, feed):
     return machine, runs
 
 
+def draw_moves(machine, folder):
+    """Draw rapids all over the workspace that the planner takes and follows to their ends: blocks for MDI."""
+    rng, planner, home = np.random.default_rng(1), Planner(machine, folder), find_home_pose(machine)
+    low, high = (np.array(end) for end in estimate_axis_ranges(machine))
+    if machine.direction is not None:  # C is one of a pair with B: half a turn is all directions
+        low[machine.direction.c], high[machine.direction.c] = -np.pi / 2.0, np.pi / 2.0
+    ends = []
+    while len(ends) < MOVES:
+        here = ends[-1] if ends else home
+        poses = rng.uniform(low, high, (4096, len(low)))
+        ways = here + np.linspace(0.0, 1.0, 100)[:, None, None] * (poses[machine.check(poses) == 0] - here)
+        allowed = (machine.check(ways.reshape(-1, len(low))).reshape(ways.shape[:2]) == 0).all(axis=0)
+        for end in ways[-1, allowed][:1]:
+            planner.start(home)
+            moves = [lambda at=at: planner.line_to(at, FASTEST) for at in [*ends, end]]
+            if all(planner.run([move]).left == 0 and not planner.told for move in moves):
+                ends.append(end)
+    rows = world(machine, np.array(ends))
+    return [" ".join(["G53 G0", *(f"{a}{row[FIELDS.index(a)]:.4f}" for a in machine.axes)]) for row in rows]
+
+
+def compare_moves(folder, place):
+    """A machine's moves by MDI with both planners: rows of the table."""
+    machine = trial(place.name, folder)
+    blocks = draw_moves(machine, folder)
+    for drives, planner in (("ideal", "LinuxCNC's"), ("ideal", "parakin's"), ("limited", "parakin's")):
+        reserve = RESERVE if drives == "limited" else None
+        with simulated(machine, reserve=reserve, stock=planner == "LinuxCNC's") as simulation:
+            run = measure_moves(machine, simulation, blocks)
+        name = f"{place.name}, {MOVES} rapids by MDI"
+        print(f"| {name} | {drives} | as programmed | {planner} | | {run.describe()} |", flush=True)
+
+
 def show(target, machine, runs):
     """The picture: as programmed with LinuxCNC's planner, and as posted with parakin's."""
     chosen = [("ideal", "as programmed", "LinuxCNC's"), ("limited", "posted", "parakin's")]
@@ -206,6 +256,7 @@ def main():
                 machine, runs = compare(folder, place, feed)
                 if (place.name, feed) == ("tricept", FEED):
                     show(options.output, machine, runs)
+            compare_moves(folder, place)
     print(options.output)
 
 

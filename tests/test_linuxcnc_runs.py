@@ -126,14 +126,14 @@ def test_it_starts_homes_and_moves(machine, linuxcnc):
     by_hand, refused = TASKS.get(name, (away(machine), {}))
     if name in TASKS:
         shutil.copy(HERE / f"{name}.ngc", linuxcnc.folder / f"{machine.name}.ngc")
-    run = linuxcnc.run({"by hand": by_hand, "program": f"{machine.name}.ngc", "refused": list(refused)})
+    run = linuxcnc.run({"by hand": [by_hand], "program": f"{machine.name}.ngc", "refused": list(refused)})
     seen, poses, joints = run.seen, run.poses, run.joints
     assert "told" not in seen, seen
     assert run.done.returncode == 0
     home = world(machine, find_home_pose(machine)[None])[0]
     assert np.abs(np.array(seen["home"]) - home).max() < 1e-6
     for letter, value in words(by_hand).items():
-        assert abs(seen["by hand"][FIELDS.index(letter)] - value) < 1e-6
+        assert abs(seen["by hand"][0][FIELDS.index(letter)] - value) < 1e-6
     counts = slice(5 if machine.axes[3:] == ("B", "C") else 9)  # upright, it may have any C
     assert np.abs(np.array(seen["program"]) - home)[counts].max() < 1e-6
     assert np.abs(np.array(seen["at last"]) - seen["program"]).max() < 1e-6  # it stayed where it was

@@ -12,6 +12,7 @@ import time
 from pathlib import Path
 
 import linuxcnc
+from hang_dump import dump
 
 MOST = 200.0  # s for a step: a program may be slowed by the override
 TRAILS = 1e-7  # mm and degrees
@@ -19,9 +20,7 @@ PATIENCE = 1.0  # s for a mode to be in force
 LATE = 1.0  # s for the feedback to come to the command
 REST = 0.15  # s for which the machine must stand
 FLICKER = 1e-8  # mm and degrees: in joint mode the position is found anew in every cycle, and its last digits change
-WATCHED = 0.5  # s between two looks at the threads of a run that hangs
 DRAINING = 0.3  # s for the sampler's last rows
-PLAIN = (int, float, str, bool, tuple, list)
 
 
 class Operator:
@@ -211,36 +210,6 @@ class Operator:
 def read_pin(name):
     """Read a pin of HAL."""
     return subprocess.run(["halcmd", "getp", name], capture_output=True, text=True).stdout.strip()
-
-
-def dump(status):
-    status.poll()
-    names = [name for name in dir(status) if not name.startswith("_")]
-    state = {name: repr(getattr(status, name)) for name in names if isinstance(getattr(status, name), PLAIN)}
-    before = list_processes()
-    time.sleep(WATCHED)
-    return state | {"processes": before, "processes later": list_processes()}
-
-
-def list_processes():
-    """List this run's threads: name, where each waits, its state, and how often it has been switched to.
-
-    Of the realtime threads, which belong to root, name, state and switches can be read.
-    """
-    processes = {}
-    for folder in Path("/proc").glob("[0-9]*/task/[0-9]*"):
-        lines = [read(folder / name) for name in ("comm", "wchan", "syscall")]
-        kept = [line for line in read(folder / "status").splitlines() if line.startswith(("State", "voluntary"))]
-        processes[str(folder)] = " ".join([*lines, *kept])
-    return processes
-
-
-def read(path):
-    """Read what is there to be read."""
-    try:
-        return path.read_text().strip()
-    except OSError:
-        return "?"
 
 
 def work(task, seen):

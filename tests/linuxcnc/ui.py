@@ -11,9 +11,11 @@ import time
 from pathlib import Path
 
 import linuxcnc
+from hang_dump import dump
 
 MOST = 45.0  # s for a step
 REST = 0.05  # s
+UNDONE = -1  # LinuxCNC's answer to waiting, after 5 s
 DRAINING = 0.3  # s for the sampler's last rows
 
 
@@ -36,8 +38,7 @@ class Machine:
             if ready(self.status):
                 return
             time.sleep(0.005)
-        s = self.status
-        raise ToldError(f"not within {MOST:g} s: task {s.task_mode} {s.exec_state}, {s.interp_state} in {s.file}")
+        raise TimeoutError
 
     def tell(self, word, *arguments):
         getattr(self.command, word)(*arguments)
@@ -74,7 +75,11 @@ class Machine:
 
     def by_hand(self, block):
         self.tell("mode", linuxcnc.MODE_MDI)
-        self.tell("mdi", block)
+        self.command.mdi(block)
+        end = time.monotonic() + MOST
+        while self.command.wait_complete() == UNDONE:
+            if time.monotonic() > end:
+                raise TimeoutError
         return self.position()
 
     def program(self, name, during=()):
@@ -108,25 +113,27 @@ class Machine:
         return text
 
 
-def work(task, seen):
-    machine, joints = Machine(), task["joints"]
+def work(machine, task, seen):
+    joints = task["joints"]
     machine.switch_on(joints)
     seen["home"] = machine.home(joints)
-    if "by hand" in task:
-        seen["by hand"] = machine.by_hand(task["by hand"])
+    seen["by hand"] = [machine.by_hand(block) for block in task.get("by hand", ())]
     machine.tell("feedrate", task.get("override", 1.0))
-    seen["program"] = machine.program(task["program"], task.get("during", ()))
+    if "program" in task:
+        seen["program"] = machine.program(task["program"], task.get("during", ()))
     seen["refused"] = {block: machine.refusal(block) for block in task.get("refused", ())}
     seen["at last"] = machine.position()
 
 
 def main():
-    task, seen = json.loads(Path("task.json").read_text()), {}
+    task, seen, machine = json.loads(Path("task.json").read_text()), {}, Machine()
     with Path("samples.txt").open("w") as file, subprocess.Popen(["halsampler"], stdout=file) as sampler:
         try:
-            work(task, seen)
+            work(machine, task, seen)
         except ToldError as told:
             seen["told"] = str(told)
+        except TimeoutError:
+            seen["hung"] = {"sent": machine.command.serial, "state": dump(machine.status)}
         time.sleep(DRAINING)
         sampler.terminate()
     Path("seen.json").write_text(json.dumps(seen))

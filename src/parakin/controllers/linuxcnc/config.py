@@ -60,7 +60,8 @@ PARAMETER_FILE = {name}.var
 
 [EMCMOT]
 EMCMOT = motmod
-COMM_TIMEOUT = 1.0
+# Longer than a servo thread of an ordinary kernel stands still: LinuxCNC drops a command that is not taken by then.
+COMM_TIMEOUT = 5.0
 SERVO_PERIOD = 1000000
 {base_period}
 [EMCIO]

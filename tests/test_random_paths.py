@@ -64,6 +64,7 @@ def controller(request, tmp_path_factory):
 
 def find_missed(points, path, within):
     """The first of points (n, 3) that a polyline (m, 3) does not pass in their order; None if it passes them all."""
+    path = np.concatenate([path, path[-1:]])  # a tool that stands still has one point
     at, step = 0, np.diff(path, axis=0)
     square = np.maximum((step**2).sum(1), 1e-30)
     for i, point in enumerate(points):

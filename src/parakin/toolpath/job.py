@@ -21,6 +21,7 @@ from .posting.posted import Posted
 from .posting.tool_lengths import fit_tool_lengths
 from .timing import Corners, Trajectory, plan_trajectory
 from .timing.lost_time import explain_lost_time
+from .timing.pole_jumps import refuse_pole_jumps
 from .timing.stops import find_stops, sum_dwells
 
 _INTERPOLATED = 0.85  # of the axis's tolerance: what the controller's interpolation may take
@@ -178,8 +179,10 @@ def _prepare_in(
                 axis_tolerance=rounded.axis,
                 stops=find_stops(posted.path),
             )
+            if interpolation == "pose":
+                refuse_pole_jumps(trajectory.joint_path)
         except PoseError as error:
-            unplanned = str(error)
+            trajectory, unplanned = None, str(error)
     explained = None if trajectory is None else explain_lost_time(trajectory)
     if explained is not None:
         posted = _add_note(posted, explained)

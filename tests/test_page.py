@@ -5,7 +5,7 @@ import zipfile
 import numpy as np
 import pytest
 from browser import needs_chromium, open_browser, open_tab, wait_until
-from shipped import NAMES
+from shipped import NAMES, REPRESENTATIVES
 
 import parakin as pk
 from parakin.cli import main
@@ -305,3 +305,70 @@ def test_the_workspace_is_drawn_in_a_worker(pages, browser):
     x, y = (np.linspace(-700.0, 700.0, 701) for _ in range(2))
     lattice = np.stack(np.meshgrid(x, y, indexing="ij"), -1).reshape(-1, 2)
     assert volume == pytest.approx(4.0 * (machine.check(lattice) == 0).sum(), rel=0.02)
+
+
+SIZED = """([poses, signs, sizes]) => {
+  const plain = values => values.map(value => Number.isFinite(value) ? value : null);
+  sizes.forEach((size, i) => { model.sizes[i] = size; });
+  const begin = {pose: model.given().slice(0, machine.axes.length), signs};
+  begin.joints = model.inverse(begin.pose, signs);
+  return {
+    given: plain(model.given()),
+    side: measureSide(begin),
+    joints: poses.map(pose => plain(model.inverse(pose, signs))),
+    margins: poses.map(pose => plain(model.margins(pose, model.inverse(pose, signs), signs))),
+    forward: poses.map(pose => followJoints(begin, model.inverse(pose, signs)).state.pose),
+  };
+}"""
+
+
+@needs_chromium
+@pytest.mark.parametrize("name", REPRESENTATIVES)
+def test_sizes_are_inputs_of_a_page(name, browser):
+    """With other sizes a page computes as the machine that is read with these."""
+    machine = pk.load(name)
+    rates, rng = machine.size_rates, np.random.default_rng(11)
+    sizes = np.array(rates.nominal) * (1.0 + rng.uniform(-0.04, 0.04, len(rates.nominal)))
+    every = {**machine.spec.sizes, **dict(zip(rates.names, sizes.tolist(), strict=True))}
+    other = pk.load(name, parameters=every)
+    poses = seeded_poses(other, 5)
+    if other.direction is not None:
+        poses[:, other.direction.b] = np.abs(poses[:, other.direction.b])
+    poses = poses[np.isfinite(other.inverse(poses)).all(1)]
+    with open_tab(browser) as tab:
+        tab.add_script_tag(content=write_core(machine))
+        signs = [1 if sign == "+" else -1 for sign in machine.mode]
+        page = tab.evaluate(SIZED, [poses.tolist(), signs, sizes.tolist()])
+    assert as_numbers(page["joints"]) == pytest.approx(other.inverse(poses), abs=AGREE)
+    assert as_numbers(page["margins"]) == pytest.approx(other.margins(poses), abs=AGREE, rel=AGREE)
+    bounds = [limit.bound for limit in other.limit_definitions]
+    given = as_numbers(page["given"])
+    assert given[: len(machine.axes)] == pytest.approx(other.home, abs=AGREE)
+    assert given[len(machine.axes) :][: len(bounds)] == pytest.approx(bounds, abs=AGREE)
+    off = as_numbers(page["forward"]) - poses
+    off[:, machine.turning_columns] = wrap_angle(off[:, machine.turning_columns])
+    assert np.abs(off).max() < AGREE
+
+
+def test_sizes_that_change_numbers_unevenly_are_left_out():
+    assert pk.load("hexam").size_rates.names == ("R", "r", "rod", "tool")  # lean turns the rails
+    assert pk.load("tricept").size_rates.names == ("R", "r", "l1", "l2")
+    machine = pk.load("tricept").replace_parameters({"legs.d1.foot.x": 1.0})
+    assert machine.size_rates.names == ()  # of no file
+
+
+@needs_chromium
+def test_a_size_is_dragged(pages, browser):
+    with open_tab(browser) as tab:
+        tab.goto(pages("tricept"))
+        slider = tab.get_by_label("R, 1").first
+        slider.evaluate("input => { input.value = 380; input.dispatchEvent(new Event('input')); }")
+        machine = pk.load("tricept", parameters={"R": tab.evaluate("parakin.model.sizes[0]")})
+        assert abs(tab.evaluate("parakin.model.sizes[0]") - 380.0) < 1.0
+        assert tab.evaluate("parakin.state.joints") == pytest.approx(machine.inverse(machine.home), abs=AGREE)
+        tab.evaluate("parakin.moveToSizes([2000, 100, 300, 150])")  # struts end before that
+        assert tab.locator("#verdict").inner_text().startswith("Stopped: d")
+        tab.get_by_role("button", name="As in the file").click()
+        assert tab.evaluate("parakin.state.joints") == pytest.approx(
+            pk.load("tricept").inverse(machine.home), abs=AGREE
+        )

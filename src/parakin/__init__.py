@@ -155,13 +155,15 @@ def load(name: str | PathLike[str], parameters: Mapping[str, float | str] | None
         raise InputError(f"name: a text or a path expected, not a {type(name).__name__}")
     if parameters is not None and not (isinstance(parameters, Mapping) and all(isinstance(k, str) for k in parameters)):
         raise InputError(f"parameters: a dict by names expected, not a {type(parameters).__name__}")
+    from functools import partial
+
     from .description import find_key_line, find_machine_file, read_machine
     from .machine import Machine
 
     path = find_machine_file(name)
     spec = read_machine(path, parameters)
     try:
-        return Machine(spec)
+        return Machine(spec, partial(read_machine, path))
     except DescriptionError as error:
         raise InputError(str(error), fspath(path), find_key_line(path, error.key)) from None
 

@@ -13,7 +13,6 @@ from .arguments import RowsLike, bound_angles, check_range, describe_value, read
 from .arrays import Array
 from .errors import NoMethodError, PoseError, quote, suggest
 from .kernels.batch import evaluate_tape, evaluate_tape_with_residual
-from .kernels.tape import NewtonTapes
 from .kinematics.assemblies import Assemblies, find_assemblies
 from .kinematics.assembly_side import find_sides
 from .kinematics.follow import follow_path, make_continuous
@@ -22,7 +21,7 @@ from .kinematics.inverse import solve_inverse
 from .kinematics.limit_margins import compute_margins, find_broken_limits
 from .kinematics.path_modes import PathMode, find_path_modes
 from .kinematics.solution import Solution
-from .kinematics.tapes import KinematicTapes, collect_newton_tapes, collect_tapes
+from .kinematics.tapes import KinematicTapes, collect_tapes
 from .kinematics.travel import LineTapes, Travel, compile_line_tapes, find_travel
 from .kinematics.wrist.pole_crossing import flip_mode
 from .kinematics.wrist.pole_thresholds import EXACT
@@ -264,10 +263,6 @@ class Machine(MachineProperties):
         """Compile the kinematics in a working mode for other interpreters, such as the C of a controller."""
         return collect_tapes(self.model, mode)
 
-    def newton_tapes(self) -> NewtonTapes:
-        """Compile Newton's method on the closures for other interpreters, where there is a closed form too."""
-        return collect_newton_tapes(self.model)
-
     def line_tapes(self, mode: str) -> LineTapes:
         """Compile the margins along a line of poses for other interpreters of intervals; only without a wrist."""
         if self.wrist is not None:
@@ -334,14 +329,9 @@ class Machine(MachineProperties):
 
     # The same on scalars of any kind (:mod:`parakin.algebra`), for interpreters such as intervals.
 
-    def trace_inverse(
-        self, pose: Sequence[Scalar], mode: str, first: Scalar | None = None
-    ) -> tuple[list[Scalar], PlatformPlacement, list[Inverse]]:
-        """Trace joints, the platform's placement, and each leg's inverse for a pose.
-
-        ``first`` gives the wrist's first joint where it is free.
-        """
-        return self.model.invert(pose, mode, first)
+    def trace_inverse(self, pose: Sequence[Scalar], mode: str) -> tuple[list[Scalar], PlatformPlacement, list[Inverse]]:
+        """Trace joints, the platform's placement, and each leg's inverse for a pose."""
+        return self.model.invert(pose, mode)
 
     def trace_margins(self, pose: Sequence[Scalar], mode: str, joints: Sequence[Scalar] | None = None) -> list[Scalar]:
         """Trace every limit's margin, in the order of :attr:`limits`, for a pose and given joints or its inverse."""

@@ -19,7 +19,9 @@ from .model.equations import Equations
 from .model.geometric_parameters import Parameter, list_parameters, replace_parameters
 from .model.legs import Leg
 from .model.limits import Limit, group_joints_by_leg
+from .model.nominal_values import SizedTrace
 from .model.rates import list_closure_joints
+from .model.size_rates import SizeRates, SpecMaker, find_size_rates, list_numbers
 from .model.spec import Spec
 from .model.structures import DirectionColumns, Structure
 from .model.traces import Model
@@ -29,8 +31,8 @@ from .units import AXIS_UNITS
 class MachineProperties:
     """A machine's properties. Nothing of it changes once it is made."""
 
-    def __init__(self, spec: Spec):
-        self.spec = spec
+    def __init__(self, spec: Spec, make_spec: SpecMaker | None = None):
+        self.spec, self._make_spec = spec, make_spec
         self.model = Model(spec)
         check_home(self.model)
 
@@ -128,6 +130,17 @@ class MachineProperties:
     def trace_equations(self, values: Mapping[str, Scalar]) -> Equations:
         """Trace the machine's equations with scalars of any kind in place of some of its :attr:`parameters`."""
         return Equations(replace_parameters(self.spec, values))
+
+    @cached_property
+    def size_rates(self) -> SizeRates:
+        """How the machine's numbers follow the named sizes of its file; none for a machine that is of no file."""
+        if self._make_spec is None:
+            return SizeRates((), (), ((),) * len(list_numbers(self.spec)))
+        return find_size_rates(self.spec, self._make_spec)
+
+    def trace_sized_equations(self, trace: SizedTrace) -> Equations:
+        """Trace the machine's equations with the sizes of :attr:`size_rates` as inputs of a trace."""
+        return Equations(self.size_rates.apply(self.spec, trace.sizes))
 
     @cached_property
     def wrist(self) -> Wrist | None:

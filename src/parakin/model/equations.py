@@ -9,9 +9,10 @@ from ..algebra import Scalar, Vec, apply, atan2, minimum, norm, scale, sincos, s
 from ..errors import DescriptionError
 from ..units import AXIS_UNITS
 from .elements import ROTATIONS
-from .legs import Inverse
+from .legs import Inverse, Leg
 from .limits import HomeRods, Limit, compute_platform_points, group_joints_by_leg, list_limits
 from .nominal_values import find_nominal_value
+from .rates import TwistRates, compute_twist_rates
 from .spec import Spec
 from .spheres import CENTRES_NEEDED, find_common_point, measure_side
 from .structures import PlatformPlacement, Structure, make_structure
@@ -30,6 +31,18 @@ class Equations:
         self.axes = self.structure.axes
         self.drives = spec.drives
         self.leg_count = sum(len(leg.drives) for leg in spec.legs)  # of the joints; head and table's follow them
+
+    @property
+    def legs(self) -> tuple[Leg, ...]:
+        return self.spec.legs
+
+    def place_leg_joints(self, placement: PlatformPlacement) -> list[Vec]:
+        """Compute the platform's joint of every leg in the base frame, mm, with the platform placed."""
+        return compute_platform_points(self.spec, placement.rotation, placement.origin)
+
+    def group_joints(self, joints: Sequence[Scalar]) -> list[list[Scalar]]:
+        """Group a joint vector by leg; it may go on with the joints of head and table."""
+        return group_joints_by_leg(self.spec, joints)
 
     @cached_property
     def turning_columns(self) -> list[int]:
@@ -192,6 +205,12 @@ class Equations:
         """Compute the rates of the constraints at a pose; see :meth:`~.structures.Structure.list_constraint_rates`."""
         placed = self.structure.place(pose, self.structure.branches)
         return self.structure.list_constraint_rates(pose, placed.rotation, placed.origin)
+
+    def compute_twist_rates(
+        self, pose: Sequence[Scalar], joints: Sequence[Scalar], given: Sequence[Scalar] = ()
+    ) -> TwistRates:
+        """Compute A and B of the tool's twist; see :func:`~.rates.compute_twist_rates`."""
+        return compute_twist_rates(self.spec, self.structure, pose, joints, given)
 
     # Home.
 

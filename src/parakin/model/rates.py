@@ -36,14 +36,21 @@ def list_closure_joints(spec: Spec) -> list[int]:
 
 
 def compute_twist_rates(
-    spec: Spec, structure: Structure, pose: Sequence[Scalar], joints: Sequence[Scalar]
+    spec: Spec,
+    structure: Structure,
+    pose: Sequence[Scalar],
+    joints: Sequence[Scalar],
+    given: Sequence[Scalar] = (),
 ) -> TwistRates:
-    """Compute A and B at a pose and its joints, scalars of any kind."""
-    trace = Trace()
-    n, m, legs = len(pose), len(joints), len(spec.legs)
-    x, q = trace.inputs(n), trace.inputs(m, n)
-    turn = trace.inputs(len(structure.turns), n + m)
-    free = [trace.inputs(3, n + m + len(turn) + 3 * i) for i in range(legs)]  # the platform's joints as variables
+    """Compute A and B at a pose and its joints, scalars of any kind.
+
+    given : the inputs of the trace on which the description's own numbers are, none where they are plain numbers
+    """
+    trace = given[0].trace if given else Trace()
+    n, m, legs, k = len(pose), len(joints), len(spec.legs), len(given)
+    x, q = trace.inputs(n, k), trace.inputs(m, k + n)
+    turn = trace.inputs(len(structure.turns), k + n + m)
+    free = [trace.inputs(3, k + n + m + len(turn) + 3 * i) for i in range(legs)]  # the platform's joints as variables
     serial = q[m - sum(step.drive is not None for step in (*spec.head, *spec.table)) :]
     rotation, origin, tilts = structure.closure(x, serial, turn)
 
@@ -54,7 +61,7 @@ def compute_twist_rates(
     points = compute_platform_points(spec, rotation, origin)
     rows = [*(f for group in closures(points) for f in group), *tilts]
     twist = [term for term, axis in zip(x, structure.axes, strict=True) if axis in "XYZ"] + turn
-    at_rest = [*pose, *joints, *[0.0] * len(turn)]
+    at_rest = [*given, *pose, *joints, *[0.0] * len(turn)]
     a = evaluate_trace(trace, [derivative(f, term) for f in rows for term in twist], at_rest)
     b = evaluate_trace(trace, [-derivative(f, term) for f in rows for term in q], at_rest)
     positions = evaluate_trace(trace, [c for point in points for c in point], at_rest)

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from math import isfinite, pi
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -20,6 +20,7 @@ from ...errors import PoseError
 from ...machine import Machine
 from ...model.chain import UNIT, compose_chain
 from ...model.elements import Step
+from ...model.equations import Equations
 from ...model.legs import Leg
 from ...model.structures import PlatformPlacement
 
@@ -109,21 +110,23 @@ def build_scene(
 
 
 def trace_scene(
-    machine: Machine, pose: Sequence[Scalar], joints: Sequence[Scalar]
+    machine: Machine, pose: Sequence[Scalar], joints: Sequence[Scalar], equations: Equations | None = None
 ) -> tuple[list[NDArray[np.object_]], NDArray[np.object_]]:
     """Trace the points, (k, 3) each, of the items of home's scene, at another pose on scalars of any kind.
 
     Also the frame (3, 4) in which poses are given. ``joints`` are those of the pose. Rails and the base stand where
-    they are at home.
+    they are at home. ``equations`` are those of the machine with other sizes, scalars of any kind too.
     """
+    bodies: Machine | Equations = machine if equations is None else equations
     home = machine.home
     with np.errstate(invalid="ignore", divide="ignore"):
         builder = _SceneBuilder(
             _Stance(machine, machine.place_platform(home, machine.mode), list(machine.inverse(home)))
         )
         builder.build()
-        placement = machine.structure.place_with_joints(list(pose), list(joints[machine.leg_count :]))
-    stance = _Stance(machine, placement, list(joints))
+        serial = list(joints[machine.leg_count :])
+        placement = bodies.structure.place_with_joints(list(pose), serial)
+    stance = _Stance(bodies, placement, list(joints))
     rotation, origin = [(np.eye(3), np.zeros(3)), *stance.list_table_frames()][-1]
     points = [np.asarray(place(stance), dtype=object) for place in builder.places]
     return points, np.column_stack([rotation, origin])
@@ -132,7 +135,7 @@ def trace_scene(
 class _Stance:
     """Where a machine's bodies are, on scalars of any kind: all points that a scene has, in the base frame or in M."""
 
-    def __init__(self, machine: Machine, placement: PlatformPlacement, joints: Sequence[Scalar]):
+    def __init__(self, machine: Machine | Equations, placement: PlatformPlacement, joints: Sequence[Scalar]):
         self.machine, self.structure, self.joints = machine, machine.structure, list(joints)
         self.placement = placement
         self.rotation: Points = np.array(placement.rotation)
@@ -157,9 +160,14 @@ class _Stance:
         """List rotation and origin after every step of the table, in M."""
         return list(_compose_steps(self.structure.table, list(self.placement.serial)[self.structure.head_joints :]))
 
+    def locate_anchor(self, leg: int, strut: int) -> Points:
+        """Locate the foot (3,) of a leg's strut, base frame."""
+        return np.array(self.machine.legs[leg].struts(self.points[leg], self.leg_joints[leg])[strut][0])
+
     def to_machine(self, points: ArrayLike) -> Points:
         """Transform points of the base frame into M."""
-        mount, base = np.array(self.structure.mount, float), np.array(self.structure.base, float)
+        mount: NDArray[Any] = np.array(self.structure.mount)
+        base: NDArray[Any] = np.array(self.structure.base)
         points_in_m: Points = np.asarray(points).reshape(-1, 3) @ mount.T + base
         return points_in_m
 
@@ -186,38 +194,39 @@ class _SceneBuilder:
         self.items.append(SceneItem(kind, name, np.asarray(place(self.stance), float), closed))
         self.places.append(place)
 
-    def _add_fixed(self, kind: SceneKind, name: str, points: Points, closed: bool = False) -> None:
-        """Add an item that does not move, with its points in the base frame."""
-        self._add(kind, name, lambda at: at.to_machine(points), closed)
-
     def _add_legs(self) -> None:
-        anchors: list[Points] = []
+        anchors: list[tuple[int, int]] = []
         for leg in range(len(self.machine.legs)):
-            anchors += self._add_leg(leg)
+            anchors += [(leg, strut) for strut in self._add_leg(leg)]
         if self.structure.has_central_leg:
             self._add("central", "central leg", lambda at: at.to_machine([np.zeros(3), at.origin]))
         if anchors:
-            ring = order_polygon(np.array(anchors))
-            self._add_fixed("base", "base", ring, len(ring) > 2)
+            order = list_polygon(np.array([self.stance.locate_anchor(*anchor) for anchor in anchors], float))
+            ring = [anchors[i] for i in order]
+            self._add(
+                "base", "base", lambda at: at.to_machine([at.locate_anchor(*anchor) for anchor in ring]), len(ring) > 2
+            )
 
-    def _add_leg(self, number: int) -> list[Points]:
-        """Add a leg's rails and struts, and labels; return the feet that no drive moves."""
+    def _add_leg(self, number: int) -> list[int]:
+        """Add a leg's rails and struts, and labels; return the struts whose feet no drive moves."""
         at, leg, anchors = self.stance, self.machine.legs[number], []
         struts = at.locate_struts(number)
         moved: dict[int, list[str]] = {}
-        sweeps = _sweep_feet(leg, at.points[number], at.leg_joints[number], struts[0])
-        for drive, unit, feet in zip(leg.drives, leg.units, sweeps, strict=True):
+        sweeps = _sweep_joints(leg, at.leg_joints[number], struts[0])
+        for drive, unit, sweep in zip(leg.drives, leg.units, sweeps, strict=True):
+            feet = np.array([[ends[0] for ends in leg.struts(at.points[number], q)] for q in sweep], float)
             for strut in np.flatnonzero(np.ptp(feet, axis=0).max(axis=-1) > _NEAR).tolist():
                 moved.setdefault(strut, []).append(drive.name)
                 # An arm that ends at the foot is what moves it; there is no rail then.
                 if not any(_coincide(other[1], struts[strut][0]) for other in struts):
-                    self._add_fixed("rail", drive.name, feet[[0, -1], strut] if unit == "mm" else feet[:, strut])
-        for strut, ends in enumerate(struts):
+                    ends = [sweep[0], sweep[-1]] if unit == "mm" else sweep
+                    self._add("rail", drive.name, _place_rail(number, strut, at.points[number], ends))
+        for strut in range(len(struts)):
             first: SceneKind = "rod" if moved.get(0) else "telescope"
             name = leg.drives[min(strut, len(leg.drives) - 1)].name
             self._add(first if strut == 0 else "arm", name, _place_strut(number, strut))
             if strut not in moved:
-                anchors.append(ends[0])
+                anchors.append(strut)
         for strut, names in moved.items():
             self.labels.append((", ".join(names), at.to_machine(struts[strut][0])[0]))
         if not moved:
@@ -225,13 +234,23 @@ class _SceneBuilder:
         return anchors
 
     def _add_platform(self) -> None:
-        ring = order_polygon(np.array([leg.platform for leg in self.machine.legs], float))
-        self._add("platform", "platform", lambda at: at.to_machine(at.locate_on_platform(ring)), len(ring) > 2)
-        middle = ring.mean(axis=0)
+        corners = np.array([leg.platform for leg in self.machine.legs], float)
+        order = list_polygon(corners)
+
+        def locate_ring(at: _Stance) -> Points:
+            return np.array([at.machine.legs[i].platform for i in order])
+
+        self._add(
+            "platform", "platform", lambda at: at.to_machine(at.locate_on_platform(locate_ring(at))), len(order) > 2
+        )
+        middle = corners[order].mean(axis=0)
         origin = self.stance.origin
         if not _coincide(self.stance.locate_on_platform(middle), origin) and not self.structure.has_central_leg:
-            link = np.array([middle, np.zeros(3)])
-            self._add("head", "platform", lambda at: at.to_machine(at.locate_on_platform(link)))
+
+            def locate_link(at: _Stance) -> Points:
+                return np.array([locate_ring(at).mean(axis=0), np.zeros(3)])
+
+            self._add("head", "platform", lambda at: at.to_machine(at.locate_on_platform(locate_link(at))))
 
     def _add_head(self) -> None:
         at, chain = self.stance, self.stance.list_head_frames()
@@ -318,16 +337,20 @@ def _compose_steps(steps: Sequence[Step], joints: Sequence[float]) -> Iterator[t
         yield np.array(rotation), np.array(origin)
 
 
-def _sweep_feet(leg: Leg, point: Sequence[float], joints: list[float], strut: Points) -> Iterator[Points]:
-    """Yield all struts' feet over each drive's range, (samples, struts, 3), the drives after it at their low end."""
+def _place_rail(leg: int, strut: int, point: Sequence[float], sweep: list[list[float]]) -> Callable[[_Stance], Points]:
+    """Make the rule that places the feet of a leg's strut where given joints take it, its platform's joint at home."""
+    return lambda at: at.to_machine([at.machine.legs[leg].struts(point, q)[strut][0] for q in sweep])
+
+
+def _sweep_joints(leg: Leg, joints: list[float], strut: Points) -> Iterator[list[list[float]]]:
+    """Yield a leg's joints over each drive's range, the drives after it at their low end."""
     length = float(np.linalg.norm(strut[1] - strut[0]))
     spans = [
         _cut_range(d.low, d.high, q, unit, length) for d, q, unit in zip(leg.drives, joints, leg.units, strict=True)
     ]
     for number, (low, high) in enumerate(spans):
         after = [low for low, _ in spans[number + 1 :]]
-        sweep = np.linspace(low, high, 49)
-        yield np.array([[ends[0] for ends in leg.struts(point, [*joints[:number], q, *after])] for q in sweep], float)
+        yield [[*joints[:number], q, *after] for q in np.linspace(low, high, 49).tolist()]
 
 
 def _cut_range(low: float, high: float, q: float, unit: str, length: float) -> tuple[float, float]:
@@ -339,15 +362,22 @@ def _cut_range(low: float, high: float, q: float, unit: str, length: float) -> t
 
 def order_polygon(points: Points) -> Points:
     """Order the distinct points round their middle in their own plane; of a line return the ends."""
-    points = points[_find_distinct(list(points))]
+    ordered: Points = points[list_polygon(points)]
+    return ordered
+
+
+def list_polygon(points: Points) -> list[int]:
+    """List the distinct points in order round their middle in their own plane; of a line the ends."""
+    distinct = np.array(_find_distinct(list(points)))
+    points = points[distinct]
     if len(points) < 3:
-        return points
+        return list(distinct.tolist())
     off = points - points.mean(axis=0)
     _, sizes, axes = np.linalg.svd(off)
     if sizes[1] < 1e-9 * sizes[0]:
         along = off @ axes[0]
-        return points[[along.argmin(), along.argmax()]]
-    return points[np.argsort(np.arctan2(off @ axes[1], off @ axes[0]))]
+        return list(distinct[[along.argmin(), along.argmax()]].tolist())
+    return list(distinct[np.argsort(np.arctan2(off @ axes[1], off @ axes[0]))].tolist())
 
 
 def _find_distinct(points: list[Points]) -> list[int]:

@@ -58,6 +58,10 @@ def encode_page_machine(machine: Machine) -> dict[str, Any]:
             }
             for limit, margin in zip(machine.limit_definitions, margins.tolist(), strict=True)
         ],
+        "sizes": [
+            {"name": name, "nominal": value}
+            for name, value in zip(machine.size_rates.names, machine.size_rates.nominal, strict=True)
+        ],
         "wrist": None
         if wrist is None
         else {"first": wrist.first, "second": wrist.second, "free": float(convert_to_freedom(PRINTED))},

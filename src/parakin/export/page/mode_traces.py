@@ -8,6 +8,7 @@ from itertools import product
 
 from ...algebra import Scalar, select
 from ...machine import Machine
+from ...model.equations import Equations
 from ...model.limits import Limit
 
 
@@ -52,17 +53,21 @@ def _choose(choices: dict[tuple[str, ...], Scalar], signs: Sequence[Scalar]) -> 
 
 
 def trace_inverse(
-    machine: Machine, pose: Sequence[Scalar], signs: Sequence[Scalar], first: Scalar | None = None
+    equations: Equations, pose: Sequence[Scalar], signs: Sequence[Scalar], first: Scalar | None = None
 ) -> list[Scalar]:
     """Trace the joints of a pose in the mode of the signs; ``first`` is the wrist's first joint where it is free."""
-    return select_by_signs(machine.mode, signs, lambda mode: machine.trace_inverse(pose, mode, first)[0])
+    return select_by_signs(equations.mode, signs, lambda mode: equations.invert(pose, mode, first)[0])
 
 
 def trace_margins(
-    machine: Machine, pose: Sequence[Scalar], joints: Sequence[Scalar], signs: Sequence[Scalar]
+    equations: Equations, pose: Sequence[Scalar], joints: Sequence[Scalar], signs: Sequence[Scalar]
 ) -> list[Scalar]:
     """Trace every limit's margin at a pose and the joints that a path takes there, in the mode of the signs."""
-    return select_by_signs(machine.mode, signs, lambda mode: machine.trace_margins(pose, mode, joints))
+
+    def trace(mode: str) -> list[Scalar]:
+        return [margin for _, margin in equations.margins(pose, joints, mode)]
+
+    return select_by_signs(equations.mode, signs, trace)
 
 
 def list_joints_of_limit(machine: Machine, limit: Limit) -> list[str]:

@@ -2,21 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 
-from ...algebra import Scalar, Trace
-from ...kernels.tape import Tape, compile_tape
+from ...algebra import Scalar, derivative
+from ...kernels.tape import compile_tape
 from ...kernels.tape_text import InputVector
 from ...machine import Machine
+from ...model.equations import Equations
+from ...model.nominal_values import SizedTrace
 from ...performance.characteristic_length import choose_characteristic_length
 from ...performance.jacobians import trace_unit_wrenches
 from ..machine.scene import trace_scene
 from .mode_traces import trace_inverse, trace_margins
 from .tape_to_js import write_function
 
+_Vectors = list[list[Scalar]]
+_Outputs = Callable[[Equations, _Vectors], Sequence[Scalar]]
+
 
 def write_model(machine: Machine) -> str:
-    """Write the functions of a machine; all take and return arrays, mm and rad.
+    """Write the functions of a machine; all take and return arrays, mm and rad, and follow ``model.sizes``.
 
     ================= =================================================================================================
     inverse           pose, signs of the working mode -> joints; NaN out of reach
@@ -28,10 +33,13 @@ def write_model(machine: Machine) -> str:
     end               coordinates, joints -> pose
     wrenches          pose, joints -> the rows of A that tell parallel singularities, in one unit
     placePoints       pose, joints -> the points of home's scene in M; then rotation and origin of the poses' frame
+    given             nothing -> home's pose, every limit's bound, every drive's low and high end
     ================= =================================================================================================
     """
     functions = dict(_write_functions(machine))
-    return f"const model = (() => {{\n{''.join(functions.values())}return {{{', '.join(functions)}}};\n}})();\n"
+    sizes = ", ".join(map(repr, machine.size_rates.nominal))
+    names = ", ".join([*functions, "sizes: z"])
+    return f"const model = (() => {{\nconst z = [{sizes}];\n{''.join(functions.values())}return {{{names}}};\n}})();\n"
 
 
 def _write_functions(machine: Machine) -> Iterator[tuple[str, str]]:
@@ -39,38 +47,61 @@ def _write_functions(machine: Machine) -> Iterator[tuple[str, str]]:
     pose, joints = InputVector("x", len(machine.axes)), InputVector("q", len(machine.joints))
     signs, first = InputVector("s", len(machine.mode)), InputVector("first", 1)
     coordinates = InputVector("y", len(machine.structure.coordinates))
+    nominal = machine.size_rates.nominal
 
-    def write(name: str, vectors: Sequence[InputVector], outputs: Sequence[Scalar], trace: Trace) -> tuple[str, str]:
-        return write_tape(name, vectors, compile_tape(trace, outputs, sum(vector.length for vector in vectors)))
+    def write(name: str, vectors: Sequence[InputVector], outputs: _Outputs) -> tuple[str, str]:
+        width = sum(vector.length for vector in vectors)
+        trace = SizedTrace(width, nominal)
+        made = outputs(machine.trace_sized_equations(trace), _split_inputs(trace, vectors))
+        tape = compile_tape(trace, made, width + len(nominal))
+        return name, write_function(name, tape, vectors, [InputVector("z", len(nominal))])
 
-    def write_tape(name: str, vectors: Sequence[InputVector], tape: Tape) -> tuple[str, str]:
-        return name, write_function(name, tape, vectors)
-
-    trace, (x, s) = _take_inputs(pose, signs)
-    yield write("inverse", [pose, signs], trace_inverse(machine, x, s), trace)
+    yield write("inverse", [pose, signs], lambda e, v: trace_inverse(e, *v))
     if machine.wrist is not None:
-        trace, (x, s, given) = _take_inputs(pose, signs, first)
-        yield write("inverseWithFirst", [pose, signs, first], trace_inverse(machine, x, s, given[0]), trace)
-        yield write_tape("freedom", [pose], machine.wrist.freedom_tape())
-    trace, (x, q, s) = _take_inputs(pose, joints, signs)
-    yield write("margins", [pose, joints, signs], trace_margins(machine, x, q, s), trace)
-    newton = machine.newton_tapes()
-    yield write_tape("begin", [pose, joints], newton.begin)
-    yield write_tape("closures", [coordinates, joints], newton.closures_and_slopes)
-    yield write_tape("end", [coordinates, joints], newton.end)
-    trace, (x, q) = _take_inputs(pose, joints)
-    rows = trace_unit_wrenches(machine, machine.trace_rates(x, q), choose_characteristic_length(machine))
-    yield write("wrenches", [pose, joints], [value for row in rows for value in row], trace)
-    points, frame = trace_scene(machine, x, q)
-    placed = [value for item in points for value in item.ravel().tolist()]
-    placed += [*frame[:, :3].ravel().tolist(), *frame[:, 3].tolist()]
-    yield write("placePoints", [pose, joints], placed, trace)
+        yield write("inverseWithFirst", [pose, signs, first], lambda e, v: trace_inverse(e, v[0], v[1], v[2][0]))
+        yield write("freedom", [pose], lambda e, v: [e.structure.place(v[0], e.structure.branches).freedom])
+    yield write("margins", [pose, joints, signs], lambda e, v: trace_margins(e, *v))
+    yield write(
+        "begin", [pose, joints], lambda e, v: e.structure.place_with_joints(v[0], e.list_serial(v[1])).coordinates
+    )
+    yield write("closures", [coordinates, joints], lambda e, v: _trace_closures(machine, e, *v))
+    yield write("end", [coordinates, joints], lambda e, v: e.compute_pose(*v))
+    yield write("wrenches", [pose, joints], lambda e, v: _trace_wrenches(machine, e, *v))
+    yield write("placePoints", [pose, joints], lambda e, v: _trace_points(machine, e, *v))
+    yield write("given", [], lambda e, v: _list_given(e))
 
 
-def _take_inputs(*vectors: InputVector) -> tuple[Trace, list[list[Scalar]]]:
-    """Make a trace with vectors of inputs, one after the other."""
-    trace, start, made = Trace(), 0, []
+def _split_inputs(trace: SizedTrace, vectors: Sequence[InputVector]) -> _Vectors:
+    start, made = 0, []
     for vector in vectors:
-        made.append(trace.inputs(vector.length, start))
+        made.append(list(trace.inputs(vector.length, start)))
         start += vector.length
-    return trace, made
+    return made
+
+
+def _trace_closures(
+    machine: Machine, equations: Equations, coordinates: list[Scalar], joints: list[Scalar]
+) -> list[Scalar]:
+    closures = equations.closures(*equations.structure.frame(coordinates), joints)
+    scaled = [closure * (1.0 / size) for closure, size in zip(closures, machine.leg_sizes, strict=True)]
+    return scaled + [derivative(row, y) for row in scaled for y in coordinates]
+
+
+def _trace_wrenches(machine: Machine, equations: Equations, pose: list[Scalar], joints: list[Scalar]) -> list[Scalar]:
+    trace = pose[0].trace
+    given = trace.inputs(trace.first + len(trace.nominal))
+    rates = equations.compute_twist_rates(pose, joints, given)
+    rows = trace_unit_wrenches(machine, rates, choose_characteristic_length(machine))
+    return [value for row in rows for value in row]
+
+
+def _trace_points(machine: Machine, equations: Equations, pose: list[Scalar], joints: list[Scalar]) -> list[Scalar]:
+    points, frame = trace_scene(machine, pose, joints, equations)
+    placed = [value for item in points for value in item.ravel().tolist()]
+    return [*placed, *frame[:, :3].ravel().tolist(), *frame[:, 3].tolist()]
+
+
+def _list_given(equations: Equations) -> list[Scalar]:
+    bounds = [limit.bound for limit, _ in equations.own_margins(equations.home, equations.mode)]
+    ends = [end for drive in equations.drives for end in (drive.low, drive.high)]
+    return [*equations.home, *bounds, *ends]

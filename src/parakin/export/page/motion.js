@@ -2,11 +2,12 @@
 
 const SAMPLES = 24, BISECTIONS = 30;
 const everyHome = () => machine.axes.map(axis => axis.home);
-const homeSide = measureSide(stateAtPose(everyHome(), machine.mode, null));
+let homeSide = measureSide(stateAtPose(everyHome(), machine.mode, null));
 let current = stateAtPose(begin, machine.mode, null);
 const options = {stops: true};
 let stoppedBy = null; // why the last move ended early, as text
 const listeners = [];
+let stopPlaying = () => {}; // the player's; what a hand moves is not played on
 
 function announce() {
   for (const listener of listeners) listener();
@@ -32,36 +33,47 @@ function describeUnreached(pose, signs) {
   return broken < 0 ? "out of reach" : nameLimit(broken);
 }
 
+// Go on from share 0 towards 1 as far as there is no obstacle; tryShare returns one, or null where it went there.
+function goOn(tryShare) {
+  let low = 0, high = 1, reason = null;
+  const goTo = share => {
+    const obstacle = tryShare(share);
+    if (obstacle === null) low = share;
+    else [high, reason] = [share, obstacle];
+    return obstacle === null;
+  };
+  for (let k = 1; k <= SAMPLES && goTo(k / SAMPLES); k++);
+  for (let k = 0; reason !== null && k < BISECTIONS && high - low > 1e-9; k++) goTo(0.5 * (low + high));
+  return {reason, low};
+}
+
+const isGuarded = (state, side) => options.stops && findObstacle(state, side) === null;
+
 // Move towards a pose on a straight line of poses.
 function moveToPose(pose) {
-  const from = current, side = measureSide(from), guarded = options.stops && findObstacle(from, side) === null;
-  if (!guarded) {
+  stopPlaying();
+  const from = current, side = measureSide(from);
+  if (!isGuarded(from, side)) {
     const state = stateAtPose(pose, from.signs, from);
     return state ? setState(state) : setState(from, describeUnreached(pose, from.signs));
   }
-  let state = from, low = 0, high = 1, reason = null;
-  const tryShare = share => {
+  let state = from;
+  const {reason} = goOn(share => {
     const between = from.pose.map((value, i) => value + share * (pose[i] - value));
     const next = stateAtPose(between, from.signs, state);
     const obstacle = next ? findObstacle(next, side) : describeUnreached(between, from.signs);
-    if (obstacle === null) {
-      state = next;
-      low = share;
-    } else {
-      reason = obstacle;
-      high = share;
-    }
-    return obstacle === null;
-  };
-  for (let k = 1; k <= SAMPLES && tryShare(k / SAMPLES); k++);
-  for (let k = 0; reason !== null && k < BISECTIONS && high - low > 1e-9; k++) tryShare(0.5 * (low + high));
+    if (obstacle === null) state = next;
+    return obstacle;
+  });
   setState(state, reason);
 }
 
 // Move towards joints on their straight line, the legs closed all the way.
 function moveToJoints(joints) {
+  stopPlaying();
   const from = current, side = measureSide(from);
-  let guarded = options.stops && findObstacle(from, side) === null, reason = null, state = from;
+  const guarded = isGuarded(from, side);
+  let reason = null, state = from;
   for (let k = 0; k < BISECTIONS; k++) {
     const goal = k === 0 ? joints : joints.map((q, i) => 0.5 * (q + state.joints[i]));
     reason = k === 0 ? null : reason;
@@ -83,12 +95,14 @@ function moveToJoints(joints) {
 
 // Choose the other branch of one leg, or of the wrist, at the same pose.
 function switchSign(i) {
+  stopPlaying();
   const signs = current.signs.map((sign, j) => j === i ? -sign : sign);
   const state = stateAtPose(current.pose, signs, current);
   setState(state ?? current, state ? null : "no such working mode here");
 }
 
 function goHome() {
+  stopPlaying();
   setState(stateAtPose(everyHome(), machine.mode, null));
 }
 
@@ -126,6 +140,7 @@ function describesSame(one, other) {
 let assemblies = [], assemblyNumber = 0;
 
 function showNextAssembly() {
+  stopPlaying();
   const known = assemblies.length && assemblies[0].joints.every((q, i) => abs(q - current.joints[i]) < 1e-9);
   if (!known) [assemblies, assemblyNumber] = [searchAssemblies(), 0];
   assemblyNumber = (assemblyNumber + 1) % assemblies.length;

@@ -24,7 +24,20 @@ if TYPE_CHECKING:
     from ...toolpath.timing import Trajectory
 
 CORE = ("linear_algebra", "kinematics")
-APP = ("motion", "view", "orbit", "labels", "drag", "free_motion", "panel", "workspace", "path", "player", "app")
+APP = (
+    "motion",
+    "sizes",
+    "view",
+    "orbit",
+    "labels",
+    "drag",
+    "free_motion",
+    "panel",
+    "workspace",
+    "path",
+    "player",
+    "app",
+)
 WORKER = ("surface_worker",)
 
 

@@ -58,6 +58,21 @@ const jointSliders = machine.joints.map((joint, i) => {
     value => moveToJoints(current.joints.map((old, j) => j === i ? value : old)));
 });
 
+const sizeSliders = path ? [] : buildSizeSliders();
+
+function buildSizeSliders() {
+  if (!machine.sizes.length) return [];
+  const section = addSection("Sizes");
+  const sliders = machine.sizes.map(({name, nominal}, i) => {
+    const reach = 0.4 * abs(nominal) || 0.05 * size;
+    return addSlider(section, {name, unit: "1", low: nominal - reach, high: nominal + reach},
+      value => moveToSizes(model.sizes.map((old, j) => j === i ? value : old)));
+  });
+  section.append(makeElement("p", {className: "note", textContent: "The file's sizes, mm or rad; the pose is held."}),
+    makeElement("button", {id: "sizes", textContent: "As in the file", onclick: () => moveToSizes(nominalSizes)}));
+  return sliders;
+}
+
 const limitSection = addSection("Nearest limits");
 const limitList = makeElement("div"), allLimits = makeElement("div");
 limitSection.append(limitList, makeElement("details", {}, makeElement("summary", {textContent: `all ${machine.limits.length} limits`}), allLimits));
@@ -102,6 +117,7 @@ singularSection.append(singularNote);
 function updatePanel(margins) {
   machine.axes.forEach((_, i) => poseSliders[i].show(current.pose[i]));
   machine.joints.forEach((_, i) => jointSliders[i].show(current.joints[i]));
+  sizeSliders.forEach((slider, i) => slider.show(model.sizes[i]));
   const rates = margins.map((margin, i) => margin >= 0 ? rateMargin(margin, i) : -1);
   const order = [...rates.keys()].sort((a, b) => rates[a] - rates[b] || a - b);
   nearestGauges.forEach((gauge, k) => showLimit(gauge, order[k], margins[order[k]]));

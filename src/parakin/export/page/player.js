@@ -34,6 +34,7 @@ function buildPlayer() {
   drawPath();
   drawLegend();
   listeners.push(drawCurves);
+  stopPlaying = () => { if (player.playing) setPlaying(false); };
 }
 
 function buildOffences() {

@@ -6,10 +6,10 @@ const LEVELS = places.length === 3 ? [14, 26, 50] : [40, 160], BORDER = 1.35;
 const FOLLOW = places.length === 3 ? [[0, 1, 3, 7], [0, 1, 5, 7], [0, 2, 3, 7], [0, 2, 6, 7], [0, 4, 5, 7], [0, 4, 6, 7]] : [[0, 1, 3], [0, 2, 3]];
 let wanted = null; // the request in force
 
-// Of each drive's range: the joint, its sign and bound, and home's margin.
+// Of each end of a drive's range: the joint, its sign, and the limit.
 const driveLimits = machine.limits.flatMap(limit => {
   const joint = machine.joints.findIndex(({name}) => limit.name === `${name}.${limit.side}`);
-  return joint < 0 ? [] : [[joint, limit.side === "max" ? -1 : 1, limit.bound, limit.atHome]];
+  return joint < 0 ? [] : [[joint, limit.side === "max" ? -1 : 1, limit]];
 });
 const FAR_OUTSIDE = -0.5; // of home's margin: where a drive is so far off its range the other limits are not looked at
 
@@ -17,7 +17,7 @@ const FAR_OUTSIDE = -0.5; // of home's margin: where a drive is so far off its r
 function measureLeastMargin(pose, signs) {
   const joints = model.inverse(pose, signs);
   let far = 0;
-  for (const [joint, sign, bound, atHome] of driveLimits) far = min(far, sign * (joints[joint] - bound) / atHome);
+  for (const [joint, sign, limit] of driveLimits) far = min(far, sign * (joints[joint] - limit.bound) / limit.atHome);
   if (far < FAR_OUTSIDE) return far;
   const margins = model.margins(pose, joints, signs);
   let least = Infinity;
@@ -142,5 +142,7 @@ async function refineSurface(request) {
 
 onmessage = event => {
   wanted = event.data;
+  wanted.sizes.forEach((size, i) => { model.sizes[i] = size; });
+  machine.limits.forEach((limit, i) => { limit.bound = wanted.bounds[i]; });
   refineSurface(wanted);
 };

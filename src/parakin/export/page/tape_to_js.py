@@ -25,9 +25,12 @@ JAVASCRIPT = Language(
 )
 
 
-def write_function(name: str, tape: Tape, inputs: Sequence[InputVector]) -> str:
-    """Write ``function name(vectors of inputs)``, which returns the tape's outputs as an array."""
-    statements, results = list_statements(tape, inputs, JAVASCRIPT)
+def write_function(name: str, tape: Tape, inputs: Sequence[InputVector], shared: Sequence[InputVector]) -> str:
+    """Write ``function name(vectors of inputs)``, which returns the tape's outputs as an array.
+
+    The tape's last inputs are vectors that all functions share, by their names.
+    """
+    statements, results = list_statements(tape, [*inputs, *shared], JAVASCRIPT)
     arguments = ", ".join(vector.name for vector in inputs)
     constants = ",\n".join(f"{name}={value.replace(' ', '')}" for name, value in statements)
     body = f"const {constants};\n" if constants else ""

@@ -25,12 +25,12 @@ function requestSurface() {
   workspaceMesh.visible = workspaceSwitch.checked;
   if (!workspaceSwitch.checked) return;
   const turns = current.pose.filter((_, i) => machine.axes[i].unit === "rad").map(turn => turn.toFixed(6));
-  const key = [...turns, ...current.signs].join(" ");
+  const key = [...turns, ...current.signs, ...model.sizes].join(" ");
   if (key === requestedKey) return;
   requestedKey = key;
   requestTime = performance.now();
   if (!surfaceWorker) startWorker();
-  surfaceWorker.postMessage({id: ++requestNumber, pose: current.pose, signs: current.signs});
+  surfaceWorker.postMessage({id: ++requestNumber, pose: current.pose, signs: current.signs, sizes: [...model.sizes], bounds: machine.limits.map(limit => limit.bound)});
 }
 
 function drawSurface({id, level, last, volume, positions, normals}) {

@@ -133,8 +133,11 @@ class MachineProperties:
 
     @cached_property
     def size_rates(self) -> SizeRates:
-        """How the machine's numbers follow the named sizes of its file; none for a machine that is of no file."""
-        if self._make_spec is None:
+        """How the machine's numbers follow the named sizes of its file; none for one of no file.
+
+        There are none either where a platform is guided by constraints: its frame is found with plain numbers.
+        """
+        if self._make_spec is None or not self.structure.takes_traced_sizes:
             return SizeRates((), (), ((),) * len(list_numbers(self.spec)))
         return find_size_rates(self.spec, self._make_spec)
 

@@ -59,6 +59,7 @@ class Structure(ABC):
     serial_order: tuple[int, ...] = ()  # the serial joints that turn them, in that order
     direction: DirectionColumns | None = None  # where of the orientation the tool's axis counts only
     has_central_leg: bool = False
+    takes_traced_sizes: bool = True  # whether the description's numbers may be scalars of any kind
     carries_pole: bool = False  # the pose turns the platform, and with it the first axis of ``pointing``
     has_slides: bool = False  # the table's drives slide it
     sign: float = 1.0  # of the central leg's length

@@ -30,6 +30,8 @@ class Guided(Structure):
     rz, and some translations. Small turns are about the machine frame's axes.
     """
 
+    takes_traced_sizes = False  # its frame is found with plain numbers
+
     def __init__(self, spec: Spec):
         super().__init__(spec)
         self.coordinates = list_independent_words(spec)

@@ -25,6 +25,8 @@ class WristOnGuidedPlatform(FiveAxis):
     carries_pole = True
     serial_order = (0, 1)
 
+    takes_traced_sizes = False  # its frame is found with plain numbers
+
     def __init__(self, spec: Spec):
         super().__init__(spec)
         self.coordinates = list_independent_words(spec)

@@ -35,6 +35,8 @@ class SlidingTable(FiveAxis):
     branches = ""
     has_slides = True
 
+    takes_traced_sizes = False  # its frame is found with plain numbers
+
     def __init__(self, spec: Spec):
         super().__init__(spec)
         self.coordinates = list_independent_words(spec)

@@ -35,6 +35,7 @@ def things(tmp_path_factory, tricept):
     orthoglide = pk.load("orthoglide")
     poses = np.random.default_rng(0).uniform(-50.0, 50.0, (6, 3))
     measured = pk.make_measurements(orthoglide, orthoglide.inverse(poses), poses)
+    accuracy = pk.analyse_accuracy(orthoglide, {"feet": "0.1 mm"}, poses)
     hexapod, below = pk.load("hexapod"), pk.workpiece(Z=-950)
     body = pk.sample_field(space, pk.workspace(space, gap=0.5).box, step=20)
     return {
@@ -65,6 +66,8 @@ def things(tmp_path_factory, tricept):
         "ToolTurn": pk.choose_tool_turn(hexapod, path, workpiece=below),
         "TurnedJob": pk.prepare_turned(hexapod, path, workpiece=below),
         "Family": pk.family(tricept, ["feet"]),
+        "Accuracy": accuracy,
+        "WorstCase": pk.bound_worst_case(accuracy, {}),
         "Measurements": measured,
         "Calibration": pk.calibrate(orthoglide, measured, ["encoders"]),
         "MeasurementPlan": pk.plan_measurements(orthoglide, 4, ["encoders"]),

@@ -24,7 +24,7 @@ FLOORS = [
     ["workspaces.connected"],
     ["workspaces"],
     ["performance"],
-    ["calibration"],
+    ["calibration", "accuracy"],
     ["toolpath.path"],
     ["toolpath.programmed_path"],
     ["toolpath.reading"],
@@ -50,7 +50,7 @@ FLOORS = [
 ]
 HEIGHT = {room: height for height, floor in enumerate(FLOORS) for room in floor}
 CORE = ["arrays", "algebra", "budget", "kernels", "model", "kinematics", "machine_properties", "machine"]
-CORE += ["families", "workspaces", "performance", "calibration"]
+CORE += ["families", "workspaces", "performance", "calibration", "accuracy"]
 RIM = {"pathlib", "json", "io", "tempfile", "shutil", "plotly", "matplotlib", "pyarrow", "rich", "cyclopts"}
 RIM |= {"pydantic", "ruamel", "http", "socket", "subprocess"}
 NO_PATH_NEEDS = {"plotly", "matplotlib", "rich", "cyclopts"}
@@ -254,7 +254,7 @@ def test_columns_of_b_and_c_are_seen(line):
 
 
 WORDS = """
-accept accumulate act add advance align allocate allow announce answer append apply approach arrange assign
+accept accumulate act add advance align analyse allocate allow announce answer append apply approach arrange assign
 average begin bind bisect blend bore bound box bracket bring build call
 calibrate cancel centre certify change check choose clamp clear climb clip clone close coincide collect combine compare
 compile complete compose compute concatenate confirm continue convert copy correct count cross cut
@@ -293,7 +293,7 @@ MATHEMATICS = {"absolute", "atan2", "copysign", "cross", "derivative", "dot", "m
 MATHEMATICS |= {"njit", "product", "sincos", "sqrt", "sub"}
 # What people type: a command has its function's name, and so do a few words of `pk`.
 COMMANDS = {"assemblies", "atlas", "design", "forward", "inverse", "linuxcnc", "machines", "post", "show", "workspace"}
-COMMANDS |= {"export", "page", "reach", "calibrate"}
+COMMANDS |= {"export", "page", "reach", "calibrate", "accuracy"}
 TYPED = COMMANDS | {"main", "to_display", "workpiece"}
 
 

@@ -13,9 +13,9 @@ import pytest
 import parakin as pk
 from parakin.calibration.calibration import choose_family
 from parakin.calibration.measurement_plan import choose_rows
-from parakin.calibration.poses import sample_allowed_poses
 from parakin.cli import main
 from parakin.errors import PoseError
+from parakin.workspaces.sampled.allowed_poses import sample_allowed_poses
 
 MACHINES = ["tricept", "hexapod", "orthoglide", "lambda6"]
 NOISE = pk.Noise(0.01, 2e-5)

@@ -10,6 +10,8 @@ from .errors import DescriptionError, InputError, InputErrors, NoMethodError, Pa
 from .version import __version__
 
 if TYPE_CHECKING:
+    from .accuracy.accuracy import Accuracy, allocate_tolerances, analyse_accuracy
+    from .accuracy.worst_case import WorstCase, bound_worst_case
     from .calibration.calibration import Calibration, calibrate
     from .calibration.identifiability import UnidentifiableError
     from .calibration.measurement_plan import MeasurementPlan, plan_measurements
@@ -18,6 +20,7 @@ if TYPE_CHECKING:
     from .controllers.joints.program_reader import JointProgram, read_joint_program
     from .controllers.linuxcnc.configuration import make_linuxcnc_configuration
     from .controllers.linuxcnc.program import make_linuxcnc_program
+    from .export.accuracy_map import render_accuracy_png
     from .export.calibration import format_calibrated_yaml, render_residuals_png
     from .export.files import write_files
     from .export.machine.picture import render_machine_png
@@ -54,6 +57,7 @@ if TYPE_CHECKING:
     from .workspaces.sampled.polar_sweep import PolarWorkspace, sweep_polar
 
 __all__ = [
+    "Accuracy",
     "Assemblies",
     "Atlas",
     "Calibration",
@@ -92,8 +96,12 @@ __all__ = [
     "TurnedJob",
     "UnidentifiableError",
     "Workspace",
+    "WorstCase",
     "__version__",
+    "allocate_tolerances",
+    "analyse_accuracy",
     "atlas",
+    "bound_worst_case",
     "calibrate",
     "choose_tool_turn",
     "family",
@@ -118,6 +126,7 @@ __all__ = [
     "read_path",
     "read_tool_table",
     "region",
+    "render_accuracy_png",
     "render_machine_page",
     "render_machine_png",
     "render_path_page",
@@ -170,6 +179,7 @@ def load(name: str | PathLike[str], parameters: Mapping[str, float | str] | None
 
 # The public names that are loaded when they are first used: the module, and the name there if it is another.
 _LAZY = {
+    "Accuracy": "accuracy.accuracy",
     "Atlas": "performance.atlas",
     "Calibration": "calibration.calibration",
     "Components": "workspaces.connected.components",
@@ -203,6 +213,10 @@ _LAZY = {
     "TurnedJob": "toolpath.turned_job",
     "UnidentifiableError": "calibration.identifiability",
     "Workspace": "workspaces.certified.workspace",
+    "WorstCase": "accuracy.worst_case",
+    "allocate_tolerances": "accuracy.accuracy",
+    "analyse_accuracy": "accuracy.accuracy",
+    "bound_worst_case": "accuracy.worst_case",
     "atlas": "performance.atlas",
     "calibrate": "calibration.calibration",
     "choose_tool_turn": "toolpath.tool_turn.choice",
@@ -226,6 +240,7 @@ _LAZY = {
     "read_path": "toolpath.reading.detect",
     "read_tool_table": "toolpath.reading.tool_table",
     "region": "workspaces.certified.region:make_region",
+    "render_accuracy_png": "export.accuracy_map",
     "render_machine_page": "export.page.page",
     "render_path_page": "export.page.page",
     "render_machine_png": "export.machine.picture",

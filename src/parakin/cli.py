@@ -13,6 +13,7 @@ from contextlib import suppress
 
 from cyclopts import App, CycloptsError, Parameter
 
+from .commands.accuracy import accuracy
 from .commands.assemblies import assemblies
 from .commands.atlas import atlas
 from .commands.calibrate import calibrate
@@ -41,7 +42,7 @@ app = App(
     default_parameter=Parameter(negative=""),
     suppress_keyboard_interrupt=False,  # main says so in one line
 )
-ANALYSES = (assemblies, reach, workspace, atlas, calibrate, design)
+ANALYSES = (assemblies, reach, workspace, atlas, accuracy, calibrate, design)
 for command in (post, inverse, forward, *ANALYSES, linuxcnc, machines, show, page, export):
     app.command(command)
 app.command(import_machine, name="import")

@@ -16,6 +16,7 @@ from ..errors import PoseError
 from ..families.family import Family, select_parameters
 from ..machine import Machine
 from ..model.geometric_parameters import Parameter
+from ..workspaces.sampled.allowed_poses import sample_allowed_poses
 from .identifiability import (
     AMPLIFIED,
     Combination,
@@ -28,7 +29,6 @@ from .identifiability import (
 )
 from .linearised import Linearised, MeasuredFamily
 from .measurements import Measurements, make_measurements
-from .poses import sample_allowed_poses
 
 Loss = Literal["linear", "soft_l1"]
 _OUTLIER = 3.0  # standard deviations: beyond these a robust loss grows as the residual, not as its square

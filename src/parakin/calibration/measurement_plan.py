@@ -11,11 +11,11 @@ from ..arguments import check_arguments
 from ..arrays import Array, Indices
 from ..errors import PoseError
 from ..machine import Machine
+from ..workspaces.sampled.allowed_poses import sample_allowed_poses
 from .calibration import CalibrationProblem, choose_family
 from .identifiability import Combination, UnidentifiableError
 from .linearised import MeasuredFamily
 from .measurements import Noise, make_measurements
-from .poses import sample_allowed_poses
 
 _CANDIDATES = 800
 _EXCHANGES = 3  # passes over all chosen poses

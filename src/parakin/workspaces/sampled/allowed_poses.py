@@ -6,10 +6,10 @@ from functools import lru_cache
 
 import numpy as np
 
-from ..arrays import Array
-from ..errors import PoseError
-from ..kernels.intervals import freeze_rows
-from ..machine import Machine
+from ...arrays import Array
+from ...errors import PoseError
+from ...kernels.intervals import freeze_rows
+from ...machine import Machine
 
 _WIDER = 1.5  # than what is proved along the axes from home
 _MOST_ROUNDS = 200

@@ -1,0 +1,189 @@
+"""Accuracy against direct problems of drawn machines, and bounds that none of them breaks."""
+
+import json
+import subprocess
+import sys
+from itertools import product
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import parakin as pk
+from parakin.accuracy.tolerances import make_tolerance_family, read_tolerances
+from parakin.accuracy.worst_case import list_directions
+from parakin.cli import main
+from parakin.errors import PoseError
+
+TOLERANCES = {
+    "tricept": {"feet": "0.05 mm", "platform": "0.03 mm", "encoders": "2 um", "joints.theta*.offset": "0.002 deg"},
+    "hexapod": {"feet": "0.05 mm", "encoders": "2 um"},
+    "orthoglide": {"feet": "0.05 mm", "rods": "0.02 mm", "rails": "0.01 deg", "encoders": "2 um"},
+    "lambda6": {"feet": "0.05 mm", "rods": "0.02 mm", "encoders": "2 um"},
+    "rpr3": {"feet": "0.05 mm", "platform": "0.03 mm"},
+}
+
+
+def pick_pose(machine):
+    """A pose where the tool is inclined."""
+    pose = machine.home + np.where(np.array(machine.axis_units) == "mm", 20.0, 0.2)
+    assert machine.check(pose) == 0
+    return pose
+
+
+def draw_errors(within, pose, sizes):
+    family = within.family
+    joints = family.machine.inverse(pose)
+    solution = family.forward(joints, sizes, near=pose)
+    assert solution.converged.all()
+    tip = [i for i, axis in enumerate(family.machine.axes) if axis in "XYZ"]
+    return np.linalg.norm((solution.poses - pose)[:, tip], axis=1)
+
+
+@pytest.mark.parametrize("name", TOLERANCES)
+def test_drawn_machines_err_as_predicted(name):
+    """A hundred thousand machines with numbers evenly within the tolerances, each by its own direct problem."""
+    machine = pk.load(name)
+    pose = pick_pose(machine)
+    accuracy = pk.analyse_accuracy(machine, TOLERANCES[name], pose[None])
+    within = accuracy.tolerances
+    rng = np.random.default_rng(0)
+    sizes = within.family.nominal + rng.uniform(-1.0, 1.0, (100_000, len(within.halves))) * within.halves
+    errors = draw_errors(within, pose, sizes)
+    assert np.sqrt((errors**2).mean()) == pytest.approx(accuracy.deviations[0], rel=0.01)
+    corners = within.family.nominal + rng.choice([-1.0, 1.0], (5_000, len(within.halves))) * within.halves
+    worst = max(errors.max(), draw_errors(within, pose, corners).max())
+    ranges = {axis: (value, value) for axis, value in zip(machine.axes, pose.tolist(), strict=True)}
+    bound = pk.bound_worst_case(accuracy, ranges)
+    assert worst <= min(1.001 * bound.attained, bound.bound)
+    assert bound.attained <= bound.bound < 1.06 * bound.attained
+    assert accuracy.greatest[0] > 0.99 * bound.attained
+
+
+@pytest.mark.parametrize(("name", "ranges"), [("orthoglide", "XYZ"), ("rpr3", "XY"), ("tricept", "XB")])
+def test_no_machine_breaks_the_bound_over_a_box(name, ranges):
+    machine = pk.load(name)
+    accuracy = pk.analyse_accuracy(machine, TOLERANCES[name], samples=20)
+    pose = pick_pose(machine)
+    size = {"mm": 15.0, "rad": 0.03}
+    units = zip(machine.axes, machine.axis_units, strict=True)
+    ways = {axis: size[unit] if axis in ranges else 0.0 for axis, unit in units}
+    box = {axis: (x - ways[axis], x + ways[axis]) for axis, x in zip(machine.axes, pose.tolist(), strict=True)}
+    proved = pk.bound_worst_case(accuracy, box, seconds=30.0)
+    assert proved.attained <= proved.bound < 1.3 * proved.attained
+    within, rng = accuracy.tolerances, np.random.default_rng(2)
+    poses = pose + rng.uniform(-1.0, 1.0, (2_000, len(pose))) * np.array(list(ways.values()))
+    sizes = within.family.nominal + rng.choice([-1.0, 1.0], (2_000, len(within.halves))) * within.halves
+    moved = within.family.forward(machine.inverse(poses), sizes, near=poses)
+    tip = [i for i, axis in enumerate(machine.axes) if axis in "XYZ"]
+    errors = np.linalg.norm((moved.poses - poses)[:, tip], axis=1)
+    assert 0.4 * proved.attained < errors.max() <= proved.bound
+
+
+def test_what_is_singular_is_unproved():
+    machine = pk.load("tricept")
+    accuracy = pk.analyse_accuracy(machine, {"feet": "0.05 mm"}, samples=10)
+    assert pk.bound_worst_case(accuracy, {}).bound == np.inf  # the tool lies along the wrist's first axis
+
+
+@pytest.mark.parametrize("size", [1, 2, 3])
+def test_the_directions_are_as_near_as_they_say(size):
+    directions, cosine = list_directions(size)
+    assert np.allclose(np.linalg.norm(directions, axis=1), 1.0)
+    drawn = np.random.default_rng(0).normal(size=(20_000, size))
+    drawn /= np.linalg.norm(drawn, axis=1)[:, None]
+    assert np.abs(drawn @ directions.T).max(1).min() >= cosine
+
+
+def test_shares_add_up_and_rank():
+    accuracy = pk.analyse_accuracy(pk.load("orthoglide"), TOLERANCES["orthoglide"])
+    assert np.allclose(accuracy.shares.sum(1), 1.0)
+    means = [mean for _, mean, _ in accuracy.budget]
+    assert means == sorted(means, reverse=True)
+    alone = pk.analyse_accuracy(accuracy.machine, {"feet": "0.05 mm"}, accuracy.poses)
+    share = dict(zip([t.name for t in accuracy.tolerances.tolerances], accuracy.shares.T, strict=True))["feet"]
+    assert np.allclose(alone.deviations**2, share * accuracy.deviations**2)
+
+
+def test_allowed_tolerances_are_the_cheapest():
+    """Against a lattice of all tolerances that keep the error, and against the closed form of one pose."""
+    accuracy = pk.analyse_accuracy(pk.load("orthoglide"), {"feet": "0.05 mm", "rods": "0.02 mm"})
+    costs = {"feet": 2.0, "rods": 1.0}
+    allowed = pk.allocate_tolerances(accuracy, 0.05, costs)
+    again = pk.analyse_accuracy(
+        accuracy.machine, {name: f"{value!r} mm" for name, value in allowed.items()}, accuracy.poses
+    )
+    assert again.percentile(100) == pytest.approx(0.05, rel=1e-6)
+
+    counts = {"feet": 9, "rods": 3}
+
+    def price(feet, rods):
+        return costs["feet"] * counts["feet"] / feet + costs["rods"] * counts["rods"] / rods
+
+    variances = (accuracy.shares * accuracy.deviations[:, None] ** 2) / np.array([0.05, 0.02]) ** 2
+    names = [t.name for t in accuracy.tolerances.tolerances]
+    lattice = np.geomspace(1e-3, 0.2, 300)
+    prices = [
+        price(feet, rods)
+        for feet, rods in product(lattice, lattice)
+        if (variances @ [{"feet": feet, "rods": rods}[name] ** 2 for name in names]).max() <= 0.05**2
+    ]
+    assert price(**allowed) <= min(prices) * (1.0 + 1e-9)
+    assert price(**allowed) > 0.95 * min(prices)
+
+
+def test_the_command(tmp_path, capsys):
+    path = tmp_path / "map.png"
+    words = ["accuracy", "orthoglide", "--tolerance", "feet=0.05mm,rods=0.02mm,encoders=2um", "--samples", "100"]
+    assert main([*words, "--error", "0.05mm", "--over", "X=-20:20", "-o", str(path)]) == 0
+    said = capsys.readouterr().out
+    assert "at 100 poses of the workspace" in said
+    assert "no machine within them is off by more than" in said
+    assert path.read_bytes().startswith(b"\x89PNG")
+    assert main([*words, "--json"]) == 0
+    answer = json.loads(capsys.readouterr().out)
+    assert answer["schema"] == "parakin.accuracy/1"
+    assert [row["name"] for row in answer["budget"]] == ["feet", "rods", "encoders"]
+    assert answer["worst_case"] is None
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["--tolerance", "feet"], "expected NAME=VALUE, such as feet=0.05mm"),
+        (["--tolerance", "feet=0.05"], 'tolerance feet: "0.05" needs a unit'),
+        (["--tolerance", "feet=-1mm"], "expected more than 0"),
+        (["--tolerance", "feet=1deg"], "tolerance feet: legs.rho_x.foot.x is a length"),
+        (["--tolerance", "foot=1mm"], 'free: unknown "foot"'),
+        (["--tolerance", "feet=1mm,legs.rho_x.foot.x=2mm"], "legs.rho_x.foot.x has one already, of feet"),
+        (["--tolerance", "feet=1mm", "--error", "5"], '--error: "5" needs a unit'),
+        (["--tolerance", "feet=1mm", "--cost", "feet=1"], "--cost: goes with --error"),
+        (["--tolerance", "feet=1mm", "--error", "5um", "--cost", "rods=1"], "costs: unknown rods"),
+        (["--tolerance", "feet=1mm", "--over", "Q=1:2"], 'unknown axis "Q"'),
+        (["--tolerance", "feet=1mm", "--samples", "0"], "samples: a number from 1"),
+        (["--tolerance", "feet=1mm", "-o", "x.pdf"], "expected a file name that ends in .png"),
+        ([], "--tolerance"),
+    ],
+)
+def test_what_is_mistaken_is_said_in_one_line(words, message, capsys):
+    assert main(["accuracy", "orthoglide", *words]) == 2
+    said = capsys.readouterr()
+    assert said.out == ""
+    assert said.err.count("\n") == 1
+    assert message in said.err
+
+
+def test_the_example_runs(tmp_path):
+    script = Path(__file__).parents[1] / "examples" / "accuracy.py"
+    done = subprocess.run([sys.executable, script, "-o", tmp_path], capture_output=True, text=True, check=True)
+    assert "in the cube of 100 mm no machine within them is off by more than" in done.stdout
+    assert [path.name for path in tmp_path.iterdir()] == ["accuracy.png"]
+
+
+def test_a_tolerance_takes_the_numbers_of_its_unit():
+    within = make_tolerance_family(
+        pk.load("tricept"), read_tolerances([("encoders", "2 um"), ("encoders", "0.001 deg")])
+    )
+    assert [len(columns) for columns in within.groups] == [3, 2]
+    with pytest.raises(PoseError, match="at least one expected"):
+        read_tolerances({})

@@ -17,7 +17,7 @@ from .tolerances import Tolerance, ToleranceFamily, make_tolerance_family, read_
 
 _UNIFORM = 1.0 / np.sqrt(3.0)  # standard deviation of what lies evenly within ±1
 SAMPLES = 400
-_MOST_SAMPLES = 100_000
+_MOST_SAMPLES = 20_000
 
 
 @dataclass(frozen=True, eq=False)

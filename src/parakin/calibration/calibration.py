@@ -231,8 +231,8 @@ class CalibrationProblem:
         known = "at all" if np.isinf(worst.amplification) else f"(noise is amplified {worst.amplification:.0f} times)"
         more = f", and {len(unknown) - 1} more combinations" if len(unknown) > 1 else ""
         raise UnidentifiableError(
-            f"{self.measured.measured!r}"[9:-1].capitalize()
-            + f" can't tell {format_names(worst.names)} apart {known}{more}; {self._suggest_measurement()}"
+            f"{self.measured.measured.describe()} can't tell {format_names(worst.names)} apart {known}{more}; "
+            f"{self._suggest_measurement()}"
         )
 
     def _suggest_measurement(self) -> str:

@@ -44,8 +44,12 @@ class Measurements:
     noise: Noise = Noise()
 
     def __repr__(self) -> str:
-        what = " ".join(self.axes) + (" distance" if self.distances is not None else "")
-        return f"<parakin measurements: {len(self.joints)} of {what.strip()}>"
+        return f"<parakin {self.describe()}>"
+
+    def describe(self) -> str:
+        """Describe what was measured: ``57 measurements of X Y Z``."""
+        what = [*self.axes, *(["distance"] if self.distances is not None else [])]
+        return f"{len(self.joints)} measurements of {' '.join(what)}"
 
     @property
     def width(self) -> int:
@@ -107,6 +111,8 @@ def check_measured_axes(machine: Machine, names: tuple[str, ...]) -> None:
     for name in names:
         if name not in machine.axes:
             raise PoseError(f"axes: unknown {name}{suggest(name, machine.axes)}")
+    if len(set(names)) != len(names):
+        raise PoseError(f"axes: {' '.join(names)}, each once expected")
     turning = [name for name in names if name not in _LETTERS]
     if turning and len(names) != len(machine.axes):
         raise PoseError(f"axes: {' '.join(machine.axes)} or some of X Y Z expected, not {' '.join(names)}")

@@ -237,8 +237,7 @@ def _format_plan(plan: MeasurementPlan) -> str:
 
 def _format_calibration(calibration: Calibration) -> str:
     measured, name = calibration.measured, calibration.family.machine.name
-    what = " ".join([*measured.axes, *([_DISTANCE] if measured.distances is not None else [])])
-    lines = [f"{name}: {len(calibration.sizes)} numbers from {len(measured.joints)} measurements of {what}\n"]
+    lines = [f"{name}: {len(calibration.sizes)} numbers from {measured.describe()}\n"]
     rows = []
     for before, found in zip(calibration.family.parameters, calibration.parameters, strict=True):
         digits = _LENGTH_DIGITS if found.unit == "mm" else _ANGLE_DIGITS

@@ -8,6 +8,8 @@ from graphlib import CycleError, TopologicalSorter
 import pytest
 from sources import MODULES, TREES, functions
 
+from parakin.cli import app
+
 # From the ground up. What stands on one line knows nothing of each other.
 FLOORS = [
     ["errors", "arrays", "version"],
@@ -44,6 +46,7 @@ FLOORS = [
     ["controllers.fluidnc", "controllers.heidenhain"],
     ["controllers", "export"],
     ["__init__"],  # the public names
+    ["studio"],
     ["commands"],
     ["cli"],
     ["__main__"],
@@ -276,8 +279,8 @@ quote
 raise rank rate read rebuild recognise record redirect reduce refine refuse reject relate release remove rename render
 renumber reorder repeat replace report repost require reserve reset resize resolve restore restrict retract retry return
 reuse reverse rewind rotate round route run
-sample save say scale score search select separate set settle share shift shorten show shrink skip smooth snap solve
-simulate slow sort space split spread square stack stage stamp start stop store stretch strip subtract suggest sum
+sample save say scale score search select separate serve set settle share shift shorten show shrink skip smooth snap
+simulate slow solve sort space split spread square stack stage stamp start stop store stretch strip subtract suggest sum
 summarise swap sweep switch
 tabulate take tally tell test thin tighten tilt trace track transform translate transpose trap trim turn
 undo unwind update use
@@ -292,8 +295,7 @@ QUESTIONS = {"begins", "bounds", "changes", "crosses", "ends", "has", "is", "spa
 MATHEMATICS = {"absolute", "atan2", "copysign", "cross", "derivative", "dot", "magnitude", "maximum", "minimum", "norm"}
 MATHEMATICS |= {"njit", "product", "sincos", "sqrt", "sub"}
 # What people type: a command has its function's name, and so do a few words of `pk`.
-COMMANDS = {"assemblies", "atlas", "design", "forward", "inverse", "linuxcnc", "machines", "post", "show", "workspace"}
-COMMANDS |= {"export", "page", "reach", "calibrate", "accuracy"}
+COMMANDS = {name for name in app if not name.startswith("-")}
 TYPED = COMMANDS | {"main", "to_display", "workpiece"}
 
 

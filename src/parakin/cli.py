@@ -27,6 +27,7 @@ from .commands.machines import machines, show
 from .commands.page import page
 from .commands.post import post
 from .commands.reach import reach
+from .commands.studio import make_studio_command
 from .commands.workspace import workspace
 from .errors import ParakinError
 from .version import __version__
@@ -46,6 +47,7 @@ ANALYSES = (assemblies, reach, workspace, atlas, accuracy, calibrate, design)
 for command in (post, inverse, forward, *ANALYSES, linuxcnc, machines, show, page, export):
     app.command(command)
 app.command(import_machine, name="import")
+app.command(make_studio_command(app))
 app.register_install_completion_command()
 
 

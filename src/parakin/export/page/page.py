@@ -34,6 +34,7 @@ APP = (
     "free_motion",
     "panel",
     "workspace",
+    "shown_surface",
     "path",
     "player",
     "app",

@@ -1,0 +1,18 @@
+// A surface from elsewhere, drawn in the frame in which poses are given: the studio shows proved workspaces by it.
+
+const shownMesh = new THREE.Mesh(new THREE.BufferGeometry(), new THREE.MeshStandardMaterial({
+  color: new THREE.Color("#2e9e6b").convertSRGBToLinear(), transparent: true, opacity: 0.36, side: THREE.DoubleSide, depthWrite: false, roughness: 0.8}));
+shownMesh.frustumCulled = false;
+shownMesh.renderOrder = 1;
+workGroup.add(shownMesh);
+
+// Draw triangles, nine numbers each, mm; none for nothing.
+function showSurface(corners) {
+  const geometry = new THREE.BufferGeometry();
+  geometry.setAttribute("position", new THREE.BufferAttribute(new Float32Array(corners), 3));
+  geometry.computeVertexNormals();
+  shownMesh.geometry.dispose();
+  shownMesh.geometry = geometry;
+  if (corners.length) fitOrbit(geometry);
+  requestPicture();
+}

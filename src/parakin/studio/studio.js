@@ -1,0 +1,335 @@
+"use strict";
+// The studio's page: forms of the commands, their runs, files, and the machines' own pages in frames.
+
+const element = id => document.getElementById(id);
+const state = {session: "", commands: [], machines: [], files: [], pages: {}, form: {}};
+
+async function ask(path, options = {}) {
+  const response = await fetch(path, options);
+  const answer = await response.json();
+  if (!response.ok) throw new Error(answer.error || response.statusText);
+  return answer;
+}
+
+const inSession = path => `sessions/${state.session}/${path}`;
+const escapeName = name => name.split("/").map(encodeURIComponent).join("/");
+const pause = seconds => new Promise(resolve => setTimeout(resolve, 1000 * seconds));
+
+function make(tag, properties = {}, ...children) {
+  const made = Object.assign(document.createElement(tag), properties);
+  made.append(...children);
+  return made;
+}
+
+function fillSelect(select, options, chosen) {
+  select.replaceChildren(...options.map(([value, text]) => make("option", {value, textContent: text})));
+  if (options.some(([value]) => value === chosen)) select.value = chosen;
+}
+
+// Runs.
+
+async function beginRun(command, values) {
+  const {run, line} = await ask(inSession("runs"), {method: "POST", body: JSON.stringify({command, values})});
+  return {number: run, line};
+}
+
+async function followRun(number, tell = () => {}) {
+  for (let wait = 0.1; ; wait = Math.min(1, 1.5 * wait)) {
+    const run = await ask(inSession(`runs/${number}`));
+    tell(run);
+    if (run.state !== "waiting" && run.state !== "running") return run;
+    await pause(wait);
+  }
+}
+
+function showRun(number, line) {
+  const status = make("span", {className: "state", textContent: "waiting"});
+  const output = make("pre", {textContent: "", hidden: true});
+  const cancel = make("button", {textContent: "Cancel", type: "button"});
+  const again = make("button", {textContent: "Copy", type: "button"});
+  const box = make("details", {className: "run", open: true}, make("summary", {}, make("code", {textContent: line}), " ", status), output,
+    make("p", {className: "row"}, cancel, again));
+  box.dataset.run = number;
+  cancel.onclick = () => ask(inSession(`runs/${number}`), {method: "DELETE"});
+  again.onclick = () => navigator.clipboard.writeText(line);
+  element("runs").prepend(box);
+  return run => {
+    const over = run.state !== "waiting" && run.state !== "running";
+    const good = run.state === "done" && run.code === 0;
+    status.textContent = `${run.state === "done" ? `exit ${run.code}` : run.state}, ${run.seconds.toFixed(1)} s`;
+    status.className = `state ${good ? "done" : over ? "bad" : ""}`;
+    output.replaceChildren(run.output, make("span", {className: "bad", textContent: run.errors}));
+    output.hidden = !(run.output || run.errors);
+    cancel.hidden = over;
+  };
+}
+
+// Links to the files that a run wrote, and its pictures.
+function showResults(number, before) {
+  const written = new Map(before.map(file => [file.name, file.written]));
+  const made = state.files.filter(file => written.get(file.name) !== file.written && !file.name.startsWith("page_"));
+  const box = element("runs").querySelector(`[data-run="${number}"]`);
+  box.append(...made.map(file => {
+    const href = inSession(`files/${escapeName(file.name)}`), link = make("a", {href, target: "_blank", rel: "noopener", textContent: file.name});
+    if (!/\.(svg|png)$/i.test(file.name)) return make("p", {className: "result"}, link);
+    return make("p", {className: "result"}, link, make("img", {src: `${href}?${file.written}`, alt: file.name}));
+  }));
+}
+
+async function run(command, values) {
+  try {
+    const before = state.files;
+    const {number, line} = await beginRun(command, values);
+    const result = await followRun(number, showRun(number, line));
+    await refreshFiles();
+    showResults(number, before);
+    return result;
+  } catch (error) {
+    element("runs").prepend(make("p", {className: "bad state", textContent: error.message}));
+    return null;
+  }
+}
+
+// Machines' pages.
+
+const findFrame = name => element("stage").querySelector(`iframe[data-machine="${CSS.escape(name)}"]`);
+const chosenMachines = () => [element("machine").value, element("second").value].filter((name, i, all) => name && all.indexOf(name) === i);
+
+// Show a page in the place of a machine's own.
+function showPage(name, file) {
+  const frame = make("iframe", {title: name, src: inSession(`page/${escapeName(file)}`)});
+  frame.dataset.machine = name;
+  const old = findFrame(name);
+  if (old) old.replaceWith(frame);
+  else element("stage").append(frame);
+}
+
+async function showMachines() {
+  for (const frame of element("stage").querySelectorAll("iframe")) if (!chosenMachines().includes(frame.dataset.machine)) frame.remove();
+  for (const name of chosenMachines()) {
+    if (findFrame(name)) continue;
+    const output = `page_${name.replace(/\.ya?ml$/, "")}.html`;
+    const result = await run("page", {NAME: name, "--output": output});
+    if (result && result.code === 0) showPage(name, output);
+    else if (result) markLine(name, result.errors);
+  }
+}
+
+// Select the line of the machine's file that an error names.
+function markLine(name, errors) {
+  const place = errors.match(/^[^\n:]+\.ya?ml:(\d+):/m);
+  if (!place || element("text-name").value !== name) return;
+  const text = element("text"), lines = text.value.split("\n"), number = +place[1];
+  const begin = lines.slice(0, number - 1).join("\n").length + (number > 1 ? 1 : 0);
+  element("editor").open = true;
+  text.focus();
+  text.setSelectionRange(begin, begin + lines[number - 1].length);
+}
+
+// The pose at which a machine stands on its page, as the commands take it.
+function readPose(name) {
+  const frame = findFrame(name), shown = frame && frame.contentWindow.parakin;
+  if (!shown) return null;
+  const {axes} = shown.machine;
+  return axes.map((axis, i) => {
+    const letter = typeof axis === "string" ? axis : axis.name;
+    const value = "ABC".includes(letter) ? shown.state.pose[i] * 180 / Math.PI : shown.state.pose[i];
+    return `${letter}=${+value.toFixed(6)}`;
+  });
+}
+
+async function showMachineFile() {
+  const {number} = await beginRun("show", {NAME: element("machine").value, "--yaml": true});
+  const result = await followRun(number);
+  element("text").value = result.code === 0 ? result.output : result.errors;
+}
+
+async function saveMachineFile() {
+  const name = element("text-name").value.trim();
+  try {
+    await ask(inSession(`files/${escapeName(name)}`), {method: "PUT", body: element("text").value});
+  } catch (error) {
+    element("runs").prepend(make("p", {className: "bad state", textContent: error.message}));
+    return;
+  }
+  await refreshFiles();
+  findFrame(name)?.remove();
+  element("machine").value = name;
+  await showMachines();
+}
+
+// Forms.
+
+function showForm() {
+  const form = state.commands.find(one => one.command === element("command").value);
+  element("command-help").textContent = form.help;
+  element("form").replaceChildren(...form.fields.map(field => {
+    const input = makeInput(field);
+    input.id = `field-${field.name}`;
+    input.dataset.name = field.name;
+    input.title = field.help;
+    input.addEventListener("input", showLine);
+    return make("label", {title: field.help}, make("span", {textContent: field.name + (field.required ? " *" : "")}), input);
+  }));
+  showLine();
+}
+
+function makeInput(field) {
+  if (field.kind === "flag") return make("input", {type: "checkbox"});
+  if (field.kind === "choice" || field.kind === "machine" || field.name === "PART") {
+    const select = make("select");
+    const parts = state.files.map(file => file.name).filter(name => !name.includes("/"));
+    const options = field.kind === "choice" ? field.choices : field.name === "PART" ? parts : [...ownMachines(), ...state.machines];
+    fillSelect(select, [...(field.required ? [] : [["", ""]]), ...options.map(name => [name, name])], startValue(field));
+    return select;
+  }
+  return make("input", {type: "text", value: startValue(field), placeholder: field.default});
+}
+
+function startValue(field) {
+  const command = element("command").value;
+  if (field.kind === "machine") return field.required ? element("machine").value : "";
+  if (field.name === "PART") return element("part").value;
+  if (field.name === "VALUES" && command === "inverse") return (readPose(element("machine").value) || []).join(" ");
+  if (field.name === "--at" && command === "reach") return (readPose(element("machine").value) || []).join(",");
+  return field.kind === "choice" ? field.default : "";
+}
+
+function readForm() {
+  const values = {};
+  for (const input of element("form").querySelectorAll("[data-name]")) {
+    const value = input.type === "checkbox" ? input.checked : input.value;
+    const field = state.commands.find(one => one.command === element("command").value).fields.find(one => one.name === input.dataset.name);
+    if (value && value !== field.default) values[field.name] = field.kind === "texts" ? [value] : value;
+  }
+  return values;
+}
+
+// The line as it will run; the server writes it again by its own rules, and tells what is wrong with it.
+function showLine() {
+  const quote = text => /^[\w@%+=:,./-]+$/.test(text) ? text : `'${text.replaceAll("'", "'\"'\"'")}'`;
+  const words = ["parakin", element("command").value];
+  for (const [name, value] of Object.entries(readForm())) {
+    if (value === true) words.push(name);
+    else for (const text of [value].flat()) words.push(name.startsWith("-") ? quote(`${name}=${text}`) : text.split(/\s+/).map(quote).join(" "));
+  }
+  element("line").textContent = words.join(" ");
+}
+
+// Files.
+
+const ownMachines = () => state.files.map(file => file.name).filter(name => /^[^/]+\.ya?ml$/.test(name));
+
+async function refreshFiles() {
+  state.files = (await ask(inSession("files"))).files;
+  const own = ownMachines(), machine = element("machine").value, second = element("second").value, part = element("part").value;
+  const all = [...own, ...state.machines].map(name => [name, name]);
+  fillSelect(element("machine"), all, machine);
+  fillSelect(element("second"), [["", "nothing"], ...all], second);
+  const parts = state.files.map(file => file.name).filter(name => /\.(aptsource|apt|cls?|ncl|ngc|nc|gcode|tap|cnc|txt)$/i.test(name));
+  fillSelect(element("part"), [["", "none"], ...parts.map(name => [name, name])], part);
+  element("files").replaceChildren(...state.files.map(file => make("li", {},
+    make("a", {href: inSession(`files/${escapeName(file.name)}`), target: "_blank", rel: "noopener", textContent: file.name}),
+    make("span", {textContent: file.size < 1e4 ? `${file.size} B` : `${(file.size / 1e3).toFixed(0)} kB`}))));
+}
+
+async function upload(files) {
+  for (const file of files) {
+    try {
+      await ask(inSession(`files/${escapeName(file.name)}`), {method: "PUT", body: file});
+    } catch (error) {
+      element("runs").prepend(make("p", {className: "bad state", textContent: error.message}));
+    }
+  }
+  await refreshFiles();
+  const last = [...files].map(file => file.name).at(-1);
+  if (ownMachines().includes(last)) { element("machine").value = last; await showMachines(); }
+  else if (last) element("part").value = last;
+  showForm();
+}
+
+// What people do most, with a press.
+
+const QUICK = {
+  "Workspace": () => refineWorkspace(),
+  "Atlas": () => run("atlas", {NAME: element("machine").value, "--output": "atlas.svg"}),
+  "Post the part": () => postPart({}),
+  "Place it for me": () => postPart({"--place": makeRanges()}),
+  "Part at the tool": () => postPart({"--workpiece": findTip().map(([axis, value]) => `${axis}=${value}`).join(",")}),
+  "LinuxCNC": () => run("linuxcnc", {NAME: element("machine").value, "--output": "linuxcnc"}),
+};
+
+// The proved workspace of each machine, at rising resolution, drawn about it.
+async function refineWorkspace() {
+  for (const gap of ["0.3", "0.1", "0.02"]) {
+    for (const name of chosenMachines()) {
+      const spatial = findTip(name).length === 3, output = `workspace_${name.replace(/\.ya?ml$/, "")}.${spatial ? "stl" : "svg"}`;
+      const result = await run("workspace", {NAME: name, "--gap": gap, "--output": [output]});
+      if (!result || result.state !== "done") return;
+      if (spatial && result.code === 0) await showSurface(name, output);
+    }
+  }
+}
+
+// Draw a binary STL on a machine's page.
+async function showSurface(name, file) {
+  const view = new DataView(await (await fetch(inSession(`files/${escapeName(file)}`))).arrayBuffer());
+  const corners = new Float32Array(9 * view.getUint32(80, true));
+  for (let i = 0; i < corners.length; i++) corners[i] = view.getFloat32(84 + 50 * Math.floor(i / 9) + 12 + 4 * (i % 9), true);
+  findFrame(name)?.contentWindow.parakin?.showSurface(corners);
+}
+
+// Where the tool of a machine's page stands: pairs of an axis and its value.
+function findTip(name = element("machine").value) {
+  return (readPose(name) || []).map(text => text.split("=")).filter(([axis]) => "XYZ".includes(axis));
+}
+
+const makeRanges = () => findTip().map(([axis, value]) => `${axis}=${Math.round(+value - 200)}:${Math.round(+value + 200)}`).join(",");
+
+// Post the part on each machine, and play it there.
+async function postPart(options) {
+  const part = element("part").value;
+  for (const name of chosenMachines()) {
+    const output = `on_${name.replace(/\.ya?ml$/, "")}`;
+    const result = await run("post", {PART: part, "--machine": name, "--output": output, "--page": true, ...options});
+    const page = `${output}/${part.replace(/\.[^.]*$/, "")}.page.html`;
+    if (result && state.files.some(file => file.name === page)) showPage(name, page);
+  }
+}
+
+// Start.
+
+async function start() {
+  const described = await ask("commands");
+  state.commands = described.commands;
+  state.machines = described.machines;
+  state.session = (await ask("sessions", {method: "POST"})).session;
+  fillSelect(element("machine"), [[described.start.machine, described.start.machine]], described.start.machine);
+  await refreshFiles();
+  element("machine").value = described.start.machine;
+  element("part").value = described.start.part;
+  fillSelect(element("command"), state.commands.map(form => [form.command, form.command]), "workspace");
+  element("quick").append(...Object.entries(QUICK).map(([text, act]) => make("button", {textContent: text, type: "button", onclick: act})));
+  element("machine").onchange = async () => { showForm(); await showMachines(); };
+  element("second").onchange = showMachines;
+  element("part").onchange = showForm;
+  element("command").onchange = showForm;
+  element("form").onsubmit = event => event.preventDefault();
+  element("run").onclick = () => run(element("command").value, readForm());
+  element("copy").onclick = () => navigator.clipboard.writeText(element("line").textContent);
+  element("save").onclick = saveMachineFile;
+  element("editor").ontoggle = () => { if (element("editor").open && !element("text").value) showMachineFile(); };
+  element("upload").onchange = event => upload(event.target.files);
+  const drop = element("drop");
+  drop.onclick = () => element("upload").click();
+  drop.onkeydown = event => { if (event.key === "Enter" || event.key === " ") element("upload").click(); };
+  document.ondragover = event => { event.preventDefault(); drop.classList.add("over"); };
+  document.ondragleave = () => drop.classList.remove("over");
+  document.ondrop = event => { event.preventDefault(); drop.classList.remove("over"); upload(event.dataTransfer.files); };
+  showForm();
+  await showMachines();
+  document.body.dataset.ready = "yes";
+}
+
+window.studio = {state, run, readPose, showMachines, refreshFiles, findFrame};
+start();

@@ -1,0 +1,273 @@
+"""The studio answers only its own page, runs what its forms say and nothing else, and its page works in Chromium."""
+
+import json
+import socket
+import time
+from pathlib import Path
+
+import pytest
+from browser import needs_chromium, open_browser, open_tab, wait_until
+from studio_client import run_studio
+
+import parakin as pk
+from parakin.cli import app, main
+from parakin.errors import InputError
+from parakin.studio.forms import list_forms, write_line
+
+FORMS = list_forms(app, ("studio",))
+RPR3 = (Path(pk.__file__).parent / "machines" / "rpr3.yaml").read_text(encoding="utf-8")
+PART = "UNITS/MM\nFEDRAT/900,MMPM\nRAPID\nGOTO/0,0,0\nGOTO/40,10,0\nGOTO/40,-30,0\nFINI\n"
+
+
+@pytest.fixture(scope="module")
+def studio(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("studio")
+    (folder / "own.yaml").write_text(RPR3, encoding="utf-8")
+    (folder / "part.apt").write_text(PART, encoding="utf-8")
+    with run_studio(folder, "own.yaml", "part.apt") as client:
+        yield client
+    assert not [path for path in folder.iterdir() if path.is_dir()]  # the sessions' files are gone
+
+
+# Forms.
+
+
+def test_every_command_has_a_form():
+    assert set(FORMS) == {name for name in app if not name.startswith("-")} - {"studio"}
+    for form in FORMS.values():
+        assert form.help
+        assert not [field.name for field in form.fields if not field.help]
+
+
+def test_a_line_is_what_was_filled_in():
+    values = {"NAME": "tricept", "VALUES": ["X=10 Z=-1500"], "--mode": "+", "--set": ["R=360mm", "r=90 mm"]}
+    assert write_line(FORMS["inverse"], values) == [
+        "inverse", "tricept", "X=10", "Z=-1500", "--mode=+", "--set=R=360mm", "--set=r=90 mm",
+    ]  # fmt: skip
+    values = {"PART": "a.cls", "--machine": "tricept", "--parquet": True, "--corners": "stop", "--rate": "  "}
+    assert write_line(FORMS["post"], values) == ["post", "a.cls", "--machine=tricept", "--corners=stop", "--parquet"]
+    assert write_line(FORMS["forward"], {"NAME": "rpr3", "VALUES": "-1 2 .5"}) == ["forward", "rpr3", "-1", "2", ".5"]
+
+
+@pytest.mark.parametrize(
+    ("command", "values", "said"),
+    [
+        ("inverse", {}, "NAME is missing"),
+        ("inverse", {"NAME": "/etc/passwd"}, "not a plain file name"),
+        ("inverse", {"NAME": "../own.yaml"}, "not a plain file name"),
+        ("inverse", {"NAME": "--help"}, "not a plain file name"),
+        ("inverse", {"NAME": "tricept", "VALUES": ["--json"]}, "read as an option"),
+        ("inverse", {"NAME": "tricept", "--csv": "/etc/passwd"}, "not a plain file name"),
+        ("inverse", {"NAME": "tricept", "--output": "a/../../b"}, "not a plain file name"),
+        ("inverse", {"NAME": "tricept", "--install-completion": True}, "no parameter"),
+        ("inverse", {"NAME": "tricept", "--mode": "a" * 3000}, "at most 2000"),
+        ("inverse", {"NAME": "tricept", "--mode": "a\nb"}, "a text"),
+        ("inverse", {"NAME": "tricept", "--mode": 7}, "a text"),
+        ("inverse", {"NAME": ["a", {}]}, "a text"),
+        ("post", {"PART": "a", "--machine": "b", "--target": "haas"}, "one of linuxcnc"),
+        ("post", {"PART": "a", "--machine": "b", "--force": "yes"}, "true or false"),
+    ],
+)
+def test_a_line_that_can_not_be_is_refused(command, values, said):
+    with pytest.raises(InputError, match=said):
+        write_line(FORMS[command], values)
+
+
+# The server.
+
+
+def test_foreign_requests_are_refused(studio):
+    own = f"127.0.0.1:{studio.port}"
+    for host in (
+        "evil.example",
+        "evil.example:80",
+        "127.0.0.1",
+        f"127.0.0.1:{studio.port + 1}",
+        f"{own}.evil.example",
+        "",
+    ):
+        assert studio.request("commands", headers={"Host": host})[0] == 403, host
+    for origin in ("http://evil.example", "null", f"https://{own}", f"http://{own}.evil.example", "file://"):
+        assert studio.request("sessions", "POST", headers={"Origin": origin})[0] == 403, origin
+    for path in ("/", "/commands", studio.prefix[:-2] + "/commands", studio.prefix.upper(), "/x" + studio.prefix, "//"):
+        assert studio.request(path, whole=True)[0] == 403, path
+    assert studio.request("", headers={"Origin": f"http://{own}"})[0] == 200
+    assert studio.request("", headers={"Host": f"localhost:{studio.port}"})[0] == 200
+
+
+@pytest.mark.parametrize("token", [True, False])
+def test_there_is_no_websocket(studio, token):
+    headers = {
+        "Upgrade": "websocket",
+        "Connection": "Upgrade",
+        "Sec-WebSocket-Version": "13",
+        "Sec-WebSocket-Key": "a" * 24,
+    }
+    status, _ = studio.request("" if token else "/", headers=headers, whole=not token)
+    assert status == 403
+
+
+def test_it_listens_on_this_computer_only(studio):
+    with socket.socket(socket.AF_INET, socket.SOCK_STREAM) as probe:
+        probe.settimeout(2.0)
+        with pytest.raises(OSError):
+            probe.connect(("127.0.0.2", studio.port))
+
+
+def test_a_page_has_its_own_files(studio):
+    first, second = studio.open_session(), studio.open_session()
+    assert studio.put_file(first, "mine.yaml", RPR3.replace("rpr3", "mine"))[0] == 200
+    names = [[file["name"] for file in studio.ask(f"sessions/{s}/files")[1]["files"]] for s in (first, second)]
+    assert names == [["mine.yaml", "own.yaml", "part.apt"], ["own.yaml", "part.apt"]]
+    assert studio.request(f"sessions/{first}/files/mine.yaml")[1].decode() == RPR3.replace("rpr3", "mine")
+    assert studio.ask(f"sessions/{second}/files/mine.yaml")[0] == 404
+    assert studio.ask("sessions/nothing/files")[0] == 404
+
+
+@pytest.mark.parametrize("name", ["../a", "..%2Fa", "a/b", ".hidden", "a\0b", "C:\\a", "a" * 100, "%2e%2e", "a..", ""])
+def test_no_file_is_written_elsewhere(studio, name):
+    session = studio.open_session()
+    status, _ = studio.request(f"sessions/{session}/files/{name}".replace("\0", "%00").replace("\\", "%5C"), "PUT", "x")
+    assert status in (400, 404)
+    assert [file["name"] for file in studio.ask(f"sessions/{session}/files")[1]["files"]] == ["own.yaml", "part.apt"]
+
+
+def test_a_large_upload_is_refused(studio):
+    session = studio.open_session()
+    status, answer = studio.put_file(session, "large.cls", b"x" * (64 * 2**20 + 1))
+    assert status == 400
+    assert "larger than 64 MiB" in answer["error"]
+
+
+@pytest.mark.parametrize(
+    "body", ["", "[]", "{", "7", '{"command": "rm"}', '{"command": "show", "values": 3}', "[" * 50000]
+)
+def test_a_malformed_run_is_refused(studio, body):
+    session = studio.open_session()
+    status, answer = studio.request(f"sessions/{session}/runs", "POST", body)
+    assert status == 400
+    assert json.loads(answer)["error"]
+
+
+def test_runs_say_what_the_commands_say(studio, capsys, tmp_path, monkeypatch):
+    session = studio.open_session()
+    told = studio.run(session, "inverse", {"NAME": "own.yaml", "VALUES": ["X=10 Y=-5"]})
+    (tmp_path / "own.yaml").write_text(RPR3, encoding="utf-8")
+    monkeypatch.chdir(tmp_path)
+    assert main(["inverse", "own.yaml", "X=10", "Y=-5"]) == 0
+    assert (told["code"], told["output"]) == (0, capsys.readouterr().out)
+    assert told["line"] == "parakin inverse own.yaml X=10 Y=-5"
+    studio.put_file(session, "bad.yaml", RPR3.replace("kind: length", "kind: lenght"))
+    told = studio.run(session, "show", {"NAME": "bad.yaml", "--yaml": True})
+    assert told["code"] == 2
+    assert told["errors"].startswith("bad.yaml:")
+    told = studio.run(session, "post", {"PART": "part.apt", "--machine": "own.yaml", "--output": "out", "--page": True})
+    assert told["code"] == 0
+    names = {file["name"] for file in studio.ask(f"sessions/{session}/files")[1]["files"]}
+    assert {"out/part.joints.csv", "out/part.report.html", "out/part.page.html"} <= names
+    assert studio.request(f"sessions/{session}/page/out/part.page.html")[0] == 200
+
+
+def test_a_run_can_be_cancelled_and_blocks_nothing(studio):
+    session = studio.open_session()
+    values = {"NAME": "hexapod", "--gap": "0.0001", "--time": "600"}
+    runs = [studio.begin_run(session, "workspace", values)[1]["run"] for _ in range(3)]
+    time.sleep(1.0)
+    assert studio.ask("commands")[0] == 200
+    states = [studio.ask(f"sessions/{session}/runs/{run}")[1]["state"] for run in runs]
+    assert states == ["running", "running", "waiting"]
+    begun = time.monotonic()
+    ended = [studio.ask(f"sessions/{session}/runs/{run}", "DELETE")[1]["state"] for run in reversed(runs)]
+    assert ended == ["cancelled"] * 3
+    assert time.monotonic() - begun < 10.0
+    assert studio.ask(f"sessions/{session}/runs/999")[0] == 404
+
+
+# The command.
+
+
+def test_bad_arguments_are_one_line(capsys, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / ".hidden.cls").write_text(PART, encoding="utf-8")
+    for words, said in (
+        (["nothing"], "unknown machine"),
+        (["tricept", "nothing.cls"], "nothing.cls"),
+        (["tricept", ".hidden.cls"], "file's name"),
+        (["--port", "70000"], "--port"),
+        (["--port", "-1"], "--port"),
+    ):
+        assert main(["studio", "--no-browser", *words]) == 2, words
+        error = capsys.readouterr().err
+        assert said in error
+        assert len(error.splitlines()) == 1
+
+
+# The page.
+
+PRESS = """() => {
+  let seed = 7;
+  const next = many => { seed = (1103515245 * seed + 12345) % 2147483648; return seed % many; };
+  const texts = ["", "1", "X=1", "-", "\\u0000", "../a"];
+  for (let i = 0; i < 300; i++) {
+    if (next(4)) {
+      const select = document.getElementById("command");
+      select.selectedIndex = next(select.options.length);
+      select.onchange();
+    } else {
+      for (const input of document.querySelectorAll("#form [data-name]")) {
+        if (input.type === "checkbox") input.checked = !!next(2);
+        else input.value = texts[next(texts.length)];
+        input.dispatchEvent(new Event("input"));
+      }
+    }
+    if (i % 30 === 0) document.getElementById("run").click();
+    if (i % 30 === 15) document.querySelector("#runs button")?.click();
+  }
+}"""
+
+
+@needs_chromium
+def test_the_page_in_a_browser(studio):
+    with open_browser() as browser, open_tab(browser, 1400, 900) as tab:
+        tab.goto(studio.address)
+        wait_until(tab, "document.body.dataset.ready === 'yes' && studio.readPose('own.yaml') !== null", 40.0)
+        assert tab.evaluate("studio.readPose('own.yaml')") == ["X=0", "Y=0", "C=0"]
+        tab.frames[1].evaluate("parakin.moveToPose([10, -5, 0.1])")
+        tab.click("text=Any command")
+        tab.select_option("#command", "inverse")
+        assert tab.inner_text("#line").startswith("parakin inverse own.yaml X=10 Y=-5 C=5.72957")
+        tab.click("#run")
+        wait_until(tab, "document.querySelector('.run').innerText.includes('parakin inverse')", 30.0)
+        wait_until(tab, "document.querySelector('.run .state').textContent.startsWith('exit 0')", 30.0)
+        assert "d1" in tab.inner_text(".run pre")
+        tab.click("text=Post the part")
+        wait_until(tab, "studio.findFrame('own.yaml')?.src.endsWith('out/part.page.html') === false "
+                        "&& studio.findFrame('own.yaml')?.src.includes('part.page.html')", 40.0)  # fmt: skip
+        assert "all within the limits" in tab.inner_text("#runs")
+        tab.click("summary:has-text('Edit the machine')")
+        wait_until(tab, "document.getElementById('text').value.includes('kind: length')", 20.0)
+        text = tab.input_value("#text")
+        tab.fill("#text", text.replace("kind: length", "kind: lenght", 1))
+        tab.click("#save")
+        wait_until(tab, "getSelection().toString().includes('lenght')", 20.0)  # the line that the error names
+        assert "mine.yaml:" in tab.inner_text("#runs")
+        tab.fill("#text", text)
+        tab.click("#save")
+        wait_until(tab, "studio.findFrame('mine.yaml') !== null", 20.0)
+
+
+@needs_chromium
+def test_seeded_presses_leave_it_alive(studio):
+    with open_browser() as browser, open_tab(browser, 1100, 700) as tab:
+        tab.goto(studio.address)
+        wait_until(tab, "document.body.dataset.ready === 'yes'", 40.0)
+        tab.evaluate(PRESS)
+        wait_until(
+            tab,
+            "studio.state.files.length > 0 && document.getElementById('line').textContent.startsWith('parakin ')",
+            20.0,
+        )
+        tab.click("text=Any command")
+        tab.select_option("#command", "machines")
+        tab.click("#run")
+        wait_until(tab, "document.querySelector('#runs').textContent.includes('orthoglide')", 60.0)

@@ -132,10 +132,14 @@ class Description:
             here = measure(rotation)
             turned = [rotation @ transform(word, 1e-6)[:, :3, :3] for word in ("rx", "ry", "rz")]
             slopes = np.stack([(measure(r) - here) / 1e-6 for r in turned], 2)
-            step = -np.einsum("nij,nj->ni", np.linalg.pinv(slopes), here)
+            across = slopes.swapaxes(1, 2)
+            square = across @ slopes + 1e-9 * np.eye(3)  # of mm², so that it has an inverse anywhere
+            step = -np.linalg.solve(square, (across @ here[..., None]))[..., 0]
             step *= np.minimum(1.0, 0.3 / np.maximum(np.linalg.norm(step, axis=1), 1e-300))[:, None]
             for word, angle in zip(("rx", "ry", "rz"), step.T, strict=True):
                 rotation = rotation @ transform(word, angle)[:, :3, :3]
+            if np.abs(step).max(initial=0.0) < 1e-14:
+                break
         return rotation, np.linalg.norm(measure(rotation)[:, len(self.constraints) :], axis=1) / 300.0
 
     def _led(self, tip, k, head):
@@ -167,13 +171,14 @@ class Description:
         """
         if not self.constraints:
             return self._misses(poses, joints)
-        found = []
+        miss, tilt = (np.full(len(poses), np.inf) for _ in range(2))
         for turns in ([1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]):
+            rows = np.flatnonzero(~(miss + 300.0 * tilt < 1e-8))
             self.start = np.diag(np.array(turns, float))
-            found.append(self._misses(poses, joints))
-        miss, tilt = (np.array(each) for each in zip(*found, strict=True))
-        best = (miss + 300.0 * tilt).argmin(0), np.arange(len(poses))
-        return miss[best], tilt[best]
+            off, lean = self._misses(poses[rows], joints[rows])
+            less = off + 300.0 * lean < miss[rows] + 300.0 * tilt[rows]
+            miss[rows[less]], tilt[rows[less]] = off[less], lean[less]
+        return miss, tilt
 
     def _misses(self, poses, joints):
         frame, missed = self.platform(poses, joints)

@@ -19,7 +19,7 @@ FEW = ["tricept", "hexapod", "orthoglide", "lambda6", "rotary_delta", "orthoglid
 
 def draw(machine, seed=0, size=0.1, count=None):
     """Draw sizes of a family of all numbers, one row or count rows."""
-    family = pk.family(machine, ["*"])
+    family = pk.family(machine, [p.name for p in machine.parameters if p.group != "sizes"])
     shape = (len(family.names),) if count is None else (count, len(family.names))
     scales = [size if p.unit == "mm" else size * 2e-3 for p in family.parameters]
     return family, family.nominal + np.random.default_rng(seed).uniform(-1.0, 1.0, shape) * scales
@@ -164,3 +164,23 @@ def test_sizes_that_break_the_machine_are_refused():
     machine = pk.load("tricept")
     with pytest.raises(pk.DescriptionError, match="home"):
         pk.family(machine, ["legs.d1.foot.x"]).at([5000.0])
+
+
+# Named sizes.
+
+
+@pytest.mark.parametrize("name", ["tricept", "linear_delta", "rotary_delta", "orthoglide", "lambda6", "hexapod"])
+def test_named_sizes_are_inputs(name):
+    """Against machines of the file with other sizes."""
+    machine = pk.load(name)
+    names = [parameter.name for parameter in machine.parameters if parameter.group == "sizes"]
+    assert names
+    family = pk.family(machine, names)
+    rng = np.random.default_rng(6)
+    for _ in range(3):
+        sizes = family.nominal * (1.0 + rng.uniform(-2e-3, 2e-3, len(names)))
+        other = pk.load(name, dict(zip(names, sizes.tolist(), strict=True)))
+        poses = draw_poses(machine, 10)
+        assert np.abs(family.inverse(poses, sizes) - other.inverse(poses)).max() < 1e-9
+        assert np.abs(family.at(sizes).inverse(poses) - other.inverse(poses)).max() < 1e-9
+        assert np.nanmax(np.abs(family.margins(poses, sizes) - other.margins(poses))) < 1e-7

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from functools import cached_property
 from typing import Any
 
@@ -26,7 +27,7 @@ from .kinematics.travel import LineTapes, Travel, compile_line_tapes, find_trave
 from .kinematics.wrist.pole_crossing import flip_mode
 from .kinematics.wrist.pole_thresholds import EXACT
 from .machine_properties import MachineProperties
-from .model.geometric_parameters import replace_parameters, settle_offsets
+from .model.geometric_parameters import settle_offsets
 from .model.legs import Inverse
 from .model.limits import compute_platform_points
 from .model.rates import TwistRates, compute_twist_rates
@@ -50,7 +51,9 @@ class Machine(MachineProperties):
         for name in values:
             if name not in known:
                 raise PoseError(f"parameters: unknown {quote(name)}{suggest(name, known)}")
-        return Machine(settle_offsets(replace_parameters(self.spec, values)))
+        spec = self._replace_numbers(values)
+        sizes = {name: values.get(name, value) for name, value in spec.sizes.items()}
+        return Machine(settle_offsets(replace(spec, sizes=sizes)))
 
     # Input at the boundary.
 

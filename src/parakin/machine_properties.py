@@ -16,7 +16,7 @@ from .kinematics.wrist.pose_angles import EVERY_DIRECTION, EVERY_ROTATION, EVERY
 from .kinematics.wrist.turning_joints import Wrist, find_wrist
 from .model.elements import Drive, PlaneConstraint
 from .model.equations import Equations
-from .model.geometric_parameters import Parameter, list_parameters, replace_parameters
+from .model.geometric_parameters import SIZES, Parameter, list_parameters, replace_parameters
 from .model.legs import Leg
 from .model.limits import Limit, group_joints_by_leg
 from .model.nominal_values import SizedTrace
@@ -124,12 +124,27 @@ class MachineProperties:
 
     @cached_property
     def parameters(self) -> tuple[Parameter, ...]:
-        """Every geometric number, with its name, unit, value and group."""
-        return list_parameters(self.spec)
+        """Every number that can be an input, with its name, unit, value and group.
+
+        First the named sizes of the machine's file that change its numbers evenly, then every geometric number.
+        """
+        units, rates = self.spec.size_units, self.size_rates
+        sizes = zip(rates.names, rates.nominal, strict=True)
+        named = (Parameter(name, units[name], value, SIZES) for name, value in sizes if name in units)
+        return (*named, *list_parameters(self.spec))
 
     def trace_equations(self, values: Mapping[str, Scalar]) -> Equations:
         """Trace the machine's equations with scalars of any kind in place of some of its :attr:`parameters`."""
-        return Equations(replace_parameters(self.spec, values))
+        return Equations(self._replace_numbers(values))
+
+    def _replace_numbers(self, values: Mapping[str, Scalar]) -> Spec:
+        """Replace named sizes, and all that follows from them, then single numbers."""
+        spec = self.spec
+        if any(name in values for name in spec.sizes):
+            rates = self.size_rates
+            sizes = zip(rates.names, rates.nominal, strict=True)
+            spec = rates.apply(spec, [values.get(name, nominal) for name, nominal in sizes])
+        return replace_parameters(spec, values)
 
     @cached_property
     def size_rates(self) -> SizeRates:

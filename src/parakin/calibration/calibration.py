@@ -15,7 +15,7 @@ from ..arrays import Array, Indices
 from ..errors import PoseError
 from ..families.family import Family, select_parameters
 from ..machine import Machine
-from ..model.geometric_parameters import Parameter
+from ..model.geometric_parameters import SIZES, Parameter
 from ..workspaces.sampled.allowed_poses import sample_allowed_poses
 from .identifiability import (
     AMPLIFIED,
@@ -36,7 +36,8 @@ _FAR_OUT = 5.0  # standard deviations of an outlier that is told
 _FOLDS = 5
 _SEED = 0
 _STRUCTURAL = 60  # poses that show which numbers no measurement of poses tells apart
-_ORDER = ("rods", "encoders", "feet", "platform", "rails", "mounting", "head", "table")  # the last are left out first
+# The last are left out first.
+_ORDER = (SIZES, "rods", "encoders", "feet", "platform", "rails", "mounting", "head", "table")
 _NO_POSE = 1e6  # standard deviations: the residual of a machine that has no pose
 
 
@@ -163,7 +164,8 @@ class FamilyChoice(NamedTuple):
 
 def choose_family(machine: Machine, free: Sequence[str] | None) -> FamilyChoice:
     """Choose the numbers to seek: of those that replace each other whatever is measured of poses, the first ones."""
-    parameters = select_parameters(machine, ["*"] if free is None else free)
+    geometric = [p.name for p in machine.parameters if p.group != SIZES]
+    parameters = select_parameters(machine, geometric if free is None else free)
     ordered = sorted(parameters, key=lambda p: _ORDER.index(p.group))
     every = Family(machine, ordered)
     poses = sample_allowed_poses(machine, _STRUCTURAL, _SEED)

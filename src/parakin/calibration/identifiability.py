@@ -16,7 +16,7 @@ from ..model.geometric_parameters import Parameter
 AMPLIFIED = 20.0  # times the measurement's noise: a combination that leaves the tool a greater error is not told apart
 _DEPENDENT = 1e-6  # of a column: what is left of one that others can replace
 _NOTHING = 1e-12  # of the greatest singular value: rounding
-_NAMED = 0.3  # of the greatest share: numbers of a combination that are named
+_NAMED = 0.15  # of the greatest share: numbers of a combination that are named
 _MOST_NAMED = 6
 
 

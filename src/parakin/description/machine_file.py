@@ -13,8 +13,9 @@ from typing import Annotated, Any
 from pydantic import PlainValidator, ValidationError, ValidationInfo
 
 from ..errors import InputError, InputErrors, quote, suggest
-from ..model.elements import Limits
+from ..model.elements import Limits, Unit
 from ..model.spec import Spec
+from ..units import ANGLE, LENGTH, Dimension
 from .document import YamlMap, YamlText, read_document
 from .groups import Legs
 from .sections import (
@@ -30,6 +31,7 @@ from .sections import (
 from .sizes import read_sizes
 from .values import Prose, ReadingContext, WordValue, describe_value, get_context, is_word
 
+_UNITS: dict[Dimension, Unit] = {LENGTH.dimension: "mm", ANGLE.dimension: "rad"}
 _MACHINES = Path(__file__).parent.parent / "machines"
 
 
@@ -99,6 +101,11 @@ def read_machine(path: str | PathLike[str], parameters: Mapping[str, float | str
         legs=tuple(leg for group in machine.legs for leg in group.build_legs()),
         home=machine.home.get_pose(),
         sizes={name: size.value for name, size in context.sizes.items() if size is not None},
+        size_units={
+            name: _UNITS[size.dimension]
+            for name, size in context.sizes.items()
+            if size is not None and size.dimension in _UNITS
+        },
         mounting=machine.mounting,
         head=machine.head,
         table=machine.table,

@@ -14,6 +14,7 @@ from .nominal_values import find_nominal_value
 from .spec import Spec
 from .structures import make_structure
 
+SIZES = "sizes"  # the group of the named sizes of a machine file
 _AXES = ("x", "y", "z")
 _TRIAL = 1e-3  # mm or rad, by which a fixed transform is changed to see whether the machine stays one
 _GROUPS = {"foot": "feet", "pivot": "feet", "platform": "platform"}  # of points; sizes and directions follow their type
@@ -21,13 +22,13 @@ _GROUPS = {"foot": "feet", "pivot": "feet", "platform": "platform"}  # of points
 
 @dataclass(frozen=True)
 class Parameter:
-    """A geometric number of a machine.
+    """A number of a machine that can be an input.
 
-    name : such as ``legs.d1.foot.x``, ``legs.d1.rod``, ``legs.d1.rail.ry`` (a small turn of a direction about an axis
-        of the base), ``joints.d1.offset`` (what is added to what the drive says), ``head.1.tz``; legs go by their
-        first drive, transforms by their place from 1
+    name : a named size's own, or such as ``legs.d1.foot.x``, ``legs.d1.rod``, ``legs.d1.rail.ry`` (a small turn of a
+        direction about an axis of the base), ``joints.d1.offset`` (what is added to what the drive says),
+        ``head.1.tz``; legs go by their first drive, transforms by their place from 1
     value : mm or rad
-    group : ``feet``, ``platform``, ``rods``, ``rails``, ``encoders``, ``mounting``, ``head`` or ``table``
+    group : ``sizes``, ``feet``, ``platform``, ``rods``, ``rails``, ``encoders``, ``mounting``, ``head`` or ``table``
     deviation : its standard deviation, mm or rad; None where it is not known
     """
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from .elements import Drive, Limits, PlaneConstraint, Step
+from .elements import Drive, Limits, PlaneConstraint, Step, Unit
 from .legs import Leg
 
 
@@ -16,6 +16,7 @@ class Spec:
     ``motion`` lists the platform's elementary transforms in order (``tx ty tz rx ry rz``); ``mounting`` places the
     base frame in the machine frame; ``head`` leads from the platform to the tool's tip, whose +z points from the tip
     into the holder; ``table`` leads from the machine frame to the workpiece. ``home`` maps axis names to a pose.
+    ``size_units`` has those of the ``sizes`` that are lengths or angles.
     ``parasitic`` are the words of the motion that follow from the others by the ``constraints``.
     """
 
@@ -32,6 +33,7 @@ class Spec:
     limits: Limits = field(default_factory=Limits)
     parasitic: tuple[str, ...] = ()
     constraints: tuple[PlaneConstraint, ...] = ()
+    size_units: Mapping[str, Unit] = field(default_factory=dict)
 
     @property
     def drives(self) -> tuple[Drive, ...]:

@@ -277,6 +277,7 @@ def test_an_offence_is_clicked(tmp_path, browser):
     assert main(["post", str(part), "-m", "linear_delta", "-o", str(tmp_path), "--page"]) == 3
     assert main(["page", str(part), "-m", "linear_delta", "-o", str(tmp_path / "long.html")]) == 3
     assert (tmp_path / "long.page.html").exists()
+    assert 'href="long.page.html"' in (tmp_path / "long.report.html").read_text(encoding="utf-8")
     with open_tab(browser) as tab:
         tab.goto((tmp_path / "long.html").as_uri())
         offence = tab.locator(".offence").first

@@ -13,15 +13,19 @@ KEYS = ["ArrowLeft", "ArrowUp", "+", "-", "h", "v", "p", "Tab", "Enter", " ", "E
 NUMBERS = ["0", "1e9", "-250", "abc", "", "37.5", "-1e-7", "1e308", "180"]
 PARTS = {
     "tricept": "G90 G21\nG0 X0 Y0 Z-1500\nG1 X120 Y40 B12 C30 F3000\nG1 X-90 Z-1600 B0 C0\nG1 X3000\n",
+    "orthoglide": "",  # a machine's page, with its sizes
     "rrr3": "G90 G21\nG0 X0 Y0 C0\nG1 X40 Y10 C10 F900\nG1 X-20 Y30 C-5\n",
 }
 
 
 def write_page(name, folder):
+    file = folder / f"{name}.html"
+    if not PARTS[name]:
+        file.write_text(pk.render_machine_page(pk.load(name)), encoding="utf-8")
+        return file.as_uri()
     part = folder / f"{name}.ngc"
     part.write_text(PARTS[name])
     job = pk.prepare(pk.load(name), pk.read_path(part))
-    file = folder / f"{name}.html"
     file.write_text(pk.render_path_page(job.posted, job.trajectory), encoding="utf-8")
     return file.as_uri()
 
@@ -82,10 +86,18 @@ def test_seeded_interactions_leave_a_page_alive(name, tmp_path):
         tab.goto(write_page(name, tmp_path))
         for number in range(COUNT):
             kind = interact(tab, rng)
-            state, page = tab.evaluate("[parakin.state, parakin.marginsAt(parakin.state).map(x => x === x ? x : null)]")
+            state, page, sizes = tab.evaluate(
+                "[parakin.state, parakin.marginsAt(parakin.state).map(x => x === x ? x : null), parakin.model.sizes]"
+            )
             assert np.isfinite(state["pose"] + state["joints"]).all(), (number, kind)
             mode = "".join("+" if sign > 0 else "-" for sign in state["signs"])
-            margins = machine.margins([state["pose"]], [state["joints"]], mode)[0]
+            own = machine
+            if sizes != list(machine.size_rates.nominal):
+                try:
+                    own = pk.load(name, parameters=dict(zip(machine.size_rates.names, sizes, strict=True)))
+                except pk.ParakinError:  # its home is off limits with these sizes
+                    continue
+            margins = own.margins([state["pose"]], [state["joints"]], mode)[0]
             assert np.array(page, float) == pytest.approx(margins, abs=1e-9, rel=1e-9, nan_ok=True), (number, kind)
         tab.keyboard.press("Escape")
         tab.get_by_role("button", name="Home").click()

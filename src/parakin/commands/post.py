@@ -291,7 +291,9 @@ def _make_files(
             files["page"] = (f"{stem}.page.html", render_path_page(posted, trajectory))
         else:
             missing.append(wanted.explain_missing("page", "the file has no motion", f"{stem}.page.html"))
-    files["report"] = (f"{stem}.report.html", render_report(posted, trajectory, job.unplanned, job.waits, job.outside))
+    page = files["page"][0] if "page" in files else None
+    report = render_report(posted, trajectory, job.unplanned, job.waits, job.outside, page)
+    files["report"] = (f"{stem}.report.html", report)
     return files, missing
 
 

@@ -64,7 +64,7 @@ function fitOrbit(geometry) {
   low.copy(box.min);
   high.copy(box.max);
   orbit.target.addVectors(low, high).multiplyScalar(0.5);
-  zoomCamera(max(1, wider));
+  zoomCamera(max(1, 0.85 * wider));
 }
 
 workspaceSwitch.addEventListener("change", () => { requestSurface(); requestPicture(); });

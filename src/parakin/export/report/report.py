@@ -6,6 +6,7 @@ from html import escape
 from math import inf
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
+from urllib.parse import quote
 
 import numpy as np
 
@@ -35,11 +36,13 @@ def render_report(
     unplanned: str = "",
     waits: float = 0.0,
     outside: Outside | None = None,
+    page: str | None = None,
 ) -> str:
     """Render the report as one HTML document: verdict, ranges, path, curves, time, offences, notes, facts.
 
     ``unplanned`` says why there is no trajectory, ``waits`` how long (s) the program waits besides it,
-    ``outside`` where the part would have to lie. Whatever the
+    ``outside`` where the part would have to lie, ``page`` the name of the file beside the report on which the machine
+    moves along the path. Whatever the
     length of the path the document stays below some 8 MB: of every stretch the extremes are drawn.
     """
     if not 0.0 <= waits < inf:
@@ -48,7 +51,7 @@ def render_report(
     name = Path(path.source).name or path.source
     title = f"{name} on {machine.spec.title or machine.name}"
     cards = [
-        f"<header><h1>{escape(title)}</h1><p class=sub>{escape(path.source)}</p></header>\n",
+        f"<header><h1>{escape(title)}</h1><p class=sub>{escape(path.source)}</p>{_link_page(page)}</header>\n",
         _render_verdict(posted, trajectory, _Remarks(unplanned, waits, outside)),
     ]
     if len(path):
@@ -58,6 +61,12 @@ def render_report(
         cards += [] if trajectory is None else [render_timing_card(trajectory, view)]
     cards += [render_offence_card(posted), render_note_card(path), render_fact_card(posted)]
     return render_page(title, "".join(cards))
+
+
+def _link_page(page: str | None) -> str:
+    if page is None:
+        return ""
+    return f'<p class=sub><a href="{escape(quote(page))}">The machine moving along it</a></p>'
 
 
 class _Remarks(NamedTuple):

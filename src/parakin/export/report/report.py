@@ -51,7 +51,7 @@ def render_report(
     name = Path(path.source).name or path.source
     title = f"{name} on {machine.spec.title or machine.name}"
     cards = [
-        f"<header><h1>{escape(title)}</h1><p class=sub>{escape(path.source)}</p>{_link_page(page)}</header>\n",
+        f"<header><h1>{escape(title)}</h1><p class=sub>{escape(path.source)}</p>{_render_page_link(page)}</header>\n",
         _render_verdict(posted, trajectory, _Remarks(unplanned, waits, outside)),
     ]
     if len(path):
@@ -63,7 +63,7 @@ def render_report(
     return render_page(title, "".join(cards))
 
 
-def _link_page(page: str | None) -> str:
+def _render_page_link(page: str | None) -> str:
     if page is None:
         return ""
     return f'<p class=sub><a href="{escape(quote(page))}">The machine moving along it</a></p>'

@@ -159,10 +159,7 @@ def _choose_common_points(model: Model, joints: Array, starts: Array | None, mod
             given, others, tape = joints[lost], second[lost], model.spheres_tape(side)
             open_by = evaluate_tape_with_residual(tape, given, others, np.empty((len(lost), 0)))
             fit = (open_by <= compute_closure_tolerance(model)) & find_in_mode(model, others, given, mode)
-            if starts is None:
-                first[lost[fit]], residual[lost[fit]], why[lost[fit]] = others[fit], open_by[fit], ANSWERED
-            else:  # the common point in the mode is not the one on the start's side
-                why[lost[fit]] = ON_ANOTHER_SIDE
+            why[lost[fit]] = ON_ANOTHER_SIDE  # the common point in the mode is not the one on the start's side
     return Answers(first, residual, np.zeros(count, np.int32), why, np.zeros(count, np.bool_))
 
 

@@ -28,8 +28,7 @@ class Solution:
 
     poses : (..., axes), NaN where not converged; C of an upright tool is the near pose's, else 0
     residual : (...,) the greatest distance by which a leg fails to close there, mm
-    converged : (...,) True where the legs close, in the working mode asked for and the start's assembly mode; in closed
-        form without a start also in the other one, if that alone has a pose in the working mode
+    converged : (...,) True where the legs close, in the working mode asked for and the start's assembly mode, or home's
     steps : (...,) Newton's steps; 0 in closed form
     why : (...,) why there is no answer, an index of :data:`REASONS`; 0 where there is one
     in_other_mode : (...,) True where no mode was asked for and the legs stand in another one than the machine's, as the

@@ -227,3 +227,17 @@ def test_random_paths_that_were_hard(tmp_path, name, seed):
     job = pk.prepare(machine, pk.read_path(tmp_path / "part.cls"))
     assert job.runs
     assert not find_fault(controller, job)
+
+
+def test_linuxcnc_takes_a_turn_of_a_tool_that_hardly_moves_in_its_time(tmp_path):
+    """Its interp_inverse.cc makes motions in inverse time no slower than 0.1 mm/min, of X Y Z if they move at all."""
+    machine = pk.load("orthoglide5_table")
+    (tmp_path / "part.cls").write_text(PathMaker(machine, 20).make(), encoding="ascii")
+    file = io.BytesIO()
+    pk.make_linuxcnc_program(pk.prepare(machine, pk.read_path(tmp_path / "part.cls")).trajectory)(file)
+    blocks = file.getvalue().decode("ascii").split("\nM67 E63 Q1\nG61\n")[1].split("\nG61.1\n")[0].splitlines()
+    values = np.array([[float(word[1:]) for word in block.split()[2:]] for block in blocks])
+    moves, turns = (np.linalg.norm(np.diff(values[:, part], axis=0), axis=1) for part in (slice(3), slice(3, 5)))
+    rates = np.where(moves > 0.0, moves, turns) * values[1:, 5]
+    assert (rates >= 0.1).all()
+    assert (moves[turns > 1e-3] > 0.0).any()

@@ -15,6 +15,7 @@ from hang_dump import dump
 
 MOST = 45.0  # s for a step
 REST = 0.05  # s
+REFUSED = 0.1  # s for the rest of what is said to a refused block
 UNDONE = -1  # LinuxCNC's answer to waiting, after 5 s
 DRAINING = 0.3  # s for the sampler's last rows
 
@@ -82,6 +83,19 @@ class Machine:
                 raise TimeoutError
         return self.position()
 
+    def try_by_hand(self, block):
+        """Where a block leads, or why LinuxCNC refuses it; where that switches the machine off it is an error."""
+        try:
+            return self.by_hand(block)
+        except ToldError as told:
+            self.status.poll()
+            if self.status.task_state != linuxcnc.STATE_ON:
+                raise
+            time.sleep(REFUSED)
+            while self.errors.poll():  # there may be more than one
+                pass
+            return str(told)
+
     def program(self, name, during=()):
         """Run a program; ``during`` it, at times in s, words to LinuxCNC with their arguments."""
         path = str(Path(name).resolve())
@@ -101,23 +115,15 @@ class Machine:
 
     def refusal(self, block):
         """What LinuxCNC says to a move that must not begin."""
-        try:
-            self.by_hand(block)
-        except ToldError as told:
-            text = str(told)
-        else:
-            text = "went there"
-        time.sleep(0.1)
-        while self.errors.poll():  # there may be more than one
-            pass
-        return text
+        answer = self.try_by_hand(block)
+        return answer if isinstance(answer, str) else "went there"
 
 
 def work(machine, task, seen):
     joints = task["joints"]
     machine.switch_on(joints)
     seen["home"] = machine.home(joints)
-    seen["by hand"] = [machine.by_hand(block) for block in task.get("by hand", ())]
+    seen["by hand"] = [machine.try_by_hand(block) for block in task.get("by hand", ())]
     machine.tell("feedrate", task.get("override", 1.0))
     if "program" in task:
         seen["program"] = machine.program(task["program"], task.get("during", ()))

@@ -9,7 +9,7 @@ from typing import BinaryIO, NamedTuple
 import numpy as np
 
 from ...arguments import check_arguments
-from ...arrays import Array, Indices, Writer
+from ...arrays import Array, Flags, Indices, Writer
 from ...errors import PoseError
 from ...kinematics.wrist.pole_crossing import get_leg_signs
 from ...machine import Machine
@@ -24,6 +24,7 @@ from .knots import Knots, choose_knots
 from .planner import SIGNAL, name_planner
 
 _ROUNDING = 1e-9  # s
+_LEAST_RATE = 0.1  # mm/min, or degrees/min: LinuxCNC's interpreter takes slower motions in inverse time for this fast
 
 
 class _Approach(NamedTuple):
@@ -109,9 +110,30 @@ def _place_records(trajectory: Trajectory, knots: Knots) -> Indices:
     return np.searchsorted(knots.times, trajectory.times - _ROUNDING, "left")
 
 
+def _hold_slow_tips(machine: Machine, rows: Array, seconds: Array, stands: Flags) -> None:
+    """Hold the tip in motions (k,) that turn it and hardly move it; rows (k + 1, axes), mm and degrees as written.
+
+    LinuxCNC tells a motion's rate by the tip's way, however small, and by the turn only where the tip stands. What
+    is held back, less than 1e-5 mm in 6 ms, moves on with the next motion that is fast enough, or that ends where the
+    trajectory ``stands`` (k + 1,).
+    """
+    tip, least = [column for column, axis in enumerate(machine.axes) if axis in "XYZ"], _LEAST_RATE / 60.0 * seconds
+    steps = np.diff(rows, axis=0)
+    ways, turns = (np.linalg.norm(steps[:, columns], axis=1) for columns in (tip, machine.turning_columns))
+    may_hold = (turns > least) & ~stands[1:]
+    for first in np.flatnonzero(may_hold & (ways > 0.0) & (ways <= least)).tolist():
+        for motion in range(first, len(seconds)):
+            way = np.linalg.norm(rows[motion + 1, tip] - rows[motion, tip])
+            if not (may_hold[motion] and 0.0 < way <= least[motion]):
+                break
+            rows[motion + 1, tip] = rows[motion, tip]
+
+
 def _format_motions(machine: Machine, knots: Knots, events: dict[int, list[str]]) -> Iterator[str]:
     """Yield the motions from knot to knot, the events before each by their number, and exact stops where it stands."""
-    rows, seconds = to_display(knots.poses[1:], machine.axis_units), np.diff(knots.times)
+    rows, seconds = to_display(knots.poses, machine.axis_units), np.diff(knots.times)
+    _hold_slow_tips(machine, rows, seconds, knots.stands)
+    rows = rows[1:]
     standing = set(np.flatnonzero(knots.stands[1:]).tolist())
     breaks = sorted({0, len(rows), *events, *standing, *(at + 1 for at in standing)})
     for begin, end in pairwise([*breaks, len(rows)]):

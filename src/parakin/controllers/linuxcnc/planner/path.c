@@ -7,8 +7,7 @@
 #define PIECES 2048  /* a power of two, more than the steps */
 #define PATIENCE 20  /* cycles for which the last motion waits for the one that follows it */
 #define LATE 2000    /* cycles for which a timed one does, whose spline goes on through the ones that follow */
-#define RESERVE 200  /* timed motions that are gathered before the first of them begins, */
-#define RESERVE_SECONDS 2.0 /* of this length too: LinuxCNC hands over hardly one a cycle, so short ones run out */
+#define RESERVE 200  /* timed motions that are gathered before the first of them begins */
 #define KNOTS 12     /* intervals ahead that shape a spline: what lies behind them changes it by less than 1e-6 */
 
 enum shape { ON_MOTION, PARABOLA, SPLINE };
@@ -126,15 +125,6 @@ static int lay_motion(void)
     return 1;
 }
 
-/* Whether enough timed motions are gathered for the first of them to begin. */
-static int is_gathered(void)
-{
-    double seconds = 0.0;
-    for (unsigned i = first_motion; i != next_motion && seconds < RESERVE_SECONDS; i++)
-        seconds += motion_at(i)->kind == TIMED ? motion_at(i)->length : 0.0;
-    return queue_length() >= QUEUE - MARGIN || (queue_length() >= RESERVE && seconds >= RESERVE_SECONDS);
-}
-
 /* Lay a timed motion: the first interval of the spline through the motions ahead. */
 static int lay_spline(void)
 {
@@ -150,7 +140,7 @@ static int lay_spline(void)
     const int age = motion_at(next_motion - 1)->age;
     if (count < KNOTS && !halts && last && age < LATE)
         return 0;
-    if (laid_motion == first_motion && laid_still && age < PATIENCE && !is_gathered())
+    if (laid_motion == first_motion && laid_still && next_motion - first_motion < RESERVE && age < PATIENCE)
         return 0;
     halts = halts || count < KNOTS;
     /* Speeds at the knots, v: of v[i-1]/h[i-1] + 2 v[i] (1/h[i-1] + 1/h[i]) + v[i+1]/h[i] = 3 (s[i-1]/h[i-1] + s[i]/h[i])

@@ -110,8 +110,8 @@ def _place_records(trajectory: Trajectory, knots: Knots) -> Indices:
     return np.searchsorted(knots.times, trajectory.times - _ROUNDING, "left")
 
 
-def _hold_slow_tips(machine: Machine, rows: Array, seconds: Array, stands: Flags) -> None:
-    """Hold the tip in motions (k,) that turn it and hardly move it; rows (k + 1, axes), mm and degrees as written.
+def _stop_slow_tips(machine: Machine, rows: Array, seconds: Array, stands: Flags) -> None:
+    """Stop the tip in motions (k,) that turn it and hardly move it; rows (k + 1, axes), mm and degrees as written.
 
     LinuxCNC tells a motion's rate by the tip's way, however small, and by the turn only where the tip stands. What
     is held back, less than 1e-5 mm in 6 ms, moves on with the next motion that is fast enough, or that ends where the
@@ -132,7 +132,7 @@ def _hold_slow_tips(machine: Machine, rows: Array, seconds: Array, stands: Flags
 def _format_motions(machine: Machine, knots: Knots, events: dict[int, list[str]]) -> Iterator[str]:
     """Yield the motions from knot to knot, the events before each by their number, and exact stops where it stands."""
     rows, seconds = to_display(knots.poses, machine.axis_units), np.diff(knots.times)
-    _hold_slow_tips(machine, rows, seconds, knots.stands)
+    _stop_slow_tips(machine, rows, seconds, knots.stands)
     rows = rows[1:]
     standing = set(np.flatnonzero(knots.stands[1:]).tolist())
     breaks = sorted({0, len(rows), *events, *standing, *(at + 1 for at in standing)})

@@ -45,6 +45,7 @@ FLOORS = [
     ["controllers.grbl", "controllers.siemens", "controllers.fanuc", "controllers.beckhoff", "export.json"],
     ["controllers.fluidnc", "controllers.heidenhain"],
     ["controllers", "export"],
+    ["notebook"],
     ["__init__"],  # the public names
     ["studio"],
     ["commands"],
@@ -276,9 +277,9 @@ name narrow normalise note number
 open order
 pace paint parse peel pick place plan point polish pose post predict prepare print project prove put
 quote
-raise rank rate read rebuild recognise record redirect reduce refine refuse reject relate release remove rename render
-renumber reorder repeat replace report repost require reserve reset resize resolve restore restrict retract retry return
-reuse reverse rewind rotate round route run
+raise rank rate read rebuild recognise record redirect reduce refine refuse register reject relate release remove rename
+render renumber reorder repeat replace report repost require reserve reset resize resolve restore restrict retract retry
+return reuse reverse rewind rotate round route run
 sample save say scale score search select separate serve set settle share shift shorten show shrink skip smooth snap
 simulate slow solve sort space split spread square stack stage stamp start stop store stretch strip subtract suggest sum
 summarise swap sweep switch

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Mapping
 from os import PathLike, fspath
 from typing import TYPE_CHECKING
@@ -267,3 +268,9 @@ def __getattr__(name: str) -> object:
         module, _, own_name = _LAZY[name].partition(":")
         return getattr(import_module(f"{__name__}.{module}"), own_name or name)
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+
+
+if "IPython" in sys.modules:
+    from .notebook import register_displays
+
+    register_displays()

@@ -139,6 +139,10 @@ PlayedPage = Annotated[
     bool,
     Parameter(help="Write PART.page.html too, on which the machine moves along the path."),
 ]
+Animation = Annotated[
+    bool,
+    Parameter(help="Write PART.glb too, the machine's bodies in motion, for Blender and other programs."),
+]
 
 
 def post(
@@ -167,6 +171,7 @@ def post(
     output: Folder = Path(),
     parquet: Parquet = False,
     page: PlayedPage = False,
+    animation: Animation = False,
     json: Json = False,
     sizes: Sizes = None,
 ) -> int:
@@ -197,7 +202,9 @@ def post(
         options = JobOptions(mode, tolerances, target, corners, rewind, clearance, turn)
         prepared = prepare_part(chosen, path, placed, place, options, progress)
         job = prepared.job
-        files, missing = _make_files(part.stem, prepared, _Wanted(target, force, rate, parquet, page, output), progress)
+        files, missing = _make_files(
+            part.stem, prepared, _Wanted(target, force, rate, parquet, page, animation, output), progress
+        )
         paths = write_files(output, dict(files.values()))
     written = {kind: str(name) for kind, name in zip(files, paths, strict=True)}
     if json:
@@ -244,6 +251,7 @@ class _Wanted:
     rate: float | None
     parquet: bool
     page: bool
+    animation: bool
     folder: Path
 
     def explain_missing(self, kind: str, reason: str, name: str) -> str:
@@ -291,6 +299,14 @@ def _make_files(
             files["page"] = (f"{stem}.page.html", render_path_page(posted, trajectory))
         else:
             missing.append(wanted.explain_missing("page", "the file has no motion", f"{stem}.page.html"))
+    if wanted.animation:
+        name = f"{stem}.glb"
+        if trajectory is None:
+            missing.append(wanted.explain_missing("animation", job.unplanned, name))
+        else:
+            from ..export.machine.animated_glb import render_path_glb
+
+            files["animation"] = (name, render_path_glb(trajectory, progress.stage("drawing the motion", 0.9, 1.0)))
     page = files["page"][0] if "page" in files else None
     report = render_report(posted, trajectory, job.unplanned, job.waits, job.outside, page)
     files["report"] = (f"{stem}.report.html", report)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from ...arrays import Array
@@ -10,7 +12,7 @@ from .multibody import METRE
 from .scene import build_scene
 from .solids import LOOKS, build_solids
 
-_Y_UP = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])  # Z up to Y up
+Y_UP = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])  # Z up to Y up
 
 
 def render_stl(machine: Machine, pose: Array | None = None) -> bytes:
@@ -30,11 +32,17 @@ def render_glb(machine: Machine, pose: Array | None = None) -> bytes:
 
     scene = Scene()
     for number, solid in enumerate(build_solids(build_scene(machine, pose))):
-        colour = [int(LOOKS[solid.kind].colour[i : i + 2], 16) / 255.0 for i in (1, 3, 5)]
-        material = PBRMaterial(baseColorFactor=[*colour, 1.0], metallicFactor=0.1, roughnessFactor=0.7)
-        vertices = solid.vertices @ _Y_UP.T * METRE
+        material = PBRMaterial(**format_material(solid.kind)["pbrMetallicRoughness"])
+        vertices = solid.vertices @ Y_UP.T * METRE
         visual = TextureVisuals(material=material)
         scene.add_geometry(
             Trimesh(vertices, solid.triangles, process=False, visual=visual), geom_name=f"{solid.name} {number}"
         )
     return bytes(scene.export(file_type="glb"))
+
+
+def format_material(kind: str) -> dict[str, Any]:
+    """Format the material of a kind of solid as glTF has it."""
+    colour = [int(LOOKS[kind].colour[i : i + 2], 16) / 255.0 for i in (1, 3, 5)]
+    look = {"baseColorFactor": [*colour, 1.0], "metallicFactor": 0.1, "roughnessFactor": 0.7}
+    return {"name": kind, "pbrMetallicRoughness": look}

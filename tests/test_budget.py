@@ -50,6 +50,24 @@ def test_a_workspace_that_is_out_of_time_holds_its_volume():
     assert hasty.volume.outer >= truth.inner
 
 
+def test_a_step_over_orientations_ends_with_its_budget(monkeypatch):
+    region = pk.region(pk.load("tricept"), some={"B": ("-10 deg", "10 deg")})
+    low, high = region.find_extent(Budget(10.0))
+    whole, hasty = region.subdivide(low, high), region.subdivide(low, high)
+    looks = []
+    bound = type(hasty)._bound_leaves
+    monkeypatch.setattr(type(hasty), "_bound_leaves", lambda self, *given: looks.append(1) or bound(self, *given))
+    spent = Budget(10.0, boxes=0)
+    for search, budget in ((whole, None), (hasty, spent)):
+        looks.clear()
+        search.refine(np.arange(len(search.open_cells.low)), budget)
+        assert (len(looks) == 2) == (budget is spent)  # at the leaves once, and at their middles
+    outer = [float((cells.outer * cells.size.prod(1)).sum()) for cells in (whole.open_cells, hasty.open_cells)]
+    inner = [float((cells.inner * cells.size.prod(1)).sum()) for cells in (whole.open_cells, hasty.open_cells)]
+    assert outer[0] <= outer[1] * (1.0 + 1e-9)
+    assert inner[1] <= outer[0]
+
+
 def test_a_box_out_of_time_is_proved_all_the_same():
     region = pk.region(pk.load("hbg80_2d"))
     began = time.monotonic()

@@ -63,6 +63,8 @@ class InclusiveSubdivision(Subdivision):
             again = np.asarray(again & ~inside[leaves.cell] & (look < LOOKS))
             redundant = _find_redundant(len(low), leaves.cell, bounds)
             again &= ~redundant
+            if self.budget is not None and self.budget.is_spent():
+                again[:] = False  # what is bounded so far holds all the same
             stay = ~again & ~redundant
             finished.append((leaves.take(stay), bounds.fractions.take(stay), bounds.planes[stay]))
             count += np.bincount(finished[-1][0].cell, minlength=len(low))

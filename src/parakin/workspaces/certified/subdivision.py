@@ -183,6 +183,7 @@ class Subdivision(ABC):
         low, size = _snap_to_grid(low, high, counts)
         index = np.array(list(product(*[range(n) for n in counts])), float).reshape(-1, len(low))
         self._decided: list[Cells] = []  # in the round that runs
+        self.budget: Budget | None = None  # of that round
         self.rounds = 0
         began = time.monotonic()
         bottom, top = (np.broadcast_to(end, (len(index), len(end))) for end in orientations)
@@ -223,7 +224,7 @@ class Subdivision(ABC):
 
         Interrupted, it leaves the cells as they were.
         """
-        self._decided = []
+        self._decided, self.budget = [], budget
         d = self.open_cells.low.shape[1]
         corners = np.array(list(product((0.0, 1.0), repeat=d)))
         is_cut = np.zeros(len(self.open_cells.low), np.bool_)

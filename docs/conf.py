@@ -1,7 +1,9 @@
 """How Sphinx makes the pages of this folder: ``make docs``."""
 
 import re
+from pathlib import Path
 
+import parakin as pk
 from parakin import __version__
 
 project = "parakin"
@@ -13,6 +15,8 @@ source_suffix = {".md": "markdown"}
 myst_heading_anchors = 3
 html_theme = "furo"
 html_show_copyright = False
+html_static_path = ["static"]
+html_css_files = ["gallery.css"]
 autodoc_member_order = "bysource"
 autodoc_typehints = "none"  # the docstrings say it, with shapes and units
 autodoc_default_options = {"members": True, "undoc-members": True}
@@ -44,6 +48,28 @@ def write_fields_as_lists(app, what, name, obj, options, lines):
     lines[:] = [re.sub(r"\|(?=\w+ \w|\w+\|)", r"\\|", line) for line in written]
 
 
+def list_live_pages(app, docname, source):
+    """Fill the gallery of live machines with what is shipped."""
+    if docname == "live":
+        cards = (
+            f'<a class="machine" href="live/{name}.html"><img src="_images/{name}.png" alt="" loading="lazy">{name}</a>'
+            for name in pk.machines()
+        )
+        source[0] = source[0].replace("MACHINES", "".join(cards))
+
+
+def write_live_pages(app, exception):
+    """Write the page of every machine beside the documentation."""
+    if exception is None and app.builder.name == "html" and app.config.live_pages:
+        folder = Path(app.outdir) / "live"
+        folder.mkdir(exist_ok=True)
+        for name in pk.machines():
+            (folder / f"{name}.html").write_text(pk.render_machine_page(pk.load(name)), encoding="utf-8")
+
+
 def setup(app):
     """Connect what this page adds to Sphinx."""
+    app.add_config_value("live_pages", True, "html")
     app.connect("autodoc-process-docstring", write_fields_as_lists)
+    app.connect("source-read", list_live_pages)
+    app.connect("build-finished", write_live_pages)

@@ -68,6 +68,7 @@ def things(tmp_path_factory, tricept):
         "Family": pk.family(tricept, ["feet"]),
         "Accuracy": accuracy,
         "WorstCase": pk.bound_worst_case(accuracy, {}),
+        "Stiffness": pk.analyse_stiffness(orthoglide, "100 N/um", poses=poses),
         "Measurements": measured,
         "Calibration": pk.calibrate(orthoglide, measured, ["encoders"]),
         "MeasurementPlan": pk.plan_measurements(orthoglide, 4, ["encoders"]),

@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from .export.machine.picture import render_machine_png
     from .export.page.page import render_machine_page, render_path_page
     from .export.report.report import render_report
+    from .export.stiffness_map import render_stiffness_png
     from .export.workspace.meshes import Mesh, make_mesh
     from .families.family import Family
     from .families.family import make_family as family
@@ -35,6 +36,7 @@ if TYPE_CHECKING:
     from .machine import Machine
     from .model.geometric_parameters import Parameter
     from .performance.atlas import Atlas, atlas
+    from .stiffness.stiffness import Stiffness, analyse_stiffness
     from .toolpath.job import Job, Tolerances, prepare
     from .toolpath.linearise.rewinds import Clearance, Rewind, RewoundPath, rewind_path
     from .toolpath.path import ToolPath
@@ -90,6 +92,7 @@ __all__ = [
     "RewoundPath",
     "SampledField",
     "Solution",
+    "Stiffness",
     "Tolerances",
     "ToolPath",
     "ToolTurn",
@@ -101,6 +104,7 @@ __all__ = [
     "__version__",
     "allocate_tolerances",
     "analyse_accuracy",
+    "analyse_stiffness",
     "atlas",
     "bound_worst_case",
     "calibrate",
@@ -133,6 +137,7 @@ __all__ = [
     "render_path_page",
     "render_report",
     "render_residuals_png",
+    "render_stiffness_png",
     "rewind_path",
     "sample_field",
     "sample_grid",
@@ -203,6 +208,7 @@ _LAZY = {
     "SampledField": "workspaces.sampled.distance_field",
     "Assemblies": "kinematics.assemblies",
     "Solution": "kinematics.solution",
+    "Stiffness": "stiffness.stiffness",
     "Tolerances": "toolpath.job",
     "Clearance": "toolpath.linearise.rewinds",
     "Rewind": "toolpath.linearise.rewinds",
@@ -217,6 +223,7 @@ _LAZY = {
     "WorstCase": "accuracy.worst_case",
     "allocate_tolerances": "accuracy.accuracy",
     "analyse_accuracy": "accuracy.accuracy",
+    "analyse_stiffness": "stiffness.stiffness",
     "bound_worst_case": "accuracy.worst_case",
     "atlas": "performance.atlas",
     "calibrate": "calibration.calibration",
@@ -247,6 +254,7 @@ _LAZY = {
     "render_machine_png": "export.machine.picture",
     "render_report": "export.report.report",
     "render_residuals_png": "export.calibration",
+    "render_stiffness_png": "export.stiffness_map",
     "sample_field": "workspaces.sampled.distance_field",
     "sample_grid": "workspaces.sampled.grid",
     "sweep_drives": "workspaces.sampled.drive_sweep",

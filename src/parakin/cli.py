@@ -27,6 +27,7 @@ from .commands.machines import machines, show
 from .commands.page import page
 from .commands.post import post
 from .commands.reach import reach
+from .commands.stiffness import stiffness
 from .commands.studio import make_studio_command
 from .commands.workspace import workspace
 from .errors import ParakinError
@@ -43,7 +44,7 @@ app = App(
     default_parameter=Parameter(negative=""),
     suppress_keyboard_interrupt=False,  # main says so in one line
 )
-ANALYSES = (assemblies, reach, workspace, atlas, accuracy, calibrate, design)
+ANALYSES = (assemblies, reach, workspace, atlas, accuracy, stiffness, calibrate, design)
 for command in (post, inverse, forward, *ANALYSES, linuxcnc, machines, show, page, export):
     app.command(command)
 app.command(import_machine, name="import")

@@ -1,0 +1,209 @@
+"""``parakin stiffness``: how far the tool gives way where drives and struts are elastic."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+from cyclopts import Parameter
+
+from ..errors import InputError, PoseError, quote
+from ..export.number_format import format_fixed
+from ..units import to_display
+from .console import announce_compiling, format_table, print_json, print_remark, print_text
+from .options import OFF_LIMITS, Json, Name, Sizes, load_machine
+from .region_options import split_axes
+
+if TYPE_CHECKING:
+    from ..arrays import Array, Indices
+    from ..machine import Machine
+    from ..stiffness.stiffness import Stiffness
+
+
+def stiffness(
+    name: Name,
+    /,
+    *,
+    drives: Annotated[list[str], Parameter(negative="")],
+    struts: str | None = None,
+    force: Annotated[str | None, Parameter(allow_leading_hyphen=True)] = None,
+    along: str | None = None,
+    csv: Path | None = None,
+    samples: int | None = None,
+    output: Annotated[Path | None, Parameter(name=["--output", "-o"])] = None,
+    json: Json = False,
+    sizes: Sizes = None,
+) -> int:
+    """The tool's stiffness over the workspace or along a path, where drives and struts are elastic.
+
+    The exit code is 3 if a pose of the file is out of reach or singular.
+
+    Parameters
+    ----------
+    name
+        A shipped machine's name or a YAML file.
+    drives
+        The stiffness of the drives along or about their joints, with slides and motors: 100N/um, or by their names
+        and patterns, d*=100N/um,theta*=20kNm/rad; rigid is one. May be given again.
+    struts
+        The section of the struts: diameter=40mm,wall=5mm,modulus=210GPa,rods=2; or how stiff each rod is along
+        itself: 300N/um. Without it they are rigid.
+    force
+        A force on the tip, whose deflection is told: X=-200N,Z=-1kN.
+    along
+        A translation: the map shows the stiffness along it, where it shows the least one by default.
+    csv
+        Rows of poses to look at instead of the workspace, such as the joint table that post writes.
+    samples
+        How many poses of the workspace are looked at; by default 400.
+    output
+        A map to write, .png: of stiffness, or with --force of the deflection; or with --csv, .csv: both at each row.
+    """
+    machine = load_machine(name, sizes)
+    if csv is not None and samples is not None:
+        raise InputError("there is a file of poses, expected one of them", "--samples")
+    if along is not None and (force is not None or output is None or csv is not None):
+        raise InputError("goes with a map, --output, and without --force", "--along")
+    _check_output(output, ".png" if csv is None else ".csv")
+    of_drives = _split_words(drives, "--drives") if any("=" in text for text in drives) else _take_one(drives)
+    of_struts = _split_words([struts], "--struts") if struts is not None and "=" in struts else struts
+    wanted = _parse_force(machine, force)
+    direction = None if along is None else _name_direction(machine, along)
+    rows, lines = (None, None) if csv is None else _read_poses(machine, csv)
+    announce_compiling()
+    from ..stiffness.stiffness import SAMPLES, analyse_stiffness
+
+    result = analyse_stiffness(machine, of_drives, of_struts, rows, SAMPLES if samples is None else samples)
+    unreachable = _find_unreachable(result, csv, lines)
+    if unreachable is not None:
+        print_remark(unreachable)
+        return OFF_LIMITS
+    files = {} if output is None else _write(result, output, direction, wanted, lines)
+    if json:
+        from ..export.json.stiffness import encode_stiffness
+
+        print_json(encode_stiffness(result, wanted, files))
+    else:
+        told = [f"{kind}  {path}" for kind, path in files.items()]
+        print_text("\n".join([_format_stiffness(result, wanted), *told]))
+    return 0
+
+
+def _check_output(output: Path | None, ending: str) -> None:
+    if output is not None and output.suffix.lower() != ending:
+        raise InputError(f"{quote(output)}: expected a file name that ends in {ending}", "--output")
+
+
+def _find_unreachable(result: Stiffness, csv: Path | None, lines: Indices | None) -> str | None:
+    """Say which rows of a file have no stiffness."""
+    import numpy as np
+
+    lost = np.flatnonzero(~np.isfinite(result.compliances).all((1, 2)))
+    if csv is None or lines is None or not lost.size:
+        return None
+    more = f", and {lost.size - 1:,} more" if lost.size > 1 else ""
+    return f"{csv}:{lines[lost[0]]}: out of reach or singular{more}"
+
+
+def _take_one(texts: Sequence[str]) -> str:
+    if len(texts) != 1:
+        raise InputError("more than one, expected them by names: d*=100N/um", "--drives")
+    return texts[0].strip()
+
+
+def _split_words(texts: Sequence[str], source: str) -> dict[str, str]:
+    """Split ``NAME=VALUE,NAME=VALUE``."""
+    words: dict[str, str] = {}
+    for one in (word for text in texts for word in text.split(",")):
+        name, equals, value = (word.strip() for word in one.partition("="))
+        if not (name and equals and value):
+            raise InputError(f"{quote(one.strip())}: expected NAME=VALUE", source)
+        if name in words:
+            raise InputError(f"{name} is given twice", source)
+        words[name] = value
+    return words
+
+
+def _parse_force(machine: Machine, text: str | None) -> Array | None:
+    if text is None:
+        return None
+    import numpy as np
+
+    from ..stiffness.springs import FORCE, parse_stiff
+
+    axes = [axis for axis in machine.axes if axis in "XYZ"]
+    result = np.zeros(len(axes))
+    for axis, value in split_axes(machine, text, "--force", "X=-200N").items():
+        if axis not in axes:
+            raise InputError(f"{axis} is no translation, expected {' '.join(axes)}", "--force")
+        bare = value.strip()
+        try:
+            size = parse_stiff(bare.removeprefix("-"), FORCE, axis)
+        except PoseError as error:
+            raise InputError(str(error), "--force") from None
+        result[axes.index(axis)] = -size if bare.startswith("-") else size
+    return result
+
+
+def _name_direction(machine: Machine, axis: str) -> dict[str, float]:
+    axes = [name for name in machine.axes if name in "XYZ"]
+    if axis.upper() not in axes:
+        raise InputError(f"{quote(axis)}, expected one of {' '.join(axes)}", "--along")
+    return {axis.upper(): 1.0}
+
+
+def _read_poses(machine: Machine, csv: Path) -> tuple[Array, Indices]:
+    from .rows import read_rows
+
+    return read_rows(csv, machine.axes, machine.axis_units)
+
+
+def _write(
+    result: Stiffness, output: Path, along: dict[str, float] | None, force: Array | None, lines: Indices | None
+) -> dict[str, str]:
+    from ..export.files import write_files
+
+    if lines is None:
+        from ..export.stiffness_map import render_stiffness_png
+
+        write_files(output.parent, {output.name: render_stiffness_png(result, along=along, force=force)})
+        return {"map": str(output)}
+    from ..export.tables.stiffness import format_stiffness_csv
+
+    write_files(output.parent, {output.name: format_stiffness_csv(result, force, lines)})
+    return {"table": str(output)}
+
+
+def _format_stiffness(result: Stiffness, force: Array | None) -> str:
+    import numpy as np
+
+    machine = result.machine
+    rows = [["least", *_format_percentiles(result.least)]]
+    for axis, unit in zip(result.translations, np.eye(len(result.translations)), strict=True):
+        rows.append([f"along {axis}", *_format_percentiles(result.along(unit))])
+    lines = [
+        f"{machine.name}: the tip's stiffness, N/um, at {len(result.poses)} poses\n",
+        format_table(rows, ["", "at the worst", "5 % are below", "half are below"], " rrr"),
+        "",
+        f"least at {_format_pose(machine, result.poses[int(result.least.argmin())])}",
+        f"of the compliance the drives make {100.0 * float(np.mean(result.drive_share)):.0f} %",
+    ]
+    if force is not None:
+        sizes = np.linalg.norm(result.deflect(force)[:, : len(force)], axis=1)
+        worst = int(sizes.argmax())
+        median, most = (format_fixed(1e3 * float(value), 2) for value in (np.median(sizes), sizes[worst]))
+        lines += ["", f"the force moves the tip by {median} um at half of them,"]
+        lines.append(f"and by {most} um at {_format_pose(machine, result.poses[worst])}")
+    return "\n".join(lines)
+
+
+def _format_percentiles(values: Array) -> list[str]:
+    import numpy as np
+
+    return [format_fixed(1e-3 * float(np.percentile(values, percent)), 2) for percent in (0, 5, 50)]
+
+
+def _format_pose(machine: Machine, pose: Array) -> str:
+    cells = zip(machine.axes, pose.tolist(), machine.axis_units, strict=True)
+    return " ".join(f"{axis}={format_fixed(to_display(value, unit), 3, '')}" for axis, value, unit in cells)

@@ -1,0 +1,223 @@
+"""The springs of a machine: its drives, and its struts from their section or as they are given."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Mapping
+from fnmatch import fnmatchcase
+from math import pi, radians
+from typing import NamedTuple, TypeAlias
+
+import numpy as np
+
+from ..arrays import Array
+from ..errors import PoseError, quote, suggest
+from ..machine import Machine
+from ..model.legs import Leg
+from ..units import LENGTH, QuantityError, parse_quantity
+
+RIGID = "rigid"
+_STEEL = "210 GPa"
+
+# Factors to N/mm, Nmm/rad, N/mm² and N.
+LINEAR = {"N/um": 1e3, "N/µm": 1e3, "kN/mm": 1e3, "MN/m": 1e3, "N/mm": 1.0, "kN/um": 1e6, "N/m": 1e-3}
+ANGULAR = {"Nm/rad": 1e3, "kNm/rad": 1e6, "Nmm/rad": 1.0, "Nm/deg": 1e3 / radians(1.0), "kNm/deg": 1e6 / radians(1.0)}
+MODULUS = {"GPa": 1e3, "MPa": 1.0, "N/mm2": 1.0}
+FORCE = {"N": 1.0, "kN": 1e3}
+_VALUE = re.compile(r"\s*([0-9.]+(?:[eE][-+]?[0-9]+)?)\s*(\S.*?)?\s*")
+
+
+class Section(NamedTuple):
+    """A strut's section.
+
+    area : mm²; second_moment : mm⁴; modulus : N/mm², of elasticity
+    """
+
+    area: float
+    second_moment: float
+    modulus: float
+
+
+Struts: TypeAlias = Section | float | None  # a section, N/mm of each rod, or None: they are rigid
+
+
+class MachineSprings(NamedTuple):
+    """The springs of a machine.
+
+    drives : (joints,) compliances, mm/N or rad/Nmm
+    """
+
+    drives: Array
+    struts: Struts
+
+
+class Springs(NamedTuple):
+    """Springs at poses.
+
+    moved : (N, closures, s) what a unit of each spring's give adds to the closures' right side
+    compliances : (N, s), mm/N or rad/Nmm
+    """
+
+    moved: Array
+    compliances: Array
+
+
+def parse_stiff(text: str, units: Mapping[str, float], name: str) -> float:
+    """Parse a number above zero with its unit.
+
+    Raises :class:`PoseError`.
+    """
+    match = _VALUE.fullmatch(text)
+    factor = units.get((match[2] or "").replace(" ", "")) if match else None
+    try:
+        value = float(match[1]) * factor if match and factor is not None else np.nan
+    except ValueError:
+        value = np.nan
+    if not 0.0 < value < np.inf:
+        raise PoseError(f"{name}: {quote(text)}, expected a number above 0 with its unit, {', '.join(units)}")
+    return value
+
+
+def read_struts(struts: Mapping[str, str] | str | None) -> Struts:
+    """Read the struts' stiffness: ``"300 N/um"``, ``"rigid"``, or a section's words.
+
+    Words: ``diameter``, of round bars and tubes; ``wall``, a tube's thickness; ``modulus``, by default steel's;
+    ``rods``, how many stand side by side in a strut (2 in a parallelogram), by default 1.
+
+    Raises :class:`PoseError`.
+    """
+    if struts is None or struts == RIGID:
+        return None
+    if isinstance(struts, str):
+        return parse_stiff(struts, LINEAR, "struts")
+    words = ("diameter", "wall", "modulus", "rods")
+    for word, text in struts.items():
+        if word not in words:
+            raise PoseError(f"struts: unknown {quote(word)}{suggest(word, words)}")
+        if not isinstance(text, str):
+            raise PoseError(f"struts: {word} is a text with its unit, such as 40 mm")
+    if "diameter" not in struts:
+        raise PoseError("struts: the diameter is missing")
+    outer = _parse_length(struts["diameter"], "diameter")
+    wall = _parse_length(struts["wall"], "wall") if "wall" in struts else 0.5 * outer
+    if wall > 0.5 * outer:
+        raise PoseError("struts: the wall is thicker than half the diameter")
+    inner = outer - 2.0 * wall
+    count = struts.get("rods", "1")
+    if not (count.isascii() and count.isdigit() and 1 <= int(count) <= 9):
+        raise PoseError(f"struts: rods of {quote(count)}, expected 1 to 9")
+    modulus = parse_stiff(struts.get("modulus", _STEEL), MODULUS, "struts: modulus")
+    area, second = pi * (outer**2 - inner**2) / 4.0, pi * (outer**4 - inner**4) / 64.0
+    return Section(int(count) * area, int(count) * second, modulus)
+
+
+def _parse_length(text: str, word: str) -> float:
+    try:
+        value = parse_quantity(text, LENGTH)
+    except QuantityError as error:
+        raise PoseError(f"struts: {word}: {error}") from None
+    if not value > 0.0:
+        raise PoseError(f"struts: {word} of {quote(text)}, expected more than 0")
+    return value
+
+
+def read_drives(machine: Machine, drives: Mapping[str, str] | str) -> Array:
+    """Read each drive's compliance, (joints,) mm/N or rad/Nmm: a stiffness for all, or by names and patterns.
+
+    Raises :class:`PoseError` for a drive without one; ``rigid`` is one.
+    """
+    stated = {"*": drives} if isinstance(drives, str) else drives
+    used: set[str] = set()
+    result = []
+    for name, unit in zip(machine.joints, machine.joint_units, strict=True):
+        fits = [pattern for pattern in stated if fnmatchcase(name, pattern)]
+        own = max(fits, key=lambda pattern: (pattern == name, len(pattern)), default=None)
+        if own is None:
+            raise PoseError(f"drives: {name} has no stiffness; {RIGID} is one")
+        used |= set(fits)
+        text = stated[own]
+        if not isinstance(text, str):
+            raise PoseError("drives: a text with its unit expected, such as 100 N/um")
+        units = ANGULAR if unit == "rad" else LINEAR
+        result.append(0.0 if text == RIGID else 1.0 / parse_stiff(text, units, f"drives: {name}"))
+    for pattern in stated:
+        if pattern not in used:
+            raise PoseError(f"drives: unknown {quote(pattern)}{suggest(pattern, machine.joints)}")
+    return np.array(result)
+
+
+class StrutColumns(NamedTuple):
+    """What a leg's springs are made from, at N poses.
+
+    leg : the leg
+    joints : (N, drives) of the leg
+    by_drive : (N, closures, drives) closures' right side by the drives
+    by_size : the same by a size of the leg, (N, closures)
+    """
+
+    leg: Leg
+    joints: Array
+    by_drive: Array
+    by_size: Callable[[str], Array]
+
+
+_LegSprings: TypeAlias = list[tuple[Array, Array]]  # of each spring: what it moves (N, closures), and compliance (N,)
+
+
+def _list_length(at: StrutColumns, struts: Section | float) -> _LegSprings:
+    length = np.abs(at.joints[:, 0])
+    own = 1.0 / struts if isinstance(struts, float) else length / (struts.modulus * struts.area)
+    return [(at.by_drive[:, :, 0], np.broadcast_to(own, length.shape))]
+
+
+def _list_rod(at: StrutColumns, struts: Section | float) -> _LegSprings:
+    rod = getattr(at.leg, "rod")  # noqa: B009  - a size of these kinds
+    own = 1.0 / struts if isinstance(struts, float) else rod / (struts.modulus * struts.area)
+    return [(at.by_size("rod"), np.full(len(at.joints), own))]
+
+
+def _list_lambda(at: StrutColumns, struts: Section | float) -> _LegSprings:
+    """List the springs of a lambda leg: both parts of the long rod, and the short rod, which bends the long one.
+
+    The hinge gives way across the long rod, a beam on two supports, by P a² b² / (3 E I L). That moves the short rod's
+    end along it, so it is in line with its own spring.
+    """
+    assert isinstance(struts, Section)  # read_springs refuses others
+    long, short, hinge = (getattr(at.leg, size) for size in ("long", "short", "hinge"))
+    lower, stretch = long - hinge, 1.0 / (struts.modulus * struts.area)
+    gap = at.joints[:, 1] - at.joints[:, 0]
+    cosine = (lower**2 + short**2 - gap**2) / (2.0 * lower * short)
+    bending = lower**2 * hinge**2 / (3.0 * struts.modulus * struts.second_moment * long)
+    by_long, every = at.by_size("long"), np.ones(len(gap))
+    return [
+        (by_long, every * lower * stretch),
+        (by_long + at.by_size("hinge"), every * hinge * stretch),
+        (at.by_size("short"), every * short * stretch + (1.0 - cosine**2) * bending),
+    ]
+
+
+_KINDS = {"length": _list_length, "slider": _list_rod, "crank": _list_rod, "lambda": _list_lambda}
+
+
+def read_springs(
+    machine: Machine, drives: Mapping[str, str] | str, struts: Mapping[str, str] | str | None
+) -> MachineSprings:
+    """Read a machine's springs; see :func:`read_drives` and :func:`read_struts`.
+
+    Raises :class:`PoseError`, also for struts that carry more than what their springs tell.
+    """
+    springs = MachineSprings(read_drives(machine, drives), read_struts(struts))
+    if springs.struts is None and not springs.drives.any():
+        raise PoseError("drives: all are rigid, and so are the struts")
+    for leg in machine.legs:
+        if springs.struts is not None and leg.kind not in _KINDS:
+            raise PoseError(f"struts: those of kind {leg.kind} bend, which is not told; leave struts out")
+        if isinstance(springs.struts, float) and leg.kind == "lambda":
+            raise PoseError("struts: the short rod bends the long one, so a section is needed: diameter, wall")
+    return springs
+
+
+def list_leg_springs(at: StrutColumns, struts: Section | float) -> Springs:
+    """List the springs of a leg's struts."""
+    springs = _KINDS[at.leg.kind](at, struts)
+    return Springs(np.stack([moved for moved, _ in springs], 2), np.stack([own for _, own in springs], 1))

@@ -1,0 +1,174 @@
+"""The tool's stiffness from the springs of drives and struts, by virtual work."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..arguments import RowsLike, check_arguments, read_rows
+from ..arrays import Array
+from ..errors import PoseError
+from ..families.family import Family, solve_each
+from ..machine import Machine
+from ..workspaces.sampled.allowed_poses import sample_allowed_poses
+from .springs import MachineSprings, Springs, StrutColumns, list_leg_springs, read_springs
+
+SAMPLES = 400
+_MOST_SAMPLES = 20_000
+
+
+@dataclass(frozen=True, eq=False)
+class Stiffness:
+    """The tool's compliance at poses, in the machine's own freedoms: what guides the platform is rigid.
+
+    poses, joints : (N, axes), (N, joints)
+    compliances : (N, n, n) of the tool's twist (the tip's translations, mm, then small turns of the tool, rad) by
+        forces, N, and moments, Nmm, at the tip; NaN where a pose is out of reach or singular
+    drive_share : (N,) of the tip's compliance that is the drives'; the rest is the struts'
+    springs : what it was analysed with
+    """
+
+    machine: Machine
+    poses: Array
+    joints: Array
+    compliances: Array
+    drive_share: Array
+    springs: MachineSprings
+
+    def __repr__(self) -> str:
+        return (
+            f"<parakin stiffness of {self.machine.name}: {len(self.poses)} poses, at least {self.least.min():.4g} N/mm>"
+        )
+
+    @property
+    def translations(self) -> tuple[str, ...]:
+        """The axes along which the tip moves."""
+        return tuple(axis for axis in self.machine.axes if axis in "XYZ")
+
+    @property
+    def matrices(self) -> Array:
+        """The stiffness matrices, (N, n, n): N/mm, N/rad, Nmm/rad; NaN where the tool is rigid in some direction."""
+        size, tip = max(self.machine.leg_sizes), len(self.translations)
+        factors = np.where(np.arange(self.compliances.shape[1]) < tip, 1.0, size)  # to mm and N
+        scaled = np.nan_to_num(self.compliances * factors[:, None] * factors)
+        good = np.linalg.matrix_rank(scaled, hermitian=True) == len(factors)
+        result = np.full_like(self.compliances, np.nan)
+        result[good] = np.linalg.inv(scaled[good]) * factors[:, None] * factors
+        return result
+
+    @property
+    def _tip(self) -> Array:
+        tip = len(self.translations)
+        return self.compliances[:, :tip, :tip]
+
+    @property
+    def least(self) -> Array:
+        """The least stiffness of the tip over all directions of a force, (N,) N/mm: force by the tip's whole way."""
+        result = np.full(len(self.poses), np.nan)
+        good = np.isfinite(self._tip).all((1, 2))
+        with np.errstate(divide="ignore"):
+            result[good] = 1.0 / np.linalg.norm(self._tip[good], 2, axis=(1, 2))
+        return result
+
+    def along(self, direction: RowsLike) -> Array:
+        """Compute the tip's stiffness along a direction, (N,) N/mm: a force along it by the tip's way along it.
+
+        direction : by the translations, (t,) or a dict, of any length
+        """
+        row = read_rows(direction, self.translations, ["mm"] * len(self.translations), self._rest, "direction")
+        size = np.linalg.norm(row, axis=-1, keepdims=True)
+        if not (size > 0.0).all():
+            raise PoseError("direction: it has no length")
+        unit = np.broadcast_to(row / size, (len(self.poses), len(self.translations)))
+        with np.errstate(divide="ignore"):
+            return np.asarray(1.0 / np.einsum("ni,nij,nj->n", unit, self._tip, unit))
+
+    def deflect(self, force: RowsLike) -> Array:
+        """Compute how the tool gives way to a force on its tip, (N, n): the twist, mm and rad.
+
+        force : N by the translations, one (t,), a row a pose (N, t), or a dict
+        """
+        tip = len(self.translations)
+        rows = read_rows(force, self.translations, ["mm"] * tip, self._rest, "force")
+        if rows.shape not in ((tip,), (len(self.poses), tip)):
+            raise PoseError(f"force: one, or as many as the {len(self.poses)} poses, expected")
+        rows = np.broadcast_to(rows, (len(self.poses), tip))
+        return np.asarray(np.einsum("nij,nj->ni", self.compliances[:, :, :tip], rows))
+
+    def _rest(self) -> Array:
+        return np.zeros(len(self.translations))
+
+
+@check_arguments
+def analyse_stiffness(
+    machine: Machine,
+    drives: Mapping[str, str] | str,
+    struts: Mapping[str, str] | str | None = None,
+    poses: RowsLike | None = None,
+    samples: int = SAMPLES,
+) -> Stiffness:
+    """Analyse the tool's stiffness where drives and struts are springs, for small forces on an unloaded machine.
+
+    drives : ``"100 N/um"`` for all, or by names and patterns, ``{"d*": "100 N/um", "theta*": "20 kNm/rad"}``; each
+        drive needs one, which may be ``rigid``; of slides and motors together, along or about the joint
+    struts : each rod's stiffness along it, ``"300 N/um"``; or its section, ``{"diameter": "40 mm", "wall": "5 mm",
+        "modulus": "210 GPa", "rods": "2"}``; by default they are rigid
+    poses : (N, axes); by default as many as ``samples`` all over the workspace, clear of singularities
+
+    By virtual work: springs that give by s move the tool by t = J s, with A J = (B, -C) of the closures' derivatives by
+    drives and sizes; the forces on them are Jᵀ w, so the compliance is J c Jᵀ. Arms of cranks count as rigid, and so
+    does all that holds the platform without a drive (central legs, constraints, a parallelogram's hold of the
+    orientation).
+
+    Raises :class:`PoseError`.
+    """
+    springs = read_springs(machine, drives, struts)
+    if poses is None:
+        if not 1 <= samples <= _MOST_SAMPLES:
+            raise PoseError(f"samples: a number from 1 to {_MOST_SAMPLES} expected, not {samples}")
+        rows = sample_allowed_poses(machine, samples)
+    else:
+        rows, _ = machine.rows(poses, machine.axes, "poses")
+    return compute_stiffness(machine, rows, springs)
+
+
+def compute_stiffness(machine: Machine, poses: Array, springs: MachineSprings) -> Stiffness:
+    """Compute the stiffness at rows of poses."""
+    joints = machine.inverse(poses)
+    a, listed = _list_springs(machine, poses, joints, springs)
+    by_kind = []
+    for one in listed:
+        ways = solve_each(a, one.moved)
+        by_kind.append(np.einsum("nis,ns,njs->nij", ways, one.compliances, ways))
+    total = np.sum(by_kind, axis=0)
+    tip = sum(axis in "XYZ" for axis in machine.axes)
+    of_drives, of_all = (np.trace(own[:, :tip, :tip], axis1=1, axis2=2) for own in (by_kind[0], total))
+    with np.errstate(invalid="ignore", divide="ignore"):
+        return Stiffness(machine, poses, joints, total, of_drives / of_all, springs)
+
+
+def _list_springs(
+    machine: Machine, poses: Array, joints: Array, springs: MachineSprings
+) -> tuple[Array, list[Springs]]:
+    """List the springs of all drives, then those of each leg's struts; with A."""
+    drives, struts = springs
+    rods = [] if struts is None else [p for p in machine.parameters if p.group == "rods"]
+    family = Family(machine, rods)
+    if rods:
+        rates = family.twist_rates(poses, joints, family.nominal)
+        a, b, c = rates.a, rates.b, rates.c
+    else:
+        a, b, _ = machine.twist_rates(poses, joints)
+        c = np.zeros((*b.shape[:2], 0))
+    result = [Springs(b, np.broadcast_to(drives, (len(poses), len(drives))))]
+    if struts is not None:
+        for leg in machine.legs:
+            own = [machine.joints.index(drive.name) for drive in leg.drives]
+
+            def by_size(size: str, name: str = leg.drives[0].name) -> Array:
+                return -c[:, :, family.names.index(f"legs.{name}.{size}")]
+
+            result.append(list_leg_springs(StrutColumns(leg, joints[:, own], b[:, :, own], by_size), struts))
+    return a, result

@@ -64,7 +64,7 @@ def measure_workspace(machine: pk.Machine) -> str:
 
 def draw_picture(machine: pk.Machine) -> bytes:
     """Draw a small picture of the machine at home."""
-    picture = Image.open(io.BytesIO(pk.render_machine_png(machine))).convert("RGB")
+    picture = Image.open(io.BytesIO(pk.render_machine_picture(machine))).convert("RGB")
     picture = picture.resize((WIDTH, round(WIDTH * picture.height / picture.width)), Image.Resampling.LANCZOS)
     file = io.BytesIO()
     picture.quantize(COLOURS).save(file, "PNG", optimize=True)

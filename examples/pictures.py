@@ -15,7 +15,9 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("-o", "--output", type=Path, default=Path("docs/pictures"))
     folder = parser.parse_args().output
-    for path in pk.write_files(folder, {f"{name}.png": pk.render_machine_png(pk.load(name)) for name in pk.machines()}):
+    for path in pk.write_files(
+        folder, {f"{name}.png": pk.render_machine_picture(pk.load(name)) for name in pk.machines()}
+    ):
         print(path)
 
 

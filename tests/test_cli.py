@@ -247,7 +247,7 @@ def test_show_picture(tmp_path, capsys):
         assert main(["show", "tricept", "-o", str(target)]) == 0
         assert capsys.readouterr().out.splitlines()[-1].endswith(str(target))
         assert target.read_bytes()[:14].lower().startswith(start.lower())
-    assert ".html or .png" in refused(capsys, "show", "tricept", "-o", tmp_path / "picture.jpg")
+    assert ".html, .png, .pdf, .svg" in refused(capsys, "show", "tricept", "-o", tmp_path / "picture.jpg")
 
 
 # inverse, forward

@@ -9,7 +9,7 @@ import pytest
 from shipped import REPRESENTATIVES
 
 import parakin as pk
-from parakin.export.machine.picture import render_machine_png
+from parakin.export.machine.picture import render_machine_picture
 from parakin.export.machine.scene import build_scene, order_polygon
 from parakin.export.machine.solids import build_solids
 from parakin.export.number_format import format_value
@@ -184,7 +184,7 @@ def test_picture_page(machine):
 
 @pytest.mark.parametrize("name", ["hbg80_2d", "orthoglide5_table"])
 def test_png(name):
-    data = render_machine_png(LOADED[name], near_home(LOADED[name]))
+    data = render_machine_picture(LOADED[name], near_home(LOADED[name]))
     assert data.startswith(b"\x89PNG\r\n\x1a\n")
     assert data[16:24] == bytes([0, 0, 4, 128, 0, 0, 4, 128])  # 1152 x 1152
 

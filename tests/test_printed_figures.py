@@ -11,6 +11,7 @@ COMMANDS = {
     "plane": ("workspace", "hbg80_2d", "--gap", "0.05"),
     "space": ("workspace", "linear_delta", "--gap", "0.2", "--step", "40"),
     "curves": ("workspace", "hbg80_2d", "--method", "drives"),
+    "machine": ("show", "tricept"),
     "map": ("atlas", "hbg80_2d", "--step", "40"),
 }
 SVG = "{http://www.w3.org/2000/svg}"

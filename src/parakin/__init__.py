@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from .export.accuracy_map import render_accuracy_png
     from .export.calibration import format_calibrated_yaml, render_residuals_png
     from .export.files import write_files
-    from .export.machine.picture import render_machine_png
+    from .export.machine.picture import render_machine_picture
     from .export.page.page import render_machine_page, render_path_page
     from .export.report.report import render_report
     from .export.stiffness_map import render_stiffness_png
@@ -133,7 +133,7 @@ __all__ = [
     "region",
     "render_accuracy_png",
     "render_machine_page",
-    "render_machine_png",
+    "render_machine_picture",
     "render_path_page",
     "render_report",
     "render_residuals_png",
@@ -251,7 +251,7 @@ _LAZY = {
     "render_accuracy_png": "export.accuracy_map",
     "render_machine_page": "export.page.page",
     "render_path_page": "export.page.page",
-    "render_machine_png": "export.machine.picture",
+    "render_machine_picture": "export.machine.picture",
     "render_report": "export.report.report",
     "render_residuals_png": "export.calibration",
     "render_stiffness_png": "export.stiffness_map",

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 from cyclopts import Parameter
 
 from ..errors import InputError
+from ..export.figure_file import PICTURES
 from ..export.json.machine import MOTOR, RATES, encode_details, encode_machine, encode_machines
 from ..export.number_format import format_fixed
 from ..units import name_display_unit
@@ -68,8 +69,8 @@ def show(
     name
         A shipped machine's name or a YAML file.
     output
-        Where to put the picture of the machine at home: an .html on which it moves (see parakin page), or a .png. By
-        default NAME.html in this folder; with --json or --yaml none.
+        Where to put the picture of the machine at home: an .html on which it moves (see parakin page), a .png, or
+        a .pdf or .svg for a printed page. By default NAME.html in this folder; with --json or --yaml none.
     yaml
         Print a machine file with every number explicit, a group for each leg: to write the numbers of a calibrated
         machine into, or to keep those of --set. Reading it gives the same machine, bit for bit.
@@ -98,15 +99,15 @@ def show(
 
 def _write_picture(machine: Machine, output: Path, force: bool) -> None:
     kind = output.suffix.lower()
-    if kind not in (".html", ".png"):
-        raise InputError(f'"{output}": expected a file name that ends in .html or .png', "--output")
+    if kind not in (".html", *PICTURES):
+        raise InputError(f'"{output}": expected a file name that ends in .html, {", ".join(PICTURES)}', "--output")
     from ..export.files import write_files
-    from ..export.machine.picture import render_machine_png
+    from ..export.machine.picture import render_machine_picture
     from ..export.page.page import render_machine_page
 
     if kind == ".html":
         refuse_foreign_file(output, force)
-    content = render_machine_page(machine) if kind == ".html" else render_machine_png(machine)
+    content = render_machine_page(machine) if kind == ".html" else render_machine_picture(machine, None, kind)
     write_files(output.parent, {output.name: content})
 
 

@@ -12,7 +12,8 @@ if TYPE_CHECKING:
 PICTURES = (".png", ".pdf", ".svg")
 
 _SCREEN = 150  # dots an inch
-_PRINTED_WIDTH = 7.2  # inches: both columns of a page
+_COLUMN, _PAGE = 3.5, 7.2  # inches: a column of a page, and both
+_NARROW = 8.0  # inches on the screen: a figure no wider is printed in a column
 _PRINTED_FONT = 7.0  # points
 _PRINTED_DOTS = 400  # an inch, of shaded surfaces, whose thousands of faces are an image on the page too
 
@@ -26,7 +27,7 @@ def render_figure(
 ) -> bytes:
     """Render a drawing as a file of a kind, one of :data:`PICTURES`.
 
-    inches : its width and height on the screen; printed it is as wide as a page and in proportion as high
+    inches : its width and height on the screen; printed it is as wide as a page, or a column if it is narrow
     add_heading : called for the screen only, for a printed figure has a caption
     dots : an inch, on the screen
 
@@ -36,7 +37,7 @@ def render_figure(
     from matplotlib.figure import Figure
 
     printed = suffix != ".png"
-    scale = _PRINTED_WIDTH / inches[0] if printed else 1.0
+    scale = (_COLUMN if inches[0] <= _NARROW else _PAGE) / inches[0] if printed else 1.0
     data = BytesIO()
     with rc_context({"svg.fonttype": "none", "svg.hashsalt": "parakin", "pdf.fonttype": 42}):
         figure = Figure(figsize=(scale * inches[0], scale * inches[1]), dpi=dots, facecolor="white")
@@ -60,6 +61,8 @@ def _fit_to_page(figure: Figure) -> None:
         text.set_fontsize(_PRINTED_FONT)
     for axes in figure.axes:
         axes.tick_params(labelsize=_PRINTED_FONT)
+        if figure.get_figwidth() < _PAGE and hasattr(axes, "get_zlim"):
+            axes.locator_params(nbins=3)  # a column has no room for more
     for surface in figure.findobj(lambda item: isinstance(item, Poly3DCollection | QuadContourSet)):
         surface.set_rasterized(True)
 

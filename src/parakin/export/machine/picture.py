@@ -1,42 +1,56 @@
-"""A machine's picture: a PNG."""
+"""A machine's picture, for the screen or a printed page."""
 
 from __future__ import annotations
 
-from io import BytesIO
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ...arguments import RowsLike, check_arguments
+from ...errors import PoseError
 from ...machine import Machine
+from ..figure_file import PICTURES, render_figure
 from .figures import INK
 from .scene import Points, Scene, build_scene
 from .solids import LOOKS, build_solids
 
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+_DOTS = 160  # an inch
 _LIGHT = np.array([0.35, -0.65, 0.70]) / np.linalg.norm([0.35, -0.65, 0.70])
 
 
 @check_arguments
-def render_machine_png(machine: Machine, pose: RowsLike | None = None) -> bytes:
-    """Render a PNG of the machine at a pose, (axes,) mm and rad, home by default; a planar machine in its plane."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
+def render_machine_picture(machine: Machine, pose: RowsLike | None = None, suffix: str = ".png") -> bytes:
+    """Render a picture of the machine at a pose, (axes,) mm and rad, home by default; a planar machine in its plane.
+
+    suffix : ``.png`` for the screen, ``.pdf`` or ``.svg`` for a printed page
+
+    Raises :class:`PoseError` for another one.
+    """
+    if suffix not in PICTURES:
+        raise PoseError(f"suffix: one of {', '.join(PICTURES)} expected, not {suffix}")
+    drawn = build_scene(machine, pose)
+    title = machine.spec.title or machine.name
+    return render_figure(
+        (7.2, 7.2), lambda figure: _draw_machine(figure, drawn), lambda figure: _add_title(figure, title), suffix, _DOTS
+    )
+
+
+def _draw_machine(figure: Figure, drawn: Scene) -> None:
     from mpl_toolkits import mplot3d  # noqa: F401  it brings the projection
 
-    drawn = build_scene(machine, pose)
-    figure = Figure(figsize=(7.2, 7.2), dpi=160, facecolor="white")
-    canvas = FigureCanvasAgg(figure)
     axes: Any = figure.add_axes((0.0, 0.0, 1.0, 1.0), projection="3d")
     _set_view(axes, drawn)
     _add_solids(axes, drawn)
     _add_frames(axes, drawn)
     for name, place in drawn.labels:
         axes.text(*(place + 0.022 * drawn.size), name, color=INK, fontsize=10.5, zorder=1000, parse_math=False)
-    title = machine.spec.title or machine.name
+
+
+def _add_title(figure: Figure, title: str) -> None:
     figure.text(0.5, 0.955, title, ha="center", color=INK, fontsize=14, weight="bold", parse_math=False)
-    data = BytesIO()
-    canvas.print_png(data)  # type: ignore[no-untyped-call]
-    return data.getvalue()
 
 
 def _set_view(axes: Any, drawn: Scene) -> None:

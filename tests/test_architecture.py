@@ -38,6 +38,7 @@ FLOORS = [
     ["toolpath.tool_turn", "toolpath.job"],
     ["toolpath.turned_job"],
     ["toolpath"],
+    ["comparison"],
     ["controllers.controller", "controllers.gcode_text", "export.files", "export.number_format", "export.figure_file"],
     ["controllers.event_commands", "export.machine", "export.tables"],
     ["controllers.event_lines", "export.page"],

@@ -169,12 +169,22 @@ def test_springs_in_a_row_add_up():
     assert np.allclose(rod.compliances, bar.compliances)
 
 
+def test_a_stiffness_for_all_is_taken_by_its_unit():
+    machine = pk.load("tricept")
+    named = pk.analyse_stiffness(machine, {"d*": "100 N/um", "theta*": "200 kNm/rad"}, samples=5)
+    both = pk.analyse_stiffness(machine, "200 kNm/rad, 100N/um", samples=5)
+    assert np.array_equal(named.compliances, both.compliances)
+    half = pk.analyse_stiffness(machine, "100N/um, rigid", samples=5)
+    assert (half.least > both.least).all()
+
+
 def test_the_command(tmp_path, capsys):
     path = tmp_path / "map.png"
     words = ["stiffness", "orthoglide", "--drives", "100N/um", "--struts", "diameter=20mm,rods=2", "--samples", "50"]
     assert main([*words, "-o", str(path), "--along", "X"]) == 0
     said = capsys.readouterr().out
     assert "at 50 poses" in said
+    assert "count as rigid: a real machine is softer" in said
     assert path.read_bytes().startswith(b"\x89PNG")
     assert main([*words, "--json", "--force", "X=-0.2kN,Z=100N", "-o", str(path)]) == 0
     answer = json.loads(capsys.readouterr().out)
@@ -207,7 +217,11 @@ def test_along_a_posted_path(tmp_path, capsys, monkeypatch):
         ("orthoglide", ["--drives=-1N/um"], "expected a number above 0"),
         ("orthoglide", ["--drives", "1..2N/um"], "expected a number above 0"),
         ("orthoglide", ["--drives", "rigid"], "all are rigid, and so are the struts"),
-        ("orthoglide", ["--drives", "1N/um", "--drives", "2N/um"], "--drives: more than one"),
+        (
+            "orthoglide",
+            ["--drives", "1N/um", "--drives", "2N/um"],
+            "drives: 1N/um and 2N/um for all, expected them by names",
+        ),
         ("orthoglide", ["--drives", "rho_x=1N/um,rho_x=2N/um"], "rho_x is given twice"),
         ("orthoglide", ["--drives", "1N/um", "--struts", "wall=2mm"], "struts: the diameter is missing"),
         ("orthoglide", ["--drives", "1N/um", "--struts", "diameter=2mm,wall=2mm"], "thicker than half the diameter"),

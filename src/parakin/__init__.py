@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from .calibration.identifiability import UnidentifiableError
     from .calibration.measurement_plan import MeasurementPlan, plan_measurements
     from .calibration.measurements import Measurements, Noise, make_measurements
+    from .comparison.comparison import Comparison, compare
     from .controllers.joints.program import make_joint_program
     from .controllers.joints.program_reader import JointProgram, read_joint_program
     from .controllers.linuxcnc.configuration import make_linuxcnc_configuration
@@ -65,6 +66,7 @@ __all__ = [
     "Atlas",
     "Calibration",
     "Clearance",
+    "Comparison",
     "Components",
     "CrossSection",
     "DescriptionError",
@@ -109,6 +111,7 @@ __all__ = [
     "bound_worst_case",
     "calibrate",
     "choose_tool_turn",
+    "compare",
     "family",
     "find_components",
     "find_cross_sections",
@@ -189,6 +192,7 @@ _LAZY = {
     "Atlas": "performance.atlas",
     "Calibration": "calibration.calibration",
     "Components": "workspaces.connected.components",
+    "Comparison": "comparison.comparison",
     "CrossSection": "workspaces.sampled.cross_sections",
     "DriveWorkspace": "workspaces.sampled.drive_sweep",
     "Family": "families.family",
@@ -228,6 +232,7 @@ _LAZY = {
     "atlas": "performance.atlas",
     "calibrate": "calibration.calibration",
     "choose_tool_turn": "toolpath.tool_turn.choice",
+    "compare": "comparison.comparison",
     "family": "families.family:make_family",
     "find_components": "workspaces.connected.components",
     "find_cross_sections": "workspaces.sampled.cross_sections",

@@ -17,6 +17,7 @@ from .commands.accuracy import accuracy
 from .commands.assemblies import assemblies
 from .commands.atlas import atlas
 from .commands.calibrate import calibrate
+from .commands.compare import compare
 from .commands.console import print_remark
 from .commands.design import design
 from .commands.export import export
@@ -44,7 +45,7 @@ app = App(
     default_parameter=Parameter(negative=""),
     suppress_keyboard_interrupt=False,  # main says so in one line
 )
-ANALYSES = (assemblies, reach, workspace, atlas, accuracy, stiffness, calibrate, design)
+ANALYSES = (assemblies, reach, workspace, atlas, accuracy, stiffness, compare, calibrate, design)
 for command in (post, inverse, forward, *ANALYSES, linuxcnc, machines, show, page, export):
     app.command(command)
 app.command(import_machine, name="import")

@@ -66,7 +66,7 @@ def accuracy(
         raise InputError(f"{quote(output)}: expected a file name that ends in .png", "--output")
     if cost is not None and error is None:
         raise InputError("goes with --error", "--cost")
-    stated = _split(tolerance, "--tolerance", "feet=0.05mm")
+    stated = split_pairs(tolerance, "--tolerance", "feet=0.05mm")
     wanted, costs = _parse_error(error), _parse_costs(cost)
     ranges, seconds = parse_axis_ranges(machine, over, "--over"), parse_time(time)
     announce_compiling()
@@ -97,7 +97,7 @@ def _write_map(result: Accuracy, output: Path | None) -> dict[str, str]:
     return {"map": str(output)}
 
 
-def _split(texts: Sequence[str], source: str, example: str) -> list[tuple[str, str]]:
+def split_pairs(texts: Sequence[str], source: str, example: str) -> list[tuple[str, str]]:
     """Split ``NAME=TEXT,NAME=TEXT`` into names and texts."""
     pairs = []
     for one in (word for text in texts for word in text.split(",")):
@@ -117,7 +117,7 @@ def _parse_error(text: str | None) -> float | None:
 
 def _parse_costs(texts: Sequence[str] | None) -> dict[str, float]:
     costs: dict[str, float] = {}
-    for name, text in _split(texts or (), "--cost", "feet=1"):
+    for name, text in split_pairs(texts or (), "--cost", "feet=1"):
         try:
             costs[name] = float(text)
         except ValueError:

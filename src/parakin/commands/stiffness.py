@@ -11,6 +11,7 @@ from cyclopts import Parameter
 from ..errors import InputError, PoseError, quote
 from ..export.number_format import format_fixed
 from ..units import to_display
+from .accuracy import split_pairs
 from .console import announce_compiling, format_table, print_json, print_remark, print_text
 from .options import OFF_LIMITS, Json, Name, Sizes, load_machine
 from .region_options import split_axes
@@ -44,8 +45,8 @@ def stiffness(
     name
         A shipped machine's name or a YAML file.
     drives
-        The stiffness of the drives along or about their joints, with slides and motors: 100N/um, or by their names
-        and patterns, d*=100N/um,theta*=20kNm/rad; rigid is one. May be given again.
+        The stiffness of the drives along or about their joints, with slides and motors: 100N/um,200kNm/rad, or by their
+        names and patterns, d*=100N/um,theta*=200kNm/rad; rigid is one. May be given again.
     struts
         The section of the struts: diameter=40mm,wall=5mm,modulus=210GPa,rods=2; or how stiff each rod is along
         itself: 300N/um. Without it they are rigid.
@@ -66,8 +67,8 @@ def stiffness(
     if along is not None and (force is not None or output is None or csv is not None):
         raise InputError("goes with a map, --output, and without --force", "--along")
     _check_output(output, ".png" if csv is None else ".csv")
-    of_drives = _split_words(drives, "--drives") if any("=" in text for text in drives) else _take_one(drives)
-    of_struts = _split_words([struts], "--struts") if struts is not None and "=" in struts else struts
+    of_drives = split_words(drives, "--drives") if any("=" in text for text in drives) else ",".join(drives)
+    of_struts = split_words([struts], "--struts") if struts is not None and "=" in struts else struts
     wanted = _parse_force(machine, force)
     direction = None if along is None else _name_direction(machine, along)
     rows, lines = (None, None) if csv is None else _read_poses(machine, csv)
@@ -106,19 +107,10 @@ def _find_unreachable(result: Stiffness, csv: Path | None, lines: Indices | None
     return f"{csv}:{lines[lost[0]]}: out of reach or singular{more}"
 
 
-def _take_one(texts: Sequence[str]) -> str:
-    if len(texts) != 1:
-        raise InputError("more than one, expected them by names: d*=100N/um", "--drives")
-    return texts[0].strip()
-
-
-def _split_words(texts: Sequence[str], source: str) -> dict[str, str]:
-    """Split ``NAME=VALUE,NAME=VALUE``."""
+def split_words(texts: Sequence[str], source: str) -> dict[str, str]:
+    """Split ``NAME=VALUE,NAME=VALUE`` into values by their names."""
     words: dict[str, str] = {}
-    for one in (word for text in texts for word in text.split(",")):
-        name, equals, value = (word.strip() for word in one.partition("="))
-        if not (name and equals and value):
-            raise InputError(f"{quote(one.strip())}: expected NAME=VALUE", source)
+    for name, value in split_pairs(texts, source, "d*=100N/um" if source == "--drives" else "diameter=40mm"):
         if name in words:
             raise InputError(f"{name} is given twice", source)
         words[name] = value
@@ -186,9 +178,12 @@ def _format_stiffness(result: Stiffness, force: Array | None) -> str:
         f"{machine.name}: the tip's stiffness, N/um, at {len(result.poses)} poses\n",
         format_table(rows, ["", "at the worst", "5 % are below", "half are below"], " rrr"),
         "",
+        "frame, platform, and what guides it without a drive count as rigid: a real machine is softer",
         f"least at {_format_pose(machine, result.poses[int(result.least.argmin())])}",
         f"of the compliance the drives make {100.0 * float(np.mean(result.drive_share)):.0f} %",
     ]
+    if result.springs.struts is None:
+        lines.append("the struts count as rigid, for --struts is not given")
     if force is not None:
         sizes = np.linalg.norm(result.deflect(force)[:, : len(force)], axis=1)
         worst = int(sizes.argmax())

@@ -121,12 +121,27 @@ def _parse_length(text: str, word: str) -> float:
     return value
 
 
+def _read_one_of(text: str, units: Mapping[str, float], name: str) -> float:
+    """Read the compliance of a drive from the one of some stiffnesses that has its unit."""
+    words = [word.strip() for word in text.split(",")]
+    own = [word for word in words if any(word.replace(" ", "").endswith(unit) for unit in units)]
+    if len(own) > 1:
+        raise PoseError(f"drives: {own[0]} and {own[1]} for all, expected them by names: d*=100N/um")
+    word = own[0] if own else words[0] if RIGID not in words else RIGID
+    return 0.0 if word == RIGID else 1.0 / parse_stiff(word, units, f"drives: {name}")
+
+
 def read_drives(machine: Machine, drives: Mapping[str, str] | str) -> Array:
-    """Read each drive's compliance, (joints,) mm/N or rad/Nmm: a stiffness for all, or by names and patterns.
+    """Read each drive's compliance, (joints,) mm/N or rad/Nmm: a stiffness by names and patterns, or for all.
+
+    The one for all may be two, of drives along and of drives about their joints: ``100 N/um, 200 kNm/rad``.
 
     Raises :class:`PoseError` for a drive without one; ``rigid`` is one.
     """
-    stated = {"*": drives} if isinstance(drives, str) else drives
+    if isinstance(drives, str):
+        kinds = [ANGULAR if unit == "rad" else LINEAR for unit in machine.joint_units]
+        return np.array([_read_one_of(drives, kind, name) for name, kind in zip(machine.joints, kinds, strict=True)])
+    stated = drives
     used: set[str] = set()
     result = []
     for name, unit in zip(machine.joints, machine.joint_units, strict=True):

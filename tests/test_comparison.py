@@ -1,0 +1,67 @@
+"""Machines side by side: the figures are those that the single commands tell."""
+
+import json
+
+import numpy as np
+import pytest
+
+import parakin as pk
+from parakin.cli import main
+from parakin.performance.indices import compute_performance
+
+PART = "UNITS/MM\nFEDRAT/900,MMPM\nGOTO/0,0,0\nGOTO/40,10,0\nGOTO/40,-30,0\nFINI\n"
+NAMES = ["linear_delta", "orthoglide"]
+ASKED = ["--tolerance", "feet=0.05mm,encoders=2um", "--drives", "100N/um", "--struts", "diameter=20mm"]
+WORDS = [*NAMES, *ASKED, "--samples", "60"]
+
+
+def test_the_figures_are_those_told_alone(tmp_path, capsys):
+    part = tmp_path / "part.apt"
+    part.write_text(PART, encoding="utf-8")
+    assert main(["compare", *WORDS, "--part", str(part), "--json"]) == 0
+    answer = json.loads(capsys.readouterr().out)
+    assert [told["name"] for told in answer["machines"]] == NAMES
+    for name, told in zip(NAMES, answer["machines"], strict=True):
+        machine = pk.load(name)
+        accuracy = pk.analyse_accuracy(machine, {"feet": "0.05 mm", "encoders": "2 um"}, samples=60)
+        assert told["tip_error"]["50"] == pytest.approx(accuracy.percentile(50))
+        stiffness = pk.analyse_stiffness(machine, "100 N/um", {"diameter": "20 mm"}, accuracy.poses)
+        assert told["least_stiffness"]["5"] == pytest.approx(np.percentile(stiffness.least, 5))
+        greatest = compute_performance(machine, accuracy.poses).greatest
+        assert told["amplification"]["95"] == pytest.approx(np.percentile(greatest, 95))
+        volume = pk.workspace(pk.region(machine), gap=0.01).volume
+        assert told["workspace"]["inner"] <= volume.outer
+        assert volume.inner <= told["workspace"]["outer"]
+        assert 5.0 < told["cycle_time"] < 10.0
+        assert told["reasons"] == {}
+
+
+def test_what_a_machine_cannot_do_is_said(tmp_path, capsys):
+    part = tmp_path / "part.apt"
+    part.write_text(PART.replace("40,", "400,"), encoding="utf-8")
+    assert main(["compare", "orthoglide", "rotary_delta", "--drives", "100N/um", "--part", str(part)]) == 0
+    said = capsys.readouterr()
+    assert "orthoglide: part: the part runs at none of" in said.err
+    assert 'rotary_delta: stiffness: drives: hip0: "100N/um"' in said.err
+    assert "the part's cycle time" in said.out
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["orthoglide"], "two machines at least"),
+        (["orthoglide", "no_such"], "no_such"),
+        ([*NAMES, "--struts", "9N/um"], "struts: the drives' stiffness is missing"),
+        ([*NAMES, "--drives", "9"], 'drives: tower_a: "9"'),
+        ([*NAMES, "--tolerance", "foot=1mm,encoders=2um"], "tolerance foot: none of the machines has such a number"),
+        ([*NAMES, "--tolerance", "feet"], "expected NAME=VALUE"),
+        ([*NAMES, "--samples", "0"], "samples"),
+        ([*NAMES, "--part", "none.apt"], "none.apt"),
+    ],
+)
+def test_what_is_mistaken_is_said_in_one_line(words, message, capsys):
+    assert main(["compare", *words]) == 2
+    said = capsys.readouterr()
+    assert said.out == ""
+    assert said.err.count("\n") == 1
+    assert message in said.err

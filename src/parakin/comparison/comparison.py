@@ -122,7 +122,7 @@ def _measure(
 
 
 def _answer(ask: Callable[[], Answer]) -> Answer | str:
-    """Ask, or say why there is no answer."""
+    """Find the answer to a question, or say why there is none."""
     try:
         return ask()
     except PoseError as error:

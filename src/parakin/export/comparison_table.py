@@ -52,12 +52,12 @@ def _tell_condition(column: MachineFigures) -> _Cell:
 def _tell_error(percent: float) -> Callable[[MachineFigures], _Cell]:
     def tell(column: MachineFigures) -> _Cell:
         accuracy = column.accuracy
-        return None if accuracy is None or isinstance(accuracy, str) else _in_um(accuracy.percentile(percent))
+        return None if accuracy is None or isinstance(accuracy, str) else _format_um(accuracy.percentile(percent))
 
     return tell
 
 
-def _in_um(value: float) -> str:
+def _format_um(value: float) -> str:
     return f"{format_fixed(1e3 * value, 1)} um"
 
 

@@ -46,7 +46,14 @@ def text_of(d):
     return "\n".join([*lines, *d.limits, f"home: {{{home}}}", ""])
 
 
-UNITS = {"length": ["mm"], "slider": ["mm"], "crank": ["rad"], "lambda": ["mm", "mm"], "column": ["rad", "mm"]}
+UNITS = {
+    "length": ["mm"],
+    "ring": ["mm"],
+    "slider": ["mm"],
+    "crank": ["rad"],
+    "lambda": ["mm", "mm"],
+    "column": ["rad", "mm"],
+}
 SINGLE = ["length", "slider", "crank"]
 FAMILIES = {  # motion, leg kinds to draw from
     "six": ("tx ty tz rz ry rx", SINGLE),
@@ -62,6 +69,8 @@ FAMILIES = {  # motion, leg kinds to draw from
     "central": ("rx ry tz", SINGLE),
     "other central": ("ry rx tz", SINGLE),
     "rolling": ("rz ry rz tz", SINGLE),
+    "rings": ("tx ty tz rx ry", ["ring"]),
+    "other rings": ("tx ty tz ry rx", ["ring"]),
 }
 
 
@@ -90,6 +99,8 @@ def _leg(rng, kind, number, end, plane):
         return leg | {"pivot": foot, "axis": axis, "zero": zero, **sizes, "branch": rng.choice(["+", "-"])}
     if kind == "length":
         return leg | {"foot": foot}
+    if kind == "ring":
+        return leg | {"foot": foot, "radius": round(rng.uniform(40, 120), 1)}
     rail = _direction(rng) * plane
     rail = rail / np.linalg.norm(rail)
     off = np.linalg.norm(np.cross(end - foot, rail))
@@ -123,6 +134,8 @@ def _two_turns(rng, family):
         if where == 1:
             return [tool], [fixed("tz"), driven(second, "h2"), fixed("tx"), fixed("ry"), driven(first, "h1")]
         return [driven("ry", "h1"), fixed("tx"), tool], [fixed("ty"), driven("rx", "h2"), fixed("tz")]
+    if "rings" in family:
+        return [tool], []
     if family == "rolling":
         return [tool, driven(rng.choice(["rx", "ry"]), "h1"), tool], []
     if "central" in family:
@@ -157,6 +170,8 @@ def draw(family, seed, count=40):
         fit = [kind for kind in kinds if total + len(UNITS[kind]) <= len(motion)]
         kind = rng.choice(fit)
         platform = np.round(rng.uniform(-180, 180, 3) * plane, 1)
+        if kind == "ring":
+            platform[:2] = 0.0
         end = frame[0, :3, :3] @ platform + frame[0, :3, 3]
         d.legs.append(_leg(rng, kind, len(d.legs), end, plane) | {"platform": platform})
         total += len(UNITS[kind])
@@ -164,7 +179,9 @@ def draw(family, seed, count=40):
         d.head = []
     joints = np.zeros((count + 1, len(d.joints)))
     joints[:, len(motion) :] = rng.uniform(0.3, 0.9, len(d.serial)) + rng.uniform(-0.2, 0.2, (count + 1, len(d.serial)))
-    if d.turns or rng.random() < 0.5:
+    if "rings" in family:
+        d.limits = ["limits:", "  cones:", "    - {at: foot, angle: 170 deg}"]
+    elif d.turns or rng.random() < 0.5:
         d.limits = ["limits:", "  cones:", "    - {at: foot, angle: 170 deg}", "    - {at: platform, angle: 150 deg}"]
     poses = d.pose(frame, joints)
     d.home = poses[0]

@@ -53,8 +53,13 @@ class Description:
         return [word for word in self.motion if word[0] == "r"]
 
     @property
+    def tells_axis(self):
+        """Whether of the tool's orientation its axis counts only."""
+        return bool(self.serial) or self.motion[0][0] == "r" or len(self.motion) == 5
+
+    @property
     def axes(self):
-        if self.serial or self.motion[0][0] == "r":
+        if self.tells_axis:
             return tuple("XYZBC")
         return tuple(LETTERS[word] for word in LETTERS if word in self.motion)
 
@@ -70,7 +75,7 @@ class Description:
         """Tool's poses (N, axes) in the workpiece for the platform's frames (N, 4, 4) in the base."""
         table, mount, head = (self.chain(steps, joints) for steps in (self.table, self.mounting, self.head))
         w = np.linalg.inv(table) @ mount @ platform @ head
-        if self.serial or self.motion[0][0] == "r":
+        if self.tells_axis:
             k = w[:, :3, 2]
             angles = {"B": np.arctan2(np.hypot(k[:, 0], k[:, 1]), k[:, 2]), "C": np.arctan2(k[:, 1], k[:, 0])}
         elif len(self.turns) == 3:
@@ -96,9 +101,13 @@ class Description:
         rotation = orientation(*(given.get(x, zero) for x in "ABC"))
         if len(self.turns) == 3 and not self.serial:
             rotation = mount[:, :3, :3].transpose(0, 2, 1) @ rotation @ head[:, :3, :3].transpose(0, 2, 1)
-        elif self.serial:
+        elif self.tells_axis:
             k = np.einsum("nji,njk,nk->ni", mount[:, :3, :3], table[:, :3, :3], tool_axis(given["B"], given["C"]))
-            rotation, missed = self._guided(tip, k, head) if self.constraints else self._led(tip, k, head)
+            if len(self.motion) == 5:  # the frame about the tool's axis is anyone
+                a, b = -np.arcsin(np.clip(k[:, 1], -1.0, 1.0)), np.arctan2(k[:, 0], k[:, 2])
+                rotation = orientation(a, b, zero)
+            else:
+                rotation, missed = self._guided(tip, k, head) if self.constraints else self._led(tip, k, head)
         frame[:, :3, :3] = rotation
         frame[:, :3, 3] = tip - np.einsum("nij,nj->ni", rotation, head[:, :3, 3])
         if self.constraints:
@@ -187,7 +196,12 @@ class Description:
         if self.constraints:
             worst += list(np.abs(self.open_planes(frame[:, :3, :3], frame[:, :3, 3])).T)
         for leg in self.legs:
-            end = frame[:, :3, 3] + frame[:, :3, :3] @ np.array(leg["platform"])
+            place = np.broadcast_to(np.array(leg["platform"]), (len(poses), 3))
+            if leg["kind"] == "ring":  # its joint is there on the ring where the foot is
+                seen = np.linalg.inv(frame) @ np.array([*leg["foot"], 1.0])
+                azimuth = np.arctan2(seen[:, 1], seen[:, 0])
+                place = place + leg["radius"] * np.stack([np.cos(azimuth), np.sin(azimuth), 0.0 * azimuth], -1)
+            end = frame[:, :3, 3] + np.einsum("nij,nj->ni", frame[:, :3, :3], place)
             worst += leg_misses(leg, end, [joints[:, self.joints.index(name)] for name in leg["joints"]])
         return np.max(worst, 0), missed
 
@@ -199,7 +213,7 @@ def leg_misses(leg, end, q):
         return np.linalg.norm(end - point, axis=1)
 
     kind = leg["kind"]
-    if kind == "length":
+    if kind in ("length", "ring"):
         return [np.abs(far(np.array(leg["foot"])) - q[0])]
     if kind == "column":
         foot = np.stack([leg["radius"] * np.cos(q[0]), leg["radius"] * np.sin(q[0]), q[1]], -1)

@@ -237,6 +237,20 @@ def exechon(s, poses):
     return np.concatenate([struts, np.stack([np.arctan2(ky, kx), np.arctan2(np.hypot(kx, ky), kz)], -1)], 1)
 
 
+def pentapod(s, poses):
+    """LinuxCNC's pentakins: the foot in the effector's frame by rpy angles, then the distance to the ring."""
+    k = tool_axis(poses[:, 3], poses[:, 4])
+    a, b = -np.arcsin(np.clip(k[:, 1], -1.0, 1.0)), np.arctan2(k[:, 0], k[:, 2])
+    turn = rotation("y", b) @ rotation("x", a)
+    struts = []
+    sides = [(-418.03, 324.56), (417.96, 324.56), (-418.03, -325.44), (417.96, -325.44), (-0.06, -492.96)]
+    for (x, y), height in zip(sides, [-185.5, -159.5, -67.5, -41.5, -14.0], strict=True):
+        seen = np.einsum("nji,nj->ni", turn, np.array([x, y, s["top"]]) - poses[:, :3])
+        out = np.hypot(seen[:, 0], seen[:, 1]) - s["ring"]
+        struts.append(np.hypot(seen[:, 2] - s["tool"] - height, out))
+    return np.stack(struts, -1)
+
+
 PAIRS, SPREAD = [80, 100, 200, 220, 320, 340], [30, 150, 150, 270, 270, 30]
 INVERSES = {
     "variax": hexapod_of(PAIRS, [45, 135, 165, 255, 285, 15]),
@@ -267,5 +281,6 @@ INVERSES = {
         eclipse,
         sprint_z3,
         exechon,
+        pentapod,
     )
 }

@@ -23,6 +23,7 @@ REPRESENTATIVES = [
     "rrr3",
     "sprint_z3",
     "exechon",
+    "pentapod",
 ]
 
 

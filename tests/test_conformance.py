@@ -38,6 +38,7 @@ SPREAD = {  # about home, mm and rad: the allowed workspace and a margin beyond
     "orthoglide": [160, 160, 160],
     "orthoglide5_head": [200, 200, 200, 1.9, 3.3],
     "orthoglide5_table": [220, 220, 220, 1.7, 3.3],
+    "pentapod": [200, 200, 150, 0.6, 3.3],
     "prr3": [130, 130, 0.45],
     "quickstep": [280, 300, 350],
     "rotary_delta": [200, 200, 200],

@@ -92,6 +92,11 @@ LDELTA_HAL = (
     "loadrt lineardeltakins\nsetp lineardeltakins.R 150\nsetp lineardeltakins.L 300.5\nsetp lineardeltakins.J1off 2\n"
 )
 TRIPOD_HAL = "setp tripodkins.Bx 10\nsetp tripodkins.Cx 5\nsetp tripodkins.Cy 7.071\n"
+PENTAPOD_HAL = "setp pentakins.tool-offset 200\nsetp pentakins.effector.2.r 75\nsetp pentakins.effector.2.z -60\n"
+PENTAPOD_INI = (
+    "[KINS]\nKINEMATICS = pentakins JOINTS=5\n[HAL]\nHALFILE = pentapod.hal\n[TRAJ]\nLINEAR_UNITS = mm\n"
+    + "".join(f"[JOINT_{i}]\nMIN_LIMIT = 400\nMAX_LIMIT = 1100\n" for i in range(5))
+)
 INCH = 25.4
 
 
@@ -161,6 +166,25 @@ def genhexkins(poses):
     return INCH * np.linalg.norm(poses[:, None, :3] / INCH + a @ turns.transpose(0, 2, 1) - b, axis=2)
 
 
+def give_turns_of_pentakins(poses):
+    """X Y Z A B of pentakins, R = Ry(B)·Rx(A), for X Y Z B C of the same tool axis."""
+    b, c = poses[:, 3:].T
+    a = -np.arcsin(np.sin(b) * np.sin(c))
+    return np.column_stack([poses[:, :3], a, np.arctan2(np.sin(b) * np.cos(c), np.cos(b))])
+
+
+def pentakins(poses):
+    """pentakins.c: the base in the effector's frame, from there to the ring; one ring and the tool changed, mm."""
+    base = np.array([[-418.03, 324.56], [417.96, 324.56], [-418.03, -325.44], [417.96, -325.44], [-0.06, -492.96]])
+    base = np.column_stack([base, np.full(5, 895.56 + 200.0)])
+    za, ra = np.array([-185.5, -159.5, -60.0, -41.5, -14.0]) + 200.0, np.array([80.32, 80.32, 75.0, 80.32, 80.32])
+    (sa, sb), (ca, cb) = (f(give_turns_of_pentakins(poses)[:, 3:].T) for f in (np.sin, np.cos))
+    zero = 0.0 * sa
+    turns = np.moveaxis(np.array([[cb, sb * sa, sb * ca], [zero, ca, -sa], [-sb, cb * sa, cb * ca]]), 2, 0)
+    x, y, z = np.moveaxis(np.einsum("nji,nkj->nki", turns, base - poses[:, None, :3]), 2, 0)
+    return np.sqrt((z - za) ** 2 + (np.hypot(x, y) - ra) ** 2)
+
+
 def rotarydeltakins(poses):
     """rotarydeltakins-common.h of LinuxCNC 2.9, with its own sizes in inches; degrees there."""
     pfr, tl, sl, fr = 10.0, 10.0, 14.0, 6.0
@@ -198,12 +222,14 @@ CASES = {
     "rdelta.ini": (RDELTA_INI, rotarydeltakins),
     "ldelta.hal": (LDELTA_HAL, lineardeltakins),
     "tripod.hal": (TRIPOD_HAL, tripodkins),
+    "pentapod.ini": (PENTAPOD_INI, pentakins),
 }
 
 
 def import_text(tmp_path, name, text, *options):
-    (tmp_path / name).write_text(text)
     (tmp_path / "hexapod.hal").write_text(HEXAPOD_HAL)
+    (tmp_path / "pentapod.hal").write_text(PENTAPOD_HAL)
+    (tmp_path / name).write_text(text)
     output = tmp_path / f"{name.partition('.')[0]}_machine.yaml"
     units = {"ldelta.hal": ["--units", "mm"], "tripod.hal": ["--units", "inch"]}.get(name, [])
     assert main(["import", str(tmp_path / name), "-o", str(output), *units, *options]) == 0
@@ -222,23 +248,26 @@ def test_the_inverse_is_the_programs_own(name, tmp_path):
     assert np.isfinite(ours).all(1).sum() > POSES // 2
     assert np.nanmax(np.abs(ours - theirs)) < 1e-8
     assert machine.check(machine.home) == 0
-    assert machine.forward(theirs[np.isfinite(theirs).all(1)][:200], near=machine.home).converged.mean() > 0.9
+    closing, halfway = np.isfinite(theirs).all(1), 0.5 * (machine.home + poses)
+    assert machine.forward(theirs[closing][:200], near=halfway[closing][:200]).converged.mean() > 0.9
 
 
 MODULES = Path("/usr/lib/linuxcnc/modules")
 
 
 @pytest.mark.skipif(not (MODULES.exists() and shutil.which("gcc")), reason="no modules of LinuxCNC, or no gcc")
-@pytest.mark.parametrize("name", ["genhexkins", "lineardeltakins", "rotarydeltakins", "tripodkins"])
+@pytest.mark.parametrize("name", ["genhexkins", "lineardeltakins", "pentakins", "rotarydeltakins", "tripodkins"])
 def test_the_inverse_is_that_of_linuxcncs_own_module(name, tmp_path):
     """Modules with their own sizes, in mm; called as LinuxCNC calls them."""
     machine = import_text(tmp_path, "own.hal", f"loadrt {name}\n", "--units", "mm")
-    kinematics = Kinematics(Stub(tmp_path).library, MODULES / f"{name}.so", 6 if name == "genhexkins" else 9)
+    width = {"genhexkins": 6, "pentakins": 5}.get(name, 9)
+    kinematics = Kinematics(Stub(tmp_path).library, MODULES / f"{name}.so", width)
     rng = np.random.default_rng(4)
     spread = np.array([0.1 * np.abs(machine.home).max() if unit == "mm" else 0.3 for unit in machine.axis_units])
     poses = machine.home + rng.uniform(-1.0, 1.0, (POSES, len(spread))) * spread
     given = np.zeros((POSES, 9))
-    given[:, : len(spread)] = np.where(np.array(machine.axis_units) == "mm", poses, np.degrees(poses))
+    theirs = give_turns_of_pentakins(poses) if name == "pentakins" else poses
+    given[:, : len(spread)] = np.where(np.array(machine.axis_units) == "mm", theirs, np.degrees(theirs))
     joints, codes = kinematics.inverse(given, np.zeros((POSES, kinematics.width)))
     theirs = joints[:, : len(machine.joints)]
     if name == "rotarydeltakins":
@@ -282,15 +311,17 @@ BAD = [
     ("a.ini", HEXAPOD_INI.replace("STEP = 0.5", ""), "hexapod.hal:3"),
     ("a.ini", HEXAPOD_INI.replace("= inch", "= furlong"), "furlong"),
     ("a.txt", "hello\n", "expected"),
+    ("pentapod.hal", PENTAPOD_HAL.replace("r 75", "r 0"), "effector.2.r"),
     ("a.cfg", "\0", "configuration"),
 ]  # fmt: skip
 
 
 @pytest.mark.parametrize(("name", "text", "told"), BAD)
 def test_bad_configurations(name, text, told, tmp_path, capsys):
-    (tmp_path / name).write_text(text)
     (tmp_path / "hexapod.hal").write_text(HEXAPOD_HAL)
-    assert main(["import", str(tmp_path / name), "-o", str(tmp_path / "out.yaml")]) == 2
+    (tmp_path / name).write_text(text)
+    options = ["--units", "mm"] if name == "pentapod.hal" else []
+    assert main(["import", str(tmp_path / name), "-o", str(tmp_path / "out.yaml"), *options]) == 2
     error = capsys.readouterr().err
     assert told in error
     assert len(error.splitlines()) == 1

@@ -155,7 +155,7 @@ def test_servos_hold_the_machine_at_home(name):
     mujoco.mj_forward(engine.model, engine.data)
     tip, turn = measure_difference(machine, engine, machine.home)
     assert tip < 0.2  # mm
-    assert turn < 1e-3
+    assert turn < (2e-3 if name == "pentapod" else 1e-3)  # its rings are near each other: 0.03 rad a mm of strut
     assert np.abs(engine.data.efc_pos[: engine.data.ne]).max() < 1e-5  # m
 
 

@@ -33,8 +33,8 @@ def test_shipped_names():
         "cmw_300", "eclipse", "exechon", "five_bar", "five_bar_slides", "g500", "george_v", "hbg80_2d", "hbg80_3d",
         "hexaglide",
         "hexam", "hexapod", "lambda6", "linapod3", "linapod6", "linear_delta", "mikromat_6x", "okuma_hexapod",
-        "orthoglide", "orthoglide5_head", "orthoglide5_table", "prr3", "quickstep", "rotary_delta", "rpr3", "rrr3",
-        "rus6", "sprint_z3", "tornado_2000", "tricept", "tricept_805", "triglide", "urane_sx", "variax",
+        "orthoglide", "orthoglide5_head", "orthoglide5_table", "pentapod", "prr3", "quickstep", "rotary_delta", "rpr3",
+        "rrr3", "rus6", "sprint_z3", "tornado_2000", "tricept", "tricept_805", "triglide", "urane_sx", "variax",
     ]  # fmt: skip
 
 

@@ -26,8 +26,8 @@ def import_machine(
     Parameters
     ----------
     file
-        LinuxCNC's .ini or .hal (genhexkins, tripodkins, lineardeltakins, rotarydeltakins), Klipper's printer.cfg
-        (delta, rotary_delta), or RepRapFirmware's config.g (linear delta).
+        LinuxCNC's .ini or .hal (genhexkins, pentakins, tripodkins, lineardeltakins, rotarydeltakins), Klipper's
+        printer.cfg (delta, rotary_delta), or RepRapFirmware's config.g (linear delta).
     output
         The machine file, .yaml; by default the configuration's name in this folder.
     units

@@ -60,6 +60,8 @@ def _list_leg(leg: Leg) -> Iterator[Parameter]:
         name = f"legs.{leg.drives[0].name}.{key}"
         if hint is Point:
             for letter, coordinate in zip(_AXES, value, strict=True):
+                if key == "platform" and letter not in leg.platform_parameters:
+                    continue
                 yield Parameter(f"{name}.{letter}", "mm", coordinate, _GROUPS.get(key, key))
         elif hint is Size:
             yield Parameter(name, "mm", value, "rods")

@@ -100,7 +100,7 @@ def group_joints_by_leg(spec: Spec, joints: Sequence[Scalar]) -> list[list[Scala
 
 def compute_platform_points(spec: Spec, rotation: Mat, origin: Vec) -> list[Vec]:
     """Compute the platform's joint of every leg in the base frame, mm."""
-    return [add(origin, apply(rotation, leg.platform)) for leg in spec.legs]
+    return [leg.place_joint(rotation, origin) for leg in spec.legs]
 
 
 def _list_bounds(
@@ -198,7 +198,7 @@ def _list_clearances(
 
 def _share_joint(one: Leg, two: Leg) -> bool:
     """Tell whether two legs meet in a joint, in a calibrated machine too: two bearings have no room there."""
-    pairs = [(one.platform, two.platform), (one.fixed_foot(), two.fixed_foot())]
+    pairs = [(one.find_fixed_joint(), two.find_fixed_joint()), (one.fixed_foot(), two.fixed_foot())]
     gaps = [sub(a, b) for a, b in pairs if a is not None and b is not None]
     return any(norm([find_nominal_value(x) for x in gap]) < _ONE_JOINT for gap in gaps)
 

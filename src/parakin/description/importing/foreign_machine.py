@@ -7,9 +7,11 @@ from dataclasses import dataclass, fields
 from math import degrees, hypot, inf, isfinite, pi
 from pathlib import Path
 
+from ...algebra import IDENTITY
 from ...errors import InputError
 from ...model.elements import Drive, Vector
 from ...model.legs import Leg
+from ...model.legs.length import Length
 
 _HEIGHTS = 2000  # of the tip that are tried for a home
 _WIDE = 10.0  # of a machine's size: a range without an end in the configuration ends there
@@ -21,6 +23,7 @@ class ForeignMachine:
 
     kinematics : the program's name of its kinematics
     side : on which side of the base the platform works, 1 above, -1 below, 0 either
+    level : height of the base, mm
     """
 
     program: str
@@ -29,6 +32,7 @@ class ForeignMachine:
     motion: str
     legs: tuple[Leg, ...]
     side: int = 0
+    level: float = 0.0
 
 
 def format_machine_yaml(machine: ForeignMachine, name: str) -> str:
@@ -38,7 +42,8 @@ def format_machine_yaml(machine: ForeignMachine, name: str) -> str:
     """
     size = _measure_size(machine)
     x, y, z = _find_home(machine, size)
-    turns = "".join(f", {letter}: 0 deg" for letter in ("A", "B", "C") if "r" in machine.motion)
+    letters = {3: "", 5: "BC", 6: "ABC"}[len(machine.motion.split())]
+    turns = "".join(f", {letter}: 0 deg" for letter in letters)
     return "\n".join(
         [
             f"# {machine.kinematics} of {machine.program}, as its configuration has it.",
@@ -106,7 +111,7 @@ def _find_home(machine: ForeignMachine, size: float) -> Vector:
         for sign in (1.0, -1.0):
             if machine.side * sign < 0.0:
                 continue
-            tip = (x, y, round(sign * 3.0 * size * step / _HEIGHTS, 3))
+            tip = (x, y, round(machine.level + sign * 3.0 * size * step / _HEIGHTS, 3))
             margin = min(_measure_margin(leg, tip, size) for leg in machine.legs)
             if margin > best:
                 best, home = margin, tip
@@ -117,7 +122,7 @@ def _find_home(machine: ForeignMachine, size: float) -> Vector:
 
 def _measure_margin(leg: Leg, tip: Vector, size: float) -> float:
     """Measure how far a leg is from its limits, as a fraction, with the platform level; NaN or negative out of them."""
-    point = tuple(float(t + p) for t, p in zip(tip, leg.platform, strict=True))
+    point = tuple(float(x) for x in leg.place_joint(IDENTITY, tip))
     drive, inverse = leg.drives[0], leg.inverse(point, getattr(leg, "branch", ""))
     if any(not reach.margin > 0.0 for reach in inverse.reach):
         return -inf
@@ -125,8 +130,8 @@ def _measure_margin(leg: Leg, tip: Vector, size: float) -> float:
     margins = [2.0 * (q - low) / (high - low), 2.0 * (high - q) / (high - low)]
     if drive.unit == "rad":
         margins += [float(reach.margin) / size**2 for reach in inverse.reach]
-    if leg.kind == "length":  # near its base a platform is singular
-        margins.append(abs(tip[2]) / size)
+    if isinstance(leg, Length):  # near its base a platform is singular
+        margins.append(abs(point[2] - leg.foot[2]) / size)
     return min(margins)
 
 

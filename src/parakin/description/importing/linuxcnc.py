@@ -1,4 +1,4 @@
-"""LinuxCNC's HAL and ini files of genhexkins, tripodkins, lineardeltakins and rotarydeltakins."""
+"""LinuxCNC's HAL and ini files of genhexkins, pentakins, tripodkins, lineardeltakins and rotarydeltakins."""
 
 from __future__ import annotations
 
@@ -9,8 +9,9 @@ from math import inf, radians
 from pathlib import Path
 
 from ...errors import InputError, quote
-from ...model.elements import Drive, Point
+from ...model.elements import Drive, Point, Size
 from ...model.legs.length import Length
+from ...model.legs.ring import Ring
 from .deltas import ArmSizes, build_arm, build_tower
 from .foreign_machine import ForeignMachine
 
@@ -20,6 +21,9 @@ _UNITS = {"mm": 1.0, "metric": 1.0, "cm": 10.0, "inch": INCH, "in": INCH, "imper
 # The modules' own values, in the machine's units, where nothing sets a pin.
 _BASE = [(-22.95, 13.25), (22.95, 13.25), (22.95, 13.25), (0.0, -26.5), (0.0, -26.5), (-22.95, 13.25)]
 _PLATFORM = [(-1.0, 11.5), (1.0, 11.5), (10.459, -4.884), (9.459, -6.616), (-9.459, -6.616), (-10.459, -4.884)]
+_PENTAPOD_BASE = [(-418.03, 324.56), (417.96, 324.56), (-418.03, -325.44), (417.96, -325.44), (-0.06, -492.96)]
+_RING_HEIGHTS = [-185.5, -159.5, -67.5, -41.5, -14.0]
+_PENTAPOD_TOP, _RING_RADIUS = 895.56, 80.32
 
 Ini = Mapping[str, Mapping[str, list[str]]]
 
@@ -152,6 +156,23 @@ def _build_genhexkins(given: _Configuration) -> ForeignMachine:
     return ForeignMachine("LinuxCNC", "genhexkins", given.source, "tx ty tz rz ry rx", legs, side=1)
 
 
+def _build_pentakins(given: _Configuration) -> ForeignMachine:
+    shift = given.get_pin("pentakins.tool-offset", 0.0)
+    legs = []
+    for i, side in enumerate(_PENTAPOD_BASE):
+        own = zip("xyz", (*side, _PENTAPOD_TOP), strict=True)
+        x, y, z = (given.get_pin(f"pentakins.base.{i}.{axis}", default) for axis, default in own)
+        radius = given.get_pin(f"pentakins.effector.{i}.r", _RING_RADIUS)
+        height = given.get_pin(f"pentakins.effector.{i}.z", _RING_HEIGHTS[i]) + shift
+        if radius <= 0.0:
+            raise InputError(f"pentakins.effector.{i}.r: a radius above 0 expected", given.source)
+        centre = Point((0.0, 0.0, given.unit * height))
+        foot = Point((given.unit * x, given.unit * y, given.unit * (z + shift)))
+        legs.append(Ring((given.make_drive(i, "mm"),), centre, foot, Size(given.unit * radius)))
+    level = sum(leg.foot[2] for leg in legs) / len(legs)
+    return ForeignMachine("LinuxCNC", "pentakins", given.source, "tx ty tz ry rx", tuple(legs), side=-1, level=level)
+
+
 def _build_tripodkins(given: _Configuration) -> ForeignMachine:
     bx, cx, cy = (given.unit * given.get_pin(f"tripodkins.{name}", 1.0) for name in ("Bx", "Cx", "Cy"))
     feet = [Point((0.0, 0.0, 0.0)), Point((bx, 0.0, 0.0)), Point((cx, cy, 0.0))]
@@ -186,6 +207,7 @@ def _build_rotarydeltakins(given: _Configuration) -> ForeignMachine:
 _MODULES: dict[str, Callable[[_Configuration], ForeignMachine]] = {
     "genhexkins": _build_genhexkins,
     "lineardeltakins": _build_lineardeltakins,
+    "pentakins": _build_pentakins,
     "rotarydeltakins": _build_rotarydeltakins,
     "tripodkins": _build_tripodkins,
 }

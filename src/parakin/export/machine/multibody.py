@@ -29,7 +29,7 @@ DENSITIES = {"rod": 7850.0, "carriage": 7850.0, "platform": 2700.0, "head": 2700
 METRE = 1e-3  # of a millimetre: simulators count in metres
 
 _NEAR = 1e-9  # mm; a body that ends nearer to its joint than this is a ball
-_FREE = 6  # coordinates of a motion that any pose has
+_FREE = 5  # coordinates of a motion from which on nothing but its legs holds a platform
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,9 +106,9 @@ def build_multibody(machine: Machine) -> Multibody:
     base = Body(BASE, "base", WORLD, np.array(structure.mount, float), np.array(structure.base, float))
     platform = _build_platform(machine, placement, head[0].origin if head else tool[2])
     bodies, loops = [base, platform], []
-    points = machine.place_leg_joints(placement)
+    points = _locate_platform_joints(machine, placement)
     for number, own in enumerate(machine.group_joints(joints)):
-        leg_bodies, leg_loops = _build_leg(machine, number, np.array(points[number], float), own)
+        leg_bodies, leg_loops = _build_leg(machine, placement, number, points[number], own)
         bodies += leg_bodies
         loops += leg_loops
     for number, constraint in enumerate(machine.constraints, 1):
@@ -126,7 +126,7 @@ def _build_platform(machine: Machine, placement: PlatformPlacement, head: Points
     """
     structure = machine.structure
     rotation, origin = np.array(placement.rotation, float), np.array(placement.origin, float)
-    ring = order_polygon(np.array([leg.platform for leg in machine.legs], float))
+    ring = order_polygon(_locate_platform_joints(machine, placement))
     corners = [*ring, ring[0]] if len(ring) != 2 else list(ring)
     bars = [np.array(pair) for pair in pairwise(corners)]
     if structure.has_central_leg:
@@ -135,7 +135,7 @@ def _build_platform(machine: Machine, placement: PlatformPlacement, head: Points
         bars.append(np.array([ring.mean(axis=0), head]))
     bounds = {limit.name: limit.bound for limit in machine.limit_definitions}
     joints = []
-    if len(structure.coordinates) == _FREE or machine.constraints:
+    if len(structure.coordinates) >= _FREE or machine.constraints:
         joints.append(BodyJoint(PLATFORM, "free", np.zeros(3), np.zeros(3)))
         mount, base = np.array(structure.mount, float), np.array(structure.base, float)
         placed = mount @ rotation, mount @ origin + base
@@ -159,10 +159,23 @@ def _build_platform(machine: Machine, placement: PlatformPlacement, head: Points
     return Body(PLATFORM, "platform", BASE, rotation, origin, tuple(joints), tuple(bars))
 
 
-def _build_leg(machine: Machine, number: int, point: Points, joints: list[float]) -> tuple[list[Body], list[Loop]]:
-    """Build a leg's bodies, which stand parallel to the base at home, and the loops that it closes."""
+def _locate_platform_joints(machine: Machine, placement: PlatformPlacement) -> Points:
+    """Locate every leg's joint (N, 3) in the platform's frame."""
+    fixed = [leg.find_fixed_joint() for leg in machine.legs]
+    placed = np.array(machine.place_leg_joints(placement), float)
+    moving = (placed - np.array(placement.origin, float)) @ np.array(placement.rotation, float)
+    return np.array([own if joint is None else joint for joint, own in zip(fixed, moving, strict=True)], float)
+
+
+def _build_leg(
+    machine: Machine, placement: PlatformPlacement, number: int, on_platform: Points, joints: list[float]
+) -> tuple[list[Body], list[Loop]]:
+    """Build a leg's bodies, which stand parallel to the base at home, and the loops that it closes.
+
+    on_platform : (3,) the platform's joint in the platform's frame
+    """
     leg = machine.legs[number]
-    links = leg.links(tuple(point.tolist()), joints)
+    links = leg.links(machine.place_leg_joints(placement)[number], joints)
     names = [f"{leg.drives[0].name}_{i}" for i in range(len(links))]
     starts = [np.array(link.start, float) for link in links]
     bodies, loops = [], []
@@ -184,10 +197,25 @@ def _build_leg(machine: Machine, number: int, point: Points, joints: list[float]
             continue
         if isinstance(link.meets, int):
             met, place = names[link.meets], end - starts[link.meets]
+        elif link.meets == "ring":
+            ring, along = _build_ring(f"{leg.drives[0].name}_ring", np.array(leg.platform, float), on_platform)
+            bodies.append(ring)
+            met, place = ring.name, on_platform - ring.origin
+            # Two points of a hinge hold it as two ball joints.
+            second = np.array(placement.rotation, float) @ along
+            loops.append(Loop(f"{name}_{met}_hinge", (name, met), (end - start + second, place + along)))
         else:
-            met, place = PLATFORM, np.array(leg.platform, float)
+            met, place = PLATFORM, on_platform
         loops.append(Loop(f"{name}_{met}", (name, met), (end - start, place)))
     return bodies, loops
+
+
+def _build_ring(name: str, centre: Points, joint: Points) -> tuple[Body, Points]:
+    """Build a ring that turns about the platform's z, and its hinge's direction, a tenth of its radius long."""
+    arm = joint - centre
+    turning = BodyJoint(name, "hinge", np.array(UNIT["rz"], float), np.zeros(3))
+    bar = np.array([np.zeros(3), arm])
+    return Body(name, "platform", PLATFORM, np.eye(3), centre, (turning,), (bar,)), 0.1 * np.cross(UNIT["rz"], arm)
 
 
 def _build_plane(name: str, constraint: PlaneConstraint, placement: PlatformPlacement) -> tuple[Body, Loop]:

@@ -234,23 +234,17 @@ class _SceneBuilder:
         return anchors
 
     def _add_platform(self) -> None:
-        corners = np.array([leg.platform for leg in self.machine.legs], float)
-        order = list_polygon(corners)
+        stance = self.stance
+        order = list_polygon((np.array(stance.points, float) - stance.origin) @ stance.rotation)
 
-        def locate_ring(at: _Stance) -> Points:
-            return np.array([at.machine.legs[i].platform for i in order])
+        def locate_corners(at: _Stance) -> Points:
+            return np.array([at.points[i] for i in order])
 
-        self._add(
-            "platform", "platform", lambda at: at.to_machine(at.locate_on_platform(locate_ring(at))), len(order) > 2
-        )
-        middle = corners[order].mean(axis=0)
-        origin = self.stance.origin
-        if not _coincide(self.stance.locate_on_platform(middle), origin) and not self.structure.has_central_leg:
-
-            def locate_link(at: _Stance) -> Points:
-                return np.array([locate_ring(at).mean(axis=0), np.zeros(3)])
-
-            self._add("head", "platform", lambda at: at.to_machine(at.locate_on_platform(locate_link(at))))
+        self._add("platform", "platform", lambda at: at.to_machine(locate_corners(at)), len(order) > 2)
+        if not _coincide(locate_corners(stance).mean(axis=0), stance.origin) and not self.structure.has_central_leg:
+            self._add(
+                "head", "platform", lambda at: at.to_machine(np.array([locate_corners(at).mean(axis=0), at.origin]))
+            )
 
     def _add_head(self) -> None:
         at, chain = self.stance, self.stance.list_head_frames()

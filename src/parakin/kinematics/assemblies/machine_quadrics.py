@@ -104,11 +104,16 @@ def _list_closure_numbers(model: Model) -> tuple[Trace, list[Scalar], list[Array
     numbers: list[Scalar] = []
     platforms = []
     for leg, own in zip(model.spec.legs, group_joints_by_leg(model.spec, joints), strict=True):
+        fixed = leg.find_fixed_joint()
+        if fixed is None:
+            raise NoMethodError(
+                f"{model.spec.name}: a leg's joint moves on the platform, and its closure is no quadric"
+            )
         for closure in leg.closures(tuple(point), own):
             slopes = [derivative(closure, x) for x in point]
             _check_form(model, slopes, point)
             numbers += [0.5 * derivative(slopes[0], point[0]), *slopes, closure]
-            platforms.append(np.array(leg.platform, float))
+            platforms.append(np.array(fixed, float))
     return trace, numbers, platforms
 
 

@@ -11,7 +11,11 @@ __all__ = ["KINDS", "Inverse", "Leg", "Reach"]
 def _collect_kinds() -> dict[str, type[Leg]]:
     for module in iter_modules(__path__):
         import_module(f"{__name__}.{module.name}")
-    return {cls.kind: cls for cls in Leg.__subclasses__()}
+    return {cls.kind: cls for cls in _list_subclasses(Leg)}  # type: ignore[type-abstract]
+
+
+def _list_subclasses(base: type[Leg]) -> list[type[Leg]]:
+    return [cls for own in base.__subclasses__() for cls in (own, *_list_subclasses(own))]
 
 
 KINDS: dict[str, type[Leg]] = _collect_kinds()

@@ -6,7 +6,7 @@ from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from typing import ClassVar, Literal
 
-from ...algebra import Scalar, Vec, dot, sub
+from ...algebra import Mat, Scalar, Vec, add, apply, dot, sub
 from ...errors import NoMethodError
 from ..elements import Drive, Point, Unit
 
@@ -36,7 +36,8 @@ class Link:
     end : where it ends; a carriage ends where it starts
     drive : which of the leg's drives moves it; None: what the leg's closure leaves it
     carrier : the link that carries it, by its number in the leg; None: the base
-    meets : what a ball joint holds its end to: the platform's joint, or a link of the leg
+    meets : what a ball joint holds its end to: the platform's joint, or a link of the leg; a hinge along it holds it to
+        a ring about the platform's z
     """
 
     joint: Literal["slide", "hinge", "ball"]
@@ -45,7 +46,7 @@ class Link:
     axis: Vec | None = None
     drive: int | None = None
     carrier: int | None = None
-    meets: Literal["platform"] | int | None = None
+    meets: Literal["platform", "ring"] | int | None = None
 
 
 def close_rod(foot: Vec, point: Vec, square: Scalar) -> Scalar:
@@ -56,7 +57,7 @@ def close_rod(foot: Vec, point: Vec, square: Scalar) -> Scalar:
 
 @dataclass(frozen=True)
 class Leg(ABC):
-    """A leg from the base to ``platform``, the point of the platform's joint in the platform's frame.
+    """A leg from the base to ``platform``, a point in the platform's frame: its joint's, or of its ring the centre.
 
     All its methods are written in :mod:`parakin.algebra`, so they serve numbers, NumPy arrays and traces alike.
     ``point`` is the platform's joint in the base frame, mm.
@@ -69,9 +70,18 @@ class Leg(ABC):
     # Where the platform's joint moves by d, less than a fifth of the rod's length L, the rod's vector changes by less
     # than sway·L·d / (branch margin); None where that is not known.
     sway: ClassVar[float | None] = None
+    platform_parameters: ClassVar[str] = "xyz"  # the coordinates of ``platform`` that may differ from leg to leg
 
     drives: tuple[Drive, ...]
     platform: Point
+
+    def place_joint(self, rotation: Mat, origin: Vec) -> Vec:
+        """Place the platform's joint in the base frame, mm, for the platform's frame there."""
+        return add(origin, apply(rotation, self.platform))
+
+    def find_fixed_joint(self) -> Vec | None:
+        """Return the platform's joint in the platform's frame; None where it moves there."""
+        return self.platform
 
     @abstractmethod
     def closures(self, point: Vec, joints: list[Scalar]) -> list[Scalar]:
@@ -118,5 +128,9 @@ class Leg(ABC):
         return at_home
 
     def sphere(self, joints: list[Scalar]) -> tuple[Vec, Scalar] | None:
-        """Return centre and radius of the sphere that the platform's joint lies on; None if there is no such sphere."""
+        """Return centre and radius of the sphere that ``platform`` lies on; None if there is no such sphere."""
         return None
+
+    def bound_platform(self, joints: list[Scalar]) -> tuple[Vec, Scalar] | None:
+        """Return centre and radius of a ball that holds ``platform``; None where none is known."""
+        return self.sphere(joints)

@@ -43,5 +43,5 @@ class Length(Leg):
     def size(self, at_home: float) -> float:
         return max(0.25 * at_home, min(find_nominal_value(self.drives[0].low), at_home))
 
-    def sphere(self, joints: list[Scalar]) -> tuple[Vec, Scalar]:
+    def sphere(self, joints: list[Scalar]) -> tuple[Vec, Scalar] | None:
         return self.foot, joints[0]

@@ -9,6 +9,7 @@ from .base import DirectionColumns, PlatformPlacement, Structure
 from .carried import Carried
 from .central_leg import CentralLeg
 from .five_axis import compute_axis_angles, compute_tool_axis
+from .five_axis_platform import FiveAxisPlatform, check_rings
 from .free import Free
 from .guided import Guided
 from .guided_wrist import WristOnGuidedPlatform
@@ -19,6 +20,7 @@ __all__ = [
     "Carried",
     "CentralLeg",
     "DirectionColumns",
+    "FiveAxisPlatform",
     "Free",
     "Guided",
     "PlatformPlacement",
@@ -36,6 +38,7 @@ def make_structure(spec: Spec) -> Structure:
     twice = [bound.name for bound in spec.limits.passive if spec.motion.count(bound.name) > 1]
     if twice:
         raise DescriptionError("limits", f"passive {twice[0]} stands twice in the motion, so it is not one coordinate")
+    check_rings(spec)
     if spec.constraints or spec.parasitic:
         return _make_guided_structure(spec)
     drives = [(step.axis, step.drive.name) for step in (*spec.head, *spec.table) if step.drive is not None]
@@ -48,7 +51,7 @@ def make_structure(spec: Spec) -> Structure:
     if driven == 0:
         if spec.table:
             raise DescriptionError("table", "a table without a driven turn does nothing; leave it out")
-        return Free(spec)
+        return FiveAxisPlatform(spec) if len(spec.motion) == 5 else Free(spec)
     if set(spec.motion) != set(TRANSLATIONS) or len(spec.motion) != 3:
         raise DescriptionError(
             "motion",

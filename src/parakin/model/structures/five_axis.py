@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from ...algebra import Scalar, Vec, atan2, dot, move_along, sincos, sqrt
+from ...algebra import Mat, Scalar, Vec, atan2, dot, move_along, sincos, sqrt
 from .base import DirectionColumns, Structure
 
 _DIRECTION = DirectionColumns(3, 4)
@@ -29,6 +29,14 @@ def turn_tool_axis(pose: Sequence[Scalar], turn: Sequence[Scalar] = ()) -> tuple
         return k, e1, e2
     first, second = turn
     return move_along(move_along(k, e1, first), e2, second), move_along(e1, k, -first), move_along(e2, k, -second)
+
+
+def make_least_rotation(z: Vec) -> Mat:
+    """Compute the least rotation that turns the z axis to a unit vector; there is none to the vector opposite."""
+    x, y, w = z
+    inverse = 1.0 / (1.0 + w)
+    across = -(x * y) * inverse
+    return ((1.0 - x * x * inverse, across, x), (across, 1.0 - y * y * inverse, y), (-x, -y, w))
 
 
 class FiveAxis(Structure):

@@ -12,7 +12,7 @@ from ..elements import ROTATIONS, TRANSLATIONS
 from ..nominal_values import find_nominal_value
 from ..spec import Spec
 from .base import PlatformPlacement
-from .five_axis import FiveAxis, compute_axis_angles, turn_tool_axis
+from .five_axis import FiveAxis, compute_axis_angles, make_least_rotation, turn_tool_axis
 from .parasitic import (
     FoundFrame,
     TurnInBasePlanes,
@@ -89,7 +89,7 @@ class SlidingTable(FiveAxis):
         world = add(self.table_origin, apply(self.table_rotation, tuple(pose[:3])))
         known = sub(transform_to_local(self.mount, self.base, world), scale(z, self.tip[2]))
         lifted = tuple(0.0 if i in self.across else c for i, c in enumerate(known))
-        guided = self.planes.solve(_turn_least(z), "rz", lifted, self.branch)
+        guided = self.planes.solve(make_least_rotation(z), "rz", lifted, self.branch)
         off = [guided.origin[i] - known[i] for i in self.across]
         return guided, [dot(row, off) for row in self.to_slides]
 
@@ -128,11 +128,3 @@ class SlidingTable(FiveAxis):
 
     def list_constraint_rates(self, pose: Sequence[Scalar], rotation: Mat, origin: Vec) -> list[list[Scalar]]:
         return list_rates(self.spec, rotation, origin, [tuple(row[2] for row in rotation)])
-
-
-def _turn_least(z: Vec) -> Mat:
-    """Compute the least rotation that turns the z axis to a unit vector; there is none to the vector opposite."""
-    x, y, w = z
-    inverse = 1.0 / (1.0 + w)
-    across = -(x * y) * inverse
-    return ((1.0 - x * x * inverse, across, x), (across, 1.0 - y * y * inverse, y), (-x, -y, w))

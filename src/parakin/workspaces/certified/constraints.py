@@ -138,7 +138,7 @@ class TracedPose:
             low = [-np.inf if f"{drive.name}.min" in without else drive.low for drive in leg.drives]
             high = [np.inf if f"{drive.name}.max" in without else drive.high for drive in leg.drives]
             trace = Trace()
-            sphere = leg.sphere([q + d.offset for q, d in zip(trace.inputs(len(low)), leg.drives, strict=True)])
+            sphere = leg.bound_platform([q + d.offset for q, d in zip(trace.inputs(len(low)), leg.drives, strict=True)])
             if sphere is None:
                 continue
             centre, radius = sphere

@@ -17,12 +17,14 @@ import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.axes import Axes
 
+from parakin.algebra import IDENTITY
 from parakin.model.elements import Direction, Drive, Point, Size
 from parakin.model.legs import Leg
 from parakin.model.legs.column import Column
 from parakin.model.legs.crank import Crank
 from parakin.model.legs.lambda_ import Lambda
 from parakin.model.legs.length import Length
+from parakin.model.legs.ring import Ring
 from parakin.model.legs.slider import Slider
 
 BASE, MOVED, OWN, OTHER = "0.55", "#0072b2", "black", "#d55e00"  # readable for colour-blind people
@@ -66,6 +68,22 @@ def draw_length(axes: Axes) -> None:
     write(axes, 150, -165, "q, the length")
     write(axes, point[0], point[2], "platform", MOVED)
     mark_platform(axes, point)
+
+
+def draw_ring(axes: Axes) -> None:
+    centre = Point((330.0, 0.0, -330.0))
+    leg = Ring(make_drives("mm"), Point((0.0, 0.0, 0.0)), foot=ORIGIN, radius=Size(110.0))
+    point = leg.place_joint(IDENTITY, centre)
+    draw_struts(axes, leg, point, "", OWN)
+    axes.plot([330, 330], [-60, -480], color=BASE, lw=1, ls="-.")
+    axes.plot([220, 440], [-330, -330], color=MOVED, lw=3)
+    axes.plot(point[0], point[2], "o", color=MOVED, ms=7)
+    write(axes, 0, 0, "foot")
+    write(axes, 110, -165, "q, the length", where="right")
+    write(axes, 330, -85, "the tool's axis", BASE)
+    draw_arrow(axes, (330, -375), (220, -375), "radius")
+    write(axes, 440, -330, "platform, the ring's centre", MOVED)
+    mark_platform(axes, centre)
 
 
 def draw_slider(axes: Axes) -> None:
@@ -155,7 +173,7 @@ def mark_platform(axes: Axes, point: Point) -> None:
 
 
 FIGURES = {
-    Length: draw_length, Slider: draw_slider, Crank: draw_crank, Lambda: draw_lambda, Column: draw_column,
+    Length: draw_length, Ring: draw_ring, Slider: draw_slider, Crank: draw_crank, Lambda: draw_lambda, Column: draw_column,
 }  # fmt: skip
 
 

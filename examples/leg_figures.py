@@ -173,7 +173,8 @@ def mark_platform(axes: Axes, point: Point) -> None:
 
 
 FIGURES = {
-    Length: draw_length, Ring: draw_ring, Slider: draw_slider, Crank: draw_crank, Lambda: draw_lambda, Column: draw_column,
+    Length: draw_length, Ring: draw_ring,
+    Slider: draw_slider, Crank: draw_crank, Lambda: draw_lambda, Column: draw_column,
 }  # fmt: skip
 
 

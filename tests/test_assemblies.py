@@ -9,12 +9,12 @@ from geometry import Description
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from independent import orientation, tool_axis
-from shipped import REPRESENTATIVES
+from shipped import ASSEMBLED, REPRESENTATIVES
 from test_conformance import poses_about, signed
 
 import parakin as pk
 
-COMPLETE = REPRESENTATIVES
+COMPLETE = [name for name in REPRESENTATIVES if name in ASSEMBLED]
 TABLE_I = [  # the joint vectors of the Lambda machine's paper
     (398.89, 299.68, 414.67, 1758.75, 1714.02, 1723.08),
     (164.59, 223.16, 467.37, 1587.58, 1565.02, 1514.00),

@@ -66,7 +66,7 @@ def test_it_undoes_the_inverse_from_a_pose_nearby(m, method):
     found = m.forward(joints, near=nudged(m, poses), method=method)
     _, least = legs_regularity(m, poses)
     regular = least > 0.02  # nearer to a singularity the start may lie beyond it
-    assert regular.mean() > 0.9
+    assert regular.mean() > (0.7 if m.name == "pentapod" else 0.9)  # its rings are near each other
     place, angle = errors(m, found.poses, poses)
     assert found.converged[regular].all()
     assert place[regular].max() < 1e-9

@@ -159,13 +159,17 @@ class Equations:
         return [c * (1.0 / size) for c, size in zip(closures, self.sizes, strict=True)]
 
     def compute_pose(self, coordinates: Sequence[Scalar], joints: Sequence[Scalar]) -> list[Scalar]:
-        """Compute the pose; NaN where a leg closes otherwise than it is built, as a strut of negative length does."""
+        """Compute the pose; NaN where a leg closes otherwise than it is built, as a strut of negative length does.
+
+        NaN too where coordinates write a frame a second way, in which their determinant has the other sign.
+        """
         first, *others = self.structure.pose(coordinates, self.list_serial(joints))
         points = compute_platform_points(self.spec, *self.structure.frame(coordinates))
         given = group_joints_by_leg(self.spec, joints)
         margins = [
             m for leg, p, q in zip(self.spec.legs, points, given, strict=True) for m in leg.assembly_margins(p, q)
         ]
+        margins += self.structure.list_coordinate_margins(coordinates)
         if margins:
             first = minimum(first, FAR + sqrt(reduce(minimum, margins)))
         return [first, *others]

@@ -162,6 +162,10 @@ class Structure(ABC):
     def pose(self, coordinates: Sequence[Scalar], serial: Sequence[Scalar]) -> list[Scalar]:
         """Compute the tool's pose; at a vertical tool axis C is 0."""
 
+    def list_coordinate_margins(self, coordinates: Sequence[Scalar]) -> list[Scalar]:
+        """List margins ≥ 0 within which the coordinates write each frame once and keep their determinant's sign."""
+        return []
+
     @abstractmethod
     def closure(
         self, pose: Sequence[Scalar], serial: Sequence[Scalar], turn: Sequence[Scalar] = ()

@@ -63,6 +63,9 @@ class FiveAxisPlatform(FiveAxis):
         tip = add(apply(self.mount, add(origin, scale(z, self.tip[2]))), self.base)
         return [*tip, *compute_axis_angles(apply(self.mount, z))]
 
+    def list_coordinate_margins(self, coordinates: Sequence[Scalar]) -> list[Scalar]:
+        return [sincos(coordinates[4])[1]]
+
     def closure(
         self, pose: Sequence[Scalar], serial: Sequence[Scalar], turn: Sequence[Scalar] = ()
     ) -> tuple[Mat, Vec, list[Scalar]]:

@@ -120,6 +120,10 @@ class SlidingTable(FiveAxis):
         _, place = compose_chain(self.spec.table, serial)
         return [*transform_to_local(self.table_rotation, place, world), *compute_axis_angles(k)]
 
+    def list_coordinate_margins(self, coordinates: Sequence[Scalar]) -> list[Scalar]:
+        given = dict(zip(self.coordinates, coordinates, strict=True))
+        return [sincos(given[self.turn_words[1]])[1]]
+
     def closure(
         self, pose: Sequence[Scalar], serial: Sequence[Scalar], turn: Sequence[Scalar] = ()
     ) -> tuple[Mat, Vec, list[Scalar]]:

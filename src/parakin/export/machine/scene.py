@@ -14,7 +14,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ...algebra import Scalar
+from ...algebra import IDENTITY, ORIGIN, Scalar
 from ...arguments import RowsLike
 from ...errors import PoseError
 from ...machine import Machine
@@ -235,7 +235,7 @@ class _SceneBuilder:
 
     def _add_platform(self) -> None:
         stance = self.stance
-        order = list_polygon((np.array(stance.points, float) - stance.origin) @ stance.rotation)
+        order = list_polygon(np.array([leg.place_joint(IDENTITY, ORIGIN) for leg in self.machine.legs], float))
 
         def locate_corners(at: _Stance) -> Points:
             return np.array([at.points[i] for i in order])

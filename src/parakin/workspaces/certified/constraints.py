@@ -114,17 +114,19 @@ class TracedPose:
 
         With a central leg the rotation follows from the position, and near the axis of its first turn the rotation has
         no bounds; on a table that turns all round the workpiece's position tells little of the machine's. There this
-        still bounds the machine's reach.
+        still bounds the machine's reach. So it does where a ring's joint is anywhere, its foot being on the axis.
         """
         structure = self.machine.structure
         is_table_swept = bool(self.swept_axes) and structure.has_turning_table
-        if not structure.carries_pole and not is_table_swept:
+        has_rings = any(leg.find_fixed_joint() is None for leg in self.machine.legs)
+        is_far = structure.carries_pole or has_rings
+        if not is_far and not is_table_swept:
             return []
         with np.errstate(all="ignore"):
             _, platform, _ = self.machine.trace_inverse(self.pose, self.mode)
         margins, shifts = [], structure.bound_shift()
         for name, middle, most in self._list_reach_spheres(without):
-            if structure.carries_pole:
+            if is_far:
                 margins.append((name, most - norm(sub(platform.origin, middle.tolist()))))
             if is_table_swept and isfinite(shifts):  # turns keep lengths, and each shift adds at most its own
                 tip = [value for axis, value in zip(self.machine.axes, self.pose, strict=True) if axis in "XYZ"]

@@ -24,6 +24,7 @@ class ForeignMachine:
     kinematics : the program's name of its kinematics
     side : on which side of the base the platform works, 1 above, -1 below, 0 either
     level : height of the base, mm
+    turning_axes : names of the pose's angles
     """
 
     program: str
@@ -33,6 +34,7 @@ class ForeignMachine:
     legs: tuple[Leg, ...]
     side: int = 0
     level: float = 0.0
+    turning_axes: tuple[str, ...] = ()
 
 
 def format_machine_yaml(machine: ForeignMachine, name: str) -> str:
@@ -42,8 +44,7 @@ def format_machine_yaml(machine: ForeignMachine, name: str) -> str:
     """
     size = _measure_size(machine)
     x, y, z = _find_home(machine, size)
-    letters = {3: "", 5: "BC", 6: "ABC"}[len(machine.motion.split())]
-    turns = "".join(f", {letter}: 0 deg" for letter in letters)
+    turns = "".join(f", {letter}: 0 deg" for letter in machine.turning_axes)
     return "\n".join(
         [
             f"# {machine.kinematics} of {machine.program}, as its configuration has it.",

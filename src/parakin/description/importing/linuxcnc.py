@@ -153,7 +153,9 @@ def _build_genhexkins(given: _Configuration) -> ForeignMachine:
         Length((given.make_drive(i, "mm"),), read_point("platform", i, _PLATFORM[i]), read_point("base", i, _BASE[i]))
         for i in range(6)
     )
-    return ForeignMachine("LinuxCNC", "genhexkins", given.source, "tx ty tz rz ry rx", legs, side=1)
+    return ForeignMachine(
+        "LinuxCNC", "genhexkins", given.source, "tx ty tz rz ry rx", legs, side=1, turning_axes=("A", "B", "C")
+    )
 
 
 def _build_pentakins(given: _Configuration) -> ForeignMachine:
@@ -170,7 +172,16 @@ def _build_pentakins(given: _Configuration) -> ForeignMachine:
         foot = Point((given.unit * x, given.unit * y, given.unit * (z + shift)))
         legs.append(Ring((given.make_drive(i, "mm"),), centre, foot, Size(given.unit * radius)))
     level = sum(leg.foot[2] for leg in legs) / len(legs)
-    return ForeignMachine("LinuxCNC", "pentakins", given.source, "tx ty tz ry rx", tuple(legs), side=-1, level=level)
+    return ForeignMachine(
+        "LinuxCNC",
+        "pentakins",
+        given.source,
+        "tx ty tz ry rx",
+        tuple(legs),
+        side=-1,
+        level=level,
+        turning_axes=("B", "C"),
+    )
 
 
 def _build_tripodkins(given: _Configuration) -> ForeignMachine:

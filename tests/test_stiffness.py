@@ -104,6 +104,7 @@ STIFF = {
     "orthoglide5_head": {"rho*": "100 N/um", "*": "50 kNm/rad"},
     "orthoglide5_table": {"rho*": "100 N/um", "*": "50 kNm/rad"},
     "sprint_z3": {"*": "100 N/um"},
+    "pentapod": {"*": "100 N/um"},
     "rpr3": {"*": "100 N/um"},
 }
 
@@ -113,7 +114,7 @@ def test_the_direct_problem_of_machines_that_give_way(name):
     """Forces on the springs by differences of the direct problem; its answer with all numbers off by what they give."""
     machine = pk.load(name)
     pose = draw_poses(machine, 1)[0]
-    rods = [leg for leg in machine.legs if leg.kind != "length"]
+    rods = [leg for leg in machine.legs if leg.kind not in ("length", "ring")]
     family = pk.family(machine, ["encoders", *(f"legs.{leg.drives[0].name}.rod" for leg in rods)])
     joints = machine.inverse(pose)
     offsets = {f"joints.{joint}.offset": i for i, joint in enumerate(machine.joints)}

@@ -211,7 +211,7 @@ def _list_lambda(at: StrutColumns, struts: Section | float) -> _LegSprings:
     ]
 
 
-_KINDS = {"length": _list_length, "slider": _list_rod, "crank": _list_rod, "lambda": _list_lambda}
+_KINDS = {"length": _list_length, "ring": _list_length, "slider": _list_rod, "crank": _list_rod, "lambda": _list_lambda}
 
 
 def read_springs(

@@ -178,7 +178,7 @@ def _format_stiffness(result: Stiffness, force: Array | None) -> str:
         f"{machine.name}: the tip's stiffness, N/um, at {len(result.poses)} poses\n",
         format_table(rows, ["", "at the worst", "5 % are below", "half are below"], " rrr"),
         "",
-        "frame, platform, and what guides it without a drive count as rigid: a real machine is softer",
+        "frame, platform, arms of cranks, and what guides without a drive count as rigid: a real machine is softer",
         f"least at {_format_pose(machine, result.poses[int(result.least.argmin())])}",
         f"of the compliance the drives make {100.0 * float(np.mean(result.drive_share)):.0f} %",
     ]

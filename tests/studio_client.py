@@ -61,8 +61,8 @@ class StudioClient:
 
 
 @contextmanager
-def run_studio(folder, *words):
-    """Run ``parakin studio`` in a folder; ends it as Ctrl-C does, and it must end well."""
+def run_studio(folder, *words, end=signal.SIGINT):
+    """Run ``parakin studio`` in a folder; ends it by a signal, and it must end well."""
     process = subprocess.Popen(
         [sys.executable, "-m", "parakin", "studio", "--no-browser", *words],
         cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True,
@@ -73,7 +73,7 @@ def run_studio(folder, *words):
         address = re.search(r"http://127\.0\.0\.1:\d+/[\w-]{32}/", line)
         assert address, line + process.stderr.read()
         yield StudioClient(address[0])
-        process.send_signal(signal.SIGINT)
+        process.send_signal(end)
         _, errors = process.communicate(timeout=20)
         assert (process.returncode, errors) == (0, "")
     finally:

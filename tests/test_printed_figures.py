@@ -21,7 +21,9 @@ SVG = "{http://www.w3.org/2000/svg}"
 def test_a_figure_for_a_page(command, tmp_path, capsys):
     path = tmp_path / "figure.svg"
     assert main([*command, "-o", str(path)]) == 0
-    capsys.readouterr()
+    said = capsys.readouterr().out
+    if command[0] == "atlas":
+        assert "hbg80_2d: performance, constant orientation" in said  # what a caption needs
     root = ElementTree.parse(path).getroot()
     assert 60.0 < float(root.get("width").removesuffix("pt")) / 72.0 * 25.4 <= 200.0  # mm, of a page
     texts = list(root.iter(f"{SVG}text"))

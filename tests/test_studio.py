@@ -1,6 +1,7 @@
 """The studio answers only its own page, runs what its forms say and nothing else, and its page works in Chromium."""
 
 import json
+import signal
 import socket
 import time
 from pathlib import Path
@@ -59,6 +60,8 @@ def test_a_line_is_what_was_filled_in():
         ("inverse", {"NAME": "tricept", "VALUES": ["--json"]}, "read as an option"),
         ("inverse", {"NAME": "tricept", "--csv": "/etc/passwd"}, "not a plain file name"),
         ("inverse", {"NAME": "tricept", "--output": "a/../../b"}, "not a plain file name"),
+        ("workspace", {"NAME": "tricept", "--output": ["a.svg", "/tmp/b.svg"]}, "not a plain file name"),
+        ("inverse", {"NAME": "tricept", "--mode": ["+", "-"]}, "one value"),
         ("inverse", {"NAME": "tricept", "--install-completion": True}, "no parameter"),
         ("inverse", {"NAME": "tricept", "--mode": "a" * 3000}, "at most 2000"),
         ("inverse", {"NAME": "tricept", "--mode": "a\nb"}, "a text"),
@@ -132,6 +135,47 @@ def test_no_file_is_written_elsewhere(studio, name):
     assert [file["name"] for file in studio.ask(f"sessions/{session}/files")[1]["files"]] == ["own.yaml", "part.apt"]
 
 
+def test_no_upload_is_run_as_code(studio):
+    session = studio.open_session()
+    for name in ("parakin.py", "numpy.py", "sitecustomize.py"):
+        assert studio.put_file(session, name, "raise SystemExit('code of an upload')")[0] == 200
+    told = studio.run(session, "machines", {})
+    assert (told["code"], "orthoglide" in told["output"]) == (0, True)
+
+
+def test_no_upload_leads_to_files_elsewhere(studio, tmp_path):
+    (tmp_path / "secret.hal").write_text("setp genhexkins.base.0.x SECRET\n")
+    session = studio.open_session()
+    ini = f"[KINS]\nKINEMATICS = genhexkins\n[TRAJ]\nLINEAR_UNITS = mm\n[HAL]\nHALFILE = {tmp_path}/secret.hal\n"
+    studio.put_file(session, "machine.ini", ini)
+    told = studio.run(session, "import", {"FILE": "machine.ini"})
+    assert told["code"] == 2
+    assert "outside" in told["errors"]
+    assert "SECRET" not in told["errors"]
+
+
+def test_a_folder_is_no_file(studio):
+    session = studio.open_session()
+    assert studio.run(session, "linuxcnc", {"NAME": "linear_delta", "--output": "lc"})["code"] == 0
+    before = studio.ask(f"sessions/{session}/files")
+    assert studio.put_file(session, "lc", "x")[0] == 400
+    assert studio.ask(f"sessions/{session}/files") == before
+
+
+def test_names_that_people_give(studio):
+    session = studio.open_session()
+    for name in ("part (1).cls", "Größe.nc"):
+        assert studio.put_file(session, name, PART)[0] == 200
+    assert studio.run(session, "post", {"PART": "part (1).cls", "--machine": "own.yaml"})["code"] == 0
+
+
+def test_a_closed_terminal_ends_it(tmp_path):
+    with run_studio(tmp_path, end=signal.SIGHUP) as client:
+        session = client.open_session()
+        client.begin_run(session, "workspace", {"NAME": "hexapod", "--gap": "0.0001", "--time": "600"})
+    assert not list(tmp_path.iterdir())
+
+
 def test_a_large_upload_is_refused(studio):
     session = studio.open_session()
     status, answer = studio.put_file(session, "large.cls", b"x" * (64 * 2**20 + 1))
@@ -192,7 +236,7 @@ def test_bad_arguments_are_one_line(capsys, tmp_path, monkeypatch):
     for words, said in (
         (["nothing"], "unknown machine"),
         (["tricept", "nothing.cls"], "nothing.cls"),
-        (["tricept", ".hidden.cls"], "file's name"),
+        (["tricept", ".hidden.cls"], "plain file name"),
         (["--port", "70000"], "--port"),
         (["--port", "-1"], "--port"),
     ):
@@ -250,10 +294,14 @@ def test_the_page_in_a_browser(studio):
         tab.fill("#text", text.replace("kind: length", "kind: lenght", 1))
         tab.click("#save")
         wait_until(tab, "getSelection().toString().includes('lenght')", 20.0)  # the line that the error names
-        assert "mine.yaml:" in tab.inner_text("#runs")
+        assert ".yaml:" in tab.inner_text("#runs .run pre")
         tab.fill("#text", text)
         tab.click("#save")
-        wait_until(tab, "studio.findFrame('mine.yaml') !== null", 20.0)
+        wait_until(tab, "studio.findFrame('my_own.yaml') !== null || studio.findFrame('own.yaml') !== null", 20.0)
+        runs = tab.evaluate("document.querySelectorAll('.run').length")
+        tab.reload()
+        wait_until(tab, "document.body.dataset.ready === 'yes'", 40.0)
+        assert tab.evaluate("document.querySelectorAll('.run').length") >= runs  # the same session
 
 
 @needs_chromium

@@ -103,10 +103,9 @@ def atlas(
             results.prove_box(ranges, bounds, progress)
         if files is not None or not (ranges or pose):
             results.compute_atlas(apart, progress)
-        written = {}
-        if files is not None and results.atlas is not None:
-            written = files.write(results.atlas, [results.map_slice(cut, apart) for cut in cuts])
-    results.print(json, written)
+        if files is not None:
+            results.write_maps(files, cuts, apart)
+    results.print(json)
     return OFF_LIMITS if results.refused else 0
 
 
@@ -170,6 +169,8 @@ class _AtlasResults:
         self.proofs: list[Proof] = []
         self.brackets: Sequence[Bracket] = ()
         self.atlas: Atlas | None = None
+        self.maps: list[PerformanceMap] = []
+        self.written: dict[str, str] = {}
 
     def examine_pose(self, pose: Array) -> None:
         from ..performance.indices import compute_performance
@@ -206,7 +207,12 @@ class _AtlasResults:
         report = progress.stage("looking at the workspace", 0.0, 1.0)
         self.atlas = atlas(self.region, step, self.length, report, self.seconds)
 
-    def map_slice(self, cut: Region, step: float | None) -> PerformanceMap:
+    def write_maps(self, files: AtlasFiles, cuts: Sequence[Region], step: float | None) -> None:
+        assert self.atlas is not None
+        self.maps = [self._map_slice(cut, step) for cut in cuts]
+        self.written = files.write(self.atlas, self.maps)
+
+    def _map_slice(self, cut: Region, step: float | None) -> PerformanceMap:
         from ..performance.atlas import map_performance
 
         assert self.atlas is not None
@@ -229,10 +235,10 @@ class _AtlasResults:
     def refused(self) -> bool:
         return bool(self.broken_limit) or any(proof.verdict == "refuted" for proof in self.proofs)
 
-    def print(self, json: bool, written: dict[str, str]) -> None:
+    def print(self, json: bool) -> None:
         """Print the results, as JSON or as text, and the files written."""
         if json:
-            print_json(self._encode(written))
+            print_json(self._encode())
             return
         paragraphs = []
         if self.performance is not None:
@@ -241,11 +247,14 @@ class _AtlasResults:
             paragraphs.append(format_proofs(self.machine, self.ranges, self.proofs, self.brackets))
         if self.atlas is not None:
             paragraphs.append(format_atlas(self.atlas))
-        if written:
-            paragraphs.append("\n".join(f"{kind:<7} {path}" for kind, path in written.items()))
+        if self.written:
+            from ..export.atlas_maps import describe_map
+
+            lines = [f"{kind:<7} {path}" for kind, path in self.written.items()]
+            paragraphs.append("\n".join([*lines, *map(describe_map, self.maps)]))
         print_text("\n\n".join(paragraphs))
 
-    def _encode(self, written: dict[str, str]) -> dict[str, Any]:
+    def _encode(self) -> dict[str, Any]:
         machine, fixed = self.machine, self.region.fixed_axes
         units = dict(zip(machine.axes, machine.axis_units, strict=True))
         proofs = encode_proofs(machine, self.ranges, self.proofs, self.brackets) if self.ranges else None
@@ -258,5 +267,5 @@ class _AtlasResults:
             "pose": None if self.performance is None else encode_performance(self.performance, self.broken_limit),
             "box": proofs,
             "region": None if self.atlas is None else encode_atlas(self.atlas),
-            "files": written,
+            "files": self.written,
         }

@@ -62,7 +62,7 @@ def show(
     json: Json = False,
     sizes: Sizes = None,
 ) -> int:
-    """A machine's sizes, drives, limits and home, and its picture in 3D.
+    """A machine's sizes, drives, limits and home, and the page on which it moves.
 
     Parameters
     ----------

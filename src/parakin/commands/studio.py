@@ -11,7 +11,7 @@ from typing import Annotated
 from cyclopts import App, Parameter
 
 from ..errors import InputError
-from ..studio.forms import FILE_NAME, list_forms
+from ..studio.forms import FILE_NAME, FILE_NAME_WORDS, list_forms
 from .console import print_text
 from .options import complete_machine, load_machine
 
@@ -54,15 +54,15 @@ def make_studio_command(app: App) -> Callable[..., int]:
             raise InputError("no such file", str(part))
         for path in given:
             if not FILE_NAME.fullmatch(path.name):
-                raise InputError("expected a file's name of letters, digits, blanks and . _ -", str(path))
+                raise InputError(f"expected {FILE_NAME_WORDS}", str(path))
         start = {"machine": Path(name).name, "part": "" if part is None else part.name}
         forms = list_forms(app, left_out=("studio",))
 
-        def announce(address: str) -> None:
+        def announce(address: str, way: Path) -> None:
             print_text(f"parakin studio: {address}\nCtrl-C ends it.")
             sys.stdout.flush()
             if not no_browser:
-                webbrowser.open(address)
+                webbrowser.open(way.as_uri())
 
         serve(forms, machines(), start, given, port, announce)
         return 0

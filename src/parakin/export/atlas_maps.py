@@ -63,15 +63,20 @@ def _draw_map(figure: Figure, map_: PerformanceMap, marks: Array) -> None:
         axes.plot(*marks[:, columns].T, "+", color="#d50000", markersize=9, markeredgewidth=1.6, linestyle="none")
 
 
+def describe_map(map_: PerformanceMap) -> str:
+    """Describe what a map shows, in a line: its machine, its slice, and the length by which angles count."""
+    text = f"{map_.region.machine.name}: performance, {describe_region(map_.region)}"
+    if map_.performance.length.value is not None:
+        text += f"; characteristic length {map_.performance.length.value:.6g} mm"
+    return text
+
+
 def _add_heading(figure: Figure, map_: PerformanceMap) -> None:
     machine = map_.region.machine
     figure.text(
         0.03, 0.955, machine.spec.title or machine.name, color=INK, fontsize=15, weight="bold", parse_math=False
     )
-    what = f"{machine.name}: performance, {describe_region(map_.region)}"
-    if map_.performance.length.value is not None:
-        what += f"; characteristic length {map_.performance.length.value:.6g} mm"
-    figure.text(0.03, 0.92, what, color=_GREY, fontsize=10.5, parse_math=False)
+    figure.text(0.03, 0.92, describe_map(map_), color=_GREY, fontsize=10.5, parse_math=False)
 
 
 def _list_panels(map_: PerformanceMap) -> list[_MapPanel]:

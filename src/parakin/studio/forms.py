@@ -14,18 +14,19 @@ from cyclopts.argument import Argument
 from ..errors import InputError, quote
 
 # A file's name without its folder: nothing outside the page's own folder is read or written.
-FILE_NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9._ -]{0,79}")
+FILE_NAME = re.compile(r"\w[\w.()+,@ -]{0,79}")
+FILE_NAME_WORDS = "a plain file name of letters, digits, blanks and . ( ) + , @ _ -"
 _NUMBER = re.compile(r"-?\.?\d")
 _LONGEST = 2000  # characters of a value
 _HIDDEN = {"--json"}
 _MACHINE = {"NAME", "--machine"}  # a shipped machine's name or a file
 
-Kind = Literal["machine", "file", "flag", "choice", "text", "texts"]
+Kind = Literal["machine", "file", "flag", "choice", "text"]
 
 
 @dataclass(frozen=True)
 class Field:
-    """A parameter of a command: its name on the command line, and how it is filled in."""
+    """A parameter of a command: its name on the line, how it is filled in, and whether it may be given again."""
 
     name: str
     kind: Kind
@@ -33,6 +34,7 @@ class Field:
     help: str
     default: str
     choices: tuple[str, ...] = ()
+    many: bool = False
 
     @property
     def is_positional(self) -> bool:
@@ -71,20 +73,23 @@ def _make_field(argument: Argument) -> Field:
         " ".join((argument.parameter.help or "").split()),
         str(shown),
         tuple(argument.get_choices() or ()),
+        argument.token_count()[1],
     )
 
 
 def _find_kind(argument: Argument) -> Kind:
-    types = set(get_args(argument.hint)) or {argument.hint}
     if argument.name in _MACHINE:
         return "machine"
-    if Path in types:
+    if Path in _list_types(argument.hint):
         return "file"
     if argument.hint is bool:
         return "flag"
-    if argument.get_choices():
-        return "choice"
-    return "texts" if argument.token_count()[1] else "text"
+    return "choice" if argument.get_choices() else "text"
+
+
+def _list_types(hint: Any) -> set[Any]:
+    """List the types in a type hint, those of lists and unions too."""
+    return {hint}.union(*(_list_types(inner) for inner in get_args(hint) if not isinstance(inner, str)))
 
 
 def write_line(form: Form, values: Mapping[str, Any]) -> list[str]:
@@ -116,13 +121,15 @@ def _list_values(form: Form, field: Field, value: Any) -> list[str]:
     if not all(isinstance(text, str) and len(text) <= _LONGEST and text.isprintable() for text in texts):
         raise InputError(f"{form.command} {field.name}: a text of at most {_LONGEST} characters expected")
     given = [text.strip() for text in texts if text.strip()]
-    if field.kind == "texts":
-        given = [word for text in given for word in (text.split() if field.is_positional else [text])]
+    if field.many and field.is_positional:
+        given = [word for text in given for word in text.split()]
+    if len(given) > 1 and not field.many:
+        raise InputError(f"{form.command} {field.name}: one value expected")
     if field.required and not given:
         raise InputError(f"{form.command}: {field.name} is missing")
     for text in given:
         if field.kind in ("machine", "file") and not FILE_NAME.fullmatch(text) and text != field.default:
-            raise InputError(f"{form.command} {field.name}: {quote(text)} is not a plain file name")
+            raise InputError(f"{form.command} {field.name}: {quote(text)} is not {FILE_NAME_WORDS}")
         if field.is_positional and text.startswith("-") and not _NUMBER.match(text):
             raise InputError(f"{form.command} {field.name}: {quote(text)} would be read as an option")
         if field.kind == "choice" and text not in field.choices:

@@ -93,7 +93,7 @@ class RunQueue:
 
     async def _run_process(self, run: Run) -> None:
         process = await asyncio.create_subprocess_exec(
-            sys.executable, "-m", "parakin", *run.words,
+            sys.executable, "-P", "-m", "parakin", *run.words,  # -P: a file in the folder is no module
             cwd=run.folder, stdin=asyncio.subprocess.DEVNULL, stdout=asyncio.subprocess.PIPE,
             stderr=asyncio.subprocess.PIPE, start_new_session=True,
             env={**os.environ, "COLUMNS": "100", "NO_COLOR": "1"},

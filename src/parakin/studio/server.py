@@ -5,8 +5,10 @@ from __future__ import annotations
 import asyncio
 import json
 import secrets
+import signal
 import socket
 import tempfile
+import threading
 from collections.abc import AsyncIterator, Awaitable, Callable, Mapping, Sequence
 from contextlib import asynccontextmanager, suppress
 from dataclasses import asdict
@@ -62,6 +64,7 @@ class Studio:
             Route(f"{in_session}/files/{{name:path}}", self._answer(self._send_file)),
             Route(f"{in_session}/files/{{name:path}}", self._answer(self._take_file), methods=["PUT"]),
             Route(f"{in_session}/page/{{name:path}}", self._answer(self._send_page)),
+            Route(f"{in_session}/runs", self._answer(self._list_runs)),
             Route(f"{in_session}/runs", self._answer(self._begin_run), methods=["POST"]),
             Route(f"{in_session}/runs/{{run:int}}", self._answer(self._tell_run)),
             Route(f"{in_session}/runs/{{run:int}}", self._answer(self._cancel_run), methods=["DELETE"]),
@@ -135,6 +138,10 @@ class Studio:
         session.write_file(name, bytes(content))
         return JSONResponse({"name": name, "size": len(content)})
 
+    async def _list_runs(self, request: Request) -> Response:
+        runs = self._find_session(request).runs
+        return JSONResponse({"runs": [{"run": number, "line": run.line} for number, run in runs.items()]})
+
     async def _begin_run(self, request: Request) -> Response:
         session, content = self._find_session(request), await _read_json(request)
         form = self._forms.get(str(content.get("command")))
@@ -191,13 +198,14 @@ def serve(
     start: Mapping[str, str],
     given: Sequence[Path],
     port: int,
-    announce: Callable[[str], None],
+    announce: Callable[[str, Path], None],
 ) -> None:
-    """Serve a studio on this computer until it is interrupted.
+    """Serve a studio on this computer until it is interrupted, or its terminal is closed.
 
     given : files that every page begins with copies of
     port : 0 for a free one
-    announce : called with the address once it listens
+    announce : called with the address once it listens, and with a file, for this user only, that leads there: what is
+        given to a browser as an argument others can see
     """
     with tempfile.TemporaryDirectory(prefix="parakin_studio_") as folder, socket.socket() as listener:
         listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
@@ -212,6 +220,26 @@ def serve(
         studio = Studio(forms, machines, start, Sessions(Path(folder), given))
         guarded = Guard(studio.make_application(), token, own_port)
         config = uvicorn.Config(guarded, log_level="error", access_log=False, ws="none", server_header=False)
-        announce(f"http://{LOOPBACK}:{own_port}/{token}/")
+        server, address = uvicorn.Server(config), f"http://{LOOPBACK}:{own_port}/{token}/"
+        _end_with_terminal(server)
+        announce(address, _write_way(Path(folder), address))
         with suppress(KeyboardInterrupt):
-            asyncio.run(uvicorn.Server(config).serve(sockets=[listener]))
+            asyncio.run(server.serve(sockets=[listener]))
+
+
+def _end_with_terminal(server: uvicorn.Server) -> None:
+    """End a server where its terminal is closed, so that its runs and files do not stay."""
+
+    def end(number: int, frame: object) -> None:
+        server.should_exit = True
+
+    if hasattr(signal, "SIGHUP") and threading.current_thread() is threading.main_thread():
+        signal.signal(signal.SIGHUP, end)
+
+
+def _write_way(folder: Path, address: str) -> Path:
+    """Write a page that leads to an address."""
+    path = folder / "parakin_studio.html"
+    path.touch(mode=0o600)
+    path.write_text(f'<meta http-equiv="refresh" content="0; url={address}"><a href="{address}">parakin studio</a>')
+    return path

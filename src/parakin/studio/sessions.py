@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from ..errors import InputError, quote
-from .forms import FILE_NAME
+from .forms import FILE_NAME, FILE_NAME_WORDS
 from .runs import Run
 
 _MOST_SESSIONS = 20
@@ -58,7 +58,7 @@ class Session:
         """
         words = name.split("/")
         if not all(FILE_NAME.fullmatch(word) and not word.endswith((".", " ")) for word in words):
-            raise InputError(f"{quote(name)} is not a plain file name")
+            raise InputError(f"{quote(name)} is not {FILE_NAME_WORDS}")
         path = self.folder.joinpath(*words)
         if not path.resolve().is_relative_to(self.folder.resolve()):
             raise InputError(f"{quote(name)} leads out of the session's folder")
@@ -77,8 +77,8 @@ class Session:
     def write_file(self, name: str, content: bytes) -> None:
         """Write a file whole."""
         path = self.find_file(name)
-        if len(path.relative_to(self.folder).parts) != 1:
-            raise InputError(f"{quote(name)} is not a plain file name")
+        if len(path.relative_to(self.folder).parts) != 1 or path.is_dir():
+            raise InputError(f"{quote(name)} is not {FILE_NAME_WORDS}, or is a folder")
         if sum(file.size for file in self.list_files()) + len(content) > _MOST_BYTES:
             raise InputError(f"{quote(name)}: the session's files would be more than {_MOST_BYTES >> 20} MiB")
         half = path.with_name(f".{path.name}.half")

@@ -2,7 +2,7 @@
 // The studio's page: forms of the commands, their runs, files, and the machines' own pages in frames.
 
 const element = id => document.getElementById(id);
-const state = {session: "", commands: [], machines: [], files: [], pages: {}, form: {}};
+const state = {session: "", commands: [], machines: [], files: [], workpieces: {}, edited: "", changed: false};
 
 async function ask(path, options = {}) {
   const response = await fetch(path, options);
@@ -96,8 +96,9 @@ const findFrame = name => element("stage").querySelector(`iframe[data-machine="$
 const chosenMachines = () => [element("machine").value, element("second").value].filter((name, i, all) => name && all.indexOf(name) === i);
 
 // Show a page in the place of a machine's own.
-function showPage(name, file) {
+function showPage(name, file, act = () => {}) {
   const frame = make("iframe", {title: name, src: inSession(`page/${escapeName(file)}`)});
+  frame.onload = () => { if (frame.contentWindow.parakin) act(frame.contentWindow.parakin); };
   frame.dataset.machine = name;
   const old = findFrame(name);
   if (old) old.replaceWith(frame);
@@ -139,19 +140,26 @@ function readPose(name) {
 }
 
 async function showMachineFile() {
-  const {number} = await beginRun("show", {NAME: element("machine").value, "--yaml": true});
+  const name = element("machine").value;
+  if (state.changed || state.edited === name) return;
+  state.edited = name;
+  const {number} = await beginRun("show", {NAME: name, "--yaml": true});
   const result = await followRun(number);
+  if (state.edited !== name) return;
   element("text").value = result.code === 0 ? result.output : result.errors;
+  element("text-name").value = ownMachines().includes(name) ? name : `my_${name}.yaml`;
 }
 
 async function saveMachineFile() {
-  const name = element("text-name").value.trim();
+  const typed = element("text-name").value.trim(), name = /\.ya?ml$/.test(typed) ? typed : `${typed}.yaml`;
   try {
     await ask(inSession(`files/${escapeName(name)}`), {method: "PUT", body: element("text").value});
   } catch (error) {
     element("runs").prepend(make("p", {className: "bad state", textContent: error.message}));
     return;
   }
+  Object.assign(state, {edited: name, changed: false});
+  element("text-name").value = name;
   await refreshFiles();
   findFrame(name)?.remove();
   element("machine").value = name;
@@ -176,6 +184,7 @@ function showForm() {
 
 function makeInput(field) {
   if (field.kind === "flag") return make("input", {type: "checkbox"});
+  if (field.many && field.name.startsWith("-")) return make("textarea", {className: "many", placeholder: "one a line"});
   if (field.kind === "choice" || field.kind === "machine" || field.name === "PART") {
     const select = make("select");
     const parts = state.files.map(file => file.name).filter(name => !name.includes("/"));
@@ -200,7 +209,7 @@ function readForm() {
   for (const input of element("form").querySelectorAll("[data-name]")) {
     const value = input.type === "checkbox" ? input.checked : input.value;
     const field = state.commands.find(one => one.command === element("command").value).fields.find(one => one.name === input.dataset.name);
-    if (value && value !== field.default) values[field.name] = field.kind === "texts" ? [value] : value;
+    if (value && value !== field.default) values[field.name] = field.many ? value.split("\n") : value;
   }
   return values;
 }
@@ -253,9 +262,9 @@ async function upload(files) {
 const QUICK = {
   "Workspace": () => refineWorkspace(),
   "Atlas": () => run("atlas", {NAME: element("machine").value, "--output": "atlas.svg"}),
-  "Post the part": () => postPart({}),
-  "Place it for me": () => postPart({"--place": makeRanges()}),
-  "Part at the tool": () => postPart({"--workpiece": findTip().map(([axis, value]) => `${axis}=${value}`).join(",")}),
+  "Post the part": () => postPart(name => state.workpieces[`${name} ${element("part").value}`]),
+  "Place it for me": () => postPart(name => ({"--place": makeRanges(name)})),
+  "Part at the tool": () => postPart(name => ({"--workpiece": findTip(name).map(([axis, value]) => `${axis}=${value}`).join(",")})),
   "LinuxCNC": () => run("linuxcnc", {NAME: element("machine").value, "--output": "linuxcnc"}),
 };
 
@@ -284,33 +293,53 @@ function findTip(name = element("machine").value) {
   return (readPose(name) || []).map(text => text.split("=")).filter(([axis]) => "XYZ".includes(axis));
 }
 
-const makeRanges = () => findTip().map(([axis, value]) => `${axis}=${Math.round(+value - 200)}:${Math.round(+value + 200)}`).join(",");
+const makeRanges = name => findTip(name).map(([axis, value]) => `${axis}=${Math.round(+value - 200)}:${Math.round(+value + 200)}`).join(",");
 
-// Post the part on each machine, and play it there.
-async function postPart(options) {
+// Post the part on each machine, and play it there. Where it lies on one is remembered.
+async function postPart(place) {
   const part = element("part").value;
   for (const name of chosenMachines()) {
-    const output = `on_${name.replace(/\.ya?ml$/, "")}`;
+    const output = `on_${name.replace(/\.ya?ml$/, "")}`, options = place(name) || {};
     const result = await run("post", {PART: part, "--machine": name, "--output": output, "--page": true, ...options});
+    if (!result) return;
+    const best = result.output.match(/^best placement --workpiece (\S+):/m);
+    const workpiece = best ? best[1] : options["--workpiece"];
+    if (workpiece) state.workpieces[`${name} ${part}`] = {"--workpiece": workpiece};
     const page = `${output}/${part.replace(/\.[^.]*$/, "")}.page.html`;
-    if (result && state.files.some(file => file.name === page)) showPage(name, page);
+    if (state.files.some(file => file.name === page)) showPage(name, page, shown => shown.setPlaying(true));
   }
 }
 
 // Start.
 
+// Go on with the session of this tab where it is still there, with its files and runs.
+async function openSession() {
+  const key = `parakin ${location.pathname}`;
+  state.session = sessionStorage.getItem(key) || "none";
+  try {
+    for (const {run, line} of (await ask(inSession("runs"))).runs) followRun(run, showRun(run, line));
+  } catch {
+    state.session = (await ask("sessions", {method: "POST"})).session;
+    sessionStorage.setItem(key, state.session);
+  }
+}
+
 async function start() {
   const described = await ask("commands");
   state.commands = described.commands;
   state.machines = described.machines;
-  state.session = (await ask("sessions", {method: "POST"})).session;
+  await openSession();
   fillSelect(element("machine"), [[described.start.machine, described.start.machine]], described.start.machine);
   await refreshFiles();
   element("machine").value = described.start.machine;
   element("part").value = described.start.part;
   fillSelect(element("command"), state.commands.map(form => [form.command, form.command]), "workspace");
   element("quick").append(...Object.entries(QUICK).map(([text, act]) => make("button", {textContent: text, type: "button", onclick: act})));
-  element("machine").onchange = async () => { showForm(); await showMachines(); };
+  element("machine").onchange = async () => {
+    showForm();
+    if (element("editor").open) showMachineFile();
+    await showMachines();
+  };
   element("second").onchange = showMachines;
   element("part").onchange = showForm;
   element("command").onchange = showForm;
@@ -318,7 +347,8 @@ async function start() {
   element("run").onclick = () => run(element("command").value, readForm());
   element("copy").onclick = () => navigator.clipboard.writeText(element("line").textContent);
   element("save").onclick = saveMachineFile;
-  element("editor").ontoggle = () => { if (element("editor").open && !element("text").value) showMachineFile(); };
+  element("editor").ontoggle = () => { if (element("editor").open) showMachineFile(); };
+  element("text").oninput = () => { state.changed = true; };
   element("upload").onchange = event => upload(event.target.files);
   const drop = element("drop");
   drop.onclick = () => element("upload").click();

@@ -121,10 +121,16 @@ def _parse_hal(text: str, file: str) -> dict[str, tuple[str, str, int]]:
 
 
 def _find_hal_file(folder: Path, name: str) -> Path | None:
-    """Find a HAL file beside the ini file, or in LinuxCNC's library; None for one that is not there, or a program."""
+    """Find a HAL file beside the ini file, or in LinuxCNC's library; None for one that is not there, or a program.
+
+    Raises :class:`InputError` for one elsewhere: an ini file from somebody else opens nothing but what came with it.
+    """
     file = _LIBRARY / name.removeprefix("LIB:") if name.startswith("LIB:") else folder / name
     candidates = [file, _LIBRARY / name]
-    return next((candidate for candidate in candidates if candidate.suffix == ".hal" and candidate.is_file()), None)
+    chosen = next((candidate for candidate in candidates if candidate.suffix == ".hal" and candidate.is_file()), None)
+    if chosen is not None and not any(chosen.resolve().is_relative_to(top.resolve()) for top in (folder, _LIBRARY)):
+        raise InputError(f"HALFILE {quote(name)} is outside of the ini file's folder; copy it there")
+    return chosen
 
 
 def _parse_number(text: str, file: str, line: int | None = None) -> float:

@@ -22,7 +22,7 @@ onClick("home", () => goHome());
 onClick("view", () => { resetOrbit(); requestPicture(); });
 onClick("labels", () => requestPicture());
 onClick("stops", event => { options.stops = event.target.checked; });
-onClick("theme", () => { document.documentElement.classList.toggle("dark"); requestPicture(); });
+onClick("theme", () => { document.documentElement.classList.toggle("dark"); requestPicture(); if (path) drawCurves(); });
 if (window.matchMedia("(prefers-color-scheme: dark)").matches) document.documentElement.classList.add("dark");
 document.addEventListener("keydown", event => {
   if (event.target.matches("input, select, button") || event.ctrlKey || event.metaKey || event.altKey) return;
@@ -50,7 +50,7 @@ function findStrut(drive) {
 
 window.parakin = {
   machine, model, path, player, options, singularity, surface, seek, stateAtTime, stateAtPose, followJoints, marginsAt, findRoot, measureSide, findFreeMotion,
-  moveToPose, moveToJoints, moveToSizes, switchSign, showNextAssembly, searchAssemblies, goHome, showSurface,
+  moveToPose, moveToJoints, moveToSizes, switchSign, showNextAssembly, searchAssemblies, goHome, showSurface, setPlaying,
   tipInPicture: () => findInPicture(handle.position), strutInPicture: drive => findInPicture(findStrut(drive)),
   get state() { return current; }, get stoppedBy() { return stoppedBy; },
 };

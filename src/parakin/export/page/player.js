@@ -41,6 +41,7 @@ function buildOffences() {
   const section = addSection("Path");
   section.append(makeElement("p", {className: "note", textContent: `${path.source}: ${path.records} records${path.timed ? `, ${formatTime(path.end)}` : ", not timed"}.`}));
   if (!path.offences.length) section.append(makeElement("p", {className: "note", textContent: "It keeps every limit."}));
+  else section.append(makeElement("p", {className: "note", textContent: "The worst place of each limit that it breaks:"}));
   for (const {text, sample} of path.offences) {
     section.append(makeElement("button", {className: "offence", textContent: text, onclick: () => { setPlaying(false); seek(pathColumns.times[sample]); }}));
   }
@@ -48,8 +49,8 @@ function buildOffences() {
 }
 
 function formatTime(seconds) {
-  const minutes = Math.floor(seconds / 60);
-  return minutes ? `${minutes} min ${(seconds - 60 * minutes).toFixed(1)} s` : `${seconds.toFixed(2)} s`;
+  const tenths = Math.round(10 * seconds), minutes = Math.floor(tenths / 600);
+  return minutes ? `${minutes} min ${((tenths - 600 * minutes) / 10).toFixed(1)} s` : `${seconds.toFixed(2)} s`;
 }
 
 function setPlaying(playing) {
@@ -77,12 +78,27 @@ function seekInCurves(event) {
 
 const shareOfRange = (joint, q) => joint.low === null || joint.high === null ? 0.5 : (q - joint.low) / (joint.high - joint.low);
 
-// Each joint over its drive's range, whose ends are the dashed lines.
+// The least and the greatest share of its range that a joint has on the path, or the range's ends.
+function findCurveBounds() {
+  let low = 0, high = 1;
+  machine.joints.forEach((joint, j) => {
+    for (let i = j; i < pathColumns.joints.length; i += machine.joints.length) {
+      const share = shareOfRange(joint, pathColumns.joints[i]);
+      if (share < low) low = share;
+      if (share > high) high = share;
+    }
+  });
+  return [low, high];
+}
+
+// Each joint over its drive's range, whose ends are the dashed lines; off limits it is beyond them.
+let curveBounds = null;
 function drawCurves() {
   const width = curves.clientWidth, height = 96, ratio = window.devicePixelRatio || 1, styles = getComputedStyle(document.documentElement);
   curves.width = width * ratio;
   curves.height = height * ratio;
-  const pen = curves.getContext("2d"), yOf = share => height - 14 - share * (height - 28), xOf = time => path.end > 0 ? time / path.end * width : 0;
+  const pen = curves.getContext("2d"), [low, high] = curveBounds ??= findCurveBounds();
+  const yOf = share => height - 14 - (share - low) / (high - low) * (height - 28), xOf = time => path.end > 0 ? time / path.end * width : 0;
   pen.scale(ratio, ratio);
   pen.strokeStyle = styles.getPropertyValue("--bad");
   pen.setLineDash([4, 4]);
@@ -146,4 +162,5 @@ if (path) {
     if (!event.target.matches("input, select, button") && event.key.toLowerCase() === "p") viewPath();
   });
   buildPlayer();
+  new ResizeObserver(drawCurves).observe(footer);
 }

@@ -26,7 +26,7 @@ FLOORS = [
     ["workspaces.connected"],
     ["workspaces"],
     ["performance"],
-    ["calibration", "accuracy", "stiffness"],
+    ["calibration", "accuracy", "stiffness", "synthesis"],
     ["toolpath.path"],
     ["toolpath.programmed_path"],
     ["toolpath.reading"],
@@ -55,7 +55,7 @@ FLOORS = [
 ]
 HEIGHT = {room: height for height, floor in enumerate(FLOORS) for room in floor}
 CORE = ["arrays", "algebra", "budget", "kernels", "model", "kinematics", "machine_properties", "machine"]
-CORE += ["families", "workspaces", "performance", "calibration", "accuracy", "stiffness"]
+CORE += ["families", "workspaces", "performance", "calibration", "accuracy", "stiffness", "synthesis"]
 RIM = {"pathlib", "json", "io", "tempfile", "shutil", "plotly", "matplotlib", "pyarrow", "rich", "cyclopts"}
 RIM |= {"pydantic", "ruamel", "http", "socket", "subprocess"}
 NO_PATH_NEEDS = {"plotly", "matplotlib", "rich", "cyclopts"}

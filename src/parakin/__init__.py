@@ -38,6 +38,8 @@ if TYPE_CHECKING:
     from .model.geometric_parameters import Parameter
     from .performance.atlas import Atlas, atlas
     from .stiffness.stiffness import Stiffness, analyse_stiffness
+    from .synthesis.designs import Designs, ProvedDesign, UnprovedDesign, find_designs
+    from .synthesis.problem import DesignProblem
     from .toolpath.job import Job, Tolerances, prepare
     from .toolpath.linearise.rewinds import Clearance, Rewind, RewoundPath, rewind_path
     from .toolpath.path import ToolPath
@@ -70,6 +72,8 @@ __all__ = [
     "Components",
     "CrossSection",
     "DescriptionError",
+    "DesignProblem",
+    "Designs",
     "DriveWorkspace",
     "Family",
     "GridWorkspace",
@@ -89,6 +93,7 @@ __all__ = [
     "Placement",
     "PolarWorkspace",
     "PoseError",
+    "ProvedDesign",
     "Region",
     "Rewind",
     "RewoundPath",
@@ -101,6 +106,7 @@ __all__ = [
     "Trajectory",
     "TurnedJob",
     "UnidentifiableError",
+    "UnprovedDesign",
     "Workspace",
     "WorstCase",
     "__version__",
@@ -115,6 +121,7 @@ __all__ = [
     "family",
     "find_components",
     "find_cross_sections",
+    "find_designs",
     "find_largest_box",
     "find_placement",
     "find_placements",
@@ -194,6 +201,11 @@ _LAZY = {
     "Components": "workspaces.connected.components",
     "Comparison": "comparison.comparison",
     "CrossSection": "workspaces.sampled.cross_sections",
+    "DesignProblem": "synthesis.problem",
+    "Designs": "synthesis.designs",
+    "ProvedDesign": "synthesis.designs",
+    "UnprovedDesign": "synthesis.designs",
+    "find_designs": "synthesis.designs",
     "DriveWorkspace": "workspaces.sampled.drive_sweep",
     "Family": "families.family",
     "GridWorkspace": "workspaces.sampled.grid",

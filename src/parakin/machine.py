@@ -11,7 +11,7 @@ import numpy as np
 
 from .algebra import Scalar, Vec
 from .arguments import RowsLike, bound_angles, check_range, describe_value, read_rows, warn_of_wide_angles
-from .arrays import Array
+from .arrays import Array, AxisRange
 from .errors import NoMethodError, PoseError, quote, suggest
 from .kernels.batch import evaluate_tape, evaluate_tape_with_residual
 from .kinematics.assemblies import Assemblies, find_assemblies
@@ -27,7 +27,7 @@ from .kinematics.travel import LineTapes, Travel, compile_line_tapes, find_trave
 from .kinematics.wrist.pole_crossing import flip_mode
 from .kinematics.wrist.pole_thresholds import EXACT
 from .machine_properties import MachineProperties
-from .model.geometric_parameters import settle_offsets
+from .model.geometric_parameters import replace_ranges, settle_offsets
 from .model.legs import Inverse
 from .model.limits import compute_platform_points
 from .model.rates import TwistRates, compute_twist_rates
@@ -42,8 +42,16 @@ class Machine(MachineProperties):
     out of reach gives a row of NaN and leaves its neighbours alone.
     """
 
-    def replace_parameters(self, values: Mapping[str, float]) -> Machine:
+    def replace_parameters(
+        self,
+        values: Mapping[str, float],
+        ranges: Mapping[str, AxisRange] | None = None,
+        home: Mapping[str, float] | None = None,
+    ) -> Machine:
         """Make the machine with other numbers, mm and rad, by the names of :attr:`parameters`.
+
+        ranges : other ranges of the legs' drives, by their names
+        home : another home, by axes
 
         Raises :class:`DescriptionError` where they are no machine that works.
         """
@@ -53,7 +61,8 @@ class Machine(MachineProperties):
                 raise PoseError(f"parameters: unknown {quote(name)}{suggest(name, known)}")
         spec = self._replace_numbers(values)
         sizes = {name: values.get(name, value) for name, value in spec.sizes.items()}
-        return Machine(settle_offsets(replace(spec, sizes=sizes)))
+        spec = replace_ranges(replace(spec, sizes=sizes, home={**spec.home, **(home or {})}), ranges or {})
+        return Machine(settle_offsets(spec))
 
     # Input at the boundary.
 

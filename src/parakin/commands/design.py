@@ -1,4 +1,4 @@
-"""``parakin design``: a machine's sizes from the amplification that it must keep."""
+"""``parakin design``: a machine's sizes from what it must do, by search and proof or in closed form."""
 
 from __future__ import annotations
 
@@ -7,10 +7,12 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
+from ..budget import SECONDS
 from ..errors import InputError, quote, suggest
 from ..export.json.design import encode_design
 from ..export.number_format import format_fixed
 from .console import announce_compiling, print_json, print_text
+from .design_search import design_by_search
 from .options import Json
 from .region_options import parse_length
 
@@ -30,33 +32,47 @@ def design(
     family: Annotated[str, Parameter(completer=_list_families)],
     /,
     *,
-    cube: Annotated[str, Parameter(allow_leading_hyphen=True)],
-    amplification: Annotated[float, Parameter(allow_leading_hyphen=True)],
+    cube: Annotated[str | None, Parameter(allow_leading_hyphen=True)] = None,
+    amplification: Annotated[float | None, Parameter(allow_leading_hyphen=True)] = None,
     output: Annotated[Path | None, Parameter(name=["--output", "-o"])] = None,
+    count: int = 7,
+    time: Annotated[float, Parameter(allow_leading_hyphen=True)] = SECONDS,
     json: Json = False,
 ) -> int:
-    """The sizes of a machine whose velocity amplification stays within bounds all over a cube.
+    """A machine's sizes from what it must do: searched for, and proved all over a box of poses.
 
     Parameters
     ----------
     family
-        What kind of machine: orthoglide.
+        A design problem, .yaml: machine, free numbers, box, bounds, what to minimise. Or orthoglide, whose sizes for a
+        cube and an amplification are known in closed form.
     cube
-        The cube's edge, mm.
+        Of orthoglide: the cube's edge, mm.
     amplification
-        The greatest velocity amplification L allowed in it, above 1; the least is 1/L.
+        Of orthoglide: the greatest velocity amplification L allowed in it, above 1; the least is 1/L.
     output
-        A machine file to write, .yaml.
+        Of orthoglide a machine file to write, .yaml; of a problem a folder for a machine file of each design and, of
+        two objectives, a picture of the front.
+    count
+        How many designs of the front of two objectives.
+    time
+        How long to search and to prove, s.
     """
+    if family.lower().endswith((".yaml", ".yml")):
+        if cube is not None or amplification is not None:
+            raise InputError("the file of a problem says that", "--cube" if cube is not None else "--amplification")
+        return design_by_search(Path(family), output, count, time, json)
+    if cube is None or amplification is None:
+        _refuse_family(family)
+        raise InputError("expected beside a family's name", "--cube" if cube is None else "--amplification")
     edge = parse_length(cube, "--cube")
     assert edge is not None
     if output is not None and output.suffix.lower() not in (".yaml", ".yml"):
         raise InputError(f'"{output}": expected a file name that ends in .yaml', "--output")
     announce_compiling()
+    _refuse_family(family)
     from ..performance.design import DESIGNS
 
-    if family not in DESIGNS:
-        raise InputError(f"unknown family {quote(family)}{suggest(family, DESIGNS)}", "design")
     result = DESIGNS[family](edge, amplification)
     files: dict[str, str] = {}
     if output is not None:
@@ -72,6 +88,15 @@ def design(
     if output is not None:
         print_text(f"\nmachine {output}")
     return 0
+
+
+def _refuse_family(family: str) -> None:
+    """Refuse a family without a closed form."""
+    from ..performance.design import DESIGNS
+
+    if family not in DESIGNS:
+        others = f"{', '.join(DESIGNS)} or the .yaml file of a design problem"
+        raise InputError(f"unknown family {quote(family)}{suggest(family, DESIGNS, others)}", "design")
 
 
 def _format_design(design: Design) -> str:

@@ -174,6 +174,14 @@ class Family:
         margins = evaluate_tape(tape, rows[0], np.empty((len(rows[0]), tape.outputs)), rows[1], whole=False)
         return margins.reshape(*lead, tape.outputs)
 
+    def base_joints(self, poses: RowsLike, sizes: RowsLike, mode: str | None = None) -> Array:
+        """Compute where the struts are joined to the base, (..., struts, 3) mm in the machine's frame."""
+        mode, (n, _) = self.machine.checked_mode(mode), self._counts
+        lead, rows = self._rows([(poses, self.machine.axes, "poses")], sizes)
+        tape = self._keep(("base joints", mode), n, lambda e, x: [c for foot in e.list_feet(x, mode) for c in foot])
+        feet = evaluate_tape(tape, rows[0], np.empty((len(rows[0]), tape.outputs)), rows[1], whole=False)
+        return feet.reshape(*lead, -1, 3)
+
     def jacobians(self, poses: RowsLike, sizes: RowsLike, mode: str | None = None) -> tuple[Array, Array, Array]:
         """Compute A (..., n, n), B (..., n, m) and C (..., n, k) with A x' + C s' = B q' at poses with their joints.
 

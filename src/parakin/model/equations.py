@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from functools import cached_property, reduce
 
-from ..algebra import Scalar, Vec, apply, atan2, minimum, norm, scale, sincos, sqrt, sub, transpose
+from ..algebra import Scalar, Vec, add, apply, atan2, minimum, norm, scale, sincos, sqrt, sub, transpose
 from ..errors import DescriptionError
 from ..units import AXIS_UNITS
 from .elements import ROTATIONS
@@ -227,6 +227,13 @@ class Equations:
         points = compute_platform_points(self.spec, placed.rotation, placed.origin)
         given = group_joints_by_leg(self.spec, joints)
         return [leg.struts(p, q)[0] for leg, p, q in zip(self.spec.legs, points, given, strict=True)]
+
+    def list_feet(self, pose: Sequence[Scalar], mode: str) -> list[Vec]:
+        """List where each strut is joined to the base at a pose, mm in the machine's frame."""
+        joints, placed, _ = self.invert(pose, mode)
+        points, given = compute_platform_points(self.spec, placed.rotation, placed.origin), self.group_joints(joints)
+        struts = (s for leg, p, q in zip(self.legs, points, given, strict=True) for s in leg.struts(p, q))
+        return [add(apply(self.structure.mount, foot), self.structure.base) for foot, _ in struts]
 
     @cached_property
     def rods_at_home(self) -> HomeRods:

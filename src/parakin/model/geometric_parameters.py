@@ -157,3 +157,13 @@ def settle_offsets(spec: Spec) -> Spec:
         return replace(step, value=step.value + step.sign * step.drive.offset, drive=replace(step.drive, offset=0.0))
 
     return replace(spec, head=tuple(map(settle, spec.head)), table=tuple(map(settle, spec.table)))
+
+
+def replace_ranges(spec: Spec, ranges: Mapping[str, tuple[float, float]]) -> Spec:
+    """Replace the ranges of the legs' drives, by their names; others keep theirs."""
+
+    def fit(drive: Drive) -> Drive:
+        low, high = ranges.get(drive.name, (drive.low, drive.high))
+        return replace(drive, low=low, high=high)
+
+    return replace(spec, legs=tuple(replace(leg, drives=tuple(map(fit, leg.drives))) for leg in spec.legs))

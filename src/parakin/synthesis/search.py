@@ -1,0 +1,224 @@
+"""The search for a design: differential evolution over a lattice of poses, then the exchange method over all of them.
+
+What must hold at every pose of a box is a semi-infinite program. The exchange method (Blankenship and Falk, 1976)
+solves it for finitely many poses by sequential quadratic programming, adds those at which the answer is worst, and goes
+on.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import OptimizeResult, differential_evolution, minimize
+
+from ..arrays import Array, Indices, Progress
+from ..budget import Budget
+from ..performance.search import search_maxima
+from .measures import LOST, DesignEvaluator, Measures
+
+SLACK = 1e-8  # in parts of the machine's size, or rad: by which limits are kept, so that this can be proved
+_ALONG = {1: 17, 2: 9, 3: 5, 4: 4}  # lattice points along each side of the box; 3 of more sides
+_LEAST_SIDE = 1e-3  # of det A in the box's middle
+_INFEASIBLE = 1e9  # added to what an infeasible design is worth
+_POPULATION = 12  # a variable
+_GENERATIONS = 100
+_ROUNDS = 12  # of the exchange
+_ROWS = 160  # constraints that a quadratic program sees
+_WORST = 4  # poses for a constraint to begin from
+_STEP = 1e-6  # of a variable's range, for derivatives
+_NEAR = 0.1  # of a variable's range, that a round of the exchange may go
+_KEPT = 1e-9  # by which a constraint may be broken in the end
+
+
+@dataclass(frozen=True, eq=False)
+class Candidate:
+    """A design x (variables,), what it is worth, and by how much it breaks which want; not proved.
+
+    points : (P, d) the poses of the box, of edges 1, that matter
+    """
+
+    x: Array
+    value: float
+    broken: float
+    want: str
+    point: Array
+    points: Array
+
+
+class DesignSearch:
+    """Minimises one quantity of a design while others are bounded."""
+
+    def __init__(self, evaluator: DesignEvaluator, objective: str, bounds: Mapping[str, float]):
+        self.evaluator, self.problem = evaluator, evaluator.problem
+        self.objective, self.bounds = objective, dict(bounds)
+        self.low, self.width = self.problem.ranges[:, 0], np.ptp(self.problem.ranges, axis=1)
+        self.lattice = _make_lattice(len(self.problem.wide_axes))
+        self.wants = [*evaluator.limits, "parallel singularity", *bounds]
+
+    def run(self, budget: Budget, seeds: Sequence[Array] = (), progress: Progress | None = None) -> Candidate:
+        """Search for the best design; where none keeps all wants, for the one that breaks them least."""
+        x = self._evolve(budget.take_fraction(0.6), seeds, progress)
+        return self._exchange(x, budget)
+
+    # Values and violations, for batches of designs.
+
+    def _measure(self, x: Array, points: Array) -> Measures:
+        return self.evaluator.measure(self.low + self.width * x, points)
+
+    def _list_values(self, name: str, x: Array, m: Measures) -> Array:
+        """List a quantity (S, R); the greatest of a row is what the design is worth."""
+        if name == "amplification":
+            return m.psi.reshape(len(x), -1)
+        if name == "greatest_amplification":
+            return np.asarray(m.psi[..., 0])
+        if name == "footprint":
+            return m.feet.reshape(len(x), -1)
+        if name == "stroke":
+            return np.asarray(m.joints.max(1) - m.joints.min(1))
+        column = self.problem.variables.index(name)
+        return np.asarray((self.low + self.width * x)[:, [column]])
+
+    def _list_margins(self, m: Measures) -> Array:
+        """List margins of limits and of singularities, (S, P, k), ≥ 0 where they are kept with some slack."""
+        return np.concatenate([m.margins - SLACK, m.side - _LEAST_SIDE], -1)
+
+    def _measure_violations(self, x: Array, m: Measures) -> Array:
+        """Measure by how much each want is broken, (S, wants)."""
+        lost = np.nan_to_num(np.maximum(-self._list_margins(m), 0.0), nan=LOST, posinf=LOST)
+        over = [
+            np.nan_to_num(np.maximum(self._list_values(name, x, m) / bound - 1.0, 0.0), nan=LOST, posinf=1e3 * LOST)
+            for name, bound in self.bounds.items()
+        ]
+        each = [lost.max(1) + lost.mean(1), *((o.max(1) + o.mean(1))[:, None] for o in over)]
+        return np.concatenate(each, 1)
+
+    # Differential evolution; a feasible design is better than one that is not (Deb, 2000).
+
+    def _evolve(self, budget: Budget, seeds: Sequence[Array], progress: Progress | None) -> Array:
+        generation = 0
+
+        def evaluate(columns: Array) -> Array:
+            x = np.ascontiguousarray(np.atleast_2d(columns.T))
+            m = self._measure(x, self.lattice)
+            violation = self._measure_violations(x, m).sum(1)
+            value = np.nan_to_num(self._list_values(self.objective, x, m).max(1), nan=_INFEASIBLE, posinf=_INFEASIBLE)
+            return np.asarray(np.where(violation > 0.0, _INFEASIBLE * (1.0 + violation), value))
+
+        def report(intermediate_result: OptimizeResult) -> bool:
+            nonlocal generation
+            generation += 1
+            if progress:
+                progress(min(1.0, generation / _GENERATIONS))
+            return budget.is_spent()
+
+        n = len(self.width)
+        rng = np.random.default_rng(1)
+        start = rng.random((max(_POPULATION * n, 20), n))
+        for row, seed in enumerate(seeds):
+            start[row] = np.clip((seed - self.low) / self.width, 0.0, 1.0)
+        result = differential_evolution(
+            evaluate, [(0.0, 1.0)] * n, maxiter=_GENERATIONS, init=start, tol=1e-3, polish=False,
+            vectorized=True, updating="deferred", seed=1, callback=report,
+        )  # fmt: skip
+        return np.asarray(result.x)
+
+    # The exchange method.
+
+    def _exchange(self, x: Array, budget: Budget) -> Candidate:
+        points = self._find_worst(x, self.lattice)
+        best = self._judge(x, points)
+        for _ in range(_ROUNDS):
+            if budget.is_spent():
+                break
+            moved = self._solve_for_points(x, points)
+            points = np.unique(np.concatenate([points, self._find_worst(moved, self.lattice)]), axis=0)
+            new = self._judge(moved, points)
+            settled = np.abs(moved - x).max() < 1e-9
+            x = moved
+            if new.broken <= _KEPT or new.broken < best.broken:
+                best = new
+            if settled:
+                break
+        return best
+
+    def _judge(self, x: Array, points: Array) -> Candidate:
+        m = self._measure(x[None], points)
+        violations = self._measure_violations(x[None], m)[0]
+        value = float(self._list_values(self.objective, x[None], m).max())
+        want = int(violations.argmax())
+        if want < len(self.wants) - len(self.bounds):
+            margins = np.nan_to_num(self._list_margins(m)[0, :, want], nan=-LOST)
+            point = points[int(margins.argmin())]
+        else:
+            point = np.full(points.shape[1], 0.5)
+        return Candidate(self.low + self.width * x, value, float(violations.max()), self.wants[want], point, points)
+
+    def _list_columns(self, m: Measures) -> Array:
+        """List everything of poses that has a worst one, (S, P, k): the least are sought."""
+        return np.concatenate([self._list_margins(m), -m.psi, -m.feet, m.joints, -m.joints], -1)
+
+    def _find_worst(self, x: Array, points: Array) -> Array:
+        """Find the poses at which each constraint, joint and quantity is worst, (P, d), by search from a lattice."""
+        columns = np.nan_to_num(self._list_columns(self._measure(x[None], points))[0], nan=-LOST)
+        count = columns.shape[1]
+        starts = np.argpartition(columns, min(_WORST, len(points) - 1), axis=0)[:_WORST]
+        owners = np.tile(np.arange(count), len(starts))
+
+        def evaluate(tries: Array, search: Indices) -> Array:
+            inside = ((tries >= 0.0) & (tries <= 1.0)).all(1)
+            at = self._list_columns(self._measure(x[None], np.clip(tries, 0.0, 1.0)))[0]
+            return np.where(inside, -at[np.arange(len(tries)), owners[search]], np.nan)
+
+        found, _ = search_maxima(evaluate, points[starts.reshape(-1)], np.full(points.shape[1], 0.25), 1e-7)
+        return np.unique(np.round(np.clip(found, 0.0, 1.0), 9), axis=0)
+
+    def _solve_for_points(self, x: Array, points: Array) -> Array:
+        """Minimise over finitely many poses, near x, by sequential quadratic programming with an epigraph variable."""
+        m = self._measure(x[None], points)
+        scale = max(abs(float(self._list_values(self.objective, x[None], m).max())), 1e-9)
+        if not np.isfinite(scale) or not np.isfinite(self._list_margins(m)).all():
+            return x
+        ends = np.stack([m.joints[0].argsort(0)[:6], (-m.joints[0]).argsort(0)[:6]])  # (2, 6, joints)
+
+        def list_rows(z: Array) -> Array:
+            """List constraints (S, R) of designs with their epigraph variable (S, n + 1)."""
+            own, t = z[:, :-1], scale * z[:, -1:]
+            at = self._measure(own, points)
+            rows = [self._list_margins(at).reshape(len(z), -1)]
+            for name, bound in [*((n, np.full_like(t, b)) for n, b in self.bounds.items()), (self.objective, t)]:
+                if name == "stroke":
+                    columns = np.arange(at.joints.shape[2])
+                    least, most = (at.joints[:, ends[side], columns] for side in (0, 1))
+                    values = (most[:, :, None] - least[:, None]).reshape(len(z), -1)
+                else:
+                    values = self._list_values(name, own, at)
+                rows.append((bound - values) / np.where(name == self.objective, scale, bound))
+            return np.concatenate(rows, 1)
+
+        start = np.append(x, 1.0)
+        chosen = np.argsort(list_rows(start[None])[0], kind="stable")[:_ROWS]
+        steps = _STEP * np.eye(len(start))
+
+        def constrain(z: Array) -> Array:
+            return np.asarray(np.nan_to_num(list_rows(z[None])[0, chosen], nan=-LOST))
+
+        def differentiate(z: Array) -> Array:
+            rows = np.nan_to_num(list_rows(np.concatenate([z + steps, z - steps]))[:, chosen], nan=-LOST)
+            up, down = np.split(rows, 2)
+            return np.asarray((up - down).T / (2.0 * _STEP))
+
+        gradient = np.append(np.zeros(len(x)), 1.0)
+        near = [(max(0.0, c - _NEAR), min(1.0, c + _NEAR)) for c in x.tolist()]
+        found = minimize(
+            lambda z: z[-1], start, jac=lambda z: gradient, bounds=[*near, (-10.0, 10.0)], method="SLSQP",
+            constraints={"type": "ineq", "fun": constrain, "jac": differentiate},
+            options={"ftol": 1e-14, "maxiter": 60},
+        )  # fmt: skip
+        return np.clip(found.x[:-1], 0.0, 1.0) if np.isfinite(found.x).all() else x
+
+
+def _make_lattice(d: int) -> Array:
+    line = np.linspace(0.0, 1.0, _ALONG.get(d, 3))
+    return np.stack(np.meshgrid(*[line] * d, indexing="ij"), -1).reshape(-1, d)

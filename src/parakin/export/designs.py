@@ -12,14 +12,14 @@ _COLOUR = "#1565c0"
 
 def format_proved_yaml(designs: Designs, index: int) -> str:
     """Format the machine file of a proved design; comments tell what is proved of it, mm and rad."""
-    found = designs.front[index]
-    box = ", ".join(f"{axis} {low:.9g} to {high:.9g}" for axis, (low, high) in found.box.items())
+    design = designs.front[index]
+    box = ", ".join(f"{axis} {low:.9g} to {high:.9g}" for axis, (low, high) in design.box.items())
     return "\n".join(
         [
             "# A design found by search; that it keeps its limits all over this box of poses is proved by intervals:",
             f"# {box} (mm, rad)",
-            *(f"# {name}: {value:.9g}" for name, value in {**found.sizes, **found.values}.items()),
-            found.machine.format_yaml(),
+            *(f"# {name}: {value:.9g}" for name, value in {**design.sizes, **design.values}.items()),
+            design.machine.format_yaml(),
         ]
     )
 
@@ -31,7 +31,7 @@ def render_front_png(designs: Designs) -> bytes:
 
     problem = designs.problem
     first, second = problem.minimise
-    points = [(found.values[first], found.values[second]) for found in designs.front]
+    points = [(design.values[first], design.values[second]) for design in designs.front]
     figure = Figure(figsize=(6.4, 4.8), dpi=150, facecolor="white")
     canvas = FigureCanvasAgg(figure)
     axes = figure.add_axes((0.14, 0.13, 0.82, 0.74))

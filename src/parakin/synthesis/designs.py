@@ -118,9 +118,11 @@ def _search_front(
         nonlocal done
         begin = _SEARCHING * done / runs
         report = (lambda f: progress(begin + _SEARCHING / runs * f)) if progress else None
-        found = DesignSearch(evaluator, objective, bounds).run(budget.take_fraction(1.0 / (runs - done)), seeds, report)
+        candidate = DesignSearch(evaluator, objective, bounds).run(
+            budget.take_fraction(1.0 / (runs - done)), seeds, report
+        )
         done += 1
-        return found
+        return candidate
 
     first = problem.minimise[0]
     best = run(first, problem.bounds, [])
@@ -138,9 +140,9 @@ def _search_front(
     highest = far.value if far is end else _measure_value(evaluator, far, second)
     for step in np.linspace(highest, other.value, count)[1:]:
         bound = float(step) * (1.0 + 1e-9)
-        found = run(first, _tighten(problem.bounds, second, bound), [front[-1].x, other.x])
-        if found.broken <= _KEPT:
-            front.append(found)
+        candidate = run(first, _tighten(problem.bounds, second, bound), [front[-1].x, other.x])
+        if candidate.broken <= _KEPT:
+            front.append(candidate)
     return front
 
 
@@ -189,15 +191,17 @@ def _prove_design(evaluator: DesignEvaluator, candidate: Candidate, budget: Budg
     footprint = values.get("footprint")
     more = [] if footprint is None else _bound_footprint(region, footprint * (1.0 + TOLERANCE))
     low, high = np.array([box[axis] for axis in region.free_axes]).T
-    held = prove_boxes(region, low[None], high[None], more, _BOXES, budget.take_fraction(0.5))
-    if not held.proved[0]:
-        limit = int(held.limit[0])
-        return UnprovedDesign(sizes, f"{held.names[limit]} is broken in the box" if limit >= 0 else "left undecided")
+    containment = prove_boxes(region, low[None], high[None], more, _BOXES, budget.take_fraction(0.5))
+    if not containment.proved[0]:
+        limit = int(containment.limit[0])
+        return UnprovedDesign(
+            sizes, f"{containment.names[limit]} is broken in the box" if limit >= 0 else "left undecided"
+        )
     proof = _prove_amplification(evaluator, region, box, values, budget)
     if proof is not None and proof.verdict != "proved":
         return UnprovedDesign(sizes, f"{proof.claim} is {proof.verdict}: {proof.reason}")
     drives = {drive.name: (drive.low, drive.high) for drive in machine.drives[: machine.leg_count]}
-    boxes = int(held.boxes[0]) + (proof.boxes if proof else 0)
+    boxes = int(containment.boxes[0]) + (proof.boxes if proof else 0)
     return ProvedDesign(machine, sizes, values, box, drives, boxes, proof)
 
 

@@ -171,8 +171,8 @@ class DesignSearch:
             at = self._list_columns(self._measure(x[None], np.clip(tries, 0.0, 1.0)))[0]
             return np.where(inside, -at[np.arange(len(tries)), owners[search]], np.nan)
 
-        found, _ = search_maxima(evaluate, points[starts.reshape(-1)], np.full(points.shape[1], 0.25), 1e-7)
-        return np.unique(np.round(np.clip(found, 0.0, 1.0), 9), axis=0)
+        worst, _ = search_maxima(evaluate, points[starts.reshape(-1)], np.full(points.shape[1], 0.25), 1e-7)
+        return np.unique(np.round(np.clip(worst, 0.0, 1.0), 9), axis=0)
 
     def _solve_for_points(self, x: Array, points: Array) -> Array:
         """Minimise over finitely many poses, near x, by sequential quadratic programming with an epigraph variable."""
@@ -211,12 +211,12 @@ class DesignSearch:
 
         gradient = np.append(np.zeros(len(x)), 1.0)
         near = [(max(0.0, c - _NEAR), min(1.0, c + _NEAR)) for c in x.tolist()]
-        found = minimize(
+        optimum = minimize(
             lambda z: z[-1], start, jac=lambda z: gradient, bounds=[*near, (-10.0, 10.0)], method="SLSQP",
             constraints={"type": "ineq", "fun": constrain, "jac": differentiate},
             options={"ftol": 1e-14, "maxiter": 60},
         )  # fmt: skip
-        return np.clip(found.x[:-1], 0.0, 1.0) if np.isfinite(found.x).all() else x
+        return np.clip(optimum.x[:-1], 0.0, 1.0) if np.isfinite(optimum.x).all() else x
 
 
 def _make_lattice(d: int) -> Array:

@@ -18,14 +18,14 @@ def encode_designs(designs: Designs, files: Sequence[str]) -> dict[str, Any]:
         "bounds": dict(designs.problem.bounds),
         "designs": [
             {
-                "sizes": dict(found.sizes),
-                "values": dict(found.values),
-                "box": {axis: list(ends) for axis, ends in found.box.items()},
-                "ranges": {name: list(ends) for name, ends in found.ranges.items()},
+                "sizes": dict(design.sizes),
+                "values": dict(design.values),
+                "box": {axis: list(ends) for axis, ends in design.box.items()},
+                "ranges": {name: list(ends) for name, ends in design.ranges.items()},
                 "verdict": "proved",
-                "boxes": found.boxes,
+                "boxes": design.boxes,
             }
-            for found in designs.front
+            for design in designs.front
         ],
         "unproved": [{"sizes": dict(failed.sizes), "reason": failed.reason} for failed in designs.unproved],
         "shortfall": designs.shortfall,

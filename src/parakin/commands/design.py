@@ -12,7 +12,6 @@ from ..errors import InputError, quote, suggest
 from ..export.json.design import encode_design
 from ..export.number_format import format_fixed
 from .console import announce_compiling, print_json, print_text
-from .design_search import design_by_search
 from .options import Json
 from .region_options import parse_length
 
@@ -61,6 +60,8 @@ def design(
     if family.lower().endswith((".yaml", ".yml")):
         if cube is not None or amplification is not None:
             raise InputError("the file of a problem says that", "--cube" if cube is not None else "--amplification")
+        from .design_search import design_by_search
+
         return design_by_search(Path(family), output, count, time, json)
     if cube is None or amplification is None:
         _refuse_family(family)

@@ -64,7 +64,7 @@ MISTAKES = [
     (
         "  kind: length\n",
         "",
-        ['m.yaml:7: legs: missing key "kind", expected one of column, crank, lambda, length, slider'],
+        ['m.yaml:7: legs: missing key "kind", expected one of column, crank, lambda, length, ring, slider'],
     ),
     ("tx ty rz", "tx ty rw", ['m.yaml:6: motion: unknown word "rw", expected one of tx, ty, tz, rx, ry, rz']),
     (
@@ -142,7 +142,7 @@ def test_several_errors_in_line_order(tmp_path):
     assert errors_of(tmp_path, text) == [
         'm.yaml:4: R: "500 furlong": unknown unit "furlong", expected a unit such as mm, in or deg',
         'm.yaml:9: unknown key "branch" in legs, expected one of '
-        "kind, joints, range, speed, acceleration, jerk, counts, lead, homing, platform, foot",
+        "kind, joints, range, speed, acceleration, jerk, counts, lead, homing, offset, platform, foot",
         'm.yaml:15: missing key "joint" in head',
         'm.yaml:19: clearance: "50" needs a unit: mm, cm, m, in',
     ]

@@ -140,6 +140,9 @@ def test_the_scissors_take_the_point_farther_from_the_origin():
     poses = poses[m.check(poses) == 0]
     assert len(poses) > 2000
     back = m.forward(m.inverse(poses))
-    assert back.converged.all()
-    assert np.abs(back.poses - poses).max() < 1e-8
-    assert m.forward([150.0, 150.0]).poses == pytest.approx([347.7178, 347.7178], abs=1e-3)
+    assert (back.converged == (m.sides(poses) * m.sides(m.home) > 0.0)).all()  # others are across the singularity
+    assert 0.5 < back.converged.mean() < 0.9
+    assert np.abs(back.poses - poses)[back.converged].max() < 1e-8
+    across = [347.7178, 347.7178]
+    assert m.forward([150.0, 150.0], near=across).poses == pytest.approx(across, abs=1e-3)
+    assert not m.forward([150.0, 150.0]).converged

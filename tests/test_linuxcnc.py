@@ -227,11 +227,9 @@ def test_a_forward_is_never_silently_wrong(m, modules):
     same = done == (library.converged & (off <= 0.01))
     # Where joints are none, and beside singularities, rounding decides. Far off, the library alone continues tilts.
     assert same.mean() > (0.75 if m.structure.has_slides else 0.998)
-    if m.name == "pentapod":  # its folds are near; beyond one the library alone goes on
-        assert not (done & ~same)[mad:].any()
-        assert same[mad:].mean() > 0.99
-    else:
-        assert same[mad:].all()
+    # Of poses that are allowed it refuses some far from home, where the library alone goes on; it answers no other.
+    assert not (done & ~same)[mad:].any()
+    assert same[mad:].mean() > 0.99
     miss, tilt = Description.of(m.spec).misses(found[done], joints[done])
     size = 1.0 + np.abs(joints[done]).max(1) / 1e3
     assert (miss / size).max() < CLOSE

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 import parakin as pk
+from parakin.synthesis.designs import Designs, ProvedDesign, UnprovedDesign
 
 PART = "UNITS/MM\nFEDRAT/3000\nGOTO/0,0,0\nGOTO/10,0,0\n"
 
@@ -38,6 +39,11 @@ def things(tmp_path_factory, tricept):
     accuracy = pk.analyse_accuracy(orthoglide, {"feet": "0.1 mm"}, poses)
     hexapod, below = pk.load("hexapod"), pk.workpiece(Z=-950)
     body = pk.sample_field(space, pk.workspace(space, gap=0.5).box, step=20)
+    sides = {axis: (-10.0, 10.0) for axis in "XYZ"}
+    problem = pk.DesignProblem(orthoglide, {"L": (200.0, 500.0)}, sides, ["L"])
+
+    proved = ProvedDesign(orthoglide, {"L": 250.0}, {"L": 250.0}, sides, {"rho_x": (0.0, 1.0)}, 3)
+    unproved = UnprovedDesign({"L": 250.0}, "no time")
     return {
         "Machine": tricept,
         "Region": plane,
@@ -74,6 +80,10 @@ def things(tmp_path_factory, tricept):
         "Calibration": pk.calibrate(orthoglide, measured, ["encoders"]),
         "MeasurementPlan": pk.plan_measurements(orthoglide, 4, ["encoders"]),
         "Noise": pk.Noise(),
+        "DesignProblem": problem,
+        "ProvedDesign": proved,
+        "UnprovedDesign": unproved,
+        "Designs": Designs(problem, (proved,), (unproved,)),
         "Parameter": tricept.parameters[0],
         "setpoints": job.trajectory.sample(10),
         "cells": found.cells,

@@ -49,6 +49,9 @@ class ProvedDesign:
     boxes: int
     amplification: Proof | None = None
 
+    def __repr__(self) -> str:
+        return f"<parakin design of {self.machine.name}: {len(self.sizes)} sizes, proved with {self.boxes} boxes>"
+
 
 @dataclass(frozen=True, eq=False)
 class UnprovedDesign:
@@ -56,6 +59,9 @@ class UnprovedDesign:
 
     sizes: Mapping[str, float]
     reason: str
+
+    def __repr__(self) -> str:
+        return f"<parakin design not proved: {len(self.sizes)} sizes>"
 
 
 @dataclass(frozen=True, eq=False)

@@ -44,6 +44,9 @@ class DesignProblem:
     bounds: Mapping[str, float] = field(default_factory=dict)
     fit_strokes: bool = False
 
+    def __repr__(self) -> str:
+        return f"<parakin design problem of {self.machine.name}: {len(self.free)} free numbers>"
+
     def __post_init__(self) -> None:
         if not self.free:
             raise PoseError("free: at least one number expected")

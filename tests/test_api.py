@@ -39,7 +39,7 @@ def things(tmp_path_factory, tricept):
     accuracy = pk.analyse_accuracy(orthoglide, {"feet": "0.1 mm"}, poses)
     hexapod, below = pk.load("hexapod"), pk.workpiece(Z=-950)
     body = pk.sample_field(space, pk.workspace(space, gap=0.5).box, step=20)
-    sides = {axis: (-10.0, 10.0) for axis in "XYZ"}
+    sides = dict.fromkeys("XYZ", (-10.0, 10.0))
     problem = pk.DesignProblem(orthoglide, {"L": (200.0, 500.0)}, sides, ["L"])
 
     proved = ProvedDesign(orthoglide, {"L": 250.0}, {"L": 250.0}, sides, {"rho_x": (0.0, 1.0)}, 3)

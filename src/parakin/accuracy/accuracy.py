@@ -12,12 +12,10 @@ from ..arguments import RowsLike, check_arguments
 from ..arrays import Array
 from ..errors import PoseError
 from ..machine import Machine
-from ..workspaces.sampled.allowed_poses import sample_allowed_poses
+from ..workspaces.sampled.allowed_poses import SAMPLES, choose_poses
 from .tolerances import Tolerance, ToleranceFamily, make_tolerance_family, read_tolerances
 
 _UNIFORM = 1.0 / np.sqrt(3.0)  # standard deviation of what lies evenly within ±1
-SAMPLES = 400
-_MOST_SAMPLES = 20_000
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,12 +82,7 @@ def analyse_accuracy(
     Raises :class:`PoseError`.
     """
     within = make_tolerance_family(machine, read_tolerances(tolerances))
-    if poses is None:
-        if not 1 <= samples <= _MOST_SAMPLES:
-            raise PoseError(f"samples: a number from 1 to {_MOST_SAMPLES} expected, not {samples}")
-        rows = sample_allowed_poses(machine, samples)
-    else:
-        rows, _ = machine.rows(poses, machine.axes, "poses")
+    rows = choose_poses(machine, poses, samples)
     joints = machine.inverse(rows)
     rates = within.family.twist_rates(rows, joints, within.family.nominal)
     slopes = rates.compute_size_rates()

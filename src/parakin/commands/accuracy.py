@@ -12,7 +12,7 @@ from ..errors import InputError, quote
 from ..export.number_format import format_fixed
 from ..units import LENGTH, QuantityError, name_display_unit, parse_quantity, to_display
 from .console import announce_compiling, format_table, print_json, print_text
-from .options import Json, Name, Sizes, load_machine
+from .options import Json, Name, OutputPath, Sizes, load_machine
 from .region_options import parse_axis_ranges, parse_time
 
 if TYPE_CHECKING:
@@ -33,7 +33,7 @@ def accuracy(
     over: Annotated[str | None, Parameter(allow_leading_hyphen=True)] = None,
     time: float | None = None,
     samples: int | None = None,
-    output: Annotated[Path | None, Parameter(name=["--output", "-o"])] = None,
+    output: OutputPath = None,
     json: Json = False,
     sizes: Sizes = None,
 ) -> int:
@@ -70,8 +70,9 @@ def accuracy(
     wanted, costs = _parse_error(error), _parse_costs(cost)
     ranges, seconds = parse_axis_ranges(machine, over, "--over"), parse_time(time)
     announce_compiling()
-    from ..accuracy.accuracy import SAMPLES, allocate_tolerances, analyse_accuracy
+    from ..accuracy.accuracy import allocate_tolerances, analyse_accuracy
     from ..accuracy.worst_case import bound_worst_case
+    from ..workspaces.sampled.allowed_poses import SAMPLES
 
     result = analyse_accuracy(machine, stated, samples=SAMPLES if samples is None else samples)
     allowed = None if wanted is None else allocate_tolerances(result, wanted, costs)

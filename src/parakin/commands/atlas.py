@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
@@ -15,7 +14,7 @@ from ..units import NUMBER, QuantityError, parse_quantity, to_display
 from .atlas_files import AtlasFiles
 from .atlas_summary import format_atlas, format_performance, format_proofs
 from .console import ProgressBar, announce_compiling, print_json, print_text
-from .options import OFF_LIMITS, Json, Mode, Name, Sizes, load_machine
+from .options import OFF_LIMITS, Json, Mode, Name, OutputPath, Sizes, load_machine
 from .region_options import (
     AllParts,
     At,
@@ -54,7 +53,7 @@ def atlas(
     size: Annotated[str | None, Parameter(name="--length")] = None,
     time: Time = None,
     mode: Mode = None,
-    output: Annotated[Path | None, Parameter(name=["--output", "-o"])] = None,
+    output: OutputPath = None,
     json: Json = False,
     sizes: Sizes = None,
 ) -> int:

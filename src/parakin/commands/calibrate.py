@@ -12,7 +12,7 @@ from ..errors import InputError, PoseError, quote
 from ..export.number_format import format_fixed
 from ..units import ANGLE, LENGTH, QuantityError, QuantityKind, name_display_unit, parse_quantity, to_display
 from .console import announce_compiling, format_table, print_json, print_text
-from .options import Json, Name, Sizes, load_machine
+from .options import Json, Name, OutputPath, Sizes, load_machine
 
 if TYPE_CHECKING:
     from ..calibration.calibration import Calibration
@@ -40,7 +40,7 @@ def calibrate(
     plain: bool = False,
     plan: int | None = None,
     measure: str | None = None,
-    output: Annotated[Path | None, Parameter(name=["--output", "-o"])] = None,
+    output: OutputPath = None,
     picture: Path | None = None,
     json: Json = False,
     sizes: Sizes = None,

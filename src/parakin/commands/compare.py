@@ -56,8 +56,8 @@ def compare(
 
         path = read_path(part)
     announce_compiling()
-    from ..comparison.comparison import SAMPLES
     from ..comparison.comparison import compare as compare_machines
+    from ..workspaces.sampled.allowed_poses import SAMPLES
 
     result = compare_machines(
         machines,

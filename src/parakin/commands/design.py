@@ -12,7 +12,7 @@ from ..errors import InputError, quote, suggest
 from ..export.json.design import encode_design
 from ..export.number_format import format_fixed
 from .console import announce_compiling, print_json, print_text
-from .options import Json
+from .options import Json, OutputPath
 from .region_options import parse_length
 
 if TYPE_CHECKING:
@@ -33,7 +33,7 @@ def design(
     *,
     cube: Annotated[str | None, Parameter(allow_leading_hyphen=True)] = None,
     amplification: Annotated[float | None, Parameter(allow_leading_hyphen=True)] = None,
-    output: Annotated[Path | None, Parameter(name=["--output", "-o"])] = None,
+    output: OutputPath = None,
     count: int = 7,
     time: Annotated[float, Parameter(allow_leading_hyphen=True)] = SECONDS,
     json: Json = False,

@@ -9,7 +9,7 @@ from cyclopts import Parameter
 
 from ..errors import InputError
 from .console import print_json, print_text
-from .options import Json, Name, Sizes, load_machine
+from .options import Json, Name, OutputPath, Sizes, load_machine
 from .values import parse_row
 
 if TYPE_CHECKING:
@@ -38,7 +38,7 @@ def export(
     *,
     to: Annotated[ExportFormat, Parameter(name="--to")],
     at: Annotated[str | None, Parameter(allow_leading_hyphen=True)] = None,
-    output: Annotated[Path | None, Parameter(name=["--output", "-o"])] = None,
+    output: OutputPath = None,
     json: Json = False,
     sizes: Sizes = None,
 ) -> int:

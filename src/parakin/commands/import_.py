@@ -4,20 +4,18 @@ from __future__ import annotations
 
 import tempfile
 from pathlib import Path
-from typing import Annotated, Literal
-
-from cyclopts import Parameter
+from typing import Literal
 
 from ..errors import InputError
 from .console import print_json, print_text
-from .options import Json
+from .options import Json, OutputPath
 
 
 def import_machine(
     file: Path,
     /,
     *,
-    output: Annotated[Path | None, Parameter(name=["--output", "-o"])] = None,
+    output: OutputPath = None,
     units: Literal["mm", "inch"] | None = None,
     json: Json = False,
 ) -> int:

@@ -3,21 +3,18 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
-
-from cyclopts import Parameter
 
 from ..controllers import Hardware, Screen
 from ..errors import InputError
 from .console import announce_compiling, print_json, print_text
-from .options import Json, Name, Sizes, load_machine
+from .options import Json, Name, OutputPath, Sizes, load_machine
 
 
 def linuxcnc(
     name: Name,
     /,
     *,
-    output: Annotated[Path | None, Parameter(name=["--output", "-o"])] = None,
+    output: OutputPath = None,
     hardware: Hardware | None = None,
     screen: Screen = "axis",
     force: bool = False,

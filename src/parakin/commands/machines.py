@@ -4,9 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
-
-from cyclopts import Parameter
+from typing import TYPE_CHECKING
 
 from ..errors import InputError
 from ..export.figure_file import PICTURES
@@ -14,7 +12,7 @@ from ..export.json.machine import MOTOR, RATES, encode_details, encode_machine, 
 from ..export.number_format import format_fixed
 from ..units import name_display_unit
 from .console import format_table, print_json, print_text
-from .options import Json, Name, Sizes, load_machine
+from .options import Json, Name, OutputPath, Sizes, load_machine
 from .page import refuse_foreign_file
 
 if TYPE_CHECKING:
@@ -56,7 +54,7 @@ def show(
     name: Name,
     /,
     *,
-    output: Annotated[Path | None, Parameter(name=["--output", "-o"])] = None,
+    output: OutputPath = None,
     yaml: bool = False,
     force: bool = False,
     json: Json = False,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
@@ -29,6 +30,7 @@ Sizes = Annotated[
 Mode = Annotated[
     str | None, Parameter(allow_leading_hyphen=True, help="Working mode: a sign for each choice of the inverse.")
 ]
+OutputPath = Annotated[Path | None, Parameter(name=["--output", "-o"])]  # each command says what it writes there
 Json = Annotated[bool, Parameter(name="--json", help="Print one JSON object and nothing else.")]
 
 

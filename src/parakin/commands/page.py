@@ -9,7 +9,7 @@ from cyclopts import Parameter
 
 from ..errors import InputError
 from .console import ProgressBar, announce_compiling, print_json, print_text
-from .options import OFF_LIMITS, Json, Mode, Sizes, complete_machine, load_machine
+from .options import OFF_LIMITS, Json, Mode, OutputPath, Sizes, complete_machine, load_machine
 from .part_job import JobOptions, prepare_part
 from .part_options import PartOptions, ToolLengthText, fit_part, parse_tool_length, read_part
 from .post import MachineOption, WorkpieceText
@@ -27,7 +27,7 @@ def page(
     /,
     *,
     machine: MachineOption | None = None,
-    output: Annotated[Path | None, Parameter(name=["--output", "-o"])] = None,
+    output: OutputPath = None,
     workpiece: WorkpieceText = None,
     tool_length: ToolLengthText = None,
     mode: Mode = None,

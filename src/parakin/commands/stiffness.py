@@ -13,7 +13,7 @@ from ..export.number_format import format_fixed
 from ..units import to_display
 from .accuracy import split_pairs
 from .console import announce_compiling, format_table, print_json, print_remark, print_text
-from .options import OFF_LIMITS, Json, Name, Sizes, load_machine
+from .options import OFF_LIMITS, Json, Name, OutputPath, Sizes, load_machine
 from .region_options import split_axes
 
 if TYPE_CHECKING:
@@ -32,7 +32,7 @@ def stiffness(
     along: str | None = None,
     csv: Path | None = None,
     samples: int | None = None,
-    output: Annotated[Path | None, Parameter(name=["--output", "-o"])] = None,
+    output: OutputPath = None,
     json: Json = False,
     sizes: Sizes = None,
 ) -> int:
@@ -73,7 +73,8 @@ def stiffness(
     direction = None if along is None else _name_direction(machine, along)
     rows, lines = (None, None) if csv is None else _read_poses(machine, csv)
     announce_compiling()
-    from ..stiffness.stiffness import SAMPLES, analyse_stiffness
+    from ..stiffness.stiffness import analyse_stiffness
+    from ..workspaces.sampled.allowed_poses import SAMPLES
 
     result = analyse_stiffness(machine, of_drives, of_struts, rows, SAMPLES if samples is None else samples)
     unreachable = _find_unreachable(result, csv, lines)

@@ -22,10 +22,8 @@ from ..toolpath.path import ToolPath
 from ..toolpath.placing.placement import find_placements
 from ..workspaces.certified.region import make_region
 from ..workspaces.certified.workspace import Workspace, workspace
-from ..workspaces.sampled.allowed_poses import sample_allowed_poses
+from ..workspaces.sampled.allowed_poses import SAMPLES, check_sample_count, sample_allowed_poses
 
-SAMPLES = 400
-_MOST_SAMPLES = 20_000
 _GAP = 0.03  # of the workspace's volume
 _SECONDS = 10.0  # for a workspace
 
@@ -83,8 +81,7 @@ def compare(
     """
     if len(machines) < 2:
         raise PoseError("machines: two at least expected")
-    if not 1 <= samples <= _MOST_SAMPLES:
-        raise PoseError(f"samples: a number from 1 to {_MOST_SAMPLES} expected, not {samples}")
+    check_sample_count(samples)
     if struts is not None and drives is None:
         raise PoseError("struts: the drives' stiffness is missing")
     for tolerance in read_tolerances(tolerances) if tolerances is not None else ():

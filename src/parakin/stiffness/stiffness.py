@@ -12,11 +12,8 @@ from ..arrays import Array
 from ..errors import PoseError
 from ..families.family import Family, solve_each
 from ..machine import Machine
-from ..workspaces.sampled.allowed_poses import sample_allowed_poses
+from ..workspaces.sampled.allowed_poses import SAMPLES, choose_poses
 from .springs import MachineSprings, Springs, StrutColumns, list_leg_springs, read_springs
-
-SAMPLES = 400
-_MOST_SAMPLES = 20_000
 
 
 @dataclass(frozen=True, eq=False)
@@ -125,12 +122,7 @@ def analyse_stiffness(
     Raises :class:`PoseError`.
     """
     springs = read_springs(machine, drives, struts)
-    if poses is None:
-        if not 1 <= samples <= _MOST_SAMPLES:
-            raise PoseError(f"samples: a number from 1 to {_MOST_SAMPLES} expected, not {samples}")
-        rows = sample_allowed_poses(machine, samples)
-    else:
-        rows, _ = machine.rows(poses, machine.axes, "poses")
+    rows = choose_poses(machine, poses, samples)
     return compute_stiffness(machine, rows, springs)
 
 

@@ -6,16 +6,36 @@ from functools import lru_cache
 
 import numpy as np
 
+from ...arguments import RowsLike
 from ...arrays import Array
 from ...errors import PoseError
 from ...kernels.intervals import freeze_rows
 from ...machine import Machine
 
+SAMPLES = 400  # of the workspace, if nothing else is said
+_MOST_SAMPLES = 20_000
 _WIDER = 1.5  # than what is proved along the axes from home
 _MOST_ROUNDS = 200
 _A_ROUND = 4096
 _REGULAR = 0.25  # of home's regularity
 _MOST_TILT = 0.5  # rad either way, of an axis that turns farther
+
+
+def choose_poses(machine: Machine, poses: RowsLike | None, samples: int) -> Array:
+    """Choose the rows of given poses, (N, axes), or as many of the workspace as ``samples`` where none are given.
+
+    Raises :class:`PoseError` for poses that are none, or for too few or too many samples.
+    """
+    if poses is not None:
+        return machine.rows(poses, machine.axes, "poses")[0]
+    check_sample_count(samples)
+    return sample_allowed_poses(machine, samples)
+
+
+def check_sample_count(samples: int) -> None:
+    """Check how many poses of a workspace are wanted; raises :class:`PoseError`."""
+    if not 1 <= samples <= _MOST_SAMPLES:
+        raise PoseError(f"samples: a number from 1 to {_MOST_SAMPLES} expected, not {samples}")
 
 
 @lru_cache(maxsize=16)

@@ -52,10 +52,13 @@ def build_smooth(path: Sines, rows: int) -> JointPath:
     return build_rows(np.diff(s), path.derive(s, 0), np.full(rows, UNBOUND))
 
 
-def draw_wild(seed: int, most: int) -> tuple[JointPath, DriveLimits]:
-    """A path with noise, steps from 1e-6 to 10 mm, stops, standing joints, changing feeds, and hard or soft limits."""
+def draw_wild(seed: int, most: int, least: float = 10.0**0.3) -> tuple[JointPath, DriveLimits]:
+    """A path with noise, steps from 1e-6 to 10 mm, stops, standing joints, changing feeds, and hard or soft limits.
+
+    It has ``least`` to ``most`` rows, their number's logarithm evenly drawn.
+    """
     rng = np.random.default_rng([seed, 11])
-    count, joints = int(10.0 ** rng.uniform(0.3, np.log10(most))), int(rng.integers(1, 7))
+    count, joints = int(10.0 ** rng.uniform(np.log10(least), np.log10(most))), int(rng.integers(1, 7))
     step = 10.0 ** rng.uniform(*sorted(rng.uniform((-4.0, -3.0), (0.0, 1.0))), count)
     tiny = rng.random(count) < rng.choice([0.0, 0.02])
     step[tiny] = 10.0 ** rng.uniform(-6.0, -4.0, int(tiny.sum()))

@@ -11,7 +11,7 @@ from parakin.errors import InputError, PoseError
 from parakin.machine import Machine
 from parakin.toolpath.path import ToolPath
 from parakin.toolpath.posting.post import post_path
-from parakin.toolpath.timing import plan_trajectory
+from parakin.toolpath.timing import joint_path, plan_trajectory
 from parakin.toolpath.timing.drive_limits import DriveLimits
 
 INF = np.inf
@@ -274,6 +274,15 @@ def test_a_corner_is_as_far_off_as_it_may_be():
         trajectory = square(machine, tolerance=tolerance)
         off = np.linalg.norm(trajectory.at(trajectory.times[1:-1]).poses - trajectory.posted.poses[1:-1], axis=1)
         assert (off <= tolerance).all() and (off > 0.98 * tolerance).all()
+
+
+def test_a_motion_of_one_step_between_two_stands_takes_its_time(monkeypatch):
+    machine = limited(pk.load("linear_delta"), mm=(INF, 2000.0, INF))
+    tip = np.array([[0.0, 0.0, 300.0 + k % 2] for k in range(6)])
+    monkeypatch.setattr(joint_path, "ENOUGH", 0)  # as on paths of millions of records
+    trajectory = plan_trajectory(posted(machine, tip), corners="stop")
+    assert trajectory.seconds == pytest.approx(5 * 2.0 * np.sqrt(1.0 / 2000.0), rel=1e-3)
+    hold(trajectory)
 
 
 def test_a_straight_line_of_many_records_is_one_line():

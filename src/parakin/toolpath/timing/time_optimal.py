@@ -56,7 +56,8 @@ def find_quickest(joint_path: JointPath, limits: DriveLimits) -> tuple[JointPath
         run_in_threads(count, lambda start, stop: lost.append(find_switches(*args, start, stop)))  # noqa: B023
         refuse_unbound(joint_path, np.maximum(x[:-1], x[1:]))
         steps = np.concatenate([np.flatnonzero(where) for where in switches])
-        if attempt == _ROUNDS - 1 or sum(lost) <= WORTH * compute_spans(joint_path, x).sum() or not len(steps):
+        # A step between two stands takes forever until it has a row; what it loses is infinite, too.
+        if attempt == _ROUNDS - 1 or sum(lost) < WORTH * compute_spans(joint_path, x).sum() or not len(steps):
             break
         fractions = np.concatenate([where[where > 0.0] for where in switches])
         order = np.lexsort((fractions, steps))
@@ -75,10 +76,11 @@ def refuse_unbound(joint_path: JointPath, x: Array) -> None:
 
 
 def compute_spans(joint_path: JointPath, x: Array) -> Array:
-    """Compute the time of each step, s, from ṡ² at the rows."""
+    """Compute the time of each step, s, from ṡ² at the rows; infinite between two stands."""
     speed, moving = np.sqrt(x), joint_path.step > 0.0
     time, total = np.zeros(len(moving)), speed[:-1] + speed[1:]
-    spans: Array = np.divide(2.0 * joint_path.step, total, out=time, where=moving)
+    with np.errstate(divide="ignore"):
+        spans: Array = np.divide(2.0 * joint_path.step, total, out=time, where=moving)
     return spans
 
 

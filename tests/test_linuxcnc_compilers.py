@@ -10,9 +10,11 @@ from pathlib import Path
 import pytest
 
 import parakin as pk
+from parakin.controllers.linuxcnc.model_header import name_model, write_model
+from parakin.controllers.linuxcnc.planner import write_planner
 
 sys.path.insert(0, str(Path(__file__).parent / "linuxcnc"))
-from stub import HEADERS, HERE
+from stub import HEADERS, HERE, PLANNER_HEADERS
 
 INSTALLED = Path("/usr/include/linuxcnc")
 WARNINGS = ["-Wall", "-Wextra", "-Werror", "-Wdouble-promotion", "-Wshadow", "-Wstrict-prototypes"]
@@ -20,23 +22,35 @@ WARNINGS += ["-Wmissing-prototypes", "-Wpointer-arith", "-Wcast-qual", "-Wundef"
 DEFINED = ["-DRTAPI", "-DUSPACE", "-D_GNU_SOURCE", "-D__MODULE__"]
 
 
-@pytest.fixture
-def headers(tmp_path):
-    """Options for LinuxCNC's own headers where they are installed, else for the tests' own."""
-    if INSTALLED.exists():
-        return ["-isystem", str(INSTALLED)]
+
+def write_stub_headers(folder):
+    """The tests' own headers in the place of LinuxCNC's."""
     for name in HEADERS:
-        (tmp_path / name).write_text('#include "stub_hal.h"\n')
-    for name in ("motion.h", "tp.h"):
-        (tmp_path / name).write_text('#include "stub_motion.h"\n')
-    return ["-isystem", str(tmp_path), "-isystem", str(HERE)]
+        (folder / name).write_text('#include "stub_hal.h"\n')
+    for name in PLANNER_HEADERS:
+        (folder / name).write_text('#include "stub_motion.h"\n')
+    return ["-isystem", str(folder), "-isystem", str(HERE)]
+
+
+def write_newer_headers(folder):
+    """LinuxCNC's headers with what its master changed by 2026 of what the planner has to do: motions have a jerk."""
+    for header in INSTALLED.glob("*.h"):
+        (folder / header.name).write_bytes(header.read_bytes())
+    functions = (folder / "tp.h").read_text()
+    changed = functions.replace("double acc,", "double acc, double ini_maxjerk,")
+    assert changed.count("ini_maxjerk") == 3  # lines, arcs, rigid tapping
+    (folder / "tp.h").write_text(changed)
+    with (folder / "emccfg.h").open("a") as file:
+        file.write("#define DEFAULT_AXIS_MAX_JERK 0.0\n")
+    return ["-isystem", str(folder)]
 
 
 @pytest.mark.parametrize("name", ["tricept", "lambda6", "orthoglide5_table", "hbg80_2d"])
 @pytest.mark.parametrize("compiler", ["gcc", "clang"])
-def test_no_compiler_warns(compiler, name, headers, tmp_path):
+def test_no_compiler_warns(compiler, name, tmp_path):
     if not shutil.which(compiler):
         pytest.skip(f"there is no {compiler}")
+    headers = ["-isystem", str(INSTALLED)] if INSTALLED.exists() else write_stub_headers(tmp_path)
     files = pk.make_linuxcnc_configuration(pk.load(name))
     sources = [file for file in files if file.endswith((".c", ".h"))]
     assert len(sources) == 4
@@ -44,6 +58,18 @@ def test_no_compiler_warns(compiler, name, headers, tmp_path):
         (tmp_path / file).write_text(files[file], encoding="utf-8")
     for file in sources:
         if file.endswith(".c"):
-            command = [compiler, "-O1", "-c", "-o", "/dev/null", *DEFINED, *WARNINGS, *headers, file]
-            done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True)
-            assert done.returncode == 0, done.stderr
+            compile_quietly(compiler, ["-O1", "-c", "-o", "/dev/null", *headers, file], tmp_path)
+
+
+def compile_quietly(compiler, arguments, folder):
+    command = [compiler, *DEFINED, *WARNINGS, *arguments]
+    done = subprocess.run(command, cwd=folder, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+
+
+@pytest.mark.skipif(not INSTALLED.exists(), reason="LinuxCNC's headers are not installed")
+def test_the_planner_takes_the_jerk_of_newer_headers(tmp_path):
+    machine, headers = pk.load("linear_delta"), write_newer_headers(tmp_path)
+    (tmp_path / name_model(machine)).write_text(write_model(machine))
+    (tmp_path / "planner.c").write_text(write_planner(machine))
+    compile_quietly("gcc", ["-fsyntax-only", *headers, "planner.c"], tmp_path)

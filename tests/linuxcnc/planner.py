@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from itertools import islice
 
 import numpy as np
-from stub import FIELDS, HERE, Stub, outward, world
+from stub import FIELDS, HERE, PLANNER_HEADERS, Stub, outward, world
 
 from parakin.controllers.linuxcnc.model_header import name_model, write_model
 from parakin.controllers.linuxcnc.planner import name_planner, write_planner
@@ -53,7 +53,7 @@ class Planner:
 
     def __init__(self, machine, folder):
         self.machine, stub, name = machine, Stub(folder), name_planner(machine)
-        for header in ("motion.h", "tp.h"):
+        for header in PLANNER_HEADERS:
             (stub.folder / header).write_text('#include "stub_motion.h"\n')
         (stub.folder / name_model(machine)).write_text(write_model(machine))
         (stub.folder / f"{name}.c").write_text(write_planner(machine))

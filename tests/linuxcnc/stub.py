@@ -13,6 +13,7 @@ from parakin.controllers.linuxcnc.model_header import list_limit_names, name_mod
 
 HERE = Path(__file__).parent
 HEADERS = ("rtapi.h", "rtapi_app.h", "rtapi_math.h", "rtapi_string.h", "hal.h", "kinematics.h", "emcmotcfg.h")
+PLANNER_HEADERS = ("motion.h", "tp.h", "emccfg.h")
 # As LinuxCNC's Makefile.modinc compiles a module.
 FLAGS = ["-Os", "-fno-fast-math", "-mieee-fp", "-fno-unsafe-math-optimizations", "-fno-builtin-sincos"]
 FLAGS += ["-fno-builtin-sin", "-fno-builtin-cos", "-D_GNU_SOURCE", "-DRTAPI", "-fPIC"]

@@ -1,5 +1,14 @@
 /* What LinuxCNC asks of a trajectory planner. It calls all of this from its servo thread. */
 
+/* From 2.10 on LinuxCNC tells each motion its jerk, of which this planner makes no use. */
+#ifdef DEFAULT_AXIS_MAX_JERK
+#define TOLD_JERK double told_jerk,
+#define IGNORE_JERK (void)told_jerk
+#else
+#define TOLD_JERK
+#define IGNORE_JERK
+#endif
+
 int tpCreate(TP_STRUCT *tp, int size, int id)
 {
     (void)tp;
@@ -100,10 +109,11 @@ int tpSetRunDir(TP_STRUCT *tp, tc_direction_t direction)
 }
 
 int tpAddLine(TP_STRUCT *tp, EmcPose end, int canon_type, double asked, double most, double acceleration,
-              unsigned char enables, char at_speed, int indexer, struct state_tag_t tag)
+              TOLD_JERK unsigned char enables, char at_speed, int indexer, struct state_tag_t tag)
 {
     (void)tp;
     (void)acceleration;
+    IGNORE_JERK;
     Motion *m = prepare_motion(&end, canon_type, asked, most, enables, at_speed, tag);
     if (!m || indexer >= 0)
         return -1;
@@ -118,11 +128,12 @@ int tpAddLine(TP_STRUCT *tp, EmcPose end, int canon_type, double asked, double m
 }
 
 int tpAddCircle(TP_STRUCT *tp, EmcPose end, PmCartesian centre, PmCartesian normal, int turns, int canon_type,
-                double asked, double most, double acceleration, unsigned char enables, char at_speed,
+                double asked, double most, double acceleration, TOLD_JERK unsigned char enables, char at_speed,
                 struct state_tag_t tag)
 {
     (void)tp;
     (void)acceleration;
+    IGNORE_JERK;
     Motion *m = prepare_motion(&end, canon_type, asked, most, enables, at_speed, tag);
     if (!m || !describe_arc(m, &centre, &normal, turns))
         return -1;
@@ -131,10 +142,11 @@ int tpAddCircle(TP_STRUCT *tp, EmcPose end, PmCartesian centre, PmCartesian norm
     return add_motion(m);
 }
 
-int tpAddRigidTap(TP_STRUCT *tp, EmcPose end, double asked, double most, double acceleration, unsigned char enables,
-                  double scale, struct state_tag_t tag)
+int tpAddRigidTap(TP_STRUCT *tp, EmcPose end, double asked, double most, double acceleration,
+                  TOLD_JERK unsigned char enables, double scale, struct state_tag_t tag)
 {
     (void)tp;
+    IGNORE_JERK;
     (void)end;
     (void)asked;
     (void)most;

@@ -39,7 +39,7 @@ def _make_module(machine: Machine) -> RealtimeModule:
         name_planner(machine),
         "LinuxCNC's trajectory planner of",
         f"{_write_numbers()}\n{read_source(__package__, *_FILES)}",
-        ("motion.h", "tp.h"),
+        ("motion.h", "tp.h", "emccfg.h"),
         _NOTE,
     )
 

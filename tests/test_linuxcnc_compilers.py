@@ -22,7 +22,6 @@ WARNINGS += ["-Wmissing-prototypes", "-Wpointer-arith", "-Wcast-qual", "-Wundef"
 DEFINED = ["-DRTAPI", "-DUSPACE", "-D_GNU_SOURCE", "-D__MODULE__"]
 
 
-
 def write_stub_headers(folder):
     """The tests' own headers in the place of LinuxCNC's."""
     for name in HEADERS:

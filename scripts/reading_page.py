@@ -136,14 +136,18 @@ def list_words() -> list[str]:
             [
                 (join_names(CYCLES), "kinds of `CYCLE`, written out as motion"),
                 (join_names(passed), "kept in order; what a controller has a code for is passed on"),
-                (join_names(TEXT_WORDS), "texts, kept in order as comments"),
+                (
+                    join_names(TEXT_WORDS),
+                    "texts, kept in order as comments; one M code of `INSERT` is passed on, other G-code refused",
+                ),
                 (join_names(silent), "no effect"),
                 (join_names(sorted(INFORMING)), "only inform; listed once"),
             ],
         ),
         "Refused with their line:\n",
         make_table(("why", "words"), refused),
-        "A word that is not here earns a note; one that begins with GO, or is one letter off a word that acts, is "
+        "A word that is not here earns a note; one that begins with GO, is one letter off a word that acts, or stands "
+        "before numbers alone, as many as a point or a frame has, is "
         "refused.\n",
     ]
 

@@ -1,6 +1,7 @@
 """Accuracy against direct problems of drawn machines, and bounds that none of them breaks."""
 
 import json
+import math
 import subprocess
 import sys
 from itertools import product
@@ -140,6 +141,10 @@ def test_the_command(tmp_path, capsys):
     assert "at 100 poses of the workspace" in said
     assert "no machine within them is off by more than" in said
     assert path.read_bytes().startswith(b"\x89PNG")
+    assert main(words) == 0
+    table = capsys.readouterr().out.rstrip().splitlines()[-4:]
+    assert [line.split()[0] for line in table] == ["tolerance", "feet", "rods", "encoders"]
+    assert "allowed" not in table[0]
     assert main([*words, "--json"]) == 0
     answer = json.loads(capsys.readouterr().out)
     assert answer["schema"] == "parakin.accuracy/1"
@@ -187,3 +192,15 @@ def test_a_tolerance_takes_the_numbers_of_its_unit():
     assert [len(columns) for columns in within.groups] == [3, 2]
     with pytest.raises(PoseError, match="at least one expected"):
         read_tolerances({})
+
+
+def test_mistaken_costs_and_ranges_in_python():
+    result = pk.analyse_accuracy(pk.load("orthoglide"), {"feet": "0.05 mm"}, samples=5)
+    for cost in ("x", 0.0, -1.0, math.nan, None):
+        with pytest.raises(pk.PoseError, match="costs feet: a number above 0 expected"):
+            pk.allocate_tolerances(result, 0.05, {"feet": cost})
+    for ends in (5, "0:1", (1,), (1.0, 0.0), (0.0, math.nan), ("0 deg", "1 deg"), None):
+        with pytest.raises(pk.PoseError, match="ranges: X"):
+            pk.bound_worst_case(result, {"X": ends})
+    told = pk.bound_worst_case(result, {"X": ("-1 cm", "10 mm")}, 0.5)
+    assert told.bound == pk.bound_worst_case(result, {"X": (-10.0, 10.0)}, 0.5).bound

@@ -257,6 +257,17 @@ def test_mistaken_arguments_are_refused_in_one_line(things, tmp_path, monkeypatc
                     raise AssertionError(f"{function.__name__}({name}={value!r})") from error
 
 
+def test_every_public_function_refuses_what_it_does_not_know():
+    for name in dir(pk):
+        function = getattr(pk, name)
+        if inspect.isfunction(function):
+            needed = [p.name for p in inspect.signature(function).parameters.values() if p.default is p.empty]
+            if needed and name != "load":
+                with pytest.raises(pk.ParakinError) as caught:
+                    function(**{argument: object() for argument in needed})
+                assert len(str(caught.value).splitlines()) == 1, name
+
+
 def test_what_is_masked_is_no_number(tricept):
     poses = np.ma.masked_array([tricept.home, tricept.home], mask=[[False] * 5, [False, True, False, False, False]])
     assert np.isfinite(tricept.inverse(poses)).all(1).tolist() == [True, False]

@@ -422,7 +422,6 @@ def test_unit(read, unit, scale):
         ("GOTO/0,0,0\nGOTO/1,0,0\n", 2),
         ("SPINDL/RPM,4000,CLW\nRAPID\nGOTO/0,0,20\nGOTO/0,0,-2\n", 4),
         ("FEDRAT/0.2,MMPR\nGOTO/0,0,0\nGOTO/1,0,0\n", 3),
-        ("SPINDL/100,SMM\nFEDRAT/0.2,MMPR\nGOTO/0,0,0\nRAPID\nGOTO/1,0,0\nGOTO/2,0,0\n", 6),
         (CREO_HEADER + "GOTO/0,20,0\nCIRCLE/0,0,0,0,0,1,20\nGOTO/20,0,0\n", 4),
         ("GOTO/0,0,9\nCYCLE/DRILL,DEPTH,5,CLEAR,2\nGOTO/0,0,0\n", 3),
         ("CYCLE/DRILL,DEPTH,5,CLEAR,2\nGOTO/0,0,0\n", 2),

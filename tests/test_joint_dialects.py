@@ -251,7 +251,6 @@ SAID = [
     ("nx", "COOLNT/OFF", ["M9"]),
     ("nx", "STOP", ["M0"]),
     ("nx", "DELAY/2.5", ["dwell 2.5"]),
-    ("nx", "DELAY/3,REV", ["dwell 0.02"]),
     ("nx", "LOAD/TOOL,2", ["M5", "M9", "M0"]),
     ("nx", "PPRINT (abort! now) ; 100% ~", []),
     ("gcode", "S800", ["speed 800"]),

@@ -310,7 +310,6 @@ def told(events, dialect="nx", writer=pk.make_linuxcnc_program, **fields):
         ("apt", "STOP", "M0"),
         ("apt", "OPSTOP", "M1"),
         ("apt", "DELAY/2.5", "G4 P2.5"),
-        ("apt", "DELAY/3,REV", "G4 P0.015"),
         ("apt", "PPRINT (abort, now) ; 100%", "( line 10: PPRINT [abort, now] , 100? )"),
         ("apt", "abort, now", "( line 10: abort, now )"),
         ("apt", "PPRINT Stück", "( line 10: PPRINT St?ck )"),

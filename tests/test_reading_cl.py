@@ -245,11 +245,6 @@ def test_feed_per_revolution_follows_the_spindle(both):
     assert p.notes == ()
 
 
-def test_surface_speed_leaves_the_spindle_open(both):
-    p = both("SPINDL/120,SMM,CLW\nGOTO/1,2,3\n")
-    assert np.isnan(p.spindle[0]) and p.notes[0].line == 1
-
-
 def test_inches(both):
     text = "$$*CATIA0\n$$ 1 0 0 1\n$$ 0 1 0 2\n$$ 0 0 1 3\nUNITS/INCHES\nCUTTER/0.5\nGOTO/1,2,3\nGODLTA/1,0,0\n"
     p = both(text)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import minimize
 
-from ..arguments import RowsLike, check_arguments
+from ..arguments import RowsLike, check_arguments, check_positive
 from ..arrays import Array
 from ..errors import PoseError
 from ..machine import Machine
@@ -113,8 +113,7 @@ def allocate_tolerances(accuracy: Accuracy, error: float, costs: Mapping[str, fl
     for name, cost in (costs or {}).items():
         if name not in names:
             raise PoseError(f"costs: unknown {name}, one of {', '.join(names)} expected")
-        if not 0.0 < cost < np.inf:
-            raise PoseError(f"costs: {name} of {cost:g}, expected more than 0")
+        check_positive(f"costs {name}", cost)
     variances = accuracy.shares * accuracy.deviations[:, None] ** 2
     units = np.array([1.0 if tolerance.unit == "mm" else 1.0 / size for tolerance in within.tolerances])
     values = np.array([tolerance.value for tolerance in within.tolerances]) / units

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..algebra import Scalar, derivative
-from ..arguments import check_arguments
-from ..arrays import Array, Flags
+from ..arguments import check_arguments, parse_range
+from ..arrays import Array, AxisRange, Flags
 from ..budget import SECONDS, Budget
 from ..errors import PoseError, suggest
 from ..kernels.batch import evaluate_tape
@@ -50,12 +50,10 @@ class WorstCase:
 
 
 @check_arguments
-def bound_worst_case(
-    accuracy: Accuracy, ranges: Mapping[str, tuple[float, float]], seconds: float = SECONDS
-) -> WorstCase:
+def bound_worst_case(accuracy: Accuracy, ranges: Mapping[str, AxisRange], seconds: float = SECONDS) -> WorstCase:
     """Bound the tip's error over a box of poses and all machines within tolerances, whose joints are the nominal ones.
 
-    ranges : of axes, mm and rad; the others are at home
+    ranges : of axes, mm and rad, or texts with their unit; the others are at home
 
     The motion's coordinates y of a machine with other sizes are a zero of its closures, so they lie in a box that
     Krawczyk's operator maps into itself, and nowhere else in it. The tip then follows by its derivatives over that box
@@ -68,9 +66,10 @@ def bound_worst_case(
     for axis, ends in ranges.items():
         if axis not in machine.axes:
             raise PoseError(f"ranges: unknown axis {axis}{suggest(axis, machine.axes)}")
-        if not -np.inf < ends[0] <= ends[1] < np.inf:
+        k = machine.axes.index(axis)
+        low[k], high[k] = parse_range(f"ranges: {axis}", ends, machine.axis_units[k])
+        if not -np.inf < low[k] <= high[k] < np.inf:
             raise PoseError(f"ranges: {axis} is empty or not finite")
-        low[machine.axes.index(axis)], high[machine.axes.index(axis)] = ends
     enclosure = _Enclosure(accuracy.tolerances)
     lows, highs = low[None], high[None]
     bounds = enclosure.bound(lows, highs)

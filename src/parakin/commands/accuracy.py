@@ -150,7 +150,7 @@ def _format_accuracy(result: Accuracy, proved: WorstCase | None, allowed: Mappin
         rows.append(row)
     header = ["tolerance", "either way", "of the variance", "at the worst pose"]
     header += ["allowed"] if allowed is not None else []
-    lines += ["", format_table(rows, header, " rrrr")]
+    lines += ["", format_table(rows, header, " " + "r" * (len(header) - 1))]
     if proved is not None:
         bound = f"{format_fixed(1e3 * proved.bound, 1)} um" if proved.bound < float("inf") else _UNPROVED
         lines += ["", f"no machine within them is off by more than  {bound}"]

@@ -166,11 +166,11 @@ def read_measurements(machine: Machine, path: Path, centre: str | None, noise: N
     Raises :class:`InputError` with file and line.
     """
     from ..calibration.measurements import make_measurements
-    from .rows import read_rows
+    from .rows import open_table, read_rows
     from .values import parse_row
 
     try:
-        with path.open(encoding="utf-8-sig") as file:
+        with open_table(path) as file:
             header = file.readline()
     except OSError as error:
         raise InputError(f"cannot be read: {error.strerror}", str(path)) from error

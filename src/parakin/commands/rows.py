@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import io
 import math
 from collections.abc import Iterator, Sequence
 from pathlib import Path
@@ -12,7 +13,7 @@ import numpy as np
 
 from ..arrays import Array, Indices
 from ..errors import InputError, quote, suggest
-from ..toolpath.reading.text import LARGEST
+from ..toolpath.reading.text import LARGEST, open_file
 from ..units import ANGLE, LENGTH, UNITS
 
 
@@ -26,12 +27,17 @@ def read_rows(path: Path, names: Sequence[str], units: Sequence[str]) -> tuple[A
     """
     source = str(path)
     try:
-        with path.open(encoding="utf-8-sig", newline="") as file:
+        with open_table(path) as file:
             return _read_table(file, source, names, units)
     except OSError as error:
         raise InputError(f"cannot be read: {error.strerror}", source) from error
     except UnicodeDecodeError:
         raise InputError("not a text file in UTF-8", source) from None
+
+
+def open_table(path: Path) -> TextIO:
+    """Open a CSV file, which is no pipe and no device: those may never end."""
+    return io.TextIOWrapper(open_file(path, str(path)), encoding="utf-8-sig", newline="")
 
 
 def _read_table(file: TextIO, source: str, names: Sequence[str], units: Sequence[str]) -> tuple[Array, Indices]:

@@ -22,7 +22,7 @@ _END = re.compile(r"M(?:2|30)")  # the program's own end replaces them
 _MESSAGE = re.compile(r"\(\s*msg\s*,(.*)\)", re.I | re.S)
 _STATEMENT = re.compile(r"([A-Z-]+)\s*(?:/(.*))?", re.S)
 _TURN = re.compile(r"^SPINDL\b.*\b(CC?LW)\b")  # which way the spindle turns; a later ON does not repeat it
-_INSERTED = re.compile(r"INSERT[\s/,]*[\"']?M(\d{1,3})[\"']?", re.I)  # a word that the file gives the controller itself
+_INSERTED = re.compile(r"INSERT[\s/,]*[\"']?M(\d{1,9})[\"']?", re.I)  # a word that the file gives the controller itself
 _KEPT_BACK = COMMENTED | {2, 30, 98, 99}  # M codes that no INSERT and no AUXFUN may give
 _LOADING = re.compile(r"M6$|(?:LOADTL|TOOLNO)\b|LOAD\s*/\s*TOOL\b", re.I)  # statements that change the tool
 _COOLANT = {"ON": "M8", "FLOOD": "M8", "MIST": "M7", "OFF": "M9"}
@@ -97,7 +97,7 @@ def _describe_change(use: ToolUse) -> str:
 def _translate_event(event: Event, path: ToolPath) -> Iterator[Command]:
     """Yield the commands of an event."""
     message = _MESSAGE.fullmatch(event.text)
-    seconds = find_dwell(event, path)
+    seconds = find_dwell(event)
     if message:
         yield Command("message", message[1], event.line)
     elif _END.fullmatch(event.text):
@@ -138,7 +138,9 @@ def _find_word(event: Event, path: ToolPath) -> str | None:
     if name == "AUXFUN":
         return _format_auxiliary(arguments, event, path)
     inserted = _INSERTED.fullmatch(event.text)
-    return None if inserted is None or int(inserted[1]) in _KEPT_BACK else f"M{int(inserted[1])}"
+    if inserted is None or (event.record == len(path) and _END.fullmatch(f"M{int(inserted[1])}")):
+        return None
+    return _format_auxiliary([inserted[1]], event, path)
 
 
 def _keep_word(event: Event, path: ToolPath) -> str | None:
@@ -155,22 +157,24 @@ def _keep_word(event: Event, path: ToolPath) -> str | None:
 
 
 def _format_auxiliary(arguments: list[str], event: Event, path: ToolPath) -> str:
-    """Switch what the controller calls by an M code (AUXFUN)."""
+    """Switch what the controller calls by an M code (AUXFUN, INSERT)."""
     number = arguments[0] if len(arguments) == 1 else ""
     if not number.isascii() or not number.isdigit() or int(number) > _LARGEST_CODE or int(number) in _KEPT_BACK:
         raise PoseError(
             f"{path.source}:{event.line}: {make_plain(event.text)[:40]} can't be passed on; "
-            f"AUXFUN and the number of an M code that moves nothing expected"
+            f"the number of an M code that moves nothing and changes no tool expected"
         )
     return f"M{int(number)}"
 
 
 def _format_spindle(arguments: list[str], event: Event, path: ToolPath) -> str | None:
-    """Switch the spindle off, or on at its speed; None for a surface speed."""
+    """Switch the spindle off, or on at its speed; None where that is not known."""
     if "OFF" in arguments:
         return "M5"
     speed = float(path.spindle[event.record]) if event.record < len(path) else float("nan")
-    if not 0.0 < speed < 1e9:
+    if speed == 0.0:
+        return "M5"
+    if not speed < 1e9:
         return None
     turns = _TURN.findall(event.text.upper())  # a tap's hole has several events in one line
     turns = turns or [turn for e in path.events if e.line <= event.line for turn in _TURN.findall(e.text.upper())]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from ..arguments import check_arguments
 from .position_map import MapText, render_position_map
 
 if TYPE_CHECKING:
@@ -11,6 +12,7 @@ if TYPE_CHECKING:
     from ..arrays import Array
 
 
+@check_arguments
 def render_accuracy_png(accuracy: Accuracy) -> bytes:
     """Render the tip's root mean square error over the first two translations, all else as at home.
 

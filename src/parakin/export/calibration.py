@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..arguments import check_arguments
 from ..units import name_display_unit, to_display
 from .machine.figures import FAINT, INK
 
@@ -16,6 +17,7 @@ if TYPE_CHECKING:
 _WAS, _IS = "#b0bec5", "#1565c0"
 
 
+@check_arguments
 def format_calibrated_yaml(calibration: Calibration) -> str:
     """Format the calibrated machine as a machine file; comments tell each number with its standard deviation."""
     lines = [
@@ -33,6 +35,7 @@ def format_calibrated_yaml(calibration: Calibration) -> str:
     return "\n".join([*lines, calibration.machine.format_yaml()])
 
 
+@check_arguments
 def render_residuals_png(calibration: Calibration) -> bytes:
     """Render each measurement's residual before and after the calibration, in the measured number's unit, log scale."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..arguments import check_arguments
 from .position_map import MapText, render_position_map
 
 if TYPE_CHECKING:
@@ -14,6 +15,7 @@ if TYPE_CHECKING:
     from ..stiffness.stiffness import Stiffness
 
 
+@check_arguments
 def render_stiffness_png(
     stiffness: Stiffness, *, along: RowsLike | None = None, force: RowsLike | None = None
 ) -> bytes:

@@ -2,11 +2,10 @@
 
 import os
 import re
-from pathlib import Path
 
 from ...arguments import check_arguments
 from ...errors import InputError
-from .text import BYTE_ORDER_MARK, decode_line, parse_number, quote_short
+from .text import BYTE_ORDER_MARK, decode_line, open_file, parse_number, quote_short
 
 _WORD = re.compile(r"([A-Za-z])\s*([-+]?[\d.]+)\s*")
 _LETTERS = "TPXYZABCUVWDIJQ"
@@ -24,12 +23,10 @@ def read_tool_table(path: str | os.PathLike[str]) -> dict[int, float]:
     """
     source = os.fsdecode(path)
     try:
-        with Path(path).open("rb") as file:
-            data = file.read(_LARGEST_FILE + 1)
+        with open_file(path, source) as file:
+            data = file.read(_LARGEST_FILE + 1) or b""
     except OSError as error:
         raise InputError(f"cannot be read: {error.strerror}", source) from error
-    except ValueError as error:
-        raise InputError("cannot be read: a null character in the name", quote_short(source)) from error
     if len(data) > _LARGEST_FILE:
         raise InputError(f"more than {_LARGEST_FILE} bytes; expected a tool table", source)
     lengths: dict[int, float] = {}
@@ -60,8 +57,9 @@ def _parse_tool(text: str) -> tuple[int, float]:
     tool = words.get("T", -1.0)
     if not (tool >= 0.0 and tool == int(tool)):
         raise InputError(f"no tool's number; {_FORM}")
-    if words.get("X") or words.get("Y"):
-        raise InputError("an offset of the tool in X or Y; expected a tool in the spindle's axis")
+    offset = next((letter for letter in "XYABCUVW" if words.get(letter)), None)
+    if offset is not None:
+        raise InputError(f"an offset of the tool in {offset}; expected a tool in the spindle's axis, told by its Z")
     length = words.get("Z", 0.0)
     if length < 0.0:
         raise InputError(f"Z{length:g}: a length below zero; expected the distance from the spindle's nose to the tip")

@@ -7,10 +7,7 @@ from .text import refuse
 
 
 class ToolLog:
-    """Keep the tools of a file. Statements between the same two records speak of one tool.
-
-    data : what is known of the tool in use
-    """
+    """Keep the tools of a file. Statements between the same two records speak of one tool."""
 
     def __init__(self) -> None:
         self.uses: list[ToolUse] = []
@@ -22,6 +19,12 @@ class ToolLog:
     def data(self) -> dict[str, float | str]:
         """What is known of the first tool."""
         return dict(self.uses[0].data) if self.uses else {}
+
+    @property
+    def diameter(self) -> float | None:
+        """The diameter of the tool in use, mm; None where it is not known."""
+        diameter = self.uses[-1].data.get("diameter") if self.uses else None
+        return diameter if isinstance(diameter, float) and diameter > 0.0 else None
 
     def tell(self, record: int, line: int, data: Mapping[str, float | str], *, loads: bool = False) -> bool:
         """Take what a statement before a record says of a tool; return whether it is another one than before.

@@ -10,7 +10,7 @@ from ..path import Event, ToolPath
 # What a controller carries out between motions: spindle, coolant, tool, stops. Modes and messages stop nothing.
 _WORDS = "STOP|OPSTOP|DELAY|DWELL|SPINDL|COOLNT|LOADTL|LOAD/TOOL|TOOLNO|AUXFUN"
 _STOPPING = re.compile(rf"(?:M\d|G4\b|(?:{_WORDS})\b|INSERT[\s/,]*[\"']?M\d)", re.I)
-_DWELL = re.compile(r"(?:G4 P|(?:DELAY|DWELL)\s*/\s*)([-+\d.eE]+)\s*(?:,\s*(REV|SEC)\s*)?", re.I)  # s, or turns
+_DWELL = re.compile(r"(?:G4 P|DELAY/)([-+\d.eE]+)")  # s
 
 
 def find_stops(path: ToolPath) -> tuple[int, ...]:
@@ -23,11 +23,11 @@ def find_stops(path: ToolPath) -> tuple[int, ...]:
 
 def sum_dwells(path: ToolPath) -> float:
     """Sum the dwells that the program states, s; tool changes and stops for the operator take a time of their own."""
-    return sum(find_dwell(event, path) or 0.0 for event in path.events)
+    return sum(find_dwell(event) or 0.0 for event in path.events)
 
 
-def find_dwell(event: Event, path: ToolPath) -> float | None:
-    """Find the seconds that an event waits; None if it does not, or for turns of a spindle whose speed is not known."""
+def find_dwell(event: Event) -> float | None:
+    """Find the seconds that an event waits; None if it does not."""
     match = _DWELL.fullmatch(event.text)
     if match is None:
         return None
@@ -35,7 +35,4 @@ def find_dwell(event: Event, path: ToolPath) -> float | None:
         value = float(match[1])
     except ValueError:
         return None
-    if (match[2] or "").upper() == "REV":
-        speed = float(path.spindle[max(0, min(event.record, len(path)) - 1)]) if len(path) else 0.0
-        value = 60.0 * value / speed if speed > 0.0 else inf
     return value if 0.0 <= value < inf else None

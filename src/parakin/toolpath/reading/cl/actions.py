@@ -17,7 +17,8 @@ from .dialects import DIALECTS, RIGHT, UNKNOWN, DialectName, find_by_comment, fi
 from .drilling import drill_hole
 from .file_frames import AXIS_TOLERANCE, build_frame, build_frame_from_matrix, normalise_direction
 from .motion import ClMotion
-from .word_arguments import LENGTH_UNITS, parse_feed, parse_numbers, parse_spindle, parse_tool_data
+from .spindle import add_dwell, set_speed
+from .word_arguments import LENGTH_UNITS, parse_feed, parse_numbers, parse_tool_data
 
 _ARC = re.compile(r"TLON,GOFWD/\(?CIRCLE/([^()/]*?)\)?,ON,(?:\d+,INTOF,)?\(?LINE/([^()/]*)\)?", re.ASCII)
 _ARC_FORM = "TLON,GOFWD/(CIRCLE/x,y,z,r),ON,2,INTOF,(LINE/x,y,z,x,y,z)"
@@ -193,7 +194,9 @@ class ClActions:
 
     def _refuse_in_cycle_or_circle(self) -> None:
         if self.motion.cycle is not None or self.motion.circle is not None:
-            refuse("only GOTO can follow within a cycle or after CIRCLE")
+            refuse(
+                "only GOTO can follow within a cycle or after CIRCLE; expected CYCLE/OFF before it, or the arc's end"
+            )
 
     def _refuse_in_circle(self) -> None:
         if self.motion.circle is not None:
@@ -211,16 +214,16 @@ class ClActions:
 
     def set_spindle(self, args: list[str], line: int) -> None:
         """Set the spindle's speed from here on (SPINDL)."""
-        speed = parse_spindle(args)
-        if "CLW" in args or "CCLW" in args:
-            self.motion.clockwise = "CLW" in args
-        if speed.off:
-            self.motion.set_speed(0.0)
-        elif speed.surface:
-            self.motion.set_speed(math.nan)
-            self.motion.notes.add(line, "a surface speed: the spindle's speed is left open")
-        elif speed.value is not None:
-            self.motion.set_speed(speed.value)
+        set_speed(self.motion, args, self.tools.diameter, line)
+
+    def wait(self, args: list[str], line: int) -> None:
+        """Wait for seconds, or for turns of the spindle (DELAY)."""
+        add_dwell(self.motion, args, line)
+
+    def check_coolant(self, args: list[str], line: int) -> None:
+        """Switch coolant on (ON, FLOOD, MIST) or off; note one that programs have no code for (COOLNT)."""
+        if not {"ON", "OFF", "FLOOD", "MIST"} & set(args[:1]):
+            self.motion.notes.add(line, f"coolant {quote_short(','.join(args))}: no code of programs, only a comment")
 
     # units and frames
 
@@ -359,6 +362,7 @@ class ClActions:
             )  # what it is by position it is by name
             data["body_length" if of_body else "set_length"] = length * self.motion.transform.scale
         if data:
+            self._refuse_in_cycle_or_circle()
             self._set_tool(line, data, loads=True)
 
     def _read_tool_values(self, values: list[str], line: int) -> dict[str, float | str]:

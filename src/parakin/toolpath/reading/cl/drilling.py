@@ -7,6 +7,7 @@ from ..text import refuse
 from .cycles import DrillCycle
 from .file_frames import Triple
 from .motion import ClMotion
+from .spindle import compute_dwell, reverse_spindle
 
 _SAME_AXIS = 1e-9  # components of two tool axes that are equal
 _SAME_HEIGHT = 1e-9  # greatest difference of two heights above a hole that count as equal, in the file's unit
@@ -37,9 +38,9 @@ def drill_hole(motion: ClMotion, cycle: DrillCycle, hole: Triple, axis_before: T
         motion.add_record(point_above(height), line, rapid=rapid, feed=feed)
     _add_dwell(motion, cycle, line)
     if cycle.kind == "tap":
-        _reverse_spindle(motion, line)
+        reverse_spindle(motion, line)
         motion.add_record(point_above(cycle.clear), line, rapid=False, feed=feed)
-        _reverse_spindle(motion, line)
+        reverse_spindle(motion, line)
     elif cycle.kind == "bore":
         motion.add_record(point_above(cycle.clear), line, rapid=False, feed=feed)
     if cycle.kind not in ("tap", "bore") or abs(out - cycle.clear) > _SAME_HEIGHT:
@@ -77,22 +78,7 @@ def _add_dwell(motion: ClMotion, cycle: DrillCycle, line: int) -> None:
     """Wait at depth."""
     if cycle.dwell is None:
         return
-    seconds, in_revolutions = cycle.dwell
-    if in_revolutions:
-        if not motion.rpm > 0.0:
-            refuse("a dwell in revolutions while the spindle speed is not known; expected SPINDL/n,RPM before it")
-        seconds *= 60.0 / motion.rpm
+    value, in_revolutions = cycle.dwell
+    seconds = compute_dwell(motion, value, in_revolutions=in_revolutions)
     if seconds > 0.0:
         motion.events.append(Event(motion.records.n, line, f"DELAY/{seconds:.6f}"))
-
-
-def _reverse_spindle(motion: ClMotion, line: int) -> None:
-    """Turn the spindle the other way at the end of a tap."""
-    if not motion.rpm > 0.0:
-        refuse("a tap while the spindle speed is not known; expected SPINDL/n,RPM before it")
-    motion.clockwise = not motion.clockwise
-    way = "CLW" if motion.clockwise else "CCLW"
-    motion.events.append(Event(motion.records.n, line, f"SPINDL/RPM,{motion.rpm:.10g},{way}"))
-    motion.notes.add(
-        line, "a tap: fed in and out with the spindle reversed, not in step with it; it needs a floating holder"
-    )

@@ -65,6 +65,7 @@ class ClMotion:
     off_unit : axes off unit length: how many, first line, worst deviation
     rapid : whether the next motion is rapid
     rpm, clockwise : spindle speed, NaN if not known, and which way it turns
+    last_speed : the last spindle speed above zero, NaN if there was none
     feed : mm/min, NaN if not known; feed_value and feed_unit as programmed
     tangent, circle, cycle : the direction of INDIRV, the circle that waits for its GOTO, the drill cycle in force
     open_arc : the last arc, until the motion after it confirms which way round it goes
@@ -87,7 +88,7 @@ class ClMotion:
         self.axis: Triple = (0.0, 0.0, 1.0)
         self.off_unit = np.zeros(3)
         self.rapid = False
-        self.rpm = math.nan
+        self.rpm = self.last_speed = math.nan
         self.clockwise = True
         self.feed_value, self.feed_unit = math.nan, "PERMIN"
         self.feed = math.nan
@@ -116,6 +117,7 @@ class ClMotion:
     def set_speed(self, rpm: float) -> None:
         """Set the spindle's speed in rev/min, and with it a feed per revolution."""
         self.rpm = rpm
+        self.last_speed = rpm if rpm > 0.0 else self.last_speed
         self.feed = self.convert_feed(self.feed_value, self.feed_unit)
 
     def require_feed(self, line: int, feed: float, value: float) -> None:

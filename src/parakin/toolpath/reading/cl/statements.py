@@ -3,7 +3,7 @@
 import re
 
 from ....errors import InputError
-from ..text import quote_short, refuse
+from ..text import is_number, quote_short, refuse
 from .actions import ClActions
 from .word_arguments import remove_blanks
 from .words import INFORMING, REFUSED, TEXT_WORDS, WORDS
@@ -13,8 +13,11 @@ _NO_TEXT = re.compile(
     rf"\s*({'|'.join(name for name, word in WORDS.items() if word.ends_message)})\s*(?:[/,]|$)", re.IGNORECASE
 )
 
+# a block of G-code that the file gives the controller; a single M code is an event
+_BLOCK = re.compile(r"\s*INSERT[\s/,\"']*(?!M\s*\d+[\s\"']*$)((?:[A-Z]\s*[-+]?[\d.]+\s*)+)[\"']?\s*", re.IGNORECASE)
 HIDDEN = "\0"  # a character that no line of a file has
 _LONGEST_WORD = 10
+_COORDINATES = range(3, 13)  # numbers of a point, with an axis, up to a frame
 _MOTION = tuple(name for name, word in WORDS.items() if word.act is not None and word.ends_message)
 _ACTING = tuple(name for name, word in WORDS.items() if word.act is not None and len(name) >= 4)
 
@@ -33,6 +36,10 @@ def execute_statement(actions: ClActions, text: str, line: int) -> str:
     text = text.removeprefix(HIDDEN)
     message = _TEXT.match(text)
     if message is not None:
+        block = _BLOCK.fullmatch(text)
+        if block is not None:
+            refuse(f"INSERT: {quote_short(block[1].strip())}, a block for the controller, cannot be honoured; "
+                   "expected plain statements, or INSERT of one M code")  # fmt: skip
         actions.read_comment(text, line)
         actions.add_event(text, line)
         return message[1].upper()
@@ -46,7 +53,7 @@ def execute_statement(actions: ClActions, text: str, line: int) -> str:
         actions.motion.arc_step = None
     word = WORDS.get(name)
     if word is None:
-        _take_unknown(actions, name, line, hidden=hidden)
+        _take_unknown(actions, name, args, line, hidden=hidden)
         return name
     if word.act is not None:
         try:
@@ -58,8 +65,11 @@ def execute_statement(actions: ClActions, text: str, line: int) -> str:
     return name
 
 
-def _take_unknown(actions: ClActions, name: str, line: int, *, hidden: bool) -> None:
-    """Refuse a word that would move, turn, shift or compensate; list one that informs; note any other."""
+def _take_unknown(actions: ClActions, name: str, args: list[str], line: int, *, hidden: bool) -> None:
+    """Refuse a word that would move, turn, shift or compensate; list one that informs; note any other.
+
+    Numbers alone, as many as a point or a frame has, are taken for coordinates.
+    """
     letters = re.match(r"[A-Z]*", name)
     begin = letters[0] if letters else ""
     if begin != name and begin in WORDS and WORDS[begin].slash:
@@ -75,6 +85,8 @@ def _take_unknown(actions: ClActions, name: str, line: int, *, hidden: bool) -> 
     meant = next((word for word in _MOTION if name.endswith(word)), None) or _find_meant(name)
     if meant is not None:
         refuse(f"unknown word {quote_short(name)}; expected {meant}")
+    if len(args) in _COORDINATES and all(is_number(a) for a in args):
+        refuse(f"unknown word {quote_short(name)} with coordinates, which may be a motion; expected GOTO/x,y,z")
     actions.motion.notes.add(line, f"unknown word {quote_short(name)}, not acted on")
 
 

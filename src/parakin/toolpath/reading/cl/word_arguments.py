@@ -19,6 +19,7 @@ FEED_UNITS: dict[str, tuple[float | None, bool]] = {
     "IPR": (INCH, True),
     "PERREV": (None, True),
 }
+SURFACE_SPEEDS = {"SFM": 12.0 * INCH, "SMM": 1000.0}  # mm/min
 LENGTH_UNITS = {"MM": 1.0, "INCHES": INCH, "INCH": INCH, "IN": INCH}  # mm
 _GEARS = ("RANGE", "MAXRPM")  # of SPINDL: the gear and the most revolutions, each with its value
 _BLANKS = re.compile(r"(?<![\d.])\s+|\s+(?![\d.])", re.ASCII)
@@ -53,17 +54,17 @@ def parse_feed(args: Sequence[str]) -> tuple[float, str | None]:
 
 
 class SpindleSpeed(NamedTuple):
-    """The arguments of SPINDL: the value or None, whether it is a surface speed, whether the spindle is off."""
+    """The arguments of SPINDL: the value or None, mm/min in a unit of a surface speed or None, whether it is off."""
 
     value: float | None
-    surface: bool
+    surface: float | None
     off: bool
 
 
 def parse_spindle(args: Sequence[str]) -> SpindleSpeed:
     """Parse SPINDL: value and words in any order."""
     form = "SPINDL/value,RPM|SFM|SMM,CLW|CCLW in any order, or SPINDL/ON|OFF"
-    words = {"RPM", "SFM", "SMM", "CLW", "CCLW", "ON", "OFF"}
+    words = {"RPM", "CLW", "CCLW", "ON", "OFF", *SURFACE_SPEEDS}
     args = [a for k, a in enumerate(args) if a not in _GEARS and (k == 0 or args[k - 1] not in _GEARS)]
     values = [a for a in args if a not in words]
     if len(values) > 1 or not args:
@@ -71,7 +72,14 @@ def parse_spindle(args: Sequence[str]) -> SpindleSpeed:
     value = parse_number(values[0]) if values and is_number(values[0]) else None
     if values and (value is None or value < 0):
         refuse(f"{quote_short(values[0])} is no spindle speed; expected {form}")
-    return SpindleSpeed(value, "SFM" in args or "SMM" in args, "OFF" in args)
+    surface = next((SURFACE_SPEEDS[a] for a in args if a in SURFACE_SPEEDS), None)
+    return SpindleSpeed(value, surface, "OFF" in args)
+
+
+def parse_dwell(args: Sequence[str]) -> tuple[float, bool]:
+    """Parse DELAY: the value, and whether it is in revolutions of the spindle, not seconds."""
+    (value,) = parse_numbers([a for a in args if a not in ("REV", "SEC")], (1,), "DELAY/seconds or DELAY/turns,REV")
+    return value, "REV" in args
 
 
 def parse_tool_data(args: Sequence[str], scale: float) -> dict[str, float | str]:

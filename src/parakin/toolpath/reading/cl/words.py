@@ -49,6 +49,9 @@ WORDS: dict[str, Word] = {
     # feed, spindle
     "FEDRAT": Word(ClActions.set_feed, ends_message=True, slash=True),
     "SPINDL": Word(ClActions.set_spindle, event=True),
+    "DELAY": Word(ClActions.wait, slash=True),
+    "DWELL": Word(ClActions.wait, slash=True),
+    "COOLNT": Word(ClActions.check_coolant, event=True),
     # units and frames
     "UNITS": Word(ClActions.set_units, slash=True),
     "UNIT": Word(ClActions.set_units, slash=True),
@@ -78,13 +81,10 @@ WORDS: dict[str, Word] = {
     # no effect on the motion
     "STOP": _EVENT,
     "OPSTOP": _EVENT,
-    "COOLNT": _EVENT,
     "MULTAX": _EVENT,
     "END": _EVENT,
     "MACHIN": _EVENT,
     "AUXFUN": _EVENT,
-    "DELAY": _EVENT,
-    "DWELL": _EVENT,
     "END-OF-PATH": _EVENT,
     "PAINT": _SILENT,
     "AUTOPS": _SILENT,
@@ -102,14 +102,14 @@ REASONS = {
         "GO GOLFT GORGT GOFWD GOBACK GOUP GODOWN TLLFT TLRGT TLONPS TLOFPS PSIS POCKET PROFIL SCURV ARCSLP"
     ),
     "a motion along a curve, which the file does not give as points": "NURBS SPLINE BSPLIN PSPLIN ELLIPS HELIX PARSRF",
-    "a motion to a place that the file does not state": "MOVETO PLUNGE POSITN SAFPOS TANSPT",
+    "a motion to a place that the file does not state": "MOVETO DELTA ARCMOV PLUNGE POSITN SAFPOS TANSPT",
     "it shifts the tool or its axis along a surface": "THICK ZSURF VTLAXS OFFSET",
     "a statement of the APT language that repeats or leads to others": (
         "CALL CALSUB INCLUD SYN MACRO TERMAC LOOPST LOOPND JUMPTO TRANTO IF DO UNTIL SUBR ENDSUB INDEX"
     ),
     "it leaves out the motions that follow": "DNTCUT CUT",
     "it moves or copies the points that follow": "COPY MATRIX REFSYS MCSYS TRANSL MIRROR",
-    "it turns an axis of the machine that wrote the file": "ROTATE ROTABL ROTHED ROTREF POSMAP TURRET",
+    "it turns an axis of the machine that wrote the file": "ROTATE ROTABL ROTHED ROTREF POSMAP TURRET SADDLE",
     "it retracts to a place that the file does not state": "RETRCT RETRACT",
     "it gives the controller a G-code": "PREFUN",
     "a motion in step with the spindle": "THREAD PITCH COUPLE",
@@ -117,9 +117,9 @@ REASONS = {
 }
 REFUSED = {word: reason for reason, words in REASONS.items() for word in words.split()}
 _INFORMING = """
-    AIR APPLY BARFED BEGIN BREAK CATCHR CHKPTS CHUCK CLAMP CLDATA CLRSRF CONTRL CSI_SET_EXTENSION_LENGTH
+    AIR APPLY BARFED BEGIN BREAK CATCHR CHKPTS CHUCK CLAMP CLDATA CLRSRF CLDIST CLEARP CONTRL CSI_SET_EXTENSION_LENGTH
     CSI_SET_PATH_PARAM CSI_TOOL_PATH DATE FEATNO FIXTUR GECENT HEAD HEADER LEADER LINTOL MATERL MCHFIN MCHTOL MFGNO NOTE
-    OFSTNO OPERATION OPNAME OPSKIP OPTION OSETNO PENDWN PENUP REWIND SAFETY SELCTL SEQNO SETSTL START SWITCH TCP TCPCTL
-    TLSTCK TMARK UNLOAD VERSION
+    OFSTNO OPERATION OPNAME OPSKIP OPTION OSETNO OVPLOT PENDWN PENUP PIVOTZ PLABEL PPTOL RESERV REWIND SAFETY SELCTL
+    SEQNO SETSTL START SWITCH TCP TCPCTL TLSTCK TMARK UNLOAD VERSION
 """
 INFORMING = frozenset(_INFORMING.split())

@@ -31,14 +31,14 @@ CONTROLS = (
         "Siemens (Sinumerik)",
         _compile_pattern(r"[\s;]*(?:%_N_\w+|\$PATH=|%MPF)"),
         _compile_pattern(
-            r"[^(;#]*(?:\b[A-Z]{1,8}\d*\s*=|\bCYCLE\d+\s*\(|\bTRA(?:ORI|FOOF|NS)\b|\bSUPA\b|\bG500\b|\bMSG\s*\(|\bDEF\s+(?:REAL|INT)\b"
+            r"\s*(?:N\d+\s*)?\$[A-Z]{1,3}_|[^(;#$]*(?:\b[A-Z]{1,8}\d*\s*=|\bCYCLE\d+\s*\(|\bTRA(?:ORI|FOOF|NS)\b|\bSUPA\b|\bG500\b|\bMSG\s*\(|\bDEF\s+(?:REAL|INT)\b"
             r"|\bMCALL\b|\bSOFT\b|\bFFWON\b|\bCOMPCAD\b|\bORI(?:WKS|MKS|AXES|VECT)\b|\bCUT3D\w+\b|\bWORKPIECE\s*\()"
         ),
     ),
     OtherControl(
         "Haas",
         _compile_pattern(r"\s*(?:O\d+\s*)?\(.*\bHaas\b"),
-        _compile_pattern(r"[^(;]*\b(?:G187|G15[34]\s*P|M97\s*P|G234|G254|G47|G1[23]\s*[IQD]|G150)(?!\d)"),
+        _compile_pattern(r"[^(;]*\b(?:(?:G103|G187|G234|G254|G47|G150)(?!\d)|G15[34]\s*P|M97\s*P|G1[23]\s*[IQD])"),
     ),
     OtherControl(
         "Marlin, Klipper or another 3D printer's control",
@@ -50,7 +50,9 @@ CONTROLS = (
             r"(?![^(;]*\bM6[678](?!\d))[^(;]*(?:(?<![A-Z0-9.])E[-+]?[\d.]|\bM(?:8[23]|10[4679]|109|140|190|20[1-5]|221|420)(?!\d))|\s*[A-Z]{3,}_[A-Z_]+"
         ),
     ),
-    OtherControl("grbl", _compile_pattern(r"\s*[(;]\s*grbl\b"), _compile_pattern(r"\s*\$")),
+    OtherControl(
+        "grbl", _compile_pattern(r"\s*[(;]\s*grbl\b"), _compile_pattern(r"\s*\$(?:J=|N?\d|[$#GINCHX]\s*$|RST=|SLP)")
+    ),
     OtherControl(
         "Fanuc",
         _compile_pattern(r"\s*(?:O\d+\s*)?\(.*\bFanuc\b"),

@@ -274,11 +274,13 @@ def test_a_part_is_played(tmp_path, browser):
 def test_an_offence_is_clicked(tmp_path, browser):
     part = tmp_path / "long.ngc"
     part.write_text(SQUARE.replace("Y40", "Y700"))
-    assert main(["post", str(part), "-m", "linear_delta", "-o", str(tmp_path), "--page"]) == 3
+    assert main(["post", str(part), "-m", "linear_delta", "-o", str(tmp_path)]) == 3
     assert main(["page", str(part), "-m", "linear_delta", "-o", str(tmp_path / "long.html")]) == 3
-    assert (tmp_path / "long.page.html").exists()
-    assert 'href="long.page.html"' in (tmp_path / "long.report.html").read_text(encoding="utf-8")
     with open_tab(browser) as tab:
+        tab.goto((tmp_path / "long.report.html").as_uri())
+        inside = tab.frame_locator("iframe")
+        assert inside.locator("#verdict").get_attribute("class") == "bad"  # it begins at the first offence
+        assert "long.ngc:4: leg tower_b can't close" in inside.locator(".offence").first.inner_text()
         tab.goto((tmp_path / "long.html").as_uri())
         offence = tab.locator(".offence").first
         assert "long.ngc:4: leg tower_b can't close" in offence.inner_text()

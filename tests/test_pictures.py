@@ -71,7 +71,8 @@ def figures_of(html):
 
 
 def own_text(html):
-    """The page without plotly's own code."""
+    """The report without plotly's own code and without the page in it, whose frame has no address."""
+    html = re.sub(r'<iframe class=page title="[^"<>]*" srcdoc="[^"<>]*"></iframe>', "", html)
     start = html.index("<script>")
     return html[:start] + html[html.index("</script>", start) :]
 
@@ -206,11 +207,9 @@ def test_clean_path_runs(machine):
     assert "<strong>Runs</strong>" in html
     assert "<h2>Offences</h2>" not in html
     figures = figures_of(html)
-    assert set(figures) == {"machine", "path", "curves"}
+    assert set(figures) == {"curves"}
     curves = [trace for trace in figures["curves"]["data"] if trace["line"]["color"] == "#2f6fb3"]
     assert [trace["name"] for trace in curves] == list(machine.joints)
-    assert any(trace["name"] == "workspace (coarse sample)" for trace in figures["machine"]["data"])
-    assert not any(trace["name"] == "off limits" for trace in figures["path"]["data"])
 
 
 def clean(machine):
@@ -231,8 +230,6 @@ def test_off_limits_says_where_and_how_much(tmp_path):
     assert "2 of 6 records off limits (33.33%)" in html
     assert "<code>GOTO/900,0,-1650,0,0,1</code>" in html
     assert "<code>GOTO/950,0,-1650,0,0,1</code>" in html
-    red = next(t for t in figures_of(html)["path"]["data"] if t["name"] == "off limits")
-    assert red["x"] == [900.0, 950.0]
     part.unlink()  # the report does without the source
     assert "<code></code>" in render_report(posted)
 
@@ -290,7 +287,6 @@ def test_long_paths_stay_small_and_keep_extremes():
         assert len(y) <= 4002
         assert min(y) == pytest.approx(values.min(), abs=1e-3)
         assert max(y) == pytest.approx(values.max(), abs=1e-3)
-    assert tip[77_777, 2] == pytest.approx(max(v for v in figures_of(html)["path"]["data"][0]["z"] if v), abs=1e-2)
 
 
 def test_use_agrees_with_the_joints():

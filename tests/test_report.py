@@ -2,6 +2,7 @@
 
 import json
 import re
+from base64 import b64decode
 from dataclasses import replace
 from importlib.resources import files
 
@@ -9,11 +10,13 @@ import numpy as np
 import pytest
 
 import parakin as pk
+from parakin.export.page.path_data import encode_page_path
 from parakin.export.report.report import render_report
 from parakin.machine import Machine
 from parakin.toolpath.checking.check import check_path
 from parakin.toolpath.path import Note, ToolPath
 from parakin.toolpath.posting.post import post_path
+from parakin.toolpath.posting.range_use import measure_range_use
 from parakin.toolpath.timing import plan_trajectory
 
 SLOW, FAST = 2400.0, 9000.0  # mm/min
@@ -167,10 +170,6 @@ def test_every_point_knows_its_record_and_line(trajectory, figures):
     x = np.array(trace["x"])
     assert (x <= trajectory.times[record] + 1e-3).all()
     assert (x >= trajectory.times[record - 1] - 1e-3).all()
-    at = traces_of(figures["binding"], "feed")[0]["customdata"]
-    times, record, line = (np.array(column) for column in zip(*at, strict=True))
-    assert (line == 3 * record + 7).all()
-    assert (times <= trajectory.times[record] + 1e-2).all()
 
 
 def test_feed_reached_beside_the_programmed(trajectory, figures, dense):
@@ -205,16 +204,39 @@ def test_feed_is_seen_among_many_short_rapids(without_jerk):
         assert y[drawn].max() <= SLOW * 1.001
 
 
-def test_path_is_coloured_by_what_binds(trajectory, figures):
-    names = [trace["name"] for trace in figures["binding"]["data"]]
-    assert set(names) == set(trajectory.binding_fractions)
-    colours = {trace["name"]: trace["line"]["color"] for trace in figures["binding"]["data"]}
+def test_the_page_has_the_colours_of_what_binds(trajectory, figures):
+    path = encode_page_path(trajectory.posted, trajectory, 30_000)
+    colours = {one["name"]: one["colour"] for one in path["bindings"] if one["colour"]}
+    assert set(colours) == set(trajectory.binding_fractions)
     assert len(set(colours.values())) == len(colours)
     assert {t["name"]: t["marker"]["color"] for t in figures["time"]["data"] if t["type"] == "bar"} == colours
-    rapid = [trace for trace in figures["binding"]["data"] if trace["line"]["width"] == 2]
-    assert rapid
-    assert all(trace["name"] != "feed" for trace in rapid)
-    assert sum(trace["showlegend"] for trace in figures["binding"]["data"]) == len(colours)
+    columns = decode_columns(path)
+    bound = {path["bindings"][int(number)]["name"] for number in columns["binding"]}
+    assert bound <= set(colours)
+    assert not columns["broken"].any()
+    assert (columns["lines"] == 3 * columns["records"] + 7).all()
+    assert (columns["times"] <= trajectory.times[columns["records"].astype(int)] + 1e-2).all()
+
+
+def test_the_page_hides_no_offence_and_no_tight_place():
+    tip = np.zeros((20_000, 3)) + [0.0, 0.0, -1650.0]
+    tip[:, 0] = np.linspace(-100.0, 100.0, 20_000)
+    tip[7_777, 2], tip[11_111, 2] = -1300.0, -1400.0
+    posted = post_path(pk.load("tricept"), path_of(tip))
+    relative = measure_range_use(posted)[1]
+    assert posted.broken_record_count == 1
+    for numbers in (600, 30_000, 500_000):
+        columns = decode_columns(encode_page_path(posted, None, numbers))
+        assert len(columns["times"]) * 17 <= numbers + 5 * 17
+        assert columns["margins"].min() == pytest.approx(relative.min(), rel=1e-6)
+        (at,) = np.flatnonzero(columns["broken"])
+        assert columns["records"][at - 1] < 7_777 <= columns["records"][at]
+        behind = np.searchsorted(columns["records"], 11_111)
+        assert columns["margins"][behind] <= relative[11_111] + 1e-6
+
+
+def decode_columns(path):
+    return {name: np.frombuffer(b64decode(text), "<f4") for name, text in path["columns"].items()}
 
 
 def test_panels_share_their_time(figures, trajectory):
@@ -255,13 +277,13 @@ def test_jerks_are_drawn_where_they_are_limited():
 def test_a_trajectory_that_stands_still():
     trajectory = plan_trajectory(post_path(pk.load("linear_delta"), path_of([[0, 0, 280]])))
     html = render_report(trajectory.posted, trajectory)
-    assert set(figures_of(html)) == {"machine", "path", "curves"}
+    assert set(figures_of(html)) == {"curves"}
     assert "Cycle time 0 s" in text_of(html)
 
 
 def test_without_a_trajectory_nothing_is_said_of_it(trajectory):
     html = render_report(trajectory.posted)
-    assert set(figures_of(html)) == {"machine", "path", "curves"}
+    assert set(figures_of(html)) == {"curves"}
     assert "Cycle time" not in html
     assert "<h2>Time</h2>" not in html
 
@@ -290,7 +312,7 @@ def test_offences_on_the_way_say_where():
         for offence in between_records:
             assert f"<small>on the way, {100 * offence.share:.0f} %</small>" in html
         if checked.broken_motion_count:
-            assert traces_of(figures_of(html)["path"], "motions off limits")
+            assert decode_columns(encode_page_path(checked, None, 30_000))["broken"].any()
     assert any(offence.share < 1.0 for offence in (*posted.offences, *halfway.offences))
     runs = check_path(post_path(pk.load("tricept"), path_of([[0, 0, -1650], [50, 0, -1650]])))
     assert "All 2 records and the motions between them stay within every limit of tricept.<" in render_report(runs)

@@ -307,8 +307,7 @@ def _make_files(
             from ..export.machine.animated_glb import render_path_glb
 
             files["animation"] = (name, render_path_glb(trajectory, progress.stage("drawing the motion", 0.9, 1.0)))
-    page = files["page"][0] if "page" in files else None
-    report = render_report(posted, trajectory, job.unplanned, job.waits, job.outside, page)
+    report = render_report(posted, trajectory, job.unplanned, job.waits, job.outside)
     files["report"] = (f"{stem}.report.html", report)
     return files, missing
 

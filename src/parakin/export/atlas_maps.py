@@ -11,8 +11,8 @@ import numpy as np
 from ..arrays import Array, Writer
 from ..performance.atlas import PerformanceMap
 from ..performance.singularities import PARALLEL
+from .colours import FAINT, INK
 from .figure_file import render_figure
-from .machine.figures import FAINT, INK
 from .workspace.describe import describe_region
 
 if TYPE_CHECKING:

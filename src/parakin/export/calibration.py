@@ -9,7 +9,7 @@ import numpy as np
 
 from ..arguments import check_arguments
 from ..units import name_display_unit, to_display
-from .machine.figures import FAINT, INK
+from .colours import FAINT, INK
 
 if TYPE_CHECKING:
     from ..calibration.calibration import Calibration

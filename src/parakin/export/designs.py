@@ -5,7 +5,7 @@ from __future__ import annotations
 from io import BytesIO
 
 from ..synthesis.designs import Designs
-from .machine.figures import FAINT, INK
+from .colours import FAINT, INK
 
 _COLOUR = "#1565c0"
 

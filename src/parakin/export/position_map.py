@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from ..errors import PoseError
-from .machine.figures import FAINT, INK
+from .colours import FAINT, INK
 
 if TYPE_CHECKING:
     from ..arrays import Array

@@ -9,8 +9,8 @@ import numpy as np
 from ...arguments import RowsLike, check_arguments
 from ...errors import PoseError
 from ...machine import Machine
+from ..colours import INK
 from ..figure_file import PICTURES, render_figure
-from .figures import INK
 from .scene import Points, Scene, build_scene
 from .solids import LOOKS, build_solids
 

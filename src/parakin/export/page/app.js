@@ -32,9 +32,10 @@ document.addEventListener("keydown", event => {
 
 listeners.push(update);
 new ResizeObserver(fitCanvas).observe(canvas.parentElement);
-fitCanvas();
-resetOrbit();
 update();
+if (path) widenView(pathLine.geometry);
+resetOrbit();
+fitCanvas();
 
 // Where the picture shows the tip, and the middle of a drive's strut, in pixels of the window.
 function findInPicture(place) {

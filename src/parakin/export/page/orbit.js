@@ -2,6 +2,16 @@
 
 const low = new THREE.Vector3(...machine.box[0]), high = new THREE.Vector3(...machine.box[1]);
 const orbit = {target: new THREE.Vector3(), azimuth: 0, elevation: 0, distance: 1};
+let shownSize = size;
+
+// Show, beside the machine's own box, what stands in the frame of poses.
+function widenView(geometry) {
+  geometry.computeBoundingBox();
+  const box = geometry.boundingBox.clone().applyMatrix4(frame).union(new THREE.Box3(low, high));
+  low.copy(box.min);
+  high.copy(box.max);
+  shownSize = max(shownSize, 0.95 * low.distanceTo(high));
+}
 
 function resetOrbit() {
   orbit.target.addVectors(low, high).multiplyScalar(0.5);
@@ -13,7 +23,7 @@ function resetOrbit() {
     orbit.elevation = across === 2 ? PI / 2 - 1e-4 : 0;
   }
   const half = 0.5 * camera.fov * PI / 180;
-  orbit.distance = 0.56 * size / Math.tan(half) / min(1, camera.aspect * 1.02);
+  orbit.distance = 0.56 * shownSize / Math.tan(half) / min(1, camera.aspect * 1.02);
   placeCamera();
 }
 
@@ -40,6 +50,6 @@ function shiftCamera(right, up) {
 }
 
 function zoomCamera(factor) {
-  orbit.distance = max(0.02 * size, min(20 * size, orbit.distance * factor));
+  orbit.distance = max(0.02 * size, min(20 * shownSize, orbit.distance * factor));
   placeCamera();
 }

@@ -69,14 +69,16 @@ def render_machine_page(machine: Machine, pose: RowsLike | None = None) -> str:
 
 
 @check_arguments
-def render_path_page(posted: Posted, trajectory: Trajectory | None = None) -> str:
+def render_path_page(posted: Posted, trajectory: Trajectory | None = None, numbers: int = 30_000) -> str:
     """Render such a page with the tool path of a posted part, which can be played.
+
+    numbers : how many of the path the page may hold, some 5 bytes each; the fewer, the coarser are its samples
 
     Raises :class:`PoseError` for a path without records.
     """
     if not len(posted.path):
         raise PoseError("posted: a path with records expected, this one has no motion")
-    path = encode_page_path(posted, trajectory)
+    path = encode_page_path(posted, trajectory, numbers)
     title = f"{path['source']} on {' '.join(posted.machine.spec.title.split()) or posted.machine.name}"
     return _render_page(posted.machine, title, posted.machine.home.tolist(), path)
 

@@ -13,20 +13,19 @@ const sampledJoints = i => rowOf("joints", i, machine.joints.length);
 
 // Blue where there is room, through yellow to red at a limit; it reads in grey and for the colour-blind.
 const SCALE = ["#b2182b", "#ef8a62", "#fddb86", "#67a9cf", "#2166ac"].map(text => new THREE.Color(text).convertSRGBToLinear());
-const BINDING_COLOURS = ["#2166ac", "#e08214", "#1b7837", "#762a83", "#b2182b", "#35978f", "#bf812d", "#5e4fa2", "#d53e4f", "#66c2a5"];
+const OFF_LIMITS = new THREE.Color(0xd50000).convertSRGBToLinear();
 
 function mixScale(share) {
   const at = max(0, min(1, Number.isFinite(share) ? share : 0)) * (SCALE.length - 1), i = min(SCALE.length - 2, Math.floor(at));
   return SCALE[i].clone().lerp(SCALE[i + 1], at - i);
 }
 
-const bindingColour = number => BINDING_COLOURS[number % BINDING_COLOURS.length];
-
 function colourSample(i, most) {
-  const {margins, feed, binding, rapid} = pathColumns;
+  const {margins, feed, binding, rapid, broken} = pathColumns;
+  if (broken[i]) return OFF_LIMITS;
   if (player.colours === "margin") return mixScale(margins[i] / most.margin);
   if (player.colours === "feed") return mixScale(feed[i] / most.feed);
-  if (player.colours === "pace") return new THREE.Color(bindingColour(binding[i])).convertSRGBToLinear();
+  if (player.colours === "pace") return new THREE.Color(path.bindings[binding[i]].colour ?? "#9fb3c0").convertSRGBToLinear();
   return new THREE.Color(rapid[i] ? "#90a4ae" : "#00695c").convertSRGBToLinear();
 }
 

@@ -10,26 +10,36 @@ import numpy as np
 
 from ...arrays import Array, Indices
 from ...toolpath.posting.offence_texts import describe_place
-from ...toolpath.posting.range_use import compute_relative_margin
+from ...toolpath.posting.range_use import compute_relative_margin, measure_range_use
+from ..colours import choose_binding_colours
 
 if TYPE_CHECKING:
     from ...toolpath.posting.posted import Posted
     from ...toolpath.timing import Trajectory
 
-_NUMBERS = 30_000  # in all samples: some 160 kB of text
-_MOST_SAMPLES = 4000
 _MOST_OFFENCES = 200
 _SPAN = 2e-4  # s
 _GAPS = 1e-3  # s or records: samples no farther apart show nothing more
 
 
-def encode_page_path(posted: Posted, trajectory: Trajectory | None) -> dict[str, Any]:
+def encode_page_path(posted: Posted, trajectory: Trajectory | None, numbers: int) -> dict[str, Any]:
     """Encode a path of one record or more: columns of float32 in base64, mm, rad, s and mm/min.
 
     With a trajectory they are samples at even times and at the corners as far as there is room, of what the machine
-    does; else the records themselves, with their number in place of the time.
+    does; else the records themselves, with their number in place of the time. All samples together have ``numbers``
+    numbers at most, and each tells the least margin, and whether a limit is broken, since the one before.
     """
-    columns = _sample_records(posted) if trajectory is None else _sample_trajectory(posted, trajectory)
+    if trajectory is not None and trajectory.seconds <= 0.0:
+        trajectory = None  # it stands still
+    most = max(2, numbers // (len(posted.machine.axes) + len(posted.machine.joints) + 7))
+    if trajectory is None:
+        columns = _sample_records(posted, most)
+        passed = columns["records"]
+    else:
+        columns = _sample_trajectory(posted, trajectory, most)
+        passed = columns["records"] - 1.0
+    _gather_records(posted, columns, passed)
+    colours = {} if trajectory is None else choose_binding_colours(trajectory)
     names = () if trajectory is None else trajectory.names
     signs = [1 if sign == "+" else -1 for sign in posted.mode]
     return {
@@ -39,7 +49,7 @@ def encode_page_path(posted: Posted, trajectory: Trajectory | None) -> dict[str,
         "signs": signs,
         "samples": len(columns["times"]),
         "columns": {name: _encode_column(values) for name, values in columns.items()},
-        "bindings": list(names),
+        "bindings": [{"name": name, "colour": colours.get(name)} for name in names],
         "offences": [_encode_offence(posted, columns, offence) for offence in posted.offences[:_MOST_OFFENCES]],
         "records": len(posted.path),
     }
@@ -54,8 +64,17 @@ def _encode_offence(posted: Posted, columns: dict[str, Array], offence: Any) -> 
     return {"text": f"{describe_place(posted, offence)}: {offence.text}", "limit": offence.limit, "sample": nearest}
 
 
-def _count_samples(posted: Posted) -> int:
-    return min(_MOST_SAMPLES, _NUMBERS // (len(posted.machine.axes) + len(posted.machine.joints) + 6))
+def _gather_records(posted: Posted, columns: dict[str, Array], passed: Array) -> None:
+    """Gather in each sample what is between it and the one before, whose last records are ``passed``."""
+    records, last = np.arange(len(posted.path)), len(passed) - 1
+    behind = np.minimum(np.searchsorted(passed, records), last)
+    np.minimum.at(columns["margins"], behind, measure_range_use(posted)[1])
+    broken = posted.broken != 0
+    if posted.broken_motions is not None:
+        broken = broken | posted.broken_motions
+    to = columns["records"]
+    columns["broken"] = broken[to.astype(np.int64)].astype(np.float64)
+    np.maximum.at(columns["broken"], np.minimum(np.searchsorted(to, records), last), broken.astype(np.float64))
 
 
 def _choose_corners(posted: Posted, most: int) -> Indices:
@@ -70,10 +89,10 @@ def _choose_corners(posted: Posted, most: int) -> Indices:
     return np.sort(np.argsort(-np.nan_to_num(off), kind="stable")[:most]) + 1
 
 
-def _sample_records(posted: Posted) -> dict[str, Array]:
+def _sample_records(posted: Posted, most: int) -> dict[str, Array]:
     count = len(posted.path)
     worst = [offence.record for offence in posted.offences]
-    chosen = np.unique([*_choose_corners(posted, _count_samples(posted)), *worst[:_MOST_OFFENCES], count - 1])
+    chosen = np.unique([*_choose_corners(posted, most), *worst[:_MOST_OFFENCES], count - 1])
     columns = _list_columns(posted, posted.poses[chosen], posted.joints[chosen])
     nothing = np.full(len(chosen), np.nan)
     return {
@@ -87,8 +106,8 @@ def _sample_records(posted: Posted) -> dict[str, Array]:
     }
 
 
-def _sample_trajectory(posted: Posted, trajectory: Trajectory) -> dict[str, Array]:
-    most, end = _count_samples(posted), trajectory.seconds
+def _sample_trajectory(posted: Posted, trajectory: Trajectory, most: int) -> dict[str, Array]:
+    end = trajectory.seconds
     at_records = trajectory.times[_choose_corners(posted, most // 2)]
     times = np.unique(np.concatenate([np.linspace(0.0, end, most // 2), at_records]))
     times = times[np.append(True, np.diff(times) > _GAPS)] if end > 1.0 else times

@@ -126,7 +126,7 @@ function strokeLine(pen, points) {
 function showClock() {
   const i = findSample(player.time), {feed, binding, lines} = pathColumns;
   timeSlider.value = player.time;
-  const pace = path.timed ? `, ${feed[i].toFixed(0)} mm/min, by ${path.bindings[binding[i]] ?? "–"}` : "";
+  const pace = path.timed ? `, ${feed[i].toFixed(0)} mm/min, by ${path.bindings[binding[i]]?.name ?? "–"}` : "";
   timeText.textContent = `${path.timed ? formatTime(player.time) : `record ${Math.round(player.time)}`}, line ${lines[i]}${pace}`;
 }
 
@@ -135,7 +135,7 @@ function drawLegend() {
   legend.replaceChildren();
   if (player.colours === "pace") {
     const used = [...new Set(pathColumns.binding)].filter(Number.isFinite).slice(0, 8);
-    legend.append(...used.map(number => makeElement("b", {textContent: path.bindings[number], style: `color: ${bindingColour(number)}`})));
+    legend.append(...used.map(number => makeElement("b", {textContent: path.bindings[number].name, style: `color: ${path.bindings[number].colour}`})));
   } else if (player.colours === "motion") {
     legend.append(makeElement("b", {textContent: "feed", style: "color: #00897b"}), makeElement("b", {textContent: "rapid", style: "color: #90a4ae"}));
   } else {
@@ -162,5 +162,6 @@ if (path) {
     if (!event.target.matches("input, select, button") && event.key.toLowerCase() === "p") viewPath();
   });
   buildPlayer();
+  if (path.offences.length) seek(pathColumns.times[path.offences[0].sample]);
   new ResizeObserver(drawCurves).observe(footer);
 }

@@ -58,13 +58,10 @@ let fitted = false;
 function fitOrbit(geometry) {
   if (fitted || !geometry.attributes.position.count) return;
   fitted = true;
-  geometry.computeBoundingBox();
-  const box = geometry.boundingBox.clone().applyMatrix4(frame).union(new THREE.Box3(low, high));
-  const wider = box.getSize(new THREE.Vector3()).length() / size;
-  low.copy(box.min);
-  high.copy(box.max);
+  const before = shownSize;
+  widenView(geometry);
   orbit.target.addVectors(low, high).multiplyScalar(0.5);
-  zoomCamera(max(1, 0.85 * wider));
+  zoomCamera(shownSize / before);
 }
 
 workspaceSwitch.addEventListener("change", () => { requestSurface(); requestPicture(); });

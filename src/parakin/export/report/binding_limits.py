@@ -1,34 +1,19 @@
-"""Which limit sets the pace of a trajectory: for how long, when, and where on the path."""
+"""Which limit sets the pace of a trajectory: for how long, and when."""
 
 from __future__ import annotations
 
 from html import escape
-from itertools import chain, repeat
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ...arrays import Indices
-from ..machine.figures import Figure, PlotTrace, build_scene_layout, round_numbers
 from ..number_format import format_duration
-from .path_view import PathView, build_stroke, choose_points, find_tips
+from .figures import PlotTrace, round_numbers
 
 if TYPE_CHECKING:
     from ...toolpath.timing import Trajectory
 
-_POINTS = 12_000  # points drawn on the path
 _BINS = 300  # equal spans of the cycle
-_FEED, _REST = "#9fb3c0", "#546e7a"
-_COLOURS = (
-    "#d32f2f", "#f57c00", "#7b1fa2", "#00838f", "#c2185b", "#558b2f", "#5d4037", "#fbc02d",
-    "#303f9f", "#00695c", "#e64a19", "#9e9d24", "#512da8", "#0277bd",
-)  # fmt: skip
-
-
-def choose_colours(trajectory: Trajectory) -> dict[str, str]:
-    """Choose a colour for each limit that binds anywhere, in the order of their fractions."""
-    free = chain(_COLOURS, repeat(_REST))
-    return {name: _FEED if name == "feed" else next(free) for name in trajectory.binding_fractions}
 
 
 def render_binding_bars(trajectory: Trajectory, shades: dict[str, str]) -> str:
@@ -72,47 +57,3 @@ def build_binding_traces(trajectory: Trajectory, shades: dict[str, str]) -> list
         }
         traces.append(trace)
     return traces
-
-
-def build_bound_path(trajectory: Trajectory, view: PathView, shades: dict[str, str]) -> Figure:
-    """Build the tool tip's path, coloured by the limit that sets the pace; rapid motions are thin."""
-    posted, joint_path = trajectory.posted, trajectory.joint_path
-    rows = len(joint_path.segment)
-    tips = find_tips(posted.machine, joint_path.poses(np.arange(rows), np.zeros(rows)))
-    tips = tips @ view.place[:, :3].T + view.place[:, 3]
-    before = np.maximum(np.arange(rows) - 1, 0)
-    record = trajectory.curve.record_of_piece[joint_path.segment[before]]  # that the step to a row leads to
-    rapid = posted.path.rapid[record]
-    limited = (trajectory.binding != 0).astype(float)  # so that thinning drops no stretch where a drive binds
-    turns = np.flatnonzero((np.diff(trajectory.binding) != 0) | (np.diff(rapid) != 0))
-    kept = choose_points((*tips.T, limited), turns, _POINTS)
-    traces: list[PlotTrace] = []
-    for name, shade in shades.items():
-        here = trajectory.binding[kept[1:]] == trajectory.names.index(name)
-        for fast in (False, True):
-            wanted = here & (rapid[kept[1:]] == fast)
-            if not wanted.any():
-                continue
-            line: Figure = {"color": shade, "width": 2 if fast else 5}
-            trace, at = build_stroke(tips, kept, wanted, line, escape(name))
-            trace |= {
-                "legendgroup": name,
-                "showlegend": not any(t["legendgroup"] == name for t in traces),
-            }
-            trace["customdata"] = _describe_points(trajectory, at, record)
-            trace["hovertemplate"] = (
-                "%{customdata[0]:,.3f} s, record %{customdata[1]:,}, line %{customdata[2]}"
-                f"<br>%{{x:,.2f}}, %{{y:,.2f}}, %{{z:,.2f}}<extra>{escape(name)}</extra>"
-            )
-            traces.append(trace)
-    points = tips[kept]
-    layout = build_scene_layout([np.array([points.min(0), points.max(0)])], view.normal)
-    layout["legend"] |= {"font": {"size": 11}}
-    return {"data": traces, "layout": layout}
-
-
-def _describe_points(trajectory: Trajectory, rows: Indices, record: Indices) -> list[list[float | int | None]]:
-    """Describe points by time (s), record and source line, for the mouse."""
-    times, records = round_numbers(trajectory.profile.row_times[rows], 3), record[rows]
-    lines = trajectory.posted.path.line[records]
-    return [[*point] for point in zip(times, records.tolist(), lines.tolist(), strict=True)]

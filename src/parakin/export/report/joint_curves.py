@@ -10,8 +10,8 @@ import numpy as np
 
 from ...arrays import Array, Indices
 from ...toolpath.posting.range_use import RangeUse
-from ..machine.figures import Figure, PlotTrace, round_numbers
 from ..number_format import format_bound
+from .figures import Figure, PlotTrace, round_numbers
 from .panels import Panel, stack_panels
 
 if TYPE_CHECKING:

@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from ..machine.figures import FAINT, FONT, INK, Figure, PlotTrace
+from ..colours import FAINT, INK
+from .figures import FONT, Figure, PlotTrace
 
 _ROW, _GAP, _BREAK = 118, 34, 44  # px: a diagram's height, the gap to the next, and more of it under an axis
 _BETWEEN = 0.065  # gap between columns, as a fraction of the figure's width

@@ -6,20 +6,17 @@ from html import escape
 from math import inf
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
-from urllib.parse import quote
-
-import numpy as np
 
 from ...arguments import check_arguments
 from ...errors import PoseError
 from ...toolpath.placing.outside import Outside, describe_outside
 from ...toolpath.posting.offence_texts import describe_place
 from ...toolpath.posting.range_use import RangeUse, measure_range_use
-from ..machine.figures import embed_figure, render_page
 from ..number_format import format_count, format_duration
+from ..page.page import render_path_page
 from .cards import make_card
+from .figures import embed_figure, render_page
 from .joint_curves import build_joint_curves
-from .path_view import PathView, build_path_view
 from .range_bars import render_range_card
 from .tables import render_fact_card, render_note_card, render_offence_card
 from .timing import format_cycle, render_timing_card
@@ -27,6 +24,8 @@ from .timing import format_cycle, render_timing_card
 if TYPE_CHECKING:
     from ...toolpath.posting.posted import Posted
     from ...toolpath.timing import Trajectory
+
+_PAGE_NUMBERS = 200_000  # of the path in the page: some 1 MB of text
 
 
 @check_arguments
@@ -36,14 +35,12 @@ def render_report(
     unplanned: str = "",
     waits: float = 0.0,
     outside: Outside | None = None,
-    page: str | None = None,
 ) -> str:
     """Render the report as one HTML document: verdict, ranges, path, curves, time, offences, notes, facts.
 
     ``unplanned`` says why there is no trajectory, ``waits`` how long (s) the program waits besides it,
-    ``outside`` where the part would have to lie, ``page`` the name of the file beside the report on which the machine
-    moves along the path. Whatever the
-    length of the path the document stays below some 8 MB: of every stretch the extremes are drawn.
+    ``outside`` where the part would have to lie. Whatever the length of the path the document stays below some 8 MB: of
+    every stretch the extremes are drawn.
     """
     if not 0.0 <= waits < inf:
         raise PoseError(f"waits: a time of 0 s or more expected, not {waits:g}")
@@ -51,22 +48,15 @@ def render_report(
     name = Path(path.source).name or path.source
     title = f"{name} on {machine.spec.title or machine.name}"
     cards = [
-        f"<header><h1>{escape(title)}</h1><p class=sub>{escape(path.source)}</p>{_render_page_link(page)}</header>\n",
+        f"<header><h1>{escape(title)}</h1><p class=sub>{escape(path.source)}</p></header>\n",
         _render_verdict(posted, trajectory, _Remarks(unplanned, waits, outside)),
     ]
     if len(path):
-        uses, relative = measure_range_use(posted)
-        view = build_path_view(posted, relative)
-        cards += [render_range_card(posted, uses), _render_space(posted, view), _render_curves(posted, uses)]
-        cards += [] if trajectory is None else [render_timing_card(trajectory, view)]
+        uses, _ = measure_range_use(posted)
+        cards += [render_range_card(posted, uses), _render_page_card(posted, trajectory), _render_curves(posted, uses)]
+        cards += [] if trajectory is None else [render_timing_card(trajectory)]
     cards += [render_offence_card(posted), render_note_card(path), render_fact_card(posted)]
     return render_page(title, "".join(cards))
-
-
-def _render_page_link(page: str | None) -> str:
-    if page is None:
-        return ""
-    return f'<p class=sub><a href="{escape(quote(page))}">The machine moving along it</a></p>'
 
 
 class _Remarks(NamedTuple):
@@ -114,25 +104,13 @@ def _note_unchecked(posted: Posted) -> str:
     return "" if posted.checked or len(posted.path) < 2 else " The motions between them were not checked."
 
 
-def _render_space(posted: Posted, view: PathView) -> str:
-    record = view.record
-    at = f"line {int(posted.path.line[record])}, record {record:,}"
-    if posted.worst is not None and posted.worst.record == record:
-        at += (
-            ", the worst offence" if posted.worst.share >= 1.0 else ", to which the motion with the worst offence leads"
-        )
-    at += "; its shadow is at home"
-    if not np.isfinite(posted.joints[record]).all():
-        at = "home, for it can take no record"
-    left = (
-        f"<div>{embed_figure('machine', view.machine, '620px')}<p class=sub>The machine at {at}."
-        " The surface is a coarse sample of where the tip can be at the path’s mean orientation.</p></div>"
+def _render_page_card(posted: Posted, trajectory: Trajectory | None) -> str:
+    page = escape(render_path_page(posted, trajectory, _PAGE_NUMBERS))
+    return make_card(
+        "The machine on the path",
+        f'<iframe class=page title="The machine on the path" srcdoc="{page}"></iframe>',
+        "Play it, drag the tool, choose what colours the path; red is off limits.",
     )
-    right = (
-        f"<div>{embed_figure('path', view.path, '620px')}<p class=sub>The tool tip’s path, coloured by the least margin"
-        " of all limits as a share of half the limit’s range: 0 % is a limit. Rapid motions are dashed.</p></div>"
-    )
-    return make_card("Path in the workspace", f"<div class=two>{left}{right}</div>")
 
 
 def _render_curves(posted: Posted, uses: list[RangeUse]) -> str:

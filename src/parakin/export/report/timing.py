@@ -6,11 +6,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..machine.figures import embed_figure
+from ..colours import choose_binding_colours
 from ..number_format import format_duration, format_value
-from .binding_limits import build_bound_path, choose_colours, render_binding_bars
+from .binding_limits import render_binding_bars
 from .cards import make_card
-from .path_view import PathView
+from .figures import embed_figure
 from .tables import sum_programmed_time
 from .timing_curves import draw_timing_curves
 
@@ -35,17 +35,15 @@ def format_cycle(trajectory: Trajectory) -> str:
     return f"Cycle time <b>{cycle}</b>: {feed} in feed motions ({beside}){tail}."
 
 
-def render_timing_card(trajectory: Trajectory, view: PathView) -> str:
+def render_timing_card(trajectory: Trajectory) -> str:
     """Render the card; a trajectory that stands still has its cycle time only."""
     if trajectory.seconds < _STILL:
         return make_card("Time", "", format_cycle(trajectory))
-    shades = choose_colours(trajectory)
-    path = embed_figure("binding", build_bound_path(trajectory, view, shades), "560px")
+    shades = choose_binding_colours(trajectory)
     figure, height = draw_timing_curves(trajectory, shades)
     body = (
-        f"<div class=two><div><h3>What sets the pace</h3>{render_binding_bars(trajectory, shades)}</div>"
-        f"<div>{path}<p class=sub>The tool tip’s path, "
-        "coloured by the limit that sets the pace. Rapid motions are thin.</p></div></div>"
+        f"<h3>What sets the pace</h3>{render_binding_bars(trajectory, shades)}"
+        "<p class=sub>Where on the path: the picture above, coloured by what sets the pace.</p>"
         f"<h3>Over the cycle</h3><div class=wide>{embed_figure('time', figure, f'{height}px')}</div>"
         "<p class=sub>Limits are dashed where they are near. Orange, red and violet: here this joint’s speed,"
         " acceleration or jerk sets the pace. Of every stretch the least and the greatest value is drawn, so no extreme"

@@ -10,9 +10,9 @@ import numpy as np
 
 from ...arrays import Flags
 from ...toolpath.posting.range_use import RangeUse
-from ..machine.figures import Figure, PlotTrace, round_numbers
 from ..number_format import format_bound
 from .binding_limits import build_binding_traces
+from .figures import Figure, PlotTrace, round_numbers
 from .joint_curves import build_panel, format_heading
 from .panels import Panel, stack_panels
 from .timing_samples import ThinnedCurve, thin_curves

@@ -11,8 +11,8 @@ import numpy as np
 from ...arrays import Array
 from ...workspaces.sampled.distance_field import SampledField
 from ...workspaces.sampled.sampling import SampledWorkspace
+from ..colours import FAINT, INK
 from ..figure_file import render_figure
-from ..machine.figures import FAINT, INK
 from .describe import AnyWorkspace, describe_size, describe_workspace, format_volume
 from .meshes import Mesh
 from .sweep_curves import CurveGroup

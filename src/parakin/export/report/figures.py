@@ -1,0 +1,43 @@
+"""Interactive figures for HTML pages that need no network: plotly's own JSON, written without its Python classes.
+
+The classes take a second to import and check what is constant here; the browser's library is all that is needed.
+"""
+
+from __future__ import annotations
+
+import json
+from html import escape
+from importlib.resources import files
+from string import Template
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+Figure = dict[str, Any]  # plotly's {"data": [traces], "layout": {...}}
+PlotTrace = dict[str, Any]
+
+FONT = {"family": "system-ui, -apple-system, 'Segoe UI', Roboto, 'Helvetica Neue', Arial, sans-serif", "size": 13}
+
+
+def round_numbers(values: ArrayLike, digits: int = 3) -> list[float | None]:
+    """Round numbers for JSON, with None for NaN and infinity: plotly leaves a gap there."""
+    array = np.round(np.asarray(values, float).ravel(), digits) + 0.0
+    return [v if ok else None for v, ok in zip(array.tolist(), np.isfinite(array).tolist(), strict=True)]
+
+
+def render_page(title: str, body: str) -> str:
+    """Render a whole HTML page around a body with figures (:func:`embed_figure`); ``body`` is HTML, ``title`` text."""
+    template = Template(files(__package__).joinpath("report.html").read_text("utf-8"))
+    script = files("plotly").joinpath("package_data", "plotly.min.js").read_text("utf-8")
+    return template.substitute(title=escape(title), body=body, plotly=script)
+
+
+def embed_figure(name: str, figure: Figure, height: str) -> str:
+    """Render a figure as HTML; ``height`` is a CSS length."""
+    # Within a script element only "<" could end or open anything.
+    data = json.dumps(figure, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c")
+    return (
+        f'<div id="{name}" class="figure" style="height:{height}"></div>\n'
+        f'<script type="application/json" data-figure="{name}">{data}</script>\n'
+    )

@@ -16,7 +16,7 @@ from parakin.performance.indices import compute_performance
 @pytest.mark.parametrize(("name", "count"), [("orthoglide", 2), ("hbg80_3d", 2)])
 def test_isotropic_poses_of_the_workspace(name, count):
     m = pk.load(name)
-    found = pk.atlas(whole_region(m))
+    found = pk.atlas(whole_region(m), seconds=None)
     assert found.isolated
     assert len(found.isotropic) == count  # home, and its image beyond a parallel singularity
     assert np.abs(found.isotropic - m.home).max(1).min() < 1e-6
@@ -31,7 +31,7 @@ def test_isotropic_poses_of_the_workspace(name, count):
 @pytest.mark.parametrize("name", ["linear_delta", "hexapod"])
 def test_no_sample_of_the_workspace_is_beyond_its_extremes(name):
     m = pk.load(name)
-    found = pk.atlas(pk.region(m))
+    found = pk.atlas(pk.region(m), seconds=None)
     assert np.array_equal(found.map.allowed, m.check(found.map.performance.poses) == 0)
     assert not found.singular
     assert len(found.isotropic) == 0
@@ -60,11 +60,11 @@ def test_no_sample_of_the_workspace_is_beyond_its_extremes(name):
 
 def test_an_atlas_of_a_slice_and_questions_that_make_no_sense():
     m = pk.load("orthoglide")
-    flat = pk.atlas(pk.region(m, at={"Z": -50.0}), step=25.0)
+    flat = pk.atlas(pk.region(m, at={"Z": -50.0}), step=25.0, seconds=None)
     assert flat.map.axes == ("X", "Y")
     assert flat.map.performance.psi.shape == (*flat.map.allowed.shape, 3)
     assert (flat.map.inside.poses[:, 2] == -50.0).all()
-    wide = pk.atlas(pk.region(m, at={"Z": -50.0}, without=["*.max"]), step=25.0)
+    wide = pk.atlas(pk.region(m, at={"Z": -50.0}, without=["*.max"]), step=25.0, seconds=None)
     assert wide.map.allowed.sum() > flat.map.allowed.sum()
     for wrong in ({"step": 0.0}, {"step": 1e-3}, {"length": -1.0}):
         with pytest.raises(pk.PoseError):

@@ -75,7 +75,7 @@ def test_the_mirror_image_behind_the_base_is_not_counted(load_text, low):
     grid = pk.sample_grid(pk.region(m), 20.0)
     assert grid.estimate == pytest.approx(own.volume.estimate, rel=0.05)
     assert grid.box[0][2] > -10.0
-    atlas = pk.atlas(pk.region(m), step=50.0)
+    atlas = pk.atlas(pk.region(m), step=50.0, seconds=None)
     assert (atlas.map.inside.poses[:, 2] > 0.0).all()
     assert pk.find_largest_box(pk.region(m)).low[2] >= 0.0
 
@@ -191,7 +191,7 @@ def test_the_verdict_does_not_hang_on_the_step(load_text):
     m = load_text(ROTARY_DELTA)
     verdicts = []
     for step in (100.0, 50.0, 40.0, 31.0):
-        atlas = pk.atlas(pk.region(m), step=step)
+        atlas = pk.atlas(pk.region(m), step=step, seconds=None)
         verdicts.append([(s.margin, s.verdict) for s in atlas.singularities])
         for singularity in atlas.singularities:
             if singularity.verdict == "met":

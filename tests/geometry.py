@@ -22,7 +22,8 @@ class Description:
     limits: str = ""
     home: np.ndarray | None = None  # pose, in the order of axes
     start: np.ndarray = field(default_factory=lambda: np.eye(3))
-    constraints: list[dict] = field(default_factory=list)  # points in planes, with their platform, foot and normal
+    constraints: list[dict] = field(default_factory=list)  # points in planes, and rods
+    parasitic: tuple[str, ...] = ()
 
     @classmethod
     def of(cls, spec):
@@ -36,7 +37,13 @@ class Description:
             [(s.axis, s.value, s.drive and s.drive.name, s.sign) for s in part]
             for part in (spec.head, spec.table, spec.mounting)
         ]
-        return cls(tuple(spec.motion), legs, *steps, constraints=[vars(each) for each in spec.constraints])
+        return cls(
+            tuple(spec.motion),
+            legs,
+            *steps,
+            constraints=[vars(each) for each in spec.constraints],
+            parasitic=spec.parasitic,
+        )
 
     @property
     def serial(self):
@@ -61,7 +68,7 @@ class Description:
     def axes(self):
         if self.tells_axis:
             return tuple("XYZBC")
-        return tuple(LETTERS[word] for word in LETTERS if word in self.motion)
+        return tuple(LETTERS[word] for word in LETTERS if word in self.motion and word not in self.parasitic)
 
     def chain(self, steps, joints):
         """Transform (N, 4, 4) along steps, for joints (N, joints)."""
@@ -99,7 +106,9 @@ class Description:
         frame = np.broadcast_to(np.eye(4), (len(poses), 4, 4)).copy()
         missed = zero
         rotation = orientation(*(given.get(x, zero) for x in "ABC"))
-        if len(self.turns) == 3 and not self.serial:
+        if len(self.parasitic) == 3 and not self.serial:  # rods alone tell it, or planes
+            rotation, _ = self._guided(tip, None, head, joints)
+        elif len(self.turns) == 3 and not self.serial:
             rotation = mount[:, :3, :3].transpose(0, 2, 1) @ rotation @ head[:, :3, :3].transpose(0, 2, 1)
         elif self.tells_axis:
             k = np.einsum("nji,njk,nk->ni", mount[:, :3, :3], table[:, :3, :3], tool_axis(given["B"], given["C"]))
@@ -107,7 +116,7 @@ class Description:
                 a, b = -np.arcsin(np.clip(k[:, 1], -1.0, 1.0)), np.arctan2(k[:, 0], k[:, 2])
                 rotation = orientation(a, b, zero)
             else:
-                rotation, missed = self._guided(tip, k, head) if self.constraints else self._led(tip, k, head)
+                rotation, missed = self._guided(tip, k, head, joints) if self.constraints else self._led(tip, k, head)
         frame[:, :3, :3] = rotation
         frame[:, :3, 3] = tip - np.einsum("nij,nj->ni", rotation, head[:, :3, 3])
         if self.constraints:
@@ -117,10 +126,27 @@ class Description:
             frame[:, planar, 3] = 0.0
         return frame, missed
 
-    def open_planes(self, rotation, origin):
-        """How far the constraints' points are from their planes, (N, constraints), mm."""
+    def carried(self, rod, joints):
+        """Where a passive rod's foot is, (N, 3)."""
+        foot = np.array(rod["foot"], float)
+        if rod["drive"] is None:
+            return np.broadcast_to(foot, (len(joints), 3))
+        leg = next(leg for leg in self.legs if rod["drive"] in leg["joints"])
+        q = joints[:, self.joints.index(rod["drive"])]
+        if leg["kind"] == "slider":
+            return foot + np.outer(q, leg["rail"])
+        arm, axis = foot - np.array(leg["pivot"]), np.array(leg["axis"])
+        about = np.outer(np.cos(q), arm) + np.outer(np.sin(q), np.cross(axis, arm))
+        return np.array(leg["pivot"]) + about + np.outer(1.0 - np.cos(q), axis * (axis @ arm))
+
+    def open_constraints(self, rotation, origin, joints):
+        """How far points are from their planes, and rods from their lengths, (N, constraints), mm."""
         far = []
         for each in self.constraints:
+            if "rod" in each:
+                end = origin + rotation @ np.array(each["platform"])
+                far.append(np.linalg.norm(end - self.carried(each, joints), axis=1) - each["rod"])
+                continue
             span = origin + rotation @ np.array(each["platform"]) - np.array(each["foot"])
             normal = np.broadcast_to(np.array(each["normal"]), span.shape)
             if each["plane_of"] == "platform":
@@ -128,14 +154,16 @@ class Description:
             far.append((span * normal).sum(1))
         return np.stack(far, 1)
 
-    def _guided(self, tip, k, head):
+    def _guided(self, tip, k, head, joints):
         """Platform's rotation that keeps the constraints and points the tool, by Gauss and Newton from a start."""
-        rotation = np.broadcast_to(self.start, (len(k), 3, 3))
+        rotation = np.broadcast_to(self.start, (len(tip), 3, 3))
 
         def measure(rotation):
             origin = tip - np.einsum("nij,nj->ni", rotation, head[:, :3, 3])
-            aside = np.einsum("nij,nj->ni", rotation, head[:, :3, 2]) - k
-            return np.concatenate([self.open_planes(rotation, origin), 300.0 * aside], 1)
+            far = self.open_constraints(rotation, origin, joints)
+            if k is None:
+                return far
+            return np.concatenate([far, 300.0 * (np.einsum("nij,nj->ni", rotation, head[:, :3, 2]) - k)], 1)
 
         for _ in range(16):
             here = measure(rotation)
@@ -145,6 +173,9 @@ class Description:
             square = across @ slopes + 1e-9 * np.eye(3)  # of mm², so that it has an inverse anywhere
             step = -np.linalg.solve(square, (across @ here[..., None]))[..., 0]
             step *= np.minimum(1.0, 0.3 / np.maximum(np.linalg.norm(step, axis=1), 1e-300))[:, None]
+            step *= (np.abs(here).max(1) > 1e-11)[
+                :, None
+            ]  # what closes stays, beside a singularity of the constraints too
             for word, angle in zip(("rx", "ry", "rz"), step.T, strict=True):
                 rotation = rotation @ transform(word, angle)[:, :3, :3]
             if np.abs(step).max(initial=0.0) < 1e-14:
@@ -194,7 +225,7 @@ class Description:
         tube = np.cross(frame[:, :3, 3], frame[:, :3, 2])  # a central leg's slides along the platform's z
         worst = [np.linalg.norm(tube, axis=1) * (self.motion[0][0] == "r")]
         if self.constraints:
-            worst += list(np.abs(self.open_planes(frame[:, :3, :3], frame[:, :3, 3])).T)
+            worst += list(np.abs(self.open_constraints(frame[:, :3, :3], frame[:, :3, 3], joints)).T)
         for leg in self.legs:
             place = np.broadcast_to(np.array(leg["platform"]), (len(poses), 3))
             if leg["kind"] == "ring":  # its joint is there on the ring where the foot is

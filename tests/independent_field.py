@@ -93,6 +93,15 @@ def triglide(s, poses):
     )
 
 
+def triglide_pairs(s, poses):
+    """By the rods of the pairs that stand behind, and below the other."""
+    x, y, z = poses.T
+    z, out = z + s["tool"], s["side"] - s["wide"]
+    ends = np.stack([x - s["half"], x - s["half"], x], -1)
+    off = np.stack([leg_of(s["rod"], aside, z) for aside in (y - out, y + out, y - s["half"] + s["half"])], -1)
+    return ends + off * [-1.0, -1.0, 1.0] + [s["half"], s["half"], 0.0]
+
+
 def linapod3(s, poses):
     off = [poses[:, :2] - p[:2] for p in on_circle(s["R"] - s["r"], SIDES)]
     return np.stack([poses[:, 2] + s["tool"] + leg_of(s["rod"], *o.T) for o in off], -1)
@@ -267,6 +276,7 @@ INVERSES = {
         hexam,
         linapod6,
         triglide,
+        triglide_pairs,
         linapod3,
         urane_sx,
         quickstep,

@@ -24,6 +24,7 @@ REPRESENTATIVES = [
     "sprint_z3",
     "exechon",
     "pentapod",
+    "triglide_pairs",
 ]
 ASSEMBLED = [name for name in NAMES if all(leg.find_fixed_joint() is not None for leg in pk.load(name).legs)]
 

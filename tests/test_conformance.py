@@ -50,6 +50,7 @@ SPREAD = {  # about home, mm and rad: the allowed workspace and a margin beyond
     "tricept": [1200, 1200, 500, 1.8, 3.3],
     "tricept_805": [1400, 1400, 600, 1.8, 3.3],
     "triglide": [500, 260, 250],
+    "triglide_pairs": [400, 200, 200],
     "urane_sx": [260, 280, 330],
     "variax": [350, 350, 300, 0.5, 0.5, 0.6],
 }

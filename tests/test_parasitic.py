@@ -138,7 +138,7 @@ def check_frames(machine, poses, turn_columns):
     for pose in poses:
         placed = machine.place_platform(pose, machine.mode)
         rotation, origin = np.array(placed.rotation, float), np.array(placed.origin, float)
-        assert np.abs(d.open_planes(rotation[None], origin[None])).max() < 1e-10
+        assert np.abs(d.open_constraints(rotation[None], origin[None], np.zeros((1, 0)))).max() < 1e-10
         assert np.allclose(rotation @ rotation.T, np.eye(3), atol=1e-13)
         c = np.arctan2(rotation[1, 0], rotation[0, 0])
         turns = {"C": c, **{axis: pose[machine.axes.index(axis)] for axis in turn_columns}}

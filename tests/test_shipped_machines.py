@@ -34,7 +34,8 @@ def test_shipped_names():
         "hexaglide",
         "hexam", "hexapod", "lambda6", "linapod3", "linapod6", "linear_delta", "mikromat_6x", "okuma_hexapod",
         "orthoglide", "orthoglide5_head", "orthoglide5_table", "pentapod", "prr3", "quickstep", "rotary_delta", "rpr3",
-        "rrr3", "rus6", "sprint_z3", "tornado_2000", "tricept", "tricept_805", "triglide", "urane_sx", "variax",
+        "rrr3", "rus6", "sprint_z3", "tornado_2000", "tricept", "tricept_805", "triglide",
+        "triglide_pairs", "urane_sx", "variax",
     ]  # fmt: skip
 
 

@@ -14,7 +14,7 @@ from .kinematics.closure_roots import compute_closure_tolerance
 from .kinematics.home import check_home
 from .kinematics.wrist.pose_angles import EVERY_DIRECTION, EVERY_ROTATION, EVERY_TURN
 from .kinematics.wrist.turning_joints import Wrist, find_wrist
-from .model.elements import Drive, PlaneConstraint
+from .model.elements import Drive, PlaneConstraint, RodConstraint
 from .model.equations import Equations
 from .model.geometric_parameters import SIZES, Parameter, list_parameters, replace_parameters
 from .model.legs import Leg
@@ -87,7 +87,7 @@ class MachineProperties:
         return self.spec.legs
 
     @property
-    def constraints(self) -> tuple[PlaneConstraint, ...]:
+    def constraints(self) -> tuple[PlaneConstraint | RodConstraint, ...]:
         """The closures without a drive."""
         return self.spec.constraints
 
@@ -215,8 +215,14 @@ class MachineProperties:
     @cached_property
     def modes(self) -> tuple[str, ...]:
         """All working modes, the default one first."""
-        every = ["".join(signs) for signs in product("+-", repeat=len(self.mode))]
+        signs = [sign if i in self.fixed_signs else "+-" for i, sign in enumerate(self.mode)]
+        every = ["".join(choice) for choice in product(*signs)]
         return (self.mode, *[mode for mode in every if mode != self.mode])
+
+    @property
+    def fixed_signs(self) -> list[int]:
+        """Places of the signs in :attr:`mode` that no other mode has otherwise."""
+        return self.model.fixed_signs
 
     @property
     def closure_tolerance(self) -> float:

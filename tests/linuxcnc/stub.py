@@ -101,13 +101,13 @@ class Stub:
         command = ["gcc", *FLAGS, *warnings, f"-I{HERE}", f"-I{self.folder}", "-shared", "-o", target, *sources, "-lm"]
         subprocess.run(command, check=True)
 
-    def built(self, machine):
+    def built(self, machine, *options):
         """A machine's module."""
         stub, name = self.library, name_kinematics(machine)
         source = self.folder / f"{name}.c"
         source.write_text(write_module(machine))
         (self.folder / name_model(machine)).write_text(write_model(machine))
-        self.compile([source], self.folder / f"{name}.so")
+        self.compile([*options, source], self.folder / f"{name}.so")
         return Kinematics(stub, self.folder / f"{name}.so", len(machine.joints))
 
     def probe(self, machine):

@@ -20,7 +20,7 @@ from .document import YamlMap, YamlText, read_document
 from .groups import Legs
 from .sections import (
     TRANSFORMS,
-    ConstraintSection,
+    ConstraintValue,
     FileSection,
     HomeSection,
     LimitsSection,
@@ -111,7 +111,7 @@ def read_machine(path: str | PathLike[str], parameters: Mapping[str, float | str
         table=machine.table,
         limits=machine.limits.build_limits() if machine.limits else Limits(),
         parasitic=machine.parasitic,
-        constraints=tuple(constraint.build() for constraint in machine.constraints),
+        constraints=machine.constraints,
     )
 
 
@@ -149,8 +149,8 @@ class _MachineSection(FileSection):
     mounting: Mounting = ()
     motion: Annotated[tuple[str, ...], PlainValidator(_read_motion)]
     parasitic: Annotated[tuple[str, ...], PlainValidator(_read_parasitic)] = ()
-    constraints: Annotated[tuple[ConstraintSection, ...], ListOf] = ()
     legs: Legs
+    constraints: Annotated[tuple[ConstraintValue, ...], ListOf] = ()  # of rods that stand on what a leg moves
     head: Steps = ()
     table: Steps = ()
     limits: LimitsSection | None = None

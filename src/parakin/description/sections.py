@@ -29,6 +29,8 @@ from ..model.elements import (
     PlaneConstraint,
     Point,
     Range,
+    RodConstraint,
+    Size,
     Step,
     Unit,
     Vector,
@@ -267,7 +269,7 @@ class LimitsSection(FileSection):
         )
 
 
-class ConstraintSection(FileSection):
+class _PlaneSection(FileSection):
     """A point of one body that stays in a plane of the other."""
 
     where: ClassVar[str] = " in constraints"
@@ -279,6 +281,35 @@ class ConstraintSection(FileSection):
 
     def build(self) -> PlaneConstraint:
         return PlaneConstraint(self.plane_of, Point(self.platform), Point(self.foot), Direction(self.normal))
+
+
+class _RodSection(FileSection):
+    """A rod without a drive, from the platform to the base or to what a leg moves."""
+
+    where: ClassVar[str] = " in constraints"
+
+    rod: Extent
+    platform: PointValue
+    foot: PointValue
+    on: WordValue | None = None
+
+    def build(self) -> RodConstraint:
+        drive = None if self.on is None else str(self.on)
+        return RodConstraint(Point(self.platform), Point(self.foot), Size(self.rod), drive)
+
+
+def _read_constraint(value: object, info: ValidationInfo) -> PlaneConstraint | RodConstraint:
+    if not isinstance(value, YamlMap) or ("rod" in value) == ("plane_of" in value):
+        raise ValueError(f"expected a mapping with plane_of, or one with rod, got {describe_value(value)}")
+    section = _RodSection if "rod" in value else _PlaneSection
+    built = section.model_validate(value, context=info.context).build()
+    joints = get_context(info).joints
+    if isinstance(built, RodConstraint) and built.drive is not None and built.drive not in joints:
+        raise ValueError(f"on: unknown joint {quote(built.drive)}{suggest(built.drive, joints)}")
+    return built
+
+
+ConstraintValue = Annotated[PlaneConstraint | RodConstraint, PlainValidator(_read_constraint)]
 
 
 class HomeSection(FileSection):

@@ -12,7 +12,19 @@ from dataclasses import fields
 from math import isfinite
 from typing import Any, get_type_hints
 
-from ..model.elements import ABSOLUTE, MOTION_UNITS, Direction, Drive, Point, Signs, Size, Step, Unit, Vector
+from ..model.elements import (
+    ABSOLUTE,
+    MOTION_UNITS,
+    Direction,
+    Drive,
+    Point,
+    RodConstraint,
+    Signs,
+    Size,
+    Step,
+    Unit,
+    Vector,
+)
 from ..model.legs import Leg
 from ..model.spec import Spec
 from ..units import AXIS_UNITS
@@ -26,11 +38,12 @@ def format_spec(spec: Spec) -> str:
         f"source: {json.dumps(' '.join(spec.source.split()), ensure_ascii=False)}",
         *_list_steps("mounting", spec.mounting),
         f"motion: {' '.join(spec.motion)}",
-        *_list_constraints(spec),
+        *([f"parasitic: {' '.join(spec.parasitic)}"] if spec.parasitic else []),
         "legs:",
     ]
     for leg in spec.legs:
         lines += _list_leg(leg)
+    lines += _list_constraints(spec)
     lines += [*_list_steps("head", spec.head), *_list_steps("table", spec.table), *_list_limits(spec)]
     home = ", ".join(f"{axis}: {_format_quantity(value, AXIS_UNITS[axis])}" for axis, value in spec.home.items())
     return "\n".join([*lines, f"home: {{{home}}}", ""])
@@ -93,13 +106,17 @@ def _format_leg_value(value: Any, hint: Any) -> str:
 
 def _list_constraints(spec: Spec) -> Iterator[str]:
     if spec.constraints:
-        yield f"parasitic: {' '.join(spec.parasitic)}"
         yield "constraints:"
     for constraint in spec.constraints:
-        yield f"  - plane_of: {constraint.plane_of}"
-        yield f"    platform: {_format_pair(constraint.platform, 'mm')}"
+        yield f"  - platform: {_format_pair(constraint.platform, 'mm')}"
         yield f"    foot: {_format_pair(constraint.foot, 'mm')}"
-        yield f"    normal: {_format_direction(constraint.normal)}"
+        if isinstance(constraint, RodConstraint):
+            yield f"    rod: {_format_quantity(constraint.rod, 'mm')}"
+            if constraint.drive is not None:
+                yield f"    on: {constraint.drive}"
+        else:
+            yield f"    plane_of: {constraint.plane_of}"
+            yield f"    normal: {_format_direction(constraint.normal)}"
 
 
 def _list_steps(key: str, steps: Sequence[Step]) -> Iterator[str]:

@@ -60,6 +60,12 @@ def compose_chain(steps: Iterable[Step], joints: Sequence[Scalar]) -> tuple[Mat,
     return rotation, origin
 
 
+def make_small_rotation(turn: Vec) -> Mat:
+    """Make the rotation by small angles about the axes x, y and z, to the first order."""
+    x, y, z = turn
+    return ((1.0, -z, y), (z, 1.0, -x), (-y, x, 1.0))
+
+
 def invert_rotations(steps: Sequence[Step]) -> list[Step]:
     """List the rotations of the inverted chain."""
     return [Step(s.axis, -s.value, s.drive, -s.sign) for s in reversed(steps) if s.axis in ROTATIONS]

@@ -107,6 +107,22 @@ class PlaneConstraint:
 
 
 @dataclass(frozen=True)
+class RodConstraint:
+    """A closure without a drive: a rod of fixed length from the platform to the base, or to what a leg's drive moves.
+
+    platform : in the platform's frame
+    foot : in the base frame; of what a drive moves where all joints of its leg are 0
+    rod : mm
+    drive : the drive of a leg on whose carriage or arm the foot is; None: the base
+    """
+
+    platform: Point
+    foot: Point
+    rod: Size
+    drive: str | None = None
+
+
+@dataclass(frozen=True)
 class Limits:
     """The limits of a machine besides its drives' ranges."""
 

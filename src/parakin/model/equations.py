@@ -8,7 +8,7 @@ from functools import cached_property, reduce
 from ..algebra import Scalar, Vec, add, apply, atan2, minimum, norm, scale, sincos, sqrt, sub, transpose
 from ..errors import DescriptionError
 from ..units import AXIS_UNITS
-from .elements import ROTATIONS
+from .elements import ROTATIONS, RodConstraint
 from .legs import Inverse, Leg
 from .limits import HomeRods, Limit, compute_platform_points, group_joints_by_leg, list_limits
 from .nominal_values import find_nominal_value
@@ -76,6 +76,20 @@ class Equations:
     def has_modes(self) -> bool:
         """Whether the legs' inverse has choices."""
         return any(leg.branches for leg in self.spec.legs)
+
+    @property
+    def fixed_signs(self) -> list[int]:
+        """Places of signs in a working mode that can't be others: of legs by whose joints motions are solved for."""
+        if not self.structure.is_solved:
+            return []
+        carriers = {each.drive for each in self.spec.constraints if isinstance(each, RodConstraint)}
+        places: list[int] = []
+        place = 0
+        for leg in self.spec.legs:
+            if carriers & {drive.name for drive in leg.drives}:
+                places += range(place, place + len(leg.branches))
+            place += len(leg.branches)
+        return places
 
     def split_mode(self, mode: str) -> tuple[list[str], str]:
         """Split a working mode into each leg's signs, and head and table's."""

@@ -9,7 +9,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations
 from math import inf
-from typing import Literal
+from typing import Literal, NamedTuple
 
 from ..algebra import (
     Mat,
@@ -28,10 +28,10 @@ from ..algebra import (
     sub,
 )
 from .elements import MOTION_UNITS, Cone
-from .legs import Leg, Reach
+from .legs import Reach
 from .nominal_values import find_nominal_value
 from .spec import Spec
-from .structures import PlatformPlacement
+from .structures import PlatformPlacement, list_rods, locate_passive_rods
 
 _ONE_JOINT = 1.0  # mm; nearer points of two legs are one joint
 
@@ -184,21 +184,44 @@ def _list_clearances(
     least = spec.limits.clearance
     if least is None:
         return
-    # Measured from the platform's end, where neighbours are closest: the platform's position cancels in the difference.
-    struts = [struts[0][::-1] for struts in _compute_rods(spec, placement, joints)]
-    for (one, a), (two, b) in combinations(zip(spec.legs, struts, strict=True), 2):
+    for one, two in combinations(_list_struts(spec, placement, joints), 2):
         if _share_joint(one, two):
             continue
-        names = f"{one.drives[0].name}-{two.drives[0].name}"
+        names = f"{one.name}-{two.name}"
         yield (
             Limit(f"clearance {names}", f"clearance of {names}", "mm", "min", least),
-            compute_segment_distance(a, b) - least,
+            compute_segment_distance(one.ends, two.ends) - least,
         )
 
 
-def _share_joint(one: Leg, two: Leg) -> bool:
-    """Tell whether two legs meet in a joint, in a calibrated machine too: two bearings have no room there."""
-    pairs = [(one.find_fixed_joint(), two.find_fixed_joint()), (one.fixed_foot(), two.fixed_foot())]
+class _Strut(NamedTuple):
+    """A strut that holds the platform: both ends in the base frame, and its fixed joints, None where one moves."""
+
+    name: str
+    ends: tuple[Vec, Vec]
+    platform: Vec | None
+    foot: Vec | None
+
+
+def _list_struts(spec: Spec, placement: PlatformPlacement, joints: Sequence[Scalar]) -> list[_Strut]:
+    """List the struts of legs and the passive rods.
+
+    They begin at the platform, where neighbours are closest: the platform's position cancels in their differences.
+    """
+    rods = _compute_rods(spec, placement, joints)
+    struts = [
+        _Strut(leg.drives[0].name, own[0][::-1], leg.find_fixed_joint(), leg.fixed_foot())
+        for leg, own in zip(spec.legs, rods, strict=True)
+    ]
+    passive = locate_passive_rods(spec, placement, group_joints_by_leg(spec, joints))
+    for name, rod in list_rods(spec).items():
+        struts.append(_Strut(name, passive[name][::-1], rod.platform, rod.foot if rod.drive is None else None))
+    return struts
+
+
+def _share_joint(one: _Strut, two: _Strut) -> bool:
+    """Tell whether two struts meet in a joint, in a calibrated machine too: two bearings have no room there."""
+    pairs = [(one.platform, two.platform), (one.foot, two.foot)]
     gaps = [sub(a, b) for a, b in pairs if a is not None and b is not None]
     return any(norm([find_nominal_value(x) for x in gap]) < _ONE_JOINT for gap in gaps)
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from .elements import Drive, Limits, PlaneConstraint, Step, Unit
+from .elements import Drive, Limits, PlaneConstraint, RodConstraint, Step, Unit
 from .legs import Leg
 
 
@@ -32,7 +32,7 @@ class Spec:
     table: tuple[Step, ...] = ()
     limits: Limits = field(default_factory=Limits)
     parasitic: tuple[str, ...] = ()
-    constraints: tuple[PlaneConstraint, ...] = ()
+    constraints: tuple[PlaneConstraint | RodConstraint, ...] = ()
     size_units: Mapping[str, Unit] = field(default_factory=dict)
 
     @property

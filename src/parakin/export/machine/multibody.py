@@ -16,8 +16,8 @@ import numpy as np
 from ...arrays import Array
 from ...machine import Machine
 from ...model.chain import UNIT, compose_chain
-from ...model.elements import ROTATIONS, Drive, PlaneConstraint, Step
-from ...model.structures import PlatformPlacement
+from ...model.elements import ROTATIONS, Drive, PlaneConstraint, RodConstraint, Step
+from ...model.structures import PlatformPlacement, locate_passive_rods
 from .scene import Points, order_polygon
 
 WORLD = "world"
@@ -111,8 +111,13 @@ def build_multibody(machine: Machine) -> Multibody:
         leg_bodies, leg_loops = _build_leg(machine, placement, number, points[number], own)
         bodies += leg_bodies
         loops += leg_loops
+    rods = locate_passive_rods(machine.spec, placement, machine.group_joints(joints))
     for number, constraint in enumerate(machine.constraints, 1):
-        body, loop = _build_plane(f"constraint{number}", constraint, placement)
+        name = f"constraint{number}"
+        if isinstance(constraint, RodConstraint):
+            body, loop = _build_rod(machine, name, constraint, np.array(rods[name], float), bodies)
+        else:
+            body, loop = _build_plane(name, constraint, placement)
         bodies.append(body)
         loops.append(loop)
     frames = {"tool": tool, "workpiece": workpiece}
@@ -216,6 +221,31 @@ def _build_ring(name: str, centre: Points, joint: Points) -> tuple[Body, Points]
     turning = BodyJoint(name, "hinge", np.array(UNIT["rz"], float), np.zeros(3))
     bar = np.array([np.zeros(3), arm])
     return Body(name, "platform", PLATFORM, np.eye(3), centre, (turning,), (bar,)), 0.1 * np.cross(UNIT["rz"], arm)
+
+
+def _build_rod(
+    machine: Machine, name: str, rod: RodConstraint, ends: Points, bodies: Sequence[Body]
+) -> tuple[Body, Loop]:
+    """Build a passive rod from what carries its foot, and the ball joint that holds it to the platform.
+
+    ends : (2, 3) in the base frame
+    """
+    carrier, start = BASE, np.zeros(3)
+    if rod.drive is not None:
+        moved = next(body for body in bodies if body.joints and body.joints[0].name == rod.drive)
+        carrier, start = moved.name, _locate_in_base(moved, bodies)
+    joint = BodyJoint(name, "ball", np.zeros(3), np.zeros(3))
+    bar = np.array([np.zeros(3), ends[1] - ends[0]])
+    body = Body(name, "rod", carrier, np.eye(3), ends[0] - start, (joint,), (bar,))
+    return body, Loop(f"{name}_{PLATFORM}", (name, PLATFORM), (ends[1] - ends[0], np.array(rod.platform, float)))
+
+
+def _locate_in_base(body: Body, bodies: Sequence[Body]) -> Points:
+    """Locate the origin (3,) of a leg's body in the base frame; legs' bodies stand parallel to it."""
+    if body.carrier == BASE:
+        return body.origin
+    carrier = next(other for other in bodies if other.name == body.carrier)
+    return body.origin + _locate_in_base(carrier, bodies)
 
 
 def _build_plane(name: str, constraint: PlaneConstraint, placement: PlatformPlacement) -> tuple[Body, Loop]:

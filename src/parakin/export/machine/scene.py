@@ -22,7 +22,7 @@ from ...model.chain import UNIT, compose_chain
 from ...model.elements import Step
 from ...model.equations import Equations
 from ...model.legs import Leg
-from ...model.structures import PlatformPlacement
+from ...model.structures import PlatformPlacement, list_rods, locate_passive_rods
 
 Points = NDArray[np.float64]
 SceneKind = Literal["base", "rail", "telescope", "rod", "arm", "platform", "central", "head", "tool", "table", "axis"]
@@ -142,6 +142,7 @@ class _Stance:
         self.origin: Points = np.array(placement.origin)
         self.points = machine.place_leg_joints(placement)
         self.leg_joints = machine.group_joints(self.joints)
+        self.rods = locate_passive_rods(machine.spec, placement, self.leg_joints)
 
     def locate_struts(self, leg: int) -> list[Points]:
         """Locate both ends (2, 3) of a leg's struts, base frame."""
@@ -198,6 +199,8 @@ class _SceneBuilder:
         anchors: list[tuple[int, int]] = []
         for leg in range(len(self.machine.legs)):
             anchors += [(leg, strut) for strut in self._add_leg(leg)]
+        for name in self.stance.rods:
+            self._add("rod", name, _place_passive_rod(name))
         if self.structure.has_central_leg:
             self._add("central", "central leg", lambda at: at.to_machine([np.zeros(3), at.origin]))
         if anchors:
@@ -235,10 +238,13 @@ class _SceneBuilder:
 
     def _add_platform(self) -> None:
         stance = self.stance
-        order = list_polygon(np.array([leg.place_joint(IDENTITY, ORIGIN) for leg in self.machine.legs], float))
+        rods = list_rods(self.machine.spec).values()
+        points = [leg.place_joint(IDENTITY, ORIGIN) for leg in self.machine.legs] + [rod.platform for rod in rods]
+        order = list_polygon(np.array(points, float))
 
         def locate_corners(at: _Stance) -> Points:
-            return np.array([at.points[i] for i in order])
+            corners = [*at.points, *(end for _, end in at.rods.values())]
+            return np.array([corners[i] for i in order])
 
         self._add("platform", "platform", lambda at: at.to_machine(locate_corners(at)), len(order) > 2)
         if not _coincide(locate_corners(stance).mean(axis=0), stance.origin) and not self.structure.has_central_leg:
@@ -291,6 +297,11 @@ class _SceneBuilder:
 def _place_strut(leg: int, strut: int) -> Callable[[_Stance], Points]:
     """Make the rule that places a leg's strut."""
     return lambda at: at.to_machine(at.locate_struts(leg)[strut])
+
+
+def _place_passive_rod(name: str) -> Callable[[_Stance], Points]:
+    """Make the rule that places a passive rod."""
+    return lambda at: at.to_machine(np.array(at.rods[name]))
 
 
 def _place_on_table(at: _Stance, points: Points) -> Points:

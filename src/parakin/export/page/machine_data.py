@@ -46,6 +46,7 @@ def encode_page_machine(machine: Machine) -> dict[str, Any]:
         ],
         "mode": [1 if sign == "+" else -1 for sign in machine.mode],
         "signs": _name_signs(machine),
+        "fixed_signs": machine.fixed_signs,
         "limits": [
             {
                 "name": limit.name,

@@ -104,7 +104,7 @@ function showLimit(gauge, i, margin) {
 }
 
 const modeSection = addSection("Modes");
-const signButtons = machine.mode.map((_, i) => makeElement("button", {onclick: () => switchSign(i), title: `the other solution of ${machine.signs[i]}`}));
+const signButtons = machine.mode.map((_, i) => makeElement("button", {onclick: () => switchSign(i), disabled: machine.fixed_signs.includes(i), title: `the other solution of ${machine.signs[i]}`}));
 if (signButtons.length) modeSection.append(makeElement("p", {className: "note", textContent: "Working mode: press to switch a branch."}), makeElement("div", {className: "buttons"}, ...signButtons));
 const assemblyNote = makeElement("p", {className: "note"});
 modeSection.append(makeElement("p", {className: "note", textContent: "Assembly: another pose of the same joints."}),

@@ -7,10 +7,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...algebra import Scalar, Term, Trace, derivative, evaluate_trace
+from ...algebra import IDENTITY, ORIGIN, Scalar, Term, Trace, derivative, dot, evaluate_trace, scale
 from ...arrays import Array
 from ...errors import NoMethodError
+from ...model.elements import RodConstraint
 from ...model.limits import group_joints_by_leg
+from ...model.structures import locate_rod
 from ...model.traces import Model
 from .generic_member import GenericMember, find_generic_member
 from .path_tracking import align_members, track_members
@@ -66,6 +68,10 @@ def make_machine_quadrics(model: Model) -> MachineQuadrics:
     size = max(model.sizes)
     quadrics = [make_closure_quadrics(p / size) for p in platforms]
     for constraint in model.spec.constraints:
+        if isinstance(constraint, RodConstraint):
+            numbers += _list_rod_numbers(model, constraint, trace)
+            quadrics.append(make_closure_quadrics(np.array(constraint.platform, float) / size))
+            continue
         foot, platform = np.array(constraint.foot, float), np.array(constraint.platform, float)
         of_base = constraint.plane_of == "base"
         quadrics.append(
@@ -115,6 +121,13 @@ def _list_closure_numbers(model: Model) -> tuple[Trace, list[Scalar], list[Array
             numbers += [0.5 * derivative(slopes[0], point[0]), *slopes, closure]
             platforms.append(np.array(fixed, float))
     return trace, numbers, platforms
+
+
+def _list_rod_numbers(model: Model, rod: RodConstraint, trace: Trace) -> list[Scalar]:
+    """List the five numbers of a passive rod, whose foot the joints tell: half its square less half the distance's."""
+    joints = group_joints_by_leg(model.spec, trace.inputs(len(model.drives), 3))
+    foot, _ = locate_rod(model.spec, rod, IDENTITY, ORIGIN, joints)
+    return [0.5, *scale(foot, -1.0), 0.5 * (dot(foot, foot) - rod.rod**2)]
 
 
 def _check_form(model: Model, slopes: list[Scalar], point: list[Term]) -> None:

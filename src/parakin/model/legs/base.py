@@ -105,6 +105,13 @@ class Leg(ABC):
         """
         raise NoMethodError(f"legs of kind {self.kind} tell nothing of their bodies")
 
+    def carry(self, foot: Vec, joints: list[Scalar], drive: int) -> Vec:
+        """Place a point, mm, of what one of the leg's drives moves, given where it is with all joints at 0.
+
+        Raises :class:`NoMethodError` for a kind whose drives move nothing that a rod could stand on.
+        """
+        raise NoMethodError(f"legs of kind {self.kind} have no carriage or arm")
+
     def assembly_margins(self, point: Vec, joints: list[Scalar]) -> tuple[Scalar, ...]:
         """Return margins ≥ 0 where a leg closes as it is built; its closures may be zero elsewhere too."""
         return ()

@@ -45,6 +45,11 @@ class Column(Leg):
         s, c = sincos(joints[0])
         return [((self.radius * c, self.radius * s, joints[1]), point)]
 
+    def carry(self, foot: Vec, joints: list[Scalar], drive: int) -> Vec:
+        s, c = sincos(joints[0])
+        x, y, z = foot
+        return (c * x - s * y, s * x + c * y, z + joints[1] if drive == 1 else z)
+
     def links(self, point: Vec, joints: list[Scalar]) -> list[Link]:
         s, c = sincos(joints[0])
         foot = (self.radius * c, self.radius * s, joints[1])

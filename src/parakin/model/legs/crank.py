@@ -44,6 +44,13 @@ class Crank(Leg):
         foot = self._foot(joints[0])
         return [(foot, point), (self.pivot, foot)]
 
+    def carry(self, foot: Vec, joints: list[Scalar], drive: int) -> Vec:
+        s, c = sincos(joints[0])
+        arm = sub(foot, self.pivot)
+        along = scale(self.axis, dot(self.axis, arm))
+        across = add(scale(sub(arm, along), c), scale(cross(self.axis, arm), s))
+        return add(self.pivot, add(along, across))
+
     def links(self, point: Vec, joints: list[Scalar]) -> list[Link]:
         foot = self._foot(joints[0])
         return [

@@ -66,6 +66,9 @@ class Lambda(Leg):
         hinge = (start[0] + rod[0], start[1] + rod[1], start[2] + rod[2])
         return [(start, point), (move_along(self.foot, self.rail, joints[1]), hinge)]
 
+    def carry(self, foot: Vec, joints: list[Scalar], drive: int) -> Vec:
+        return move_along(foot, self.rail, joints[drive])
+
     def links(self, point: Vec, joints: list[Scalar]) -> list[Link]:
         (first, _), (second, hinge) = self.struts(point, joints)
         return [

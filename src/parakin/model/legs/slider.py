@@ -48,6 +48,9 @@ class Slider(Leg):
     def struts(self, point: Vec, joints: list[Scalar]) -> list[tuple[Vec, Vec]]:
         return [(self._foot(joints[0]), point)]
 
+    def carry(self, foot: Vec, joints: list[Scalar], drive: int) -> Vec:
+        return move_along(foot, self.rail, joints[drive])
+
     def links(self, point: Vec, joints: list[Scalar]) -> list[Link]:
         foot = self._foot(joints[0])
         return [

@@ -8,6 +8,7 @@ from ..spec import Spec
 from .base import DirectionColumns, PlatformPlacement, Structure
 from .carried import Carried
 from .central_leg import CentralLeg
+from .constraint_rates import list_rods, locate_passive_rods, locate_rod
 from .five_axis import compute_axis_angles, compute_tool_axis
 from .five_axis_platform import FiveAxisPlatform, check_rings
 from .free import Free
@@ -29,6 +30,9 @@ __all__ = [
     "WristOnGuidedPlatform",
     "compute_axis_angles",
     "compute_tool_axis",
+    "list_rods",
+    "locate_passive_rods",
+    "locate_rod",
     "make_structure",
 ]
 

@@ -110,6 +110,11 @@ class Structure(ABC):
         return []
 
     @property
+    def is_solved(self) -> bool:
+        """Whether parasitic motions are solved for in steps, the legs that carry rods in their own modes."""
+        return False
+
+    @property
     def parasitic_turns(self) -> int:
         """How many of the parasitic motions are turns."""
         return sum(word in ROTATIONS for word in self.spec.parasitic)

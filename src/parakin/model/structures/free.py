@@ -24,7 +24,7 @@ from ...algebra import (
 )
 from ...algebra import make_axis_rotation as turned
 from ...errors import DescriptionError
-from ..chain import UNIT, compose_chain, transform_to_local
+from ..chain import UNIT, compose_chain, make_small_rotation, transform_to_local
 from ..elements import ROTATIONS, TRANSLATIONS
 from ..nominal_values import find_nominal_value
 from ..spec import Spec
@@ -134,8 +134,7 @@ class Free(Structure):
     def _make_small_rotation(self, turn: Sequence[Scalar]) -> Mat:
         """Compute the rotation by small angles about the axes that the platform turns about."""
         given = dict(zip(self.turns, turn, strict=True))
-        x, y, z = (given.get(name, 0.0) for name in ("wx", "wy", "wz"))
-        return ((1.0, -z, y), (z, 1.0, -x), (-y, x, 1.0))
+        return make_small_rotation([given.get(name, 0.0) for name in ("wx", "wy", "wz")])
 
     def closure(
         self, pose: Sequence[Scalar], serial: Sequence[Scalar], turn: Sequence[Scalar] = ()

@@ -7,27 +7,32 @@ from collections.abc import Sequence
 from ...algebra import IDENTITY, Mat, Scalar, Vec, add, apply, atan2, product, sincos, sqrt, sub
 from ...algebra import make_axis_rotation as turned
 from ...errors import DescriptionError
-from ..chain import UNIT, compose_chain
+from ..chain import UNIT, compose_chain, make_small_rotation
 from ..elements import ROTATIONS, TRANSLATIONS
 from ..nominal_values import find_nominal_value
 from ..spec import Spec
 from .base import LETTERS, PlatformPlacement, Structure
+from .constraint_rates import list_rates
 from .parasitic import (
     FoundFrame,
     TurnedByPlanes,
     TurnInBasePlanes,
     choose_branch,
+    has_parallel_planes,
     has_planes_of,
     list_independent_words,
-    list_rates,
+    list_planes,
 )
+from .solved_constraints import SolvedConstraints, UnturnedByRods, make_parallelograms
 
 
 class Guided(Structure):
     """The pose is the motion's independent coordinates, and the others follow; tool and head are fixed frames.
 
-    Planes of the platform tell all three turns (axes X Y Z), or planes of the base tell the first turn of the motion,
-    rz, and some translations. Small turns are about the machine frame's axes.
+    Closed forms: rods in parallel with legs' rods keep the platform upright, planes of the platform tell all three
+    turns (axes X Y Z), or planes of the base tell the first turn of the motion, rz, and some translations. All else
+    is solved in steps.
+    Small turns are about the machine frame's axes.
     """
 
     takes_traced_sizes = False  # its frame is found with plain numbers
@@ -48,42 +53,58 @@ class Guided(Structure):
             )
         _, self.tip = compose_chain(spec.head, ())
         home = [float(spec.home.get(letter, 0.0)) for letter in self.axes]
-        self.turned: TurnedByPlanes | None = None
+        self.turned: TurnedByPlanes | UnturnedByRods | None = None
         self.planes: TurnInBasePlanes | None = None
+        self.solved: SolvedConstraints | None = None
         self.branch = 1.0
-        if self.coordinates == TRANSLATIONS and has_planes_of(spec, "platform"):
-            if any(find_nominal_value(x) for x in self.tip):
-                raise DescriptionError(
-                    "head", "planes of the platform tell its turns for the platform's origin: no head"
-                )
+        if self.coordinates == TRANSLATIONS and make_parallelograms(spec):
+            self.turned = UnturnedByRods(spec)
+        elif self.coordinates == TRANSLATIONS and has_parallel_planes(spec) and not self._has_head:
             self.turned = TurnedByPlanes(spec)
             self.turned.choose_branches(sub(home, self.base))
         elif "rz" in spec.parasitic and self.parasitic_turns == 1 and has_planes_of(spec, "base"):
             words = [word for word in TRANSLATIONS if word in spec.parasitic]
-            self.planes = TurnInBasePlanes(spec.constraints, words, self.tip)
+            self.planes = TurnInBasePlanes(list_planes(spec), words, self.tip)
             self.branch = choose_branch(self._solve(home, ()).rotation[0][0])
+        elif set(turn_words) & set(spec.parasitic) in (set(), {"rz"}, set(ROTATIONS)):
+            self.solved = SolvedConstraints(spec, self.tip, self._know(home))
         else:
             raise DescriptionError(
-                "constraints",
-                "no closed form is known: planes of the base tell rz and translations, planes of the platform rz ry rx",
+                "parasitic", f"{' '.join(spec.parasitic)}: of the turns rz ry rx none, rz or all are parasitic"
             )
+
+    @property
+    def _has_head(self) -> bool:
+        return any(find_nominal_value(x) for x in self.tip)
+
+    @property
+    def is_solved(self) -> bool:
+        return self.solved is not None
+
+    def _know(self, pose: Sequence[Scalar]) -> dict[str, Scalar]:
+        """Name the pose's coordinates by their words; lengths are in the base."""
+        shifts = dict(zip(TRANSLATIONS, self.base, strict=True))
+        return {word: value - shifts.get(word, 0.0) for word, value in zip(self.coordinates, pose, strict=True)}
 
     @property
     def middle_turn(self) -> int | None:
         return self.coordinates.index("ry") if "ry" in self.coordinates else None
 
     def _solve(self, pose: Sequence[Scalar], turn: Sequence[Scalar]) -> FoundFrame:
-        given = dict(zip(self.coordinates, pose, strict=True))
-        known = tuple(given.get(word, 0.0) - shift for word, shift in zip(TRANSLATIONS, self.base, strict=True))
+        given = self._know(pose)
+        known = tuple(given.get(word, 0.0) for word in TRANSLATIONS)
+        small = dict(zip(self.turns, turn, strict=False))
+        turned_on = tuple(small.get(name, 0.0) for name in ("wx", "wy", "wz"))
+        if self.solved is not None:
+            return self.solved.find_frame(given, turned_on)
         if self.turned is not None:
-            return self.turned.find_frame(known)
+            moved = self.turned.find_frame(known)
+            return FoundFrame(moved.rotation, sub(moved.origin, apply(moved.rotation, self.tip)), moved.reach)
         assert self.planes is not None
         before = IDENTITY
         for word in ("ry", "rx"):
             before = product(before, turned(word, *sincos(given[word])))
-        small = dict(zip(self.turns, turn, strict=False))
-        x, y = small.get("wx", 0.0), small.get("wy", 0.0)
-        guided = self.planes.solve(((1.0, 0.0, y), (0.0, 1.0, -x), (-y, x, 1.0)), "rz", known, self.branch, before)
+        guided = self.planes.solve(make_small_rotation(turned_on), "rz", known, self.branch, before)
         return FoundFrame(guided.rotation, sub(guided.origin, apply(guided.rotation, self.tip)), guided.reach)
 
     def place(self, pose: Sequence[Scalar], branch: str, first: Scalar | None = None) -> PlatformPlacement:
@@ -111,6 +132,5 @@ class Guided(Structure):
         return guided.rotation, guided.origin, []
 
     def list_constraint_rates(self, pose: Sequence[Scalar], rotation: Mat, origin: Vec) -> list[list[Scalar]]:
-        if self.turned is not None:
-            return self.turned.list_rates(rotation, origin)
-        return list_rates(self.spec, rotation, origin, [UNIT["tz"]])
+        axes = [UNIT[word] for word in ROTATIONS] if self.parasitic_turns == 3 else [UNIT["tz"]]
+        return list_rates(self.spec, rotation, origin, axes[: self.parasitic_turns])

@@ -7,10 +7,11 @@ from collections.abc import Sequence
 from ...algebra import Mat, Scalar, Vec, add, apply, move_along, product, transpose
 from ...errors import DescriptionError
 from ..chain import UNIT, Pointing, compose_chain, transform_to_local
-from ..elements import TRANSLATIONS
+from ..elements import ROTATIONS, TRANSLATIONS
 from ..nominal_values import find_nominal_value
 from ..spec import Spec
 from .base import PlatformPlacement
+from .constraint_rates import list_rates
 from .five_axis import FiveAxis, compute_axis_angles, turn_tool_axis
 from .parasitic import TurnedByPlanes, has_planes_of, list_independent_words
 from .wrist_centre import find_wrist_centre
@@ -88,4 +89,4 @@ class WristOnGuidedPlatform(FiveAxis):
         return rotation, origin, self._tilt_rows(pose, turn, self._point(rotation, head))
 
     def list_constraint_rates(self, pose: Sequence[Scalar], rotation: Mat, origin: Vec) -> list[list[Scalar]]:
-        return self.turned.list_rates(rotation, origin)
+        return list_rates(self.spec, rotation, origin, [UNIT[word] for word in ROTATIONS])

@@ -49,24 +49,6 @@ def find_direction(first: Vec, a: Scalar, second: Vec, b: Scalar, side: float) -
     return add(middle, scale(normal, side * sqrt(margin * inverse))), margin
 
 
-def measure_constraint(constraint: PlaneConstraint, rotation: Mat, origin: Vec) -> Scalar:
-    """Measure how far a constraint's point is from its plane, mm."""
-    span = sub(add(origin, apply(rotation, constraint.platform)), constraint.foot)
-    normal = constraint.normal if constraint.plane_of == "base" else apply(rotation, constraint.normal)
-    return dot(normal, span)
-
-
-def list_constraint_wrench(constraint: PlaneConstraint, rotation: Mat, origin: Vec) -> tuple[Vec, Vec]:
-    """Compute the constraint's wrench on the platform: a unit force, and its moment about the platform's origin, mm.
-
-    They are how fast :func:`measure_constraint` changes as the origin moves, and as the platform turns about it.
-    """
-    if constraint.plane_of == "base":
-        return constraint.normal, cross(apply(rotation, constraint.platform), constraint.normal)
-    normal = apply(rotation, constraint.normal)
-    return normal, cross(sub(constraint.foot, origin), normal)
-
-
 class TurnInBasePlanes:
     """Points of the platform in planes of the base; some translations and one turn are unknown."""
 
@@ -110,17 +92,21 @@ class TurnInBasePlanes:
         return FoundFrame(rotation if before is None else product(rotation, before), tuple(origin), (margin,))
 
 
+def _list_parallel_planes(constraints: Sequence[PlaneConstraint]) -> list[tuple[int, int, int]]:
+    """List the orders of three planes in which the first two have one normal."""
+    return [
+        pair
+        for pair in ((0, 1, 2), (0, 2, 1), (1, 2, 0))
+        if norm(cross(constraints[pair[0]].normal, constraints[pair[1]].normal)) < _FEW
+        and dot(constraints[pair[0]].normal, constraints[pair[1]].normal) > 0.0
+    ]
+
+
 class TurnsInPlatformPlanes:
     """Points of the base in planes of the platform, two of which are parallel; all three turns are unknown."""
 
     def __init__(self, constraints: Sequence[PlaneConstraint]):
-        pairs = [(0, 1, 2), (0, 2, 1), (1, 2, 0)]
-        parallel = [
-            pair
-            for pair in pairs
-            if norm(cross(constraints[pair[0]].normal, constraints[pair[1]].normal)) < _FEW
-            and dot(constraints[pair[0]].normal, constraints[pair[1]].normal) > 0.0
-        ]
+        parallel = _list_parallel_planes(constraints)
         if not parallel:
             raise DescriptionError(
                 "constraints", "of three planes of the platform two must have one normal: else no closed form is known"
@@ -148,19 +134,19 @@ class TurnsInPlatformPlanes:
         return FoundFrame(rotation, tuple(origin), (first_margin, second_margin))
 
 
-def list_rates(spec: Spec, rotation: Mat, origin: Vec, axes: Sequence[Vec]) -> list[list[Scalar]]:
-    """List each constraint's rates by the parasitic translations, and by turns about ``axes`` (base frame)."""
-    columns = [TRANSLATIONS.index(word) for word in TRANSLATIONS if word in spec.parasitic]
-    rows = []
-    for constraint in spec.constraints:
-        force, moment = list_constraint_wrench(constraint, rotation, origin)
-        rows.append([*(force[column] for column in columns), *(dot(moment, axis) for axis in axes)])
-    return rows
-
-
 def has_planes_of(spec: Spec, body: str) -> bool:
     """Tell whether all constraints are planes of a body."""
-    return all(constraint.plane_of == body for constraint in spec.constraints)
+    return all(isinstance(each, PlaneConstraint) and each.plane_of == body for each in spec.constraints)
+
+
+def has_parallel_planes(spec: Spec) -> bool:
+    """Tell whether all three constraints are planes of the platform, two of them with one normal."""
+    return has_planes_of(spec, "platform") and bool(_list_parallel_planes(list_planes(spec)))
+
+
+def list_planes(spec: Spec) -> list[PlaneConstraint]:
+    """List the constraints that are planes."""
+    return [constraint for constraint in spec.constraints if isinstance(constraint, PlaneConstraint)]
 
 
 def list_independent_words(spec: Spec) -> tuple[str, ...]:
@@ -177,7 +163,7 @@ class TurnedByPlanes:
     """Three turns that planes of the platform tell for the platform's origin."""
 
     def __init__(self, spec: Spec):
-        self.spec, self.planes = spec, TurnsInPlatformPlanes(spec.constraints)
+        self.spec, self.planes = spec, TurnsInPlatformPlanes(list_planes(spec))
         self.branches = 1.0, 1.0
 
     def choose_branches(self, origin: Vec) -> None:
@@ -192,9 +178,6 @@ class TurnedByPlanes:
 
     def find_frame(self, origin: Vec) -> FoundFrame:
         return self.planes.solve(origin, self.branches)
-
-    def list_rates(self, rotation: Mat, origin: Vec) -> list[list[Scalar]]:
-        return list_rates(self.spec, rotation, origin, [UNIT[word] for word in TRANSLATIONS])
 
 
 def check_parasitic_words(motion: Sequence[str], parasitic: Sequence[str], count: int) -> None:

@@ -12,6 +12,7 @@ from ..elements import ROTATIONS, TRANSLATIONS
 from ..nominal_values import find_nominal_value
 from ..spec import Spec
 from .base import PlatformPlacement
+from .constraint_rates import list_rates
 from .five_axis import FiveAxis, compute_axis_angles, make_least_rotation, turn_tool_axis
 from .parasitic import (
     FoundFrame,
@@ -19,7 +20,7 @@ from .parasitic import (
     choose_branch,
     has_planes_of,
     list_independent_words,
-    list_rates,
+    list_planes,
 )
 
 _ZERO = 1e-12  # of a direction: what is less is rounding
@@ -56,7 +57,7 @@ class SlidingTable(FiveAxis):
         if any(find_nominal_value(x) for x in aside):
             raise DescriptionError("head", "over a sliding table the tool stands on the platform's z")
         words = [word for word in TRANSLATIONS if word in spec.parasitic]
-        self.planes = TurnInBasePlanes(spec.constraints, words)
+        self.planes = TurnInBasePlanes(list_planes(spec), words)
         self.across = [TRANSLATIONS.index(word) for word in words]
         self._read_slides()
         first, second = self.turn_words[:2]

@@ -165,6 +165,7 @@ class Description:
                 return far
             return np.concatenate([far, 300.0 * (np.einsum("nij,nj->ni", rotation, head[:, :3, 2]) - k)], 1)
 
+        closed = np.abs(measure(rotation)).max(1) < 1.5e-9  # beside a singularity rounding would turn it far
         for _ in range(16):
             here = measure(rotation)
             turned = [rotation @ transform(word, 1e-6)[:, :3, :3] for word in ("rx", "ry", "rz")]
@@ -173,9 +174,7 @@ class Description:
             square = across @ slopes + 1e-9 * np.eye(3)  # of mm², so that it has an inverse anywhere
             step = -np.linalg.solve(square, (across @ here[..., None]))[..., 0]
             step *= np.minimum(1.0, 0.3 / np.maximum(np.linalg.norm(step, axis=1), 1e-300))[:, None]
-            step *= (np.abs(here).max(1) > 1e-11)[
-                :, None
-            ]  # what closes stays, beside a singularity of the constraints too
+            step[closed] = 0.0
             for word, angle in zip(("rx", "ry", "rz"), step.T, strict=True):
                 rotation = rotation @ transform(word, angle)[:, :3, :3]
             if np.abs(step).max(initial=0.0) < 1e-14:

@@ -57,6 +57,7 @@ UNITS = {
 SINGLE = ["length", "slider", "crank"]
 FAMILIES = {  # motion, leg kinds to draw from
     "six": ("tx ty tz rz ry rx", SINGLE),
+    "another order": ("tx ty tz rx rz ry", SINGLE),
     "lambdas": ("tx ty tz rz ry rx", ["lambda"]),
     "columns": ("tx ty tz rz ry rx", ["column"]),
     "any": ("tx ty tz rz ry rx", [*SINGLE, "lambda", "column"]),

@@ -60,9 +60,14 @@ class Description:
         return [word for word in self.motion if word[0] == "r"]
 
     @property
+    def hangs(self):
+        """Whether a central leg holds the platform."""
+        return self.motion[0][0] == "r" and [word for word in self.motion if word[0] == "t"] == ["tz"]
+
+    @property
     def tells_axis(self):
         """Whether of the tool's orientation its axis counts only."""
-        return bool(self.serial) or self.motion[0][0] == "r" or len(self.motion) == 5
+        return bool(self.serial) or self.hangs or len(self.motion) == 5
 
     @property
     def axes(self):
@@ -122,7 +127,7 @@ class Description:
         if self.constraints:
             return frame, missed
         planar = [i for i, word in enumerate(("tx", "ty", "tz")) if word not in self.motion]
-        if self.motion[0][0] == "t":
+        if not self.hangs:
             frame[:, planar, 3] = 0.0
         return frame, missed
 
@@ -184,7 +189,7 @@ class Description:
     def _led(self, tip, k, head):
         """Platform's rotation under a driven head: none, or that of the central leg through the wrist's centre."""
         along = head[:, :3, 2]
-        if self.motion[0][0] == "t":
+        if not self.hangs:
             return np.broadcast_to(np.eye(3), (len(k), 3, 3)), np.linalg.norm(along - k, axis=1)
         # The central leg hangs, from the base towards -z. The wrist's centre is the point of the tool's axis that the
         # platform's axis x = y = 0 passes through.
@@ -222,7 +227,7 @@ class Description:
     def _misses(self, poses, joints):
         frame, missed = self.platform(poses, joints)
         tube = np.cross(frame[:, :3, 3], frame[:, :3, 2])  # a central leg's slides along the platform's z
-        worst = [np.linalg.norm(tube, axis=1) * (self.motion[0][0] == "r")]
+        worst = [np.linalg.norm(tube, axis=1) * self.hangs]
         if self.constraints:
             worst += list(np.abs(self.open_constraints(frame[:, :3, :3], frame[:, :3, 3], joints)).T)
         for leg in self.legs:

@@ -222,14 +222,6 @@ def test_check_is_the_first_broken_margin(m):
         m.check(poses, joints=m.inverse(poses[:1]))
 
 
-@pytest.mark.parametrize("words", ["rx ry rz", "ry rx rz"])
-def test_turns_in_another_order_than_the_pose_has_them_are_refused(words, tmp_path):
-    d, _ = draw("six", 3)
-    d.motion = ("tx", "ty", "tz", *words.split())
-    with pytest.raises(pk.InputError, match="its three turns go rz ry rx"):
-        machine_of(d, tmp_path)
-
-
 def test_a_passive_limit_bounds_the_coordinate_it_names(tmp_path):
     d, _ = draw("six", 3)
     d.motion, d.mounting, d.head = ("tx", "ty", "tz", "rz", "ry", "rx"), [], []

@@ -339,6 +339,12 @@ class Machine(MachineProperties):
         """Compute the platform's joint of every leg in the base frame, mm, with the platform placed."""
         return compute_platform_points(self.spec, placement.rotation, placement.origin)
 
+    def locate_passive_rods(
+        self, placement: PlatformPlacement, joints: Sequence[Sequence[Scalar]]
+    ) -> dict[str, tuple[Vec, Vec]]:
+        """Locate both ends of each of :attr:`passive_rods` in the base frame, mm, for the joints of each leg."""
+        return self.model.locate_passive_rods(placement, joints)
+
     # The same on scalars of any kind (:mod:`parakin.algebra`), for interpreters such as intervals.
 
     def trace_inverse(self, pose: Sequence[Scalar], mode: str) -> tuple[list[Scalar], PlatformPlacement, list[Inverse]]:

@@ -92,6 +92,11 @@ class MachineProperties:
         return self.spec.constraints
 
     @property
+    def passive_rods(self) -> dict[str, RodConstraint]:
+        """The constraints that are rods, by their names."""
+        return self.model.passive_rods
+
+    @property
     def closure_joints(self) -> list[int]:
         """The joint of each leg's closure, as an index in the joint vector."""
         return list_closure_joints(self.spec)

@@ -15,7 +15,7 @@ from .nominal_values import find_nominal_value
 from .rates import TwistRates, compute_twist_rates
 from .spec import Spec
 from .spheres import CENTRES_NEEDED, find_common_point, measure_side
-from .structures import PlatformPlacement, Structure, make_structure
+from .structures import PlatformPlacement, Structure, list_rods, locate_passive_rods, make_structure
 
 ARM = 0.2  # of the greatest leg: the length by which angles of turning drives are compared with lengths
 
@@ -39,6 +39,17 @@ class Equations:
     def place_leg_joints(self, placement: PlatformPlacement) -> list[Vec]:
         """Compute the platform's joint of every leg in the base frame, mm, with the platform placed."""
         return compute_platform_points(self.spec, placement.rotation, placement.origin)
+
+    @property
+    def passive_rods(self) -> dict[str, RodConstraint]:
+        """The constraints that are rods, by their names."""
+        return list_rods(self.spec)
+
+    def locate_passive_rods(
+        self, placement: PlatformPlacement, joints: Sequence[Sequence[Scalar]]
+    ) -> dict[str, tuple[Vec, Vec]]:
+        """Locate both ends of each passive rod in the base frame, mm, for the joints of each leg."""
+        return locate_passive_rods(self.spec, placement, joints)
 
     def group_joints(self, joints: Sequence[Scalar]) -> list[list[Scalar]]:
         """Group a joint vector by leg; it may go on with the joints of head and table."""

@@ -17,7 +17,7 @@ from ...arrays import Array
 from ...machine import Machine
 from ...model.chain import UNIT, compose_chain
 from ...model.elements import ROTATIONS, Drive, PlaneConstraint, RodConstraint, Step
-from ...model.structures import PlatformPlacement, locate_passive_rods
+from ...model.structures import PlatformPlacement
 from .scene import Points, order_polygon
 
 WORLD = "world"
@@ -111,7 +111,7 @@ def build_multibody(machine: Machine) -> Multibody:
         leg_bodies, leg_loops = _build_leg(machine, placement, number, points[number], own)
         bodies += leg_bodies
         loops += leg_loops
-    rods = locate_passive_rods(machine.spec, placement, machine.group_joints(joints))
+    rods = machine.locate_passive_rods(placement, machine.group_joints(joints))
     for number, constraint in enumerate(machine.constraints, 1):
         name = f"constraint{number}"
         if isinstance(constraint, RodConstraint):

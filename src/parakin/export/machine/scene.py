@@ -22,7 +22,7 @@ from ...model.chain import UNIT, compose_chain
 from ...model.elements import Step
 from ...model.equations import Equations
 from ...model.legs import Leg
-from ...model.structures import PlatformPlacement, list_rods, locate_passive_rods
+from ...model.structures import PlatformPlacement
 
 Points = NDArray[np.float64]
 SceneKind = Literal["base", "rail", "telescope", "rod", "arm", "platform", "central", "head", "tool", "table", "axis"]
@@ -142,7 +142,7 @@ class _Stance:
         self.origin: Points = np.array(placement.origin)
         self.points = machine.place_leg_joints(placement)
         self.leg_joints = machine.group_joints(self.joints)
-        self.rods = locate_passive_rods(machine.spec, placement, self.leg_joints)
+        self.rods = machine.locate_passive_rods(placement, self.leg_joints)
 
     def locate_struts(self, leg: int) -> list[Points]:
         """Locate both ends (2, 3) of a leg's struts, base frame."""
@@ -238,7 +238,7 @@ class _SceneBuilder:
 
     def _add_platform(self) -> None:
         stance = self.stance
-        rods = list_rods(self.machine.spec).values()
+        rods = self.machine.passive_rods.values()
         points = [leg.place_joint(IDENTITY, ORIGIN) for leg in self.machine.legs] + [rod.platform for rod in rods]
         order = list_polygon(np.array(points, float))
 

@@ -14,6 +14,7 @@ from .five_axis_platform import FiveAxisPlatform, check_rings
 from .free import Free
 from .guided import Guided
 from .guided_wrist import WristOnGuidedPlatform
+from .ordered_motion import OrderedMotion, has_pose_order
 from .parasitic import check_parasitic_words
 from .sliding_table import SlidingTable
 
@@ -24,6 +25,7 @@ __all__ = [
     "FiveAxisPlatform",
     "Free",
     "Guided",
+    "OrderedMotion",
     "PlatformPlacement",
     "SlidingTable",
     "Structure",
@@ -50,12 +52,14 @@ def make_structure(spec: Spec) -> Structure:
         if axis in TRANSLATIONS:
             raise DescriptionError("head", f"joint {name}: the drives of head and table turn; {axis} can't be one")
     driven = len(drives)
-    if spec.motion[0] in ROTATIONS:
+    if spec.motion[0] in ROTATIONS and set(spec.motion) & set(TRANSLATIONS) == {"tz"}:
         return CentralLeg(spec)
     if driven == 0:
         if spec.table:
             raise DescriptionError("table", "a table without a driven turn does nothing; leave it out")
-        return FiveAxisPlatform(spec) if len(spec.motion) == 5 else Free(spec)
+        if len(spec.motion) == 5:
+            return FiveAxisPlatform(spec)
+        return Free(spec) if has_pose_order(spec.motion) else OrderedMotion(spec)
     if set(spec.motion) != set(TRANSLATIONS) or len(spec.motion) != 3:
         raise DescriptionError(
             "motion",

@@ -41,18 +41,13 @@ class Free(Structure):
         super().__init__(spec)
         words = set(spec.motion)
         turns = [w for w in spec.motion if w in ROTATIONS]
-        if len(turns) == 2 or any(w in TRANSLATIONS for w in spec.motion[len(spec.motion) - len(turns) :]):
+        if len(turns) == 2 or len(words) != len(spec.motion):
             raise DescriptionError(
-                "motion",
-                f"{' '.join(spec.motion)}: a free motion has its translations first, then no, one or three turns",
+                "motion", f"{' '.join(spec.motion)}: a free motion has no, one or three turns, and each word once"
             )
         if len(turns) == 3 and len(words) != 6:
             raise DescriptionError(
                 "motion", f"{' '.join(spec.motion)}: with three turns a free motion has three translations"
-            )
-        if len(turns) == 3 and turns != ["rz", "ry", "rx"]:
-            raise DescriptionError(
-                "motion", f"{' '.join(spec.motion)}: its three turns go rz ry rx, as C, B and A of a pose do"
             )
         if len(turns) < 3 and spec.mounting:
             if not words >= set(TRANSLATIONS):

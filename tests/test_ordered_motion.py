@@ -68,7 +68,7 @@ def test_where_the_pose_is_singular_the_motion_need_not_be(tmp_path):
     d.home = np.array([0.0, 0.0, -700.0, 0.0, 0.5 * np.pi, 0.0])
     with pytest.warns(SingularHomeWarning):
         assert not machine_of(d, tmp_path).forward(machine_of(d, tmp_path).inverse(d.home)).converged
-    d.motion = tuple(["tx", "ty", "tz", "rx", "rz", "ry"])
+    d.motion = ("tx", "ty", "tz", "rx", "rz", "ry")
     machine = machine_of(d, tmp_path)
     joints = machine.inverse(machine.home)
     moved = joints + 0.01 * np.where(np.array(machine.joint_units) == "mm", 10.0, 0.1)

@@ -41,8 +41,8 @@ def has_pose_order(motion: Sequence[str]) -> bool:
 class OrderedMotion(Free):
     """A free motion whose coordinates are its elementary transforms in the order written, from the base on.
 
-    The pose is as ever, with R = Rz(C)·Ry(B)·Rx(A). Of three turns the middle one is within ±90°; the motion is singular
-    there, and not where a pose's B is ±90°.
+    The pose is as ever, with R = Rz(C)·Ry(B)·Rx(A). Of three turns the middle one is within ±90°; the motion is
+    singular there, and not where a pose's B is ±90°.
     """
 
     def __init__(self, spec: Spec):

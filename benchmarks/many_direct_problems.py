@@ -45,16 +45,20 @@ def main(count: int = COUNT) -> str:
         wrong = [str(number) for number in (tally.other_mode, tally.other_side)]
         close = f"{tally.close_refused - tally.close_across} of {tally.close:,}"
         cells = [f"{tally.refused:,}", close, str(tally.close_across), f"{1e9 * machine.seconds / count:.0f}"]
-        rows.append([name, *wrong, *cells])
+        causes = ", ".join(f"{number} {cause}" for cause, number in tally.causes.items())
+        rows.append([name, *wrong, f"{tally.open_by:.1e}", *cells, causes])
+        print(*rows[-1], sep=" | ", file=sys.stderr, flush=True)
     title = f"{count:,} direct problems a machine from starts up to 600 mm and 80° off, the farthest refused"
     columns = [
         "machine",
         "in another mode",
         "on another side",
+        "open by, mm",
         "refused",
         "refused from 1 mm",
         "across",
         "ns a problem",
+        "refused from 1 mm, why",
     ]
     return table(title, columns, rows)
 

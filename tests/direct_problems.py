@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections import Counter
+from dataclasses import dataclass, field
 
 import numpy as np
+from geometry import Description
 from test_conformance import poses_about
 
-from parakin.kinematics.solution import ON_ANOTHER_SIDE
+from parakin.kinematics.solution import ON_ANOTHER_SIDE, REASONS
 
 BATCH = 100_000
 OFFSETS = [(0.0, 0.0), (1.0, 0.5), (10.0, 3.0), (50.0, 10.0), (200.0, 30.0), (600.0, 80.0)]  # mm and degrees
@@ -24,6 +26,8 @@ class Tally:
     close: int = 0  # problems with a start 1 mm and 0.5° off at most
     close_refused: int = 0
     close_across: int = 0  # of these, with a start that lies on another side by its own determinant, and said so
+    open_by: float = 0.0  # mm, the greatest distance by which a leg of an answer fails to close, by the second model
+    causes: Counter[str] = field(default_factory=Counter)  # why those close by were refused, but for those across
 
 
 def draw_poses(machine, count, rng):
@@ -71,7 +75,7 @@ def measure_sides(machine, poses):
 
 def try_direct_problems(machine, count, seed=0, **options):
     """Solve ``count`` direct problems of random allowed poses from starts at random distances."""
-    rng, tally = np.random.default_rng(seed), Tally()
+    rng, tally, description = np.random.default_rng(seed), Tally(), Description.of(machine.spec)
     for begin in range(0, count, BATCH):
         poses = draw_poses(machine, min(BATCH, count - begin), rng)
         joints = machine.inverse(poses)
@@ -84,8 +88,12 @@ def try_direct_problems(machine, count, seed=0, **options):
         lost = close & ~done
         tally.close_refused += int(lost.sum())
         across = measure_sides(machine, poses[lost]) * measure_sides(machine, starts[lost]) < 0.0
-        tally.close_across += int((across & (found.why[lost] == ON_ANOTHER_SIDE)).sum())
+        across &= found.why[lost] == ON_ANOTHER_SIDE
+        tally.close_across += int(across.sum())
+        tally.causes.update(REASONS[why] for why in found.why[lost][~across])
         assert (found.why[~done] > 0).all()
+        misses = description.misses(found.poses[done], joints[done])[0]
+        tally.open_by = max(tally.open_by, float(misses.max(initial=0.0)))
         error = measure_mode_error(machine, found.poses[done], joints[done])
         in_mode = error < 1e-5
         tally.other_mode += int((~in_mode).sum())

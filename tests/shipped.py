@@ -26,7 +26,6 @@ REPRESENTATIVES = [
     "pentapod",
     "triglide_pairs",
 ]
-ASSEMBLED = [name for name in NAMES if all(leg.find_fixed_joint() is not None for leg in pk.load(name).legs)]
 
 
 def list_features(machine):

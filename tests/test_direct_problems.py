@@ -19,6 +19,7 @@ def test_no_answer_is_in_another_mode_or_on_another_side(m):
     assert tally.count == COUNT
     assert tally.other_mode == 0
     assert tally.other_side == 0
+    assert tally.open_by < 1e-9
     assert tally.close_refused - tally.close_across <= CLOSE_REFUSED * tally.close
     assert tally.refused < 0.25 * tally.count  # of small machines most starts 600 mm off are beyond reach
 

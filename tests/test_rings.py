@@ -1,8 +1,11 @@
 """Five axes on a free platform: struts on rings about the tool tell tip and axis, whatever its turn about the axis."""
 
+from functools import partial
+
 import numpy as np
 import pytest
 from independent import rotation
+from test_assemblies import distinct, multistart
 
 import parakin as pk
 from parakin.cli import main
@@ -74,10 +77,47 @@ def test_a_ring_is_a_parameter_with_its_height_and_radius():
     assert "legs.strut1.platform.x" not in names  # the ring is about the tool's axis
 
 
-def test_assemblies_are_refused():
-    machine = pk.load("pentapod")
-    with pytest.raises(pk.NoMethodError, match="moves on the platform"):
-        machine.assemblies(machine.inverse(machine.home))
+def measure_struts(machine, places, lengths, side):
+    """How far struts are from closing on the rings' near (1) or far (-1) side, and the axis from length one: (N, 6)."""
+    p, u = places[:, None, :3], places[:, None, 3:]
+    heights, radii = np.array([(leg.platform[2], leg.radius) for leg in machine.legs]).T
+    to_foot = np.array([leg.foot for leg in machine.legs]) - p - heights[:, None] * u
+    along = (to_foot * u).sum(2)
+    across = np.sqrt(np.maximum((to_foot**2).sum(2) - along**2, 0.0))
+    open_by = along**2 + (across - side * radii) ** 2 - lengths**2
+    return np.column_stack([open_by / 1e3, 300.0 * ((places[:, 3:] ** 2).sum(1) - 1.0)])
+
+
+@pytest.mark.parametrize("moved", [0.0, 60.0])
+def test_assemblies_are_all_that_newtons_method_finds(moved, tmp_path):
+    """The shipped machine, whose feet are in a plane, and one with feet out of it."""
+    machine = pk.load(
+        write(tmp_path, TEXT.replace("[-418.03 mm, 324.56 mm, top]", f"[-418.03 mm, 324.56 mm, {895.56 + moved} mm]"))
+    )
+    rng = np.random.default_rng(9)
+    for pose in draw_poses(machine, 1):
+        lengths = machine.inverse(pose)
+        answer = machine.assemblies(lengths)
+        assert answer.complete == "all paths accounted for"
+        assert len(answer) + answer.untold_count + answer.complex_count == 256  # 2⁸, none at infinity
+        assert np.isfinite(answer.radii).all() and answer.radii[:, 0].max() < 1e-3
+        assert np.abs(answer.poses - pose).max(1).min() < 1e-8
+        np.testing.assert_allclose(machine.inverse(answer.poses), np.tile(lengths, (len(answer), 1)), atol=1e-9)
+        b, c = answer.poses[:, 3:].T
+        axes = np.column_stack([np.sin(b) * np.cos(c), np.sin(b) * np.sin(c), np.cos(b)])
+        mine = np.column_stack([answer.poses[:, :3] + 250.0 * axes, axes])
+        starts = np.column_stack([rng.uniform(-1500.0, 1500.0, (1500, 3)) + [0, 0, 900.0], rng.normal(size=(1500, 3))])
+        starts[:, 3:] /= np.linalg.norm(starts[:, 3:], axis=1)[:, None]
+        caps = np.array([150.0, 150.0, 150.0, 0.3, 0.3, 0.3])
+        for side in (1.0, -1.0):
+            measure = partial(measure_struts, machine, lengths=lengths, side=side)
+            found = multistart(measure, starts, caps, steps=40)
+            found = distinct(found[np.abs(measure(found)).max(1) < 1e-6], 1e-3)
+            if side > 0.0:
+                assert len(found) == len(mine)
+                assert all(np.abs(found - row).max(1).min() < 1e-3 for row in mine)
+            else:
+                assert len(found) <= answer.untold_count  # beside those with struts on either side
 
 
 BAD = [

@@ -16,10 +16,8 @@ from ..inverse import SINGULAR
 from ..limit_margins import find_broken_limits
 from ..wrist.pole_thresholds import is_upright
 from .closed_forms import LONGEST, ClosedForm, find_closed_form, solve_closed_form
-from .homotopy_roots import find_coordinates, find_real_roots
-from .machine_quadrics import make_machine_quadrics
+from .homotopy_roots import find_coordinates, find_real_roots, make_closure_system
 from .root_boxes import prove_roots
-from .study import compute_study_points
 
 _AT_ONCE = 256  # rows of joints: some thousands of solutions
 CLOSED_FORM = "proved (closed form)"
@@ -41,8 +39,8 @@ class Assemblies:
     complex_count : solutions that are not real; None of a closed form
     infinite_count : paths that ended at infinity; None of a closed form
     lost_count : paths that could not be followed; None of a closed form
-    untold_count : real solutions that no pose of this machine tells: its platform hangs there the other way round, or
-        its constraints hold it in another of their own solutions
+    untold_count : real solutions that no pose of this machine tells: its platform hangs there the other way round, its
+        constraints hold it in another of their own solutions, or a strut ends on its ring's far side
     """
 
     poses: Array
@@ -84,7 +82,7 @@ def _find_in_block(model: Model, joints: Array) -> list[Assemblies]:
     answers = _describe(model, joints, [_make_empty_coordinates(model)] * len(joints), CLOSED_FORM)
     rows = np.flatnonzero(near)
     roots = find_real_roots(model, joints[rows])
-    coordinates = [find_coordinates(model, own.points) for own in roots]
+    coordinates = [find_coordinates(model, own.points, given) for own, given in zip(roots, joints[rows], strict=True)]
     with_pose = [find_finite_rows(own) for own in coordinates]
     kept = [own[has_pose] for own, has_pose in zip(coordinates, with_pose, strict=True)]
     described = _describe(model, joints[rows], kept, ALL_PATHS)
@@ -164,21 +162,14 @@ def _prove_poses(model: Model, joints: Array, coordinates: Array, owners: Indice
 
     owners : (k,) the row of joints (N, joints) of each
     """
-    quadrics = make_machine_quadrics(model)
     if not len(coordinates):
         return np.empty((0, 2))
-    rotation, origin = model.structure.frame(list(coordinates.T))
+    system = make_closure_system(model)
+    with np.errstate(divide="ignore", invalid="ignore"):  # of a tool axis the other way round the axis alone is told
+        rotation, origin = model.structure.frame(list(coordinates.T))
     entries = np.stack(
         np.broadcast_arrays(*(entry for row in rotation for entry in row), *origin, coordinates[:, 0]), 1
     )
-    rotations, origins = entries[:, :9].reshape(-1, 3, 3), entries[:, 9:12]
-    points = compute_study_points(rotations, origins / quadrics.size) @ quadrics.family.hull.T
-    points /= np.linalg.norm(points, axis=1, keepdims=True)
-    width = prove_roots(quadrics.make_systems(joints).real[owners], points) * np.sqrt(points.shape[1])
-    x = points @ quadrics.family.hull
-    e, g = np.linalg.norm(x[:, :4], axis=1), np.linalg.norm(x[:, 4:], axis=1)
-    with np.errstate(invalid="ignore"):
-        least = e - width
-        turn = np.where(least > 0.0, 4.0 * width / least, np.nan)
-        move = np.where(least > 0.0, 2.0 * width / least * (1.0 + 2.0 * (g + width) / least), np.nan)
-    return np.stack([move * quadrics.size, turn], 1)
+    points = system.compute_points(entries[:, :9].reshape(-1, 3, 3), entries[:, 9:12])
+    widths = prove_roots(system.make_systems(joints).real[owners], points) * np.sqrt(points.shape[1])
+    return system.bound_moves(points, widths)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import NamedTuple, TypeVar
 
 import numpy as np
@@ -10,13 +11,14 @@ from ...arrays import Array
 from ...errors import NoMethodError
 from ...model.traces import Model
 from ..planar_rpr import CONTINUUM
+from .closure_system import ClosureSystem
 from .generic_member import GenericMember
-from .machine_quadrics import MachineQuadrics, find_own_member, make_machine_quadrics
+from .machine_quadrics import make_machine_quadrics
 from .path_tracking import LENIENT, STRICT, align_closures, find_meetings, measure_angles, track_members
 from .quadric_family import Complex
-from .study import compute_frames
+from .ring_quadrics import find_tori, make_ring_quadrics
 
-_AT_INFINITY = 1e-5  # |e·e| of a singular end: its translation is infinite
+_AT_INFINITY = 1e-5  # of what a singular end's place is divided by: it is infinite
 _REAL = 1e-4  # imaginary part, for a point of length one, from which Newton's method may find a real root
 _CLOSED = 1e-12  # of a quadric at a point of length one: it is a root
 _STRIDE = 1e-3  # along the null direction of a double root
@@ -44,15 +46,27 @@ class RealRoots(NamedTuple):
     lost_count: int
 
 
+@lru_cache(maxsize=32)
+def make_closure_system(model: Model) -> ClosureSystem:
+    """Make the system of a machine's closures.
+
+    Raises :class:`NoMethodError` where a leg's closure puts its platform point on no sphere and no plane, and its foot
+    on no torus about the tool.
+    """
+    on_rings = find_tori(model, [0.0] * len(model.drives)) is not None
+    return make_ring_quadrics(model) if on_rings else make_machine_quadrics(model)
+
+
 def find_real_roots(model: Model, joints: Array) -> list[RealRoots]:
     """Find all real roots of a machine's quadrics for each row of joints (N, joints).
 
     Raises :class:`NoMethodError` for a continuum of roots.
     """
-    quadrics, own = make_machine_quadrics(model), find_own_member(model)
+    closures = make_closure_system(model)
+    own = closures.own_member
     if not len(own.roots):
         raise NoMethodError(f"{model.spec.name}: {CONTINUUM}, or do not close, whatever the joints are")
-    systems = quadrics.make_systems(joints)
+    systems = closures.make_systems(joints)
     roots = _track_and_sort(model, systems, own)
     for row in [row for row, own_roots in enumerate(roots) if own_roots.lost_count]:
         roots[row] = _track_and_sort(model, systems[row : row + 1], own, _PHASE, STRICT)[0]
@@ -66,7 +80,7 @@ def _track_and_sort(
 
     phase : the member's closures are multiplied by it, which leaves their roots and leads along other paths
     """
-    fixed = len(make_machine_quadrics(model).family.fixed)
+    fixed = make_closure_system(model).fixed_count
     first, last = align_closures(own.system, systems, fixed)
     first[:, fixed:] *= phase
     ends = track_members(first, last, own.roots, tolerance)
@@ -88,7 +102,7 @@ def _sort_ends(model: Model, system: Complex, points: Complex, reached: Array, m
     single = _polish_points(system.real, points[regular & near_real].real, 4)
     turned_real = _measure_closures(system.real, single) < _CLOSED
     ends_singular = _refine_singular(system, points[~regular & ~lost])
-    kinds = _sort_singular(make_machine_quadrics(model), system, ends_singular)
+    kinds = _sort_singular(make_closure_system(model), system, ends_singular)
     doubles = _join_same(_turn_to_real(ends_singular[kinds == _DOUBLE]).real, _SAME_DOUBLE)
     if any(_is_in_continuum(system.real, point) for point in doubles):
         raise NoMethodError(f"{model.spec.name}: {CONTINUUM}")
@@ -150,17 +164,16 @@ def _refine_singular(system: Complex, points: Complex) -> Complex:
     return refined
 
 
-def _sort_singular(quadrics: MachineQuadrics, system: Complex, points: Complex) -> Array:
+def _sort_singular(closures: ClosureSystem, system: Complex, points: Complex) -> Array:
     """Tell real double roots, complex ones, ends at infinity, and what is no root."""
     kinds = np.full(len(points), _LOST)
     if not len(points):
         return kinds
     turned = _turn_to_real(points)
-    e = points @ quadrics.family.hull[:, :4]
     closed = np.abs(np.einsum("ki,rij,kj->kr", points, system, points)).max(1) < 1e-9
     kinds[closed & (np.abs(turned.imag).max(1) < _REAL)] = _DOUBLE
     kinds[closed & (np.abs(turned.imag).max(1) >= _REAL)] = _COMPLEX
-    kinds[np.abs((e * e).sum(1)) < _AT_INFINITY] = _INFINITE
+    kinds[closures.measure_scales(points) < _AT_INFINITY] = _INFINITE
     return kinds
 
 
@@ -186,21 +199,23 @@ def _is_in_continuum(system: Array, point: Array) -> bool:
     return bool(closes and np.linalg.norm(x - point) > 0.3 * _STRIDE)
 
 
-def find_coordinates(model: Model, points: Array) -> Array:
-    """Compute the motion's coordinates (k, m) of real points (k, n) of a machine's family.
+def find_coordinates(model: Model, points: Array, joints: Array) -> Array:
+    """Compute the motion's coordinates (k, m) of real roots (k, n) for one row of joints (joints,).
 
-    A row is NaN where constraints hold the platform as no pose tells it, in another of their solutions.
+    A row is NaN where no pose tells it: constraints hold the platform in another of their solutions, or a leg closes
+    otherwise than it is built.
     """
-    quadrics = make_machine_quadrics(model)
-    rotations, origins = compute_frames(points @ quadrics.family.hull)
+    closures = make_closure_system(model)
+    rotations, origins = closures.compute_frames(points)
     columns = model.structure.coordinates_of(
-        [[rotations[:, i, j] for j in range(3)] for i in range(3)], list((origins * quadrics.size).T)
+        [[rotations[:, i, j] for j in range(3)] for i in range(3)], list(origins.T)
     )
     coordinates = np.ascontiguousarray(np.stack(np.broadcast_arrays(*columns), 1))
+    coordinates[~closures.find_assembled(points, joints)] = np.nan
     if model.spec.constraints and len(coordinates):
         with np.errstate(invalid="ignore", divide="ignore"):
             turned, place = model.structure.frame(list(coordinates.T))
         off = [np.abs(turned[i][j] - rotations[:, i, j]) for i in range(3) for j in range(3)]
-        off += [np.abs(place[i] / quadrics.size - origins[:, i]) for i in range(3)]
+        off += [np.abs(place[i] - origins[:, i]) / closures.size for i in range(3)]
         coordinates[~(np.max(np.broadcast_arrays(*off), 0) < _SAME_FRAME)] = np.nan
     return coordinates

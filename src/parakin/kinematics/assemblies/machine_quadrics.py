@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from functools import lru_cache
-from typing import NamedTuple
+from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -14,20 +14,22 @@ from ...model.elements import RodConstraint
 from ...model.limits import group_joints_by_leg
 from ...model.structures import locate_rod
 from ...model.traces import Model
+from .closure_system import ClosureSystem
 from .generic_member import GenericMember, find_generic_member
 from .path_tracking import align_members, track_members
 from .quadric_family import Complex, QuadricFamily, draw_complex, make_family
-from .study import make_closure_quadrics, make_inverse_closure_quadrics
+from .study import compute_frames, compute_study_points, make_closure_quadrics, make_inverse_closure_quadrics
 
 _SEED = 3
 _RIGID = ("tx", "ty", "tz", "rz", "ry", "rx")
 _SAMPLES = 60  # of joints
 _VARIES = 1e-9  # of the greatest singular value: a number that depends on the joints
-_AT_INFINITY = 1e-6  # |e| of a point of length one, in the machine's size
+_NO_TURN = 1e-6  # |e| of a point of length one, in the machine's size: it is no frame
 
 
-class MachineQuadrics(NamedTuple):
-    """What turns joints into a system of quadrics, lengths in ``size``.
+@dataclass(frozen=True, eq=False)
+class MachineQuadrics(ClosureSystem):
+    """Closures as quadrics in the coordinates of a motion's family, a subspace of Study's.
 
     matrices : (closures, 5, n, n) of |p|², p's coordinates and 1 for each closure's platform point, and each
         constraint's point
@@ -39,9 +41,13 @@ class MachineQuadrics(NamedTuple):
     trace: Trace
     numbers: list[Scalar]
     size: float
+    model: Model
+
+    @property
+    def fixed_count(self) -> int:
+        return len(self.family.fixed)
 
     def make_systems(self, joints: Array) -> Complex:
-        """Make the systems (N, n - 1, n, n) of rows of joints (N, joints)."""
         return self.family.make_member(self.combine(self.compute_numbers(joints)))
 
     def compute_numbers(self, joints: Array) -> Array:
@@ -56,8 +62,39 @@ class MachineQuadrics(NamedTuple):
         scaled: Complex = quadrics / np.linalg.norm(quadrics, axis=(2, 3), keepdims=True)
         return scaled
 
+    @cached_property
+    def own_member(self) -> GenericMember:
+        generic = find_generic_member(_name_family(self.model))
+        numbers = _draw_numbers(self.compute_numbers(_sample_joints(self.model)))
+        system = self.family.make_member(self.combine(numbers))
+        first, last = align_members(generic.system, system, self.fixed_count)
+        ends = track_members(first, last, generic.roots)
+        e = ends.points[0] @ self.family.hull[:, :4]
+        regular = (ends.reached[0] == 1.0) & (np.linalg.norm(e, axis=1) > _NO_TURN)
+        return GenericMember(system[0], ends.points[0][regular])
 
-@lru_cache(maxsize=32)
+    def measure_scales(self, points: Complex) -> Array:
+        e = points @ self.family.hull[:, :4]
+        return np.asarray(np.abs((e * e).sum(1)))
+
+    def compute_frames(self, points: Array) -> tuple[Array, Array]:
+        rotations, origins = compute_frames(points @ self.family.hull)
+        return rotations, origins * self.size
+
+    def compute_points(self, rotations: Array, origins: Array) -> Array:
+        points = compute_study_points(rotations, origins / self.size) @ self.family.hull.T
+        return np.asarray(points / np.linalg.norm(points, axis=1, keepdims=True))
+
+    def bound_moves(self, points: Array, widths: Array) -> Array:
+        x = points @ self.family.hull
+        e, g = np.linalg.norm(x[:, :4], axis=1), np.linalg.norm(x[:, 4:], axis=1)
+        with np.errstate(invalid="ignore"):
+            least = e - widths
+            turn = np.where(least > 0.0, 4.0 * widths / least, np.nan)
+            move = np.where(least > 0.0, 2.0 * widths / least * (1.0 + 2.0 * (g + widths) / least), np.nan)
+        return np.stack([move * self.size, turn], 1)
+
+
 def make_machine_quadrics(model: Model) -> MachineQuadrics:
     """Make a machine's quadrics.
 
@@ -79,22 +116,7 @@ def make_machine_quadrics(model: Model) -> MachineQuadrics:
         )
         numbers += [0.0, *constraint.normal, -float(np.dot(constraint.normal, foot if of_base else platform))]
     matrices = family.hull @ np.array(quadrics) @ family.hull.T
-    return MachineQuadrics(family, matrices, trace, numbers, size)
-
-
-@lru_cache(maxsize=32)
-def find_own_member(model: Model) -> GenericMember:
-    """Track the roots of a family's generic member to one of a machine's own.
-
-    It has the machine's platform and feet, and generic complex numbers for what depends on the joints.
-    """
-    quadrics, generic = make_machine_quadrics(model), find_generic_member(_name_family(model))
-    family = quadrics.family
-    system = family.make_member(quadrics.combine(_draw_numbers(quadrics.compute_numbers(_sample_joints(model)))))
-    first, last = align_members(generic.system, system, len(family.fixed))
-    ends = track_members(first, last, generic.roots)
-    regular = (ends.reached[0] == 1.0) & (np.linalg.norm(ends.points[0] @ family.hull[:, :4], axis=1) > _AT_INFINITY)
-    return GenericMember(system[0], ends.points[0][regular])
+    return MachineQuadrics(family, matrices, trace, numbers, size, model)
 
 
 def _name_family(model: Model) -> tuple[str, ...]:

@@ -138,6 +138,13 @@ class Leg(ABC):
         """Return centre and radius of the sphere that ``platform`` lies on; None if there is no such sphere."""
         return None
 
+    def torus(self, joints: list[Scalar]) -> tuple[Scalar, Scalar] | None:
+        """Return the radii of the torus about the platform's z, ``platform`` its centre, that the foot lies on.
+
+        The ring's and the strut's, mm; None if there is no such torus.
+        """
+        return None
+
     def bound_platform(self, joints: list[Scalar]) -> tuple[Vec, Scalar] | None:
         """Return centre and radius of a ball that holds ``platform``; None where none is known."""
         return self.sphere(joints)

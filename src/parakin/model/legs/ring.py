@@ -36,6 +36,9 @@ class Ring(Length):
     def sphere(self, joints: list[Scalar]) -> tuple[Vec, Scalar] | None:
         return None
 
+    def torus(self, joints: list[Scalar]) -> tuple[Scalar, Scalar]:
+        return self.radius, joints[0]
+
     def bound_platform(self, joints: list[Scalar]) -> tuple[Vec, Scalar]:
         return self.foot, joints[0] + self.radius
 

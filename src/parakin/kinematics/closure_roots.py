@@ -22,13 +22,13 @@ from ..model.traces import Model
 from .tapes import collect_newton_tapes
 from .wrist.pole_thresholds import SAME_MODE
 
-CLOSED = 1e-9  # greatest closure error of an answer, mm in a machine of a metre
+CLOSED = 1e-9  # greatest closure error of an answer, mm in a machine of up to ten metres, whose rounding is some 1e-11
 MOST_STEPS = 24
 
 
 def compute_closure_tolerance(model: Model) -> float:
     """Return the greatest closure error of an answer, mm: rounding grows with the machine."""
-    return CLOSED * max(1.0, max(model.sizes) / 1000.0)
+    return CLOSED * max(1.0, max(model.sizes) / 10_000.0)
 
 
 def compute_mode_tolerance(model: Model) -> float:

@@ -36,13 +36,13 @@ class RingQuadrics(ClosureSystem):
     """Struts on rings about the tool.
 
     squares, heights : (struts, 9) the linear forms s and h of each strut's foot
-    parts : (struts, 4, 9, 9) of each strut the quadrics of 1, s, s² and h²
+    quadrics : (struts, 4, 9, 9) of each strut the quadrics of 1, s, s² and h²
     rings : (struts,) their radii in ``size``
     """
 
     squares: Array
     heights: Array
-    parts: Array
+    quadrics: Array
     rings: Array
     size: float
     model: Model
@@ -64,7 +64,7 @@ class RingQuadrics(ClosureSystem):
         """Join the quadrics of the coordinates, and the tori of squared lengths (N, struts), each of length one."""
         rest = self.rings**2 - squared_lengths
         numbers = [rest**2, 2.0 * rest - 4.0 * self.rings**2, np.ones_like(rest), 4.0 * self.rings**2 + 0.0 * rest]
-        tori = np.einsum("fnc,cfij->ncij", np.array(numbers), self.parts)
+        tori = np.einsum("fnc,cfij->ncij", np.array(numbers), self.quadrics)
         tori /= np.linalg.norm(tori, axis=(2, 3), keepdims=True)
         fixed = np.broadcast_to(_make_fixed_quadrics(), (len(tori), 3, _COORDINATES, _COORDINATES))
         return np.ascontiguousarray(np.concatenate([fixed, tori], 1))
@@ -105,12 +105,13 @@ class RingQuadrics(ClosureSystem):
         with np.errstate(invalid="ignore"):
             least = np.where(one > widths, one - widths, np.nan)
             moves = [
-                widths * (1.0 + np.linalg.norm(points[:, part], axis=1) / one) / least for part in (_ORIGIN, _AXIS)
+                widths * (1.0 + np.linalg.norm(points[:, columns], axis=1) / one) / least
+                for columns in (_ORIGIN, _AXIS)
             ]
         return np.stack([moves[0] * self.size, 0.5 * np.pi * moves[1]], 1)
 
     def find_assembled(self, points: Array, joints: Array) -> Flags:
-        """Where the struts end on their rings' near sides: of ±2·R·√(s - h²) = s + R² - r² that of the plus."""
+        """Find where struts end on their rings' near sides: of ±2·R·√(s - h²) = s + R² - r² it is that of the plus."""
         places = points / points[:, [_ONE]]
         squares = places @ self.squares.T
         return np.asarray((squares + self.rings**2 >= self._find_lengths(joints[None]) ** 2).all(1))
@@ -120,8 +121,8 @@ def find_tori(model: Model, joints: Sequence[Scalar]) -> list[tuple[Scalar, Scal
     """Find both radii, mm, of each leg's torus; None where a leg puts its foot on none."""
     given = group_joints_by_leg(model.spec, joints)
     tori = [leg.torus(own) for leg, own in zip(model.spec.legs, given, strict=True)]
-    told = [torus for torus in tori if torus is not None]
-    return told if len(told) == len(tori) else None
+    known = [torus for torus in tori if torus is not None]
+    return known if len(known) == len(tori) else None
 
 
 def make_ring_quadrics(model: Model) -> RingQuadrics:
@@ -137,12 +138,12 @@ def make_ring_quadrics(model: Model) -> RingQuadrics:
         along[_ONE], along[_AXIS], along[_ALONG] = -height, foot, -1.0
         forms.append((square, along))
     one = np.eye(_COORDINATES)[_ONE]
-    parts = [[_multiply(one, one), _multiply(s, one), _multiply(s, s), _multiply(h, h)] for s, h in forms]
+    quadrics = [[_multiply(one, one), _multiply(s, one), _multiply(s, s), _multiply(h, h)] for s, h in forms]
     radii = find_tori(model, [0.0] * len(model.drives))
     assert radii is not None
     squares, heights = np.array(forms).swapaxes(0, 1)
     rings = np.array([ring for ring, _ in radii], float) / size
-    return RingQuadrics(squares, heights, np.array(parts), rings, size, model)
+    return RingQuadrics(squares, heights, np.array(quadrics), rings, size, model)
 
 
 def _multiply(one: Array, other: Array) -> Array:

@@ -8,7 +8,9 @@ import pytest
 from regions import whole_region
 
 import parakin as pk
+from parakin.budget import Budget
 from parakin.cli import main
+from parakin.performance.atlas import map_performance
 from parakin.performance.extremes import MEASURES
 from parakin.performance.indices import compute_performance
 
@@ -167,3 +169,8 @@ def test_bad_input_is_one_line(arguments, capsys, tmp_path, monkeypatch):
     assert said.out == ""
     assert said.err.count("\n") == 1
     assert not list(tmp_path.iterdir())
+
+
+def test_a_map_whose_outline_is_not_found_in_time_is_refused():
+    with pytest.raises(pk.PoseError, match="time is up"):
+        map_performance(pk.region(pk.load("linear_delta"), at={"Z": 280.0}), budget=Budget(1e-6))

@@ -43,7 +43,7 @@ def render_map(map_: PerformanceMap, marks: Array, suffix: str) -> bytes:
 
 def _draw_map(figure: Figure, map_: PerformanceMap, marks: Array) -> None:
     panels = figure.subplots(2, 2)
-    figure.subplots_adjust(left=0.08, right=0.97, bottom=0.06, top=0.86, hspace=0.28, wspace=0.28)
+    figure.subplots_adjust(left=0.08, right=0.90, bottom=0.06, top=0.86, hspace=0.28, wspace=0.48)
     for axes, panel in zip(panels.flat, _list_panels(map_), strict=True):
         axes.set_title(panel.title, color=INK, fontsize=11, loc="left")
         axes.tick_params(labelsize=8, colors=_GREY)
@@ -116,7 +116,7 @@ def _draw_panel(figure: Figure, axes: Any, map_: PerformanceMap, panel: _MapPane
         axes.contour(x, y, room, levels=[0.0], colors=_OUTLINE, linewidths=1.2)
     if crossed:
         axes.contour(x, y, np.ma.masked_where(room < 0.0, values), levels=[0.0], colors="#b71c1c", linewidths=1.2)
-    bar = figure.colorbar(filled, ax=axes, shrink=0.9, pad=0.02)
+    bar = figure.colorbar(filled, cax=axes.inset_axes((1.03, 0.0, 0.045, 1.0)))
     if panel.endless:
         ticks = levels[:: _LEVELS // 6].tolist()
         bar.set_ticks(ticks, labels=[f"{tick:.3g}" for tick in ticks], minor=False)

@@ -28,6 +28,7 @@ _ALONG = {1: 400, 2: 120, 3: 36}  # positions along the longest side, at most, i
 _AT_ONCE = 1 << 15
 _ON = 1e-3  # a pose nearer than this fraction of a grid's step lies on the slice
 _ROUGH, _OUTLINE = 0.1, 0.2  # gap, and fraction of the time, of the workspace by which the grid is placed
+_FEW = 25  # allowed positions of a map that shows something
 _SEARCH = 0.4  # of the time that is left, for the extremes, and then for isotropic poses
 
 
@@ -161,7 +162,7 @@ def map_performance(
         raise PoseError(f"step: a length above 0 mm expected, not {step:g}")
     outline = budget.take_fraction(_OUTLINE)
     low, high = _find_bounds(region, outline)
-    step = _round_up(float((high - low).max()) / _ALONG[len(region.free_axes)]) if step is None else float(step)
+    asked, step = step, step or _round_up(float((high - low).max()) / _ALONG[len(region.free_axes)])
     counts = [(b - a) / step + 1.0 for a, b in zip(low, high, strict=True)]
     if prod(counts) > MOST:
         if outline.is_spent():  # the bounds are wider than need be
@@ -179,6 +180,8 @@ def map_performance(
                 f"step: no place of a grid of {step:g} mm lies on home's side of the parallel singularities"
             )
         raise PoseError(f"step: no place of a grid of {step:g} mm is allowed, choose a finer one")
+    if asked is None and outline.is_spent() and np.count_nonzero(slack >= 0.0) < _FEW:
+        raise PoseError(TOO_SLOW)  # the bounds were far too wide to choose a step by
     on_grid = _change_columns(performance, lambda column: column.reshape(*shape, *column.shape[1:]))
     return PerformanceMap(region, step, grid, (slack >= 0.0).reshape(shape), slack.reshape(shape), on_grid)
 

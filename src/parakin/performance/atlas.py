@@ -162,28 +162,29 @@ def map_performance(
         raise PoseError(f"step: a length above 0 mm expected, not {step:g}")
     outline = budget.take_fraction(_OUTLINE)
     low, high = _find_bounds(region, outline)
-    asked, step = step, step or _round_up(float((high - low).max()) / _ALONG[len(region.free_axes)])
-    counts = [(b - a) / step + 1.0 for a, b in zip(low, high, strict=True)]
+    longest = float((high - low).max())
+    grid_step = _round_up(longest / _ALONG[len(region.free_axes)]) if step is None else float(step)
+    counts = [(b - a) / grid_step + 1.0 for a, b in zip(low, high, strict=True)]
     if prod(counts) > MOST:
         if outline.is_spent():  # the bounds are wider than need be
             raise PoseError(TOO_SLOW)
         size = " x ".join(f"{count:,.0f}" for count in counts)
-        raise PoseError(f"step: {step:g} mm makes {size} places, at most {MOST:,} are possible")
-    grid = tuple(_list_multiples(a, b, step) for a, b in zip(low, high, strict=True))
+        raise PoseError(f"step: {grid_step:g} mm makes {size} places, at most {MOST:,} are possible")
+    grid = tuple(_list_multiples(a, b, grid_step) for a, b in zip(low, high, strict=True))
     positions = np.stack(np.meshgrid(*grid, indexing="ij"), -1).reshape(-1, len(grid))
     shape = tuple(len(line) for line in grid)
     performance = _compute_in_blocks(region, positions, scale, budget, progress)
     slack = compute_slack(region, positions)
+    if step is None and outline.is_spent() and np.count_nonzero(slack >= 0.0) < _FEW:
+        raise PoseError(TOO_SLOW)  # the bounds were far too wide to choose a step by
     if not (slack >= 0.0).any():
         if (compute_slack(region.include_all_components(), positions) >= 0.0).any():
             raise PoseError(
-                f"step: no place of a grid of {step:g} mm lies on home's side of the parallel singularities"
+                f"step: no place of a grid of {grid_step:g} mm lies on home's side of the parallel singularities"
             )
-        raise PoseError(f"step: no place of a grid of {step:g} mm is allowed, choose a finer one")
-    if asked is None and outline.is_spent() and np.count_nonzero(slack >= 0.0) < _FEW:
-        raise PoseError(TOO_SLOW)  # the bounds were far too wide to choose a step by
+        raise PoseError(f"step: no place of a grid of {grid_step:g} mm is allowed, choose a finer one")
     on_grid = _change_columns(performance, lambda column: column.reshape(*shape, *column.shape[1:]))
-    return PerformanceMap(region, step, grid, (slack >= 0.0).reshape(shape), slack.reshape(shape), on_grid)
+    return PerformanceMap(region, grid_step, grid, (slack >= 0.0).reshape(shape), slack.reshape(shape), on_grid)
 
 
 def _find_bounds(region: Region, budget: Budget) -> tuple[Array, Array]:

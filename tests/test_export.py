@@ -8,6 +8,7 @@ import trimesh
 
 import parakin as pk
 from parakin.cli import main
+from parakin.description.machine_file import list_shipped_machines
 from parakin.export.machine.scene import build_scene
 
 DELTAS = ["linear_delta", "linapod3"]
@@ -56,6 +57,28 @@ def test_a_delta_comes_back(name, to, tmp_path):
     assert [drive.high for drive in again.drives] == pytest.approx(tops, abs=1e-6)
 
 
+@pytest.mark.parametrize("counts", ["downward", "upward"])
+def test_a_rotary_delta_comes_back(counts, tmp_path):
+    """Above its bed, with arms that count either way; the firmware's count upward."""
+    text = list_shipped_machines()["rotary_delta"].read_text().replace("home: {X: 0 mm, Y: 0 mm, Z: -280 mm}", "")
+    text = text.replace("[-30 deg, 80 deg]", "[2 deg, 80 deg]")
+    text += "mounting:\n  - tz: 500 mm\nhome: {X: 0 mm, Y: 0 mm, Z: 200 mm}\n"
+    if counts == "upward":
+        text = text.replace("[[1, 0, 0], [-0.5, cos(30 deg), 0], [-0.5, -cos(30 deg), 0]]",
+                            "[[-1, 0, 0], [0.5, -cos(30 deg), 0], [0.5, cos(30 deg), 0]]")  # fmt: skip
+        text = text.replace('branch: "+"', 'branch: "-"').replace("[2 deg, 80 deg]", "[-80 deg, -2 deg]")
+    (tmp_path / "mine.yaml").write_text(text)
+    machine = pk.load(tmp_path / "mine.yaml")
+    assert main(["export", str(tmp_path / "mine.yaml"), "--to", "klipper", "-o", str(tmp_path / "printer.cfg")]) == 0
+    assert main(["import", str(tmp_path / "printer.cfg"), "-o", str(tmp_path / "again.yaml")]) == 0
+    again = pk.load(tmp_path / "again.yaml")
+    poses = machine.home + np.random.default_rng(6).uniform(-80.0, 80.0, (1000, 3))
+    sign = 1.0 if counts == "upward" else -1.0
+    np.testing.assert_allclose(again.inverse(poses), sign * machine.inverse(poses), atol=1e-9)
+    assert [drive.high for drive in again.drives] == pytest.approx([np.radians(-2.0)] * 3, abs=1e-9)
+    assert ("counts downward" in (tmp_path / "printer.cfg").read_text()) == (counts == "downward")
+
+
 def test_calibrated_deltas_come_back(tmp_path):
     """Three rods, turned towers and uneven endstops."""
     text = "M669 K3\nM665 R131.5 L290.8:290.9:291 H300.2 X0.3 Y-0.2 Z0.1\nM666 X0.5 Y-0.3 Z-0.2\n"
@@ -70,7 +93,10 @@ def test_calibrated_deltas_come_back(tmp_path):
 @pytest.mark.parametrize(
     ("words", "told"),
     [
-        (["hexapod", "--to", "klipper"], "three towers"),
+        (["hexapod", "--to", "klipper"], "three legs"),
+        (["rus6", "--to", "klipper"], "three legs"),
+        (["rotary_delta", "--to", "klipper"], "knees are not outside"),
+        (["rotary_delta", "--to", "reprapfirmware"], "no tower"),
         (["orthoglide", "--to", "reprapfirmware"], "no tower"),
         (["hexapod", "--to", "check-move-klipper"], "X, Y and Z"),
         (["hexapod", "--to", "mjcf", "--at", "X=1"], "no pose"),

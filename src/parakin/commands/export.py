@@ -14,10 +14,23 @@ from .values import parse_row
 
 if TYPE_CHECKING:
     from ..arrays import Array
+    from ..controllers.move_check.move_check import Firmware
     from ..export.files import Content
     from ..machine import Machine
 
-ExportFormat = Literal["mjcf", "urdf", "glb", "stl", "klipper", "reprapfirmware", "check-move", "check-move-klipper"]
+ExportFormat = Literal[
+    "mjcf",
+    "urdf",
+    "glb",
+    "stl",
+    "klipper",
+    "reprapfirmware",
+    "check-move",
+    "check-move-klipper",
+    "check-move-grblhal",
+    "check-move-fluidnc",
+    "check-move-reprapfirmware",
+]
 
 _ENDINGS: dict[ExportFormat, str] = {
     "mjcf": ".xml",
@@ -28,8 +41,17 @@ _ENDINGS: dict[ExportFormat, str] = {
     "reprapfirmware": ".g",
     "check-move": ".h",
     "check-move-klipper": ".py",
+    "check-move-grblhal": ".c",
+    "check-move-fluidnc": ".h",
+    "check-move-reprapfirmware": ".h",
 }
 _POSED = ("glb", "stl")
+_FIRMWARES: dict[ExportFormat, Firmware] = {
+    "check-move-klipper": "Klipper",
+    "check-move-grblhal": "grblHAL",
+    "check-move-fluidnc": "FluidNC",
+    "check-move-reprapfirmware": "RepRapFirmware",
+}
 
 
 def export(
@@ -52,7 +74,8 @@ def export(
         What to write: mjcf, a MuJoCo model with closed loops, limits, masses and a servo for each drive; urdf, its
         tree, and its loops in a JSON file beside it; glb and stl, a mesh of its parts at a pose; klipper and
         reprapfirmware, a delta's sizes in that firmware's words; check-move, a small C function for firmware that
-        proves a straight move inside the machine's limits, and check-move-klipper, a module for Klipper with it.
+        proves a straight move inside the machine's limits, and check-move-klipper, -grblhal, -fluidnc and
+        -reprapfirmware, what makes that firmware refuse a move that it does not prove.
     at
         The pose of a mesh: X=10,Z=-1400 or all values in order, mm and degrees; the rest is home's. By default home.
     output
@@ -95,6 +118,7 @@ def _render(machine: Machine, to: ExportFormat, output: Path, pose: Array | None
         "klipper": firmware.render_klipper,
         "reprapfirmware": firmware.render_reprapfirmware,
         "check-move": move_check.render_move_check,
-        "check-move-klipper": move_check.render_klipper_check,
     }
+    if to in _FIRMWARES:
+        return {output.name: move_check.render_firmware_check(machine, _FIRMWARES[to])}
     return {output.name: render[to](machine)}

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from importlib.resources import files
+from typing import Literal
 
 from ...errors import NoMethodError
 from ...kernels.tape import Tape
 from ...machine import Machine
 from ...version import __version__
+
+Firmware = Literal["Klipper", "grblHAL", "FluidNC", "RepRapFirmware"]
 
 _HALF_TURN = 3.141592653589793
 _REGISTER = (1 << 40) - 1  # of a tape's operands: above it stands what else the interpreter is told
@@ -42,14 +45,17 @@ def render_move_check(machine: Machine) -> str:
     }
 
 
-def render_klipper_check(machine: Machine) -> str:
-    """Render a module for Klipper's ``klippy/extras`` that refuses moves which ``check_move`` does not prove.
+def render_firmware_check(machine: Machine, firmware: Firmware) -> str:
+    """Render what makes a firmware refuse moves which ``check_move`` does not prove.
+
+    It is a module for Klipper's ``klippy/extras``, a plugin for grblHAL, or a header that FluidNC's or RepRapFirmware's
+    kinematics are derived by.
 
     Raises :class:`NoMethodError` for a machine whose axes are not X, Y and Z.
     """
     if machine.axes != ("X", "Y", "Z"):
-        raise NoMethodError(f"{machine.name}: Klipper moves X, Y and Z, not {' '.join(machine.axes)}")
-    template = files(__package__).joinpath("klipper.txt").read_text(encoding="utf-8")
+        raise NoMethodError(f"{machine.name}: {firmware} moves X, Y and Z, not {' '.join(machine.axes)}")
+    template = files(__package__).joinpath(f"{firmware.lower()}.txt").read_text(encoding="utf-8")
     title = _format_comment(f"{machine.name} ({machine.spec.title})")
     return template % {"version": __version__, "title": title, "header": render_move_check(machine)}
 

@@ -1,14 +1,14 @@
 """A delta as the configuration of a firmware: Klipper's printer.cfg sections, RepRapFirmware's M665, M666 and M669.
 
-Both count a carriage's height from the nozzle's zero, z + √(L² - r²). Where a machine counts from elsewhere, what is
-written is the same machine, and a comment tells by how much each joint differs.
+Both count a carriage's height from the nozzle's zero, z + √(L² - r²), and Klipper a rotary delta's arms from level up.
+Where a machine counts from elsewhere, what is written is the same machine, and a comment tells how each joint differs.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from itertools import permutations
-from math import atan2, degrees, hypot, isfinite, sqrt
+from math import atan2, cos, degrees, hypot, isfinite, sin, sqrt
 from typing import Any
 
 import numpy as np
@@ -35,18 +35,37 @@ class _Tower:
     offset: float  # joint less the firmware's height of the carriage, mm
 
 
+@dataclass(frozen=True)
+class _Arm:
+    """An arm as Klipper sees it: its joint, its shoulder, the arm's and the rod's length, the nozzle's Z at the top."""
+
+    joint: str
+    radius: float
+    height: float
+    angle: float  # deg, in [0, 360)
+    upper: float
+    lower: float
+    top: float
+    rises: bool  # with the joint
+
+
 def render_klipper(machine: Machine) -> str:
-    """Render Klipper's sections of a linear delta, to be completed by pins and the like.
+    """Render Klipper's sections of a linear or rotary delta, to be completed by pins and the like.
 
     Raises :class:`NoMethodError` for another machine.
     """
+    rotary = all(leg.kind == "crank" for leg in machine.legs)
+    head, steppers = _list_rotary_delta(machine) if rotary else _list_linear_delta(machine)
+    what = (
+        f"# {machine.name}, by parakin {__version__}: the sizes of a delta. Pins, endstops and speeds are to be added."
+    )
+    return "\n".join([what, "[printer]", *head, *steppers, ""])
+
+
+def _list_linear_delta(machine: Machine) -> tuple[list[str], list[str]]:
+    """List the lines of the section of a linear delta, and of its steppers."""
     towers = _list_towers(machine)
-    lines = [
-        f"# {machine.name}, by parakin {__version__}: the sizes of a delta. Pins, endstops and speeds are to be added.",
-        "[printer]",
-        "kinematics: delta",
-        f"delta_radius: {_format(towers[0].radius)}",
-    ]
+    lines = []
     for letter, tower in zip("abc", towers, strict=True):
         top = tower.high - sqrt(tower.rod**2 - tower.radius**2)
         lines += [
@@ -56,7 +75,60 @@ def render_klipper(machine: Machine) -> str:
             f"angle: {_format(tower.angle)}",
             f"position_endstop: {_format(top)}",
         ]
-    return "\n".join([*lines, ""])
+    return ["kinematics: delta", f"delta_radius: {_format(towers[0].radius)}"], lines
+
+
+def _list_rotary_delta(machine: Machine) -> tuple[list[str], list[str]]:
+    """List the lines of the section of a rotary delta, and of its steppers."""
+    shift = _find_shift(machine)
+    arms = [_make_arm(machine, number, shift) for number in range(3)]
+    for shoulders in ([arm.radius for arm in arms], [arm.height for arm in arms]):
+        if max(shoulders) - min(shoulders) > _ALIKE:
+            raise NoMethodError(
+                f"{machine.name}: its shoulders differ in radius or height, which this firmware does not know"
+            )
+    if arms[0].height <= 0.0:
+        raise NoMethodError(f"{machine.name}: its shoulders are not above Z 0, which this firmware asks for")
+    lines = []
+    for letter, arm in zip("abc", arms, strict=True):
+        lines += [
+            "",
+            f"[stepper_{letter}]  # {arm.joint}{'' if arm.rises else ', which counts downward'}",
+            f"upper_arm_length: {_format(arm.upper)}",
+            f"lower_arm_length: {_format(arm.lower)}",
+            f"angle: {_format(arm.angle)}",
+            f"position_endstop: {_format(arm.top)}",
+        ]
+    sizes = [f"shoulder_radius: {_format(arms[0].radius)}", f"shoulder_height: {_format(arms[0].height)}"]
+    return ["kinematics: rotary_delta", *sizes], lines
+
+
+def _make_arm(machine: Machine, number: int, shift: Array) -> _Arm:
+    leg, drive = machine.legs[number], machine.legs[number].drives[0]
+    crank: Any = leg
+    place = np.array(crank.pivot, float) - np.array(leg.platform, float) + shift
+    zero, axis = np.array(crank.zero, float), np.array(crank.axis, float)
+    radius, height = hypot(*place[:2]), float(place[2])
+    out = np.array([*place[:2], 0.0]) / max(radius, _ALIKE)
+    rises = bool(np.cross(axis, zero)[2] > 0.0)
+    level = np.allclose(zero, out, atol=1e-9) and abs(axis[2]) < 1e-9
+    if not level or crank.branch != ("-" if rises else "+"):
+        raise NoMethodError(
+            f"{machine.name}: {drive.name} is no arm that points outward at zero, with its knee outside and above"
+        )
+    high = drive.high if rises else -drive.low
+    if not isfinite(high):
+        raise NoMethodError(f"{machine.name}: {drive.name} has no limit for the endstop above")
+    arm, rod = float(crank.arm), float(crank.rod)
+    below = rod**2 - (radius + arm * cos(high)) ** 2
+    top = arm * sin(high) - sqrt(max(below, 0.0))  # over the shoulder
+    if below <= 0.0 or cos(high) * top + sin(high) * radius >= 0.0:
+        raise NoMethodError(
+            f"{machine.name}: with all arms at the upper limit of {drive.name} their knees are not outside: "
+            "the firmware asks for an endstop that they reach"
+        )
+    angle = degrees(atan2(place[1], place[0])) % 360.0
+    return _Arm(drive.name, radius, height, angle, arm, rod, height + top, rises)
 
 
 def render_reprapfirmware(machine: Machine) -> str:
@@ -86,15 +158,20 @@ def render_reprapfirmware(machine: Machine) -> str:
 
 def _list_towers(machine: Machine) -> list[_Tower]:
     """List the towers of a linear delta, in the order of its joints."""
-    structure = machine.structure
-    upright = np.allclose(np.array(structure.mount, float), np.eye(3), atol=1e-12)
-    if machine.axes != ("X", "Y", "Z") or len(machine.legs) != 3 or not upright:
-        raise NoMethodError(f"{machine.name}: only a delta with three towers can be written for this firmware")
-    shift = np.array(structure.tip, float) + np.array(structure.base, float)
+    shift = _find_shift(machine)
     towers = [_make_tower(machine, number, shift) for number in range(3)]
     if max(tower.radius for tower in towers) - min(tower.radius for tower in towers) > _ALIKE:
         raise NoMethodError(f"{machine.name}: its towers stand at different radii, which this firmware does not know")
     return towers
+
+
+def _find_shift(machine: Machine) -> Array:
+    """Find how far the tip is from the platform's middle, and the base from the machine's origin, mm."""
+    structure = machine.structure
+    upright = np.allclose(np.array(structure.mount, float), np.eye(3), atol=1e-12)
+    if machine.axes != ("X", "Y", "Z") or len(machine.legs) != 3 or not upright:
+        raise NoMethodError(f"{machine.name}: only a delta of three legs can be written for this firmware")
+    return np.asarray(np.array(structure.tip, float) + np.array(structure.base, float))
 
 
 def _make_tower(machine: Machine, number: int, shift: Array) -> _Tower:

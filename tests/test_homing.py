@@ -18,6 +18,7 @@ from parakin.controllers.linuxcnc.homing.homing_plan import pace_return
 from parakin.controllers.linuxcnc.homing.starts import compute_regularity, sample_starts
 from parakin.controllers.linuxcnc.homing.walk import begin_walk, walk_joints
 from parakin.controllers.linuxcnc.model_header import LEAST_REGULARITY
+from parakin.performance.singularities import compute_singularity_margins
 
 sys.path.insert(0, str(Path(__file__).parent / "linuxcnc"))
 from stub import Stub, outward, pose
@@ -42,6 +43,20 @@ def test_starts_are_whole_machines():
     assert np.ptp(starts.poses, axis=0)[:3].min() > 200.0
     assert compute_regularity(m, starts.poses).min() >= 2.0 * LEAST_REGULARITY
     assert compute_regularity(m, m.home[None]) == pytest.approx(1.0)
+
+
+def test_constraint_singularities_count():
+    """Exechon far beyond its limits, where what guides the platform is nearly singular and its drives are not."""
+    m = pk.load("exechon")
+    rng = np.random.default_rng(0)
+    poses = m.home + rng.uniform(-1.0, 1.0, (20_000, 5)) * [1500.0, 1500.0, 1500.0, 3.0, 3.0]
+    poses = poses[np.isfinite(m.inverse(poses)).all(1)]
+    margins, home = (compute_singularity_margins(m, rows) for rows in (poses, m.home[None]))
+    constraint, others = margins[:, -1] / home[0, -1], margins[:, :4] / [home[0, 0], 1.0, 1.0, 1.0]
+    least = constraint < others.min(1)
+    assert least.any()
+    assert compute_regularity(m, poses[least]) == pytest.approx(constraint[least])
+    assert compute_regularity(m, poses[~least]) == pytest.approx(others[~least].min(1))
 
 
 def test_the_tricept_pulls_its_struts_in():

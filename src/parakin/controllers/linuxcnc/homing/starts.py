@@ -86,7 +86,8 @@ def compute_other_margins(machine: Machine, poses: Array, joints: Array) -> Arra
 
 def compute_regularity(machine: Machine, poses: Array) -> Array:
     """Compute the least singularity margin (n,) as a fraction of home's (of 1 for a leg's drive), wrists apart."""
-    legs = slice(0, 1 + machine.leg_count)
-    unit = find_least_margins(machine)[legs] / LEAST_REGULARITY
-    regularity: Array = (compute_singularity_margins(machine, poses)[:, legs] / unit).min(1)
+    least = find_least_margins(machine)
+    counted = least > 0.0
+    margins = compute_singularity_margins(machine, poses)[:, counted]
+    regularity: Array = (margins * (LEAST_REGULARITY / least[counted])).min(1)
     return regularity

@@ -310,6 +310,26 @@ def test_the_workspace_is_drawn_in_a_worker(pages, browser):
     assert volume == pytest.approx(4.0 * (machine.check(lattice) == 0).sum(), rel=0.02)
 
 
+@needs_chromium
+@pytest.mark.parametrize("name", ["hbg80_2d", "tricept"])
+def test_a_section_shows_how_far_singularities_are(pages, browser, name):
+    machine = pk.load(name)
+    with open_tab(browser) as tab:
+        tab.goto(pages(name))
+        tab.get_by_label("a section through the tool, by det A").check()
+        wait_until(tab, "parakin.section.corners > 0")
+        drawn = tab.evaluate("parakin.section")
+    poses = np.tile(machine.home, (40_000, 1))
+    poses[:, :2] = np.random.default_rng(5).uniform(-1400.0, 1400.0, (len(poses), 2))
+    poses = poses[machine.check(poses) == 0]
+    assert len(poses) > 1000
+    parallel = compute_singularity_margins(machine, np.vstack([machine.home, poses]))[:, 0]
+    shares = parallel[1:] / parallel[0]
+    span = shares.max() - shares.min()
+    assert drawn["least"] == pytest.approx(shares.min(), abs=0.03 * span)
+    assert drawn["most"] == pytest.approx(shares.max(), abs=0.03 * span)
+
+
 SIZED = """([poses, signs, sizes]) => {
   const plain = values => values.map(value => Number.isFinite(value) ? value : null);
   sizes.forEach((size, i) => { model.sizes[i] = size; });

@@ -50,7 +50,7 @@ function findStrut(drive) {
 }
 
 window.parakin = {
-  machine, model, path, player, options, singularity, surface, seek, stateAtTime, stateAtPose, followJoints, marginsAt, findRoot, measureSide, findFreeMotion,
+  machine, model, path, player, options, singularity, surface, section, seek, stateAtTime, stateAtPose, followJoints, marginsAt, findRoot, measureSide, findFreeMotion,
   moveToPose, moveToJoints, moveToSizes, switchSign, showNextAssembly, searchAssemblies, goHome, showSurface, setPlaying,
   tipInPicture: () => findInPicture(handle.position), strutInPicture: drive => findInPicture(findStrut(drive)),
   get state() { return current; }, get stoppedBy() { return stoppedBy; },

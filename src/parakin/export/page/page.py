@@ -34,6 +34,7 @@ APP = (
     "free_motion",
     "panel",
     "workspace",
+    "section",
     "shown_surface",
     "path",
     "player",

@@ -15,16 +15,11 @@ const sampledJoints = i => rowOf("joints", i, machine.joints.length);
 const SCALE = ["#b2182b", "#ef8a62", "#fddb86", "#67a9cf", "#2166ac"].map(text => new THREE.Color(text).convertSRGBToLinear());
 const OFF_LIMITS = new THREE.Color(0xd50000).convertSRGBToLinear();
 
-function mixScale(share) {
-  const at = max(0, min(1, Number.isFinite(share) ? share : 0)) * (SCALE.length - 1), i = min(SCALE.length - 2, Math.floor(at));
-  return SCALE[i].clone().lerp(SCALE[i + 1], at - i);
-}
-
 function colourSample(i, most) {
   const {margins, feed, binding, rapid, broken} = pathColumns;
   if (broken[i]) return OFF_LIMITS;
-  if (player.colours === "margin") return mixScale(margins[i] / most.margin);
-  if (player.colours === "feed") return mixScale(feed[i] / most.feed);
+  if (player.colours === "margin") return mixColours(SCALE, margins[i] / most.margin);
+  if (player.colours === "feed") return mixColours(SCALE, feed[i] / most.feed);
   if (player.colours === "pace") return new THREE.Color(path.bindings[binding[i]].colour ?? "#9fb3c0").convertSRGBToLinear();
   return new THREE.Color(rapid[i] ? "#90a4ae" : "#00695c").convertSRGBToLinear();
 }

@@ -2,8 +2,8 @@
 // and marching tetrahedra (in the plane, triangles). What a lattice steps over is not seen.
 
 const places = [...machine.axes.keys()].filter(i => machine.axes[i].unit === "mm");
-const LEVELS = places.length === 3 ? [14, 26, 50] : [40, 160], BORDER = 1.35;
-const FOLLOW = places.length === 3 ? [[0, 1, 3, 7], [0, 1, 5, 7], [0, 2, 3, 7], [0, 2, 6, 7], [0, 4, 5, 7], [0, 4, 6, 7]] : [[0, 1, 3], [0, 2, 3]];
+const LEVELS = places.length === 3 ? [14, 26, 50] : [40, 160], SECTION_LEVELS = [24, 64], BORDER = 1.35;
+const FOLLOW = {2: [[0, 1, 3], [0, 2, 3]], 3: [[0, 1, 3, 7], [0, 1, 5, 7], [0, 2, 3, 7], [0, 2, 6, 7], [0, 4, 5, 7], [0, 4, 6, 7]]};
 let wanted = null; // the request in force
 
 // Of each end of a drive's range: the joint, its sign, and the limit.
@@ -29,17 +29,23 @@ function measureLeastMargin(pose, signs) {
   return least;
 }
 
-function makeLattice(low, high, count) {
-  const d = places.length, step = low.map((value, k) => (high[k] - value) / (count - 1));
-  return {low, step, count, values: new Float64Array(count ** d), d};
+// A lattice over some axes of the pose.
+function makeLattice(axes, low, high, count) {
+  const d = axes.length, step = low.map((value, k) => (high[k] - value) / (count - 1));
+  return {axes, low, step, count, values: new Float64Array(count ** d), d};
+}
+
+function findRanges(axes) {
+  const ranges = axes.map(i => machine.axes[i]), middle = ranges.map(axis => 0.5 * (axis.low + axis.high));
+  return [-1, 1].map(side => ranges.map((axis, k) => middle[k] + side * BORDER * 0.5 * (axis.high - axis.low)));
 }
 
 // Fill one layer of the lattice; what lies on its border counts as outside, so that the surface is closed.
 function fillLayer(lattice, layer, request) {
-  const {low, step, count, values, d} = lattice, pose = [...request.pose], width = count ** (d - 1);
+  const {axes, low, step, count, values, d} = lattice, pose = [...request.pose], width = count ** (d - 1);
   for (let cell = 0; cell < width; cell++) {
     const index = d === 3 ? [layer, Math.floor(cell / count), cell % count] : [layer, cell];
-    places.forEach((axis, k) => { pose[axis] = low[k] + step[k] * index[k]; });
+    axes.forEach((axis, k) => { pose[axis] = low[k] + step[k] * index[k]; });
     const value = measureLeastMargin(pose, request.signs);
     values[layer * width + cell] = index.some(i => i === 0 || i === count - 1) ? min(value, -1e-6) : value;
   }
@@ -60,11 +66,12 @@ function findInside({low, step, count, values, d}) {
   return [least, greatest].map(ends => ends.map((i, k) => low[k] + step[k] * i));
 }
 
-// Triangles of the surface with normals (in the plane: of the area itself), and the volume inside.
+// Triangles of the surface with normals (in the plane: of the area itself, with the lattice points that each corner lies
+// between, and their weights), and the volume inside.
 function marchLattice(lattice) {
   const {low, step, count, values, d} = lattice, corners = 2 ** d, strides = d === 3 ? [count * count, count, 1] : [count, 1];
   const offsets = Array.from({length: corners}, (_, c) => strides.reduce((sum, stride, k) => sum + ((c >> (d - 1 - k)) & 1) * stride, 0));
-  const positions = [], normals = [], locate = number => strides.map((stride, k) => low[k] + step[k] * (Math.floor(number / stride) % count));
+  const positions = [], normals = [], between = [], locate = number => strides.map((stride, k) => low[k] + step[k] * (Math.floor(number / stride) % count));
   const cellVolume = step.reduce((product, length) => product * length, 1);
   let inside = 0;
   const slope = (number, k) => (values[number + strides[k]] - values[number - strides[k]]) / step[k];
@@ -75,7 +82,10 @@ function marchLattice(lattice) {
   const isInner = number => strides.every(stride => { const i = Math.floor(number / stride) % count; return i > 0 && i < count - 1; });
   const put = vertices => vertices.forEach(({at, ends}) => {
     positions.push(...at);
-    if (d !== 3) return;
+    if (d !== 3) {
+      between.push(ends);
+      return;
+    }
     const inner = ends.filter(([number]) => isInner(number));
     const g = strides.map((_, k) => -inner.reduce((sum, [number, weight]) => sum + weight * slope(number, k), 0)), length = hypot(...g) || 1;
     normals.push(...g.map(x => x / length));
@@ -87,13 +97,13 @@ function marchLattice(lattice) {
     for (let c = 0; c < corners; c++) within += values[number + offsets[c]] >= 0;
     inside += within / corners;
     if (within === 0 || d === 3 && within === corners) continue;
-    for (const simplex of FOLLOW) {
+    for (const simplex of FOLLOW[d]) {
       const all = simplex.map(c => number + offsets[c]), ins = all.filter(n => values[n] >= 0), outs = all.filter(n => !(values[n] >= 0));
       if (d === 3) marchTetrahedron(ins, outs, cross, put);
       else fillTriangle(ins, outs, cross, put, locate);
     }
   }
-  return {positions, normals, volume: inside * cellVolume};
+  return {positions, normals, between, volume: inside * cellVolume};
 }
 
 function marchTetrahedron(ins, outs, cross, put) {
@@ -120,10 +130,9 @@ function fillTriangle(ins, outs, cross, put, locate) {
 const rest = () => new Promise(resolve => setTimeout(resolve, 0));
 
 async function refineSurface(request) {
-  const ranges = places.map(i => machine.axes[i]), middle = ranges.map(axis => 0.5 * (axis.low + axis.high));
-  let ends = [-1, 1].map(side => ranges.map((axis, k) => middle[k] + side * BORDER * 0.5 * (axis.high - axis.low)));
+  let ends = findRanges(places);
   for (const [level, count] of LEVELS.entries()) {
-    const lattice = makeLattice(ends[0], ends[1], count);
+    const lattice = makeLattice(places, ...ends, count);
     let begin = performance.now();
     for (let layer = 0; layer < count; layer++) {
       fillLayer(lattice, layer, request);
@@ -140,9 +149,35 @@ async function refineSurface(request) {
   }
 }
 
-onmessage = event => {
-  wanted = event.data;
-  wanted.sizes.forEach((size, i) => { model.sizes[i] = size; });
-  machine.limits.forEach((limit, i) => { limit.bound = wanted.bounds[i]; });
-  refineSurface(wanted);
+// What is allowed in the plane of the first two axes through the pose, with det A over home's at each corner.
+function computeSection(request) {
+  let ends = findRanges(places.slice(0, 2)), lattice = null;
+  for (const count of SECTION_LEVELS) {
+    lattice = makeLattice(places.slice(0, 2), ...ends, count);
+    for (let layer = 0; layer < count; layer++) fillLayer(lattice, layer, request);
+    ends = findInside(lattice);
+    if (ends === null) return {positions: new Float32Array(0), shares: new Float32Array(0)};
+  }
+  const {axes, low, step, count, values} = lattice, pose = [...request.pose], {positions, between} = marchLattice(lattice);
+  const shareAt = Float64Array.from(values, (value, number) => {
+    if (!(value >= 0)) return NaN; // the corners of the border take the value of their inner end
+    axes.forEach((axis, k) => { pose[axis] = low[k] + step[k] * (k ? number % count : Math.floor(number / count)); });
+    return measureSide({pose, joints: model.inverse(pose, request.signs)}) / request.homeSide;
+  });
+  const shares = between.map(ends => {
+    const known = ends.filter(([number]) => values[number] >= 0), whole = known.reduce((sum, [, weight]) => sum + weight, 0);
+    return whole > 0 ? known.reduce((sum, [number, weight]) => sum + weight / whole * shareAt[number], 0) : shareAt[known[0][0]];
+  });
+  return {positions: new Float32Array(positions), shares: new Float32Array(shares)};
+}
+
+onmessage = ({data: request}) => {
+  request.sizes.forEach((size, i) => { model.sizes[i] = size; });
+  machine.limits.forEach((limit, i) => { limit.bound = request.bounds[i]; });
+  if (request.kind === "section") {
+    postMessage({kind: "section", id: request.id, ...computeSection(request)});
+  } else {
+    wanted = request;
+    refineSurface(request);
+  }
 };

@@ -135,6 +135,12 @@ const handle = new THREE.Mesh(ball, new THREE.MeshStandardMaterial({color: 0xd81
 handle.userData = {drive: -1, kind: "handle"};
 scene.add(handle);
 
+// A colour between those of a scale, by a share of its length; what is no number is at its beginning.
+function mixColours(scale, share) {
+  const at = max(0, min(1, Number.isFinite(share) ? share : 0)) * (scale.length - 1), i = min(scale.length - 2, Math.floor(at));
+  return scale[i].clone().lerp(scale[i + 1], at - i);
+}
+
 // The place of a pose's tip in M.
 function locateTip(pose, into = new THREE.Vector3()) {
   const place = [...machine.tip];

@@ -10,14 +10,29 @@ workGroup.add(workspaceMesh);
 const workspaceSection = addSection("Workspace");
 const workspaceSwitch = makeElement("input", {type: "checkbox", id: "workspace"});
 const workspaceNote = makeElement("p", {className: "note"});
+workspaceSection.hidden = places.length < 2; // a line has neither surface nor section
 workspaceSection.append(makeElement("label", {}, workspaceSwitch, " its surface at this orientation"), workspaceNote);
 const surface = {level: -1, volume: NaN, milliseconds: NaN}; // the last one that was drawn
-let surfaceWorker = null, requestNumber = 0, requestedKey = "", requestTime = 0;
+let latticeWorker = null, requestNumber = 0, requestedKey = "", requestTime = 0;
 
-function startWorker() {
-  const source = ["core", "worker"].map(id => document.getElementById(id).textContent).join("\n");
-  surfaceWorker = new Worker(URL.createObjectURL(new Blob([source], {type: "text/javascript"})));
-  surfaceWorker.onmessage = event => drawSurface(event.data);
+function askWorker(request) {
+  if (!latticeWorker) {
+    const source = ["core", "worker"].map(id => document.getElementById(id).textContent).join("\n");
+    latticeWorker = new Worker(URL.createObjectURL(new Blob([source], {type: "text/javascript"})));
+    latticeWorker.onmessage = ({data}) => data.kind === "section" ? drawSection(data) : drawSurface(data);
+  }
+  const {pose, signs} = current;
+  latticeWorker.postMessage({pose, signs, sizes: [...model.sizes], bounds: machine.limits.map(limit => limit.bound), ...request});
+}
+
+// Points of lattices over the first axes of the pose, as places in the frame of poses.
+function placeCorners(positions, axes, pose) {
+  const corners = new Float32Array(positions.length / axes.length * 3), place = locateTip(pose).toArray();
+  for (let n = 0; n < corners.length / 3; n++) {
+    corners.set(place, 3 * n);
+    axes.forEach((axis, k) => { corners[3 * n + "XYZ".indexOf(machine.axes[axis].name)] = positions[axes.length * n + k]; });
+  }
+  return corners;
 }
 
 // Ask for the surface anew where what it depends on has changed: turns of the pose, and the mode.
@@ -29,18 +44,13 @@ function requestSurface() {
   if (key === requestedKey) return;
   requestedKey = key;
   requestTime = performance.now();
-  if (!surfaceWorker) startWorker();
-  surfaceWorker.postMessage({id: ++requestNumber, pose: current.pose, signs: current.signs, sizes: [...model.sizes], bounds: machine.limits.map(limit => limit.bound)});
+  askWorker({kind: "surface", id: ++requestNumber});
 }
 
 function drawSurface({id, level, last, volume, positions, normals}) {
   if (id !== requestNumber) return;
-  const geometry = new THREE.BufferGeometry(), points = new Float32Array(positions.length / places.length * 3);
-  for (let n = 0; n < points.length / 3; n++) {
-    for (let i = 0; i < 3; i++) points[3 * n + i] = machine.tip[i];
-    places.forEach((axis, k) => { points[3 * n + "XYZ".indexOf(machine.axes[axis].name)] = positions[places.length * n + k]; });
-  }
-  geometry.setAttribute("position", new THREE.BufferAttribute(points, 3));
+  const geometry = new THREE.BufferGeometry();
+  geometry.setAttribute("position", new THREE.BufferAttribute(placeCorners(positions, places, current.pose), 3));
   if (normals.length) geometry.setAttribute("normal", new THREE.BufferAttribute(normals, 3));
   else geometry.computeVertexNormals();
   workspaceMesh.geometry.dispose();

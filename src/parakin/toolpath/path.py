@@ -78,6 +78,8 @@ class ToolPath:
         tool of that length has to be, and ``tools`` have the lengths that count; None for a path as read
     extension : (n,) mm, how much longer the tool is than ``fitted_length``: its own tip is at
         ``tip - extension * axis``; None where that is zero throughout
+    exact : (n,) bool, whether the axis was computed, so that the least lean of it tells a direction, and not read, with
+        the digits of a file; None where none was
     """
 
     source: str
@@ -98,6 +100,7 @@ class ToolPath:
     tools: tuple[ToolUse, ...] = ()
     fitted_length: float | None = None
     extension: Array | None = None
+    exact: Flags | None = None
 
     def __len__(self) -> int:
         return len(self.line)
@@ -111,7 +114,7 @@ class ToolPath:
 
 
 # What stands in a path once a record: its columns.
-_COLUMNS = ("tip", "axis", "line", "rapid", "feed", "spindle", "turns", "seconds", "extension")
+_COLUMNS = ("tip", "axis", "line", "rapid", "feed", "spindle", "turns", "seconds", "extension", "exact")
 
 
 def insert_records(

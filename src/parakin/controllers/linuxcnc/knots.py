@@ -24,6 +24,7 @@ _STANDING = 1e-9  # mm/s of path speed: rounding
 _FEWEST = 4  # intervals between two stands
 _APART = 2e-6  # mm, angles on an arm of 100 mm: nearer knots could be one in a program
 _SLOWEST = 0.11 / 60.0  # mm/s of the tip: just what LinuxCNC obeys
+_MADE_UP = 0.25  # of _SLOWEST: how much faster a tip is that makes up for what it was held back
 _SLOW = 1.0  # mm/s: a slower tool is looked at less often than in every cycle, once in 1 µm,
 _MOST_SLOW = 1e4  # or so many cycles
 _SHORT = 1e-4  # s, for the speed of a pose by differences
@@ -83,7 +84,8 @@ def _drop_creeping(trajectory: Trajectory, knots: Knots) -> Knots:
     """Drop knots that are not apart from the one before, but for those of stands, and hold tips that creep.
 
     LinuxCNC obeys no feed below a tenth of a mm a minute, by which it measures a motion whose tip moves, however the
-    tool turns: a tip that moves by less stays where it was, and makes up for it in a later motion.
+    tool turns: a tip that moves by less stays where it was. It makes up for it in later motions, at first at just that
+    feed and then by a little more than its own: beside a pole, a sudden step would shake the first joint.
     """
     poses, weights = knots.poses.copy(), _weigh_axes(trajectory)
     linear = np.array([unit == "mm" for unit in trajectory.posted.machine.axis_units])
@@ -94,9 +96,13 @@ def _drop_creeping(trajectory: Trajectory, knots: Knots) -> Knots:
     kept = [0]
     for i in range(1, len(poses)):
         last = kept[-1]
-        tip = np.linalg.norm(poses[i, linear] - poses[last, linear])
-        if tip < min(_SLOWEST * (knots.times[i] - knots.times[last]), _NEAR):
+        way = poses[i, linear] - poses[last, linear]
+        tip, least = np.linalg.norm(way), _SLOWEST * (knots.times[i] - knots.times[last])
+        most = max(least, steps[last:i].sum() + _MADE_UP * least)
+        if tip < min(least, _NEAR):
             poses[i, linear] = poses[last, linear]
+        elif tip > most:
+            poses[i, linear] = poses[last, linear] + most / tip * way
         apart = (np.abs(poses[i] - poses[last]) * weights).max() >= _APART
         if apart or (knots.stands[last] and knots.stands[i]):
             kept.append(i)

@@ -69,7 +69,7 @@ def convert_to_freedom(angle: float) -> float:
     return float(np.sin(angle) ** 2)
 
 
-def is_on_pole(square: Any, within: float) -> Any:
+def is_on_pole(square: Any, within: Any) -> Any:
     """Tell where a tool's axis, a unit vector, is on a pole, by the square of its part across the pole."""
     return square < within * within
 

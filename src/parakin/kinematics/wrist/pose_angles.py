@@ -19,10 +19,14 @@ EVERY_TURN: AxisRange = (-np.pi, np.pi)
 EVERY_DIRECTION: dict[str, AxisRange] = {"B": (0.0, np.pi), "C": (-np.pi, np.pi)}
 
 
-def solve_direction(k: Array) -> tuple[Array, Array, Flags]:
-    """Solve k = Rz(C)·Ry(B)·z, (n, 3), for B from 0 to 180° and C; tell where C is free, to printed digits."""
+def solve_direction(k: Array, exact: Flags | None = None) -> tuple[Array, Array, Flags]:
+    """Solve k = Rz(C)·Ry(B)·z, (n, 3), for B from 0 to 180° and C; tell where C is free.
+
+    exact : (n,) which k were computed; the others have the digits of a file, and lean no less than these tell
+    """
     b, c = compute_axis_angles(list(k.T))
-    return b, c, is_on_pole(k[:, 0] * k[:, 0] + k[:, 1] * k[:, 1], PRINTED)
+    within = PRINTED if exact is None else np.where(exact, EXACT, PRINTED)
+    return b, c, is_on_pole(k[:, 0] * k[:, 0] + k[:, 1] * k[:, 1], within)
 
 
 def point_direction(b: Array, c: Array) -> Array:

@@ -36,6 +36,8 @@ def divide_motions(path: ToolPath, motion: Indices, share: Array) -> ToolPath:
     tip, axis = programmed.interpolate(motion, share)
     extension = programmed.interpolate_extension(motion, share)
     values = {"tip": tip, "axis": axis, "turns": programmed.interpolate_turns(motion, share), "extension": extension}
+    if path.exact is not None:
+        values["exact"] = path.exact[motion] & path.exact[motion - 1]
     ahead = np.searchsorted(motion, np.arange(len(path) + 1))
     divided = insert_records(path, motion, values, ahead)
     return divided if path.seconds is None else replace(divided, seconds=_divide_seconds(path.seconds, motion, share))
@@ -51,17 +53,19 @@ def _divide_seconds(seconds: Array, motion: Indices, share: Array) -> Array:
 def replace_axes(path: ToolPath, record: Indices, axis: Array) -> ToolPath:
     """Replace the tool axes of some records by others (m, 3) in W.
 
-    Turns that the path gives change with them: B and C become the nearest that point there; A has to be 0.
+    The new axes are exact. Turns that the path gives change with them: B and C become the nearest that point there; A
+    has to be 0.
     """
     axes, turns, tip = path.axis.copy(), path.turns, path.tip
-    axes[record] = axis
+    exact = np.zeros(len(path), np.bool_) if path.exact is None else path.exact.copy()
+    axes[record], exact[record] = axis, True
     if path.extension is not None:  # the tip of the longer tool stays
         tip = tip.copy()
         tip[record] += path.extension[record][:, None] * (axis - path.axis[record])
     if turns is not None:
         turns = turns.copy()
         turns[record] = find_nearest_direction(axis, turns[record])
-    return replace(path, tip=tip, axis=axes, turns=turns)
+    return replace(path, tip=tip, axis=axes, turns=turns, exact=exact)
 
 
 def insert_axes(posted: Posted, positions: PathPositions, added: list[AddedRecord]) -> tuple[Posted, PathPositions]:

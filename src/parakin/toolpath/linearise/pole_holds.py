@@ -38,7 +38,7 @@ _MOST_BETWEEN = 64  # records into which a motion is divided for that
 _CLOSE = 0.1  # fraction of the circle: records so close keep the way over the pole straight
 _STILL = 0.95  # of the circle: the middle of an arc comes no nearer
 _OPPOSITE = 1.0 - 1e-6  # cosine between the ways to the pole and from it
-_EDGE = 1e-9  # of a motion: what is rounding
+_EDGE = 1e-9  # of a motion, of the circle: what is rounding
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,7 +107,8 @@ def find_pole_holds(
     is_led = np.zeros(len(steps.record), np.bool_)
     for first, last in led_steps:
         is_led[first : last + 1] = True
-    runs = _find_runs(steps, (steps.nearest < radius) & ~is_led, radius)
+    near = steps.nearest < (1.0 - _EDGE) * radius  # a record on the circle is where a hold begins or ends
+    runs = _find_runs(steps, near & ~is_led, radius)
     builder = _HoldBuilder(pole, posted, programmed, steps, moved, radius, aside)
     return [hold for run in runs if (hold := builder.build(run)) is not None]
 

@@ -88,12 +88,18 @@ class PathLimit:
 
 
 def compute_poses(
-    machine: Machine, tip: Array, axis: Array, frame: Array, turns: Array | None = None
+    machine: Machine,
+    tip: Array,
+    axis: Array,
+    frame: Array,
+    turns: Array | None = None,
+    exact: Flags | None = None,
 ) -> tuple[Array, tuple[PathLimit, ...]]:
     """Compute poses (n, axes) for tool tips and axes, (n, 3) each, and what the machine's axes can't follow.
 
     frame : (3, 4), leads into M
     turns : (n, 3) rad, A, B, C as a program gives them, from which the axes follow
+    exact : (n,) which axes were computed, as :class:`~..path.ToolPath` has it
 
     A machine that turns three ways, or turns its tool about the tool's own axis, takes the whole orientation of the
     turns; one with B and C takes them as programmed where A is zero and the frame turns about Z alone: see
@@ -116,7 +122,7 @@ def compute_poses(
             np.add(values, shift, out=column[block])
     angles = None if turns is None else find_programmed_angles(orientation, turns, frame)
     if angles is None or orientation.restriction:
-        pointed, lean = orientation.point_along(axis, rotation)
+        pointed, lean = orientation.point_along(axis, rotation, exact)
         if angles is None and turns is not None and orientation.letters:
             steps, at_records = add_turn_steps(turns, range(3))
             if len(steps) > len(turns):

@@ -96,7 +96,8 @@ def _compute_rows(machine: Machine, programmed: ProgrammedPath, frame: Array, sa
     tip[between], axis[between] = programmed.interpolate(record[between], share[between])
     if turns is not None:
         turns[between] = programmed.interpolate_turns(record[between], share[between])
-    return compute_poses(machine, tip, axis, frame, turns)[0]
+    exact = None if path.exact is None else path.exact[record] & (share == 1.0)
+    return compute_poses(machine, tip, axis, frame, turns, exact)[0]
 
 
 def _find_wide_steps(machine: Machine, poses: Array, joints: Array | None, has_free_direction: bool) -> Indices:

@@ -47,7 +47,7 @@ def post_path(
         raise PoseError("workpiece: a transform of shape (3, 4) expected")
     path = fit_tool_lengths(machine, path, workpiece=workpiece)
     frame = compose_frames(workpiece, path.frame)
-    poses, path_limits = compute_poses(machine, path.tip, path.axis, frame, path.turns)
+    poses, path_limits = compute_poses(machine, path.tip, path.axis, frame, path.turns, path.exact)
     report(0.3)
     best, fewest = None, (0, 0)
     candidates = list_candidate_modes(machine, mode)

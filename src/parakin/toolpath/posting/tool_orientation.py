@@ -9,7 +9,7 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
-from ...arrays import Array, split_rows
+from ...arrays import Array, Flags, split_rows
 from ...kinematics.rotations import LEVEL, get_turning_axis
 from ...kinematics.turns import turn_ahead, unwind_angles
 from ...kinematics.wrist.pole_thresholds import EXACT, PRINTED, is_on_pole
@@ -27,8 +27,8 @@ class ToolOrientation:
     """How a machine points its tool.
 
     letters : the axes that turn it
-    solve : for tool axes k (n, 3) in M an angle for each of the letters, where the continuous one of them is free, and
-        how far the tool then still leans off k
+    solve : for tool axes k (n, 3) in M, of which some (n,) are exact, an angle for each of the letters, where the
+        continuous one of them is free, and how far the tool then still leans off k
     continuous : the letter whose angle is made continuous along a path
     restriction : what the machine does where k asks for another tilt; empty where it can have every tilt
     has_direction : the turns are B and C of the tool's axis
@@ -37,21 +37,22 @@ class ToolOrientation:
     """
 
     letters: str
-    solve: Callable[[Array], TurnSolution]
+    solve: Callable[[Array, Flags | None], TurnSolution]
     continuous: str | None
     restriction: str = ""
     has_direction: bool = False
     spins: bool = False
     tool: Array | None = None
 
-    def point_along(self, axis: Array, rotation: Array) -> tuple[Array, Array]:
+    def point_along(self, axis: Array, rotation: Array, exact: Flags | None = None) -> tuple[Array, Array]:
         """Find angles (n, letters) without jumps for tool axes (n, 3), and the lean (n,); ``rotation`` leads into M."""
         count = len(axis)
         turns, lean = np.empty((count, len(self.letters)), order="F"), np.zeros(count)  # worked on by columns
         free: Any = np.zeros(count, bool)
         to_machine = np.ascontiguousarray(rotation.T)
         for block in split_rows(count, BLOCK):
-            angles, free[block], leaning = self.solve(axis[block] @ to_machine)
+            is_exact = None if exact is None else exact[block]
+            angles, free[block], leaning = self.solve(axis[block] @ to_machine, is_exact)
             for column, values in enumerate(angles):
                 turns[block, column] = values
             if self.restriction:
@@ -69,7 +70,7 @@ def find_tool_orientation(machine: Machine) -> ToolOrientation:
     letters = "".join(machine.axes[column] for column in machine.turning_columns)
     if len(letters) == 3:
         home_c = float(machine.home[machine.turning_columns[-1]])  # C is free, and the machine is made for its home
-        return ToolOrientation(letters, lambda k: solve_three_turns(k, home_c), "B")
+        return ToolOrientation(letters, lambda k, exact: solve_three_turns(k, home_c), "B")
     if machine.has_direction:
         return ToolOrientation(letters, _solve_direction, "C", has_direction=True)
     tool = np.array(machine.structure.tool_rotation, dtype=np.float64)
@@ -79,18 +80,18 @@ def find_tool_orientation(machine: Machine) -> ToolOrientation:
     if is_on_pole(1.0 - cosine * cosine, EXACT):  # no turn, or one about the tool's own axis, which changes nothing
         restriction = "keeps it upright" if abs(at_home[2] - 1.0) < LEVEL else "keeps its direction"
 
-        def solve_no_turn(k: Array) -> TurnSolution:
+        def solve_no_turn(k: Array, exact: Flags | None) -> TurnSolution:
             return [np.zeros(len(k))] * len(letters), False, _measure_angle(k, at_home)
 
         return ToolOrientation(letters, solve_no_turn, None, restriction, spins=bool(letters), tool=tool)
     return ToolOrientation(
-        letters, lambda k: _solve_one_turn(k, turning, at_home, cosine), letters, "can't follow", tool=tool
+        letters, lambda k, exact: _solve_one_turn(k, turning, at_home, cosine), letters, "can't follow", tool=tool
     )
 
 
-def _solve_direction(k: Array) -> TurnSolution:
+def _solve_direction(k: Array, exact: Flags | None) -> TurnSolution:
     """Solve k = Rz(C)·Ry(B)·z for B from 0 to 180° and C."""
-    b, c, free = solve_direction(k)
+    b, c, free = solve_direction(k, exact)
     return [b, c], free, None
 
 

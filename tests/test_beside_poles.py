@@ -77,9 +77,11 @@ def test_what_runs_runs_in_the_planner(controller, seed, tmp_path):
 
 def test_what_would_jump_is_refused(controller, tmp_path):
     """The first joint comes to the pole at another angle than the one at which it has to leave, and nothing led it."""
-    middle = "0.000000,0.000000,-1650.000000"
-    ways = ["0.1000000,0.0000000,0.9949874", "0.0000000,0.0000000,1.0000000", "0.0500000,0.0800000,0.9955400"]
-    text = "".join(f"GOTO/{middle},{axis}\n" for axis in ways)
+    tip = np.array([300.0, 0.0, -1650.0])
+    pole, across = -tip / np.linalg.norm(tip), np.array([0.0, 1.0, 0.0])
+    axes = np.cos(0.1) * pole + np.sin(0.1) * np.array([np.cross(across, pole), across])
+    rows = [[*tip, *axis] for axis in (axes[0], pole, axes[1])]
+    text = "".join("GOTO/" + ",".join(f"{value:.9f}" for value in row) + "\n" for row in rows)
     (tmp_path / "part.cls").write_text(f"TOOL PATH/CORNER\nFEDRAT/1000.0,MMPM\n{text}FINI\n", encoding="ascii")
     path = pk.read_path(tmp_path / "part.cls")
     assert pk.prepare(controller.machine, path).runs

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ...arrays import Array, Indices
+from ...arrays import Array, Flags, Indices
 from ...kinematics.wrist.pose_angles import find_nearest_direction
 from ..path import ToolPath, insert_records
 from ..posting.post import post_path
@@ -35,7 +35,8 @@ def divide_motions(path: ToolPath, motion: Indices, share: Array) -> ToolPath:
     programmed = ProgrammedPath(path)
     tip, axis = programmed.interpolate(motion, share)
     extension = programmed.interpolate_extension(motion, share)
-    values = {"tip": tip, "axis": axis, "turns": programmed.interpolate_turns(motion, share), "extension": extension}
+    turns = programmed.interpolate_turns(motion, share)
+    values: dict[str, Array | Flags | None] = {"tip": tip, "axis": axis, "turns": turns, "extension": extension}
     if path.exact is not None:
         values["exact"] = path.exact[motion] & path.exact[motion - 1]
     ahead = np.searchsorted(motion, np.arange(len(path) + 1))

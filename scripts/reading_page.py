@@ -92,7 +92,8 @@ def list_dialects() -> list[str]:
         "## Dialects of CL files\n\n"
         "The file tells its dialect by a comment before the first motion or by words that only one system writes; the "
         "notes name it.\nA motion that joins an arc tangentially proves which way round it goes; one that contradicts "
-        "the dialect is refused.\n"
+        "the dialect is refused. Where words alone tell the dialect, a straight cut into an arc of less than half "
+        "a turn goes before it, with a note.\n"
     )
     senses = {SAME: "another is refused", DOWN: "counts down from CLEAR", HEIGHT: "CLEAR is a height, RAPTO a distance"}
     reasons = [f"- {dialect.title}: {dialect.cycle_values}" for dialect in DIALECTS.values()]
@@ -166,7 +167,12 @@ def list_codes() -> list[str]:
     passed = [code for code in others if code not in COMMENTED]
     rows.append((join_names(f"M{code}" for code in passed), "modes of the controller; they pass through"))
     rows.append((join_names(f"M{code}" for code in others if code not in passed), "kept as comments"))
-    rows.append(("other M codes", "a note; they pass through with their words P, Q, R, E and L"))
+    rows.append(
+        (
+            "other M codes to M199",
+            "a note; they pass through with their words P, Q, R, E and L; greater ones into no program",
+        )
+    )
     refused: dict[str, list[str]] = {}
     for code, reason in G_REFUSED.items():
         refused.setdefault(reason, []).append(format_g_code(code))

@@ -88,3 +88,14 @@ def test_unknown_words_with_coordinates_are_refused(read, word):
 def test_unknown_words_without_coordinates_are_noted(read):
     path = read(cut("COLOUR/1,2", "STOCKX/BLOCK,1,2,3"))
     assert [note.line for note in path.notes] == [4, 6]
+
+
+def test_a_feed_behind_rapid_is_told(read):
+    path = read(cut("RAPID\nFEDRAT/50,MMPM", "RAPID\nSPINDL/9", "FEDRAT/70,MMPM\nRAPID"))
+    assert path.rapid.tolist() == [False, True, True, True]
+    assert [note.line for note in path.notes] == [5]
+
+
+@pytest.mark.parametrize("tool", ["LOADTL/2,LENGTH,-5", "CUTTER/5,0,0,0,0,0,-1", "TLDATA/MILL,5,0,-1,0,0"])
+def test_a_tools_length_below_zero_is_refused(read, tool):
+    refused(read, cut(tool), 4, "below zero")

@@ -264,6 +264,21 @@ def test_the_loaded_tools_offset(read):
 # other codes
 
 
+@pytest.mark.parametrize(
+    ("text", "line"),
+    [
+        ("T1 M6\nG43 H2\nG0 X0 Y0 Z0\nG1 X1 F9\nM2\n", 2),
+        ("T1 M6\nG43\nG0 X0 Y0 Z0\nT2 M6\nG1 X1 F9\nM2\n", 4),
+        ("G10 L1 P2 Z55\nT2 M6\nG43 H1\nG0 X0 Y0 Z0\nG1 X1 F9\nM2\n", 3),
+        ("T1 M6\nG43\nG0 X0 Y0 Z0\nT2 M6\nG43\nG1 X1 F9\nM2\n", None),
+    ],
+)
+def test_a_tool_with_another_ones_offset_is_told(read, text, line):
+    path = read("G21 G90\n" + text, tools={1: 100.0, 2: 200.0})
+    told = [note.line for note in path.notes if "not with its own" in note.text]
+    assert told == ([] if line is None else [line + 1])
+
+
 def test_codes_that_pass_through(read):
     p = read("G21 G0 X0 Y0 Z0\nM64 P0\nM67 E1 Q2.5\nM66 P1 L3 Q2\nM101 P5\nM10\nM106 S255\nM50 P0\nM19 R90\nX1 M2\n")
     expected = ["M64 P0", "M67 E1 Q2.5", "M66 P1 L3 Q2", "M101 P5", "M10", "S255", "M106", "M50 P0", "M19 R90", "M2"]

@@ -215,6 +215,8 @@ def test_along_a_posted_path(tmp_path, capsys, monkeypatch):
         ("tricept", ["--drives", "d*=100N/um"], "drives: theta1 has no stiffness; rigid is one"),
         ("tricept", ["--drives", "*=rigid,q=1N/um"], 'drives: unknown "q"'),
         ("orthoglide", ["--drives", "100"], "expected a number above 0 with its unit, N/um"),
+        ("orthoglide", ["--drives", "1e300N/um"], '"1e300N/um" is out of range'),
+        ("orthoglide", ["--drives", "100N/um", "--force", "X=1e300N"], '--force: X: "1e300N" is out of range'),
         ("orthoglide", ["--drives=-1N/um"], "expected a number above 0"),
         ("orthoglide", ["--drives", "1..2N/um"], "expected a number above 0"),
         ("orthoglide", ["--drives", "rigid"], "all are rigid, and so are the struts"),

@@ -24,6 +24,7 @@ LINEAR = {"N/um": 1e3, "N/µm": 1e3, "kN/mm": 1e3, "MN/m": 1e3, "N/mm": 1.0, "kN
 ANGULAR = {"Nm/rad": 1e3, "kNm/rad": 1e6, "Nmm/rad": 1.0, "Nm/deg": 1e3 / radians(1.0), "kNm/deg": 1e6 / radians(1.0)}
 MODULUS = {"GPa": 1e3, "MPa": 1.0, "N/mm2": 1.0}
 FORCE = {"N": 1.0, "kN": 1e3}
+_LEAST, _GREATEST = 1e-30, 1e30  # N, N/mm, Nmm/rad and MPa: sums of their squares do not overflow
 _VALUE = re.compile(r"\s*([0-9.]+(?:[eE][-+]?[0-9]+)?)\s*(\S.*?)?\s*")
 
 
@@ -75,6 +76,8 @@ def parse_stiff(text: str, units: Mapping[str, float], name: str) -> float:
         value = np.nan
     if not 0.0 < value < np.inf:
         raise PoseError(f"{name}: {quote(text)}, expected a number above 0 with its unit, {', '.join(units)}")
+    if not _LEAST < value < _GREATEST:
+        raise PoseError(f"{name}: {quote(text)} is out of range")
     return value
 
 

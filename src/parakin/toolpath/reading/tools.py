@@ -5,6 +5,8 @@ from collections.abc import Mapping
 from ..path import ToolUse
 from .text import refuse
 
+_LENGTHS = {"length", "body_length", "set_length"}
+
 
 class ToolLog:
     """Keep the tools of a file. Statements between the same two records speak of one tool."""
@@ -31,10 +33,13 @@ class ToolLog:
 
         loads : whether the statement puts the tool into the spindle
         """
+        lengths = _LENGTHS & data.keys()
+        if any(float(data[key]) < 0.0 for key in lengths):
+            refuse("a tool's length below zero")
         if record != self._group_record:
             self._group, self._group_record, self._group_line = {}, record, 0
         self._group |= data
-        told_at = line if {"length", "body_length", "set_length"} & data.keys() else 0
+        told_at = line if lengths else 0
         self._group_line = told_at or self._group_line
         if not self.uses:
             self.uses.append(ToolUse(record, line, dict(data), changed=loads and record > 0, length_line=told_at))

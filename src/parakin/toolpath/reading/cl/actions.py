@@ -207,7 +207,7 @@ class ClActions:
     def set_feed(self, args: list[str], line: int) -> None:
         """Set the feed from here on (FEDRAT)."""
         value, unit = parse_feed(args)
-        self.motion.set_feed(value, unit)
+        self.motion.take_feed(value, unit, line)
         if unit in ("IPM", "IPR") and not self.units_given and not self.inches_noted:
             self.inches_noted = True
             self.motion.notes.add(line, "feeds in inches in a file without UNITS: its lengths are taken for mm")

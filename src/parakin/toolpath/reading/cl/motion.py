@@ -114,6 +114,12 @@ class ClMotion:
         self.feed_value, self.feed_unit = value, unit or self.feed_unit
         self.feed = self.convert_feed(self.feed_value, self.feed_unit)
 
+    def take_feed(self, value: float, unit: str | None, line: int) -> None:
+        """Set the feed that a line states; the motion that RAPID announced before it stays a rapid one."""
+        if self.rapid:
+            self.notes.add(line, "a feed between RAPID and its motion, which is rapid all the same")
+        self.set_feed(value, unit)
+
     def set_speed(self, rpm: float) -> None:
         """Set the spindle's speed in rev/min, and with it a feed per revolution."""
         self.rpm = rpm

@@ -300,6 +300,6 @@ class ClReader:
             return
         word, value, unit = known
         if word == "FEDRAT":
-            self.motion.set_feed(value, unit)
+            self.motion.take_feed(value, unit, line)
         elif word == "RAPID":
             self.motion.rapid = True

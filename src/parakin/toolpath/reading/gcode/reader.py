@@ -33,7 +33,7 @@ from .execution import BlockExecutor
 from .motion import AXES, GcodeMotion
 from .plain_lines import read_plain_lines
 from .records import FEED, LINE, RAPID, SECONDS, SPINDLE, WIDTH
-from .tool_uses import list_tool_uses
+from .tool_uses import find_other_lengths, list_tool_uses
 from .work_systems import apply_frames
 
 _MOST_BLOCKS = 150_000  # executed again in loops and calls, some 4 s of work; a long line counts as several
@@ -296,6 +296,8 @@ class GcodeReader:
             uses = list_tool_uses(executor.tools, executor.offsets.lengths, self.tools)
         except InputError as error:
             raise self._fail(error.message, error.line) from None
+        for line, text in find_other_lengths(uses, lambda number: executor.offsets.read_tool_offset(number)[2]):
+            motion.notes.add(line, text)
         turns = np.radians(np.ascontiguousarray(columns[3:6].T))
         seconds = columns[SECONDS].copy()
         return ToolPath(

@@ -1,11 +1,13 @@
 """The tools of a G-code program with the lengths in force: by tool length offsets, or by the tool table."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 
 from ...path import ToolUse
 from ..tools import ToolLog
 from .offsets import LengthOffset
+
+_SAME_LENGTH = 1e-6  # mm
 
 
 def list_tool_uses(
@@ -35,6 +37,20 @@ def list_tool_uses(
         line = use.line if loaded is not None and use.line else length.line
         uses.append(ToolUse(record, line, data, loaded is not None and use.changed, length.from_table, length.line))
     return tuple(uses)
+
+
+def find_other_lengths(uses: Sequence[ToolUse], find_length: Callable[[float], float]) -> Iterator[tuple[int, str]]:
+    """Find the tools that an offset gives another length than their own; yield line and remark.
+
+    find_length : of a tool's number its own length, NaN if not known
+    """
+    for use in uses:
+        number, given = use.data.get("number"), use.data.get("set_length")
+        if isinstance(number, float) and isinstance(given, float) and given:
+            own = find_length(number)
+            if abs(own - given) > _SAME_LENGTH:
+                line = max(use.line, use.length_line)
+                yield line, f"tool {number:g} goes with an offset of {given:g} mm, and not with its own, {own:g} mm"
 
 
 def _list_changes(log: ToolLog) -> list[ToolUse]:

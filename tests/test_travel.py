@@ -179,3 +179,5 @@ def test_command(capsys):
 def test_a_direction_of_zeros_is_refused_by_its_option(capsys):
     assert main(["reach", "tricept", "--along", "X=0"]) == 2
     assert capsys.readouterr().err == '--along: "X=0": a direction that is not zero expected\n'
+    assert main(["reach", "tricept", "--along", "X=1e-300"]) == 2  # it never ended
+    assert capsys.readouterr().err == "axis: a direction of at least 1e-06 mm or rad expected\n"

@@ -33,6 +33,8 @@ from .model.limits import compute_platform_points
 from .model.rates import TwistRates, compute_twist_rates
 from .model.structures import PlatformPlacement
 
+_SHORTEST_DIRECTION = 1e-6  # mm or rad; travel in multiples of a shorter one overflows
+
 
 class Machine(MachineProperties):
     """A parallel kinematic machine. Made by :func:`parakin.load`; nothing of it changes after that.
@@ -250,6 +252,8 @@ class Machine(MachineProperties):
         direction = self._read_one({**nothing, **axis} if isinstance(axis, Mapping) else axis, self.axes, "axis")
         if not (np.isfinite(direction).all() and direction.any()):
             raise PoseError("axis: a direction that is not zero expected")
+        if np.abs(direction).max() < _SHORTEST_DIRECTION:
+            raise PoseError(f"axis: a direction of at least {_SHORTEST_DIRECTION:g} mm or rad expected")
         return direction
 
     def sides(self, poses: RowsLike) -> Array:

@@ -9,7 +9,7 @@ import numpy as np
 from parakin.toolpath.timing.drive_limits import DriveLimits
 from parakin.toolpath.timing.jerk_limited import limit_jerk
 from parakin.toolpath.timing.joint_path import JointPath
-from parakin.toolpath.timing.kernels.splines import JointRows, fit_splines
+from parakin.toolpath.timing.kernels.splines import JointRows, fit_splines, make_unforced_rows
 from parakin.toolpath.timing.time_optimal import UNBOUND, compute_ceilings, find_reachable
 
 
@@ -42,7 +42,7 @@ def build_rows(step: np.ndarray, joints: np.ndarray, feed_ceiling: np.ndarray) -
     """A joint path through rows; only its rows are asked."""
     curvature, nothing = np.empty_like(joints), np.zeros(len(joints), np.int64)
     fit_splines(step, joints, curvature, np.empty(len(joints)))
-    rows = JointRows(step, joints, curvature, feed_ceiling)
+    rows = JointRows(step, joints, curvature, feed_ceiling, make_unforced_rows(len(joints)))
     unasked: Any = None
     return JointPath(unasked, unasked, nothing, np.append(0.0, np.cumsum(step)), rows)
 

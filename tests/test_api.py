@@ -75,6 +75,7 @@ def things(tmp_path_factory, tricept):
         "Accuracy": accuracy,
         "WorstCase": pk.bound_worst_case(accuracy, {}),
         "Stiffness": pk.analyse_stiffness(orthoglide, "100 N/um", poses=poses),
+        "DriveForces": pk.compute_drive_forces(job.trajectory),
         "Comparison": pk.compare([plane.machine, pk.load("five_bar")], samples=5),
         "Measurements": measured,
         "Calibration": pk.calibrate(orthoglide, measured, ["encoders"]),

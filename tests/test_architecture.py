@@ -21,6 +21,7 @@ FLOORS = [
     ["machine_properties"],
     ["machine"],
     ["families"],
+    ["dynamics"],
     ["workspaces.certified"],
     ["workspaces.inscribed", "workspaces.sampled"],
     ["workspaces.connected"],
@@ -62,7 +63,7 @@ FLOORS = [
 ]
 HEIGHT = {room: height for height, floor in enumerate(FLOORS) for room in floor}
 CORE = ["arrays", "algebra", "budget", "kernels", "model", "kinematics", "machine_properties", "machine"]
-CORE += ["families", "workspaces", "performance", "calibration", "accuracy", "stiffness", "synthesis"]
+CORE += ["families", "dynamics", "workspaces", "performance", "calibration", "accuracy", "stiffness", "synthesis"]
 RIM = {"pathlib", "json", "io", "tempfile", "shutil", "plotly", "matplotlib", "pyarrow", "rich", "cyclopts"}
 RIM |= {"pydantic", "ruamel", "http", "socket", "subprocess"}
 NO_PATH_NEEDS = {"plotly", "matplotlib", "rich", "cyclopts"}

@@ -142,7 +142,8 @@ def test_several_errors_in_line_order(tmp_path):
     assert errors_of(tmp_path, text) == [
         'm.yaml:4: R: "500 furlong": unknown unit "furlong", expected a unit such as mm, in or deg',
         'm.yaml:9: unknown key "branch" in legs, expected one of '
-        "kind, joints, range, speed, acceleration, jerk, counts, lead, homing, offset, platform, foot",
+        "kind, joints, range, speed, acceleration, jerk, counts, lead, homing, offset, force, rated, power, "
+        "inertia, stiffness, platform, foot",
         'm.yaml:15: missing key "joint" in head',
         'm.yaml:19: clearance: "50" needs a unit: mm, cm, m, in',
     ]

@@ -10,6 +10,7 @@ from parakin.cli import main
 from parakin.export.machine.mjcf import render_mjcf
 
 mujoco = pytest.importorskip("mujoco")
+from mujoco_engine import Engine  # noqa: E402
 
 MACHINES = Path(__file__).parent / "machines"
 OWN = [str(MACHINES / f"{name}.yaml") for name in ("hexaglide", "swing", "arm", "balls")]
@@ -45,46 +46,7 @@ legs:
 home: {X: 0, Y: 0, Z: 700 mm, A: 0, B: 0, C: 0}
 """,
 }
-METRE = 1000.0  # mm
 STEPS = 12  # of a way from home
-
-
-class Engine:
-    """A model whose drives are set and whose other joints follow by Newton on MuJoCo's own constraints."""
-
-    def __init__(self, machine):
-        self.model = mujoco.MjModel.from_xml_string(render_mjcf(machine))
-        self.model.opt.jacobian = mujoco.mjtJacobian.mjJAC_DENSE
-        self.model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_LIMIT
-        self.data = mujoco.MjData(self.model)
-        driven = [self.model.joint(name) for name in machine.joints]
-        self.places = np.array([joint.qposadr[0] for joint in driven])
-        self.free = np.setdiff1d(np.arange(self.model.nv), [joint.dofadr[0] for joint in driven])
-        self.units = np.array([METRE if unit == "mm" else 1.0 for unit in machine.joint_units])
-
-    def reset(self):
-        mujoco.mj_resetData(self.model, self.data)
-
-    def drive(self, joints):
-        """Set the drives, close the loops, and return what does not close, m."""
-        self.data.qpos[self.places] = joints / self.units
-        for _ in range(30):
-            mujoco.mj_forward(self.model, self.data)
-            count = self.data.ne
-            gaps = self.data.efc_pos[:count].copy()
-            if np.abs(gaps).max() < 1e-13:
-                break
-            jacobian = self.data.efc_J.reshape(-1, self.model.nv)[:count, self.free]
-            step = np.zeros(self.model.nv)
-            step[self.free] = -np.linalg.lstsq(jacobian, gaps, rcond=1e-10)[0]
-            mujoco.mj_integratePos(self.model, self.data.qpos, step, 1.0)
-        return np.abs(gaps).max()
-
-    def read(self):
-        """The tool's tip, mm, and its rotation, in the workpiece's frame."""
-        turn = np.empty(9)
-        mujoco.mju_quat2Mat(turn, self.data.sensor("tool_orientation").data)
-        return self.data.sensor("tool_position").data * METRE, turn.reshape(3, 3)
 
 
 def rotate(axis, angle):

@@ -9,8 +9,9 @@ import pytest
 from shipped import REPRESENTATIVES
 
 import parakin as pk
+from parakin.dynamics.polygon import order_polygon
 from parakin.export.machine.picture import render_machine_picture
-from parakin.export.machine.scene import build_scene, order_polygon
+from parakin.export.machine.scene import build_scene
 from parakin.export.machine.solids import build_solids
 from parakin.export.number_format import format_value
 from parakin.export.page.page import render_machine_page

@@ -51,7 +51,7 @@ from parakin.units import (
     ],
 )
 def test_quantities(text, kind, value):
-    names = {"a": Quantity(3.0, (1, 0, 0)), "b": Quantity(2.0, (1, 0, 0)), "w": Quantity(pi / 3, (0, 1, 0))}
+    names = {"a": Quantity(3.0, (1, 0, 0, 0)), "b": Quantity(2.0, (1, 0, 0, 0)), "w": Quantity(pi / 3, (0, 1, 0, 0))}
     assert parse_quantity(text, kind, names) == pytest.approx(value, rel=1e-12, abs=1e-15)
 
 
@@ -106,6 +106,6 @@ def test_bad_quantities(text, message):
 @given(text=st.text(alphabet="0123456789.eE+-*/() abmdegin\tsqrt/^²°,'\n", max_size=30))
 def test_any_expression(text):
     try:
-        assert isfinite(evaluate_expression(text, {"a": Quantity(2.0, (1, 0, 0))}).value)
+        assert isfinite(evaluate_expression(text, {"a": Quantity(2.0, (1, 0, 0, 0))}).value)
     except QuantityError as error:
         assert str(error).isprintable()

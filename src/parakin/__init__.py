@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from .export.accuracy_map import render_accuracy_png
     from .export.calibration import format_calibrated_yaml, render_residuals_png
     from .export.files import write_files
+    from .export.force_curves import render_drive_forces
     from .export.machine.picture import render_machine_picture
     from .export.page.page import render_machine_page, render_path_page
     from .export.report.report import render_report
@@ -48,6 +49,7 @@ if TYPE_CHECKING:
     from .toolpath.posting.tool_lengths import fit_tool_lengths
     from .toolpath.reading.detect import read_path
     from .toolpath.reading.tool_table import read_tool_table
+    from .toolpath.timing.drive_forces import DriveForces, compute_drive_forces
     from .toolpath.timing.trajectory import Trajectory
     from .toolpath.tool_turn.choice import ToolTurn, choose_tool_turn
     from .toolpath.turned_job import TurnedJob, prepare_turned
@@ -74,6 +76,7 @@ __all__ = [
     "DescriptionError",
     "DesignProblem",
     "Designs",
+    "DriveForces",
     "DriveWorkspace",
     "Family",
     "GridWorkspace",
@@ -118,6 +121,7 @@ __all__ = [
     "calibrate",
     "choose_tool_turn",
     "compare",
+    "compute_drive_forces",
     "family",
     "find_components",
     "find_cross_sections",
@@ -142,6 +146,7 @@ __all__ = [
     "read_tool_table",
     "region",
     "render_accuracy_png",
+    "render_drive_forces",
     "render_machine_page",
     "render_machine_picture",
     "render_path_page",
@@ -206,6 +211,7 @@ _LAZY = {
     "ProvedDesign": "synthesis.designs",
     "UnprovedDesign": "synthesis.designs",
     "find_designs": "synthesis.designs",
+    "DriveForces": "toolpath.timing.drive_forces",
     "DriveWorkspace": "workspaces.sampled.drive_sweep",
     "Family": "families.family",
     "GridWorkspace": "workspaces.sampled.grid",
@@ -245,6 +251,7 @@ _LAZY = {
     "calibrate": "calibration.calibration",
     "choose_tool_turn": "toolpath.tool_turn.choice",
     "compare": "comparison.comparison",
+    "compute_drive_forces": "toolpath.timing.drive_forces",
     "family": "families.family:make_family",
     "find_components": "workspaces.connected.components",
     "find_cross_sections": "workspaces.sampled.cross_sections",
@@ -266,6 +273,7 @@ _LAZY = {
     "read_tool_table": "toolpath.reading.tool_table",
     "region": "workspaces.certified.region:make_region",
     "render_accuracy_png": "export.accuracy_map",
+    "render_drive_forces": "export.force_curves",
     "render_machine_page": "export.page.page",
     "render_path_page": "export.page.page",
     "render_machine_picture": "export.machine.picture",

@@ -21,6 +21,7 @@ from .commands.compare import compare
 from .commands.console import print_remark
 from .commands.design import design
 from .commands.export import export
+from .commands.forces import forces
 from .commands.import_ import import_machine
 from .commands.kinematics import forward, inverse
 from .commands.linuxcnc import linuxcnc
@@ -45,7 +46,7 @@ app = App(
     default_parameter=Parameter(negative=""),
     suppress_keyboard_interrupt=False,  # main says so in one line
 )
-ANALYSES = (assemblies, reach, workspace, atlas, accuracy, stiffness, compare, calibrate, design)
+ANALYSES = (assemblies, reach, workspace, atlas, accuracy, stiffness, forces, compare, calibrate, design)
 for command in (post, inverse, forward, *ANALYSES, linuxcnc, machines, show, page, export):
     app.command(command)
 app.command(import_machine, name="import")

@@ -14,7 +14,7 @@ from .kinematics.closure_roots import compute_closure_tolerance
 from .kinematics.home import check_home
 from .kinematics.wrist.pose_angles import EVERY_DIRECTION, EVERY_ROTATION, EVERY_TURN
 from .kinematics.wrist.turning_joints import Wrist, find_wrist
-from .model.elements import Drive, PlaneConstraint, RodConstraint
+from .model.elements import BodyBuild, Drive, PlaneConstraint, RodConstraint
 from .model.equations import Equations
 from .model.geometric_parameters import SIZES, Parameter, list_parameters, replace_parameters
 from .model.legs import Leg
@@ -85,6 +85,11 @@ class MachineProperties:
     def legs(self) -> tuple[Leg, ...]:
         """The legs, each with its drives and what follows from their joints."""
         return self.spec.legs
+
+    @property
+    def bodies(self) -> Mapping[str, BodyBuild]:
+        """What the machine's file says its bodies are made of, by their kinds."""
+        return self.spec.bodies
 
     @property
     def constraints(self) -> tuple[PlaneConstraint | RodConstraint, ...]:

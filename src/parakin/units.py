@@ -1,7 +1,7 @@
 """Numbers with units, and expressions of them: ``350 mm``, ``-(l1 + l2 + 800 mm)``, ``R * cos(30 deg)``.
 
-Values are in mm, rad and s; a dimension is the powers of length, angle and time. Only machine files and command lines
-use other units.
+Values are in mm, rad, s and N (so masses are in t); a dimension is the powers of length, angle, time and force. Only
+machine files and command lines use other units.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from .errors import quote, suggest
 # Units of a pose's axes and a frame's values, ISO 841.
 AXIS_UNITS = {"X": "mm", "Y": "mm", "Z": "mm", "A": "rad", "B": "rad", "C": "rad"}
 
-Dimension: TypeAlias = tuple[int, int, int]  # powers of length, angle and time
+Dimension: TypeAlias = tuple[int, int, int, int]  # powers of length, angle, time and force
 
 
 @dataclass(frozen=True)
@@ -33,23 +33,33 @@ class QuantityKind:
         return f"{self.name} ({self.units})" if self.units else self.name
 
 
-NUMBER = QuantityKind((0, 0, 0), "a number", "")
-LENGTH = QuantityKind((1, 0, 0), "a length", "mm, cm, m, in")
-ANGLE = QuantityKind((0, 1, 0), "an angle", "deg, rad")
-SPEED = QuantityKind((1, 0, -1), "a speed", "mm/s, m/s, mm/min, m/min, in/min")
-ANGULAR_SPEED = QuantityKind((0, 1, -1), "an angular speed", "deg/s, rad/s, rpm")
-ACCELERATION = QuantityKind((1, 0, -2), "an acceleration", "mm/s2, m/s2, in/s2")
-ANGULAR_ACCELERATION = QuantityKind((0, 1, -2), "an angular acceleration", "deg/s2, rad/s2")
-JERK = QuantityKind((1, 0, -3), "a jerk", "mm/s3, m/s3, in/s3")
-ANGULAR_JERK = QuantityKind((0, 1, -3), "an angular jerk", "deg/s3, rad/s3")
+NUMBER = QuantityKind((0, 0, 0, 0), "a number", "")
+LENGTH = QuantityKind((1, 0, 0, 0), "a length", "mm, cm, m, in")
+ANGLE = QuantityKind((0, 1, 0, 0), "an angle", "deg, rad")
+SPEED = QuantityKind((1, 0, -1, 0), "a speed", "mm/s, m/s, mm/min, m/min, in/min")
+ANGULAR_SPEED = QuantityKind((0, 1, -1, 0), "an angular speed", "deg/s, rad/s, rpm")
+ACCELERATION = QuantityKind((1, 0, -2, 0), "an acceleration", "mm/s2, m/s2, in/s2")
+ANGULAR_ACCELERATION = QuantityKind((0, 1, -2, 0), "an angular acceleration", "deg/s2, rad/s2")
+JERK = QuantityKind((1, 0, -3, 0), "a jerk", "mm/s3, m/s3, in/s3")
+ANGULAR_JERK = QuantityKind((0, 1, -3, 0), "an angular jerk", "deg/s3, rad/s3")
+FORCE = QuantityKind((0, 0, 0, 1), "a force", "N, kN")
+TORQUE = QuantityKind((1, 0, 0, 1), "a torque", "Nm, Nmm")
+POWER = QuantityKind((1, 0, -1, 1), "a power", "W, kW")
+MASS = QuantityKind((-1, 0, 2, 1), "a mass", "kg, g, t")
+INERTIA = QuantityKind((1, 0, 2, 1), "a moment of inertia", "kg m2, g m2")
+DENSITY = QuantityKind((-4, 0, 2, 1), "a density", "kg/m3, g/cm3")
+STIFFNESS = QuantityKind((-1, 0, 0, 1), "a stiffness", "N/um, kN/mm, N/mm")
+ANGULAR_STIFFNESS = QuantityKind((1, -1, 0, 1), "an angular stiffness", "Nm/rad, kNm/rad")
+MODULUS = QuantityKind((-2, 0, 0, 1), "a modulus of elasticity", "GPa, MPa")
 _STRAIGHT = (LENGTH, SPEED, ACCELERATION, JERK)
 _ANGULAR = (ANGLE, ANGULAR_SPEED, ANGULAR_ACCELERATION, ANGULAR_JERK)
-_KINDS = {kind.dimension: kind for kind in (NUMBER, *_STRAIGHT, *_ANGULAR)}
+_LOADS = (FORCE, TORQUE, POWER, MASS, INERTIA, DENSITY, STIFFNESS, ANGULAR_STIFFNESS, MODULUS)
+_KINDS = {kind.dimension: kind for kind in (NUMBER, *_STRAIGHT, *_ANGULAR, *_LOADS)}
 
 
 @dataclass(frozen=True)
 class Quantity:
-    """A value in mm, rad and s, with its dimension."""
+    """A value in mm, rad, s and N, with its dimension."""
 
     value: float
     dimension: Dimension = NUMBER.dimension
@@ -59,7 +69,7 @@ class Quantity:
         """The kind's name for a message: ``a length``, ``an angle``, ..."""
         if self.dimension in _KINDS:
             return _KINDS[self.dimension].name
-        names = zip(("length", "angle", "time"), self.dimension, strict=True)
+        names = zip(("length", "angle", "time", "force"), self.dimension, strict=True)
         return "a product of dimension " + " ".join(n if p == 1 else f"{n}^{p}" for n, p in names if p)
 
 
@@ -77,17 +87,34 @@ def _build_units() -> dict[str, tuple[float, Dimension]]:
     units = {"rpm": (2.0 * math.pi / 60.0, ANGULAR_SPEED.dimension)}
     for base, powers in ((lengths, (1, 0)), (angles, (0, 1))):
         for name, factor in base.items():
-            units[name] = (factor, (*powers, 0))
-            units[f"{name}/s"] = (factor, (*powers, -1))
-            units[f"{name}/min"] = (factor / 60.0, (*powers, -1))
+            units[name] = (factor, (*powers, 0, 0))
+            units[f"{name}/s"] = (factor, (*powers, -1, 0))
+            units[f"{name}/min"] = (factor / 60.0, (*powers, -1, 0))
             for square in ("/s2", "/s^2", "/s²"):
-                units[name + square] = (factor, (*powers, -2))
+                units[name + square] = (factor, (*powers, -2, 0))
             for cube in ("/s3", "/s^3", "/s³"):
-                units[name + cube] = (factor, (*powers, -3))
+                units[name + cube] = (factor, (*powers, -3, 0))
     return units
 
 
-UNITS = _build_units()  # factor to mm, rad and s, and dimension, by name
+def _build_load_units() -> dict[str, tuple[float, Dimension]]:
+    factors: dict[QuantityKind, dict[str, float]] = {
+        FORCE: {"N": 1.0, "kN": 1e3, "MN": 1e6},
+        TORQUE: {"Nmm": 1.0, "Nm": 1e3, "kNm": 1e6},
+        POWER: {"W": 1e3, "kW": 1e6, "Nmm/s": 1.0},
+        MASS: {"kg": 1e-3, "g": 1e-6, "t": 1.0},
+        INERTIA: {"kg m2": 1e3, "kgm2": 1e3, "kg m²": 1e3, "g m2": 1.0, "kg mm2": 1e-3, "t mm2": 1.0},
+        DENSITY: {"kg/m3": 1e-12, "kg/m³": 1e-12, "g/cm3": 1e-9, "t/mm3": 1.0},
+        STIFFNESS: {"N/um": 1e3, "N/µm": 1e3, "kN/um": 1e6, "kN/mm": 1e3, "MN/m": 1e3, "N/mm": 1.0, "N/m": 1e-3},
+        ANGULAR_STIFFNESS: {"Nm/rad": 1e3, "kNm/rad": 1e6, "Nmm/rad": 1.0},
+        MODULUS: {"GPa": 1e3, "MPa": 1.0, "N/mm2": 1.0},
+    }
+    factors[ANGULAR_STIFFNESS] |= {f"{name}/deg": math.degrees(factors[TORQUE][name]) for name in ("Nm", "kNm")}
+    return {name: (factor, kind.dimension) for kind, names in factors.items() for name, factor in names.items()}
+
+
+_MOTION_UNITS = _build_units()
+UNITS = _MOTION_UNITS | _build_load_units()  # factor to mm, rad, s and N, and dimension, by name
 
 
 def parse_quantity(text: str, kind: QuantityKind, names: Mapping[str, Quantity | None] | None = None) -> float:
@@ -128,7 +155,7 @@ def is_reserved(name: str) -> bool:
     return name in _FUNCTIONS or name in _UNIT_WORDS
 
 
-_UNIT_WORDS = {word for unit in UNITS for word in re.findall(r"[a-z]+", unit)}
+_UNIT_WORDS = {word for unit in _MOTION_UNITS for word in re.findall(r"[a-z]+", unit)}
 _UNIT = "|".join(re.escape(u) for u in sorted(UNITS, key=len, reverse=True))
 _TOKEN = re.compile(
     rf"""\s*(?:
@@ -146,8 +173,8 @@ def _sqrt(x: Quantity) -> Quantity:
         raise QuantityError("square root of a negative value")
     if any(p % 2 for p in x.dimension):
         raise QuantityError(f"square root of {x.what}")
-    length, angle, time = x.dimension
-    return Quantity(math.sqrt(x.value), (length // 2, angle // 2, time // 2))
+    length, angle, time, force = x.dimension
+    return Quantity(math.sqrt(x.value), (length // 2, angle // 2, time // 2, force // 2))
 
 
 def _accept_angle(function: Callable[[float], float]) -> Callable[[Quantity], Quantity]:
@@ -218,11 +245,11 @@ class _ExpressionParser:
         while self.kind == "sign" and self.word in "*/":
             sign = 1 if self._take_word() == "*" else -1
             term = self._parse_factor()
-            a, b, c = (p + sign * q for p, q in zip(total.dimension, term.dimension, strict=True))
+            a, b, c, d = (p + sign * q for p, q in zip(total.dimension, term.dimension, strict=True))
             if sign < 0 and term.value == 0.0:
                 raise QuantityError(f"{quote(self.text)}: division by zero")
             value = total.value * term.value if sign > 0 else total.value / term.value
-            total = self._make_finite(value, (a, b, c))
+            total = self._make_finite(value, (a, b, c, d))
         return total
 
     def _parse_factor(self) -> Quantity:

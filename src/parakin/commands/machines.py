@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from ..errors import InputError
 from ..export.figure_file import PICTURES
-from ..export.json.machine import MOTOR, RATES, encode_details, encode_machine, encode_machines
+from ..export.json.machine import LOADS, MOTOR, RATES, encode_details, encode_machine, encode_machines
 from ..export.number_format import format_fixed
 from ..units import name_display_unit
 from .console import format_table, print_json, print_text
@@ -22,6 +22,7 @@ _LONGEST_TITLE = 48  # characters: a line of the list then has 80 at most
 
 _HEADERS = dict(zip(RATES, ("speed /s", "acceleration /s2", "jerk /s3"), strict=True))
 _HEADERS |= dict(zip(MOTOR, ("counts a turn", "lead", "homing"), strict=True))
+_HEADERS |= dict(zip(LOADS, ("force N, Nm", "rated N, Nm", "power W", "adds kg, kg m2", "N/um, kNm/rad"), strict=True))
 
 
 def machines(*, json: Json = False) -> int:
@@ -124,7 +125,7 @@ def _format_bound(value: float | None, unit: str) -> tuple[str, str]:
 def _summarise_machine(machine: Machine) -> str:
     details = encode_details(machine)
     columns = [key for key in RATES if any(d[key] < float("inf") for d in details["drives"])]
-    columns += [key for key in MOTOR if any(d[key] is not None for d in details["drives"])]
+    columns += [key for key in (*MOTOR, *LOADS) if any(d[key] is not None for d in details["drives"])]
     headers = [_HEADERS[key] for key in columns]
     drives = [
         (d["joint"], *(_format_number(d[key]) for key in ("low", "high")), d["unit"],

@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
-from ..errors import InputError, PoseError, quote
+from ..errors import InputError, quote
 from ..export.number_format import format_fixed
 from ..units import to_display
 from .accuracy import split_pairs
 from .console import announce_compiling, format_table, print_json, print_remark, print_text
+from .force_option import parse_force
 from .options import OFF_LIMITS, Json, Name, OutputPath, Sizes, load_machine
-from .region_options import split_axes
 
 if TYPE_CHECKING:
     from ..arrays import Array, Indices
@@ -69,7 +69,7 @@ def stiffness(
     _check_output(output, ".png" if csv is None else ".csv")
     of_drives = split_words(drives, "--drives") if any("=" in text for text in drives) else ",".join(drives)
     of_struts = split_words([struts], "--struts") if struts is not None and "=" in struts else struts
-    wanted = _parse_force(machine, force)
+    wanted = parse_force(machine, force)
     direction = None if along is None else _name_direction(machine, along)
     rows, lines = (None, None) if csv is None else _read_poses(machine, csv)
     announce_compiling()
@@ -116,27 +116,6 @@ def split_words(texts: Sequence[str], source: str) -> dict[str, str]:
             raise InputError(f"{name} is given twice", source)
         words[name] = value
     return words
-
-
-def _parse_force(machine: Machine, text: str | None) -> Array | None:
-    if text is None:
-        return None
-    import numpy as np
-
-    from ..stiffness.springs import FORCE, parse_stiff
-
-    axes = [axis for axis in machine.axes if axis in "XYZ"]
-    result = np.zeros(len(axes))
-    for axis, value in split_axes(machine, text, "--force", "X=-200N").items():
-        if axis not in axes:
-            raise InputError(f"{axis} is no translation, expected {' '.join(axes)}", "--force")
-        bare = value.strip()
-        try:
-            size = parse_stiff(bare.removeprefix("-"), FORCE, axis)
-        except PoseError as error:
-            raise InputError(str(error), "--force") from None
-        result[axes.index(axis)] = -size if bare.startswith("-") else size
-    return result
 
 
 def _name_direction(machine: Machine, axis: str) -> dict[str, float]:

@@ -21,7 +21,17 @@ from ..model.elements import Direction, Drive, Point, Signs, Size
 from ..model.legs import KINDS, Leg
 from .document import YamlList, YamlMap, YamlText
 from .sections import CirclePoints, FileSection
-from .values import DRIVE_TYPES, DirectionValue, Extent, PlacedError, PointValue, WordValue, describe_value, get_context
+from .values import (
+    DRIVE_KEYS,
+    DRIVE_TYPES,
+    DirectionValue,
+    Extent,
+    PlacedError,
+    PointValue,
+    WordValue,
+    describe_value,
+    get_context,
+)
 
 
 class LegGroup(FileSection):
@@ -40,6 +50,11 @@ class LegGroup(FileSection):
     lead: Any = None
     homing: Any = None
     offset: Any = None
+    force: Any = None
+    rated: Any = None
+    power: Any = None
+    inertia: Any = None
+    stiffness: Any = None
 
     def build_legs(self) -> list[Leg]:
         """Build the legs with their drives."""
@@ -48,7 +63,7 @@ class LegGroup(FileSection):
             drives = []
             for j, unit in enumerate(self.leg.units):
                 drive = Drive(str(names[j]), unit, *self.range[i][j])
-                for what in ("speed", "acceleration", "jerk", "counts", "lead", "homing", "offset"):
+                for what in DRIVE_KEYS:
                     rows = getattr(self, what)
                     drive = drive if rows is None else replace(drive, **{what: rows[i][j]})
                 drives.append(drive)
@@ -170,18 +185,13 @@ def _build_group_model(kind: str) -> type[LegGroup]:
             type_ = Annotated[type_, AfterValidator(_check_right_angle)]
         own[spec.name] = (type_, ... if spec.default is MISSING else None)
     drives = [DRIVE_TYPES[unit] for unit in leg.units]
+    for key in DRIVE_KEYS:
+        own[key] = (_make_rows_type(tuple(getattr(drive, key) for drive in drives), 0), None)
     model = create_model(
         f"Group_{kind}",
         __base__=LegGroup,
         joints=(_make_joints_type(leg), ...),
         range=(_make_rows_type(tuple(d.range for d in drives), 1), ...),
-        speed=(_make_rows_type(tuple(d.speed for d in drives), 0), None),
-        acceleration=(_make_rows_type(tuple(d.acceleration for d in drives), 0), None),
-        jerk=(_make_rows_type(tuple(d.jerk for d in drives), 0), None),
-        counts=(_make_rows_type(tuple(d.counts for d in drives), 0), None),
-        lead=(_make_rows_type(tuple(d.lead for d in drives), 0), None),
-        homing=(_make_rows_type(tuple(d.homing for d in drives), 0), None),
-        offset=(_make_rows_type(tuple(d.value for d in drives), 0), None),
         **own,
     )
     model.leg = leg

@@ -16,6 +16,7 @@ from ..errors import InputError, InputErrors, quote, suggest
 from ..model.elements import Limits, Unit
 from ..model.spec import Spec
 from ..units import ANGLE, LENGTH, Dimension
+from .bodies import BodiesSection
 from .document import YamlMap, YamlText, read_document
 from .groups import Legs
 from .sections import (
@@ -112,6 +113,7 @@ def read_machine(path: str | PathLike[str], parameters: Mapping[str, float | str
         limits=machine.limits.build_limits() if machine.limits else Limits(),
         parasitic=machine.parasitic,
         constraints=machine.constraints,
+        bodies=machine.bodies.build() if machine.bodies else {},
     )
 
 
@@ -154,6 +156,7 @@ class _MachineSection(FileSection):
     head: Steps = ()
     table: Steps = ()
     limits: LimitsSection | None = None
+    bodies: BodiesSection | None = None
     home: HomeSection
 
 

@@ -38,6 +38,7 @@ from ..model.elements import (
 from ..units import ANGLE, LENGTH
 from .document import YamlList, YamlMap, YamlText
 from .values import (
+    DRIVE_KEYS,
     DRIVE_TYPES,
     AnglePair,
     AngleValue,
@@ -117,27 +118,27 @@ class _DrivenStep(FileSection):
     counts: float | None = None
     lead: float | None = None
     homing: Any = None
+    force: float = inf
+    rated: float = inf
+    power: float = inf
+    inertia: float = 0.0
+    stiffness: float | None = None
 
     def build_step(self, axis: str, unit: Unit) -> Step:
-        rates = self.speed, self.acceleration, self.jerk
-        drive = Drive(str(self.joint), unit, *self.range, *rates, self.counts, self.lead, self.homing)
+        values = {key: getattr(self, key) for key in DRIVE_KEYS if key != "offset"}  # that of a step is its own
+        drive = Drive(str(self.joint), unit, *self.range, **values)
         return Step(axis, self.offset, drive, -1.0 if self.reverse else 1.0)
 
 
 def _build_driven_model(unit: Unit) -> type[_DrivenStep]:
     types = DRIVE_TYPES[unit]
-    return create_model(
-        f"Driven_{unit}",
-        __base__=_DrivenStep,
-        range=types.range,
-        offset=(types.value, 0.0),
-        speed=(types.speed, inf),
-        acceleration=(types.acceleration, inf),
-        jerk=(types.jerk, inf),
-        counts=(types.counts | None, None),
-        lead=(types.lead | None, None),
-        homing=(types.homing | None, None),
-    )
+    own: dict[str, Any] = {
+        key: (getattr(types, key) | None, _DrivenStep.model_fields[key].default)
+        for key in DRIVE_KEYS
+        if key != "offset"
+    }
+    offset = (types.value, 0.0)
+    return create_model(f"Driven_{unit}", __base__=_DrivenStep, range=types.range, offset=offset, **own)
 
 
 _DRIVEN: dict[Unit, type[_DrivenStep]] = {"mm": _build_driven_model("mm"), "rad": _build_driven_model("rad")}

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from math import hypot, nan, pi
 from typing import Annotated, Any, TypeAlias, cast
 
@@ -25,10 +25,19 @@ from ..units import (
     ANGULAR_ACCELERATION,
     ANGULAR_JERK,
     ANGULAR_SPEED,
+    ANGULAR_STIFFNESS,
+    DENSITY,
+    FORCE,
+    INERTIA,
     JERK,
     LENGTH,
+    MASS,
+    MODULUS,
     NUMBER,
+    POWER,
     SPEED,
+    STIFFNESS,
+    TORQUE,
     Quantity,
     QuantityError,
     QuantityKind,
@@ -138,13 +147,14 @@ ValidRange: TypeAlias = tuple[float, float, str]  # low < value ≤ high, and bo
 
 _SPEEDS = (SPEED, ANGULAR_SPEED, ACCELERATION, ANGULAR_ACCELERATION)
 _JERKS = (JERK, ANGULAR_JERK)
+_LOADS = (FORCE, TORQUE, POWER, MASS, INERTIA, DENSITY, STIFFNESS, ANGULAR_STIFFNESS, MODULUS)
 # Far beyond any machine, and small enough that no result overflows.
 _USUAL_BOUNDS: dict[QuantityKind, ValidRange] = {
     NUMBER: (-1e6, 1e6, "-1e6 to 1e6"),
     LENGTH: (-1e6, 1e6, "-1 km to 1 km"),
     ANGLE: (-1e4, 1e4, "-10000 rad to 10000 rad"),
     **{kind: (0.0, 1e9, f"more than 0 ({kind.units})") for kind in _SPEEDS},
-    **{kind: (0.0, 1e12, f"more than 0 ({kind.units})") for kind in _JERKS},
+    **{kind: (0.0, 1e12, f"more than 0 ({kind.units})") for kind in (*_JERKS, *_LOADS)},
 }
 
 
@@ -229,6 +239,15 @@ class DriveTypes:
     counts: Any
     lead: Any
     homing: Any
+    offset: Any
+    force: Any
+    rated: Any
+    power: Any
+    inertia: Any
+    stiffness: Any
+
+
+DRIVE_KEYS = tuple(field.name for field in fields(DriveTypes) if field.name not in ("value", "range"))
 
 
 def _refuse_zero(value: float) -> float:
@@ -251,16 +270,23 @@ def _accept_homing(kind: QuantityKind) -> PlainValidator:
     return PlainValidator(read)
 
 
-def _build_drive_types(value: Any, pair: Any, kind: QuantityKind, rates: tuple[QuantityKind, ...]) -> DriveTypes:
+def _build_drive_types(value: Any, pair: Any, kind: QuantityKind, others: tuple[QuantityKind, ...]) -> DriveTypes:
     """Build the types of a drive's values from those of a position and of a range, and from the kinds of quantities."""
-    speed, acceleration, jerk = (Annotated[float, accept_quantity(rate)] for rate in rates)
+    speed, acceleration, jerk, force, inertia, stiffness = (Annotated[float, accept_quantity(kind)] for kind in others)
+    power = Annotated[float, accept_quantity(POWER)]
     counts = Annotated[float, accept_quantity(NUMBER, (0.0, 1e9, "more than 0, at most 1e9"))]
     lead = Annotated[float, accept_quantity(kind), AfterValidator(_refuse_zero)]
     homing = Annotated[float | str, _accept_homing(kind)]
-    return DriveTypes(value, pair, speed, acceleration, jerk, counts, lead, homing)
+    of_load = force, force, power, inertia, stiffness
+    return DriveTypes(value, pair, speed, acceleration, jerk, counts, lead, homing, value, *of_load)
 
 
 DRIVE_TYPES: dict[Unit, DriveTypes] = {
-    "mm": _build_drive_types(LengthValue, LengthPair, LENGTH, (SPEED, ACCELERATION, JERK)),
-    "rad": _build_drive_types(AngleValue, AnglePair, ANGLE, (ANGULAR_SPEED, ANGULAR_ACCELERATION, ANGULAR_JERK)),
+    "mm": _build_drive_types(LengthValue, LengthPair, LENGTH, (SPEED, ACCELERATION, JERK, FORCE, MASS, STIFFNESS)),
+    "rad": _build_drive_types(
+        AngleValue,
+        AnglePair,
+        ANGLE,
+        (ANGULAR_SPEED, ANGULAR_ACCELERATION, ANGULAR_JERK, TORQUE, INERTIA, ANGULAR_STIFFNESS),
+    ),
 }

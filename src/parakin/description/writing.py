@@ -29,6 +29,8 @@ from ..model.legs import Leg
 from ..model.spec import Spec
 from ..units import AXIS_UNITS
 
+_BODY_UNITS = {"density": "t/mm3", "modulus": "N/mm2", "diameter": "mm", "wall": "mm", "mass": "t"}
+
 
 def format_spec(spec: Spec) -> str:
     """Format a description as the text of a machine file."""
@@ -45,6 +47,7 @@ def format_spec(spec: Spec) -> str:
         lines += _list_leg(leg)
     lines += _list_constraints(spec)
     lines += [*_list_steps("head", spec.head), *_list_steps("table", spec.table), *_list_limits(spec)]
+    lines += _list_bodies(spec)
     home = ", ".join(f"{axis}: {_format_quantity(value, AXIS_UNITS[axis])}" for axis, value in spec.home.items())
     return "\n".join([*lines, f"home: {{{home}}}", ""])
 
@@ -67,6 +70,15 @@ def _list_drive_values(drive: Drive) -> Iterator[tuple[str, str]]:
     for key, per in (("speed", "/s"), ("acceleration", "/s2"), ("jerk", "/s3")):
         if isfinite(getattr(drive, key)):
             yield key, _format_quantity(getattr(drive, key), drive.unit + per)
+    per_kind = ("N", "t", "N/mm") if drive.unit == "mm" else ("Nmm", "t mm2", "Nmm/rad")
+    force, inertia, stiffness = per_kind
+    for key, unit in (("force", force), ("rated", force), ("power", "Nmm/s")):
+        if isfinite(getattr(drive, key)):
+            yield key, _format_quantity(getattr(drive, key), unit)
+    if drive.inertia:
+        yield "inertia", _format_quantity(drive.inertia, inertia)
+    if drive.stiffness is not None:
+        yield "stiffness", _format_quantity(drive.stiffness, stiffness)
     if drive.counts is not None:
         yield "counts", repr(float(drive.counts))
     if drive.lead is not None:
@@ -160,3 +172,14 @@ def _list_limits(spec: Spec) -> Iterator[str]:
     if lines:
         yield "limits:"
         yield from lines
+
+
+def _list_bodies(spec: Spec) -> Iterator[str]:
+    if spec.bodies:
+        yield "bodies:"
+    for kind, build in spec.bodies.items():
+        values = {"rods": repr(build.rods)} if build.rods != 1 else {}
+        for key, unit in _BODY_UNITS.items():
+            if getattr(build, key) is not None:
+                values[key] = _format_quantity(getattr(build, key), unit)
+        yield f"  {kind}: {{{', '.join(f'{key}: {value}' for key, value in values.items())}}}"

@@ -34,6 +34,10 @@ class Drive:
         motor turns the other way; None: not said
     homing : where the home switch trips, or ``absolute`` for an encoder that needs none; None: not said
     offset : what a leg's joint is more than the drive says, mm or rad; ranges and homing are what the drive says
+    force, rated : the greatest force of the drive, and the greatest root of its mean square, N along a joint, Nmm about
+        one; power : its greatest power, Nmm/s
+    inertia : what motor and screw add, t along a joint, t mm² about one
+    stiffness : N/mm, Nmm/rad of slide, screw and motor together
     """
 
     name: str
@@ -47,6 +51,29 @@ class Drive:
     lead: float | None = None
     homing: float | Literal["absolute"] | None = None
     offset: float = 0.0
+    force: float = inf
+    rated: float = inf
+    power: float = inf
+    inertia: float = 0.0
+    stiffness: float | None = None
+
+
+@dataclass(frozen=True)
+class BodyBuild:
+    """What bodies of a kind are made of; None for what is not stated.
+
+    density : t/mm³; modulus : N/mm², of elasticity
+    diameter, wall : mm, of round bars; without a wall they are solid
+    rods : how many bars stand side by side
+    mass : t, of each body
+    """
+
+    density: float | None = None
+    modulus: float | None = None
+    diameter: float | None = None
+    wall: float | None = None
+    rods: int = 1
+    mass: float | None = None
 
 
 @dataclass(frozen=True)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from .elements import Drive, Limits, PlaneConstraint, RodConstraint, Step, Unit
+from .elements import BodyBuild, Drive, Limits, PlaneConstraint, RodConstraint, Step, Unit
 from .legs import Leg
 
 
@@ -17,6 +17,7 @@ class Spec:
     base frame in the machine frame; ``head`` leads from the platform to the tool's tip, whose +z points from the tip
     into the holder; ``table`` leads from the machine frame to the workpiece. ``home`` maps axis names to a pose.
     ``size_units`` has those of the ``sizes`` that are lengths or angles.
+    ``bodies`` tells what bodies of some kinds are made of: ``rod``, ``carriage``, ``platform``, ``head``, ``table``.
     ``parasitic`` are the words of the motion that follow from the others by the ``constraints``.
     """
 
@@ -34,6 +35,7 @@ class Spec:
     parasitic: tuple[str, ...] = ()
     constraints: tuple[PlaneConstraint | RodConstraint, ...] = ()
     size_units: Mapping[str, Unit] = field(default_factory=dict)
+    bodies: Mapping[str, BodyBuild] = field(default_factory=dict)
 
     @property
     def drives(self) -> tuple[Drive, ...]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from math import isfinite
 from typing import TYPE_CHECKING, Any
 
 from ...units import name_display_unit, to_display
@@ -13,6 +14,11 @@ if TYPE_CHECKING:
 
 RATES = ("speed", "acceleration", "jerk")
 MOTOR = ("counts", "lead", "homing")
+LOADS = ("force", "rated", "power", "inertia", "stiffness")
+_LOAD_UNITS = {  # N, N, W, kg and N/um of what slides; Nm, Nm, W, kg m² and kNm/rad of what turns
+    "mm": (1.0, 1.0, 1e3, 1e-3, 1e3),
+    "rad": (1e3, 1e3, 1e3, 1e3, 1e6),
+}
 
 
 def encode_machines(machines: Iterable[Machine]) -> dict[str, Any]:
@@ -50,6 +56,7 @@ def encode_details(machine: Machine) -> dict[str, Any]:
             "unit": name_display_unit(drive.unit),
             **{key: to_display(getattr(drive, key), drive.unit) for key in ("low", "high", *RATES)},
             **_encode_motor(drive),
+            **_encode_loads(drive),
         }
         for drive in machine.drives
     ]
@@ -80,4 +87,13 @@ def _encode_motor(drive: Drive) -> dict[str, Any]:
     return {
         key: to_display(value, drive.unit) if isinstance(value, float) and key != "counts" else value
         for key, value in said.items()
+    }
+
+
+def _encode_loads(drive: Drive) -> dict[str, float | None]:
+    """Encode what a drive can give, what it adds, and how stiff it is; None for what the file does not say."""
+    values = {key: getattr(drive, key) for key in LOADS}
+    return {
+        key: value / unit if value is not None and isfinite(value) and value > 0.0 else None
+        for (key, value), unit in zip(values.items(), _LOAD_UNITS[drive.unit], strict=True)
     }

@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ...arrays import Array, Indices, Progress
+from ...dynamics.multibody import METRE
 from ...errors import PoseError
 from ...machine import Machine
-from .multibody import METRE
 from .posed_mesh import Y_UP, format_material
 from .scene import build_scene, trace_scene
 from .solids import Solid, build_solids

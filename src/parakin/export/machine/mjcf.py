@@ -13,37 +13,42 @@ from xml.etree.ElementTree import Comment, Element, SubElement, indent, tostring
 import numpy as np
 
 from ...arrays import Array
+from ...dynamics.inverse_dynamics import GRAVITY
+from ...dynamics.masses import DENSITIES, DISC, BodyMass, compute_masses, find_radius
+from ...dynamics.multibody import METRE, WORLD, Body, BodyJoint, Multibody, build_multibody
+from ...dynamics.polygon import Points
 from ...machine import Machine
 from ...version import __version__
-from .multibody import DENSITIES, METRE, WORLD, Body, BodyJoint, Multibody, build_multibody
-from .scene import Points, build_scene
 from .solids import LOOKS
 
 _TIME_STEP = "0.0005"  # s
 _STIFF = {"solref": "0.001 1", "solimp": "0.999 0.9999 0.001 0.5 2"}  # of loops: two time steps, nearly rigid
 _SERVO = {"slide": 1e6, "hinge": 1e5}  # N/m and N m/rad of a drive: far stiffer than these weights ask for
+_TONNE = 1e3  # kg
 _ARMATURE = {"slide": "1", "hinge": "0.1"}  # kg and kg m² of a drive, which alone swings at 1000 rad/s
 _DAMPING = {"ball": "0.05", "hinge": "0.05", "slide": "5"}  # N m s/rad and N s/m, of joints that no drive moves
-_DISC = 0.12  # of the scene's size: the table's radius
 
 
 def render_mjcf(machine: Machine) -> str:
     """Render a machine as a MuJoCo model, XML."""
     multibody = build_multibody(machine)
-    size = build_scene(machine).size
+    masses = compute_masses(multibody)
     root = Element("mujoco", model=machine.name)
     root.append(Comment(f" {machine.spec.title}; by parakin {__version__}. Metres, kilograms, radians. "))
     SubElement(root, "compiler", angle="radian", autolimits="true")
-    SubElement(root, "option", timestep=_TIME_STEP, integrator="implicitfast", iterations="200", tolerance="1e-12")
+    solver = {"integrator": "implicitfast", "iterations": "200", "tolerance": "1e-12"}
+    SubElement(root, "option", {"timestep": _TIME_STEP, "gravity": f"0 0 {-GRAVITY * METRE:.9g}", **solver})
     _add_defaults(root)
     world = SubElement(root, "worldbody")
-    SubElement(world, "light", pos=_format(np.array([0.0, 0.0, 2.0 * size * METRE])), directional="true")
+    SubElement(world, "light", pos=_format(np.array([0.0, 0.0, 2.0 * multibody.size * METRE])), directional="true")
     elements = {WORLD: world}
     for body in multibody.bodies:
-        elements[body.name] = _add_body(elements[body.carrier], body, size)
+        elements[body.name] = _add_body(
+            elements[body.carrier], body, masses[body.name], find_radius(multibody, body.kind)
+        )
     for name, (carrier, rotation, origin) in multibody.frames.items():
         SubElement(elements[carrier], "site", name=name, pos=_format(origin * METRE), quat=_format_turn(rotation))
-    _add_table_disc(elements, multibody, size)
+    _add_table_disc(elements, multibody)
     _add_loops(root, elements, multibody)
     _add_drives(root, multibody)
     indent(root)
@@ -60,20 +65,28 @@ def _add_defaults(root: Element) -> None:
         SubElement(of_kind, "geom", density=f"{density:g}", rgba=_format_colour(LOOKS[kind].colour))
 
 
-def _add_body(carrier: Element, body: Body, size: float) -> Element:
+def _add_body(carrier: Element, body: Body, mass: BodyMass, radius: float) -> Element:
     placed = {"pos": _format(body.origin * METRE), "quat": _format_turn(body.rotation)}
     element = SubElement(carrier, "body", {"name": body.name, **placed})
     for joint in body.joints:
         _add_joint(element, joint)
-    radius = LOOKS[body.kind].radius * size
+    if body.bars:
+        _add_inertia(element, mass)
     for start, end in body.bars:
         look = {"class": body.kind}
         if np.linalg.norm(end - start) < radius:
-            SubElement(element, "geom", look, type="sphere", size=f"{radius * METRE:.6g}", pos=_format(start * METRE))
+            SubElement(element, "geom", look, type="sphere", size=f"{radius * METRE:.16g}", pos=_format(start * METRE))
         else:
             ends = _format(np.concatenate([start, end]) * METRE)
-            SubElement(element, "geom", look, type="capsule", size=f"{radius * METRE:.6g}", fromto=ends)
+            SubElement(element, "geom", look, type="capsule", size=f"{radius * METRE:.16g}", fromto=ends)
     return element
+
+
+def _add_inertia(element: Element, mass: BodyMass) -> None:
+    j = mass.inertia * METRE**2
+    numbers = np.array([j[0, 0], j[1, 1], j[2, 2], j[0, 1], j[0, 2], j[1, 2]])
+    given = {"pos": _format(mass.centre * METRE), "mass": f"{mass.mass:.16g}", "fullinertia": _format(numbers)}
+    SubElement(element, "inertial", given)
 
 
 def _add_joint(body: Element, joint: BodyJoint) -> None:
@@ -81,7 +94,11 @@ def _add_joint(body: Element, joint: BodyJoint) -> None:
         SubElement(body, "freejoint", name=joint.name)
         return
     given = {"name": joint.name, "type": joint.kind}
-    given |= {"damping": _DAMPING[joint.kind]} if joint.drive is None else {"armature": _ARMATURE[joint.kind]}
+    if joint.drive is None:
+        given["damping"] = _DAMPING[joint.kind]
+    else:
+        stated = joint.drive.inertia * _TONNE * (1.0 if joint.kind == "slide" else METRE**2)
+        given["armature"] = f"{stated:.16g}" if stated else _ARMATURE[joint.kind]
     if joint.kind != "ball":
         unit = METRE if joint.kind == "slide" else 1.0
         given |= {
@@ -94,13 +111,13 @@ def _add_joint(body: Element, joint: BodyJoint) -> None:
     SubElement(body, "joint", given)
 
 
-def _add_table_disc(elements: dict[str, Element], multibody: Multibody, size: float) -> None:
+def _add_table_disc(elements: dict[str, Element], multibody: Multibody) -> None:
     body, rotation, origin = multibody.frames["workpiece"]
     if body == WORLD:
         return
-    half = LOOKS["table"].radius * size * METRE
+    half = find_radius(multibody, "table") * METRE
     place = {"pos": _format(origin * METRE - rotation[:, 2] * half), "quat": _format_turn(rotation)}
-    disc = f"{_DISC * size * METRE:.6g} {half:.6g}"
+    disc = f"{DISC * multibody.size * METRE:.16g} {half:.16g}"
     SubElement(elements[body], "geom", {"class": "table", "type": "cylinder", "size": disc, **place})
 
 

@@ -7,11 +7,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ...arguments import RowsLike, check_arguments
+from ...dynamics.polygon import Points
 from ...errors import PoseError
 from ...machine import Machine
 from ..colours import INK
 from ..figure_file import PICTURES, render_figure
-from .scene import Points, Scene, build_scene
+from .scene import Scene, build_scene
 from .solids import LOOKS, build_solids
 
 if TYPE_CHECKING:

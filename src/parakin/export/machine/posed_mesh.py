@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 
 from ...arrays import Array
+from ...dynamics.multibody import METRE
 from ...machine import Machine
-from .multibody import METRE
 from .scene import build_scene
 from .solids import LOOKS, build_solids
 

@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ...algebra import IDENTITY, ORIGIN, Scalar
 from ...arguments import RowsLike
+from ...dynamics.polygon import Points, coincide, find_distinct, list_polygon
 from ...errors import PoseError
 from ...machine import Machine
 from ...model.chain import UNIT, compose_chain
@@ -24,7 +25,6 @@ from ...model.equations import Equations
 from ...model.legs import Leg
 from ...model.structures import PlatformPlacement
 
-Points = NDArray[np.float64]
 SceneKind = Literal["base", "rail", "telescope", "rod", "arm", "platform", "central", "head", "tool", "table", "axis"]
 
 _NEAR = 1e-6  # mm; points nearer than this are one
@@ -221,7 +221,7 @@ class _SceneBuilder:
             for strut in np.flatnonzero(np.ptp(feet, axis=0).max(axis=-1) > _NEAR).tolist():
                 moved.setdefault(strut, []).append(drive.name)
                 # An arm that ends at the foot is what moves it; there is no rail then.
-                if not any(_coincide(other[1], struts[strut][0]) for other in struts):
+                if not any(coincide(other[1], struts[strut][0]) for other in struts):
                     ends = [sweep[0], sweep[-1]] if unit == "mm" else sweep
                     self._add("rail", drive.name, _place_rail(number, strut, at.points[number], ends))
         for strut in range(len(struts)):
@@ -247,7 +247,7 @@ class _SceneBuilder:
             return np.array([corners[i] for i in order])
 
         self._add("platform", "platform", lambda at: at.to_machine(locate_corners(at)), len(order) > 2)
-        if not _coincide(locate_corners(stance).mean(axis=0), stance.origin) and not self.structure.has_central_leg:
+        if not coincide(locate_corners(stance).mean(axis=0), stance.origin) and not self.structure.has_central_leg:
             self._add(
                 "head", "platform", lambda at: at.to_machine(np.array([locate_corners(at).mean(axis=0), at.origin]))
             )
@@ -255,7 +255,7 @@ class _SceneBuilder:
     def _add_head(self) -> None:
         at, chain = self.stance, self.stance.list_head_frames()
         # Joints of the links, the platform's origin first; those at one place count once.
-        kept = _find_distinct([np.zeros(3), *[origin for _, origin in chain]])
+        kept = find_distinct([np.zeros(3), *[origin for _, origin in chain]])
 
         def place_links(at: _Stance, first: int, last: int) -> Points:
             origins = [np.zeros(3), *[origin for _, origin in at.list_head_frames()]]
@@ -325,7 +325,7 @@ def _join_labels(labels: list[tuple[str, Points]]) -> tuple[tuple[str, Points], 
     """Join the labels at one place into one."""
     joined: list[tuple[str, Points]] = []
     for name, place in labels:
-        same = next((i for i, (_, other) in enumerate(joined) if _coincide(place, other)), None)
+        same = next((i for i, (_, other) in enumerate(joined) if coincide(place, other)), None)
         if same is None:
             joined.append((name, place))
         else:
@@ -363,36 +363,3 @@ def _cut_range(low: float, high: float, q: float, unit: str, length: float) -> t
     reach = pi if unit == "rad" else 0.5 * length
     low, high = (low if isfinite(low) else q - reach), (high if isfinite(high) else q + reach)
     return (q - pi, q + pi) if unit == "rad" and high - low > 2.0 * pi else (low, high)
-
-
-def order_polygon(points: Points) -> Points:
-    """Order the distinct points round their middle in their own plane; of a line return the ends."""
-    ordered: Points = points[list_polygon(points)]
-    return ordered
-
-
-def list_polygon(points: Points) -> list[int]:
-    """List the distinct points in order round their middle in their own plane; of a line the ends."""
-    distinct = np.array(_find_distinct(list(points)))
-    points = points[distinct]
-    if len(points) < 3:
-        return list(distinct.tolist())
-    off = points - points.mean(axis=0)
-    _, sizes, axes = np.linalg.svd(off)
-    if sizes[1] < 1e-9 * sizes[0]:
-        along = off @ axes[0]
-        return list(distinct[[along.argmin(), along.argmax()]].tolist())
-    return list(distinct[np.argsort(np.arctan2(off @ axes[1], off @ axes[0]))].tolist())
-
-
-def _find_distinct(points: list[Points]) -> list[int]:
-    """Find the first point of each place."""
-    kept: list[int] = []
-    for number, point in enumerate(points):
-        if not any(_coincide(point, points[other]) for other in kept):
-            kept.append(number)
-    return kept
-
-
-def _coincide(a: Points, b: Points) -> bool:
-    return bool(np.linalg.norm(a - b) < _NEAR)

@@ -10,7 +10,9 @@ from typing import NamedTuple
 import numpy as np
 
 from ...arrays import Indices
-from .scene import Points, Scene, SceneItem, SceneKind
+from ...dynamics.masses import THICKNESS
+from ...dynamics.polygon import Points
+from .scene import Scene, SceneItem, SceneKind
 
 _SIDES = 14
 
@@ -32,19 +34,19 @@ class Look(NamedTuple):
 
 
 LOOKS: dict[str, Look] = {
-    "base": Look("#5b6670", 0.0055),
+    "base": Look("#5b6670", THICKNESS["base"]),
     "rail": Look("#aab4bd", 0.0045),
     "telescope": Look("#2f6fb3", 0.0105),
     "piston": Look("#c9d3dc", 0.0060),
-    "rod": Look("#2f6fb3", 0.0060),
+    "rod": Look("#2f6fb3", THICKNESS["rod"]),
     "arm": Look("#4c9a8b", 0.0060),
-    "carriage": Look("#37474f", 0.0125),
+    "carriage": Look("#37474f", THICKNESS["carriage"]),
     "joint": Look("#37474f", 0.0085),
-    "platform": Look("#e0912f", 0.0070),
+    "platform": Look("#e0912f", THICKNESS["platform"]),
     "central": Look("#8b98a4", 0.0075),
-    "head": Look("#e0912f", 0.0110),
+    "head": Look("#e0912f", THICKNESS["head"]),
     "tool": Look("#b3372f", 0.0050),
-    "table": Look("#c3ad84", 0.0060),
+    "table": Look("#c3ad84", THICKNESS["table"]),
     "axis": Look("#8a7a5c", 0.0075),
 }
 

@@ -15,20 +15,21 @@ from xml.etree.ElementTree import Comment, Element, SubElement, indent, tostring
 import numpy as np
 
 from ...arrays import Array
+from ...dynamics.masses import NOTHING, BodyMass, compute_masses, find_radius
+from ...dynamics.multibody import METRE, WORLD, Body, BodyJoint, Multibody, build_multibody
+from ...dynamics.polygon import Points
 from ...machine import Machine
 from ...version import __version__
-from .multibody import DENSITIES, METRE, WORLD, Body, BodyJoint, Multibody, build_multibody
-from .scene import Points, build_scene
-from .solids import LOOKS
 
-_LEAST_INERTIA = 1e-9  # kg m²; a body without one is none to simulators
+_LEAST_INERTIA, _LEAST_MASS = 1e-9, 1e-6  # kg m² and kg; a body without one is none to simulators
 _EFFORT = 1e5  # N and N m: URDF asks for a bound of each drive's
 _KINDS = {"slide": "prismatic", "hinge": "revolute", "free": "floating"}
 
 
 def render_urdf(machine: Machine) -> tuple[str, str]:
     """Render a machine's tree as URDF, and its loops and drives as JSON."""
-    multibody, size = build_multibody(machine), build_scene(machine).size
+    multibody = build_multibody(machine)
+    masses = compute_masses(multibody)
     root = Element("robot", name=machine.name)
     root.append(Comment(f" {machine.spec.title}; by parakin {__version__}. Loops are in {machine.name}_loops.json. "))
     SubElement(root, "link", name=WORLD)
@@ -42,7 +43,7 @@ def render_urdf(machine: Machine) -> tuple[str, str]:
             link = body.name if is_last else f"{body.name}_{joint.name}"
             kind = "fixed" if not body.joints else _KINDS[joint.kind]
             _add_joint(root, joint, kind, (carrier, link), frame)
-            _add_link(root, link, body if is_last else None, size)
+            _add_link(root, link, (body, find_radius(multibody, body.kind), masses[body.name]) if is_last else None)
             carrier = link
     for name, (body_name, rotation, origin) in multibody.frames.items():
         frame = np.column_stack([rotation, origin])
@@ -125,37 +126,31 @@ def _add_joint(root: Element, joint: BodyJoint, kind: str, links: tuple[str, str
         SubElement(element, "limit", {**limits, "effort": f"{_EFFORT:g}", "velocity": f"{speed * unit:.12g}"})
 
 
-def _add_link(root: Element, name: str, body: Body | None, size: float) -> None:
-    """Add a link with its bars as cylinders and balls, and the inertia of these."""
+def _add_link(root: Element, name: str, seen: tuple[Body, float, BodyMass] | None) -> None:
+    """Add a link with a body's bars as cylinders and balls of a radius, and its mass; a joint's own has nothing."""
     link = SubElement(root, "link", name=name)
-    mass, centre, inertia = 0.0, np.zeros(3), np.zeros((3, 3))
-    for start, end in body.bars if body is not None else ():
-        assert body is not None
-        radius = LOOKS[body.kind].radius * size * METRE
+    if seen is None:
+        _add_inertia(link, NOTHING)
+        return
+    body, radius, mass = seen
+    for start, end in body.bars:
         a, b = start * METRE, end * METRE
         length = float(np.linalg.norm(b - a))
         visual = SubElement(link, "visual")
-        if length < radius:
-            along, own = np.array([0.0, 0.0, 1.0]), DENSITIES[body.kind] * 4.0 / 3.0 * pi * radius**3
-            spin, swing = 0.4 * own * radius**2, 0.4 * own * radius**2
-            shape, sizes = "sphere", {"radius": f"{radius:.6g}"}
+        if length < radius * METRE:
+            along, shape, sizes = np.array([0.0, 0.0, 1.0]), "sphere", {}
         else:
-            along, own = (b - a) / length, DENSITIES[body.kind] * pi * radius**2 * length
-            spin, swing = 0.5 * own * radius**2, own * (3.0 * radius**2 + length**2) / 12.0
-            shape, sizes = "cylinder", {"radius": f"{radius:.6g}", "length": f"{length:.9g}"}
-        middle = 0.5 * (a + b)
-        SubElement(visual, "origin", {"xyz": _format(middle), "rpy": _format(_find_angles(along))})
-        SubElement(SubElement(visual, "geometry"), shape, sizes)
-        about = swing * np.eye(3) + (spin - swing) * np.outer(along, along)
-        inertia += about + own * (middle @ middle * np.eye(3) - np.outer(middle, middle))
-        mass, centre = mass + own, centre + own * middle
-    if mass > 0.0:
-        centre = centre / mass
-        inertia -= mass * (centre @ centre * np.eye(3) - np.outer(centre, centre))
-    mass, inertia = max(mass, 1e-6), inertia + _LEAST_INERTIA * np.eye(3)
+            along, shape, sizes = (b - a) / length, "cylinder", {"length": f"{length:.9g}"}
+        SubElement(visual, "origin", {"xyz": _format(0.5 * (a + b)), "rpy": _format(_find_angles(along))})
+        SubElement(SubElement(visual, "geometry"), shape, {"radius": f"{radius * METRE:.6g}", **sizes})
+    _add_inertia(link, mass)
+
+
+def _add_inertia(link: Element, mass: BodyMass) -> None:
+    inertia = mass.inertia * METRE**2 + _LEAST_INERTIA * np.eye(3)
     element = SubElement(link, "inertial")
-    SubElement(element, "origin", xyz=_format(centre))
-    SubElement(element, "mass", value=f"{mass:.9g}")
+    SubElement(element, "origin", xyz=_format(mass.centre * METRE))
+    SubElement(element, "mass", value=f"{max(mass.mass, _LEAST_MASS):.9g}")
     pairs = {"ixx": (0, 0), "ixy": (0, 1), "ixz": (0, 2), "iyy": (1, 1), "iyz": (1, 2), "izz": (2, 2)}
     SubElement(element, "inertia", {key: f"{inertia[pair]:.9g}" for key, pair in pairs.items()})
 

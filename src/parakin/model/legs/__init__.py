@@ -3,9 +3,9 @@
 from importlib import import_module
 from pkgutil import iter_modules
 
-from .base import Inverse, Leg, Reach
+from .base import Inverse, Leg, Link, Reach
 
-__all__ = ["KINDS", "Inverse", "Leg", "Reach"]
+__all__ = ["KINDS", "Inverse", "Leg", "Link", "Reach"]
 
 
 def _collect_kinds() -> dict[str, type[Leg]]:

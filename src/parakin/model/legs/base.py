@@ -34,6 +34,7 @@ class Link:
     joint : what joins it, at ``start``, to the link that carries it: it slides along ``axis``, turns about it, or turns
         about the point
     end : where it ends; a carriage ends where it starts
+    axis : of a ball joint: along the link, where its ends don't tell
     drive : which of the leg's drives moves it; None: what the leg's closure leaves it
     carrier : the link that carries it, by its number in the leg; None: the base
     meets : what a ball joint holds its end to: the platform's joint, or a link of the leg; a hinge along it holds it to

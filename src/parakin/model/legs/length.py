@@ -30,7 +30,7 @@ class Length(Leg):
     def links(self, point: Vec, joints: list[Scalar]) -> list[Link]:
         along = scale(sub(point, self.foot), 1.0 / norm(sub(point, self.foot)))
         return [
-            Link("ball", self.foot, self.foot),
+            Link("ball", self.foot, self.foot, along),
             Link("slide", self.foot, point, along, drive=0, carrier=0, meets="platform"),
         ]
 

@@ -139,7 +139,8 @@ def _pose_problem(joint_path: JointPath, limits: DriveLimits) -> StepLimits:
     top = (_FASTER / mean) ** 2 if mean > 0.0 else np.inf
     start, end = (np.minimum(ceiling, top) for ceiling in ceilings)
     even = np.ones(len(start))
-    return StepLimits(rows.step, slope, bend, start, end, 1.0 / limits.acceleration, 1.0 / limits.jerk, even)
+    rates = 1.0 / limits.acceleration, 1.0 / limits.jerk
+    return StepLimits(rows.step, slope, bend, start, end, *rates, rows.forces.along, rows.forces.across, even)
 
 
 def _find_start(joint_path: JointPath, limits: DriveLimits, problem: StepLimits, ramp: float) -> tuple[Array, Array]:

@@ -19,6 +19,7 @@ from .joint_following import find_nearest_joints, follow_curve
 from .kernels.rounded_corners import place_rows
 from .kernels.speed_ceilings import CurveRows, FeedLimits, compute_feed_ceilings
 from .kernels.splines import (
+    ForceRows,
     JointRows,
     JointState,
     Midpoints,
@@ -26,6 +27,7 @@ from .kernels.splines import (
     SplineTolerances,
     evaluate_splines,
     fit_splines,
+    make_unforced_rows,
     mark_coarse_steps,
 )
 
@@ -156,7 +158,7 @@ def build_joint_path(
 def _build_single_row(posted: Posted, curve: Curve) -> JointPath:
     """Build the joint path of a curve that is a single point."""
     joints, empty = posted.joints[:1], np.empty(0)
-    rows = JointRows(empty, joints, np.zeros_like(joints), empty)
+    rows = JointRows(empty, joints, np.zeros_like(joints), empty, make_unforced_rows(1))
     return JointPath(posted, curve, np.zeros(1, np.int64), np.zeros(1), rows)
 
 
@@ -199,7 +201,7 @@ def _find_coarse_steps(joint_path: JointPath, tolerances: SplineTolerances, cand
 
 
 def refine_joint_path(joint_path: JointPath, steps: Indices, fractions: Array, anew: bool = False) -> JointPath:
-    """Add rows in steps, ascending, after ``fractions`` of them.
+    """Add rows in steps, ascending, after ``fractions`` of them; none is bounded by forces.
 
     The joints at the new rows are those nearest to the old splines; with ``anew`` all are followed from the start.
     """
@@ -236,8 +238,19 @@ def divide_joint_path(joint_path: JointPath, steps: Indices, fractions: Array) -
             np.insert(rows.joints, steps + 1, joints, axis=0),
             np.insert(rows.curvature, steps + 1, bend, axis=0),
             np.insert(rows.feed_ceiling, steps, rows.feed_ceiling[steps]),
+            _divide_forces(rows.forces, steps, fractions),
         ),
     )
+
+
+def _divide_forces(forces: ForceRows, steps: Indices, fractions: Array) -> ForceRows:
+    """Add rows in steps after ``fractions`` of them."""
+
+    def divide(values: Array) -> Array:
+        between = values[steps] + fractions[:, None] * (values[steps + 1] - values[steps])
+        return np.insert(values, steps + 1, between, axis=0)
+
+    return ForceRows(forces.drive, divide(forces.along), divide(forces.across))
 
 
 def _follow_rows(posted: Posted, curve: Curve, segment: Indices, offset: Array) -> JointPath:
@@ -260,7 +273,8 @@ def _fit_rows(posted: Posted, curve: Curve, segment: Indices, offset: Array, joi
     curvature = np.empty_like(joints)
     fit_splines(step, joints, curvature, np.empty(len(segment)))
     feed_ceiling = _compute_feed_ceiling(posted, curve, CurveRows(segment, offset, step))
-    joint_path = JointPath(posted, curve, segment, offset, JointRows(step, joints, curvature, feed_ceiling))
+    rows = JointRows(step, joints, curvature, feed_ceiling, make_unforced_rows(len(segment)))
+    joint_path = JointPath(posted, curve, segment, offset, rows)
     if not np.isfinite(joints.sum()):
         lost = int((~np.isfinite(joints)).any(1).argmax())
         raise PoseError(f"{joint_path.describe_step(lost)} the legs can't close")

@@ -11,6 +11,7 @@ from ...errors import PoseError
 from ..posting.posted import Posted
 from .corners import Corners, check_tolerance, round_corners
 from .drive_limits import DriveLimits
+from .force_limits import ForceLimits
 from .jerk_limited import limit_jerk
 from .joint_path import build_joint_path
 from .speed_profile import SpeedProfile
@@ -41,9 +42,10 @@ def plan_trajectory(
     stops : records at which the tool stands still, besides the first and the last
 
     Between records the tip moves straight and the pose's angles evenly. The feed is that of the record that the motion
-    leads to; in rapid, and where none is programmed, drives are the only limit. Where no drive has an acceleration or a
-    jerk, corners are neither rounded nor stopped at, and speeds change at once. With jerks the trajectory is the
-    quickest but for less than 0.5 %, on paths of more than 100,000 rows for less than 10 %.
+    leads to; in rapid, and where none is programmed, drives are the only limit. A drive's force, where its file says
+    one, bounds what weight and inertia ask of it. Where no drive has an acceleration, a jerk or a force, corners are
+    neither rounded nor stopped at, and speeds change at once. With jerks the trajectory is the quickest but for less
+    than 0.5 %, on paths of more than 100,000 rows for less than 10 %.
 
     Raises
     ------
@@ -58,14 +60,16 @@ def plan_trajectory(
         DriveLimits.of(posted.machine),
         name_limits(posted.machine.joints),
     )
-    curve = round_corners(posted, corners, tolerance, axis_tolerance, parted, limits.bounds_acceleration)
+    forces = ForceLimits(posted.machine)
+    bounded = limits.bounds_acceleration or bool(forces)
+    curve = round_corners(posted, corners, tolerance, axis_tolerance, parted, bounded)
     joint_path = build_joint_path(posted, curve, limits, tolerance, axis_tolerance)
     if not len(joint_path.step):
         return Trajectory(posted, curve, joint_path, SpeedProfile.allocate(0, 1), np.full(1, len(names) - 1), names)
-    if not limits.bounds_acceleration:
+    if not bounded:
         profile, binding = build_uniform_profile(joint_path, limits)
         return Trajectory(posted, curve, joint_path, profile, binding, names)
-    joint_path, x, u = find_quickest(joint_path, limits)
+    joint_path, x, u = find_quickest(joint_path, limits, forces)
     if np.isfinite(limits.jerk).any():
         joint_path, profile, binding = limit_jerk(joint_path, limits, x)
     else:

@@ -8,6 +8,7 @@ from ...arrays import Array, Indices
 from ...errors import PoseError
 from ...kernels.batch import run_in_threads
 from .drive_limits import DriveLimits
+from .force_limits import ForceLimits
 from .joint_path import JointPath, refine_joint_path
 from .kernels.acceleration_limits import AccelerationLimits
 from .kernels.reachability import Switches, compute_controllable, compute_reachable, find_switches
@@ -44,9 +45,10 @@ def find_reachable(joint_path: JointPath, limits: DriveLimits, ceilings: StepCei
     return x, u
 
 
-def find_quickest(joint_path: JointPath, limits: DriveLimits) -> tuple[JointPath, Array, Array]:
+def find_quickest(joint_path: JointPath, limits: DriveLimits, forces: ForceLimits) -> tuple[JointPath, Array, Array]:
     """Find ṡ² (rows,) and s̈ (steps,) of the quickest profile without jerks, with rows where it switches."""
     for attempt in range(_ROUNDS):
+        joint_path = forces.bound(joint_path)
         rows, count = joint_path.rows, len(joint_path.step)
         ceilings = compute_ceilings(joint_path, limits)
         x, u = find_reachable(joint_path, limits, ceilings)

@@ -111,6 +111,25 @@ def _add_accelerations(i, limits, k, weight, d):
 
 
 @njit(nogil=True, cache=True, error_model="numpy")
+def _add_forces(i, limits, k, weight, d):
+    """Add the barriers of the drives' forces at place k of step i: its start, its middle or its end."""
+    at, rise, form = d.state[k, 0], d.state[k, 2], d.form[0]
+    square, tight, h = d.state[k, 1] ** 2, limits.tightening[i] ** 2, limits.step[i]
+    for j in range(limits.along.shape[1]):
+        along, across = limits.along[i, j] * tight, limits.across[i, j] * tight
+        bend, turn = (limits.along[i + 1, j] * tight - along) / h, (limits.across[i + 1, j] * tight - across) / h
+        p, q = along + bend * at, across + turn * at
+        rest = 1.0 / (1.0 - p * rise - q * square)
+        for n in range(4):
+            change = (bend * rise + turn * square) * d.way[k, n]
+            form[n] = (p * d.rise[k, n] + q * d.square[k, n] + change) * rest
+        for n in range(4):
+            d.gradient[n] += weight * form[n]
+            for m in range(n, 4):
+                d.hessian[n, m] += weight * form[n] * form[m]
+
+
+@njit(nogil=True, cache=True, error_model="numpy")
 def _add_jerks(i, limits, k, piece, weight, d):
     """Add the barriers of the joints' jerks at place k of step i, its start, middle or end, with a piece's s⃛."""
     at, speed, rise, jerk = d.state[k, 0], d.state[k, 1], d.state[k, 2], d.state[piece, 3]
@@ -212,6 +231,7 @@ def expand_step(i, limits, weight, x0, a0, x1, a1, d):
         d.state[k, 2] = a0 if k == 0 else a if k == 1 else a1
         d.state[k, 3] = e0 if k == 0 else e1
         _add_accelerations(i, limits, k, weight, d)
+        _add_forces(i, limits, k, weight, d)
     _add_ceilings(i, limits, t, weight, d)
     _add_flow(h, t, x0, a0, x1, a1, weight, d)
     _add_jerks(i, limits, 0, 0, weight, d)

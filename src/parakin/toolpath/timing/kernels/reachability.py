@@ -48,10 +48,10 @@ def find_controllable(i, x, after, rows, limits, lines):
         falls, rises = -half, -half
         for k in range(count):
             b = lines.tilt[k] * x
-            if lines.reach[k] - b < high:
-                high, falls = lines.reach[k] - b, -lines.tilt[k]
-            if -lines.reach[k] - b > low:
-                low, rises = -lines.reach[k] - b, -lines.tilt[k]
+            if lines.upper[k] - b < high:
+                high, falls = lines.upper[k] - b, -lines.tilt[k]
+            if -lines.lower[k] - b > low:
+                low, rises = -lines.lower[k] - b, -lines.tilt[k]
         if low <= high:
             break
         less = (low - high) / (rises - falls)
@@ -69,8 +69,8 @@ def find_acceleration(i, x, after, most, rows, limits, lines):
     high, low = min(most, (after - x) * half), -x * half
     for k in range(count):
         b = lines.tilt[k] * x
-        high = min(high, lines.reach[k] - b)
-        low = max(low, -lines.reach[k] - b)
+        high = min(high, lines.upper[k] - b)
+        low = max(low, -lines.lower[k] - b)
     return max(high, low)
 
 
@@ -81,7 +81,7 @@ def compute_controllable(rows, limits, ceiling, controllable, start, stop):
     rows : :class:`~.splines.JointRows`; limits : :class:`AccelerationLimits`
     ceiling : (rows,) of x, 0 where the motion stops; controllable : (rows,) becomes the result
     """
-    lines = allocate_lines(limits)
+    lines = allocate_lines(rows, limits)
     controllable[stop] = 0.0
     for i in range(stop - 1, start - 1, -1):
         controllable[i] = 0.0
@@ -92,7 +92,7 @@ def compute_controllable(rows, limits, ceiling, controllable, start, stop):
 @njit(nogil=True, cache=True, error_model="numpy")
 def compute_reachable(rows, limits, controllable, x, u, start, stop):
     """Find the quickest trajectory, x (rows,) from 0 at row ``start`` on, and u (steps,) (forward pass)."""
-    lines = allocate_lines(limits)
+    lines = allocate_lines(rows, limits)
     x[start] = 0.0
     for i in range(start, stop):
         h = rows.step[i]
@@ -108,7 +108,7 @@ def find_switches(rows, limits, ceilings, x, switches, start, stop):
 
     ceilings : :class:`~.speed_ceilings.StepCeilings` of x; switches : :class:`Switches`, overwritten
     """
-    lines = allocate_lines(limits)
+    lines = allocate_lines(rows, limits)
     total = 0.0
     for i in range(start, stop):
         switches.rise_end[i] = switches.fall_start[i] = 0.0
@@ -118,8 +118,8 @@ def find_switches(rows, limits, ceilings, x, switches, start, stop):
         count, _ = bound_acceleration(i, rows, limits, lines)
         high, low = np.inf, -np.inf
         for k in range(count):
-            high = min(high, lines.reach[k] - lines.tilt[k] * here)
-            low = max(low, -lines.reach[k] - lines.tilt[k] * here)
+            high = min(high, lines.upper[k] - lines.tilt[k] * here)
+            low = max(low, -lines.lower[k] - lines.tilt[k] * here)
         if not (0.0 < high < np.inf and -np.inf < low < 0.0):
             continue
         # here + 2·high·r meets after - 2·low·(h - r) at the apex, or the ceiling before it

@@ -14,18 +14,36 @@ from ....arrays import Array, Indices
 from ....kernels.compiling import njit
 
 
+class ForceRows(NamedTuple):
+    """Bounds of the drives' forces at n rows: along·s̈ + across·ṡ² ≤ 1 for each of c, linear in s between rows.
+
+    drive : (c,) the drive whose force it bounds, one way; along, across : (n, c)
+    """
+
+    drive: Indices
+    along: Array
+    across: Array
+
+
+def make_unforced_rows(rows: int) -> ForceRows:
+    """Make the bounds of rows whose drives may give any force."""
+    return ForceRows(np.empty(0, np.int64), np.empty((rows, 0)), np.empty((rows, 0)))
+
+
 class JointRows(NamedTuple):
     """The rows of a joint path over its length s: cubic splines of n rows, and what the feed allows.
 
     step : (n - 1,) mm of s from row to row, 0 between two stretches
     joints, curvature : (n, joints) and their second derivatives by s
     feed_ceiling : (n - 1,) the greatest ṡ² that the feed allows over each step
+    forces : what the drives' forces allow
     """
 
     step: Array
     joints: Array
     curvature: Array
     feed_ceiling: Array
+    forces: ForceRows
 
 
 class PathState(NamedTuple):

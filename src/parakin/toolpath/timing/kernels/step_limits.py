@@ -21,6 +21,7 @@ class StepLimits(NamedTuple):
     step : (steps,) mm; slope : (steps, joints) q' at each step's start; curvature : (rows, joints) q''
     ceiling_start, ceiling_end : (steps,) of x; between them it goes straight
     per_acceleration, per_jerk : (joints,) the reciprocals of the limits
+    along, across : (rows, c) bounds of the drives' forces, as of :class:`~.splines.ForceRows`
     tightening : (steps,) the factor in time by which the limits of each step are tightened, 1 or more
     """
 
@@ -31,6 +32,8 @@ class StepLimits(NamedTuple):
     ceiling_end: Array
     per_acceleration: Array
     per_jerk: Array
+    along: Array
+    across: Array
     tightening: Array
 
 
@@ -59,7 +62,8 @@ def join_step(h, x0, a0, x1, a1):
 def _use_limits(i, limits, x0, a0, x1, a1):
     """Measure a step: its time, the greatest fraction c of a ceiling, of an acceleration and of a jerk, and a product.
 
-    The product is that of 1 - c² for all of them. The time is negative where the rows can't be joined.
+    The product is that of 1 - c² for all of them, and of 1 - c for forces, which count as accelerations. The time is
+    negative where the rows can't be joined.
     """
     h = limits.step[i]
     t, v, a, e0, e1, o = join_step(h, x0, a0, x1, a1)
@@ -101,12 +105,20 @@ def _use_limits(i, limits, x0, a0, x1, a1):
             c3 = abs(slope1 * e1 + v1 * (3.0 * bend1 * a1 + third * x1)) * w
             of_jerk = max(of_jerk, max(c0, c1), max(c2, c3))
             product *= (1.0 - c0 * c0) * (1.0 - c1 * c1) * (1.0 - c2 * c2) * (1.0 - c3 * c3)
+    share, w = o / h, tight**2
+    for k in range(limits.along.shape[1]):
+        along0, across0 = limits.along[i, k] * w, limits.across[i, k] * w
+        along1, across1 = limits.along[i + 1, k] * w, limits.across[i + 1, k] * w
+        c0, c2 = along0 * a0 + across0 * x0, along1 * a1 + across1 * x1
+        c1 = (along0 + share * (along1 - along0)) * a + (across0 + share * (across1 - across0)) * x
+        of_acceleration = max(of_acceleration, c0, c1, c2)
+        product *= (1.0 - c0) * (1.0 - c1) * (1.0 - c2)
     return t, of_ceiling, of_acceleration, of_jerk, product
 
 
 @njit(nogil=True, cache=True, error_model="numpy")
 def measure_step(i, limits, x0, a0, x1, a1):
-    """Measure a step: its time, and the product of 1 - c² for all limits, each taken by c; 0 where one is broken."""
+    """Measure a step: its time, and the product of what all limits leave; 0 where one is broken."""
     t, of_ceiling, of_acceleration, of_jerk, product = _use_limits(i, limits, x0, a0, x1, a1)
     return t, product if of_ceiling < 1.0 and of_acceleration < 1.0 and of_jerk < 1.0 else 0.0
 

@@ -22,7 +22,7 @@ class Utilisation(NamedTuple):
     kept : (pieces, 4) the fractions of a piece's ṡ, s̈ and s⃛ with which it would keep all limits, 1 where it does, and
         the factor by which it would have to be stretched
     binding : (rows,) the limit that is taken most of where each row is passed: 0 the feed, 1 + j the speed of joint j,
-        1 + m + j its acceleration, 1 + 2m + j its jerk, of m joints
+        1 + m + j its acceleration, 1 + 2m + j its jerk, 1 + 3m + j its drive's force, of m joints
     changed : (steps,) where pieces have to be measured; for the others ``kept`` and ``binding`` hold
     """
 
@@ -35,9 +35,9 @@ class _PlaceUtilisation(NamedTuple):
     """Utilisation at k places.
 
     motion : (k, 4) mm after the row, ṡ, s̈ and s⃛
-    greatest, joint : (k, 3) of a speed, an acceleration and a jerk, and the joint whose it is
-    causes : (k, 5) the greatest ones of an acceleration whose greater part is from s̈, and from ṡ; and of a jerk whose
-        greatest part is from s⃛, from ṡ with s̈, and from ṡ alone
+    greatest, joint : (k, 4) of a speed, an acceleration, a jerk and a force, and the joint whose it is
+    causes : (k, 5) the greatest ones of an acceleration or a force whose greater part is from s̈, and from ṡ; and of a
+        jerk whose greatest part is from s⃛, from ṡ with s̈, and from ṡ alone
     """
 
     motion: Array
@@ -75,6 +75,24 @@ def _measure_places(step, rows, limits, places):
                 greatest[k, 2], joint[k, 2] = used, j
             cause = 2 if abs(along) > abs(both + across) else 3 if abs(both) > abs(across) else 4
             causes[k, cause] = max(causes[k, cause], used)
+    _measure_forces(step, rows, places)
+
+
+@njit(nogil=True, cache=True, error_model="numpy")
+def _measure_forces(step, rows, places):
+    """Measure the utilisation of the drives' forces at each place on a step."""
+    forces, h = rows.forces, rows.step[step]
+    for c in range(len(forces.drive)):
+        along0, across0 = forces.along[step, c], forces.across[step, c]
+        for k in range(len(places.motion)):
+            share, v, a = places.motion[k, 0] / h, places.motion[k, 1], places.motion[k, 2]
+            along = (along0 + share * (forces.along[step + 1, c] - along0)) * a
+            across = (across0 + share * (forces.across[step + 1, c] - across0)) * v * v
+            used = along + across
+            if used > places.greatest[k, 3]:
+                places.greatest[k, 3], places.joint[k, 3] = used, forces.drive[c]
+            cause = 0 if abs(along) > abs(across) else 1
+            places.causes[k, cause] = max(places.causes[k, cause], used)
 
 
 @njit(nogil=True, cache=True, error_model="numpy")
@@ -88,6 +106,8 @@ def _find_binding(k, feed_use, places, joints):
         stretch, limit = np.sqrt(greatest[k, 1]), 1 + joints + joint[k, 1]
     if greatest[k, 2] > stretch**3:
         stretch, limit = np.cbrt(greatest[k, 2]), 1 + 2 * joints + joint[k, 2]
+    if greatest[k, 3] > stretch**2:
+        stretch, limit = np.sqrt(greatest[k, 3]), 1 + 3 * joints + joint[k, 3]
     return stretch, limit
 
 
@@ -129,7 +149,7 @@ def measure_utilisation(rows, limits, profile, use, count, first, last):
     """
     row, kept, binding = profile.row, use.kept, use.binding
     places = _PlaceUtilisation(
-        np.empty((count, 4)), np.empty((count, 3)), np.empty((count, 3), np.int64), np.empty((count, 5))
+        np.empty((count, 4)), np.empty((count, 4)), np.empty((count, 4), np.int64), np.empty((count, 5))
     )
     joints, worst, before = rows.joints.shape[1], 0.0, 0.0
     for p in range(first, last):

@@ -5,7 +5,7 @@ It is what simulators of mechanisms take. All stands as at home; lengths are mm,
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from math import inf
@@ -13,19 +13,17 @@ from typing import Literal
 
 import numpy as np
 
-from ...arrays import Array
-from ...machine import Machine
-from ...model.chain import UNIT, compose_chain
-from ...model.elements import ROTATIONS, Drive, PlaneConstraint, RodConstraint, Step
-from ...model.structures import PlatformPlacement
-from .scene import Points, order_polygon
+from ..arrays import Array
+from ..machine import Machine
+from ..model.chain import UNIT, compose_chain
+from ..model.elements import ROTATIONS, BodyBuild, Drive, PlaneConstraint, RodConstraint, Step
+from ..model.structures import PlatformPlacement
+from .polygon import Points, order_polygon
 
 WORLD = "world"
 BASE = "base"
 PLATFORM: str = "platform"
 
-# Densities of what is drawn, kg/m³: rods and carriages of steel, what they carry of aluminium.
-DENSITIES = {"rod": 7850.0, "carriage": 7850.0, "platform": 2700.0, "head": 2700.0, "table": 2700.0}
 METRE = 1e-3  # of a millimetre: simulators count in metres
 
 _NEAR = 1e-9  # mm; a body that ends nearer to its joint than this is a ball
@@ -82,12 +80,16 @@ class Multibody:
 
     frames : body, rotation and origin in it, of ``tool`` and ``workpiece``
     drives : names of the joints that are driven, in the order of the joint vector
+    builds : what bodies of a kind are made of, as far as it is stated
+    size : a length that thicknesses follow, mm: the diagonal of the box about all bars at home
     """
 
     bodies: tuple[Body, ...]
     loops: tuple[Loop, ...]
     frames: dict[str, tuple[str, Array, Points]]
     drives: tuple[str, ...]
+    size: float
+    builds: Mapping[str, BodyBuild]
 
 
 def build_multibody(machine: Machine) -> Multibody:
@@ -121,7 +123,23 @@ def build_multibody(machine: Machine) -> Multibody:
         bodies.append(body)
         loops.append(loop)
     frames = {"tool": tool, "workpiece": workpiece}
-    return Multibody((*bodies, *head, *table), tuple(loops), frames, machine.joints)
+    every = (*bodies, *head, *table)
+    return Multibody(every, tuple(loops), frames, machine.joints, _measure_size(every), machine.bodies)
+
+
+def place_bodies(bodies: Sequence[Body]) -> dict[str, tuple[Array, Points]]:
+    """Find rotation and origin of bodies in the machine's frame at home, by their names."""
+    placed: dict[str, tuple[Array, Points]] = {WORLD: (np.eye(3), np.zeros(3))}
+    for body in bodies:
+        rotation, origin = placed[body.carrier]
+        placed[body.name] = (rotation @ body.rotation, rotation @ body.origin + origin)
+    return placed
+
+
+def _measure_size(bodies: Sequence[Body]) -> float:
+    placed = place_bodies(bodies)
+    points = [bar @ placed[body.name][0].T + placed[body.name][1] for body in bodies for bar in body.bars]
+    return float(np.linalg.norm(np.ptp(np.vstack(points), axis=0)))
 
 
 def _build_platform(machine: Machine, placement: PlatformPlacement, head: Points) -> Body:

@@ -1,0 +1,195 @@
+"""Inverse dynamics: the drives' forces for a motion, by virtual work over all bodies.
+
+With z = (y, q) of the motion's coordinates y and the joints q the closures f(z) = 0 give y' = G q' and
+y'' = G q'' - F⁻¹ γ, where F = ∂f/∂y, G = -F⁻¹ ∂f/∂q, and γ is the second derivative of f along z'. Each body's
+weighted vectors v (:mod:`.inertia_vectors`) give Q = Σ w (∂v/∂z)ᵀ (v'' - g); the drives' forces are Q_q + Gᵀ Q_y.
+All derivatives are the traces' own.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from ..algebra import Scalar, Term, Trace, derivative
+from ..arrays import Array
+from ..families.family import solve_each
+from ..kernels.batch import evaluate_tape
+from ..kernels.tape import Tape, compile_tape
+from ..machine import Machine
+from .inertia_vectors import WeightedVector, list_weighted_vectors
+
+GRAVITY = 9806.65  # mm/s², along -Z of the machine's frame
+_NEWTON = 1e-3  # of kg mm/s²
+WATT = 1e-3  # of N mm/s
+
+
+class Motion(NamedTuple):
+    """A machine in motion, at N times.
+
+    poses : (N, axes) mm, rad
+    joints, speeds, accelerations : (N, joints) mm, rad and seconds
+    """
+
+    poses: Array
+    joints: Array
+    speeds: Array
+    accelerations: Array
+
+
+class PathForces(NamedTuple):
+    """The drives' forces along a path by its length s: inertia·s̈ + centrifugal·ṡ² + weight; (N, joints) each.
+
+    Per mm/s², per mm²/s², and N or Nmm.
+    """
+
+    inertia: Array
+    centrifugal: Array
+    weight: Array
+
+
+class Dynamics:
+    """A machine's equations of motion, for batches; forces are N along a joint, Nmm about one.
+
+    Raises :class:`NoMethodError` where a leg's kind tells nothing of its bodies.
+    """
+
+    def __init__(self, machine: Machine):
+        self.machine = machine
+        self._equations = machine.trace_equations({})
+        self._rotors = np.array([drive.inertia for drive in machine.drives])
+        self._coordinates = len(machine.structure.coordinates)
+        self._width = self._coordinates + len(machine.joints)
+        self._tapes = {
+            name: self._compile(blocks, trace_outputs)
+            for name, blocks, trace_outputs in (
+                ("slopes", 1, self._trace_slopes),
+                ("bends", 2, self._trace_bends),
+                ("forces", 3, self._trace_forces),
+                ("tip", 1, self._trace_tip),
+            )
+        }
+        axes = len(machine.axes)
+        trace = Trace()
+        placed = machine.structure.place_with_joints(
+            trace.inputs(axes), self._equations.list_serial(trace.inputs(len(machine.joints), axes))
+        )
+        self._begin = compile_tape(trace, placed.coordinates, axes + len(machine.joints))
+
+    def __repr__(self) -> str:
+        return f"<parakin dynamics of {self.machine.name}>"
+
+    # Tapes: inputs are z, then z', then z'' and the gravity.
+
+    def _compile(self, blocks: int, trace_outputs: Callable[[Trace], Sequence[Scalar]]) -> Tape:
+        trace = Trace()
+        return compile_tape(trace, trace_outputs(trace), blocks * self._width + (blocks == 3))
+
+    def _block(self, trace: Trace, number: int = 0) -> list[Term]:
+        return trace.inputs(self._width, number * self._width)
+
+    def _trace_closures(self, trace: Trace) -> list[Scalar]:
+        z, n = self._block(trace), self._coordinates
+        return self._equations.scaled_closures(z[:n], z[n:])
+
+    def _trace_slopes(self, trace: Trace) -> list[Scalar]:
+        return [derivative(f, z) for f in self._trace_closures(trace) for z in self._block(trace)]
+
+    def _trace_bends(self, trace: Trace) -> list[Scalar]:
+        z, rates = self._block(trace), self._block(trace, 1)
+        return [_differentiate_along(_differentiate_along(f, z, rates), z, rates) for f in self._trace_closures(trace)]
+
+    def _trace_forces(self, trace: Trace) -> list[Scalar]:
+        z, rates, bends = (self._block(trace, number) for number in range(3))
+        gravity, n = trace.input(3 * self._width), self._coordinates
+        totals: list[Scalar] = [0.0] * self._width
+        for weighted in list_weighted_vectors(self.machine, self._equations, z[:n], z[n:]):
+            _add_forces(weighted, (z, rates, bends), gravity, totals)
+        return totals
+
+    def _trace_tip(self, trace: Trace) -> list[Scalar]:
+        z, n = self._block(trace), self._coordinates
+        pose = self._equations.structure.pose(z[:n], self._equations.list_serial(z[n:]))
+        tip = [x for x, axis in zip(pose, self.machine.axes, strict=True) if axis in "XYZ"]
+        return [derivative(x, one) for x in tip for one in z]
+
+    # Batches.
+
+    def _evaluate(self, name: str, inputs: Array) -> Array:
+        tape = self._tapes[name]
+        return evaluate_tape(tape, np.ascontiguousarray(inputs), np.empty((len(inputs), tape.outputs)))
+
+    def _place(self, poses: Array, joints: Array) -> tuple[Array, Array, Array]:
+        """Find z (N, z), F (N, n, n) and G (N, n, joints)."""
+        n = self._coordinates
+        coordinates = evaluate_tape(self._begin, poses, np.empty((len(poses), n)), joints)
+        z = np.hstack([coordinates, joints])
+        slopes = self._evaluate("slopes", z).reshape(len(z), n, self._width)
+        matrices = np.ascontiguousarray(slopes[:, :, :n])
+        return z, matrices, -solve_each(matrices, slopes[:, :, n:])
+
+    def _compute(self, placed: tuple[Array, Array, Array], motion: tuple[Array, Array], gravity: float) -> Array:
+        z, matrices, ways = placed
+        speeds, accelerations = motion
+        n = self._coordinates
+        rates = np.hstack([_apply_each(ways, speeds), speeds])
+        bends = self._evaluate("bends", np.hstack([z, rates]))
+        own = _apply_each(ways, accelerations) - solve_each(matrices, bends[:, :, None])[:, :, 0]
+        state = np.hstack([z, rates, own, accelerations, np.full((len(z), 1), gravity)])
+        forces = self._evaluate("forces", state)
+        by_motion = _NEWTON * (forces[:, n:] + np.einsum("nij,ni->nj", ways, forces[:, :n]))
+        return np.asarray(by_motion + self._rotors * accelerations)
+
+    def compute_forces(self, motion: Motion, force: Array | None = None) -> Array:
+        """Compute the drives' forces, (N, joints); NaN where a pose is out of reach or singular.
+
+        force : (translations,) or (N, translations), N: what acts on the tool's tip, along the pose's axes
+        """
+        placed = self._place(motion.poses, motion.joints)
+        result = self._compute(placed, (motion.speeds, motion.accelerations), GRAVITY)
+        if force is not None:
+            z, _, ways = placed
+            n = self._coordinates
+            rates = self._evaluate("tip", z).reshape(len(z), -1, self._width)
+            whole = rates[:, :, n:] + rates[:, :, :n] @ ways
+            result -= np.einsum("nij,ni->nj", whole, np.broadcast_to(force, whole.shape[:2]))
+        return result
+
+    def compute_path_forces(self, poses: Array, joints: Array, slopes: Array, bends: Array) -> PathForces:
+        """Compute the drives' forces along a path, from the joints' first and second derivatives by its length."""
+        placed, still = self._place(poses, joints), np.zeros_like(joints)
+        return PathForces(
+            self._compute(placed, (still, slopes), 0.0),
+            self._compute(placed, (slopes, bends), 0.0),
+            self._compute(placed, (still, still), GRAVITY),
+        )
+
+
+def _differentiate_along(y: Scalar, z: Sequence[Term], rates: Sequence[Scalar]) -> Scalar:
+    """Differentiate a trace along rates of its inputs."""
+    total: Scalar = 0.0
+    for one, rate in zip(z, rates, strict=True):
+        total = derivative(y, one) * rate + total
+    return total
+
+
+def _add_forces(
+    weighted: WeightedVector, states: tuple[list[Term], list[Term], list[Term]], gravity: Term, totals: list[Scalar]
+) -> None:
+    """Add a vector's w (∂v/∂z)ᵀ (v'' - g) to the totals."""
+    z, rates, bends = states
+    for number, component in enumerate(weighted.vector):
+        slopes = [derivative(component, one) for one in z]
+        along = _differentiate_along(component, z, rates)
+        second = _differentiate_along(along, z, rates) + _differentiate_along(component, z, bends)
+        if weighted.falls and number == 2:
+            second = gravity + second
+        for i, slope in enumerate(slopes):
+            if isinstance(slope, Term) or slope != 0.0:
+                totals[i] = weighted.weight * (slope * second) + totals[i]
+
+
+def _apply_each(matrices: Array, vectors: Array) -> Array:
+    return np.asarray(np.einsum("nij,nj->ni", matrices, vectors))

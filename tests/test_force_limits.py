@@ -1,0 +1,166 @@
+"""Drives' forces as a limit of the feed, against toppra's; and the keys of machine files that say them."""
+
+import logging
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import parakin as pk
+from parakin.cli import main
+from parakin.dynamics.inverse_dynamics import Dynamics, Motion
+from parakin.dynamics.masses import sum_masses
+
+MACHINE = """name: heavy
+source: Sizes were chosen.
+motion: tx ty tz
+legs:
+  kind: slider
+  joints: [x, y, z]
+  foot: [[0, -50 mm, 0], [0, 0, 0], [0, 0, 0]]
+  rail: [[1, 0, 0], [0, 1, 0], [0, 0, 1]]
+  rod: 300 mm
+  platform: [[0, -50 mm, 0], [0, 0, 0], [0, 0, 0]]
+  range: [-500 mm, 500 mm]
+  speed: 60 m/min
+  acceleration: 10 m/s2
+  force: [1.2 kN, 1 kN, 1.8 kN]
+  rated: 1 kN
+  power: 2 kW
+  inertia: 30 kg
+  stiffness: 100 N/um
+bodies:
+  rod: {diameter: 30 mm, wall: 4 mm, rods: 2, modulus: 210 GPa}
+  carriage: {mass: 25 kg}
+  platform: {mass: 80 kg}
+home: {X: 0 mm, Y: 0 mm, Z: 0 mm}
+"""
+PART = """UNITS/MM
+FEDRAT/9000,MMPM
+RAPID
+GOTO/-60,-40,30
+GOTO/-60,-40,-20
+GOTO/60,-40,-20
+GOTO/60,40,-20
+RAPID
+GOTO/-60,-40,30
+FINI
+"""
+
+
+def load(folder, *changes):
+    text = MACHINE
+    for old, new in changes:
+        assert old in text
+        text = text.replace(old, new)
+    path = folder / "heavy.yaml"
+    path.write_text(text, encoding="utf-8")
+    return pk.load(path)
+
+
+def prepare(folder, machine, part=PART):
+    path = folder / "part.apt"
+    path.write_text(part, encoding="utf-8")
+    return pk.prepare(machine, pk.read_path(path))
+
+
+def test_as_quick_as_toppra(tmp_path):
+    """One rapid motion at the limits of forces that weight, inertia and centrifugal forces take."""
+    toppra = pytest.importorskip("toppra")
+    logging.getLogger("toppra").setLevel(logging.ERROR)
+    machine = load(tmp_path)
+    job = prepare(tmp_path, machine, "UNITS/MM\nRAPID\nGOTO/-120,-80,60\nRAPID\nGOTO/120,90,-50\nFINI\n")
+    rows = job.trajectory.joint_path
+    s = np.append(0.0, np.cumsum(rows.step))
+    dynamics, drives = Dynamics(machine), machine.drives
+
+    def ask(q, speeds, accelerations):
+        pose = machine.forward(q).poses
+        return dynamics.compute_forces(Motion(*(row[None] for row in (pose, q, speeds, accelerations))))[0]
+
+    forces = np.array([drive.force for drive in drives])
+    constraints = [
+        toppra.constraint.JointVelocityConstraint(np.array([[-d.speed, d.speed] for d in drives])),
+        toppra.constraint.JointAccelerationConstraint(np.array([[-d.acceleration, d.acceleration] for d in drives])),
+        toppra.constraint.JointTorqueConstraint(ask, np.column_stack([-forces, forces]), np.zeros(len(drives))),
+    ]
+    path = toppra.SplineInterpolator(s, rows.joints, bc_type="natural")
+    theirs = toppra.algorithm.TOPPRA(constraints, path, gridpoints=s[::2], solver_wrapper="seidel").compute_trajectory()
+    assert job.seconds == pytest.approx(theirs.duration, rel=2e-3)
+    used = pk.compute_drive_forces(job.trajectory).force_use
+    assert used.max() == pytest.approx(1.0, abs=1e-3)
+    assert any(name.endswith(".force") for name in job.trajectory.binding_fractions)
+
+
+@pytest.mark.parametrize("jerk", ["", "\n  jerk: 200 m/s3"])
+def test_the_feed_keeps_the_forces(jerk, tmp_path):
+    strong = load(tmp_path, ("m/s2", f"m/s2{jerk}"), ("[1.2 kN, 1 kN, 1.8 kN]", "9 kN"))
+    weak = load(tmp_path, ("m/s2", f"m/s2{jerk}"), ("[1.2 kN, 1 kN, 1.8 kN]", "[0.7 kN, 0.6 kN, 1.6 kN]"))
+    quick, slow = prepare(tmp_path, strong), prepare(tmp_path, weak)
+    assert quick.runs and slow.runs
+    peaks = pk.compute_drive_forces(quick.trajectory).peaks
+    assert (peaks > [700.0, 600.0, 1600.0]).all()
+    used = pk.compute_drive_forces(slow.trajectory).force_use
+    assert (used < 1.001).all()
+    assert (used > 0.99).all()
+    assert slow.seconds > quick.seconds
+    fractions = slow.trajectory.binding_fractions
+    assert {"x.force", "y.force", "z.force"} <= set(fractions)
+    assert not any(name.endswith(".force") for name in quick.trajectory.binding_fractions)
+
+
+def test_a_weight_that_no_drive_holds_is_said(tmp_path, capsys):
+    job = prepare(tmp_path, load(tmp_path, ("[1.2 kN, 1 kN, 1.8 kN]", "[1.2 kN, 1 kN, 0.9 kN]")))
+    assert not job.runs
+    assert "z can't hold the weight: its force is too small" in job.unplanned
+    assert main(["forces", str(tmp_path / "heavy.yaml"), str(tmp_path / "part.apt")]) == 3
+    said = capsys.readouterr()
+    assert not said.out
+    assert "z can't hold the weight" in said.err
+
+
+def test_the_command_tells_what_is_too_much(tmp_path, capsys):
+    load(tmp_path, ("rated: 1 kN", "rated: 0.9 kN"))
+    (tmp_path / "part.apt").write_text(PART, encoding="utf-8")
+    assert main(["forces", str(tmp_path / "heavy.yaml"), str(tmp_path / "part.apt")]) == 3
+    said = capsys.readouterr().out
+    assert "of 900 N" in said
+    assert "more than the drives can: z" in said
+    assert "as thick as drawn" not in said
+
+
+def test_what_the_file_says_is_kept_to_the_last_bit(tmp_path):
+    machine = load(tmp_path)
+    again = tmp_path / "again.yaml"
+    again.write_text(machine.format_yaml(), encoding="utf-8")
+    copy = pk.load(again)
+    assert copy.drives == machine.drives
+    assert copy.bodies == machine.bodies
+
+
+def test_masses_follow_what_the_file_says(tmp_path):
+    masses = sum_masses(load(tmp_path))
+    tube = np.pi * (15.0**2 - 11.0**2) * 300.0 + 4.0 / 3.0 * np.pi * 15.0**3  # with the balls at its ends
+    assert masses == pytest.approx({"platform": 80.0, "carriage": 75.0, "rod": 3 * 2 * 7850e-9 * tube})
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("power: 2 kW", "power: 2 kN", ':16: power: "2 kN" is a force, expected a power (W, kW)'),
+        ("rated: 1 kN", "rated: 1", ':15: rated: "1" needs a unit: N, kN'),
+        ("inertia: 30 kg", "inertia: 1 kg m2", "is a moment of inertia, expected a mass"),
+        ("rated: 1 kN", "rated: -1 kN", "is out of range, expected more than 0 (N, kN)"),
+        ("wall: 4 mm", "wall: 16 mm", "expected a diameter of at least twice as much"),
+        ("rods: 2", "rods: 2.5", "a whole number from 1 to 9 expected"),
+        ("carriage:", "cariage:", 'unknown key "cariage" in bodies'),
+        ("80 kg", "80 mm", 'mass: "80 mm" is a length, expected a mass (kg, g, t)'),
+    ],
+)
+def test_bad_keys_are_refused_in_one_line(old, new, message, tmp_path, capsys):
+    (tmp_path / "heavy.yaml").write_text(MACHINE.replace(old, new), encoding="utf-8")
+    assert main(["show", str(tmp_path / "heavy.yaml")]) == 2
+    said = capsys.readouterr().err
+    assert said.count("\n") == 1
+    assert message in said
+    assert Path(said.split(":", 1)[0]).name == "heavy.yaml"

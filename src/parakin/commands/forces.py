@@ -72,12 +72,7 @@ def forces(
         A figure to write, .png, .pdf or .svg: the same as curves.
     """
     machine = load_machine(name, sizes)
-    if output is not None and output.suffix.lower() not in _FIGURES:
-        raise InputError(f"{quote(output)}: expected a file name that ends in .png, .pdf or .svg", "--output")
-    if csv is not None and csv.suffix.lower() != ".csv":
-        raise InputError(f"{quote(csv)}: expected a file name that ends in .csv", "--csv")
-    if not arc_tolerance > 0.0:
-        raise InputError("expected a length above zero, in mm", "--arc-tolerance")
+    _check_options(output, csv, arc_tolerance)
     acting, placed = parse_force(machine, force), None if workpiece is None else parse_workpiece(workpiece)
     length = parse_tool_length(tool_length, tools)
     announce_compiling()
@@ -93,9 +88,8 @@ def forces(
         saying = progress.stage("checking and timing", 0.1, 0.9)
         job = prepare(machine, path, workpiece=placed, mode=mode, corners=corners, progress=saying)
     if job.trajectory is None or job.posted.first is not None:
-        print_remark(
-            f"{part}: {'off limits' if job.posted.first is not None else job.unplanned}; parakin post tells more"
-        )
+        reason = job.unplanned if job.posted.first is None else "off limits"
+        print_remark(f"{part}: {reason}; parakin post tells more")
         return OFF_LIMITS
     result = compute_drive_forces(job.trajectory, acting)
     files = _write(result, csv, output)
@@ -104,9 +98,17 @@ def forces(
 
         print_json(encode_drive_forces(result, files))
     else:
-        told = [f"{kind}  {path}" for kind, path in files.items()]
-        print_text("\n".join([_format_forces(result), *told]))
+        print_text("\n".join([_format_forces(result), *(f"{kind}  {path}" for kind, path in files.items())]))
     return OFF_LIMITS if result.overloaded else 0
+
+
+def _check_options(output: Path | None, csv: Path | None, arc_tolerance: float) -> None:
+    if output is not None and output.suffix.lower() not in _FIGURES:
+        raise InputError(f"{quote(output)}: expected a file name that ends in .png, .pdf or .svg", "--output")
+    if csv is not None and csv.suffix.lower() != ".csv":
+        raise InputError(f"{quote(csv)}: expected a file name that ends in .csv", "--csv")
+    if not arc_tolerance > 0.0:
+        raise InputError("expected a length above zero, in mm", "--arc-tolerance")
 
 
 def _write(result: DriveForces, csv: Path | None, output: Path | None) -> dict[str, str]:

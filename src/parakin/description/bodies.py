@@ -40,12 +40,12 @@ class _BodySection(FileSection):
         return BodyBuild(**(given | {"rods": int(given.get("rods", 1))}))
 
 
-class _RodSection(_BodySection):
+class _BarSection(_BodySection):
     modulus: _Modulus | None = None
     rods: _Count = 1.0
 
     @model_validator(mode="after")
-    def _check_count(self) -> _RodSection:
+    def _check_count(self) -> _BarSection:
         if self.rods != int(self.rods):
             raise ValueError("rods: a whole number from 1 to 9 expected")
         return self
@@ -56,7 +56,7 @@ class BodiesSection(FileSection):
 
     where: ClassVar[str] = " in bodies"
 
-    rod: _RodSection | None = None
+    rod: _BarSection | None = None
     carriage: _BodySection | None = None
     platform: _BodySection | None = None
     head: _BodySection | None = None

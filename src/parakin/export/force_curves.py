@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..arguments import check_arguments
 from .colours import FAINT, INK
 from .figure_file import render_figure
 
@@ -20,6 +21,7 @@ _WIDTH, _ROW, _REST = 9.0, 1.9, 1.5  # inches
 _STRETCHES = 2000  # along the time: of each the least and the greatest are drawn
 
 
+@check_arguments
 def render_drive_forces(result: DriveForces, suffix: str = ".png") -> bytes:
     """Render the forces of drives along and about their joints, and all powers, over the time.
 

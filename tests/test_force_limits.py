@@ -144,6 +144,16 @@ def test_masses_follow_what_the_file_says(tmp_path):
     assert masses == pytest.approx({"platform": 80.0, "carriage": 75.0, "rod": 3 * 2 * 7850e-9 * tube})
 
 
+def test_stiffness_is_what_the_file_says(tmp_path):
+    machine = load(tmp_path)
+    poses = [[0.0, 0.0, 0.0], [60.0, -30.0, 20.0]]
+    stated = pk.analyse_stiffness(machine, poses=poses)
+    rods = {"diameter": "30 mm", "wall": "4 mm", "rods": "2", "modulus": "210 GPa"}
+    given = pk.analyse_stiffness(machine, "100 N/um", rods, poses)
+    assert stated.compliances == pytest.approx(given.compliances, rel=1e-12)
+    assert stated.drive_share.max() < 1.0
+
+
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [

@@ -240,7 +240,7 @@ def test_along_a_posted_path(tmp_path, capsys, monkeypatch):
         ("orthoglide", ["--drives", "1N/um", "--along", "B", "-o", "x.png"], '--along: "B", expected one of X Y Z'),
         ("orthoglide", ["--drives", "1N/um", "-o", "x.pdf"], "expected a file name that ends in .png"),
         ("orthoglide", ["--drives", "1N/um", "--samples", "0"], "samples: a number from 1"),
-        ("orthoglide", [], "--drives"),
+        ("orthoglide", [], "drives: the machine's file says no stiffness of rho_x"),
     ],
 )
 def test_what_is_mistaken_is_said_in_one_line(name, words, message, capsys):

@@ -26,7 +26,7 @@ def stiffness(
     name: Name,
     /,
     *,
-    drives: Annotated[list[str], Parameter(negative="")],
+    drives: Annotated[list[str] | None, Parameter(negative="")] = None,
     struts: str | None = None,
     force: Annotated[str | None, Parameter(allow_leading_hyphen=True)] = None,
     along: str | None = None,
@@ -46,10 +46,11 @@ def stiffness(
         A shipped machine's name or a YAML file.
     drives
         The stiffness of the drives along or about their joints, with slides and motors: 100N/um,200kNm/rad, or by their
-        names and patterns, d*=100N/um,theta*=200kNm/rad; rigid is one. May be given again.
+        names and patterns, d*=100N/um,theta*=200kNm/rad; rigid is one. May be given again. By default as the
+        machine's file says.
     struts
         The section of the struts: diameter=40mm,wall=5mm,modulus=210GPa,rods=2; or how stiff each rod is along
-        itself: 300N/um. Without it they are rigid.
+        itself: 300N/um. By default as the machine's file says, else they are rigid.
     force
         A force on the tip, whose deflection is told: X=-200N,Z=-1kN.
     along
@@ -67,7 +68,7 @@ def stiffness(
     if along is not None and (force is not None or output is None or csv is not None):
         raise InputError("goes with a map, --output, and without --force", "--along")
     _check_output(output, ".png" if csv is None else ".csv")
-    of_drives = split_words(drives, "--drives") if any("=" in text for text in drives) else ",".join(drives)
+    of_drives = _read_drives(drives)
     of_struts = split_words([struts], "--struts") if struts is not None and "=" in struts else struts
     wanted = parse_force(machine, force)
     direction = None if along is None else _name_direction(machine, along)
@@ -90,6 +91,12 @@ def stiffness(
         told = [f"{kind}  {path}" for kind, path in files.items()]
         print_text("\n".join([_format_stiffness(result, wanted), *told]))
     return 0
+
+
+def _read_drives(texts: list[str] | None) -> dict[str, str] | str | None:
+    if texts is None:
+        return None
+    return split_words(texts, "--drives") if any("=" in text for text in texts) else ",".join(texts)
 
 
 def _check_output(output: Path | None, ending: str) -> None:
@@ -163,7 +170,7 @@ def _format_stiffness(result: Stiffness, force: Array | None) -> str:
         f"of the compliance the drives make {100.0 * float(np.mean(result.drive_share)):.0f} %",
     ]
     if result.springs.struts is None:
-        lines.append("the struts count as rigid, for --struts is not given")
+        lines.append("the struts count as rigid, for neither --struts nor the machine's file says more")
     if force is not None:
         sizes = np.linalg.norm(result.deflect(force)[:, : len(force)], axis=1)
         worst = int(sizes.argmax())

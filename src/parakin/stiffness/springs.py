@@ -105,13 +105,11 @@ def read_struts(struts: Mapping[str, str] | str | None) -> Struts:
     wall = _parse_length(struts["wall"], "wall") if "wall" in struts else 0.5 * outer
     if wall > 0.5 * outer:
         raise PoseError("struts: the wall is thicker than half the diameter")
-    inner = outer - 2.0 * wall
     count = struts.get("rods", "1")
     if not (count.isascii() and count.isdigit() and 1 <= int(count) <= 9):
         raise PoseError(f"struts: rods of {quote(count)}, expected 1 to 9")
     modulus = parse_stiff(struts.get("modulus", _STEEL), MODULUS, "struts: modulus")
-    area, second = pi * (outer**2 - inner**2) / 4.0, pi * (outer**4 - inner**4) / 64.0
-    return Section(int(count) * area, int(count) * second, modulus)
+    return _make_section(outer, 2.0 * wall, int(count), modulus)
 
 
 def _parse_length(text: str, word: str) -> float:
@@ -134,13 +132,41 @@ def _read_one_of(text: str, units: Mapping[str, float], name: str) -> float:
     return 0.0 if word == RIGID else 1.0 / parse_stiff(word, units, f"drives: {name}")
 
 
-def read_drives(machine: Machine, drives: Mapping[str, str] | str) -> Array:
+def _read_stated_drives(machine: Machine) -> Array:
+    """Read the compliances that the machine's file says."""
+    for drive in machine.drives:
+        if drive.stiffness is None:
+            raise PoseError(f"drives: the machine's file says no stiffness of {drive.name}, expected one here")
+    return np.array([1.0 / drive.stiffness for drive in machine.drives if drive.stiffness is not None])
+
+
+def _find_stated_section(machine: Machine) -> Section | None:
+    """Find the struts' section that the machine's file says; without one they are rigid."""
+    rod = machine.bodies.get("rod")
+    if rod is None or rod.diameter is None:
+        return None
+    modulus = parse_stiff(_STEEL, MODULUS, "modulus") if rod.modulus is None else rod.modulus
+    return _make_section(rod.diameter, rod.diameter if rod.wall is None else 2.0 * rod.wall, rod.rods, modulus)
+
+
+def _make_section(outer: float, walls: float, rods: int, modulus: float) -> Section:
+    """Make the section of round bars side by side; ``walls`` is twice the thickness of a tube's wall."""
+    inner = outer - walls
+    area, second = pi * (outer**2 - inner**2) / 4.0, pi * (outer**4 - inner**4) / 64.0
+    return Section(rods * area, rods * second, modulus)
+
+
+def read_drives(machine: Machine, drives: Mapping[str, str] | str | None) -> Array:
     """Read each drive's compliance, (joints,) mm/N or rad/Nmm: a stiffness by names and patterns, or for all.
+
+    None takes those of the machine's file.
 
     The one for all may be two, of drives along and of drives about their joints: ``100 N/um, 200 kNm/rad``.
 
     Raises :class:`PoseError` for a drive without one; ``rigid`` is one.
     """
+    if drives is None:
+        return _read_stated_drives(machine)
     if isinstance(drives, str):
         kinds = [ANGULAR if unit == "rad" else LINEAR for unit in machine.joint_units]
         return np.array([_read_one_of(drives, kind, name) for name, kind in zip(machine.joints, kinds, strict=True)])
@@ -218,13 +244,14 @@ _KINDS = {"length": _list_length, "ring": _list_length, "slider": _list_rod, "cr
 
 
 def read_springs(
-    machine: Machine, drives: Mapping[str, str] | str, struts: Mapping[str, str] | str | None
+    machine: Machine, drives: Mapping[str, str] | str | None, struts: Mapping[str, str] | str | None
 ) -> MachineSprings:
     """Read a machine's springs; see :func:`read_drives` and :func:`read_struts`.
 
     Raises :class:`PoseError`, also for struts that carry more than what their springs tell.
     """
-    springs = MachineSprings(read_drives(machine, drives), read_struts(struts))
+    own = _find_stated_section(machine) if struts is None else read_struts(struts)
+    springs = MachineSprings(read_drives(machine, drives), own)
     if springs.struts is None and not springs.drives.any():
         raise PoseError("drives: all are rigid, and so are the struts")
     for leg in machine.legs:

@@ -101,7 +101,7 @@ class Stiffness:
 @check_arguments
 def analyse_stiffness(
     machine: Machine,
-    drives: Mapping[str, str] | str,
+    drives: Mapping[str, str] | str | None = None,
     struts: Mapping[str, str] | str | None = None,
     poses: RowsLike | None = None,
     samples: int = SAMPLES,
@@ -109,9 +109,11 @@ def analyse_stiffness(
     """Analyse the tool's stiffness where drives and struts are springs, for small forces on an unloaded machine.
 
     drives : ``"100 N/um"`` for all, or by names and patterns, ``{"d*": "100 N/um", "theta*": "20 kNm/rad"}``; each
-        drive needs one, which may be ``rigid``; of slides and motors together, along or about the joint
+        drive needs one, which may be ``rigid``; of slides and motors together, along or about the joint. By default
+        what the machine's file says
     struts : each rod's stiffness along it, ``"300 N/um"``; or its section, ``{"diameter": "40 mm", "wall": "5 mm",
-        "modulus": "210 GPa", "rods": "2"}``; by default they are rigid
+        "modulus": "210 GPa", "rods": "2"}``. By default what the machine's file says of its ``rod`` bodies, else they
+        are rigid
     poses : (N, axes); by default as many as ``samples`` all over the workspace, clear of singularities
 
     By virtual work: springs that give by s move the tool by t = J s, with A J = (B, -C) of the closures' derivatives by

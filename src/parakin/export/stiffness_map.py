@@ -6,11 +6,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..arguments import check_arguments
+from ..arguments import RowsLike, check_arguments
 from .position_map import MapText, render_position_map
 
 if TYPE_CHECKING:
-    from ..arguments import RowsLike
     from ..arrays import Array
     from ..stiffness.stiffness import Stiffness
 

@@ -13,6 +13,7 @@ import re
 import shutil
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 from typing import NamedTuple
 
 import numpy as np
@@ -21,6 +22,7 @@ from random_paths import REACH, PathMaker
 
 import parakin as pk
 from parakin.controllers.linuxcnc.home_pose import find_home_pose
+from parakin.controllers.linuxcnc.knots import Knots, _drop_creeping
 
 sys.path.insert(0, str(Path(__file__).parent / "linuxcnc"))
 from planner import CYCLE, Planner, read_program
@@ -241,3 +243,21 @@ def test_linuxcnc_takes_a_turn_of_a_tool_that_hardly_moves_in_its_time(tmp_path)
     rates = np.where(moves > 0.0, moves, turns) * values[1:, 5]
     assert (rates >= 0.1).all()
     assert (moves[turns > 1e-3] > 0.0).any()
+
+
+def test_a_tip_that_crept_catches_up_gently():
+    """It stands or is as fast as LinuxCNC obeys, and never much faster than it is told; it was 16 times as fast."""
+    slowest, machine = 0.11 / 60.0, pk.load("tricept")  # mm/s
+    times = np.concatenate([np.arange(0.0, 0.16, 0.016), 0.16 + 1e-3 * np.arange(200)])
+    poses = np.tile(machine.home, (len(times), 1))
+    poses[:, 0] += 0.005 * times**2
+    poses[:, 4] = times
+    stands = np.zeros(len(times), bool)
+    trajectory = SimpleNamespace(posted=SimpleNamespace(machine=machine))
+    knots = _drop_creeping(trajectory, Knots(times, poses, stands))
+    assert len(knots.times) == len(times)
+    speeds, told = (np.diff(rows[:, 0]) / np.diff(times) for rows in (knots.poses, poses))
+    assert ((speeds == 0.0) | (speeds > 0.999 * slowest)).all()
+    assert (speeds < 1.001 * np.maximum(slowest, told + 0.25 * slowest)).all()
+    assert (np.abs(knots.poses - poses)[:, 0] < 5e-5).all()
+    assert np.abs(knots.poses - poses)[-1, 0] < slowest * 1e-3

@@ -70,6 +70,8 @@ FAMILIES = {  # motion, leg kinds to draw from
     "central": ("rx ry tz", SINGLE),
     "other central": ("ry rx tz", SINGLE),
     "rolling": ("rz ry rz tz", SINGLE),
+    "led": ("rz ry rz tz", SINGLE),
+    "led tripod": ("ry rx tz", SINGLE),
     "rings": ("tx ty tz rx ry", ["ring"]),
     "other rings": ("tx ty tz ry rx", ["ring"]),
 }
@@ -135,7 +137,7 @@ def _two_turns(rng, family):
         if where == 1:
             return [tool], [fixed("tz"), driven(second, "h2"), fixed("tx"), fixed("ry"), driven(first, "h1")]
         return [driven("ry", "h1"), fixed("tx"), tool], [fixed("ty"), driven("rx", "h2"), fixed("tz")]
-    if "rings" in family:
+    if "rings" in family or "led" in family.split():
         return [tool], []
     if family == "rolling":
         return [tool, driven(rng.choice(["rx", "ry"]), "h1"), tool], []
@@ -165,7 +167,7 @@ def draw(family, seed, count=40):
     frame = np.broadcast_to(np.eye(4), (count + 1, 4, 4))
     third = iter([given["rz"], given["rx"]])
     for word in motion:
-        frame = frame @ transform(word, next(third) if family == "rolling" and word == "rz" else given[word])
+        frame = frame @ transform(word, next(third) if motion.count("rz") == 2 and word == "rz" else given[word])
     total = 0
     while total < len(motion):
         fit = [kind for kind in kinds if total + len(UNITS[kind]) <= len(motion)]

@@ -67,12 +67,14 @@ class Description:
     @property
     def tells_axis(self):
         """Whether of the tool's orientation its axis counts only."""
-        return bool(self.serial) or self.hangs or len(self.motion) == 5
+        return bool(self.serial) or len(self.motion) == 5
 
     @property
     def axes(self):
         if self.tells_axis:
             return tuple("XYZBC")
+        if self.hangs:
+            return tuple("XYZC")[: len(self.motion)]
         return tuple(LETTERS[word] for word in LETTERS if word in self.motion and word not in self.parasitic)
 
     def chain(self, steps, joints):
@@ -111,7 +113,9 @@ class Description:
         frame = np.broadcast_to(np.eye(4), (len(poses), 4, 4)).copy()
         missed = zero
         rotation = orientation(*(given.get(x, zero) for x in "ABC"))
-        if len(self.parasitic) == 3 and not self.serial:  # rods alone tell it, or planes
+        if self.hangs and not self.serial:
+            rotation = self._hung(tip, given.get("C"), mount[:, :3, :3])
+        elif len(self.parasitic) == 3 and not self.serial:  # rods alone tell it, or planes
             rotation, _ = self._guided(tip, None, head, joints)
         elif len(self.turns) == 3 and not self.serial:
             rotation = mount[:, :3, :3].transpose(0, 2, 1) @ rotation @ head[:, :3, :3].transpose(0, 2, 1)
@@ -195,18 +199,30 @@ class Description:
         # platform's axis x = y = 0 passes through.
         probe = self.chain(self.head, np.full((1, len(self.joints)), 0.7))[0, :2]
         centre = tip - (probe[:, 3] @ probe[:, 2]) / (probe[:, 2] @ probe[:, 2]) * k
-        x, y, z = (-centre / np.linalg.norm(centre, axis=1, keepdims=True)).T
-        first, second = {
-            ("rx", "ry"): (np.arctan2(-y, z), np.arctan2(x, np.hypot(y, z))),
-            ("ry", "rx"): (np.arctan2(x, z), np.arctan2(-y, np.hypot(x, z))),
-            ("rz", "ry"): (np.arctan2(y, x), np.arctan2(np.hypot(x, y), z)),
-        }[self.motion[:2]]
-        r = (transform(self.motion[0], first) @ transform(self.motion[1], second))[:, :3, :3]
+        r = self._lead(-centre / np.linalg.norm(centre, axis=1, keepdims=True))
         seen = np.einsum("nji,nj->ni", r, k)
         if len(self.turns) == 3:
             roll = np.arctan2(seen[:, 1], seen[:, 0]) - np.arctan2(along[:, 1], along[:, 0])
             return r @ transform("rz", roll)[:, :3, :3], np.abs(seen[:, 2] - along[:, 2])
         return r, np.linalg.norm(seen - along, axis=1)
+
+    def _hung(self, tip, c, mount):
+        """Platform's rotation where the tool lies along the central leg."""
+        z = -tip / np.linalg.norm(tip, axis=1, keepdims=True)
+        if len(self.turns) == 2:
+            return self._lead(z)
+        x, y, w = np.einsum("nji,nj->in", orientation(0.0 * c, 0.0 * c, c), np.einsum("nij,nj->ni", mount, z))
+        return mount.transpose(0, 2, 1) @ orientation(np.arcsin(-y), np.arctan2(x, w), c)
+
+    def _lead(self, z):
+        """Rotation by the central leg's first two turns that leads its line along z (N, 3)."""
+        x, y, z = z.T
+        first, second = {
+            ("rx", "ry"): (np.arctan2(-y, z), np.arctan2(x, np.hypot(y, z))),
+            ("ry", "rx"): (np.arctan2(x, z), np.arctan2(-y, np.hypot(x, z))),
+            ("rz", "ry"): (np.arctan2(y, x), np.arctan2(np.hypot(x, y), z)),
+        }[self.motion[:2]]
+        return (transform(self.motion[0], first) @ transform(self.motion[1], second))[:, :3, :3]
 
     def misses(self, poses, joints):
         """The greatest distance, mm, by which a rod or a hinge misses its place, and the axis' error, both (N,).

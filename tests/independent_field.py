@@ -216,6 +216,17 @@ def eclipse(s, poses):
     return np.stack([*angles, *heights], -1)
 
 
+def four_struts(s, poses):
+    """The tool lies on the line through the central leg's foot; C turns the level line across the tool's own x."""
+    tip, c = poses[:, :3], poses[:, 3]
+    z = -tip / np.linalg.norm(tip, axis=1, keepdims=True)
+    x = np.cross(np.stack([-np.sin(c), np.cos(c), 0.0 * c], -1), z)
+    x /= np.linalg.norm(x, axis=1, keepdims=True)
+    turn = np.stack([x, np.cross(z, x), z], -1)
+    corners = on_circle(s["r"], [90, 90, 270, 270])
+    return strut_lengths(on_circle(s["R"], [45, 135, 225, 315]), [tip + s["tool"] * z + turn @ p for p in corners])
+
+
 def sprint_z3(s, poses):
     """The 3-PRS turns without torsion, and its middle moves aside by r/2·(1 - cos B): Carretero and others (2000)."""
     k, b, c = tool_axis(poses[:, 3], poses[:, 4]), poses[:, 3], poses[:, 4]
@@ -290,6 +301,7 @@ INVERSES = {
         prr3,
         eclipse,
         sprint_z3,
+        four_struts,
         exechon,
         pentapod,
     )

@@ -25,6 +25,7 @@ REPRESENTATIVES = [
     "exechon",
     "pentapod",
     "triglide_pairs",
+    "four_struts",
 ]
 
 

@@ -22,6 +22,7 @@ SPREAD = {  # about home, mm and rad: the allowed workspace and a margin beyond
     "exechon": [500, 500, 300, 1.9, 3.3],
     "five_bar": [330, 230],
     "five_bar_slides": [500, 200],
+    "four_struts": [300, 300, 200, 0.9],
     "g500": [250, 250, 250, 0.5, 0.5, 0.5],
     "george_v": [400, 400, 400, 1.9, 3.3],
     "hbg80_2d": [230, 230],

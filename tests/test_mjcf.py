@@ -65,6 +65,8 @@ def measure_difference(machine, engine, pose):
     home = (
         np.array(machine.structure.tool_rotation) if not machine.has_direction and len(machine.axes) < 6 else np.eye(3)
     )
+    if machine.structure.has_central_leg and not machine.has_direction:  # which leans by itself
+        wanted = np.array(machine.place_platform(pose, machine.mode).rotation, float)
     off = turn - wanted @ home
     off = off[:, 2] if machine.has_direction else off
     return max(abs(tip["XYZ".index(axis)] - given[axis]) for axis in "XYZ" if axis in given), np.abs(off).max()

@@ -107,7 +107,7 @@ def build_multibody(machine: Machine) -> Multibody:
     table, workpiece = _build_chain("table", structure.table, serial[count:], WORLD)
     base = Body(BASE, "base", WORLD, np.array(structure.mount, float), np.array(structure.base, float))
     platform = _build_platform(machine, placement, head[0].origin if head else tool[2])
-    bodies, loops = [base, platform], []
+    bodies, loops = [base, *_carry_by_ball(platform)], []
     points = _locate_platform_joints(machine, placement)
     for number, own in enumerate(machine.group_joints(joints)):
         leg_bodies, leg_loops = _build_leg(machine, placement, number, points[number], own)
@@ -164,7 +164,7 @@ def _build_platform(machine: Machine, placement: PlatformPlacement, head: Points
         placed = mount @ rotation, mount @ origin + base
         return Body(PLATFORM, "platform", WORLD, *placed, tuple(joints), tuple(bars))
     before: list[Step] = []
-    for word, value in zip(structure.coordinates, placement.coordinates, strict=True):
+    for word, value in structure.list_motion(placement):
         turned, pivot = compose_chain(before, ())
         turns, place = word in ROTATIONS, np.array(pivot if structure.has_central_leg else placement.origin, float)
         joints.append(
@@ -180,6 +180,18 @@ def _build_platform(machine: Machine, placement: PlatformPlacement, head: Points
         )
         before.append(Step(word, float(value)))
     return Body(PLATFORM, "platform", BASE, rotation, origin, tuple(joints), tuple(bars))
+
+
+def _carry_by_ball(platform: Body) -> list[Body]:
+    """List a platform, before it a central leg that turns every way: its three turns are a ball, free of poles."""
+    turns = [joint for joint in platform.joints if joint.kind == "hinge"]
+    if len(turns) < 3:
+        return [platform]
+    ball = BodyJoint("central", "ball", np.zeros(3), np.zeros(3))
+    tube = np.array([np.zeros(3), platform.rotation.T @ platform.origin])
+    leg = Body("central", "rod", BASE, platform.rotation, np.zeros(3), (ball,), (tube,))
+    slides = tuple(joint for joint in platform.joints if joint.kind == "slide")
+    return [leg, replace(platform, carrier=leg.name, rotation=np.eye(3), origin=tube[1], joints=slides)]
 
 
 def _locate_platform_joints(machine: Machine, placement: PlatformPlacement) -> Points:

@@ -213,7 +213,7 @@ class Equations:
         self, placed: PlatformPlacement, joints: Sequence[Scalar], legs: Sequence[Inverse]
     ) -> list[tuple[Limit, Scalar]]:
         home = self.rods_at_home if any(cone.axis is None for cone in self.spec.limits.cones) else None
-        coordinates = list(zip(self.structure.coordinates, placed.coordinates, strict=True))
+        coordinates = self.structure.list_motion(placed)
         return list_limits(self.spec, placed, coordinates, joints, [leg.reach for leg in legs], home)
 
     @cached_property

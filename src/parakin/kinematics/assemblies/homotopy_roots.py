@@ -202,8 +202,8 @@ def _is_in_continuum(system: Array, point: Array) -> bool:
 def find_coordinates(model: Model, points: Array, joints: Array) -> Array:
     """Compute the motion's coordinates (k, m) of real roots (k, n) for one row of joints (joints,).
 
-    A row is NaN where no pose tells it: constraints hold the platform in another of their solutions, or a leg closes
-    otherwise than it is built.
+    A row is NaN where no pose tells it: constraints hold the platform in another of their solutions, a central leg leads
+    the other way, or a leg closes otherwise than it is built.
     """
     closures = make_closure_system(model)
     rotations, origins = closures.compute_frames(points)
@@ -212,7 +212,7 @@ def find_coordinates(model: Model, points: Array, joints: Array) -> Array:
     )
     coordinates = np.ascontiguousarray(np.stack(np.broadcast_arrays(*columns), 1))
     coordinates[~closures.find_assembled(points, joints)] = np.nan
-    if model.spec.constraints and len(coordinates):
+    if (model.spec.constraints or not model.structure.writes_frames_once) and len(coordinates):
         with np.errstate(invalid="ignore", divide="ignore"):
             turned, place = model.structure.frame(list(coordinates.T))
         off = [np.abs(turned[i][j] - rotations[:, i, j]) for i in range(3) for j in range(3)]

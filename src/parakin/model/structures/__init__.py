@@ -14,6 +14,7 @@ from .five_axis_platform import FiveAxisPlatform, check_rings
 from .free import Free
 from .guided import Guided
 from .guided_wrist import WristOnGuidedPlatform
+from .led_platform import LedPlatform
 from .ordered_motion import OrderedMotion, has_pose_order
 from .parasitic import check_parasitic_words
 from .sliding_table import SlidingTable
@@ -25,6 +26,7 @@ __all__ = [
     "FiveAxisPlatform",
     "Free",
     "Guided",
+    "LedPlatform",
     "OrderedMotion",
     "PlatformPlacement",
     "SlidingTable",
@@ -53,7 +55,7 @@ def make_structure(spec: Spec) -> Structure:
             raise DescriptionError("head", f"joint {name}: the drives of head and table turn; {axis} can't be one")
     driven = len(drives)
     if spec.motion[0] in ROTATIONS and set(spec.motion) & set(TRANSLATIONS) == {"tz"}:
-        return CentralLeg(spec)
+        return CentralLeg(spec) if driven else LedPlatform(spec)
     if driven == 0:
         if spec.table:
             raise DescriptionError("table", "a table without a driven turn does nothing; leave it out")

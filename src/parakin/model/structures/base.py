@@ -61,6 +61,7 @@ class Structure(ABC):
     has_central_leg: bool = False
     takes_traced_sizes: bool = True  # whether the description's numbers may be scalars of any kind
     carries_pole: bool = False  # the pose turns the platform, and with it the first axis of ``pointing``
+    writes_frames_once: bool = True  # whether its coordinates hold every frame that its motion's words reach
     has_slides: bool = False  # the table's drives slide it
     sign: float = 1.0  # of the central leg's length
     tip: Vec = ORIGIN  # of a fixed tool, in the platform's frame
@@ -166,6 +167,10 @@ class Structure(ABC):
     @abstractmethod
     def pose(self, coordinates: Sequence[Scalar], serial: Sequence[Scalar]) -> list[Scalar]:
         """Compute the tool's pose; at a vertical tool axis C is 0."""
+
+    def list_motion(self, placement: PlatformPlacement) -> list[tuple[str, Scalar]]:
+        """List the motion's elementary transforms, mm and rad, that passive limits bound."""
+        return list(zip(self.coordinates, placement.coordinates, strict=True))
 
     def list_coordinate_margins(self, coordinates: Sequence[Scalar]) -> list[Scalar]:
         """List margins ≥ 0 within which the coordinates write each frame once and keep their determinant's sign."""

@@ -202,8 +202,8 @@ def _is_in_continuum(system: Array, point: Array) -> bool:
 def find_coordinates(model: Model, points: Array, joints: Array) -> Array:
     """Compute the motion's coordinates (k, m) of real roots (k, n) for one row of joints (joints,).
 
-    A row is NaN where no pose tells it: constraints hold the platform in another of their solutions, a central leg points
-    the other way, or a leg closes otherwise than it is built.
+    A row is NaN where no pose tells it: constraints hold the platform in another of their solutions, a central leg
+    points the other way, or a leg closes otherwise than it is built.
     """
     closures = make_closure_system(model)
     rotations, origins = closures.compute_frames(points)

@@ -188,10 +188,10 @@ def _carry_by_ball(platform: Body) -> list[Body]:
     if len(turns) < 3:
         return [platform]
     ball = BodyJoint("central", "ball", np.zeros(3), np.zeros(3))
-    tube = np.array([np.zeros(3), platform.rotation.T @ platform.origin])
-    leg = Body("central", "rod", BASE, platform.rotation, np.zeros(3), (ball,), (tube,))
+    ends = np.array([np.zeros(3), platform.rotation.T @ platform.origin])
+    leg = Body("central", "rod", BASE, platform.rotation, np.zeros(3), (ball,), (ends,))
     slides = tuple(joint for joint in platform.joints if joint.kind == "slide")
-    return [leg, replace(platform, carrier=leg.name, rotation=np.eye(3), origin=tube[1], joints=slides)]
+    return [leg, replace(platform, carrier=leg.name, rotation=np.eye(3), origin=ends[1], joints=slides)]
 
 
 def _locate_platform_joints(machine: Machine, placement: PlatformPlacement) -> Points:

@@ -107,7 +107,7 @@ def build_multibody(machine: Machine) -> Multibody:
     table, workpiece = _build_chain("table", structure.table, serial[count:], WORLD)
     base = Body(BASE, "base", WORLD, np.array(structure.mount, float), np.array(structure.base, float))
     platform = _build_platform(machine, placement, head[0].origin if head else tool[2])
-    bodies, loops = [base, *_carry_by_ball(platform)], []
+    bodies, loops = [base, *_list_platform_bodies(platform)], []
     points = _locate_platform_joints(machine, placement)
     for number, own in enumerate(machine.group_joints(joints)):
         leg_bodies, leg_loops = _build_leg(machine, placement, number, points[number], own)
@@ -182,7 +182,7 @@ def _build_platform(machine: Machine, placement: PlatformPlacement, head: Points
     return Body(PLATFORM, "platform", BASE, rotation, origin, tuple(joints), tuple(bars))
 
 
-def _carry_by_ball(platform: Body) -> list[Body]:
+def _list_platform_bodies(platform: Body) -> list[Body]:
     """List a platform, before it a central leg that turns every way: its three turns are a ball, free of poles."""
     turns = [joint for joint in platform.joints if joint.kind == "hinge"]
     if len(turns) < 3:

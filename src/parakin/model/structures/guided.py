@@ -23,7 +23,7 @@ from .parasitic import (
     list_independent_words,
     list_planes,
 )
-from .solved_constraints import SolvedConstraints, UnturnedByRods, make_parallelograms
+from .solved_constraints import SolvedConstraints, UnturnedByRods, has_parallelograms
 
 
 class Guided(Structure):
@@ -57,7 +57,7 @@ class Guided(Structure):
         self.planes: TurnInBasePlanes | None = None
         self.solved: SolvedConstraints | None = None
         self.branch = 1.0
-        if self.coordinates == TRANSLATIONS and make_parallelograms(spec):
+        if self.coordinates == TRANSLATIONS and has_parallelograms(spec):
             self.turned = UnturnedByRods(spec)
         elif self.coordinates == TRANSLATIONS and has_parallel_planes(spec) and not self._has_head:
             self.turned = TurnedByPlanes(spec)

@@ -87,14 +87,16 @@ class LedPlatform(Structure):
         return rotation
 
     def _find_frame(self, pose: Sequence[Scalar], turn: Sequence[Scalar]) -> tuple[Mat, Vec]:
-        tip = transform_to_local(self.mount, self.base, tuple(pose[:3]))
-        z = scale(tip, self.sign / norm(tip))
-        turned = pose[3] + turn[0] if turn else pose[3] if len(pose) > 3 else 0.0
-        return self._find_rotation(z, turned), move_along(tip, z, -self.tip[2])
+        x, y, z, *turns = pose
+        tip = transform_to_local(self.mount, self.base, (x, y, z))
+        axis = scale(tip, self.sign / norm(tip))
+        turned = sum((*turns, *turn), 0.0)
+        return self._find_rotation(axis, turned), move_along(tip, axis, -self.tip[2])
 
     def place(self, pose: Sequence[Scalar], branch: str, first: Scalar | None = None) -> PlatformPlacement:
         rotation, origin = self._find_frame(pose, ())
-        return PlatformPlacement(rotation, origin, [*origin, *pose[3:]], [])
+        _, _, _, *turns = pose
+        return PlatformPlacement(rotation, origin, [*origin, *turns], [])
 
     def frame(self, coordinates: Sequence[Scalar]) -> tuple[Mat, Vec]:
         origin = tuple(coordinates[:3])

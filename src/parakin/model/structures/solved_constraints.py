@@ -187,7 +187,7 @@ class UnturnedByRods:
         return FoundFrame(IDENTITY, tuple(origin), ())
 
 
-def make_parallelograms(spec: Spec) -> bool:
+def has_parallelograms(spec: Spec) -> bool:
     """Tell whether every constraint is a rod that makes a parallelogram with the rod of the leg that carries it."""
     return all(isinstance(each, RodConstraint) and _is_parallel(spec, each) for each in spec.constraints)
 

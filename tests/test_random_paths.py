@@ -246,7 +246,7 @@ def test_linuxcnc_takes_a_turn_of_a_tool_that_hardly_moves_in_its_time(tmp_path)
 
 
 def test_a_tip_that_crept_catches_up_gently():
-    """It stands or is as fast as LinuxCNC obeys, and never much faster than it is told; it was 16 times as fast."""
+    """It stands or is as fast as LinuxCNC obeys, and never much faster than it is told; it was 14 times as fast."""
     slowest, machine = 0.11 / 60.0, pk.load("tricept")  # mm/s
     times = np.concatenate([np.arange(0.0, 0.16, 0.016), 0.16 + 1e-3 * np.arange(200)])
     poses = np.tile(machine.home, (len(times), 1))

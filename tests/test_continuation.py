@@ -278,13 +278,28 @@ def test_joints_at_a_singularity_have_a_double_root(tmp_path):
     assert len(found) + found.complex_count + found.lost_count + found.infinite_count >= 38
 
 
-def test_an_architecture_that_is_singular_everywhere_is_named(tmp_path):
-    angles = np.radians([0, 60, 120, 180, 240, 300])
-    feet = np.column_stack([np.cos(angles), np.sin(angles), np.zeros(6)])
-    with pytest.warns(pk.errors.SingularHomeWarning):
-        machine = platform(tmp_path, feet, 0.5 * feet)
+def make_hexagon(angles):
+    return np.column_stack([np.cos(np.radians(angles)), np.sin(np.radians(angles)), np.zeros(6)])
+
+
+REGULAR, SEMI_REGULAR = make_hexagon([0, 60, 120, 180, 240, 300]), make_hexagon([-10, 10, 110, 130, 230, 250])
+UNEVEN = np.column_stack([np.random.default_rng(1).uniform(-1.0, 1.0, (6, 2)), np.zeros(6)])  # on no conic
+
+
+@pytest.mark.parametrize("turn", [0.0, 0.6])
+@pytest.mark.parametrize("feet", [REGULAR, SEMI_REGULAR], ids=["regular", "semi-regular"])
+def test_similar_hexagons_on_a_conic_are_singular_everywhere(feet, turn, tmp_path):
+    """O. Ma and J. Angeles, Architecture singularities of platform manipulators, 1991."""
+    with pytest.warns(pk.errors.SingularHomeWarning, match="architecturally singular"):
+        machine = platform(tmp_path, feet, 0.6 * feet @ orientation(*np.array([[0.0], [0.0], [turn]]))[0].T)
     with pytest.raises(pk.NoMethodError, match="continuum"):
         machine.assemblies(machine.inverse(machine.home))
+
+
+def test_similar_hexagons_on_no_conic_are_not(tmp_path):
+    machine = platform(tmp_path, UNEVEN, 0.6 * UNEVEN + [0.1, 0.2, 0.0])
+    found = machine.assemblies(machine.inverse(machine.home))
+    assert found.complete == "all paths accounted for" and np.abs(found.poses - machine.home).max(1).min() < 1e-6
 
 
 PHC = shutil.which("phc")

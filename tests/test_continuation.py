@@ -202,6 +202,17 @@ def test_closed_forms_find_the_same(name):
             assert np.nanmin(np.linalg.norm(origins - origin, axis=1)) < 1e-6
 
 
+def test_no_root_is_lost_on_the_way_to_a_machines_own_member(tmp_path):
+    """A platform on whose way from the family's member one of forty paths is lost; PHCpack finds all of them."""
+    rng = np.random.default_rng(1008)
+    for _ in range(64):
+        pose = np.append(rng.uniform(-0.5, 0.5, 2), [rng.uniform(0.8, 2.0), *rng.uniform(-0.6, 0.6, 3)])
+        feet, corners = draw_platform(rng)
+    machine = platform(tmp_path, feet, corners, home=pose)
+    found = machine.assemblies(machine.inverse(machine.home))
+    assert len(found) + found.complex_count == 40
+
+
 COLUMNS = """\
 name: columns
 source: drawn

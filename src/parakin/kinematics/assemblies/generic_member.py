@@ -16,14 +16,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .path_tracking import track_members
+from .path_tracking import join_roots, track_members
 from .quadric_family import Complex, QuadricFamily, draw_complex, make_family
 
 _SEED = 2
 _QUIET_LOOPS = 4  # without a new root, before the trace test
 _MOST_LOOPS = 60
 _LINEAR = 1e-8  # of the trace's size
-_SAME = 1e-8
 _STORED = "generic_members.npz"
 _ROUNDING = 1e-10  # by how much a stored member may differ from one of the family computed here
 
@@ -102,10 +101,7 @@ def _go_round(family: QuadricFamily, system: Complex, roots: Complex, rng: np.ra
     for first, last in pairwise(corners):
         ends = track_members(first[None], last[None], points)
         points = ends.points[0][ends.reached[0] == 1.0]
-    for point in points:
-        if not (np.abs(roots.conj() @ point) > 1.0 - _SAME).any():
-            roots = np.vstack([roots, point])
-    return roots
+    return join_roots(roots, points)
 
 
 def measure_trace(family: QuadricFamily, member: GenericMember, rng: np.random.Generator) -> float:

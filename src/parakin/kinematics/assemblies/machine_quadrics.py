@@ -16,7 +16,7 @@ from ...model.structures import locate_rod
 from ...model.traces import Model
 from .closure_system import ClosureSystem
 from .generic_member import GenericMember, find_generic_member
-from .path_tracking import align_members, track_members
+from .path_tracking import align_members, find_regular_roots
 from .quadric_family import Complex, QuadricFamily, draw_complex, make_family
 from .study import compute_frames, compute_study_points, make_closure_quadrics, make_inverse_closure_quadrics
 
@@ -68,10 +68,8 @@ class MachineQuadrics(ClosureSystem):
         numbers = _draw_numbers(self.compute_numbers(_sample_joints(self.model)))
         system = self.family.make_member(self.combine(numbers))
         first, last = align_members(generic.system, system, self.fixed_count)
-        ends = track_members(first, last, generic.roots)
-        e = ends.points[0] @ self.family.hull[:, :4]
-        regular = (ends.reached[0] == 1.0) & (np.linalg.norm(e, axis=1) > _NO_TURN)
-        return GenericMember(system[0], ends.points[0][regular])
+        roots = find_regular_roots(first, last, generic.roots, self.fixed_count)
+        return GenericMember(system[0], roots[np.linalg.norm(roots @ self.family.hull[:, :4], axis=1) > _NO_TURN])
 
     def measure_scales(self, points: Complex) -> Array:
         e = points @ self.family.hull[:, :4]

@@ -13,6 +13,7 @@ from .quadric_family import Complex
 _CLOSE = 1e-8  # 1 - cos of the angle of two points of projective space that may be the same
 _SAME = 1e-7  # rad: a regular root is known better than this, and two that are farther apart are two
 _PATHS_A_THREAD = 16
+_MOST_PHASES = 8
 
 LENIENT = 1e-4  # tolerances of the last terms of a path's series: usual, and where paths met
 STRICT = 1e-9
@@ -82,6 +83,36 @@ def track_members(first: Complex, last: Complex, starts: Complex, tolerance: flo
             again = track_members(first[system : system + 1], last[system : system + 1], starts, STRICT)
             ends.points[system], ends.reached[system] = again.points[0], again.reached[0]
     return ends
+
+
+def find_regular_roots(first: Complex, last: Complex, starts: Complex, fixed: int) -> Complex:
+    """Track ``starts`` to regular roots of one system, along homotopies that differ by a phase, until one adds none.
+
+    A path that is lost, or jumps onto another one, is so on one of them: what is left out here would be missing in all
+    answers that begin at these roots.
+
+    first, last : (1, n - 1, n, n), whose first ``fixed`` quadrics stay as they are
+
+    Raises :class:`ArithmeticError` where the roots do not settle.
+    """
+    roots = np.empty((0, starts.shape[1]), np.complex128)
+    for number in range(_MOST_PHASES):
+        turned = first.copy()
+        turned[:, fixed:] *= np.exp(1j * number)
+        ends = track_members(turned, last, starts, STRICT if number else LENIENT)
+        before = len(roots)
+        roots = join_roots(roots, ends.points[0][ends.reached[0] == 1.0])
+        if len(roots) == len(starts) or (number and len(roots) == before):
+            return roots
+    raise ArithmeticError(f"{len(roots)} roots of {len(starts)} paths, and each tracking finds others")
+
+
+def join_roots(roots: Complex, more: Complex) -> Complex:
+    """Join roots (k, n) with those of others that are not among them, whatever their phases."""
+    for point in more:
+        if not (np.abs(roots.conj() @ point) > 1.0 - _CLOSE).any():
+            roots = np.vstack([roots, point])
+    return roots
 
 
 def find_meetings(ends: PathEnds) -> Flags:

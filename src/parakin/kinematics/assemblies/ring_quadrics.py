@@ -22,7 +22,7 @@ from ...model.structures.five_axis import make_least_rotation
 from ...model.traces import Model
 from .closure_system import ClosureSystem
 from .generic_member import GenericMember
-from .path_tracking import track_members
+from .path_tracking import find_regular_roots
 from .quadric_family import Complex, draw_complex
 
 _SEED = 4
@@ -82,8 +82,8 @@ class RingQuadrics(ClosureSystem):
             first[0, i, i + 1, i + 1], first[0, i, 0, 0] = own, -one
         signs = np.array(list(product((-1.0, 1.0), repeat=count)))
         starts = np.column_stack([np.ones(len(signs)), signs * np.sqrt(phases[:, 1] / phases[:, 0])])
-        ends = track_members(first, system, starts / np.linalg.norm(starts, axis=1, keepdims=True))
-        return GenericMember(system[0], ends.points[0][ends.reached[0] == 1.0])
+        starts /= np.linalg.norm(starts, axis=1, keepdims=True)
+        return GenericMember(system[0], find_regular_roots(first, system, starts, fixed=0))
 
     def measure_scales(self, points: Complex) -> Array:
         return np.asarray(np.abs(points[:, _ONE]))

@@ -20,3 +20,9 @@ void probe_distances(long n, const double *x, const double *q, double *distances
     for (long i = 0; i < n; i++)
         distances[i] = distance_to_limits(x + i * AXES, q + i * JOINTS, &nearest[i]);
 }
+
+void probe_telling(long n, const double *margins, double share, int *codes)
+{
+    for (long i = 0; i < n; i++)
+        codes[i] = joints_tell_pose(margins + i * SINGULARITIES, share);
+}

@@ -143,6 +143,14 @@ class ModelProbe:
         self._call("probe_distances", poses, joints, distances, nearest)
         return distances, [self.names[i] for i in nearest]
 
+    def tell_pose(self, margins, share):
+        """Whether joints tell their pose where the singularity margins (n, margins) are so far off, (n,)."""
+        margins, codes = np.ascontiguousarray(margins), np.empty(len(margins), np.int32)
+        self.library.probe_telling(
+            ctypes.c_long(len(margins)), _pointer(margins), ctypes.c_double(share), _pointer(codes)
+        )
+        return codes != 0
+
     def _call(self, name, poses, joints, *arrays):
         given = [np.ascontiguousarray(rows, float) for rows in (poses, joints)]
         getattr(self.library, name)(ctypes.c_long(len(poses)), *map(_pointer, [*given, *arrays]))

@@ -197,6 +197,14 @@ MODEL int regular(const double *x, const double *q)
     return 1;
 }
 
+/* Whether joints tell their pose: it is farther than a share of the least margins from the singularities across which they
+   have another pose, the parallel ones and those of constraints. */
+MODEL int joints_tell_pose(const double *margins, double share)
+{
+    return fabs(margins[0]) > share * least_singularity[0]
+        && fabs(margins[CONSTRAINT]) > share * least_singularity[CONSTRAINT];
+}
+
 /* How far a pose is from its nearest limit or singularity, and which of limit_names that is: 0 where it is reached, 1
    where jogs stop. */
 MODEL double distance_to_limits(const double *x, const double *q, int *nearest)

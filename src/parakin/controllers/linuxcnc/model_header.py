@@ -105,13 +105,16 @@ def write_model(machine: Machine) -> str:
 def _write_numbers(machine: Machine) -> str:
     """Write the sizes of everything, and the constants of the method; mm and rad."""
     by_spheres, open_by = int(machine.has_closed_forward), format_c(machine.closure_tolerance)
+    names = list_margin_names(machine)
     lines = [
         f"#define AXES {len(machine.axes)}",
         f"#define JOINTS {len(machine.joints)}",
         f"#define CLOSURES {machine.leg_count}",
         f"#define SERIAL {len(machine.joints) - machine.leg_count} /* joints of head and table */",
         f"#define LIMITS {len(machine.limits)} /* of the machine's description */",
-        f"#define SINGULARITIES {len(list_margin_names(machine))}",
+        f"#define SINGULARITIES {len(names)}",
+        f"#define CONSTRAINT {names.index(CONSTRAINT) if machine.constraints else 0} "
+        "/* the margin of the constraints, the parallel one where there are none */",
         f"#define SPHERES {by_spheres} /* the forward in closed form: the common point of spheres */",
         f"#define WRIST {int(machine.wrist is not None)} /* two turning joints point the tool */",
         f"#define TOOL_AXIS {int(machine.has_direction)} /* of the orientation only the tool's axis counts */",

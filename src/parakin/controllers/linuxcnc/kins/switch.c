@@ -5,7 +5,7 @@
    then only homing does. Back to the machine's kinematics it goes only from joints whose pose is known, on home's side,
    within all limits and in the legs' own working mode. */
 
-#define SIDE_IS_SURE 0.1 /* of the least parallel singularity margin: nearer to it the joints don't tell the side */
+#define SIDE_IS_SURE 0.1 /* of the least singularity margin: nearer to it the joints don't tell the side */
 
 static double joints_before[JOINTS]; /* commanded a cycle ago */
 static int joints_stand, was_homed;
@@ -27,7 +27,7 @@ static void follow_pose(const double *q)
     }
     if (pose_known) {
         measure_singularities(x, q, margins);
-        pose_known = fabs(margins[0]) > SIDE_IS_SURE * least_singularity[0];
+        pose_known = joints_tell_pose(margins, SIDE_IS_SURE);
     }
     if (!pose_known) {
         forget_pose();

@@ -61,7 +61,7 @@ class LedPlatform(Structure):
         head, self.tip = compose_chain(spec.head, ())
         if any(find_nominal_value(x) for x in (*self.tip[:2], *sub(head[2], UNIT["tz"]))):
             raise DescriptionError("head", "without a driven head the tool stands on the central leg's line")
-        home = tuple(float(spec.home.get(letter, 0.0)) for letter in "XYZ")
+        home = tuple(spec.home.get(letter, 0.0) for letter in "XYZ")
         place = transform_to_local(self.mount, self.base, home)
         self.sign = 1.0 if find_nominal_value(place[2]) > 0.0 else -1.0
         length = self.sign * find_nominal_value(norm(place)) - find_nominal_value(self.tip[2])

@@ -68,7 +68,8 @@ def _gather_records(posted: Posted, columns: dict[str, Array], passed: Array) ->
     """Gather in each sample what is between it and the one before, whose last records are ``passed``."""
     records, last = np.arange(len(posted.path)), len(passed) - 1
     behind = np.minimum(np.searchsorted(passed, records), last)
-    np.minimum.at(columns["margins"], behind, measure_range_use(posted)[1])
+    with np.errstate(invalid="ignore"):  # NaN where no record is within reach
+        np.minimum.at(columns["margins"], behind, measure_range_use(posted)[1])
     broken = posted.broken != 0
     if posted.broken_motions is not None:
         broken = broken | posted.broken_motions

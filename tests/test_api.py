@@ -86,6 +86,8 @@ def things(tmp_path_factory, tricept):
         "UnprovedDesign": unproved,
         "Designs": Designs(problem, (proved,), (unproved,)),
         "Parameter": tricept.parameters[0],
+        "SweepPlan": pk.SweepPlan(problem, 10, 8),
+        "SweepResult": pk.SweepResult(10, 3, 10, 1e-8, 1e-9, {}),
         "setpoints": job.trajectory.sample(10),
         "cells": found.cells,
         "spec": tricept.spec,

@@ -402,4 +402,4 @@ def test_machine_names_are_completed():
     from parakin.cli import app
 
     names = [found.value for found in compute_completions(app, ["show", "tri"])]
-    assert names == ["tricept", "tricept_805", "triglide"]
+    assert names == ["tricept", "tricept_805", "triglide", "triglide_pairs"]

@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from .export.page.page import render_machine_page, render_path_page
     from .export.report.report import render_report
     from .export.stiffness_map import render_stiffness_png
+    from .export.sweep_folder import SweepResult, run_sweep
     from .export.workspace.meshes import Mesh, make_mesh
     from .families.family import Family
     from .families.family import make_family as family
@@ -41,6 +42,7 @@ if TYPE_CHECKING:
     from .stiffness.stiffness import Stiffness, analyse_stiffness
     from .synthesis.designs import Designs, ProvedDesign, UnprovedDesign, find_designs
     from .synthesis.problem import DesignProblem
+    from .synthesis.sweep import SweepPlan
     from .toolpath.job import Job, Tolerances, prepare
     from .toolpath.linearise.rewinds import Clearance, Rewind, RewoundPath, rewind_path
     from .toolpath.path import ToolPath
@@ -103,6 +105,8 @@ __all__ = [
     "SampledField",
     "Solution",
     "Stiffness",
+    "SweepPlan",
+    "SweepResult",
     "Tolerances",
     "ToolPath",
     "ToolTurn",
@@ -154,6 +158,7 @@ __all__ = [
     "render_residuals_png",
     "render_stiffness_png",
     "rewind_path",
+    "run_sweep",
     "sample_field",
     "sample_grid",
     "sweep_drives",
@@ -212,6 +217,9 @@ _LAZY = {
     "UnprovedDesign": "synthesis.designs",
     "find_designs": "synthesis.designs",
     "DriveForces": "toolpath.timing.drive_forces",
+    "run_sweep": "export.sweep_folder",
+    "SweepPlan": "synthesis.sweep",
+    "SweepResult": "export.sweep_folder",
     "DriveWorkspace": "workspaces.sampled.drive_sweep",
     "Family": "families.family",
     "GridWorkspace": "workspaces.sampled.grid",

@@ -31,6 +31,7 @@ from .commands.post import post
 from .commands.reach import reach
 from .commands.stiffness import stiffness
 from .commands.studio import make_studio_command
+from .commands.sweep import sweep
 from .commands.workspace import workspace
 from .errors import ParakinError
 from .version import __version__
@@ -46,7 +47,7 @@ app = App(
     default_parameter=Parameter(negative=""),
     suppress_keyboard_interrupt=False,  # main says so in one line
 )
-ANALYSES = (assemblies, reach, workspace, atlas, accuracy, stiffness, forces, compare, calibrate, design)
+ANALYSES = (assemblies, reach, workspace, atlas, accuracy, stiffness, forces, compare, calibrate, design, sweep)
 for command in (post, inverse, forward, *ANALYSES, linuxcnc, machines, show, page, export):
     app.command(command)
 app.command(import_machine, name="import")

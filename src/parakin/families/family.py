@@ -174,6 +174,17 @@ class Family:
         margins = evaluate_tape(tape, rows[0], np.empty((len(rows[0]), tape.outputs)), rows[1], whole=False)
         return margins.reshape(*lead, tape.outputs)
 
+    def make_check_tape(self, limits: Sequence[int] | None = None, mode: str | None = None) -> Tape:
+        """Make the tape of the margins of those limits, by their numbers; all by default."""
+        mode, (n, _) = self.machine.checked_mode(mode), self._counts
+        chosen = tuple(range(len(self.machine.limits)) if limits is None else limits)
+
+        def outputs(e: Equations, x: list[Scalar]) -> list[Scalar]:
+            margins = [margin for _, margin in e.own_margins(x, mode)]
+            return [margins[number] for number in chosen]
+
+        return self._keep(("check", mode, chosen), n, outputs)
+
     def base_joints(self, poses: RowsLike, sizes: RowsLike, mode: str | None = None) -> Array:
         """Compute where the struts are joined to the base, (..., struts, 3) mm in the machine's frame."""
         mode, (n, _) = self.machine.checked_mode(mode), self._counts

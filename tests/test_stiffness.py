@@ -11,6 +11,9 @@ from frame_elements import Frame
 
 import parakin as pk
 from parakin.cli import main
+from parakin.dynamics.inverse_dynamics import Dynamics, Motion
+from parakin.dynamics.masses import compute_masses
+from parakin.dynamics.multibody import build_multibody
 
 E = 210e3  # N/mm²
 TUBE = {"diameter": "40 mm", "wall": "5 mm"}
@@ -267,3 +270,52 @@ def test_the_example_runs(tmp_path):
     done = subprocess.run([sys.executable, script, "-o", tmp_path], capture_output=True, text=True, check=True)
     assert "N/um at the worst" in done.stdout
     assert [path.name for path in tmp_path.iterdir()] == ["stiffness.png"]
+
+
+def load_heavy(name, folder, platform):
+    """A shipped machine whose platform alone has weight."""
+    path = folder / f"{name}.yaml"
+    bodies = "bodies:\n  rod: {mass: 1e-9 kg}\n  carriage: {mass: 1e-9 kg}\n  head: {mass: 1e-9 kg}\n"
+    path.write_text(pk.load(name).format_yaml() + bodies + f"  platform: {{mass: {platform} kg}}\n", encoding="utf-8")
+    return pk.load(path)
+
+
+def test_finite_elements_sag_alike(tmp_path):
+    """A platform's weight where its centre is, on the rigid body of the finite elements."""
+    machine = load_heavy("hexapod", tmp_path, 150)
+    poses = draw_poses(machine)
+    (platform,) = (mass for name, mass in compute_masses(build_multibody(machine)).items() if name == "platform")
+    sags = pk.analyse_stiffness(machine, "100 N/um", TUBE, poses).sag()
+    for pose, sag in zip(poses, sags, strict=True):
+        placed = machine.place_platform(pose, machine.mode)
+        centre = np.array(placed.origin) + np.array(placed.rotation) @ platform.centre
+        force = np.array([0.0, 0.0, -150.0 * 9.80665])
+        wrench = np.concatenate([force, np.cross(centre - pose[:3], force)])
+        assert sag == pytest.approx(compute_hexapod(machine, pose) @ wrench, rel=1e-4, abs=1e-9)
+
+
+@pytest.mark.parametrize("name", ["tricept", "lambda6", "rotary_delta"])
+def test_weight_on_drives_is_what_moves_them(name, tmp_path):
+    """Drives that give way by their own forces at rest: the direct problem of the joints that are left."""
+    machine = load_heavy(name, tmp_path, 60)
+    pose = draw_poses(machine, 1)[0]
+    stiff = {"mm": "100 kN/um", "rad": "9e5 kNm/rad"}
+    stated = {joint: stiff[unit] for joint, unit in zip(machine.joints, machine.joint_units, strict=True)}
+    found = pk.analyse_stiffness(machine, stated, None, [pose])
+    joints = machine.inverse(pose)
+    still = np.zeros((1, len(joints)))
+    forces = Dynamics(machine).compute_forces(Motion(pose[None], joints[None], still, still))[0]
+    given = joints - forces * found.springs.drives
+    moved = machine.forward(given, near=pose).poses - pose
+    tip = len(found.translations)
+    assert found.sag()[0, :tip] == pytest.approx(moved[:tip], rel=1e-3, abs=1e-9)
+
+
+def test_the_command_tells_the_sag(tmp_path, capsys):
+    load_heavy("hexapod", tmp_path, 150)
+    words = ["stiffness", str(tmp_path / "hexapod.yaml"), "--drives", "100N/um", "--samples", "9", "--weight"]
+    assert main(words) == 0
+    assert "its own weight moves the tip by" in capsys.readouterr().out
+    assert main([*words, "--json"]) == 0
+    sag = json.loads(capsys.readouterr().out)["sag"]
+    assert 0.0 < sag["median"] <= sag["worst"] < 0.1

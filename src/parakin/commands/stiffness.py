@@ -29,6 +29,7 @@ def stiffness(
     drives: Annotated[list[str] | None, Parameter(negative="")] = None,
     struts: str | None = None,
     force: Annotated[str | None, Parameter(allow_leading_hyphen=True)] = None,
+    weight: bool = False,
     along: str | None = None,
     csv: Path | None = None,
     samples: int | None = None,
@@ -53,6 +54,8 @@ def stiffness(
         itself: 300N/um. By default as the machine's file says, else they are rigid.
     force
         A force on the tip, whose deflection is told: X=-200N,Z=-1kN.
+    weight
+        Tell how far the machine's own weight moves the tip.
     along
         A translation: the map shows the stiffness along it, where it shows the least one by default.
     csv
@@ -86,10 +89,10 @@ def stiffness(
     if json:
         from ..export.json.stiffness import encode_stiffness
 
-        print_json(encode_stiffness(result, wanted, files))
+        print_json(encode_stiffness(result, wanted, files, weight))
     else:
         told = [f"{kind}  {path}" for kind, path in files.items()]
-        print_text("\n".join([_format_stiffness(result, wanted), *told]))
+        print_text("\n".join([_format_stiffness(result, wanted), *([_format_sag(result)] if weight else []), *told]))
     return 0
 
 
@@ -178,6 +181,18 @@ def _format_stiffness(result: Stiffness, force: Array | None) -> str:
         lines += ["", f"the force moves the tip by {median} um at half of them,"]
         lines.append(f"and by {most} um at {_format_pose(machine, result.poses[worst])}")
     return "\n".join(lines)
+
+
+def _format_sag(result: Stiffness) -> str:
+    import numpy as np
+
+    sizes = np.linalg.norm(result.sag()[:, : len(result.translations)], axis=1)
+    worst = int(sizes.argmax())
+    median, most = (format_fixed(1e3 * float(value), 2) for value in (np.median(sizes), sizes[worst]))
+    return (
+        f"\nits own weight moves the tip by {median} um at half of them,\n"
+        f"and by {most} um at {_format_pose(result.machine, result.poses[worst])}"
+    )
 
 
 def _format_percentiles(values: Array) -> list[str]:

@@ -157,6 +157,17 @@ class Dynamics:
             result -= np.einsum("nij,ni->nj", whole, np.broadcast_to(force, whole.shape[:2]))
         return result
 
+    def compute_weights(self, poses: Array, joints: Array, moved: Array) -> Array:
+        """Compute the rates of the weight's potential by sizes of the legs while the joints stand, (N, sizes) N.
+
+        moved : (N, closures, sizes) what a unit of each size adds to the closures' right side, mm²
+        """
+        z, matrices, _ = self._place(poses, joints)
+        n, still = self._coordinates, np.zeros((len(z), 2 * self._width))
+        forces = self._evaluate("forces", np.hstack([z, still, np.full((len(z), 1), GRAVITY)]))
+        ways = solve_each(matrices, moved[:, :n] / np.array(self._equations.sizes)[:, None])
+        return np.asarray(_NEWTON * np.einsum("nis,ni->ns", ways, forces[:, :n]))
+
     def compute_path_forces(self, poses: Array, joints: Array, slopes: Array, bends: Array) -> PathForces:
         """Compute the drives' forces along a path, from the joints' first and second derivatives by its length."""
         placed, still = self._place(poses, joints), np.zeros_like(joints)

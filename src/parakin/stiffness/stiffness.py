@@ -9,6 +9,7 @@ import numpy as np
 
 from ..arguments import RowsLike, check_arguments, read_rows
 from ..arrays import Array
+from ..dynamics.inverse_dynamics import Dynamics, Motion
 from ..errors import PoseError
 from ..families.family import Family, solve_each
 from ..machine import Machine
@@ -93,6 +94,21 @@ class Stiffness:
             raise PoseError(f"force: one, or as many as the {len(self.poses)} poses, expected")
         rows = np.broadcast_to(rows, (len(self.poses), tip))
         return np.asarray(np.einsum("nij,nj->ni", self.compliances[:, :, :tip], rows))
+
+    def sag(self) -> Array:
+        """Compute how the machine's own weight moves the tool, (N, n): the twist, mm and rad.
+
+        The masses are those of :func:`parakin.compute_drive_forces`; struts are held at both ends, so none of their own
+        weight bends them.
+        """
+        dynamics, still = Dynamics(self.machine), np.zeros_like(self.joints)
+        a, (drives, *struts) = _list_springs(self.machine, self.poses, self.joints, self.springs)
+        weights = [dynamics.compute_forces(Motion(self.poses, self.joints, still, still))]
+        weights += [dynamics.compute_weights(self.poses, self.joints, own.moved) for own in struts]
+        total = np.zeros(self.compliances.shape[:2])
+        for own, weight in zip((drives, *struts), weights, strict=True):
+            total -= np.einsum("nis,ns->ni", solve_each(a, own.moved), own.compliances * weight)
+        return total
 
     def _rest(self) -> Array:
         return np.zeros(len(self.translations))

@@ -17,7 +17,9 @@ if TYPE_CHECKING:
 _PERCENTS = (0, 5, 50)
 
 
-def encode_stiffness(stiffness: Stiffness, force: Array | None, files: Mapping[str, str]) -> dict[str, Any]:
+def encode_stiffness(
+    stiffness: Stiffness, force: Array | None, files: Mapping[str, str], weight: bool = False
+) -> dict[str, Any]:
     """Encode stiffnesses in N/mm, deflections in mm and rad, the compliance at the worst pose in mm, rad, N, Nmm."""
     machine, worst = stiffness.machine, int(stiffness.least.argmin())
     units = np.eye(len(stiffness.translations))
@@ -35,6 +37,7 @@ def encode_stiffness(stiffness: Stiffness, force: Array | None, files: Mapping[s
         "twist": list(list_twist_names(machine)),
         "compliance_at_worst_pose": stiffness.compliances[worst].tolist(),
         "deflection": None if force is None else _encode_deflection(stiffness, force),
+        "sag": _encode_sag(stiffness) if weight else None,
         "files": dict(files),
     }
 
@@ -52,5 +55,15 @@ def _encode_deflection(stiffness: Stiffness, force: Array) -> dict[str, Any]:
         "median": float(np.median(sizes)),
         "worst": float(sizes[worst]),
         "worst_twist": dict(zip(names, moved[worst].tolist(), strict=True)),
+        "worst_pose": encode_pose(stiffness.machine, stiffness.poses[worst]),
+    }
+
+
+def _encode_sag(stiffness: Stiffness) -> dict[str, Any]:
+    sizes = np.linalg.norm(stiffness.sag()[:, : len(stiffness.translations)], axis=1)
+    worst = int(sizes.argmax())
+    return {
+        "median": float(np.median(sizes)),
+        "worst": float(sizes[worst]),
         "worst_pose": encode_pose(stiffness.machine, stiffness.poses[worst]),
     }

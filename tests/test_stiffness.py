@@ -319,3 +319,43 @@ def test_the_command_tells_the_sag(tmp_path, capsys):
     assert main([*words, "--json"]) == 0
     sag = json.loads(capsys.readouterr().out)["sag"]
     assert 0.0 < sag["median"] <= sag["worst"] < 0.1
+
+
+@pytest.mark.parametrize("name", ["hexapod", "tricept", "rotary_delta"])
+def test_a_loaded_machine_gives_way_by_its_equilibrium(name, tmp_path):
+    """The joints at which soft springs hold weight and a force, found anew for each small force more."""
+    machine = load_heavy(name, tmp_path, 60)
+    pose = draw_poses(machine, 1)[0]
+    stiff = {"mm": "0.2 N/um", "rad": "1 kNm/rad"}
+    springs = {joint: stiff[unit] for joint, unit in zip(machine.joints, machine.joint_units, strict=True)}
+    found = pk.analyse_stiffness(machine, springs, None, [pose])
+    force, tip, dynamics = np.array([300.0, -200.0, -4000.0]), len(found.translations), Dynamics(machine)
+    joints, compliance = machine.inverse(pose), found.springs.drives
+
+    def ask(q, force):
+        still = np.zeros((1, len(q)))
+        return dynamics.compute_forces(Motion(machine.forward(q, near=pose).poses[None], q[None], still, still), force)[
+            0
+        ]
+
+    free = joints + compliance * ask(joints, force)  # where the drives stand, so that the loaded pose is this one
+
+    def settle(force):
+        q = joints
+        for _ in range(60):
+            q = free - compliance * ask(q, force)
+        return machine.forward(q, near=pose).poses[:tip]
+
+    steps = 20.0 * np.eye(tip)
+    expected = np.column_stack([(settle(force + step) - settle(force - step)) / 40.0 for step in steps])
+    loaded, unloaded = found.load(force).compliances[0, :tip, :tip], found.compliances[0, :tip, :tip]
+    assert loaded == pytest.approx(expected, abs=2e-3 * np.abs(loaded - unloaded).max())
+    assert np.abs(loaded - unloaded).max() > 5e-3 * np.abs(loaded).max()
+
+
+def test_loads_on_rods_are_refused():
+    found = pk.analyse_stiffness(pk.load("orthoglide"), "100 N/um", {"diameter": "20 mm"}, samples=3)
+    with pytest.raises(pk.PoseError, match="of kind slider"):
+        found.load()
+    with pytest.raises(pk.PoseError, match="force: one number each"):
+        found.load([1.0, 2.0])

@@ -9,6 +9,7 @@ All derivatives are the traces' own.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from itertools import combinations_with_replacement
 from typing import NamedTuple
 
 import numpy as np
@@ -69,6 +70,7 @@ class Dynamics:
                 ("bends", 2, self._trace_bends),
                 ("forces", 3, self._trace_forces),
                 ("tip", 1, self._trace_tip),
+                ("turns", 3, self._trace_turns),
             )
         }
         axes = len(machine.axes)
@@ -114,6 +116,18 @@ class Dynamics:
         pose = self._equations.structure.pose(z[:n], self._equations.list_serial(z[n:]))
         tip = [x for x, axis in zip(pose, self.machine.axes, strict=True) if axis in "XYZ"]
         return [derivative(x, one) for x in tip for one in z]
+
+    def _trace_turns(self, trace: Trace) -> list[Scalar]:
+        """Trace the second derivatives of the weight's potential, by the gravity, and of the tip's place."""
+        states = [self._block(trace, number) for number in range(3)]
+        z, n = states[0], self._coordinates
+        potential: Scalar = 0.0
+        for weighted in list_weighted_vectors(self.machine, self._equations, z[:n], z[n:]):
+            if weighted.falls:
+                potential = potential + weighted.weight * weighted.vector[2]
+        pose = self._equations.structure.pose(z[:n], self._equations.list_serial(z[n:]))
+        tip = [x for x, axis in zip(pose, self.machine.axes, strict=True) if axis in "XYZ"]
+        return [_differentiate_twice(term, *states) for term in (trace.input(3 * self._width) * potential, *tip)]
 
     # Batches.
 
@@ -168,6 +182,30 @@ class Dynamics:
         ways = solve_each(matrices, moved[:, :n] / np.array(self._equations.sizes)[:, None])
         return np.asarray(_NEWTON * np.einsum("nis,ni->ns", ways, forces[:, :n]))
 
+    def compute_load_rates(self, poses: Array, joints: Array, force: Array) -> Array:
+        """Compute how the drives' forces at rest change with the joints, (N, joints, joints) N/mm, under a load.
+
+        force : (translations,) N on the tool's tip, along the pose's axes; the weight is added
+
+        It is the Hessian of the loads' potential, from its second derivatives along sums of two joints.
+        """
+        z, matrices, ways = self._place(poses, joints)
+        count = joints.shape[1]
+        second = np.empty((count, count, len(z)))
+        for i, j in combinations_with_replacement(range(count), 2):
+            speeds = np.zeros_like(joints)
+            speeds[:, i] = speeds[:, j] = 1.0
+            rates = np.hstack([_apply_each(ways, speeds), speeds])
+            bends = self._evaluate("bends", np.hstack([z, rates]))
+            own = -solve_each(matrices, bends[:, :, None])[:, :, 0]
+            state = np.hstack([z, rates, own, np.zeros_like(joints), np.full((len(z), 1), GRAVITY)])
+            turns = self._evaluate("turns", state)
+            second[i, j] = second[j, i] = _NEWTON * turns[:, 0] - turns[:, 1:] @ force
+        single = np.einsum("iin->in", second)
+        both = 0.5 * (second - single[:, None] - single[None])
+        both[np.arange(count), np.arange(count)] = single
+        return np.ascontiguousarray(both.transpose(2, 0, 1))
+
     def compute_path_forces(self, poses: Array, joints: Array, slopes: Array, bends: Array) -> PathForces:
         """Compute the drives' forces along a path, from the joints' first and second derivatives by its length."""
         placed, still = self._place(poses, joints), np.zeros_like(joints)
@@ -186,6 +224,11 @@ def _differentiate_along(y: Scalar, z: Sequence[Term], rates: Sequence[Scalar]) 
     return total
 
 
+def _differentiate_twice(y: Scalar, z: Sequence[Term], rates: Sequence[Scalar], bends: Sequence[Scalar]) -> Scalar:
+    """Differentiate a trace twice by the time, from the first and second derivatives of its inputs."""
+    return _differentiate_along(_differentiate_along(y, z, rates), z, rates) + _differentiate_along(y, z, bends)
+
+
 def _add_forces(
     weighted: WeightedVector, states: tuple[list[Term], list[Term], list[Term]], gravity: Term, totals: list[Scalar]
 ) -> None:
@@ -193,8 +236,7 @@ def _add_forces(
     z, rates, bends = states
     for number, component in enumerate(weighted.vector):
         slopes = [derivative(component, one) for one in z]
-        along = _differentiate_along(component, z, rates)
-        second = _differentiate_along(along, z, rates) + _differentiate_along(component, z, bends)
+        second = _differentiate_twice(component, z, rates, bends)
         if weighted.falls and number == 2:
             second = gravity + second
         for i, slope in enumerate(slopes):

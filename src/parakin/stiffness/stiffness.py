@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -109,6 +109,35 @@ class Stiffness:
         for own, weight in zip((drives, *struts), weights, strict=True):
             total -= np.einsum("nis,ns->ni", solve_each(a, own.moved), own.compliances * weight)
         return total
+
+    def load(self, force: RowsLike | None = None) -> Stiffness:
+        """Compute the stiffness of the machine that weight and a force on the tip load at these poses.
+
+        force : N by the translations, (t,) or a dict; by default none
+
+        The loads keep their directions, so what they do changes with the geometry: their potential's Hessian stands
+        beside the springs'. NaN where the machine gives way without bound.
+
+        Raises :class:`PoseError` for struts whose springs are not along their drives, of kinds other than ``length``.
+        """
+        acting = self._rest()
+        if force is not None:
+            acting = read_rows(force, self.translations, ["mm"] * len(acting), self._rest, "force")
+        if acting.shape != self._rest().shape or not np.isfinite(acting).all():
+            raise PoseError(f"force: one number each for {' '.join(self.translations)} expected")
+        machine, compliance = self.machine, np.zeros_like(self.joints)
+        a, (drives, *struts) = _list_springs(machine, self.poses, self.joints, self.springs)
+        compliance += drives.compliances
+        for leg, own in zip(machine.legs, struts, strict=False):
+            if leg.kind not in ("length", "ring"):
+                raise PoseError(f"struts: loads on those of kind {leg.kind} are not told, expected rigid ones")
+            compliance[:, machine.joints.index(leg.drives[0].name)] += own.compliances[:, 0]
+        rates = Dynamics(machine).compute_load_rates(self.poses, self.joints, acting)
+        ways, softer = solve_each(a, drives.moved), np.eye(rates.shape[1]) + compliance[:, :, None] * rates
+        inverse = solve_each(softer, compliance[:, :, None] * np.eye(rates.shape[1]))
+        loaded = ways @ inverse @ ways.transpose(0, 2, 1)
+        steady = np.linalg.eigvals(np.where(np.isfinite(softer), softer, 0.0)).real.min(axis=1) > 0.0
+        return replace(self, compliances=np.where(steady[:, None, None], loaded, np.nan))
 
     def _rest(self) -> Array:
         return np.zeros(len(self.translations))

@@ -334,9 +334,8 @@ def test_a_loaded_machine_gives_way_by_its_equilibrium(name, tmp_path):
 
     def ask(q, force):
         still = np.zeros((1, len(q)))
-        return dynamics.compute_forces(Motion(machine.forward(q, near=pose).poses[None], q[None], still, still), force)[
-            0
-        ]
+        given = machine.forward(q, near=pose).poses[None]
+        return dynamics.compute_forces(Motion(given, q[None], still, still), force)[0]
 
     free = joints + compliance * ask(joints, force)  # where the drives stand, so that the loaded pose is this one
 
@@ -358,4 +357,4 @@ def test_loads_on_rods_are_refused():
     with pytest.raises(pk.PoseError, match="of kind slider"):
         found.load()
     with pytest.raises(pk.PoseError, match="force: one number each"):
-        found.load([1.0, 2.0])
+        found.load(np.zeros((2, 3)))

@@ -86,14 +86,20 @@ def stiffness(
         print_remark(unreachable)
         return OFF_LIMITS
     files = {} if output is None else _write(result, output, direction, wanted, lines)
+    _tell(result, wanted, weight, files, json)
+    return 0
+
+
+def _tell(result: Stiffness, force: Array | None, weight: bool, files: dict[str, str], json: bool) -> None:
     if json:
         from ..export.json.stiffness import encode_stiffness
 
-        print_json(encode_stiffness(result, wanted, files, weight))
-    else:
-        told = [f"{kind}  {path}" for kind, path in files.items()]
-        print_text("\n".join([_format_stiffness(result, wanted), *([_format_sag(result)] if weight else []), *told]))
-    return 0
+        print_json(encode_stiffness(result, force, files, weight))
+        return
+    sag = [_format_sag(result)] if weight else []
+    print_text(
+        "\n".join([_format_stiffness(result, force), *sag, *(f"{kind}  {path}" for kind, path in files.items())])
+    )
 
 
 def _read_drives(texts: list[str] | None) -> dict[str, str] | str | None:

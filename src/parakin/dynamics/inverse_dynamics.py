@@ -199,8 +199,8 @@ class Dynamics:
             bends = self._evaluate("bends", np.hstack([z, rates]))
             own = -solve_each(matrices, bends[:, :, None])[:, :, 0]
             state = np.hstack([z, rates, own, np.zeros_like(joints), np.full((len(z), 1), GRAVITY)])
-            turns = self._evaluate("turns", state)
-            second[i, j] = second[j, i] = _NEWTON * turns[:, 0] - turns[:, 1:] @ force
+            curvatures = self._evaluate("turns", state)
+            second[i, j] = second[j, i] = _NEWTON * curvatures[:, 0] - curvatures[:, 1:] @ force
         single = np.einsum("iin->in", second)
         both = 0.5 * (second - single[:, None] - single[None])
         both[np.arange(count), np.arange(count)] = single

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from drawn import draw, machine_of
 from geometry import Description
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from independent import orientation, tool_axis
 from shipped import REPRESENTATIVES
@@ -224,7 +224,6 @@ def signed_pose(poses, pose):
     "family", ["translational", "carried", "plane", "planar", "sideways", "central", "other central"]
 )
 @given(seed=st.integers(0, 2**32 - 1))
-@settings(max_examples=15)
 def test_those_of_drawn_machines(family, seed, tmp_path):
     d, _ = draw(family, seed, 1)
     m = machine_of(d, tmp_path)

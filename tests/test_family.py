@@ -1,7 +1,6 @@
 """Families against machines made one by one: by replaced numbers, by machine files, and by differences."""
 
 import tempfile
-import time
 from dataclasses import replace
 from pathlib import Path
 
@@ -13,7 +12,8 @@ from parakin.errors import PoseError
 from parakin.machine import Machine
 from parakin.model.elements import Point, Size
 
-SHIPPED = pk.machines()
+SOLVED = ["triglide_pairs"]  # constraints without a closed form, once a number of them is free
+SHIPPED = [name for name in pk.machines() if name not in SOLVED]
 FEW = ["tricept", "hexapod", "orthoglide", "lambda6", "rotary_delta", "orthoglide5_table", "eclipse", "rpr3"]
 
 
@@ -51,6 +51,14 @@ def test_a_family_is_the_machines_of_its_sizes(name):
     theirs = one.forward(joints, near=poses)
     assert solution.converged.all() and theirs.converged.all()
     assert np.abs(solution.poses - theirs.poses).max() < 1e-9
+
+
+@pytest.mark.parametrize("name", SOLVED)
+def test_no_number_is_free_where_constraints_are_solved(name):
+    machine = pk.load(name)
+    family = pk.family(machine, ["legs.*.foot.*"])
+    with pytest.raises(pk.DescriptionError, match="no number of the machine can be free"):
+        family.inverse(machine.home, family.nominal)
 
 
 @pytest.mark.parametrize("name", FEW)
@@ -123,16 +131,13 @@ def test_batches_of_machines_and_poses_broadcast():
     assert np.abs(back.poses - poses[:, None]).max() < 1e-10
 
 
-def test_a_machine_a_row_costs_no_trace():
+def test_a_machine_a_row_costs_no_trace(monkeypatch):
     machine = pk.load("hexapod")
     family = pk.family(machine, ["feet", "platform"])
-    count = 200_000
-    sizes = family.nominal + np.random.default_rng(0).uniform(-0.1, 0.1, (count, len(family.names)))
-    poses = np.broadcast_to(machine.home, (count, 6))
-    family.inverse(poses, sizes)
-    start = time.perf_counter()
-    family.inverse(poses, sizes)
-    assert time.perf_counter() - start < 1.0  # some 0.2 s; a trace alone takes 3 ms a machine
+    family.inverse(machine.home, family.nominal)
+    monkeypatch.delattr("parakin.families.family.compile_tape")
+    sizes = family.nominal + np.random.default_rng(0).uniform(-0.1, 0.1, (1000, len(family.names)))
+    assert np.isfinite(family.inverse(machine.home, sizes)).all()
 
 
 def test_struts_of_a_joint_may_differ_a_little():

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from drawn import draw, machine_of
 from geometry import Description, transform
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from test_conformance import everyone, families, poses_about
 
@@ -224,7 +224,6 @@ def well_away(m, poses, mode, serial):
 
 @families
 @given(seed=st.integers(0, 2**32 - 1))
-@settings(max_examples=25)
 def test_drawn_machines_come_back(family, seed, tmp_path):
     d, drawn = draw(family, seed, 20)
     m = machine_of(d, tmp_path)

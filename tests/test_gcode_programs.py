@@ -21,7 +21,7 @@ from parakin.toolpath.reading.gcode.reader import read_gcode
 
 pytestmark = pytest.mark.skipif(shutil.which("rs274") is None, reason="LinuxCNC's interpreter is not here")
 
-COUNT = int(os.environ.get("PARAKIN_PROGRAMS", "1500"))
+COUNT = int(os.environ.get("PARAKIN_PROGRAMS", "800"))
 TOOLS = {1: 12.5, 2: 40.0, 3: 101.6, 7: 0.5}
 INCH = 25.4
 SECONDS = 3  # of the processor for a program; a few never end

@@ -264,8 +264,8 @@ PRESS = """() => {
         input.dispatchEvent(new Event("input"));
       }
     }
-    if (i % 30 === 0) document.getElementById("run").click();
-    if (i % 30 === 15) document.querySelector("#runs button")?.click();
+    if (i % 100 === 0) document.getElementById("run").click();
+    if (i % 100 === 50) document.querySelector("#runs button")?.click();
   }
 }"""
 

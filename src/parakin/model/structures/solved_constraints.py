@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import fields, is_dataclass
 from math import isfinite
 
 import numpy as np
@@ -12,6 +13,7 @@ from ...algebra import (
     ORIGIN,
     Mat,
     Scalar,
+    Term,
     Trace,
     Vec,
     apply,
@@ -32,6 +34,7 @@ from ...errors import DescriptionError
 from ..chain import make_small_rotation
 from ..elements import ROTATIONS, TRANSLATIONS, PlaneConstraint, RodConstraint
 from ..legs import Leg
+from ..nominal_values import find_nominal_value
 from ..spec import Spec
 from .constraint_rates import find_carrier, measure_constraint
 from .parasitic import FoundFrame
@@ -55,6 +58,10 @@ class SolvedConstraints:
     """
 
     def __init__(self, spec: Spec, middle: Vec, home: Mapping[str, float]):
+        if find_term((spec.constraints, spec.legs, middle)):
+            raise DescriptionError(
+                "constraints", "are solved, not in closed form: no number of the machine can be free"
+            )
         self.spec, self.middle = spec, middle
         self.unknown = tuple(word for word in _WORDS if word in spec.parasitic)
         self._trace = Trace()
@@ -187,6 +194,13 @@ class UnturnedByRods:
         return FoundFrame(IDENTITY, tuple(origin), ())
 
 
+def find_term(described: object) -> bool:
+    """Tell whether a number of a description, of tuples and dataclasses, follows from what is free."""
+    if is_dataclass(described):
+        return any(find_term(getattr(described, field.name)) for field in fields(described))
+    return isinstance(described, Term) or (isinstance(described, tuple) and any(find_term(each) for each in described))
+
+
 def has_parallelograms(spec: Spec) -> bool:
     """Tell whether every constraint is a rod that makes a parallelogram with the rod of the leg that carries it."""
     return all(isinstance(each, RodConstraint) and _is_parallel(spec, each) for each in spec.constraints)
@@ -198,14 +212,17 @@ def _is_parallel(spec: Spec, rod: RodConstraint) -> bool:
     leg, number = find_carrier(spec, rod.drive)
     if leg.find_fixed_joint() is None or leg.sphere([0.0] * len(leg.drives)) is None:
         return False
-    return all(_measure_skew(rod, leg, number, q) <= 1e-12 * rod.rod for q in (0.0, 0.7, -1.3))
+    return not any(_find_skew(rod, leg, number, q) for q in (0.0, 0.7, -1.3))
 
 
-def _measure_skew(rod: RodConstraint, leg: Leg, number: int, q: float) -> float:
-    """Measure by how much a rod is not parallel to the leg's own, or of another length, mm, at one value of joints."""
+def _find_skew(rod: RodConstraint, leg: Leg, number: int, q: float) -> bool:
+    """Find whether a rod is not parallel to the leg's own, or of another length, at one value of joints.
+
+    What follows from free sizes counts as zero only where it is for all of them.
+    """
     joints = [q] * len(leg.drives)
     sphere = leg.sphere(joints)
     assert sphere is not None
     feet = sub(leg.carry(rod.foot, joints, number), sphere[0])
-    off = sub(feet, sub(rod.platform, leg.platform))
-    return float(max(*(abs(x) for x in off), abs(rod.rod - sphere[1])))
+    off = (*sub(feet, sub(rod.platform, leg.platform)), rod.rod - sphere[1])
+    return any(isinstance(x, Term) or abs(x) > 1e-12 * find_nominal_value(rod.rod) for x in off)

@@ -12,7 +12,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import trimesh
 from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 from mpl_toolkits.mplot3d.art3d import Line3DCollection, Poly3DCollection
 
@@ -20,6 +22,8 @@ import parakin as pk
 from parakin.units import name_display_unit, to_display
 
 BLUE, ORANGE, GREEN, GREY = "#1565c0", "#ef6c00", "#2e7d32", "#90a4ae"
+VIEW: dict[str, Any] = {"elev": 24.0, "azim": -56.0}  # degrees
+LIGHT = np.array([0.30, -0.55, 0.78])
 TILT = np.deg2rad(15.0)
 TOTAL = dict.fromkeys("ABC", (-TILT, TILT))
 
@@ -63,39 +67,51 @@ def sizes(name: str) -> str:
     return f"Sizes of `{name}`: {', '.join([*lengths, *drives])}. {source}"
 
 
-def plane(width: float = 6.4, height: float = 6.0, count: int = 1) -> tuple[Figure, list[Any]]:
+def plane(width: float = 6.4, height: float = 6.0) -> tuple[Figure, Any]:
     figure = Figure(figsize=(width, height), dpi=110, layout="constrained")
-    axes = [figure.add_subplot(1, count, i + 1) for i in range(count)]
-    for ax in axes:
-        ax.set_aspect("equal")
-        ax.grid(color="#e3e8ec", linewidth=0.7)
-        ax.set_axisbelow(True)
-    return figure, axes
+    ax = figure.add_subplot()
+    ax.set_aspect("equal")
+    ax.grid(color="#e3e8ec", linewidth=0.7)
+    ax.set_axisbelow(True)
+    ax.set_xlabel("X [mm]", fontsize=8)
+    ax.set_ylabel("Y [mm]", fontsize=8)
+    ax.tick_params(labelsize=7)
+    return figure, ax
 
 
 def space(count: int = 1, width: float = 7.0, height: float = 6.4) -> tuple[Figure, list[Any]]:
-    figure = Figure(figsize=(width, height), dpi=110, layout="constrained")
-    return figure, [figure.add_subplot(1, count, i + 1, projection="3d") for i in range(count)]
+    figure = Figure(figsize=(width, height), dpi=110)
+    figure.subplots_adjust(0.02, 0.04, 0.95, 0.98, wspace=0.12)
+    return figure, [figure.add_subplot(1, count, i + 1, projection="3d", **VIEW) for i in range(count)]
 
 
 def frame(ax: Any, low: np.ndarray, high: np.ndarray, names: tuple[str, ...]) -> None:
     for letter, name, a, b in zip("xyz", names, low, high, strict=True):
         getattr(ax, f"set_{letter}lim")(a, b)
         getattr(ax, f"set_{letter}label")(f"{name} [mm]", fontsize=8)
-    ax.set_box_aspect(high - low)
+        getattr(ax, f"{letter}axis").set_pane_color((0.975, 0.98, 0.985, 1.0))
+    ax.set_box_aspect(high - low, zoom=0.92)
     ax.tick_params(labelsize=7)
     ax.locator_params(nbins=5)
 
 
 def solid(ax: Any, shape: pk.Mesh, colour: str, alpha: float) -> None:
-    corners = shape.vertices[shape.faces]
-    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-12)
-    light = 0.65 + 0.35 * (normals @ np.array([0.3, -0.55, 0.78]))
-    rgb = np.array([int(colour[i : i + 2], 16) / 255.0 for i in (1, 3, 5)])
-    ax.add_collection3d(
-        Poly3DCollection(corners, facecolors=np.column_stack([np.outer(light, rgb), np.full(len(light), alpha)]))
-    )
+    """Draw a surface, lit by the normals at its vertices, so that it looks as smooth as it is."""
+    normals = trimesh.Trimesh(shape.vertices, shape.faces).vertex_normals[shape.faces].mean(1)
+    shades = np.outer(0.68 + 0.32 * (normals @ LIGHT), to_rgb(colour)) + 0.06
+    faces = np.column_stack([shades.clip(0.0, 1.0), np.full(len(shades), alpha)])
+    # Edges of an opaque face's own colour hide the seams that antialiasing leaves.
+    edge = {"edgecolors": faces, "linewidths": 0.3} if alpha == 1.0 else {"linewidths": 0.0}
+    ax.add_collection3d(Poly3DCollection(shape.vertices[shape.faces], facecolors=faces, **edge))
+
+
+def outlines(ax: Any, found: pk.Workspace, levels: np.ndarray, step: float, colour: str) -> None:
+    """Draw a workspace as contours, plane by plane."""
+    assert found.box is not None
+    field = pk.sample_field(found.region, found.box, step, seconds=None)
+    cuts = pk.find_cross_sections(field, "Z", levels.tolist(), seconds=None)
+    lines = [np.insert(outline, 2, cut.value, axis=1) for cut in cuts for outline in cut.outlines]
+    ax.add_collection3d(Line3DCollection(lines, colors=colour, linewidths=0.7, alpha=0.75))
 
 
 def edges(low: np.ndarray, high: np.ndarray) -> list[list[np.ndarray]]:
@@ -123,12 +139,13 @@ def tricept(page: Page) -> None:
         ("c", pk.find_largest_box(found.region, shape=(1.0, 1.0, 1.0)), "#6a1b9a"),
     ]
     figure, (ax,) = space()
-    shape = meshed(found, 40.0)
-    solid(ax, shape, BLUE, 0.16)
+    assert found.box is not None
+    low, high = found.box
+    outlines(ax, found, np.linspace(low[2], high[2], 26)[1:-1], 25.0, BLUE)
     for name, box, colour in boxes:
-        ax.add_collection3d(Line3DCollection(edges(box.low, box.high), colors=colour, linewidths=1.6, label=name))
-    frame(ax, shape.vertices.min(0), shape.vertices.max(0), found.axes)
-    ax.legend(loc="upper left")
+        ax.add_collection3d(Line3DCollection(edges(box.low, box.high), colors=colour, linewidths=1.8, label=name))
+        ax.text(box.high[0], box.low[1], box.high[2], f" {name}", color=colour, fontsize=11, weight="bold")
+    frame(ax, low, high, found.axes)
     sizes = "; ".join(f"{name} {' × '.join(f'{e:,.0f}' for e in box.edges)}" for name, box, _ in boxes)
     page.add(
         "tricept_4",
@@ -147,7 +164,7 @@ def hbg80(page: Page) -> None:
     two, three = pk.sweep_drives(plane_region, cells=48), pk.sweep_drives(space_region, cells=24)
     # |det J| grows without end where both assemblies meet: sums over few cells are off by more than the proved bounds.
     fine_area, fine_volume = pk.sweep_drives(plane_region, 2400).estimate, pk.sweep_drives(space_region, 240).estimate
-    figure, (ax,) = plane()
+    figure, ax = plane()
     for image in two.contours:
         for number, piece in enumerate(image.pieces):
             label = image.strategy.name if image.side == "home" and not number else None
@@ -164,7 +181,7 @@ def hbg80(page: Page) -> None:
         f"{proved(pk.workspace(plane_region))}. Home's assembly alone: "
         f"{proved(pk.workspace(pk.region(plane_region.machine)))}.",
     )
-    figure, (ax,) = plane()
+    figure, ax = plane()
     for net in two.nets:
         for lines in (net.positions, net.positions.swapaxes(0, 1)):
             for line in lines[::3]:
@@ -206,7 +223,7 @@ def lambda6(page: Page) -> None:
     machine = pk.load("lambda6")
     level = {"A": 0.0, "B": 0.0, "C": 0.0}
     one = pk.sweep_polar(pk.region(machine, at={**level, "Z": 1400.0}, components="all"), step=10.0, rays=72)
-    figure, (ax,) = plane()
+    figure, ax = plane()
     for angle, radius in zip(one.angles, one.radii[0], strict=True):
         ax.plot(*np.outer([np.cos(angle), np.sin(angle)], [0.0, radius]), color=GREY, linewidth=0.5)
     ax.plot(*one.outlines[0].T, "o-", color=BLUE, markersize=2.5, linewidth=1.2)
@@ -234,8 +251,8 @@ def lambda6(page: Page) -> None:
     numbers = []
     for ax, (title, without) in zip(axes, cases, strict=True):
         found = pk.workspace(pk.region(machine, at=level, without=without, components="all"))
-        shape = meshed(found, 25.0)
-        solid(ax, shape, BLUE, 0.75)
+        shape = meshed(found, 12.0)
+        solid(ax, shape, BLUE, 1.0)
         frame(ax, np.array([-500.0, -500.0, 800.0]), np.array([500.0, 500.0, 2100.0]), found.axes)
         ax.set_title(title, fontsize=10)
         numbers.append(f"{title}: {proved(found)}")
@@ -243,10 +260,11 @@ def lambda6(page: Page) -> None:
     total = pk.workspace(pk.region(machine, every=TOTAL, components="all"), gap=0.05)
     achievable = pk.workspace(pk.region(machine, at=level, components="all"))
     figure, (ax,) = space()
-    solid(ax, meshed(achievable, 25.0), BLUE, 0.13)
-    solid(ax, meshed(total, 25.0), ORANGE, 0.9)
     assert achievable.box is not None
-    frame(ax, *achievable.box, achievable.axes)
+    low, high = achievable.box
+    outlines(ax, achievable, np.linspace(low[2], high[2], 26)[1:-1], 25.0, BLUE)
+    solid(ax, meshed(total, 15.0), ORANGE, 1.0)
+    frame(ax, low, high, achievable.axes)
     page.add(
         "lambda_13",
         "Figure 13: the total orientation workspace inside the achievable one",
@@ -289,7 +307,7 @@ def orthoglide(page: Page) -> None:
         f"{int(cells.inside.sum()):,} cells proved inside, {int((~cells.inside).sum()):,} at the boundary, the "
         f"smallest {cells.size.min():.1f} mm. {proved(found)}. The thin end is in the other assembly mode.",
     )
-    figure, (ax,) = plane()
+    figure, ax = plane()
     field = pk.sample_field(found.region, found.box, 4.0, seconds=None)
     (cut,) = pk.find_cross_sections(field, "Z", [0.0], seconds=None)
     for outline in cut.outlines:

@@ -158,7 +158,7 @@ def test_command(tmp_path, capsys, monkeypatch):
         (["-o", "f.gif"], "expected a file name that ends in .png"),
         (["--csv", "f.txt"], "expected a file name that ends in .csv"),
         (["--force", "Q=5N"], 'unknown axis "Q"'),
-        (["--force", "X=5"], "expected a number above 0 with its unit"),
+        (["--force", "X=5"], "needs a unit: N, kN"),
         (["--arc-tolerance", "0"], "--arc-tolerance: expected a length"),
         (["--workpiece", "1,2"], "--workpiece"),
         (["--mode", "x"], "mode"),

@@ -214,14 +214,18 @@ def test_along_a_posted_path(tmp_path, capsys, monkeypatch):
 @pytest.mark.parametrize(
     ("name", "words", "message"),
     [
-        ("tricept", ["--drives", "100N/um"], 'drives: theta1: "100N/um", expected a number above 0 with its unit'),
+        (
+            "tricept",
+            ["--drives", "100N/um"],
+            'drives: theta1: "100N/um" is a stiffness, expected an angular stiffness (Nm/rad, kNm/rad)',
+        ),
         ("tricept", ["--drives", "d*=100N/um"], "drives: theta1 has no stiffness; rigid is one"),
         ("tricept", ["--drives", "*=rigid,q=1N/um"], 'drives: unknown "q"'),
-        ("orthoglide", ["--drives", "100"], "expected a number above 0 with its unit, N/um"),
+        ("orthoglide", ["--drives", "100"], '"100" needs a unit: N/um, kN/mm, N/mm'),
         ("orthoglide", ["--drives", "1e300N/um"], '"1e300N/um" is out of range'),
         ("orthoglide", ["--drives", "100N/um", "--force", "X=1e300N"], '--force: X: "1e300N" is out of range'),
-        ("orthoglide", ["--drives=-1N/um"], "expected a number above 0"),
-        ("orthoglide", ["--drives", "1..2N/um"], "expected a number above 0"),
+        ("orthoglide", ["--drives=-1N/um"], "expected more than 0"),
+        ("orthoglide", ["--drives", "1..2N/um"], 'drives: rho_x: "1..2N/um"'),
         ("orthoglide", ["--drives", "rigid"], "all are rigid, and so are the struts"),
         (
             "orthoglide",
@@ -236,7 +240,7 @@ def test_along_a_posted_path(tmp_path, capsys, monkeypatch):
         ("orthoglide", ["--drives", "1N/um", "--struts", "diametre=2mm"], 'struts: unknown "diametre"'),
         ("lambda6", ["--drives", "1N/um", "--struts", "9N/um"], "the short rod bends the long one"),
         ("eclipse", ["--drives", "*=rigid", "--struts", "diameter=9mm"], "those of kind column bend"),
-        ("orthoglide", ["--drives", "1N/um", "--force", "X=5"], '--force: X: "5", expected a number above 0'),
+        ("orthoglide", ["--drives", "1N/um", "--force", "X=5"], '--force: X: "5" needs a unit: N, kN'),
         ("tricept", ["--drives", "*=rigid", "--force", "B=5N"], "--force: B is no translation"),
         ("orthoglide", ["--drives", "1N/um", "--force", "Q=5N"], 'unknown axis "Q"'),
         ("orthoglide", ["--drives", "1N/um", "--along", "X"], "--along: goes with a map"),

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from ..errors import InputError, PoseError
+from ..errors import InputError, quote
+from ..units import FORCE, QuantityError, parse_quantity
 from .region_options import split_axes
 
 if TYPE_CHECKING:
     from ..arrays import Array
     from ..machine import Machine
+
+_GREATEST = 1e30  # N: its square does not overflow
 
 
 def parse_force(machine: Machine, text: str | None) -> Array | None:
@@ -18,17 +21,16 @@ def parse_force(machine: Machine, text: str | None) -> Array | None:
         return None
     import numpy as np
 
-    from ..stiffness.springs import FORCE, parse_stiff
-
     axes = [axis for axis in machine.axes if axis in "XYZ"]
     result = np.zeros(len(axes))
     for axis, value in split_axes(machine, text, "--force", "X=-200N").items():
         if axis not in axes:
             raise InputError(f"{axis} is no translation, expected {' '.join(axes)}", "--force")
-        bare = value.strip()
         try:
-            size = parse_stiff(bare.removeprefix("-"), FORCE, axis)
-        except PoseError as error:
-            raise InputError(str(error), "--force") from None
-        result[axes.index(axis)] = -size if bare.startswith("-") else size
+            size = parse_quantity(value, FORCE)
+        except QuantityError as error:
+            raise InputError(f"{axis}: {error}", "--force") from None
+        if not abs(size) < _GREATEST:
+            raise InputError(f"{axis}: {quote(value)} is out of range", "--force")
+        result[axes.index(axis)] = size
     return result

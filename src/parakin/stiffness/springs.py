@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable, Mapping
 from fnmatch import fnmatchcase
-from math import pi, radians
+from math import pi
 from typing import NamedTuple, TypeAlias
 
 import numpy as np
@@ -14,18 +13,21 @@ from ..arrays import Array
 from ..errors import PoseError, quote, suggest
 from ..machine import Machine
 from ..model.legs import Leg
-from ..units import LENGTH, QuantityError, parse_quantity
+from ..units import (
+    ANGULAR_STIFFNESS,
+    LENGTH,
+    MODULUS,
+    STIFFNESS,
+    QuantityError,
+    QuantityKind,
+    evaluate_expression,
+    parse_quantity,
+)
 
 RIGID = "rigid"
 _STEEL = "210 GPa"
 
-# Factors to N/mm, Nmm/rad, N/mm² and N.
-LINEAR = {"N/um": 1e3, "N/µm": 1e3, "kN/mm": 1e3, "MN/m": 1e3, "N/mm": 1.0, "kN/um": 1e6, "N/m": 1e-3}
-ANGULAR = {"Nm/rad": 1e3, "kNm/rad": 1e6, "Nmm/rad": 1.0, "Nm/deg": 1e3 / radians(1.0), "kNm/deg": 1e6 / radians(1.0)}
-MODULUS = {"GPa": 1e3, "MPa": 1.0, "N/mm2": 1.0}
-FORCE = {"N": 1.0, "kN": 1e3}
 _LEAST, _GREATEST = 1e-30, 1e30  # N, N/mm, Nmm/rad and MPa: sums of their squares do not overflow
-_VALUE = re.compile(r"\s*([0-9.]+(?:[eE][-+]?[0-9]+)?)\s*(\S.*?)?\s*")
 
 
 class Section(NamedTuple):
@@ -63,19 +65,17 @@ class Springs(NamedTuple):
     compliances: Array
 
 
-def parse_stiff(text: str, units: Mapping[str, float], name: str) -> float:
+def parse_positive(text: str, kind: QuantityKind, name: str) -> float:
     """Parse a number above zero with its unit.
 
     Raises :class:`PoseError`.
     """
-    match = _VALUE.fullmatch(text)
-    factor = units.get((match[2] or "").replace(" ", "")) if match else None
     try:
-        value = float(match[1]) * factor if match and factor is not None else np.nan
-    except ValueError:
-        value = np.nan
-    if not 0.0 < value < np.inf:
-        raise PoseError(f"{name}: {quote(text)}, expected a number above 0 with its unit, {', '.join(units)}")
+        value = parse_quantity(text, kind)
+    except QuantityError as error:
+        raise PoseError(f"{name}: {error}") from None
+    if not value > 0.0:
+        raise PoseError(f"{name}: {quote(text)}, expected more than 0")
     if not _LEAST < value < _GREATEST:
         raise PoseError(f"{name}: {quote(text)} is out of range")
     return value
@@ -92,7 +92,7 @@ def read_struts(struts: Mapping[str, str] | str | None) -> Struts:
     if struts is None or struts == RIGID:
         return None
     if isinstance(struts, str):
-        return parse_stiff(struts, LINEAR, "struts")
+        return parse_positive(struts, STIFFNESS, "struts")
     words = ("diameter", "wall", "modulus", "rods")
     for word, text in struts.items():
         if word not in words:
@@ -101,35 +101,32 @@ def read_struts(struts: Mapping[str, str] | str | None) -> Struts:
             raise PoseError(f"struts: {word} is a text with its unit, such as 40 mm")
     if "diameter" not in struts:
         raise PoseError("struts: the diameter is missing")
-    outer = _parse_length(struts["diameter"], "diameter")
-    wall = _parse_length(struts["wall"], "wall") if "wall" in struts else 0.5 * outer
+    outer = parse_positive(struts["diameter"], LENGTH, "struts: diameter")
+    wall = parse_positive(struts["wall"], LENGTH, "struts: wall") if "wall" in struts else 0.5 * outer
     if wall > 0.5 * outer:
         raise PoseError("struts: the wall is thicker than half the diameter")
     count = struts.get("rods", "1")
     if not (count.isascii() and count.isdigit() and 1 <= int(count) <= 9):
         raise PoseError(f"struts: rods of {quote(count)}, expected 1 to 9")
-    modulus = parse_stiff(struts.get("modulus", _STEEL), MODULUS, "struts: modulus")
+    modulus = parse_positive(struts.get("modulus", _STEEL), MODULUS, "struts: modulus")
     return _make_section(outer, 2.0 * wall, int(count), modulus)
 
 
-def _parse_length(text: str, word: str) -> float:
-    try:
-        value = parse_quantity(text, LENGTH)
-    except QuantityError as error:
-        raise PoseError(f"struts: {word}: {error}") from None
-    if not value > 0.0:
-        raise PoseError(f"struts: {word} of {quote(text)}, expected more than 0")
-    return value
-
-
-def _read_one_of(text: str, units: Mapping[str, float], name: str) -> float:
-    """Read the compliance of a drive from the one of some stiffnesses that has its unit."""
+def _read_one_of(text: str, kind: QuantityKind, name: str) -> float:
+    """Read the compliance of a drive from the one of some stiffnesses that is of its kind."""
     words = [word.strip() for word in text.split(",")]
-    own = [word for word in words if any(word.replace(" ", "").endswith(unit) for unit in units)]
+    own = [word for word in words if word != RIGID and _is_of_kind(word, kind)]
     if len(own) > 1:
         raise PoseError(f"drives: {own[0]} and {own[1]} for all, expected them by names: d*=100N/um")
     word = own[0] if own else words[0] if RIGID not in words else RIGID
-    return 0.0 if word == RIGID else 1.0 / parse_stiff(word, units, f"drives: {name}")
+    return 0.0 if word == RIGID else 1.0 / parse_positive(word, kind, f"drives: {name}")
+
+
+def _is_of_kind(text: str, kind: QuantityKind) -> bool:
+    try:
+        return evaluate_expression(text).dimension == kind.dimension
+    except QuantityError:
+        return False
 
 
 def _read_stated_drives(machine: Machine) -> Array:
@@ -145,7 +142,7 @@ def _find_stated_section(machine: Machine) -> Section | None:
     rod = machine.bodies.get("rod")
     if rod is None or rod.diameter is None:
         return None
-    modulus = parse_stiff(_STEEL, MODULUS, "modulus") if rod.modulus is None else rod.modulus
+    modulus = parse_positive(_STEEL, MODULUS, "modulus") if rod.modulus is None else rod.modulus
     return _make_section(rod.diameter, rod.diameter if rod.wall is None else 2.0 * rod.wall, rod.rods, modulus)
 
 
@@ -168,7 +165,7 @@ def read_drives(machine: Machine, drives: Mapping[str, str] | str | None) -> Arr
     if drives is None:
         return _read_stated_drives(machine)
     if isinstance(drives, str):
-        kinds = [ANGULAR if unit == "rad" else LINEAR for unit in machine.joint_units]
+        kinds = [ANGULAR_STIFFNESS if unit == "rad" else STIFFNESS for unit in machine.joint_units]
         return np.array([_read_one_of(drives, kind, name) for name, kind in zip(machine.joints, kinds, strict=True)])
     stated = drives
     used: set[str] = set()
@@ -182,8 +179,8 @@ def read_drives(machine: Machine, drives: Mapping[str, str] | str | None) -> Arr
         text = stated[own]
         if not isinstance(text, str):
             raise PoseError("drives: a text with its unit expected, such as 100 N/um")
-        units = ANGULAR if unit == "rad" else LINEAR
-        result.append(0.0 if text == RIGID else 1.0 / parse_stiff(text, units, f"drives: {name}"))
+        kind = ANGULAR_STIFFNESS if unit == "rad" else STIFFNESS
+        result.append(0.0 if text == RIGID else 1.0 / parse_positive(text, kind, f"drives: {name}"))
     for pattern in stated:
         if pattern not in used:
             raise PoseError(f"drives: unknown {quote(pattern)}{suggest(pattern, machine.joints)}")

@@ -18,7 +18,7 @@ mujoco = pytest.importorskip("mujoco")
 from mujoco_engine import METRE, Engine  # noqa: E402
 
 MACHINES = ["tricept", "hexapod", "orthoglide", "lambda6", "rotary_delta", "eclipse", "sprint_z3", "exechon"]
-MACHINES += ["orthoglide5_table", "triglide_pairs", "hbg80_3d", "rrr3", "five_bar"]
+MACHINES += ["orthoglide5_table", "triglide_pairs", "hbg80_3d", "rrr3", "five_bar", "four_struts"]
 
 
 def draw_motion(machine, count, seed):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import shutil
 import sys
 from pathlib import Path
@@ -194,3 +195,15 @@ def test_a_rod_that_is_none_is_refused(tmp_path, old, new, message):
     assert old in MIXED
     with pytest.raises((InputErrors, pk.ParakinError), match=message):
         load_text(tmp_path, MIXED.replace(old, new))
+
+
+def test_a_rod_on_a_strut_that_changes_its_length_is_refused(tmp_path):
+    text = MIXED.replace("kind: crank", "kind: length").replace("on: q1", "on: q2")
+    for key in ("pivot", "axis", "zero", "arm", "branch", "rod"):
+        text = re.sub(rf"(?m)^  {key}: .*\n", "", text)
+    text = text.replace(
+        "  range: [-80 deg, 80 deg]",
+        "  foot: {circle: 300 mm, at: [90 deg, 210 deg, 330 deg]}\n  range: [300 mm, 900 mm]",
+    )
+    with pytest.raises(pk.InputError, match=r":\d+: .*legs of kind length have no carriage or arm"):
+        load_text(tmp_path, text)

@@ -5,6 +5,7 @@ import os
 import signal
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import numpy as np
@@ -216,3 +217,25 @@ def test_no_design_keeps_all(tmp_path, capsys):
     assert main(arguments) == 3
     assert "0 of 50 designs" in capsys.readouterr().out
     assert Path(tmp_path / "out" / "_sweep.json").exists()
+
+
+def test_a_sweep_whose_designs_all_keep_their_limits(tmp_path):
+    problem = read_problem(tmp_path, GLIDE.replace("[200 mm, 500 mm]", "[330 mm, 340 mm]"))
+    result = pk.run_sweep(pk.SweepPlan(problem, 20, 20), tmp_path / "out")
+    assert set(read_table(tmp_path / "out")["limit"]) == {None}
+    assert result.designs == 20
+    with pytest.raises(pk.PoseError, match="designs: at most"):
+        pk.SweepPlan(problem, 10**15, 20)
+
+
+def test_a_scheduler_without_workers_is_told(tmp_path, monkeypatch):
+    monkeypatch.setattr(sweep_folder, "_TIMEOUT", 2.0)
+    made = Cluster(tmp_path)
+    try:
+        while not made.file.exists():
+            time.sleep(0.1)
+        plan = pk.SweepPlan(read_problem(tmp_path, GLIDE), 20, 20)
+        with pytest.raises(pk.InputError, match="the scheduler has no worker"):
+            pk.run_sweep(plan, tmp_path / "out", made.address)
+    finally:
+        made.close()

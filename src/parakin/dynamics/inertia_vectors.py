@@ -12,8 +12,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..algebra import Mat, Scalar, Vec, add, apply, cross, move_along, norm, product, scale, sub, transpose
+from ..algebra import ORIGIN, Mat, Scalar, Vec, add, apply, cross, move_along, norm, product, scale, sub, transpose
 from ..arrays import Array
+from ..errors import NoMethodError
 from ..machine import Machine
 from ..model.chain import compose_chain
 from ..model.elements import PlaneConstraint, RodConstraint, Step
@@ -21,7 +22,7 @@ from ..model.equations import Equations
 from ..model.legs import Leg, Link
 from ..model.structures import PlatformPlacement
 from .masses import BodyMass, compute_masses
-from .multibody import PLATFORM, build_multibody, place_bodies
+from .multibody import CENTRAL, PLATFORM, build_multibody, place_bodies
 
 _LEAST = 1e-12  # of a body's greatest second moment: a smaller one is rounding
 
@@ -54,7 +55,7 @@ def list_weighted_vectors(
 ) -> list[WeightedVector]:
     """List the vectors of all bodies for the motion's coordinates and joints, scalars of any kind.
 
-    Raises :class:`NoMethodError` where a leg's kind tells nothing of its bodies.
+    Raises :class:`NoMethodError` where a leg's kind tells nothing of its bodies, or not how each of them moves.
     """
     multibody = build_multibody(machine)
     masses = compute_masses(multibody)
@@ -62,8 +63,13 @@ def list_weighted_vectors(
     home = machine.place_platform(machine.home, machine.mode)
     home_joints = machine.inverse(machine.home).tolist()
     frames_at_home = dict(_list_frames(equations, machine.constraints, home.coordinates, home_joints))
+    lost = {body.name for body in multibody.bodies if body.joints} - set(frames_at_home)
+    if lost:
+        raise NoMethodError(f"it is not known how {', '.join(sorted(lost))} moves")
     vectors: list[WeightedVector] = []
     for name, frame in _list_frames(equations, machine.constraints, coordinates, joints):
+        if name not in masses:
+            continue  # a central leg that is part of its platform
         home_frame = frames_at_home[name]
         vectors += _list_body_vectors(masses[name], at_home[name], home_frame, frame)
     return vectors
@@ -111,6 +117,8 @@ def _list_frames(
     turned = product(structure.mount, rotation)
     platform = BodyFrame(to_machine(origin), tuple(transpose(turned)))
     yield PLATFORM, platform
+    if structure.has_central_leg:
+        yield CENTRAL, BodyFrame(to_machine(ORIGIN), platform.directions)
     placement = PlatformPlacement(rotation, origin, [], [])
     points, of_legs = equations.place_leg_joints(placement), equations.group_joints(joints)
     for leg, point, own in zip(equations.legs, points, of_legs, strict=True):

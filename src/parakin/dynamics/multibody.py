@@ -23,6 +23,7 @@ from .polygon import Points, order_polygon
 WORLD = "world"
 BASE = "base"
 PLATFORM: str = "platform"
+CENTRAL = "central"  # a central leg that turns every way, and what turns it
 
 METRE = 1e-3  # of a millimetre: simulators count in metres
 
@@ -187,11 +188,12 @@ def _list_platform_bodies(platform: Body) -> list[Body]:
     turns = [joint for joint in platform.joints if joint.kind == "hinge"]
     if len(turns) < 3:
         return [platform]
-    ball = BodyJoint("central", "ball", np.zeros(3), np.zeros(3))
+    ball = BodyJoint(CENTRAL, "ball", np.zeros(3), np.zeros(3))
     ends = np.array([np.zeros(3), platform.rotation.T @ platform.origin])
-    leg = Body("central", "rod", BASE, platform.rotation, np.zeros(3), (ball,), (ends,))
+    leg = Body(CENTRAL, "rod", BASE, platform.rotation, np.zeros(3), (ball,), (ends,))
     slides = tuple(joint for joint in platform.joints if joint.kind == "slide")
-    return [leg, replace(platform, carrier=leg.name, rotation=np.eye(3), origin=ends[1], joints=slides)]
+    bars = tuple(bar for bar in platform.bars if np.ptp(bar + ends, axis=0).max() > _NEAR)  # the leg is one of its own
+    return [leg, replace(platform, carrier=leg.name, rotation=np.eye(3), origin=ends[1], joints=slides, bars=bars)]
 
 
 def _locate_platform_joints(machine: Machine, placement: PlatformPlacement) -> Points:

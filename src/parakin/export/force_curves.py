@@ -46,7 +46,7 @@ def render_drive_forces(result: DriveForces, suffix: str = ".png") -> bytes:
     def add_heading(figure: Figure) -> None:
         source = result.trajectory.posted.path.source.rsplit("/", 1)[-1]
         title = f"{machine.name}: what {source} asks of the drives"
-        figure.text(0.03, 1.0 - 0.35 / height, title, color=INK, fontsize=13, weight="bold")
+        figure.text(0.03, 1.0 - 0.35 / height, title, color=INK, fontsize=13, weight="bold", parse_math=False)
 
     return render_figure((_WIDTH, height), draw, add_heading, suffix)
 

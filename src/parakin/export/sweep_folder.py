@@ -30,7 +30,7 @@ _PLAN = "_sweep.json"
 _SCHEMA = "parakin.sweep-plan/1"
 _WAITING = 3  # chunks for each thread of the scheduler's workers that are asked for at a time
 _RETRIES = 5  # of a chunk whose worker is lost
-_TIMEOUT = 10.0  # s until a scheduler answers
+_TIMEOUT = 10.0  # s until a scheduler answers, and until it has a worker
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,12 +76,13 @@ def run_sweep(
     missing = [number for number, name in enumerate(names) if not (base / name).exists()]
     evaluator = SweepEvaluator(plan)
     made, begin = 0, perf_counter()
+    wanted = sum(_count_designs(plan, number) for number in missing)
     with _open_source(plan, evaluator, missing, scheduler) as chunks:
         for number, chunk in chunks:
             write_files(base, {names[number]: _write_parquet(plan, evaluator.limits, chunk)})
             made += len(chunk.designs)
             if progress:
-                progress(made / sum(_count_designs(plan, each) for each in missing))
+                progress(made / wanted)
     cost = (perf_counter() - begin) / (made * plan.poses) if made else nan
     keeping, best = _summarise(plan, [base / name for name in names])
     return SweepResult(plan.designs, keeping, made, cost, evaluator.measure_kernel(), best)
@@ -125,6 +126,10 @@ def _open_source(
     except (OSError, ValueError) as error:
         raise InputError(f"{quote(scheduler)}: no scheduler answers: {error}", "--scheduler") from None
     with client:
+        try:
+            client.wait_for_workers(1, timeout=_TIMEOUT)
+        except TimeoutError:
+            raise InputError(f"{quote(scheduler)}: the scheduler has no worker", "--scheduler") from None
         yield _gather_chunks(client, plan, missing)
 
 
@@ -186,7 +191,7 @@ def _write_parquet(plan: SweepPlan, limits: Sequence[str], chunk: SweepChunk) ->
             names[name]: factor * values
             for name, factor, values in zip(plan.problem.variables, factors, chunk.designs.T, strict=True)
         }
-        named = pa.array(np.array([*limits, None], object)[chunk.limit])
+        named = pa.array(np.array([*limits, None], object)[chunk.limit], pa.string())
         columns |= {"allowed": chunk.allowed, "limit": named.dictionary_encode()}
         columns |= dict(zip(plan.quantities, chunk.values.T, strict=True))
         pq.write_table(pa.table(columns | {"keeps": chunk.keeps}), file)

@@ -13,6 +13,7 @@ import numpy as np
 from ..arrays import Array, Flags, Indices, split_rows
 from ..errors import PoseError
 from ..kernels.batch import find_first_negative
+from ..version import __version__
 from .measures import DesignEvaluator
 from .problem import QUANTITIES, DesignProblem
 
@@ -20,6 +21,7 @@ _ROWS = 1 << 22  # designs times poses of a chunk
 _AT_ONCE = 1 << 16  # of them at a time: they stay in the cache
 _REPEATS = 3  # of a measured time, of which the least counts
 _MOST_POSES = 1 << 20
+_MOST_CHUNKS = 100_000
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,6 +46,10 @@ class SweepPlan:
         corners = 2 ** len(self.problem.wide_axes)
         if not corners <= self.poses <= _MOST_POSES:
             raise PoseError(f"poses: {corners:,} (the box's corners) to {_MOST_POSES:,} expected, not {self.poses:,}")
+        if self.chunk_count > _MOST_CHUNKS:
+            raise PoseError(
+                f"designs: at most {_MOST_CHUNKS * self.chunk_size:,} at so many poses, not {self.designs:,}"
+            )
         if self.seed < 0:
             raise PoseError(f"seed: 0 or more expected, not {self.seed}")
 
@@ -85,6 +91,7 @@ class SweepPlan:
         """A text that two plans have in common only if all of their answers are the same."""
         problem = self.problem
         said = (
+            __version__,
             problem.machine.format_yaml(), sorted(problem.free.items()), sorted(problem.ends.items()),
             sorted(problem.shift.items()), sorted(problem.bounds.items()), tuple(problem.minimise),
             problem.fit_strokes, self.designs, self.poses, self.seed,
@@ -134,7 +141,8 @@ class SweepEvaluator:
         limit = np.where(broken[:, 0] < self.plan.poses, broken[:, 1:].argmax(1), -1)
         values = self._measure_quantities(x)
         bounds = np.array([self.problem.bounds.get(name, np.inf) for name in self.plan.quantities])
-        return SweepChunk(x, allowed, limit, values, (limit < 0) & (values <= bounds).all(1))
+        keeps = (limit < 0) & (np.isfinite(values) & (values <= bounds)).all(1)
+        return SweepChunk(x, allowed, limit, values, keeps)
 
     def find_broken(self, x: Array) -> Indices:
         """Find the first limit that designs x (S, variables) break at each pose, (S, poses): 1 + its number, or 0."""

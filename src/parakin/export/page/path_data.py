@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from base64 import b64encode
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -14,7 +15,7 @@ from ...toolpath.posting.range_use import compute_relative_margin, measure_range
 from ..colours import choose_binding_colours
 
 if TYPE_CHECKING:
-    from ...toolpath.posting.posted import Posted
+    from ...toolpath.posting.posted import Offence, Posted
     from ...toolpath.timing import Trajectory
 
 _MOST_OFFENCES = 200
@@ -39,6 +40,7 @@ def encode_page_path(posted: Posted, trajectory: Trajectory | None, numbers: int
         columns = _sample_trajectory(posted, trajectory, most)
         passed = columns["records"] - 1.0
     _gather_records(posted, columns, passed)
+    offences = posted.offences[:_MOST_OFFENCES]
     colours = {} if trajectory is None else choose_binding_colours(trajectory)
     names = () if trajectory is None else trajectory.names
     signs = [1 if sign == "+" else -1 for sign in posted.mode]
@@ -50,7 +52,10 @@ def encode_page_path(posted: Posted, trajectory: Trajectory | None, numbers: int
         "samples": len(columns["times"]),
         "columns": {name: _encode_column(values) for name, values in columns.items()},
         "bindings": [{"name": name, "colour": colours.get(name)} for name in names],
-        "offences": [_encode_offence(posted, columns, offence) for offence in posted.offences[:_MOST_OFFENCES]],
+        "offences": [
+            _encode_offence(posted, offence, int(np.abs(columns["times"] - at).argmin()))
+            for offence, at in zip(offences, _locate_offences(trajectory, offences), strict=True)
+        ],
         "records": len(posted.path),
     }
 
@@ -59,9 +64,17 @@ def _encode_column(values: Array) -> str:
     return b64encode(np.ascontiguousarray(values, "<f4").tobytes()).decode("ascii")
 
 
-def _encode_offence(posted: Posted, columns: dict[str, Array], offence: Any) -> dict[str, Any]:
-    nearest = int(np.abs(columns["records"] - (offence.record - 1.0 + offence.share)).argmin())
-    return {"text": f"{describe_place(posted, offence)}: {offence.text}", "limit": offence.limit, "sample": nearest}
+def _locate_offences(trajectory: Trajectory | None, offences: Sequence[Offence]) -> list[float]:
+    """Locate offences in the samples' times: s, or records and shares of the motions to them."""
+    motions = [(max(offence.record - 1, 0), offence.record, offence.share) for offence in offences]
+    if trajectory is None:
+        return [before + share * (to - before) for before, to, share in motions]
+    times = trajectory.times
+    return [float(times[before] + share * (times[to] - times[before])) for before, to, share in motions]
+
+
+def _encode_offence(posted: Posted, offence: Offence, sample: int) -> dict[str, Any]:
+    return {"text": f"{describe_place(posted, offence)}: {offence.text}", "limit": offence.limit, "sample": sample}
 
 
 def _gather_records(posted: Posted, columns: dict[str, Array], passed: Array) -> None:

@@ -175,7 +175,7 @@ onmessage = ({data: request}) => {
   request.sizes.forEach((size, i) => { model.sizes[i] = size; });
   machine.limits.forEach((limit, i) => { limit.bound = request.bounds[i]; });
   if (request.kind === "section") {
-    postMessage({kind: "section", id: request.id, ...computeSection(request)});
+    postMessage({kind: "section", ...computeSection(request)});
   } else {
     wanted = request;
     refineSurface(request);

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
 from ...arguments import check_arguments
-from ...errors import PoseError
+from ...errors import NoMethodError, PoseError
 from ...toolpath.placing.outside import Outside, describe_outside
 from ...toolpath.posting.offence_texts import describe_place
 from ...toolpath.posting.range_use import RangeUse, measure_range_use
@@ -105,7 +105,10 @@ def _note_unchecked(posted: Posted) -> str:
 
 
 def _render_page_card(posted: Posted, trajectory: Trajectory | None) -> str:
-    page = escape(render_path_page(posted, trajectory, _PAGE_NUMBERS))
+    try:
+        page = escape(render_path_page(posted, trajectory, _PAGE_NUMBERS))
+    except NoMethodError as error:
+        return make_card("The machine on the path", "", escape(str(error)))
     return make_card(
         "The machine on the path",
         f'<iframe class=page title="The machine on the path" srcdoc="{page}"></iframe>',

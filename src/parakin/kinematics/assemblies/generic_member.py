@@ -16,6 +16,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ...errors import NoMethodError
 from .path_tracking import join_roots, track_members
 from .quadric_family import Complex, QuadricFamily, draw_complex, make_family
 
@@ -84,7 +85,7 @@ def search_generic_member(motion: tuple[str, ...]) -> GenericMember:
         roots = more
         if quiet >= _QUIET_LOOPS and measure_trace(family, GenericMember(system, roots), rng) < _LINEAR:
             return GenericMember(system, roots)
-    raise ArithmeticError(f"{' '.join(motion)}: monodromy found {len(roots)} roots, and the trace test fails")
+    raise NoMethodError(f"{' '.join(motion)}: monodromy found {len(roots)} roots, and the trace test fails")
 
 
 def _draw_member(family: QuadricFamily, rng: np.random.Generator) -> Complex:

@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...arrays import Array, Flags
+from ...errors import NoMethodError
 from ...kernels.batch import run_in_threads
 from .quadric_family import Complex
 
@@ -93,7 +94,7 @@ def find_regular_roots(first: Complex, last: Complex, starts: Complex, fixed: in
 
     first, last : (1, n - 1, n, n), whose first ``fixed`` quadrics stay as they are
 
-    Raises :class:`ArithmeticError` where the roots do not settle.
+    Raises :class:`NoMethodError` where the roots do not settle.
     """
     roots = np.empty((0, starts.shape[1]), np.complex128)
     for number in range(_MOST_PHASES):
@@ -104,7 +105,7 @@ def find_regular_roots(first: Complex, last: Complex, starts: Complex, fixed: in
         roots = join_roots(roots, ends.points[0][ends.reached[0] == 1.0])
         if len(roots) == len(starts) or (number and len(roots) == before):
             return roots
-    raise ArithmeticError(f"{len(roots)} roots of {len(starts)} paths, and each tracking finds others")
+    raise NoMethodError(f"{len(roots)} roots of {len(starts)} paths, and each tracking finds others")
 
 
 def join_roots(roots: Complex, more: Complex) -> Complex:

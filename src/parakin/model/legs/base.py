@@ -71,6 +71,7 @@ class Leg(ABC):
     # Where the platform's joint moves by d, less than a fifth of the rod's length L, the rod's vector changes by less
     # than sway·L·d / (branch margin); None where that is not known.
     sway: ClassVar[float | None] = None
+    has_carriers: ClassVar[bool] = False  # its drives move what a passive rod could stand on
     platform_parameters: ClassVar[str] = "xyz"  # the coordinates of ``platform`` that may differ from leg to leg
 
     drives: tuple[Drive, ...]
@@ -109,7 +110,7 @@ class Leg(ABC):
     def carry(self, foot: Vec, joints: list[Scalar], drive: int) -> Vec:
         """Place a point, mm, of what one of the leg's drives moves, given where it is with all joints at 0.
 
-        Raises :class:`NoMethodError` for a kind whose drives move nothing that a rod could stand on.
+        Raises :class:`NoMethodError` for a kind without :attr:`has_carriers`.
         """
         raise NoMethodError(f"legs of kind {self.kind} have no carriage or arm")
 

@@ -18,6 +18,7 @@ class Column(Leg):
     kind = "column"
     family = "columns on a circular rail"
     units = ("rad", "mm")
+    has_carriers = True
     branches = "-"
 
     radius: Size  # of the circular rail

@@ -14,6 +14,7 @@ class Crank(Leg):
     kind = "crank"
     family = "rods on arms that turn"
     units = ("rad",)
+    has_carriers = True
     branches = "+"
 
     pivot: Point

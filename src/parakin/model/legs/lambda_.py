@@ -16,6 +16,7 @@ class Lambda(Leg):
     kind = "lambda"
     family = "two slides on a rail for each leg"
     units = ("mm", "mm")
+    has_carriers = True
     branches = "-+"
 
     foot: Point  # of both sliders at q = 0

@@ -17,6 +17,7 @@ class Slider(Leg):
     kind = "slider"
     family = "rods on straight slides"
     units = ("mm",)
+    has_carriers = True
     branches = "-"
     # The branch margin is r, with r² = L² - s². The rod changes by d across the rail, and along it by |r' - r|, less
     # than (2·s·d + d²) / r; and r + 2·s ≤ √5·L.

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from ...algebra import Mat, Scalar, Trace, Vec, add, apply, derivative, dot, evaluate_trace, product, sub
+from ...errors import DescriptionError
 from ..chain import make_small_rotation
 from ..elements import TRANSLATIONS, PlaneConstraint, RodConstraint
 from ..legs import Leg
@@ -13,8 +14,14 @@ from .base import PlatformPlacement
 
 
 def find_carrier(spec: Spec, drive: str) -> tuple[Leg, int]:
-    """Find the leg of a drive, and the drive's number in it."""
-    return next((leg, i) for leg in spec.legs for i, own in enumerate(leg.drives) if own.name == drive)
+    """Find the leg of a drive, and the drive's number in it.
+
+    Raises :class:`DescriptionError` where its drives move nothing that a rod could stand on.
+    """
+    leg, number = next((leg, i) for leg in spec.legs for i, own in enumerate(leg.drives) if own.name == drive)
+    if not leg.has_carriers:
+        raise DescriptionError("constraints", f"on {drive}: legs of kind {leg.kind} have no carriage or arm")
+    return leg, number
 
 
 def locate_rod(

@@ -84,7 +84,9 @@ class Job:
 
         Without one it can run too where the rates of its drives are unknown.
         """
-        rated = all(isfinite(drive.speed) or isfinite(drive.acceleration) for drive in self.posted.machine.drives)
+        drives = self.posted.machine.drives
+        rated = all(isfinite(drive.speed) or isfinite(drive.acceleration) for drive in drives)
+        rated |= any(isfinite(drive.force) for drive in drives)
         return self.posted.first is None and (self.trajectory is not None or not rated)
 
     @property

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from math import isfinite
 
 import numpy as np
 
@@ -67,7 +68,8 @@ def build_joint_motions(trajectory: Trajectory, digits: Mapping[str, int], short
     records = np.flatnonzero(np.diff(corner, prepend=-1))
     rows = to_display(posted.joints[records], machine.joint_units, digits)
     moved = np.flatnonzero(np.append(True, np.diff(rows, axis=0).any(axis=1)))
-    halt = np.logical_or.reduceat(trajectory.curve.parted & limits.bounds_acceleration, moved)
+    bounded = limits.bounds_acceleration or any(isfinite(drive.force) for drive in machine.drives)
+    halt = np.logical_or.reduceat(trajectory.curve.parted & bounded, moved)
     reached = np.searchsorted(moved, np.arange(len(rows)), side="right") - 1  # the row of each corner
     places = [int(reached[corner[event.record - 1]]) if event.record else FIRST for event in path.events]
     fixed = halt.copy()

@@ -203,10 +203,10 @@ def test_mutated_files(monkeypatch, seed):
     cycle = "GOTO/0,0,50\nCYCLE/DRILL,RAPTO,3.0,FEDTO,-33.0,RTRCTO,AUTO,MMPM,250.0\nGOTO/10,0,0\nCYCLE/OFF\n"
     texts = [CATIA, NX, NX.replace("END-OF-PATH\n", cycle), "UNITS/INCHES\nFROM/1,2,3\n" + CATIA]
     read_ones = 0
-    for _ in range(12_500):
+    for _ in range(4_000):
         p = taken(monkeypatch, mutated(rng.choice(texts), rng))
         if p is not None:
             read_ones += 1
             assert np.isfinite(p.tip).all()
             assert np.abs((p.axis**2).sum(axis=1) - 1.0).max() < 1e-12
-    assert read_ones > 1250
+    assert read_ones > 400

@@ -153,16 +153,16 @@ SEEDS = [
 def test_mutated_bytes(monkeypatch, seed):
     monkeypatch.setattr(gcode, "read_plain_lines", PLAIN)
     rng, read_ones = random.Random(seed), 0
-    for _ in range(15_000):
+    for _ in range(5_000):
         path = taken(mutated(rng.choice(SEEDS), rng))
         read_ones += path is not None
-    assert read_ones > 1500
+    assert read_ones > 500
 
 
 def test_random_pieces(monkeypatch):
     monkeypatch.setattr(gcode, "read_plain_lines", PLAIN)
     rng, read_ones = random.Random(0), 0
-    for _ in range(15_000):
+    for _ in range(5_000):
         data = b"G0 X1 Y2 Z3 F9\n" + b" ".join(rng.choices(PIECES, k=rng.randint(1, 9)))
         read_ones += taken(data) is not None
     assert read_ones > 500

@@ -270,6 +270,47 @@ def test_a_part_is_played(tmp_path, browser):
         assert tab.evaluate("parakin.player.time") < 0.05 * job.seconds
 
 
+def read_column(tab, name):
+    return np.array(tab.evaluate(f"Array.from(parakin.placing.columns.{name}, x => x === x ? x : null)"), float)
+
+
+@needs_chromium
+def test_a_part_is_placed(tmp_path, browser):
+    part, page = tmp_path / "square.ngc", tmp_path / "square.html"
+    part.write_text(SQUARE)
+    assert main(["page", str(part), "-m", "linear_delta", "--workpiece", "X=5,C=30", "-o", str(page)]) == 0
+    machine = pk.load("linear_delta")
+    with open_tab(browser) as tab:
+        tab.goto(page.as_uri())
+        assert tab.inner_text("#workpiece") == "--workpiece X=5,C=30"
+        tab.locator("#arrows").check()
+        before = read_column(tab, "poses").reshape(-1, 3)
+        for axis in range(3):
+            x, y = tab.evaluate(f"parakin.arrowInPicture({axis})")
+            tab.mouse.move(x, y)
+            tab.mouse.down()
+            tab.mouse.move(x + 30, y - 25, steps=3)
+            tab.mouse.up()
+        shift = np.array(tab.evaluate("parakin.placing.shift"))
+        assert (np.abs(shift) > 1.0).all()
+        x, y, z = shift
+        assert tab.inner_text("#workpiece") == f"--workpiece X={5 + x:.4f},Y={y:.4f},Z={z:.4f},C=30".replace("0,", ",")
+        poses = read_column(tab, "poses").reshape(-1, 3)
+        assert poses == pytest.approx(before + shift, abs=1e-3)
+        # Far out, half of the part is off limits, as the library has it there.
+        tab.evaluate("parakin.movePath([320, 0, 0])")
+        poses, joints = (read_column(tab, name).reshape(-1, 3) for name in ("poses", "joints"))
+        broken = machine.check(poses) != 0
+        assert 0 < broken.sum() < len(poses)
+        assert tab.evaluate("parakin.placing.broken") == pytest.approx(broken.sum(), abs=2)
+        assert joints == pytest.approx(machine.inverse(poses), abs=1e-3, nan_ok=True)
+        assert (
+            f"of {len(poses)} samples are off limits" in tab.locator("section", has_text="Place the part").inner_text()
+        )
+        tab.click("#unplace")
+        assert (read_column(tab, "poses").reshape(-1, 3) == before).all()
+
+
 @needs_chromium
 def test_an_offence_is_clicked(tmp_path, browser):
     part = tmp_path / "long.ngc"

@@ -288,6 +288,13 @@ def test_the_page_in_a_browser(studio):
         wait_until(tab, "studio.findFrame('own.yaml')?.src.endsWith('out/part.page.html') === false "
                         "&& studio.findFrame('own.yaml')?.src.includes('part.page.html')", 40.0)  # fmt: skip
         assert "all within the limits" in tab.inner_text("#runs")
+        page = next(frame for frame in tab.frames if "part.page.html" in frame.url)
+        wait_until(page, "document.getElementById('post')?.hidden === false", 20.0)
+        page.evaluate("parakin.movePath([2, 0, 0])")
+        page.click("#post")
+        wait_until(
+            tab, "[...document.querySelectorAll('.run code')].some(one => one.textContent.includes('workpiece=X=2'))"
+        )
         tab.click("summary:has-text('Edit the machine')")
         wait_until(tab, "document.getElementById('text').value.includes('kind: length')", 20.0)
         text = tab.input_value("#text")

@@ -295,10 +295,10 @@ function findTip(name = element("machine").value) {
 
 const makeRanges = name => findTip(name).map(([axis, value]) => `${axis}=${Math.round(+value - 200)}:${Math.round(+value + 200)}`).join(",");
 
-// Post the part on each machine, and play it there. Where it lies on one is remembered.
-async function postPart(place) {
+// Post the part on each machine, and play it there. Where it lies on one is remembered; on its page it can be moved.
+async function postPart(place, machines = chosenMachines()) {
   const part = element("part").value;
-  for (const name of chosenMachines()) {
+  for (const name of machines) {
     const output = `on_${name.replace(/\.ya?ml$/, "")}`, options = place(name) || {};
     const result = await run("post", {PART: part, "--machine": name, "--output": output, "--page": true, ...options});
     if (!result) return;
@@ -306,7 +306,10 @@ async function postPart(place) {
     const workpiece = best ? best[1] : options["--workpiece"];
     if (workpiece) state.workpieces[`${name} ${part}`] = {"--workpiece": workpiece};
     const page = `${output}/${part.replace(/\.[^.]*$/, "")}.page.html`;
-    if (state.files.some(file => file.name === page)) showPage(name, page, shown => shown.setPlaying(true));
+    if (state.files.some(file => file.name === page)) showPage(name, page, shown => {
+      shown.offerPosting(text => postPart(() => ({"--workpiece": text}), [name]));
+      shown.setPlaying(true);
+    });
   }
 }
 

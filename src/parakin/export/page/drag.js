@@ -1,4 +1,4 @@
-// Dragging: the tool by its handle, a drive by its strut, else the camera.
+// Dragging: the tool by its handle, a drive by its strut, the part by its arrows, else the camera.
 
 const raycaster = new THREE.Raycaster(), pointer = new THREE.Vector2();
 const pointers = new Map(); // those that are down, by their identity
@@ -13,6 +13,8 @@ function aimRay(event) {
 function findGrip(event) {
   aimRay(event);
   scene.updateMatrixWorld();
+  const arrow = arrows.visible && raycaster.intersectObjects(arrows.children)[0];
+  if (arrow) return {kind: "part", axis: arrow.object.userData.axis};
   const near = raycaster.ray.distanceToPoint(handle.position) < 2.2 * handle.scale.x;
   if (near) return {kind: "tool", offset: null};
   const hits = raycaster.intersectObjects(machineGroup.children);
@@ -89,6 +91,7 @@ canvas.addEventListener("pointermove", event => {
   if (pointers.size === 2) pinch(event, before);
   else if (grip?.kind === "tool") dragTool(event);
   else if (grip?.kind === "drive") dragDrive(event);
+  else if (grip?.kind === "part") dragArrow(event);
   else if (event.buttons & 2 || event.shiftKey) shiftCamera(event.clientX - before.clientX, event.clientY - before.clientY);
   else turnCamera(0.006 * (event.clientX - before.clientX), 0.006 * (event.clientY - before.clientY));
   if (grip) Object.assign(grip, {x: event.clientX, y: event.clientY});

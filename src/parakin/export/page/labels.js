@@ -30,16 +30,26 @@ const triad = new THREE.Group();
 });
 workGroup.add(triad);
 
-const labelPlace = new THREE.Vector3();
+const labelPlace = new THREE.Vector3(), LINE = 13; // px
+
+// The first place from y downwards that is clear of the labels already placed.
+function findClear(x, y, width, taken) {
+  const meets = other => abs(x - other.x) < 0.5 * (width + other.width) + 2 && abs(y - other.y) < LINE;
+  for (let other; (other = taken.find(meets));) y = other.y + LINE;
+  taken.push({x, y, width});
+  return y;
+}
 
 function placeLabels() {
+  const taken = [];
   const shown = document.getElementById("labels").checked, {clientWidth: width, clientHeight: height} = canvas;
   for (const {span, place, axis} of labels) {
     place(labelPlace).project(camera);
     const seen = (shown || axis) && labelPlace.z < 1 && abs(labelPlace.x) < 1 && abs(labelPlace.y) < 1;
     span.style.display = seen ? "" : "none";
     if (!seen) continue;
-    const x = (0.5 + 0.5 * labelPlace.x) * width + (axis ? -5 : 9), y = (0.5 - 0.5 * labelPlace.y) * height - (axis ? 9 : 20);
+    const x = (0.5 + 0.5 * labelPlace.x) * width + (axis ? -5 : 9);
+    const y = findClear(x, (0.5 - 0.5 * labelPlace.y) * height - (axis ? 9 : 20), 7 * span.textContent.length, taken);
     span.style.transform = `translate(${x.toFixed(1)}px, ${y.toFixed(1)}px)`;
   }
 }

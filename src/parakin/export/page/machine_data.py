@@ -12,6 +12,7 @@ from ...kinematics.wrist.pole_thresholds import PRINTED, convert_to_freedom
 from ...machine import Machine
 from ...performance.characteristic_length import choose_characteristic_length
 from ...performance.jacobians import list_twist_names
+from ...toolpath.posting.range_use import list_ranges
 from ..machine.scene import Scene, build_scene
 from ..machine.solids import LOOKS
 from .mode_traces import list_joints_of_limit
@@ -27,6 +28,7 @@ def encode_page_machine(machine: Machine) -> dict[str, Any]:
     low, high = _find_axis_ranges(machine, scene.size)
     margins = machine.margins(machine.home)
     wrist = machine.wrist
+    ranges, quantities = list_ranges(machine)
     return {
         "name": machine.name,
         "title": " ".join(machine.spec.title.split()),
@@ -56,8 +58,9 @@ def encode_page_machine(machine: Machine) -> dict[str, Any]:
                 "bound": limit.bound,
                 "joints": [machine.joints.index(name) for name in list_joints_of_limit(machine, limit)],
                 "atHome": max(float(margin), 1e-9),
+                "span": None if quantity < 0 else ranges[quantity].span,
             }
-            for limit, margin in zip(machine.limit_definitions, margins.tolist(), strict=True)
+            for limit, margin, quantity in zip(machine.limit_definitions, margins.tolist(), quantities, strict=True)
         ],
         "sizes": [
             {"name": name, "nominal": value}

@@ -32,7 +32,9 @@ function placeCamera() {
   camera.position.set(cos(elevation) * cos(azimuth), cos(elevation) * sin(azimuth), sin(elevation)).multiplyScalar(distance).add(target);
   camera.lookAt(target);
   camera.updateMatrixWorld();
-  handle.scale.setScalar(0.026 * distance * Math.tan(0.5 * camera.fov * PI / 180)); // of one size in the picture
+  const seen = distance * Math.tan(0.5 * camera.fov * PI / 180);
+  handle.scale.setScalar(0.026 * seen); // of one size in the picture
+  arrows.scale.setScalar(0.3 * seen);
 }
 
 function turnCamera(right, up) {

@@ -38,6 +38,7 @@ APP = (
     "shown_surface",
     "path",
     "player",
+    "place",
     "app",
 )
 WORKER = ("surface_worker",)

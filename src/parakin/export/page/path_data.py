@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ...arrays import Array, Indices
+from ...toolpath.posting.frames import compose_frames, find_frame_angles, invert_frame
 from ...toolpath.posting.offence_texts import describe_place
 from ...toolpath.posting.range_use import compute_relative_margin, measure_range_use
 from ..colours import choose_binding_colours
@@ -57,7 +58,15 @@ def encode_page_path(posted: Posted, trajectory: Trajectory | None, numbers: int
             for offence, at in zip(offences, _locate_offences(trajectory, offences), strict=True)
         ],
         "records": len(posted.path),
+        "workpiece": _find_workpiece(posted),
     }
+
+
+def _find_workpiece(posted: Posted) -> list[float]:
+    """Find X, Y, Z, mm, and A, B, C, rad, of the workpiece that a path was posted on, without the path's own frame."""
+    own = posted.path.frame
+    placed = posted.frame if own is None else compose_frames(posted.frame, invert_frame(own))
+    return [*placed[:, 3].tolist(), *find_frame_angles(placed)]
 
 
 def _encode_column(values: Array) -> str:

@@ -64,6 +64,12 @@ def compose_frames(outer: Array | None, inner: Array | None) -> Array:
     return np.column_stack([rotation, outer[:, :3] @ inner[:, 3] + outer[:, 3]])
 
 
+def invert_frame(frame: Array) -> Array:
+    """Invert a transform (3, 4)."""
+    turned_back = frame[:, :3].T
+    return np.column_stack([turned_back, -turned_back @ frame[:, 3]])
+
+
 @dataclass(frozen=True, eq=False)
 class PathLimit:
     """What a path asks for and a machine with fewer axes can't do: a limit of the path, not of the machine.

@@ -1,0 +1,122 @@
+// Placing the part: the path is moved along the axes, by arrows at its middle or by sliders, and the machine's equations
+// tell at once where it is off limits there. Feeds and what sets the pace stay those of the path as it was posted.
+
+const placing = {shift: [0, 0, 0], broken: 0, columns: pathColumns, post: null}; // post: what a studio does with the option --workpiece
+const shiftable = ["X", "Y", "Z"].filter(letter => machine.axes.some(axis => axis.name === letter));
+const posted = path && Object.fromEntries(["poses", "joints", "margins", "broken"].map(name => [name, pathColumns[name].slice()]));
+const arrows = new THREE.Group();
+let placeSliders = [], placeNote = null;
+
+// The least margin of a state, each over half its range: zero at a limit.
+function measureRoom(margins) {
+  return margins.reduce((least, margin, i) => machine.limits[i].span ? min(least, margin / machine.limits[i].span) : least, 1);
+}
+
+// Move the path from where it was posted, mm, and find again what its samples ask of the machine.
+function movePath(shift) {
+  const number = machine.axes.length, count = machine.joints.length, still = shift.every(value => value === 0);
+  const moves = machine.axes.map(axis => "XYZ".includes(axis.name) ? shift["XYZ".indexOf(axis.name)] : 0);
+  const {poses, joints, margins, broken} = pathColumns;
+  for (const [name, values] of Object.entries(posted)) pathColumns[name].set(values);
+  let before = stateAtPose(everyHome(), path.signs, null);
+  for (let i = 0; i < path.samples && !still; i++) {
+    const pose = rowOf("poses", i, number).map((value, k) => value + moves[k]), state = stateAtPose(pose, path.signs, before);
+    const own = state ? marginsAt(state) : [];
+    poses.set(pose, i * number);
+    joints.set(state ? state.joints : Array(count).fill(NaN), i * count);
+    margins[i] = state ? measureRoom(own) : NaN;
+    broken[i] = !state || findBroken(own) >= 0 ? 1 : 0;
+    before = state ?? before;
+  }
+  Object.assign(placing, {shift: [...shift], broken: broken.reduce((sum, value) => sum + value, 0)});
+  curveBounds = null;
+  offenceDots.visible = still;
+  arrows.position.copy(middle).add(new THREE.Vector3(...shift));
+  drawPath();
+  drawLegend();
+  seek(player.time);
+  showPlace();
+}
+
+// The option that puts the part where the path lies now.
+function writeWorkpiece() {
+  const placed = path.workpiece.map((value, i) => i < 3 ? value + placing.shift[i] : value / DEGREE);
+  return placed.map((value, i) => [`${"XYZABC"[i]}=`, Number(value.toFixed(4))]).filter(([, value]) => value !== 0)
+    .map(([name, value]) => name + value).join(",") || "X=0";
+}
+
+function showPlace() {
+  placeSliders.forEach((slider, i) => slider.show(path.workpiece["XYZ".indexOf(shiftable[i])] + placing.shift["XYZ".indexOf(shiftable[i])]));
+  const moved = placing.shift.some(value => value !== 0);
+  placeNote.className = `note ${placing.broken ? "bad" : ""}`;
+  placeNote.textContent = !moved ? "As it was posted."
+    : placing.broken ? `${placing.broken} of ${path.samples} samples are off limits here.`
+    : `All ${path.samples} samples keep the limits here; between them only posting tells.`;
+  document.getElementById("workpiece").textContent = `--workpiece ${writeWorkpiece()}`;
+}
+
+const middle = new THREE.Vector3();
+
+function buildArrows() {
+  pathLine.geometry.computeBoundingSphere();
+  middle.copy(pathLine.geometry.boundingSphere.center);
+  for (const letter of shiftable) {
+    const axis = "XYZ".indexOf(letter), unit = new THREE.Vector3().setComponent(axis, 1);
+    const material = new THREE.MeshBasicMaterial({color: AXIS_COLOURS[axis], depthTest: false, transparent: true, opacity: 0.85});
+    const shaft = new THREE.Mesh(bar, material), head = new THREE.Mesh(new THREE.ConeGeometry(1, 1, 20), material);
+    placeBar(shaft, new THREE.Vector3(), unit.clone().multiplyScalar(0.8), 0.02);
+    head.position.copy(unit).multiplyScalar(0.9);
+    head.quaternion.setFromUnitVectors(UP, unit);
+    head.scale.set(0.07, 0.2, 0.07);
+    for (const mesh of [shaft, head]) {
+      mesh.userData = {drive: -1, kind: "arrow", axis};
+      mesh.renderOrder = 2;
+      arrows.add(mesh);
+    }
+  }
+  arrows.visible = false;
+  arrows.position.copy(middle);
+  workGroup.add(arrows);
+}
+
+// Move the path along an arrow's axis so that the place that was taken stays under the pointer.
+function dragArrow(event) {
+  aimRay(event);
+  const origin = arrows.position.clone().applyMatrix4(frame), way = new THREE.Vector3().setFromMatrixColumn(frame, grip.axis);
+  const apart = origin.sub(raycaster.ray.origin), {direction} = raycaster.ray, along = way.dot(direction);
+  const square = 1 - along * along;
+  if (square < 1e-3) return; // seen from its end
+  const share = (along * apart.dot(direction) - apart.dot(way)) / square;
+  grip.share ??= share;
+  const limit = FARTHEST * size, shift = [...placing.shift];
+  shift[grip.axis] = max(-limit, min(limit, shift[grip.axis] + share - grip.share));
+  movePath(shift);
+}
+
+function buildPlacing() {
+  const place = addSection("Place the part"), show = makeElement("input", {type: "checkbox", id: "arrows"});
+  show.onchange = () => { arrows.visible = show.checked; requestPicture(); };
+  place.append(makeElement("label", {}, show, " arrows that move it"));
+  placeSliders = shiftable.map(letter => {
+    const axis = "XYZ".indexOf(letter), at = path.workpiece[axis], reach = 0.5 * size;
+    return addSlider(place, {name: letter, unit: "mm", low: at - reach, high: at + reach},
+      value => movePath(placing.shift.map((old, i) => i === axis ? value - at : old)));
+  });
+  placeNote = makeElement("p", {className: "note", role: "status"});
+  const option = makeElement("code", {id: "workpiece"}), post = makeElement("button", {id: "post", textContent: "Post it here", hidden: true});
+  post.onclick = () => placing.post(writeWorkpiece());
+  place.append(placeNote, makeElement("p", {className: "note"}, option), makeElement("div", {className: "buttons"},
+    makeElement("button", {id: "unplace", textContent: "As posted", onclick: () => movePath([0, 0, 0])}),
+    makeElement("button", {textContent: "Copy", onclick: () => navigator.clipboard?.writeText(option.textContent)}), post));
+  panel.insertBefore(place, panel.children[1]);
+  buildArrows();
+  showPlace();
+}
+
+// Let a studio post the part again where it was put.
+function offerPosting(act) {
+  placing.post = act;
+  document.getElementById("post").hidden = false;
+}
+
+if (path) buildPlacing();

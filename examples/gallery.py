@@ -142,7 +142,7 @@ def tricept(page: Page) -> None:
     assert found.box is not None
     low, high = found.box
     outlines(ax, found, np.linspace(low[2], high[2], 26)[1:-1], 25.0, BLUE)
-    for (name, box, colour), (x, y) in zip(boxes, ((1, 0), (0, 0), (1, 1)), strict=True):  # at corners clear of each other
+    for (name, box, colour), (x, y) in zip(boxes, ((1, 0), (0, 0), (1, 1)), strict=True):  # corners clear of each other
         ax.add_collection3d(Line3DCollection(edges(box.low, box.high), colors=colour, linewidths=1.8, label=name))
         corner = (box.low, box.high)[x][0], (box.low, box.high)[y][1], box.high[2] + 40.0
         ax.text(*corner, name, color=colour, fontsize=11, weight="bold", ha="center", zorder=10)

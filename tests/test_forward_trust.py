@@ -18,23 +18,7 @@ from parakin.kinematics.solution import (
     SINGULAR_START,
 )
 
-RAILS = """\
-name: six_vertical_rails
-source: Sizes were chosen.
-sizes: {R: 260 mm, r: 85 mm}
-motion: tx ty tz rz ry rx
-legs:
-  kind: slider
-  joints: [q1, q2, q3, q4, q5, q6]
-  foot: {circle: R, at: [43 deg, 137 deg, 163 deg, 257 deg, 283 deg, 17 deg]}
-  platform: {circle: r, at: [72 deg, 108 deg, 192 deg, 228 deg, 312 deg, 348 deg]}
-  rail: [0, 0, 1]
-  rod: 265 mm
-  branch: "-"
-  range: [-2 m, 2 m]
-home: {X: 0 mm, Y: 0 mm, Z: 100 mm, A: 0, B: 0, C: 0}
-"""
-
+RAILS = (Path(__file__).parent / "machines" / "six_vertical_rails.yaml").read_text(encoding="utf-8")
 PRR = """\
 name: prr
 source: Sizes were chosen.

@@ -168,6 +168,23 @@ def test_a_singularity_beyond_a_gap_is_not_met():
     assert judge_singularities(pk.region(machine))[0].verdict == "none"
 
 
+def test_a_sign_change_in_a_corner_of_the_reach_is_proved():
+    # The rods of two slides are stretched there; det A is below zero within some tenths of a mm.
+    machine = pk.load(Path(__file__).parent / "machines" / "six_vertical_rails.yaml")
+    verdict = judge_singularities(pk.region(machine, at={"Z": 0.0}))[0]
+    assert verdict.verdict == "met"
+    assert machine.check(verdict.pose) == 0
+    feet, arms = np.radians([43, 137, 163, 257, 283, 17]), np.radians([72, 108, 192, 228, 312, 348])
+    arms = 85.0 * np.array([np.cos(arms), np.sin(arms), 0.0 * arms]).T
+    sides = []
+    for x, y in (machine.home[:2], verdict.pose[:2]):
+        rods = arms + [x, y, 0.0]
+        rods[:, :2] -= 260.0 * np.array([np.cos(feet), np.sin(feet)]).T
+        rods[:, 2] = np.sqrt(265.0**2 - (rods[:, :2] ** 2).sum(1))
+        sides.append(np.linalg.det(np.hstack([rods / 265.0, np.cross(arms, rods) / 265.0 / 85.0])))
+    assert sides[0] * sides[1] < -1e-3
+
+
 @pytest.mark.parametrize(("b", "c"), [(0.0, 0.0), (0.3, 0.7), (0.2, -2.0)])
 def test_a_pole_that_a_region_meets_is_proved(b, c):
     # The platform of a Tricept hangs along the line from its centre, the origin, to the wrist: on the pole the tip is

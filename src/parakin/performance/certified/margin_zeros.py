@@ -1,6 +1,7 @@
 """Prove that a singularity margin is zero at some position of a region, by a straight way from a position inside.
 
-The way follows the margin's gradient, or that of a leg's reach, so it finds what the cells of a subdivision miss.
+The way follows the margin's gradient, or that of a leg's reach, or leads to where a search finds the margin least; so
+it finds what the cells of a subdivision miss.
 """
 
 from __future__ import annotations
@@ -16,11 +17,15 @@ from ...kernels.intervals import IntervalProgram
 from ...workspaces.certified.constraints import Constraint
 from ...workspaces.certified.containment import prove_boxes
 from ...workspaces.certified.region import Region
+from ..extremes import compute_slack
+from ..search import search_maxima
 
 _STEPS = 20  # of Newton's method
 _HALF_WIDTHS = (0.5, 0.05, 0.005)  # mm, by which a way goes beyond a zero and stays before it
 _NEAR = 1e-3  # of the least half width, within which Newton's method has found a zero
 _PIECES = 24  # of a way, each half as long as the one before
+_FINEST = 1e-6  # last step of a search for the least margin, of its first
+_BISECTIONS = 50
 
 
 def prove_sign_change(region: Region, margin: Constraint, starts: Array, budget: Budget) -> Array | None:
@@ -38,6 +43,33 @@ def prove_sign_change(region: Region, margin: Constraint, starts: Array, budget:
                 region, start, beyond, budget
             ):
                 return np.asarray(beyond)
+    return None
+
+
+def search_sign_change(region: Region, margin: Constraint, starts: Array, step: float, budget: Budget) -> Array | None:
+    """Find a position (d,) with a margin proved to be below zero, where a search for its least value leads.
+
+    In a corner of the region the margin may change its sign so near the ends of several legs' reach, where its gradient
+    is not bounded, that Newton's method leads out of the region. The least place lies on the boundary; the way ends
+    half-way between the zero on the straight line to it and the place itself.
+
+    starts : (N, d) positions in the region at which the margin is positive
+    step : the search's first, mm
+    """
+
+    def evaluate(points: Array, _: Indices) -> Array:
+        return np.where(compute_slack(region, points) >= 0.0, -_evaluate(margin, points)[0], np.nan)
+
+    if not len(starts):
+        return None
+    least, depth = search_maxima(evaluate, starts, np.full(starts.shape[1], step), _FINEST, budget)
+    for number in np.argsort(-depth, kind="stable"):
+        if not depth[number] > 0.0 or budget.is_spent():
+            break
+        start, end = starts[number], least[number]
+        below = 0.5 * (_bisect_sign(margin, start, end) + end)
+        if margin.point_program(below[None], below[None])[1][0, 0] < 0.0 and _prove_way(region, start, below, budget):
+            return np.asarray(below)
     return None
 
 
@@ -110,8 +142,19 @@ def _find_zeros(constraint: Constraint, starts: Array) -> tuple[Array, Indices]:
     return points[order], order
 
 
+def _bisect_sign(constraint: Constraint, above: Array, below: Array) -> Array:
+    """Bisect the straight line between two positions for a change of sign of a constraint; return the end below."""
+    for _ in range(_BISECTIONS):
+        middle = 0.5 * (above + below)
+        if _evaluate(constraint, middle[None])[0][0] < 0.0:
+            below = middle
+        else:
+            above = middle
+    return below
+
+
 def _evaluate(constraint: Constraint, points: Array) -> tuple[Array, Array]:
-    """Evaluate a smooth constraint (N,) and its gradient (N, d) at points."""
+    """Evaluate a constraint (N,) and, of a smooth one, its gradient (N, d) at points."""
     bottom, top = constraint.point_program(points, points)
     with np.errstate(invalid="ignore"):  # intervals without bounds
         middle = 0.5 * (bottom + top)

@@ -23,7 +23,7 @@ from ...workspaces.connected.adjacency import find_adjacent_cells, label_compone
 from ..search import pick_best_of_blocks
 from ..singularities import PARALLEL, has_serial_turns, list_margin_names
 from .free_angles import prove_free_angle
-from .margin_zeros import prove_sign_change, prove_stretched_leg
+from .margin_zeros import prove_sign_change, prove_stretched_leg, search_sign_change
 
 SingularityVerdict = Literal["met", "none", "unproved"]
 
@@ -33,6 +33,7 @@ _PROVING = 0.5  # of the budget, for the proofs that there is none, and of the r
 _STARTS = 64  # cells from which a zero that is only touched is looked for
 _ABOVE = 1e-9  # of a margin's greatest value: what is proved to be no less is above zero
 _ZERO = 1e-12  # a margin no greater is zero
+_CHANGES = "its margin changes sign on the way to it"
 _FEW, _ROUNDS = 30_000, 24  # undecided cells, and rounds, with which a proof that there is none is given up
 
 
@@ -98,7 +99,7 @@ def _judge_left(
     if pose is None and positive.is_smooth:
         pose = _pose_at(region, prove_sign_change(region, positive, starts, budget.take_fraction(_PROVING)))
     if pose is not None:
-        return RegionSingularity(name, "met", pose, "its margin changes sign on the way to it")
+        return RegionSingularity(name, "met", pose, _CHANGES)
     if 1 <= number <= legs:
         margins = _trace_margins(region)[1 : legs + 1]
         position = prove_stretched_leg(region, margins, number - 1, starts, budget.take_fraction(_PROVING))
@@ -110,6 +111,9 @@ def _judge_left(
         position = None
     if position is not None:
         return RegionSingularity(name, "met", _pose_at(region, position), "its margin falls to zero there, to a mm")
+    pose = _pose_at(region, search_sign_change(region, positive, starts, about.greatest_edge, budget))
+    if pose is not None:
+        return RegionSingularity(name, "met", pose, _CHANGES)
     return RegionSingularity(name, "unproved", None, _describe_left(budget))
 
 
@@ -172,6 +176,11 @@ class _RegionCells(NamedTuple):
     inside: Cells
     component: Indices
     joined: Cells
+
+    @property
+    def greatest_edge(self) -> float:
+        """The greatest edge of the cells inside, mm; 0 for none."""
+        return float(self.inside.size.max(initial=0.0))
 
     def find_components(self, position: Array) -> Indices:
         """Find the components of the cells that hold a position (d,)."""

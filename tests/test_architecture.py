@@ -3,10 +3,12 @@
 import ast
 import subprocess
 import sys
+from collections.abc import Iterable
+from functools import cache
 from graphlib import CycleError, TopologicalSorter
 
 import pytest
-from sources import MODULES, TREES, functions
+from sources import MODULES, TREES, for_each, functions, nodes
 
 from parakin.cli import app
 
@@ -69,13 +71,14 @@ RIM |= {"pydantic", "ruamel", "http", "socket", "subprocess"}
 NO_PATH_NEEDS = {"plotly", "matplotlib", "rich", "cyclopts"}
 
 
+@cache
 def imports(module: str) -> tuple[set[str], set[str]]:
     """What a file imports anywhere in it, for types only too: modules of parakin's own, and names of others."""
     path, own, others = MODULES[module], set(), set()
     package = [] if module == "__init__" else module.split(".")
     if path.name != "__init__.py":
         package = package[:-1]
-    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+    for node in nodes(module):
         if isinstance(node, ast.Import):
             others |= {alias.name.split(".")[0] for alias in node.names}
         elif isinstance(node, ast.ImportFrom) and not node.level:
@@ -95,12 +98,12 @@ def room_of(module: str) -> str | None:
     return max(rooms, key=len, default=None)
 
 
-@pytest.mark.parametrize("module", MODULES)
+@for_each(MODULES)
 def test_every_module_has_a_room(module):
     assert room_of(module) is not None
 
 
-@pytest.mark.parametrize("module", MODULES)
+@for_each(MODULES)
 def test_no_import_leads_up(module):
     here = room_of(module)
     for other in imports(module)[0] - {module}:
@@ -116,12 +119,12 @@ def test_no_imports_lead_in_a_circle():
         pytest.fail(" -> ".join(reversed(error.args[1])))
 
 
-@pytest.mark.parametrize("module", [m for m in MODULES if m.split(".")[0] in CORE])
+@for_each([m for m in MODULES if m.split(".")[0] in CORE])
 def test_the_core_knows_no_files_plots_or_controllers(module):
     assert not imports(module)[1] & RIM
 
 
-@pytest.mark.parametrize("module", [m for m in MODULES if m.startswith("toolpath")])
+@for_each([m for m in MODULES if m.startswith("toolpath")])
 def test_tool_paths_know_no_plots_and_no_terminal(module):
     assert not imports(module)[1] & NO_PATH_NEEDS
 
@@ -152,31 +155,29 @@ def parameters(function: ast.FunctionDef) -> int:
 ABOVE = [m for m in MODULES if room_of(m) is not None and HEIGHT[room_of(m)] > HEIGHT["machine"]]
 
 
-@pytest.mark.parametrize("module", ABOVE)
+@for_each(ABOVE)
 def test_nobody_above_the_machine_asks_its_model(module):
-    tree = TREES[module]
-    asked = [n.lineno for n in ast.walk(tree) if isinstance(n, ast.Attribute) and n.attr == "model"]
+    asked = [n.lineno for n in nodes(module) if isinstance(n, ast.Attribute) and n.attr == "model"]
     assert not asked
 
 
 DESCRIBED = {"family", "title", "source"}  # what a machine's description says in words
 
 
-@pytest.mark.parametrize("module", [m for m in ABOVE if m != "export.json.machine"])  # that one writes the description
+@for_each([m for m in ABOVE if m != "export.json.machine"])  # that one writes the description
 def test_nobody_above_the_machine_reads_its_description(module):
-    nodes = list(ast.walk(TREES[module]))
-    words = {id(n.value) for n in nodes if isinstance(n, ast.Attribute) and n.attr in DESCRIBED}
-    assert not [n.lineno for n in nodes if isinstance(n, ast.Attribute) and n.attr == "spec" and id(n) not in words]
+    words = {id(n.value) for n in nodes(module) if isinstance(n, ast.Attribute) and n.attr in DESCRIBED}
+    asked = [n for n in nodes(module) if isinstance(n, ast.Attribute) and n.attr == "spec"]
+    assert not [n.lineno for n in asked if id(n) not in words]
 
 
-@pytest.mark.parametrize("module", [m for m in MODULES if room_of(m) != "model"])
+@for_each([m for m in MODULES if room_of(m) != "model"])
 def test_structures_are_asked_for_behaviour_not_for_their_type(module):
-    tree = TREES[module]
-    calls = [n for n in ast.walk(tree) if isinstance(n, ast.Call) and ast.unparse(n.func) == "isinstance"]
+    calls = [n for n in nodes(module) if isinstance(n, ast.Call) and ast.unparse(n.func) == "isinstance"]
     assert not [call.lineno for call in calls if "structure" in ast.unparse(call.args[0])]
 
 
-@pytest.mark.parametrize("module", [m for m in MODULES if room_of(m) != "commands"])
+@for_each([m for m in MODULES if room_of(m) != "commands"])
 def test_no_function_takes_more_than_eight_parameters(module):
     assert not [f.name for f in functions(module) if parameters(f) > 8]
 
@@ -184,7 +185,7 @@ def test_no_function_takes_more_than_eight_parameters(module):
 TAPES = {"kernels.enclosures.interpret"}
 
 
-@pytest.mark.parametrize("module", MODULES)
+@for_each(MODULES)
 def test_no_function_is_longer_than_seventy_lines(module):
     long = [f.name for f in functions(module) if f.end_lineno - f.lineno >= 70]
     assert not [name for name in long if f"{module}.{name}" not in TAPES]
@@ -192,11 +193,11 @@ def test_no_function_is_longer_than_seventy_lines(module):
 
 def type_names(module: str) -> list[str]:
     """Classes, and names that a file gives to types: those that begin with a capital but are no constants."""
-    tree, names = TREES[module], []
-    for node in ast.walk(tree):
+    names = []
+    for node in nodes(module):
         if isinstance(node, ast.ClassDef):
             names.append(node.name)
-    for node in tree.body:
+    for node in TREES[module].body:
         targets = node.targets if isinstance(node, ast.Assign) else [getattr(node, "target", None)]
         names += [t.id for t in targets if isinstance(t, ast.Name) and t.id[:1].isupper() and not t.id.isupper()]
     return names
@@ -222,10 +223,10 @@ COLUMNS |= {"controllers.joints.letters"}  # the letters that a program gives to
 COLUMNS |= {"toolpath.linearise.pole_passes"}  # A of the turns that a program gives
 
 
-def pole_columns(source: str) -> list[int]:
+def pole_columns(tree_nodes: Iterable[ast.AST]) -> list[int]:
     """Find the lines that take B or C of a pose by number or by letter."""
     letters, lines = {"'A'", "'B'", "'C'"}, []
-    for node in ast.walk(ast.parse(source)):
+    for node in tree_nodes:
         names: set[str] = set()
         if isinstance(node, ast.Constant) and node.value in ("ABC", "AB", "BC"):
             lines.append(node.lineno)
@@ -251,9 +252,9 @@ def pole_columns(source: str) -> list[int]:
     return lines
 
 
-@pytest.mark.parametrize("module", [m for m in MODULES if m not in COLUMNS and room_of(m) != "toolpath.reading"])
+@for_each([m for m in MODULES if m not in COLUMNS and room_of(m) != "toolpath.reading"])
 def test_the_columns_of_b_and_c_are_the_wrists_matter(module):
-    assert not pole_columns(MODULES[module].read_text(encoding="utf-8"))
+    assert not pole_columns(nodes(module))
 
 
 POLE_LINES = ["poses[:, 4]", "machine.axes.index('C')", "home[3:]", "letter == 'B'", "rates['C']", "machine.home[-1]"]
@@ -262,8 +263,10 @@ POLE_LINES += ["letter in 'ABC'", "turns[:, 2]", "'ABC'.index(x)", "axis in ('B'
 
 @pytest.mark.parametrize("line", POLE_LINES)
 def test_columns_of_b_and_c_are_seen(line):
-    assert set(pole_columns(line)) == {1}
-    assert not pole_columns("poses[:, direction.c]; home[:3]; joints[:, 4]; code[i, 4]")
+    others = "poses[:, direction.c]; home[:3]; joints[:, 4]; code[i, 4]"
+    seen, unseen = (pole_columns(ast.walk(ast.parse(text))) for text in (line, others))
+    assert set(seen) == {1}
+    assert not unseen
 
 
 WORDS = """
@@ -309,7 +312,7 @@ COMMANDS = {name for name in app if not name.startswith("-")}
 TYPED = COMMANDS | {"main", "to_display", "workpiece"}
 
 
-@pytest.mark.parametrize("module", MODULES)
+@for_each(MODULES)
 def test_a_function_is_named_by_a_verb(module):
     for node in TREES[module].body:
         if isinstance(node, ast.FunctionDef) and not node.name.startswith("__"):
@@ -322,7 +325,7 @@ def is_property(function: ast.FunctionDef) -> bool:
     return any("property" in ast.unparse(decorator) for decorator in function.decorator_list)
 
 
-@pytest.mark.parametrize("module", MODULES)
+@for_each(MODULES)
 def test_a_function_is_described_by_a_verb(module):
     for function in functions(module):
         text = ast.get_docstring(function)
@@ -355,10 +358,10 @@ THRESHOLDS |= {"VICINITY", "TRAVEL", "REPORTED", "TILTED", "NEAR_START", "NEAR_T
 THRESHOLDS |= {"OWN", "OTHER", "EITHER"}
 
 
-@pytest.mark.parametrize("module", [m for m in MODULES if not m.startswith("kinematics.wrist.pole_")])
+@for_each([m for m in MODULES if not m.startswith("kinematics.wrist.pole_")])
 def test_pole_thresholds_and_modes_are_the_wrists_matter(module):
     """No other file has a threshold or a mode of the same name, or turns one into sin²."""
-    for node in ast.walk(TREES[module]):
+    for node in nodes(module):
         if isinstance(node, ast.Assign):
             assert not {ast.unparse(target).lstrip("_") for target in node.targets} & THRESHOLDS
         if isinstance(node, ast.Call) and ast.unparse(node.func) in ("np.sin", "sin", "math.sin"):
@@ -384,22 +387,27 @@ FRACTIONS = {
 }
 
 
-def pole_constants(source: str) -> set[str]:
+def pole_constants(source: str, tree: ast.Module) -> set[str]:
     """Find the module's constants whose comment, on their line, speaks of a pole."""
     lines, names = source.splitlines(), set()
-    for node in ast.parse(source).body:
+    for node in tree.body:
         if isinstance(node, ast.Assign) and "pole" in lines[node.end_lineno - 1].partition("#")[2]:
             names |= {ast.unparse(target) for target in node.targets}
     return names
 
 
+def constants_about_poles(module: str) -> set[str]:
+    return pole_constants(MODULES[module].read_text(encoding="utf-8"), TREES[module])
+
+
 def test_constants_about_poles_are_seen():
-    assert pole_constants("_LEAST = 0.02  # rad off the pole\nOTHER = 1.0  # mm") == {"_LEAST"}
-    constants = {f"{m}.{name}" for m in MODULES for name in pole_constants(MODULES[m].read_text(encoding="utf-8"))}
+    source = "_LEAST = 0.02  # rad off the pole\nOTHER = 1.0  # mm"
+    assert pole_constants(source, ast.parse(source)) == {"_LEAST"}
+    constants = {f"{m}.{name}" for m in MODULES for name in constants_about_poles(m)}
     assert constants >= FRACTIONS
 
 
-@pytest.mark.parametrize("module", [m for m in MODULES if not m.startswith("kinematics.wrist.pole_")])
+@for_each([m for m in MODULES if not m.startswith("kinematics.wrist.pole_")])
 def test_numbers_about_poles_are_the_wrists_matter(module):
-    constants = pole_constants(MODULES[module].read_text(encoding="utf-8"))
+    constants = constants_about_poles(module)
     assert not {f"{module}.{name}" for name in constants} - FRACTIONS

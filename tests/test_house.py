@@ -5,12 +5,12 @@ import re
 from collections import Counter
 
 import pytest
-from sources import MODULES, ROOT, TREES, functions
+from sources import MODULES, ROOT, TREES, for_each, functions
 
 SOURCES = sorted(path for ending in ("py", "c", "js", "css") for path in ROOT.rglob(f"*.{ending}"))
 
 
-@pytest.mark.parametrize("path", SOURCES, ids=lambda path: str(path.relative_to(ROOT)))
+@for_each(SOURCES)
 def test_no_file_is_longer_than_400_lines(path):
     assert len(path.read_text(encoding="utf-8").splitlines()) <= 400
 
@@ -50,7 +50,7 @@ def names_given(tree: ast.AST) -> set[str]:
     return names | {n.name for n in ast.walk(tree) if isinstance(n, (ast.FunctionDef, ast.ClassDef))}
 
 
-@pytest.mark.parametrize("module", [m for m in MODULES if not m.startswith("commands.")])
+@for_each([m for m in MODULES if not m.startswith("commands.")])
 def test_names_say_what_they_hold(module):
     names = names_given(TREES[module])
     assert not {name for name in names & (EMPTY | REPLACED) if (module, name) not in OPTIONS}
@@ -66,7 +66,7 @@ ARCHAIC = re.compile(
 )
 
 
-@pytest.mark.parametrize("path", SOURCES, ids=lambda path: str(path.relative_to(ROOT)))
+@for_each(SOURCES)
 def test_words_are_plain(path):
     assert not ARCHAIC.findall(path.read_text(encoding="utf-8"))
 
@@ -93,6 +93,16 @@ def test_nothing_stands_for_the_tests_alone():
     names = {name for module in MODULES if not module.startswith("model.legs.") for name in definitions(module)}
     assert len(names) > 1000
     assert not {name for name in names if words[name] == 1} - FROM_OUTSIDE
+
+
+def test_all_that_break_a_rule_are_listed():
+    @for_each([1, 2, 3])
+    def rule(number):
+        assert number == 2, "odd"
+
+    with pytest.raises(AssertionError) as raised:
+        rule()
+    assert [line.split(":")[0] for line in str(raised.value).splitlines() if "odd" in line] == ["1", "3"]
 
 
 def test_functions_are_seen():

@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..arrays import Array
+from ..kernels.small_matrices import compute_singular_values, solve_quotients
 from ..performance.characteristic_length import choose_characteristic_length
 from ..performance.jacobians import list_column_scales
 from .problem import DesignProblem
@@ -76,11 +77,9 @@ class DesignEvaluator:
 
 def compute_extremes(a: Array, b: Array) -> Array:
     """Compute the greatest singular value of A⁻¹B and the reciprocal of the least, (N, 2); NaN where A or B is."""
-    result = np.full((len(a), 2), np.nan)
-    known = np.flatnonzero(np.isfinite(a).all((1, 2)) & np.isfinite(b).all((1, 2)))
-    regular = known[(np.linalg.det(a[known]) != 0.0)]
-    result[known] = np.inf
-    s = np.linalg.svd(np.linalg.solve(a[regular], b[regular]), compute_uv=False)
+    quotients = solve_quotients(a, b)
+    s = compute_singular_values(quotients)
     with np.errstate(divide="ignore"):
-        result[regular] = np.stack([s[:, 0], 1.0 / s[:, -1]], -1)
+        result = np.stack([s[:, 0], 1.0 / s[:, -1]], -1)
+    result[np.isinf(quotients[:, 0, 0])] = np.inf
     return result

@@ -9,6 +9,7 @@ import numpy as np
 
 from ...arrays import Array, Indices, Progress
 from ...budget import Budget
+from ...kernels.small_matrices import compute_singular_values
 from ..extremes import ExtremeSide
 from ..indices import compute_performance
 from ..search import pick_best_of_blocks, search_maxima_in_box
@@ -189,7 +190,7 @@ def _bound_linear_terms(matrices: LinearMatrices) -> tuple[Array, Array]:
 
 def _compute_greatest(matrices: Array) -> Array:
     """Compute the greatest singular values."""
-    return np.asarray(np.linalg.svd(matrices, compute_uv=False)[..., 0])
+    return np.asarray(compute_singular_values(matrices)[..., 0])
 
 
 def _compute_norm(matrices: Array) -> Array:

@@ -5,11 +5,13 @@ What the check passes LinuxCNC's planner runs; what it can't is refused with its
 
 from __future__ import annotations
 
+import io
 import shutil
+from itertools import pairwise
 
 import numpy as np
 import pytest
-from test_random_paths import build_controller, find_fault
+from test_random_paths import build_controller, find_fault, read_program
 
 import parakin as pk
 from parakin.toolpath.linearise.continuation import MACHINE_FRAME
@@ -17,6 +19,7 @@ from parakin.toolpath.posting.frames import compute_poses
 from parakin.toolpath.posting.post import post_path
 from parakin.toolpath.timing import plan_trajectory
 from parakin.toolpath.timing.pole_jumps import refuse_pole_jumps
+from parakin.toolpath.timing.pole_pace import LEAST
 
 pytestmark = pytest.mark.skipif(not shutil.which("gcc"), reason="there is no gcc to build the planner with")
 KINDS = ("stand", "crawl", "cross", "tilt", "star")
@@ -73,6 +76,48 @@ def test_what_runs_runs_in_the_planner(controller, seed, tmp_path):
     job = prepare(controller.machine, seed, tmp_path)
     assert job.runs
     assert not find_fault(controller, job)
+
+
+@pytest.fixture(scope="module")
+def star(tmp_path_factory):
+    """A job of two ways out of the middle and back: both poles lie on it, and stands a few µrad apart."""
+    lines = make_path(5022).splitlines()
+    file = tmp_path_factory.mktemp("star") / "part.cls"
+    file.write_text("\n".join([*lines[:2], *lines[16:20], "FINI", ""]), encoding="ascii")
+    return pk.prepare(pk.load("tricept"), pk.read_path(file))
+
+
+def test_a_stretch_on_the_pole_takes_cycles_enough(star):
+    """In 7 to 9 ms the splines of a program took the first joint off by more than it may make up for in a cycle."""
+    trajectory, wrist = star.trajectory, star.posted.machine.wrist
+    ends = np.unique(
+        np.concatenate([[0.0, trajectory.seconds], trajectory.profile.time[:-1][trajectory.profile.speed < 1e-9]])
+    )
+    on_pole = 0
+    for begin, end in pairwise(ends.tolist()):
+        if wrist.find_free(trajectory.at(np.linspace(begin, end, 50)).poses, 8e-6).any():
+            on_pole += 1
+            assert end - begin > 0.999 * LEAST
+    assert on_pole > 1
+    times = np.linspace(1e-5, trajectory.seconds - 1e-5, 5000)
+    before, at, after = (trajectory.at(times + by) for by in (-1e-6, 0.0, 1e-6))
+    assert np.abs((after.joints - before.joints) / 2e-6 - at.speeds).max() < 1e-3
+
+
+def test_a_program_tells_the_wrist_as_the_trajectory_does(star):
+    """Its tips are rounded to 1 nm, and held back where they creep; beside the pole that was 2e-4 rad of theta1."""
+    file, machine = io.BytesIO(), star.posted.machine
+    pk.make_linuxcnc_program(star.trajectory)(file)
+    program = read_program(file.getvalue().decode("ascii"))
+    rows = program.rows[program.timed]
+    told = np.column_stack([rows[:, :3], np.radians(rows[:, 4:6])])
+    poses = star.trajectory.at(np.cumsum(program.seconds[program.timed])).poses
+    lean = np.sqrt(machine.wrist.measure_freedom(poses))
+    beside = (lean > 8e-6) & (lean < 0.01)
+    off = (machine.inverse(told) - machine.inverse(poses))[beside, machine.wrist.first]
+    assert beside.sum() > 300
+    assert np.abs(np.angle(np.exp(1j * off))).max() < 3e-5
+    assert np.abs(told - poses)[:, :3].max() < 1e-4
 
 
 def test_what_would_jump_is_refused(controller, tmp_path):

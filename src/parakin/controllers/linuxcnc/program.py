@@ -12,7 +12,10 @@ from ...arguments import check_arguments
 from ...arrays import Array, Flags, Indices, Writer
 from ...errors import PoseError
 from ...kinematics.wrist.pole_crossing import get_leg_signs
+from ...kinematics.wrist.pole_thresholds import DISTINCT
+from ...kinematics.wrist.pose_angles import find_nearest_direction, point_direction
 from ...machine import Machine
+from ...toolpath.linearise.poles import find_poles
 from ...toolpath.posting.setup_texts import describe_setup
 from ...toolpath.timing.trajectory import Trajectory
 from ..event_commands import check_events
@@ -86,7 +89,7 @@ def _format_program(trajectory: Trajectory, knots: Knots, approach: _Approach, f
     way = to_display(approach.poses, machine.axis_units)
     yield "G93 G61.1\n" + format_blocks("G53 G1 ", machine.axes, machine.axis_units, way, approach.seconds)
     yield f"M67 E{SIGNAL} Q1\nG61\n"
-    yield from _format_motions(machine, knots, events)
+    yield from _format_motions(trajectory, knots, events)
     yield f"M67 E{SIGNAL} Q0\nM2\n"
 
 
@@ -129,10 +132,34 @@ def _stop_slow_tips(machine: Machine, rows: Array, seconds: Array, stands: Flags
             rows[motion + 1, tip] = rows[motion, tip]
 
 
-def _format_motions(machine: Machine, knots: Knots, events: dict[int, list[str]]) -> Iterator[str]:
+def _keep_wrist(trajectory: Trajectory, times: Array, rows: Array) -> None:
+    """Turn the tool in rows (k, axes), mm and degrees, so that its wrist stands as at ``times`` (k,); in place.
+
+    Tips are rounded, and held back where they creep. Where a central leg carries the wrist, its pole moves with the
+    tip, and beside it the first joint would turn by many times the angle that the pole moves by.
+    """
+    machine = trajectory.posted.machine
+    pole = next((pole for pole in find_poles(machine, "pose", False) if pole.moves), None)
+    if pole is None or machine.wrist is None:
+        return
+    poses = trajectory.at(times).poses
+    near = np.flatnonzero(machine.wrist.find_free(poses, DISTINCT))
+    columns, poses = machine.wrist.direction.pair, poses[near]
+    angles = np.zeros((len(near), 3))
+    angles[:, 1:] = poses[:, columns]
+    axis = point_direction(*angles[:, 1:].T)
+    projected = pole.project_axes(poses[:, :3], axis)
+    axis = pole.find_axes(rows[near, :3], axis, projected, np.zeros(len(near)))
+    poses[:, columns] = find_nearest_direction(axis, angles)[:, 1:]
+    rows[near, columns] = to_display(poses, machine.axis_units)[:, columns]
+
+
+def _format_motions(trajectory: Trajectory, knots: Knots, events: dict[int, list[str]]) -> Iterator[str]:
     """Yield the motions from knot to knot, the events before each by their number, and exact stops where it stands."""
+    machine = trajectory.posted.machine
     rows, seconds = to_display(knots.poses, machine.axis_units), np.diff(knots.times)
     _stop_slow_tips(machine, rows, seconds, knots.stands)
+    _keep_wrist(trajectory, knots.times, rows)
     rows = rows[1:]
     standing = set(np.flatnonzero(knots.stands[1:]).tolist())
     breaks = sorted({0, len(rows), *events, *standing, *(at + 1 for at in standing)})

@@ -14,6 +14,7 @@ from .drive_limits import DriveLimits
 from .force_limits import ForceLimits
 from .jerk_limited import limit_jerk
 from .joint_path import build_joint_path
+from .pole_pace import slow_down_on_pole
 from .speed_profile import SpeedProfile
 from .time_optimal import (
     build_accelerated_profile,
@@ -74,6 +75,7 @@ def plan_trajectory(
         joint_path, profile, binding = limit_jerk(joint_path, limits, x)
     else:
         profile, binding = build_accelerated_profile(joint_path, limits, x, u)
+    profile = slow_down_on_pole(joint_path, profile)
     binding[joint_path.find_ends()] = len(names) - 1
     return Trajectory(posted, curve, joint_path, profile, binding, names)
 

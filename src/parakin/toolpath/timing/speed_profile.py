@@ -50,6 +50,13 @@ class SpeedProfile(NamedTuple):
             time=factor * self.time, speed=speed, acceleration=acceleration, row_times=factor * self.row_times
         )
 
+    def stretch_pieces(self, factor: Array) -> SpeedProfile:
+        """Stretch pieces in time by factors (p,), which may differ only where the motion stands still."""
+        time = np.append(self.time[0], self.time[0] + np.cumsum(factor * np.diff(self.time)))
+        speed, acceleration, jerk = self.speed / factor, self.acceleration / factor**2, self.jerk / factor**3
+        row_times = np.interp(self.row_times, self.time, time)
+        return self._replace(time=time, speed=speed, acceleration=acceleration, jerk=jerk, row_times=row_times)
+
     def at(self, times: Array) -> tuple[Indices, Array, Array, Array]:
         """Evaluate row, mm of s after the row, ṡ and s̈ at times (k,); outside the profile's time, at its ends."""
         piece = np.clip(np.searchsorted(self.time, times, "right") - 1, 0, len(self.row) - 1)

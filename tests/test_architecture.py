@@ -368,11 +368,12 @@ def test_pole_thresholds_and_modes_are_the_wrists_matter(module):
             assert ast.unparse(node.args[0]) not in THRESHOLDS
 
 
-# Numbers about poles that are no angles off a pole: fractions of the tolerance or of a way, ratios, steps.
+# Numbers about poles that are no angles off a pole: fractions of the tolerance or of a way, ratios, steps, times.
 FRACTIONS = {
     "controllers.linuxcnc.approach._LEADS",
     "kinematics.travel._HOP",
     "toolpath.posting.working_mode.HELD",
+    "toolpath.timing.pole_pace.LEAST",
     "toolpath.linearise.crossed_poles._TOGETHER",
     "toolpath.linearise.pole_holds._OFF_POLE",
     "toolpath.linearise.pole_holds._ARC",

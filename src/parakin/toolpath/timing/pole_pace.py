@@ -8,7 +8,7 @@ from ...kinematics.wrist.pole_thresholds import RIM, RIM_WIDTH
 from .joint_path import JointPath
 from .speed_profile import SpeedProfile
 
-LEAST = 0.036  # s: a stretch on the pole takes no less; a controller is told poses a cycle apart, some ms
+LEAST = 0.036  # s: a stretch on the pole takes no less; of cycles of a ms so many tell a spline
 
 
 def slow_down_on_pole(joint_path: JointPath, profile: SpeedProfile) -> SpeedProfile:

@@ -5,9 +5,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from shipped import REPRESENTATIVES
+from shipped import REPRESENTATIVES, load_shipped
 
-import parakin as pk
 from parakin.kinematics.wrist.pole_thresholds import PRINTED
 from parakin.machine import Machine
 from parakin.toolpath.path import ToolPath
@@ -140,7 +139,7 @@ REACH = {"X": 130.0, "Y": 130.0, "Z": 90.0, "A": 0.25, "B": 0.25, "C": 0.9}
 
 def drawn(name, count, seed=0):
     """A machine whose joints have ranges that motions bulge out of, and random poses, long ways apart."""
-    machine = pk.load(name)
+    machine = load_shipped(name)
     rng = np.random.default_rng([seed, REPRESENTATIVES.index(name)])
     size = 0.4 if name.startswith("ortho") else 1.0
     half = np.array([REACH[axis] * (size if axis in "XYZ" else 1.0) for axis in machine.axes])

@@ -6,6 +6,8 @@ is a machine among the representatives, which the conformance suite tests.
 
 from __future__ import annotations
 
+from functools import cache
+
 import parakin as pk
 
 NAMES = pk.machines()
@@ -27,6 +29,13 @@ REPRESENTATIVES = [
     "triglide_pairs",
     "four_struts",
 ]
+
+
+@cache
+def load_shipped(name: str) -> pk.Machine:
+    """Load a shipped machine, once for all tests of a process."""
+    assert name in NAMES, name
+    return pk.load(name)
 
 
 def list_features(machine):

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from shipped import load_shipped
 
 import parakin as pk
 from parakin.accuracy.tolerances import make_tolerance_family, read_tolerances
@@ -44,7 +45,7 @@ def draw_errors(within, pose, sizes):
 @pytest.mark.parametrize("name", TOLERANCES)
 def test_drawn_machines_err_as_predicted(name):
     """A hundred thousand machines with numbers evenly within the tolerances, each by its own direct problem."""
-    machine = pk.load(name)
+    machine = load_shipped(name)
     pose = pick_pose(machine)
     accuracy = pk.analyse_accuracy(machine, TOLERANCES[name], pose[None])
     within = accuracy.tolerances
@@ -63,7 +64,7 @@ def test_drawn_machines_err_as_predicted(name):
 
 @pytest.mark.parametrize(("name", "ranges"), [("orthoglide", "XYZ"), ("rpr3", "XY"), ("tricept", "XB")])
 def test_no_machine_breaks_the_bound_over_a_box(name, ranges):
-    machine = pk.load(name)
+    machine = load_shipped(name)
     accuracy = pk.analyse_accuracy(machine, TOLERANCES[name], samples=20)
     pose = pick_pose(machine)
     size = {"mm": 15.0, "rad": 0.03}
@@ -82,7 +83,7 @@ def test_no_machine_breaks_the_bound_over_a_box(name, ranges):
 
 
 def test_what_is_singular_is_unproved():
-    machine = pk.load("tricept")
+    machine = load_shipped("tricept")
     accuracy = pk.analyse_accuracy(machine, {"feet": "0.05 mm"}, samples=10)
     assert pk.bound_worst_case(accuracy, {}).bound == np.inf  # the tool lies along the wrist's first axis
 
@@ -97,7 +98,7 @@ def test_the_directions_are_as_near_as_they_say(size):
 
 
 def test_shares_add_up_and_rank():
-    accuracy = pk.analyse_accuracy(pk.load("orthoglide"), TOLERANCES["orthoglide"])
+    accuracy = pk.analyse_accuracy(load_shipped("orthoglide"), TOLERANCES["orthoglide"])
     assert np.allclose(accuracy.shares.sum(1), 1.0)
     means = [mean for _, mean, _ in accuracy.budget]
     assert means == sorted(means, reverse=True)
@@ -108,7 +109,7 @@ def test_shares_add_up_and_rank():
 
 def test_allowed_tolerances_are_the_cheapest():
     """Against a lattice of all tolerances that keep the error, and against the closed form of one pose."""
-    accuracy = pk.analyse_accuracy(pk.load("orthoglide"), {"feet": "0.05 mm", "rods": "0.02 mm"})
+    accuracy = pk.analyse_accuracy(load_shipped("orthoglide"), {"feet": "0.05 mm", "rods": "0.02 mm"})
     costs = {"feet": 2.0, "rods": 1.0}
     allowed = pk.allocate_tolerances(accuracy, 0.05, costs)
     again = pk.analyse_accuracy(
@@ -187,7 +188,7 @@ def test_the_example_runs(tmp_path):
 
 def test_a_tolerance_takes_the_numbers_of_its_unit():
     within = make_tolerance_family(
-        pk.load("tricept"), read_tolerances([("encoders", "2 um"), ("encoders", "0.001 deg")])
+        load_shipped("tricept"), read_tolerances([("encoders", "2 um"), ("encoders", "0.001 deg")])
     )
     assert [len(columns) for columns in within.groups] == [3, 2]
     with pytest.raises(PoseError, match="at least one expected"):
@@ -195,7 +196,7 @@ def test_a_tolerance_takes_the_numbers_of_its_unit():
 
 
 def test_mistaken_costs_and_ranges_in_python():
-    result = pk.analyse_accuracy(pk.load("orthoglide"), {"feet": "0.05 mm"}, samples=5)
+    result = pk.analyse_accuracy(load_shipped("orthoglide"), {"feet": "0.05 mm"}, samples=5)
     for cost in ("x", 0.0, -1.0, math.nan, None):
         with pytest.raises(pk.PoseError, match="costs feet: a number above 0 expected"):
             pk.allocate_tolerances(result, 0.05, {"feet": cost})

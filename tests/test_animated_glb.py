@@ -6,6 +6,7 @@ import struct
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
+from shipped import load_shipped
 
 import parakin as pk
 from parakin.cli import main
@@ -70,7 +71,7 @@ def find_outline(vertices, triangles):
 
 @pytest.mark.parametrize("name", ["tricept", "orthoglide5_table", "eclipse", "rus6", "rpr3"])
 def test_bodies_are_where_the_picture_has_them(name):
-    machine = pk.load(name)
+    machine = load_shipped(name)
     rng = np.random.default_rng(3)
     size = [30.0 if unit == "mm" else 0.1 for unit in machine.axis_units]
     poses = machine.home + rng.uniform(-1.0, 1.0, (6, len(size))) * size
@@ -97,7 +98,7 @@ def test_bodies_are_where_the_picture_has_them(name):
 
 
 def test_turns_take_the_short_way():
-    machine = pk.load("tricept")
+    machine = load_shipped("tricept")
     poses = np.tile(machine.home, (200, 1)) + [0.0, 0.0, 0.0, 0.3, 0.0]
     poses[:, 4] = np.linspace(0.0, 2.0 * np.pi, 200)
     content, arrays = read_glb(render_animated_glb(machine, np.arange(200.0), poses, machine.follow(poses)))

@@ -9,6 +9,7 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
+from shipped import load_shipped
 
 import parakin as pk
 from parakin.synthesis.designs import Designs, ProvedDesign, UnprovedDesign
@@ -18,7 +19,7 @@ PART = "UNITS/MM\nFEDRAT/3000\nGOTO/0,0,0\nGOTO/10,0,0\n"
 
 @pytest.fixture(scope="module")
 def tricept():
-    return pk.load("tricept")
+    return load_shipped("tricept")
 
 
 @pytest.fixture(scope="module")
@@ -26,18 +27,18 @@ def things(tmp_path_factory, tricept):
     """One of each public object, made cheaply."""
     folder = tmp_path_factory.mktemp("api")
     (folder / "a.cls").write_text(PART)
-    plane = pk.region(pk.load("hbg80_2d"))
+    plane = pk.region(load_shipped("hbg80_2d"))
     found = pk.workspace(plane, gap=0.3)
     path = pk.read_path(folder / "a.cls")
     job = pk.prepare(tricept, path, workpiece=pk.workpiece(Z=-1400))
     (program,) = pk.write_files(folder, {"j.ngc": pk.make_joint_program(job.trajectory)})
     field = pk.sample_field(plane, found.box)
-    space = pk.region(pk.load("orthoglide"))
-    orthoglide = pk.load("orthoglide")
+    space = pk.region(load_shipped("orthoglide"))
+    orthoglide = load_shipped("orthoglide")
     poses = np.random.default_rng(0).uniform(-50.0, 50.0, (6, 3))
     measured = pk.make_measurements(orthoglide, orthoglide.inverse(poses), poses)
     accuracy = pk.analyse_accuracy(orthoglide, {"feet": "0.1 mm"}, poses)
-    hexapod, below = pk.load("hexapod"), pk.workpiece(Z=-950)
+    hexapod, below = load_shipped("hexapod"), pk.workpiece(Z=-950)
     body = pk.sample_field(space, pk.workspace(space, gap=0.5).box, step=20)
     sides = dict.fromkeys("XYZ", (-10.0, 10.0))
     problem = pk.DesignProblem(orthoglide, {"L": (200.0, 500.0)}, sides, ["L"])
@@ -76,7 +77,7 @@ def things(tmp_path_factory, tricept):
         "WorstCase": pk.bound_worst_case(accuracy, {}),
         "Stiffness": pk.analyse_stiffness(orthoglide, "100 N/um", poses=poses),
         "DriveForces": pk.compute_drive_forces(job.trajectory),
-        "Comparison": pk.compare([plane.machine, pk.load("five_bar")], samples=5),
+        "Comparison": pk.compare([plane.machine, load_shipped("five_bar")], samples=5),
         "Measurements": measured,
         "Calibration": pk.calibrate(orthoglide, measured, ["encoders"]),
         "MeasurementPlan": pk.plan_measurements(orthoglide, 4, ["encoders"]),
@@ -170,7 +171,7 @@ def test_poses_by_name(tricept):
     assert np.array_equal(tricept.margins(named), tricept.margins(pose))
     by_joint = dict(zip(tricept.joints, joints.tolist(), strict=True))
     assert np.array_equal(tricept.forward(by_joint, near=named).poses, tricept.forward(joints, near=pose).poses)
-    assert len(pk.find_components(pk.region(pk.load("hbg80_2d")), start={"X": 100, "Y": 100}, cell=20))
+    assert len(pk.find_components(pk.region(load_shipped("hbg80_2d")), start={"X": 100, "Y": 100}, cell=20))
 
 
 @pytest.mark.parametrize(
@@ -198,7 +199,7 @@ NONSENSE = (
 def cheap_calls(things):
     """Each public function with arguments that are right and cost little."""
     m, plane, trajectory = things["Machine"], things["Region"], things["Trajectory"]
-    pose, path = m.home.tolist(), things["ToolPath"]
+    pose, path, delta = m.home.tolist(), things["ToolPath"], load_shipped("linear_delta")
     return [
         (pk.load, {"name": "tricept", "parameters": {"R": 350.0}}),
         (pk.region, {"machine": m, "at": {"B": 0.1}, "every": {}, "some": {}, "dexterous": False, "mode": "+"}),
@@ -220,7 +221,7 @@ def cheap_calls(things):
         (pk.find_placement, {"machine": m, "path": path, "bounds": {"Z": (-1400.0, -1400.0)}, "mode": "+"}),
         (pk.make_joint_program, {"trajectory": trajectory, "forced": None}),
         (pk.make_linuxcnc_program, {"trajectory": trajectory, "forced": None}),
-        (pk.make_linuxcnc_configuration, {"machine": pk.load("linear_delta")}),
+        (pk.make_linuxcnc_configuration, {"machine": delta}),
         (pk.read_joint_program, {"path": "/nonexistent"}),
         (pk.render_machine_page, {"machine": m, "pose": pose}),
         (pk.render_path_page, {"posted": things["Posted"], "trajectory": trajectory}),
@@ -233,7 +234,7 @@ def cheap_calls(things):
         (m.head_modes, {"mode": "+"}),
         (m.place_platform, {"pose": pose, "mode": "+", "joints": m.inverse(m.home)}),
         (m.twist_rates, {"poses": [pose], "joints": [m.inverse(m.home)], "whole": True}),
-        (pk.load("linear_delta").common_points, {"joints": [pk.load("linear_delta").inverse([0, 0, 0])], "side": 1.0}),
+        (delta.common_points, {"joints": [delta.inverse([0, 0, 0])], "side": 1.0}),
         (m.assemblies, {"joints": m.inverse(m.home)}),
         (m.jacobians, {"poses": pose, "mode": "+"}),
         (m.margins, {"poses": pose, "joints": m.inverse(m.home), "mode": "+"}),

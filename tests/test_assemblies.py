@@ -9,10 +9,8 @@ from geometry import Description
 from hypothesis import given
 from hypothesis import strategies as st
 from independent import orientation, tool_axis
-from shipped import REPRESENTATIVES
+from shipped import REPRESENTATIVES, load_shipped
 from test_conformance import poses_about, signed
-
-import parakin as pk
 
 TABLE_I = [  # the joint vectors of the Lambda machine's paper
     (398.89, 299.68, 414.67, 1758.75, 1714.02, 1723.08),
@@ -68,7 +66,7 @@ def closes(m, d, poses, joints):
 
 @pytest.mark.parametrize("name", REPRESENTATIVES)
 def test_all_close_and_the_true_pose_is_among_them(name):
-    m = pk.load(name)
+    m = load_shipped(name)
     d = Description.of(m.spec)
     poses = poses_about(m, 400, seed=21)
     if m.axes == tuple("XYZBC"):
@@ -88,7 +86,7 @@ def test_all_close_and_the_true_pose_is_among_them(name):
 @pytest.mark.parametrize("name", REPRESENTATIVES)
 @pytest.mark.parametrize("kind", ["apart", "nan", "inf", "huge", "negative", "zero"])
 def test_joints_that_do_not_assemble_have_none(name, kind):
-    m = pk.load(name)
+    m = load_shipped(name)
     joints = m.inverse(m.home).copy()
     if kind == "apart":
         sliding = np.flatnonzero(np.array(m.joint_units) == "mm")[:2]
@@ -108,7 +106,7 @@ def test_joints_that_do_not_assemble_have_none(name, kind):
 
 
 def test_the_tricept_has_no_others():
-    m = pk.load("tricept")
+    m = load_shipped("tricept")
     s = m.spec.sizes
     big, small, root = s["R"], s["r"], np.sqrt(3.0)
     rng = np.random.default_rng(22)
@@ -141,7 +139,7 @@ def test_the_tricept_has_no_others():
 
 @pytest.mark.parametrize("joints", [*TABLE_I, (500.0, 420.0, 460.0, 1800.0, 1750.0, 1900.0), None])
 def test_the_lambda_machine_has_no_others(joints):
-    m = pk.load("lambda6")
+    m = load_shipped("lambda6")
     d, s = Description.of(m.spec), m.spec.sizes
     if joints is None:
         joints = m.inverse([30.0, -40.0, 1420.0, 0.1, -0.15, 0.3])

@@ -6,6 +6,7 @@ import json
 import numpy as np
 import pytest
 from regions import whole_region
+from shipped import load_shipped
 
 import parakin as pk
 from parakin.budget import Budget
@@ -17,7 +18,7 @@ from parakin.performance.indices import compute_performance
 
 @pytest.mark.parametrize(("name", "count"), [("orthoglide", 2), ("hbg80_3d", 2)])
 def test_isotropic_poses_of_the_workspace(name, count):
-    m = pk.load(name)
+    m = load_shipped(name)
     found = pk.atlas(whole_region(m), seconds=None)
     assert found.isolated
     assert len(found.isotropic) == count  # home, and its image beyond a parallel singularity
@@ -32,7 +33,7 @@ def test_isotropic_poses_of_the_workspace(name, count):
 
 @pytest.mark.parametrize("name", ["linear_delta", "hexapod"])
 def test_no_sample_of_the_workspace_is_beyond_its_extremes(name):
-    m = pk.load(name)
+    m = load_shipped(name)
     found = pk.atlas(pk.region(m), seconds=None)
     assert np.array_equal(found.map.allowed, m.check(found.map.performance.poses) == 0)
     assert not found.singular
@@ -61,7 +62,7 @@ def test_no_sample_of_the_workspace_is_beyond_its_extremes(name):
 
 
 def test_an_atlas_of_a_slice_and_questions_that_make_no_sense():
-    m = pk.load("orthoglide")
+    m = load_shipped("orthoglide")
     flat = pk.atlas(pk.region(m, at={"Z": -50.0}), step=25.0, seconds=None)
     assert flat.map.axes == ("X", "Y")
     assert flat.map.performance.psi.shape == (*flat.map.allowed.shape, 3)
@@ -75,7 +76,7 @@ def test_an_atlas_of_a_slice_and_questions_that_make_no_sense():
         with pytest.raises(pk.PoseError):
             pk.atlas(pk.region(m, **wrong))
     with pytest.raises(pk.PoseError, match="region: an atlas is of one orientation, B must not be swept"):
-        pk.atlas(pk.region(pk.load("orthoglide5_head"), every={"B": (0.0, 0.1)}))
+        pk.atlas(pk.region(load_shipped("orthoglide5_head"), every={"B": (0.0, 0.1)}))
 
 
 # The command.
@@ -89,7 +90,7 @@ def told(capsys, *arguments, code=0):
 def test_the_command_at_a_pose(capsys):
     said = json.loads(told(capsys, "tricept", "--pose", "X=100,Z=-1500,B=10", "--json"))
     assert said["schema"] == "parakin.atlas/1"
-    m = pk.load("tricept")
+    m = load_shipped("tricept")
     found = compute_performance(m, [100, 0, -1500, np.radians(10), 0])
     pose = said["pose"]
     assert pose["pose"] == pytest.approx({"X": 100, "Y": 0, "Z": -1500, "B": 10, "C": 0})
@@ -115,7 +116,7 @@ def test_the_command_over_the_workspace(capsys, tmp_path):
     assert picture.read_bytes().startswith(b"\x89PNG")
     with table.open() as file:
         rows = list(csv.DictReader(file))
-    m = pk.load("orthoglide")
+    m = load_shipped("orthoglide")
     poses = np.array([[float(row[f"{axis} [mm]"]) for axis in m.axes] for row in rows])
     assert (poses[:, 2] == -20).all()
     assert np.array_equal([row["allowed"] == "1" for row in rows], m.check(poses) == 0)
@@ -132,7 +133,7 @@ def test_the_command_proves_and_refutes(capsys):
     said = json.loads(told(capsys, "orthoglide", "--box", box, "--amplification", "1/2:2", "--json", code=3))
     assert said["verdict"] == "refuted"
     pose = said["box"]["claims"][2]["counterexample"]
-    assert compute_performance(pk.load("orthoglide"), list(pose.values())).greatest > 2
+    assert compute_performance(load_shipped("orthoglide"), list(pose.values())).greatest > 2
     assert "refuted" in told(capsys, "orthoglide", "--box", box, "--amplification", "1/2:2", code=3)
 
 
@@ -173,4 +174,4 @@ def test_bad_input_is_one_line(arguments, capsys, tmp_path, monkeypatch):
 
 def test_a_map_whose_outline_is_not_found_in_time_is_refused():
     with pytest.raises(pk.PoseError, match="time is up"):
-        map_performance(pk.region(pk.load("linear_delta"), at={"Z": 280.0}), budget=Budget(1e-6))
+        map_performance(pk.region(load_shipped("linear_delta"), at={"Z": 280.0}), budget=Budget(1e-6))

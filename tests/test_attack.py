@@ -10,6 +10,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from shipped import load_shipped
 
 import parakin as pk
 from parakin.cli import main
@@ -322,7 +323,7 @@ def test_a_very_slow_program_takes_little_memory(tmp_path):
     """5,000 minutes at 0.0001 mm/min: a sample of its speed each millisecond would fill the memory."""
     path = tmp_path / "a.cls"
     path.write_text("UNITS/MM\nFEDRAT/0.0001,MMPM\nGOTO/0,0,0\nGOTO/0.25,0,0\nGOTO/0.5,0,0\nFINI\n")
-    job = pk.prepare(pk.load("tricept"), pk.read_path(path), workpiece=pk.workpiece(Z=-1400))
+    job = pk.prepare(load_shipped("tricept"), pk.read_path(path), workpiece=pk.workpiece(Z=-1400))
     assert job.seconds > 100_000
     before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     (program,) = pk.write_files(tmp_path, {"a.ngc": pk.make_linuxcnc_program(job.trajectory)})

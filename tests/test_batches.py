@@ -6,13 +6,14 @@ import numpy as np
 import pytest
 from geometry import Description
 from independent import tool_axis
+from shipped import load_shipped
 from test_conformance import everyone, poses_about
 
 import parakin as pk
 
 SHAPES = [(), (5,), (3, 4), (0,), (2, 0), (1, 1, 1)]
 FIVE = ["orthoglide5_head", "orthoglide5_table", "tricept"]
-five = pytest.mark.parametrize("m", [pk.load(name) for name in FIVE], ids=FIVE)
+five = pytest.mark.parametrize("m", [load_shipped(name) for name in FIVE], ids=FIVE)
 
 
 def allowed_like(m, shape):

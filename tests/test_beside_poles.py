@@ -11,6 +11,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from shipped import load_shipped
 from test_random_paths import build_controller, find_fault, read_program
 
 import parakin as pk
@@ -137,7 +138,7 @@ def test_what_would_jump_is_refused(controller, tmp_path):
 
 def test_what_was_computed_tells_the_least_lean():
     """A file's digits tell no C where the tool leans less than 2 µrad; an axis that was computed does."""
-    machine = pk.load("tricept")
+    machine = load_shipped("tricept")
     lean, c = 5e-7, np.radians([10.0, 40.0, 130.0])
     axis = np.column_stack([lean * np.cos(c), lean * np.sin(c), np.ones(3)])
     tip = np.tile([0.0, 0.0, -1650.0], (3, 1))

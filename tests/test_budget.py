@@ -5,6 +5,7 @@ import time
 
 import numpy as np
 import pytest
+from shipped import load_shipped
 
 import parakin as pk
 from parakin.budget import Budget
@@ -34,16 +35,16 @@ def test_a_share_is_of_what_is_left():
 
 @pytest.mark.parametrize("seconds", [0.0, -1.0, float("nan")])
 def test_no_time_is_refused(seconds):
-    region = pk.region(pk.load("orthoglide"))
+    region = pk.region(load_shipped("orthoglide"))
     for ask in (pk.workspace, pk.find_largest_box, pk.find_components, pk.atlas):
         with pytest.raises(PoseError, match="seconds: a time above 0 s expected"):
             ask(region, seconds=seconds)
 
 
 def test_a_workspace_that_is_out_of_time_holds_its_volume():
-    truth = pk.workspace(pk.region(pk.load("hbg80_2d")), gap=1e-3).volume
+    truth = pk.workspace(pk.region(load_shipped("hbg80_2d")), gap=1e-3).volume
     began = time.monotonic()
-    hasty = pk.workspace(pk.region(pk.load("hbg80_2d")), gap=1e-9, seconds=1e-6)
+    hasty = pk.workspace(pk.region(load_shipped("hbg80_2d")), gap=1e-9, seconds=1e-6)
     assert time.monotonic() - began < LATE
     assert hasty.stopped == "time"
     assert hasty.volume.inner <= truth.outer
@@ -51,7 +52,7 @@ def test_a_workspace_that_is_out_of_time_holds_its_volume():
 
 
 def test_a_step_over_orientations_ends_with_its_budget(monkeypatch):
-    region = pk.region(pk.load("tricept"), some={"B": ("-10 deg", "10 deg")})
+    region = pk.region(load_shipped("tricept"), some={"B": ("-10 deg", "10 deg")})
     low, high = region.find_extent(Budget(10.0))
     whole, hasty = region.subdivide(low, high), region.subdivide(low, high)
     looks = []
@@ -69,7 +70,7 @@ def test_a_step_over_orientations_ends_with_its_budget(monkeypatch):
 
 
 def test_a_box_out_of_time_is_proved_all_the_same():
-    region = pk.region(pk.load("hbg80_2d"))
+    region = pk.region(load_shipped("hbg80_2d"))
     began = time.monotonic()
     try:
         box = pk.find_largest_box(region, seconds=0.3)
@@ -84,7 +85,7 @@ def test_a_box_out_of_time_is_proved_all_the_same():
 
 
 def test_boxes_out_of_time_are_undecided():
-    region = pk.region(pk.load("hbg80_2d"))
+    region = pk.region(load_shipped("hbg80_2d"))
     budget = Budget(1e-9)
     low = region.machine.home[:2] - 1.0
     found = prove_boxes(region, [low], [low + 2.0], budget=budget)
@@ -94,13 +95,13 @@ def test_boxes_out_of_time_are_undecided():
 
 
 def test_singularities_out_of_time_are_unproved():
-    verdicts = judge_singularities(pk.region(pk.load("hexapod")), Budget(1e-6))
+    verdicts = judge_singularities(pk.region(load_shipped("hexapod")), Budget(1e-6))
     assert {verdict.verdict for verdict in verdicts} <= {"unproved", "none"}
     assert any("in the time given" in verdict.reason for verdict in verdicts)
 
 
 def test_an_extent_out_of_time_is_larger_and_not_kept():
-    region = pk.region(pk.load("hexapod"), some=ALL_ROUND)
+    region = pk.region(load_shipped("hexapod"), some=ALL_ROUND)
     began = time.monotonic()
     hasty = region.find_extent(Budget(1e-9))
     assert time.monotonic() - began < LATE
@@ -127,13 +128,13 @@ def test_a_box_that_is_not_found_does_not_hide_the_volume(capsys):
 
 
 def test_sampling_that_does_not_end_in_its_time_is_refused(capsys):
-    region = pk.region(pk.load("hexapod"), every=ALL_ROUND)
+    region = pk.region(load_shipped("hexapod"), every=ALL_ROUND)
     began = time.monotonic()
     for sample in (pk.sample_grid, pk.sweep_polar):
         with pytest.raises(PoseError, match="the time is up before all places are sampled"):
             sample(region, 1.0 if sample is pk.sweep_polar else 5.0, seconds=1e-6)
     with pytest.raises(PoseError, match="the time is up"):
-        pk.sweep_drives(pk.region(pk.load("hbg80_2d")), seconds=1e-6)
+        pk.sweep_drives(pk.region(load_shipped("hbg80_2d")), seconds=1e-6)
     assert time.monotonic() - began < 3 * LATE
     assert main(["workspace", "hbg80_2d", "--method", "grid", "--time", "1e-6"]) == 2
     assert capsys.readouterr().err.startswith("--time: the time is up")
@@ -163,7 +164,7 @@ def test_drawing_ends_in_its_time_and_says_so(tmp_path, capsys):
 
 
 def test_a_grid_of_the_atlas_that_is_not_done_is_refused():
-    region = pk.region(pk.load("lambda6"))
+    region = pk.region(load_shipped("lambda6"))
     region.find_extent()
     with pytest.raises(pk.PoseError, match="the time is up"):
         pk.atlas(region, step=20.0, seconds=0.01)

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from shipped import load_shipped
 
 import parakin as pk
 from parakin.calibration.calibration import choose_family
@@ -25,7 +26,7 @@ class Simulated:
     """A machine whose numbers are off, with measured and held-out poses."""
 
     def __init__(self, name, seed=0, count=40, held_out=100):
-        self.machine = pk.load(name)
+        self.machine = load_shipped(name)
         self.rng = np.random.default_rng(seed)
         family = choose_family(self.machine, None).family
         deviations = np.array([0.2 if p.unit == "mm" else 3e-4 for p in family.parameters])
@@ -124,7 +125,7 @@ def measure_bed(machine, spread=120.0):
 @pytest.mark.parametrize("name", ["linear_delta", "rotary_delta"])
 def test_probing_a_bed_tells_not_radius_from_rod(name):
     """What delta printers' users meet: the answer is a refusal that names the measurement that would tell."""
-    machine = pk.load(name)
+    machine = load_shipped(name)
     joints, poses = measure_bed(machine)
     free = ["rods", "encoders", "feet"]
     probed = pk.make_measurements(machine, joints, poses[:, 2:], axes="Z", noise=pk.Noise(0.02))
@@ -142,7 +143,7 @@ def test_probing_a_bed_tells_not_radius_from_rod(name):
 )
 def test_a_radius_and_rods_of_one_length_neither(name, free):
     """Tools that guess find rods of 281 mm where they are 272 mm: some 9 mm is what such probing leaves open."""
-    machine = pk.load(name)
+    machine = load_shipped(name)
     joints, poses = measure_bed(machine)
     probed = pk.make_measurements(machine, joints, poses[:, 2:], axes="Z", noise=pk.Noise(0.02))
     with pytest.raises(pk.UnidentifiableError, match="measure X of the tool") as refusal:
@@ -154,7 +155,7 @@ def test_a_radius_and_rods_of_one_length_neither(name, free):
 
 
 def test_probing_a_bed_tells_the_endstops():
-    machine = pk.load("linear_delta")
+    machine = load_shipped("linear_delta")
     family = pk.family(machine, ["encoders"])
     true = family.nominal + [0.4, -0.3, 0.9]
     _, poses = measure_bed(machine)
@@ -225,7 +226,7 @@ def test_the_chosen_rows_have_the_greatest_determinant():
 
 
 def test_a_plan_beats_poses_at_random():
-    machine = pk.load("hexapod")
+    machine = load_shipped("hexapod")
     plan = pk.plan_measurements(machine, 12)
     assert (machine.check(plan.poses) == 0).all()
     assert np.array_equal(plan.joints, machine.inverse(plan.poses))
@@ -297,7 +298,7 @@ def test_the_command_plans(tmp_path, capsys):
     ],
 )
 def test_what_is_mistaken_is_said_in_one_line(tmp_path, capsys, arguments, message):
-    machine = pk.load("orthoglide")
+    machine = load_shipped("orthoglide")
     poses = machine.home + np.array([[10.0, 0.0, 0.0], [0.0, 10.0, 5.0], [3.0, 3.0, -20.0]])
     few, joints = tmp_path / "few.csv", tmp_path / "joints.csv"
     write_csv(few, machine, machine.inverse(poses), poses, machine.axes)
@@ -320,7 +321,7 @@ def test_the_example_runs(tmp_path):
 
 
 def test_joints_without_a_pose_are_named():
-    machine = pk.load("orthoglide")
+    machine = load_shipped("orthoglide")
     poses = machine.home + np.random.default_rng(0).uniform(-50.0, 50.0, (20, 3))
     joints = machine.inverse(poses)
     joints[7] = 5000.0

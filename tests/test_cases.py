@@ -7,6 +7,7 @@ import json
 
 import numpy as np
 import pytest
+from shipped import load_shipped
 
 import parakin as pk
 from parakin.cli import main
@@ -181,7 +182,7 @@ def test_far_records_by_the_ten_thousand_end_soon(write, monkeypatch):
     text = "UNITS/MM\nFEDRAT/500,MMPM\n" + "".join(f"GOTO/{','.join(f'{v:.6f}' for v in row)}\n" for row in rows)
     path = pk.read_path(write(text, "apt"))
     monkeypatch.setattr("parakin.toolpath.job._MOST_BROKEN", 20)
-    job = pk.prepare(pk.load("tricept"), path)
+    job = pk.prepare(load_shipped("tricept"), path)
     assert job.inserted == 0 and job.posted.broken_record_count == 30 and not job.runs
     assert job.unplanned.startswith("off limits at more than 20 records")
 

@@ -6,8 +6,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from motion_sampling import SEEN, Sampled, dense_path, drawn, everyone, pose, posted_on, ranged
+from shipped import load_shipped
 
-import parakin as pk
 from parakin.machine import Machine
 from parakin.toolpath.checking.check import check_path
 from parakin.toolpath.checking.motion_bisection import MotionBisection
@@ -90,7 +90,7 @@ def test_worst_values_and_first_places_are_those_of_a_dense_sample(name):
 
 def delta_chord(y=150.0, half=80.0, high=None):
     """A chord past tower a, at (0, 290) from the platform's middle; its carriage is highest half way."""
-    machine = pk.load("linear_delta")
+    machine = load_shipped("linear_delta")
     peak = 280.0 + 80.0 + math.sqrt(700.0**2 - (290.0 - y) ** 2)
     if high is not None:
         machine = ranged(machine, {"tower_a": (700.0, peak + high)})
@@ -142,7 +142,7 @@ def test_a_limit_touched_to_the_last_digit_counts_as_kept():
 
 
 def test_a_path_along_a_limit_is_kept():
-    machine = pk.load("orthoglide")
+    machine = load_shipped("orthoglide")
     edge = machine.inverse([0.0, 0.0, 0.0])[2]
     machine = ranged(machine, {"rho_z": (edge, 2.0 * edge)})
     x = np.linspace(0.0, 0.0, 200)
@@ -165,7 +165,7 @@ def bulging(machine, kind):
 
 @pytest.mark.parametrize("kind", [".foot", ".platform", "clearance"])
 def test_cones_and_clearances_are_passed_between_two_records(kind):
-    machine = pk.load("hexapod")
+    machine = load_shipped("hexapod")
     ends, column = bulging(machine, kind)
     sampled = Sampled(posted_on(machine, ends), 400)
     least, at_ends = sampled.least(0, column), float(min(sampled.margins[[0, -1], 0, column]))
@@ -188,7 +188,7 @@ def test_cones_and_clearances_are_passed_between_two_records(kind):
 
 def test_a_leg_that_cannot_close_between_two_records():
     # The platform's joint swings out on its arc, half way it is farthest from its shaft.
-    machine = pk.load("lambda6")
+    machine = load_shipped("lambda6")
     legs = tuple(replace(leg, short=1000.0) for leg in machine.spec.legs)  # so that the long rod is what does not reach
     wide = Machine(replace(machine.spec, legs=legs, limits=replace(machine.spec.limits, gaps=())))
     wide = ranged(wide, dict.fromkeys(machine.joints, (-9e3, 9e3)))
@@ -204,7 +204,7 @@ def test_a_leg_that_cannot_close_between_two_records():
 
 
 def test_records_out_of_reach_are_left_to_their_own_offence():
-    machine = pk.load("linear_delta")
+    machine = load_shipped("linear_delta")
     poses = [[0.0, 0.0, 280.0], [40.0, 0.0, 280.0], [900.0, 0.0, 280.0], [40.0, 0.0, 280.0], [0.0, 0.0, 280.0]]
     posted = posted_on(machine, poses)
     checked = check_path(posted)
@@ -225,7 +225,7 @@ def test_records_out_of_reach_are_left_to_their_own_offence():
 
 @everyone
 def test_a_dense_path_well_inside_is_proved_with_few_boxes(name):
-    machine = pk.load(name)
+    machine = load_shipped(name)
     count = 20_000
     bisection = MotionBisection(posted_on(machine, dense_path(machine, count)))
     bisection.check_motions(lambda fraction: None)
@@ -235,7 +235,7 @@ def test_a_dense_path_well_inside_is_proved_with_few_boxes(name):
 
 
 def test_what_takes_too_long_is_told(monkeypatch):
-    machine, poses = pk.load("linear_delta"), np.array([[-70.0, 130.0, 270.0], [80.0, 160.0, 280.0]])
+    machine, poses = load_shipped("linear_delta"), np.array([[-70.0, 130.0, 270.0], [80.0, 160.0, 280.0]])
     rows = poses[0] + np.linspace(0.0, 1.0, 10_001)[:, None] * (poses[1] - poses[0])
     machine = ranged(machine, {"tower_a": (700.0, machine.inverse(rows)[:, 0].max() + 1e-4)})
     assert check_path(posted_on(machine, poses)).first is None
@@ -248,7 +248,7 @@ def test_what_takes_too_long_is_told(monkeypatch):
 
 @pytest.mark.parametrize("count", [0, 1])
 def test_paths_without_motions(count):
-    machine = pk.load("tricept")
+    machine = load_shipped("tricept")
     said = []
     checked = check_path(posted_on(machine, np.tile(machine.home, (count, 1))), said.append)
     assert checked.checked and checked.first is None and checked.offences == ()
@@ -257,7 +257,7 @@ def test_paths_without_motions(count):
 
 
 def test_a_single_record_off_limits_keeps_its_offence():
-    machine = pk.load("linear_delta")
+    machine = load_shipped("linear_delta")
     posted = posted_on(machine, [[0.0, 0.0, 700.0]])
     checked = check_path(posted)
     assert checked.first.text == posted.first.text
@@ -266,7 +266,7 @@ def test_a_single_record_off_limits_keeps_its_offence():
 
 
 def test_progress_and_records_that_repeat():
-    machine = pk.load("orthoglide5_table")
+    machine = load_shipped("orthoglide5_table")
     poses = np.repeat(dense_path(machine, 500), 2, axis=0)
     said = []
     assert check_path(posted_on(machine, poses), said.append).first is None

@@ -6,8 +6,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from motion_sampling import TURN, pose, posted_on, ranged
+from shipped import load_shipped
 
-import parakin as pk
 from parakin.performance.singularities import compute_singularity_margins
 from parakin.toolpath.checking.check import check_path
 from parakin.toolpath.checking.motion_bisection import MotionBisection
@@ -17,7 +17,7 @@ from parakin.toolpath.checking.motion_bisection import MotionBisection
 
 @pytest.mark.parametrize("name", ["tricept", "orthoglide5_head", "orthoglide5_table"])
 def test_turns_counted_over_the_seam(name):
-    machine = pk.load(name)
+    machine = load_shipped(name)
     c = np.arange(0.0, 330.0, 10.0)
     poses = [pose(machine, B=20.0, C=angle) for angle in c]
     joint = list(machine.joints).index("c" if "c" in machine.joints else "theta1")
@@ -39,7 +39,7 @@ def test_turns_counted_over_the_seam(name):
 
 @pytest.mark.parametrize("name", ["orthoglide5_head", "orthoglide5_table"])
 def test_a_pole_is_crossed_without_a_swing(name):
-    machine = pk.load(name)
+    machine = load_shipped(name)
     b = np.array([6.0, 4.0, 1.5, -2.0, -4.0])
     poses = [pose(machine, B=angle, C=40.0) for angle in b]
     posted = posted_on(machine, poses)
@@ -48,7 +48,7 @@ def test_a_pole_is_crossed_without_a_swing(name):
 
 
 def test_beside_a_pole_the_swing_is_followed():
-    machine = pk.load("orthoglide5_head")
+    machine = load_shipped("orthoglide5_head")
     poses = [pose(machine, B=5.0, C=0.0), pose(machine, B=1e-3, C=20.0), pose(machine, B=1e-3, C=140.0)]
     poses.append(pose(machine, B=5.0, C=160.0))
     assert check_path(posted_on(machine, poses)).first is None
@@ -59,7 +59,7 @@ def test_beside_a_pole_the_swing_is_followed():
 
 
 def test_upright_throughout():
-    machine = pk.load("orthoglide5_head")
+    machine = load_shipped("orthoglide5_head")
     rng = np.random.default_rng(2)
     poses = np.tile(machine.home, (300, 1))
     poses[:, :3] += rng.uniform(-30.0, 30.0, (300, 3))
@@ -73,7 +73,7 @@ def test_upright_throughout():
 
 @pytest.mark.parametrize("c", [0.0, 40.0, -115.0])
 def test_three_axis_work_on_a_table_at_its_pole(c):
-    table = ranged(pk.load("orthoglide5_table"), dict.fromkeys(("rho_x", "rho_y", "rho_z"), (150.0, 290.0)))
+    table = ranged(load_shipped("orthoglide5_table"), dict.fromkeys(("rho_x", "rho_y", "rho_z"), (150.0, 290.0)))
     rng = np.random.default_rng(8)
     ends = np.column_stack([rng.uniform(-90.0, 90.0, (200, 3)), np.zeros((200, 2))])
     joints = table.follow(np.vstack([pose(table, X=0.0, B=1e-3, C=c), ends]))[1:]
@@ -93,7 +93,7 @@ def test_three_axis_work_on_a_table_at_its_pole(c):
 
 
 def test_joints_that_are_whole_turns_off():
-    machine = pk.load("orthoglide5_head")
+    machine = load_shipped("orthoglide5_head")
     poses = [pose(machine, B=30.0, C=angle) for angle in (0.0, 20.0, 150.0, 160.0)]
     assert check_path(posted_on(machine, poses)).first is None
     turns = np.zeros((4, 5))
@@ -108,7 +108,7 @@ def test_joints_that_are_whole_turns_off():
 
 
 def test_a_motion_of_whole_turns():
-    machine = pk.load("orthoglide5_head")
+    machine = load_shipped("orthoglide5_head")
     poses = [pose(machine, B=30.0, C=angle) for angle in (0.0, -360.0, -350.0)]
     back = np.zeros((3, 5))
     back[1:, 3] = -1.0
@@ -121,7 +121,7 @@ def test_a_motion_of_whole_turns():
 def test_records_that_change_the_working_mode_far_from_the_pole():
     # The tip at (300, 0, -1600): the tool stands along the central leg at B = 10.6°, C = 180°; a motion at B = 21°
     # from C = 95° to 265° goes round that pole, while following the records alone leads across it.
-    machine = pk.load("tricept")
+    machine = load_shipped("tricept")
     ends = np.array([pose(machine, X=300.0, Z=-1600.0, B=21.0, C=c) for c in (95.0, 265.0)])
     checked = check_path(posted_on(machine, ends))
     assert [offence.limit for offence in checked.offences] == ["turns"]
@@ -136,7 +136,7 @@ def test_records_that_change_the_working_mode_far_from_the_pole():
 
 def test_a_parallel_singularity_is_found_where_the_rods_are_parallel():
     # Equal rods of l: along (l² - y²)^½, y and x, (l² - x²)^½; parallel on the circle x² + y² = l².
-    machine = pk.load("hbg80_2d")
+    machine = load_shipped("hbg80_2d")
     wide = ranged(machine, dict.fromkeys(machine.joints, (-9e3, 9e3)))
     rod = 400.0
     posted = posted_on(wide, [[200.0, 200.0], [300.0, 300.0], [310.0, 300.0], [250.0, 200.0]])
@@ -151,7 +151,7 @@ def test_a_parallel_singularity_is_found_where_the_rods_are_parallel():
 
 
 def test_parallel_singularities_are_those_of_a_dense_sample():
-    machine = pk.load("lambda6")  # singular about C = 0
+    machine = load_shipped("lambda6")  # singular about C = 0
     rng = np.random.default_rng(8)
     half = np.array([60.0, 60.0, 60.0, 0.2, 0.2, 0.5])
     poses = machine.home + rng.uniform(-1.0, 1.0, (80, 6)) * half - [0, 0, 0, 0, 0, 0.4]

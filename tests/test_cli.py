@@ -8,7 +8,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from shipped import REPRESENTATIVES
+from shipped import REPRESENTATIVES, load_shipped
 
 import parakin as pk
 from parakin.cli import main
@@ -195,7 +195,7 @@ def test_machines(capsys):
     assert all(name in said for name in pk.machines())
     assert max(len(line) for line in said.splitlines()) <= 80
     families = [paragraph.splitlines() for paragraph in said.strip().split("\n\n")]
-    assert [lines[0] for lines in families] == sorted({pk.load(name).spec.family for name in pk.machines()})
+    assert [lines[0] for lines in families] == sorted({load_shipped(name).spec.family for name in pk.machines()})
     of = {line.split()[0]: lines[0] for lines in families for line in lines[2:]}
     assert of["hexaglide"] == of["linear_delta"] == "rods on straight slides"
     assert of["tricept"] == of["g500"] == "struts of variable length on fixed feet"
@@ -208,7 +208,7 @@ def test_show(name, capsys, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     assert main(["show", name]) == 0
     said = capsys.readouterr().out
-    assert all(joint in said for joint in pk.load(name).joints)
+    assert all(joint in said for joint in load_shipped(name).joints)
     assert said.splitlines()[-1] == f"picture {name}.html"
     (tmp_path / f"{name}.html").unlink()
     assert main(["show", name, "--json"]) == 0
@@ -236,7 +236,7 @@ def test_show_yaml(capsys, tmp_path, monkeypatch):
     assert main(["show", "tricept", "--yaml", "--set", "R=360mm"]) == 0
     (tmp_path / "mine.yaml").write_text(capsys.readouterr().out, encoding="utf-8")
     assert [path.name for path in tmp_path.iterdir()] == ["mine.yaml"]
-    here = pk.load("tricept").home
+    here = load_shipped("tricept").home
     assert (pk.load("mine.yaml").inverse(here) == pk.load("tricept", parameters={"R": "360 mm"}).inverse(here)).all()
     assert "--yaml" in refused(capsys, "show", "tricept", "--yaml", "--json")
 

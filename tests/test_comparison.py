@@ -4,6 +4,7 @@ import json
 
 import numpy as np
 import pytest
+from shipped import load_shipped
 
 import parakin as pk
 from parakin.cli import main
@@ -22,7 +23,7 @@ def test_the_figures_are_those_told_alone(tmp_path, capsys):
     answer = json.loads(capsys.readouterr().out)
     assert [told["name"] for told in answer["machines"]] == NAMES
     for name, told in zip(NAMES, answer["machines"], strict=True):
-        machine = pk.load(name)
+        machine = load_shipped(name)
         accuracy = pk.analyse_accuracy(machine, {"feet": "0.05 mm", "encoders": "2 um"}, samples=60)
         assert told["tip_error"]["50"] == pytest.approx(accuracy.percentile(50))
         stiffness = pk.analyse_stiffness(machine, "100 N/um", {"diameter": "20 mm"}, accuracy.poses)

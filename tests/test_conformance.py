@@ -10,7 +10,7 @@ from hypothesis import event, given
 from hypothesis import strategies as st
 from independent import INVERSES as PAPERS
 from independent_field import INVERSES as FIELD
-from shipped import NAMES, REPRESENTATIVES, list_features
+from shipped import NAMES, REPRESENTATIVES, list_features, load_shipped
 
 import parakin as pk
 from parakin.model.legs import KINDS
@@ -55,7 +55,7 @@ SPREAD = {  # about home, mm and rad: the allowed workspace and a margin beyond
     "urane_sx": [260, 280, 330],
     "variax": [350, 350, 300, 0.5, 0.5, 0.6],
 }
-everyone = pytest.mark.parametrize("m", [pk.load(name) for name in NAMES], ids=NAMES)
+everyone = pytest.mark.parametrize("m", [load_shipped(name) for name in NAMES], ids=NAMES)
 families = pytest.mark.parametrize("family", sorted(FAMILIES))
 seeds = st.integers(0, 2**32 - 1)
 
@@ -76,7 +76,7 @@ def test_every_machine_has_a_second_inverse_and_every_leg_kind_is_drawn():
 
 
 def test_what_machines_have_is_represented():
-    of = {name: list_features(pk.load(name)) for name in NAMES}
+    of = {name: list_features(load_shipped(name)) for name in NAMES}
     assert set().union(*of.values()) == set().union(*(of[name] for name in REPRESENTATIVES))
 
 
@@ -190,7 +190,7 @@ def test_jacobians_of_drawn_machines(family, seed, tmp_path):
 
 
 def test_the_jacobians_of_the_orthoglide_are_the_papers():
-    m = pk.load("orthoglide")
+    m = load_shipped("orthoglide")
     poses = poses_about(m, 100, seed=3)
     a, b = m.jacobians(poses)
     rods = poses[:, None, :] - m.inverse(poses)[:, :, None] * np.eye(3)

@@ -9,6 +9,7 @@ from regions import whole_region
 from scipy import ndimage
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
+from shipped import load_shipped
 
 import parakin as pk
 from parakin.model.rates import expand_determinant
@@ -102,7 +103,7 @@ FLOODED = [("hbg80_2d", 900, 2), ("hbg80_3d", 100, 2), ("orthoglide", 100, 2), (
 
 @pytest.mark.parametrize(("name", "n", "parts"), FLOODED)
 def test_parts_are_those_of_a_flood_fill(name, n, parts):
-    asked = pk.region(pk.load(name), **ASKED[name])
+    asked = pk.region(load_shipped(name), **ASKED[name])
     found = find_components(asked, start=asked.machine.home)
     expected = flooded(asked, n)
     assert len(found) == found.at_least == len(expected) == parts
@@ -118,7 +119,7 @@ def test_parts_are_those_of_a_flood_fill(name, n, parts):
 
 @pytest.mark.parametrize("name", ["hbg80_2d", "orthoglide"])
 def test_a_part_holds_the_place_it_names(name):
-    asked = pk.region(pk.load(name), **ASKED[name])
+    asked = pk.region(load_shipped(name), **ASKED[name])
     first = find_components(asked)
     assert first.start is None
     for number, part in enumerate(first.components):
@@ -129,7 +130,7 @@ def test_a_part_holds_the_place_it_names(name):
 
 
 def test_coarse_cells_never_prove_too_many_parts():
-    asked = pk.region(pk.load("hbg80_3d"))
+    asked = pk.region(load_shipped("hbg80_3d"))
     truth = find_components(asked).components
     for cell in (120.0, 60.0, 30.0, 15.0):
         found = find_components(asked, cell=cell)
@@ -143,7 +144,7 @@ def test_coarse_cells_never_prove_too_many_parts():
 
 
 def test_every_turn_counts_and_the_parts_shrink():
-    m = pk.load("hexapod")
+    m = load_shipped("hexapod")
     fixed = find_components(pk.region(m), cell=40.0)
     swept = find_components(pk.region(m, every={"A": (-0.2, 0.2), "B": (-0.2, 0.2)}), start=m.home, cell=40.0)
     assert (fixed.at_least, swept.at_least, swept.start) == (1, 1, 0)
@@ -151,7 +152,7 @@ def test_every_turn_counts_and_the_parts_shrink():
 
 
 def test_the_volumes_of_all_parts_are_the_workspace():
-    m = pk.load("orthoglide")
+    m = load_shipped("orthoglide")
     whole = pk.workspace(whole_region(m), gap=0.005).volume
     parts = find_components(pk.region(m)).components
     assert sum(part.volume.inner for part in parts) <= whole.outer
@@ -187,7 +188,7 @@ def test_a_start_that_is_none_is_refused(tmp_path, start, said):
 
 
 def test_what_makes_no_sense_is_refused(tmp_path):
-    m = pk.load("hexapod")
+    m = load_shipped("hexapod")
     with pytest.raises(pk.PoseError, match="some"):
         find_components(pk.region(m, some={"A": (-0.1, 0.1)}))
     with pytest.raises(pk.PoseError, match=r"A is 0\.2, but fixed at 0 here"):
@@ -199,7 +200,7 @@ def test_what_makes_no_sense_is_refused(tmp_path):
     with pytest.raises(pk.PoseError, match="too fine"):
         find_components(ring(tmp_path, 0), cell=0.01)
     with pytest.raises(pk.PoseError, match="empty"):
-        find_components(pk.region(pk.load("tricept"), {"Z": 500.0}))
+        find_components(pk.region(load_shipped("tricept"), {"Z": 500.0}))
 
 
 def test_the_determinant_is_numpys():

@@ -9,9 +9,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from shipped import load_shipped
 from test_conformance import poses_about
-
-import parakin as pk
 
 LEAST = 0.1  # of 1, which couples at right angles have
 
@@ -42,7 +41,7 @@ def measure_constraint(rods, sides):
 
 @pytest.mark.parametrize("name", ["linear_delta", "orthoglide", "hbg80_3d"])
 def test_pairs_of_rods_hold_the_platform_everywhere(name):
-    machine = pk.load(name)
+    machine = load_shipped(name)
     places = poses_about(machine, 100_000)
     places = places[machine.check(places) == 0]
     assert len(places) > 1000

@@ -10,7 +10,7 @@ import subprocess
 import numpy as np
 import pytest
 from independent import orientation
-from shipped import NAMES, REPRESENTATIVES
+from shipped import NAMES, REPRESENTATIVES, load_shipped
 
 import parakin as pk
 from parakin.kinematics.assemblies import generic_member, homotopy_roots, path_tracking
@@ -106,7 +106,7 @@ def test_a_stored_member_is_taken_only_for_its_own_family(monkeypatch):
 @pytest.mark.parametrize("name", NAMES)
 def test_every_shipped_machine_finds_the_pose_that_it_stands_in(name):
     """No root of a machine's own generic member may be missing, nor lie on paths through more general systems."""
-    machine = pk.load(name)
+    machine = load_shipped(name)
     poses = machine.home + np.random.default_rng(2).uniform(-1.0, 1.0, (60, len(machine.axes))) * np.where(
         np.array(machine.axis_units) == "mm", 60.0, 0.15
     )
@@ -153,7 +153,7 @@ def test_roots_close_to_a_singularity_are_told_apart():
 
 
 def test_a_batch_has_the_answers_of_its_rows():
-    machine = pk.load("hexapod")
+    machine = load_shipped("hexapod")
     joints = machine.inverse(machine.home) + np.random.default_rng(4).uniform(-20.0, 20.0, (5, 6))
     joints[3] = np.nan
     answers = machine.list_assemblies(joints)
@@ -181,7 +181,7 @@ def test_general_platforms_have_forty_and_the_true_pose_is_among_them(tmp_path):
 
 @pytest.mark.parametrize("name", [name for name in REPRESENTATIVES if name not in ("hexapod", "tricept", "pentapod")])
 def test_closed_forms_find_the_same(name):
-    machine = pk.load(name)
+    machine = load_shipped(name)
     rng = np.random.default_rng(7)
     spread = np.where(np.array(machine.axis_units) == "mm", 60.0, 0.15)
     for pose in machine.home + rng.uniform(-1.0, 1.0, (8, len(machine.axes))) * spread:

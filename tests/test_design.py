@@ -4,6 +4,7 @@ import json
 
 import numpy as np
 import pytest
+from shipped import load_shipped
 
 import parakin as pk
 from parakin.cli import main
@@ -12,7 +13,7 @@ from parakin.performance.indices import compute_performance
 
 
 def test_the_shipped_orthoglide_is_the_design_for_200_mm_and_3():
-    found, m = design_orthoglide(200.0, 3.0), pk.load("orthoglide")
+    found, m = design_orthoglide(200.0, 3.0), load_shipped("orthoglide")
     assert found.rod == pytest.approx(254.264, abs=5e-4)
     assert found.stroke == pytest.approx((61.668, 330.928), abs=5e-4)
     assert found.cube == pytest.approx((-123.336, 76.664), abs=5e-4)

@@ -4,6 +4,7 @@ import json
 
 import numpy as np
 import pytest
+from shipped import load_shipped
 
 import parakin as pk
 from parakin.cli import main
@@ -26,7 +27,7 @@ minimise: L
 def glide(minimise, bound):
     free, shift = {"L": (150.0, 500.0)}, {"X Y Z": (-150.0, 150.0)}
     bounds = {"amplification": bound}
-    return pk.DesignProblem(pk.load("orthoglide"), free, CUBE, minimise, shift, bounds, fit_strokes=True)
+    return pk.DesignProblem(load_shipped("orthoglide"), free, CUBE, minimise, shift, bounds, fit_strokes=True)
 
 
 def test_the_search_finds_the_closed_form_and_proves_it():
@@ -48,7 +49,7 @@ def test_the_search_finds_the_closed_form_and_proves_it():
 def test_a_tricept_holds_the_box_of_the_figure_with_less_footprint():
     box = {"X": (-530.0, 530.0), "Y": (-492.0, 492.0), "Z": (-130.0, 130.0), "B": 0.0, "C": 0.0}
     shift = {"Y": (-200.0, 200.0), "Z": (-2000.0, -1000.0)}
-    problem = pk.DesignProblem(pk.load("tricept"), {"R": (200.0, 500.0)}, box, ["footprint"], shift)
+    problem = pk.DesignProblem(load_shipped("tricept"), {"R": (200.0, 500.0)}, box, ["footprint"], shift)
     (best,) = pk.find_designs(problem).front
     assert best.values["footprint"] == pytest.approx(400.0, rel=1e-6)  # feet on a circle of radius R, at its least
     axes = best.machine.axes
@@ -60,7 +61,7 @@ def test_a_tricept_holds_the_box_of_the_figure_with_less_footprint():
 
 @pytest.mark.parametrize("name", ["orthoglide", "hexapod", "tricept", "rotary_delta"])
 def test_measures_are_those_of_the_machine(name):
-    m = pk.load(name)
+    m = load_shipped(name)
     parameter = m.parameters[0]
     free = {parameter.name: (parameter.value - 1.0, parameter.value + 1.0)}
     home = dict(zip(m.axes, m.home.tolist(), strict=True))
@@ -82,7 +83,7 @@ def test_measures_are_those_of_the_machine(name):
 
 
 def test_the_footprint_of_the_hexapod_is_its_feet():
-    m = pk.load("hexapod")
+    m = load_shipped("hexapod")
     evaluator = DesignEvaluator(
         pk.DesignProblem(
             m, {m.parameters[0].name: (1.0, 2000.0)}, {**CUBE, "Z": tuple(m.home[2] + [0, 1])}, ["footprint"]

@@ -4,10 +4,9 @@ import os
 
 import pytest
 from direct_problems import try_direct_problems
+from shipped import load_shipped
 from test_conformance import everyone
 from test_forward import allowed
-
-import parakin as pk
 
 COUNT = int(os.environ.get("PARAKIN_DIRECT_PROBLEMS", "5000"))
 CLOSE_REFUSED = 1e-5  # of starts 1 mm and 0.5° off, but for those across a singular line beside an allowed pose
@@ -33,7 +32,7 @@ def test_without_a_mode_only_starts_that_stand_in_another_one_lead_there(m):
 
 @pytest.mark.parametrize("name", ["lambda6", "hexapod", "tricept"])
 def test_home_finds_all_on_its_side(name):
-    machine = pk.load(name)
+    machine = load_shipped(name)
     poses = allowed(name)
     on_side = machine.sides(poses) * machine.sides(machine.home[None]) > 0.0
     found = machine.forward(machine.inverse(poses))

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import trimesh
 from regions import whole_region
-from shipped import REPRESENTATIVES
+from shipped import REPRESENTATIVES, load_shipped
 
 import parakin as pk
 from parakin.export.workspace.cells import format_cells_csv, format_cells_vtu
@@ -19,7 +19,7 @@ from parakin.performance.indices import compute_performance
 from parakin.workspaces.sampled.cross_sections import compute_signed_area, find_cross_sections
 from parakin.workspaces.sampled.distance_field import DistanceField, sample_field
 
-SPACE = [name for name in REPRESENTATIVES if "Z" in pk.load(name).axes]
+SPACE = [name for name in REPRESENTATIVES if "Z" in load_shipped(name).axes]
 
 
 def struts(path, motion, legs, home):
@@ -95,7 +95,7 @@ def test_the_field_of_struts_is_the_distance(lens):
 
 @pytest.mark.parametrize("name", REPRESENTATIVES)
 def test_the_field_is_positive_where_the_machine_is_allowed(name):
-    machine = pk.load(name)
+    machine = load_shipped(name)
     here = whole_region(machine)
     rng = np.random.default_rng(2)
     low, high = pk.workspace(whole_region(machine), gap=0.1).box
@@ -107,7 +107,7 @@ def test_the_field_is_positive_where_the_machine_is_allowed(name):
 
 @pytest.mark.parametrize("kind", ["every", "some"])
 def test_the_field_over_turns_asks_all_of_them(kind):
-    machine = pk.load("hexapod")
+    machine = load_shipped("hexapod")
     spans = {"A": (-0.1, 0.1), "B": (-0.05, 0.2)}
     here = whole_region(machine, **{kind: spans})
     distance = DistanceField(here)
@@ -126,7 +126,7 @@ def test_the_field_over_turns_asks_all_of_them(kind):
 
 
 def test_a_narrow_range_has_three_turns_and_a_wide_one_is_thinned():
-    machine = pk.load("hexapod")
+    machine = load_shipped("hexapod")
     assert len(DistanceField(whole_region(machine, every={"A": (0.0, 0.01)})).orientations) == 3
     assert len(DistanceField(whole_region(machine, some={"A": (0.2, 0.2)})).orientations) == 1
     assert len(DistanceField(whole_region(machine, dexterous=True)).orientations) <= 4096
@@ -185,7 +185,7 @@ def test_a_region_in_parts_gives_a_body_each(tmp_path):
 
 @pytest.mark.parametrize("name", SPACE)
 def test_every_shipped_machine_has_a_closed_mesh(name):
-    found, whole = around(pk.load(name))
+    found, whole = around(load_shipped(name))
     mesh = solid(make_mesh(whole))
     assert found.volume.inner * 0.99 < mesh.volume < found.volume.outer * 1.01
     low, high = found.box
@@ -197,13 +197,13 @@ def test_every_shipped_machine_has_a_closed_mesh(name):
     "name, turns", [("hexapod", {"A": (-0.15, 0.15), "B": (-0.15, 0.15)}), ("lambda6", {"B": (-0.2, 0.2)})]
 )
 def test_total_orientation_has_a_closed_mesh(name, turns):
-    found, whole = around(pk.load(name), every=turns, gap=0.03)
+    found, whole = around(load_shipped(name), every=turns, gap=0.03)
     mesh = solid(make_mesh(whole))
     assert found.volume.inner * 0.98 < mesh.volume < found.volume.outer * 1.02
 
 
 def test_a_mesh_is_in_space_only():
-    _, whole = around(pk.load("hbg80_2d"))
+    _, whole = around(load_shipped("hbg80_2d"))
     with pytest.raises(pk.PoseError, match="volume"):
         make_mesh(whole)
 
@@ -258,7 +258,7 @@ def test_holes_are_no_part_of_the_area(hollow):
 
 @pytest.mark.parametrize("name", ["hexapod", "lambda6", "tricept"])
 def test_cross_sections_lie_in_the_certified_bracket(name):
-    machine = pk.load(name)
+    machine = load_shipped(name)
     _, whole = around(machine)
     for section in find_cross_sections(whole, values=3):
         volume = pk.workspace(whole_region(machine, at={"Z": section.value}), gap=0.005).volume
@@ -266,7 +266,7 @@ def test_cross_sections_lie_in_the_certified_bracket(name):
 
 
 def test_the_outline_of_a_planar_machine_is_its_only_section():
-    found, whole = around(pk.load("hbg80_2d"))
+    found, whole = around(load_shipped("hbg80_2d"))
     (section,) = find_cross_sections(whole)
     assert section.axis is section.value is None
     assert found.volume.inner < section.area < found.volume.outer
@@ -323,7 +323,7 @@ def test_vtu(lens, tmp_path, at, kind):
 
 
 def test_vtu_tells_the_performance_at_the_cells(tmp_path):
-    found = pk.workspace(whole_region(pk.load("orthoglide")), gap=0.1)
+    found = pk.workspace(whole_region(load_shipped("orthoglide")), gap=0.1)
     (tmp_path / "cells.vtu").write_bytes(format_cells_vtu(found))
     data = {name: values[0] for name, values in meshio.read(tmp_path / "cells.vtu").cell_data.items()}
     middles = found.cells.low + 0.5 * found.cells.size
@@ -372,7 +372,7 @@ def test_the_bracket_is_rounded_outward(lens):
 
 
 def test_what_was_asked_is_said():
-    machine = pk.load("hexapod")
+    machine = load_shipped("hexapod")
     here = whole_region(machine, at={"C": pi / 6, "Z": -900.0}, every={"A": (-0.1, 0.1)}, without=["strut0.*"])
     words = describe_region(here)
     assert words.startswith("total orientation, A -5.73° to 5.73°, Z = -900 mm, B = 0°, C = 30°")

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from shipped import load_shipped
 
 import parakin as pk
 from parakin.cli import main
@@ -37,7 +38,7 @@ def draw_motion(machine, count, seed):
 
 @pytest.mark.parametrize("name", MACHINES)
 def test_forces_are_those_of_mujoco(name):
-    machine = pk.load(name)
+    machine = load_shipped(name)
     motion, units = draw_motion(machine, 4, 3)
     assert len(motion.poses) == 4
     forces = Dynamics(machine).compute_forces(motion)
@@ -55,7 +56,7 @@ def test_forces_are_those_of_mujoco(name):
 @pytest.mark.parametrize("name", ["tricept", "orthoglide5_table", "eclipse", "sprint_z3"])
 def test_masses_are_those_of_the_shapes(name):
     """Without our inertias MuJoCo finds its own from shapes and densities."""
-    text = render_mjcf(pk.load(name))
+    text = render_mjcf(load_shipped(name))
     ours = mujoco.MjModel.from_xml_string(text)
     bare, count = re.subn("<inertial .*?/>", "", text)
     theirs = mujoco.MjModel.from_xml_string(bare)
@@ -85,11 +86,11 @@ FINI
 def orthoglide_job(tmp_path_factory):
     part = tmp_path_factory.mktemp("part") / "part.apt"
     part.write_text(PART, encoding="utf-8")
-    return pk.prepare(pk.load("orthoglide"), pk.read_path(part))
+    return pk.prepare(load_shipped("orthoglide"), pk.read_path(part))
 
 
 def test_a_force_on_the_tip_is_carried_by_the_jacobian():
-    machine = pk.load("lambda6")
+    machine = load_shipped("lambda6")
     motion, _ = draw_motion(machine, 3, 8)
     force = np.array([300.0, -50.0, 120.0])
     dynamics = Dynamics(machine)
@@ -100,7 +101,7 @@ def test_a_force_on_the_tip_is_carried_by_the_jacobian():
 
 def test_forces_along_a_path_are_those_of_its_motion():
     """Inertia, centrifugal forces and weight add up, whatever the speed along the path."""
-    machine = pk.load("tricept")
+    machine = load_shipped("tricept")
     motion, _ = draw_motion(machine, 3, 5)
     dynamics = Dynamics(machine)
     own = dynamics.compute_path_forces(motion.poses, motion.joints, motion.speeds, motion.accelerations)

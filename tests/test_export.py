@@ -5,6 +5,7 @@ import json
 import numpy as np
 import pytest
 import trimesh
+from shipped import load_shipped
 
 import parakin as pk
 from parakin.cli import main
@@ -16,7 +17,7 @@ DELTAS = ["linear_delta", "linapod3"]
 
 @pytest.mark.parametrize("name", ["hexapod", "tricept", "orthoglide5_table"])
 def test_meshes_stand_at_the_pose(name, tmp_path):
-    machine = pk.load(name)
+    machine = load_shipped(name)
     pose = machine.home.copy()
     pose[:2] += [20.0, -10.0]
     at = ",".join(f"{value}" for value in pose[:3])
@@ -40,7 +41,7 @@ def test_meshes_stand_at_the_pose(name, tmp_path):
 def test_a_delta_comes_back(name, to, tmp_path):
     """Written for a firmware and imported again, the inverse is the same but for where joints count from."""
     file = tmp_path / {"klipper": "printer.cfg", "reprapfirmware": "config.g"}[to]
-    machine = pk.load(name)
+    machine = load_shipped(name)
     assert main(["export", name, "--to", to, "-o", str(file)]) == 0
     assert main(["import", str(file), "-o", str(tmp_path / "again.yaml")]) == 0
     again = pk.load(tmp_path / "again.yaml")
@@ -116,7 +117,7 @@ def test_what_can_not_be_written_is_refused(words, told, tmp_path, capsys, monke
 def test_a_urdf_stands_as_at_home(name, tmp_path):
     """Read by MuJoCo with its joints at home's values, the tool is at home's pose, and the loops close."""
     mujoco = pytest.importorskip("mujoco")
-    machine = pk.load(name)
+    machine = load_shipped(name)
     output = tmp_path / "m.urdf"
     assert main(["export", name, "--to", "urdf", "-o", str(output)]) == 0
     loops = json.loads((tmp_path / "m_loops.json").read_text())

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from shipped import load_shipped
 
 import parakin as pk
 from parakin.errors import PoseError
@@ -35,7 +36,7 @@ def draw_poses(machine, count, seed=1):
 
 @pytest.mark.parametrize("name", SHIPPED)
 def test_a_family_is_the_machines_of_its_sizes(name):
-    machine = pk.load(name)
+    machine = load_shipped(name)
     family, sizes = draw(machine)
     one, poses = family.at(sizes), draw_poses(machine, 20)
     joints = one.inverse(poses)
@@ -55,7 +56,7 @@ def test_a_family_is_the_machines_of_its_sizes(name):
 
 @pytest.mark.parametrize("name", SOLVED)
 def test_no_number_is_free_where_constraints_are_solved(name):
-    machine = pk.load(name)
+    machine = load_shipped(name)
     family = pk.family(machine, ["legs.*.foot.*"])
     with pytest.raises(pk.DescriptionError, match="no number of the machine can be free"):
         family.inverse(machine.home, family.nominal)
@@ -63,7 +64,7 @@ def test_no_number_is_free_where_constraints_are_solved(name):
 
 @pytest.mark.parametrize("name", FEW)
 def test_sizes_move_the_pose_as_differences_say(name):
-    machine = pk.load(name)
+    machine = load_shipped(name)
     family, sizes = draw(machine, 2)
     poses = draw_poses(machine, 5, 3)
     joints = family.inverse(poses, sizes)
@@ -79,7 +80,7 @@ def test_sizes_move_the_pose_as_differences_say(name):
 
 
 def test_a_number_replaced_by_hand_is_the_same():
-    machine = pk.load("linear_delta")
+    machine = load_shipped("linear_delta")
     spec = machine.spec
     x, y, z = spec.legs[0].foot
     leg = replace(spec.legs[0], foot=Point((x + 0.3, y, z)), rod=Size(spec.legs[0].rod - 0.2))
@@ -92,7 +93,7 @@ def test_a_number_replaced_by_hand_is_the_same():
 
 @pytest.mark.parametrize("name", FEW)
 def test_a_file_of_the_sizes_reads_back(name):
-    family, sizes = draw(pk.load(name), 4)
+    family, sizes = draw(load_shipped(name), 4)
     one = family.at(sizes)
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder, "own.yaml")
@@ -105,7 +106,7 @@ def test_a_file_of_the_sizes_reads_back(name):
 
 @pytest.mark.parametrize("name", FEW)
 def test_an_offset_shifts_what_the_drives_say(name):
-    machine = pk.load(name)
+    machine = load_shipped(name)
     offsets = {f"joints.{joint}.offset": 0.01 * (i + 1) for i, joint in enumerate(machine.joints)}
     other = machine.replace_parameters(offsets)
     poses = draw_poses(machine, 10)
@@ -119,7 +120,7 @@ def test_an_offset_shifts_what_the_drives_say(name):
 
 
 def test_batches_of_machines_and_poses_broadcast():
-    machine = pk.load("hexapod")
+    machine = load_shipped("hexapod")
     family, sizes = draw(machine, 5, count=7)
     poses = draw_poses(machine, 4)
     joints = family.inverse(poses[:, None], sizes)
@@ -132,7 +133,7 @@ def test_batches_of_machines_and_poses_broadcast():
 
 
 def test_a_machine_a_row_costs_no_trace(monkeypatch):
-    machine = pk.load("hexapod")
+    machine = load_shipped("hexapod")
     family = pk.family(machine, ["feet", "platform"])
     family.inverse(machine.home, family.nominal)
     monkeypatch.delattr("parakin.families.family.compile_tape")
@@ -142,7 +143,7 @@ def test_a_machine_a_row_costs_no_trace(monkeypatch):
 
 def test_struts_of_a_joint_may_differ_a_little():
     """Two struts of one joint keep no clearance, in a calibrated machine neither."""
-    machine = pk.load("hexapod")
+    machine = load_shipped("hexapod")
     other = machine.replace_parameters({"legs.strut0.foot.x": machine.legs[0].foot[0] + 0.05})
     assert other.limits == machine.limits
 
@@ -161,12 +162,12 @@ def test_struts_of_a_joint_may_differ_a_little():
 )
 def test_what_is_mistaken_is_said(call, message):
     with pytest.raises(PoseError) as error:
-        call(pk.load("tricept"))
+        call(load_shipped("tricept"))
     assert message in str(error.value)
 
 
 def test_sizes_that_break_the_machine_are_refused():
-    machine = pk.load("tricept")
+    machine = load_shipped("tricept")
     with pytest.raises(pk.DescriptionError, match="home"):
         pk.family(machine, ["legs.d1.foot.x"]).at([5000.0])
 
@@ -177,7 +178,7 @@ def test_sizes_that_break_the_machine_are_refused():
 @pytest.mark.parametrize("name", ["tricept", "linear_delta", "rotary_delta", "orthoglide", "lambda6", "hexapod"])
 def test_named_sizes_are_inputs(name):
     """Against machines of the file with other sizes."""
-    machine = pk.load(name)
+    machine = load_shipped(name)
     names = [parameter.name for parameter in machine.parameters if parameter.group == "sizes"]
     assert names
     family = pk.family(machine, names)

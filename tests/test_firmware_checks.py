@@ -7,9 +7,9 @@ import subprocess
 
 import numpy as np
 import pytest
+from shipped import load_shipped
 from test_move_check import SAMPLES, draw_moves
 
-import parakin as pk
 from parakin.cli import main
 
 pytestmark = pytest.mark.skipif(not (shutil.which("gcc") and shutil.which("g++")), reason="no compilers")
@@ -202,7 +202,7 @@ FIRMWARES = {
 @pytest.fixture(scope="module")
 def moves():
     """Moves (N, 6) of floats, and which of them keep all limits of linear_delta at all samples."""
-    machine = pk.load("linear_delta")
+    machine = load_shipped("linear_delta")
     start, end = (np.round(rows * GRID) / GRID for rows in draw_moves(machine, COUNT, 12))
     allowed = np.ones(len(start), bool)
     for share in np.linspace(0.0, 1.0, SAMPLES):

@@ -10,6 +10,7 @@ from drawn import draw, machine_of
 from geometry import Description, transform
 from hypothesis import given
 from hypothesis import strategies as st
+from shipped import load_shipped
 from test_conformance import everyone, families, poses_about
 
 import parakin as pk
@@ -19,7 +20,7 @@ CLOSE = 1.5e-9  # mm: 1e-9 in a machine of a metre
 
 @cache
 def allowed(name, count=4000):
-    m = pk.load(name)
+    m = load_shipped(name)
     poses = poses_about(m, 12 * count, seed=11)
     if m.axes == tuple("XYZBC"):  # an axis' angles as the direct problem gives them
         poses[:, 3] = np.abs(poses[:, 3])
@@ -124,7 +125,7 @@ def test_closed_form_and_newton_agree(m):
 
 @pytest.mark.parametrize(("tilt", "steps"), [(15.0, 5), (30.0, 9), (45.0, 19)])
 def test_the_papers_constant_jacobian_on_the_tricept(tilt, steps):
-    m = pk.load("tricept")
+    m = load_shipped("tricept")
     rng = np.random.default_rng(5)
     psi, theta = np.radians(rng.uniform(-tilt, tilt, (2, 5000)))
     psi[:4], theta[:4] = np.radians(tilt) * np.array([[1, 1, -1, -1], [1, -1, 1, -1]])
@@ -186,7 +187,7 @@ def test_what_is_no_length_never_converges_and_harms_no_neighbour(m, bad, method
 
 
 def test_a_central_leg_does_not_fold_over():
-    m = pk.load("tricept")
+    m = load_shipped("tricept")
     joints = np.random.default_rng(7).uniform([500, 500, 500, -3, 0], [2000, 2000, 2000, 3, 2], (50_000, 5))
     found = m.forward(joints)
     done = found.converged

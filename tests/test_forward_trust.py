@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from shipped import load_shipped
 
 import parakin as pk
 from parakin.errors import SingularHomeWarning
@@ -113,7 +114,7 @@ def test_an_answer_is_in_the_working_mode(load):
 )
 @pytest.mark.parametrize("far", [0.0, 1.0, 100.0])
 def test_an_answers_inverse_is_the_joints(name, far):
-    machine = pk.load(name)
+    machine = load_shipped(name)
     poses = draw(machine, 3000, (200.0, 0.4))
     joints = machine.inverse(poses)
     step = np.array([far if unit == "mm" else far * 3e-3 for unit in machine.axis_units])
@@ -141,7 +142,7 @@ def test_the_side_is_the_near_poses_own(load):
 
 
 def test_sides_know_no_angles_of_the_pose():
-    machine = pk.load("hexapod")
+    machine = load_shipped("hexapod")
     poses = draw(machine, 400, (200.0, 0.5), 3)
     rng = np.random.default_rng(4)
     near = poses + rng.uniform(-1.0, 1.0, poses.shape) * [400.0, 400.0, 400.0, 1.4, 1.4, 1.4]
@@ -156,7 +157,7 @@ def test_sides_know_no_angles_of_the_pose():
 
 @pytest.mark.parametrize("name", ["hexapod", "lambda6", "tricept"])
 def test_a_row_hangs_on_itself_alone(name):
-    machine = pk.load(name)
+    machine = load_shipped(name)
     poses = draw(machine, 1500, (250.0, 0.6), 5)
     rng = np.random.default_rng(6)
     step = np.array([200.0 if unit == "mm" else 0.5 for unit in machine.axis_units])
@@ -171,11 +172,11 @@ def test_a_row_hangs_on_itself_alone(name):
 
 
 def test_why_there_is_no_answer(load):
-    machine = pk.load("hexapod")
+    machine = load_shipped("hexapod")
     found = machine.forward(machine.inverse(machine.home) + [5000.0, -5000.0, 5000.0, -5000.0, 5000.0, -5000.0])
     assert (found.converged, found.why) == (False, OPEN)
     assert {REASONS[why] for why in (OPEN, ON_ANOTHER_SIDE, OTHER_MODE)} and REASONS[ANSWERED] == ""
-    across = pk.load("hbg80_2d")
+    across = load_shipped("hbg80_2d")
     poses = draw(across, 2000)
     far = poses[across.sides(poses) * across.sides(across.home[None]) < 0.0]
     found = across.forward(across.inverse(far), method="newton")
@@ -221,7 +222,7 @@ def test_shipped_homes_are_no_singularities():
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         for name in pk.machines():
-            pk.load(name)
+            load_shipped(name)
 
 
 # Truths and starts of a hexapod; the starts' B is near or beyond 90°, where the angles' determinant changes its sign.
@@ -233,7 +234,7 @@ FLIPS = [
 
 @pytest.mark.parametrize(("truth", "near"), FLIPS)
 def test_a_start_beyond_a_right_angle_keeps_its_assembly(truth, near):
-    machine = pk.load("hexapod")
+    machine = load_shipped("hexapod")
     truth, near = np.array(truth), np.array(near)
     twin = near + [0.0, 0.0, 0.0, np.pi, 0.0, np.pi]
     twin[4] = np.pi - near[4]
@@ -244,7 +245,7 @@ def test_a_start_beyond_a_right_angle_keeps_its_assembly(truth, near):
 
 
 def test_beside_a_singularity_lambda6_is_found_from_home():
-    machine = pk.load("lambda6")
+    machine = load_shipped("lambda6")
     poses = np.array(
         [
             [-268.31694, -126.046312, 1493.387614, -0.17854, 0.372856, -0.011269],
@@ -304,7 +305,7 @@ def test_spheres_about_one_line_share_a_continuum_or_nothing(load, x):
 @pytest.mark.parametrize("name", ["linear_delta", "orthoglide", "lambda6", "orthoglide5_table"])
 def test_a_pose_in_another_mode_than_the_machines_says_so(name):
     """The joints of the first leg's other solution lead back to the pose near by, and the answer says in which mode."""
-    machine = pk.load(name)
+    machine = load_shipped(name)
     pose = machine.home + 0.1
     other = ("-" if machine.mode[0] == "+" else "+") + machine.mode[1:]
     joints = np.stack([machine.inverse(pose, mode) for mode in (machine.mode, other)])
@@ -319,7 +320,7 @@ def test_a_pose_in_another_mode_than_the_machines_says_so(name):
 @pytest.mark.parametrize("name", ["linear_delta", "hbg80_2d", "hbg80_3d", "orthoglide5_head", "orthoglide5_table"])
 def test_closed_forms_answer_on_the_side_of_starts_at_any_distance(name):
     """The side by the determinant of the twist, with the start's own joints; poses up to the rim of reach."""
-    machine, rng = pk.load(name), np.random.default_rng(7)
+    machine, rng = load_shipped(name), np.random.default_rng(7)
     spread = np.where(np.array(machine.axis_units) == "mm", max(machine.leg_sizes), 0.5)
     poses = machine.home + rng.uniform(-1.0, 1.0, (30_000, len(spread))) * spread
     starts = poses + spread * rng.normal(size=poses.shape) * 10.0 ** rng.uniform(-4.0, 0.0, (len(poses), 1))

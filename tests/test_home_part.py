@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from regions import whole_region
+from shipped import load_shipped
 
 import parakin as pk
 from parakin.cli import main
@@ -124,7 +125,7 @@ def test_the_command_names_what_else_there_is(capsys):
 
 def test_a_drive_sweep_counts_the_same_parts():
     for components in ("home", "all"):
-        region = pk.region(pk.load("hbg80_2d"), components=components)
+        region = pk.region(load_shipped("hbg80_2d"), components=components)
         volume = pk.workspace(region, gap=0.002).volume
         assert volume.inner * 0.999 <= pk.sweep_drives(region, 2000).estimate <= volume.outer * 1.001
 
@@ -134,7 +135,7 @@ def test_a_drive_sweep_counts_the_same_parts():
 
 def test_a_singularity_is_proved_or_said_to_be_unproved():
     verdicts = {
-        name: {s.margin: s.verdict for s in judge_singularities(pk.region(pk.load(name)))}
+        name: {s.margin: s.verdict for s in judge_singularities(pk.region(load_shipped(name)))}
         for name in ("hexapod", "linear_delta", "orthoglide", "hbg80_2d", "hbg80_3d", "tricept")
     }
     for name in ("orthoglide", "hbg80_2d", "hbg80_3d"):
@@ -148,7 +149,7 @@ def test_a_singularity_is_proved_or_said_to_be_unproved():
 
 def test_a_stretched_leg_is_proved(load_text):
     # The rod of a slide on X is stretched where the tool is as far from the slide's rail as the rod is long.
-    plane = pk.load("hbg80_2d")
+    plane = load_shipped("hbg80_2d")
     for index, verdict in enumerate(judge_singularities(pk.region(plane))[1:]):
         assert verdict.verdict == "met"
         assert plane.check(verdict.pose) == 0
@@ -189,7 +190,7 @@ def test_a_sign_change_in_a_corner_of_the_reach_is_proved():
 def test_a_pole_that_a_region_meets_is_proved(b, c):
     # The platform of a Tricept hangs along the line from its centre, the origin, to the wrist: on the pole the tip is
     # on the line through the origin along the tool's axis k.
-    m = pk.load("tricept")
+    m = load_shipped("tricept")
     verdict = judge_singularities(pk.region(m, at={"B": b, "C": c}))[-1]
     assert verdict.verdict == "met"
     k = np.array([np.sin(b) * np.cos(c), np.sin(b) * np.sin(c), np.cos(b)])
@@ -199,7 +200,7 @@ def test_a_pole_that_a_region_meets_is_proved(b, c):
 
 
 def test_a_pole_that_is_nowhere_or_everywhere_is_told():
-    m = pk.load("orthoglide5_head")  # its platform does not turn
+    m = load_shipped("orthoglide5_head")  # its platform does not turn
     assert judge_singularities(pk.region(m))[-1].verdict == "met"
     assert judge_singularities(pk.region(m, at={"B": 0.2, "C": 0.1}))[-1].verdict == "none"
 
@@ -223,7 +224,7 @@ def test_the_verdict_does_not_hang_on_the_step(load_text):
 
 def test_nothing_proved_free_is_singular_in_samples():
     for name in ("hexapod", "linear_delta", "tricept", "orthoglide", "hbg80_3d"):
-        region = pk.region(pk.load(name))
+        region = pk.region(load_shipped(name))
         box, m = pk.workspace(region).box, region.machine
         positions = np.random.default_rng(3).uniform(*box, (20_000, 3))
         poses = region.poses(positions)
@@ -250,7 +251,7 @@ def test_the_command_says_what_is_proved(capsys):
 
 
 def test_a_swept_region_of_home_has_its_assembly_mode(load_text):
-    m = pk.load("hexapod")
+    m = load_shipped("hexapod")
     swept = pk.workspace(pk.region(m, every={"A": (-0.1, 0.1)}), gap=0.1, seconds=20)
     whole = pk.workspace(whole_region(m, every={"A": (-0.1, 0.1)}), gap=0.1, seconds=20)
     assert swept.volume.inner <= whole.volume.outer
@@ -264,7 +265,7 @@ def test_a_swept_region_of_home_has_its_assembly_mode(load_text):
 @pytest.mark.parametrize("name", ["orthoglide5_table", "tricept"])
 def test_an_inclusive_region_with_wide_ranges_has_a_bracket_and_an_honest_estimate(name):
     """A table that turns all round bounds the workpiece's positions; wide bounds are no estimate."""
-    region = pk.region(pk.load(name), some={"B": ("0 deg", "50 deg"), "C": (-pi, pi)})
+    region = pk.region(load_shipped(name), some={"B": ("0 deg", "50 deg"), "C": (-pi, pi)})
     found = pk.workspace(region, seconds=3.0)
     volume, box = found.volume, found.box
     positions = np.random.default_rng(1).uniform(*box, (1500, 3))

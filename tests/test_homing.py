@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from geometry import Description
+from shipped import load_shipped
 
 import parakin as pk
 from parakin.controllers.linuxcnc.homing import find_homing
@@ -34,7 +35,7 @@ def changed(tmp_path, name, old, new):
 
 
 def test_starts_are_whole_machines():
-    m = pk.load("hexapod")
+    m = load_shipped("hexapod")
     starts = sample_starts(m)
     assert len(starts.poses) == 1000
     assert (m.check(starts.poses) == 0).all()
@@ -47,7 +48,7 @@ def test_starts_are_whole_machines():
 
 def test_constraint_singularities_count():
     """Exechon far beyond its limits, where what guides the platform is nearly singular and its drives are not."""
-    m = pk.load("exechon")
+    m = load_shipped("exechon")
     rng = np.random.default_rng(0)
     poses = m.home + rng.uniform(-1.0, 1.0, (20_000, 5)) * [1500.0, 1500.0, 1500.0, 3.0, 3.0]
     poses = poses[np.isfinite(m.inverse(poses)).all(1)]
@@ -61,7 +62,7 @@ def test_constraint_singularities_count():
 
 def test_the_tricept_pulls_its_struts_in():
     """Up is away from the work: the platform hangs below, and all struts are shortest at 934 mm."""
-    plan = find_homing(pk.load("tricept"))
+    plan = find_homing(load_shipped("tricept"))
     assert [(j.switch, j.direction, j.sequence) for j in plan.joints[:3]] == [(934.0, -1.0, 1)] * 3
     assert plan.unsafe is None
     assert 0.3 < plan.least < 1.0
@@ -71,7 +72,7 @@ def test_the_tricept_pulls_its_struts_in():
 
 
 def test_joints_of_a_sequence_arrive_together():
-    m = pk.load("tricept")
+    m = load_shipped("tricept")
     plan, home = find_homing(m), m.inverse(m.home)
     speeds = pace_return(m, plan)
     seconds = [abs(home[i] - plan.joints[i].switch) / speeds[i] for i in range(3)]
@@ -81,7 +82,7 @@ def test_joints_of_a_sequence_arrive_together():
 
 def test_the_orthoglide_goes_where_its_rods_meet():
     """With all slides at their high ends the rods can't meet: those ends lie on a circle wider than a rod is long."""
-    m = pk.load("orthoglide")
+    m = load_shipped("orthoglide")
     rod = m.spec.sizes["L"]
     high = m.drives[0].high
     assert high * sqrt(2.0 / 3.0) > rod
@@ -93,7 +94,7 @@ def test_the_orthoglide_goes_where_its_rods_meet():
 
 
 def test_a_walk_that_loses_no_leg_stays_closed():
-    m = pk.load("linear_delta")
+    m = load_shipped("linear_delta")
     starts = sample_starts(m)
     ends = {0: 1300.0, 1: 1300.0, 2: 1300.0}
     walk = walk_joints(m, begin_walk(m, starts), ends, np.full(3, 50.0), patient=False)
@@ -108,7 +109,7 @@ def test_a_walk_that_loses_no_leg_stays_closed():
 
 @pytest.mark.parametrize("name", ["hexapod", "hbg80_2d"])
 def test_no_switches_where_homing_can_do_harm(name):
-    plan = find_homing(pk.load(name))
+    plan = find_homing(load_shipped(name))
     assert all(joint.switch is None for joint in plan.joints)
     assert 0.0 < plan.unsafe < 0.1
     assert plan.ambiguous == 0.0
@@ -118,7 +119,7 @@ def test_no_switches_where_homing_can_do_harm(name):
 @pytest.mark.parametrize("name", ["hexapod", "lambda6", "hbg80_2d"])
 def test_linuxcnc_finds_the_pose_that_encoders_tell(name, tmp_path):
     """Where nothing moves to home, the kinematics has joints of any pose, and a guess of zeros."""
-    m = pk.load(name)
+    m = load_shipped(name)
     starts = sample_starts(m)
     rows, codes = Stub(tmp_path).built(m).forward(outward(m, starts.joints), np.zeros((len(starts.poses), 9)))
     assert (codes == 0).all()
@@ -146,5 +147,5 @@ def test_switches_are_where_the_file_says(tmp_path):
 
 
 def test_the_same_in_every_run():
-    one, two = (find_homing(pk.load("linear_delta")) for _ in range(2))
+    one, two = (find_homing(load_shipped("linear_delta")) for _ in range(2))
     assert replace(one) == two

@@ -6,6 +6,7 @@ from math import pi, sqrt
 import numpy as np
 import pytest
 from regions import whole_region
+from shipped import load_shipped
 
 import parakin as pk
 from parakin.workspaces.certified.containment import MOST, prove_boxes
@@ -122,7 +123,7 @@ ASKED = {
 
 @pytest.mark.parametrize("name", ASKED)
 def test_what_is_proved_holds_and_what_is_broken_is(name):
-    m, rng = pk.load(name), np.random.default_rng(4)
+    m, rng = load_shipped(name), np.random.default_rng(4)
     asked = whole_region(m, **ASKED[name])
     d, home = len(asked.free_axes), home_of(asked)
     size = 0.8 * (np.subtract(*asked.extent[::-1]).clip(0, 2000))
@@ -146,7 +147,7 @@ def test_what_is_proved_holds_and_what_is_broken_is(name):
 
 
 def test_one_turn_is_enough_of_an_inclusive_region():
-    m, rng = pk.load("hexapod"), np.random.default_rng(5)
+    m, rng = load_shipped("hexapod"), np.random.default_rng(5)
     asked = whole_region(m, some={"A": (-0.3, 0.3)})
     half = np.array([270.0, 230.0, 160.0])
     home = home_of(asked)
@@ -221,7 +222,7 @@ def test_a_hole_is_touched_in_the_middle_of_a_face(tmp_path):
 @pytest.mark.parametrize("name", ["orthoglide", "hbg80_2d", "tricept", "hexapod"])
 def test_no_face_can_move_and_no_place_is_outside(name):
     rng = np.random.default_rng(6)
-    asked = whole_region(pk.load(name), **ASKED[name])
+    asked = whole_region(load_shipped(name), **ASKED[name])
     box = find_largest_box(asked)
     assert not len(broken_in(asked, box.low, box.high, rng, 200_000))
     for axis in range(len(box.low)):
@@ -238,7 +239,7 @@ def test_no_face_can_move_and_no_place_is_outside(name):
 
 
 def test_the_cube_that_the_orthoglide_was_designed_for_is_its_largest():
-    asked = whole_region(pk.load("orthoglide"))
+    asked = whole_region(load_shipped("orthoglide"))
     box = find_largest_box(asked, shape=(1, 1, 1), tolerance=1e-3)
     assert box.edges.min() > 200.0 - 2e-3
     assert box.edges.max() <= 200.0 + 1e-9
@@ -251,7 +252,7 @@ def test_the_cube_that_the_orthoglide_was_designed_for_is_its_largest():
 
 @pytest.mark.parametrize("name", ASKED)
 def test_what_is_given_is_what_was_proved(name):
-    asked = whole_region(pk.load(name), **ASKED[name])
+    asked = whole_region(load_shipped(name), **ASKED[name])
     d = len(asked.free_axes)
     home = home_of(asked) + 20.0
     for kind in ({"shape": (3.0, 1.0, 2.0)[:d]}, {"around": home}, {"around": home, "shape": (1.0, 2.0, 1.5)[:d]}):
@@ -283,7 +284,7 @@ def rectangle_by_histogram(mask):
 
 @pytest.mark.parametrize("name", ["hbg80_2d", "linear_delta"])
 def test_it_is_as_large_as_the_largest_of_a_fine_grid(name):
-    asked = whole_region(pk.load(name), **ASKED.get(name, {}))
+    asked = whole_region(load_shipped(name), **ASKED.get(name, {}))
     box = find_largest_box(asked)
     low, high = asked.extent
     n = 400 if len(low) == 2 else 40
@@ -329,7 +330,7 @@ def test_boxes_of_a_mask():
 
 
 def test_an_inclusive_region_has_a_larger_box_and_a_line_one_too():
-    m = pk.load("orthoglide5_head")
+    m = load_shipped("orthoglide5_head")
     line = whole_region(m, at={"Y": 0.0, "Z": -150.0})
     box = find_largest_box(line)
     assert box.axes == ("X",)
@@ -337,7 +338,7 @@ def test_an_inclusive_region_has_a_larger_box_and_a_line_one_too():
     assert not len(broken_in(line, box.low, box.high, np.random.default_rng(8)))
     for low, high in ((box.low - 1.0, box.low), (box.high, box.high + 1.0)):
         assert prove_box(line, low, high).limit is not None
-    hexapod = pk.load("hexapod")
+    hexapod = load_shipped("hexapod")
     plane = {"X": 0.0, "A": 0.0, "B": 0.0}
     fixed, some = whole_region(hexapod, at=plane), whole_region(hexapod, {"X": 0.0, "B": 0.0}, some={"A": (-0.2, 0.2)})
     assert find_largest_box(some, shape=(1, 1)).volume > 1.05 * find_largest_box(fixed, shape=(1, 1)).volume
@@ -373,9 +374,9 @@ def test_what_makes_no_sense_is_refused(disc, kind, said):
 
 def test_an_empty_region_and_corners_that_are_none_are_refused(disc):
     with pytest.raises(pk.PoseError, match="empty"):
-        find_largest_box(whole_region(pk.load("tricept"), {"Z": 500.0}))
+        find_largest_box(whole_region(load_shipped("tricept"), {"Z": 500.0}))
     with pytest.raises(pk.PoseError, match="empty"):
-        find_largest_box(whole_region(pk.load("hexapod"), every={"A": (-pi / 2, pi / 2)}))
+        find_largest_box(whole_region(load_shipped("hexapod"), every={"A": (-pi / 2, pi / 2)}))
     with pytest.raises(pk.PoseError, match="corner"):
         prove_box(disc, [1.0, 0.0], [0.0, 1.0])
     with pytest.raises(pk.PoseError, match="corner"):

@@ -13,6 +13,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from shipped import load_shipped
 
 import parakin as pk
 from parakin.cli import main
@@ -60,7 +61,7 @@ def jobs(tmp_path_factory):
             place, upright = PLACES[name]
             lines = turbine_blade.nx_lines(turbine_blade.tool_path(150, upright), turbine_blade.FEEDS | {"cut": 1e4})
             (folder / "part.cls").write_text("\n".join(lines) + "\n", encoding="ascii")
-            machine = pk.load(name)
+            machine = load_shipped(name)
             path = pk.fit_tool_lengths(machine, pk.read_path(folder / "part.cls"), "machine")
             known[name, interpolation] = pk.prepare(machine, path, workpiece=place, interpolation=interpolation)
         return known[name, interpolation]
@@ -239,7 +240,7 @@ def square(events, dialect="nx", scale=1.0):
         np.full(4, 3000.0), np.full(4, 9000.0), dialect=dialect,
         events=tuple(Event(record, 10 * record + i, text) for i, (record, text) in enumerate(events)),
     )  # fmt: skip
-    return plan_trajectory(post_path(pk.load("linear_delta"), path), stops=find_stops(path))
+    return plan_trajectory(post_path(load_shipped("linear_delta"), path), stops=find_stops(path))
 
 
 TARGETS = ["grbl", "fluidnc", "siemens", "heidenhain", "fanuc"]
@@ -274,7 +275,7 @@ def test_events_in_every_dialect(target, dialect, text, actions):
 
 def at_corner(number):
     """The joints at a corner of the square, by the formula of the machine's sliders."""
-    machine = pk.load("linear_delta")
+    machine = load_shipped("linear_delta")
     tips = np.array([[0.0, 0.0, 280.0], [5.0, 0.0, 280.0], [5.0, 5.0, 280.0], [0.0, 5.0, 280.0]])
     return INVERSES["linear_delta"](machine.spec.sizes, tips)[number]
 
@@ -373,7 +374,7 @@ def dense(tip, feed=6000.0):
         square([]).posted.path, tip=tip, axis=np.tile([0.0, 0.0, 1.0], (count, 1)), line=np.arange(1, count + 1),
         rapid=np.zeros(count, bool), feed=np.full(count, feed), spindle=np.full(count, np.nan),
     )  # fmt: skip
-    return plan_trajectory(post_path(pk.load("linear_delta"), path))
+    return plan_trajectory(post_path(load_shipped("linear_delta"), path))
 
 
 @pytest.mark.parametrize(("target", "shortest"), [("grbl", 0.005), ("fluidnc", 0.008), ("fanuc", 0.006)])

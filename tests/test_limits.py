@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from geometry import Description
 from scipy.optimize import minimize
+from shipped import load_shipped
 
 import parakin as pk
 
@@ -32,7 +33,7 @@ def hexapod_struts(m, pose):
 
 
 def test_clearances_and_cones_of_the_hexapod():
-    m = pk.load("hexapod")
+    m = load_shipped("hexapod")
     names = list(m.limits)
     least = m.spec.limits.clearance
     poses = about_home(m, 6)
@@ -69,7 +70,7 @@ def test_clearances_and_cones_of_the_hexapod():
 
 
 def test_gaps_of_the_lambda():
-    m = pk.load("lambda6")
+    m = load_shipped("lambda6")
     poses = about_home(m, 50)
     q, row = m.inverse(poses), m.margins(poses)
     assert len(m.spec.limits.gaps) == 3
@@ -84,7 +85,7 @@ def test_gaps_of_the_lambda():
 @pytest.mark.parametrize("start", [0, 3])
 def test_a_path_with_upright_poses_closes_everywhere(name, start):
     """Poses exactly on the pole between leaning ones: the joints that follow() gives make those poses."""
-    m = pk.load(name)
+    m = load_shipped(name)
     lean = np.array([0.0, 0.0, 0.2, 0.1, 0.0, 0.0, 0.1, 0.3, 0.0])[start:]
     poses = np.tile(m.home, (len(lean), 1))
     poses[:, :3] += np.random.default_rng(4).uniform(-25, 25, (len(lean), 3))
@@ -101,7 +102,7 @@ def test_a_path_with_upright_poses_closes_everywhere(name, start):
 
 @pytest.mark.parametrize("name", ["orthoglide5_head", "orthoglide5_table"])
 def test_over_the_pole_the_first_joint_does_not_swing(name):
-    m = pk.load(name)
+    m = load_shipped(name)
     lean = np.radians([-17.0, -11.0, -5.0, -1.0, 2.0, 7.0, 12.0, 17.0])
     poses = np.tile(m.home, (len(lean), 1))
     poses[:, 3], poses[:, 4] = np.abs(lean), np.where(lean < 0, np.pi, 0.0)
@@ -130,11 +131,11 @@ def test_a_range_can_forbid_to_go_on_over_the_pole(tmp_path):
     poses[:, 3], poses[:, 4] = np.abs(lean), np.where(lean < 0, np.pi, 0.0)
     assert (m.check(poses, m.follow(poses)) == 0).all()
     assert m.follow(poses)[:, 4].min() > 0.0
-    assert pk.load("tricept").follow(poses)[:, 4].min() < -0.2
+    assert load_shipped("tricept").follow(poses)[:, 4].min() < -0.2
 
 
 def test_the_scissors_take_the_point_farther_from_the_origin():
-    m = pk.load("hbg80_2d")
+    m = load_shipped("hbg80_2d")
     rng = np.random.default_rng(6)
     poses = rng.uniform(60.0, 390.0, (20000, 2))
     poses = poses[m.check(poses) == 0]

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from dense_deviations import DEGREE, UNDER, axis_of, path_of, within
 from scipy.spatial.transform import Rotation
+from shipped import load_shipped
 
 import parakin as pk
 from parakin.toolpath.linearise.linearise import linearise_path
@@ -19,7 +20,7 @@ from parakin.toolpath.programmed_path import ProgrammedPath
 
 def a_path(name):
     """A few long motions for a machine."""
-    machine = pk.load(name)
+    machine = load_shipped(name)
     if name == "linear_delta":
         return machine, path_of([[-100, 0, 280], [100, 0, 280], [20, 90, 350], [20, 90.5, 350], [0, -100, 250]])
     tip = {
@@ -64,7 +65,7 @@ def test_the_tool_stays_within_both_tolerances(name, under, chord, angle):
 
 @UNDER
 def test_lambda6_as_a_program_turns_it(under):
-    machine = pk.load("lambda6")
+    machine = load_shipped("lambda6")
     turns = np.radians([[5, -5, 30], [-8, 6, 45], [10, 10, 20]])
     posted = post_path(machine, turned([[0, 0, 1400], [60, -40, 1420], [-50, 30, 1390]], turns))
     result = linearise_path(posted, under, chord=0.02)
@@ -93,7 +94,7 @@ def test_no_point_can_be_spared(name, under):
 
 
 def test_a_long_line_of_a_linear_delta():
-    machine = pk.load("linear_delta")
+    machine = load_shipped("linear_delta")
     posted = post_path(machine, path_of([[-100, 0, 280], [100, 0, 280]]))
     assert linearise_path(posted, "pose") is posted
     counts = []
@@ -107,7 +108,7 @@ def test_a_long_line_of_a_linear_delta():
 
 @UNDER
 def test_a_dense_path_needs_nothing(under):
-    machine = pk.load("tricept")
+    machine = load_shipped("tricept")
     t = np.linspace(0.0, 2.0, 400)
     path = path_of(np.column_stack([40 * np.cos(t), 40 * np.sin(t), -1650 + t]), axis_of(20 + t, 50 * t))
     posted = post_path(machine, path)
@@ -125,7 +126,7 @@ def turned(tip, turns, **others):
 @UNDER
 @pytest.mark.parametrize("angles", [None, {"A": 12 * DEGREE, "B": -7 * DEGREE, "C": 20 * DEGREE}])
 def test_turns_of_a_program(under, angles):
-    machine = pk.load("tricept")
+    machine = load_shipped("tricept")
     z = 0.0 if angles else -1650.0
     workpiece = pk.workpiece(Z=-1650, **angles) if angles else None
     turns = np.radians([[0, 20, 10], [0, 25, 200], [0, 25, 200], [0, -15, 230], [0, -15, 0]])
@@ -140,7 +141,7 @@ def test_turns_of_a_program(under, angles):
 
 
 def test_whole_turns_in_one_motion_hide_nothing():
-    machine = pk.load("orthoglide5_table")
+    machine = load_shipped("orthoglide5_table")
     start = np.radians([[0, 10, 0]])
     for whole in (1, 2, 3):
         turns = np.vstack([start, start + [0, 0, whole * 2 * math.pi]])
@@ -155,7 +156,7 @@ def test_whole_turns_in_one_motion_hide_nothing():
 
 
 def test_lines_feeds_events_and_times():
-    machine = pk.load("linear_delta")
+    machine = load_shipped("linear_delta")
     path = path_of(
         [[-100, 0, 280], [100, 0, 280], [100, 0.1, 280], [0, 60, 300]],
         events=(Event(0, 9, "M3"), Event(1, 10, "M8"), Event(2, 11, "M0"), Event(4, 20, "M2")),
@@ -193,7 +194,7 @@ def test_lines_feeds_events_and_times():
 def test_the_file_s_own_frame_stays():
     frame = np.column_stack([Rotation.from_euler("z", 40, degrees=True).as_matrix(), [10.0, -5.0, 280.0]])
     posted = post_path(
-        pk.load("linear_delta"), path_of([[-80, 0, 0], [80, 0, 0]], frame=frame), workpiece=pk.workpiece(X=1, Y=1)
+        load_shipped("linear_delta"), path_of([[-80, 0, 0], [80, 0, 0]], frame=frame), workpiece=pk.workpiece(X=1, Y=1)
     )
     result = linearise_path(posted, "joints")
     assert within(posted, result, "joints", 0.01, 1e-3) <= 1.0
@@ -201,7 +202,7 @@ def test_the_file_s_own_frame_stays():
 
 def test_rapid_motions_are_kept_to_their_lines():
     posted = post_path(
-        pk.load("linear_delta"), replace(path_of([[-100, 0, 280], [100, 0, 280]]), rapid=np.ones(2, bool))
+        load_shipped("linear_delta"), replace(path_of([[-100, 0, 280], [100, 0, 280]]), rapid=np.ones(2, bool))
     )
     assert len(linearise_path(posted, "joints").path) > 20
 
@@ -210,7 +211,7 @@ def test_rapid_motions_are_kept_to_their_lines():
 
 
 def test_paths_with_nothing_to_do():
-    machine = pk.load("tricept")
+    machine = load_shipped("tricept")
     for tip in (np.empty((0, 3)), [[0, 0, -1650]]):
         posted = post_path(machine, path_of(np.reshape(tip, (-1, 3))))
         for under in ("pose", "joints"):
@@ -220,7 +221,7 @@ def test_paths_with_nothing_to_do():
 @UNDER
 @pytest.mark.parametrize("name", ["orthoglide5_head", "orthoglide5_table", "tricept"])
 def test_an_upright_tool_stays_on_the_pole(name, under):
-    machine = pk.load(name)
+    machine = load_shipped(name)
     posted = post_path(machine, path_of(machine.home[:3] + np.array([[0, 0, 0], [0.5, 0, 0], [0.5, 0.5, 0]])))
     result = linearise_path(posted, under)
     assert within(posted, result, under, 0.01, 1e-3) <= 1.0
@@ -230,7 +231,7 @@ def test_an_upright_tool_stays_on_the_pole(name, under):
 @UNDER
 def test_records_out_of_reach_are_left_alone(under):
     posted = post_path(
-        pk.load("linear_delta"), path_of([[-100, 0, 280], [0, 0, 280], [2000, 0, 280], [0, 0, 280], [0, 100, 280]])
+        load_shipped("linear_delta"), path_of([[-100, 0, 280], [0, 0, 280], [2000, 0, 280], [0, 0, 280], [0, 100, 280]])
     )
     result = linearise_path(posted, under)
     counts = np.bincount(result.path.line)
@@ -255,7 +256,7 @@ def test_a_motion_out_of_reach_in_between_is_an_offence():
 
 def test_opposite_axes_are_refused_with_their_line():
     path = path_of([[0, 0, -950], [10, 0, -950]], [[0.0, 0.0, 1.0], [0.0, 0.0, -1.0]])
-    posted = post_path(pk.load("hexapod"), path)
+    posted = post_path(load_shipped("hexapod"), path)
     if np.isfinite(posted.joints).all():
         with pytest.raises(pk.PoseError, match=r"part\.cls:11: the tool axis turns to its opposite"):
             linearise_path(posted, "pose")
@@ -265,7 +266,7 @@ def test_opposite_axes_are_refused_with_their_line():
 
 @pytest.mark.parametrize("bad", [{"chord": 0.0}, {"chord": math.nan}, {"angle": -1.0}, {"angle": math.inf}])
 def test_bad_tolerances(bad):
-    posted = post_path(pk.load("tricept"), path_of([[0, 0, -1650]]))
+    posted = post_path(load_shipped("tricept"), path_of([[0, 0, -1650]]))
     with pytest.raises(pk.PoseError, match=next(iter(bad))):
         linearise_path(posted, "pose", **bad)
     with pytest.raises(pk.PoseError, match="under"):

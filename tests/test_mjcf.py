@@ -4,6 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from shipped import load_shipped
 
 import parakin as pk
 from parakin.cli import main
@@ -89,7 +90,7 @@ def load(name, tmp_path):
     if name in KINDS:
         (tmp_path / f"{name}.yaml").write_text(KINDS[name])
         name = str(tmp_path / f"{name}.yaml")
-    return pk.load(name)
+    return load_shipped(name)
 
 
 @pytest.mark.parametrize("name", [*pk.machines(), *OWN, *KINDS], ids=lambda name: Path(name).stem)
@@ -110,7 +111,7 @@ def test_the_engine_shows_our_pose(name, tmp_path):
 @pytest.mark.parametrize("name", pk.machines())
 def test_servos_hold_the_machine_at_home(name):
     """A second of dynamics under its own weight: closed, and where home is."""
-    machine = pk.load(name)
+    machine = load_shipped(name)
     engine = Engine(machine)
     mujoco.mj_resetDataKeyframe(engine.model, engine.data, 0)
     assert engine.data.ctrl == pytest.approx(machine.inverse(machine.home) / engine.units, abs=1e-12)
@@ -124,7 +125,7 @@ def test_servos_hold_the_machine_at_home(name):
 
 
 def test_ranges_and_drives_are_the_machines():
-    machine = pk.load("tricept")
+    machine = load_shipped("tricept")
     model = mujoco.MjModel.from_xml_string(render_mjcf(machine))
     assert [model.actuator(i).name for i in range(model.nu)] == list(machine.joints)
     assert model.joint("d2").range == pytest.approx([0.934, 1.520])
@@ -135,7 +136,7 @@ def test_ranges_and_drives_are_the_machines():
 
 def test_masses_follow_from_the_densities():
     """A rod is a capsule of steel: the cylinder's volume and the ball's, times 7850 kg/m³."""
-    model = mujoco.MjModel.from_xml_string(render_mjcf(pk.load("linear_delta")))
+    model = mujoco.MjModel.from_xml_string(render_mjcf(load_shipped("linear_delta")))
     geom = model.geom(model.body("tower_a_1").geomadr[0])
     radius, half = geom.size[:2]
     assert 2.0 * half == pytest.approx(0.7)

@@ -6,8 +6,8 @@ import subprocess
 
 import numpy as np
 import pytest
+from shipped import load_shipped
 
-import parakin as pk
 from parakin.cli import main
 from parakin.controllers.move_check.move_check import render_move_check
 from parakin.errors import NoMethodError
@@ -56,7 +56,7 @@ def draw_moves(machine, count, seed):
 @pytest.mark.parametrize("name", MOVES)
 def test_no_false_yes(name, tmp_path):
     """1e5 moves over all machines: each that is proved keeps all limits at all its samples, and its side."""
-    machine = pk.load(name)
+    machine = load_shipped(name)
     start, end = draw_moves(machine, MOVES[name], 7)
     assert len(start) == MOVES[name]
     proved = prove(build(machine, tmp_path), start, end)
@@ -74,7 +74,7 @@ def test_no_false_yes(name, tmp_path):
 
 def test_moves_to_the_brink(tmp_path):
     """A move that ends just inside what travel proves is allowed, and one that ends just beyond is not."""
-    machine = pk.load("hexapod")
+    machine = load_shipped("hexapod")
     library = build(machine, tmp_path)
     start, end = draw_moves(machine, 12, 3)
     for pose, direction in zip(start, end - start, strict=True):
@@ -86,7 +86,7 @@ def test_moves_to_the_brink(tmp_path):
 
 
 def test_what_is_no_number_is_refused(tmp_path):
-    machine = pk.load("linear_delta")
+    machine = load_shipped("linear_delta")
     library = build(machine, tmp_path)
     home = machine.home[None]
     bad = np.array([[np.nan, 0.0, 280.0], [np.inf, 0.0, 280.0], [0.0, 0.0, -1e300]])
@@ -98,7 +98,7 @@ def test_what_is_no_number_is_refused(tmp_path):
 @pytest.mark.parametrize("name", ["tricept", "orthoglide5_table"])
 def test_wrists_are_refused(name):
     with pytest.raises(NoMethodError, match="without turning joints"):
-        render_move_check(pk.load(name))
+        render_move_check(load_shipped(name))
 
 
 class Printer:
@@ -134,7 +134,7 @@ class Move:
 
 
 def test_the_module_for_klipper_refuses_moves(tmp_path):
-    machine = pk.load("linear_delta")
+    machine = load_shipped("linear_delta")
     output = tmp_path / "parakin_check_move.py"
     assert main(["export", "linear_delta", "--to", "check-move-klipper", "-o", str(output)]) == 0
     namespace = {}
@@ -156,7 +156,7 @@ def test_the_module_for_klipper_refuses_moves(tmp_path):
 def test_command(tmp_path, capsys):
     output = tmp_path / "check_move.h"
     assert main(["export", "linear_delta", "--to", "check-move", "-o", str(output)]) == 0
-    assert output.read_text() == render_move_check(pk.load("linear_delta"))
+    assert output.read_text() == render_move_check(load_shipped("linear_delta"))
     assert main(["export", "tricept", "--to", "check-move", "-o", str(tmp_path / "no.h")]) == 2
     assert len(capsys.readouterr().err.splitlines()) == 1
     assert [path.name for path in tmp_path.iterdir()] == ["check_move.h"]

@@ -9,6 +9,7 @@ import pytest
 from drawn import draw, machine_of
 from independent import orientation, transform
 from scipy.spatial.transform import Rotation
+from shipped import load_shipped
 
 import parakin as pk
 from parakin.errors import SingularHomeWarning
@@ -78,7 +79,7 @@ def test_where_the_pose_is_singular_the_motion_need_not_be(tmp_path):
 
 
 def test_a_turn_before_the_translations_of_a_plane(tmp_path):
-    before = pk.load("rpr3")
+    before = load_shipped("rpr3")
     text = before.format_yaml().replace("motion: tx ty rz", "motion: rz tx ty").replace("name: rpr3", "name: turned")
     (tmp_path / "m.yaml").write_text(text.replace("passive: {", "passive: {tx: [-30 mm, 30 mm], "))
     after = pk.load(tmp_path / "m.yaml")
@@ -89,7 +90,7 @@ def test_a_turn_before_the_translations_of_a_plane(tmp_path):
 
 
 def test_assemblies_do_not_depend_on_the_order(tmp_path):
-    before = pk.load("hexapod")
+    before = load_shipped("hexapod")
     text = before.format_yaml().replace("motion: tx ty tz rz ry rx", "motion: ry rz rx tx ty tz")
     (tmp_path / "m.yaml").write_text(text.replace("name: hexapod", "name: turned"))
     joints = before.inverse(before.home + [30.0, -20.0, 10.0, 0.1, -0.1, 0.2])

@@ -5,7 +5,7 @@ import zipfile
 import numpy as np
 import pytest
 from browser import needs_chromium, open_browser, open_tab, wait_until
-from shipped import NAMES, REPRESENTATIVES
+from shipped import NAMES, REPRESENTATIVES, load_shipped
 
 import parakin as pk
 from parakin.cli import main
@@ -54,7 +54,7 @@ def as_numbers(rows):
 @needs_chromium
 @pytest.mark.parametrize("name", NAMES)
 def test_a_page_computes_as_the_library(name, browser):
-    machine = pk.load(name)
+    machine = load_shipped(name)
     poses = seeded_poses(machine, 7)
     modes = machine.modes[:MODES]
     joints = machine.inverse(poses)
@@ -97,7 +97,7 @@ def pages(tmp_path_factory):
     def write(name):
         file = folder / f"{name}.html"
         if not file.exists():
-            file.write_text(render_machine_page(pk.load(name)), encoding="utf-8")
+            file.write_text(render_machine_page(load_shipped(name)), encoding="utf-8")
         return file.as_uri()
 
     return write
@@ -105,7 +105,7 @@ def pages(tmp_path_factory):
 
 @needs_chromium
 def test_a_page_is_one_small_file_without_a_network(pages, browser):
-    assert len(render_machine_page(pk.load("hexapod")).encode()) < 1_000_000
+    assert len(render_machine_page(load_shipped("hexapod")).encode()) < 1_000_000
     with open_tab(browser) as tab:
         requests = []
         tab.on("request", lambda request: requests.append(request.url))
@@ -123,7 +123,7 @@ def test_a_page_opens_from_a_disk_and_moves(pages, browser):
         number.fill("150")
         number.press("Enter")
         assert tab.evaluate("parakin.state.pose[0]") == pytest.approx(150.0, abs=1e-9)
-        machine = pk.load("tricept")
+        machine = load_shipped("tricept")
         expected = machine.inverse({"X": 150.0})
         assert tab.evaluate("parakin.state.joints") == pytest.approx(expected, abs=AGREE)
         assert tab.locator("#verdict").inner_text() == "Allowed"
@@ -133,7 +133,7 @@ def test_a_page_opens_from_a_disk_and_moves(pages, browser):
 
 @needs_chromium
 def test_a_limit_that_stops_a_move_is_named(pages, browser):
-    machine = pk.load("tricept")
+    machine = load_shipped("tricept")
     with open_tab(browser) as tab:
         tab.goto(pages("tricept"))
         tab.evaluate("parakin.moveToPose([0, 0, -2100, 0, 0])")
@@ -168,7 +168,7 @@ def test_the_tool_and_a_strut_are_dragged(name, place, pages, browser):
 
 @needs_chromium
 def test_modes_are_switched(pages, browser):
-    machine = pk.load("five_bar")
+    machine = load_shipped("five_bar")
     with open_tab(browser) as tab:
         tab.goto(pages("five_bar"))
         tab.get_by_role("button", name=f"{machine.joints[0]} −").click()
@@ -187,7 +187,7 @@ def test_modes_are_switched(pages, browser):
 @needs_chromium
 def test_a_free_motion_is_the_null_space_of_a(pages, browser):
     """Next to a singularity a step along the arrow changes the struts least."""
-    machine = pk.load("hexapod")
+    machine = load_shipped("hexapod")
     with open_tab(browser) as tab:
         tab.goto(pages("hexapod"))
         tab.evaluate("() => { parakin.options.stops = false; parakin.moveToPose([0, 0, -950, 0, 0, 1.5]); }")
@@ -248,7 +248,7 @@ def test_a_part_is_played(tmp_path, browser):
     part = tmp_path / "square.ngc"
     part.write_text(SQUARE)
     assert main(["page", str(part), "-m", "linear_delta", "-o", str(tmp_path / "square.html")]) == 0
-    machine = pk.load("linear_delta")
+    machine = load_shipped("linear_delta")
     job = pk.prepare(machine, pk.read_path(part))
     with open_tab(browser) as tab:
         tab.goto((tmp_path / "square.html").as_uri())
@@ -279,7 +279,7 @@ def test_a_part_is_placed(tmp_path, browser):
     part, page = tmp_path / "square.ngc", tmp_path / "square.html"
     part.write_text(SQUARE)
     assert main(["page", str(part), "-m", "linear_delta", "--workpiece", "X=5,C=30", "-o", str(page)]) == 0
-    machine = pk.load("linear_delta")
+    machine = load_shipped("linear_delta")
     with open_tab(browser) as tab:
         tab.goto(page.as_uri())
         assert tab.inner_text("#workpiece") == "--workpiece X=5,C=30"
@@ -340,7 +340,7 @@ def test_options_of_a_part_ask_for_a_machine(tmp_path, capsys):
 
 @needs_chromium
 def test_the_workspace_is_drawn_in_a_worker(pages, browser):
-    machine = pk.load("hbg80_2d")
+    machine = load_shipped("hbg80_2d")
     with open_tab(browser) as tab:
         tab.goto(pages("hbg80_2d"))
         tab.get_by_label("its surface at this orientation").check()
@@ -354,7 +354,7 @@ def test_the_workspace_is_drawn_in_a_worker(pages, browser):
 @needs_chromium
 @pytest.mark.parametrize("name", ["hbg80_2d", "tricept"])
 def test_a_section_shows_how_far_singularities_are(pages, browser, name):
-    machine = pk.load(name)
+    machine = load_shipped(name)
     with open_tab(browser) as tab:
         tab.goto(pages(name))
         tab.get_by_label("a section through the tool, by det A").check()
@@ -396,7 +396,7 @@ SIZED = """([poses, signs, sizes]) => {
 @pytest.mark.parametrize("name", REPRESENTATIVES)
 def test_sizes_are_inputs_of_a_page(name, browser):
     """With other sizes a page computes as the machine that is read with these."""
-    machine = pk.load(name)
+    machine = load_shipped(name)
     rates, rng = machine.size_rates, np.random.default_rng(11)
     sizes = np.array(rates.nominal) * (1.0 + rng.uniform(-0.04, 0.04, len(rates.nominal)))
     every = {**machine.spec.sizes, **dict(zip(rates.names, sizes.tolist(), strict=True))}
@@ -421,9 +421,9 @@ def test_sizes_are_inputs_of_a_page(name, browser):
 
 
 def test_sizes_that_change_numbers_unevenly_are_left_out():
-    assert pk.load("hexam").size_rates.names == ("R", "r", "rod", "tool")  # lean turns the rails
-    assert pk.load("tricept").size_rates.names == ("R", "r", "l1", "l2")
-    machine = pk.load("tricept").replace_parameters({"legs.d1.foot.x": 1.0})
+    assert load_shipped("hexam").size_rates.names == ("R", "r", "rod", "tool")  # lean turns the rails
+    assert load_shipped("tricept").size_rates.names == ("R", "r", "l1", "l2")
+    machine = load_shipped("tricept").replace_parameters({"legs.d1.foot.x": 1.0})
     assert machine.size_rates.names == ()  # of no file
 
 
@@ -440,5 +440,5 @@ def test_a_size_is_dragged(pages, browser):
         assert tab.locator("#verdict").inner_text().startswith("Stopped: d")
         tab.get_by_role("button", name="As in the file").click()
         assert tab.evaluate("parakin.state.joints") == pytest.approx(
-            pk.load("tricept").inverse(machine.home), abs=AGREE
+            load_shipped("tricept").inverse(machine.home), abs=AGREE
         )

@@ -5,6 +5,7 @@ import os
 import numpy as np
 import pytest
 from browser import needs_chromium, open_browser, open_tab
+from shipped import load_shipped
 
 import parakin as pk
 
@@ -21,11 +22,11 @@ PARTS = {
 def write_page(name, folder):
     file = folder / f"{name}.html"
     if not PARTS[name]:
-        file.write_text(pk.render_machine_page(pk.load(name)), encoding="utf-8")
+        file.write_text(pk.render_machine_page(load_shipped(name)), encoding="utf-8")
         return file.as_uri()
     part = folder / f"{name}.ngc"
     part.write_text(PARTS[name])
-    job = pk.prepare(pk.load(name), pk.read_path(part))
+    job = pk.prepare(load_shipped(name), pk.read_path(part))
     file.write_text(pk.render_path_page(job.posted, job.trajectory), encoding="utf-8")
     return file.as_uri()
 
@@ -81,7 +82,7 @@ def interact(tab, rng):
 @needs_chromium
 @pytest.mark.parametrize("name", sorted(PARTS))
 def test_seeded_interactions_leave_a_page_alive(name, tmp_path):
-    machine, rng = pk.load(name), np.random.default_rng(20261129)
+    machine, rng = load_shipped(name), np.random.default_rng(20261129)
     with open_browser() as browser, open_tab(browser) as tab:
         tab.goto(write_page(name, tmp_path))
         for number in range(COUNT):

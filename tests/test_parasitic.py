@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from geometry import Description
 from independent import orientation
+from shipped import load_shipped
 
 import parakin as pk
 from parakin.performance.certified.proofs import make_pose_box, prove_no_singularity
@@ -166,7 +167,7 @@ def test_a_crooked_3_prs_alone_has_the_axes_that_are_independent(seed, tmp_path)
 
 
 def test_the_exechon_without_its_wrist_moves_in_place(tmp_path):
-    text = pk.load("exechon").format_yaml()
+    text = load_shipped("exechon").format_yaml()
     head, limits = text.index("head:"), text.index("limits:")
     text = text[:head] + "home: {X: 0, Y: 0, Z: -1200 mm}\n"
     assert limits > head
@@ -223,7 +224,7 @@ def test_where_the_constraints_fail_their_margin_is_zero(tmp_path):
 
 def test_the_exechon_reaches_its_constraint_singularity():
     """Where the centre sees the third foot at right angles to the others' line, one turn is free (Thales)."""
-    machine = pk.load("exechon")
+    machine = load_shipped("exechon")
     half = 0.5 * machine.spec.sizes["c"]
     way = np.append(np.linspace(-1200.0, -half - 1e-3, 9), -half)
     poses = np.array([[0.0, half, z - machine.spec.sizes["tool"], 0.0, 0.0] for z in way])
@@ -267,6 +268,6 @@ def test_what_has_no_closed_form_is_refused_in_a_line(old, new, message, tmp_pat
 
 
 def test_planes_of_the_platform_without_a_common_normal_are_refused(tmp_path):
-    text = pk.load("exechon").format_yaml().replace("normal: [0.0, 1.0, 0.0]", "normal: [0.1, 1.0, 0.0]", 1)
+    text = load_shipped("exechon").format_yaml().replace("normal: [0.0, 1.0, 0.0]", "normal: [0.1, 1.0, 0.0]", 1)
     with pytest.raises(pk.ParakinError, match="two must have one normal"):
         load_text(tmp_path, text)

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from geometry import Description
 from independent import orientation
+from shipped import load_shipped
 from test_mjcf import Engine, draw_ways
 from test_parasitic import draw_prs, load_text
 
@@ -132,7 +133,7 @@ def test_where_the_steps_do_not_converge_there_is_no_answer(tmp_path):
 
 
 def test_rods_in_the_plane_of_the_rails_are_a_constraint_singularity():
-    machine = pk.load("triglide_pairs")
+    machine = load_shipped("triglide_pairs")
     column = list_margin_names(machine).index("constraint")
     poses = machine.home + np.linspace(0.0, 429.9, 50)[:, None] * [0.0, 0.0, 1.0]  # at 430 all rods lie flat
     margins = np.abs(compute_singularity_margins(machine, poses)[:, column])

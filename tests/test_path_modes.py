@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from shipped import load_shipped
 
 import parakin as pk
 
 
 @pytest.mark.parametrize("name", ["hbg80_2d", "linear_delta", "orthoglide", "lambda6", "hexapod"])
 def test_modes_carry_what_each_pose_of_the_path_allows(name):
-    machine, rng = pk.load(name), np.random.default_rng(7)
+    machine, rng = load_shipped(name), np.random.default_rng(7)
     for _ in range(4):
         way = rng.normal(size=len(machine.axes)) * np.where(np.array(machine.axis_units) == "mm", 900.0, 0.4)
         poses = machine.home + np.linspace(0.0, 1.0, 120)[:, None] * way
@@ -27,7 +28,7 @@ def test_modes_carry_what_each_pose_of_the_path_allows(name):
 
 def test_a_path_through_a_parallel_singularity_leaves_its_assembly_mode():
     """Lambda6's parallel singularity lies at C = 0."""
-    machine = pk.load("lambda6")
+    machine = load_shipped("lambda6")
     poses = np.tile(machine.home, (41, 1))
     poses[:, 5] = np.deg2rad(np.linspace(20.5, -20.5, 41))
     own = machine.find_path_modes(poses)[0]

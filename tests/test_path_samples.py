@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from shipped import load_shipped
 
 import parakin as pk
 from parakin.toolpath.path import ToolPath
@@ -30,7 +31,7 @@ def random_motion(machine, rng):
 
 @pytest.mark.parametrize("name", ["tricept", "orthoglide5_head", "orthoglide5_table"])
 def test_two_records_and_two_hundred_get_one_verdict(name):
-    machine, rng = pk.load(name), np.random.default_rng(11)
+    machine, rng = load_shipped(name), np.random.default_rng(11)
     for _ in range(12):
         tip, axis = random_motion(machine, rng)
         sparse, dense = (pk.prepare(machine, tilting_path(tip, axis, count)) for count in (2, 201))
@@ -40,7 +41,7 @@ def test_two_records_and_two_hundred_get_one_verdict(name):
 
 
 def test_the_joints_of_records_are_those_of_a_dense_path():
-    machine, rng = pk.load("tricept"), np.random.default_rng(5)
+    machine, rng = load_shipped("tricept"), np.random.default_rng(5)
     for _ in range(40):
         tip, axis = random_motion(machine, rng)
         sparse, dense = (post_path(machine, tilting_path(tip, axis, count)) for count in (2, 801))

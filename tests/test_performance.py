@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from drawn import draw, machine_of
 from scipy.spatial.transform import Rotation
-from shipped import REPRESENTATIVES
+from shipped import REPRESENTATIVES, load_shipped
 
 import parakin as pk
 from parakin.performance.characteristic_length import choose_characteristic_length
@@ -13,7 +13,7 @@ from parakin.performance.jacobians import list_twist_names
 from parakin.performance.singularities import compute_singularity_margins, list_margin_names
 
 NAMES = REPRESENTATIVES
-everyone = pytest.mark.parametrize("m", [pk.load(name) for name in NAMES], ids=NAMES)
+everyone = pytest.mark.parametrize("m", [load_shipped(name) for name in NAMES], ids=NAMES)
 
 
 def twist_jacobians(machine, poses, mode=None):
@@ -126,14 +126,14 @@ def test_the_jacobians_of_a_rolling_platform_hold_in_the_wrists_other_mode(tmp_p
 
 
 def test_where_the_poses_angle_is_free_the_twist_is_regular():
-    m = pk.load("orthoglide5_table")
+    m = load_shipped("orthoglide5_table")
     a, _ = twist_jacobians(m, m.home)
     assert abs(np.linalg.det(m.jacobians(m.home)[0])) < 1e-6
     assert abs(np.linalg.det(a)) > 1e6
 
 
 def test_performance_of_the_orthoglide_is_that_of_its_rods():
-    m = pk.load("orthoglide")
+    m = load_shipped("orthoglide")
     poses = np.random.default_rng(4).uniform(-110, 70, (50, 3))
     rods = poses[:, None, :] - m.inverse(poses)[:, :, None] * np.eye(3)
     j = np.linalg.inv(rods / np.einsum("nii->ni", rods)[:, :, None])
@@ -156,7 +156,7 @@ def test_performance_of_the_orthoglide_is_that_of_its_rods():
 
 def test_the_condition_number_takes_no_root_of_its_own():
     """On the diagonal psi are 1/(1 + v), twice, and 1/(1 - 2v)."""
-    m = pk.load("orthoglide")
+    m = load_shipped("orthoglide")
     t = 60.0
     v = t / np.sqrt(m.spec.sizes["L"] ** 2 - 2 * t * t)
     found = compute_performance(m, [t, t, t])
@@ -166,7 +166,7 @@ def test_the_condition_number_takes_no_root_of_its_own():
 
 @pytest.mark.parametrize("name", ["orthoglide", "hbg80_3d"])
 def test_isotropic_at_home(name):
-    m = pk.load(name)
+    m = load_shipped(name)
     found = compute_performance(m, m.home)
     assert found.psi == pytest.approx([1, 1, 1], abs=1e-12)
     assert found.margins == pytest.approx([1, 1, 1, 1], abs=1e-12)
@@ -174,7 +174,7 @@ def test_isotropic_at_home(name):
 
 @pytest.mark.filterwarnings("error")
 def test_singular_and_unreachable_poses_are_told_without_a_warning():
-    m = pk.load("lambda6")
+    m = load_shipped("lambda6")
     centre = m.home * [1, 1, 1, 1, 1, 0]
     found = compute_performance(m, [centre, m.home, [9e3, 0, 0, 0, 0, 0]])
     assert found.greatest[0] == found.condition[0] == np.inf
@@ -185,7 +185,7 @@ def test_singular_and_unreachable_poses_are_told_without_a_warning():
     assert np.isfinite(found.psi[1]).all()
     beyond = centre - [0, 0, 0, 0, 0, 0.3]
     assert compute_singularity_margins(m, beyond)[0] < 0
-    m = pk.load("tricept")
+    m = load_shipped("tricept")
     found = compute_performance(m, m.home)  # θ2 = 0
     assert found.least == 0.0
     assert found.condition == np.inf
@@ -197,7 +197,7 @@ def test_singular_and_unreachable_poses_are_told_without_a_warning():
 
 @pytest.mark.parametrize("name", ["tricept", "orthoglide5_head"])
 def test_the_heads_margin_is_the_sine_of_its_second_angle(name):
-    m = pk.load(name)
+    m = load_shipped(name)
     poses = allowed_poses(m, 50)
     margins = compute_singularity_margins(m, poses)
     assert list_margin_names(m)[-1] == "serial theta1-theta2"
@@ -205,7 +205,7 @@ def test_the_heads_margin_is_the_sine_of_its_second_angle(name):
 
 
 def test_the_parallel_margin_of_a_hexapod_is_that_of_its_lines():
-    m = pk.load("hexapod")
+    m = load_shipped("hexapod")
     poses = allowed_poses(m, 20)
     length = 250.0
     turns = Rotation.from_euler("xyz", poses[:, 3:]).as_matrix()
@@ -221,7 +221,7 @@ def test_the_parallel_margin_of_a_hexapod_is_that_of_its_lines():
 
 
 def test_the_length_makes_angles_millimetres():
-    m = pk.load("hexapod")
+    m = load_shipped("hexapod")
     rule = choose_characteristic_length(m)
     corners = np.array([leg.platform for leg in m.spec.legs])
     assert rule.value == pytest.approx(np.sqrt(np.square(corners - corners.mean(0)).sum(1).mean()))
@@ -231,9 +231,9 @@ def test_the_length_makes_angles_millimetres():
     a, b = twist_jacobians(m, pose)
     j = np.diag([1, 1, 1, 100, 100, 100]) @ np.linalg.solve(a, b)
     assert one.psi == pytest.approx(np.linalg.svd(j, compute_uv=False))
-    assert choose_characteristic_length(pk.load("tricept")).value == pytest.approx(150.0)
-    assert choose_characteristic_length(pk.load("orthoglide5_table")).value == pytest.approx(100.0)
-    assert choose_characteristic_length(pk.load("linear_delta")).value is None
+    assert choose_characteristic_length(load_shipped("tricept")).value == pytest.approx(150.0)
+    assert choose_characteristic_length(load_shipped("orthoglide5_table")).value == pytest.approx(100.0)
+    assert choose_characteristic_length(load_shipped("linear_delta")).value is None
     for wrong in (0.0, -1.0, np.nan, np.inf):
         with pytest.raises(pk.PoseError):
             compute_performance(m, pose, wrong)

@@ -6,9 +6,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from shipped import REPRESENTATIVES
+from shipped import REPRESENTATIVES, load_shipped
 
-import parakin as pk
 from parakin.dynamics.polygon import order_polygon
 from parakin.export.machine.picture import render_machine_picture
 from parakin.export.machine.scene import build_scene
@@ -25,7 +24,7 @@ from parakin.toolpath.reading.cl.reader import read_cl
 
 OWN = Path(__file__).parent / "machines" / "rpr3.yaml"
 MACHINES = [*REPRESENTATIVES, str(OWN)]
-LOADED = {name: pk.load(name) for name in MACHINES}
+LOADED = {name: load_shipped(name) for name in MACHINES}
 machines = pytest.mark.parametrize("machine", LOADED.values(), ids=lambda machine: machine.name)
 
 

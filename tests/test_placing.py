@@ -7,6 +7,7 @@ from importlib.resources import files
 
 import numpy as np
 import pytest
+from shipped import load_shipped
 
 import parakin as pk
 from parakin.cli import main
@@ -79,7 +80,7 @@ CASES = [
 
 @pytest.mark.parametrize(("name", "path", "text", "each", "near"), CASES)
 def test_no_placement_of_a_grid_is_better(name, path, text, each, near):
-    machine, bounds = pk.load(name), parse_bounds(text)
+    machine, bounds = load_shipped(name), parse_bounds(text)
     found = find_placement(machine, path, bounds)
     best = on_grid(machine, path, bounds, each)
     assert best > 0.2
@@ -98,7 +99,7 @@ def test_no_placement_of_a_grid_is_better(name, path, text, each, near):
 def test_a_round_part_belongs_in_the_middle():
     angle = np.arange(24) * 15 * DEGREE
     path = path_of(150.0 * np.column_stack([np.cos(angle), np.sin(angle), 0.0 * angle]))
-    found = find_placement(pk.load("linear_delta"), path, parse_bounds("X=-90:120,Y=-110:80,Z=280"))
+    found = find_placement(load_shipped("linear_delta"), path, parse_bounds("X=-90:120,Y=-110:80,Z=280"))
     assert abs(found.values["X"]) < 1e-3
     assert abs(found.values["Y"]) < 1e-3
     assert found.values["Z"] == 280.0
@@ -106,19 +107,19 @@ def test_a_round_part_belongs_in_the_middle():
 
 def test_a_square_part_belongs_on_the_diagonal_of_two_equal_drives():
     path = path_of([[x, y, 0.0] for x in (-90, 90) for y in (-90, 90)])
-    found = find_placement(pk.load("hbg80_2d"), path, parse_bounds("X=0:400,Y=50:390"))
+    found = find_placement(load_shipped("hbg80_2d"), path, parse_bounds("X=0:400,Y=50:390"))
     assert found.values["X"] == pytest.approx(found.values["Y"], abs=1e-4)
 
 
 def test_the_same_again():
-    machine, path, bounds = pk.load("tricept"), scattered(7, 80, [50, 50, 20], 10), parse_bounds(CASES[4][2])
+    machine, path, bounds = load_shipped("tricept"), scattered(7, 80, [50, 50, 20], 10), parse_bounds(CASES[4][2])
     one, two = (find_placement(machine, path, bounds) for _ in range(2))
     assert one.values == two.values
     assert (one.margin, one.limit, one.record, one.tried) == (two.margin, two.limit, two.record, two.tried)
 
 
 def test_on_top_of_the_files_own_frame():
-    machine, path = pk.load("linear_delta"), scattered(8, 40, [100, 90, 40])
+    machine, path = load_shipped("linear_delta"), scattered(8, 40, [100, 90, 40])
     bounds = parse_bounds("X=-100:100,Y=-100:100,Z=150:450")
     shifted = replace(path, frame=build_frame_from_angles(30.0, -20.0, 10.0, 0.0, 0.0, 0.0))
     one, two = (find_placement(machine, each, bounds) for each in (path, shifted))
@@ -134,7 +135,7 @@ def test_a_record_that_is_not_on_the_outside():
     spread = path_of(tip, axis_of(lean, 20.0 + lean))
     lean[2345] = 70.0
     path = path_of(tip, axis_of(lean, 20.0 + lean))
-    machine, bounds = pk.load("tricept"), parse_bounds("X=-200:200,Y=-200:200,Z=-2000:-1400")
+    machine, bounds = load_shipped("tricept"), parse_bounds("X=-200:200,Y=-200:200,Z=-2000:-1400")
     found = find_placement(machine, path, bounds)
     assert found.record == 2345
     assert found.margin < find_placement(machine, spread, bounds).margin - 0.05
@@ -148,7 +149,7 @@ def test_a_record_that_is_not_on_the_outside():
 
 def test_turns_of_the_path_as_a_whole_count():
     # C goes from 0 to 640 deg; the plate has 720. From where the part lies follows where it begins and ends.
-    machine = pk.load("orthoglide5_table")
+    machine = load_shipped("orthoglide5_table")
     c = np.linspace(0.0, 640.0, 300)
     path = path_of(np.zeros((300, 3)), axis_of(np.full(300, 10.0), c))
     bounds = parse_bounds("C=-180:180")
@@ -158,7 +159,7 @@ def test_turns_of_the_path_as_a_whole_count():
 
 
 def test_none_where_the_part_is_too_large():
-    machine = pk.load("linear_delta")
+    machine = load_shipped("linear_delta")
     path = path_of([[x, y, 0.0] for x in (-400, 400) for y in (-400, 400)])
     bounds = parse_bounds("X=-100:100,Y=-100:100,Z=0:500")
     with pytest.raises(pk.PoseError, match="no placement within these bounds is allowed; the nearest is X="):
@@ -173,13 +174,13 @@ def test_none_where_the_part_is_too_large():
 
 def test_none_where_the_tool_would_have_to_lean():
     path = path_of([[0, 0, 0], [20, 0, 0]], axis_of([0.0, 10.0], [0.0, 0.0]))
-    found = pk.find_placements(pk.load("linear_delta"), path, parse_bounds("X=-50:50,Z=250:300"))[0]
+    found = pk.find_placements(load_shipped("linear_delta"), path, parse_bounds("X=-50:50,Z=250:300"))[0]
     assert (found.limit, found.record) == ("tilt", 1)
     assert found.margin == pytest.approx(1e-4 - 10 * DEGREE, abs=1e-9)
 
 
 def test_found_from_far_off():
-    machine, path = pk.load("linear_delta"), scattered(3, 40, [80, 80, 20])
+    machine, path = load_shipped("linear_delta"), scattered(3, 40, [80, 80, 20])
     found = find_placement(machine, path, parse_bounds("X=-4m:4m,Y=-4m:4m,Z=-3m:3m"))
     assert found.margin == pytest.approx(
         find_placement(machine, path, parse_bounds("X=-99:99,Y=-99:99,Z=99:499")).margin, abs=1e-6
@@ -190,7 +191,7 @@ def test_found_from_far_off():
 
 
 def test_a_single_placement():
-    machine, path = pk.load("tricept"), scattered(10, 50, [100, 100, 30], 20)
+    machine, path = load_shipped("tricept"), scattered(10, 50, [100, 100, 30], 20)
     found = find_placement(machine, path, parse_bounds("X=10,Z=-1650"))
     assert found.values == {"X": 10.0, "Z": -1650.0}
     assert found.margin == pytest.approx(least(machine, path, pk.workpiece(X=10, Z=-1650)), abs=1e-12)
@@ -210,14 +211,14 @@ def test_the_other_mode_where_the_default_allows_none(tmp_path):
 def test_progress():
     said = []
     find_placement(
-        pk.load("linear_delta"), scattered(3, 40, [80, 80, 20]), parse_bounds("X=-9:9,Z=280"), progress=said.append
+        load_shipped("linear_delta"), scattered(3, 40, [80, 80, 20]), parse_bounds("X=-9:9,Z=280"), progress=said.append
     )
     assert said == sorted(said)
     assert said[-1] == 1.0
 
 
 def test_questions_that_make_no_sense():
-    machine, path = pk.load("linear_delta"), path_of([0, 0, 0])
+    machine, path = load_shipped("linear_delta"), path_of([0, 0, 0])
     for bounds in ({"Q": (0.0, 1.0)}, {"X": (1.0, 0.0)}, {"X": (0.0, math.inf)}, {"X": (math.nan, 1.0)}):
         with pytest.raises(pk.PoseError, match="bounds: "):
             find_placement(machine, path, bounds)
@@ -228,7 +229,7 @@ def test_questions_that_make_no_sense():
 
 
 def test_the_other_maxima_come_after_the_best():
-    machine, path = pk.load("tricept"), scattered(4, 40, [150, 100, 40], 30)
+    machine, path = load_shipped("tricept"), scattered(4, 40, [150, 100, 40], 30)
     bounds = parse_bounds("X=-300:300,Y=-300:300,Z=-2000:-1400")
     placements = pk.find_placements(machine, path, bounds)
     margins = [placement.margin for placement in placements]
@@ -240,7 +241,7 @@ def test_the_other_maxima_come_after_the_best():
 
 def test_the_command_takes_a_placement_at_which_the_whole_job_runs(tmp_path, monkeypatch, capsys):
     (tmp_path / "a.apt").write_text("UNITS/MM\nFEDRAT/600,MMPM\nGOTO/0,0,0\nGOTO/40,0,0\nFINI\n")
-    found = pk.find_placements(pk.load("tricept"), pk.read_path(tmp_path / "a.apt"), {"Z": (-1600, -1500)})
+    found = pk.find_placements(load_shipped("tricept"), pk.read_path(tmp_path / "a.apt"), {"Z": (-1600, -1500)})
     outside = replace(found[0], workpiece=pk.workpiece(Z=500.0))
     arguments = [
         "post",
@@ -260,7 +261,7 @@ def test_the_command_takes_a_placement_at_which_the_whole_job_runs(tmp_path, mon
 
 def test_turns_that_the_job_does_not_make_do_not_count():
     """Three turns about the pole: within the angle tolerance the joint stands still, farther off it is rewound."""
-    machine, azimuth = pk.load("orthoglide5_head"), np.linspace(0.1, 6.0 * np.pi + 0.1, 61)
+    machine, azimuth = load_shipped("orthoglide5_head"), np.linspace(0.1, 6.0 * np.pi + 0.1, 61)
     tip = np.column_stack([5.0 * np.cos(azimuth), 5.0 * np.sin(azimuth), np.full(61, -100.0)])
     bounds = parse_bounds("X=-5:5,Y=-5:5")
     path = path_of(tip, axis_of(np.full(61, 0.02), np.degrees(azimuth)))

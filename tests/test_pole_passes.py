@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from dense_deviations import UNDER, axis_of, path_of, programmed, tools, within
 from scipy.spatial.transform import Rotation
+from shipped import load_shipped
 
-import parakin as pk
 from parakin.toolpath.linearise.linearise import linearise_path
 from parakin.toolpath.linearise.pole_steps import PoleSteps
 from parakin.toolpath.linearise.pole_swings import note_swings
@@ -38,7 +38,7 @@ def swing(posted):
 @pytest.mark.parametrize("miss", [0.0, 5e-5, 4e-4, 9e-4])
 @pytest.mark.parametrize("name", ["orthoglide5_head", "orthoglide5_table"])
 def test_a_pass_within_the_tolerance_is_led_through_the_pole(name, under, count, miss):
-    posted = post_path(pk.load(name), across(name, miss, count))
+    posted = post_path(load_shipped(name), across(name, miss, count))
     result = linearise_path(posted, under, chord=0.05)
     assert within(posted, result, under, 0.05, 1e-3) <= 1.0
     assert swing(result) < 8.0
@@ -50,7 +50,7 @@ def test_a_pass_within_the_tolerance_is_led_through_the_pole(name, under, count,
 @pytest.mark.parametrize("count", [2, 201])
 @pytest.mark.parametrize("miss", [2e-3, 0.014])
 def test_a_pass_beside_the_pole_is_told(under, count, miss):
-    posted = post_path(pk.load("orthoglide5_head"), across("orthoglide5_head", miss, count))
+    posted = post_path(load_shipped("orthoglide5_head"), across("orthoglide5_head", miss, count))
     result = linearise_path(posted, under, chord=0.05)
     assert within(posted, result, under, 0.05, 1e-3) <= 1.0
     assert swing(result) > 170.0
@@ -67,7 +67,7 @@ def test_a_pass_beside_the_pole_is_told(under, count, miss):
 @UNDER
 def test_the_wrist_of_a_tricept(under):
     """Its pole is the platform's normal, and stands apart from B = 0."""
-    machine = pk.load("tricept")
+    machine = load_shipped("tricept")
     joints = machine.inverse([60.0, -50.0, -1620.0, 0.3, 0.7])
     ends = np.array([joints, joints])
     ends[0, 3:], ends[1, 3:] = np.radians([25.0, -18.0]), np.radians([25.0, 18.0])
@@ -84,7 +84,7 @@ def test_the_wrist_of_a_tricept(under):
 
 
 def test_jitter_about_the_pole_is_stilled():
-    machine = pk.load("orthoglide5_head")
+    machine = load_shipped("orthoglide5_head")
     rng = np.random.default_rng(5)
     axis = np.column_stack([rng.uniform(-4e-4, 4e-4, (80, 2)), np.ones(80)])
     path = path_of(
@@ -102,7 +102,7 @@ def test_jitter_about_the_pole_is_stilled():
 def test_a_corner_on_the_pole_is_told():
     path = across("orthoglide5_head", 0.0, 3)
     path.axis[2] = axis_of(20.0, 120.0)  # came along 210 deg, goes on along 120
-    posted = post_path(pk.load("orthoglide5_head"), path)
+    posted = post_path(load_shipped("orthoglide5_head"), path)
     result = linearise_path(posted, "joints", chord=0.05)
     assert within(posted, result, "joints", 0.05, 1e-3) <= 1.0
     assert [note.text for note in result.path.notes] == [
@@ -111,7 +111,7 @@ def test_a_corner_on_the_pole_is_told():
 
 
 def test_a_step_longer_than_the_travel_over_which_a_swing_is_measured():
-    pole = find_poles(pk.load("tricept"), "pose", False)[0]
+    pole = find_poles(load_shipped("tricept"), "pose", False)[0]
     first, last = np.array([[-0.15, 0.005]]), np.array([[0.15, 0.005]])
     zero, one = np.zeros(1), np.ones(1)
     steps = PoleSteps(np.array([1]), zero, one, first, last, np.array([False]), 0.005 * one, 0.5 * one)

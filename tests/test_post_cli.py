@@ -6,8 +6,8 @@ import re
 
 import numpy as np
 import pytest
+from shipped import load_shipped
 
-import parakin as pk
 from parakin.cli import main
 from parakin.toolpath.reading.detect import read_path
 
@@ -59,7 +59,7 @@ def test_setpoints(part, out, capsys):
     with (out / "square.setpoints.csv").open() as file:
         rows = list(csv.DictReader(file))
     assert len(rows) == int(np.ceil(50 * said["seconds"])) + 1
-    machine = pk.load("linear_delta")
+    machine = load_shipped("linear_delta")
     poses = np.array([[float(row[f"{axis} [mm]"]) for axis in "XYZ"] for row in rows])
     joints = np.array([[float(row[f"{joint} [mm]"]) for joint in machine.joints] for row in rows])
     np.testing.assert_allclose(machine.inverse(poses), joints, atol=0.01)

@@ -12,7 +12,7 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 from independent import transform
-from shipped import NAMES
+from shipped import NAMES, load_shipped
 
 import parakin as pk
 from parakin.export.tables import joints as table
@@ -64,17 +64,17 @@ def test_option_goes_on_top_of_the_files_frame(tmp_path):
     # File: 90 deg about Z, origin (1, 2, 3): (1, 0, 0) -> (1, 3, 3). Option: 90 deg about Z, then (10, 20, 30).
     part = tmp_path / "part.aptsource"
     part.write_text("$$*CATIA0\n$$ 0 -1 0 1\n$$ 1 0 0 2\n$$ 0 0 1 3\nGOTO/1,0,0,0.6,0,0.8\n")
-    posted = post_path(pk.load("tricept"), read_cl(part), workpiece=pk.workpiece(X=10, Y=20, Z=30, C=90 * DEGREE))
+    posted = post_path(load_shipped("tricept"), read_cl(part), workpiece=pk.workpiece(X=10, Y=20, Z=30, C=90 * DEGREE))
     np.testing.assert_allclose(posted.poses[0, :3], [-3 + 10, 1 + 20, 3 + 30], atol=1e-12)
     # The axis (0.6, 0, 0.8) turns with both frames, by 180 deg.
     np.testing.assert_allclose(posted.poses[0, 3:], [math.atan2(0.6, 0.8), math.pi], atol=1e-12)
-    alone = post_path(pk.load("tricept"), read_cl(part))
+    alone = post_path(load_shipped("tricept"), read_cl(part))
     np.testing.assert_allclose(alone.poses[0, :3], [1, 3, 3], atol=1e-12)
 
 
 @pytest.mark.parametrize("name", ["hexapod", "lambda6"])
 def test_three_turns_give_the_axis_with_c_as_at_home(name):
-    machine = pk.load(name)
+    machine = load_shipped(name)
     rng = np.random.default_rng(7)
     axis = rng.normal(size=(200, 3))
     axis /= np.linalg.norm(axis, axis=1)[:, None]
@@ -89,7 +89,7 @@ def test_three_turns_give_the_axis_with_c_as_at_home(name):
 
 
 def test_c_and_theta1_are_continuous_through_upright():
-    machine = pk.load("tricept")
+    machine = load_shipped("tricept")
     lean = np.concatenate([np.linspace(10, 0, 41), np.zeros(9), np.linspace(0, 10, 41)])
     turn = np.where(np.arange(len(lean)) < 45, 170.0, -175.0)  # 15 deg apart, over the seam of atan2
     posted = post_path(machine, path_of(np.tile([0.0, 0.0, -1650.0], (len(lean), 1)), axis_of(lean, turn)))
@@ -102,13 +102,13 @@ def test_c_and_theta1_are_continuous_through_upright():
 
 
 def test_upright_throughout_leaves_c_at_zero():
-    posted = post_path(pk.load("tricept"), path_of(np.tile([0.0, 0.0, -1650.0], (5, 1))))
+    posted = post_path(load_shipped("tricept"), path_of(np.tile([0.0, 0.0, -1650.0], (5, 1))))
     assert np.all(posted.poses[:, 3:] == 0.0)
 
 
 @pytest.mark.parametrize(("start", "end"), [(-250, 430), (70, -610)])  # c goes 20 to 700 deg off; -340 to 340 will do
 def test_turns_are_counted_into_the_drives_range(start, end):
-    machine = pk.load("orthoglide5_table")
+    machine = load_shipped("orthoglide5_table")
     tip, _ = home_of(machine)
     turn = np.linspace(start, end, 1401)
     posted = post_path(machine, path_of(np.tile(tip, (len(turn), 1)), axis_of(5.0, turn)))
@@ -127,7 +127,7 @@ def test_leg_too_long_is_told_with_its_line(tmp_path):
     # On the axis the struts are sqrt((R - r)² + p²) long with p = -Z - l1 - l2.
     part = tmp_path / "part.cls"
     part.write_text("FEDRAT/900,MMPM\nGOTO/0,0,-1650,0,0,1\nGOTO/0,0,-2050\nGOTO/0,0,-2060\nGOTO/0,0,-1650\n")
-    posted = post_path(pk.load("tricept"), read_cl(part))
+    posted = post_path(load_shipped("tricept"), read_cl(part))
     assert posted.broken.tolist() == [0, 1 + posted.limits.index("d1.max"), 1 + posted.limits.index("d1.max"), 0]
     assert posted.broken_record_count == 2
     length = math.hypot(250, 1610)
@@ -143,12 +143,12 @@ def test_leg_too_long_is_told_with_its_line(tmp_path):
 
 def test_slight_excess_shows_enough_digits():
     z = -450 - math.sqrt(1520.0003**2 - 250**2)
-    posted = post_path(pk.load("tricept"), path_of([0, 0, z]))
+    posted = post_path(load_shipped("tricept"), path_of([0, 0, z]))
     assert "would be 1,520.0003 mm, limit 1,520" in posted.offences[0].text
 
 
 def test_out_of_reach_is_an_offence():
-    machine = pk.load("linear_delta")
+    machine = load_shipped("linear_delta")
     posted = post_path(machine, path_of([[0, 0, 280], [1000, 0, 280]]))
     assert np.isnan(posted.joints[1]).any()
     by_name = {offence.limit: offence for offence in posted.offences}
@@ -160,14 +160,16 @@ def test_out_of_reach_is_an_offence():
 
 
 def test_tilt_of_a_machine_without_turns():
-    posted = post_path(pk.load("linear_delta"), path_of([[0, 0, 280]] * 3, axis_of([0, 12.3, 5e-4 * DEGREE], 40.0)))
+    posted = post_path(
+        load_shipped("linear_delta"), path_of([[0, 0, 280]] * 3, axis_of([0, 12.3, 5e-4 * DEGREE], 40.0))
+    )
     assert [posted.limits[b - 1] if b else "" for b in posted.broken] == ["", "tilt", ""]
     assert posted.first.text == "tool axis would lean 12.3°, the machine keeps it upright"
     assert posted.first.value == pytest.approx(12.3 * DEGREE)
 
 
 def test_out_of_the_plane_of_a_planar_machine():
-    posted = post_path(pk.load("hbg80_2d"), path_of([[230, 230, 0], [230, 230, 5], [230, 230, 1e-7]]))
+    posted = post_path(load_shipped("hbg80_2d"), path_of([[230, 230, 0], [230, 230, 5], [230, 230, 1e-7]]))
     assert [posted.limits[b - 1] if b else "" for b in posted.broken] == ["", "Z", ""]
     assert posted.first.text == "Z would be 5.0 mm, the machine works in Z = 0"
 
@@ -212,7 +214,7 @@ def test_upright_planar_machine_tilts_in_its_plane(tmp_path):
 
 @pytest.mark.parametrize("name", NAMES)
 def test_every_machine_takes_a_small_part(name):
-    machine = pk.load(name)
+    machine = load_shipped(name)
     path = small_part(machine)
     posted = post_path(machine, path)
     assert posted.broken_record_count == 0, [offence.text for offence in posted.offences]
@@ -226,7 +228,7 @@ def test_every_machine_takes_a_small_part(name):
 
 @pytest.mark.parametrize("name", NAMES)
 def test_no_machine_is_silent_about_what_it_cant_do(name):
-    machine = pk.load(name)
+    machine = load_shipped(name)
     posted = post_path(machine, path_of([[5000, 5000, 9000]] * 3, axis_of(150.0, [0, 50, 100])))
     assert posted.broken.all()
     assert posted.offences
@@ -234,7 +236,7 @@ def test_no_machine_is_silent_about_what_it_cant_do(name):
 
 
 def test_counts_agree_with_the_margins():
-    machine = pk.load("hexapod")
+    machine = load_shipped("hexapod")
     rng = np.random.default_rng(3)
     tip, axis = home_of(machine)
     n = 70_000  # more than the block in which margins are held
@@ -251,7 +253,7 @@ def test_counts_agree_with_the_margins():
 
 def test_unknown_mode():
     with pytest.raises(pk.PoseError, match="mode 'x'"):
-        post_path(pk.load("tricept"), path_of([0, 0, -1650]), mode="x")
+        post_path(load_shipped("tricept"), path_of([0, 0, -1650]), mode="x")
 
 
 # The table.
@@ -264,7 +266,7 @@ def table_of(posted):
 
 
 def test_csv_reads_back_within_its_digits():
-    machine = pk.load("tricept")
+    machine = load_shipped("tricept")
     rng = np.random.default_rng(5)
     n = 40_000  # several batches
     tip = rng.uniform([-300, -300, -2300], [300, 300, -1500], (n, 3))
@@ -286,7 +288,7 @@ def test_csv_reads_back_within_its_digits():
 
 
 def test_numbers_print_as_decimals():
-    machine = pk.load("linear_delta")
+    machine = load_shipped("linear_delta")
     values = [
         0.0,
         -0.0,
@@ -315,7 +317,7 @@ def test_numbers_print_as_decimals():
 
 
 def test_unreachable_records_have_empty_fields():
-    posted = post_path(pk.load("linear_delta"), path_of([[0, 0, 280], [1000, 0, 280]]))
+    posted = post_path(load_shipped("linear_delta"), path_of([[0, 0, 280], [1000, 0, 280]]))
     good, lost = table_of(posted)
     assert good["broken"] == ""
     assert float(good["tower_a [mm]"]) > 0
@@ -324,7 +326,7 @@ def test_unreachable_records_have_empty_fields():
 
 
 def test_parquet_holds_the_same():
-    machine = pk.load("linear_delta")
+    machine = load_shipped("linear_delta")
     posted = post_path(machine, path_of([[0, 0, 280], [1000, 0, 280], [5, 0, 280]], first_line=4))
     file = io.BytesIO()
     table.make_joint_parquet(posted)(file)
@@ -380,7 +382,7 @@ def test_a_folder_that_cant_be_made(tmp_path):
 
 @pytest.mark.parametrize("name", ["orthoglide5_head", "tricept"])
 def test_c_and_the_wrist_stay_continuous_over_the_pole(name):
-    m = pk.load(name)
+    m = load_shipped(name)
     lean = np.linspace(-0.21, 0.2, 12)
     axis = np.column_stack([np.sin(lean), np.zeros(12), np.cos(lean)])
     tip = np.tile(m.home[:3], (12, 1))
@@ -412,7 +414,7 @@ def turned_path(machine, turns, tip=None):
 
 @pytest.mark.parametrize("name", ["hexapod", "lambda6"])
 def test_three_turns_as_programmed(name):
-    machine = pk.load(name)
+    machine = load_shipped(name)
     way = np.linspace(0.0, 1.0, 60)[:, None]
     path = turned_path(machine, [3.0, -2.0, -200.0] + way * [5.0, 4.0, 900.0])
     for x, angle in ((0.0, 0.0), (3.0, 40.0 * DEGREE), (0.0, math.pi)):
@@ -421,7 +423,7 @@ def test_three_turns_as_programmed(name):
 
 
 def test_three_turns_in_a_tilted_frame():
-    machine, rng = pk.load("hexapod"), np.random.default_rng(8)
+    machine, rng = load_shipped("hexapod"), np.random.default_rng(8)
     ends = np.cumsum(rng.uniform(-150, 150, (30, 3)), axis=0)
     share = np.linspace(0.0, 1.0, 41)[:-1, None]
     fine = np.vstack([a + share * (b - a) for a, b in itertools.pairwise(ends)] + [ends[-1:]])
@@ -437,7 +439,7 @@ def test_three_turns_in_a_tilted_frame():
 
 
 def test_a_frame_tilted_by_a_rounding_changes_no_turn_count():
-    machine = pk.load("hexapod")
+    machine = load_shipped("hexapod")
     path = turned_path(machine, [[1.0, 100.0, 700.0], [2.0, 100.0, -1000.0], [400.0, 95.0, -1000.0]])
     workpieces = [pk.workpiece(A=a * DEGREE, C=30 * DEGREE) for a in (0, 1e-7)]
     plain, tilted = (post_path(machine, path, workpiece=workpiece).poses[:, 3:] for workpiece in workpieces)
@@ -446,7 +448,7 @@ def test_a_frame_tilted_by_a_rounding_changes_no_turn_count():
 
 
 def test_turns_through_b_of_90_degrees():
-    machine = pk.load("hexapod")
+    machine = load_shipped("hexapod")
     b = np.array([80.0, 88.0, 90.0 - 1e-9, 90.0, 91.0, 100.0, 90.0, 89.0])
     path = turned_path(machine, np.column_stack([np.full(8, 10.0), b, np.full(8, 20.0)]))
     posted = post_path(machine, path, workpiece=pk.workpiece(A=1e-8 * DEGREE))
@@ -457,7 +459,7 @@ def test_turns_through_b_of_90_degrees():
 
 @pytest.mark.parametrize("name", ["tricept", "orthoglide5_head", "orthoglide5_table"])
 def test_b_and_c_as_programmed(name):
-    machine = pk.load(name)
+    machine = load_shipped(name)
     path = turned_path(machine, [[0, 10, 400], [0, 5, 420], [0, 0, 500], [0, -8, 500], [0, -12, 480]])
     posted = post_path(machine, path, workpiece=pk.workpiece(C=-15 * DEGREE))
     assert (posted.poses[:, 3:] == path.turns[:, 1:] + [0.0, -15.0 * DEGREE]).all()
@@ -474,7 +476,7 @@ def test_b_and_c_as_programmed(name):
 
 
 def test_a_tool_may_spin_where_it_is_round():
-    machine = pk.load("linear_delta")
+    machine = load_shipped("linear_delta")
     assert post_path(machine, turned_path(machine, [[0, 0, 0], [0, 0, 200], [0, 0, 900]])).broken_record_count == 0
     posted = post_path(machine, turned_path(machine, [[0, 0, 0], [0, 3, 200], [1, 0, 0]]))
     assert [posted.limits[b - 1] if b else "" for b in posted.broken] == ["", "tilt", "tilt"]
@@ -499,5 +501,5 @@ def test_planar_machines_turn_as_programmed(tmp_path):
 
 def test_gcode_from_its_file_to_the_hexapod(tmp_path):
     (part := tmp_path / "part.ngc").write_text("G21 G90\nG0 X0 Y0 Z-950\nG1 A5 B-3 C12.5 F500\nG1 X10 C372.5\nM2\n")
-    posted = post_path(pk.load("hexapod"), read_gcode(part))
+    posted = post_path(load_shipped("hexapod"), read_gcode(part))
     np.testing.assert_allclose(np.degrees(posted.poses[:, 3:]), [[0, 0, 0], [5, -3, 12.5], [5, -3, 372.5]], atol=1e-12)

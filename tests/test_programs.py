@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from scipy.interpolate import CubicSpline
+from shipped import load_shipped
 
 import parakin as pk
 from parakin.controllers.joints.letters import assign_joint_letters
@@ -46,7 +47,7 @@ def trajectories(tmp_path_factory):
             place, upright = PLACES[name]
             lines = turbine_blade.nx_lines(turbine_blade.tool_path(400, upright), turbine_blade.FEEDS | {"cut": 1e4})
             (folder / "part.cls").write_text("\n".join(lines) + "\n", encoding="ascii")
-            machine = pk.load(name)
+            machine = load_shipped(name)
             path = pk.fit_tool_lengths(machine, pk.read_path(folder / "part.cls"), "machine")
             known[name] = plan_trajectory(post_path(machine, path, workpiece=place))
         return known[name]
@@ -138,7 +139,7 @@ def test_every_motion_is_in_machine_coordinates_and_inverse_time(trajectories, n
 
 
 def test_where_the_trajectory_stands_still_linuxcnc_does_too():
-    machine = pk.load("linear_delta")
+    machine = load_shipped("linear_delta")
     path = path_of([[0.0, 0.0, 280.0], [40.0, 0.0, 280.0], [40.0, 40.0, 280.0], [80.0, 40.0, 280.0]])
     stopping, rounding = (
         text_of(pk.make_linuxcnc_program(plan_trajectory(post_path(machine, path), corners=c)))
@@ -156,7 +157,7 @@ def test_where_the_trajectory_stands_still_linuxcnc_does_too():
 @pytest.mark.parametrize("name", ["tricept", "orthoglide5_head", "orthoglide5_table"])
 @pytest.mark.parametrize("mode", ["+", "-"])
 def test_from_home_the_wrist_does_not_jump(name, mode):
-    machine = pk.load(name)
+    machine = load_shipped(name)
     mode = machine.mode[:-1] + mode
     first = machine.home + np.array([15.0, 10.0, -5.0, 0.4, 2.0])
     joints = machine.inverse(first, mode)
@@ -179,7 +180,7 @@ def test_from_home_the_wrist_does_not_jump(name, mode):
 
 
 def test_what_linuxcnc_cant_follow_is_refused(trajectories):
-    machine = pk.load("linear_delta")
+    machine = load_shipped("linear_delta")
     trajectory = plan_trajectory(post_path(machine, path_of([[0.0, 0.0, 280.0], [1.0, 0.0, 280.0]])))
     other = next(mode for mode in machine.modes if mode != machine.mode)
     with pytest.raises(pk.PoseError, match="mode"):
@@ -192,7 +193,7 @@ def test_what_linuxcnc_cant_follow_is_refused(trajectories):
 
 
 def test_a_path_of_one_record(tmp_path):
-    machine = pk.load("hexapod")
+    machine = load_shipped("hexapod")
     trajectory = plan_trajectory(post_path(machine, path_of([[0.0, 0.0, -940.0]] * 2)))
     lines = motion_lines(text_of(pk.make_linuxcnc_program(trajectory)))
     assert len(lines) == 1
@@ -225,12 +226,12 @@ def test_what_is_written_in_joints_is_read_back(trajectories, name, tmp_path):
 
 
 def test_linear_joints_are_xyzuvw_and_turning_ones_abc():
-    assert assign_joint_letters(pk.load("hexapod")) == tuple("XYZUVW")
-    assert assign_joint_letters(pk.load("tricept")) == tuple("XYZAB")
+    assert assign_joint_letters(load_shipped("hexapod")) == tuple("XYZUVW")
+    assert assign_joint_letters(load_shipped("tricept")) == tuple("XYZAB")
 
 
 def test_more_joints_than_letters(monkeypatch):
-    machine = pk.load("hexapod")
+    machine = load_shipped("hexapod")
     monkeypatch.setitem(machine.__dict__, "joint_units", ("mm",) * 7)
     with pytest.raises(pk.PoseError, match="hexapod has 7 linear and 0 turning joints; G-code has letters for 6 and 3"):
         assign_joint_letters(machine)
@@ -290,7 +291,7 @@ def told(events, dialect="nx", writer=pk.make_linuxcnc_program, **fields):
     """The lines of a program of three records that are no motion and no mode, and where its motions are among them."""
     path = path_of([[0.0, 0.0, 280.0], [5.0, 0.0, 280.0], [5.0, 5.0, 280.0]], dialect=dialect, **fields)
     path = replace(path, events=tuple(Event(record, 10 * record + i, text) for i, (record, text) in enumerate(events)))
-    trajectory = plan_trajectory(post_path(pk.load("linear_delta"), path), stops=find_stops(path))
+    trajectory = plan_trajectory(post_path(load_shipped("linear_delta"), path), stops=find_stops(path))
     return text_of(writer(trajectory)).splitlines()
 
 

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from shipped import load_shipped
 from test_performance import everyone, twist_jacobians
 
 import parakin as pk
@@ -89,7 +90,7 @@ def test_boxes_are_proved_free_of_singularities(m):
 
 
 def test_the_shipped_orthoglide_keeps_its_bounds_in_its_cube():
-    m = pk.load("orthoglide")
+    m = load_shipped("orthoglide")
     rod = m.spec.sizes["L"]
     low, high = -2 * rod / np.sqrt(17), rod / np.sqrt(11)
     proof = prove_amplification(cube(m, low, high), 1 / 3, 3)
@@ -104,7 +105,7 @@ def test_the_shipped_orthoglide_keeps_its_bounds_in_its_cube():
 
 
 def test_a_false_claim_on_the_amplification_is_refuted_by_a_pose():
-    m = pk.load("orthoglide")
+    m = load_shipped("orthoglide")
     for low, high, bounds in ((-100, 90, (1 / 3, 3)), (-100, 60, (0.6, 3)), (-123.4, 76, (1 / 3, 2.999))):
         proof = prove_amplification(cube(m, low, high), *bounds)
         assert proof.verdict == "refuted"
@@ -114,20 +115,20 @@ def test_a_false_claim_on_the_amplification_is_refuted_by_a_pose():
 
 
 def test_singularities_are_met():
-    m = pk.load("orthoglide")
+    m = load_shipped("orthoglide")
     proof = prove_no_singularity(cube(m, -100, 150), "parallel")
     assert proof.verdict == "refuted"
     assert abs(compute_singularity_margins(m, proof.counterexample)[0]) < 1e-12
     proof = prove_amplification(cube(m, -100, 150), 0.1, 100.0)
     assert proof.verdict == "refuted"
     assert compute_performance(m, proof.counterexample).greatest > 1e6
-    m = pk.load("lambda6")
+    m = load_shipped("lambda6")
     for box in (make_pose_box(pk.region(m), {"C": (-0.1, 0.3)}), make_pose_box(pk.region(m, at={"C": 0.0}), {})):
         proof = prove_no_singularity(box, "parallel")
         assert proof.verdict == "refuted"
         assert abs(proof.counterexample[5]) < 1e-9
         assert prove_no_singularity(box, "serial").verdict == "proved"
-    m = pk.load("tricept")
+    m = load_shipped("tricept")
     box = make_pose_box(pk.region(m), {"X": (-110, 90), "Y": (-130, 70), "Z": (-1650, -1500)})
     proof = prove_no_singularity(box, "serial")
     assert proof.verdict == "refuted"
@@ -136,7 +137,7 @@ def test_singularities_are_met():
 
 
 def test_a_box_out_of_reach_is_refuted_and_one_out_of_time_is_left_open():
-    m = pk.load("orthoglide")
+    m = load_shipped("orthoglide")
     proof = prove_no_singularity(cube(m, -100, 200), "serial")
     assert proof.verdict == "refuted"
     assert "does not reach" in proof.reason
@@ -150,7 +151,7 @@ def test_a_box_out_of_reach_is_refuted_and_one_out_of_time_is_left_open():
 
 
 def test_boxes_that_are_none():
-    m = pk.load("tricept")
+    m = load_shipped("tricept")
     wrong = [{"Q": (0, 1)}, {"X": (1, 0)}, {"X": (0, np.inf)}]
     for ranges in wrong:
         with pytest.raises(pk.PoseError):

@@ -19,6 +19,7 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 from random_paths import REACH, PathMaker
+from shipped import load_shipped
 
 import parakin as pk
 from parakin.controllers.linuxcnc.home_pose import find_home_pose
@@ -55,7 +56,7 @@ class Controller(NamedTuple):
 
 
 def build_controller(name, folder):
-    machine = pk.load(name)
+    machine = load_shipped(name)
     return Controller(machine, Planner(machine, folder), Stub(folder).built(machine))
 
 
@@ -233,7 +234,7 @@ def test_random_paths_that_were_hard(tmp_path, name, seed):
 
 def test_linuxcnc_takes_a_turn_of_a_tool_that_hardly_moves_in_its_time(tmp_path):
     """Its interp_inverse.cc makes motions in inverse time no slower than 0.1 mm/min, of X Y Z if they move at all."""
-    machine = pk.load("orthoglide5_table")
+    machine = load_shipped("orthoglide5_table")
     (tmp_path / "part.cls").write_text(PathMaker(machine, 20).make(), encoding="ascii")
     file = io.BytesIO()
     pk.make_linuxcnc_program(pk.prepare(machine, pk.read_path(tmp_path / "part.cls")).trajectory)(file)
@@ -247,7 +248,7 @@ def test_linuxcnc_takes_a_turn_of_a_tool_that_hardly_moves_in_its_time(tmp_path)
 
 def test_a_tip_that_crept_catches_up_gently():
     """It stands or is as fast as LinuxCNC obeys, and never much faster than it is told; it was 14 times as fast."""
-    slowest, machine = 0.11 / 60.0, pk.load("tricept")  # mm/s
+    slowest, machine = 0.11 / 60.0, load_shipped("tricept")  # mm/s
     times = np.concatenate([np.arange(0.0, 0.16, 0.016), 0.16 + 1e-3 * np.arange(200)])
     poses = np.tile(machine.home, (len(times), 1))
     poses[:, 0] += 0.005 * times**2

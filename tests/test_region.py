@@ -3,6 +3,7 @@
 import math
 
 import pytest
+from shipped import load_shipped
 
 import parakin as pk
 
@@ -45,22 +46,22 @@ def of_work(question):
 )
 def test_what_makes_no_sense_is_refused(question, said):
     with pytest.raises(pk.PoseError, match=said) as error:
-        pk.workspace(pk.region(pk.load("tricept"), **of_region(question)), **of_work(question))
+        pk.workspace(pk.region(load_shipped("tricept"), **of_region(question)), **of_work(question))
     assert "\n" not in str(error.value)
 
 
 def test_reach_can_not_be_switched_off():
     with pytest.raises(pk.PoseError, match="the legs don't close"):
-        pk.region(pk.load("orthoglide"), without=["*.reach"])
+        pk.region(load_shipped("orthoglide"), without=["*.reach"])
 
 
 def test_what_nothing_bounds_is_said():
     with pytest.raises(pk.PoseError, match="do not bound the workspace in"):
-        pk.workspace(pk.region(pk.load("tricept"), without=["d*", "r*"]))
+        pk.workspace(pk.region(load_shipped("tricept"), without=["d*", "r*"]))
 
 
 def test_nothing_is_allowed_every_way_and_that_is_proved():
-    found = pk.workspace(pk.region(pk.load("lambda6"), dexterous=True))
+    found = pk.workspace(pk.region(load_shipped("lambda6"), dexterous=True))
     assert found.empty
     assert found.volume.outer == 0.0
     assert found.box is None
@@ -69,11 +70,11 @@ def test_nothing_is_allowed_every_way_and_that_is_proved():
 
 
 def test_held_out_of_reach_it_is_empty():
-    assert pk.workspace(pk.region(pk.load("orthoglide"), at={"X": 5000.0})).empty
+    assert pk.workspace(pk.region(load_shipped("orthoglide"), at={"X": 5000.0})).empty
 
 
 def test_an_interruption_gives_what_there_is():
-    machine, calls = pk.load("orthoglide"), []
+    machine, calls = load_shipped("orthoglide"), []
 
     def stop(fraction):
         calls.append(fraction)
@@ -89,7 +90,7 @@ def test_an_interruption_gives_what_there_is():
 
 
 def test_time_runs_out_with_a_bracket_that_holds():
-    machine = pk.load("tricept")
+    machine = load_shipped("tricept")
     found = pk.workspace(pk.region(machine), gap=1e-9, seconds=0.3)
     assert found.stopped == "time"
     exact = pk.workspace(pk.region(machine), gap=0.01)
@@ -98,7 +99,7 @@ def test_time_runs_out_with_a_bracket_that_holds():
 
 
 def test_it_says_what_it_reached():
-    machine = pk.load("orthoglide")
+    machine = load_shipped("orthoglide")
     assert pk.workspace(pk.region(machine)).stopped == "gap"
     by_cells = pk.workspace(pk.region(machine), cell=30.0)
     assert by_cells.stopped == "cell"
@@ -107,7 +108,7 @@ def test_it_says_what_it_reached():
 
 
 def test_it_can_be_run_again_from_its_parameters():
-    machine = pk.load("lambda6")
+    machine = load_shipped("lambda6")
     first = pk.workspace(pk.region(machine, every={"C": (0.4, 0.6)}, without=["gap *"]), gap=0.05)
     given = dict(first.parameters)
     assert given.pop("machine") == machine.name

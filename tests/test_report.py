@@ -8,6 +8,7 @@ from importlib.resources import files
 
 import numpy as np
 import pytest
+from shipped import load_shipped
 
 import parakin as pk
 from parakin.export.page.path_data import encode_page_path
@@ -222,7 +223,7 @@ def test_the_page_hides_no_offence_and_no_tight_place():
     tip = np.zeros((20_000, 3)) + [0.0, 0.0, -1650.0]
     tip[:, 0] = np.linspace(-100.0, 100.0, 20_000)
     tip[7_777, 2], tip[11_111, 2] = -1300.0, -1400.0
-    posted = post_path(pk.load("tricept"), path_of(tip))
+    posted = post_path(load_shipped("tricept"), path_of(tip))
     relative = measure_range_use(posted)[1]
     assert posted.broken_record_count == 1
     for numbers in (600, 30_000, 500_000):
@@ -257,7 +258,7 @@ def test_long_trajectories_stay_small(trajectory, html):
 
 
 def test_jerks_are_drawn_where_they_are_limited():
-    machine = pk.load("linear_delta")
+    machine = load_shipped("linear_delta")
     legs = tuple(
         replace(leg, drives=tuple(d and replace(d, jerk=2e5) for d in leg.drives)) for leg in machine.spec.legs
     )
@@ -275,7 +276,7 @@ def test_jerks_are_drawn_where_they_are_limited():
 
 
 def test_a_trajectory_that_stands_still():
-    trajectory = plan_trajectory(post_path(pk.load("linear_delta"), path_of([[0, 0, 280]])))
+    trajectory = plan_trajectory(post_path(load_shipped("linear_delta"), path_of([[0, 0, 280]])))
     html = render_report(trajectory.posted, trajectory)
     assert set(figures_of(html)) == {"curves"}
     assert "Cycle time 0 s" in text_of(html)
@@ -291,7 +292,7 @@ def test_without_a_trajectory_nothing_is_said_of_it(trajectory):
 def test_inverse_time_counts_as_programmed():
     path = path_of([[0, 0, 280], [30, 0, 280], [60, 0, 280]], feed=np.array([np.nan, np.nan, 1200.0]))
     path = replace(path, seconds=np.array([np.nan, 4.0, np.nan]), dialect="gcode", notes=(Note(0, "of all"),))
-    trajectory = plan_trajectory(post_path(pk.load("linear_delta"), path))
+    trajectory = plan_trajectory(post_path(load_shipped("linear_delta"), path))
     html = render_report(trajectory.posted, trajectory)
     assert "5.5 s in feed motions, at the programmed feeds<" in html  # 4 s, and 30 mm at 20 mm/s
     programmed = np.array(traces_of(figures_of(html)["time"], "programmed feed")[0]["y"], float)
@@ -302,8 +303,8 @@ def test_inverse_time_counts_as_programmed():
 
 def test_offences_on_the_way_say_where():
     # Both ends are 934 mm or more from each foot's joint, the middle is not.
-    posted = check_path(post_path(pk.load("tricept"), path_of([[-300, 0, -1450], [0, 0, -1340], [300, 0, -1450]])))
-    halfway = check_path(post_path(pk.load("tricept"), path_of([[-200, 0, -1345], [200, 0, -1345]])))
+    posted = check_path(post_path(load_shipped("tricept"), path_of([[-300, 0, -1450], [0, 0, -1340], [300, 0, -1450]])))
+    halfway = check_path(post_path(load_shipped("tricept"), path_of([[-200, 0, -1345], [200, 0, -1345]])))
     for checked in (posted, halfway):
         html = render_report(checked)
         assert "were not checked" not in html
@@ -314,5 +315,5 @@ def test_offences_on_the_way_say_where():
         if checked.broken_motion_count:
             assert decode_columns(encode_page_path(checked, None, 30_000))["broken"].any()
     assert any(offence.share < 1.0 for offence in (*posted.offences, *halfway.offences))
-    runs = check_path(post_path(pk.load("tricept"), path_of([[0, 0, -1650], [50, 0, -1650]])))
+    runs = check_path(post_path(load_shipped("tricept"), path_of([[0, 0, -1650], [50, 0, -1650]])))
     assert "All 2 records and the motions between them stay within every limit of tricept.<" in render_report(runs)

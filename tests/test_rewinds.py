@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from shipped import load_shipped
 from test_working_mode import TURN, axis_of, path_of, spirals
 
 import parakin as pk
@@ -29,7 +30,7 @@ def first_angles(posted):
 
 @pytest.mark.parametrize("name", WRISTS)
 def test_a_cut_that_winds_up_is_refused_without_a_clearance_and_runs_with_one(name):
-    machine = pk.load(name)
+    machine = load_shipped(name)
     path = winding(machine)
     refused = pk.prepare(machine, path)
     assert not refused.runs
@@ -48,7 +49,7 @@ def test_a_cut_that_winds_up_is_refused_without_a_clearance_and_runs_with_one(na
 
 @pytest.mark.parametrize("name", WRISTS)
 def test_a_rewind_retracts_along_the_axis_turns_there_and_returns(name):
-    machine = pk.load(name)
+    machine = load_shipped(name)
     path = winding(machine)
     rewound = pk.rewind_path(machine, path, pk.Clearance(retract=5.0))
     posted = post_path(machine, rewound.path)
@@ -74,7 +75,7 @@ def test_a_rewind_retracts_along_the_axis_turns_there_and_returns(name):
 
 @pytest.mark.parametrize("name", ["orthoglide5_table", "orthoglide5_head"])
 def test_turns_are_taken_back_above_the_plane_only(name):
-    machine = pk.load(name)
+    machine = load_shipped(name)
     tip = machine.home[:3] - [0, 0, 15]
     path = spirals([0, 300, 600, 900], [300, 600, 900, 1200], tip=tip)
     assert post_path(machine, path).broken_record_count > 0
@@ -90,7 +91,7 @@ def test_turns_are_taken_back_above_the_plane_only(name):
 
 
 def test_rapid_motions_are_better_places_than_cuts():
-    machine = pk.load("orthoglide5_table")
+    machine = load_shipped("orthoglide5_table")
     path = spirals([0, 300, 600, 900], [300, 600, 900, 1200], tip=machine.home[:3] - [0, 0, 15])
     rewound = pk.rewind_path(machine, path, pk.Clearance(retract=5.0))
     assert rewound.rewinds
@@ -98,7 +99,7 @@ def test_rapid_motions_are_better_places_than_cuts():
 
 
 def test_what_the_machine_cannot_retract_is_left_and_said():
-    machine = pk.load("orthoglide5_table")
+    machine = load_shipped("orthoglide5_table")
     path = winding(machine)
     rewound = pk.rewind_path(machine, path, pk.Clearance(retract=5000.0))
     assert not rewound.rewinds and len(rewound.path) == len(path)
@@ -107,7 +108,7 @@ def test_what_the_machine_cannot_retract_is_left_and_said():
 
 
 def test_a_path_within_the_range_is_left_alone():
-    machine = pk.load("tricept")
+    machine = load_shipped("tricept")
     path = winding(machine, turns=1.0)
     rewound = pk.rewind_path(machine, path, pk.Clearance(retract=5.0))
     assert not rewound.rewinds and not rewound.path.notes
@@ -115,7 +116,7 @@ def test_a_path_within_the_range_is_left_alone():
 
 
 def test_events_keep_their_motions():
-    machine = pk.load("tricept")
+    machine = load_shipped("tricept")
     path = winding(machine)
     events = tuple(Event(record, int(path.line[record]), f"M{record}") for record in range(0, len(path), 7))
     path = replace(path, events=events)
@@ -126,7 +127,7 @@ def test_events_keep_their_motions():
 
 
 def test_programmed_turns_go_on_from_a_rewind():
-    machine = pk.load("orthoglide5_table")
+    machine = load_shipped("orthoglide5_table")
     c = np.linspace(0.0, 4.0 * TURN, 200)
     turns = np.column_stack([0.0 * c, np.full(200, np.radians(15.0)), c])
     path = path_of(machine.home[:3] - [0, 0, 15], axis_of(15.0, np.degrees(c)), turns=turns)
@@ -138,7 +139,7 @@ def test_programmed_turns_go_on_from_a_rewind():
 
 @pytest.mark.parametrize("clearance", [pk.Clearance(0.0), pk.Clearance(-1.0), pk.Clearance(None, np.nan)])
 def test_what_is_no_clearance(clearance):
-    machine = pk.load("tricept")
+    machine = load_shipped("tricept")
     with pytest.raises(pk.PoseError, match=r"retract|plane"):
         pk.rewind_path(machine, winding(machine), clearance)
 
@@ -175,7 +176,7 @@ def test_the_command_rewinds(tmp_path, monkeypatch, capsys):
 @pytest.mark.parametrize("name", WRISTS)
 def test_turns_within_tolerance_of_the_pole_need_no_rewind(name):
     """Four turns of an axis that is 1e-5 rad off the first turning axis: held beside it, the joint stands still."""
-    machine = pk.load(name)
+    machine = load_shipped(name)
     path = winding(machine, tilt=np.degrees(1e-5), count=80, radius=1e-3)
     assert np.ptp(np.unwrap(first_angles(post_path(machine, path)))) > 3.0 * TURN
     rewound = pk.rewind_path(machine, path, pk.Clearance(retract=5.0))

@@ -5,6 +5,7 @@ from functools import partial
 import numpy as np
 import pytest
 from independent import rotation
+from shipped import load_shipped
 from test_assemblies import distinct, multistart
 
 import parakin as pk
@@ -27,7 +28,7 @@ def draw_poses(machine, count):
 
 
 def test_a_ring_joint_does_not_follow_the_platforms_turn_about_its_axis():
-    leg = pk.load("pentapod").legs[2]
+    leg = load_shipped("pentapod").legs[2]
     tilted = (rotation("y", 0.3) @ rotation("x", -0.2))[0]
     origin = (30.0, -20.0, 400.0)
     placed = [leg.place_joint((tilted @ rotation("z", turn)[0]).tolist(), origin) for turn in (0.0, 1.0, 3.0)]
@@ -41,7 +42,7 @@ def test_a_ring_joint_does_not_follow_the_platforms_turn_about_its_axis():
 
 def test_struts_do_not_turn_the_platform_about_the_tool():
     """Each strut's line meets the tool's axis or is parallel to it, so that it has no moment about it."""
-    machine = pk.load("pentapod")
+    machine = load_shipped("pentapod")
     for pose in draw_poses(machine, 20):
         placed = machine.place_platform(pose, machine.mode)
         rotated, origin = np.array(placed.rotation, float), np.array(placed.origin, float)
@@ -52,7 +53,7 @@ def test_struts_do_not_turn_the_platform_about_the_tool():
 
 
 def test_rates_are_those_of_the_inverse():
-    machine = pk.load("pentapod")
+    machine = load_shipped("pentapod")
     poses = draw_poses(machine, 200)
     poses[:, 3] += 0.05
     a, b = (np.array(part) for part in machine.jacobians(poses))
@@ -72,7 +73,7 @@ def test_an_upright_tool_tilts_any_way_on_a_path(tmp_path):
 
 
 def test_a_ring_is_a_parameter_with_its_height_and_radius():
-    names = {parameter.name for parameter in pk.load("pentapod").parameters}
+    names = {parameter.name for parameter in load_shipped("pentapod").parameters}
     assert {"legs.strut1.platform.z", "legs.strut1.radius", "legs.strut1.foot.x"} <= names
     assert "legs.strut1.platform.x" not in names  # the ring is about the tool's axis
 

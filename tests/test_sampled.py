@@ -5,7 +5,7 @@ from itertools import product
 import numpy as np
 import pytest
 from regions import whole_region
-from shipped import REPRESENTATIVES
+from shipped import REPRESENTATIVES, load_shipped
 
 import parakin as pk
 from parakin.errors import NoMethodError, PoseError
@@ -60,7 +60,7 @@ def places_of(grid, rng, count):
 
 @pytest.mark.parametrize("name", REPRESENTATIVES)
 def test_a_grid_says_what_check_says(name, rng):
-    machine = pk.load(name)
+    machine = load_shipped(name)
     turned = {
         axis: value + 0.1
         for axis, value, unit in zip(machine.axes, machine.home, machine.axis_units, strict=True)
@@ -88,7 +88,7 @@ TURNS = [
 
 @pytest.mark.parametrize(("name", "step", "asked"), TURNS, ids=lambda value: value if isinstance(value, str) else "")
 def test_with_turns_a_grid_looks_at_every_combination(name, step, asked, rng):
-    machine = pk.load(name)
+    machine = load_shipped(name)
     question = whole_region(machine, **asked)
     ends = [machine.home[:3] - 12.0 * step, machine.home[:3] + 12.0 * step]
     grid = sample_grid(question, step, ends, turns_step=8.0 * DEG)
@@ -110,7 +110,7 @@ def test_with_turns_a_grid_looks_at_every_combination(name, step, asked, rng):
 
 @pytest.mark.parametrize(("name", "asked", "step"), CONSTANT, ids=[case[0] for case in CONSTANT])
 def test_a_grid_finds_the_certified_volume(name, asked, step):
-    machine = pk.load(name)
+    machine = load_shipped(name)
     agrees(
         lambda h: sample_grid(whole_region(machine, **asked), h),
         pk.workspace(whole_region(machine, **asked), gap=0.004),
@@ -120,16 +120,16 @@ def test_a_grid_finds_the_certified_volume(name, asked, step):
 
 @pytest.fixture(scope="module")
 def total():
-    return pk.workspace(whole_region(pk.load("lambda6"), **SMALL), gap=0.03)
+    return pk.workspace(whole_region(load_shipped("lambda6"), **SMALL), gap=0.03)
 
 
 def test_a_grid_finds_the_certified_total_orientation_workspace(total):
-    asked = whole_region(pk.load("lambda6"), **SMALL)
+    asked = whole_region(load_shipped("lambda6"), **SMALL)
     agrees(lambda h: sample_grid(asked, h), total, 80.0)
 
 
 def test_what_follows_from_a_grid_is_what_follows_from_the_proof():
-    machine = pk.load("tricept")
+    machine = load_shipped("tricept")
     certified = pk.workspace(whole_region(machine, **UPRIGHT), gap=0.01)
     grid = sample_grid(whole_region(machine, **UPRIGHT), 20.0)
     low, high = grid.box
@@ -147,7 +147,7 @@ def test_what_follows_from_a_grid_is_what_follows_from_the_proof():
 
 
 def test_a_box_cuts_a_part_out_of_the_same_lattice():
-    asked = whole_region(pk.load("orthoglide"))
+    asked = whole_region(load_shipped("orthoglide"))
     low, high = (-103.0, 0.0, -50.0), (200.0, 52.4, 400.0)
     whole, part = sample_grid(asked, 5.0), sample_grid(asked, 5.0, (low, high))
     kept = [(x >= a) & (x <= b) for x, a, b in zip(whole.coordinates, low, high, strict=True)]
@@ -161,7 +161,7 @@ def test_a_box_cuts_a_part_out_of_the_same_lattice():
 
 
 def test_a_line_and_single_cells_are_grids_too():
-    machine = pk.load("orthoglide")
+    machine = load_shipped("orthoglide")
     line = sample_grid(whole_region(machine, {"X": 0.0, "Y": 0.0}), 0.01)
     certified = pk.workspace(whole_region(machine, {"X": 0.0, "Y": 0.0}), gap=1e-4).volume
     assert line.unit == "mm" and certified.inner - 0.02 <= line.estimate <= certified.outer + 0.02
@@ -173,7 +173,7 @@ def test_a_line_and_single_cells_are_grids_too():
 
 
 def test_a_sweep_can_be_run_again_from_its_parameters():
-    machine = pk.load("lambda6")
+    machine = load_shipped("lambda6")
     asked = whole_region(machine, some={"C": (0.2, 0.7)}, without=["gap*"])
     grid = sample_grid(asked, 60.0, turns_step=0.1)
     p = grid.parameters
@@ -185,13 +185,13 @@ def test_a_sweep_can_be_run_again_from_its_parameters():
 
 def test_progress_comes_to_its_end():
     seen = []
-    sample_grid(whole_region(pk.load("lambda6"), every={"C": (0.4, 0.5)}), 8.0, progress=seen.append)
+    sample_grid(whole_region(load_shipped("lambda6"), every={"C": (0.4, 0.5)}), 8.0, progress=seen.append)
     assert len(seen) > 1 and seen == sorted(seen) and seen[-1] == 1.0
 
 
 def test_an_empty_region_is_an_empty_grid():
     for at in ({"Z": 5000.0, "B": 0.0, "C": 0.0}, {"Z": -1650.0, "B": 3.0, "C": 0.0}):
-        grid = sample_grid(whole_region(pk.load("tricept"), at), 10.0)
+        grid = sample_grid(whole_region(load_shipped("tricept"), at), 10.0)
         assert grid.empty and grid.estimate == 0.0 and grid.box is None and grid.centroid is None
         assert grid.bounded_by == ()
 
@@ -201,25 +201,25 @@ def test_an_empty_region_is_an_empty_grid():
 
 @pytest.mark.parametrize(("name", "asked", "step"), FLAT, ids=[case[0] for case in FLAT])
 def test_rays_find_the_certified_area(name, asked, step):
-    machine = pk.load(name)
+    machine = load_shipped(name)
     certified = pk.workspace(whole_region(machine, **asked), gap=0.002)
     agrees(lambda h: sweep_polar(whole_region(machine, **asked), h, rays=720), certified, step)
 
 
 def test_rays_find_the_certified_volume_of_what_is_star_shaped():
-    machine = pk.load("lambda6")
+    machine = load_shipped("lambda6")
     certified = pk.workspace(whole_region(machine), gap=0.004)
     agrees(lambda h: sweep_polar(whole_region(machine), h, rays=180), certified, 80.0)
 
 
 def test_rays_find_the_certified_total_orientation_workspace(total):
-    asked = whole_region(pk.load("lambda6"), **SMALL)
+    asked = whole_region(load_shipped("lambda6"), **SMALL)
     agrees(lambda h: sweep_polar(asked, h, rays=120), total, 80.0)
 
 
 @pytest.mark.parametrize(("name", "asked"), [("tricept", UPRIGHT), ("orthoglide", {}), ("hbg80_3d", {})])
 def test_a_ray_ends_at_the_first_place_not_allowed(name, asked, rng):
-    machine = pk.load(name)
+    machine = load_shipped(name)
     question = whole_region(machine, **asked)
     found = sweep_polar(question, 7.0, planes=31.0, rays=40)
     assert 0.0 < np.isnan(found.radii).mean() < 1.0
@@ -241,7 +241,7 @@ def test_a_ray_ends_at_the_first_place_not_allowed(name, asked, rng):
 
 
 def test_outlines_are_closed_and_of_the_planes_that_hold_the_axis():
-    machine = pk.load("orthoglide")
+    machine = load_shipped("orthoglide")
     found = sweep_polar(whole_region(machine), 5.0, planes=40.0, rays=36, axis=(-20.0, 10.0))
     held = ~np.isnan(found.radii).any(1)
     assert len(found.outlines) == held.sum() > 2
@@ -257,10 +257,10 @@ def test_outlines_are_closed_and_of_the_planes_that_hold_the_axis():
 
 
 def test_a_polar_sweep_is_of_two_or_three_places():
-    flat = sweep_polar(whole_region(pk.load("hbg80_2d")), 10.0)
+    flat = sweep_polar(whole_region(load_shipped("hbg80_2d")), 10.0)
     assert flat.heights is None and flat.radii.shape == (1, 72) and flat.outlines[0].shape == (73, 2)
     with pytest.raises(PoseError, match="needs a plane"):
-        sweep_polar(whole_region(pk.load("hbg80_2d"), {"X": 200.0}), 10.0)
+        sweep_polar(whole_region(load_shipped("hbg80_2d"), {"X": 200.0}), 10.0)
 
 
 # The sweep of the drives.
@@ -268,14 +268,14 @@ def test_a_polar_sweep_is_of_two_or_three_places():
 
 @pytest.mark.parametrize("name", TRANSLATING)
 def test_drives_find_the_certified_volume(name):
-    machine = pk.load(name)
+    machine = load_shipped(name)
     certified = pk.workspace(whole_region(machine), gap=0.004)
     widest = max(drive.high - drive.low for drive in machine.model.drives)
     agrees(lambda h: pk.sweep_drives(whole_region(machine), round(widest / h)), certified, widest / 12)
 
 
 def test_a_contour_of_the_planar_machine_is_the_circle_it_must_be():
-    machine = pk.load("hbg80_2d")
+    machine = load_shipped("hbg80_2d")
     found = pk.sweep_drives(whole_region(machine), 50)
     names = {image.strategy.name for image in found.contours}
     assert names == {
@@ -301,7 +301,7 @@ def test_a_contour_of_the_planar_machine_is_the_circle_it_must_be():
 
 
 def test_the_net_of_the_shell_lies_on_spheres_and_is_the_boundary():
-    machine = pk.load("hbg80_3d")
+    machine = load_shipped("hbg80_3d")
     found = pk.sweep_drives(whole_region(machine), 24)
     assert len({image.strategy.name for image in found.contours}) == 12
     assert len({image.strategy.name for image in found.nets}) == 6
@@ -326,7 +326,7 @@ def test_the_net_of_the_shell_lies_on_spheres_and_is_the_boundary():
 
 
 def test_a_drive_stands_at_its_limit_though_rounding_says_otherwise():
-    machine = pk.load("orthoglide")
+    machine = load_shipped("orthoglide")
     image = next(
         i
         for i in pk.sweep_drives(whole_region(machine), 8).nets
@@ -341,15 +341,18 @@ def test_a_drive_stands_at_its_limit_though_rounding_says_otherwise():
 )
 def test_other_machines_have_no_sweep_of_the_drives(name, why):
     with pytest.raises(NoMethodError, match=f"{name}.*{why}"):
-        pk.sweep_drives(whole_region(pk.load(name)))
+        pk.sweep_drives(whole_region(load_shipped(name)))
 
 
 # Bad input.
 
 
 def test_bad_numbers_are_refused_in_one_line():
-    tricept, lambda6 = whole_region(pk.load("tricept")), whole_region(pk.load("lambda6"), every={"C": (0.4, 0.5)})
-    flat = pk.load("hbg80_2d")
+    tricept, lambda6 = (
+        whole_region(load_shipped("tricept")),
+        whole_region(load_shipped("lambda6"), every={"C": (0.4, 0.5)}),
+    )
+    flat = load_shipped("hbg80_2d")
     for step in (0.0, -1.0, np.nan, np.inf):
         for sweep in (sample_grid, sweep_polar):
             with pytest.raises(PoseError, match=r"^step: a number above 0 mm expected"):

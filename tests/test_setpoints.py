@@ -8,6 +8,7 @@ import tracemalloc
 import numpy as np
 import pyarrow.parquet as pq
 import pytest
+from shipped import load_shipped
 
 import parakin as pk
 from parakin.export.tables.setpoints import (
@@ -29,7 +30,7 @@ def trajectory_of(name, tip, axis=(0.0, 0.0, 1.0), feed=6000.0):
     n = len(tip)
     axis = np.broadcast_to(np.asarray(axis, float), (n, 3))
     path = ToolPath("part.apt", tip, axis, np.arange(n) + 1, np.zeros(n, bool), np.full(n, feed), np.full(n, np.nan))
-    return plan_trajectory(post_path(pk.load(name), path))
+    return plan_trajectory(post_path(load_shipped(name), path))
 
 
 @pytest.fixture(scope="module")

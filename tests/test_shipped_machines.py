@@ -8,6 +8,7 @@ from math import cos, hypot, isfinite, pi, radians, sin, sqrt
 
 import numpy as np
 import pytest
+from shipped import load_shipped
 
 import parakin as pk
 from parakin.description import list_shipped_machines, read_machine
@@ -184,7 +185,7 @@ def test_linear_delta():
 
 @pytest.mark.parametrize("name", list_shipped_machines())
 def test_a_machine_written_with_every_number_is_the_same_machine(name, tmp_path):
-    machine, file = pk.load(name), tmp_path / "written.yaml"
+    machine, file = load_shipped(name), tmp_path / "written.yaml"
     file.write_text(machine.format_yaml(), encoding="utf-8")
     written = pk.load(file)
     poses = machine.home + np.random.default_rng(1).uniform(-0.3, 0.3, (1000, len(machine.axes))) * [

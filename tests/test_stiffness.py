@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from frame_elements import Frame
+from shipped import load_shipped
 
 import parakin as pk
 from parakin.cli import main
@@ -91,7 +92,7 @@ def compute_lambda(machine, pose):
     ("name", "compute"), [("hexapod", compute_hexapod), ("orthoglide", compute_orthoglide), ("lambda6", compute_lambda)]
 )
 def test_finite_elements_give_way_alike(name, compute):
-    machine = pk.load(name)
+    machine = load_shipped(name)
     poses = draw_poses(machine)
     found = pk.analyse_stiffness(machine, "100 N/um", TUBE, poses)
     for pose, own, matrix in zip(poses, found.compliances, found.matrices, strict=True):
@@ -115,7 +116,7 @@ STIFF = {
 @pytest.mark.parametrize("name", STIFF)
 def test_the_direct_problem_of_machines_that_give_way(name):
     """Forces on the springs by differences of the direct problem; its answer with all numbers off by what they give."""
-    machine = pk.load(name)
+    machine = load_shipped(name)
     pose = draw_poses(machine, 1)[0]
     rods = [leg for leg in machine.legs if leg.kind not in ("length", "ring")]
     family = pk.family(machine, ["encoders", *(f"legs.{leg.drives[0].name}.rod" for leg in rods)])
@@ -153,7 +154,7 @@ def test_the_direct_problem_of_machines_that_give_way(name):
 def test_the_published_orthoglide_is_stiff_as_its_amplification_tells():
     """Chablat and Wenger: amplification 1 all ways at the isotropic point; at the end of the cube's diagonal 1/(1 + v)
     across it and 1/(1 - 2v) along it, of which the first is 3."""
-    machine = pk.load("orthoglide")
+    machine = load_shipped("orthoglide")
     isotropic, corner = [0.0, 0.0, 0.0], [-123.336] * 3
     found = pk.analyse_stiffness(machine, "100 N/um", None, [isotropic, corner])
     assert np.allclose(found.matrices[0], DRIVE * np.eye(3), atol=1e-6 * DRIVE)
@@ -163,7 +164,7 @@ def test_the_published_orthoglide_is_stiff_as_its_amplification_tells():
 
 
 def test_springs_in_a_row_add_up():
-    machine = pk.load("hexapod")
+    machine = load_shipped("hexapod")
     drives, both = (pk.analyse_stiffness(machine, "100 N/um", struts, samples=20) for struts in (None, "50 N/um"))
     assert np.allclose(both.compliances, 3.0 * drives.compliances)
     assert np.allclose(both.drive_share, 1.0 / 3.0)
@@ -174,7 +175,7 @@ def test_springs_in_a_row_add_up():
 
 
 def test_a_stiffness_for_all_is_taken_by_its_unit():
-    machine = pk.load("tricept")
+    machine = load_shipped("tricept")
     named = pk.analyse_stiffness(machine, {"d*": "100 N/um", "theta*": "200 kNm/rad"}, samples=5)
     both = pk.analyse_stiffness(machine, "200 kNm/rad, 100N/um", samples=5)
     assert np.array_equal(named.compliances, both.compliances)
@@ -259,7 +260,7 @@ def test_what_is_mistaken_is_said_in_one_line(name, words, message, capsys):
 
 
 def test_the_library_refuses_what_fits_nothing():
-    found = pk.analyse_stiffness(pk.load("orthoglide"), "100 N/um", samples=5)
+    found = pk.analyse_stiffness(load_shipped("orthoglide"), "100 N/um", samples=5)
     with pytest.raises(pk.PoseError, match="it has no length"):
         found.along([0.0, 0.0, 0.0])
     with pytest.raises(pk.PoseError, match="force: one, or as many as the 5 poses"):
@@ -280,7 +281,9 @@ def load_heavy(name, folder, platform):
     """A shipped machine whose platform alone has weight."""
     path = folder / f"{name}.yaml"
     bodies = "bodies:\n  rod: {mass: 1e-9 kg}\n  carriage: {mass: 1e-9 kg}\n  head: {mass: 1e-9 kg}\n"
-    path.write_text(pk.load(name).format_yaml() + bodies + f"  platform: {{mass: {platform} kg}}\n", encoding="utf-8")
+    path.write_text(
+        load_shipped(name).format_yaml() + bodies + f"  platform: {{mass: {platform} kg}}\n", encoding="utf-8"
+    )
     return pk.load(path)
 
 
@@ -357,7 +360,7 @@ def test_a_loaded_machine_gives_way_by_its_equilibrium(name, tmp_path):
 
 
 def test_loads_on_rods_are_refused():
-    found = pk.analyse_stiffness(pk.load("orthoglide"), "100 N/um", {"diameter": "20 mm"}, samples=3)
+    found = pk.analyse_stiffness(load_shipped("orthoglide"), "100 N/um", {"diameter": "20 mm"}, samples=3)
     with pytest.raises(pk.PoseError, match="of kind slider"):
         found.load()
     with pytest.raises(pk.PoseError, match="force: one number each"):

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from s_curves import s_curve_time
+from shipped import load_shipped
 
 import parakin as pk
 from parakin.errors import InputError, PoseError
@@ -62,7 +63,7 @@ def drawn(name, seed, jerk=False):
     for low, high, share in ((1.3, 2.7, 1.0), (-0.5, 0.7, 1.0 / 70.0)):
         a = acceleration * share
         limits.append((10.0 ** rng.uniform(low, high), a, a / ramp if ramp else INF))
-    machine = limited(pk.load(name), mm=limits[0], rad=limits[1])
+    machine = limited(load_shipped(name), mm=limits[0], rad=limits[1])
     n = int(rng.integers(2, 14))
     strides = rng.normal(0.0, 10.0 ** rng.uniform(-1.0, 1.3), (n, 3))
     strides *= rng.choice([1.0, 0.01, 0.0], (n, 1), p=[0.8, 0.15, 0.05])
@@ -178,7 +179,7 @@ def drive_of(drives, machine, unit):
 
 @pytest.mark.parametrize(("way", "feed"), [(100.0, 6000.0), (100.0, 600.0), (0.5, 6000.0), (100.0, 1e6), (0.5, 1e-4)])
 def test_a_straight_motion_takes_the_time_of_its_trapezoid(way, feed):
-    machine = limited(pk.load("linear_delta"), mm=(1000.0, 2000.0, INF))
+    machine = limited(load_shipped("linear_delta"), mm=(1000.0, 2000.0, INF))
     trajectory = plan_trajectory(posted(machine, [[0, 0, 280], [0, 0, 280 + way]], feed=feed))
     a, v = 2000.0, min(feed / 60.0, 1000.0)
     expected = way / v + v / a if way > v * v / a else 2.0 * np.sqrt(way / a)
@@ -192,7 +193,7 @@ def test_a_straight_motion_takes_the_time_of_its_trapezoid(way, feed):
 @pytest.mark.parametrize(("way", "feed"), [(100.0, 6000.0), (2.0, 6000.0), (0.01, 6000.0), (0.5, 0.01)])
 def test_with_jerks_a_straight_motion_takes_the_time_of_its_s_curve(way, feed):
     v, a, j = feed / 60.0, 2000.0, 50_000.0
-    machine = limited(pk.load("linear_delta"), mm=(INF, a, j))
+    machine = limited(load_shipped("linear_delta"), mm=(INF, a, j))
     trajectory = plan_trajectory(posted(machine, [[0, 0, 280], [0, 0, 280 + way]], feed=feed))
     least = s_curve_time(way, v, a, j)
     assert least < trajectory.seconds < 1.005 * least
@@ -226,16 +227,16 @@ def test_a_circle_at_the_feed_that_its_centripetal_acceleration_allows():
 def test_without_accelerations_only_the_feed_counts():
     tip = np.array([[0, 0, 0], [30, 0, 0], [30, 40, 0], [30, 40, 0], [0, 0, 0]], float)
     feed = np.array([100.0, 600.0, 1200.0, 1.0, 3000.0])
-    trajectory = plan_trajectory(posted(limited(pk.load("orthoglide")), tip, feed=feed))
+    trajectory = plan_trajectory(posted(limited(load_shipped("orthoglide")), tip, feed=feed))
     assert np.diff(trajectory.times) == pytest.approx([3.0, 2.0, 0.0, 1.0], abs=1e-9)
     assert trajectory.binding_fractions == {"feed": pytest.approx(1.0)}
     assert trajectory.at([1.5, 4.0]).poses == pytest.approx(np.array([[15.0, 0.0, 0.0], [30.0, 20.0, 0.0]]), abs=1e-9)
     with pytest.raises(PoseError, match=r":2, record 1: on the way to it nothing limits the motion: no feed"):
-        plan_trajectory(posted(limited(pk.load("orthoglide")), tip, feed=np.nan))
+        plan_trajectory(posted(limited(load_shipped("orthoglide")), tip, feed=np.nan))
 
 
 def test_rapid_and_seconds():
-    machine = limited(pk.load("linear_delta"), mm=(500.0, INF, INF))
+    machine = limited(load_shipped("linear_delta"), mm=(500.0, INF, INF))
     tip = np.array([[0, 0, 280], [0, 0, 380], [0, 0, 280], [0, 0, 270]], float)
     seconds = np.array([np.nan, np.nan, 4.0, np.nan])
     trajectory = plan_trajectory(
@@ -254,7 +255,7 @@ def square(machine, **how):
 
 
 def test_corners_are_stopped_at():
-    machine = limited(pk.load("orthoglide"), mm=(INF, 2000.0, INF))
+    machine = limited(load_shipped("orthoglide"), mm=(INF, 2000.0, INF))
     trajectory = square(machine, corners="stop")
     at = trajectory.at(trajectory.times)
     assert np.abs(at.speeds).max() < 1e-6
@@ -269,7 +270,7 @@ def test_corners_are_stopped_at():
 
 
 def test_a_corner_is_as_far_off_as_it_may_be():
-    machine = limited(pk.load("orthoglide"), mm=(INF, 2000.0, INF))
+    machine = limited(load_shipped("orthoglide"), mm=(INF, 2000.0, INF))
     for tolerance in (0.1, 0.01, 0.001):
         trajectory = square(machine, tolerance=tolerance)
         off = np.linalg.norm(trajectory.at(trajectory.times[1:-1]).poses - trajectory.posted.poses[1:-1], axis=1)
@@ -277,7 +278,7 @@ def test_a_corner_is_as_far_off_as_it_may_be():
 
 
 def test_a_motion_of_one_step_between_two_stands_takes_its_time(monkeypatch):
-    machine = limited(pk.load("linear_delta"), mm=(INF, 2000.0, INF))
+    machine = limited(load_shipped("linear_delta"), mm=(INF, 2000.0, INF))
     tip = np.array([[0.0, 0.0, 300.0 + k % 2] for k in range(6)])
     monkeypatch.setattr(joint_path, "ENOUGH", 0)  # as on paths of millions of records
     trajectory = plan_trajectory(posted(machine, tip), corners="stop")
@@ -286,7 +287,7 @@ def test_a_motion_of_one_step_between_two_stands_takes_its_time(monkeypatch):
 
 
 def test_a_straight_line_of_many_records_is_one_line():
-    machine = limited(pk.load("linear_delta"), mm=(INF, 2000.0, INF))
+    machine = limited(load_shipped("linear_delta"), mm=(INF, 2000.0, INF))
     z = np.linspace(280.0, 380.0, 1000)
     tip = np.stack([0 * z, 0 * z, z], 1)
     for corners in ("round", "stop"):
@@ -295,7 +296,7 @@ def test_a_straight_line_of_many_records_is_one_line():
 
 
 def test_the_path_may_lead_over_a_pole_or_beside_it():
-    machine = limited(pk.load("tricept"), mm=(500.0, 5000.0, INF), rad=(3.0, 30.0, INF))
+    machine = limited(load_shipped("tricept"), mm=(500.0, 5000.0, INF), rad=(3.0, 30.0, INF))
     x = np.linspace(-30.0, 30.0, 21)
     tip = np.stack([x, 0 * x, 0 * x - 1650.0], 1)
     for lean in (0.0, 1e-5, 1e-3, 1e-2):
@@ -323,7 +324,7 @@ def test_more_is_quicker(name):
 
 
 def test_setpoints_are_a_table():
-    trajectory = square(limited(pk.load("orthoglide"), mm=(INF, 2000.0, INF)))
+    trajectory = square(limited(load_shipped("orthoglide"), mm=(INF, 2000.0, INF)))
     points = trajectory.sample(500.0)
     assert points.columns[:5] == ("time", "rho_x", "rho_y", "rho_z", "rho_x.speed")
     assert points.columns[-4:] == ("rho_z.acceleration", "X", "Y", "Z")
@@ -335,7 +336,7 @@ def test_setpoints_are_a_table():
 
 
 def test_one_place_takes_no_time():
-    trajectory = plan_trajectory(posted(pk.load("linear_delta"), [[0, 0, 280]] * 3))
+    trajectory = plan_trajectory(posted(load_shipped("linear_delta"), [[0, 0, 280]] * 3))
     assert trajectory.seconds == 0.0 and trajectory.times.tolist() == [0.0] * 3 and trajectory.binding_fractions == {}
     assert trajectory.sample(1000.0).joints == pytest.approx(trajectory.posted.joints[:1])
 
@@ -351,12 +352,12 @@ def test_one_place_takes_no_time():
 )
 def test_what_is_refused(how, message):
     with pytest.raises(PoseError) as caught:
-        square(pk.load("orthoglide"), **how)
+        square(load_shipped("orthoglide"), **how)
     assert str(caught.value) == message
 
 
 def test_a_path_that_the_machine_cannot_follow_is_refused_with_its_place():
-    machine = limited(pk.load("orthoglide"), mm=(INF, 2000.0, INF))
+    machine = limited(load_shipped("orthoglide"), mm=(INF, 2000.0, INF))
     tip = np.array([[0, 0, 0], [0, 400, 0], [0, 0, 0]], float)
     with pytest.raises(PoseError, match=r"part.apt:2, record 1: the machine can't take this pose"):
         plan_trajectory(posted(machine, tip))
@@ -394,10 +395,10 @@ def test_a_time_far_over_the_feeds_is_explained_at_its_line(tmp_path):
         for k, a in enumerate(np.radians(np.arange(0.0, 181.0, 9.0)))
     ]
     (tmp_path / "part.apt").write_text("\n".join(["UNITS/MM", "FEDRAT/10000,MMPM", *words, *turned, "FINI", ""]))
-    job = pk.prepare(pk.load("tricept"), pk.read_path(tmp_path / "part.apt"))
+    job = pk.prepare(load_shipped("tricept"), pk.read_path(tmp_path / "part.apt"))
     assert job.seconds > 3.0
     note = next(note for note in job.posted.path.notes if "its feeds ask for" in note.text)
     assert note.line > 4 and "theta1" in note.text
     (tmp_path / "part.apt").write_text("\n".join(["UNITS/MM", "FEDRAT/600,MMPM", *words, "FINI", ""]))
-    job = pk.prepare(pk.load("tricept"), pk.read_path(tmp_path / "part.apt"))
+    job = pk.prepare(load_shipped("tricept"), pk.read_path(tmp_path / "part.apt"))
     assert not any("its feeds ask for" in note.text for note in job.posted.path.notes)

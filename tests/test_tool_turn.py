@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from dense_deviations import axis_of, path_of
 from scipy.spatial.transform import Rotation
+from shipped import load_shipped
 
 import parakin as pk
 from parakin.cli import main
@@ -88,7 +89,7 @@ OFFSETS = {"hexapod": [120.0, -150.0, 150.0], "lambda6": [-80.0, 40.0, 60.0]}
 @pytest.mark.parametrize("tilted", [False, True])
 @pytest.mark.parametrize("name", OFFSETS)
 def test_the_chosen_turn_keeps_the_axis_and_leaves_more_margin(name, tilted):
-    machine = pk.load(name)
+    machine = load_shipped(name)
     path = wave(machine, OFFSETS[name])
     frame = pk.workpiece(X=3.0, A=0.4, B=-0.3) if tilted else pk.workpiece()
     path = path_of((path.tip - frame[:, 3]) @ frame[:, :3], path.axis @ frame[:, :3])  # the same path on the machine
@@ -118,7 +119,7 @@ def test_the_chosen_turn_keeps_the_axis_and_leaves_more_margin(name, tilted):
 
 @pytest.mark.parametrize("name", OFFSETS)
 def test_at_one_place_the_turn_is_the_best_of_all(name):
-    machine = pk.load(name)
+    machine = load_shipped(name)
     tip = machine.home[:3] + OFFSETS[name] + np.array([[0.0, 0.0, 0.0], [0.5, 0.0, 0.0]])
     axis = axis_of(17.0, 40.0)
     turn = pk.choose_tool_turn(machine, path_of(tip, np.tile(axis, (2, 1))))
@@ -134,20 +135,20 @@ def test_at_one_place_the_turn_is_the_best_of_all(name):
 
 
 def test_a_path_that_only_another_turn_can_follow():
-    machine = pk.load("hexapod")
+    machine = load_shipped("hexapod")
     turned = pk.prepare_turned(machine, wave(machine, [170.0, 120.0, 150.0]))
     assert turned.is_chosen and turned.job.runs and not turned.home.runs
 
 
 def test_the_same_path_gives_the_same_turn():
-    machine = pk.load("lambda6")
+    machine = load_shipped("lambda6")
     path = wave(machine, OFFSETS["lambda6"])
     first, second = (pk.choose_tool_turn(machine, path) for _ in range(2))
     assert (first.path.turns == second.path.turns).all()
 
 
 def test_dense_and_sparse_records_give_nearly_the_same_turn():
-    machine = pk.load("lambda6")
+    machine = load_shipped("lambda6")
     few, many = (pk.choose_tool_turn(machine, wave(machine, OFFSETS["lambda6"], count)) for count in (400, 4000))
     assert few.margin == pytest.approx(many.margin, abs=0.01)
     assert (few.low, few.high) == pytest.approx((many.low, many.high), abs=np.radians(3.0))
@@ -155,21 +156,21 @@ def test_dense_and_sparse_records_give_nearly_the_same_turn():
 
 @pytest.mark.parametrize("count", [1, 2, 3])
 def test_short_paths(count):
-    machine = pk.load("hexapod")
+    machine = load_shipped("hexapod")
     path = path_of(machine.home[:3] + np.arange(count)[:, None] * [0.0, 0.0, 0.0])
     turned = pk.prepare_turned(machine, path)
     assert turned.job.runs
 
 
 def test_axes_that_turn_to_their_opposites():
-    machine = pk.load("hexapod")
+    machine = load_shipped("hexapod")
     path = path_of(np.tile(machine.home[:3], (2, 1)), [[0.0, 0.0, 1.0], [0.0, 0.0, -1.0]])
     assert pk.choose_tool_turn(machine, path) is None
     assert "opposite" in pk.prepare_turned(machine, path).job.unplanned
 
 
 def test_a_longer_tool_keeps_its_own_tip():
-    machine = pk.load("hexapod")
+    machine = load_shipped("hexapod")
     path = wave(machine, OFFSETS["hexapod"])
     longer = pk.fit_tool_lengths(machine, path, 170.0)
     posted = pk.prepare(machine, pk.choose_tool_turn(machine, longer).path).posted
@@ -180,7 +181,7 @@ def test_a_longer_tool_keeps_its_own_tip():
 
 
 def test_a_programs_own_turns_with_a_longer_tool_need_few_records():
-    machine = pk.load("hexapod")
+    machine = load_shipped("hexapod")
     path = wave(machine, OFFSETS["hexapod"])
     k = path.axis
     turns = np.column_stack([np.arcsin(-k[:, 1]), np.arctan2(k[:, 0], k[:, 2]), np.zeros(len(k))])
@@ -190,18 +191,18 @@ def test_a_programs_own_turns_with_a_longer_tool_need_few_records():
 
 
 def test_where_no_turn_is_free():
-    machine = pk.load("tricept")
+    machine = load_shipped("tricept")
     path = path_of(np.tile(machine.home[:3], (2, 1)))
     with pytest.raises(pk.PoseError, match="tricept does not turn the tool three ways"):
         pk.choose_tool_turn(machine, path)
-    hexapod = pk.load("hexapod")
+    hexapod = load_shipped("hexapod")
     path = path_of(np.tile(hexapod.home[:3], (2, 1)), turns=np.zeros((2, 3)))
     with pytest.raises(pk.PoseError, match="the program gives A, B and C itself"):
         pk.prepare_turned(hexapod, path)
 
 
 def test_where_no_turn_keeps_the_limits():
-    machine = pk.load("hexapod")
+    machine = load_shipped("hexapod")
     turned = pk.prepare_turned(machine, path_of(machine.home[:3] + np.array([[0.0, 0.0, 0.0], [0.0, 0.0, 5000.0]])))
     assert not turned.is_chosen and not turned.job.runs
 
@@ -238,7 +239,7 @@ def test_arms_that_turn_over_half_a_turn(tmp_path):
 
 
 def test_a_placement_with_its_turn_leaves_more_margin():
-    machine = pk.load("lambda6")
+    machine = load_shipped("lambda6")
     path = wave(machine, [0.0, 0.0, 60.0], count=20)
     bounds = {"X": (-60.0, 60.0), "Y": (-60.0, 60.0), "Z": (-100.0, 100.0)}
     placements = find_turned_placements(machine, path, bounds)
@@ -254,7 +255,7 @@ def run(capsys, *arguments, code=0):
 
 
 def test_the_command_tells_the_turn(tmp_path, capsys):
-    machine = pk.load("lambda6")
+    machine = load_shipped("lambda6")
     path = wave(machine, OFFSETS["lambda6"])
     part = tmp_path / "part.cls"
     rows = np.column_stack([path.tip, path.axis]).tolist()

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from shipped import load_shipped
 
 import parakin as pk
 from parakin.cli import main
@@ -84,7 +85,7 @@ def write(tmp_path):
 
 @pytest.fixture(scope="module")
 def tricept():
-    return pk.load("tricept")
+    return load_shipped("tricept")
 
 
 def post(capsys, path, *options, code=0, machine="tricept", place="0,0,-1450"):

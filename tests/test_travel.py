@@ -5,9 +5,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from shipped import REPRESENTATIVES
+from shipped import REPRESENTATIVES, load_shipped
 
-import parakin as pk
 from parakin.cli import main
 from parakin.errors import PoseError
 from parakin.kinematics.travel import FARTHEST, SINGULARITY
@@ -63,7 +62,7 @@ def find_end(machine, pose, direction, far):
 
 @pytest.mark.parametrize("name", [*REPRESENTATIVES, *OWN], ids=lambda name: Path(name).stem)
 def test_travel_is_what_samples_allow(name):
-    machine = pk.load(name)
+    machine = load_shipped(name)
     reached = 0
     count = 1 if name == "rus6" else 4  # bounds of its cranks are wide, and its ways take a thousand steps each
     for pose in draw_poses(machine, count, 3):
@@ -88,7 +87,7 @@ def test_travel_is_what_samples_allow(name):
 
 def test_ends_in_closed_form():
     """The hexapod's platform goes down until its struts, all alike there, are 1310 mm long."""
-    machine = pk.load("hexapod")
+    machine = load_shipped("hexapod")
     travel = machine.travel(machine.home, "Z")
     feet = np.array([[-22.95, 13.25], [22.95, 13.25], [0.0, -26.5]]) * 25.4
     joints = np.array([[-1.0, 11.5], [10.459, -4.884], [9.459, -6.616]]) * 25.4
@@ -98,7 +97,7 @@ def test_ends_in_closed_form():
 
 
 def test_any_direction_and_turns_are_counted():
-    machine = pk.load("tricept")
+    machine = load_shipped("tricept")
     pose = machine.home + np.array([0.0, 0.0, 0.0, 0.5, 0.0])
     travel = machine.travel(pose, [0.0, 0.0, 0.0, 0.0, 1.0])
     assert [travel.ahead.limit, travel.back.limit] == ["theta1.max", "theta1.min"]
@@ -112,7 +111,7 @@ def test_any_direction_and_turns_are_counted():
 
 def test_a_way_over_the_pole_goes_on():
     """Through the wrist's pole, where its first joint is free, the strut that ends the way is met."""
-    machine = pk.load("tricept")
+    machine = load_shipped("tricept")
     pose = machine.home - np.array([100.0, 0.0, 0.0, 0.0, 0.0])
     travel = machine.travel(pose, "X")
     at_home = machine.travel(machine.home, "X")
@@ -121,7 +120,7 @@ def test_a_way_over_the_pole_goes_on():
 
 
 def test_off_limits_and_on_a_limit():
-    machine = pk.load("orthoglide")
+    machine = load_shipped("orthoglide")
     off = machine.travel([200.0, 0.0, 0.0], "X")
     assert off.ahead.distance == off.back.distance == 0.0
     assert off.ahead.limit == "rho_x.max"
@@ -134,13 +133,13 @@ def test_off_limits_and_on_a_limit():
 @pytest.mark.parametrize("axis", ["Q", "", [1.0, 2.0], [0.0] * 6, {"X": 0.0}, None, [np.nan] * 6, 3])
 def test_bad_directions(axis):
     with pytest.raises(PoseError) as error:
-        pk.load("hexapod").travel(pk.load("hexapod").home, axis)
+        load_shipped("hexapod").travel(load_shipped("hexapod").home, axis)
     assert len(str(error.value).splitlines()) == 1
 
 
 @pytest.mark.parametrize("name", ["hexapod", "orthoglide5_table"])
 def test_directions_at_random(name):
-    machine = pk.load(name)
+    machine = load_shipped(name)
     rng = np.random.default_rng(8)
     spread = np.array([1.0 if unit == "mm" else 0.002 for unit in machine.axis_units])
     for pose in draw_poses(machine, 8, 4):
@@ -161,7 +160,7 @@ def test_command(capsys):
     answer = json.loads(out)
     assert (code, err, answer["schema"]) == (0, "", "parakin.reach/1")
     assert [line["along"] for line in answer["travel"]] == ["X", "Y", "Z"]
-    ahead = pk.load("orthoglide").travel([10.0, 0.0, 0.0], "X").ahead
+    ahead = load_shipped("orthoglide").travel([10.0, 0.0, 0.0], "X").ahead
     assert answer["travel"][0]["ahead"] == {
         "distance": ahead.distance, "limit": "rho_x.max", "pose": {"X": ahead.pose[0], "Y": 0.0, "Z": 0.0},
     }  # fmt: skip

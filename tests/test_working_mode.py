@@ -6,6 +6,7 @@ from importlib.resources import files
 import numpy as np
 import pytest
 from random_paths import PathMaker
+from shipped import load_shipped
 
 import parakin as pk
 from parakin.toolpath.path import ToolPath
@@ -86,7 +87,7 @@ def spirals(starts, stops, b=20.0, tip=(0.0, 0.0, 0.0), step=5.0, aside=20.0):
 
 
 def test_no_turn_is_taken_back_where_one_count_serves():
-    machine = pk.load("orthoglide5_table")
+    machine = load_shipped("orthoglide5_table")
     path = spirals([-245, 50], [50, 445])  # the plate stands at 90 deg - C
     posted = post_path(machine, path)
     assert posted.broken_record_count == 0
@@ -94,7 +95,7 @@ def test_no_turn_is_taken_back_where_one_count_serves():
 
 
 def test_a_path_without_rapids_breaks_as_few_records_as_can_be():
-    machine = pk.load("orthoglide5_table")
+    machine = load_shipped("orthoglide5_table")
     c = np.concatenate([np.linspace(0, 900, 181), np.full(100, 900.0)])
     path = path_of(machine.home[:3], axis_of(10.0, c))
     posted = post_path(machine, path)
@@ -107,7 +108,7 @@ def test_a_path_without_rapids_breaks_as_few_records_as_can_be():
 
 
 def test_turns_against_every_count_there_is():
-    machine = pk.load("orthoglide5_table")
+    machine = load_shipped("orthoglide5_table")
     column, rng = joint(machine, "c"), np.random.default_rng(4)
     for _ in range(12):
         ends = np.cumsum(rng.uniform(-400, 500, 5))
@@ -121,7 +122,7 @@ def test_turns_against_every_count_there_is():
 
 
 def test_the_count_nearest_to_home():
-    machine = pk.load("orthoglide5_table")
+    machine = load_shipped("orthoglide5_table")
     column = joint(machine, "c")
     path = path_of(machine.home[:3], axis_of(10.0, np.linspace(-170, -350, 40)))
     angle = np.unwrap(machine.inverse(post_path(machine, path).poses)[:, column])
@@ -136,7 +137,7 @@ def test_the_count_nearest_to_home():
 @pytest.mark.parametrize("name", ["orthoglide5_table", "orthoglide5_head", "tricept"])
 @pytest.mark.parametrize("c", [300.0, -350.0, 170.0])
 def test_a_turn_programmed_in_one_motion_is_made(name, c):
-    machine = pk.load(name)
+    machine = load_shipped(name)
     few = np.radians([[0.0, 20.0, 0.0], [0.0, 25.0, c], [0.0, 25.0, c + 10.0]])
     share = np.linspace(0.0, 1.0, 1001)[:, None]
     many = np.vstack([few[0] + share * (few[1] - few[0]), few[2:]])
@@ -149,7 +150,7 @@ def test_a_turn_programmed_in_one_motion_is_made(name, c):
 
 def test_too_many_turns_are_refused():
     turns = np.array([[0.0, 0.3, 0.0], [0.0, 0.3, 1e6]])
-    machine = pk.load("tricept")
+    machine = load_shipped("tricept")
     with pytest.raises(pk.PoseError, match="record 1 makes 159,155 turns"):
         post_path(machine, path_of(machine.home[:3], compute_tool_axes(turns), turns=turns))
 
@@ -170,7 +171,7 @@ def test_the_other_mode_where_the_default_breaks_a_limit(tmp_path):
 
 
 def test_the_default_mode_where_both_serve():
-    machine = pk.load("orthoglide5_head")
+    machine = load_shipped("orthoglide5_head")
     path = path_of(machine.home[:3], axis_of(30.0, np.linspace(0, 200, 30)))
     assert post_path(machine, path).mode == machine.mode
     assert post_path(machine, path, mode=machine.mode[:-1] + "-").broken_record_count == 0
@@ -191,7 +192,7 @@ def test_the_other_mode_where_it_spares_a_flip(tmp_path):
 
 
 def test_legs_keep_their_modes():
-    machine = pk.load("hbg80_2d")
+    machine = load_shipped("hbg80_2d")
     path = path_of([900.0, 230.0, 0.0], np.tile([0.0, 0.0, 1.0], (3, 1)))
     posted = post_path(machine, path)
     assert posted.mode == machine.mode
@@ -199,7 +200,7 @@ def test_legs_keep_their_modes():
 
 
 def test_a_job_that_runs_in_one_mode_only_is_prepared_in_that(tmp_path):
-    machine = pk.load("tricept")
+    machine = load_shipped("tricept")
     maker = PathMaker(machine, 106)
     maker.widest *= 2.5
     (tmp_path / "part.cls").write_text(maker.make(), encoding="ascii")

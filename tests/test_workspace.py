@@ -9,12 +9,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 from regions import whole_region
-from shipped import REPRESENTATIVES
+from shipped import REPRESENTATIVES, load_shipped
 
 import parakin as pk
 
 MACHINES = Path(__file__).parent / "machines"
-SHIPPED = {name: pk.load(name) for name in REPRESENTATIVES}
+SHIPPED = {name: load_shipped(name) for name in REPRESENTATIVES}
 
 
 def known(name, **sizes):

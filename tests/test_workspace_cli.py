@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 import trimesh
 from regions import whole_region
+from shipped import load_shipped
 
 import parakin as pk
 from parakin.cli import main
@@ -107,7 +108,7 @@ def test_parameters_are_enough_to_run_it_again(capsys):
     assert given["without"] == ["strut0.min", "strut0.max"]
     again = pk.workspace(
         whole_region(
-            pk.load("hexapod"),
+            load_shipped("hexapod"),
             at={axis: np.radians(v) if axis in "ABC" else v for axis, v in given["at"].items()},
             every={axis: tuple(np.radians(span)) for axis, span in given["every"].items()},
             without=given["without"],
@@ -215,7 +216,7 @@ def test_the_time_is_kept(capsys):
 
 @pytest.mark.parametrize("method", ["grid", "polar", "drives"])
 def test_other_methods(method, tmp_path, capsys):
-    proved = pk.workspace(pk.region(pk.load("hbg80_3d"))).volume.estimate
+    proved = pk.workspace(pk.region(load_shipped("hbg80_3d"))).volume.estimate
     said = told(capsys, "hbg80_3d", "--method", method, "-o", tmp_path / "a.png", "-o", tmp_path / "a.stl")
     assert said["volume"]["inner"] is said["volume"]["outer"] is said["gap"] is None
     assert said["volume"]["estimate"] == pytest.approx(proved, rel=0.1 if method == "polar" else 0.01)
@@ -229,7 +230,7 @@ def test_other_methods(method, tmp_path, capsys):
 
 
 def test_curves_of_the_sweeps(capsys):
-    machine = pk.load("hbg80_2d")
+    machine = load_shipped("hbg80_2d")
     for method in ("polar", "drives"):
         said = told(capsys, "hbg80_2d", "--method", method)
         points = np.vstack([line for group in said["curves"] for line in group["lines"]])

@@ -4,8 +4,8 @@ import json
 
 import numpy as np
 import pytest
+from shipped import load_shipped
 
-import parakin as pk
 from parakin.cli import main
 
 
@@ -22,7 +22,7 @@ def test_a_box_of_given_proportions_is_inside(capsys):
     assert np.allclose((high - low) / (high - low)[1], [2.0, 1.0, 1.0], rtol=1e-6)
     assert box["volume"] == pytest.approx((high - low).prod())
     places = low + (high - low) * np.random.default_rng(0).random((100_000, 3))
-    assert (pk.load("orthoglide").check(places) == 0).all()
+    assert (load_shipped("orthoglide").check(places) == 0).all()
 
 
 def test_the_largest_box_about_a_place(capsys):

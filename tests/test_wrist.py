@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from shipped import load_shipped
 
 import parakin as pk
 from parakin.kinematics import turns
@@ -35,9 +36,9 @@ def tilted(machine, by):
     return poses
 
 
-@pytest.mark.parametrize("name", [name for name in pk.machines() if pk.load(name).axes != tuple("XYZBC")])
+@pytest.mark.parametrize("name", [name for name in pk.machines() if load_shipped(name).axes != tuple("XYZBC")])
 def test_other_machines_have_none(name):
-    assert pk.load(name).wrist is None
+    assert load_shipped(name).wrist is None
 
 
 def test_both_modes_point_the_tool_the_same_way(machine):

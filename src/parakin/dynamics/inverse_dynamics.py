@@ -63,16 +63,7 @@ class Dynamics:
         self._rotors = np.array([drive.inertia for drive in machine.drives])
         self._coordinates = len(machine.structure.coordinates)
         self._width = self._coordinates + len(machine.joints)
-        self._tapes = {
-            name: self._compile(blocks, trace_outputs)
-            for name, blocks, trace_outputs in (
-                ("slopes", 1, self._trace_slopes),
-                ("bends", 2, self._trace_bends),
-                ("forces", 3, self._trace_forces),
-                ("tip", 1, self._trace_tip),
-                ("turns", 3, self._trace_turns),
-            )
-        }
+        self._tapes: dict[str, Tape] = {}  # compiled when first asked for
         axes = len(machine.axes)
         trace = Trace()
         placed = machine.structure.place_with_joints(
@@ -85,7 +76,15 @@ class Dynamics:
 
     # Tapes: inputs are z, then z', then z'' and the gravity.
 
-    def _compile(self, blocks: int, trace_outputs: Callable[[Trace], Sequence[Scalar]]) -> Tape:
+    def _compile(self, name: str) -> Tape:
+        kinds: dict[str, tuple[int, Callable[[Trace], Sequence[Scalar]]]] = {
+            "slopes": (1, self._trace_slopes),
+            "bends": (2, self._trace_bends),
+            "forces": (3, self._trace_forces),
+            "tip": (1, self._trace_tip),
+            "turns": (3, self._trace_turns),
+        }
+        blocks, trace_outputs = kinds[name]
         trace = Trace()
         return compile_tape(trace, trace_outputs(trace), blocks * self._width + (blocks == 3))
 
@@ -132,6 +131,8 @@ class Dynamics:
     # Batches.
 
     def _evaluate(self, name: str, inputs: Array) -> Array:
+        if name not in self._tapes:
+            self._tapes[name] = self._compile(name)
         tape = self._tapes[name]
         return evaluate_tape(tape, np.ascontiguousarray(inputs), np.empty((len(inputs), tape.outputs)))
 

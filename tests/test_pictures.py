@@ -6,8 +6,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from shipped import REPRESENTATIVES, load_shipped
+from shipped import REPRESENTATIVES
 
+import parakin as pk
 from parakin.dynamics.polygon import order_polygon
 from parakin.export.machine.picture import render_machine_picture
 from parakin.export.machine.scene import build_scene
@@ -24,7 +25,7 @@ from parakin.toolpath.reading.cl.reader import read_cl
 
 OWN = Path(__file__).parent / "machines" / "rpr3.yaml"
 MACHINES = [*REPRESENTATIVES, str(OWN)]
-LOADED = {name: load_shipped(name) for name in MACHINES}
+LOADED = {name: pk.load(name) for name in MACHINES}
 machines = pytest.mark.parametrize("machine", LOADED.values(), ids=lambda machine: machine.name)
 
 

@@ -284,6 +284,14 @@ def test_the_page_in_a_browser(studio):
         wait_until(tab, "document.querySelector('.run').innerText.includes('parakin inverse')", 30.0)
         wait_until(tab, "document.querySelector('.run .state').textContent.startsWith('exit 0')", 30.0)
         assert "d1" in tab.inner_text(".run pre")
+        page = tab.frames[1]
+        tab.click("text=Largest box")
+        wait_until(page, "parakin.shown.box !== null", 40.0)
+        (low, high) = page.evaluate("parakin.shown.box")
+        assert not pk.load("rpr3").check([[x, y, 0.0] for x in (low[0], high[0]) for y in (low[1], high[1])]).any()
+        tab.click("button:has-text('Atlas')")
+        wait_until(page, "parakin.shown.values > 20", 40.0)
+        assert "1/condition number, violet 0 to yellow 1" in page.locator("aside").inner_text()
         tab.click("text=Post the part")
         wait_until(tab, "studio.findFrame('own.yaml')?.src.endsWith('out/part.page.html') === false "
                         "&& studio.findFrame('own.yaml')?.src.includes('part.page.html')", 40.0)  # fmt: skip

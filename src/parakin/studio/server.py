@@ -56,8 +56,7 @@ class Studio:
         in_session = "/sessions/{session}"
         routes = [
             Route("/", _serve_own("studio.html")),
-            Route("/studio.js", _serve_own("studio.js")),
-            Route("/studio.css", _serve_own("studio.css")),
+            *(Route(f"/{name}", _serve_own(name)) for name in ("studio.js", "results.js", "studio.css")),
             Route("/commands", self._answer(self._describe)),
             Route("/sessions", self._answer(self._open_session), methods=["POST"]),
             Route(f"{in_session}/files", self._answer(self._list_files)),

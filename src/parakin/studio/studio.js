@@ -261,32 +261,13 @@ async function upload(files) {
 
 const QUICK = {
   "Workspace": () => refineWorkspace(),
-  "Atlas": () => run("atlas", {NAME: element("machine").value, "--output": "atlas.svg"}),
+  "Largest box": () => findBox(),
+  "Atlas": () => drawAtlas(),
   "Post the part": () => postPart(name => state.workpieces[`${name} ${element("part").value}`]),
   "Place it for me": () => postPart(name => ({"--place": makeRanges(name)})),
   "Part at the tool": () => postPart(name => ({"--workpiece": findTip(name).map(([axis, value]) => `${axis}=${value}`).join(",")})),
   "LinuxCNC": () => run("linuxcnc", {NAME: element("machine").value, "--output": "linuxcnc"}),
 };
-
-// The proved workspace of each machine, at rising resolution, drawn about it.
-async function refineWorkspace() {
-  for (const gap of ["0.3", "0.1", "0.02"]) {
-    for (const name of chosenMachines()) {
-      const spatial = findTip(name).length === 3, output = `workspace_${name.replace(/\.ya?ml$/, "")}.${spatial ? "stl" : "svg"}`;
-      const result = await run("workspace", {NAME: name, "--gap": gap, "--output": [output]});
-      if (!result || result.state !== "done") return;
-      if (spatial && result.code === 0) await showSurface(name, output);
-    }
-  }
-}
-
-// Draw a binary STL on a machine's page.
-async function showSurface(name, file) {
-  const view = new DataView(await (await fetch(inSession(`files/${escapeName(file)}`))).arrayBuffer());
-  const corners = new Float32Array(9 * view.getUint32(80, true));
-  for (let i = 0; i < corners.length; i++) corners[i] = view.getFloat32(84 + 50 * Math.floor(i / 9) + 12 + 4 * (i % 9), true);
-  findFrame(name)?.contentWindow.parakin?.showSurface(corners);
-}
 
 // Where the tool of a machine's page stands: pairs of an axis and its value.
 function findTip(name = element("machine").value) {

@@ -1,29 +1,42 @@
 // The camera turns about a target, with Z upright.
 
-const low = new THREE.Vector3(...machine.box[0]), high = new THREE.Vector3(...machine.box[1]);
 const orbit = {target: new THREE.Vector3(), azimuth: 0, elevation: 0, distance: 1};
+const seen = []; // places that the picture shows at first: the machine's own, and what is drawn beside it
 let shownSize = size;
 
-// Show, beside the machine's own box, what stands in the frame of poses.
+// Show, beside the machine, what stands in the frame of poses.
 function widenView(geometry) {
   geometry.computeBoundingBox();
-  const box = geometry.boundingBox.clone().applyMatrix4(frame).union(new THREE.Box3(low, high));
-  low.copy(box.min);
-  high.copy(box.max);
-  shownSize = max(shownSize, 0.95 * low.distanceTo(high));
+  const {min: a, max: b} = geometry.boundingBox;
+  for (let k = 0; k < 8; k++) seen.push(new THREE.Vector3(k & 1 ? b.x : a.x, k & 2 ? b.y : a.y, k & 4 ? b.z : a.z).applyMatrix4(frame));
 }
 
 function resetOrbit() {
-  orbit.target.addVectors(low, high).multiplyScalar(0.5);
-  orbit.azimuth = -0.95;
+  orbit.azimuth = -1.2;
   orbit.elevation = 0.32;
   if (machine.normal) {
     const across = machine.normal.map(abs).indexOf(max(...machine.normal.map(abs)));
     orbit.azimuth = across === 0 ? 0 : -PI / 2;
     orbit.elevation = across === 2 ? PI / 2 - 1e-4 : 0;
   }
-  const half = 0.5 * camera.fov * PI / 180;
-  orbit.distance = 0.56 * shownSize / Math.tan(half) / min(1, camera.aspect * 1.02);
+  fitView();
+}
+
+// Aim at the middle of what is to be seen, as it looks from the camera's side, and step back until all of it is in the picture.
+function fitView() {
+  if (!seen.length) seen.push(handle.position.clone(), ...itemPoints.flat().map(point => point.clone()));
+  placeCamera();
+  const middle = new THREE.Vector3(), reach = [0, 0, 0], half = Math.tan(0.5 * camera.fov * PI / 180);
+  for (let i = 0; i < 3; i++) {
+    const way = new THREE.Vector3().setFromMatrixColumn(camera.matrix, i), along = seen.map(point => point.dot(way));
+    const [least, most] = [min(...along), max(...along)];
+    middle.addScaledVector(way, 0.5 * (least + most));
+    reach[i] = 0.5 * (most - least);
+  }
+  const [right, up, back] = reach;
+  shownSize = max(size, 2 * hypot(right, up, back));
+  orbit.target.copy(middle);
+  orbit.distance = max(0.1 * size, 1.12 * max(up, right / camera.aspect) / half + back);
   placeCamera();
 }
 

@@ -36,6 +36,7 @@ APP = (
     "workspace",
     "section",
     "shown_surface",
+    "shown_values",
     "path",
     "player",
     "place",

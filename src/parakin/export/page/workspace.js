@@ -63,15 +63,13 @@ function drawSurface({id, level, last, volume, positions, normals}) {
   requestPicture();
 }
 
-// Step back, once, as far as the whole surface asks for.
+// Step back, once, as far as all of the surface asks for.
 let fitted = false;
 function fitOrbit(geometry) {
   if (fitted || !geometry.attributes.position.count) return;
   fitted = true;
-  const before = shownSize;
   widenView(geometry);
-  orbit.target.addVectors(low, high).multiplyScalar(0.5);
-  zoomCamera(shownSize / before);
+  fitView();
 }
 
 workspaceSwitch.addEventListener("change", () => { requestSurface(); requestPicture(); });

@@ -85,7 +85,7 @@ def star(tmp_path_factory):
     lines = make_path(5022).splitlines()
     file = tmp_path_factory.mktemp("star") / "part.cls"
     file.write_text("\n".join([*lines[:2], *lines[16:20], "FINI", ""]), encoding="ascii")
-    return pk.prepare(pk.load("tricept"), pk.read_path(file))
+    return pk.prepare(load_shipped("tricept"), pk.read_path(file))
 
 
 def test_a_stretch_on_the_pole_takes_cycles_enough(star):

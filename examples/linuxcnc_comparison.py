@@ -30,7 +30,7 @@ from parakin.controllers.linuxcnc.home_pose import find_home_pose
 HERE = Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE.parent / "tests" / "linuxcnc"))
 from planner import Planner, read_program  # noqa: E402
-from simulation import CYCLE, as_programmed, first_line, simulated, trial, why_not  # noqa: E402
+from simulation import CYCLE, as_programmed, first_line, simulated, why_not  # noqa: E402
 from stub import FIELDS, outward, world  # noqa: E402
 
 RECORDS, SHOWN = 2000, 130  # of the whole operation, and of it here
@@ -178,7 +178,7 @@ def prepare(machine, folder, place, feed):
 
 def compare(folder, place, feed):
     """A machine, as programmed and as posted, with both planners: rows of the table, and what ran by their titles."""
-    machine = trial(place.name, folder)
+    machine = pk.load(place.name)
     job, posted, plain = prepare(machine, folder, place, feed)
     texts = {"as programmed": plain, "posted": posted}
     runs = {}
@@ -220,7 +220,7 @@ def draw_moves(machine, folder):
 
 def compare_moves(folder, place):
     """A machine's moves by MDI with both planners: rows of the table."""
-    machine = trial(place.name, folder)
+    machine = pk.load(place.name)
     blocks = draw_moves(machine, folder)
     for drives, planner in (("ideal", "LinuxCNC's"), ("ideal", "parakin's"), ("limited", "parakin's")):
         reserve = RESERVE if drives == "limited" else None

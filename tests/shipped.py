@@ -1,11 +1,13 @@
 """The shipped machines that tests run over: all of them, or, where a test takes long, those that stand for the rest.
 
 The conformance suite and all that is quick run over every machine. Of every set of axes, structure and leg kind there
-is a machine among the representatives, which the conformance suite tests.
+is a machine among the representatives, which the conformance suite tests. LinuxCNC runs one machine of every kind of
+motion, or, with PARAKIN_LINUXCNC=all, all representatives, and an operator's long sessions.
 """
 
 from __future__ import annotations
 
+import os
 from functools import cache
 
 import parakin as pk
@@ -29,6 +31,16 @@ REPRESENTATIVES = [
     "triglide_pairs",
     "four_struts",
 ]
+MOTIONS = [
+    "linear_delta",  # translates
+    "tricept",  # a wrist
+    "orthoglide5_table",  # a table
+    "hexapod",  # struts turn the tool
+    "sprint_z3",  # constraints
+    "rrr3",  # in a plane
+]
+EVERYTHING = os.environ.get("PARAKIN_LINUXCNC") == "all"
+CONFIGURED = REPRESENTATIVES if EVERYTHING else MOTIONS
 
 
 @cache

@@ -13,7 +13,9 @@ from time import process_time
 import numpy as np
 from seeded_rows import draw_wild, measure_pieces, plan_rows
 
+import parakin as pk
 from parakin.toolpath.timing import time_optimal
+from parakin.toolpath.timing.force_limits import ForceLimits
 from parakin.toolpath.timing.joint_path import divide_joint_path
 
 BEYOND = 1.001  # times a limit
@@ -25,6 +27,7 @@ SIZES = (  # share up to here, least and most rows
 )
 PLACES, FEWER, MANY = 41, 11, 50_000  # on each piece where joints are looked at; of more pieces fewer
 BLOCK = 20_000  # pieces
+UNFORCED = ForceLimits(pk.load("linear_delta"))  # whose drives' forces are not limited
 
 
 def draw_sized(seed):
@@ -64,7 +67,7 @@ def sweep(seed):
     refined, profile = plan_rows(path, limits)
     seconds = process_time() - begin
     soft = limits._replace(jerk=np.full_like(limits.jerk, np.inf))
-    finer, x, u = time_optimal.find_quickest(path, soft)
+    finer, x, u = time_optimal.find_quickest(path, soft, UNFORCED)
     plain = time_optimal.build_accelerated_profile(finer, soft, x, u)[0]
     wrong = [check_profile(refined, way, profile, limits), check_profile(finer, way, plain, soft)]
     return wrong, len(path.step), seconds

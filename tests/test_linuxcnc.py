@@ -14,12 +14,13 @@ import numpy as np
 import pytest
 from drawn import FAMILIES, draw, machine_of
 from geometry import Description
-from shipped import REPRESENTATIVES
+from shipped import CONFIGURED, REPRESENTATIVES, load_shipped
 from test_conformance import SPREAD, everyone, poses_about, signed
 from test_forward import CLOSE, allowed, garbage, legs_regularity, nudged
 
 import parakin as pk
 from parakin.cli import main
+from parakin.controllers.linuxcnc.config import write_hal
 from parakin.controllers.linuxcnc.home_pose import find_home_pose
 from parakin.controllers.linuxcnc.kinematics_module import write_module
 from parakin.kinematics.closure_roots import find_roots
@@ -28,10 +29,12 @@ from parakin.performance.singularities import compute_singularity_margins, list_
 
 sys.path.insert(0, str(Path(__file__).parent / "linuxcnc"))
 from ini_file import read_ini
+from simulation import make_configuration
 from stub import Stub, inward, outward, pose, world
 
 COUNT = 100_000
-representatives = pytest.mark.parametrize("m", [pk.load(name) for name in REPRESENTATIVES], ids=REPRESENTATIVES)
+representatives = pytest.mark.parametrize("m", [load_shipped(name) for name in REPRESENTATIVES], ids=REPRESENTATIVES)
+configured = pytest.mark.parametrize("m", [load_shipped(name) for name in CONFIGURED], ids=CONFIGURED)
 ENDS = (
     "_guard.c",
     "_tp.c",
@@ -417,9 +420,9 @@ def numbers(text):
     return np.array([float(word) for word in text.split()])
 
 
-@representatives
+@configured
 def test_the_ini_says_what_the_machine_says(m):
-    files = pk.make_linuxcnc_configuration(m)
+    files = make_configuration(m)
     assert sorted(files) == sorted(f"{m.name}{end}" for end in ENDS)
     ini = read_ini(files[f"{m.name}.ini"])
     assert ini["KINS"]["KINEMATICS"] == f"{m.name}_kins"
@@ -441,9 +444,9 @@ def test_the_ini_says_what_the_machine_says(m):
             assert not np.isfinite(value) or float(joint[key]) == pytest.approx(value * factor)
 
 
-@representatives
+@configured
 def test_the_axes_hold_the_poses_that_the_machine_can_take(m):
-    ini = read_ini(pk.make_linuxcnc_configuration(m)[f"{m.name}.ini"])
+    ini = read_ini(make_configuration(m)[f"{m.name}.ini"])
     ends = [[float(ini[f"AXIS_{axis}"][f"PROGRAM_{end}_LIMIT"]) for axis in m.axes] for end in ("MIN", "MAX")]
     scale = np.where(np.array(m.axis_units) == "rad", np.degrees(1.0), 1.0)
     low, high = np.array(ends) / scale
@@ -455,9 +458,9 @@ def test_the_axes_hold_the_poses_that_the_machine_can_take(m):
     assert (m.check(np.random.default_rng(4).uniform(low, high, (200_000, len(low)))) == 0).any()
 
 
-@representatives
+@configured
 def test_by_hand_an_axis_box_keeps_all_limits_and_all_axes_at_once_keep_the_joints_rates(m):
-    ini = read_ini(pk.make_linuxcnc_configuration(m)[f"{m.name}.ini"])
+    ini = read_ini(make_configuration(m)[f"{m.name}.ini"])
     keys = ("MIN_LIMIT", "MAX_LIMIT", "MAX_VELOCITY", "MAX_ACCELERATION")
     scale = np.where(np.array(m.axis_units) == "rad", np.degrees(1.0), 1.0)
     low, high, speed, acceleration = (np.array([float(ini[f"AXIS_{a}"][key]) for a in m.axes]) / scale for key in keys)
@@ -480,9 +483,9 @@ def test_by_hand_an_axis_box_keeps_all_limits_and_all_axes_at_once_keep_the_join
     assert (np.abs(pulled) + np.abs(bend) <= drives[:, 1] * 1.05).all()
 
 
-@representatives
+@configured
 def test_the_first_program_stays_inside(m):
-    text = pk.make_linuxcnc_configuration(m)[f"{m.name}.ngc"]
+    text = make_configuration(m)[f"{m.name}.ngc"]
     blocks = [re.findall(r"([XYZABC])(\S+)", line) for line in text.splitlines() if line.startswith("G1")]
     assert all([letter for letter, _ in block] == list(m.axes) for block in blocks)
     scale = np.where(np.array(m.axis_units) == "rad", np.degrees(1.0), 1.0)
@@ -509,29 +512,29 @@ def test_what_a_description_leaves_open_is_chosen_and_said(tmp_path):
     joint = text[text.index("[JOINT_0]") : text.index("[JOINT_1]")]
     assert "does not say it: acceleration\n" in joint
     assert "MAX_VELOCITY = 500\n" in joint
-    text = pk.make_linuxcnc_configuration(pk.load("linear_delta"))["linear_delta.ini"]
+    text = make_configuration(load_shipped("linear_delta"))["linear_delta.ini"]
     assert "does not say it" not in text
 
 
-@pytest.mark.parametrize("name", REPRESENTATIVES)
-def test_the_c_is_under_the_gpl_and_names_itself(name):
-    files = pk.make_linuxcnc_configuration(pk.load(name))
+@configured
+def test_the_c_is_under_the_gpl_and_names_itself(m):
+    files = make_configuration(m)
     sources = [text for file, text in files.items() if file.endswith((".c", ".h"))]
     assert len(sources) >= 2
     for text in sources:
         assert "GNU General Public" in text.split("*/")[0]
         assert not re.search(r"\b(inf|nan)\b", text)
         assert text.count("{") == text.count("}")
-    assert 'MODULE_LICENSE("GPL")' in files[f"{name}_kins.c"]
-    assert f'#define MODULE "{name}_kins"' in files[f"{name}_kins.c"]
+    assert 'MODULE_LICENSE("GPL")' in files[f"{m.name}_kins.c"]
+    assert f'#define MODULE "{m.name}_kins"' in files[f"{m.name}_kins.c"]
 
 
 def test_a_module_of_another_making_is_not_loaded(modules):
-    m = pk.load("tricept")
+    m = load_shipped("tricept")
     mark = re.search('#define MADE "(.*)"', write_module(m))[1]
-    assert f"KINEMATICS made={mark}\n" in pk.make_linuxcnc_configuration(m)["tricept.hal"]
+    assert f"KINEMATICS made={mark}\n" in make_configuration(m)["tricept.hal"]
     other = pk.load("tricept", parameters={"R": "351 mm"})
-    assert f"made={mark}" not in pk.make_linuxcnc_configuration(other)["tricept.hal"]
+    assert f"made={mark}" not in write_hal(other)
     library = modules(m).library
     given = ctypes.POINTER(ctypes.c_char_p).in_dll(library, "stub_string_made")
     codes = []
@@ -545,8 +548,8 @@ def test_a_module_of_another_making_is_not_loaded(modules):
 
 
 def test_the_command_writes_the_files(tmp_path, capsys):
-    assert main(["linuxcnc", "tricept", "-o", str(tmp_path / "out")]) == 0
-    files = pk.make_linuxcnc_configuration(pk.load("tricept"))
+    assert main(["linuxcnc", "linear_delta", "-o", str(tmp_path / "out")]) == 0
+    files = make_configuration(load_shipped("linear_delta"))
     assert sorted(path.name for path in (tmp_path / "out").iterdir()) == sorted(files)
     for name, text in files.items():
         assert (tmp_path / "out" / name).read_text(encoding="utf-8") == text
@@ -562,7 +565,7 @@ def test_the_commands_folder_json_and_sizes(tmp_path, monkeypatch, capsys):
     assert repr(410.0**2) in Path("hbg80_2d/hbg80_2d_model.h").read_text()
 
 
-@pytest.mark.parametrize("arguments", [["nothing"], ["hexapod", "--set", "tool=1"], ["hexapod", "-o", "/dev/null/x"]])
+@pytest.mark.parametrize("arguments", [["nothing"], ["hexapod", "--set", "tool=1"], ["hbg80_2d", "-o", "/dev/null/x"]])
 def test_what_the_command_refuses(arguments, capsys):
     assert main(["linuxcnc", *arguments]) == 2
     said = capsys.readouterr()

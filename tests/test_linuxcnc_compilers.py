@@ -8,12 +8,13 @@ import sys
 from pathlib import Path
 
 import pytest
+from shipped import load_shipped
 
-import parakin as pk
 from parakin.controllers.linuxcnc.model_header import name_model, write_model
 from parakin.controllers.linuxcnc.planner import write_planner
 
 sys.path.insert(0, str(Path(__file__).parent / "linuxcnc"))
+from simulation import make_configuration
 from stub import HEADERS, HERE, PLANNER_HEADERS
 
 INSTALLED = Path("/usr/include/linuxcnc")
@@ -50,7 +51,7 @@ def test_no_compiler_warns(compiler, name, tmp_path):
     if not shutil.which(compiler):
         pytest.skip(f"there is no {compiler}")
     headers = ["-isystem", str(INSTALLED)] if INSTALLED.exists() else write_stub_headers(tmp_path)
-    files = pk.make_linuxcnc_configuration(pk.load(name))
+    files = make_configuration(load_shipped(name))
     sources = [file for file in files if file.endswith((".c", ".h"))]
     assert len(sources) == 4
     for file in sources:
@@ -68,7 +69,7 @@ def compile_quietly(compiler, arguments, folder):
 
 @pytest.mark.skipif(not INSTALLED.exists(), reason="LinuxCNC's headers are not installed")
 def test_the_planner_takes_the_jerk_of_newer_headers(tmp_path):
-    machine, headers = pk.load("linear_delta"), write_newer_headers(tmp_path)
+    machine, headers = load_shipped("linear_delta"), write_newer_headers(tmp_path)
     (tmp_path / name_model(machine)).write_text(write_model(machine))
     (tmp_path / "planner.c").write_text(write_planner(machine))
     compile_quietly("gcc", ["-fsyntax-only", *headers, "planner.c"], tmp_path)

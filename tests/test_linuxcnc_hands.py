@@ -7,12 +7,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from shipped import load_shipped
 
 import parakin as pk
 from parakin.performance.singularities import compute_singularity_margins
 
 sys.path.insert(0, str(Path(__file__).parent / "linuxcnc"))
-from simulation import CYCLE, simulated, trial, why_not
+from simulation import CYCLE, simulated, why_not
 from stub import FIELDS, inward, outward, pose
 
 WHY_NOT = why_not()
@@ -48,12 +49,12 @@ def check_pose(machine, own, step):
     assert np.abs(tools[0] - tools[1]).max() < 1e-9, step
 
 
-def test_a_tilted_tools_length_counts_along_the_tool(tmp_path):
-    tilted, upright = "G1 X10 Y20 Z-1650 B20 C30 F3000", "G1 X40 Y20 Z-1650 B0 C30"
+def test_a_tilted_tools_length_counts_along_the_tool():
+    tilted, upright = "G1 X10 Y20 Z-1650 B20 C30 F9000", "G1 X40 Y20 Z-1650 B0 C30"
     steps = [[40.0, "G43.1 Z40"], [40.0, tilted], [-30.0, "G43.1 Z-30"], [-30.0, "G1 X30"], [-30.0, upright]]
     steps += [[70.0, "G43.1 Z70"], [70.0, "G91 G1 X5"], [70.0, "G90 G1 X45 B20"], [0.0, "G49"]]
     steps.insert(2, [40.0, "jog", 0, 20, 1])
-    machine = trial("tricept", tmp_path)
+    machine = load_shipped("tricept")
     words = [["mdi", *step] if step[0] != "jog" else step for step in (step[1:] for step in steps)]
     seen, _ = operate(machine, words)
     assert not any(step["said"] for step in seen)
@@ -66,14 +67,14 @@ def test_a_tilted_tools_length_counts_along_the_tool(tmp_path):
         assert seen[number]["joints"] == pytest.approx(seen[number - 1]["joints"], abs=1e-9)
 
 
-def test_a_program_that_takes_a_place_from_before_the_length_changed_is_refused(tmp_path):
+def test_a_program_that_takes_a_place_from_before_the_length_changed_is_refused():
     first = "G21 G90\nG1 X0 Y0 Z-1650 B20 C30 F3000\nG43.1 Z50\n"
     programs = {"stale.ngc": f"{first}G1 X10\nM2\n", "named.ngc": f"{first}G1 X10 Y10 Z-1640\nG1 X0\nM2\n"}
     programs |= {"waits.ngc": f"{first}M66 E0 L0\nG1 X10\nM2\n", "relative.ngc": f"{first}G91 G1 X1 Y1 Z1\nG90\nM2\n"}
     steps = [step for name in programs for step in (["program", name], ["mdi", "G49"])]
     programs["after.ngc"] = "G21 G91\nG1 X1 Y2 Z3 F3000\nG90\nM2\n"
     steps += [["mdi", "G1 B20 C30 F3000"], ["mdi", "G43.1 Z50"], ["program", "after.ngc"]]
-    (*seen, told, moved), _ = operate(trial("tricept", tmp_path), steps, programs)
+    (*seen, told, moved), _ = operate(load_shipped("tricept"), steps, programs)
     said = [" ".join(step["said"]) for step in seen[::2]]
     assert "line 4 goes on from where the tool was" in said[0] and not said[1] and not said[2]
     assert "line 4 goes on from where the tool was" in said[3]
@@ -82,10 +83,10 @@ def test_a_program_that_takes_a_place_from_before_the_length_changed_is_refused(
     assert np.subtract(moved["position"], told["position"])[:3] == pytest.approx([1.0, 2.0, 3.0], abs=1e-6)
 
 
-def test_joints_are_moved_one_by_one_and_the_pose_is_right_after(tmp_path):
-    machine = trial("tricept", tmp_path)
+def test_joints_are_moved_one_by_one_and_the_pose_is_right_after():
+    machine = load_shipped("tricept")
     steps = [["mdi", "G1 B20 C30 F3000"], ["mdi", "M429"], ["mdi", "G53 G1 X1215 F600"], ["jog", 1, 20, 1]]
-    steps += [["jog_joint", 2, 5, 1], ["mdi", "M430"], ["mdi", "M428"], ["mdi", "G1 X0"]]
+    steps += [["jog_joint", 2, 5, 1], ["mdi", "M430"], ["mdi", "M428"], ["mdi", "G1 X0 F6000"]]
     seen, joints = operate(machine, steps)
     columns = [FIELDS.index(axis) for axis in machine.axes]
     for step in seen[1:5]:  # every axis shows the joint of its number
@@ -106,24 +107,15 @@ def test_a_hexaglide_stops_before_a_singularity_and_is_driven_out_joint_by_joint
     turn = np.array(machine.home)
     turn[4] = np.radians(3.3)  # beyond a singularity
     assert compute_singularity_margins(machine, turn)[0] * home < 0.0
-    steps = [
-        ["mdi", "G1 B2.5 F600"],
-        ["jog", 4, 3, 3],
-        ["jog", 4, -3, 1],
-        ["mdi", "G1 B10 F60"],
-        ["mdi", "G1 A0 B0 C12"],
-    ]
-    steps += [
-        ["jog", 5, 3, 3],
-        ["jog", 5, -3, 1],
-        ["mdi", "G1 C0"],
-        ["jog_joint", 0, -40, 4],
-        ["jog_joint", 0, 40, 0.5],
-    ]
-    steps += [["mdi", "M429"], ["jog", 0, -100, 2], ["jog", 0, 40, 1], ["mdi", "M428"], ["mdi", "G1 B0"]]
+    steps = [["mdi", "G1 B2.5 F600"], ["jog", 4, 3, 1.0], ["jog", 4, -3, 0.5], ["mdi", "G1 B10"]]
+    steps += [["mdi", "G1 A0 B0 C12"], ["jog", 5, 3, 1.0], ["jog", 5, -3, 0.5], ["mdi", "G1 C0"]]
+    steps += [["jog_joint", 0, -80, 1.5], ["jog_joint", 0, 40, 0.5], ["mdi", "M429"], ["jog", 0, -100, 1.0]]
+    steps += [["jog", 0, 40, 1.0], ["mdi", "M428"], ["mdi", "G1 B0"]]
     seen, joints = operate(machine, steps)
     b, c = ([step["position"][column] for step in seen] for column in (4, 5))
-    assert 2.5 < b[1] < 3.2 and b[2] < b[1] - 1.0 and b[3] == b[2] and 12.0 < c[5] < 13.6 and c[6] < c[5] - 1.0
+    assert (
+        2.5 < b[1] < 3.2 and b[2] < b[1] - 1.0 and abs(b[3] - b[2]) < 1e-9 and 12.0 < c[5] < 13.6 and c[6] < c[5] - 1.0
+    )
     assert "kinematicsInverse" in seen[3]["said"][0]
     for number in (1, 5, 8, 11):
         assert any("jog-stop" in word for word in seen[number]["said"]), seen[number]

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from shipped import REPRESENTATIVES
+from shipped import CONFIGURED, load_shipped
 
 import parakin as pk
 from parakin.cli import main
@@ -27,9 +27,9 @@ sys.path.insert(0, str(Path(__file__).parent / "linuxcnc"))
 from cards import check_wiring, exports_of, merge, programs, write_mock
 from ini_file import read_ini
 from parport_machine import driven_by_parport
-from simulation import ALONE, AS_NOBODY, FIELDS, MODULES, simulated, trial, why_not
+from simulation import ALONE, AS_NOBODY, FIELDS, simulated, why_not
 
-NAMES = REPRESENTATIVES
+NAMES = CONFIGURED
 EACH = [(name, card) for name in NAMES for card in CARDS]
 PROGRAMS = ("loadusr", "source")
 LATE = 1.0  # mm or degrees by which a switch may be found late: on a busy computer steps come late
@@ -39,14 +39,9 @@ real = pytest.mark.skipif(bool(WHY_NOT), reason=WHY_NOT)
 
 
 @cache
-def machine_of(name):
-    return pk.load(name)
-
-
-@cache
 def configuration(name, card):
     """The files that a card changes; making all of them takes long."""
-    machine = machine_of(name)
+    machine = load_shipped(name)
     equipment = equip_machine(machine, card)
     texts = {f"{name}.ini": write_ini(machine, equipment), f"{name}.hal": write_hal(machine, equipment)}
     return texts | {f"{name}.md": write_page(machine, equipment)} | dict(equipment.layout.files)
@@ -61,7 +56,7 @@ def test_pins_are_the_drivers(name, card):
     files = configuration(name, card)
     exports, hal = exports_of(files, name), files[f"{name}.hal"]
     joined = check_wiring(hal, exports)
-    joints = len(machine_of(name).joints)
+    joints = len(load_shipped(name).joints)
     if card.startswith("mesa"):
         assert sum(pin.endswith(".velocity-cmd") for pin in joined) == joints
     if card == "parport":
@@ -168,26 +163,23 @@ def replace_drivers(machine, hal):
 
 def load_hal(machine, card, folder):
     """Load a card's HAL file with the real halcmd; return the process."""
-    files = pk.make_linuxcnc_configuration(machine, card)
+    files = configuration(machine.name, card)
     exports = programs() if card == "parport" else merge(exports_of(files, machine.name), programs())
     exports.pins |= {f"ENCODER-{joint}": ("float", "OUT") for joint in machine.joints}
     (folder / "trial_card.c").write_text(write_mock("trial_card", exports), encoding="utf-8")
     (folder / "card.ini").write_text(files[f"{machine.name}.ini"], encoding="utf-8")
     (folder / "card.hal").write_text(replace_drivers(machine, files[f"{machine.name}.hal"]), encoding="utf-8")
     load = f"{REALTIME} start && halcmd -i card.ini -f card.hal && halcmd show thread"
-    try:
-        subprocess.run(["halcompile", "--install", "trial_card.c"], cwd=folder, check=True, capture_output=True)
-        command = [*ALONE, *AS_NOBODY, f"HOME={folder}", "sh", "-c", f"{load}; code=$?; halrun -U; exit $code"]
-        return subprocess.run(command, cwd=folder, capture_output=True, text=True, timeout=60)
-    finally:
-        (MODULES / "trial_card.so").unlink(missing_ok=True)
+    subprocess.run(["halcompile", "--compile", "trial_card.c"], cwd=folder, check=True, capture_output=True)
+    command = [*ALONE, *AS_NOBODY, f"HOME={folder}", "sh", "-c", f"{load}; code=$?; halrun -U; exit $code"]
+    return subprocess.run(command, cwd=folder, capture_output=True, text=True, timeout=60)
 
 
 @real
 @pytest.mark.parametrize("name", ["tricept", "hexapod"])
-def test_hal_takes_every_card(name, tmp_path):
+def test_hal_takes_every_card(name):
     """The real halcmd joins all pins: of the real motion controller, loops and ports, and of the driver's documents."""
-    machine = trial(name, tmp_path)
+    machine = load_shipped(name)
     with simulated(machine) as simulation:
         for card in CARDS:
             done = load_hal(machine, card, simulation.folder)
@@ -221,12 +213,12 @@ def follow(machine, rows, pose):
 
 @real
 @pytest.mark.parametrize("name", ["linear_delta", "tricept", "hexapod"])
-def test_homing_keeps_off_singularities(name, tmp_path):
+def test_homing_keeps_off_singularities(name):
     """LinuxCNC homes the template: the joints go home on home's side of all singularities, and it knows the pose.
 
     Then the emergency stop's contact opens: the machine is off at once, and can be switched on again.
     """
-    machine = trial(name, tmp_path)
+    machine = load_shipped(name)
     joints, pose = choose_start(machine)
     plan, home = find_homing(machine), machine.inverse(find_home_pose(machine))
     turning = np.array(machine.joint_units) == "rad"

@@ -2,29 +2,29 @@
 
 from __future__ import annotations
 
-import os
 import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
+from shipped import EVERYTHING, load_shipped
 
 from parakin.controllers.linuxcnc.hand_box import find_hand_box
 
 sys.path.insert(0, str(Path(__file__).parent / "linuxcnc"))
 from session import run_session
-from simulation import CYCLE, simulated, trial, why_not
+from simulation import CYCLE, simulated, why_not
 from stub import FIELDS, inward, outward, pose, world
 
-STEPS = int(os.environ.get("PARAKIN_OPERATOR_STEPS", "10"))  # of a random session
+STEPS = 100 if EVERYTHING else 8  # of a random session
 
 WHY_NOT = why_not()
 pytestmark = pytest.mark.skipif(bool(WHY_NOT), reason=WHY_NOT)
 
 
-def operate(name, folder, steps):
+def operate(name, steps):
     """Do steps on a shipped machine; return it, what was seen, and the joints (n, joints) of every cycle once homed."""
-    machine = trial(name, folder)
+    machine = load_shipped(name)
     with simulated(machine) as simulation:
         seen, rows = simulation.operate(steps)
     joints = rows[:, 2 + len(machine.axes) :]
@@ -46,10 +46,10 @@ def check_joints(machine, joints, seen):
         assert machine.check(given, at)[0] == 0, step
 
 
-def test_a_mirror_pose_is_refused_and_jogs_stop_softly(tmp_path):
+def test_a_mirror_pose_is_refused_and_jogs_stop_softly():
     steps = [["mdi", "G1 C5 F3000"], ["mdi", "G1 C-20 F3000"], ["mdi", "G1 C35 F3000"]]
     steps += [["jog", 5, -20, 4], ["jog", 5, 20, 0.5], ["jog", 0, 100, 4], ["jog", 0, -50, 1]]
-    machine, seen, joints = operate("lambda6", tmp_path, steps)
+    machine, seen, joints = operate("lambda6", steps)
     assert all(step["on"] for step in seen)
     check_joints(machine, joints, seen)
     c, x = ([step["position"][FIELDS.index(axis)] for step in seen] for axis in "CX")
@@ -64,9 +64,9 @@ def test_a_mirror_pose_is_refused_and_jogs_stop_softly(tmp_path):
     assert any("jog-stop" in word for word in seen[3]["said"])
 
 
-def test_a_wrist_is_jogged_from_home_without_a_swing(tmp_path):
+def test_a_wrist_is_jogged_from_home_without_a_swing():
     steps = [["jog", 1, 100, 2], ["jog", 1, -100, 2], ["jog", 4, 20, 2], ["jog", 4, -20, 2], ["jog", 5, 20, 1]]
-    machine, seen, joints = operate("tricept", tmp_path, steps)
+    machine, seen, joints = operate("tricept", steps)
     assert all(step["on"] for step in seen)
     check_joints(machine, joints, seen)
     speed = outward(machine, np.array([drive.speed for drive in machine.drives]))
@@ -74,8 +74,8 @@ def test_a_wrist_is_jogged_from_home_without_a_swing(tmp_path):
     assert seen[0]["position"][1] > 20.0
 
 
-@pytest.mark.parametrize("name", ["tricept", "orthoglide5_table"])
-def test_a_random_session(name, tmp_path):
-    seen, _, wrong = run_session(trial(name, tmp_path), STEPS, 11)
+@pytest.mark.parametrize("name", ["tricept", "orthoglide5_table", "hexapod"] if EVERYTHING else ["tricept"])
+def test_a_random_session(name):
+    seen, _, wrong = run_session(load_shipped(name), STEPS, 11)
     assert len(seen) == STEPS
     assert not wrong

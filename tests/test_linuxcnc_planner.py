@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from scipy.optimize import minimize_scalar
+from shipped import load_shipped
 
 import parakin as pk
 
@@ -26,7 +27,7 @@ def planners(tmp_path_factory):
 
     def plan(name):
         if name not in made:
-            made[name] = Planner(pk.load(name), tmp_path_factory.mktemp(name))
+            made[name] = Planner(load_shipped(name), tmp_path_factory.mktemp(name))
         return made[name]
 
     return plan

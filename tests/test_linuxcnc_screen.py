@@ -10,19 +10,18 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from shipped import REPRESENTATIVES
+from shipped import CONFIGURED, load_shipped
 
-import parakin as pk
 from parakin.controllers.linuxcnc.home_pose import find_home_pose
 from parakin.controllers.linuxcnc.model_header import list_limit_names
 from parakin.controllers.linuxcnc.screen import name_screen
 from parakin.export.machine.scene import build_scene
 
 sys.path.insert(0, str(Path(__file__).parent / "linuxcnc"))
-from simulation import simulated, trial, why_not
+from simulation import make_configuration, simulated, why_not
 from stub import inward, outward, world
 
-everyone = pytest.mark.parametrize("name", REPRESENTATIVES)
+configured = pytest.mark.parametrize("name", CONFIGURED)
 LETTERS = "XYZABCUVW"
 SCREENS = ("axis", "gmoccapy")
 
@@ -34,7 +33,7 @@ def screens():
 
     def screen_of(machine):
         if machine.name not in known:
-            text = pk.make_linuxcnc_configuration(machine)[f"{name_screen(machine)}.py"]
+            text = make_configuration(machine)[f"{name_screen(machine)}.py"]
             screen = types.ModuleType(machine.name)
             with pytest.MonkeyPatch.context() as patch:
                 patch.setitem(sys.modules, "hal", types.ModuleType("hal"))
@@ -64,9 +63,9 @@ def place_items(screen, machine, pose, joints, tool=0.0):
     return items, points[ends[-1] :]
 
 
-@everyone
+@configured
 def test_points_are_where_the_machine_places_them(name, screens):
-    machine = pk.load(name)
+    machine = load_shipped(name)
     screen = screens(machine)
     for pose, joints in zip(*draw_poses(machine), strict=True):
         items, frame = place_items(screen, machine, pose, joints)
@@ -81,7 +80,7 @@ def test_points_are_where_the_machine_places_them(name, screens):
 
 @pytest.mark.parametrize("name", ["tricept", "hexapod"])
 def test_struts_are_as_long_as_their_joints_say(name, screens):
-    machine = pk.load(name)
+    machine = load_shipped(name)
     for pose, joints in zip(*draw_poses(machine), strict=True):
         items, _ = place_items(screens(machine), machine, pose, joints)
         lengths = [np.linalg.norm(points[1] - points[0]) for kind, points in items if kind == "telescope"]
@@ -90,9 +89,9 @@ def test_struts_are_as_long_as_their_joints_say(name, screens):
         )
 
 
-@pytest.mark.parametrize("name", ["orthoglide", "orthoglide5_head", "orthoglide5_table", "linear_delta", "lambda6"])
+@pytest.mark.parametrize("name", ["orthoglide5_head", "orthoglide5_table", "linear_delta", "lambda6"])
 def test_rods_keep_their_length_and_the_tool_its_own(name, screens):
-    machine = pk.load(name)
+    machine = load_shipped(name)
     seen = []
     for pose, joints in zip(*draw_poses(machine), strict=True):
         items, _ = place_items(screens(machine), machine, pose, joints)
@@ -105,7 +104,7 @@ def test_rods_keep_their_length_and_the_tool_its_own(name, screens):
 @pytest.mark.parametrize("name", ["tricept", "orthoglide5_table", "hexapod"])
 def test_a_longer_tool_leaves_the_machine_where_its_joints_are(name, screens):
     """LinuxCNC's tip of a tool longer by 50 mm is 50 mm along Z above that tip's place."""
-    machine = pk.load(name)
+    machine = load_shipped(name)
     poses, all_joints = draw_poses(machine, 10)
     for pose, joints in zip(poses, all_joints, strict=True):
         row = world(machine, pose[None])[0]
@@ -127,9 +126,9 @@ def test_a_longer_tool_leaves_the_machine_where_its_joints_are(name, screens):
             assert np.abs(one - two).max() < 1e-8
 
 
-@everyone
+@configured
 def test_the_hull_is_allowed_inside_and_not_beyond(name, screens):
-    machine = pk.load(name)
+    machine = load_shipped(name)
     screen, home = screens(machine), find_home_pose(machine)
     columns = [machine.axes.index(axis) for axis in "XYZ" if axis in machine.axes]
     letters = [i for i, axis in enumerate("XYZ") if axis in machine.axes]
@@ -148,24 +147,24 @@ def test_the_hull_is_allowed_inside_and_not_beyond(name, screens):
     assert {corner for line in screen.HULL_LINES for corner in line} <= set(range(len(screen.HULL)))
 
 
-@everyone
+@configured
 def test_every_limit_has_its_words(name, screens):
-    machine = pk.load(name)
+    machine = load_shipped(name)
     limits = screens(machine).LIMITS
     assert len(limits) == len(list_limit_names(machine))
     assert len(set(limits)) == len(limits)
 
 
 def test_limits_in_words(screens):
-    assert "leg d1: at most 1,520.0 mm" in screens(pk.load("tricept")).LIMITS
-    assert "foot joint of strut0: at most 35.00°" in screens(pk.load("hexapod")).LIMITS
-    assert "leg tower_a: end of its reach" in screens(pk.load("linear_delta")).LIMITS
+    assert "leg d1: at most 1,520.0 mm" in screens(load_shipped("tricept")).LIMITS
+    assert "foot joint of strut0: at most 35.00°" in screens(load_shipped("hexapod")).LIMITS
+    assert "leg tower_a: end of its reach" in screens(load_shipped("linear_delta")).LIMITS
 
 
-@everyone
+@configured
 def test_all_files_of_the_screen_are_python_and_hal(name):
-    machine = pk.load(name)
-    files = pk.make_linuxcnc_configuration(machine)
+    machine = load_shipped(name)
+    files = make_configuration(machine)
     compile(files[f"{name}_axis.py"], "axis", "exec")
     nets = [line for line in files[f"{name}_screen.hal"].splitlines() if line.startswith("net ")]
     pins = {line.split()[-1] for line in nets}
@@ -178,8 +177,8 @@ def test_all_files_of_the_screen_are_python_and_hal(name):
 
 
 def test_gmoccapy_has_no_settings_of_axis():
-    machine = pk.load("orthoglide")
-    axis, other = (pk.make_linuxcnc_configuration(machine, None, screen)["orthoglide.ini"] for screen in SCREENS)
+    machine = load_shipped("orthoglide")
+    axis, other = (make_configuration(machine, None, screen)["orthoglide.ini"] for screen in SCREENS)
     assert "\nDISPLAY = axis\n" in axis and "\nUSER_COMMAND_FILE = orthoglide_axis.py\n" in axis
     kept = [
         line for line in axis.splitlines() if not line.startswith(("DISPLAY = ", "USER_COMMAND_FILE", "# as parakin"))
@@ -194,10 +193,10 @@ def why_no_screen():
     return f"there is no {missing[0]}" if missing else why_not()
 
 
-def test_it_is_seen_under_linuxcnc(tmp_path):
+def test_it_is_seen_under_linuxcnc():
     if why_no_screen():
         pytest.skip(why_no_screen())
-    machine = trial("tricept", tmp_path)
+    machine = load_shipped("tricept")
     with simulated(machine) as simulation:
         seen = simulation.show(
             [
@@ -234,9 +233,9 @@ def test_without_a_display_the_machine_runs(tmp_path):
     """The other runs of LinuxCNC have no display; here the window's program says so and waits."""
     if not Path("/usr/bin/python3").exists():
         pytest.skip("there is no Python of the system's own")
-    machine = pk.load("orthoglide")
+    machine = load_shipped("orthoglide")
     file = tmp_path / "screen.py"
-    file.write_text(pk.make_linuxcnc_configuration(machine)["orthoglide_screen.py"], encoding="utf-8")
+    file.write_text(make_configuration(machine)["orthoglide_screen.py"], encoding="utf-8")
     (tmp_path / "hal.py").write_text(
         "HAL_FLOAT = HAL_BIT = HAL_U32 = HAL_IN = 0\n"
         "class component:\n"

@@ -12,9 +12,8 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
-from simulation import HERE, Simulation, installed
+from simulation import HERE, Simulation, make_configuration, write_folder
 
-import parakin as pk
 from parakin.controllers.linuxcnc.hardware import equip_machine
 
 BASE_PERIOD = 100_000  # ns: a busy computer makes no faster pulses
@@ -86,8 +85,8 @@ def adapt_ini(ini):
 def driven_by_parport(machine, start):
     """A :class:`Simulation` of the template, with joints (joints,) that stand at ``start``, mm and rad."""
     with tempfile.TemporaryDirectory(dir="/var/tmp") as name:
-        folder, files = Path(name), pk.make_linuxcnc_configuration(machine, "parport")
+        folder, files = Path(name), dict(make_configuration(machine, "parport"))
         files[f"{machine.name}.hal"] = adapt_hal(machine, files[f"{machine.name}.hal"], start)
         files[f"{machine.name}.ini"] = adapt_ini(files[f"{machine.name}.ini"])
-        with installed(folder, files | {"sampler.hal": write_sampler(machine)}, HERE / "operator_ui.py"):
-            yield Simulation(machine, folder)
+        write_folder(folder, files | {"sampler.hal": write_sampler(machine)}, HERE / "operator_ui.py")
+        yield Simulation(machine, folder)

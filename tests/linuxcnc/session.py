@@ -6,13 +6,12 @@
 from __future__ import annotations
 
 import sys
-import tempfile
 from collections import Counter
 from pathlib import Path
 from time import perf_counter
 
 import numpy as np
-from simulation import CYCLE, simulated, trial
+from simulation import CYCLE, simulated
 from stub import FIELDS, inward, outward, pose, world
 
 import parakin as pk
@@ -154,9 +153,8 @@ def check_joints(machine, joints, steps):
 
 def main():
     name, count, seed, begin = sys.argv[1], int(sys.argv[2]), int(sys.argv[3]), perf_counter()
-    with tempfile.TemporaryDirectory() as folder:
-        machine = pk.load(name) if name.endswith(".yaml") else trial(name, folder)
-        seen, joints, wrong = run_session(machine, count, seed)
+    machine = pk.load(name)
+    seen, joints, wrong = run_session(machine, count, seed)
     said = Counter(" ".join(step["said"])[:90] for step in seen)
     took = f"{perf_counter() - begin:.0f} s"
     print(f"{Path(name).stem}, seed {seed}: {len(seen)} steps, {len(joints)} cycles, {len(wrong)} wrong, {took}")

@@ -10,6 +10,7 @@ import subprocess
 import tempfile
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -18,13 +19,22 @@ from running import run_linuxcnc
 import parakin as pk
 
 HERE = Path(__file__).parent
-MODULES = Path("/usr/lib/linuxcnc/modules")
 NOBODY = 65534
 CYCLE = 1e-3  # s
 # LinuxCNC refuses root, wants fixed keys of shared memory and a lock in /tmp for itself, and ends processes by name.
-# Ahead of others, lest on a busy computer a program runs out of motions that are planned.
+# Ahead of others, lest on a busy computer a program runs out of motions that are planned. The modules of the folder
+# stand beside LinuxCNC's own for this run alone.
 ALONE = ["nice", "-n", "-15", "unshare", "--ipc", "--pid", "--mount", "--net", "--fork", "--mount-proc", "--kill-child"]
-ALONE += ["sh", "-c", 'mount -t tmpfs -o mode=1777 none /tmp && exec "$@"', "sh"]
+ALONE += [
+    "sh",
+    "-c",
+    """\
+mount -t tmpfs -o mode=1777 none /tmp && cp -r /usr/lib/linuxcnc/modules /tmp &&
+find . -maxdepth 1 -name '*.so' -exec cp {} /tmp/modules ';' &&
+mount --bind /tmp/modules /usr/lib/linuxcnc/modules && exec "$@"
+""",
+    "sh",
+]
 AS_NOBODY = ["setpriv", f"--reuid={NOBODY}", f"--regid={NOBODY}", "--clear-groups", "env", "-i", "PATH=/usr/bin:/bin"]
 FIELDS = "XYZABCUVW"
 
@@ -35,18 +45,10 @@ def why_not():
         if not shutil.which(tool):
             return f"there is no {tool} (Debian's packages: linuxcnc-uspace, linuxcnc-uspace-dev)"
     if os.geteuid():
-        return "only root can install a kinematics module"
+        return "only root can keep LinuxCNC's runs apart"
     if subprocess.run([*ALONE, "true"], capture_output=True).returncode:
         return "there are no namespaces here, which keep LinuxCNC's runs apart"
     return ""
-
-
-def trial(name, folder):
-    """A shipped machine under another name, so that no module of the user's is replaced."""
-    text = (Path(pk.__file__).parent / "machines" / f"{name}.yaml").read_text(encoding="utf-8")
-    path = Path(folder) / "trial.yaml"
-    path.write_text(text.replace(f"name: {name}\n", f"name: trial_{name}\n"), encoding="utf-8")
-    return pk.load(path)
 
 
 @dataclass
@@ -134,7 +136,7 @@ class Simulation:
         task = {"machine": self.machine.name, "joints": len(self.machine.joints), "steps": steps}
         task |= {"ini": "screen.ini", "screen": screen}
         (self.folder / "task.json").write_text(json.dumps(task))
-        ini = pk.make_linuxcnc_configuration(self.machine, None, screen)[f"{self.machine.name}.ini"]
+        ini = make_configuration(self.machine, None, screen)[f"{self.machine.name}.ini"]
         ini = ini.replace(f"OPEN_FILE = ./{self.machine.name}.ngc", f"OPEN_FILE = ./{opened}")
         (self.folder / "screen.ini").write_text(ini, encoding="utf-8")
         for file in ("operator_ui.py", "screen_ui.py", "hang_dump.py"):
@@ -169,42 +171,55 @@ def say_why(output):
     return "hung"
 
 
+@cache
+def make_configuration(machine, hardware=None, screen="axis"):
+    """The files of a machine's configuration, made once: {file: text}."""
+    return pk.make_linuxcnc_configuration(machine, hardware, screen)
+
+
+@cache
+def compile_modules(sources):
+    """Compile the C among files ((file, text), ...) by halcompile, once: ((file, bytes), ...)."""
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        for file, text in sources:
+            (folder / file).write_text(text, encoding="utf-8")
+        modules = [Path(file) for file, _ in sources if file.endswith(".c")]
+        for module in modules:
+            command = ["halcompile", "--compile", str(module)]
+            subprocess.run(command, cwd=folder, check=True, capture_output=True)
+        return tuple((f"{module.stem}.so", (folder / f"{module.stem}.so").read_bytes()) for module in modules)
+
+
 @contextmanager
 def simulated(machine, reserve=None, stock=False):
-    """A :class:`Simulation`; kinematics and planner are built and installed, and removed at the end.
+    """A :class:`Simulation`, with kinematics and planner.
 
     reserve : by which the drives' limits are above the description's; None: drives without limits
     stock : with LinuxCNC's own planner, which knows the axes' limits only
     """
     with tempfile.TemporaryDirectory(dir="/var/tmp") as name:  # pytest's own folders are closed to others
-        folder, files = Path(name), pk.make_linuxcnc_configuration(machine)
+        folder, files = Path(name), dict(make_configuration(machine))
         if reserve is not None:
             files[f"{machine.name}.hal"] = limit_drives(machine, files[f"{machine.name}.hal"], 1.0 + reserve)
         if stock:
             use_stock_planner(machine, files)
         ini = files[f"{machine.name}.ini"].replace("DISPLAY = axis", "DISPLAY = ./ui.py")
         files[f"{machine.name}.ini"] = ini.replace("[KINS]", "HALFILE = sampler.hal\n\n[KINS]")
-        with installed(folder, files | {"sampler.hal": sampler(machine)}, HERE / "ui.py"):
-            yield Simulation(machine, folder)
+        write_folder(folder, files | {"sampler.hal": sampler(machine)}, HERE / "ui.py")
+        yield Simulation(machine, folder)
 
 
-@contextmanager
-def installed(folder, files, ui):
-    """Files that LinuxCNC reads as nobody, and its user interface, in a folder; C modules are installed meanwhile."""
+def write_folder(folder, files, ui):
+    """Write files that LinuxCNC reads as nobody, its user interface, and the modules that halcompile makes of the C."""
     for file, text in files.items():
         (folder / file).write_text(text, encoding="utf-8")
+    for file, code in compile_modules(tuple((file, files[file]) for file in files if file.endswith((".c", ".h")))):
+        (folder / file).write_bytes(code)
     shutil.copy(ui, folder / "ui.py")
     shutil.copy(HERE / "hang_dump.py", folder)
-    modules = [Path(file).stem for file in files if file.endswith(".c")]
-    try:
-        for module in modules:
-            subprocess.run(["halcompile", "--install", f"{module}.c"], cwd=folder, check=True, capture_output=True)
-        for path in (folder, *folder.iterdir()):
-            os.chown(path, NOBODY, NOBODY)
-        yield
-    finally:
-        for module in modules:
-            (MODULES / f"{module}.so").unlink(missing_ok=True)
+    for path in (folder, *folder.iterdir()):
+        os.chown(path, NOBODY, NOBODY)
 
 
 # What LinuxCNC's own planner gets of the drives' least rates, or it would crawl: it begins and ends every motion that

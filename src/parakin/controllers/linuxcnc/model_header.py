@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from functools import lru_cache
 from importlib.resources import files
 
 import numpy as np
@@ -91,6 +92,7 @@ def name_model(machine: Machine) -> str:
     return f"{machine.name}_model.h"
 
 
+@lru_cache(maxsize=32)
 def write_model(machine: Machine) -> str:
     """Write the header: numbers, mathematics, and the questions that all modules ask, without any state."""
     core = files(__package__).joinpath("core.c").read_text(encoding="utf-8")

@@ -16,7 +16,7 @@ from session import run_session
 from simulation import CYCLE, simulated, why_not
 from stub import FIELDS, inward, outward, pose, world
 
-STEPS = 100 if EVERYTHING else 8  # of a random session
+STEPS = 100 if EVERYTHING else 5  # of a random session
 
 WHY_NOT = why_not()
 pytestmark = pytest.mark.skipif(bool(WHY_NOT), reason=WHY_NOT)
@@ -48,7 +48,7 @@ def check_joints(machine, joints, seen):
 
 def test_a_mirror_pose_is_refused_and_jogs_stop_softly():
     steps = [["mdi", "G1 C5 F3000"], ["mdi", "G1 C-20 F3000"], ["mdi", "G1 C35 F3000"]]
-    steps += [["jog", 5, -20, 4], ["jog", 5, 20, 0.5], ["jog", 0, 100, 4], ["jog", 0, -50, 1]]
+    steps += [["jog", 5, -20, 1.5], ["jog", 5, 20, 0.5], ["jog", 0, 100, 2.0], ["jog", 0, -50, 0.5]]
     machine, seen, joints = operate("lambda6", steps)
     assert all(step["on"] for step in seen)
     check_joints(machine, joints, seen)
@@ -65,7 +65,13 @@ def test_a_mirror_pose_is_refused_and_jogs_stop_softly():
 
 
 def test_a_wrist_is_jogged_from_home_without_a_swing():
-    steps = [["jog", 1, 100, 2], ["jog", 1, -100, 2], ["jog", 4, 20, 2], ["jog", 4, -20, 2], ["jog", 5, 20, 1]]
+    steps = [
+        ["jog", 1, 100, 1.0],
+        ["jog", 1, -100, 1.0],
+        ["jog", 4, 20, 1.0],
+        ["jog", 4, -20, 1.0],
+        ["jog", 5, 20, 0.5],
+    ]
     machine, seen, joints = operate("tricept", steps)
     assert all(step["on"] for step in seen)
     check_joints(machine, joints, seen)

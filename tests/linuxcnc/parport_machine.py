@@ -17,7 +17,7 @@ from simulation import HERE, Simulation, make_configuration, write_folder
 from parakin.controllers.linuxcnc.hardware import equip_machine
 
 BASE_PERIOD = 100_000  # ns: a busy computer makes no faster pulses
-FASTER = 4.0  # than the template homes, for there is no machine to be careful with
+FASTER = 8.0  # than the template homes, for there is no machine to be careful with
 LOOPBACKS = """\
 net tool-prepare iocontrol.0.tool-prepare => iocontrol.0.tool-prepared
 net tool-change iocontrol.0.tool-change => iocontrol.0.tool-changed

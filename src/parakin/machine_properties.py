@@ -143,9 +143,17 @@ class MachineProperties:
         named = (Parameter(name, units[name], value, SIZES) for name, value in sizes if name in units)
         return (*named, *list_parameters(self.spec))
 
-    def trace_equations(self, values: Mapping[str, Scalar]) -> Equations:
-        """Trace the machine's equations with scalars of any kind in place of some of its :attr:`parameters`."""
-        return Equations(self._replace_numbers(values))
+    def trace_equations(self, values: Mapping[str, Scalar], shifts: Mapping[str, Scalar] | None = None) -> Equations:
+        """Trace the machine's equations with scalars of any kind in place of some of its :attr:`parameters`.
+
+        shifts : what is added to parameters, once the others follow from ``values``
+        """
+        if not shifts:
+            return Equations(self._replace_numbers(values))
+        named = {p.name: values.get(p.name, p.value) + shifts[p.name] for p in self.parameters if p.name in shifts}
+        spec = self._replace_numbers({**values, **{name: x for name, x in named.items() if name in self.spec.sizes}})
+        shifted = {p.name: p.value + shifts[p.name] for p in list_parameters(spec) if p.name in shifts}
+        return Equations(replace_parameters(spec, shifted))
 
     def _replace_numbers(self, values: Mapping[str, Scalar]) -> Spec:
         """Replace named sizes, and all that follows from them, then single numbers."""

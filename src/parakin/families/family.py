@@ -124,7 +124,8 @@ class Family:
         except ValueError:
             shapes = " and ".join(str(array.shape) for array in arrays)
             raise PoseError(f"sizes: shapes {shapes} do not fit") from None
-        return lead, [np.broadcast_to(array, (*lead, array.shape[-1])).reshape(-1, array.shape[-1]) for array in arrays]
+        wide = (np.broadcast_to(array, (*lead, array.shape[-1])) for array in arrays)
+        return lead, [array.reshape(int(np.prod(lead)), array.shape[-1]) for array in wide]
 
     def _read(self, values: RowsLike, names: tuple[str, ...], what: str) -> Array:
         rows, lead = self.machine.rows(values, names, what)
@@ -148,6 +149,23 @@ class Family:
         return len(self.machine.axes), len(self.machine.joints)
 
     # Answers.
+
+    def evaluate(
+        self,
+        name: str,
+        outputs: Callable[[list[Scalar], dict[str, Scalar]], list[Scalar]],
+        poses: RowsLike,
+        sizes: RowsLike,
+    ) -> Array:
+        """Evaluate functions of pose and sizes, (..., axes) and (..., k) -> (..., outputs).
+
+        name : by which their tape is kept
+        outputs : traces them from a pose and the sizes by their names
+        """
+        n = len(self.machine.axes)
+        lead, rows = self._rows([(poses, self.machine.axes, "poses")], sizes)
+        tape = self._keep((name,), n, lambda e, x: outputs(x, dict(zip(self.names, x[0].trace.sizes, strict=True))))
+        return self._evaluate(tape, rows, tape.outputs).reshape(*lead, tape.outputs)
 
     def at(self, sizes: RowsLike) -> Machine:
         """Make the machine of given sizes (k,).

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from fnmatch import fnmatchcase
 from math import pi
 from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
+from ..algebra import Scalar, absolute, add
 from ..arrays import Array
 from ..errors import PoseError, quote, suggest
+from ..families.shift_rates import trace_shift_rates
 from ..machine import Machine
 from ..model.legs import Leg
 from ..units import (
@@ -54,15 +56,15 @@ class MachineSprings(NamedTuple):
     struts: Struts
 
 
-class Springs(NamedTuple):
-    """Springs at poses.
+class Spring(NamedTuple):
+    """A spring at a pose; scalars of any kind.
 
-    moved : (N, closures, s) what a unit of each spring's give adds to the closures' right side
-    compliances : (N, s), mm/N or rad/Nmm
+    moved : (n,) what a unit of its give adds to the closures' right side
+    compliance : mm/N or rad/Nmm
     """
 
-    moved: Array
-    compliances: Array
+    moved: Sequence[Scalar]
+    compliance: Scalar
 
 
 def parse_positive(text: str, kind: QuantityKind, name: str) -> float:
@@ -187,37 +189,33 @@ def read_drives(machine: Machine, drives: Mapping[str, str] | str | None) -> Arr
     return np.array(result)
 
 
-class StrutColumns(NamedTuple):
-    """What a leg's springs are made from, at N poses.
+class StrutScalars(NamedTuple):
+    """What a leg's springs are made from, at a pose; scalars of any kind.
 
     leg : the leg
-    joints : (N, drives) of the leg
-    by_drive : (N, closures, drives) closures' right side by the drives
-    by_size : the same by a size of the leg, (N, closures)
+    joints : of the leg
+    by_drive : for each drive what a unit of it adds to the closures' right side (n,)
+    by_size : the same by a size of the leg
     """
 
     leg: Leg
-    joints: Array
-    by_drive: Array
-    by_size: Callable[[str], Array]
+    joints: Sequence[Scalar]
+    by_drive: Sequence[Sequence[Scalar]]
+    by_size: Callable[[str], list[Scalar]]
 
 
-_LegSprings: TypeAlias = list[tuple[Array, Array]]  # of each spring: what it moves (N, closures), and compliance (N,)
+def _list_length(at: StrutScalars, struts: Section | float) -> list[Spring]:
+    own = 1.0 / struts if isinstance(struts, float) else absolute(at.joints[0]) / (struts.modulus * struts.area)
+    return [Spring(at.by_drive[0], own)]
 
 
-def _list_length(at: StrutColumns, struts: Section | float) -> _LegSprings:
-    length = np.abs(at.joints[:, 0])
-    own = 1.0 / struts if isinstance(struts, float) else length / (struts.modulus * struts.area)
-    return [(at.by_drive[:, :, 0], np.broadcast_to(own, length.shape))]
-
-
-def _list_rod(at: StrutColumns, struts: Section | float) -> _LegSprings:
+def _list_rod(at: StrutScalars, struts: Section | float) -> list[Spring]:
     rod = getattr(at.leg, "rod")  # noqa: B009  - a size of these kinds
     own = 1.0 / struts if isinstance(struts, float) else rod / (struts.modulus * struts.area)
-    return [(at.by_size("rod"), np.full(len(at.joints), own))]
+    return [Spring(at.by_size("rod"), own)]
 
 
-def _list_lambda(at: StrutColumns, struts: Section | float) -> _LegSprings:
+def _list_lambda(at: StrutScalars, struts: Section | float) -> list[Spring]:
     """List the springs of a lambda leg: both parts of the long rod, and the short rod, which bends the long one.
 
     The hinge gives way across the long rod, a beam on two supports, by P a² b² / (3 E I L). That moves the short rod's
@@ -226,14 +224,15 @@ def _list_lambda(at: StrutColumns, struts: Section | float) -> _LegSprings:
     assert isinstance(struts, Section)  # read_springs refuses others
     long, short, hinge = (getattr(at.leg, size) for size in ("long", "short", "hinge"))
     lower, stretch = long - hinge, 1.0 / (struts.modulus * struts.area)
-    gap = at.joints[:, 1] - at.joints[:, 0]
-    cosine = (lower**2 + short**2 - gap**2) / (2.0 * lower * short)
-    bending = lower**2 * hinge**2 / (3.0 * struts.modulus * struts.second_moment * long)
-    by_long, every = at.by_size("long"), np.ones(len(gap))
+    gap = at.joints[1] - at.joints[0]
+    cosine = (lower * lower + short * short - gap * gap) / (2.0 * lower * short)
+    across = lower * hinge
+    bending = across * across / (3.0 * struts.modulus * struts.second_moment * long)
+    by_long, by_hinge = at.by_size("long"), at.by_size("hinge")
     return [
-        (by_long, every * lower * stretch),
-        (by_long + at.by_size("hinge"), every * hinge * stretch),
-        (at.by_size("short"), every * short * stretch + (1.0 - cosine**2) * bending),
+        Spring(by_long, lower * stretch),
+        Spring(add(by_long, by_hinge), hinge * stretch),
+        Spring(at.by_size("short"), short * stretch + (1.0 - cosine * cosine) * bending),
     ]
 
 
@@ -259,7 +258,27 @@ def read_springs(
     return springs
 
 
-def list_leg_springs(at: StrutColumns, struts: Section | float) -> Springs:
-    """List the springs of a leg's struts."""
-    springs = _KINDS[at.leg.kind](at, struts)
-    return Springs(np.stack([moved for moved, _ in springs], 2), np.stack([own for _, own in springs], 1))
+def trace_springs(
+    machine: Machine, pose: Sequence[Scalar], springs: MachineSprings, sizes: Mapping[str, Scalar]
+) -> tuple[list[list[Scalar]], list[list[Spring]]]:
+    """Trace A of the tool's twist at a pose, scalars of any kind, and the springs: drives', then each leg's struts'.
+
+    sizes : other values of the machine's parameters, by name
+    """
+    equations = machine.trace_equations(sizes)
+    joints, _, _ = equations.invert(pose, machine.mode)
+    rods = [] if springs.struts is None else [p.name for p in machine.parameters if p.group == "rods"]
+    a, b, c = trace_shift_rates(machine, pose, joints, rods, sizes)
+    by_joint = [list(column) for column in zip(*b, strict=True)]
+    result = [[Spring(column, own) for column, own in zip(by_joint, springs.drives.tolist(), strict=True)]]
+    given = equations.group_joints(joints)
+    for leg, own in zip(equations.legs, given, strict=True) if springs.struts is not None else ():
+        drives = [by_joint[machine.joints.index(drive.name)] for drive in leg.drives]
+
+        def list_slopes(size: str, name: str = leg.drives[0].name) -> list[Scalar]:
+            column = rods.index(f"legs.{name}.{size}")
+            return [-row[column] for row in c]
+
+        assert springs.struts is not None
+        result.append(_KINDS[leg.kind](StrutScalars(leg, own, drives, list_slopes), springs.struts))
+    return a, result

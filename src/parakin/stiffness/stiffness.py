@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
+from ..algebra import Scalar
 from ..arguments import RowsLike, check_arguments, read_rows
 from ..arrays import Array
 from ..dynamics.inverse_dynamics import Dynamics, Motion
@@ -14,7 +16,7 @@ from ..errors import PoseError
 from ..families.family import Family, solve_each
 from ..machine import Machine
 from ..workspaces.sampled.allowed_poses import SAMPLES, choose_poses
-from .springs import MachineSprings, Springs, StrutColumns, list_leg_springs, read_springs
+from .springs import MachineSprings, read_springs, trace_springs
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,7 +104,7 @@ class Stiffness:
         weight bends them.
         """
         dynamics, still = Dynamics(self.machine), np.zeros_like(self.joints)
-        a, (drives, *struts) = _list_springs(self.machine, self.poses, self.joints, self.springs)
+        a, (drives, *struts) = _list_springs(self.machine, self.poses, self.springs)
         weights = [dynamics.compute_forces(Motion(self.poses, self.joints, still, still))]
         weights += [dynamics.compute_weights(self.poses, self.joints, own.moved) for own in struts]
         total = np.zeros(self.compliances.shape[:2])
@@ -126,7 +128,7 @@ class Stiffness:
         if acting.shape != self._rest().shape or not np.isfinite(acting).all():
             raise PoseError(f"force: one number each for {' '.join(self.translations)} expected")
         machine, compliance = self.machine, np.zeros_like(self.joints)
-        a, (drives, *struts) = _list_springs(machine, self.poses, self.joints, self.springs)
+        a, (drives, *struts) = _list_springs(machine, self.poses, self.springs)
         compliance += drives.compliances
         for leg, own in zip(machine.legs, struts, strict=False):
             if leg.kind not in ("length", "ring"):
@@ -176,7 +178,7 @@ def analyse_stiffness(
 def compute_stiffness(machine: Machine, poses: Array, springs: MachineSprings) -> Stiffness:
     """Compute the stiffness at rows of poses."""
     joints = machine.inverse(poses)
-    a, listed = _list_springs(machine, poses, joints, springs)
+    a, listed = _list_springs(machine, poses, springs)
     by_kind = []
     for one in listed:
         ways = solve_each(a, one.moved)
@@ -188,26 +190,30 @@ def compute_stiffness(machine: Machine, poses: Array, springs: MachineSprings) -
         return Stiffness(machine, poses, joints, total, of_drives / of_all, springs)
 
 
-def _list_springs(
-    machine: Machine, poses: Array, joints: Array, springs: MachineSprings
-) -> tuple[Array, list[Springs]]:
-    """List the springs of all drives, then those of each leg's struts; with A."""
-    drives, struts = springs
-    rods = [] if struts is None else [p for p in machine.parameters if p.group == "rods"]
-    family = Family(machine, rods)
-    if rods:
-        rates = family.twist_rates(poses, joints, family.nominal)
-        a, b, c = rates.a, rates.b, rates.c
-    else:
-        a, b, _ = machine.twist_rates(poses, joints)
-        c = np.zeros((*b.shape[:2], 0))
-    result = [Springs(b, np.broadcast_to(drives, (len(poses), len(drives))))]
-    if struts is not None:
-        for leg in machine.legs:
-            own = [machine.joints.index(drive.name) for drive in leg.drives]
+class Springs(NamedTuple):
+    """Springs at poses.
 
-            def by_size(size: str, name: str = leg.drives[0].name) -> Array:
-                return -c[:, :, family.names.index(f"legs.{name}.{size}")]
+    moved : (N, closures, s) what a unit of each spring's give adds to the closures' right side
+    compliances : (N, s), mm/N or rad/Nmm
+    """
 
-            result.append(list_leg_springs(StrutColumns(leg, joints[:, own], b[:, :, own], by_size), struts))
-    return a, result
+    moved: Array
+    compliances: Array
+
+
+def _list_springs(machine: Machine, poses: Array, springs: MachineSprings) -> tuple[Array, list[Springs]]:
+    """List A, and the springs of all drives, then those of each leg's struts."""
+    n, sizes = len(machine.axes), list[int]()
+
+    def list_outputs(pose: list[Scalar], own: Mapping[str, Scalar]) -> list[Scalar]:
+        a, groups = trace_springs(machine, pose, springs, own)
+        sizes.extend(len(group) for group in groups)
+        moved = [x for group in groups for row in zip(*(s.moved for s in group), strict=True) for x in row]
+        return [*(x for row in a for x in row), *moved, *(s.compliance for group in groups for s in group)]
+
+    rows = Family(machine, ()).evaluate("springs", list_outputs, poses, ())
+    edges = np.cumsum([n * n, *(n * size for size in sizes), *sizes])[:-1]
+    a, *columns = np.split(rows, edges, axis=1)
+    moved, compliances = columns[: len(sizes)], columns[len(sizes) :]
+    groups = zip(sizes, moved, compliances, strict=True)
+    return a.reshape(-1, n, n), [Springs(own.reshape(-1, n, size), c) for size, own, c in groups]

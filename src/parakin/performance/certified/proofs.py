@@ -20,10 +20,11 @@ from ...errors import PoseError
 from ...workspaces.certified.region import Region
 from ..characteristic_length import choose_characteristic_length
 from ..extremes import SIDES
-from .amplification import UNBOUNDED, Bracket, bracket_amplification
+from .amplification import Bracket, bracket_amplification
 from .bisection import decide_nonnegative, decide_regular, find_undecided_box
 from .counterexamples import SingularityKind, find_singular_pose
 from .interval_matrices import MatrixBounds, PoseBox
+from .quotient_norms import UNBOUNDED
 
 Verdict = Literal["proved", "refuted", "undecided"]
 

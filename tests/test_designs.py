@@ -10,7 +10,6 @@ import parakin as pk
 from parakin.cli import main
 from parakin.performance.design import design_orthoglide
 from parakin.performance.indices import compute_performance
-from parakin.synthesis.measures import DesignEvaluator
 
 CUBE = dict.fromkeys("XYZ", (-100.0, 100.0))
 GLIDE = """\
@@ -66,30 +65,27 @@ def test_measures_are_those_of_the_machine(name):
     free = {parameter.name: (parameter.value - 1.0, parameter.value + 1.0)}
     home = dict(zip(m.axes, m.home.tolist(), strict=True))
     box = {axis: (home[axis] - 5.0, home[axis] + 9.0) for axis in "XYZ"}
-    evaluator = DesignEvaluator(pk.DesignProblem(m, free, box, ["footprint"]))
-    points = np.random.default_rng(1).random((20, 3))
+    problem = pk.DesignProblem(m, free, box, ["footprint"])
+    points = problem.make_points(0, np.random.default_rng(1).random((20, 3)))
     x = np.array([[parameter.value], [parameter.value + 0.5]])
-    measures = evaluator.measure(x, points)
+    measures = problem.measure(x, points)
     for number in range(2):
         own = m.replace_parameters({parameter.name: x[number, 0]})
-        poses = evaluator.problem.place_poses(x[number], points)
-        told = compute_performance(own, poses, evaluator.length.value)
+        poses = problem.place_poses(x[number], points)
+        told = compute_performance(own, poses, problem.model.length.value)
         assert measures.psi[number, :, 0] == pytest.approx(told.greatest, rel=1e-9)
         assert 1.0 / measures.psi[number, :, 1] == pytest.approx(told.least, rel=1e-9)
         joints = own.inverse(poses)[:, : m.leg_count]
         assert measures.joints[number] == pytest.approx(joints, rel=1e-12)
-        margins = own.margins(poses)[:, evaluator.counted] * evaluator.limit_scales
+        margins = own.margins(poses)[:, problem.model.counted] * problem.model.limit_scales
         assert np.allclose(measures.margins[number], margins, rtol=1e-9, atol=1e-12, equal_nan=True)
 
 
 def test_the_footprint_of_the_hexapod_is_its_feet():
     m = load_shipped("hexapod")
-    evaluator = DesignEvaluator(
-        pk.DesignProblem(
-            m, {m.parameters[0].name: (1.0, 2000.0)}, {**CUBE, "Z": tuple(m.home[2] + [0, 1])}, ["footprint"]
-        )
-    )
-    feet = evaluator.measure(np.array([[m.parameters[0].value]]), np.full((1, 3), 0.5)).feet
+    box = {**CUBE, "Z": tuple(m.home[2] + [0, 1])}
+    problem = pk.DesignProblem(m, {m.parameters[0].name: (1.0, 2000.0)}, box, ["footprint"])
+    feet = problem.measure(np.array([[m.parameters[0].value]]), problem.middle).feet
     assert feet[0, 0] == pytest.approx([2.0 * np.hypot(*leg.foot[:2]) for leg in m.legs])
 
 

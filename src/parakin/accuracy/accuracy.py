@@ -13,9 +13,7 @@ from ..arrays import Array
 from ..errors import PoseError
 from ..machine import Machine
 from ..workspaces.sampled.allowed_poses import SAMPLES, choose_poses
-from .tolerances import Tolerance, ToleranceFamily, make_tolerance_family, read_tolerances
-
-_UNIFORM = 1.0 / np.sqrt(3.0)  # standard deviation of what lies evenly within ±1
+from .tolerances import UNIFORM, Tolerance, ToleranceFamily, make_tolerance_family, read_tolerances
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,11 +86,11 @@ def analyse_accuracy(
     slopes = rates.compute_size_rates()
     tip = sum(axis in "XYZ" for axis in machine.axes)
     own = slopes * within.halves
-    variances = (own[:, :tip] ** 2).sum(1) * _UNIFORM**2
+    variances = (own[:, :tip] ** 2).sum(1) * UNIFORM**2
     by_group = np.stack([variances[:, columns].sum(1) for columns in within.groups], 1)
     with np.errstate(invalid="ignore", divide="ignore"):
         shares = by_group / by_group.sum(1, keepdims=True)
-    turns = np.sqrt((own[:, tip:] ** 2).sum((1, 2))) * _UNIFORM
+    turns = np.sqrt((own[:, tip:] ** 2).sum((1, 2))) * UNIFORM
     greatest = np.sqrt((np.abs(own[:, :tip]).sum(2) ** 2).sum(1))
     return Accuracy(within, rows, joints, slopes, np.sqrt(by_group.sum(1)), turns, greatest, shares)
 

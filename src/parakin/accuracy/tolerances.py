@@ -7,12 +7,15 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..algebra import Scalar
 from ..arrays import Array, Indices
 from ..errors import PoseError, quote
 from ..families.family import Family, select_parameters
+from ..families.shift_rates import trace_shift_rates
 from ..machine import Machine
 from ..units import ANGLE, LENGTH, Quantity, QuantityError, evaluate_expression
 
+UNIFORM = float(1.0 / np.sqrt(3.0))  # standard deviation of what lies evenly within ±1
 _UNITS = {LENGTH.dimension: "mm", ANGLE.dimension: "rad"}
 
 
@@ -85,3 +88,17 @@ def make_tolerance_family(machine: Machine, tolerances: Sequence[Tolerance]) -> 
     halves = np.array([tolerances[i].value for i in indices])
     groups = tuple(np.flatnonzero(indices == i) for i in range(len(tolerances)))
     return ToleranceFamily(family, tuple(tolerances), halves, groups)
+
+
+def trace_error(
+    machine: Machine, pose: Sequence[Scalar], within: ToleranceFamily, sizes: Mapping[str, Scalar]
+) -> tuple[list[list[Scalar]], list[list[Scalar]]]:
+    """Trace A of the tool's twist, and W: the deviation of the tip is the norm (Frobenius') of its rows of A⁻¹W.
+
+    Of numbers that lie evenly within their tolerances, to the first order.
+
+    sizes : other values of the machine's parameters, by name
+    """
+    joints, _, _ = machine.trace_equations(sizes).invert(pose, machine.mode)
+    a, _, c = trace_shift_rates(machine, pose, joints, within.family.names, sizes)
+    return a, [[x * (UNIFORM * half) for x, half in zip(row, within.halves.tolist(), strict=True)] for row in c]

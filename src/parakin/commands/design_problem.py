@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from ..description.document import Value, YamlList, YamlMap, YamlText, read_document
 from ..errors import InputError, InputErrors, PoseError, quote, suggest
-from ..units import ANGLE, LENGTH, NUMBER, QuantityError, QuantityKind, parse_quantity
+from ..units import ANGLE, LENGTH, QuantityError, QuantityKind, parse_quantity
 from .options import load_machine
 
 if TYPE_CHECKING:
@@ -16,8 +16,12 @@ if TYPE_CHECKING:
     from ..machine import Machine
     from ..synthesis.problem import DesignProblem
 
-_KEYS = ("machine", "free", "box", "shift", "bounds", "strokes", "minimise")
+_POSES = ("box", "cylinder", "poses")
+_KEYS = (
+    "machine", "free", *_POSES, "shift", "bounds", "strokes", "drives", "struts", "tolerances", "minimise", "maximise",
+)  # fmt: skip
 _STROKES = ("keep", "fit")
+_CYLINDER = ("along", "diameter")
 
 
 def read_design_problem(path: Path) -> DesignProblem:
@@ -31,9 +35,9 @@ def read_design_problem(path: Path) -> DesignProblem:
         raise InputErrors(errors)
     reader = _ProblemReader(source)
     top = reader.read_map(document, "a design problem", _KEYS)
-    for key in ("machine", "free", "box", "minimise"):
-        if key not in top:
-            raise InputError(f"key {key} is missing", source, 1)
+    for keys in (("machine",), ("free",), _POSES, ("minimise", "maximise")):
+        if not any(key in top for key in keys):
+            raise InputError(f"key {' or '.join(keys)} is missing", source, 1)
     return reader.make_problem(top)
 
 
@@ -74,46 +78,82 @@ class _ProblemReader:
         return low, high
 
     def make_problem(self, top: YamlMap) -> DesignProblem:
-        from ..synthesis.problem import QUANTITIES, DesignProblem
+        from ..synthesis.problem import DesignProblem
+        from ..synthesis.wants import WANTS
 
         machine = self._load(self.read_text(top["machine"], "machine"))
         numbers = {p.name: ANGLE if p.unit == "rad" else LENGTH for p in machine.parameters}
         free = self.read_map(top["free"], "free", tuple(numbers))
         shift = self.read_map(top["shift"], "shift") if "shift" in top else {}
-        bounds = self.read_map(top["bounds"], "bounds", QUANTITIES) if "bounds" in top else {}
+        bounds = self.read_map(top["bounds"], "bounds", tuple(WANTS)) if "bounds" in top else {}
         strokes = self.read_text(top["strokes"], "strokes") if "strokes" in top else "keep"
         if strokes not in _STROKES:
             raise self.fail(f"strokes: {quote(strokes)}{suggest(strokes, _STROKES)}", top["strokes"])
-        names = top["minimise"] if isinstance(top["minimise"], YamlList) else [top["minimise"]]
-        minimise = [str(self.read_text(name, "minimise")) for name in names]
-        ranges = {str(key): self.read_range(value, key, numbers[key]) for key, value in free.items()}
         try:
             return DesignProblem(
                 machine,
-                ranges,
-                self._read_box(machine, top["box"]),
-                minimise,
+                {str(key): self.read_range(value, key, numbers[key]) for key, value in free.items()},
+                self._read_axes(machine, top["box"], "box") if "box" in top else {},
+                self._read_names(top, "minimise"),
                 {str(key): self.read_range(value, key, LENGTH) for key, value in shift.items()},
-                {
-                    str(key): self.read_value(value, key, NUMBER if "amplification" in key else LENGTH)
-                    for key, value in bounds.items()
-                },
+                {str(key): self.read_value(value, key, WANTS[key].kind) for key, value in bounds.items()},
                 strokes == "fit",
+                self._read_names(top, "maximise"),
+                self._read_cylinder(machine, top["cylinder"]) if "cylinder" in top else None,
+                self._read_poses(machine, top["poses"]) if "poses" in top else (),
+                self._read_words(top, "drives"),
+                self._read_words(top, "struts"),
+                self._read_tolerances(top),
             )
         except PoseError as error:
             key = str(error).split(":")[0]
             line = next((own.line for own in top if own == key), 1)
             raise InputError(str(error), self.source, line) from None
 
-    def _read_box(self, machine: Machine, value: Value) -> dict[str, AxisRange | float]:
-        kinds = {
-            axis: ANGLE if u == "rad" else LENGTH for axis, u in zip(machine.axes, machine.axis_units, strict=True)
-        }
-        box: dict[str, AxisRange | float] = {}
-        for axis, ends in self.read_map(value, "box", machine.axes).items():
-            is_range = isinstance(ends, YamlList)
-            box[str(axis)] = (self.read_range if is_range else self.read_value)(ends, axis, kinds[axis])
-        return box
+    def _read_names(self, top: YamlMap, key: str) -> list[str]:
+        if key not in top:
+            return []
+        names = top[key] if isinstance(top[key], YamlList) else [top[key]]
+        return [str(self.read_text(name, key)) for name in names]
+
+    def _read_words(self, top: YamlMap, key: str) -> dict[str, str] | str | None:
+        """Read a text for all, or texts by names."""
+        if key not in top:
+            return None
+        if isinstance(top[key], YamlMap):
+            words = self.read_map(top[key], key)
+            return {str(name): str(self.read_text(value, name)) for name, value in words.items()}
+        return str(self.read_text(top[key], key))
+
+    def _read_tolerances(self, top: YamlMap) -> dict[str, str] | None:
+        words = self._read_words(top, "tolerances")
+        if isinstance(words, str):
+            raise self.fail("tolerances: a mapping expected, such as {feet: 0.05 mm}", top["tolerances"])
+        return words
+
+    def _read_poses(self, machine: Machine, value: Value) -> list[dict[str, AxisRange | float]]:
+        if not isinstance(value, YamlList):
+            raise self.fail("poses: a list expected", value)
+        return [self._read_axes(machine, axes, "a pose") for axes in value]
+
+    def _read_cylinder(self, machine: Machine, value: Value) -> dict[str, AxisRange | float | str]:
+        whole = self.read_map(value, "cylinder", (*_CYLINDER, *machine.axes))
+        said: dict[str, AxisRange | float | str] = {}
+        for key, ends in whole.items():
+            if key in machine.axes:
+                said[str(key)] = self._read_axis(machine, key, ends)
+            else:
+                length = key == "diameter"
+                said[str(key)] = self.read_value(ends, key, LENGTH) if length else str(self.read_text(ends, key))
+        return said
+
+    def _read_axes(self, machine: Machine, value: Value, what: str) -> dict[str, AxisRange | float]:
+        axes = self.read_map(value, what, machine.axes)
+        return {str(axis): self._read_axis(machine, axis, ends) for axis, ends in axes.items()}
+
+    def _read_axis(self, machine: Machine, axis: str, value: Value) -> AxisRange | float:
+        kind = ANGLE if machine.axis_units[machine.axes.index(axis)] == "rad" else LENGTH
+        return (self.read_range if isinstance(value, YamlList) else self.read_value)(value, axis, kind)
 
     def _load(self, name: YamlText) -> Machine:
         beside = Path(self.source).parent / name

@@ -14,7 +14,8 @@ from .region_options import parse_time
 
 if TYPE_CHECKING:
     from ..export.files import Content
-    from ..synthesis.designs import Designs
+    from ..synthesis.designs import Designs, ProvedDesign
+    from ..synthesis.problem import DesignProblem
 
 _NUMBERS = ".9g"
 
@@ -50,13 +51,32 @@ def _write_designs(designs: Designs, output: Path) -> list[str]:
     files: dict[str, Content] = {
         f"design_{number}.yaml": format_proved_yaml(designs, number - 1) for number in range(1, len(designs.front) + 1)
     }
-    if len(designs.problem.minimise) > 1:
+    if len(designs.problem.objectives) > 1:
         files["front.png"] = render_front_png(designs)
     write_files(output, files)
     return [str(output / name) for name in files]
 
 
+def _describe_objectives(problem: DesignProblem) -> str:
+    ways = (("least", problem.minimise), ("greatest", problem.maximise))
+    return ", ".join(f"{way} {' and '.join(names)}" for way, names in ways if names)
+
+
+def _describe_proofs(number: int, design: ProvedDesign) -> str:
+    """Say of which quantities less is proved than what was found where they were looked at."""
+    said = []
+    for name, worst in design.proved.items():
+        value = design.values[name]
+        if worst is None:
+            said.append(f"{name} is sampled only")
+        elif abs(worst - value) > 2e-6 * abs(value) and name in design.values:
+            said.append(f"{name} proved to be {'above' if worst < value else 'below'} {worst:{_NUMBERS}}")
+    return f"{number}: {', '.join(said)}" if said else ""
+
+
 def _format_designs(designs: Designs) -> str:
+    from ..synthesis.wants import WANTS
+
     problem = designs.problem
     lines = []
     if designs.shortfall:
@@ -65,7 +85,7 @@ def _format_designs(designs: Designs) -> str:
     if designs.front:
         first = designs.front[0]
         quantities = [name for name in first.values if name not in first.sizes]
-        header = ["", *first.sizes, *quantities]
+        header = ["", *first.sizes, *(f"{name} [{WANTS[name].unit}]".removesuffix(" []") for name in quantities)]
         rows = [
             [
                 str(number),
@@ -74,8 +94,10 @@ def _format_designs(designs: Designs) -> str:
             ]
             for number, found in enumerate(designs.front, 1)
         ]
-        lines += [f"{problem.machine.name}: {len(rows)} proved, least {' and '.join(problem.minimise)}\n"]
+        lines += [f"{problem.machine.name}: {len(rows)} proved, {_describe_objectives(problem)}\n"]
         lines += [format_table(rows, header, "r" * len(header))]
+        lines += [_describe_proofs(number, found) for number, found in enumerate(designs.front, 1)]
+        lines = [line for line in lines if line]
     for number, found in enumerate(designs.front, 1) if problem.fit_strokes else ():
         drives = dict(zip(found.machine.joints, found.machine.joint_units, strict=True))
         ends = ", ".join(

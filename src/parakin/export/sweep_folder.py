@@ -42,7 +42,7 @@ class SweepResult:
     made : how many designs were evaluated this time, not before
     cost : of these, the time that a design took at a pose, files included, s; NaN where none was
     kernel : what it takes the bare kernel on this machine, limits alone, s
-    best : by the name of what is minimised, the best of those that keep all: its columns by their names
+    best : by the name of each objective, the best of those that keep all: its columns by their names
     """
 
     designs: int
@@ -213,10 +213,11 @@ def _summarise(plan: SweepPlan, files: Sequence[Path]) -> tuple[int, dict[str, d
     for file in files:
         kept = _read_part(file, list(names.values()))
         keeping += len(kept)
-        for name in plan.problem.minimise if len(kept) else ():
-            values = kept.column(names[name]).to_numpy()
+        for name in plan.problem.objectives if len(kept) else ():
+            sign = plan.problem.get_sign(name)
+            values = sign * kept.column(names[name]).to_numpy()
             row = kept.slice(int(values.argmin()), 1).to_pylist()[0]
-            if name not in best or row[names[name]] < best[name][names[name]]:
+            if name not in best or sign * row[names[name]] < sign * best[name][names[name]]:
                 best[name] = row
     return keeping, best
 

@@ -10,7 +10,14 @@ from ..errors import DescriptionError
 from ..units import AXIS_UNITS
 from .elements import ROTATIONS, RodConstraint
 from .legs import Inverse, Leg
-from .limits import HomeRods, Limit, compute_platform_points, group_joints_by_leg, list_limits
+from .limits import (
+    HomeRods,
+    Limit,
+    compute_platform_points,
+    group_joints_by_leg,
+    list_limits,
+    list_strut_distances,
+)
 from .nominal_values import find_nominal_value
 from .rates import TwistRates, compute_twist_rates
 from .spec import Spec
@@ -259,6 +266,11 @@ class Equations:
         points, given = compute_platform_points(self.spec, placed.rotation, placed.origin), self.group_joints(joints)
         struts = (s for leg, p, q in zip(self.legs, points, given, strict=True) for s in leg.struts(p, q))
         return [add(apply(self.structure.mount, foot), self.structure.base) for foot, _ in struts]
+
+    def list_strut_distances(self, pose: Sequence[Scalar], mode: str) -> list[Scalar]:
+        """List the distances of the axes of all pairs of struts that share no joint, at a pose, mm."""
+        joints, placed, _ = self.invert(pose, mode)
+        return [distance for _, distance in list_strut_distances(self.spec, placed, joints)]
 
     @cached_property
     def rods_at_home(self) -> HomeRods:

@@ -184,14 +184,17 @@ def _list_clearances(
     least = spec.limits.clearance
     if least is None:
         return
+    for names, distance in list_strut_distances(spec, placement, joints):
+        yield Limit(f"clearance {names}", f"clearance of {names}", "mm", "min", least), distance - least
+
+
+def list_strut_distances(
+    spec: Spec, placement: PlatformPlacement, joints: Sequence[Scalar]
+) -> Iterator[tuple[str, Scalar]]:
+    """List the distances of the axes of all pairs of struts that share no joint, with their names."""
     for one, two in combinations(_list_struts(spec, placement, joints), 2):
-        if _share_joint(one, two):
-            continue
-        names = f"{one.name}-{two.name}"
-        yield (
-            Limit(f"clearance {names}", f"clearance of {names}", "mm", "min", least),
-            compute_segment_distance(one.ends, two.ends) - least,
-        )
+        if not _share_joint(one, two):
+            yield f"{one.name}-{two.name}", compute_segment_distance(one.ends, two.ends)
 
 
 class _Strut(NamedTuple):

@@ -9,7 +9,7 @@ from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
-from ..algebra import Scalar, absolute, add
+from ..algebra import Scalar, absolute, add, sqrt
 from ..arrays import Array
 from ..errors import PoseError, quote, suggest
 from ..families.shift_rates import trace_shift_rates
@@ -282,3 +282,13 @@ def trace_springs(
         assert springs.struts is not None
         result.append(_KINDS[leg.kind](StrutScalars(leg, own, drives, list_slopes), springs.struts))
     return a, result
+
+
+def trace_compliance(
+    machine: Machine, pose: Sequence[Scalar], springs: MachineSprings, sizes: Mapping[str, Scalar]
+) -> tuple[list[list[Scalar]], list[list[Scalar]]]:
+    """Trace A of the tool's twist, and W such that A⁻¹W (A⁻¹W)ᵀ is the tool's compliance."""
+    a, groups = trace_springs(machine, pose, springs, sizes)
+    soft = [spring for group in groups for spring in group if spring.compliance != 0.0]
+    columns = [[x * sqrt(spring.compliance) for x in spring.moved] for spring in soft]
+    return a, [list(row) for row in zip(*columns, strict=True)]

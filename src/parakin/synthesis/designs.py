@@ -1,4 +1,4 @@
-"""Designs: the winners of a search, each proved all over its box, and the front of two objectives."""
+"""Designs: the winners of a search, each proved at all wanted poses, and the front of several objectives."""
 
 from __future__ import annotations
 
@@ -7,47 +7,42 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from ..algebra import Scalar, dot
 from ..arguments import check_arguments
-from ..arrays import Array, AxisRange, Progress
+from ..arrays import AxisRange, Progress
 from ..budget import SECONDS, Budget
 from ..errors import DescriptionError, PoseError
 from ..machine import Machine
-from ..performance.certified.proofs import Proof, make_pose_box, prove_amplification
-from ..workspaces.certified.constraints import Constraint
-from ..workspaces.certified.containment import prove_boxes
-from ..workspaces.certified.region import Region, make_region
-from .measures import DesignEvaluator
+from .design_proof import TOLERANCE, DesignProof
+from .front import search_front
 from .problem import DesignProblem
-from .search import SLACK, Candidate, DesignSearch
+from .search import KEPT, SLACK, Candidate
+from .wants import WANTS, MarginProof, NormProof
 
-TOLERANCE = 1e-6  # relative, within which bounds are kept
-_KEPT = 1e-8  # by which a search may break a want, relative
 _ALIKE = 1e-7  # relative: objectives closer than that are one
-_BOXES = 200_000  # of a proof
 _SEARCHING = 0.7  # of the time; the rest is for proofs
 MOST_DESIGNS = 50
 
 
 @dataclass(frozen=True, eq=False)
 class ProvedDesign:
-    """A machine that is proved to keep all wants at every pose of its box.
+    """A machine that is proved to keep all wants at every wanted pose.
 
     sizes : its free numbers and shifts, mm and rad
-    values : what it is worth: the objectives and the bounded quantities, amplification or mm
-    box : low and high of each axis
+    values : what it is worth: the objectives and the bounded quantities, each in the unit of its kind
+    proved : of each of these quantities the value that is proved to be no better than the worst; None where it is only
+        sampled, which happens to objectives without a bound when time is short
+    box : low and high of each axis, of the first wanted poses
     ranges : of the legs' drives
-    boxes : how many parts of the box the proofs examined
-    amplification : the proof of its bound, where one was wanted
+    boxes : how many parts of the poses the proofs examined
     """
 
     machine: Machine
     sizes: Mapping[str, float]
     values: Mapping[str, float]
+    proved: Mapping[str, float | None]
     box: Mapping[str, AxisRange]
     ranges: Mapping[str, AxisRange]
     boxes: int
-    amplification: Proof | None = None
 
     def __repr__(self) -> str:
         return f"<parakin design of {self.machine.name}: {len(self.sizes)} sizes, proved with {self.boxes} boxes>"
@@ -86,24 +81,25 @@ class Designs:
 def find_designs(
     problem: DesignProblem, count: int = 7, seconds: float | None = SECONDS, progress: Progress | None = None
 ) -> Designs:
-    """Find the design of the least objective, or ``count`` designs of the Pareto front of two, and prove each.
+    """Find the best design by one objective, or ``count`` designs of the Pareto front of several, and prove each.
 
     Found by differential evolution, refined by the exchange method for semi-infinite programs, proved by intervals. The
-    front's designs have the least first objective under evenly spaced bounds of the second one. A proved design keeps
-    the wants; that there is no better one is not proved. ``seconds`` bounds the time of all.
+    front's designs of two objectives have the best first one under evenly spaced bounds of the second one; of more, the
+    least greatest distance from the ideal under evenly spaced weights. A proved design keeps the wants; that there is
+    no better one is not proved. ``seconds`` bounds the time of all.
 
     Raises :class:`PoseError` for an invalid count or time.
     """
     if not 1 <= count <= MOST_DESIGNS:
         raise PoseError(f"count: 1 to {MOST_DESIGNS} designs expected, not {count}")
     budget = Budget(seconds)
-    evaluator = DesignEvaluator(problem)
-    candidates = _search_front(evaluator, count, budget.take_fraction(_SEARCHING), progress)
-    if isinstance(candidates, str):
-        return Designs(problem, (), (), candidates)
+    search = (lambda f: progress(_SEARCHING * f)) if progress else None
+    candidates = search_front(problem, count, budget.take_fraction(_SEARCHING), search)
+    if candidates[0].broken > KEPT:
+        return Designs(problem, (), (), _describe_shortfall(problem, candidates[0]))
     proved, unproved = list[ProvedDesign](), list[UnprovedDesign]()
     for number, candidate in enumerate(candidates):
-        design = _prove_design(evaluator, candidate, budget.take_fraction(1.0 / (len(candidates) - number)))
+        design = _prove_design(problem, candidate, budget.take_fraction(1.0 / (len(candidates) - number)))
         if isinstance(design, ProvedDesign):
             proved.append(design)
         else:
@@ -113,152 +109,84 @@ def find_designs(
     return Designs(problem, _keep_best(problem, proved), tuple(unproved))
 
 
-def _search_front(
-    evaluator: DesignEvaluator, count: int, budget: Budget, progress: Progress | None
-) -> list[Candidate] | str:
-    """Search the front's designs by bounds of the second objective; a line on the want that is broken if none is."""
-    problem = evaluator.problem
-    runs, done = count + 2 if len(problem.minimise) > 1 and count > 1 else 1, 0
-
-    def run(objective: str, bounds: Mapping[str, float], seeds: list[Array]) -> Candidate:
-        nonlocal done
-        begin = _SEARCHING * done / runs
-        report = (lambda f: progress(begin + _SEARCHING / runs * f)) if progress else None
-        candidate = DesignSearch(evaluator, objective, bounds).run(
-            budget.take_fraction(1.0 / (runs - done)), seeds, report
-        )
-        done += 1
-        return candidate
-
-    first = problem.minimise[0]
-    best = run(first, problem.bounds, [])
-    if best.broken > _KEPT:
-        return _describe_shortfall(problem, best)
-    if runs == 1:
-        return [best]
-    second = problem.minimise[1]
-    other = run(second, problem.bounds, [best.x])
-    if other.broken > _KEPT:
-        return [best]
-    end = run(second, _tighten(problem.bounds, first, best.value * (1.0 + TOLERANCE)), [best.x])
-    far = end if end.broken <= _KEPT else best
-    front = [far]
-    highest = far.value if far is end else _measure_value(evaluator, far, second)
-    for step in np.linspace(highest, other.value, count)[1:]:
-        bound = float(step) * (1.0 + 1e-9)
-        candidate = run(first, _tighten(problem.bounds, second, bound), [front[-1].x, other.x])
-        if candidate.broken <= _KEPT:
-            front.append(candidate)
-    return front
-
-
-def _tighten(bounds: Mapping[str, float], name: str, bound: float) -> dict[str, float]:
-    return {**bounds, name: min(bound, bounds.get(name, np.inf))}
-
-
-def _measure_value(evaluator: DesignEvaluator, candidate: Candidate, name: str) -> float:
+def _measure_value(problem: DesignProblem, candidate: Candidate, name: str) -> float:
     """Measure a quantity of a design at the poses that matter."""
-    problem = evaluator.problem
-    if name in problem.variables:
-        return float(candidate.x[problem.variables.index(name)])
-    m = evaluator.measure(candidate.x[None], candidate.points)
-    if name == "stroke":
-        return float((m.joints[0].max(0) - m.joints[0].min(0)).max())
-    values = {"amplification": m.psi, "greatest_amplification": m.psi[..., 0], "footprint": m.feet}
-    return float(values[name].max())
+    x = candidate.x[None]
+    return problem.get_sign(name) * float(problem.list_losses(name, x, problem.measure(x, candidate.points)).max())
 
 
 def _describe_shortfall(problem: DesignProblem, nearest: Candidate) -> str:
     sizes = ", ".join(f"{name} {value:.6g}" for name, value in zip(problem.variables, nearest.x, strict=True))
-    return f"no design found that keeps every want; the nearest one ({sizes}) breaks {nearest.want}"
+    want = nearest.want
+    if want in problem.bounds:
+        value = _measure_value(problem, nearest, want)
+        want += f": {value:.6g} where at {'least' if WANTS[want].more else 'most'} {problem.bounds[want]:.6g} is wanted"
+    return f"no design found that keeps every want; the nearest one ({sizes}) breaks {want}"
 
 
-def _prove_design(evaluator: DesignEvaluator, candidate: Candidate, budget: Budget) -> ProvedDesign | UnprovedDesign:
-    """Make a design's machine, and prove its limits, footprint and amplification all over its box."""
-    problem, n = evaluator.problem, len(evaluator.problem.family.names)
+def _prove_design(problem: DesignProblem, candidate: Candidate, budget: Budget) -> ProvedDesign | UnprovedDesign:
+    """Make a design's machine, and prove its limits and bounds at all wanted poses."""
     sizes = dict(zip(problem.variables, candidate.x.tolist(), strict=True))
-    ranges = _fit_ranges(evaluator, candidate) if problem.fit_strokes else {}
-    home = problem.place_poses(candidate.x, np.full(len(problem.wide_axes), 0.5)).tolist()
+    ranges = _fit_ranges(problem, candidate) if problem.fit_strokes else {}
+    home = problem.place_poses(candidate.x, problem.middle)[0].tolist()
+    numbers = {name: sizes[name] for name in problem.family.names}
     try:
-        numbers = dict(zip(problem.family.names, candidate.x[:n].tolist(), strict=True))
         axes = dict(zip(problem.machine.axes, home, strict=True))
         machine = problem.machine.replace_parameters(numbers, ranges, axes)
     except DescriptionError as error:
         return UnprovedDesign(sizes, str(error))
-    box = problem.place_box(candidate.x)
-    named = [*problem.minimise, *(name for name in problem.bounds if name not in problem.minimise)]
-    values = {name: _measure_value(evaluator, candidate, name) for name in named}
+    named = dict.fromkeys((*problem.objectives, *problem.bounds))
+    values = {name: _measure_value(problem, candidate, name) for name in named}
     for name, bound in problem.bounds.items():
-        if values[name] > bound * (1.0 + TOLERANCE):
+        sign = WANTS[name].sign
+        if sign * values[name] > sign * bound + TOLERANCE * abs(bound):
             return UnprovedDesign(sizes, f"{name} is {values[name]:.9g}")
-    turning = {axis: ends for axis, ends in box.items() if axis not in "XYZ" and ends[0] < ends[1]}
-    fixed = {axis: ends[0] for axis, ends in box.items() if ends[0] == ends[1]}
-    region = make_region(machine, at=fixed, every=turning)
-    footprint = values.get("footprint")
-    more = [] if footprint is None else _bound_footprint(region, footprint * (1.0 + TOLERANCE))
-    low, high = np.array([box[axis] for axis in region.free_axes]).T
-    containment = prove_boxes(region, low[None], high[None], more, _BOXES, budget.take_fraction(0.5))
-    if not containment.proved[0]:
-        limit = int(containment.limit[0])
-        return UnprovedDesign(
-            sizes, f"{containment.names[limit]} is broken in the box" if limit >= 0 else "left undecided"
-        )
-    proof = _prove_amplification(evaluator, region, box, values, budget)
-    if proof is not None and proof.verdict != "proved":
-        return UnprovedDesign(sizes, f"{proof.claim} is {proof.verdict}: {proof.reason}")
-    drives = {drive.name: (drive.low, drive.high) for drive in machine.drives[: machine.leg_count]}
-    boxes = int(containment.boxes[0]) + (proof.boxes if proof else 0)
-    return ProvedDesign(machine, sizes, values, box, drives, boxes, proof)
-
-
-def _prove_amplification(
-    evaluator: DesignEvaluator,
-    region: Region,
-    box: Mapping[str, AxisRange],
-    values: Mapping[str, float],
-    budget: Budget,
-) -> Proof | None:
-    """Prove the bounds of the amplification that a problem names; None where it names none."""
-    bounds = {
-        name: min(evaluator.problem.bounds.get(name, np.inf), values[name] * (1.0 + TOLERANCE))
-        for name in ("amplification", "greatest_amplification")
-        if name in values
+    proof = DesignProof(problem, machine, problem.move_sets(candidate.x), numbers, budget)
+    wanted = {
+        name: (values[name] if name in problem.objectives else problem.bounds[name])
+        * (1.0 + WANTS[name].sign * TOLERANCE)
+        for name in problem.wants
     }
-    if not bounds:
-        return None
-    wide = {axis: ends for axis, ends in box.items() if ends[0] < ends[1]}
-    poses = make_pose_box(region, wide, evaluator.length.value)
-    least = 1.0 / bounds["amplification"] if "amplification" in bounds else 0.0
-    seconds = None if budget.seconds_left == np.inf else max(budget.seconds_left, 1e-3)
-    return prove_amplification(poses, least, min(bounds.values()), TOLERANCE, _BOXES, seconds)
+    margins = {name: bound for name, bound in wanted.items() if isinstance(WANTS[name].proof, MarginProof)}
+    reason = proof.prove_margins(margins)
+    if reason:
+        return UnprovedDesign(sizes, reason)
+    proved: dict[str, float | None] = {name: wanted[name] for name in wanted}
+    norms = [name for name in wanted if isinstance(WANTS[name].proof, NormProof)]
+    for number, name in enumerate(norms):
+        seconds = budget.seconds_left / (len(norms) - number)
+        worst = proof.bound_norm(name, wanted[name], seconds)
+        proved[name] = worst
+        if name in problem.bounds and not _is_kept(name, worst, problem.bounds[name]):
+            limit = "nothing" if worst is None else f"{worst:.9g}"
+            return UnprovedDesign(sizes, f"{name} is {values[name]:.9g} where it was looked at, and {limit} is proved")
+    drives = {drive.name: (drive.low, drive.high) for drive in machine.drives[: machine.leg_count]}
+    return ProvedDesign(machine, sizes, values, proved, proof.sets[0].ends, drives, proof.boxes)
 
 
-def _fit_ranges(evaluator: DesignEvaluator, candidate: Candidate) -> dict[str, AxisRange]:
+def _is_kept(name: str, worst: float | None, bound: float) -> bool:
+    sign = WANTS[name].sign
+    return worst is not None and sign * worst <= sign * bound * (1.0 + sign * 1.01 * TOLERANCE)
+
+
+def _fit_ranges(problem: DesignProblem, candidate: Candidate) -> dict[str, AxisRange]:
     """Fit the legs' drives to what they take at the poses that matter, some 1e-8 of the machine's size wider."""
-    machine = evaluator.problem.machine
-    joints = evaluator.measure(candidate.x[None], candidate.points).joints[0]
+    machine = problem.machine
+    joints = problem.measure(candidate.x[None], candidate.points).joints[0]
     units = machine.joint_units[: machine.leg_count]
-    slack = [SLACK * (evaluator.size if unit == "mm" else 1.0) for unit in units]
+    slack = [SLACK * (problem.model.size if unit == "mm" else 1.0) for unit in units]
     ends = zip(joints.min(0).tolist(), joints.max(0).tolist(), slack, strict=True)
     names = [drive.name for drive in machine.drives[: machine.leg_count]]
     return {name: (low - by, high + by) for name, (low, high, by) in zip(names, ends, strict=True)}
 
 
-def _bound_footprint(region: Region, diameter: float) -> list[Constraint]:
-    """Bound the struts' joints at the base: margins that are ≥ 0 within a circle about the machine's Z axis."""
-    traced, d = region.traced_pose, len(region.free_axes)
-    feet = region.machine.trace_equations({}).list_feet(traced.pose, region.mode)
-    position, orientation = traced.inputs[:d], traced.inputs[d:]
-    margins: list[Scalar] = [1.0 - dot(foot[:2], foot[:2]) * (4.0 / diameter**2) for foot in feet]
-    return [Constraint("footprint", margin, position, orientation) for margin in margins]
-
-
 def _keep_best(problem: DesignProblem, designs: list[ProvedDesign]) -> tuple[ProvedDesign, ...]:
     """Keep the designs that no other one is as good as in all objectives, the best by the first one first."""
-    values = np.array([[design.values[name] for name in problem.minimise] for design in designs])
+    signs = [problem.get_sign(name) for name in problem.objectives]
+    values = np.array([[design.values[name] for name in problem.objectives] for design in designs]) * signs
     order: list[int] = np.lexsort(values.T[::-1]).tolist() if len(designs) else []
     kept = list[int]()
     for number in order:
-        if not any((values[other] <= values[number] * (1.0 + _ALIKE)).all() for other in kept):
+        if not any((values[other] <= values[number] + _ALIKE * np.abs(values[number])).all() for other in kept):
             kept.append(number)
     return tuple(designs[number] for number in kept)

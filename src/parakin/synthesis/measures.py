@@ -1,78 +1,96 @@
-"""What designs are worth: limits, amplification, strokes and footprint, for batches of designs and poses at once."""
+"""What designs are worth at poses: margins of limits and every quantity, for batches of both at once."""
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from functools import cached_property
 
 import numpy as np
 
 from ..arrays import Array
+from ..families.family import FamilyRates
 from ..kernels.small_matrices import compute_singular_values, solve_quotients
-from ..performance.characteristic_length import choose_characteristic_length
-from ..performance.jacobians import list_column_scales
-from .problem import DesignProblem
+from .design_model import DesignModel
 
 LOST = 1.0  # what a pose out of reach breaks a want by
 
 
-class Measures(NamedTuple):
-    """Designs at poses, (..., poses, k) each; NaN out of reach.
+class Measures:
+    """Quantities of S designs at P poses each, computed as they are asked for; NaN out of reach.
 
-    margins : of the limits that count, ≥ 0 where they are kept, in parts of the machine's size or rad
-    side : det A by that in the box's middle, > 0 on its side of the parallel singularities, (..., poses, 1)
-    psi : the greatest velocity amplification and the reciprocal of the least
-    joints : of the legs' drives
-    feet : twice the distance of the struts' joints at the base from the machine's Z axis, mm
+    poses : (S, P + 1, axes), the last of which is the one whose side of the parallel singularities counts
+    sizes : (S, 1, k) of the family
     """
 
-    margins: Array
-    side: Array
-    psi: Array
-    joints: Array
-    feet: Array
-
-
-class DesignEvaluator:
-    """Evaluates a problem's designs through one tape for each quantity, whose inputs are poses and sizes."""
-
-    def __init__(self, problem: DesignProblem):
-        self.problem, machine = problem, problem.machine
-        self.length = choose_characteristic_length(machine)
-        self.scales = list_column_scales(machine, self.length)
-        drives = [drive.name for drive in machine.drives[: machine.leg_count]]
-        fitted = {f"{name}.{end}" for name in drives for end in ("min", "max")} if problem.fit_strokes else set()
-        self.counted = [i for i, name in enumerate(machine.limits) if name not in fitted]
-        self.limits = [machine.limits[i] for i in self.counted]
-        units = [machine.limit_definitions[i].unit for i in self.counted]
-        self.size = max(machine.leg_sizes)
-        powers = {"mm": 1.0, "mm²": 2.0}
-        self.limit_scales = np.array([self.size ** -powers.get(unit, 0.0) for unit in units])
-
-    def measure(self, x: Array, points: Array) -> Measures:
-        """Measure designs x (S, variables) at points (P, d) of the box."""
-        problem, family = self.problem, self.problem.family
-        middle = np.full((1, points.shape[1]), 0.5)
-        poses = problem.place_poses(x[:, None], np.concatenate([points, middle])[None])
-        sizes = x[:, None, : len(family.names)]
-        joints = family.inverse(poses, sizes)
-        margins = family.margins(poses, sizes)[..., self.counted] * self.limit_scales
-        feet = 2.0 * np.hypot(*np.moveaxis(family.base_joints(poses, sizes)[..., :2], -1, 0))
-        flat = np.broadcast_to(sizes, (*poses.shape[:-1], sizes.shape[-1]))
-        rates = family.twist_rates(
-            poses.reshape(-1, poses.shape[-1]), joints.reshape(-1, joints.shape[-1]), flat.reshape(-1, flat.shape[-1])
-        )
-        a, b = rates.a * self.scales[0], rates.b * self.scales[1]
-        psi = compute_extremes(a, b)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            side = np.linalg.det(a[:, : self._rows, : self._rows]).reshape(*poses.shape[:-1], 1)
-            side = side / side[:, -1:]
-        legs = joints[..., : problem.machine.leg_count]
-        psi = psi.reshape(*poses.shape[:-1], 2)
-        return Measures(*(array[:, :-1] for array in (margins, side, psi, legs, feet)))
+    def __init__(self, model: DesignModel, poses: Array, sizes: Array):
+        self._model, self._all, self._sizes = model, poses, sizes
 
     @property
-    def _rows(self) -> int:
-        return self.problem.machine.parallel_size
+    def _poses(self) -> Array:
+        return self._all[:, :-1]
+
+    @cached_property
+    def _all_joints(self) -> Array:
+        return self._model.family.inverse(self._all, self._sizes)
+
+    @property
+    def joints(self) -> Array:
+        """Joints of the legs' drives, (S, P, legs)."""
+        return self._all_joints[:, :-1, : self._model.machine.leg_count]
+
+    @cached_property
+    def margins(self) -> Array:
+        """Margins of the limits that count, ≥ 0 where they are kept, in parts of the machine's size or rad."""
+        model = self._model
+        return model.family.margins(self._poses, self._sizes)[..., model.counted] * model.limit_scales
+
+    @cached_property
+    def _rates(self) -> FamilyRates:
+        sizes = np.broadcast_to(self._sizes, (*self._all.shape[:-1], self._sizes.shape[-1]))
+        rows = (array.reshape(-1, array.shape[-1]) for array in (self._all, self._all_joints, sizes))
+        return self._model.family.twist_rates(*rows)
+
+    @cached_property
+    def side(self) -> Array:
+        """Det A by that of the pose that counts, > 0 on its side of the parallel singularities, (S, P, 1)."""
+        size = self._model.machine.parallel_size
+        with np.errstate(divide="ignore", invalid="ignore"):
+            side = np.linalg.det(self._rates.a[:, :size, :size]).reshape(*self._all.shape[:-1], 1)
+            return side[:, :-1] / side[:, -1:]
+
+    @cached_property
+    def psi(self) -> Array:
+        """The greatest velocity amplification and the reciprocal of the least, (S, P, 2)."""
+        rates, scales = self._rates, self._model.scales
+        psi = compute_extremes(rates.a * scales[0], rates.b * scales[1])
+        return psi.reshape(*self._all.shape[:-1], 2)[:, :-1]
+
+    @cached_property
+    def feet(self) -> Array:
+        """Twice the distance of the struts' joints at the base from the machine's Z axis, (S, P, struts) mm."""
+        feet = self._model.family.base_joints(self._poses, self._sizes)[..., :2]
+        return 2.0 * np.hypot(*np.moveaxis(feet, -1, 0))
+
+    @cached_property
+    def distances(self) -> Array:
+        """Distances of the axes of struts that share no joint, (S, P, pairs) mm."""
+        return self._model.measure_distances(self._poses, self._sizes)
+
+    @cached_property
+    def stiffness(self) -> Array:
+        """The tip's least stiffness over all directions, (S, P, 1) N/mm; zero at parallel singularities."""
+        model = self._model
+        ways = model.evaluate_quotient("compliance", model.trace_compliance, self._poses, self._sizes)
+        with np.errstate(divide="ignore"):
+            stiffness = compute_singular_values(ways)[..., :1] ** -2
+        stiffness[np.isinf(ways[..., 0, 0])] = 0.0
+        return stiffness
+
+    @cached_property
+    def deviation(self) -> Array:
+        """Root mean square of the tip's error within the tolerances, (S, P, 1) mm."""
+        model = self._model
+        ways = model.evaluate_quotient("error", model.trace_error, self._poses, self._sizes)
+        return np.sqrt(np.square(ways).sum((-2, -1)))[..., None]
 
 
 def compute_extremes(a: Array, b: Array) -> Array:

@@ -1,4 +1,4 @@
-"""Design problems: which numbers of a machine are free, what is wanted of it, and what is minimised."""
+"""Design problems: which numbers of a machine are free, what is wanted of it, and what is best."""
 
 from __future__ import annotations
 
@@ -11,11 +11,12 @@ import numpy as np
 
 from ..arrays import Array, AxisRange
 from ..errors import PoseError, quote, suggest
-from ..families.family import Family, make_family
+from ..families.family import Family
 from ..machine import Machine
-
-QUANTITIES = ("amplification", "greatest_amplification", "stroke", "footprint")  # that can be bounded and minimised
-MOST_OBJECTIVES = 2
+from .design_model import DesignModel
+from .measures import Measures
+from .pose_sets import PoseSet, make_box_set, make_cylinder_set
+from .wants import WANTS
 
 
 @dataclass(frozen=True, eq=False)
@@ -26,12 +27,19 @@ class DesignProblem:
     ----------
     free : the ranges of the machine's free numbers, by names of :attr:`Machine.parameters`
     box : (low, high) of each axis X, Y, Z, of the tool's orientation a range or one value; axes left out are as at home
-    minimise : one or two of the quantities that ``bounds`` can have and the free numbers
-    shift : how far the box may be moved: ranges by an axis, or by several that are moved together (``"X Y Z"``)
-    bounds : the greatest ``amplification`` λ (1/λ ≤ psi ≤ λ all over the box) or ``greatest_amplification`` (psi ≤ λ
-        alone), the greatest ``stroke`` of a leg's drive, the greatest ``footprint``: the diameter, about the machine's
-        Z axis, of the circle that holds the struts' joints at the base
-    fit_strokes : the ranges of the legs' drives become what the box needs; otherwise they are the machine's own
+    minimise, maximise : one or more of the free numbers, and of the quantities that ``bounds`` can have, each its way
+    shift : how far the poses may be moved: ranges by an axis, or by several that are moved together (``"X Y Z"``)
+    bounds : the greatest ``amplification`` λ (1/λ ≤ psi ≤ λ all over the poses), ``greatest_amplification`` (psi ≤ λ
+        alone) or ``condition`` number; the least ``stiffness`` of the tip over all directions, N/mm; the greatest
+        ``accuracy``, the root mean square of the tip's error within the tolerances; the least ``clearance`` of the axes
+        of struts that share no joint; the greatest ``stroke`` of a leg's drive; the greatest ``footprint``: the
+        diameter, about the machine's Z axis, of the circle that holds the struts' joints at the base
+    fit_strokes : the ranges of the legs' drives become what the poses need; otherwise they are the machine's own
+    cylinder : more poses, or these alone: ``along`` an axis, ``diameter``, the other axes as in ``box``, of those
+        across it the middle
+    poses : more of them, each as a box that may have no width
+    drives, struts : for stiffness, as of :func:`parakin.analyse_stiffness`
+    tolerances : for accuracy, as of :func:`parakin.analyse_accuracy`
 
     Raises :class:`PoseError` for a problem that makes no sense.
     """
@@ -39,10 +47,16 @@ class DesignProblem:
     machine: Machine
     free: Mapping[str, AxisRange]
     box: Mapping[str, AxisRange | float]
-    minimise: Sequence[str]
+    minimise: Sequence[str] = ()
     shift: Mapping[str, AxisRange] = field(default_factory=dict)
     bounds: Mapping[str, float] = field(default_factory=dict)
     fit_strokes: bool = False
+    maximise: Sequence[str] = ()
+    cylinder: Mapping[str, AxisRange | float | str] | None = None
+    poses: Sequence[Mapping[str, AxisRange | float]] = ()
+    drives: Mapping[str, str] | str | None = None
+    struts: Mapping[str, str] | str | None = None
+    tolerances: Mapping[str, str] | None = None
 
     def __repr__(self) -> str:
         return f"<parakin design problem of {self.machine.name}: {len(self.free)} free numbers>"
@@ -58,57 +72,84 @@ class DesignProblem:
             for name, (low, high) in ranges.items():
                 if not (isfinite(low) and isfinite(high) and low < high):
                     raise PoseError(f"{what}: {name}: a range that rises expected, not {low:g} to {high:g}")
-        self._check_box()
+        self._check_poses()
         self._check_wants()
 
-    def _check_box(self) -> None:
-        axes = self.machine.axes
-        for axis in (*self.box, *(axis for key in self.shift for axis in key.split())):
-            if axis not in axes:
-                raise PoseError(f"unknown axis {quote(axis)}, {self.machine.name} has {' '.join(axes)}")
-        for axis, (low, high) in self.ends.items():
-            if not (isfinite(low) and isfinite(high) and low <= high):
-                raise PoseError(f"box: {axis}: a range that rises expected, not {low:g} to {high:g}")
-        for axis in axes:
-            if axis in "XYZ" and axis not in self.box:
-                raise PoseError(f"box: {axis} is missing")
-        if not any(low < high for axis, (low, high) in self.ends.items() if axis in "XYZ"):
-            raise PoseError("box: a range of X, Y or Z expected")
+    def _check_poses(self) -> None:
         moved = [axis for key in self.shift for axis in key.split()]
-        if len(set(moved)) < len(moved) or not set(moved) <= set("XYZ"):
-            raise PoseError("shift: X, Y and Z expected, each once")
+        if len(set(moved)) < len(moved) or not set(moved) <= set("XYZ") & set(self.machine.axes):
+            axes = " ".join(axis for axis in self.machine.axes if axis in "XYZ")
+            raise PoseError(f"shift: some of {axes} expected, each once")
+        if not self.pose_sets:
+            raise PoseError("box: missing, as are cylinder and poses; one of them expected")
+        if self.box and not any(e[0] < e[1] for axis, e in self.pose_sets[0].ends.items() if axis in "XYZ"):
+            raise PoseError("box: a range of X, Y or Z expected")
 
     def _check_wants(self) -> None:
         for name, bound in self.bounds.items():
-            if name not in QUANTITIES:
-                raise PoseError(f"bounds: unknown {quote(name)}{suggest(name, QUANTITIES)}")
-            least = 1.0 if name == "amplification" else 0.0
+            if name not in WANTS:
+                raise PoseError(f"bounds: unknown {quote(name)}{suggest(name, tuple(WANTS))}")
+            least = WANTS[name].least
             if not (isfinite(bound) and bound > least):
-                raise PoseError(f"{name}: a bound above {least:g} expected, not {bound:g}")
-        if not 1 <= len(self.minimise) <= MOST_OBJECTIVES or len(set(self.minimise)) < len(self.minimise):
-            raise PoseError(f"minimise: one or two objectives expected, not {len(self.minimise)}")
-        known = [*QUANTITIES, *self.free]
-        for name in self.minimise:
-            if name not in known:
-                raise PoseError(f"minimise: unknown {quote(name)}{suggest(name, known)}")
-        if "stroke" in (*self.bounds, *self.minimise) and not self.fit_strokes:
+                raise PoseError(f"bounds: {name}: a number above {least:g} expected, not {bound:g}")
+        known = [*WANTS, *self.free]
+        for what, names in (("minimise", self.minimise), ("maximise", self.maximise)):
+            for name in names:
+                if name not in known:
+                    raise PoseError(f"{what}: unknown {quote(name)}{suggest(name, known)}")
+                if name in WANTS and WANTS[name].more != (what == "maximise"):
+                    way, key = ("more", "maximise") if WANTS[name].more else ("less", "minimise")
+                    raise PoseError(f"{what}: of {name} {way} is better; it belongs to {key}")
+        if not self.objectives:
+            raise PoseError("minimise: missing, as is maximise; one objective or more expected")
+        if len(set(self.objectives)) < len(self.objectives):
+            what = "maximise" if set(self.minimise) & set(self.maximise) else "minimise"
+            raise PoseError(f"{what}: each objective once expected")
+        psi, greatest = self.bounds.get("amplification"), self.bounds.get("greatest_amplification")
+        if psi is not None and greatest is not None and greatest * psi < 1.0:
+            low = f"{1.0 / psi:.6g}"
+            raise PoseError(
+                f"bounds: they contradict: amplification wants psi above {low}, greatest_amplification below"
+            )
+        if "stroke" in self.wants and not self.fit_strokes:
             raise PoseError("stroke: the drives' ranges are the machine's own; let them be fitted to the box")
+        if "clearance" in self.wants and not self.machine.trace_equations({}).list_strut_distances(
+            self.machine.home.tolist(), self.machine.mode
+        ):
+            raise PoseError("bounds: clearance: every two struts share a joint")
+        for name, needed in (("stiffness", "springs"), ("accuracy", "tolerances")):
+            if name in self.wants:
+                getattr(self.model, needed)
+
+    @property
+    def objectives(self) -> tuple[str, ...]:
+        """What is minimised, then what is maximised."""
+        return (*self.minimise, *self.maximise)
+
+    @property
+    def wants(self) -> tuple[str, ...]:
+        """The quantities that are bounded or are objectives, in the table's order."""
+        return tuple(name for name in WANTS if name in self.bounds or name in self.objectives)
+
+    def get_sign(self, name: str) -> float:
+        """Return what makes less of a quantity or a free number better."""
+        return WANTS[name].sign if name in WANTS else -1.0 if name in self.maximise else 1.0
 
     @cached_property
-    def ends(self) -> dict[str, AxisRange]:
-        """Low and high of every axis, the box where it is stated."""
-        home = dict(zip(self.machine.axes, self.machine.home.tolist(), strict=True))
-        given = {axis: self.box.get(axis, home[axis]) for axis in self.machine.axes}
-        return {axis: (e, e) if isinstance(e, (int, float)) else (e[0], e[1]) for axis, e in given.items()}
+    def pose_sets(self) -> tuple[PoseSet, ...]:
+        """The wanted poses: the box, the cylinder, then the others."""
+        sets = [make_box_set(self.machine, self.box, "box")] if self.box else []
+        sets += [] if self.cylinder is None else [make_cylinder_set(self.machine, self.cylinder)]
+        return (*sets, *(make_box_set(self.machine, axes, "poses") for axes in self.poses))
 
     @cached_property
-    def wide_axes(self) -> tuple[str, ...]:
-        """The axes along which the box has a width."""
-        return tuple(axis for axis, (low, high) in self.ends.items() if low < high)
+    def model(self) -> DesignModel:
+        free, own = list(self.free), (self.drives, self.struts, self.tolerances)
+        return DesignModel(self.machine, free, self.fit_strokes, *own)
 
-    @cached_property
+    @property
     def family(self) -> Family:
-        return make_family(self.machine, list(self.free))
+        return self.model.family
 
     @cached_property
     def variables(self) -> tuple[str, ...]:
@@ -120,22 +161,58 @@ class DesignProblem:
         """Low and high of each variable, (variables, 2)."""
         return np.array([*(self.free[name] for name in self.family.names), *self.shift.values()], float)
 
-    def place_box(self, x: Array) -> dict[str, AxisRange]:
-        """Place the box of a design x (variables,)."""
-        d = len(self.wide_axes)
-        low, high = self.place_poses(x, np.array([np.zeros(d), np.ones(d)])).tolist()
-        return {axis: (a, b) for axis, a, b in zip(self.machine.axes, low, high, strict=True)}
+    # Poses go by points: the number of a set, then its coordinates in a box of edges 1; columns of no use are 0.
+
+    @cached_property
+    def width(self) -> int:
+        """The columns of a point."""
+        return 1 + max(len(poses.coordinates) for poses in self.pose_sets)
+
+    def make_points(self, number: int, inside: Array) -> Array:
+        """Make points (P, width) of a set from those inside of its box of edges 1, (P, coordinates)."""
+        points = np.zeros((len(inside), self.width))
+        points[:, 0], points[:, 1 : 1 + inside.shape[1]] = number, inside
+        return points
+
+    @cached_property
+    def lattice(self) -> Array:
+        """Points all over the sets."""
+        return np.concatenate([self.make_points(i, poses.make_lattice()) for i, poses in enumerate(self.pose_sets)])
+
+    @property
+    def middle(self) -> Array:
+        """The middle of the first set, (1, width): the home of designs, on whose side of singularities poses lie."""
+        return self.make_points(0, np.full((1, len(self.pose_sets[0].coordinates)), 0.5))
 
     def place_poses(self, x: Array, points: Array) -> Array:
-        """Place poses of designs x (..., variables) at points (..., wide axes) of a box of edges 1; (..., axes)."""
-        lead = np.broadcast_shapes(x.shape[:-1], points.shape[:-1])
-        poses = np.empty((*lead, len(self.machine.axes)))
-        shifts = [set(key.split()) for key in self.shift]
-        for column, (axis, (low, high)) in enumerate(self.ends.items()):
-            poses[..., column] = low
-            if axis in self.wide_axes:
-                poses[..., column] += (high - low) * points[..., self.wide_axes.index(axis)]
-            for number, axes in enumerate(shifts, len(self.family.names)):
-                if axis in axes:
-                    poses[..., column] += x[..., number]
-        return poses
+        """Place poses of designs x (..., variables) at points (P, width); (..., P, axes)."""
+        still = np.empty((len(points), len(self.machine.axes)))
+        for number, poses in enumerate(self.pose_sets):
+            rows = points[:, 0] == number
+            still[rows] = poses.place_rows(points[rows, 1:])
+        moved = np.zeros((*x.shape[:-1], 1, still.shape[1]))
+        for column, key in enumerate(self.shift, len(self.family.names)):
+            for axis in key.split():
+                moved[..., 0, self.machine.axes.index(axis)] = x[..., column]
+        return still + moved
+
+    def move_sets(self, x: Array) -> tuple[PoseSet, ...]:
+        """Move the sets to where a design x (variables,) has them."""
+        shifts = dict(zip(self.shift, x[len(self.family.names) :].tolist(), strict=True))
+        by = {axis: shift for key, shift in shifts.items() for axis in key.split()}
+        return tuple(poses.move(by) for poses in self.pose_sets)
+
+    def measure(self, x: Array, points: Array) -> Measures:
+        """Measure designs x (S, variables) at points (P, width)."""
+        poses = self.place_poses(x, np.concatenate([points, self.middle]))
+        return Measures(self.model, poses, x[:, None, : len(self.family.names)])
+
+    def list_losses(self, name: str, x: Array, m: Measures) -> Array:
+        """List a quantity or a free number of designs, (S, R), less is better; the greatest of a row counts."""
+        if name not in WANTS:
+            return self.get_sign(name) * x[:, [self.variables.index(name)]]
+        want = WANTS[name]
+        values = want.measure(m)
+        if want.spread:
+            return np.asarray(values.max(1) - values.min(1))
+        return want.sign * values.reshape(len(x), -1)

@@ -1,6 +1,6 @@
 """The search for a design: differential evolution over a lattice of poses, then the exchange method over all of them.
 
-What must hold at every pose of a box is a semi-infinite program. The exchange method (Blankenship and Falk, 1976)
+What must hold at every pose of a set is a semi-infinite program. The exchange method (Blankenship and Falk, 1976)
 solves it for finitely many poses by sequential quadratic programming, adds those at which the answer is worst, and goes
 on.
 """
@@ -16,11 +16,12 @@ from scipy.optimize import OptimizeResult, differential_evolution, minimize
 from ..arrays import Array, Indices, Progress
 from ..budget import Budget
 from ..performance.search import search_maxima
-from .measures import LOST, DesignEvaluator, Measures
+from .measures import LOST, Measures
+from .problem import DesignProblem
+from .wants import WANTS
 
 SLACK = 1e-8  # in parts of the machine's size, or rad: by which limits are kept, so that this can be proved
-_ALONG = {1: 17, 2: 9, 3: 5, 4: 4}  # lattice points along each side of the box; 3 of more sides
-_LEAST_SIDE = 1e-3  # of det A in the box's middle
+_LEAST_SIDE = 1e-3  # of det A in the middle of the wanted poses
 _INFEASIBLE = 1e9  # added to what an infeasible design is worth
 _POPULATION = 12  # a variable
 _GENERATIONS = 100
@@ -30,32 +31,46 @@ _WORST = 4  # poses for a constraint to begin from
 _STEP = 1e-6  # of a variable's range, for derivatives
 _NEAR = 0.1  # of a variable's range, that a round of the exchange may go
 _KEPT = 1e-9  # by which a constraint may be broken in the end
+KEPT = 1e-8  # by which a search may break a want, relative
 
 
 @dataclass(frozen=True, eq=False)
 class Candidate:
     """A design x (variables,), what it is worth, and by how much it breaks which want; not proved.
 
-    points : (P, d) the poses of the box, of edges 1, that matter
+    points : (P, width) the poses that matter
     """
 
     x: Array
     value: float
     broken: float
     want: str
-    point: Array
     points: Array
 
 
-class DesignSearch:
-    """Minimises one quantity of a design while others are bounded."""
+@dataclass(frozen=True, eq=False)
+class Goal:
+    """What is minimised: of some quantities the greatest of (loss - reference)/scale, less is better."""
 
-    def __init__(self, evaluator: DesignEvaluator, objective: str, bounds: Mapping[str, float]):
-        self.evaluator, self.problem = evaluator, evaluator.problem
-        self.objective, self.bounds = objective, dict(bounds)
-        self.low, self.width = self.problem.ranges[:, 0], np.ptp(self.problem.ranges, axis=1)
-        self.lattice = _make_lattice(len(self.problem.wide_axes))
-        self.wants = [*evaluator.limits, "parallel singularity", *bounds]
+    names: tuple[str, ...]
+    references: tuple[float, ...] = (0.0,)
+    scales: tuple[float, ...] = (1.0,)
+
+    @property
+    def terms(self) -> list[tuple[str, float, float]]:
+        return list(zip(self.names, self.references, self.scales, strict=True))
+
+
+class DesignSearch:
+    """Minimises a goal while quantities are bounded."""
+
+    def __init__(self, problem: DesignProblem, goal: Goal, bounds: Mapping[str, float]):
+        """Take bounds of losses, the greatest ones, by names of quantities and of free numbers."""
+        self.problem, self.goal, self.bounds = problem, goal, dict(bounds)
+        self.low, self.width = problem.ranges[:, 0], np.ptp(problem.ranges, axis=1)
+        self.lattice = problem.lattice
+        self.wants = [*problem.model.limits, "parallel singularity", *bounds]
+        self.columns = [WANTS[name] for name in dict.fromkeys((*bounds, *goal.names)) if name in WANTS]
 
     def run(self, budget: Budget, seeds: Sequence[Array] = (), progress: Progress | None = None) -> Candidate:
         """Search for the best design; where none keeps all wants, for the one that breaks them least."""
@@ -65,30 +80,29 @@ class DesignSearch:
     # Values and violations, for batches of designs.
 
     def _measure(self, x: Array, points: Array) -> Measures:
-        return self.evaluator.measure(self.low + self.width * x, points)
+        return self.problem.measure(self.low + self.width * x, points)
 
-    def _list_values(self, name: str, x: Array, m: Measures) -> Array:
-        """List a quantity (S, R); the greatest of a row is what the design is worth."""
-        if name == "amplification":
-            return m.psi.reshape(len(x), -1)
-        if name == "greatest_amplification":
-            return np.asarray(m.psi[..., 0])
-        if name == "footprint":
-            return m.feet.reshape(len(x), -1)
-        if name == "stroke":
-            return np.asarray(m.joints.max(1) - m.joints.min(1))
-        column = self.problem.variables.index(name)
-        return np.asarray((self.low + self.width * x)[:, [column]])
+    def _list_losses(self, name: str, x: Array, m: Measures) -> Array:
+        return self.problem.list_losses(name, self.low + self.width * x, m)
 
     def _list_margins(self, m: Measures) -> Array:
         """List margins of limits and of singularities, (S, P, k), ≥ 0 where they are kept with some slack."""
         return np.concatenate([m.margins - SLACK, m.side - _LEAST_SIDE], -1)
 
+    def _measure_goal(self, x: Array, m: Measures) -> Array:
+        """Measure what designs are worth, (S,)."""
+        each = [(self._list_losses(name, x, m).max(1) - low) / scale for name, low, scale in self.goal.terms]
+        return np.asarray(np.max(each, axis=0))
+
     def _measure_violations(self, x: Array, m: Measures) -> Array:
         """Measure by how much each want is broken, (S, wants)."""
         lost = np.nan_to_num(np.maximum(-self._list_margins(m), 0.0), nan=LOST, posinf=LOST)
         over = [
-            np.nan_to_num(np.maximum(self._list_values(name, x, m) / bound - 1.0, 0.0), nan=LOST, posinf=1e3 * LOST)
+            np.nan_to_num(
+                np.maximum((self._list_losses(name, x, m) - bound) / _scale_bound(bound), 0.0),
+                nan=LOST,
+                posinf=1e3 * LOST,
+            )
             for name, bound in self.bounds.items()
         ]
         each = [lost.max(1) + lost.mean(1), *((o.max(1) + o.mean(1))[:, None] for o in over)]
@@ -103,7 +117,7 @@ class DesignSearch:
             x = np.ascontiguousarray(np.atleast_2d(columns.T))
             m = self._measure(x, self.lattice)
             violation = self._measure_violations(x, m).sum(1)
-            value = np.nan_to_num(self._list_values(self.objective, x, m).max(1), nan=_INFEASIBLE, posinf=_INFEASIBLE)
+            value = np.nan_to_num(self._measure_goal(x, m), nan=_INFEASIBLE, posinf=_INFEASIBLE)
             return np.asarray(np.where(violation > 0.0, _INFEASIBLE * (1.0 + violation), value))
 
         def report(intermediate_result: OptimizeResult) -> bool:
@@ -146,58 +160,67 @@ class DesignSearch:
     def _judge(self, x: Array, points: Array) -> Candidate:
         m = self._measure(x[None], points)
         violations = self._measure_violations(x[None], m)[0]
-        value = float(self._list_values(self.objective, x[None], m).max())
-        want = int(violations.argmax())
-        if want < len(self.wants) - len(self.bounds):
-            margins = np.nan_to_num(self._list_margins(m)[0, :, want], nan=-LOST)
-            point = points[int(margins.argmin())]
-        else:
-            point = np.full(points.shape[1], 0.5)
-        return Candidate(self.low + self.width * x, value, float(violations.max()), self.wants[want], point, points)
+        value = float(self._measure_goal(x[None], m)[0])
+        want = self.wants[int(violations.argmax())]
+        return Candidate(self.low + self.width * x, value, float(violations.max()), want, points)
 
     def _list_columns(self, m: Measures) -> Array:
         """List everything of poses that has a worst one, (S, P, k): the least are sought."""
-        return np.concatenate([self._list_margins(m), -m.psi, -m.feet, m.joints, -m.joints], -1)
+        columns = [self._list_margins(m)]
+        columns += [-want.sign * want.measure(m) for want in self.columns]
+        if self.problem.fit_strokes or any(want.spread for want in self.columns):
+            columns += [m.joints, -m.joints]
+        return np.concatenate(columns, -1)
 
     def _find_worst(self, x: Array, points: Array) -> Array:
-        """Find the poses at which each constraint, joint and quantity is worst, (P, d), by search from a lattice."""
+        """Find the poses (P, width) at which each constraint, joint and quantity is worst, by search from a lattice."""
         columns = np.nan_to_num(self._list_columns(self._measure(x[None], points))[0], nan=-LOST)
         count = columns.shape[1]
         starts = np.argpartition(columns, min(_WORST, len(points) - 1), axis=0)[:_WORST]
         owners = np.tile(np.arange(count), len(starts))
+        begin = points[starts.reshape(-1)]
+        sets = begin[:, :1]
+
+        def place(tries: Array, search: Indices) -> Array:
+            return np.concatenate([sets[search], np.clip(tries, 0.0, 1.0)], 1)
 
         def evaluate(tries: Array, search: Indices) -> Array:
             inside = ((tries >= 0.0) & (tries <= 1.0)).all(1)
-            at = self._list_columns(self._measure(x[None], np.clip(tries, 0.0, 1.0)))[0]
+            at = self._list_columns(self._measure(x[None], place(tries, search)))[0]
             return np.where(inside, -at[np.arange(len(tries)), owners[search]], np.nan)
 
-        worst, _ = search_maxima(evaluate, points[starts.reshape(-1)], np.full(points.shape[1], 0.25), 1e-7)
-        return np.unique(np.round(np.clip(worst, 0.0, 1.0), 9), axis=0)
+        step = np.full(points.shape[1] - 1, 0.25)
+        worst, _ = search_maxima(evaluate, begin[:, 1:], step, 1e-7)
+        return np.unique(np.round(place(worst, np.arange(len(worst))), 9), axis=0)
 
     def _solve_for_points(self, x: Array, points: Array) -> Array:
         """Minimise over finitely many poses, near x, by sequential quadratic programming with an epigraph variable."""
         m = self._measure(x[None], points)
-        scale = max(abs(float(self._list_values(self.objective, x[None], m).max())), 1e-9)
-        if not np.isfinite(scale) or not np.isfinite(self._list_margins(m)).all():
+        value = float(self._measure_goal(x[None], m)[0])
+        if not np.isfinite(value) or not np.isfinite(self._list_margins(m)).all():
             return x
+        size = max(abs(value), 1e-9) if len(self.goal.names) == 1 else 1.0
         ends = np.stack([m.joints[0].argsort(0)[:6], (-m.joints[0]).argsort(0)[:6]])  # (2, 6, joints)
 
         def list_rows(z: Array) -> Array:
             """List constraints (S, R) of designs with their epigraph variable (S, n + 1)."""
-            own, t = z[:, :-1], scale * z[:, -1:]
+            own, t = z[:, :-1], size * z[:, -1:]
             at = self._measure(own, points)
             rows = [self._list_margins(at).reshape(len(z), -1)]
-            for name, bound in [*((n, np.full_like(t, b)) for n, b in self.bounds.items()), (self.objective, t)]:
-                if name == "stroke":
-                    columns = np.arange(at.joints.shape[2])
-                    least, most = (at.joints[:, ends[side], columns] for side in (0, 1))
-                    values = (most[:, :, None] - least[:, None]).reshape(len(z), -1)
+            ceilings = [(name, np.full_like(t, bound), _scale_bound(bound)) for name, bound in self.bounds.items()]
+            ceilings += [(name, low + scale * t, scale * size) for name, low, scale in self.goal.terms]
+            for name, ceiling, scale in ceilings:
+                if name in WANTS and WANTS[name].spread:
+                    values = WANTS[name].measure(at)
+                    columns = np.arange(values.shape[2])
+                    least, most = (values[:, ends[side], columns] for side in (0, 1))
+                    losses = (most[:, :, None] - least[:, None]).reshape(len(z), -1)
                 else:
-                    values = self._list_values(name, own, at)
-                rows.append((bound - values) / np.where(name == self.objective, scale, bound))
+                    losses = self._list_losses(name, own, at)
+                rows.append((ceiling - losses) / scale)
             return np.concatenate(rows, 1)
 
-        start = np.append(x, 1.0)
+        start = np.append(x, value / size)
         chosen = np.argsort(list_rows(start[None])[0], kind="stable")[:_ROWS]
         steps = _STEP * np.eye(len(start))
 
@@ -219,6 +242,6 @@ class DesignSearch:
         return np.clip(optimum.x[:-1], 0.0, 1.0) if np.isfinite(optimum.x).all() else x
 
 
-def _make_lattice(d: int) -> Array:
-    line = np.linspace(0.0, 1.0, _ALONG.get(d, 3))
-    return np.stack(np.meshgrid(*[line] * d, indexing="ij"), -1).reshape(-1, d)
+def _scale_bound(bound: float) -> float:
+    """Scale by which breaking a bound counts: its size."""
+    return max(abs(bound), 1e-9)

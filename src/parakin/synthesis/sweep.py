@@ -14,8 +14,9 @@ from ..arrays import Array, Flags, Indices, split_rows
 from ..errors import PoseError
 from ..kernels.batch import find_first_negative
 from ..version import __version__
-from .measures import DesignEvaluator
-from .problem import QUANTITIES, DesignProblem
+from .pose_sets import PoseSet
+from .problem import DesignProblem
+from .wants import JACOBIANS, WANTS
 
 _ROWS = 1 << 22  # designs times poses of a chunk
 _AT_ONCE = 1 << 16  # of them at a time: they stay in the cache
@@ -29,7 +30,7 @@ class SweepPlan:
     """What a sweep looks at; each of its chunks is the same whoever evaluates it, and whenever.
 
     problem : whose free numbers are drawn, evenly over their ranges
-    designs, poses : how many of each; the poses are the corners of the box and places drawn evenly in it
+    designs, poses : how many of each; the poses are the corners of the sets and places drawn evenly in them
     seed : of what is drawn
 
     Raises :class:`PoseError` for numbers that make no sense.
@@ -43,9 +44,9 @@ class SweepPlan:
     def __post_init__(self) -> None:
         if self.designs < 1:
             raise PoseError(f"designs: one or more expected, not {self.designs}")
-        corners = 2 ** len(self.problem.wide_axes)
+        corners = self._corner_count
         if not corners <= self.poses <= _MOST_POSES:
-            raise PoseError(f"poses: {corners:,} (the box's corners) to {_MOST_POSES:,} expected, not {self.poses:,}")
+            raise PoseError(f"poses: {corners:,} (the corners) to {_MOST_POSES:,} expected, not {self.poses:,}")
         if self.chunk_count > _MOST_CHUNKS:
             raise PoseError(
                 f"designs: at most {_MOST_CHUNKS * self.chunk_size:,} at so many poses, not {self.designs:,}"
@@ -68,16 +69,22 @@ class SweepPlan:
     @property
     def quantities(self) -> tuple[str, ...]:
         """The quantities that the problem bounds or minimises."""
-        named = (*self.problem.bounds, *self.problem.minimise)
-        return tuple(name for name in QUANTITIES if name in named)
+        return self.problem.wants
 
     @cached_property
     def points(self) -> Array:
-        """(poses, wide axes) of a box of edges 1."""
-        d = len(self.problem.wide_axes)
-        corners = np.stack(np.meshgrid(*[[0.0, 1.0]] * d, indexing="ij"), -1).reshape(-1, d)
-        drawn = np.random.default_rng([self.seed, 0]).random((self.poses - len(corners), d))
-        return np.concatenate([corners, drawn])
+        """Points (poses, width) of the problem: the corners of each set, then some drawn evenly in each by turns."""
+        sets = self.problem.pose_sets
+        drawn = np.random.default_rng([self.seed, 0]).random((self.poses - self._corner_count, self.problem.width - 1))
+        groups = []
+        for number, poses in enumerate(sets):
+            inside = np.concatenate([_list_corners(poses), drawn[number :: len(sets), : len(poses.coordinates)]])
+            groups.append(self.problem.make_points(number, inside))
+        return np.concatenate(groups)
+
+    @property
+    def _corner_count(self) -> int:
+        return sum(len(_list_corners(poses)) for poses in self.problem.pose_sets)
 
     def draw_designs(self, chunk: int) -> Array:
         """Draw the designs of a chunk, (S, variables); mm and rad."""
@@ -92,8 +99,10 @@ class SweepPlan:
         problem = self.problem
         said = (
             __version__,
-            problem.machine.format_yaml(), sorted(problem.free.items()), sorted(problem.ends.items()),
-            sorted(problem.shift.items()), sorted(problem.bounds.items()), tuple(problem.minimise),
+            problem.machine.format_yaml(), sorted(problem.free.items()),
+            [(sorted(poses.ends.items()), poses.across, poses.diameter) for poses in problem.pose_sets],
+            sorted(problem.shift.items()), sorted(problem.bounds.items()), problem.objectives,
+            problem.drives, problem.struts, problem.tolerances,
             problem.fit_strokes, self.designs, self.poses, self.seed,
         )  # fmt: skip
         return sha256(repr(said).encode()).hexdigest()
@@ -104,8 +113,8 @@ class SweepChunk(NamedTuple):
 
     designs : (S, variables) mm and rad
     allowed : (S,) at what share of the poses the limits are kept
-    limit : (S,) which of the evaluator's limits is the first broken at most of the others; -1 where none is
-    values : (S, quantities) the greatest at any pose: infinite where one is out of reach or singular
+    limit : (S,) which of the limits that count is the first broken at most of the others; -1 where none is
+    values : (S, quantities) the worst at any pose: infinite, or zero, where one is out of reach or singular
     keeps : (S,) whether all limits and bounds are kept at these poses
     """
 
@@ -121,9 +130,8 @@ class SweepEvaluator:
 
     def __init__(self, plan: SweepPlan):
         self.plan, self.problem = plan, plan.problem
-        self.evaluator = DesignEvaluator(plan.problem)
-        self.limits = self.evaluator.limits
-        self._tape = self.problem.family.make_check_tape(self.evaluator.counted)
+        self.limits = self.problem.model.limits
+        self._tape = self.problem.family.make_check_tape(self.problem.model.counted)
 
     def evaluate(self, chunk: int) -> SweepChunk:
         """Evaluate one of the plan's chunks."""
@@ -140,8 +148,7 @@ class SweepEvaluator:
         allowed = broken[:, 0] / self.plan.poses
         limit = np.where(broken[:, 0] < self.plan.poses, broken[:, 1:].argmax(1), -1)
         values = self._measure_quantities(x)
-        bounds = np.array([self.problem.bounds.get(name, np.inf) for name in self.plan.quantities])
-        keeps = (limit < 0) & (np.isfinite(values) & (values <= bounds)).all(1)
+        keeps = (limit < 0) & self._find_kept(values)
         return SweepChunk(x, allowed, limit, values, keeps)
 
     def find_broken(self, x: Array) -> Indices:
@@ -153,7 +160,7 @@ class SweepEvaluator:
         """List the poses of designs, (S * poses, axes)."""
         axes = len(self.problem.machine.axes)
         if self.problem.shift:
-            return self.problem.place_poses(x[:, None], self.plan.points[None]).reshape(-1, axes)
+            return self.problem.place_poses(x, self.plan.points).reshape(-1, axes)
         return self._same_poses[: len(x) * self.plan.poses]
 
     @cached_property
@@ -184,14 +191,28 @@ class SweepEvaluator:
         names = self.plan.quantities
         if not names:
             return np.empty((len(x), 0))
-        m = self.evaluator.measure(x, self.plan.points)
-        columns = {
-            "amplification": lambda: m.psi.max((1, 2)),
-            "greatest_amplification": lambda: m.psi[..., 0].max(1),
-            "stroke": lambda: (m.joints.max(1) - m.joints.min(1)).max(1),
-            "footprint": lambda: m.feet.max((1, 2)),
-        }
-        values: Array = np.nan_to_num(np.stack([columns[name]() for name in names], 1), nan=np.inf, posinf=np.inf)
-        if any("amplification" in name for name in names):  # beyond a singularity no bound is kept
-            values[~(m.side > 0.0).all((1, 2))] = np.inf
-        return values
+        m = self.problem.measure(x, self.plan.points)
+        signs = np.array([WANTS[name].sign for name in names])
+        losses = np.stack([self.problem.list_losses(name, x, m).max(1) for name in names], 1)
+        if any(name in JACOBIANS for name in names):  # beyond a singularity no bound is kept
+            losses[~(m.side > 0.0).all((1, 2))] = np.nan
+        worst = np.where(signs > 0.0, np.inf, 0.0)
+        return np.where(np.isfinite(losses), signs * losses, worst)
+
+    def _find_kept(self, values: Array) -> Flags:
+        """Tell which designs keep all bounds, (S,)."""
+        kept: Flags = np.ones(len(values), np.bool_)
+        for name, column in zip(self.plan.quantities, values.T, strict=True):
+            want = WANTS[name]
+            kept &= np.isfinite(column) & (
+                want.sign * column <= want.sign * self.problem.bounds.get(name, np.inf * want.sign)
+            )
+            if want.more:
+                kept &= column > 0.0
+        return kept
+
+
+def _list_corners(poses: PoseSet) -> Array:
+    """List the corners of a set's box of edges 1, (corners, coordinates)."""
+    ends = [[0.0, 1.0] if low < high else [0.5] for low, high in poses.coordinates.values()]
+    return np.stack(np.meshgrid(*ends, indexing="ij"), -1).reshape(-1, len(ends))

@@ -15,11 +15,13 @@ def encode_designs(designs: Designs, files: Sequence[str]) -> dict[str, Any]:
         "schema": "parakin.designs/1",
         "machine": designs.problem.machine.name,
         "minimise": list(designs.problem.minimise),
+        "maximise": list(designs.problem.maximise),
         "bounds": dict(designs.problem.bounds),
         "designs": [
             {
                 "sizes": dict(design.sizes),
                 "values": dict(design.values),
+                "proved": dict(design.proved),
                 "box": {axis: list(ends) for axis, ends in design.box.items()},
                 "ranges": {name: list(ends) for name, ends in design.ranges.items()},
                 "verdict": "proved",

@@ -63,7 +63,8 @@ class PoseBox:
         return self.inputs[0].trace if self.inputs else JumpFreeTrace()
 
     @cached_property
-    def _pose(self) -> list[Scalar]:
+    def pose(self) -> list[Scalar]:
+        """The whole pose as terms of the inputs."""
         varied = dict(zip(self.ranges, self.inputs, strict=True))
         return [varied[axis] if axis in varied else np.float64(self.fixed_axes[axis]) for axis in self.machine.axes]
 
@@ -71,8 +72,8 @@ class PoseBox:
     def _rates(self) -> tuple[TwistRates, list[Scalar]]:
         machine = self.machine
         with np.errstate(all="ignore"):
-            joints, platform, legs = machine.trace_inverse(self._pose, self.mode)
-            rates = machine.trace_rates(self._pose, joints)
+            joints, platform, legs = machine.trace_inverse(self.pose, self.mode)
+            rates = machine.trace_rates(self.pose, joints)
         columns_a, columns_b = list_column_scales(machine, self.length)
         a = [[x * float(k) for x, k in zip(row, columns_a, strict=True)] for row in rates.a]
         b = [[x * float(k) for x, k in zip(row, columns_b, strict=True)] for row in rates.b]
@@ -119,7 +120,7 @@ class PoseBox:
         """The matrix that is singular at constraint singularities: the constraints' rates, angles times the length."""
         scales = list_constraint_scales(self.machine, self.length)
         with np.errstate(all="ignore"):
-            rates = self.machine.trace_constraint_rates(self._pose)
+            rates = self.machine.trace_constraint_rates(self.pose)
         return [[rate * float(k) for rate, k in zip(row, scales, strict=True)] for row in rates]
 
 

@@ -70,8 +70,10 @@ class NormSearch:
         ]
         self.best, self.point = -np.inf, 0.5 * (self.box.low + self.box.high)
 
-    def bracket(self, tolerance: float, budget: Budget, bound: float, progress: Progress | None = None) -> NormBracket:
-        """Bracket it until high ≤ low·(1 + tolerance), or until the budget is spent.
+    def bracket(
+        self, tolerance: float, budget: Budget, bound: float, progress: Progress | None = None, enough: float = 0.0
+    ) -> NormBracket:
+        """Bracket it until high ≤ low·(1 + tolerance), or high ≤ ``enough``, or until the budget is spent.
 
         Only a small part of the budget is spent once it is known to exceed ``bound``.
         """
@@ -83,7 +85,7 @@ class NormSearch:
         top = -np.inf  # of what was decided
         closed = False
         while True:
-            is_open = upper > self.best * (1.0 + tolerance)
+            is_open = upper > max(self.best * (1.0 + tolerance), enough)
             top = max(top, float(upper[~is_open].max(initial=-np.inf)))
             low, high, upper, axis = low[is_open], high[is_open], upper[is_open], axis[is_open]
             closed = not len(low)

@@ -66,25 +66,39 @@ def prove_boxes(
         raise PoseError(f"two corners of {' '.join(region.free_axes)} expected of a box")
     if not (np.isfinite(bottom).all() and np.isfinite(top).all() and (bottom <= top).all()):
         raise PoseError("two finite corners expected of a box, the lower one first")
-    bisection = _BoxBisection(region, bottom, top, more, most, budget or Budget(None))
-    if region.every_orientation or not bisection.constraints:
-        for number, constraint in enumerate(bisection.constraints):
-            bisection.prove_constraint(number, constraint)
-        bisection.proved[:] = bisection.undecided
-    else:
-        bisection.prove_at_best_orientations()
+    constraints = [*(c for c in region.constraints if not c.implied), *more]
+    bisection = _BoxBisection(constraints, region.swept_bounds, bottom, top, most, budget or Budget(None))
+    if region.every_orientation or not constraints:
+        return bisection.prove_all_orientations()
+    bisection.prove_at_best_orientations(region, more)
     return bisection.result
+
+
+def prove_constraints(
+    constraints: Sequence[Constraint], low: Array, high: Array, most: int = MOST, budget: Budget | None = None
+) -> Containment:
+    """Prove that constraints are kept all over a box [low, high] of their positions and orientations, as one box."""
+    d = len(constraints[0].position)
+    boxes = _BoxBisection(constraints, (low[d:], high[d:]), low[None, :d], high[None, :d], most, budget or Budget(None))
+    return boxes.prove_all_orientations()
 
 
 class _BoxBisection:
     """N boxes in sub-boxes; ``undecided`` are those whose sub-boxes are all proved so far or can still be."""
 
-    def __init__(self, region: Region, low: Array, high: Array, more: Sequence[Constraint], most: int, budget: Budget):
-        self.region, self.low, self.high, self.more = region, low, high, more
+    def __init__(
+        self,
+        constraints: Sequence[Constraint],
+        swept: tuple[Array, Array],
+        low: Array,
+        high: Array,
+        most: int,
+        budget: Budget,
+    ):
+        self.constraints, self.low, self.high = constraints, low, high
         self.most, self.budget = most, budget
-        self.constraints = [*(c for c in region.constraints if not c.implied), *more]
         n, self.d = low.shape
-        self.first, self.last = region.swept_bounds
+        self.first, self.last = swept
         self.proved, self.limit = np.zeros(n, np.bool_), np.full(n, -1, np.int64)
         self.positions, self.orientations = np.full(low.shape, np.nan), np.full((n, len(self.first)), np.nan)
         self.boxes, self.undecided = np.zeros(n, np.int64), np.ones(n, np.bool_)
@@ -102,7 +116,14 @@ class _BoxBisection:
             self.undecided[box] = False
         return np.asarray(self.undecided[box])
 
-    def prove_constraint(self, number: int, constraint: Constraint) -> None:
+    def prove_all_orientations(self) -> Containment:
+        """Prove every constraint at all orientations."""
+        for number, constraint in enumerate(self.constraints):
+            self._prove_constraint(number, constraint)
+        self.proved[:] = self.undecided
+        return self.result
+
+    def _prove_constraint(self, number: int, constraint: Constraint) -> None:
         """Prove one constraint at all orientations: sub-boxes are boxes of both, bisected where bounds are widest."""
         d = self.d
         # A determinant's bounds are wider than those of limits, and it gets a budget of its own.
@@ -132,7 +153,7 @@ class _BoxBisection:
             box, low, high = _bisect_sub_boxes(box, low, high, _measure_spread(constraint, low, high, d))
         self.undecided[box] = False
 
-    def prove_at_best_orientations(self) -> None:
+    def prove_at_best_orientations(self, region: Region, more: Sequence[Constraint]) -> None:
         """Prove each sub-box by one orientation allowed all over it: that of its whole, or the best at its middle."""
         box, low, high = np.arange(len(self.low)), self.low, self.high
         orientations: Array | None = None
@@ -145,7 +166,7 @@ class _BoxBisection:
             if not len(box):
                 break
             middle = 0.5 * (low + high)
-            orientations, margins = self._find_best_orientations(middle)
+            orientations, margins = self._find_best_orientations(region, middle, more)
             if self.budget.is_spent():
                 break
             broken = ~(margins >= 0.0).all(1)
@@ -160,15 +181,17 @@ class _BoxBisection:
         self.undecided[box] = False
         self.proved[:] = self.undecided
 
-    def _find_best_orientations(self, positions: Array) -> tuple[Array, Array]:
+    def _find_best_orientations(
+        self, region: Region, positions: Array, more: Sequence[Constraint]
+    ) -> tuple[Array, Array]:
         """Find the best orientation at each position, and the margins there; NaN where the budget does not allow it."""
-        names = [*self.region.limits, *(constraint.name for constraint in self.more)]
+        names = [*region.limits, *(constraint.name for constraint in more)]
         orientations = np.full((len(positions), len(self.first)), np.nan)
         margins = np.full((len(positions), len(names)), np.nan)
         for block in split_rows(len(positions), _AT_ONCE):
             if self.budget.is_spent():
                 break
-            orientations[block], margins[block] = find_best_orientations(self.region, positions[block], self.more)
+            orientations[block], margins[block] = find_best_orientations(region, positions[block], more)
         return orientations, margins
 
     def _prove_at_orientations(self, low: Array, high: Array, orientations: Array) -> Flags:

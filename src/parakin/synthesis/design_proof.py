@@ -1,0 +1,80 @@
+"""The proof of a design: its limits and bounds hold at every wanted pose, by intervals."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from ..budget import Budget
+from ..machine import Machine
+from ..performance.certified.quotient_norms import NormSearch
+from ..performance.characteristic_length import choose_characteristic_length
+from ..workspaces.certified.assembly_mode import make_side_constraints
+from ..workspaces.certified.constraints import Constraint
+from ..workspaces.certified.containment import prove_constraints
+from .pose_sets import PoseSet
+from .problem import DesignProblem
+from .wants import WANTS, MarginProof, NormProof
+
+TOLERANCE = 1e-6  # relative, within which bounds are kept
+_CLOSE = 0.25 * TOLERANCE  # between what is attained and what is proved, relative
+_BOXES = 200_000  # of a proof
+
+
+class DesignProof:
+    """Proves what is wanted of a design all over its wanted poses.
+
+    sets : the poses, where the design has them
+    sizes : its free numbers
+    boxes : how many parts of the sets the proofs examined
+    """
+
+    def __init__(
+        self,
+        problem: DesignProblem,
+        machine: Machine,
+        sets: tuple[PoseSet, ...],
+        sizes: Mapping[str, float],
+        budget: Budget,
+    ):
+        self.problem, self.machine, self.sets, self.sizes, self.budget = problem, machine, sets, sizes, budget
+        self.length = choose_characteristic_length(machine, problem.model.length.value)
+        self.boxes = 0
+
+    def prove_margins(self, bounds: Mapping[str, float]) -> str:
+        """Prove the limits, the side of the singularities, and bounds that are margins; returns what fails, or ""."""
+        for number, poses in enumerate(self.sets):
+            traced = poses.trace(self.machine)
+            constraints = [c for c in traced.build_constraints() if not c.implied]
+            constraints.append(make_side_constraints(traced)[0])
+            d = len(traced.free_axes)
+            position, orientation = traced.inputs[:d], traced.inputs[d:]
+            for name, bound in bounds.items():
+                proof = WANTS[name].proof
+                assert isinstance(proof, MarginProof)
+                margins = proof.trace(self.machine, traced.pose, bound)
+                constraints += [Constraint(name, margin, position, orientation) for margin in margins]
+            budget = self.budget.take_fraction(0.5 / (len(self.sets) - number))
+            containment = prove_constraints(constraints, *poses.bounds, _BOXES, budget)
+            self.boxes += int(containment.boxes[0])
+            limit = int(containment.limit[0])
+            if limit >= 0:
+                return f"{containment.names[limit]} is broken at a wanted pose"
+            if not containment.proved[0]:
+                return "left undecided"
+        return ""
+
+    def bound_norm(self, name: str, bound: float, seconds: float) -> float | None:
+        """Bound the worst value of a quantity, closely or so far that a bound is kept; None where it can't be."""
+        proof = WANTS[name].proof
+        assert isinstance(proof, NormProof)
+        most, worst, budget = bound**proof.power, 0.0, Budget(max(seconds, 1e-3), _BOXES)
+        for poses in self.sets:
+            box = poses.make_box(self.machine, self.length)
+            for quotients in proof.trace(self.problem.model, box, self.sizes):
+                search = NormSearch(box, quotients)
+                bracket = search.bracket(_CLOSE, budget, most, enough=most)
+                worst = max(worst, bracket.high)
+        self.boxes += budget.used
+        return worst ** (1.0 / proof.power) if np.isfinite(worst) else None

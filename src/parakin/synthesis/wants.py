@@ -1,0 +1,117 @@
+"""The table of what can be wanted of a design: its value over the poses, which way is better, how it is proved."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+from ..algebra import Scalar, dot
+from ..arrays import Array
+from ..machine import Machine
+from ..performance.certified.interval_matrices import PoseBox
+from ..performance.certified.quotient_norms import Quotient
+from ..units import LENGTH, NUMBER, STIFFNESS, QuantityKind
+from .design_model import DesignModel, TracedQuotient
+from .measures import Measures
+
+_UNITS = {NUMBER: "", LENGTH: "mm", STIFFNESS: "N/mm"}
+_Margins = Callable[[Machine, Sequence[Scalar], float], list[Scalar]]
+_Quotients = Callable[[DesignModel, PoseBox, Mapping[str, Scalar]], list[list[Quotient]]]
+
+
+@dataclass(frozen=True)
+class MarginProof:
+    """Proved by margins that are ≥ 0 where a bound is kept, traced from a machine, a pose and the bound."""
+
+    trace: _Margins
+
+
+@dataclass(frozen=True)
+class NormProof:
+    """Proved by products of norms, each of which must be no greater than the bound to a power.
+
+    trace : their quotients over a box of poses, for sizes by their names
+    """
+
+    trace: _Quotients
+    power: float = 1.0
+
+
+@dataclass(frozen=True)
+class Want:
+    """What can be bounded, and minimised or maximised.
+
+    kind : of its value
+    measure : its values at poses, (S, P, k); the worst of all counts
+    proof : by which a bound is proved at every pose; None where the limits' own proof is one
+    more : whether greater is better
+    least : what a bound must exceed
+    spread : what counts is how far each column spreads over the poses
+    """
+
+    kind: QuantityKind
+    measure: Callable[[Measures], Array]
+    proof: MarginProof | NormProof | None
+    more: bool = False
+    least: float = 0.0
+    spread: bool = False
+
+    @property
+    def unit(self) -> str:
+        """The unit of its value; none of a number."""
+        return _UNITS[self.kind]
+
+    @property
+    def sign(self) -> float:
+        """What makes less of it better."""
+        return -1.0 if self.more else 1.0
+
+
+def _bound_feet(machine: Machine, pose: Sequence[Scalar], diameter: float) -> list[Scalar]:
+    feet = machine.trace_equations({}).list_feet(pose, machine.mode)
+    return [1.0 - dot(foot[:2], foot[:2]) * (4.0 / diameter**2) for foot in feet]
+
+
+def _bound_distances(machine: Machine, pose: Sequence[Scalar], least: float) -> list[Scalar]:
+    distances = machine.trace_equations({}).list_strut_distances(pose, machine.mode)
+    return [distance - least for distance in distances]
+
+
+def _scale_columns(model: DesignModel, box: PoseBox, trace: TracedQuotient, sizes: Mapping[str, Scalar]) -> Quotient:
+    a, w = trace(box.pose, sizes)
+    return Quotient([[x * k for x, k in zip(row, model.scales[0].tolist(), strict=True)] for row in a], w)
+
+
+def _list_compliance(model: DesignModel, box: PoseBox, sizes: Mapping[str, Scalar]) -> list[list[Quotient]]:
+    return [[_scale_columns(model, box, model.trace_compliance, sizes)._replace(rows=model.tip)]]
+
+
+def _list_error(model: DesignModel, box: PoseBox, sizes: Mapping[str, Scalar]) -> list[list[Quotient]]:
+    return [[_scale_columns(model, box, model.trace_error, sizes)._replace(rows=model.tip, norm="frobenius")]]
+
+
+WANTS: dict[str, Want] = {
+    "amplification": Want(
+        NUMBER,
+        lambda m: m.psi,
+        NormProof(lambda _, box, sizes: [[Quotient(box.a, box.b)], [Quotient(box.b, box.a)]]),
+        least=1.0,
+    ),
+    "greatest_amplification": Want(
+        NUMBER, lambda m: m.psi[..., :1], NormProof(lambda _, box, sizes: [[Quotient(box.a, box.b)]])
+    ),
+    "condition": Want(
+        NUMBER,
+        lambda m: m.psi.prod(-1, keepdims=True),
+        NormProof(lambda _, box, sizes: [[Quotient(box.a, box.b), Quotient(box.b, box.a)]]),
+        least=1.0,
+    ),
+    "stiffness": Want(STIFFNESS, lambda m: m.stiffness, NormProof(_list_compliance, -0.5), more=True),
+    "accuracy": Want(LENGTH, lambda m: m.deviation, NormProof(_list_error)),
+    "clearance": Want(LENGTH, lambda m: m.distances, MarginProof(_bound_distances), more=True),
+    "footprint": Want(LENGTH, lambda m: m.feet, MarginProof(_bound_feet)),
+    "stroke": Want(LENGTH, lambda m: m.joints, None, spread=True),
+}
+
+# What follows from the inverse of A, and so tells nothing beyond a singularity.
+JACOBIANS = tuple(name for name, want in WANTS.items() if isinstance(want.proof, NormProof))

@@ -72,12 +72,12 @@ def test_measures_are_those_of_the_machine(name):
     for number in range(2):
         own = m.replace_parameters({parameter.name: x[number, 0]})
         poses = problem.place_poses(x[number], points)
-        told = compute_performance(own, poses, problem.model.length.value)
+        told = compute_performance(own, poses, problem.tapes.length.value)
         assert measures.psi[number, :, 0] == pytest.approx(told.greatest, rel=1e-9)
         assert 1.0 / measures.psi[number, :, 1] == pytest.approx(told.least, rel=1e-9)
         joints = own.inverse(poses)[:, : m.leg_count]
         assert measures.joints[number] == pytest.approx(joints, rel=1e-12)
-        margins = own.margins(poses)[:, problem.model.counted] * problem.model.limit_scales
+        margins = own.margins(poses)[:, problem.tapes.counted] * problem.tapes.limit_scales
         assert np.allclose(measures.margins[number], margins, rtol=1e-9, atol=1e-12, equal_nan=True)
 
 

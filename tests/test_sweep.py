@@ -186,7 +186,7 @@ def test_the_command(tmp_path, capsys):
 @pytest.mark.parametrize(
     ("more", "said"),
     [
-        (["--poses", "4"], "--poses: 8 (the box's corners) to"),
+        (["--poses", "4"], "--poses: 8 (the corners) to"),
         (["--designs", "0"], "--designs: one or more expected"),
         (["--seed", "-1"], "--seed: 0 or more expected"),
         (["--scheduler", "tcp://127.0.0.1:1"], '--scheduler: "tcp://127.0.0.1:1": no scheduler answers'),

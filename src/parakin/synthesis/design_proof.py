@@ -39,7 +39,7 @@ class DesignProof:
         budget: Budget,
     ):
         self.problem, self.machine, self.sets, self.sizes, self.budget = problem, machine, sets, sizes, budget
-        self.length = choose_characteristic_length(machine, problem.model.length.value)
+        self.length = choose_characteristic_length(machine, problem.tapes.length.value)
         self.boxes = 0
 
     def prove_margins(self, bounds: Mapping[str, float]) -> str:
@@ -72,7 +72,7 @@ class DesignProof:
         most, worst, budget = bound**proof.power, 0.0, Budget(max(seconds, 1e-3), _BOXES)
         for poses in self.sets:
             box = poses.make_box(self.machine, self.length)
-            for quotients in proof.trace(self.problem.model, box, self.sizes):
+            for quotients in proof.trace(self.problem.tapes, box, self.sizes):
                 search = NormSearch(box, quotients)
                 bracket = search.bracket(_CLOSE, budget, most, enough=most)
                 worst = max(worst, bracket.high)

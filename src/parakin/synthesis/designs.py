@@ -29,20 +29,20 @@ class ProvedDesign:
 
     sizes : its free numbers and shifts, mm and rad
     values : what it is worth: the objectives and the bounded quantities, each in the unit of its kind
-    proved : of each of these quantities the value that is proved to be no better than the worst; None where it is only
-        sampled, which happens to objectives without a bound when time is short
     box : low and high of each axis, of the first wanted poses
     ranges : of the legs' drives
     boxes : how many parts of the poses the proofs examined
+    proved : of each of these quantities a value that is proved to be worse nowhere; None where it is only sampled, as
+        objectives without a bound are where time is short
     """
 
     machine: Machine
     sizes: Mapping[str, float]
     values: Mapping[str, float]
-    proved: Mapping[str, float | None]
     box: Mapping[str, AxisRange]
     ranges: Mapping[str, AxisRange]
     boxes: int
+    proved: Mapping[str, float | None] = field(default_factory=dict)
 
     def __repr__(self) -> str:
         return f"<parakin design of {self.machine.name}: {len(self.sizes)} sizes, proved with {self.boxes} boxes>"
@@ -161,7 +161,7 @@ def _prove_design(problem: DesignProblem, candidate: Candidate, budget: Budget) 
             limit = "nothing" if worst is None else f"{worst:.9g}"
             return UnprovedDesign(sizes, f"{name} is {values[name]:.9g} where it was looked at, and {limit} is proved")
     drives = {drive.name: (drive.low, drive.high) for drive in machine.drives[: machine.leg_count]}
-    return ProvedDesign(machine, sizes, values, proved, proof.sets[0].ends, drives, proof.boxes)
+    return ProvedDesign(machine, sizes, values, proof.sets[0].ends, drives, proof.boxes, proved)
 
 
 def _is_kept(name: str, worst: float | None, bound: float) -> bool:
@@ -174,7 +174,7 @@ def _fit_ranges(problem: DesignProblem, candidate: Candidate) -> dict[str, AxisR
     machine = problem.machine
     joints = problem.measure(candidate.x[None], candidate.points).joints[0]
     units = machine.joint_units[: machine.leg_count]
-    slack = [SLACK * (problem.model.size if unit == "mm" else 1.0) for unit in units]
+    slack = [SLACK * (problem.tapes.size if unit == "mm" else 1.0) for unit in units]
     ends = zip(joints.min(0).tolist(), joints.max(0).tolist(), slack, strict=True)
     names = [drive.name for drive in machine.drives[: machine.leg_count]]
     return {name: (low - by, high + by) for name, (low, high, by) in zip(names, ends, strict=True)}

@@ -9,7 +9,7 @@ import numpy as np
 from ..arrays import Array
 from ..families.family import FamilyRates
 from ..kernels.small_matrices import compute_singular_values, solve_quotients
-from .design_model import DesignModel
+from .design_tapes import DesignTapes
 
 LOST = 1.0  # what a pose out of reach breaks a want by
 
@@ -21,8 +21,8 @@ class Measures:
     sizes : (S, 1, k) of the family
     """
 
-    def __init__(self, model: DesignModel, poses: Array, sizes: Array):
-        self._model, self._all, self._sizes = model, poses, sizes
+    def __init__(self, tapes: DesignTapes, poses: Array, sizes: Array):
+        self._tapes, self._all, self._sizes = tapes, poses, sizes
 
     @property
     def _poses(self) -> Array:
@@ -30,56 +30,56 @@ class Measures:
 
     @cached_property
     def _all_joints(self) -> Array:
-        return self._model.family.inverse(self._all, self._sizes)
+        return self._tapes.family.inverse(self._all, self._sizes)
 
     @property
     def joints(self) -> Array:
         """Joints of the legs' drives, (S, P, legs)."""
-        return self._all_joints[:, :-1, : self._model.machine.leg_count]
+        return self._all_joints[:, :-1, : self._tapes.machine.leg_count]
 
     @cached_property
     def margins(self) -> Array:
         """Margins of the limits that count, ≥ 0 where they are kept, in parts of the machine's size or rad."""
-        model = self._model
-        return model.family.margins(self._poses, self._sizes)[..., model.counted] * model.limit_scales
+        tapes = self._tapes
+        return np.asarray(tapes.family.margins(self._poses, self._sizes)[..., tapes.counted] * tapes.limit_scales)
 
     @cached_property
     def _rates(self) -> FamilyRates:
         sizes = np.broadcast_to(self._sizes, (*self._all.shape[:-1], self._sizes.shape[-1]))
         rows = (array.reshape(-1, array.shape[-1]) for array in (self._all, self._all_joints, sizes))
-        return self._model.family.twist_rates(*rows)
+        return self._tapes.family.twist_rates(*rows)
 
     @cached_property
     def side(self) -> Array:
         """Det A by that of the pose that counts, > 0 on its side of the parallel singularities, (S, P, 1)."""
-        size = self._model.machine.parallel_size
+        size = self._tapes.machine.parallel_size
         with np.errstate(divide="ignore", invalid="ignore"):
             side = np.linalg.det(self._rates.a[:, :size, :size]).reshape(*self._all.shape[:-1], 1)
-            return side[:, :-1] / side[:, -1:]
+            return np.asarray(side[:, :-1] / side[:, -1:])
 
     @cached_property
     def psi(self) -> Array:
         """The greatest velocity amplification and the reciprocal of the least, (S, P, 2)."""
-        rates, scales = self._rates, self._model.scales
+        rates, scales = self._rates, self._tapes.scales
         psi = compute_extremes(rates.a * scales[0], rates.b * scales[1])
         return psi.reshape(*self._all.shape[:-1], 2)[:, :-1]
 
     @cached_property
     def feet(self) -> Array:
         """Twice the distance of the struts' joints at the base from the machine's Z axis, (S, P, struts) mm."""
-        feet = self._model.family.base_joints(self._poses, self._sizes)[..., :2]
-        return 2.0 * np.hypot(*np.moveaxis(feet, -1, 0))
+        feet = self._tapes.family.base_joints(self._poses, self._sizes)[..., :2]
+        return np.asarray(2.0 * np.hypot(*np.moveaxis(feet, -1, 0)))
 
     @cached_property
     def distances(self) -> Array:
         """Distances of the axes of struts that share no joint, (S, P, pairs) mm."""
-        return self._model.measure_distances(self._poses, self._sizes)
+        return self._tapes.measure_distances(self._poses, self._sizes)
 
     @cached_property
     def stiffness(self) -> Array:
         """The tip's least stiffness over all directions, (S, P, 1) N/mm; zero at parallel singularities."""
-        model = self._model
-        ways = model.evaluate_quotient("compliance", model.trace_compliance, self._poses, self._sizes)
+        tapes = self._tapes
+        ways = tapes.evaluate_quotient("compliance", tapes.trace_compliance, self._poses, self._sizes)
         with np.errstate(divide="ignore"):
             stiffness = compute_singular_values(ways)[..., :1] ** -2
         stiffness[np.isinf(ways[..., 0, 0])] = 0.0
@@ -88,9 +88,9 @@ class Measures:
     @cached_property
     def deviation(self) -> Array:
         """Root mean square of the tip's error within the tolerances, (S, P, 1) mm."""
-        model = self._model
-        ways = model.evaluate_quotient("error", model.trace_error, self._poses, self._sizes)
-        return np.sqrt(np.square(ways).sum((-2, -1)))[..., None]
+        tapes = self._tapes
+        ways = tapes.evaluate_quotient("error", tapes.trace_error, self._poses, self._sizes)
+        return np.asarray(np.sqrt(np.square(ways).sum((-2, -1)))[..., None])
 
 
 def compute_extremes(a: Array, b: Array) -> Array:

@@ -56,8 +56,8 @@ class PoseSet:
         known = dict(coordinates)
         if self.across:
             sine, cosine = sincos(known[ANGLE])
-            for axis, part in zip(self.across, (cosine, sine), strict=True):
-                known[axis] = known[RADIUS] * part + self.ends[axis][0]
+            for axis, share in zip(self.across, (cosine, sine), strict=True):
+                known[axis] = known[RADIUS] * share + self.ends[axis][0]
         return [known[axis] if axis in known else np.float64(self.ends[axis][0]) for axis in self.axes]
 
     def place_rows(self, points: Array) -> Array:

@@ -13,7 +13,7 @@ from ..arrays import Array, AxisRange
 from ..errors import PoseError, quote, suggest
 from ..families.family import Family
 from ..machine import Machine
-from .design_model import DesignModel
+from .design_tapes import DesignTapes
 from .measures import Measures
 from .pose_sets import PoseSet, make_box_set, make_cylinder_set
 from .wants import WANTS
@@ -119,7 +119,7 @@ class DesignProblem:
             raise PoseError("bounds: clearance: every two struts share a joint")
         for name, needed in (("stiffness", "springs"), ("accuracy", "tolerances")):
             if name in self.wants:
-                getattr(self.model, needed)
+                getattr(self.tapes, needed)
 
     @property
     def objectives(self) -> tuple[str, ...]:
@@ -143,13 +143,13 @@ class DesignProblem:
         return (*sets, *(make_box_set(self.machine, axes, "poses") for axes in self.poses))
 
     @cached_property
-    def model(self) -> DesignModel:
+    def tapes(self) -> DesignTapes:
         free, own = list(self.free), (self.drives, self.struts, self.tolerances)
-        return DesignModel(self.machine, free, self.fit_strokes, *own)
+        return DesignTapes(self.machine, free, self.fit_strokes, *own)
 
     @property
     def family(self) -> Family:
-        return self.model.family
+        return self.tapes.family
 
     @cached_property
     def variables(self) -> tuple[str, ...]:
@@ -205,7 +205,7 @@ class DesignProblem:
     def measure(self, x: Array, points: Array) -> Measures:
         """Measure designs x (S, variables) at points (P, width)."""
         poses = self.place_poses(x, np.concatenate([points, self.middle]))
-        return Measures(self.model, poses, x[:, None, : len(self.family.names)])
+        return Measures(self.tapes, poses, x[:, None, : len(self.family.names)])
 
     def list_losses(self, name: str, x: Array, m: Measures) -> Array:
         """List a quantity or a free number of designs, (S, R), less is better; the greatest of a row counts."""

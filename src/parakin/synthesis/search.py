@@ -69,7 +69,7 @@ class DesignSearch:
         self.problem, self.goal, self.bounds = problem, goal, dict(bounds)
         self.low, self.width = problem.ranges[:, 0], np.ptp(problem.ranges, axis=1)
         self.lattice = problem.lattice
-        self.wants = [*problem.model.limits, "parallel singularity", *bounds]
+        self.wants = [*problem.tapes.limits, "parallel singularity", *bounds]
         self.columns = [WANTS[name] for name in dict.fromkeys((*bounds, *goal.names)) if name in WANTS]
 
     def run(self, budget: Budget, seeds: Sequence[Array] = (), progress: Progress | None = None) -> Candidate:

@@ -130,8 +130,8 @@ class SweepEvaluator:
 
     def __init__(self, plan: SweepPlan):
         self.plan, self.problem = plan, plan.problem
-        self.limits = self.problem.model.limits
-        self._tape = self.problem.family.make_check_tape(self.problem.model.counted)
+        self.limits = self.problem.tapes.limits
+        self._tape = self.problem.family.make_check_tape(self.problem.tapes.counted)
 
     def evaluate(self, chunk: int) -> SweepChunk:
         """Evaluate one of the plan's chunks."""

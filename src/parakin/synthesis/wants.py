@@ -11,12 +11,12 @@ from ..machine import Machine
 from ..performance.certified.interval_matrices import PoseBox
 from ..performance.certified.quotient_norms import Quotient
 from ..units import LENGTH, NUMBER, STIFFNESS, QuantityKind
-from .design_model import DesignModel, TracedQuotient
+from .design_tapes import DesignTapes, TracedQuotient
 from .measures import Measures
 
 _UNITS = {NUMBER: "", LENGTH: "mm", STIFFNESS: "N/mm"}
 _Margins = Callable[[Machine, Sequence[Scalar], float], list[Scalar]]
-_Quotients = Callable[[DesignModel, PoseBox, Mapping[str, Scalar]], list[list[Quotient]]]
+_Quotients = Callable[[DesignTapes, PoseBox, Mapping[str, Scalar]], list[list[Quotient]]]
 
 
 @dataclass(frozen=True)
@@ -77,17 +77,17 @@ def _bound_distances(machine: Machine, pose: Sequence[Scalar], least: float) -> 
     return [distance - least for distance in distances]
 
 
-def _scale_columns(model: DesignModel, box: PoseBox, trace: TracedQuotient, sizes: Mapping[str, Scalar]) -> Quotient:
+def _scale_columns(tapes: DesignTapes, box: PoseBox, trace: TracedQuotient, sizes: Mapping[str, Scalar]) -> Quotient:
     a, w = trace(box.pose, sizes)
-    return Quotient([[x * k for x, k in zip(row, model.scales[0].tolist(), strict=True)] for row in a], w)
+    return Quotient([[x * k for x, k in zip(row, tapes.scales[0].tolist(), strict=True)] for row in a], w)
 
 
-def _list_compliance(model: DesignModel, box: PoseBox, sizes: Mapping[str, Scalar]) -> list[list[Quotient]]:
-    return [[_scale_columns(model, box, model.trace_compliance, sizes)._replace(rows=model.tip)]]
+def _list_compliance(tapes: DesignTapes, box: PoseBox, sizes: Mapping[str, Scalar]) -> list[list[Quotient]]:
+    return [[_scale_columns(tapes, box, tapes.trace_compliance, sizes)._replace(rows=tapes.tip)]]
 
 
-def _list_error(model: DesignModel, box: PoseBox, sizes: Mapping[str, Scalar]) -> list[list[Quotient]]:
-    return [[_scale_columns(model, box, model.trace_error, sizes)._replace(rows=model.tip, norm="frobenius")]]
+def _list_error(tapes: DesignTapes, box: PoseBox, sizes: Mapping[str, Scalar]) -> list[list[Quotient]]:
+    return [[_scale_columns(tapes, box, tapes.trace_error, sizes)._replace(rows=tapes.tip, norm="frobenius")]]
 
 
 WANTS: dict[str, Want] = {

@@ -1,4 +1,4 @@
-"""The extremes of amplification, and the greatest condition number, over a box of poses, each between two numbers."""
+"""The greatest and the least velocity amplification over a box of poses, between two numbers, by branch and bound."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from ...budget import Budget
 from ..extremes import ExtremeSide
 from ..indices import compute_performance
 from .interval_matrices import PoseBox
-from .quotient_norms import NormBracket, NormSearch, Quotient
+from .quotient_norms import NormSearch, Quotient
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,13 +62,3 @@ def bracket_amplification(
     if forward:
         return Bracket(side, norm.low, norm.high, pose, norm.closed)
     return Bracket(side, 1.0 / norm.high, 1.0 / norm.low, pose, norm.closed)
-
-
-def bracket_condition(box: PoseBox, tolerance: float, budget: Budget, bound: float) -> NormBracket:
-    """Bracket the greatest condition number of J over a box, as :func:`bracket_amplification`."""
-
-    def evaluate(points: Array) -> Array:
-        return compute_performance(box.machine, box.poses(points), box.length.value, box.mode).condition
-
-    search = NormSearch(box, [Quotient(box.a, box.b), Quotient(box.b, box.a)], evaluate)
-    return search.bracket(tolerance, budget, bound)

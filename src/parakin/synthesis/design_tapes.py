@@ -22,7 +22,7 @@ from ..stiffness.springs import MachineSprings, read_springs, trace_compliance
 TracedQuotient = Callable[[Sequence[Scalar], Mapping[str, Scalar]], tuple[list[list[Scalar]], list[list[Scalar]]]]
 
 
-class DesignModel:
+class DesignTapes:
     """A machine with free numbers, its springs, and the tolerances of its numbers.
 
     counted : numbers of the machine's limits that count, without those of drives whose ranges are fitted

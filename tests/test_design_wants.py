@@ -5,6 +5,7 @@ from itertools import combinations, product
 import numpy as np
 import pytest
 from scipy.optimize import minimize_scalar
+from shipped import load_shipped
 
 import parakin as pk
 from parakin.cli import main
@@ -13,7 +14,7 @@ from parakin.synthesis.wants import WANTS
 
 CUBE = dict.fromkeys("XYZ", (-100.0, 100.0))
 FREE, SHIFT = {"L": (150.0, 500.0)}, {"X Y Z": (-150.0, 150.0)}
-GLIDE = pk.load("orthoglide")
+GLIDE = load_shipped("orthoglide")
 SPRINGS = {"drives": "100 N/um", "struts": {"diameter": "20 mm", "rods": "2"}}
 TOLERANCES = {"encoders": "0.01 mm", "rods": "0.02 mm"}
 
@@ -93,7 +94,7 @@ def test_a_cylinder_lies_between_its_boxes():
 
 
 def test_a_list_of_poses_with_orientations():
-    hexapod = pk.load("hexapod")
+    hexapod = load_shipped("hexapod")
     own = hexapod.parameters[0]
     z = float(hexapod.home[2])
     wanted = [
@@ -121,7 +122,7 @@ def test_a_list_of_poses_with_orientations():
 
 @pytest.mark.parametrize("name", ["orthoglide", "hexapod", "tricept"])
 def test_quantities_are_those_of_the_machine(name):
-    machine = pk.load(name)
+    machine = load_shipped(name)
     parameter = machine.parameters[0]
     home = dict(zip(machine.axes, machine.home.tolist(), strict=True))
     box = {axis: (home[axis] - 5.0, home[axis] + 9.0) for axis in "XYZ"}
@@ -145,7 +146,7 @@ def test_quantities_are_those_of_the_machine(name):
 
 def test_clearance_is_the_distance_of_the_struts():
     """By brute force: points along both struts of each pair that shares no joint."""
-    hexapod = pk.load("hexapod")
+    hexapod = load_shipped("hexapod")
     tool = hexapod.parameters[0]
     z = float(hexapod.home[2])
     box = {"X": (-30.0, 30.0), "Y": (-30.0, 30.0), "Z": (z - 20.0, z + 20.0)}

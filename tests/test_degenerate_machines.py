@@ -5,10 +5,12 @@ import warnings
 import numpy as np
 import pytest
 from geometry import Description
+from hypothesis import settings
 
 import parakin as pk
 
 MOTIONS = ["tx ty tz", "tx tz", "tx ty rz", "tx ty tz rz ry rx"]
+COUNT = settings().max_examples  # of machines in each of four parts
 LENGTHS = [0.0, 1e-9, 100.0, 100.0, 250.0, 400.0]
 
 
@@ -73,7 +75,7 @@ def load(text, folder):
 @pytest.mark.parametrize("part", range(4))
 def test_degenerate_machines_do_no_harm(part, tmp_path):
     loaded = 0
-    for seed in range(60 * part, 60 * part + 60):
+    for seed in range(COUNT * part, COUNT * part + COUNT):
         rng = np.random.default_rng(seed)
         text = draw_machine(rng)
         try:
@@ -107,4 +109,4 @@ def test_degenerate_machines_do_no_harm(part, tmp_path):
                     continue
                 miss, _ = Description.of(machine.spec).misses(listed, np.tile(row, (len(listed), 1)))
                 assert miss.max(initial=0.0) < 1e-6, text
-    assert loaded > 5
+    assert loaded > COUNT // 12

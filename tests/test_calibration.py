@@ -282,7 +282,7 @@ def test_the_command_plans(tmp_path, capsys):
     [
         ([], "a CSV file of measurements expected, or --plan"),
         (["MISSING"], "cannot be read"),
-        (["FEW"], "3 measurements of 9 numbers for 18 unknown ones, 6 or more expected"),
+        (["FEW"], "few.csv: 3 measurements of 9 numbers for 18 unknown ones, 6 or more expected"),
         (["JOINTS"], "its header names nothing measured"),
         (["FEW", "--noise", "10"], '--noise: "10" needs a unit'),
         (["FEW", "--noise", "-1um"], "--noise"),

@@ -209,9 +209,8 @@ class CalibrationProblem:
         if count < sought:
             rows = len(self.at_nominal.residuals)
             needed = -(-sought // self.at_nominal.residuals.shape[1])
-            raise PoseError(
-                f"{rows} measurements of {count} numbers for {sought} unknown ones, {needed} or more expected"
-            )
+            measured = f"{rows} measurement{'s' * (rows != 1)} of {count} numbers"
+            raise PoseError(f"{measured} for {sought} unknown ones, {needed} or more expected")
 
     def find_combinations(self) -> list[Combination]:
         return self._combine(self.own_slopes)

@@ -94,7 +94,11 @@ def calibrate(
     from ..calibration.calibration import calibrate as calibrate_machine
 
     rows = read_measurements(machine, measured, centre, stated)
-    _show(calibrate_machine(machine, rows, free, "linear" if plain else "soft_l1"), output, picture, json)
+    try:
+        found = calibrate_machine(machine, rows, free, "linear" if plain else "soft_l1")
+    except PoseError as error:  # of what the file holds
+        raise InputError(str(error), str(measured)) from None
+    _show(found, output, picture, json)
     return 0
 
 

@@ -31,7 +31,8 @@ def summarise_job(prepared: PreparedPart, target: Target | None, written: dict[s
     job, placement = prepared.job, prepared.placement
     posted = job.posted
     path = posted.path
-    count = f"{len(job.programmed.path):,} records"
+    records = len(job.programmed.path)
+    count = f"{records:,} record{'s' * (records != 1)}"
     if job.inserted:
         count += f" and {job.inserted:,} inserted"
     lines = [f"{path.source} on {posted.machine.name}: {count}, {_format_verdict(job)}", ""]

@@ -82,6 +82,7 @@ def things(tmp_path_factory, tricept):
         "Calibration": pk.calibrate(orthoglide, measured, ["encoders"]),
         "MeasurementPlan": pk.plan_measurements(orthoglide, 4, ["encoders"]),
         "Noise": pk.Noise(),
+        "MeasuringSetup": pk.MeasuringSetup(),
         "DesignProblem": problem,
         "ProvedDesign": proved,
         "UnprovedDesign": unproved,

@@ -9,11 +9,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 from shipped import load_shipped
 
 import parakin as pk
 from parakin.calibration.calibration import choose_family
 from parakin.calibration.measurement_plan import choose_rows
+from parakin.calibration.setups import InstrumentFrame, UnknownPlane
 from parakin.cli import main
 from parakin.errors import PoseError
 from parakin.workspaces.sampled.allowed_poses import sample_allowed_poses
@@ -25,10 +27,10 @@ NOISE = pk.Noise(0.01, 2e-5)
 class Simulated:
     """A machine whose numbers are off, with measured and held-out poses."""
 
-    def __init__(self, name, seed=0, count=40, held_out=100):
+    def __init__(self, name, seed=0, count=40, held_out=100, frame="machine"):
         self.machine = load_shipped(name)
         self.rng = np.random.default_rng(seed)
-        family = choose_family(self.machine, None).family
+        family = choose_family(self.machine, None, frame).family
         deviations = np.array([0.2 if p.unit == "mm" else 3e-4 for p in family.parameters])
         self.family = family
         self.true = family.nominal + self.rng.normal(size=len(deviations)) * deviations
@@ -187,6 +189,103 @@ def test_a_ball_bar_whose_end_is_not_known():
         simulated.poses - point, axis=1
     )
     assert np.sqrt((differences**2).mean()) < 0.002
+
+
+@pytest.mark.parametrize("turn", [[0.0, 0.0, 0.0], [1e-8, 0.0, 2e-8], [0.4, -1.1, 0.7], [2.0, 2.0, 1.2]])
+def test_what_measures_and_its_derivatives_are_differences(turn):
+    rng = np.random.default_rng(3)
+    tips = rng.uniform(-200.0, 200.0, (12, 3))
+    frame = np.concatenate([[300.0, -40.0, 120.0], turn])
+    values = Rotation.from_rotvec(turn).inv().apply(tips - frame[:3])
+    instrument = InstrumentFrame(tips, values)
+    assert instrument.predict(tips, instrument.begin).values == pytest.approx(values, abs=1e-9)
+    normal = np.array([0.1, 0.2, -0.97]) / np.linalg.norm([0.1, 0.2, -0.97])
+    plane = UnknownPlane(tips, tips @ normal - 12.0)
+    assert np.abs(plane.find_normal(plane.begin) - normal).max() < 1e-9
+    for setup, unknown in ((instrument, frame), (plane, plane.begin + [0.5, 0.03, -0.02])):
+        told = setup.predict(tips, unknown)
+        for i in range(len(unknown)):
+            step = 1e-6 * np.eye(len(unknown))[i]
+            ends = [setup.predict(tips, unknown + sign * step).values for sign in (1.0, -1.0)]
+            assert told.by_unknown[:, :, i] == pytest.approx((ends[0] - ends[1]) / 2e-6, abs=1e-5)
+        for i in range(3):
+            step = 1e-4 * np.eye(3)[i]
+            ends = [setup.predict(tips + sign * step, unknown).values for sign in (1.0, -1.0)]
+            assert told.by_tips[:, :, i] == pytest.approx((ends[0] - ends[1]) / 2e-4, abs=1e-6)
+
+
+TRACKER = np.array([1500.0, -800.0, 400.0, 0.4, -1.1, 0.7])  # its origin, mm, and the vector of its turn
+
+
+def see_from_tracker(tips, frame=TRACKER):
+    return Rotation.from_rotvec(frame[3:]).inv().apply(tips - frame[:3])
+
+
+@pytest.mark.parametrize("name", ["orthoglide", "linear_delta"])
+def test_a_tracker_in_its_own_frame(name):
+    """Within 1.2 of the Cramér-Rao bound, by differences, of places that it sees later; the machine's frame is kept."""
+    simulated = Simulated(name, 3, 60, frame="instrument")
+    family, tip, noise = simulated.family, simulated.tip, pk.Noise(0.01)
+    k, squares, ratios = len(family.names), [], []
+    for _ in range(3):
+        values = see_from_tracker(simulated.poses[:, tip]) + simulated.rng.normal(0.0, noise.length, (60, 3))
+        setup = pk.MeasuringSetup("instrument")
+        rows = pk.make_measurements(simulated.machine, simulated.joints, values, "X Y Z", setup=setup, noise=noise)
+        result = pk.calibrate(simulated.machine, rows)
+        assert result.family.names == family.names
+        ratios.append(result.fit)
+        found = result.family.forward(simulated.held_joints, result.sizes, near=simulated.held_poses).poses[:, tip]
+        back = (found - result.frame[:, 3]) @ result.frame[:, :3]
+        squares.append(((back - see_from_tracker(simulated.held_poses[:, tip])) ** 2).sum(1).mean())
+    steps = np.concatenate([[1e-3 if p.unit == "mm" else 1e-6 for p in family.parameters], [1e-3] * 3, [1e-6] * 3])
+
+    def see(joints, near, unknown):
+        poses = family.forward(joints, simulated.true + unknown[:k], near=near).poses
+        return see_from_tracker(poses[:, tip], TRACKER + unknown[k:]).ravel()
+
+    slopes = [
+        np.column_stack([(see(*at, step) - see(*at, -step)) / (2.0 * step.max()) for step in np.diag(steps)])
+        for at in ((simulated.joints, simulated.poses), (simulated.held_joints, simulated.held_poses))
+    ]
+    covariance = np.linalg.inv(slopes[0].T @ slopes[0]) * noise.length**2
+    bound = np.sqrt(3.0 * np.einsum("nk,kl,nl->n", slopes[1], covariance, slopes[1]).mean())
+    assert 0.5 * bound < np.sqrt(np.mean(squares)) < 1.2 * bound
+    assert np.mean(ratios) == pytest.approx(1.0, abs=0.1)
+
+
+def test_the_command_finds_a_trackers_frame(tmp_path, capsys):
+    simulated = Simulated("orthoglide", 6, 50, frame="instrument")
+    values = see_from_tracker(simulated.poses) + simulated.rng.normal(0.0, 0.01, (50, 3))
+    write_csv(tmp_path / "seen.csv", simulated.machine, simulated.joints, values, ("X", "Y", "Z"))
+    words = ["calibrate", "orthoglide", str(tmp_path / "seen.csv"), "--frame", "instrument"]
+    assert main([*words, "--json"]) == 0
+    frame = np.array(json.loads(capsys.readouterr().out)["frame"])
+    assert np.abs(frame[:, 3] - TRACKER[:3]).max() < 0.2
+    assert np.abs(frame[:, :3] - Rotation.from_rotvec(TRACKER[3:]).as_matrix()).max() < 1e-4
+    assert main(words) == 0
+    assert re.search(r"the instrument's zero is at 1,(500|499)\.\d+, -[78]", capsys.readouterr().out)
+    write_csv(tmp_path / "few.csv", simulated.machine, simulated.joints, values[:, :2], ("X", "Y"))
+    assert main(["calibrate", "orthoglide", str(tmp_path / "few.csv"), "--frame", "instrument"]) == 2
+    assert (
+        "few.csv: frame: an instrument's own frame is found from X Y Z of the tip, not from X Y"
+        in capsys.readouterr().err
+    )
+
+
+def test_a_flat_artefact_whose_place_is_not_known():
+    """Blocks of known heights on a plane tell the rods; not what moves the machine along the plane."""
+    simulated = Simulated("orthoglide", 5, 80)
+    family = pk.family(simulated.machine, ["rods"])
+    true = family.nominal + np.array([0.15, -0.1, 0.2])
+    normal = np.array([0.05, -0.03, 1.0]) / np.linalg.norm([0.05, -0.03, 1.0])
+    joints, heights = family.inverse(simulated.poses, true), simulated.poses @ normal + 55.0
+    heights += simulated.rng.normal(0.0, 0.002, len(heights))
+    rows = pk.make_measurements(simulated.machine, joints, heights=heights[:, None], noise=pk.Noise(0.002))
+    result = pk.calibrate(simulated.machine, rows, ["rods"])
+    deviations = np.array([p.deviation for p in result.parameters])
+    assert np.abs(result.sizes - true).max() < 4.0 * deviations.max() < 0.05
+    with pytest.raises(pk.UnidentifiableError, match="measurements of height can't tell legs"):
+        pk.calibrate(simulated.machine, rows, ["feet"])
 
 
 def test_outliers_are_told_and_do_not_pull():

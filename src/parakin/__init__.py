@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from .calibration.calibration import Calibration, calibrate
     from .calibration.identifiability import UnidentifiableError
     from .calibration.measurement_plan import MeasurementPlan, plan_measurements
-    from .calibration.measurements import Measurements, Noise, make_measurements
+    from .calibration.measurements import Measurements, MeasuringSetup, Noise, make_measurements
     from .comparison.comparison import Comparison, compare
     from .controllers.joints.program import make_joint_program
     from .controllers.joints.program_reader import JointProgram, read_joint_program
@@ -90,6 +90,7 @@ __all__ = [
     "Machine",
     "MeasurementPlan",
     "Measurements",
+    "MeasuringSetup",
     "Mesh",
     "NoMethodError",
     "Noise",
@@ -229,6 +230,7 @@ _LAZY = {
     "Machine": "machine",
     "MeasurementPlan": "calibration.measurement_plan",
     "Measurements": "calibration.measurements",
+    "MeasuringSetup": "calibration.measurements",
     "Mesh": "export.workspace.meshes",
     "Noise": "calibration.measurements",
     "Parameter": "model.geometric_parameters",

@@ -28,7 +28,8 @@ from .identifiability import (
     project_out,
 )
 from .linearised import Linearised, MeasuredFamily
-from .measurements import Measurements, make_measurements
+from .measurements import Measurements, MeasuringFrame, make_measurements
+from .setups import FixedPoint, InstrumentFrame, Setup, build_instrument_frame
 
 Loss = Literal["linear", "soft_l1"]
 _OUTLIER = 3.0  # standard deviations: beyond these a robust loss grows as the residual, not as its square
@@ -48,7 +49,7 @@ class Calibration:
     family : of the numbers that were sought
     sizes, covariance : (k,) mm and rad, and (k, k)
     fixed : numbers that others replace whatever is measured of poses; they keep their values
-    centre : (3,) the point of measured distances where that was unknown, mm, else (0,)
+    setups : what measured, each with the numbers that were found of it, mm and rad; ``frame`` and ``centre`` tell them
     residuals : (N, c) measured less predicted, mm and rad; of whole poses the twist
     before : the same with the machine as it was
     fit, held_out : root mean square of the weighed residuals, one if noise and machine are what was stated; of rows
@@ -61,7 +62,7 @@ class Calibration:
     sizes: Array
     covariance: Array
     fixed: tuple[str, ...]
-    centre: Array
+    setups: list[tuple[Setup, Array]]
     measured: Measurements
     residuals: Array
     before: Array
@@ -80,6 +81,21 @@ class Calibration:
     def machine(self) -> Machine:
         """The calibrated machine."""
         return self.family.at(self.sizes)
+
+    @property
+    def frame(self) -> Array | None:
+        """The transform (3, 4) from the instrument's frame to the machine's, if that was found."""
+        numbers = self._find_unknown(InstrumentFrame)
+        return None if numbers is None else build_instrument_frame(numbers)
+
+    @property
+    def centre(self) -> Array | None:
+        """The point of measured distances (3,), mm, if that was found."""
+        numbers = self._find_unknown(FixedPoint)
+        return numbers if numbers is not None and len(numbers) else None
+
+    def _find_unknown(self, kind: type) -> Array | None:
+        return next((numbers for setup, numbers in self.setups if isinstance(setup, kind)), None)
 
     @cached_property
     def error(self) -> float:
@@ -119,19 +135,19 @@ def calibrate(
     Raises :class:`UnidentifiableError` where the measurements can't tell these numbers apart, :class:`PoseError` where
     they are too few, or have no pose.
     """
-    choice = choose_family(machine, free)
+    choice = choose_family(machine, free, measured.frame)
     family, fixed = choice.family, choice.fixed
     problem = CalibrationProblem(MeasuredFamily(family, measured), choice.effects)
     problem.check_count()
     combinations = problem.find_combinations()
     problem.refuse_unknown(combinations)
-    solution, centre = problem.solve(loss)
-    at = problem.measured.linearise(solution, centre)
+    solution, unknown = problem.solve(loss)
+    at = problem.measured.linearise(solution, unknown)
     weighed = problem.weigh(at)
     rows = (weighed**2).sum(1)
-    freedom = max(weighed.size - len(solution) - centre.size, 1)
+    freedom = max(weighed.size - len(solution) - len(unknown), 1)
     fit = float(np.sqrt(rows.sum() / freedom))
-    matrix = np.hstack([problem.weigh_slopes(at), problem.weigh_centre(at)])
+    matrix = np.hstack([problem.weigh_slopes(at), problem.weigh_unknown(at)])
     every: Array = np.linalg.inv(np.asarray(matrix.T @ matrix, np.float64))
     covariance = every[: len(solution), : len(solution)] * max(1.0, fit) ** 2
     return Calibration(
@@ -139,7 +155,7 @@ def calibrate(
         solution,
         covariance,
         fixed,
-        centre,
+        list(zip(problem.measured.setups, problem.measured.split(unknown), strict=True)),
         measured,
         at.residuals,
         problem.at_nominal.residuals,
@@ -162,32 +178,46 @@ class FamilyChoice(NamedTuple):
     effects: Array
 
 
-def choose_family(machine: Machine, free: Sequence[str] | None) -> FamilyChoice:
-    """Choose the numbers to seek: of those that replace each other whatever is measured of poses, the first ones."""
+def choose_family(machine: Machine, free: Sequence[str] | None, frame: MeasuringFrame = "machine") -> FamilyChoice:
+    """Choose the numbers to seek: of those that replace each other whatever is measured of poses, the first ones.
+
+    In an instrument's own frame that is of the tip's places, and those that move the whole machine keep their values.
+    """
     geometric = [p.name for p in machine.parameters if p.group != SIZES]
     parameters = select_parameters(machine, geometric if free is None else free)
     ordered = sorted(parameters, key=lambda p: _ORDER.index(p.group))
     every = Family(machine, ordered)
     poses = sample_allowed_poses(machine, _STRUCTURAL, _SEED)
     rates = every.twist_rates(poses, machine.inverse(poses), every.nominal).compute_size_rates()
-    turning = np.arange(rates.shape[1]) >= sum(axis in "XYZ" for axis in machine.axes)
-    rates *= np.where(turning, max(machine.leg_sizes), 1.0)[:, None]
-    rates = rates[np.isfinite(rates).all((1, 2))]
-    slopes = rates.reshape(-1, len(ordered)) * compute_scales(machine, ordered)
-    chosen, left = choose_independent(slopes)
+    tip = sum(axis in "XYZ" for axis in machine.axes)
+    rates *= np.where(np.arange(rates.shape[1]) >= tip, max(machine.leg_sizes), 1.0)[:, None]
+    known = np.isfinite(rates).all((1, 2))
+    rates, poses = rates[known], poses[known]
+    slopes = rates if frame == "machine" else rates[:, :tip]
+    columns = slopes.reshape(-1, len(ordered)) * compute_scales(machine, ordered)
+    moves = _list_moves(machine, poses) if frame == "instrument" else np.empty((len(columns), 0))
+    chosen, left = choose_independent(np.hstack([moves, columns]))
+    chosen, left = chosen[chosen >= moves.shape[1]] - moves.shape[1], left - moves.shape[1]
     if not len(chosen):
         raise PoseError("free: no number of these moves the tool")
     fixed = tuple(ordered[i].name for i in left)
     return FamilyChoice(Family(machine, [ordered[i] for i in chosen]), fixed, rates[:, :, chosen])
 
 
+def _list_moves(machine: Machine, poses: Array) -> Array:
+    """List what small motions of the whole machine do to the tips, (3 poses, 6)."""
+    tips = poses[:, [machine.axes.index(axis) for axis in "XYZ"]]
+    frame = InstrumentFrame(tips, tips)
+    return np.reshape(frame.predict(tips, frame.begin).by_unknown, (-1, len(frame.begin)))
+
+
 class CalibrationProblem:
-    """Least squares of a family's sizes, and of the distances' point where that is unknown."""
+    """Least squares of a family's sizes, and of the unknown numbers of what measured."""
 
     def __init__(self, measured: MeasuredFamily, effects: Array):
         self.measured, self.family, self.effects = measured, measured.family, effects
-        self.centre = measured.find_centre()
-        self.at_nominal = measured.linearise(self.family.nominal, self.centre)
+        self.begin = measured.begin
+        self.at_nominal = measured.linearise(self.family.nominal, self.begin)
         if not np.isfinite(self.at_nominal.slopes).all():
             row = int((~np.isfinite(self.at_nominal.slopes).all((1, 2))).argmax()) + 1
             raise PoseError(f"joints: row {row} is a singular pose, where a measurement says nothing of the machine")
@@ -200,12 +230,12 @@ class CalibrationProblem:
     def weigh_slopes(self, at: Linearised) -> Array:
         return np.vstack(np.einsum("ncd,ndk->nck", self.weights, at.slopes))
 
-    def weigh_centre(self, at: Linearised) -> Array:
-        return np.vstack(np.einsum("ncd,ndk->nck", self.weights, at.centre))
+    def weigh_unknown(self, at: Linearised) -> Array:
+        return np.vstack(np.einsum("ncd,ndk->nck", self.weights, at.unknown))
 
     def check_count(self) -> None:
         """Refuse fewer numbers measured than sought."""
-        count, sought = self.at_nominal.residuals.size, len(self.scales) + self.centre.size
+        count, sought = self.at_nominal.residuals.size, len(self.scales) + len(self.begin)
         if count < sought:
             rows = len(self.at_nominal.residuals)
             needed = -(-sought // self.at_nominal.residuals.shape[1])
@@ -220,8 +250,8 @@ class CalibrationProblem:
 
     @cached_property
     def own_slopes(self) -> Array:
-        """The weighed slopes of what is measured, (rows, k), the centre's projected out."""
-        return project_out(self.weigh_slopes(self.at_nominal), self.weigh_centre(self.at_nominal))
+        """The weighed slopes of what is measured, (rows, k), those of what measured projected out."""
+        return project_out(self.weigh_slopes(self.at_nominal), self.weigh_unknown(self.at_nominal))
 
     def refuse_unknown(self, combinations: Sequence[Combination]) -> None:
         """Refuse measurements that leave a combination of the numbers unknown, and name one that would tell it."""
@@ -240,16 +270,15 @@ class CalibrationProblem:
         """Name the least that would have to be measured besides, at the same joints."""
         measured, machine = self.measured.measured, self.family.machine
         tip = " ".join(axis for axis in machine.axes if axis in "XYZ")
-        others = [
-            (f"measure {axis} of the tool too", {"axes": axis}) for axis in tip.split() if axis not in measured.axes
-        ]
-        others.append((f"measure {tip.replace(' ', ', ')} of the tool", {"axes": tip}))
+        where = " in the machine's frame" if measured.frame == "instrument" else ""
+        others = [(f"measure {axis} of the tool too", axis) for axis in tip.split() if axis not in measured.axes]
+        others.append((f"measure {tip.replace(' ', ', ')} of the tool{where}", tip))
         if len(machine.axes) > len(tip.split()):
-            others.append(("measure the whole pose of the tool", {"axes": " ".join(machine.axes)}))
-        for text, option in others:
-            columns = [machine.axes.index(axis) for axis in option["axes"].split()]
+            others.append((f"measure the whole pose of the tool{where}", " ".join(machine.axes)))
+        for text, axes in others:
+            columns = [machine.axes.index(axis) for axis in axes.split()]
             values = self.measured.starts[:, columns]
-            more = make_measurements(machine, measured.joints, values, noise=measured.noise, **option)
+            more = make_measurements(machine, measured.joints, values, axes, noise=measured.noise)
             try:
                 other = CalibrationProblem(MeasuredFamily(self.family, more, self.measured.starts), self.effects)
             except PoseError:  # a pose of these numbers is missing: the next measurement needs none
@@ -259,10 +288,11 @@ class CalibrationProblem:
         return "measure at more joints, farther apart (--plan chooses them), or free less numbers"
 
     def solve(self, loss: Loss) -> tuple[Array, Array]:
-        """Solve for the sizes (k,) and the centre (3,) or (0,), by Gauss' and Newton's method in a trust region."""
+        """Solve for the sizes (k,) and the setups' numbers (u,), by Gauss' and Newton's method in a trust region."""
         k = len(self.scales)
-        scales = np.concatenate([self.scales, np.ones(self.centre.size)])
-        begin = np.concatenate([self.family.nominal, self.centre])
+        turn = 1.0 / max(self.family.machine.leg_sizes)
+        scales = np.concatenate([self.scales, np.where(self.measured.turns, turn, 1.0)])
+        begin = np.concatenate([self.family.nominal, self.begin])
 
         @lru_cache(maxsize=2)
         def locate_at(content: bytes) -> Linearised:
@@ -278,7 +308,7 @@ class CalibrationProblem:
 
         def compute_slopes(x: Array) -> Array:
             at = locate(x)
-            slopes: Array = -np.hstack([self.weigh_slopes(at), self.weigh_centre(at)]) * scales
+            slopes: Array = -np.hstack([self.weigh_slopes(at), self.weigh_unknown(at)]) * scales
             return np.asarray(np.nan_to_num(slopes), np.float64)
 
         result = least_squares(
@@ -292,7 +322,7 @@ class CalibrationProblem:
     def take(self, rows: Indices) -> CalibrationProblem:
         """Take the problem of some of the measurements."""
         measured = self.measured
-        own = MeasuredFamily(self.family, measured.measured.take(rows), measured.starts[rows])
+        own = MeasuredFamily(self.family, measured.measured.take(rows), measured.starts[rows], measured.setups)
         return CalibrationProblem(own, self.effects)
 
     def validate(self, loss: Loss) -> float:
@@ -302,8 +332,8 @@ class CalibrationProblem:
         squares = []
         for fold in np.array_split(order, _FOLDS):
             rest = np.sort(np.setdiff1d(order, fold))
-            if not len(fold) or len(rest) * self.at_nominal.residuals.shape[1] <= len(self.scales) + self.centre.size:
+            if not len(fold) or len(rest) * self.at_nominal.residuals.shape[1] <= len(self.scales) + len(self.begin):
                 return float("nan")
-            sizes, centre = self.take(rest).solve(loss)
-            squares.append(self.weigh(self.measured.linearise(sizes, centre))[fold] ** 2)
+            sizes, unknown = self.take(rest).solve(loss)
+            squares.append(self.weigh(self.measured.linearise(sizes, unknown))[fold] ** 2)
         return float(np.sqrt(np.concatenate(squares).mean()))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -10,9 +11,8 @@ from ..arrays import Array
 from ..errors import PoseError
 from ..families.family import Family, solve_each
 from ..machine import Machine
-from .measurements import Measurements
-
-_TIP = "XYZ"
+from .measurements import LETTERS, Measurements
+from .setups import Setup, make_setups
 
 
 class Linearised(NamedTuple):
@@ -20,13 +20,13 @@ class Linearised(NamedTuple):
 
     residuals : (N, c) measured less predicted; the whole pose's as a twist
     slopes : (N, c, k) of what is predicted, by the sizes
-    centre : (N, c, 3) the same by the distances' unknown point, else (N, c, 0)
+    unknown : (N, c, u) the same by the unknown numbers of the setups
     joints : (N, c, m) the same by what the drives say
     """
 
     residuals: Array
     slopes: Array
-    centre: Array
+    unknown: Array
     joints: Array
 
 
@@ -53,15 +53,48 @@ def find_poses(machine: Machine, joints: Array) -> Array:
 class MeasuredFamily:
     """Measurements of a machine of a family, and where its tool was about."""
 
-    def __init__(self, family: Family, measured: Measurements, starts: Array | None = None):
+    def __init__(
+        self,
+        family: Family,
+        measured: Measurements,
+        starts: Array | None = None,
+        setups: Sequence[Setup] | None = None,
+    ):
         self.family, self.measured = family, measured
-        self.whole = len(measured.axes) == len(family.machine.axes) and measured.distances is None
+        others = (measured.distances, measured.heights)
+        all_axes = len(measured.axes) == len(family.machine.axes) and measured.frame == "machine"
+        self.whole = all_axes and others == (None, None)
         if self.whole:
             starts = measured.values
         self.starts: Array = find_poses(family.machine, measured.joints) if starts is None else starts
+        self.tip_axes = [axis for axis in family.machine.axes if axis in LETTERS]
+        made = [] if self.whole else make_setups(measured, self._find_tips(self.starts))
+        self.setups = [one for one, _ in made] if setups is None else list(setups)
+        self._values = [values for _, values in made]
 
-    def linearise(self, sizes: Array, centre: Array) -> Linearised:
-        """Compute residuals and slopes for sizes (k,) and the distances' point (3,), if that is unknown.
+    def _find_tips(self, poses: Array) -> Array:
+        """Find the tips (N, 3) of poses; an axis that the machine lacks is 0."""
+        tips = np.zeros((len(poses), 3))
+        for axis in self.tip_axes:
+            tips[:, LETTERS.index(axis)] = poses[:, self.family.machine.axes.index(axis)]
+        return tips
+
+    def split(self, unknown: Array) -> list[Array]:
+        """Split the unknown numbers by setups."""
+        return np.split(unknown, np.cumsum([len(one.begin) for one in self.setups])[:-1]) if self.setups else []
+
+    @property
+    def begin(self) -> Array:
+        """The unknown numbers of the setups, (u,), about."""
+        return np.concatenate([np.empty(0), *(one.begin for one in self.setups)])
+
+    @property
+    def turns(self) -> Array:
+        """Which of them are angles, (u,)."""
+        return np.concatenate([np.empty(0, bool), *(one.turns for one in self.setups)])
+
+    def linearise(self, sizes: Array, unknown: Array) -> Linearised:
+        """Compute residuals and slopes for sizes (k,) and the unknown numbers of the setups (u,).
 
         NaN where the machine of these sizes has no pose.
         """
@@ -75,49 +108,23 @@ class MeasuredFamily:
         if self.whole:
             off = solve_each(rates.a, rates.closures[:, :, None])[:, :, 0]
             return Linearised(off, by_sizes, np.empty((count, off.shape[1], 0)), by_joints)
-        axes = family.machine.axes
-        tip_axes = [axis for axis in axes if axis in _TIP]
-        rows = [tip_axes.index(axis) for axis in measured.axes]
-        columns = [axes.index(axis) for axis in measured.axes]
-        differences = [measured.values - poses[:, columns]]
-        slopes, of_joints = [by_sizes[:, rows]], [by_joints[:, rows]]
-        of_centre = np.zeros((count, len(rows), centre.size))
-        if measured.distances is not None:
-            point = centre if measured.centre is None else measured.centre
-            tips = np.zeros((count, 3))
-            tips[:, [_TIP.index(axis) for axis in tip_axes]] = poses[:, [axes.index(axis) for axis in tip_axes]]
-            lengths = np.linalg.norm(tips - point, axis=1)
-            along = (tips - point) / lengths[:, None]
-            own = along[:, [_TIP.index(axis) for axis in tip_axes]]
-            differences.append((measured.distances - lengths)[:, None])
-            slopes.append(np.einsum("ni,nik->nk", own, by_sizes[:, : len(tip_axes)])[:, None])
-            of_joints.append(np.einsum("ni,nik->nk", own, by_joints[:, : len(tip_axes)])[:, None])
-            of_centre = np.concatenate([of_centre, -along[:, None, : centre.size]], 1)
-        joined = (np.concatenate(pieces, 1) for pieces in (differences, slopes, of_joints))
-        residuals, by_size, by_joint = joined
-        return Linearised(residuals, by_size, of_centre, by_joint)
-
-    def find_centre(self) -> Array:
-        """Find the point from which the distances were measured, about, (3,); (0,) where it is known or there is none.
-
-        The differences of the squared distances are linear in it.
-        """
-        measured = self.measured
-        if measured.distances is None or measured.centre is not None:
-            return np.empty(0)
-        axes = self.family.machine.axes
-        tips = np.zeros((len(self.starts), 3))
-        for i, letter in enumerate(_TIP):
-            if letter in axes:
-                tips[:, i] = self.starts[:, axes.index(letter)]
-        matrix = np.hstack([2.0 * tips, np.ones((len(tips), 1))])
-        right = (tips * tips).sum(1) - measured.distances**2
-        return np.asarray(np.linalg.lstsq(matrix, right, rcond=None)[0][:3])
+        tips, rows = self._find_tips(poses), [LETTERS.index(axis) for axis in self.tip_axes]
+        predictions = [one.predict(tips, own) for one, own in zip(self.setups, self.split(unknown), strict=True)]
+        by_tips = np.concatenate([one.by_tips for one in predictions], 1)[:, :, rows]
+        by_unknown = np.zeros((*by_tips.shape[:2], len(unknown)))
+        row = column = 0
+        for one in predictions:
+            r, u = one.by_unknown.shape[1:]
+            by_unknown[:, row : row + r, column : column + u] = one.by_unknown
+            row, column = row + r, column + u
+        residuals = np.hstack(self._values) - np.hstack([one.values for one in predictions])
+        tip = slice(len(rows))
+        return Linearised(residuals, by_tips @ by_sizes[:, tip], by_unknown, by_tips @ by_joints[:, tip])
 
     def compute_weights(self, at: Linearised) -> Array:
         """Compute the matrices (N, c, c) that make residuals uncorrelated with deviation one: of both sides' noise."""
         noise, machine = self.measured.noise, self.family.machine
-        tips = sum(axis in _TIP for axis in machine.axes)
+        tips = len(self.tip_axes)
         count = at.residuals.shape[1]
         own = np.full(count, noise.length)
         if self.whole:

@@ -1,18 +1,20 @@
-"""What was measured of a machine: the tool's pose, some of its coordinates, or its distance from a point."""
+"""What was measured of a machine: the tool's pose, some of its coordinates, its distance from a point or a plane."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from math import inf
+from typing import Literal, get_args
 
 import numpy as np
 
 from ..arguments import RowsLike, check_arguments, check_range, read_rows, read_vector
 from ..arrays import Array, Indices
-from ..errors import PoseError, suggest
+from ..errors import PoseError, quote, suggest
 from ..machine import Machine
 
-_LETTERS = "XYZ"
+LETTERS = "XYZ"
+MeasuringFrame = Literal["machine", "instrument"]
 
 
 @dataclass(frozen=True)
@@ -26,20 +28,36 @@ class Noise:
 
 
 @dataclass(frozen=True, eq=False)
+class MeasuringSetup:
+    """What is known of where things were measured.
+
+    frame : of the coordinates: the machine's, or an instrument's own, which is found with the rest
+    centre : (3,) mm, the point of measured distances; None: not known, and found with the rest
+    """
+
+    frame: MeasuringFrame = "machine"
+    centre: RowsLike | None = None
+
+
+@dataclass(frozen=True, eq=False)
 class Measurements:
     """What was measured at joint vectors.
 
     joints : (N, joints) mm and rad
     axes : the measured coordinates of the pose: all of them, or some of X, Y and Z
-    values : (N, axes) mm and rad, in the machine frame
+    values : (N, axes) mm and rad
     distances : (N,) mm, of the tool's tip from one fixed point, as of a ball bar; None: not measured
-    centre : (3,) that point, mm; None: not known, and found with the rest
+    heights : (N,) mm, of the tip over one plane, which is found with the rest; None: not measured
+    frame : the coordinates' frame, the machine's or an instrument's own, which is found with the rest
+    centre : (3,) the distances' point, mm; None: not known, and found with the rest
     """
 
     joints: Array
     axes: tuple[str, ...]
     values: Array
     distances: Array | None = None
+    heights: Array | None = None
+    frame: MeasuringFrame = "machine"
     centre: Array | None = None
     noise: Noise = Noise()
 
@@ -48,18 +66,19 @@ class Measurements:
 
     def describe(self) -> str:
         """Describe what was measured: ``57 measurements of X Y Z``."""
-        what = [*self.axes, *(["distance"] if self.distances is not None else [])]
-        return f"{len(self.joints)} measurements of {' '.join(what)}"
+        others = {"distance": self.distances, "height": self.heights}
+        what = " ".join([*self.axes, *(name for name, values in others.items() if values is not None)])
+        return f"{len(self.joints)} measurements of {what}{' in an own frame' * (self.frame != 'machine')}"
 
     @property
     def width(self) -> int:
         """How many numbers were measured at each joint vector."""
-        return len(self.axes) + (self.distances is not None)
+        return len(self.axes) + (self.distances is not None) + (self.heights is not None)
 
     def take(self, rows: Indices) -> Measurements:
         """Take some of the measurements."""
-        distances = None if self.distances is None else self.distances[rows]
-        return replace(self, joints=self.joints[rows], values=self.values[rows], distances=distances)
+        distances, heights = (None if one is None else one[rows] for one in (self.distances, self.heights))
+        return replace(self, joints=self.joints[rows], values=self.values[rows], distances=distances, heights=heights)
 
 
 @check_arguments
@@ -69,15 +88,18 @@ def make_measurements(
     values: RowsLike | None = None,
     axes: str | None = None,
     distances: RowsLike | None = None,
-    centre: RowsLike | None = None,
+    heights: RowsLike | None = None,
+    setup: MeasuringSetup | None = None,
     noise: Noise | None = None,
 ) -> Measurements:
     """Make measurements of a machine.
 
     joints : (N, joints) mm and rad
-    values : (N, axes) measured coordinates in the machine frame, mm and rad
+    values : (N, axes) measured coordinates, mm and rad
     axes : which they are: names of all axes (by default), or some of X, Y and Z
-    distances, centre : (N,) mm, of the tip from a fixed point (3,), which may be unknown
+    distances : (N,) mm, of the tip from a fixed point
+    heights : (N,) mm, of the tip over an unknown plane: 0 where it touches a flat artefact
+    setup : whose frame the coordinates are in, and the distances' point; by default the machine's, and unknown
     noise : standard deviations
 
     Raises :class:`PoseError`.
@@ -91,19 +113,36 @@ def make_measurements(
     if values is not None:
         units = [unit for axis, unit in zip(machine.axes, machine.axis_units, strict=True) if axis in names]
         measured = read_rows(values, names, units, lambda: np.full(len(names), np.nan), "values")
-    lengths = None if distances is None else np.asarray(read_rows(distances, ("d",), ("mm",), lambda: np.empty(1), "d"))
-    if values is None and lengths is None:
-        raise PoseError("values: measured coordinates or distances expected")
-    for what, array in (("values", measured), ("distances", lengths)):
+    lengths, over = (
+        None if one is None else np.asarray(read_rows(one, ("d",), ("mm",), lambda: np.empty(1), what))
+        for what, one in (("distances", distances), ("heights", heights))
+    )
+    if values is None and lengths is None and over is None:
+        raise PoseError("values: measured coordinates, distances or heights expected")
+    for what, array in (("values", measured), ("distances", lengths), ("heights", over)):
         if array is not None and (array.ndim != 2 or len(array) != len(rows) or not np.isfinite(array).all()):
             raise PoseError(f"{what}: {len(rows)} rows of finite numbers expected, one a row of joints")
     if not np.isfinite(rows).all():
         raise PoseError("joints: finite numbers expected")
-    point = None if centre is None else read_vector("centre", centre, tuple(_LETTERS))
-    lengths = None if lengths is None else lengths[:, 0]
+    setup = MeasuringSetup() if setup is None else setup
+    point = None if setup.centre is None else read_vector("centre", setup.centre, tuple(LETTERS))
+    _check_setup(machine, setup, names, over)
+    lengths, over = (None if one is None else one[:, 0] for one in (lengths, over))
     noise = Noise() if noise is None else noise
     check_noise(noise)
-    return Measurements(rows, names, measured, lengths, point, noise)
+    return Measurements(rows, names, measured, lengths, over, setup.frame, point, noise)
+
+
+def _check_setup(machine: Machine, setup: MeasuringSetup, names: tuple[str, ...], heights: Array | None) -> None:
+    """Refuse a frame or a plane that such measurements can't tell."""
+    if setup.frame not in get_args(MeasuringFrame):
+        raise PoseError(f"frame: machine or instrument expected, not {quote(str(setup.frame))}")
+    spatial = set(LETTERS) <= set(machine.axes)
+    if setup.frame == "instrument" and names != tuple(LETTERS):
+        given = " ".join(names) or "none"
+        raise PoseError(f"frame: an instrument's own frame is found from X Y Z of the tip, not from {given}")
+    if heights is not None and not spatial:
+        raise PoseError(f"heights: a plane is found for machines with X, Y and Z, not for {' '.join(machine.axes)}")
 
 
 def check_measured_axes(machine: Machine, names: tuple[str, ...]) -> None:
@@ -113,7 +152,7 @@ def check_measured_axes(machine: Machine, names: tuple[str, ...]) -> None:
             raise PoseError(f"axes: unknown {name}{suggest(name, machine.axes)}")
     if len(set(names)) != len(names):
         raise PoseError(f"axes: {' '.join(names)}, each once expected")
-    turning = [name for name in names if name not in _LETTERS]
+    turning = [name for name in names if name not in LETTERS]
     if turning and len(names) != len(machine.axes):
         raise PoseError(f"axes: {' '.join(machine.axes)} or some of X Y Z expected, not {' '.join(names)}")
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Literal
 
 from cyclopts import Parameter
 
@@ -15,13 +15,14 @@ from .console import announce_compiling, format_table, print_json, print_text
 from .options import Json, Name, OutputPath, Sizes, load_machine
 
 if TYPE_CHECKING:
+    from ..arrays import Array
     from ..calibration.calibration import Calibration
     from ..calibration.measurement_plan import MeasurementPlan
-    from ..calibration.measurements import Measurements, Noise
+    from ..calibration.measurements import Measurements, MeasuringSetup, Noise
     from ..export.files import Content
     from ..machine import Machine
 
-_DISTANCE = "distance"
+_LENGTHS = "distance", "height"  # columns besides the axes
 _LENGTH_DIGITS, _ANGLE_DIGITS = 4, 5
 _MOST_NAMED = 8
 
@@ -37,6 +38,7 @@ def calibrate(
     encoders: str | None = None,
     angle_encoders: str | None = None,
     centre: Annotated[str | None, Parameter(allow_leading_hyphen=True)] = None,
+    frame: Literal["machine", "instrument"] = "machine",
     plain: bool = False,
     plan: int | None = None,
     measure: str | None = None,
@@ -52,9 +54,8 @@ def calibrate(
     name
         A shipped machine's name or a YAML file.
     measured
-        A CSV file with a header: a column for each joint, and what was measured there in the machine's frame: all axes
-        of the pose, some of X, Y and Z, or the tip's distance from a fixed point (distance); mm and degrees, or with a
-        unit: X [in].
+        A CSV file with a header: the joints, and what was measured there: all axes of the pose, some of X, Y, Z, the
+        tip's distance from a point (distance), its height over a plane (height); mm and degrees, or a unit: X [in].
     free
         A number that may change: its name, a pattern such as legs.*.foot.*, or a group (feet, platform, rods, rails,
         encoders, mounting, head, table). May be given again; by default all that measurements of poses tell.
@@ -68,6 +69,8 @@ def calibrate(
         That of what a drive that turns says; by default 0deg.
     centre
         The point of the distances, X,Y,Z in mm; by default it is found with the rest.
+    frame
+        Whose frame X, Y, Z are in: the machine's, or an instrument's (laser tracker), which is found with the rest.
     plain
         Plain least squares; by default outliers pull no harder than three standard deviations do.
     plan
@@ -82,24 +85,27 @@ def calibrate(
     machine = load_machine(name, sizes)
     _check_outputs(plan, output, picture)
     stated = _parse_noise(noise, angle_noise, encoders, angle_encoders)
-    if plan is not None and measured is not None:
-        raise InputError("a plan needs no measurements", "--plan")
     if plan is not None:
+        if measured is not None:
+            raise InputError("a plan needs no measurements", "--plan")
         return _plan(machine, plan, free, measure, stated, output, json)
     if measured is None:
         raise InputError("a CSV file of measurements expected, or --plan", "calibrate")
     if measure is not None:
         raise InputError("goes with --plan; the columns of a file of measurements tell what was measured", "--measure")
+    rows = read_measurements(machine, measured, parse_setup(centre, frame), stated)
+    _show(_calibrate(machine, rows, measured, free, plain), output, picture, json)
+    return 0
+
+
+def _calibrate(machine: Machine, rows: Measurements, path: Path, free: list[str] | None, plain: bool) -> Calibration:
     announce_compiling()
     from ..calibration.calibration import calibrate as calibrate_machine
 
-    rows = read_measurements(machine, measured, centre, stated)
     try:
-        found = calibrate_machine(machine, rows, free, "linear" if plain else "soft_l1")
+        return calibrate_machine(machine, rows, free, "linear" if plain else "soft_l1")
     except PoseError as error:  # of what the file holds
-        raise InputError(str(error), str(measured)) from None
-    _show(found, output, picture, json)
-    return 0
+        raise InputError(str(error), str(path)) from None
 
 
 def _show(calibration: Calibration, output: Path | None, picture: Path | None, json: bool) -> None:
@@ -164,14 +170,22 @@ def _parse_noise(length: str | None, angle: str | None, slide: str | None, turn:
     return result
 
 
-def read_measurements(machine: Machine, path: Path, centre: str | None, noise: Noise) -> Measurements:
+def parse_setup(centre: str | None, frame: Literal["machine", "instrument"]) -> MeasuringSetup:
+    """Parse what is known of where things were measured."""
+    from ..calibration.measurements import MeasuringSetup
+    from .values import parse_row
+
+    point = None if centre is None else parse_row(centre.split(","), ("X", "Y", "Z"), ("mm",) * 3, None, "--centre")
+    return MeasuringSetup(frame, point)
+
+
+def read_measurements(machine: Machine, path: Path, setup: MeasuringSetup, noise: Noise) -> Measurements:
     """Read a file of measurements; its header tells what was measured.
 
     Raises :class:`InputError` with file and line.
     """
     from ..calibration.measurements import make_measurements
     from .rows import open_table, read_rows
-    from .values import parse_row
 
     try:
         with open_table(path) as file:
@@ -182,24 +196,27 @@ def read_measurements(machine: Machine, path: Path, centre: str | None, noise: N
         raise InputError("not a text file in UTF-8", str(path)) from None
     words = [cell.partition("[")[0].strip().strip('"').lower() for cell in header.split(",")]
     axes = [axis for axis in machine.axes if axis.lower() in words]
-    names, units = [*machine.joints, *axes], [*machine.joint_units]
-    units += [unit for axis, unit in zip(machine.axes, machine.axis_units, strict=True) if axis in axes]
-    has_distance = _DISTANCE in words
-    if not axes and not has_distance:
-        wanted = ", ".join((*machine.joints, *machine.axes))
-        raise InputError(f"its header names nothing measured, expected {wanted} (or {_DISTANCE})", str(path), 1)
-    if has_distance:
-        names, units = [*names, _DISTANCE], [*units, "mm"]
-    elif centre is not None:
-        raise InputError(f"goes with a column {_DISTANCE}", "--centre")
-    values, _ = read_rows(path, names, units)
-    point = None if centre is None else parse_row(centre.split(","), ("X", "Y", "Z"), ("mm",) * 3, None, "--centre")
+    lengths = [name for name in _LENGTHS if name in words]
+    if not axes and not lengths:
+        wanted = f"{', '.join((*machine.joints, *machine.axes))} (or {' or '.join(_LENGTHS)})"
+        raise InputError(f"its header names nothing measured, expected {wanted}", str(path), 1)
+    if "distance" not in lengths and setup.centre is not None:
+        raise InputError("goes with a column distance", "--centre")
+    units = [unit for axis, unit in zip(machine.axes, machine.axis_units, strict=True) if axis in axes]
+    names = [*machine.joints, *axes, *lengths]
+    values, _ = read_rows(path, names, [*machine.joint_units, *units, *["mm"] * len(lengths)])
+    columns = {name: values[:, [names.index(name)]] for name in lengths}
     count = len(machine.joints)
-    coordinates = values[:, count : count + len(axes)] if axes else None
-    distances = values[:, -1:] if has_distance else None
     try:
         return make_measurements(
-            machine, values[:, :count], coordinates, " ".join(axes) or None, distances, point, noise
+            machine,
+            values[:, :count],
+            values[:, count : count + len(axes)] if axes else None,
+            " ".join(axes) or None,
+            columns.get("distance"),
+            columns.get("height"),
+            setup,
+            noise,
         )
     except PoseError as error:
         raise InputError(str(error), str(path)) from None
@@ -239,7 +256,13 @@ def _format_plan(plan: MeasurementPlan) -> str:
     )
 
 
+def _format_place(place: Array) -> str:
+    return ", ".join(format_fixed(x, _LENGTH_DIGITS) for x in place.tolist()) + " mm"
+
+
 def _format_calibration(calibration: Calibration) -> str:
+    from ..toolpath.posting.frames import find_frame_angles
+
     measured, name = calibration.measured, calibration.family.machine.name
     lines = [f"{name}: {len(calibration.sizes)} numbers from {measured.describe()}\n"]
     rows = []
@@ -253,8 +276,12 @@ def _format_calibration(calibration: Calibration) -> str:
     if calibration.fixed:
         more = f" and {len(calibration.fixed) - _MOST_NAMED} more" if len(calibration.fixed) > _MOST_NAMED else ""
         lines.append(f"kept, for others replace them: {' '.join(calibration.fixed[:_MOST_NAMED])}{more}")
-    if calibration.centre.size:
-        lines.append("distances from " + ", ".join(format_fixed(x, _LENGTH_DIGITS) for x in calibration.centre) + " mm")
+    if calibration.centre is not None:
+        lines.append(f"distances from {_format_place(calibration.centre)}")
+    if calibration.frame is not None:
+        turns = (format_fixed(to_display(x, "rad"), _ANGLE_DIGITS) for x in find_frame_angles(calibration.frame))
+        place = _format_place(calibration.frame[:, 3])
+        lines.append(f"the instrument's zero is at {place}, its A, B, C are {', '.join(turns)} deg")
     if calibration.outliers:
         rows_told = " ".join(str(row + 1) for row in calibration.outliers[:_MOST_NAMED])
         lines.append(f"outliers: measurement{'s' * (len(calibration.outliers) > 1)} {rows_told}")

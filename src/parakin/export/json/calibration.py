@@ -33,7 +33,8 @@ def encode_calibration(calibration: Calibration, files: Mapping[str, str]) -> di
             for before, parameter in zip(calibration.family.parameters, calibration.parameters, strict=True)
         ],
         "fixed": list(calibration.fixed),
-        "centre": calibration.centre.tolist() or None,
+        "centre": None if calibration.centre is None else calibration.centre.tolist(),
+        "frame": None if calibration.frame is None else calibration.frame.tolist(),
         "error": calibration.error,
         "residual": {"fit": calibration.fit, "held_out": calibration.held_out},
         "residuals": calibration.residuals.tolist(),

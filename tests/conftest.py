@@ -8,7 +8,7 @@ settings.register_profile(
     "parakin",
     deadline=None,
     derandomize=True,
-    max_examples=int(os.environ.get("PARAKIN_EXAMPLES", "12")),
+    max_examples=int(os.environ.get("PARAKIN_EXAMPLES", "8")),
     suppress_health_check=[HealthCheck.too_slow, HealthCheck.function_scoped_fixture],
 )
 settings.load_profile("parakin")

@@ -109,4 +109,4 @@ def test_degenerate_machines_do_no_harm(part, tmp_path):
                     continue
                 miss, _ = Description.of(machine.spec).misses(listed, np.tile(row, (len(listed), 1)))
                 assert miss.max(initial=0.0) < 1e-6, text
-    assert loaded > COUNT // 12
+    assert loaded > COUNT // 16

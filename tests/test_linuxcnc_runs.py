@@ -14,7 +14,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from geometry import Description
 from random_paths import PathMaker
 from shipped import CONFIGURED, EVERYTHING, load_shipped
 
@@ -24,15 +23,14 @@ from parakin.toolpath.posting.post import post_path
 from parakin.toolpath.timing import plan_trajectory
 
 HERE = Path(__file__).parent / "linuxcnc"
-RATES = ("speed", "acceleration")
-DIGIT = 5e-7  # half a unit of the last digit that is sampled
 
 sys.path.insert(0, str(HERE))
 sys.path.insert(0, str(Path(__file__).parents[1] / "examples"))
 import turbine_blade  # noqa: E402
+from cycles import RISE, SPEED, check_joints, find_near_pole, measure_use, write_move_away  # noqa: E402
 from planner import Planner, read_program  # noqa: E402
 from simulation import CYCLE, as_programmed, first_line, simulated, why_not  # noqa: E402
-from stub import FIELDS, inward, outward, pose, world  # noqa: E402
+from stub import FIELDS, outward, pose, world  # noqa: E402
 
 # A move by hand, and moves that must be refused with a word: off a drive's range, off another limit of the machine's.
 # These machines have a program of their own here; the others run the one they come with.
@@ -48,7 +46,6 @@ PLACES = {
     "linear_delta": (pk.workpiece(X=-60, Y=45, Z=1920), True),
 }
 RESERVE = 0.02  # of the drives' speeds and accelerations
-SPEED, RISE = 1.02, 1.05  # of a joint's limits, in any cycle
 FEED = 10_000.0  # mm/min, in the cut: ball mill of 10 mm, four teeth, aluminium
 
 WHY_NOT = why_not()
@@ -66,63 +63,13 @@ def linuxcnc(machine):
         yield simulation
 
 
-def expected(machine, poses, last):
-    """The library's joints, mm and degrees: of both solutions of a wrist, and all turns, those nearest to the last."""
-    given, last = pose(machine, poses), inward(machine, last)
-    turning = np.array(machine.joint_units) == "rad"
-    modes = [machine.mode] if not turning.any() else [machine.mode[:-1] + sign for sign in "+-"]
-    found = np.stack([machine.inverse(given, mode) for mode in modes])
-    found[..., turning] -= 2.0 * np.pi * np.round((found - last)[..., turning] / (2.0 * np.pi))
-    nearest = np.abs(found - last)[..., turning].sum(-1).argmin(0)
-    return outward(machine, found[nearest, np.arange(len(given))])
-
-
-def read_to(machine, poses, joints):
-    """How far the joints of sampled poses may be off, mm and degrees: the sampler writes six digits of all of them."""
-    at, off = expected(machine, poses, joints), np.full(joints.shape, DIGIT)
-    for letter in machine.axes:
-        moved = poses.copy()
-        moved[:, FIELDS.index(letter)] += DIGIT
-        off += np.abs(expected(machine, moved, joints) - at)
-    return 1.5 * off
-
-
-def near_the_pole(machine, joints):
-    """Where the first joint of a wrist is free or nearly so, (n,)."""
-    if machine.wrist is None:
-        return np.zeros(len(joints), bool)
-    return np.abs(joints[:, machine.wrist.second]) < 0.01
-
-
-def check_joints(machine, poses, joints):
-    """Every cycle's joints are the library's; where a wrist's first is not free, to the digits that are sampled."""
-    turning = np.array(machine.joint_units) == "rad"
-    off, read = np.abs(joints[1:] - expected(machine, poses[1:], joints[:-1])), read_to(machine, poses[1:], joints[:-1])
-    free = near_the_pole(machine, joints)
-    assert (off < read)[~free[1:]].all()
-    assert off[~free[1:]][:, ~turning].max(initial=0.0) < 8e-6
-    miss, tilt = Description.of(machine.spec).misses(pose(machine, poses), inward(machine, joints))
-    assert miss.max() < 2e-5  # poses have six decimals, and a rod may lie near the tip's way
-    assert tilt.max() < 1e-7
-
-
 def words(block):
     return {word[0]: float(word[1:]) for word in block.split() if word[0] in FIELDS}
 
 
-def away(machine):
-    """A block that moves 20 mm and turns 10 degrees away from home along all axes, where it is allowed."""
-    step = np.where(np.array(machine.axis_units) == "mm", 20.0, np.radians(10.0))
-    home = find_home_pose(machine)
-    end = next(home + sign * step for sign in (1.0, -1.0) if machine.check(home + sign * step) == 0)
-    row = world(machine, end[None])[0]
-    words = [f"{axis}{row[FIELDS.index(axis)]:.6f}" for axis in machine.axes]
-    return " ".join(["G1", *words, "F9000"])
-
-
 @pytest.mark.parametrize("machine", CONFIGURED, indirect=True)
 def test_it_starts_homes_and_moves(machine, linuxcnc):
-    by_hand, refused = TASKS.get(machine.name, (away(machine), {}))
+    by_hand, refused = TASKS.get(machine.name, (write_move_away(machine), {}))
     if machine.name in TASKS:
         shutil.copy(HERE / f"{machine.name}.ngc", linuxcnc.folder)
     run = linuxcnc.run(
@@ -144,7 +91,7 @@ def test_it_starts_homes_and_moves(machine, linuxcnc):
     moved = np.ptp(pose(machine, poses), axis=0)
     assert (moved >= np.where(np.array(machine.axis_units) == "mm", 20.0, np.radians(10.0)) - 1e-6).all()
     check_joints(machine, poses, joints)
-    free = near_the_pole(machine, joints)
+    free = find_near_pole(machine, joints)
     assert np.abs(np.diff(joints, axis=0))[~free[:-1]].max() < 3.0  # nothing swings round
 
 
@@ -173,16 +120,6 @@ def written(trajectory):
     return re.sub(r"(?<= F)[\d.]+$", lambda feed: f"{4.0 * float(feed[0]):.6f}", approach, flags=re.M) + timed + rest
 
 
-def utilisation(machine, joints):
-    """The joints' greatest speed and acceleration over their limits, in the cycles apart from a wrist's pole."""
-    limits = [outward(machine, np.array([[getattr(d, rate) for d in machine.drives]])) for rate in RATES]
-    read = 2.0 * DIGIT / CYCLE / limits[0].min(), 4.0 * DIGIT / CYCLE**2 / limits[1].min()  # what the digits make of it
-    apart = ~near_the_pole(machine, joints)
-    rises = np.abs(np.diff(joints, 2, axis=0)) / CYCLE**2 / limits[1]
-    speed = (np.abs(np.diff(joints, axis=0)) / CYCLE / limits[0]).max()
-    return speed - read[0], rises[apart[:-2] & apart[1:-1] & apart[2:]].max() - read[1]
-
-
 @pytest.mark.parametrize("machine", PLACES, indirect=True)
 def test_a_posted_program_keeps_the_joints_limits_and_its_time(machine, linuxcnc, tmp_path):
     job = first_passes(machine, tmp_path)
@@ -192,7 +129,7 @@ def test_a_posted_program_keeps_the_joints_limits_and_its_time(machine, linuxcnc
     run = linuxcnc.run({"program": "part.ngc", "override": 1.5}, {"part.ngc": text})
     assert "told" not in run.seen, run.seen
     check_joints(machine, run.poses, run.joints)
-    speed, rise = utilisation(machine, run.joints)  # from home on
+    speed, rise = measure_use(machine, run.joints)  # from home on
     assert 0.6 < speed <= SPEED and 0.9 < rise <= RISE
     part = run.part(first_line(text), world(machine, posted.poses[:1])[0])
     assert (part.stop - part.start - 1) * CYCLE == pytest.approx(trajectory.seconds, rel=0.01)
@@ -222,7 +159,7 @@ def test_overrides_and_pauses_keep_the_joints_limits(machine, linuxcnc, tmp_path
     during = [[before + at, *rest] for at, *rest in changes]
     run = linuxcnc.run({"program": "part.ngc", "during": during}, {"part.ngc": text})
     assert "told" not in run.seen, run.seen
-    speed, rise = utilisation(machine, run.joints)
+    speed, rise = measure_use(machine, run.joints)
     assert speed <= SPEED and rise <= RISE
     part = run.part(first_line(text), world(machine, job.posted.poses[:1])[0])
     assert (part.stop - part.start - 1) * CYCLE > job.trajectory.seconds + 1.2
@@ -236,7 +173,7 @@ def test_a_foreign_program_is_slowed_where_a_joint_would_pass_its_limits(machine
     text = as_programmed(job.posted, written(job.trajectory))
     run = linuxcnc.run({"program": "part.ngc"}, {"part.ngc": text})
     assert "told" not in run.seen, run.seen
-    speed, rise = utilisation(machine, run.joints)
+    speed, rise = measure_use(machine, run.joints)
     assert 0.95 < speed <= SPEED and 0.95 < rise <= RISE
     check_joints(machine, run.poses, run.joints)
     part = run.part(first_line(text), world(machine, job.posted.poses[:1])[0])
@@ -262,7 +199,7 @@ def test_random_paths_run_as_the_planner_does_alone(machine, linuxcnc, tmp_path)
         text = written(job.trajectory)
         run = linuxcnc.run({"program": "part.ngc"}, {"part.ngc": text})
         assert "told" not in run.seen, run.seen
-        assert utilisation(machine, run.joints)[0] <= SPEED
+        assert measure_use(machine, run.joints)[0] <= SPEED
         planner.start(find_home_pose(machine))
         alone = world(machine, planner.run_program(read_program(text)).poses)
         first, moving = (int(np.flatnonzero((np.diff(p, axis=0) != 0.0).any(1))[0]) for p in (run.poses, alone))
@@ -298,7 +235,7 @@ def test_a_wrist_goes_on_in_its_other_mode_and_stops_are_kept(machine, linuxcnc,
     text = written(trajectory)
     run = linuxcnc.run({"program": "part.ngc"}, {"part.ngc": text})
     assert "told" not in run.seen, run.seen
-    speed, rise = utilisation(machine, run.joints)
+    speed, rise = measure_use(machine, run.joints)
     assert speed <= SPEED and rise <= RISE
     part = run.part(first_line(text), world(machine, posted.poses[:1])[0])
     assert np.abs(run.joints[part][-1] - outward(machine, posted.joints[-1:])[0]).max() < 2e-6

@@ -77,6 +77,11 @@ class MarginRates:
         down, up = self._values(low, high)
         return down[:, :-1], up[:, -1]
 
+    def enclose_margins(self, low: Array, high: Array) -> tuple[Array, Array]:
+        """Bound every margin from below and above, (N, margins) each; NaN where nothing is known."""
+        down, up = self._values(low, high)
+        return down[:, :-1], up[:, :-1]
+
     def prove_regular(self, low: Array, high: Array) -> Flags:
         """Prove that no parallel singularity is in the box, (N,)."""
         decided: Flags = self._decide_regular(low, high)[0]

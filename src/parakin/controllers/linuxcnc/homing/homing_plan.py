@@ -18,6 +18,7 @@ from ....model.elements import ABSOLUTE, Drive
 from ....units import name_display_unit, to_display
 from ..axis_rates import choose_drive_rates
 from ..home_pose import find_home_pose
+from .proof import prove_homing
 from .starts import HomingStarts, sample_starts
 from .walk import HomingWalk, begin_walk, walk_joints
 
@@ -47,6 +48,7 @@ class HomingPlan:
 
     starts : from how many poses the legs' homing was followed
     least : the least regularity on the way, a fraction of home's; 1 where nothing moves
+    proved : whether it is proved that no start comes to a singularity; where nothing moves nothing is left to prove
     unsafe : None, or the share of the starts from which the best order of switches would do harm
     ambiguous : the share of the starts whose joints the direct problem, asked from home, answers with another pose
     """
@@ -54,6 +56,7 @@ class HomingPlan:
     joints: tuple[JointHoming, ...]
     starts: int
     least: float
+    proved: bool
     unsafe: float | None
     ambiguous: float
 
@@ -88,7 +91,10 @@ def find_homing(machine: Machine) -> HomingPlan:
     legs = _describe_legs(machine, choice[0] if choice else None)
     joints = (*legs, *_describe_serial_joints(machine, 1 + max((leg.sequence for leg in legs), default=0)))
     least = float(choice[1].least.min()) if choice else 1.0
-    return HomingPlan(joints, len(starts.poses), least, unsafe, 0.0 if choice else _find_ambiguity(machine, starts))
+    sequences = choice[0].sequences if choice else ()
+    proved = not choice or (len(sequences) == 1 and prove_homing(machine, sequences[0], _choose_search_speeds(machine)))
+    ambiguous = 0.0 if choice else _find_ambiguity(machine, starts)
+    return HomingPlan(joints, len(starts.poses), least, proved, unsafe, ambiguous)
 
 
 def _refuse_far_switches(machine: Machine) -> None:

@@ -29,11 +29,11 @@ This was followed from {starts} poses all over the workspace, in steps of 4 mm: 
 start where the machine may be left: inside its limits, on home's side of all singularities. Legs can't be jogged one
 by one, for their sequence is negative."""
 
-_PROVED = """\
+_PROVED_SAFE = """\
 That none comes to a singularity, from wherever the machine may be left, is proved by intervals, for joints within
 10 mm of their even motion; that no other limit is broken is sampled."""
 
-_SAMPLED = "Samples are no proof."
+_ONLY_SAMPLED = "Samples are no proof."
 
 _UNSAFE = """\
 Home switches will not do: from {share} of {starts} sampled poses the legs, all together in their best directions,
@@ -125,7 +125,9 @@ def _describe_homing(machine: Machine, equipment: Equipment) -> list[str]:
         lines.append(f"{first} {', '.join(word for word in words if word)}, all together, and then together to home.")
     if sequences:
         lines.append(
-            _FOLLOWED.format(starts=plan.starts, least=f"{plan.least:.2f}", proof=_PROVED if plan.proved else _SAMPLED)
+            _FOLLOWED.format(
+                starts=plan.starts, least=f"{plan.least:.2f}", proof=_PROVED_SAFE if plan.proved else _ONLY_SAMPLED
+            )
         )
     else:
         lines.append("Homing moves no leg: their encoders are absolute.")

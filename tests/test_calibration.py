@@ -288,6 +288,24 @@ def test_a_flat_artefact_whose_place_is_not_known():
         pk.calibrate(simulated.machine, rows, ["feet"])
 
 
+def test_a_tip_held_in_one_place(tmp_path, capsys):
+    """A tool that turns about its tip in a ball socket tells a hexapod's rods without any instrument."""
+    machine, rng = load_shipped("hexapod"), np.random.default_rng(8)
+    poses = np.tile(machine.home, (60, 1))
+    poses[:, 3:] += rng.uniform(-0.25, 0.25, (60, 3))
+    family = pk.family(machine, ["encoders"])
+    true = family.nominal + rng.normal(0.0, 0.1, len(family.names))
+    joints = family.inverse(poses, true)
+    rows = pk.make_measurements(machine, joints, setup=pk.MeasuringSetup(pinned=True), noise=pk.Noise(0.002))
+    result = pk.calibrate(machine, rows, ["encoders"])
+    assert np.abs(result.sizes - true).max() < 1e-3
+    write_csv(tmp_path / "held.csv", machine, joints, np.empty((60, 0)), ())
+    assert main(["calibrate", "hexapod", str(tmp_path / "held.csv"), "--pinned", "--free", "encoders"]) == 0
+    assert "60 measurements of one place" in capsys.readouterr().out
+    assert main(["calibrate", "hexapod", str(tmp_path / "held.csv")]) == 2
+    assert "its header names nothing measured" in capsys.readouterr().err
+
+
 def test_outliers_are_told_and_do_not_pull():
     simulated = Simulated("orthoglide", 4)
     measured = simulated.measure()

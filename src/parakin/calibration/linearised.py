@@ -61,9 +61,8 @@ class MeasuredFamily:
         setups: Sequence[Setup] | None = None,
     ):
         self.family, self.measured = family, measured
-        others = (measured.distances, measured.heights)
         all_axes = len(measured.axes) == len(family.machine.axes) and measured.frame == "machine"
-        self.whole = all_axes and others == (None, None)
+        self.whole = all_axes and measured.width == len(measured.axes)
         if self.whole:
             starts = measured.values
         self.starts: Array = find_poses(family.machine, measured.joints) if starts is None else starts

@@ -33,10 +33,12 @@ class MeasuringSetup:
 
     frame : of the coordinates: the machine's, or an instrument's own, which is found with the rest
     centre : (3,) mm, the point of measured distances; None: not known, and found with the rest
+    pinned : whether the tip was held in one place, which is found with the rest
     """
 
     frame: MeasuringFrame = "machine"
     centre: RowsLike | None = None
+    pinned: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,6 +52,7 @@ class Measurements:
     heights : (N,) mm, of the tip over one plane, which is found with the rest; None: not measured
     frame : the coordinates' frame, the machine's or an instrument's own, which is found with the rest
     centre : (3,) the distances' point, mm; None: not known, and found with the rest
+    pinned : whether the tip was held in one place, which is found with the rest
     """
 
     joints: Array
@@ -59,6 +62,7 @@ class Measurements:
     heights: Array | None = None
     frame: MeasuringFrame = "machine"
     centre: Array | None = None
+    pinned: bool = False
     noise: Noise = Noise()
 
     def __repr__(self) -> str:
@@ -66,14 +70,18 @@ class Measurements:
 
     def describe(self) -> str:
         """Describe what was measured: ``57 measurements of X Y Z``."""
-        others = {"distance": self.distances, "height": self.heights}
-        what = " ".join([*self.axes, *(name for name, values in others.items() if values is not None)])
+        others = {
+            "distance": self.distances is not None,
+            "height": self.heights is not None,
+            "one place": self.pinned,
+        }
+        what = " ".join([*self.axes, *(name for name, is_measured in others.items() if is_measured)])
         return f"{len(self.joints)} measurements of {what}{' in an own frame' * (self.frame != 'machine')}"
 
     @property
     def width(self) -> int:
         """How many numbers were measured at each joint vector."""
-        return len(self.axes) + (self.distances is not None) + (self.heights is not None)
+        return len(self.axes) + (self.distances is not None) + (self.heights is not None) + 3 * self.pinned
 
     def take(self, rows: Indices) -> Measurements:
         """Take some of the measurements."""
@@ -117,20 +125,20 @@ def make_measurements(
         None if one is None else np.asarray(read_rows(one, ("d",), ("mm",), lambda: np.empty(1), what))
         for what, one in (("distances", distances), ("heights", heights))
     )
-    if values is None and lengths is None and over is None:
+    setup = MeasuringSetup() if setup is None else setup
+    if values is None and lengths is None and over is None and not setup.pinned:
         raise PoseError("values: measured coordinates, distances or heights expected")
     for what, array in (("values", measured), ("distances", lengths), ("heights", over)):
         if array is not None and (array.ndim != 2 or len(array) != len(rows) or not np.isfinite(array).all()):
             raise PoseError(f"{what}: {len(rows)} rows of finite numbers expected, one a row of joints")
     if not np.isfinite(rows).all():
         raise PoseError("joints: finite numbers expected")
-    setup = MeasuringSetup() if setup is None else setup
     point = None if setup.centre is None else read_vector("centre", setup.centre, tuple(LETTERS))
     _check_setup(machine, setup, names, over)
     lengths, over = (None if one is None else one[:, 0] for one in (lengths, over))
     noise = Noise() if noise is None else noise
     check_noise(noise)
-    return Measurements(rows, names, measured, lengths, over, setup.frame, point, noise)
+    return Measurements(rows, names, measured, lengths, over, setup.frame, point, setup.pinned, noise)
 
 
 def _check_setup(machine: Machine, setup: MeasuringSetup, names: tuple[str, ...], heights: Array | None) -> None:
@@ -141,8 +149,9 @@ def _check_setup(machine: Machine, setup: MeasuringSetup, names: tuple[str, ...]
     if setup.frame == "instrument" and names != tuple(LETTERS):
         given = " ".join(names) or "none"
         raise PoseError(f"frame: an instrument's own frame is found from X Y Z of the tip, not from {given}")
-    if heights is not None and not spatial:
-        raise PoseError(f"heights: a plane is found for machines with X, Y and Z, not for {' '.join(machine.axes)}")
+    if (heights is not None or setup.pinned) and not spatial:
+        what = "heights: a plane" if heights is not None else "pinned: a place"
+        raise PoseError(f"{what} is found for machines with X, Y and Z, not for {' '.join(machine.axes)}")
 
 
 def check_measured_axes(machine: Machine, names: tuple[str, ...]) -> None:

@@ -1,4 +1,4 @@
-"""What measures the tip, and what is unknown of it: the machine's frame, an instrument's own, a point, a plane.
+"""What measures the tip, and what is unknown of it: a frame, a point, a place, a plane.
 
 The unknown numbers are found with the machine's.
 """
@@ -115,6 +115,19 @@ def _find_centre(tips: Array, distances: Array) -> Array:
     return np.asarray(np.linalg.lstsq(matrix, (tips * tips).sum(1) - distances**2, rcond=None)[0][:3])
 
 
+class PinnedPlace:
+    """One place in which the tip was held while the tool turned about it, as in a ball socket; it is unknown."""
+
+    turns = np.zeros(3, bool)
+
+    def __init__(self, tips: Array):
+        self.begin = tips.mean(0)
+
+    def predict(self, tips: Array, unknown: Array) -> Prediction:
+        every = np.broadcast_to(np.eye(3), (len(tips), 3, 3))
+        return Prediction(tips - unknown, every, -every)
+
+
 class UnknownPlane:
     """The tip's height over a plane, as where it touches a flat artefact: n·tip - d.
 
@@ -158,4 +171,6 @@ def make_setups(measured: Measurements, tips: Array) -> list[tuple[Setup, Array]
         setups.append((point, measured.distances[:, None]))
     if measured.heights is not None:
         setups.append((UnknownPlane(tips, measured.heights), measured.heights[:, None]))
+    if measured.pinned:
+        setups.append((PinnedPlace(tips), np.zeros_like(tips)))
     return setups

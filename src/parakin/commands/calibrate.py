@@ -39,6 +39,7 @@ def calibrate(
     angle_encoders: str | None = None,
     centre: Annotated[str | None, Parameter(allow_leading_hyphen=True)] = None,
     frame: Literal["machine", "instrument"] = "machine",
+    pinned: bool = False,
     plain: bool = False,
     plan: int | None = None,
     measure: str | None = None,
@@ -71,6 +72,8 @@ def calibrate(
         The point of the distances, X,Y,Z in mm; by default it is found with the rest.
     frame
         Whose frame X, Y, Z are in: the machine's, or an instrument's (laser tracker), which is found with the rest.
+    pinned
+        The tip was held in one place while the tool turned about it; the place is found with the rest.
     plain
         Plain least squares; by default outliers pull no harder than three standard deviations do.
     plan
@@ -89,13 +92,18 @@ def calibrate(
         if measured is not None:
             raise InputError("a plan needs no measurements", "--plan")
         return _plan(machine, plan, free, measure, stated, output, json)
+    path = _require_file(measured, measure)
+    rows = read_measurements(machine, path, parse_setup(centre, frame, pinned), stated)
+    _show(_calibrate(machine, rows, path, free, plain), output, picture, json)
+    return 0
+
+
+def _require_file(measured: Path | None, measure: str | None) -> Path:
     if measured is None:
         raise InputError("a CSV file of measurements expected, or --plan", "calibrate")
     if measure is not None:
         raise InputError("goes with --plan; the columns of a file of measurements tell what was measured", "--measure")
-    rows = read_measurements(machine, measured, parse_setup(centre, frame), stated)
-    _show(_calibrate(machine, rows, measured, free, plain), output, picture, json)
-    return 0
+    return measured
 
 
 def _calibrate(machine: Machine, rows: Measurements, path: Path, free: list[str] | None, plain: bool) -> Calibration:
@@ -170,13 +178,13 @@ def _parse_noise(length: str | None, angle: str | None, slide: str | None, turn:
     return result
 
 
-def parse_setup(centre: str | None, frame: Literal["machine", "instrument"]) -> MeasuringSetup:
+def parse_setup(centre: str | None, frame: Literal["machine", "instrument"], pinned: bool) -> MeasuringSetup:
     """Parse what is known of where things were measured."""
     from ..calibration.measurements import MeasuringSetup
     from .values import parse_row
 
     point = None if centre is None else parse_row(centre.split(","), ("X", "Y", "Z"), ("mm",) * 3, None, "--centre")
-    return MeasuringSetup(frame, point)
+    return MeasuringSetup(frame, point, pinned)
 
 
 def read_measurements(machine: Machine, path: Path, setup: MeasuringSetup, noise: Noise) -> Measurements:
@@ -197,7 +205,7 @@ def read_measurements(machine: Machine, path: Path, setup: MeasuringSetup, noise
     words = [cell.partition("[")[0].strip().strip('"').lower() for cell in header.split(",")]
     axes = [axis for axis in machine.axes if axis.lower() in words]
     lengths = [name for name in _LENGTHS if name in words]
-    if not axes and not lengths:
+    if not (axes or lengths or setup.pinned):
         wanted = f"{', '.join((*machine.joints, *machine.axes))} (or {' or '.join(_LENGTHS)})"
         raise InputError(f"its header names nothing measured, expected {wanted}", str(path), 1)
     if "distance" not in lengths and setup.centre is not None:

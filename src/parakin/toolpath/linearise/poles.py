@@ -19,7 +19,7 @@ _ROUNDS = 60
 _POINTS_AT_ONCE = 1 << 12
 _BENDING = 0.1  # sine of B: where C turns as much as for a tool more upright, even poses are not straight
 _RATIOS = (4.0, 2.0, 1.0)  # of RIM
-_CLOSE_RATIOS = (*(2.0 ** (0.5 * k) for k in range(12, -1, -1)), 0.97)  # of RIM, where the tool is NEAR_Z
+_CLOSE_RATIOS = (*(2.0 ** (0.5 * k) for k in range(12, -1, -1)), 0.989, 0.97)  # of RIM, where the tool is NEAR_Z
 
 
 @dataclass(frozen=True, eq=False)

@@ -90,7 +90,7 @@ def load(name, tmp_path):
     if name in KINDS:
         (tmp_path / f"{name}.yaml").write_text(KINDS[name])
         name = str(tmp_path / f"{name}.yaml")
-    return load_shipped(name)
+    return pk.load(name)
 
 
 @pytest.mark.parametrize("name", [*pk.machines(), *OWN, *KINDS], ids=lambda name: Path(name).stem)

@@ -62,7 +62,7 @@ def find_end(machine, pose, direction, far):
 
 @pytest.mark.parametrize("name", [*REPRESENTATIVES, *OWN], ids=lambda name: Path(name).stem)
 def test_travel_is_what_samples_allow(name):
-    machine = load_shipped(name)
+    machine = pk.load(name)
     reached = 0
     count = 1 if name == "rus6" else 4  # bounds of its cranks are wide, and its ways take a thousand steps each
     for pose in draw_poses(machine, count, 3):

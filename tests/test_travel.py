@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from shipped import REPRESENTATIVES, load_shipped
 
+import parakin as pk
 from parakin.cli import main
 from parakin.errors import PoseError
 from parakin.kinematics.travel import FARTHEST, SINGULARITY

@@ -20,7 +20,7 @@ from parakin.toolpath.timing import plan_trajectory
 from parakin.toolpath.timing.kernels.acceleration_limits import AccelerationLimits
 from parakin.toolpath.timing.kernels.reachability import compute_controllable, compute_reachable
 from parakin.toolpath.timing.kernels.speed_ceilings import StepCeilings, compute_speed_ceilings
-from parakin.toolpath.timing.kernels.splines import JointRows, fit_splines
+from parakin.toolpath.timing.kernels.splines import JointRows, fit_splines, make_unforced_rows
 
 ROWS, JOINTS = 100_000, 6
 
@@ -47,7 +47,7 @@ def quickest(s: np.ndarray, q: np.ndarray, speed: np.ndarray, acceleration: np.n
     step = np.diff(s)
     n, curvature = len(step), np.empty_like(q)
     fit_splines(step, q, curvature, np.empty(n + 1))
-    rows = JointRows(step, q, curvature, np.full(n, np.inf))
+    rows = JointRows(step, q, curvature, np.full(n, np.inf), make_unforced_rows(n + 1))
     ceilings = StepCeilings(np.empty(n), np.empty(n))
     compute_speed_ceilings(rows, speed, np.inf, ceilings, 0, n)
     ceiling = np.minimum(np.append(ceilings.start, 0.0), np.append(0.0, ceilings.end))

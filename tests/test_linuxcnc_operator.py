@@ -16,7 +16,7 @@ from session import run_session
 from simulation import CYCLE, simulated, why_not
 from stub import FIELDS, inward, outward, pose, world
 
-STEPS = 100 if EVERYTHING else 5  # of a random session
+STEPS = 100 if EVERYTHING else 8  # of a random session
 
 WHY_NOT = why_not()
 pytestmark = pytest.mark.skipif(bool(WHY_NOT), reason=WHY_NOT)

@@ -217,11 +217,12 @@ def work(task, seen):
     operator.switch_on()
     operator.home()
     for step in task["steps"]:
-        operator.said = []
+        operator.said, begin = [], time.monotonic()
         try:
             getattr(operator, step[0])(*step[1:])
             operator.stands()
-            seen["steps"].append({"step": step} | operator.describe())
+            seconds = time.monotonic() - begin
+            seen["steps"].append({"step": step, "seconds": seconds} | operator.describe())
             if operator.is_off():
                 step = ["switch on"]
                 operator.switch_on()

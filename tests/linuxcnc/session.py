@@ -24,6 +24,7 @@ HELD = 1e-2  # the same nearer to a wrist's pole than 8e-6 rad, where a joint is
 STEP = 2.0  # of a joint's speed: the most in a cycle
 FEEDS = 6e3, 6e4  # mm/min: the planner is to keep the joints' limits
 STOPS = ("stop_at_once", "stop_amid")
+LONGEST_STOP = 5.0  # s until the machine is on again: LinuxCNC's screens wait so long for a command that is not done
 
 
 class Session:
@@ -129,6 +130,8 @@ def check_steps(machine, seen):
         if not step["on"]:
             yield words + "the machine is off"
             continue
+        if step["step"][0] in STOPS and step["seconds"] > LONGEST_STOP:
+            yield words + f"it took {step['seconds']:.1f} s"
         off = np.abs(np.array(step["position"]) - step["shown"]).max()
         given, joints = pose(machine, np.array([step["position"]])), inward(machine, np.array([step["joints"]]))
         held = machine.wrist is not None and not step["identity"] and machine.wrist.find_free(given, 1.2e-5)[0]

@@ -6,6 +6,7 @@
 
 #define EMCMOT_MAX_DIO 64
 #define EMCMOT_MAX_AIO 64
+#define EMCMOT_MOTION_INPOS_BIT 0x0002
 #define EMCMOT_MOTION_ERROR_BIT 0x0008
 #define ZERO_EMC_POSE(pose) memset(&(pose), 0, sizeof(EmcPose))
 

@@ -17,12 +17,15 @@ int tpCreate(TP_STRUCT *tp, int size, int id)
     return 0;
 }
 
+/* LinuxCNC calls it when the machine is switched off, and then does not look at "in position" until it is on again: off
+   amid a move its screens would wait for that in vain, seconds for each command. */
 int tpClear(TP_STRUCT *tp)
 {
     (void)tp;
     clear_path();
     clear_outputs();
     timed = synchronized = 0;
+    emcmotStatus->motionFlag |= EMCMOT_MOTION_INPOS_BIT;
     return 0;
 }
 

@@ -22,6 +22,7 @@ from parakin.model.elements import Direction, Drive, Point, Size
 from parakin.model.legs import Leg
 from parakin.model.legs.column import Column
 from parakin.model.legs.crank import Crank
+from parakin.model.legs.driven_column import DrivenColumn
 from parakin.model.legs.lambda_ import Lambda
 from parakin.model.legs.length import Length
 from parakin.model.legs.ring import Ring
@@ -148,9 +149,25 @@ def draw_lambda(axes: Axes) -> None:
 def draw_column(axes: Axes) -> None:
     point = Point((330.0, 0.0, 380.0))
     leg = Column(make_drives("rad", "mm"), ORIGIN, radius=Size(560.0), rod=Size(330.0))
+    draw_rail_and_slide(axes, leg, point)
+
+
+def draw_driven_column(axes: Axes) -> None:
+    point = Point((330.0, 0.0, 380.0))
+    leg = DrivenColumn(make_drives("rad", "mm", "rad"), ORIGIN, radius=Size(560.0), rod=Size(330.0))
+    draw_rail_and_slide(axes, leg, point)
+    low, angle = leg.inverse(point, "-").joints[1:]
+    turn = np.linspace(np.pi, np.pi - angle, 30)
+    axes.plot([560, 400], [low, low], color=BASE, lw=1, ls="--")
+    axes.plot(560 + 130 * np.cos(turn), low + 130 * np.sin(turn), color=BASE, lw=1.4)
+    write(axes, 415, low + 45, "q3", BASE, where="right")
+
+
+def draw_rail_and_slide(axes: Axes, leg: Column, point: Point) -> None:
+    """Draw a column with the rail's axis, the slide, and both branches of the link."""
     axes.plot([0, 0], [-40, 740], color=BASE, lw=1, ls="-.")
     axes.plot([560, 560], [0, 720], color=BASE, lw=1)
-    _, low = draw_struts(axes, leg, point, "-", OWN)
+    low = draw_struts(axes, leg, point, "-", OWN)[1]
     draw_struts(axes, leg, point, "+", OTHER)
     draw_arrow(axes, (0, 0), (560, 0), "radius")
     axes.annotate(
@@ -174,7 +191,7 @@ def mark_platform(axes: Axes, point: Point) -> None:
 
 FIGURES = {
     Length: draw_length, Ring: draw_ring,
-    Slider: draw_slider, Crank: draw_crank, Lambda: draw_lambda, Column: draw_column,
+    Slider: draw_slider, Crank: draw_crank, Lambda: draw_lambda, Column: draw_column, DrivenColumn: draw_driven_column,
 }  # fmt: skip
 
 

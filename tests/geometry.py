@@ -51,9 +51,9 @@ class Description:
 
     @property
     def joints(self):
-        """Names: the legs' first joints, their second ones, head's and table's."""
-        firsts = [leg["joints"][0] for leg in self.legs]
-        return tuple(firsts + [leg["joints"][1] for leg in self.legs if len(leg["joints"]) > 1] + self.serial)
+        """Names: the legs' first joints, their second ones, third ones, head's and table's."""
+        legs = [leg["joints"][i] for i in range(3) for leg in self.legs if len(leg["joints"]) > i]
+        return tuple(legs + self.serial)
 
     @property
     def turns(self):
@@ -269,6 +269,11 @@ def leg_misses(leg, end, q):
     if kind == "column":
         foot = np.stack([leg["radius"] * np.cos(q[0]), leg["radius"] * np.sin(q[0]), q[1]], -1)
         return [np.abs(far(foot) - leg["rod"]), np.abs(np.sin(q[0]) * end[:, 0] - np.cos(q[0]) * end[:, 1])]
+    if kind == "driven_column":
+        inward = -np.stack([np.cos(q[0]), np.sin(q[0]), 0.0 * q[0]], -1)
+        foot = -leg["radius"] * inward + np.outer(q[1], [0, 0, 1])
+        link = np.cos(q[2])[:, None] * inward + np.outer(np.sin(q[2]), [0, 0, 1])
+        return [np.linalg.norm(foot + leg["rod"] * link - end, axis=1)]
     if kind == "crank":
         zero, axis = np.array(leg["zero"]), np.array(leg["axis"])
         arm = np.outer(np.cos(q[0]), zero) + np.outer(np.sin(q[0]), np.cross(axis, zero))

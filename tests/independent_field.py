@@ -216,6 +216,14 @@ def eclipse(s, poses):
     return np.stack([*angles, *heights], -1)
 
 
+def eclipse_overactuated(s, poses):
+    """The links of the first two columns lean by the arc sine of the fall to their ends, of slides above those."""
+    joints = eclipse(s, poses)
+    ends = platform_joints(poses, on_circle(s["r"], SIDES[:2]), s["tool"])
+    falls = [joints[:, 3 + i] - end[:, 2] for i, end in enumerate(ends)]
+    return np.column_stack([joints, *(-np.arcsin(fall / s["rod"]) for fall in falls)])
+
+
 def four_struts(s, poses):
     """The tool lies on the line through the central leg's foot; C turns the level line across the tool's own x."""
     tip, c = poses[:, :3], poses[:, 3]
@@ -300,6 +308,7 @@ INVERSES = {
         rrr3,
         prr3,
         eclipse,
+        eclipse_overactuated,
         sprint_z3,
         four_struts,
         exechon,

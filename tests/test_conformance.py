@@ -19,6 +19,7 @@ INVERSES = PAPERS | FIELD
 SPREAD = {  # about home, mm and rad: the allowed workspace and a margin beyond
     "cmw_300": [250, 250, 250, 0.5, 0.5, 0.5],
     "eclipse": [120, 110, 300, 0.35, 0.35, 0.5],
+    "eclipse_overactuated": [120, 110, 300, 0.35, 0.35, 0.5],
     "exechon": [500, 500, 300, 1.9, 3.3],
     "five_bar": [330, 230],
     "five_bar_slides": [500, 200],

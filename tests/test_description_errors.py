@@ -75,7 +75,7 @@ MISTAKES = [
     (
         "tx ty rz",
         "tx ty",
-        ["m.yaml:7: legs: 3 joints (q1, q2, q3) for 2 words of motion (tx ty), expected as many joints as words"],
+        ["m.yaml:7: legs: 1 joint (q1) for 2 words of motion (tx ty), expected at least as many joints as words"],
     ),
     ("[q1, q2, q3]", "[q1, q2, q1]", ['m.yaml:9: joint "q1" is used twice, first in line 9']),
     ("joint: turn", "joint: q2", ['m.yaml:14: joint "q2" is used twice, first in line 9']),

@@ -48,15 +48,20 @@ def errors(m, found, poses):
 
 
 def legs_regularity(m, poses):
-    """The determinant of the legs' closures, rows and columns scaled, and the least singular value, (N,) each."""
-    rows, scales = len(m.spec.legs[0].drives) * len(m.spec.legs), np.where(np.array(m.axis_units) == "mm", 1.0, 200.0)
+    """The determinant of the legs' closures, rows and columns scaled, and the least singular value, (N,) each.
+
+    With more drives than freedoms the determinant is the root of AᵀA's.
+    """
+    rows, scales = sum(len(leg.drives) for leg in m.spec.legs), np.where(np.array(m.axis_units) == "mm", 1.0, 200.0)
+    columns = rows - (len(m.joints) - len(m.axes))
     if m.structure.has_slides:  # the slides follow the platform, which C does not turn where it is free
-        a, rows = m.twist_rates(poses, m.inverse(poses))[0], len(m.axes)
+        a, rows, columns = m.twist_rates(poses, m.inverse(poses))[0], len(m.joints), len(m.axes)
     else:
         a, _ = m.jacobians(poses)
-    a = (a / scales)[:, :rows, :rows]
+    a = (a / scales)[:, :rows, :columns]
     a = a / np.linalg.norm(a, axis=2, keepdims=True)
-    return np.linalg.det(a), np.linalg.svd(a)[1][:, -1]
+    det = np.linalg.det(a) if rows == columns else np.sqrt(np.linalg.det(a.swapaxes(1, 2) @ a))
+    return det, np.linalg.svd(a)[1][:, -1]
 
 
 @everyone

@@ -228,6 +228,9 @@ def test_a_forward_is_never_silently_wrong(m, modules):
             [np.abs(signed(m, m.inverse(library.poses, mode), joints))[:, legs].max(1) for mode in modes]
         )
     same = done == (library.converged & (off <= 0.01))
+    # Measured joints of more drives than freedoms disagree by their following errors, which the module allows for.
+    vague = m.is_redundant & (library.residual > CLOSE) & (library.residual < 1.1)
+    same, done = same | vague, done & ~vague
     # Where joints are none, and beside singularities, rounding decides. Far off, the library alone continues tilts.
     assert same.mean() > (0.75 if m.structure.has_slides else 0.998)
     # Of poses that are allowed it refuses some far from home, where the library alone goes on; it answers no other.

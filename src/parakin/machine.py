@@ -171,6 +171,7 @@ class Machine(MachineProperties):
         near: RowsLike | None = None,
         method: str | None = None,
         mode: str | None = None,
+        agreement: float = 0.0,
     ) -> Solution:
         """Compute poses for joints, (..., joints) -> :class:`~.kinematics.solution.Solution`: residual and verdict too.
 
@@ -184,12 +185,16 @@ class Machine(MachineProperties):
         mode : working mode that the legs stand in, head and table may stand in either of theirs; by default the
             machine's, but where a near pose tells by its own joints that the legs stand in another one, which
             ``in_other_mode`` of the solution says
+        agreement : by how much legs may fail to close, mm, where joints of more drives than freedoms disagree, as
+            measured and rounded ones do; the pose is then that of least squares
         """
         rows, lead = self.rows(joints, self.joints, "joints")
         if not isinstance(method, str | None):
             raise PoseError(f"method: a text expected, not {describe_value(method)}")
+        check_range("agreement", agreement, 0.0, np.inf, "mm")
         starts = None if near is None else self._starts(near, lead)
-        solution = solve_forward(self.model, rows, starts, method, None if mode is None else self.checked_mode(mode))
+        own_mode = None if mode is None else self.checked_mode(mode)
+        solution = solve_forward(self.model, rows, starts, method, own_mode, float(agreement))
         return Solution(
             solution.poses.reshape(*lead, len(self.axes)),
             solution.residual.reshape(lead)[()],
@@ -286,31 +291,32 @@ class Machine(MachineProperties):
         return compile_line_tapes(self.model, self.checked_mode(mode))
 
     def jacobians(self, poses: RowsLike, mode: str | None = None) -> tuple[Array, Array]:
-        """Compute A and B, each (..., n, n), with A x' = B q' for the rates of pose and joints.
+        """Compute A (..., m, n) and B (..., m, m), with A x' = B q' for the rates of pose and joints.
 
         Rows of legs are their closures' derivatives (a rod's vector, mm); the last two rows of a machine with driven
         head or table say that the tool's axis turns with the pose's. det A = 0 at a parallel singularity (or where the
-        pose's angles are: B = 0), det B = 0 at a serial one. NaN where the pose is out of reach.
+        pose's angles are: B = 0), det B = 0 at a serial one. With more drives than axes a parallel singularity is where
+        the rank of A falls. NaN where the pose is out of reach.
         """
         rows, lead = self.rows(poses, self.axes, "poses")
         n, m = len(self.axes), len(self.joints)
         joints = self.inverse(rows, mode)
-        both = evaluate_tape(self.model.jacobian_tape(), rows, np.empty((len(rows), n * n + n * m)), joints)
-        return both[:, : n * n].reshape(*lead, n, n), both[:, n * n :].reshape(*lead, n, m)
+        both = evaluate_tape(self.model.jacobian_tape(), rows, np.empty((len(rows), m * n + m * m)), joints)
+        return both[:, : m * n].reshape(*lead, m, n), both[:, m * n :].reshape(*lead, m, m)
 
     def twist_rates(self, poses: RowsLike, joints: RowsLike, whole: bool = True) -> tuple[Array, Array, Array]:
-        """Compute A and B (n, m, m) with A t' = B q' for the tool's twist t', and the legs' wrench norms (n, legs), mm.
+        """Compute A (N, m, n) and B (N, m, m) with A t' = B q' for the twist t', and the legs' wrench norms, mm.
 
         Poses and joints are rows; see :class:`parakin.model.rates.TwistRates`. With ``whole`` a row is NaN if a number
         of it is not finite.
         """
-        m, rows = len(self.axes), self.rows(poses, self.axes, "poses")[0]
+        n, m, rows = len(self.axes), len(self.joints), self.rows(poses, self.axes, "poses")[0]
         if not isinstance(whole, bool):
             raise PoseError(f"whole: True or False expected, not {describe_value(whole)}")
         tape = self.model.rates_tape()
         both = evaluate_tape(tape, rows, np.empty((len(rows), tape.outputs)), self._joints_of(joints, len(rows)), whole)
-        a, b = (both[:, i * m * m : (i + 1) * m * m].reshape(-1, m, m) for i in (0, 1))
-        return a, b, both[:, 2 * m * m :]
+        ends = m * n, m * (n + m)
+        return both[:, : ends[0]].reshape(-1, m, n), both[:, ends[0] : ends[1]].reshape(-1, m, m), both[:, ends[1] :]
 
     def constraint_rates(self, poses: RowsLike) -> Array:
         """Compute the constraints' rates (n, c, c) by the parasitic motions, at rows of poses; NaN out of reach.

@@ -10,6 +10,7 @@ import numpy as np
 
 from .algebra import Scalar
 from .arrays import Array, AxisRange
+from .errors import NoMethodError
 from .kinematics.closure_roots import compute_closure_tolerance
 from .kinematics.home import check_home
 from .kinematics.wrist.pose_angles import EVERY_DIRECTION, EVERY_ROTATION, EVERY_TURN
@@ -116,9 +117,20 @@ class MachineProperties:
         return self.model.leg_count
 
     @property
-    def parallel_size(self) -> int:
+    def parallel_block(self) -> tuple[int, int]:
         """How many rows and columns of A tell parallel singularities."""
-        return self.model.parallel_size
+        return self.model.parallel_block
+
+    @property
+    def is_redundant(self) -> bool:
+        """Whether there are more drives than freedoms, so that the joints follow the pose and not it them."""
+        return self.model.is_redundant
+
+    def refuse_redundancy(self, what: str) -> None:
+        """Raise :class:`NoMethodError` where there are more drives than freedoms, of what they decide together."""
+        if self.is_redundant:
+            counts = f"{len(self.joints)} drives for {len(self.axes)} freedoms"
+            raise NoMethodError(f"{self.name}: no {what} of a machine that has {counts}, which work against each other")
 
     @property
     def leg_sizes(self) -> list[float]:

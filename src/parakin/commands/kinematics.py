@@ -13,7 +13,7 @@ from ..errors import InputError
 from ..export.json.poses import encode_poses
 from ..export.number_format import format_fixed
 from ..export.tables.poses import ColumnGroup, PoseTable, format_pose_csv
-from ..units import name_display_unit, to_display
+from ..units import LENGTH, QuantityError, name_display_unit, parse_quantity, to_display
 from .console import announce_compiling, format_table, print_json, print_remark, print_text
 from .offences import format_offence
 from .options import OFF_LIMITS, Json, Mode, Name, Sizes, load_machine
@@ -71,6 +71,7 @@ def forward(
     *values: str,
     csv: Csv = None,
     near: Annotated[str | None, Parameter(allow_leading_hyphen=True)] = None,
+    agreement: str = "1 um",
     output: Output = None,
     json: Json = False,
     sizes: Sizes = None,
@@ -87,10 +88,14 @@ def forward(
         Joints in mm and degrees, in their order or by name: d1=1200 d2=1250; the rest is home's.
     near
         A pose to start from and to stay near, with commas: 0,0,-1400,0,0 or X=10,Z=-1400; home by default.
+    agreement
+        By how much legs may fail to close where there are more drives than freedoms, whose joints never quite agree as
+        they are measured or written.
     """
     import numpy as np
 
     machine = load_machine(name, sizes)
+    agreed = _parse_agreement(agreement)
     announce_compiling()
     joints, lines = _read_values(machine, "joints", values, csv, machine.inverse(machine.home))
     start = None
@@ -99,7 +104,7 @@ def forward(
         start = parse_row(words, machine.axes, machine.axis_units, machine.home, "--near")
     from ..toolpath.posting.offences import judge_path
 
-    solution = machine.forward(joints, start)
+    solution = machine.forward(joints, start, agreement=agreed)
     solved = np.flatnonzero(solution.converged)
     judgement = judge_path(machine, solution.poses[solved], joints[solved], lines[solved])
     offences = tuple(replace(offence, record=int(solved[offence.record])) for offence in judgement.offences)
@@ -111,6 +116,14 @@ def forward(
     _report_lost(machine, solution, csv, lines)
     _report_other_modes(machine, solution)
     return OFF_LIMITS if len(solved) < len(joints) or offences else 0
+
+
+def _parse_agreement(text: str) -> float:
+    """Parse a length, mm."""
+    try:
+        return parse_quantity(text, LENGTH)
+    except QuantityError as error:
+        raise InputError(str(error), "--agreement") from None
 
 
 def _report_other_modes(machine: Machine, solution: Solution) -> None:

@@ -223,11 +223,12 @@ def _check_joint_count(groups: list[LegGroup], info: ValidationInfo) -> list[Leg
     context.legs_read = True
     names = [str(name) for group in groups for leg in group.joints for name in leg]
     motion = None if context.motion is None else [word for word in context.motion if word not in context.parasitic]
-    if motion is not None and len(names) != len(motion):
+    if motion is not None and len(names) < len(motion):
         what = "independent word" if context.parasitic else "word"
+        count = _format_count(len(motion), what)
         raise ValueError(
-            f"{_format_count(len(names), 'joint')} ({', '.join(names)}) for "
-            f"{_format_count(len(motion), what)} of motion ({' '.join(motion)}), expected as many joints as words"
+            f"{_format_count(len(names), 'joint')} ({', '.join(names)}) for {count} of motion ({' '.join(motion)}), "
+            "expected at least as many joints as words"
         )
     return groups
 

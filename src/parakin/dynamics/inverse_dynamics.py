@@ -4,6 +4,10 @@ With z = (y, q) of the motion's coordinates y and the joints q the closures f(z)
 y'' = G q'' - F⁻¹ γ, where F = ∂f/∂y, G = -F⁻¹ ∂f/∂q, and γ is the second derivative of f along z'. Each body's
 weighted vectors v (:mod:`.inertia_vectors`) give Q = Σ w (∂v/∂z)ᵀ (v'' - g); the drives' forces are Q_q + Gᵀ Q_y.
 All derivatives are the traces' own.
+
+With more drives than freedoms motions that keep the closures fix only Kᵀτ of the drives' forces τ, with q' = K y'. They
+share it so that the sum of their squares is least, torques taken as forces at the length of their leg; G is then the
+pseudo-inverse of K in that measure, and the forces are Gᵀ(Q_y + Kᵀ Q_q).
 """
 
 from __future__ import annotations
@@ -19,6 +23,7 @@ from ..arrays import Array
 from ..families.family import solve_each
 from ..kernels.batch import evaluate_tape
 from ..kernels.tape import Tape, compile_tape
+from ..kinematics.tall_matrices import invert_from_left
 from ..machine import Machine
 from .inertia_vectors import WeightedVector, list_weighted_vectors
 
@@ -49,6 +54,37 @@ class PathForces(NamedTuple):
     inertia: Array
     centrifugal: Array
     weight: Array
+
+
+class _Placed(NamedTuple):
+    """A machine at N poses.
+
+    z : (N, z) coordinates and joints
+    ways : (N, n, joints) G
+    joint_ways : (N, joints, joints) how joints that keep the closures follow given ones; None where these are free
+    inverse : (N, n, closures) of F from the left where it is tall, else None
+    slopes : (N, closures, n) F
+    """
+
+    z: Array
+    ways: Array
+    joint_ways: Array | None
+    inverse: Array | None
+    slopes: Array
+
+    def solve(self, right: Array) -> Array:
+        """Solve F x = r for each right side (N, closures, k)."""
+        return solve_each(self.slopes, right) if self.inverse is None else self.inverse @ right
+
+    def follow(self, by_coordinates: Array, by_joints: Array) -> Array:
+        """Compute how what is given by coordinates (N, k, n) and joints (N, k, joints) follows the joints."""
+        own = by_joints if self.joint_ways is None else by_joints @ self.joint_ways
+        return own + by_coordinates @ self.ways
+
+    def share(self, by_coordinates: Array, by_joints: Array) -> Array:
+        """Share generalized forces on coordinates (N, n) and joints (N, joints) among the drives, (N, joints)."""
+        own = by_joints if self.joint_ways is None else np.einsum("nij,ni->nj", self.joint_ways, by_joints)
+        return np.asarray(own + np.einsum("nij,ni->nj", self.ways, by_coordinates))
 
 
 class Dynamics:
@@ -136,26 +172,39 @@ class Dynamics:
         tape = self._tapes[name]
         return evaluate_tape(tape, np.ascontiguousarray(inputs), np.empty((len(inputs), tape.outputs)))
 
-    def _place(self, poses: Array, joints: Array) -> tuple[Array, Array, Array]:
-        """Find z (N, z), F (N, n, n) and G (N, n, joints)."""
-        n = self._coordinates
+    def _place(self, poses: Array, joints: Array) -> _Placed:
+        """Place the machine, with F and G."""
+        n, machine = self._coordinates, self.machine
         coordinates = evaluate_tape(self._begin, poses, np.empty((len(poses), n)), joints)
         z = np.hstack([coordinates, joints])
-        slopes = self._evaluate("slopes", z).reshape(len(z), n, self._width)
-        matrices = np.ascontiguousarray(slopes[:, :, :n])
-        return z, matrices, -solve_each(matrices, slopes[:, :, n:])
+        slopes = self._evaluate("slopes", z).reshape(len(z), machine.leg_count, self._width)
+        by_coordinates, by_joints = np.ascontiguousarray(slopes[:, :, :n]), slopes[:, :, n:]
+        if not machine.is_redundant:
+            return _Placed(z, -solve_each(by_coordinates, by_joints), None, None, by_coordinates)
+        by_legs = by_joints[:, :, : machine.leg_count]
+        inverse = invert_from_left(by_coordinates, by_legs / self._arms)
+        ways = -inverse @ by_joints
+        joint_ways = np.tile(np.eye(joints.shape[1]), (len(z), 1, 1))
+        joint_ways[:, : machine.leg_count] = solve_each(by_legs, by_coordinates @ inverse @ by_joints)
+        return _Placed(z, ways, joint_ways, inverse, by_coordinates)
 
-    def _compute(self, placed: tuple[Array, Array, Array], motion: tuple[Array, Array], gravity: float) -> Array:
-        z, matrices, ways = placed
+    @property
+    def _arms(self) -> Array:
+        """What brings motions of the legs' drives to mm, (legs' joints,): turns count at the length of their leg."""
+        arms = dict(zip(self.machine.closure_joints, self.machine.leg_sizes, strict=True))
+        units = self.machine.joint_units
+        return np.array([arms[i] if units[i] == "rad" else 1.0 for i in range(self.machine.leg_count)])
+
+    def _compute(self, placed: _Placed, motion: tuple[Array, Array], gravity: float) -> Array:
+        z, ways = placed.z, placed.ways
         speeds, accelerations = motion
         n = self._coordinates
         rates = np.hstack([_apply_each(ways, speeds), speeds])
         bends = self._evaluate("bends", np.hstack([z, rates]))
-        own = _apply_each(ways, accelerations) - solve_each(matrices, bends[:, :, None])[:, :, 0]
+        own = _apply_each(ways, accelerations) - placed.solve(bends[:, :, None])[:, :, 0]
         state = np.hstack([z, rates, own, accelerations, np.full((len(z), 1), gravity)])
-        forces = self._evaluate("forces", state)
-        by_motion = _NEWTON * (forces[:, n:] + np.einsum("nij,ni->nj", ways, forces[:, :n]))
-        return np.asarray(by_motion + self._rotors * accelerations)
+        forces = _NEWTON * self._evaluate("forces", state)
+        return placed.share(forces[:, :n], forces[:, n:] + self._rotors * accelerations)
 
     def compute_forces(self, motion: Motion, force: Array | None = None) -> Array:
         """Compute the drives' forces, (N, joints); NaN where a pose is out of reach or singular.
@@ -165,10 +214,9 @@ class Dynamics:
         placed = self._place(motion.poses, motion.joints)
         result = self._compute(placed, (motion.speeds, motion.accelerations), GRAVITY)
         if force is not None:
-            z, _, ways = placed
             n = self._coordinates
-            rates = self._evaluate("tip", z).reshape(len(z), -1, self._width)
-            whole = rates[:, :, n:] + rates[:, :, :n] @ ways
+            rates = self._evaluate("tip", placed.z).reshape(len(placed.z), -1, self._width)
+            whole = placed.follow(rates[:, :, :n], rates[:, :, n:])
             result -= np.einsum("nij,ni->nj", whole, np.broadcast_to(force, whole.shape[:2]))
         return result
 
@@ -177,10 +225,11 @@ class Dynamics:
 
         moved : (N, closures, sizes) what a unit of each size adds to the closures' right side, mm²
         """
-        z, matrices, _ = self._place(poses, joints)
+        placed = self._place(poses, joints)
+        z = placed.z
         n, still = self._coordinates, np.zeros((len(z), 2 * self._width))
         forces = self._evaluate("forces", np.hstack([z, still, np.full((len(z), 1), GRAVITY)]))
-        ways = solve_each(matrices, moved[:, :n] / np.array(self._equations.sizes)[:, None])
+        ways = placed.solve(moved[:, :n] / np.array(self._equations.sizes)[:, None])
         return np.asarray(_NEWTON * np.einsum("nis,ni->ns", ways, forces[:, :n]))
 
     def compute_load_rates(self, poses: Array, joints: Array, force: Array) -> Array:
@@ -190,7 +239,8 @@ class Dynamics:
 
         It is the Hessian of the loads' potential, from its second derivatives along sums of two joints.
         """
-        z, matrices, ways = self._place(poses, joints)
+        placed = self._place(poses, joints)
+        z, ways = placed.z, placed.ways
         count = joints.shape[1]
         second = np.empty((count, count, len(z)))
         for i, j in combinations_with_replacement(range(count), 2):
@@ -198,7 +248,7 @@ class Dynamics:
             speeds[:, i] = speeds[:, j] = 1.0
             rates = np.hstack([_apply_each(ways, speeds), speeds])
             bends = self._evaluate("bends", np.hstack([z, rates]))
-            own = -solve_each(matrices, bends[:, :, None])[:, :, 0]
+            own = -placed.solve(bends[:, :, None])[:, :, 0]
             state = np.hstack([z, rates, own, np.zeros_like(joints), np.full((len(z), 1), GRAVITY)])
             curvatures = self._evaluate("turns", state)
             second[i, j] = second[j, i] = _NEWTON * curvatures[:, 0] - curvatures[:, 1:] @ force

@@ -27,8 +27,8 @@ _OTHER_MODE = 1e-4  # of the greatest leg: by which joints of another working mo
 class FamilyRates(NamedTuple):
     """The closures f and their derivatives at poses: A x' + C s' = B q' for the rates of pose, sizes and joints.
 
-    closures : (N, n), zero where the legs close; of legs mm², of head and table 1
-    a : (N, n, n); b : (N, n, m); c : (N, n, k) = ∂f/∂s
+    closures : (N, m), zero where the legs close; of legs mm², of head and table 1
+    a : (N, m, n); b : (N, m, m); c : (N, m, k) = ∂f/∂s
     """
 
     closures: Array
@@ -212,7 +212,7 @@ class Family:
         return feet.reshape(*lead, -1, 3)
 
     def jacobians(self, poses: RowsLike, sizes: RowsLike, mode: str | None = None) -> tuple[Array, Array, Array]:
-        """Compute A (..., n, n), B (..., n, m) and C (..., n, k) with A x' + C s' = B q' at poses with their joints.
+        """Compute A (..., m, n), B (..., m, m) and C (..., m, k) with A x' + C s' = B q' at poses with their joints.
 
         A and B are those of :meth:`Machine.jacobians`, C has the closures' derivatives by the sizes.
         """
@@ -245,9 +245,9 @@ class Family:
 
         tape = self._keep((by,), n + turns + m, outputs)
         at_rest = np.zeros((len(rows[0]), turns))
-        values = self._evaluate(tape, [rows[0], at_rest, *rows[1:]], n + n * n + n * m + n * k)
-        f, a, b, c = np.split(values, np.cumsum([n, n * n, n * m]), axis=1)
-        return FamilyRates(f, a.reshape(-1, n, n), b.reshape(-1, n, m), c.reshape(-1, n, k))
+        values = self._evaluate(tape, [rows[0], at_rest, *rows[1:]], m + m * n + m * m + m * k)
+        f, a, b, c = np.split(values, np.cumsum([m, m * n, m * m]), axis=1)
+        return FamilyRates(f, a.reshape(-1, m, n), b.reshape(-1, m, m), c.reshape(-1, m, k))
 
     def _evaluate(self, tape: Tape, rows: Sequence[Array], width: int) -> Array:
         first = np.hstack(rows[:-1]) if len(rows) > 2 else np.ascontiguousarray(rows[0])

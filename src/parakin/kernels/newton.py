@@ -4,6 +4,9 @@ A block ends when its slowest lane has converged, but every lane decides for its
 stops, so an answer does not depend on the rows that share its block. A lane's matrix is made anew only while that still
 matters; its last steps keep it. Where all lanes of a block do, a step is only the closures and a substitution. Rows are
 exchanged lane by lane.
+
+With more closures than coordinates it is the Gauss-Newton method: steps end where what is left of the closures is at
+right angles to all that the coordinates can change. That is a root only where nothing is left.
 """
 
 from __future__ import annotations
@@ -12,6 +15,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from .elementary import Lane, Lanes
+from .factoring import Factors, MatrixShape, factor_matrix, solve_factored
 from .lane_program import Columns, Program
 from .operations import evaluate
 from .tape import NewtonTapes
@@ -22,7 +26,6 @@ WORTH = 1e-4  # mm: where a step will end no worse than this, the matrix at hand
 SLOW = 0.05  # a kept matrix that gains less than this a step is made anew
 FINE = 1e-12  # mm: where the next step is predicted to end, it is the last
 DOUBLE = 0.2  # a new matrix that leaves more than this a step is beside a double root, where each leaves a quarter
-PIVOT = 4.0  # how many times greater an entry must be to become the pivot
 
 
 class NewtonShape(NamedTuple):
@@ -58,24 +61,14 @@ class NewtonNumbers(NamedTuple):
     caps: Sequence[Lane]
 
 
-class Factors(NamedTuple):
-    """What :func:`factor_matrix` makes of m·m entries: multipliers below, reciprocal pivots on the diagonal.
-
-    exchanged : where rows k and i > k were, in the order of elimination
-    """
-
-    matrix: list[Lane]
-    exchanged: list[Lane]
-    determinant: Lane
-
-
 class NewtonState(NamedTuple):
     """What a step leaves to the next one.
 
     point : the coordinates
     factors : of each lane's matrix
     first : the determinant of the first matrix
-    before, worst : the greatest closure, at the last step and at the one before
+    worst : the greatest closure that the last step could close: of all, as they are as many as the coordinates
+    residual : the greatest closure
     renews : wants a new matrix
     last, done : takes one more step; takes none
     steps : taken by the lane
@@ -86,6 +79,7 @@ class NewtonState(NamedTuple):
     factors: Factors
     first: Lane
     worst: Lane
+    residual: Lane
     renews: Lane
     last: Lane
     done: Lane
@@ -96,68 +90,36 @@ class NewtonState(NamedTuple):
         return [*self.point, *self.factors.matrix, *self.factors.exchanged, self.factors.determinant, *self[2:]]
 
 
-def _gather_state(lanes: Sequence[Lane], m: int) -> NewtonState:
-    """Gather the state of m coordinates from its lanes in a row."""
-    pairs = m * (m - 1) // 2
-    ends = [m, m + m * m, m + m * m + pairs]
-    factors = Factors(list(lanes[ends[0] : ends[1]]), list(lanes[ends[1] : ends[2]]), lanes[ends[2]])
-    return NewtonState(list(lanes[:m]), factors, *lanes[ends[2] + 1 :])
+def _gather_state(lanes: Sequence[Lane], shape: MatrixShape) -> NewtonState:
+    """Gather the state from its lanes in a row."""
+    m = shape.columns
+    factors = lanes[m : m + shape.factor_entries + shape.exchanges + 1]
+    return NewtonState(list(lanes[:m]), _gather_factors(factors, shape), *lanes[m + len(factors) :])
 
 
-def factor_matrix(lanes: Lanes, entries: Sequence[Lane], m: int) -> Factors:
-    """Factor the matrix of m·m entries, row by row, with exchanges of rows chosen lane by lane."""
-    a, exchanged, determinant = [list(entries[m * i : m * i + m]) for i in range(m)], [], lanes.constant(1.0)
-    for k in range(m):
-        for i in range(k + 1, m):
-            swap = abs(a[i][k]) > PIVOT * abs(a[k][k])
-            exchanged.append(swap)
-            determinant = lanes.select(swap, -determinant, determinant)
-            for c in range(k, m):
-                upper, lower = a[k][c], a[i][c]
-                a[k][c], a[i][c] = lanes.select(swap, lower, upper), lanes.select(swap, upper, lower)
-        determinant = determinant * a[k][k]
-        a[k][k] = 1.0 / a[k][k]
-        for i in range(k + 1, m):
-            a[i][k] = a[i][k] * a[k][k]
-            for c in range(k + 1, m):
-                a[i][c] = a[i][c] - a[i][k] * a[k][c]
-    return Factors([entry for row in a for entry in row], exchanged, determinant)
-
-
-def solve_factored(lanes: Lanes, factors: Factors, right: Sequence[Lane]) -> list[Lane]:
-    """Solve the linear system whose matrix is factored."""
-    f, m, exchanges = list(right), len(right), iter(factors.exchanged)
-    for k in range(m):
-        for i in range(k + 1, m):
-            swap, upper, lower = next(exchanges), f[k], f[i]
-            f[k], f[i] = lanes.select(swap, lower, upper), lanes.select(swap, upper, lower)
-        for i in range(k + 1, m):
-            f[i] = f[i] - factors.matrix[m * i + k] * f[k]
-    for k in reversed(range(m)):
-        for c in range(k + 1, m):
-            f[k] = f[k] - factors.matrix[m * k + c] * f[c]
-        f[k] = f[k] * factors.matrix[m * k + k]
-    return f
+def _gather_factors(lanes: Sequence[Lane], shape: MatrixShape) -> Factors:
+    """Gather a matrix's factors from their lanes in a row."""
+    return Factors(list(lanes[: shape.factor_entries]), list(lanes[shape.factor_entries : -1]), lanes[-1])
 
 
 def _evaluate_closures(
     lanes: Lanes, tapes: NewtonTapes, state: NewtonState, joints: Sequence[Lane]
 ) -> tuple[list[Lane], Factors]:
     """Evaluate the closures, and the matrix anew in the lanes that want it; returns both."""
-    m, old, inputs = len(state.point), state.factors, [*state.point, *joints]
+    shape, old, inputs = tapes.matrix_shape, state.factors, [*state.point, *joints]
 
     def renew() -> list[Lane]:
         outputs = evaluate(lanes, tapes.closures_and_slopes, inputs)
-        new = factor_matrix(lanes, outputs[m:], m)
+        new = factor_matrix(lanes, outputs[shape.rows :], shape)
         pairs = zip([*new.matrix, *new.exchanged], [*old.matrix, *old.exchanged], strict=True)
         chosen = [lanes.select(state.renews, one, other) for one, other in pairs]
-        return [*outputs[:m], *chosen, lanes.select(state.renews, new.determinant, old.determinant)]
+        return [*outputs[: shape.rows], *chosen, lanes.select(state.renews, new.determinant, old.determinant)]
 
     def keep() -> list[Lane]:
         return [*evaluate(lanes, tapes.closures, inputs), *old.matrix, *old.exchanged, old.determinant]
 
     result = lanes.branch(state.renews, renew, keep)
-    return result[:m], Factors(result[m : m + m * m], result[m + m * m : -1], result[-1])
+    return result[: shape.rows], _gather_factors(result[shape.rows :], shape)
 
 
 def _measure_greatest(lanes: Lanes, closures: Sequence[Lane]) -> Lane:
@@ -195,24 +157,24 @@ def find_root(
     lanes: Lanes, tapes: NewtonTapes, limits: NewtonNumbers, point: Sequence[Lane], joints: Sequence[Lane]
 ) -> NewtonState:
     """Run Newton's method from the coordinates of a point to the root."""
-    m, zero = len(point), lanes.constant(0.0)
+    shape, zero, infinite = tapes.matrix_shape, lanes.constant(0.0), lanes.constant(float("inf"))
     yes, no = zero == 0.0, zero != 0.0
-    factors = Factors([zero] * (m * m), [no] * (m * (m - 1) // 2), zero)
-    begin = NewtonState(list(point), factors, zero, lanes.constant(float("inf")), yes, no, no, zero, zero)
+    factors = Factors([zero] * shape.factor_entries, [no] * shape.exchanges, zero)
+    begin = NewtonState(list(point), factors, zero, infinite, infinite, yes, no, no, zero, zero)
 
     def step(given: list[Lane]) -> tuple[list[Lane], Lane]:
-        state = _gather_state(given, m)
+        state = _gather_state(given, shape)
         closures, factors = _evaluate_closures(lanes, tapes, state, joints)
         first = lanes.select(state.number == 0.0, factors.determinant, state.first)
-        worst = _measure_greatest(lanes, closures)
+        change, closable = solve_factored(lanes, factors, closures, shape)
+        worst, residual = (_measure_greatest(lanes, each) for each in (closable, closures))
         steps = lanes.select(state.done, state.steps, state.number)
         renews, last, done = _choose_next_matrix(state, worst, limits)
-        change = solve_factored(lanes, factors, closures)
         moved = _take_step(lanes, state, change, done | (worst < FINE), limits.caps)
-        after = NewtonState(moved, factors, first, worst, renews, last, done, steps, state.number + 1.0)
+        after = NewtonState(moved, factors, first, worst, residual, renews, last, done, steps, state.number + 1.0)
         return after.flatten(), ~done & (state.number < limits.most)
 
-    return _gather_state(lanes.repeat(begin.flatten(), step), m)
+    return _gather_state(lanes.repeat(begin.flatten(), step), shape)
 
 
 def write_newton(tapes: NewtonTapes, shape: NewtonShape) -> Program:
@@ -227,7 +189,7 @@ def write_newton(tapes: NewtonTapes, shape: NewtonShape) -> Program:
         wanted = [*state.point, *joints, *near][: tapes.end.inputs]
         outputs = evaluate(lanes, tapes.end, wanted)
         bad = find_spoiled([*(near if shape.near_role == "rows" else []), *joints, *outputs[: shape.answer]])
-        residual, determinant = state.worst + bad, state.factors.determinant
+        residual, determinant = state.residual + bad, state.factors.determinant
         product = determinant * (sides[0][0] if sides else state.first)
         settled = find_positive(lanes, outputs[shape.answer :]) & (residual <= limits.closed)
         settled = settled & (product > limits.turned) & (state.steps <= limits.steps)
@@ -235,5 +197,6 @@ def write_newton(tapes: NewtonTapes, shape: NewtonShape) -> Program:
         return [[lane + bad for lane in outputs[: shape.answer]], [residual], [state.steps], [product], [settled]]
 
     made = (Columns(shape.answer), Columns(1), Columns(1, kind="int32"), Columns(1), Columns(1, kind="bool"))
-    length = sum(len(tape.code) for tape in tapes) + 2 * shape.coordinates**3
+    rows, columns = tapes.matrix_shape
+    length = sum(len(tape.code) for tape in tapes) + 2 * rows * columns**2
     return Program((*given, *own_sides), made, compute, length)

@@ -15,6 +15,7 @@ import numpy as np
 from .. import algebra as alg
 from ..algebra import Scalar, Term, Trace
 from ..arrays import Array, Indices
+from .factoring import MatrixShape
 
 # Opcodes. The number of summands is part of the code, so that the interpreter's loops have no inner ones.
 CONST, LIN1, LIN2, LIN3, QUAD1, QUAD2, QUAD3, FMA, DIV, SQRT, SINCOS, ATAN2, MIN, MAX, ABS, COPYSIGN, SELECT = range(17)
@@ -76,6 +77,12 @@ class NewtonTapes(NamedTuple):
     closures: Tape
     closures_and_slopes: Tape
     end: Tape
+
+    @property
+    def matrix_shape(self) -> MatrixShape:
+        """The shape of ∂f/∂y."""
+        closures = self.closures.outputs
+        return MatrixShape(closures, self.closures_and_slopes.outputs // closures - 1)
 
 
 def _find_opcode(term: Term) -> int:

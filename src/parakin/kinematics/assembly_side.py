@@ -17,8 +17,8 @@ from .wrist.pole_crossing import flip_mode
 def find_sides(model: Model, poses: Array, mode: str | None = None, joints: Array | None = None) -> Array:
     """Compute the determinant of the twist at poses, (N,), but for its size.
 
-    Its sign tells the assembly mode, and zero is a singularity. Its closures are those of the poses' own joints in a
-    working mode; where these do not exist, of ``joints`` (1 or N rows), if given.
+    Its sign tells the assembly mode, and zero is a singularity; a redundant machine's has no sign. Its closures are
+    those of the poses' own joints in a working mode; where these do not exist, of ``joints`` (1 or N rows), if given.
     """
     mode = model.mode if mode is None else mode
     own = solve_inverse(model, poses, mode)
@@ -34,9 +34,12 @@ def find_sides(model: Model, poses: Array, mode: str | None = None, joints: Arra
 
 
 def find_angle_signs(model: Model, poses: Array) -> Array | float:
-    """Find the sign by which the determinant of the pose's rates differs from the twist's, at poses or for all."""
+    """Find the sign by which the determinant of the pose's rates differs from the twist's, at poses or for all.
+
+    The volume of a redundant machine has no sign.
+    """
     column = model.structure.middle_turn
-    if column is None:
+    if column is None or model.is_redundant:
         return 1.0
     turns = poses[:, column]
     if np.abs(turns).max(initial=0.0) < 0.5 * np.pi:  # false for NaN
@@ -46,7 +49,10 @@ def find_angle_signs(model: Model, poses: Array) -> Array | float:
 
 
 def bound_determinant(model: Model) -> float:
-    """Return the greatest determinant that closures' derivatives of home's sizes can have, by Hadamard."""
+    """Return the greatest determinant that closures' derivatives of home's sizes can have, by Hadamard.
+
+    Of a redundant machine the columns bound it, of others the rows.
+    """
     home, tape = np.array(model.home)[None, :], model.newton_tape(True)
     joints, count = solve_inverse(model, home, model.mode), len(model.structure.coordinates)
     coordinates = evaluate_tape(model.begin_tape(), home, np.empty((1, count)), joints)
@@ -54,7 +60,8 @@ def bound_determinant(model: Model) -> float:
     scales = np.array(
         [max(model.sizes) if MOTION_UNITS[word] == "rad" else 1.0 for word in model.structure.coordinates]
     )
-    return float(np.linalg.norm(slopes.reshape(-1, count) / scales, axis=1).prod() * scales.prod())
+    sizes = np.linalg.norm(slopes.reshape(-1, count) / scales, axis=0 if model.is_redundant else 1)
+    return float(sizes.prod() * scales.prod())
 
 
 def find_own_sides(model: Model, joints: Array, starts: Array, mode: str) -> Array:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import Array
+from ..arrays import Array, Flags
 from ..errors import NoMethodError, PoseError
 from ..kernels.batch import (
     ClosureLimits,
@@ -17,11 +17,19 @@ from ..kernels.batch import (
 )
 from ..model.traces import Model
 from .assembly_side import bound_determinant, find_angle_signs, find_own_sides, find_sides
-from .closure_roots import MOST_STEPS, compute_closure_tolerance, compute_poses, find_in_mode, find_roots
+from .closure_roots import (
+    MOST_STEPS,
+    compare_with_mode,
+    compute_closure_tolerance,
+    compute_poses,
+    find_in_mode,
+    find_roots,
+)
 from .inverse import SINGULAR, solve_inverse
 from .settling import compile_settling_end, compile_settling_spheres
 from .solution import (
     ANSWERED,
+    IN_DISAGREEMENT,
     ON_ANOTHER_SIDE,
     OPEN,
     OTHER_MODE,
@@ -42,11 +50,17 @@ STEADY = 0.2  # by which the determinant may change from start to answer and sti
 NOT_FALLEN = 0.999  # by which it may change before the answer may be a singularity itself
 FIRST_STRIDE, LEAST_STRIDE = 1.0 / 8.0, 1e-5  # of the way in joints that a step of the continuation takes
 MOST_STRIDES = 400  # steps of the continuation
+OF_AGREEMENT = 10.0  # so far joints that disagree may be from those of the pose that they tell
 NEAR_STEPS = 6  # of Newton's method for a step of the continuation; one that needs more is halved
 
 
 def solve_forward(
-    model: Model, joints: Array, starts: Array | None, method: str | None = None, mode: str | None = None
+    model: Model,
+    joints: Array,
+    starts: Array | None,
+    method: str | None = None,
+    mode: str | None = None,
+    agreement: float = 0.0,
 ) -> Solution:
     """Solve the direct problem of rows of joints (N, joints), from rows of poses (N, axes) or from home.
 
@@ -68,11 +82,22 @@ def solve_forward(
         own_starts = None if starts is None else starts[rest]
         if mode is None and own_starts is not None and model.has_modes:
             in_other_mode[rest] = answer_in_modes_of_starts(model, looked_at, joints[rest], own_starts, solve)
+        _accept_disagreement(model, looked_at, joints[rest], model.mode if mode is None else mode, agreement)
         _find_singular_starts(model, looked_at, own_starts, model.mode if mode is None else mode)
         _finish_poses(model, looked_at, own_starts)
         put_rows(answers, rest, looked_at)
     converged = answers.why == ANSWERED
     return Solution(answers.poses, answers.residual, converged, answers.steps, answers.why, in_other_mode)
+
+
+def _accept_disagreement(model: Model, answers: Answers, joints: Array, mode: str, agreement: float) -> None:
+    """Accept the poses of least squares of joints that disagree by no more than ``agreement``, mm; in place."""
+    rows = np.flatnonzero((answers.why == IN_DISAGREEMENT) & (answers.residual <= agreement))
+    if len(rows):
+        tolerance = OF_AGREEMENT * agreement
+        off = np.abs(compare_with_mode(model, answers.poses[rows], joints[rows], mode)).max(1)
+        with np.errstate(invalid="ignore"):
+            answers.why[rows] = np.where(off <= tolerance, ANSWERED, OTHER_MODE)
 
 
 def _find_singular_starts(model: Model, answers: Answers, starts: Array | None, mode: str) -> None:
@@ -104,13 +129,24 @@ def _count_turns(model: Model, poses: Array, near: Array) -> None:
 
 
 def _judge(model: Model, roots: Roots, joints: Array, mode: str | None) -> NDArray[np.int8]:
-    """Tell why roots are no answers, as indices of :data:`REASONS`; zero where they are."""
+    """Tell why roots are no answers, as indices of :data:`REASONS`; zero where they are.
+
+    Joints of a redundant machine whose least squares are found, and not zero, do not agree with each other.
+    """
     turned = roots.turned * find_angle_signs(model, roots.rows)
     with np.errstate(invalid="ignore"):
         why = np.where(find_in_mode(model, roots.rows, joints, mode), ANSWERED, OTHER_MODE).astype(np.int8)
         why[~(turned > 0.0)] = ON_ANOTHER_SIDE
-        why[~(roots.residual <= compute_closure_tolerance(model))] = OPEN
+        closed = roots.residual <= compute_closure_tolerance(model)
+    why[~closed] = OPEN
+    if model.is_redundant:
+        why[~closed & _find_least_squares(roots, MOST_STEPS)] = IN_DISAGREEMENT
     return why
+
+
+def _find_least_squares(roots: Roots, most: int) -> Flags:
+    """Find the rows where the Gauss-Newton method came to its end, whether or not all closures are zero there."""
+    return np.asarray((roots.steps < most) & np.isfinite(roots.residual) & (roots.turned > 0.0))
 
 
 def _solve_by_spheres(model: Model, joints: Array, starts: Array | None, mode: str | None) -> Answers:
@@ -230,7 +266,8 @@ def _continue_from_starts(
     """Continue along the joints' straight line from the start where Newton's method in one go failed; in place.
 
     Steps are halved where Newton's method does not converge at once, on the same side and in the working mode, and
-    doubled where it does. A row that can't be continued keeps the reason of its last step.
+    doubled where it does. A row that can't be continued keeps the reason of its last step. On the line the joints of a
+    redundant machine do not agree, and the poses on the way are those of least squares.
     """
     roots, why = into
     walk = np.broadcast_to(near, (len(joints), near.shape[1]))
@@ -251,6 +288,10 @@ def _continue_from_starts(
         reason = _judge(model, step, given, mode)
         roots.steps[rows[going]] += step.steps
         fine = np.asarray(reason == ANSWERED)
+        if model.is_redundant:
+            found = _find_least_squares(step, NEAR_STEPS)
+            fine |= (share < 1.0) & found
+            stride[going[(share >= 1.0) & found & ~fine]] = 0.0  # where they disagree, so will they after smaller steps
         kept = going[fine]
         walk[kept], gone[kept] = step.rows[fine], share[fine]
         stride[kept] *= 2.0
@@ -272,7 +313,7 @@ def _solve_by_constant_jacobian(model: Model, joints: Array, starts: Array | Non
     both = evaluate_tape(tape, y, np.empty((len(y), legs + legs * m)))
     singular = ~np.isfinite(both).all(1)
     matrices = both[:, legs:].reshape(-1, legs, m).copy()
-    matrices[singular] = np.eye(m)
+    matrices[singular] = np.eye(legs, m)
     inverse = np.linalg.pinv(matrices)
     steps = np.zeros(len(y), np.int32)
     with np.errstate(invalid="ignore", over="ignore"):

@@ -13,6 +13,7 @@ from ..model.elements import MOTION_UNITS
 from ..model.traces import Model
 from ..units import AXIS_UNITS, name_display_unit, to_display
 from .inverse import SINGULAR, solve_inverse
+from .tall_matrices import compute_determinants
 
 _LEAST_LEG = 1e-3  # mm, of a leg at home: closures are measured in fractions of it
 _ABOUT = 8  # poses about home that are looked at
@@ -58,12 +59,15 @@ def _warn_of_singular_home(model: Model) -> None:
 
 
 def _measure_regularity(model: Model, poses: Array) -> dict[str, Array]:
-    """Measure how far poses (n, axes) are from singularities, (n,): |determinant| over its rows' sizes, from 0 to 1.
+    """Measure how far poses (n, axes) are from singularities, (n,): |determinant| over its rows' sizes, 1 at most.
+
+    Of a redundant machine it is the volume, which may be somewhat more than 1.
 
     ``parallel`` is of the legs against the motion's coordinates, a turn counted as the greatest leg's length at home;
     ``serial`` of the legs against their drives. NaN out of reach.
     """
     joints, legs, n = solve_inverse(model, poses, model.mode), model.leg_count, len(model.axes)
+    m = len(model.drives)
     count = len(model.structure.coordinates)
     coordinates = evaluate_tape(model.begin_tape(), poses, np.empty((len(poses), count)), joints)
     tape, jacobians = model.newton_tape(True), model.jacobian_tape()
@@ -71,12 +75,11 @@ def _measure_regularity(model: Model, poses: Array) -> dict[str, Array]:
     a = slopes[:, legs:].reshape(-1, legs, count)
     a = a / np.where([MOTION_UNITS[word] == "rad" for word in model.structure.coordinates], max(model.sizes), 1.0)
     both = evaluate_tape(jacobians, poses, np.empty((len(poses), jacobians.outputs)), joints)
-    b = both[:, n * n :].reshape(len(poses), n, -1)[:, :legs, :legs]
+    b = both[:, m * n :].reshape(len(poses), m, m)[:, :legs, :legs]
     return {"parallel": _compare_determinant(a), "serial": _compare_determinant(b)}
 
 
 def _compare_determinant(matrices: Array) -> Array:
     """Divide the sizes of determinants by the products of their rows' sizes (Hadamard)."""
     with np.errstate(all="ignore"):
-        ratio: Array = np.abs(np.linalg.det(matrices / np.linalg.norm(matrices, axis=2)[:, :, None]))
-    return ratio
+        return np.abs(compute_determinants(matrices / np.linalg.norm(matrices, axis=2)[:, :, None]))

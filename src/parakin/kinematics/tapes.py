@@ -27,7 +27,7 @@ class SphereTapes(NamedTuple):
 class KinematicTapes(NamedTuple):
     """The inverse in a working mode, and the direct problem: the common point of spheres, or Newton's method.
 
-    jacobians : pose, joints -> A (n·n) and B (n·n) with A x' = B q'
+    jacobians : pose, joints -> A (m·n) and B (m·m) with A x' = B q'
     coordinates : names of the motion's coordinates, which Newton's method solves for
     """
 

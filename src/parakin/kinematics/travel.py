@@ -18,7 +18,7 @@ from ..algebra import Scalar, Trace, derivative
 from ..arrays import Array, Flags
 from ..kernels.intervals import IntervalProgram, JumpFreeTrace
 from ..kernels.tape import Tape
-from ..model.rates import compute_twist_rates, expand_determinant
+from ..model.rates import compute_twist_rates, trace_determinant
 from ..model.traces import Model
 from ..units import AXIS_UNITS
 from .inverse import solve_inverse
@@ -97,8 +97,8 @@ class _LineBounds:
         joints, placed, _ = model.invert(pose, self._mode, trace.input(2 * n + 1) if self._first_given else None)
         listed = model.margins(pose, joints, self._mode) if self._first_given else model.own_margins(pose, self._mode)
         rates = compute_twist_rates(model.spec, model.structure, pose, joints)
-        size = model.parallel_size
-        determinant = expand_determinant([row[:size] for row in rates.a[:size]])
+        height, width = model.parallel_block
+        determinant = trace_determinant([row[:width] for row in rates.a[:height]])
         turning = [joints[i] for i in model.turning_joints]
         return [m for _, m in listed], determinant, turning, 1.0 if placed.freedom is None else placed.freedom
 

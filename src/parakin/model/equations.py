@@ -79,9 +79,23 @@ class Equations:
         return (self.leg_count + order[0], self.leg_count + order[1]) if order else None
 
     @property
-    def parallel_size(self) -> int:
-        """How many rows and columns of A tell parallel singularities: the legs' alone where a wrist never matters."""
-        return len(self.axes) if self.wrist_joints is None else self.leg_count
+    def redundancy(self) -> int:
+        """How many drives there are more than freedoms."""
+        return len(self.drives) - len(self.axes)
+
+    @property
+    def is_redundant(self) -> bool:
+        """Whether there are more drives than freedoms, so that the joints follow the pose and not it them."""
+        return self.redundancy > 0
+
+    @property
+    def parallel_block(self) -> tuple[int, int]:
+        """How many rows and columns of A tell parallel singularities: the legs' alone where a wrist never matters.
+
+        A redundant machine has more rows than columns.
+        """
+        rows = len(self.drives) if self.wrist_joints is None else self.leg_count
+        return rows, rows - self.redundancy
 
     # Working modes: the signs of every leg's choices, then head and table's.
 
@@ -296,7 +310,7 @@ class Equations:
         """True where the direct problem is the common point of spheres or circles: no turns, one rod a leg."""
         turns = any(word in ROTATIONS for word in self.spec.motion)
         on_spheres = [leg.sphere([0.0] * len(leg.drives)) is not None for leg in self.spec.legs]
-        return not turns and all(on_spheres) and len(on_spheres) in CENTRES_NEEDED
+        return not turns and all(on_spheres) and len(on_spheres) in CENTRES_NEEDED and not self.is_redundant
 
     def find_spheres(self, joints: Sequence[Scalar]) -> tuple[list[Vec], list[Scalar], list[int]]:
         """Find centres and radii of the spheres that hold the platform's origin, and the coordinates it moves in."""

@@ -7,8 +7,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import combinations
 
-from ..algebra import Scalar, Trace, derivative, evaluate_trace, norm
+from ..algebra import Scalar, Trace, derivative, evaluate_trace, norm, sqrt
 from .limits import compute_platform_points, group_joints_by_leg
 from .spec import Spec
 from .structures import Structure
@@ -18,8 +19,8 @@ from .structures import Structure
 class TwistRates:
     """A and B, a row for each closure: the legs' in their order, then those of head and table.
 
-    a : (n, n) columns are the tool tip's velocity along the machine's translations, then the structure's small turns
-    b : (n, m) columns are the joints
+    a : (m, n) columns are the tool tip's velocity along the machine's translations, then the structure's small turns
+    b : (m, m) columns are the joints
     wrench_norms : mm, how much each leg's closure changes as the platform's joint moves by a unit length: a rod's
         length; a leg's row of A divided by it is a unit wrench
     """
@@ -70,8 +71,20 @@ def compute_twist_rates(
         for group, point in zip(closures(free), free, strict=True)
         for f in group
     ]
-    a_rows, b_rows = [a[i : i + n] for i in range(0, n * n, n)], [b[i : i + m] for i in range(0, n * m, m)]
+    a_rows, b_rows = [a[i : i + n] for i in range(0, m * n, n)], [b[i : i + m] for i in range(0, m * m, m)]
     return TwistRates(a_rows, b_rows, wrench_norms)
+
+
+def trace_determinant(rows: Sequence[Sequence[Scalar]]) -> Scalar:
+    """Trace the determinant of a matrix of scalars of any kind; of one with more rows than columns its volume.
+
+    The volume √det(AᵀA) is the root of the sum of all minors' squares (Cauchy-Binet), zero where the rank falls.
+    """
+    n = len(rows[0])
+    if len(rows) == n:
+        return expand_determinant(rows)
+    minors = [expand_determinant(chosen) for chosen in combinations(rows, n)]
+    return sqrt(sum((minor * minor for minor in minors[1:]), minors[0] * minors[0]))
 
 
 def expand_determinant(rows: Sequence[Sequence[Scalar]]) -> Scalar:

@@ -104,7 +104,7 @@ class Model(Equations):
         return self.keep_tape(("check", mode), self._poses, outputs)
 
     def jacobian_tape(self) -> Tape:
-        """Compile pose, joints -> A (n·n) and B (n·n) with A x' = B q'."""
+        """Compile pose, joints -> A (m·n) and B (m·m) with A x' = B q'."""
 
         def outputs(trace: Trace) -> list[Scalar]:
             pose, joints = self._pose_and_joints(trace)
@@ -116,7 +116,7 @@ class Model(Equations):
         return self.keep_tape(("jacobian",), self._poses + len(self.drives), outputs)
 
     def rates_tape(self) -> Tape:
-        """Compile pose, joints -> A (n·n), B (n·n) and the legs' wrench norms: see :mod:`parakin.model.rates`."""
+        """Compile pose, joints -> A (m·n), B (m·m) and the legs' wrench norms: see :mod:`parakin.model.rates`."""
 
         def outputs(trace: Trace) -> list[Scalar]:
             twist = compute_twist_rates(self.spec, self.structure, *self._pose_and_joints(trace))
@@ -160,7 +160,8 @@ class Model(Equations):
     def newton_tape(self, derivatives: bool) -> Tape:
         """Compile coordinates, joints -> closures in mm, and then, if wanted, their derivatives by the coordinates.
 
-        The closures come in the order in which elimination at home needs no exchange.
+        The closures come in the order in which elimination at home needs no exchange, of a redundant machine, whose
+        matrix is not eliminated, in their own.
         """
 
         def outputs(trace: Trace) -> list[Scalar]:
@@ -172,7 +173,18 @@ class Model(Equations):
         return self.keep_tape(("newton", derivatives), self._motions + len(self.drives), outputs)
 
     @cached_property
+    def leading_closures(self) -> list[int]:
+        """As many of the legs' closures as the motion has coordinates, which hold the platform at home alone."""
+        order, count = self._pivot_closures(), len(self.structure.coordinates)
+        return sorted(order[:count])
+
+    @cached_property
     def closure_order(self) -> list[int]:
+        """The order in which :meth:`newton_tape` has the closures."""
+        return list(range(self.leg_count)) if self.is_redundant else self._pivot_closures()
+
+    def _pivot_closures(self) -> list[int]:
+        """Order the closures as elimination with exchanges of rows does at home."""
         trace = Trace()
         coordinates, joints = self._coordinates_and_joints(trace)
         f = self.scaled_closures(coordinates, joints)
@@ -181,7 +193,7 @@ class Model(Equations):
         at_home = evaluate_trace(trace, entries, [*placed.coordinates, *home])
         matrix = np.array(at_home, float).reshape(len(f), len(coordinates))
         order = list(range(len(f)))
-        for k in range(len(order) - 1):
+        for k in range(min(len(f) - 1, len(coordinates))):
             best = k + int(np.abs(matrix[k:, k]).argmax())
             order[k], order[best] = order[best], order[k]
             matrix[[k, best]] = matrix[[best, k]]

@@ -74,7 +74,7 @@ def _measure_platform_radius(machine: Machine) -> float:
 
 
 def _measure_arms(machine: Machine) -> float:
-    """Measure the arms of turning drives at home: how fast their feet move, mm/rad."""
+    """Measure the arms of turning drives at home: how fast their feet move, mm/rad; of those that turn a foot."""
     at_home = machine.group_joints(machine.inverse(machine.home).tolist())
     lengths = []
     for leg, given in zip(machine.legs, at_home, strict=True):
@@ -84,7 +84,7 @@ def _measure_arms(machine: Machine) -> float:
         for i, drive in enumerate(leg.drives):
             if drive.unit == "rad":
                 lengths.append(float(norm(evaluate_trace(trace, [derivative(c, q[i]) for c in foot], given))))
-    return _compute_rms(lengths)
+    return _compute_rms([length for length in lengths if length > 0.0])
 
 
 def _measure_rods_at_home(machine: Machine) -> Array:

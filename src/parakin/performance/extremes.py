@@ -125,11 +125,11 @@ def find_extremes(
 def find_isotropic_poses(
     region: Region, inside: Performance, apart: float, budget: Budget | None = None
 ) -> tuple[Array, bool]:
-    """Find allowed poses (k, axes) where J⁻¹J⁻ᵀ is a multiple of 1 to 1e-9, and whether each stands alone.
+    """Find allowed poses (k, axes) where J⁻ᵀJ⁻¹ is a multiple of 1 to 1e-9, and whether each stands alone.
 
     The starts are the best conditioned of the positions ``inside``, at least ``apart`` (mm) from each other.
     """
-    n = inside.psi.shape[1]
+    n = inside.psi.shape[-1]
     upper = np.triu_indices(n)
     positions = _list_positions(region, inside)
 
@@ -137,8 +137,8 @@ def find_isotropic_poses(
         rates = compute_scaled_rates(region.machine, region.poses(points), inside.length, region.mode)
         with np.errstate(invalid="ignore"):
             regular = np.abs(np.linalg.det(rates.b)) > 1e-12
-        back = np.linalg.solve(np.where(regular[:, None, None], rates.b, np.eye(n)), rates.a)
-        square = back @ back.swapaxes(1, 2)
+        back = np.linalg.solve(np.where(regular[:, None, None], rates.b, np.eye(rates.b.shape[1])), rates.a)
+        square = back.swapaxes(1, 2) @ back
         mean = np.einsum("nii->n", square) / n
         off = square / mean[:, None, None] - np.eye(n)
         return np.where(regular[:, None], off[:, *upper], np.nan)

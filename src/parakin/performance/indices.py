@@ -20,8 +20,9 @@ _SINGULAR = 1e-13  # singular values below this fraction of the greatest count a
 class Performance:
     """Performance indices at poses (..., axes), in one unit: angles are multiplied by the characteristic length.
 
-    J maps joints' rates to the tool's twist, t' = J q'. NaN where the machine is out of reach; a singularity gives
-    infinity and zero.
+    J maps joints' rates to the tool's twist, t' = J q'. With more drives than freedoms only such rates q' go together
+    as the pose's change asks for, q' = B⁻¹A t', and J is the pseudo-inverse of B⁻¹A. NaN where the machine is out of
+    reach; a singularity gives infinity and zero.
 
     psi : (..., n) singular values of J, the greatest first: how much faster than the drives the tool moves
     directions : (..., n, n), a row for each of ``psi``: the direction, a unit twist in the order of ``twist``, of the
@@ -108,8 +109,10 @@ def compute_performance(
 
 def _compute_amplifications(rates: ScaledRates) -> tuple[Array, Array]:
     """Compute psi (N, n), the greatest first, and their directions (N, n, n), by singular values of J or of J⁻¹."""
-    n = rates.a.shape[1]
     a, b = rates.a, rates.b
+    n = a.shape[2]
+    if a.shape[1] > n:
+        return _compute_redundant_amplifications(a, b)
     known = np.asarray(np.isfinite(a).all((1, 2)) & np.isfinite(b).all((1, 2)))
     a, b = (np.where(known[:, None, None], m, np.eye(n)) for m in (a, b))
     size_a, size_b = np.abs(np.linalg.det(a)), np.abs(np.linalg.det(b))
@@ -125,5 +128,29 @@ def _compute_amplifications(rates: ScaledRates) -> tuple[Array, Array]:
     if both.any():
         psi[both], directions[both] = np.nan, np.nan
         psi[both, 0], psi[both, -1] = np.inf, 0.0
+    psi[~known], directions[~known] = np.nan, np.nan
+    return psi, directions
+
+
+def _compute_redundant_amplifications(a: Array, b: Array) -> tuple[Array, Array]:
+    """Compute psi and directions of J = (B⁻¹A)⁺, for more drives than freedoms, by the CS decomposition.
+
+    Twists t' and drive rates q' that go together, A t' = B q', are the null space of (A, -B). In an orthonormal basis
+    (T, Q) of it the singular values of T, c, and of Q, s, have c² + s² = 1, and psi = c/s.
+    """
+    n, rows = a.shape[2], a.shape[1]
+    known = np.asarray(np.isfinite(a).all((1, 2)) & np.isfinite(b).all((1, 2)))
+    both = np.where(known[:, None, None], np.concatenate([a, -b], 2), np.eye(rows, n + rows))
+    _, sizes, v = np.linalg.svd(both)
+    basis = v[:, rows:].swapaxes(1, 2)
+    directions, c, _ = np.linalg.svd(basis[:, :n])
+    s = np.linalg.svd(basis[:, n:], compute_uv=False)[:, ::-1]
+    c, s = (np.where(size <= _SINGULAR, 0.0, size) for size in (c, s))
+    with np.errstate(divide="ignore"):
+        psi = c / s
+    directions = directions.swapaxes(1, 2).copy()
+    lost = sizes[:, -1] <= _SINGULAR * sizes[:, 0]  # legs and drives are singular together
+    psi[lost], directions[lost] = np.nan, np.nan
+    psi[lost, 0], psi[lost, -1] = np.inf, 0.0
     psi[~known], directions[~known] = np.nan, np.nan
     return psi, directions

@@ -24,7 +24,7 @@ def list_twist_names(machine: Machine) -> tuple[str, ...]:
 
 @dataclass(frozen=True, eq=False)
 class ScaledRates:
-    """A and B (N, n, n) of :func:`compute_scaled_rates`, and how many of their first rows are the legs'.
+    """A (N, m, n) and B (N, m, m) of :func:`compute_scaled_rates`, and how many of their first rows are the legs'.
 
     constraints : (N, c, c) the constraints' unit wrenches against the parasitic motions; c is 0 without constraints
     """
@@ -69,10 +69,10 @@ def trace_unit_wrenches(machine: Machine, rates: TwistRates, length: Characteris
     Each of a leg is a unit wrench. They are the legs' alone where head and table never matter, and their columns then
     the translations.
     """
-    count, others = machine.parallel_size, len(machine.axes) - machine.leg_count
+    (height, width), others = machine.parallel_block, len(machine.joints) - machine.leg_count
     factors = [*(1.0 / norm for norm in rates.wrench_norms), *[get_serial_factor(machine, length)] * others]
     scales = list_column_scales(machine, length)[0].tolist()
-    return [[rates.a[row][i] * factors[row] * scales[i] for i in range(count)] for row in range(count)]
+    return [[rates.a[row][i] * factors[row] * scales[i] for i in range(width)] for row in range(height)]
 
 
 def list_column_scales(machine: Machine, length: CharacteristicLength) -> tuple[Array, Array]:

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arrays import Array
+from ..kinematics.tall_matrices import compute_determinants
 from ..machine import Machine
 from .characteristic_length import CharacteristicLength, choose_characteristic_length
 from .jacobians import ScaledRates, compute_scaled_rates
@@ -40,6 +41,7 @@ def compute_singularity_margins(
     - parallel: det A of unit wrenches (legs' rows divided by their rods' lengths, angles times the characteristic
       length), positive as at home. Of a five-axis machine, whose head and table never matter here, that is the
       determinant of the legs' rows against the translations. Where it is zero the tool moves though the drives stand.
+      With more drives than freedoms it is the volume √det(AᵀA), which has no sign.
     - serial, of a leg's joint: the part of the drive's motion that reaches the platform's joint (mm a mm; a radian
       counts as the characteristic length), positive as at home. Where it is zero the drive moves and the platform's
       joint need not.
@@ -75,9 +77,9 @@ def derive_margins(machine: Machine, rates: ScaledRates, signs: Array) -> Array:
 
 def _compute_determinants(machine: Machine, rates: ScaledRates) -> Array:
     legs = rates.legs
-    block = machine.parallel_size
+    height, width = machine.parallel_block
     with np.errstate(invalid="ignore"):
-        columns = [np.linalg.det(rates.a[:, :block, :block])]
+        columns = [compute_determinants(rates.a[:, :height, :width])]
         columns += [rates.b[:, row, joint] for row, joint in enumerate(machine.closure_joints)]
         if has_serial_turns(machine):
             columns.append(np.abs(np.linalg.det(rates.b[:, legs:, legs:])))

@@ -14,6 +14,7 @@ from ..arrays import Array
 from ..dynamics.inverse_dynamics import Dynamics, Motion
 from ..errors import PoseError
 from ..families.family import Family, solve_each
+from ..kinematics.tall_matrices import invert_from_left
 from ..machine import Machine
 from ..workspaces.sampled.allowed_poses import SAMPLES, choose_poses
 from .springs import MachineSprings, read_springs, trace_springs
@@ -102,7 +103,10 @@ class Stiffness:
 
         The masses are those of :func:`parakin.compute_drive_forces`; struts are held at both ends, so none of their own
         weight bends them.
+
+        Raises :class:`NoMethodError` for a machine with more drives than freedoms.
         """
+        self.machine.refuse_redundancy("sag")
         dynamics, still = Dynamics(self.machine), np.zeros_like(self.joints)
         a, (drives, *struts) = _list_springs(self.machine, self.poses, self.springs)
         weights = [dynamics.compute_forces(Motion(self.poses, self.joints, still, still))]
@@ -120,8 +124,10 @@ class Stiffness:
         The loads keep their directions, so what they do changes with the geometry: their potential's Hessian stands
         beside the springs'. NaN where the machine gives way without bound.
 
-        Raises :class:`PoseError` for struts whose springs are not along their drives, of kinds other than ``length``.
+        Raises :class:`PoseError` for struts whose springs are not along their drives, of kinds other than ``length``,
+        :class:`NoMethodError` for a machine with more drives than freedoms.
         """
+        self.machine.refuse_redundancy("stiffness under load")
         acting = self._rest()
         if force is not None:
             acting = read_rows(force, self.translations, ["mm"] * len(acting), self._rest, "force")
@@ -164,9 +170,10 @@ def analyse_stiffness(
     poses : (N, axes); by default as many as ``samples`` all over the workspace, clear of singularities
 
     By virtual work: springs that give by s move the tool by t = J s, with A J = (B, -C) of the closures' derivatives by
-    drives and sizes; the forces on them are Jᵀ w, so the compliance is J c Jᵀ. Arms of cranks count as rigid, and so
-    does all that holds the platform without a drive (central legs, constraints, a parallelogram's hold of the
-    orientation).
+    drives and sizes; the forces on them are Jᵀ w, so the compliance is J c Jᵀ. With more drives than freedoms the tool
+    is where all springs together hold the least energy; NaN where rigid ones can't give way together. Arms of cranks
+    count as rigid, and so does all that holds the platform without a drive (central legs, constraints, a
+    parallelogram's hold of the orientation).
 
     Raises :class:`PoseError`.
     """
@@ -181,7 +188,7 @@ def compute_stiffness(machine: Machine, poses: Array, springs: MachineSprings) -
     a, listed = _list_springs(machine, poses, springs)
     by_kind = []
     for one in listed:
-        ways = solve_each(a, one.moved)
+        ways = _find_ways(a, listed, one.moved)
         by_kind.append(np.einsum("nis,ns,njs->nij", ways, one.compliances, ways))
     total = np.sum(by_kind, axis=0)
     tip = sum(axis in "XYZ" for axis in machine.axes)
@@ -201,9 +208,17 @@ class Springs(NamedTuple):
     compliances: Array
 
 
+def _find_ways(a: Array, springs: list[Springs], moved: Array) -> Array:
+    """Find how the tool follows what the springs give: A t' = M s', of a tall A where all springs hold least energy."""
+    if a.shape[1] == a.shape[2]:
+        return solve_each(a, moved)
+    metric = np.concatenate([own.moved * np.sqrt(own.compliances)[:, None] for own in springs], 2)
+    return invert_from_left(a, metric) @ moved
+
+
 def _list_springs(machine: Machine, poses: Array, springs: MachineSprings) -> tuple[Array, list[Springs]]:
     """List A, and the springs of all drives, then those of each leg's struts."""
-    n, sizes = len(machine.axes), list[int]()
+    n, m, sizes = len(machine.axes), len(machine.joints), list[int]()
 
     def list_outputs(pose: list[Scalar], own: Mapping[str, Scalar]) -> list[Scalar]:
         a, groups = trace_springs(machine, pose, springs, own)
@@ -212,8 +227,8 @@ def _list_springs(machine: Machine, poses: Array, springs: MachineSprings) -> tu
         return [*(x for row in a for x in row), *moved, *(s.compliance for group in groups for s in group)]
 
     rows = Family(machine, ()).evaluate("springs", list_outputs, poses, ())
-    edges = np.cumsum([n * n, *(n * size for size in sizes), *sizes])[:-1]
+    edges = np.cumsum([m * n, *(m * size for size in sizes), *sizes])[:-1]
     a, *columns = np.split(rows, edges, axis=1)
     moved, compliances = columns[: len(sizes)], columns[len(sizes) :]
     groups = zip(sizes, moved, compliances, strict=True)
-    return a.reshape(-1, n, n), [Springs(own.reshape(-1, n, size), c) for size, own, c in groups]
+    return a.reshape(-1, m, n), [Springs(own.reshape(-1, m, size), c) for size, own, c in groups]

@@ -52,7 +52,7 @@ class Measures:
     @cached_property
     def side(self) -> Array:
         """Det A by that of the pose that counts, > 0 on its side of the parallel singularities, (S, P, 1)."""
-        size = self._tapes.machine.parallel_size
+        size = self._tapes.machine.parallel_block[1]
         with np.errstate(divide="ignore", invalid="ignore"):
             side = np.linalg.det(self._rates.a[:, :size, :size]).reshape(*self._all.shape[:-1], 1)
             return np.asarray(side[:, :-1] / side[:, -1:])

@@ -48,7 +48,7 @@ MODEL void shift_tip(double *x, double length)
 MODEL void take_axes_as_joints(const double *x, double *q)
 {
     for (int i = 0; i < JOINTS; i++)
-        q[i] = x[i] / (turning_axis[i] ? DEGREE : 1.0) * (turning[i] ? DEGREE : 1.0);
+        q[i] = i < AXES ? x[i] / (turning_axis[i] ? DEGREE : 1.0) * (turning[i] ? DEGREE : 1.0) : 0.0;
 }
 
 MODEL void take_joints_as_axes(const double *q, double *x)
@@ -147,6 +147,49 @@ MODEL inline void substitute(int n, double a[n][n], const int order[n], double f
     }
 }
 
+#if REDUNDANT
+/* A matrix of m rows and fewer columns as Q R by Gram and Schmidt: Q in place, R with its diagonal's reciprocals; the
+   volume. */
+MODEL inline double orthogonalise(int m, int n, double q[m][n], double r[n][n])
+{
+    double volume = 1.0;
+    for (int k = 0; k < n; k++) {
+        for (int j = k; j < n; j++) {
+            r[k][j] = 0.0;
+            for (int i = 0; i < m; i++)
+                r[k][j] += q[i][k] * q[i][j];
+        }
+        const double size = sqrt(r[k][k]);
+        volume *= size;
+        r[k][k] = 1.0 / size;
+        for (int i = 0; i < m; i++)
+            q[i][k] *= r[k][k];
+        for (int j = k + 1; j < n; j++) {
+            r[k][j] *= r[k][k];
+            for (int i = 0; i < m; i++)
+                q[i][j] -= r[k][j] * q[i][k];
+        }
+    }
+    return volume;
+}
+
+/* The x of least squares of A x = f; what it leaves of f stays there. */
+MODEL inline void solve_least_squares(int m, int n, double q[m][n], double r[n][n], double f[m], double x[n])
+{
+    for (int k = 0; k < n; k++) {
+        x[k] = 0.0;
+        for (int i = 0; i < m; i++)
+            x[k] += q[i][k] * f[i];
+        for (int i = 0; i < m; i++)
+            f[i] -= x[k] * q[i][k];
+    }
+    for (int k = n - 1; k >= 0; k--) {
+        for (int j = k + 1; j < n; j++)
+            x[k] -= r[k][j] * x[j];
+        x[k] *= r[k][k];
+    }
+}
+#endif
 
 /* Rates, and how far a pose is from what it must not reach. */
 

@@ -14,13 +14,14 @@ from ...kernels.newton import SLOW, WORTH
 from ...kernels.tape import Tape, compile_tape
 from ...kernels.tape_text import InputVector
 from ...kinematics.closure_roots import MOST_STEPS, list_step_caps
-from ...kinematics.forward import STEADY
+from ...kinematics.forward import OF_AGREEMENT, STEADY
 from ...kinematics.start_modes import SETTLED
 from ...kinematics.turns import TURN
 from ...kinematics.wrist.pole_crossing import GAIN, compile_way_comparison
 from ...kinematics.wrist.pole_thresholds import EXACT, NEAR_MODE, SAME_AXIS, STANDING, SWING
 from ...machine import Machine
 from ...model.limits import Limit
+from ...model.rates import trace_determinant
 from ...performance.characteristic_length import choose_characteristic_length
 from ...performance.jacobians import (
     get_serial_factor,
@@ -40,6 +41,7 @@ from .home_pose import find_home_pose
 from .margin_signs import find_cheap_sign
 from .tape_to_c import format_c, write_function, write_test
 
+AGREEMENT = 1.0  # mm: joints of more drives than freedoms disagree by their following errors
 NO_SIDE = 1e-6  # of home's determinant: less is a singularity, of no side
 TELLS = 0.02  # of a leg: a pose from which the legs are farther off is a guess, and its side says nothing
 LEAST_REGULARITY = (
@@ -112,6 +114,8 @@ def _write_numbers(machine: Machine) -> str:
         f"#define AXES {len(machine.axes)}",
         f"#define JOINTS {len(machine.joints)}",
         f"#define CLOSURES {machine.leg_count}",
+        f"#define MOTIONS {len(machine.structure.coordinates)} /* what the forward finds */",
+        f"#define REDUNDANT {int(machine.is_redundant)} /* more drives than freedoms: the joints follow the pose */",
         f"#define SERIAL {len(machine.joints) - machine.leg_count} /* joints of head and table */",
         f"#define LIMITS {len(machine.limits)} /* of the machine's description */",
         f"#define SINGULARITIES {len(names)}",
@@ -121,14 +125,15 @@ def _write_numbers(machine: Machine) -> str:
         f"#define WRIST {int(machine.wrist is not None)} /* two turning joints point the tool */",
         f"#define TOOL_AXIS {int(machine.has_direction)} /* of the orientation only the tool's axis counts */",
         f"#define LEG_MODES {_count_leg_modes(machine)} /* choices of the legs' inverse */",
-        f"#define SAME {format_c(NEAR_MODE)} /* mm or rad: joints nearer to each other stand in one working mode */",
         f"#define TURN {format_c(TURN)}",
         f"#define DEGREE {format_c(np.pi / 180.0)}",
         f"#define FREE {format_c(STANDING)} "
         "/* rad: nearer to a turning axis the tool's tells no angle in a program's digits: it stands still */",
         f"#define UPRIGHT {format_c(EXACT)} /* rad: nearer to upright C is told by rounding only */",
         f"#define SAME_AXIS {format_c(SAME_AXIS)} /* what a tool's axis may be off another one by rounding */",
-        f"#define TOLERANCE {open_by} /* mm by which the legs of an answer may fail to close */",
+        f"#define TOLERANCE {open_by} /* mm by which the legs of an answer may fail to close, */",
+        f"#define AGREEMENT {format_c(AGREEMENT) if machine.is_redundant else open_by} "
+        "/* and joints that are measured may disagree */",
         *_write_wrist(machine),
         *_write_sides(machine),
         *_write_newton(machine),
@@ -137,6 +142,8 @@ def _write_numbers(machine: Machine) -> str:
         f"#define STEP_FACTOR {format_c(STEP_FACTOR)} /* a joint's step beyond so much of its speed is refused */",
         f"#define COMMAND_LAG {format_c(COMMAND_LAG)} /* steps by which a commanded joint may trail */",
         _write_array("double", "home", [format_c(value) for value in find_home_pose(machine).tolist()]),
+        _write_array("double", "same_mode", [format_c(value) for value in _list_mode_tolerances(machine)])
+        + " /* mm, rad: joints nearer to each other stand in one working mode */",
         _write_array("int", "turning", [str(int(unit == "rad")) for unit in machine.joint_units]),
     ]
     columns = {axis: column for column, axis in enumerate(machine.axes)}
@@ -147,6 +154,15 @@ def _write_numbers(machine: Machine) -> str:
     lines.append(_write_array("int", "turn_columns", places_and_turns[3:]))
     lines.append(_write_array("int", "turning_axis", [str(int(unit == "rad")) for unit in machine.axis_units]))
     return "\n".join(lines) + "\n"
+
+
+def _list_mode_tolerances(machine: Machine) -> list[float]:
+    """List by how much joints may differ from those of their working mode, mm and rad."""
+    if not machine.is_redundant:
+        return [NEAR_MODE] * len(machine.joints)
+    at_legs = dict(zip(machine.closure_joints, machine.leg_sizes, strict=True))
+    rads = [1.0 / at_legs.get(i, 1.0) if unit == "rad" else 1.0 for i, unit in enumerate(machine.joint_units)]
+    return [OF_AGREEMENT * AGREEMENT * rad for rad in rads]
 
 
 def _count_leg_modes(machine: Machine) -> int:
@@ -170,7 +186,8 @@ def _write_sides(machine: Machine) -> Iterator[str]:
     """Write home's side of the singularities, and what tells that a given pose has a side of its own."""
     determinant = float(machine.sides(machine.home[None, :])[0])
     side = machine.home_side if machine.has_closed_forward else float(np.sign(determinant))
-    least, most, middle = min(machine.leg_sizes), max(machine.leg_sizes), machine.structure.middle_turn
+    least, most = min(machine.leg_sizes), max(machine.leg_sizes)
+    middle = None if machine.is_redundant else machine.structure.middle_turn
     yield f"#define SIZE {format_c(least)} /* of the legs, mm */"
     yield f"#define LONGEST {format_c(most)}"
     yield f"#define HOME_SIDE {format_c(side)} /* of the singularities; on the other one is another assembly */"
@@ -324,15 +341,16 @@ def _compile_singularities(machine: Machine) -> Tape:
     length = choose_characteristic_length(machine)
     columns_b = list_column_scales(machine, length)[1].tolist()
     signs = find_home_signs(machine, length, machine.mode).tolist()
-    factors = [*(1.0 / size for size in rates.wrench_norms), *[get_serial_factor(machine, length)] * (n - legs)]
-    outputs = [signs[0] * expand_determinant(trace_unit_wrenches(machine, rates, length))]
+    turns = len(machine.joints) - legs
+    factors = [*(1.0 / size for size in rates.wrench_norms), *[get_serial_factor(machine, length)] * turns]
+    outputs = [signs[0] * trace_determinant(trace_unit_wrenches(machine, rates, length))]
     for number, joint in enumerate(machine.closure_joints):
         outputs.append(rates.b[number][joint] * factors[number] * (signs[1 + number] * columns_b[joint]))
     if has_serial_turns(machine):
-        scale = float(np.prod(columns_b[legs:])) * length.factor ** (n - legs)
+        scale = float(np.prod(columns_b[legs:])) * length.factor**turns
         serial = [row[legs:] for row in rates.b[legs:]]
         first, last = serial[0], serial[-1]
-        outputs.append(absolute(first[0] * last[1] - first[1] * last[0] if n - legs == 2 else first[0]) * scale)
+        outputs.append(absolute(first[0] * last[1] - first[1] * last[0] if turns == 2 else first[0]) * scale)
     if machine.constraints:
         scales = list_constraint_scales(machine, length).tolist()
         constraints = machine.trace_constraint_rates(trace.inputs(n))

@@ -21,17 +21,18 @@ function stateAtPose(pose, signs, before) {
   return {pose: [...pose], joints: before ? unwind(joints, before.joints) : joints, signs};
 }
 
-// Newton's method on the closures from a pose; null where it finds no root within the tolerance.
+// Newton's method on the closures from a pose, with more of these than freedoms that of Gauss and Newton; null where it
+// finds no root within the tolerance.
 function findRoot(near, joints) {
   const n = machine.caps.length;
   let y = model.begin(near, joints), residual = Infinity, determinant = 0;
   for (let step = 0; step < MOST_STEPS; step++) {
-    const values = model.closures(y, joints), f = values.slice(0, n);
+    const values = model.closures(y, joints), f = values.slice(0, values.length / (n + 1));
     const before = residual;
     residual = max(...f.map(abs));
     if (!Number.isFinite(residual)) return null;
     if (residual <= machine.tolerance && residual >= 0.1 * before || residual === 0) break;
-    const solved = solveLinear(values.slice(n), f, n);
+    const solved = solveLeastSquares(values.slice(f.length), f, n);
     determinant = solved.determinant;
     let shrink = 1;
     solved.x.forEach((change, i) => { shrink = min(shrink, machine.caps[i] / abs(change)); });
@@ -67,18 +68,53 @@ function compareJoints(one, other) {
   }, 0);
 }
 
+// Of more drives than freedoms those that stand follow the others, and as little as they can.
+const FOLLOWS = 1e-3, DIFFERENCE = 1e-4; // what their ways count; mm between poses that tell rates, a turn on the size
+const SETTLED = 1e-6; // mm: a step as small as this is the last but for rounding
+
+// The state whose joints are those given in the least squares, from one next to it; null where none is found.
+function settleJoints(state, joints, counts) {
+  const n = machine.axes.length, arms = machine.axes.map(axis => axis.unit === "rad" ? 1 / machine.size : 1);
+  const weighs = machine.joints.map((joint, i) => counts[i] * (isTurning[i] ? machine.size : 1));
+  let here = state, before = Infinity;
+  for (let step = 0; step < MOST_STEPS; step++) {
+    const columns = axisNumbers.map(k => [-1, 1].map(way => stateAtPose(
+      here.pose.map((value, i) => i === k ? value + way * DIFFERENCE * arms[k] : value), here.signs, here)));
+    if (columns.flat().includes(null)) return null;
+    const slopes = weighs.flatMap((weight, i) =>
+      columns.map(([below, above]) => weight * (above.joints[i] - below.joints[i]) / (2 * DIFFERENCE)));
+    const off = weighs.map((weight, i) => weight * (here.joints[i] - joints[i]));
+    const {x} = solveLeastSquares(slopes, off, n), most = max(...x.map(abs));
+    if (!Number.isFinite(most)) return null;
+    const shrink = min(1, machine.size / 6 / most);
+    here = stateAtPose(here.pose.map((value, i) => value - shrink * arms[i] * x[i]), here.signs, here);
+    if (!here || most <= machine.tolerance || most < SETTLED && most >= 0.5 * before) return here;
+    before = most;
+  }
+  return null;
+}
+
+// The state at joints next to a state; null where there is none on its side of the singularities.
+function findBeside(state, joints, counts, side) {
+  if (machine.redundant) {
+    const reached = settleJoints(state, joints, counts);
+    return reached && isNear(reached.pose, state.pose) ? reached : null;
+  }
+  const root = findRoot(state.pose, joints), pose = root && nearTurns(root.pose, state.pose);
+  const reached = pose && {pose, joints, signs: findSigns(pose, joints, state.signs)};
+  return reached && isNear(pose, state.pose) && measureSide(reached) * side > 0 ? reached : null;
+}
+
 // The direct problem, continued along the joints' straight line from a state. Calls visit with each state on the way
 // and ends where that says false. Returns the last state, and whether it is the end.
 function followJoints(from, joints, visit = () => true) {
   let state = from, share = 0, stride = 1 / 4;
-  const side = measureSide(from);
+  const side = measureSide(from), counts = joints.map((q, i) => q === from.joints[i] ? FOLLOWS : 1);
   while (share < 1 && stride > LEAST_STRIDE) {
     const next = min(1, share + stride);
     const given = from.joints.map((q, i) => q + next * (joints[i] - q));
-    const root = findRoot(state.pose, given);
-    const pose = root && nearTurns(root.pose, state.pose);
-    const reached = pose && {pose, joints: given, signs: findSigns(pose, given, state.signs)};
-    if (!reached || !isNear(pose, state.pose) || measureSide(reached) * side <= 0) {
+    const reached = findBeside(state, given, counts, side);
+    if (!reached) {
       stride /= 2;
       continue;
     }
@@ -98,12 +134,12 @@ function isNear(pose, other) {
 // det A of the unit wrenches: 0 at a parallel singularity; its sign tells the assembly mode.
 function measureSide(state) {
   const rows = model.wrenches(state.pose, state.joints);
-  return computeDeterminant(rows, Math.round(sqrt(rows.length)));
+  return computeDeterminant(rows, machine.parallelColumns);
 }
 
 // The motion that is free at a parallel singularity: the tip's velocity and the small turn (3 each), of unit size.
 function findFreeMotion(state) {
-  const rows = model.wrenches(state.pose, state.joints), n = Math.round(sqrt(rows.length));
+  const rows = model.wrenches(state.pose, state.joints), n = machine.parallelColumns;
   const vector = findNullVector(rows, n), motion = {velocity: [0, 0, 0], turn: [0, 0, 0]};
   machine.twist.slice(0, n).forEach((name, i) => {
     if (name.length === 1) motion.velocity["XYZ".indexOf(name)] = vector[i];

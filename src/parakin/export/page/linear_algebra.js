@@ -25,18 +25,32 @@ function solveLinear(a, b, n) {
   return {x: b, determinant};
 }
 
-function computeDeterminant(a, n) {
-  return solveLinear([...a], new Array(n).fill(0), n).determinant;
+// The least squares of A x = b with n columns and as many rows or more; returns x and det A, of a tall A its volume.
+function solveLeastSquares(a, b, n) {
+  if (b.length === n) return solveLinear(a, b, n);
+  const square = multiplyTransposed(a, n), right = new Array(n).fill(0);
+  for (let j = 0; j < n; j++) for (let k = 0; k < b.length; k++) right[j] += a[k * n + j] * b[k];
+  const {x, determinant} = solveLinear(square, right, n);
+  return {x, determinant: sqrt(max(0, determinant))};
 }
 
-// The right singular vector of the least singular value of A (n, n), by Jacobi's rotations of AᵀA; its greatest
+function multiplyTransposed(a, n) {
+  const square = new Array(n * n).fill(0);
+  for (let i = 0; i < n; i++) for (let j = 0; j < n; j++) {
+    for (let k = 0; k * n < a.length; k++) square[i * n + j] += a[k * n + i] * a[k * n + j];
+  }
+  return square;
+}
+
+function computeDeterminant(a, n) {
+  return solveLeastSquares([...a], new Array(a.length / n).fill(0), n).determinant;
+}
+
+// The right singular vector of the least singular value of A with n columns, by Jacobi's rotations of AᵀA; its greatest
 // component is positive.
 function findNullVector(a, n) {
-  const m = new Float64Array(n * n), v = new Float64Array(n * n);
-  for (let i = 0; i < n; i++) {
-    v[i * n + i] = 1;
-    for (let j = 0; j < n; j++) for (let k = 0; k < n; k++) m[i * n + j] += a[k * n + i] * a[k * n + j];
-  }
+  const m = multiplyTransposed(a, n), v = new Float64Array(n * n);
+  for (let i = 0; i < n; i++) v[i * n + i] = 1;
   for (let sweep = 0; sweep < 12; sweep++) {
     for (let p = 0; p < n; p++) for (let q = p + 1; q < n; q++) rotateJacobi(m, v, n, p, q);
   }

@@ -70,6 +70,8 @@ def encode_page_machine(machine: Machine) -> dict[str, Any]:
         if wrist is None
         else {"first": wrist.first, "second": wrist.second, "free": float(convert_to_freedom(PRINTED))},
         "legJoints": machine.leg_count,
+        "redundant": machine.is_redundant,
+        "parallelColumns": machine.parallel_block[1],
         "twist": list(list_twist_names(machine)),
         "length": choose_characteristic_length(machine).factor,
         "caps": list_step_caps(machine.structure.coordinates, max(machine.leg_sizes)),

@@ -19,6 +19,7 @@ from .closed_forms import LONGEST, ClosedForm, find_closed_form, solve_closed_fo
 from .homotopy_roots import find_coordinates, find_real_roots, make_closure_system
 from .root_boxes import prove_roots
 
+_OPEN = 1e-6  # of the greatest leg: a root of the leading closures that leaves others farther open is no pose
 _AT_ONCE = 256  # rows of joints: some thousands of solutions
 CLOSED_FORM = "proved (closed form)"
 ALL_PATHS = "all paths accounted for"
@@ -66,7 +67,8 @@ def find_assemblies(model: Model, joints: Array) -> list[Assemblies]:
 
     Machines that only translate on three (two) rods have two: the common points of spheres (circles). Three rods in a
     plane have up to six, three Lambda legs on parallel shafts up to twelve. All others are systems of quadrics in
-    Study's parameters, whose roots are those of a generic one, tracked to it.
+    Study's parameters, whose roots are those of a generic one, tracked to it. With more drives than freedoms all roots
+    of the leading closures are found, as many as there are freedoms, and those kept at which the others close too.
 
     Raises :class:`NoMethodError` for a continuum of poses.
     """
@@ -83,6 +85,8 @@ def _find_in_block(model: Model, joints: Array) -> list[Assemblies]:
     rows = np.flatnonzero(near)
     roots = find_real_roots(model, joints[rows])
     coordinates = [find_coordinates(model, own.points, given) for own, given in zip(roots, joints[rows], strict=True)]
+    if model.is_redundant:
+        coordinates = [_drop_open(model, own, given) for own, given in zip(coordinates, joints[rows], strict=True)]
     with_pose = [find_finite_rows(own) for own in coordinates]
     kept = [own[has_pose] for own, has_pose in zip(coordinates, with_pose, strict=True)]
     described = _describe(model, joints[rows], kept, ALL_PATHS)
@@ -96,6 +100,13 @@ def _find_in_block(model: Model, joints: Array) -> list[Assemblies]:
             untold_count=answer.untold_count + int((~has_pose).sum()),
         )
     return answers
+
+
+def _drop_open(model: Model, coordinates: Array, joints: Array) -> Array:
+    """Drop coordinates (k, m) at which closures besides the leading ones are open, for one row of joints (joints,)."""
+    given = np.ascontiguousarray(np.broadcast_to(joints, (len(coordinates), len(joints))))
+    residual = find_roots(model, coordinates, given, most=0, poses=False).residual
+    return coordinates[~(residual > _OPEN * max(model.sizes))]
 
 
 def _make_empty_coordinates(model: Model) -> Array:

@@ -21,6 +21,8 @@ ClosedForm = Literal["spheres", "planar", "lambda"]
 
 def find_closed_form(model: Model) -> ClosedForm | None:
     """Find the closed form of a machine's direct problem, if there is one."""
+    if model.is_redundant:
+        return None
     return "spheres" if model.by_spheres else model.structure.assembly_method
 
 

@@ -94,12 +94,14 @@ class MachineQuadrics(ClosureSystem):
 
 
 def make_machine_quadrics(model: Model) -> MachineQuadrics:
-    """Make a machine's quadrics.
+    """Make a machine's quadrics: of more closures than freedoms the leading ones.
 
     Raises :class:`NoMethodError` where a leg's closure puts its platform point on no sphere and no plane.
     """
     family = make_family(_name_family(model))
-    trace, numbers, platforms = _list_closure_numbers(model)
+    trace, every_number, every_platform = _list_closure_numbers(model)
+    platforms = [every_platform[i] for i in model.leading_closures]
+    numbers = [number for i in model.leading_closures for number in every_number[5 * i : 5 * i + 5]]
     size = max(model.sizes)
     quadrics = [make_closure_quadrics(p / size) for p in platforms]
     for constraint in model.spec.constraints:

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 from ...algebra import ORIGIN, Scalar, Vec, atan2, sincos, sqrt
-from ..elements import Signs, Size
+from ..elements import Signs, Size, Unit
 from .base import Inverse, Leg, Link, Reach, close_rod
 
 _UP: Vec = (0.0, 0.0, 1.0)
@@ -17,7 +18,7 @@ class Column(Leg):
 
     kind = "column"
     family = "columns on a circular rail"
-    units = ("rad", "mm")
+    units: ClassVar[tuple[Unit, ...]] = ("rad", "mm")
     has_carriers = True
     branches = "-"
 

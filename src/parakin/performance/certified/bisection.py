@@ -9,6 +9,7 @@ import numpy as np
 
 from ...arrays import Array, Flags, Indices
 from ...budget import Budget
+from ...kinematics.tall_matrices import compute_determinants
 from .interval_matrices import LinearMatrices, MatrixBounds
 
 AT_ONCE = 512  # boxes
@@ -68,7 +69,7 @@ def decide_nonnegative(bounds: MatrixBounds, first: Array) -> Callable[[Array, A
 
 
 def decide_regular(bounds: MatrixBounds, first: Array) -> Callable[[Array, Array], Decided]:
-    """Make the function that decides, for boxes (N, d), that all matrices in it are regular.
+    """Make the function that decides, for boxes (N, d), that all matrices in it are regular, tall ones of full rank.
 
     They are if 1 - Y·A has a spectral radius below 1 for all A there, with Y about the inverse of the middle one.
     """
@@ -87,21 +88,40 @@ def decide_regular(bounds: MatrixBounds, first: Array) -> Callable[[Array, Array
     return decide
 
 
-def invert_middles(matrices: LinearMatrices) -> tuple[Array, Flags]:
-    """Invert the bounded, regular middles; returns the inverses, and which these are."""
+def invert_middles(matrices: LinearMatrices, dividend: LinearMatrices | None = None) -> tuple[Array, Flags]:
+    """Invert the bounded, regular middles; returns the inverses, and which these are.
+
+    Of a tall middle M the inverse Y is one from the left, Y·M = 1: the pseudo-inverse, or with a square ``dividend`` N
+    that for which Y·N is the pseudo-inverse of N⁻¹M.
+    """
     good = matrices.bounded
+    if dividend is not None and _is_tall(matrices):
+        good = good & dividend.bounded
+        good[good] = compute_determinants(dividend.middle[good]) != 0.0
     with np.errstate(all="ignore"):
-        size = np.abs(np.linalg.det(np.where(good[:, None, None], matrices.middle, 0.0)))
+        size = np.abs(compute_determinants(np.where(good[:, None, None], matrices.middle, 0.0)))
     good = good & (size > 0.0) & np.isfinite(size)
-    inverse = np.linalg.inv(matrices.middle[good])
+    middle = matrices.middle[good]
+    if not _is_tall(matrices):
+        inverse = np.linalg.inv(middle)
+    elif dividend is None:
+        inverse = np.linalg.pinv(middle)
+    else:
+        back = np.linalg.inv(dividend.middle[good])
+        inverse = np.linalg.pinv(back @ middle) @ back
     fine = np.isfinite(inverse).all((1, 2))
     good[np.flatnonzero(good)[~fine]] = False
     return inverse[fine], good
 
 
+def _is_tall(matrices: LinearMatrices) -> bool:
+    """Tell whether there are more rows than columns."""
+    return bool(matrices.middle.shape[1] > matrices.middle.shape[2])
+
+
 def bound_inverse_error(product: LinearMatrices, given: LinearMatrices, inverse: Array) -> Array:
     """Bound the error of the computed inverse, entry by entry: how far middle × inverse may be from the identity."""
-    n = inverse.shape[1]
+    n = product.middle.shape[1]
     return np.asarray(np.abs(product.middle - np.eye(n)) + _ROUNDING * (np.abs(inverse) @ np.abs(given.middle)))
 
 

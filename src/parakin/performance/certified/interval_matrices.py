@@ -98,8 +98,8 @@ class PoseBox:
     @cached_property
     def parallel(self) -> Matrix:
         """The matrix that is singular at parallel singularities: A, of five axes the legs' rows by the translations."""
-        a, size = self._rates[0].a, self.machine.parallel_size
-        return [row[:size] for row in a[:size]]
+        a, (rows, columns) = self._rates[0].a, self.machine.parallel_block
+        return [row[:columns] for row in a[:rows]]
 
     @cached_property
     def serial(self) -> Matrix:
@@ -153,7 +153,7 @@ class LinearMatrices:
         return np.asarray(ends & np.isfinite(self.slopes).all((1, 2, 3)) & np.isfinite(self.spread).all((1, 2, 3)))
 
     def multiply_left(self, left: Array) -> LinearMatrices:
-        """Multiply by matrices (N, n, n) from the left."""
+        """Multiply by matrices (N, k, n) from the left."""
         size = np.abs(left)
         spread = size[:, None] @ self.spread
         return LinearMatrices(left @ self.middle, size @ self.own, left[:, None] @ self.slopes, spread, self.half)

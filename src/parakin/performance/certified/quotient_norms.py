@@ -181,11 +181,14 @@ def _bound_quotient(
 
     With Y about the inverse of the middle M and G = Y·M - 1 of size g < 1, M⁻¹N = (1 + G)⁻¹·YN, that is YN - G·YN and
     a remainder no greater than g²/(1 - g)·|YN|.
+
+    Where M is tall, M⁻¹N is the pseudo-inverse of N⁻¹M. (1 + G)⁻¹·YN is an inverse of that from the left, so its size
+    is no less, and in the middle it is the pseudo-inverse itself.
     """
     count, d = divisor.half.shape
     signs = np.array(list(product((-1.0, 1.0), repeat=d))).reshape(2**d, d) if d <= _CORNERS else np.zeros((1, d))
     sizes = np.full((count, len(signs)), np.inf)
-    y, good = invert_middles(divisor)
+    y, good = invert_middles(divisor, dividend)
     fine = dividend.bounded[good]
     y, good[good] = y[fine], fine
     given = divisor.take(good)

@@ -13,7 +13,7 @@ from ...algebra import Scalar, Term, absolute
 from ...arrays import Array, Flags, Indices
 from ...budget import Budget
 from ...errors import PoseError
-from ...model.rates import expand_determinant
+from ...model.rates import expand_determinant, trace_determinant
 from ...workspaces.certified.constraints import Constraint
 from ...workspaces.certified.plane_cuts import CLEARED
 from ...workspaces.certified.region import Region
@@ -142,8 +142,8 @@ def _trace_margins(region: Region) -> list[Scalar]:
     def compute_margins(pose: Sequence[Scalar]) -> list[Scalar]:
         with np.errstate(all="ignore"):  # a pose out of reach gives NaN
             rates = machine.trace_rates(pose, machine.trace_inverse(pose, region.mode)[0])
-        legs, size = machine.leg_count, machine.parallel_size
-        margins = [expand_determinant([row[:size] for row in rates.a[:size]])]
+        legs, (height, width) = machine.leg_count, machine.parallel_block
+        margins = [trace_determinant([row[:width] for row in rates.a[:height]])]
         margins += [rates.b[row][joint] for row, joint in enumerate(machine.closure_joints)]
         if has_serial_turns(machine):
             margins.append(absolute(expand_determinant([row[legs:] for row in rates.b[legs:]])))

@@ -8,6 +8,7 @@ from functools import cached_property
 import numpy as np
 
 from ...arrays import Array, Flags, Indices
+from ...kinematics.tall_matrices import compute_determinants
 from ...kinematics.turns import count_nearest_turns
 from ...kinematics.wrist.pole_crossing import EITHER, OTHER, OWN, WristModes
 from ...kinematics.wrist.pole_thresholds import PRINTED
@@ -100,13 +101,15 @@ class PathMotions:
         return joints, np.full(len(poses), OWN, np.int8)
 
     def compute_determinants(self, points: MotionPoints) -> Array:
-        """Compute det A of unit wrenches, (n,): its sign changes where a motion passes a parallel singularity."""
-        a_scale, size = self._scales[0], self.machine.parallel_size
+        """Compute det A of unit wrenches, (n,): its sign changes where a motion passes a parallel singularity.
+
+        With more drives than freedoms it has no sign, and only falls to zero there.
+        """
+        a_scale, (height, width) = self._scales[0], self.machine.parallel_block
         a, _, wrench_norms = self.machine.twist_rates(points.poses, points.joints)
         a = a * a_scale
         with np.errstate(all="ignore"):
-            determinants: Array = np.linalg.det(a[:, :size, :size]) / wrench_norms.prod(1)
-        return determinants
+            return np.asarray(compute_determinants(a[:, :height, :width]) / wrench_norms.prod(1))
 
     @cached_property
     def singular_determinant(self) -> float:

@@ -29,12 +29,12 @@ def make_side_constraints(traced: TracedPose) -> tuple[Constraint, Constraint]:
 
 
 def _trace_leg_rows(traced: TracedPose, pose: Sequence[Scalar]) -> list[list[Scalar]]:
-    """Trace the square block of A that can become singular."""
+    """Trace the block of A that can become singular."""
     machine = traced.machine
     with np.errstate(all="ignore"):  # a pose out of reach gives NaN
         rates = machine.trace_rates(pose, machine.trace_inverse(pose, traced.mode)[0])
-    size = machine.parallel_size
-    return [row[:size] for row in rates.a[:size]]
+    height, width = machine.parallel_block
+    return [row[:width] for row in rates.a[:height]]
 
 
 def _scale_at_home(traced: TracedPose) -> float:

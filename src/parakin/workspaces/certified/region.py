@@ -68,9 +68,12 @@ class Region:
         return self.traced_pose.build_constraints(self.without)
 
     @cached_property
-    def side_constraints(self) -> tuple[Constraint, Constraint]:
-        """The sign of det A as at home, and the other one."""
-        return make_side_constraints(self.traced_pose)
+    def side_constraints(self) -> tuple[Constraint, ...]:
+        """The sign of det A as at home, and the other one; none for a machine with more drives than freedoms.
+
+        Its singular poses are those where several determinants vanish at once, and leave no side of their own.
+        """
+        return () if self.machine.is_redundant else make_side_constraints(self.traced_pose)
 
     @cached_property
     def constraints(self) -> list[Constraint]:
@@ -78,9 +81,8 @@ class Region:
         limits = self.limit_constraints
         if self.components == "all":
             return limits
-        side = self.side_constraints[0]
         first_implied = next((i for i, limit in enumerate(limits) if limit.implied), len(limits))
-        return [*limits[:first_implied], side, *limits[first_implied:]]
+        return [*limits[:first_implied], *self.side_constraints[:1], *limits[first_implied:]]
 
     @property
     def limits(self) -> tuple[str, ...]:

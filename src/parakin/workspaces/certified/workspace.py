@@ -218,6 +218,8 @@ def measure_elsewhere(workspace: Workspace, gap: float = 0.05, seconds: float | 
     extent, everywhere = region.find_extent(budget), region.include_all_components()
     if extent is None:
         return workspace.apart
+    if not everywhere.side_constraints:
+        return workspace.apart
     own = everywhere.side_constraints[0]
     other = replace(own, margin=0.0 - own.margin)  # a singularity all over an orientation is no part of home's either
     cells = everywhere.subdivide(*extent, [other]).run(gap, budget=budget)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import product
 from typing import NamedTuple
@@ -72,19 +73,19 @@ class _LabelledCells(NamedTuple):
 
 
 def find_cell_components(
-    region: Region, constraint: Constraint, low: Array, high: Array, resolution: Resolution
+    region: Region, side: Sequence[Constraint], low: Array, high: Array, resolution: Resolution
 ) -> CellComponents:
-    """Find the connected components of a region within a box [low, high], where the constraint is kept too.
+    """Find the connected components of a region within a box [low, high], where those of one side are kept too.
 
     Cells that share a point, undecided ones included, form groups; no path leads from one group to another.
     """
-    subdivision = region.subdivide(low, high, [constraint])
+    subdivision = region.subdivide(low, high, side)
     cells = refuse_interrupted(subdivision.run(_GAP, resolution.cell, resolution.budget))
     if not len(cells.low):
         return CellComponents([], 0, 0.0, cells.stopped)
     faces, points = find_adjacent_cells(cells.low, cells.size)
     group = label_components(len(cells.low), points)
-    component = _join_cells(region, constraint, cells, (faces, points), resolution.budget)
+    component = _join_cells(region, side, cells, (faces, points), resolution.budget)
     labelled = _LabelledCells(cells, component, _spread_owners(component, cells.inside, points))
     components, at_least, undecided = [], 0, 0.0
     for number in np.unique(group):
@@ -98,7 +99,7 @@ def find_cell_components(
             undecided += lost
             components += own_components
         else:
-            finer = _refine_group(region, constraint, cells, members, resolution)
+            finer = _refine_group(region, side, cells, members, resolution)
             components += finer.components
             at_least += finer.at_least
             undecided += finer.undecided
@@ -128,7 +129,7 @@ def _sum_volumes(cells: Cells, fractions: Array, which: Flags) -> float:
 
 
 def _refine_group(
-    region: Region, constraint: Constraint, cells: Cells, members: Flags, resolution: Resolution
+    region: Region, side: Sequence[Constraint], cells: Cells, members: Flags, resolution: Resolution
 ) -> CellComponents:
     """Find the components of a group of undecided cells by finer ones, if no other cell is in their box."""
     low, high = cells.low[members].min(0), (cells.low + cells.size)[members].max(0)
@@ -136,11 +137,11 @@ def _refine_group(
     if not resolution.deeper or others.any() or resolution.budget.is_spent():
         return CellComponents([], 0, _sum_volumes(cells, cells.outer, members), cells.stopped)
     finer = Resolution(resolution.cell / _FINER, resolution.budget, resolution.deeper - 1)
-    return find_cell_components(region, constraint, low, high, finer)
+    return find_cell_components(region, side, low, high, finer)
 
 
 def _join_cells(
-    region: Region, constraint: Constraint, cells: Cells, adjacency: tuple[Indices, Indices], budget: Budget
+    region: Region, side: Sequence[Constraint], cells: Cells, adjacency: tuple[Indices, Indices], budget: Budget
 ) -> Indices:
     """Label cells inside that hang together: by faces, or by thin boxes that are proved inside.
 
@@ -152,7 +153,7 @@ def _join_cells(
     component = label_components(count, pairs)
     for _ in range(_ROUNDS):
         links = _list_links(component, inside, points)
-        proved = _prove_links(region, constraint, cells, links, budget)
+        proved = _prove_links(region, side, cells, links, budget)
         if not proved.any():
             break
         pairs = np.concatenate([pairs, links[proved]])
@@ -172,7 +173,7 @@ def _list_links(component: Indices, inside: Flags, points: Indices) -> Indices:
     return links[:: max(1, -(-len(links) // _LINKS))]
 
 
-def _prove_links(region: Region, constraint: Constraint, cells: Cells, links: Indices, budget: Budget) -> Flags:
+def _prove_links(region: Region, side: Sequence[Constraint], cells: Cells, links: Indices, budget: Budget) -> Flags:
     """Prove that a thin box from cell to cell is inside, for each of the links."""
     proved = np.zeros(len(links), np.bool_)
     top = cells.low + cells.size
@@ -187,7 +188,7 @@ def _prove_links(region: Region, constraint: Constraint, cells: Cells, links: In
         middle = low[left] + np.array(along) * (high[left] - low[left])
         box_low = np.where(apart[left], low[left], middle - thin)
         box_high = np.where(apart[left], high[left], middle + thin)
-        proved[left] = prove_boxes(region, box_low, box_high, [constraint], _MOST_BOXES, budget).proved
+        proved[left] = prove_boxes(region, box_low, box_high, side, _MOST_BOXES, budget).proved
     return proved
 
 

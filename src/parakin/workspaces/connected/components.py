@@ -31,6 +31,9 @@ _NEAR = 32  # cells of a component from which a path to a position is looked for
 
 ONE_ORIENTATION = "of one turn for each place nothing is known of the turns between; hold or sweep them"
 
+_Side = tuple[Constraint, ...]
+_ONE_SIDE: dict[int, _Side] = {1: ()}  # of more drives than freedoms: no singularity separates poses
+
 _Pair = tuple["Component", CellComponent]
 
 
@@ -38,7 +41,7 @@ _Pair = tuple["Component", CellComponent]
 class Component:
     """One connected component of a region.
 
-    sign : of det A, 1 where it is as at home, else -1
+    sign : of det A, 1 where it is as at home, else -1; 1 with more drives than freedoms
     volume : mm³ (in the plane mm²): at least what is proved to hang together, at most with all cells that may
     position : a position in it, (d,) mm
     low, high : corners of a box proved to hold it
@@ -115,7 +118,9 @@ def find_components(
         raise PoseError(f"cell: a size above 0 mm expected, not {cell:g}")
     budget, report = Budget(seconds), progress or (lambda fraction: None)
     region = region.include_all_components()
-    sides = dict(zip((1, -1), region.side_constraints, strict=True))
+    sides = {
+        sign: (constraint,) for sign, constraint in zip((1, -1), region.side_constraints, strict=False)
+    } or _ONE_SIDE
     position, sign = (None, 0) if start is None else _locate_start(region, start, sides)
     outline = find_outline_cells(region, budget.take_fraction(_OUTLINE))
     low, high = outline.low.min(0), (outline.low + outline.size).max(0)
@@ -123,10 +128,10 @@ def find_components(
     refuse_too_many_cells(np.ceil((high - low) / edge), edge)
     pairs: list[_Pair] = []
     at_least, undecided, stopped = 0, 0.0, "cell"
-    for done, (own_sign, constraint) in enumerate(sides.items()):
+    for done, (own_sign, side) in enumerate(sides.items()):
         report((1.0 + done) / (1.0 + len(sides)))
         one_side = find_cell_components(
-            region, constraint, low, high, Resolution(edge, budget.take_fraction(1.0 / (len(sides) - done)))
+            region, side, low, high, Resolution(edge, budget.take_fraction(1.0 / (len(sides) - done)))
         )
         pairs += [(_describe_component(own_sign, cells), cells) for cells in one_side.components]
         at_least += one_side.at_least
@@ -151,7 +156,7 @@ def _describe_component(sign: int, cells: CellComponent) -> Component:
     return Component(sign, volume, position, *cells.box, cells.apart)
 
 
-def _locate_start(region: Region, start: RowsLike, sides: Mapping[int, Constraint]) -> tuple[Array, int]:
+def _locate_start(region: Region, start: RowsLike, sides: Mapping[int, _Side]) -> tuple[Array, int]:
     """Check that the start is in the region; returns its position, and the sign of det A there."""
     machine = region.machine
     rows, lead = machine.rows(start, machine.axes, "start")
@@ -171,13 +176,13 @@ def _locate_start(region: Region, start: RowsLike, sides: Mapping[int, Constrain
     if containment.limit[0] >= 0:
         name = containment.names[int(containment.limit[0])]
         raise PoseError(f"start: it is outside the region, {name} is broken")
-    for sign, constraint in sides.items():
-        if prove_boxes(region, position[None], position[None], [constraint]).proved[0]:
+    for sign, side in sides.items():
+        if prove_boxes(region, position[None], position[None], side).proved[0]:
             return position, sign
     raise PoseError("start: it is on the region's boundary or at a parallel singularity")
 
 
-def _find_holder(region: Region, position: Array, sign: int, constraint: Constraint, pairs: list[_Pair]) -> int:
+def _find_holder(region: Region, position: Array, sign: int, side: _Side, pairs: list[_Pair]) -> int:
     """Find the component that contains a position, or that a box proved inside connects with it."""
     near: list[tuple[float, int, Array, Array]] = []
     for number, (component, cells) in enumerate(pairs):
@@ -190,7 +195,7 @@ def _find_holder(region: Region, position: Array, sign: int, constraint: Constra
     near.sort(key=lambda each: each[0])
     if near:
         bottom, top = (np.array([each[i] for each in near]) for i in (2, 3))
-        joined = prove_boxes(region, bottom, top, [constraint]).proved
+        joined = prove_boxes(region, bottom, top, side).proved
         if joined.any():
             return near[int(joined.argmax())][1]
     raise PoseError("start: it is too near to the boundary to tell its part; smaller cells would")

@@ -10,6 +10,7 @@ from ...arguments import RowsLike
 from ...arrays import Array
 from ...errors import PoseError
 from ...kernels.intervals import freeze_rows
+from ...kinematics.tall_matrices import compute_determinants
 from ...machine import Machine
 
 SAMPLES = 400  # of the workspace, if nothing else is said
@@ -83,5 +84,5 @@ def _measure_regularity(machine: Machine, poses: Array) -> Array:
     turning = np.arange(a.shape[2]) >= sum(axis in "XYZ" for axis in machine.axes)
     a[:, :legs] /= np.where(turning, max(machine.leg_sizes), 1.0)
     values = np.linalg.svd(a, compute_uv=False)[:, -1]
-    sides = np.sign(np.linalg.det(a))
+    sides = np.sign(compute_determinants(a))
     return np.asarray((values * sides * sides[-1])[:-1])

@@ -74,13 +74,17 @@ def find_homing(machine: Machine) -> HomingPlan:
 
     The orders are tried in turn: all legs together; those of one slot of the legs after those of the other; one leg
     after the other. Of directions that do no harm the one that lifts the tool most is taken. Where none is left, legs
-    that say nothing of their homing get absolute encoders, and legs that ask for a switch are refused.
+    that say nothing of their homing get absolute encoders, and legs that ask for a switch are refused. So it is with
+    more drives than freedoms, for no joint moves by itself.
 
     Raises :class:`InputError` for switches with which homing can do harm.
     """
     _refuse_far_switches(machine)
     starts = sample_starts(machine)
     looking = [i for i in range(machine.leg_count) if machine.drives[i].homing != ABSOLUTE]
+    if machine.is_redundant:
+        _refuse_switches(machine, looking)
+        looking = []
     choice = _choose_order(machine, starts, looking) if looking else None
     unsafe = _measure_harm(machine, starts, looking) if looking and choice is None else None
     if unsafe is not None and any(machine.drives[i].homing is not None for i in looking):
@@ -95,6 +99,16 @@ def find_homing(machine: Machine) -> HomingPlan:
     proved = not choice or (len(sequences) == 1 and prove_homing(machine, sequences[0], _choose_search_speeds(machine)))
     ambiguous = 0.0 if choice else _find_ambiguity(machine, starts)
     return HomingPlan(joints, len(starts.poses), least, proved, unsafe, ambiguous)
+
+
+def _refuse_switches(machine: Machine, looking: list[int]) -> None:
+    """Refuse legs that ask for a switch."""
+    for drive in (machine.drives[i] for i in looking):
+        if drive.homing is not None:
+            raise InputError(
+                f"homing: joint {drive.name} can't go to a switch by itself, there are {len(machine.drives)} drives "
+                f"for {len(machine.axes)} freedoms; expected an absolute encoder (homing: {ABSOLUTE})"
+            )
 
 
 def _refuse_far_switches(machine: Machine) -> None:

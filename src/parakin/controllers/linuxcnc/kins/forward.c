@@ -74,19 +74,47 @@ static double angle_sign(const double *x)
 #endif
 }
 
+/* What a step of Newton's method needs of the closures' slopes. */
+typedef struct {
+    double a[CLOSURES][MOTIONS];
+#if REDUNDANT
+    double r[MOTIONS][MOTIONS];
+#else
+    int order[CLOSURES];
+#endif
+} Factors;
+
+static inline double factor_slopes(Factors *by)
+{
+#if REDUNDANT
+    return orthogonalise(CLOSURES, MOTIONS, by->a, by->r);
+#else
+    return factor(CLOSURES, by->a, by->order);
+#endif
+}
+
+static inline double greatest(int n, const double *f)
+{
+    double worst = 0.0;
+    for (int i = 0; i < n; i++)
+        if (!(fabs(f[i]) <= worst))
+            worst = fabs(f[i]);
+    return worst;
+}
+
 /* The given pose's own side, by its sign. Its determinant with the given joints is at hand, which is its own for struts
    of any length; of other legs it tells the side where it changes little on the way to the answer. */
 static double side_of(const double *near, double det, int steady)
 {
 #if LEG_MODES
     if (!steady) {
-        double own[JOINTS], y[CLOSURES], f[CLOSURES], a[CLOSURES][CLOSURES];
-        int order[CLOSURES];
+        double own[JOINTS], y[MOTIONS], f[CLOSURES];
+        Factors by;
         inverse(near, own);
         if (finite_all(own, JOINTS)) {
             begin(near, own, y);
-            closures_and_slopes(y, own, f, a[0]);
-            det = factor(CLOSURES, a, order);
+            closures_and_slopes(y, own, f, by.a[0]);
+            det = factor_slopes(&by);
         }
     }
 #else
@@ -95,44 +123,58 @@ static double side_of(const double *near, double det, int steady)
     return fabs(det) > NO_SIDE ? det * angle_sign(near) : HOME_SIDE;
 }
 
-/* Newton's method on the legs' closures in bounded steps. The matrix serves on while it gains enough. */
+/* Newton's method on the legs' closures in bounded steps. The matrix serves on while it gains enough. With more drives
+   than freedoms it ends at the pose of least squares, where joints may disagree as far as following errors let them. */
 static int pose_near(const double *near, const double *q, double *x, double *side, int *tells)
 {
-    double y[CLOSURES], f[CLOSURES], a[CLOSURES][CLOSURES], det = 0.0, before = 0.0, first = 0.0;
-    int order[CLOSURES], anew = 1, last = 0, closed = 0;
+    double y[MOTIONS], f[CLOSURES], det = 0.0, before = 0.0, first = 0.0;
+    int anew = 1, last = 0, closed = 0;
+    Factors by;
+#if REDUNDANT
+    double change[MOTIONS], closable[CLOSURES];
+#else
+    double *change = f;
+#endif
     *tells = 0;
     begin(near, q, y);
     for (int step = 0;; step++) {
         if (anew) {
-            closures_and_slopes(y, q, f, a[0]);
-            det = factor(CLOSURES, a, order);
+            closures_and_slopes(y, q, f, by.a[0]);
+            det = factor_slopes(&by);
         } else {
             closures(y, q, f);
         }
-        double worst = 0.0, shrink = 1.0;
+        const double open = greatest(CLOSURES, f);
+        double worst = open, shrink = 1.0;
+#if REDUNDANT
+        memcpy(closable, f, sizeof f);
+        solve_least_squares(CLOSURES, MOTIONS, by.a, by.r, f, change);
         for (int i = 0; i < CLOSURES; i++)
-            if (!(fabs(f[i]) <= worst))
-                worst = fabs(f[i]);
+            closable[i] -= f[i];
+        worst = greatest(CLOSURES, closable);
+#endif
         if (!isfinite(worst))
             break;
         if (step == 0) {
             first = det;
-            *tells = worst <= TELLS;
+            *tells = open <= TELLS;
         }
         if (worst < FINE || (last && worst <= TOLERANCE) || step == MOST_STEPS) {
-            closed = worst <= TOLERANCE;
+            closed = worst <= TOLERANCE && open <= AGREEMENT;
             break;
         }
         const double ratio = anew ? worst / SIZE : worst / before; /* what the next step will leave of it */
         last = ratio * worst < FINE;
         anew = anew ? worst * worst > WORTH * SIZE : ratio > SLOW;
         before = worst;
-        substitute(CLOSURES, a, order, f);
-        for (int i = 0; i < CLOSURES; i++)
-            if (fabs(f[i]) * shrink > caps[i])
-                shrink = caps[i] / fabs(f[i]);
-        for (int i = 0; i < CLOSURES; i++)
-            y[i] -= shrink * f[i];
+#if !REDUNDANT
+        substitute(CLOSURES, by.a, by.order, f);
+#endif
+        for (int i = 0; i < MOTIONS; i++)
+            if (fabs(change[i]) * shrink > caps[i])
+                shrink = caps[i] / fabs(change[i]);
+        for (int i = 0; i < MOTIONS; i++)
+            y[i] -= shrink * change[i];
     }
     if (closed)
         end(y, q, x);
@@ -147,7 +189,7 @@ static int pose_near(const double *near, const double *q, double *x, double *sid
 static int same_legs(const double *p, const double *q)
 {
     for (int i = 0; i < CLOSURES; i++)
-        if (!(fabs(turning[i] ? within_half_a_turn(p[i] - q[i], 0.0) : p[i] - q[i]) <= SAME))
+        if (!(fabs(turning[i] ? within_half_a_turn(p[i] - q[i], 0.0) : p[i] - q[i]) <= same_mode[i]))
             return 0;
     return 1;
 }

@@ -39,7 +39,7 @@ int kinematicsJacobian(const double *joints, const EmcPose *world, double jac[EM
     if (!finite_all(x, AXES) || !finite_all(q, JOINTS))
         return -1;
     if (*pins->identity) {
-        for (int i = 0; i < JOINTS; i++)
+        for (int i = 0; i < AXES; i++)
             jac[i][axis_numbers[i]] = 1.0;
         return 0;
     }

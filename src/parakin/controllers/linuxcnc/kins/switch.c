@@ -95,6 +95,10 @@ int kinematicsSwitch(int type)
         obstacle = "not while anything moves or a program is paused";
     else if (type == 0)
         obstacle = find_obstacle();
+#if REDUNDANT
+    else
+        obstacle = "there are more drives than freedoms, so no joint moves by itself";
+#endif
     if (*obstacle) {
         rtapi_print_msg(RTAPI_MSG_ERR, MODULE ": the kinematics is not switched to type %d: %s\n", type, obstacle);
         return 0;

@@ -64,7 +64,10 @@ MISTAKES = [
     (
         "  kind: length\n",
         "",
-        ['m.yaml:7: legs: missing key "kind", expected one of column, crank, lambda, length, ring, slider'],
+        [
+            'm.yaml:7: legs: missing key "kind", expected one of column, crank, driven_column, lambda, length, '
+            "ring, slider"
+        ],
     ),
     ("tx ty rz", "tx ty rw", ['m.yaml:6: motion: unknown word "rw", expected one of tx, ty, tz, rx, ry, rz']),
     (
@@ -74,8 +77,11 @@ MISTAKES = [
     ),
     (
         "tx ty rz",
-        "tx ty",
-        ["m.yaml:7: legs: 1 joint (q1) for 2 words of motion (tx ty), expected at least as many joints as words"],
+        "tx ty tz rz",
+        [
+            "m.yaml:7: legs: 3 joints (q1, q2, q3) for 4 words of motion (tx ty tz rz), "
+            "expected at least as many joints as words"
+        ],
     ),
     ("[q1, q2, q3]", "[q1, q2, q1]", ['m.yaml:9: joint "q1" is used twice, first in line 9']),
     ("joint: turn", "joint: q2", ['m.yaml:14: joint "q2" is used twice, first in line 9']),

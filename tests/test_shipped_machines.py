@@ -31,7 +31,7 @@ def test_shipped(name):
 
 def test_shipped_names():
     assert sorted(list_shipped_machines()) == [
-        "cmw_300", "eclipse", "exechon", "five_bar", "five_bar_slides",
+        "cmw_300", "eclipse", "eclipse_overactuated", "exechon", "five_bar", "five_bar_slides",
         "four_struts", "g500", "george_v", "hbg80_2d", "hbg80_3d",
         "hexaglide",
         "hexam", "hexapod", "lambda6", "linapod3", "linapod6", "linear_delta", "mikromat_6x", "okuma_hexapod",

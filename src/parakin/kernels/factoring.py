@@ -49,10 +49,10 @@ class Factors(NamedTuple):
 
 def factor_matrix(lanes: Lanes, entries: Sequence[Lane], shape: MatrixShape) -> Factors:
     """Factor a matrix, given row by row."""
-    return (_eliminate if shape.is_square else _orthogonalise)(lanes, entries, shape)
+    return (_factor_square if shape.is_square else _factor_tall)(lanes, entries, shape)
 
 
-def _eliminate(lanes: Lanes, entries: Sequence[Lane], shape: MatrixShape) -> Factors:
+def _factor_square(lanes: Lanes, entries: Sequence[Lane], shape: MatrixShape) -> Factors:
     """Factor a square matrix by elimination, with exchanges of rows chosen lane by lane."""
     m = shape.columns
     a, exchanged, determinant = [list(entries[m * i : m * i + m]) for i in range(m)], [], lanes.constant(1.0)
@@ -80,7 +80,7 @@ def _dot(one: Sequence[Lane], other: Sequence[Lane]) -> Lane:
     return total
 
 
-def _orthogonalise(lanes: Lanes, entries: Sequence[Lane], shape: MatrixShape) -> Factors:
+def _factor_tall(lanes: Lanes, entries: Sequence[Lane], shape: MatrixShape) -> Factors:
     """Factor a tall matrix by the modified Gram-Schmidt method."""
     columns = [list(entries[k :: shape.columns]) for k in range(shape.columns)]
     triangle: list[Lane] = []
@@ -105,11 +105,11 @@ def solve_factored(
     Returns the solution, and the part of the right side that it meets: all of it where the matrix is square.
     """
     if shape.is_square:
-        return _substitute(lanes, factors, right), list(right)
-    return _solve_least_squares(factors.matrix, right, shape)
+        return _solve_square(lanes, factors, right), list(right)
+    return _solve_tall(factors.matrix, right, shape)
 
 
-def _substitute(lanes: Lanes, factors: Factors, right: Sequence[Lane]) -> list[Lane]:
+def _solve_square(lanes: Lanes, factors: Factors, right: Sequence[Lane]) -> list[Lane]:
     """Solve the linear system whose square matrix is factored."""
     f, m, exchanges = list(right), len(right), iter(factors.exchanged)
     for k in range(m):
@@ -125,9 +125,7 @@ def _substitute(lanes: Lanes, factors: Factors, right: Sequence[Lane]) -> list[L
     return f
 
 
-def _solve_least_squares(
-    matrix: Sequence[Lane], right: Sequence[Lane], shape: MatrixShape
-) -> tuple[list[Lane], list[Lane]]:
+def _solve_tall(matrix: Sequence[Lane], right: Sequence[Lane], shape: MatrixShape) -> tuple[list[Lane], list[Lane]]:
     """Solve a tall system in the least squares; returns the solution, and the right side's part in the columns."""
     rest, shares = list(right), list[Lane]()
     for k in range(shape.columns):

@@ -11,7 +11,8 @@ __all__ = ["KINDS", "Inverse", "Leg", "Link", "Reach"]
 def _collect_kinds() -> dict[str, type[Leg]]:
     for module in iter_modules(__path__):
         import_module(f"{__name__}.{module.name}")
-    return {cls.kind: cls for cls in _list_subclasses(Leg)}  # type: ignore[type-abstract]
+    kinds = _list_subclasses(Leg)  # type: ignore[type-abstract]
+    return {cls.kind: cls for cls in sorted(kinds, key=lambda cls: cls.kind)}
 
 
 def _list_subclasses(base: type[Leg]) -> list[type[Leg]]:

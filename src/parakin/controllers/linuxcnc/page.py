@@ -79,12 +79,7 @@ without it take the line with `{name}_screen.hal` out of `{name}.hal`.
 {pole}- A tool length offset (G43) counts along the tool: what the tool is longer than the machine's own. As it is
   switched on or off the joints stay and the position follows, of a tilted tool X and Y too. A program's next motion
   that takes a coordinate from before is refused: name X Y Z in it, or put `M66 E0 L0` behind G43.
-- M429 has every axis move the joint of its number (X the first joint), by MDI, programs and jogs, so that a machine
-  which stands at a singularity or a limit can be driven out joint by joint; give places with G53. M428 goes back to
-  the machine's kinematics. It is refused while the joints are beyond a singularity or a limit, and, until the machine
-  is homed again, once they have been so near to a singularity that they don't tell the pose. The window shows the true
-  pose meanwhile, and the guard stops jogs.
-- Speeds and accelerations that the description does not say were chosen, and are marked so in the ini file.
+{by_joints}- Speeds and accelerations that the description does not say were chosen, and are marked so in the ini file.
 
 The kinematics is compiled against LinuxCNC's headers and loaded into its programs, which are under the GNU General
 Public License; therefore `{kinematics}.c` is, too.
@@ -94,6 +89,20 @@ _POLE = """\
 - Where the tool lies along the wrist's first axis, that axis is free and stays where it is. From there a tilt in
   another direction makes it turn at once, which is refused; so home lies aside. Begin a program with the tool tilted
   the way it goes on.
+"""
+
+_JOINTS = """\
+- M429 has every axis move the joint of its number (X the first joint), by MDI, programs and jogs, so that a machine
+  which stands at a singularity or a limit can be driven out joint by joint; give places with G53. M428 goes back to
+  the machine's kinematics. It is refused while the joints are beyond a singularity or a limit, and, until the machine
+  is homed again, once they have been so near to a singularity that they don't tell the pose. The window shows the true
+  pose meanwhile, and the guard stops jogs.
+"""
+
+_REDUNDANT_JOINTS = """\
+- There are more drives than freedoms, so no joint may move by itself: the encoders are absolute, M429 is refused. Do
+  not jog single joints. Drives that are a following error apart pull at each other; the position shown is that of
+  least squares, and none is where they disagree by more than 1 mm.
 """
 
 _DIRECTION = "the tool's axis is Rz(C)·Ry(B)·z, from the tip into the holder"
@@ -123,6 +132,7 @@ def write_page(machine: Machine, equipment: Equipment | None = None) -> str:
         equipment=describe_equipment(machine, equipment) if equipment else "",
         frame=_DIRECTION if machine.has_direction else _ORIENTATION if len(machine.axes) == 6 else _PLACE,
         pole=_POLE if machine.wrist is not None else "",
+        by_joints=_REDUNDANT_JOINTS if machine.is_redundant else _JOINTS,
         least=format_number(100.0 * LEAST_REGULARITY),
         limits="\n".join(f"  - {i}: {escape(name, quote=False)}" for i, name in enumerate(list_limit_names(machine))),
     )

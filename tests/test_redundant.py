@@ -133,7 +133,7 @@ def test_the_pose_is_that_of_the_machines_without_the_other_drives(name, machine
     joints = m.inverse(poses)
     for start in (None, poses + 1e-2):
         found = m.forward(joints, near=start)
-        assert found.converged.mean() > (0.98 if start is None else 0.999)
+        assert found.converged.mean() > (0.97 if start is None else 0.999)
         done = found.converged
         assert np.abs(found.poses - poses)[done].max() < 1e-9
         assert found.residual[done].max() < 1e-9
@@ -175,7 +175,7 @@ def test_the_pose_of_least_squares_is_another_methods(machines):
     found = m.forward(joints, near=poses, agreement=5.0)
     for pose, own in zip(found.poses, joints, strict=True):
         best = least_squares(close, pose + 0.01, args=(own,), xtol=1e-15, ftol=1e-15, gtol=1e-15).x
-        assert np.abs(best - pose).max() < 1e-3
+        assert np.abs(best - pose).max() < 3e-5
 
 
 @every

@@ -185,16 +185,15 @@ class Machine(MachineProperties):
         mode : working mode that the legs stand in, head and table may stand in either of theirs; by default the
             machine's, but where a near pose tells by its own joints that the legs stand in another one, which
             ``in_other_mode`` of the solution says
-        agreement : by how much legs may fail to close, mm, where joints of more drives than freedoms disagree, as
-            measured and rounded ones do; the pose is then that of least squares
+        agreement : by how much legs may fail to close, mm, where joints of more drives than freedoms disagree
         """
         rows, lead = self.rows(joints, self.joints, "joints")
         if not isinstance(method, str | None):
             raise PoseError(f"method: a text expected, not {describe_value(method)}")
         check_range("agreement", agreement, 0.0, np.inf, "mm")
         starts = None if near is None else self._starts(near, lead)
-        own_mode = None if mode is None else self.checked_mode(mode)
-        solution = solve_forward(self.model, rows, starts, method, own_mode, float(agreement))
+        own = None if mode is None else self.checked_mode(mode)
+        solution = solve_forward(self.model, rows, starts, method, own, float(agreement))
         return Solution(
             solution.poses.reshape(*lead, len(self.axes)),
             solution.residual.reshape(lead)[()],
@@ -294,9 +293,8 @@ class Machine(MachineProperties):
         """Compute A (..., m, n) and B (..., m, m), with A x' = B q' for the rates of pose and joints.
 
         Rows of legs are their closures' derivatives (a rod's vector, mm); the last two rows of a machine with driven
-        head or table say that the tool's axis turns with the pose's. det A = 0 at a parallel singularity (or where the
-        pose's angles are: B = 0), det B = 0 at a serial one. With more drives than axes a parallel singularity is where
-        the rank of A falls. NaN where the pose is out of reach.
+        head or table say that the tool's axis turns with the pose's. det A = 0 (of more drives than axes: its rank falls)
+        at a parallel singularity or where the pose's angles are, B = 0; det B = 0 at a serial one. NaN out of reach.
         """
         rows, lead = self.rows(poses, self.axes, "poses")
         n, m = len(self.axes), len(self.joints)

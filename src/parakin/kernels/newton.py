@@ -170,6 +170,8 @@ def find_root(
         worst, residual = (_measure_greatest(lanes, each) for each in (closable, closures))
         steps = lanes.select(state.done, state.steps, state.number)
         renews, last, done = _choose_next_matrix(state, worst, limits)
+        if not shape.is_square:  # what is left is at right angles to the columns of its own place
+            renews = renews | last
         moved = _take_step(lanes, state, change, done | (worst < FINE), limits.caps)
         after = NewtonState(moved, factors, first, worst, residual, renews, last, done, steps, state.number + 1.0)
         return after.flatten(), ~done & (state.number < limits.most)

@@ -278,20 +278,19 @@ def _continue_from_starts(
     walk, begin, goal = np.ascontiguousarray(walk[rows]), begin[rows], joints[rows]
     side = find_sides(model, walk, mode)
     gone, stride = np.zeros(len(rows)), np.full(len(rows), FIRST_STRIDE)
+    most = MOST_STEPS if model.is_redundant else NEAR_STEPS  # least squares that leave something are come to slowly
     for _ in range(MOST_STRIDES):
         going = np.flatnonzero((gone < 1.0) & (stride >= LEAST_STRIDE))
         if not len(going):
             break
         share = np.minimum(1.0, gone[going] + stride[going])
         given = begin[going] + share[:, None] * (goal[going] - begin[going])
-        step = find_roots(model, walk[going], given, most=NEAR_STEPS, side=side[going])
+        step = find_roots(model, walk[going], given, most=most, side=side[going])
         reason = _judge(model, step, given, mode)
         roots.steps[rows[going]] += step.steps
         fine = np.asarray(reason == ANSWERED)
         if model.is_redundant:
-            found = _find_least_squares(step, NEAR_STEPS)
-            fine |= (share < 1.0) & found
-            stride[going[(share >= 1.0) & found & ~fine]] = 0.0  # where they disagree, so will they after smaller steps
+            fine |= (share < 1.0) & _find_least_squares(step, most)
         kept = going[fine]
         walk[kept], gone[kept] = step.rows[fine], share[fine]
         stride[kept] *= 2.0

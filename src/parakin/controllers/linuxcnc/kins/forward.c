@@ -166,6 +166,9 @@ static int pose_near(const double *near, const double *q, double *x, double *sid
         const double ratio = anew ? worst / SIZE : worst / before; /* what the next step will leave of it */
         last = ratio * worst < FINE;
         anew = anew ? worst * worst > WORTH * SIZE : ratio > SLOW;
+#if REDUNDANT
+        anew |= last; /* what joints that disagree leave is at right angles to the columns of its own place */
+#endif
         before = worst;
 #if !REDUNDANT
         substitute(CLOSURES, by.a, by.order, f);

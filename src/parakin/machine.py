@@ -293,8 +293,8 @@ class Machine(MachineProperties):
         """Compute A (..., m, n) and B (..., m, m), with A x' = B q' for the rates of pose and joints.
 
         Rows of legs are their closures' derivatives (a rod's vector, mm); the last two rows of a machine with driven
-        head or table say that the tool's axis turns with the pose's. det A = 0 (of more drives than axes: its rank falls)
-        at a parallel singularity or where the pose's angles are, B = 0; det B = 0 at a serial one. NaN out of reach.
+        head or table say that the tool's axis turns with the pose's. det A = 0 (of more drives: its rank falls) at a
+        parallel singularity or where the pose's angles are, B = 0; det B = 0 at a serial one. NaN out of reach.
         """
         rows, lead = self.rows(poses, self.axes, "poses")
         n, m = len(self.axes), len(self.joints)

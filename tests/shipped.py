@@ -23,7 +23,7 @@ REPRESENTATIVES = [
     "orthoglide5_head",
     "orthoglide5_table",
     "tricept",
-    "eclipse_overactuated",
+    "eclipse",
     "rrr3",
     "sprint_z3",
     "exechon",

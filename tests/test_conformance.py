@@ -71,14 +71,17 @@ def signed(m, a, b):
     return np.where(turning, (a - b + np.pi) % (2.0 * np.pi) - np.pi, a - b)
 
 
+REDUNDANT = {"driven_column"}  # test_redundant.py has machines of its own
+
+
 def test_every_machine_has_a_second_inverse_and_every_leg_kind_is_drawn():
     assert sorted(INVERSES) == NAMES
-    assert {kind for _, kinds in FAMILIES.values() for kind in kinds} == set(KINDS)
+    assert {kind for _, kinds in FAMILIES.values() for kind in kinds} == set(KINDS) - REDUNDANT
 
 
 def test_what_machines_have_is_represented():
     of = {name: list_features(load_shipped(name)) for name in NAMES}
-    assert set().union(*of.values()) == set().union(*(of[name] for name in REPRESENTATIVES))
+    assert set().union(*of.values()) - REDUNDANT == set().union(*(of[name] for name in REPRESENTATIVES))
 
 
 @everyone

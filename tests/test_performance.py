@@ -19,9 +19,9 @@ everyone = pytest.mark.parametrize("m", [load_shipped(name) for name in NAMES], 
 def twist_jacobians(machine, poses, mode=None):
     """A and B of the twist at poses (..., axes)."""
     poses = np.asarray(poses, float)
-    rows, n = poses.reshape(-1, poses.shape[-1]), len(machine.axes)
+    rows, n, m = poses.reshape(-1, poses.shape[-1]), len(machine.axes), len(machine.joints)
     a, b, _ = machine.twist_rates(rows, machine.inverse(rows, mode))
-    return a.reshape(*poses.shape[:-1], n, n), b.reshape(*poses.shape[:-1], n, n)
+    return a.reshape(*poses.shape[:-1], m, n), b.reshape(*poses.shape[:-1], m, m)
 
 
 def allowed_poses(m, count, seed=0):

@@ -289,6 +289,7 @@ def test_what_drives_decide_together_is_refused(machines):
     for refused in (
         lambda: pk.analyse_accuracy(m, {"encoders": "2 um"}),
         lambda: pk.plan_measurements(m, 40),
+        lambda: pk.DesignProblem(m, {"legs.d1.foot.x": (400.0, 600.0)}, {"X": (-10.0, 10.0)}),
         lambda: analyse_stiffness(m, "100 N/um", poses=m.home[None]).sag(),
         lambda: analyse_stiffness(m, "100 N/um", poses=m.home[None]).load(),
     ):

@@ -12,6 +12,7 @@ import parakin as pk
 from parakin.controllers.linuxcnc.homing.homing_plan import find_homing
 from parakin.dynamics.inverse_dynamics import Dynamics, Motion
 from parakin.errors import InputError, NoMethodError, SingularHomeWarning
+from parakin.export.machine.scene import build_scene
 from parakin.machine import Machine
 from parakin.performance.certified.proofs import bracket_extremes, make_pose_box, prove_no_singularity
 from parakin.performance.indices import compute_performance
@@ -295,6 +296,11 @@ def test_what_drives_decide_together_is_refused(machines):
     ):
         with pytest.raises(NoMethodError, match="7 drives for 6 freedoms, which work against each other"):
             refused()
+
+
+def test_every_drive_has_a_label(machines):
+    for m in machines.values():
+        assert sorted(", ".join(name for name, _ in build_scene(m).labels).split(", ")) == sorted(m.joints)
 
 
 def test_no_joint_is_homed_by_itself(machines, tmp_path):

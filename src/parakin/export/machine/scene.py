@@ -232,8 +232,10 @@ class _SceneBuilder:
                 anchors.append(strut)
         for strut, names in moved.items():
             self.labels.append((", ".join(names), at.to_machine(struts[strut][0])[0]))
-        if not moved:
-            self.labels.append((leg.drives[0].name, at.to_machine(struts[0].mean(axis=0))[0]))
+        of_feet = [name for names in moved.values() for name in names]
+        of_strut = [drive.name for drive in leg.drives if drive.name not in of_feet]
+        if of_strut:
+            self.labels.append((", ".join(of_strut), at.to_machine(struts[0].mean(axis=0))[0]))
         return anchors
 
     def _add_platform(self) -> None:

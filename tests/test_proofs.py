@@ -6,7 +6,6 @@ from shipped import load_shipped
 from test_performance import everyone, twist_jacobians
 
 import parakin as pk
-from parakin.performance.certified.interval_matrices import MatrixBounds
 from parakin.performance.certified.proofs import (
     bracket_extremes,
     make_pose_box,
@@ -15,6 +14,7 @@ from parakin.performance.certified.proofs import (
 )
 from parakin.performance.indices import compute_performance
 from parakin.performance.singularities import compute_singularity_margins
+from parakin.workspaces.certified.matrix_bounds import MatrixBounds
 
 
 def cube(m, low, high):

@@ -13,9 +13,11 @@ from .legs import Inverse, Leg
 from .limits import (
     HomeRods,
     Limit,
+    SignForms,
     compute_platform_points,
     group_joints_by_leg,
     list_limits,
+    list_sign_forms,
     list_strut_distances,
 )
 from .nominal_values import find_nominal_value
@@ -233,9 +235,19 @@ class Equations:
     def _margins(
         self, placed: PlatformPlacement, joints: Sequence[Scalar], legs: Sequence[Inverse]
     ) -> list[tuple[Limit, Scalar]]:
-        home = self.rods_at_home if any(cone.axis is None for cone in self.spec.limits.cones) else None
+        home = self._cone_rods
         coordinates = self.structure.list_motion(placed)
         return list_limits(self.spec, placed, coordinates, joints, [leg.reach for leg in legs], home)
+
+    @property
+    def _cone_rods(self) -> HomeRods | None:
+        """The rods at home, if cones need them."""
+        return self.rods_at_home if any(cone.axis is None for cone in self.spec.limits.cones) else None
+
+    def list_sign_forms(self, pose: Sequence[Scalar], mode: str) -> SignForms:
+        """List what tells the signs of limits' margins at a pose; see :class:`~.limits.SignForms`."""
+        joints, placed, _ = self.invert(pose, mode)
+        return list_sign_forms(self.spec, placed, joints, self._cone_rods)
 
     @cached_property
     def limits(self) -> tuple[Limit, ...]:

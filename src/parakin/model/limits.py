@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations
-from math import inf
+from math import cos, inf, pi
 from typing import Literal, NamedTuple
 
 from ..algebra import (
@@ -26,6 +26,7 @@ from ..algebra import (
     scale,
     stop_gradient,
     sub,
+    transpose,
 )
 from .elements import MOTION_UNITS, Cone
 from .legs import Reach
@@ -163,6 +164,14 @@ def _find_cone_axis(cone: Cone, number: int, home: HomeRods | None) -> Vec:
 def _list_cones(
     spec: Spec, placement: PlatformPlacement, joints: Sequence[Scalar], home: HomeRods | None
 ) -> Iterator[tuple[Limit, Scalar]]:
+    for limit, axis, rod in _list_tilted_rods(spec, placement, joints, home):
+        yield limit, limit.bound - atan2(norm(cross(axis, rod)), dot(axis, rod))
+
+
+def _list_tilted_rods(
+    spec: Spec, placement: PlatformPlacement, joints: Sequence[Scalar], home: HomeRods | None
+) -> Iterator[tuple[Limit, Vec, Vec]]:
+    """List the limits of cones, each with the cone's unit axis and the rod."""
     if not spec.limits.cones:
         return
     rods = [struts[0] for struts in _compute_rods(spec, placement, joints)]
@@ -171,11 +180,45 @@ def _list_cones(
             axis = _find_cone_axis(cone, number, home)
             if cone.at == "platform":
                 axis = apply(placement.rotation, axis)
-            rod = sub(point, foot)
-            angle = atan2(norm(cross(axis, rod)), dot(axis, rod))
             name = leg.drives[0].name
             limit = Limit(f"{name}.{cone.at}", f"{cone.at} joint of {name}", "rad", "max", cone.angle)
-            yield limit, cone.angle - angle
+            yield limit, axis, sub(point, foot)
+
+
+SegmentPair = tuple[tuple[Vec, Vec], tuple[Vec, Vec]]
+
+
+class SignForms(NamedTuple):
+    """What tells the signs of margins that intervals bound badly, by the limits' names.
+
+    cones : what is ≥ 0 where the margin is, without the corner at the cone's axis
+    struts : both ends of two struts that must be clear, in the base frame and in the platform's
+    """
+
+    cones: dict[str, Scalar]
+    struts: dict[str, list[SegmentPair]]
+
+
+def list_sign_forms(
+    spec: Spec, placement: PlatformPlacement, joints: Sequence[Scalar], home: HomeRods | None
+) -> SignForms:
+    """List the forms of cones narrower than half a turn and of clearances."""
+    tilted = _list_tilted_rods(spec, placement, joints, home)
+    cones = {
+        limit.name: dot(axis, rod) - cos(limit.bound) * norm(rod) for limit, axis, rod in tilted if limit.bound < pi
+    }
+    back = transpose(placement.rotation)
+
+    def turn_back(strut: _Strut) -> tuple[Vec, Vec]:
+        """Place a strut in the platform's frame, where a joint of the platform stands still."""
+        near, far = (apply(back, sub(end, placement.origin)) for end in strut.ends)
+        return near if strut.platform is None else strut.platform, far
+
+    pairs = _list_strut_pairs(spec, placement, joints) if spec.limits.clearance is not None else ()
+    struts = {
+        f"clearance {names}": [(one.ends, two.ends), (turn_back(one), turn_back(two))] for names, one, two in pairs
+    }
+    return SignForms(cones, struts)
 
 
 def _list_clearances(
@@ -192,9 +235,16 @@ def list_strut_distances(
     spec: Spec, placement: PlatformPlacement, joints: Sequence[Scalar]
 ) -> Iterator[tuple[str, Scalar]]:
     """List the distances of the axes of all pairs of struts that share no joint, with their names."""
+    for names, one, two in _list_strut_pairs(spec, placement, joints):
+        yield names, compute_segment_distance(one.ends, two.ends)
+
+
+def _list_strut_pairs(
+    spec: Spec, placement: PlatformPlacement, joints: Sequence[Scalar]
+) -> Iterator[tuple[str, _Strut, _Strut]]:
     for one, two in combinations(_list_struts(spec, placement, joints), 2):
         if not _share_joint(one, two):
-            yield f"{one.name}-{two.name}", compute_segment_distance(one.ends, two.ends)
+            yield f"{one.name}-{two.name}", one, two
 
 
 class _Strut(NamedTuple):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from math import isfinite, pi
@@ -100,9 +100,8 @@ class PoseSet:
 class _TracedSet(TracedPose):
     pose_set: PoseSet
 
-    @cached_property
-    def pose(self) -> list[Scalar]:
-        return self.pose_set.place(dict(zip((*self.free_axes, *self.swept_axes), self.inputs, strict=True)))
+    def place(self, inputs: Sequence[Scalar]) -> list[Scalar]:
+        return self.pose_set.place(dict(zip((*self.free_axes, *self.swept_axes), inputs, strict=True)))
 
 
 @dataclass(frozen=True, eq=False)

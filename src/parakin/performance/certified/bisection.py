@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from math import inf
 
 import numpy as np
 
 from ...arrays import Array, Flags, Indices
 from ...budget import Budget
-from ...kinematics.tall_matrices import compute_determinants
-from .interval_matrices import LinearMatrices, MatrixBounds
+from ...workspaces.certified.matrix_bounds import MatrixBounds, prove_regular
 
 AT_ONCE = 512  # boxes
 _FINEST = 1e-13  # smallest box as a fraction of the first: below this no digits are left
@@ -69,69 +67,13 @@ def decide_nonnegative(bounds: MatrixBounds, first: Array) -> Callable[[Array, A
 
 
 def decide_regular(bounds: MatrixBounds, first: Array) -> Callable[[Array, Array], Decided]:
-    """Make the function that decides, for boxes (N, d), that all matrices in it are regular, tall ones of full rank.
-
-    They are if 1 - Y·A has a spectral radius below 1 for all A there, with Y about the inverse of the middle one.
-    """
+    """Make the function that decides, for boxes (N, d), that all matrices in it are regular, tall ones of full rank."""
 
     def decide(low: Array, high: Array) -> Decided:
-        matrices = bounds(low, high)
-        decided, axis = np.zeros(len(low), np.bool_), find_widest_inputs(low, high, first)
-        inverse, good = invert_middles(matrices)
-        scaled = matrices.take(good).multiply_left(inverse)
-        off = bound_inverse_error(scaled, matrices.take(good), inverse)
-        decided[good] = _bound_spectral_radius(off + scaled.linear_change + scaled.rest) < 1.0 - _ROUNDING
+        regular = prove_regular(bounds(low, high))
+        decided, axis = regular.sign != 0.0, find_widest_inputs(low, high, first)
         if len(first):
-            axis[good] = scaled.widest
+            axis[regular.inverted] = regular.spread[regular.inverted].argmax(1)
         return decided, axis
 
     return decide
-
-
-def invert_middles(matrices: LinearMatrices, dividend: LinearMatrices | None = None) -> tuple[Array, Flags]:
-    """Invert the bounded, regular middles; returns the inverses, and which these are.
-
-    Of a tall middle M the inverse Y is one from the left, Y·M = 1: the pseudo-inverse, or with a square ``dividend`` N
-    that for which Y·N is the pseudo-inverse of N⁻¹M.
-    """
-    good = matrices.bounded
-    if dividend is not None and _is_tall(matrices):
-        good = good & dividend.bounded
-        good[good] = compute_determinants(dividend.middle[good]) != 0.0
-    with np.errstate(all="ignore"):
-        size = np.abs(compute_determinants(np.where(good[:, None, None], matrices.middle, 0.0)))
-    good = good & (size > 0.0) & np.isfinite(size)
-    middle = matrices.middle[good]
-    if not _is_tall(matrices):
-        inverse = np.linalg.inv(middle)
-    elif dividend is None:
-        inverse = np.linalg.pinv(middle)
-    else:
-        back = np.linalg.inv(dividend.middle[good])
-        inverse = np.linalg.pinv(back @ middle) @ back
-    fine = np.isfinite(inverse).all((1, 2))
-    good[np.flatnonzero(good)[~fine]] = False
-    return inverse[fine], good
-
-
-def _is_tall(matrices: LinearMatrices) -> bool:
-    """Tell whether there are more rows than columns."""
-    return bool(matrices.middle.shape[1] > matrices.middle.shape[2])
-
-
-def bound_inverse_error(product: LinearMatrices, given: LinearMatrices, inverse: Array) -> Array:
-    """Bound the error of the computed inverse, entry by entry: how far middle × inverse may be from the identity."""
-    n = product.middle.shape[1]
-    return np.asarray(np.abs(product.middle - np.eye(n)) + _ROUNDING * (np.abs(inverse) @ np.abs(given.middle)))
-
-
-def _bound_spectral_radius(matrices: Array) -> Array:
-    """Bound the spectral radius of matrices (N, n, n) without negative entries, by Collatz and Wielandt."""
-    best = np.full(len(matrices), inf)
-    vector = np.ones(matrices.shape[:2])
-    for _ in range(3):
-        image = np.einsum("nij,nj->ni", matrices, vector) + 1e-300
-        with np.errstate(over="ignore"):
-            best = np.minimum(best, (image / vector).max(1))
-        vector = image / image.max(1, keepdims=True) + 1e-6
-    return best

@@ -1,4 +1,4 @@
-"""Interval matrices: A and B of a machine as terms over a box of poses, and linear bounds of matrices of terms."""
+"""Boxes of poses: A and B of a machine as terms over them, to be bounded."""
 
 from __future__ import annotations
 
@@ -8,16 +8,15 @@ from functools import cached_property
 
 import numpy as np
 
-from ...algebra import Scalar, Term, Trace, derivative
-from ...arrays import Array, Flags, Indices
-from ...kernels.intervals import IntervalProgram, JumpFreeTrace
+from ...algebra import Scalar, Term, Trace
+from ...arrays import Array
+from ...kernels.intervals import JumpFreeTrace
 from ...machine import Machine
 from ...model.rates import TwistRates
+from ...workspaces.certified.matrix_bounds import Matrix
 from ..characteristic_length import CharacteristicLength
 from ..jacobians import list_column_scales, list_constraint_scales
 from ..singularities import has_serial_turns
-
-Matrix = Sequence[Sequence[Scalar]]
 
 _SAMPLES = {0: 1, 1: 65, 2: 17, 3: 9, 4: 5}  # along each input of a box; 3 of more than these
 
@@ -126,83 +125,3 @@ class PoseBox:
 
 def _put_on_diagonal(blocks: Sequence[Scalar]) -> Matrix:
     return [[block if i == j else 0.0 for j in range(len(blocks))] for i, block in enumerate(blocks)]
-
-
-@dataclass(frozen=True, eq=False)
-class LinearMatrices:
-    """Matrices over N boxes: ``middle`` + Σ (``slopes`` ± ``spread``)·δ ± ``own``, entry by entry, for |δ| ≤ ``half``.
-
-    middle, own (N, n, m); slopes, spread (N, d, n, m); half (N, d). An entry without bounds is infinite or NaN.
-    """
-
-    middle: Array
-    own: Array
-    slopes: Array
-    spread: Array
-    half: Array
-
-    def take(self, which: Flags) -> LinearMatrices:
-        """Keep some of the boxes."""
-        columns = (self.middle, self.own, self.slopes, self.spread, self.half)
-        return LinearMatrices(*(column[which] for column in columns))
-
-    @cached_property
-    def bounded(self) -> Flags:
-        """(N,) where everything is finite."""
-        ends = np.isfinite(self.middle).all((1, 2)) & np.isfinite(self.own).all((1, 2))
-        return np.asarray(ends & np.isfinite(self.slopes).all((1, 2, 3)) & np.isfinite(self.spread).all((1, 2, 3)))
-
-    def multiply_left(self, left: Array) -> LinearMatrices:
-        """Multiply by matrices (N, k, n) from the left."""
-        size = np.abs(left)
-        spread = size[:, None] @ self.spread
-        return LinearMatrices(left @ self.middle, size @ self.own, left[:, None] @ self.slopes, spread, self.half)
-
-    @cached_property
-    def linear_change(self) -> Array:
-        """By how much the linear part changes at most, (N, n, m)."""
-        return np.asarray(np.einsum("nd,ndij->nij", self.half, np.abs(self.slopes)))
-
-    @cached_property
-    def rest(self) -> Array:
-        """How far the matrices are from the linear part at most, (N, n, m)."""
-        return np.asarray(self.own + np.einsum("nd,ndij->nij", self.half, self.spread))
-
-    @property
-    def widest(self) -> Indices:
-        """The input that changes the matrix most, (N,)."""
-        sizes = (np.sqrt(np.square(changes).sum((2, 3))) for changes in (self.slopes, self.spread))
-        return np.asarray((self.half * sum(sizes)).argmax(1))
-
-
-@dataclass(frozen=True, eq=False)
-class MatrixBounds:
-    """A matrix of terms, to be bounded over boxes of their inputs by the mean value theorem."""
-
-    matrix: Matrix
-    inputs: Sequence[Term]
-    trace: Trace
-
-    @cached_property
-    def _programs(self) -> tuple[IntervalProgram, IntervalProgram]:
-        entries = [x for row in self.matrix for x in row]
-        slopes = [derivative(x, term) for term in self.inputs for x in entries]
-        return IntervalProgram(self.trace, entries), IntervalProgram(self.trace, slopes)
-
-    def __call__(self, low: Array, high: Array) -> LinearMatrices:
-        """Bound it over boxes [low, high], (N, d)."""
-        count, d = low.shape
-        shape = len(self.matrix), len(self.matrix[0])
-        at, over = self._programs
-        middle = 0.5 * (low + high)
-        half = np.maximum(middle - low, high - middle)
-        entries = _compute_middles(*(end.reshape(count, *shape) for end in at(middle, middle)))
-        slopes = _compute_middles(*(end.reshape(count, d, *shape) for end in over(low, high)))
-        return LinearMatrices(*entries, *slopes, half)
-
-
-def _compute_middles(down: Array, up: Array) -> tuple[Array, Array]:
-    """Compute middles and radii of intervals, radii rounded up."""
-    with np.errstate(invalid="ignore", over="ignore"):
-        middle = 0.5 * down + 0.5 * up
-        return middle, np.maximum(up - middle, middle - down) * (1.0 + 1e-15)

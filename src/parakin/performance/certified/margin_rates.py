@@ -12,9 +12,10 @@ from ...algebra import Scalar, Term, Trace, derivative
 from ...arrays import Array, Flags
 from ...kernels.intervals import IntervalProgram, JumpFreeTrace
 from ...machine import Machine
+from ...workspaces.certified.matrix_bounds import LinearMatrices, MatrixBounds
 from ..characteristic_length import choose_characteristic_length
 from .bisection import Decided, decide_regular
-from .interval_matrices import LinearMatrices, MatrixBounds, PoseBox
+from .interval_matrices import PoseBox
 
 _MOST = 1e300  # stands for no bound, so that times zero it is zero
 

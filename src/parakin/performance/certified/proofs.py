@@ -17,13 +17,14 @@ import numpy as np
 from ...arrays import Array, AxisRange, Progress
 from ...budget import SECONDS, Budget
 from ...errors import PoseError
+from ...workspaces.certified.matrix_bounds import MatrixBounds
 from ...workspaces.certified.region import Region
 from ..characteristic_length import choose_characteristic_length
 from ..extremes import SIDES
 from .amplification import Bracket, bracket_amplification
 from .bisection import decide_nonnegative, decide_regular, find_undecided_box
 from .counterexamples import SingularityKind, find_singular_pose
-from .interval_matrices import MatrixBounds, PoseBox
+from .interval_matrices import PoseBox
 from .quotient_norms import UNBOUNDED
 
 Verdict = Literal["proved", "refuted", "undecided"]

@@ -17,9 +17,16 @@ import numpy as np
 from ...arrays import Array, Indices, Progress
 from ...budget import Budget
 from ...kernels.small_matrices import compute_singular_values, solve_quotients
+from ...workspaces.certified.matrix_bounds import (
+    LinearMatrices,
+    Matrix,
+    MatrixBounds,
+    bound_inverse_error,
+    invert_middles,
+)
 from ..search import pick_best_of_blocks, search_maxima_in_box
-from .bisection import AT_ONCE, bisect_inputs, bound_inverse_error, find_widest_inputs, invert_middles
-from .interval_matrices import LinearMatrices, Matrix, MatrixBounds, PoseBox
+from .bisection import AT_ONCE, bisect_inputs, find_widest_inputs
+from .interval_matrices import PoseBox
 
 Norm = Literal["spectral", "frobenius"]
 

@@ -9,6 +9,7 @@ import numpy as np
 from ...algebra import Scalar
 from ...model.rates import expand_determinant
 from .constraints import Constraint, TracedPose
+from .sign_proofs import SignProof, make_side_proof
 
 PARALLEL_SINGULARITY = "parallel singularity"
 ZERO = 1e-12  # determinants up to this fraction of the product of the rows' sizes at home have no sign
@@ -20,11 +21,17 @@ def make_side_constraints(traced: TracedPose) -> tuple[Constraint, Constraint]:
     A is of the tool's twist, so that free angles of the pose do not count. Of five axes it is the legs' rows against
     the translations, for head and table have no parallel singularity.
     """
-    d = len(traced.free_axes)
-    margin = expand_determinant(_trace_leg_rows(traced, traced.pose)) / _scale_at_home(traced)
+    d, scale = len(traced.free_axes), _scale_at_home(traced)
+    margin = expand_determinant(_trace_leg_rows(traced, traced.pose)) / scale
     x, orientation = traced.inputs[:d], traced.inputs[d:]
-    return Constraint(PARALLEL_SINGULARITY, margin - ZERO, x, orientation), Constraint(
-        PARALLEL_SINGULARITY, -margin - ZERO, x, orientation
+    sides: tuple[SignProof | None, SignProof | None] = None, None
+    height, width = traced.machine.parallel_block
+    if orientation and height == width:
+        inputs = traced.jump_free_inputs
+        rows, side = _trace_leg_rows(traced, traced.place(inputs)), 1.0 if scale > 0.0 else -1.0
+        sides = make_side_proof(rows, side, inputs), make_side_proof(rows, -side, inputs)
+    return Constraint(PARALLEL_SINGULARITY, margin - ZERO, x, orientation, sign=sides[0]), Constraint(
+        PARALLEL_SINGULARITY, -margin - ZERO, x, orientation, sign=sides[1]
     )
 
 

@@ -12,8 +12,9 @@ import numpy as np
 from ... import algebra as alg
 from ...algebra import Scalar, Term, Trace, absolute, derivative, find_dependencies, maximum, minimum, norm, sub
 from ...arrays import Array
-from ...kernels.intervals import IntervalProgram
+from ...kernels.intervals import IntervalProgram, JumpFreeTrace
 from ...machine import Machine
+from .sign_proofs import SignProof, make_margin_proof, make_separation_proof
 
 _ROUNDING = 1e-12  # relative, of bounds that limits imply
 
@@ -27,6 +28,7 @@ class Constraint:
     the second derivatives by x (d(d + 1)/2 of them), or of one with corners the gradient by x instead.
 
     implied : it follows from others, and serves only to prove that they can't hold
+    sign : proves the margin's sign over boxes of x, then θ, where the programs don't tell it
     """
 
     name: str
@@ -34,6 +36,7 @@ class Constraint:
     position: Sequence[Term]
     orientation: Sequence[Term] = ()
     implied: bool = False
+    sign: SignProof | None = None
 
     @cached_property
     def _trace(self) -> Trace:
@@ -95,8 +98,17 @@ class TracedPose:
     @cached_property
     def pose(self) -> list[Scalar]:
         """The whole pose; the trace folds away what depends on fixed axes alone."""
-        varied = dict(zip((*self.free_axes, *self.swept_axes), self.inputs, strict=True))
+        return self.place(self.inputs)
+
+    def place(self, inputs: Sequence[Scalar]) -> list[Scalar]:
+        """Compute the whole pose from a scalar for each free axis, then for each swept one."""
+        varied = dict(zip((*self.free_axes, *self.swept_axes), inputs, strict=True))
         return [varied[axis] if axis in varied else np.float64(self.fixed_axes[axis]) for axis in self.machine.axes]
+
+    @cached_property
+    def jump_free_inputs(self) -> list[Term]:
+        """Inputs as :attr:`inputs`, of a trace whose angles don't jump over intervals."""
+        return JumpFreeTrace().inputs(len(self.inputs))
 
     def build_constraints(self, without: Sequence[str] = ()) -> list[Constraint]:
         """Build the constraints of the machine's limits, but for those named in ``without``."""
@@ -105,9 +117,19 @@ class TracedPose:
         d = len(self.free_axes)
         x, orientation = self.inputs[:d], self.inputs[d:]
         kept = [(name, g) for name, g in zip(self.machine.limits, margins, strict=True) if name not in without]
-        constraints = [Constraint(name, g, x, orientation) for name, g in kept]
+        signs = self._make_sign_proofs() if orientation else {}
+        constraints = [Constraint(name, g, x, orientation, sign=signs.get(name)) for name, g in kept]
         implied = [*_bound_angle_sizes(kept), *self._bound_reach(without)]
         return constraints + [Constraint(name, g, x, orientation, implied=True) for name, g in implied]
+
+    def _make_sign_proofs(self) -> dict[str, SignProof]:
+        inputs = self.jump_free_inputs
+        with np.errstate(all="ignore"):
+            forms = self.machine.trace_sign_forms(self.place(inputs), self.mode)
+        proofs = {name: make_margin_proof(margin, inputs) for name, margin in forms.cones.items()}
+        least = {limit.name: limit.bound for limit in self.machine.limit_definitions}
+        clear = {name: make_separation_proof(pair, least[name], inputs) for name, pair in forms.struts.items()}
+        return proofs | clear
 
     def _bound_reach(self, without: Sequence[str]) -> list[tuple[str, Scalar]]:
         """Bound how far platform and tool may be, whatever the orientation.

@@ -14,9 +14,9 @@ from ...errors import PoseError
 from .assembly_mode import PARALLEL_SINGULARITY
 from .best_orientation import find_best_orientations
 from .constraints import Constraint
-from .plane_cuts import CLEARED, EXCLUDED, LinearBounds
+from .plane_cuts import CLEARED, EXCLUDED, KEPT, LinearBounds
 from .region import Region
-from .subdivision import OrientationBoxes, bound_margin
+from .subdivision import OrientationBoxes, bound_margin, prove_signs
 
 MOST = 4096  # sub-boxes of a box to be examined before it is left undecided
 _ROUNDS = 60  # bisected more often, a sub-box's numbers have no digits left
@@ -208,7 +208,9 @@ def _bound_sub_boxes(constraint: Constraint, low: Array, high: Array, first: Arr
     """Bound a margin over positions [low, high] and orientations [first, last], the last ulp included."""
     size = np.where(high > low, high - low + _ULP * np.maximum(np.abs(low), np.abs(high)), 0.0)
     boxes = OrientationBoxes(np.arange(len(low)), first, last, np.zeros((len(low), 0), np.bool_))
-    return bound_margin(constraint, low, size, boxes, every=True)
+    bounds = bound_margin(constraint, low, size, boxes, every=True)
+    prove_signs(constraint, low, size, boxes, bounds, bounds.state == KEPT)
+    return bounds
 
 
 def _guess_least(low: Array, high: Array, bounds: LinearBounds) -> Array:
@@ -221,6 +223,8 @@ def _guess_least(low: Array, high: Array, bounds: LinearBounds) -> Array:
 def _measure_spread(constraint: Constraint, low: Array, high: Array, d: int) -> Array:
     """Measure how far each axis of position and orientation spreads a margin's bounds, (N, d + s)."""
     half = 0.5 * (high - low)
+    if constraint.sign is not None:
+        return _mend_spread(constraint.sign(low, high).spread, half)
     down, up = constraint.box_program(low, high)
     size = np.maximum(np.abs(down), np.abs(up))
     s = low.shape[1] - d
@@ -235,6 +239,11 @@ def _measure_spread(constraint: Constraint, low: Array, high: Array, d: int) -> 
                 spread[:, k] += 0.5 * np.maximum(-down[:, column], 0.0) * half[:, k] ** 2
             else:
                 spread[:, [k, n]] += 0.5 * (size[:, column] * half[:, k] * half[:, n])[:, None]
+    return _mend_spread(spread, half)
+
+
+def _mend_spread(spread: Array, half: Array) -> Array:
+    """Take the half widths, relative to the widest, where a spread is not known."""
     unknown = ~np.isfinite(spread).all(1)
     widest = half[unknown].max(0, initial=0.0)
     spread[unknown] = half[unknown] / np.where(widest > 0.0, widest, 1.0)

@@ -152,13 +152,15 @@ class Region:
         """Begin the subdivision of a box of positions, (d,) mm, under ``more`` constraints besides."""
         return self._subdivide_under([*self.constraints, *more], low, high)
 
-    def _subdivide_under(self, constraints: Sequence[Constraint], low: Array, high: Array) -> Subdivision:
+    def _subdivide_under(
+        self, constraints: Sequence[Constraint], low: Array, high: Array, closely: bool = True
+    ) -> Subdivision:
         subdivision = TotalSubdivision if self.every_orientation else InclusiveSubdivision
-        return subdivision(constraints, low, high, self.swept_bounds)
+        return subdivision(constraints, low, high, self.swept_bounds, closely)
 
     def subdivide_all_components(self, low: Array, high: Array) -> Subdivision:
         """Begin the subdivision of a box of positions, (d,) mm, under the limits alone."""
-        return self._subdivide_under(self.limit_constraints, low, high)
+        return self._subdivide_under(self.limit_constraints, low, high, closely=False)
 
     def include_all_components(self) -> Region:
         """Make the same region of all assembly modes, which has the same extent."""

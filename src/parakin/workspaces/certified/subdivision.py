@@ -21,7 +21,16 @@ from ...arrays import Array, Flags, Indices, Progress
 from ...budget import Budget
 from ...kernels.batch import run_in_threads
 from .constraints import Constraint
-from .plane_cuts import CellFractions, LinearBounds, PlaneCuts, TaylorBounds, accumulate_cuts, bound_linearly
+from .plane_cuts import (
+    CLEARED,
+    EXCLUDED,
+    CellFractions,
+    LinearBounds,
+    PlaneCuts,
+    TaylorBounds,
+    accumulate_cuts,
+    bound_linearly,
+)
 
 FIRST = 8  # cells along the longest side of the first box
 MOST = 3_000_000  # undecided cells at a time
@@ -150,9 +159,7 @@ def bound_margin(constraint: Constraint, low: Array, size: Array, boxes: Orienta
     every : the margin must be kept at every orientation of a box, else at one
     """
     n, d, s = len(boxes.cell), low.shape[1], boxes.low.shape[1]
-    corner = low[boxes.cell]
-    bottom = np.concatenate([corner, boxes.low], 1)
-    top = np.concatenate([corner + size[boxes.cell], boxes.high], 1)
+    bottom, top = _join_boxes(low, size, boxes)
     middle = 0.5 * (bottom + top)
     half = np.maximum(middle - bottom, top - middle)
     over_box = constraint.box_program(bottom, top)
@@ -163,6 +170,32 @@ def bound_margin(constraint: Constraint, low: Array, size: Array, boxes: Orienta
     return result
 
 
+def _join_boxes(low: Array, size: Array, boxes: OrientationBoxes) -> tuple[Array, Array]:
+    """Join cells and their boxes of orientations to boxes of both, (N, d + s)."""
+    corner = low[boxes.cell]
+    return np.concatenate([corner, boxes.low], 1), np.concatenate([corner + size[boxes.cell], boxes.high], 1)
+
+
+def prove_signs(
+    constraint: Constraint, low: Array, size: Array, boxes: OrientationBoxes, bounds: LinearBounds, which: Flags
+) -> None:
+    """Decide some boxes whose bounds don't tell by the constraint's sign proof; others get its spread.
+
+    The sum of a spread stays, shared by how far each angle spreads the form that would have decided.
+    """
+    rows = np.flatnonzero(which)
+    if constraint.sign is None or not len(rows):
+        return
+    sign, shares = constraint.sign(*_join_boxes(low, size, boxes.take(rows)))
+    bounds.state[rows] = np.where(sign > 0.0, CLEARED, np.where(sign < 0.0, EXCLUDED, bounds.state[rows]))
+    shares = shares[:, low.shape[1] :]
+    with np.errstate(invalid="ignore", divide="ignore"):
+        shares = shares / shares.sum(1, keepdims=True)
+    known, total = np.isfinite(shares).all(1), bounds.spread[rows].sum(1)
+    total = np.where(np.isfinite(total), total, 1.0)
+    bounds.spread[rows[known]] = (total[:, None] * shares)[known]
+
+
 def add_cuts(cuts: PlaneCuts, number: int, cell: Indices, half: Array, bounds: LinearBounds) -> None:
     """Add the cuts of a constraint to cells of half widths (cells, d); ``cell`` is sorted, all its bounds must hold."""
     run_in_threads(len(cell), lambda start, stop: accumulate_cuts(bounds, number, cell, half, cuts, start, stop))
@@ -171,12 +204,20 @@ def add_cuts(cuts: PlaneCuts, number: int, cell: Indices, half: Array, bounds: L
 class Subdivision(ABC):
     """The subdivision of a box of positions under constraints; :meth:`run` refines it until a condition stops it.
 
+    closely : whether signs are proved where bounds don't tell them; it is of no use in cells larger than the machine
     open_cells : undecided cells
     open_boxes : lists of what is still to be proved of them
     """
 
-    def __init__(self, constraints: Sequence[Constraint], low: Array, high: Array, orientations: tuple[Array, Array]):
-        self.constraints = list(constraints)
+    def __init__(
+        self,
+        constraints: Sequence[Constraint],
+        low: Array,
+        high: Array,
+        orientations: tuple[Array, Array],
+        closely: bool = True,
+    ):
+        self.constraints, self.closely = list(constraints), closely
         edge = float((high - low).max()) / FIRST
         self.finest = edge * _FINEST
         counts = np.maximum(1, np.ceil((high - low) / edge - 1e-9)).astype(int)

@@ -13,10 +13,20 @@ import numpy as np
 from ...arrays import Array, Flags, Indices
 from .constraints import Constraint
 from .plane_cuts import EXCLUDED, KEPT, LinearBounds, PlaneCuts
-from .subdivision import Cells, OrientationBoxes, Subdivision, add_cuts, bisect_boxes, bound_margin, concatenate_boxes
+from .subdivision import (
+    Cells,
+    OrientationBoxes,
+    Subdivision,
+    add_cuts,
+    bisect_boxes,
+    bound_margin,
+    concatenate_boxes,
+    prove_signs,
+)
 
 LOOKS = 6  # tries at narrowed orientations in a round
 MOST = 32  # boxes of orientations that a constraint may have in a cell
+_MANY = 3  # swept angles from which on signs are proved by closer forms, and twice as many boxes may be left
 _SPREAD = 0.15  # boxes whose margin changes more with orientation than this × its change with position are bisected
 
 
@@ -48,9 +58,16 @@ class TotalSubdivision(Subdivision):
         """
         finished: list[tuple[OrientationBoxes, LinearBounds]] = []
         count = np.zeros(len(low), np.int64)
+        closely = self.closely and boxes.low.shape[1] >= _MANY
+        most = 2 * MOST if closely else MOST
         for look in range(LOOKS + 1):
             boxes = boxes.take(~outside[boxes.cell])
             bounds = bound_margin(constraint, low, size, boxes, every=True)
+            spread, change = bounds.spread.sum(1), np.abs(bounds.slopes).sum(1)
+            narrow: Flags = (bounds.least_at != 0).any(1)
+            large = ~narrow & (spread > _SPREAD * change) & (spread > 0.0)
+            if closely:
+                prove_signs(constraint, low, size, boxes, bounds, large & (bounds.state == KEPT))
             outside[boxes.cell[bounds.state == EXCLUDED]] = True
             wide = boxes.take(~np.all(np.isfinite(bounds.spread), axis=1))  # without bounds in their middle: look there
             middle = 0.5 * (wide.low + wide.high)
@@ -59,10 +76,8 @@ class TotalSubdivision(Subdivision):
             kept = bounds.state == KEPT
             again = np.zeros(len(kept), np.bool_)
             if look < LOOKS and boxes.low.shape[1]:
-                spread, change = bounds.spread.sum(1), np.abs(bounds.slopes).sum(1)
-                few = (count + np.bincount(boxes.cell, minlength=len(low)))[boxes.cell] < MOST
-                large = few & (spread > _SPREAD * change) & (spread > 0.0)
-                again = kept & ((bounds.least_at != 0).any(1) | large)
+                few = (count + np.bincount(boxes.cell, minlength=len(low)))[boxes.cell] < most
+                again = kept & (narrow | (large & few))
             finished.append((boxes.take(kept & ~again), bounds.take(kept & ~again)))
             count += np.bincount(finished[-1][0].cell, minlength=len(low))
             if not again.any():

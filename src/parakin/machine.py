@@ -29,7 +29,7 @@ from .kinematics.wrist.pole_thresholds import EXACT
 from .machine_properties import MachineProperties
 from .model.geometric_parameters import replace_ranges, settle_offsets
 from .model.legs import Inverse
-from .model.limits import SignForms, compute_platform_points
+from .model.limits import compute_platform_points
 from .model.rates import TwistRates, compute_twist_rates
 from .model.structures import PlatformPlacement
 
@@ -363,10 +363,6 @@ class Machine(MachineProperties):
         """Trace every limit's margin, in the order of :attr:`limits`, for a pose and given joints or its inverse."""
         own = self.model.own_margins(pose, mode) if joints is None else self.model.margins(pose, joints, mode)
         return [margin for _, margin in own]
-
-    def trace_sign_forms(self, pose: Sequence[Scalar], mode: str) -> SignForms:
-        """Trace what tells the signs of limits' margins that intervals bound badly."""
-        return self.model.list_sign_forms(pose, mode)
 
     def trace_rates(self, pose: Sequence[Scalar], joints: Sequence[Scalar]) -> TwistRates:
         """Trace A and B of the tool's twist, and the legs' wrench norms."""

@@ -19,7 +19,7 @@ from .model.elements import BodyBuild, Drive, PlaneConstraint, RodConstraint
 from .model.equations import Equations
 from .model.geometric_parameters import SIZES, Parameter, list_parameters, replace_parameters
 from .model.legs import Leg
-from .model.limits import Limit, group_joints_by_leg
+from .model.limits import Limit, SignForms, group_joints_by_leg
 from .model.nominal_values import SizedTrace
 from .model.rates import list_closure_joints
 from .model.size_rates import SizeRates, SpecMaker, find_size_rates, list_numbers
@@ -185,6 +185,10 @@ class MachineProperties:
         if self._make_spec is None or not self.structure.takes_traced_sizes:
             return SizeRates((), (), ((),) * len(list_numbers(self.spec)))
         return find_size_rates(self.spec, self._make_spec)
+
+    def trace_sign_forms(self, pose: Sequence[Scalar], mode: str) -> SignForms:
+        """Trace what tells the signs of limits' margins that intervals bound badly."""
+        return self.model.list_sign_forms(pose, mode)
 
     def trace_sized_equations(self, trace: SizedTrace) -> Equations:
         """Trace the machine's equations with the sizes of :attr:`size_rates` as inputs of a trace."""

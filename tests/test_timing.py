@@ -399,6 +399,10 @@ def test_a_time_far_over_the_feeds_is_explained_at_its_line(tmp_path):
     assert job.seconds > 3.0
     note = next(note for note in job.posted.path.notes if "its feeds ask for" in note.text)
     assert note.line > 4 and "theta1" in note.text
+    (tmp_path / "part.apt").write_text("\n".join(["UNITS/MM", "FEDRAT/10000,MMPM", *turned[:4], "FINI", ""]))
+    job = pk.prepare(load_shipped("tricept"), pk.read_path(tmp_path / "part.apt"))
+    assert job.seconds < 1.0  # short paths too
+    assert any("its feeds ask for" in note.text for note in job.posted.path.notes)
     (tmp_path / "part.apt").write_text("\n".join(["UNITS/MM", "FEDRAT/600,MMPM", *words, "FINI", ""]))
     job = pk.prepare(load_shipped("tricept"), pk.read_path(tmp_path / "part.apt"))
     assert not any("its feeds ask for" in note.text for note in job.posted.path.notes)

@@ -9,7 +9,7 @@ from ..path import Note
 from .trajectory import Trajectory
 
 _LONGER = 1.5  # times what feeds and rapids ask for, from which on it is explained,
-_LEAST = 1.0  # s: if it is so much longer
+_LEAST = 0.3  # s: if it is so much longer: to start and to stop takes some tenths
 
 
 def explain_lost_time(trajectory: Trajectory) -> Note | None:

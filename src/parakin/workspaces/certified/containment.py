@@ -224,7 +224,7 @@ def _measure_spread(constraint: Constraint, low: Array, high: Array, d: int) -> 
     """Measure how far each axis of position and orientation spreads a margin's bounds, (N, d + s)."""
     half = 0.5 * (high - low)
     if constraint.sign is not None:
-        return _mend_spread(constraint.sign(low, high).spread, half)
+        return _fill_spread(constraint.sign(low, high).spread, half)
     down, up = constraint.box_program(low, high)
     size = np.maximum(np.abs(down), np.abs(up))
     s = low.shape[1] - d
@@ -239,11 +239,11 @@ def _measure_spread(constraint: Constraint, low: Array, high: Array, d: int) -> 
                 spread[:, k] += 0.5 * np.maximum(-down[:, column], 0.0) * half[:, k] ** 2
             else:
                 spread[:, [k, n]] += 0.5 * (size[:, column] * half[:, k] * half[:, n])[:, None]
-    return _mend_spread(spread, half)
+    return _fill_spread(spread, half)
 
 
-def _mend_spread(spread: Array, half: Array) -> Array:
-    """Take the half widths, relative to the widest, where a spread is not known."""
+def _fill_spread(spread: Array, half: Array) -> Array:
+    """Fill in the half widths, relative to the widest, where a spread is not known."""
     unknown = ~np.isfinite(spread).all(1)
     widest = half[unknown].max(0, initial=0.0)
     spread[unknown] = half[unknown] / np.where(widest > 0.0, widest, 1.0)

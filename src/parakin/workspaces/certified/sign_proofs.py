@@ -15,7 +15,7 @@ from ...arrays import Array
 from .matrix_bounds import LinearMatrices, MatrixBounds, prove_regular
 
 
-class Signs(NamedTuple):
+class ProvedSigns(NamedTuple):
     """What is proved of a margin over N boxes.
 
     sign : (N,) 1 where it is kept all over the box, -1 where it is broken all over it, 0 where neither is proved
@@ -26,7 +26,7 @@ class Signs(NamedTuple):
     spread: Array
 
 
-SignProof: TypeAlias = Callable[[Array, Array], Signs]
+SignProof: TypeAlias = Callable[[Array, Array], ProvedSigns]
 
 _ROUNDING = 1e-12  # relative, of sums of a few products
 _TINY = 1e-300
@@ -38,13 +38,13 @@ def make_margin_proof(margin: Scalar, inputs: Sequence[Term]) -> SignProof:
     """Make the proof by another margin of the same sign."""
     bounds = MatrixBounds([[margin]], inputs, inputs[0].trace)
 
-    def prove(low: Array, high: Array) -> Signs:
+    def prove(low: Array, high: Array) -> ProvedSigns:
         form = bounds(low, high)
         off = (form.linear_change + form.rest)[:, 0, 0] * (1.0 + _ROUNDING)
         middle = form.middle[:, 0, 0]
         with np.errstate(invalid="ignore"):
             kept, broken = middle - off >= 0.0, middle + off < 0.0
-        return Signs(
+        return ProvedSigns(
             np.where(kept, 1.0, np.where(broken, -1.0, 0.0)),
             form.half * (np.abs(form.slopes) + form.spread)[:, :, 0, 0],
         )
@@ -62,19 +62,19 @@ def make_separation_proof(
     """
     gaps = [MatrixBounds([sub(a, b) for a in one for b in two], inputs, inputs[0].trace) for one, two in frames]
 
-    def prove(low: Array, high: Array) -> Signs:
+    def prove(low: Array, high: Array) -> ProvedSigns:
         best, spread = np.full(len(low), -np.inf), np.zeros(low.shape)
         for bounds in gaps:
-            _improve_separation(bounds, (low, high), least, best, spread)
-        return Signs(np.where(best >= least, 1.0, 0.0), spread)
+            _tighten_separation(bounds, (low, high), least, best, spread)
+        return ProvedSigns(np.where(best >= least, 1.0, 0.0), spread)
 
     return prove
 
 
-def _improve_separation(
+def _tighten_separation(
     bounds: MatrixBounds, boxes: tuple[Array, Array], least: float, best: Array, spread: Array
 ) -> None:
-    """Improve the ``best`` separations (N,) proved so far, and how far each input spreads them (N, d).
+    """Tighten the ``best`` separations (N,) proved so far, and how far each input spreads them (N, d).
 
     Where the direction of the distance is not enough, others about it are tried, by as much as leaves ``least`` of it.
     """
@@ -121,9 +121,9 @@ def make_side_proof(rows: Sequence[Sequence[Scalar]], side: float, inputs: Seque
     """Make the proof that a determinant has the sign of ``side`` all over a box, by the matrices' regularity."""
     bounds = MatrixBounds(rows, inputs, inputs[0].trace)
 
-    def prove(low: Array, high: Array) -> Signs:
+    def prove(low: Array, high: Array) -> ProvedSigns:
         regular = prove_regular(bounds(low, high))
-        return Signs(regular.sign * side, regular.spread)
+        return ProvedSigns(regular.sign * side, regular.spread)
 
     return prove
 

@@ -209,11 +209,21 @@ def test_show(name, capsys, tmp_path, monkeypatch):
     assert main(["show", name]) == 0
     said = capsys.readouterr().out
     assert all(joint in said for joint in load_shipped(name).joints)
-    assert said.splitlines()[-1] == f"picture {name}.html"
-    (tmp_path / f"{name}.html").unlink()
+    assert said.splitlines()[-1] == f"-o {name}.html writes the page on which it moves"
     assert main(["show", name, "--json"]) == 0
     assert not list(tmp_path.iterdir())
     assert json.loads(capsys.readouterr().out, parse_constant=pytest.fail)["name"] == name
+
+
+@pytest.mark.parametrize(("answer", "written"), [("y", ["rpr3.html"]), ("", []), ("no", [])])
+def test_show_asks_at_a_terminal(answer, written, capsys, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    for stream in (sys.stdin, sys.stdout):
+        monkeypatch.setattr(stream, "isatty", lambda: True)
+    monkeypatch.setattr("builtins.input", lambda question: answer if "rpr3.html" in question else pytest.fail(question))
+    assert main(["show", "rpr3"]) == 0
+    assert [path.name for path in tmp_path.iterdir()] == written
+    assert ("picture rpr3.html" in capsys.readouterr().out) == bool(written)
 
 
 def test_show_how_a_joint_is_driven(tmp_path, capsys):

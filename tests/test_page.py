@@ -431,7 +431,7 @@ def test_sizes_that_change_numbers_unevenly_are_left_out():
 def test_a_size_is_dragged(pages, browser):
     with open_tab(browser) as tab:
         tab.goto(pages("tricept"))
-        slider = tab.get_by_label("R, 1").first
+        slider = tab.get_by_label("R", exact=True).first
         slider.evaluate("input => { input.value = 380; input.dispatchEvent(new Event('input')); }")
         machine = pk.load("tricept", parameters={"R": tab.evaluate("parakin.model.sizes[0]")})
         assert abs(tab.evaluate("parakin.model.sizes[0]") - 380.0) < 1.0

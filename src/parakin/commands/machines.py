@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -69,7 +70,7 @@ def show(
         A shipped machine's name or a YAML file.
     output
         Where to put the picture of the machine at home: an .html on which it moves (see parakin page), a .png, or
-        a .pdf or .svg for a printed page. By default NAME.html in this folder; with --json or --yaml none.
+        a .pdf or .svg for a printed page. Without it a terminal is asked whether to write NAME.html.
     yaml
         Print a machine file with every number explicit, a group for each leg: to write the numbers of a calibrated
         machine into, or to keep those of --set. Reading it gives the same machine, bit for bit.
@@ -79,8 +80,6 @@ def show(
     if yaml and json:
         raise InputError("only one of --yaml and --json, expected what to print", "--yaml")
     machine = load_machine(name, sizes)
-    if output is None and not (json or yaml):
-        output = Path(f"{machine.name}.html")
     if output is not None:
         _write_picture(machine, output, force)
     if json:
@@ -92,8 +91,27 @@ def show(
         return 0
     print_text(_summarise_machine(machine))
     print()
-    print_text(f"picture {output}")
+    if output is None:
+        output = _ask_for_page(machine, force)
+    if output is not None:
+        print_text(f"picture {output}")
     return 0
+
+
+def _ask_for_page(machine: Machine, force: bool) -> Path | None:
+    """Ask at a terminal whether to write the page on which a machine moves; elsewhere tell how to."""
+    output = Path(f"{machine.name}.html")
+    if not (sys.stdin.isatty() and sys.stdout.isatty()):
+        print_text(f"-o {output} writes the page on which it moves")
+        return None
+    try:
+        answer = input(f"write {output}, on which it moves? [y/N] ")
+    except EOFError:
+        answer = ""
+    if answer.strip().lower() not in ("y", "yes"):
+        return None
+    _write_picture(machine, output, force)
+    return output
 
 
 def _write_picture(machine: Machine, output: Path, force: bool) -> None:

@@ -10,7 +10,7 @@ async function refineWorkspace() {
   for (const gap of ["0.3", "0.1", "0.02"]) {
     for (const name of chosenMachines()) {
       const spatial = findTip(name).length === 3, output = nameResult("workspace", name, spatial ? ".stl" : ".svg");
-      const result = await run("workspace", {NAME: name, "--gap": gap, "--output": [output]});
+      const result = await run("workspace", {NAME: name, "--gap": gap, "--output": [output], ...readSizes(name)});
       if (!result || result.state !== "done") return;
       if (spatial && result.code === 0) await showSurface(name, output);
     }
@@ -29,7 +29,7 @@ async function showSurface(name, file) {
 async function findBox() {
   for (const name of chosenMachines()) {
     const output = nameResult("box", name, ".json");
-    const result = await run("workspace", {NAME: name, "--box": true, "--output": [output]});
+    const result = await run("workspace", {NAME: name, "--box": true, "--output": [output], ...readSizes(name)});
     if (!result || result.code !== 0) continue;
     const box = (await (await fetchResult(output)).json()).box_inside;
     if (box) pageOf(name)?.showBox(box.low, box.high);
@@ -40,7 +40,7 @@ async function findBox() {
 async function drawAtlas() {
   for (const name of chosenMachines()) {
     const folder = nameResult("atlas", name);
-    const result = await run("atlas", {NAME: name, "--output": folder});
+    const result = await run("atlas", {NAME: name, "--output": folder, ...readSizes(name)});
     const table = state.files.find(file => file.name.startsWith(`${folder}/`) && file.name.endsWith(".csv"));
     if (result && result.code === 0 && table) showTable(name, await (await fetchResult(table.name)).text());
   }

@@ -127,6 +127,14 @@ function markLine(name, errors) {
   text.setSelectionRange(begin, begin + lines[number - 1].length);
 }
 
+// The sizes that were dragged on a machine's page, as the commands take them.
+function readSizes(name) {
+  const shown = pageOf(name);
+  if (!shown) return {};
+  const moved = shown.machine.sizes.map((size, i) => ({...size, value: shown.model.sizes[i]})).filter(({value, nominal}) => value !== nominal);
+  return moved.length ? {"--set": moved.map(({name: size, unit, value}) => `${size}=${+value.toFixed(6)}${unit === "1" ? "" : unit}`)} : {};
+}
+
 // The pose at which a machine stands on its page, as the commands take it.
 function readPose(name) {
   const frame = findFrame(name), shown = frame && frame.contentWindow.parakin;
@@ -143,7 +151,7 @@ async function showMachineFile() {
   const name = element("machine").value;
   if (state.changed || state.edited === name) return;
   state.edited = name;
-  const {number} = await beginRun("show", {NAME: name, "--yaml": true});
+  const {number} = await beginRun("show", {NAME: name, "--yaml": true, ...readSizes(name)});
   const result = await followRun(number);
   if (state.edited !== name) return;
   element("text").value = result.code === 0 ? result.output : result.errors;
@@ -266,7 +274,7 @@ const QUICK = {
   "Post the part": () => postPart(name => state.workpieces[`${name} ${element("part").value}`]),
   "Place it for me": () => postPart(name => ({"--place": makeRanges(name)})),
   "Part at the tool": () => postPart(name => ({"--workpiece": findTip(name).map(([axis, value]) => `${axis}=${value}`).join(",")})),
-  "LinuxCNC": () => run("linuxcnc", {NAME: element("machine").value, "--output": "linuxcnc"}),
+  "LinuxCNC": () => run("linuxcnc", {NAME: element("machine").value, "--output": "linuxcnc", ...readSizes(element("machine").value)}),
 };
 
 // Where the tool of a machine's page stands: pairs of an axis and its value.
@@ -281,7 +289,7 @@ async function postPart(place, machines = chosenMachines()) {
   const part = element("part").value;
   for (const name of machines) {
     const output = `on_${name.replace(/\.ya?ml$/, "")}`, options = place(name) || {};
-    const result = await run("post", {PART: part, "--machine": name, "--output": output, "--page": true, ...options});
+    const result = await run("post", {PART: part, "--machine": name, "--output": output, "--page": true, ...readSizes(name), ...options});
     if (!result) return;
     const best = result.output.match(/^best placement --workpiece (\S+):/m);
     const workpiece = best ? best[1] : options["--workpiece"];
@@ -299,8 +307,9 @@ async function postPart(place, machines = chosenMachines()) {
 // Go on with the session of this tab where it is still there, with its files and runs.
 async function openSession() {
   const key = `parakin ${location.pathname}`;
-  state.session = sessionStorage.getItem(key) || "none";
+  state.session = sessionStorage.getItem(key);
   try {
+    if (!state.session) throw new Error("a new tab");
     for (const {run, line} of (await ask(inSession("runs"))).runs) followRun(run, showRun(run, line));
   } catch {
     state.session = (await ask("sessions", {method: "POST"})).session;

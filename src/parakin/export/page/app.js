@@ -25,7 +25,7 @@ onClick("stops", event => { options.stops = event.target.checked; });
 onClick("theme", () => { document.documentElement.classList.toggle("dark"); requestPicture(); if (path) drawCurves(); });
 if (window.matchMedia("(prefers-color-scheme: dark)").matches) document.documentElement.classList.add("dark");
 document.addEventListener("keydown", event => {
-  if (event.target.matches("input, select, button") || event.ctrlKey || event.metaKey || event.altKey) return;
+  if (event.target.matches("input:not([type=checkbox]), select") || event.ctrlKey || event.metaKey || event.altKey) return;
   if (event.key === "h" || event.key === "H") goHome();
   if (event.key === "v" || event.key === "V") { resetOrbit(); requestPicture(); }
 });

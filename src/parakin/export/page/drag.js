@@ -76,6 +76,7 @@ function seeGrip(state) {
 
 canvas.addEventListener("pointerdown", event => {
   canvas.setPointerCapture(event.pointerId);
+  document.getElementById("hint").hidden = renderer !== null;
   pointers.set(event.pointerId, event);
   grip = event.button === 0 && pointers.size === 1 ? findGrip(event) : null;
   if (grip) Object.assign(grip, {x: event.clientX, y: event.clientY});
@@ -108,6 +109,7 @@ function pinch(event, before) {
 
 for (const end of ["pointerup", "pointercancel"]) canvas.addEventListener(end, event => {
   pointers.delete(event.pointerId);
+  if (grip?.kind === "part") movePath(placing.shift);
   grip = null;
 });
 canvas.addEventListener("contextmenu", event => event.preventDefault());

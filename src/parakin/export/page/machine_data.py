@@ -10,6 +10,7 @@ from ...arrays import Array
 from ...kinematics.closure_roots import list_step_caps
 from ...kinematics.wrist.pole_thresholds import PRINTED, convert_to_freedom
 from ...machine import Machine
+from ...model.geometric_parameters import SIZES
 from ...performance.characteristic_length import choose_characteristic_length
 from ...performance.jacobians import list_twist_names
 from ...toolpath.posting.range_use import list_ranges
@@ -29,6 +30,7 @@ def encode_page_machine(machine: Machine) -> dict[str, Any]:
     margins = machine.margins(machine.home)
     wrist = machine.wrist
     ranges, quantities = list_ranges(machine)
+    units = {parameter.name: parameter.unit for parameter in machine.parameters if parameter.group == SIZES}
     return {
         "name": machine.name,
         "title": " ".join(machine.spec.title.split()),
@@ -63,7 +65,7 @@ def encode_page_machine(machine: Machine) -> dict[str, Any]:
             for limit, margin, quantity in zip(machine.limit_definitions, margins.tolist(), quantities, strict=True)
         ],
         "sizes": [
-            {"name": name, "nominal": value}
+            {"name": name, "unit": units[name], "nominal": value}
             for name, value in zip(machine.size_rates.names, machine.size_rates.nominal, strict=True)
         ],
         "wrist": None

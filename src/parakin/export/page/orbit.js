@@ -1,8 +1,8 @@
 // The camera turns about a target, with Z upright.
 
 const orbit = {target: new THREE.Vector3(), azimuth: 0, elevation: 0, distance: 1};
-const seen = []; // places that the picture shows at first: the machine's own, and what is drawn beside it
-let shownSize = size;
+const seen = []; // places that the picture shows at first: of what is drawn beside the machine
+let machineSeen = null, shownSize = size; // and the machine's own, as it stood at first
 
 // Show, beside the machine, what stands in the frame of poses.
 function widenView(geometry) {
@@ -24,11 +24,12 @@ function resetOrbit() {
 
 // Aim at the middle of what is to be seen, as it looks from the camera's side, and step back until all of it is in the picture.
 function fitView() {
-  if (!seen.length) seen.push(handle.position.clone(), ...itemPoints.flat().map(point => point.clone()));
+  machineSeen ??= [handle.position, new THREE.Vector3().setFromMatrixPosition(frame), ...itemPoints.flat()].map(point => point.clone());
+  const places = [...machineSeen, ...seen];
   placeCamera();
   const middle = new THREE.Vector3(), reach = [0, 0, 0], half = Math.tan(0.5 * camera.fov * PI / 180);
   for (let i = 0; i < 3; i++) {
-    const way = new THREE.Vector3().setFromMatrixColumn(camera.matrix, i), along = seen.map(point => point.dot(way));
+    const way = new THREE.Vector3().setFromMatrixColumn(camera.matrix, i), along = places.map(point => point.dot(way));
     const [least, most] = [min(...along), max(...along)];
     middle.addScaledVector(way, 0.5 * (least + most));
     reach[i] = 0.5 * (most - least);

@@ -26,7 +26,7 @@ function addSlider(section, {name, unit, low, high}, change) {
   const range = makeElement("input", {type: "range", min: low * factor, max: high * factor, step: (high - low) * factor / 2000});
   const number = makeElement("input", {type: "number", step: "any"});
   for (const input of [range, number]) {
-    input.setAttribute("aria-label", `${name}, ${unit === "rad" ? "degrees" : unit}`);
+    input.setAttribute("aria-label", unit === "1" ? name : `${name}, ${unit === "rad" ? "degrees" : unit}`);
     input.addEventListener(input === range ? "input" : "change", () => {
       const value = input.valueAsNumber / factor, farthest = FARTHEST * (high - low);
       if (value > low - farthest && value < high + farthest) change(value);

@@ -12,17 +12,25 @@ function measureRoom(margins) {
   return margins.reduce((least, margin, i) => machine.limits[i].span ? min(least, margin / machine.limits[i].span) : least, 1);
 }
 
-// Move the path from where it was posted, mm, and find again what its samples ask of the machine.
-function movePath(shift) {
+const MOST_DRAGGED = 350; // samples that are found again while the part is dragged
+
+// Move the path from where it was posted, mm, and find again what its samples ask of the machine: of all of them, or
+// while it is dragged of every few, which stand for those after them.
+function movePath(shift, stride = 1) {
   const number = machine.axes.length, count = machine.joints.length, still = shift.every(value => value === 0);
   const moves = machine.axes.map(axis => "XYZ".includes(axis.name) ? shift["XYZ".indexOf(axis.name)] : 0);
   const {poses, joints, margins, broken} = pathColumns;
   for (const [name, values] of Object.entries(posted)) pathColumns[name].set(values);
   let before = stateAtPose(everyHome(), path.signs, null);
   for (let i = 0; i < path.samples && !still; i++) {
-    const pose = rowOf("poses", i, number).map((value, k) => value + moves[k]), state = stateAtPose(pose, path.signs, before);
-    const own = state ? marginsAt(state) : [];
+    const pose = rowOf("poses", i, number).map((value, k) => value + moves[k]);
     poses.set(pose, i * number);
+    if (i % stride) {
+      joints.set(rowOf("joints", i - 1, count), i * count);
+      [margins[i], broken[i]] = [margins[i - 1], broken[i - 1]];
+      continue;
+    }
+    const state = stateAtPose(pose, path.signs, before), own = state ? marginsAt(state) : [];
     joints.set(state ? state.joints : Array(count).fill(NaN), i * count);
     margins[i] = state ? measureRoom(own) : NaN;
     broken[i] = !state || findBroken(own) >= 0 ? 1 : 0;
@@ -90,7 +98,7 @@ function dragArrow(event) {
   grip.share ??= share;
   const limit = FARTHEST * size, shift = [...placing.shift];
   shift[grip.axis] = max(-limit, min(limit, shift[grip.axis] + share - grip.share));
-  movePath(shift);
+  movePath(shift, Math.ceil(path.samples / MOST_DRAGGED));
 }
 
 function buildPlacing() {

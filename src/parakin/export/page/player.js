@@ -159,7 +159,7 @@ if (path) {
   button.hidden = false;
   button.addEventListener("click", viewPath);
   document.addEventListener("keydown", event => {
-    if (!event.target.matches("input, select, button") && event.key.toLowerCase() === "p") viewPath();
+    if (!event.target.matches("input:not([type=checkbox]), select") && event.key.toLowerCase() === "p") viewPath();
   });
   buildPlayer();
   if (path.offences.length) seek(pathColumns.times[path.offences[0].sample]);

@@ -13,6 +13,7 @@ function showSurface(corners) {
   geometry.computeVertexNormals();
   shownMesh.geometry.dispose();
   shownMesh.geometry = geometry;
-  if (corners.length) fitOrbit(geometry);
+  if (corners.length) fitOrbit(geometry, "proved");
+  rememberShown();
   requestPicture();
 }

@@ -10,6 +10,21 @@ const valueNote = makeElement("p", {className: "note"});
 workspaceSection.append(valueNote);
 const shown = {values: 0, box: null}; // what was drawn last
 
+// What is shown is of the sizes, the mode and the orientation at which it was drawn; elsewhere it is hidden.
+let shownFor = "";
+const nameState = () => [...axisNumbers.filter(i => machine.axes[i].unit === "rad").map(i => current.pose[i].toFixed(4)), ...current.signs, ...model.sizes].join(" ");
+
+function rememberShown() {
+  shownFor = nameState();
+  hideOthers();
+}
+
+function hideOthers() {
+  for (const mesh of [valueMesh, shownBox, shownMesh]) mesh.visible = nameState() === shownFor;
+}
+
+listeners.push(hideOthers);
+
 // Draw a square of a grid's step about the tip of each pose, mm and rad, parallel to the first two axes, coloured by a
 // value from 0, violet, to 1, yellow; none for nothing.
 function showValues(poses, values, step, title) {
@@ -33,7 +48,8 @@ function showValues(poses, values, step, title) {
   valueMesh.geometry = geometry;
   valueNote.textContent = poses.length ? `${title}, violet 0 to yellow 1: ${min(...values).toPrecision(3)} to ${max(...values).toPrecision(3)}.` : "";
   shown.values = poses.length;
-  if (poses.length) fitOrbit(geometry);
+  if (poses.length) fitOrbit(geometry, "values");
+  rememberShown();
   requestPicture();
 }
 
@@ -50,6 +66,7 @@ function showBox(low, high) {
   shownBox.geometry = new THREE.BufferGeometry();
   shownBox.geometry.setAttribute("position", new THREE.BufferAttribute(new Float32Array(edges), 3));
   shown.box = [low, high];
-  fitOrbit(shownBox.geometry);
+  fitOrbit(shownBox.geometry, "box");
+  rememberShown();
   requestPicture();
 }

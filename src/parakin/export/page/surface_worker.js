@@ -4,7 +4,7 @@
 const places = [...machine.axes.keys()].filter(i => machine.axes[i].unit === "mm");
 const LEVELS = places.length === 3 ? [14, 26, 50] : [40, 160], SECTION_LEVELS = [24, 64], BORDER = 1.35;
 const FOLLOW = {2: [[0, 1, 3], [0, 2, 3]], 3: [[0, 1, 3, 7], [0, 1, 5, 7], [0, 2, 3, 7], [0, 2, 6, 7], [0, 4, 5, 7], [0, 4, 6, 7]]};
-let wanted = null; // the request in force
+let wanted = null, refining = false; // the request in force, and whether one is being worked on
 
 // Of each end of a drive's range: the joint, its sign, and the limit.
 const driveLimits = machine.limits.flatMap(limit => {
@@ -80,16 +80,23 @@ function marchLattice(lattice) {
     return {at: p.map((x, k) => x + share * (q[k] - x)), ends: [[a, 1 - share], [b, share]]};
   };
   const isInner = number => strides.every(stride => { const i = Math.floor(number / stride) % count; return i > 0 && i < count - 1; });
-  const put = vertices => vertices.forEach(({at, ends}) => {
-    positions.push(...at);
-    if (d !== 3) {
-      between.push(ends);
-      return;
-    }
+  const findNormal = ({ends}) => {
     const inner = ends.filter(([number]) => isInner(number));
     const g = strides.map((_, k) => -inner.reduce((sum, [number, weight]) => sum + weight * slope(number, k), 0)), length = hypot(...g) || 1;
-    normals.push(...g.map(x => x / length));
-  });
+    return g.map(x => x / length);
+  };
+  const put = vertices => {
+    if (d !== 3) {
+      vertices.forEach(({at, ends}) => { positions.push(...at); between.push(ends); });
+      return;
+    }
+    const outward = vertices.map(findNormal); // a triangle's corners go round as its normals say
+    const order = measureTurn(vertices.map(({at}) => at), outward) < 0 ? [0, 2, 1] : [0, 1, 2];
+    for (const i of order) {
+      positions.push(...vertices[i].at);
+      normals.push(...outward[i]);
+    }
+  };
   const cells = count - 1;
   for (let number = 0; number < values.length; number++) {
     if (strides.some(stride => Math.floor(number / stride) % count === cells)) continue;
@@ -104,6 +111,13 @@ function marchLattice(lattice) {
     }
   }
   return {positions, normals, between, volume: inside * cellVolume};
+}
+
+// Positive where a triangle's corners go round its normals to the left.
+function measureTurn([a, b, c], normals) {
+  const [u, v] = [b, c].map(point => point.map((x, i) => x - a[i]));
+  const across = [u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]];
+  return across.reduce((sum, x, i) => sum + x * (normals[0][i] + normals[1][i] + normals[2][i]), 0);
 }
 
 function marchTetrahedron(ins, outs, cross, put) {
@@ -131,22 +145,38 @@ const rest = () => new Promise(resolve => setTimeout(resolve, 0));
 
 async function refineSurface(request) {
   let ends = findRanges(places);
+  useMachine(request);
   for (const [level, count] of LEVELS.entries()) {
     const lattice = makeLattice(places, ...ends, count);
     let begin = performance.now();
     for (let layer = 0; layer < count; layer++) {
       fillLayer(lattice, layer, request);
       if (performance.now() - begin < 12) continue;
-      await rest(); // a newer request may have come
-      if (wanted !== request) return;
+      await rest(); // a newer request may have come: only the coarse surface is finished before it
+      if (wanted !== request && level > 0) return;
       begin = performance.now();
     }
     const {positions, normals, volume} = marchLattice(lattice);
     const surface = {id: request.id, level, last: level === LEVELS.length - 1, volume, positions: new Float32Array(positions), normals: new Float32Array(normals)};
     postMessage(surface, [surface.positions.buffer, surface.normals.buffer]);
     ends = findInside(lattice);
-    if (ends === null) return;
+    if (ends === null || wanted !== request) return;
   }
+}
+
+// Refine the surface that is wanted, and then what was wanted since.
+async function keepRefining() {
+  refining = true;
+  for (let done = null; done !== wanted;) {
+    done = wanted;
+    await refineSurface(done);
+  }
+  refining = false;
+}
+
+function useMachine({sizes, bounds}) {
+  sizes.forEach((size, i) => { model.sizes[i] = size; });
+  machine.limits.forEach((limit, i) => { limit.bound = bounds[i]; });
 }
 
 // What is allowed in the plane of the first two axes through the pose, with det A over home's at each corner.
@@ -172,12 +202,12 @@ function computeSection(request) {
 }
 
 onmessage = ({data: request}) => {
-  request.sizes.forEach((size, i) => { model.sizes[i] = size; });
-  machine.limits.forEach((limit, i) => { limit.bound = request.bounds[i]; });
   if (request.kind === "section") {
+    useMachine(request);
     postMessage({kind: "section", ...computeSection(request)});
+    if (refining) useMachine(wanted);
   } else {
     wanted = request;
-    refineSurface(request);
+    if (!refining) keepRefining();
   }
 };

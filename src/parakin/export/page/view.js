@@ -26,7 +26,7 @@ function makeRenderer() {
   }
 }
 
-const bar = new THREE.CylinderGeometry(1, 1, 1, 20), taper = new THREE.CylinderGeometry(1, 0.25, 1, 20);
+const bar = new THREE.CylinderGeometry(1, 1, 1, 20), taper = new THREE.CylinderGeometry(0.25, 1, 1, 20);
 const ball = new THREE.SphereGeometry(1, 20, 14), UP = new THREE.Vector3(0, 1, 0);
 const materials = new Map(), driveMaterials = machine.joints.map(() => ({}));
 

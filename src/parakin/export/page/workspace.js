@@ -48,7 +48,7 @@ function requestSurface() {
 }
 
 function drawSurface({id, level, last, volume, positions, normals}) {
-  if (id !== requestNumber) return;
+  if (id !== requestNumber && level > 0) return;
   const geometry = new THREE.BufferGeometry();
   geometry.setAttribute("position", new THREE.BufferAttribute(placeCorners(positions, places, current.pose), 3));
   if (normals.length) geometry.setAttribute("normal", new THREE.BufferAttribute(normals, 3));
@@ -59,15 +59,15 @@ function drawSurface({id, level, last, volume, positions, normals}) {
   const [power, unit] = places.length === 3 ? [1e9, "m³"] : [1e6, "m²"];
   workspaceNote.textContent = volume > 0 ? `About ${(volume / power).toPrecision(3)} ${unit}, counted on a lattice${last ? "" : ", being refined"}. Assemblies are not told apart.`
     : "Nothing is allowed at this orientation.";
-  if (last) fitOrbit(geometry);
+  if (last) fitOrbit(geometry, "surface");
   requestPicture();
 }
 
-// Step back, once, as far as all of the surface asks for.
-let fitted = false;
-function fitOrbit(geometry) {
-  if (fitted || !geometry.attributes.position.count) return;
-  fitted = true;
+// Step back, once for each kind of what is drawn, as far as all of it asks for.
+const fitted = new Set();
+function fitOrbit(geometry, kind) {
+  if (fitted.has(kind) || !geometry.attributes.position.count) return;
+  fitted.add(kind);
   widenView(geometry);
   fitView();
 }

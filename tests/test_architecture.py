@@ -271,7 +271,7 @@ def test_columns_of_b_and_c_are_seen(line):
 
 
 WORDS = """
-accept accumulate act add advance align analyse allocate allow announce answer append apply approach arrange assign
+accept accumulate act add advance align analyse allocate allow announce answer append apply approach arrange ask assign
 average begin bind bisect blend bore bound box bracket bring build call
 calibrate cancel centre certify change check choose clamp clear climb clip clone close coincide collect combine compare
 compile complete compose compute concatenate confirm continue convert copy correct count cross cut

@@ -66,11 +66,17 @@ def measure_mode_error(machine, poses, joints):
 
 
 def measure_sides(machine, poses):
-    """The determinant of the twist's matrix at poses with their own joints, rows scaled: it knows no angles."""
+    """The determinant of the twist's matrix at poses with their own joints, rows scaled: it knows no angles.
+
+    A tall one has a volume, whose sign tells nothing.
+    """
     a = machine.twist_rates(poses, machine.inverse(poses))[0]
     a = a / np.where(np.arange(a.shape[2]) < 3, 1.0, 200.0)
     with np.errstate(all="ignore"):
-        return np.linalg.det(a / np.linalg.norm(a, axis=2, keepdims=True))
+        scaled = a / np.linalg.norm(a, axis=2, keepdims=True)
+        if scaled.shape[1] > scaled.shape[2]:
+            return np.sqrt(np.linalg.det(scaled.swapaxes(1, 2) @ scaled))
+        return np.linalg.det(scaled)
 
 
 def try_direct_problems(machine, count, seed=0, **options):

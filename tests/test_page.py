@@ -5,6 +5,7 @@ import zipfile
 import numpy as np
 import pytest
 from browser import needs_chromium, open_browser, open_tab, wait_until
+from dense_deviations import axis_of, path_of
 from shipped import NAMES, REPRESENTATIVES, load_shipped
 
 import parakin as pk
@@ -12,6 +13,7 @@ from parakin.cli import main
 from parakin.errors import NoMethodError
 from parakin.export.page import three_script
 from parakin.export.page.page import render_machine_page, write_core
+from parakin.export.page.path_data import encode_page_path
 from parakin.kinematics.turns import wrap_angle
 from parakin.performance.singularities import compute_singularity_margins
 
@@ -272,6 +274,14 @@ def test_a_part_is_played(tmp_path, browser):
 
 def read_column(tab, name):
     return np.array(tab.evaluate(f"Array.from(parakin.placing.columns.{name}, x => x === x ? x : null)"), float)
+
+
+def test_the_workpiece_of_a_page_is_without_the_files_own_frame():
+    own, placed = pk.workpiece(X=20, Z=-3, C=0.4), pk.workpiece(X=-5, Y=7, Z=-1600, C=0.3)
+    path = path_of([[-60.0, 0.0, 0.0], [90.0, 20.0, 0.0]], axis_of([4.0, 20.0], [10.0, 90.0]), frame=own)
+    job = pk.prepare(load_shipped("tricept"), path, workpiece=placed)
+    assert len(job.posted.path) > len(path)  # it was posted again, with records inserted
+    assert encode_page_path(job.posted, job.trajectory, 3000)["workpiece"] == pytest.approx([-5, 7, -1600, 0, 0, 0.3])
 
 
 @needs_chromium

@@ -82,5 +82,6 @@ def insert_axes(posted: Posted, positions: PathPositions, added: list[AddedRecor
 
 
 def repost_path(posted: Posted, path: ToolPath) -> Posted:
-    """Post another path in the frame and mode of a posted one."""
-    return post_path(posted.machine, replace(path, frame=None), workpiece=posted.frame, mode=posted.mode)
+    """Post another path in the frame and mode of a posted one, which holds the path's own frame already."""
+    result = post_path(posted.machine, replace(path, frame=None), workpiece=posted.frame, mode=posted.mode)
+    return replace(result, path=replace(result.path, frame=path.frame))

@@ -109,7 +109,7 @@ async function showMachines() {
   for (const frame of element("stage").querySelectorAll("iframe")) if (!chosenMachines().includes(frame.dataset.machine)) frame.remove();
   for (const name of chosenMachines()) {
     if (findFrame(name)) continue;
-    const output = `page_${name.replace(/\.ya?ml$/, "")}.html`;
+    const output = nameResult("page", name, ".html");
     const result = await run("page", {NAME: name, "--output": output});
     if (result && result.code === 0) showPage(name, output);
     else if (result) markLine(name, result.errors);
@@ -137,7 +137,7 @@ function readSizes(name) {
 
 // The pose at which a machine stands on its page, as the commands take it.
 function readPose(name) {
-  const frame = findFrame(name), shown = frame && frame.contentWindow.parakin;
+  const shown = pageOf(name);
   if (!shown) return null;
   const {axes} = shown.machine;
   return axes.map((axis, i) => {
@@ -288,7 +288,7 @@ const makeRanges = name => findTip(name).map(([axis, value]) => `${axis}=${Math.
 async function postPart(place, machines = chosenMachines()) {
   const part = element("part").value;
   for (const name of machines) {
-    const output = `on_${name.replace(/\.ya?ml$/, "")}`, options = place(name) || {};
+    const output = nameResult("on", name), options = place(name) || {};
     const result = await run("post", {PART: part, "--machine": name, "--output": output, "--page": true, ...readSizes(name), ...options});
     if (!result) return;
     const best = result.output.match(/^best placement --workpiece (\S+):/m);

@@ -12,15 +12,14 @@ const shown = {values: 0, box: null}; // what was drawn last
 
 // What is shown is of the sizes, the mode and the orientation at which it was drawn; elsewhere it is hidden.
 let shownFor = "";
-const nameState = () => [...axisNumbers.filter(i => machine.axes[i].unit === "rad").map(i => current.pose[i].toFixed(4)), ...current.signs, ...model.sizes].join(" ");
 
 function rememberShown() {
-  shownFor = nameState();
+  shownFor = nameSetting();
   hideOthers();
 }
 
 function hideOthers() {
-  for (const mesh of [valueMesh, shownBox, shownMesh]) mesh.visible = nameState() === shownFor;
+  for (const mesh of [valueMesh, shownBox, shownMesh]) mesh.visible = nameSetting() === shownFor;
 }
 
 listeners.push(hideOthers);

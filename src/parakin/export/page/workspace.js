@@ -35,12 +35,17 @@ function placeCorners(positions, axes, pose) {
   return corners;
 }
 
+// The orientation, the mode and the sizes, as text: what a workspace depends on.
+function nameSetting() {
+  const turns = current.pose.filter((_, i) => machine.axes[i].unit === "rad").map(turn => turn.toFixed(6));
+  return [...turns, ...current.signs, ...model.sizes].join(" ");
+}
+
 // Ask for the surface anew where what it depends on has changed: turns of the pose, and the mode.
 function requestSurface() {
   workspaceMesh.visible = workspaceSwitch.checked;
   if (!workspaceSwitch.checked) return;
-  const turns = current.pose.filter((_, i) => machine.axes[i].unit === "rad").map(turn => turn.toFixed(6));
-  const key = [...turns, ...current.signs, ...model.sizes].join(" ");
+  const key = nameSetting();
   if (key === requestedKey) return;
   requestedKey = key;
   requestTime = performance.now();

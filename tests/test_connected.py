@@ -12,7 +12,7 @@ from scipy.sparse.csgraph import connected_components
 from shipped import load_shipped
 
 import parakin as pk
-from parakin.model.rates import expand_determinant
+from parakin.algebra import expand_determinant
 from parakin.workspaces.certified.subdivision import Subdivision
 from parakin.workspaces.connected.adjacency import find_adjacent_cells, label_components
 from parakin.workspaces.connected.components import find_components

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import combinations
 
-from ..algebra import Scalar, Trace, derivative, evaluate_trace, norm, sqrt
+from ..algebra import Scalar, Trace, derivative, evaluate_trace, expand_determinant, norm, sqrt
 from .limits import compute_platform_points, group_joints_by_leg
 from .spec import Spec
 from .structures import Structure
@@ -85,18 +85,3 @@ def trace_determinant(rows: Sequence[Sequence[Scalar]]) -> Scalar:
         return expand_determinant(rows)
     minors = [expand_determinant(chosen) for chosen in combinations(rows, n)]
     return sqrt(sum((minor * minor for minor in minors[1:]), minors[0] * minors[0]))
-
-
-def expand_determinant(rows: Sequence[Sequence[Scalar]]) -> Scalar:
-    """Expand a determinant of scalars of any kind, without quotients, by all minors of the first rows."""
-    minors: dict[tuple[int, ...], Scalar] = {(): 1.0}
-    for row in rows:
-        longer: dict[tuple[int, ...], Scalar] = {}
-        for columns, minor in minors.items():
-            for j, entry in enumerate(row):
-                if j not in columns:
-                    wider = tuple(sorted((*columns, j)))
-                    sign = -1.0 if (len(columns) - wider.index(j)) % 2 else 1.0
-                    longer[wider] = minor * entry * sign + longer.get(wider, 0.0)
-        minors = longer
-    return minors[tuple(range(len(rows)))]

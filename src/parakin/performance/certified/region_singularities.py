@@ -9,11 +9,11 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from ...algebra import Scalar, Term, absolute
+from ...algebra import Scalar, Term, absolute, expand_determinant
 from ...arrays import Array, Flags, Indices
 from ...budget import Budget
 from ...errors import PoseError
-from ...model.rates import expand_determinant, trace_determinant
+from ...model.rates import trace_determinant
 from ...workspaces.certified.constraints import Constraint
 from ...workspaces.certified.plane_cuts import CLEARED
 from ...workspaces.certified.region import Region

@@ -6,8 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ...algebra import Scalar
-from ...model.rates import expand_determinant
+from ...algebra import Scalar, expand_determinant
 from .constraints import Constraint, TracedPose
 from .sign_proofs import SignProof, make_side_proof
 

@@ -301,6 +301,8 @@ def test_nx_times(read):
         *("RAPDI", "FEDRATE/5", "SPINDLE/3", "ORIGN/1,2,3", "CYCL/OFF", "UNTS/MM", "MSY/0,0,0,1,0,0,0,1,0"),
         *("TLON,GOLFT/L1", "GOFWD/C1,PAST,L2", "GOLFT/L1", "TLLFT,GOLFT/L1", "COPY/1,TRANSL,10,0,0,1"),
         *("CALL/SUB1", "ROTABL/90", "M1=MACRO/A", "L1)LOOPST"),
+        *("RAPID/OFF", "RAPID/ON", "RAPID,GOTO/1,2,3", "MULTAX,GOTO/1,2,3", "FEDRAT,9/GOTO/1,2,3", "COOLNT,ON"),
+        *("GOTO/1  2,3,4", "GOTO/1,2,3      00010", "GOTO/1,2, 3\t\t4", "FEDRAT/1   5"),
     ],
 )
 def test_refused_with_the_line(read, statement):
@@ -406,7 +408,30 @@ def test_settings_that_change_nothing(read):
     assert len(path) == 2 and [note.text for note in path.notes] == ["words that only inform: SET"]
 
 
+TILTED = "FEDRAT/9\nMULTAX/ON\nGOTO/0,0,0,0.6,0,0.8\nMULTAX/OFF\n"
+
+
+def test_a_tilted_axis_is_not_carried_on_after_multax_off(read):
+    for motion in ("GOTO/1,0,0\n", "RAPID\nGOTO/1,0,0\n", "GODLTA/1,0,0\n", "FROM/1,0,0\n"):
+        refused(read, TILTED + motion, TILTED.count("\n") + motion.count("\n"), "MULTAX/OFF")
+    refused(read, TILTED + "CYCLE/DRILL,DEPTH,5,CLEAR,2\nGOTO/1,0,0\n", 6, "MULTAX/OFF")
+    for words in ("TLAXIS/0,0,1\nGOTO/1,0,0\n", "GOTO/1,0,0,0,0,1\n", "TOOL PATH/B,TOOL,T\nGOTO/1,0,0\n"):
+        assert read(TILTED + words).axis.tolist() == [[0.6, 0, 0.8], [0, 0, 1]]
+    assert read(TILTED + "MULTAX/ON\nGOTO/1,0,0\n").axis[1].tolist() == [0.6, 0, 0.8]
+    assert len(read("MULTAX/OFF\nFEDRAT/9\nGOTO/0,0,0\nGOTO/1,0,0\n")) == 2
+    # PTC Creo's sequences of three axes are along Z
+    assert read(CREO_HEADER + TILTED + "GOTO/1,0,0\n").axis.tolist() == [[0.6, 0, 0.8], [0, 0, 1]]
+
+
 # units and feeds
+
+
+def test_units_behind_the_tool_hold_for_it_too(read):
+    tool = "CUTTER/.5,.1\nLOADTL/1,LENGTH,5\n"
+    for text in (tool + "UNITS/INCHES\n", "UNITS/INCHES\n" + tool, tool + "UNITS/MM\nUNITS/INCHES\n"):
+        path = read(text + "FEDRAT/9\nGOTO/0,0,0\n")
+        sizes = {"diameter": 12.7, "corner_radius": 2.54, "number": 1.0, "set_length": 127.0}
+        assert path.tool == pytest.approx(sizes) and path.tools[0].data == pytest.approx(sizes)
 
 
 @pytest.mark.parametrize(("unit", "scale"), [("INCH", 25.4), ("MM", 1.0)])

@@ -63,7 +63,11 @@ def test_a_coolant_without_a_code_is_noted(read):
     assert [(note.line, "coolant" in note.text) for note in path.notes] == [(4, True), (8, True)]
 
 
-@pytest.mark.parametrize("block", [" G0 X100", " M3 S500", "/G53Z0", '/"T5"', " n10 m8"])
+@pytest.mark.parametrize(
+    "block",
+    [" G0 X100", " M3 S500", "/G53Z0", '/"T5"', " n10 m8", " G68.2 X0 (a)", " M8 (b)", " TRANS X=5", " R1=2",
+     " G54;G0 X5", " CYCLE800(1)", " A = -.5", "/M8$\nINSERT G0 X5"],
+)  # fmt: skip
 def test_a_block_for_the_controller_is_refused(read, block):
     refused(read, cut(f"INSERT{block}"), 4, "INSERT")
 
@@ -71,6 +75,8 @@ def test_a_block_for_the_controller_is_refused(read, block):
 def test_an_inserted_code_is_passed_on_or_refused(read):
     assert said(read(cut("INSERT M62", 'INSERT/"M07"', "INSERT MIND THE CLAMP 5")))[0][1:4] == [["M62"], ["M7"], []]
     assert said(read(cut("INSERT/M62").replace("FINI", "INSERT/M30\nFINI")))[0][1] == ["M62"]
+    path = read(cut("INSERT MIND THE CLAMP 5", "INSERT (G0 X5)\nINSERT ; G0 X5"))
+    assert [(note.line, "comment" in note.text) for note in path.notes] == [(4, True)]
     for code in (6, 30, 98, 600):
         with pytest.raises(PoseError, match=f":4: INSERT/M{code} can't be passed on"):
             said(read(cut(f"INSERT/M{code}", "STOP")))

@@ -6,6 +6,7 @@ from ..path import ToolUse
 from .text import refuse
 
 _LENGTHS = {"length", "body_length", "set_length"}
+_SIZES = _LENGTHS | {"diameter", "corner_radius"}
 
 
 class ToolLog:
@@ -27,6 +28,11 @@ class ToolLog:
         """The diameter of the tool in use, mm; None where it is not known."""
         diameter = self.uses[-1].data.get("diameter") if self.uses else None
         return diameter if isinstance(diameter, float) and diameter > 0.0 else None
+
+    def scale_lengths(self, factor: float) -> None:
+        """Read the sizes told so far in another unit."""
+        self._group = _scale_sizes(self._group, factor)
+        self.uses = [use._replace(data=_scale_sizes(use.data, factor)) for use in self.uses]
 
     def tell(self, record: int, line: int, data: Mapping[str, float | str], *, loads: bool = False) -> bool:
         """Take what a statement before a record says of a tool; return whether it is another one than before.
@@ -79,3 +85,7 @@ class ToolLog:
                 refuse(f"tool {number:g} has length 0 in the tool table; expected it from the spindle's nose", use.line)
             uses.append(use._replace(data={**use.data, "set_length": float(table[int(number)])}, from_table=True))
         return tuple(uses)
+
+
+def _scale_sizes(data: Mapping[str, float | str], factor: float) -> dict[str, float | str]:
+    return {name: float(value) * factor if name in _SIZES else value for name, value in data.items()}

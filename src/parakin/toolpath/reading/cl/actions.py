@@ -15,7 +15,7 @@ from .circles import Circle
 from .cycles import DrillCycle, parse_cycle
 from .dialects import DIALECTS, RIGHT, UNKNOWN, DialectName, find_by_comment, find_by_word
 from .drilling import drill_hole
-from .file_frames import AXIS_TOLERANCE, build_frame, build_frame_from_matrix, normalise_direction
+from .file_frames import AXIS_TOLERANCE, UPRIGHT, build_frame, build_frame_from_matrix, normalise_direction
 from .motion import ClMotion
 from .spindle import add_dwell, set_speed
 from .word_arguments import LENGTH_UNITS, parse_feed, parse_numbers, parse_tool_data
@@ -109,14 +109,15 @@ class ClActions:
         """Start at a point; one that is not the file's first is reached in rapid (FROM)."""
         v = parse_numbers(args, (3, 6), _POINT_FORM)
         self._refuse_in_cycle_or_circle()
-        if v[3:]:
-            self.motion.axis = self.motion.normalize_axis(v[3:], line)
+        self.motion.take_axis(v[3:], line)
         self.motion.close_arc(None)
         self.motion.add_record((v[0], v[1], v[2]), line, rapid=self.motion.records.n > 0)
         self.motion.tangent = None
 
     def set_rapid(self, args: list[str], line: int) -> None:
         """Make the next motion a rapid one (RAPID)."""
+        if any(args):
+            refuse(f"{quote_short(','.join(args))} behind RAPID, which is for the next motion; expected RAPID alone")
         self.motion.rapid = True
 
     def set_arc_direction(self, args: list[str], line: int) -> None:
@@ -235,6 +236,7 @@ class ClActions:
         scale = LENGTH_UNITS[args[0]]
         if not self.motion.records.n:
             self.units = "mm" if scale == 1.0 else "inch"
+            self.tools.scale_lengths(scale / self.motion.transform.scale)
         elif scale != self.motion.transform.scale:
             self.motion.notes.add(line, "the unit of length changes within the file")
         self.units_given = True
@@ -243,7 +245,14 @@ class ClActions:
     def set_tool_axis(self, args: list[str], line: int) -> None:
         """Set the tool axis from here on (TLAXIS)."""
         v = parse_numbers(args, (3,), "a tool axis i,j,k")
-        self.motion.axis = self.motion.normalize_axis(v, line)
+        self.motion.set_axis(self.motion.normalize_axis(v, line))
+
+    def set_axis_output(self, args: list[str], line: int) -> None:
+        """Tell whether points have tool axes (MULTAX); after OFF a point has to, or is upright in a file of PTC Creo."""
+        off = args[:1] == ["OFF"]
+        if off and DIALECTS[self.dialect].upright:
+            self.motion.set_axis(UPRIGHT)
+        self.motion.axis_is_open = off and self.motion.axis != UPRIGHT
 
     def set_origin(self, args: list[str], line: int) -> None:
         """Set where the control's zero lies in the part: it is subtracted from the points after it (ORIGIN)."""
@@ -386,6 +395,6 @@ class ClActions:
     def start_tool_path(self, args: list[str], line: int) -> None:
         """Start a tool path and set its tool's name (TOOL PATH of NX)."""
         self._refuse_in_cycle_or_circle()
-        self.motion.axis = (0.0, 0.0, 1.0)
+        self.motion.set_axis(UPRIGHT)
         if "TOOL" in args[1:-1]:
             self._set_tool(line, {"name": args[args.index("TOOL", 1) + 1]})

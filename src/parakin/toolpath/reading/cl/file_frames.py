@@ -14,6 +14,7 @@ _SHORTEST = 1e-6  # a direction of a smaller length is none
 _ROUNDED = 1e-12  # a rotation closer to orthogonal than this is left as it is
 
 Triple = tuple[float, float, float]
+UPRIGHT: Triple = (0.0, 0.0, 1.0)  # the tool axis along Z
 
 
 @dataclass(frozen=True)

@@ -23,7 +23,7 @@ from .circles import (
 )
 from .cycles import DrillCycle
 from .dialects import RIGHT, UNKNOWN
-from .file_frames import AXIS_TOLERANCE, MACHINE, SMALLEST_SQUARE, FileTransform, Frame, Triple
+from .file_frames import AXIS_TOLERANCE, MACHINE, SMALLEST_SQUARE, UPRIGHT, FileTransform, Frame, Triple
 from .records import ClRecords
 from .word_arguments import FEED_UNITS
 
@@ -60,6 +60,7 @@ class ClMotion:
     """Modal state and the records made from it.
 
     position, axis : the last point and tool axis in the file's own numbers (position None: not known)
+    axis_is_open : whether the next point has to say its tool axis
     transform : from the file's numbers to the first frame, in mm
     frame, first_frame : the workpiece's frame in the machine in force, and at the first record; None: not given
     off_unit : axes off unit length: how many, first line, worst deviation
@@ -85,7 +86,8 @@ class ClMotion:
         self.frame_line = 0
         self.origin_turn: Array | None = None
         self.position: Triple | None = None
-        self.axis: Triple = (0.0, 0.0, 1.0)
+        self.axis = UPRIGHT
+        self.axis_is_open = False
         self.off_unit = np.zeros(3)
         self.rapid = False
         self.rpm = self.last_speed = math.nan
@@ -174,7 +176,7 @@ class ClMotion:
             x, y, z = self.transform.invert(here[0]).tolist()
             self.position = (x, y, z)
         if not np.array_equal(np.eye(3) if old_turn is None else old_turn, np.eye(3) if turn is None else turn):
-            self.axis = (0.0, 0.0, 1.0)  # the old axis is not in the new directions
+            self.set_axis(UPRIGHT)  # the old axis is not in the new directions
         self.set_feed(self.feed_value, None)
 
     def _relate_to_first_frame(self, scale: float, line: int) -> tuple[Array | None, Array]:
@@ -230,11 +232,18 @@ class ClMotion:
         r.n = n + 1
         self.position = tip
 
+    def set_axis(self, axis: Triple) -> None:
+        """Set the tool axis of the points from here on."""
+        self.axis, self.axis_is_open = axis, False
+
     def take_axis(self, ijk: list[float], line: int) -> Triple:
-        """Set the tool axis, if one is given; return the one before."""
+        """Set the tool axis, if one is given; return the one before. Refuse a point that leaves it open."""
         before = self.axis
         if ijk:
-            self.axis = self.normalize_axis(ijk, line)
+            self.set_axis(self.normalize_axis(ijk, line))
+        elif self.axis_is_open:
+            refuse("a point without a tool axis after MULTAX/OFF took a tilted one away; expected TLAXIS/i,j,k, "
+                   "or a point with its axis")  # fmt: skip
         return before
 
     def move_to(self, tip: Triple, ijk: list[float], line: int) -> None:
@@ -349,7 +358,7 @@ class ClMotion:
         if not self.rapid:
             self.require_feed(line, self.feed, math.nan)
         self.close_arc(np.array(self.tangent))
-        self._add_arc(Arc(line, centre, normal, radius, helix=False), end, self.axis, line)
+        self._add_arc(Arc(line, centre, normal, radius, helix=False), end, self.take_axis([], line), line)
         self.rapid = False
         self.tangent = None
 

@@ -237,7 +237,7 @@ class ClReader:
     def _may_read_plain_lines(self) -> bool:
         """Tell whether the next line depends on no line before it."""
         motion = self.motion
-        within = self.lines.is_open or motion.circle or motion.cycle or motion.open_arc
+        within = self.lines.is_open or motion.circle or motion.cycle or motion.open_arc or motion.axis_is_open
         return not (within or self.actions.finished)
 
     def _read_plain_lines(self, buffer: NDArray[np.uint8], at: int) -> int:

@@ -13,8 +13,10 @@ _NO_TEXT = re.compile(
     rf"\s*({'|'.join(name for name, word in WORDS.items() if word.ends_message)})\s*(?:[/,]|$)", re.IGNORECASE
 )
 
-# a block of G-code that the file gives the controller; a single M code is an event
-_BLOCK = re.compile(r"\s*INSERT[\s/,\"']*(?!M\s*\d+[\s\"']*$)((?:[A-Z]\s*[-+]?[\d.]+\s*)+)[\"']?\s*", re.IGNORECASE)
+_INSERT = re.compile(r"\s*INSERT[\s/,\"']*(.*?)[\s\"']*", re.IGNORECASE | re.DOTALL)
+_CODE = re.compile(r"M\s*\d+", re.IGNORECASE)  # the one that becomes an event
+_BLOCK = re.compile(r"(?<![A-Z0-9_])[A-Z]\s*=?\s*[-+.]?\d|[=#$]|\w\(", re.IGNORECASE | re.ASCII)  # a controller's words
+_COMMENT = re.compile(r"(?<!\w)\([^()]*\)|;.*", re.DOTALL)
 HIDDEN = "\0"  # a character that no line of a file has
 _LONGEST_WORD = 10
 _COORDINATES = range(3, 13)  # numbers of a point, with an axis, up to a frame
@@ -36,10 +38,7 @@ def execute_statement(actions: ClActions, text: str, line: int) -> str:
     text = text.removeprefix(HIDDEN)
     message = _TEXT.match(text)
     if message is not None:
-        block = _BLOCK.fullmatch(text)
-        if block is not None:
-            refuse(f"INSERT: {quote_short(block[1].strip())}, a block for the controller, cannot be honoured; "
-                   "expected plain statements, or INSERT of one M code")  # fmt: skip
+        _check_insert(actions, text, line)
         actions.read_comment(text, line)
         actions.add_event(text, line)
         return message[1].upper()
@@ -52,6 +51,8 @@ def execute_statement(actions: ClActions, text: str, line: int) -> str:
     if name != "GOTO":
         actions.motion.arc_step = None
     word = WORDS.get(name)
+    if comma and word is not None and not word.whole:
+        refuse(f"{name}: a comma behind the word, or two statements in one; expected {name}/ with its values")
     if word is None:
         _take_unknown(actions, name, args, line, hidden=hidden)
         return name
@@ -63,6 +64,19 @@ def execute_statement(actions: ClActions, text: str, line: int) -> str:
     if word.event:
         actions.add_event(text, line)
     return name
+
+
+def _check_insert(actions: ClActions, text: str, line: int) -> None:
+    """Refuse an INSERT that gives the controller a block; note one of other words than a comment or an M code."""
+    insert = _INSERT.fullmatch(text)
+    if insert is None or _CODE.fullmatch(insert[1]):
+        return
+    said = _COMMENT.sub("", insert[1]).strip()
+    if _BLOCK.search(said):
+        refuse(f"INSERT: {quote_short(insert[1])}, a block for the controller, cannot be honoured; "
+               "expected plain statements, or INSERT of one M code")  # fmt: skip
+    if said:
+        actions.motion.notes.add(line, "INSERT of words that are no M code: a comment in programs")
 
 
 def _take_unknown(actions: ClActions, name: str, args: list[str], line: int, *, hidden: bool) -> None:

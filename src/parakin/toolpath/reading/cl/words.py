@@ -56,6 +56,7 @@ WORDS: dict[str, Word] = {
     "UNITS": Word(ClActions.set_units, slash=True),
     "UNIT": Word(ClActions.set_units, slash=True),
     "TLAXIS": Word(ClActions.set_tool_axis, slash=True),
+    "MULTAX": Word(ClActions.set_axis_output, event=True),
     "ORIGIN": Word(ClActions.set_origin),
     "MSYS": Word(ClActions.set_frame, slash=True),
     "CSYS": Word(ClActions.set_csys, slash=True),
@@ -81,7 +82,6 @@ WORDS: dict[str, Word] = {
     # no effect on the motion
     "STOP": _EVENT,
     "OPSTOP": _EVENT,
-    "MULTAX": _EVENT,
     "END": _EVENT,
     "MACHIN": _EVENT,
     "AUXFUN": _EVENT,

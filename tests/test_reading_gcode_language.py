@@ -303,6 +303,8 @@ def test_words_without_effect(read):
         ("G0 X0\nG0 A0. C=30.\n", 2, "Siemens"),
         ("G0 X0\nCYCLE832(0.01)\n", 2, "Siemens"),
         ("G0 X0\nG0 A3=0 B3=0 C3=1\n", 2, "Siemens"),
+        ("G0 X0\nAROT Z30\n", 2, "Siemens"),
+        ("G0 X0\nSTART_PRINT BED=60\n", 2, "Marlin"),
         (";FLAVOR:Marlin\nG28\n", 2, "Marlin"),
         ("G0 X0 F1\nG1 X1 E0.5\n", 2, "Marlin"),
         ("SET_VELOCITY_LIMIT ACCEL=1\n", 1, "Marlin"),

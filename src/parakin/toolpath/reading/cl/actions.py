@@ -248,7 +248,7 @@ class ClActions:
         self.motion.set_axis(self.motion.normalize_axis(v, line))
 
     def set_axis_output(self, args: list[str], line: int) -> None:
-        """Tell whether points have tool axes (MULTAX); after OFF a point has to, or is upright in a file of PTC Creo."""
+        """Set whether points have tool axes (MULTAX); where OFF takes a tilted one away, refuse a point without one."""
         off = args[:1] == ["OFF"]
         if off and DIALECTS[self.dialect].upright:
             self.motion.set_axis(UPRIGHT)

@@ -30,10 +30,10 @@ class Dialect(NamedTuple):
     header : a comment ($$, PPRINT, REMARK) before the first motion that tells the dialect
     words : words that only this dialect has
     clear : what CLEAR of a cycle is where RAPTO stands beside it
-    upright : whether points after MULTAX/OFF have the tool along Z
     cycle_values : why the values of a cycle by position tell nothing
     tool_values : what the values behind the number of LOADTL are, by position: ``set_length`` from the spindle's nose
         to the tip, ``body_length`` below the holder, or something that is no length; None: not known
+    upright : whether points after MULTAX/OFF have the tool along Z
     """
 
     title: str
@@ -43,8 +43,8 @@ class Dialect(NamedTuple):
     words: tuple[str, ...] = ()
     tool_values: tuple[str, ...] | None = None
     clear: str = SAME
-    upright: bool = False
     cycle_values: str = _OTHER_VALUES
+    upright: bool = False
 
 
 DIALECTS: dict[DialectName, Dialect] = {

@@ -31,7 +31,7 @@ CONTROLS = (
         "Siemens (Sinumerik)",
         _compile_pattern(r"[\s;]*(?:%_N_\w+|\$PATH=|%MPF)"),
         _compile_pattern(
-            r"\s*(?:N\d+\s*)?\$[A-Z]{1,3}_|[^(;#$]*(?:\b[A-Z]{1,8}\d*\s*=|\bCYCLE\d+\s*\(|\bTRA(?:ORI|FOOF|NS)\b|\bSUPA\b|\bG500\b|\bMSG\s*\(|\bDEF\s+(?:REAL|INT)\b"
+            r"\s*(?:N\d+\s*)?\$[A-Z]{1,3}_|(?!\s*[A-Z]{3,}_)[^(;#$]*(?:\b[A-Z]{1,8}\d*\s*=|\bCYCLE\d+\s*\(|\bTRA(?:ORI|FOOF)\b|\bA?(?:TRANS|ROT|MIRROR|SCALE)\b|\bCIP\b|\bGOTO[FB]\b|\bSUPA\b|\bG500\b|\bMSG\s*\(|\bDEF\s+(?:REAL|INT)\b"
             r"|\bMCALL\b|\bSOFT\b|\bFFWON\b|\bCOMPCAD\b|\bORI(?:WKS|MKS|AXES|VECT)\b|\bCUT3D\w+\b|\bWORKPIECE\s*\()"
         ),
     ),
@@ -58,7 +58,7 @@ CONTROLS = (
         _compile_pattern(r"\s*(?:O\d+\s*)?\(.*\bFanuc\b"),
         _compile_pattern(
             r"[^(;]*(?:\bG0?5(?:\.1\s*Q|\s*P)|\bG54\.1\s*P|\bG6(?:5|6|8(?:\.[23])?|9)(?!\d)|\bM0?9[89](?!\d)|\bG10\.6|\bG0?8\s*P"
-            r"|\bG43\.5|\bG53\.1|\bG15(?!\d)|\bG16(?!\d)|\bG5[01](?:\.1)?(?!\d))"
+            r"|\bG43\.5|\bG53\.1|\bG15(?!\d|\s*H)|\bG16(?!\d)|\bG5[01](?:\.1)?(?!\d))"
             r"|\s*(?:N\d+\s*)?(?:IF\s*\[|WHILE\s*\[|GOTO\s*\d|END\s*\d|POPEN|DPRNT|SETVN)"
         ),
     ),

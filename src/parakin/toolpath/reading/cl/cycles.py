@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 from ..text import is_number, parse_number, quote_short, refuse
 from .dialects import BELOW, DOWN, HEIGHT, Dialect
+from .file_frames import Triple
 from .word_arguments import FEED_UNITS, parse_numbers
 
 # name of a cycle: how its motion goes
@@ -61,6 +62,13 @@ class DrillCycle(NamedTuple):
     kind: str = "drill"
     step: float = 0.0
     dwell: tuple[float, bool] | None = None
+
+
+class CycleStart(NamedTuple):
+    """Where a drill cycle began: height along the tool axis in the file's unit, and that axis."""
+
+    height: float
+    axis: Triple
 
 
 class _Options(NamedTuple):

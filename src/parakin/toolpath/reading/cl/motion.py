@@ -21,7 +21,7 @@ from .circles import (
     prove_hand,
     settle_sweep,
 )
-from .cycles import DrillCycle
+from .cycles import CycleStart, DrillCycle
 from .dialects import RIGHT, UNKNOWN
 from .file_frames import AXIS_TOLERANCE, MACHINE, SMALLEST_SQUARE, UPRIGHT, FileTransform, Frame, Triple
 from .records import ClRecords
@@ -47,13 +47,6 @@ class Arc(NamedTuple):
     radius: float
     helix: bool
     turns: int = 0
-
-
-class CycleStart(NamedTuple):
-    """Where a drill cycle began: height along the tool axis in the file's unit, and that axis."""
-
-    height: float
-    axis: Triple
 
 
 class ClMotion:

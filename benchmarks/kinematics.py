@@ -14,7 +14,7 @@ from parakin.kernels.batch import count_cores
 
 COUNT = 1_000_000
 # What each has to keep to: inverse and direct, times the copy.
-BOUNDS = {"tricept": (2.0, 12.0), "hexapod": (2.0, 25.0), "linear_delta": (None, 6.0)}
+BOUNDS = {"tricept": (2.0, 12.0), "hexapod": (2.0, 25.0), "lambda6": (2.0, None), "linear_delta": (None, 6.0)}
 
 
 def poses_around_home(machine: pk.Machine, rng: np.random.Generator) -> np.ndarray:
@@ -31,7 +31,7 @@ def poses_around_home(machine: pk.Machine, rng: np.random.Generator) -> np.ndarr
 def main() -> str:
     rng = np.random.default_rng(1)
     rows = []
-    for name in ("tricept", "hexapod", "linear_delta"):
+    for name in BOUNDS:
         machine = pk.load(name)
         poses = poses_around_home(machine, rng)
         joints = np.empty((COUNT, len(machine.joints)))

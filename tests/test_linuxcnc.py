@@ -21,6 +21,7 @@ from test_forward import CLOSE, allowed, garbage, legs_regularity, nudged
 import parakin as pk
 from parakin.cli import main
 from parakin.controllers.linuxcnc.config import write_hal
+from parakin.controllers.linuxcnc.hand_box import find_hand_box
 from parakin.controllers.linuxcnc.home_pose import find_home_pose
 from parakin.controllers.linuxcnc.kinematics_module import write_module
 from parakin.kinematics.closure_roots import find_roots
@@ -127,6 +128,22 @@ def test_the_inverse_is_the_librarys(m, modules):
     assert np.array_equal(found[codes != 0], last[codes != 0])  # refused, it leaves the joints as they were
 
 
+@pytest.mark.parametrize("name", ["linear_delta", "tricept"])
+def test_where_the_box_proves_a_pose_it_is_taken_as_if_measured(name, modules, tmp_path):
+    """In the box, on its faces and beside them a module that measures nothing there answers as one that does."""
+    m = load_shipped(name)
+    box, rng = find_hand_box(m), np.random.default_rng(6)
+    shares = rng.uniform(-0.05, 1.05, (COUNT // 5, len(m.axes)))
+    shares[::2] = np.clip(np.round(shares[::2], 1), 0.0, 1.0)
+    poses = np.vstack([box.low + shares * (box.high - box.low), poses_about(m, COUNT // 10)])
+    last = np.nan_to_num(outward(m, m.inverse(poses)))
+    found, codes = Stub(tmp_path).built(m, box=box).inverse(world(m, poses), last)
+    joints, measured = modules(m).inverse(world(m, poses), last)
+    assert np.array_equal(codes, measured)
+    assert np.array_equal(found, joints)
+    assert (codes == 0).mean() > 0.5
+
+
 def winding_path(m, count=20_000):
     """Poses about home that turn on and on and swing through the pole of head and table."""
     t = np.linspace(0.0, 1.0, count)[:, None]
@@ -206,6 +223,20 @@ def test_the_forward_undoes_the_inverse_and_is_the_librarys(m, modules):
     assert place.max() < 1e-9
     assert turned.max() < closely
     assert (rows[~done] == world(m, starts)[~done]).all()  # refused, it leaves the pose as it was
+
+
+@pytest.mark.parametrize("name", ["linear_delta", "rotary_delta", "lambda6", "eclipse"])
+def test_legs_in_another_mode_are_refused(name, modules):
+    """Joints of the same pose in every other working mode, from that very pose: their slopes tell the mode."""
+    m = load_shipped(name)
+    poses = allowed(name)[:200]
+    own = m.inverse(poses)
+    for mode in m.modes[:: max(1, len(m.modes) // 8)]:
+        joints = m.inverse(poses, mode=mode)
+        apart = np.abs(signed(m, joints, own)).max(1) > 0.02
+        codes = modules(m).forward(outward(m, joints[apart]), world(m, poses[apart]))[1]
+        assert (codes != 0).all()
+        assert apart.all() or mode == m.mode
 
 
 @representatives

@@ -101,11 +101,11 @@ class Stub:
         command = ["gcc", *FLAGS, *warnings, f"-I{HERE}", f"-I{self.folder}", "-shared", "-o", target, *sources, "-lm"]
         subprocess.run(command, check=True)
 
-    def built(self, machine, *options):
-        """A machine's module."""
+    def built(self, machine, *options, box=None):
+        """A machine's module, which knows a box of poses that are proved to be good, or measures each."""
         stub, name = self.library, name_kinematics(machine)
         source = self.folder / f"{name}.c"
-        source.write_text(write_module(machine))
+        source.write_text(write_module(machine, box))
         (self.folder / name_model(machine)).write_text(write_model(machine))
         self.compile([*options, source], self.folder / f"{name}.so")
         return Kinematics(stub, self.folder / f"{name}.so", len(machine.joints))

@@ -301,7 +301,7 @@ def write_hal(machine: Machine, equipment: Equipment | None = None) -> str:
     commanded = [f"net told-{i} joint.{i}.pos-cmd => kins.joint-{i}" for i in range(len(machine.joints))]
     return _HAL.format(
         name=machine.name,
-        made=hash_kinematics(machine),
+        made=hash_kinematics(machine, find_hand_box(machine)),
         head=head,
         base_period="base_period_nsec=[EMCMOT]BASE_PERIOD " if equipment and equipment.card.period else "",
         loading="\n".join(loading),

@@ -9,6 +9,7 @@ from ...machine import Machine
 from .config import write_hal, write_ini, write_rates_hal, write_tool_table
 from .first_program import write_first_program
 from .guard import name_guard, write_guard
+from .hand_box import find_hand_box
 from .hardware import equip_machine
 from .kinematics_module import name_kinematics, write_module
 from .kinematics_switch import write_switch_programs
@@ -35,7 +36,7 @@ def make_linuxcnc_configuration(
     """
     equipment = None if hardware is None else equip_machine(machine, hardware)
     texts = {
-        f"{name_kinematics(machine)}.c": write_module(machine),
+        f"{name_kinematics(machine)}.c": write_module(machine, find_hand_box(machine)),
         f"{name_guard(machine)}.c": write_guard(machine),
         f"{name_planner(machine)}.c": write_planner(machine),
         name_model(machine): write_model(machine),

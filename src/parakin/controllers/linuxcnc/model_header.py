@@ -141,18 +141,18 @@ def _write_numbers(machine: Machine) -> str:
         f"#define CYCLE {format_c(CYCLE)} /* s: the servo period */",
         f"#define STEP_FACTOR {format_c(STEP_FACTOR)} /* a joint's step beyond so much of its speed is refused */",
         f"#define COMMAND_LAG {format_c(COMMAND_LAG)} /* steps by which a commanded joint may trail */",
-        _write_array("double", "home", [format_c(value) for value in find_home_pose(machine).tolist()]),
-        _write_array("double", "same_mode", [format_c(value) for value in _list_mode_tolerances(machine)])
+        write_array("double", "home", [format_c(value) for value in find_home_pose(machine).tolist()]),
+        write_array("double", "same_mode", [format_c(value) for value in _list_mode_tolerances(machine)])
         + " /* mm, rad: joints nearer to each other stand in one working mode */",
-        _write_array("int", "turning", [str(int(unit == "rad")) for unit in machine.joint_units]),
+        write_array("int", "turning", [str(int(unit == "rad")) for unit in machine.joint_units]),
     ]
     columns = {axis: column for column, axis in enumerate(machine.axes)}
     lines.append(f'MODEL const char axis_letters[] = "{"".join(machine.axes).lower()}";')
-    lines.append(_write_array("int", "axis_numbers", [str(list(_FIELDS).index(axis)) for axis in machine.axes]))
+    lines.append(write_array("int", "axis_numbers", [str(list(_FIELDS).index(axis)) for axis in machine.axes]))
     places_and_turns = [str(columns.get(axis, -1)) for axis in _FIELDS]
-    lines.append(_write_array("int", "place_columns", places_and_turns[:3]))
-    lines.append(_write_array("int", "turn_columns", places_and_turns[3:]))
-    lines.append(_write_array("int", "turning_axis", [str(int(unit == "rad")) for unit in machine.axis_units]))
+    lines.append(write_array("int", "place_columns", places_and_turns[:3]))
+    lines.append(write_array("int", "turn_columns", places_and_turns[3:]))
+    lines.append(write_array("int", "turning_axis", [str(int(unit == "rad")) for unit in machine.axis_units]))
     return "\n".join(lines) + "\n"
 
 
@@ -169,7 +169,8 @@ def _count_leg_modes(machine: Machine) -> int:
     return len(machine.mode) - (machine.wrist is not None)
 
 
-def _write_array(kind: str, name: str, values: Sequence[str]) -> str:
+def write_array(kind: str, name: str, values: Sequence[str]) -> str:
+    """Write a constant array of C."""
     return f"MODEL const {kind} {name}[] = {{{', '.join(values)}}};"
 
 
@@ -203,13 +204,13 @@ def _write_limits(machine: Machine) -> Iterator[str]:
     near = [NEAR_LIMIT[limit.unit] * _scale_reach(limit) for limit in machine.limit_definitions]
     least = find_least_margins(machine)
     rates = np.array([choose_drive_rates(drive) for drive in machine.drives])
-    yield _write_array("char *const", "limit_names", [f'"{name}"' for name in list_limit_names(machine)])
-    yield _write_array("double", "near_limit", [format_c(value) for value in near] or ["0.0"]) + " /* mm, rad */"
-    yield _write_array("double", "least_singularity", [format_c(value) for value in least])
+    yield write_array("char *const", "limit_names", [f'"{name}"' for name in list_limit_names(machine)])
+    yield write_array("double", "near_limit", [format_c(value) for value in near] or ["0.0"]) + " /* mm, rad */"
+    yield write_array("double", "least_singularity", [format_c(value) for value in least])
     for name, values in (("joint_speed", rates[:, 0]), ("joint_acceleration", rates[:, 1])):
-        yield _write_array("double", name, [format_c(value) for value in values]) + " /* of the drives, mm, rad, s */"
+        yield write_array("double", name, [format_c(value) for value in values]) + " /* of the drives, mm, rad, s */"
     for name, ends in (("joint_low", "low"), ("joint_high", "high")):
-        yield _write_array("double", name, [format_c(getattr(drive, ends)) for drive in machine.drives])
+        yield write_array("double", name, [format_c(getattr(drive, ends)) for drive in machine.drives])
 
 
 def list_limit_names(machine: Machine) -> list[str]:
@@ -246,7 +247,7 @@ def _write_newton(machine: Machine) -> Iterator[str]:
         yield f"#define SLOW {format_c(SLOW)} /* a kept matrix that gains less than this a step is made anew */"
         yield f"#define MOST_STEPS {MOST_STEPS}"
         caps = list_step_caps(tapes.coordinates, max(machine.leg_sizes))
-        yield _write_array("double", "caps", [format_c(cap) for cap in caps]) + " /* greatest step */"
+        yield write_array("double", "caps", [format_c(cap) for cap in caps]) + " /* greatest step */"
 
 
 def _write_transfer(machine: Machine) -> str:
@@ -299,6 +300,8 @@ def _write_mathematics(machine: Machine) -> Iterator[str]:
     yield write_function(
         "measure_limits", _compile_limits(machine, True), [x, q], [InputVector("margins", len(machine.limits))]
     )
+    if _count_leg_modes(machine):
+        yield write_test("legs_keep_mode", _compile_leg_signs(machine), [x, q])
     count = len(machine.joints)
     singularities = InputVector("margins", len(list_margin_names(machine)))
     yield write_function("measure_singularities", _compile_singularities(machine), [x, q], [singularities])
@@ -358,6 +361,18 @@ def _compile_singularities(machine: Machine) -> Tape:
         wrenches = [[rate * (1.0 / norm(row)) for rate in row] for row in scaled]
         outputs.append(signs[-1] * expand_determinant(wrenches))
     return compile_tape(trace, outputs, n + len(machine.joints))
+
+
+def _compile_leg_signs(machine: Machine) -> Tape:
+    """Compile pose, joints -> the slope of every leg's closure by its joint, positive in the machine's working mode.
+
+    A leg closes at two places of its joint, and its closure rises at the one and falls at the other.
+    """
+    trace, n = Trace(), len(machine.axes)
+    b = machine.trace_rates(trace.inputs(n), trace.inputs(len(machine.joints), n)).b
+    signs = find_home_signs(machine, choose_characteristic_length(machine), machine.mode).tolist()
+    slopes = [b[row][joint] * signs[1 + row] for row, joint in enumerate(machine.closure_joints)]
+    return compile_tape(trace, slopes, n + len(machine.joints))
 
 
 def bounds_drive(machine: Machine, limit: Limit) -> bool:

@@ -197,11 +197,13 @@ static int same_legs(const double *p, const double *q)
     return 1;
 }
 
-/* Whether the legs stand in the working mode: in another one the inverse would make them jump. A table's turns move the
-   legs, so each of its solutions counts. */
+/* Whether legs that close stand in the working mode: in another one the inverse would make them jump. Beside the end of a
+   leg's reach, where two modes meet, the joints decide; a table's turns move the legs, so each of its solutions counts. */
 static int in_mode(const double *x, const double *q)
 {
     double again[JOINTS];
+    if (legs_keep_mode(x, q))
+        return 1;
     inverse(x, again);
     int same = same_legs(again, q);
 #if WRIST
@@ -294,7 +296,7 @@ static int find_pose_in_motion(double *near, const double *q, double *x)
     return pose_known && find_pose_near(near, q, x);
 }
 
-int kinematicsForward(const double *joints, EmcPose *world,
+__attribute__((flatten)) int kinematicsForward(const double *joints, EmcPose *world,
                       const KINEMATICS_FORWARD_FLAGS *fflags, KINEMATICS_INVERSE_FLAGS *iflags)
 {
     double q[JOINTS], near[AXES], x[AXES];

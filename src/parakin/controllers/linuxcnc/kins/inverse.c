@@ -18,6 +18,20 @@ static int can_step(const double *q, const double *last)
     return !far_from_last || !far_from_commanded;
 }
 
+/* Whether a pose may be taken. In the box for moves by hand that is proved; elsewhere its limits and singularities are
+   measured. */
+static int may_be_at(const double *x, const double *q)
+{
+#if HAND_BOX
+    int inside = 1;
+    for (int i = 0; i < AXES; i++)
+        inside &= x[i] >= box_low[i] && x[i] <= box_high[i];
+    if (inside)
+        return 1;
+#endif
+    return allowed(x, q) && regular(x, q);
+}
+
 __attribute__((flatten)) int kinematicsInverse(const EmcPose *world, double *joints,
                       const KINEMATICS_INVERSE_FLAGS *iflags, KINEMATICS_FORWARD_FLAGS *fflags)
 { /* flattened: what joints, limits and singularities have in common is computed once */
@@ -32,7 +46,7 @@ __attribute__((flatten)) int kinematicsInverse(const EmcPose *world, double *joi
         take_axes_as_joints(x, q);
     } else {
         shift_tip(x, *pins->tool_offset);
-        if (!find_joints(x, last, q) || !allowed(x, q) || !regular(x, q))
+        if (!find_joints(x, last, q) || !may_be_at(x, q))
             return -1;
     }
     if (steps_are_watched) {

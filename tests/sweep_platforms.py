@@ -1,0 +1,88 @@
+"""Count all solutions of random general platforms: forty complex ones each, the same as PHCpack's where asked.
+
+``python sweep_platforms.py FIRST LAST LOG`` takes seeds FIRST to LAST - 1 and adds a line to LOG for each; what the log
+has already is not run again. With ``phc`` behind it each platform goes through PHCpack's black box too, which takes
+seconds and loses a solution now and then: then it starts again with other random numbers.
+"""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+import numpy as np
+from test_continuation import draw_platform, platform, read_phc_places, write_phc_system
+
+ALL = 40
+RESTARTS = 5
+SAME = 1e-6  # m
+
+
+def draw_posed(seed):
+    """Feet, corners and a pose that the seed draws."""
+    rng = np.random.default_rng([seed, 40])
+    pose = np.append(rng.uniform(-0.5, 0.5, 2), [rng.uniform(0.8, 2.0), *rng.uniform(-0.6, 0.6, 3)])
+    return *draw_platform(rng), pose
+
+
+def solve_by_phcpack(folder, feet, corners, lengths):
+    """The places (k, 3) of all solutions, complex, m; how many starts that took."""
+    system, out = folder / "platform.in", folder / "platform.out"
+    system.write_text(write_phc_system(feet, corners, lengths))
+    places = np.empty((0, 3))
+    for start in range(1, RESTARTS + 1):
+        subprocess.run(["phc", "-b", system, out], check=True, capture_output=True, timeout=600)
+        again = read_phc_places(out.read_text())
+        places = again if len(again) > len(places) else places
+        if len(places) == ALL:
+            break
+    return places, start
+
+
+def compare(found, theirs):
+    """Say how our answer differs from PHCpack's places."""
+    real = theirs[np.abs(theirs.imag).max(1) < SAME].real
+    apart = np.linalg.norm(found.poses[:, None, :3] / 1000.0 - real, axis=2)
+    unknown = (apart.min(0, initial=np.inf) > SAME).sum()
+    missed = (apart.min(1, initial=np.inf) > SAME).sum()
+    return "agrees" if len(theirs) == ALL and not unknown and not missed else (
+        f"DIFFERS: PHCpack has {len(theirs)}, {len(real)} real, {unknown} of them unknown to us, {missed} of ours to it"
+    )  # fmt: skip
+
+
+def sweep(folder, seed, by_phcpack):
+    """What is to be told of one platform."""
+    feet, corners, pose = draw_posed(seed)
+    machine = platform(folder, feet, corners, home=pose)
+    lengths = machine.inverse(machine.home)
+    found = machine.assemblies(lengths)
+    total = len(found) + found.complex_count
+    open_by = np.abs(machine.inverse(found.poses) - lengths).max(initial=0.0)
+    near = np.abs(found.poses - machine.home).max(1).min(initial=np.inf)
+    proved = np.isfinite(found.radii).all()
+    good = total == ALL and not found.lost_count and proved and open_by < 1e-9 * lengths.max() and near < 1e-4
+    words = f"{'good' if good else 'BAD'} {len(found)} real {found.complex_count} complex {found.infinite_count} at infinity "
+    words += f"{found.lost_count} lost, open by {open_by:.1e} mm, {'proved' if proved else 'not proved'}, home off {near:.1e}"
+    if by_phcpack:
+        theirs, starts = solve_by_phcpack(folder, feet, corners, lengths / 1000.0)
+        words += f"; PHCpack {compare(found, theirs)} after {starts}"
+    return words
+
+
+def main():
+    first, last, log = int(sys.argv[1]), int(sys.argv[2]), Path(sys.argv[3])
+    done = {line.split()[0] for line in log.read_text().splitlines()} if log.exists() else set()
+    with tempfile.TemporaryDirectory() as folder:
+        for seed in range(first, last):
+            if str(seed) not in done:
+                try:
+                    words = sweep(Path(folder), seed, "phc" in sys.argv)
+                except Exception as error:  # it is told, and the others are run
+                    words = f"BAD {type(error).__name__}: {error}"
+                with log.open("a") as file:
+                    file.write(f"{seed} {words}\n")
+
+
+main()

@@ -32,13 +32,13 @@ def solve_by_phcpack(folder, feet, corners, lengths):
     system, out = folder / "platform.in", folder / "platform.out"
     system.write_text(write_phc_system(feet, corners, lengths))
     places = np.empty((0, 3))
-    for start in range(1, RESTARTS + 1):
-        subprocess.run(["phc", "-b", system, out], check=True, capture_output=True, timeout=600)
+    starts = 0
+    while len(places) < ALL and starts < RESTARTS:
+        starts += 1
+        subprocess.run(["phc", "-b", system, out], check=True, capture_output=True)
         again = read_phc_places(out.read_text())
         places = again if len(again) > len(places) else places
-        if len(places) == ALL:
-            break
-    return places, start
+    return places, starts
 
 
 def compare(found, theirs):
@@ -47,9 +47,9 @@ def compare(found, theirs):
     apart = np.linalg.norm(found.poses[:, None, :3] / 1000.0 - real, axis=2)
     unknown = (apart.min(0, initial=np.inf) > SAME).sum()
     missed = (apart.min(1, initial=np.inf) > SAME).sum()
-    return "agrees" if len(theirs) == ALL and not unknown and not missed else (
-        f"DIFFERS: PHCpack has {len(theirs)}, {len(real)} real, {unknown} of them unknown to us, {missed} of ours to it"
-    )  # fmt: skip
+    if len(theirs) == ALL and not unknown and not missed:
+        return "agrees"
+    return f"DIFFERS: it has {len(theirs)}, {len(real)} real, {unknown} of them unknown to us, {missed} of ours to it"
 
 
 def sweep(folder, seed, by_phcpack):
@@ -63,8 +63,9 @@ def sweep(folder, seed, by_phcpack):
     near = np.abs(found.poses - machine.home).max(1).min(initial=np.inf)
     proved = np.isfinite(found.radii).all()
     good = total == ALL and not found.lost_count and proved and open_by < 1e-9 * lengths.max() and near < 1e-4
-    words = f"{'good' if good else 'BAD'} {len(found)} real {found.complex_count} complex {found.infinite_count} at infinity "
-    words += f"{found.lost_count} lost, open by {open_by:.1e} mm, {'proved' if proved else 'not proved'}, home off {near:.1e}"
+    ends = f"{found.infinite_count} at infinity, {found.lost_count} lost"
+    words = f"{'good' if good else 'BAD'} {len(found)} real {found.complex_count} complex, {ends}, "
+    words += f"open by {open_by:.1e} mm, {'proved' if proved else 'not proved'}, home off {near:.1e}"
     if by_phcpack:
         theirs, starts = solve_by_phcpack(folder, feet, corners, lengths / 1000.0)
         words += f"; PHCpack {compare(found, theirs)} after {starts}"

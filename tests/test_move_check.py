@@ -23,7 +23,14 @@ void run(const double *moves, int *verdicts, int count)
     for (i = 0; i < count; i++) verdicts[i] = check_move(moves + 2 * CM_AXES * i, moves + 2 * CM_AXES * i + CM_AXES);
 }
 """
-MOVES = {"hexapod": 6_000, "lambda6": 14_000, "linear_delta": 30_000, "orthoglide": 25_000, "hbg80_3d": 25_000}
+MOVES = {
+    "hexapod": 6_000,
+    "lambda6": 14_000,
+    "linear_delta": 30_000,
+    "orthoglide": 25_000,
+    "hbg80_3d": 15_000,
+    "five_bar": 10_000,
+}
 SAMPLES = 40
 
 
@@ -68,7 +75,7 @@ def test_no_false_yes(name, tmp_path):
         if share in (0.0, 1.0):
             allowed &= np.sign(machine.sides(poses)) == side
     assert not (proved & ~allowed).any()
-    assert 0.3 < allowed.mean() < 0.97
+    assert 0.3 < allowed.mean() < 0.99
     assert (proved & allowed).sum() > 0.98 * allowed.sum()
 
 

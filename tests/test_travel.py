@@ -181,3 +181,27 @@ def test_a_direction_of_zeros_is_refused_by_its_option(capsys):
     assert capsys.readouterr().err == '--along: "X=0": a direction that is not zero expected\n'
     assert main(["reach", "tricept", "--along", "X=1e-300"]) == 2  # it never ended
     assert capsys.readouterr().err == "axis: a direction of at least 1e-06 mm or rad expected\n"
+
+
+def test_a_turning_joint_goes_on_over_half_a_turn():
+    """The columns' ranges lie alike about their middles, 50° to either side, and one of them goes over -180°."""
+    machine = load_shipped("eclipse")
+    travel = machine.travel(machine.home, "C")
+    assert np.degrees([travel.ahead.distance, travel.back.distance]) == pytest.approx([50.0, 50.0], abs=1e-6)
+    assert np.degrees(machine.inverse(machine.home - np.radians([0, 0, 0, 0, 0, 40.0]))[1]) == pytest.approx(-190.0)
+
+
+def test_an_arm_whose_zero_points_elsewhere_has_the_same_workspace(tmp_path):
+    """Angles counted from the other side, in ranges moved by half a turn, over ±180° or not."""
+    machine = load_shipped("five_bar")
+    text = (Path(pk.__file__).parent / "machines" / "five_bar.yaml").read_text()
+    text = text.replace("zero: [1, 0, 0]", "zero: [-1, 0, 0]")
+    text = text.replace("[60 deg, 220 deg]", "[-120 deg, 40 deg]").replace("[-40 deg, 120 deg]", "[140 deg, 300 deg]")
+    (tmp_path / "turned.yaml").write_text(text)
+    turned = pk.load(tmp_path / "turned.yaml")
+    poses = np.random.default_rng(5).uniform([-700.0, -100.0], [700.0, 700.0], (20_000, 2))
+    allowed = machine.check(poses) == 0
+    np.testing.assert_array_equal(allowed, turned.check(poses) == 0)
+    joints = machine.inverse(poses[allowed])
+    np.testing.assert_allclose(turned.inverse(poses[allowed]), joints + [-np.pi, np.pi], atol=1e-12)
+    assert (joints > np.pi).any()

@@ -12,22 +12,22 @@ from ...version import __version__
 
 Firmware = Literal["Klipper", "grblHAL", "FluidNC", "RepRapFirmware"]
 
-_HALF_TURN = 3.141592653589793
+_TURN = 6.283185307179586
 _REGISTER = (1 << 40) - 1  # of a tape's operands: above it stands what else the interpreter is told
 
 
 def render_move_check(machine: Machine) -> str:
     """Render the C header with ``check_move`` for a machine in its own working mode.
 
-    Raises :class:`NoMethodError` for a machine with turning joints of head and table, or with joints that may turn by
-    more than ±180°: which turn they are in depends on more than the move.
+    Raises :class:`NoMethodError` for a machine with turning joints of head and table, or with joints whose range is more
+    than a turn: which turn they are in depends on more than the move.
     """
     if machine.wrist is not None:
         raise NoMethodError(f"{machine.name}: check_move is for machines without turning joints in head and table")
     for joint in machine.turning_joints:
         drive = machine.drives[joint]
-        if max(-drive.low, drive.high) > _HALF_TURN:
-            raise NoMethodError(f"{machine.name}: check_move needs {drive.name} to stay within ±180 deg")
+        if drive.high - drive.low > _TURN:
+            raise NoMethodError(f"{machine.name}: check_move needs {drive.name} to stay within one turn")
     line = machine.line_tapes(machine.mode)
     tables = [_render_tape("values", line.values), _render_tape("rates", line.rates)]
     tables.append(f"#define CM_INPUTS {line.values.inputs}")

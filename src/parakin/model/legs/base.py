@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
+from math import cos, isfinite, pi, sin
 from typing import ClassVar, Literal
 
-from ...algebra import Mat, Scalar, Vec, add, apply, dot, sub
+from ...algebra import Mat, Scalar, Vec, add, apply, atan2, dot, sub
 from ...errors import NoMethodError
 from ..elements import Drive, Point, Unit
+from ..nominal_values import find_nominal_value
 
 
 @dataclass(frozen=True)
@@ -48,6 +50,19 @@ class Link:
     drive: int | None = None
     carrier: int | None = None
     meets: Literal["platform", "ring"] | int | None = None
+
+
+def measure_turn(drive: Drive, y: Scalar, x: Scalar) -> Scalar:
+    """Measure the angle of (x, y), rad, on the turn on which the drive's range is.
+
+    Where the range goes beyond ±180° the angle is within half a turn of its middle, and so jumps nowhere in it.
+    """
+    low, high = (find_nominal_value(end + drive.offset) for end in (drive.low, drive.high))
+    middle = 0.5 * (low + high)
+    if not isfinite(middle) or middle == 0.0 or (low >= -pi and high <= pi):
+        return atan2(y, x)
+    s, c = sin(middle), cos(middle)
+    return middle + atan2(c * y - s * x, c * x + s * y)
 
 
 def close_rod(foot: Vec, point: Vec, square: Scalar) -> Scalar:

@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
-from ...algebra import ORIGIN, Scalar, Vec, atan2, sincos, sqrt
+from ...algebra import ORIGIN, Scalar, Vec, sincos, sqrt
 from ..elements import Signs, Size, Unit
-from .base import Inverse, Leg, Link, Reach, close_rod
+from .base import Inverse, Leg, Link, Reach, close_rod, measure_turn
 
 _UP: Vec = (0.0, 0.0, 1.0)
 
@@ -41,7 +41,8 @@ class Column(Leg):
         out = self.radius - sqrt(x * x + y * y)
         reach = self.rod**2 - out * out
         root = sqrt(reach)
-        return Inverse([atan2(y, x), z - root if signs == "-" else z + root], (Reach(reach, self.rod),))
+        height = z - root if signs == "-" else z + root
+        return Inverse([measure_turn(self.drives[0], y, x), height], (Reach(reach, self.rod),))
 
     def struts(self, point: Vec, joints: list[Scalar]) -> list[tuple[Vec, Vec]]:
         s, c = sincos(joints[0])

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from ...algebra import Scalar, Vec, add, atan2, cross, dot, scale, sincos, sqrt, sub
+from ...algebra import Scalar, Vec, add, cross, dot, scale, sincos, sqrt, sub
 from ..elements import Direction, Point, Signs, Size
-from .base import Inverse, Leg, Link, Reach, close_rod
+from .base import Inverse, Leg, Link, Reach, close_rod, measure_turn
 
 
 @dataclass(frozen=True)
@@ -39,7 +39,7 @@ class Crank(Leg):
         m = (dot(w, w) + (self.arm**2 - self.rod**2)) / (2.0 * self.arm)
         reach = x * x + y * y - m * m
         root = sqrt(reach) if signs == "+" else -sqrt(reach)
-        return Inverse([atan2(y * m - x * root, x * m + y * root)], (Reach(reach),))
+        return Inverse([measure_turn(self.drives[0], y * m - x * root, x * m + y * root)], (Reach(reach),))
 
     def struts(self, point: Vec, joints: list[Scalar]) -> list[tuple[Vec, Vec]]:
         foot = self._foot(joints[0])

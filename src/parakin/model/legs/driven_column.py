@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-from ...algebra import Scalar, Vec, atan2, sincos
-from .base import Inverse, Link
+from ...algebra import Scalar, Vec, sincos
+from .base import Inverse, Link, measure_turn
 from .column import Column
 
 
@@ -34,7 +34,7 @@ class DrivenColumn(Column):
         x, y, z = point
         s, c = sincos(column.joints[0])
         up, inward = z - column.joints[1], self.radius - (x * c + y * s)
-        return replace(column, joints=[*column.joints, atan2(up, inward)])
+        return replace(column, joints=[*column.joints, measure_turn(self.drives[2], up, inward)])
 
     def links(self, point: Vec, joints: list[Scalar]) -> list[Link]:
         carriage, slide, link = super().links(point, joints)

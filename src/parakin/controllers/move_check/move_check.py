@@ -19,8 +19,8 @@ _REGISTER = (1 << 40) - 1  # of a tape's operands: above it stands what else the
 def render_move_check(machine: Machine) -> str:
     """Render the C header with ``check_move`` for a machine in its own working mode.
 
-    Raises :class:`NoMethodError` for a machine with turning joints of head and table, or with joints whose range is more
-    than a turn: which turn they are in depends on more than the move.
+    Raises :class:`NoMethodError` for a machine with turning joints of head and table, or with joints whose range is
+    more than a turn: which turn they are in depends on more than the move.
     """
     if machine.wrist is not None:
         raise NoMethodError(f"{machine.name}: check_move is for machines without turning joints in head and table")

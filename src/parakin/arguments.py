@@ -30,6 +30,7 @@ F = TypeVar("F", bound=Callable[..., Any])
 TURN = 2.0 * pi * (1.0 + 1e-9)  # rad; more is hardly meant
 _LEAST, _GREATEST = 1e-60, 1e60  # of a number's size: its powers do not overflow
 _ROWS_LOOKED_AT = 1000  # for angles that look like degrees
+_ARRAY_LIKE = set(get_args(ArrayLike)) or {ArrayLike}  # from NumPy 2.5 on an alias with a name, not a union
 _PACKAGE = __name__.partition(".")[0]
 _NAMES = {
     float: "a number",
@@ -85,8 +86,14 @@ def _resolve_hints(function: Callable[..., Any]) -> Iterator[tuple[str, Any]]:
                 yield name, hint
 
 
+def _expand_alias(hint: Any) -> Any:
+    """Expand an alias with a name, as NumPy's arrays have from 2.5 on, to what it stands for."""
+    return hint if hint is ArrayLike else getattr(hint, "__value__", hint)
+
+
 def _accept_value(value: object, hint: Any) -> bool:
     """Tell whether a value is of the kind that an annotation tells; of unknown annotations all are."""
+    hint = _expand_alias(hint)
     if isinstance(hint, str):
         names = {kind.__name__ for kind in type(value).__mro__} | ({"None"} if value is None else set())
         return not names.isdisjoint(name.strip() for name in hint.split("|"))
@@ -94,7 +101,7 @@ def _accept_value(value: object, hint: Any) -> bool:
     if hint is Any or hint == ArrayLike or isinstance(hint, TypeVar):
         return True
     if origin in (Union, types.UnionType):
-        if set(get_args(ArrayLike)) <= set(get_args(hint)):  # its values are read where they are used
+        if set(get_args(hint)) >= _ARRAY_LIKE:  # its values are read where they are used
             return True
         return any(_accept_value(value, option) for option in get_args(hint))
     if hint is None or hint is type(None):
@@ -166,6 +173,7 @@ def _is_numeric(value: object) -> bool:
 
 
 def _describe_hint(hint: Any) -> str:
+    hint = _expand_alias(hint)
     origin = get_origin(hint)
     if origin in (Union, types.UnionType):
         return " or ".join(_describe_hint(option) for option in get_args(hint))

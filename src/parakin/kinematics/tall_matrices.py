@@ -17,9 +17,9 @@ def compute_determinants(matrices: Array) -> Array:
     rows, columns = matrices.shape[-2:]
     if rows == columns:
         return np.asarray(np.linalg.det(matrices))
-    known: Flags = np.isfinite(matrices).all((-2, -1), keepdims=True)  # type: ignore[assignment]
-    values = np.linalg.svd(np.where(known, matrices, 0.0), compute_uv=False).prod(-1)
-    return np.asarray(np.where(known[..., 0, 0], values, np.nan))
+    known: Flags = np.asarray(np.isfinite(matrices).all((-2, -1)))
+    values = np.linalg.svd(np.where(known[..., None, None], matrices, 0.0), compute_uv=False).prod(-1)
+    return np.asarray(np.where(known, values, np.nan))
 
 
 def invert_from_left(matrices: Array, metric: Array) -> Array:

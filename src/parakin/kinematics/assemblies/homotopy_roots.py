@@ -128,7 +128,7 @@ def _turn_to_real(points: Complex) -> Complex:
 def _measure_closures(system: Array, points: Array) -> Array:
     """Measure the greatest quadric at points (k, n): (k,)."""
     values: Array = np.abs(np.einsum("ki,rij,kj->kr", points, system, points))
-    return values.max(1, initial=0.0)  # type: ignore[no-any-return]
+    return np.asarray(values.max(1, initial=0.0))
 
 
 def _polish_points(system: AnyPoints, points: AnyPoints, steps: int) -> AnyPoints:

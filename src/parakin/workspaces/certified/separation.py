@@ -6,7 +6,7 @@ from itertools import product
 
 import numpy as np
 
-from ...arrays import Array, Flags
+from ...arrays import Array, Flags, Indices
 from .subdivision import Cells
 
 _LONGEST = {1: 4096, 2: 512, 3: 64}  # voxels along the longest edge, by dimension
@@ -37,7 +37,7 @@ def find_joined_cells(cells: Cells, position: Array) -> Flags | None:
     return np.asarray(flooded[tuple(first.T)])
 
 
-def _paint_ranges(first: Array, last: Array) -> Flags:
+def _paint_ranges(first: Indices, last: Indices) -> Flags:
     """Paint boxes of voxels, each from its first to its last one: sums of differences at their corners."""
     d = first.shape[1]
     sums = np.zeros(last.max(0) + 2, np.int64)

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from .algebra import Scalar, Vec
-from .arguments import RowsLike, bound_angles, check_range, describe_value, read_rows, warn_of_wide_angles
+from .arguments import RowsLike, bound_angles, check_range, check_text, read_rows, warn_of_wide_angles
 from .arrays import Array, AxisRange
 from .errors import NoMethodError, PoseError, quote, suggest
 from .kernels.batch import evaluate_tape, evaluate_tape_with_residual
@@ -99,8 +99,7 @@ class Machine(MachineProperties):
         """Check a working mode and return it, the default one for None; an invalid one raises :class:`PoseError`."""
         if mode is None:
             return self.mode
-        if not isinstance(mode, str):
-            raise PoseError(f"mode: a text such as {self.mode!r} expected, not {describe_value(mode)}")
+        check_text("mode", mode, f" such as {self.mode!r}")
         if mode not in self.modes:
             raise PoseError(f"mode {mode!r}: one of {', '.join(repr(m) for m in self.modes[:8])} expected")
         return mode
@@ -188,8 +187,7 @@ class Machine(MachineProperties):
         agreement : by how much legs may fail to close, mm, where joints of more drives than freedoms disagree
         """
         rows, lead = self.rows(joints, self.joints, "joints")
-        if not isinstance(method, str | None):
-            raise PoseError(f"method: a text expected, not {describe_value(method)}")
+        check_text("method", "" if method is None else method)
         check_range("agreement", agreement, 0.0, np.inf, "mm")
         starts = None if near is None else self._starts(near, lead)
         own = None if mode is None else self.checked_mode(mode)

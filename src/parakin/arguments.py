@@ -48,8 +48,7 @@ def check_arguments(function: F) -> F:
         for name, value in bound.arguments.items():
             if name not in hints:
                 continue
-            if not accept_value(value, hints[name]):
-                raise PoseError(f"{name}: {describe_hint(hints[name])} expected, not {describe_value(value)}")
+            check_kind(name, value, hints[name])
             if isinstance(value, Real) and is_number_hint(hints[name]):
                 bound.arguments[name] = _check_size(name, float(value))
         return function(*bound.args, **bound.kwargs)
@@ -64,10 +63,10 @@ def _check_size(name: str, value: float) -> float:
     return value
 
 
-def check_text(name: str, value: object, such_as: str = "") -> None:
-    """Raise :class:`PoseError` for a value that is no text."""
-    if not isinstance(value, str):
-        raise PoseError(f"{name}: a text{such_as} expected, not {describe_value(value)}")
+def check_kind(name: str, value: object, kind: Any, such_as: str = "") -> None:
+    """Raise :class:`PoseError` for a value that is not of the kind that an annotation tells."""
+    if not accept_value(value, kind):
+        raise PoseError(f"{name}: {describe_hint(kind)}{such_as} expected, not {describe_value(value)}")
 
 
 def check_positive(name: str, value: float, unit: str = "") -> float:

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from .algebra import Scalar, Vec
-from .arguments import RowsLike, bound_angles, check_range, check_text, read_rows, warn_of_wide_angles
+from .arguments import RowsLike, bound_angles, check_kind, check_range, read_rows, warn_of_wide_angles
 from .arrays import Array, AxisRange
 from .errors import NoMethodError, PoseError, quote, suggest
 from .kernels.batch import evaluate_tape, evaluate_tape_with_residual
@@ -99,7 +99,7 @@ class Machine(MachineProperties):
         """Check a working mode and return it, the default one for None; an invalid one raises :class:`PoseError`."""
         if mode is None:
             return self.mode
-        check_text("mode", mode, f" such as {self.mode!r}")
+        check_kind("mode", mode, str, f" such as {self.mode!r}")
         if mode not in self.modes:
             raise PoseError(f"mode {mode!r}: one of {', '.join(repr(m) for m in self.modes[:8])} expected")
         return mode
@@ -187,7 +187,7 @@ class Machine(MachineProperties):
         agreement : by how much legs may fail to close, mm, where joints of more drives than freedoms disagree
         """
         rows, lead = self.rows(joints, self.joints, "joints")
-        check_text("method", "" if method is None else method)
+        check_kind("method", method, str | None)
         check_range("agreement", agreement, 0.0, np.inf, "mm")
         starts = None if near is None else self._starts(near, lead)
         own = None if mode is None else self.checked_mode(mode)
@@ -307,8 +307,7 @@ class Machine(MachineProperties):
         of it is not finite.
         """
         n, m, rows = len(self.axes), len(self.joints), self.rows(poses, self.axes, "poses")[0]
-        if not isinstance(whole, bool):
-            raise PoseError(f"whole: True or False expected, not {describe_value(whole)}")
+        check_kind("whole", whole, bool)
         tape = self.model.rates_tape()
         both = evaluate_tape(tape, rows, np.empty((len(rows), tape.outputs)), self._joints_of(joints, len(rows)), whole)
         ends = m * n, m * (n + m)

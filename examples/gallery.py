@@ -12,18 +12,20 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import trimesh
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
-from mpl_toolkits.mplot3d.art3d import Line3DCollection, Poly3DCollection
+from matplotlib.patheffects import withStroke
+from mpl_toolkits.mplot3d.art3d import Line3DCollection
 
 import parakin as pk
+from parakin.export.shaded_bodies import add_bodies
+from parakin.export.space_axes import fit_to_room, set_space_axes
 from parakin.units import name_display_unit, to_display
 
 BLUE, ORANGE, GREEN, GREY = "#1565c0", "#ef6c00", "#2e7d32", "#90a4ae"
+WALL = "#5b9bd5"
 VIEW: dict[str, Any] = {"elev": 24.0, "azim": -56.0}  # degrees
-LIGHT = np.array([0.30, -0.55, 0.78])
 TILT = np.deg2rad(15.0)
 TOTAL = dict.fromkeys("ABC", (-TILT, TILT))
 
@@ -81,37 +83,22 @@ def plane(width: float = 6.4, height: float = 6.0) -> tuple[Figure, Any]:
 
 def space(count: int = 1, width: float = 7.0, height: float = 6.4) -> tuple[Figure, list[Any]]:
     figure = Figure(figsize=(width, height), dpi=110)
-    figure.subplots_adjust(0.02, 0.04, 0.95, 0.98, wspace=0.12)
     return figure, [figure.add_subplot(1, count, i + 1, projection="3d", **VIEW) for i in range(count)]
 
 
 def frame(ax: Any, low: np.ndarray, high: np.ndarray, names: tuple[str, ...]) -> None:
-    for letter, name, a, b in zip("xyz", names, low, high, strict=True):
-        getattr(ax, f"set_{letter}lim")(a, b)
-        getattr(ax, f"set_{letter}label")(f"{name} [mm]", fontsize=8)
-        getattr(ax, f"{letter}axis").set_pane_color((0.975, 0.98, 0.985, 1.0))
-    ax.set_box_aspect(high - low, zoom=0.92)
-    ax.tick_params(labelsize=7)
-    ax.locator_params(nbins=5)
+    """Give axes in space equal scales over a box, and the room that there is."""
+    set_space_axes(ax, 0.5 * (low + high), 0.5 * (high - low), names)
+    spec = ax.get_subplotspec()
+    left = spec.colspan.start / spec.get_gridspec().ncols
+    fit_to_room(ax, 0.5 * (high - low), (left + 0.01, 0.02, left + 1.0 / spec.get_gridspec().ncols - 0.01, 0.94))
 
 
-def solid(ax: Any, shape: pk.Mesh, colour: str, alpha: float) -> None:
-    """Draw a surface, lit by the normals at its vertices, so that it looks as smooth as it is."""
-    normals = trimesh.Trimesh(shape.vertices, shape.faces).vertex_normals[shape.faces].mean(1)
-    shades = np.outer(0.68 + 0.32 * (normals @ LIGHT), to_rgb(colour)) + 0.06
-    faces = np.column_stack([shades.clip(0.0, 1.0), np.full(len(shades), alpha)])
-    # Edges of an opaque face's own colour hide the seams that antialiasing leaves.
-    edge = {"edgecolors": faces, "linewidths": 0.3} if alpha == 1.0 else {"linewidths": 0.0}
-    ax.add_collection3d(Poly3DCollection(shape.vertices[shape.faces], facecolors=faces, **edge))
-
-
-def outlines(ax: Any, found: pk.Workspace, levels: np.ndarray, step: float, colour: str) -> None:
-    """Draw a workspace as contours, plane by plane."""
-    assert found.box is not None
-    field = pk.sample_field(found.region, found.box, step, seconds=None)
-    cuts = pk.find_cross_sections(field, "Z", levels.tolist(), seconds=None)
-    lines = [np.insert(outline, 2, cut.value, axis=1) for cut in cuts for outline in cut.outlines]
-    ax.add_collection3d(Line3DCollection(lines, colors=colour, linewidths=0.7, alpha=0.75))
+def solid(ax: Any, shapes: list[tuple[pk.Mesh, str, float]]) -> None:
+    """Draw surfaces, each in a colour and with an opacity, lit by the normals of the limits that make them."""
+    bodies = [shape.make_body(np.broadcast_to(to_rgb(colour), (len(shape.faces), 3)), opacity)
+              for shape, colour, opacity in shapes]  # fmt: skip
+    add_bodies(ax, bodies)
 
 
 def edges(low: np.ndarray, high: np.ndarray) -> list[list[np.ndarray]]:
@@ -134,19 +121,21 @@ def tricept(page: Page) -> None:
     page.paper("Tricept: FME Transactions 41 (2013)", "tricept")
     found = pk.workspace(pk.region(pk.load("tricept"), at={"B": 0.0, "C": 0.0}))
     boxes: list[tuple[str, pk.InscribedBox, str]] = [
-        ("a", pk.find_largest_box(found.region), ORANGE),
-        ("b", pk.find_largest_box(found.region, shape=(3.0, 3.0, 1.0)), GREEN),
-        ("c", pk.find_largest_box(found.region, shape=(1.0, 1.0, 1.0)), "#6a1b9a"),
+        ("a", pk.find_largest_box(found.region, seconds=None), ORANGE),
+        ("b", pk.find_largest_box(found.region, shape=(3.0, 3.0, 1.0), seconds=None), GREEN),
+        ("c", pk.find_largest_box(found.region, shape=(1.0, 1.0, 1.0), seconds=None), "#6a1b9a"),
     ]
     figure, (ax,) = space()
     assert found.box is not None
     low, high = found.box
-    outlines(ax, found, np.linspace(low[2], high[2], 26)[1:-1], 25.0, BLUE)
-    for (name, box, colour), (x, y) in zip(boxes, ((1, 0), (0, 0), (1, 1)), strict=True):  # corners clear of each other
-        ax.add_collection3d(Line3DCollection(edges(box.low, box.high), colors=colour, linewidths=1.8, label=name))
-        corner = (box.low, box.high)[x][0], (box.low, box.high)[y][1], box.high[2] + 40.0
-        ax.text(*corner, name, color=colour, fontsize=11, weight="bold", ha="center", zorder=10)
     frame(ax, low, high, found.axes)
+    solid(ax, [(meshed(found, 30.0), WALL, 0.22)])
+    for (name, box, colour), (x, y) in zip(boxes, ((0, 0), (1, 0), (1, 1)), strict=True):  # corners clear of each other
+        for line in edges(box.low, box.high):
+            ax.plot(*np.transpose(line), color=colour, linewidth=1.8, zorder=20)
+        corner = (box.low, box.high)[x][0], (box.low, box.high)[y][1], box.high[2] + 40.0
+        halo = [withStroke(linewidth=3.0, foreground="white")]
+        ax.text(*corner, name, color=colour, fontsize=12, weight="bold", ha="center", zorder=30, path_effects=halo)
     sizes = "; ".join(f"{name} {' × '.join(f'{e:,.0f}' for e in box.edges)}" for name, box, _ in boxes)
     page.add(
         "tricept_4",
@@ -162,9 +151,13 @@ def hbg80(page: Page) -> None:
     page.paper("HBG80: Parallel kinematic machines (about 2000)", "hbg80_2d")
     # Both assemblies count.
     plane_region, space_region = (pk.region(pk.load(f"hbg80_{n}d"), components="all") for n in (2, 3))
-    two, three = pk.sweep_drives(plane_region, cells=48), pk.sweep_drives(space_region, cells=24)
+    two, three = (
+        pk.sweep_drives(plane_region, cells=48, seconds=None),
+        pk.sweep_drives(space_region, cells=24, seconds=None),
+    )
     # |det J| grows without end where both assemblies meet: sums over few cells are off by more than the proved bounds.
-    fine_area, fine_volume = pk.sweep_drives(plane_region, 2400).estimate, pk.sweep_drives(space_region, 240).estimate
+    fine_area = pk.sweep_drives(plane_region, 2400, seconds=None).estimate
+    fine_volume = pk.sweep_drives(space_region, 240, seconds=None).estimate
     figure, ax = plane()
     for image in two.contours:
         for number, piece in enumerate(image.pieces):
@@ -223,7 +216,9 @@ def lambda6(page: Page) -> None:
     page.paper("Lambda: IJEEC 6 (2022)", "lambda6")
     machine = pk.load("lambda6")
     level = {"A": 0.0, "B": 0.0, "C": 0.0}
-    one = pk.sweep_polar(pk.region(machine, at={**level, "Z": 1400.0}, components="all"), step=10.0, rays=72)
+    one = pk.sweep_polar(
+        pk.region(machine, at={**level, "Z": 1400.0}, components="all"), step=10.0, rays=72, seconds=None
+    )
     figure, ax = plane()
     for angle, radius in zip(one.angles, one.radii[0], strict=True):
         ax.plot(*np.outer([np.cos(angle), np.sin(angle)], [0.0, radius]), color=GREY, linewidth=0.5)
@@ -237,7 +232,7 @@ def lambda6(page: Page) -> None:
         "what the limits allow there.",
     )
     whole = pk.region(machine, at=level, components="all")
-    swept = pk.sweep_polar(whole, step=10.0, planes=50.0)
+    swept = pk.sweep_polar(whole, step=10.0, planes=50.0, seconds=None)
     figure, (ax,) = space()
     stacked(ax, swept, BLUE)
     page.add(
@@ -248,24 +243,23 @@ def lambda6(page: Page) -> None:
         f"Certified, it need not be star-shaped: {proved(pk.workspace(whole))}.",
     )
     cases = [("a) strokes", ("gap *",)), ("b) and least gaps", ("gap *.max",)), ("c) and greatest gaps", ())]
-    figure, axes = space(3, 12.0, 5.2)
+    figure, axes = space(3, 12.0, 4.8)
     numbers = []
     for ax, (title, without) in zip(axes, cases, strict=True):
         found = pk.workspace(pk.region(machine, at=level, without=without, components="all"))
         shape = meshed(found, 12.0)
-        solid(ax, shape, BLUE, 1.0)
         frame(ax, np.array([-500.0, -500.0, 800.0]), np.array([500.0, 500.0, 2100.0]), found.axes)
-        ax.set_title(title, fontsize=10)
+        solid(ax, [(shape, WALL, 1.0)])
+        figure.text((len(numbers) + 0.5) / len(cases), 0.94, title, fontsize=10, ha="center")
         numbers.append(f"{title}: {proved(found)}")
     page.add("lambda_11", "Figure 11: the limits, one after the other", figure, "; ".join(numbers) + ".")
-    total = pk.workspace(pk.region(machine, every=TOTAL, components="all"), gap=0.05)
+    total = pk.workspace(pk.region(machine, every=TOTAL, components="all"), gap=0.05, seconds=None)
     achievable = pk.workspace(pk.region(machine, at=level, components="all"))
     figure, (ax,) = space()
     assert achievable.box is not None
     low, high = achievable.box
-    outlines(ax, achievable, np.linspace(low[2], high[2], 26)[1:-1], 25.0, BLUE)
-    solid(ax, meshed(total, 15.0), ORANGE, 1.0)
     frame(ax, low, high, achievable.axes)
+    solid(ax, [(meshed(achievable, 12.0), WALL, 0.22), (meshed(total, 12.0), ORANGE, 1.0)])
     page.add(
         "lambda_13",
         "Figure 13: the total orientation workspace inside the achievable one",
@@ -273,16 +267,6 @@ def lambda6(page: Page) -> None:
         f"A, B and C anywhere in ±15° (the paper's Figure 12 is the flow chart of this): {proved(total)}, that is "
         f"{total.volume.estimate / achievable.volume.estimate:.0%} of the achievable workspace.",
     )
-
-
-def blocks(low: np.ndarray, size: np.ndarray) -> Poly3DCollection:
-    """The faces of boxes that look at the viewer: +x, -y, +z."""
-    faces, colours = [], []
-    for axis, end, shade in ((0, 1.0, "#64b5f6"), (1, 0.0, "#42a5f5"), (2, 1.0, "#bbdefb")):
-        square = np.insert(np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]]), axis, end, axis=1)
-        faces.append(low[:, None] + square * size[:, None])
-        colours += [shade] * len(low)
-    return Poly3DCollection(np.concatenate(faces), facecolors=colours, edgecolors="#37474f", linewidths=0.15)
 
 
 def stacked(ax: Any, swept: pk.PolarWorkspace, colour: str) -> None:
@@ -294,17 +278,17 @@ def stacked(ax: Any, swept: pk.PolarWorkspace, colour: str) -> None:
 
 def orthoglide(page: Page) -> None:
     page.paper("Orthoglide: Chablat and Wenger, Chemnitz (2000)", "orthoglide")
-    found = pk.workspace(pk.region(pk.load("orthoglide"), components="all"), cell=14.0)
+    found = pk.workspace(pk.region(pk.load("orthoglide"), components="all"), cell=14.0, seconds=None)
     cells = found.cells
     assert found.box is not None
     figure, (ax,) = space()
-    full = cells.estimate > 0.5
-    ax.add_collection3d(blocks(cells.low[full], cells.size[full]))
     frame(ax, *found.box, found.axes)
+    solid(ax, [(meshed(found, 4.0), WALL, 1.0)])
     page.add(
         "orthoglide_3",
-        "Figure 3: Cartesian workspace as an octree",
+        "Figure 3: Cartesian workspace",
         figure,
+        "The paper draws the blocks of an octree; this is the surface on which the least limit is zero. "
         f"{int(cells.inside.sum()):,} cells proved inside, {int((~cells.inside).sum()):,} at the boundary, the "
         f"smallest {cells.size.min():.1f} mm. {proved(found)}. The thin end is in the other assembly mode.",
     )

@@ -48,9 +48,11 @@ FLOORS = [
         "controllers.gcode_text",
         "export.files",
         "export.number_format",
-        "export.figure_file",
         "export.colours",
+        "export.rasterising",
     ],
+    ["export.shaded_bodies"],
+    ["export.space_axes", "export.figure_file"],
     ["controllers.event_commands", "export.machine", "export.tables"],
     ["controllers.event_lines", "export.page"],
     ["controllers.joints", "controllers.linuxcnc", "export.report", "export.workspace"],
@@ -67,9 +69,9 @@ FLOORS = [
 HEIGHT = {room: height for height, floor in enumerate(FLOORS) for room in floor}
 CORE = ["arrays", "algebra", "budget", "kernels", "model", "kinematics", "machine_properties", "machine"]
 CORE += ["families", "dynamics", "workspaces", "performance", "calibration", "accuracy", "stiffness", "synthesis"]
-RIM = {"pathlib", "json", "io", "tempfile", "shutil", "plotly", "matplotlib", "pyarrow", "rich", "cyclopts"}
+RIM = {"pathlib", "json", "io", "tempfile", "shutil", "matplotlib", "pyarrow", "rich", "cyclopts"}
 RIM |= {"pydantic", "ruamel", "http", "socket", "subprocess"}
-NO_PATH_NEEDS = {"plotly", "matplotlib", "rich", "cyclopts"}
+NO_PATH_NEEDS = {"matplotlib", "rich", "cyclopts"}
 
 
 @cache
@@ -143,7 +145,7 @@ def test_starting_imports_nothing_heavy(module):
     code = f"import sys, {module}; print(*sys.modules)"
     loaded = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.split()
     assert module in loaded
-    heavy = {"numpy", "numba", "pydantic", "plotly", "matplotlib", "pyarrow", "scipy", "ruamel.yaml"}
+    heavy = {"numpy", "numba", "pydantic", "matplotlib", "pyarrow", "scipy", "ruamel.yaml"}
     heavy |= {"trimesh", "skimage"}
     assert not heavy & set(loaded)
 

@@ -373,7 +373,7 @@ def run(*command, **options):
 def test_help_imports_nothing_heavy():
     code = (
         "import sys; from parakin.cli import main; assert main(['--help']) == 0; "
-        "heavy = {'numpy', 'numba', 'pydantic', 'pyarrow', 'plotly', 'matplotlib', 'ruamel'}; "
+        "heavy = {'numpy', 'numba', 'pydantic', 'pyarrow', 'matplotlib', 'ruamel'}; "
         "print(heavy & set(sys.modules), file=sys.stderr)"
     )
     done = run(sys.executable, "-c", code)

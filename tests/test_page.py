@@ -1,5 +1,6 @@
 """The page of a machine in Chromium: its numbers are the library's, and it does what is clicked and dragged."""
 
+import json
 import zipfile
 
 import numpy as np
@@ -332,6 +333,21 @@ def test_an_offence_is_clicked(tmp_path, browser):
         inside = tab.frame_locator("iframe")
         assert inside.locator("#verdict").get_attribute("class") == "bad"  # it begins at the first offence
         assert "long.ngc:4: leg tower_b can't close" in inside.locator(".offence").first.inner_text()
+        tab.focus("#curves")
+        for key in ("ArrowRight", "ArrowRight", "ArrowDown"):  # its first curve's second point, and the next curve
+            tab.keyboard.press(key)
+        read = tab.locator("#curves .note").inner_text().split("\n")
+        figure = json.loads(tab.locator("[data-figure=curves]").inner_text())
+        trace = next(trace for trace in figure["data"] if trace["name"] == read[2])
+        assert read[:2] == [f"line {trace['customdata'][1]}, record 1", f"{trace['y'][1]:,.3f} mm"]
+        box = tab.locator("#curves").bounding_box()
+        tab.mouse.move(box["x"] + 0.4 * box["width"], box["y"] + 60)
+        tab.mouse.down()
+        tab.mouse.move(box["x"] + 0.6 * box["width"], box["y"] + 60)
+        drawn = tab.evaluate("document.querySelector('#curves canvas').toDataURL()")
+        tab.mouse.up()
+        tab.mouse.move(0, 0)
+        assert tab.evaluate("document.querySelector('#curves canvas').toDataURL()") != drawn  # a closer view
         tab.goto((tmp_path / "long.html").as_uri())
         offence = tab.locator(".offence").first
         assert "long.ngc:4: leg tower_b can't close" in offence.inner_text()

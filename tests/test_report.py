@@ -254,7 +254,7 @@ def test_panels_share_their_time(figures, trajectory):
 
 def test_long_trajectories_stay_small(trajectory, html):
     assert 3 * len(trajectory.profile.row) > 9000  # so curves are thinned here
-    assert len(html) < 8_000_000
+    assert len(html) < 2_000_000
 
 
 def test_jerks_are_drawn_where_they_are_limited():

@@ -9,21 +9,22 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-PICTURES = (".png", ".pdf", ".svg")
+SCREEN = ".png"
+PICTURES = (SCREEN, ".pdf", ".svg")
 
-_SCREEN = 150  # dots an inch
+_DOTS = 150  # dots an inch
 _COLUMN, _PAGE = 3.5, 7.2  # inches: a column of a page, and both
 _NARROW = 8.0  # inches on the screen: a figure no wider is printed in a column
 _PRINTED_FONT = 7.0  # points
-_PRINTED_DOTS = 400  # an inch, of shaded surfaces, whose thousands of faces are an image on the page too
+_PRINTED_DOTS = 400  # an inch, of maps, which are an image on the page too
 
 
 def render_figure(
     inches: tuple[float, float],
     draw: Callable[[Figure], None],
     add_heading: Callable[[Figure], None],
-    suffix: str = ".png",
-    dots: int = _SCREEN,
+    suffix: str = SCREEN,
+    dots: int = _DOTS,
 ) -> bytes:
     """Render a drawing as a file of a kind, one of :data:`PICTURES`.
 
@@ -31,12 +32,12 @@ def render_figure(
     add_heading : called for the screen only, for a printed figure has a caption
     dots : an inch, on the screen
 
-    Printed, text is as large as a caption's, and stays text; only shaded surfaces become images.
+    Printed, text is as large as a caption's, and stays text; only maps become images.
     """
     from matplotlib import rc_context
     from matplotlib.figure import Figure
 
-    printed = suffix != ".png"
+    printed = suffix != SCREEN
     scale = (_COLUMN if inches[0] <= _NARROW else _PAGE) / inches[0] if printed else 1.0
     data = BytesIO()
     with rc_context({"svg.fonttype": "none", "svg.hashsalt": "parakin", "pdf.fonttype": 42}):
@@ -52,10 +53,11 @@ def render_figure(
 
 
 def _fit_to_page(figure: Figure) -> None:
-    """Set all text in one size, and make images of shaded surfaces and maps, whose seams would show."""
+    """Set all text in one size, draw bodies as polygons, and make images of maps, whose seams would show."""
     from matplotlib.contour import QuadContourSet
     from matplotlib.text import Text
-    from mpl_toolkits.mplot3d.art3d import Poly3DCollection
+
+    from .shaded_bodies import print_bodies
 
     for text in figure.findobj(Text):
         text.set_fontsize(_PRINTED_FONT)
@@ -63,8 +65,9 @@ def _fit_to_page(figure: Figure) -> None:
         axes.tick_params(labelsize=_PRINTED_FONT)
         if figure.get_figwidth() < _PAGE and hasattr(axes, "get_zlim"):
             axes.locator_params(nbins=3)  # a column has no room for more
-    for surface in figure.findobj(lambda item: isinstance(item, Poly3DCollection | QuadContourSet)):
-        surface.set_rasterized(True)
+    for map_ in figure.findobj(QuadContourSet):
+        map_.set_rasterized(True)
+    print_bodies(figure)
 
 
 def _drop_date(suffix: str) -> dict[str, None]:

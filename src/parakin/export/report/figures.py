@@ -1,7 +1,4 @@
-"""Interactive figures for HTML pages that need no network: plotly's own JSON, written without its Python classes.
-
-The classes take a second to import and check what is constant here; the browser's library is all that is needed.
-"""
+"""Figures for HTML pages that need no network, in plotly's JSON as far as ``plots.js`` draws it."""
 
 from __future__ import annotations
 
@@ -21,16 +18,16 @@ FONT = {"family": "system-ui, -apple-system, 'Segoe UI', Roboto, 'Helvetica Neue
 
 
 def round_numbers(values: ArrayLike, digits: int = 3) -> list[float | None]:
-    """Round numbers for JSON, with None for NaN and infinity: plotly leaves a gap there."""
+    """Round numbers for JSON, with None for NaN and infinity: a curve has a gap there."""
     array = np.round(np.asarray(values, float).ravel(), digits) + 0.0
     return [v if ok else None for v, ok in zip(array.tolist(), np.isfinite(array).tolist(), strict=True)]
 
 
 def render_page(title: str, body: str) -> str:
     """Render a whole HTML page around a body with figures (:func:`embed_figure`); ``body`` is HTML, ``title`` text."""
-    template = Template(files(__package__).joinpath("report.html").read_text("utf-8"))
-    script = files("plotly").joinpath("package_data", "plotly.min.js").read_text("utf-8")
-    return template.substitute(title=escape(title), body=body, plotly=script)
+    names = ("report.html", "page_frame.js", "plots.js")
+    template, page, plots = (files(__package__).joinpath(name).read_text("utf-8") for name in names)
+    return Template(template).substitute(title=escape(title), body=body, page=page, plots=plots)
 
 
 def embed_figure(name: str, figure: Figure, height: str) -> str:

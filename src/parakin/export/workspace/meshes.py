@@ -10,6 +10,8 @@ from ...arguments import check_arguments
 from ...arrays import Array, Indices
 from ...errors import PoseError
 from ...workspaces.sampled.distance_field import SampledField
+from ..shaded_bodies import ShadedBody, smooth_normals
+from .surface_fitting import fit_surface
 
 
 @dataclass(frozen=True, eq=False)
@@ -18,10 +20,12 @@ class Mesh:
 
     vertices : (V, 3) mm
     faces : (F, 3) indices of vertices
+    normals : (F, 3) of the boundary at the middle of each triangle, outward, by the gradient of the limit that makes it
     """
 
     vertices: Array
     faces: Indices
+    normals: Array
 
     @property
     def volume(self) -> float:
@@ -29,22 +33,29 @@ class Mesh:
         a, b, c = np.moveaxis(self.vertices[self.faces] - self.vertices.mean(0), 1, 0)
         return float((np.cross(a, b) * c).sum() / 6.0)
 
+    def make_body(self, colours: Array, opacity: float = 1.0) -> ShadedBody:
+        """Make the body to be drawn, its triangles in colours (F, 3)."""
+        normals = smooth_normals(self.vertices, self.faces, self.normals)
+        return ShadedBody(self.vertices[self.faces], normals, colours, opacity)
+
     def __repr__(self) -> str:
         return f"<parakin mesh: {len(self.vertices)} vertices, {len(self.faces)} triangles, {self.volume:.6g} mm³>"
 
 
 @check_arguments
 def make_mesh(field: SampledField) -> Mesh:
-    """Make the surface where a field in space is 0, by marching cubes.
+    """Make the surface where a field in space is 0, by marching cubes, fitted to the boundary's tangent planes.
 
-    Raises :class:`PoseError` for a field that is not in space.
+    Raises :class:`PoseError` for a field that is not in space, and where its time is up.
     """
     from skimage.measure import marching_cubes
 
     if field.values.ndim != 3:
         raise PoseError("a mesh needs a volume, this workspace is flat")
     vertices, faces, _, _ = marching_cubes(field.values, 0.0, gradient_direction="ascent")
-    return Mesh(field.refine_crossings(vertices.astype(np.float64)), faces.astype(np.int64))
+    faces = faces.astype(np.int64)
+    fitted = fit_surface(field, field.refine_crossings(vertices.astype(np.float64)), faces)
+    return Mesh(fitted.vertices, faces, fitted.normals)
 
 
 def format_mesh(mesh: Mesh, kind: str) -> bytes:

@@ -13,6 +13,8 @@ from ...workspaces.sampled.distance_field import SampledField
 from ...workspaces.sampled.sampling import SampledWorkspace
 from ..colours import FAINT, INK
 from ..figure_file import render_figure
+from ..shaded_bodies import add_bodies
+from ..space_axes import GREY, add_space_axes, fit_to_room
 from .describe import AnyWorkspace, describe_size, describe_workspace, format_volume
 from .meshes import Mesh
 from .sweep_curves import CurveGroup
@@ -22,11 +24,10 @@ if TYPE_CHECKING:
 
     from ...workspaces.sampled.cross_sections import CrossSection
 
-_GREY = "#607d8b"
 _VIEW = {"elev": 22.0, "azim": -56.0}  # from the front right, degrees
-_LIGHT = np.array([0.30, -0.55, 0.78]) / np.linalg.norm([0.30, -0.55, 0.78])
 _LEGEND = {"frameon": False, "fontsize": 9, "labelcolor": INK, "alignment": "left"}
 _IN_SPACE, _IN_PLANE = (12.0, 6.6), (9.6, 7.2)  # inches
+_ROOM = (0.01, 0.02, 0.58, 0.82)  # of axes in space
 _WIDE = 96  # letters of a heading's line
 _FILLED = 0.13  # opacity of a cross-section's inside
 # P. Tol's muted scheme, told apart by colour-blind people too.
@@ -65,7 +66,7 @@ def _add_title(figure: Figure, workspace: AnyWorkspace) -> None:
     name = workspace.machine.spec.title or workspace.machine.name
     figure.text(0.025, 0.945, name, color=INK, fontsize=15, weight="bold", parse_math=False)
     what = f"{fill(describe_workspace(workspace), _WIDE)}\n{describe_size(workspace)}"
-    figure.text(0.025, 0.905, what, color=_GREY, fontsize=10.5, va="top", linespacing=1.5, parse_math=False)
+    figure.text(0.025, 0.905, what, color=GREY, fontsize=10.5, va="top", linespacing=1.5, parse_math=False)
 
 
 # In space.
@@ -74,62 +75,25 @@ def _add_title(figure: Figure, workspace: AnyWorkspace) -> None:
 def _draw_space(figure: Figure, workspace: AnyWorkspace, mesh: Mesh, slices: Sequence[CrossSection]) -> None:
     from matplotlib import colormaps
     from matplotlib.colors import Normalize
-    from mpl_toolkits import mplot3d  # noqa: F401  it brings the projection
 
     axis = slices[0].axis if slices else workspace.axes[-1]
     along = workspace.axes.index(str(axis))
     scale = Normalize(mesh.vertices[:, along].min(), mesh.vertices[:, along].max())
     colours: Any = colormaps["viridis"]
-    axes: Any = figure.add_axes((0.0, 0.0, 0.58, 0.88), projection="3d")
-    _set_view(axes, mesh.vertices.min(0), mesh.vertices.max(0), workspace.axes)
-    _add_faces(axes, mesh, colours(0.12 + 0.8 * scale(mesh.vertices[mesh.faces][:, :, along].mean(1)))[:, :3])
+    axes = _add_axes(figure, mesh.vertices.min(0), mesh.vertices.max(0), workspace.axes)
+    height = mesh.vertices[mesh.faces][:, :, along].mean(1)
+    add_bodies(axes, [mesh.make_body(colours(0.12 + 0.8 * scale(height))[:, :3])])
     if slices:
         _draw_sections(figure, slices, lambda value: colours(0.12 + 0.8 * scale(value)))
 
 
-def _set_view(axes: Any, low: Array, high: Array, names: Sequence[str]) -> None:
+def _add_axes(figure: Figure, low: Array, high: Array, names: Sequence[str]) -> Any:
     half = 0.54 * (high - low)
-    for name, letter, middle, h in zip("xyz", names, 0.5 * (low + high), half, strict=True):
-        getattr(axes, f"set_{name}lim")(middle - h, middle + h)
-        axis = getattr(axes, f"{name}axis")
-        axis.set_pane_color((0.975, 0.98, 0.985, 1.0))
-        axis._axinfo["grid"].update(color="#dfe5ea", linewidth=0.6)
-        axis.line.set_color("#b0bec5")
-        getattr(axes, f"set_{name}label")(f"{letter} [mm]", color=_GREY, fontsize=9, labelpad=7)
-    seen = max(0.8 * half[0] + 0.6 * half[1], half[2] + 0.25 * half[:2].sum())
-    axes.set_box_aspect(half, zoom=float(0.74 * np.linalg.norm(half) / seen))
+    axes = add_space_axes(figure, 0.5 * (low + high), half, names)
     axes.set_proj_type("persp", focal_length=1.6)
     axes.view_init(**_VIEW)
-    axes.tick_params(labelsize=8, colors=_GREY)
-    axes.zaxis.set_tick_params(pad=5)
-    axes.locator_params(nbins=5)
-
-
-def _add_faces(axes: Any, mesh: Mesh, colours: Array) -> None:
-    """Add the faces that look at the viewer, lit from above."""
-    from mpl_toolkits.mplot3d.art3d import Poly3DCollection
-
-    corners, normals = mesh.vertices[mesh.faces], _smooth_normals(mesh)
-    up, round_ = np.radians(_VIEW["elev"]), np.radians(_VIEW["azim"])
-    eye = np.array([np.cos(up) * np.cos(round_), np.cos(up) * np.sin(round_), np.sin(up)])
-    front = normals @ eye > -0.35  # the view is in perspective, so a little more than half
-    light = 0.62 + 0.38 * (normals[front] @ _LIGHT)
-    lit = np.clip(colours[front] * light[:, None] + 0.10, 0.0, 1.0)
-    # Edges of the faces' own colour hide the seams that antialiasing leaves.
-    axes.add_collection3d(Poly3DCollection(corners[front], facecolors=lit, edgecolors=lit, linewidths=0.4))
-
-
-def _smooth_normals(mesh: Mesh) -> Array:
-    """Compute a normal for each face, the mean of those at its corners, so that the surface looks smooth."""
-    corners = mesh.vertices[mesh.faces]
-    areas = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    at_vertices = np.zeros_like(mesh.vertices)
-    for corner in mesh.faces.T:
-        np.add.at(at_vertices, corner, areas)
-    normals = at_vertices[mesh.faces].sum(1)
-    lengths = np.linalg.norm(normals, axis=1, keepdims=True)
-    smooth: Array = normals / np.where(lengths > 0.0, lengths, 1.0)
-    return smooth
+    fit_to_room(axes, half, _ROOM)
+    return axes
 
 
 def _draw_sections(figure: Figure, slices: Sequence[CrossSection], colour: Any) -> None:
@@ -150,11 +114,11 @@ def _draw_sections(figure: Figure, slices: Sequence[CrossSection], colour: Any) 
 def _set_plane(axes: Any, names: Sequence[str]) -> None:
     axes.set_aspect("equal", adjustable="datalim")
     axes.locator_params(nbins=6)
-    axes.set_xlabel(f"{names[0]} [mm]", color=_GREY, fontsize=9)
-    axes.set_ylabel(f"{names[1]} [mm]", color=_GREY, fontsize=9)
+    axes.set_xlabel(f"{names[0]} [mm]", color=GREY, fontsize=9)
+    axes.set_ylabel(f"{names[1]} [mm]", color=GREY, fontsize=9)
     axes.grid(color=FAINT, linewidth=0.7)
     axes.set_axisbelow(True)
-    axes.tick_params(labelsize=8, colors=_GREY, length=0)
+    axes.tick_params(labelsize=8, colors=GREY, length=0)
     for side in axes.spines.values():
         side.set_color("#cfd8dc")
 
@@ -171,7 +135,7 @@ def _draw_plane(figure: Figure, workspace: AnyWorkspace, field: SampledField, sl
     step = field.step / _PIXELS
     near = np.repeat(np.repeat(field.values > -field.step.min(), _PIXELS, 0), _PIXELS, 1)
     low = field.low - 0.5 * field.step
-    nearest = field.distance.find_nearest_limits(low + (np.argwhere(near) + 0.5) * step)
+    nearest = field.distance.find_nearest_limits(low + (np.argwhere(near) + 0.5) * step).limit
     limit = np.full(tuple(fine), -1)
     limit[near] = nearest
     count = np.bincount(nearest, minlength=len(workspace.region.limits))
@@ -214,14 +178,12 @@ def _draw_net(
 ) -> None:
     from matplotlib import colormaps
     from matplotlib.colors import Normalize
-    from mpl_toolkits import mplot3d  # noqa: F401  it brings the projection
     from mpl_toolkits.mplot3d.art3d import Line3DCollection
 
     low, high = field.span
     scale = Normalize(low[2], high[2])
     colours: Any = colormaps["viridis"]
-    axes: Any = figure.add_axes((0.0, 0.0, 0.58, 0.88), projection="3d")
-    _set_view(axes, low, high, workspace.axes)
+    axes = _add_axes(figure, low, high, workspace.axes)
     for group in groups:
         width = 0.6 if group.fine else 1.3
         tint = [colours(0.12 + 0.8 * scale(line[:, 2].mean())) for line in group.lines]

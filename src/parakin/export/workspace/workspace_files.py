@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from math import sqrt
 
 import numpy as np
 
@@ -16,7 +17,8 @@ from ...workspaces.sampled.distance_field import SampledField, sample_field
 from ...workspaces.sampled.drive_sweep import DriveWorkspace
 from ...workspaces.sampled.polar_sweep import PolarWorkspace
 from ...workspaces.sampled.sampling import TOO_SLOW, SampledWorkspace, find_bounding_box
-from ..figure_file import PICTURES
+from ..figure_file import PICTURES, SCREEN
+from ..shaded_bodies import MOST_PRINTED
 from .cells import format_cells_csv, format_cells_vtu
 from .describe import AnyWorkspace
 from .meshes import Mesh, format_mesh, make_mesh
@@ -55,6 +57,17 @@ class WorkspaceFiles:
     def mesh(self) -> Mesh:
         return make_mesh(self._filled_field)
 
+    @cached_property
+    def printed_mesh(self) -> Mesh:
+        """The mesh with no more triangles than a printed page wants, of a coarser field if need be."""
+        field, mesh = self._filled_field, self.mesh
+        coarser = sqrt(len(mesh.faces) / MOST_PRINTED)
+        if coarser <= 1.0:
+            return mesh
+        step = coarser * float(field.step.max())
+        return make_mesh(sample_field(field.region, field.box, step, field.distance.turns_step,
+                                      seconds=field.distance.seconds))  # fmt: skip
+
     @property
     def _filled_field(self) -> SampledField:
         if self.field is None:
@@ -76,7 +89,8 @@ class WorkspaceFiles:
             curves = build_sweep_curves(self.workspace)
             return render_curves(self.workspace, self._filled_field, curves, self.cross_sections, suffix)
         if len(self.workspace.axes) == 3:
-            return render_space(self.workspace, self.mesh, self.cross_sections, suffix)
+            mesh = self.mesh if suffix == SCREEN else self.printed_mesh
+            return render_space(self.workspace, mesh, self.cross_sections, suffix)
         return render_plane(self.workspace, self._filled_field, self.cross_sections, suffix)
 
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 from math import ceil
+from typing import NamedTuple
 
 import numpy as np
 
@@ -33,6 +34,28 @@ _CUT = 2.0  # steps from the boundary at which the distance is cut off
 _OFF = 1e-3  # steps by which nodes are kept off the boundary: no surface passes through one
 _ON_EDGE = 1e-4  # steps: less is the rounding of a point on an edge
 _HALVINGS = 4  # bisections of a grid's edge, to find where the boundary crosses it
+
+
+class NearestLimits(NamedTuple):
+    """The limit of the least distance at positions, and the swept axes at which it is least.
+
+    limit : (N,) indices in the region's limits
+    swept : (N, s) rad
+    """
+
+    limit: Indices
+    swept: Array
+
+
+class TangentPlanes(NamedTuple):
+    """The first order of a field at positions.
+
+    distance : (N,) mm, positive inside
+    normal : (N, d) unit vectors, outward; not finite where the limit has no gradient
+    """
+
+    distance: Array
+    normal: Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,6 +95,18 @@ class DistanceField:
         return self._compile([_derive_distance(constraint) for constraint in self._constraints])
 
     @cached_property
+    def _plane_tapes(self) -> dict[int, Tape]:
+        """Tapes of one limit's distance and gradient, compiled when they are asked for."""
+        return {}
+
+    def _compile_plane(self, limit: int) -> Tape:
+        if limit not in self._plane_tapes:
+            own = self._constraints[limit]
+            gradient = [alg.derivative(own.margin, x) for x in own.position]
+            self._plane_tapes[limit] = self._compile([own.margin, *gradient])
+        return self._plane_tapes[limit]
+
+    @cached_property
     def orientations(self) -> Array:
         """Samples of the swept axes (K, s), at least three of each, those that decide most often first."""
         widths = [high - low for low, high in self.region.swept_axes.values() if high > low]
@@ -98,14 +133,20 @@ class DistanceField:
                 live, rows = live[unsettled], rows[unsettled]
         return sign * distance
 
-    def find_nearest_limits(self, positions: Array) -> Indices:
-        """Find the index in the region's limits of the least distance, at the orientation that decides: (N,)."""
+    def find_nearest_limits(self, positions: Array, orientations: Array | None = None) -> NearestLimits:
+        """Find the limit of the least distance, at the orientation that decides, for positions (N, d) mm.
+
+        orientations : (K, s) rad, of the samples that may decide; all by default
+        """
+        orientations = self.orientations if orientations is None else orientations
         d, sign = positions.shape[1], 1.0 if self.region.every_orientation else -1.0
         distance, limit = np.full(len(positions), np.inf), np.zeros(len(positions), np.int64)
         rows = np.empty((len(positions), d + len(self.region.swept_axes)))
         rows[:, :d] = positions
+        swept = np.empty((len(positions), rows.shape[1] - d))
+        swept[:] = orientations[0]
         budget = Budget(self.seconds)
-        for orientation in self.orientations:
+        for orientation in orientations:
             if budget.is_spent():
                 raise PoseError(TOO_SLOW)
             rows[:, d:] = orientation
@@ -114,7 +155,19 @@ class DistanceField:
             least = each.min(1)
             better = sign * least < distance
             distance[better], limit[better] = sign * least[better], each.argmin(1)[better]
-        return limit
+            swept[better] = orientation
+        return NearestLimits(limit, swept)
+
+    def find_tangent_planes(self, positions: Array, nearest: NearestLimits) -> TangentPlanes:
+        """Find the planes that touch, to the first order, the boundary that the nearest limit makes."""
+        rows = np.column_stack([positions, nearest.swept])
+        planes = np.empty((len(rows), 1 + positions.shape[1]))
+        for limit in np.unique(nearest.limit).tolist():
+            own = np.flatnonzero(nearest.limit == limit)
+            planes[own] = evaluate_tape(self._compile_plane(limit), rows[own], planes[own], whole=False)
+        with np.errstate(invalid="ignore", divide="ignore"):
+            size = np.linalg.norm(planes[:, 1:], axis=1)
+            return TangentPlanes(planes[:, 0] / size, -planes[:, 1:] / size[:, None])
 
     def _evaluate_rows(self, rows: Array) -> Array:
         """Evaluate it at one orientation each; where a leg can't close, by the limits of reach alone."""

@@ -295,9 +295,9 @@ quote
 raise rank rate read rebuild recognise record redirect reduce refine refuse register reject relate release remove rename
 render renumber reorder repeat replace report repost require reserve reset resize resolve restore restrict retract retry
 return reuse reverse rewind rotate round route run
-sample save say scale score search select separate serve set settle share shift shorten show shrink skip smooth snap
-simulate slow solve sort space split spread square stack stage stamp start stop store stretch strip subtract suggest sum
-summarise swap sweep switch
+sample save say scale score search select separate serve set settle shade share shift shorten show shrink skip smooth
+snap simulate slow solve sort space split spread square stack stage stamp start stop store stretch strip subtract
+suggest sum summarise swap sweep switch
 tabulate take tally tell test thin tighten tilt trace track transform translate transpose trap trim turn
 undo unwind update use
 validate verify

@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 from matplotlib.image import imread
 from matplotlib.transforms import Bbox
 
-from parakin.export.machine.label_placing import Label, add_labels
+from parakin.export.machine.label_placing import BodyLabel, add_labels
 from parakin.export.rasterising import find_front_faces
 from parakin.export.shaded_bodies import ShadedBody, add_bodies, project, smooth_normals
 
@@ -87,7 +87,7 @@ def test_normals_are_smooth_over_a_bend_and_not_over_an_edge():
 
 def test_labels_keep_off_bodies_and_off_each_other():
     axes, body = make_axes_from_above(), make_square(0.0, 0.3, RED)
-    labels = [Label(text, np.zeros(3), "black", 7.0) for text in ("first", "second", "third")]
+    labels = [BodyLabel(text, np.zeros(3), "black", 7.0) for text in ("first", "second", "third")]
     add_labels(axes, labels, [body], [])
     axes.figure.savefig(BytesIO(), format="png")
     ends = project(axes, body.corners.reshape(-1, 3))[:, :2]

@@ -79,14 +79,13 @@ def print_bodies(figure: Any) -> None:
 
 
 def _make_artist(bodies: Sequence[ShadedBody], zorder: float) -> Artist:
-    from matplotlib.artist import Artist, allow_rasterization
+    from matplotlib.artist import Artist
 
     class ShadedBodies(Artist):
         """Draws bodies by the projection of their axes."""
 
         is_printed = False
 
-        @allow_rasterization
         def draw(self, renderer: Any) -> None:
             view = _View(self.axes, bodies)
             if self.is_printed:
@@ -121,13 +120,14 @@ class _View:
         self.is_clear = self.is_front & (self.opacity < 1.0)
 
     def shade(self, normals: Array, colours: Array) -> Array:
-        """Light colours (N, 3) by their normals (N, 3); of a wall that is seen from behind, by its inner side."""
+        """Shade colours (N, 3) by their normals (N, 3); of a wall that is seen from behind, by its inner side."""
         facing = normals @ self.eye
         lit = np.where(facing < 0.0, -1.0, 1.0)[:, None] * normals
         half = (_LIGHT + self.eye) / np.linalg.norm(_LIGHT + self.eye)
         gloss = _GLOSS * np.clip(lit @ half, 0.0, 1.0) ** _SHARPNESS
         light = _DARK + _BRIGHT * (0.5 + 0.5 * (lit @ _LIGHT))
-        return np.clip(colours * light[:, None] + gloss[:, None], 0.0, 1.0)
+        lights: Array = np.clip(colours * light[:, None] + gloss[:, None], 0.0, 1.0)
+        return lights
 
 
 def _draw_image(view: _View, renderer: Any, artist: Any) -> None:

@@ -42,7 +42,7 @@ def set_space_axes(axes: Any, middle: Array, half: Array, names: Sequence[str]) 
 
 
 def fit_to_room(axes: Any, half: Array, room: Room) -> None:
-    """Zoom and move axes so that they fill their room, names and numbers within; before bodies are added."""
+    """Fit axes to their room, names and numbers within, by zoom and place; before bodies are added."""
     zoom, low, high = 1.0, np.array(room[:2]), np.array(room[2:])
     for _ in range(_ROUNDS):
         first, last = _measure(axes)
@@ -58,8 +58,9 @@ def _measure(axes: Any) -> tuple[Array, Array]:
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.transforms import Bbox
 
-    figure = axes.figure
-    renderer = FigureCanvasAgg(figure).get_renderer()
+    figure: Any = axes.figure
+    canvas: Any = FigureCanvasAgg(figure)
+    renderer = canvas.get_renderer()
     figure.draw_without_rendering()
     limits = [getattr(axes, f"get_{letter}lim")() for letter in "xyz"]
     corners = project(axes, np.array(list(product(*limits))))[:, :2]

@@ -11,14 +11,14 @@ from ...arrays import Array, Flags
 from ..rasterising import find_front_faces
 from ..shaded_bodies import ShadedBody, project
 
-_CELL = 2.0  # dots of a figure that are one of the map of what is taken
+_CELL = 2.0  # dots of a figure that are one of the map of what is covered
 _ANGLES = np.linspace(0.0, 2.0 * np.pi, 16, endpoint=False)  # around the point, the right side first
 _DISTANCES = np.array([1.0, 1.4, 1.9, 2.5, 3.2, 4.0, 5.0])  # of the text's nearest edge, in heights of half a line
-_TAKEN = 1000.0  # heights that a label would go farther for not lying on anything at all
+_COVERING = 1000.0  # heights that a label would go farther for not lying on anything at all
 _GAP = 2.0  # dots around a label
 
 
-class Label(NamedTuple):
+class BodyLabel(NamedTuple):
     """A text beside a point (3,) mm, in points, red, green and blue by matplotlib's names."""
 
     text: str
@@ -27,7 +27,7 @@ class Label(NamedTuple):
     size: float
 
 
-def add_labels(axes: Any, labels: Sequence[Label], bodies: Sequence[ShadedBody], lines: Sequence[Array]) -> None:
+def add_labels(axes: Any, labels: Sequence[BodyLabel], bodies: Sequence[ShadedBody], lines: Sequence[Array]) -> None:
     """Add labels to axes in space, off ``bodies`` and off ``lines``, (2, 3) mm each."""
     from matplotlib.artist import Artist
     from matplotlib.transforms import IdentityTransform
@@ -42,11 +42,11 @@ def add_labels(axes: Any, labels: Sequence[Label], bodies: Sequence[ShadedBody],
         """Places the texts before they are drawn, for only then their sizes are known."""
 
         def draw(self, renderer: Any) -> None:
-            taken = _map_taken(axes, bodies, lines)
+            covered = _map_cover(axes, bodies, lines)
             points = project(axes, np.array([label.point for label in labels]))[:, :2]
             for text, point in zip(texts, points, strict=True):
                 box = text.get_window_extent(renderer)
-                text.set_position(_find_place(taken, point, np.array([box.width, box.height])))
+                text.set_position(_find_place(covered, point, np.array([box.width, box.height])))
 
     placing = LabelPlacing()
     placing.set_zorder(-1.0)
@@ -54,23 +54,23 @@ def add_labels(axes: Any, labels: Sequence[Label], bodies: Sequence[ShadedBody],
     axes.add_artist(placing)
 
 
-def _map_taken(axes: Any, bodies: Sequence[ShadedBody], lines: Sequence[Array]) -> Flags:
+def _map_cover(axes: Any, bodies: Sequence[ShadedBody], lines: Sequence[Array]) -> Flags:
     """Map what bodies and lines cover of the figure, a cell for some dots."""
     width, height = np.ceil(axes.figure.bbox.size / _CELL).astype(int).tolist()
     corners = np.concatenate([body.corners for body in bodies])
     screen = project(axes, corners.reshape(-1, 3)).reshape(-1, 3, 3) / [_CELL, _CELL, 1.0]
     front = find_front_faces(screen, width, height)
-    taken = np.zeros((height, width), np.bool_)
-    taken[front.row, front.column] = True
+    covered = np.zeros((height, width), np.bool_)
+    covered[front.row, front.column] = True
     steps = np.linspace(0.0, 1.0, 200)[:, None]
     for line in lines:
         column, row = (project(axes, line[0] + steps * (line[1] - line[0]))[:, :2] / _CELL).astype(int).T
         kept = (row >= 0) & (row < height) & (column >= 0) & (column < width)
-        taken[row[kept], column[kept]] = True
-    return taken
+        covered[row[kept], column[kept]] = True
+    return covered
 
 
-def _find_place(taken: Flags, point: Array, size: Array) -> Array:
+def _find_place(covered: Flags, point: Array, size: Array) -> Array:
     """Find the middle of a text's box beside a point, in dots, and take it."""
     half, line = 0.5 * size + _GAP, 0.5 * size[1]
     away = np.array([np.cos(_ANGLES), np.sin(_ANGLES)]).T
@@ -78,16 +78,16 @@ def _find_place(taken: Flags, point: Array, size: Array) -> Array:
     reach = np.min(half / np.maximum(np.abs(away), 1e-9), axis=1)
     distances = reach[:, None] + (_DISTANCES - 1.0) * line
     places = (point + distances[:, :, None] * away[:, None]).reshape(-1, 2)
-    sums = np.pad(taken, ((1, 0), (1, 0))).astype(np.int64).cumsum(0).cumsum(1)
-    most = np.array(taken.shape[::-1])
+    sums = np.pad(covered, ((1, 0), (1, 0))).astype(np.int64).cumsum(0).cumsum(1)
+    most = np.array(covered.shape[::-1])
     low = np.clip(np.floor((places - half) / _CELL).astype(int), 0, most)
     high = np.clip(np.ceil((places + half) / _CELL).astype(int), 0, most)
-    covered = sums[high[:, 1], high[:, 0]] - sums[low[:, 1], high[:, 0]] - sums[high[:, 1], low[:, 0]]
-    covered = covered + sums[low[:, 1], low[:, 0]]
+    under = sums[high[:, 1], high[:, 0]] - sums[low[:, 1], high[:, 0]] - sums[high[:, 1], low[:, 0]]
+    under = under + sums[low[:, 1], low[:, 0]]
     whole = np.prod(size / _CELL)
     outside = whole - np.minimum(np.prod(high - low, axis=1), whole)
-    cost = np.tile(_DISTANCES, len(away)) + _TAKEN * (covered + outside) / whole
+    cost = np.tile(_DISTANCES, len(away)) + _COVERING * (under + outside) / whole
     best = int(cost.argmin())
-    taken[low[best, 1] : high[best, 1], low[best, 0] : high[best, 0]] = True
+    covered[low[best, 1] : high[best, 1], low[best, 0] : high[best, 0]] = True
     place: Array = places[best]
     return place

@@ -14,7 +14,7 @@ from ..colours import INK
 from ..figure_file import PICTURES, render_figure
 from ..shaded_bodies import ShadedBody, add_bodies, smooth_normals
 from ..space_axes import add_space_axes, fit_to_room
-from .label_placing import Label, add_labels
+from .label_placing import BodyLabel, add_labels
 from .scene import Scene, build_scene
 from .solids import LOOKS, build_solids
 
@@ -50,8 +50,8 @@ def _draw_machine(figure: Figure, drawn: Scene) -> None:
     frames = _list_frame_axes(drawn)
     for _, ends, colour in frames:
         axes.plot(*ends.T, color=colour, linewidth=1.6, zorder=900)
-    labels = [Label(letter, ends[1], colour, 8.5) for letter, ends, colour in frames]
-    labels += [Label(name, place, INK, 10.5) for name, place in drawn.labels]
+    labels = [BodyLabel(letter, ends[1], colour, 8.5) for letter, ends, colour in frames]
+    labels += [BodyLabel(name, place, INK, 10.5) for name, place in drawn.labels]
     add_labels(axes, labels, bodies, [ends for _, ends, _ in frames])
 
 

@@ -56,7 +56,7 @@ def fit_surface(field: SampledField, vertices: Array, faces: Indices) -> FittedS
         planes = _find_planes(field, vertices, faces, nearest)
     for _ in range(_LANDINGS):  # of the vertices, beside an edge on one of its limits after the other
         nearest = field.distance.find_nearest_limits(vertices, deciding)
-        vertices = _land(vertices, field.distance.find_tangent_planes(vertices, nearest), field).point
+        vertices = _place_on_planes(vertices, field.distance.find_tangent_planes(vertices, nearest), field).point
     return FittedSurface(np.clip(vertices, low, high), planes.normal)
 
 
@@ -73,13 +73,13 @@ def _find_planes(field: SampledField, vertices: Array, faces: Indices, nearest: 
     own = areas / np.where(sizes > 0.0, sizes, 1.0)
     points = vertices[faces].mean(1)
     for _ in range(_LANDINGS):
-        landing = _land(points, field.distance.find_tangent_planes(points, nearest), field)
+        landing = _place_on_planes(points, field.distance.find_tangent_planes(points, nearest), field)
         points = landing.point
     return landing._replace(normal=np.where(landing.is_known[:, None], landing.normal, own))
 
 
-def _land(points: Array, planes: TangentPlanes, field: SampledField) -> _Landing:
-    """Land points on their planes; those whose plane is farther than a step of the grid stay where they are."""
+def _place_on_planes(points: Array, planes: TangentPlanes, field: SampledField) -> _Landing:
+    """Place points on their planes; those whose plane is farther than a step of the grid stay where they are."""
     with np.errstate(invalid="ignore"):
         is_known = np.abs(planes.distance) < float(field.step.max())
         landed = points + planes.distance[:, None] * planes.normal

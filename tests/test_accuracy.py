@@ -107,6 +107,23 @@ def test_shares_add_up_and_rank():
     assert np.allclose(alone.deviations**2, share * accuracy.deviations**2)
 
 
+def test_a_named_size_has_its_share_beside_its_followers():
+    """Errors of a size and of the numbers that follow it are independent, so their squares add up."""
+    machine = load_shipped("tricept")
+    size, own = {"R": "1 mm"}, {"feet": "0.05 mm"}
+    pose = pick_pose(machine)[None]
+    both, alone, rest = (pk.analyse_accuracy(machine, each, pose) for each in (size | own, size, own))
+    assert alone.deviations[0] > 0.2 * rest.deviations[0]
+    assert both.deviations[0] == pytest.approx(np.hypot(alone.deviations[0], rest.deviations[0]), rel=1e-9)
+    assert both.shares[0, 0] == pytest.approx((alone.deviations[0] / both.deviations[0]) ** 2, rel=1e-9)
+    ranges = {axis: (value, value) for axis, value in zip(machine.axes, pose[0].tolist(), strict=True)}
+    bounds = [pk.bound_worst_case(each, ranges).bound for each in (both, rest)]
+    assert bounds[0] > bounds[1] + alone.greatest[0] / 2.0
+    family = both.tolerances.family
+    sizes = family.nominal + both.tolerances.halves * np.where(np.arange(len(family.names)) % 2, -1.0, 1.0)
+    assert family.at(sizes).inverse(pose[0]) == pytest.approx(family.inverse(pose[0], sizes), abs=1e-9)
+
+
 def test_allowed_tolerances_are_the_cheapest():
     """Against a lattice of all tolerances that keep the error, and against the closed form of one pose."""
     accuracy = pk.analyse_accuracy(load_shipped("orthoglide"), {"feet": "0.05 mm", "rods": "0.02 mm"})

@@ -30,7 +30,6 @@ FLOORS = [
     ["workspaces"],
     ["performance"],
     ["calibration", "accuracy", "stiffness"],
-    ["synthesis"],
     ["toolpath.path"],
     ["toolpath.programmed_path"],
     ["toolpath.reading"],
@@ -42,7 +41,7 @@ FLOORS = [
     ["toolpath.tool_turn", "toolpath.job"],
     ["toolpath.turned_job"],
     ["toolpath"],
-    ["comparison"],
+    ["comparison", "synthesis"],
     [
         "controllers.controller",
         "controllers.gcode_text",

@@ -36,6 +36,7 @@ class QuantityKind:
 NUMBER = QuantityKind((0, 0, 0, 0), "a number", "")
 LENGTH = QuantityKind((1, 0, 0, 0), "a length", "mm, cm, m, in")
 ANGLE = QuantityKind((0, 1, 0, 0), "an angle", "deg, rad")
+TIME = QuantityKind((0, 0, 1, 0), "a time", "s, min")
 SPEED = QuantityKind((1, 0, -1, 0), "a speed", "mm/s, m/s, mm/min, m/min, in/min")
 ANGULAR_SPEED = QuantityKind((0, 1, -1, 0), "an angular speed", "deg/s, rad/s, rpm")
 ACCELERATION = QuantityKind((1, 0, -2, 0), "an acceleration", "mm/s2, m/s2, in/s2")
@@ -54,7 +55,7 @@ MODULUS = QuantityKind((-2, 0, 0, 1), "a modulus of elasticity", "GPa, MPa")
 _STRAIGHT = (LENGTH, SPEED, ACCELERATION, JERK)
 _ANGULAR = (ANGLE, ANGULAR_SPEED, ANGULAR_ACCELERATION, ANGULAR_JERK)
 _LOADS = (FORCE, TORQUE, POWER, MASS, INERTIA, DENSITY, STIFFNESS, ANGULAR_STIFFNESS, MODULUS)
-_KINDS = {kind.dimension: kind for kind in (NUMBER, *_STRAIGHT, *_ANGULAR, *_LOADS)}
+_KINDS = {kind.dimension: kind for kind in (NUMBER, TIME, *_STRAIGHT, *_ANGULAR, *_LOADS)}
 
 
 @dataclass(frozen=True)
@@ -85,6 +86,7 @@ def _build_units() -> dict[str, tuple[float, Dimension]]:
     lengths = {"mm": 1.0, "cm": 10.0, "m": 1000.0, "in": 25.4, "um": 1e-3, "µm": 1e-3}
     angles = {"deg": math.pi / 180.0, "°": math.pi / 180.0, "rad": 1.0}
     units = {"rpm": (2.0 * math.pi / 60.0, ANGULAR_SPEED.dimension)}
+    units |= {"s": (1.0, TIME.dimension), "min": (60.0, TIME.dimension)}
     for base, powers in ((lengths, (1, 0)), (angles, (0, 1))):
         for name, factor in base.items():
             units[name] = (factor, (*powers, 0, 0))

@@ -83,7 +83,7 @@ def make_tolerance_family(machine: Machine, tolerances: Sequence[Tolerance]) -> 
                 other = tolerances[owner[parameter.name]].name
                 raise PoseError(f"tolerance {tolerance.name}: {parameter.name} has one already, of {other}")
             owner[parameter.name] = index
-    family = Family(machine, [p for p in machine.parameters if p.name in owner])
+    family = Family(machine, [p for p in machine.parameters if p.name in owner], added=True)
     indices = np.array([owner[name] for name in family.names])
     halves = np.array([tolerances[i].value for i in indices])
     groups = tuple(np.flatnonzero(indices == i) for i in range(len(tolerances)))

@@ -123,7 +123,7 @@ class _Enclosure:
         trace = _SizedJumpFreeTrace(n + self.width, family.nominal.tolist())
         pose, changes = trace.inputs(n), trace.inputs(self.width, n)
         joints, placed, _ = machine.trace_equations({}).invert(pose, machine.mode)
-        equations = machine.trace_equations(dict(zip(family.names, trace.sizes, strict=True)))
+        equations = family.trace_equations(trace.sizes)
         y = [start + change for start, change in zip(placed.coordinates, changes, strict=True)]
         closures = equations.scaled_closures(y, joints)
         tip_axes = [i for i, axis in enumerate(machine.axes) if axis in "XYZ"]

@@ -8,17 +8,19 @@ from typing import TYPE_CHECKING
 
 from ..description.document import Value, YamlList, YamlMap, YamlText, read_document
 from ..errors import InputError, InputErrors, PoseError, quote, suggest
-from ..units import ANGLE, LENGTH, QuantityError, QuantityKind, parse_quantity
+from ..units import ANGLE, AXIS_UNITS, LENGTH, QuantityError, QuantityKind, parse_quantity
 from .options import load_machine
 
 if TYPE_CHECKING:
-    from ..arrays import AxisRange
+    from ..arrays import Array, AxisRange
     from ..machine import Machine
     from ..synthesis.problem import DesignProblem
+    from ..toolpath.path import ToolPath
 
 _POSES = ("box", "cylinder", "poses")
 _KEYS = (
-    "machine", "free", *_POSES, "shift", "bounds", "strokes", "drives", "struts", "tolerances", "minimise", "maximise",
+    "machine", "free", *_POSES, "shift", "bounds", "strokes", "drives", "struts", "tolerances", "part", "workpiece",
+    "minimise", "maximise",
 )  # fmt: skip
 _STROKES = ("keep", "fit")
 _CYLINDER = ("along", "diameter")
@@ -104,6 +106,8 @@ class _ProblemReader:
                 self._read_words(top, "drives"),
                 self._read_words(top, "struts"),
                 self._read_tolerances(top),
+                self._read_part(top["part"]) if "part" in top else None,
+                self._read_workpiece(top["workpiece"]) if "workpiece" in top else None,
             )
         except PoseError as error:
             key = str(error).split(":")[0]
@@ -130,6 +134,27 @@ class _ProblemReader:
         if isinstance(words, str):
             raise self.fail("tolerances: a mapping expected, such as {feet: 0.05 mm}", top["tolerances"])
         return words
+
+    def _read_part(self, value: Value) -> ToolPath:
+        """Read a tool path, whose file stands beside the problem's."""
+        from ..toolpath.reading.detect import read_path
+
+        name = self.read_text(value, "part")
+        try:
+            return read_path(Path(self.source).parent / name)
+        except InputErrors:
+            raise
+        except InputError as error:
+            raise error if error.line is not None else self.fail(f"part: {error}", name) from None
+
+    def _read_workpiece(self, value: Value) -> Array:
+        from ..toolpath.posting.frames import workpiece
+
+        axes = self.read_map(value, "workpiece", tuple(AXIS_UNITS))
+        kinds = {"mm": LENGTH, "rad": ANGLE}
+        return workpiece(
+            **{str(axis): self.read_value(own, axis, kinds[AXIS_UNITS[axis]]) for axis, own in axes.items()}
+        )
 
     def _read_poses(self, machine: Machine, value: Value) -> list[dict[str, AxisRange | float]]:
         if not isinstance(value, YamlList):

@@ -18,7 +18,7 @@ from ..kernels.tape import NewtonTapes, Tape, compile_tape
 from ..kinematics.closure_roots import MOST_STEPS, list_step_caps
 from ..machine import Machine
 from ..model.equations import Equations
-from ..model.geometric_parameters import Parameter
+from ..model.geometric_parameters import SIZES, Parameter
 from ..model.nominal_values import SizedTrace
 
 _OTHER_MODE = 1e-4  # of the greatest leg: by which joints of another working mode differ
@@ -100,10 +100,15 @@ class Family:
 
     Poses and joints are as of :class:`Machine`; sizes are rows of :attr:`names` (mm, rad), or a dict of some of them.
     Leading shapes broadcast. Nothing is traced or compiled for a machine of its own.
+
+    added : a number that follows a free named size is what this makes it, and its own difference to its nominal value
+        is added; otherwise a number that is free itself follows no size
     """
 
-    def __init__(self, machine: Machine, parameters: Sequence[Parameter]):
+    def __init__(self, machine: Machine, parameters: Sequence[Parameter], added: bool = False):
         self.machine, self.parameters = machine, tuple(parameters)
+        self._sized = [parameter.name for parameter in self.parameters if parameter.group == SIZES]
+        self._added = added and bool(self._sized)
         self.names = tuple(parameter.name for parameter in self.parameters)
         self.nominal: Array = np.array([parameter.value for parameter in self.parameters], np.float64)
         self._tapes: dict[tuple[object, ...], Tape] = {}
@@ -139,10 +144,18 @@ class Family:
         tape = self._tapes.get(key)
         if tape is None:
             trace = SizedTrace(width, self.nominal.tolist())
-            equations = self.machine.trace_equations(dict(zip(self.names, trace.sizes, strict=True)))
+            equations = self.trace_equations(trace.sizes)
             made = outputs(equations, trace.inputs(width))
             tape = self._tapes[key] = compile_tape(trace, made, width + len(self.names))
         return tape
+
+    def trace_equations(self, sizes: Sequence[Scalar]) -> Equations:
+        """Trace the equations of the machine of given sizes, scalars of any kind."""
+        own = dict(zip(self.names, sizes, strict=True))
+        if not self._added:
+            return self.machine.trace_equations(own)
+        shifts = {p.name: own[p.name] - p.value for p in self.parameters}
+        return self.machine.trace_equations({}, shifts)
 
     @property
     def _counts(self) -> tuple[int, int]:
@@ -175,7 +188,14 @@ class Family:
         lead, (rows,) = self._rows([], sizes)
         if lead != ():
             raise PoseError(f"sizes: one machine's expected, not {lead}")
-        return self.machine.replace_parameters(dict(zip(self.names, rows[0].tolist(), strict=True)))
+        own = dict(zip(self.names, rows[0].tolist(), strict=True))
+        if not self._added:
+            return self.machine.replace_parameters(own)
+        sized = self.machine.replace_parameters({name: own[name] for name in self._sized})
+        differences = {p.name: own[p.name] - p.value for p in self.parameters if p.name not in self._sized}
+        return sized.replace_parameters(
+            {p.name: p.value + differences[p.name] for p in sized.parameters if p.name in differences}
+        )
 
     def inverse(self, poses: RowsLike, sizes: RowsLike, mode: str | None = None) -> Array:
         """Compute joints for poses, (..., axes) and (..., k) -> (..., joints); NaN where the legs can't close."""

@@ -4,14 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 
 from ..arguments import check_arguments
-from ..arrays import AxisRange, Progress
+from ..arrays import Array, AxisRange, Progress
 from ..budget import SECONDS, Budget
 from ..errors import DescriptionError, PoseError
 from ..machine import Machine
+from ..toolpath.job import Job
 from .design_proof import TOLERANCE, DesignProof
 from .front import search_front
 from .problem import DesignProblem
@@ -19,6 +21,8 @@ from .search import KEPT, SLACK, Candidate
 from .wants import WANTS, MarginProof, NormProof
 
 _ALIKE = 1e-7  # relative: objectives closer than that are one
+_SPARE = 1.0 + 1e-3  # by which estimates that were too short are longer: jobs come within some 0.1 % of the quickest
+_ROUNDS = 5  # of searches with estimated times, each corrected by the jobs of the one before
 _SEARCHING = 0.7  # of the time; the rest is for proofs
 MOST_DESIGNS = 50
 
@@ -34,6 +38,7 @@ class ProvedDesign:
     boxes : how many parts of the poses the proofs examined
     proved : of each of these quantities a value that is proved to be worse nowhere; None where it is only sampled, as
         objectives without a bound are where time is short
+    job : of the problem's part, which keeps all limits too
     """
 
     machine: Machine
@@ -43,6 +48,7 @@ class ProvedDesign:
     ranges: Mapping[str, AxisRange]
     boxes: int
     proved: Mapping[str, float | None] = field(default_factory=dict)
+    job: Job | None = None
 
     def __repr__(self) -> str:
         return f"<parakin design of {self.machine.name}: {len(self.sizes)} sizes, proved with {self.boxes} boxes>"
@@ -88,18 +94,27 @@ def find_designs(
     least greatest distance from the ideal under evenly spaced weights. A proved design keeps the wants; that there is
     no better one is not proved. ``seconds`` bounds the time of all.
 
+    A part's cycle time is estimated in the search, without jerks and forces, and told by its job where a design is
+    proved. Where its bound is broken there, the search is repeated with estimates that are longer by as much.
+
     Raises :class:`PoseError` for an invalid count or time.
     """
     if not 1 <= count <= MOST_DESIGNS:
         raise PoseError(f"count: 1 to {MOST_DESIGNS} designs expected, not {count}")
     budget = Budget(seconds)
     search = (lambda f: progress(_SEARCHING * f)) if progress else None
-    candidates = search_front(problem, count, budget.take_fraction(_SEARCHING), search)
-    if candidates[0].broken > KEPT:
-        return Designs(problem, (), (), _describe_shortfall(problem, candidates[0]))
+    rounds = _ROUNDS if "cycle_time" in problem.bounds else 1
+    for left in range(rounds, 0, -1):
+        candidates = search_front(problem, count, budget.take_fraction(_SEARCHING / left), search)
+        if candidates[0].broken > KEPT:
+            return Designs(problem, (), (), _describe_shortfall(problem, candidates[0]))
+        made = [_make_design(problem, candidate) for candidate in candidates]
+        if left == 1 or not _correct_estimates(problem, candidates, made):
+            break
     proved, unproved = list[ProvedDesign](), list[UnprovedDesign]()
-    for number, candidate in enumerate(candidates):
-        design = _prove_design(problem, candidate, budget.take_fraction(1.0 / (len(candidates) - number)))
+    for number, own in enumerate(made):
+        share = budget.take_fraction(1.0 / (len(made) - number))
+        design = own if isinstance(own, UnprovedDesign) else _prove_design(problem, own, share)
         if isinstance(design, ProvedDesign):
             proved.append(design)
         else:
@@ -107,6 +122,20 @@ def find_designs(
         if progress:
             progress(_SEARCHING + (1.0 - _SEARCHING) * (number + 1) / len(candidates))
     return Designs(problem, _keep_best(problem, proved), tuple(unproved))
+
+
+def _correct_estimates(
+    problem: DesignProblem, candidates: list[Candidate], made: list[_MadeDesign | UnprovedDesign]
+) -> bool:
+    """Lengthen the estimates of cycle times where a job breaks the bound that its estimate keeps; tell whether."""
+    timer, bound, excess = problem.timer, problem.bounds["cycle_time"], 1.0
+    assert timer is not None
+    for candidate, design in zip(candidates, made, strict=True):
+        if not isinstance(design, UnprovedDesign) and design.values["cycle_time"] > bound * (1.0 + TOLERANCE):
+            estimate = _measure_value(problem, candidate, "cycle_time")
+            excess = max(excess, design.values["cycle_time"] / estimate)
+    timer.factor *= excess * _SPARE if excess > 1.0 else 1.0
+    return excess > 1.0
 
 
 def _measure_value(problem: DesignProblem, candidate: Candidate, name: str) -> float:
@@ -124,24 +153,54 @@ def _describe_shortfall(problem: DesignProblem, nearest: Candidate) -> str:
     return f"no design found that keeps every want; the nearest one ({sizes}) breaks {want}"
 
 
-def _prove_design(problem: DesignProblem, candidate: Candidate, budget: Budget) -> ProvedDesign | UnprovedDesign:
-    """Make a design's machine, and prove its limits and bounds at all wanted poses."""
+class _MadeDesign(NamedTuple):
+    """A design as a machine, with the job of the part."""
+
+    machine: Machine
+    x: Array
+    sizes: dict[str, float]
+    values: dict[str, float]
+    job: Job | None
+
+
+def _make_design(problem: DesignProblem, candidate: Candidate) -> _MadeDesign | UnprovedDesign:
+    """Make a design's machine and run the part on it; ranges that are fitted are what it needs between rows too."""
     sizes = dict(zip(problem.variables, candidate.x.tolist(), strict=True))
     ranges = _fit_ranges(problem, candidate) if problem.fit_strokes else {}
     home = problem.place_poses(candidate.x, problem.middle)[0].tolist()
     numbers = {name: sizes[name] for name in problem.family.names}
+    axes = dict(zip(problem.machine.axes, home, strict=True))
+    job = None
     try:
-        axes = dict(zip(problem.machine.axes, home, strict=True))
         machine = problem.machine.replace_parameters(numbers, ranges, axes)
+        if problem.timer is not None:
+            shift = problem.list_shifts(candidate.x)
+            job = problem.timer.prepare_job(machine, shift)
+            if _widen_ranges(problem, ranges, job):
+                machine = problem.machine.replace_parameters(numbers, ranges, axes)
+                job = problem.timer.prepare_job(machine, shift)
     except DescriptionError as error:
         return UnprovedDesign(sizes, str(error))
     named = dict.fromkeys((*problem.objectives, *problem.bounds))
     values = {name: _measure_value(problem, candidate, name) for name in named}
+    if job is not None:
+        if job.seconds is None or not job.runs:
+            why = job.unplanned if job.posted.first is None else job.posted.first.text
+            return UnprovedDesign(sizes, f"the part does not run: {why}")
+        if "cycle_time" in values:
+            values["cycle_time"] = job.seconds
+    return _MadeDesign(machine, candidate.x, sizes, values, job)
+
+
+def _prove_design(problem: DesignProblem, made: _MadeDesign, budget: Budget) -> ProvedDesign | UnprovedDesign:
+    """Prove a design's limits and bounds at all wanted poses."""
+    machine, sizes, values = made.machine, made.sizes, made.values
+    numbers = {name: sizes[name] for name in problem.family.names}
     for name, bound in problem.bounds.items():
         sign = WANTS[name].sign
         if sign * values[name] > sign * bound + TOLERANCE * abs(bound):
             return UnprovedDesign(sizes, f"{name} is {values[name]:.9g}")
-    proof = DesignProof(problem, machine, problem.move_sets(candidate.x), numbers, budget)
+    proof = DesignProof(problem, machine, problem.move_sets(made.x), numbers, budget)
     wanted = {
         name: (values[name] if name in problem.objectives else problem.bounds[name])
         * (1.0 + WANTS[name].sign * TOLERANCE)
@@ -151,7 +210,9 @@ def _prove_design(problem: DesignProblem, candidate: Candidate, budget: Budget) 
     reason = proof.prove_margins(margins)
     if reason:
         return UnprovedDesign(sizes, reason)
-    proved: dict[str, float | None] = {name: wanted[name] for name in wanted}
+    proved: dict[str, float | None] = {
+        name: values[name] if WANTS[name].whole else bound for name, bound in wanted.items()
+    }
     norms = [name for name in wanted if isinstance(WANTS[name].proof, NormProof)]
     for number, name in enumerate(norms):
         seconds = budget.seconds_left / (len(norms) - number)
@@ -161,7 +222,7 @@ def _prove_design(problem: DesignProblem, candidate: Candidate, budget: Budget) 
             limit = "nothing" if worst is None else f"{worst:.9g}"
             return UnprovedDesign(sizes, f"{name} is {values[name]:.9g} where it was looked at, and {limit} is proved")
     drives = {drive.name: (drive.low, drive.high) for drive in machine.drives[: machine.leg_count]}
-    return ProvedDesign(machine, sizes, values, proof.sets[0].ends, drives, proof.boxes, proved)
+    return ProvedDesign(machine, sizes, values, proof.sets[0].ends, drives, proof.boxes, proved, made.job)
 
 
 def _is_kept(name: str, worst: float | None, bound: float) -> bool:
@@ -172,12 +233,25 @@ def _is_kept(name: str, worst: float | None, bound: float) -> bool:
 def _fit_ranges(problem: DesignProblem, candidate: Candidate) -> dict[str, AxisRange]:
     """Fit the legs' drives to what they take at the poses that matter, some 1e-8 of the machine's size wider."""
     machine = problem.machine
-    joints = problem.measure(candidate.x[None], candidate.points).joints[0]
+    joints = problem.measure(candidate.x[None], candidate.points).travel[0]
     units = machine.joint_units[: machine.leg_count]
     slack = [SLACK * (problem.tapes.size if unit == "mm" else 1.0) for unit in units]
     ends = zip(joints.min(0).tolist(), joints.max(0).tolist(), slack, strict=True)
     names = [drive.name for drive in machine.drives[: machine.leg_count]]
     return {name: (low - by, high + by) for name, (low, high, by) in zip(names, ends, strict=True)}
+
+
+def _widen_ranges(problem: DesignProblem, ranges: dict[str, AxisRange], job: Job) -> bool:
+    """Widen fitted ranges to where a job breaks them, and by the slack; tell whether there is one."""
+    widened = False
+    for offence in job.posted.offences:
+        name, _, end = offence.limit.rpartition(".")
+        if name in ranges and end in ("min", "max"):
+            low, high = ranges[name]
+            slack = SLACK * (problem.tapes.size if offence.unit == "mm" else 1.0)
+            ranges[name] = (min(low, offence.value - slack), max(high, offence.value + slack))
+            widened = True
+    return widened
 
 
 def _keep_best(problem: DesignProblem, designs: list[ProvedDesign]) -> tuple[ProvedDesign, ...]:

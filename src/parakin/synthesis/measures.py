@@ -10,6 +10,7 @@ from ..arrays import Array
 from ..families.family import FamilyRates
 from ..kernels.small_matrices import compute_singular_values, solve_quotients
 from .design_tapes import DesignTapes
+from .part_timing import PartTimer
 
 LOST = 1.0  # what a pose out of reach breaks a want by
 
@@ -19,10 +20,18 @@ class Measures:
 
     poses : (S, P + 1, axes), the last of which is the one whose side of the parallel singularities counts
     sizes : (S, 1, k) of the family
+    timer, shifts : of a part, and how far designs move it, (S, axes)
     """
 
-    def __init__(self, tapes: DesignTapes, poses: Array, sizes: Array):
-        self._tapes, self._all, self._sizes = tapes, poses, sizes
+    def __init__(
+        self,
+        tapes: DesignTapes,
+        poses: Array,
+        sizes: Array,
+        timer: PartTimer | None = None,
+        shifts: Array | None = None,
+    ):
+        self._tapes, self._all, self._sizes, self._timer, self._shifts = tapes, poses, sizes, timer, shifts
 
     @property
     def _poses(self) -> Array:
@@ -36,6 +45,25 @@ class Measures:
     def joints(self) -> Array:
         """Joints of the legs' drives, (S, P, legs)."""
         return self._all_joints[:, :-1, : self._tapes.machine.leg_count]
+
+    @cached_property
+    def at_part(self) -> Measures | None:
+        """The same designs at poses of the part's path; None without a part."""
+        if self._timer is None or self._shifts is None:
+            return None
+        poses = self._timer.checked_poses + self._shifts[:, None]
+        return Measures(self._tapes, np.concatenate([poses, self._all[:, -1:]], 1), self._sizes)
+
+    @property
+    def travel(self) -> Array:
+        """Joints of the legs' drives at the poses and along the part, (S, P', legs)."""
+        return self.joints if self.at_part is None else np.concatenate([self.joints, self.at_part.joints], 1)
+
+    @cached_property
+    def cycle_time(self) -> Array:
+        """The part's cycle time as it is estimated, (S, 1, 1) s."""
+        assert self._timer is not None and self._shifts is not None
+        return self._timer.estimate_seconds(self._shifts, self._sizes[:, 0])[:, None, None]
 
     @cached_property
     def margins(self) -> Array:

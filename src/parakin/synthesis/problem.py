@@ -13,8 +13,10 @@ from ..arrays import Array, AxisRange
 from ..errors import PoseError, quote, suggest
 from ..families.family import Family
 from ..machine import Machine
+from ..toolpath.path import ToolPath
 from .design_tapes import DesignTapes
 from .measures import Measures
+from .part_timing import PartTimer
 from .pose_sets import PoseSet, make_box_set, make_cylinder_set
 from .wants import WANTS
 
@@ -33,13 +35,16 @@ class DesignProblem:
         alone) or ``condition`` number; the least ``stiffness`` of the tip over all directions, N/mm; the greatest
         ``accuracy``, the root mean square of the tip's error within the tolerances; the least ``clearance`` of the axes
         of struts that share no joint; the greatest ``stroke`` of a leg's drive; the greatest ``footprint``: the
-        diameter, about the machine's Z axis, of the circle that holds the struts' joints at the base
+        diameter, about the machine's Z axis, of the circle that holds the struts' joints at the base; the greatest
+        ``cycle_time`` of the part, s
     fit_strokes : the ranges of the legs' drives become what the poses need; otherwise they are the machine's own
     cylinder : more poses, or these alone: ``along`` an axis, ``diameter``, the other axes as in ``box``, of those
         across it the middle
     poses : more of them, each as a box that may have no width
     drives, struts : for stiffness, as of :func:`parakin.analyse_stiffness`
     tolerances : for accuracy, as of :func:`parakin.analyse_accuracy`
+    part : a tool path that every design must run; it is moved with the poses
+    workpiece : where the part lies, as for :func:`parakin.prepare`
 
     Raises :class:`PoseError` for a problem that makes no sense.
     """
@@ -57,6 +62,8 @@ class DesignProblem:
     drives: Mapping[str, str] | str | None = None
     struts: Mapping[str, str] | str | None = None
     tolerances: Mapping[str, str] | None = None
+    part: ToolPath | None = None
+    workpiece: Array | None = None
 
     def __repr__(self) -> str:
         return f"<parakin design problem of {self.machine.name}: {len(self.free)} free numbers>"
@@ -118,6 +125,10 @@ class DesignProblem:
             self.machine.home.tolist(), self.machine.mode
         ):
             raise PoseError("bounds: clearance: every two struts share a joint")
+        if self.timer is None and "cycle_time" in self.wants:
+            raise PoseError("part: missing, cycle_time needs it")
+        if self.timer is None and self.workpiece is not None:
+            raise PoseError("workpiece: there is no part that it places")
         for name, needed in (("stiffness", "springs"), ("accuracy", "tolerances")):
             if name in self.wants:
                 getattr(self.tapes, needed)
@@ -147,6 +158,11 @@ class DesignProblem:
     def tapes(self) -> DesignTapes:
         free, own = list(self.free), (self.drives, self.struts, self.tolerances)
         return DesignTapes(self.machine, free, self.fit_strokes, *own)
+
+    @cached_property
+    def timer(self) -> PartTimer | None:
+        """What times the part; None without one."""
+        return None if self.part is None else PartTimer(self.family, self.part, self.workpiece)
 
     @property
     def family(self) -> Family:
@@ -191,11 +207,15 @@ class DesignProblem:
         for number, poses in enumerate(self.pose_sets):
             rows = points[:, 0] == number
             still[rows] = poses.place_rows(points[rows, 1:])
-        moved = np.zeros((*x.shape[:-1], 1, still.shape[1]))
+        return still + self.list_shifts(x)[..., None, :]
+
+    def list_shifts(self, x: Array) -> Array:
+        """List how far designs x (..., variables) move poses, (..., axes)."""
+        moved = np.zeros((*x.shape[:-1], len(self.machine.axes)))
         for column, key in enumerate(self.shift, len(self.family.names)):
             for axis in key.split():
-                moved[..., 0, self.machine.axes.index(axis)] = x[..., column]
-        return still + moved
+                moved[..., self.machine.axes.index(axis)] = x[..., column]
+        return moved
 
     def move_sets(self, x: Array) -> tuple[PoseSet, ...]:
         """Move the sets to where a design x (variables,) has them."""
@@ -206,7 +226,8 @@ class DesignProblem:
     def measure(self, x: Array, points: Array) -> Measures:
         """Measure designs x (S, variables) at points (P, width)."""
         poses = self.place_poses(x, np.concatenate([points, self.middle]))
-        return Measures(self.tapes, poses, x[:, None, : len(self.family.names)])
+        sizes = x[:, None, : len(self.family.names)]
+        return Measures(self.tapes, poses, sizes, self.timer, self.list_shifts(x))
 
     def list_losses(self, name: str, x: Array, m: Measures) -> Array:
         """List a quantity or a free number of designs, (S, R), less is better; the greatest of a row counts."""

@@ -89,6 +89,10 @@ class DesignSearch:
         """List margins of limits and of singularities, (S, P, k), ≥ 0 where they are kept with some slack."""
         return np.concatenate([m.margins - SLACK, m.side - _LEAST_SIDE], -1)
 
+    def _list_all_margins(self, m: Measures) -> Array:
+        """List those at the part's poses too, (S, P', k)."""
+        return np.concatenate([self._list_margins(at) for at in (m, m.at_part) if at is not None], 1)
+
     def _measure_goal(self, x: Array, m: Measures) -> Array:
         """Measure what designs are worth, (S,)."""
         each = [(self._list_losses(name, x, m).max(1) - low) / scale for name, low, scale in self.goal.terms]
@@ -96,7 +100,7 @@ class DesignSearch:
 
     def _measure_violations(self, x: Array, m: Measures) -> Array:
         """Measure by how much each want is broken, (S, wants)."""
-        lost = np.nan_to_num(np.maximum(-self._list_margins(m), 0.0), nan=LOST, posinf=LOST)
+        lost = np.nan_to_num(np.maximum(-self._list_all_margins(m), 0.0), nan=LOST, posinf=LOST)
         over = [
             np.nan_to_num(
                 np.maximum((self._list_losses(name, x, m) - bound) / _scale_bound(bound), 0.0),
@@ -167,7 +171,7 @@ class DesignSearch:
     def _list_columns(self, m: Measures) -> Array:
         """List everything of poses that has a worst one, (S, P, k): the least are sought."""
         columns = [self._list_margins(m)]
-        columns += [-want.sign * want.measure(m) for want in self.columns]
+        columns += [-want.sign * want.measure(m) for want in self.columns if not (want.spread or want.whole)]
         if self.problem.fit_strokes or any(want.spread for want in self.columns):
             columns += [m.joints, -m.joints]
         return np.concatenate(columns, -1)
@@ -197,16 +201,16 @@ class DesignSearch:
         """Minimise over finitely many poses, near x, by sequential quadratic programming with an epigraph variable."""
         m = self._measure(x[None], points)
         value = float(self._measure_goal(x[None], m)[0])
-        if not np.isfinite(value) or not np.isfinite(self._list_margins(m)).all():
+        if not np.isfinite(value) or not np.isfinite(self._list_all_margins(m)).all():
             return x
         size = max(abs(value), 1e-9) if len(self.goal.names) == 1 else 1.0
-        ends = np.stack([m.joints[0].argsort(0)[:6], (-m.joints[0]).argsort(0)[:6]])  # (2, 6, joints)
+        ends = np.stack([m.travel[0].argsort(0)[:6], (-m.travel[0]).argsort(0)[:6]])  # (2, 6, joints)
 
         def list_rows(z: Array) -> Array:
             """List constraints (S, R) of designs with their epigraph variable (S, n + 1)."""
             own, t = z[:, :-1], size * z[:, -1:]
             at = self._measure(own, points)
-            rows = [self._list_margins(at).reshape(len(z), -1)]
+            rows = [self._list_all_margins(at).reshape(len(z), -1)]
             ceilings = [(name, np.full_like(t, bound), _scale_bound(bound)) for name, bound in self.bounds.items()]
             ceilings += [(name, low + scale * t, scale * size) for name, low, scale in self.goal.terms]
             for name, ceiling, scale in ceilings:

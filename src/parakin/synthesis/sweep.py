@@ -102,7 +102,7 @@ class SweepPlan:
             problem.machine.format_yaml(), sorted(problem.free.items()),
             [(sorted(poses.ends.items()), poses.across, poses.diameter) for poses in problem.pose_sets],
             sorted(problem.shift.items()), sorted(problem.bounds.items()), problem.objectives,
-            problem.drives, problem.struts, problem.tolerances,
+            problem.drives, problem.struts, problem.tolerances, _list_bytes(problem),
             problem.fit_strokes, self.designs, self.poses, self.seed,
         )  # fmt: skip
         return sha256(repr(said).encode()).hexdigest()
@@ -210,6 +210,15 @@ class SweepEvaluator:
             if want.more:
                 kept &= column > 0.0
         return kept
+
+
+def _list_bytes(problem: DesignProblem) -> list[bytes | str]:
+    """List what makes two parts different."""
+    if problem.part is None:
+        return []
+    path = problem.part
+    arrays = (path.tip, path.axis, path.rapid, path.feed, path.turns, path.seconds, path.frame, problem.workpiece)
+    return [*(b"" if array is None else array.tobytes() for array in arrays), repr(path.events), repr(path.tools)]
 
 
 def _list_corners(poses: PoseSet) -> Array:

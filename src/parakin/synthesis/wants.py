@@ -10,11 +10,11 @@ from ..arrays import Array
 from ..machine import Machine
 from ..performance.certified.interval_matrices import PoseBox
 from ..performance.certified.quotient_norms import Quotient
-from ..units import LENGTH, NUMBER, STIFFNESS, QuantityKind
+from ..units import LENGTH, NUMBER, STIFFNESS, TIME, QuantityKind
 from .design_tapes import DesignTapes, TracedQuotient
 from .measures import Measures
 
-_UNITS = {NUMBER: "", LENGTH: "mm", STIFFNESS: "N/mm"}
+_UNITS = {NUMBER: "", LENGTH: "mm", STIFFNESS: "N/mm", TIME: "s"}
 _Margins = Callable[[Machine, Sequence[Scalar], float], list[Scalar]]
 _Quotients = Callable[[DesignTapes, PoseBox, Mapping[str, Scalar]], list[list[Quotient]]]
 
@@ -43,10 +43,11 @@ class Want:
 
     kind : of its value
     measure : its values at poses, (S, P, k); the worst of all counts
-    proof : by which a bound is proved at every pose; None where the limits' own proof is one
+    proof : by which a bound is proved at every pose; None where the limits' own proof is one, or the part's job
     more : whether greater is better
     least : what a bound must exceed
     spread : what counts is how far each column spreads over the poses
+    whole : the part's, so the same at all poses
     """
 
     kind: QuantityKind
@@ -55,6 +56,7 @@ class Want:
     more: bool = False
     least: float = 0.0
     spread: bool = False
+    whole: bool = False
 
     @property
     def unit(self) -> str:
@@ -110,7 +112,8 @@ WANTS: dict[str, Want] = {
     "accuracy": Want(LENGTH, lambda m: m.deviation, NormProof(_list_error)),
     "clearance": Want(LENGTH, lambda m: m.distances, MarginProof(_bound_distances), more=True),
     "footprint": Want(LENGTH, lambda m: m.feet, MarginProof(_bound_feet)),
-    "stroke": Want(LENGTH, lambda m: m.joints, None, spread=True),
+    "stroke": Want(LENGTH, lambda m: m.travel, None, spread=True),
+    "cycle_time": Want(TIME, lambda m: m.cycle_time, None, whole=True),
 }
 
 # What follows from the inverse of A, and so tells nothing beyond a singularity.

@@ -16,6 +16,7 @@ from ..posting.posted import Posted
 from .corners import Curve
 from .drive_limits import DriveLimits
 from .joint_following import find_nearest_joints, follow_curve
+from .kernels.grading import bound_sizes, cut_steps
 from .kernels.rounded_corners import place_rows
 from .kernels.speed_ceilings import CurveRows, FeedLimits, compute_feed_ceilings
 from .kernels.splines import (
@@ -155,6 +156,27 @@ def build_joint_path(
     raise PoseError(f"{where} a joint would have to jump: the tool passes a singular pose")
 
 
+def grade_rows(curve: Curve, segment: Indices, offset: Array, longest: float) -> tuple[Indices, Array]:
+    """Add rows until no step is longer than about twice its neighbour, or than ``longest`` mm."""
+    step, size = _measure_steps(curve, segment, offset), np.full(len(segment), longest)
+    bound_sizes(step, size)
+    count = cut_steps(step, size, np.empty(0, np.int64), np.empty(0))
+    steps, fractions = np.empty(count, np.int64), np.empty(count)
+    cut_steps(step, size, steps, fractions)
+    return np.insert(segment, steps + 1, segment[steps]), np.insert(
+        offset, steps + 1, offset[steps] + fractions * step[steps]
+    )
+
+
+def _measure_steps(curve: Curve, segment: Indices, offset: Array) -> Array:
+    """Measure the steps from row to row, (rows - 1,) mm; zero where the curve is parted."""
+    step = np.diff(offset)
+    over = np.flatnonzero(segment[1:] != segment[:-1])
+    ends = curve.length[segment[over]]
+    step[over] = np.where(offset[over] < ends, ends - offset[over], 0.0)
+    return step
+
+
 def _build_single_row(posted: Posted, curve: Curve) -> JointPath:
     """Build the joint path of a curve that is a single point."""
     joints, empty = posted.joints[:1], np.empty(0)
@@ -211,7 +233,7 @@ def refine_joint_path(joint_path: JointPath, steps: Indices, fractions: Array, a
     if anew:
         return _follow_rows(joint_path.posted, joint_path.curve, segment, offset)
     joints = np.insert(joint_path.joints, steps + 1, joint_path.joints_at(steps, shift)[0], axis=0)
-    return _fit_rows(joint_path.posted, joint_path.curve, segment, offset, joints)
+    return fit_joint_path(joint_path.posted, joint_path.curve, segment, offset, joints)
 
 
 def divide_joint_path(joint_path: JointPath, steps: Indices, fractions: Array) -> JointPath:
@@ -261,15 +283,15 @@ def _follow_rows(posted: Posted, curve: Curve, segment: Indices, offset: Array) 
     turns = measure_whole_turns(joints[0, turning], posted.joints[0, turning])
     if turns.any():
         joints[:, turning] += turns
-    return _fit_rows(posted, curve, segment, offset, joints)
+    return fit_joint_path(posted, curve, segment, offset, joints)
 
 
-def _fit_rows(posted: Posted, curve: Curve, segment: Indices, offset: Array, joints: Array) -> JointPath:
-    """Fit splines through the joints of rows."""
-    step = np.diff(offset)
-    over = np.flatnonzero(segment[1:] != segment[:-1])
-    ends = curve.length[segment[over]]
-    step[over] = np.where(offset[over] < ends, ends - offset[over], 0.0)
+def fit_joint_path(posted: Posted, curve: Curve, segment: Indices, offset: Array, joints: Array) -> JointPath:
+    """Fit splines through the joints of rows.
+
+    Raises :class:`PoseError` where they are out of reach.
+    """
+    step = _measure_steps(curve, segment, offset)
     curvature = np.empty_like(joints)
     fit_splines(step, joints, curvature, np.empty(len(segment)))
     feed_ceiling = _compute_feed_ceiling(posted, curve, CurveRows(segment, offset, step))

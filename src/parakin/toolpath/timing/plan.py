@@ -8,6 +8,7 @@ import numpy as np
 
 from ...arrays import Flags
 from ...errors import PoseError
+from ..path import ToolPath
 from ..posting.posted import Posted
 from .corners import Corners, check_tolerance, round_corners
 from .drive_limits import DriveLimits
@@ -56,8 +57,9 @@ def plan_trajectory(
         raise PoseError(f"corners: 'round' or 'stop' expected, not {corners!r}")
     check_tolerance(tolerance, "tolerance")
     check_tolerance(axis_tolerance, "axis_tolerance")
+    _refuse_untimed(posted)
     parted, limits, names = (
-        _flag_stops(posted, stops),
+        flag_stops(posted.path, stops),
         DriveLimits.of(posted.machine),
         name_limits(posted.machine.joints),
     )
@@ -80,17 +82,24 @@ def plan_trajectory(
     return Trajectory(posted, curve, joint_path, profile, binding, names)
 
 
-def _flag_stops(posted: Posted, stops: Sequence[int]) -> Flags:
-    """Flag the records to stop at, (n,); raises :class:`PoseError` for a path that can't be timed."""
-    count = len(posted.path)
-    if not count:
+def _refuse_untimed(posted: Posted) -> None:
+    """Raise :class:`PoseError` for a path without records or with poses out of reach."""
+    if not len(posted.path):
         raise PoseError("the path has no records")
     lost = ~np.isfinite(posted.joints.sum(axis=1))
     if lost.any():
         raise PoseError(f"{posted.path.locate(int(lost.argmax()))}: the machine can't take this pose")
-    idle = ~posted.path.rapid & (posted.path.feed <= 0.0)
+
+
+def flag_stops(path: ToolPath, stops: Sequence[int]) -> Flags:
+    """Flag the records to stop at, (n,).
+
+    Raises :class:`PoseError` for a feed of zero, and for stops at records that there are not.
+    """
+    count = len(path)
+    idle = ~path.rapid & (path.feed <= 0.0)
     if idle.any():
-        raise PoseError(f"{posted.path.locate(int(idle.argmax()))}: more than 0 expected for the feed")
+        raise PoseError(f"{path.locate(int(idle.argmax()))}: more than 0 expected for the feed")
     flags = np.zeros(count, bool)
     for stop in stops:
         if not 0 <= stop < count:

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from typing import TypeAlias
+
 import numpy as np
 
 from ...arrays import Array, Indices
@@ -18,6 +21,7 @@ from .speed_profile import SpeedProfile
 
 UNBOUND = 1e12  # mm²/s², of ṡ²: nothing is as fast
 WORTH = 5e-4  # least fraction of the cycle time that more rows must save
+AddRows: TypeAlias = Callable[[JointPath, Indices, Array], JointPath]  # in steps, ascending, after fractions of them
 _ROUNDS = 4
 RAMP = 0.1  # s in which a drive is assumed to reach its acceleration where only a jerk is given
 _ROUNDING = 1e-8
@@ -45,10 +49,12 @@ def find_reachable(joint_path: JointPath, limits: DriveLimits, ceilings: StepCei
     return x, u
 
 
-def find_quickest(joint_path: JointPath, limits: DriveLimits, forces: ForceLimits) -> tuple[JointPath, Array, Array]:
+def find_quickest(
+    joint_path: JointPath, limits: DriveLimits, forces: ForceLimits | None, add_rows: AddRows = refine_joint_path
+) -> tuple[JointPath, Array, Array]:
     """Find ṡ² (rows,) and s̈ (steps,) of the quickest profile without jerks, with rows where it switches."""
     for attempt in range(_ROUNDS):
-        joint_path = forces.bound(joint_path)
+        joint_path = joint_path if forces is None else forces.bound(joint_path)
         rows, count = joint_path.rows, len(joint_path.step)
         ceilings = compute_ceilings(joint_path, limits)
         x, u = find_reachable(joint_path, limits, ceilings)
@@ -63,7 +69,7 @@ def find_quickest(joint_path: JointPath, limits: DriveLimits, forces: ForceLimit
             break
         fractions = np.concatenate([where[where > 0.0] for where in switches])
         order = np.lexsort((fractions, steps))
-        joint_path = refine_joint_path(joint_path, steps[order], fractions[order])
+        joint_path = add_rows(joint_path, steps[order], fractions[order])
     return joint_path, x, u
 
 

@@ -1,0 +1,129 @@
+"""How long designs take for a part: estimated in a search, where each has its own joints along the same curve."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..arrays import Array, Indices
+from ..errors import PoseError
+from ..families.family import Family
+from ..kinematics.turns import unwind_angles
+from ..kinematics.wrist.pole_crossing import find_crossings
+from ..machine import Machine
+from ..toolpath.job import Job, Tolerances, prepare
+from ..toolpath.path import ToolPath
+from ..toolpath.posting.frames import compose_frames, workpiece
+from ..toolpath.posting.post import post_path
+from ..toolpath.timing.corners import Curve, round_corners
+from ..toolpath.timing.drive_limits import DriveLimits
+from ..toolpath.timing.joint_path import LONGEST, divide_joint_path, fit_joint_path, grade_rows
+from ..toolpath.timing.plan import flag_stops
+from ..toolpath.timing.stops import find_stops, sum_dwells
+from ..toolpath.timing.time_optimal import compute_spans, find_quickest
+
+_ROWS = 2400  # of the path that are timed, at most
+_WINDOWS = 6  # stretches of so many rows in all, where the path has more
+_ROUNDING = np.array([0.5, 1.0])  # of a rounding's reach, where it has rows
+_CLOSE = 1e-6  # of a piece: rows nearer to each other are one
+_CHECKED = 200  # poses of the path at which limits are looked at
+
+
+class PartTimer:
+    """Times a part on a family's machines by the quickest profile without jerks and forces along rows of its curve.
+
+    The curve, its corners and its rows are the nominal machine's, for they hang on the tool alone. Of a path with more
+    rows stretches evenly spread are timed, and stand for the others.
+
+    path, frame : a part, and where it lies, as for :func:`parakin.prepare`
+    factor : by which an estimate is multiplied, as the time of a job has shown
+
+    Raises :class:`PoseError` for a path that can't be timed, or drives without accelerations.
+    """
+
+    def __init__(self, family: Family, path: ToolPath, frame: Array | None):
+        self.family, self.path, self.frame, self.factor = family, path, frame, 1.0
+        machine = family.machine
+        self._limits = DriveLimits.of(machine)
+        if not self._limits.bounds_acceleration:
+            raise PoseError("part: no drive has an acceleration or a jerk, so all designs take as long")
+        stops = flag_stops(path, find_stops(path))
+        self._posted = post_path(machine, path, workpiece=frame, mode=machine.mode)
+        rounded = Tolerances().share_with_corners()
+        self._curve = round_corners(self._posted, "round", rounded.tip, rounded.axis, stops, True)
+        length = float(self._curve.length.sum())
+        if not length:
+            raise PoseError("part: its tool path has a single point")
+        segment, offset = grade_rows(self._curve, *_place_rows(self._curve), max(LONGEST, 2.0 * length / _ROWS))
+        self._windows = _choose_windows(segment)
+        self._segment, self._offset = segment, offset
+        self._timed = np.concatenate([self._curve.poses(segment[w], offset[w]) for w in self._windows])
+        whole = np.unique(np.linspace(0, len(segment) - 1, _CHECKED).astype(int))
+        self.checked_poses = self._curve.poses(segment[whole], offset[whole])
+        at = np.append(0.0, np.cumsum(self._curve.length))[segment] + offset
+        self._stands_for = length / sum(float(at[w.stop - 1] - at[w.start]) for w in self._windows)
+        self._waits = sum_dwells(path)
+
+    def __repr__(self) -> str:
+        return f"<parakin part timer on {self.family.machine.name}: {len(self._timed)} rows>"
+
+    def estimate_seconds(self, shifts: Array, sizes: Array) -> Array:
+        """Estimate the cycle times of designs, (S,) s, from how far the part is moved (S, axes) and sizes (S, k).
+
+        NaN where the part is out of reach.
+        """
+        joints = self._follow(self._timed + shifts[:, None], sizes[:, None])
+        seconds = np.full(len(joints), np.nan)
+        ends = np.cumsum([window.stop - window.start for window in self._windows])[:-1]
+        for design in np.flatnonzero(np.isfinite(joints).all((1, 2))).tolist():
+            parts = zip(self._windows, np.split(joints[design], ends), strict=True)
+            seconds[design] = sum(self._time_rows(window, own) for window, own in parts)
+        return self.factor * self._stands_for * seconds + self._waits
+
+    def _follow(self, poses: Array, sizes: Array) -> Array:
+        """Follow the joints along each design's rows, (S, R, axes) -> (S, R, joints); over poles in the other mode."""
+        machine = self.family.machine
+        joints = self.family.inverse(poses, sizes)
+        wrist = machine.wrist
+        if wrist is not None:
+            other = self.family.inverse(poses, sizes, wrist.other_mode(machine.mode))
+            for own, there in zip(joints, other, strict=True):
+                over = find_crossings(own[:, wrist.pair], there[:, wrist.pair])
+                own[over] = there[over]
+        for own in joints:
+            for column in machine.turning_joints:
+                own[:, column] = unwind_angles(own[:, column])
+        return joints
+
+    def prepare_job(self, machine: Machine, shift: Array) -> Job:
+        """Prepare the part's job on a design's machine, moved by ``shift`` (axes,)."""
+        by = {axis: float(value) for axis, value in zip(machine.axes, shift, strict=True) if axis in "XYZ"}
+        return prepare(machine, self.path, workpiece=compose_frames(workpiece(**by), self.frame))
+
+    def _time_rows(self, window: slice, joints: Array) -> float:
+        path = fit_joint_path(self._posted, self._curve, self._segment[window], self._offset[window], joints)
+        path, x, _ = find_quickest(path, self._limits, None, divide_joint_path)
+        return float(compute_spans(path, x).sum())
+
+
+def _place_rows(curve: Curve) -> tuple[Indices, Array]:
+    """Place rows at the corners of a curve, in their roundings and in the middle of its pieces."""
+    count, length = len(curve.length), curve.length[:, None]
+    near, far = curve.reach[:-1, None] * _ROUNDING, length - curve.reach[1:, None] * _ROUNDING[::-1]
+    offset = np.sort(np.concatenate([np.zeros((count, 1)), near, 0.5 * length, far, length], 1))
+    kept = np.diff(offset, append=np.inf) > _CLOSE * length
+    kept[:, -1] = curve.parted[1:]
+    kept[:, 0] = True
+    segment = np.broadcast_to(np.arange(count)[:, None], offset.shape)
+    return segment[kept], offset[kept]
+
+
+def _choose_windows(segment: Indices) -> list[slice]:
+    """Choose the rows that are timed: all, or stretches of them from a piece's first row to another's."""
+    count = len(segment)
+    if count <= _ROWS:
+        return [slice(0, count)]
+    each = _ROWS // _WINDOWS
+    starts = np.linspace(0, count - each, _WINDOWS).astype(int)
+    first = np.searchsorted(segment, segment[starts])
+    last = np.minimum(np.searchsorted(segment, segment[starts + each - 1], "right"), count - 1)
+    return [slice(begin, end + 1) for begin, end in zip(first.tolist(), last.tolist(), strict=True)]

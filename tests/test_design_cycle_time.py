@@ -50,7 +50,7 @@ def test_no_tower_runs_the_part_sooner(path):
 
 
 def test_a_bound_is_one_of_the_job_not_of_the_estimate(path):
-    free, bound = {"rod": (560.0, 800.0)}, measure_job(path, rod=700.0)
+    free, bound = {"rod": (660.0, 740.0)}, measure_job(path, rod=700.0)
     problem = pk.DesignProblem(
         DELTA, free, BOX, ["rod"], bounds={"cycle_time": bound}, part=path, workpiece=PLACE, fit_strokes=True
     )

@@ -28,6 +28,7 @@ _GENERATIONS = 100
 _ROUNDS = 12  # of the exchange
 _ROWS = 160  # constraints that a quadratic program sees
 _WORST = 4  # poses for a constraint to begin from
+_FINEST = 1e-5  # last step of the search for the worst, of its first: inner maxima are flat, sides are tried exactly
 _STEP = 1e-6  # of a variable's range, for derivatives
 _NEAR = 0.1  # of a variable's range, that a round of the exchange may go
 _KEPT = 1e-9  # by which a constraint may be broken in the end
@@ -189,12 +190,11 @@ class DesignSearch:
             return np.concatenate([sets[search], np.clip(tries, 0.0, 1.0)], 1)
 
         def evaluate(tries: Array, search: Indices) -> Array:
-            inside = ((tries >= 0.0) & (tries <= 1.0)).all(1)
             at = self._list_columns(self._measure(x[None], place(tries, search)))[0]
-            return np.where(inside, -at[np.arange(len(tries)), owners[search]], np.nan)
+            return np.asarray(-at[np.arange(len(tries)), owners[search]])
 
         step = np.full(points.shape[1] - 1, 0.25)
-        worst, _ = search_maxima(evaluate, begin[:, 1:], step, 1e-7)
+        worst, _ = search_maxima(evaluate, begin[:, 1:], step, _FINEST)
         return np.unique(np.round(place(worst, np.arange(len(worst))), 9), axis=0)
 
     def _solve_for_points(self, x: Array, points: Array) -> Array:

@@ -41,7 +41,7 @@ def measure_job(path, **sizes):
 
 def test_no_tower_runs_the_part_sooner(path):
     free = {"tower": (300.0, 420.0)}
-    (best,) = pk.find_designs(pk.DesignProblem(DELTA, free, BOX, ["cycle_time"], part=path, workpiece=PLACE)).front
+    (best,) = pk.find_designs(pk.DesignProblem(DELTA, free, BOX, ["cycle_time"], path=path, workpiece=PLACE)).front
     assert best.job.runs
     assert best.values["cycle_time"] == best.proved["cycle_time"] == best.job.seconds
     others = [measure_job(path, tower=tower) for tower in np.linspace(*free["tower"], 4)]
@@ -52,7 +52,7 @@ def test_no_tower_runs_the_part_sooner(path):
 def test_a_bound_is_one_of_the_job_not_of_the_estimate(path):
     free, bound = {"rod": (660.0, 740.0)}, measure_job(path, rod=700.0)
     problem = pk.DesignProblem(
-        DELTA, free, BOX, ["rod"], bounds={"cycle_time": bound}, part=path, workpiece=PLACE, fit_strokes=True
+        DELTA, free, BOX, ["rod"], bounds={"cycle_time": bound}, path=path, workpiece=PLACE, fit_strokes=True
     )
     (best,) = pk.find_designs(problem).front
     assert best.sizes["rod"] == pytest.approx(700.0, abs=10.0)
@@ -63,7 +63,7 @@ def test_a_bound_is_one_of_the_job_not_of_the_estimate(path):
 
 def test_too_short_a_time_is_the_want_that_no_design_keeps(path):
     problem = pk.DesignProblem(
-        DELTA, {"rod": (650.0, 800.0)}, BOX, ["rod"], bounds={"cycle_time": 0.5}, part=path, workpiece=PLACE
+        DELTA, {"rod": (650.0, 800.0)}, BOX, ["rod"], bounds={"cycle_time": 0.5}, path=path, workpiece=PLACE
     )
     assert "breaks cycle_time" in pk.find_designs(problem).shortfall
 

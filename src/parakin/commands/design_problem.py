@@ -22,6 +22,7 @@ _KEYS = (
     "machine", "free", *_POSES, "shift", "bounds", "strokes", "drives", "struts", "tolerances", "part", "workpiece",
     "minimise", "maximise",
 )  # fmt: skip
+_KEYS_OF_ARGUMENTS = {"path": "part"}
 _STROKES = ("keep", "fit")
 _CYLINDER = ("along", "diameter")
 
@@ -110,9 +111,10 @@ class _ProblemReader:
                 self._read_workpiece(top["workpiece"]) if "workpiece" in top else None,
             )
         except PoseError as error:
-            key = str(error).split(":")[0]
+            key, colon, message = str(error).partition(":")
+            key = _KEYS_OF_ARGUMENTS.get(key, key)
             line = next((own.line for own in top if own == key), 1)
-            raise InputError(str(error), self.source, line) from None
+            raise InputError(f"{key}{colon}{message}", self.source, line) from None
 
     def _read_names(self, top: YamlMap, key: str) -> list[str]:
         if key not in top:

@@ -127,7 +127,7 @@ def find_designs(
 def _correct_estimates(
     problem: DesignProblem, candidates: list[Candidate], made: list[_MadeDesign | UnprovedDesign]
 ) -> bool:
-    """Lengthen the estimates of cycle times where a job breaks the bound that its estimate keeps; tell whether."""
+    """Scale the estimates of cycle times up where a job breaks the bound that its estimate keeps; tell whether."""
     timer, bound, excess = problem.timer, problem.bounds["cycle_time"], 1.0
     assert timer is not None
     for candidate, design in zip(candidates, made, strict=True):

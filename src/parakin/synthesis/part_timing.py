@@ -45,14 +45,14 @@ class PartTimer:
         machine = family.machine
         self._limits = DriveLimits.of(machine)
         if not self._limits.bounds_acceleration:
-            raise PoseError("part: no drive has an acceleration or a jerk, so all designs take as long")
+            raise PoseError("path: no drive has an acceleration or a jerk, so all designs take as long")
         stops = flag_stops(path, find_stops(path))
         self._posted = post_path(machine, path, workpiece=frame, mode=machine.mode)
         rounded = Tolerances().share_with_corners()
         self._curve = round_corners(self._posted, "round", rounded.tip, rounded.axis, stops, True)
         length = float(self._curve.length.sum())
         if not length:
-            raise PoseError("part: its tool path has a single point")
+            raise PoseError("path: its tool path has a single point")
         segment, offset = grade_rows(self._curve, *_place_rows(self._curve), max(LONGEST, 2.0 * length / _ROWS))
         self._windows = _choose_windows(segment)
         self._segment, self._offset = segment, offset
@@ -75,8 +75,8 @@ class PartTimer:
         seconds = np.full(len(joints), np.nan)
         ends = np.cumsum([window.stop - window.start for window in self._windows])[:-1]
         for design in np.flatnonzero(np.isfinite(joints).all((1, 2))).tolist():
-            parts = zip(self._windows, np.split(joints[design], ends), strict=True)
-            seconds[design] = sum(self._time_rows(window, own) for window, own in parts)
+            windows = zip(self._windows, np.split(joints[design], ends), strict=True)
+            seconds[design] = sum(self._time_rows(window, own) for window, own in windows)
         return self.factor * self._stands_for * seconds + self._waits
 
     def _follow(self, poses: Array, sizes: Array) -> Array:

@@ -43,7 +43,7 @@ class DesignProblem:
     poses : more of them, each as a box that may have no width
     drives, struts : for stiffness, as of :func:`parakin.analyse_stiffness`
     tolerances : for accuracy, as of :func:`parakin.analyse_accuracy`
-    part : a tool path that every design must run; it is moved with the poses
+    path : of a part that every design must run; it is moved with the poses
     workpiece : where the part lies, as for :func:`parakin.prepare`
 
     Raises :class:`PoseError` for a problem that makes no sense.
@@ -62,7 +62,7 @@ class DesignProblem:
     drives: Mapping[str, str] | str | None = None
     struts: Mapping[str, str] | str | None = None
     tolerances: Mapping[str, str] | None = None
-    part: ToolPath | None = None
+    path: ToolPath | None = None
     workpiece: Array | None = None
 
     def __repr__(self) -> str:
@@ -126,9 +126,9 @@ class DesignProblem:
         ):
             raise PoseError("bounds: clearance: every two struts share a joint")
         if self.timer is None and "cycle_time" in self.wants:
-            raise PoseError("part: missing, cycle_time needs it")
+            raise PoseError("path: missing, cycle_time needs it")
         if self.timer is None and self.workpiece is not None:
-            raise PoseError("workpiece: there is no part that it places")
+            raise PoseError("workpiece: there is no path that it places")
         for name, needed in (("stiffness", "springs"), ("accuracy", "tolerances")):
             if name in self.wants:
                 getattr(self.tapes, needed)
@@ -162,7 +162,7 @@ class DesignProblem:
     @cached_property
     def timer(self) -> PartTimer | None:
         """What times the part; None without one."""
-        return None if self.part is None else PartTimer(self.family, self.part, self.workpiece)
+        return None if self.path is None else PartTimer(self.family, self.path, self.workpiece)
 
     @property
     def family(self) -> Family:

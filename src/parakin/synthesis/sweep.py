@@ -214,9 +214,9 @@ class SweepEvaluator:
 
 def _list_bytes(problem: DesignProblem) -> list[bytes | str]:
     """List what makes two parts different."""
-    if problem.part is None:
+    path = problem.path
+    if path is None:
         return []
-    path = problem.part
     arrays = (path.tip, path.axis, path.rapid, path.feed, path.turns, path.seconds, path.frame, problem.workpiece)
     return [*(b"" if array is None else array.tobytes() for array in arrays), repr(path.events), repr(path.tools)]
 

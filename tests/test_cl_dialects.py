@@ -302,7 +302,7 @@ def test_nx_times(read):
         *("TLON,GOLFT/L1", "GOFWD/C1,PAST,L2", "GOLFT/L1", "TLLFT,GOLFT/L1", "COPY/1,TRANSL,10,0,0,1"),
         *("CALL/SUB1", "ROTABL/90", "M1=MACRO/A", "L1)LOOPST"),
         *("RAPID/OFF", "RAPID/ON", "RAPID,GOTO/1,2,3", "MULTAX,GOTO/1,2,3", "FEDRAT,9/GOTO/1,2,3", "COOLNT,ON"),
-        *("GOTO/1  2,3,4", "GOTO/1,2,3      00010", "GOTO/1,2, 3\t\t4", "FEDRAT/1   5"),
+        *("GOTO/1,2,3$\n4", "GOTO/1  2,3,4", "GOTO/1,2,3      00010", "GOTO/1,2, 3\t\t4", "FEDRAT/1   5"),
     ],
 )
 def test_refused_with_the_line(read, statement):

@@ -60,6 +60,7 @@ def test_dwells(read):
 def test_a_coolant_without_a_code_is_noted(read):
     path = read(cut("COOLNT/THRU", "COOLNT/ON,FLOOD", "COOLNT"))
     assert said(path)[0][1:4] == [[], ["M8"], []]
+    assert said(read(cut("COOLNT/FLOOD,OFF", "COOLNT/OFF,MIST")))[0][1:3] == [["M9"], ["M9"]]
     assert [(note.line, "coolant" in note.text) for note in path.notes] == [(4, True), (8, True)]
 
 

@@ -132,6 +132,17 @@ def test_bad_files(part, out, tmp_path, capsys):
     refused(capsys, "post", part, "-m", "tricept", "-o", out)
 
 
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        (["post", ""], "behind post"), (["post", "a.cls", "-m", ""], "behind -m"), (["show", "tricept", "-o", ""], "behind -o"),
+        (["inverse", "tricept", "--csv="], "for --csv"), ([""], "in front"),
+    ],
+)  # fmt: skip
+def test_empty_words_are_no_names(capsys, words, told):
+    assert refused(capsys, *words) == f"parakin: an empty value {told}; expected a file, a name or a value"
+
+
 def test_bad_machines(part, out, tmp_path, capsys):
     assert 'did you mean "tricept"?' in refused(capsys, "post", part, "-m", "tricpt", "-o", out)
     assert "none.yaml" in refused(capsys, "post", part, "-m", tmp_path / "none.yaml", "-o", out)

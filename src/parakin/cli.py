@@ -33,7 +33,7 @@ from .commands.stiffness import stiffness
 from .commands.studio import make_studio_command
 from .commands.sweep import sweep
 from .commands.workspace import workspace
-from .errors import ParakinError
+from .errors import InputError, ParakinError
 from .version import __version__
 
 _MALFORMED = 2
@@ -69,6 +69,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         signal.signal(signal.SIGTERM, _exit_on_signal)  # so that half-written files are removed
     try:
         words = list(sys.argv[1:] if arguments is None else arguments)
+        _check_words(words)
         code = app(words, exit_on_error=False, print_error=False, result_action="return_value")
         sys.stdout.flush()
     except ParakinError as error:
@@ -95,6 +96,15 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print_remark("parakin: the output can't be written: it is closed")
         return _MALFORMED
     return code if isinstance(code, int) else 0
+
+
+def _check_words(words: Sequence[str]) -> None:
+    """Refuse an empty word, as an unset variable of a shell leaves it: as a file's name it would be this folder."""
+    for k, word in enumerate(words):
+        option, equals, value = word.partition("=")
+        if not word or (equals and not value and option.startswith("-")):
+            behind = f"behind {words[k - 1]}" if k and not word else f"for {option}" if word else "in front"
+            raise InputError(f"an empty value {behind}; expected a file, a name or a value", "parakin")
 
 
 def _replace_closed_streams() -> bool:

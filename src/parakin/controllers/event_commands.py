@@ -132,7 +132,7 @@ def _find_word(event: Event, path: ToolPath) -> str | None:
     if name == "OPSTOP":
         return "M1"
     if name == "COOLNT":
-        return _COOLANT.get(arguments[0])
+        return _COOLANT["OFF"] if "OFF" in arguments else _COOLANT.get(arguments[0])
     if name == "SPINDL":
         return _format_spindle(arguments, event, path)
     if name == "AUXFUN":

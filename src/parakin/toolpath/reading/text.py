@@ -28,6 +28,8 @@ def open_file(path: str | os.PathLike[str], source: str) -> io.FileIO:
 
     A pipe is refused: its format is looked for before it is read, and what is read of it once is gone.
     """
+    if not source:
+        raise InputError("an empty name; expected a file's", "path")
     try:
         mode = Path(path).stat().st_mode
         if not stat.S_ISREG(mode) and not stat.S_ISDIR(mode):

@@ -106,7 +106,7 @@ class LineReader:
 
     def _take_continued(self) -> tuple[str, int]:
         """Join the pieces of a continued statement; return it with its first line."""
-        text = "".join(self.continued)
+        text = " ".join(self.continued)  # a number ends with its line
         self.continued, self.continued_length = [], 0
         return text, self.continued_from
 

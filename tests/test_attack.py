@@ -213,21 +213,24 @@ def test_what_a_kill_leaves_is_swept_by_the_next_run(tmp_path, exists):
 KILLED_BETWEEN = """
 import os, signal, sys
 import parakin as pk
-replace = os.replace
-def once(*arguments):
+replace, left = os.replace, [int(sys.argv[2])]
+def count_down(*arguments):
     replace(*arguments)
-    os.kill(os.getpid(), signal.SIGKILL)
-os.replace = once
+    left[0] -= 1
+    if not left[0]:
+        os.kill(os.getpid(), signal.SIGKILL)
+os.replace = count_down
 pk.write_files(sys.argv[1], {"a": "new", "b": "new"})
 """
 
 
 @POSIX
-def test_a_set_torn_by_a_kill_says_so_until_it_is_complete(tmp_path):
+@pytest.mark.parametrize(("moved", "held"), [(1, ["old", "old"]), (2, ["new", "old"])])  # the note moves first, whole
+def test_a_set_torn_by_a_kill_says_so_until_it_is_complete(tmp_path, moved, held):
     pk.write_files(tmp_path, {"a": "old", "b": "old"})
     assert sorted(path.name for path in tmp_path.iterdir()) == ["a", "b"]
-    subprocess.run([sys.executable, "-c", KILLED_BETWEEN, str(tmp_path)], check=False, timeout=120)
-    assert [(tmp_path / name).read_text() for name in "ab"] == ["new", "old"]
+    subprocess.run([sys.executable, "-c", KILLED_BETWEEN, str(tmp_path), str(moved)], check=False, timeout=120)
+    assert [(tmp_path / name).read_text() for name in "ab"] == held
     (note,) = tmp_path.glob("parakin-incomplete-*.txt")
     assert note.read_text().splitlines()[1:] == ["a", "b"]
     pk.write_files(tmp_path, {"a": "newer", "c": "new"})  # b is still the old one

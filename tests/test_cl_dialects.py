@@ -649,6 +649,16 @@ def test_a_file_of_arcs_without_end(read):
     refused(read, "GOTO/50000000,0,0\nFEDRAT/1000\n" + arc.format(50000000) * 60, 66, "points in all")
 
 
+def test_a_file_of_pecks_and_of_blanks_without_end(read, monkeypatch):
+    monkeypatch.setattr("parakin.toolpath.reading.cl.motion._MOST_CYCLE_POINTS", 10_000)
+    cycle = "SPINDL/9,RPM\nRAPID\nGOTO/0,0,9\nCYCLE/DEEP,DEPTH,90,STEP,.1,CLEAR,3,MMPM,9\n"
+    begin = time.process_time()
+    refused(read, cycle + "GOTO/0,0,0\n" * 9999, 8, "motions in all")  # 900 pecks, 2,700 motions a hole
+    refused(read, "FEDRAT/9\nGOTO/1" + " " * 1_000_000 + "2,3,4\n", 2, "not a number")
+    assert len(read("FEDRAT/9\nINSERT a" + " " * 1_000_000 + "b\nGOTO/1,2,3\n")) == 1
+    assert time.process_time() - begin < 10.0
+
+
 def mutate(text, rng):
     lines = text.split("\n")
     for _ in range(rng.randint(1, 4)):

@@ -135,7 +135,7 @@ def test_bad_files(part, out, tmp_path, capsys):
 @pytest.mark.parametrize(
     ("words", "told"),
     [
-        (["post", ""], "behind post"), (["post", "a.cls", "-m", ""], "behind -m"), (["show", "tricept", "-o", ""], "behind -o"),
+        (["post", ""], "behind post"), (["post", "a", "-m", ""], "behind -m"), (["show", "a", "-o", ""], "behind -o"),
         (["inverse", "tricept", "--csv="], "for --csv"), ([""], "in front"),
     ],
 )  # fmt: skip

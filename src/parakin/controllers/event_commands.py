@@ -53,21 +53,22 @@ def list_commands(path: ToolPath, places: Sequence[int]) -> dict[int, list[Comma
     """
     commands = dict[int, list[Command]]()
     changes = _find_changes(path)
+    turns = _list_turns(path)
     for number, (place, event) in enumerate(zip(places, path.events, strict=True)):
         here = commands.setdefault(place, [])
         if number in changes:
             use = changes[number]
             here += [Command("code", "M5", event.line), Command("code", "M9", event.line)]
             here += [] if use is None else [Command("message", _describe_change(use), event.line)]
-        here += _translate_event(event, path)
+        here += _translate_event(event, path, turns[number])
         here += [Command("code", "M0", event.line)] if number in changes else []
     return commands
 
 
 def check_events(path: ToolPath) -> None:
     """Refuse a path with an event that no controller can be told; see :func:`list_commands`."""
-    for event in path.events:
-        _find_word(event, path)
+    for event, turn in zip(path.events, _list_turns(path), strict=True):
+        _find_word(event, path, turn)
 
 
 def _find_changes(path: ToolPath) -> dict[int, ToolUse | None]:
@@ -94,7 +95,16 @@ def _describe_change(use: ToolUse) -> str:
     return f"{describe_tool(use)}, length {use.length:.6g} mm"
 
 
-def _translate_event(event: Event, path: ToolPath) -> Iterator[Command]:
+def _list_turns(path: ToolPath) -> list[str]:
+    """List for each event which way the spindle turns from there on, as SPINDL has said last: CLW or CCLW."""
+    turn, turns = "CLW", []
+    for event in path.events:
+        turn = next(iter(_TURN.findall(event.text.upper())), turn)
+        turns.append(turn)
+    return turns
+
+
+def _translate_event(event: Event, path: ToolPath, turn: str) -> Iterator[Command]:
     """Yield the commands of an event."""
     message = _MESSAGE.fullmatch(event.text)
     seconds = find_dwell(event)
@@ -105,7 +115,7 @@ def _translate_event(event: Event, path: ToolPath) -> Iterator[Command]:
     elif seconds is not None:
         yield Command("dwell", f"{seconds:.10g}", event.line)
     else:
-        word = _find_word(event, path)
+        word = _find_word(event, path, turn)
         if word is None:
             yield Command("remark", f"line {event.line}: {event.text}", event.line)
         else:
@@ -120,8 +130,11 @@ def _is_own(event: Event, path: ToolPath) -> bool:
     return bool(_OWN_CODE.match(event.text))
 
 
-def _find_word(event: Event, path: ToolPath) -> str | None:
-    """Find the G-code word that says the same as an event; None where there is none."""
+def _find_word(event: Event, path: ToolPath, turn: str) -> str | None:
+    """Find the G-code word that says the same as an event; None where there is none.
+
+    turn : CLW or CCLW, which way the spindle turns from the event on
+    """
     if path.dialect == "gcode":
         return _keep_word(event, path)
     statement = _STATEMENT.fullmatch(event.text.upper())
@@ -134,7 +147,7 @@ def _find_word(event: Event, path: ToolPath) -> str | None:
     if name == "COOLNT":
         return _COOLANT["OFF"] if "OFF" in arguments else _COOLANT.get(arguments[0])
     if name == "SPINDL":
-        return _format_spindle(arguments, event, path)
+        return _format_spindle(arguments, event, path, turn)
     if name == "AUXFUN":
         return _format_auxiliary(arguments, event, path)
     inserted = _INSERTED.fullmatch(event.text)
@@ -167,7 +180,7 @@ def _format_auxiliary(arguments: list[str], event: Event, path: ToolPath) -> str
     return f"M{int(number)}"
 
 
-def _format_spindle(arguments: list[str], event: Event, path: ToolPath) -> str | None:
+def _format_spindle(arguments: list[str], event: Event, path: ToolPath, turn: str) -> str | None:
     """Switch the spindle off, or on at its speed; None where that is not known."""
     if "OFF" in arguments:
         return "M5"
@@ -176,6 +189,4 @@ def _format_spindle(arguments: list[str], event: Event, path: ToolPath) -> str |
         return "M5"
     if not speed < 1e9:
         return None
-    turns = _TURN.findall(event.text.upper())  # a tap's hole has several events in one line
-    turns = turns or [turn for e in path.events if e.line <= event.line for turn in _TURN.findall(e.text.upper())]
-    return f"S{speed:.10g} {'M4' if turns[-1:] == ['CCLW'] else 'M3'}"
+    return f"S{speed:.10g} {'M4' if turn == 'CCLW' else 'M3'}"

@@ -71,7 +71,7 @@ def write_files(folder: str | os.PathLike[str], files: Mapping[str, Content]) ->
             if is_new and _rename_folder(stage, base):
                 return targets
             base.mkdir(exist_ok=True)
-            with _delay_signals(), _note_incomplete(base, stage.name, files):
+            with _delay_signals(), _note_incomplete(base, stage, files):
                 for target in targets:
                     current = str(target)
                     os.replace(stage / target.name, target)  # noqa: PTH105
@@ -132,14 +132,15 @@ def _sweep_leftovers(base: Path) -> None:
 
 
 @contextlib.contextmanager
-def _note_incomplete(base: Path, token: str, names: Iterable[str]) -> Iterator[None]:
+def _note_incomplete(base: Path, stage: Path, names: Iterable[str]) -> Iterator[None]:
     """Keep a note in a folder while files of a set appear there; then also remove the notes of sets they complete."""
     names = sorted(names)
     if len(names) < 2:
         yield
         return
-    note = base / f"{_NOTE}{token.removeprefix(_BEGIN).removesuffix(_END)}.txt"
-    note.write_text("\n".join([_NOTE_TEXT, *names, ""]), encoding="utf-8", errors="backslashreplace")
+    note = f"{_NOTE}{stage.name.removeprefix(_BEGIN).removesuffix(_END)}.txt"
+    (stage / note).write_text("\n".join([_NOTE_TEXT, *names, ""]), encoding="utf-8", errors="backslashreplace")
+    os.replace(stage / note, base / note)  # noqa: PTH105
     yield
     for other in base.glob(f"{_NOTE}*.txt"):
         listed = other.read_text(encoding="utf-8", errors="replace").splitlines()

@@ -65,6 +65,22 @@ class OpenArc(NamedTuple):
     end_line: int
 
 
+class Arc(NamedTuple):
+    """An arc without its ends, in the file's unit; the motion is right-handed about the unit normal (3,).
+
+    line : source line of the points between the ends
+    helix : whether the ends may differ in height along the normal
+    turns : full turns before the arc's own
+    """
+
+    line: int
+    centre: list[float]
+    normal: Array
+    radius: float
+    helix: bool
+    turns: int = 0
+
+
 def find_tangent(circle: Circle, point: Triple, hand: int) -> Array:
     """Find the direction (3,) of the motion along a circle at a point; zero at its centre."""
     out = np.array(point) - circle.centre

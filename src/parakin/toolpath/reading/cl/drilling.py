@@ -22,6 +22,7 @@ def drill_hole(motion: ClMotion, cycle: DrillCycle, hole: Triple, axis_before: T
     def point_above(height: float) -> Triple:
         return x + height * a[0], y + height * a[1], z + height * a[2]
 
+    begin = motion.records.n
     out = _find_way_out(motion, cycle, hole)
     feed = motion.feed if cycle.feed is None else motion.convert_feed(*cycle.feed)
     if motion.position is not None and axis_before == a:
@@ -45,6 +46,7 @@ def drill_hole(motion: ClMotion, cycle: DrillCycle, hole: Triple, axis_before: T
         motion.add_record(point_above(cycle.clear), line, rapid=False, feed=feed)
     if cycle.kind not in ("tap", "bore") or abs(out - cycle.clear) > _SAME_HEIGHT:
         motion.add_record(point_above(out), line, rapid=True)
+    motion.count_cycle_points(motion.records.n - begin)
     motion.notes.add(line, "a drill cycle's hole, written out as motion")
 
 

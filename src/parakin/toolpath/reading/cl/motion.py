@@ -1,7 +1,6 @@
 """The modal state of a CL file and the records that follow from it: points, arcs, drill cycles, feeds, frames."""
 
 import math
-from typing import NamedTuple
 
 import numpy as np
 
@@ -12,6 +11,7 @@ from ..arcs import find_arc_normal, interpolate_arc, interpolate_axis
 from ..notes import NoteBook
 from ..text import refuse
 from .circles import (
+    Arc,
     Circle,
     OpenArc,
     decide_hand,
@@ -29,24 +29,9 @@ from .word_arguments import FEED_UNITS
 
 _HELIX = 0.01  # mm along a circle's axis between an arc's ends; above this the arc is a helix
 _MOST_ARC_POINTS = 5_000_000  # greatest number of points of all arcs of a file: some hundred MB of memory
+_MOST_CYCLE_POINTS = 1_000_000  # greatest number of motions of all cycles of a file
 _PROVED_NOTE = "an arc that goes the other way round than this dialect has it, as the straight cut into it proves"
 _FAR = 1e3  # the length of a direction that stands for a motion
-
-
-class Arc(NamedTuple):
-    """An arc without its ends, in the file's unit; the motion is right-handed about the unit normal (3,).
-
-    line : source line of the points between the ends
-    helix : whether the ends may differ in height along the normal
-    turns : full turns before the arc's own
-    """
-
-    line: int
-    centre: list[float]
-    normal: Array
-    radius: float
-    helix: bool
-    turns: int = 0
 
 
 class ClMotion:
@@ -92,7 +77,7 @@ class ClMotion:
         self.open_arc: OpenArc | None = None
         self.arc_step: tuple[Circle, int, float] | None = None
         self.arc_end: tuple[int, Array] = 0, np.zeros(3)
-        self.arc_points = 0
+        self.arc_points = self.cycle_points = 0
         self.cycle: DrillCycle | None = None
         self.cycle_start: CycleStart | None = None
 
@@ -385,6 +370,12 @@ class ClMotion:
         self.position = end
 
     # drill cycles
+
+    def count_cycle_points(self, count: int) -> None:
+        """Count the records of a hole; refuse a file whose cycles have too many in all."""
+        self.cycle_points += count
+        if self.cycle_points > _MOST_CYCLE_POINTS:
+            refuse(f"cycles of more than {_MOST_CYCLE_POINTS} motions in all; expected larger steps or fewer holes")
 
     def set_cycle(self, cycle: DrillCycle | None) -> None:
         """Drill at the points from here on, or with None no longer."""

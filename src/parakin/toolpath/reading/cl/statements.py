@@ -13,9 +13,9 @@ _NO_TEXT = re.compile(
     rf"\s*({'|'.join(name for name, word in WORDS.items() if word.ends_message)})\s*(?:[/,]|$)", re.IGNORECASE
 )
 
-_INSERT = re.compile(r"\s*INSERT[\s/,\"']*(.*?)[\s\"']*", re.IGNORECASE | re.DOTALL)
-_CODE = re.compile(r"M\s*\d+", re.IGNORECASE)  # the one that becomes an event
-_BLOCK = re.compile(r"(?<![A-Z0-9_])[A-Z]\s*=?\s*[-+.]?\d|[=#$]|\w\(", re.IGNORECASE | re.ASCII)  # a controller's words
+_INSERT = re.compile(r"INSERT[ /,\"']*", re.IGNORECASE)
+_CODE = re.compile(r"M ?\d+", re.IGNORECASE)  # the one that becomes an event
+_BLOCK = re.compile(r"(?<![A-Z0-9_])[A-Z] ?=? ?[-+.]?\d|[=#$]|\w\(", re.IGNORECASE | re.ASCII)  # a controller's words
 _COMMENT = re.compile(r"(?<!\w)\([^()]*\)|;.*", re.DOTALL)
 HIDDEN = "\0"  # a character that no line of a file has
 _LONGEST_WORD = 10
@@ -68,12 +68,14 @@ def execute_statement(actions: ClActions, text: str, line: int) -> str:
 
 def _check_insert(actions: ClActions, text: str, line: int) -> None:
     """Refuse an INSERT that gives the controller a block; note one of other words than a comment or an M code."""
-    insert = _INSERT.fullmatch(text)
-    if insert is None or _CODE.fullmatch(insert[1]):
+    plain = " ".join(text.split())
+    begin = _INSERT.match(plain)
+    given = plain[begin.end() :].rstrip(" \"'") if begin else ""
+    if begin is None or _CODE.fullmatch(given):
         return
-    said = _COMMENT.sub("", insert[1]).strip()
+    said = _COMMENT.sub("", given).strip()
     if _BLOCK.search(said):
-        refuse(f"INSERT: {quote_short(insert[1])}, a block for the controller, cannot be honoured; "
+        refuse(f"INSERT: {quote_short(given)}, a block for the controller, cannot be honoured; "
                "expected plain statements, or INSERT of one M code")  # fmt: skip
     if said:
         actions.motion.notes.add(line, "INSERT of words that are no M code: a comment in programs")

@@ -22,7 +22,7 @@ FEED_UNITS: dict[str, tuple[float | None, bool]] = {
 SURFACE_SPEEDS = {"SFM": 12.0 * INCH, "SMM": 1000.0}  # mm/min
 LENGTH_UNITS = {"MM": 1.0, "INCHES": INCH, "INCH": INCH, "IN": INCH}  # mm
 _GEARS = ("RANGE", "MAXRPM")  # of SPINDL: the gear and the most revolutions, each with its value
-_BLANKS = re.compile(r"(?<![\d.\s])\s+|\s+(?![\d.\s])", re.ASCII)
+_BLANKS = re.compile(r"(?<![\d.\s])\s+|(?<!\s)\s++(?![\d.])", re.ASCII)
 
 
 def remove_blanks(text: str) -> str:

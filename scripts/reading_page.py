@@ -98,8 +98,15 @@ def list_dialects() -> list[str]:
     senses = {SAME: "another is refused", DOWN: "counts down from CLEAR", HEIGHT: "CLEAR is a height, RAPTO a distance"}
     reasons = [f"- {dialect.title}: {dialect.cycle_values}" for dialect in DIALECTS.values()]
     cycles = ["Values of a `CYCLE` by position are refused:\n", *reasons, ""]
-    rows = [(*row, senses[dialect.clear]) for row, dialect in zip(rows, DIALECTS.values(), strict=True)]
-    titles = ("dialect", "told by", "CIRCLE turns", "FEDTO of a cycle", "RAPTO beside CLEAR")
+    axes = {True: "upright", False: "refused after a tilted tool"}
+    rows = [
+        (*row, senses[dialect.clear], axes[dialect.upright])
+        for row, dialect in zip(rows, DIALECTS.values(), strict=True)
+    ]
+    titles = (
+        "dialect", "told by", "CIRCLE turns", "FEDTO of a cycle", "RAPTO beside CLEAR",
+        "points without an axis after MULTAX/OFF",
+    )  # fmt: skip
     return [text, make_table(titles, rows), *cycles]
 
 
@@ -139,7 +146,7 @@ def list_words() -> list[str]:
                 (join_names(passed), "kept in order; what a controller has a code for is passed on"),
                 (
                     join_names(TEXT_WORDS),
-                    "texts, kept in order as comments; one M code of `INSERT` is passed on, other G-code refused",
+                    "texts, kept in order as comments; one M code of `INSERT` is passed on, a block is refused",
                 ),
                 (join_names(silent), "no effect"),
                 (join_names(sorted(INFORMING)), "only inform; listed once"),

@@ -419,8 +419,9 @@ def test_a_tilted_axis_is_not_carried_on_after_multax_off(read):
         assert read(TILTED + words).axis.tolist() == [[0.6, 0, 0.8], [0, 0, 1]]
     assert read(TILTED + "MULTAX/ON\nGOTO/1,0,0\n").axis[1].tolist() == [0.6, 0, 0.8]
     assert len(read("MULTAX/OFF\nFEDRAT/9\nGOTO/0,0,0\nGOTO/1,0,0\n")) == 2
-    # PTC Creo's sequences of three axes are along Z
-    assert read(CREO_HEADER + TILTED + "GOTO/1,0,0\n").axis.tolist() == [[0.6, 0, 0.8], [0, 0, 1]]
+    # sequences of three axes of these systems are along Z
+    for header in (CREO_HEADER, "PPRINT/'AUTODESK'\n"):
+        assert read(header + TILTED + "GOTO/1,0,0\n").axis.tolist() == [[0.6, 0, 0.8], [0, 0, 1]]
 
 
 # units and feeds

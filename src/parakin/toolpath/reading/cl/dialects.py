@@ -62,7 +62,7 @@ DIALECTS: dict[DialectName, Dialect] = {
     ),
     "autodesk": Dialect(
         "Autodesk APT", RIGHT, None, r"\bAUTODESK\b|\bHSMWORKS\b|\bFUSION ?360\b|\bINVENTOR CAM\b", ("MOVARC",),
-        ("pocket", "body_length", "offset", "offset"), cycle_values=_AUTODESK_VALUES,
+        ("pocket", "body_length", "offset", "offset"), cycle_values=_AUTODESK_VALUES, upright=True,
     ),
     "camplete": Dialect(
         "Autodesk's post for CAMplete", LEFT, BELOW, r"\bCAMPLETE\b|\bMANUSNC\b", ("MCS", "CSI_TOOL_PATH"),

@@ -15,7 +15,7 @@ from parakin.cli import app
 # From the ground up. What stands on one line knows nothing of each other.
 FLOORS = [
     ["errors", "arrays", "version"],
-    ["units", "algebra", "budget", "annotations"],
+    ["displays", "units", "algebra", "budget", "annotations"],
     ["arguments"],
     ["kernels"],
     ["model"],

@@ -83,7 +83,7 @@ def definitions(module: str) -> list[str]:
 
 
 # Called by others: Python, Numba, a terminal's key bindings; found by their folder; for the page of scripts/.
-FROM_OUTSIDE = {"_load_data", "_save_data", "on_end", "on_start", "GROUP_TITLES"}
+FROM_OUTSIDE = {"_repr_html_", "_load_data", "_save_data", "on_end", "on_start", "GROUP_TITLES"}
 
 
 def test_nothing_stands_for_the_tests_alone():

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import sys
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from os import PathLike, fspath
 from typing import TYPE_CHECKING
 
+from .displays import register_display
 from .errors import DescriptionError, InputError, InputErrors, NoMethodError, ParakinError, PoseError
 from .version import __version__
 
@@ -313,7 +313,21 @@ def __getattr__(name: str) -> object:
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
 
 
-if "IPython" in sys.modules:
-    from .notebook import register_displays
+# What notebooks show: a class, and the function of :mod:`.notebook` that renders its objects.
+_DISPLAYED = {"Machine": "format_machine", "Job": "format_job", "Workspace": "format_workspace"}
 
-    register_displays()
+
+def _make_renderer(name: str) -> Callable[[object], str | None]:
+    """Make what a notebook calls for an object; nothing heavy is imported before something is shown."""
+
+    def render(shown: object) -> str | None:
+        from . import notebook
+
+        html: str | None = getattr(notebook, name)(shown)
+        return html
+
+    return render
+
+
+for _class_name, _render_name in _DISPLAYED.items():
+    register_display(_class_name, _make_renderer(_render_name))

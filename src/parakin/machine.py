@@ -12,6 +12,7 @@ import numpy as np
 from .algebra import Scalar, Vec
 from .arguments import RowsLike, bound_angles, check_kind, check_range, read_rows, warn_of_wide_angles
 from .arrays import Array, AxisRange
+from .displays import Displayed
 from .errors import NoMethodError, PoseError, quote, suggest
 from .kernels.batch import evaluate_tape, evaluate_tape_with_residual
 from .kinematics.assemblies import Assemblies, find_assemblies
@@ -36,7 +37,7 @@ from .model.structures import PlatformPlacement
 _SHORTEST_DIRECTION = 1e-6  # mm or rad; travel in multiples of a shorter one overflows
 
 
-class Machine(MachineProperties):
+class Machine(MachineProperties, Displayed):
     """A parallel kinematic machine. Made by :func:`parakin.load`; nothing of it changes after that.
 
     Poses are rows of ``axes`` (mm, rad) of the tool in the workpiece's frame, orientation R = Rz(C)·Ry(B)·Rx(A);

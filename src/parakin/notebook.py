@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from html import escape
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from .machine import Machine
@@ -12,24 +12,6 @@ if TYPE_CHECKING:
 
 _HEIGHT = 560  # px
 _SECONDS = 10.0  # for a picture
-
-
-def register_displays() -> bool:
-    """Register how IPython displays what parakin gives; return whether a notebook is running."""
-    from IPython import get_ipython  # type: ignore[attr-defined, import-not-found, unused-ignore]
-
-    shell = get_ipython()  # type: ignore[no-untyped-call, unused-ignore]
-    if shell is None:
-        return False
-    register_formatters(shell.display_formatter.formatters["text/html"])
-    return True
-
-
-def register_formatters(html: Any) -> None:
-    """Register the displays in a formatter of IPython; nothing heavy is imported before something is shown."""
-    html.for_type_by_name("parakin.machine", "Machine", format_machine)
-    html.for_type_by_name("parakin.workspaces.certified.workspace", "Workspace", format_workspace)
-    html.for_type_by_name("parakin.toolpath.job", "Job", format_job)
 
 
 def format_machine(machine: Machine) -> str:
@@ -48,15 +30,11 @@ def format_job(job: Job) -> str:
 
 def format_workspace(workspace: Workspace) -> str | None:
     """Format a workspace as its picture; none for a line, or where there is no time for one."""
-    from .errors import PoseError
     from .export.workspace.workspace_files import explain_unfit, prepare_files
 
     if explain_unfit(".svg", "certified", len(workspace.axes)):
         return None
-    try:
-        picture = prepare_files(workspace, None, lambda done: None, _SECONDS).make_file(".svg")
-    except PoseError:
-        return None
+    picture = prepare_files(workspace, None, lambda done: None, _SECONDS).make_file(".svg")
     return f"<p>{escape(repr(workspace)[1:-1])}</p>\n{picture.decode()}"
 
 

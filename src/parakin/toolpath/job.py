@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 from ..arguments import check_arguments, check_positive
 from ..arrays import Array, Progress
+from ..displays import Displayed
 from ..errors import PoseError
 from ..machine import Machine
 from .checking.check import check_path
@@ -53,7 +54,7 @@ class Tolerances(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class Job:
+class Job(Displayed):
     """A tool path made ready for a machine and its controller.
 
     programmed : the path as it came, on the machine

@@ -33,12 +33,9 @@ function drawPath() {
     locateTip(sampledPose(i), place).toArray(positions, 3 * i);
     colourSample(i, most).toArray(colours, 3 * i);
   }
-  pathLine.geometry.dispose();
-  pathLine.geometry = new THREE.BufferGeometry();
-  pathLine.geometry.setAttribute("position", new THREE.BufferAttribute(positions, 3));
-  pathLine.geometry.setAttribute("color", new THREE.BufferAttribute(colours, 3));
+  replaceGeometry(pathLine, {position: positions, color: colours});
   const marked = path.offences.flatMap(({sample}) => Array.from(positions.subarray(3 * sample, 3 * sample + 3)));
-  offenceDots.geometry.setAttribute("position", new THREE.BufferAttribute(new Float32Array(marked), 3));
+  replaceGeometry(offenceDots, {position: new Float32Array(marked)});
   requestPicture();
 }
 

@@ -30,15 +30,11 @@ function drawSection({positions, shares}) {
   const [least, most] = shares.reduce(([low, high], share) => [min(low, share), max(high, share)], [Infinity, -Infinity]);
   const colours = new Float32Array(3 * shares.length), bottom = min(0, least), top = max(most, 1e-9);
   shares.forEach((share, n) => mixColours(DEPTHS, (share - bottom) / (top - bottom)).toArray(colours, 3 * n));
-  const geometry = new THREE.BufferGeometry();
-  geometry.setAttribute("position", new THREE.BufferAttribute(placeCorners(positions, places.slice(0, 2), pose), 3));
-  geometry.setAttribute("color", new THREE.BufferAttribute(colours, 3));
-  sectionMesh.geometry.dispose();
-  sectionMesh.geometry = geometry;
+  replaceGeometry(sectionMesh, {position: placeCorners(positions, places.slice(0, 2), pose), color: colours});
   Object.assign(section, {count: section.count + 1, corners: shares.length, least, most});
   sectionNote.textContent = shares.length ? `det A over home’s is ${least.toFixed(2)} to ${most.toFixed(2)} there; violet is ${bottom < 0 ? "beyond a singularity" : "at a singularity"}.`
     : "Nothing is allowed in this plane.";
-  fitOrbit(geometry, "surface");
+  fitOrbit(sectionMesh.geometry, "surface");
   requestSection();
   requestPicture();
 }

@@ -8,12 +8,8 @@ workGroup.add(shownMesh);
 
 // Draw triangles, nine numbers each, mm; none for nothing.
 function showSurface(corners) {
-  const geometry = new THREE.BufferGeometry();
-  geometry.setAttribute("position", new THREE.BufferAttribute(new Float32Array(corners), 3));
-  geometry.computeVertexNormals();
-  shownMesh.geometry.dispose();
-  shownMesh.geometry = geometry;
-  if (corners.length) fitOrbit(geometry, "proved");
+  replaceGeometry(shownMesh, {position: new Float32Array(corners)}).computeVertexNormals();
+  if (corners.length) fitOrbit(shownMesh.geometry, "proved");
   rememberShown();
   requestPicture();
 }

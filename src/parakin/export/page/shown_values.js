@@ -40,14 +40,10 @@ function showValues(poses, values, step, title) {
       colour.toArray(colours, 18 * n + 3 * k);
     });
   });
-  const geometry = new THREE.BufferGeometry();
-  geometry.setAttribute("position", new THREE.BufferAttribute(positions, 3));
-  geometry.setAttribute("color", new THREE.BufferAttribute(colours, 3));
-  valueMesh.geometry.dispose();
-  valueMesh.geometry = geometry;
+  replaceGeometry(valueMesh, {position: positions, color: colours});
   valueNote.textContent = poses.length ? `${title}, violet 0 to yellow 1: ${min(...values).toPrecision(3)} to ${max(...values).toPrecision(3)}.` : "";
   shown.values = poses.length;
-  if (poses.length) fitOrbit(geometry, "values");
+  if (poses.length) fitOrbit(valueMesh.geometry, "values");
   rememberShown();
   requestPicture();
 }
@@ -61,9 +57,7 @@ function showBox(low, high) {
   });
   const corners = [...Array(8).keys()].map(k => [0, 1, 2].map(i => ends[k >> i & 1][i])), edges = [];
   for (let k = 0; k < 8; k++) for (let i = 0; i < 3; i++) if (!(k >> i & 1)) edges.push(...corners[k], ...corners[k | 1 << i]);
-  shownBox.geometry.dispose();
-  shownBox.geometry = new THREE.BufferGeometry();
-  shownBox.geometry.setAttribute("position", new THREE.BufferAttribute(new Float32Array(edges), 3));
+  replaceGeometry(shownBox, {position: new Float32Array(edges)});
   shown.box = [low, high];
   fitOrbit(shownBox.geometry, "box");
   rememberShown();

@@ -46,6 +46,15 @@ function materialOf(kind, drive) {
 // Bodies with what places them from the points of an item.
 const bodies = [];
 
+// Replace what is drawn by new arrays of three numbers a corner, by the names of their attributes.
+function replaceGeometry(drawn, arrays) {
+  const geometry = new THREE.BufferGeometry();
+  for (const [name, values] of Object.entries(arrays)) geometry.setAttribute(name, new THREE.BufferAttribute(values, 3));
+  drawn.geometry.dispose();
+  drawn.geometry = geometry;
+  return geometry;
+}
+
 function addMesh(geometry, kind, item, place) {
   const drive = machine.joints.findIndex(joint => joint.name === item.name);
   const mesh = new THREE.Mesh(geometry, materialOf(kind, drive));

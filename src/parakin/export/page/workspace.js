@@ -54,12 +54,9 @@ function requestSurface() {
 
 function drawSurface({id, level, last, volume, positions, normals}) {
   if (id !== requestNumber && level > 0) return;
-  const geometry = new THREE.BufferGeometry();
-  geometry.setAttribute("position", new THREE.BufferAttribute(placeCorners(positions, places, current.pose), 3));
-  if (normals.length) geometry.setAttribute("normal", new THREE.BufferAttribute(normals, 3));
-  else geometry.computeVertexNormals();
-  workspaceMesh.geometry.dispose();
-  workspaceMesh.geometry = geometry;
+  const position = placeCorners(positions, places, current.pose);
+  const geometry = replaceGeometry(workspaceMesh, normals.length ? {position, normal: normals} : {position});
+  if (!normals.length) geometry.computeVertexNormals();
   Object.assign(surface, {level, volume, last, milliseconds: performance.now() - requestTime});
   const [power, unit] = places.length === 3 ? [1e9, "m³"] : [1e6, "m²"];
   workspaceNote.textContent = volume > 0 ? `About ${(volume / power).toPrecision(3)} ${unit}, counted on a lattice${last ? "" : ", being refined"}. Assemblies are not told apart.`

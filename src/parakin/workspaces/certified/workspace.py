@@ -14,6 +14,7 @@ import numpy as np
 from ...arguments import check_arguments
 from ...arrays import Array, Flags, Progress, split_rows
 from ...budget import SECONDS, Budget
+from ...displays import Displayed
 from ...errors import PoseError
 from .best_orientation import find_best_orientations
 from .region import Region
@@ -57,7 +58,7 @@ class BoundingLimit:
 
 
 @dataclass(frozen=True, eq=False)
-class Workspace(RegionResult):
+class Workspace(RegionResult, Displayed):
     """A region with its proved volume, and the cells that prove it.
 
     stopped : why the subdivision ended: ``gap`` reached, ``cell`` size reached, ``time``, ``interrupted``,

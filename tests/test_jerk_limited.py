@@ -7,6 +7,9 @@ from seeded_rows import build_rows, build_smooth, draw_smooth, draw_wild, measur
 
 from parakin.kernels import batch
 from parakin.toolpath.timing.drive_limits import DriveLimits
+from parakin.toolpath.timing.jerk_limited import _PLACES
+from parakin.toolpath.timing.kernels.utilisation import Places, Utilisation, measure_utilisation
+from parakin.toolpath.timing.speed_profile import SpeedProfile
 
 BEYOND = 1.001  # times a limit
 
@@ -59,3 +62,26 @@ def test_the_trajectory_does_not_hang_on_the_number_of_cores(monkeypatch):
     monkeypatch.setattr(batch, "count_cores", lambda: 1)
     one = plan_rows(rows, limits)[1]
     assert (many.time == one.time).all() and (many.jerk == one.jerk).all()
+
+
+def test_peaks_between_the_places_are_measured():
+    missed = 0
+    for seed in range(10):
+        path, limits = draw_smooth(seed)
+        path, rng = build_smooth(path, 30), np.random.default_rng(seed)
+        for row in range(30):
+            speed = rng.uniform(10.0, 100.0)
+            seconds = 0.5 * path.step[row] / speed
+            rise, jerk = rng.uniform(-0.5, 0.5) * speed / seconds, rng.uniform(-1.0, 1.0) * speed / seconds**2
+            motion = (np.array([value]) for value in (0.0, speed, rise, jerk))
+            piece = SpeedProfile(np.array([0.0, seconds]), np.array([row]), *motion, np.zeros(len(path.step) + 1))
+            dense = measure_pieces(path, piece, limits, places=201)
+            expected = max(dense[0], np.sqrt(dense[1]), np.cbrt(dense[2]), dense[3])
+            use = Utilisation(np.empty(1), np.zeros(len(path.step) + 1, np.int64), np.ones(len(path.step), bool))
+            measured, sampled = (
+                measure_utilisation(path.rows, limits, piece, use, places, 0, 1)
+                for places in (_PLACES, Places(9, False))
+            )
+            assert measured == pytest.approx(expected, rel=1e-4), (seed, row)
+            missed += sampled < 0.999 * expected
+    assert missed

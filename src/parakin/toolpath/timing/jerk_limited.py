@@ -12,10 +12,19 @@ from .drive_limits import DriveLimits
 from .joint_path import JointPath, divide_joint_path
 from .kernels.grading import bound_sizes, cut_steps
 from .kernels.interior_point import Sweep, allocate_newton, shorten_windows
-from .kernels.slowing import allocate_scratch, slow_down, smooth_speeds
+from .kernels.slowing import allocate_scratch, measure_needs, slow_down, smooth_speeds
 from .kernels.speed_ceilings import StepCeilings
-from .kernels.step_limits import StepLimits, locate_times, measure_steps, stretch_pieces, tighten_steps, write_pieces
-from .kernels.utilisation import Utilisation, measure_utilisation
+from .kernels.step_limits import (
+    StepLimits,
+    compute_slopes,
+    locate_times,
+    measure_steps,
+    stretch_pieces,
+    tighten_steps,
+    write_pieces,
+    write_times,
+)
+from .kernels.utilisation import Places, Utilisation, measure_utilisation
 from .speed_profile import SpeedProfile
 from .time_optimal import RAMP, compute_ceilings, find_reachable
 
@@ -34,7 +43,7 @@ _STEPS, _SWEEPS = 12, 6  # of Newton's in each window and sweep, and sweeps of e
 _WORK = 4_000_000  # steps of the path that Newton's method expands in all, at most: some 5 s on two cores
 _ENOUGH = 6  # of Newton's steps for each of the path's are left to a weight, if the next one has to go without
 _WORTH = 1e-3  # a window is left as it is where the last sweep saved less than this fraction of the time
-_PLACES, _FEWER, _LONG = 34, 10, 200_000  # on each piece where utilisation is measured, and on paths of more rows
+_PLACES = Places(18, True)  # on each piece where utilisation is measured
 _OVER = 1.0005  # a step whose pieces take more of a limit is cut into _MORE_PIECES, or tightened
 _MEASUREMENTS, _REFINEMENTS, _MORE_PIECES = 6, 2, 4  # how often pieces are measured at most, and steps cut for it
 _SURE = 1.0001  # a profile is slowed by this × the worst utilisation, which is measured at some places only
@@ -75,7 +84,7 @@ def limit_jerk(joint_path: JointPath, limits: DriveLimits, x: Array) -> tuple[Jo
     work = _shorten(plan, _BARRIERS[_ROUGH:], work)
     profile, use = _write_profile(plan, limits, None)
     for again in range(_MEASUREMENTS):
-        over = use.kept[:, 3] > _OVER
+        over = use.excess > _OVER
         if not over.any():
             break
         known: tuple[Utilisation, Array, Array] | None
@@ -86,12 +95,12 @@ def limit_jerk(joint_path: JointPath, limits: DriveLimits, x: Array) -> tuple[Jo
             plan, known = _cut_steps(plan, limits, ramp, pieces), None
         else:
             known = use, plan.x.copy(), plan.a.copy()
-            plan = _tighten_steps(plan, ramp, profile.row[over], _SURE * use.kept[over, 3])
+            plan = _tighten_steps(plan, ramp, profile.row[over], _SURE * use.excess[over])
         if again < _MEASUREMENTS - 1:
             work = _shorten(plan, _BARRIERS[_ROUGH:], work)
         profile, use = _write_profile(plan, limits, known)
     pieces = 2 * (plan.edges[:, 1] - plan.edges[:, 0])
-    worst = np.maximum.reduceat(use.kept[:, 3], np.cumsum(pieces) - pieces)
+    worst = np.maximum.reduceat(use.excess, np.cumsum(pieces) - pieces)
     stretch_pieces(plan.edges, profile, np.where(worst > 1.0, _SURE * worst, 1.0))
     return plan.joint_path, profile, use.binding
 
@@ -129,18 +138,16 @@ def _grade_steps(joint_path: JointPath, limits: DriveLimits, ramp: float, x: Arr
 
 def _pose_problem(joint_path: JointPath, limits: DriveLimits) -> StepLimits:
     """Pose the problem for the interior point method."""
-    rows, h = joint_path.rows, joint_path.step[:, None]
-    bend, ceilings = rows.curvature, compute_ceilings(joint_path, limits)
-    acceleration = np.minimum(limits.acceleration, RAMP * limits.jerk)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        slope = np.diff(rows.joints, axis=0) / h - h * (2.0 * bend[:-1] + bend[1:]) / 6.0
-        pace = np.max(np.abs(slope) / np.minimum(limits.speed, RAMP * acceleration), axis=1)
-    mean = float((pace * rows.step)[rows.step > 0.0].sum() / rows.step.sum())
+    rows, ceilings = joint_path.rows, compute_ceilings(joint_path, limits)
+    speed = np.minimum(limits.speed, RAMP * np.minimum(limits.acceleration, RAMP * limits.jerk))
+    slope, slowness = np.empty((len(rows.step), len(speed))), np.empty(len(rows.step))
+    run_in_threads(len(slope), lambda first, last: compute_slopes(rows, speed, slope, slowness, first, last))
+    mean = float((slowness * rows.step).sum() / rows.step.sum())
     top = (_FASTER / mean) ** 2 if mean > 0.0 else np.inf
     start, end = (np.minimum(ceiling, top) for ceiling in ceilings)
     even = np.ones(len(start))
     rates = 1.0 / limits.acceleration, 1.0 / limits.jerk
-    return StepLimits(rows.step, slope, bend, start, end, *rates, rows.forces.along, rows.forces.across, even)
+    return StepLimits(rows.step, slope, rows.curvature, start, end, *rates, rows.forces.along, rows.forces.across, even)
 
 
 def _find_start(joint_path: JointPath, limits: DriveLimits, problem: StepLimits, ramp: float) -> tuple[Array, Array]:
@@ -148,7 +155,7 @@ def _find_start(joint_path: JointPath, limits: DriveLimits, problem: StepLimits,
     rows, count = joint_path.rows, len(joint_path.step)
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         third = np.abs(np.diff(rows.curvature, axis=0)) / rows.step[:, None]
-        ceiling = np.min((_ACROSS * limits.jerk / third) ** (2.0 / 3.0), axis=1)
+        ceiling = np.min(_ACROSS * limits.jerk / third, axis=1) ** (2.0 / 3.0)
     ceiling = np.fmin(ceiling, np.minimum(problem.ceiling_start, problem.ceiling_end))
     x, a = find_reachable(joint_path, limits, StepCeilings(ceiling, ceiling))[0], np.zeros(count + 1)
     edges, scratch = joint_path.find_stretches(), allocate_scratch(count + 1)
@@ -160,9 +167,10 @@ def _find_start(joint_path: JointPath, limits: DriveLimits, problem: StepLimits,
 
 def _slow_stretches(problem: StepLimits, edges: Indices, ramp: float, x: Array, a: Array) -> None:
     """Slow each stretch down where it breaks a limit."""
-    scratch = allocate_scratch(len(x))
+    scratch, needs = allocate_scratch(len(x)), np.empty((len(problem.step), 2))
+    run_in_threads(len(needs), lambda start, stop: measure_needs(problem, x, a, needs, start, stop))
     for first, last in edges:
-        slow_down(first, last, problem, ramp, x, a, scratch)
+        slow_down(first, last, problem, ramp, x, a, needs, scratch)
 
 
 def _cut_windows(edges: Indices, rows: int, odd: int) -> Indices:
@@ -276,11 +284,14 @@ def _write_profile(
     rows, pieces = len(plan.x), 2 * int((plan.edges[:, 1] - plan.edges[:, 0]).sum())
     profile = SpeedProfile.allocate(pieces, rows)
     if known is None:
-        use = Utilisation(np.empty((pieces, 4)), np.zeros(rows, np.int64), np.ones(rows - 1, bool))
+        use = Utilisation(np.empty(pieces), np.zeros(rows, np.int64), np.ones(rows - 1, bool))
     else:
         rows_changed = (known[1] != plan.x) | (known[2] != plan.a)
         use = known[0]._replace(changed=rows_changed[:-1] | rows_changed[1:])
-    write_pieces(plan.edges, plan.problem, plan.x, plan.a, profile)
-    args = (plan.joint_path.rows, limits, profile, use, _PLACES if rows <= _LONG else _FEWER)
+    steps = np.flatnonzero(plan.problem.step)
+    span, motion = np.empty(len(steps)), (plan.problem, plan.x, plan.a)
+    run_in_threads(len(steps), lambda first, last: write_pieces(steps, *motion, profile, span, first, last))
+    write_times(plan.edges, span, profile)
+    args = (plan.joint_path.rows, limits, profile, use, _PLACES)
     run_in_threads(pieces // 2, lambda first, last: measure_utilisation(*args, 2 * first, 2 * last))
     return profile, use

@@ -16,7 +16,7 @@ from .joint_path import JointPath, refine_joint_path
 from .kernels.acceleration_limits import AccelerationLimits
 from .kernels.reachability import Switches, compute_controllable, compute_reachable, find_switches
 from .kernels.speed_ceilings import StepCeilings, compute_speed_ceilings
-from .kernels.utilisation import Utilisation, measure_utilisation
+from .kernels.utilisation import Places, Utilisation, measure_utilisation
 from .speed_profile import SpeedProfile
 
 UNBOUND = 1e12  # mm²/s², of ṡ²: nothing is as fast
@@ -25,7 +25,7 @@ AddRows: TypeAlias = Callable[[JointPath, Indices, Array], JointPath]  # in step
 _ROUNDS = 4
 RAMP = 0.1  # s in which a drive is assumed to reach its acceleration where only a jerk is given
 _ROUNDING = 1e-8
-_PLACES = 6  # on each step where utilisation is measured, the start twice
+_PLACES = Places(5, False)  # on each step where utilisation is measured: the limits were kept between them, too
 
 
 def compute_ceilings(joint_path: JointPath, limits: DriveLimits) -> StepCeilings:
@@ -117,7 +117,7 @@ def _write_steps(
     profile = SpeedProfile(time, row, still, speed[row], acceleration[row], still, row_times)
     without_jerk = limits._replace(jerk=np.full_like(limits.jerk, np.inf))
     binding, changed = np.zeros(len(row_times), np.int64), np.ones(len(joint_path.step), bool)
-    args = (joint_path.rows, without_jerk, profile, Utilisation(np.empty((len(row), 4)), binding, changed), _PLACES)
+    args = (joint_path.rows, without_jerk, profile, Utilisation(np.empty(len(row)), binding, changed), _PLACES)
     factors = list[float]()
     run_in_threads(len(row), lambda first, last: factors.append(measure_utilisation(*args, first, last)))
     worst = max(factors)

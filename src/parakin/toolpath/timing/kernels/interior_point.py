@@ -50,7 +50,8 @@ class Newton(NamedTuple):
     gradient, direction : (n, 2) by x and a; diagonal : (n, 3) of each block xx, xa, aa
     beside : (n, 4) the blocks xx, xa, ax, aa between a row and the next
     weight : (n,) of the barriers of each step
-    x, a : (n,) the iterate tried
+    time, room : (n,) of each step, and the logarithm of what all limits leave it
+    x, a, tried_time, tried_room : (n,) the iterate tried
     derivatives : of one step
     """
 
@@ -59,8 +60,12 @@ class Newton(NamedTuple):
     diagonal: Array
     beside: Array
     weight: Array
+    time: Array
+    room: Array
     x: Array
     a: Array
+    tried_time: Array
+    tried_room: Array
     derivatives: Derivatives
 
 
@@ -68,8 +73,9 @@ class Newton(NamedTuple):
 def allocate_newton(n):
     """Allocate the scratch of a window of n rows."""
     gradient, direction, diagonal, beside = np.empty((n, 2)), np.empty((n, 2)), np.empty((n, 3)), np.empty((n, 4))
-    weight, x, a = np.empty(n), np.empty(n), np.empty(n)
-    return Newton(gradient, direction, diagonal, beside, weight, x, a, allocate_derivatives())
+    weight, time, room, x, a = np.empty(n), np.empty(n), np.empty(n), np.empty(n), np.empty(n)
+    tried = np.empty(n), np.empty(n)
+    return Newton(gradient, direction, diagonal, beside, weight, time, room, x, a, *tried, allocate_derivatives())
 
 
 @njit(nogil=True, cache=True, error_model="numpy")
@@ -128,34 +134,42 @@ def _solve_window(count, damping, newton):
 
 
 @njit(nogil=True, cache=True, error_model="numpy")
-def _measure_window(first, last, limits, x, a, at, weight):
-    """Measure a window's time and barriers, infinite where a limit breaks; x and a begin with row ``at``."""
-    time, barrier = 0.0, 0.0
-    for i in range(first, last):
-        k = i - at
-        t, product = measure_step(i, limits, x[k], a[k], x[k + 1], a[k + 1])
+def _measure_window(first, limits, x, a, time, room):
+    """Measure each step's time and the logarithm of its room; returns whether no limit breaks. x and a are its rows."""
+    for k in range(len(x) - 1):
+        time[k], product = measure_step(first + k, limits, x[k], a[k], x[k + 1], a[k + 1])
         if not product > 0.0:
-            return np.inf, np.inf
-        time += t
-        barrier -= weight[i - first] * np.log(product)
-    return time, barrier
+            return False
+        room[k] = np.log(product)
+    return True
+
+
+@njit(nogil=True, cache=True, error_model="numpy")
+def _sum_cost(count, time, room, weight):
+    """Sum time and barriers of a window's steps."""
+    total, barrier = 0.0, 0.0
+    for k in range(count):
+        total += time[k]
+        barrier -= weight[k] * room[k]
+    return total + barrier
 
 
 @njit(nogil=True, cache=True, error_model="numpy")
 def _search_line(first, last, limits, x, a, now, slope, newton):
     """Take as much of Newton's step as lowers time and barriers; returns how much, 0 for none."""
-    fraction = 1.0
+    fraction, count = 1.0, last - first
+    tried = newton.x[: count + 1], newton.a[: count + 1]
     for _ in range(_HALVINGS):
         fits = True
-        for k in range(last - first + 1):
+        for k in range(count + 1):
             newton.x[k] = x[first + k] + fraction * newton.direction[k, 0]
             newton.a[k] = a[first + k] + fraction * newton.direction[k, 1]
-            fits &= newton.x[k] > 0.0 or k == 0 or k == last - first
-        if fits:
-            time, barrier = _measure_window(first, last, limits, newton.x, newton.a, first, newton.weight)
-            if time + barrier <= now + _ARMIJO * fraction * slope:
-                for k in range(last - first + 1):
-                    x[first + k], a[first + k] = newton.x[k], newton.a[k]
+            fits &= newton.x[k] > 0.0 or k == 0 or k == count
+        if fits and _measure_window(first, limits, *tried, newton.tried_time, newton.tried_room):
+            cost = _sum_cost(count, newton.tried_time, newton.tried_room, newton.weight)
+            if cost <= now + _ARMIJO * fraction * slope:
+                x[first : last + 1], a[first : last + 1] = tried
+                newton.time[:count], newton.room[:count] = newton.tried_time[:count], newton.tried_room[:count]
                 return fraction
         fraction *= 0.5
     return 0.0
@@ -164,34 +178,23 @@ def _search_line(first, last, limits, x, a, now, slope, newton):
 @njit(nogil=True, cache=True, error_model="numpy")
 def _take_step(first, last, limits, x, a, mu, damping, newton):
     """Take one of Newton's steps; returns whether it is worth it, and the damping of the next."""
-    total = 0.0
-    for i in range(first, last):
-        t = measure_step(i, limits, x[i], a[i], x[i + 1], a[i + 1])[0]
-        newton.weight[i - first] = mu * t
-        total += t
-    time, barrier = _measure_window(first, last, limits, x, a, 0, newton.weight)
-    worth = _GAIN * mu * total
+    count, total = last - first, 0.0
+    for k in range(count):
+        newton.weight[k] = mu * newton.time[k]
+        total += newton.time[k]
+    now, worth = _sum_cost(count, newton.time, newton.room, newton.weight), _GAIN * mu * total
     while damping < _STIFF:
         _expand_window(first, last, limits, x, a, newton)
-        slope = _solve_window(last - first, damping, newton)
+        slope = _solve_window(count, damping, newton)
         if not -slope > worth:
             break
-        fraction = _search_line(first, last, limits, x, a, time + barrier, slope, newton)
+        fraction = _search_line(first, last, limits, x, a, now, slope, newton)
         if fraction > 0.3:
             return True, max(_RIDGE, 0.1 * damping)
         if fraction > 0.0:
             return True, damping
         damping = max(10.0 * damping, _DAMPED)
     return False, _RIDGE
-
-
-@njit(nogil=True, cache=True, error_model="numpy")
-def _measure_time(first, last, limits, x, a):
-    """Measure the time of a window, s."""
-    time = 0.0
-    for i in range(first, last):
-        time += measure_step(i, limits, x[i], a[i], x[i + 1], a[i + 1])[0]
-    return time
 
 
 @njit(nogil=True, cache=True, error_model="numpy")
@@ -210,8 +213,13 @@ def shorten_windows(windows, sweep, newton):
     work = 0
     for k in range(len(windows)):
         first, last = windows[k, 0], windows[k, 1]
-        time = _measure_time(first, last, limits, x, a)
-        if time <= _NEAR * _bound_time(first, last, limits) or gains[first:last].max() < sweep.worth:
+        rows = slice(first, last + 1)
+        if gains[first:last].max() < sweep.worth or not _measure_window(
+            first, limits, x[rows], a[rows], newton.time, newton.room
+        ):
+            continue
+        time = newton.time[: last - first].sum()
+        if time <= _NEAR * _bound_time(first, last, limits):
             continue
         damping = _RIDGE
         for _ in range(sweep.steps):
@@ -219,5 +227,5 @@ def shorten_windows(windows, sweep, newton):
             work += last - first
             if not advanced:
                 break
-        gains[first:last] = abs(1.0 - _measure_time(first, last, limits, x, a) / time)
+        gains[first:last] = abs(1.0 - newton.time[: last - first].sum() / time)
     return work

@@ -141,39 +141,52 @@ def smooth_speeds(first, last, step, span, x, a, scratch):
 
 
 @njit(nogil=True, cache=True, error_model="numpy")
-def _find_need(first, last, limits, x, a, scratch):
-    """Find how much slower the rows of broken steps have to be, as logarithms in ``values``.
+def measure_needs(limits, x, a, needs, start, stop):
+    """Measure steps from ``start`` to ``stop``: their time, s, and how much slower, as a logarithm, they have to be.
 
-    Returns the greatest, and whether a step can't be passed at all.
+    needs : (steps, 2), overwritten; the time of a step that can't be passed at all is below 0
+    """
+    for i in range(start, stop):
+        if limits.step[i] > 0.0:
+            needs[i, 0], product = measure_step(i, limits, x[i], a[i], x[i + 1], a[i + 1])
+            needs[i, 1] = 0.0
+            if not product > 0.0:
+                excess = measure_excess(i, limits, x[i], a[i], x[i + 1], a[i + 1])
+                needs[i, 1] = np.log(max(excess, 1.0) / _ROOM) if excess < np.inf else 1.0
+
+
+@njit(nogil=True, cache=True, error_model="numpy")
+def _gather_needs(first, last, limits, x, needs, scratch):
+    """Gather the needs of a stretch's steps at its rows in ``values``, and the rows' times.
+
+    Returns the greatest need, and whether a step can't be passed at all.
     """
     times, values, worst, lost = scratch.times, scratch.values, 0.0, False
     times[first] = values[first] = 0.0
     for i in range(first, last):
-        t, product = measure_step(i, limits, x[i], a[i], x[i + 1], a[i + 1])
-        values[i + 1] = 0.0
-        if not product > 0.0:
-            excess = measure_excess(i, limits, x[i], a[i], x[i + 1], a[i + 1])
-            need = np.log(max(excess, 1.0) / _ROOM) if excess < np.inf else 1.0
-            values[i], values[i + 1], worst = max(values[i], need), need, max(worst, need)
-            if t < 0.0:
-                lost = True
-                t = 2.0 * limits.step[i] / (np.sqrt(x[i]) + np.sqrt(x[i + 1]))
+        t, need = needs[i, 0], needs[i, 1]
+        values[i], values[i + 1], worst = max(values[i], need), need, max(worst, need)
+        if t < 0.0:
+            lost = True
+            t = 2.0 * limits.step[i] / (np.sqrt(x[i]) + np.sqrt(x[i + 1]))
         times[i + 1] = times[i] + t
     return worst, lost
 
 
 @njit(nogil=True, cache=True, error_model="numpy")
-def slow_down(first, last, limits, ramp, x, a, scratch):
+def slow_down(first, last, limits, ramp, x, a, needs, scratch):
     """Slow a stretch down until it keeps all limits, from row ``first`` to ``last``, at rest; returns whether it does.
 
     limits : :class:`~.step_limits.StepLimits`; ramp : the first span, s; x, a : (rows,) ṡ² and s̈, changed
+    needs : of :func:`measure_needs`, changed
     """
     span, values, mean, rate = ramp, scratch.values, scratch.mean, scratch.rate
     for _ in range(_ROUNDS):
-        worst, lost = _find_need(first, last, limits, x, a, scratch)
+        worst, lost = _gather_needs(first, last, limits, x, needs, scratch)
         if lost:
             _clip_acceleration(first, last, limits.step, x, a)
-            worst, lost = _find_need(first, last, limits, x, a, scratch)
+            measure_needs(limits, x, a, needs, first, last)
+            worst, lost = _gather_needs(first, last, limits, x, needs, scratch)
         if worst == 0.0:
             return True
         if _WHOLE * span >= scratch.times[last]:
@@ -185,8 +198,13 @@ def slow_down(first, last, limits, ramp, x, a, scratch):
             _average(first, last, scratch, scratch.spread, values)
             _average(first, last, scratch, values, scratch.spread)
             _average(first, last, scratch, scratch.spread, mean)
+        slowed = False
         for i in range(first, last + 1):
-            slower = np.exp(-2.0 * mean[i])
-            x[i], a[i] = x[i] * slower, (a[i] - np.sqrt(x[i]) * rate[i]) * slower
+            before, slowed = slowed, mean[i] != 0.0 or rate[i] != 0.0
+            if slowed:
+                slower = np.exp(-2.0 * mean[i])
+                x[i], a[i] = x[i] * slower, (a[i] - np.sqrt(x[i]) * rate[i]) * slower
+            if i > first and (before or slowed):
+                measure_needs(limits, x, a, needs, i - 1, i)
         span *= 2.0
     return False

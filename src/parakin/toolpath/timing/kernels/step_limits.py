@@ -37,6 +37,22 @@ class StepLimits(NamedTuple):
     tightening: Array
 
 
+@njit(nogil=True, cache=True, error_model="numpy")
+def compute_slopes(rows, speed, slope, slowness, first, last):
+    """Compute q' at the start of steps ``first`` to ``last``, and the greatest of |q'|/``speed`` (joints,).
+
+    rows : :class:`~.splines.JointRows`; both are 0 for a step of length 0
+    """
+    q, bend = rows.joints, rows.curvature
+    for i in range(first, last):
+        h, slowness[i] = rows.step[i], 0.0
+        for j in range(len(speed)):
+            slope[i, j] = 0.0
+            if h > 0.0:
+                slope[i, j] = (q[i + 1, j] - q[i, j]) / h - h * (2.0 * bend[i, j] + bend[i + 1, j]) / 6.0
+                slowness[i] = max(slowness[i], abs(slope[i, j]) / speed[j])
+
+
 @njit(nogil=True, cache=True, error_model="numpy", inline="always")
 def join_step(h, x0, a0, x1, a1):
     """Join two rows by two pieces of equal time: the time of both, ṡ and s̈ between them, s⃛ of both, mm to the middle.
@@ -168,20 +184,31 @@ def locate_times(limits, x, a, steps, times, states):
 
 
 @njit(nogil=True, cache=True, error_model="numpy")
-def write_pieces(edges, limits, x, a, profile):
-    """Write two pieces of constant s⃛ for each step of the stretches to the profile."""
+def write_pieces(steps, limits, x, a, profile, span, first, last):
+    """Write two pieces of constant s⃛ for ``steps`` from ``first`` to ``last`` to the profile, and the ``span`` of both.
+
+    steps : (k,) all that are not of length 0, ascending; the profile's times are left to :func:`write_times`
+    """
     speed, rise, jerk = profile.speed, profile.acceleration, profile.jerk
-    n, now = 0, 0.0
-    for k in range(len(edges)):
-        for i in range(edges[k, 0], edges[k, 1]):
-            profile.row_times[i] = now
-            t, v, middle, e0, e1, o = join_step(limits.step[i], x[i], a[i], x[i + 1], a[i + 1])
-            profile.time[n], profile.row[n], profile.shift[n] = now, i, 0.0
-            speed[n], rise[n], jerk[n] = np.sqrt(x[i]), a[i], e0
-            profile.time[n + 1], profile.row[n + 1], profile.shift[n + 1] = now + 0.5 * t, i, o
-            speed[n + 1], rise[n + 1], jerk[n + 1] = v, middle, e1
-            now, n = now + t, n + 2
-        profile.row_times[edges[k, 1]] = profile.time[n] = now
+    for k in range(first, last):
+        i, n = steps[k], 2 * k
+        span[k], v, middle, e0, e1, o = join_step(limits.step[i], x[i], a[i], x[i + 1], a[i + 1])
+        profile.row[n], profile.shift[n] = i, 0.0
+        speed[n], rise[n], jerk[n] = np.sqrt(x[i]), a[i], e0
+        profile.row[n + 1], profile.shift[n + 1] = i, o
+        speed[n + 1], rise[n + 1], jerk[n + 1] = v, middle, e1
+
+
+@njit(nogil=True, cache=True, error_model="numpy")
+def write_times(edges, span, profile):
+    """Write the times of pieces, two of equal time for each ``span`` (k,), and of the rows of the stretches."""
+    k, now = 0, 0.0
+    for n in range(len(edges)):
+        for i in range(edges[n, 0], edges[n, 1]):
+            profile.row_times[i] = profile.time[2 * k] = now
+            profile.time[2 * k + 1] = now + 0.5 * span[k]
+            now, k = now + span[k], k + 1
+        profile.row_times[edges[n, 1]] = profile.time[2 * k] = now
 
 
 @njit(nogil=True, cache=True, error_model="numpy")

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import os
 import shutil
 import subprocess
 import sys
 import types
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -18,6 +20,7 @@ from parakin.controllers.linuxcnc.screen import name_screen
 from parakin.export.machine.scene import build_scene
 
 sys.path.insert(0, str(Path(__file__).parent / "linuxcnc"))
+from ini_file import read_ini
 from simulation import make_configuration, simulated, why_not
 from stub import inward, outward, world
 
@@ -165,7 +168,6 @@ def test_limits_in_words(screens):
 def test_all_files_of_the_screen_are_python_and_hal(name):
     machine = load_shipped(name)
     files = make_configuration(machine)
-    compile(files[f"{name}_axis.py"], "axis", "exec")
     nets = [line for line in files[f"{name}_screen.hal"].splitlines() if line.startswith("net ")]
     pins = {line.split()[-1] for line in nets}
     assert {f"{name}_screen.{axis.lower()}" for axis in machine.axes} <= pins
@@ -176,16 +178,32 @@ def test_all_files_of_the_screen_are_python_and_hal(name):
         assert len(words) == 5 or f"net {words[1]} " in own  # a signal that the machine's own file has
 
 
-def test_gmoccapy_has_no_settings_of_axis():
+def test_a_screen_has_its_own_settings():
     machine = load_shipped("orthoglide")
-    axis, other = (make_configuration(machine, None, screen)["orthoglide.ini"] for screen in SCREENS)
-    assert "\nDISPLAY = axis\n" in axis and "\nUSER_COMMAND_FILE = orthoglide_axis.py\n" in axis
-    kept = [
-        line for line in axis.splitlines() if not line.startswith(("DISPLAY = ", "USER_COMMAND_FILE", "# as parakin"))
-    ]
-    assert [line for line in other.splitlines() if not line.startswith("# as parakin")] == [
-        *kept[: kept.index("[DISPLAY]") + 1], "DISPLAY = gmoccapy", *kept[kept.index("[DISPLAY]") + 1 :],
-    ]  # fmt: skip
+    for screen in SCREENS:
+        files = make_configuration(machine, None, screen)
+        display = read_ini(files["orthoglide.ini"])["DISPLAY"]
+        assert display["DISPLAY"] == screen
+        compile(files[display["USER_COMMAND_FILE"]], screen, "exec")
+        assert [name for name in files if name.endswith("_axis.py")] == ["orthoglide_axis.py"] * (screen == "axis")
+
+
+class Gmoccapy:
+    """What gmoccapy, which runs its settings in its own namespace, has for them: preferences, ini, commands."""
+
+    def __init__(self, preferred, ini):
+        self.prefs = SimpleNamespace(getpref=lambda name, default, kind: preferred)
+        self.get_ini_info = SimpleNamespace(inifile=SimpleNamespace(find=lambda section, key: ini[section].get(key)))
+        self.opened = []
+        self.command = SimpleNamespace(program_open=self.opened.append)
+
+
+@pytest.mark.parametrize(("preferred", "opened"), [("", ["/cnc/orthoglide.ngc"]), ("/other.ngc", [])])
+def test_gmoccapy_opens_the_inis_program_unless_it_prefers_another(preferred, opened):
+    files = make_configuration(load_shipped("orthoglide"), None, "gmoccapy")
+    screen = Gmoccapy(preferred, read_ini(files["orthoglide.ini"]))
+    exec(files["orthoglide_gmoccapy.py"], {"os": os, "CONFIGPATH": "/cnc", "self": screen})
+    assert screen.opened == opened
 
 
 def why_no_screen():

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import sys
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 from scipy.optimize import least_squares
 
 import parakin as pk
+from parakin.controllers.linuxcnc.config import write_ini
 from parakin.controllers.linuxcnc.homing.homing_plan import find_homing
 from parakin.dynamics.inverse_dynamics import Dynamics, Motion
 from parakin.errors import InputError, NoMethodError, SingularHomeWarning
@@ -19,6 +22,9 @@ from parakin.performance.indices import compute_performance
 from parakin.performance.jacobians import compute_scaled_rates
 from parakin.performance.singularities import compute_singularity_margins
 from parakin.stiffness.stiffness import analyse_stiffness
+
+sys.path.insert(0, str(Path(__file__).parent / "linuxcnc"))
+from ini_file import read_ini
 
 PLANAR = """\
 name: planar_four
@@ -308,3 +314,11 @@ def test_no_joint_is_homed_by_itself(machines, tmp_path):
     (tmp_path / "switches.yaml").write_text(PLANAR.replace("  range:", "  homing: 150 mm\n  range:"))
     with pytest.raises(InputError, match="joint d1 can't go to a switch by itself, there are 4 drives for 3 freedoms"):
         find_homing(pk.load(tmp_path / "switches.yaml"))
+
+
+def test_no_leg_is_jogged_by_itself(machines):
+    m = machines["four_struts_and_wrist"]
+    ini = read_ini(write_ini(m))
+    sequences = [int(ini[f"JOINT_{i}"]["HOME_SEQUENCE"]) for i in range(len(m.joints))]
+    assert all(sequence < 0 for sequence in sequences[: m.leg_count])  # LinuxCNC jogs none of these
+    assert all(sequence >= 0 for sequence in sequences[m.leg_count :])

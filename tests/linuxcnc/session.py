@@ -21,6 +21,7 @@ from parakin.controllers.linuxcnc.home_pose import find_home_pose
 LIMITED = 0.02  # drives' limits above the description's
 AGREE = 1e-6  # mm and degrees
 HELD = 1e-2  # the same nearer to a wrist's pole than 8e-6 rad, where a joint is held
+APART = 1e-4  # mm: the sampler writes six digits
 STEP = 2.0  # of a joint's speed: the most in a cycle
 FEEDS = 6e3, 6e4  # mm/min: the planner is to keep the joints' limits
 STOPS = ("stop_at_once", "stop_amid")
@@ -103,8 +104,10 @@ class Session:
         return [["mdi", f"G43.1 Z{self.rng.uniform(-20.0, 20.0):.3f}" if self.rng.random() < 0.7 else "G49"]]
 
     def switch(self):
-        """Joint by joint a little way, and back by way of home."""
+        """Joint by joint a little way, and back by way of home; with more drives than freedoms it is refused."""
         machine = self.machine
+        if machine.is_redundant:
+            return [["mdi", "M429"], *self.jog_joint()]
         home = outward(machine, machine.inverse(find_home_pose(machine))[None])[0]
         back = " ".join(f"{machine.axes[i]}{home[i]:.6f}" for i in range(len(home)))
         axis = machine.axes[self.rng.integers(len(machine.axes))]
@@ -120,7 +123,8 @@ def run_session(machine, count, seed):
         seen, rows = simulation.operate(steps, session.programs, seconds=120 + 12 * count)
     joints = rows[:, 2 + len(machine.axes) :]
     joints = joints[int((joints != joints[0]).any(1).argmax()) + 1 :]
-    return seen, joints, [*check_steps(machine, seen), *check_joints(machine, joints, steps)]
+    wrong = [*check_steps(machine, seen), *check_joints(machine, joints, steps)]
+    return seen, joints, [*wrong, *check_agreement(machine, joints)]
 
 
 def check_steps(machine, seen):
@@ -152,6 +156,14 @@ def check_joints(machine, joints, steps):
     stops = sum(step[0] in STOPS for step in steps)  # then the commands become the feedback's
     if fast > stops:
         yield f"{fast} cycles in which a joint steps too far, {stops} stops"
+
+
+def check_agreement(machine, joints):
+    """Say where joints of more drives than freedoms were sent apart."""
+    if machine.is_redundant:
+        residual = machine.forward(inward(machine, np.unique(joints, axis=0)), near=machine.home).residual
+        if not residual.max() < APART:
+            yield f"joints that are {residual.max():g} mm apart"
 
 
 def main():

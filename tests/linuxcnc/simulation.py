@@ -136,7 +136,9 @@ class Simulation:
         task = {"machine": self.machine.name, "joints": len(self.machine.joints), "steps": steps}
         task |= {"ini": "screen.ini", "screen": screen}
         (self.folder / "task.json").write_text(json.dumps(task))
-        ini = make_configuration(self.machine, None, screen)[f"{self.machine.name}.ini"]
+        files, settings = make_configuration(self.machine, None, screen), f"{self.machine.name}_{screen}.py"
+        (self.folder / settings).write_text(files[settings], encoding="utf-8")
+        ini = files[f"{self.machine.name}.ini"]
         ini = ini.replace(f"OPEN_FILE = ./{self.machine.name}.ngc", f"OPEN_FILE = ./{opened}")
         (self.folder / "screen.ini").write_text(ini, encoding="utf-8")
         for file in ("operator_ui.py", "screen_ui.py", "hang_dump.py"):

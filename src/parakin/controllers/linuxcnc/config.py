@@ -19,6 +19,7 @@ from .kinematics_module import hash_kinematics, name_kinematics
 from .kinematics_switch import list_remaps
 from .number_text import format_number
 from .planner import hash_planner, name_planner
+from .screen import name_screen_settings
 
 _JOG = 0.25  # of the speed of moves by hand: what the screen begins with
 _END_DIGIT = 0.01  # mm and degrees
@@ -42,7 +43,8 @@ POSITION_OFFSET = RELATIVE
 POSITION_FEEDBACK = ACTUAL
 PROGRAM_PREFIX = .
 OPEN_FILE = ./{name}.ngc
-{settings}GEOMETRY = {letters}
+USER_COMMAND_FILE = {settings}
+GEOMETRY = {letters}
 DEFAULT_LINEAR_VELOCITY = {jog}
 MAX_LINEAR_VELOCITY = {by_hand}
 DEFAULT_ANGULAR_VELOCITY = {turn_jog}
@@ -178,7 +180,7 @@ def write_ini(
         spindle=wiring.SPINDLE_INI if equipment else "",
         name=machine.name,
         screen=screen,
-        settings=f"USER_COMMAND_FILE = {machine.name}_axis.py\n" if screen == "axis" else "",
+        settings=name_screen_settings(machine, screen),
         axes=" ".join(machine.axes),
         letters="".join(machine.axes),
         joints=len(machine.joints),
@@ -198,8 +200,8 @@ def write_ini(
     axes = [_format_axis(machine, box, column) for column in range(len(machine.axes))]
     at_home = machine.inverse(pose).tolist()
     homing = [
-        _list_immediate_homing(drive, q) if equipment is None else wiring.list_joint_keys(machine, equipment, i)
-        for i, (drive, q) in enumerate(zip(machine.drives, at_home, strict=True))
+        _list_immediate_homing(machine, i, q) if equipment is None else wiring.list_joint_keys(machine, equipment, i)
+        for i, q in enumerate(at_home)
     ]
     joints = [_format_joint(i, drive, homing[i]) for i, drive in enumerate(machine.drives)]
     return "\n".join([head, *axes, *joints])
@@ -252,11 +254,15 @@ def _format_rates(speed: float, acceleration: float, unit: str) -> Iterator[str]
     yield f"MAX_ACCELERATION = {format_number(to_display(acceleration, unit))}"
 
 
-def _list_immediate_homing(drive: Drive, home: float) -> Iterator[str]:
+def _list_immediate_homing(machine: Machine, index: int, home: float) -> Iterator[str]:
     """List the keys of homing of a simulation: a joint is at home at once."""
-    yield f"HOME = {format_number(to_display(home, drive.unit))}"
-    yield f"HOME_OFFSET = {format_number(to_display(home, drive.unit))}"
-    yield from ("HOME_SEARCH_VEL = 0", "HOME_LATCH_VEL = 0", "HOME_SEQUENCE = 0")
+    at_home = format_number(to_display(home, machine.drives[index].unit))
+    yield from (f"HOME = {at_home}", f"HOME_OFFSET = {at_home}", "HOME_SEARCH_VEL = 0", "HOME_LATCH_VEL = 0")
+    if machine.is_redundant and index < machine.leg_count:
+        yield "# The legs' joints move together only: LinuxCNC jogs none whose sequence is negative."
+        yield "HOME_SEQUENCE = -1"
+    else:
+        yield "HOME_SEQUENCE = 0"
 
 
 def _format_joint(index: int, drive: Drive, homing: Iterable[str]) -> str:

@@ -16,7 +16,13 @@ from .kinematics_switch import write_switch_programs
 from .model_header import name_model, write_model
 from .page import write_page
 from .planner import name_planner, write_planner
-from .screen import name_screen, write_axis_settings, write_screen, write_screen_hal
+from .screen import (
+    name_screen,
+    name_screen_settings,
+    write_screen,
+    write_screen_hal,
+    write_screen_settings,
+)
 from .stamp import stamp_file
 
 
@@ -45,10 +51,10 @@ def make_linuxcnc_configuration(
         f"{machine.name}_rates.hal": write_rates_hal(machine),
         f"{name_screen(machine)}.py": write_screen(machine),
         f"{name_screen(machine)}.hal": write_screen_hal(machine),
-        f"{machine.name}_axis.py": write_axis_settings(machine),
+        name_screen_settings(machine, screen): write_screen_settings(machine, screen),
         f"{machine.name}.tbl": write_tool_table(machine),
         f"{machine.name}.ngc": write_first_program(machine),
-        f"{machine.name}.md": write_page(machine, equipment),
+        f"{machine.name}.md": write_page(machine, equipment, screen),
         **write_switch_programs(machine),
         **(equipment.layout.files if equipment else {}),
     }

@@ -14,6 +14,7 @@ from .kinematics_module import name_kinematics
 from .model_header import LEAST_REGULARITY, list_limit_names
 from .number_text import format_number
 from .planner import NO_TOLERANCE, name_planner
+from .screen import name_screen_settings
 
 _PAGE = """\
 # {title} under LinuxCNC
@@ -29,7 +30,7 @@ For LinuxCNC 2.9, {purpose}.
 | `{name}.ini` | ranges, speeds and home |
 | `{name}.hal`, `{name}_rates.hal` | {drives}, the guard, the axes' rates |
 {files}| `{name}_screen.py`, `{name}_screen.hal` | the window that shows the machine, and what brings it the joints |
-| `{name}_axis.py` | what LinuxCNC's screen AXIS does at its start |
+| `{settings}` | what LinuxCNC's screen does at its start |
 | `{name}.tbl` | the tool |
 | `{switches}_m428.ngc` to `m430` | M428 and M429, which choose the kinematics |
 | `{name}.ngc` | a first program: a square at home |
@@ -100,9 +101,9 @@ _JOINTS = """\
 """
 
 _REDUNDANT_JOINTS = """\
-- There are more drives than freedoms, so no joint may move by itself: the encoders are absolute, M429 is refused. Do
-  not jog single joints. Drives that are a following error apart pull at each other; the position shown is that of
-  least squares, and none is where they disagree by more than 1 mm.
+- There are more drives than freedoms, so no joint of a leg may move by itself: the encoders are absolute, M429 is
+  refused, and LinuxCNC refuses to jog one, for its HOME_SEQUENCE is negative. Drives that are a following error apart
+  pull at each other; the position shown is that of least squares, and none is where they disagree by more than 1 mm.
 """
 
 _DIRECTION = "the tool's axis is Rz(C)·Ry(B)·z, from the tip into the holder"
@@ -110,13 +111,14 @@ _ORIENTATION = "the tool's frame is Rz(C)·Ry(B)·Rx(A)"
 _PLACE = "the axes are those of the machine's frame"
 
 
-def write_page(machine: Machine, equipment: Equipment | None = None) -> str:
+def write_page(machine: Machine, equipment: Equipment | None = None, screen: str = "axis") -> str:
     """Write the page, Markdown."""
     home = zip(machine.axes, find_home_pose(machine).tolist(), machine.axis_units, strict=True)
     words = [f"{axis} {format_number(to_display(value, unit))}" for axis, value, unit in home]
     return _PAGE.format(
         title=escape(" ".join(machine.spec.title.split()), quote=False),
         name=machine.name,
+        settings=name_screen_settings(machine, screen),
         switches=machine.name.lower(),
         kinematics=name_kinematics(machine),
         guard=name_guard(machine),

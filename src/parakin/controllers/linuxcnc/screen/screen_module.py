@@ -55,6 +55,17 @@ if root_window.winfo_screenwidth() >= 1800:
     root_window.tk.call("wm", "geometry", ".", "%dx%d+0+0" % (root_window.winfo_screenwidth() // 2 - 20, 820))
 """
 
+_GMOCCAPY = """\
+# gmoccapy runs this at the end of its start. By itself it opens only the program that its own settings name; where they
+# name none it now opens OPEN_FILE of the ini file of {machine}, as AXIS does.
+
+if not self.prefs.getpref("open_file", "", str).strip():
+    opened = os.path.join(CONFIGPATH, self.get_ini_info.inifile.find("DISPLAY", "OPEN_FILE"))
+    self.command.program_open(os.path.abspath(opened))
+"""
+
+_SETTINGS = {"axis": _AXIS, "gmoccapy": _GMOCCAPY}
+
 
 def name_screen(machine: Machine) -> str:
     """Name the window's program, and its component in HAL."""
@@ -139,6 +150,11 @@ def write_screen_hal(machine: Machine) -> str:
     return _HAL.format(machine=machine.name, name=name, nets="\n".join(nets))
 
 
-def write_axis_settings(machine: Machine) -> str:
-    """Write what LinuxCNC's screen AXIS runs at its start: the numbers do not cover its picture."""
-    return _AXIS.format(machine=machine.name)
+def name_screen_settings(machine: Machine, screen: str) -> str:
+    """Name the file that LinuxCNC's screen runs at its start."""
+    return f"{machine.name}_{screen}.py"
+
+
+def write_screen_settings(machine: Machine, screen: str) -> str:
+    """Write what LinuxCNC's screen runs at its start: AXIS leaves its picture free, gmoccapy opens a program."""
+    return _SETTINGS[screen].format(machine=machine.name)

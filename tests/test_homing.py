@@ -95,9 +95,11 @@ def test_what_may_come_to_a_singularity_is_not_proved(monkeypatch):
     for side in ("low", "high"):
         assert not prove_homing(m, {i: getattr(drive, side) for i, drive in enumerate(m.drives)}, np.ones(2))
     assert not find_homing(load_shipped("tricept")).proved
-    monkeypatch.setattr(proof, "_SLACK", 1000.0)
     m = load_shipped("linear_delta")
-    assert not prove_homing(m, {i: drive.high for i, drive in enumerate(m.drives)}, np.ones(3))
+    switches = {i: drive.high for i, drive in enumerate(m.drives)}
+    assert not prove_homing(m, switches | {1: m.drives[1].high - 20.0}, np.ones(3))  # it may stand beyond the switch
+    monkeypatch.setattr(proof, "_SLACK", 1000.0)
+    assert not prove_homing(m, switches, np.ones(3))
 
 
 def test_joints_of_a_sequence_arrive_together():

@@ -28,7 +28,8 @@ def prove_homing(machine: Machine, ends: dict[int, float], speeds: Array) -> boo
     singular, and none lies on the boundary of the searched box: so the pose, which goes on where it is regular, stays
     among them. Limits other than the ranges of the drives are not part of the claim.
 
-    Only for machines that translate, without constraints; of others, and where cells are left undecided, False.
+    Only for machines that translate, without constraints, whose switches lie at the ends of the joints' ranges or
+    beyond; of others, and where cells are left undecided, False.
 
     ends : joint's index to its switch, mm; speeds (joints,)
     """
@@ -50,12 +51,16 @@ class _TogetherProof:
         self.switches = np.array([ends[i] for i in joints])
         middles = np.array([0.5 * (machine.drives[i].low + machine.drives[i].high) for i in joints])
         self.signs = np.where(self.switches < middles, -1.0, 1.0)
+        ends_of_ranges = np.array([[getattr(drive, end) for drive in machine.drives] for end in ("low", "high")])
+        self.before = ((self.switches - ends_of_ranges) * self.signs).min(0)
         self.pairs = list(permutations(joints, 2))
         low, high = (np.array(end) for end in estimate_axis_ranges(machine))
         self.low, self.high = low - _BEYOND * (high - low), high + _BEYOND * (high - low)
 
     def holds(self) -> bool:
         """Tell whether it is proved."""
+        if (self.before < -_SLACK).any():
+            return False  # a joint may stand beyond its switch
         longest, apart = self._bound_starts()
         low, high, left = self.low[None], self.high[None], _MOST_CELLS
         while len(low):

@@ -53,6 +53,7 @@ UNITS = {
     "crank": ["rad"],
     "lambda": ["mm", "mm"],
     "column": ["rad", "mm"],
+    "driven_column": ["rad", "mm", "rad"],
 }
 SINGLE = ["length", "slider", "crank"]
 FAMILIES = {  # motion, leg kinds to draw from
@@ -74,7 +75,10 @@ FAMILIES = {  # motion, leg kinds to draw from
     "led tripod": ("ry rx tz", SINGLE),
     "rings": ("tx ty tz rx ry", ["ring"]),
     "other rings": ("tx ty tz ry rx", ["ring"]),
+    "seven": ("tx ty tz rz ry rx", SINGLE),
+    "driven columns": ("tx ty tz rz ry rx", ["column", "driven_column"]),
 }
+MORE_DRIVES = {"seven": 1, "driven columns": 2}  # than freedoms
 
 
 def _direction(rng):
@@ -84,9 +88,9 @@ def _direction(rng):
 
 def _leg(rng, kind, number, end, plane):
     """A leg to the platform's joint at ``end`` at home; ``plane``: 1 for the directions it may lie in."""
-    leg = {"kind": kind, "joints": [f"q{number}{letter}" for letter in "ab"[: len(UNITS[kind])]]}
+    leg = {"kind": kind, "joints": [f"q{number}{letter}" for letter in "abc"[: len(UNITS[kind])]]}
     foot = np.round(rng.uniform(-500, 500, 3) * plane + [0, 0, 300] * plane, 1)
-    if kind == "column":
+    if kind in ("column", "driven_column"):
         radius = round(rng.uniform(300, 600), 1)
         out = abs(radius - np.hypot(*end[:2]))
         return leg | {"radius": radius, "rod": round(1.3 * out + 80, 1), "branch": rng.choice(["+", "-"])}
@@ -168,9 +172,12 @@ def draw(family, seed, count=40):
     third = iter([given["rz"], given["rx"]])
     for word in motion:
         frame = frame @ transform(word, next(third) if motion.count("rz") == 2 and word == "rz" else given[word])
-    total = 0
-    while total < len(motion):
-        fit = [kind for kind in kinds if total + len(UNITS[kind]) <= len(motion)]
+    total, drives = 0, len(motion) + MORE_DRIVES.get(family, 0)
+    while total < drives:
+        left = {kind: drives - total - len(UNITS[kind]) for kind in kinds}
+        fit = [
+            kind for kind, rest in left.items() if rest >= 0 and (rest != 1 or any(len(UNITS[k]) == 1 for k in kinds))
+        ]
         kind = rng.choice(fit)
         platform = np.round(rng.uniform(-180, 180, 3) * plane, 1)
         if kind == "ring":
@@ -181,7 +188,7 @@ def draw(family, seed, count=40):
     if planar:  # the tool is the platform's own frame: nothing leads out of the plane
         d.head = []
     joints = np.zeros((count + 1, len(d.joints)))
-    joints[:, len(motion) :] = rng.uniform(0.3, 0.9, len(d.serial)) + rng.uniform(-0.2, 0.2, (count + 1, len(d.serial)))
+    joints[:, drives:] = rng.uniform(0.3, 0.9, len(d.serial)) + rng.uniform(-0.2, 0.2, (count + 1, len(d.serial)))
     if "rings" in family:
         d.limits = ["limits:", "  cones:", "    - {at: foot, angle: 170 deg}"]
     elif d.turns or rng.random() < 0.5:

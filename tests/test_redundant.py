@@ -11,6 +11,7 @@ import pytest
 from scipy.optimize import least_squares
 
 import parakin as pk
+from parakin.accuracy.worst_case import bound_worst_case
 from parakin.controllers.linuxcnc.config import write_ini
 from parakin.controllers.linuxcnc.homing.homing_plan import find_homing
 from parakin.dynamics.inverse_dynamics import Dynamics, Motion
@@ -291,13 +292,69 @@ def test_springs_hold_the_tool_together(machines):
     assert found.drive_share == pytest.approx(0.75)
 
 
+@pytest.mark.parametrize("name", ["seven_struts", "four_struts_and_wrist"])
+def test_weight_moves_the_tool_to_where_the_energy_is_least(name, machines):
+    """Against the drives' forces at rest, of any share, and the stiffness; and drives too soft to help are as none."""
+    m = machines[name]
+    poses = poses_about(m, 6, 0.5)
+    springs = {
+        joint: "100 N/um" if unit == "mm" else "20 kNm/rad" for joint, unit in zip(m.joints, m.joint_units, strict=True)
+    }
+    found = analyse_stiffness(m, springs, "rigid", poses)
+    joints = m.inverse(poses)
+    still = np.zeros_like(joints)
+    forces = Dynamics(m).compute_forces(Motion(poses, joints, still, still))
+    a, b, _ = m.twist_rates(poses, joints)
+    pull = np.einsum("nij,ni->nj", np.linalg.solve(b, a), forces)
+    assert found.sag() == pytest.approx(-np.einsum("nij,nj->ni", found.compliances, pull), rel=1e-6, abs=1e-9)
+
+
+def test_soft_links_leave_the_weight_to_the_others(machines):
+    m, square = machines["eclipse_overactuated"], pk.load("eclipse")
+    poses = poses_about(square, 4, 0.5)
+    springs = {
+        joint: "100 N/um" if unit == "mm" else "20 kNm/rad"
+        for joint, unit in zip(square.joints, square.joint_units, strict=True)
+    }
+    expected = analyse_stiffness(square, springs, "rigid", poses).sag()
+    soft = {name: "0.001 Nm/rad" for name in m.joints if name not in square.joints}
+    found = analyse_stiffness(m, springs | soft, "rigid", poses).sag()
+    assert found == pytest.approx(expected, rel=1e-4)
+
+
+@every
+def test_sizes_that_are_off_move_the_tool_as_least_squares_do(name, machines):
+    """Against the direct problem of machines whose sizes are drawn, which ends at the least squares of closures."""
+    m = machines[name]
+    poses = poses_about(m, 40, 0.5)
+    found = pk.analyse_accuracy(m, {"feet" if name != "eclipse_overactuated" else "platform": "0.01 mm"}, poses)
+    family = found.tolerances.family
+    off = found.tolerances.halves * np.random.default_rng(3).uniform(-1.0, 1.0, (len(poses), len(family.names)))
+    moved = family.forward(found.joints, family.nominal + off, near=poses)
+    assert np.all(moved.converged)
+    tip = [i for i, axis in enumerate(m.axes) if axis in "XYZ"]
+    expected = np.einsum("nik,nk->ni", found.slopes[:, : len(tip)], off)
+    assert (moved.poses - poses)[:, tip] == pytest.approx(expected, abs=3e-3 * np.abs(expected).max())
+
+
+def test_calibration_finds_a_machines_numbers(machines):
+    m = machines["seven_struts"]
+    names = [p.name for p in m.parameters if p.group in ("feet", "joints")]
+    family = pk.family(m, names)
+    true = family.nominal + np.random.default_rng(4).uniform(-0.3, 0.3, len(names))
+    poses = poses_about(m, 40)
+    measured = pk.make_measurements(m, family.at(true).inverse(poses), poses)
+    found = pk.calibrate(m, measured, free=names)
+    values = dict(zip(names, true, strict=True))
+    assert found.sizes == pytest.approx([values[name] for name in found.family.names], abs=1e-6)
+
+
 def test_what_drives_decide_together_is_refused(machines):
     m = machines["seven_struts"]
+    accuracy = pk.analyse_accuracy(m, {"encoders": "2 um"}, m.home[None])
     for refused in (
-        lambda: pk.analyse_accuracy(m, {"encoders": "2 um"}),
-        lambda: pk.plan_measurements(m, 40),
+        lambda: bound_worst_case(accuracy, {"X": (-1.0, 1.0)}),
         lambda: pk.DesignProblem(m, {"legs.d1.foot.x": (400.0, 600.0)}, {"X": (-10.0, 10.0)}),
-        lambda: analyse_stiffness(m, "100 N/um", poses=m.home[None]).sag(),
         lambda: analyse_stiffness(m, "100 N/um", poses=m.home[None]).load(),
     ):
         with pytest.raises(NoMethodError, match="7 drives for 6 freedoms, which work against each other"):

@@ -77,9 +77,10 @@ def analyse_accuracy(
         mm", "rods": "0.02 mm", "encoders": "2 um"}``; each coordinate of a point has it
     poses : (N, axes); by default as many as ``samples`` all over the workspace, clear of singularities
 
-    Raises :class:`PoseError`, :class:`NoMethodError` for a machine with more drives than freedoms.
+    With more drives than freedoms the tool is where the closures' least squares are, as in :meth:`Machine.forward`.
+
+    Raises :class:`PoseError`.
     """
-    machine.refuse_redundancy("accuracy")
     within = make_tolerance_family(machine, read_tolerances(tolerances))
     rows = choose_poses(machine, poses, samples)
     joints = machine.inverse(rows)

@@ -59,9 +59,11 @@ def bound_worst_case(accuracy: Accuracy, ranges: Mapping[str, AxisRange], second
     Krawczyk's operator maps into itself, and nowhere else in it. The tip then follows by its derivatives over that box
     (mean value theorem). Boxes of poses are halved until bound and attained error are within 5 %, or time is up.
 
-    Raises :class:`PoseError` for an unknown axis or an empty range.
+    Raises :class:`PoseError` for an unknown axis or an empty range, :class:`NoMethodError` for a machine with more
+    drives than freedoms, whose pose is no zero of its closures.
     """
     machine, budget = accuracy.machine, Budget(seconds)
+    machine.refuse_redundancy("proved worst case")
     low, high = machine.home.copy(), machine.home.copy()
     for axis, ends in ranges.items():
         if axis not in machine.axes:

@@ -133,7 +133,7 @@ def calibrate(
     loss : ``soft_l1`` bounds the pull of outliers, ``linear`` is plain least squares
 
     Raises :class:`UnidentifiableError` where the measurements can't tell these numbers apart, :class:`PoseError` where
-    they are too few, or have no pose, :class:`NoMethodError` for a machine with more drives than freedoms.
+    they are too few, or have no pose.
     """
     choice = choose_family(machine, free, measured.frame)
     family, fixed = choice.family, choice.fixed
@@ -183,7 +183,6 @@ def choose_family(machine: Machine, free: Sequence[str] | None, frame: Measuring
 
     In an instrument's own frame that is of the tip's places, and those that move the whole machine keep their values.
     """
-    machine.refuse_redundancy("calibration")
     geometric = [p.name for p in machine.parameters if p.group != SIZES]
     parameters = select_parameters(machine, geometric if free is None else free)
     ordered = sorted(parameters, key=lambda p: _ORDER.index(p.group))

@@ -9,7 +9,7 @@ import numpy as np
 
 from ..arrays import Array
 from ..errors import PoseError
-from ..families.family import Family, solve_each
+from ..families.family import Family
 from ..machine import Machine
 from .measurements import LETTERS, Measurements
 from .setups import Setup, make_setups
@@ -105,7 +105,7 @@ class MeasuredFamily:
         rates = family.twist_rates(poses, joints, sizes)
         by_sizes, by_joints = rates.compute_size_rates(), rates.compute_joint_rates()
         if self.whole:
-            off = solve_each(rates.a, rates.closures[:, :, None])[:, :, 0]
+            off = rates.solve(rates.closures[:, :, None])[:, :, 0]
             return Linearised(off, by_sizes, np.empty((count, off.shape[1], 0)), by_joints)
         tips, rows = self._find_tips(poses), [LETTERS.index(axis) for axis in self.tip_axes]
         predictions = [one.predict(tips, own) for one, own in zip(self.setups, self.split(unknown), strict=True)]

@@ -56,6 +56,19 @@ class PathForces(NamedTuple):
     weight: Array
 
 
+class WeightRates(NamedTuple):
+    """Rates of the weight's potential V at rest, and of the legs' closures f in mm, which coordinates and joints keep.
+
+    by_coordinates, by_joints : (N, n) and (N, joints) of V: N or Nmm
+    slopes, by_drives : (N, closures, n) of f by the coordinates, and (N, closures, joints) of -f by the joints
+    """
+
+    by_coordinates: Array
+    by_joints: Array
+    slopes: Array
+    by_drives: Array
+
+
 class _Placed(NamedTuple):
     """A machine at N poses.
 
@@ -220,17 +233,13 @@ class Dynamics:
             result -= np.einsum("nij,ni->nj", whole, np.broadcast_to(force, whole.shape[:2]))
         return result
 
-    def compute_weights(self, poses: Array, joints: Array, moved: Array) -> Array:
-        """Compute the rates of the weight's potential by sizes of the legs while the joints stand, (N, sizes) N.
-
-        moved : (N, closures, sizes) what a unit of each size adds to the closures' right side, mm²
-        """
-        placed = self._place(poses, joints)
-        z = placed.z
-        n, still = self._coordinates, np.zeros((len(z), 2 * self._width))
-        forces = self._evaluate("forces", np.hstack([z, still, np.full((len(z), 1), GRAVITY)]))
-        ways = placed.solve(moved[:, :n] / np.array(self._equations.sizes)[:, None])
-        return np.asarray(_NEWTON * np.einsum("nis,ni->ns", ways, forces[:, :n]))
+    def compute_weight_rates(self, poses: Array, joints: Array) -> WeightRates:
+        """Compute the rates of the weight's potential at rest, and of the legs' closures."""
+        n, still = self._coordinates, np.zeros((len(poses), 2 * self._width))
+        z = self._place(poses, joints).z
+        forces = _NEWTON * self._evaluate("forces", np.hstack([z, still, np.full((len(z), 1), GRAVITY)]))
+        slopes = self._evaluate("slopes", z).reshape(len(z), self.machine.leg_count, self._width)
+        return WeightRates(forces[:, :n], forces[:, n:], slopes[:, :, :n], -slopes[:, :, n:])
 
     def compute_load_rates(self, poses: Array, joints: Array, force: Array) -> Array:
         """Compute how the drives' forces at rest change with the joints, (N, joints, joints) N/mm, under a load.

@@ -16,12 +16,15 @@ from ..errors import PoseError, quote, suggest
 from ..kernels.batch import NEVER, NewtonSteps, evaluate_tape, solve_by_newton
 from ..kernels.tape import NewtonTapes, Tape, compile_tape
 from ..kinematics.closure_roots import MOST_STEPS, list_step_caps
+from ..kinematics.tall_matrices import invert_from_left
 from ..machine import Machine
 from ..model.equations import Equations
 from ..model.geometric_parameters import SIZES, Parameter
 from ..model.nominal_values import SizedTrace
 
 _OTHER_MODE = 1e-4  # of the greatest leg: by which joints of another working mode differ
+_DISAGREE = 0.02  # likewise of more drives than freedoms, whose joints sizes that are off make disagree
+_EXACT = 1e-6  # of a leg's closure: one of head and table in least squares, to which these have to keep
 
 
 class FamilyRates(NamedTuple):
@@ -29,20 +32,28 @@ class FamilyRates(NamedTuple):
 
     closures : (N, m), zero where the legs close; of legs mm², of head and table 1
     a : (N, m, n); b : (N, m, m); c : (N, m, k) = ∂f/∂s
+    scales : (m,) what one of each closure is in the least squares of more drives than freedoms
     """
 
     closures: Array
     a: Array
     b: Array
     c: Array
+    scales: Array
 
     def compute_size_rates(self) -> Array:
         """Compute how the pose moves with each size while the joints stand, (N, n, k)."""
-        return -solve_each(self.a, self.c)
+        return -self.solve(self.c)
 
     def compute_joint_rates(self) -> Array:
         """Compute how the pose moves with each joint, (N, n, m)."""
-        return solve_each(self.a, self.b)
+        return self.solve(self.b)
+
+    def solve(self, right: Array) -> Array:
+        """Solve A x = right (N, m, k), of more drives than freedoms by the forward's least squares, (N, n, k)."""
+        if self.a.shape[1] == self.a.shape[2]:
+            return solve_each(self.a, right)
+        return invert_from_left(self.a, np.broadcast_to(np.diag(self.scales), self.b.shape)) @ right
 
 
 def solve_each(matrices: Array, right: Array) -> Array:
@@ -238,7 +249,7 @@ class Family:
         """
         lead, rows = self._rows([(poses, self.machine.axes, "poses")], sizes)
         rates = self._differentiate("pose", rows[0], self.inverse(rows[0], rows[1], mode), rows[1])
-        return tuple(array.reshape(*lead, *array.shape[1:]) for array in rates[1:])  # type: ignore[return-value]
+        return tuple(array.reshape(*lead, *array.shape[1:]) for array in rates[1:4])  # type: ignore[return-value]
 
     def twist_rates(self, poses: RowsLike, joints: RowsLike, sizes: RowsLike) -> FamilyRates:
         """Compute closures, A, B and C for rows of poses, joints and sizes; x' is the tool's twist.
@@ -267,7 +278,8 @@ class Family:
         at_rest = np.zeros((len(rows[0]), turns))
         values = self._evaluate(tape, [rows[0], at_rest, *rows[1:]], m + m * n + m * m + m * k)
         f, a, b, c = np.split(values, np.cumsum([m, m * n, m * m]), axis=1)
-        return FamilyRates(f, a.reshape(-1, m, n), b.reshape(-1, m, m), c.reshape(-1, m, k))
+        scales = np.array([*machine.leg_sizes, *[_EXACT * min(machine.leg_sizes)] * (m - machine.leg_count)])
+        return FamilyRates(f, a.reshape(-1, m, n), b.reshape(-1, m, m), c.reshape(-1, m, k), scales)
 
     def _evaluate(self, tape: Tape, rows: Sequence[Array], width: int) -> Array:
         first = np.hstack(rows[:-1]) if len(rows) > 2 else np.ascontiguousarray(rows[0])
@@ -279,7 +291,8 @@ class Family:
         """Compute poses for joints by Newton's method, (..., joints) and (..., k) -> :class:`FamilySolution`.
 
         near : poses (axes,) or (..., axes) to start from; by default home. The answer lies on the side of the parallel
-            singularities on which the start lies with the given joints and sizes, and in the working mode.
+            singularities on which the start lies with the given joints and sizes, and in the working mode. With more
+            drives than freedoms it is that of least squares, whether or not the joints agree with these sizes.
         """
         machine, mode = self.machine, self.machine.checked_mode(mode)
         starts = machine.home if near is None else near
@@ -292,12 +305,14 @@ class Family:
         inputs = np.ascontiguousarray(np.hstack([joint_rows, size_rows]))
         roots = solve_by_newton(self._newton_tapes, steps, np.ascontiguousarray(near_rows), inputs, np.empty(0))
         with np.errstate(invalid="ignore"):
-            converged = (roots.residual <= closed) & (roots.turned > 0.0)
+            found = roots.steps < MOST_STEPS if machine.is_redundant else roots.residual <= closed
+            converged = found & np.isfinite(roots.residual) & (roots.turned > 0.0)
             own = self.inverse(roots.rows, size_rows, mode) - joint_rows
             own[:, machine.turning_joints] = np.remainder(own[:, machine.turning_joints] + np.pi, 2.0 * np.pi) - np.pi
             off = np.abs(own[:, : machine.leg_count])
             units = np.array(machine.joint_units[: machine.leg_count])
-            tolerance = np.where(units == "rad", _OTHER_MODE, _OTHER_MODE * max(leg_sizes))
+            apart = _DISAGREE if machine.is_redundant else _OTHER_MODE
+            tolerance = np.where(units == "rad", apart, apart * max(leg_sizes))
             converged &= (off <= tolerance).all(1)
         roots.rows[~converged] = np.nan
         n = len(machine.axes)

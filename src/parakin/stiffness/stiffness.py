@@ -11,7 +11,7 @@ import numpy as np
 from ..algebra import Scalar
 from ..arguments import RowsLike, check_arguments, read_rows
 from ..arrays import Array
-from ..dynamics.inverse_dynamics import Dynamics, Motion
+from ..dynamics.inverse_dynamics import Dynamics
 from ..errors import PoseError
 from ..families.family import Family, solve_each
 from ..kinematics.tall_matrices import invert_from_left
@@ -104,16 +104,20 @@ class Stiffness:
         The masses are those of :func:`parakin.compute_drive_forces`; struts are held at both ends, so none of their own
         weight bends them.
 
-        Raises :class:`NoMethodError` for a machine with more drives than freedoms.
+        With more drives than freedoms all springs together share the weight, so that the energy is least.
         """
-        self.machine.refuse_redundancy("sag")
-        dynamics, still = Dynamics(self.machine), np.zeros_like(self.joints)
-        a, (drives, *struts) = _list_springs(self.machine, self.poses, self.springs)
-        weights = [dynamics.compute_forces(Motion(self.poses, self.joints, still, still))]
-        weights += [dynamics.compute_weights(self.poses, self.joints, own.moved) for own in struts]
+        a, springs = _list_springs(self.machine, self.poses, self.springs)
+        weight = Dynamics(self.machine).compute_weight_rates(self.poses, self.joints)
+        sizes = np.array(self.machine.leg_sizes)[:, None]
+        of_legs = [own._replace(moved=own.moved[:, : self.machine.leg_count] / sizes) for own in springs]
+        of_legs[0] = springs[0]._replace(moved=weight.by_drives)
         total = np.zeros(self.compliances.shape[:2])
-        for own, weight in zip((drives, *struts), weights, strict=True):
-            total -= np.einsum("nis,ns->ni", solve_each(a, own.moved), own.compliances * weight)
+        for number, own in enumerate(springs):
+            ways = _find_ways(weight.slopes, of_legs, of_legs[number].moved)
+            rates = np.einsum("nis,ni->ns", ways, weight.by_coordinates)
+            if number == 0:  # the drives move bodies of their own
+                rates += weight.by_joints
+            total -= np.einsum("nis,ns->ni", _find_ways(a, springs, own.moved), own.compliances * rates)
         return total
 
     def load(self, force: RowsLike | None = None) -> Stiffness:

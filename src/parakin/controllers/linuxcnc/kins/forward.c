@@ -124,8 +124,9 @@ static double side_of(const double *near, double det, int steady)
 }
 
 /* Newton's method on the legs' closures in bounded steps. The matrix serves on while it gains enough. With more drives
-   than freedoms it ends at the pose of least squares, where joints may disagree as far as following errors let them. */
-static int pose_near(const double *near, const double *q, double *x, double *side, int *tells)
+   than freedoms it ends at the pose of least squares, where joints may disagree as far as following errors let them. Its
+   frame is large, and there is one of it. */
+__attribute__((noinline)) static int pose_near(const double *near, const double *q, double *x, double *side, int *tells)
 {
     double y[MOTIONS], f[CLOSURES], det = 0.0, before = 0.0, first = 0.0;
     int anew = 1, last = 0, closed = 0;
@@ -298,7 +299,7 @@ static int find_pose_in_motion(double *near, const double *q, double *x)
 
 __attribute__((flatten)) int kinematicsForward(const double *joints, EmcPose *world,
                       const KINEMATICS_FORWARD_FLAGS *fflags, KINEMATICS_INVERSE_FLAGS *iflags)
-{
+{ /* flattened, as the inverse is */
     double q[JOINTS], near[AXES], x[AXES];
     (void)fflags;
     (void)iflags;

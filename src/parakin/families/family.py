@@ -305,8 +305,8 @@ class Family:
         inputs = np.ascontiguousarray(np.hstack([joint_rows, size_rows]))
         roots = solve_by_newton(self._newton_tapes, steps, np.ascontiguousarray(near_rows), inputs, np.empty(0))
         with np.errstate(invalid="ignore"):
-            found = roots.steps < MOST_STEPS if machine.is_redundant else roots.residual <= closed
-            converged = found & np.isfinite(roots.residual) & (roots.turned > 0.0)
+            converged = roots.steps < MOST_STEPS if machine.is_redundant else roots.residual <= closed
+            converged &= np.isfinite(roots.residual) & (roots.turned > 0.0)
             own = self.inverse(roots.rows, size_rows, mode) - joint_rows
             own[:, machine.turning_joints] = np.remainder(own[:, machine.turning_joints] + np.pi, 2.0 * np.pi) - np.pi
             off = np.abs(own[:, : machine.leg_count])

@@ -24,7 +24,7 @@ from ..model.nominal_values import SizedTrace
 
 _OTHER_MODE = 1e-4  # of the greatest leg: by which joints of another working mode differ
 _DISAGREE = 0.02  # likewise of more drives than freedoms, whose joints sizes that are off make disagree
-_EXACT = 1e-6  # of a leg's closure: one of head and table in least squares, to which these have to keep
+_KEPT = 1e-6  # of a leg's closure: one of head and table in least squares, to which these have to keep
 
 
 class FamilyRates(NamedTuple):
@@ -278,7 +278,7 @@ class Family:
         at_rest = np.zeros((len(rows[0]), turns))
         values = self._evaluate(tape, [rows[0], at_rest, *rows[1:]], m + m * n + m * m + m * k)
         f, a, b, c = np.split(values, np.cumsum([m, m * n, m * m]), axis=1)
-        scales = np.array([*machine.leg_sizes, *[_EXACT * min(machine.leg_sizes)] * (m - machine.leg_count)])
+        scales = np.array([*machine.leg_sizes, *[_KEPT * min(machine.leg_sizes)] * (m - machine.leg_count)])
         return FamilyRates(f, a.reshape(-1, m, n), b.reshape(-1, m, m), c.reshape(-1, m, k), scales)
 
     def _evaluate(self, tape: Tape, rows: Sequence[Array], width: int) -> Array:

@@ -7,6 +7,7 @@ import subprocess
 import sys
 import time
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pyarrow.parquet as pq
@@ -151,6 +152,16 @@ def test_a_killed_worker_loses_nothing(tmp_path, cluster):
     near = pk.run_sweep(plan, tmp_path / "near")
     assert read_table(tmp_path / "far") == read_table(tmp_path / "near")
     assert (near.keeping, near.best) == (result.keeping, result.best)
+
+
+def test_the_dashboard_is_told_where_there_is_one():
+    services = {"dashboard": 8787}
+    client = SimpleNamespace(
+        scheduler_info=lambda n_workers: {"services": services}, dashboard_link="http://127.0.0.1:8787/status"
+    )
+    assert sweep_folder.find_dashboard(client) == "http://127.0.0.1:8787/status"
+    services.clear()
+    assert sweep_folder.find_dashboard(client) == ""
 
 
 def write_command(tmp_path, text, designs):

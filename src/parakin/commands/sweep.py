@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 from cyclopts import Parameter
 
 from ..errors import InputError, PoseError
-from .console import ProgressBar, announce_compiling, print_json, print_text
+from .console import ProgressBar, announce_compiling, print_json, print_remark, print_text
 from .options import OFF_LIMITS, Json
 
 if TYPE_CHECKING:
@@ -42,7 +42,8 @@ def sweep(
     seed
         Of what is drawn.
     scheduler
-        Of Dask workers, tcp://HOST:PORT, which have parakin installed; by default the cores of this machine.
+        Of Dask workers, tcp://HOST:PORT, which have parakin installed; by default the cores of this machine. Where the
+        scheduler serves its dashboard (it does with bokeh), its address is told.
     """
     from .design_problem import read_design_problem
 
@@ -57,7 +58,8 @@ def sweep(
         option, _, message = str(error).partition(": ")
         raise InputError(message, f"--{option}") from None
     with ProgressBar() as bar:
-        result = run_sweep(plan, output, scheduler, bar.stage("designs", 0.0, 1.0))
+        report = bar.stage("designs", 0.0, 1.0)
+        result = run_sweep(plan, output, scheduler, report, lambda link: print_remark(f"dashboard {link}"))
     if json:
         answer = {"machine": wanted.machine.name, "designs": result.designs, "poses": poses, "made": result.made}
         answer |= {"ns_per_pose": 1e9 * result.cost if result.made else None, "kernel_ns_per_pose": 1e9 * result.kernel}

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import os
 from collections import OrderedDict
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from math import nan
@@ -58,7 +58,11 @@ class SweepResult:
 
 @check_arguments
 def run_sweep(
-    plan: SweepPlan, folder: str | os.PathLike[str], scheduler: str | None = None, progress: Progress | None = None
+    plan: SweepPlan,
+    folder: str | os.PathLike[str],
+    scheduler: str | None = None,
+    progress: Progress | None = None,
+    show_dashboard: Callable[[str], None] | None = None,
 ) -> SweepResult:
     """Evaluate what a sweep's folder does not hold yet, and tell what all of it says.
 
@@ -68,6 +72,7 @@ def run_sweep(
         of the same plan is kept, so an interrupted sweep goes on.
     scheduler : of Dask's workers, such as ``tcp://host:8786``, which have parakin installed; by default this process
         and its cores. What a lost worker was doing is done again by another.
+    show_dashboard : called once with the address of the scheduler's dashboard, if it has one (with bokeh)
 
     Raises :class:`InputError` for a folder with another sweep or a scheduler that does not answer.
     """
@@ -77,7 +82,7 @@ def run_sweep(
     evaluator = SweepEvaluator(plan)
     made, begin = 0, perf_counter()
     wanted = sum(_count_designs(plan, number) for number in missing)
-    with _open_source(plan, evaluator, missing, scheduler) as chunks:
+    with _open_source(plan, evaluator, missing, scheduler, show_dashboard) as chunks:
         for number, chunk in chunks:
             write_files(base, {names[number]: _write_parquet(plan, evaluator.limits, chunk)})
             made += len(chunk.designs)
@@ -112,7 +117,11 @@ def _prepare_folder(plan: SweepPlan, base: Path) -> None:
 
 @contextmanager
 def _open_source(
-    plan: SweepPlan, evaluator: SweepEvaluator, missing: Sequence[int], scheduler: str | None
+    plan: SweepPlan,
+    evaluator: SweepEvaluator,
+    missing: Sequence[int],
+    scheduler: str | None,
+    show_dashboard: Callable[[str], None] | None,
 ) -> Iterator[Iterator[tuple[int, SweepChunk]]]:
     if scheduler is None or not missing:
         yield ((number, evaluator.evaluate(number)) for number in missing)
@@ -130,7 +139,16 @@ def _open_source(
             client.wait_for_workers(1, timeout=_TIMEOUT)
         except TimeoutError:
             raise InputError(f"{quote(scheduler)}: the scheduler has no worker", "--scheduler") from None
+        link = find_dashboard(client)
+        if link and show_dashboard:
+            show_dashboard(link)
         yield _gather_chunks(client, plan, missing)
+
+
+def find_dashboard(client: Any) -> str:
+    """Find the address of a scheduler's dashboard; empty where it serves none."""
+    served = "dashboard" in client.scheduler_info(n_workers=0).get("services", {})
+    return str(client.dashboard_link) if served else ""
 
 
 def _gather_chunks(client: Any, plan: SweepPlan, missing: Sequence[int]) -> Iterator[tuple[int, SweepChunk]]:

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.interpolate import CubicSpline
 
 import parakin as pk
 from parakin.cli import main
@@ -58,10 +59,10 @@ def load(folder, *changes):
     return pk.load(path)
 
 
-def prepare(folder, machine, part=PART):
+def prepare(folder, machine, part=PART, cutting_force=None):
     path = folder / "part.apt"
     path.write_text(part, encoding="utf-8")
-    return pk.prepare(machine, pk.read_path(path))
+    return pk.prepare(machine, pk.read_path(path), cutting_force=cutting_force)
 
 
 def test_as_quick_as_toppra(tmp_path):
@@ -107,6 +108,80 @@ def test_the_feed_keeps_the_forces(jerk, tmp_path):
     fractions = slow.trajectory.binding_fractions
     assert {"x.force", "y.force", "z.force"} <= set(fractions)
     assert not any(name.endswith(".force") for name in quick.trajectory.binding_fractions)
+
+
+def integrate_quickest(machine, rows, acting, powers):
+    """The time of one motion by both passes of steps in the phase plane, each force and power tried as it is."""
+    s = np.append(0.0, np.cumsum(rows.step))
+    at = np.linspace(0.0, s[-1], 2001)
+    joints = CubicSpline(s, rows.joints)
+    q, slopes, bends = joints(at), joints(at, 1), joints(at, 2)
+    poses = machine.forward(q, near=machine.home).poses
+    own = Dynamics(machine).compute_path_forces(poses, q, slopes, bends, np.broadcast_to(acting, (len(at), 3)))
+    force, speed, most = (
+        np.array([getattr(d, key) for d in machine.drives]) for key in ("force", "speed", "acceleration")
+    )
+    h = at[1] - at[0]
+
+    def bound(k, x):
+        """The least and the greatest s̈ at places, (..., 1) each."""
+        able = np.minimum(force, powers / np.maximum(np.abs(slopes[k]) * np.sqrt(x), 1e-9))
+        rest = own.weight[k] + own.centrifugal[k] * x
+        rates = np.concatenate([own.inertia[k], slopes[k]], -1)
+        low = np.concatenate([-able - rest, -most - bends[k] * x], -1) / rates
+        high = np.concatenate([able - rest, most - bends[k] * x], -1) / rates
+        return np.minimum(low, high).max(-1), np.maximum(low, high).min(-1)
+
+    every, ceiling = np.arange(len(at)), np.min((speed / np.abs(slopes)) ** 2, axis=1)
+    below, above = np.zeros(len(at)), ceiling
+    for _ in range(50):  # beyond some speed no s̈ keeps all
+        middle = 0.5 * (below + above)
+        low, high = bound(every, middle[:, None])
+        below, above = np.where(low <= high, [middle, above], [below, middle])
+    ceiling = below
+    ahead, back = np.zeros(len(at)), np.zeros(len(at))
+    for k in range(len(at) - 1):
+        ahead[k + 1] = min(max(ahead[k] + 2.0 * h * bound(k, ahead[k])[1], 1e-6), ceiling[k + 1])
+    for k in range(len(at) - 1, 0, -1):
+        back[k - 1] = min(max(back[k] - 2.0 * h * bound(k, back[k])[0], 1e-6), ceiling[k - 1])
+    v = np.sqrt(np.minimum(ahead, back))
+    return float((2.0 * h / (v[1:] + v[:-1])).sum())
+
+
+@pytest.mark.parametrize("acting", [(0.0, 0.0, 0.0), (-150.0, 80.0, -200.0)])
+def test_powers_and_cutting_are_kept_and_cost_no_more_than_they_must(acting, tmp_path):
+    machine = load(tmp_path, ("2 kW", "0.35 kW"))
+    job = prepare(tmp_path, machine, "UNITS/MM\nFEDRAT/90000,MMPM\nGOTO/-120,-80,60\nGOTO/120,90,-50\nFINI\n", acting)
+    forces = pk.compute_drive_forces(job.trajectory, acting)
+    assert (forces.power_use < 1.001).all()
+    assert (forces.force_use < 1.001).all()
+    assert forces.power_use.max() > 0.99
+    assert any(name.endswith(".power") for name in job.trajectory.binding_fractions)
+    best = integrate_quickest(machine, job.trajectory.joint_path, acting, 350e3)
+    assert job.seconds == pytest.approx(best, rel=1e-2)
+
+
+def test_the_feed_keeps_forces_with_that_of_cutting(tmp_path):
+    machine = load(tmp_path)
+    free, cutting = prepare(tmp_path, machine), prepare(tmp_path, machine, PART, {"Z": -500.0})
+    assert pk.compute_drive_forces(free.trajectory, {"Z": -500.0}).force_use.max() > 1.05
+    assert pk.compute_drive_forces(cutting.trajectory, {"Z": -500.0}).force_use.max() < 1.001
+    assert cutting.seconds > free.seconds
+    too_much = prepare(tmp_path, machine, PART, {"Z": -1000.0})
+    assert "z can't hold the weight and the cutting force: its force is too small" in too_much.unplanned
+
+
+def test_the_report_tells_the_forces(tmp_path, capsys):
+    load(tmp_path)
+    (tmp_path / "part.apt").write_text(PART, encoding="utf-8")
+    words = ["post", str(tmp_path / "part.apt"), "--machine", str(tmp_path / "heavy.yaml"), "-o", str(tmp_path)]
+    assert main([*words, "--cutting-force", "Z=-200N"]) == 0
+    report = (tmp_path / "part.report.html").read_text("utf-8")
+    assert "Forces of the drives" in report
+    assert "with a force of Z -200 N on the tip where it cuts" in report
+    capsys.readouterr()
+    assert main([*words, "--cutting-force", "W=-200N"]) == 2
+    assert "--cutting-force" in capsys.readouterr().err
 
 
 def test_a_weight_that_no_drive_holds_is_said(tmp_path, capsys):

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 _GREATEST = 1e30  # N: its square does not overflow
 
 
-def parse_force(machine: Machine, text: str | None) -> Array | None:
+def parse_force(machine: Machine, text: str | None, option: str = "--force") -> Array | None:
     """Parse a force by the machine's translations, ``X=-200N,Z=-1kN``, to (translations,) N."""
     if text is None:
         return None
@@ -23,14 +23,14 @@ def parse_force(machine: Machine, text: str | None) -> Array | None:
 
     axes = [axis for axis in machine.axes if axis in "XYZ"]
     result = np.zeros(len(axes))
-    for axis, value in split_axes(machine, text, "--force", "X=-200N").items():
+    for axis, value in split_axes(machine, text, option, "X=-200N").items():
         if axis not in axes:
-            raise InputError(f"{axis} is no translation, expected {' '.join(axes)}", "--force")
+            raise InputError(f"{axis} is no translation, expected {' '.join(axes)}", option)
         try:
             size = parse_quantity(value, FORCE)
         except QuantityError as error:
-            raise InputError(f"{axis}: {error}", "--force") from None
+            raise InputError(f"{axis}: {error}", option) from None
         if not abs(size) < _GREATEST:
-            raise InputError(f"{axis}: {quote(value)} is out of range", "--force")
+            raise InputError(f"{axis}: {quote(value)} is out of range", option)
         result[axes.index(axis)] = size
     return result

@@ -65,7 +65,8 @@ def forces(
     part
         The CL file, of CATIA (APT) or Siemens NX, or a G-code program.
     force
-        A force on the tool's tip wherever it cuts, not in rapid: X=-200N,Z=-1kN.
+        A force on the tool's tip wherever it cuts, not in rapid: X=-200N,Z=-1kN. Where the machine's file bounds forces
+        or powers, the feed keeps them with it.
     csv
         A table to write: forces and powers of each drive over the time.
     output
@@ -86,7 +87,9 @@ def forces(
         path = read_part(part, options, arc_tolerance, compose_frames(placed, None), saying)
         path = fit_part(machine, path, length, placed)
         saying = progress.stage("checking and timing", 0.1, 0.9)
-        job = prepare(machine, path, workpiece=placed, mode=mode, corners=corners, progress=saying)
+        job = prepare(
+            machine, path, workpiece=placed, mode=mode, corners=corners, cutting_force=acting, progress=saying
+        )
     if job.trajectory is None or job.posted.first is not None:
         reason = job.unplanned if job.posted.first is None else "off limits"
         print_remark(f"{part}: {reason}; parakin post tells more")

@@ -12,6 +12,7 @@ from cyclopts import Parameter
 from ..controllers import Target, load_controller
 from ..errors import InputError, PoseError
 from .console import ProgressBar, announce_compiling, print_json, print_text
+from .force_option import parse_force
 from .options import OFF_LIMITS, Json, Mode, Sizes, complete_machine, load_machine
 from .part_job import JobOptions, check_clearance, check_turn, prepare_part
 from .part_options import (
@@ -30,6 +31,8 @@ from .workpiece import parse_workpiece
 if TYPE_CHECKING:
     from ..arrays import Array, Writer
     from ..export.files import Content
+    from ..toolpath.job import Job
+    from ..toolpath.timing.drive_forces import DriveForces
     from .part_job import PreparedPart
 
 Part = Annotated[
@@ -120,6 +123,16 @@ ClearancePlane = Annotated[
         help="Z of the workpiece, in mm, above which rapid motions are clear: a turning joint may turn back there.",
     ),
 ]
+CuttingForce = Annotated[
+    str | None,
+    Parameter(
+        allow_leading_hyphen=True,
+        help=(
+            "A force on the tool's tip wherever it cuts, X=-200N,Z=-1kN: the feed keeps the drives' forces and powers "
+            "with it, where the machine's file bounds them, and the report tells them."
+        ),
+    ),
+]
 Rate = Annotated[
     float | None,
     Parameter(help="Write setpoints too, so many a second: PART.setpoints.csv."),
@@ -167,6 +180,7 @@ def post(
     turn: TurnChoice = "home",
     rewind: Retract = None,
     clearance: ClearancePlane = None,
+    cutting_force: CuttingForce = None,
     rate: Rate = None,
     output: Folder = Path(),
     parquet: Parquet = False,
@@ -185,6 +199,7 @@ def post(
     _check_tolerances(tolerance, angle_tolerance, arc_tolerance)
     length = parse_tool_length(tool_length, tools)
     check_clearance(rewind, clearance)
+    acting = parse_force(chosen, cutting_force, "--cutting-force")
     announce_compiling()
     from ..export.files import write_files
     from ..toolpath.job import Tolerances
@@ -199,11 +214,11 @@ def post(
         check_turn(chosen, path, turn)
         path = fit_part(chosen, path, length, placed)
         tolerances = Tolerances(tolerance, radians(angle_tolerance))
-        options = JobOptions(mode, tolerances, target, corners, rewind, clearance, turn)
+        options = JobOptions(mode, tolerances, target, corners, rewind, clearance, turn, acting)
         prepared = prepare_part(chosen, path, placed, place, options, progress)
         job = prepared.job
         files, missing = _make_files(
-            part.stem, prepared, _Wanted(target, force, rate, parquet, page, animation, output), progress
+            part.stem, prepared, _Wanted(target, force, rate, parquet, page, animation, output, acting), progress
         )
         paths = write_files(output, dict(files.values()))
     written = {kind: str(name) for kind, name in zip(files, paths, strict=True)}
@@ -253,6 +268,7 @@ class _Wanted:
     page: bool
     animation: bool
     folder: Path
+    acting: Array | None
 
     def explain_missing(self, kind: str, reason: str, name: str) -> str:
         """Say why a file can't be made, and that one of an earlier run stays in its place."""
@@ -307,9 +323,22 @@ def _make_files(
             from ..export.machine.animated_glb import render_path_glb
 
             files["animation"] = (name, render_path_glb(trajectory, progress.stage("drawing the motion", 0.9, 1.0)))
-    report = render_report(posted, trajectory, job.unplanned, job.waits, job.outside)
+    report = render_report(
+        posted, trajectory, job.unplanned, job.waits, job.outside, _measure_forces(job, wanted.acting)
+    )
     files["report"] = (f"{stem}.report.html", report)
     return files, missing
+
+
+def _measure_forces(job: Job, acting: Array | None) -> DriveForces | None:
+    """Measure the drives' forces where the tool's is stated, or the machine's file says what its drives can give."""
+    drives = job.posted.machine.drives
+    said = any(isfinite(value) for drive in drives for value in (drive.force, drive.rated, drive.power))
+    if job.trajectory is None or not (said or acting is not None):
+        return None
+    from ..toolpath.timing.drive_forces import compute_drive_forces
+
+    return compute_drive_forces(job.trajectory, acting)
 
 
 def _make_program(prepared: PreparedPart, force: bool) -> Writer:

@@ -226,12 +226,14 @@ class Dynamics:
         """
         placed = self._place(motion.poses, motion.joints)
         result = self._compute(placed, (motion.speeds, motion.accelerations), GRAVITY)
-        if force is not None:
-            n = self._coordinates
-            rates = self._evaluate("tip", placed.z).reshape(len(placed.z), -1, self._width)
-            whole = placed.follow(rates[:, :, :n], rates[:, :, n:])
-            result -= np.einsum("nij,ni->nj", whole, np.broadcast_to(force, whole.shape[:2]))
-        return result
+        return result if force is None else result - self._hold_force(placed, force)
+
+    def _hold_force(self, placed: _Placed, force: Array) -> Array:
+        """Compute what a force on the tip does to the joints, (N, joints): the drives give as much the other way."""
+        n = self._coordinates
+        rates = self._evaluate("tip", placed.z).reshape(len(placed.z), -1, self._width)
+        whole = placed.follow(rates[:, :, :n], rates[:, :, n:])
+        return np.asarray(np.einsum("nij,ni->nj", whole, np.broadcast_to(force, whole.shape[:2])))
 
     def compute_weight_rates(self, poses: Array, joints: Array) -> WeightRates:
         """Compute the rates of the weight's potential at rest, and of the legs' closures."""
@@ -266,13 +268,19 @@ class Dynamics:
         both[np.arange(count), np.arange(count)] = single
         return np.ascontiguousarray(both.transpose(2, 0, 1))
 
-    def compute_path_forces(self, poses: Array, joints: Array, slopes: Array, bends: Array) -> PathForces:
-        """Compute the drives' forces along a path, from the joints' first and second derivatives by its length."""
+    def compute_path_forces(
+        self, poses: Array, joints: Array, slopes: Array, bends: Array, force: Array | None = None
+    ) -> PathForces:
+        """Compute the drives' forces along a path, from the joints' first and second derivatives by its length.
+
+        force : as of :meth:`compute_forces`; what it asks for is part of the weight
+        """
         placed, still = self._place(poses, joints), np.zeros_like(joints)
+        weight = self._compute(placed, (still, still), GRAVITY)
         return PathForces(
             self._compute(placed, (still, slopes), 0.0),
             self._compute(placed, (slopes, bends), 0.0),
-            self._compute(placed, (still, still), GRAVITY),
+            weight if force is None else weight - self._hold_force(placed, force),
         )
 
 

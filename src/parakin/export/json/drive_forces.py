@@ -13,7 +13,6 @@ if TYPE_CHECKING:
 def encode_drive_forces(result: DriveForces, files: Mapping[str, str]) -> dict[str, Any]:
     """Encode each drive's peak and rms in N or Nm, its greatest power in W, and the masses in kg."""
     machine = result.trajectory.posted.machine
-    axes = [axis for axis in machine.axes if axis in "XYZ"]
     joints = {}
     for i, drive in enumerate(machine.drives):
         scale = 1e-3 if drive.unit == "rad" else 1.0
@@ -32,7 +31,7 @@ def encode_drive_forces(result: DriveForces, files: Mapping[str, str]) -> dict[s
         "machine": machine.name,
         "part": result.trajectory.posted.path.source,
         "seconds": result.trajectory.seconds,
-        "force": dict(zip(axes, result.force.tolist(), strict=True)),
+        "force": dict(zip(result.force_axes, result.force.tolist(), strict=True)),
         "joints": joints,
         "overloaded": list(result.overloaded),
         "masses": dict(result.masses),

@@ -18,6 +18,7 @@ from ..number_format import format_count, format_duration
 from ..page.page import render_path_page
 from .cards import make_card
 from .figures import embed_figure, render_page
+from .force_card import render_force_card
 from .joint_curves import build_joint_curves
 from .range_bars import render_range_card
 from .tables import render_fact_card, render_note_card, render_offence_card
@@ -26,6 +27,7 @@ from .timing import format_cycle, render_timing_card
 if TYPE_CHECKING:
     from ...toolpath.posting.posted import Posted
     from ...toolpath.timing import Trajectory
+    from ...toolpath.timing.drive_forces import DriveForces
 
 _PAGE_NUMBERS = 120_000  # of the path in the page: some 0.5 MB of text
 
@@ -37,12 +39,13 @@ def render_report(
     unplanned: str = "",
     waits: float = 0.0,
     outside: Outside | None = None,
+    forces: DriveForces | None = None,
 ) -> str:
     """Render the report as one HTML document: verdict, ranges, path, curves, time, offences, notes, facts.
 
-    ``unplanned`` says why there is no trajectory, ``waits`` how long (s) the program waits besides it,
-    ``outside`` where the part would have to lie. Whatever the length of the path the document stays below some 2 MB: of
-    every stretch the extremes are drawn.
+    ``unplanned`` says why there is no trajectory, ``waits`` how long (s) the program waits besides it, ``outside``
+    where the part would have to lie, ``forces`` what the trajectory asks of the drives. Whatever the length of the path
+    the document stays below some 2 MB: of every stretch the extremes are drawn.
     """
     if not 0.0 <= waits < inf:
         raise PoseError(f"waits: a time of 0 s or more expected, not {waits:g}")
@@ -57,6 +60,7 @@ def render_report(
         uses, _ = measure_range_use(posted)
         cards += [render_range_card(posted, uses), _render_page_card(posted, trajectory), _render_curves(posted, uses)]
         cards += [] if trajectory is None else [render_timing_card(trajectory)]
+        cards += [] if forces is None else [render_force_card(forces)]
     cards += [render_offence_card(posted), render_note_card(path), render_fact_card(posted)]
     return render_page(title, "".join(cards))
 

@@ -46,7 +46,7 @@ def render_timing_card(trajectory: Trajectory) -> str:
         "<p class=sub>Where on the path: choose “what sets the pace” as the colour in the picture above.</p>"
         f"<h3>Over the cycle</h3><div class=wide>{embed_figure('time', figure, f'{height}px')}</div>"
         "<p class=sub>Limits are dashed where they are near. Orange, red and violet: here this joint’s speed,"
-        " acceleration or jerk sets the pace; of its force the bars above tell. Of every stretch the least and the"
-        " greatest value is drawn, so no extreme is left out.</p>"
+        " acceleration or jerk sets the pace; of its force and power the bars above tell. Of every stretch the least"
+        " and the greatest value is drawn, so no extreme is left out.</p>"
     )
     return make_card("Time", body, format_cycle(trajectory))

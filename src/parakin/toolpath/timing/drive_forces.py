@@ -6,12 +6,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...arguments import RowsLike, check_arguments, read_rows
+from ...arguments import RowsLike, check_arguments
 from ...arrays import Array, Indices
 from ...dynamics.inverse_dynamics import WATT, Dynamics, Motion
 from ...dynamics.masses import sum_masses
 from ...errors import PoseError
 from ...model.elements import Drive
+from .force_limits import read_cutting_force
 from .kernels.splines import PathState
 from .trajectory import Trajectory
 
@@ -40,6 +41,11 @@ class DriveForces:
     powers: Array
     rms: Array
     masses: dict[str, float]
+
+    @property
+    def force_axes(self) -> tuple[str, ...]:
+        """The axes that :attr:`force` is along."""
+        return tuple(axis for axis in self.trajectory.posted.machine.axes if axis in "XYZ")
 
     @property
     def peaks(self) -> Array:
@@ -100,12 +106,7 @@ def compute_drive_forces(trajectory: Trajectory, force: RowsLike | None = None) 
     tells nothing of its bodies.
     """
     machine = trajectory.posted.machine
-    axes = tuple(axis for axis in machine.axes if axis in "XYZ")
-    acting = np.zeros(len(axes))
-    if force is not None:
-        acting = read_rows(force, axes, ["mm"] * len(axes), lambda: np.zeros(len(axes)), "force")
-        if acting.shape != (len(axes),) or not np.isfinite(acting).all():
-            raise PoseError(f"force: one number each for {' '.join(axes)} expected")
+    acting = read_cutting_force(machine, force)
     times, rows, state = _list_states(trajectory)
     if len(times) > _MOST_STATES:
         raise PoseError(f"a trajectory of {len(times) // 3:,} pieces, at most {_MOST_STATES // 3:,} are possible")

@@ -6,13 +6,14 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from ...arguments import RowsLike
 from ...arrays import Flags
 from ...errors import PoseError
 from ..path import ToolPath
 from ..posting.posted import Posted
 from .corners import Corners, check_tolerance, round_corners
 from .drive_limits import DriveLimits
-from .force_limits import ForceLimits
+from .force_limits import ForceLimits, read_cutting_force
 from .jerk_limited import limit_jerk
 from .joint_path import build_joint_path
 from .pole_pace import slow_down_on_pole
@@ -32,6 +33,7 @@ def plan_trajectory(
     tolerance: float = 0.01,
     axis_tolerance: float = 1e-3,
     stops: Sequence[int] = (),
+    cutting_force: RowsLike | None = None,
 ) -> Trajectory:
     """Plan the quickest trajectory along a posted path that keeps its feeds and its drives' limits.
 
@@ -42,12 +44,13 @@ def plan_trajectory(
         in :class:`~.corners.Curve`), and rounds the others
     tolerance, axis_tolerance : mm of the tool's tip and rad of its axis that rounding may take it off
     stops : records at which the tool stands still, besides the first and the last
+    cutting_force : N by the machine's translations, (t,) or a dict, on the tool's tip at programmed feeds
 
     Between records the tip moves straight and the pose's angles evenly. The feed is that of the record that the motion
-    leads to; in rapid, and where none is programmed, drives are the only limit. A drive's force, where its file says
-    one, bounds what weight and inertia ask of it. Where no drive has an acceleration, a jerk or a force, corners are
-    neither rounded nor stopped at, and speeds change at once. With jerks the trajectory is the quickest but for less
-    than 0.5 %, on paths of more than 100,000 rows for less than 10 %.
+    leads to; in rapid, and where none is programmed, drives are the only limit. A drive's force and its power, where
+    its file says them, bound what weight, inertia and cutting ask of it. Where no drive has an acceleration, a jerk, a
+    force or a power, corners are neither rounded nor stopped at, and speeds change at once. With jerks the trajectory
+    is the quickest but for less than 0.5 %, on paths of more than 100,000 rows for less than 10 %.
 
     Raises
     ------
@@ -63,7 +66,7 @@ def plan_trajectory(
         DriveLimits.of(posted.machine),
         name_limits(posted.machine.joints),
     )
-    forces = ForceLimits(posted.machine)
+    forces = ForceLimits(posted.machine, read_cutting_force(posted.machine, cutting_force))
     bounded = limits.bounds_acceleration or bool(forces)
     curve = round_corners(posted, corners, tolerance, axis_tolerance, parted, bounded)
     joint_path = build_joint_path(posted, curve, limits, tolerance, axis_tolerance)

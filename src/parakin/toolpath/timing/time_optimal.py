@@ -23,6 +23,7 @@ UNBOUND = 1e12  # mm²/s², of ṡ²: nothing is as fast
 WORTH = 5e-4  # least fraction of the cycle time that more rows must save
 AddRows: TypeAlias = Callable[[JointPath, Indices, Array], JointPath]  # in steps, ascending, after fractions of them
 _ROUNDS = 4
+_TANGENTS = 5  # of the drives' powers, each where the profile of the one before goes
 RAMP = 0.1  # s in which a drive is assumed to reach its acceleration where only a jerk is given
 _ROUNDING = 1e-8
 _PLACES = Places(5, False)  # on each step where utilisation is measured: the limits were kept between them, too
@@ -58,6 +59,10 @@ def find_quickest(
         rows, count = joint_path.rows, len(joint_path.step)
         ceilings = compute_ceilings(joint_path, limits)
         x, u = find_reachable(joint_path, limits, ceilings)
+        for _ in range(_TANGENTS if forces is not None and forces.bounds_power else 0):
+            joint_path = forces.bound(joint_path, x)
+            x, u = find_reachable(joint_path, limits, ceilings)
+        rows = joint_path.rows
         bounds = AccelerationLimits(np.minimum(limits.acceleration, RAMP * limits.jerk), np.full(count, np.inf))
         switches, lost = Switches(np.empty(count), np.empty(count)), list[float]()
         args = (rows, bounds, ceilings, x, switches)

@@ -56,8 +56,8 @@ class Trajectory:
     joint_path : the joints along the curve, by rows
     profile : the speed along the curve
     binding : (rows,) the limit that bounds the speed at each row, an index into ``names``
-    names : ``feed``, then for each joint ``d1.speed``, ``d1.acceleration``, ``d1.jerk``, ``d1.force``, and
-        ``start/stop``
+    names : ``feed``, then for each joint ``d1.speed``, ``d1.acceleration``, ``d1.jerk``, ``d1.force``,
+        ``d1.power``, and ``start/stop``
     """
 
     posted: Posted
@@ -138,5 +138,5 @@ class Trajectory:
 
 def name_limits(joints: Sequence[str]) -> tuple[str, ...]:
     """Name all limits that can bind, in the order of :attr:`Trajectory.binding`."""
-    kinds = ("speed", "acceleration", "jerk", "force")
+    kinds = ("speed", "acceleration", "jerk", "force", "power")
     return ("feed", *(f"{joint}.{kind}" for kind in kinds for joint in joints), "start/stop")

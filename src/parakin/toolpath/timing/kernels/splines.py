@@ -17,7 +17,8 @@ from ....kernels.compiling import njit
 class ForceRows(NamedTuple):
     """Bounds of the drives' forces at n rows: along·s̈ + across·ṡ² ≤ 1 for each of c, linear in s between rows.
 
-    drive : (c,) the drive whose force it bounds, one way; along, across : (n, c)
+    drive : (c,) the drive whose force it bounds, one way; plus the number of joints where it is the drive's power
+    along, across : (n, c)
     """
 
     drive: Indices

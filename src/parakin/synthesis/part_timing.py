@@ -19,7 +19,7 @@ from ..toolpath.timing.drive_limits import DriveLimits
 from ..toolpath.timing.joint_path import LONGEST, divide_joint_path, fit_joint_path, grade_rows
 from ..toolpath.timing.plan import flag_stops
 from ..toolpath.timing.stops import find_stops, sum_dwells
-from ..toolpath.timing.time_optimal import compute_spans, find_quickest
+from ..toolpath.timing.time_optimal import find_quickest, sum_spans
 
 _ROWS = 2400  # of the path that are timed, at most
 _WINDOWS = 6  # stretches of so many rows in all, where the path has more
@@ -102,7 +102,7 @@ class PartTimer:
     def _time_rows(self, window: slice, joints: Array) -> float:
         path = fit_joint_path(self._posted, self._curve, self._segment[window], self._offset[window], joints)
         path, x, _ = find_quickest(path, self._limits, None, divide_joint_path)
-        return float(compute_spans(path, x).sum())
+        return sum_spans(path, x)
 
 
 def _place_rows(curve: Curve) -> tuple[Indices, Array]:

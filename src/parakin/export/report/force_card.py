@@ -10,7 +10,7 @@ import numpy as np
 
 from ..number_format import format_fixed
 from .cards import make_card
-from .figures import embed_figure, round_numbers
+from .figures import PlotTrace, embed_figure, round_numbers
 from .joint_curves import pick_extremes
 from .panels import Panel, stack_panels
 
@@ -36,7 +36,7 @@ def render_force_card(forces: DriveForces) -> str:
         rows.append(f"<tr><td>{escape(drive.name)}</td>{cells}<td>{escape(forces.describe_peak(i))}</td></tr>\n")
         values = scale * forces.forces[:, i]
         kept = pick_extremes(values, _POINTS)
-        line = {"type": "scatter", "mode": "lines", "line": {"color": _COLOUR, "width": 1.2}}
+        line: PlotTrace = {"type": "scatter", "mode": "lines", "line": {"color": _COLOUR, "width": 1.2}}
         line |= {"x": round_numbers(forces.times[kept]), "y": round_numbers(values[kept], 2)}
         low, high = float(np.min(values)), float(np.max(values))
         room = 0.08 * (high - low) or 1.0

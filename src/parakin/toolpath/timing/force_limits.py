@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...arguments import RowsLike, read_rows
-from ...arrays import Array
+from ...arrays import Array, Flags
 from ...dynamics.inverse_dynamics import Dynamics, PathForces
 from ...errors import PoseError
 from ...machine import Machine
@@ -102,10 +102,11 @@ class ForceLimits:
         self._known = joint_path.joints, _Demands(PathForces(*forces), slopes)
         return self._known[1]
 
-    def _find_acting(self, joint_path: JointPath) -> Array:
+    def _find_acting(self, joint_path: JointPath) -> Flags:
         """Find the rows at an end of a motion at a programmed feed, where the tool cuts."""
         rapid = joint_path.posted.path.rapid[joint_path.curve.record_of_piece[joint_path.segment]]
-        return ~(rapid & np.append(rapid[:1], rapid[:-1]))
+        cutting: Flags = ~(rapid & np.append(rapid[:1], rapid[:-1]))
+        return cutting
 
     def _bound_forces(self, joint_path: JointPath, own: PathForces) -> tuple[Array, Array, Array]:
         drives = self._forced

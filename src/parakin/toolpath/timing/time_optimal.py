@@ -23,7 +23,8 @@ UNBOUND = 1e12  # mm²/s², of ṡ²: nothing is as fast
 WORTH = 5e-4  # least fraction of the cycle time that more rows must save
 AddRows: TypeAlias = Callable[[JointPath, Indices, Array], JointPath]  # in steps, ascending, after fractions of them
 _ROUNDS = 4
-_TANGENTS = 5  # of the drives' powers, each where the profile of the one before goes
+_TANGENTS = 40  # of the drives' powers, each where the profile of the one before goes, until the time is the same
+_SAME = 1e-4
 RAMP = 0.1  # s in which a drive is assumed to reach its acceleration where only a jerk is given
 _ROUNDING = 1e-8
 _PLACES = Places(5, False)  # on each step where utilisation is measured: the limits were kept between them, too
@@ -59,8 +60,11 @@ def find_quickest(
         rows, count = joint_path.rows, len(joint_path.step)
         ceilings = compute_ceilings(joint_path, limits)
         x, u = find_reachable(joint_path, limits, ceilings)
-        for _ in range(_TANGENTS if forces is not None and forces.bounds_power else 0):
-            joint_path = forces.bound(joint_path, x)
+        seconds = np.inf
+        for _ in range(_TANGENTS):
+            if forces is None or not forces.bounds_power or abs(seconds - sum_spans(joint_path, x)) < _SAME * seconds:
+                break
+            seconds, joint_path = sum_spans(joint_path, x), forces.bound(joint_path, x)
             x, u = find_reachable(joint_path, limits, ceilings)
         rows = joint_path.rows
         bounds = AccelerationLimits(np.minimum(limits.acceleration, RAMP * limits.jerk), np.full(count, np.inf))
@@ -70,7 +74,7 @@ def find_quickest(
         refuse_unbound(joint_path, np.maximum(x[:-1], x[1:]))
         steps = np.concatenate([np.flatnonzero(where) for where in switches])
         # A step between two stands takes forever until it has a row; what it loses is infinite, too.
-        if attempt == _ROUNDS - 1 or sum(lost) < WORTH * compute_spans(joint_path, x).sum() or not len(steps):
+        if attempt == _ROUNDS - 1 or sum(lost) < WORTH * sum_spans(joint_path, x) or not len(steps):
             break
         fractions = np.concatenate([where[where > 0.0] for where in switches])
         order = np.lexsort((fractions, steps))
@@ -95,6 +99,11 @@ def compute_spans(joint_path: JointPath, x: Array) -> Array:
     with np.errstate(divide="ignore"):
         spans: Array = np.divide(2.0 * joint_path.step, total, out=time, where=moving)
     return spans
+
+
+def sum_spans(joint_path: JointPath, x: Array) -> float:
+    """Sum the time of all steps, s."""
+    return float(compute_spans(joint_path, x).sum())
 
 
 def build_accelerated_profile(

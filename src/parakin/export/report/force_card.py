@@ -27,12 +27,12 @@ def render_force_card(forces: DriveForces) -> str:
     rows, panels = [], []
     for i, drive in enumerate(drives):
         scale, unit = (1e-3, "Nm") if drive.unit == "rad" else (1.0, "N")
-        told = [
+        used = [
             _format_use(scale * float(forces.peaks[i]), scale * drive.force, unit),
             _format_use(scale * float(forces.rms[i]), scale * drive.rated, unit),
             _format_use(float(forces.peak_powers[i]), 1e-3 * drive.power, "W"),
         ]
-        cells = "".join(f"<td class=n>{cell}</td>" for cell in told)
+        cells = "".join(f"<td class=n>{cell}</td>" for cell in used)
         rows.append(f"<tr><td>{escape(drive.name)}</td>{cells}<td>{escape(forces.describe_peak(i))}</td></tr>\n")
         values = scale * forces.forces[:, i]
         kept = pick_extremes(values, _POINTS)

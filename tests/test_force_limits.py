@@ -1,6 +1,7 @@
 """Drives' forces as a limit of the feed, against toppra's; and the keys of machine files that say them."""
 
 import logging
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -59,10 +60,10 @@ def load(folder, *changes):
     return pk.load(path)
 
 
-def prepare(folder, machine, part=PART, cutting_force=None):
+def prepare(folder, machine, part=PART, cutting_force=(0.0, 0.0, 0.0)):
     path = folder / "part.apt"
     path.write_text(part, encoding="utf-8")
-    return pk.prepare(machine, pk.read_path(path), cutting_force=cutting_force)
+    return pk.prepare(machine, replace(pk.read_path(path), cutting_force=cutting_force))
 
 
 def test_as_quick_as_toppra(tmp_path):
@@ -152,7 +153,7 @@ def integrate_quickest(machine, rows, acting, powers):
 def test_powers_and_cutting_are_kept_and_cost_no_more_than_they_must(acting, tmp_path):
     machine = load(tmp_path, ("2 kW", "0.35 kW"))
     job = prepare(tmp_path, machine, "UNITS/MM\nFEDRAT/90000,MMPM\nGOTO/-120,-80,60\nGOTO/120,90,-50\nFINI\n", acting)
-    forces = pk.compute_drive_forces(job.trajectory, acting)
+    forces = pk.compute_drive_forces(job.trajectory)
     assert (forces.power_use < 1.001).all()
     assert (forces.force_use < 1.001).all()
     assert forces.power_use.max() > 0.99
@@ -163,11 +164,11 @@ def test_powers_and_cutting_are_kept_and_cost_no_more_than_they_must(acting, tmp
 
 def test_the_feed_keeps_forces_with_that_of_cutting(tmp_path):
     machine = load(tmp_path)
-    free, cutting = prepare(tmp_path, machine), prepare(tmp_path, machine, PART, {"Z": -500.0})
+    free, cutting = prepare(tmp_path, machine), prepare(tmp_path, machine, PART, (0.0, 0.0, -500.0))
     assert pk.compute_drive_forces(free.trajectory, {"Z": -500.0}).force_use.max() > 1.05
-    assert pk.compute_drive_forces(cutting.trajectory, {"Z": -500.0}).force_use.max() < 1.001
+    assert pk.compute_drive_forces(cutting.trajectory).force_use.max() < 1.001
     assert cutting.seconds > free.seconds
-    too_much = prepare(tmp_path, machine, PART, {"Z": -1000.0})
+    too_much = prepare(tmp_path, machine, PART, (0.0, 0.0, -1000.0))
     assert "z can't hold the weight and the cutting force: its force is too small" in too_much.unplanned
 
 

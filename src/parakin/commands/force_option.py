@@ -34,3 +34,11 @@ def parse_force(machine: Machine, text: str | None, option: str = "--force") -> 
             raise InputError(f"{axis}: {quote(value)} is out of range", option)
         result[axes.index(axis)] = size
     return result
+
+
+def parse_cutting_force(machine: Machine, text: str | None, option: str) -> tuple[float, float, float]:
+    """Parse a force on the tip wherever it cuts, as :attr:`ToolPath.cutting_force`; zeros where there is none."""
+    force = parse_force(machine, text, option)
+    along = () if force is None else zip((axis for axis in machine.axes if axis in "XYZ"), force.tolist(), strict=True)
+    known = dict(along)
+    return known.get("X", 0.0), known.get("Y", 0.0), known.get("Z", 0.0)

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from math import isfinite
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
 from ..errors import InputError, quote
-from ..export.number_format import format_fixed
+from ..export.number_format import format_fixed, format_use
 from .console import ProgressBar, announce_compiling, format_table, print_json, print_remark, print_text
-from .force_option import parse_force
+from .force_option import parse_cutting_force
 from .options import OFF_LIMITS, Json, Mode, Name, OutputPath, Sizes, load_machine
 from .part_options import (
     FrameChoice,
@@ -74,7 +74,10 @@ def forces(
     """
     machine = load_machine(name, sizes)
     _check_options(output, csv, arc_tolerance)
-    acting, placed = parse_force(machine, force), None if workpiece is None else parse_workpiece(workpiece)
+    acting, placed = (
+        parse_cutting_force(machine, force, "--force"),
+        None if workpiece is None else parse_workpiece(workpiece),
+    )
     length = parse_tool_length(tool_length, tools)
     announce_compiling()
     from ..toolpath.job import prepare
@@ -85,16 +88,14 @@ def forces(
         options = PartOptions(frame, start, reference, tools)
         saying = progress.stage("reading", 0.0, 0.1)
         path = read_part(part, options, arc_tolerance, compose_frames(placed, None), saying)
-        path = fit_part(machine, path, length, placed)
+        path = replace(fit_part(machine, path, length, placed), cutting_force=acting)
         saying = progress.stage("checking and timing", 0.1, 0.9)
-        job = prepare(
-            machine, path, workpiece=placed, mode=mode, corners=corners, cutting_force=acting, progress=saying
-        )
+        job = prepare(machine, path, workpiece=placed, mode=mode, corners=corners, progress=saying)
     if job.trajectory is None or job.posted.first is not None:
         reason = job.unplanned if job.posted.first is None else "off limits"
         print_remark(f"{part}: {reason}; parakin post tells more")
         return OFF_LIMITS
-    result = compute_drive_forces(job.trajectory, acting)
+    result = compute_drive_forces(job.trajectory)
     files = _write(result, csv, output)
     if json:
         from ..export.json.drive_forces import encode_drive_forces
@@ -136,9 +137,9 @@ def _format_forces(result: DriveForces) -> str:
     rows = []
     for i, drive in enumerate(machine.drives):
         scale, name = (1e-3, "Nm") if drive.unit == "rad" else (1.0, "N")
-        peak = _format_used(scale * float(result.peaks[i]), scale * drive.force, name)
-        rms = _format_used(scale * float(result.rms[i]), scale * drive.rated, name)
-        power = _format_used(float(result.peak_powers[i]), 1e-3 * drive.power, "W")
+        peak = format_use(scale * float(result.peaks[i]), scale * drive.force, name)
+        rms = format_use(scale * float(result.rms[i]), scale * drive.rated, name)
+        power = format_use(float(result.peak_powers[i]), 1e-3 * drive.power, "W")
         rows.append([drive.name, peak, rms, power, result.describe_peak(i)])
     masses = ", ".join(f"{kind} {format_fixed(mass, 1)}" for kind, mass in result.masses.items())
     drawn = [kind for kind in result.masses if not _is_stated(machine.bodies.get(kind))]
@@ -159,8 +160,3 @@ def _format_forces(result: DriveForces) -> str:
 
 def _is_stated(build: BodyBuild | None) -> bool:
     return build is not None and (build.mass is not None or build.diameter is not None)
-
-
-def _format_used(value: float, limit: float, unit: str) -> str:
-    of_limit = f" of {limit:g}" if isfinite(limit) else ""
-    return f"{format_fixed(value, 1)}{of_limit} {unit}"

@@ -35,7 +35,6 @@ class JobOptions:
     rewind: float | None
     clearance: float | None
     turn: Literal["home", "free"] = "home"
-    cutting_force: Array | None = None
 
     @property
     def interpolation(self) -> Interpolation:
@@ -158,7 +157,6 @@ def _prepare_at(
     prepare_job = partial(
         prepare_turned if options.turn == "free" else prepare, machine, path, workpiece=workpiece, mode=mode,
         tolerances=options.tolerances, interpolation=options.interpolation, corners=options.corners,
-        cutting_force=options.cutting_force,
         progress=progress.stage("checking and timing", 0.3, 0.7),
     )  # fmt: skip
     prepared = prepare_job()

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import isfinite, radians
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
@@ -12,7 +12,7 @@ from cyclopts import Parameter
 from ..controllers import Target, load_controller
 from ..errors import InputError, PoseError
 from .console import ProgressBar, announce_compiling, print_json, print_text
-from .force_option import parse_force
+from .force_option import parse_cutting_force
 from .options import OFF_LIMITS, Json, Mode, Sizes, complete_machine, load_machine
 from .part_job import JobOptions, check_clearance, check_turn, prepare_part
 from .part_options import (
@@ -199,7 +199,7 @@ def post(
     _check_tolerances(tolerance, angle_tolerance, arc_tolerance)
     length = parse_tool_length(tool_length, tools)
     check_clearance(rewind, clearance)
-    acting = parse_force(chosen, cutting_force, "--cutting-force")
+    acting = parse_cutting_force(chosen, cutting_force, "--cutting-force")
     announce_compiling()
     from ..export.files import write_files
     from ..toolpath.job import Tolerances
@@ -212,13 +212,13 @@ def post(
             None if place else compose_frames(placed, None), progress.stage("reading", 0.0, 0.1),
         )  # fmt: skip
         check_turn(chosen, path, turn)
-        path = fit_part(chosen, path, length, placed)
+        path = replace(fit_part(chosen, path, length, placed), cutting_force=acting)
         tolerances = Tolerances(tolerance, radians(angle_tolerance))
-        options = JobOptions(mode, tolerances, target, corners, rewind, clearance, turn, acting)
+        options = JobOptions(mode, tolerances, target, corners, rewind, clearance, turn)
         prepared = prepare_part(chosen, path, placed, place, options, progress)
         job = prepared.job
         files, missing = _make_files(
-            part.stem, prepared, _Wanted(target, force, rate, parquet, page, animation, output, acting), progress
+            part.stem, prepared, _Wanted(target, force, rate, parquet, page, animation, output), progress
         )
         paths = write_files(output, dict(files.values()))
     written = {kind: str(name) for kind, name in zip(files, paths, strict=True)}
@@ -268,7 +268,6 @@ class _Wanted:
     page: bool
     animation: bool
     folder: Path
-    acting: Array | None
 
     def explain_missing(self, kind: str, reason: str, name: str) -> str:
         """Say why a file can't be made, and that one of an earlier run stays in its place."""
@@ -323,22 +322,20 @@ def _make_files(
             from ..export.machine.animated_glb import render_path_glb
 
             files["animation"] = (name, render_path_glb(trajectory, progress.stage("drawing the motion", 0.9, 1.0)))
-    report = render_report(
-        posted, trajectory, job.unplanned, job.waits, job.outside, _measure_forces(job, wanted.acting)
-    )
+    report = render_report(posted, trajectory, job.unplanned, job.waits, job.outside, _measure_forces(job))
     files["report"] = (f"{stem}.report.html", report)
     return files, missing
 
 
-def _measure_forces(job: Job, acting: Array | None) -> DriveForces | None:
+def _measure_forces(job: Job) -> DriveForces | None:
     """Measure the drives' forces where the tool's is stated, or the machine's file says what its drives can give."""
     drives = job.posted.machine.drives
     said = any(isfinite(value) for drive in drives for value in (drive.force, drive.rated, drive.power))
-    if job.trajectory is None or not (said or acting is not None):
+    if job.trajectory is None or not (said or any(job.posted.path.cutting_force)):
         return None
     from ..toolpath.timing.drive_forces import compute_drive_forces
 
-    return compute_drive_forces(job.trajectory, acting)
+    return compute_drive_forces(job.trajectory)
 
 
 def _make_program(prepared: PreparedPart, force: bool) -> Writer:

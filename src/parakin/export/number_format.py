@@ -38,3 +38,9 @@ def format_duration(seconds: float) -> str:
         return f"{whole:g} s"
     hours, rest = divmod(int(whole), 3600)
     return f"{f'{hours:,} h ' if hours else ''}{rest // 60} min {rest % 60} s"
+
+
+def format_use(value: float, limit: float, unit: str) -> str:
+    """Format a value beside its limit, where there is one."""
+    of_limit = f" of {limit:g}" if isfinite(limit) else ""
+    return f"{format_fixed(value, 1)}{of_limit} {unit}"

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from math import isfinite
 from typing import NamedTuple
 
-from ..arguments import RowsLike, check_arguments, check_positive
+from ..arguments import check_arguments, check_positive
 from ..arrays import Array, Progress
 from ..displays import Displayed
 from ..errors import PoseError
@@ -21,7 +21,6 @@ from .posting.post import post_path
 from .posting.posted import Posted
 from .posting.tool_lengths import fit_tool_lengths
 from .timing import Corners, Trajectory, plan_trajectory
-from .timing.force_limits import read_cutting_force
 from .timing.lost_time import explain_lost_time
 from .timing.pole_jumps import refuse_pole_jumps
 from .timing.stops import find_stops, sum_dwells
@@ -112,7 +111,6 @@ def prepare(
     interpolation: Interpolation = "pose",
     tolerances: Tolerances = Tolerances(),  # noqa: B008  it never changes
     corners: Corners = "round",
-    cutting_force: RowsLike | None = None,
     progress: Progress | None = None,
 ) -> Job:
     """Post a tool path, insert the points that its controller needs, check it everywhere, and plan its trajectory.
@@ -123,7 +121,7 @@ def prepare(
     interpolation : what the controller moves evenly between two records, the tool's ``pose`` or the ``joints``
     tolerances : of tip and axis about the programmed path, for the controller's interpolation and for rounded corners
         together
-    corners, cutting_force : as for :func:`~.timing.plan.plan_trajectory`
+    corners : ``round`` or ``stop``, as for :func:`~.timing.plan.plan_trajectory`
     progress : called now and then with the fraction done, 0 to 1
 
     Where no mode is given and the job does not run in the one that the records suggest, it is prepared with head and
@@ -137,8 +135,7 @@ def prepare(
     report = progress or (lambda fraction: None)
 
     def prepare_in(mode: str | None) -> Job:
-        planning = _Planning(interpolation, tolerances, corners, read_cutting_force(machine, cutting_force))
-        return _prepare_in(machine, path, workpiece, mode, planning, report)
+        return _prepare_in(machine, path, workpiece, mode, interpolation, tolerances, corners, report)
 
     job = prepare_in(mode)
     others = machine.head_modes(job.posted.mode)[1:] if mode is None else []
@@ -148,25 +145,17 @@ def prepare(
     return in_other_mode if in_other_mode.runs else job
 
 
-class _Planning(NamedTuple):
-    """How a job is linearised and timed, see :func:`prepare`."""
-
-    interpolation: Interpolation
-    tolerances: Tolerances
-    corners: Corners
-    cutting_force: Array
-
-
 def _prepare_in(
     machine: Machine,
     path: ToolPath,
     workpiece: Array | None,
     mode: str | None,
-    planning: _Planning,
+    interpolation: Interpolation,
+    tolerances: Tolerances,
+    corners: Corners,
     report: Progress,
 ) -> Job:
     """Prepare a job in a mode, or in the one that the records suggest."""
-    interpolation, tolerances = planning.interpolation, planning.tolerances
 
     def report_stage(begin: float, end: float) -> Progress:
         return lambda fraction: report(begin + (end - begin) * fraction)
@@ -188,8 +177,7 @@ def _prepare_in(
         try:
             trajectory = plan_trajectory(
                 posted,
-                corners=planning.corners,
-                cutting_force=planning.cutting_force,
+                corners=corners,
                 tolerance=rounded.tip,
                 axis_tolerance=rounded.axis,
                 stops=find_stops(posted.path),

@@ -80,6 +80,8 @@ class ToolPath:
         ``tip - extension * axis``; None where that is zero throughout
     exact : (n,) bool, whether the axis was computed, so that the least lean of it tells a direction, and not read, with
         the digits of a file; None where none was
+    cutting_force : N on the tip wherever it cuts, along the machine's X, Y and Z; not in rapid. The feed keeps the
+        drives' forces and powers with it
     """
 
     source: str
@@ -101,6 +103,7 @@ class ToolPath:
     fitted_length: float | None = None
     extension: Array | None = None
     exact: Flags | None = None
+    cutting_force: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
     def __len__(self) -> int:
         return len(self.line)

@@ -7,7 +7,7 @@ from math import inf
 
 import numpy as np
 
-from ..arguments import RowsLike, check_arguments
+from ..arguments import check_arguments
 from ..arrays import Array, Progress
 from ..machine import Machine
 from .job import Job, Tolerances, prepare
@@ -60,7 +60,6 @@ def prepare_turned(
     interpolation: Interpolation = "pose",
     tolerances: Tolerances = Tolerances(),  # noqa: B008  it never changes
     corners: Corners = "round",
-    cutting_force: RowsLike | None = None,
     progress: Progress | None = None,
 ) -> TurnedJob:
     """Prepare a job as :func:`~.job.prepare` does, whose turn about the tool's axis is chosen along the whole path.
@@ -79,7 +78,7 @@ def prepare_turned(
     def prepare_one(path: ToolPath, lean: float, begin: float, end: float) -> Job:
         return prepare(
             machine, path, workpiece=workpiece, mode=mode, interpolation=interpolation,
-            tolerances=tolerances._replace(axis=tolerances.axis - lean), corners=corners, cutting_force=cutting_force,
+            tolerances=tolerances._replace(axis=tolerances.axis - lean), corners=corners,
             progress=lambda fraction: report(begin + (end - begin) * fraction),
         )  # fmt: skip
 

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from html import escape
-from math import isfinite
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..number_format import format_fixed
+from ..number_format import format_use
 from .cards import make_card
 from .figures import PlotTrace, embed_figure, round_numbers
 from .joint_curves import pick_extremes
@@ -28,9 +27,9 @@ def render_force_card(forces: DriveForces) -> str:
     for i, drive in enumerate(drives):
         scale, unit = (1e-3, "Nm") if drive.unit == "rad" else (1.0, "N")
         used = [
-            _format_use(scale * float(forces.peaks[i]), scale * drive.force, unit),
-            _format_use(scale * float(forces.rms[i]), scale * drive.rated, unit),
-            _format_use(float(forces.peak_powers[i]), 1e-3 * drive.power, "W"),
+            format_use(scale * float(forces.peaks[i]), scale * drive.force, unit),
+            format_use(scale * float(forces.rms[i]), scale * drive.rated, unit),
+            format_use(float(forces.peak_powers[i]), 1e-3 * drive.power, "W"),
         ]
         cells = "".join(f"<td class=n>{cell}</td>" for cell in used)
         rows.append(f"<tr><td>{escape(drive.name)}</td>{cells}<td>{escape(forces.describe_peak(i))}</td></tr>\n")
@@ -53,8 +52,3 @@ def render_force_card(forces: DriveForces) -> str:
     )
     said = f"with a force of {acting} on the tip where it cuts" if acting else "without a force on the tool"
     return make_card("Forces of the drives", body, f"Weight and inertia of all that moves, {said}; without friction.")
-
-
-def _format_use(value: float, limit: float, unit: str) -> str:
-    of_limit = f" of {limit:g}" if isfinite(limit) else ""
-    return f"{format_fixed(value, 1)}{of_limit} {unit}"

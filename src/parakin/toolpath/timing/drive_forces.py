@@ -6,13 +6,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...arguments import RowsLike, check_arguments
+from ...arguments import RowsLike, check_arguments, read_rows
 from ...arrays import Array, Indices
 from ...dynamics.inverse_dynamics import WATT, Dynamics, Motion
 from ...dynamics.masses import sum_masses
 from ...errors import PoseError
 from ...model.elements import Drive
-from .force_limits import read_cutting_force
+from .force_limits import list_cutting_force
 from .kernels.splines import PathState
 from .trajectory import Trajectory
 
@@ -97,7 +97,8 @@ class DriveForces:
 def compute_drive_forces(trajectory: Trajectory, force: RowsLike | None = None) -> DriveForces:
     """Compute the drives' forces and powers along a trajectory: weights, inertia and a force on the tool.
 
-    force : N by the machine's translations, (t,) or a dict, on the tool's tip at programmed feeds; by default none
+    force : N by the machine's translations, (t,) or a dict, on the tool's tip at programmed feeds; by default
+        :attr:`ToolPath.cutting_force`
 
     Bodies are of what the machine's file says (``bodies``), else of steel and aluminium and as thick as they are drawn.
     There is no friction; motors and screws count with the drives' ``inertia``.
@@ -106,7 +107,12 @@ def compute_drive_forces(trajectory: Trajectory, force: RowsLike | None = None) 
     tells nothing of its bodies.
     """
     machine = trajectory.posted.machine
-    acting = read_cutting_force(machine, force)
+    acting = list_cutting_force(trajectory.posted)
+    if force is not None:
+        axes = tuple(axis for axis in machine.axes if axis in "XYZ")
+        acting = read_rows(force, axes, ["mm"] * len(axes), lambda: np.zeros(len(axes)), "force")
+        if acting.shape != (len(axes),) or not np.isfinite(acting).all():
+            raise PoseError(f"force: one number each for {' '.join(axes)} expected")
     times, rows, state = _list_states(trajectory)
     if len(times) > _MOST_STATES:
         raise PoseError(f"a trajectory of {len(times) // 3:,} pieces, at most {_MOST_STATES // 3:,} are possible")

@@ -7,11 +7,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...arguments import RowsLike, read_rows
 from ...arrays import Array, Flags
 from ...dynamics.inverse_dynamics import Dynamics, PathForces
 from ...errors import PoseError
-from ...machine import Machine
+from ..posting.posted import Posted
 from .joint_path import JointPath
 from .kernels.splines import ForceRows, PathState
 
@@ -26,32 +25,27 @@ class _Demands(NamedTuple):
     slopes: Array
 
 
-def read_cutting_force(machine: Machine, force: RowsLike | None) -> Array:
-    """Read a force on the tool's tip, (translations,) N; zeros by default.
+def list_cutting_force(posted: Posted) -> Array:
+    """List the force on the tip of a path by the machine's translations, (translations,) N.
 
     Raises :class:`PoseError` for what is none.
     """
-    axes = tuple(axis for axis in machine.axes if axis in "XYZ")
-    acting = np.zeros(len(axes))
-    if force is not None:
-        acting = read_rows(force, axes, ["mm"] * len(axes), lambda: np.zeros(len(axes)), "force")
-        if acting.shape != (len(axes),) or not np.isfinite(acting).all():
-            raise PoseError(f"force: one number each for {' '.join(axes)} expected")
-    return acting
+    force = np.array(posted.path.cutting_force, np.float64)
+    if force.shape != (3,) or not np.isfinite(force).all():
+        raise PoseError("cutting_force: three numbers expected")
+    return force[["XYZ".index(axis) for axis in posted.machine.axes if axis in "XYZ"]]
 
 
 class ForceLimits:
-    """What the forces and powers of a machine's drives may be, where its file says it.
+    """What the forces and powers of a machine's drives may be on a path, where the machine's file says it."""
 
-    acting : (translations,) N on the tool's tip at programmed feeds, not in rapid
-    """
-
-    def __init__(self, machine: Machine, acting: Array):
+    def __init__(self, posted: Posted):
+        machine = posted.machine
         self._greatest = np.array([drive.force for drive in machine.drives])
         self._power = np.array([drive.power for drive in machine.drives])
         self._forced = np.flatnonzero(np.isfinite(self._greatest))
         self._powered = np.flatnonzero(np.isfinite(self._power))
-        self._acting = acting
+        self._acting = list_cutting_force(posted)
         self._dynamics = Dynamics(machine) if len(self._forced) + len(self._powered) else None
         self._known: tuple[Array, _Demands] | None = None  # of the joints at the rows that were measured last
 

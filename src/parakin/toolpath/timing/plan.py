@@ -6,14 +6,13 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ...arguments import RowsLike
 from ...arrays import Flags
 from ...errors import PoseError
 from ..path import ToolPath
 from ..posting.posted import Posted
 from .corners import Corners, check_tolerance, round_corners
 from .drive_limits import DriveLimits
-from .force_limits import ForceLimits, read_cutting_force
+from .force_limits import ForceLimits
 from .jerk_limited import limit_jerk
 from .joint_path import build_joint_path
 from .pole_pace import slow_down_on_pole
@@ -33,7 +32,6 @@ def plan_trajectory(
     tolerance: float = 0.01,
     axis_tolerance: float = 1e-3,
     stops: Sequence[int] = (),
-    cutting_force: RowsLike | None = None,
 ) -> Trajectory:
     """Plan the quickest trajectory along a posted path that keeps its feeds and its drives' limits.
 
@@ -44,7 +42,6 @@ def plan_trajectory(
         in :class:`~.corners.Curve`), and rounds the others
     tolerance, axis_tolerance : mm of the tool's tip and rad of its axis that rounding may take it off
     stops : records at which the tool stands still, besides the first and the last
-    cutting_force : N by the machine's translations, (t,) or a dict, on the tool's tip at programmed feeds
 
     Between records the tip moves straight and the pose's angles evenly. The feed is that of the record that the motion
     leads to; in rapid, and where none is programmed, drives are the only limit. A drive's force and its power, where
@@ -66,7 +63,7 @@ def plan_trajectory(
         DriveLimits.of(posted.machine),
         name_limits(posted.machine.joints),
     )
-    forces = ForceLimits(posted.machine, read_cutting_force(posted.machine, cutting_force))
+    forces = ForceLimits(posted)
     bounded = limits.bounds_acceleration or bool(forces)
     curve = round_corners(posted, corners, tolerance, axis_tolerance, parted, bounded)
     joint_path = build_joint_path(posted, curve, limits, tolerance, axis_tolerance)

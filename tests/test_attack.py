@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import os
+import re
 import resource
 import signal
 import subprocess
 import sys
+import warnings
 from pathlib import Path
 
 import pytest
@@ -332,3 +334,23 @@ def test_a_very_slow_program_takes_little_memory(tmp_path):
     (program,) = pk.write_files(tmp_path, {"a.ngc": pk.make_linuxcnc_program(job.trajectory)})
     assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before < 200_000  # kB
     assert len(program.read_text().splitlines()) < 1000
+
+
+def test_a_path_of_many_years_is_told_and_not_planned(tmp_path):
+    part = tmp_path / "slow.cl"
+    part.write_text("FEDRAT/1e-9,MMPM\nGOTO/0,0,-1400\nGOTO/10,0,-1400\n")
+    job = pk.prepare(load_shipped("tricept"), pk.read_path(part))
+    assert job.posted.first is None and job.trajectory is None
+    told = re.match(r"(.*):3: the path takes ([\d,]+) years at its feeds", job.unplanned)
+    assert told[1] == str(part)
+    assert float(told[2].replace(",", "")) == pytest.approx(10 / 1e-9 / 60 / 24 / 365.25, rel=0.01)
+
+
+def test_thousands_of_kilometres_out_of_reach_are_not_counted_and_warn_of_nothing(tmp_path, monkeypatch):
+    monkeypatch.setattr("parakin.toolpath.timing.joint_path.place_rows", None)
+    part = tmp_path / "far.cl"
+    part.write_text("FEDRAT/1000,MMPM\nGOTO/0,0,-1400\nGOTO/1000000000,0,0\nGOTO/-1000000000,0,0,1,0,0\n")
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        job = pk.prepare(load_shipped("tricept"), pk.read_path(part))
+    assert job.posted.first is not None and job.unplanned == "a path of 3,000 km, too long to be timed"

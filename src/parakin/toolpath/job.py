@@ -21,7 +21,7 @@ from .posting.post import post_path
 from .posting.posted import Posted
 from .posting.tool_lengths import fit_tool_lengths
 from .timing import Corners, Trajectory, plan_trajectory
-from .timing.lost_time import explain_lost_time
+from .timing.lost_time import explain_lost_time, refuse_endless
 from .timing.pole_jumps import refuse_pole_jumps
 from .timing.stops import find_stops, sum_dwells
 
@@ -182,6 +182,7 @@ def _prepare_in(
                 axis_tolerance=rounded.axis,
                 stops=find_stops(posted.path),
             )
+            refuse_endless(trajectory)
             if interpolation == "pose":
                 refuse_pole_jumps(trajectory.joint_path)
         except PoseError as error:

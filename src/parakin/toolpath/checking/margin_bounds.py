@@ -80,6 +80,7 @@ class MotionProver:
         self.tolerance = KEPT * np.array([sizes[limit.unit] for limit in machine.limit_definitions])
         self.boxes = 0
 
+    @np.errstate(over="ignore", invalid="ignore")  # thousands of km away rates overflow, and bound nothing
     def bound_sections(self, sections: Sections) -> MarginBounds:
         """Bound the margins over sections by the mean value theorem from both ends."""
         p0, p1, m0, m1 = sections.first.poses, sections.last.poses, sections.first.margins, sections.last.margins
@@ -101,6 +102,7 @@ class MotionProver:
         self._allow_free_wrist(free, np.minimum(m0, m1), np.abs(change), least, counted)
         return MarginBounds(least, counted)
 
+    @np.errstate(over="ignore", invalid="ignore")
     def bound_runs(
         self, at: MotionPoints, wrist_modes: WristModes, box: tuple[Array, Array], joint_range: tuple[Array, Array]
     ) -> MarginBounds:

@@ -128,10 +128,11 @@ def build_joint_path(
     most = min(MOST_STEPS, ENOUGH // len(curve.length))
     corner_steps = np.ceil(np.minimum(STEPS_PER_RAD * curve.sharpness, most)).astype(np.int64)
     each = _EACH if _EACH * _SPANS * len(curve.length) <= ENOUGH else 1
-    size = place_rows(curve, corner_steps, each, LONGEST, np.empty(0, np.int64), np.empty(0))
-    if size > _MOST_ROWS:
-        length = 1e-6 * float(curve.length.sum())
-        raise PoseError(f"a path of {length:,.0f} km, too long to be timed")
+    length = float(curve.length.sum())
+    too_long = not length < LONGEST * _MOST_ROWS  # rows are counted one by one
+    size = 0 if too_long else place_rows(curve, corner_steps, each, LONGEST, np.empty(0, np.int64), np.empty(0))
+    if too_long or size > _MOST_ROWS:
+        raise PoseError(f"a path of {1e-6 * length:,.0f} km, too long to be timed")
     segment, offset = np.empty(size, np.int64), np.empty(size)
     place_rows(curve, corner_steps, each, LONGEST, segment, offset)
     fine = FINE * np.where(np.array(posted.machine.joint_units) == "mm", tolerance, axis_tolerance)

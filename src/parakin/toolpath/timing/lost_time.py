@@ -1,15 +1,28 @@
-"""Explain a cycle time that is far longer than the programmed feeds ask for, at the line that costs most of it."""
+"""Explain a cycle time that is far longer than the programmed feeds ask for, and refuse one that never ends."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from ...arrays import Array
+from ...errors import PoseError
 from ..path import Note
 from .trajectory import Trajectory
 
 _LONGER = 1.5  # times what feeds and rapids ask for, from which on it is explained,
+_LONGEST = 1e8  # s, three years: a feed with a slip of the pen
+_YEAR = 365.25 * 86400.0  # s
 _LEAST = 0.3  # s: if it is so much longer: to start and to stop takes some tenths
+
+
+def refuse_endless(trajectory: Trajectory) -> None:
+    """Refuse a trajectory of more than three years, which no program can be made of in a bounded time."""
+    if trajectory.seconds > _LONGEST:
+        path, longest = trajectory.posted.path, int(np.diff(trajectory.times, prepend=0.0).argmax())
+        raise PoseError(
+            f"{path.source}:{path.line[longest]}: the path takes {trajectory.seconds / _YEAR:,.0f} years at its feeds, "
+            f"most of them here; less than {_LONGEST / _YEAR:.3g} expected"
+        )
 
 
 def explain_lost_time(trajectory: Trajectory) -> Note | None:

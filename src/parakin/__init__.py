@@ -39,6 +39,7 @@ if TYPE_CHECKING:
     from .machine import Machine
     from .model.geometric_parameters import Parameter
     from .performance.atlas import Atlas, atlas
+    from .performance.certified.nearest_singularity import SingularityDistance, find_nearest_singularity
     from .stiffness.stiffness import Stiffness, analyse_stiffness
     from .synthesis.designs import Designs, ProvedDesign, UnprovedDesign, find_designs
     from .synthesis.problem import DesignProblem
@@ -104,6 +105,7 @@ __all__ = [
     "Rewind",
     "RewoundPath",
     "SampledField",
+    "SingularityDistance",
     "Solution",
     "Stiffness",
     "SweepPlan",
@@ -132,6 +134,7 @@ __all__ = [
     "find_cross_sections",
     "find_designs",
     "find_largest_box",
+    "find_nearest_singularity",
     "find_placement",
     "find_placements",
     "fit_tool_lengths",
@@ -217,6 +220,7 @@ _LAZY = {
     "ProvedDesign": "synthesis.designs",
     "UnprovedDesign": "synthesis.designs",
     "find_designs": "synthesis.designs",
+    "find_nearest_singularity": "performance.certified.nearest_singularity",
     "DriveForces": "toolpath.timing.drive_forces",
     "run_sweep": "export.sweep_folder",
     "SweepPlan": "synthesis.sweep",
@@ -240,6 +244,7 @@ _LAZY = {
     "SampledField": "workspaces.sampled.distance_field",
     "Assemblies": "kinematics.assemblies",
     "Solution": "kinematics.solution",
+    "SingularityDistance": "performance.certified.nearest_singularity",
     "Stiffness": "stiffness.stiffness",
     "Tolerances": "toolpath.job",
     "Clearance": "toolpath.linearise.rewinds",

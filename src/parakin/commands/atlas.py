@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from cyclopts import Parameter
 
 from ..budget import SECONDS, Budget
 from ..errors import InputError, PoseError, quote
-from ..export.json.performance import encode_atlas, encode_performance, encode_proofs
+from ..export.json.performance import encode_atlas, encode_distance, encode_performance, encode_proofs
 from ..units import NUMBER, QuantityError, parse_quantity, to_display
 from .atlas_files import AtlasFiles
-from .atlas_summary import format_atlas, format_performance, format_proofs
+from .atlas_summary import format_atlas, format_distance, format_performance, format_proofs
 from .console import ProgressBar, announce_compiling, print_json, print_text
 from .options import OFF_LIMITS, Json, Mode, Name, OutputPath, Sizes, load_machine
 from .region_options import (
@@ -33,6 +33,7 @@ if TYPE_CHECKING:
     from ..performance.atlas import Atlas, PerformanceMap
     from ..performance.certified.amplification import Bracket
     from ..performance.certified.counterexamples import SingularityKind
+    from ..performance.certified.nearest_singularity import SingularityDistance
     from ..performance.certified.proofs import Proof
     from ..performance.indices import Performance
     from ..workspaces.certified.region import Region
@@ -46,6 +47,7 @@ def atlas(
     pose: Annotated[str | None, Parameter(allow_leading_hyphen=True)] = None,
     box: str | None = None,
     amplification: str | None = None,
+    grow: Literal["box", "sphere"] | None = None,
     slices: Annotated[list[str] | None, Parameter(name="--slice")] = None,
     without: Without = None,
     all_parts: AllParts = False,
@@ -72,6 +74,9 @@ def atlas(
         Poses all over which the claims must hold: X=-50:50,Y=-50:50,Z=-1600:-1500; turning axes go too.
     amplification
         A claim on the box, LOW:HIGH: every velocity amplification is within, 1/3:3.
+    grow
+        The largest box of the proportions of --box, or the largest sphere of tips at all of its orientations, about its
+        middle and within it, that has no parallel singularity: what is proved, and the singular pose that is met.
     slices
         A place to hold for a map: Z=-100. May be given again; by default as at home.
     step
@@ -88,6 +93,11 @@ def atlas(
     seconds = SECONDS if given is None else given
     ranges = parse_axis_ranges(machine, box, "--box")
     bounds = _parse_claim(amplification, bool(ranges))
+    if grow is not None and (not ranges or bounds is not None):
+        expected = (
+            "it grows within --box, name that" if not ranges else "it and --amplification are asked one at a time"
+        )
+        raise InputError(expected, "--grow")
     cuts = _cut_region(region, slices or ())
     if slices and output is None:
         raise InputError("a map is a file, name it or its folder with -o", "--slice")
@@ -98,7 +108,9 @@ def atlas(
     with ProgressBar() as progress:
         if one_pose is not None:
             results.examine_pose(one_pose)
-        if ranges:
+        if grow is not None:
+            results.grow(ranges, grow)
+        elif ranges:
             results.prove_box(ranges, bounds, progress)
         if files is not None or not (ranges or pose):
             results.compute_atlas(apart, progress)
@@ -167,6 +179,7 @@ class _AtlasResults:
         self.ranges: dict[str, AxisRange] = {}
         self.proofs: list[Proof] = []
         self.brackets: Sequence[Bracket] = ()
+        self.grown: SingularityDistance | None = None
         self.atlas: Atlas | None = None
         self.maps: list[PerformanceMap] = []
         self.written: dict[str, str] = {}
@@ -199,6 +212,14 @@ class _AtlasResults:
             self.brackets = self.proofs[-1].brackets
         elif all(proof.verdict == "proved" for proof in self.proofs):
             self.brackets = bracket_extremes(box, seconds=self.seconds, progress=report).brackets
+
+    def grow(self, ranges: dict[str, AxisRange], shape: Literal["box", "sphere"]) -> None:
+        from ..performance.certified.nearest_singularity import find_nearest_singularity
+
+        try:
+            self.grown = find_nearest_singularity(self.region, ranges, shape, seconds=self.seconds)
+        except PoseError as error:
+            raise InputError(str(error).removeprefix("box: "), "--box") from None
 
     def compute_atlas(self, step: float | None, progress: ProgressBar) -> None:
         from ..performance.atlas import atlas
@@ -244,6 +265,8 @@ class _AtlasResults:
             paragraphs.append(format_performance(self.performance, self.broken_limit))
         if self.ranges:
             paragraphs.append(format_proofs(self.machine, self.ranges, self.proofs, self.brackets))
+        if self.grown is not None:
+            paragraphs.append(format_distance(self.grown))
         if self.atlas is not None:
             paragraphs.append(format_atlas(self.atlas))
         if self.written:
@@ -265,6 +288,7 @@ class _AtlasResults:
             "verdict": self.verdict,
             "pose": None if self.performance is None else encode_performance(self.performance, self.broken_limit),
             "box": proofs,
+            "grown": None if self.grown is None else encode_distance(self.grown),
             "region": None if self.atlas is None else encode_atlas(self.atlas),
             "files": self.written,
         }

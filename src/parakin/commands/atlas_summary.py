@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from math import floor
 from typing import TYPE_CHECKING
 
 from ..export.json.performance import encode_pose
@@ -15,6 +16,7 @@ if TYPE_CHECKING:
     from ..machine import Machine
     from ..performance.atlas import Atlas
     from ..performance.certified.amplification import Bracket
+    from ..performance.certified.nearest_singularity import SingularityDistance
     from ..performance.certified.proofs import Proof
     from ..performance.characteristic_length import CharacteristicLength
     from ..performance.indices import Performance
@@ -109,6 +111,36 @@ def _format_singularities(atlas: Atlas) -> list[str]:
     return lines
 
 
+def format_distance(grown: SingularityDistance) -> str:
+    """Format the largest box or sphere without a parallel singularity, rounded down, and what ends it."""
+    machine, about = grown.machine, f"about {_format_pose(grown.machine, grown.middle)}"
+    scale, unit = (1.0, "mm") if grown.shape == "sphere" else (100.0, "%")
+    inner = format_fixed(floor(1e3 * scale * grown.inner) / 1e3, 3)
+    what = f"a sphere of {inner} mm" if grown.shape == "sphere" else f"{inner} % of the box"
+    lines = [
+        f"{machine.name}: {what} {about}\n",
+        f"within {', '.join(_list_sides(machine, grown.grown_ranges))}",
+        f"the legs close and no parallel singularity is met: proved, {grown.boxes:,} boxes",
+    ]
+    if grown.pose is not None:
+        lines.append(
+            f"at {_format_number(scale * grown.outer)} {unit}, {_format_pose(machine, grown.pose)}: {grown.reason}"
+        )
+    elif grown.inner >= grown.outer:
+        lines.append("as large as was asked for")
+    return "\n".join(lines)
+
+
+def _list_sides(machine: Machine, ranges: Mapping[str, tuple[float, float]]) -> list[str]:
+    units = dict(zip(machine.axes, machine.axis_units, strict=True))
+    sides = []
+    for axis, (low, high) in ranges.items():
+        unit = units[axis]
+        ends = f"{_format_axis_value(low, unit)} to {_format_axis_value(high, unit)}"
+        sides.append(f"{axis} {ends} {name_display_unit(unit)}")
+    return sides
+
+
 def format_proofs(
     machine: Machine,
     ranges: Mapping[str, tuple[float, float]],
@@ -116,13 +148,7 @@ def format_proofs(
     brackets: Sequence[Bracket],
 ) -> str:
     """Format proofs over the box of ``ranges``, and brackets of the amplification there."""
-    units = dict(zip(machine.axes, machine.axis_units, strict=True))
-    sides = []
-    for axis, (low, high) in ranges.items():
-        unit = units[axis]
-        ends = f"{_format_axis_value(low, unit)} to {_format_axis_value(high, unit)}"
-        sides.append(f"{axis} {ends} {name_display_unit(unit)}")
-    lines = [f"{machine.name} all over {', '.join(sides)}", ""]
+    lines = [f"{machine.name} all over {', '.join(_list_sides(machine, ranges))}", ""]
     width = max(len(proof.claim) for proof in proofs)
     for proof in proofs:
         within = f" to {proof.tolerance:g}" if proof.tolerance and proof.verdict == "proved" else ""

@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     from ...machine import Machine
     from ...performance.atlas import Atlas
     from ...performance.certified.amplification import Bracket
+    from ...performance.certified.nearest_singularity import SingularityDistance
     from ...performance.certified.proofs import Proof
     from ...performance.characteristic_length import CharacteristicLength
     from ...performance.indices import Performance
@@ -102,6 +103,22 @@ def encode_proofs(
             for proof in proofs
         ],
         "psi": {bracket.side: _encode_bracket(machine, bracket) for bracket in brackets} or None,
+    }
+
+
+def encode_distance(grown: SingularityDistance) -> dict[str, Any]:
+    """Encode the largest box (a fraction of the given one) or sphere (mm) without a parallel singularity."""
+    machine = grown.machine
+    units = dict(zip(machine.axes, machine.axis_units, strict=True))
+    return {
+        "shape": grown.shape,
+        "middle": encode_pose(machine, grown.middle),
+        "inner": grown.inner,
+        "outer": grown.outer,
+        "spans": {axis: [to_display(end, units[axis]) for end in ends] for axis, ends in grown.grown_ranges.items()},
+        "pose": None if grown.pose is None else encode_pose(machine, grown.pose),
+        "reason": grown.reason or None,
+        "boxes": grown.boxes,
     }
 
 

@@ -44,7 +44,7 @@ def test_six_axes(shape):
     middle = dict(zip(machine.axes, machine.home.tolist(), strict=True))
     half = dict.fromkeys("XYZ", 300.0) | dict.fromkeys("ABC", np.radians(20.0 if shape == "sphere" else 60.0))
     ranges = {axis: (middle[axis] - by, middle[axis] + by) for axis, by in half.items()}
-    found = pk.find_nearest_singularity(pk.region(machine), ranges, shape, 0.2, seconds=20.0)
+    found = pk.find_nearest_singularity(pk.region(machine), ranges, shape, 0.3, seconds=20.0)
     assert found.inner >= (0.3 if shape == "box" else 200.0)
     assert (compute_singularity_margins(machine, draw_inside(found, 20_000))[:, 0] > 0.0).all()
 

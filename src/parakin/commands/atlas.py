@@ -39,6 +39,17 @@ if TYPE_CHECKING:
     from ..workspaces.certified.region import Region
 
 
+Growth = Annotated[
+    Literal["box", "sphere"] | None,
+    Parameter(
+        help=(
+            "The largest box of the proportions of --box, or sphere of tips at all of its orientations, about its middle "
+            "and within it, without a parallel singularity, proved; and the singular pose that ends it."
+        )
+    ),
+]
+
+
 def atlas(
     name: Name,
     /,
@@ -47,7 +58,7 @@ def atlas(
     pose: Annotated[str | None, Parameter(allow_leading_hyphen=True)] = None,
     box: str | None = None,
     amplification: str | None = None,
-    grow: Literal["box", "sphere"] | None = None,
+    grow: Growth = None,
     slices: Annotated[list[str] | None, Parameter(name="--slice")] = None,
     without: Without = None,
     all_parts: AllParts = False,
@@ -74,9 +85,6 @@ def atlas(
         Poses all over which the claims must hold: X=-50:50,Y=-50:50,Z=-1600:-1500; turning axes go too.
     amplification
         A claim on the box, LOW:HIGH: every velocity amplification is within, 1/3:3.
-    grow
-        The largest box of the proportions of --box, or the largest sphere of tips at all of its orientations, about its
-        middle and within it, that has no parallel singularity: what is proved, and the singular pose that is met.
     slices
         A place to hold for a map: Z=-100. May be given again; by default as at home.
     step
@@ -93,11 +101,7 @@ def atlas(
     seconds = SECONDS if given is None else given
     ranges = parse_axis_ranges(machine, box, "--box")
     bounds = _parse_claim(amplification, bool(ranges))
-    if grow is not None and (not ranges or bounds is not None):
-        expected = (
-            "it grows within --box, name that" if not ranges else "it and --amplification are asked one at a time"
-        )
-        raise InputError(expected, "--grow")
+    _check_growth(grow, bool(ranges), bounds is not None)
     cuts = _cut_region(region, slices or ())
     if slices and output is None:
         raise InputError("a map is a file, name it or its folder with -o", "--slice")
@@ -108,10 +112,8 @@ def atlas(
     with ProgressBar() as progress:
         if one_pose is not None:
             results.examine_pose(one_pose)
-        if grow is not None:
-            results.grow(ranges, grow)
-        elif ranges:
-            results.prove_box(ranges, bounds, progress)
+        if ranges:
+            results.prove_box(ranges, bounds, progress) if grow is None else results.grow(ranges, grow)
         if files is not None or not (ranges or pose):
             results.compute_atlas(apart, progress)
         if files is not None:
@@ -134,6 +136,13 @@ def _parse_claim(text: str | None, has_box: bool) -> tuple[float, float] | None:
     if not 0.0 <= ends[0] <= ends[1]:
         raise InputError(f"{quote(text)}: expected LOW:HIGH, such as 1/3:3", "--amplification")
     return ends
+
+
+def _check_growth(grow: str | None, has_box: bool, has_claim: bool) -> None:
+    if grow is not None and not has_box:
+        raise InputError("it grows within --box, name that", "--grow")
+    if grow is not None and has_claim:
+        raise InputError("it and --amplification are asked one at a time", "--grow")
 
 
 def _parse_pose(region: Region, text: str) -> Array:

@@ -119,8 +119,8 @@ class _DistanceSearch:
         while len(low) and nearest.min() < (1.0 - tolerance) * self.outer and not self.budget.is_spent():
             order = np.argpartition(nearest, min(AT_ONCE, len(nearest)) - 1)
             now, rest = order[:AT_ONCE], order[AT_ONCE:]
-            parts = self._split(low[now], high[now])
-            low, high = (np.concatenate([own[rest], new]) for own, new in zip((low, high), parts, strict=True))
+            halves = self._split(low[now], high[now])
+            low, high = (np.concatenate([own[rest], new]) for own, new in zip((low, high), halves, strict=True))
             nearest = self._measure(low, high)
             kept = nearest < self.outer
             low, high, nearest = *self._clip(low[kept], high[kept]), nearest[kept]

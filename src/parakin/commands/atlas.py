@@ -43,8 +43,8 @@ Growth = Annotated[
     Literal["box", "sphere"] | None,
     Parameter(
         help=(
-            "The largest box of the proportions of --box, or sphere of tips at all of its orientations, about its middle "
-            "and within it, without a parallel singularity, proved; and the singular pose that ends it."
+            "The largest box of the proportions of --box, or sphere of tips at all of its orientations, about its "
+            "middle and within it, without a parallel singularity, proved; and the singular pose that ends it."
         )
     ),
 ]

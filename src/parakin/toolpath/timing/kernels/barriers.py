@@ -13,6 +13,8 @@ from ....arrays import Array
 from ....kernels.compiling import njit
 from .step_limits import join_step
 
+_ROUNDED = {"contract", "arcp"}  # a·b + c is rounded once, a / b may be a·(1/b): a seventh off the time
+
 
 class Derivatives(NamedTuple):
     """Derivatives by x and a at a step's start and end, (4,) each.
@@ -45,7 +47,7 @@ def allocate_derivatives():
     )  # fmt: skip
 
 
-@njit(nogil=True, cache=True, error_model="numpy")
+@njit(nogil=True, cache=True, error_model="numpy", fastmath=_ROUNDED)
 def _expand_joining(h, x0, a0, x1, a1, d):
     """Derive what :func:`_join` computes by x0, a0, x1 and a1: rows of ``d``, see :class:`Derivatives`."""
     t, v, _, e0, e1, _ = join_step(h, x0, a0, x1, a1)
@@ -73,7 +75,7 @@ def _expand_joining(h, x0, a0, x1, a1, d):
         d.way[1, p] = 0.5 * v * dt + t * way
 
 
-@njit(nogil=True, cache=True, error_model="numpy")
+@njit(nogil=True, cache=True, error_model="numpy", fastmath=_ROUNDED)
 def _add_form(weight, f, s, d):
     """Add a place's barriers by the rows of ``d.form``: their first and second derivatives ``f`` (3), ``s`` (6)."""
     gradient, hessian, form = d.gradient, d.hessian, d.form
@@ -87,7 +89,7 @@ def _add_form(weight, f, s, d):
             hessian[p, q] += k0 * form[0, q] + k1 * form[1, q] + k2 * form[2, q]
 
 
-@njit(nogil=True, cache=True, error_model="numpy")
+@njit(nogil=True, cache=True, error_model="numpy", fastmath=_ROUNDED)
 def _add_accelerations(i, limits, k, weight, d):
     """Add the barriers of the joints' accelerations at place k of step i: its start, its middle or its end."""
     at, rise = d.state[k, 0], d.state[k, 2]
@@ -110,7 +112,7 @@ def _add_accelerations(i, limits, k, weight, d):
     _add_form(weight, (f0, f1, f2), (s0, s1, s2, s3, s4, s5), d)
 
 
-@njit(nogil=True, cache=True, error_model="numpy")
+@njit(nogil=True, cache=True, error_model="numpy", fastmath=_ROUNDED)
 def _add_forces(i, limits, k, weight, d):
     """Add the barriers of the drives' forces at place k of step i: its start, its middle or its end."""
     at, rise, form = d.state[k, 0], d.state[k, 2], d.form[0]
@@ -129,7 +131,7 @@ def _add_forces(i, limits, k, weight, d):
                 d.hessian[n, m] += weight * form[n] * form[m]
 
 
-@njit(nogil=True, cache=True, error_model="numpy")
+@njit(nogil=True, cache=True, error_model="numpy", fastmath=_ROUNDED)
 def _add_jerks(i, limits, k, piece, weight, d):
     """Add the barriers of the joints' jerks at place k of step i, its start, middle or end, with a piece's s⃛."""
     at, speed, rise, jerk = d.state[k, 0], d.state[k, 1], d.state[k, 2], d.state[piece, 3]
@@ -153,7 +155,7 @@ def _add_jerks(i, limits, k, piece, weight, d):
     _add_form(weight, (f0, f1, f2), (s0, s1, s2, s3, s4, s5), d)
 
 
-@njit(nogil=True, cache=True, error_model="numpy")
+@njit(nogil=True, cache=True, error_model="numpy", fastmath=_ROUNDED)
 def _add_ceilings(i, limits, t, weight, d):
     """Add the barriers of the ceilings of x at a step's start, middle and end."""
     o = d.state[1, 0]
@@ -190,7 +192,7 @@ def _add_ceilings(i, limits, t, weight, d):
                 hessian[p, q] += second * form[p] * form[q]
 
 
-@njit(nogil=True, cache=True, error_model="numpy")
+@njit(nogil=True, cache=True, error_model="numpy", fastmath=_ROUNDED)
 def _add_flow(h, t, x0, a0, x1, a1, weight, d):
     """Add the barriers that keep ṡ above 0 on the way, and two rows so near that they can be joined."""
     v0, v1, form = np.sqrt(x0), np.sqrt(x1), d.form
@@ -210,7 +212,7 @@ def _add_flow(h, t, x0, a0, x1, a1, weight, d):
                 d.hessian[p, q] += weight * along * form[k, q] / values[k]
 
 
-@njit(nogil=True, cache=True, error_model="numpy")
+@njit(nogil=True, cache=True, error_model="numpy", fastmath=_ROUNDED)
 def expand_step(i, limits, weight, x0, a0, x1, a1, d):
     """Expand a step's time and barriers to the second order: ``d.gradient``, and the upper half of ``d.hessian``."""
     h = limits.step[i]

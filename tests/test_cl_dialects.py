@@ -639,6 +639,13 @@ def test_a_frame_an_operation(read):
         np.testing.assert_allclose(path.axis, [[0.6, 0, 0.8], [0, 0, 1], [0, 1, 0]], atol=1e-12)
 
 
+def test_the_axis_stays_where_only_the_origin_of_a_turned_frame_moves(read):
+    turned = "MSYS/{},0,0,0.6,0.64,0.48,-0.8,0.48,0.36\n"
+    path = read(turned.format(0) + "FEDRAT/9\nGOTO/0,0,0,0.6,0,0.8\n" + turned.format(5) + "GOTO/0,0,0\n")
+    np.testing.assert_array_equal(path.axis[1], path.axis[0])
+    np.testing.assert_allclose(path.tip[1], path.frame[:, :3].T @ [5, 0, 0], atol=1e-12)
+
+
 # bounds and fuzz
 
 

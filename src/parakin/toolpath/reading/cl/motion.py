@@ -168,13 +168,15 @@ class ClMotion:
         first = (self.first_frame or MACHINE).scale_origin(self.first_scale)
         if now.equals(first):
             return turn, shift
-        relative = first.rotation.T @ now.rotation
         shift = first.rotation.T @ (now.origin - first.origin)
         origin = ", ".join(f"{value:.6g}" for value in now.origin + 0.0)
         self.notes.add(
             line,
             f"another workpiece frame, origin {origin} mm: its points are given in the file's first one",
         )
+        if np.array_equal(first.rotation, now.rotation):  # their product is the identity but for rounding
+            return turn, shift
+        relative = first.rotation.T @ now.rotation
         return relative if turn is None else relative @ turn, shift
 
     def place_records(self) -> None:

@@ -8,8 +8,12 @@ import sys
 from pathlib import Path
 
 import pytest
+from machine_texts import write
 from shipped import load_shipped
+from test_redundant import PLANAR
 
+import parakin as pk
+from parakin.controllers.linuxcnc.guard import write_guard
 from parakin.controllers.linuxcnc.model_header import name_model, write_model
 from parakin.controllers.linuxcnc.planner import write_planner
 
@@ -52,13 +56,27 @@ def test_no_compiler_warns(compiler, name, tmp_path):
         pytest.skip(f"there is no {compiler}")
     headers = ["-isystem", str(INSTALLED)] if INSTALLED.exists() else write_stub_headers(tmp_path)
     files = make_configuration(load_shipped(name))
-    sources = [file for file in files if file.endswith((".c", ".h"))]
+    sources = {file: text for file, text in files.items() if file.endswith((".c", ".h"))}
     assert len(sources) == 4
-    for file in sources:
-        (tmp_path / file).write_text(files[file], encoding="utf-8")
+    compile_all_quietly(compiler, sources, headers, tmp_path)
+
+
+def test_no_compiler_warns_of_more_joints_than_axes(tmp_path):
+    """The guard looks at joints and axes side by side."""
+    if not shutil.which("gcc"):
+        pytest.skip("there is no gcc")
+    machine = pk.load(write(tmp_path, PLANAR))
+    headers = ["-isystem", str(INSTALLED)] if INSTALLED.exists() else write_stub_headers(tmp_path)
+    sources = {name_model(machine): write_model(machine), "guard.c": write_guard(machine)}
+    compile_all_quietly("gcc", sources, headers, tmp_path)
+
+
+def compile_all_quietly(compiler, sources, headers, folder):
+    for file, text in sources.items():
+        (folder / file).write_text(text, encoding="utf-8")
     for file in sources:
         if file.endswith(".c"):
-            compile_quietly(compiler, ["-O1", "-c", "-o", "/dev/null", *headers, file], tmp_path)
+            compile_quietly(compiler, ["-O1", "-c", "-o", "/dev/null", *headers, file], folder)
 
 
 def compile_quietly(compiler, arguments, folder):

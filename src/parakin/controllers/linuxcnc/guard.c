@@ -71,8 +71,9 @@ static int read_motion(Motion *m)
 /* The time in which the machine comes to rest if it is stopped now, as time at its speed: every axis or joint by itself. */
 static double find_stop_time(int by_axis, int i, double rate)
 {
-    const double unit = turning_axis[i] ? DEGREE : 1.0;
-    const double slowing = by_axis ? *pins->axis[i].hand_acceleration * unit : joint_acceleration[i];
+    double slowing = joint_acceleration[i];
+    if (by_axis) /* there may be more joints than axes */
+        slowing = *pins->axis[i].hand_acceleration * (turning_axis[i] ? DEGREE : 1.0);
     return 0.5 * fabs(rate) / slowing + LATENCY * CYCLE;
 }
 

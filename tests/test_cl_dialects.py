@@ -302,6 +302,7 @@ def test_nx_times(read):
         *("TLON,GOLFT/L1", "GOFWD/C1,PAST,L2", "GOLFT/L1", "TLLFT,GOLFT/L1", "COPY/1,TRANSL,10,0,0,1"),
         *("CALL/SUB1", "ROTABL/90", "M1=MACRO/A", "L1)LOOPST"),
         *("RAPID/OFF", "RAPID/ON", "RAPID,GOTO/1,2,3", "MULTAX,GOTO/1,2,3", "FEDRAT,9/GOTO/1,2,3", "COOLNT,ON"),
+        *("G0 X5", "N10 G01X5.Y-.5", "X1Y2", "M30", "LOADTL/-1", "LOADTL/1.5", "CUTTER/-5"),
         *("GOTO/1,2,3$\n4", "GOTO/1  2,3,4", "GOTO/1,2,3      00010", "GOTO/1,2, 3\t\t4", "FEDRAT/1   5"),
     ],
 )
@@ -591,6 +592,7 @@ def test_dwell(read):
         ("", "CYCLE/DEEP,DEPTH,20,CLEAR,3,STEP,0.001"),
         ("", "CYCLE/DRILL,DEPTH,20,FEDTO,-20,CLEAR,3"),
         ("", "CYCLE/DRILL,DEPTH,20"),
+        ("", "CYCLE/DRILL,DEPTH,20,CLEAR,3,MMPM,100,IPM,5"),
         ("", "CYCLE/DRILL,DEPTH,20,CLEAR,3,INIT,RETURN,9"),
         ("", "CYCLE/BORE,DEPTH,20,CLEAR,3,ORIENT,90"),
         ("", "CYCLE/BORE,NODRAG,DEPTH,20,CLEAR,3"),

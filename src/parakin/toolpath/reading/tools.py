@@ -40,8 +40,8 @@ class ToolLog:
         loads : whether the statement puts the tool into the spindle
         """
         lengths = _LENGTHS & data.keys()
-        if any(float(data[key]) < 0.0 for key in lengths):
-            refuse("a tool's length below zero")
+        if any(float(data[key]) < 0.0 for key in _SIZES & data.keys()):
+            refuse("a tool's length or diameter below zero")
         if record != self._group_record:
             self._group, self._group_record, self._group_line = {}, record, 0
         self._group |= data

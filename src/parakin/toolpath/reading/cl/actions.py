@@ -18,7 +18,7 @@ from .drilling import drill_hole
 from .file_frames import AXIS_TOLERANCE, UPRIGHT, build_frame, build_frame_from_matrix, normalise_direction
 from .motion import ClMotion
 from .spindle import add_dwell, set_speed
-from .word_arguments import LENGTH_UNITS, parse_feed, parse_numbers, parse_tool_data
+from .word_arguments import LENGTH_UNITS, parse_feed, parse_numbers, parse_tool_data, parse_tool_number
 
 _ARC = re.compile(r"TLON,GOFWD/\(?CIRCLE/([^()/]*?)\)?,ON,(?:\d+,INTOF,)?\(?LINE/([^()/]*)\)?", re.ASCII)
 _ARC_FORM = "TLON,GOFWD/(CIRCLE/x,y,z,r),ON,2,INTOF,(LINE/x,y,z,x,y,z)"
@@ -359,7 +359,7 @@ class ClActions:
         args = args[1:] if args[:1] == ["TOOL"] else args
         data: dict[str, float | str] = {}
         if args and is_number(args[0]):
-            data["number"] = parse_number(args[0])
+            data["number"] = parse_tool_number(args[0])
         elif args and args[0]:
             data["name"] = args[0]
         data |= self._read_tool_values(list(takewhile(is_number, args[1:])) if data else [], line)
@@ -390,7 +390,7 @@ class ClActions:
         """Keep the number of the tool that is made ready (SELECT), where none is known yet."""
         args = args[1:] if args[:1] == ["TOOL"] else args
         if args and is_number(args[0]) and not self.motion.records.n and "number" not in self.tools.data:
-            self._set_tool(line, {"number": parse_number(args[0])})
+            self._set_tool(line, {"number": parse_tool_number(args[0])})
 
     def start_tool_path(self, args: list[str], line: int) -> None:
         """Start a tool path and set its tool's name (TOOL PATH of NX)."""

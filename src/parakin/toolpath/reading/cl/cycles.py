@@ -179,6 +179,8 @@ def _parse_options(words: list[str]) -> _Options:
             refuse(f"{word} beside another word of its meaning; expected {_FORM}")
         if name is not None:
             values[name] = value
+        elif feed is not None:
+            refuse(f"two feeds; expected {_FORM}")
         elif value < 0.0:
             refuse(f"a feed below zero; expected {_FORM}")
         else:

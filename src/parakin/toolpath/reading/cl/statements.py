@@ -16,6 +16,7 @@ _NO_TEXT = re.compile(
 _INSERT = re.compile(r"INSERT[ /,\"']*", re.IGNORECASE)
 _CODE = re.compile(r"M ?\d+", re.IGNORECASE)  # the one that becomes an event
 _BLOCK = re.compile(r"(?<![A-Z0-9_])[A-Z] ?=? ?[-+.]?\d|[=#$]|\w\(", re.IGNORECASE | re.ASCII)  # a controller's words
+_G_CODE = re.compile(r"(?:[GMNXYZ][-+]?(?:\d+\.?\d*|\.\d+))(?:[A-Z][-+]?(?:\d+\.?\d*|\.\d+))*", re.ASCII)
 _COMMENT = re.compile(r"(?<!\w)\([^()]*\)|;.*", re.DOTALL)
 HIDDEN = "\0"  # a character that no line of a file has
 _LONGEST_WORD = 10
@@ -96,6 +97,8 @@ def _take_unknown(actions: ClActions, name: str, args: list[str], line: int, *, 
     if hidden or name in INFORMING:
         actions.informing.setdefault(name, line)
         return
+    if _G_CODE.fullmatch(name):
+        refuse(f"{quote_short(name)}, a block of G-code in a CL file; expected GOTO/x,y,z, or a file named .ngc")
     if name.startswith("GO"):
         refuse(f"unknown word {quote_short(name)} that begins as motion does; expected GOTO/x,y,z")
     meant = next((word for word in _MOTION if name.endswith(word)), None) or _find_meant(name)

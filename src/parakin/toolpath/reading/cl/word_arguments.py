@@ -82,6 +82,14 @@ def parse_dwell(args: Sequence[str]) -> tuple[float, bool]:
     return value, "REV" in args
 
 
+def parse_tool_number(text: str) -> float:
+    """Parse a tool's number, refusing one that is not whole or below zero."""
+    number = parse_number(text)
+    if number < 0.0 or number != int(number):
+        refuse(f"{quote_short(text)} is no tool's number; expected a whole one, not below zero")
+    return number
+
+
 def parse_tool_data(args: Sequence[str], scale: float) -> dict[str, float | str]:
     """Parse TLDATA: words for the kind, then for a mill diameter, lower radius, length, taper and tip; lengths to mm.
 

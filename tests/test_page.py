@@ -468,3 +468,13 @@ def test_a_size_is_dragged(pages, browser):
         assert tab.evaluate("parakin.state.joints") == pytest.approx(
             load_shipped("tricept").inverse(machine.home), abs=AGREE
         )
+
+
+@needs_chromium
+def test_every_drive_is_named_in_the_picture(tmp_path, browser):
+    machine = load_shipped("eclipse_overactuated")  # its columns move in two ways, and a driven link in a third
+    (tmp_path / "page.html").write_text(render_machine_page(machine), encoding="utf-8")
+    with open_tab(browser) as tab:
+        tab.goto((tmp_path / "page.html").as_uri())
+        names = tab.locator("#overlay span:not(.axis)").all_inner_texts()
+    assert sorted(name for label in names for name in label.split(", ")) == sorted(machine.joints)

@@ -13,11 +13,15 @@ function addLabel(text, place, colour = null) {
   labels.push({span, place, axis: colour !== null});
 }
 
+const itemOf = joint => machine.items.findIndex(item => item.name === joint.name && item.kind !== "rail");
 machine.joints.forEach(joint => {
-  const number = machine.items.findIndex(item => item.name === joint.name && item.kind !== "rail");
+  const number = itemOf(joint);
   if (number < 0) return;
+  // What moves the same strut without a body of its own is named with it, at the leg's first one.
+  const leg = machine.joints.filter(other => joint.leg >= 0 && other.leg === joint.leg), isFirst = leg.find(other => itemOf(other) >= 0) === joint;
+  const names = isFirst ? leg.filter(other => other === joint || itemOf(other) < 0) : [joint];
   const points = itemPoints[number], share = machine.items[number].kind === "telescope" ? 0.5 : 0;
-  addLabel(joint.name, into => into.lerpVectors(points[0], points[points.length - 1], share));
+  addLabel(names.map(({name}) => name).join(", "), into => into.lerpVectors(points[0], points[points.length - 1], share));
 });
 
 const triad = new THREE.Group();

@@ -45,8 +45,9 @@ def encode_page_machine(machine: Machine) -> dict[str, Any]:
                 "unit": drive.unit,
                 "low": _replace_infinite(drive.low),
                 "high": _replace_infinite(drive.high),
+                "leg": leg,
             }
-            for drive in machine.drives
+            for drive, leg in zip(machine.drives, _list_legs(machine), strict=True)
         ],
         "mode": [1 if sign == "+" else -1 for sign in machine.mode],
         "signs": _name_signs(machine),
@@ -100,6 +101,12 @@ def _encode_scene(machine: Machine, scene: Scene) -> dict[str, Any]:
         ],
         "looks": {kind: [look.colour, look.radius] for kind, look in LOOKS.items()},
     }
+
+
+def _list_legs(machine: Machine) -> list[int]:
+    """List the number of each drive's leg; -1 for those of head and table."""
+    legs = {drive.name: number for number, leg in enumerate(machine.legs) for drive in leg.drives}
+    return [legs.get(name, -1) for name in machine.joints]
 
 
 def _name_signs(machine: Machine) -> list[str]:

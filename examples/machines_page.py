@@ -14,7 +14,7 @@ from PIL import Image
 
 import parakin as pk
 
-WIDTH, COLOURS = 360, 48  # of a picture, px
+WIDTH, COLOURS = 360, 160  # of a picture, px
 HEAD = """\
 # Machines
 

@@ -1,6 +1,7 @@
 """Fields, meshes, cross-sections and cell files of workspaces, against closed forms and the certified bracket."""
 
 import csv
+import re
 from io import BytesIO, StringIO
 from math import acos, cos, pi, sin, sqrt
 
@@ -13,7 +14,7 @@ from shipped import REPRESENTATIVES, load_shipped
 
 import parakin as pk
 from parakin.export.workspace.cells import format_cells_csv, format_cells_vtu
-from parakin.export.workspace.describe import describe_region, format_bracket, format_volume
+from parakin.export.workspace.describe import describe_region, describe_size, format_bracket, format_volume
 from parakin.export.workspace.meshes import format_mesh, make_mesh
 from parakin.performance.indices import compute_performance
 from parakin.workspaces.sampled.cross_sections import compute_signed_area, find_cross_sections
@@ -382,6 +383,12 @@ def test_the_bracket_is_rounded_outward(lens):
     assert format_bracket(volume, 3).endswith(" litres")
     assert low * 1e6 <= volume.inner < volume.outer <= high * 1e6
     assert high - low < 1.1 * (volume.outer - volume.inner) / 1e6 + 0.2
+
+
+def test_a_caption_says_that_nothing_is_proved(lens):
+    early = pk.workspace(whole_region(lens), seconds=1e-9)
+    assert early.volume.inner == 0.0
+    assert re.fullmatch(r"(.* by samples, )?no place proved, at most [\d,.]+ (m³|litres)", describe_size(early))
 
 
 def test_what_was_asked_is_said():

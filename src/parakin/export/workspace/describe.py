@@ -36,11 +36,15 @@ def describe_workspace(workspace: AnyWorkspace) -> str:
 
 
 def describe_size(workspace: AnyWorkspace) -> str:
-    """Describe how large it is: ``19.9 litres, proved between 19.84 and 19.97 litres``."""
+    """Describe how large it is: ``19.9 litres, proved between 19.84 and 19.97 litres``, or that no place is proved."""
     d = len(workspace.axes)
     if isinstance(workspace, SampledWorkspace):
         return f"{format_volume(workspace.estimate, d)}, an estimate"
-    return f"{format_volume(workspace.volume.estimate, d)}, proved between {format_bracket(workspace.volume, d)}"
+    volume = workspace.volume
+    if volume.inner == 0.0 < volume.outer:
+        least = f"{format_volume(volume.estimate, d)} by samples, " if volume.estimate > 0.0 else ""
+        return f"{least}no place proved, at most {' '.join(_round_outward(volume, d)[1:])}"
+    return f"{format_volume(volume.estimate, d)}, proved between {format_bracket(volume, d)}"
 
 
 def find_note(workspace: SampledWorkspace) -> str:
@@ -74,12 +78,18 @@ def format_volume(value: float, dimension: int) -> str:
 
 def format_bracket(volume: Volume, dimension: int) -> str:
     """Format the proved bracket, rounded outward, with enough digits to part its ends: ``19.84 and 19.97 litres``."""
-    unit, size = _choose_unit(volume.estimate, dimension)
+    low, high, unit = _round_outward(volume, dimension)
+    return f"{low} and {high} {unit}"
+
+
+def _round_outward(volume: Volume, dimension: int) -> tuple[str, str, str]:
+    """Round the ends of a bracket outward, with enough digits to part them; return them and their unit."""
+    unit, size = _choose_unit(volume.estimate or volume.outer, dimension)
     gap = (volume.outer - volume.inner) / size
     scale = 10 ** min(9, max(0, 2 - ceil(log10(gap)))) if gap > 0.0 else 1000
     low, high = floor(volume.inner / size * scale) / scale, ceil(volume.outer / size * scale) / scale
     digits = len(str(scale)) - 1
-    return f"{low:,.{digits}f} and {high:,.{digits}f} {unit}"
+    return f"{low:,.{digits}f}", f"{high:,.{digits}f}", unit
 
 
 def _choose_unit(value: float, dimension: int) -> tuple[str, float]:

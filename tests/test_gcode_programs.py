@@ -212,7 +212,8 @@ class Maker:
             self.offset,
             self.assign,
         ]
-        rng.choice(kinds + [self.arc, self.length, self.spindle] + ([self.control] * 2 if depth else []))(depth)
+        kinds += [self.arc, self.arc_by_radius, self.arc_about_centre, self.inverse_time, self.turn, self.other]
+        rng.choice(kinds + [self.length, self.spindle] + ([self.control] * 2 if depth else []))(depth)
 
     def straight(self, depth):
         code = self.rng.choice(["G0 ", "G1 ", "G1 ", "", "G1 F150 "])
@@ -229,6 +230,49 @@ class Maker:
         if plane == "G17":
             words = words.removesuffix(" K0")
         self.lines += [f"{plane} {self.rng.choice(['G2', 'G3'])} {words}", "G17 G1"]
+
+    def arc_by_radius(self, depth):
+        rng = self.rng
+        plane, (first, second) = rng.choice([("G17", "XY"), ("G18", "XZ"), ("G19", "YZ")])
+        radius = f"R{rng.choice(['', '-'])}{rng.uniform(13, 40):.3f}"
+        words = [f"G91 {plane}", rng.choice(["G2", "G3"]), first + self.number(9), second + self.number(9), radius]
+        self.lines += [" ".join([*words, rng.choice(["", f"A{self.number(20)}"]), "F300"]), "G90 G17 G1"]
+
+    def arc_about_centre(self, depth):
+        rng = self.rng
+        x, y, radius = rng.uniform(-9, 9), rng.uniform(-9, 9), rng.uniform(1, 20)
+        (a, b), (c, d) = (
+            (x + radius * math.cos(angle), y + radius * math.sin(angle))
+            for angle in (rng.uniform(0, 3), rng.uniform(3.2, 6.2))
+        )
+        height = rng.choice(["", " Z[#1]"])
+        self.lines += [
+            f"G90 G0 X{a:.4f} Y{b:.4f}",
+            f"G90.1 G17 {rng.choice(['G2', 'G3'])} X{c:.4f} Y{d:.4f}{height} I{x:.4f} J{y:.4f}",
+            "G91.1 G1",
+        ]
+
+    def inverse_time(self, depth):
+        rng = self.rng
+        self.lines.append(f"G93 G1 F{rng.uniform(0.5, 20):.2f} {self.axes('XYZABC')}")
+        self.lines.append(f"G94 F{rng.randint(10, 900)} {rng.choice(['', 'X1', 'G0 Y1'])}")
+
+    def turn(self, depth):
+        rng = self.rng
+        offset = rng.choice([f"G10 L2 P{rng.randint(1, 3)}", "G92", f"G10 L20 P{rng.randint(0, 3)}", "G0", "G1 F99"])
+        self.lines.append(f"{offset} {self.axes('ABC', 40)}")
+
+    def other(self, depth):
+        rng, tool = self.rng, self.rng.choice(list(TOOLS))
+        told = f"G10 L1 P{tool} Z{rng.uniform(0, 50):.3f}"
+        self.lines += rng.choice(
+            [
+                ["G64 P0.1 Q0.2"], ["G61"], ["G61.1"], ["M3 S250 G4 P1"], ["(MSG, x) G0 X1"], ["M62 P3 G0 X2"],
+                ["M67 E1 Q2.5 X3"], ["M66 P1 L0"], ["G97 S77"], ["M5 M9"], ["F33"], ["G53 G1 X3 Y4"], ["S#2*0"],
+                ["N12.5 G0 X1"], ["x1y2 z3"], ["G0X-.5Y+1. ;c"], ["g 1 x 1 y 2"], ["/G0 X1"], ["/N5 Z3"], ["G8"],
+                [f"T{tool} G0 X3"], [told], [told, f"G43 H{tool} G0 X1 Y1 Z1"],
+            ]
+        )  # fmt: skip
 
     def cycle(self, depth):
         rng = self.rng

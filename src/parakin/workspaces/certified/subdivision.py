@@ -11,6 +11,7 @@ import time
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property, reduce
 from itertools import product
 from math import inf
 from typing import Any
@@ -61,9 +62,9 @@ class Cells:
     stopped: str = "gap"
     rounds: int = 0
 
-    @property
+    @cached_property
     def volumes(self) -> Array:
-        return np.asarray(self.size.prod(1))
+        return multiply_columns(self.size)
 
     @property
     def inside(self) -> Flags:
@@ -73,7 +74,7 @@ class Cells:
         """Sum the volume that fractions of the cells are together, mm³ (mm² in the plane)."""
         return float(np.dot(fractions, self.volumes))
 
-    @property
+    @cached_property
     def gap(self) -> float:
         """(outer - inner)/estimate; 0 if both are zero."""
         outer, inner, estimate = (self.total(fractions) for fractions in (self.outer, self.inner, self.estimate))
@@ -86,6 +87,11 @@ class Cells:
 
     def __repr__(self) -> str:
         return f"<parakin cells: {len(self.low)}, {np.count_nonzero(self.inside)} of them inside>"
+
+
+def multiply_columns(rows: Array) -> Array:
+    """Multiply the columns of rows (N, d), (N,); many times quicker than along such short rows."""
+    return np.asarray(reduce(np.multiply, rows.T, np.ones(len(rows))))
 
 
 _COLUMNS = ("low", "size", "inner", "outer", "estimate", "limit", "area")
@@ -251,7 +257,7 @@ class Subdivision(ABC):
         """Store the cells proved inside, drop those outside, and return the others."""
         estimate = np.clip(fractions.estimate, fractions.inner, fractions.outer)
         limit = np.where(fractions.inner >= 1.0, -1, fractions.limit)
-        area = fractions.area * size.prod(1)
+        area = fractions.area * multiply_columns(size)
         cells = Cells(low, size, fractions.inner, fractions.outer, estimate, limit, area)
         outside = fractions.outer <= 0.0
         self._decided.append(cells.take(~outside & (limit < 0)))

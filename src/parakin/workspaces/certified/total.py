@@ -56,6 +56,8 @@ class TotalSubdivision(Subdivision):
         Returns the boxes in which it is not proved to hold, sorted by cell, with bounds; the cells that it excludes are
         marked in ``outside``.
         """
+        if not boxes.low.shape[1]:
+            return self._bound_still(constraint, low, size, boxes, outside)
         finished: list[tuple[OrientationBoxes, LinearBounds]] = []
         count = np.zeros(len(low), np.int64)
         closely = self.closely and boxes.low.shape[1] >= _MANY
@@ -69,13 +71,15 @@ class TotalSubdivision(Subdivision):
             if closely:
                 prove_signs(constraint, low, size, boxes, bounds, large & (bounds.state == KEPT))
             outside[boxes.cell[bounds.state == EXCLUDED]] = True
-            wide = boxes.take(~np.all(np.isfinite(bounds.spread), axis=1))  # without bounds in their middle: look there
-            middle = 0.5 * (wide.low + wide.high)
-            in_middle = bound_margin(constraint, low, size, replace(wide, low=middle, high=middle), every=True)
-            outside[wide.cell[in_middle.state == EXCLUDED]] = True
+            unbounded = ~np.all(np.isfinite(bounds.spread), axis=1)
+            if unbounded.any():  # their middle is looked at
+                wide = boxes.take(unbounded)
+                middle = 0.5 * (wide.low + wide.high)
+                in_middle = bound_margin(constraint, low, size, replace(wide, low=middle, high=middle), every=True)
+                outside[wide.cell[in_middle.state == EXCLUDED]] = True
             kept = bounds.state == KEPT
             again = np.zeros(len(kept), np.bool_)
-            if look < LOOKS and boxes.low.shape[1]:
+            if look < LOOKS:
                 few = (count + np.bincount(boxes.cell, minlength=len(low)))[boxes.cell] < most
                 again = kept & (narrow | (large & few))
             finished.append((boxes.take(kept & ~again), bounds.take(kept & ~again)))
@@ -84,6 +88,17 @@ class TotalSubdivision(Subdivision):
                 break
             boxes = _narrow_boxes(boxes.take(again), bounds.take(again))
         return _sort_by_cell(finished)
+
+    def _bound_still(
+        self, constraint: Constraint, low: Array, size: Array, boxes: OrientationBoxes, outside: Flags
+    ) -> tuple[OrientationBoxes, LinearBounds]:
+        """Bound a margin where there is one orientation, as :meth:`_bound_constraint`."""
+        if outside.any():
+            boxes = boxes.take(~outside[boxes.cell])
+        bounds = bound_margin(constraint, low, size, boxes, every=True)
+        outside[boxes.cell[bounds.state == EXCLUDED]] = True
+        kept = bounds.state == KEPT
+        return (boxes, bounds) if kept.all() else (boxes.take(kept), bounds.take(kept))
 
 
 def _narrow_boxes(boxes: OrientationBoxes, bounds: LinearBounds) -> OrientationBoxes:

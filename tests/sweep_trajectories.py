@@ -13,9 +13,7 @@ from time import process_time
 import numpy as np
 from seeded_rows import draw_wild, measure_pieces, plan_rows
 
-import parakin as pk
 from parakin.toolpath.timing import time_optimal
-from parakin.toolpath.timing.force_limits import ForceLimits
 from parakin.toolpath.timing.joint_path import divide_joint_path
 
 BEYOND = 1.001  # times a limit
@@ -27,7 +25,6 @@ SIZES = (  # share up to here, least and most rows
 )
 PLACES, FEWER, MANY = 41, 11, 50_000  # on each piece where joints are looked at; of more pieces fewer
 BLOCK = 20_000  # pieces
-UNFORCED = ForceLimits(pk.load("linear_delta"))  # whose drives' forces are not limited
 
 
 def draw_sized(seed):
@@ -67,14 +64,14 @@ def sweep(seed):
     refined, profile = plan_rows(path, limits)
     seconds = process_time() - begin
     soft = limits._replace(jerk=np.full_like(limits.jerk, np.inf))
-    finer, x, u = time_optimal.find_quickest(path, soft, UNFORCED)
+    # There is no machine: no forces, and new rows lie on the splines.
+    finer, x, u = time_optimal.find_quickest(path, soft, None, divide_joint_path)
     plain = time_optimal.build_accelerated_profile(finer, soft, x, u)[0]
     wrong = [check_profile(refined, way, profile, limits), check_profile(finer, way, plain, soft)]
     return wrong, len(path.step), seconds
 
 
 def main():
-    time_optimal.refine_joint_path = divide_joint_path  # there is no machine: new rows lie on the splines
     first, last, log = int(sys.argv[1]), int(sys.argv[2]), Path(sys.argv[3])
     done = {line.split()[0] for line in log.read_text().splitlines()} if log.exists() else set()
     for seed in range(first, last):
@@ -87,4 +84,5 @@ def main():
             file.write(f"{seed} {words}\n")
 
 
-main()
+if __name__ == "__main__":
+    main()

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from s_curves import s_curve_time
 from seeded_rows import build_rows, build_smooth, draw_smooth, draw_wild, measure_pieces, plan_rows
+from sweep_trajectories import sweep
 
 from parakin.kernels import batch
 from parakin.toolpath.timing.drive_limits import DriveLimits
@@ -53,6 +54,10 @@ def test_every_path_keeps_its_limits():
         assert (np.diff(profile.time) > 0.0).all(), seed
         assert measure_pieces(refined, profile, limits, places=41).max() < BEYOND, seed
         assert refined.step.sum() == pytest.approx(path.step.sum())
+
+
+def test_the_sweep_of_many_more_paths_runs():
+    assert sweep(701002)[0] == ["", ""]
 
 
 def test_the_trajectory_does_not_hang_on_the_number_of_cores(monkeypatch):

@@ -9,10 +9,11 @@ import pytest
 from flint import arb, ctx
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from shipped import load_shipped
 from test_kernels import MEANING, steps
 
 from parakin import algebra as alg
-from parakin.kernels.intervals import IntervalProgram
+from parakin.kernels.intervals import IntervalProgram, JumpFreeTrace
 
 ctx.prec = 200
 VANISHING = 1e-300  # below this numbers count as 0
@@ -341,3 +342,21 @@ def test_bounds_of_expressions_hold_the_exact_values(program, seed, wide):
                 for truth in (folded, value.value):
                     assert not truth < arb(down[i, n]) - VANISHING
                     assert not truth > arb(up[i, n]) + VANISHING
+
+
+@pytest.mark.parametrize("name", ["rotary_delta", "five_bar", "rus6"])
+def test_rates_of_turning_arms_are_bounded_closely(name):
+    """Over 10 mm cells about allowed poses: no less than what samples turn, and at most a quarter more (a half was)."""
+    machine = load_shipped(name)
+    size = np.where(np.array(machine.axis_units) == "mm", 5.0, 0.01)
+    poses = machine.home + np.random.default_rng(3).uniform(-10.0, 10.0, (200, len(size))) * size
+    poses = poses[machine.check(poses) == 0][:60]
+    trace = JumpFreeTrace()
+    pose = trace.inputs(len(size))
+    joints = machine.trace_inverse(pose, machine.mode)[0]
+    down, up = IntervalProgram(trace, [alg.derivative(q, x) for q in joints for x in pose])(poses - size, poses + size)
+    samples = poses[:, None] + np.random.default_rng(4).integers(-1, 2, (1, 100, len(size))) * size
+    a, b = machine.jacobians(samples)
+    seen = np.linalg.solve(b, a).reshape(len(poses), 100, -1)
+    assert (seen >= down[:, None] - 1e-12).all() and (seen <= up[:, None] + 1e-12).all()
+    assert np.median(np.maximum(np.abs(down), np.abs(up)) / np.abs(seen).max(1)) < 1.25

@@ -311,3 +311,12 @@ def test_the_shares_of_cells_are_between_inner_and_outer(name):
             assert np.abs(share - cells.estimate).mean() < 0.25
         assert (cells.inner <= cells.estimate).all()
         assert (cells.estimate <= cells.outer).all()
+
+
+def test_rods_that_are_nearly_parallel_are_proved_clear():
+    """Which points of two such rods are nearest no interval tells; a direction that separates them does."""
+    machine = load_shipped("rus6")
+    region = pk.region(machine, at={"A": 0.0, "B": 0.0, "C": 0.0})
+    volume = pk.workspace(region, gap=0.1).volume
+    assert volume.outer - volume.inner < 0.1 * volume.estimate
+    assert volume.inner < 4.26e7 < volume.outer

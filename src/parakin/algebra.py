@@ -76,6 +76,7 @@ class Trace:
         self.nodes: list[Term] = []
         self._known: dict[tuple[Any, ...], Term] = {}
         self._derivatives: dict[int, dict[int, Scalar]] = {}
+        self.known_slopes: dict[int, list[tuple[Scalar, Scalar]]] = {}  # factors of others' derivatives
 
     def input(self, number: int) -> Term:
         """Return the ``number``-th input."""
@@ -327,9 +328,10 @@ def derivative(y: Scalar, x: Term) -> Scalar:
 def _differentiate_node(y: Term, x: Term, known: dict[int, Scalar]) -> Scalar:
     if y is x:
         return 1.0
-    a = y.args
-    d = [known[arg.index] for arg in a]
-    if not any(isinstance(slope, Term) or slope != 0.0 for slope in d):
+    if y.index in y.trace.known_slopes:
+        return sum((factor * derivative(other, x) for factor, other in y.trace.known_slopes[y.index]), 0.0)
+    a, d = y.args, [known[arg.index] for arg in y.args]
+    if y.op == STOP_GRADIENT or not any(isinstance(slope, Term) or slope != 0.0 for slope in d):
         return 0.0
     if y.op == LIN:
         return sum((k * slope for k, slope in zip(y.k[1:], d, strict=True)), 0.0)
@@ -355,8 +357,6 @@ def _differentiate_node(y: Term, x: Term, known: dict[int, Scalar]) -> Scalar:
         return select(a[1], a[0], d[0], d[1])
     if y.op == ABS:
         return select(a[0], 0.0, -d[0], d[0])
-    if y.op == STOP_GRADIENT:
-        return 0.0
     if y.op == SELECT:
         return select(a[0], a[1], d[2], d[3])
     raise TypeError(f"no derivative of operation {y.op}")

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from math import cos, isfinite, pi, sin
 from typing import ClassVar, Literal
 
-from ...algebra import Mat, Scalar, Vec, add, apply, atan2, dot, sub
+from ...algebra import Mat, Scalar, Term, Vec, add, apply, atan2, dot, sub
 from ...errors import NoMethodError
 from ..elements import Drive, Point, Unit
 from ..nominal_values import find_nominal_value
@@ -52,17 +52,30 @@ class Link:
     meets: Literal["platform", "ring"] | int | None = None
 
 
-def measure_turn(drive: Drive, y: Scalar, x: Scalar) -> Scalar:
-    """Measure the angle of (x, y), rad, on the turn on which the drive's range is.
+def measure_turn(drive: Drive, y: Scalar, x: Scalar, v: Scalar = 0.0, u: Scalar = 1.0) -> Scalar:
+    """Measure the angle of (x, y) less that of (u, v), rad, on the turn on which the drive's range is.
 
     Where the range goes beyond ±180° the angle is within half a turn of its middle, and so jumps nowhere in it.
     """
     low, high = (find_nominal_value(end + drive.offset) for end in (drive.low, drive.high))
     middle = 0.5 * (low + high)
     if not isfinite(middle) or middle == 0.0 or (low >= -pi and high <= pi):
-        return atan2(y, x)
+        return subtract_angles(y, x, v, u)
     s, c = sin(middle), cos(middle)
-    return middle + atan2(c * y - s * x, c * x + s * y)
+    return middle + subtract_angles(c * y - s * x, c * x + s * y, v, u)
+
+
+def subtract_angles(y: Scalar, x: Scalar, v: Scalar, u: Scalar) -> Scalar:
+    """Compute the angle of (x, y) less that of (u, v), in (-π, π].
+
+    Its derivative is that of the one less that of the other, in which equal terms have cancelled, so over boxes it is
+    some times narrower.
+    """
+    angle = atan2(y * u - x * v, x * u + y * v)
+    if isinstance(angle, Term):
+        one, other = x * x + y * y, u * u + v * v
+        angle.trace.known_slopes[angle.index] = [(x / one, y), (-y / one, x), (-u / other, v), (v / other, u)]
+    return angle
 
 
 def close_rod(foot: Vec, point: Vec, square: Scalar) -> Scalar:

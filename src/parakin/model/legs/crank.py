@@ -39,7 +39,7 @@ class Crank(Leg):
         m = (dot(w, w) + (self.arm**2 - self.rod**2)) / (2.0 * self.arm)
         reach = x * x + y * y - m * m
         root = sqrt(reach) if signs == "+" else -sqrt(reach)
-        return Inverse([measure_turn(self.drives[0], y * m - x * root, x * m + y * root)], (Reach(reach),))
+        return Inverse([measure_turn(self.drives[0], y, x, root, m)], (Reach(reach),))
 
     def struts(self, point: Vec, joints: list[Scalar]) -> list[tuple[Vec, Vec]]:
         foot = self._foot(joints[0])

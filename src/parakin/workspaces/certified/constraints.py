@@ -117,7 +117,7 @@ class TracedPose:
         d = len(self.free_axes)
         x, orientation = self.inputs[:d], self.inputs[d:]
         kept = [(name, g) for name, g in zip(self.machine.limits, margins, strict=True) if name not in without]
-        signs = self._make_sign_proofs() if orientation else {}
+        signs = self._make_sign_proofs()
         constraints = [Constraint(name, g, x, orientation, sign=signs.get(name)) for name, g in kept]
         implied = [*_bound_angle_sizes(kept), *self._bound_reach(without)]
         return constraints + [Constraint(name, g, x, orientation, implied=True) for name, g in implied]

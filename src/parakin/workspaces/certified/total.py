@@ -26,7 +26,9 @@ from .subdivision import (
 
 LOOKS = 6  # tries at narrowed orientations in a round
 MOST = 32  # boxes of orientations that a constraint may have in a cell
-_MANY = 3  # swept angles from which on signs are proved by closer forms, and twice as many boxes may be left
+_MANY = (
+    3  # swept angles from which on signs are proved by closer forms, as without any; twice as many boxes may be left
+)
 _SPREAD = 0.15  # boxes whose margin changes more with orientation than this × its change with position are bisected
 
 
@@ -68,8 +70,8 @@ class TotalSubdivision(Subdivision):
             spread, change = bounds.spread.sum(1), np.abs(bounds.slopes).sum(1)
             narrow: Flags = (bounds.least_at != 0).any(1)
             large = ~narrow & (spread > _SPREAD * change) & (spread > 0.0)
-            if closely:
-                prove_signs(constraint, low, size, boxes, bounds, large & (bounds.state == KEPT))
+            if closely or (self.closely and not boxes.low.shape[1]):
+                prove_signs(constraint, low, size, boxes, bounds, (large | (not closely)) & (bounds.state == KEPT))
             outside[boxes.cell[bounds.state == EXCLUDED]] = True
             unbounded = ~np.all(np.isfinite(bounds.spread), axis=1)
             if unbounded.any():  # their middle is looked at

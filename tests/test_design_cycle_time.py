@@ -104,6 +104,7 @@ minimise: L
         ("C: 90 deg", "C: 90 mm", "problem.yaml:6: C: "),
         ("C: 90 deg", "U: 90 deg", "problem.yaml:6: unknown key"),
         ("orthoglide", "eclipse_overactuated", "problem.yaml:"),
+        (PROBLEM, "", "problem.yaml:1: empty, expected a design problem"),
     ],
 )
 def test_what_is_mistaken_is_one_line(old, new, said, capsys, tmp_path):

@@ -33,7 +33,7 @@ def read_design_problem(path: Path) -> DesignProblem:
     Raises :class:`InputError` with file and line.
     """
     source = fspath(path)
-    document, errors = read_document(path, source)
+    document, errors = read_document(path, source, "a design problem")
     if errors:
         raise InputErrors(errors)
     reader = _ProblemReader(source)

@@ -54,8 +54,10 @@ class YamlMap(dict[Any, Any]):
 Value: TypeAlias = YamlText | YamlList | YamlMap
 
 
-def read_document(path: Path, source: str) -> tuple[Value, list[InputError]]:
+def read_document(path: Path, source: str, what: str = "a machine's description") -> tuple[Value, list[InputError]]:
     """Read a YAML file's only document; return it with the errors that leave the rest readable (keys written twice).
+
+    what : is expected in it, for messages
 
     Raises :class:`InputError` if there is no such document.
     """
@@ -94,7 +96,7 @@ def parse_document(text: str, source: str) -> tuple[Value, list[InputError]]:
     except (YAMLError, ValueError, LookupError, TypeError, AttributeError, AssertionError, OverflowError):
         raise InputError("not valid YAML", source) from None
     if node is None:
-        raise InputError("empty, expected a machine's description", source, 1)
+        raise InputError(f"empty, expected {what}", source, 1)
     builder = _DocumentBuilder(source)
     return builder.build(node, node.start_mark.line + 1, 0), builder.errors
 

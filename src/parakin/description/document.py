@@ -18,6 +18,7 @@ from ruamel.yaml.reader import ReaderError
 
 from ..errors import CONTROL_CHARACTER, InputError, quote
 
+MACHINE = "a machine's description"  # what is expected in a file, for messages
 _LONGEST = 100_000  # bytes
 _DEEPEST = 16  # levels; aliases can make a cycle
 _MOST = 20_000  # values; aliases of aliases grow exponentially
@@ -54,7 +55,7 @@ class YamlMap(dict[Any, Any]):
 Value: TypeAlias = YamlText | YamlList | YamlMap
 
 
-def read_document(path: Path, source: str, what: str = "a machine's description") -> tuple[Value, list[InputError]]:
+def read_document(path: Path, source: str, what: str = MACHINE) -> tuple[Value, list[InputError]]:
     """Read a YAML file's only document; return it with the errors that leave the rest readable (keys written twice).
 
     what : is expected in it, for messages
@@ -74,10 +75,10 @@ def read_document(path: Path, source: str, what: str = "a machine's description"
     except UnicodeDecodeError as error:
         line = content.count(b"\n", 0, error.start) + 1
         raise InputError("not a text file in UTF-8, expected YAML", source, line) from None
-    return parse_document(text, source)
+    return parse_document(text, source, what)
 
 
-def parse_document(text: str, source: str) -> tuple[Value, list[InputError]]:
+def parse_document(text: str, source: str, what: str = MACHINE) -> tuple[Value, list[InputError]]:
     """Parse the text of a YAML file; as :func:`read_document`."""
     reader = YAML(typ="safe", pure=True)
     reader.Composer = _BoundedComposer

@@ -115,10 +115,11 @@ def _render_page_card(posted: Posted, trajectory: Trajectory | None) -> str:
         page = render_path_page(posted, trajectory, _PAGE_NUMBERS)
     except NoMethodError as error:
         return make_card("The machine on the path", "", escape(str(error)))
+    packed = b64encode(compress(page.encode("utf-8", "backslashreplace"), 9)).decode("ascii")
     return make_card(
         "The machine on the path",
         '<iframe class=page title="The machine on the path"></iframe>\n'
-        f'<script type="text/plain" id="page">{b64encode(compress(page.encode(), 9)).decode("ascii")}</script>\n',
+        f'<script type="text/plain" id="page">{packed}</script>\n',
         "Play it, drag the tool, choose what colours the path; red is off limits.",
     )
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from math import ceil, isnan, log10
 from typing import TYPE_CHECKING
 
 from ..errors import InputError
@@ -58,7 +59,7 @@ def _format_poses(machine: Machine, answer: Assemblies) -> str:
             *(format_fixed(to_display(v, u), 6) for v, u in zip(pose.tolist(), machine.axis_units, strict=True)),
             _SIDES[int(side)],
             "yes" if within else "no",
-            f"{radius:.1e}" if radius == radius else "not proved",
+            _format_bound(radius),
         ]
         for pose, side, within, radius in zip(
             answer.poses,
@@ -69,6 +70,13 @@ def _format_poses(machine: Machine, answer: Assemblies) -> str:
         )
     ]
     return format_table(rows, [*header, "side", "within limits", "proved within mm"], "r" * len(header) + "llr")
+
+
+def _format_bound(radius: float) -> str:
+    """Format how far off a pose may be, mm, rounded up to a power of ten; NaN where that is not proved."""
+    if isnan(radius):
+        return "not proved"
+    return f"1e{ceil(log10(radius))}" if radius > 0.0 else "0"
 
 
 def _format_summary(answer: Assemblies) -> str:

@@ -7,22 +7,69 @@ import numpy as np
 # How far tips go from home, mm, and how far axes tilt from the pole, degrees.
 REACH = {"tricept": 150.0, "orthoglide5_head": 45.0, "orthoglide5_table": 45.0, "hexapod": 60.0, "lambda6": 60.0}
 TILT = {"tricept": 35.0, "orthoglide5_head": 50.0, "orthoglide5_table": 30.0, "hexapod": 18.0, "lambda6": 12.0}
+OTHERS = {  # machines that tilt the tool: the same, where nearly all poses are allowed
+    "tricept_805": (200.0, 40.0),
+    "exechon": (150.0, 40.0),
+    "george_v": (150.0, 40.0),
+    "sprint_z3": (150.0, 30.0),
+    "pentapod": (100.0, 12.0),
+    "cmw_300": (120.0, 28.0),
+    "variax": (150.0, 28.0),
+    "mikromat_6x": (120.0, 22.0),
+    "tornado_2000": (150.0, 28.0),
+    "g500": (120.0, 28.0),
+    "okuma_hexapod": (120.0, 28.0),
+    "hexaglide": (60.0, 28.0),
+    "hexam": (100.0, 28.0),
+    "linapod6": (60.0, 28.0),
+    "rus6": (80.0, 25.0),
+    "eclipse": (45.0, 18.0),
+    "eclipse_overactuated": (45.0, 18.0),
+}
+REACH_OF_ALL = REACH | {name: reach for name, (reach, _) in OTHERS.items()}
+TILT_OF_ALL = TILT | {name: tilt for name, (_, tilt) in OTHERS.items()}
 _MISSES = (0.0, 0.0, 1e-7, 1e-6, 1e-5, 1e-4, 3e-4, 1e-3, 3e-3, 1e-2)  # rad, off the pole
 _FEEDS = (10.0, 20_000.0)  # mm/min
 _STEPS = (1e-4, 40.0)  # mm
+
+
+def point_at_middle(machine, tip):
+    """The pole of a wrist on a leg through the origin."""
+    return -tip / np.linalg.norm(tip)
+
+
+def solve_pole(machine, tip):
+    """The pole of a wrist at a tip, a unit vector: sin² off it is quadratic in how far the axis leans to X and Y."""
+    lean, step = np.zeros(2), 1e-3
+    offsets = step * np.array([[0, 0], [1, 0], [-1, 0], [0, 1], [0, -1], [1, 1], [-1, -1]])
+    for _ in range(4):
+        x, y = (lean + offsets).T
+        poses = np.column_stack([np.tile(tip, (7, 1)), np.arctan(np.hypot(x, y)), np.arctan2(y, x)])
+        f = machine.wrist.measure_freedom(poses)
+        slope = np.array([f[1] - f[2], f[3] - f[4]]) / (2.0 * step)
+        mixed = (f[5] + f[6] - f[1] - f[2] - f[3] - f[4] + 2.0 * f[0]) / (2.0 * step**2)
+        bend = np.array([f[1] + f[2] - 2.0 * f[0], f[3] + f[4] - 2.0 * f[0]]) / step**2
+        lean = lean - np.linalg.solve([[bend[0], mixed], [mixed, bend[1]]], slope)
+        step, offsets = 0.1 * step, 0.1 * offsets
+    return np.array([*lean, 1.0]) / np.hypot(1.0, np.linalg.norm(lean))
+
+
+POLES = {"tricept": point_at_middle, "tricept_805": point_at_middle, "exechon": solve_pole}
 
 
 class PathMaker:
     """Makes one random path on a machine. Points are a tip, mm, and the tool axis by tilt and azimuth from a pole."""
 
     def __init__(self, machine, seed):
-        self.rng, self.name = np.random.default_rng(seed), machine.name.removeprefix("trial_")
-        self.home = np.asarray(machine.home)[:3]
-        self.upright = self.name != "tricept" or self.rng.random() < 0.3  # the pole of a pose, else that of the wrist
-        self.tip = self.home + self.rng.uniform(-1.0, 1.0, 3) * REACH[self.name] * 0.7
+        self.rng, self.machine = np.random.default_rng(seed), machine
+        self.name = machine.name.removeprefix("trial_")
+        self.home, self.reach = np.asarray(machine.home)[:3], REACH_OF_ALL[self.name]
+        apart = self.name in POLES  # the wrist's pole from that of a pose
+        self.upright = not apart or self.rng.random() < 0.3
+        self.tip = self.home + self.rng.uniform(-1.0, 1.0, 3) * self.reach * 0.7
         self.lines, self.recipes = [], []
         self.digits = int(self.rng.choice([4, 6, 9]))
-        self.widest = np.radians(TILT[self.name])
+        self.widest = np.radians(TILT_OF_ALL[self.name])
 
     def make(self):
         """Make a path of a few pieces; return its CL text."""
@@ -47,8 +94,8 @@ class PathMaker:
     def go(self, tip, tilt, azimuth, rapid=False, noise=0.0):
         """Go to a tip, held within reach of home, with the axis tilted from the pole there."""
         away = np.asarray(tip) - self.home
-        self.tip = self.home + np.clip(away, -REACH[self.name], REACH[self.name])
-        z = np.array([0.0, 0.0, 1.0]) if self.upright else -self.tip / np.linalg.norm(self.tip)
+        self.tip = self.home + np.clip(away, -self.reach, self.reach)
+        z = np.array([0.0, 0.0, 1.0]) if self.upright else POLES[self.name](self.machine, self.tip)
         x = np.cross([0.0, 1.0, 0.0], z)
         x /= np.linalg.norm(x)
         y = np.cross(z, x)

@@ -273,6 +273,14 @@ def test_every_public_function_refuses_what_it_does_not_know():
                 assert len(str(caught.value).splitlines()) == 1, name
 
 
+@pytest.mark.parametrize("kind", [pk.Machine, pk.Family, pk.DesignProblem, pk.SweepPlan])
+@pytest.mark.parametrize("value", [5, None, "x", [1, 2], {}])
+def test_a_public_class_refuses_what_it_does_not_know(kind, value):
+    needed = [p for p in inspect.signature(kind).parameters.values() if p.default is p.empty]
+    with pytest.raises(pk.PoseError, match=rf"^{needed[0].name}: an? .* expected, not "):
+        kind(*[value] * len(needed))
+
+
 def test_what_is_masked_is_no_number(tricept):
     poses = np.ma.masked_array([tricept.home, tricept.home], mask=[[False] * 5, [False, True, False, False, False]])
     assert np.isfinite(tricept.inverse(poses)).all(1).tolist() == [True, False]

@@ -357,7 +357,7 @@ def test_no_two_functions_have_one_body():
 
 THRESHOLDS = {"EXACT", "PRINTED", "PROVED", "ASIDE", "LEEWAY", "SAME_MODE", "NEAR_MODE", "SWING", "FLIP", "DISTINCT"}
 THRESHOLDS |= {"VICINITY", "TRAVEL", "REPORTED", "TILTED", "NEAR_START", "NEAR_TURN", "NEAR_HOLD", "FAR_TILT"}
-THRESHOLDS |= {"OWN", "OTHER", "EITHER"}
+THRESHOLDS |= {"WAVER", "LEAST_LEAN", "OWN", "OTHER", "EITHER"}
 
 
 @for_each([m for m in MODULES if not m.startswith("kinematics.wrist.pole_")])

@@ -56,6 +56,12 @@ def check_arguments(function: F) -> F:
     return cast(F, call)
 
 
+def check_constructor(kind: F) -> F:
+    """Let a public class refuse arguments of the wrong kind, as :func:`check_arguments`."""
+    kind.__init__ = check_arguments(kind.__init__)  # type: ignore[method-assign]
+    return kind
+
+
 def _check_size(name: str, value: float) -> float:
     """Return a number; those so small or great that sums and quotients of them overflow are refused."""
     if value != 0.0 and not _LEAST < abs(value) < _GREATEST and isfinite(value):

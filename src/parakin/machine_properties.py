@@ -9,6 +9,7 @@ from itertools import product
 import numpy as np
 
 from .algebra import Scalar
+from .arguments import check_constructor
 from .arrays import Array, AxisRange
 from .errors import NoMethodError
 from .kinematics.closure_roots import compute_closure_tolerance
@@ -29,6 +30,7 @@ from .model.traces import Model
 from .units import AXIS_UNITS
 
 
+@check_constructor
 class MachineProperties:
     """A machine's properties. Nothing of it changes once it is made."""
 

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..algebra import Scalar, derivative
-from ..arguments import RowsLike, check_arguments, read_rows
+from ..arguments import RowsLike, check_arguments, check_constructor, read_rows
 from ..arrays import Array
 from ..errors import PoseError, quote, suggest
 from ..kernels.batch import NEVER, NewtonSteps, evaluate_tape, solve_by_newton
@@ -106,6 +106,7 @@ def select_parameters(machine: Machine, patterns: Sequence[str]) -> tuple[Parame
     return tuple(p for p in known if p.name in chosen)
 
 
+@check_constructor
 class Family:
     """Machines that differ in some of their numbers; every call takes poses or joints, and sizes, of any batch.
 

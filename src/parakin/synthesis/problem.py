@@ -9,6 +9,7 @@ from math import isfinite
 
 import numpy as np
 
+from ..arguments import check_constructor
 from ..arrays import Array, AxisRange
 from ..errors import PoseError, quote, suggest
 from ..families.family import Family
@@ -21,6 +22,7 @@ from .pose_sets import PoseSet, make_box_set, make_cylinder_set
 from .wants import WANTS
 
 
+@check_constructor
 @dataclass(frozen=True, eq=False)
 class DesignProblem:
     """A problem of dimensional synthesis; lengths are mm, angles rad.

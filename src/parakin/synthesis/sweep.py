@@ -10,6 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..arguments import check_constructor
 from ..arrays import Array, Flags, Indices, split_rows
 from ..errors import PoseError
 from ..kernels.batch import find_first_negative
@@ -25,6 +26,7 @@ _MOST_POSES = 1 << 20
 _MOST_CHUNKS = 100_000
 
 
+@check_constructor
 @dataclass(frozen=True, eq=False)
 class SweepPlan:
     """What a sweep looks at; each of its chunks is the same whoever evaluates it, and whenever.

@@ -82,21 +82,26 @@ class ProgrammedPath:
         return opposite
 
     def _interpolate_axes(self, record: Indices, share: Array) -> Array:
-        """Interpolate axes on great circles (slerp), exact for small angles too."""
+        """Interpolate axes on great circles."""
         a, b = self.axis[record - 1], self.axis[record]
-        d = b - a
-        cosine = compute_dots(a, b)
-        across = d - compute_dots(d, a)[:, None] * a  # the part of b at right angles to a
-        sine = compute_norms(across)
         opposite = self.find_opposite(record)
         if opposite.any():
             line = int(self.path.line[record[opposite.argmax()]])
             raise PoseError(
                 f"{self.path.source}:{line}: the tool axis turns to its opposite, and nothing says which way"
             )
-        angle = share * np.arctan2(sine, cosine)
-        along = np.divide(np.sin(angle), sine, out=np.zeros_like(sine), where=sine > 0.0)
-        return np.cos(angle)[:, None] * a + along[:, None] * across
+        return interpolate_great_circle(a, b, share)
+
+
+def interpolate_great_circle(a: Array, b: Array, share: Array) -> Array:
+    """Interpolate unit vectors (m, 3) on great circles (slerp) from a to b, exact for small angles too."""
+    d = b - a
+    across = d - compute_dots(d, a)[:, None] * a  # the part of b at right angles to a
+    sine = compute_norms(across)
+    angle = share * np.arctan2(sine, compute_dots(a, b))
+    along = np.divide(np.sin(angle), sine, out=np.zeros_like(sine), where=sine > 0.0)
+    axes: Array = np.cos(angle)[:, None] * a + along[:, None] * across
+    return axes
 
 
 def compute_tool_axes(turns: Array) -> Array:

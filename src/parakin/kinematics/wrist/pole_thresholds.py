@@ -27,6 +27,8 @@ RIM        8.024e-6     off the pole: just where that begins; a record there tel
 RIM_WIDTH  8e-8         off the pole: a record no farther from there is there
 NEAR_Z     1e-4         B: on a wrist's pole so near to Z, C turns far while the tool passes over the pole
 NEAR_HOLD  1e-5         off the pole: no tool axis is held nearer, or printed digits would turn the first angle
+WAVER      0.02°        first angle: the controller's own way between two records turns it aside by no more
+LEAST_LEAN 1e-6         tool axis: what is off its way by less is not brought nearer for that
 FAR_TILT   30°          second angle at home of a controller: moves about it go neither round the pole nor through it
 ========== ============ ==============================================================================================
 """
@@ -61,6 +63,8 @@ RIM = 1.003 * STANDING
 RIM_WIDTH = 0.01 * STANDING
 NEAR_Z = 1e-4
 NEAR_HOLD = 5.0 * PRINTED
+WAVER = np.radians(0.02)
+LEAST_LEAN = 0.5 * PRINTED
 FAR_TILT = np.pi / 6.0
 
 

@@ -8,11 +8,12 @@ from typing import Literal, TypeAlias
 
 import numpy as np
 
-from ...arrays import Array, Indices
+from ...arrays import Array, Flags, Indices
 from ...kinematics.rotations import collect_turns
+from ...kinematics.wrist.pole_thresholds import LEAST_LEAN, WAVER
 from ...machine import Machine
 from ..posting.frames import compute_poses
-from ..programmed_path import ProgrammedPath, compute_norms, compute_tool_axes
+from ..programmed_path import ProgrammedPath, compute_norms, compute_tool_axes, interpolate_great_circle
 from .continuation import MACHINE_FRAME, PosedPoints
 
 Interpolation: TypeAlias = Literal["pose", "joints"]  # what a controller moves evenly from record to record
@@ -67,6 +68,7 @@ class Deviation:
             share = (begin + shares * length).ravel()
             poses = self._interpolate_poses(spans.first[block], spans.last[block], shares)
             ratio = self.measure_poses(record, share, poses)[2]
+            ratio = np.maximum(ratio, self._measure_wavering(spans.first[block], spans.last[block], shares, poses))
             ratio = np.where(np.isnan(ratio), np.inf, ratio)
             worst[block] = ratio.reshape(-1, len(shares)).max(1)
         return worst
@@ -97,6 +99,31 @@ class Deviation:
         off = compute_norms(tip - point - extension[:, None] * (reached - k) if extension.any() else tip - point)
         lean = 2.0 * np.arcsin(np.minimum(1.0, 0.5 * compute_norms(reached - k)))
         return off, lean, np.maximum(off / self.chord, lean / self.angle)
+
+    def find_wavering(self, spans: MotionSpans, shares: Array) -> Flags:
+        """Find the spans (m,) on which the wrist's first joint is led aside too far, at shares (k,)."""
+        poses = self._interpolate_poses(spans.first, spans.last, shares)
+        wavering = self._measure_wavering(spans.first, spans.last, shares, poses)
+        wavers: Flags = wavering.reshape(-1, len(shares)).max(1) > 1.0
+        return wavers
+
+    def _measure_wavering(self, first: PosedPoints, last: PosedPoints, shares: Array, poses: Array) -> Array:
+        """Measure how far poses between two points lead the wrist's first joint aside, (m,), in fractions of WAVER.
+
+        The axis leaves the great circle between both points, and the nearer the pole, the more that turns the joint. A
+        wrist that the platform does not turn goes evenly with the pose, and a program's own turns are as they are.
+        """
+        wavering, wrist = np.zeros(len(poses)), self.machine.wrist
+        is_even = self.interpolation == "joints" or self.programmed.path.turns is not None
+        if wrist is None or is_even or not self.machine.structure.carries_pole:
+            return wavering
+        begin, end = (np.repeat(self._compute_axes(point.poses), len(shares), axis=0) for point in (first, last))
+        even = interpolate_great_circle(begin, end, np.tile(shares, len(first.poses)))
+        lean = compute_norms(self._compute_axes(poses) - even)
+        near = np.flatnonzero(lean > LEAST_LEAN)
+        off_pole = np.sqrt(wrist.measure_freedom(poses[near]))
+        wavering[near] = lean[near] / np.maximum(WAVER * off_pole, LEAST_LEAN)
+        return wavering
 
     def _interpolate_poses(self, first: PosedPoints, last: PosedPoints, shares: Array) -> Array:
         """Interpolate the controller's poses at shares of spans, share by share of the first span, then of the next."""

@@ -105,7 +105,24 @@ def find_cuts(deviation: Deviation, posted: Posted, positions: PathPositions, mo
         shares.append(share[~unmoved | unreachable])
         search.advance(share, points, ~(unmoved | unreachable))
     stuck.append(search.motion)
-    return PathCuts.sort(np.concatenate(motions), np.concatenate(shares), np.concatenate(stuck))
+    cuts = PathCuts.sort(np.concatenate(motions), np.concatenate(shares), np.concatenate(stuck))
+    wavering = motion[deviation.find_wavering(select_spans(posted, positions, motion), _SHARES)]
+    for each in np.setdiff1d(wavering, cuts.stuck):
+        own = np.flatnonzero(cuts.motion == each)
+        cuts.share[own] = _spread_cuts(cuts.share[own])
+    return cuts
+
+
+def _spread_cuts(share: Array) -> Array:
+    """Spread cuts of a motion (k,) evenly over its spans, the last of which is shorter than they need be.
+
+    Records whose distances jump make joints tremble where a path is rounded over whole motions.
+    """
+    ends = np.concatenate([[0.0], share, [1.0]])
+    last = min(1.0, (ends[-1] - ends[-2]) / (ends[-2] - ends[-3])) if len(share) else 1.0
+    places = np.append(np.arange(len(share) + 1.0), len(share) + last)
+    spread: Array = np.interp(places[-1] * np.arange(1, len(share) + 1) / (len(share) + 1), places, ends)
+    return spread
 
 
 class _CutSearch:

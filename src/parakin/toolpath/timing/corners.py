@@ -22,6 +22,7 @@ _SAME = 1e-6  # mm: records no farther apart are one corner
 _TIGHT = 1e-5  # mm of reach for each rad (mm/mm) of turn: a corner passed so slowly is as well stopped at
 _BESIDE = 0.05  # a rounding ends at a piece's end, or at least this fraction of the piece from it
 _BENT = 1e-9  # rad/mm and mm/mm: what is rounding
+_TURNING = 0.25  # fraction of a piece's length that is the tip's, where angles make most of it
 _LIKE = 1.5  # neighbouring pieces may count as equally long if neither is longer than this times the other
 _STEADY = 0.5  # and the logarithm of their ratio changes by no more than this fraction from corner to corner,
 _JITTER = 1e-4  # or by rounding
@@ -32,8 +33,8 @@ class Curve(NamedTuple):
     """A tool path as a curve over its length s, c corners.
 
     s counts mm of the tip and, for turns of the pose's angles, LEVER mm a rad (root of the sum of squares). Pieces
-    whose lengths change steadily count as equally long: roundings that reach over whole pieces then are a uniform
-    cubic B-spline, which does not tremble from piece to piece.
+    that are mostly turns, and whose lengths change steadily, count as equally long: roundings that reach over whole
+    pieces then are a uniform cubic B-spline, which does not tremble from piece to piece.
 
     Between corners the pose is linear in s. Where two straight pieces meet, the pose's derivative by s turns from one
     slope to the next within ``reach`` on either side; its second derivative rises and falls linearly, so two
@@ -97,6 +98,8 @@ def round_corners(
         bend[1:-1] = np.diff(motion, axis=0) / 6.0
         kept = _compute_norms(bend * ~angles) < _KEPT * tolerance
         kept &= _bound_axis_turn(posted.machine, corner, bend) < _KEPT * axis_tolerance
+        turns = _compute_norms(motion * ~angles) < _TURNING * length
+        kept[1:-1] &= turns[1:] & turns[:-1]  # where the tip moves, its feed would have to follow the change
         length = _align_lengths(posted.machine, corner, length, kept, parted)
     slope = motion / length[:, None]
     turn = np.zeros_like(corner)
@@ -119,7 +122,7 @@ def round_corners(
 def _align_lengths(machine: Machine, corner: Array, length: Array, kept: Flags, parted: Flags) -> Array:
     """Let neighbouring pieces whose lengths (c - 1,) change steadily count as equally long.
 
-    kept : (c,) corners at which a rounding over both whole pieces keeps to the tolerances then
+    kept : (c,) corners between turns, at which a rounding over both whole pieces keeps to the tolerances then
     """
     growth = np.diff(np.log(length))
     change = np.abs(np.diff(growth, prepend=growth[:1], append=growth[-1:]))

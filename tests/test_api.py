@@ -63,6 +63,7 @@ def things(tmp_path_factory, tricept):
         "PolarWorkspace": pk.sweep_polar(plane, 20),
         "DriveWorkspace": pk.sweep_drives(plane, 8),
         "Atlas": pk.atlas(plane, step=50),
+        "SingularityDistance": pk.find_nearest_singularity(plane, {"X": (-9.0, 9.0)}),
         "Placement": pk.find_placement(tricept, path, {"Z": (-1500, -1400)}),
         "Assemblies": tricept.assemblies(tricept.inverse(tricept.home)),
         "Solution": tricept.forward(tricept.inverse(tricept.home)),

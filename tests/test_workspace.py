@@ -317,6 +317,6 @@ def test_rods_that_are_nearly_parallel_are_proved_clear():
     """Which points of two such rods are nearest no interval tells; a direction that separates them does."""
     machine = load_shipped("rus6")
     region = pk.region(machine, at={"A": 0.0, "B": 0.0, "C": 0.0})
-    volume = pk.workspace(region, gap=0.1).volume
+    volume = pk.workspace(region, gap=0.1, seconds=60.0).volume
     assert volume.outer - volume.inner < 0.1 * volume.estimate
     assert volume.inner < 4.26e7 < volume.outer

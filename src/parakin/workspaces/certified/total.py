@@ -70,8 +70,8 @@ class TotalSubdivision(Subdivision):
             spread, change = bounds.spread.sum(1), np.abs(bounds.slopes).sum(1)
             narrow: Flags = (bounds.least_at != 0).any(1)
             large = ~narrow & (spread > _SPREAD * change) & (spread > 0.0)
-            if closely or (self.closely and not boxes.low.shape[1]):
-                prove_signs(constraint, low, size, boxes, bounds, (large | (not closely)) & (bounds.state == KEPT))
+            if closely:
+                prove_signs(constraint, low, size, boxes, bounds, large & (bounds.state == KEPT))
             outside[boxes.cell[bounds.state == EXCLUDED]] = True
             unbounded = ~np.all(np.isfinite(bounds.spread), axis=1)
             if unbounded.any():  # their middle is looked at
@@ -98,6 +98,8 @@ class TotalSubdivision(Subdivision):
         if outside.any():
             boxes = boxes.take(~outside[boxes.cell])
         bounds = bound_margin(constraint, low, size, boxes, every=True)
+        if self.closely:
+            prove_signs(constraint, low, size, boxes, bounds, bounds.state == KEPT)
         outside[boxes.cell[bounds.state == EXCLUDED]] = True
         kept = bounds.state == KEPT
         return (boxes, bounds) if kept.all() else (boxes.take(kept), bounds.take(kept))

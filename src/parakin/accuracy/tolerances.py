@@ -12,11 +12,17 @@ from ..arrays import Array, Indices
 from ..errors import PoseError, quote
 from ..families.family import Family, select_parameters
 from ..families.shift_rates import trace_shift_rates
+from ..kernels.intervals import JumpFreeTrace
 from ..machine import Machine
+from ..model.nominal_values import SizedTrace
 from ..units import ANGLE, LENGTH, Quantity, QuantityError, evaluate_expression
 
 UNIFORM = float(1.0 / np.sqrt(3.0))  # standard deviation of what lies evenly within ±1
 _UNITS = {LENGTH.dimension: "mm", ANGLE.dimension: "rad"}
+
+
+class SizedJumpFreeTrace(SizedTrace, JumpFreeTrace):
+    """A trace of sizes whose angles do not jump over intervals."""
 
 
 class Tolerance(NamedTuple):

@@ -13,10 +13,9 @@ from ..arrays import Array, AxisRange, Flags
 from ..budget import SECONDS, Budget
 from ..errors import PoseError, suggest
 from ..kernels.batch import evaluate_tape
-from ..kernels.intervals import IntervalProgram, JumpFreeTrace
-from ..model.nominal_values import SizedTrace
+from ..kernels.intervals import IntervalProgram
 from .accuracy import Accuracy
-from .tolerances import ToleranceFamily
+from .tolerances import SizedJumpFreeTrace, ToleranceFamily
 
 _ROUNDS = 8  # of widening a box until it holds its own image
 _WIDER = 1.1
@@ -24,10 +23,6 @@ _SPARE = 1e-9  # relative, and mm: far more than the rounding of the sums below
 _GAP = 0.05  # between what is proved and what is attained, relative, where the search ends
 _AT_ONCE = 512
 _CELLS = 8  # of a lattice of directions, along an edge of a cube
-
-
-class _SizedJumpFreeTrace(SizedTrace, JumpFreeTrace):
-    """A trace of sizes whose angles do not jump over intervals."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -122,7 +117,7 @@ class _Enclosure:
         family, self.halves = tolerances.family, tolerances.halves
         machine = family.machine
         n, self.width = len(machine.axes), len(machine.structure.coordinates)
-        trace = _SizedJumpFreeTrace(n + self.width, family.nominal.tolist())
+        trace = SizedJumpFreeTrace(n + self.width, family.nominal.tolist())
         pose, changes = trace.inputs(n), trace.inputs(self.width, n)
         joints, placed, _ = machine.trace_equations({}).invert(pose, machine.mode)
         equations = family.trace_equations(trace.sizes)

@@ -19,8 +19,8 @@ if TYPE_CHECKING:
 
 _POSES = ("box", "cylinder", "poses")
 _KEYS = (
-    "machine", "free", *_POSES, "shift", "bounds", "strokes", "drives", "struts", "tolerances", "part", "workpiece",
-    "minimise", "maximise",
+    "machine", "free", *_POSES, "shift", "bounds", "strokes", "drives", "struts", "tolerances", "within", "part",
+    "workpiece", "minimise", "maximise",
 )  # fmt: skip
 _KEYS_OF_ARGUMENTS = {"path": "part"}
 _STROKES = ("keep", "fit")
@@ -106,9 +106,10 @@ class _ProblemReader:
                 self._read_poses(machine, top["poses"]) if "poses" in top else (),
                 self._read_words(top, "drives"),
                 self._read_words(top, "struts"),
-                self._read_tolerances(top),
+                self._read_tolerances(top, "tolerances"),
                 self._read_part(top["part"]) if "part" in top else None,
                 self._read_workpiece(top["workpiece"]) if "workpiece" in top else None,
+                self._read_tolerances(top, "within"),
             )
         except PoseError as error:
             key, colon, message = str(error).partition(":")
@@ -131,10 +132,10 @@ class _ProblemReader:
             return {str(name): str(self.read_text(value, name)) for name, value in words.items()}
         return str(self.read_text(top[key], key))
 
-    def _read_tolerances(self, top: YamlMap) -> dict[str, str] | None:
-        words = self._read_words(top, "tolerances")
+    def _read_tolerances(self, top: YamlMap, key: str) -> dict[str, str] | None:
+        words = self._read_words(top, key)
         if isinstance(words, str):
-            raise self.fail("tolerances: a mapping expected, such as {feet: 0.05 mm}", top["tolerances"])
+            raise self.fail(f"{key}: a mapping expected, such as {{feet: 0.05 mm}}", top[key])
         return words
 
     def _read_part(self, value: Value) -> ToolPath:

@@ -17,6 +17,7 @@ from ..toolpath.job import Job
 from .design_proof import TOLERANCE, DesignProof
 from .front import search_front
 from .problem import DesignProblem
+from .reserves import measure_reserve
 from .search import KEPT, SLACK, Candidate
 from .wants import WANTS, MarginProof, NormProof
 
@@ -94,6 +95,9 @@ def find_designs(
     least greatest distance from the ideal under evenly spaced weights. A proved design keeps the wants; that there is
     no better one is not proved. ``seconds`` bounds the time of all.
 
+    With tolerances (``within``) a proof is one for all machines within them. The search is repeated with what the
+    nominal machine has to keep in hand for that, to the first order, until it is enough.
+
     A part's cycle time is estimated in the search, without jerks and forces, and told by its job where a design is
     proved. Where its bound is broken there, the search is repeated with estimates that are longer by as much.
 
@@ -103,13 +107,14 @@ def find_designs(
         raise PoseError(f"count: 1 to {MOST_DESIGNS} designs expected, not {count}")
     budget = Budget(seconds)
     search = (lambda f: progress(_SEARCHING * f)) if progress else None
-    rounds = _ROUNDS if "cycle_time" in problem.bounds else 1
+    rounds = _ROUNDS if "cycle_time" in problem.bounds or problem.within is not None else 1
     for left in range(rounds, 0, -1):
         candidates = search_front(problem, count, budget.take_fraction(_SEARCHING / left), search)
         if candidates[0].broken > KEPT:
             return Designs(problem, (), (), _describe_shortfall(problem, candidates[0]))
         made = [_make_design(problem, candidate) for candidate in candidates]
-        if left == 1 or not _correct_estimates(problem, candidates, made):
+        corrected = [correct(problem, candidates, made) for correct in (_correct_estimates, _grow_reserve)]
+        if left == 1 or not any(corrected):
             break
     proved, unproved = list[ProvedDesign](), list[UnprovedDesign]()
     for number, own in enumerate(made):
@@ -128,14 +133,28 @@ def _correct_estimates(
     problem: DesignProblem, candidates: list[Candidate], made: list[_MadeDesign | UnprovedDesign]
 ) -> bool:
     """Scale the estimates of cycle times up where a job breaks the bound that its estimate keeps; tell whether."""
-    timer, bound, excess = problem.timer, problem.bounds["cycle_time"], 1.0
-    assert timer is not None
+    timer, bound, excess = problem.timer, problem.bounds.get("cycle_time"), 1.0
+    if timer is None or bound is None:
+        return False
     for candidate, design in zip(candidates, made, strict=True):
         if not isinstance(design, UnprovedDesign) and design.values["cycle_time"] > bound * (1.0 + TOLERANCE):
             estimate = _measure_value(problem, candidate, "cycle_time")
             excess = max(excess, design.values["cycle_time"] / estimate)
     timer.factor *= excess * _SPARE if excess > 1.0 else 1.0
     return excess > 1.0
+
+
+def _grow_reserve(
+    problem: DesignProblem, candidates: list[Candidate], made: list[_MadeDesign | UnprovedDesign]
+) -> bool:
+    """Grow what designs keep in hand to what their tolerances need; tell whether they need more."""
+    needed = [
+        measure_reserve(problem, design.machine, candidate.x, candidate.points)
+        for candidate, design in zip(candidates, made, strict=True)
+        if problem.within is not None and not isinstance(design, UnprovedDesign)
+    ]
+    grown = [problem.reserve.grow(reserve) for reserve in needed]
+    return any(grown)
 
 
 def _measure_value(problem: DesignProblem, candidate: Candidate, name: str) -> float:
@@ -201,11 +220,7 @@ def _prove_design(problem: DesignProblem, made: _MadeDesign, budget: Budget) -> 
         if sign * values[name] > sign * bound + TOLERANCE * abs(bound):
             return UnprovedDesign(sizes, f"{name} is {values[name]:.9g}")
     proof = DesignProof(problem, machine, problem.move_sets(made.x), numbers, budget)
-    wanted = {
-        name: (values[name] if name in problem.objectives else problem.bounds[name])
-        * (1.0 + WANTS[name].sign * TOLERANCE)
-        for name in problem.wants
-    }
+    wanted = {name: _find_wanted(problem, name, values[name]) for name in problem.wants}
     margins = {name: bound for name, bound in wanted.items() if isinstance(WANTS[name].proof, MarginProof)}
     reason = proof.prove_margins(margins)
     if reason:
@@ -225,6 +240,13 @@ def _prove_design(problem: DesignProblem, made: _MadeDesign, budget: Budget) -> 
     return ProvedDesign(machine, sizes, values, proof.sets[0].ends, drives, proof.boxes, proved, made.job)
 
 
+def _find_wanted(problem: DesignProblem, name: str, value: float) -> float:
+    """Find what of a quantity is to be proved: its bound, or of an objective its value and what tolerances take."""
+    sign = WANTS[name].sign
+    bound = value + sign * problem.reserve.losses.get(name, 0.0) if name in problem.objectives else problem.bounds[name]
+    return bound * (1.0 + sign * TOLERANCE)
+
+
 def _is_kept(name: str, worst: float | None, bound: float) -> bool:
     sign = WANTS[name].sign
     return worst is not None and sign * worst <= sign * bound * (1.0 + sign * 1.01 * TOLERANCE)
@@ -236,7 +258,8 @@ def _fit_ranges(problem: DesignProblem, candidate: Candidate) -> dict[str, AxisR
     joints = problem.measure(candidate.x[None], candidate.points).travel[0]
     units = machine.joint_units[: machine.leg_count]
     slack = [SLACK * (problem.tapes.size if unit == "mm" else 1.0) for unit in units]
-    ends = zip(joints.min(0).tolist(), joints.max(0).tolist(), slack, strict=True)
+    bottom, top = joints.min(0) - problem.reserve.low, joints.max(0) + problem.reserve.high
+    ends = zip(bottom.tolist(), top.tolist(), slack, strict=True)
     names = [drive.name for drive in machine.drives[: machine.leg_count]]
     return {name: (low - by, high + by) for name, (low, high, by) in zip(names, ends, strict=True)}
 

@@ -13,6 +13,7 @@ from ..algebra import Scalar, sincos
 from ..arrays import Array, AxisRange
 from ..errors import PoseError, quote, suggest
 from ..machine import Machine
+from ..model.equations import Equations
 from ..performance.certified.interval_matrices import PoseBox
 from ..performance.characteristic_length import CharacteristicLength
 from ..workspaces.certified.constraints import TracedPose
@@ -84,28 +85,37 @@ class PoseSet:
         low, high = np.array(list(self.coordinates.values())).T
         return low, high
 
-    def trace(self, machine: Machine) -> TracedPose:
+    def trace(self, machine: Machine) -> TracedSet:
         """Trace the pose of coordinates of a machine with these axes, for constraints."""
         turns = tuple(self.turns)
         free = tuple(self.coordinates)[: len(self.coordinates) - len(turns)]
-        return _TracedSet(machine, free, turns, {}, machine.mode, self)
+        return TracedSet(machine, free, turns, {}, machine.mode, self)
 
     def make_box(self, machine: Machine, length: CharacteristicLength) -> PoseBox:
         """Make the box of the coordinates of a machine with these axes, for bounds of matrices."""
         wide = {name: ends for name, ends in self.coordinates.items() if ends[0] < ends[1]}
-        return _SetBox(machine, wide, {}, machine.mode, length, self)
+        return SetBox(machine, wide, {}, machine.mode, length, self)
 
 
 @dataclass(frozen=True, eq=False)
-class _TracedSet(TracedPose):
+class TracedSet(TracedPose):
+    """The pose of a set's coordinates."""
+
     pose_set: PoseSet
+
+    @property
+    def equations(self) -> Equations:
+        """The machine's equations."""
+        return self.machine.trace_equations({})
 
     def place(self, inputs: Sequence[Scalar]) -> list[Scalar]:
         return self.pose_set.place(dict(zip((*self.free_axes, *self.swept_axes), inputs, strict=True)))
 
 
 @dataclass(frozen=True, eq=False)
-class _SetBox(PoseBox):
+class SetBox(PoseBox):
+    """The box of a set's coordinates."""
+
     pose_set: PoseSet
 
     def poses(self, points: Array) -> Array:

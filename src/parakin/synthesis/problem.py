@@ -16,6 +16,7 @@ from ..families.family import Family
 from ..machine import Machine
 from ..toolpath.path import ToolPath
 from .design_tapes import DesignTapes
+from .manufactured import Reserve, SizeBox
 from .measures import Measures
 from .part_timing import PartTimer
 from .pose_sets import PoseSet, make_box_set, make_cylinder_set
@@ -47,6 +48,8 @@ class DesignProblem:
     tolerances : for accuracy, as of :func:`parakin.analyse_accuracy`
     path : of a part that every design must run; it is moved with the poses
     workpiece : where the part lies, as for :func:`parakin.prepare`
+    within : manufacturing tolerances, as for accuracy but of no named sizes: all machines within them must keep the
+        limits and bounds, too; the part runs on the nominal one
 
     Raises :class:`PoseError` for a problem that makes no sense.
     """
@@ -66,6 +69,7 @@ class DesignProblem:
     tolerances: Mapping[str, str] | None = None
     path: ToolPath | None = None
     workpiece: Array | None = None
+    within: Mapping[str, str] | None = None
 
     def __repr__(self) -> str:
         return f"<parakin design problem of {self.machine.name}: {len(self.free)} free numbers>"
@@ -84,6 +88,7 @@ class DesignProblem:
                     raise PoseError(f"{what}: {name}: a range that rises expected, not {low:g} to {high:g}")
         self._check_poses()
         self._check_wants()
+        self.make_size_box(self.machine)
 
     def _check_poses(self) -> None:
         moved = [axis for key in self.shift for axis in key.split()]
@@ -158,8 +163,26 @@ class DesignProblem:
 
     @cached_property
     def tapes(self) -> DesignTapes:
-        free, own = list(self.free), (self.drives, self.struts, self.tolerances)
-        return DesignTapes(self.machine, free, self.fit_strokes, *own)
+        return self.make_tapes(self.machine, list(self.free))
+
+    def make_tapes(self, machine: Machine, free: Sequence[str]) -> DesignTapes:
+        """Make the tapes of a machine with free numbers, and what else the problem says."""
+        return DesignTapes(machine, free, self.fit_strokes, self.drives, self.struts, self.tolerances)
+
+    def make_size_box(self, machine: Machine) -> SizeBox | None:
+        """Make the box of a design's numbers within tolerance; None without tolerances."""
+        if self.within is None:
+            return None
+        try:
+            return SizeBox(machine, self.within)
+        except PoseError as error:
+            raise PoseError(f"within: {error}") from None
+
+    @cached_property
+    def reserve(self) -> Reserve:
+        """What designs keep in hand for tolerances; it grows as they are known."""
+        legs = self.machine.leg_count
+        return Reserve(np.zeros(len(self.tapes.counted)), np.zeros(legs), np.zeros(legs))
 
     @cached_property
     def timer(self) -> PartTimer | None:

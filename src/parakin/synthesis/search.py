@@ -67,7 +67,8 @@ class DesignSearch:
 
     def __init__(self, problem: DesignProblem, goal: Goal, bounds: Mapping[str, float]):
         """Take bounds of losses, the greatest ones, by names of quantities and of free numbers."""
-        self.problem, self.goal, self.bounds = problem, goal, dict(bounds)
+        self.problem, self.goal = problem, goal
+        self.bounds = {name: bound - problem.reserve.losses.get(name, 0.0) for name, bound in bounds.items()}
         self.low, self.width = problem.ranges[:, 0], np.ptp(problem.ranges, axis=1)
         self.lattice = problem.lattice
         self.wants = [*problem.tapes.limits, "parallel singularity", *bounds]
@@ -88,7 +89,7 @@ class DesignSearch:
 
     def _list_margins(self, m: Measures) -> Array:
         """List margins of limits and of singularities, (S, P, k), ≥ 0 where they are kept with some slack."""
-        return np.concatenate([m.margins - SLACK, m.side - _LEAST_SIDE], -1)
+        return np.concatenate([m.margins - SLACK - self.problem.reserve.margins, m.side - _LEAST_SIDE], -1)
 
     def _list_all_margins(self, m: Measures) -> Array:
         """List those at the part's poses too, (S, P', k)."""

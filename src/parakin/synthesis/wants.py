@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from ..algebra import Scalar, dot
 from ..arrays import Array
-from ..machine import Machine
+from ..model.equations import Equations
 from ..performance.certified.interval_matrices import PoseBox
 from ..performance.certified.quotient_norms import Quotient
 from ..units import LENGTH, NUMBER, STIFFNESS, TIME, QuantityKind
@@ -15,13 +15,13 @@ from .design_tapes import DesignTapes, TracedQuotient
 from .measures import Measures
 
 _UNITS = {NUMBER: "", LENGTH: "mm", STIFFNESS: "N/mm", TIME: "s"}
-_Margins = Callable[[Machine, Sequence[Scalar], float], list[Scalar]]
+_Margins = Callable[[Equations, Sequence[Scalar], str, float], list[Scalar]]
 _Quotients = Callable[[DesignTapes, PoseBox, Mapping[str, Scalar]], list[list[Quotient]]]
 
 
 @dataclass(frozen=True)
 class MarginProof:
-    """Proved by margins that are ≥ 0 where a bound is kept, traced from a machine, a pose and the bound."""
+    """Proved by margins that are ≥ 0 where a bound is kept, traced from equations, a pose, its mode and the bound."""
 
     trace: _Margins
 
@@ -69,13 +69,13 @@ class Want:
         return -1.0 if self.more else 1.0
 
 
-def _bound_feet(machine: Machine, pose: Sequence[Scalar], diameter: float) -> list[Scalar]:
-    feet = machine.trace_equations({}).list_feet(pose, machine.mode)
+def _bound_feet(equations: Equations, pose: Sequence[Scalar], mode: str, diameter: float) -> list[Scalar]:
+    feet = equations.list_feet(pose, mode)
     return [1.0 - dot(foot[:2], foot[:2]) * (4.0 / diameter**2) for foot in feet]
 
 
-def _bound_distances(machine: Machine, pose: Sequence[Scalar], least: float) -> list[Scalar]:
-    distances = machine.trace_equations({}).list_strut_distances(pose, machine.mode)
+def _bound_distances(equations: Equations, pose: Sequence[Scalar], mode: str, least: float) -> list[Scalar]:
+    distances = equations.list_strut_distances(pose, mode)
     return [distance - least for distance in distances]
 
 

@@ -39,6 +39,11 @@ class PoseBox:
     def high(self) -> Array:
         return np.array([ends[1] for ends in self.ranges.values()], float)
 
+    @property
+    def widths(self) -> Array:
+        """What the widths of parts are compared with, where one is bisected, (d,)."""
+        return self.high - self.low
+
     @cached_property
     def samples(self) -> Array:
         """Points (N, d) of a lattice all over the box, its corners among them."""

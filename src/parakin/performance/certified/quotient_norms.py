@@ -100,7 +100,7 @@ class NormSearch:
                 break
             order = np.argsort(-upper, kind="stable")
             now, later = order[:AT_ONCE], order[AT_ONCE:]
-            if ((high[now[0]] - low[now[0]]) <= _FINEST * (self.box.high - self.box.low)).all():
+            if ((high[now[0]] - low[now[0]]) <= _FINEST * self.box.widths).all():
                 break
             if progress:
                 progress(min(1.0, tolerance / max(float(upper[now[0]]) / self.best - 1.0, tolerance)))
@@ -115,7 +115,7 @@ class NormSearch:
 
     def _bound_boxes(self, low: Array, high: Array) -> tuple[Array, Indices]:
         """Bound it over boxes from above, (N,); returns the input across which each box is best bisected too."""
-        axis = find_widest_inputs(low, high, self.box.high - self.box.low)
+        axis = find_widest_inputs(low, high, self.box.widths)
         sizes = [
             _bound_quotient(quotient, divisor(low, high), dividend(low, high), axis)
             for quotient, (divisor, dividend) in zip(self.quotients, self._bounds, strict=True)

@@ -21,31 +21,35 @@ def make_side_constraints(traced: TracedPose) -> tuple[Constraint, Constraint]:
     the translations, for head and table have no parallel singularity.
     """
     d, scale = len(traced.free_axes), _scale_at_home(traced)
-    margin = expand_determinant(_trace_leg_rows(traced, traced.pose)) / scale
+    margin = expand_determinant(_trace_leg_rows(traced, traced.inputs)) / scale
     x, orientation = traced.inputs[:d], traced.inputs[d:]
     sides: tuple[SignProof | None, SignProof | None] = None, None
     height, width = traced.machine.parallel_block
-    if orientation and height == width:
+    if traced.swept_axes and height == width:
         inputs = traced.jump_free_inputs
-        rows, side = _trace_leg_rows(traced, traced.place(inputs)), 1.0 if scale > 0.0 else -1.0
+        rows, side = _trace_leg_rows(traced, inputs), 1.0 if scale > 0.0 else -1.0
         sides = make_side_proof(rows, side, inputs), make_side_proof(rows, -side, inputs)
     return Constraint(PARALLEL_SINGULARITY, margin - ZERO, x, orientation, sign=sides[0]), Constraint(
         PARALLEL_SINGULARITY, -margin - ZERO, x, orientation, sign=sides[1]
     )
 
 
-def _trace_leg_rows(traced: TracedPose, pose: Sequence[Scalar]) -> list[list[Scalar]]:
+def _trace_leg_rows(traced: TracedPose, inputs: Sequence[Scalar]) -> list[list[Scalar]]:
     """Trace the block of A that can become singular."""
-    machine = traced.machine
     with np.errstate(all="ignore"):  # a pose out of reach gives NaN
-        rates = machine.trace_rates(pose, machine.trace_inverse(pose, traced.mode)[0])
-    height, width = machine.parallel_block
-    return [row[:width] for row in rates.a[:height]]
+        rows = traced.trace_twist_rows(inputs)
+    height, width = traced.machine.parallel_block
+    return [row[:width] for row in rows[:height]]
 
 
 def _scale_at_home(traced: TracedPose) -> float:
     """Compute Hadamard's bound of det A at home, with its sign there; 1 where another working mode can't reach home."""
-    rows = np.array(_trace_leg_rows(traced, [np.float64(value) for value in traced.machine.home]), float)
+    machine = traced.machine
+    home = [np.float64(value) for value in machine.home]
+    with np.errstate(all="ignore"):
+        whole = machine.trace_rates(home, machine.trace_inverse(home, traced.mode)[0]).a
+    height, width = machine.parallel_block
+    rows = np.array(whole, float)[:height, :width]
     most = float(np.prod(np.sqrt((rows**2).sum(1))))
     if not (np.isfinite(most) and most > 0.0):
         return 1.0

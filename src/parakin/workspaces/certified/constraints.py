@@ -110,10 +110,19 @@ class TracedPose:
         """Inputs as :attr:`inputs`, of a trace whose angles don't jump over intervals."""
         return JumpFreeTrace().inputs(len(self.inputs))
 
+    def trace_margins(self) -> list[Scalar]:
+        """Trace the margins of the machine's limits."""
+        return self.machine.trace_margins(self.pose, self.mode)
+
+    def trace_twist_rows(self, inputs: Sequence[Scalar]) -> list[list[Scalar]]:
+        """Trace A of the tool's twist at the pose of these inputs."""
+        pose = self.place(inputs)
+        return self.machine.trace_rates(pose, self.machine.trace_inverse(pose, self.mode)[0]).a
+
     def build_constraints(self, without: Sequence[str] = ()) -> list[Constraint]:
         """Build the constraints of the machine's limits, but for those named in ``without``."""
         with np.errstate(all="ignore"):  # fixed axes out of reach give numbers that are not finite, a broken margin
-            margins = self.machine.trace_margins(self.pose, self.mode)
+            margins = self.trace_margins()
         d = len(self.free_axes)
         x, orientation = self.inputs[:d], self.inputs[d:]
         kept = [(name, g) for name, g in zip(self.machine.limits, margins, strict=True) if name not in without]

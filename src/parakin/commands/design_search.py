@@ -62,6 +62,12 @@ def _describe_objectives(problem: DesignProblem) -> str:
     return ", ".join(f"{way} {' and '.join(names)}" for way, names in ways if names)
 
 
+def _describe_tolerances(problem: DesignProblem) -> str:
+    """Say of which machines a proof is."""
+    own = ", ".join(f"{name} {value}" for name, value in (problem.within or {}).items())
+    return f" of all machines within {own}" if own else ""
+
+
 def _describe_proofs(number: int, design: ProvedDesign) -> str:
     """Say of which quantities less is proved than what was found where they were looked at."""
     said = []
@@ -94,7 +100,8 @@ def _format_designs(designs: Designs) -> str:
             ]
             for number, found in enumerate(designs.front, 1)
         ]
-        lines += [f"{problem.machine.name}: {len(rows)} proved, {_describe_objectives(problem)}\n"]
+        proved = f"{len(rows)} proved{_describe_tolerances(problem)}"
+        lines += [f"{problem.machine.name}: {proved}, {_describe_objectives(problem)}\n"]
         lines += [format_table(rows, header, "r" * len(header))]
         lines += [_describe_proofs(number, found) for number, found in enumerate(designs.front, 1)]
         lines = [line for line in lines if line]

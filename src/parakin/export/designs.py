@@ -21,6 +21,10 @@ def format_proved_yaml(designs: Designs, index: int) -> str:
         [
             "# A design found by search; that it keeps its limits all over this box of poses is proved by intervals:",
             f"# {box} (mm, rad){more}",
+            *(
+                f"# of every machine with {name} within {value}"
+                for name, value in (designs.problem.within or {}).items()
+            ),
             *(f"# {name}: {value:.9g}" for name, value in {**design.sizes, **design.values}.items()),
             *(f"# proved of {name}: {value:.9g}" for name, value in design.proved.items() if value is not None),
             design.machine.format_yaml(),

@@ -129,21 +129,21 @@ class _SizedBox(SetBox):
     size_box: SizeBox
 
     @property
-    def _count(self) -> int:
+    def searched(self) -> int:
         return len(self.ranges) - len(self.size_box.names)
 
     @cached_property
     def inputs(self) -> list[Term]:
-        return SizedJumpFreeTrace(self._count, self.size_box.family.nominal.tolist()).inputs(len(self.ranges))
+        return SizedJumpFreeTrace(self.searched, self.size_box.family.nominal.tolist()).inputs(len(self.ranges))
 
     @property
     def sizes(self) -> Mapping[str, Scalar]:
-        return dict(zip(self.size_box.names, self.inputs[self._count :], strict=True))
+        return dict(zip(self.size_box.names, self.inputs[self.searched :], strict=True))
 
     @property
     def widths(self) -> Array:
         """The sizes' are infinite: poses alone are bisected."""
-        return np.concatenate([(self.high - self.low)[: self._count], np.full(len(self.sizes), np.inf)])
+        return np.concatenate([(self.high - self.low)[: self.searched], np.full(len(self.sizes), np.inf)])
 
     @cached_property
     def samples(self) -> Array:
@@ -152,7 +152,7 @@ class _SizedBox(SetBox):
 
     @cached_property
     def pose(self) -> list[Scalar]:
-        return self.pose_set.place(dict(zip(self.ranges, self.inputs[: self._count], strict=False)))
+        return self.pose_set.place(dict(zip(self.ranges, self.inputs[: self.searched], strict=False)))
 
     @cached_property
     def _rates(self) -> tuple[TwistRates, list[Scalar]]:

@@ -17,6 +17,7 @@ def encode_designs(designs: Designs, files: Sequence[str]) -> dict[str, Any]:
         "minimise": list(designs.problem.minimise),
         "maximise": list(designs.problem.maximise),
         "bounds": dict(designs.problem.bounds),
+        "within": dict(designs.problem.within or {}),
         "designs": [
             {
                 "sizes": dict(design.sizes),

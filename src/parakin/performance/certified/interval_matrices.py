@@ -40,6 +40,11 @@ class PoseBox:
         return np.array([ends[1] for ends in self.ranges.values()], float)
 
     @property
+    def searched(self) -> int:
+        """How many inputs, the first ones, differ among the samples and are worth a search."""
+        return len(self.ranges)
+
+    @property
     def widths(self) -> Array:
         """What the widths of parts are compared with, where one is bisected, (d,)."""
         return self.high - self.low

@@ -143,9 +143,16 @@ class NormSearch:
         values = self._evaluate(points)
         first = pick_best_of_blocks(points, values, _STARTS) if points.shape[1] else np.zeros(1, np.int64)
         self._try_points(points[first])
-        if not points.shape[1] or not len(first):
+        d = self.box.searched
+        if not d or not len(first):
             return
-        self._try_points(search_maxima_in_box(self._evaluate, self.box.low, self.box.high, points[first], 1e-6)[0])
+
+        def extend(inner: Array) -> Array:
+            return np.hstack([inner, np.broadcast_to(points[0, d:], (len(inner), points.shape[1] - d))])
+
+        low, high = self.box.low[:d], self.box.high[:d]
+        best, _ = search_maxima_in_box(lambda inner: self._evaluate(extend(inner)), low, high, points[first, :d], 1e-6)
+        self._try_points(extend(best))
 
     def _try_points(self, points: Array) -> None:
         """Keep the best of these points if it is better than all before."""

@@ -1,0 +1,127 @@
+"""Designs for all machines within tolerance: against machines that are drawn, the worst corners among them."""
+
+import json
+
+import numpy as np
+import pytest
+from shipped import load_shipped
+
+import parakin as pk
+from parakin.cli import main
+
+CUBE = dict.fromkeys("XYZ", (-100.0, 100.0))
+WITHIN = {"feet": "0.1 mm", "rods": "0.05 mm"}
+HALVES = {"feet": 0.1, "rods": 0.05}
+BOUND = 3.0
+TRICEPT = {"X": (-530.0, 530.0), "Y": (-492.0, 492.0), "Z": (-130.0, 130.0), "B": 0.0, "C": 0.0}
+
+
+def glide(within):
+    return pk.DesignProblem(
+        load_shipped("orthoglide"), {"L": (150.0, 500.0)}, CUBE, ["L"], {"X Y Z": (-150.0, 150.0)},
+        {"amplification": BOUND}, fit_strokes=True, within=within,
+    )  # fmt: skip
+
+
+def find_best(problem):
+    found = pk.find_designs(problem)
+    assert not found.unproved
+    assert not found.shortfall
+    return found.front[0]
+
+
+class Made:
+    """Machines of a design within tolerance: numbers moved by parts -1 to 1 of it."""
+
+    def __init__(self, design, halves):
+        self.family = pk.family(design.machine, list(halves))
+        self.halves = np.array([halves[p.group] for p in self.family.parameters])
+        self.low, self.high = np.array([design.box[axis] for axis in design.machine.axes]).T
+
+    def draw_poses(self, count):
+        """Corners of the box, and poses in it."""
+        rng = np.random.default_rng(4)
+        inside = rng.uniform(self.low, self.high, (count, len(self.low)))
+        return np.concatenate([np.where(rng.random(inside.shape) < 0.5, self.low, self.high), inside])
+
+    def draw_moves(self, count):
+        rng, k = np.random.default_rng(3), len(self.halves)
+        return np.concatenate([rng.choice([-1.0, 1.0], (count, k)), rng.uniform(-1.0, 1.0, (count, k))])
+
+    def measure_amplification(self, moves, poses):
+        """The greatest of each machine, (machines,); of three translations it is that of A⁻¹B."""
+        a, b, _ = self.family.jacobians(poses, (self.family.nominal + moves * self.halves)[:, None])
+        singular = np.linalg.svd(np.linalg.solve(a, b), compute_uv=False)
+        return np.maximum(singular[..., 0], 1.0 / singular[..., -1]).max(1)
+
+    def find_worst_move(self, poses):
+        """Each number at the end at which the amplification is greater, moved alone."""
+        alone = np.eye(len(self.halves))
+        return np.sign(self.measure_amplification(alone, poses) - self.measure_amplification(-alone, poses))
+
+    def find_least_margin(self, moves, poses):
+        return self.family.margins(poses, (self.family.nominal + moves * self.halves)[:, None]).min()
+
+
+def test_every_machine_that_is_made_keeps_the_bounds():
+    best, nominal = find_best(glide(WITHIN)), find_best(glide(None))
+    assert best.sizes["L"] > nominal.sizes["L"] + 0.1
+    worst, margins = [], []
+    for design in (best, nominal):
+        made = Made(design, HALVES)
+        poses = made.draw_poses(100)
+        moves = np.concatenate([made.find_worst_move(poses)[None], made.draw_moves(200)])
+        worst.append(made.measure_amplification(moves, poses).max())
+        margins.append(made.find_least_margin(moves, poses))
+    assert margins[0] >= 0.0 > margins[1]
+    assert worst[1] > BOUND * (1.0 + 1e-3)
+    assert best.values["amplification"] < worst[0] <= best.proved["amplification"] <= BOUND * (1.0 + 2e-6)
+    assert worst[0] > 0.99 * BOUND  # no more is kept in hand than is needed
+
+
+def test_a_tricept_keeps_its_strokes_whatever_feet_are_made():
+    shift, halves = {"Y": (-200.0, 200.0), "Z": (-2000.0, -1000.0)}, {"feet": 0.2, "platform": 0.2}
+    problem = pk.DesignProblem(
+        load_shipped("tricept"), {"R": (200.0, 500.0)}, TRICEPT, ["footprint"], shift,
+        within={name: f"{half} mm" for name, half in halves.items()},
+    )  # fmt: skip
+    best = find_best(problem)
+    assert 400.0 + 2.0 * 0.2 < best.proved["footprint"] < 400.0 + 2.0 * 0.2 * np.sqrt(2.0) * 1.2
+    made = Made(best, halves)
+    assert made.find_least_margin(made.draw_moves(100), made.draw_poses(300)) >= 0.0
+
+
+def test_more_than_can_be_kept_is_said():
+    found = pk.find_designs(glide({"rods": "60 mm"}))
+    assert not found.front
+    assert found.shortfall or found.unproved
+
+
+def test_the_command_tells_of_which_machines(capsys, tmp_path):
+    path = tmp_path / "made.yaml"
+    path.write_text(
+        "machine: orthoglide\nfree: {L: [150 mm, 500 mm]}\n"
+        "box: {X: [-100 mm, 100 mm], Y: [-100 mm, 100 mm], Z: [-100 mm, 100 mm]}\n"
+        "bounds: {amplification: 4}\nwithin: {rods: 0.05 mm}\nstrokes: fit\nminimise: L\n"
+    )
+    assert main(["design", str(path), "-o", str(tmp_path / "out"), "--json"]) == 0
+    said = json.loads(capsys.readouterr().out)
+    assert said["within"] == {"rods": "0.05 mm"}
+    assert said["designs"][0]["verdict"] == "proved"
+    assert "# of every machine with rods within 0.05 mm" in (tmp_path / "out" / "design_1.yaml").read_text()
+
+
+@pytest.mark.parametrize(
+    ("within", "message"),
+    [
+        ({"L": "0.1 mm"}, "within: L is a named size; tolerances of numbers that are made expected, such as feet"),
+        ({"foots": "0.1 mm"}, 'within: unknown "foots"'),
+        ({"rods": "0.1"}, 'within: tolerance rods: "0.1" needs a unit'),
+        ({"rods": "1 deg"}, "within: tolerance rods: legs.rho_x.rod is a length"),
+        ({}, "within: tolerances: at least one expected"),
+    ],
+)
+def test_bad_tolerances_are_refused(within, message):
+    with pytest.raises(pk.PoseError) as caught:
+        glide(within)
+    assert str(caught.value).startswith(message)

@@ -217,13 +217,13 @@ def well_away(m, poses, mode, serial):
     """Poses well away from the singularities of the legs, and of head and table."""
     a, b = m.jacobians(poses, mode=mode)
     calm = np.isfinite(a).all((1, 2)) & np.isfinite(b).all((1, 2))
-    calm[calm] &= np.abs(np.linalg.det(a[calm])) > 0.0
-    rates = np.linalg.solve(a[calm], b[calm])
+    calm[calm] &= np.linalg.cond(a[calm]) < 1e14
+    rates = np.linalg.pinv(a[calm]) @ b[calm]
     scale = np.where(np.array(m.axis_units) == "mm", 1.0, 200.0)[:, None]
     scale = scale / np.where(np.array(m.joint_units) == "mm", 1.0, 200.0)
     if serial:
         calm[calm] &= np.abs(np.linalg.det(b[calm][:, -serial:, -serial:])) > 0.1
-        rates = np.linalg.solve(a[calm], b[calm])
+        rates = np.linalg.pinv(a[calm]) @ b[calm]
     calm[calm] &= np.linalg.norm(rates * scale, axis=(1, 2)) < 15.0
     return calm
 

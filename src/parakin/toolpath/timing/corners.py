@@ -12,7 +12,7 @@ from ...kernels.batch import run_in_threads
 from ...kinematics.wrist.pole_thresholds import PRINTED, RIM, RIM_WIDTH
 from ...machine import Machine
 from ..posting.posted import Posted
-from .kernels.rounded_corners import SLIVER, align_lengths, blend_poses
+from .kernels.rounded_corners import SLIVER, blend_poses
 
 Corners: TypeAlias = Literal["round", "stop"]
 
@@ -22,23 +22,16 @@ _SAME = 1e-6  # mm: records no farther apart are one corner
 _TIGHT = 1e-5  # mm of reach for each rad (mm/mm) of turn: a corner passed so slowly is as well stopped at
 _BESIDE = 0.05  # a rounding ends at a piece's end, or at least this fraction of the piece from it
 _BENT = 1e-9  # rad/mm and mm/mm: what is rounding
-_TURNING = 0.25  # fraction of a piece's length that is the tip's, where angles make most of it
-_LIKE = 1.5  # neighbouring pieces may count as equally long if neither is longer than this times the other
-_STEADY = 0.5  # and the logarithm of their ratio changes by no more than this fraction from corner to corner,
-_JITTER = 1e-4  # or by rounding
 _KEPT = 0.995  # fraction of the tolerances that corners use; the rest is for the error of the joints' splines
 
 
 class Curve(NamedTuple):
     """A tool path as a curve over its length s, c corners.
 
-    s counts mm of the tip and, for turns of the pose's angles, LEVER mm a rad (root of the sum of squares). Pieces
-    that are mostly turns, and whose lengths change steadily, count as equally long: roundings that reach over whole
-    pieces then are a uniform cubic B-spline, which does not tremble from piece to piece.
-
-    Between corners the pose is linear in s. Where two straight pieces meet, the pose's derivative by s turns from one
-    slope to the next within ``reach`` on either side; its second derivative rises and falls linearly, so two
-    derivatives are continuous. The pose is then nowhere farther from the polyline than at the corners, |turn|·reach/6.
+    s counts mm of the tip and, for turns of the pose's angles, LEVER mm a rad (root of the sum of squares). Between
+    corners the pose is linear in s. Where two straight pieces meet, the pose's derivative by s turns from one slope to
+    the next within ``reach`` on either side; its second derivative rises and falls linearly, so two derivatives are
+    continuous. The pose is then nowhere farther from the polyline than at the corners, |turn|·reach/6.
 
     corner : (c, axes) poses, mm and rad
     length : (c - 1,) of the pieces
@@ -90,20 +83,12 @@ def round_corners(
     corner = np.ascontiguousarray(poses[moved])
     motion = np.diff(corner, axis=0)
     length = _compute_norms(motion * scale)
-    parted = np.zeros(len(corner), bool)
-    parted[corner_of_record[stops]] = True
-    parted[[0, -1]] = True
-    if smooth and corners == "round":
-        bend = np.zeros_like(corner)
-        bend[1:-1] = np.diff(motion, axis=0) / 6.0
-        kept = _compute_norms(bend * ~angles) < _KEPT * tolerance
-        kept &= _bound_axis_turn(posted.machine, corner, bend) < _KEPT * axis_tolerance
-        turns = _compute_norms(motion * ~angles) < _TURNING * length
-        kept[1:-1] &= turns[1:] & turns[:-1]  # where the tip moves, its feed would have to follow the change
-        length = _align_lengths(posted.machine, corner, length, kept, parted)
     slope = motion / length[:, None]
     turn = np.zeros_like(corner)
     turn[1:-1] = np.diff(slope, axis=0)
+    parted = np.zeros(len(corner), bool)
+    parted[corner_of_record[stops]] = True
+    parted[[0, -1]] = True
     sharpness = _compute_norms(turn * scale)
     if not smooth:
         parted[:] = True
@@ -117,24 +102,6 @@ def round_corners(
     parted |= (reach < _TIGHT * sharpness) | _find_bends_on_pole(posted.machine, corner, turn)
     turn[parted] = sharpness[parted] = reach[parted] = 0.0
     return Curve(corner, length, slope, turn, sharpness, reach, parted, corner_of_record, record_of_piece)
-
-
-def _align_lengths(machine: Machine, corner: Array, length: Array, kept: Flags, parted: Flags) -> Array:
-    """Let neighbouring pieces whose lengths (c - 1,) change steadily count as equally long.
-
-    kept : (c,) corners between turns, at which a rounding over both whole pieces keeps to the tolerances then
-    """
-    growth = np.diff(np.log(length))
-    change = np.abs(np.diff(growth, prepend=growth[:1], append=growth[-1:]))
-    size = np.abs(growth)
-    steady = (size < np.log(_LIKE)) & (np.maximum(change[:-1], change[1:]) <= _STEADY * size + _JITTER)
-    even = kept & ~parted
-    even[1:-1] &= steady
-    if machine.wrist is not None:
-        even &= ~machine.wrist.find_free(corner, RIM + RIM_WIDTH)  # where any bend parts the curve
-    result = np.empty_like(length)
-    align_lengths(length, even, parted, result)
-    return result
 
 
 def _find_bends_on_pole(machine: Machine, corner: Array, turn: Array) -> Flags:

@@ -16,24 +16,6 @@ import numpy as np
 from ....kernels.compiling import njit
 
 SLIVER = 2e-3  # knots nearer to each other than this fraction of a piece are one
-_FARTHEST = 1e3  # from its own length that of a piece is never led
-
-
-@njit(nogil=True, cache=True)
-def align_lengths(length, even, parted, result):
-    """Lead the lengths of pieces, (pieces,), into ``result`` so that both pieces at the corners ``even`` are equal.
-
-    At other corners the ratio of both stays, and at parted ones a piece has its own length.
-    """
-    scale = 1.0
-    for piece in range(len(length)):
-        if parted[piece]:
-            scale = 1.0
-        elif even[piece]:
-            next_scale = scale * length[piece - 1] / length[piece]
-            if 1.0 / _FARTHEST < next_scale < _FARTHEST:
-                scale = next_scale
-        result[piece] = scale * length[piece]
 
 
 @njit(nogil=True, cache=True)

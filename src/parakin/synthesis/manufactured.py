@@ -23,6 +23,7 @@ from ..model.nominal_values import SizedTrace
 from ..model.rates import TwistRates
 from ..performance.characteristic_length import CharacteristicLength
 from ..performance.jacobians import list_column_scales
+from ..workspaces.certified.sign_proofs import SignProof
 from .pose_sets import PoseSet, SetBox, TracedSet
 
 _SAME = 1e-3  # relative: a reserve that grows by less is the same
@@ -119,6 +120,10 @@ class _SizedSet(TracedSet):
 
     def trace_margins(self) -> list[Scalar]:
         return [margin for _, margin in self.equations.own_margins(self.pose, self.mode)]
+
+    def _make_sign_proofs(self) -> dict[str, SignProof]:
+        """Make none: those of cones and struts are of the nominal machine."""
+        return {}
 
     def trace_twist_rows(self, inputs: Sequence[Scalar]) -> list[list[Scalar]]:
         return _trace_rates(self.size_box, self.place(inputs), inputs[self._count :], self.mode).a

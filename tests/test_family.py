@@ -175,7 +175,9 @@ def test_sizes_that_break_the_machine_are_refused():
 # Named sizes.
 
 
-@pytest.mark.parametrize("name", ["tricept", "linear_delta", "rotary_delta", "orthoglide", "lambda6", "hexapod"])
+@pytest.mark.parametrize(
+    "name", ["tricept", "linear_delta", "rotary_delta", "lambda6", "hexapod", "exechon", "sprint_z3", "triglide_pairs"]
+)
 def test_named_sizes_are_inputs(name):
     """Against machines of the file with other sizes."""
     machine = load_shipped(name)

@@ -2,6 +2,7 @@
 
 import json
 import zipfile
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -446,9 +447,18 @@ def test_sizes_are_inputs_of_a_page(name, browser):
     assert np.abs(off).max() < AGREE
 
 
-def test_sizes_that_change_numbers_unevenly_are_left_out():
+def test_sizes_that_change_numbers_unevenly_or_the_structure_are_left_out(tmp_path):
     assert load_shipped("hexam").size_rates.names == ("R", "r", "rod", "tool")  # lean turns the rails
     assert load_shipped("tricept").size_rates.names == ("R", "r", "l1", "l2")
+    text = (Path(pk.__file__).parent / "machines" / "triglide_pairs.yaml").read_text(encoding="utf-8")
+    text = text.replace("  half:", "  second: 650 mm\n  half:").replace("{rod: rod, on: left", "{rod: second, on: left")
+    (tmp_path / "pairs.yaml").write_text(text, encoding="utf-8")
+    assert pk.load(tmp_path / "pairs.yaml").size_rates.names == (
+        "side",
+        "wide",
+        "half",
+        "tool",
+    )  # of rods one skews the pair
     machine = load_shipped("tricept").replace_parameters({"legs.d1.foot.x": 1.0})
     assert machine.size_rates.names == ()  # of no file
 

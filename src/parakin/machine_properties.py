@@ -11,7 +11,7 @@ import numpy as np
 from .algebra import Scalar
 from .arguments import check_constructor
 from .arrays import Array, AxisRange
-from .errors import NoMethodError
+from .errors import DescriptionError, NoMethodError
 from .kinematics.closure_roots import compute_closure_tolerance
 from .kinematics.home import check_home
 from .kinematics.wrist.pose_angles import EVERY_DIRECTION, EVERY_ROTATION, EVERY_TURN
@@ -25,7 +25,7 @@ from .model.nominal_values import SizedTrace
 from .model.rates import list_closure_joints
 from .model.size_rates import SizeRates, SpecMaker, find_size_rates, list_numbers
 from .model.spec import Spec
-from .model.structures import DirectionColumns, Structure
+from .model.structures import DirectionColumns, Structure, make_structure
 from .model.traces import Model
 from .units import AXIS_UNITS
 
@@ -182,11 +182,19 @@ class MachineProperties:
     def size_rates(self) -> SizeRates:
         """How the machine's numbers follow the named sizes of its file; none for one of no file.
 
-        There are none either where a platform is guided by constraints: its frame is found with plain numbers.
+        There are none either where constraints are solved in steps; a size without which they are not is left out.
         """
-        if self._make_spec is None or not self.structure.takes_traced_sizes:
+        if self._make_spec is None or self.structure.is_solved:
             return SizeRates((), (), ((),) * len(list_numbers(self.spec)))
-        return find_size_rates(self.spec, self._make_spec)
+        return find_size_rates(self.spec, self._make_spec if self.spec.constraints == () else self._make_closed_spec)
+
+    def _make_closed_spec(self, sizes: Mapping[str, float]) -> Spec:
+        """Make the description with other sizes, where its constraints have a closed form there too."""
+        assert self._make_spec is not None
+        spec = self._make_spec(sizes)
+        if make_structure(spec).is_solved:
+            raise DescriptionError("sizes", "the constraints have a closed form with the file's sizes only")
+        return spec
 
     def trace_sign_forms(self, pose: Sequence[Scalar], mode: str) -> SignForms:
         """Trace what tells the signs of limits' margins that intervals bound badly."""

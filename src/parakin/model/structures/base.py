@@ -59,7 +59,6 @@ class Structure(ABC):
     serial_order: tuple[int, ...] = ()  # the serial joints that turn them, in that order
     direction: DirectionColumns | None = None  # where of the orientation the tool's axis counts only
     has_central_leg: bool = False
-    takes_traced_sizes: bool = True  # whether the description's numbers may be scalars of any kind
     carries_pole: bool = False  # the pose turns the platform, and with it the first axis of ``pointing``
     writes_frames_once: bool = True  # whether its coordinates hold every frame that its motion's words reach
     has_slides: bool = False  # the table's drives slide it

@@ -35,8 +35,6 @@ class Guided(Structure):
     Small turns are about the machine frame's axes.
     """
 
-    takes_traced_sizes = False  # its frame is found with plain numbers
-
     def __init__(self, spec: Spec):
         super().__init__(spec)
         self.coordinates = list_independent_words(spec)
@@ -52,7 +50,7 @@ class Guided(Structure):
                 "head", "a guided platform without a drive in head or table turns neither it nor its mounting"
             )
         _, self.tip = compose_chain(spec.head, ())
-        home = [float(spec.home.get(letter, 0.0)) for letter in self.axes]
+        home = [spec.home.get(letter, 0.0) for letter in self.axes]
         self.turned: TurnedByPlanes | UnturnedByRods | None = None
         self.planes: TurnInBasePlanes | None = None
         self.solved: SolvedConstraints | None = None

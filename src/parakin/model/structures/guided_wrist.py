@@ -26,8 +26,6 @@ class WristOnGuidedPlatform(FiveAxis):
     carries_pole = True
     serial_order = (0, 1)
 
-    takes_traced_sizes = False  # its frame is found with plain numbers
-
     def __init__(self, spec: Spec):
         super().__init__(spec)
         self.coordinates = list_independent_words(spec)
@@ -42,7 +40,7 @@ class WristOnGuidedPlatform(FiveAxis):
         if max(abs(find_nominal_value(c)) for c in centre) > _ZERO * (1.0 + abs(find_nominal_value(self.reach))):
             raise DescriptionError("head", "its axes must meet in the platform's origin")
         self.turned = TurnedByPlanes(spec)
-        home = [float(spec.home.get(letter, 0.0)) for letter in self.axes]
+        home = [spec.home.get(letter, 0.0) for letter in self.axes]
         self.turned.choose_branches(self._centre(home, turn_tool_axis(home)[0]))
 
     def _centre(self, pose: Sequence[Scalar], k: Vec) -> Vec:

@@ -123,7 +123,7 @@ class TurnsInPlatformPlanes:
     def solve(self, origin: Vec, branches: tuple[float, float]) -> FoundFrame:
         """Find the frame whose origin is given (base frame, mm)."""
         across = sub(self.first.foot, self.second.foot)
-        offsets = [float(dot(c.normal, c.platform)) for c in (self.first, self.second, self.third)]
+        offsets = [dot(c.normal, c.platform) for c in (self.first, self.second, self.third)]
         v, first_margin = find_direction(
             across, offsets[0] - offsets[1], sub(self.first.foot, origin), offsets[0], branches[0]
         )

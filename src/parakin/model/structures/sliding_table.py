@@ -36,8 +36,6 @@ class SlidingTable(FiveAxis):
     branches = ""
     has_slides = True
 
-    takes_traced_sizes = False  # its frame is found with plain numbers
-
     def __init__(self, spec: Spec):
         super().__init__(spec)
         self.coordinates = list_independent_words(spec)
@@ -63,7 +61,7 @@ class SlidingTable(FiveAxis):
         first, second = self.turn_words[:2]
         self.tilts = Pointing(UNIT[first], UNIT[second], UNIT["tz"])
         self.branch = 1.0
-        home = [float(spec.home.get(letter, 0.0)) for letter in self.axes]
+        home = [spec.home.get(letter, 0.0) for letter in self.axes]
         self.branch = choose_branch(self._place(home, turn_tool_axis(home)[0])[0].rotation[0][0])
 
     def _read_slides(self) -> None:

@@ -111,7 +111,22 @@ def test_on_the_pole_the_nearest_joints_have_the_guess_s_first(machine):
     joints, modes = machine.wrist.solve_nearest(poses, machine.mode, guess, PRINTED)
     assert (modes == EITHER).all()
     np.testing.assert_array_equal(joints[:, machine.wrist.first], guess[:, machine.wrist.first])
-    assert machine.wrist.measure_blur(poses).min() > 1e6
+    assert machine.wrist.measure_blur(poses, machine.mode, joints)[:, machine.wrist.first].min() > 1e6
+
+
+def test_beside_a_table_s_pole_the_legs_are_as_vague_as_the_turn_of_the_part():
+    """The part is 40 mm off the table's axis: joints were taken to jump by roundings of its turn."""
+    machine = load_shipped("orthoglide5_table")
+    lean, c = 8e-6, np.linspace(0.1, 3.0, 40)
+    poses = np.column_stack([np.tile([30.0, -26.0, 4.0], (40, 1)), np.full(40, lean), c])
+    joints = machine.inverse(poses)
+    blur = machine.wrist.measure_blur(poses, machine.mode, joints)
+    turned = poses.copy()
+    turned[:, 4] += 1e-6  # of C turns the part by as much, and legs by what its lever makes of it
+    lever = np.abs(machine.inverse(turned) - joints)[:, :3] / 1e-6
+    vague = (blur[:, :3] - np.maximum(1.0, np.abs(joints[:, :3]))) / blur[:, 4:]
+    assert lever.max() > 20.0
+    np.testing.assert_allclose(vague, lever, rtol=0.01, atol=0.1)
 
 
 @given(angles, angles)

@@ -18,6 +18,7 @@ from .pole_crossing import EITHER, OTHER, OWN, WristModes, find_crossings, flip_
 from .pole_thresholds import DISTINCT, EXACT, PRINTED, SAME_MODE, SWING, convert_to_freedom
 
 MODE_LEVER = 100.0  # mm/rad: where the joints of two modes are compared, how far a turn by one rad is
+_SLIGHTLY = 1e-4  # rad: a turn by which the rates of joints are told
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,10 +114,19 @@ class Wrist:
         kept[free] = EITHER
         return own, kept
 
-    def measure_blur(self, poses: Array) -> Array:
-        """Compute the factor (n,), ≥ 1, by which the first joint is less exact than the others at poses (n, axes)."""
-        freedom = np.maximum(self.measure_freedom(poses), convert_to_freedom(EXACT))
-        blur: Array = np.maximum(1.0, DISTINCT / np.sqrt(freedom))
+    def measure_blur(self, poses: Array, mode: str, joints: Array) -> Array:
+        """Compute how many units of rounding joints (n, joints) of poses (n, axes) are off, (n, joints), mm and rad.
+
+        Off the pole that is a joint's size, at least 1. Beside it the first joint is less exact, and so are the others
+        that turn what it turns.
+        """
+        blur = np.maximum(1.0, np.abs(joints))
+        off_pole = np.sqrt(np.maximum(self.measure_freedom(poses), convert_to_freedom(EXACT)))
+        near = np.flatnonzero(off_pole < DISTINCT)
+        first = joints[near, self.first]
+        turned, still = (self.solve_with_first(poses[near], mode, first + by) for by in (_SLIGHTLY, 0.0))
+        vague = blur[near, self.first] * DISTINCT / off_pole[near]
+        blur[near] += np.nan_to_num(vague[:, None] * np.abs(turned - still) / _SLIGHTLY)
         return blur
 
     def find_reachable(self, joints: Array) -> Flags:

@@ -103,13 +103,15 @@ class JointPath:
     def joints_at(self, row: Indices, shift: Array) -> tuple[Array, Array, Array]:
         """Compute the machine's joints ``shift`` mm after rows (k,), the nearest to the splines, and the splines.
 
-        The third (k,) is how much less exact the wrist's first joint is than the others, ≥ 1.
+        The third (k, joints) is how far rounding takes the former off.
         """
         still = np.zeros(len(row))
         splined = self.evaluate(PathState(row, shift, still, still)).joints
         machine, poses = self.posted.machine, self.poses(row, shift)
-        blur = np.ones(len(row)) if machine.wrist is None else machine.wrist.measure_blur(poses)
-        return find_nearest_joints(machine, self.posted.mode, poses, splined), splined, blur
+        joints = find_nearest_joints(machine, self.posted.mode, poses, splined)
+        if machine.wrist is None:
+            return joints, splined, _NOISE * np.maximum(1.0, np.abs(joints))
+        return joints, splined, _NOISE * machine.wrist.measure_blur(poses, self.posted.mode, joints)
 
     def __repr__(self) -> str:
         return f"<parakin joint path: {len(self.segment)} rows>"
@@ -207,13 +209,10 @@ def _widen_flags(flags: Flags) -> Flags:
 
 def _find_coarse_steps(joint_path: JointPath, tolerances: SplineTolerances, candidates: Indices) -> Indices:
     """Find those of some steps over which the splines are off by more than the tolerances."""
-    blocks, wrist = [], joint_path.posted.machine.wrist
+    blocks = []
     for begin in range(0, len(candidates), _BLOCK):
         steps = candidates[begin : begin + _BLOCK]
-        joints, splined, blur = joint_path.joints_at(steps, 0.5 * joint_path.step[steps])
-        rounding = np.full(joints.shape, _NOISE)
-        if wrist is not None:
-            rounding[:, wrist.first] *= blur
+        joints, splined, rounding = joint_path.joints_at(steps, 0.5 * joint_path.step[steps])
         coarse = np.empty(len(steps), bool)
         mark = partial(
             mark_coarse_steps, joint_path.rows, steps, Midpoints(joints, splined, rounding), tolerances, coarse

@@ -65,10 +65,7 @@ class JointState(NamedTuple):
 
 
 class Midpoints(NamedTuple):
-    """The middle of k steps, (k, joints) each: the machine's joints, the splines', and the rounding of the former.
-
-    rounding : relative to a joint's size
-    """
+    """The middle of k steps, (k, joints) each: the machine's joints, the splines', and the rounding of the former."""
 
     joints: Array
     splined: Array
@@ -171,7 +168,7 @@ def mark_coarse_steps(rows, steps, middle, tolerances, coarse, start, stop):
         coarse[k] = False
         for j in range(len(limit)):
             off = abs(middle.joints[k, j] - middle.splined[k, j])
-            if off > middle.rounding[k, j] * max(1.0, abs(middle.splined[k, j])):
+            if off > middle.rounding[k, j]:
                 # a spline off in the middle is off 32/h² times as much in its second derivative
                 harder = limit[j] < np.inf and 32.0 * off / rows.step[i] ** 2 * x > tolerances.fraction * limit[j]
                 coarse[k] |= off > tolerances.joints[j] or harder

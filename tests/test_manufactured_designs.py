@@ -8,6 +8,8 @@ from shipped import load_shipped
 
 import parakin as pk
 from parakin.cli import main
+from parakin.synthesis.manufactured import SizeBox
+from parakin.synthesis.pose_sets import make_box_set
 
 CUBE = dict.fromkeys("XYZ", (-100.0, 100.0))
 WITHIN = {"feet": "0.1 mm", "rods": "0.05 mm"}
@@ -89,6 +91,52 @@ def test_a_tricept_keeps_its_strokes_whatever_feet_are_made():
     assert 400.0 + 2.0 * 0.2 < best.proved["footprint"] < 400.0 + 2.0 * 0.2 * np.sqrt(2.0) * 1.2
     made = Made(best, halves)
     assert made.find_least_margin(made.draw_moves(100), made.draw_poses(300)) >= 0.0
+
+
+def test_a_delta_keeps_clearances_and_cones_whatever_is_made():
+    halves = {"feet": 0.5, "platform": 0.5, "rods": 0.2}
+    box, missed = {"X": (-120.0, 120.0), "Y": (-120.0, 120.0), "Z": (230.0, 330.0)}, []
+    for within in ({name: f"{half} mm" for name, half in halves.items()}, None):
+        problem = pk.DesignProblem(
+            load_shipped("linear_delta"), {"plate": (20.0, 120.0)}, box, ["plate"], fit_strokes=True, within=within
+        )  # fmt: skip
+        made = Made(find_best(problem), halves)
+        moves = (made.family.nominal + made.draw_moves(100) * made.halves)[:, None]
+        least = made.family.margins(made.draw_poses(50), moves).min((0, 1))
+        missed.append([name for name, margin in zip(problem.machine.limits, least, strict=True) if margin < 0.0])
+    assert not missed[0]
+    assert "clearance tower_a-tower_b" in missed[1]
+
+
+@pytest.mark.parametrize("name", ["hexapod", "linear_delta"])
+def test_signs_that_are_proved_are_those_of_every_machine(name):
+    """The closer proofs of cones and clearances, on parts of a box where one of them ends."""
+    m, rng, halves = load_shipped(name), np.random.default_rng(7), {"feet": 0.25, "platform": 0.25}
+    ends = {axis: ((home - 400.0, home + 400.0) if axis in "XYZ" else (-0.6, 0.6)) for axis, home in
+            zip(m.axes, m.home.tolist(), strict=True)}  # fmt: skip
+    poses = make_box_set(m, ends, "box")
+    size_box = SizeBox(m, {group: f"{half} mm" for group, half in halves.items()})
+    limits = [c for c in size_box.trace_set(poses).build_limits() if c.sign is not None]
+    nominal = [c for c in poses.trace(m).build_limits() if c.sign is not None]
+    columns = [m.limits.index(c.name) for c in limits]
+    low, high = poses.bounds
+    drawn = rng.uniform(low, high, (20_000, len(low)))
+    near = np.abs(m.margins(drawn)[:, columns] * [1.0 if "clear" in c.name else 300.0 for c in limits]).min(1)
+    middle = drawn[near.argsort()[:100]]
+    half = 10.0 ** rng.uniform(-5, -1, (100, 1)) * (high - low)
+    numbers = [np.tile(end, (len(half), 1)) for end in size_box.bounds]
+    boxes = np.hstack([middle - half, numbers[0]]), np.hstack([middle + half, numbers[1]])
+    signs = np.stack([c.sign(*boxes).sign for c in limits], 1)
+    of_nominal = np.stack([c.sign(middle - half, middle + half).sign for c in nominal], 1)
+    known, wrong = size_box.family.nominal, 0
+    for move in rng.choice([-1.0, 1.0], (10, len(known))) * size_box.halves:
+        made = m.replace_parameters(dict(zip(size_box.names, (known + move).tolist(), strict=True)))
+        margins = made.margins(middle + half * rng.uniform(-1.0, 1.0, half.shape))[:, columns]
+        assert not ((signs > 0.0) & (margins < 0.0) | (signs < 0.0) & (margins >= 0.0)).any()
+        wrong += np.count_nonzero((of_nominal > 0.0) & (margins < 0.0) | (of_nominal < 0.0) & (margins >= 0.0))
+    assert (signs > 0.0).mean() > 0.5
+    assert (signs < 0.0).any()
+    assert wrong > 0  # the nominal machine's signs are not those of all
 
 
 def test_more_than_can_be_kept_is_said():

@@ -20,7 +20,7 @@ from .model.elements import BodyBuild, Drive, PlaneConstraint, RodConstraint
 from .model.equations import Equations
 from .model.geometric_parameters import SIZES, Parameter, list_parameters, replace_parameters
 from .model.legs import Leg
-from .model.limits import Limit, SignForms, group_joints_by_leg
+from .model.limits import Limit, group_joints_by_leg
 from .model.nominal_values import SizedTrace
 from .model.rates import list_closure_joints
 from .model.size_rates import SizeRates, SpecMaker, find_size_rates, list_numbers
@@ -163,7 +163,7 @@ class MachineProperties:
         shifts : what is added to parameters, once the others follow from ``values``
         """
         if not shifts:
-            return Equations(self._replace_numbers(values))
+            return Equations(self._replace_numbers(values)) if values else self.model
         named = {p.name: values.get(p.name, p.value) + shifts[p.name] for p in self.parameters if p.name in shifts}
         spec = self._replace_numbers({**values, **{name: x for name, x in named.items() if name in self.spec.sizes}})
         shifted = {p.name: p.value + shifts[p.name] for p in list_parameters(spec) if p.name in shifts}
@@ -195,10 +195,6 @@ class MachineProperties:
         if make_structure(spec).is_solved:
             raise DescriptionError("sizes", "the constraints have a closed form with the file's sizes only")
         return spec
-
-    def trace_sign_forms(self, pose: Sequence[Scalar], mode: str) -> SignForms:
-        """Trace what tells the signs of limits' margins that intervals bound badly."""
-        return self.model.list_sign_forms(pose, mode)
 
     def trace_sized_equations(self, trace: SizedTrace) -> Equations:
         """Trace the machine's equations with the sizes of :attr:`size_rates` as inputs of a trace."""

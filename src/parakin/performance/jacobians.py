@@ -81,3 +81,12 @@ def list_column_scales(machine: Machine, length: CharacteristicLength) -> tuple[
     turns = len(machine.structure.turns)
     a = np.array([1.0] * (len(machine.axes) - turns) + [small] * turns)
     return a, np.array([small if unit == "rad" else 1.0 for unit in machine.joint_units])
+
+
+def scale_twist_rates(machine: Machine, rates: TwistRates, length: CharacteristicLength) -> TwistRates:
+    """Scale the columns of A and B to mm: angles times the length."""
+    a, b = (
+        [[x * factor for x, factor in zip(row, scales.tolist(), strict=True)] for row in rows]
+        for rows, scales in zip((rates.a, rates.b), list_column_scales(machine, length), strict=True)
+    )
+    return TwistRates(a, b, rates.wrench_norms)

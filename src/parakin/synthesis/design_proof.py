@@ -51,11 +51,11 @@ class DesignProof:
         """Prove the limits, the side of the singularities, and bounds that are margins; returns what fails, or ""."""
         for number, poses in enumerate(self.sets):
             traced = poses.trace(self.machine) if self.size_box is None else self.size_box.trace_set(poses)
-            constraints = [c for c in traced.build_constraints() if not c.implied]
+            constraints = traced.build_limits()
             constraints.append(make_side_constraints(traced)[0])
             d = len(traced.free_axes)
             position, orientation = traced.inputs[:d], traced.inputs[d:]
-            equations = traced.equations
+            equations = traced.trace_equations(traced.inputs)
             for name, bound in bounds.items():
                 proof = WANTS[name].proof
                 assert isinstance(proof, MarginProof)

@@ -22,8 +22,7 @@ from ..model.geometric_parameters import SIZES
 from ..model.nominal_values import SizedTrace
 from ..model.rates import TwistRates
 from ..performance.characteristic_length import CharacteristicLength
-from ..performance.jacobians import list_column_scales
-from ..workspaces.certified.sign_proofs import SignProof
+from ..performance.jacobians import scale_twist_rates
 from .pose_sets import PoseSet, SetBox, TracedSet
 
 _SAME = 1e-3  # relative: a reserve that grows by less is the same
@@ -114,16 +113,8 @@ class _SizedSet(TracedSet):
     def place(self, inputs: Sequence[Scalar]) -> list[Scalar]:
         return super().place(inputs[: self._count])
 
-    @property
-    def equations(self) -> Equations:
-        return self.size_box.trace_equations(self.inputs[self._count :])
-
-    def trace_margins(self) -> list[Scalar]:
-        return [margin for _, margin in self.equations.own_margins(self.pose, self.mode)]
-
-    def _make_sign_proofs(self) -> dict[str, SignProof]:
-        """Make none: those of cones and struts are of the nominal machine."""
-        return {}
+    def trace_equations(self, inputs: Sequence[Scalar]) -> Equations:
+        return self.size_box.trace_equations(inputs[self._count :])
 
     def trace_twist_rows(self, inputs: Sequence[Scalar]) -> list[list[Scalar]]:
         return _trace_rates(self.size_box, self.place(inputs), inputs[self._count :], self.mode).a
@@ -162,10 +153,7 @@ class _SizedBox(SetBox):
     @cached_property
     def _rates(self) -> tuple[TwistRates, list[Scalar]]:
         rates = _trace_rates(self.size_box, self.pose, list(self.sizes.values()), self.mode)
-        columns_a, columns_b = list_column_scales(self.machine, self.length)
-        a = [[x * float(k) for x, k in zip(row, columns_a, strict=True)] for row in rates.a]
-        b = [[x * float(k) for x, k in zip(row, columns_b, strict=True)] for row in rates.b]
-        return TwistRates(a, b, []), []
+        return scale_twist_rates(self.machine, rates, self.length), []
 
 
 def _trace_rates(sizes: SizeBox, pose: Sequence[Scalar], values: Sequence[Scalar], mode: str) -> TwistRates:

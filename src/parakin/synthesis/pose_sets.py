@@ -13,7 +13,6 @@ from ..algebra import Scalar, sincos
 from ..arrays import Array, AxisRange
 from ..errors import PoseError, quote, suggest
 from ..machine import Machine
-from ..model.equations import Equations
 from ..performance.certified.interval_matrices import PoseBox
 from ..performance.characteristic_length import CharacteristicLength
 from ..workspaces.certified.constraints import TracedPose
@@ -102,11 +101,6 @@ class TracedSet(TracedPose):
     """The pose of a set's coordinates."""
 
     pose_set: PoseSet
-
-    @property
-    def equations(self) -> Equations:
-        """The machine's equations."""
-        return self.machine.trace_equations({})
 
     def place(self, inputs: Sequence[Scalar]) -> list[Scalar]:
         return self.pose_set.place(dict(zip((*self.free_axes, *self.swept_axes), inputs, strict=True)))

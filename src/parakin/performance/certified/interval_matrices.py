@@ -15,7 +15,7 @@ from ...machine import Machine
 from ...model.rates import TwistRates
 from ...workspaces.certified.matrix_bounds import Matrix
 from ..characteristic_length import CharacteristicLength
-from ..jacobians import list_column_scales, list_constraint_scales
+from ..jacobians import list_constraint_scales, scale_twist_rates
 from ..singularities import has_serial_turns
 
 _SAMPLES = {0: 1, 1: 65, 2: 17, 3: 9, 4: 5}  # along each input of a box; 3 of more than these
@@ -83,11 +83,8 @@ class PoseBox:
         with np.errstate(all="ignore"):
             joints, platform, legs = machine.trace_inverse(self.pose, self.mode)
             rates = machine.trace_rates(self.pose, joints)
-        columns_a, columns_b = list_column_scales(machine, self.length)
-        a = [[x * float(k) for x, k in zip(row, columns_a, strict=True)] for row in rates.a]
-        b = [[x * float(k) for x, k in zip(row, columns_b, strict=True)] for row in rates.b]
         reach = [*platform.constraint_reach, *platform.reach, *(reach.margin for leg in legs for reach in leg.reach)]
-        return TwistRates(a, b, rates.wrench_norms), reach
+        return scale_twist_rates(machine, rates, self.length), reach
 
     @property
     def reach(self) -> list[Scalar]:

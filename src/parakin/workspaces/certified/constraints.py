@@ -14,6 +14,7 @@ from ...algebra import Scalar, Term, Trace, absolute, derivative, find_dependenc
 from ...arrays import Array
 from ...kernels.intervals import IntervalProgram, JumpFreeTrace
 from ...machine import Machine
+from ...model.equations import Equations
 from .sign_proofs import SignProof, make_margin_proof, make_separation_proof
 
 _ROUNDING = 1e-12  # relative, of bounds that limits imply
@@ -110,9 +111,9 @@ class TracedPose:
         """Inputs as :attr:`inputs`, of a trace whose angles don't jump over intervals."""
         return JumpFreeTrace().inputs(len(self.inputs))
 
-    def trace_margins(self) -> list[Scalar]:
-        """Trace the margins of the machine's limits."""
-        return self.machine.trace_margins(self.pose, self.mode)
+    def trace_equations(self, inputs: Sequence[Scalar]) -> Equations:
+        """Trace the machine's equations, whose numbers are the same at all poses."""
+        return self.machine.trace_equations({})
 
     def trace_twist_rows(self, inputs: Sequence[Scalar]) -> list[list[Scalar]]:
         """Trace A of the tool's twist at the pose of these inputs."""
@@ -120,21 +121,25 @@ class TracedPose:
         return self.machine.trace_rates(pose, self.machine.trace_inverse(pose, self.mode)[0]).a
 
     def build_constraints(self, without: Sequence[str] = ()) -> list[Constraint]:
+        """Build the constraints of the machine's limits, but for those named in ``without``, and what they imply."""
+        limits, d = self.build_limits(without), len(self.free_axes)
+        implied = [*_bound_angle_sizes(limits), *self._bound_reach(without)]
+        x, orientation = self.inputs[:d], self.inputs[d:]
+        return limits + [Constraint(name, g, x, orientation, implied=True) for name, g in implied]
+
+    def build_limits(self, without: Sequence[str] = ()) -> list[Constraint]:
         """Build the constraints of the machine's limits, but for those named in ``without``."""
         with np.errstate(all="ignore"):  # fixed axes out of reach give numbers that are not finite, a broken margin
-            margins = self.trace_margins()
-        d = len(self.free_axes)
+            margins = self.trace_equations(self.inputs).own_margins(self.pose, self.mode)
+        d, signs = len(self.free_axes), self._make_sign_proofs()
         x, orientation = self.inputs[:d], self.inputs[d:]
-        kept = [(name, g) for name, g in zip(self.machine.limits, margins, strict=True) if name not in without]
-        signs = self._make_sign_proofs()
-        constraints = [Constraint(name, g, x, orientation, sign=signs.get(name)) for name, g in kept]
-        implied = [*_bound_angle_sizes(kept), *self._bound_reach(without)]
-        return constraints + [Constraint(name, g, x, orientation, implied=True) for name, g in implied]
+        kept = [(limit.name, margin) for limit, margin in margins if limit.name not in without]
+        return [Constraint(name, margin, x, orientation, sign=signs.get(name)) for name, margin in kept]
 
     def _make_sign_proofs(self) -> dict[str, SignProof]:
         inputs = self.jump_free_inputs
         with np.errstate(all="ignore"):
-            forms = self.machine.trace_sign_forms(self.place(inputs), self.mode)
+            forms = self.trace_equations(inputs).list_sign_forms(self.place(inputs), self.mode)
         proofs = {name: make_margin_proof(margin, inputs) for name, margin in forms.cones.items()}
         least = {limit.name: limit.bound for limit in self.machine.limit_definitions}
         clear = {name: make_separation_proof(pair, least[name], inputs) for name, pair in forms.struts.items()}
@@ -184,13 +189,14 @@ class TracedPose:
                 yield leg.drives[0].name, middle, float(most)
 
 
-def _bound_angle_sizes(margins: Sequence[tuple[str, Scalar]]) -> list[tuple[str, Scalar]]:
+def _bound_angle_sizes(limits: Sequence[Constraint]) -> list[tuple[str, Scalar]]:
     """Derive margins of an angle's size from limits on both sides of it: a size does not jump at ±180°."""
     bounds: dict[int, dict[bool, tuple[float, Term, str]]] = {}
-    for name, g in margins:
+    for limit in limits:
+        g = limit.margin
         if isinstance(g, Term) and g.op == alg.LIN and len(g.args) == 1 and g.args[0].op == alg.ATAN2:
             angle = g.args[0]
-            bounds.setdefault(angle.index, {})[g.k[1] < 0.0] = abs(g.k[0] / g.k[1]), angle, name
+            bounds.setdefault(angle.index, {})[g.k[1] < 0.0] = abs(g.k[0] / g.k[1]), angle, limit.name
     sizes = []
     for sides in bounds.values():
         most = max(bound for bound, _, _ in sides.values())

@@ -30,6 +30,7 @@ int kinematicsSwitch(int type);
 typedef double hal_float_t;
 typedef char hal_bit_t;
 typedef uint32_t hal_u32_t;
+typedef int hal_pin_dir_t;
 enum { HAL_IN = 16, HAL_OUT = 32 };
 void *hal_malloc(long size);
 typedef void StubFunction(void *, long);

@@ -6,23 +6,23 @@
    within the limits; where every axis moves one joint, that joint's range and rates. It keeps the last pose. */
 
 typedef struct {
-    hal_float_t *position;                          /* axis.L.pos-cmd */
-    hal_float_t *pose;                              /* kins.L */
-    hal_float_t *hand_min, *hand_max;               /* the box for moves by hand */
-    hal_float_t *hand_velocity, *hand_acceleration; /* rates for moves by hand */
-    hal_float_t *program_min, *program_max, *program_velocity, *program_acceleration;
-    hal_float_t *min_limit, *max_limit, *max_velocity, *max_acceleration; /* to ini.L. */
+    hal_real_t position;                         /* axis.L.pos-cmd */
+    hal_real_t pose;                             /* kins.L */
+    hal_real_t hand_min, hand_max;               /* the box for moves by hand */
+    hal_real_t hand_velocity, hand_acceleration; /* rates for moves by hand */
+    hal_real_t program_min, program_max, program_velocity, program_acceleration;
+    hal_real_t min_limit, max_limit, max_velocity, max_acceleration; /* to ini.L. */
 } Axis;
 
 typedef struct {
     Axis axis[AXES];
-    hal_float_t *joint[JOINTS]; /* joint.N.pos-cmd */
-    hal_float_t *tool_offset;   /* motion.tooloffset.z */
-    hal_bit_t *homed, *enabled, *teleop, *coordinated; /* motion. */
-    hal_bit_t *identity, *pose_known; /* kins.: every axis moves the joint of its number; the pose is known all the same */
-    hal_u32_t *nearest;         /* index of the nearest limit: NAME_model.h and NAME.md have the names */
-    hal_float_t *distance;      /* to it: 0 where it is reached, 1 where jogs stop */
-    hal_bit_t *jog_stop;        /* to motion.jog-stop */
+    hal_real_t joint[JOINTS]; /* joint.N.pos-cmd */
+    hal_real_t tool_offset;   /* motion.tooloffset.z */
+    hal_bool_t homed, enabled, teleop, coordinated; /* motion. */
+    hal_bool_t identity, pose_known; /* kins.: every axis moves the joint of its number; the pose is known all the same */
+    hal_uint_t nearest;       /* index of the nearest limit: NAME_model.h and NAME.md have the names */
+    hal_real_t distance;      /* to it: 0 where it is reached, 1 where jogs stop */
+    hal_bool_t jog_stop;      /* to motion.jog-stop */
 } Pins;
 
 static Pins *pins;
@@ -38,12 +38,13 @@ typedef struct {
 static int read_motion(Motion *m)
 {
     double world[AXES], joints[JOINTS], own[JOINTS];
-    if (*pins->identity && !*pins->pose_known)
+    if (hal_get_bool(pins->identity) && !hal_get_bool(pins->pose_known))
         return 0;
     for (int i = 0; i < AXES; i++)
-        world[i] = *(*pins->identity ? pins->axis[i].pose : pins->axis[i].position) * (turning_axis[i] ? DEGREE : 1.0);
+        world[i] = hal_get_real(hal_get_bool(pins->identity) ? pins->axis[i].pose : pins->axis[i].position)
+                   * (turning_axis[i] ? DEGREE : 1.0);
     for (int i = 0; i < JOINTS; i++)
-        joints[i] = *pins->joint[i];
+        joints[i] = hal_get_real(pins->joint[i]);
     read_joints(joints, m->joints);
     if (!finite_all(world, AXES) || !finite_all(m->joints, JOINTS))
         return 0;
@@ -73,7 +74,7 @@ static double find_stop_time(int by_axis, int i, double rate)
 {
     double slowing = joint_acceleration[i];
     if (by_axis) /* there may be more joints than axes */
-        slowing = *pins->axis[i].hand_acceleration * (turning_axis[i] ? DEGREE : 1.0);
+        slowing = hal_get_real(pins->axis[i].hand_acceleration) * (turning_axis[i] ? DEGREE : 1.0);
     return 0.5 * fabs(rate) / slowing + LATENCY * CYCLE;
 }
 
@@ -119,8 +120,8 @@ static int leaves_the_box(const Motion *m, const double *stop)
     for (int i = 0; i < AXES; i++) {
         const double unit = turning_axis[i] ? DEGREE : 1.0;
         const Axis *axis = &pins->axis[i];
-        if ((m->pose_rates[i] > 0.0 && stop[i] > *axis->hand_max * unit)
-            || (m->pose_rates[i] < 0.0 && stop[i] < *axis->hand_min * unit))
+        if ((m->pose_rates[i] > 0.0 && stop[i] > hal_get_real(axis->hand_max) * unit)
+            || (m->pose_rates[i] < 0.0 && stop[i] < hal_get_real(axis->hand_min) * unit))
             return 1;
     }
     return 0;
@@ -148,21 +149,22 @@ static int swings(const Motion *m, const double *stop)
 
 static void give_rates(void)
 {
-    const int program = *pins->coordinated;
+    const int program = hal_get_bool(pins->coordinated);
     for (int i = 0; i < AXES; i++) {
         const Axis *axis = &pins->axis[i];
         const double unit = turning[i] ? DEGREE : 1.0;
-        if (*pins->identity) {
-            *axis->min_limit = joint_low[i] / unit;
-            *axis->max_limit = joint_high[i] / unit;
-            *axis->max_velocity = joint_speed[i] / unit;
-            *axis->max_acceleration = joint_acceleration[i] / unit;
+        if (hal_get_bool(pins->identity)) {
+            hal_set_real(axis->min_limit, joint_low[i] / unit);
+            hal_set_real(axis->max_limit, joint_high[i] / unit);
+            hal_set_real(axis->max_velocity, joint_speed[i] / unit);
+            hal_set_real(axis->max_acceleration, joint_acceleration[i] / unit);
             continue;
         }
-        *axis->min_limit = *axis->program_min;
-        *axis->max_limit = *axis->program_max;
-        *axis->max_velocity = program ? *axis->program_velocity : *axis->hand_velocity;
-        *axis->max_acceleration = program ? *axis->program_acceleration : *axis->hand_acceleration;
+        hal_set_real(axis->min_limit, hal_get_real(axis->program_min));
+        hal_set_real(axis->max_limit, hal_get_real(axis->program_max));
+        hal_set_real(axis->max_velocity, hal_get_real(program ? axis->program_velocity : axis->hand_velocity));
+        hal_set_real(axis->max_acceleration,
+                     hal_get_real(program ? axis->program_acceleration : axis->hand_acceleration));
     }
 }
 
@@ -175,38 +177,39 @@ static void watch(void *arg, long period)
     (void)period;
     give_rates();
     motion_offset = told_offset;
-    told_offset = *pins->tool_offset;
-    if (!*pins->homed || !*pins->enabled)
+    told_offset = hal_get_real(pins->tool_offset);
+    if (!hal_get_bool(pins->homed) || !hal_get_bool(pins->enabled))
         knows_last = 0;
     if (!knows_last)
         knows_margin = 0;
-    is_known = *pins->homed && *pins->enabled && read_motion(&m);
+    is_known = hal_get_bool(pins->homed) && hal_get_bool(pins->enabled) && read_motion(&m);
     if (!is_known) { /* not homed, switched off, or driven out of a singularity joint by joint */
-        *pins->distance = 0.0;
-        *pins->jog_stop = 0;
+        hal_set_real(pins->distance, 0.0);
+        hal_set_bool(pins->jog_stop, 0);
         return;
     }
     const double distance = distance_to_limits(m.pose, m.joints, &nearest);
-    *pins->distance = distance;
-    *pins->nearest = nearest;
+    hal_set_real(pins->distance, distance);
+    hal_set_ui32(pins->nearest, nearest);
     for (int i = 0; i < AXES; i++)
         moves |= m.pose_rates[i] != 0.0;
-    const int by_axes = *pins->teleop && !*pins->identity;
+    const int by_axes = hal_get_bool(pins->teleop) && !hal_get_bool(pins->identity);
     predict_stop(&m, by_axes, stop);
     const double ahead = moves ? distance_at(stop, m.joints, joints) : distance;
-    if (*pins->coordinated) {
-        *pins->jog_stop = 0;
+    if (hal_get_bool(pins->coordinated)) {
+        hal_set_bool(pins->jog_stop, 0);
         return;
     }
     const int is_near = ahead < 1.0 && ahead < distance;
-    *pins->jog_stop = moves && (is_near || (by_axes ? leaves_the_box(&m, stop) || swings(&m, stop)
+    const int stops = moves && (is_near || (by_axes ? leaves_the_box(&m, stop) || swings(&m, stop)
                                                     : runs_into_singularity(&m)));
+    hal_set_bool(pins->jog_stop, stops);
 }
 
 /* A float pin of an axis, by its letter. */
-static int axis_pin(hal_pin_dir_t dir, hal_float_t **pin, int i, const char *name)
+static int axis_pin(hal_pdir_t direction, hal_real_t *pin, int i, const char *name)
 {
-    return hal_pin_float_newf(dir, pin, component, "guard.%c.%s", axis_letters[i], name);
+    return hal_pin_new_real(component, direction, pin, 0, "guard.%c.%s", axis_letters[i], name);
 }
 
 static int make_pins(void)
@@ -230,17 +233,17 @@ static int make_pins(void)
         bad |= axis_pin(HAL_OUT, &axis->max_acceleration, i, "max-acceleration");
     }
     for (int i = 0; i < JOINTS; i++)
-        bad |= hal_pin_float_newf(HAL_IN, &pins->joint[i], component, "guard.joint-%d", i);
-    bad |= hal_pin_float_newf(HAL_IN, &pins->tool_offset, component, "guard.tool-offset");
-    bad |= hal_pin_bit_newf(HAL_IN, &pins->homed, component, "guard.homed");
-    bad |= hal_pin_bit_newf(HAL_IN, &pins->enabled, component, "guard.enabled");
-    bad |= hal_pin_bit_newf(HAL_IN, &pins->teleop, component, "guard.teleop-mode");
-    bad |= hal_pin_bit_newf(HAL_IN, &pins->coordinated, component, "guard.coord-mode");
-    bad |= hal_pin_bit_newf(HAL_IN, &pins->identity, component, "guard.identity");
-    bad |= hal_pin_bit_newf(HAL_IN, &pins->pose_known, component, "guard.pose-known");
-    bad |= hal_pin_u32_newf(HAL_OUT, &pins->nearest, component, "guard.nearest");
-    bad |= hal_pin_float_newf(HAL_OUT, &pins->distance, component, "guard.distance");
-    bad |= hal_pin_bit_newf(HAL_OUT, &pins->jog_stop, component, "guard.jog-stop");
+        bad |= hal_pin_new_real(component, HAL_IN, &pins->joint[i], 0, "guard.joint-%d", i);
+    bad |= hal_pin_new_real(component, HAL_IN, &pins->tool_offset, 0, "guard.tool-offset");
+    bad |= hal_pin_new_bool(component, HAL_IN, &pins->homed, 0, "guard.homed");
+    bad |= hal_pin_new_bool(component, HAL_IN, &pins->enabled, 0, "guard.enabled");
+    bad |= hal_pin_new_bool(component, HAL_IN, &pins->teleop, 0, "guard.teleop-mode");
+    bad |= hal_pin_new_bool(component, HAL_IN, &pins->coordinated, 0, "guard.coord-mode");
+    bad |= hal_pin_new_bool(component, HAL_IN, &pins->identity, 0, "guard.identity");
+    bad |= hal_pin_new_bool(component, HAL_IN, &pins->pose_known, 0, "guard.pose-known");
+    bad |= hal_pin_new_ui32(component, HAL_OUT, &pins->nearest, 0, "guard.nearest");
+    bad |= hal_pin_new_real(component, HAL_OUT, &pins->distance, 0, "guard.distance");
+    bad |= hal_pin_new_bool(component, HAL_OUT, &pins->jog_stop, 0, "guard.jog-stop");
     return bad;
 }
 

@@ -24,6 +24,7 @@ _HEAD = """\
 
 {headers}
 
+{pins}
 #define MODULE "{name}"
 #define MADE "{made}" /* what the configuration of the same making names */
 
@@ -64,6 +65,7 @@ def write_realtime_module(machine: Machine, module: RealtimeModule) -> str:
         gpl=GPL,
         model=name_model(machine),
         headers="\n".join(f'#include "{header}"' for header in (*_HEADERS, *module.headers)),
+        pins=read_source(__package__, "hal_pins.c"),
         made=hash_realtime_module(machine, module),
     )
     return head + _join_sources(module)

@@ -306,16 +306,16 @@ __attribute__((flatten)) int kinematicsForward(const double *joints, EmcPose *wo
     read_joints(joints, q);
     if (!finite_all(q, JOINTS))
         return -1;
-    if (*pins->identity) {
+    if (hal_get_bool(pins->identity)) {
         take_joints_as_axes(q, x);
         write_pose(x, world);
         return 0;
     }
     read_pose(world, near);
-    shift_tip(near, *pins->tool_offset);
+    shift_tip(near, hal_get_real(pins->tool_offset));
     if (guess_is_old)
         memcpy(near, own_pose, sizeof near);
-    const int in_motion = *pins->teleop || *pins->coordinated;
+    const int in_motion = hal_get_bool(pins->teleop) || hal_get_bool(pins->coordinated);
     if (!(in_motion ? find_pose_in_motion(near, q, x) : find_pose_for_homing(near, q, x)))
         return -1;
     if (!in_mode(x, q))
@@ -324,7 +324,7 @@ __attribute__((flatten)) int kinematicsForward(const double *joints, EmcPose *wo
     if (in_motion)
         write_as_commanded(x);
     keep_pose(x);
-    shift_tip(x, -*pins->tool_offset);
+    shift_tip(x, -hal_get_real(pins->tool_offset));
     write_pose(x, world);
     return 0;
 }

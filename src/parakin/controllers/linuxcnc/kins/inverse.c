@@ -42,10 +42,10 @@ __attribute__((flatten)) int kinematicsInverse(const EmcPose *world, double *joi
     read_joints(joints, last);
     if (!finite_all(x, AXES) || !finite_all(last, JOINTS))
         return -1;
-    if (*pins->identity) {
+    if (hal_get_bool(pins->identity)) {
         take_axes_as_joints(x, q);
     } else {
-        shift_tip(x, *pins->tool_offset);
+        shift_tip(x, hal_get_real(pins->tool_offset));
         if (!find_joints(x, last, q) || !may_be_at(x, q))
             return -1;
     }

@@ -38,15 +38,15 @@ int kinematicsJacobian(const double *joints, const EmcPose *world, double jac[EM
     read_joints(joints, q);
     if (!finite_all(x, AXES) || !finite_all(q, JOINTS))
         return -1;
-    if (*pins->identity) {
+    if (hal_get_bool(pins->identity)) {
         for (int i = 0; i < AXES; i++)
             jac[i][axis_numbers[i]] = 1.0;
         return 0;
     }
-    shift_tip(x, *pins->tool_offset);
+    shift_tip(x, hal_get_real(pins->tool_offset));
     if (!joint_rates(x, q, rates))
         return -1;
-    add_tool_rates(x, *pins->tool_offset, rates);
+    add_tool_rates(x, hal_get_real(pins->tool_offset), rates);
     for (int j = 0; j < JOINTS; j++)
         for (int i = 0; i < AXES; i++)
             jac[j][axis_numbers[i]] = rates[j][i] * (turning_axis[i] ? DEGREE : 1.0) / (turning[j] ? DEGREE : 1.0);

@@ -7,13 +7,13 @@
 
 /* What the kinematics is told through HAL, and what it tells. */
 typedef struct {
-    hal_float_t *tool_offset;      /* what the tool is longer than the machine's own, mm: motion.tooloffset.z */
-    hal_float_t *joint[JOINTS];    /* where the joints are commanded to be: joint.N.pos-cmd */
-    hal_bit_t *teleop, *coordinated; /* motion.teleop-mode, motion.coord-mode */
-    hal_bit_t *homed, *in_position;  /* motion.is-all-homed, motion.in-position */
-    hal_bit_t *identity;           /* every axis moves the joint of its number: motion.switchkins-type 1 */
-    hal_bit_t *pose_known;
-    hal_float_t *pose[AXES];       /* the tool's, in mm and degrees, whichever kinematics is in force */
+    hal_real_t tool_offset;         /* what the tool is longer than the machine's own, mm: motion.tooloffset.z */
+    hal_real_t joint[JOINTS];       /* where the joints are commanded to be: joint.N.pos-cmd */
+    hal_bool_t teleop, coordinated; /* motion.teleop-mode, motion.coord-mode */
+    hal_bool_t homed, in_position;  /* motion.is-all-homed, motion.in-position */
+    hal_bool_t identity;            /* every axis moves the joint of its number: motion.switchkins-type 1 */
+    hal_bool_t pose_known;
+    hal_real_t pose[AXES];          /* the tool's, in mm and degrees, whichever kinematics is in force */
 } Pins;
 
 static Pins *pins;
@@ -28,7 +28,7 @@ static int read_commanded_joints(double *q)
 {
     double commanded[JOINTS];
     for (int i = 0; i < JOINTS; i++)
-        commanded[i] = *pins->joint[i];
+        commanded[i] = hal_get_real(pins->joint[i]);
     read_joints(commanded, q);
     return finite_all(q, JOINTS);
 }
@@ -39,15 +39,15 @@ static void keep_pose(const double *own)
     double x[AXES];
     memcpy(own_pose, own, sizeof own_pose);
     memcpy(x, own, sizeof x);
-    shift_tip(x, -*pins->tool_offset);
+    shift_tip(x, -hal_get_real(pins->tool_offset));
     for (int i = 0; i < AXES; i++)
-        *pins->pose[i] = x[i] / (turning_axis[i] ? DEGREE : 1.0);
+        hal_set_real(pins->pose[i], x[i] / (turning_axis[i] ? DEGREE : 1.0));
     pose_known = 1;
-    *pins->pose_known = 1;
+    hal_set_bool(pins->pose_known, 1);
 }
 
 static void forget_pose(void)
 {
     pose_known = 0;
-    *pins->pose_known = 0;
+    hal_set_bool(pins->pose_known, 0);
 }

@@ -15,7 +15,7 @@ static void follow_pose(const double *q)
 {
     double x[AXES], near[AXES], margins[SINGULARITIES];
     memcpy(near, own_pose, sizeof near);
-    if (!*pins->homed) {
+    if (!hal_get_bool(pins->homed)) {
         forget_pose();
         return;
     }
@@ -49,9 +49,9 @@ static void begin_steps(void *arg, long period)
         joints_stand &= fabs(q[i] - joints_before[i]) <= 1e-6 * CYCLE * joint_speed[i];
         joints_before[i] = q[i];
     }
-    if (*pins->identity && known)
+    if (hal_get_bool(pins->identity) && known)
         follow_pose(q);
-    was_homed = *pins->homed;
+    was_homed = hal_get_bool(pins->homed);
 }
 
 static void end_steps(void *arg, long period)
@@ -65,7 +65,7 @@ static void end_steps(void *arg, long period)
 static const char *find_obstacle(void)
 {
     double q[JOINTS];
-    if (!*pins->homed)
+    if (!hal_get_bool(pins->homed))
         return ""; /* it begins with homing */
     if (!pose_known || !read_commanded_joints(q))
         return "it has been too near to a singularity, the joints don't tell the pose: home the machine";
@@ -85,13 +85,13 @@ int kinematicsSwitchable(void) { return 1; }
 int kinematicsSwitch(int type)
 {
     const char *obstacle = "";
-    if (type == !!*pins->identity)
+    if (type == !!hal_get_bool(pins->identity))
         return 0;
     if (type != 0 && type != 1)
         obstacle = "there is no such type";
-    else if (*pins->teleop)
+    else if (hal_get_bool(pins->teleop))
         obstacle = "not while the axes are moved by hand";
-    else if (!joints_stand || !*pins->in_position)
+    else if (!joints_stand || !hal_get_bool(pins->in_position))
         obstacle = "not while anything moves or a program is paused";
     else if (type == 0)
         obstacle = find_obstacle();
@@ -103,7 +103,7 @@ int kinematicsSwitch(int type)
         rtapi_print_msg(RTAPI_MSG_ERR, MODULE ": the kinematics is not switched to type %d: %s\n", type, obstacle);
         return 0;
     }
-    *pins->identity = type != 0;
+    hal_set_bool(pins->identity, type != 0);
     guess_is_old = pose_known;
     return 0;
 }

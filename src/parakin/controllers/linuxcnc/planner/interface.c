@@ -62,7 +62,7 @@ int tpSetPos(TP_STRUCT *tp, const EmcPose *position)
 {
     (void)tp;
     read_pose(position, pose);
-    tool_length = *pins->tool_offset;
+    tool_length = hal_get_real(pins->tool_offset);
     reader_may_be_old = 0;
     clear_path();
     return 0;

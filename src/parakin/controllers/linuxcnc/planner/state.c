@@ -1,8 +1,8 @@
 /* What LinuxCNC and HAL tell the planner, and the joints of a pose in the kinematics that is in force. */
 
 typedef struct {
-    hal_float_t *tool_offset; /* motion.tooloffset.z, as the kinematics has it */
-    hal_bit_t *identity;      /* kins.identity: every axis moves the joint of its number */
+    hal_real_t tool_offset; /* motion.tooloffset.z, as the kinematics has it */
+    hal_bool_t identity;    /* kins.identity: every axis moves the joint of its number */
 } Pins;
 
 static Pins *pins;
@@ -24,7 +24,7 @@ static void shift_to_own_tip(const double *x, double *own)
 static int reach_pose(const double *x, const double *near, double *q)
 {
     double own[AXES];
-    if (*pins->identity) {
+    if (hal_get_bool(pins->identity)) {
         take_axes_as_joints(x, q);
         return 1;
     }
@@ -37,7 +37,7 @@ static int solve_inverse(const double *x, const double *near, double *q)
 {
     double own[AXES];
     shift_to_own_tip(x, own);
-    return reach_pose(x, near, q) && (*pins->identity || (allowed(own, q) && regular(own, q)));
+    return reach_pose(x, near, q) && (hal_get_bool(pins->identity) || (allowed(own, q) && regular(own, q)));
 }
 
 static int set_up(void)
@@ -45,6 +45,6 @@ static int set_up(void)
     pins = hal_malloc(sizeof *pins);
     if (!pins)
         return -1;
-    const int failed = hal_pin_float_newf(HAL_IN, &pins->tool_offset, component, "planner.tool-offset");
-    return failed | hal_pin_bit_newf(HAL_IN, &pins->identity, component, "planner.identity");
+    const int failed = hal_pin_new_real(component, HAL_IN, &pins->tool_offset, 0, "planner.tool-offset");
+    return failed | hal_pin_new_bool(component, HAL_IN, &pins->identity, 0, "planner.identity");
 }

@@ -24,10 +24,10 @@ static int tool_is_up_to_date(void) { return tool_length == emcmotStatus->tool_o
 /* Take the tool's length as the kinematics has it now; the joints stay. The queue is empty. */
 static void update_tool_length(void)
 {
-    const double length = *pins->tool_offset;
+    const double length = hal_get_real(pins->tool_offset);
     if (length == tool_length)
         return;
-    if (!*pins->identity) {
+    if (!hal_get_bool(pins->identity)) {
         memcpy(old_pose, pose, sizeof pose);
         shift_tip(pose, tool_length);
         shift_tip(pose, -length);

@@ -54,6 +54,11 @@ int hal_pin_new_ui32(int, hal_pdir_t, hal_uint_t *, rtapi_u32, const char *, ...
 #pragma GCC poison hal_float_t hal_bit_t hal_u32_t hal_pin_dir_t hal_pin_float_newf hal_pin_bit_newf hal_pin_u32_newf
 #endif
 """
+NEWER_KINEMATICS = """
+#include "emcmotcfg.h"
+extern int kinematicsJacobian(const double *joint, const EmcPose *world,
+                              double jac[EMCMOT_MAX_JOINTS][EMCMOT_MAX_AXIS], const KINEMATICS_INVERSE_FLAGS *iflags);
+"""
 
 
 def write_newer_headers(folder):
@@ -70,8 +75,7 @@ def write_newer_headers(folder):
     added = {
         "emccfg.h": "#define DEFAULT_AXIS_MAX_JERK 0.0\n",
         "hal.h": NEWER_HAL,
-        "kinematics.h": "#include \"emcmotcfg.h\"\nextern int kinematicsJacobian(const double *joint, const EmcPose *world,"
-        " double jac[EMCMOT_MAX_JOINTS][EMCMOT_MAX_AXIS], const KINEMATICS_INVERSE_FLAGS *iflags);\n",
+        "kinematics.h": NEWER_KINEMATICS,
     }
     for name, text in added.items():
         with (folder / name).open("a") as file:

@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 from shipped import CONFIGURED, load_shipped
 
+from parakin.controllers.linuxcnc.hand_box import find_hand_box
 from parakin.controllers.linuxcnc.home_pose import find_home_pose
 from parakin.controllers.linuxcnc.model_header import list_limit_names
 from parakin.controllers.linuxcnc.screen import name_screen
@@ -188,22 +189,46 @@ def test_a_screen_has_its_own_settings():
         assert [name for name in files if name.endswith("_axis.py")] == ["orthoglide_axis.py"] * (screen == "axis")
 
 
-class Gmoccapy:
-    """What gmoccapy, which runs its settings in its own namespace, has for them: preferences, ini, commands."""
+class Slider:
+    """A slider of gmoccapy's."""
 
-    def __init__(self, preferred, ini):
+    def set_property(self, name, value):
+        self.most = {"max": value}[name]
+
+    def get_property(self, name):
+        return {"max": self.most}[name]
+
+    def set_value(self, value):
+        self.value = value
+
+
+class Gmoccapy:
+    """What gmoccapy, which runs its settings within a method of its own, has for them."""
+
+    def __init__(self, files, name, preferred=""):
+        ini = read_ini(files[f"{name}.ini"])
         self.prefs = SimpleNamespace(getpref=lambda name, default, kind: preferred)
         self.get_ini_info = SimpleNamespace(inifile=SimpleNamespace(find=lambda section, key: ini[section].get(key)))
         self.opened = []
         self.command = SimpleNamespace(program_open=self.opened.append)
+        self.widgets = SimpleNamespace(spc_lin_jog_vel=Slider(), spc_ang_jog_vel=Slider())
+        exec(files[f"{name}_gmoccapy.py"], {"os": os, "CONFIGPATH": "/cnc"}, {"self": self})
 
 
 @pytest.mark.parametrize(("preferred", "opened"), [("", ["/cnc/orthoglide.ngc"]), ("/other.ngc", [])])
 def test_gmoccapy_opens_the_inis_program_unless_it_prefers_another(preferred, opened):
     files = make_configuration(load_shipped("orthoglide"), None, "gmoccapy")
-    screen = Gmoccapy(preferred, read_ini(files["orthoglide.ini"]))
-    exec(files["orthoglide_gmoccapy.py"], {"os": os, "CONFIGPATH": "/cnc", "self": screen})
-    assert screen.opened == opened
+    assert Gmoccapy(files, "orthoglide", preferred).opened == opened
+
+
+def test_gmoccapys_sliders_for_jogs_end_at_the_speeds_by_hand():
+    machine = load_shipped("tricept")
+    files, box = make_configuration(machine, None, "gmoccapy"), find_hand_box(machine)
+    screen, (x, c) = Gmoccapy(files, "tricept"), 60.0 * box.speed[[0, 4]]
+    assert screen.widgets.spc_lin_jog_vel.most == screen.jog_rate_max == pytest.approx(x)  # mm/min
+    assert screen.widgets.spc_lin_jog_vel.value == pytest.approx(0.25 * x)
+    assert screen.widgets.spc_ang_jog_vel.most == pytest.approx(np.degrees(c))  # deg/min
+    assert screen.widgets.spc_ang_jog_vel.value == pytest.approx(0.25 * np.degrees(c))
 
 
 def why_no_screen():

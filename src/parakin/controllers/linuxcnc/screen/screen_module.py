@@ -62,6 +62,15 @@ _GMOCCAPY = """\
 if not self.prefs.getpref("open_file", "", str).strip():
     opened = os.path.join(CONFIGPATH, self.get_ini_info.inifile.find("DISPLAY", "OPEN_FILE"))
     self.command.program_open(os.path.abspath(opened))
+
+# Its sliders for jogs count by the minute. The ini file tells their speeds by the second, as LinuxCNC wants it, but
+# gmoccapy takes the turning ones' as they are, and for the greatest of the others that of programs.
+
+ini = self.get_ini_info.inifile
+for slider, kind in ((self.widgets.spc_lin_jog_vel, "LINEAR"), (self.widgets.spc_ang_jog_vel, "ANGULAR")):
+    slider.set_property("max", 60.0 * float(ini.find("DISPLAY", "MAX_%s_VELOCITY" % kind)))
+    slider.set_value(60.0 * float(ini.find("DISPLAY", "DEFAULT_%s_VELOCITY" % kind)))
+self.jog_rate_max = self.widgets.spc_lin_jog_vel.get_property("max")
 """
 
 _SETTINGS = {"axis": _AXIS, "gmoccapy": _GMOCCAPY}
@@ -156,5 +165,5 @@ def name_screen_settings(machine: Machine, screen: str) -> str:
 
 
 def write_screen_settings(machine: Machine, screen: str) -> str:
-    """Write what LinuxCNC's screen runs at its start: AXIS leaves its picture free, gmoccapy opens a program."""
+    """Write what LinuxCNC's screen runs at its start: AXIS leaves its picture free, gmoccapy gets a program, speeds."""
     return _SETTINGS[screen].format(machine=machine.name)

@@ -32,10 +32,17 @@ def test_a_figure_for_a_page(kind, tmp_path, capsys):
     sizes = {re.search(r"([\d.]+)px", text.get("style"))[1] for text in texts}
     assert sizes == {"7"}
     assert path.stat().st_size < 2_000_000
-    assert (len(list(root.iter(f"{SVG}image"))) > 0) == (kind in ("plane", "map"))  # maps alone are images
+    assert not list(root.iter(f"{SVG}image"))
     first = path.read_bytes()
     assert main([*command, "-o", str(path)]) == 0
     assert path.read_bytes() == first  # no date, no random names
+
+
+def test_a_finer_map_has_no_more_corners_than_show(tmp_path):
+    for step in ("10", "2.5"):
+        assert main(["atlas", "hbg80_2d", "--step", step, "-o", str(tmp_path / f"{step}.svg")]) == 0
+    coarse, fine = ((tmp_path / f"{step}.svg").stat().st_size for step in ("10", "2.5"))
+    assert fine < 1.3 * coarse  # four times as many places along each line
 
 
 def test_a_pdf_and_a_heading_on_the_screen_only(tmp_path, capsys):

@@ -16,7 +16,7 @@ _DOTS = 150  # dots an inch
 _COLUMN, _PAGE = 3.5, 7.2  # inches: a column of a page, and both
 _NARROW = 8.0  # inches on the screen: a figure no wider is printed in a column
 _PRINTED_FONT = 7.0  # points
-_PRINTED_DOTS = 400  # an inch, of maps, which are an image on the page too
+SEAM = 0.3  # points, by which areas of a map overlap: else a reader's smoothing shows the ground between them
 
 
 def render_figure(
@@ -32,7 +32,7 @@ def render_figure(
     add_heading : called for the screen only, for a printed figure has a caption
     dots : an inch, on the screen
 
-    Printed, text is as large as a caption's, and stays text; only maps become images.
+    Printed, text is as large as a caption's, and stays text; all else is lines and polygons.
     """
     from matplotlib import rc_context
     from matplotlib.figure import Figure
@@ -47,13 +47,13 @@ def render_figure(
             _fit_to_page(figure)
         else:
             add_heading(figure)
-        figure.savefig(data, format=suffix.removeprefix("."), dpi=_PRINTED_DOTS if printed else dots,
+        figure.savefig(data, format=suffix.removeprefix("."), dpi=dots,
                        bbox_inches="tight" if printed else None, metadata=_drop_date(suffix))  # fmt: skip
     return data.getvalue()
 
 
 def _fit_to_page(figure: Figure) -> None:
-    """Set all text in one size, draw bodies as polygons, and make images of maps, whose seams would show."""
+    """Set all text in one size, draw bodies as polygons, and let areas of maps overlap, with few corners."""
     from matplotlib.contour import QuadContourSet
     from matplotlib.text import Text
 
@@ -65,9 +65,14 @@ def _fit_to_page(figure: Figure) -> None:
         axes.tick_params(labelsize=_PRINTED_FONT)
         if figure.get_figwidth() < _PAGE and hasattr(axes, "get_zlim"):
             axes.locator_params(nbins=3)  # a column has no room for more
-    for map_ in figure.findobj(QuadContourSet):
-        map_.set_rasterized(True)
     print_bodies(figure)
+    figure.draw_without_rendering()  # type: ignore[no-untyped-call]  # only then axes have their sizes
+    for map_ in figure.findobj(QuadContourSet):
+        to_dots = map_.get_transform()
+        drawn = [path.transformed(to_dots).cleaned(simplify=True) for path in map_.get_paths()]
+        map_.set_paths([path.transformed(to_dots.inverted()) for path in drawn])
+        if map_.filled:
+            map_.set(edgecolor="face", linewidth=SEAM)
 
 
 def _drop_date(suffix: str) -> dict[str, None]:

@@ -12,7 +12,7 @@ from ...arrays import Array
 from ...workspaces.sampled.distance_field import SampledField
 from ...workspaces.sampled.sampling import SampledWorkspace
 from ..colours import FAINT, INK
-from ..figure_file import render_figure
+from ..figure_file import SEAM, render_figure
 from ..shaded_bodies import add_bodies
 from ..space_axes import GREY, add_space_axes, fit_to_room
 from .describe import AnyWorkspace, describe_size, describe_workspace, format_volume
@@ -136,21 +136,27 @@ def _draw_plane(figure: Figure, workspace: AnyWorkspace, field: SampledField, sl
     near = np.repeat(np.repeat(field.values > -field.step.min(), _PIXELS, 0), _PIXELS, 1)
     low = field.low - 0.5 * field.step
     nearest = field.distance.find_nearest_limits(low + (np.argwhere(near) + 0.5) * step).limit
-    limit = np.full(tuple(fine), -1)
-    limit[near] = nearest
     count = np.bincount(nearest, minlength=len(workspace.region.limits))
-    image = np.zeros((*limit.shape, 4))
-    patches = []
+    places, patches = np.full(len(count), -1), []
     for place, number in enumerate(np.argsort(-count, kind="stable")[: int((count > 0).sum())].tolist()):
         colour = _choose_colour(place)
-        image[limit == number] = colour
+        places[number] = place
         label = f"{workspace.region.limits[number]}   {count[number] / len(nearest):.1%}"
         patches.append(Patch(facecolor=colour, label=label))
     axes: Any = figure.add_axes((0.08, 0.08, 0.60, 0.72))
-    high = low + fine * step
-    picture = axes.imshow(image.swapaxes(0, 1), origin="lower", extent=(low[0], high[0], low[1], high[1]), zorder=2)
     edge = Path.make_compound_path(*(Path(outline, closed=True) for outline in outlines))
-    picture.set_clip_path(PathPatch(edge, transform=axes.transData))
+    shown, lines = (
+        np.full(tuple(fine), -1),
+        [a + (np.arange(n) + 0.5) * b for a, n, b in zip(low, fine, step, strict=True)],
+    )
+    shown[near] = places[nearest]
+    for place, patch in enumerate(patches):  # the first one lies below all others
+        own = shown == place if place else near
+        area = axes.contourf(
+            *lines, own.T, levels=[0.5, 1.5], colors=[patch.get_facecolor()], antialiased=True, zorder=2
+        )
+        area.set(edgecolor="face", linewidth=SEAM)
+        area.set_clip_path(PathPatch(edge, transform=axes.transData))
     axes.add_patch(PathPatch(edge, facecolor="none", edgecolor=INK, linewidth=1.4, zorder=3))
     _set_plane(axes, workspace.axes)
     axes.legend(handles=patches, loc="upper left", bbox_to_anchor=(1.02, 1.0), **_LEGEND,

@@ -7,6 +7,7 @@ import feed
 import kinematics
 import linuxcnc
 import many_direct_problems
+import page
 import post
 import startup
 import trajectory
@@ -14,6 +15,6 @@ import workspace
 
 if __name__ == "__main__":
     for benchmark in (
-        kinematics, many_direct_problems, assemblies, post, startup, workspace, feed, trajectory, linuxcnc,
+        kinematics, many_direct_problems, assemblies, post, startup, workspace, feed, trajectory, linuxcnc, page,
     ):  # fmt: skip
         print(benchmark.main(), flush=True)

@@ -54,5 +54,5 @@ window.parakin = {
   moveToPose, moveToJoints, moveToSizes, switchSign, showNextAssembly, searchAssemblies, goHome, showSurface, showValues, showBox, setPlaying,
   arrowInPicture: axis => findInPicture(arrows.localToWorld(new THREE.Vector3().setComponent(axis, 0.9))),
   tipInPicture: () => findInPicture(handle.position), strutInPicture: drive => findInPicture(findStrut(drive)),
-  get state() { return current; }, get stoppedBy() { return stoppedBy; },
+  get state() { return current; }, get stoppedBy() { return stoppedBy; }, get pictures() { return pictureCount; },
 };

@@ -58,7 +58,7 @@ function placeLabels() {
   }
 }
 
-let pictureRequested = false;
+let pictureRequested = false, pictureCount = 0;
 
 // Draw the picture anew, once for all that changes before it.
 function requestPicture() {
@@ -68,5 +68,6 @@ function requestPicture() {
     pictureRequested = false;
     render();
     placeLabels();
+    pictureCount += 1;
   });
 }

@@ -97,7 +97,7 @@ def _render_page(machine: Machine, title: str, begin: list[float], path: dict[st
         style=_read_text("page.css"),
         three=read_three_script(),
         core=_quote_script(write_core(machine)),
-        worker=_join_scripts(WORKER),
+        worker=write_surface_worker(),
         script=f'(() => {{\n"use strict";\n{_quote_script(data)}{_join_scripts(APP)}}})();',
     )
 
@@ -106,6 +106,11 @@ def write_core(machine: Machine) -> str:
     """Write the script of a machine's data and mathematics, which needs no document."""
     data = json.dumps(encode_page_machine(machine), separators=(",", ":"), allow_nan=False)
     return f"const machine = {data};\n{_read_text('elementary.js')}{write_model(machine)}{_join_scripts(CORE)}"
+
+
+def write_surface_worker() -> str:
+    """Write the script that computes surfaces and sections beside a page, after that of :func:`write_core`."""
+    return _join_scripts(WORKER)
 
 
 def _join_scripts(names: tuple[str, ...]) -> str:

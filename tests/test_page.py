@@ -3,6 +3,7 @@
 import json
 import zipfile
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -230,11 +231,15 @@ def test_the_command_writes_a_page_and_spares_other_files(tmp_path, capsys):
 def test_a_trimesh_without_three_js_is_told(tmp_path, monkeypatch):
     folder = tmp_path / "resources" / "templates"
     folder.mkdir(parents=True)
-    monkeypatch.setattr(three_script, "files", lambda package: tmp_path)
+    package = SimpleNamespace(submodule_search_locations=[str(tmp_path)])
+    monkeypatch.setattr(three_script, "find_spec", lambda name: package)
     with pytest.raises(NoMethodError, match=r"three\.js r140"):
         three_script.read_three_script()
     with zipfile.ZipFile(folder / "viewer.zip", "w") as archive:
         archive.writestr("viewer.html.template", "<script>another</script>")
+    with pytest.raises(NoMethodError, match=r"three\.js r140"):
+        three_script.read_three_script()
+    monkeypatch.setattr(three_script, "find_spec", lambda name: None)
     with pytest.raises(NoMethodError, match=r"three\.js r140"):
         three_script.read_three_script()
 

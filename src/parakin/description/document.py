@@ -7,6 +7,7 @@ surprises. The reader of a value decides what it is.
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import lru_cache
 from pathlib import Path
 from typing import Any, TypeAlias
 
@@ -80,6 +81,12 @@ def read_document(path: Path, source: str, what: str = MACHINE) -> tuple[Value, 
 
 def parse_document(text: str, source: str, what: str = MACHINE) -> tuple[Value, list[InputError]]:
     """Parse the text of a YAML file; as :func:`read_document`."""
+    document, errors = _parse_text(text, source, what)
+    return document, list(errors)
+
+
+@lru_cache(maxsize=8)  # a machine's file is read again for every change of its sizes
+def _parse_text(text: str, source: str, what: str) -> tuple[Value, tuple[InputError, ...]]:
     reader = YAML(typ="safe", pure=True)
     reader.Composer = _BoundedComposer
     try:
@@ -99,7 +106,7 @@ def parse_document(text: str, source: str, what: str = MACHINE) -> tuple[Value, 
     if node is None:
         raise InputError(f"empty, expected {what}", source, 1)
     builder = _DocumentBuilder(source)
-    return builder.build(node, node.start_mark.line + 1, 0), builder.errors
+    return builder.build(node, node.start_mark.line + 1, 0), tuple(builder.errors)
 
 
 class _NestingError(Exception):

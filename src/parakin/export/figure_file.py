@@ -66,7 +66,7 @@ def _fit_to_page(figure: Figure) -> None:
         if figure.get_figwidth() < _PAGE and hasattr(axes, "get_zlim"):
             axes.locator_params(nbins=3)  # a column has no room for more
     print_bodies(figure)
-    figure.draw_without_rendering()  # type: ignore[no-untyped-call]  # only then axes have their sizes
+    figure.draw_without_rendering()  # only then axes have their sizes
     for map_ in figure.findobj(QuadContourSet):
         to_dots = map_.get_transform()
         drawn = [path.transformed(to_dots).cleaned(simplify=True) for path in map_.get_paths()]

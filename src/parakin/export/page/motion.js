@@ -76,18 +76,18 @@ function moveToJoints(joints) {
   let reason = null, state = from;
   for (let k = 0; k < BISECTIONS; k++) {
     const goal = k === 0 ? joints : joints.map((q, i) => 0.5 * (q + state.joints[i]));
-    reason = k === 0 ? null : reason;
+    let met = false; // an obstacle, on this way
     const way = followJoints(state, goal, next => {
       const obstacle = guarded ? findObstacle(next, side) : null;
       if (obstacle !== null) {
-        reason = obstacle;
+        [reason, met] = [obstacle, true];
         joints = next.joints;
       }
       return obstacle === null;
     });
     state = way.state;
-    if (!way.complete && reason === null) reason = "parallel singularity";
-    if (way.complete && k === 0 || !guarded) break;
+    if (!way.complete && !met) reason ??= "parallel singularity";
+    if (!met && (k === 0 || !way.complete) || !guarded) break; // a way ends next to a singularity
     if (joints.every((q, i) => abs(q - state.joints[i]) < 1e-9)) break;
   }
   setState(state, reason);

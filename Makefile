@@ -27,10 +27,11 @@ bench: .venv/developing
 pages: .venv/installed
 	$(BIN)/python scripts/reading_page.py
 
-pictures: .venv/installed
+pictures: .venv/developing
 	$(BIN)/python examples/pictures.py -o docs/pictures
 	$(BIN)/python examples/gallery.py -o docs
 	$(BIN)/python examples/leg_figures.py -o docs/pictures/legs
+	$(BIN)/python examples/page_pictures.py -o docs/pictures
 
 .venv/installed: pyproject.toml
 	$(PYTHON) -c "import sys; sys.exit('parakin needs Python 3.11 to 3.13, not ' + sys.version.split()[0]) if not (3, 11) <= sys.version_info[:2] <= (3, 13) else None"

@@ -12,6 +12,7 @@ from pathlib import Path
 
 from parakin.commands import part_options
 from parakin.controllers.event_commands import COMMENTED
+from parakin.toolpath.reading.cl.actions import INCH_SPEEDS
 from parakin.toolpath.reading.cl.cycles import CYCLES
 from parakin.toolpath.reading.cl.dialects import BELOW, DIALECTS, DOWN, HEIGHT, LEFT, RIGHT, SAME, Dialect
 from parakin.toolpath.reading.cl.words import INFORMING, REASONS, TEXT_WORDS, WORDS
@@ -139,6 +140,9 @@ def list_words() -> list[str]:
     refused = [(reason, join_names(words.split())) for reason, words in REASONS.items()]
     return [
         "## Words of CL files\n",
+        "Lengths are in mm until UNITS or UNIT says otherwise. A file without either whose speeds are in inches or "
+        f"feet\n({join_names(sorted(INCH_SPEEDS))}) is refused: its lengths are hardly mm, and taken for them the path "
+        "would be\n25.4 times too small.\n",
         make_table(("word", "what it does"), acting),
         make_table(
             ("words", "what becomes of them"),
@@ -155,7 +159,8 @@ def list_words() -> list[str]:
         ),
         "Refused with their line:\n",
         make_table(("why", "words"), refused),
-        "A word that is not here earns a note; one that begins with GO, is one letter off a word that acts, or stands "
+        "A word that is not here earns a note; one that begins with GO, as a word of motion or one refused does "
+        "(`CYCLE81`, `CALLSUB`), is one letter off a word that acts, or stands "
         "before numbers alone, as many as a point or a frame has, is "
         "refused.\n",
     ]

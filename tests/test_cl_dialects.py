@@ -398,14 +398,31 @@ def test_a_tool_with_a_body_and_a_cutter_stays_the_same_tool(read):
 
 @pytest.mark.parametrize(
     "statement",
-    ["SET/MODE,INCR", "NURBS/KNOT,0,0,1,1", "MOVETO/1,2,3", "PLUNGE/5", "THICK/2", "ZSURF/3", "COUPLE/AUTO", "ZERO/2"],
+    [
+        "SET/MODE,INCR",
+        "NURBS/KNOT,0,0,1,1",
+        "MOVETO/1,2,3",
+        "PLUNGE/5",
+        "THICK/2",
+        "ZSURF/3",
+        "COUPLE/AUTO",
+        "ZERO/2",
+        "FIXTUR/2",
+        "TLCOMP/ON,LEFT",
+        "WPLANE/XYPLAN",
+        "CALLSUB/1001",
+        "TRANSFORM/XY",
+        "CYCLE83/10,0,2,-50,0,0,0,5,0.5,0,0.5,1,0,0",
+    ],
 )
 def test_other_words_that_move_or_shift_are_refused(read, statement):
-    refused(read, f"ZERO/1\nFEDRAT/9\nGOTO/0,0,0\n{statement}\nGOTO/1,0,0\n", 4, statement.partition("/")[0])
+    refused(read, f"ZERO/1\nFIXTUR/1\nFEDRAT/9\nGOTO/0,0,0\n{statement}\nGOTO/1,0,0\n", 5, statement.partition("/")[0])
 
 
 def test_settings_that_change_nothing(read):
-    path = read("ZERO/1\nSET/MODE,ABSOL\nSET/ADJUST,1\nSELECTL/3\nFEDRAT/9\nGOTO/0,0,0\nZERO/1\nGOTO/1,0,0\n")
+    path = read(
+        "ZERO/1\nSET/MODE,ABSOL\nSET/ADJUST,1\nSELECTL/3\nFIXTUR/2\nFEDRAT/9\nGOTO/0,0,0\nZERO/1\nFIXTUR/2\nGOTO/1,0,0\n"
+    )
     assert len(path) == 2 and [note.text for note in path.notes] == ["words that only inform: SET"]
 
 
@@ -441,6 +458,16 @@ def test_unit(read, unit, scale):
     path = read(f"UNIT/{unit}\nRAPID/\nGOTO/1,2,1\nFEDRAT/10.,IPM\nGOTO/1,2,-0.5\n")
     np.testing.assert_allclose(path.tip, np.array([[1, 2, 1], [1, 2, -0.5]]) * scale, rtol=1e-15)
     assert path.feed[1] == 254.0
+
+
+@pytest.mark.parametrize("speed", ["FEDRAT/10,IPM", "SPINDL/SFM,300,CLW", "CYCLE/DRILL,DEPTH,1,CLEAR,1,IPM,3"])
+def test_inches_are_stated(read, speed):
+    start, cut = f"CUTTER/10\nFEDRAT/9\n{speed}\nCYCLE/OFF\n", "GOTO/0,0,0\nGOTO/1,0,0\n"
+    for text in (start + cut, start + cut + "UNITS/INCHES\n", start.replace(speed, "GOTO/0,0,0\n" + speed) + cut):
+        refused(read, text, 1 + text[: text.index(speed)].count("\n"), "unit of length")
+    for text in (start + "UNITS/INCHES\n" + cut, "UNITS/INCHES\n" + start + cut):
+        path = read(text)
+        assert path.tip[-1, 0] == 25.4 and path.units == "inch"
 
 
 @pytest.mark.parametrize(

@@ -44,7 +44,7 @@ def test_a_feed_per_revolution_follows_the_spindle_switched_on_again(read):
 
 @pytest.mark.parametrize(("unit", "mm"), [("SMM", 1000.0), ("SFM", 304.8)])
 def test_a_surface_speed_is_that_of_the_cutter_in_use(read, unit, mm):
-    path = read(cut(f"SPINDL/{unit},50,CLW", f"LOADTL/2\nCUTTER/20\nSPINDL/50,{unit}"))
+    path = read("UNITS/MM\n" + cut(f"SPINDL/{unit},50,CLW", f"LOADTL/2\nCUTTER/20\nSPINDL/50,{unit}"))
     np.testing.assert_allclose(math.pi * np.array([8.0, 20.0]) * path.spindle[1:], 50.0 * mm)
     assert said(path)[0][1] == [f"S{path.spindle[1]:.10g} M3"]
     refused(read, cut("LOADTL/2\nSPINDL/50,SMM"), 5, "diameter")

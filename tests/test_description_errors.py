@@ -197,6 +197,8 @@ def test_machine_file(tmp_path):
     assert find_machine_file(tmp_path / "x.yaml") == tmp_path / "x.yaml"
     with pytest.raises(InputError, match=r'unknown machine "tricpt", did you mean "tricept"\?'):
         find_machine_file("tricpt")
+    with pytest.raises(InputError, match="an empty name"):
+        find_machine_file("")
 
 
 # Fuzz: whatever a file holds, it is read or refused with a place.

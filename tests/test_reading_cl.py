@@ -216,7 +216,7 @@ def test_rapid_holds_for_one_motion(both):
     [
         ("FEDRAT/1500.,MMPM", 1500.0),
         ("FEDRAT/MMPM,1500.", 1500.0),
-        ("FEDRAT / ipm , 2", 50.8),
+        ("UNITS/MM\nFEDRAT / ipm , 2", 50.8),
         ("FEDRAT/100,PERMIN", 100.0),
         ("UNITS/INCHES\nFEDRAT/PERMIN,10", 254.0),
         ("FEDRAT/PERMIN,10\nUNITS/INCHES", 254.0),
@@ -224,7 +224,7 @@ def test_rapid_holds_for_one_motion(both):
         ("SPINDL/1000,RPM,CLW\nFEDRAT/0.1,MMPR", 100.0),
         ("SPINDL/RPM,1000,CLW,RANGE,2,MAXRPM,5000\nFEDRAT/0.1,MMPR", 100.0),
         ("FEDRAT/0.1,MMPR\nSPINDL/CCLW,RPM,1000", 100.0),
-        ("SPINDL/1000\nFEDRAT/IPR,0.01", 254.0),
+        ("UNITS/MM\nSPINDL/1000\nFEDRAT/IPR,0.01", 254.0),
         ("UNITS/INCHES\nSPINDL/RPM,500\nFEDRAT/0.02,PERREV", 254.0),
         ("FEDRAT/7,MMPM\nFEDRAT/8", 8.0),
         ("", math.nan),

@@ -327,6 +327,13 @@ def test_other_controls_are_named(read, text, line, control):
     refuse(read, text, line, "is of a program for " + control)
 
 
+def test_the_end_of_a_long_line_is_its_own(read):
+    text = "G1 X [" + "1+" * 196 + "1*" + "2]"  # the 400th character is the asterisk
+    with pytest.raises(InputError) as caught:
+        read(f"G21 G90\n{text} Q5\n")
+    assert text[399] == "*" and "Heidenhain" not in str(caught.value)
+
+
 def test_plain_programs_of_other_controls_are_read(read):
     for head in ("(FANUC 31i)", "; grbl", "(Haas VF2)", ";FLAVOR:Marlin"):
         assert len(read(f"{head}\nG21 G90\nG0 X0 Y0 Z0\nG1 X1 F5\nM30\n")) == 2

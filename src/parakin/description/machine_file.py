@@ -44,8 +44,10 @@ def list_shipped_machines() -> dict[str, Path]:
 def find_machine_file(name: str | PathLike[str]) -> Path:
     """Find the file of a machine, by its shipped name or by the path of the user's own file.
 
-    Raises :class:`InputError` for a plain word that is no shipped name and no file.
+    Raises :class:`InputError` for an empty name, and for a plain word that is no shipped name and no file.
     """
+    if name == "":
+        raise InputError("an empty name; expected a machine's, or a file's", "name")
     known = list_shipped_machines()
     if str(name) in known:
         return known[str(name)]

@@ -25,6 +25,7 @@ _ARC_FORM = "TLON,GOFWD/(CIRCLE/x,y,z,r),ON,2,INTOF,(LINE/x,y,z,x,y,z)"
 _POINT_FORM = "x,y,z or x,y,z,i,j,k"
 _MOVARC_FORM = "MOVARC/cx,cy,cz,ax,ay,az,radius[,ANGLE,degrees]"
 _NX_CIRCLE = 8  # values of a CIRCLE that only Siemens NX writes: tolerances follow the radius
+INCH_SPEEDS = frozenset(("IPM", "IPR", "SFM"))  # units of feeds and surface speeds
 _MOST_TURNS = 1e6  # greatest number of turns of an arc
 
 
@@ -44,11 +45,11 @@ class ClActions:
         self.informing: dict[str, int] = {}
         self.units: Literal["mm", "inch"] = "mm"
         self.units_given = False
-        self.inches_noted = False
+        self.inch_line: int | None = None  # where inches are first told by a speed alone
         self.tools = ToolLog()
         self.finished = False
         self._last_cycle: DrillCycle | None = None
-        self._work_system: list[str] | None = None
+        self._work_systems: dict[str, list[str]] = {}  # by the word that chose it
 
     # dialects
 
@@ -185,6 +186,7 @@ class ClActions:
             self.motion.set_cycle(self._last_cycle)
         else:
             self._last_cycle = parse_cycle(args, DIALECTS[self.dialect])
+            self._note_inches(args, line)
             self.motion.set_cycle(self._last_cycle)
 
     def end_program(self, args: list[str], line: int) -> None:
@@ -209,13 +211,25 @@ class ClActions:
         """Set the feed from here on (FEDRAT)."""
         value, unit = parse_feed(args)
         self.motion.take_feed(value, unit, line)
-        if unit in ("IPM", "IPR") and not self.units_given and not self.inches_noted:
-            self.inches_noted = True
-            self.motion.notes.add(line, "feeds in inches in a file without UNITS: its lengths are taken for mm")
+        self._note_inches(args, line)
 
     def set_spindle(self, args: list[str], line: int) -> None:
         """Set the spindle's speed from here on (SPINDL)."""
         set_speed(self.motion, args, self.tools.diameter, line)
+        self._note_inches(args, line)
+
+    def _note_inches(self, args: list[str], line: int) -> None:
+        if not self.units_given and self.inch_line is None and not INCH_SPEEDS.isdisjoint(args):
+            self.inch_line = line
+
+    def check_units(self) -> None:
+        """Refuse lengths without a unit beside speeds in inches or feet: mm would be 25.4 times too small."""
+        if self.inch_line is not None:
+            refuse(
+                "a speed in inches or feet while no unit of length is stated; expected UNITS/INCHES or UNITS/MM "
+                "before the first motion",
+                self.inch_line,
+            )
 
     def wait(self, args: list[str], line: int) -> None:
         """Wait for seconds, or for turns of the spindle (DELAY)."""
@@ -235,6 +249,7 @@ class ClActions:
         self._refuse_in_cycle_or_circle()
         scale = LENGTH_UNITS[args[0]]
         if not self.motion.records.n:
+            self.inch_line = None
             self.units = "mm" if scale == 1.0 else "inch"
             self.tools.scale_lengths(scale / self.motion.transform.scale)
         elif scale != self.motion.transform.scale:
@@ -298,9 +313,16 @@ class ClActions:
 
     def check_work_system(self, args: list[str], line: int) -> None:
         """Refuse a change of the control's work system, whose offset the file does not tell (ZERO)."""
-        if self._work_system not in (None, args) and self.motion.records.n:
+        self._keep_work_system("ZERO", args)
+
+    def check_fixture(self, args: list[str], line: int) -> None:
+        """Refuse a change of the control's fixture offset, which the file does not tell (FIXTUR)."""
+        self._keep_work_system("FIXTUR", args)
+
+    def _keep_work_system(self, word: str, args: list[str]) -> None:
+        if self._work_systems.get(word, args) != args and self.motion.records.n:
             refuse("another work system, whose place the file does not tell; expected one throughout")
-        self._work_system = args
+        self._work_systems[word] = args
 
     # modes that are honoured where they change nothing
 

@@ -160,6 +160,7 @@ class ClReader:
             raise self._fail("CIRCLE: the file ends; expected the GOTO that ends the arc", self.motion.circle.line)
         try:
             self.motion.close_arc(None)
+            self.actions.check_units()
         except InputError as error:
             raise self._fail(error.message, error.line) from error
         if not self.motion.records.n:

@@ -21,7 +21,9 @@ _COMMENT = re.compile(r"(?<!\w)\([^()]*\)|;.*", re.DOTALL)
 HIDDEN = "\0"  # a character that no line of a file has
 _LONGEST_WORD = 10
 _COORDINATES = range(3, 13)  # numbers of a point, with an axis, up to a frame
+_NO_STEMS = frozenset(("FROM", "FINI", "TLON", "GO", "IF", "DO", "CUT", "SYN"))  # short, and other words begin so
 _MOTION = tuple(name for name, word in WORDS.items() if word.act is not None and word.ends_message)
+_STEMS = tuple(name for name in (*_MOTION, *REFUSED, "TRACUT", "TRANS", "CUTCOM") if name not in _NO_STEMS)
 _ACTING = tuple(name for name, word in WORDS.items() if word.act is not None and len(name) >= 4)
 
 
@@ -104,6 +106,9 @@ def _take_unknown(actions: ClActions, name: str, args: list[str], line: int, *, 
     meant = next((word for word in _MOTION if name.endswith(word)), None) or _find_meant(name)
     if meant is not None:
         refuse(f"unknown word {quote_short(name)}; expected {meant}")
+    stem = next((word for word in _STEMS if name.startswith(word)), None)
+    if stem is not None:
+        refuse(f"unknown word {quote_short(name)} that begins as {stem} does; expected plain motion")
     if len(args) in _COORDINATES and all(is_number(a) for a in args):
         refuse(f"unknown word {quote_short(name)} with coordinates, which may be a motion; expected GOTO/x,y,z")
     actions.motion.notes.add(line, f"unknown word {quote_short(name)}, not acted on")

@@ -3,7 +3,7 @@
 To read a new word, add its row to WORDS. If it acts on motion, state or tool, write its method in :mod:`.actions`, with
 the parser of its arguments in :mod:`.word_arguments`. A word that moves, turns, shifts or compensates and cannot be
 honoured is a row of REFUSED; one that only informs is in INFORMING. Words without a row earn a note and do nothing, but
-those that begin with GO or are one letter off a word that acts are refused.
+those that begin with GO or with a word of motion or of REFUSED, or are one letter off a word that acts, are refused.
 """
 
 from collections.abc import Callable
@@ -63,6 +63,7 @@ WORDS: dict[str, Word] = {
     "MCS": Word(ClActions.set_work_plane, slash=True),
     "MCS2": Word(ClActions.check_work_plane, slash=True),
     "ZERO": Word(ClActions.check_work_system, event=True),
+    "FIXTUR": Word(ClActions.check_fixture, event=True),
     # modes that are honoured where they change nothing
     "CUTCOM": Word(ClActions.check_compensation),
     "CUTCOM_GEOMETRY_TYPE": Word(ClActions.set_compensation_type),
@@ -108,7 +109,8 @@ REASONS = {
         "CALL CALSUB INCLUD SYN MACRO TERMAC LOOPST LOOPND JUMPTO TRANTO IF DO UNTIL SUBR ENDSUB INDEX"
     ),
     "it leaves out the motions that follow": "DNTCUT CUT",
-    "it moves or copies the points that follow": "COPY MATRIX REFSYS MCSYS TRANSL MIRROR",
+    "it moves or copies the points that follow": "COPY MATRIX REFSYS MCSYS TRANSL MIRROR WPLANE SHIFT SCALE",
+    "a compensation that is left to the controller": "TLCOMP",
     "it turns an axis of the machine that wrote the file": "ROTATE ROTABL ROTHED ROTREF POSMAP TURRET SADDLE",
     "it retracts to a place that the file does not state": "RETRCT RETRACT",
     "it gives the controller a G-code": "PREFUN",
@@ -118,7 +120,7 @@ REASONS = {
 REFUSED = {word: reason for reason, words in REASONS.items() for word in words.split()}
 _INFORMING = """
     AIR APPLY BARFED BEGIN BREAK CATCHR CHKPTS CHUCK CLAMP CLDATA CLRSRF CLDIST CLEARP CONTRL CSI_SET_EXTENSION_LENGTH
-    CSI_SET_PATH_PARAM CSI_TOOL_PATH DATE FEATNO FIXTUR GECENT HEAD HEADER LEADER LINTOL MATERL MCHFIN MCHTOL MFGNO NOTE
+    CSI_SET_PATH_PARAM CSI_TOOL_PATH DATE FEATNO GECENT HEAD HEADER LEADER LINTOL MATERL MCHFIN MCHTOL MFGNO NOTE
     OFSTNO OPERATION OPNAME OPSKIP OPTION OSETNO OVPLOT PENDWN PENUP PLABEL PPTOL RESERV REWIND SAFETY SELCTL
     SEQNO SETSTL START SWITCH TCP TCPCTL TLSTCK TMARK UNLOAD VERSION
 """

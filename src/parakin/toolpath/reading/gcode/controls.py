@@ -4,6 +4,7 @@ import re
 from typing import NamedTuple
 
 _LOOKED_AT = 400  # characters of a line
+_CUT = "\0"  # stands where a line was cut, so that no pattern takes that for its end
 
 
 class OtherControl(NamedTuple):
@@ -67,7 +68,8 @@ CONTROLS = (
 
 def recognise_block(text: str) -> str | None:
     """Return the name of the control that alone writes such a line, None if it is none of those known."""
-    text = text[:_LOOKED_AT]
+    if len(text) > _LOOKED_AT:
+        text = text[:_LOOKED_AT] + _CUT
     headers = (control.name for control in CONTROLS if control.header.match(text))
     blocks = (control.name for control in CONTROLS if control.block.match(text))
     return next(headers, None) or next(blocks, None)

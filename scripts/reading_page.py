@@ -12,9 +12,9 @@ from pathlib import Path
 
 from parakin.commands import part_options
 from parakin.controllers.event_commands import COMMENTED
-from parakin.toolpath.reading.cl.actions import INCH_SPEEDS
 from parakin.toolpath.reading.cl.cycles import CYCLES
 from parakin.toolpath.reading.cl.dialects import BELOW, DIALECTS, DOWN, HEIGHT, LEFT, RIGHT, SAME, Dialect
+from parakin.toolpath.reading.cl.length_units import INCH_SPEEDS
 from parakin.toolpath.reading.cl.words import INFORMING, REASONS, TEXT_WORDS, WORDS
 from parakin.toolpath.reading.gcode.codes import (
     G_GROUPS,

@@ -4,28 +4,34 @@ import math
 import re
 from collections.abc import Mapping
 from itertools import takewhile
-from typing import Literal
 
 import numpy as np
 
 from ...path import Event
-from ..text import is_number, parse_number, quote_short, refuse
+from ..text import is_number, quote_short, refuse
 from ..tools import ToolLog
 from .circles import Circle
 from .cycles import DrillCycle, parse_cycle
 from .dialects import DIALECTS, RIGHT, UNKNOWN, DialectName, find_by_comment, find_by_word
 from .drilling import drill_hole
-from .file_frames import AXIS_TOLERANCE, UPRIGHT, build_frame, build_frame_from_matrix, normalise_direction
+from .file_frames import AXIS_TOLERANCE, UPRIGHT, WorkSystems, build_frame, build_frame_from_matrix, normalise_direction
+from .length_units import StatedUnits
 from .motion import ClMotion
 from .spindle import add_dwell, set_speed
-from .word_arguments import LENGTH_UNITS, parse_feed, parse_numbers, parse_tool_data, parse_tool_number
+from .word_arguments import (
+    LENGTH_UNITS,
+    parse_feed,
+    parse_numbers,
+    parse_tool_data,
+    parse_tool_number,
+    parse_tool_values,
+)
 
 _ARC = re.compile(r"TLON,GOFWD/\(?CIRCLE/([^()/]*?)\)?,ON,(?:\d+,INTOF,)?\(?LINE/([^()/]*)\)?", re.ASCII)
 _ARC_FORM = "TLON,GOFWD/(CIRCLE/x,y,z,r),ON,2,INTOF,(LINE/x,y,z,x,y,z)"
 _POINT_FORM = "x,y,z or x,y,z,i,j,k"
 _MOVARC_FORM = "MOVARC/cx,cy,cz,ax,ay,az,radius[,ANGLE,degrees]"
 _NX_CIRCLE = 8  # values of a CIRCLE that only Siemens NX writes: tolerances follow the radius
-INCH_SPEEDS = frozenset(("IPM", "IPR", "SFM"))  # units of feeds and surface speeds
 _MOST_TURNS = 1e6  # greatest number of turns of an arc
 
 
@@ -43,13 +49,11 @@ class ClActions:
         self.told_line = 0
         self.compensated = False
         self.informing: dict[str, int] = {}
-        self.units: Literal["mm", "inch"] = "mm"
-        self.units_given = False
-        self.inch_line: int | None = None  # where inches are first told by a speed alone
+        self.units = StatedUnits()
         self.tools = ToolLog()
         self.finished = False
         self._last_cycle: DrillCycle | None = None
-        self._work_systems: dict[str, list[str]] = {}  # by the word that chose it
+        self._work_systems = WorkSystems()
 
     # dialects
 
@@ -186,7 +190,7 @@ class ClActions:
             self.motion.set_cycle(self._last_cycle)
         else:
             self._last_cycle = parse_cycle(args, DIALECTS[self.dialect])
-            self._note_inches(args, line)
+            self.units.note_speed(args, line)
             self.motion.set_cycle(self._last_cycle)
 
     def end_program(self, args: list[str], line: int) -> None:
@@ -211,25 +215,12 @@ class ClActions:
         """Set the feed from here on (FEDRAT)."""
         value, unit = parse_feed(args)
         self.motion.take_feed(value, unit, line)
-        self._note_inches(args, line)
+        self.units.note_speed(args, line)
 
     def set_spindle(self, args: list[str], line: int) -> None:
         """Set the spindle's speed from here on (SPINDL)."""
         set_speed(self.motion, args, self.tools.diameter, line)
-        self._note_inches(args, line)
-
-    def _note_inches(self, args: list[str], line: int) -> None:
-        if not self.units_given and self.inch_line is None and not INCH_SPEEDS.isdisjoint(args):
-            self.inch_line = line
-
-    def check_units(self) -> None:
-        """Refuse lengths without a unit beside speeds in inches or feet: mm would be 25.4 times too small."""
-        if self.inch_line is not None:
-            refuse(
-                "a speed in inches or feet while no unit of length is stated; expected UNITS/INCHES or UNITS/MM "
-                "before the first motion",
-                self.inch_line,
-            )
+        self.units.note_speed(args, line)
 
     def wait(self, args: list[str], line: int) -> None:
         """Wait for seconds, or for turns of the spindle (DELAY)."""
@@ -249,12 +240,10 @@ class ClActions:
         self._refuse_in_cycle_or_circle()
         scale = LENGTH_UNITS[args[0]]
         if not self.motion.records.n:
-            self.inch_line = None
-            self.units = "mm" if scale == 1.0 else "inch"
             self.tools.scale_lengths(scale / self.motion.transform.scale)
         elif scale != self.motion.transform.scale:
             self.motion.notes.add(line, "the unit of length changes within the file")
-        self.units_given = True
+        self.units.state(scale, in_motion=self.motion.records.n > 0)
         self.motion.change_frame(line, scale=scale)
 
     def set_tool_axis(self, args: list[str], line: int) -> None:
@@ -313,16 +302,11 @@ class ClActions:
 
     def check_work_system(self, args: list[str], line: int) -> None:
         """Refuse a change of the control's work system, whose offset the file does not tell (ZERO)."""
-        self._keep_work_system("ZERO", args)
+        self._work_systems.keep("ZERO", args, in_motion=self.motion.records.n > 0)
 
     def check_fixture(self, args: list[str], line: int) -> None:
         """Refuse a change of the control's fixture offset, which the file does not tell (FIXTUR)."""
-        self._keep_work_system("FIXTUR", args)
-
-    def _keep_work_system(self, word: str, args: list[str]) -> None:
-        if self._work_systems.get(word, args) != args and self.motion.records.n:
-            refuse("another work system, whose place the file does not tell; expected one throughout")
-        self._work_systems[word] = args
+        self._work_systems.keep("FIXTUR", args, in_motion=self.motion.records.n > 0)
 
     # modes that are honoured where they change nothing
 
@@ -388,25 +372,18 @@ class ClActions:
         if "LENGTH" in args:
             k = args.index("LENGTH")
             (length,) = parse_numbers(args[k + 1 : k + 2], (1,), "LENGTH,length")
-            of_body = "body_length" in (
-                DIALECTS[self.dialect].tool_values or ()
-            )  # what it is by position it is by name
+            of_body = "body_length" in (DIALECTS[self.dialect].tool_values or ())  # by its name as by its position
             data["body_length" if of_body else "set_length"] = length * self.motion.transform.scale
         if data:
             self._refuse_in_cycle_or_circle()
             self._set_tool(line, data, loads=True)
 
     def _read_tool_values(self, values: list[str], line: int) -> dict[str, float | str]:
-        """Read the lengths among the values behind a tool's number, whose order is the dialect's."""
         names = DIALECTS[self.dialect].tool_values
-        if names is None:
-            if values:
-                text = "values behind the tool's number, whose meaning no header tells: not taken for a length"
-                self.motion.notes.add(line, text)
-            return {}
-        scale = self.motion.transform.scale
-        pairs = zip(names, values, strict=False)
-        return {name: parse_number(value) * scale for name, value in pairs if name.endswith("length")}
+        if names is None and values:
+            text = "values behind the tool's number, whose meaning no header tells: not taken for a length"
+            self.motion.notes.add(line, text)
+        return dict(parse_tool_values(names or (), values, self.motion.transform.scale))
 
     def select_tool(self, args: list[str], line: int) -> None:
         """Keep the number of the tool that is made ready (SELECT), where none is known yet."""

@@ -100,3 +100,16 @@ def build_frame_from_matrix(rows: list[list[float]], word: str = "$$*CATIA0") ->
         left, _, right = np.linalg.svd(rotation)
         rotation = left @ right
     return Frame(rotation, matrix[:, 3])
+
+
+class WorkSystems:
+    """The control's work systems that a file chooses without telling where they are, by the word that does."""
+
+    def __init__(self) -> None:
+        self._chosen: dict[str, list[str]] = {}
+
+    def keep(self, word: str, args: list[str], *, in_motion: bool) -> None:
+        """Keep what a word chooses; refuse another one behind the first motion."""
+        if in_motion and self._chosen.get(word, args) != args:
+            refuse("another work system, whose place the file does not tell; expected one throughout")
+        self._chosen[word] = args

@@ -160,7 +160,7 @@ class ClReader:
             raise self._fail("CIRCLE: the file ends; expected the GOTO that ends the arc", self.motion.circle.line)
         try:
             self.motion.close_arc(None)
-            self.actions.check_units()
+            self.actions.units.check()
         except InputError as error:
             raise self._fail(error.message, error.line) from error
         if not self.motion.records.n:
@@ -199,7 +199,7 @@ class ClReader:
             spindle=records.spindle,
             frame=frame,
             dialect=actions.dialect,
-            units=actions.units,
+            units=actions.units.name,
             tool=dict(uses[0].data) if uses else {},
             tools=uses,
             events=tuple(motion.events),

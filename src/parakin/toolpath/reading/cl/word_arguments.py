@@ -108,3 +108,9 @@ def parse_tool_data(args: Sequence[str], scale: float) -> dict[str, float | str]
     if words == ["MILL"]:
         tool |= {"taper": values[3], "tip": values[4]}
     return tool
+
+
+def parse_tool_values(names: Sequence[str], values: Sequence[str], scale: float) -> dict[str, float]:
+    """Parse the lengths among the values behind a tool's number, in mm; ``names`` are the dialect's, in order."""
+    pairs = zip(names, values, strict=False)
+    return {name: parse_number(value) * scale for name, value in pairs if name.endswith("length")}

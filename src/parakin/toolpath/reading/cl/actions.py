@@ -14,14 +14,7 @@ from .circles import Circle
 from .cycles import DrillCycle, parse_cycle
 from .dialects import DIALECTS, RIGHT, UNKNOWN, DialectName, find_by_comment, find_by_word
 from .drilling import drill_hole
-from .file_frames import (
-    AXIS_TOLERANCE,
-    UPRIGHT,
-    ChosenWorkSystems,
-    build_frame,
-    build_frame_from_matrix,
-    normalise_direction,
-)
+from .file_frames import AXIS_TOLERANCE, UPRIGHT, WorkZeros, build_frame, build_frame_from_matrix, normalise_direction
 from .length_units import StatedUnits
 from .motion import ClMotion
 from .spindle import add_dwell, set_speed
@@ -60,7 +53,7 @@ class ClActions:
         self.tools = ToolLog()
         self.finished = False
         self._last_cycle: DrillCycle | None = None
-        self._work_systems = ChosenWorkSystems()
+        self._work_systems = WorkZeros()
 
     # dialects
 

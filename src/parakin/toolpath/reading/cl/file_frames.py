@@ -102,7 +102,7 @@ def build_frame_from_matrix(rows: list[list[float]], word: str = "$$*CATIA0") ->
     return Frame(rotation, matrix[:, 3])
 
 
-class ChosenWorkSystems:
+class WorkZeros:
     """The control's work systems that a file chooses without telling where they are, by the word that does."""
 
     def __init__(self) -> None:

@@ -271,12 +271,26 @@ def test_the_loaded_tools_offset(read):
         ("T1 M6\nG43\nG0 X0 Y0 Z0\nT2 M6\nG1 X1 F9\nM2\n", 4),
         ("G10 L1 P2 Z55\nT2 M6\nG43 H1\nG0 X0 Y0 Z0\nG1 X1 F9\nM2\n", 3),
         ("T1 M6\nG43\nG0 X0 Y0 Z0\nT2 M6\nG43\nG1 X1 F9\nM2\n", None),
+        ("T1 M6\nG0 X0 Y0 Z0\nG1 X1 F9\nT2 M6\nG43\nG0 X2\nM2\n", 1),
+        ("T1 M6\nG0 X0 Y0 Z0\nG43 H1\nG1 X1 F9\nM2\n", None),
     ],
 )
 def test_a_tool_with_another_ones_offset_is_told(read, text, line):
     path = read("G21 G90\n" + text, tools={1: 100.0, 2: 200.0})
     told = [note.line for note in path.notes if "not with its own" in note.text]
     assert told == ([] if line is None else [line + 1])
+
+
+def test_an_offset_in_the_block_of_a_change_needs_its_number(read):
+    text = "G21 G90\nT1 M6 G43{}\nG0 X0 Y0 Z0\nM2\n"
+    after = "G21 G90\nT1 M6\nG43{}\nG0 X0 Y0 Z0\nM2\n"
+    for number in ("", " H0", " H1"):  # rs274 takes the tool in the spindle for H0 too
+        assert read(after.format(number), tools={1: 100.0}).tools[0].data["set_length"] == 100.0
+    assert read(text.format(" H1"), tools={1: 100.0}).tools[0].data["set_length"] == 100.0
+    with pytest.raises(InputError, match="expected H") as caught:
+        read(text.format(""), tools={1: 100.0})
+    assert caught.value.line == 2
+    assert "set_length" not in read(text.format("")).tools[0].data
 
 
 def test_codes_that_pass_through(read):

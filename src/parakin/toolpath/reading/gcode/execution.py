@@ -88,8 +88,7 @@ class BlockExecutor:
         self.motion.plane = block.g.get("plane", self.motion.plane)
         if block.values.pop("D", None) is not None:
             self.motion.notes.add(line, "D, a tool's number for radius compensation, which is off: of no effect")
-        # a tool changed in the same block is not yet the one that G43 without H takes
-        self.offsets.execute_length_offset(block, line, math.nan if "tool" in block.m else self._loaded_tool)
+        self.offsets.execute_length_offset(block, line, None if "tool" in block.m else self._loaded_tool)
         self.offsets.execute_work_system(block, line)
         self._execute_path_mode(block, line)
         if "distance" in block.g:

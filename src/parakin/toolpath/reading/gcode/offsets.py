@@ -113,10 +113,10 @@ class OffsetExecutor:
 
     # tool lengths
 
-    def execute_length_offset(self, block: Block, line: int, loaded: float) -> None:
+    def execute_length_offset(self, block: Block, line: int, loaded: float | None) -> None:
         """Execute a tool length offset (G43 to G49): the holder stays, so that the tip's coordinates change.
 
-        loaded : the number of the tool in the spindle, NaN if not known
+        loaded : the number of the tool in the spindle, NaN if not known, None while this block changes it
         """
         code, values = block.g.get("length"), block.values
         if code is None:
@@ -135,11 +135,16 @@ class OffsetExecutor:
             if self._unknown_length is not None and len(shifts) < len("XYZ") and "Z" not in shifts:
                 offset = None
         else:
-            text = name
-            number = loaded
-            if "H" in values:
-                number = float(round_whole("H", values.pop("H")))
-                text = f"{name} H{number:.0f}"
+            given = float(round_whole("H", values.pop("H"))) if "H" in values else None
+            text = name if given is None else f"{name} H{given:.0f}"
+            number = given or loaded  # H0 is the tool in the spindle, as LinuxCNC has it
+            if number is None and self._tools is not None:
+                refuse(
+                    f"{name} without the tool's number as H in the block of its change, which may still be for the "
+                    "tool before; expected H, or a block of its own"
+                )
+            if number is None or math.isnan(number):
+                number = math.nan if given is None else 0.0
             length = self._find_length(name, number)
             offset = None if length is None else [0.0, 0.0, length]
             if code == codes.G43_2 and offset is not None:

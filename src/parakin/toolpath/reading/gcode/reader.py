@@ -296,7 +296,9 @@ class GcodeReader:
             uses = list_tool_uses(executor.tools, executor.offsets.lengths, self.tools)
         except InputError as error:
             raise self._fail(error.message, error.line) from None
-        for line, text in find_other_lengths(uses, lambda number: executor.offsets.read_tool_offset(number)[2]):
+        uses = tuple(use._replace(record=max(0, use.record + begun - dropped)) for use in uses)
+        cuts, read_offset = columns[RAPID] == 0.0, executor.offsets.read_tool_offset
+        for line, text in find_other_lengths(uses, cuts, lambda number: read_offset(number)[2]):
             motion.notes.add(line, text)
         turns = np.radians(np.ascontiguousarray(columns[3:6].T))
         seconds = columns[SECONDS].copy()
@@ -311,7 +313,7 @@ class GcodeReader:
             dialect="gcode",
             units=executor.units,
             tool=self._describe_tool(),
-            tools=tuple(use._replace(record=max(0, use.record + begun - dropped)) for use in uses),
+            tools=uses,
             events=tuple(Event(max(0, e.record + begun - dropped), e.line, e.text) for e in executor.events),
             notes=motion.notes.list_notes(),
             turns=turns if any(motion.turned) else None,

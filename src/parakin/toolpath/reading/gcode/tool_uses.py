@@ -3,6 +3,9 @@
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 
+import numpy as np
+from numpy.typing import NDArray
+
 from ...path import ToolUse
 from ..tools import ToolLog
 from .offsets import LengthOffset
@@ -39,18 +42,25 @@ def list_tool_uses(
     return tuple(uses)
 
 
-def find_other_lengths(uses: Sequence[ToolUse], find_length: Callable[[float], float]) -> Iterator[tuple[int, str]]:
+def find_other_lengths(
+    uses: Sequence[ToolUse], cuts: NDArray[np.bool_], find_length: Callable[[float], float]
+) -> Iterator[tuple[int, str]]:
     """Find the tools that an offset gives another length than their own; yield line and remark.
 
+    Rapid motions without an offset are the rule between a tool's change and its G43, cuts without one are not.
+
+    cuts : of each record whether it is a cut
     find_length : of a tool's number its own length, NaN if not known
     """
-    for use in uses:
+    ends = [use.record for use in uses[1:]] + [len(cuts)]
+    for use, end in zip(uses, ends, strict=False):
         number, given = use.data.get("number"), use.data.get("set_length")
-        if isinstance(number, float) and isinstance(given, float) and given:
-            own = find_length(number)
-            if abs(own - given) > _SAME_LENGTH:
-                line = max(use.line, use.length_line)
-                yield line, f"tool {number:g} goes with an offset of {given:g} mm, and not with its own, {own:g} mm"
+        if not isinstance(number, float) or not isinstance(given, float) or not (given or cuts[use.record : end].any()):
+            continue
+        own = find_length(number)
+        if abs(own - given) > _SAME_LENGTH:
+            fate = f"goes with an offset of {given:g} mm" if given else "cuts without an offset"
+            yield max(use.line, use.length_line), f"tool {number:g} {fate}, and not with its own, {own:g} mm"
 
 
 def _list_changes(log: ToolLog) -> list[ToolUse]:

@@ -15,6 +15,7 @@ from shipped import REPRESENTATIVES, load_shipped
 import parakin as pk
 from parakin.export.workspace.cells import format_cells_csv, format_cells_vtu
 from parakin.export.workspace.describe import describe_region, describe_size, format_bracket, format_volume
+from parakin.export.workspace.edge_flips import unfold_surface
 from parakin.export.workspace.meshes import format_mesh, make_mesh
 from parakin.performance.indices import compute_performance
 from parakin.workspaces.sampled.cross_sections import compute_signed_area, find_cross_sections
@@ -163,6 +164,36 @@ def test_the_mesh_of_a_lens(lens):
     assert np.abs(gaps.min(0)).max() < 0.02
     assert (gaps.max(0) < 0.1 * whole.step.max()).sum() > 2 * pi * 300 / whole.step.max()
     assert mesh.bounds == pytest.approx(np.array([[-100, -300, -300], [100, 300, 300]]), abs=0.1)
+
+
+def test_a_folded_surface_is_unfolded():
+    """Vertices of a sphere that were drawn over an edge: afterwards all triangles look outward again."""
+    ball = trimesh.creation.icosphere(4)
+    vertices, faces = np.array(ball.vertices), np.array(ball.faces)
+    for vertex in (20, 500, 900):
+        edge = np.setdiff1d(faces[(faces == vertex).any(1)][0], vertex)  # it ends beyond this edge
+        vertices[vertex] += 1.3 * (vertices[edge].mean(0) - vertices[vertex])
+    vertices /= np.linalg.norm(vertices, axis=1, keepdims=True)
+    normals = vertices[faces].mean(1) / np.linalg.norm(vertices[faces].mean(1), axis=1, keepdims=True)
+
+    def count_folded(faces):
+        a, b, c = np.moveaxis(vertices[faces], 1, 0)
+        return int((np.linalg.det(np.stack([a, b, c], 1)) < 0.0).sum())  # seen from the middle
+
+    assert count_folded(faces) >= 3
+    flipped, own = unfold_surface(vertices, faces, normals)
+    assert count_folded(flipped) == 0
+    assert own.shape == normals.shape
+    mesh = trimesh.Trimesh(vertices, flipped, process=False)
+    assert mesh.is_watertight and mesh.is_winding_consistent
+    assert mesh.volume == pytest.approx(ball.volume, rel=1e-3)
+
+
+def test_few_triangles_of_a_sharp_edge_fold_over():
+    found = pk.workspace(whole_region(load_shipped("orthoglide")), gap=0.3)
+    shape = make_mesh(sample_field(found.region, found.box, step=8.0))
+    areas = np.cross(*(shape.vertices[shape.faces[:, i]] - shape.vertices[shape.faces[:, 0]] for i in (1, 2)))
+    assert (np.einsum("fi,fi->f", areas, shape.normals) < 0.0).sum() < 1e-3 * len(shape.faces)  # 5e-3 as it was fitted
 
 
 def test_the_mesh_has_the_normals_of_the_boundary(lens):

@@ -45,7 +45,7 @@ COARSE = """() => {
   const request = {pose: machine.axes.map(axis => axis.home), signs: machine.mode};
   const lattice = makeLattice(places, ...findRanges(places), LEVELS[0]);
   for (let layer = 0; layer < lattice.count; layer++) fillLayer(lattice, layer, request);
-  return marchLattice(lattice).positions.length;
+  return marchLattice(lattice, request).positions.length;
 }"""
 
 

@@ -15,7 +15,7 @@ from shipped import REPRESENTATIVES, load_shipped
 import parakin as pk
 from parakin.export.workspace.cells import format_cells_csv, format_cells_vtu
 from parakin.export.workspace.describe import describe_region, describe_size, format_bracket, format_volume
-from parakin.export.workspace.edge_flips import unfold_surface
+from parakin.export.workspace.edge_flips import flip_folded_triangles
 from parakin.export.workspace.meshes import format_mesh, make_mesh
 from parakin.performance.indices import compute_performance
 from parakin.workspaces.sampled.cross_sections import compute_signed_area, find_cross_sections
@@ -181,7 +181,7 @@ def test_a_folded_surface_is_unfolded():
         return int((np.linalg.det(np.stack([a, b, c], 1)) < 0.0).sum())  # seen from the middle
 
     assert count_folded(faces) >= 3
-    flipped, own = unfold_surface(vertices, faces, normals)
+    flipped, own = flip_folded_triangles(vertices, faces, normals)
     assert count_folded(flipped) == 0
     assert own.shape == normals.shape
     mesh = trimesh.Trimesh(vertices, flipped, process=False)

@@ -15,7 +15,7 @@ import parakin as pk
 from parakin.cli import main
 from parakin.errors import NoMethodError
 from parakin.export.page import three_script
-from parakin.export.page.page import render_machine_page, write_core
+from parakin.export.page.page import render_machine_page, write_core, write_surface_worker
 from parakin.export.page.path_data import encode_page_path
 from parakin.kinematics.turns import wrap_angle
 from parakin.performance.singularities import compute_singularity_margins
@@ -279,6 +279,27 @@ def test_a_part_is_played(tmp_path, browser):
         assert tab.evaluate("parakin.player.time") < 0.05 * job.seconds
 
 
+COARSE = """() => {
+  const request = {pose: machine.axes.map(axis => axis.home), signs: machine.mode};
+  const lattice = makeLattice(places, ...findRanges(places), LEVELS[0]);
+  for (let layer = 0; layer < lattice.count; layer++) fillLayer(lattice, layer, request);
+  return marchLattice(lattice, request).positions;
+}"""
+
+
+@needs_chromium
+def test_a_coarse_workspace_ends_where_the_limits_do(browser):
+    """Also where a leg can't close, and its other limits have no margin beyond: the area is that which is proved."""
+    machine = load_shipped("five_bar")
+    with open_tab(browser) as tab:
+        tab.add_script_tag(content=write_core(machine) + write_surface_worker())
+        corners = as_numbers(tab.evaluate(COARSE)).reshape(-1, 3, 2)
+    area = 0.5 * np.abs(np.linalg.det(corners[:, 1:] - corners[:, :1])).sum()
+    assert area == pytest.approx(pk.workspace(pk.region(machine), gap=0.01).volume.estimate, rel=1e-3)
+    inside = machine.home + 0.999 * (corners.reshape(-1, 2) - machine.home)
+    assert (machine.check(inside) == 0).all()
+
+
 def read_column(tab, name):
     return np.array(tab.evaluate(f"Array.from(parakin.placing.columns.{name}, x => x === x ? x : null)"), float)
 
@@ -381,6 +402,25 @@ def test_the_workspace_is_drawn_in_a_worker(pages, browser):
     x, y = (np.linspace(-700.0, 700.0, 701) for _ in range(2))
     lattice = np.stack(np.meshgrid(x, y, indexing="ij"), -1).reshape(-1, 2)
     assert volume == pytest.approx(4.0 * (machine.check(lattice) == 0).sum(), rel=0.02)
+
+
+@needs_chromium
+def test_the_picture_has_room_for_a_section_and_the_workspace(pages, browser):
+    distances = []
+    boxes = {
+        "its surface at this orientation": "parakin.surface.last",
+        "a section through": "parakin.section.corners > 0",
+    }
+    for order in (list(boxes), list(boxes)[::-1]):
+        with open_tab(browser, 768, 1024) as tab:
+            tab.goto(pages("tricept"))
+            before = tab.evaluate("parakin.orbit.distance")
+            for label in order:
+                tab.get_by_label(label).check()
+                wait_until(tab, boxes[label])
+            distances.append(tab.evaluate("parakin.orbit.distance"))
+    assert distances[0] == pytest.approx(distances[1])
+    assert distances[0] > 1.1 * before
 
 
 @needs_chromium

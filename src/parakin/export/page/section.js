@@ -34,7 +34,7 @@ function drawSection({positions, shares}) {
   Object.assign(section, {count: section.count + 1, corners: shares.length, least, most});
   sectionNote.textContent = shares.length ? `det A over home’s is ${least.toFixed(2)} to ${most.toFixed(2)} there; violet is ${bottom < 0 ? "beyond a singularity" : "at a singularity"}.`
     : "Nothing is allowed in this plane.";
-  fitOrbit(sectionMesh.geometry, "surface");
+  fitOrbit(sectionMesh.geometry, "section");
   requestSection();
   requestPicture();
 }

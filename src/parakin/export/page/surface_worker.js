@@ -66,18 +66,51 @@ function findInside({low, step, count, values, d}) {
   return [least, greatest].map(ends => ends.map((i, k) => low[k] + step[k] * i));
 }
 
+const CROSSING_STEPS = 3; // by which the place between two points of the lattice is found where the least margin is zero
+
+// The share of the way between two places, with their margins, at which the margin is zero: by false position, each end's
+// margin halved where the other one has been moved twice. Where a leg can't close the margin jumps.
+function findCrossing(measure, inside, outside) {
+  let [low, high] = [0, 1], share = inside / (inside - outside), moved = 0;
+  for (let k = 0; k < CROSSING_STEPS; k++) {
+    const value = measure(share);
+    if (value >= 0) {
+      [low, inside] = [share, value];
+      if (moved > 0) outside *= 0.5;
+      moved = 1;
+    } else {
+      [high, outside] = [share, value];
+      if (moved < 0) inside *= 0.5;
+      moved = -1;
+    }
+    share = low + (high - low) * inside / (inside - outside);
+  }
+  return share;
+}
+
 // Triangles of the surface with normals (in the plane: of the area itself, with the lattice points that each corner lies
 // between, and their weights), and the volume inside.
-function marchLattice(lattice) {
-  const {low, step, count, values, d} = lattice, corners = 2 ** d, strides = d === 3 ? [count * count, count, 1] : [count, 1];
+function marchLattice(lattice, request) {
+  const {axes, low, step, count, values, d} = lattice, pose = [...request.pose], crossings = new Map(), corners = 2 ** d, strides = d === 3 ? [count * count, count, 1] : [count, 1];
   const offsets = Array.from({length: corners}, (_, c) => strides.reduce((sum, stride, k) => sum + ((c >> (d - 1 - k)) & 1) * stride, 0));
   const positions = [], normals = [], between = [], locate = number => strides.map((stride, k) => low[k] + step[k] * (Math.floor(number / stride) % count));
   const cellVolume = step.reduce((product, length) => product * length, 1);
   let inside = 0;
   const slope = (number, k) => (values[number + strides[k]] - values[number - strides[k]]) / step[k];
+  const makeCrossing = (a, b) => {
+    const [p, q] = [locate(a), locate(b)], place = share => p.map((x, k) => x + share * (q[k] - x));
+    const share = findCrossing(share => {
+      place(share).forEach((x, k) => { pose[axes[k]] = x; });
+      return measureLeastMargin(pose, request.signs);
+    }, values[a], values[b]);
+    return {at: place(share), ends: [[a, 1 - share], [b, share]]};
+  };
   const cross = (a, b) => {
-    const share = values[a] / (values[a] - values[b]), [p, q] = [locate(a), locate(b)];
-    return {at: p.map((x, k) => x + share * (q[k] - x)), ends: [[a, 1 - share], [b, share]]};
+    const key = a * values.length + b, known = crossings.get(key);
+    if (known) return known;
+    const made = makeCrossing(a, b);
+    crossings.set(key, made);
+    return made;
   };
   const isInner = number => strides.every(stride => { const i = Math.floor(number / stride) % count; return i > 0 && i < count - 1; });
   const findNormal = ({ends}) => {
@@ -156,7 +189,7 @@ async function refineSurface(request) {
       if (wanted !== request && level > 0) return;
       begin = performance.now();
     }
-    const {positions, normals, volume} = marchLattice(lattice);
+    const {positions, normals, volume} = marchLattice(lattice, request);
     const surface = {id: request.id, level, last: level === LEVELS.length - 1, volume, positions: new Float32Array(positions), normals: new Float32Array(normals)};
     postMessage(surface, [surface.positions.buffer, surface.normals.buffer]);
     ends = findInside(lattice);
@@ -188,7 +221,7 @@ function computeSection(request) {
     ends = findInside(lattice);
     if (ends === null) return {positions: new Float32Array(0), shares: new Float32Array(0)};
   }
-  const {axes, low, step, count, values} = lattice, pose = [...request.pose], {positions, between} = marchLattice(lattice);
+  const {axes, low, step, count, values} = lattice, pose = [...request.pose], {positions, between} = marchLattice(lattice, request);
   const shareAt = Float64Array.from(values, (value, number) => {
     if (!(value >= 0)) return NaN; // the corners of the border take the value of their inner end
     axes.forEach((axis, k) => { pose[axis] = low[k] + step[k] * (k ? number % count : Math.floor(number / count)); });

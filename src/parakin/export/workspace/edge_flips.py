@@ -25,8 +25,8 @@ class _Flip(NamedTuple):
     normals: Array
 
 
-def unfold_surface(vertices: Array, faces: Indices, normals: Array) -> tuple[Indices, Array]:
-    """Unfold a closed surface by edge flips; return its triangles (F, 3) and the boundary's normals (F, 3) at them.
+def flip_folded_triangles(vertices: Array, faces: Indices, normals: Array) -> tuple[Indices, Array]:
+    """Flip edges of a closed surface until it is not folded; return its triangles and the normals at them, both (F, 3).
 
     vertices : (V, 3)
     normals : (F, 3) outward, unit vectors, each of the boundary near a triangle; a new triangle takes the one of the

@@ -11,7 +11,7 @@ from ...arrays import Array, Indices
 from ...errors import PoseError
 from ...workspaces.sampled.distance_field import SampledField
 from ..shaded_bodies import ShadedBody, smooth_normals
-from .edge_flips import unfold_surface
+from .edge_flips import flip_folded_triangles
 from .surface_fitting import fit_surface
 
 
@@ -56,7 +56,7 @@ def make_mesh(field: SampledField) -> Mesh:
     vertices, faces, _, _ = marching_cubes(field.values, 0.0, gradient_direction="ascent")
     faces = faces.astype(np.int64)
     fitted = fit_surface(field, field.refine_crossings(vertices.astype(np.float64)), faces)
-    return Mesh(fitted.vertices, *unfold_surface(fitted.vertices, faces, fitted.normals))
+    return Mesh(fitted.vertices, *flip_folded_triangles(fitted.vertices, faces, fitted.normals))
 
 
 def format_mesh(mesh: Mesh, kind: str) -> bytes:

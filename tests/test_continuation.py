@@ -6,6 +6,7 @@ import os
 import re
 import shutil
 import subprocess
+from itertools import product
 
 import numpy as np
 import pytest
@@ -140,6 +141,36 @@ def test_a_lost_path_is_tracked_once_more_another_way(tmp_path, monkeypatch):
     assert found.lost_count == 0 and found.complete == "all paths accounted for"
     np.testing.assert_allclose(found.poses, expected.poses, atol=1e-9)
     assert len(starts) == 2 and np.abs(starts[0] - starts[1]).max() > 0.1
+
+
+def test_paths_side_by_side_end_in_known_roots():
+    """xᵢ² = bᵢ: the eight paths of a system are as many as the lanes, and those of the next one take these up."""
+    rng = np.random.default_rng(6)
+    values = np.exp(2j * np.pi * rng.uniform(size=(2, 5, 3))) * rng.uniform(0.5, 2.0, (2, 5, 3))
+    values[0] = values[0, 0]
+    first, last = np.zeros((2, 5, 3, 4, 4), complex)
+    for systems, own in zip((first, last), values, strict=True):
+        for i in range(3):
+            systems[:, i, i + 1, i + 1], systems[:, i, 0, 0] = 1.0, -own[:, i]
+    signs = np.array(list(product((-1.0, 1.0), repeat=3)))
+    ends = path_tracking.track_members(first, last, np.column_stack([np.ones(8), signs * np.sqrt(values[0, 0])]))
+    assert (ends.reached == 1.0).all() and not find_meetings(ends).any()
+    places = ends.points[:, :, 1:] / ends.points[:, :, :1]
+    np.testing.assert_allclose(places**2, np.broadcast_to(values[1][:, None], places.shape), atol=1e-9)
+    assert np.abs(np.linalg.norm(ends.points, axis=2) - 1.0).max() < 1e-12
+
+
+def test_struts_lengths_alone_change_along_paths(tmp_path):
+    """Of each strut's quadric that is |e|², and the first system still has all roots of the machine's own member."""
+    machine = platform(tmp_path, *draw_platform(np.random.default_rng(9)))
+    closures = make_machine_quadrics(machine.model)
+    own = closures.own_member
+    systems = closures.make_systems(machine.inverse(machine.home)[None])
+    first, last = path_tracking.align_closures(own.system, systems, closures.fixed_count, closures.steady)
+    np.testing.assert_array_equal(last, systems)
+    changes = np.abs(last - first)[0]
+    assert (changes[1:, range(4), range(4)] > 0.0).all() and (changes > 0.0).sum() == 24
+    assert np.abs(np.einsum("ki,rij,kj->kr", own.roots, first[0], own.roots)).max() < 1e-11
 
 
 def test_roots_close_to_a_singularity_are_told_apart():

@@ -27,6 +27,11 @@ class ClosureSystem(ABC):
 
     @property
     @abstractmethod
+    def steady(self) -> Flags:
+        """Where joints change entries of the quadrics (n - 1, n, n) by no more than the scale of a closure."""
+
+    @property
+    @abstractmethod
     def own_member(self) -> GenericMember:
         """A system of the machine's own, with generic complex numbers for what depends on joints, and all its roots."""
 

@@ -80,8 +80,9 @@ def _track_and_sort(
 
     phase : the member's closures are multiplied by it, which leaves their roots and leads along other paths
     """
-    fixed = make_closure_system(model).fixed_count
-    first, last = align_closures(own.system, systems, fixed)
+    closures = make_closure_system(model)
+    fixed = closures.fixed_count
+    first, last = align_closures(own.system, systems, fixed, closures.steady)
     first[:, fixed:] *= phase
     ends = track_members(first, last, own.roots, tolerance)
     met = find_meetings(ends).sum(1)

@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 
 from ...algebra import IDENTITY, ORIGIN, Scalar, Term, Trace, derivative, dot, evaluate_trace, scale
-from ...arrays import Array
+from ...arrays import Array, Flags
 from ...errors import NoMethodError
 from ...model.elements import RodConstraint
 from ...model.limits import group_joints_by_leg
@@ -65,11 +65,24 @@ class MachineQuadrics(ClosureSystem):
     @cached_property
     def own_member(self) -> GenericMember:
         generic = find_generic_member(_name_family(self.model))
-        numbers = _draw_numbers(self.compute_numbers(_sample_joints(self.model)))
+        numbers = _draw_numbers(self._samples)
         system = self.family.make_member(self.combine(numbers))
         first, last = align_members(generic.system, system, self.fixed_count)
         roots = find_regular_roots(first, last, generic.roots, self.fixed_count)
         return GenericMember(system[0], roots[np.linalg.norm(roots @ self.family.hull[:, :4], axis=1) > _NO_TURN])
+
+    @cached_property
+    def _samples(self) -> Array:
+        return self.compute_numbers(_sample_joints(self.model))
+
+    @cached_property
+    def steady(self) -> Flags:
+        closures = [
+            (matrices[(np.abs(basis) > _VARIES).any(0)] == 0.0).all(0)
+            for (_, basis), matrices in zip(_find_variations(self._samples), self.matrices, strict=True)
+        ]
+        n = self.matrices.shape[2]
+        return np.concatenate([np.ones((self.fixed_count, n, n), np.bool_), np.array(closures)])
 
     def measure_scales(self, points: Complex) -> Array:
         e = points @ self.family.hull[:, :4]
@@ -169,13 +182,20 @@ def _sample_joints(model: Model) -> Array:
     return rng.uniform(low, high, (_SAMPLES, len(low)))
 
 
+def _find_variations(samples: Array) -> list[tuple[Array, Array]]:
+    """Find how samples (N, closures, 5) of each closure's numbers vary: standard deviations (k,) along rows (k, 5)."""
+    variations = []
+    for own in samples.swapaxes(0, 1):
+        _, values, basis = np.linalg.svd(own - own.mean(0), full_matrices=False)
+        varies = values > _VARIES * max(np.abs(own).max(), 1e-300)
+        variations.append((values[varies] / np.sqrt(len(samples)), basis[varies]))
+    return variations
+
+
 def _draw_numbers(samples: Array) -> Complex:
     """Draw generic complex numbers, (1, closures, 5), from the affine span of samples of each closure's."""
     rng = np.random.default_rng(_SEED)
     drawn: Complex = samples.mean(0)[None].astype(np.complex128)
-    for closure in range(samples.shape[1]):
-        _, values, basis = np.linalg.svd(samples[:, closure] - samples[:, closure].mean(0), full_matrices=False)
-        own = values > _VARIES * max(np.abs(samples[:, closure]).max(), 1e-300)
-        spread = values[own] / np.sqrt(len(samples))
-        drawn[0, closure] += (draw_complex(rng, int(own.sum())) * spread * 2.0) @ basis[own]
+    for closure, (spread, basis) in enumerate(_find_variations(samples)):
+        drawn[0, closure] += (draw_complex(rng, len(spread)) * spread * 2.0) @ basis
     return drawn

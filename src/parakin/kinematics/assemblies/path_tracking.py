@@ -15,6 +15,7 @@ _CLOSE = 1e-8  # 1 - cos of the angle of two points of projective space that may
 _SAME = 1e-7  # rad: a regular root is known better than this, and two that are farther apart are two
 _PATHS_A_THREAD = 16
 _MOST_PHASES = 8
+_ENOUGH = 1e-3  # of a closure of length one: the length of its steady entries from which they tell its scale
 
 LENIENT = 1e-4  # tolerances of the last terms of a path's series: usual, and where paths met
 STRICT = 1e-9
@@ -51,18 +52,25 @@ def align_members(first: Complex, last: Complex, fixed: int) -> tuple[Complex, C
     return begin, end
 
 
-def align_closures(first: Complex, last: Complex, fixed: int) -> tuple[Complex, Complex]:
-    """Scale each closure of ``first`` so that it differs little from that of ``last``: the same roots, shorter paths.
+def align_closures(first: Complex, last: Complex, fixed: int, steady: Flags) -> tuple[Complex, Complex]:
+    """Scale each closure of ``first`` so that it differs little from that of ``last``: same roots, shorter paths.
 
     Every closure between is one of the same leg, so that ``first`` may be generic among one machine's systems alone.
+    The entries that no joint changes become the same, and the others alone change on the way.
 
     first : (n - 1, n, n); last : (systems, n - 1, n, n), both with closures of length one
     fixed : how many quadrics of each come first and stay as they are
+    steady : (n - 1, n, n) where joints change an entry by no more than the whole closure's scale
     """
-    products = np.einsum("rij,srij->sr", first.conj(), last)
-    phases = products / np.maximum(np.abs(products), 1e-300)
-    phases[:, :fixed] = 1.0
-    return phases[..., None, None] * first, last
+    kept = np.where(steady, first, 0.0)
+    squares = (np.abs(kept) ** 2).sum((1, 2))
+    known = squares > _ENOUGH**2
+    own = np.where(known[:, None, None], kept, first)
+    products = np.einsum("rij,srij->sr", own.conj(), last)
+    factors = products / np.where(known, squares, np.maximum(np.abs(products), 1e-300))
+    factors[:, :fixed] = 1.0
+    aligned = factors[..., None, None] * first
+    return np.where(steady & known[:, None, None], last, aligned), last
 
 
 def track_members(first: Complex, last: Complex, starts: Complex, tolerance: float = LENIENT) -> PathEnds:
@@ -73,12 +81,15 @@ def track_members(first: Complex, last: Complex, starts: Complex, tolerance: flo
     Where two paths of a system end in one regular root, one has jumped onto the other; both are tracked once more in
     shorter steps.
     """
-    from ...kernels.homotopy import track_paths
+    from ...kernels.homotopy import list_entries, track_paths
 
     shape = (len(last), *starts.shape)
     ends = PathEnds(np.empty(shape, np.complex128), np.empty(shape[:2]))
     ends.points[:] = starts
-    run_in_threads(shape[0] * shape[1], lambda a, b: track_paths(first, last, tolerance, ends, a, b), _PATHS_A_THREAD)
+    entries, changes = list_entries(last), list_entries(last - first)
+    run_in_threads(
+        shape[0] * shape[1], lambda a, b: track_paths(entries, changes, tolerance, ends, a, b), _PATHS_A_THREAD
+    )
     if tolerance > STRICT:
         for system in np.flatnonzero(find_meetings(ends).any(1)):
             again = track_members(first[system : system + 1], last[system : system + 1], starts, STRICT)

@@ -64,7 +64,7 @@ def make_family(motion: tuple[str, ...]) -> QuadricFamily:
         for values in rng.uniform(-_WIDE, _WIDE, (_SAMPLES, len(motion))).tolist()
     ]
     points = compute_study_points(np.array([f[0] for f in frames], float), np.array([f[1] for f in frames], float))
-    hull = _find_span(points)
+    hull = _find_hull(points)
     inside = points @ hull.T
     own: Array | Complex = _find_quadrics(inside)
     n, freedoms = len(hull), len(motion)
@@ -77,6 +77,12 @@ def make_family(motion: tuple[str, ...]) -> QuadricFamily:
         basis = np.linalg.qr(_find_quadrics(inside).reshape(-1, n * n).T)[0]
         closures = closures - closures @ basis @ basis.T
     return QuadricFamily(hull, own.astype(np.complex128), _find_span(closures).reshape(-1, n, n), inside[0], freedoms)
+
+
+def _find_hull(points: Array) -> Array:
+    """Find orthonormal rows that span points (N, 8): where these span all, the coordinates, whose zeros are kept."""
+    hull = _find_span(points)
+    return np.eye(points.shape[1]) if len(hull) == points.shape[1] else hull
 
 
 def _find_span(rows: Array) -> Array:

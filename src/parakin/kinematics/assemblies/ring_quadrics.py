@@ -28,6 +28,7 @@ from .quadric_family import Complex, draw_complex
 _SEED = 4
 _COORDINATES = 9  # 1, p (3), u (3), |p|², p·u
 _ONE, _ORIGIN, _AXIS, _SQUARE, _ALONG = 0, slice(1, 4), slice(4, 7), 7, 8
+_VARYING = 2  # of a torus's four numbers the first ones hang on its strut's length
 _SPREAD = 0.5  # of a generic strut's squared length, by its real one at home
 
 
@@ -68,6 +69,11 @@ class RingQuadrics(ClosureSystem):
         tori /= np.linalg.norm(tori, axis=(2, 3), keepdims=True)
         fixed = np.broadcast_to(_make_fixed_quadrics(), (len(tori), 3, _COORDINATES, _COORDINATES))
         return np.ascontiguousarray(np.concatenate([fixed, tori], 1))
+
+    @cached_property
+    def steady(self) -> Flags:
+        tori = (self.quadrics[:, :_VARYING] == 0.0).all(1)
+        return np.concatenate([np.ones((self.fixed_count, *tori.shape[1:]), np.bool_), tori])
 
     @cached_property
     def own_member(self) -> GenericMember:

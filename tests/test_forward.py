@@ -14,6 +14,7 @@ from shipped import load_shipped
 from test_conformance import everyone, families, poses_about
 
 import parakin as pk
+from parakin.model.spheres import compute_square_determinant, compute_square_height, find_common_point
 
 CLOSE = 1.5e-9  # mm: 1e-9 in a machine of a metre
 
@@ -126,6 +127,26 @@ def test_closed_form_and_newton_agree(m):
     place, angle = errors(m, closed.poses, newton.poses)
     assert place[both].max() < 1e-9
     assert angle[both].max() < 1e-11
+
+
+@pytest.mark.parametrize("flat", [1.0, 0.01])
+def test_spheres_share_the_point_that_they_were_drawn_through(flat):
+    """By constants across the rails, or by the normal where centres stand nearly in a plane along each of them."""
+    rng = np.random.default_rng(3)
+    plane = [0, 1, 2]
+    for _ in range(200):
+        place, centres = rng.uniform(-1.0, 1.0, 3), rng.uniform(-1.0, 1.0, (3, 3))
+        centres[2] = centres[0] + rng.uniform(0.3, 0.7) * (centres[1] - centres[0]) + flat * (centres[2] - centres[0])
+        radii = np.linalg.norm(place - centres, axis=1)
+        normal = np.cross(centres[1] - centres[0], centres[2] - centres[0])
+        height = (place - centres[0]) @ normal / np.linalg.norm(normal)
+        given = centres.tolist(), radii.tolist(), plane
+        shared = find_common_point(*given, float(np.sign(height)), None)
+        doubtful = 1e-13 / (np.linalg.norm(normal) ** 2 * abs(height))
+        np.testing.assert_allclose(shared, place, atol=doubtful)
+        assert abs(compute_square_height(*given) - height**2) < 1e-13 / np.linalg.norm(normal) ** 2
+        determinant = (height * np.linalg.norm(normal)) ** 2
+        assert abs(compute_square_determinant(*given) - determinant) < 1e-13
 
 
 @pytest.mark.parametrize(("tilt", "steps"), [(15.0, 5), (30.0, 9), (45.0, 19)])

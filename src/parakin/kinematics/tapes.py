@@ -12,13 +12,13 @@ from .wrist.pole_crossing import flip_mode
 class SphereTapes(NamedTuple):
     """The direct problem in closed form, by the common point of the legs' spheres.
 
-    nearest : joints, near pose -> pose on that pose's side, closures, the square of the height over the centres
+    at_home : joints -> pose on home's side, closures, the square of the height over the centres
     on_side : joints, a number -> pose on the side that its sign tells, closures
     own_side : pose -> such a number, for the pose's own joints; NaN out of reach
     own_side_over : the same in the other mode of head and table, where there is one
     """
 
-    nearest: Tape
+    at_home: Tape
     on_side: Tape
     own_side: Tape
     own_side_over: Tape | None

@@ -12,6 +12,7 @@ from typing import NamedTuple
 from ..algebra import Scalar, Vec, add, copysign, cross, dot, scale, sqrt, sub
 
 CENTRES_NEEDED = (2, 3)
+_UPRIGHT = 0.05  # least area that three centres span at right angles to the rails, of their edges' product
 
 
 def find_common_point(
@@ -29,13 +30,13 @@ def find_common_point(
     if side is None and near is not None:
         side = dot(sub(near, foot.first), foot.normal)
     height = height * side if isinstance(side, float) else copysign(height, side)
-    return add(add(foot.first, foot.offset), scale(foot.normal, height))
+    return add(add(foot.first, foot.offset), scale(foot.normal, height - foot.back))
 
 
 def compute_square_determinant(centres: Sequence[Vec], radii: Sequence[Scalar], plane: Sequence[int]) -> Scalar:
     """Compute the square of the rods' determinant at the common point, mm⁶ (mm⁴): of :func:`measure_side` there."""
     foot = _find_foot(centres, radii, plane)
-    return foot.square * foot.size
+    return foot.square * dot(foot.normal, foot.normal) * foot.scale**2
 
 
 def compute_square_height(centres: Sequence[Vec], radii: Sequence[Scalar], plane: Sequence[int]) -> Scalar:
@@ -44,44 +45,84 @@ def compute_square_height(centres: Sequence[Vec], radii: Sequence[Scalar], plane
 
 
 class _Foot(NamedTuple):
-    """Where the common points' middle lies: ``first`` centre + ``offset``; they are off it along the ``normal``.
+    """Where the common points lie: on the line through the ``first`` centre + ``offset`` along the ``normal``.
 
-    size : the normal's square
-    inverse : 1 over it; the only quotient, for that costs as much as six products
+    back : how far that place is in front of the points' middle, in units of the normal
+    scale : of the normal, by which it is u × v of the edges from the first centre (the edge turned by 90°)
+    inverse : 1 over the normal's square; the only quotient, for that costs as much as six products
     square : of the distance from the middle to either point, mm²
     """
 
     first: Vec
     offset: Vec
+    back: Scalar
     normal: Vec
-    size: Scalar
+    scale: float
     inverse: Scalar
     square: Scalar
 
 
 def _find_foot(centres: Sequence[Vec], radii: Sequence[Scalar], plane: Sequence[int]) -> _Foot:
-    first = centres[0]
     if len(centres) == 2:
-        i, j = plane
-        out = 3 - i - j
-        across: Vec = tuple(1.0 if c == out else 0.0 for c in range(3))
-        u: Vec = tuple(0.0 if c == out else x for c, x in enumerate(sub(centres[1], first)))
-        normal = cross(across, u)
-        size = _replace_zero(dot(normal, normal))
-        inverse = 1.0 / size
-        first = tuple(0.0 if c == out else x for c, x in enumerate(first))
-        squares = [r * r - c[out] * c[out] for r, c in zip(radii, centres, strict=True)]
-        foot = scale(u, 0.5 * (squares[0] - squares[1] + size) * inverse)
-    else:
-        u, v = sub(centres[1], first), sub(centres[2], first)
-        normal = cross(u, v)
-        size = _replace_zero(dot(normal, normal))
-        inverse = 1.0 / size
-        squares = [r * r for r in radii]
-        a = 0.5 * (squares[0] - squares[1] + dot(u, u))
-        b = 0.5 * (squares[0] - squares[2] + dot(v, v))
-        foot = add(scale(cross(v, normal), a * inverse), scale(cross(normal, u), b * inverse))
-    return _Foot(first, foot, normal, size, inverse, squares[0] - dot(foot, foot))
+        return _find_foot_of_circles(centres, radii, plane)
+    first = centres[0]
+    u, v = sub(centres[1], first), sub(centres[2], first)
+    normal = cross(u, v)
+    squares = [r * r for r in radii]
+    a = 0.5 * (squares[0] - squares[1] + dot(u, u))
+    b = 0.5 * (squares[0] - squares[2] + dot(v, v))
+    rails = [k for k in range(3) if _is_constant_across(u, v, normal, k)]
+    if rails:
+        k = max(rails, key=lambda k: abs(normal[k]))
+        return _find_foot_along(first, squares[0], (u, v), (a, b), normal, k)
+    inverse = 1.0 / _replace_zero(dot(normal, normal))
+    foot = add(scale(cross(v, normal), a * inverse), scale(cross(normal, u), b * inverse))
+    return _Foot(first, foot, 0.0, normal, 1.0, inverse, squares[0] - dot(foot, foot))
+
+
+def _find_foot_of_circles(centres: Sequence[Vec], radii: Sequence[Scalar], plane: Sequence[int]) -> _Foot:
+    i, j = plane
+    out = 3 - i - j
+    across: Vec = tuple(1.0 if c == out else 0.0 for c in range(3))
+    u: Vec = tuple(0.0 if c == out else x for c, x in enumerate(sub(centres[1], centres[0])))
+    normal = cross(across, u)
+    size = _replace_zero(dot(normal, normal))
+    inverse = 1.0 / size
+    first = tuple(0.0 if c == out else x for c, x in enumerate(centres[0]))
+    squares = [r * r - c[out] * c[out] for r, c in zip(radii, centres, strict=True)]
+    foot = scale(u, 0.5 * (squares[0] - squares[1] + size) * inverse)
+    return _Foot(first, foot, 0.0, normal, 1.0, inverse, squares[0] - dot(foot, foot))
+
+
+def _is_constant_across(u: Vec, v: Vec, normal: Vec, k: int) -> bool:
+    """Tell whether centres move along coordinate k alone, and stand well apart across it."""
+    edges = [edge[i] for edge in (u, v) for i in range(3) if i != k]
+    if not isinstance(normal[k], int | float) or not all(isinstance(x, int | float) for x in edges):
+        return False
+    return bool(abs(normal[k]) > _UPRIGHT * math.hypot(*edges[:2]) * math.hypot(*edges[2:]))
+
+
+def _find_foot_along(
+    first: Vec, square: Scalar, edges: tuple[Vec, Vec], rights: tuple[Scalar, Scalar], normal: Vec, k: int
+) -> _Foot:
+    """Find the foot from where the normal through it crosses the first centre's height k, in constants of the rails.
+
+    square : of the first radius
+    rights : what the products of that place with both edges are
+    """
+    (u, v), (a, b) = edges, rights
+    i, j = (k + 1) % 3, (k + 2) % 3
+    crossing = [0.0, 0.0, 0.0]
+    crossing[i] = a * (v[j] / normal[k]) - b * (u[j] / normal[k])
+    crossing[j] = b * (u[i] / normal[k]) - a * (v[i] / normal[k])
+    unit = abs(normal[k])
+    direction = scale(normal, 1.0 / unit)
+    inverse = 1.0 / dot(direction, direction)
+    along = dot(crossing, direction)
+    back = along * inverse
+    return _Foot(
+        first, tuple(crossing), back, direction, unit, inverse, square - dot(crossing, crossing) + along * back
+    )
 
 
 def _replace_zero(size: Scalar) -> Scalar:

@@ -221,20 +221,15 @@ class Model(Equations):
         return self.keep_tape(("spheres", side), len(self.drives) + (self._poses if side is None else 0), outputs)
 
     def spheres_with_height_tape(self) -> Tape:
-        """Compile joints, near pose -> as :meth:`spheres_tape`, then the square of the height over the centres, mm²."""
+        """Compile joints -> as :meth:`spheres_tape`, on home's side, then the squared height over the centres, mm²."""
 
         def outputs(trace: Trace) -> list[Scalar]:
             joints = list(trace.inputs(len(self.drives)))
-            placed = self.structure.place_with_joints(trace.inputs(self._poses, len(joints)), self.list_serial(joints))
-            coordinates = self.spheres(joints, None, placed.origin)
-            closures = self.scaled_closures(coordinates, joints)
-            return [
-                *self.compute_pose(coordinates, joints),
-                *closures,
-                compute_square_height(*self.find_spheres(joints)),
-            ]
+            coordinates = self.spheres(joints, self.home_side)
+            height = compute_square_height(*self.find_spheres(joints))
+            return [*self.compute_pose(coordinates, joints), *self.scaled_closures(coordinates, joints), height]
 
-        return self.keep_tape(("spheres with height",), len(self.drives) + self._poses, outputs)
+        return self.keep_tape(("spheres with height",), len(self.drives), outputs)
 
     def spheres_on_side_tape(self) -> Tape:
         """Compile joints, a number -> as :meth:`spheres_tape`, on the side that the number's sign tells."""

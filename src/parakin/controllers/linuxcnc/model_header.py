@@ -309,7 +309,7 @@ def _write_mathematics(machine: Machine) -> Iterator[str]:
     yield write_function("jacobians", tapes.jacobians, [x, q], jacobians)
     if tapes.spheres is not None:
         square, side = InputVector("square", 1), InputVector("side", 1)
-        yield write_function("common_point", tapes.spheres.nearest, [q, near], [x, f, square])
+        yield write_function("common_point_at_home", tapes.spheres.at_home, [q], [x, f, square])
         yield write_function("common_point_on", tapes.spheres.on_side, [q, side], [x, f])
         yield write_function("own_side", tapes.spheres.own_side, [near], [side])
         if tapes.spheres.own_side_over is not None:

@@ -4,16 +4,15 @@
    guess says nothing, for its joints are far from the given ones (zeros, at the start), it lies on home's side; and in
    coordinated motion such a guess is refused, for it would show another pose with the same joints. */
 
-/* The greatest difference of two poses, mm, an angle counted on the arm of a leg. */
-static double distance_of(const double *x, const double *near)
+/* The square of the distance of two poses, mm², an angle counted on the arm of a leg. */
+static inline double square_distance(const double *x, const double *near)
 {
-    double most = 0.0;
+    double sum = 0.0;
     for (int i = 0; i < AXES; i++) {
-        const double off = fabs(x[i] - near[i]) * (turning_axis[i] ? SIZE : 1.0);
-        if (!(off <= most))
-            most = off;
+        const double off = (x[i] - near[i]) * (turning_axis[i] ? SIZE : 1.0);
+        sum += off * off;
     }
-    return most;
+    return sum;
 }
 
 #if SPHERES
@@ -48,16 +47,34 @@ static double side_of(const double *near, const double *x, const double *q)
     return isfinite(side[0]) ? side[0] : HOME_SIDE;
 }
 
+/* Whether a given pose at the square of a distance from a common point is surely on the same side. A leg as long as this
+   moves its drive by no more than the root of 2 LONGEST r for a distance r, where it is at right angles. If r and that are
+   a quarter of the height over the centres, where there is a singularity, the side is the same: 32 LONGEST r + 16 r r <
+   square. */
+static inline int is_beside(double far, double square)
+{
+    const double rest = square - 16.0 * far;
+    return rest > 0.0 && 1024.0 * LONGEST * LONGEST * far < rest * rest;
+}
+
+/* Of both common points the answer is the one that a given pose is beside; home's is the first to be asked. Where it is
+   beside neither, its own side decides. */
 static int pose_near(const double *near, const double *q, double *x, double *side, int *tells)
 {
     double f[CLOSURES], square[1];
-    common_point(q, near, x, f, square);
-    const double far = distance_of(x, near);
-    *tells = far <= TELLS;
-    /* A leg as long as this moves its drive by no more than the root of 2 LONGEST far, where it is at right angles. If
-       that is a quarter of the height over the centres, where there is a singularity, the side is the same. */
-    if (closes(f) && 32.0 * LONGEST * far + 16.0 * far * far < square[0])
-        return finite_all(x, AXES);
+    const double over[1] = {-HOME_SIDE};
+    common_point_at_home(q, x, f, square);
+    double far = square_distance(x, near);
+    *tells = far <= TELLS * TELLS;
+    if (*tells && is_beside(far, square[0]))
+        return closes(f);
+    if (!*tells) {
+        common_point_on(q, over, x, f);
+        far = square_distance(x, near);
+        *tells = far <= TELLS * TELLS;
+        if (*tells && is_beside(far, square[0]))
+            return closes(f);
+    }
     *side = *tells ? side_of(near, x, q) : HOME_SIDE;
     common_point_on(q, side, x, f);
     return closes(f) && finite_all(x, AXES);
@@ -184,7 +201,8 @@ __attribute__((noinline)) static int pose_near(const double *near, const double 
         end(y, q, x);
     closed = closed && finite_all(x, AXES);
     if (*tells)
-        *side = side_of(near, first, closed && fabs(det - first) <= STEADY * fabs(first) && distance_of(x, near) <= SETTLED);
+        *side = side_of(near, first, closed && fabs(det - first) <= STEADY * fabs(first)
+                                     && square_distance(x, near) <= SETTLED * SETTLED);
     return closed && det * angle_sign(x) * *side > 0.0;
 }
 #endif
@@ -271,7 +289,7 @@ static int find_pose_near(const double *near, const double *q, double *x)
 {
     double side = HOME_SIDE;
     int tells;
-    return finite_all(near, AXES) && pose_near(near, q, x, &side, &tells) && tells;
+    return pose_near(near, q, x, &side, &tells) && tells;
 }
 
 /* The pose of joints for homing, where LinuxCNC's guess may say nothing: then from home, whose turns it has not. */
@@ -283,7 +301,7 @@ static int find_pose_for_homing(double *near, const double *q, double *x)
         return 1;
     if (!(side * HOME_SIDE > 0.0))
         return 0;
-    memcpy(near, home, AXES * sizeof *near);
+    copy_pose(home, near);
     return pose_near(near, q, x, &side, &tells);
 }
 
@@ -293,7 +311,7 @@ static int find_pose_in_motion(double *near, const double *q, double *x)
 {
     if (find_pose_near(near, q, x))
         return 1;
-    memcpy(near, own_pose, sizeof own_pose);
+    copy_pose(own_pose, near);
     return pose_known && find_pose_near(near, q, x);
 }
 
@@ -304,9 +322,9 @@ __attribute__((flatten)) int kinematicsForward(const double *joints, EmcPose *wo
     (void)fflags;
     (void)iflags;
     read_joints(joints, q);
-    if (!finite_all(q, JOINTS))
-        return -1;
     if (hal_get_bool(pins->identity)) {
+        if (!finite_all(q, JOINTS))
+            return -1;
         take_joints_as_axes(q, x);
         write_pose(x, world);
         return 0;
@@ -314,7 +332,7 @@ __attribute__((flatten)) int kinematicsForward(const double *joints, EmcPose *wo
     read_pose(world, near);
     shift_tip(near, hal_get_real(pins->tool_offset));
     if (guess_is_old)
-        memcpy(near, own_pose, sizeof near);
+        copy_pose(own_pose, near);
     const int in_motion = hal_get_bool(pins->teleop) || hal_get_bool(pins->coordinated);
     if (!(in_motion ? find_pose_in_motion(near, q, x) : find_pose_for_homing(near, q, x)))
         return -1;
@@ -324,7 +342,6 @@ __attribute__((flatten)) int kinematicsForward(const double *joints, EmcPose *wo
     if (in_motion)
         write_as_commanded(x);
     keep_pose(x);
-    shift_tip(x, -hal_get_real(pins->tool_offset));
     write_pose(x, world);
     return 0;
 }

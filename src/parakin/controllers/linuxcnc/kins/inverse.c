@@ -29,7 +29,7 @@ static int may_be_at(const double *x, const double *q)
     if (inside)
         return 1;
 #endif
-    return allowed(x, q) && regular(x, q);
+    return finite_all(x, AXES) && allowed(x, q) && regular(x, q);
 }
 
 __attribute__((flatten)) int kinematicsInverse(const EmcPose *world, double *joints,
@@ -40,10 +40,10 @@ __attribute__((flatten)) int kinematicsInverse(const EmcPose *world, double *joi
     (void)fflags;
     read_pose(world, x);
     read_joints(joints, last);
-    if (!finite_all(x, AXES) || !finite_all(last, JOINTS))
-        return -1;
     if (hal_get_bool(pins->identity)) {
         take_axes_as_joints(x, q);
+        if (!finite_all(x, AXES) || !finite_all(last, JOINTS))
+            return -1;
     } else {
         shift_tip(x, hal_get_real(pins->tool_offset));
         if (!find_joints(x, last, q) || !may_be_at(x, q))

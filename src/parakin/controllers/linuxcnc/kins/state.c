@@ -33,12 +33,17 @@ static int read_commanded_joints(double *q)
     return finite_all(q, JOINTS);
 }
 
-/* Keep a pose of the machine's own tip as the last answer, and tell the tool's. */
-static void keep_pose(const double *own)
+/* For memcpy a compiler that saves space writes a string instruction, which takes some 10 ns to begin. */
+static inline void copy_pose(const double *from, double *to)
 {
-    double x[AXES];
-    memcpy(own_pose, own, sizeof own_pose);
-    memcpy(x, own, sizeof x);
+    for (int i = 0; i < AXES; i++)
+        to[i] = from[i];
+}
+
+/* Keep a pose of the machine's own tip as the last answer, and tell the tool's, which it becomes. */
+static void keep_pose(double *x)
+{
+    copy_pose(x, own_pose);
     shift_tip(x, -hal_get_real(pins->tool_offset));
     for (int i = 0; i < AXES; i++)
         hal_set_real(pins->pose[i], x[i] / (turning_axis[i] ? DEGREE : 1.0));

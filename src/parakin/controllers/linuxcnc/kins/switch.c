@@ -14,13 +14,13 @@ static int joints_stand, was_homed;
 static void follow_pose(const double *q)
 {
     double x[AXES], near[AXES], margins[SINGULARITIES];
-    memcpy(near, own_pose, sizeof near);
+    copy_pose(own_pose, near);
     if (!hal_get_bool(pins->homed)) {
         forget_pose();
         return;
     }
     if (!was_homed) {
-        memcpy(near, home, sizeof near);
+        copy_pose(home, near);
         pose_known = find_pose_for_homing(near, q, x);
     } else {
         pose_known = pose_known && find_pose_near(near, q, x);

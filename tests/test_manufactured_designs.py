@@ -1,19 +1,20 @@
 """Designs for all machines within tolerance: against machines that are drawn, the worst corners among them."""
 
 import json
+from functools import cache
 
 import numpy as np
 import pytest
 from shipped import load_shipped
 
 import parakin as pk
+from parakin.accuracy.tolerances import make_tolerance_family, read_tolerances
 from parakin.cli import main
 from parakin.synthesis.manufactured import SizeBox
 from parakin.synthesis.pose_sets import make_box_set
 
 CUBE = dict.fromkeys("XYZ", (-100.0, 100.0))
 WITHIN = {"feet": "0.1 mm", "rods": "0.05 mm"}
-HALVES = {"feet": 0.1, "rods": 0.05}
 BOUND = 3.0
 TRICEPT = {"X": (-530.0, 530.0), "Y": (-492.0, 492.0), "Z": (-130.0, 130.0), "B": 0.0, "C": 0.0}
 
@@ -32,12 +33,16 @@ def find_best(problem):
     return found.front[0]
 
 
+@cache
+def find_nominal():
+    return find_best(glide(None))
+
+
 class Made:
     """Machines of a design within tolerance: numbers moved by parts -1 to 1 of it."""
 
-    def __init__(self, design, halves):
-        self.family = pk.family(design.machine, list(halves))
-        self.halves = np.array([halves[p.group] for p in self.family.parameters])
+    def __init__(self, design, within):
+        self.family, _, self.halves, _ = make_tolerance_family(design.machine, read_tolerances(within))
         self.low, self.high = np.array([design.box[axis] for axis in design.machine.axes]).T
 
     def draw_poses(self, count):
@@ -65,12 +70,13 @@ class Made:
         return self.family.margins(poses, (self.family.nominal + moves * self.halves)[:, None]).min()
 
 
-def test_every_machine_that_is_made_keeps_the_bounds():
-    best, nominal = find_best(glide(WITHIN)), find_best(glide(None))
+@pytest.mark.parametrize("within", [WITHIN, {"L": "0.1 mm", "rods": "0.05 mm"}])
+def test_every_machine_that_is_made_keeps_the_bounds(within):
+    best, nominal = find_best(glide(within)), find_nominal()
     assert best.sizes["L"] > nominal.sizes["L"] + 0.1
     worst, margins = [], []
     for design in (best, nominal):
-        made = Made(design, HALVES)
+        made = Made(design, within)
         poses = made.draw_poses(100)
         moves = np.concatenate([made.find_worst_move(poses)[None], made.draw_moves(200)])
         worst.append(made.measure_amplification(moves, poses).max())
@@ -82,25 +88,25 @@ def test_every_machine_that_is_made_keeps_the_bounds():
 
 
 def test_a_tricept_keeps_its_strokes_whatever_feet_are_made():
-    shift, halves = {"Y": (-200.0, 200.0), "Z": (-2000.0, -1000.0)}, {"feet": 0.2, "platform": 0.2}
+    shift, within = {"Y": (-200.0, 200.0), "Z": (-2000.0, -1000.0)}, {"feet": "0.2 mm", "platform": "0.2 mm"}
     problem = pk.DesignProblem(
         load_shipped("tricept"), {"R": (200.0, 500.0)}, TRICEPT, ["footprint"], shift,
-        within={name: f"{half} mm" for name, half in halves.items()},
+        within=within,
     )  # fmt: skip
     best = find_best(problem)
     assert 400.0 + 2.0 * 0.2 < best.proved["footprint"] < 400.0 + 2.0 * 0.2 * np.sqrt(2.0) * 1.2
-    made = Made(best, halves)
+    made = Made(best, within)
     assert made.find_least_margin(made.draw_moves(100), made.draw_poses(300)) >= 0.0
 
 
 def test_a_delta_keeps_clearances_and_cones_whatever_is_made():
-    halves = {"feet": 0.5, "platform": 0.5, "rods": 0.2}
+    tolerances = {"feet": "0.5 mm", "platform": "0.5 mm", "rods": "0.2 mm"}
     box, missed = {"X": (-120.0, 120.0), "Y": (-120.0, 120.0), "Z": (230.0, 330.0)}, []
-    for within in ({name: f"{half} mm" for name, half in halves.items()}, None):
+    for within in (tolerances, None):
         problem = pk.DesignProblem(
             load_shipped("linear_delta"), {"plate": (20.0, 120.0)}, box, ["plate"], fit_strokes=True, within=within
         )  # fmt: skip
-        made = Made(find_best(problem), halves)
+        made = Made(find_best(problem), tolerances)
         moves = (made.family.nominal + made.draw_moves(100) * made.halves)[:, None]
         least = made.family.margins(made.draw_poses(50), moves).min((0, 1))
         missed.append([name for name, margin in zip(problem.machine.limits, least, strict=True) if margin < 0.0])
@@ -111,11 +117,11 @@ def test_a_delta_keeps_clearances_and_cones_whatever_is_made():
 @pytest.mark.parametrize("name", ["hexapod", "linear_delta"])
 def test_signs_that_are_proved_are_those_of_every_machine(name):
     """The closer proofs of cones and clearances, on parts of a box where one of them ends."""
-    m, rng, halves = load_shipped(name), np.random.default_rng(7), {"feet": 0.25, "platform": 0.25}
+    m, rng = load_shipped(name), np.random.default_rng(7)
     ends = {axis: ((home - 400.0, home + 400.0) if axis in "XYZ" else (-0.6, 0.6)) for axis, home in
             zip(m.axes, m.home.tolist(), strict=True)}  # fmt: skip
     poses = make_box_set(m, ends, "box")
-    size_box = SizeBox(m, {group: f"{half} mm" for group, half in halves.items()})
+    size_box = SizeBox(m, {"feet": "0.25 mm", "platform": "0.25 mm"})
     limits = [c for c in size_box.trace_set(poses).build_limits() if c.sign is not None]
     nominal = [c for c in poses.trace(m).build_limits() if c.sign is not None]
     columns = [m.limits.index(c.name) for c in limits]
@@ -128,7 +134,7 @@ def test_signs_that_are_proved_are_those_of_every_machine(name):
     boxes = np.hstack([middle - half, numbers[0]]), np.hstack([middle + half, numbers[1]])
     signs = np.stack([c.sign(*boxes).sign for c in limits], 1)
     of_nominal = np.stack([c.sign(middle - half, middle + half).sign for c in nominal], 1)
-    known, wrong = size_box.family.nominal, 0
+    known, wrong = size_box.nominal, 0
     for move in rng.choice([-1.0, 1.0], (10, len(known))) * size_box.halves:
         made = m.replace_parameters(dict(zip(size_box.names, (known + move).tolist(), strict=True)))
         margins = made.margins(middle + half * rng.uniform(-1.0, 1.0, half.shape))[:, columns]
@@ -147,11 +153,15 @@ def test_more_than_can_be_kept_is_said():
 
 def test_the_command_tells_of_which_machines(capsys, tmp_path):
     path = tmp_path / "made.yaml"
+    (tmp_path / "part.apt").write_text("UNITS/MM\nFEDRAT/20000,MMPM\nGOTO/-50,0,0\nGOTO/50,20,0\nFINI\n")
     path.write_text(
         "machine: orthoglide\nfree: {L: [150 mm, 500 mm]}\n"
         "box: {X: [-100 mm, 100 mm], Y: [-100 mm, 100 mm], Z: [-100 mm, 100 mm]}\n"
-        "bounds: {amplification: 4}\nwithin: {rods: 0.05 mm}\nstrokes: fit\nminimise: L\n"
+        "bounds: {amplification: 4}\nwithin: {rods: 0.05 mm}\nstrokes: fit\nminimise: L\npart: part.apt\n"
     )
+    assert main(["design", str(path)]) == 0
+    said = capsys.readouterr().out
+    assert "1 proved of all machines within rods 0.05 mm, the part run on the nominal one" in said
     assert main(["design", str(path), "-o", str(tmp_path / "out"), "--json"]) == 0
     said = json.loads(capsys.readouterr().out)
     assert said["within"] == {"rods": "0.05 mm"}
@@ -162,7 +172,6 @@ def test_the_command_tells_of_which_machines(capsys, tmp_path):
 @pytest.mark.parametrize(
     ("within", "message"),
     [
-        ({"L": "0.1 mm"}, "within: L is a named size; tolerances of numbers that are made expected, such as feet"),
         ({"foots": "0.1 mm"}, 'within: unknown "foots"'),
         ({"rods": "0.1"}, 'within: tolerance rods: "0.1" needs a unit'),
         ({"rods": "1 deg"}, "within: tolerance rods: legs.rho_x.rod is a length"),

@@ -171,7 +171,7 @@ def write_command(tmp_path, text, designs):
 
 
 def test_the_command(tmp_path, capsys):
-    read_problem(tmp_path, GLIDE)
+    read_problem(tmp_path, f"{GLIDE}within: {{L: 0.1 mm}}\n")
     arguments = [
         "sweep",
         str(tmp_path / "problem.yaml"),
@@ -183,8 +183,9 @@ def test_the_command(tmp_path, capsys):
         "50",
     ]
     assert main(arguments) == 0
-    said = capsys.readouterr().out
-    assert "of 500 designs keep all limits and bounds" in said
+    said = capsys.readouterr()
+    assert "of 500 designs keep all limits and bounds" in said.out
+    assert "nominal machines are looked at" in said.err
     assert main([*arguments, "--json"]) == 0
     answer = json.loads(capsys.readouterr().out)
     assert answer["made"] == 0

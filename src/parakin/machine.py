@@ -32,6 +32,7 @@ from .model.geometric_parameters import replace_ranges, settle_offsets
 from .model.legs import Inverse
 from .model.limits import compute_platform_points
 from .model.rates import TwistRates, compute_twist_rates
+from .model.spec import Spec
 from .model.structures import PlatformPlacement
 
 _SHORTEST_DIRECTION = 1e-6  # mm or rad; travel in multiples of a shorter one overflows
@@ -53,6 +54,8 @@ class Machine(MachineProperties, Displayed):
     ) -> Machine:
         """Make the machine with other numbers, mm and rad, by the names of :attr:`parameters`.
 
+        The numbers that are not among them follow its named sizes.
+
         ranges : other ranges of the legs' drives, by their names
         home : another home, by axes
 
@@ -62,10 +65,14 @@ class Machine(MachineProperties, Displayed):
         for name in values:
             if name not in known:
                 raise PoseError(f"parameters: unknown {quote(name)}{suggest(name, known)}")
-        spec = self._replace_numbers(values)
-        sizes = {name: values.get(name, value) for name, value in spec.sizes.items()}
-        spec = replace_ranges(replace(spec, sizes=sizes, home={**spec.home, **(home or {})}), ranges or {})
-        return Machine(settle_offsets(spec))
+
+        def make_spec(sizes: Mapping[str, float]) -> Spec:
+            spec = self._replace_numbers({**values, **sizes})
+            own = {name: sizes.get(name, values.get(name, value)) for name, value in spec.sizes.items()}
+            spec = replace_ranges(replace(spec, sizes=own, home={**spec.home, **(home or {})}), ranges or {})
+            return settle_offsets(spec)
+
+        return Machine(make_spec({}), make_spec)
 
     # Input at the boundary.
 

@@ -65,7 +65,9 @@ def _describe_objectives(problem: DesignProblem) -> str:
 def _describe_tolerances(problem: DesignProblem) -> str:
     """Say of which machines a proof is."""
     own = ", ".join(f"{name} {value}" for name, value in (problem.within or {}).items())
-    return f" of all machines within {own}" if own else ""
+    if not own:
+        return ""
+    return f" of all machines within {own}" + (", the part run on the nominal one" if problem.path is not None else "")
 
 
 def _describe_proofs(number: int, design: ProvedDesign) -> str:

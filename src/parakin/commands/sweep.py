@@ -48,6 +48,8 @@ def sweep(
     from .design_problem import read_design_problem
 
     wanted = read_design_problem(problem)
+    if wanted.within is not None:
+        print_remark("nominal machines are looked at: within is for parakin design, which proves it")
     announce_compiling()
     from ..export.sweep_folder import run_sweep
     from ..synthesis.sweep import SweepPlan

@@ -14,6 +14,7 @@ from typing import Literal, NamedTuple
 from ..algebra import (
     Mat,
     Scalar,
+    Term,
     Vec,
     add,
     apply,
@@ -202,10 +203,12 @@ class SignForms(NamedTuple):
 def list_sign_forms(
     spec: Spec, placement: PlatformPlacement, joints: Sequence[Scalar], home: HomeRods | None
 ) -> SignForms:
-    """List the forms of cones narrower than half a turn and of clearances."""
+    """List the forms of cones narrower than half a turn and of clearances, whose bounds are numbers."""
     tilted = _list_tilted_rods(spec, placement, joints, home)
     cones = {
-        limit.name: dot(axis, rod) - cos(limit.bound) * norm(rod) for limit, axis, rod in tilted if limit.bound < pi
+        limit.name: dot(axis, rod) - cos(limit.bound) * norm(rod)
+        for limit, axis, rod in tilted
+        if not isinstance(limit.bound, Term) and limit.bound < pi
     }
     back = transpose(placement.rotation)
 
@@ -214,7 +217,8 @@ def list_sign_forms(
         near, far = (apply(back, sub(end, placement.origin)) for end in strut.ends)
         return near if strut.platform is None else strut.platform, far
 
-    pairs = _list_strut_pairs(spec, placement, joints) if spec.limits.clearance is not None else ()
+    told = spec.limits.clearance is not None and not isinstance(spec.limits.clearance, Term)
+    pairs = _list_strut_pairs(spec, placement, joints) if told else ()
     struts = {
         f"clearance {names}": [(one.ends, two.ends), (turn_back(one), turn_back(two))] for names, one, two in pairs
     }

@@ -14,11 +14,10 @@ import numpy as np
 from ..accuracy.tolerances import SizedJumpFreeTrace, make_tolerance_family, read_tolerances
 from ..algebra import Scalar, Term
 from ..arrays import Array
-from ..errors import PoseError
 from ..families.shift_rates import trace_shift_rates
 from ..machine import Machine
 from ..model.equations import Equations
-from ..model.geometric_parameters import SIZES
+from ..model.geometric_parameters import SIZES, list_parameters
 from ..model.nominal_values import SizedTrace
 from ..model.rates import TwistRates
 from ..performance.characteristic_length import CharacteristicLength
@@ -57,37 +56,54 @@ class Reserve:
 class SizeBox:
     """The numbers that have tolerances, and between which values each may be.
 
-    Raises :class:`PoseError` for tolerances of no number, or of a named size, from which a made machine deviates in
-    each number on its own.
+    A number that follows a named size is what that makes it, and its own deviation is added.
+
+    Raises :class:`PoseError` for tolerances of no number.
     """
 
     def __init__(self, machine: Machine, within: Mapping[str, str]):
         tolerances = make_tolerance_family(machine, read_tolerances(within))
-        self.family, self.halves = tolerances.family, tolerances.halves
-        named = [p.name for p in self.family.parameters if p.group == SIZES]
-        if named:
-            raise PoseError(f"{named[0]} is a named size; tolerances of numbers that are made expected, such as feet")
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        return self.family.names
+        self.machine, self.halves = machine, tolerances.halves
+        self.names, self.nominal = tolerances.family.names, tolerances.family.nominal
+        self._parameters = tolerances.family.parameters
 
     @property
     def bounds(self) -> tuple[Array, Array]:
         """Low and high of each number."""
-        return self.family.nominal - self.halves, self.family.nominal + self.halves
+        return self.nominal - self.halves, self.nominal + self.halves
 
-    def trace_equations(self, sizes: Sequence[Scalar]) -> Equations:
-        return self.family.machine.trace_equations(dict(zip(self.names, sizes, strict=True)))
+    @cached_property
+    def follow_rates(self) -> Array:
+        """How each number (rows) moves with each one that is off (columns): with itself, and with the named sizes."""
+        rates = np.eye(len(self.names))
+        for column, parameter in enumerate(self._parameters):
+            if parameter.group == SIZES:
+                spec = self.machine.trace_equations({parameter.name: parameter.value + 1.0}).spec
+                moved = {own.name: own.value for own in list_parameters(spec)}
+                rates[:, column] += [moved.get(own.name, own.value) - own.value for own in self._parameters]
+        return rates
+
+    def list_values(self, inputs: Sequence[Scalar]) -> dict[str, Scalar]:
+        """List what the numbers are by their names, where each is off to an input."""
+        values = dict[str, Scalar]()
+        for row, (name, x) in enumerate(zip(self.names, inputs, strict=True)):
+            for column in np.flatnonzero(self.follow_rates[row]).tolist():
+                if column != row:
+                    x = x + (inputs[column] - float(self.nominal[column])) * float(self.follow_rates[row, column])
+            values[name] = x
+        return values
+
+    def trace_equations(self, inputs: Sequence[Scalar]) -> Equations:
+        return self.machine.trace_equations(self.list_values(inputs))
 
     def trace_set(self, poses: PoseSet) -> TracedSet:
         """Trace the pose of a set's coordinates, with the sizes as further inputs."""
-        machine, plain = self.family.machine, poses.trace(self.family.machine)
+        machine, plain = self.machine, poses.trace(self.machine)
         return _SizedSet(machine, plain.free_axes, plain.swept_axes, {}, machine.mode, poses, self)
 
     def make_box(self, poses: PoseSet, length: CharacteristicLength) -> _SizedBox:
         """Make the box of a set's coordinates and the sizes, for bounds of matrices."""
-        plain = poses.make_box(self.family.machine, length)
+        plain = poses.make_box(self.machine, length)
         ends = dict(zip(self.names, zip(*(end.tolist() for end in self.bounds), strict=True), strict=True))
         return _SizedBox(plain.machine, {**plain.ranges, **ends}, {}, plain.mode, length, poses, self)
 
@@ -102,12 +118,12 @@ class _SizedSet(TracedSet):
 
     @cached_property
     def inputs(self) -> list[Term]:
-        nominal = self.size_box.family.nominal.tolist()
+        nominal = self.size_box.nominal.tolist()
         return SizedTrace(self._count, nominal).inputs(self._count + len(nominal))
 
     @cached_property
     def jump_free_inputs(self) -> list[Term]:
-        nominal = self.size_box.family.nominal.tolist()
+        nominal = self.size_box.nominal.tolist()
         return SizedJumpFreeTrace(self._count, nominal).inputs(self._count + len(nominal))
 
     def place(self, inputs: Sequence[Scalar]) -> list[Scalar]:
@@ -117,7 +133,8 @@ class _SizedSet(TracedSet):
         return self.size_box.trace_equations(inputs[self._count :])
 
     def trace_twist_rows(self, inputs: Sequence[Scalar]) -> list[list[Scalar]]:
-        return _trace_rates(self.size_box, self.place(inputs), inputs[self._count :], self.mode).a
+        sizes = self.size_box.list_values(inputs[self._count :])
+        return _trace_rates(self.machine, self.place(inputs), sizes, self.mode).a
 
 
 @dataclass(frozen=True, eq=False)
@@ -130,21 +147,21 @@ class _SizedBox(SetBox):
 
     @cached_property
     def inputs(self) -> list[Term]:
-        return SizedJumpFreeTrace(self.searched, self.size_box.family.nominal.tolist()).inputs(len(self.ranges))
+        return SizedJumpFreeTrace(self.searched, self.size_box.nominal.tolist()).inputs(len(self.ranges))
 
     @property
     def sizes(self) -> Mapping[str, Scalar]:
-        return dict(zip(self.size_box.names, self.inputs[self.searched :], strict=True))
+        return self.size_box.list_values(self.inputs[self.searched :])
 
     @property
     def widths(self) -> Array:
         """The sizes' are infinite: poses alone are bisected."""
-        return np.concatenate([(self.high - self.low)[: self.searched], np.full(len(self.sizes), np.inf)])
+        return np.concatenate([(self.high - self.low)[: self.searched], np.full(len(self.size_box.names), np.inf)])
 
     @cached_property
     def samples(self) -> Array:
         plain = self.pose_set.make_box(self.machine, self.length).samples
-        return np.hstack([plain, np.tile(self.size_box.family.nominal, (len(plain), 1))])
+        return np.hstack([plain, np.tile(self.size_box.nominal, (len(plain), 1))])
 
     @cached_property
     def pose(self) -> list[Scalar]:
@@ -152,13 +169,12 @@ class _SizedBox(SetBox):
 
     @cached_property
     def _rates(self) -> tuple[TwistRates, list[Scalar]]:
-        rates = _trace_rates(self.size_box, self.pose, list(self.sizes.values()), self.mode)
+        rates = _trace_rates(self.machine, self.pose, self.sizes, self.mode)
         return scale_twist_rates(self.machine, rates, self.length), []
 
 
-def _trace_rates(sizes: SizeBox, pose: Sequence[Scalar], values: Sequence[Scalar], mode: str) -> TwistRates:
+def _trace_rates(machine: Machine, pose: Sequence[Scalar], sizes: Mapping[str, Scalar], mode: str) -> TwistRates:
     with np.errstate(all="ignore"):
-        joints, _, _ = sizes.trace_equations(values).invert(pose, mode)
-        own = dict(zip(sizes.names, values, strict=True))
-        a, b, _ = trace_shift_rates(sizes.family.machine, pose, joints, (), own)
+        joints, _, _ = machine.trace_equations(sizes).invert(pose, mode)
+        a, b, _ = trace_shift_rates(machine, pose, joints, (), sizes)
     return TwistRates(a, b, [])

@@ -48,8 +48,8 @@ class DesignProblem:
     tolerances : for accuracy, as of :func:`parakin.analyse_accuracy`
     path : of a part that every design must run; it is moved with the poses
     workpiece : where the part lies, as for :func:`parakin.prepare`
-    within : manufacturing tolerances, as for accuracy but of no named sizes: all machines within them must keep the
-        limits and bounds, too; the part runs on the nominal one
+    within : manufacturing tolerances, as for accuracy: all machines within them must keep the limits and bounds, too;
+        the part runs on the nominal one
 
     Raises :class:`PoseError` for a problem that makes no sense.
     """
@@ -88,7 +88,8 @@ class DesignProblem:
                     raise PoseError(f"{what}: {name}: a range that rises expected, not {low:g} to {high:g}")
         self._check_poses()
         self._check_wants()
-        self.make_size_box(self.machine)
+        nominal = {parameter.name: parameter.value for parameter in self.family.parameters}
+        self.make_size_box(self.machine.replace_parameters(nominal) if self.within else self.machine)
 
     def _check_poses(self) -> None:
         moved = [axis for key in self.shift for axis in key.split()]

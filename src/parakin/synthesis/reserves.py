@@ -25,7 +25,8 @@ def measure_reserve(problem: DesignProblem, machine: Machine, x: Array, points: 
     moves = np.concatenate([np.zeros((1, k)), np.diag(size_box.halves), -np.diag(size_box.halves)])
     poses = problem.place_poses(x, np.concatenate([points, problem.middle]))
     tapes = problem.make_tapes(machine, size_box.names)
-    sizes = tapes.family.nominal + moves[:, _order(tapes.family.names, size_box.names)]
+    values = moves @ size_box.follow_rates.T
+    sizes = tapes.family.nominal + values[:, _order(tapes.family.names, size_box.names)]
     m = Measures(tapes, np.broadcast_to(poses, (len(sizes), *poses.shape)), sizes[:, None])
     low, high = _add_up(m.joints), _add_up(-m.joints)
     losses = {

@@ -27,7 +27,7 @@ legs:
   speed: 60 m/min
   acceleration: 10 m/s2
   force: [1.2 kN, 1 kN, 1.8 kN]
-  rated: 1 kN
+  rated: 2 kN
   power: 2 kW
   inertia: 30 kg
   stiffness: 100 N/um
@@ -195,14 +195,35 @@ def test_a_weight_that_no_drive_holds_is_said(tmp_path, capsys):
     assert "z can't hold the weight" in said.err
 
 
-def test_the_command_tells_what_is_too_much(tmp_path, capsys):
-    load(tmp_path, ("rated: 1 kN", "rated: 0.9 kN"))
+@pytest.mark.parametrize("acting", [(0.0, 0.0, 0.0), (-150.0, 80.0, 0.0)])
+def test_the_whole_takes_longer_for_what_the_rms_may_be(acting, tmp_path):
+    free = prepare(tmp_path, load(tmp_path, ("rated: 2 kN", "rated: 9 kN")), PART, acting)
+    kept = prepare(tmp_path, load(tmp_path, ("rated: 2 kN", "rated: [260 N, 9 kN, 9 kN]")), PART, acting)
+    assert pk.compute_drive_forces(free.trajectory).rms[0] > 300.0
+    assert kept.trajectory.binding_fractions["x.rated"] > 0.99
+    steps, dynamics = kept.trajectory.sample(20_000.0), Dynamics(kept.posted.machine)
+    cuts = ~kept.posted.path.rapid[
+        np.searchsorted(kept.trajectory.times, steps.times).clip(0, len(kept.posted.path) - 1)
+    ]
+    motion = Motion(steps.poses, steps.joints, steps.speeds, steps.accelerations)
+    rms = np.sqrt(np.mean(dynamics.compute_forces(motion, cuts[:, None] * np.array(acting)) ** 2, 0))
+    assert rms[0] == pytest.approx(260.0, rel=2e-3)
+    quickest = free.trajectory.at(steps.times * free.seconds / kept.seconds)
+    assert np.abs(quickest.joints - steps.joints).max() < 1e-6
+    assert pk.compute_drive_forces(kept.trajectory).overloaded == ()
+
+
+def test_the_command_tells_what_the_rms_costs(tmp_path, capsys):
+    load(tmp_path, ("rated: 2 kN", "rated: [260 N, 9 kN, 9 kN]"))
     (tmp_path / "part.apt").write_text(PART, encoding="utf-8")
-    assert main(["forces", str(tmp_path / "heavy.yaml"), str(tmp_path / "part.apt")]) == 3
+    assert main(["forces", str(tmp_path / "heavy.yaml"), str(tmp_path / "part.apt")]) == 0
     said = capsys.readouterr().out
-    assert "of 900 N" in said
-    assert "more than the drives can: z" in said
+    assert "260.0 of 260 N" in said
     assert "as thick as drawn" not in said
+    load(tmp_path, ("rated: 2 kN", "rated: 0.9 kN"))
+    assert main(["forces", str(tmp_path / "heavy.yaml"), str(tmp_path / "part.apt")]) == 3
+    said = capsys.readouterr().err
+    assert "z can't bear weight and cutting for long: its rated force is too small" in said
 
 
 def test_what_the_file_says_is_kept_to_the_last_bit(tmp_path):
@@ -234,9 +255,9 @@ def test_stiffness_is_what_the_file_says(tmp_path):
     ("old", "new", "message"),
     [
         ("power: 2 kW", "power: 2 kN", ':16: power: "2 kN" is a force, expected a power (W, kW)'),
-        ("rated: 1 kN", "rated: 1", ':15: rated: "1" needs a unit: N, kN'),
+        ("rated: 2 kN", "rated: 1", ':15: rated: "1" needs a unit: N, kN'),
         ("inertia: 30 kg", "inertia: 1 kg m2", "is a moment of inertia, expected a mass"),
-        ("rated: 1 kN", "rated: -1 kN", "is out of range, expected more than 0 (N, kN)"),
+        ("rated: 2 kN", "rated: -1 kN", "is out of range, expected more than 0 (N, kN)"),
         ("wall: 4 mm", "wall: 16 mm", "expected a diameter of at least twice as much"),
         ("rods: 2", "rods: 2.5", "a whole number from 1 to 9 expected"),
         ("carriage:", "cariage:", 'unknown key "cariage" in bodies'),

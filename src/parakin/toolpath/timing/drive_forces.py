@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -113,26 +115,54 @@ def compute_drive_forces(trajectory: Trajectory, force: RowsLike | None = None) 
         acting = read_rows(force, axes, ["mm"] * len(axes), lambda: np.zeros(len(axes)), "force")
         if acting.shape != (len(axes),) or not np.isfinite(acting).all():
             raise PoseError(f"force: one number each for {' '.join(axes)} expected")
-    times, rows, state = _list_states(trajectory)
-    if len(times) > _MOST_STATES:
-        raise PoseError(f"a trajectory of {len(times) // 3:,} pieces, at most {_MOST_STATES // 3:,} are possible")
-    cuts = ~trajectory.posted.path.rapid[trajectory.curve.record_of_piece[trajectory.joint_path.segment[rows]]]
+    motion = TimedMotion(trajectory, acting)
     dynamics = Dynamics(machine)
-    forces, powers = (np.empty((len(times), len(machine.joints))) for _ in range(2))
-    for begin in range(0, len(times), _BLOCK):
-        block = slice(begin, begin + _BLOCK)
-        motion = _evaluate(
-            trajectory, PathState(state.row[block], state.shift[block], *(rate[block] for rate in state[2:]))
-        )
-        forces[block] = dynamics.compute_forces(motion, cuts[block, None] * acting)
-        powers[block] = WATT * forces[block] * motion.speeds
+    forces, powers = (np.empty((len(motion.times), len(machine.joints))) for _ in range(2))
+    for block, state, tip in motion.list_blocks():
+        forces[block] = dynamics.compute_forces(state, tip)
+        powers[block] = WATT * forces[block] * state.speeds
     if not np.isfinite(forces.sum()):
         raise PoseError("the tool passes a singular pose, where forces have no bound")
-    weights = np.diff(trajectory.profile.time)[:, None] * np.array([1.0, 4.0, 1.0]) / 6.0  # Simpson's
-    total = weights.ravel() @ forces**2 if trajectory.seconds > 0.0 else np.mean(forces**2, axis=0)
-    return DriveForces(
-        trajectory, acting, times, forces, powers, np.sqrt(total / (trajectory.seconds or 1.0)), sum_masses(machine)
-    )
+    rms = np.sqrt(motion.weights @ forces**2)
+    return DriveForces(trajectory, acting, motion.times, forces, powers, rms, sum_masses(machine))
+
+
+class TimedMotion:
+    """The motion of a trajectory at the start, the middle and the end of each piece, N of them in all.
+
+    acting : (translations,) N on the tip at programmed feeds
+    times : (N,) s
+
+    Raises :class:`PoseError` for a path of more than some millions of pieces.
+    """
+
+    def __init__(self, trajectory: Trajectory, acting: Array):
+        self._trajectory, self._acting = trajectory, acting
+        self.times, self._rows, self._state = _list_states(trajectory)
+        if len(self.times) > _MOST_STATES:
+            pieces = f"{len(self.times) // 3:,} pieces, at most {_MOST_STATES // 3:,} are possible"
+            raise PoseError(f"a trajectory of {pieces}")
+
+    def __repr__(self) -> str:
+        return f"<parakin timed motion: {len(self.times)} states>"
+
+    @cached_property
+    def weights(self) -> Array:
+        """The weights of values (N,) whose sum is their mean over the time, by Simpson's rule in each piece."""
+        if not self._trajectory.seconds > 0.0:
+            return np.full(len(self.times), 1.0 / len(self.times))
+        spans = np.diff(self._trajectory.profile.time)[:, None] / self._trajectory.seconds
+        return np.ravel(spans * np.array([1.0, 4.0, 1.0]) / 6.0)
+
+    def list_blocks(self) -> Iterator[tuple[slice, Motion, Array]]:
+        """Yield some states at a time: which they are, the motion, and the force on the tip (n, translations)."""
+        trajectory, state = self._trajectory, self._state
+        segment = trajectory.joint_path.segment[self._rows]
+        cuts = ~trajectory.posted.path.rapid[trajectory.curve.record_of_piece[segment]]
+        for begin in range(0, len(self.times), _BLOCK):
+            block = slice(begin, begin + _BLOCK)
+            own = PathState(state.row[block], state.shift[block], *(rate[block] for rate in state[2:]))
+            yield block, _evaluate(trajectory, own), cuts[block, None] * self._acting
 
 
 def _list_states(trajectory: Trajectory) -> tuple[Array, Indices, PathState]:

@@ -16,6 +16,7 @@ from .force_limits import ForceLimits
 from .jerk_limited import limit_jerk
 from .joint_path import build_joint_path
 from .pole_pace import slow_down_on_pole
+from .rated_forces import keep_rated_forces
 from .speed_profile import SpeedProfile
 from .time_optimal import (
     build_accelerated_profile,
@@ -45,9 +46,10 @@ def plan_trajectory(
 
     Between records the tip moves straight and the pose's angles evenly. The feed is that of the record that the motion
     leads to; in rapid, and where none is programmed, drives are the only limit. A drive's force and its power, where
-    its file says them, bound what weight, inertia and cutting ask of it. Where no drive has an acceleration, a jerk, a
-    force or a power, corners are neither rounded nor stopped at, and speeds change at once. With jerks the trajectory
-    is the quickest but for less than 0.5 %, on paths of more than 100,000 rows for less than 10 %.
+    its file says them, bound what weight, inertia and cutting ask of it; where the rms of its force would be more than
+    its file says, the whole takes longer. Where no drive has an acceleration, a jerk, a force or a power, corners are
+    neither rounded nor stopped at, and speeds change at once. With jerks the trajectory is the quickest but for less
+    than 0.5 %, on paths of more than 100,000 rows for less than 10 %. For the rms all times are longer alike.
 
     Raises
     ------
@@ -78,8 +80,9 @@ def plan_trajectory(
     else:
         profile, binding = build_accelerated_profile(joint_path, limits, x, u)
     profile = slow_down_on_pole(joint_path, profile)
-    binding[joint_path.find_ends()] = len(names) - 1
-    return Trajectory(posted, curve, joint_path, profile, binding, names)
+    trajectory = keep_rated_forces(Trajectory(posted, curve, joint_path, profile, binding, names))
+    trajectory.binding[joint_path.find_ends()] = len(names) - 1
+    return trajectory
 
 
 def _refuse_untimed(posted: Posted) -> None:

@@ -57,7 +57,7 @@ class Trajectory:
     profile : the speed along the curve
     binding : (rows,) the limit that bounds the speed at each row, an index into ``names``
     names : ``feed``, then for each joint ``d1.speed``, ``d1.acceleration``, ``d1.jerk``, ``d1.force``,
-        ``d1.power``, and ``start/stop``
+        ``d1.power``, ``d1.rated`` (at all rows, if at any), and ``start/stop``
     """
 
     posted: Posted
@@ -138,5 +138,5 @@ class Trajectory:
 
 def name_limits(joints: Sequence[str]) -> tuple[str, ...]:
     """Name all limits that can bind, in the order of :attr:`Trajectory.binding`."""
-    kinds = ("speed", "acceleration", "jerk", "force", "power")
+    kinds = ("speed", "acceleration", "jerk", "force", "power", "rated")
     return ("feed", *(f"{joint}.{kind}" for kind in kinds for joint in joints), "start/stop")

@@ -66,13 +66,18 @@ class Cells:
     def volumes(self) -> Array:
         return multiply_columns(self.size)
 
+    @cached_property
+    def longest_edges(self) -> Array:
+        """The longest edge of each cell, (N,) mm; by columns, for rows are so short."""
+        return np.asarray(reduce(np.maximum, self.size.T))
+
     @property
     def inside(self) -> Flags:
         return self.limit < 0
 
     def total(self, fractions: Array) -> float:
         """Sum the volume that fractions of the cells are together, mm³ (mm² in the plane)."""
-        return float(np.dot(fractions, self.volumes))
+        return float(np.einsum("n,n->", fractions, self.volumes))  # BLAS' threads go on spinning
 
     @cached_property
     def gap(self) -> float:
@@ -321,7 +326,8 @@ class Subdivision(ABC):
             low, high = cells.low.min(0), (cells.low + cells.size).max(0)
             slack = 1e-9 * (high - low)
             outermost = (open_cells.low <= low + slack) | (open_cells.low + open_cells.size >= high - slack)
-            coarse = np.flatnonzero(outermost.any(1) & (open_cells.size.max(1) > (high - low).max() * fraction))
+            is_coarse = open_cells.longest_edges > (high - low).max() * fraction
+            coarse = np.flatnonzero(reduce(np.logical_or, outermost.T) & is_coarse)
             if not len(coarse) or len(coarse) > OUTERMOST or (budget is not None and budget.is_spent()):
                 return low, high
             self.refine(coarse, budget)
@@ -354,7 +360,7 @@ class Subdivision(ABC):
     def _choose_parents(self, cells: Cells, gap: float, cell: float | None) -> tuple[str, Indices]:
         """Choose which open cells to refine, the worst first; returns why to stop, or "", and their indices."""
         open_cells = self.open_cells
-        large = open_cells.size.max(1) > (self.finest if cell is None else max(cell * (1.0 + 1e-9), self.finest))
+        large = open_cells.longest_edges > (self.finest if cell is None else max(cell * (1.0 + 1e-9), self.finest))
         if cell is None and cells.gap <= gap:
             return "gap", np.zeros(0, np.int64)
         if not large.any():

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
@@ -28,11 +27,9 @@ from .kinematics.travel import LineTapes, Travel, compile_line_tapes, find_trave
 from .kinematics.wrist.pole_crossing import flip_mode
 from .kinematics.wrist.pole_thresholds import EXACT
 from .machine_properties import MachineProperties
-from .model.geometric_parameters import replace_ranges, settle_offsets
 from .model.legs import Inverse
 from .model.limits import compute_platform_points
 from .model.rates import TwistRates, compute_twist_rates
-from .model.spec import Spec
 from .model.structures import PlatformPlacement
 
 _SHORTEST_DIRECTION = 1e-6  # mm or rad; travel in multiples of a shorter one overflows
@@ -65,13 +62,7 @@ class Machine(MachineProperties, Displayed):
         for name in values:
             if name not in known:
                 raise PoseError(f"parameters: unknown {quote(name)}{suggest(name, known)}")
-
-        def make_spec(sizes: Mapping[str, float]) -> Spec:
-            spec = self._replace_numbers({**values, **sizes})
-            own = {name: sizes.get(name, values.get(name, value)) for name, value in spec.sizes.items()}
-            spec = replace_ranges(replace(spec, sizes=own, home={**spec.home, **(home or {})}), ranges or {})
-            return settle_offsets(spec)
-
+        make_spec = partial(self._make_other_spec, values, ranges or {}, home or {})
         return Machine(make_spec({}), make_spec)
 
     # Input at the boundary.

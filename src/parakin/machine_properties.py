@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from functools import cached_property
 from itertools import product
 
@@ -18,7 +19,14 @@ from .kinematics.wrist.pose_angles import EVERY_DIRECTION, EVERY_ROTATION, EVERY
 from .kinematics.wrist.turning_joints import Wrist, find_wrist
 from .model.elements import BodyBuild, Drive, PlaneConstraint, RodConstraint
 from .model.equations import Equations
-from .model.geometric_parameters import SIZES, Parameter, list_parameters, replace_parameters
+from .model.geometric_parameters import (
+    SIZES,
+    Parameter,
+    list_parameters,
+    replace_parameters,
+    replace_ranges,
+    settle_offsets,
+)
 from .model.legs import Leg
 from .model.limits import Limit, group_joints_by_leg
 from .model.nominal_values import SizedTrace
@@ -177,6 +185,25 @@ class MachineProperties:
             sizes = zip(rates.names, rates.nominal, strict=True)
             spec = rates.apply(spec, [values.get(name, nominal) for name, nominal in sizes])
         return replace_parameters(spec, values)
+
+    def list_follow_rates(self, size: str) -> dict[str, float]:
+        """List the rates at which geometric numbers follow a named size, by their names; no others."""
+        moved = list_parameters(self._replace_numbers({size: self.spec.sizes[size] + 1.0}))
+        numbers = zip(list_parameters(self.spec), moved, strict=True)
+        return {old.name: new.value - old.value for old, new in numbers if new.value != old.value}
+
+    def _make_other_spec(
+        self,
+        values: Mapping[str, float],
+        ranges: Mapping[str, AxisRange],
+        home: Mapping[str, float],
+        sizes: Mapping[str, float],
+    ) -> Spec:
+        """Make the description with other numbers, ranges of drives and home, and then other named sizes."""
+        spec = self._replace_numbers({**values, **sizes})
+        named = {name: sizes.get(name, values.get(name, value)) for name, value in spec.sizes.items()}
+        spec = replace_ranges(replace(spec, sizes=named, home={**spec.home, **home}), ranges)
+        return settle_offsets(spec)
 
     @cached_property
     def size_rates(self) -> SizeRates:

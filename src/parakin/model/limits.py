@@ -217,8 +217,8 @@ def list_sign_forms(
         near, far = (apply(back, sub(end, placement.origin)) for end in strut.ends)
         return near if strut.platform is None else strut.platform, far
 
-    told = spec.limits.clearance is not None and not isinstance(spec.limits.clearance, Term)
-    pairs = _list_strut_pairs(spec, placement, joints) if told else ()
+    is_number = spec.limits.clearance is not None and not isinstance(spec.limits.clearance, Term)
+    pairs = _list_strut_pairs(spec, placement, joints) if is_number else ()
     struts = {
         f"clearance {names}": [(one.ends, two.ends), (turn_back(one), turn_back(two))] for names, one, two in pairs
     }

@@ -17,7 +17,7 @@ from ..arrays import Array
 from ..families.shift_rates import trace_shift_rates
 from ..machine import Machine
 from ..model.equations import Equations
-from ..model.geometric_parameters import SIZES, list_parameters
+from ..model.geometric_parameters import SIZES
 from ..model.nominal_values import SizedTrace
 from ..model.rates import TwistRates
 from ..performance.characteristic_length import CharacteristicLength
@@ -78,9 +78,8 @@ class SizeBox:
         rates = np.eye(len(self.names))
         for column, parameter in enumerate(self._parameters):
             if parameter.group == SIZES:
-                spec = self.machine.trace_equations({parameter.name: parameter.value + 1.0}).spec
-                moved = {own.name: own.value for own in list_parameters(spec)}
-                rates[:, column] += [moved.get(own.name, own.value) - own.value for own in self._parameters]
+                followers = self.machine.list_follow_rates(parameter.name)
+                rates[:, column] += [followers.get(name, 0.0) for name in self.names]
         return rates
 
     def list_values(self, inputs: Sequence[Scalar]) -> dict[str, Scalar]:

@@ -30,9 +30,13 @@ def keep_rated_forces(trajectory: Trajectory) -> Trajectory:
     rest, both, moving = (np.zeros(len(rated)) for _ in range(3))  # mean squares and mean product
     for block, state, tip in motion.list_blocks():
         still = np.zeros_like(state.speeds)
-        held = dynamics.compute_forces(state._replace(speeds=still, accelerations=still), tip)
-        added, weights = dynamics.compute_forces(state, tip) - held, motion.weights[block]
-        rest, both, moving = rest + weights @ held**2, both + weights @ (held * added), moving + weights @ added**2
+        at_rest = dynamics.compute_forces(state._replace(speeds=still, accelerations=still), tip)
+        added, weights = dynamics.compute_forces(state, tip) - at_rest, motion.weights[block]
+        rest, both, moving = (
+            rest + weights @ at_rest**2,
+            both + weights @ (at_rest * added),
+            moving + weights @ added**2,
+        )
     most = rated**2
     for name, own in zip(machine.joints, rest >= most, strict=True):
         if own:

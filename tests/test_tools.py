@@ -307,6 +307,24 @@ def test_the_tool_is_withdrawn_before_a_change(tricept, write, away, second):
     assert [event.record for event in path.events if event.text == "LOAD/TOOL,2"] == [at]
 
 
+@pytest.mark.parametrize(
+    ("text", "name", "change"),
+    [
+        ("G21 G90\nT1 M6\nG0 X0 Y0 Z5\nG1 Z0 F60\nM63 P0\nG4 P2\nM9\nM5\nT2 M6\nM64 P1\nG0 X5\nM2\n", "a.ngc", "T2"),
+        ("UNITS/MM\nLOADTL/1\nFEDRAT/60\nGOTO/0,0,5\nGOTO/0,0,0\nAUXFUN/63\nDELAY/2\nCOOLNT/OFF\nSPINDL/OFF\n"
+         "LOADTL/2\nAUXFUN/64\nGOTO/5,0,0\n", "a.apt", "LOADTL/2"),
+    ],
+)  # fmt: skip
+def test_what_is_said_before_a_change_happens_where_it_was_said(tricept, write, text, name, change):
+    path = pk.fit_tool_lengths(tricept, pk.read_path(write(text, name)))
+    height = {event.text: path.tip[event.record - 1, 2] for event in path.events if event.record}
+    said = list(height)
+    first = next(k for k, text in enumerate(said) if "63" in text)
+    assert [height[text] for text in said[first : first + 5]] == [0, 0, 20, 20, 20] and change in said[first + 4]
+    assert next(height[text] for text in said if "64" in text) == 20
+    assert [event.record for event in path.events] == sorted(event.record for event in path.events)
+
+
 @pytest.mark.parametrize("text, name", [(CHANGE.format(away=AWAY, second=50.0), "a.cls"), (NGC, "a.ngc")])
 @pytest.mark.parametrize("target", ["linuxcnc", "joints"])
 def test_spindle_and_coolant_stop_before_a_change(text, name, target, write, capsys):

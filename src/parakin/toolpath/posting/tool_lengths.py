@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import replace
 from typing import Literal, NoReturn, TypeAlias
 
@@ -27,6 +27,7 @@ _SAME = 1e-3  # mm: lengths that are the same, with the decimals of a file
 _CLEARANCES = (20.0, 10.0, 5.0, 2.0)  # mm to withdraw from a cut before a change: the first that the machine allows
 _LONGEST = 1e4  # mm
 _UPRIGHT = 1e-4  # rad: 0.1 um at a tip that is 1 m off
+_STOPS = re.compile(r"M0?[59]$|(SPINDL|COOLNT)\s*/\s*OFF", re.I)  # events that stop spindle or coolant
 _STARTS = re.compile(r"M0?[34]\b|SPINDL\b(?!\s*/\s*OFF)", re.I)  # events that start the spindle
 
 
@@ -53,7 +54,8 @@ def fit_tool_lengths(
 
     Before a change the tool is withdrawn along its axis, from a cut by 20 mm, or less where the machine can't, and by
     what the next tool is longer, so that no tool is put in deeper than the one before; from a rapid position the next
-    one goes on from the same point.
+    one goes on from the same point. What the file says before the change happens before that, but spindle and coolant
+    that it stops right before the change run on until the tool is out.
 
     Raises :class:`InputError` with file and line for a length that contradicts the machine's, and :class:`PoseError`
     for an invalid length or a path fitted to another machine.
@@ -237,4 +239,23 @@ def _insert_lifts(path: ToolPath, at: Indices, new: Flags, height: Array, events
     }
     ahead = np.searchsorted(at, np.arange(len(path) + 1), side="right")
     ahead[list(events_at)] = list(events_at.values())
-    return insert_records(path, at, values, ahead)
+    inserted = insert_records(path, at, values, ahead)
+    begins = np.searchsorted(at, np.arange(len(path) + 1)).tolist()  # how many are inserted before a record's first one
+    events = list(inserted.events)
+    for k in _find_events_before_changes(path, events_at):
+        record = path.events[k].record
+        events[k] = events[k]._replace(record=record + begins[record])
+    return replace(inserted, events=tuple(events))
+
+
+def _find_events_before_changes(path: ToolPath, records: Collection[int]) -> Iterator[int]:
+    """Find the events between the last motion before a change of tool and the change; yield their indices."""
+    lines = {use.record: use.line for use in path.tools if use.record in records}
+    for record, line in lines.items():
+        here = [k for k, event in enumerate(path.events) if event.record == record]
+        at_change = [i for i, k in enumerate(here) if path.events[k].line == line]
+        behind = [i for i, k in enumerate(here) if path.events[k].line > line]
+        end = min(at_change or behind or [0])
+        while end and _STOPS.match(path.events[here[end - 1]].text):
+            end -= 1
+        yield from here[:end]

@@ -125,6 +125,9 @@ def test_a_page_has_its_own_files(studio):
     assert studio.request(f"sessions/{first}/files/mine.yaml")[1].decode() == RPR3.replace("rpr3", "mine")
     assert studio.ask(f"sessions/{second}/files/mine.yaml")[0] == 404
     assert studio.ask("sessions/nothing/files")[0] == 404
+    assert studio.request("machines/rpr3") == (200, RPR3.encode())
+    for name in ("nothing", "..%2Frpr3", "rpr3.yaml"):
+        assert studio.request(f"machines/{name}")[0] == 404
 
 
 @pytest.mark.parametrize("name", ["../a", "..%2Fa", "a/b", ".hidden", "a\0b", "C:\\a", "a" * 100, "%2e%2e", "a..", ""])
@@ -306,9 +309,16 @@ def test_the_page_in_a_browser(studio):
         tab.click("summary:has-text('Edit the machine')")
         wait_until(tab, "document.getElementById('text').value.includes('kind: length')", 20.0)
         text = tab.input_value("#text")
-        tab.fill("#text", text.replace("kind: length", "kind: lenght", 1))
+        assert text == RPR3  # as it was written, with its comments and sizes
+        remarks = "# a remark\n" * 60
+        tab.fill("#text", remarks + text.replace("kind: length", "kind: lenght", 1) + remarks)
         tab.click("#save")
         wait_until(tab, "getSelection().toString().includes('lenght')", 20.0)  # the line that the error names
+        lines = [*(remarks + text).split("\n"), *remarks.split("\n")[1:]]
+        number = next(number for number, line in enumerate(lines) if "kind: length" in line)
+        top, height, whole = tab.evaluate("(({scrollTop, clientHeight, scrollHeight}) => [scrollTop, clientHeight, "
+                                          "scrollHeight])(document.getElementById('text'))")  # fmt: skip
+        assert top < number / len(lines) * whole < top + height  # and it is in view
         assert ".yaml:" in tab.inner_text("#runs .run pre")
         tab.fill("#text", text)
         tab.click("#save")

@@ -22,6 +22,7 @@ from starlette.requests import Request
 from starlette.responses import FileResponse, JSONResponse, Response
 from starlette.routing import Route
 
+from ..description import list_shipped_machines
 from ..errors import InputError
 from .forms import Form, write_line
 from .request_guard import LOOPBACK, Guard
@@ -58,6 +59,7 @@ class Studio:
             Route("/", _serve_own("studio.html")),
             *(Route(f"/{name}", _serve_own(name)) for name in ("studio.js", "results.js", "studio.css")),
             Route("/commands", self._answer(self._describe)),
+            Route("/machines/{name}", self._answer(self._send_machine_file)),
             Route("/sessions", self._answer(self._open_session), methods=["POST"]),
             Route(f"{in_session}/files", self._answer(self._list_files)),
             Route(f"{in_session}/files/{{name:path}}", self._answer(self._send_file)),
@@ -100,6 +102,11 @@ class Studio:
     async def _describe(self, request: Request) -> Response:
         forms = [asdict(form) for form in self._forms.values()]
         return JSONResponse({"commands": forms, "machines": list(self._machines), "start": dict(self._start)})
+
+    async def _send_machine_file(self, request: Request) -> Response:
+        """Send the file of a shipped machine."""
+        path = list_shipped_machines()[request.path_params["name"]]
+        return FileResponse(path, media_type="text/plain", headers={"content-security-policy": _FILE_POLICY})
 
     async def _open_session(self, request: Request) -> Response:
         return JSONResponse({"session": self._sessions.open_session()})

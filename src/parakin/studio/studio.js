@@ -125,6 +125,7 @@ function markLine(name, errors) {
   element("editor").open = true;
   text.focus();
   text.setSelectionRange(begin, begin + lines[number - 1].length);
+  text.scrollTop = (number - 0.5) / lines.length * text.scrollHeight - 0.5 * text.clientHeight;
 }
 
 // The sizes that were dragged on a machine's page, as the commands take them.
@@ -147,14 +148,25 @@ function readPose(name) {
   });
 }
 
+// A machine's file as it was written; where sizes were dragged, the file of the machine as it is now.
+async function readMachineFile(name) {
+  const sizes = readSizes(name);
+  if (!Object.keys(sizes).length) {
+    const response = await fetch(ownMachines().includes(name) ? inSession(`files/${escapeName(name)}`) : `machines/${escapeName(name)}`);
+    if (response.ok) return response.text();
+  }
+  const {number} = await beginRun("show", {NAME: name, "--yaml": true, ...sizes});
+  const result = await followRun(number);
+  return result.code === 0 ? result.output : result.errors;
+}
+
 async function showMachineFile() {
   const name = element("machine").value;
   if (state.changed || state.edited === name) return;
   state.edited = name;
-  const {number} = await beginRun("show", {NAME: name, "--yaml": true, ...readSizes(name)});
-  const result = await followRun(number);
+  const text = await readMachineFile(name);
   if (state.edited !== name) return;
-  element("text").value = result.code === 0 ? result.output : result.errors;
+  element("text").value = text;
   element("text-name").value = ownMachines().includes(name) ? name : `my_${name}.yaml`;
 }
 
@@ -297,7 +309,7 @@ async function postPart(place, machines = chosenMachines()) {
     const page = `${output}/${part.replace(/\.[^.]*$/, "")}.page.html`;
     if (state.files.some(file => file.name === page)) showPage(name, page, shown => {
       shown.offerPosting(text => postPart(() => ({"--workpiece": text}), [name]));
-      shown.setPlaying(true);
+      if (!shown.path.offences.length) shown.setPlaying(true); // else it stands at the first one
     });
   }
 }

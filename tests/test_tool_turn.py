@@ -70,6 +70,19 @@ def least_margins(machine, poses):
     return (machine.margins(poses)[:, spans > 0.0] / spans[spans > 0.0]).min(axis=1)
 
 
+def find_best_margin(machine, tip, axis, step):
+    """The best least margin that any turn of the tool leaves at a place; turns ``step`` deg apart."""
+    c = np.radians(np.arange(-180.0, 180.0, step))
+    k = Rotation.from_euler("z", -c[:, None]).apply(axis)
+    a, b = np.arcsin(-k[:, 1]), np.arctan2(k[:, 0], k[:, 2])
+    poses = np.column_stack([np.tile(tip, (len(c), 1)), a, b, c])
+    with np.errstate(invalid="ignore"):
+        margins = np.nan_to_num(least_margins(machine, poses), nan=-1.0)
+        margins[machine.sides(poses) * machine.sides(machine.home[None]) <= 0.0] = -1.0
+        margins[machine.check(poses) != 0] = -1.0
+    return margins.max()
+
+
 def dense(rows, count=25):
     """Rows evenly between rows."""
     share = np.linspace(0.0, 1.0, count, endpoint=False)[:, None]
@@ -102,6 +115,10 @@ def test_the_chosen_turn_keeps_the_axis_and_leaves_more_margin(name, tilted):
     assert turn.home_margin == pytest.approx(at_home, abs=2e-3)
     assert turn.margin == pytest.approx(least_margins(machine, poses).min(), abs=2e-3)
     assert turn.margin > at_home + 0.01
+    # nearly as much as the best turn of each record leaves by itself, which no way of turns passes
+    records = zip(path.tip @ frame[:, :3].T + frame[:, 3], path.axis @ frame[:, :3].T, strict=True)
+    best = min(find_best_margin(machine, tip, axis, 3.0) for tip, axis in records)
+    assert 0.94 * best <= turn.margin <= best + 1e-3
     # the same side of all singularities, C continuous and in the range that is told
     assert (machine.sides(poses) * machine.sides(machine.home[None]) > 0.0).all()
     assert turn.low - 1e-12 <= poses[:, 5].min() and poses[:, 5].max() <= turn.high + 1e-12
@@ -123,15 +140,8 @@ def test_at_one_place_the_turn_is_the_best_of_all(name):
     tip = machine.home[:3] + OFFSETS[name] + np.array([[0.0, 0.0, 0.0], [0.5, 0.0, 0.0]])
     axis = axis_of(17.0, 40.0)
     turn = pk.choose_tool_turn(machine, path_of(tip, np.tile(axis, (2, 1))))
-    c = np.radians(np.arange(-180.0, 180.0, 0.25))
-    k = Rotation.from_euler("z", -c[:, None]).apply(axis)
-    a, b = np.arcsin(-k[:, 1]), np.arctan2(k[:, 0], k[:, 2])
-    poses = np.column_stack([np.tile(tip[0], (len(c), 1)), a, b, c])
-    with np.errstate(invalid="ignore"):
-        margins = np.nan_to_num(least_margins(machine, poses), nan=-1.0)
-        margins[machine.sides(poses) * machine.sides(machine.home[None]) <= 0.0] = -1.0
-        margins[machine.check(poses) != 0] = -1.0
-    assert 0.9 * margins.max() <= turn.margin <= margins.max() + 1e-3
+    best = find_best_margin(machine, tip[0], axis, 0.25)
+    assert 0.9 * best <= turn.margin <= best + 1e-3
 
 
 def test_a_path_that_only_another_turn_can_follow():

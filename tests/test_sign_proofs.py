@@ -8,7 +8,7 @@ import parakin as pk
 from parakin.workspaces.certified.containment import prove_boxes
 
 
-@pytest.mark.parametrize("name", ["hexapod", "eclipse", "tricept"])
+@pytest.mark.parametrize("name", ["hexapod", "eclipse", "tricept", "hexaglide"])
 def test_what_is_proved_is_true_at_samples(name):
     m, rng = load_shipped(name), np.random.default_rng(0)
     turning = [axis for axis in m.axes if axis in "ABC"]
@@ -23,13 +23,18 @@ def test_what_is_proved_is_true_at_samples(name):
     for constraint in region.constraints:
         if constraint.sign is None:
             continue
-        sign = constraint.sign(middle - half, middle + half).sign
+        sign, _, planes = constraint.sign(middle - half, middle + half)
         decided += np.count_nonzero(sign)
         for _ in range(8):
-            points = middle + half * np.clip(rng.uniform(-1.4, 1.4, half.shape[:1] + scale.shape), -1.0, 1.0)
+            shares = np.clip(rng.uniform(-1.4, 1.4, half.shape[:1] + scale.shape), -1.0, 1.0)
+            points = middle + half * shares
             low, high = (end[:, 0] for end in constraint.point_program(points, points))
             assert not ((sign > 0.0) & (high < 0.0)).any()
             assert not ((sign < 0.0) & (low >= 0.0)).any()
+            if planes is not None:
+                change = (planes.slopes * shares).sum(1)
+                assert not ((change + planes.low >= 0.0) & (high < 0.0)).any()
+                assert not ((change + planes.high < 0.0) & (low >= 0.0)).any()
     assert decided > 200
 
 

@@ -15,7 +15,8 @@ from ...arrays import Array
 from ...kernels.intervals import IntervalProgram, JumpFreeTrace
 from ...machine import Machine
 from ...model.equations import Equations
-from .sign_proofs import SignProof, make_margin_proof, make_separation_proof
+from .sign_proofs import SignProof, make_margin_proof
+from .strut_separation import make_separation_proof
 
 _ROUNDING = 1e-12  # relative, of bounds that limits imply
 

@@ -32,6 +32,7 @@ from .plane_cuts import (
     accumulate_cuts,
     bound_linearly,
 )
+from .sign_proofs import FormPlanes
 
 FIRST = 8  # cells along the longest side of the first box
 MOST = 3_000_000  # undecided cells at a time
@@ -190,21 +191,36 @@ def _join_boxes(low: Array, size: Array, boxes: OrientationBoxes) -> tuple[Array
 def prove_signs(
     constraint: Constraint, low: Array, size: Array, boxes: OrientationBoxes, bounds: LinearBounds, which: Flags
 ) -> None:
-    """Decide some boxes whose bounds don't tell by the constraint's sign proof; others get its spread.
+    """Decide some boxes whose bounds don't tell by the constraint's sign proof; others get its spread and planes.
 
-    The sum of a spread stays, shared by how far each angle spreads the form that would have decided.
+    The sum of a spread stays, shared by how far each angle spreads the form that would have decided. Planes are
+    taken where they are relatively closer: of a form that has the margin's sign, they bound the same part of a cell.
     """
     rows = np.flatnonzero(which)
     if constraint.sign is None or not len(rows):
         return
-    sign, shares = constraint.sign(*_join_boxes(low, size, boxes.take(rows)))
+    sign, shares, planes = constraint.sign(*_join_boxes(low, size, boxes.take(rows)))
     bounds.state[rows] = np.where(sign > 0.0, CLEARED, np.where(sign < 0.0, EXCLUDED, bounds.state[rows]))
+    if planes is not None:
+        _take_closer_planes(bounds, rows, planes)
     shares = shares[:, low.shape[1] :]
     with np.errstate(invalid="ignore", divide="ignore"):
         shares = shares / shares.sum(1, keepdims=True)
     known, total = np.isfinite(shares).all(1), bounds.spread[rows].sum(1)
     total = np.where(np.isfinite(total), total, 1.0)
     bounds.spread[rows[known]] = (total[:, None] * shares)[known]
+
+
+def _take_closer_planes(bounds: LinearBounds, rows: Indices, planes: FormPlanes) -> None:
+    """Take planes over boxes, the angles' part added to their heights, where they are closer than the bounds are."""
+    d = bounds.slopes.shape[1]
+    slopes, turned = planes.slopes[:, :d], np.abs(planes.slopes[:, d:]).sum(1)
+    low, high = planes.low - turned, planes.high + turned
+    with np.errstate(invalid="ignore", divide="ignore"):
+        own = (bounds.high[rows] - bounds.low[rows]) / np.abs(bounds.slopes[rows]).sum(1)
+        closer = (high - low) / np.abs(slopes).sum(1) < np.nan_to_num(own, nan=inf)
+    taken = rows[closer]
+    bounds.low[taken], bounds.high[taken], bounds.slopes[taken] = low[closer], high[closer], slopes[closer]
 
 
 def add_cuts(cuts: PlaneCuts, number: int, cell: Indices, half: Array, bounds: LinearBounds) -> None:

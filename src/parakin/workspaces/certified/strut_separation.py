@@ -179,7 +179,7 @@ def _tilt_directions(direction: Array, distance: Array, least: float, number: in
 
 def _complete_axes(direction: Array) -> Array:
     """Complete unit vectors (N, 3) to three at right angles, (N, 3, 3)."""
-    direction = np.where(direction.any(1)[:, None], direction, np.eye(3)[2])
+    direction = np.where(direction.any(1, keepdims=True), direction, np.eye(3)[2])
     first = np.cross(direction, np.eye(3)[np.abs(direction).argmin(1)])
     first /= np.linalg.norm(first, axis=1)[:, None] + _TINY
     return np.stack([direction, first, np.cross(direction, first)], 1)

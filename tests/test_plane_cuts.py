@@ -18,6 +18,7 @@ from parakin.kernels.batch import evaluate_tape
 from parakin.kernels.tape import compile_tape
 from parakin.model.limits import compute_segment_distance
 from parakin.workspaces.certified.constraints import Constraint
+from parakin.workspaces.certified.orientation_boxes import OrientationBoxes, add_cuts, bound_margin
 from parakin.workspaces.certified.plane_cuts import (
     CLEARED,
     EXCLUDED,
@@ -28,7 +29,6 @@ from parakin.workspaces.certified.plane_cuts import (
     bound_unions,
     keep_tightest_planes,
 )
-from parakin.workspaces.certified.subdivision import OrientationBoxes, add_cuts, bound_margin
 
 ROOM = np.empty(3)
 

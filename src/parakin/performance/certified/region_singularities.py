@@ -15,10 +15,11 @@ from ...budget import Budget
 from ...errors import PoseError
 from ...model.rates import trace_determinant
 from ...workspaces.certified.constraints import Constraint
+from ...workspaces.certified.orientation_boxes import OrientationBoxes, bound_margin
 from ...workspaces.certified.plane_cuts import CLEARED
 from ...workspaces.certified.region import Region
 from ...workspaces.certified.separation import find_joined_cells
-from ...workspaces.certified.subdivision import Cells, OrientationBoxes, bound_margin
+from ...workspaces.certified.subdivision import Cells
 from ...workspaces.connected.adjacency import find_adjacent_cells, label_components
 from ..search import pick_best_of_blocks
 from ..singularities import PARALLEL, has_serial_turns, list_margin_names

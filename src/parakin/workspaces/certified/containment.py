@@ -14,9 +14,9 @@ from ...errors import PoseError
 from .assembly_mode import PARALLEL_SINGULARITY
 from .best_orientation import find_best_orientations
 from .constraints import Constraint
+from .orientation_boxes import OrientationBoxes, bound_margin, prove_signs
 from .plane_cuts import CLEARED, EXCLUDED, KEPT, LinearBounds
 from .region import Region
-from .subdivision import OrientationBoxes, bound_margin, prove_signs
 
 MOST = 4096  # sub-boxes of a box to be examined before it is left undecided
 _ROUNDS = 60  # bisected more often, a sub-box's numbers have no digits left

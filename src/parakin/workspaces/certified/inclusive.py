@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...arrays import Array, Flags, Indices
+from .orientation_boxes import OrientationBoxes, add_cuts, bisect_boxes, bound_margin, concatenate_boxes
 from .plane_cuts import (
     CLEARED,
     EXCLUDED,
@@ -19,7 +20,7 @@ from .plane_cuts import (
     find_redundant_leaves,
     keep_tightest_planes,
 )
-from .subdivision import Cells, OrientationBoxes, Subdivision, add_cuts, bisect_boxes, bound_margin, concatenate_boxes
+from .subdivision import Cells, Subdivision
 
 LOOKS = 4  # tries at narrowed orientations in a round
 MOST = 128  # boxes of orientations that a cell may have

@@ -12,17 +12,16 @@ import numpy as np
 
 from ...arrays import Array, Flags, Indices
 from .constraints import Constraint
-from .plane_cuts import EXCLUDED, KEPT, LinearBounds, PlaneCuts
-from .subdivision import (
-    Cells,
+from .orientation_boxes import (
     OrientationBoxes,
-    Subdivision,
     add_cuts,
     bisect_boxes,
     bound_margin,
     concatenate_boxes,
     prove_signs,
 )
+from .plane_cuts import EXCLUDED, KEPT, LinearBounds, PlaneCuts
+from .subdivision import Cells, Subdivision
 
 LOOKS = 6  # tries at narrowed orientations in a round
 MOST = 32  # boxes of orientations that a constraint may have in a cell

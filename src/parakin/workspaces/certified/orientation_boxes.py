@@ -1,0 +1,136 @@
+"""Boxes of orientations, each in a cell of positions, and the bounds of margins over both."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from math import inf
+
+import numpy as np
+
+from ...arrays import Array, Flags, Indices
+from ...kernels.batch import run_in_threads
+from .constraints import Constraint
+from .plane_cuts import (
+    CLEARED,
+    EXCLUDED,
+    LinearBounds,
+    PlaneCuts,
+    TaylorBounds,
+    accumulate_cuts,
+    bound_linearly,
+)
+from .sign_proofs import FormPlanes
+
+
+@dataclass(frozen=True, eq=False)
+class OrientationBoxes:
+    """Boxes of orientations [low, high], (N, s) rad, each in a cell, that are still to be proved.
+
+    cell : (N,) index of the cell
+    needs : (N, constraints) which constraints, where a list is not one constraint's alone
+    """
+
+    cell: Indices
+    low: Array
+    high: Array
+    needs: Flags
+
+    def take(self, which: Flags | Indices) -> OrientationBoxes:
+        """Keep some of the boxes."""
+        return OrientationBoxes(self.cell[which], self.low[which], self.high[which], self.needs[which])
+
+    def renumber(self, new: Indices) -> OrientationBoxes:
+        """Renumber the cells; the boxes of cells without a number (-1) are dropped."""
+        kept = self.take(new[self.cell] >= 0)
+        return replace(kept, cell=new[kept.cell])
+
+    def shift(self, offset: int) -> OrientationBoxes:
+        """Add an offset to the cells' numbers."""
+        return replace(self, cell=self.cell + offset)
+
+    def repeat_for_children(self, count: int) -> OrientationBoxes:
+        """Repeat the boxes for each of the ``count`` children of their cells."""
+        cell = (self.cell[:, None] * count + np.arange(count)).reshape(-1)
+        return replace(self.take(np.repeat(np.arange(len(self.cell)), count)), cell=cell)
+
+
+def concatenate_boxes(groups: Sequence[OrientationBoxes]) -> OrientationBoxes:
+    """Put boxes of orientations together."""
+    names = ("cell", "low", "high", "needs")
+    return OrientationBoxes(*(np.concatenate([getattr(group, name) for group in groups]) for name in names))
+
+
+def bisect_boxes(boxes: OrientationBoxes, which: Flags, spread: Array) -> OrientationBoxes:
+    """Bisect some boxes across the angle with the greatest ``spread`` (N, s), or the widest if that is not finite."""
+    cut = np.flatnonzero(which)
+    known = np.isfinite(spread[cut]).all(1, keepdims=True)
+    axis = np.where(known, spread[cut], (boxes.high - boxes.low)[cut]).argmax(1)
+    row = np.arange(len(cut))
+    middle = 0.5 * (boxes.low[cut, axis] + boxes.high[cut, axis])
+    first, second = boxes.take(cut), boxes.take(cut)
+    first.high[row, axis], second.low[row, axis] = middle, middle
+    return concatenate_boxes([boxes.take(~which), first, second])
+
+
+def bound_margin(constraint: Constraint, low: Array, size: Array, boxes: OrientationBoxes, every: bool) -> LinearBounds:
+    """Bound a margin by planes over cells of corner ``low`` and edges ``size``, (cells, d), at boxes of orientations.
+
+    every : the margin must be kept at every orientation of a box, else at one
+    """
+    n, d, s = len(boxes.cell), low.shape[1], boxes.low.shape[1]
+    bottom, top = _join_boxes(low, size, boxes)
+    middle = 0.5 * (bottom + top)
+    half = np.maximum(middle - bottom, top - middle)
+    over_box = constraint.box_program(bottom, top)
+    in_middle = constraint.point_program(middle, middle)
+    given = TaylorBounds(constraint.is_smooth, *over_box, *in_middle, half)
+    result = LinearBounds.allocate(n, d, s)
+    run_in_threads(n, lambda start, stop: bound_linearly(given, every, result, start, stop))
+    return result
+
+
+def _join_boxes(low: Array, size: Array, boxes: OrientationBoxes) -> tuple[Array, Array]:
+    """Join cells and their boxes of orientations to boxes of both, (N, d + s)."""
+    corner = low[boxes.cell]
+    return np.concatenate([corner, boxes.low], 1), np.concatenate([corner + size[boxes.cell], boxes.high], 1)
+
+
+def prove_signs(
+    constraint: Constraint, low: Array, size: Array, boxes: OrientationBoxes, bounds: LinearBounds, which: Flags
+) -> None:
+    """Decide some boxes whose bounds don't tell by the constraint's sign proof; others get its spread and planes.
+
+    The sum of a spread stays, shared by how far each angle spreads the form that would have decided. Planes are
+    taken where they are relatively closer: of a form that has the margin's sign, they bound the same part of a cell.
+    """
+    rows = np.flatnonzero(which)
+    if constraint.sign is None or not len(rows):
+        return
+    sign, shares, planes = constraint.sign(*_join_boxes(low, size, boxes.take(rows)))
+    bounds.state[rows] = np.where(sign > 0.0, CLEARED, np.where(sign < 0.0, EXCLUDED, bounds.state[rows]))
+    if planes is not None:
+        _take_closer_planes(bounds, rows, planes)
+    shares = shares[:, low.shape[1] :]
+    with np.errstate(invalid="ignore", divide="ignore"):
+        shares = shares / shares.sum(1, keepdims=True)
+    known, total = np.isfinite(shares).all(1), bounds.spread[rows].sum(1)
+    total = np.where(np.isfinite(total), total, 1.0)
+    bounds.spread[rows[known]] = (total[:, None] * shares)[known]
+
+
+def _take_closer_planes(bounds: LinearBounds, rows: Indices, planes: FormPlanes) -> None:
+    """Take planes over boxes, the angles' part added to their heights, where they are closer than the bounds are."""
+    d = bounds.slopes.shape[1]
+    slopes, turned = planes.slopes[:, :d], np.abs(planes.slopes[:, d:]).sum(1)
+    low, high = planes.low - turned, planes.high + turned
+    with np.errstate(invalid="ignore", divide="ignore"):
+        own = (bounds.high[rows] - bounds.low[rows]) / np.abs(bounds.slopes[rows]).sum(1)
+        closer = (high - low) / np.abs(slopes).sum(1) < np.nan_to_num(own, nan=inf)
+    taken = rows[closer]
+    bounds.low[taken], bounds.high[taken], bounds.slopes[taken] = low[closer], high[closer], slopes[closer]
+
+
+def add_cuts(cuts: PlaneCuts, number: int, cell: Indices, half: Array, bounds: LinearBounds) -> None:
+    """Add the cuts of a constraint to cells of half widths (cells, d); ``cell`` is sorted, all its bounds must hold."""
+    run_in_threads(len(cell), lambda start, stop: accumulate_cuts(bounds, number, cell, half, cuts, start, stop))

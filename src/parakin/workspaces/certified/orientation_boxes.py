@@ -127,8 +127,8 @@ def _take_closer_planes(bounds: LinearBounds, rows: Indices, planes: FormPlanes)
     with np.errstate(invalid="ignore", divide="ignore"):
         own = (bounds.high[rows] - bounds.low[rows]) / np.abs(bounds.slopes[rows]).sum(1)
         closer = (high - low) / np.abs(slopes).sum(1) < np.nan_to_num(own, nan=inf)
-    taken = rows[closer]
-    bounds.low[taken], bounds.high[taken], bounds.slopes[taken] = low[closer], high[closer], slopes[closer]
+    rows = rows[closer]
+    bounds.low[rows], bounds.high[rows], bounds.slopes[rows] = low[closer], high[closer], slopes[closer]
 
 
 def add_cuts(cuts: PlaneCuts, number: int, cell: Indices, half: Array, bounds: LinearBounds) -> None:

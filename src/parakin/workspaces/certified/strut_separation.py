@@ -42,8 +42,8 @@ def make_separation_proof(
             nearest = _find_nearest(form.middle)
             own = _bound_distance(form, nearest)
             closer = own.high - own.low < planes.high - planes.low
-            for kept, found in zip(planes, own, strict=True):
-                kept[closer] = found[closer]
+            for best_so_far, new in zip(planes, own, strict=True):
+                best_so_far[closer] = new[closer]
             _tighten_separation(form, nearest, least, best, spread)
         change = np.abs(planes.slopes).sum(1) * (1.0 + _ROUNDING)
         apart = (best >= least) | (planes.low - change >= least)
@@ -127,12 +127,12 @@ def _follow_perpendicular(form: LinearMatrices, nearest: _NearestPoints, along: 
     second = (form.middle[:, 0] - form.middle[:, 1]) * nearest.inside[:, 1:]
     sides = np.stack([first, second], 1)
     sides -= np.einsum("nki,ni->nk", sides, nearest.direction)[:, :, None] * nearest.direction[:, None]
-    asked = np.stack([along[:, :, 0] - along[:, :, 2], along[:, :, 1] - along[:, :, 0]], 2)
-    asked *= nearest.inside[:, None]
+    changes = np.stack([along[:, :, 0] - along[:, :, 2], along[:, :, 1] - along[:, :, 0]], 2)
+    changes *= nearest.inside[:, None]
     squares = np.einsum("nki,nli->nkl", sides, sides)
     size = np.trace(squares, axis1=1, axis2=2)
     squares += (_PARALLEL * size + (size == 0.0))[:, None, None] * np.eye(2)
-    return np.asarray(asked @ np.linalg.inv(squares) @ sides)
+    return np.asarray(changes @ np.linalg.inv(squares) @ sides)
 
 
 def _tighten_separation(

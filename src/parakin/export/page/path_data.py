@@ -83,7 +83,8 @@ def _locate_offences(trajectory: Trajectory | None, offences: Sequence[Offence])
 
 
 def _encode_offence(posted: Posted, offence: Offence, sample: int) -> dict[str, Any]:
-    return {"text": f"{describe_place(posted, offence)}: {offence.text}", "limit": offence.limit, "sample": sample}
+    place = describe_place(posted, offence, Path(posted.path.source).name)
+    return {"text": f"{place}: {offence.text}", "limit": offence.limit, "sample": sample}
 
 
 def _gather_records(posted: Posted, columns: dict[str, Array], passed: Array) -> None:

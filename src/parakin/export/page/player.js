@@ -119,7 +119,9 @@ function drawCurves() {
 
 function strokeLine(pen, points) {
   pen.beginPath();
-  points.forEach(([x, y], i) => i && Number.isFinite(y) ? pen.lineTo(x, y) : pen.moveTo(x, Number.isFinite(y) ? y : 0));
+  points.forEach(([x, y], i) => { // it is broken where a value is none
+    if (Number.isFinite(y)) pen[i && Number.isFinite(points[i - 1][1]) ? "lineTo" : "moveTo"](x, y);
+  });
   pen.stroke();
 }
 

@@ -54,13 +54,14 @@ def _describe_reach(limit: Limit, excess: float) -> OffenceText:
     return OffenceText(f"{text} there", (-math.sqrt(excess), 0.0, "mm", math.sqrt(excess)))
 
 
-def describe_place(posted: Posted, offence: Offence) -> str:
+def describe_place(posted: Posted, offence: Offence, source: str | None = None) -> str:
     """Describe where an offence is: its source and line, on a motion with the place.
 
     ``part.cls:214`` at a record; ``part.cls:214: 37 % on the way there, X 12.3 Y -40.1 Z -1650.2`` on the motion to it,
-    ``from 37 %`` where the offence begins there and its value is that of a later place.
+    ``from 37 %`` where the offence begins there and its value is that of a later place. ``source`` is what the path's
+    source is called, its own name by default.
     """
-    where = f"{posted.path.source}:{offence.line}"
+    where = f"{source or posted.path.source}:{offence.line}"
     if offence.share >= 1.0:
         return where
     start, end = posted.poses[offence.record - 1], posted.poses[offence.record]

@@ -72,8 +72,9 @@ A table of lengths 0 only, as `parakin linuxcnc` writes it, leaves all to the ma
 from a table, G53 and G28 tell of the spindle's nose, as on a machine with such a table; else of the own tool's tip.
 
 Before a change of the tool it is withdrawn along its axis: from a cut by 20 mm (less where the machine can't), and
-by what the next one is longer. Spindle and coolant are stopped (M5, M9) before the stop for the operator (M0), whom
-a message tells tool and length; they start again where the file says so.
+by what the next one is longer; what the file says before the change, a dwell or a stop, happens before that.
+Spindle and coolant are stopped (M5, M9) before the stop for the operator (M0), whom a message tells tool and length;
+they start again where the file says so.
 """
 
 
@@ -151,7 +152,8 @@ def list_words() -> list[str]:
                 (join_names(passed), "kept in order; what a controller has a code for is passed on"),
                 (
                     join_names(TEXT_WORDS),
-                    "texts, kept in order as comments; one M code of `INSERT` is passed on, a block is refused",
+                    "texts, kept in order as comments; one M code of `INSERT` is passed on, a block is refused (of "
+                    "SolidWorks CAM, which describes tools and stock in it, only where it is nothing else)",
                 ),
                 (join_names(silent), "no effect"),
                 (join_names(sorted(INFORMING)), "only inform; listed once"),

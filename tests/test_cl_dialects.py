@@ -255,6 +255,15 @@ def test_points_on_an_arc(read):
     assert len(read(CREO_HEADER + text + "FEDRAT/8\nGOTO/20,0,0\n")) == len(arc) + 1
 
 
+def test_a_circle_without_its_radius(read):
+    text = "UNIT/{}\nFEDRAT/9\nGOTO/3,-4,1\nCIRCLE/0,0,1,0,0,-1.\nGOTO/-5,0,1\n"
+    for unit, mm in (("MM", 1.0), ("INCH", 25.4)):
+        path = read(text.format(unit))
+        np.testing.assert_allclose(np.hypot(path.tip[:, 0], path.tip[:, 1]), 5.0 * mm)
+        assert turn_about(path.tip) == pytest.approx(-math.degrees(math.acos(-0.6)))
+    refused(read, "UNIT/MM\nFEDRAT/9\nCIRCLE/0,0,1,0,0,-1.\nGOTO/-5,0,1\n", 3, "start")
+
+
 @pytest.mark.parametrize(
     ("axis", "angle", "end", "expected"),
     [
@@ -676,6 +685,17 @@ def test_the_axis_stays_where_only_the_origin_of_a_turned_frame_moves(read):
 
 
 # bounds and fuzz
+
+
+@pytest.mark.parametrize(
+    "statement", ["X1111111111" * 20 + "!", "GOTO/" + "1" * 60_000 + "x,0,0", "INSERT X" + "1" * 60_000]
+)
+def test_a_line_of_digits_without_end(read, statement):
+    began = time.process_time()
+    for head in ("", "UNIT/MM\n"):
+        with contextlib.suppress(InputError):
+            read(f"{head}FEDRAT/9\nGOTO/0,0,0\n{statement}\nGOTO/1,0,0\n")
+    assert time.process_time() - began < 2.0
 
 
 def test_a_file_of_arcs_without_end(read):

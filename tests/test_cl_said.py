@@ -73,6 +73,15 @@ def test_a_block_for_the_controller_is_refused(read, block):
     refused(read, cut(f"INSERT{block}"), 4, "INSERT")
 
 
+def test_solidworks_describes_tools_and_stock_in_insert(read):
+    texts = ["INSERT/[HOLDER=C40-M12EM2] 14MM CRB 2FL 32 LOC", "INSERT/Stock Size X135. Y135. Z32.5"]
+    path = read("UNIT/MM\n" + cut(*texts))
+    assert [note.line for note in path.notes if "comment" in note.text] == [5]
+    for block in ("G0 X100", "N10 M8 Y-.5"):
+        refused(read, "UNIT/MM\n" + cut(f"INSERT/{block}"), 5, "INSERT")
+    refused(read, cut(texts[1]), 4, "INSERT")
+
+
 def test_an_inserted_code_is_passed_on_or_refused(read):
     assert said(read(cut("INSERT M62", 'INSERT/"M07"', "INSERT MIND THE CLAMP 5")))[0][1:4] == [["M62"], ["M7"], []]
     assert said(read(cut("INSERT/M62").replace("FINI", "INSERT/M30\nFINI")))[0][1] == ["M62"]

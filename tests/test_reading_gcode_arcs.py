@@ -90,6 +90,13 @@ def test_full_circles_and_helices(both, plane, code, sign, turns):
             check_arc(p.tip[1:], plane, (7, 1), 7, sign * 2 * math.pi * turns, rise, 0.05)
 
 
+def test_a_centre_alone_goes_on_with_a_full_circle(both):
+    p = both("G0 X10 Y0 Z0\nG3 X-10 I-10 F9\nI10 P2\nG17 J5 S50 M3\nM2\n", arc_tolerance=0.05)  # rs274 reads so
+    first, second = (np.flatnonzero(p.line == line) for line in (3, 4))
+    check_arc(p.tip[first[0] - 1 : first[-1] + 1], "G17", (0, 0), 10, 4 * math.pi, 0, 0.05)
+    check_arc(p.tip[second[0] - 1 :], "G17", (-10, 5), 5, 2 * math.pi, 0, 0.05)
+
+
 def test_a_half_circle_by_r(both):
     for code, side in (("G2", 1), ("G3", -1)):
         for radius in ("5", "-5", "4.999"):
@@ -143,7 +150,8 @@ def test_arcs_slightly_off_their_circle(both):
         ("G3 X0 Y10 I-10 Q1\n", 3, ["Q1"]),
         ("G3 X0 Y10 I-10 F0\n", 3, ["G3 without a feed"]),
         ("G93 G3 X0 Y10 I-10\n", 3, ["G93", "F"]),
-        ("G3 I-10\nI-10\n", 4, ["I-10"]),
+        ("G3 I-10\nR10\n", 4, ["R10"]),
+        ("G3 I-10\nG1 I-10\n", 4, ["I-10"]),
     ],
 )
 def test_arcs_refused(both, text, line, words):

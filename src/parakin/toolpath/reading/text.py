@@ -19,7 +19,7 @@ LARGEST = 1e9  # the largest number in a file: a thousand kilometres in mm
 INCH = 25.4  # mm
 READ_SIZE = 1 << 20  # bytes read from a file at a time
 BYTE_ORDER_MARK = b"\xef\xbb\xbf"
-_NUMBER = re.compile(r"([+-]?)\s*(\d+\.?\d*|\.\d+)(?:[EeDd]([+-]?\d+))?", re.ASCII)
+_NUMBER = re.compile(r"([+-]?)\s*(\d+(?:\.\d*)?|\.\d+)(?:[EeDd]([+-]?\d+))?", re.ASCII)
 _LONGEST_EXPONENT = 6  # characters; keeps float() fast on hostile input
 
 

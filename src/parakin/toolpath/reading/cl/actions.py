@@ -10,7 +10,7 @@ import numpy as np
 from ...path import Event
 from ..text import is_number, quote_short, refuse
 from ..tools import ToolLog
-from .circles import Circle
+from .circles import Circle, measure_radius
 from .cycles import DrillCycle, parse_cycle
 from .dialects import DIALECTS, RIGHT, UNKNOWN, DialectName, find_by_comment, find_by_word
 from .drilling import drill_hole
@@ -142,7 +142,7 @@ class ClActions:
 
     def start_circle(self, args: list[str], line: int) -> None:
         """Start an arc that the next GOTO ends (CIRCLE)."""
-        form = "cx,cy,cz,ax,ay,az,radius,..."
+        form = "cx,cy,cz,ax,ay,az[,radius,...]"
         revolutions = None
         if "TIMES" in args:
             k = args.index("TIMES")
@@ -150,7 +150,7 @@ class ClActions:
             if not 0.0 < revolutions <= _MOST_TURNS:
                 refuse(f"{revolutions:g} turns; expected more than zero and at most {_MOST_TURNS:g}")
             args = args[:k]
-        v = parse_numbers(args, range(7, 13), form)
+        v = parse_numbers(args, range(6, 13), form)
         if len(v) >= _NX_CIRCLE:
             self.tell_dialect("nx", line, by_word=False)
         hand = DIALECTS[self.dialect].circle
@@ -174,10 +174,11 @@ class ClActions:
         self, v: list[float], line: int, hand: int, *, sweep: float | None = None, revolutions: float | None = None
     ) -> None:
         self._refuse_in_cycle_or_circle()
-        axis = np.array(normalise_direction(v[3:6]))
+        centre, axis = np.array(v[:3]), np.array(normalise_direction(v[3:6]))
         points = self.dialect == "creo"
         firm = self.told_by_header or sweep is not None or revolutions is not None
-        self.motion.circle = Circle(line, np.array(v[:3]), axis, v[6], hand, sweep, revolutions, points, firm)
+        radius = v[6] if v[6:] else measure_radius(centre, axis, self.motion.position)
+        self.motion.circle = Circle(line, centre, axis, radius, hand, sweep, revolutions, points, firm)
 
     def set_cycle(self, args: list[str], line: int) -> None:
         """Start, repeat or end a drill cycle at the points from here on (CYCLE)."""

@@ -81,6 +81,13 @@ class Arc(NamedTuple):
     turns: int = 0
 
 
+def measure_radius(centre: Array, axis: Array, start: Triple | None) -> float:
+    """Measure the radius of a circle that is stated by centre and unit axis alone, from where its arc starts."""
+    if start is None:
+        refuse("an arc without a position to start from; expected FROM or GOTO before it")
+    return float(np.linalg.norm(np.cross(axis, np.array(start) - centre)))
+
+
 def find_tangent(circle: Circle, point: Triple, hand: int) -> Array:
     """Find the direction (3,) of the motion along a circle at a point; zero at its centre."""
     out = np.array(point) - circle.centre

@@ -16,7 +16,8 @@ _NO_TEXT = re.compile(
 _INSERT = re.compile(r"INSERT[ /,\"']*", re.IGNORECASE)
 _CODE = re.compile(r"M ?\d+", re.IGNORECASE)  # the one that becomes an event
 _BLOCK = re.compile(r"(?<![A-Z0-9_])[A-Z] ?=? ?[-+.]?\d|[=#$]|\w\(", re.IGNORECASE | re.ASCII)  # a controller's words
-_G_CODE = re.compile(r"(?:[GMNXYZ][-+]?(?:\d+\.?\d*|\.\d+))(?:[A-Z][-+]?(?:\d+\.?\d*|\.\d+))*", re.ASCII)
+_G_CODE = re.compile(r"(?:[GMNXYZ][-+]?(?:\d+(?:\.\d*)?|\.\d+))(?:[A-Z][-+]?(?:\d+(?:\.\d*)?|\.\d+))*", re.ASCII)
+_ONLY_CODES = re.compile(r"(?:[A-Z] ?[-+]?(?:\d+(?:\.\d*)?|\.\d+)\s*)+", re.IGNORECASE | re.ASCII)
 _COMMENT = re.compile(r"(?<!\w)\([^()]*\)|;.*", re.DOTALL)
 HIDDEN = "\0"  # a character that no line of a file has
 _LONGEST_WORD = 10
@@ -70,14 +71,17 @@ def execute_statement(actions: ClActions, text: str, line: int) -> str:
 
 
 def _check_insert(actions: ClActions, text: str, line: int) -> None:
-    """Refuse an INSERT that gives the controller a block; note one of other words than a comment or an M code."""
+    """Refuse an INSERT that gives the controller a block; note one of other words than a comment or an M code.
+
+    SolidWorks CAM describes tools and stock in it, with numbers behind letters: there a block has nothing else.
+    """
     plain = " ".join(text.split())
     begin = _INSERT.match(plain)
     given = plain[begin.end() :].rstrip(" \"'") if begin else ""
     if begin is None or _CODE.fullmatch(given):
         return
     said = _COMMENT.sub("", given).strip()
-    if _BLOCK.search(said):
+    if _ONLY_CODES.fullmatch(said) if actions.dialect == "solidworks" else _BLOCK.search(said):
         refuse(f"INSERT: {quote_short(given)}, a block for the controller, cannot be honoured; "
                "expected plain statements, or INSERT of one M code")  # fmt: skip
     if said:

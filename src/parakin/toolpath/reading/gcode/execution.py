@@ -140,8 +140,9 @@ class BlockExecutor:
             refuse(f"{min(named)} without a motion code; expected G0, G1, G2 or G3 with it or before it")
         if code in codes.CYCLES and not named:
             refuse(f"{format_g_code(code or 0)} without axis words; expected the place of a hole")
-        # an arc needs no axis words, for it can end where it starts
-        return bool(named) or code in (codes.G2, codes.G3)
+        # an arc needs no axis words, for it can end where it starts; its centre alone goes on with one
+        goes_on = motion.mode in (codes.G2, codes.G3) and not block.values.keys().isdisjoint("IJK")
+        return bool(named) or code in (codes.G2, codes.G3) or goes_on
 
     def _execute_motion(self, block: Block, line: int, named: set[str], moves: bool) -> None:
         """Make the records of G0, G1, G2 and G3; ``named`` are the block's axis letters."""

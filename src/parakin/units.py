@@ -35,6 +35,7 @@ class QuantityKind:
 
 NUMBER = QuantityKind((0, 0, 0, 0), "a number", "")
 LENGTH = QuantityKind((1, 0, 0, 0), "a length", "mm, cm, m, in")
+VOLUME = QuantityKind((3, 0, 0, 0), "a volume", "mm**3")
 ANGLE = QuantityKind((0, 1, 0, 0), "an angle", "deg, rad")
 TIME = QuantityKind((0, 0, 1, 0), "a time", "s, min")
 SPEED = QuantityKind((1, 0, -1, 0), "a speed", "mm/s, m/s, mm/min, m/min, in/min")

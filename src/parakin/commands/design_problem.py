@@ -88,7 +88,11 @@ class _ProblemReader:
         numbers = {p.name: ANGLE if p.unit == "rad" else LENGTH for p in machine.parameters}
         free = self.read_map(top["free"], "free", tuple(numbers))
         shift = self.read_map(top["shift"], "shift") if "shift" in top else {}
-        bounds = self.read_map(top["bounds"], "bounds", tuple(WANTS)) if "bounds" in top else {}
+        bounds = (
+            self.read_map(top["bounds"], "bounds", tuple(name for name in WANTS if WANTS[name].bounded))
+            if "bounds" in top
+            else {}
+        )
         strokes = self.read_text(top["strokes"], "strokes") if "strokes" in top else "keep"
         if strokes not in _STROKES:
             raise self.fail(f"strokes: {quote(strokes)}{suggest(strokes, _STROKES)}", top["strokes"])

@@ -101,6 +101,8 @@ def find_designs(
     A part's cycle time is estimated in the search, without jerks and forces, and told by its job where a design is
     proved. Where its bound is broken there, the search is repeated with estimates that are longer by as much.
 
+    A workspace's volume is estimated in the search, and a lower bound of it is proved of a winner.
+
     Raises :class:`PoseError` for an invalid count or time.
     """
     if not 1 <= count <= MOST_DESIGNS:
@@ -208,6 +210,8 @@ def _make_design(problem: DesignProblem, candidate: Candidate) -> _MadeDesign | 
             return UnprovedDesign(sizes, f"the part does not run: {why}")
         if "cycle_time" in values:
             values["cycle_time"] = job.seconds
+    if problem.gauge is not None:
+        values["workspace"] = problem.gauge.prove(machine)
     return _MadeDesign(machine, candidate.x, sizes, values, job)
 
 

@@ -11,6 +11,7 @@ from ..families.family import FamilyRates
 from ..kernels.small_matrices import compute_singular_values, solve_quotients
 from .design_tapes import DesignTapes
 from .part_timing import PartTimer
+from .workspace_gauge import WorkspaceGauge
 
 LOST = 1.0  # what a pose out of reach breaks a want by
 
@@ -21,6 +22,7 @@ class Measures:
     poses : (S, P + 1, axes), the last of which is the one whose side of the parallel singularities counts
     sizes : (S, 1, k) of the family
     timer, shifts : of a part, and how far designs move it, (S, axes)
+    gauge : of workspaces
     """
 
     def __init__(
@@ -30,8 +32,10 @@ class Measures:
         sizes: Array,
         timer: PartTimer | None = None,
         shifts: Array | None = None,
+        gauge: WorkspaceGauge | None = None,
     ):
         self._tapes, self._all, self._sizes, self._timer, self._shifts = tapes, poses, sizes, timer, shifts
+        self._gauge = gauge
 
     @property
     def _poses(self) -> Array:
@@ -64,6 +68,12 @@ class Measures:
         """The part's cycle time as it is estimated, (S, 1, 1) s."""
         assert self._timer is not None and self._shifts is not None
         return self._timer.estimate_seconds(self._shifts, self._sizes[:, 0])[:, None, None]
+
+    @cached_property
+    def workspace(self) -> Array:
+        """The volume of the total orientation workspace as it is estimated, (S, 1, 1) mm³."""
+        assert self._gauge is not None
+        return self._gauge.estimate(self._sizes[:, 0], self._all[:, -1])[:, None, None]
 
     @cached_property
     def margins(self) -> Array:

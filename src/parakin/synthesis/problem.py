@@ -21,6 +21,7 @@ from .measures import Measures
 from .part_timing import PartTimer
 from .pose_sets import PoseSet, make_box_set, make_cylinder_set
 from .wants import WANTS
+from .workspace_gauge import WorkspaceGauge
 
 
 @check_constructor
@@ -39,7 +40,8 @@ class DesignProblem:
         ``accuracy``, the root mean square of the tip's error within the tolerances; the least ``clearance`` of the axes
         of struts that share no joint; the greatest ``stroke`` of a leg's drive; the greatest ``footprint``: the
         diameter, about the machine's Z axis, of the circle that holds the struts' joints at the base; the greatest
-        ``cycle_time`` of the part, s
+        ``cycle_time`` of the part, s; the ``workspace``, an objective alone: the volume of the positions at which every
+        orientation of the box is allowed
     fit_strokes : the ranges of the legs' drives become what the poses need; otherwise they are the machine's own
     cylinder : more poses, or these alone: ``along`` an axis, ``diameter``, the other axes as in ``box``, of those
         across it the middle
@@ -105,6 +107,8 @@ class DesignProblem:
         for name, bound in self.bounds.items():
             if name not in WANTS:
                 raise PoseError(f"bounds: unknown {quote(name)}{suggest(name, tuple(WANTS))}")
+            if not WANTS[name].bounded:
+                raise PoseError(f"bounds: {name} has none; it can be an objective")
             least = WANTS[name].least
             if not (isfinite(bound) and bound > least):
                 raise PoseError(f"bounds: {name}: a number above {least:g} expected, not {bound:g}")
@@ -129,6 +133,10 @@ class DesignProblem:
             )
         if "stroke" in self.wants and not self.fit_strokes:
             raise PoseError("stroke: the drives' ranges are the machine's own; let them be fitted to the box")
+        if "workspace" in self.wants:
+            if self.fit_strokes:
+                raise PoseError("workspace: the drives' ranges are fitted; let them be the machine's own")
+            self.gauge  # noqa: B018  refuses a workspace without end
         if "clearance" in self.wants and not self.machine.trace_equations({}).list_strut_distances(
             self.machine.home.tolist(), self.machine.mode
         ):
@@ -189,6 +197,11 @@ class DesignProblem:
     def timer(self) -> PartTimer | None:
         """What times the part; None without one."""
         return None if self.path is None else PartTimer(self.family, self.path, self.workpiece)
+
+    @cached_property
+    def gauge(self) -> WorkspaceGauge | None:
+        """What gauges the workspace; None where it is not wanted."""
+        return WorkspaceGauge(self.tapes, self.pose_sets[0]) if "workspace" in self.wants else None
 
     @property
     def family(self) -> Family:
@@ -253,7 +266,7 @@ class DesignProblem:
         """Measure designs x (S, variables) at points (P, width)."""
         poses = self.place_poses(x, np.concatenate([points, self.middle]))
         sizes = x[:, None, : len(self.family.names)]
-        return Measures(self.tapes, poses, sizes, self.timer, self.list_shifts(x))
+        return Measures(self.tapes, poses, sizes, self.timer, self.list_shifts(x), self.gauge)
 
     def list_losses(self, name: str, x: Array, m: Measures) -> Array:
         """List a quantity or a free number of designs, (S, R), less is better; the greatest of a row counts."""

@@ -10,11 +10,11 @@ from ..arrays import Array
 from ..model.equations import Equations
 from ..performance.certified.interval_matrices import PoseBox
 from ..performance.certified.quotient_norms import Quotient
-from ..units import LENGTH, NUMBER, STIFFNESS, TIME, QuantityKind
+from ..units import LENGTH, NUMBER, STIFFNESS, TIME, VOLUME, QuantityKind
 from .design_tapes import DesignTapes, TracedQuotient
 from .measures import Measures
 
-_UNITS = {NUMBER: "", LENGTH: "mm", STIFFNESS: "N/mm", TIME: "s"}
+_UNITS = {NUMBER: "", LENGTH: "mm", STIFFNESS: "N/mm", TIME: "s", VOLUME: "mm³"}
 _Margins = Callable[[Equations, Sequence[Scalar], str, float], list[Scalar]]
 _Quotients = Callable[[DesignTapes, PoseBox, Mapping[str, Scalar]], list[list[Quotient]]]
 
@@ -43,11 +43,12 @@ class Want:
 
     kind : of its value
     measure : its values at poses, (S, P, k); the worst of all counts
-    proof : by which a bound is proved at every pose; None where the limits' own proof is one, or the part's job
+    proof : by which a bound is proved at every pose; None where limits, the part's job or a volume's bracket are one
     more : whether greater is better
     least : what a bound must exceed
     spread : what counts is how far each column spreads over the poses
-    whole : the part's, so the same at all poses
+    whole : of the machine or the part, so the same at all poses
+    bounded : whether it can be bounded; otherwise it can only be an objective
     """
 
     kind: QuantityKind
@@ -57,6 +58,7 @@ class Want:
     least: float = 0.0
     spread: bool = False
     whole: bool = False
+    bounded: bool = True
 
     @property
     def unit(self) -> str:
@@ -114,6 +116,7 @@ WANTS: dict[str, Want] = {
     "footprint": Want(LENGTH, lambda m: m.feet, MarginProof(_bound_feet)),
     "stroke": Want(LENGTH, lambda m: m.travel, None, spread=True),
     "cycle_time": Want(TIME, lambda m: m.cycle_time, None, whole=True),
+    "workspace": Want(VOLUME, lambda m: m.workspace, None, more=True, whole=True, bounded=False),
 }
 
 # What follows from the inverse of A, and so tells nothing beyond a singularity.

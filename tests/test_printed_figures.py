@@ -3,9 +3,11 @@
 import re
 from xml.etree import ElementTree
 
+import numpy as np
 import pytest
 
 from parakin.cli import main
+from parakin.export.atlas_maps import extend_grid
 
 COMMANDS = {
     "plane": ("workspace", "hbg80_2d", "--gap", "0.05"),
@@ -56,3 +58,12 @@ def test_several_slices_need_a_folder(tmp_path, capsys):
     words = ["atlas", "orthoglide", "--slice", "Z=0", "--slice", "Z=-20", "-o", str(tmp_path / "a.pdf")]
     assert main(words) == 2
     assert "several slices are several pictures" in capsys.readouterr().err
+
+
+def test_a_map_goes_on_evenly_beyond_what_is_known():
+    x, y = np.meshgrid(np.arange(9.0), np.arange(7.0), indexing="ij")
+    plane = 3.0 - 0.5 * x + 0.2 * y
+    extended = extend_grid(np.where(x + y < 8.0, plane, np.nan))
+    near = (x + y < 10.0) & (np.abs(x - y) < 6.0)
+    assert extended[near] == pytest.approx(plane[near], abs=1e-12)
+    assert np.isnan(extended[-1, -1])

@@ -149,11 +149,12 @@ def test_what_was_computed_tells_the_least_lean():
     assert np.degrees(exact[:, -1]) == pytest.approx([10.0, 40.0, 40.0], abs=1e-9)
 
 
-@pytest.mark.parametrize(("tilt", "azimuth", "most"), [(4.0, 0.0, 1.05), (20.0, 2.5, 1.2)])
-def test_a_motion_off_a_carried_pole_leads_the_first_joint_nowhere_aside(tmp_path, tilt, azimuth, most):
+@pytest.mark.parametrize(("tilt", "azimuth", "most"), [(4.0, 0.0, 0.5), (20.0, 2.5, 0.75)])
+def test_a_motion_off_a_carried_pole_takes_its_time_however_dense_it_is(tmp_path, tilt, azimuth, most):
     """B and C that go evenly would lead the wrist's first joint aside between the records, and trembling takes time.
 
-    It stands but for hundredths of a degree, by poses between the records. In 1 piece the motions took 1.20 and 1.44 s.
+    It stands but for hundredths of a degree, by poses between the records. In 1 piece the motions took 1.20 and 1.44 s,
+    in 200 1.41 and 1.22.
     """
     machine = load_shipped("tricept")
     tips = machine.home[:3] + np.array([[30.0, 20.0, 0.0], [35.0, 20.0, 0.0]])
@@ -163,7 +164,7 @@ def test_a_motion_off_a_carried_pole_leads_the_first_joint_nowhere_aside(tmp_pat
     end = np.cos(np.radians(tilt)) * z[1] + np.sin(np.radians(tilt)) * lean
     angle = np.arccos(z[0] @ end)
     seconds = []
-    for count in (1, 200):
+    for count in (1, 33, 200):
         lines = ["TOOL PATH/TILT", "FEDRAT/2000.0,MMPM"]
         for s in np.linspace(0.0, 1.0, count + 1):
             axis = (np.sin((1.0 - s) * angle) * z[0] + np.sin(s * angle) * end) / np.sin(angle)
@@ -179,4 +180,4 @@ def test_a_motion_off_a_carried_pole_leads_the_first_joint_nowhere_aside(tmp_pat
         off = np.sin(2.0 * (machine.inverse(between)[:, 3] - job.posted.joints[0, 3]) / 2.0)  # in either mode
         far = machine.wrist.measure_freedom(between) > 1e-6
         assert np.abs(off[far]).max() < np.radians(0.05)
-    assert seconds[0] < most and max(seconds) < 1.45
+    assert max(seconds) < most and max(seconds) < 1.45 * min(seconds)

@@ -13,6 +13,7 @@ from parakin.machine import Machine
 from parakin.toolpath.path import ToolPath
 from parakin.toolpath.posting.post import post_path
 from parakin.toolpath.timing import joint_path, plan_trajectory
+from parakin.toolpath.timing.corners import round_corners
 from parakin.toolpath.timing.drive_limits import DriveLimits
 
 INF = np.inf
@@ -275,6 +276,55 @@ def test_a_corner_is_as_far_off_as_it_may_be():
         trajectory = square(machine, tolerance=tolerance)
         off = np.linalg.norm(trajectory.at(trajectory.times[1:-1]).poses - trajectory.posted.poses[1:-1], axis=1)
         assert (off <= tolerance).all() and (off > 0.98 * tolerance).all()
+
+
+def draw_pieces(rng, count, most):
+    """Lengths of pieces that grow, shrink and jump, neighbours by up to ``most`` times."""
+    return np.exp(np.cumsum(rng.choice([0.0, 0.05, 1.0], count) * rng.uniform(-1.0, 1.0, count) * np.log(most)))
+
+
+def round_records(path):
+    return round_corners(path, "round", TOLERANCE, AXIS_TOLERANCE, np.zeros(len(path.path), bool), True)
+
+
+def test_an_arc_of_uneven_pieces_bends_as_an_arc():
+    """Its second derivative is 1/R all along; with vertices on the records it was 0.3 to 1.7 times that."""
+    radius, pieces = 200.0, draw_pieces(np.random.default_rng(4), 60, 3.0)
+    at = np.append(0.0, np.cumsum(pieces / pieces.max()))[:, None] / radius
+    tip = radius * np.hstack([np.sin(at), np.cos(at) - 1.0, 0.0 * at])
+    curve = round_records(posted(load_shipped("orthoglide"), tip))
+    bends = np.linalg.norm(curve.bend[2:-2], axis=1) * radius
+    assert 0.97 < bends.min() and bends.max() < 1.03
+    np.testing.assert_allclose(curve.poses(np.arange(2, 58), np.zeros(56)), tip[2:58], rtol=0.0, atol=1e-5)
+
+
+@pytest.mark.parametrize("name", ["orthoglide", "orthoglide5_table"])
+def test_a_rounded_path_keeps_to_its_tolerances_whatever_its_pieces(name):
+    """At each length it is no farther from the polyline there, and its slope is continuous."""
+    machine, rng, share = load_shipped(name), np.random.default_rng(8), np.linspace(0.0, 1.0, 11)
+    for scale in np.geomspace(0.01, 3.0, 12):
+        pieces = scale * draw_pieces(rng, 80, 5.0)[:, None]
+        heading = np.cumsum(rng.normal(0.0, rng.choice([0.01, 0.1]), (80, 3)), axis=0)
+        tip = MIDDLE[name] + np.cumsum(pieces * np.sin(heading), axis=0).clip(-50.0, 50.0)
+        b, c = 0.3 + 0.1 * np.sin(0.02 * np.cumsum(pieces)), 0.02 * np.cumsum(pieces * np.sin(heading[:, :1]))
+        path = posted(machine, tip, axis_of(b, c) if "B" in machine.axes else (0.0, 0.0, 1.0))
+        curve = round_records(path)
+        piece = np.repeat(np.arange(len(curve.length)), len(share))
+        along = np.tile(share, len(curve.length))
+        poses = curve.poses(piece, along * curve.length[piece])
+        straight = curve.corner[piece] + along[:, None] * np.diff(curve.corner, axis=0)[piece]
+        assert np.linalg.norm((poses - straight)[:, :3], axis=1).max() < TOLERANCE
+        if "B" in machine.axes:
+            off = axis_of(poses[:, 3], poses[:, 4]) - axis_of(straight[:, 3], straight[:, 4])
+            assert np.linalg.norm(off, axis=1).max() < AXIS_TOLERANCE
+        least = 1e-5 * curve.length[:-1].min()
+        inner = np.arange(len(curve.length) - 1)
+        ends = [curve.poses(inner, curve.length[:-1] - by) for by in (least, 0.0)]
+        begins = [curve.poses(inner + 1, np.full(len(inner), by)) for by in (0.0, least)]
+        np.testing.assert_allclose(ends[1], begins[0], rtol=0.0, atol=1e-11)
+        rounded = ~curve.parted[1:-1]
+        jump = (begins[1] - begins[0] - ends[1] + ends[0])[rounded] / least
+        assert np.abs(jump).max(initial=0.0) < 1e-5 + 2.0 * least * np.abs(curve.bend).max()
 
 
 def test_a_motion_of_one_step_between_two_stands_takes_its_time(monkeypatch):

@@ -108,7 +108,7 @@ class PartTimer:
 def _place_rows(curve: Curve) -> tuple[Indices, Array]:
     """Place rows at the corners of a curve, in their roundings and in the middle of its pieces."""
     count, length = len(curve.length), curve.length[:, None]
-    near, far = curve.reach[:-1, None] * _ROUNDING, length - curve.reach[1:, None] * _ROUNDING[::-1]
+    near, far = curve.fall[:-1, None] * _ROUNDING, length - curve.rise[1:, None] * _ROUNDING[::-1]
     offset = np.sort(np.concatenate([np.zeros((count, 1)), near, 0.5 * length, far, length], 1))
     kept = np.diff(offset, append=np.inf) > _CLOSE * length
     kept[:, -1] = curve.parted[1:]

@@ -22,34 +22,45 @@ _SAME = 1e-6  # mm: records no farther apart are one corner
 _TIGHT = 1e-5  # mm of reach for each rad (mm/mm) of turn: a corner passed so slowly is as well stopped at
 _BESIDE = 0.05  # a rounding ends at a piece's end, or at least this fraction of the piece from it
 _BENT = 1e-9  # rad/mm and mm/mm: what is rounding
+_FARTHER = 1.5  # a rounding reaches over whole pieces if it may reach so many times farther than the longer one
+_ALIKE = 4.0  # and the longer one is no longer than so many times the other
+_UNSTEADY = 0.5  # of two neighbours' second derivatives: what changes by as much is no steady bend
+_ABOUT = 4  # corners about one at which a bend is steady
 _KEPT = 0.995  # fraction of the tolerances that corners use; the rest is for the error of the joints' splines
 
 
 class Curve(NamedTuple):
     """A tool path as a curve over its length s, c corners.
 
-    s counts mm of the tip and, for turns of the pose's angles, LEVER mm a rad (root of the sum of squares). Between
-    corners the pose is linear in s. Where two straight pieces meet, the pose's derivative by s turns from one slope to
-    the next within ``reach`` on either side; its second derivative rises and falls linearly, so two derivatives are
-    continuous. The pose is then nowhere farther from the polyline than at the corners, |turn|·reach/6.
+    s counts mm of the tip and, for turns of the pose's angles, LEVER mm a rad (root of the sum of squares). A piece
+    leads from corner to corner. On it the pose is a straight line in s, with second derivatives that fall linearly
+    behind the corner where it begins and rise before the one where it ends, so two derivatives are continuous.
+
+    Where the tolerances ask for it, that is within ``reach`` mm on either side, and the pose is nowhere farther from
+    the polyline than at the corners, |turn|·reach/6. Where roundings may reach over whole pieces, the curve is a cubic
+    B-spline with its knots at the corners. Its vertices then lie ahead of the corners or behind them as their knots
+    ask for, and beside them by what takes the curve through the corners, if the path bends steadily there.
 
     corner : (c, axes) poses, mm and rad
+    begin : (c - 1, axes) the pose on each piece's straight line where the piece begins
     length : (c - 1,) of the pieces
-    slope : (c - 1, axes) the pose's derivative by s on the pieces
-    turn : (c, axes) the change of slope at each corner; 0 where the corner is not rounded
-    sharpness : (c,) its size, angles counted as in s
-    reach : (c,) mm of s on either side; no more than the pieces there
+    slope : (c - 1, axes) the pose's derivative by s on the straight lines
+    bend : (c, axes) the pose's second derivative by s at each corner; 0 where the corner is not rounded
+    sharpness : (c,) the size of the change of slope, angles counted as in s; 0 where the corner is not rounded
+    rise, fall : (c,) mm of s over which the second derivative rises before a corner and falls behind it
     parted : (c,) where the derivatives are not continuous: start, end, and corners that are not rounded
     corner_of_record : (n,) the corner at which each record lies
     record_of_piece : (c - 1,) the record that each piece leads to
     """
 
     corner: Array
+    begin: Array
     length: Array
     slope: Array
-    turn: Array
+    bend: Array
     sharpness: Array
-    reach: Array
+    rise: Array
+    fall: Array
     parted: Flags
     corner_of_record: Indices
     record_of_piece: Indices
@@ -83,25 +94,80 @@ def round_corners(
     corner = np.ascontiguousarray(poses[moved])
     motion = np.diff(corner, axis=0)
     length = _compute_norms(motion * scale)
-    slope = motion / length[:, None]
-    turn = np.zeros_like(corner)
-    turn[1:-1] = np.diff(slope, axis=0)
+    chord = motion / length[:, None]
+    turn = _measure_turns(chord)
     parted = np.zeros(len(corner), bool)
     parted[corner_of_record[stops]] = True
     parted[[0, -1]] = True
-    sharpness = _compute_norms(turn * scale)
     if not smooth:
         parted[:] = True
     elif corners == "stop":
-        parted |= sharpness > 2.0 * np.sin(0.5 * CORNER)
-    tip_turn = _compute_norms(turn * ~angles)
-    axis_turn = _bound_axis_turn(posted.machine, corner, turn)
-    with np.errstate(divide="ignore"):
-        reach = _KEPT * np.minimum(6.0 * tolerance / tip_turn, 6.0 * axis_tolerance / axis_turn)
+        parted |= _compute_norms(turn * scale) > 2.0 * np.sin(0.5 * CORNER)
+    parted |= _find_bends_on_pole(posted.machine, corner, turn)
+
+    def bound_reach() -> Array:
+        tip_turn, axis_turn = _compute_norms(turn * ~angles), _bound_axis_turn(posted.machine, corner, turn)
+        with np.errstate(divide="ignore"):
+            return np.asarray(_KEPT * np.minimum(6.0 * tolerance / tip_turn, 6.0 * axis_tolerance / axis_turn))
+
+    whole = ~parted & _find_whole_roundings(bound_reach(), length)
+    vertex, ahead = _place_vertices(corner, chord, length, whole, scale)
+    slope = np.diff(vertex, axis=0) / (length + np.diff(ahead))[:, None]
+    turn = _measure_turns(slope)
+    sharpness = _compute_norms(turn * scale)
+    reach = bound_reach()
     reach[1:-1] = _clear_short_rests(np.minimum(reach[1:-1], np.minimum(length[:-1], length[1:])), length)
-    parted |= (reach < _TIGHT * sharpness) | _find_bends_on_pole(posted.machine, corner, turn)
-    turn[parted] = sharpness[parted] = reach[parted] = 0.0
-    return Curve(corner, length, slope, turn, sharpness, reach, parted, corner_of_record, record_of_piece)
+    parted |= ~whole & (reach < _TIGHT * sharpness)
+    rise, fall = np.where(whole, np.append(0.0, length), reach), np.where(whole, np.append(length, 0.0), reach)
+    turn[parted] = sharpness[parted] = rise[parted] = fall[parted] = 0.0
+    bend = 2.0 * turn / np.where(parted, 1.0, rise + fall)[:, None]
+    begin = vertex[:-1] - slope * ahead[:-1, None]
+    return Curve(corner, begin, length, slope, bend, sharpness, rise, fall, parted, corner_of_record, record_of_piece)
+
+
+def _measure_turns(slope: Array) -> Array:
+    """Measure the change of slope (c - 1, axes) at each corner, (c, axes); zero at both ends."""
+    turn = np.zeros((len(slope) + 1, slope.shape[1]))
+    turn[1:-1] = np.diff(slope, axis=0)
+    return turn
+
+
+def _find_whole_roundings(reach: Array, length: Array) -> Flags:
+    """Find the corners (c,) whose roundings may reach over both pieces: ``reach`` (c,) mm is what tolerances allow."""
+    whole = np.zeros(len(reach), np.bool_)
+    short, long = np.minimum(length[:-1], length[1:]), np.maximum(length[:-1], length[1:])
+    whole[1:-1] = (reach[1:-1] > _FARTHER * long) & (long < _ALIKE * short)
+    return whole
+
+
+def _place_vertices(corner: Array, chord: Array, length: Array, whole: Flags, scale: Array) -> tuple[Array, Array]:
+    """Place the vertices of the B-spline: the poses (c, axes), and how far ahead of the corners they lie, (c,) mm of s.
+
+    A spline through the corners of a parabola has that parabola's second derivative whatever the pieces' lengths; one
+    whose vertices are the corners trembles where lengths change. Where it is the corners that tremble, by the last
+    digit of a file, vertices on them lead the path more smoothly.
+
+    whole : (c,) the corners whose vertices are not on them
+    """
+    left, right = length[:-1, None], length[1:, None]
+    vertex, ahead = corner.copy(), np.zeros(len(corner))
+    ahead[1:-1] = (length[1:] - length[:-1]) / 3.0
+    ahead[~whole] = 0.0
+    curvature = 2.0 * np.diff(chord, axis=0) / (left + right)
+    slope = (right * chord[:-1] + left * chord[1:]) / (left + right)
+    beside = _measure_steadiness(curvature * scale)[:, None] * left * right / 6.0
+    vertex[1:-1] += np.where(whole[1:-1, None], ahead[1:-1, None] * slope - beside * curvature, 0.0)
+    return vertex, ahead
+
+
+def _measure_steadiness(curvature: Array) -> Array:
+    """Measure how steadily a path bends about corners, from second derivatives (k, axes): (k,), from 0 to 1."""
+    size = _compute_norms(curvature)
+    change = _compute_norms(np.diff(curvature, axis=0)) / np.maximum(size[1:] + size[:-1], _BENT)
+    steady = np.clip(2.0 * (1.0 - change / _UNSTEADY), 0.0, 1.0)
+    least = np.pad(np.minimum(np.append(steady, 1.0), np.append(1.0, steady)), _ABOUT, mode="edge")
+    near = [least[_ABOUT + by : _ABOUT + by + len(size)] + abs(by) / _ABOUT for by in range(-_ABOUT, _ABOUT + 1)]
+    return np.asarray(np.min(near, axis=0)).clip(0.0, 1.0)
 
 
 def _find_bends_on_pole(machine: Machine, corner: Array, turn: Array) -> Flags:

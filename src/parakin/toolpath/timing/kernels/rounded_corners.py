@@ -1,9 +1,9 @@
 """Kernels for a path of straight pieces with rounded corners: where its rows lie, and the poses there.
 
-Over ``reach`` on either side of a corner the slope turns from that of one piece to that of the next; its rate of
-turning, the pose's second derivative, rises linearly to its greatest value at the corner and falls again. That adds
-turn·reach/6·(1 - d/reach)³ to the straight pieces at the distance d from the corner. The roundings of neighbours may
-overlap up to each other's corners; there they add up.
+Before a corner the pose's second derivative rises linearly over ``rise``, up to ``bend`` at the corner, and behind it
+falls again over ``fall``. Behind a corner that adds bend·fall²/6·(1 - d/fall)³ to the straight line of the piece at the
+distance d from the corner, and before it the same with ``rise``. The roundings of neighbours may overlap up to each
+other's corners; there they add up.
 
 A row lies on a piece (``segment``) at a distance from the piece's start (``offset``). ``curve`` is a
 :class:`~parakin.toolpath.timing.corners.Curve`.
@@ -22,7 +22,7 @@ SLIVER = 2e-3  # knots nearer to each other than this fraction of a piece are on
 def _find_knots(curve, piece, knots):
     """Write the knots of a piece, where its roundings end, to ``knots`` (4,); returns how many there are."""
     whole = curve.length[piece]
-    a, b = min(curve.reach[piece], whole), max(whole - curve.reach[piece + 1], 0.0)
+    a, b = min(curve.fall[piece], whole), max(whole - curve.rise[piece + 1], 0.0)
     a, b = min(a, b), max(a, b)
     near = SLIVER * whole
     knots[0] = 0.0
@@ -51,9 +51,9 @@ def place_rows(curve, corner_steps, each, longest, segment, offset):
         for i in range(count - 1):
             span = knots[i + 1] - knots[i]
             steps = max(each, int(np.ceil(span / longest)))
-            if knots[i] + 0.5 * span < curve.reach[piece]:
+            if knots[i] + 0.5 * span < curve.fall[piece]:
                 steps = max(steps, corner_steps[piece])
-            if knots[i + 1] - 0.5 * span > curve.length[piece] - curve.reach[piece + 1]:
+            if knots[i + 1] - 0.5 * span > curve.length[piece] - curve.rise[piece + 1]:
                 steps = max(steps, corner_steps[piece + 1])
             for step in range(steps):
                 if row < len(segment):
@@ -69,12 +69,12 @@ def place_rows(curve, corner_steps, each, longest, segment, offset):
 @njit(nogil=True, cache=True)
 def blend_poses(curve, segment, offset, poses, start, stop):
     """Compute the poses of rows into ``poses`` (rows, axes): the straight piece and the roundings at its ends."""
-    corner, slope, turn, reach = curve.corner, curve.slope, curve.turn, curve.reach
+    begin, slope, bend, rise, fall = curve.begin, curve.slope, curve.bend, curve.rise, curve.fall
     for row in range(start, stop):
         k, o = segment[row], offset[row]
         rest = curve.length[k] - o
-        a = max(0.0, 1.0 - o / reach[k]) if reach[k] > 0.0 else 0.0
-        b = max(0.0, 1.0 - rest / reach[k + 1]) if reach[k + 1] > 0.0 else 0.0
-        a, b = reach[k] * a * a * a / 6.0, reach[k + 1] * b * b * b / 6.0
+        a = max(0.0, 1.0 - o / fall[k]) if fall[k] > 0.0 else 0.0
+        b = max(0.0, 1.0 - rest / rise[k + 1]) if rise[k + 1] > 0.0 else 0.0
+        a, b = fall[k] * fall[k] * a * a * a / 6.0, rise[k + 1] * rise[k + 1] * b * b * b / 6.0
         for c in range(poses.shape[1]):
-            poses[row, c] = corner[k, c] + slope[k, c] * o + turn[k, c] * a + turn[k + 1, c] * b
+            poses[row, c] = begin[k, c] + slope[k, c] * o + bend[k, c] * a + bend[k + 1, c] * b

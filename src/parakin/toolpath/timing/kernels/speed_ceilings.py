@@ -49,26 +49,22 @@ def compute_feed_ceilings(rows, curve, limits, ceiling, start, stop):
 
     rows : :class:`CurveRows`; limits : :class:`FeedLimits`
     """
-    slope, turn, reach = curve.slope, curve.turn, curve.reach
+    slope, bend, rise, fall = curve.slope, curve.bend, curve.rise, curve.fall
     for r in range(start, stop):
         k, o, h = rows.segment[r], rows.offset[r], rows.step[r]
         s0, s1, s2 = 0.0, 0.0, 0.0
         a, b = 0.0, 0.0
         a1, b1 = 0.0, 0.0
-        if reach[k] > 0.0:
-            a, a1 = max(0.0, 1.0 - o / reach[k]), max(0.0, 1.0 - (o + h) / reach[k])
-        if reach[k + 1] > 0.0:
+        if fall[k] > 0.0:
+            a, a1 = max(0.0, 1.0 - o / fall[k]), max(0.0, 1.0 - (o + h) / fall[k])
+        if rise[k + 1] > 0.0:
             rest = curve.length[k] - o
-            b, b1 = max(0.0, 1.0 - rest / reach[k + 1]), max(0.0, 1.0 - (rest - h) / reach[k + 1])
+            b, b1 = max(0.0, 1.0 - rest / rise[k + 1]), max(0.0, 1.0 - (rest - h) / rise[k + 1])
         for c in limits.tip_columns:
-            first = slope[k, c] - 0.5 * a * a * turn[k, c] + 0.5 * b * b * turn[k + 1, c]
-            last = slope[k, c] - 0.5 * a1 * a1 * turn[k, c] + 0.5 * b1 * b1 * turn[k + 1, c]
-            bend = 0.0
-            if reach[k] > 0.0:
-                bend += turn[k, c] * a / reach[k]
-            if reach[k + 1] > 0.0:
-                bend += turn[k + 1, c] * b / reach[k + 1]
-            middle = first + 0.5 * h * bend
+            falling, rising = 0.5 * fall[k] * bend[k, c], 0.5 * rise[k + 1] * bend[k + 1, c]
+            first = slope[k, c] - a * a * falling + b * b * rising
+            last = slope[k, c] - a1 * a1 * falling + b1 * b1 * rising
+            middle = first + 0.5 * h * (a * bend[k, c] + b * bend[k + 1, c])
             s0 += first * first
             s1 += middle * middle
             s2 += last * last

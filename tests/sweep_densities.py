@@ -2,13 +2,14 @@
 
 For running by hand. ``python sweep_densities.py FIRST LAST LOG [MACHINE ...]`` draws a pair of paths for each of seeds
 FIRST to LAST - 1 on each machine, and adds a line to LOG with both times and their ratio, or with both verdicts; what
-the log has already is not run again. Records have nine decimals, as the last one that a file prints is noise of its own.
+the log has already is not run again. Records have nine decimals, for the last one that a file prints is noise.
 """
 
 from __future__ import annotations
 
 import sys
 import tempfile
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -39,7 +40,7 @@ def draw_rows(machine, seed):
 def cut_rows(rows, count):
     """Each motion in ``count`` pieces: tips on the straight line, axes evenly on the great circle."""
     cut = [rows[:1]]
-    for begin, end in zip(rows[:-1], rows[1:], strict=True):
+    for begin, end in pairwise(rows):
         s = np.arange(1.0, count + 1.0)[:, None] / count
         angle = np.arctan2(np.linalg.norm(np.cross(begin[3:], end[3:])), begin[3:] @ end[3:])
         weights = (np.sin((1.0 - s) * angle), np.sin(s * angle)) if angle > 1e-9 else (1.0 - s, s)

@@ -288,13 +288,13 @@ def round_records(path):
 
 
 def test_an_arc_of_uneven_pieces_bends_as_an_arc():
-    """Its second derivative is 1/R all along; with vertices on the records it was 0.3 to 1.7 times that."""
+    """Its second derivative is 1/R all along; with vertices on the records it was 0.3 to 1.9 times that."""
     radius, pieces = 200.0, draw_pieces(np.random.default_rng(4), 60, 3.0)
     at = np.append(0.0, np.cumsum(pieces / pieces.max()))[:, None] / radius
     tip = radius * np.hstack([np.sin(at), np.cos(at) - 1.0, 0.0 * at])
     curve = round_records(posted(load_shipped("orthoglide"), tip))
     bends = np.linalg.norm(curve.bend[2:-2], axis=1) * radius
-    assert 0.97 < bends.min() and bends.max() < 1.03
+    assert bends.min() > 0.97 and bends.max() < 1.03
     np.testing.assert_allclose(curve.poses(np.arange(2, 58), np.zeros(56)), tip[2:58], rtol=0.0, atol=1e-5)
 
 

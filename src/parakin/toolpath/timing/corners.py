@@ -110,8 +110,9 @@ def round_corners(
         with np.errstate(divide="ignore"):
             return np.asarray(_KEPT * np.minimum(6.0 * tolerance / tip_turn, 6.0 * axis_tolerance / axis_turn))
 
-    whole = ~parted & _find_whole_roundings(bound_reach(), length)
-    vertex, ahead = _place_vertices(corner, chord, length, whole, scale)
+    steadiness = _measure_steadiness(turn * scale, length)
+    whole = ~parted & (steadiness > 0.0) & _find_whole_roundings(bound_reach(), length)
+    vertex, ahead = _place_vertices(corner, chord, length, np.where(whole, steadiness, 0.0))
     slope = np.diff(vertex, axis=0) / (length + np.diff(ahead))[:, None]
     turn = _measure_turns(slope)
     sharpness = _compute_norms(turn * scale)
@@ -140,34 +141,37 @@ def _find_whole_roundings(reach: Array, length: Array) -> Flags:
     return whole
 
 
-def _place_vertices(corner: Array, chord: Array, length: Array, whole: Flags, scale: Array) -> tuple[Array, Array]:
+def _place_vertices(corner: Array, chord: Array, length: Array, steadiness: Array) -> tuple[Array, Array]:
     """Place the vertices of the B-spline: the poses (c, axes), and how far ahead of the corners they lie, (c,) mm of s.
 
     A spline through the corners of a parabola has that parabola's second derivative whatever the pieces' lengths; one
-    whose vertices are the corners trembles where lengths change. Where it is the corners that tremble, by the last
-    digit of a file, vertices on them lead the path more smoothly.
+    whose vertices are the corners trembles where lengths change.
 
-    whole : (c,) the corners whose vertices are not on them
+    steadiness : (c,) how much of that a corner's vertex is led aside; zero where it is the corner
     """
     left, right = length[:-1, None], length[1:, None]
     vertex, ahead = corner.copy(), np.zeros(len(corner))
-    ahead[1:-1] = (length[1:] - length[:-1]) / 3.0
-    ahead[~whole] = 0.0
-    curvature = 2.0 * np.diff(chord, axis=0) / (left + right)
+    ahead[1:-1] = np.where(steadiness[1:-1] > 0.0, (length[1:] - length[:-1]) / 3.0, 0.0)
     slope = (right * chord[:-1] + left * chord[1:]) / (left + right)
-    beside = _measure_steadiness(curvature * scale)[:, None] * left * right / 6.0
-    vertex[1:-1] += np.where(whole[1:-1, None], ahead[1:-1, None] * slope - beside * curvature, 0.0)
+    aside = left * right * np.diff(chord, axis=0) / (3.0 * (left + right))
+    vertex[1:-1] += ahead[1:-1, None] * slope - steadiness[1:-1, None] * aside
     return vertex, ahead
 
 
-def _measure_steadiness(curvature: Array) -> Array:
-    """Measure how steadily a path bends about corners, from second derivatives (k, axes): (k,), from 0 to 1."""
+def _measure_steadiness(turn: Array, length: Array) -> Array:
+    """Measure how steadily a polyline that turns by (c, axes) bends about its corners: (c,), from 0 to 1.
+
+    Where the corners themselves tremble, as by the last digit of a file, or the path begins to bend, it is 0.
+    """
+    if len(turn) < 4:
+        return np.zeros(len(turn))
+    curvature = turn[1:-1] / (0.5 * (length[:-1] + length[1:]))[:, None]
     size = _compute_norms(curvature)
     change = _compute_norms(np.diff(curvature, axis=0)) / np.maximum(size[1:] + size[:-1], _BENT)
-    steady = np.clip(2.0 * (1.0 - change / _UNSTEADY), 0.0, 1.0)
-    least = np.pad(np.minimum(np.append(steady, 1.0), np.append(1.0, steady)), _ABOUT, mode="edge")
+    steady = np.pad(np.clip(2.0 * (1.0 - change / _UNSTEADY), 0.0, 1.0), 1, constant_values=1.0)
+    least = np.pad(np.minimum(steady[:-1], steady[1:]), _ABOUT, mode="edge")
     near = [least[_ABOUT + by : _ABOUT + by + len(size)] + abs(by) / _ABOUT for by in range(-_ABOUT, _ABOUT + 1)]
-    return np.asarray(np.min(near, axis=0)).clip(0.0, 1.0)
+    return np.pad(np.min(near, axis=0).clip(0.0, 1.0), 1)
 
 
 def _find_bends_on_pole(machine: Machine, corner: Array, turn: Array) -> Flags:

@@ -9,7 +9,7 @@ import numpy as np
 from geometry import Description
 from test_conformance import poses_about
 
-from parakin.kinematics.solution import ON_ANOTHER_SIDE, REASONS
+from parakin.kinematics.solution import ON_ANOTHER_SIDE, REASONS, SINGULAR_WAY
 
 BATCH = 100_000
 OFFSETS = [(0.0, 0.0), (1.0, 0.5), (10.0, 3.0), (50.0, 10.0), (200.0, 30.0), (600.0, 80.0)]  # mm and degrees
@@ -94,7 +94,7 @@ def try_direct_problems(machine, count, seed=0, **options):
         lost = close & ~done
         tally.close_refused += int(lost.sum())
         across = measure_sides(machine, poses[lost]) * measure_sides(machine, starts[lost]) < 0.0
-        across &= found.why[lost] == ON_ANOTHER_SIDE
+        across &= np.isin(found.why[lost], (ON_ANOTHER_SIDE, SINGULAR_WAY))
         tally.close_across += int(across.sum())
         tally.causes.update(REASONS[why] for why in found.why[lost][~across])
         assert (found.why[~done] > 0).all()

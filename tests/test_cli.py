@@ -305,7 +305,10 @@ def test_inverse_off_limits_and_out_of_reach(capsys):
 
 def test_forward_without_a_pose(capsys):
     assert main(["forward", "hexapod", "strut0=100"]) == 3
-    assert "no pose found, the legs do not close near the start" in capsys.readouterr().err
+    assert (
+        "no pose found, on the way from the start to the joints the legs come to a parallel singularity"
+        in capsys.readouterr().err
+    )
 
 
 def test_forward_of_several_rows(tmp_path, capsys):

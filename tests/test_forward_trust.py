@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from direct_problems import measure_sides
 from shipped import load_shipped
 
 import parakin as pk
@@ -17,6 +18,7 @@ from parakin.kinematics.solution import (
     REASONS,
     SINGULAR_ANSWER,
     SINGULAR_START,
+    SINGULAR_WAY,
 )
 
 RAILS = (Path(__file__).parent / "machines" / "six_vertical_rails.yaml").read_text(encoding="utf-8")
@@ -174,7 +176,7 @@ def test_a_row_hangs_on_itself_alone(name):
 def test_why_there_is_no_answer(load):
     machine = load_shipped("hexapod")
     found = machine.forward(machine.inverse(machine.home) + [5000.0, -5000.0, 5000.0, -5000.0, 5000.0, -5000.0])
-    assert (found.converged, found.why) == (False, OPEN)
+    assert (found.converged, found.why) == (False, SINGULAR_WAY)  # where its root meets another and both end
     assert {REASONS[why] for why in (OPEN, ON_ANOTHER_SIDE, OTHER_MODE)} and REASONS[ANSWERED] == ""
     across = load_shipped("hbg80_2d")
     poses = draw(across, 2000)
@@ -182,6 +184,24 @@ def test_why_there_is_no_answer(load):
     found = across.forward(across.inverse(far), method="newton")
     assert len(far) > 100 and not found.converged.any()
     assert np.isin(found.why, (ON_ANOTHER_SIDE, OTHER_MODE, OPEN)).all()
+
+
+def test_starts_that_lie_a_mm_off_across_a_singularity_say_so():
+    """The pentapod's close starts that were refused since "the legs do not close near the start": they do, across."""
+    machine = load_shipped("pentapod")
+    poses = np.array([
+        [-160.258453, -46.011684, 82.349898, 0.207942, -0.908815],
+        [-122.127259, -90.736228, 145.499216, 0.284223, -0.587466],
+        [-79.197392, -89.018647, 240.240812, 0.210584, -0.879235],
+    ])  # fmt: skip
+    starts = np.array([
+        [-159.729314, -46.834252, 82.141584, 0.21665, -0.909388],
+        [-122.550426, -89.830423, 145.478063, 0.279332, -0.594693],
+        [-79.18721, -89.034283, 239.240986, 0.217606, -0.874053],
+    ])  # fmt: skip
+    assert (measure_sides(machine, poses) * measure_sides(machine, starts) < 0.0).all()
+    found = machine.forward(machine.inverse(poses), near=starts)
+    assert np.isin(found.why, (SINGULAR_WAY, ON_ANOTHER_SIDE)).all()
 
 
 def test_a_continuum_is_named(load):

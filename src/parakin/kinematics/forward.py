@@ -35,6 +35,7 @@ from .solution import (
     OTHER_MODE,
     SINGULAR_ANSWER,
     SINGULAR_START,
+    SINGULAR_WAY,
     Answers,
     Solution,
     put_rows,
@@ -50,6 +51,7 @@ STEADY = 0.2  # by which the determinant may change from start to answer and sti
 NOT_FALLEN = 0.999  # by which it may change before the answer may be a singularity itself
 FIRST_STRIDE, LEAST_STRIDE = 1.0 / 8.0, 1e-5  # of the way in joints that a step of the continuation takes
 MOST_STRIDES = 400  # steps of the continuation
+_NEXT_STRIDES = 10.0  # least strides within which a determinant that falls to zero has ended a continuation
 OF_AGREEMENT = 10.0  # so far joints that disagree may be from those of the pose that they tell
 NEAR_STEPS = 6  # of Newton's method for a step of the continuation; one that needs more is halved
 
@@ -102,7 +104,7 @@ def _accept_disagreement(model: Model, answers: Answers, joints: Array, mode: st
 
 def _find_singular_starts(model: Model, answers: Answers, starts: Array | None, mode: str) -> None:
     """Say where there is no answer because the start is a parallel singularity; in place."""
-    rows = np.flatnonzero((answers.why == OPEN) | (answers.why == ON_ANOTHER_SIDE))
+    rows = np.flatnonzero(np.isin(answers.why, (OPEN, ON_ANOTHER_SIDE, SINGULAR_WAY)))
     if len(rows):
         singular = find_sides(model, np.array(model.home)[None, :] if starts is None else starts[rows], mode) == 0.0
         answers.why[rows[np.broadcast_to(singular, rows.shape)]] = SINGULAR_START
@@ -266,8 +268,9 @@ def _continue_from_starts(
     """Continue along the joints' straight line from the start where Newton's method in one go failed; in place.
 
     Steps are halved where Newton's method does not converge at once, on the same side and in the working mode, and
-    doubled where it does. A row that can't be continued keeps the reason of its last step. On the line the joints of a
-    redundant machine do not agree, and the poses on the way are those of least squares.
+    doubled where it does. A row that can't be continued keeps the reason of its last step, but where the determinant
+    falls to zero there: beside a singularity, where a root meets another, its square falls evenly along the line. On
+    the line the joints of a redundant machine do not agree, and the poses on the way are those of least squares.
     """
     roots, why = into
     walk = np.broadcast_to(near, (len(joints), near.shape[1]))
@@ -278,6 +281,7 @@ def _continue_from_starts(
     walk, begin, goal = np.ascontiguousarray(walk[rows]), begin[rows], joints[rows]
     side = find_sides(model, walk, mode)
     gone, stride = np.zeros(len(rows)), np.full(len(rows), FIRST_STRIDE)
+    square, falling = np.full((2, len(rows)), np.nan)  # of the determinant, and the way along which it falls by one
     most = MOST_STEPS if model.is_redundant else NEAR_STEPS  # least squares that leave something are come to slowly
     for _ in range(MOST_STRIDES):
         going = np.flatnonzero((gone < 1.0) & (stride >= LEAST_STRIDE))
@@ -292,14 +296,20 @@ def _continue_from_starts(
         if model.is_redundant:
             fine |= (share < 1.0) & _find_least_squares(step, most)
         kept = going[fine]
-        walk[kept], gone[kept] = step.rows[fine], share[fine]
+        now = step.turned[fine] ** 2
+        with np.errstate(all="ignore"):
+            falling[kept] = (share[fine] - gone[kept]) / (square[kept] - now)
+        walk[kept], gone[kept], square[kept] = step.rows[fine], share[fine], now
         stride[kept] *= 2.0
         stride[going[~fine]] *= 0.5
         why[rows[going]] = reason
         done = kept[gone[kept] >= 1.0]
         at_end = np.flatnonzero(fine & (share >= 1.0))
         roots.rows[rows[done]], roots.residual[rows[done]] = step.rows[at_end], step.residual[at_end]
-    why[rows[gone < 1.0]] = np.where(why[rows[gone < 1.0]] == ANSWERED, OPEN, why[rows[gone < 1.0]])
+    with np.errstate(all="ignore"):
+        ends = (falling > 0.0) & (falling * square < _NEXT_STRIDES * LEAST_STRIDE)
+    stopped = np.flatnonzero((gone < 1.0) & np.isin(why[rows], (ANSWERED, OPEN)))
+    why[rows[stopped]] = np.where(ends[stopped], SINGULAR_WAY, OPEN)
 
 
 def _solve_by_constant_jacobian(model: Model, joints: Array, starts: Array | None, mode: str | None) -> Answers:

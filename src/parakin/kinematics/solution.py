@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from ..arrays import Array, Flags, Indices
 
 # Why there is no answer.
-ANSWERED, OPEN, ON_ANOTHER_SIDE, OTHER_MODE, SINGULAR_START, SINGULAR_ANSWER, IN_DISAGREEMENT = range(7)
+ANSWERED, OPEN, ON_ANOTHER_SIDE, OTHER_MODE, SINGULAR_START, SINGULAR_ANSWER, IN_DISAGREEMENT, SINGULAR_WAY = range(8)
 REASONS = (
     "",
     "the legs do not close near the start",
@@ -20,6 +20,7 @@ REASONS = (
     "the start is a parallel singularity, so it lies on no side",
     "the legs close in a parallel singularity, where they leave the platform free to move",
     "the joints do not agree with each other near the start, as those of more drives than freedoms must",
+    "on the way from the start to the joints the legs come to a parallel singularity",
 )
 
 

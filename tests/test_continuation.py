@@ -173,6 +173,15 @@ def test_struts_lengths_alone_change_along_paths(tmp_path):
     assert np.abs(np.einsum("ki,rij,kj->kr", own.roots, first[0], own.roots)).max() < 1e-11
 
 
+def test_paths_that_crowd_at_infinity_are_not_lost():
+    """Of RUS legs' forty twelve end there, several in one place: some arrive, some stop at t = 0.98."""
+    machine = load_shipped("rus6")
+    joints = machine.inverse(machine.home) * (1.0 + 0.002 * np.random.default_rng(1).normal(size=(20, 6)))
+    for found in machine.list_assemblies(joints):
+        assert (len(found) + found.complex_count, found.infinite_count, found.lost_count) == (28, 12, 0)
+        assert found.complete == "all paths accounted for"
+
+
 def test_roots_close_to_a_singularity_are_told_apart():
     """Two points a ten thousandth of a radian apart are two roots; to the eleventh figure the same they are one."""
     rng = np.random.default_rng(3)

@@ -7,7 +7,7 @@ from typing import NamedTuple, TypeVar
 
 import numpy as np
 
-from ...arrays import Array
+from ...arrays import Array, Flags
 from ...errors import NoMethodError
 from ...model.traces import Model
 from ..planar_rpr import CONTINUUM
@@ -19,6 +19,8 @@ from .quadric_family import Complex
 from .ring_quadrics import find_tori, make_ring_quadrics
 
 _AT_INFINITY = 1e-5  # of what a singular end's place is divided by: it is infinite
+_FAR = 1e-8  # of the same: an end is infinite however its path came there, and wherever it stopped
+_ENDED = 1e-6  # of a quadric of the last system, where a path stops on its way to infinity
 _REAL = 1e-4  # imaginary part, for a point of length one, from which Newton's method may find a real root
 _CLOSED = 1e-12  # of a quadric at a point of length one: it is a root
 _STRIDE = 1e-3  # along the null direction of a double root
@@ -85,20 +87,25 @@ def _track_and_sort(
     first, last = align_closures(own.system, systems, fixed, closures.steady)
     first[:, fixed:] *= phase
     ends = track_members(first, last, own.roots, tolerance)
-    met = find_meetings(ends).sum(1)
+    met = find_meetings(ends)
     return [
-        _sort_ends(model, system, ends.points[row], ends.reached[row], int(met[row]))
-        for row, system in enumerate(systems)
+        _sort_ends(model, system, ends.points[row], ends.reached[row], met[row]) for row, system in enumerate(systems)
     ]
 
 
-def _sort_ends(model: Model, system: Complex, points: Complex, reached: Array, met: int) -> RealRoots:
-    """Sort the ends of all paths (paths, n) of one system, of which ``met`` ended where another one did.
+def _sort_ends(model: Model, system: Complex, points: Complex, reached: Array, met: Flags) -> RealRoots:
+    """Sort the ends of all paths (paths, n) of one system.
 
     reached : (paths,) the last t of each
+    met : (paths,) where another path ended too
+
+    Where several paths end in one place at infinity, the last steps are so ill conditioned that some arrive, some stop
+    early, and some are taken for one.
     """
+    infinite = make_closure_system(model).measure_scales(points) < _FAR
+    infinite &= _measure_closures(system, points) < _ENDED
+    points, reached, met = _turn_to_real(points[~infinite]), reached[~infinite], met[~infinite]
     regular, lost = reached == 1.0, reached < _AT_END
-    points = _turn_to_real(points)
     near_real = np.abs(points.imag).max(1) < _REAL
     single = _polish_points(system.real, points[regular & near_real].real, 4)
     turned_real = _measure_closures(system.real, single) < _CLOSED
@@ -110,8 +117,8 @@ def _sort_ends(model: Model, system: Complex, points: Complex, reached: Array, m
     return RealRoots(
         np.concatenate([_join_same(single[turned_real], _SAME_SINGLE), doubles]),
         int((regular & ~near_real).sum() + (~turned_real).sum() + (kinds == _COMPLEX).sum()),
-        int((kinds == _INFINITE).sum()),
-        int((kinds == _LOST).sum() + lost.sum()) + met,
+        int(infinite.sum() + (kinds == _INFINITE).sum()),
+        int((kinds == _LOST).sum() + lost.sum() + met.sum()),
     )
 
 
@@ -126,7 +133,7 @@ def _turn_to_real(points: Complex) -> Complex:
     return turned
 
 
-def _measure_closures(system: Array, points: Array) -> Array:
+def _measure_closures(system: AnyPoints, points: AnyPoints) -> Array:
     """Measure the greatest quadric at points (k, n): (k,)."""
     values: Array = np.abs(np.einsum("ki,rij,kj->kr", points, system, points))
     return np.asarray(values.max(1, initial=0.0))

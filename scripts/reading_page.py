@@ -95,7 +95,8 @@ def list_dialects() -> list[str]:
         "The file tells its dialect by a comment before the first motion or by words that only one system writes; the "
         "notes name it. A machine of PTC Creo's own (`MACHIN/UNCX01`) and a `CIRCLE` of eight values (Siemens NX) tell "
         "it too.\nA motion that joins an arc tangentially proves which way round it goes; one that contradicts "
-        "the dialect is refused. Where words alone tell the dialect, a straight cut into an arc of less than half "
+        "the dialect is refused, unless the arc is shorter than half a turn and others of the file prove the dialect. "
+        "Where words alone tell the dialect, a straight cut into an arc of less than half "
         "a turn goes before it, with a note.\n"
     )
     senses = {SAME: "another is refused", DOWN: "counts down from CLEAR", HEIGHT: "CLEAR is a height, RAPTO a distance"}

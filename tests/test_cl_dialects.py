@@ -255,6 +255,19 @@ def test_points_on_an_arc(read):
     assert len(read(CREO_HEADER + text + "FEDRAT/8\nGOTO/20,0,0\n")) == len(arc) + 1
 
 
+def test_a_short_arc_may_turn_back_where_another_one_proves_the_dialect(read):
+    """The corner that a smaller tool cleans: out along its fillet, back along the larger tool's (SolidWorks CAM)."""
+    fillet = "GOTO/0,9.25,0\nGOTO/0,8,0\nCIRCLE/.75,8,0,0,0,1\nGOTO/0.75,7.25,0\nGOTO/3,7.25,0\n"
+    corner = "RAPID\nGOTO/0,2.5,0\nGOTO/0,0,0\nCIRCLE/3.25,0,0,0,0,-1\nGOTO/3.25,3.25,0\nGOTO/.75,3.25,0\n"
+    head = "$$ SOLID WORKS\nFEDRAT/9\n"
+    path = read(head + fillet + corner)
+    assert -90 < turn_about(path.tip[path.line == 11], (3.25, 0)) < -60
+    assert [note.line for note in path.notes if "turns back" in note.text] == [11]
+    refused(read, head + corner, 6, "contradicts")
+    long_way = corner.replace("0,0,-1", "0,0,1").replace("0,2.5", "0,-2.5").replace(".75,3", "5,3")
+    refused(read, head + fillet + long_way, 11, "contradicts")
+
+
 def test_a_circle_without_its_radius(read):
     text = "UNIT/{}\nFEDRAT/9\nGOTO/3,-4,1\nCIRCLE/0,0,1,0,0,-1.\nGOTO/-5,0,1\n"
     for unit, mm in (("MM", 1.0), ("INCH", 25.4)):
@@ -590,6 +603,15 @@ def test_solidworks_pecks_in_inches(read):
     path = read(SOLIDWORKS)
     expected = [1, 1, 0.1, -0.2, 0.1, -0.19, -0.4, 0.1, -0.39, -0.5, 1]
     np.testing.assert_allclose(path.tip[:, 2] / 25.4, expected, atol=1e-12)
+
+
+def test_solidworks_first_pecks_and_initial_height(read):
+    cycle = "CYCLE/DEEP2,FEDTO,9,1STPECK,5,SUBPECK,2,MMPM,60,RAPTO,3{}"
+    text = f"UNIT/MM\nRAPID\nGOTO/0,0,25\nCYCLE/INIT\n{cycle}\nGOTO/0,0,-1\n"
+    for back, out in (("", 25.0), (",RTRCTO,10", 9.0)):
+        path = read(text.format(back))
+        assert path.tip[~path.rapid, 2].tolist() == [-6.0, -8.0, -10.0] and path.tip[-1, 2] == out
+    refused(read, text.format(",MINPECK,1"), 5, "MINPECK")
 
 
 def test_bore_and_ream_are_fed_out(read):

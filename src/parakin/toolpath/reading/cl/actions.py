@@ -53,6 +53,7 @@ class ClActions:
         self.tools = ToolLog()
         self.finished = False
         self._last_cycle: DrillCycle | None = None
+        self._initial = False  # CYCLE/INIT
         self._work_systems = WorkZeros()
 
     # dialects
@@ -189,8 +190,10 @@ class ClActions:
             if self._last_cycle is None:
                 refuse("CYCLE/ON before any cycle; expected CYCLE/DRILL,... first")
             self.motion.set_cycle(self._last_cycle)
+        elif args == ["INIT"]:
+            self._initial = True
         else:
-            self._last_cycle = parse_cycle(args, DIALECTS[self.dialect])
+            self._last_cycle = parse_cycle(args, DIALECTS[self.dialect], initial=self._initial)
             self.units.note_speed(args, line)
             self.motion.set_cycle(self._last_cycle)
 
@@ -202,9 +205,7 @@ class ClActions:
 
     def _refuse_in_cycle_or_circle(self) -> None:
         if self.motion.cycle is not None or self.motion.circle is not None:
-            refuse(
-                "only GOTO can follow within a cycle or after CIRCLE; expected CYCLE/OFF before it, or the arc's end"
-            )
+            refuse("only GOTO can follow in a cycle or after CIRCLE; expected CYCLE/OFF before it, or the arc's end")
 
     def _refuse_in_circle(self) -> None:
         if self.motion.circle is not None:
@@ -291,8 +292,7 @@ class ClActions:
         """Set the workpiece's frame by the directions of X, Y and Z and the origin (MCS)."""
         v = parse_numbers(args, (12,), "the directions of X, Y and Z and an origin: twelve numbers")
         self._refuse_in_cycle_or_circle()
-        rows = np.array(v).reshape(4, 3).T.tolist()
-        self.motion.change_frame(line, frame=build_frame_from_matrix(rows, "MCS"))
+        self.motion.change_frame(line, frame=build_frame_from_matrix(np.array(v).reshape(4, 3).T.tolist(), "MCS"))
 
     def check_work_plane(self, args: list[str], line: int) -> None:
         """Refuse other directions of X, Y and Z than those of MCS (MCS2)."""

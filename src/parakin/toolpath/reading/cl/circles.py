@@ -112,12 +112,16 @@ def prove_hand(circle: Circle, point: Triple, motion: Array | None, scale: float
     return RIGHT if cosine > _TANGENT else LEFT if cosine < -_TANGENT else UNKNOWN
 
 
-def decide_hand(arc: OpenArc, leaving: int) -> int:
-    """Decide the hand of an arc by its dialect and its neighbours; refuse what they contradict or leave open."""
+def decide_hand(arc: OpenArc, leaving: int, *, proved: bool) -> int:
+    """Decide the hand of an arc by its dialect and its neighbours; refuse what they contradict or leave open.
+
+    proved : whether another arc of the file proves the dialect's hand: then a short arc may turn back on its neighbours
+    """
     proofs = {arc.entry, leaving} - {UNKNOWN}
     hand = arc.circle.hand
     if hand != UNKNOWN:
-        if -hand in proofs and hand not in proofs:
+        turns_back = proved and measure_turn(arc.circle, arc.start, arc.end, hand) < math.pi
+        if -hand in proofs and hand not in proofs and not turns_back:
             side = "right" if hand == RIGHT else "left"
             refuse(
                 f"an arc whose way round, {side}-handed about its axis in this dialect, contradicts the motion "

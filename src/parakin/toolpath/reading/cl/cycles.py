@@ -19,6 +19,7 @@ CYCLES = {
     "CBORE": "drill",
     "SPOT": "drill",
     "DEEP": "deep",
+    "DEEP2": "deep",
     "BRKCHP": "break",
     "TAP": "tap",
     "BORE": "bore",
@@ -37,6 +38,8 @@ _VALUES = {
     "RTRCTO": "RETURN",
     "STEP": "STEP",
     "INCR": "STEP",
+    "1STPECK": "FIRST",
+    "SUBPECK": "STEP",
     "DWELL": "DWELL",
 }
 _INITIAL = ("AUTO", "INIT")  # the height at which the cycle was called
@@ -52,6 +55,7 @@ class DrillCycle(NamedTuple):
     retract : where the tool withdraws to, or None for the height it came from
     feed : value and unit word, or None for the feed in force
     step : the depth of a peck, 0 without pecks
+    first_step : the depth of the first peck, 0 for that of the others
     dwell : time at depth and whether it is in revolutions, not seconds; None for no dwell
     """
 
@@ -62,6 +66,7 @@ class DrillCycle(NamedTuple):
     kind: str = "drill"
     step: float = 0.0
     dwell: tuple[float, bool] | None = None
+    first_step: float = 0.0
 
 
 class CycleStart(NamedTuple):
@@ -80,8 +85,11 @@ class _Options(NamedTuple):
     revolutions: bool
 
 
-def parse_cycle(args: Sequence[str], dialect: Dialect) -> DrillCycle:
-    """Parse CYCLE, refusing a cycle whose motion the statement alone does not settle."""
+def parse_cycle(args: Sequence[str], dialect: Dialect, *, initial: bool = False) -> DrillCycle:
+    """Parse CYCLE, refusing a cycle whose motion the statement alone does not settle.
+
+    initial : whether the tool goes back to the height it came from where the statement says nothing else
+    """
     if not args or args[0] not in CYCLES:
         refuse(f"a cycle that cannot be turned into motion: {quote_short('/'.join(args[:1]))}; expected {_FORM}")
     kind, rest = CYCLES[args[0]], list(args[1:])
@@ -95,22 +103,22 @@ def parse_cycle(args: Sequence[str], dialect: Dialect) -> DrillCycle:
         refuse(f"a cycle without a clearance (CLEAR, RAPTO) and one depth (DEPTH, FEDTO); expected {_FORM}")
     clear, out = _find_clearance(values, dialect)
     depth = -_parse_depth(values, dialect)
-    retract = None if options.initial else out
-    step = values.get("STEP", 0.0)
+    retract = None if options.initial or (initial and "RETURN" not in values) else out
+    step, first_step = values.get("STEP", 0.0), values.get("FIRST", 0.0)
     if not depth < clear or (retract is not None and retract < clear) or clear < 0.0:
         refuse(f"expected a depth below the clearance and a return not below it in {_FORM}")
-    if step < 0.0 or (kind in ("deep", "break") and step == 0.0):
+    if min(step, first_step) < 0.0 or (kind in ("deep", "break") and step == 0.0):
         refuse(f"pecks without a step above zero (STEP, INCR); expected {_FORM}")
     if kind in ("deep", "break") and (clear - depth) / step > _MOST_PECKS:
         refuse(f"more than {_MOST_PECKS} pecks in a hole")
-    if kind == "drill" and step > 0.0:
+    if kind == "drill" and (step > 0.0 or first_step > 0.0):
         refuse(f"STEP in a cycle without pecks; expected {_FORM}")
     dwell = None
     if "DWELL" in values:
         dwell = values["DWELL"], options.revolutions
         if dwell[0] < 0.0:
             refuse("a dwell below zero")
-    return DrillCycle(clear, depth, retract, options.feed, kind, step, dwell)
+    return DrillCycle(clear, depth, retract, options.feed, kind, step, dwell, first_step)
 
 
 def _find_clearance(values: dict[str, float], dialect: Dialect) -> tuple[float, float | None]:

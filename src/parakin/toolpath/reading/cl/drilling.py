@@ -65,7 +65,7 @@ def _list_strokes(cycle: DrillCycle, gap: float) -> list[tuple[float, bool]]:
     strokes: list[tuple[float, bool]] = []
     if cycle.kind in ("deep", "break"):
         # pecks count from the hole's point; the first one goes through the air above it too
-        reached = min(0.0, cycle.clear) - cycle.step
+        reached = min(0.0, cycle.clear) - (cycle.first_step or cycle.step)
         while reached > cycle.depth + _SAME_HEIGHT:
             strokes.append((reached, False))
             if cycle.kind == "break":

@@ -31,6 +31,7 @@ _HELIX = 0.01  # mm along a circle's axis between an arc's ends; above this the 
 _MOST_ARC_POINTS = 5_000_000  # greatest number of points of all arcs of a file: some hundred MB of memory
 _MOST_CYCLE_POINTS = 1_000_000  # greatest number of motions of all cycles of a file
 _PROVED_NOTE = "an arc that goes the other way round than this dialect has it, as the straight cut into it proves"
+_TURNED_NOTE = "an arc that turns back on the motion that joins it, for other arcs prove which way its dialect goes"
 _FAR = 1e3  # the length of a direction that stands for a motion
 
 
@@ -75,6 +76,7 @@ class ClMotion:
         self.tangent: Triple | None = None
         self.circle: Circle | None = None
         self.open_arc: OpenArc | None = None
+        self.hand_is_proved = False  # by an arc whose neighbours go round as its dialect's CIRCLE does
         self.arc_step: tuple[Circle, int, float] | None = None
         self.arc_end: tuple[int, Array] = 0, np.zeros(3)
         self.arc_points = self.cycle_points = 0
@@ -315,10 +317,15 @@ class ClMotion:
         arc, self.open_arc = self.open_arc, None
         if arc is None:
             return
+        left = prove_hand(arc.circle, arc.end, leaving, self.transform.scale)
         try:
-            hand = decide_hand(arc, prove_hand(arc.circle, arc.end, leaving, self.transform.scale))
+            hand = decide_hand(arc, left, proved=self.hand_is_proved)
         except InputError as error:
             refuse(error.message, arc.circle.line)
+        known = arc.circle.hand != UNKNOWN
+        if known and hand not in (arc.entry, left) and -hand in (arc.entry, left):
+            self.notes.add(arc.circle.line, _TURNED_NOTE)
+        self.hand_is_proved |= known and hand in (arc.entry, left) and -hand not in (arc.entry, left)
         if hand != arc.hand:
             records, begin = self.records, arc.begin
             feed, rpm, axis, rapid = records.feed[begin], records.spindle[begin], self.axis, self.rapid

@@ -144,7 +144,7 @@ def test_nx_helix(both):
         ("GOTO/10,0,0\nCIRCLE/0,0,0,0,0,1,10,0,0,0,0\nGOTO/0,10.5,0\n", 3, ["end", "0.5 mm"]),
         ("GOTO/10,0,0\nCIRCLE/0,0,0,0,0,0,10,0,0,0,0\nGOTO/0,10,0\n", 2, ["CIRCLE"]),
         ("GOTO/10,0,0\nCIRCLE/0,0,0,0,0,1,-10,0,0,0,0\nGOTO/0,10,0\n", 3, ["radius"]),
-        ("GOTO/10,0,0\nCIRCLE/0,0,0,0,0,1\nGOTO/0,10,0\n", 2, ["radius"]),
+        ("GOTO/10,0,0\nCIRCLE/0,0,0,0,0\nGOTO/0,10,0\n", 2, ["radius"]),
         ("GOTO/10,0,0\nCIRCLE/0,0,0,0,0,1,10,0,0,0,0,TIMES,2\nGOTO/0,10,0\n", 3, ["TIMES"]),
         ("GOTO/10,0,0\nCIRCLE/0,0,0,0,0,1,10\n", 2, ["GOTO"]),
         ("GOTO/10,0,0\nCIRCLE/0,0,0,0,0,1,10\nFINI\n", 3, ["CIRCLE"]),

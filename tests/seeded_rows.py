@@ -88,14 +88,14 @@ def measure_pieces(path: JointPath, profile, limits: DriveLimits, places: int = 
     """The greatest fractions of speed, acceleration and jerk, and of the feed, at even times of all pieces.
 
     The joints are the rows' cubics; with s(t) of the profile the chain rule gives their derivatives by time. A piece
-    ends on its row but for its times' digits: of a path of years they leave a hundredth of a piece of microseconds.
+    ends on its row but for its times' digits, which in a path of years are as long as the shortest pieces.
     """
     dt = np.diff(profile.time)[:, None] * np.linspace(0.0, 1.0, places)
     v, a, e = profile.speed[:, None], profile.acceleration[:, None], profile.jerk[:, None]
     s = profile.shift[:, None] + dt * (v + dt * (a / 2.0 + dt * e / 6.0))
     v, a = v + dt * (a + dt * e / 2.0), a + dt * e
     i, h, worst = profile.row, path.step[profile.row], np.zeros(4)
-    assert (s <= h[:, None] * (1.0 + 1e-9) + 2.0 * np.spacing(profile.time[-1]) * v).all()
+    assert (s <= h[:, None] * (1.0 + 1e-9) + 2.0 * np.spacing(profile.time[-1]) * v.max(1, keepdims=True)).all()
     s = np.minimum(s, h[:, None])
     for j in range(path.joints.shape[1]):
         q, bend = path.joints[:, j], path.rows.curvature[:, j]

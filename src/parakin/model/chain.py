@@ -29,7 +29,8 @@ from ..algebra import (
     transpose,
 )
 from ..errors import DescriptionError
-from .elements import ROTATIONS, TRANSLATIONS, Step
+from .elements import ROTATIONS, TRANSLATIONS, Drive, Step
+from .turning_angles import find_turn_middle, turn_back
 
 UNIT: dict[str, Vec] = {
     word: tuple(1.0 if word[1] == letter else 0.0 for letter in "xyz") for word in (*TRANSLATIONS, *ROTATIONS)
@@ -88,13 +89,15 @@ class Pointing:
     """Two turning axes that point a direction: turn(first)·turn(second)·``start`` = v.
 
     This is the general two-axis problem (Paden and Kahan's second); tilted and nutating heads and tables are no
-    special case. ``signs`` are those of the joints in the turns.
+    special case. ``signs`` are those of the joints in the turns, ``drives`` what moves them:
+    their ranges tell on which turn the joints are.
     """
 
     first: Vec
     second: Vec
     start: Vec
     signs: tuple[float, float] = (1.0, 1.0)
+    drives: tuple[Drive | None, Drive | None] = (None, None)
 
     @classmethod
     def from_steps(cls, steps: Iterable[Step], key: str) -> Pointing:
@@ -102,17 +105,18 @@ class Pointing:
 
         ``key`` is the chain's name in errors.
         """
-        rotation, axes, signs = IDENTITY, [], []
+        rotation, axes, signs, drives = IDENTITY, [], [], []
         for step in steps:
             if step.axis in TRANSLATIONS:
                 continue
             if step.drive is not None:
                 axes.append(apply(rotation, UNIT[step.axis]))
                 signs.append(step.sign)
+                drives.append(step.drive)
             rotation = product(rotation, make_axis_rotation(step.axis, *compute_exact_sincos(step.value)))
         if len(axes) != 2:
             raise DescriptionError(key, f"{len(axes)} driven turns point the tool, two are needed")
-        pointing = cls(axes[0], axes[1], apply(rotation, UNIT["tz"]), (signs[0], signs[1]))
+        pointing = cls(axes[0], axes[1], apply(rotation, UNIT["tz"]), (signs[0], signs[1]), (drives[0], drives[1]))
         if norm(cross(axes[0], axes[1])) < _PARALLEL:
             raise DescriptionError(key, "its two axes are parallel and can't point the tool")
         if norm(cross(pointing.second, pointing.start)) < _PARALLEL:
@@ -165,7 +169,10 @@ class Pointing:
             (dot(off, cross(v, a1)), dot(off, v)),
             (dot(middle, cross(a2, w)), dot(middle, w) - beta * beta),
         )
-        angles = [sign * atan2(s, c) for sign, (s, c) in zip(self.signs, turns, strict=True)]
+        angles = []
+        for sign, drive, (s, c) in zip(self.signs, self.drives, turns, strict=True):
+            middle = 0.0 if drive is None else sign * find_turn_middle(drive)
+            angles.append(sign * (atan2(s, c) if middle == 0.0 else middle + atan2(*turn_back(s, c, middle))))
         joints = (angles[0] if first is None else first, angles[1])
         return PointingAngles(joints, freedom, around, reach, turns, 1.0 - beta * beta)
 

@@ -4,13 +4,11 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from math import cos, isfinite, pi, sin
 from typing import ClassVar, Literal
 
-from ...algebra import Mat, Scalar, Term, Vec, add, apply, atan2, dot, sub
+from ...algebra import Mat, Scalar, Vec, add, apply, dot, sub
 from ...errors import NoMethodError
 from ..elements import Drive, Point, Unit
-from ..nominal_values import find_nominal_value
 
 
 @dataclass(frozen=True)
@@ -50,32 +48,6 @@ class Link:
     drive: int | None = None
     carrier: int | None = None
     meets: Literal["platform", "ring"] | int | None = None
-
-
-def measure_turn(drive: Drive, y: Scalar, x: Scalar, v: Scalar = 0.0, u: Scalar = 1.0) -> Scalar:
-    """Measure the angle of (x, y) less that of (u, v), rad, on the turn on which the drive's range is.
-
-    Where the range goes beyond ±180° the angle is within half a turn of its middle, and so jumps nowhere in it.
-    """
-    low, high = (find_nominal_value(end + drive.offset) for end in (drive.low, drive.high))
-    middle = 0.5 * (low + high)
-    if not isfinite(middle) or middle == 0.0 or (low >= -pi and high <= pi):
-        return subtract_angles(y, x, v, u)
-    s, c = sin(middle), cos(middle)
-    return middle + subtract_angles(c * y - s * x, c * x + s * y, v, u)
-
-
-def subtract_angles(y: Scalar, x: Scalar, v: Scalar, u: Scalar) -> Scalar:
-    """Compute the angle of (x, y) less that of (u, v), in (-π, π].
-
-    Its derivative is that of the one less that of the other, in which equal terms have cancelled, so over boxes it is
-    some times narrower.
-    """
-    angle = atan2(y * u - x * v, x * u + y * v)
-    if isinstance(angle, Term):
-        one, other = x * x + y * y, u * u + v * v
-        angle.trace.known_slopes[angle.index] = [(x / one, y), (-y / one, x), (-u / other, v), (v / other, u)]
-    return angle
 
 
 def close_rod(foot: Vec, point: Vec, square: Scalar) -> Scalar:

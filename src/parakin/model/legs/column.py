@@ -7,7 +7,8 @@ from typing import ClassVar
 
 from ...algebra import ORIGIN, Scalar, Vec, sincos, sqrt
 from ..elements import Signs, Size, Unit
-from .base import Inverse, Leg, Link, Reach, close_rod, measure_turn
+from ..turning_angles import measure_turn
+from .base import Inverse, Leg, Link, Reach, close_rod
 
 _UP: Vec = (0.0, 0.0, 1.0)
 

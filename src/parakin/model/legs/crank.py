@@ -6,7 +6,8 @@ from dataclasses import dataclass
 
 from ...algebra import Scalar, Vec, add, cross, dot, scale, sincos, sqrt, sub
 from ..elements import Direction, Point, Signs, Size
-from .base import Inverse, Leg, Link, Reach, close_rod, measure_turn
+from ..turning_angles import measure_turn
+from .base import Inverse, Leg, Link, Reach, close_rod
 
 
 @dataclass(frozen=True)

@@ -5,7 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 from ...algebra import Scalar, Vec, sincos
-from .base import Inverse, Link, measure_turn
+from ..turning_angles import measure_turn
+from .base import Inverse, Link
 from .column import Column
 
 

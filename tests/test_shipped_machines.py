@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from itertools import product
 from math import cos, hypot, isfinite, pi, radians, sin, sqrt
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -181,6 +182,17 @@ def test_linear_delta():
         for leg in spec.legs:
             rod = np.array([leg.foot[0] - leg.platform[0] - x, leg.foot[1] - leg.platform[1] - y])
             assert 300 < sqrt(spec.sizes["rod"] ** 2 - rod @ rod) < 700
+
+
+def test_every_machine_says_where_it_was_built_or_that_it_is_not_known():
+    said = ("Maker, as named there: ", "Maker of the head: ", "built", "Built")
+    silent = [
+        name for name in list_shipped_machines() if not any(words in load_shipped(name).spec.source for words in said)
+    ]
+    assert not silent
+    page = (Path(__file__).parents[1] / "docs" / "machines.md").read_text(encoding="utf-8")
+    missing = [name for name in list_shipped_machines() if " ".join(load_shipped(name).spec.source.split()) not in page]
+    assert not missing
 
 
 @pytest.mark.parametrize("name", list_shipped_machines())

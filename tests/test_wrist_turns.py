@@ -45,7 +45,7 @@ def test_every_angle_is_told_on_the_turn_of_the_range(name, ends, tmp_path):
 
 
 def test_a_path_keeps_to_the_turn_that_the_range_allows(tmp_path):
-    """Most of a turn about the pole: the joint follows from the turn that it begins on, off limits where it leaves the range."""
+    """Most of a turn about the pole: the joint follows from the turn that it begins on, and leaves its range there."""
     m = load_lopsided("orthoglide5_head", (-30, 330), tmp_path)
     shipped, first = load_shipped("orthoglide5_head"), m.wrist.first
     poses = np.tile(m.home, (200, 1))

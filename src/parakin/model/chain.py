@@ -171,8 +171,8 @@ class Pointing:
         )
         angles = []
         for sign, drive, (s, c) in zip(self.signs, self.drives, turns, strict=True):
-            middle = 0.0 if drive is None else sign * find_turn_middle(drive)
-            angles.append(sign * (atan2(s, c) if middle == 0.0 else middle + atan2(*turn_back(s, c, middle))))
+            zero = 0.0 if drive is None else sign * find_turn_middle(drive)
+            angles.append(sign * (atan2(s, c) if zero == 0.0 else zero + atan2(*turn_back(s, c, zero))))
         joints = (angles[0] if first is None else first, angles[1])
         return PointingAngles(joints, freedom, around, reach, turns, 1.0 - beta * beta)
 

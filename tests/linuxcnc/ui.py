@@ -13,7 +13,7 @@ from pathlib import Path
 import linuxcnc
 from hang_dump import dump
 
-MOST = 45.0  # s for a step
+MOST = 45.0  # s for a step in which nothing moves
 REST = 0.05  # s
 REFUSED = 0.1  # s for the rest of what is said to a refused block
 UNDONE = -1  # LinuxCNC's answer to waiting, after 5 s
@@ -24,22 +24,36 @@ class ToldError(Exception):
     """What LinuxCNC told its user."""
 
 
+class Patience:
+    """With a machine that stands still; one that moves does not hang, be its program as long as it may."""
+
+    def __init__(self, status):
+        self.status, self.position, self.end = status, None, 0.0
+
+    def look(self):
+        """Poll the status; raise TimeoutError where the machine has stood for too long."""
+        self.status.poll()
+        if self.status.position != self.position:
+            self.position, self.end = self.status.position, time.monotonic() + MOST
+        elif time.monotonic() > self.end:
+            raise TimeoutError
+
+
 class Machine:
     def __init__(self):
         self.command, self.status, self.errors = linuxcnc.command(), linuxcnc.stat(), linuxcnc.error_channel()
 
     def wait(self, ready):
         """Until ``ready(status)``."""
-        end = time.monotonic() + MOST
-        while time.monotonic() < end:
-            self.status.poll()
+        patience = Patience(self.status)
+        while True:
+            patience.look()
             told = self.errors.poll()
             if told:
                 raise ToldError(told[1].strip())
             if ready(self.status):
                 return
             time.sleep(0.005)
-        raise TimeoutError
 
     def tell(self, word, *arguments):
         getattr(self.command, word)(*arguments)
@@ -77,10 +91,9 @@ class Machine:
     def by_hand(self, block):
         self.tell("mode", linuxcnc.MODE_MDI)
         self.command.mdi(block)
-        end = time.monotonic() + MOST
+        patience = Patience(self.status)
         while self.command.wait_complete() == UNDONE:
-            if time.monotonic() > end:
-                raise TimeoutError
+            patience.look()
         return self.position()
 
     def try_by_hand(self, block):

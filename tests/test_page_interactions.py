@@ -14,7 +14,7 @@ KEYS = ["ArrowLeft", "ArrowUp", "+", "-", "h", "v", "p", "Tab", "Enter", " ", "E
 NUMBERS = ["0", "1e9", "-250", "abc", "", "37.5", "-1e-7", "1e308", "180"]
 PARTS = {
     "tricept": "G90 G21\nG0 X0 Y0 Z-1500\nG1 X120 Y40 B12 C30 F3000\nG1 X-90 Z-1600 B0 C0\nG1 X3000\n",
-    "orthoglide": "",  # a machine's page, with its sizes
+    "exechon": "",  # a machine's page, with its sizes, which move its home
     "rrr3": "G90 G21\nG0 X0 Y0 C0\nG1 X40 Y10 C10 F900\nG1 X-20 Y30 C-5\n",
 }
 
@@ -102,4 +102,5 @@ def test_seeded_interactions_leave_a_page_alive(name, tmp_path):
             assert np.array(page, float) == pytest.approx(margins, abs=1e-9, rel=1e-9, nan_ok=True), (number, kind)
         tab.keyboard.press("Escape")
         tab.get_by_role("button", name="Home").click()
-        assert tab.evaluate("parakin.state.pose") == pytest.approx(machine.home, abs=1e-12)
+        home = tab.evaluate("parakin.machine.axes.map(axis => axis.home)")
+        assert tab.evaluate("parakin.state.pose") == pytest.approx(home, abs=1e-12)

@@ -37,11 +37,19 @@ def test_the_figures_are_those_told_alone(tmp_path, capsys):
         assert told["reasons"] == {}
 
 
-def test_what_a_machine_cannot_do_is_said(tmp_path, capsys):
+def test_what_a_machine_cannot_do_is_said(tmp_path, capsys, monkeypatch):
     part = tmp_path / "part.apt"
     part.write_text(PART.replace("40,", "400,"), encoding="utf-8")
-    assert main(["compare", "orthoglide", "rotary_delta", "--drives", "100N/um", "--part", str(part)]) == 0
+    page = tmp_path / "compared.html"
+    words = ["compare", "orthoglide", "rotary_delta", "-o", str(page)]
+    monkeypatch.setattr("parakin.commands.compare._WIDEST", 60)  # too narrow for both
+    assert main([*words, "--drives", "100N/um", "--part", str(part)]) == 0
     said = capsys.readouterr()
+    assert max(map(len, said.out.split("page")[0].splitlines())) <= 60
+    assert said.out.count("the part's cycle time") == said.out.count("its box") == 2
+    text = page.read_text("utf-8")
+    assert text.count("data:image/png") == 2
+    assert "orthoglide: part: the part runs at none of" in text
     assert "orthoglide: part: the part runs at none of" in said.err
     assert 'rotary_delta: stiffness: drives: hip0: "100N/um"' in said.err
     assert "the part's cycle time" in said.out
@@ -58,6 +66,7 @@ def test_what_a_machine_cannot_do_is_said(tmp_path, capsys):
         ([*NAMES, "--tolerance", "feet"], "expected NAME=VALUE"),
         ([*NAMES, "--samples", "0"], "samples"),
         ([*NAMES, "--part", "none.apt"], "none.apt"),
+        ([*NAMES, "-o", "compared.pdf"], '"compared.pdf": expected a file name that ends in .html'),
     ],
 )
 def test_what_is_mistaken_is_said_in_one_line(words, message, capsys):

@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from .controllers.linuxcnc.program import make_linuxcnc_program
     from .export.accuracy_map import render_accuracy_png
     from .export.calibration import format_calibrated_yaml, render_residuals_png
+    from .export.comparison_page import render_comparison_page
     from .export.files import write_files
     from .export.force_curves import render_drive_forces
     from .export.machine.picture import render_machine_picture
@@ -154,6 +155,7 @@ __all__ = [
     "read_tool_table",
     "region",
     "render_accuracy_png",
+    "render_comparison_page",
     "render_drive_forces",
     "render_machine_page",
     "render_machine_picture",
@@ -288,6 +290,7 @@ _LAZY = {
     "read_tool_table": "toolpath.reading.tool_table",
     "region": "workspaces.certified.region:make_region",
     "render_accuracy_png": "export.accuracy_map",
+    "render_comparison_page": "export.comparison_page",
     "render_drive_forces": "export.force_curves",
     "render_machine_page": "export.page.page",
     "render_path_page": "export.page.page",

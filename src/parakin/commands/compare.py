@@ -7,14 +7,16 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
-from ..errors import InputError
+from ..errors import InputError, quote
 from .accuracy import split_pairs
 from .console import announce_compiling, format_table, print_json, print_remark, print_text
-from .options import Json, complete_machine, load_machine
+from .options import Json, OutputPath, complete_machine, load_machine
 from .stiffness import split_words
 
 if TYPE_CHECKING:
     from ..comparison.comparison import Comparison
+
+_WIDEST = 100  # letters of a line
 
 
 def compare(
@@ -26,6 +28,7 @@ def compare(
     struts: str | None = None,
     part: Path | None = None,
     samples: int | None = None,
+    output: OutputPath = None,
     json: Json = False,
 ) -> int:
     """Machines side by side: workspace, indices, accuracy, stiffness, and the time that a part takes.
@@ -44,7 +47,11 @@ def compare(
         A CL file or G-code, which is placed on each machine where its least margin is greatest.
     samples
         How many poses of each workspace are looked at; by default 400.
+    output
+        A page to write, .html: the machines' pictures and figures side by side.
     """
+    if output is not None and output.suffix.lower() != ".html":
+        raise InputError(f"{quote(output)}: expected a file name that ends in .html", "--output")
     if len(names) < 2:
         raise InputError("two machines at least expected", "compare")
     machines = [load_machine(name) for name in names]
@@ -69,19 +76,36 @@ def compare(
     )
     from ..export.json.comparison import encode_comparison
 
-    encoded = encode_comparison(result)
+    files = {} if output is None else _write_page(result, output)
     if json:
-        print_json(encoded)
+        print_json(encode_comparison(result, files))
         return 0
-    print_text(_format_comparison(result))
-    for column in encoded["machines"]:
-        for what, reason in column["reasons"].items():
-            print_remark(f"{column['name']}: {what}: {reason}")
+    print_text("\n\n".join([_format_comparison(result), *(f"{kind}  {name}" for kind, name in files.items())]))
+    for column in result.columns:
+        for what, reason in column.reasons.items():
+            print_remark(f"{column.machine.name}: {what}: {reason}")
     return 0
 
 
+def _write_page(result: Comparison, output: Path) -> dict[str, str]:
+    from ..export.comparison_page import render_comparison_page
+    from ..export.files import write_files
+
+    write_files(output.parent, {output.name: render_comparison_page(result)})
+    return {"page": str(output)}
+
+
 def _format_comparison(result: Comparison) -> str:
+    """Format a column for each machine, as many beside each other as fit a line."""
     from ..export.comparison_table import list_rows
 
-    header = ["", *(column.machine.name for column in result.columns)]
-    return format_table(list_rows(result), header, " " + "r" * len(result.columns))
+    names = [column.machine.name for column in result.columns]
+    titles, *columns = zip(*[["", *names], *list_rows(result)], strict=True)
+    room = _WIDEST - max(map(len, titles))
+    blocks: list[list[tuple[str, ...]]] = [[]]
+    for column in columns:
+        if blocks[-1] and sum(2 + max(map(len, own)) for own in (*blocks[-1], column)) > room:
+            blocks.append([])
+        blocks[-1].append(column)
+    tables = [list(zip(titles, *block, strict=True)) for block in blocks]
+    return "\n\n".join(format_table(rows, header, " " + "r" * (len(header) - 1)) for header, *rows in tables)

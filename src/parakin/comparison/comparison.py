@@ -46,6 +46,12 @@ class MachineFigures:
     stiffness: Stiffness | str | None
     job: Job | str | None
 
+    @property
+    def reasons(self) -> dict[str, str]:
+        """Why there is no answer, by what was asked."""
+        answers = {"performance": self.performance, "accuracy": self.accuracy, "stiffness": self.stiffness}
+        return {name: answer for name, answer in {**answers, "part": self.job}.items() if isinstance(answer, str)}
+
 
 @dataclass(frozen=True, eq=False)
 class Comparison:

@@ -13,17 +13,17 @@ if TYPE_CHECKING:
 _PERCENTS = (5, 50, 95)
 
 
-def encode_comparison(comparison: Comparison) -> dict[str, Any]:
+def encode_comparison(comparison: Comparison, files: dict[str, str]) -> dict[str, Any]:
     """Encode each machine's figures, mm, N/mm and s; null for what was not answers for, or that it can't do."""
     return {
         "schema": "parakin.comparison/1",
         "machines": [_encode_column(column) for column in comparison.columns],
+        "files": files,
     }
 
 
 def _encode_column(column: MachineFigures) -> dict[str, Any]:
     indices, accuracy, stiffness, job = column.performance, column.accuracy, column.stiffness, column.job
-    answers = {"performance": indices, "accuracy": accuracy, "stiffness": stiffness, "part": job}
     volume = column.workspace.volume
     return {
         "name": column.machine.name,
@@ -42,7 +42,7 @@ def _encode_column(column: MachineFigures) -> dict[str, Any]:
         if stiffness is None or isinstance(stiffness, str)
         else _encode_percentiles(stiffness.least),
         "cycle_time": None if job is None or isinstance(job, str) else job.seconds,
-        "reasons": {what: answer for what, answer in answers.items() if isinstance(answer, str)},
+        "reasons": column.reasons,
     }
 
 

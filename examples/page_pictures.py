@@ -1,4 +1,4 @@
-"""Pictures of the page and the studio, as they stand in Chromium.
+"""Pictures of the page, the studio and a comparison, as they stand in Chromium.
 
 python examples/page_pictures.py [-o FOLDER]
 
@@ -82,12 +82,22 @@ def show_studio(browser, folder: Path, picture: Path) -> None:
         tab.screenshot(path=picture)
 
 
+def show_comparison(browser, folder: Path, picture: Path) -> None:
+    """Three machines side by side."""
+    machines = [pk.load(name) for name in ("orthoglide", "linear_delta", "hexapod")]
+    compared = pk.compare(machines, tolerances=[("feet", "0.05 mm")], drives="100 N/um")
+    (folder / "compared.html").write_text(pk.render_comparison_page(compared), encoding="utf-8")
+    with open_tab(browser, 1000, 640) as tab:
+        tab.goto((folder / "compared.html").as_uri())
+        tab.screenshot(path=picture)
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("-o", "--output", type=Path, default=Path("docs/pictures"))
     output = parser.parse_args().output
     output.mkdir(parents=True, exist_ok=True)
-    pictures = {"page": show_page, "page_path": show_path, "studio": show_studio}
+    pictures = {"page": show_page, "page_path": show_path, "studio": show_studio, "comparison": show_comparison}
     for name, show in pictures.items():
         with tempfile.TemporaryDirectory() as folder, open_browser() as browser:
             show(browser, Path(folder), output / f"{name}.png")

@@ -383,6 +383,7 @@ def test_what_cannot_be_passed_is_refused(write, capsys):
 def test_the_start_and_the_reference_point(write, capsys):
     path = write("G21 G90\nG1 X20 F600\nG28\nM2\n", "a.ngc")
     assert "a stated reference" not in refusal(capsys, path, "--start", "0,0,10")
+    assert refusal(capsys, write("G21 G91\nG1 X20 F600\nM2\n", "b.ngc")).endswith("in G90 before, or --start")
     said = post(capsys, path, "--start", "X=0,Y=0,Z=10", "--reference", "X=5,Y=6,Z=-1400")
     assert said["records"] >= 3
     read = pk.read_path(path, start={"X": 0.0, "Y": 0.0, "Z": 10.0}, reference={"X": 5.0, "Y": 6.0, "Z": -1400.0},

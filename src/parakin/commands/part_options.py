@@ -97,6 +97,7 @@ def read_part(
         if error.source in _ARGUMENTS:
             raise InputError(error.message, f"--{error.source.replace('_', '-')}") from None
         message = error.message.replace("a stated reference", "--reference").replace("a table of tools", "--tools")
+        message = message.replace("a stated start", "--start")
         raise InputError(message, error.source, error.line) from None
 
 

@@ -80,7 +80,9 @@ class GcodeMotion:
         for k, value in self._take_words(values, line):
             if self.incremental:
                 if end[k] != end[k]:
-                    refuse(f"G91 while {AXES[k]} is not known; expected {AXES[k]} once in G90 before")
+                    refuse(
+                        f"G91 while {AXES[k]} is not known; expected {AXES[k]} once in G90 before, or a stated start"
+                    )
                 value += end[k]
             end[k] = value
         if any(letter in values for letter in POLAR):

@@ -13,9 +13,9 @@ from parakin.errors import PoseError
 from parakin.machine import Machine
 from parakin.model.elements import Point, Size
 
-SOLVED = ["triglide_pairs"]  # constraints without a closed form, once a number of them is free
-SHIPPED = [name for name in pk.machines() if name not in SOLVED]
+SHIPPED = pk.machines()
 FEW = ["tricept", "hexapod", "orthoglide", "lambda6", "rotary_delta", "orthoglide5_table", "eclipse", "rpr3"]
+FEW += ["triglide_pairs"]  # whose constraints have no closed form once a number of them is free
 
 
 def draw(machine, seed=0, size=0.1, count=None):
@@ -43,7 +43,10 @@ def test_a_family_is_the_machines_of_its_sizes(name):
     assert np.isfinite(joints).all()
     assert np.abs(family.inverse(poses, sizes) - joints).max() < 1e-9
     if family.margins(poses, sizes).shape == one.margins(poses).shape:
-        assert np.nanmax(np.abs(family.margins(poses, sizes) - one.margins(poses))) < 1e-8
+        own = [name != "constraints.reach" for name in one.limits]  # which is against home's, of the nominal machine
+        off = np.abs(family.margins(poses, sizes) - one.margins(poses))
+        assert np.nanmax(off[:, own]) < 1e-8
+        assert np.nanmax(off) < 0.1
     a, b, c = family.jacobians(poses, sizes)
     for ours, theirs in zip((a, b), one.jacobians(poses), strict=True):
         assert np.abs(ours - theirs).max() < 1e-11 * np.abs(theirs).max()
@@ -52,14 +55,6 @@ def test_a_family_is_the_machines_of_its_sizes(name):
     theirs = one.forward(joints, near=poses)
     assert solution.converged.all() and theirs.converged.all()
     assert np.abs(solution.poses - theirs.poses).max() < 1e-9
-
-
-@pytest.mark.parametrize("name", SOLVED)
-def test_no_number_is_free_where_constraints_are_solved(name):
-    machine = load_shipped(name)
-    family = pk.family(machine, ["legs.*.foot.*"])
-    with pytest.raises(pk.DescriptionError, match="no number of the machine can be free"):
-        family.inverse(machine.home, family.nominal)
 
 
 @pytest.mark.parametrize("name", FEW)

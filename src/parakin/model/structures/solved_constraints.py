@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import fields, is_dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import fields, is_dataclass, replace
 from math import isfinite
+from typing import Any
 
 import numpy as np
 
@@ -47,6 +48,7 @@ _SAMPLES, _ROUNDS = 2000, 4  # poses that are looked at for how far parasitic mo
 _MARGIN = 3.0  # times what is seen
 _REGULAR = 0.2  # of home's determinant: nearer to a constraint singularity parasitic motions have no bound
 _LEAST = {"t": 1.0, "r": 1e-3}  # mm and rad
+_LEAST_OF_FREE = {"t": 30.0, "r": 0.03}  # likewise where sizes are free, which move the platform as well
 _WORDS = (*TRANSLATIONS, *ROTATIONS)
 
 
@@ -54,38 +56,48 @@ class SolvedConstraints:
     """Constraints of any kind, as many as there are parasitic motions, solved by Newton's method.
 
     The platform's frame is given by all six words: where ``middle`` is in the base, and R = Rz·Ry·Rx. Derivatives by
-    the other words are those of the solution, to the second order: they pass through the last two steps.
+    the other words, and by sizes that are free, are those of the solution, to the second order: they pass through the
+    last two steps. Where the steps begin and how far motions go is decided by the sizes' nominal values.
     """
 
-    def __init__(self, spec: Spec, middle: Vec, home: Mapping[str, float]):
-        if find_term((spec.constraints, spec.legs, middle)):
-            raise DescriptionError(
-                "constraints", "are solved, not in closed form: no number of the machine can be free"
-            )
-        self.spec, self.middle = spec, middle
+    def __init__(self, spec: Spec, middle: Vec, home: Mapping[str, Scalar]):
+        self.middle = middle
         self.unknown = tuple(word for word in _WORDS if word in spec.parasitic)
         self._trace = Trace()
         given = dict(zip(_WORDS, self._trace.inputs(6), strict=True))
-        frame = self._place(given, make_small_rotation(self._trace.inputs(3, 6)))
-        open_by = [measure_constraint(spec, constraint, *frame) for constraint in spec.constraints]
+        small = make_small_rotation(self._trace.inputs(3, 6))
+        self._sizes: list[Term] = []  # that are free, terms of another trace; they are inputs of this one
+
+        def take_size(size: Term) -> Scalar:
+            self._sizes.append(size)
+            return self._trace.input(8 + len(self._sizes))
+
+        own = replace_terms(spec, take_size)
+        frame = self._place(given, small, replace_terms(middle, take_size))
+        open_by = [measure_constraint(own, constraint, *frame) for constraint in own.constraints]
+        self.spec, self._nominal_middle = replace_terms((spec, middle), find_nominal_value)
+        self._nominal_sizes = [find_nominal_value(size) for size in self._sizes]
         slopes = [derivative(f, given[word]) for f in open_by for word in self.unknown]
         self._outputs = [*open_by, *slopes]
         self.start = dict.fromkeys(self.unknown, 0.0)
         self.home_determinant = 1.0
+        home = {word: find_nominal_value(value) for word, value in home.items()}
         self._assemble_home(home)
         with np.errstate(all="ignore"):
             self.farthest = self._bound_motions(home)
 
-    def _place(self, values: Mapping[str, Scalar], small: Mat) -> tuple[Mat, Vec]:
+    def _place(self, values: Mapping[str, Scalar], small: Mat, middle: Vec) -> tuple[Mat, Vec]:
         rotation = small
         for word in ("rz", "ry", "rx"):
             rotation = product(rotation, turned(word, *sincos(values[word])))
-        return rotation, sub([values[word] for word in TRANSLATIONS], apply(rotation, self.middle))
+        return rotation, sub([values[word] for word in TRANSLATIONS], apply(rotation, middle))
 
-    def _step(self, values: Mapping[str, Scalar], turn: Vec) -> tuple[dict[str, Scalar], Scalar]:
+    def _step(
+        self, values: Mapping[str, Scalar], turn: Vec, sizes: Sequence[Scalar]
+    ) -> tuple[dict[str, Scalar], Scalar]:
         """Take one of Newton's steps from values of all six words; return the changes, and the determinant."""
         n = len(self.unknown)
-        results = evaluate_trace(self._trace, self._outputs, [*(values[word] for word in _WORDS), *turn])
+        results = evaluate_trace(self._trace, self._outputs, [*(values[word] for word in _WORDS), *turn, *sizes])
         open_by, rows = results[:n], [results[n + i * n : n + (i + 1) * n] for i in range(n)]
         determinant = expand_determinant(rows)
         inverse = 1.0 / determinant
@@ -102,7 +114,7 @@ class SolvedConstraints:
         """Find home's parasitic motions from none, by damped steps."""
         values = {**dict.fromkeys(_WORDS, 0.0), **home}
         for _ in range(_HOME_STEPS):
-            changes, determinant = self._step(values, ORIGIN)
+            changes, determinant = self._step(values, ORIGIN, self._nominal_sizes)
             steps = {word: float(change) for word, change in changes.items()}
             if not all(isfinite(step) for step in steps.values()):
                 break
@@ -125,6 +137,7 @@ class SolvedConstraints:
         size = max(sum(map(abs, (*each.platform, *each.foot))) + _get_rod(each) for each in self.spec.constraints)
         rng, farthest = np.random.default_rng(0), {word: 1.0 if word in ROTATIONS else size for word in self.unknown}
         spread = {word: 1.0 if word in ROTATIONS else size for word in home}
+        least = _LEAST_OF_FREE if self._sizes else _LEAST
         for _ in range(_ROUNDS):
             values: dict[str, Scalar] = {
                 word: value + spread[word] * rng.uniform(-1.0, 1.0, _SAMPLES) for word, value in home.items()
@@ -133,21 +146,21 @@ class SolvedConstraints:
             changes: dict[str, Scalar] = {}
             determinant: Scalar = 0.0
             for _ in range(2 * STEPS):
-                changes, determinant = self._step(values, ORIGIN)
+                changes, determinant = self._step(values, ORIGIN, self._nominal_sizes)
                 values.update({word: values[word] + change for word, change in changes.items()})
             regular = determinant * (1.0 / self.home_determinant) > _REGULAR
             kept = (self._measure_step(changes) < CONVERGED**2) & regular & self._find_in_range(values)
             if kept.any():
                 spread = {word: 1.2 * np.abs(values[word][kept] - home[word]).max() for word in home}
                 farthest = {
-                    word: _MARGIN * float(np.abs(values[word][kept] - self.start[word]).max()) + _LEAST[word[0]]
+                    word: _MARGIN * float(np.abs(values[word][kept] - self.start[word]).max()) + least[word[0]]
                     for word in self.unknown
                 }
         return farthest
 
     def _find_in_range(self, values: Mapping[str, Scalar]) -> Flags:
         """Find rows in which every leg's joints are within their ranges."""
-        rotation, origin = self._place(values, IDENTITY)
+        rotation, origin = self._place(values, IDENTITY, self._nominal_middle)
         kept = np.ones(_SAMPLES, np.bool_)
         for leg in self.spec.legs:
             joints = leg.inverse(leg.place_joint(rotation, origin), getattr(leg, "branch", "")).joints
@@ -171,10 +184,10 @@ class SolvedConstraints:
         for step in range(STEPS):
             if step == STEPS - 2:
                 values.update({word: stop_gradient(values[word]) for word in self.unknown})
-            changes, determinant = self._step(values, turn)
+            changes, determinant = self._step(values, turn, self._sizes)
             values.update({word: self._clamp(word, values[word] + change) for word, change in changes.items()})
             size = maximum(minimum(self._measure_step(changes), 1.0), 0.0)  # bounds of it have an end
-        rotation, origin = self._place(values, make_small_rotation(turn))
+        rotation, origin = self._place(values, make_small_rotation(turn), self.middle)
         first, *others = origin
         first = minimum(first, _FAR + sqrt(stop_gradient(1.0 - size * CONVERGED**-2)))
         return FoundFrame(rotation, (first, *others), (determinant * (1.0 / self.home_determinant),))
@@ -194,11 +207,18 @@ class UnturnedByRods:
         return FoundFrame(IDENTITY, tuple(origin), ())
 
 
-def find_term(described: object) -> bool:
-    """Tell whether a number of a description, of tuples and dataclasses, follows from what is free."""
-    if is_dataclass(described):
-        return any(find_term(getattr(described, field.name)) for field in fields(described))
-    return isinstance(described, Term) or (isinstance(described, tuple) and any(find_term(each) for each in described))
+def replace_terms(described: Any, change: Callable[[Term], Scalar]) -> Any:
+    """Replace the terms of a description, of tuples, mappings and dataclasses, by what ``change`` makes of each."""
+    if isinstance(described, Term):
+        return change(described)
+    if isinstance(described, tuple):
+        return tuple(replace_terms(each, change) for each in described)
+    if isinstance(described, Mapping):
+        return {key: replace_terms(each, change) for key, each in described.items()}
+    if is_dataclass(described) and not isinstance(described, type):
+        names = [field.name for field in fields(described) if field.init]
+        return replace(described, **{name: replace_terms(getattr(described, name), change) for name in names})
+    return described
 
 
 def has_parallelograms(spec: Spec) -> bool:

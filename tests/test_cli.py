@@ -3,6 +3,7 @@
 import csv
 import json
 import os
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -11,7 +12,7 @@ import pytest
 from shipped import REPRESENTATIVES, load_shipped
 
 import parakin as pk
-from parakin.cli import main
+from parakin.cli import app, main
 
 PART = "UNITS/MM\nFEDRAT/1000,MMPM\nGOTO/0,0,-1650,0,0,1\nGOTO/10,0,-1650\nGOTO/10,20,-1660\n"
 LONG = "FEDRAT/1000,MMPM\nGOTO/0,0,-1650,0,0,1\nGOTO/0,0,-2050\n"
@@ -420,10 +421,29 @@ def test_interruption(monkeypatch, part, out, capsys):
     assert not out.exists()
 
 
-def test_machine_names_are_completed():
-    from cyclopts.completion._engine import compute_completions
-
-    from parakin.cli import app
-
-    names = [found.value for found in compute_completions(app, ["show", "tri"])]
-    assert names == ["tricept", "tricept_805", "triglide", "triglide_pairs"]
+@pytest.mark.skipif(shutil.which("bash") is None, reason="needs bash")
+def test_bash_completes_machines_files_and_parts(tmp_path):
+    """By the script as it is installed, with the words split as bash splits them."""
+    shell = tmp_path / "bin" / "parakin"
+    shell.parent.mkdir()
+    shell.write_text(f'#!/bin/sh\nexec "{sys.executable}" -m parakin "$@"\n')
+    shell.chmod(0o755)
+    (tmp_path / "complete").write_text(app.generate_completion(shell="bash"))
+    (tmp_path / "work" / "sub").mkdir(parents=True)
+    for name in ("trio.yaml", "trial.cls", "sub/own.yml"):
+        (tmp_path / "work" / name).touch()
+    asked = {
+        "show tri": "tricept tricept_805 triglide triglide_pairs trio.yaml",
+        "compare tricept ./tri": "./trio.yaml",
+        "page tria": "trial.cls",
+        "export sub": "sub/own.yml",
+        "post trial.cls --machine = tricept_": "tricept_805",
+        "linuxcnc ''": " ".join([*pk.machines(), "sub/own.yml", "trio.yaml"]),
+    }
+    steps = "".join(
+        f'COMP_WORDS=(parakin {words}); COMP_CWORD=$((${{#COMP_WORDS[@]}} - 1)); _parakin; echo "${{COMPREPLY[*]}}"\n'
+        for words in asked
+    )
+    done = run("bash", "-c", f'. ../complete\n{steps}', cwd=tmp_path / "work",
+               env={**os.environ, "PATH": f"{shell.parent}:{os.environ['PATH']}"})  # fmt: skip
+    assert done.stdout.splitlines() == list(asked.values())

@@ -39,6 +39,7 @@ from .version import __version__
 _MALFORMED = 2
 _INTERRUPTED = 130
 _BROKEN_PIPE = 141
+_COMPLETE = "__complete"  # by which a shell's completion calls
 
 app = App(
     name="parakin",
@@ -69,7 +70,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         signal.signal(signal.SIGTERM, _exit_on_signal)  # so that half-written files are removed
     try:
         words = list(sys.argv[1:] if arguments is None else arguments)
-        _check_words(words)
+        if words[:1] != [_COMPLETE]:  # there the last word may be empty, as it is typed so far
+            _check_words(words)
         code = app(words, exit_on_error=False, print_error=False, result_action="return_value")
         sys.stdout.flush()
     except ParakinError as error:

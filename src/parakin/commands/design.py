@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
 
@@ -12,7 +12,7 @@ from ..errors import InputError, quote, suggest
 from ..export.json.design import encode_design
 from ..export.number_format import format_fixed
 from .console import announce_compiling, print_json, print_text
-from .options import Json, OutputPath
+from .options import YAML_ENDINGS, Json, OutputPath, list_files
 from .region_options import parse_length
 
 if TYPE_CHECKING:
@@ -21,14 +21,16 @@ if TYPE_CHECKING:
 _DIGITS = 4  # digits of lengths
 
 
-def _list_families(context: object) -> list[str]:
+def _complete_problem(context: Any) -> list[str]:
+    """List the families of closed form and the files that begin with what is typed, for the shell's completion."""
     from ..performance.design import DESIGNS
 
-    return list(DESIGNS)
+    families = [name for name in DESIGNS if name.startswith(context.incomplete)]
+    return families + list_files(context.incomplete, YAML_ENDINGS)
 
 
 def design(
-    family: Annotated[str, Parameter(completer=_list_families)],
+    family: Annotated[str, Parameter(completer=_complete_problem)],
     /,
     *,
     cube: Annotated[str | None, Parameter(allow_leading_hyphen=True)] = None,
@@ -57,7 +59,7 @@ def design(
     time
         How long to search and to prove, s.
     """
-    if family.lower().endswith((".yaml", ".yml")):
+    if family.lower().endswith(YAML_ENDINGS):
         if cube is not None or amplification is not None:
             raise InputError("the file of a problem says that", "--cube" if cube is not None else "--amplification")
         from .design_search import design_by_search
@@ -68,7 +70,7 @@ def design(
         raise InputError("expected beside a family's name", "--cube" if cube is None else "--amplification")
     edge = parse_length(cube, "--cube")
     assert edge is not None
-    if output is not None and output.suffix.lower() not in (".yaml", ".yml"):
+    if output is not None and output.suffix.lower() not in YAML_ENDINGS:
         raise InputError(f'"{output}": expected a file name that ends in .yaml', "--output")
     announce_compiling()
     _refuse_family(family)

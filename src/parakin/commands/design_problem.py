@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from ..description.document import Value, YamlList, YamlMap, YamlText, read_document
 from ..errors import InputError, InputErrors, PoseError, quote, suggest
 from ..units import ANGLE, AXIS_UNITS, LENGTH, QuantityError, QuantityKind, parse_quantity
-from .options import load_machine
+from .options import YAML_ENDINGS, load_machine
 
 if TYPE_CHECKING:
     from ..arrays import Array, AxisRange
@@ -190,7 +190,7 @@ class _ProblemReader:
     def _load(self, name: YamlText) -> Machine:
         beside = Path(self.source).parent / name
         try:
-            return load_machine(fspath(beside) if name.endswith((".yaml", ".yml")) else name)
+            return load_machine(fspath(beside) if name.endswith(YAML_ENDINGS) else name)
         except InputErrors:
             raise
         except InputError as error:

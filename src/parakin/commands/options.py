@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from glob import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -14,13 +15,26 @@ if TYPE_CHECKING:
     from ..machine import Machine
 
 OFF_LIMITS = 3  # exit code
+YAML_ENDINGS = (".yaml", ".yml")  # of machine files and design problems
 
 
 def complete_machine(context: Any) -> list[str]:
-    """List the shipped machines that begin with what is typed, for the shell's completion."""
+    """List the shipped machines and the machine files that begin with what is typed, for the shell's completion."""
     from .. import machines
 
-    return [name for name in machines() if name.startswith(context.incomplete)]
+    shipped = [name for name in machines() if name.startswith(context.incomplete)]
+    return shipped + list_files(context.incomplete, YAML_ENDINGS)
+
+
+def list_files(begin: str, endings: Sequence[str] = ()) -> list[str]:
+    """List the files whose paths begin so, those in folders that begin so too; only of some endings where there are."""
+    name = begin.rpartition("/")[2]
+    place = begin.removesuffix(name)
+    folder = Path(place or ".")
+    found = [path for pattern in ("*", "*/*") for path in folder.glob(escape(name) + pattern)]
+    files = [path.relative_to(folder).as_posix() for path in found if path.is_file()]
+    shown = [file for file in sorted(files) if name or not file.startswith(".")]
+    return [place + file for file in shown if not endings or file.endswith(tuple(endings))]
 
 
 Name = Annotated[str, Parameter(completer=complete_machine)]

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
 
 from ..errors import InputError
 from .console import ProgressBar, announce_compiling, print_json, print_text
-from .options import OFF_LIMITS, Json, Mode, OutputPath, Sizes, complete_machine, load_machine
+from .options import OFF_LIMITS, Json, Mode, OutputPath, Sizes, complete_machine, list_files, load_machine
 from .part_job import JobOptions, prepare_part
 from .part_options import PartOptions, ToolLengthText, fit_part, parse_tool_length, read_part
 from .post import MachineOption, WorkpieceText
@@ -22,8 +22,13 @@ if TYPE_CHECKING:
 _ARC_TOLERANCE = 0.01  # mm, as of ``parakin post``
 
 
+def _complete_machine_or_part(context: Any) -> list[str]:
+    """List the shipped machines and the files that begin with what is typed, for the shell's completion."""
+    return list(dict.fromkeys([*complete_machine(context), *list_files(context.incomplete)]))
+
+
 def page(
-    name: Annotated[str, Parameter(completer=complete_machine)],
+    name: Annotated[str, Parameter(completer=_complete_machine_or_part)],
     /,
     *,
     machine: MachineOption | None = None,

@@ -291,6 +291,42 @@ def test_limits_are_the_configurations(tmp_path):
     assert arms.drives[0].high == pytest.approx(klipper_rotary(np.array([[0.0, 0.0, 252.0]]))[0, 0])
 
 
+def test_files_that_a_configuration_reads(tmp_path, capsys):
+    """What M500 has saved counts as the firmware reads it, and so does what a printer.cfg includes."""
+    (tmp_path / "config-override.g").write_text("m665 r131.5 l290.8:290.9:291 x.3 Y-0.2 Z0.1\n; M665 R1\n")
+    (tmp_path / "bed.g").write_text('M117 "M665 R2" M665 H300.2 M208 X-120:120 Z-0.5:300\n')
+    config = 'M665 L200 R100 B120 H250\nM501\nM98 P"/sys/bed.g"\nM98 P"0:/macros/none.g"\n'
+    machine = import_text(tmp_path, "config.g", config)
+    assert "not there, so not read: macros/none.g" in capsys.readouterr().out
+    poses = machine.home + np.random.default_rng(0).uniform(-60.0, 60.0, (1000, 3))
+    assert np.abs(machine.inverse(poses) - reprap_delta(poses)).max() < 1e-8
+    assert machine.drives[1].high == pytest.approx(300.2 + np.sqrt(290.9**2 - 131.5**2))
+    assert machine.drives[0].low == pytest.approx(-0.5 + np.sqrt(290.8**2 - 251.5**2))
+    lines = KLIPPER_DELTA.splitlines(keepends=True)
+    (tmp_path / "towers.cfg").write_text("".join(lines[:8]))
+    printer = import_text(tmp_path, "printer.cfg", "".join(["[include tow*.cfg]\n[include gone.cfg]\n", *lines[8:]]))
+    poses = printer.home + np.random.default_rng(0).uniform(-60.0, 60.0, (1000, 3))
+    assert np.abs(printer.inverse(poses) - klipper_delta(poses)).max() < 1e-8
+
+
+def test_home_is_within_the_axes_limits(tmp_path):
+    """LinuxCNC's own pentapod: its feet are on a wall, so that nothing works over the middle of them."""
+    feet = [(-418, -140), (418, -140), (0, -310), (418, 510), (-418, 510)]
+    rings = [87.0, 114.5, 140.5, 232.5, 258.5]
+    hal = "".join(
+        f"setp pentakins.base.{i}.x {x}\nsetp pentakins.base.{i}.y 500\nsetp pentakins.base.{i}.z {z}\n"
+        f"setp pentakins.effector.{i}.z {rings[i]}\n"
+        for i, (x, z) in enumerate(feet)
+    )
+    limits = "".join(f"[AXIS_{axis}]\nMIN_LIMIT = -250\nMAX_LIMIT = 250\n" for axis in "XYZ")
+    (tmp_path / "wall.hal").write_text(hal)
+    machine = import_text(tmp_path, "wall.ini", PENTAPOD_INI.replace("pentapod.hal", "wall.hal") + limits)
+    assert np.abs(machine.home[:3]).max() < 250.0
+    for (x, z), ring, joint in zip(feet, rings, machine.inverse(machine.home), strict=True):
+        away = np.array([x, 500.0, z]) - machine.home[:3]
+        assert joint == pytest.approx(np.hypot(away[2] - ring, np.hypot(away[0], away[1]) - 80.32))
+
+
 def test_command_says_what_it_did(tmp_path, capsys):
     import_text(tmp_path, "config.g", CONFIG_G, "--json")
     answer = json.loads(capsys.readouterr().out)
@@ -306,6 +342,13 @@ BAD = [
     ("config.g", CONFIG_G.replace("B0.00", "B0.5"), ":4:"),
     ("config.g", "M665 L1:2 R0.5\n", ":1:"),
     ("config.g", "M665 L100 R200\n", "longer"),
+    ("config.g", "M669 K3\nM665 R{global.r}\n", ":2:"),
+    ("config.g", "M665 R100 L200 H-500\n", "stroke"),
+    ("config.g", "M501\n", "not there: config-override.g"),
+    ("config.g", 'M98 P"../x.g"\n', ":1:"),
+    ("a.cfg", "[include a.cfg]\n[printer]\n", "a.cfg:1: include"),
+    ("a.cfg", "[include **x]\n[printer]\n", ":1:"),
+    ("a.cfg", "[include gone.cfg]\n[printer]\n", "not there: gone.cfg"),
     ("a.ini", "[KINS]\nKINEMATICS = trivkins\n", "trivkins"),
     ("a.hal", TRIPOD_HAL, "--units"),
     ("a.ini", HEXAPOD_INI.replace("STEP = 0.5", ""), "hexapod.hal:3"),

@@ -57,10 +57,13 @@ def import_machine(
                 "program": machine.program,
                 "kinematics": machine.kinematics,
                 "files": {"machine": str(output)},
+                "missing": list(machine.missing),
             }
         )
     else:
         print_text(f"{machine.kinematics} of {machine.program}  {output}")
+        if machine.missing:
+            print_text(f"not there, so not read: {', '.join(machine.missing)}")
     return 0
 
 

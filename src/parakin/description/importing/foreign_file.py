@@ -6,12 +6,11 @@ import re
 from pathlib import Path
 
 from ...errors import InputError
+from .configuration_text import read_configuration
 from .foreign_machine import ForeignMachine
 from .klipper import read_klipper
 from .linuxcnc import read_linuxcnc
 from .reprapfirmware import read_reprapfirmware
-
-_LARGEST = 1 << 22  # bytes of a configuration
 
 
 def read_foreign_machine(path: Path, unit: str | None = None) -> ForeignMachine:
@@ -21,19 +20,11 @@ def read_foreign_machine(path: Path, unit: str | None = None) -> ForeignMachine:
 
     Raises :class:`InputError` with file and line for what can't be imported.
     """
-    source = str(path)
-    try:
-        with path.open("rb") as file:
-            content = file.read(_LARGEST + 1)
-    except OSError as error:
-        raise InputError(f"can't be read: {error.strerror or error}", source) from error
-    if len(content) > _LARGEST or b"\0" in content:
-        raise InputError("is no configuration in words", source)
-    text = content.decode("utf-8", "replace")
+    text = read_configuration(path)
     if path.suffix.lower() in (".ini", ".hal"):
         return read_linuxcnc(path, text, unit)
-    if re.search(r"^\s*\[printer\]", text, re.MULTILINE):
-        return read_klipper(text, source)
-    if re.search(r"^\s*M66[59]\b", text, re.MULTILINE | re.IGNORECASE):
-        return read_reprapfirmware(text, source)
-    raise InputError("expected LinuxCNC's .ini or .hal, Klipper's printer.cfg, or RepRapFirmware's config.g", source)
+    if re.search(r"^\s*\[(printer\]|include\s)", text, re.MULTILINE):
+        return read_klipper(path, text)
+    if path.suffix.lower() == ".g" or re.search(r"^\s*M66[59]\b", text, re.MULTILINE | re.IGNORECASE):
+        return read_reprapfirmware(path, text)
+    raise InputError("expected LinuxCNC's .ini or .hal, Klipper's printer.cfg, or RepRapFirmware's config.g", str(path))

@@ -7,6 +7,8 @@ from dataclasses import dataclass, fields
 from math import degrees, hypot, inf, isfinite, pi
 from pathlib import Path
 
+import numpy as np
+
 from ...algebra import IDENTITY
 from ...errors import InputError
 from ...model.elements import Drive, Vector
@@ -25,6 +27,8 @@ class ForeignMachine:
     side : on which side of the base the platform works, 1 above, -1 below, 0 either
     level : height of the base, mm
     turning_axes : names of the pose's angles
+    box : limits of X, Y and Z, mm, where the configuration has them
+    missing : files that the configuration names, and that are not there
     """
 
     program: str
@@ -35,6 +39,8 @@ class ForeignMachine:
     side: int = 0
     level: float = 0.0
     turning_axes: tuple[str, ...] = ()
+    box: tuple[tuple[float, float], ...] = ((-inf, inf),) * 3
+    missing: tuple[str, ...] = ()
 
 
 def format_machine_yaml(machine: ForeignMachine, name: str) -> str:
@@ -53,6 +59,7 @@ def format_machine_yaml(machine: ForeignMachine, name: str) -> str:
             "source: >",
             f"  Imported by parakin from {Path(machine.source).name}.",
             f"  Joints are counted as {machine.program} counts them.",
+            *(f"  Not read, for it was not there: {name}." for name in machine.missing),
             f"motion: {machine.motion}",
             "legs:",
             *(line for leg in machine.legs for line in _format_leg(leg, size)),
@@ -104,28 +111,39 @@ def _format_value(value: float, drive: Drive) -> str:
 
 
 def _find_home(machine: ForeignMachine, size: float) -> Vector:
-    """Find the height over the middle of the feet at which the least margin is greatest."""
+    """Find the tip at which the least margin is greatest, over the middles of the feet and of the axes' limits.
+
+    Poses within the axes' limits are preferred; joints' ranges are kept in any case.
+    """
     starts = [_get_start(leg) for leg in machine.legs]
-    x, y = (round(sum(start[i] for start in starts) / len(starts), 3) + 0.0 for i in range(2))
-    best, home = 0.0, None
-    for step in range(1, _HEIGHTS):
-        for sign in (1.0, -1.0):
-            if machine.side * sign < 0.0:
-                continue
-            tip = (x, y, round(machine.level + sign * 3.0 * size * step / _HEIGHTS, 3))
-            margin = min(_measure_margin(leg, tip, size) for leg in machine.legs)
-            if margin > best:
-                best, home = margin, tip
-    if home is None:
+    columns = [tuple(sum(start[i] for start in starts) / len(starts) for i in range(2))]
+    if all(isfinite(end) for limits in machine.box[:2] for end in limits):
+        columns.append((sum(machine.box[0]) / 2.0, sum(machine.box[1]) / 2.0))
+    signs = [sign for sign in (1.0, -1.0) if not machine.side * sign < 0.0]
+    tips = [
+        (round(x, 3) + 0.0, round(y, 3) + 0.0, round(machine.level + sign * 3.0 * size * step / _HEIGHTS, 3))
+        for x, y in columns
+        for step in range(1, _HEIGHTS)
+        for sign in signs
+    ]
+    with np.errstate(all="ignore"):  # a pose where a leg's direction is undefined has no margin
+        margins = [min(_measure_margin(leg, tip, size) for leg in machine.legs) for tip in tips]
+    inside = [_is_inside(tip, machine.box) for tip in tips]
+    best = max(range(len(tips)), key=lambda i: (margins[i] > 0.0 and inside[i], margins[i]))
+    if not margins[best] > 0.0:
         raise InputError("no pose over the middle of its feet is within the ranges of all joints", machine.source)
-    return home
+    return tips[best]
+
+
+def _is_inside(tip: Vector, box: tuple[tuple[float, float], ...]) -> bool:
+    return all(low <= value <= high for value, (low, high) in zip(tip, box, strict=True))
 
 
 def _measure_margin(leg: Leg, tip: Vector, size: float) -> float:
     """Measure how far a leg is from its limits, as a fraction, with the platform level; NaN or negative out of them."""
     point = tuple(float(x) for x in leg.place_joint(IDENTITY, tip))
     drive, inverse = leg.drives[0], leg.inverse(point, getattr(leg, "branch", ""))
-    if any(not reach.margin > 0.0 for reach in inverse.reach):
+    if not isfinite(inverse.joints[0]) or any(not reach.margin > 0.0 for reach in inverse.reach):
         return -inf
     q, (low, high) = float(inverse.joints[0]), _bound_range(drive, size)
     margins = [2.0 * (q - low) / (high - low), 2.0 * (high - q) / (high - low)]

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from math import atan2, inf, sqrt
+from pathlib import Path
 
 from ...errors import InputError, quote
 from ...model.elements import Drive
+from .configuration_text import check_beside, read_configuration
 from .deltas import ArmSizes, build_arm, build_tower
 from .foreign_machine import ForeignMachine
 
@@ -15,56 +17,82 @@ _STEPPERS = ("stepper_a", "stepper_b", "stepper_c")
 
 
 class _Sections:
-    """The sections of a file, each option with its line; what SAVE_CONFIG has appended replaces what stands above."""
+    """The sections of a file and of those that it includes, each option with its place; the last one counts."""
 
-    def __init__(self, text: str, source: str):
-        self.source = source
-        self.values: dict[tuple[str, str], tuple[str, int]] = {}
+    def __init__(self, path: Path, text: str):
+        self.folder, self.source = path.parent, str(path)
+        self.values: dict[tuple[str, str], tuple[str, tuple[str, int]]] = {}
+        self.missing: tuple[str, ...] = ()
+        self._read(path, text, (path.resolve(),))
+
+    def _read(self, path: Path, text: str, within: tuple[Path, ...]) -> None:
+        """Read a file, and at its place each that it includes; what SAVE_CONFIG has appended stands below."""
         section = ""
         for number, whole in enumerate(text.splitlines(), start=1):
             line = whole.removeprefix("#*#").partition("#")[0].partition(";")[0].rstrip()
             if line.lstrip().startswith("["):
                 section = line.strip().strip("[]").strip()
+                word, _, pattern = section.partition(" ")
+                if word == "include" and pattern:
+                    self._include(path, pattern.strip(), number, within)
             elif (line.strip() and not line[:1].isspace()) or whole.startswith("#*#"):
                 key, _, value = line.replace("=", ":", 1).partition(":")
-                self.values[section, key.strip().lower()] = (value.strip(), number)
+                self.values[section, key.strip().lower()] = (value.strip(), (str(path), number))
 
-    def get_text(self, section: str, key: str, default: str | None = None) -> str:
-        if (section, key) in self.values:
-            return self.values[section, key][0]
-        if default is None:
-            raise InputError(f"[{section}] has no {key}", self.source)
-        return default
+    def _include(self, path: Path, pattern: str, line: int, within: tuple[Path, ...]) -> None:
+        """Read the files that a pattern names; remember one that is not there."""
+        try:
+            files = sorted(path.parent.glob(pattern))
+        except (ValueError, NotImplementedError) as error:  # ** beside other letters, or an absolute path
+            raise InputError(f"include {quote(pattern)}: can't be followed", str(path), line) from error
+        if not files and not any(letter in pattern for letter in "*?["):
+            self.missing += (pattern,)
+        for file in files:
+            chosen = check_beside(file, (self.folder,), "include", str(path), line)
+            if chosen.resolve() in within:
+                raise InputError(f"include {quote(pattern)}: the file includes itself", str(path), line)
+            self._read(chosen, read_configuration(chosen), (*within, chosen.resolve()))
+
+    def _tell_lack(self, section: str, key: str) -> InputError:
+        """Tell an option that is nowhere, and the files where it may be."""
+        files = f" (not there: {', '.join(self.missing)})" if self.missing else ""
+        return InputError(f"[{section}] has no {key}{files}", self.source)
+
+    def get_text(self, section: str, key: str) -> str:
+        if (section, key) not in self.values:
+            raise self._tell_lack(section, key)
+        return self.values[section, key][0]
 
     def get_number(self, section: str, key: str, default: float | None = None, above: float = -inf) -> float:
         """Return a number; ``default`` where it is not given, and an error where there is none."""
         if (section, key) not in self.values:
             if default is None:
-                raise InputError(f"[{section}] has no {key}", self.source)
+                raise self._tell_lack(section, key)
             return default
-        text, line = self.values[section, key]
+        text, place = self.values[section, key]
         try:
             value = float(text)
         except ValueError:
             value = inf
         if not above < value < 1e9:
             expected = "a number" if above == -inf else f"a number above {above:g}"
-            raise InputError(f"{key} {quote(text)}: {expected} expected", self.source, line)
+            raise InputError(f"{key} {quote(text)}: {expected} expected", *place)
         return value
 
 
-def read_klipper(text: str, source: str) -> ForeignMachine:
+def read_klipper(path: Path, text: str) -> ForeignMachine:
     """Read a machine from Klipper's configuration; joints are its steppers a, b and c.
 
     Raises :class:`InputError` for other kinematics.
     """
-    sections = _Sections(text, source)
+    sections = _Sections(path, text)
     kinematics = sections.get_text("printer", "kinematics")
     if kinematics == "delta":
         return _build_delta(sections)
     if kinematics == "rotary_delta":
         return _build_rotary_delta(sections)
-    raise InputError(f"kinematics {quote(kinematics)} can't be imported, expected delta or rotary_delta", source)
+    place = sections.values["printer", "kinematics"][1]
+    raise InputError(f"kinematics {quote(kinematics)} can't be imported, expected delta or rotary_delta", *place)
 
 
 def _build_delta(sections: _Sections) -> ForeignMachine:
@@ -81,7 +109,7 @@ def _build_delta(sections: _Sections) -> ForeignMachine:
         low = bottom + sqrt(max(0.0, rod**2 - widest**2))
         angle = sections.get_number(section, "angle", usual)
         legs.append(build_tower(Drive(section, "mm", low, top), radius, angle, rod))
-    return ForeignMachine("Klipper", "delta", sections.source, "tx ty tz", tuple(legs))
+    return ForeignMachine("Klipper", "delta", sections.source, "tx ty tz", tuple(legs), missing=sections.missing)
 
 
 def _build_rotary_delta(sections: _Sections) -> ForeignMachine:
@@ -101,7 +129,9 @@ def _build_rotary_delta(sections: _Sections) -> ForeignMachine:
         drive = Drive(section, "rad", -inf, _find_elbow_angle(-radius, top - height, upper, lower, sections.source))
         sizes = ArmSizes(upper, lower, 0.0)
         legs.append(build_arm(drive, (radius, 0.0, height), angle, sizes, rises=True, platform_above=False))
-    return ForeignMachine("Klipper", "rotary_delta", sections.source, "tx ty tz", tuple(legs), side=1)
+    return ForeignMachine(
+        "Klipper", "rotary_delta", sections.source, "tx ty tz", tuple(legs), side=1, missing=sections.missing
+    )
 
 
 def _find_elbow_angle(x: float, y: float, upper: float, lower: float, source: str) -> float:

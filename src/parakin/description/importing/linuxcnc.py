@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import inf, radians
 from pathlib import Path
 
@@ -12,6 +12,7 @@ from ...errors import InputError, quote
 from ...model.elements import Drive, Point, Size
 from ...model.legs.length import Length
 from ...model.legs.ring import Ring
+from .configuration_text import check_beside, read_configuration
 from .deltas import ArmSizes, build_arm, build_tower
 from .foreign_machine import ForeignMachine
 
@@ -50,6 +51,15 @@ class _Configuration:
             text = values[0]
         return _parse_number(text, file, line)
 
+    def get_axis_limits(self, axis: str) -> tuple[float, float]:
+        """Return the limits of X, Y or Z, mm; infinite where the ini file has none."""
+        section = self.ini.get(f"AXIS_{axis}", {})
+        low, high = (
+            self.unit * _parse_number(section[key][0], self.source) if section.get(key) else default
+            for key, default in (("MIN_LIMIT", -inf), ("MAX_LIMIT", inf))
+        )
+        return low, high
+
     def make_drive(self, joint: int, unit: str) -> Drive:
         """Make the drive of a joint with the limits of its section."""
         section = self.ini.get(f"JOINT_{joint}", {})
@@ -73,11 +83,16 @@ def read_linuxcnc(path: Path, text: str, unit: str | None) -> ForeignMachine:
     source = str(path)
     ini = _parse_ini(text) if path.suffix.lower() == ".ini" else {}
     pins: dict[str, tuple[str, str, int]] = {}
+    missing: tuple[str, ...] = ()
     if ini:
-        for name in ini.get("HAL", {}).get("HALFILE", []):
-            file = _find_hal_file(path.parent, name.split()[0])
-            if file is not None:
-                pins |= _parse_hal(file.read_text(encoding="utf-8", errors="replace"), str(file))
+        for name in (words.split()[0] for words in ini.get("HAL", {}).get("HALFILE", []) if words):
+            if not name.endswith(".hal"):
+                continue  # a program, which may do anything
+            file = _find_hal_file(path.parent, name, source)
+            if file is None:
+                missing += (name,)
+            else:
+                pins |= _parse_hal(read_configuration(file), str(file))
     else:
         pins = _parse_hal(text, source)
     words = ini.get("KINS", {}).get("KINEMATICS") or [pin.partition(".")[0] for pin in pins] or [""]
@@ -91,7 +106,9 @@ def read_linuxcnc(path: Path, text: str, unit: str | None) -> ForeignMachine:
         raise InputError("no unit of length in a HAL file alone: give --units mm or inch", source)
     if given.lower() not in _UNITS:
         raise InputError(f"unit {quote(given)}: expected mm or inch", source)
-    return _MODULES[kinematics](_Configuration(source, ini, pins, _UNITS[given.lower()]))
+    configuration = _Configuration(source, ini, pins, _UNITS[given.lower()])
+    machine = _MODULES[kinematics](configuration)
+    return replace(machine, box=tuple(configuration.get_axis_limits(axis) for axis in "XYZ"), missing=missing)
 
 
 def _parse_ini(text: str) -> dict[str, dict[str, list[str]]]:
@@ -120,17 +137,11 @@ def _parse_hal(text: str, file: str) -> dict[str, tuple[str, str, int]]:
     return pins
 
 
-def _find_hal_file(folder: Path, name: str) -> Path | None:
-    """Find a HAL file beside the ini file, or in LinuxCNC's library; None for one that is not there, or a program.
-
-    Raises :class:`InputError` for one elsewhere: an ini file from somebody else opens nothing but what came with it.
-    """
+def _find_hal_file(folder: Path, name: str, source: str) -> Path | None:
+    """Find a HAL file beside the ini file, or in LinuxCNC's library; None for one that is not there."""
     file = _LIBRARY / name.removeprefix("LIB:") if name.startswith("LIB:") else folder / name
-    candidates = [file, _LIBRARY / name]
-    chosen = next((candidate for candidate in candidates if candidate.suffix == ".hal" and candidate.is_file()), None)
-    if chosen is not None and not any(chosen.resolve().is_relative_to(top.resolve()) for top in (folder, _LIBRARY)):
-        raise InputError(f"HALFILE {quote(name)} is outside of the ini file's folder; copy it there")
-    return chosen
+    chosen = next((candidate for candidate in (file, _LIBRARY / name) if candidate.is_file()), None)
+    return None if chosen is None else check_beside(chosen, (folder, _LIBRARY), "HALFILE", source)
 
 
 def _parse_number(text: str, file: str, line: int | None = None) -> float:

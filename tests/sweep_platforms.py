@@ -1,22 +1,22 @@
 """Count all solutions of random general platforms: forty complex ones each, the same as PHCpack's where asked.
 
 ``python sweep_platforms.py FIRST LAST LOG`` takes seeds FIRST to LAST - 1 and adds a line to LOG for each; what the log
-has already is not run again. With ``phc`` behind it each platform goes through PHCpack's black box too, which takes
-seconds and loses a solution now and then: then it starts again with other random numbers. With ``systems`` behind it
-the same platforms are systems of quadrics only, tracked from the family's generic member a hundred at a time, which
-takes a fraction of the time of a machine each.
+has already is not run again. With ``phc`` behind it PHCpack tracks its own forty solutions to each platform too, again
+with another phase where two of its paths met; ours are then matched one to one with them, the complex ones as well.
+With ``systems`` behind it the same platforms are systems of quadrics only, tracked from the family's generic member a
+hundred at a time, which takes a fraction of the time of a machine each.
 """
 
 from __future__ import annotations
 
-import subprocess
 import sys
 import tempfile
 from pathlib import Path
 
 import numpy as np
 from independent import orientation
-from test_continuation import draw_platform, platform, read_phc_places, write_phc_system
+from phcpack import describe_closures, match_points, measure_angles, track_by_phcpack
+from test_continuation import draw_platform, platform
 
 from parakin.kinematics.assemblies.generic_member import find_generic_member
 from parakin.kinematics.assemblies.path_tracking import STRICT, align_members, find_meetings, track_members
@@ -25,7 +25,7 @@ from parakin.kinematics.assemblies.study import compute_study_points, make_closu
 
 ALL = 40
 RESTARTS = 5
-SAME = 1e-6  # m
+SAME = 1e-6  # rad, in Study's parameters in m
 BLOCK = 100
 FREE = ("tx", "ty", "tz", "rz", "ry", "rx")
 
@@ -37,29 +37,26 @@ def draw_posed(seed):
     return *draw_platform(rng), pose
 
 
-def solve_by_phcpack(folder, feet, corners, lengths):
-    """The places (k, 3) of all solutions, complex, m; how many starts that took."""
-    system, out = folder / "platform.in", folder / "platform.out"
-    system.write_text(write_phc_system(feet, corners, lengths))
-    places = np.empty((0, 3))
-    starts = 0
-    while len(places) < ALL and starts < RESTARTS:
-        starts += 1
-        subprocess.run(["phc", "-b", system, out], check=True, capture_output=True)
-        again = read_phc_places(out.read_text())
-        places = again if len(again) > len(places) else places
-    return places, starts
+def ask_phcpack(folder, feet, corners, lengths):
+    """PHCpack's solutions (k, 8); how many starts that took."""
+    best = np.empty((0, 8))
+    for start in range(1, RESTARTS + 1):
+        points = track_by_phcpack(folder, describe_closures(feet, corners, lengths), phase=start)
+        best = points if len(points) > len(best) else best
+        if len(best) == ALL:
+            break
+    return best, start
 
 
-def compare(found, theirs):
-    """Say how our answer differs from PHCpack's places."""
-    real = theirs[np.abs(theirs.imag).max(1) < SAME].real
-    apart = np.linalg.norm(found.poses[:, None, :3] / 1000.0 - real, axis=2)
-    unknown = (apart.min(0, initial=np.inf) > SAME).sum()
-    missed = (apart.min(1, initial=np.inf) > SAME).sum()
-    if len(theirs) == ALL and not unknown and not missed:
-        return "agrees"
-    return f"DIFFERS: it has {len(theirs)}, {len(real)} real, {unknown} of them unknown to us, {missed} of ours to it"
+def compare(found, ends, theirs):
+    """Say how our poses, and the ends of our forty paths (40, 8), differ from PHCpack's points."""
+    turns = np.array([orientation(*pose[3:]).reshape(3, 3) for pose in found.poses])
+    poses = compute_study_points(turns.reshape(-1, 3, 3), found.poses[:, :3] / 1000.0)
+    real = theirs[measure_angles(theirs, theirs.conj()).diagonal() < SAME]
+    apart = [match_points(poses, real), match_points(ends, theirs)]
+    if len(theirs) == ALL and max(apart) < SAME:
+        return f"agrees within {apart[0]:.1e}, with the complex ones {apart[1]:.1e}"
+    return f"DIFFERS: it has {len(theirs)}, {len(real)} real, {apart[0]:.1e} and {apart[1]:.1e} from ours"
 
 
 def sweep(folder, seed, by_phcpack):
@@ -77,8 +74,9 @@ def sweep(folder, seed, by_phcpack):
     words = f"{'good' if good else 'BAD'} {len(found)} real {found.complex_count} complex, {ends}, "
     words += f"open by {open_by:.1e} mm, {'proved' if proved else 'not proved'}, home off {near:.1e}"
     if by_phcpack:
-        theirs, starts = solve_by_phcpack(folder, feet, corners, lengths / 1000.0)
-        words += f"; PHCpack {compare(found, theirs)} after {starts}"
+        theirs, starts = ask_phcpack(folder, feet, corners, lengths / 1000.0)
+        ends = track_platforms(make_systems([seed])[0], 1.0, STRICT)
+        words += f"; PHCpack {compare(found, ends.points[0], theirs)} after {starts}"
     return words
 
 
@@ -101,15 +99,20 @@ def track_platforms(systems, phase, tolerance):
     return track_members(first, last, member.roots, tolerance)
 
 
-def sweep_systems(seeds):
-    """What is to be told of each platform: all ends apart, on its quadrics, and the pose drawn among them."""
+def make_systems(seeds):
+    """The systems of the platforms that seeds draw, and the points of the poses that they draw."""
     poses, systems = [], []
     for seed in seeds:
         feet, corners, pose = draw_posed(seed)
         turn = orientation(*pose[3:]).reshape(3, 3)
         systems.append(make_system(feet, corners, pose[:3], turn))
         poses.append(compute_study_points(turn[None], pose[None, :3])[0])
-    systems = make_family(FREE).make_member(np.array(systems, complex))
+    return make_family(FREE).make_member(np.array(systems, complex)), poses
+
+
+def sweep_systems(seeds):
+    """What is to be told of each platform: all ends apart, on its quadrics, and the pose drawn among them."""
+    systems, poses = make_systems(seeds)
     ends = track_platforms(systems, 1.0, 1e-4)
     lines = []
     for row, (pose, system) in enumerate(zip(poses, systems, strict=True)):

@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-import os
-import re
-import shutil
-import subprocess
 from itertools import product
 
 import numpy as np
 import pytest
 from independent import orientation
+from phcpack import PHC, describe_closures, match_points, measure_angles, track_by_phcpack
 from shipped import NAMES, REPRESENTATIVES, load_shipped
 
 import parakin as pk
@@ -26,6 +23,7 @@ from parakin.kinematics.assemblies.machine_quadrics import make_machine_quadrics
 from parakin.kinematics.assemblies.path_tracking import PathEnds, find_meetings
 from parakin.kinematics.assemblies.quadric_family import make_family
 from parakin.kinematics.assemblies.root_boxes import prove_roots
+from parakin.kinematics.assemblies.study import compute_study_points
 from parakin.model.legs.column import Column
 
 # P. Dietmaier, The Stewart-Gough platform of general geometry can have 40 real postures (1998): feet, platform, lengths
@@ -353,63 +351,19 @@ def test_similar_hexagons_on_no_conic_are_not(tmp_path):
     assert found.complete == "all paths accounted for" and np.abs(found.poses - machine.home).max(1).min() < 1e-6
 
 
-PHC = shutil.which("phc")
-
-
-def write_phc_system(feet, corners, lengths):
-    """Write a platform's equations for PHCpack in Study's parameters s + u·i + v·j + w·k and d + x·i + y·j + z·k.
-
-    Of the point c in the frame of the platform and the foot a: 4|d, x, y, z|² + ... as Husty (1996) has them.
-    """
-    square = "(s^2+u^2+v^2+w^2)"
-    turn = [
-        ["(s^2+u^2-v^2-w^2)", "(2*u*v-2*s*w)", "(2*u*w+2*s*v)"],
-        ["(2*u*v+2*s*w)", "(s^2-u^2+v^2-w^2)", "(2*v*w-2*s*u)"],
-        ["(2*u*w-2*s*v)", "(2*v*w+2*s*u)", "(s^2-u^2-v^2+w^2)"],
-    ]
-    moved = ["(s*x-u*d+v*z-w*y)", "(s*y-v*d+w*x-u*z)", "(s*z-w*d+u*y-v*x)"]  # half the place, times the square
-    turned = ["(s*x-u*d-v*z+w*y)", "(s*y-v*d-w*x+u*z)", "(s*z-w*d-u*y+v*x)"]  # the same in the platform's frame
-    lines = ["s*d+u*x+v*y+w*z;", "0.31*s-0.57*u+0.83*v+0.42*w+0.29*d-0.61*x+0.74*y-0.38*z-1;"]
-    for a, c, length in zip(np.asarray(feet), np.asarray(corners), lengths, strict=True):
-        terms = [f"4*(d^2+x^2+y^2+z^2){a @ a + c @ c - length**2:+.17g}*{square}"]
-        terms += [f"{-4.0 * a[i]:+.17g}*{moved[i]}{4.0 * c[i]:+.17g}*{turned[i]}" for i in range(3)]
-        terms += [f"{-2.0 * a[i] * c[j]:+.17g}*{turn[i][j]}" for i in range(3) for j in range(3)]
-        lines.append("".join(terms) + ";")
-    return "8\n" + "\n".join(lines) + "\n"
-
-
-def read_phc_places(text):
-    """Read all finite solutions' places, 2·g·e*/|e|², (k, 3) complex, each once."""
-    points, places = [], []
-    for block in text[text.rindex("THE SOLUTIONS") :].split("the solution for t :")[1:]:
-        numbers = re.findall(r"^ (\w) : +(\S+) +(\S+)", block, re.M)[:8]
-        values = {name: complex(float(real), float(imaginary)) for name, real, imaginary in numbers}
-        x = np.array([values[name] for name in "suvwdxyz"])
-        x = x / np.linalg.norm(x)
-        if abs(x[:4] @ x[:4]) > 1e-4 and not any(abs(np.vdot(x, y)) > 1.0 - 1e-9 for y in points):
-            points.append(x)
-            s, u, v, w, d, a, b, c = x
-            moved = [s * a - u * d + v * c - w * b, s * b - v * d + w * a - u * c, s * c - w * d + u * b - v * a]
-            places.append(2.0 * np.array(moved) / (x[:4] @ x[:4]))
-    return np.array(places)
-
-
 @pytest.mark.skipif(PHC is None, reason="PHCpack is not installed")
-def test_phcpack_finds_the_same_poses(tmp_path):
-    """PARAKIN_PLATFORMS says how many platforms are compared. PHCpack loses a solution now and then."""
-    rng = np.random.default_rng(8)
-    for number in range(int(os.environ.get("PARAKIN_PLATFORMS", "1"))):
-        pose = np.append(rng.uniform(-0.5, 0.5, 2), [rng.uniform(0.8, 2.0), *rng.uniform(-0.6, 0.6, 3)])
-        feet, corners = draw_platform(rng)
-        machine = platform(tmp_path, feet, corners, home=pose)
-        lengths = machine.inverse(machine.home)
-        system, out = tmp_path / f"{number}.in", tmp_path / f"{number}.out"
-        system.write_text(write_phc_system(feet, corners, lengths / 1000.0))
-        subprocess.run([PHC, "-b", system, out], check=True, capture_output=True, timeout=300)
-        theirs = read_phc_places(out.read_text())
-        real = theirs[np.abs(theirs.imag).max(1) < 1e-6].real
-        found = machine.assemblies(lengths)
-        apart = np.linalg.norm(found.poses[:, None, :3] / 1000.0 - real, axis=2)
-        assert len(theirs) <= 40
-        assert (apart.min(0) < 1e-6).all()  # none that we do not know
-        assert len(real) == len(found) or len(theirs) < 40
+@pytest.mark.parametrize("seed", [None, 8], ids=["Dietmaier's", "drawn"])
+def test_phcpack_finds_the_same_poses(seed, tmp_path):
+    """``sweep_platforms.py`` asks PHCpack for platforms by the thousand, and for complex solutions too."""
+    feet, corners, lengths = np.array(FEET), np.array(CORNERS), np.array(LENGTHS)
+    if seed:
+        feet, corners = draw_platform(np.random.default_rng(seed))
+        turn, place = orientation(0.3, -0.2, 0.5).reshape(3, 3), [0.2, -0.1, 1.3]
+        lengths = 1000.0 * np.linalg.norm(place + corners @ turn.T - feet, axis=1)
+    points = track_by_phcpack(tmp_path, describe_closures(feet, corners, lengths / 1000.0))
+    assert len(points) == 40
+    real = points[measure_angles(points, points.conj()).diagonal() < 1e-9]
+    found = platform(tmp_path, feet, corners).assemblies(lengths)
+    assert len(found) == len(real) >= (2 if seed else 40)
+    turns = np.array([orientation(*pose[3:]).reshape(3, 3) for pose in found.poses])
+    assert match_points(compute_study_points(turns, found.poses[:, :3] / 1000.0), real) < 1e-9

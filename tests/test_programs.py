@@ -9,6 +9,7 @@ from dataclasses import replace
 from importlib.resources import files
 from itertools import pairwise
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -18,6 +19,7 @@ from shipped import load_shipped
 import parakin as pk
 from parakin.controllers.joints.letters import assign_joint_letters
 from parakin.controllers.linuxcnc.approach import plan_approach
+from parakin.controllers.linuxcnc.knots import choose_knots
 from parakin.toolpath.path import Event, ToolPath
 from parakin.toolpath.posting.post import post_path
 from parakin.toolpath.posting.wrist_poses import find_pose_with_wrist
@@ -116,6 +118,34 @@ def test_a_spline_through_the_written_points_is_the_trajectory(trajectories, nam
         worst = max(worst, (np.abs(np.diff(joints, axis=0)) / 1e-3 / speeds).max(initial=0.0))
         assert (np.abs(np.diff(joints, 2, axis=0)) / 1e-6 / accelerations).max(initial=0.0) <= 1.05
     assert 0.6 < worst <= 1.002
+
+
+@pytest.mark.parametrize("lasts", [0.005, 0.02])
+@pytest.mark.parametrize("at", [0.108, 0.358, 0.655, 0.748, 0.812, 0.85])
+def test_a_spline_holds_where_an_acceleration_ceases(at, lasts):
+    """A joint that leaves its limit of acceleration to go evenly, wherever that lies among the knots, and mirrored."""
+    most, middle = 5.0, 1.0
+
+    def find_poses(times):
+        time = np.minimum(times, 2.0 * middle - np.asarray(times))
+        since = [np.maximum(time - moment, 0.0) for moment in (at, at + lasts)]
+        gone = most * (time**2 / 2.0 - (since[0] ** 3 - since[1] ** 3) / (6.0 * lasts))
+        whole = 2.0 * most * (0.5 * middle**2 - ((middle - at) ** 3 - (middle - at - lasts) ** 3) / (6.0 * lasts))
+        return np.where(times <= middle, gone, whole - gone)[:, None]
+
+    drive = SimpleNamespace(speed=np.inf, acceleration=most, jerk=np.inf)
+    trajectory = SimpleNamespace(
+        posted=SimpleNamespace(
+            machine=SimpleNamespace(axis_units=("mm",), drives=(drive,), follow=lambda poses, _: poses), mode=""
+        ),
+        at=lambda times: SimpleNamespace(poses=find_poses(np.clip(times, 0.0, 2.0 * middle))),
+        profile=SimpleNamespace(time=np.array([0.0, middle, 2.0 * middle]), speed=np.array([0.0, most * at])),
+        seconds=2.0 * middle,
+    )
+    knots = choose_knots(trajectory)
+    spline = CubicSpline(knots.times, knots.poses[:, 0], bc_type="clamped")
+    accelerations = np.diff(spline(np.arange(0.0, 2.0 * middle, 1e-3)), 2) / 1e-6
+    assert np.abs(accelerations).max() < 1.025 * most
 
 
 @every_place

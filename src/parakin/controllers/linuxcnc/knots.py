@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from ...arrays import Array, Flags
+from ...arrays import Array, Flags, Indices
 from ...toolpath.timing.drive_limits import DriveLimits
 from ...toolpath.timing.trajectory import Trajectory
 
@@ -22,6 +22,7 @@ _LATE = 1e-4  # s: how far a joint may be off, as time at its full speed
 _LIMIT = 1.005  # of a joint's acceleration that the spline may need
 _STANDING = 1e-9  # mm/s of path speed: rounding
 _FEWEST = 4  # intervals between two stands
+_LONGER = 1.5  # of an interval: intervals are halved, so that one is longer by a factor of 2 or more
 _APART = 2e-6  # mm, angles on an arm of 100 mm: nearer knots could be one in a program
 _SLOWEST = 0.11 / 60.0  # mm/s of the tip: just what LinuxCNC obeys
 _MADE_UP = 0.25  # of _SLOWEST: how much faster a tip is that makes up for what it was held back
@@ -141,13 +142,25 @@ def _divide_window(trajectory: Trajectory, window: tuple[float, float], rates: t
     while True:
         spline = CubicSpline(knots, trajectory.at(knots).poses, bc_type=((1, rates[0]), (1, rates[1])))
         off = _find_deviations(trajectory, planned, _follow_cycles(trajectory, cycles, spline(cycles)))
-        bad = np.searchsorted(knots, cycles[off], "right") - 1
-        bad = np.unique(np.concatenate([bad, bad - 1]))  # beside a knot either side may be at fault
-        bad = bad[(bad >= 0) & (bad < len(knots) - 1)]
-        bad = bad[knots[bad + 1] - knots[bad] >= 2.0 * SHORTEST]
+        bad = _find_faulty_intervals(knots, cycles[off])
         if not len(bad):
             return knots
         knots = np.sort(np.concatenate([knots, 0.5 * (knots[bad] + knots[bad + 1])]))
+
+
+def _find_faulty_intervals(knots: Array, times: Array) -> Indices:
+    """Find the intervals between knots to halve for a spline that is off at times (k,): theirs and their neighbours.
+
+    Beside a knot either side may be at fault: the interval behind, and a longer one ahead, whose bend the spline takes
+    back into short ones. None is halved that is shorter than two cycles.
+    """
+    lengths = np.diff(knots)
+    own = np.minimum(np.searchsorted(knots, times, "right") - 1, len(lengths) - 1)
+    ahead = np.minimum(own + 1, len(lengths) - 1)
+    ahead = ahead[lengths[ahead] > _LONGER * lengths[own]]
+    candidates = np.unique(np.concatenate([own, np.maximum(own - 1, 0), ahead]))
+    faulty: Indices = candidates[lengths[candidates] >= 2.0 * SHORTEST]
+    return faulty
 
 
 def _find_fastest(trajectory: Trajectory, window: tuple[float, float]) -> float:

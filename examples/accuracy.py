@@ -28,7 +28,7 @@ def main() -> None:
 
     allowed = pk.allocate_tolerances(accuracy, 0.05, costs={"feet": 1.0, "rods": 2.0, "encoders": 0.1})
     print("50 um all over the workspace:", ", ".join(f"{name} {1e3 * value:.1f} um" for name, value in allowed.items()))
-    for path in pk.write_files(folder, {"accuracy.png": pk.render_accuracy_png(accuracy)}):
+    for path in pk.write_files(folder, {"accuracy.png": pk.render_accuracy_map(accuracy)}):
         print(path)
 
 

@@ -41,7 +41,7 @@ def main() -> None:
         errors = np.linalg.norm((machine.forward(joints, near=check).poses - check)[:, :3], axis=1)
         print(f"{name}: the tip is {1e3 * np.sqrt((errors**2).mean()):.1f} um off, root mean square of 200 poses")
 
-    picture, text = pk.render_residuals_png(result), pk.format_calibrated_yaml(result)
+    picture, text = pk.render_residuals(result), pk.format_calibrated_yaml(result)
     files = {"calibration.png": picture, "tricept_calibrated.yaml": text}
     for path in pk.write_files(folder, files):
         print(path)

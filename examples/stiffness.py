@@ -30,7 +30,7 @@ def main() -> None:
     print(
         f"200 N against X and 100 N against Z move the tip by {np.median(moved):.1f} um, at most by {moved.max():.1f}"
     )
-    for path in pk.write_files(folder, {"stiffness.png": pk.render_stiffness_png(stiffness)}):
+    for path in pk.write_files(folder, {"stiffness.png": pk.render_stiffness_map(stiffness)}):
         print(path)
 
 

@@ -184,7 +184,7 @@ def test_the_command(tmp_path, capsys):
         (["--tolerance", "feet=1mm", "--error", "5um", "--cost", "rods=1"], "costs: unknown rods"),
         (["--tolerance", "feet=1mm", "--over", "Q=1:2"], 'unknown axis "Q"'),
         (["--tolerance", "feet=1mm", "--samples", "0"], "samples: a number from 1"),
-        (["--tolerance", "feet=1mm", "-o", "x.pdf"], "expected a file name that ends in .png"),
+        (["--tolerance", "feet=1mm", "-o", "x.gif"], "expected a file name that ends in .png, .pdf, .svg"),
         ([], "--tolerance"),
     ],
 )

@@ -114,7 +114,11 @@ def test_the_command_finds_the_front_of_the_closed_form(capsys, tmp_path):
     assert bounds[0] == pytest.approx(3.0, rel=1e-5)
     assert rods[-1] == pytest.approx(500.0, rel=1e-5)
     assert rods == pytest.approx([design_orthoglide(200.0, bound).rod for bound in bounds], rel=1e-5)
-    assert sorted(p.name for p in output.iterdir()) == [*(f"design_{n}.yaml" for n in (1, 2, 3)), "front.png"]
+    assert sorted(p.name for p in output.iterdir()) == [
+        *(f"design_{n}.yaml" for n in (1, 2, 3)),
+        "front.pdf",
+        "front.png",
+    ]
     assert pk.load(output / "design_1.yaml").inverse([0.0, 0.0, 0.0]) == pytest.approx([rods[0]] * 3)
     assert (output / "front.png").read_bytes().startswith(b"\x89PNG")
 

@@ -5,9 +5,12 @@ from xml.etree import ElementTree
 
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
+from shipped import load_shipped
 
+import parakin as pk
 from parakin.cli import main
-from parakin.export.atlas_maps import extend_grid
+from parakin.export.position_map import extend_grid, fill_map
 
 COMMANDS = {
     "plane": ("workspace", "hbg80_2d", "--gap", "0.05"),
@@ -15,6 +18,8 @@ COMMANDS = {
     "curves": ("workspace", "hbg80_2d", "--method", "drives"),
     "machine": ("show", "tricept"),
     "map": ("atlas", "hbg80_2d", "--step", "40"),
+    "accuracy": ("accuracy", "rpr3", "--tolerance", "feet=0.05mm", "--samples", "40"),
+    "stiffness": ("stiffness", "hbg80_2d", "--drives", "100N/um", "--samples", "40"),
 }
 SVG = "{http://www.w3.org/2000/svg}"
 
@@ -67,3 +72,17 @@ def test_a_map_goes_on_evenly_beyond_what_is_known():
     near = (x + y < 10.0) & (np.abs(x - y) < 6.0)
     assert extended[near] == pytest.approx(plane[near], abs=1e-12)
     assert np.isnan(extended[-1, -1])
+
+
+def test_an_outline_is_smooth_where_legs_end_to_close():
+    """Arm and rod straight: there no joint tells how near the end is, and the margins jump."""
+    machine = load_shipped("five_bar")
+    grid = [np.linspace(-400.0, 400.0, 81), np.linspace(100.0, 620.0, 53)]  # 10 mm apart
+    axes = Figure().subplots()
+    fill_map(axes, grid, np.ones((81, 53)), pk.region(machine), np.array([0.0, 2.0]), "neither")
+    outline = axes.collections[-1].get_paths()[0].vertices
+    base, arm, rod = (machine.spec.sizes[name] for name in ("base", "arm", "rod"))
+    away = np.linalg.norm(outline[:, None] - [[-base, 0.0], [base, 0.0]], axis=2).max(1)
+    upper = (outline[:, 1] > 400.0) & (np.abs(outline[:, 0]) < 200.0)
+    assert upper.sum() > 100
+    assert np.abs(away[upper] - (arm + rod)).max() < 1.0

@@ -246,7 +246,7 @@ def test_along_a_posted_path(tmp_path, capsys, monkeypatch):
         ("orthoglide", ["--drives", "1N/um", "--force", "Q=5N"], 'unknown axis "Q"'),
         ("orthoglide", ["--drives", "1N/um", "--along", "X"], "--along: goes with a map"),
         ("orthoglide", ["--drives", "1N/um", "--along", "B", "-o", "x.png"], '--along: "B", expected one of X Y Z'),
-        ("orthoglide", ["--drives", "1N/um", "-o", "x.pdf"], "expected a file name that ends in .png"),
+        ("orthoglide", ["--drives", "1N/um", "-o", "x.gif"], "expected a file name that ends in .png, .pdf, .svg"),
         ("orthoglide", ["--drives", "1N/um", "--samples", "0"], "samples: a number from 1"),
         ("orthoglide", [], "drives: the machine's file says no stiffness of rho_x"),
     ],

@@ -22,15 +22,15 @@ if TYPE_CHECKING:
     from .controllers.joints.program_reader import JointProgram, read_joint_program
     from .controllers.linuxcnc.configuration import make_linuxcnc_configuration
     from .controllers.linuxcnc.program import make_linuxcnc_program
-    from .export.accuracy_map import render_accuracy_png
-    from .export.calibration import format_calibrated_yaml, render_residuals_png
+    from .export.accuracy_map import render_accuracy_map
+    from .export.calibration import format_calibrated_yaml, render_residuals
     from .export.comparison_page import render_comparison_page
     from .export.files import write_files
     from .export.force_curves import render_drive_forces
     from .export.machine.picture import render_machine_picture
     from .export.page.page import render_machine_page, render_path_page
     from .export.report.report import render_report
-    from .export.stiffness_map import render_stiffness_png
+    from .export.stiffness_map import render_stiffness_map
     from .export.sweep_folder import SweepResult, run_sweep
     from .export.workspace.meshes import Mesh, make_mesh
     from .families.family import Family
@@ -154,15 +154,15 @@ __all__ = [
     "read_path",
     "read_tool_table",
     "region",
-    "render_accuracy_png",
+    "render_accuracy_map",
     "render_comparison_page",
     "render_drive_forces",
     "render_machine_page",
     "render_machine_picture",
     "render_path_page",
     "render_report",
-    "render_residuals_png",
-    "render_stiffness_png",
+    "render_residuals",
+    "render_stiffness_map",
     "rewind_path",
     "run_sweep",
     "sample_field",
@@ -289,15 +289,15 @@ _LAZY = {
     "read_path": "toolpath.reading.detect",
     "read_tool_table": "toolpath.reading.tool_table",
     "region": "workspaces.certified.region:make_region",
-    "render_accuracy_png": "export.accuracy_map",
+    "render_accuracy_map": "export.accuracy_map",
     "render_comparison_page": "export.comparison_page",
     "render_drive_forces": "export.force_curves",
     "render_machine_page": "export.page.page",
     "render_path_page": "export.page.page",
     "render_machine_picture": "export.machine.picture",
     "render_report": "export.report.report",
-    "render_residuals_png": "export.calibration",
-    "render_stiffness_png": "export.stiffness_map",
+    "render_residuals": "export.calibration",
+    "render_stiffness_map": "export.stiffness_map",
     "sample_field": "workspaces.sampled.distance_field",
     "sample_grid": "workspaces.sampled.grid",
     "sweep_drives": "workspaces.sampled.drive_sweep",

@@ -9,10 +9,11 @@ from typing import TYPE_CHECKING, Annotated
 from cyclopts import Parameter
 
 from ..errors import InputError, quote
+from ..export.figure_file import PICTURES
 from ..export.number_format import format_fixed
 from ..units import LENGTH, QuantityError, name_display_unit, parse_quantity, to_display
 from .console import announce_compiling, format_table, print_json, print_text
-from .options import Json, Name, OutputPath, Sizes, load_machine
+from .options import Json, Name, OutputPath, Sizes, load_machine, require_ending
 from .region_options import parse_axis_ranges, parse_time
 
 if TYPE_CHECKING:
@@ -59,11 +60,10 @@ def accuracy(
     samples
         How many poses of the workspace are looked at; by default 400.
     output
-        A map of the error to write, .png.
+        A map of the error to write: .png, or .pdf or .svg for a printed page.
     """
     machine = load_machine(name, sizes)
-    if output is not None and output.suffix.lower() != ".png":
-        raise InputError(f"{quote(output)}: expected a file name that ends in .png", "--output")
+    require_ending(output, PICTURES)
     if cost is not None and error is None:
         raise InputError("goes with --error", "--cost")
     stated = split_pairs(tolerance, "--tolerance", "feet=0.05mm")
@@ -91,10 +91,10 @@ def accuracy(
 def _write_map(result: Accuracy, output: Path | None) -> dict[str, str]:
     if output is None:
         return {}
-    from ..export.accuracy_map import render_accuracy_png
+    from ..export.accuracy_map import render_accuracy_map
     from ..export.files import write_files
 
-    write_files(output.parent, {output.name: render_accuracy_png(result)})
+    write_files(output.parent, {output.name: render_accuracy_map(result, output.suffix.lower())})
     return {"map": str(output)}
 
 

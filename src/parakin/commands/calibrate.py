@@ -8,11 +8,12 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 from cyclopts import Parameter
 
-from ..errors import InputError, PoseError, quote
+from ..errors import InputError, PoseError
+from ..export.figure_file import PICTURES
 from ..export.number_format import format_fixed
 from ..units import ANGLE, LENGTH, QuantityError, QuantityKind, name_display_unit, parse_quantity, to_display
 from .console import announce_compiling, format_table, print_json, print_text
-from .options import Json, Name, OutputPath, Sizes, load_machine
+from .options import Json, Name, OutputPath, Sizes, load_machine, require_ending
 
 if TYPE_CHECKING:
     from ..arrays import Array
@@ -83,7 +84,7 @@ def calibrate(
     output
         A machine file to write, .yaml; of a plan a table, .csv.
     picture
-        A picture of the residuals to write, .png.
+        A picture of the residuals to write: .png, or .pdf or .svg for a printed page.
     """
     machine = load_machine(name, sizes)
     _check_outputs(plan, output, picture)
@@ -118,13 +119,13 @@ def _calibrate(machine: Machine, rows: Measurements, path: Path, free: list[str]
 
 def _show(calibration: Calibration, output: Path | None, picture: Path | None, json: bool) -> None:
     """Write the files of a calibration, and print it."""
-    from ..export.calibration import format_calibrated_yaml, render_residuals_png
+    from ..export.calibration import format_calibrated_yaml, render_residuals
 
     contents: dict[str, tuple[Path, Content]] = {}
     if output is not None:
         contents["machine"] = output, format_calibrated_yaml(calibration)
     if picture is not None:
-        contents["picture"] = picture, render_residuals_png(calibration)
+        contents["picture"] = picture, render_residuals(calibration, picture.suffix.lower())
     files = _write(contents)
     if json:
         from ..export.json.calibration import encode_calibration
@@ -135,12 +136,10 @@ def _show(calibration: Calibration, output: Path | None, picture: Path | None, j
 
 
 def _check_outputs(plan: int | None, output: Path | None, picture: Path | None) -> None:
-    ending = ".yaml" if plan is None else ".csv"
-    if output is not None and output.suffix.lower() != ending:
-        raise InputError(f"{quote(output)}: expected a file name that ends in {ending}", "--output")
-    if picture is not None and (plan is not None or picture.suffix.lower() != ".png"):
-        what = "a plan has none" if plan is not None else f"{quote(picture)}: expected a file name that ends in .png"
-        raise InputError(what, "--picture")
+    require_ending(output, (".yaml" if plan is None else ".csv",))
+    if picture is not None and plan is not None:
+        raise InputError("a plan has none", "--picture")
+    require_ending(picture, PICTURES, "--picture")
 
 
 def _write(contents: dict[str, tuple[Path, Content]]) -> dict[str, str]:

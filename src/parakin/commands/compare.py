@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
-from ..errors import InputError, quote
+from ..errors import InputError
 from .accuracy import split_pairs
 from .console import announce_compiling, format_table, print_json, print_remark, print_text
-from .options import Json, OutputPath, complete_machine, load_machine
+from .options import Json, OutputPath, complete_machine, load_machine, require_ending
 from .stiffness import split_words
 
 if TYPE_CHECKING:
@@ -50,8 +50,7 @@ def compare(
     output
         A page to write, .html: the machines' pictures and figures side by side.
     """
-    if output is not None and output.suffix.lower() != ".html":
-        raise InputError(f"{quote(output)}: expected a file name that ends in .html", "--output")
+    require_ending(output, (".html",))
     if len(names) < 2:
         raise InputError("two machines at least expected", "compare")
     machines = [load_machine(name) for name in names]

@@ -12,7 +12,7 @@ from ..errors import InputError, quote, suggest
 from ..export.json.design import encode_design
 from ..export.number_format import format_fixed
 from .console import announce_compiling, print_json, print_text
-from .options import YAML_ENDINGS, Json, OutputPath, list_files
+from .options import YAML_ENDINGS, Json, OutputPath, list_files, require_ending
 from .region_options import parse_length
 
 if TYPE_CHECKING:
@@ -70,8 +70,7 @@ def design(
         raise InputError("expected beside a family's name", "--cube" if cube is None else "--amplification")
     edge = parse_length(cube, "--cube")
     assert edge is not None
-    if output is not None and output.suffix.lower() not in YAML_ENDINGS:
-        raise InputError(f'"{output}": expected a file name that ends in .yaml', "--output")
+    require_ending(output, YAML_ENDINGS)
     announce_compiling()
     _refuse_family(family)
     from ..performance.design import DESIGNS

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..errors import InputError, PoseError, quote
+from ..export.figure_file import SCREEN
 from ..units import name_display_unit, to_display
 from .console import ProgressBar, announce_compiling, format_table, print_json, print_text
 from .design_problem import read_design_problem
@@ -45,14 +46,14 @@ def design_by_search(path: Path, output: Path | None, count: int, time: float, j
 
 
 def _write_designs(designs: Designs, output: Path) -> list[str]:
-    from ..export.designs import format_proved_yaml, render_front_png
+    from ..export.designs import format_proved_yaml, render_front
     from ..export.files import write_files
 
     files: dict[str, Content] = {
         f"design_{number}.yaml": format_proved_yaml(designs, number - 1) for number in range(1, len(designs.front) + 1)
     }
     if len(designs.problem.objectives) > 1:
-        files["front.png"] = render_front_png(designs)
+        files |= {f"front{kind}": render_front(designs, kind) for kind in (SCREEN, ".pdf")}
     write_files(output, files)
     return [str(output / name) for name in files]
 

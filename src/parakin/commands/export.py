@@ -9,7 +9,7 @@ from cyclopts import Parameter
 
 from ..errors import InputError
 from .console import print_json, print_text
-from .options import Json, Name, OutputPath, Sizes, load_machine
+from .options import Json, Name, OutputPath, Sizes, load_machine, require_ending
 from .values import parse_row
 
 if TYPE_CHECKING:
@@ -84,8 +84,7 @@ def export(
     machine = load_machine(name, sizes)
     ending = _ENDINGS[to]
     output = Path(f"{machine.name}{ending}") if output is None else output
-    if output.suffix.lower() != ending:
-        raise InputError(f'"{output}": expected a file name that ends in {ending}', "--output")
+    require_ending(output, (ending,))
     if at is not None and to not in _POSED:
         raise InputError(f"{to} has no pose, only {' and '.join(_POSED)} have one", "--at")
     pose = None if at is None else parse_row(at.split(","), machine.axes, machine.axis_units, machine.home, "--at")

@@ -8,11 +8,12 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
-from ..errors import InputError, quote
+from ..errors import InputError
+from ..export.figure_file import PICTURES
 from ..export.number_format import format_fixed, format_use
 from .console import ProgressBar, announce_compiling, format_table, print_json, print_remark, print_text
 from .force_option import parse_cutting_force
-from .options import OFF_LIMITS, Json, Mode, Name, OutputPath, Sizes, load_machine
+from .options import OFF_LIMITS, Json, Mode, Name, OutputPath, Sizes, load_machine, require_ending
 from .part_options import (
     FrameChoice,
     PartOptions,
@@ -30,8 +31,6 @@ from .workpiece import parse_workpiece
 if TYPE_CHECKING:
     from ..model.elements import BodyBuild
     from ..toolpath.timing.drive_forces import DriveForces
-
-_FIGURES = (".png", ".pdf", ".svg")
 
 
 def forces(
@@ -107,10 +106,8 @@ def forces(
 
 
 def _check_options(output: Path | None, csv: Path | None, arc_tolerance: float) -> None:
-    if output is not None and output.suffix.lower() not in _FIGURES:
-        raise InputError(f"{quote(output)}: expected a file name that ends in .png, .pdf or .svg", "--output")
-    if csv is not None and csv.suffix.lower() != ".csv":
-        raise InputError(f"{quote(csv)}: expected a file name that ends in .csv", "--csv")
+    require_ending(output, PICTURES)
+    require_ending(csv, (".csv",), "--csv")
     if not arc_tolerance > 0.0:
         raise InputError("expected a length above zero, in mm", "--arc-tolerance")
 

@@ -8,7 +8,7 @@ from typing import Literal
 
 from ..errors import InputError
 from .console import print_json, print_text
-from .options import YAML_ENDINGS, Json, OutputPath
+from .options import YAML_ENDINGS, Json, OutputPath, require_ending
 
 
 def import_machine(
@@ -35,8 +35,7 @@ def import_machine(
 
     machine = read_foreign_machine(file, units)
     output = Path(f"{file.stem}.yaml") if output is None else output
-    if output.suffix.lower() not in YAML_ENDINGS:
-        raise InputError(f'"{output}": expected a file name that ends in .yaml', "--output")
+    require_ending(output, YAML_ENDINGS)
     text = format_machine_yaml(machine, _make_word(output.stem))
     with tempfile.TemporaryDirectory() as folder:  # what is written is a machine
         trial = Path(folder) / output.name

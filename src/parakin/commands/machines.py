@@ -13,7 +13,7 @@ from ..export.json.machine import LOADS, MOTOR, RATES, encode_details, encode_ma
 from ..export.number_format import format_fixed
 from ..units import name_display_unit
 from .console import format_table, print_json, print_text
-from .options import Json, Name, OutputPath, Sizes, load_machine
+from .options import Json, Name, OutputPath, Sizes, load_machine, require_ending
 from .page import refuse_foreign_file
 
 if TYPE_CHECKING:
@@ -116,8 +116,7 @@ def _ask_for_page(machine: Machine, force: bool) -> Path | None:
 
 def _write_picture(machine: Machine, output: Path, force: bool) -> None:
     kind = output.suffix.lower()
-    if kind not in (".html", *PICTURES):
-        raise InputError(f'"{output}": expected a file name that ends in .html, {", ".join(PICTURES)}', "--output")
+    require_ending(output, (".html", *PICTURES))
     from ..export.files import write_files
     from ..export.machine.picture import render_machine_picture
     from ..export.page.page import render_machine_page

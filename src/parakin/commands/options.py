@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
 
-from ..errors import InputError, InputErrors
+from ..errors import InputError, InputErrors, quote
 
 if TYPE_CHECKING:
     from ..machine import Machine
@@ -46,6 +46,12 @@ Mode = Annotated[
 ]
 OutputPath = Annotated[Path | None, Parameter(name=["--output", "-o"])]  # each command says what it writes there
 Json = Annotated[bool, Parameter(name="--json", help="Print one JSON object and nothing else.")]
+
+
+def require_ending(path: Path | None, endings: Sequence[str], option: str = "--output") -> None:
+    """Refuse a file that a command can't write, by its ending."""
+    if path is not None and path.suffix.lower() not in endings:
+        raise InputError(f"{quote(str(path))}: expected a file name that ends in {', '.join(endings)}", option)
 
 
 def load_machine(name: str, sizes: Sequence[str] | None = None) -> Machine:

@@ -9,7 +9,17 @@ from cyclopts import Parameter
 
 from ..errors import InputError
 from .console import ProgressBar, announce_compiling, print_json, print_text
-from .options import OFF_LIMITS, Json, Mode, OutputPath, Sizes, complete_machine, list_files, load_machine
+from .options import (
+    OFF_LIMITS,
+    Json,
+    Mode,
+    OutputPath,
+    Sizes,
+    complete_machine,
+    list_files,
+    load_machine,
+    require_ending,
+)
 from .part_job import JobOptions, prepare_part
 from .part_options import PartOptions, ToolLengthText, fit_part, parse_tool_length, read_part
 from .post import MachineOption, WorkpieceText
@@ -62,8 +72,7 @@ def page(
     if machine is None and (workpiece, tool_length, mode) != (None, None, None):
         raise InputError("only a part has a workpiece, a tool length and a mode; expected --machine", name)
     output = Path(f"{chosen.name if machine is None else Path(name).stem}.html") if output is None else output
-    if output.suffix.lower() != ".html":
-        raise InputError(f'"{output}": expected a file name that ends in .html', "--output")
+    require_ending(output, (".html",))
     refuse_foreign_file(output, force)
     from ..export.files import write_files
     from ..export.page.page import render_machine_page, render_path_page

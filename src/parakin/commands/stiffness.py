@@ -9,12 +9,13 @@ from typing import TYPE_CHECKING, Annotated
 from cyclopts import Parameter
 
 from ..errors import InputError, quote
+from ..export.figure_file import PICTURES
 from ..export.number_format import format_fixed
 from ..units import to_display
 from .accuracy import split_pairs
 from .console import announce_compiling, format_table, print_json, print_remark, print_text
 from .force_option import parse_force
-from .options import OFF_LIMITS, Json, Name, OutputPath, Sizes, load_machine
+from .options import OFF_LIMITS, Json, Name, OutputPath, Sizes, load_machine, require_ending
 
 if TYPE_CHECKING:
     from ..arrays import Array, Indices
@@ -63,14 +64,15 @@ def stiffness(
     samples
         How many poses of the workspace are looked at; by default 400.
     output
-        A map to write, .png: of stiffness, or with --force of the deflection; or with --csv, .csv: both at each row.
+        A map to write, of stiffness, or with --force of the deflection: .png, or .pdf or .svg for a printed page; or
+        with --csv, .csv: both at each row.
     """
     machine = load_machine(name, sizes)
     if csv is not None and samples is not None:
         raise InputError("there is a file of poses, expected one of them", "--samples")
     if along is not None and (force is not None or output is None or csv is not None):
         raise InputError("goes with a map, --output, and without --force", "--along")
-    _check_output(output, ".png" if csv is None else ".csv")
+    require_ending(output, PICTURES if csv is None else (".csv",))
     of_drives = _read_drives(drives)
     of_struts = split_words([struts], "--struts") if struts is not None and "=" in struts else struts
     wanted = parse_force(machine, force)
@@ -106,11 +108,6 @@ def _read_drives(texts: list[str] | None) -> dict[str, str] | str | None:
     if texts is None:
         return None
     return split_words(texts, "--drives") if any("=" in text for text in texts) else ",".join(texts)
-
-
-def _check_output(output: Path | None, ending: str) -> None:
-    if output is not None and output.suffix.lower() != ending:
-        raise InputError(f"{quote(output)}: expected a file name that ends in {ending}", "--output")
 
 
 def _find_unreachable(result: Stiffness, csv: Path | None, lines: Indices | None) -> str | None:
@@ -153,9 +150,10 @@ def _write(
     from ..export.files import write_files
 
     if lines is None:
-        from ..export.stiffness_map import render_stiffness_png
+        from ..export.stiffness_map import render_stiffness_map
 
-        write_files(output.parent, {output.name: render_stiffness_png(result, along=along, force=force)})
+        content = render_stiffness_map(result, along=along, force=force, suffix=output.suffix.lower())
+        write_files(output.parent, {output.name: content})
         return {"map": str(output)}
     from ..export.tables.stiffness import format_stiffness_csv
 

@@ -12,7 +12,7 @@ from cyclopts import Parameter
 from ..errors import InputError, PoseError
 from ..export.json.text import format_json
 from .console import ProgressBar, announce_compiling, print_json, print_remark, print_text
-from .options import OFF_LIMITS, Json, Mode, Name, Sizes, load_machine
+from .options import OFF_LIMITS, Json, Mode, Name, Sizes, load_machine, require_ending
 from .region_options import AllParts, At, Every, Some, Time, Without, parse_length, parse_time, read_region
 from .workspace_inside import InsideOptions, check_inside, encode_inside, explore_inside, format_inside
 from .workspace_methods import Effort, Method, find_workspace
@@ -175,8 +175,7 @@ def _sort_files(paths: Sequence[Path], method: str, dimension: int) -> dict[str,
     files: dict[str, Path] = {}
     for path in paths:
         suffix = path.suffix.lower()
-        if suffix not in SUFFIXES:
-            raise InputError(f'"{path}": expected a file name that ends in {", ".join(SUFFIXES)}', "--output")
+        require_ending(path, SUFFIXES)
         if suffix in files:
             raise InputError(f'"{path}": a second {suffix}', "--output")
         reason = explain_unfit(suffix, method, dimension)

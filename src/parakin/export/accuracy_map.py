@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from ..arguments import check_arguments
+from .figure_file import SCREEN
 from .position_map import MapText, render_position_map
 
 if TYPE_CHECKING:
@@ -13,8 +14,10 @@ if TYPE_CHECKING:
 
 
 @check_arguments
-def render_accuracy_png(accuracy: Accuracy) -> bytes:
+def render_accuracy_map(accuracy: Accuracy, suffix: str = SCREEN) -> bytes:
     """Render the tip's root mean square error over the first two translations, all else as at home.
+
+    suffix : of the file, ``.png``, ``.pdf`` or ``.svg``
 
     Raises :class:`PoseError` for a machine of fewer translations.
     """
@@ -28,4 +31,4 @@ def render_accuracy_png(accuracy: Accuracy) -> bytes:
 
     shown = ", ".join(f"{t.name} ±{t.value:.6g} {t.unit}" for t in tolerances)
     text = MapText(f"{machine.name}: accuracy", shown, "tip's error, root mean square [µm]", "viridis_r")
-    return render_position_map(machine, accuracy.poses, compute, text)
+    return render_position_map(machine, accuracy.poses, compute, text, suffix)

@@ -13,16 +13,14 @@ from ..performance.atlas import PerformanceMap
 from ..performance.singularities import PARALLEL
 from .colours import FAINT, INK
 from .figure_file import render_figure
+from .position_map import COLOURED, fill_map, fit_to_allowed
 from .workspace.describe import describe_region
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-_GREY, _OUTLINE = "#607d8b", "#37474f"
+_GREY = "#607d8b"
 _LEVELS = 24
-_ROUNDING = 1e-12
-_BORDER = 0.05  # of what is allowed, beside it
-_COLOURED = 98.0  # percent of the positions that have colours of their own: near a singularity numbers grow without end
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,23 +90,6 @@ def _list_panels(map_: PerformanceMap) -> list[_MapPanel]:
     ]
 
 
-def extend_grid(values: Array) -> Array:
-    """Extend values (x, y) by two places beyond those that are known, evenly along the axes: the mean of all ways.
-
-    NaN farther away. A contour then ends where the values lead, and not at the last place that is known.
-    """
-    for _ in range(2):
-        padded = np.pad(values, 2, constant_values=np.nan)
-        ways = []
-        for axis, way in ((0, 1), (0, -1), (1, 1), (1, -1)):
-            near, far = (np.roll(padded, way * places, axis)[2:-2, 2:-2] for places in (1, 2))
-            ways.append(2.0 * near - far)
-        count = np.isfinite(ways).sum(0)
-        mean = np.where(np.isfinite(ways), ways, 0.0).sum(0) / np.maximum(count, 1)
-        values = np.where(np.isnan(values) & (count > 0), mean, values)
-    return values
-
-
 def _draw_panel(figure: Figure, axes: Any, map_: PerformanceMap, panel: _MapPanel) -> None:
     from matplotlib.colors import LogNorm, TwoSlopeNorm
 
@@ -117,11 +98,8 @@ def _draw_panel(figure: Figure, axes: Any, map_: PerformanceMap, panel: _MapPane
     axes.set_aspect("equal")
     if len(x) < 2 or len(y) < 2 or not len(inside):
         return
-    for set_ends, line, across in ((axes.set_xlim, x, 1), (axes.set_ylim, y, 0)):
-        shown = line[map_.allowed.any(across)]
-        border = map_.step + _BORDER * float(np.ptp(shown))
-        set_ends(max(line[0], shown[0] - border), min(line[-1], shown[-1] + border))
-    low, high = float(inside.min()), float(np.percentile(inside, _COLOURED) if panel.endless else inside.max())
+    fit_to_allowed(axes, map_.grid, map_.allowed)
+    low, high = float(inside.min()), float(np.percentile(inside, COLOURED) if panel.endless else inside.max())
     if not high > low:
         low, high = low - 0.5 * abs(low) - 1e-6, high + 0.5 * abs(high) + 1e-6
     crossed = low < 0.0 < high
@@ -132,16 +110,9 @@ def _draw_panel(figure: Figure, axes: Any, map_: PerformanceMap, panel: _MapPane
     elif panel.endless:
         colours["norm"], levels = LogNorm(low, high), np.geomspace(low, high, _LEVELS + 1)
     known = np.where(np.isinf(panel.values), high, panel.values)
-    beyond = np.clip(extend_grid(known), low, high)
-    values = np.ma.masked_invalid(np.where(np.isfinite(known), known, beyond).T)
-    filled = axes.contourf(x, y, values, levels=levels, extend="max" if panel.endless else "neither", **colours)
-    outside = np.fmin(extend_grid(map_.slack), -_ROUNDING)  # where no leg closes
-    room = np.nan_to_num(np.where(np.isfinite(map_.slack), map_.slack, outside), nan=-1.0).T
-    if room.min() < 0.0:
-        axes.contourf(x, y, room, levels=[room.min() - 1.0, 0.0], colors="white")
-        axes.contour(x, y, room, levels=[0.0], colors=_OUTLINE, linewidths=1.2)
+    filled = fill_map(axes, map_.grid, known, map_.region, levels, "max" if panel.endless else "neither", **colours)
     if crossed:
-        axes.contour(x, y, np.ma.masked_where(room < 0.0, values), levels=[0.0], colors="#b71c1c", linewidths=1.2)
+        axes.contour(x, y, np.where(map_.slack >= 0.0, known, np.nan).T, levels=[0.0], colors="#b71c1c", linewidths=1.2)
     bar = figure.colorbar(filled, cax=axes.inset_axes((1.03, 0.0, 0.045, 1.0)))
     if panel.endless:
         ticks = levels[:: _LEVELS // 6].tolist()

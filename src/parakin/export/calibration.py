@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from io import BytesIO
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -10,8 +9,11 @@ import numpy as np
 from ..arguments import check_arguments
 from ..units import name_display_unit, to_display
 from .colours import FAINT, INK
+from .figure_file import SCREEN, render_figure
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
     from ..calibration.calibration import Calibration
 
 _WAS, _IS = "#b0bec5", "#1565c0"
@@ -36,29 +38,31 @@ def format_calibrated_yaml(calibration: Calibration) -> str:
 
 
 @check_arguments
-def render_residuals_png(calibration: Calibration) -> bytes:
-    """Render each measurement's residual before and after the calibration, in the measured number's unit, log scale."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
+def render_residuals(calibration: Calibration, suffix: str = SCREEN) -> bytes:
+    """Render each measurement's residual before and after the calibration, in the measured number's unit, log scale.
 
+    suffix : of the file, ``.png``, ``.pdf`` or ``.svg``
+    """
     lengths = sum(axis in "XYZ" for axis in calibration.measured.axes) + (calibration.measured.distances is not None)
-    figure = Figure(figsize=(9.0, 4.2), dpi=150, facecolor="white")
-    canvas = FigureCanvasAgg(figure)
-    axes = figure.add_axes((0.09, 0.14, 0.88, 0.68))
     rows = np.arange(1, len(calibration.residuals) + 1)
-    for residuals, colour, label in ((calibration.before, _WAS, "before"), (calibration.residuals, _IS, "calibrated")):
-        sizes = 1e3 * np.linalg.norm(residuals[:, :lengths], axis=1)
-        axes.plot(rows, np.maximum(sizes, 1e-3), "o-", color=colour, markersize=4, linewidth=1.0, label=label)
-    axes.axhline(1e3 * calibration.measured.noise.length, color=INK, linewidth=0.8, linestyle=":", label="noise")
-    axes.set_yscale("log")
-    axes.grid(color=FAINT, linewidth=0.6)
-    axes.set_xlabel("measurement", color=INK, fontsize=9)
-    axes.set_ylabel("residual length [µm]", color=INK, fontsize=9)
-    axes.legend(frameon=False, fontsize=9, ncols=3, loc="lower right", bbox_to_anchor=(1.0, 1.0))
-    name = calibration.family.machine.name
-    figure.text(
-        0.03, 0.92, f"{name}: {len(calibration.sizes)} numbers calibrated", color=INK, fontsize=13, weight="bold"
-    )
-    data = BytesIO()
-    canvas.print_png(data)  # type: ignore[no-untyped-call]
-    return data.getvalue()
+
+    def draw(figure: Figure) -> None:
+        axes = figure.add_axes((0.09, 0.14, 0.88, 0.68))
+        for residuals, colour, label in (
+            (calibration.before, _WAS, "before"),
+            (calibration.residuals, _IS, "calibrated"),
+        ):
+            sizes = 1e3 * np.linalg.norm(residuals[:, :lengths], axis=1)
+            axes.plot(rows, np.maximum(sizes, 1e-3), "o-", color=colour, markersize=4, linewidth=1.0, label=label)
+        axes.axhline(1e3 * calibration.measured.noise.length, color=INK, linewidth=0.8, linestyle=":", label="noise")
+        axes.set_yscale("log")
+        axes.grid(color=FAINT, linewidth=0.6)
+        axes.set_xlabel("measurement", color=INK, fontsize=9)
+        axes.set_ylabel("residual length [µm]", color=INK, fontsize=9)
+        axes.legend(frameon=False, fontsize=9, ncols=3, loc="lower right", bbox_to_anchor=(1.0, 1.0))
+
+    def add_heading(figure: Figure) -> None:
+        title = f"{calibration.family.machine.name}: {len(calibration.sizes)} numbers calibrated"
+        figure.text(0.03, 0.92, title, color=INK, fontsize=13, weight="bold", parse_math=False)
+
+    return render_figure((9.0, 4.2), draw, add_heading, suffix)

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
-from io import BytesIO
+from typing import TYPE_CHECKING
 
 from ..synthesis.designs import Designs
 from ..synthesis.wants import WANTS
 from .colours import FAINT, INK
+from .figure_file import SCREEN, render_figure
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 _COLOUR = "#1565c0"
 
@@ -32,31 +36,31 @@ def format_proved_yaml(designs: Designs, index: int) -> str:
     )
 
 
-def render_front_png(designs: Designs) -> bytes:
-    """Render the Pareto front, each objective against the first one, its designs by their numbers."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
+def render_front(designs: Designs, suffix: str = SCREEN) -> bytes:
+    """Render the Pareto front, each objective against the first one, its designs by their numbers.
 
+    suffix : of the file, ``.png``, ``.pdf`` or ``.svg``
+    """
     problem, front = designs.problem, designs.front
     first, *others = problem.objectives
     width = 0.8 + 5.6 * len(others)
-    figure = Figure(figsize=(width, 4.8), dpi=150, facecolor="white")
-    canvas = FigureCanvasAgg(figure)
     units = {name: f" [{want.unit}]" for name, want in WANTS.items() if want.unit}
     units |= {parameter.name: f" [{parameter.unit}]" for parameter in problem.family.parameters}
-    for place, second in enumerate(others):
-        axes = figure.add_axes(((0.9 + 5.6 * place) / width, 0.13, 4.9 / width, 0.74))
-        points = [(design.values[first], design.values[second]) for design in front]
-        axes.plot(
-            *zip(*points, strict=True), "o-" if len(others) == 1 else "o", color=_COLOUR, markersize=5, linewidth=1.0
-        )
-        for number, point in enumerate(points, 1):
-            axes.annotate(str(number), point, xytext=(5, 5), textcoords="offset points", color=INK, fontsize=9)
-        axes.grid(color=FAINT, linewidth=0.6)
-        axes.set_xlabel(first + units.get(first, ""), color=INK, fontsize=9)
-        axes.set_ylabel(second + units.get(second, ""), color=INK, fontsize=9)
-    title = f"{problem.machine.name}: {len(front)} designs, none better than another"
-    figure.text(0.2 / width, 0.93, title, color=INK, fontsize=13, weight="bold")
-    data = BytesIO()
-    canvas.print_png(data)  # type: ignore[no-untyped-call]
-    return data.getvalue()
+
+    def draw(figure: Figure) -> None:
+        for place, second in enumerate(others):
+            axes = figure.add_axes(((0.9 + 5.6 * place) / width, 0.13, 4.9 / width, 0.74))
+            points = [(design.values[first], design.values[second]) for design in front]
+            line = "o-" if len(others) == 1 else "o"
+            axes.plot(*zip(*points, strict=True), line, color=_COLOUR, markersize=5, linewidth=1.0)
+            for number, point in enumerate(points, 1):
+                axes.annotate(str(number), point, xytext=(5, 5), textcoords="offset points", color=INK, fontsize=9)
+            axes.grid(color=FAINT, linewidth=0.6)
+            axes.set_xlabel(first + units.get(first, ""), color=INK, fontsize=9)
+            axes.set_ylabel(second + units.get(second, ""), color=INK, fontsize=9)
+
+    def add_heading(figure: Figure) -> None:
+        title = f"{problem.machine.name}: {len(front)} designs, none better than another"
+        figure.text(0.2 / width, 0.93, title, color=INK, fontsize=13, weight="bold", parse_math=False)
+
+    return render_figure((width, 4.8), draw, add_heading, suffix)

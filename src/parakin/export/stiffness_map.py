@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..arguments import RowsLike, check_arguments
+from .figure_file import SCREEN
 from .position_map import MapText, render_position_map
 
 if TYPE_CHECKING:
@@ -15,13 +16,14 @@ if TYPE_CHECKING:
 
 
 @check_arguments
-def render_stiffness_png(
-    stiffness: Stiffness, *, along: RowsLike | None = None, force: RowsLike | None = None
+def render_stiffness_map(
+    stiffness: Stiffness, *, along: RowsLike | None = None, force: RowsLike | None = None, suffix: str = SCREEN
 ) -> bytes:
     """Render the tip's least stiffness over the first two translations, all else as at home.
 
     along : instead the stiffness along this direction, as in :meth:`Stiffness.along`
     force : instead how far the tip gives way to this force, as in :meth:`Stiffness.deflect`
+    suffix : of the file, ``.png``, ``.pdf`` or ``.svg``
 
     Raises :class:`PoseError` for a machine of fewer translations.
     """
@@ -40,7 +42,7 @@ def render_stiffness_png(
     else:
         which = "least over all directions" if along is None else f"along {_describe(along)}"
         text = MapText(f"{machine.name}: stiffness", f"of the tip, {which}", "stiffness [N/µm]", "viridis")
-    return render_position_map(machine, stiffness.poses, compute, text)
+    return render_position_map(machine, stiffness.poses, compute, text, suffix)
 
 
 def _describe(direction: RowsLike) -> str:

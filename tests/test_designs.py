@@ -1,7 +1,5 @@
 """Searched designs against the Orthoglide's closed form, samples of the whole box, and refusals."""
 
-import json
-
 import numpy as np
 import pytest
 from shipped import load_shipped
@@ -100,27 +98,6 @@ def test_a_design_without_a_proof_is_no_winner():
     found = pk.find_designs(glide(["L"], 3.0), seconds=1e-3)
     assert not found.front
     assert found.unproved or found.shortfall
-
-
-def test_the_command_finds_the_front_of_the_closed_form(capsys, tmp_path):
-    path, output = tmp_path / "glide.yaml", tmp_path / "out"
-    path.write_text(GLIDE.replace("minimise: L", "minimise: [L, amplification]"))
-    assert main(["design", str(path), "--count", "3", "-o", str(output), "--json"]) == 0
-    said = json.loads(capsys.readouterr().out)
-    assert said["schema"] == "parakin.designs/1"
-    assert [found["verdict"] for found in said["designs"]] == ["proved"] * 3
-    rods, bounds = ([found["values"][name] for found in said["designs"]] for name in ("L", "amplification"))
-    assert rods == sorted(rods)
-    assert bounds[0] == pytest.approx(3.0, rel=1e-5)
-    assert rods[-1] == pytest.approx(500.0, rel=1e-5)
-    assert rods == pytest.approx([design_orthoglide(200.0, bound).rod for bound in bounds], rel=1e-5)
-    assert sorted(p.name for p in output.iterdir()) == [
-        *(f"design_{n}.yaml" for n in (1, 2, 3)),
-        "front.pdf",
-        "front.png",
-    ]
-    assert pk.load(output / "design_1.yaml").inverse([0.0, 0.0, 0.0]) == pytest.approx([rods[0]] * 3)
-    assert (output / "front.png").read_bytes().startswith(b"\x89PNG")
 
 
 @pytest.mark.parametrize(

@@ -74,7 +74,7 @@ def figures_of(html):
 def own_text(html):
     """The report without its scripts and without the frame of the page in it, which has no address."""
     html = re.sub(r'<iframe class=page title="[^"<>]*"></iframe>', "", html)
-    html = re.sub(r'<script type="text/plain" id="page">[A-Za-z0-9+/=]*</script>', "", html)
+    html = re.sub(r'<script type="text/plain" id="pages">[A-Za-z0-9+/=]*</script>', "", html)
     return html[: html.index("<script>")]
 
 

@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from .export.comparison_page import render_comparison_page
     from .export.files import write_files
     from .export.force_curves import render_drive_forces
+    from .export.front_page import render_front_page
     from .export.machine.picture import render_machine_picture
     from .export.page.page import render_machine_page, render_path_page
     from .export.report.report import render_report
@@ -157,6 +158,7 @@ __all__ = [
     "render_accuracy_map",
     "render_comparison_page",
     "render_drive_forces",
+    "render_front_page",
     "render_machine_page",
     "render_machine_picture",
     "render_path_page",
@@ -292,6 +294,7 @@ _LAZY = {
     "render_accuracy_map": "export.accuracy_map",
     "render_comparison_page": "export.comparison_page",
     "render_drive_forces": "export.force_curves",
+    "render_front_page": "export.front_page",
     "render_machine_page": "export.page.page",
     "render_path_page": "export.page.page",
     "render_machine_picture": "export.machine.picture",

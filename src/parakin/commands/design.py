@@ -52,8 +52,8 @@ def design(
     amplification
         Of orthoglide: the greatest velocity amplification L allowed in it, above 1; the least is 1/L.
     output
-        Of orthoglide a machine file to write, .yaml; of a problem a folder for a machine file of each design and, of
-        two objectives, a picture of the front.
+        Of orthoglide a machine file to write, .yaml; of a problem a folder for a machine file of each design, a picture
+        of the front and its page, or the page alone, .html: the front, each design with its machine file and moving.
     count
         How many designs of the front of two objectives.
     time

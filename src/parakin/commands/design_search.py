@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING
 
 from ..errors import InputError, PoseError, quote
 from ..export.figure_file import SCREEN
-from ..units import name_display_unit, to_display
 from .console import ProgressBar, announce_compiling, format_table, print_json, print_text
 from .design_problem import read_design_problem
 from .options import OFF_LIMITS
@@ -15,16 +14,17 @@ from .region_options import parse_time
 
 if TYPE_CHECKING:
     from ..export.files import Content
-    from ..synthesis.designs import Designs, ProvedDesign
-    from ..synthesis.problem import DesignProblem
+    from ..synthesis.designs import Designs
 
 _NUMBERS = ".9g"
 
 
 def design_by_search(path: Path, output: Path | None, count: int, time: float, json: bool) -> int:
     """Search for the designs of a problem's file, write and print them; 3 where none is proved."""
-    if output is not None and output.suffix:
-        raise InputError(f"{quote(output)}: expected a folder for the designs of a problem", "--output")
+    if output is not None and output.suffix.lower() not in ("", ".html"):
+        raise InputError(
+            f"{quote(output)}: expected a folder, or a page .html, for the designs of a problem", "--output"
+        )
     problem = read_design_problem(path)
     seconds = parse_time(time)
     announce_compiling()
@@ -48,74 +48,46 @@ def design_by_search(path: Path, output: Path | None, count: int, time: float, j
 def _write_designs(designs: Designs, output: Path) -> list[str]:
     from ..export.designs import format_proved_yaml, render_front
     from ..export.files import write_files
+    from ..export.front_page import render_front_page
 
+    if output.suffix:
+        write_files(output.parent, {output.name: render_front_page(designs)})
+        return [str(output)]
     files: dict[str, Content] = {
         f"design_{number}.yaml": format_proved_yaml(designs, number - 1) for number in range(1, len(designs.front) + 1)
     }
     if len(designs.problem.objectives) > 1:
         files |= {f"front{kind}": render_front(designs, kind) for kind in (SCREEN, ".pdf")}
+    files["front.html"] = render_front_page(designs)
     write_files(output, files)
     return [str(output / name) for name in files]
 
 
-def _describe_objectives(problem: DesignProblem) -> str:
-    ways = (("least", problem.minimise), ("greatest", problem.maximise))
-    return ", ".join(f"{way} {' and '.join(names)}" for way, names in ways if names)
-
-
-def _describe_tolerances(problem: DesignProblem) -> str:
-    """Say of which machines a proof is."""
-    own = ", ".join(f"{name} {value}" for name, value in (problem.within or {}).items())
-    if not own:
-        return ""
-    return f" of all machines within {own}" + (", the part run on the nominal one" if problem.path is not None else "")
-
-
-def _describe_proofs(number: int, design: ProvedDesign) -> str:
-    """Say of which quantities less is proved than what was found where they were looked at."""
-    said = []
-    for name, worst in design.proved.items():
-        value = design.values[name]
-        if worst is None:
-            said.append(f"{name} is sampled only")
-        elif abs(worst - value) > 2e-6 * abs(value) and name in design.values:
-            said.append(f"{name} proved to be {'above' if worst < value else 'below'} {worst:{_NUMBERS}}")
-    return f"{number}: {', '.join(said)}" if said else ""
-
-
 def _format_designs(designs: Designs) -> str:
-    from ..synthesis.wants import WANTS
+    from ..export.designs import (
+        describe_designs,
+        describe_proofs,
+        describe_ranges,
+        list_shown_values,
+        list_units,
+        name_with_unit,
+    )
 
     problem = designs.problem
-    lines = []
-    if designs.shortfall:
-        lines.append(designs.shortfall)
-    units = {parameter.name: parameter.unit for parameter in problem.family.parameters}
+    lines = [designs.shortfall] if designs.shortfall else []
+    units = list_units(problem)
     if designs.front:
-        first = designs.front[0]
-        quantities = [name for name in first.values if name not in first.sizes]
-        header = ["", *first.sizes, *(f"{name} [{WANTS[name].unit}]".removesuffix(" []") for name in quantities)]
+        shown = [list_shown_values(designs, index) for index in range(len(designs.front))]
+        header = ["", *(name if name in problem.variables else name_with_unit(name, units) for name in shown[0])]
         rows = [
-            [
-                str(number),
-                *(f"{to_display(value, units.get(name, 'mm')):{_NUMBERS}}" for name, value in found.sizes.items()),
-                *(f"{found.values[name]:{_NUMBERS}}" for name in quantities),
-            ]
-            for number, found in enumerate(designs.front, 1)
+            [str(number), *(f"{value:{_NUMBERS}}" for value in values.values())]
+            for number, values in enumerate(shown, 1)
         ]
-        proved = f"{len(rows)} proved{_describe_tolerances(problem)}"
-        lines += [f"{problem.machine.name}: {proved}, {_describe_objectives(problem)}\n"]
-        lines += [format_table(rows, header, "r" * len(header))]
-        lines += [_describe_proofs(number, found) for number, found in enumerate(designs.front, 1)]
-        lines = [line for line in lines if line]
+        lines += [f"{describe_designs(designs)}\n", format_table(rows, header, "r" * len(header))]
+        proofs = [describe_proofs(found, _NUMBERS) for found in designs.front]
+        lines += [f"{number}: {said}" for number, said in enumerate(proofs, 1) if said]
     for number, found in enumerate(designs.front, 1) if problem.fit_strokes else ():
-        drives = dict(zip(found.machine.joints, found.machine.joint_units, strict=True))
-        ends = ", ".join(
-            f"{name} {to_display(low, drives[name]):.4f} to {to_display(high, drives[name]):.4f} "
-            f"{name_display_unit(drives[name])}"
-            for name, (low, high) in found.ranges.items()
-        )
-        lines.append(f"{number}: {ends}")
+        lines.append(f"{number}: {describe_ranges(found)}")
     for failed in designs.unproved:
         sizes = ", ".join(f"{name} {value:{_NUMBERS}}" for name, value in failed.sizes.items())
         lines.append(f"not proved: {sizes}: {failed.reason}")

@@ -1,11 +1,14 @@
-"""Searched designs as machine files, and their Pareto front as a picture."""
+"""Searched designs as machine files and as text, and their Pareto front as a picture."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
-from ..synthesis.designs import Designs
+from ..synthesis.designs import Designs, ProvedDesign
+from ..synthesis.problem import DesignProblem
 from ..synthesis.wants import WANTS
+from ..units import name_display_unit, to_display
 from .colours import FAINT, INK
 from .figure_file import SCREEN, render_figure
 
@@ -13,6 +16,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _COLOUR = "#1565c0"
+_ALIKE = 2e-6  # relative: what is proved to that is what was found
 
 
 def format_proved_yaml(designs: Designs, index: int) -> str:
@@ -36,6 +40,58 @@ def format_proved_yaml(designs: Designs, index: int) -> str:
     )
 
 
+def list_units(problem: DesignProblem) -> dict[str, str]:
+    """List the units in which free numbers, shifts and quantities are shown; an empty text for those of a number."""
+    units = {name: want.unit for name, want in WANTS.items()} | {f"shift {key}": "mm" for key in problem.shift}
+    return units | {parameter.name: name_display_unit(parameter.unit) for parameter in problem.family.parameters}
+
+
+def name_with_unit(name: str, units: Mapping[str, str]) -> str:
+    """Name a column with its unit in brackets."""
+    return f"{name} [{units[name]}]" if units[name] else name
+
+
+def list_shown_values(designs: Designs, index: int) -> dict[str, float]:
+    """List a design's free numbers, then its other values, each in its unit of :func:`list_units`."""
+    own = {parameter.name: parameter.unit for parameter in designs.problem.family.parameters}
+    design = designs.front[index]
+    sizes = {name: float(to_display(value, own.get(name, "mm"))) for name, value in design.sizes.items()}
+    return {**sizes, **{name: value for name, value in design.values.items() if name not in sizes}}
+
+
+def describe_proofs(design: ProvedDesign, digits: str) -> str:
+    """Say of which quantities less is proved than what was found where they were looked at; ``digits`` is a format."""
+    said = []
+    for name, worst in design.proved.items():
+        value = design.values[name]
+        if worst is None:
+            said.append(f"{name} is sampled only")
+        elif abs(worst - value) > _ALIKE * abs(value):
+            said.append(f"{name} proved to be {'above' if worst < value else 'below'} {worst:{digits}}")
+    return ", ".join(said)
+
+
+def describe_ranges(design: ProvedDesign) -> str:
+    """Describe the ranges of the legs' drives, in the units of their joints."""
+    units = dict(zip(design.machine.joints, design.machine.joint_units, strict=True))
+    return ", ".join(
+        f"{name} {to_display(ends[0], units[name]):.4f} to {to_display(ends[1], units[name]):.4f} "
+        f"{name_display_unit(units[name])}"
+        for name, ends in design.ranges.items()
+    )
+
+
+def describe_designs(designs: Designs) -> str:
+    """Describe how many designs of which machine are proved, of which machines, and what is best of them."""
+    problem = designs.problem
+    ways = (("least", problem.minimise), ("greatest", problem.maximise))
+    best = ", ".join(f"{way} {' and '.join(names)}" for way, names in ways if names)
+    own = ", ".join(f"{name} {value}" for name, value in (problem.within or {}).items())
+    nominal = ", the part run on the nominal one" if own and problem.path is not None else ""
+    made = f" of all machines within {own}{nominal}" if own else ""
+    return f"{problem.machine.name}: {len(designs.front)} proved{made}, {best}"
+
+
 def render_front(designs: Designs, suffix: str = SCREEN) -> bytes:
     """Render the Pareto front, each objective against the first one, its designs by their numbers.
 
@@ -44,20 +100,20 @@ def render_front(designs: Designs, suffix: str = SCREEN) -> bytes:
     problem, front = designs.problem, designs.front
     first, *others = problem.objectives
     width = 0.8 + 5.6 * len(others)
-    units = {name: f" [{want.unit}]" for name, want in WANTS.items() if want.unit}
-    units |= {parameter.name: f" [{parameter.unit}]" for parameter in problem.family.parameters}
+    units = list_units(problem)
+    shown = [list_shown_values(designs, index) for index in range(len(front))]
 
     def draw(figure: Figure) -> None:
         for place, second in enumerate(others):
             axes = figure.add_axes(((0.9 + 5.6 * place) / width, 0.13, 4.9 / width, 0.74))
-            points = [(design.values[first], design.values[second]) for design in front]
+            points = [(values[first], values[second]) for values in shown]
             line = "o-" if len(others) == 1 else "o"
             axes.plot(*zip(*points, strict=True), line, color=_COLOUR, markersize=5, linewidth=1.0)
             for number, point in enumerate(points, 1):
                 axes.annotate(str(number), point, xytext=(5, 5), textcoords="offset points", color=INK, fontsize=9)
             axes.grid(color=FAINT, linewidth=0.6)
-            axes.set_xlabel(first + units.get(first, ""), color=INK, fontsize=9)
-            axes.set_ylabel(second + units.get(second, ""), color=INK, fontsize=9)
+            axes.set_xlabel(name_with_unit(first, units), color=INK, fontsize=9)
+            axes.set_ylabel(name_with_unit(second, units), color=INK, fontsize=9)
 
     def add_heading(figure: Figure) -> None:
         title = f"{problem.machine.name}: {len(front)} designs, none better than another"

@@ -1,13 +1,37 @@
-// Fills the report's frame with its page, which is compressed: three.js alone would be a third of the report.
+// Fills the frame with a page of those that are packed beside it: three.js alone would be a third of the report. Where
+// the document has choices, that of the address is shown, and its page; the first one where there is none.
 "use strict";
 
-async function fillFrame(frame, source) {
+async function readPages(source) {
   const bytes = Uint8Array.from(atob(source.textContent), (letter) => letter.charCodeAt(0));
   const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("deflate"));
-  frame.srcdoc = await new Response(stream).text();
+  const { lines, pages } = await new Response(stream).json();
+  return (number) => pages[number].map((line) => lines[line]).join("\n");
 }
 
-const source = document.getElementById("page");
+async function fillFrame(frame, source) {
+  const writePage = await readPages(source);
+  const choices = [...document.querySelectorAll("[data-choice]")];
+  let shown = null;
+  const show = () => {
+    const chosen = Math.max(0, choices.findIndex((choice) => `#${choice.dataset.choice}` === location.hash));
+    if (choices.length && !location.hash) location.replace(`#${choices[0].dataset.choice}`);
+    if (chosen === shown) return;
+    choices.forEach((choice, number) => { choice.hidden = number !== chosen; });
+    frame.srcdoc = writePage(chosen);
+    if (shown !== null) choices[chosen].scrollIntoView({ block: "nearest" });
+    shown = chosen;
+  };
+  for (const link of document.querySelectorAll("a[data-page]")) {
+    link.addEventListener("click", () => {
+      link.href = URL.createObjectURL(new Blob([writePage(Number(link.dataset.page))], { type: "text/html" }));
+    });
+  }
+  addEventListener("hashchange", show);
+  show();
+}
+
+const source = document.getElementById("pages");
 if (source) {
   const frame = document.querySelector("iframe.page");
   if ("DecompressionStream" in window) fillFrame(frame, source);

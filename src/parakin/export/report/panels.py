@@ -24,14 +24,14 @@ class Panel:
     ticks: str = ","
 
 
-def stack_panels(rows: Sequence[Sequence[Panel]], title: str) -> tuple[Figure, int]:
-    """Stack rows of panels over one x axis called ``title``; return the figure and its height in px.
+def stack_panels(rows: Sequence[Sequence[Panel]], title: str, tall: int = _ROW) -> tuple[Figure, int]:
+    """Stack rows of panels, each ``tall`` px, over one x axis called ``title``; return the figure and its height in px.
 
     Rows of one panel come before rows of several; all of the latter have the same number.
     """
     wide = sum(len(row) == 1 for row in rows)
     parted = _BREAK if 0 < wide < len(rows) else 0
-    inner = len(rows) * (_ROW + _GAP) - 24 + parted
+    inner = len(rows) * (tall + _GAP) - 24 + parted
     layout: Figure = {"height": inner + _TOP + _BOTTOM, "showlegend": False, "hovermode": "closest"}
     layout |= {"font": {**FONT, "color": INK}, "margin": {"l": 62, "r": 16, "t": _TOP, "b": _BOTTOM}}
     layout |= {"plot_bgcolor": "#fff", "paper_bgcolor": "#fff", "shapes": [], "annotations": []}
@@ -39,7 +39,7 @@ def stack_panels(rows: Sequence[Sequence[Panel]], title: str) -> tuple[Figure, i
     feet: dict[tuple[int, int], str] = {}  # of each column, in how many: its lowest y axis
     count = 0
     for number, row in enumerate(rows):
-        top = 1.0 - (number * (_ROW + _GAP) + parted * (len(row) > 1)) / inner
+        top = 1.0 - (number * (tall + _GAP) + parted * (len(row) > 1)) / inner
         for column, panel in enumerate(row):
             count += 1
             y = "y" if count == 1 else f"y{count}"
@@ -47,7 +47,7 @@ def stack_panels(rows: Sequence[Sequence[Panel]], title: str) -> tuple[Figure, i
             x = _name_x_axis(wide > 0, len(row), column)
             feet[len(row), column] = y
             traces += [trace | ({"yaxis": y} if x == "x" else {"xaxis": x, "yaxis": y}) for trace in panel.traces]
-            axis: Figure = {"domain": [max(0.0, top - _ROW / inner), top], "gridcolor": FAINT, "zeroline": False}
+            axis: Figure = {"domain": [max(0.0, top - tall / inner), top], "gridcolor": FAINT, "zeroline": False}
             axis |= {"nticks": 5, "range": panel.span, "tickformat": panel.ticks, "linecolor": "#cfd8dc"}
             layout[f"yaxis{y[1:]}"] = axis | {"showline": True} | ({} if x == "x" else {"anchor": x})
             dash: Figure = {"type": "line", "xref": "paper", "x0": left, "x1": right, "yref": y}

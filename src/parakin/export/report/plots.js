@@ -62,6 +62,7 @@ class Plot {
     for (const kind of ["pointermove", "pointerdown", "pointerup", "pointerleave", "dblclick", "keydown", "blur"])
       place.addEventListener(kind, (event) => this[kind](event));
     new ResizeObserver(() => this.draw()).observe(place);
+    addEventListener("hashchange", () => this.draw());
   }
 
   listPanels({ data, layout }) {
@@ -172,6 +173,11 @@ class Plot {
   }
 
   drawCurve(pen, trace, x, y) {
+    if (trace.mode.includes("lines")) this.drawLines(pen, trace, x, y);
+    if (trace.mode.includes("markers")) this.drawMarkers(pen, trace, x, y);
+  }
+
+  drawLines(pen, trace, x, y) {
     this.setLine(pen, trace.line);
     pen.lineJoin = "round";
     pen.beginPath();
@@ -187,10 +193,27 @@ class Plot {
       before = value;
     });
     pen.stroke();
-    if (!trace.mode.includes("markers")) return;
+  }
+
+  // Draws points, with their texts; a ring is about the one whose link is where the document is.
+  drawMarkers(pen, trace, x, y) {
     pen.fillStyle = trace.marker.color ?? trace.line.color;
     trace.y.forEach((value, number) => {
       if (value !== null) this.drawDot(pen, x(trace.x[number]), y(value), trace.marker.size / 2);
+    });
+    pen.setLineDash([]);
+    pen.strokeStyle = pen.fillStyle = INK;
+    pen.textAlign = "left";
+    pen.textBaseline = "bottom";
+    trace.y.forEach((value, number) => {
+      if (value === null) return;
+      const [px, py] = [x(trace.x[number]), y(value)];
+      if (trace.text) pen.fillText(trace.text[number], px + 6, py - 4);
+      if (trace.links?.[number] !== location.hash) return;
+      pen.lineWidth = 2;
+      pen.beginPath();
+      pen.arc(px, py, trace.marker.size / 2 + 4, 0, 2 * Math.PI);
+      pen.stroke();
     });
   }
 
@@ -252,6 +275,7 @@ class Plot {
   choose(point) {
     this.chosen = point;
     this.note.hidden = !point;
+    this.place.style.cursor = point?.trace.links ? "pointer" : "";
     if (point) {
       const { panel, trace, at } = point, { frame, x } = this.scales(panel);
       this.note.innerHTML = describePoint(trace, at);
@@ -263,14 +287,24 @@ class Plot {
   }
 
   pointermove(event) {
-    const { left, top } = this.place.getBoundingClientRect(), x = event.clientX - left, y = event.clientY - top;
     if (this.from !== undefined) {
-      this.to = x;
+      this.to = event.clientX - this.place.getBoundingClientRect().left;
       this.draw();
       return;
     }
+    this.choose(this.pointUnder(event));
+  }
+
+  pointUnder(event) {
+    const { left, top } = this.place.getBoundingClientRect(), x = event.clientX - left, y = event.clientY - top;
     const panel = this.panelAt(x, y);
-    this.choose(panel ? this.nearest(panel, x, y) : null);
+    return panel ? this.nearest(panel, x, y) : null;
+  }
+
+  // Goes to where a point links to, if it does.
+  follow(point) {
+    const link = point?.trace.links?.[point.at];
+    if (link) location.hash = link;
   }
 
   pointerdown(event) {
@@ -282,10 +316,10 @@ class Plot {
     }
   }
 
-  pointerup() {
+  pointerup(event) {
     const { from, to } = this;
     this.from = this.to = undefined;
-    if (from === undefined || to === undefined || Math.abs(to - from) < DRAGGED) return;
+    if (from === undefined || to === undefined || Math.abs(to - from) < DRAGGED) return this.follow(this.pointUnder(event));
     const frame = this.frame(this.dragged), [x0, x1] = this.span;
     const ends = [Math.min(from, to), Math.max(from, to)].map((px) => x0 + (Math.min(1, Math.max(0, (px - frame.x) / frame.width))) * (x1 - x0));
     if (ends[1] - ends[0] > 1e-9 * (this.full[1] - this.full[0])) this.span = ends;
@@ -308,6 +342,7 @@ class Plot {
   keydown(event) {
     const step = { ArrowRight: 1, ArrowLeft: -1 }[event.key], change = { ArrowDown: 1, ArrowUp: -1 }[event.key];
     if (event.key === "Escape") this.dblclick();
+    else if (event.key === "Enter") this.follow(this.chosen);
     else if (step) this.step(step);
     else if (change) this.change(change);
     else return;

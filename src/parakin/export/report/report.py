@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from base64 import b64encode
 from html import escape
 from math import inf
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
-from zlib import compress
 
 from ...arguments import check_arguments
 from ...errors import NoMethodError, PoseError
@@ -20,6 +18,7 @@ from .cards import make_card
 from .figures import embed_figure, render_page
 from .force_card import render_force_card
 from .joint_curves import build_joint_curves
+from .packed_pages import render_page_frame
 from .range_bars import render_range_card
 from .tables import render_fact_card, render_note_card, render_offence_card
 from .timing import format_cycle, render_timing_card
@@ -115,11 +114,9 @@ def _render_page_card(posted: Posted, trajectory: Trajectory | None) -> str:
         page = render_path_page(posted, trajectory, _PAGE_NUMBERS)
     except NoMethodError as error:
         return make_card("The machine on the path", "", escape(str(error)))
-    packed = b64encode(compress(page.encode("utf-8", "backslashreplace"), 9)).decode("ascii")
     return make_card(
         "The machine on the path",
-        '<iframe class=page title="The machine on the path"></iframe>\n'
-        f'<script type="text/plain" id="page">{packed}</script>\n',
+        render_page_frame([page], "The machine on the path"),
         "Play it, drag the tool, choose what colours the path; red is off limits.",
     )
 

@@ -1,4 +1,4 @@
-"""Pictures of the page, the studio and a comparison, as they stand in Chromium.
+"""Pictures of the page, the studio, a comparison and a front of designs, as they stand in Chromium.
 
 python examples/page_pictures.py [-o FOLDER]
 
@@ -92,12 +92,34 @@ def show_comparison(browser, folder: Path, picture: Path) -> None:
         tab.screenshot(path=picture)
 
 
+def show_front(browser, folder: Path, picture: Path) -> None:
+    """Designs of an Orthoglide for a cube of 200 mm, one of them chosen."""
+    cube, free = dict.fromkeys("XYZ", (-100.0, 100.0)), {"L": (150.0, 500.0)}
+    shift, bounds = {"X Y Z": (-150.0, 150.0)}, {"amplification": 3.0}
+    glide = pk.load("orthoglide")
+    designs = pk.find_designs(
+        pk.DesignProblem(glide, free, cube, ["L", "amplification"], shift, bounds, fit_strokes=True)
+    )
+    (folder / "front.html").write_text(pk.render_front_page(designs), encoding="utf-8")
+    with open_tab(browser, 1360, 900) as tab:
+        tab.goto((folder / "front.html").as_uri() + "#design_5")
+        wait_until(tab, "document.querySelector('iframe')?.contentWindow.parakin?.pictures > 0", 60.0)
+        tab.wait_for_timeout(1000)
+        tab.screenshot(path=picture)
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("-o", "--output", type=Path, default=Path("docs/pictures"))
     output = parser.parse_args().output
     output.mkdir(parents=True, exist_ok=True)
-    pictures = {"page": show_page, "page_path": show_path, "studio": show_studio, "comparison": show_comparison}
+    pictures = {
+        "page": show_page,
+        "page_path": show_path,
+        "studio": show_studio,
+        "comparison": show_comparison,
+        "front": show_front,
+    }
     for name, show in pictures.items():
         with tempfile.TemporaryDirectory() as folder, open_browser() as browser:
             show(browser, Path(folder), output / f"{name}.png")

@@ -254,6 +254,8 @@ def test_it_is_seen_under_linuxcnc():
             ]
         )
         assert not seen["said"]
+        ini = read_ini(make_configuration(machine)["tricept.ini"])
+        assert seen["most speed"] == float(ini["TRAJ"]["MAX_LINEAR_VELOCITY"])  # no program is slowed by the screen
         pins, screen = seen["pins"], name_screen(machine)
         joints = [float(pins[f"{screen}.joint-{i}"]) for i in range(5)]
         home = find_home_pose(machine)

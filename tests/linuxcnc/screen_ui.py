@@ -64,7 +64,8 @@ def work(task, seen):
         else:
             getattr(operator, word)(*arguments)
             operator.stands()
-    seen["said"] = operator.said
+    operator.status.poll()
+    seen["said"], seen["most speed"] = operator.said, operator.status.max_velocity
 
 
 def main():

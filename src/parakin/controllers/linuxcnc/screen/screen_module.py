@@ -53,6 +53,14 @@ o.enable_dro = False
 o.show_overlay = False
 if root_window.winfo_screenwidth() >= 1800:
     root_window.tk.call("wm", "geometry", ".", "%dx%d+0+0" % (root_window.winfo_screenwidth() // 2 - 20, 820))
+
+# The greatest speed of jogs, MAX_LINEAR_VELOCITY of [DISPLAY], would be AXIS' greatest speed of programs, too, which it
+# tells LinuxCNC at once: posted programs would take longer than told. Its slider ends where [TRAJ] does, far off.
+
+fastest = float(inifile.find("TRAJ", "MAX_LINEAR_VELOCITY"))
+vars.max_maxvel.set(fastest)
+c.maxvel(fastest)
+root_window.tk.eval("${{pane_top}}.maxvel.l configure -width 9")
 """
 
 _GMOCCAPY = """\

@@ -12,6 +12,7 @@ from parakin.budget import Budget
 from parakin.cli import main
 from parakin.commands.options import OFF_LIMITS
 from parakin.errors import PoseError
+from parakin.kernels.compiling import njit
 from parakin.performance.certified.region_singularities import judge_singularities
 from parakin.workspaces.certified.containment import prove_boxes
 from parakin.workspaces.inscribed.largest_box import NoBoxError
@@ -31,6 +32,13 @@ def test_a_share_is_of_what_is_left():
     assert step.is_spent()
     assert Budget(None).take_fraction(0.1).seconds_left == float("inf")
     assert Budget(1e-9).take_fraction(1.0).seconds_left == 0.0
+
+
+def test_compiling_is_no_time_of_a_search():
+    budget, began = Budget(100.0), time.monotonic()
+    assert njit()(lambda x: np.sqrt(x) + np.sin(x))(4.0) == pytest.approx(2.0 + np.sin(4.0))
+    taken = time.monotonic() - began
+    assert 100.0 - budget.seconds_left < 0.5 * taken
 
 
 @pytest.mark.parametrize("seconds", [0.0, -1.0, float("nan")])

@@ -1,5 +1,8 @@
 """Designs with the largest workspace, against other sizes' proved volumes and machines of their own."""
 
+import sys
+from pathlib import Path
+
 import numpy as np
 import pytest
 from shipped import load_shipped
@@ -8,6 +11,9 @@ import parakin as pk
 from parakin.synthesis.design_tapes import DesignTapes
 from parakin.synthesis.pose_sets import make_box_set
 from parakin.synthesis.workspace_gauge import WorkspaceGauge
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "examples"))
+from largest_workspace import make_problem
 
 DELTA = {"X": (-20.0, 20.0), "Y": (-20.0, 20.0), "Z": (270.0, 290.0)}
 TILTS = {"A": (-0.35, 0.35), "B": (-0.35, 0.35), "C": (0.17, 0.87)}
@@ -43,6 +49,20 @@ def test_the_estimate_counts_what_machines_of_those_sizes_allow():
             turns = np.where(rng.random((len(positions), 3)) < 0.5, tilts[:, 0], tilts[:, 1])
             positions = positions[made.check(np.hstack([positions, turns])) == 0]
         assert estimate == pytest.approx(np.prod(high - low) * len(positions) / 30_000, rel=0.1)
+
+
+def test_no_drawn_lambda_is_larger_than_the_examples():
+    problem = make_problem()
+    best = dict(zip("Dcur", (150.0, 1261.0, 818.4, 500.0), strict=True))  # as examples/largest_workspace.py finds it
+    nominal = {parameter.name: parameter.value for parameter in problem.machine.parameters}
+    names, (low, high) = problem.family.names, problem.ranges.T
+    drawn = np.random.default_rng(0).uniform(low, high, (24, len(names)))
+    sizes = np.vstack([[[own[name] for name in names] for own in (best, nominal)], drawn])
+    middle = problem.place_poses(drawn[0], problem.middle)
+    largest, shipped, *others = problem.gauge.estimate(sizes, np.repeat(middle, len(sizes), 0))
+    assert largest == pytest.approx(0.45e9, rel=0.05)  # by 60,000 positions drawn
+    assert shipped == pytest.approx(0.14e9, rel=0.05)
+    assert max(others) < largest
 
 
 @pytest.mark.parametrize(

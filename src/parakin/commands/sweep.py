@@ -78,7 +78,9 @@ def _format_result(result: SweepResult, name: str) -> str:
     lines += [f"{older:,} of them were there before"] if older else []
     if result.made:
         cost, kernel = 1e9 * result.cost, 1e9 * result.kernel
-        lines.append(f"{cost:.3g} ns a design and pose; the bare kernel of the limits takes {kernel:.3g} ns here")
+        lines.append(
+            f"{cost:.3g} ns of wall time a design and pose; the bare kernel of the limits takes {kernel:.3g} ns here"
+        )
     for quantity, row in result.best.items():
         lines.append(f"best {quantity}:  {', '.join(f'{column} {value:.6g}' for column, value in row.items())}")
     return "\n".join(lines)

@@ -10,13 +10,13 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from math import nan
 from pathlib import Path
-from time import perf_counter
 from typing import TYPE_CHECKING, Any, BinaryIO
 
 import numpy as np
 
 from ..arguments import check_arguments
 from ..arrays import Progress, Writer
+from ..budget import CLOCK
 from ..errors import InputError, quote
 from ..synthesis.sweep import SweepChunk, SweepEvaluator, SweepPlan
 from ..units import name_display_unit
@@ -40,7 +40,7 @@ class SweepResult:
     designs : how many
     keeping : how many of them keep all limits and bounds at the poses
     made : how many designs were evaluated this time, not before
-    cost : of these, the time that a design took at a pose, files included, s; NaN where none was
+    cost : of these, the wall time that a design took at a pose, files included, s; NaN where none was
     kernel : what it takes the bare kernel on this machine, limits alone, s
     best : by the name of each objective, the best of those that keep all: its columns by their names
     """
@@ -80,7 +80,7 @@ def run_sweep(
     _prepare_folder(plan, base)
     missing = [number for number, name in enumerate(names) if not (base / name).exists()]
     evaluator = SweepEvaluator(plan)
-    made, begin = 0, perf_counter()
+    made, begin = 0, CLOCK.read()
     wanted = sum(_count_designs(plan, number) for number in missing)
     with _open_source(plan, evaluator, missing, scheduler, show_dashboard) as chunks:
         for number, chunk in chunks:
@@ -88,7 +88,7 @@ def run_sweep(
             made += len(chunk.designs)
             if progress:
                 progress(made / wanted)
-    cost = (perf_counter() - begin) / (made * plan.poses) if made else nan
+    cost = (CLOCK.read() - begin) / (made * plan.poses) if made else nan
     keeping, best = _summarise(plan, [base / name for name in names])
     return SweepResult(plan.designs, keeping, made, cost, evaluator.measure_kernel(), best)
 

@@ -10,25 +10,35 @@ import warnings
 import zlib
 from collections.abc import Callable
 from functools import cache
+from time import monotonic
 from typing import Any
 
 import numba
 from numba.core import event
 from numba.core.caching import FunctionCache, IndexDataCacheFile
 
+from ..budget import CLOCK
 from .compile_notice import report_compilation
 
 _CHECKSUM = 4  # bytes
 
 
 class _Listener(event.Listener):  # type: ignore[misc]
-    """Passes on that Numba compiles."""
+    """Passes on that Numba compiles, and how long; a kernel compiles those that it calls within."""
+
+    def __init__(self) -> None:
+        self.depth, self.began = 0, 0.0
 
     def on_start(self, event: object) -> None:
+        if not self.depth:
+            self.began = monotonic()
+        self.depth += 1
         report_compilation()
 
     def on_end(self, event: object) -> None:
-        pass
+        self.depth -= 1
+        if not self.depth:
+            CLOCK.compiling += monotonic() - self.began
 
 
 event.register("numba:compile", _Listener())

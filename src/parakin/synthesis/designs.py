@@ -210,8 +210,6 @@ def _make_design(problem: DesignProblem, candidate: Candidate) -> _MadeDesign | 
             return UnprovedDesign(sizes, f"the part does not run: {why}")
         if "cycle_time" in values:
             values["cycle_time"] = job.seconds
-    if problem.gauge is not None:
-        values["workspace"] = problem.gauge.prove(machine)
     return _MadeDesign(machine, candidate.x, sizes, values, job)
 
 
@@ -240,6 +238,8 @@ def _prove_design(problem: DesignProblem, made: _MadeDesign, budget: Budget) -> 
         if name in problem.bounds and not _is_kept(name, worst, problem.bounds[name]):
             limit = "nothing" if worst is None else f"{worst:.9g}"
             return UnprovedDesign(sizes, f"{name} is {values[name]:.9g} where it was looked at, and {limit} is proved")
+    if problem.gauge is not None:
+        values["workspace"] = proved["workspace"] = problem.gauge.prove(machine, budget.seconds_left)
     drives = {drive.name: (drive.low, drive.high) for drive in machine.drives[: machine.leg_count]}
     return ProvedDesign(machine, sizes, values, proof.sets[0].ends, drives, proof.boxes, proved, made.job)
 

@@ -19,7 +19,8 @@ from .pose_sets import PoseSet
 _POSITIONS = 1500
 _WIDER = 0.5  # of the nominal machine's extent, by which positions are drawn beyond it on each side
 _GAP = 0.02  # relative, of what is proved
-_SECONDS = 20.0  # of a proof
+_SECONDS = 20.0  # of the nominal machine's extent
+_LEAST_SECONDS = 1e-3
 
 
 class WorkspaceGauge:
@@ -76,6 +77,6 @@ class WorkspaceGauge:
         fractions[rows[sides[1:] != sides[0]]] = 0.0
         return self._volume * float(fractions.reshape(-1, self._count).min(1).mean())
 
-    def prove(self, machine: Machine) -> float:
-        """Bound the volume of a machine from below, mm³."""
-        return workspace(self._make_region(machine), _GAP, seconds=_SECONDS).volume.inner
+    def prove(self, machine: Machine, seconds: float) -> float:
+        """Bound the volume of a machine from below, mm³; the closer the more time there is."""
+        return workspace(self._make_region(machine), _GAP, seconds=max(seconds, _LEAST_SECONDS)).volume.inner

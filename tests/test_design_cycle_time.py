@@ -72,11 +72,26 @@ def test_a_part_moves_with_the_poses(path):
     machine = load_shipped("orthoglide5_table")
     family = pk.family(machine, free=[machine.parameters[0].name])
     home = dict(zip(machine.axes, machine.home.tolist(), strict=True))
-    low, high = (PartTimer(family, path, pk.workpiece(X=x, Z=home["Z"] + z)) for x, z in ((0.0, -30.0), (20.0, -20.0)))
     shift = np.array([{"X": 20.0, "Z": 10.0}.get(axis, 0.0) for axis in machine.axes])
-    seconds = high.estimate_seconds(np.zeros((1, len(shift))), family.nominal[None])
+    still = np.zeros_like(shift)
+    low, high = (
+        PartTimer(family, path, pk.workpiece(X=x, Z=home["Z"] + z), own)
+        for x, z, own in ((0.0, -30.0, shift), (20.0, -20.0, still))
+    )
+    seconds = high.estimate_seconds(still[None], family.nominal[None])
     assert low.estimate_seconds(shift[None], family.nominal[None]) == pytest.approx(seconds, rel=1e-9)
-    assert seconds[0] == pytest.approx(low.prepare_job(machine, shift).seconds, rel=0.2)
+    assert seconds[0] == pytest.approx(low.prepare_job(machine, shift).seconds, rel=1e-9)
+
+
+def test_estimates_of_other_sizes_are_near_their_jobs(path, monkeypatch):
+    """Also where stretches alone are timed."""
+    family, towers = pk.family(DELTA, free=["tower"]), np.array([310.0, 410.0])
+    jobs = [measure_job(path, tower=tower) for tower in towers]
+    assert jobs[0] < 0.92 * jobs[1]
+    for rows in (2400, 24):
+        monkeypatch.setattr("parakin.synthesis.part_timing._ROWS", rows)
+        timer = PartTimer(family, path, PLACE, np.zeros(3))
+        assert timer.estimate_seconds(np.zeros((2, 3)), towers[:, None]) == pytest.approx(jobs, rel=0.01)
 
 
 PROBLEM = """\

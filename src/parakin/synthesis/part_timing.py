@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from functools import cached_property
+from math import isfinite
+
 import numpy as np
 
 from ..arrays import Array, Indices
@@ -32,16 +35,17 @@ class PartTimer:
     """Times a part on a family's machines by the quickest profile without jerks and forces along rows of its curve.
 
     The curve, its corners and its rows are the nominal machine's, for they hang on the tool alone. Of a path with more
-    rows stretches evenly spread are timed, and stand for the others.
+    rows stretches evenly spread are timed. What jerks, forces, and what lies between the stretches add is taken to be
+    the same fraction for all designs: that of the nominal machine's job.
 
     path, frame : a part, and where it lies, as for :func:`parakin.prepare`
-    factor : by which an estimate is multiplied, as the time of a job has shown
+    shift : (axes,) how far the nominal machine's part is moved from there
 
     Raises :class:`PoseError` for a path that can't be timed, or drives without accelerations.
     """
 
-    def __init__(self, family: Family, path: ToolPath, frame: Array | None):
-        self.family, self.path, self.frame, self.factor = family, path, frame, 1.0
+    def __init__(self, family: Family, path: ToolPath, frame: Array | None, shift: Array):
+        self.family, self.path, self.frame, self.shift = family, path, frame, shift
         machine = family.machine
         self._limits = DriveLimits.of(machine)
         if not self._limits.bounds_acceleration:
@@ -71,13 +75,23 @@ class PartTimer:
 
         NaN where the part is out of reach.
         """
+        return self.factor * self._time_stretches(shifts, sizes) + self._waits
+
+    @cached_property
+    def factor(self) -> float:
+        """By which estimates are multiplied, as the time of a job has shown; 1 where the nominal machine has none."""
+        seconds = self.prepare_job(self.family.machine, self.shift).seconds
+        estimate = float(self._time_stretches(self.shift[None], self.family.nominal[None])[0])
+        return 1.0 if seconds is None or not isfinite(estimate) else (seconds - self._waits) / estimate
+
+    def _time_stretches(self, shifts: Array, sizes: Array) -> Array:
         joints = self._follow(self._timed + shifts[:, None], sizes[:, None])
         seconds = np.full(len(joints), np.nan)
         ends = np.cumsum([window.stop - window.start for window in self._windows])[:-1]
         for design in np.flatnonzero(np.isfinite(joints).all((1, 2))).tolist():
             windows = zip(self._windows, np.split(joints[design], ends), strict=True)
             seconds[design] = sum(self._time_rows(window, own) for window, own in windows)
-        return self.factor * self._stands_for * seconds + self._waits
+        return self._stands_for * seconds
 
     def _follow(self, poses: Array, sizes: Array) -> Array:
         """Follow the joints along each design's rows, (S, R, axes) -> (S, R, joints); over poles in the other mode."""

@@ -196,7 +196,9 @@ class DesignProblem:
     @cached_property
     def timer(self) -> PartTimer | None:
         """What times the part; None without one."""
-        return None if self.path is None else PartTimer(self.family, self.path, self.workpiece)
+        if self.path is None:
+            return None
+        return PartTimer(self.family, self.path, self.workpiece, self.list_shifts(self.ranges.mean(1)))
 
     @cached_property
     def gauge(self) -> WorkspaceGauge | None:

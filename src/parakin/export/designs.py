@@ -87,7 +87,8 @@ def describe_designs(designs: Designs) -> str:
     ways = (("least", problem.minimise), ("greatest", problem.maximise))
     best = ", ".join(f"{way} {' and '.join(names)}" for way, names in ways if names)
     own = ", ".join(f"{name} {value}" for name, value in (problem.within or {}).items())
-    nominal = ", the part run on the nominal one" if own and problem.path is not None else ""
+    nominal = ", the part run on the nominal one" if problem.path is not None else ""
+    nominal += ", the workspace that of the nominal one" if problem.gauge is not None else ""
     made = f" of all machines within {own}{nominal}" if own else ""
     return f"{problem.machine.name}: {len(designs.front)} proved{made}, {best}"
 

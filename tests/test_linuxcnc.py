@@ -225,6 +225,22 @@ def test_the_forward_undoes_the_inverse_and_is_the_librarys(m, modules):
     assert (rows[~done] == world(m, starts)[~done]).all()  # refused, it leaves the pose as it was
 
 
+@pytest.mark.parametrize("name", ["linear_delta", "quickstep"])
+def test_a_forward_that_closes_by_its_form_does(name, modules):
+    """Joints all over their ranges and somewhat beyond, guesses of all kinds: answers close by the tests' own model."""
+    m = load_shipped(name)
+    rng = np.random.default_rng(3)
+    low, high = np.array([(drive.low, drive.high) for drive in m.drives]).T
+    joints = low - 20.0 + (high - low + 40.0) * rng.uniform(size=(COUNT, 3))
+    poses = m.common_points(joints, m.home_side)[0]
+    joints, poses = joints[np.isfinite(poses).all(1)], poses[np.isfinite(poses).all(1)]
+    starts = poses + rng.normal(size=poses.shape) * rng.choice([0.1, 10.0, 100.0], (len(poses), 1))
+    rows, codes = modules(m).forward(outward(m, joints), world(m, starts))
+    done = codes == 0
+    assert done.mean() > 0.5
+    assert Description.of(m.spec).misses(pose(m, rows)[done], joints[done])[0].max() < CLOSE
+
+
 @pytest.mark.parametrize("name", ["linear_delta", "rotary_delta", "lambda6", "eclipse"])
 def test_legs_in_another_mode_are_refused(name, modules):
     """Joints of the same pose in every other working mode, from that very pose: their slopes tell the mode."""

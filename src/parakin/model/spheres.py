@@ -26,7 +26,7 @@ def find_common_point(
     near : with ``side`` None, the one on the side of this point
     """
     foot = _find_foot(centres, radii, plane)
-    height = sqrt(foot.square * foot.inverse)  # in units of the normal
+    height = foot.height
     if side is None and near is not None:
         side = dot(sub(near, foot.first), foot.normal)
     height = height * side if isinstance(side, float) else copysign(height, side)
@@ -48,17 +48,19 @@ class _Foot(NamedTuple):
     """Where the common points lie: on the line through the ``first`` centre + ``offset`` along the ``normal``.
 
     back : how far that place is in front of the points' middle, in units of the normal
+    height : from the middle to either point, in units of the normal
     scale : of the normal, by which it is u × v of the edges from the first centre (the edge turned by 90°)
-    inverse : 1 over the normal's square; the only quotient, for that costs as much as six products
-    square : of the distance from the middle to either point, mm²
+    square : of the height, mm²
+
+    There is one quotient, 1 over the normal's square, for that costs as much as six products.
     """
 
     first: Vec
     offset: Vec
     back: Scalar
     normal: Vec
+    height: Scalar
     scale: float
-    inverse: Scalar
     square: Scalar
 
 
@@ -77,7 +79,8 @@ def _find_foot(centres: Sequence[Vec], radii: Sequence[Scalar], plane: Sequence[
         return _find_foot_along(first, squares[0], (u, v), (a, b), normal, k)
     inverse = 1.0 / _replace_zero(dot(normal, normal))
     foot = add(scale(cross(v, normal), a * inverse), scale(cross(normal, u), b * inverse))
-    return _Foot(first, foot, 0.0, normal, 1.0, inverse, squares[0] - dot(foot, foot))
+    square = squares[0] - dot(foot, foot)
+    return _Foot(first, foot, 0.0, normal, sqrt(square * inverse), 1.0, square)
 
 
 def _find_foot_of_circles(centres: Sequence[Vec], radii: Sequence[Scalar], plane: Sequence[int]) -> _Foot:
@@ -91,7 +94,8 @@ def _find_foot_of_circles(centres: Sequence[Vec], radii: Sequence[Scalar], plane
     first = tuple(0.0 if c == out else x for c, x in enumerate(centres[0]))
     squares = [r * r - c[out] * c[out] for r, c in zip(radii, centres, strict=True)]
     foot = scale(u, 0.5 * (squares[0] - squares[1] + size) * inverse)
-    return _Foot(first, foot, 0.0, normal, 1.0, inverse, squares[0] - dot(foot, foot))
+    square = squares[0] - dot(foot, foot)
+    return _Foot(first, foot, 0.0, normal, sqrt(square * inverse), 1.0, square)
 
 
 def _is_constant_across(u: Vec, v: Vec, normal: Vec, k: int) -> bool:
@@ -109,6 +113,8 @@ def _find_foot_along(
 
     square : of the first radius
     rights : what the products of that place with both edges are
+
+    Along the normal the points are roots of a quadratic equation, whose own root does not wait for the quotient.
     """
     (u, v), (a, b) = edges, rights
     i, j = (k + 1) % 3, (k + 2) % 3
@@ -117,11 +123,18 @@ def _find_foot_along(
     crossing[j] = b * (u[i] / normal[k]) - a * (v[i] / normal[k])
     unit = abs(normal[k])
     direction = scale(normal, 1.0 / unit)
-    inverse = 1.0 / dot(direction, direction)
+    size = dot(direction, direction)
+    inverse = 1.0 / size
     along = dot(crossing, direction)
-    back = along * inverse
+    under_root = along * along - size * (dot(crossing, crossing) - square)
     return _Foot(
-        first, tuple(crossing), back, direction, unit, inverse, square - dot(crossing, crossing) + along * back
+        first,
+        tuple(crossing),
+        along * inverse,
+        direction,
+        sqrt(under_root) * inverse,
+        unit,
+        under_root * inverse,
     )
 
 

@@ -57,22 +57,52 @@ static inline int is_beside(double far, double square)
     return rest > 0.0 && 1024.0 * LONGEST * LONGEST * far < rest * rest;
 }
 
+/* Whether a given pose is surely on a common point's side, by the square of the height over the centres; and whether it
+   tells a side at all. */
+static inline int stands_beside(const double *near, const double *x, double square, int *tells)
+{
+    const double far = square_distance(x, near);
+    *tells = far <= TELLS * TELLS;
+    return *tells && is_beside(far, square);
+}
+
+/* Whether the common point of joints closes, by its squared height over the centres: whatever rounding does, or measured. */
+static inline int surely_closes(const double *q, const double *f, double square)
+{
+#if CERTAIN
+    (void)f;
+    for (int i = 0; i < CLOSURES; i++)
+        if (!(q[i] >= joint_low[i] && q[i] <= joint_high[i]))
+            return 0;
+    return square >= CERTAIN_HEIGHT;
+#else
+    (void)q, (void)square;
+    return closes(f);
+#endif
+}
+
+/* The answer of every cycle: home's common point, that the given pose is beside. */
+static inline int pose_beside(const double *near, const double *q, double *x)
+{
+    double f[CLOSURES], square[1];
+    int tells;
+    common_point_at_home(q, x, f, square);
+    return surely_closes(q, f, square[0]) && stands_beside(near, x, square[0], &tells);
+}
+
 /* Of both common points the answer is the one that a given pose is beside; home's is the first to be asked. Where it is
    beside neither, its own side decides. */
-static int pose_near(const double *near, const double *q, double *x, double *side, int *tells)
+__attribute__((noinline, cold)) static int pose_near(const double *near, const double *q, double *x, double *side,
+                                                     int *tells)
 {
     double f[CLOSURES], square[1];
     const double over[1] = {-HOME_SIDE};
     common_point_at_home(q, x, f, square);
-    double far = square_distance(x, near);
-    *tells = far <= TELLS * TELLS;
-    if (*tells && is_beside(far, square[0]))
+    if (stands_beside(near, x, square[0], tells))
         return closes(f);
     if (!*tells) {
         common_point_on(q, over, x, f);
-        far = square_distance(x, near);
-        *tells = far <= TELLS * TELLS;
-        if (*tells && is_beside(far, square[0]))
+        if (stands_beside(near, x, square[0], tells))
             return closes(f);
     }
     *side = *tells ? side_of(near, x, q) : HOME_SIDE;
@@ -205,6 +235,7 @@ __attribute__((noinline)) static int pose_near(const double *near, const double 
                                      && square_distance(x, near) <= SETTLED * SETTLED);
     return closed && det * angle_sign(x) * *side > 0.0;
 }
+#define pose_beside(near, q, x) 0
 #endif
 
 #if LEG_MODES
@@ -216,13 +247,11 @@ static int same_legs(const double *p, const double *q)
     return 1;
 }
 
-/* Whether legs that close stand in the working mode: in another one the inverse would make them jump. Beside the end of a
-   leg's reach, where two modes meet, the joints decide; a table's turns move the legs, so each of its solutions counts. */
-static int in_mode(const double *x, const double *q)
+/* Whether legs stand where the working mode has them. Beside the end of a leg's reach, where two modes meet, the joints
+   decide; a table's turns move the legs, so each of its solutions counts. */
+__attribute__((noinline, cold)) static int legs_are_same(const double *x, const double *q)
 {
     double again[JOINTS];
-    if (legs_keep_mode(x, q))
-        return 1;
     inverse(x, again);
     int same = same_legs(again, q);
 #if WRIST
@@ -238,6 +267,12 @@ static int in_mode(const double *x, const double *q)
     }
 #endif
     return same;
+}
+
+/* Whether legs that close stand in the working mode: in another one the inverse would make them jump. */
+static inline int in_mode(const double *x, const double *q)
+{
+    return legs_keep_mode(x, q) || legs_are_same(x, q);
 }
 #else
 #define in_mode(x, q) 1
@@ -317,7 +352,7 @@ static int find_pose_in_motion(double *near, const double *q, double *x)
 
 __attribute__((flatten)) int kinematicsForward(const double *joints, EmcPose *world,
                       const KINEMATICS_FORWARD_FLAGS *fflags, KINEMATICS_INVERSE_FLAGS *iflags)
-{ /* flattened, as the inverse is */
+{ /* flattened, as the inverse is; what no cycle needs is a call, which leaves registers to the rest */
     double q[JOINTS], near[AXES], x[AXES];
     (void)fflags;
     (void)iflags;
@@ -334,7 +369,7 @@ __attribute__((flatten)) int kinematicsForward(const double *joints, EmcPose *wo
     if (guess_is_old)
         copy_pose(own_pose, near);
     const int in_motion = hal_get_bool(pins->teleop) || hal_get_bool(pins->coordinated);
-    if (!(in_motion ? find_pose_in_motion(near, q, x) : find_pose_for_homing(near, q, x)))
+    if (!pose_beside(near, q, x) && !(in_motion ? find_pose_in_motion(near, q, x) : find_pose_for_homing(near, q, x)))
         return -1;
     if (!in_mode(x, q))
         return -1;

@@ -15,7 +15,7 @@ import numpy as np
 
 from ... import algebra as alg
 from ...algebra import Scalar, Term, Trace
-from ...arrays import Array
+from ...arrays import Array, Flags
 
 _UNIT = 2.0**-53  # of a result, by which an operation rounds at most
 _CUTS = 8  # of an input's range
@@ -123,7 +123,7 @@ def _bound_nothing(k: Sequence[float], args: Sequence[Rounded]) -> Rounded:
     return _know_where(np.zeros(1, np.bool_), _ONE)
 
 
-def _know_where(known: Array, value: Rounded) -> Rounded:
+def _know_where(known: Flags, value: Rounded) -> Rounded:
     """Keep a value in the cells where it is known."""
     low, high, error = (np.where(known, x, end) for x, end in zip(value, (-np.inf, np.inf, np.inf), strict=True))
     return Rounded(low, high, error)

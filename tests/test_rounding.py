@@ -7,7 +7,7 @@ import pytest
 from shipped import load_shipped
 
 from parakin.algebra import Trace, sqrt
-from parakin.controllers.linuxcnc.model_header import CLEAR
+from parakin.controllers.linuxcnc.certainty import CLEAR
 from parakin.controllers.linuxcnc.rounding import bound_rounding
 from parakin.model.spheres import compute_square_height
 

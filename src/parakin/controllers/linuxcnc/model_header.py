@@ -22,7 +22,6 @@ from ...kinematics.wrist.pole_thresholds import EXACT, NEAR_MODE, SAME_AXIS, STA
 from ...machine import Machine
 from ...model.limits import Limit
 from ...model.rates import trace_determinant
-from ...model.spheres import compute_square_height
 from ...performance.characteristic_length import choose_characteristic_length
 from ...performance.jacobians import (
     get_serial_factor,
@@ -38,15 +37,14 @@ from ...performance.singularities import (
     list_margin_names,
 )
 from .axis_rates import choose_drive_rates
+from .certainty import write_certainty
 from .home_pose import find_home_pose
 from .margin_signs import find_cheap_sign
-from .rounding import bound_rounding
 from .tape_to_c import format_c, write_function, write_test
 
 AGREEMENT = 1.0  # mm: joints of more drives than freedoms disagree by their following errors
 NO_SIDE = 1e-6  # of home's determinant: less is a singularity, of no side
 TELLS = 0.02  # of a leg: a pose from which the legs are farther off is a guess, and its side says nothing
-CLEAR = 0.1  # of a leg: a common point of spheres so high over their centres is told without a check
 LEAST_REGULARITY = (
     0.02  # of home's singularity margin (of 1 for a leg's serial one): no pose is nearer to a singularity
 )
@@ -139,7 +137,7 @@ def _write_numbers(machine: Machine) -> str:
         "/* and joints that are measured may disagree */",
         *_write_wrist(machine),
         *_write_sides(machine),
-        *_write_certainty(machine),
+        *write_certainty(machine),
         *_write_newton(machine),
         *_write_limits(machine),
         f"#define CYCLE {format_c(CYCLE)} /* s: the servo period */",
@@ -201,23 +199,6 @@ def _write_sides(machine: Machine) -> Iterator[str]:
     yield f"#define SETTLED {format_c(SETTLED * most)} /* mm: an answer as near to a given pose has its side, */"
     yield f"#define STEADY {format_c(STEADY)} /* where the determinant changes by no more than this fraction */"
     yield f"#define MIDDLE_TURN {-1 if middle is None else middle} /* whose ±90° is singular to a pose's angles */"
-
-
-def _write_certainty(machine: Machine) -> Iterator[str]:
-    """Write whether rounding can't leave a common point's closures open, with joints in their ranges.
-
-    An exact point is on the spheres, so that its own error bounds what it leaves open.
-    """
-    certain, height = False, CLEAR * min(machine.leg_sizes)
-    if machine.has_closed_forward:
-        model, trace = machine.model, Trace()
-        joints = trace.inputs(len(model.drives))
-        known = {compute_square_height(*model.find_spheres(joints)): height**2}
-        box = [(drive.low, drive.high) for drive in model.drives]
-        errors = bound_rounding(trace, model.spheres(joints, model.home_side), box, known)
-        certain = 2.0 * float(np.hypot.reduce(errors)) <= machine.closure_tolerance
-    yield f"#define CERTAIN {int(certain)} /* with joints in their ranges the forward closes by its form */"
-    yield f"#define CERTAIN_HEIGHT {format_c(height**2)} /* where it is higher over the spheres' centres, mm² */"
 
 
 def _write_limits(machine: Machine) -> Iterator[str]:

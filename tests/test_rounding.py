@@ -9,25 +9,22 @@ from shipped import load_shipped
 from parakin.algebra import Trace, sqrt
 from parakin.controllers.linuxcnc.certainty import CLEAR
 from parakin.controllers.linuxcnc.rounding import bound_rounding
-from parakin.model.spheres import compute_square_height
 
 
 @pytest.mark.parametrize("name", ["linear_delta", "linapod3", "quickstep", "urane_sx"])
 def test_common_points_are_as_near_to_those_of_longer_numbers(name):
     """Joints all over their ranges, and many that bring the point down to where the bound begins."""
     machine = load_shipped(name)
-    model, trace, least = machine.model, Trace(), CLEAR * min(machine.leg_sizes)
-    inputs = trace.inputs(3)
+    trace, least = Trace(), CLEAR * min(machine.leg_sizes)
+    point, square = machine.trace_common_point(trace.inputs(3))
     box = [(drive.low, drive.high) for drive in machine.drives]
-    known = {compute_square_height(*model.find_spheres(inputs)): least**2}
-    bounds = np.array(bound_rounding(trace, model.spheres(inputs, model.home_side), box, known))
+    bounds = np.array(bound_rounding(trace, point, box, {square: least**2}))
     joints = np.random.default_rng(1).uniform(*np.transpose(box), (200_000, 3))
     with np.errstate(invalid="ignore"):
-        height = compute_square_height(*model.find_spheres(list(joints.T))) ** 0.5
+        height = np.sqrt(machine.trace_common_point(list(joints.T))[1])
         joints = joints[(height >= least) & ((height < 1.2 * least) | (np.arange(len(joints)) < 20_000))]
-        short, long = (
-            np.array(model.spheres(list(q.T), model.home_side)) for q in (joints, joints.astype(np.longdouble))
-        )
+        numbers = (joints, joints.astype(np.longdouble))
+        short, long = (np.array(machine.trace_common_point(list(q.T))[0]) for q in numbers)
     errors = np.abs(short - long).max(1)
     assert np.isfinite(short).all() and len(joints) > 1000
     assert (errors <= bounds).all()

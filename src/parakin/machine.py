@@ -360,6 +360,10 @@ class Machine(MachineProperties, Displayed):
         own = self.model.own_margins(pose, mode) if joints is None else self.model.margins(pose, joints, mode)
         return [margin for _, margin in own]
 
+    def trace_common_point(self, joints: Sequence[Scalar]) -> tuple[list[Scalar], Scalar]:
+        """Trace where the legs' spheres meet on home's side, and its squared height over their centres, mm²."""
+        return self.model.trace_home_spheres(joints)
+
     def trace_rates(self, pose: Sequence[Scalar], joints: Sequence[Scalar]) -> TwistRates:
         """Trace A and B of the tool's twist, and the legs' wrench norms."""
         return compute_twist_rates(self.spec, self.structure, pose, joints)

@@ -5,7 +5,7 @@ Inputs are numbered: first the pose (or the motion's coordinates), then the join
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import cached_property
 
 import numpy as np
@@ -225,11 +225,14 @@ class Model(Equations):
 
         def outputs(trace: Trace) -> list[Scalar]:
             joints = list(trace.inputs(len(self.drives)))
-            coordinates = self.spheres(joints, self.home_side)
-            height = compute_square_height(*self.find_spheres(joints))
+            coordinates, height = self.trace_home_spheres(joints)
             return [*self.compute_pose(coordinates, joints), *self.scaled_closures(coordinates, joints), height]
 
         return self.keep_tape(("spheres with height",), len(self.drives), outputs)
+
+    def trace_home_spheres(self, joints: Sequence[Scalar]) -> tuple[list[Scalar], Scalar]:
+        """Trace the common point of the legs' spheres on home's side, and its squared height over the centres, mm²."""
+        return self.spheres(joints, self.home_side), compute_square_height(*self.find_spheres(joints))
 
     def spheres_on_side_tape(self) -> Tape:
         """Compile joints, a number -> as :meth:`spheres_tape`, on the side that the number's sign tells."""

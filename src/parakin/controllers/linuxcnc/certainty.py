@@ -8,7 +8,6 @@ import numpy as np
 
 from ...algebra import Trace
 from ...machine import Machine
-from ...model.spheres import compute_square_height
 from .rounding import bound_rounding
 from .tape_to_c import format_c
 
@@ -22,11 +21,10 @@ def write_certainty(machine: Machine) -> Iterator[str]:
     """
     certain, height = False, CLEAR * min(machine.leg_sizes)
     if machine.has_closed_forward:
-        model, trace = machine.model, Trace()
-        joints = trace.inputs(len(model.drives))
-        known = {compute_square_height(*model.find_spheres(joints)): height**2}
-        box = [(drive.low, drive.high) for drive in model.drives]
-        errors = bound_rounding(trace, model.spheres(joints, model.home_side), box, known)
+        trace = Trace()
+        point, square = machine.trace_common_point(trace.inputs(len(machine.joints)))
+        box = [(drive.low, drive.high) for drive in machine.drives]
+        errors = bound_rounding(trace, point, box, {square: height**2})
         certain = 2.0 * float(np.hypot.reduce(errors)) <= machine.closure_tolerance
     yield f"#define CERTAIN {int(certain)} /* with joints in their ranges the forward closes by its form */"
     yield f"#define CERTAIN_HEIGHT {format_c(height**2)} /* where it is higher over the spheres' centres, mm² */"

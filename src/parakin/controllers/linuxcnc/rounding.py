@@ -109,21 +109,21 @@ def _bound_quotient(k: Sequence[float], args: Sequence[Rounded]) -> Rounded:
     low, high = reduce(np.minimum, ends), reduce(np.maximum, ends)
     size = np.maximum(np.abs(low), np.abs(high))
     error = (a.error + size * b.error) / least + 2.0 * _UNIT * size
-    return _know_where(least > 0.0, Rounded(low, high, error))
+    return _keep_where(least > 0.0, Rounded(low, high, error))
 
 
 def _bound_root(k: Sequence[float], args: Sequence[Rounded]) -> Rounded:
     (a,) = args
     least = a.low - a.error
     low, high = np.sqrt(a.low), np.sqrt(a.high)
-    return _know_where(least > 0.0, Rounded(low, high, a.error / np.sqrt(least) + 2.0 * _UNIT * high))
+    return _keep_where(least > 0.0, Rounded(low, high, a.error / np.sqrt(least) + 2.0 * _UNIT * high))
 
 
 def _bound_nothing(k: Sequence[float], args: Sequence[Rounded]) -> Rounded:
-    return _know_where(np.zeros(1, np.bool_), _ONE)
+    return _keep_where(np.zeros(1, np.bool_), _ONE)
 
 
-def _know_where(known: Flags, value: Rounded) -> Rounded:
+def _keep_where(known: Flags, value: Rounded) -> Rounded:
     """Keep a value in the cells where it is known."""
     low, high, error = (np.where(known, x, end) for x, end in zip(value, (-np.inf, np.inf, np.inf), strict=True))
     return Rounded(low, high, error)

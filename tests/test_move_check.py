@@ -79,6 +79,15 @@ def test_no_false_yes(name, tmp_path):
     assert (proved & allowed).sum() > 0.98 * allowed.sum()
 
 
+@pytest.mark.parametrize("language", ["c99", "c11", "c++11", "c++20"])
+def test_any_firmwares_compiler_takes_it(language, tmp_path):
+    """Without a GNU extension: Klipper and grblHAL are C, FluidNC and RepRapFirmware C++."""
+    (tmp_path / "check_move.h").write_text(render_move_check(load_shipped("linear_delta")))
+    (tmp_path / "run.c").write_text(RUN)
+    flags = [f"-std={language}", "-Wall", "-Wextra", "-Wpedantic", "-Werror", "-fsyntax-only"]
+    subprocess.run([CC, *flags, "-x", "c++" if "+" in language else "c", "run.c"], cwd=tmp_path, check=True)
+
+
 def test_moves_to_the_brink(tmp_path):
     """A move that ends just inside what travel proves is allowed, and one that ends just beyond is not."""
     machine = load_shipped("hexapod")

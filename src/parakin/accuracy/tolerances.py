@@ -7,10 +7,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..algebra import Scalar
+from ..algebra import Scalar, dot
 from ..arrays import Array, Indices
 from ..errors import PoseError, quote
-from ..families.family import Family, select_parameters
+from ..families.family import Family, list_scales, select_parameters
 from ..families.shift_rates import trace_shift_rates
 from ..kernels.intervals import JumpFreeTrace
 from ..machine import Machine
@@ -101,10 +101,17 @@ def trace_error(
 ) -> tuple[list[list[Scalar]], list[list[Scalar]]]:
     """Trace A of the tool's twist, and W: the deviation of the tip is the norm (Frobenius') of its rows of A⁻¹W.
 
-    Of numbers that lie evenly within their tolerances, to the first order.
+    Of numbers that lie evenly within their tolerances, to the first order. With more drives than freedoms they are
+    those of the forward's least squares: AᵀVA and AᵀVW, with V of the closures' scales.
 
     sizes : other values of the machine's parameters, by name
     """
     joints, _, _ = machine.trace_equations(sizes).invert(pose, machine.mode)
     a, _, c = trace_shift_rates(machine, pose, joints, within.family.names, sizes)
-    return a, [[x * (UNIFORM * half) for x, half in zip(row, within.halves.tolist(), strict=True)] for row in c]
+    w = [[x * (UNIFORM * half) for x, half in zip(row, within.halves.tolist(), strict=True)] for row in c]
+    if not machine.is_redundant:
+        return a, w
+    scaled, off = ([[x / s for x in row] for row, s in zip(m, list_scales(machine), strict=True)] for m in (a, w))
+    columns = list(zip(*scaled, strict=True))
+    normal = [[dot(column, other) for other in columns] for column in columns]
+    return normal, [[dot(column, other) for other in zip(*off, strict=True)] for column in columns]

@@ -56,6 +56,12 @@ class FamilyRates(NamedTuple):
         return invert_from_left(self.a, np.broadcast_to(np.diag(self.scales), self.b.shape)) @ right
 
 
+def list_scales(machine: Machine) -> list[float]:
+    """List what one of each closure is in the least squares of more drives than freedoms."""
+    least = _KEPT * min(machine.leg_sizes)
+    return [*machine.leg_sizes, *[least] * (len(machine.joints) - machine.leg_count)]
+
+
 def solve_each(matrices: Array, right: Array) -> Array:
     """Solve a linear system for each matrix; NaN where it is singular or not a number."""
     good = np.flatnonzero(np.isfinite(matrices).all((1, 2)))
@@ -279,7 +285,7 @@ class Family:
         at_rest = np.zeros((len(rows[0]), turns))
         values = self._evaluate(tape, [rows[0], at_rest, *rows[1:]], m + m * n + m * m + m * k)
         f, a, b, c = np.split(values, np.cumsum([m, m * n, m * m]), axis=1)
-        scales = np.array([*machine.leg_sizes, *[_KEPT * min(machine.leg_sizes)] * (m - machine.leg_count)])
+        scales = np.array(list_scales(machine))
         return FamilyRates(f, a.reshape(-1, m, n), b.reshape(-1, m, m), c.reshape(-1, m, k), scales)
 
     def _evaluate(self, tape: Tape, rows: Sequence[Array], width: int) -> Array:

@@ -50,6 +50,14 @@ def compute_singular_values(matrices: Array) -> Array:
     return result.reshape(*lead, n)
 
 
+def compute_volumes(matrices: Array) -> Array:
+    """Compute the determinants of matrices (..., m, n), (...,); where m > n √det(AᵀA), which has no sign."""
+    rows, columns = matrices.shape[-2:]
+    if rows == columns:
+        return np.asarray(np.linalg.det(matrices))
+    return np.asarray(compute_singular_values(matrices.swapaxes(-2, -1)).prod(-1))
+
+
 @njit(nogil=True, cache=True, fastmath=FAST, error_model="numpy")
 def _solve_lanes(divisors, dividends, n, m, out, start, stop):
     """Solve for the matrices start ≤ i < stop, by Gauss and Jordan."""

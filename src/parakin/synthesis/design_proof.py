@@ -11,6 +11,7 @@ from ..arrays import Array
 from ..budget import Budget
 from ..machine import Machine
 from ..performance.certified.interval_matrices import PoseBox
+from ..performance.certified.proofs import prove_no_singularity
 from ..performance.certified.quotient_norms import NormSearch
 from ..performance.characteristic_length import choose_characteristic_length
 from ..workspaces.certified.assembly_mode import make_side_constraints
@@ -52,7 +53,8 @@ class DesignProof:
         for number, poses in enumerate(self.sets):
             traced = poses.trace(self.machine) if self.size_box is None else self.size_box.trace_set(poses)
             constraints = traced.build_limits()
-            constraints.append(make_side_constraints(traced)[0])
+            if not self.machine.is_redundant:
+                constraints.append(make_side_constraints(traced)[0])
             d = len(traced.free_axes)
             position, orientation = traced.inputs[:d], traced.inputs[d:]
             equations = traced.trace_equations(traced.inputs)
@@ -69,6 +71,12 @@ class DesignProof:
                 return f"{containment.names[limit]} is broken at a wanted pose"
             if not containment.proved[0]:
                 return "left undecided"
+            if self.machine.is_redundant:
+                box = self._make_box(poses)[1]
+                proof = prove_no_singularity(box, "parallel", _BOXES, max(budget.seconds_left, 1e-3))
+                self.boxes += proof.boxes
+                if proof.verdict != "proved":
+                    return f"{proof.claim}: {proof.verdict}, {proof.reason}"
         return ""
 
     def _list_ends(self, poses: PoseSet) -> tuple[Array, Array]:

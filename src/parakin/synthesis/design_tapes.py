@@ -12,10 +12,10 @@ from ..algebra import Scalar
 from ..arrays import Array
 from ..errors import PoseError
 from ..families.family import make_family
-from ..kernels.small_matrices import solve_quotients
 from ..machine import Machine
 from ..performance.characteristic_length import choose_characteristic_length
 from ..performance.jacobians import list_column_scales
+from ..performance.quotients import compute_quotients
 from ..stiffness.springs import MachineSprings, read_springs, trace_compliance
 
 # Traces M and N at a pose, for sizes by their names, where the first rows of M⁻¹N tell a quantity of the tip.
@@ -85,18 +85,21 @@ class DesignTapes:
         """Trace what the tip's deviation follows from."""
         return trace_error(self.machine, pose, self.tolerances, sizes)
 
-    def evaluate_quotient(self, name: str, trace: TracedQuotient, poses: Array, sizes: Array) -> Array:
-        """Evaluate the tip's rows of a quotient, (..., tip, k); infinite where it is singular, NaN out of reach."""
+    def evaluate_quotient(self, name: str, trace: TracedQuotient, poses: Array, sizes: Array, rows: int) -> Array:
+        """Evaluate the tip's rows of a quotient A⁻¹W, (..., tip, k); infinite where it is singular, NaN out of reach.
+
+        rows : of A, which is tall with more drives than freedoms
+        """
         n = len(self.machine.axes)
 
         def list_outputs(pose: Sequence[Scalar], own: Mapping[str, Scalar]) -> list[Scalar]:
             a, w = trace(pose, own)
             return [x for row in (*a, *w) for x in row]
 
-        rows = self.family.evaluate(name, list_outputs, poses, sizes)
-        lead = rows.shape[:-1]
-        a, w = np.split(rows.reshape(-1, rows.shape[-1]), [n * n], axis=1)
-        ways = solve_quotients(a.reshape(-1, n, n), w.reshape(len(w), n, -1))[:, : self.tip]
+        values = self.family.evaluate(name, list_outputs, poses, sizes)
+        lead = values.shape[:-1]
+        a, w = np.split(values.reshape(-1, values.shape[-1]), [rows * n], axis=1)
+        ways = compute_quotients(a.reshape(-1, rows, n), w.reshape(len(w), rows, -1))[:, : self.tip]
         return ways.reshape(*lead, *ways.shape[1:])
 
     def measure_distances(self, poses: Array, sizes: Array) -> Array:

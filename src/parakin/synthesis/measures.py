@@ -8,7 +8,7 @@ import numpy as np
 
 from ..arrays import Array
 from ..families.family import FamilyRates
-from ..kernels.small_matrices import compute_singular_values, solve_quotients
+from ..kernels.small_matrices import compute_singular_values, compute_volumes, solve_quotients
 from .design_tapes import DesignTapes
 from .part_timing import PartTimer
 from .workspace_gauge import WorkspaceGauge
@@ -89,10 +89,13 @@ class Measures:
 
     @cached_property
     def side(self) -> Array:
-        """Det A by that of the pose that counts, > 0 on its side of the parallel singularities, (S, P, 1)."""
-        size = self._tapes.machine.parallel_block[1]
+        """Det A by that of the pose that counts, > 0 on its side of the parallel singularities, (S, P, 1).
+
+        With more drives than freedoms it is the volume, > 0 off singularities.
+        """
+        rows, columns = self._tapes.machine.parallel_block
         with np.errstate(divide="ignore", invalid="ignore"):
-            side = np.linalg.det(self._rates.a[:, :size, :size]).reshape(*self._all.shape[:-1], 1)
+            side = compute_volumes(self._rates.a[:, :rows, :columns]).reshape(*self._all.shape[:-1], 1)
             return np.asarray(side[:, :-1] / side[:, -1:])
 
     @cached_property
@@ -117,7 +120,8 @@ class Measures:
     def stiffness(self) -> Array:
         """The tip's least stiffness over all directions, (S, P, 1) N/mm; zero at parallel singularities."""
         tapes = self._tapes
-        ways = tapes.evaluate_quotient("compliance", tapes.trace_compliance, self._poses, self._sizes)
+        rows = len(tapes.machine.joints)
+        ways = tapes.evaluate_quotient("compliance", tapes.trace_compliance, self._poses, self._sizes, rows)
         with np.errstate(divide="ignore"):
             stiffness = compute_singular_values(ways)[..., :1] ** -2
         stiffness[np.isinf(ways[..., 0, 0])] = 0.0
@@ -127,15 +131,21 @@ class Measures:
     def deviation(self) -> Array:
         """Root mean square of the tip's error within the tolerances, (S, P, 1) mm."""
         tapes = self._tapes
-        ways = tapes.evaluate_quotient("error", tapes.trace_error, self._poses, self._sizes)
+        rows = len(tapes.machine.axes)  # of normal equations too
+        ways = tapes.evaluate_quotient("error", tapes.trace_error, self._poses, self._sizes, rows)
         return np.asarray(np.sqrt(np.square(ways).sum((-2, -1)))[..., None])
 
 
 def compute_extremes(a: Array, b: Array) -> Array:
-    """Compute the greatest singular value of A⁻¹B and the reciprocal of the least, (N, 2); NaN where A or B is."""
-    quotients = solve_quotients(a, b)
+    """Compute the greatest singular value of J = A⁻¹B and the reciprocal of the least, (N, 2); NaN where A or B is.
+
+    Of a tall A, of more drives than freedoms, J is the pseudo-inverse of B⁻¹A.
+    """
+    tall = a.shape[1] > a.shape[2]
+    quotients = solve_quotients(b, a).swapaxes(1, 2) if tall else solve_quotients(a, b)
     s = compute_singular_values(quotients)
     with np.errstate(divide="ignore"):
-        result = np.stack([s[:, 0], 1.0 / s[:, -1]], -1)
+        ends = (1.0 / s[:, -1], s[:, 0]) if tall else (s[:, 0], 1.0 / s[:, -1])
+    result = np.stack(ends, -1)
     result[np.isinf(quotients[:, 0, 0])] = np.inf
     return result

@@ -77,7 +77,6 @@ class DesignProblem:
         return f"<parakin design problem of {self.machine.name}: {len(self.free)} free numbers>"
 
     def __post_init__(self) -> None:
-        self.machine.refuse_redundancy("design")
         if not self.free:
             raise PoseError("free: at least one number expected")
         known = [parameter.name for parameter in self.machine.parameters]

@@ -10,6 +10,7 @@ from scipy.stats import qmc
 from ..arrays import Array
 from ..budget import Budget
 from ..errors import PoseError
+from ..kernels.small_matrices import compute_volumes
 from ..machine import Machine
 from ..workspaces.certified.region import Region, make_region
 from ..workspaces.certified.workspace import workspace
@@ -70,10 +71,10 @@ class WorkspaceGauge:
         fractions = np.clip(0.5 + margins.min(1) / self._edge, 0.0, 1.0)
         rows = np.flatnonzero(fractions > 0.0)
         poses = np.concatenate([middle[None], self._poses[rows]])
-        size = tapes.machine.parallel_block[1]
-        a = family.twist_rates(poses, family.inverse(poses, sizes), sizes).a[:, :size, :size]
+        height, width = tapes.machine.parallel_block
+        a = family.twist_rates(poses, family.inverse(poses, sizes), sizes).a[:, :height, :width]
         with np.errstate(invalid="ignore"):
-            sides = np.sign(np.linalg.det(a))
+            sides = np.sign(compute_volumes(a))
         fractions[rows[sides[1:] != sides[0]]] = 0.0
         return self._volume * float(fractions.reshape(-1, self._count).min(1).mean())
 

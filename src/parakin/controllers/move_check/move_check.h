@@ -75,6 +75,12 @@ static cm_interval cm_scale(double k, cm_interval a)
     return y;
 }
 
+static cm_interval cm_span(double low, double high)
+{
+    const cm_interval y = {low, high};
+    return y;
+}
+
 static cm_interval cm_product(double k, int a, int b)
 {
     cm_interval y = cm_multiply(cm_r[a], cm_r[b]);
@@ -115,7 +121,7 @@ static cm_interval cm_divide(cm_interval a, cm_interval b)
 {
     cm_interval y = {-HUGE_VAL, HUGE_VAL};
     if (b.low <= 0.0 && b.high >= 0.0) return y;
-    b = cm_multiply(a, (cm_interval){1.0 / b.high, 1.0 / b.low});
+    b = cm_multiply(a, cm_span(1.0 / b.high, 1.0 / b.low));
     y.low = cm_round(b.low, b.low, 4.0 * fabs(b.low)).low;
     y.high = cm_round(b.high, b.high, 4.0 * fabs(b.high)).high;
     return y;
@@ -185,8 +191,8 @@ static void cm_run(const unsigned short (*code)[8], const double (*constants)[4]
             cm_r[c[1]] = terms[0];
             break;
         case 11: cm_r[c[1]] = cm_angle(a, b); break;
-        case 12: terms[0] = (cm_interval){cm_min(a.low, b.low), cm_min(a.high, b.high)}; cm_r[c[1]] = terms[0]; break;
-        case 13: terms[0] = (cm_interval){cm_max(a.low, b.low), cm_max(a.high, b.high)}; cm_r[c[1]] = terms[0]; break;
+        case 12: terms[0] = cm_span(cm_min(a.low, b.low), cm_min(a.high, b.high)); cm_r[c[1]] = terms[0]; break;
+        case 13: terms[0] = cm_span(cm_max(a.low, b.low), cm_max(a.high, b.high)); cm_r[c[1]] = terms[0]; break;
         case 14: cm_r[c[1]] = cm_size(a); break;
         case 15: cm_r[c[1]] = cm_copy_sign(a, b); break;
         default: cm_r[c[1]] = cm_select(a, b, cm_r[c[4]], cm_r[c[5]]); break;

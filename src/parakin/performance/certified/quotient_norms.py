@@ -16,7 +16,7 @@ import numpy as np
 
 from ...arrays import Array, Indices, Progress
 from ...budget import Budget
-from ...kernels.small_matrices import compute_singular_values, solve_quotients
+from ...kernels.small_matrices import compute_singular_values
 from ...workspaces.certified.matrix_bounds import (
     LinearMatrices,
     Matrix,
@@ -24,6 +24,7 @@ from ...workspaces.certified.matrix_bounds import (
     bound_inverse_error,
     invert_middles,
 )
+from ..quotients import compute_quotients
 from ..search import pick_best_of_blocks, search_maxima_in_box
 from .bisection import AT_ONCE, bisect_inputs, find_widest_inputs
 from .interval_matrices import PoseBox
@@ -133,7 +134,7 @@ class NormSearch:
             return self.evaluate(points)
         values: Array = np.ones(len(points))
         for quotient, (divisor, dividend) in zip(self.quotients, self._bounds, strict=True):
-            matrices = solve_quotients(divisor(points, points).middle, dividend(points, points).middle)
+            matrices = compute_quotients(divisor(points, points).middle, dividend(points, points).middle)
             values = values * _compute_norms(matrices[:, : quotient.rows], quotient.norm)
         return np.where(np.isnan(values), np.nan, values)
 

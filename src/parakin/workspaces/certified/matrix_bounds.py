@@ -13,7 +13,7 @@ import numpy as np
 from ...algebra import Scalar, Term, Trace, derivative
 from ...arrays import Array, Flags, Indices
 from ...kernels.intervals import IntervalProgram
-from ...kinematics.tall_matrices import compute_determinants
+from ...kinematics.tall_matrices import compute_determinants, invert_from_left
 
 Matrix = Sequence[Sequence[Scalar]]
 
@@ -108,13 +108,12 @@ def _compute_middles(down: Array, up: Array) -> tuple[Array, Array]:
 def invert_middles(matrices: LinearMatrices, dividend: LinearMatrices | None = None) -> tuple[Array, Flags]:
     """Invert the bounded, regular middles; returns the inverses, and which these are.
 
-    Of a tall middle M the inverse Y is one from the left, Y·M = 1: the pseudo-inverse, or with a square ``dividend`` N
-    that for which Y·N is the pseudo-inverse of N⁻¹M.
+    Of a tall middle M the inverse Y is one from the left, Y·M = 1: the pseudo-inverse, or with a ``dividend`` N that
+    for which Y·N is least, of a square N the pseudo-inverse of N⁻¹M.
     """
     good = matrices.bounded
     if dividend is not None and _is_tall(matrices):
         good = good & dividend.bounded
-        good[good] = compute_determinants(dividend.middle[good]) != 0.0
     with np.errstate(all="ignore"):
         size = np.abs(compute_determinants(np.where(good[:, None, None], matrices.middle, 0.0)))
     good = good & (size > 0.0) & np.isfinite(size)
@@ -124,8 +123,7 @@ def invert_middles(matrices: LinearMatrices, dividend: LinearMatrices | None = N
     elif dividend is None:
         inverse = np.linalg.pinv(middle)
     else:
-        back = np.linalg.inv(dividend.middle[good])
-        inverse = np.linalg.pinv(back @ middle) @ back
+        inverse = invert_from_left(middle, dividend.middle[good])
     fine = np.isfinite(inverse).all((1, 2))
     good[np.flatnonzero(good)[~fine]] = False
     return inverse[fine], good

@@ -30,6 +30,7 @@ MOVES = {
     "orthoglide": 25_000,
     "hbg80_3d": 15_000,
     "five_bar": 10_000,
+    "hexaglide": 600,
 }
 SAMPLES = 40
 

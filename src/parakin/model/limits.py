@@ -284,14 +284,23 @@ def _share_joint(one: _Strut, two: _Strut) -> bool:
 
 
 def compute_segment_distance(a: tuple[Vec, Vec], b: tuple[Vec, Vec]) -> Scalar:
-    """Compute the least distance of two segments (Ericson, Real-Time Collision Detection, 5.1.9), branch-free."""
+    """Compute the least distance of two segments (Ericson, Real-Time Collision Detection, 5.1.9), branch-free.
+
+    Its rate is that of the gap along its direction, whose parts are never beyond 1: so its bounds over a span are
+    finite where segments are nearly parallel, and where they are nearest is open.
+    """
     u, v, w = sub(a[1], a[0]), sub(b[1], b[0]), sub(a[0], b[0])
     uu, vv, uv, uw, vw = dot(u, u), dot(v, v), dot(u, v), dot(u, w), dot(v, w)
     # A tiny part of |u|²|v|² avoids 0/0 for parallel segments, where any point is right.
     s = _clamp_fraction((uv * vw - uw * vv) / maximum(uu * vv - uv * uv, 1e-14 * (uu * vv)))
     t = _clamp_fraction((uv * s + vw) / vv)
     s = _clamp_fraction((uv * t - uw) / uu)
-    return norm(sub(add(w, scale(u, stop_gradient(s))), scale(v, stop_gradient(t))))
+    gap = sub(add(w, scale(u, stop_gradient(s))), scale(v, stop_gradient(t)))
+    distance = norm(gap)
+    if isinstance(distance, Term):
+        along = [maximum(minimum(x / distance, 1.0), -1.0) for x in gap]
+        distance.trace.known_slopes[distance.index] = list(zip(along, gap, strict=True))
+    return distance
 
 
 def _clamp_fraction(x: Scalar) -> Scalar:

@@ -73,10 +73,10 @@ class DesignProof:
                 return "left undecided"
             if self.machine.is_redundant:
                 box = self._make_box(poses)[1]
-                proof = prove_no_singularity(box, "parallel", _BOXES, max(budget.seconds_left, 1e-3))
-                self.boxes += proof.boxes
-                if proof.verdict != "proved":
-                    return f"{proof.claim}: {proof.verdict}, {proof.reason}"
+                regular = prove_no_singularity(box, "parallel", _BOXES, max(budget.seconds_left, 1e-3))
+                self.boxes += regular.boxes
+                if regular.verdict != "proved":
+                    return f"{regular.claim}: {regular.verdict}, {regular.reason}"
         return ""
 
     def _list_ends(self, poses: PoseSet) -> tuple[Array, Array]:

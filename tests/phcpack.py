@@ -3,7 +3,7 @@
 A platform's closures are linear in seventeen forms of Study's parameters (Wampler, Soma coordinates, 1996). PHCpack's
 black box has solved six closures with random complex numbers, a generic member of that linear space, and found forty
 solutions. From these its path tracker follows the line to the closures of a given platform, which stays in that space
-(Morgan and Sommese, Coefficient-parameter polynomial continuation, 1989). That takes 0.4 s where the black box takes
+(Morgan and Sommese, Coefficient-parameter polynomial continuation, 1989). That takes 0.2 s where the black box takes
 10 s.
 
 ``python phcpack.py`` asks the black box for the forty again.
@@ -22,18 +22,13 @@ import numpy as np
 PHC = shutil.which("phc")
 START = Path(__file__).parent / "phcpack_start.txt"
 NAMES = "suvwdxyz"  # of e = s + u·i + v·j + w·k and g = d + x·i + y·j + z·k: turned by e, moved by 2·g·e*/|e|²
-SQUARE = "(s^2+u^2+v^2+w^2)"
-TURN = [
-    ["(s^2+u^2-v^2-w^2)", "(2*u*v-2*s*w)", "(2*u*w+2*s*v)"],
-    ["(2*u*v+2*s*w)", "(s^2-u^2+v^2-w^2)", "(2*v*w-2*s*u)"],
-    ["(2*u*w-2*s*v)", "(2*v*w+2*s*u)", "(s^2-u^2-v^2+w^2)"],
+FORMS = [  # |g|² and what places are made of; then products of e, which the turns are made of
+    *["(d^2+x^2+y^2+z^2)", "(s*x-u*d)", "(s*y-v*d)", "(s*z-w*d)", "(v*z-w*y)", "(w*x-u*z)", "(u*y-v*x)"],
+    *["s^2", "u^2", "v^2", "w^2", "s*u", "s*v", "s*w", "v*w", "u*w", "u*v"],
 ]
-MOVED = ["(s*x-u*d+v*z-w*y)", "(s*y-v*d+w*x-u*z)", "(s*z-w*d+u*y-v*x)"]  # half the place, times the square
-TURNED = ["(s*x-u*d-v*z+w*y)", "(s*y-v*d-w*x+u*z)", "(s*z-w*d-u*y+v*x)"]  # the same in the platform's frame
-FORMS = ["(d^2+x^2+y^2+z^2)", SQUARE, *MOVED, *TURNED, *(entry for row in TURN for entry in row)]
 STUDY = "s*d+u*x+v*y+w*z;"
 LENGTH = "0.31*s-0.57*u+0.83*v+0.42*w+0.29*d-0.61*x+0.74*y-0.38*z-1;"
-INFINITE = 1e-10  # |e|² of a point of length one; of generic ones 1e-6 was met
+INFINITE = 1e-10  # |e|² of a point of length one
 SAME = 1e-7  # rad
 CLOSED = 1e-8  # of an equation
 SEED = 3  # of the black box
@@ -43,9 +38,15 @@ END = {4: "1e-3", 12: "0.1"}  # from where on, and by what steps, an end game go
 
 def describe_closures(feet, corners, lengths):
     """The numbers (6, 17) of a platform's closures, 4|g|² + ... as Husty (1996) has them."""
-    squares = (feet**2).sum(1) + (corners**2).sum(1) - lengths**2
-    turned = -2.0 * (feet[:, :, None] * corners[:, None, :]).reshape(6, 9)
-    return np.column_stack([np.full(6, 4.0), squares, -4.0 * feet, 4.0 * corners, turned])
+    turns = -2.0 * feet[:, :, None] * corners[:, None, :]
+    square = (feet**2).sum(1) + (corners**2).sum(1) - lengths**2
+    trace = np.trace(turns, axis1=1, axis2=2)
+    numbers = [np.full(6, 4.0), *4.0 * (corners - feet).T, *-4.0 * (corners + feet).T]
+    numbers += [square + trace, *(square - trace + 2.0 * turns[:, i, i] for i in range(3))]
+    pairs = [(1, 2), (2, 0), (0, 1)]
+    numbers += [2.0 * (turns[:, j, i] - turns[:, i, j]) for i, j in pairs]
+    numbers += [2.0 * (turns[:, j, i] + turns[:, i, j]) for i, j in pairs]
+    return np.column_stack(numbers)
 
 
 def draw_generic():
@@ -53,10 +54,11 @@ def draw_generic():
 
 
 def write_system(numbers):
-    """Write the equations of closures (6, 17) for PHCpack."""
+    """Write the equations of closures (6, 17) for PHCpack, each with one of the first six forms."""
     lines = [STUDY, LENGTH]
-    for row in numbers.astype(complex):
-        lines.append("".join(f"+({a.real:+.17g}{a.imag:+.17g}*i)*{f}" for a, f in zip(row, FORMS, strict=True)) + ";")
+    for form, row in zip(FORMS, np.linalg.solve(numbers[:, :6], numbers[:, 6:]).astype(complex), strict=False):
+        summands = (f"+({a.real:+.17g}{a.imag:+.17g}*i)*{other}" for a, other in zip(row, FORMS[6:], strict=True))
+        lines.append(form + "".join(summands) + ";")
     return "8\n" + "\n".join(lines) + "\n"
 
 

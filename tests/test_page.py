@@ -1,6 +1,7 @@
 """The page of a machine in Chromium: its numbers are the library's, and it does what is clicked and dragged."""
 
 import json
+import re
 import zipfile
 from pathlib import Path
 from types import SimpleNamespace
@@ -18,6 +19,7 @@ from parakin.export.page import three_script
 from parakin.export.page.page import render_machine_page, write_core, write_surface_worker
 from parakin.export.page.path_data import encode_page_path
 from parakin.kinematics.turns import wrap_angle
+from parakin.model.size_rates import list_numbers
 from parakin.performance.singularities import compute_singularity_margins
 
 AGREE = 1e-9  # mm, rad
@@ -511,8 +513,27 @@ def test_sizes_are_inputs_of_a_page(name, browser):
     assert np.abs(off).max() < AGREE
 
 
+def test_numbers_follow_lengths_angles_and_sizes_that_others_are_calculated_from(tmp_path):
+    hexam = load_shipped("hexam")
+    rates, other = hexam.size_rates, {"lean": 0.8, "rod": 640.0, "R": 430.0}
+    assert rates.names == rates.acting == ("R", "r", "rod", "lean", "tool")
+    numbers = list_numbers(rates.apply(hexam.spec, [other.get(n, hexam.spec.sizes[n]) for n in rates.names]))
+    assert numbers == pytest.approx(list_numbers(pk.load("hexam", other).spec), rel=1e-12, abs=1e-12)
+    rails = pk.family(hexam, free=["lean"]).inverse(hexam.home, {"lean": "41 deg"})
+    assert rails == pytest.approx(pk.load("hexam", {"lean": "41 deg"}).inverse(hexam.home), abs=1e-9)
+    table = load_shipped("orthoglide5_table").size_rates
+    assert (table.names, table.acting) == (("cube", "L", "middle", "tool"), ("L", "middle", "tool"))
+    text = (Path(pk.__file__).parent / "machines" / "rpr3.yaml").read_text(encoding="utf-8")
+    text = re.sub("sizes: .*", "sizes: {R: 500 mm, v: 1 m/s, turn: 4 deg, r: 120 mm, e: R * R / 5 m}", text)
+    text = re.sub("r, at: .30 deg", "r, at: [30 deg + turn", text)
+    (tmp_path / "rpr3.yaml").write_text(re.sub(r"range: \[", "range: [0.5 * e + ", text), encoding="utf-8")
+    assert pk.load(tmp_path / "rpr3.yaml").size_rates.names == (
+        "turn",
+        "e",
+    )  # r times a turn is no sum
+
+
 def test_sizes_that_change_numbers_unevenly_or_the_structure_are_left_out(tmp_path):
-    assert load_shipped("hexam").size_rates.names == ("R", "r", "rod", "tool")  # lean turns the rails
     assert load_shipped("tricept").size_rates.names == ("R", "r", "l1", "l2")
     text = (Path(pk.__file__).parent / "machines" / "triglide_pairs.yaml").read_text(encoding="utf-8")
     text = text.replace("  half:", "  second: 650 mm\n  half:").replace("{rod: rod, on: left", "{rod: second, on: left")
@@ -531,10 +552,11 @@ def test_sizes_that_change_numbers_unevenly_or_the_structure_are_left_out(tmp_pa
 def test_a_size_is_dragged(pages, browser):
     with open_tab(browser) as tab:
         tab.goto(pages("tricept"))
-        slider = tab.get_by_label("R", exact=True).first
+        slider = tab.get_by_label("R, mm", exact=True).first
         slider.evaluate("input => { input.value = 380; input.dispatchEvent(new Event('input')); }")
         machine = pk.load("tricept", parameters={"R": tab.evaluate("parakin.model.sizes[0]")})
         assert abs(tab.evaluate("parakin.model.sizes[0]") - 380.0) < 1.0
+        assert [own["name"] for own in tab.evaluate("parakin.listOwnSizes()")] == ["R"]
         assert tab.evaluate("parakin.state.joints") == pytest.approx(machine.inverse(machine.home), abs=AGREE)
         tab.evaluate("parakin.moveToSizes([2000, 100, 300, 150])")  # struts end before that
         assert tab.locator("#verdict").inner_text().startswith("Stopped: d")
@@ -542,6 +564,22 @@ def test_a_size_is_dragged(pages, browser):
         assert tab.evaluate("parakin.state.joints") == pytest.approx(
             load_shipped("tricept").inverse(machine.home), abs=AGREE
         )
+
+
+@needs_chromium
+def test_sizes_follow_one_that_the_file_calculates_them_from(pages, browser):
+    with open_tab(browser) as tab:
+        tab.goto(pages("orthoglide5_table"))
+        for name, value in (("cube", "206"), ("L", "265")):
+            number = tab.get_by_label(f"{name}, mm").nth(1)
+            number.fill(value)
+            number.press("Enter")
+        own = {size["name"]: size["value"] for size in tab.evaluate("parakin.listOwnSizes()")}
+        assert own == {"cube": 206.0, "L": 265.0}
+        machine = pk.load("orthoglide5_table", parameters=own)  # middle follows L
+        assert tab.evaluate("parakin.model.sizes") == pytest.approx(list(machine.spec.sizes.values()), abs=AGREE)
+        joints = machine.inverse(tab.evaluate("parakin.state.pose"))
+        assert tab.evaluate("parakin.state.joints") == pytest.approx(joints, abs=AGREE)
 
 
 @needs_chromium

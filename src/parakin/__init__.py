@@ -11,6 +11,8 @@ from .errors import DescriptionError, InputError, InputErrors, NoMethodError, Pa
 from .version import __version__
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from .accuracy.accuracy import Accuracy, allocate_tolerances, analyse_accuracy
     from .accuracy.worst_case import WorstCase, bound_worst_case
     from .calibration.calibration import Calibration, calibrate
@@ -40,6 +42,7 @@ if TYPE_CHECKING:
     from .kinematics.solution import Solution
     from .machine import Machine
     from .model.geometric_parameters import Parameter
+    from .model.spec import Spec
     from .performance.atlas import Atlas, atlas
     from .performance.certified.nearest_singularity import SingularityDistance, find_nearest_singularity
     from .stiffness.stiffness import Stiffness, analyse_stiffness
@@ -206,9 +209,16 @@ def load(name: str | PathLike[str], parameters: Mapping[str, float | str] | None
     path = find_machine_file(name)
     spec = read_machine(path, parameters)
     try:
-        return Machine(spec, partial(read_machine, path))
+        return Machine(spec, partial(_read_with_sizes, path, dict(parameters or {})))
     except DescriptionError as error:
         raise InputError(str(error), fspath(path), find_key_line(path, error.key)) from None
+
+
+def _read_with_sizes(path: Path, given: Mapping[str, float | str], sizes: Mapping[str, float]) -> Spec:
+    """Read a machine file with other sizes in place of those that it was loaded with."""
+    from .description import read_machine
+
+    return read_machine(path, {**given, **sizes})
 
 
 # The public names that are loaded when they are first used: the module, and the name there if it is another.

@@ -37,6 +37,8 @@ from .model.structures import DirectionColumns, Structure, make_structure
 from .model.traces import Model
 from .units import AXIS_UNITS
 
+_SMALL_TURN = 1e-4  # rad, by which an angle is changed to see how numbers follow it
+
 
 @check_constructor
 class MachineProperties:
@@ -158,11 +160,10 @@ class MachineProperties:
     def parameters(self) -> tuple[Parameter, ...]:
         """Every number that can be an input, with its name, unit, value and group.
 
-        First the named sizes of the machine's file that change its numbers evenly, then every geometric number.
+        First the named sizes of the machine's file that its numbers follow, then every geometric number.
         """
-        units, rates = self.spec.size_units, self.size_rates
-        sizes = zip(rates.names, rates.nominal, strict=True)
-        named = (Parameter(name, units[name], value, SIZES) for name, value in sizes if name in units)
+        spec, acting = self.spec, self.size_rates.acting
+        named = (Parameter(name, spec.size_units[name], spec.sizes[name], SIZES) for name in acting)
         return (*named, *list_parameters(self.spec))
 
     def trace_equations(self, values: Mapping[str, Scalar], shifts: Mapping[str, Scalar] | None = None) -> Equations:
@@ -188,9 +189,10 @@ class MachineProperties:
 
     def list_follow_rates(self, size: str) -> dict[str, float]:
         """List the rates at which geometric numbers follow a named size, by their names; no others."""
-        moved = list_parameters(self._replace_numbers({size: self.spec.sizes[size] + 1.0}))
-        numbers = zip(list_parameters(self.spec), moved, strict=True)
-        return {old.name: new.value - old.value for old, new in numbers if new.value != old.value}
+        value, step = self.spec.sizes[size], 1.0 if self.spec.size_units[size] == "mm" else _SMALL_TURN
+        after, before = (list_parameters(self._replace_numbers({size: value + way * step})) for way in (1.0, -1.0))
+        ends = zip(after, before, strict=True)
+        return {new.name: 0.5 * (new.value - old.value) / step for new, old in ends if new.value != old.value}
 
     def _make_other_spec(
         self,
@@ -212,7 +214,7 @@ class MachineProperties:
         There are none either where constraints are solved in steps; a size without which they are not is left out.
         """
         if self._make_spec is None or self.structure.is_solved:
-            return SizeRates((), (), ((),) * len(list_numbers(self.spec)))
+            return SizeRates((), (), (), ((),) * len(list_numbers(self.spec)), ())
         return find_size_rates(self.spec, self._make_spec if self.spec.constraints == () else self._make_closed_spec)
 
     def _make_closed_spec(self, sizes: Mapping[str, float]) -> Spec:

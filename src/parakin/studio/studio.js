@@ -132,9 +132,11 @@ function markLine(name, errors) {
 function readSizes(name) {
   const shown = pageOf(name);
   if (!shown) return {};
-  const moved = shown.machine.sizes.map((size, i) => ({...size, value: shown.model.sizes[i]})).filter(({value, nominal}) => value !== nominal);
-  return moved.length ? {"--set": moved.map(({name: size, unit, value}) => `${size}=${+value.toFixed(6)}${unit === "1" ? "" : unit}`)} : {};
+  const own = shown.listOwnSizes();
+  return own.length ? {"--set": own.map(({name: size, unit, value}) => `${size}=${writeSize(value, unit)}`)} : {};
 }
+
+const writeSize = (value, unit) => unit === "rad" ? `${+(value * 180 / Math.PI).toFixed(6)}deg` : `${+value.toFixed(6)}${unit}`;
 
 // The pose at which a machine stands on its page, as the commands take it.
 function readPose(name) {

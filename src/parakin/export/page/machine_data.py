@@ -10,7 +10,6 @@ from ...arrays import Array
 from ...kinematics.closure_roots import list_step_caps
 from ...kinematics.wrist.pole_thresholds import PRINTED, convert_to_freedom
 from ...machine import Machine
-from ...model.geometric_parameters import SIZES
 from ...performance.characteristic_length import choose_characteristic_length
 from ...performance.jacobians import list_twist_names
 from ...toolpath.posting.range_use import list_ranges
@@ -30,7 +29,7 @@ def encode_page_machine(machine: Machine) -> dict[str, Any]:
     margins = machine.margins(machine.home)
     wrist = machine.wrist
     ranges, quantities = list_ranges(machine)
-    units = {parameter.name: parameter.unit for parameter in machine.parameters if parameter.group == SIZES}
+    rates, units = machine.size_rates, machine.spec.size_units
     return {
         "name": machine.name,
         "title": " ".join(machine.spec.title.split()),
@@ -66,9 +65,10 @@ def encode_page_machine(machine: Machine) -> dict[str, Any]:
             for limit, margin, quantity in zip(machine.limit_definitions, margins.tolist(), quantities, strict=True)
         ],
         "sizes": [
-            {"name": name, "unit": units[name], "nominal": value}
-            for name, value in zip(machine.size_rates.names, machine.size_rates.nominal, strict=True)
+            {"name": name, "unit": units[name], "nominal": value, "follows": follows}
+            for name, value, follows in zip(rates.names, rates.nominal, rates.follows, strict=True)
         ],
+        "fixedSizes": [name for name in machine.spec.sizes if name not in rates.names],
         "wrist": None
         if wrist is None
         else {"first": wrist.first, "second": wrist.second, "free": float(convert_to_freedom(PRINTED))},

@@ -61,15 +61,17 @@ const jointSliders = machine.joints.map((joint, i) => {
 const sizeSliders = path ? [] : buildSizeSliders();
 
 function buildSizeSliders() {
-  if (!machine.sizes.length) return [];
+  if (!machine.sizes.length && !machine.fixedSizes.length) return [];
   const section = addSection("Sizes");
-  const sliders = machine.sizes.map(({name, nominal}, i) => {
-    const reach = 0.4 * abs(nominal) || 0.05 * size;
-    return addSlider(section, {name, unit: "1", low: nominal - reach, high: nominal + reach},
-      value => moveToSizes(model.sizes.map((old, j) => j === i ? value : old)));
+  const sliders = machine.sizes.map(({name, unit, nominal}, i) => {
+    const reach = 0.4 * abs(nominal) || (unit === "rad" ? 0.2 : 0.05 * size);
+    return addSlider(section, {name, unit, low: nominal - reach, high: nominal + reach}, value => moveToSizes(followSize(i, value)));
   });
-  section.append(makeElement("p", {className: "note", textContent: "The file's sizes, mm or rad; the pose is held."}),
-    makeElement("button", {id: "sizes", textContent: "As in the file", onclick: () => moveToSizes(nominalSizes)}));
+  const notes = ["The file's sizes; the pose is held."];
+  if (machine.sizes.some(({follows}) => follows.some(rate => rate !== 0))) notes.push("One that the file calculates from another follows it.");
+  if (machine.fixedSizes.length) notes.push(`Only in the file, for the machine follows them neither evenly nor as a turn, or not in closed form: ${machine.fixedSizes.join(", ")}.`);
+  section.append(...notes.map(textContent => makeElement("p", {className: "note", textContent})));
+  if (sliders.length) section.append(makeElement("button", {id: "sizes", textContent: "As in the file", onclick: () => moveToSizes(nominalSizes)}));
   return sliders;
 }
 

@@ -19,6 +19,23 @@ function setSizes(sizes) {
   readGiven();
 }
 
+// The sizes where one of them has a value: those that the file calculates from it follow.
+function followSize(number, value) {
+  const sizes = [...model.sizes];
+  sizes[number] = value;
+  for (let i = number + 1; i < sizes.length; i++) sizes[i] += leadSize(i, sizes, model.sizes);
+  return sizes;
+}
+
+// By how much a size follows others between two vectors of sizes.
+const leadSize = (i, sizes, from) => machine.sizes[i].follows.reduce((sum, rate, j) => sum + rate * (sizes[j] - from[j]), 0);
+
+// The sizes that have values of their own, not as in the file or as the file calculates them from others.
+function listOwnSizes() {
+  return machine.sizes.map((size, i) => ({...size, value: model.sizes[i]}))
+    .filter(({nominal, value}, i) => abs(value - nominal - leadSize(i, model.sizes, nominalSizes)) > 1e-9 * (1 + abs(value)));
+}
+
 // Change sizes at the pose that is held, as far as the machine can be there.
 function moveToSizes(sizes) {
   const from = current, before = [...model.sizes], side = measureSide(from), guarded = isGuarded(from, side);

@@ -263,6 +263,17 @@ def test_show_yaml(capsys, tmp_path, monkeypatch):
     assert "--yaml" in refused(capsys, "show", "tricept", "--yaml", "--json")
 
 
+def test_a_file_is_printed_with_other_sizes(tmp_path, capsys):
+    path = tmp_path / "own.yaml"
+    path.write_text((Path(pk.__file__).parent / "machines" / "orthoglide.yaml").read_text(encoding="utf-8"))
+    assert main(["show", str(path), "--file", "--set", "cube=150mm + 70mm", "--set", "L=-1 * (0 mm - 280 mm)"]) == 0
+    said, text = capsys.readouterr().out, path.read_text()
+    told = text.replace("cube: 200 mm\n", "cube: 150mm + 70mm\n")
+    assert said == told.replace("L: cube / (1 / sqrt(11) + 2 / sqrt(17)) ", 'L: "-1 * (0 mm - 280 mm)" ')
+    path.write_text(said)
+    assert pk.load(path).spec.sizes == {"cube": 220.0, "L": 280.0}
+
+
 def test_show_picture(tmp_path, capsys):
     for suffix, start in (("html", b"<!doctype html"), ("png", b"\x89PNG")):
         target = tmp_path / f"picture.{suffix}"

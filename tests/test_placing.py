@@ -13,7 +13,7 @@ import parakin as pk
 from parakin.cli import main
 from parakin.commands.workpiece import parse_bounds
 from parakin.toolpath.path import ToolPath
-from parakin.toolpath.placing.placement import find_placement
+from parakin.toolpath.placing.placement import bound_near_home, find_placement
 from parakin.toolpath.posting.frames import build_frame_from_angles
 from parakin.toolpath.posting.post import post_path
 
@@ -25,6 +25,12 @@ def path_of(tip, axis=None):
     n = len(tip)
     axis = np.tile([0.0, 0.0, 1.0], (n, 1)) if axis is None else axis
     return ToolPath("part", tip, axis, np.arange(1, n + 1), np.zeros(n, bool), np.full(n, 1e3), np.full(n, np.nan))
+
+
+def test_bounds_near_home_bring_the_middle_of_a_part_there():
+    machine = load_shipped("orthoglide")
+    path = path_of([[-30.0, 400.0, 7.0], [70.0, 440.0, 7.0], [10.0, 410.0, 107.0]])
+    assert bound_near_home(machine, path, 25.0) == {"X": (-45.0, 5.0), "Y": (-445.0, -395.0), "Z": (-82.0, -32.0)}
 
 
 def axis_of(b, c):

@@ -12,10 +12,11 @@ from studio_client import run_studio
 
 import parakin as pk
 from parakin.cli import app, main
+from parakin.commands.studio import make_forms
 from parakin.errors import InputError
-from parakin.studio.forms import list_forms, write_line
+from parakin.studio.forms import write_line
 
-FORMS = list_forms(app, ("studio",))
+FORMS = make_forms(app)
 RPR3 = (Path(pk.__file__).parent / "machines" / "rpr3.yaml").read_text(encoding="utf-8")
 PART = "UNITS/MM\nFEDRAT/900,MMPM\nRAPID\nGOTO/0,0,0\nGOTO/40,10,0\nGOTO/40,-30,0\nFINI\n"
 
@@ -61,6 +62,8 @@ def test_a_line_is_what_was_filled_in():
         ("inverse", {"NAME": "tricept", "--csv": "/etc/passwd"}, "not a plain file name"),
         ("inverse", {"NAME": "tricept", "--output": "a/../../b"}, "not a plain file name"),
         ("workspace", {"NAME": "tricept", "--output": ["a.svg", "/tmp/b.svg"]}, "not a plain file name"),
+        ("compare", {"NAMES": "tricept ../own.yaml"}, "not a plain file name"),
+        ("design", {"FAMILY": "/tmp/problem.yaml"}, "not a plain file name"),
         ("inverse", {"NAME": "tricept", "--mode": ["+", "-"]}, "one value"),
         ("inverse", {"NAME": "tricept", "--install-completion": True}, "no parameter"),
         ("inverse", {"NAME": "tricept", "--mode": "a" * 3000}, "at most 2000"),
@@ -295,6 +298,7 @@ def test_the_page_in_a_browser(studio):
         tab.click("button:has-text('Atlas')")
         wait_until(page, "parakin.shown.values > 20", 40.0)
         assert "1/condition number, violet 0 to yellow 1" in page.locator("aside").inner_text()
+        page.evaluate("parakin.moveToSizes([510, 120])")
         tab.click("text=Post the part")
         wait_until(tab, "studio.findFrame('own.yaml')?.src.endsWith('out/part.page.html') === false "
                         "&& studio.findFrame('own.yaml')?.src.includes('part.page.html')", 40.0)  # fmt: skip
@@ -306,10 +310,13 @@ def test_the_page_in_a_browser(studio):
         wait_until(
             tab, "[...document.querySelectorAll('.run code')].some(one => one.textContent.includes('workpiece=X=2'))"
         )
+        tab.click("text=Place it for me")
+        placed = "/post part.apt --machine=own.yaml --place=200mm --output=on_own --page --set=R=510mm exit 0/"
+        wait_until(tab, f"{placed}.test(document.getElementById('runs').innerText)", 40.0)
         tab.click("summary:has-text('Edit the machine')")
         wait_until(tab, "document.getElementById('text').value.includes('kind: length')", 20.0)
         text = tab.input_value("#text")
-        assert text == RPR3  # as it was written, with its comments and sizes
+        assert text == RPR3.replace("R: 500 mm", "R: 510mm")  # as it was written, with the size that was dragged
         remarks = "# a remark\n" * 60
         tab.fill("#text", remarks + text.replace("kind: length", "kind: lenght", 1) + remarks)
         tab.click("#save")

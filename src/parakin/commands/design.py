@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
@@ -12,7 +12,7 @@ from ..errors import InputError, quote, suggest
 from ..export.json.design import encode_design
 from ..export.number_format import format_fixed
 from .console import announce_compiling, print_json, print_text
-from .options import YAML_ENDINGS, Json, OutputPath, list_files, require_ending
+from .options import YAML_ENDINGS, Json, OutputPath, complete_problem, require_ending
 from .region_options import parse_length
 
 if TYPE_CHECKING:
@@ -21,16 +21,8 @@ if TYPE_CHECKING:
 _DIGITS = 4  # digits of lengths
 
 
-def _complete_problem(context: Any) -> list[str]:
-    """List the families of closed form and the files that begin with what is typed, for the shell's completion."""
-    from ..performance.design import DESIGNS
-
-    families = [name for name in DESIGNS if name.startswith(context.incomplete)]
-    return families + list_files(context.incomplete, YAML_ENDINGS)
-
-
 def design(
-    family: Annotated[str, Parameter(completer=_complete_problem)],
+    family: Annotated[str, Parameter(completer=complete_problem)],
     /,
     *,
     cube: Annotated[str | None, Parameter(allow_leading_hyphen=True)] = None,

@@ -13,7 +13,7 @@ from ..export.json.machine import LOADS, MOTOR, RATES, encode_details, encode_ma
 from ..export.number_format import format_fixed
 from ..units import name_display_unit
 from .console import format_table, print_json, print_text
-from .options import Json, Name, OutputPath, Sizes, load_machine, require_ending
+from .options import Json, Name, OutputPath, Sizes, load_machine, require_ending, split_sizes
 from .page import refuse_foreign_file
 
 if TYPE_CHECKING:
@@ -58,6 +58,7 @@ def show(
     *,
     output: OutputPath = None,
     yaml: bool = False,
+    file: bool = False,
     force: bool = False,
     json: Json = False,
     sizes: Sizes = None,
@@ -74,11 +75,13 @@ def show(
     yaml
         Print a machine file with every number explicit, a group for each leg: to write the numbers of a calibrated
         machine into, or to keep those of --set. Reading it gives the same machine, bit for bit.
+    file
+        Print the machine's file as it was written, with the values of --set in their places.
     force
         Overwrite an .html that parakin did not write.
     """
-    if yaml and json:
-        raise InputError("only one of --yaml and --json, expected what to print", "--yaml")
+    if yaml + file + json > 1:
+        raise InputError("only one of --yaml, --file and --json, expected what to print", "show")
     machine = load_machine(name, sizes)
     if output is not None:
         _write_picture(machine, output, force)
@@ -88,6 +91,11 @@ def show(
         return 0
     if yaml:
         print_text(machine.format_yaml().rstrip())
+        return 0
+    if file:
+        from ..description import find_machine_file, write_sizes
+
+        print_text(write_sizes(find_machine_file(name), split_sizes(sizes)).rstrip("\n"))
         return 0
     print_text(_summarise_machine(machine))
     print()

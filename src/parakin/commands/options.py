@@ -26,6 +26,19 @@ def complete_machine(context: Any) -> list[str]:
     return shipped + list_files(context.incomplete, YAML_ENDINGS)
 
 
+def complete_machine_or_part(context: Any) -> list[str]:
+    """List the shipped machines and the files that begin with what is typed, for the shell's completion."""
+    return list(dict.fromkeys([*complete_machine(context), *list_files(context.incomplete)]))
+
+
+def complete_problem(context: Any) -> list[str]:
+    """List the families of closed form and the files that begin with what is typed, for the shell's completion."""
+    from ..performance.design import DESIGNS
+
+    families = [name for name in DESIGNS if name.startswith(context.incomplete)]
+    return families + list_files(context.incomplete, YAML_ENDINGS)
+
+
 def list_files(begin: str, endings: Sequence[str] = ()) -> list[str]:
     """List the files whose paths begin so, those in folders that begin so too; only of some endings where there are."""
     name = begin.rpartition("/")[2]
@@ -58,6 +71,16 @@ def load_machine(name: str, sizes: Sequence[str] | None = None) -> Machine:
     """Load the machine of a command, a shipped name or a file, with sizes ``NAME=VALUE`` that replace its own."""
     from .. import load
 
+    try:
+        return load(name, split_sizes(sizes))
+    except InputErrors as errors:
+        raise InputErrors([_name_option(error) for error in errors.errors]) from None
+    except InputError as error:
+        raise _name_option(error) from None
+
+
+def split_sizes(sizes: Sequence[str] | None) -> dict[str, str]:
+    """Split ``NAME=VALUE`` of ``--set`` into values by their names."""
     parameters: dict[str, str] = {}
     for text in sizes or ():
         size, equals, value = (word.strip() for word in text.partition("="))
@@ -66,12 +89,7 @@ def load_machine(name: str, sizes: Sequence[str] | None = None) -> Machine:
         if size in parameters:
             raise InputError(f"{size} is given twice", "--set")
         parameters[size] = value
-    try:
-        return load(name, parameters)
-    except InputErrors as errors:
-        raise InputErrors([_name_option(error) for error in errors.errors]) from None
-    except InputError as error:
-        raise _name_option(error) from None
+    return parameters
 
 
 def _name_option(error: InputError) -> InputError:

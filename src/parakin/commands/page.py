@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
@@ -15,8 +15,7 @@ from .options import (
     Mode,
     OutputPath,
     Sizes,
-    complete_machine,
-    list_files,
+    complete_machine_or_part,
     load_machine,
     require_ending,
 )
@@ -32,13 +31,8 @@ if TYPE_CHECKING:
 _ARC_TOLERANCE = 0.01  # mm, as of ``parakin post``
 
 
-def _complete_machine_or_part(context: Any) -> list[str]:
-    """List the shipped machines and the files that begin with what is typed, for the shell's completion."""
-    return list(dict.fromkeys([*complete_machine(context), *list_files(context.incomplete)]))
-
-
 def page(
-    name: Annotated[str, Parameter(completer=_complete_machine_or_part)],
+    name: Annotated[str, Parameter(completer=complete_machine_or_part)],
     /,
     *,
     machine: MachineOption | None = None,

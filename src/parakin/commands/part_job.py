@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Literal, NamedTuple
 
 from ..controllers import Target, load_controller
 from ..errors import InputError
+from .region_options import parse_length
 from .workpiece import parse_bounds
 
 if TYPE_CHECKING:
@@ -93,24 +94,26 @@ def prepare_part(
     options: JobOptions,
     progress: ProgressBar,
 ) -> PreparedPart:
-    """Prepare a part on a workpiece, or at the best placement within bounds ``place`` at which the whole job runs.
+    """Prepare a part on a workpiece, or at the best placement within ``place`` at which the whole job runs.
 
     Placements in the mode with head and table's other sign are searched where it runs at none of those found first.
     Where it runs nowhere, it is prepared at the best of all.
     """
     if place is None:
         return _prepare_in_modes(machine, path, workpiece, options, progress)
-    from ..toolpath.placing.placement import find_placements
+    from ..toolpath.placing.placement import bound_near_home, find_placements
     from ..toolpath.tool_turn.turned_placement import find_turned_placements
 
     saying = progress.stage("placing the part", 0.1, 0.3)
     find = find_turned_placements
     if options.turn == "home":
         find = partial(find_placements, rewinds=options.rewinds, angle=options.lean)
+    near = None if "=" in place else parse_length(place, "--place")
+    bounds = parse_bounds(place) if near is None else bound_near_home(machine, path, near)
     prepared, modes = list[PreparedPart](), [options.mode]
     while modes:
         mode = modes.pop()
-        placements = find(machine, path, parse_bounds(place), mode=mode, progress=saying)
+        placements = find(machine, path, bounds, mode=mode, progress=saying)
         for placement in placements:
             prepared_part = _prepare_at(machine, path, placement.workpiece, placement.mode, options, progress)
             prepared_part = prepared_part._replace(placement=placement)

@@ -61,7 +61,10 @@ PlaceBounds = Annotated[
     str | None,
     Parameter(
         allow_leading_hyphen=True,
-        help="Find where the part lies best instead, within bounds: X=-100:100,Y=-100:100,C=-180:180.",
+        help=(
+            "Find where the part lies best instead, within bounds: X=-100:100,Y=-100:100,C=-180:180; or with its "
+            "middle within a length of home along X, Y and Z: 200mm."
+        ),
     ),
 ]
 TargetName = Annotated[

@@ -11,11 +11,21 @@ from typing import Annotated
 from cyclopts import App, Parameter
 
 from ..errors import InputError
-from ..studio.forms import FILE_NAME, FILE_NAME_WORDS, list_forms
+from ..studio.forms import FILE_NAME, FILE_NAME_WORDS, Completer, Form, Kind, list_forms
 from .console import print_text
-from .options import complete_machine, load_machine
+from .options import complete_machine, complete_machine_or_part, complete_problem, load_machine
 
 _FIRST = "tricept"
+
+
+def make_forms(app: App) -> dict[str, Form]:
+    """Make the forms of all commands of an app but the studio itself."""
+    named: dict[Completer, Kind] = {
+        complete_machine: "machine",
+        complete_machine_or_part: "machine",
+        complete_problem: "file",
+    }
+    return list_forms(app, ("studio",), named)
 
 
 def make_studio_command(app: App) -> Callable[..., int]:
@@ -56,7 +66,7 @@ def make_studio_command(app: App) -> Callable[..., int]:
             if not FILE_NAME.fullmatch(path.name):
                 raise InputError(f"expected {FILE_NAME_WORDS}", str(path))
         start = {"machine": Path(name).name, "part": "" if part is None else part.name}
-        forms = list_forms(app, left_out=("studio",))
+        forms = make_forms(app)
 
         def announce(address: str, way: Path) -> None:
             print_text(f"parakin studio: {address}\nCtrl-C ends it.")

@@ -27,13 +27,14 @@ _TAGS = {f"tag:yaml.org,2002:{t}" for t in ("map", "seq", "str", "int", "float",
 
 
 class YamlText(str):
-    """A scalar as written, with its line."""
+    """A scalar as written, with its line, and where in the file's text it stands: the first character and the end."""
 
     line: int
+    place: slice
 
-    def __new__(cls, text: str, line: int) -> YamlText:
+    def __new__(cls, text: str, line: int, place: slice | None = None) -> YamlText:
         self = super().__new__(cls, text)
-        self.line = line
+        self.line, self.place = line, place or slice(0, 0)
         return self
 
 
@@ -63,6 +64,11 @@ def read_document(path: Path, source: str, what: str = MACHINE) -> tuple[Value, 
 
     Raises :class:`InputError` if there is no such document.
     """
+    return parse_document(read_text(path, source), source, what)
+
+
+def read_text(path: Path, source: str) -> str:
+    """Read a YAML file as text; raises :class:`InputError` if it is none, or too long."""
     try:
         with path.open("rb") as file:
             content = file.read(_LONGEST + 1)
@@ -72,11 +78,10 @@ def read_document(path: Path, source: str, what: str = MACHINE) -> tuple[Value, 
     if len(content) > _LONGEST:
         raise InputError(f"longer than {_LONGEST} bytes, expected a YAML file of some twenty lines", source)
     try:
-        text = content.decode("utf-8-sig")
+        return content.decode("utf-8-sig")
     except UnicodeDecodeError as error:
         line = content.count(b"\n", 0, error.start) + 1
         raise InputError("not a text file in UTF-8, expected YAML", source, line) from None
-    return parse_document(text, source, what)
 
 
 def parse_document(text: str, source: str, what: str = MACHINE) -> tuple[Value, list[InputError]]:
@@ -154,7 +159,7 @@ class _DocumentBuilder:
             items = [self.build(item, item.start_mark.line + 1, depth + 1) for item in node.value]
             return YamlList(items, line)
         self._refuse_control_characters(node.value, line)
-        return YamlText(node.value, line)
+        return YamlText(node.value, line, slice(node.start_mark.index, node.end_mark.index))
 
     def _refuse_control_characters(self, text: str, line: int) -> None:
         control = CONTROL_CHARACTER.search(text.replace("\n", " "))

@@ -5,6 +5,7 @@ All errors of a file are found in one pass and reported as ``file:line: what is 
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from os import PathLike, fspath
 from pathlib import Path
@@ -17,7 +18,7 @@ from ..model.elements import Limits, Unit
 from ..model.spec import Spec
 from ..units import ANGLE, LENGTH, Dimension
 from .bodies import BodiesSection
-from .document import YamlMap, YamlText, read_document
+from .document import YamlMap, YamlText, parse_document, read_document, read_text
 from .groups import Legs
 from .sections import (
     TRANSFORMS,
@@ -33,6 +34,7 @@ from .sizes import read_sizes
 from .values import Prose, ReadingContext, WordValue, describe_value, get_context, is_word
 
 _UNITS: dict[Dimension, Unit] = {LENGTH.dimension: "mm", ANGLE.dimension: "rad"}
+_PLAIN = re.compile(r"[\w.(][\w.+*/() °-]*")  # a value that YAML needs no quotes for
 _MACHINES = Path(__file__).parent.parent / "machines"
 
 
@@ -61,6 +63,19 @@ def find_key_line(path: str | PathLike[str], key: str) -> int:
     document, _ = read_document(Path(path), fspath(path))
     keys = document if isinstance(document, YamlMap) else {}
     return next((name.line for name in keys if isinstance(name, YamlText) and name == key), 1)
+
+
+def write_sizes(path: Path, sizes: Mapping[str, str]) -> str:
+    """Write a machine file's text with other values of its sizes, all else as it stands there."""
+    source = fspath(path)
+    text = read_text(path, source)
+    document, _ = parse_document(text, source)
+    given = document.get("sizes") if isinstance(document, YamlMap) else None
+    for name, content in reversed(list(given.items()) if isinstance(given, YamlMap) else []):
+        if name in sizes:
+            value = sizes[name] if _PLAIN.fullmatch(sizes[name]) else f'"{sizes[name]}"'
+            text = text[: content.place.start] + value + text[content.place.stop :]
+    return text
 
 
 def read_machine(path: str | PathLike[str], parameters: Mapping[str, float | str] | None = None) -> Spec:

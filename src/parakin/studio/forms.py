@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal, get_args
@@ -19,9 +19,11 @@ FILE_NAME_WORDS = "a plain file name of letters, digits, blanks and . ( ) + , @ 
 _NUMBER = re.compile(r"-?\.?\d")
 _LONGEST = 2000  # characters of a value
 _HIDDEN = {"--json"}
-_MACHINE = {"NAME", "--machine"}  # a shipped machine's name or a file
 
 Kind = Literal["machine", "file", "flag", "choice", "text"]
+
+
+Completer = Callable[..., Any]
 
 
 @dataclass(frozen=True)
@@ -51,24 +53,27 @@ class Form:
     fields: tuple[Field, ...]
 
 
-def list_forms(app: App, left_out: Sequence[str]) -> dict[str, Form]:
-    """List the forms of an app's commands by their names, but for those left out."""
+def list_forms(app: App, left_out: Sequence[str], kinds: Mapping[Completer, Kind]) -> dict[str, Form]:
+    """List the forms of an app's commands by their names, but for those left out.
+
+    kinds : of parameters that are texts, by the functions that complete them in a shell: names of machines and of files
+    """
     names = [name for name in app if not name.startswith("-") and name not in left_out]
-    return {name: _make_form(name, app[name]) for name in names}
+    return {name: _make_form(name, app[name], kinds) for name in names}
 
 
-def _make_form(name: str, command: App) -> Form:
+def _make_form(name: str, command: App, kinds: Mapping[Completer, Kind]) -> Form:
     arguments = [a for a in command.assemble_argument_collection(parse_docstring=True) if a.name not in _HIDDEN]
     text = (command.help or "").strip().partition("\n")[0]
-    return Form(name, text, tuple(_make_field(argument) for argument in arguments))
+    return Form(name, text, tuple(_make_field(argument, kinds) for argument in arguments))
 
 
-def _make_field(argument: Argument) -> Field:
+def _make_field(argument: Argument, kinds: Mapping[Completer, Kind]) -> Field:
     default = argument.field_info.default
     shown = default if isinstance(default, str | int | float | Path) and not isinstance(default, bool) else ""
     return Field(
         argument.name,
-        _find_kind(argument),
+        _find_kind(argument, kinds),
         bool(argument.required),
         " ".join((argument.parameter.help or "").split()),
         str(shown),
@@ -77,9 +82,10 @@ def _make_field(argument: Argument) -> Field:
     )
 
 
-def _find_kind(argument: Argument) -> Kind:
-    if argument.name in _MACHINE:
-        return "machine"
+def _find_kind(argument: Argument, kinds: Mapping[Completer, Kind]) -> Kind:
+    completer = argument.parameter.completer
+    if completer is not None and completer in kinds:
+        return kinds[completer]
     if Path in _list_types(argument.hint):
         return "file"
     if argument.hint is bool:

@@ -2,7 +2,7 @@
 // The studio's page: forms of the commands, their runs, files, and the machines' own pages in frames.
 
 const element = id => document.getElementById(id);
-const state = {session: "", commands: [], machines: [], files: [], workpieces: {}, edited: "", changed: false};
+const state = {session: "", commands: [], machines: [], files: [], workpieces: {}, sizes: {}, edited: "", changed: false};
 
 async function ask(path, options = {}) {
   const response = await fetch(path, options);
@@ -13,6 +13,7 @@ async function ask(path, options = {}) {
 
 const inSession = path => `sessions/${state.session}/${path}`;
 const escapeName = name => name.split("/").map(encodeURIComponent).join("/");
+const CHOICE_STANDS = 0.4; // s
 const pause = seconds => new Promise(resolve => setTimeout(resolve, 1000 * seconds));
 
 function make(tag, properties = {}, ...children) {
@@ -109,11 +110,20 @@ async function showMachines() {
   for (const frame of element("stage").querySelectorAll("iframe")) if (!chosenMachines().includes(frame.dataset.machine)) frame.remove();
   for (const name of chosenMachines()) {
     if (findFrame(name)) continue;
+    delete state.sizes[name];
     const output = nameResult("page", name, ".html");
     const result = await run("page", {NAME: name, "--output": output});
     if (result && result.code === 0) showPage(name, output);
     else if (result) markLine(name, result.errors);
   }
+}
+
+// Show what was chosen once the choice stands: by the keyboard a list is gone through entry by entry.
+let showTimer = 0;
+
+function showMachinesSoon() {
+  clearTimeout(showTimer);
+  showTimer = setTimeout(showMachines, 1000 * CHOICE_STANDS);
 }
 
 // Select the line of the machine's file that an error names.
@@ -128,11 +138,14 @@ function markLine(name, errors) {
   text.scrollTop = (number - 0.5) / lines.length * text.scrollHeight - 0.5 * text.clientHeight;
 }
 
-// The sizes that were dragged on a machine's page, as the commands take them.
+// The sizes that were dragged on a machine's page, as the commands take them; a part's page is of these already.
 function readSizes(name) {
   const shown = pageOf(name);
-  if (!shown) return {};
-  const own = shown.listOwnSizes();
+  if (shown && !shown.path) state.sizes[name] = writeSizes(shown.listOwnSizes());
+  return state.sizes[name] || {};
+}
+
+function writeSizes(own) {
   return own.length ? {"--set": own.map(({name: size, unit, value}) => `${size}=${writeSize(value, unit)}`)} : {};
 }
 
@@ -150,24 +163,24 @@ function readPose(name) {
   });
 }
 
-// A machine's file as it was written; where sizes were dragged, the file of the machine as it is now.
+// A machine's file as it was written; where sizes were dragged, with these in it.
 async function readMachineFile(name) {
   const sizes = readSizes(name);
   if (!Object.keys(sizes).length) {
     const response = await fetch(ownMachines().includes(name) ? inSession(`files/${escapeName(name)}`) : `machines/${escapeName(name)}`);
     if (response.ok) return response.text();
   }
-  const {number} = await beginRun("show", {NAME: name, "--yaml": true, ...sizes});
+  const {number} = await beginRun("show", {NAME: name, "--file": true, ...sizes});
   const result = await followRun(number);
   return result.code === 0 ? result.output : result.errors;
 }
 
 async function showMachineFile() {
-  const name = element("machine").value;
-  if (state.changed || state.edited === name) return;
-  state.edited = name;
+  const name = element("machine").value, shown = JSON.stringify([name, readSizes(name)]);
+  if (state.changed || state.edited === shown) return;
+  state.edited = shown;
   const text = await readMachineFile(name);
-  if (state.edited !== name) return;
+  if (state.edited !== shown) return;
   element("text").value = text;
   element("text-name").value = ownMachines().includes(name) ? name : `my_${name}.yaml`;
 }
@@ -180,7 +193,7 @@ async function saveMachineFile() {
     element("runs").prepend(make("p", {className: "bad state", textContent: error.message}));
     return;
   }
-  Object.assign(state, {edited: name, changed: false});
+  Object.assign(state, {edited: JSON.stringify([name, {}]), changed: false});
   element("text-name").value = name;
   await refreshFiles();
   findFrame(name)?.remove();
@@ -207,7 +220,7 @@ function showForm() {
 function makeInput(field) {
   if (field.kind === "flag") return make("input", {type: "checkbox"});
   if (field.many && field.name.startsWith("-")) return make("textarea", {className: "many", placeholder: "one a line"});
-  if (field.kind === "choice" || field.kind === "machine" || field.name === "PART") {
+  if (field.kind === "choice" || (field.kind === "machine" && !field.many) || field.name === "PART") {
     const select = make("select");
     const parts = state.files.map(file => file.name).filter(name => !name.includes("/"));
     const options = field.kind === "choice" ? field.choices : field.name === "PART" ? parts : [...ownMachines(), ...state.machines];
@@ -219,7 +232,7 @@ function makeInput(field) {
 
 function startValue(field) {
   const command = element("command").value;
-  if (field.kind === "machine") return field.required ? element("machine").value : "";
+  if (field.kind === "machine") return !field.required ? "" : field.many ? chosenMachines().join(" ") : element("machine").value;
   if (field.name === "PART") return element("part").value;
   if (field.name === "VALUES" && command === "inverse") return (readPose(element("machine").value) || []).join(" ");
   if (field.name === "--at" && command === "reach") return (readPose(element("machine").value) || []).join(",");
@@ -286,8 +299,9 @@ const QUICK = {
   "Largest box": () => findBox(),
   "Atlas": () => drawAtlas(),
   "Post the part": () => postPart(name => state.workpieces[`${name} ${element("part").value}`]),
-  "Place it for me": () => postPart(name => ({"--place": makeRanges(name)})),
+  "Place it for me": () => postPart(() => ({"--place": "200mm"})),
   "Part at the tool": () => postPart(name => ({"--workpiece": findTip(name).map(([axis, value]) => `${axis}=${value}`).join(",")})),
+  "Compare": () => run("compare", {NAMES: chosenMachines(), "--part": element("part").value, "--output": "compared.html"}),
   "LinuxCNC": () => run("linuxcnc", {NAME: element("machine").value, "--output": "linuxcnc", ...readSizes(element("machine").value)}),
 };
 
@@ -295,8 +309,6 @@ const QUICK = {
 function findTip(name = element("machine").value) {
   return (readPose(name) || []).map(text => text.split("=")).filter(([axis]) => "XYZ".includes(axis));
 }
-
-const makeRanges = name => findTip(name).map(([axis, value]) => `${axis}=${Math.round(+value - 200)}:${Math.round(+value + 200)}`).join(",");
 
 // Post the part on each machine, and play it there. Where it lies on one is remembered; on its page it can be moved.
 async function postPart(place, machines = chosenMachines()) {
@@ -342,19 +354,20 @@ async function start() {
   element("part").value = described.start.part;
   fillSelect(element("command"), state.commands.map(form => [form.command, form.command]), "workspace");
   element("quick").append(...Object.entries(QUICK).map(([text, act]) => make("button", {textContent: text, type: "button", onclick: act})));
-  element("machine").onchange = async () => {
+  element("machine").onchange = () => {
     showForm();
     if (element("editor").open) showMachineFile();
-    await showMachines();
+    showMachinesSoon();
   };
-  element("second").onchange = showMachines;
+  element("second").onchange = showMachinesSoon;
   element("part").onchange = showForm;
   element("command").onchange = showForm;
   element("form").onsubmit = event => event.preventDefault();
   element("run").onclick = () => run(element("command").value, readForm());
   element("copy").onclick = () => navigator.clipboard.writeText(element("line").textContent);
   element("save").onclick = saveMachineFile;
-  element("editor").ontoggle = () => { if (element("editor").open) showMachineFile(); };
+  for (const event of ["toggle", "pointerenter", "focusin"]) // sizes may have been dragged since
+    element("editor").addEventListener(event, () => { if (element("editor").open) showMachineFile(); });
   element("text").oninput = () => { state.changed = true; };
   element("upload").onchange = event => upload(event.target.files);
   const drop = element("drop");

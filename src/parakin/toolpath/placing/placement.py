@@ -15,6 +15,7 @@ from ...errors import PoseError, quote
 from ...machine import Machine
 from ...units import AXIS_UNITS, to_display
 from ..path import ToolPath
+from ..posting.frames import compose_frames
 from ..posting.posted import Posted
 from ..posting.range_use import find_tightest_limit, measure_range_use
 from ..posting.tool_lengths import fit_tool_lengths
@@ -101,6 +102,21 @@ def find_placement(
     if not placements[0].allowed:
         raise PoseError(f"bounds: {placements[0].describe_refusal()}")
     return placements[0]
+
+
+def bound_near_home(machine: Machine, path: ToolPath, reach: float) -> dict[str, tuple[float, float]]:
+    """Bound the workpiece's place, mm by axis, so that the middle of a path is within a reach of home along each axis.
+
+    Raises :class:`PoseError` for a path without records.
+    """
+    if not len(path):
+        raise PoseError("a path without records has no middle")
+    frame = compose_frames(None, path.frame)
+    tips = path.tip @ frame[:, :3].T + frame[:, 3]
+    middle = 0.5 * (tips.min(axis=0) + tips.max(axis=0))
+    home = {axis: float(value) for axis, value in zip(machine.axes, machine.home, strict=True) if axis in "XYZ"}
+    places = {axis: round(value - float(middle["XYZ".index(axis)]), 1) for axis, value in home.items()}
+    return {axis: (place - reach, place + reach) for axis, place in places.items()}
 
 
 @check_arguments

@@ -214,8 +214,13 @@ class MachineProperties:
         There are none either where constraints are solved in steps; a size without which they are not is left out.
         """
         if self._make_spec is None or self.structure.is_solved:
-            return SizeRates((), (), (), ((),) * len(list_numbers(self.spec)), ())
+            return SizeRates((), (), (), (), ((),) * len(list_numbers(self.spec)), ())
         return find_size_rates(self.spec, self._make_spec if self.spec.constraints == () else self._make_closed_spec)
+
+    @cached_property
+    def fixed_sizes(self) -> tuple[str, ...]:
+        """Names of the file's sizes that are no inputs: numbers follow them in no way that :attr:`size_rates` knows."""
+        return tuple(name for name in self.spec.sizes if name not in self.size_rates.names)
 
     def _make_closed_spec(self, sizes: Mapping[str, float]) -> Spec:
         """Make the description with other sizes, where its constraints have a closed form there too."""

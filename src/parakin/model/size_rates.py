@@ -9,6 +9,7 @@ from typing import Any, Literal, NamedTuple
 
 from ..algebra import Scalar, sincos
 from ..errors import ParakinError
+from .elements import Unit
 from .spec import Spec
 
 _STEP = 0.01  # of a length, or mm where it is zero, by which it is changed to see what it changes
@@ -37,13 +38,14 @@ class SizeRates:
     """How the numbers of a description follow its named sizes: each is a constant plus rates times terms of the sizes.
 
     names : of the sizes that change numbers, or sizes among these, so, whatever the others are; as in the file
-    nominal : their values, mm or rad
+    units, nominal : of them, and their values in these
     terms : of the sizes
     rates : for each number of the description, in the order of :func:`list_numbers`, its rates by the terms
     follows : for each size, its rates by the others, as the file calculates it from them
     """
 
     names: tuple[str, ...]
+    units: tuple[Unit, ...]
     nominal: tuple[float, ...]
     terms: tuple[SizeTerm, ...]
     rates: tuple[tuple[float, ...], ...]
@@ -112,6 +114,7 @@ def find_size_rates(spec: Spec, make_spec: SpecMaker) -> SizeRates:
     terms = [(SizeTerm(i, shape), column) for i, n in enumerate(names) for shape, column in acting.get(n, {}).items()]
     return SizeRates(
         tuple(names),
+        tuple(spec.size_units[name] for name in names),
         tuple(spec.sizes[name] for name in names),
         tuple(term for term, _ in terms),
         tuple(tuple(column[i] for _, column in terms) for i in range(len(reader.numbers))),

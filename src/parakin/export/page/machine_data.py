@@ -29,7 +29,7 @@ def encode_page_machine(machine: Machine) -> dict[str, Any]:
     margins = machine.margins(machine.home)
     wrist = machine.wrist
     ranges, quantities = list_ranges(machine)
-    rates, units = machine.size_rates, machine.spec.size_units
+    rates = machine.size_rates
     return {
         "name": machine.name,
         "title": " ".join(machine.spec.title.split()),
@@ -65,10 +65,10 @@ def encode_page_machine(machine: Machine) -> dict[str, Any]:
             for limit, margin, quantity in zip(machine.limit_definitions, margins.tolist(), quantities, strict=True)
         ],
         "sizes": [
-            {"name": name, "unit": units[name], "nominal": value, "follows": follows}
-            for name, value, follows in zip(rates.names, rates.nominal, rates.follows, strict=True)
+            {"name": name, "unit": unit, "nominal": value, "follows": follows}
+            for name, unit, value, follows in zip(rates.names, rates.units, rates.nominal, rates.follows, strict=True)
         ],
-        "fixedSizes": [name for name in machine.spec.sizes if name not in rates.names],
+        "fixedSizes": list(machine.fixed_sizes),
         "wrist": None
         if wrist is None
         else {"first": wrist.first, "second": wrist.second, "free": float(convert_to_freedom(PRINTED))},

@@ -18,14 +18,14 @@ _EVEN = 1e-9  # by which a number may miss where its rates say it is, of one mor
 _TRIALS = (2.0, -1.0)  # steps at which more than an even change is told and held against
 
 SpecMaker = Callable[[Mapping[str, float]], Spec]  # a description with other values of some of its sizes
-Shape = Literal["even", "cos", "sin"]
+TermShape = Literal["even", "cos", "sin"]
 
 
 class SizeTerm(NamedTuple):
     """A function of one size, by its number: itself, or of an angle its cosine or sine."""
 
     size: int
-    shape: Shape
+    shape: TermShape
 
     def evaluate(self, sizes: Sequence[Scalar]) -> Scalar:
         """Evaluate it at sizes, scalars of any kind."""
@@ -103,7 +103,7 @@ def find_size_rates(spec: Spec, make_spec: SpecMaker) -> SizeRates:
     there are, and one that changes nothing.
     """
     reader = _SizeReader(spec, make_spec)
-    acting: dict[str, dict[Shape, list[float]]] = {}
+    acting: dict[str, dict[TermShape, list[float]]] = {}
     known = [name for name in spec.sizes if name in spec.size_units]
     for name in known:
         rates = reader.measure_rates(name)
@@ -129,7 +129,7 @@ class _SizeReader:
         self.sizes, self._units = dict(spec.sizes), spec.size_units
         self.numbers, self._make_spec = list_numbers(spec), make_spec
 
-    def measure_rates(self, name: str) -> dict[Shape, list[float]]:
+    def measure_rates(self, name: str) -> dict[TermShape, list[float]]:
         """Measure the rates of the numbers by a size, all others as they are; none where there are no such rates."""
         step = self._choose_step(name)
         once, twice, back = (self._read({name: count * step}) for count in (1.0, *_TRIALS))
@@ -143,7 +143,7 @@ class _SizeReader:
             if self._units[name] == "rad" and not _is_near(moved[1], base + 2.0 * step * even[i]):
                 even[i] = 0.0
                 cosine[i], sine[i] = _solve_wave(self.sizes[name], step, moved[0] - base, moved[2] - base)
-        shapes: list[tuple[Shape, list[float]]] = [("even", even), ("cos", cosine), ("sin", sine)]
+        shapes: list[tuple[TermShape, list[float]]] = [("even", even), ("cos", cosine), ("sin", sine)]
         return {shape: rates for shape, rates in shapes if any(rates)}
 
     def measure_ways(self, name: str) -> dict[str, float] | None:
@@ -164,7 +164,7 @@ class _SizeReader:
                 rates[other] = rate
         return rates
 
-    def is_proved(self, chosen: Mapping[str, Mapping[Shape, list[float]]]) -> bool:
+    def is_proved(self, chosen: Mapping[str, Mapping[TermShape, list[float]]]) -> bool:
         """Tell whether the numbers are where the rates say, with all chosen sizes changed at once, to either side."""
         for way in _list_ways(len(chosen)):
             steps = {name: count * self._choose_step(name) for name, count in zip(chosen, way, strict=True)}

@@ -11,6 +11,7 @@ from scipy.optimize import minimize_scalar
 from shipped import load_shipped
 
 import parakin as pk
+from parakin.kinematics.wrist.pole_thresholds import STANDING
 
 sys.path.insert(0, str(Path(__file__).parent / "linuxcnc"))
 from planner import ANY_SPEED, CYCLE, Planner
@@ -198,6 +199,24 @@ def test_a_joint_that_would_jump_at_the_pole_is_refused(planners):
     run = planner.run([lambda: planner.line_to(beside, 100.0)])
     assert planner.library.has_error() and "line 1: a joint would jump" in planner.told
     assert run.measure_shares(follow(run))[0] <= SPEED and np.abs(run.poses[-1] - home).max() < 3e-3
+
+
+@pytest.mark.parametrize("turn", [90.0, -200.0, 31.0])
+@pytest.mark.parametrize("name", ["tricept", "orthoglide5_table"])
+def test_a_joint_slows_down_before_its_wrist_is_held(name, turn, planners):
+    """On its pole a wrist's first joint stands; a motion that turns it on the way there has to stop it before."""
+    planner = planners(name)
+    pole, beside = np.array(planner.machine.home), np.array(planner.machine.home)
+    assert planner.machine.wrist.find_free(pole[None], 1e-6)[0]
+    beside[[3, 4]] += np.radians(10.0), np.radians(turn)
+    planner.start(beside)
+    run = planner.run([lambda: planner.line_to(pole, 1e6)])
+    assert np.abs(run.poses[-1] - pole).max() < 1e-12 and not planner.told
+    wrist, joints = planner.machine.wrist, follow(run)
+    held = np.abs(joints[:, wrist.second]) < STANDING
+    joints[held, wrist.first] = joints[~held, wrist.first][-1]
+    speed, rise = run.measure_shares(joints)
+    assert 2 < held.sum() < 100 and speed <= SPEED and rise <= RISE
 
 
 def test_motions_wait_for_the_spindle_and_write_outputs_as_they_begin(planners):

@@ -35,7 +35,14 @@ class Kinematics:
         assert ctypes.c_int.in_dll(stub, "stub_ready").value == 1
         offset = ctypes.POINTER(ctypes.c_double).in_dll(stub, "stub_tool_offset")
         self.tool_offset = offset.contents if offset else None  # mm; LinuxCNC's own modules have none of this name
+        pins = (ctypes.POINTER(ctypes.c_double) * 16).in_dll(stub, "stub_joint")
+        self.commanded = [pin.contents if pin else None for pin in pins]
         self.exported = stub.stub_count()  # its functions are the last
+
+    def command(self, joints):
+        """Tell where the joints are commanded to be, mm and degrees."""
+        for pin, value in zip(self.commanded, joints, strict=False):
+            pin.value = value
 
     def watch_steps(self, watched):
         """Let the inverse refuse steps that no drive can follow, as within a servo cycle, or not."""

@@ -7,6 +7,7 @@
 #include <string.h>
 
 double *stub_tool_offset; /* the last module's length of the tool, which a test may set */
+double *stub_joint[16];   /* where its joints are commanded to be */
 char stub_name[64];
 int stub_ready;
 
@@ -58,6 +59,12 @@ int hal_pin_float_newf(int dir, double **data, int component, const char *format
     *data = pin(sizeof **data);
     if (!strcmp(format, "kins.tool-offset"))
         stub_tool_offset = *data;
+    if (!strcmp(format, "kins.joint-%d")) {
+        va_list given;
+        va_start(given, format);
+        stub_joint[va_arg(given, int)] = *data;
+        va_end(given);
+    }
     return 0;
 }
 

@@ -4,6 +4,20 @@
    joints must do in one cycle. Other questions are about the ends of moves to come. */
 static int steps_are_watched;
 
+/* LinuxCNC's last joints are an answer of the cycle before. Where none was asked for then, be it off, they may be those of
+   long ago: a wrist on its pole would be held where it was, and the machine could not be switched on again. */
+static int last_is_answer, has_answered;
+
+/* The joints that answers are to be near, LinuxCNC's last ones or, where these may be old, those that are commanded. */
+static void read_last_joints(const double *joints, double *last)
+{
+    double commanded[JOINTS];
+    read_joints(joints, last);
+    if (steps_are_watched && !last_is_answer && read_commanded_joints(commanded))
+        for (int i = 0; i < JOINTS; i++)
+            last[i] = commanded[i];
+}
+
 /* Whether joints can go from the last ones, or from where they are commanded to be, to these in a cycle; after a stop
    LinuxCNC's last joints may be old. */
 static int can_step(const double *q, const double *last)
@@ -39,7 +53,7 @@ __attribute__((flatten)) int kinematicsInverse(const EmcPose *world, double *joi
     (void)iflags;
     (void)fflags;
     read_pose(world, x);
-    read_joints(joints, last);
+    read_last_joints(joints, last);
     if (hal_get_bool(pins->identity)) {
         take_axes_as_joints(x, q);
         if (!finite_all(x, AXES) || !finite_all(last, JOINTS))
@@ -53,6 +67,7 @@ __attribute__((flatten)) int kinematicsInverse(const EmcPose *world, double *joi
         if (!can_step(q, last))
             return -1;
         read_pose(world, commanded_pose);
+        has_answered = 1;
     }
     write_joints(q, joints);
     return 0;

@@ -43,6 +43,8 @@ static void begin_steps(void *arg, long period)
     (void)arg;
     (void)period;
     steps_are_watched = 1;
+    last_is_answer = has_answered;
+    has_answered = 0;
     const int known = read_commanded_joints(q);
     joints_stand = known;
     for (int i = 0; i < JOINTS && known; i++) {

@@ -14,6 +14,7 @@
 #define LEAST_STEP 1e-6   /* of the path's units: a joint that goes farther in less jumps */
 #define KINK 0.02         /* of the acceleration in a cycle: what a corner may add to it */
 #define NEARBY 1e-3       /* of the path's units: for the joints' rates beside a corner */
+#define EDGE 1e-9         /* of the path's units: how well it is known where a wrist begins to be held */
 #define BEYOND 1e-6       /* mm or degrees: rounding */
 #define UNKNOWN -1.0      /* a speed that is not computed yet */
 
@@ -123,6 +124,20 @@ static int find_joint_beyond(const double *q)
     return -1;
 }
 
+#if WRIST
+/* Whether a wrist's first joint is held at a place. */
+static int is_held(const Piece *p, double at)
+{
+    double x[AXES], own[AXES], lean[1];
+    if (hal_get_bool(pins->identity))
+        return 0;
+    locate(p, at, x);
+    shift_to_own_tip(x, own);
+    freedom(own, lean);
+    return lean[0] < FREE * FREE;
+}
+#endif
+
 /* The joints at a place of the piece that is cut, near given ones; 0 where there are none or they lie too far. */
 static int reach_joints(const Piece *p, double at, const double *near, double *q)
 {
@@ -141,18 +156,18 @@ static int reach_joints(const Piece *p, double at, const double *near, double *q
     return 1;
 }
 
-/* The joints' rates at the start or the end of a piece, by the joints in three places; 0 where there are none. */
-static int measure_rates(const Piece *p, int at_end, double *rates)
+/* The joints' rates at a place of a piece on one side of it, by the joints there and at both ends of two ways, which are
+   less than zero behind it; 0 where there are none. */
+static int measure_rates(const Piece *p, double at, double way, double *rates)
 {
-    const double end = at_end ? p->length : 0.0, way = (at_end ? -1.0 : 1.0) * fmin(NEARBY, 0.25 * p->length);
     double x[AXES], here[JOINTS], near[JOINTS], far[JOINTS];
-    locate(p, end, x);
+    locate(p, at, x);
     if (!reach_pose(x, cut_joints, here))
         return 0;
-    locate(p, end + way, x);
+    locate(p, at + way, x);
     if (!reach_pose(x, here, near))
         return 0;
-    locate(p, end + 2.0 * way, x);
+    locate(p, at + 2.0 * way, x);
     if (!reach_pose(x, near, far))
         return 0;
     for (int j = 0; j < JOINTS; j++)
@@ -164,8 +179,10 @@ static int measure_rates(const Piece *p, int at_end, double *rates)
    within a cycle. */
 static double find_corner_cap(const Piece *p)
 {
+    const Piece *last = p - 1 < pieces ? &pieces[PIECES - 1] : p - 1;
     double before[JOINTS], after[JOINTS], cap = HUGE_VAL;
-    if (!measure_rates(p - 1 < pieces ? &pieces[PIECES - 1] : p - 1, 1, before) || !measure_rates(p, 0, after))
+    if (!measure_rates(last, last->length, -fmin(NEARBY, 0.25 * last->length), before)
+        || !measure_rates(p, 0.0, fmin(NEARBY, 0.25 * p->length), after))
         return 0.0;
     for (int j = 0; j < JOINTS; j++)
         cap = fmin(cap, KINK * joint_acceleration[j] * cycle_seconds / fabs(after[j] - before[j]));
@@ -199,6 +216,46 @@ static int take_jump(const Piece *p, double at)
     return 1;
 }
 
+/* How far on from a place a wrist begins to be held, within a length; 0 where it does not. */
+static double find_hold(const Piece *p, double at, double length)
+{
+#if WRIST
+    double low = EDGE, high = length;
+    if (!(high > low) || is_held(p, at + low) || !is_held(p, at + high))
+        return 0.0;
+    while (high - low > EDGE) {
+        const double middle = 0.5 * (low + high);
+        if (is_held(p, at + middle))
+            high = middle;
+        else
+            low = middle;
+    }
+    return low;
+#else
+    (void)p;
+    (void)at;
+    (void)length;
+    return 0.0;
+#endif
+}
+
+/* Bring the next step's length to where a wrist begins to be held, or to the last bit of the way there. That takes a
+   cycle at least, so that the first joint, which stands in the cycle that follows, stops within its acceleration. Returns
+   the greatest x of the step by that. In timed motions that joint stands on the way there, too. */
+static double slow_down_to_hold(const Piece *p, double *length)
+{
+    const double hold = find_hold(p, cut_at, *length);
+    double rates[JOINTS], most = HUGE_VAL; /* of speed, by what the joints can change theirs in a cycle */
+    if (!(hold > LEAST_STEP) || !measure_rates(p, cut_at + hold, -fmin(NEARBY, 0.25 * (cut_at + hold)), rates))
+        return HUGE_VAL;
+    for (int j = 0; j < JOINTS; j++)
+        if (turning[j])
+            most = fmin(most, joint_acceleration[j] * cycle_seconds / fabs(rates[j]));
+    const double bit = most * cycle_seconds, slow = fmin(0.5 * most, hold / cycle_seconds);
+    *length = hold > bit + LEAST_STEP ? hold - bit : hold;
+    return *length < hold ? HUGE_VAL : slow * slow;
+}
+
 /* Cut the next step from the path; 0 where there is none. */
 static int cut_step(void)
 {
@@ -219,10 +276,13 @@ static int cut_step(void)
         else if (!try_step(p, length, middle, end))
             return 0;
     }
+    const double whole = length, slow = p->shape == SPLINE ? HUGE_VAL : slow_down_to_hold(p, &length);
+    if (length < whole && !try_step(p, length, middle, end))
+        return 0;
     s->piece = cut_piece;
     s->at = cut_at;
     s->length = length;
-    s->cap = p->most_speed * p->most_speed;
+    s->cap = fmin(p->most_speed * p->most_speed, slow);
     s->corner = cut_at > 0.0 ? HUGE_VAL : p->begins_still ? 0.0 : p->begins_bent ? find_corner_cap(p) : HUGE_VAL;
     s->most = UNKNOWN;
     const double slack = p->shape == SPLINE ? TIMED_SLACK : 1.0;

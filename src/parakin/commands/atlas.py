@@ -82,7 +82,8 @@ def atlas(
     pose
         A pose to look at: X=10,Z=-1400 or all values in order, mm and degrees; the rest is home's.
     box
-        Poses all over which the claims must hold: X=-50:50,Y=-50:50,Z=-1600:-1500; turning axes go too.
+        Poses all over which the claims must hold: X=-50:50,Y=-50:50,Z=-1600:-1500; turning axes go too. Without a claim
+        on the amplification it is bracketed; what a few seconds leave open, --time closes.
     amplification
         A claim on the box, LOW:HIGH: every velocity amplification is within, 1/3:3.
     slices
@@ -108,7 +109,7 @@ def atlas(
     files = AtlasFiles(machine.name, output, len(cuts)) if output is not None else None
     one_pose = None if pose is None else _parse_pose(region, pose)
     announce_compiling()
-    results = _AtlasResults(region, scale, seconds)
+    results = _AtlasResults(region, scale, seconds, _QUICK if given is None else _MOST)
     with ProgressBar() as progress:
         if one_pose is not None:
             results.examine_pose(one_pose)
@@ -174,14 +175,19 @@ def _cut_region(region: Region, slices: Sequence[str]) -> list[Region]:
     return [region.fix({axis: value}) for axis, value in cuts]
 
 
+_QUICK, _MOST = 20_000, 200_000  # boxes of brackets, some 3 s of six axes where no time is given
+
+
 class _AtlasResults:
     """All results of a run of the command, and how they are printed.
 
     length : the characteristic length, mm, or None for the machine's own
     seconds : for each proof, and for the workspace
+    boxes : that the amplification's brackets may examine, where no claim is made
     """
 
-    def __init__(self, region: Region, length: float | None, seconds: float):
+    def __init__(self, region: Region, length: float | None, seconds: float, boxes: int):
+        self.boxes = boxes
         self.machine, self.region, self.length, self.seconds = region.machine, region, length, seconds
         self.performance: Performance | None = None
         self.broken_limit = ""
@@ -220,7 +226,7 @@ class _AtlasResults:
             self.proofs.append(prove_amplification(box, *bounds, seconds=self.seconds, progress=report))
             self.brackets = self.proofs[-1].brackets
         elif all(proof.verdict == "proved" for proof in self.proofs):
-            self.brackets = bracket_extremes(box, seconds=self.seconds, progress=report).brackets
+            self.brackets = bracket_extremes(box, boxes=self.boxes, seconds=self.seconds, progress=report).brackets
 
     def grow(self, ranges: dict[str, AxisRange], shape: Literal["box", "sphere"]) -> None:
         from ..performance.certified.nearest_singularity import find_nearest_singularity

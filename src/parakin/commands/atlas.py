@@ -82,8 +82,7 @@ def atlas(
     pose
         A pose to look at: X=10,Z=-1400 or all values in order, mm and degrees; the rest is home's.
     box
-        Poses all over which the claims must hold: X=-50:50,Y=-50:50,Z=-1600:-1500; turning axes go too. Without a claim
-        on the amplification it is bracketed; what a few seconds leave open, --time closes.
+        Poses all over which the claims must hold: X=-50:50,Y=-50:50,Z=-1600:-1500,B=0:30; --time closes brackets.
     amplification
         A claim on the box, LOW:HIGH: every velocity amplification is within, 1/3:3.
     slices

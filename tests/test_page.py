@@ -174,6 +174,23 @@ def test_the_tool_and_a_strut_are_dragged(name, place, pages, browser):
 
 
 @needs_chromium
+def test_drives_are_taken_by_their_names(pages, browser):
+    """A strut under another one in the picture, and a turn about the place that is taken."""
+    with open_tab(browser) as tab:
+        tab.goto(pages("orthoglide5_table"))
+        for number, name in ((1, "rho_y"), (4, "c")):
+            before = tab.evaluate("parakin.state.joints")
+            box = tab.locator("#overlay b", has_text=name).last.bounding_box()
+            x, y = box["x"] + 0.5 * box["width"], box["y"] + 0.5 * box["height"]
+            tab.mouse.move(x, y)
+            tab.mouse.down()
+            tab.mouse.move(x + 12, y + 8, steps=3)
+            tab.mouse.up()
+            moved = np.abs(np.subtract(tab.evaluate("parakin.state.joints"), before)) > 1e-6
+            assert moved.tolist() == [k == number for k in range(5)]
+
+
+@needs_chromium
 def test_modes_are_switched(pages, browser):
     machine = load_shipped("five_bar")
     with open_tab(browser) as tab:

@@ -2,6 +2,8 @@
 
 const raycaster = new THREE.Raycaster(), pointer = new THREE.Vector2();
 const pointers = new Map(); // those that are down, by their identity
+const PER_PIXEL = 0.006; // rad, or of the machine's size
+const STILL = 1e-3; // px: a place that moves less with 1e-3 rad, or of the machine's size, stands still in the picture
 let grip = null; // what is dragged
 
 function aimRay(event) {
@@ -43,7 +45,7 @@ function dragTool(event) {
 
 function turnTool(event) {
   const turning = axisNumbers.filter(i => machine.axes[i].unit === "rad"), pose = [...current.pose];
-  const [right, up] = [event.clientX - grip.x, event.clientY - grip.y].map(pixels => 0.006 * pixels);
+  const [right, up] = [event.clientX - grip.x, event.clientY - grip.y].map(pixels => PER_PIXEL * pixels);
   if (!turning.length) return;
   const [across, upright] = turning.length === 1 ? [turning[0], turning[0]] : [turning[turning.length - 1], turning[turning.length - 2]];
   pose[across] += right;
@@ -52,17 +54,19 @@ function turnTool(event) {
   moveToPose(pose);
 }
 
-// Move a drive so that the place of its strut that was taken follows the pointer, as the picture shows it.
+// Move a drive so that the place of its strut that was taken follows the pointer, as the picture shows it; where that does not
+// move in the picture, as on the axis of a turn, to the right.
 function dragDrive(event) {
-  const step = machine.joints[grip.drive].unit === "rad" ? 1e-3 : 1e-3 * size, before = seeGrip(current);
+  const unit = machine.joints[grip.drive].unit === "rad" ? 1 : size, step = 1e-3 * unit, before = seeGrip(current);
   const ahead = followJoints(current, current.joints.map((q, i) => i === grip.drive ? q + step : q));
   const after = seeGrip(ahead.state);
   const g = [(after[0] - before[0]) / step, (after[1] - before[1]) / step], square = g[0] * g[0] + g[1] * g[1];
   placeMachine(current);
-  if (!ahead.complete || square * step * step < 1e-12) return;
+  if (!ahead.complete) return;
   const way = [event.clientX - grip.x, event.clientY - grip.y];
-  const most = machine.joints[grip.drive].unit === "rad" ? 0.2 : 0.1 * size;
-  const change = max(-most, min(most, (way[0] * g[0] + way[1] * g[1]) / square));
+  const most = unit === 1 ? 0.2 : 0.1 * size;
+  const asked = square * step * step < STILL * STILL ? PER_PIXEL * unit * way[0] : (way[0] * g[0] + way[1] * g[1]) / square;
+  const change = max(-most, min(most, asked));
   moveToJoints(current.joints.map((q, i) => i === grip.drive ? q + change : q));
 }
 
@@ -74,14 +78,24 @@ function seeGrip(state) {
   return [0.5 * place.x * canvas.clientWidth, -0.5 * place.y * canvas.clientHeight];
 }
 
-canvas.addEventListener("pointerdown", event => {
+// The strut of a drive that was taken by its name, at its middle.
+function findNamed({drive, item}) {
+  const {mesh} = bodies.find(body => body.item === machine.items[item]);
+  return {kind: "drive", drive: Number(drive), point: mesh.position.clone(), mesh};
+}
+
+function takeHold(event, find) {
   canvas.setPointerCapture(event.pointerId);
   document.getElementById("hint").hidden = renderer !== null;
   pointers.set(event.pointerId, event);
-  grip = event.button === 0 && pointers.size === 1 ? findGrip(event) : null;
+  scene.updateMatrixWorld();
+  grip = event.button === 0 && pointers.size === 1 ? find() : null;
   if (grip) Object.assign(grip, {x: event.clientX, y: event.clientY});
   if (grip?.mesh) grip.local = grip.mesh.worldToLocal(grip.point.clone());
-});
+}
+
+canvas.addEventListener("pointerdown", event => takeHold(event, () => findGrip(event)));
+overlay.addEventListener("pointerdown", event => takeHold(event, () => findNamed(event.target.dataset)));
 
 canvas.addEventListener("pointermove", event => {
   const before = pointers.get(event.pointerId);
@@ -94,7 +108,7 @@ canvas.addEventListener("pointermove", event => {
   else if (grip?.kind === "drive") dragDrive(event);
   else if (grip?.kind === "part") dragArrow(event);
   else if (event.buttons & 2 || event.shiftKey) shiftCamera(event.clientX - before.clientX, event.clientY - before.clientY);
-  else turnCamera(0.006 * (event.clientX - before.clientX), 0.006 * (event.clientY - before.clientY));
+  else turnCamera(PER_PIXEL * (event.clientX - before.clientX), PER_PIXEL * (event.clientY - before.clientY));
   if (grip) Object.assign(grip, {x: event.clientX, y: event.clientY});
   pointers.set(event.pointerId, event);
   requestPicture();
@@ -113,7 +127,7 @@ for (const end of ["pointerup", "pointercancel"]) canvas.addEventListener(end, e
   grip = null;
 });
 canvas.addEventListener("contextmenu", event => event.preventDefault());
-canvas.addEventListener("wheel", event => {
+for (const place of [canvas, overlay]) place.addEventListener("wheel", event => {
   event.preventDefault();
   zoomCamera(Math.exp(0.0012 * max(-400, min(400, event.deltaY))));
   requestPicture();

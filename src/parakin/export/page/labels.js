@@ -2,9 +2,9 @@
 
 const AXIS_COLOURS = ["#d13a34", "#2f8f3a", "#2a6fd0"], labels = [];
 
-function addLabel(text, place, colour = null) {
+function addLabel(texts, place, colour = null) {
   const span = document.createElement("span");
-  span.textContent = text;
+  span.append(...texts);
   if (colour) {
     span.className = "axis";
     span.style.color = colour;
@@ -21,8 +21,17 @@ machine.joints.forEach(joint => {
   const leg = machine.joints.filter(other => joint.leg >= 0 && other.leg === joint.leg), isFirst = leg.find(other => itemOf(other) >= 0) === joint;
   const names = isFirst ? leg.filter(other => other === joint || itemOf(other) < 0) : [joint];
   const points = itemPoints[number], share = machine.items[number].kind === "telescope" ? 0.5 : 0;
-  addLabel(names.map(({name}) => name).join(", "), into => into.lerpVectors(points[0], points[points.length - 1], share));
+  addLabel(names.flatMap((own, i) => [...(i ? [", "] : []), makeName(own, number)]), into => into.lerpVectors(points[0], points[points.length - 1], share));
 });
+
+// A drive's name, by which its strut is taken where another one lies over it in the picture.
+function makeName(joint, item) {
+  const name = document.createElement("b");
+  name.textContent = joint.name;
+  name.dataset.drive = machine.joints.indexOf(joint);
+  name.dataset.item = item;
+  return name;
+}
 
 const triad = new THREE.Group();
 ["X", "Y", "Z"].forEach((letter, i) => {
@@ -30,7 +39,7 @@ const triad = new THREE.Group();
   if (machine.normal && abs(machine.normal[i]) > 0.999) return;
   const arrow = new THREE.ArrowHelper(unit, new THREE.Vector3(), 0.085 * size, AXIS_COLOURS[i], 0.02 * size, 0.011 * size);
   triad.add(arrow);
-  addLabel(letter, into => into.copy(unit).multiplyScalar(0.1 * size).applyMatrix4(frame), AXIS_COLOURS[i]);
+  addLabel([letter], into => into.copy(unit).multiplyScalar(0.1 * size).applyMatrix4(frame), AXIS_COLOURS[i]);
 });
 workGroup.add(triad);
 

@@ -60,7 +60,7 @@ function addMesh(geometry, kind, item, place) {
   const mesh = new THREE.Mesh(geometry, materialOf(kind, drive));
   mesh.userData = {drive: machine.joints[drive] ? drive : -1, kind};
   machineGroup.add(mesh);
-  bodies.push({item, place: points => place(mesh, points)});
+  bodies.push({item, mesh, place: points => place(mesh, points)});
   return mesh;
 }
 

@@ -1,5 +1,7 @@
 """A part's cycle time as a want of designs, against the jobs of machines of other sizes."""
 
+import re
+
 import numpy as np
 import pytest
 from shipped import load_shipped
@@ -61,11 +63,14 @@ def test_a_bound_is_one_of_the_job_not_of_the_estimate(path):
         assert low <= column.min() <= column.max() <= high
 
 
-def test_too_short_a_time_is_the_want_that_no_design_keeps(path):
+@pytest.mark.parametrize(("bound", "shift"), [(0.5, {}), (1e-3, {"Z": (-400.0, 400.0)})])
+def test_too_short_a_time_is_the_want_that_no_design_keeps(path, bound, shift):
+    """Designs that are out of reach are no nearer, however short the time is."""
     problem = pk.DesignProblem(
-        DELTA, {"rod": (650.0, 800.0)}, BOX, ["rod"], bounds={"cycle_time": 0.5}, path=path, workpiece=PLACE
+        DELTA, {"rod": (650.0, 800.0)}, BOX, ["rod"], shift, {"cycle_time": bound}, path=path, workpiece=PLACE
     )
-    assert "breaks cycle_time" in pk.find_designs(problem).shortfall
+    said = pk.find_designs(problem).shortfall
+    assert re.search(rf"breaks cycle_time: 0\.\d+ where at most {bound:g} is wanted", said)
 
 
 def test_a_part_moves_with_the_poses(path):

@@ -170,7 +170,9 @@ def _describe_shortfall(problem: DesignProblem, nearest: Candidate) -> str:
     want = nearest.want
     if want in problem.bounds:
         value = _measure_value(problem, nearest, want)
+        reserve = problem.reserve.losses.get(want, 0.0)
         want += f": {value:.6g} where at {'least' if WANTS[want].more else 'most'} {problem.bounds[want]:.6g} is wanted"
+        want += f" and {reserve:.6g} kept in hand for tolerances" if reserve else ""
     return f"no design found that keeps every want; the nearest one ({sizes}) breaks {want}"
 
 

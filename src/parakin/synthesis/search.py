@@ -104,11 +104,7 @@ class DesignSearch:
         """Measure by how much each want is broken, (S, wants)."""
         lost = np.nan_to_num(np.maximum(-self._list_all_margins(m), 0.0), nan=LOST, posinf=LOST)
         over = [
-            np.nan_to_num(
-                np.maximum((self._list_losses(name, x, m) - bound) / _scale_bound(bound), 0.0),
-                nan=LOST,
-                posinf=1e3 * LOST,
-            )
+            _limit_excess((self._list_losses(name, x, m) - bound) / _scale_bound(bound))
             for name, bound in self.bounds.items()
         ]
         each = [lost.max(1) + lost.mean(1), *((o.max(1) + o.mean(1))[:, None] for o in over)]
@@ -245,6 +241,11 @@ class DesignSearch:
             options={"ftol": 1e-14, "maxiter": 60},
         )  # fmt: skip
         return np.clip(optimum.x[:-1], 0.0, 1.0) if np.isfinite(optimum.x).all() else x
+
+
+def _limit_excess(excess: Array) -> Array:
+    """Limit what bounds are broken by to less than what a pose out of reach counts, which is worse than any value."""
+    return np.nan_to_num(LOST - LOST**2 / (LOST + np.maximum(excess, 0.0)), nan=LOST)
 
 
 def _scale_bound(bound: float) -> float:

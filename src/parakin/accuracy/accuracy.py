@@ -105,6 +105,9 @@ def allocate_tolerances(accuracy: Accuracy, error: float, costs: Mapping[str, fl
         inverse; by default 1, of an angle at the greatest leg's length
 
     Returns tolerances by name, mm and rad. The cost is convex in their squares, in which the variance is linear.
+
+    Raises :class:`PoseError` for an error that is not above zero, a cost of no tolerance, and a tolerance that does not
+    move the tip.
     """
     if not 0.0 < error < np.inf:
         raise PoseError(f"error: a number above 0 mm expected, not {error:g}")

@@ -19,7 +19,11 @@ MeasuringFrame = Literal["machine", "instrument"]
 
 @dataclass(frozen=True)
 class Noise:
-    """Standard deviations of measured lengths and angles, and of what drives say of lengths and angles; mm and rad."""
+    """Standard deviations of what is measured and of what drives say.
+
+    length, angle : of measured lengths, mm, and angles, rad
+    slide, turn : of what drives say of lengths, mm, and of angles, rad
+    """
 
     length: float = 0.01
     angle: float = 2e-5

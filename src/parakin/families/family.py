@@ -92,7 +92,7 @@ class FamilySolution:
 def make_family(machine: Machine, free: Sequence[str]) -> Family:
     """Make the family of a machine in which some of its numbers are free.
 
-    free : names of :attr:`Machine.parameters`, or patterns such as ``legs.*.foot.*``
+    free : names of :attr:`Machine.parameters`, patterns such as ``legs.*.foot.*``, or groups such as ``feet``
 
     Raises :class:`PoseError` for a name that no parameter has.
     """

@@ -57,7 +57,11 @@ class ProvedDesign:
 
 @dataclass(frozen=True, eq=False)
 class UnprovedDesign:
-    """What the search found, but no proof confirmed: its numbers, and why."""
+    """What the search found, but no proof confirmed.
+
+    sizes : its free numbers by name, mm and rad
+    reason : what was not proved
+    """
 
     sizes: Mapping[str, float]
     reason: str

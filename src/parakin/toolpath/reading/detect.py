@@ -39,10 +39,19 @@ def read_path(
     reference: Mapping[str, float] | None = None,
     progress: Progress | None = None,
 ) -> ToolPath:
-    """Read a CL file or a G-code program, whichever it is; see :func:`read_cl` and :func:`read_gcode`.
+    """Read a CL file or a G-code program, whichever it is, as a tool path in mm.
 
-    ``workpiece`` is for G53 in G-code; it does not place the path. ``frame`` is for CL files, ``start`` and
-    ``reference`` are for G-code. ``tools``, lengths by number as from :func:`parakin.read_tool_table`, is for both.
+    It is in the workpiece frame of a CL file's first record, or the first work system of a program.
+
+    arc_tolerance : mm, the largest distance of the straight lines that replace an arc from it
+    workpiece : (3, 4), where the part will lie, for G53 in G-code; it does not place the path
+    frame : of CL files: take the file's own frame (MSYS, CSYS, CATIA's matrix) as the part's place, or ignore it
+    start : of G-code: where the tool is when it starts, in the work system: X to C, mm and degrees
+    tools : the tools' lengths by number, mm, as from :func:`parakin.read_tool_table`; they go before those of the file
+    reference : of G-code: the machine's reference point (G28, G30): X to C, mm and degrees
+    progress : called now and then with the fraction done, 0 to 1
+
+    Raises :class:`InputError` with file and line for what cannot be read or understood.
     """
     source = os.fsdecode(path)
     with open_file(path, source) as file:

@@ -74,6 +74,7 @@ class Workspace(RegionResult, Displayed):
 
     @cached_property
     def volume(self) -> Volume:
+        """The two numbers between which the volume is proved to lie, in the region's unit."""
         return _sum_volumes(self.cells)
 
     @property

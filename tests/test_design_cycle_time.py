@@ -5,6 +5,7 @@ import re
 import numpy as np
 import pytest
 from shipped import load_shipped
+from test_front_page import unpack_pages
 
 import parakin as pk
 from parakin.cli import main
@@ -43,8 +44,11 @@ def measure_job(path, **sizes):
 
 def test_no_tower_runs_the_part_sooner(path):
     free = {"tower": (300.0, 420.0)}
-    (best,) = pk.find_designs(pk.DesignProblem(DELTA, free, BOX, ["cycle_time"], path=path, workpiece=PLACE)).front
+    found = pk.find_designs(pk.DesignProblem(DELTA, free, BOX, ["cycle_time"], path=path, workpiece=PLACE))
+    (best,) = found.front
     assert best.job.runs
+    (page,) = unpack_pages(pk.render_front_page(found))
+    assert "<title>part.apt on Linear Delta" in page
     assert best.values["cycle_time"] == best.proved["cycle_time"] == best.job.seconds
     others = [measure_job(path, tower=tower) for tower in np.linspace(*free["tower"], 4)]
     assert best.values["cycle_time"] < min(others) * (1.0 + 1e-3)

@@ -28,6 +28,12 @@ POINT = """(number) => {
 NAMES = [f"design_{number}" for number in (1, 2, 3)]
 
 
+def unpack_pages(text):
+    packed = re.search(r'<script type="text/plain" id="pages">(.*?)</script>', text)[1]
+    found = json.loads(decompress(b64decode(packed)))
+    return ["\n".join(found["lines"][number] for number in page) for page in found["pages"]]
+
+
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
     folder = tmp_path_factory.mktemp("front")
@@ -66,12 +72,9 @@ def test_the_page_holds_every_design(answer, folder):
     assert trace["links"] == [f"#{name}" for name in NAMES]
     assert trace["x"] == [found["values"]["L"] for found in answer["designs"]]
     assert trace["y"] == [found["values"]["amplification"] for found in answer["designs"]]
-    packed = re.search(r'<script type="text/plain" id="pages">(.*?)</script>', text)[1]
-    pages = json.loads(decompress(b64decode(packed)))
-    for name, numbers in zip(NAMES, pages["pages"], strict=True):
+    for name, page in zip(NAMES, unpack_pages(text), strict=True):
         file = re.search(f'<a download="{name}.yaml" href="data:text/yaml;base64,(.*?)">', text)[1]
         assert b64decode(file).decode() == (folder / "out" / f"{name}.yaml").read_text("utf-8")
-        page = "\n".join(pages["lines"][number] for number in numbers)
         assert page.startswith("<!DOCTYPE html>")
         machine = json.loads(re.search(r"^const machine = (.*);$", page, re.MULTILINE)[1])
         drives = pk.load(folder / "out" / f"{name}.yaml").drives

@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -251,3 +252,12 @@ def test_a_scheduler_without_workers_is_told(tmp_path, monkeypatch):
             pk.run_sweep(plan, tmp_path / "out", made.address)
     finally:
         made.close()
+
+
+def test_the_example_runs(tmp_path):
+    script = Path(__file__).parents[1] / "examples" / "sweep.py"
+    done = subprocess.run(
+        [sys.executable, script, "-o", tmp_path, "--designs", "400"], capture_output=True, text=True, check=True
+    )
+    assert re.search(r"\d+ of 400 designs keep all limits and bounds", done.stdout)
+    assert [path.name for path in tmp_path.iterdir()] == ["sweep.png"]

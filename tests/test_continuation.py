@@ -351,6 +351,22 @@ def test_similar_hexagons_on_no_conic_are_not(tmp_path):
     assert found.complete == "all paths accounted for" and np.abs(found.poses - machine.home).max(1).min() < 1e-6
 
 
+@pytest.mark.parametrize("off", [1e-2, 1e-3, 1e-4, 1e-5])
+def test_a_platform_that_is_nearly_singular_everywhere_tells_no_count_that_it_has_not(off, tmp_path):
+    """Similar hexagons with corners a little off, m: its own pose is among the answers, or these are not complete."""
+    for seed in range(3):
+        corners = 0.6 * SEMI_REGULAR + off * np.random.default_rng(seed).normal(size=(6, 3))
+        machine = platform(tmp_path, SEMI_REGULAR, corners, home=(0.2, -0.1, 0.9, 0.2, -0.3, 0.1))
+        try:
+            found = machine.assemblies(machine.inverse(machine.home))
+        except pk.NoMethodError as error:
+            assert "nearly" in str(error) and off < 1e-3
+            continue
+        assert len(found) + found.complex_count + found.infinite_count + found.lost_count == 40
+        if off > 1e-3 or found.complete != "not complete":
+            assert found.lost_count == 0 and np.abs(found.poses - machine.home).max(1).min() < 1e-6
+
+
 @pytest.mark.skipif(PHC is None, reason="PHCpack is not installed")
 @pytest.mark.parametrize("seed", [None, 8], ids=["Dietmaier's", "drawn"])
 def test_phcpack_finds_the_same_poses(seed, tmp_path):

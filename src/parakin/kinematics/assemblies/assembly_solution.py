@@ -39,7 +39,8 @@ class Assemblies:
     complete : :data:`CLOSED_FORM`, :data:`ALL_PATHS` of a homotopy, or :data:`NOT_COMPLETE`
     complex_count : solutions that are not real; None of a closed form
     infinite_count : paths that ended at infinity; None of a closed form
-    lost_count : paths that could not be followed; None of a closed form
+    lost_count : paths that could not be followed, for these joints or for any, as of a platform that is nearly singular
+        everywhere; None of a closed form
     untold_count : real solutions that no pose of this machine tells: its platform hangs there the other way round, its
         constraints hold it in another of their own solutions, or a strut ends on its ring's far side
     """

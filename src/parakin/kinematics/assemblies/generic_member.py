@@ -33,10 +33,12 @@ class GenericMember(NamedTuple):
 
     system : (n - 1, n, n)
     roots : (k, n) of length one
+    lost_count : how many paths lead to it that may end at roots besides these
     """
 
     system: Complex
     roots: Complex
+    lost_count: int = 0
 
 
 @cache

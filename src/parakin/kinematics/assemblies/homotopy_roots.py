@@ -67,12 +67,12 @@ def find_real_roots(model: Model, joints: Array) -> list[RealRoots]:
     closures = make_closure_system(model)
     own = closures.own_member
     if not len(own.roots):
-        raise NoMethodError(f"{model.spec.name}: {CONTINUUM}, or do not close, whatever the joints are")
+        raise NoMethodError(f"{model.spec.name}: {CONTINUUM} or nearly so, or do not close, whatever the joints are")
     systems = closures.make_systems(joints)
     roots = _track_and_sort(model, systems, own)
     for row in [row for row, own_roots in enumerate(roots) if own_roots.lost_count]:
         roots[row] = _track_and_sort(model, systems[row : row + 1], own, _PHASE, STRICT)[0]
-    return roots
+    return [found._replace(lost_count=found.lost_count + own.lost_count) for found in roots]
 
 
 def _track_and_sort(

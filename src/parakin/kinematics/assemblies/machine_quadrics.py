@@ -68,8 +68,9 @@ class MachineQuadrics(ClosureSystem):
         numbers = _draw_numbers(self._samples)
         system = self.family.make_member(self.combine(numbers))
         first, last = align_members(generic.system, system, self.fixed_count)
-        roots = find_regular_roots(first, last, generic.roots, self.fixed_count)
-        return GenericMember(system[0], roots[np.linalg.norm(roots @ self.family.hull[:, :4], axis=1) > _NO_TURN])
+        roots, lost_count = find_regular_roots(first, last, generic.roots, self.fixed_count)
+        turns = np.linalg.norm(roots @ self.family.hull[:, :4], axis=1) > _NO_TURN
+        return GenericMember(system[0], roots[turns], lost_count)
 
     @cached_property
     def _samples(self) -> Array:

@@ -7,7 +7,6 @@ from typing import NamedTuple
 import numpy as np
 
 from ...arrays import Array, Flags
-from ...errors import NoMethodError
 from ...kernels.batch import run_in_threads
 from .quadric_family import Complex
 
@@ -97,26 +96,26 @@ def track_members(first: Complex, last: Complex, starts: Complex, tolerance: flo
     return ends
 
 
-def find_regular_roots(first: Complex, last: Complex, starts: Complex, fixed: int) -> Complex:
-    """Track ``starts`` to regular roots of one system, along homotopies that differ by a phase, until one adds none.
+def find_regular_roots(first: Complex, last: Complex, starts: Complex, fixed: int) -> tuple[Complex, int]:
+    """Track ``starts`` to regular roots of one system, along homotopies that differ by a phase, until one finds all.
 
     A path that is lost, or jumps onto another one, is so on one of them: what is left out here would be missing in all
-    answers that begin at these roots.
+    answers that begin at these roots. Paths that lead to no regular root are lost on every homotopy; the other number
+    is of those that are lost on some only, however often that is tried: they lead to roots that are nearly singular.
 
     first, last : (1, n - 1, n, n), whose first ``fixed`` quadrics stay as they are
-
-    Raises :class:`NoMethodError` where the roots do not settle.
     """
     roots = np.empty((0, starts.shape[1]), np.complex128)
     for number in range(_MOST_PHASES):
         turned = first.copy()
         turned[:, fixed:] *= np.exp(1j * number)
         ends = track_members(turned, last, starts, STRICT if number else LENIENT)
+        found = join_roots(roots[:0], ends.points[0][ends.reached[0] == 1.0])
         before = len(roots)
-        roots = join_roots(roots, ends.points[0][ends.reached[0] == 1.0])
-        if len(roots) == len(starts) or (number and len(roots) == before):
-            return roots
-    raise NoMethodError(f"{len(roots)} roots of {len(starts)} paths, and each tracking finds others")
+        roots = join_roots(roots, found)
+        if len(roots) == len(starts) or (number and len(found) == len(roots) == before):
+            return roots, 0
+    return roots, len(starts) - len(roots)
 
 
 def join_roots(roots: Complex, more: Complex) -> Complex:

@@ -89,7 +89,7 @@ class RingQuadrics(ClosureSystem):
         signs = np.array(list(product((-1.0, 1.0), repeat=count)))
         starts = np.column_stack([np.ones(len(signs)), signs * np.sqrt(phases[:, 1] / phases[:, 0])])
         starts /= np.linalg.norm(starts, axis=1, keepdims=True)
-        return GenericMember(system[0], find_regular_roots(first, system, starts, fixed=0))
+        return GenericMember(system[0], *find_regular_roots(first, system, starts, fixed=0))
 
     def measure_scales(self, points: Complex) -> Array:
         return np.asarray(np.abs(points[:, _ONE]))

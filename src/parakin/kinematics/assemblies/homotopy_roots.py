@@ -72,7 +72,7 @@ def find_real_roots(model: Model, joints: Array) -> list[RealRoots]:
     roots = _track_and_sort(model, systems, own)
     for row in [row for row, own_roots in enumerate(roots) if own_roots.lost_count]:
         roots[row] = _track_and_sort(model, systems[row : row + 1], own, _PHASE, STRICT)[0]
-    return [found._replace(lost_count=found.lost_count + own.lost_count) for found in roots]
+    return [of_row._replace(lost_count=of_row.lost_count + own.lost_count) for of_row in roots]
 
 
 def _track_and_sort(

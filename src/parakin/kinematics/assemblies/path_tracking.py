@@ -110,10 +110,10 @@ def find_regular_roots(first: Complex, last: Complex, starts: Complex, fixed: in
         turned = first.copy()
         turned[:, fixed:] *= np.exp(1j * number)
         ends = track_members(turned, last, starts, STRICT if number else LENIENT)
-        found = join_roots(roots[:0], ends.points[0][ends.reached[0] == 1.0])
+        again = join_roots(roots[:0], ends.points[0][ends.reached[0] == 1.0])
         before = len(roots)
-        roots = join_roots(roots, found)
-        if len(roots) == len(starts) or (number and len(found) == len(roots) == before):
+        roots = join_roots(roots, again)
+        if len(roots) == len(starts) or (number and len(again) == len(roots) == before):
             return roots, 0
     return roots, len(starts) - len(roots)
 

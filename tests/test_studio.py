@@ -4,7 +4,9 @@ import json
 import signal
 import socket
 import time
+from io import BytesIO
 from pathlib import Path
+from zipfile import ZipFile
 
 import pytest
 from browser import needs_chromium, open_browser, open_tab, wait_until
@@ -164,6 +166,13 @@ def test_a_folder_is_no_file(studio):
     session = studio.open_session()
     assert studio.run(session, "linuxcnc", {"NAME": "linear_delta", "--output": "lc"})["code"] == 0
     before = studio.ask(f"sessions/{session}/files")
+    names = {file["name"] for file in before[1]["files"]}
+    for way, own in (("packed.zip", names), ("packed/lc.zip", {name for name in names if name.startswith("lc/")})):
+        with ZipFile(BytesIO(studio.request(f"sessions/{session}/{way}")[1])) as archive:
+            assert set(archive.namelist()) == own
+            assert archive.read("lc/linear_delta.ini").startswith(b"#")
+    for name in ("nothing", "..", "own.yaml%2F..%2F..", "lc/.."):
+        assert studio.request(f"sessions/{session}/packed/{name}.zip")[0] in (400, 404)
     assert studio.put_file(session, "lc", "x")[0] == 400
     assert studio.ask(f"sessions/{session}/files") == before
 

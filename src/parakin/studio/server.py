@@ -15,6 +15,7 @@ from dataclasses import asdict
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
+from urllib.parse import quote as quote_url
 
 import uvicorn
 from starlette.applications import Starlette
@@ -64,6 +65,8 @@ class Studio:
             Route(f"{in_session}/files", self._answer(self._list_files)),
             Route(f"{in_session}/files/{{name:path}}", self._answer(self._send_file)),
             Route(f"{in_session}/files/{{name:path}}", self._answer(self._take_file), methods=["PUT"]),
+            Route(f"{in_session}/packed.zip", self._answer(self._send_packed)),
+            Route(f"{in_session}/packed/{{name:path}}.zip", self._answer(self._send_packed)),
             Route(f"{in_session}/page/{{name:path}}", self._answer(self._send_page)),
             Route(f"{in_session}/runs", self._answer(self._list_runs)),
             Route(f"{in_session}/runs", self._answer(self._begin_run), methods=["POST"]),
@@ -126,6 +129,14 @@ class Studio:
             content_disposition_type="inline" if shown else "attachment",
             headers={"content-security-policy": _FILE_POLICY},
         )
+
+    async def _send_packed(self, request: Request) -> Response:
+        """Send a folder's files, or all, as one file."""
+        folder = request.path_params.get("name", "")
+        content = await asyncio.to_thread(self._find_session(request).pack_files, folder)
+        name = f"{folder.replace('/', '_') or 'studio'}.zip"
+        headers = {"content-disposition": f"attachment; filename*=UTF-8''{quote_url(name)}"}
+        return Response(content, media_type="application/zip", headers=headers)
 
     async def _send_page(self, request: Request) -> Response:
         """Send a page that ``parakin page`` wrote, of the studio's own origin, so that both can talk."""

@@ -7,8 +7,10 @@ import shutil
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
+from io import BytesIO
 from pathlib import Path
 from typing import NamedTuple
+from zipfile import ZIP_DEFLATED, ZipFile
 
 from ..errors import InputError, quote
 from .forms import FILE_NAME, FILE_NAME_WORDS
@@ -73,6 +75,24 @@ class Session:
                 about = path.stat()
                 listed.append(SessionFile(path.relative_to(self.folder).as_posix(), about.st_size, about.st_mtime))
         return listed
+
+    def pack_files(self, folder: str) -> bytes:
+        """Pack the files of a folder, or all where none is named, as a .zip.
+
+        Raises :class:`InputError` where there are none.
+        """
+        inside = self.folder if not folder else self.find_file(folder)
+        packed, count = BytesIO(), 0
+        with ZipFile(packed, "w", ZIP_DEFLATED) as archive:
+            for file in self.list_files():
+                path = self.folder / file.name
+                if path.is_relative_to(inside):
+                    with suppress(FileNotFoundError):  # a command replaces it
+                        archive.write(path, file.name)
+                        count += 1
+        if not count:
+            raise InputError(f"{quote(folder)} is no folder with files")
+        return packed.getvalue()
 
     def write_file(self, name: str, content: bytes) -> None:
         """Write a file whole."""

@@ -70,6 +70,9 @@ function showResults(number, before) {
   const written = new Map(before.map(file => [file.name, file.written]));
   const made = state.files.filter(file => written.get(file.name) !== file.written && !file.name.startsWith("page_"));
   const box = element("runs").querySelector(`[data-run="${number}"]`);
+  const folders = new Set(made.filter(file => file.name.includes("/")).map(file => file.name.split("/")[0]));
+  box.append(...[...folders].map(folder => make("p", {className: "result"},
+    make("a", {href: inSession(`packed/${escapeName(folder)}.zip`), textContent: `${folder}.zip, all of these`}))));
   box.append(...made.map(file => {
     const href = inSession(`files/${escapeName(file.name)}`), link = make("a", {href, target: "_blank", rel: "noopener", textContent: file.name});
     if (!/\.(svg|png)$/i.test(file.name)) return make("p", {className: "result"}, link);
@@ -272,6 +275,7 @@ async function refreshFiles() {
   fillSelect(element("second"), [["", "nothing"], ...all], second);
   const parts = state.files.map(file => file.name).filter(name => /\.(aptsource|apt|cls?|ncl|ngc|nc|gcode|tap|cnc|txt)$/i.test(name));
   fillSelect(element("part"), [["", "none"], ...parts.map(name => [name, name])], part);
+  element("all").href = inSession("packed.zip");
   element("files").replaceChildren(...state.files.map(file => make("li", {},
     make("a", {href: inSession(`files/${escapeName(file.name)}`), target: "_blank", rel: "noopener", textContent: file.name}),
     make("span", {textContent: file.size < 1e4 ? `${file.size} B` : `${(file.size / 1e3).toFixed(0)} kB`}))));

@@ -289,7 +289,7 @@ label lay lead leave let limit linearise list load locate lock lower
 make map march mark match maximise measure meet merge minimise move multiply
 name narrow normalise note number
 open order
-pace paint parse peel pick place plan point polish pose post predict prepare print project prove put
+pace paint pack parse peel pick place plan point polish pose post predict prepare print project prove put
 quote
 raise rank rate read rebuild recognise record redirect reduce refine refuse register reject relate release remove rename
 render renumber reorder repeat replace report repost require reserve reset resize resolve restore restrict retract retry

@@ -77,7 +77,7 @@ class Session:
         return listed
 
     def pack_files(self, folder: str) -> bytes:
-        """Pack the files of a folder, or all where none is named, as a .zip.
+        """Pack the files of a folder, or all where none is named, into a .zip.
 
         Raises :class:`InputError` where there are none.
         """

@@ -19,8 +19,8 @@ HEAD = """\
 # Machines
 
 What is shipped, written by `python examples/machines_page.py`. A workspace is where the tool's tip may be with the tool
-as at home, proved to lie between the two numbers. Each source says which sizes are published and which were chosen, who
-made the machine, and where it was built; what is not known of that is said to be not known.
+as at home, proved to lie between the two numbers. Each source says which sizes are published and which were chosen, and
+ends with who built the machine or where, or that it is not known.
 """
 
 

@@ -8,6 +8,7 @@ import pytest
 from shipped import load_shipped
 
 import parakin as pk
+from parakin.export.designs import list_shown_values
 from parakin.synthesis.design_tapes import DesignTapes
 from parakin.synthesis.pose_sets import make_box_set
 from parakin.synthesis.workspace_gauge import WorkspaceGauge
@@ -25,7 +26,9 @@ def bound_volume(machine):
 
 def test_no_tower_has_a_larger_workspace():
     machine = load_shipped("linear_delta")
-    (best,) = pk.find_designs(pk.DesignProblem(machine, {"tower": (250.0, 450.0)}, DELTA, maximise=["workspace"])).front
+    found = pk.find_designs(pk.DesignProblem(machine, {"tower": (250.0, 450.0)}, DELTA, maximise=["workspace"]))
+    (best,) = found.front
+    assert list_shown_values(found, 0)["workspace"] == pytest.approx(1e-6 * best.values["workspace"])  # litres
     volume = bound_volume(best.machine)
     assert volume.inner <= best.values["workspace"] * (1.0 + 1e-9) <= volume.outer
     assert best.proved["workspace"] == best.values["workspace"]

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _COLOUR = "#1565c0"
+_SHOWN = {"mm³": ("litres", 1e-6)}  # units that are shown for others
 _ALIKE = 2e-6  # relative: what is proved to that is what was found
 
 
@@ -42,7 +43,8 @@ def format_proved_yaml(designs: Designs, index: int) -> str:
 
 def list_units(problem: DesignProblem) -> dict[str, str]:
     """List the units in which free numbers, shifts and quantities are shown; an empty text for those of a number."""
-    units = {name: want.unit for name, want in WANTS.items()} | {f"shift {key}": "mm" for key in problem.shift}
+    units = {name: _SHOWN.get(want.unit, (want.unit, 1.0))[0] for name, want in WANTS.items()}
+    units |= {f"shift {key}": "mm" for key in problem.shift}
     return units | {parameter.name: name_display_unit(parameter.unit) for parameter in problem.family.parameters}
 
 
@@ -56,7 +58,8 @@ def list_shown_values(designs: Designs, index: int) -> dict[str, float]:
     own = {parameter.name: parameter.unit for parameter in designs.problem.family.parameters}
     design = designs.front[index]
     sizes = {name: float(to_display(value, own.get(name, "mm"))) for name, value in design.sizes.items()}
-    return {**sizes, **{name: value for name, value in design.values.items() if name not in sizes}}
+    scales = {name: _SHOWN.get(want.unit, (want.unit, 1.0))[1] for name, want in WANTS.items()}
+    return {**sizes, **{name: value * scales[name] for name, value in design.values.items() if name not in sizes}}
 
 
 def describe_proofs(design: ProvedDesign, digits: str) -> str:

@@ -11,6 +11,7 @@ from scipy.optimize import minimize_scalar
 from shipped import load_shipped
 
 import parakin as pk
+from parakin.controllers.linuxcnc.planner.planner_module import TIMED_SLACK
 from parakin.kinematics.wrist.pole_thresholds import STANDING
 
 sys.path.insert(0, str(Path(__file__).parent / "linuxcnc"))
@@ -217,6 +218,26 @@ def test_a_joint_slows_down_before_its_wrist_is_held(name, turn, planners):
     joints[held, wrist.first] = joints[~held, wrist.first][-1]
     speed, rise = run.measure_shares(joints)
     assert 2 < held.sum() < 100 and speed <= SPEED and rise <= RISE
+
+
+def test_timed_motions_keep_the_limits_in_single_block_and_as_they_go_on(planners):
+    """Each comes to rest where the trajectory runs on; then all that is left starts from rest amid it."""
+    planner = planners("hexapod")
+    home, acceleration = np.array(planner.machine.home), planner.machine.drives[0].acceleration
+    pulse, amplitude, knot = 60.0, 0.9 * acceleration / 60.0**2, np.pi / 12.0 / 60.0  # rad/s, mm, s
+    t = knot * np.arange(6, 25)  # from the greatest speed to where it stands
+    ends = home + np.outer(amplitude * np.cos(pulse * t), [0.0, 0.0, 1.0, 0.0, 0.0, 0.0])
+    planner.start(ends[0])
+    planner.set_signal(63, 1.0)
+    step = np.linalg.norm(np.diff(ends, axis=0)[:, :3], axis=1)
+    motions = [lambda k=k: planner.line_to(ends[k + 1], step[k] / knot) for k in range(len(step))]
+    for part in ([motions[0]], [motions[1]], motions[2:]):
+        run = planner.run(part)
+        speed, rise = run.measure_shares(follow(run))
+        assert not run.left and speed <= SPEED and rise <= TIMED_SLACK + RISE - 1.0
+        planner.pose = run.poses[-1]
+    assert np.abs(run.poses[-1] - ends[-1]).max() < 1e-9
+    planner.set_signal(63, 0.0)
 
 
 def test_motions_wait_for_the_spindle_and_write_outputs_as_they_begin(planners):

@@ -8,6 +8,9 @@
 #define PATIENCE 20  /* cycles for which the last motion waits for the one that follows it */
 #define LATE 2000    /* cycles for which a timed one does, whose spline goes on through the ones that follow */
 #define RESERVE 200  /* timed motions that are gathered before the first of them begins */
+#define BENDING 4    /* timed motions behind a rest, whose splines bend as the trajectory may not: */
+#define FINER 0.06   /* steps are no longer than this share of them there, */
+#define FINEST 2.5e-4 /* or than so many seconds, so that a cycle lays more than it runs */
 #define KNOTS 12     /* intervals ahead that shape a spline: what lies behind them changes it by less than 1e-6 */
 
 enum shape { ON_MOTION, PARABOLA, SPLINE };
@@ -30,6 +33,7 @@ static double laid_from;     /* and where on it */
 static int laid_still;       /* whether the path stands still there */
 static int laid_bent;        /* whether it may turn sharply there */
 static double laid_rate[AXES]; /* of a spline: the speeds there */
+static int laid_since_rest;    /* timed motions */
 
 static Piece *piece_at(unsigned index) { return &pieces[index % PIECES]; }
 
@@ -125,7 +129,8 @@ static int lay_motion(void)
     return 1;
 }
 
-/* Lay a timed motion: the first interval of the spline through the motions ahead. */
+/* Lay a timed motion: the first interval of the spline through the motions ahead. One that runs by itself, as in single
+   block, is straight, and as quick as the joints can. */
 static int lay_spline(void)
 {
     double seconds[KNOTS], upper[KNOTS], rate[KNOTS + 1][AXES];
@@ -164,14 +169,19 @@ static int lay_spline(void)
         for (int i = 0; i < AXES; i++)
             rate[k][i] -= upper[k] * rate[k + 1][i];
     const Motion *m = motion_at(laid_motion);
+    const int alone = count == 1 && laid_still && !m->stops;
     Piece *p = add_piece(SPLINE, laid_motion, m->length);
+    laid_since_rest = p->begins_still ? 0 : laid_since_rest + 1;
+    p->finest = laid_since_rest < BENDING ? fmax(FINER * m->length, FINEST) : m->length;
     for (int i = 0; i < AXES; i++) {
         const double h = m->length, slope = (m->end[i] - m->start[i]) / h;
+        if (alone)
+            rate[0][i] = rate[1][i] = slope;
         p->c[0][i] = m->start[i];
         p->c[1][i] = rate[0][i];
         p->c[2][i] = (3.0 * slope - 2.0 * rate[0][i] - rate[1][i]) / h;
         p->c[3][i] = (rate[0][i] + rate[1][i] - 2.0 * slope) / (h * h);
-        laid_rate[i] = rate[1][i];
+        laid_rate[i] = alone ? 0.0 : rate[1][i];
     }
     laid_motion++;
     const Motion *next = laid_motion != next_motion ? motion_at(laid_motion) : 0;

@@ -261,7 +261,7 @@ static int cut_step(void)
 {
     const Piece *p = piece_at(cut_piece);
     Step *s = step_at(next_step);
-    const double rest = p->length - cut_at, limit = p->shape == SPLINE ? STEP_SECONDS : p->finest;
+    const double rest = p->length - cut_at, limit = p->shape == SPLINE ? fmin(STEP_SECONDS, p->finest) : p->finest;
     double length = fmin(fmin(2.0 * cut_length, rest), limit), middle[JOINTS], end[JOINTS];
     while (!try_step(p, length, middle, end)) {
         length *= 0.5;

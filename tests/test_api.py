@@ -40,6 +40,8 @@ def things(tmp_path_factory, tricept):
     accuracy = pk.analyse_accuracy(orthoglide, {"feet": "0.1 mm"}, poses)
     hexapod, below = load_shipped("hexapod"), pk.workpiece(Z=-950)
     body = pk.sample_field(space, pk.workspace(space, gap=0.5).box, step=20)
+    atlas, swept, travel = pk.atlas(plane, step=50), pk.sweep_drives(plane, 8), tricept.travel(tricept.home, "X")
+    comparison = pk.compare([plane.machine, load_shipped("five_bar")], samples=5)
     sides = dict.fromkeys("XYZ", (-10.0, 10.0))
     problem = pk.DesignProblem(orthoglide, {"L": (200.0, 500.0)}, sides, ["L"])
 
@@ -61,8 +63,8 @@ def things(tmp_path_factory, tricept):
         "InscribedBox": pk.find_largest_box(plane),
         "GridWorkspace": pk.sample_grid(plane, 20),
         "PolarWorkspace": pk.sweep_polar(plane, 20),
-        "DriveWorkspace": pk.sweep_drives(plane, 8),
-        "Atlas": pk.atlas(plane, step=50),
+        "DriveWorkspace": swept,
+        "Atlas": atlas,
         "SingularityDistance": pk.find_nearest_singularity(plane, {"X": (-9.0, 9.0)}),
         "Placement": pk.find_placement(tricept, path, {"Z": (-1500, -1400)}),
         "Assemblies": tricept.assemblies(tricept.inverse(tricept.home)),
@@ -78,7 +80,7 @@ def things(tmp_path_factory, tricept):
         "WorstCase": pk.bound_worst_case(accuracy, {}),
         "Stiffness": pk.analyse_stiffness(orthoglide, "100 N/um", poses=poses),
         "DriveForces": pk.compute_drive_forces(job.trajectory),
-        "Comparison": pk.compare([plane.machine, load_shipped("five_bar")], samples=5),
+        "Comparison": comparison,
         "Measurements": measured,
         "Calibration": pk.calibrate(orthoglide, measured, ["encoders"]),
         "MeasurementPlan": pk.plan_measurements(orthoglide, 4, ["encoders"]),
@@ -94,6 +96,13 @@ def things(tmp_path_factory, tricept):
         "setpoints": job.trajectory.sample(10),
         "cells": found.cells,
         "spec": tricept.spec,
+        "drive": tricept.drives[3],
+        "leg": tricept.legs[0],
+        "travel": travel,
+        "end of travel": travel.ahead,
+        "extreme": atlas.extremes[0],
+        "figures": comparison.columns[0],
+        "image": swept.contours[0],
     }
 
 

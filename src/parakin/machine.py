@@ -247,7 +247,7 @@ class Machine(MachineProperties, Displayed):
         """Read a direction (axes,): the name of an axis, values by names, or all values."""
         if isinstance(axis, str):
             if axis not in self.axes:
-                raise PoseError(f"axis {axis!r}: one of {' '.join(self.axes)} expected{suggest(axis, self.axes)}")
+                raise PoseError(f"axis {axis!r}: one of {' '.join(self.axes)} expected")
             axis = {axis: 1.0}
         nothing = dict.fromkeys(self.axes, 0.0)
         direction = self._read_one({**nothing, **axis} if isinstance(axis, Mapping) else axis, self.axes, "axis")

@@ -52,6 +52,9 @@ class MachineFigures:
         answers = {"performance": self.performance, "accuracy": self.accuracy, "stiffness": self.stiffness}
         return {name: answer for name, answer in {**answers, "part": self.job}.items() if isinstance(answer, str)}
 
+    def __repr__(self) -> str:
+        return f"<parakin figures of {self.machine.name}>"
+
 
 @dataclass(frozen=True, eq=False)
 class Comparison:

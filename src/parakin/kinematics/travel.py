@@ -52,6 +52,12 @@ class TravelEnd:
     pose: Array
     limit: str | None
 
+    def __repr__(self) -> str:
+        return f"<parakin end of travel: {self}>"
+
+    def __str__(self) -> str:
+        return f"{self.distance:.6g} until {self.limit or 'nothing'}"
+
 
 @dataclass(frozen=True, eq=False)
 class Travel:
@@ -59,6 +65,9 @@ class Travel:
 
     ahead: TravelEnd
     back: TravelEnd
+
+    def __repr__(self) -> str:
+        return f"<parakin travel: ahead {self.ahead}, back {self.back}>"
 
 
 class LineTapes(NamedTuple):

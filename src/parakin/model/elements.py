@@ -57,6 +57,9 @@ class Drive:
     inertia: float = 0.0
     stiffness: float | None = None
 
+    def __repr__(self) -> str:
+        return f"<parakin drive {self.name}: {self.low:.6g} to {self.high:.6g} {self.unit}>"
+
 
 @dataclass(frozen=True)
 class BodyBuild:

@@ -39,6 +39,9 @@ class Extreme:
     value: float
     pose: Array
 
+    def __repr__(self) -> str:
+        return f"<parakin extreme: {self.side} {self.quantity} {self.value:.6g}>"
+
 
 def compute_slack(region: Region, positions: Array) -> Array:
     """Compute a field that is zero on a region's boundary, positive inside: (N,) for positions (N, d).

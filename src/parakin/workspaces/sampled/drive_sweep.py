@@ -63,6 +63,9 @@ class DriveImage:
         edges = np.flatnonzero(np.diff(allowed.astype(np.int8), prepend=0, append=0))
         return [self.positions[a:b] for a, b in zip(edges[::2], edges[1::2], strict=True)]
 
+    def __repr__(self) -> str:
+        return f"<parakin image of {' '.join(self.strategy.runs)}: {self.side}, shape {self.joints.shape}>"
+
 
 @dataclass(frozen=True, eq=False, repr=False)
 class DriveWorkspace(SampledWorkspace):

@@ -143,6 +143,35 @@ def test_the_side_is_the_near_poses_own(load):
         np.testing.assert_allclose(found.poses, truth, atol=1e-7)
 
 
+def measure_planar_sides(machine, poses, joints):
+    """The determinants of a planar 3-PRR's rods as lines about its tool, (N,), by its legs' points alone."""
+    x, y, turn = poses.T
+    rows = []
+    for leg, joint in zip(machine.spec.legs, joints.T, strict=True):
+        px, py, _ = leg.platform
+        at = np.cos(turn) * px - np.sin(turn) * py, np.sin(turn) * px + np.cos(turn) * py
+        rod = [x + at[0] - leg.foot[0] - joint * leg.rail[0], y + at[1] - leg.foot[1] - joint * leg.rail[1]]
+        rows.append(np.stack([*rod, at[0] * rod[1] - at[1] * rod[0]], axis=1))
+    return np.linalg.det(np.stack(rows, axis=1))
+
+
+@pytest.mark.parametrize("mode", ["++-", "-++"])
+def test_the_side_is_that_of_the_starts_own_joints_in_every_mode(mode):
+    """Across a singular line from the start the rods turn as the sliders move, not only as the platform does."""
+    machine, rng = load_shipped("prr3"), np.random.default_rng(1)
+    poses = machine.home + rng.uniform(-1.0, 1.0, (3000, 3)) * [120.0, 120.0, 0.25]
+    near = poses + rng.uniform(-1.0, 1.0, poses.shape) * [1.0, 1.0, 0.005]
+    joints, own = machine.inverse(poses, mode), machine.inverse(near, mode)
+    reached = np.isfinite(joints).all(1) & np.isfinite(own).all(1)
+    poses, near, joints, own = (rows[reached] for rows in (poses, near, joints, own))
+    found = machine.forward(joints, near=near, mode=mode)
+    start, goal = measure_planar_sides(machine, near, own), measure_planar_sides(machine, poses, joints)
+    done = found.converged
+    assert (start[done] * measure_planar_sides(machine, found.poses[done], joints[done]) > 0.0).all()
+    assert done[start * goal > 0.0].mean() > 0.999
+    assert (start * goal < 0.0).any()
+
+
 def test_sides_know_no_angles_of_the_pose():
     machine = load_shipped("hexapod")
     poses = draw(machine, 400, (200.0, 0.5), 3)

@@ -47,7 +47,7 @@ from .wrist.pole_thresholds import is_upright
 from .wrist.pose_angles import bring_within_poles
 
 WITHIN_A_TURN = 6  # steps of half a radian at most, which can't leave the start's turn
-STEADY = 0.2  # by which the determinant may change from start to answer and still tell the start's own side
+STEADY = 0.2  # by which the determinant may change and still tell the start's own side, where the mode is open
 NOT_FALLEN = 0.999  # by which it may change before the answer may be a singularity itself
 FIRST_STRIDE, LEAST_STRIDE = 1.0 / 8.0, 1e-5  # of the way in joints that a step of the continuation takes
 MOST_STRIDES = 400  # steps of the continuation
@@ -202,7 +202,11 @@ def _choose_common_points(model: Model, joints: Array, starts: Array | None, mod
 
 
 def _solve_by_newton(model: Model, joints: Array, starts: Array | None, mode: str | None) -> Answers:
-    """Solve the closures from the starts; what that does not settle is judged, and continued where it failed."""
+    """Solve the closures from the starts; what that does not settle is judged, and continued where it failed.
+
+    Legs that stand in a mode have other joints at the start than the given ones, and there a determinant of their own.
+    However little it changes with the pose from start to root, the joints alone can turn its sign.
+    """
     near = np.array(model.home)[None, :] if starts is None else starts
     end = compile_settling_end(model, mode, starts is not None)
     if starts is None:
@@ -210,14 +214,16 @@ def _solve_by_newton(model: Model, joints: Array, starts: Array | None, mode: st
         roots = find_roots(model, near, joints, side=find_sides(model, near, mode), end=end, settling=settling)
     else:
         least = (SINGULAR * bound_determinant(model)) ** 2
-        settling = Settling(least, STEADY if model.has_modes else NOT_FALLEN, WITHIN_A_TURN)
-        roots = find_roots(model, near, joints, end=end, settling=settling)
+        own_joints = model.has_modes and mode is not None
+        sides = find_sides(model, near, mode, joints) if own_joints else None
+        settling = Settling(least, STEADY if model.has_modes and not own_joints else NOT_FALLEN, WITHIN_A_TURN)
+        roots = find_roots(model, near, joints, side=sides, end=end, settling=settling)
     answers = Answers(roots.rows, roots.residual, roots.steps, np.zeros(len(joints), np.int8), roots.settled)
     rest = np.flatnonzero(~roots.settled)
     if len(rest):
         own = Roots._make(field[rest] for field in roots)
         own_starts = near if starts is None else starts[rest]
-        if starts is not None:
+        if starts is not None and sides is None:
             _take_own_sides(model, own, own_starts, joints[rest], mode)
         why = _judge(model, own, joints[rest], mode)
         if (why != ANSWERED).any():
@@ -243,8 +249,8 @@ def _refuse_singular_answers(
 def _take_own_sides(model: Model, roots: Roots, near: Array, joints: Array, mode: str | None) -> None:
     """Multiply the roots' determinants by those of the starts with their own joints, not with the given ones; in place.
 
-    The determinant of struts of any length is the same. Else it differs little where it differs little from the
-    root's; only where it does not, the starts' own joints are looked for.
+    The determinant of struts of any length is the same. Where the legs may stand in any mode it counts as the same
+    where it differs little from the root's; only where it does not, the starts' own joints are looked for.
     """
     roots.turned[:] *= find_angle_signs(model, near)
     if not model.has_modes:

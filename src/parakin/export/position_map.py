@@ -82,6 +82,8 @@ def render_position_map(
         levels = _choose_levels(float(known.min()), float(np.percentile(known, COLOURED)))
         filled = fill_map(axes, grid, values, region, levels, "max", cmap=text.colours)
         bar = figure.colorbar(filled, cax=axes.inset_axes((1.04, 0.0, 0.045, 1.0)))
+        ticks = levels[:: _LEVELS // 6].tolist()
+        bar.set_ticks(ticks, labels=[f"{tick:.3g}" for tick in ticks])
         bar.set_label(text.label, color=INK, fontsize=9)
 
     def add_heading(figure: Figure) -> None:

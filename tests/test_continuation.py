@@ -327,6 +327,33 @@ def test_joints_at_a_singularity_have_a_double_root(tmp_path):
     assert len(found) + found.complex_count + found.lost_count + found.infinite_count >= 38
 
 
+@pytest.mark.parametrize(("name", "off"), [("hexapod", 1e-4), ("hexapod", 2e-6), ("rpr3", 1e-4)])
+def test_two_poses_beside_a_singularity_are_two_and_no_continuum(name, off):
+    """Poses a fraction of the way off a change of det A's sign, and their counterparts beyond, twice as far away."""
+    machine = load_shipped(name)
+    rng = np.random.default_rng(3)
+    mm = np.array(machine.axis_units) == "mm"
+    told = 0
+    for _ in range(12):
+        way = rng.normal(size=len(mm)) * np.where(mm, 1000.0, 1.0)
+        poses = machine.home + np.linspace(0.0, 1.0, 60)[:, None] * way
+        same = machine.sides(poses) * machine.sides(machine.home[None]) > 0.0
+        count = int(np.argmin(same))
+        if same.all() or not np.isfinite(machine.inverse(poses[: count + 1])).all():
+            continue
+        low, high = (count - 1) / 59.0, count / 59.0
+        for _ in range(60):
+            middle = 0.5 * (low + high)
+            side = machine.sides((machine.home + middle * way)[None]) * machine.sides(machine.home[None])
+            low, high = (middle, high) if side[0] > 0.0 else (low, middle)
+        pose = machine.home + (low - off) * way
+        found = machine.assemblies(machine.inverse(pose))
+        apart = np.abs(found.poses - pose).max(1)
+        told += apart.min() < 1e-6
+        assert (apart < 1.0).sum() in (0, 2)  # none where angles beyond 90° are written otherwise
+    assert told >= 6
+
+
 def make_hexagon(angles):
     return np.column_stack([np.cos(np.radians(angles)), np.sin(np.radians(angles)), np.zeros(6)])
 

@@ -15,6 +15,8 @@ CONTINUUM = "the assemblies are a continuum here: the legs leave the platform fr
 _SAMPLES = 16  # the polynomial has harmonics up to the fourth (which cancels), so nine would do
 _STEPS, _IDLE = 50, 4
 _SINGULAR, _STRIDE = 1e-6, 1e-3  # of the greatest singular value, and of the size: what tells a continuum
+_ASIDE = 0.3  # of a stride: what closes farther from its end is another root
+_FREE = 1e-11  # of the size: what closes so well a stride away is free to move
 
 
 def solve_planar_rpr(centres: Array, radii: Array, corners: Array) -> Array:
@@ -46,16 +48,23 @@ def solve_planar_rpr(centres: Array, radii: Array, corners: Array) -> Array:
 
 
 def _is_in_continuum(pose: Array, centres: Array, radii: Array, corners: Array) -> bool:
-    """Tell whether a solution belongs to a continuum: a step along the null direction can be closed again there."""
+    """Tell whether a solution belongs to a continuum: steps along the null direction, both ways, can be closed there.
+
+    Another root beside it lies one way.
+    """
     _, jacobian = _linearise(pose, centres, corners)
     size = float(np.abs(jacobian).max())
-    scaled = jacobian * np.array([1.0, 1.0, 1.0 / max(size, 1e-300)])  # the turn in units of a length of its own
-    _, values, directions = np.linalg.svd(scaled)
+    units = np.array([1.0, 1.0, 1.0 / max(size, 1e-300)])  # the turn in units of a length of its own
+    _, values, directions = np.linalg.svd(jacobian * units)
     if values[-1] > _SINGULAR * values[0]:
         return False
-    step = _STRIDE * size * directions[-1] * np.array([1.0, 1.0, 1.0 / max(size, 1e-300)])
-    error, moved = _polish_pose(pose + step, centres, radii, corners)
-    return error < 1e-11 * size and not _is_same(pose, moved, size)
+    for step in (_STRIDE * size * directions[-1] * units, -_STRIDE * size * directions[-1] * units):
+        error, moved = _polish_pose(pose + step, centres, radii, corners, _SINGULAR)
+        aside = moved - pose - step
+        aside[2] = (aside[2] + np.pi) % (2.0 * np.pi) - np.pi
+        if not (error < _FREE * size and float(np.linalg.norm(aside / units)) < _ASIDE * _STRIDE * size):
+            return False
+    return True
 
 
 def _turn_points(angle: Array, points: Array) -> Array:
@@ -95,8 +104,13 @@ def _find_starts(angle: float, centres: Array, radii: Array, corners: Array) -> 
     return starts
 
 
-def _polish_pose(pose: Array, centres: Array, radii: Array, corners: Array) -> tuple[float, Array]:
-    """Polish a pose by Newton's method as long as it improves; return the best and its greatest error of a radius."""
+def _polish_pose(
+    pose: Array, centres: Array, radii: Array, corners: Array, least_value: float = 1e-13
+) -> tuple[float, Array]:
+    """Polish a pose by Newton's method as long as it improves; return the best and its greatest error of a radius.
+
+    least_value : of the greatest singular value: along directions of less it does not move
+    """
     best, least, idle = pose, np.inf, 0
     for _ in range(_STEPS):
         rods, jacobian = _linearise(pose, centres, corners)
@@ -107,7 +121,7 @@ def _polish_pose(pose: Array, centres: Array, radii: Array, corners: Array) -> t
             best, least = pose, error
         if idle > _IDLE:
             break
-        pose = pose - np.linalg.lstsq(jacobian, f, rcond=1e-13)[0]
+        pose = pose - np.linalg.lstsq(jacobian, f, rcond=least_value)[0]
     return least, np.array([best[0], best[1], np.pi - (np.pi - best[2]) % (2.0 * np.pi)])
 
 

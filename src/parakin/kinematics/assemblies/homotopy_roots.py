@@ -17,6 +17,7 @@ from .machine_quadrics import make_machine_quadrics
 from .path_tracking import LENIENT, STRICT, align_closures, find_meetings, measure_angles, track_members
 from .quadric_family import Complex
 from .ring_quadrics import find_tori, make_ring_quadrics
+from .root_boxes import prove_roots
 
 _AT_INFINITY = 1e-5  # of what a singular end's place is divided by: it is infinite
 _FAR = 1e-8  # of the same: an end is infinite however its path came there, and wherever it stopped
@@ -24,6 +25,7 @@ _ENDED = 1e-6  # of a quadric of the last system, where a path stops on its way 
 _REAL = 1e-4  # imaginary part, for a point of length one, from which Newton's method may find a real root
 _CLOSED = 1e-12  # of a quadric at a point of length one: it is a root
 _STRIDE = 1e-3  # along the null direction of a double root
+_ASIDE = 0.3  # of a stride: what closes farther from its end is another root
 _SAME_SINGLE, _SAME_DOUBLE = 1e-7, 1e-5  # rad: between points of the same root, regular and double
 _AT_END = 0.99  # t from which on a path ends at a singular root: one that stops before is lost
 _PHASE = np.exp(1j)  # of the paths that are tracked where one of the first was lost
@@ -99,6 +101,7 @@ def _sort_ends(model: Model, system: Complex, points: Complex, reached: Array, m
     reached : (paths,) the last t of each
     met : (paths,) where another path ended too
 
+    Of two roots beside each other, at which paths stop as at a double one, each that is proved is one of its own.
     Where several paths end in one place at infinity, the last steps are so ill conditioned that some arrive, some stop
     early, and some are taken for one.
     """
@@ -111,11 +114,13 @@ def _sort_ends(model: Model, system: Complex, points: Complex, reached: Array, m
     turned_real = _measure_closures(system.real, single) < _CLOSED
     ends_singular = _refine_singular(system, points[~regular & ~lost])
     kinds = _sort_singular(make_closure_system(model), system, ends_singular)
-    doubles = _join_same(_turn_to_real(ends_singular[kinds == _DOUBLE]).real, _SAME_DOUBLE)
+    beside = _turn_to_real(ends_singular[kinds == _DOUBLE]).real
+    apart = np.isfinite(prove_roots(np.broadcast_to(system.real, (len(beside), *system.shape)), beside))
+    doubles = _join_same(beside[~apart], _SAME_DOUBLE)
     if any(_is_in_continuum(system.real, point) for point in doubles):
         raise NoMethodError(f"{model.spec.name}: {CONTINUUM}")
     return RealRoots(
-        np.concatenate([_join_same(single[turned_real], _SAME_SINGLE), doubles]),
+        np.concatenate([_join_same(np.concatenate([single[turned_real], beside[apart]]), _SAME_SINGLE), doubles]),
         int((regular & ~near_real).sum() + (~turned_real).sum() + (kinds == _COMPLEX).sum()),
         int(infinite.sum() + (kinds == _INFINITE).sum()),
         int((kinds == _LOST).sum() + lost.sum() + met.sum()),
@@ -195,16 +200,24 @@ def _join_same(points: Array, angle: float) -> Array:
 
 
 def _is_in_continuum(system: Array, point: Array) -> bool:
-    """Tell whether a step along the null direction of a singular root can be closed again there."""
+    """Tell whether steps along the null direction of a singular root, both ways, can be closed again there.
+
+    Another root beside it lies one way.
+    """
     matrix = np.vstack([2.0 * np.einsum("rij,j->ri", system, point), point])
-    start = point + _STRIDE * np.linalg.svd(matrix)[2][-1]
-    x = start / np.linalg.norm(start)
+    along = _STRIDE * np.linalg.svd(matrix)[2][-1]
+    return all(_closes_there(system, (point + step) / np.linalg.norm(point + step)) for step in (along, -along))
+
+
+def _closes_there(system: Array, start: Array) -> bool:
+    """Tell whether a point can be closed where it is, without a move along a null direction."""
+    x = start
     for _ in range(20):
         half = np.einsum("rij,j->ri", system, x)
         x = x - np.linalg.lstsq(np.vstack([2.0 * half, x]), np.append(half @ x, 0.0), rcond=1e-6)[0]
         x = x / np.linalg.norm(x)
     closes = _measure_closures(system, x[None])[0] < _CLOSED
-    return bool(closes and np.linalg.norm(x - point) > 0.3 * _STRIDE)
+    return bool(closes and np.linalg.norm(x - start) < _ASIDE * _STRIDE)
 
 
 def find_coordinates(model: Model, points: Array, joints: Array) -> Array:

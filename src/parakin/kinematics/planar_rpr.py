@@ -15,7 +15,7 @@ CONTINUUM = "the assemblies are a continuum here: the legs leave the platform fr
 _SAMPLES = 16  # the polynomial has harmonics up to the fourth (which cancels), so nine would do
 _STEPS, _IDLE = 50, 4
 _SINGULAR, _STRIDE = 1e-6, 1e-3  # of the greatest singular value, and of the size: what tells a continuum
-_ASIDE = 0.3  # of a stride: what closes farther from its end is another root
+_NEAR_PLANAR_STRIDE = 0.3  # of a stride: what closes farther from its end is another root
 _FREE = 1e-11  # of the size: what closes so well a stride away is free to move
 
 
@@ -62,7 +62,7 @@ def _is_in_continuum(pose: Array, centres: Array, radii: Array, corners: Array) 
         error, moved = _polish_pose(pose + step, centres, radii, corners, _SINGULAR)
         aside = moved - pose - step
         aside[2] = (aside[2] + np.pi) % (2.0 * np.pi) - np.pi
-        if not (error < _FREE * size and float(np.linalg.norm(aside / units)) < _ASIDE * _STRIDE * size):
+        if not (error < _FREE * size and float(np.linalg.norm(aside / units)) < _NEAR_PLANAR_STRIDE * _STRIDE * size):
             return False
     return True
 

@@ -25,7 +25,7 @@ _ENDED = 1e-6  # of a quadric of the last system, where a path stops on its way 
 _REAL = 1e-4  # imaginary part, for a point of length one, from which Newton's method may find a real root
 _CLOSED = 1e-12  # of a quadric at a point of length one: it is a root
 _STRIDE = 1e-3  # along the null direction of a double root
-_ASIDE = 0.3  # of a stride: what closes farther from its end is another root
+_NEAR_STRIDE = 0.3  # of a stride: what closes farther from its end is another root
 _SAME_SINGLE, _SAME_DOUBLE = 1e-7, 1e-5  # rad: between points of the same root, regular and double
 _AT_END = 0.99  # t from which on a path ends at a singular root: one that stops before is lost
 _PHASE = np.exp(1j)  # of the paths that are tracked where one of the first was lost
@@ -206,10 +206,10 @@ def _is_in_continuum(system: Array, point: Array) -> bool:
     """
     matrix = np.vstack([2.0 * np.einsum("rij,j->ri", system, point), point])
     along = _STRIDE * np.linalg.svd(matrix)[2][-1]
-    return all(_closes_there(system, (point + step) / np.linalg.norm(point + step)) for step in (along, -along))
+    return all(_is_closable(system, (point + step) / np.linalg.norm(point + step)) for step in (along, -along))
 
 
-def _closes_there(system: Array, start: Array) -> bool:
+def _is_closable(system: Array, start: Array) -> bool:
     """Tell whether a point can be closed where it is, without a move along a null direction."""
     x = start
     for _ in range(20):
@@ -217,7 +217,7 @@ def _closes_there(system: Array, start: Array) -> bool:
         x = x - np.linalg.lstsq(np.vstack([2.0 * half, x]), np.append(half @ x, 0.0), rcond=1e-6)[0]
         x = x / np.linalg.norm(x)
     closes = _measure_closures(system, x[None])[0] < _CLOSED
-    return bool(closes and np.linalg.norm(x - start) < _ASIDE * _STRIDE)
+    return bool(closes and np.linalg.norm(x - start) < _NEAR_STRIDE * _STRIDE)
 
 
 def find_coordinates(model: Model, points: Array, joints: Array) -> Array:

@@ -12,12 +12,12 @@ function aimRay(event) {
   raycaster.setFromCamera(pointer, camera);
 }
 
-function findGrip(event) {
+function findGrip(event, reach = 2.2) { // of the tool's handle, in its radii
   aimRay(event);
   scene.updateMatrixWorld();
   const arrow = arrows.visible && raycaster.intersectObjects(arrows.children)[0];
   if (arrow) return {kind: "part", axis: arrow.object.userData.axis};
-  const near = raycaster.ray.distanceToPoint(handle.position) < 2.2 * handle.scale.x;
+  const near = raycaster.ray.distanceToPoint(handle.position) < reach * handle.scale.x;
   if (near) return {kind: "tool", offset: null};
   const hits = raycaster.intersectObjects(machineGroup.children);
   const hit = hits.find(({object}) => object.userData.drive >= 0 && object.visible);
@@ -78,8 +78,10 @@ function seeGrip(state) {
   return [0.5 * place.x * canvas.clientWidth, -0.5 * place.y * canvas.clientHeight];
 }
 
-// The strut of a drive that was taken by its name, at its middle.
-function findNamed({drive, item}) {
+// The strut of a drive that was taken by its name, at its middle; the tool and the part where a name lies over their handles.
+function findNamed(event) {
+  const {drive, item} = event.target.dataset, beneath = findGrip(event, 1);
+  if (beneath && beneath.kind !== "drive") return beneath;
   const {mesh} = bodies.find(body => body.item === machine.items[item]);
   return {kind: "drive", drive: Number(drive), point: mesh.position.clone(), mesh};
 }
@@ -95,7 +97,7 @@ function takeHold(event, find) {
 }
 
 canvas.addEventListener("pointerdown", event => takeHold(event, () => findGrip(event)));
-overlay.addEventListener("pointerdown", event => takeHold(event, () => findNamed(event.target.dataset)));
+overlay.addEventListener("pointerdown", event => takeHold(event, () => findNamed(event)));
 
 canvas.addEventListener("pointermove", event => {
   const before = pointers.get(event.pointerId);

@@ -27,11 +27,12 @@ FORMS = [  # |g|² and what places are made of; then products of e, which the tu
     *["s^2", "u^2", "v^2", "w^2", "s*u", "s*v", "s*w", "v*w", "u*w", "u*v"],
 ]
 STUDY = "s*d+u*x+v*y+w*z;"
-LENGTH = "0.31*s-0.57*u+0.83*v+0.42*w+0.29*d-0.61*x+0.74*y-0.38*z-1;"
+PATCH = np.exp(1j * np.arange(8.0) ** 2)  # that combination of a point is 1: complex, for a real one is zero somewhere
 INFINITE = 1e-10  # |e|² of a point of length one
 SAME = 1e-7  # rad
 CLOSED = 1e-8  # of an equation
 SEED = 3  # of the black box
+PHASES = 5
 CORRECTIONS = dict.fromkeys((21, 23, 25, 27), "1e-6")  # precision along a path; all ends are refined
 END = {4: "1e-3", 12: "0.1"}  # from where on, and by what steps, an end game goes on: these ends are regular
 
@@ -55,17 +56,22 @@ def draw_generic():
 
 def write_system(numbers):
     """Write the equations of closures (6, 17) for PHCpack, each with one of the first six forms."""
-    lines = [STUDY, LENGTH]
+    lines = [STUDY, "".join(f"{_write_factor(a)}*{name}" for a, name in zip(PATCH, NAMES, strict=True)) + "-1;"]
     for form, row in zip(FORMS, np.linalg.solve(numbers[:, :6], numbers[:, 6:]).astype(complex), strict=False):
-        summands = (f"+({a.real:+.17g}{a.imag:+.17g}*i)*{other}" for a, other in zip(row, FORMS[6:], strict=True))
-        lines.append(form + "".join(summands) + ";")
+        lines.append(
+            form + "".join(f"{_write_factor(a)}*{other}" for a, other in zip(row, FORMS[6:], strict=True)) + ";"
+        )
     return "8\n" + "\n".join(lines) + "\n"
 
 
+def _write_factor(a):
+    return f"+({a.real:+.17g}{a.imag:+.17g}*i)"
+
+
 def write_solutions(points):
-    """Write points (k, 8) that solve a system, to stand behind it."""
+    """Write points (k, 8) that solve a system, scaled as its equations have them, to stand behind it."""
     lines = ["", "THE SOLUTIONS :", f"{len(points)} 8", "=" * 75]
-    for number, point in enumerate(points, 1):
+    for number, point in enumerate(points / (points @ PATCH)[:, None], 1):
         lines += [f"solution {number} :", "t : 0.0 0.0", "m : 1", "the solution for t :"]
         lines += [f" {name} : {a.real:.17e} {a.imag:.17e}" for name, a in zip(NAMES, point, strict=True)]
         lines.append("== err : 1.0E-15 = rco : 1.0E-01 = res : 1.0E-15 ==")
@@ -108,7 +114,18 @@ def read_start():
     return np.loadtxt(START).view(complex)
 
 
-def track_by_phcpack(folder, closures, phase=1.0):
+def track_by_phcpack(folder, closures):
+    """The solutions (k, 8) of closures (6, 17), and how many phases it took until no two of the paths had met."""
+    best = np.empty((0, 8))
+    for phase in range(1, PHASES + 1):
+        points = track_paths(folder, closures, phase)
+        best = points if len(points) > len(best) else best
+        if len(best) == len(read_start()):
+            break
+    return best, phase
+
+
+def track_paths(folder, closures, phase):
     """The solutions (k, 8) of closures (6, 17), where PHCpack's forty paths end that a phase, rad, leads."""
     start, target, out = folder / "start.txt", folder / "target.txt", folder / "out.txt"
     if not start.exists():

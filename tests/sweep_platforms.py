@@ -24,7 +24,6 @@ from parakin.kinematics.assemblies.quadric_family import make_family
 from parakin.kinematics.assemblies.study import compute_study_points, make_closure_quadrics
 
 ALL = 40
-RESTARTS = 5
 SAME = 1e-6  # rad, in Study's parameters in m
 BLOCK = 100
 FREE = ("tx", "ty", "tz", "rz", "ry", "rx")
@@ -35,17 +34,6 @@ def draw_posed(seed):
     rng = np.random.default_rng([seed, 40])
     pose = np.append(rng.uniform(-0.5, 0.5, 2), [rng.uniform(0.8, 2.0), *rng.uniform(-0.6, 0.6, 3)])
     return *draw_platform(rng), pose
-
-
-def ask_phcpack(folder, feet, corners, lengths):
-    """PHCpack's solutions (k, 8); how many starts that took."""
-    best = np.empty((0, 8))
-    for start in range(1, RESTARTS + 1):
-        points = track_by_phcpack(folder, describe_closures(feet, corners, lengths), phase=start)
-        best = points if len(points) > len(best) else best
-        if len(best) == ALL:
-            break
-    return best, start
 
 
 def compare(found, ends, theirs):
@@ -74,8 +62,8 @@ def sweep(folder, seed, by_phcpack):
     words = f"{'good' if good else 'BAD'} {len(found)} real {found.complex_count} complex, {ends}, "
     words += f"open by {open_by:.1e} mm, {'proved' if proved else 'not proved'}, home off {near:.1e}"
     if by_phcpack:
-        theirs, starts = ask_phcpack(folder, feet, corners, lengths / 1000.0)
-        ends = track_platforms(make_systems([seed])[0], 1.0, STRICT)
+        theirs, starts = track_by_phcpack(folder, describe_closures(feet, corners, lengths / 1000.0))
+        ends = track_once_more(make_systems([seed])[0])
         words += f"; PHCpack {compare(found, ends.points[0], theirs)} after {starts}"
     return words
 
@@ -110,6 +98,11 @@ def make_systems(seeds):
     return make_family(FREE).make_member(np.array(systems, complex)), poses
 
 
+def track_once_more(systems):
+    """The ends of all paths another way, in shorter steps, as where a path was lost or met another."""
+    return track_platforms(systems, np.exp(1j), STRICT)
+
+
 def sweep_systems(seeds):
     """What is to be told of each platform: all ends apart, on its quadrics, and the pose drawn among them."""
     systems, poses = make_systems(seeds)
@@ -119,7 +112,7 @@ def sweep_systems(seeds):
         points, whole = ends.points[row], (ends.reached[row] == 1.0).all() and not find_meetings(ends)[row].any()
         words = "tracked once"
         if not whole:
-            again = track_platforms(system[None], np.exp(1j), STRICT)
+            again = track_once_more(system[None])
             points, whole = again.points[0], (again.reached == 1.0).all() and not find_meetings(again).any()
             words = "tracked twice"
         cosines = np.abs(points.conj() @ points.T) - np.eye(ALL)

@@ -403,7 +403,7 @@ def test_phcpack_finds_the_same_poses(seed, tmp_path):
         feet, corners = draw_platform(np.random.default_rng(seed))
         turn, place = orientation(0.3, -0.2, 0.5).reshape(3, 3), [0.2, -0.1, 1.3]
         lengths = 1000.0 * np.linalg.norm(place + corners @ turn.T - feet, axis=1)
-    points = track_by_phcpack(tmp_path, describe_closures(feet, corners, lengths / 1000.0))
+    points, _ = track_by_phcpack(tmp_path, describe_closures(feet, corners, lengths / 1000.0))
     assert len(points) == 40
     real = points[measure_angles(points, points.conj()).diagonal() < 1e-9]
     found = platform(tmp_path, feet, corners).assemblies(lengths)

@@ -284,6 +284,21 @@ def test_legs_in_another_mode_are_refused(name, modules):
         assert apart.all() or mode == m.mode
 
 
+def test_the_side_is_that_of_the_given_poses_own_joints(modules):
+    """Next to singular lines: across one, these joints alone can turn the sign of the determinant."""
+    m, rng = load_shipped("eclipse"), np.random.default_rng(1)
+    spread = np.where(np.array(m.axis_units) == "mm", 1.0, 0.0025)
+    poses = m.home + rng.uniform(-1.0, 1.0, (10_000, len(m.axes))) * 120.0 * spread
+    near = poses + rng.uniform(-1.0, 1.0, poses.shape) * spread
+    joints, sides, own = m.inverse(poses), m.sides(poses), m.sides(near)
+    kept = np.isfinite(joints).all(1) & np.isfinite(own)
+    rows, codes = modules(m).forward(outward(m, joints[kept]), world(m, near[kept]))
+    done = codes == 0
+    assert (m.sides(pose(m, rows[done])) * own[kept][done] > 0.0).all()
+    assert (sides[kept] * own[kept] < 0.0).sum() > 10
+    assert done.mean() > 0.99
+
+
 @representatives
 def test_a_forward_is_never_silently_wrong(m, modules):
     mad = 10_000

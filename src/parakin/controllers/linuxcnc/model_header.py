@@ -14,8 +14,7 @@ from ...kernels.newton import SLOW, WORTH
 from ...kernels.tape import Tape, compile_tape
 from ...kernels.tape_text import InputVector
 from ...kinematics.closure_roots import MOST_STEPS, list_step_caps
-from ...kinematics.forward import OF_AGREEMENT, STEADY
-from ...kinematics.start_modes import SETTLED
+from ...kinematics.forward import OF_AGREEMENT
 from ...kinematics.turns import TURN
 from ...kinematics.wrist.pole_crossing import GAIN, compile_way_comparison
 from ...kinematics.wrist.pole_thresholds import EXACT, NEAR_MODE, SAME_AXIS, STANDING, SWING
@@ -196,8 +195,6 @@ def _write_sides(machine: Machine) -> Iterator[str]:
     yield f"#define HOME_SIDE {format_c(side)} /* of the singularities; on the other one is another assembly */"
     yield f"#define NO_SIDE {format_c(NO_SIDE * abs(determinant))} /* the least determinant that tells a side */"
     yield f"#define TELLS {format_c(TELLS * least)} /* mm: legs farther off do not stand at a given pose */"
-    yield f"#define SETTLED {format_c(SETTLED * most)} /* mm: an answer as near to a given pose has its side, */"
-    yield f"#define STEADY {format_c(STEADY)} /* where the determinant changes by no more than this fraction */"
     yield f"#define MIDDLE_TURN {-1 if middle is None else middle} /* whose ±90° is singular to a pose's angles */"
 
 

@@ -150,22 +150,18 @@ static inline double greatest(int n, const double *f)
 }
 
 /* The given pose's own side, by its sign. Its determinant with the given joints is at hand, which is its own for struts
-   of any length; of other legs it tells the side where it changes little on the way to the answer. */
-static double side_of(const double *near, double det, int steady)
+   of any length; that of other legs' own joints can have the other sign, however near the pose is to the answer. */
+static double side_of(const double *near, double det)
 {
 #if LEG_MODES
-    if (!steady) {
-        double own[JOINTS], y[MOTIONS], f[CLOSURES];
-        Factors by;
-        inverse(near, own);
-        if (finite_all(own, JOINTS)) {
-            begin(near, own, y);
-            closures_and_slopes(y, own, f, by.a[0]);
-            det = factor_slopes(&by);
-        }
+    double own[JOINTS], y[MOTIONS], f[CLOSURES];
+    Factors by;
+    inverse(near, own);
+    if (finite_all(own, JOINTS)) {
+        begin(near, own, y);
+        closures_and_slopes(y, own, f, by.a[0]);
+        det = factor_slopes(&by);
     }
-#else
-    (void)steady;
 #endif
     return fabs(det) > NO_SIDE ? det * angle_sign(near) : HOME_SIDE;
 }
@@ -231,8 +227,7 @@ __attribute__((noinline)) static int pose_near(const double *near, const double 
         end(y, q, x);
     closed = closed && finite_all(x, AXES);
     if (*tells)
-        *side = side_of(near, first, closed && fabs(det - first) <= STEADY * fabs(first)
-                                     && square_distance(x, near) <= SETTLED * SETTLED);
+        *side = side_of(near, first);
     return closed && det * angle_sign(x) * *side > 0.0;
 }
 #define pose_beside(near, q, x) 0

@@ -181,6 +181,22 @@ def test_a_wrist_on_its_pole_goes_on_from_where_it_is_commanded_to_be(name, modu
     assert codes[0] == 0 and np.abs(found - outward(m, now)).max() < 1e-9
 
 
+@pytest.mark.parametrize("name", ["george_v", "orthoglide5_head", "tricept"])
+def test_upright_a_guess_may_have_any_c(name, modules):
+    """A program turns C while the tool stands upright: what is shown follows, and does not stay behind for good."""
+    m = load_shipped(name)
+    pose = np.array(m.home)[None]
+    pose[0, 3:] = 0.0
+    turned = np.repeat(pose, 5, 0)
+    turned[:, 4] = np.radians([0.0, 2.0, -30.0, 90.0, 179.0])
+    kinematics = modules(m)
+    kinematics.coordinate(True)
+    found, codes = kinematics.forward(outward(m, np.repeat(m.inverse(pose), 5, 0)), world(m, turned))
+    kinematics.coordinate(False)
+    assert not codes.any()
+    assert np.abs(found - world(m, turned))[:, :5].max() < 1e-6  # X Y Z A B; C is the commanded one
+
+
 @representatives
 def test_a_path_is_followed_cycle_by_cycle(m, modules):
     poses = winding_path(m)

@@ -37,12 +37,17 @@ class Kinematics:
         self.tool_offset = offset.contents if offset else None  # mm; LinuxCNC's own modules have none of this name
         pins = (ctypes.POINTER(ctypes.c_double) * 16).in_dll(stub, "stub_joint")
         self.commanded = [pin.contents if pin else None for pin in pins]
+        self.coordinated = ctypes.POINTER(ctypes.c_char).in_dll(stub, "stub_coordinated")
         self.exported = stub.stub_count()  # its functions are the last
 
     def command(self, joints):
         """Tell where the joints are commanded to be, mm and degrees."""
         for pin, value in zip(self.commanded, joints, strict=False):
             pin.value = value
+
+    def coordinate(self, coordinated):
+        """Tell whether LinuxCNC moves the machine's pose."""
+        self.coordinated[0] = int(coordinated)
 
     def watch_steps(self, watched):
         """Let the inverse refuse steps that no drive can follow, as within a servo cycle, or not."""

@@ -8,6 +8,7 @@
 
 double *stub_tool_offset; /* the last module's length of the tool, which a test may set */
 double *stub_joint[16];   /* where its joints are commanded to be */
+char *stub_coordinated;    /* whether LinuxCNC moves its pose */
 char stub_name[64];
 int stub_ready;
 
@@ -81,8 +82,11 @@ int hal_param_float_newf(int dir, double *data, int component, const char *forma
 
 int hal_pin_bit_newf(int dir, char **data, int component, const char *format, ...)
 {
-    (void)dir, (void)component, (void)format;
-    return *data = pin(sizeof **data), 0;
+    (void)dir, (void)component;
+    *data = pin(sizeof **data);
+    if (!strcmp(format, "kins.coord-mode"))
+        stub_coordinated = *data;
+    return 0;
 }
 
 int hal_pin_u32_newf(int dir, uint32_t **data, int component, const char *format, ...)

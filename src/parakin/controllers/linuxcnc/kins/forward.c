@@ -15,6 +15,23 @@ static inline double square_distance(const double *x, const double *near)
     return sum;
 }
 
+/* The same where it counts: of a tool's axis nothing but its direction, for upright it has any C. It is no greater. */
+static double square_distance_of_tools(const double *x, const double *near)
+{
+#if TOOL_AXIS
+    double k[3], last[3], sum = 0.0;
+    find_tool_axis(x, k);
+    find_tool_axis(near, last);
+    for (int i = 0; i < 3; i++) {
+        const double way = x[i] - near[i], turn = (k[i] - last[i]) * SIZE;
+        sum += way * way + turn * turn;
+    }
+    return sum;
+#else
+    return square_distance(x, near);
+#endif
+}
+
 #if SPHERES
 static int closes(const double *f)
 {
@@ -57,11 +74,10 @@ static inline int is_beside(double far, double square)
     return rest > 0.0 && 1024.0 * LONGEST * LONGEST * far < rest * rest;
 }
 
-/* Whether a given pose is surely on a common point's side, by the square of the height over the centres; and whether it
-   tells a side at all. */
-static inline int stands_beside(const double *near, const double *x, double square, int *tells)
+/* Whether a given pose at the square of a distance is surely on a common point's side, by the square of the height over
+   the centres; and whether it tells a side at all. */
+static inline int stands_beside(double far, double square, int *tells)
 {
-    const double far = square_distance(x, near);
     *tells = far <= TELLS * TELLS;
     return *tells && is_beside(far, square);
 }
@@ -87,7 +103,7 @@ static inline int pose_beside(const double *near, const double *q, double *x)
     double f[CLOSURES], square[1];
     int tells;
     common_point_at_home(q, x, f, square);
-    return surely_closes(q, f, square[0]) && stands_beside(near, x, square[0], &tells);
+    return surely_closes(q, f, square[0]) && stands_beside(square_distance(x, near), square[0], &tells);
 }
 
 /* Of both common points the answer is the one that a given pose is beside; home's is the first to be asked. Where it is
@@ -98,11 +114,11 @@ __attribute__((noinline, cold)) static int pose_near(const double *near, const d
     double f[CLOSURES], square[1];
     const double over[1] = {-HOME_SIDE};
     common_point_at_home(q, x, f, square);
-    if (stands_beside(near, x, square[0], tells))
+    if (stands_beside(square_distance_of_tools(x, near), square[0], tells))
         return closes(f);
     if (!*tells) {
         common_point_on(q, over, x, f);
-        if (stands_beside(near, x, square[0], tells))
+        if (stands_beside(square_distance_of_tools(x, near), square[0], tells))
             return closes(f);
     }
     *side = *tells ? side_of(near, x, q) : HOME_SIDE;

@@ -15,7 +15,6 @@ from pathlib import Path
 
 DISPLAY = ":77"
 SIZE = "1920x850x24"
-ASIDE = ("1919", "849")  # the pointer, so that no button says what it is for
 TITLES = {"axis": "AXIS|axis", "gmoccapy": "gmoccapy"}
 SETTLED = 2.0  # s for the windows to be drawn
 
@@ -76,7 +75,6 @@ def main():
     started = [screen]
     try:
         time.sleep(1.0)
-        subprocess.run(["xdotool", "mousemove", *ASIDE], check=True)
         with Path("linuxcnc.log").open("w") as log:
             cnc = subprocess.Popen(["linuxcnc", task["ini"]], stdin=subprocess.DEVNULL, stdout=log, stderr=log)
         started.append(cnc)

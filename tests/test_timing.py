@@ -327,6 +327,27 @@ def test_a_rounded_path_keeps_to_its_tolerances_whatever_its_pieces(name):
         assert np.abs(jump).max(initial=0.0) < 1e-5 + 2.0 * least * np.abs(curve.bend).max()
 
 
+@pytest.mark.parametrize("creep", [1e-5, 1e-4, 1e-3])
+def test_a_creeping_step_beside_a_long_one_needs_no_shorter_rows(creep):
+    """Straight, round a corner and back, upright and out of a tilt: the corners' roundings are as long as the step."""
+    machine = limited(load_shipped("hexapod"), mm=(500.0, 10_000.0, INF))
+    for angle in np.radians([1.0, 90.0, 180.0]):
+        for tilt in (0.0, 0.04):
+            way = np.array([0.8 * np.sin(angle), 0.6 * np.sin(angle), np.cos(angle)])
+            tip = MIDDLE["hexapod"] + np.vstack([[0.0, 0.0, -0.4], np.outer([0.0, creep, 2.0 * creep, 0.4], way)])
+            trajectory = plan_trajectory(posted(machine, tip, axis_of(np.array([tilt, 0, 0, 0, 0]), 0.7), 3000.0))
+            step = trajectory.joint_path.step
+            assert len(step) < 40
+            assert step[step > 0.0].min() > 0.01 * creep
+            hold(trajectory)
+
+
+def test_steps_beside_a_coarse_one_are_cut_where_they_are_longer_than_its_parts():
+    steps, fractions = joint_path._divide_steps(np.array([1, 4, 5]), np.array([1e-9, 1.0, 0.3, 0.0, 4.0, 1.0, 2.0]))
+    assert steps.tolist() == [1, 1, 1, 2, 4, 4, 4, 5, 5, 5, 6]
+    assert fractions.tolist() == [0.25, 0.5, 0.75, 0.5, 0.25, 0.5, 0.75, 0.25, 0.5, 0.75, 0.5]
+
+
 def test_a_motion_of_one_step_between_two_stands_takes_its_time(monkeypatch):
     machine = limited(load_shipped("linear_delta"), mm=(INF, 2000.0, INF))
     tip = np.array([[0.0, 0.0, 300.0 + k % 2] for k in range(6)])

@@ -188,10 +188,11 @@ def _build_single_row(posted: Posted, curve: Curve) -> JointPath:
 
 
 def _divide_steps(coarse: Indices, step: Array) -> tuple[Indices, Array]:
-    """List the steps to cut, ascending, and at which fractions: coarse ones are quartered, their neighbours halved."""
-    beside = np.setdiff1d(np.concatenate([coarse - 1, coarse + 1]), coarse)
-    beside = beside[(beside >= 0) & (beside < len(step))]
-    beside = beside[step[beside] > 0.0]
+    """List the steps to cut, ascending, and at which fractions: coarse ones are quartered, longer neighbours halved."""
+    quarter, beside = 0.25 * np.tile(step[coarse], 2), np.concatenate([coarse - 1, coarse + 1])
+    inside = (beside >= 0) & (beside < len(step))
+    quarter, beside = quarter[inside], beside[inside]
+    beside = np.setdiff1d(beside[step[beside] > quarter], coarse)
     steps = np.concatenate([np.repeat(coarse, 3), beside])
     fractions = np.concatenate([np.tile([0.25, 0.5, 0.75], len(coarse)), np.full(len(beside), 0.5)])
     order = np.lexsort((fractions, steps))

@@ -15,22 +15,23 @@ import numpy as np
 
 from ....kernels.compiling import njit
 
-SLIVER = 2e-3  # knots nearer to each other than this fraction of a piece are one
+SLIVER = 2e-3  # fraction of a piece: roundings that end nearer to each other, or to the piece's far end, end together
 
 
 @njit(nogil=True, cache=True)
 def _find_knots(curve, piece, knots):
     """Write the knots of a piece, where its roundings end, to ``knots`` (4,); returns how many there are."""
-    whole = curve.length[piece]
-    a, b = min(curve.fall[piece], whole), max(whole - curve.rise[piece + 1], 0.0)
-    a, b = min(a, b), max(a, b)
+    whole, fall, rise = curve.length[piece], curve.fall[piece], curve.rise[piece + 1]
     near = SLIVER * whole
+    a = fall if fall < whole - near else 0.0
+    b = whole - rise if rise < whole - near else whole
+    a, b = min(a, b), max(a, b)
     knots[0] = 0.0
     count = 1
-    if near < a < whole - near:
+    if a > 0.0:
         knots[count] = a
         count += 1
-    if max(near, knots[count - 1] + near) < b < whole - near:
+    if a + near < b < whole:
         knots[count] = b
         count += 1
     knots[count] = whole

@@ -342,6 +342,18 @@ def test_a_creeping_step_beside_a_long_one_needs_no_shorter_rows(creep):
             hold(trajectory)
 
 
+@pytest.mark.parametrize("name", ["hexapod", "orthoglide"])
+@pytest.mark.parametrize(
+    ("creep", "angle", "way", "feed"),
+    [(2e-5, 5.0, 0.4, 10_000.0), (1e-4, 60.0, 0.4, 1000.0), (2e-4, 90.0, 3.0, 1000.0), (1e-3, 150.0, 0.4, 1000.0)],
+)
+def test_rounding_a_creeping_step_takes_no_longer_than_stopping_at_it(name, creep, angle, way, feed):
+    turned = np.array([0.8 * np.sin(np.radians(angle)), 0.6 * np.sin(np.radians(angle)), np.cos(np.radians(angle))])
+    tip = MIDDLE[name] + np.vstack([[0.0, 0.0, -way], np.outer([0.0, creep, creep + way], turned)])
+    result = posted(load_shipped(name), tip, feed=feed)
+    assert plan_trajectory(result).seconds < 1.002 * plan_trajectory(result, stops=(1, 2)).seconds
+
+
 def test_steps_beside_a_coarse_one_are_cut_where_they_are_longer_than_its_parts():
     steps, fractions = joint_path._divide_steps(np.array([1, 4, 5]), np.array([1e-9, 1.0, 0.3, 0.0, 4.0, 1.0, 2.0]))
     assert steps.tolist() == [1, 1, 1, 2, 4, 4, 4, 5, 5, 5, 6]

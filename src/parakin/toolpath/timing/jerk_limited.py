@@ -29,6 +29,7 @@ from .speed_profile import SpeedProfile
 from .time_optimal import RAMP, compute_ceilings, find_reachable
 
 _FIRST, _LEAST = 1.0 / 16.0, 1e-6  # of the way in which s̈ is built up, and mm: the first step behind a stop
+_OF_WAY = 0.5  # of the way from rest to a row's speed: where it is low, no step is cut shorter
 _START = 1.0 / 64.0  # of a stretch: no first step is longer
 _ACROSS = 0.5  # fraction of a jerk limit that q'''·ṡ³ may take at first
 _FASTER = 50.0  # × the path's mean speed at the joints' speeds: nothing is faster, also where all joints turn back
@@ -112,7 +113,7 @@ def _find_ramp(limits: DriveLimits) -> float:
 
 
 def _grade_steps(joint_path: JointPath, limits: DriveLimits, ramp: float, x: Array) -> tuple[JointPath, Array]:
-    """Grade the steps, short ones at stops; ṡ² goes straight between the rows."""
+    """Grade the steps, short ones at stops and at corners passed slowly; ṡ² goes straight between the rows."""
     edges, size = joint_path.find_stretches(), np.full(len(x), np.inf)
     starts, stops = edges.T
     length = np.append(0.0, np.cumsum(joint_path.step))
@@ -126,7 +127,8 @@ def _grade_steps(joint_path: JointPath, limits: DriveLimits, ramp: float, x: Arr
         way = np.where((way > 0.0) & np.isfinite(way), _FIRST * way, np.inf)
         size[row] = np.minimum(np.maximum(way, _LEAST), greatest)
     bound_sizes(joint_path.step, size)
-    size = np.maximum(size, np.sqrt(x) * (ramp / _PER_RAMP))
+    way = np.minimum(np.sqrt(x) * (ramp / _PER_RAMP), _OF_WAY * _bound_ways_from_rest(joint_path, limits, x))
+    size = np.maximum(size, way)
     count = cut_steps(joint_path.step, size, np.empty(0, np.int64), np.empty(0))
     if not count:
         return joint_path, x
@@ -134,6 +136,23 @@ def _grade_steps(joint_path: JointPath, limits: DriveLimits, ramp: float, x: Arr
     cut_steps(joint_path.step, size, steps, fractions)
     x = np.insert(x, steps + 1, x[steps] + fractions * (x[steps + 1] - x[steps]))
     return divide_joint_path(joint_path, steps, fractions), x
+
+
+def _bound_ways_from_rest(joint_path: JointPath, limits: DriveLimits, x: Array) -> Array:
+    """Bound the ways (rows,) that jerks need from rest to the speeds of ``x``, by those of the rows about.
+
+    Jerk j alone makes (9/2 j d²)^(1/3) of speed on the way d.
+    """
+    step = joint_path.step
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+        slope = np.abs(np.diff(joint_path.joints, axis=0)) / step[:, None]
+        jerk = np.min(limits.jerk / slope, axis=1)
+        way = np.sqrt(x**1.5 / (4.5 * np.fmin(np.append(jerk, np.inf), np.append(np.inf, jerk))))
+    way[np.isnan(way)] = np.inf
+    at = np.append(0.0, np.cumsum(step))
+    way = np.minimum.accumulate(way - at) + at
+    bounded: Array = np.minimum.accumulate((way + at)[::-1])[::-1] - at
+    return bounded
 
 
 def _pose_problem(joint_path: JointPath, limits: DriveLimits) -> StepLimits:

@@ -195,6 +195,17 @@ def test_a_weight_that_no_drive_holds_is_said(tmp_path, capsys):
     assert "z can't hold the weight" in said.err
 
 
+@pytest.mark.parametrize("way", [2, 6, 30])
+def test_a_power_that_is_not_reached_costs_no_time_at_short_corners(way, tmp_path):
+    """A tangent at the corner's slow row bounded the long step beside it: to hours, and to infinite time."""
+    corners = ((0, 0, 0), (way, 0, 0), (way, way, 0), (way, way, way))
+    part = "UNITS/MM\n" + "".join(f"RAPID\nGOTO/{x},{y},{z}\n" for x, y, z in corners) + "FINI\n"
+    kept, free = (
+        prepare(tmp_path, load(tmp_path, ("  power: 2 kW\n", line)), part) for line in ("  power: 9 kW\n", "")
+    )
+    assert kept.seconds == pytest.approx(free.seconds, rel=1e-3)
+
+
 @pytest.mark.parametrize("acting", [(0.0, 0.0, 0.0), (-150.0, 80.0, 0.0)])
 def test_the_whole_takes_longer_for_what_the_rms_may_be(acting, tmp_path):
     free = prepare(tmp_path, load(tmp_path, ("rated: 2 kN", "rated: 9 kN")), PART, acting)

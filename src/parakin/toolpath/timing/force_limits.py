@@ -16,6 +16,9 @@ from .kernels.splines import ForceRows, PathState
 
 _BLOCK = 1 << 15  # rows at a time
 _LEAST = 1e-12  # mm²/s², of ṡ² at which a power is replaced by its tangent
+_BESIDE = (
+    0.5  # of ṡ² at the next rows: a tangent at less would bound it there, too, for bounds go straight between rows
+)
 
 
 class _Demands(NamedTuple):
@@ -115,7 +118,7 @@ class ForceLimits:
         drives, own = self._powered, demands.forces
         slopes = np.abs(demands.slopes[:, drives])
         beside = np.maximum(np.append(squares[1:], 0.0), np.append(0.0, squares[:-1]))
-        beside = np.where(squares > 0.0, squares, beside)
+        beside = np.where(squares > 0.0, np.maximum(squares, _BESIDE * beside), beside)
         weight, power = own.weight[:, drives], self._power[drives]
         with np.errstate(divide="ignore"):
             holding = (power / (slopes * np.abs(weight))) ** 2  # ṡ² at which the weight takes all of the power

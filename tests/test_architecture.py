@@ -376,7 +376,6 @@ FRACTIONS = {
     "kinematics.travel._HOP",
     "toolpath.posting.working_mode.HELD",
     "toolpath.timing.pole_pace.LEAST",
-    "toolpath.timing.pole_pace._TURNED",
     "toolpath.linearise.crossed_poles._TOGETHER",
     "toolpath.linearise.pole_holds._OFF_POLE",
     "toolpath.linearise.pole_holds._ARC",

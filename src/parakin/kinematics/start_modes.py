@@ -10,8 +10,9 @@ import numpy as np
 from ..arrays import Array, Flags, Indices
 from ..kernels.batch import find_first_negative
 from ..model.traces import Model
+from .assembly_side import find_sides
 from .closure_roots import compare_with_mode, find_in_mode
-from .solution import ANSWERED, Answers, put_rows, take_rows
+from .solution import ANSWERED, ON_ANOTHER_SIDE, Answers, put_rows, take_rows
 from .turns import wrap_angle
 from .wrist.pose_angles import point_direction
 
@@ -47,9 +48,21 @@ def answer_in_modes_of_starts(
         with np.errstate(invalid="ignore"):
             accepted = (answers.why == ANSWERED) & (_measure_way(model, answers, starts[lost]) <= beside)
         accepted &= ~find_in_mode(model, answers.poses, joints[lost], model.mode)  # refused there: another side
+        next_to = np.flatnonzero(accepted)
+        across = next_to[_find_across(model, answers.poses[next_to], starts[lost[next_to]], joints[lost[next_to]])]
+        accepted[across], solution.why[lost[across]] = False, ON_ANOTHER_SIDE
         put_rows(solution, lost[accepted], take_rows(answers, accepted))
         in_other_mode[lost[accepted]] = True
     return in_other_mode
+
+
+def _find_across(model: Model, poses: Array, starts: Array, joints: Array) -> Flags:
+    """Find answers (N,) on another side than their starts, each with its own joints in the answer's mode."""
+    across = np.zeros(len(poses), np.bool_)
+    for mode, rows in _group_by_mode(model, poses, joints).items():
+        start, answer = (find_sides(model, each[rows], mode, joints[rows]) for each in (starts, poses))
+        across[rows] = start * answer < 0.0
+    return across
 
 
 def _is_settled(model: Model, solution: Answers, starts: Array) -> Flags:

@@ -74,7 +74,7 @@ def measure(kinematics: Kinematics, poses: np.ndarray, joints: np.ndarray) -> tu
     assert not codes.any()
     kinematics.forward(found[:2], poses[:2])  # the first start of some is not the one that is given
     again, codes = kinematics.forward_path(found, poses[0])
-    assert not codes.any() and np.abs(again - poses).max() < 1e-6
+    assert not codes.any() and np.abs(again - poses).max() < 1e-5  # next to upright C is told to 1e-6°
     return (
         nanoseconds(lambda: kinematics.inverse_path(poses, found[0])),
         nanoseconds(lambda: kinematics.forward_path(found, poses[0])),

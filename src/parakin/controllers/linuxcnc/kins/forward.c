@@ -4,6 +4,7 @@
    guess says nothing, for its joints are far from the given ones (zeros, at the start), it lies on home's side; and in
    coordinated motion such a guess is refused, for it would show another pose with the same joints. */
 
+#if SPHERES
 /* The square of the distance of two poses, mm², an angle counted on the arm of a leg. */
 static inline double square_distance(const double *x, const double *near)
 {
@@ -32,7 +33,6 @@ static double square_distance_of_tools(const double *x, const double *near)
 #endif
 }
 
-#if SPHERES
 static int closes(const double *f)
 {
     for (int i = 0; i < CLOSURES; i++)

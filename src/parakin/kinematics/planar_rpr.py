@@ -13,6 +13,9 @@ from ..errors import NoMethodError
 
 CONTINUUM = "the assemblies are a continuum here: the legs leave the platform free to move"
 _SAMPLES = 16  # the polynomial has harmonics up to the fourth (which cancels), so nine would do
+_BESIDE, _NARROWER, _CLOSEST = 1e-2, 0.1, 1e-12  # rad: turns that may be one root, at each look closer, and at the last
+_NODES = np.cos(np.pi * (np.arange(9) + 0.5) / 9)  # of an interval, where the eliminant is looked at closer
+_BESIDE_LINE = 0.1  # of half an interval: how far roots may leave it
 _STEPS, _IDLE = 50, 4
 _SINGULAR, _STRIDE = 1e-6, 1e-3  # of the greatest singular value, and of the size: what tells a continuum
 _NEAR_PLANAR_STRIDE = 0.3  # of a stride: what closes farther from its end is another root
@@ -25,17 +28,7 @@ def solve_planar_rpr(centres: Array, radii: Array, corners: Array) -> Array:
     centres, corners : (3, 2), mm; radii : (3,), mm. Turns are in (-π, π].
     """
     size = float(np.abs(centres - centres[0]).max() + np.abs(corners).max() + np.abs(radii).max())
-    turns = 2.0 * np.pi * np.arange(_SAMPLES) / _SAMPLES
-    values = _compute_eliminant(turns, centres / size, radii / size, corners / size)
-    harmonics = np.fft.fft(values) / _SAMPLES
-    top = 4
-    scale = np.abs(harmonics).max()
-    while top > 0 and abs(harmonics[top]) < 1e-13 * scale:
-        top -= 1
-    coefficients = [harmonics[h] for h in range(top, -top - 1, -1)]  # of z^(h + top), z = exp(iφ)
-    z = np.roots(coefficients)
-    # A double root leaves the unit circle by the root of the rounding; the polishing below decides.
-    angles = np.angle(z[np.abs(np.abs(z) - 1.0) < 1e-2])
+    angles = _find_turns(centres / size, radii / size, corners / size)
     starts = [start for angle in angles for start in _find_starts(angle, centres, radii, corners)]
     polished = [_polish_pose(start, centres, radii, corners) for start in starts]
     poses: list[Array] = []
@@ -45,6 +38,46 @@ def solve_planar_rpr(centres: Array, radii: Array, corners: Array) -> Array:
     if any(_is_in_continuum(pose, centres, radii, corners) for pose in poses):
         raise NoMethodError(CONTINUUM)
     return np.array(sorted(poses, key=lambda p: (p[2], p[0], p[1]))).reshape(-1, 3)
+
+
+def _find_turns(centres: Array, radii: Array, corners: Array) -> Array:
+    """Find turns near all at which the eliminant is zero, some more than once, for lengths of the order of one."""
+    turns = 2.0 * np.pi * np.arange(_SAMPLES) / _SAMPLES
+    harmonics = np.fft.fft(_compute_eliminant(turns, centres, radii, corners)) / _SAMPLES
+    top = 4
+    scale = np.abs(harmonics).max()
+    while top > 0 and abs(harmonics[top]) < 1e-13 * scale:
+        top -= 1
+    z = np.roots([harmonics[h] for h in range(top, -top - 1, -1)])  # of z^(h + top), z = exp(iφ)
+    # A root of n leaves the unit circle by the n-th root of the rounding; the polishing decides.
+    turns = -1j * np.log(z[np.abs(np.abs(z) - 1.0) < _BESIDE])
+    turns = turns[np.argsort(turns.real)]
+    seam = int(np.argmax(np.diff(turns.real, append=turns[:1].real + 2.0 * np.pi))) + 1 if len(turns) else 0
+    turns = np.concatenate([turns[seam:], turns[:seam] + 2.0 * np.pi])
+    return _separate(turns, _BESIDE, centres, radii, corners).real
+
+
+def _separate(turns: Array, beside: float, centres: Array, radii: Array, corners: Array) -> Array:
+    """Find those of sorted turns anew that lie within ``beside`` of each other, and their middle, from the eliminant.
+
+    Its harmonics are rounded as its greatest values are, and about roots that meet it is far less than these: of equal
+    triangles that are turned alike it has four in one place. Sampled there it is rounded as its values there are.
+
+    turns : complex, as roots that meet may leave the real ones
+    """
+    found = [turns[:0]]
+    for group in np.split(turns, np.flatnonzero(np.diff(turns.real) > beside) + 1):
+        middle = group.real.mean() if len(group) else 0.0
+        half = 4.0 * np.abs(group - middle).max(initial=0.0)
+        closer = group[:0]
+        if len(group) > 1 and half > _CLOSEST:
+            values = _compute_eliminant(middle + half * _NODES, centres, radii, corners)
+            roots = np.polynomial.chebyshev.chebroots(np.polynomial.chebyshev.chebfit(_NODES, values, len(_NODES) - 1))
+            closer = roots[(np.abs(roots.real) < 1.0) & (np.abs(roots.imag) < _BESIDE_LINE)]
+            closer = middle + half * closer[np.argsort(closer.real)]
+            closer = _separate(closer, _NARROWER * beside, centres, radii, corners)
+        found.append(np.append(closer, middle) if len(closer) else group)
+    return np.concatenate(found)
 
 
 def _is_in_continuum(pose: Array, centres: Array, radii: Array, corners: Array) -> bool:

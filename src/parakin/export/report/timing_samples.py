@@ -16,6 +16,10 @@ if TYPE_CHECKING:
     from ...toolpath.timing import Trajectory
 
 _BLOCK = 1 << 15  # pieces of a trajectory at a time
+# Second derivatives at -1, 0 and 1 of the quintic with three values and three derivatives there.
+_JERKS = np.array(
+    [[-11.5, 8.0, 3.5, -6.0, -8.0, -1.0], [2.0, -4.0, 2.0, 0.5, 0.0, -0.5], [3.5, 8.0, -11.5, 1.0, 8.0, 6.0]]
+)
 _SHORTEST = 1e-7  # s: a piece as short adds rounding only
 
 
@@ -91,7 +95,7 @@ def _sample_blocks(trajectory: Trajectory) -> Iterator[tuple[Array, Indices, Ind
         feed = np.linalg.norm(_differentiate_parabolas(at.poses[:, tip], times), axis=1)
         curves = {"feed.any": 60.0 * feed, "feed.programmed": _find_programmed_feed(trajectory, record)}
         curves["feed.reached"] = np.where(trajectory.posted.path.rapid[record], np.nan, 60.0 * feed)
-        jerks = _differentiate_parabolas(at.accelerations[:, jerky], times)
+        jerks = _compute_jerks(at.speeds[:, jerky], at.accelerations[:, jerky], times)
         for j, name in enumerate(machine.joints):
             curves |= {name: at.joints[:, j], f"{name}.speed": at.speeds[:, j]}
             curves[f"{name}.acceleration"] = at.accelerations[:, j]
@@ -106,6 +110,19 @@ def _differentiate_parabolas(values: Array, times: Array) -> Array:
     first, middle, last = np.moveaxis(values.reshape(len(times), 3, -1), 1, 0)
     rates = np.stack([4.0 * middle - 3.0 * first - last, last - first, first - 4.0 * middle + 3.0 * last], axis=1)
     result: Array = (rates / (times[:, 2] - times[:, 0])[:, None, None]).reshape(values.shape)
+    return result
+
+
+def _compute_jerks(speeds: Array, accelerations: Array, times: Array) -> Array:
+    """Compute the jerks (3 k, joints) at start, middle and end of k pieces, with errors of the fourth order.
+
+    They are second derivatives of the quintics that have the speeds and accelerations there.
+    """
+    half = 0.5 * (times[:, 2] - times[:, 0])[:, None, None]
+    given = np.concatenate(
+        [speeds.reshape(len(times), 3, -1) / half**2, accelerations.reshape(len(times), 3, -1) / half], axis=1
+    )
+    result: Array = (_JERKS @ given).reshape(speeds.shape)
     return result
 
 

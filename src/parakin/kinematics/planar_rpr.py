@@ -65,7 +65,7 @@ def _separate(turns: Array, beside: float, centres: Array, radii: Array, corners
 
     turns : complex, as roots that meet may leave the real ones
     """
-    found = [turns[:0]]
+    separated = [turns[:0]]
     for group in np.split(turns, np.flatnonzero(np.diff(turns.real) > beside) + 1):
         middle = group.real.mean() if len(group) else 0.0
         half = 4.0 * np.abs(group - middle).max(initial=0.0)
@@ -76,8 +76,8 @@ def _separate(turns: Array, beside: float, centres: Array, radii: Array, corners
             closer = roots[(np.abs(roots.real) < 1.0) & (np.abs(roots.imag) < _BESIDE_LINE)]
             closer = middle + half * closer[np.argsort(closer.real)]
             closer = _separate(closer, _NARROWER * beside, centres, radii, corners)
-        found.append(np.append(closer, middle) if len(closer) else group)
-    return np.concatenate(found)
+        separated.append(np.append(closer, middle) if len(closer) else group)
+    return np.concatenate(separated)
 
 
 def _is_in_continuum(pose: Array, centres: Array, radii: Array, corners: Array) -> bool:

@@ -16,9 +16,8 @@ from .kernels.splines import ForceRows, PathState
 
 _BLOCK = 1 << 15  # rows at a time
 _LEAST = 1e-12  # mm²/s², of ṡ² at which a power is replaced by its tangent
-_BESIDE = (
-    0.5  # of ṡ² at the next rows: a tangent at less would bound it there, too, for bounds go straight between rows
-)
+# Of ṡ² at the next rows: a tangent at less would bound it there, too, for bounds go straight between rows.
+_BESIDE = 0.5
 
 
 class _Demands(NamedTuple):

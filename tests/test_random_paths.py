@@ -218,13 +218,15 @@ def test_a_tool_beside_the_middle_needs_no_turn(tmp_path, kind, off):
         ("orthoglide5_table", 910000),
         ("tricept", 30049),
         ("tricept", 30185),
+        ("sprint_z3", 920036),
     ],
 )
 def test_random_paths_that_were_hard(tmp_path, name, seed):
     """What went wrong once: blends in a cycle or two, a moving pole with two records on it, motions through its circle.
 
-    Also a step of the planner whose half jumps, a way from home beside a moving pole that leaves a joint's range, and
-    legs that roundings of a table's turn beside the pole took off by some nm.
+    Also a step of the planner whose half jumps, a way from home beside a moving pole that leaves a joint's range,
+    legs that roundings of a table's turn beside the pole took off by some nm, and C that turns far while joints hardly
+    move.
     """
     controller = build_controller(name, tmp_path)
     machine = controller.machine

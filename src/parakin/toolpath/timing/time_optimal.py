@@ -71,7 +71,7 @@ def find_quickest(
         switches, lost = Switches(np.empty(count), np.empty(count)), list[float]()
         args = (rows, bounds, ceilings, x, switches)
         run_in_threads(count, lambda start, stop: lost.append(find_switches(*args, start, stop)))  # noqa: B023
-        refuse_unbound(joint_path, np.maximum(x[:-1], x[1:]))
+        refuse_unbound(joint_path, limits, np.maximum(x[:-1], x[1:]))
         steps = np.concatenate([np.flatnonzero(where) for where in switches])
         # A step between two stands takes forever until it has a row; what it loses is infinite, too.
         if attempt == _ROUNDS - 1 or sum(lost) < WORTH * sum_spans(joint_path, x) or not len(steps):
@@ -82,10 +82,14 @@ def find_quickest(
     return joint_path, x, u
 
 
-def refuse_unbound(joint_path: JointPath, x: Array) -> None:
-    """Raise for a step (of ṡ² ``x``) on which joints move and nothing limits them."""
+def refuse_unbound(joint_path: JointPath, limits: DriveLimits, x: Array) -> None:
+    """Raise for a step (of ṡ² ``x``) on which joints move and nothing limits them.
+
+    Joints with limits that hardly move while C turns by itself, the tool upright, are as fast as they may be.
+    """
+    unlimited = np.isinf(limits.speed) & np.isinf(limits.acceleration)
     for step in np.flatnonzero((x >= 0.5 * UNBOUND) & (joint_path.step > 0.0)):
-        moving = np.abs(joint_path.joints[step + 1] - joint_path.joints[step]) > 1e-12
+        moving = unlimited & (np.abs(joint_path.joints[step + 1] - joint_path.joints[step]) > 1e-12)
         if moving.any():
             names = [name for name, moves in zip(joint_path.posted.machine.joints, moving, strict=True) if moves]
             text = f"no feed, and no speed or acceleration of {', '.join(names)}"
@@ -116,7 +120,7 @@ def build_accelerated_profile(
 def build_uniform_profile(joint_path: JointPath, limits: DriveLimits) -> tuple[SpeedProfile, Indices]:
     """Build the profile of the greatest constant speed over each step, and what binds it at each row."""
     ceiling = np.minimum(*compute_ceilings(joint_path, limits))
-    refuse_unbound(joint_path, ceiling)
+    refuse_unbound(joint_path, limits, ceiling)
     speed = np.sqrt(ceiling)
     return _write_steps(joint_path, limits, speed, np.zeros(len(speed)), joint_path.step / speed)
 

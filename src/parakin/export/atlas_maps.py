@@ -13,7 +13,7 @@ from ..performance.atlas import PerformanceMap
 from ..performance.singularities import PARALLEL
 from .colours import FAINT, INK
 from .figure_file import render_figure
-from .position_map import COLOURED, fill_map, fit_to_allowed
+from .position_map import COLOURED, fill_map, fit_to_allowed, separate_ends
 from .workspace.describe import describe_region
 
 if TYPE_CHECKING:
@@ -99,9 +99,8 @@ def _draw_panel(figure: Figure, axes: Any, map_: PerformanceMap, panel: _MapPane
     if len(x) < 2 or len(y) < 2 or not len(inside):
         return
     fit_to_allowed(axes, map_.grid, map_.allowed)
-    low, high = float(inside.min()), float(np.percentile(inside, COLOURED) if panel.endless else inside.max())
-    if not high > low:
-        low, high = low - 0.5 * abs(low) - 1e-6, high + 0.5 * abs(high) + 1e-6
+    highest = np.percentile(inside, COLOURED) if panel.endless else inside.max()
+    low, high = separate_ends(float(inside.min()), float(highest))
     crossed = low < 0.0 < high
     colours: dict[str, Any] = {"cmap": panel.colours}
     levels = np.linspace(low, high, _LEVELS + 1)

@@ -94,10 +94,15 @@ def render_position_map(
 
 
 def _choose_levels(low: float, high: float) -> Array:
-    """Choose the levels of a map's areas, also where all values are one."""
-    if not high > low:
-        low, high = low - 0.5 * abs(low) - 1e-6, high + 0.5 * abs(high) + 1e-6
-    return np.linspace(low, high, _LEVELS + 1)
+    """Choose the levels of a map's areas."""
+    return np.linspace(*separate_ends(low, high), _LEVELS + 1)
+
+
+def separate_ends(low: float, high: float) -> tuple[float, float]:
+    """Give a map's levels ends that differ, also where all values are one."""
+    if high > low:
+        return low, high
+    return low - 0.5 * abs(low) - 1e-6, high + 0.5 * abs(high) + 1e-6
 
 
 def fit_to_allowed(axes: Axes, grid: Sequence[Array], allowed: Flags) -> None:

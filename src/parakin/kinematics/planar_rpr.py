@@ -10,6 +10,7 @@ import numpy as np
 
 from ..arrays import Array
 from ..errors import NoMethodError
+from .turns import wrap_angle
 
 CONTINUUM = "the assemblies are a continuum here: the legs leave the platform free to move"
 _SAMPLES = 16  # the polynomial has harmonics up to the fourth (which cancels), so nine would do
@@ -52,8 +53,9 @@ def _find_turns(centres: Array, radii: Array, corners: Array) -> Array:
     # A root of n leaves the unit circle by the n-th root of the rounding; the polishing decides.
     turns = -1j * np.log(z[np.abs(np.abs(z) - 1.0) < _BESIDE])
     turns = turns[np.argsort(turns.real)]
-    seam = int(np.argmax(np.diff(turns.real, append=turns[:1].real + 2.0 * np.pi))) + 1 if len(turns) else 0
-    turns = np.concatenate([turns[seam:], turns[:seam] + 2.0 * np.pi])
+    if len(turns):  # none that lie together stand at both ends
+        seam = int(np.argmax(np.diff(turns.real, append=turns[0].real + 2.0 * np.pi))) + 1
+        turns = np.concatenate([turns[seam:], turns[:seam] + 2.0 * np.pi])
     return _separate(turns, _BESIDE, centres, radii, corners).real
 
 
@@ -65,10 +67,12 @@ def _separate(turns: Array, beside: float, centres: Array, radii: Array, corners
 
     turns : complex, as roots that meet may leave the real ones
     """
-    separated = [turns[:0]]
+    if len(turns) < 2:
+        return turns
+    separated = []
     for group in np.split(turns, np.flatnonzero(np.diff(turns.real) > beside) + 1):
-        middle = group.real.mean() if len(group) else 0.0
-        half = 4.0 * np.abs(group - middle).max(initial=0.0)
+        middle = group.real.mean()
+        half = 4.0 * np.abs(group - middle).max()
         closer = group[:0]
         if len(group) > 1 and half > _CLOSEST:
             values = _compute_eliminant(middle + half * _NODES, centres, radii, corners)
@@ -94,7 +98,7 @@ def _is_in_continuum(pose: Array, centres: Array, radii: Array, corners: Array) 
     for step in (_STRIDE * size * directions[-1] * units, -_STRIDE * size * directions[-1] * units):
         error, moved = _polish_pose(pose + step, centres, radii, corners, _SINGULAR)
         aside = moved - pose - step
-        aside[2] = (aside[2] + np.pi) % (2.0 * np.pi) - np.pi
+        aside[2] = wrap_angle(aside[2])
         if not (error < _FREE * size and float(np.linalg.norm(aside / units)) < _NEAR_PLANAR_STRIDE * _STRIDE * size):
             return False
     return True
@@ -166,5 +170,4 @@ def _linearise(pose: Array, centres: Array, corners: Array) -> tuple[Array, Arra
 
 
 def _is_same(a: Array, b: Array, size: float) -> bool:
-    turn = abs((a[2] - b[2] + np.pi) % (2.0 * np.pi) - np.pi)
-    return bool(np.hypot(a[0] - b[0], a[1] - b[1]) < 1e-6 * size and turn < 1e-6)
+    return bool(np.hypot(a[0] - b[0], a[1] - b[1]) < 1e-6 * size and abs(wrap_angle(a[2] - b[2])) < 1e-6)

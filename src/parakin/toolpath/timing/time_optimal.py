@@ -87,13 +87,14 @@ def refuse_unbound(joint_path: JointPath, limits: DriveLimits, x: Array) -> None
 
     Joints with limits that hardly move while C turns by itself, the tool upright, are as fast as they may be.
     """
-    unlimited = np.isinf(limits.speed) & np.isinf(limits.acceleration)
-    for step in np.flatnonzero((x >= 0.5 * UNBOUND) & (joint_path.step > 0.0)):
-        moving = unlimited & (np.abs(joint_path.joints[step + 1] - joint_path.joints[step]) > 1e-12)
-        if moving.any():
-            names = [name for name, moves in zip(joint_path.posted.machine.joints, moving, strict=True) if moves]
-            text = f"no feed, and no speed or acceleration of {', '.join(names)}"
-            raise PoseError(f"{joint_path.describe_step(int(step))} nothing limits the motion: {text}")
+    fast = np.flatnonzero((x >= 0.5 * UNBOUND) & (joint_path.step > 0.0))
+    moving = np.abs(joint_path.joints[fast + 1] - joint_path.joints[fast]) > 1e-12
+    moving &= np.isinf(limits.speed) & np.isinf(limits.acceleration)
+    unbound = np.flatnonzero(moving.any(1))
+    if len(unbound):
+        own = zip(joint_path.posted.machine.joints, moving[unbound[0]], strict=True)
+        text = f"no feed, and no speed or acceleration of {', '.join(joint for joint, moves in own if moves)}"
+        raise PoseError(f"{joint_path.describe_step(int(fast[unbound[0]]))} nothing limits the motion: {text}")
 
 
 def compute_spans(joint_path: JointPath, x: Array) -> Array:

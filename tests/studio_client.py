@@ -65,9 +65,13 @@ def run_studio(folder, *words, end=signal.SIGINT):
     """Run ``parakin studio`` in a folder; ends it by a signal, and it must end well."""
     process = subprocess.Popen(
         [sys.executable, "-m", "parakin", "studio", "--no-browser", *words],
-        cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True,
-        env={**os.environ, "TMPDIR": str(folder)},
-    )  # fmt: skip
+        cwd=folder,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+        env={**os.environ, "TMPDIR": str(folder), "PYTHONPATH": os.pathsep + os.environ.get("PYTHONPATH", "")},
+    )  # fmt: skip; the empty entry is the folder in which Python runs
     try:
         line = process.stdout.readline()
         address = re.search(r"http://127\.0\.0\.1:\d+/[\w-]{32}/", line)

@@ -119,10 +119,17 @@ def test_a_design_without_a_proof_is_no_winner():
         ("minimise: L", "minimise: volume", ":7:"),
         ("minimise: L", "", ":1:"),
         (GLIDE, "- 1", ":1:"),
+        ("machine: orthoglide", "machine: ../elsewhere/own.yaml", ":1: machine"),
+        ("machine: orthoglide", "machine: /etc/passwd", ":1: machine"),
+        ("minimise: L", "part: ../elsewhere/part.apt\nminimise: L", ":7: part"),
     ],
 )
 def test_bad_problems_are_one_line(old, new, line, capsys, tmp_path):
-    path = tmp_path / "glide.yaml"
+    path = tmp_path / "beside" / "glide.yaml"
+    (tmp_path / "elsewhere").mkdir()
+    (tmp_path / "elsewhere" / "own.yaml").write_text("name: private\n")
+    (tmp_path / "elsewhere" / "part.apt").write_text("PRIVATE\n")
+    path.parent.mkdir()
     assert old in GLIDE
     path.write_text(GLIDE.replace(old, new))
     assert main(["design", str(path)]) == 2

@@ -135,7 +135,9 @@ def test_a_page_has_its_own_files(studio):
         assert studio.request(f"machines/{name}")[0] == 404
 
 
-@pytest.mark.parametrize("name", ["../a", "..%2Fa", "a/b", ".hidden", "a\0b", "C:\\a", "a" * 100, "%2e%2e", "a..", ""])
+@pytest.mark.parametrize(
+    "name", ["matplotlibrc", "../a", "..%2Fa", "a/b", ".hidden", "a\0b", "C:\\a", "a" * 100, "%2e%2e", "a..", ""]
+)
 def test_no_file_is_written_elsewhere(studio, name):
     session = studio.open_session()
     status, _ = studio.request(f"sessions/{session}/files/{name}".replace("\0", "%00").replace("\\", "%5C"), "PUT", "x")
@@ -155,11 +157,18 @@ def test_no_upload_leads_to_files_elsewhere(studio, tmp_path):
     (tmp_path / "secret.hal").write_text("setp genhexkins.base.0.x SECRET\n")
     session = studio.open_session()
     ini = f"[KINS]\nKINEMATICS = genhexkins\n[TRAJ]\nLINEAR_UNITS = mm\n[HAL]\nHALFILE = {tmp_path}/secret.hal\n"
-    studio.put_file(session, "machine.ini", ini)
-    told = studio.run(session, "import", {"FILE": "machine.ini"})
-    assert told["code"] == 2
-    assert "outside" in told["errors"]
-    assert "SECRET" not in told["errors"]
+    problem = f"machine: {tmp_path}/secret.hal\nfree: {{R: [1 mm, 2 mm]}}\nbox: {{X: 0 mm}}\nminimise: R\n"
+    for name, text, command, word in (
+        ("machine.ini", ini, "import", "FILE"),
+        ("printer.cfg", "[include ../*/*]\n[printer]\nkinematics: delta\n", "import", "FILE"),
+        ("problem.yaml", problem, "design", "FAMILY"),
+    ):
+        studio.put_file(session, name, text)
+        told = studio.run(session, command, {word: name})
+        assert told["code"] == 2
+        assert told["errors"].startswith(f"{name}:") and told["errors"].count("\n") == 1
+        assert "outside" in told["errors"]
+        assert "SECRET" not in told["errors"]
 
 
 def test_a_folder_is_no_file(studio):

@@ -7,6 +7,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..description.document import Value, YamlList, YamlMap, YamlText, read_document
+from ..description.importing.configuration_text import check_beside
+from ..description.values import is_word
 from ..errors import InputError, InputErrors, PoseError, quote, suggest
 from ..units import ANGLE, AXIS_UNITS, LENGTH, QuantityError, QuantityKind, parse_quantity
 from .options import YAML_ENDINGS, load_machine
@@ -147,8 +149,9 @@ class _ProblemReader:
         from ..toolpath.reading.detect import read_path
 
         name = self.read_text(value, "part")
+        file = self._find_beside(name, "part")
         try:
-            return read_path(Path(self.source).parent / name)
+            return read_path(file)
         except InputErrors:
             raise
         except InputError as error:
@@ -187,10 +190,16 @@ class _ProblemReader:
         kind = ANGLE if machine.axis_units[machine.axes.index(axis)] == "rad" else LENGTH
         return (self.read_range if isinstance(value, YamlList) else self.read_value)(value, axis, kind)
 
+    def _find_beside(self, name: YamlText, key: str) -> Path:
+        folder = Path(self.source).parent
+        return check_beside(folder / name, (folder,), key, self.source, name.line)
+
     def _load(self, name: YamlText) -> Machine:
-        beside = Path(self.source).parent / name
+        """Load a shipped machine, or one whose file stands beside the problem's."""
+        is_file = name.endswith(YAML_ENDINGS) or not is_word(name)
+        chosen = fspath(self._find_beside(name, "machine")) if is_file else str(name)
         try:
-            return load_machine(fspath(beside) if name.endswith(YAML_ENDINGS) else name)
+            return load_machine(chosen)
         except InputErrors:
             raise
         except InputError as error:

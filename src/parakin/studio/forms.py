@@ -13,9 +13,10 @@ from cyclopts.argument import Argument
 
 from ..errors import InputError, quote
 
-# A file's name without its folder: nothing outside the page's own folder is read or written.
-FILE_NAME = re.compile(r"\w[\w.()+,@ -]{0,79}")
-FILE_NAME_WORDS = "a plain file name of letters, digits, blanks and . ( ) + , @ _ -"
+# A file's name without its folder: nothing outside the page's own folder is read or written. matplotlib would take
+# its settings from there.
+FILE_NAME = re.compile(r"(?!(?i:matplotlibrc)\Z)\w[\w.()+,@ -]{0,79}")
+FILE_NAME_WORDS = "a plain file name of letters, digits, blanks and . ( ) + , @ _ -, other than matplotlibrc"
 _NUMBER = re.compile(r"-?\.?\d")
 _LONGEST = 2000  # characters of a value
 _HIDDEN = {"--json"}

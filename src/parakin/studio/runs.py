@@ -96,7 +96,7 @@ class RunQueue:
             sys.executable, "-P", "-m", "parakin", *run.words,  # -P: a file in the folder is no module
             cwd=run.folder, stdin=asyncio.subprocess.DEVNULL, stdout=asyncio.subprocess.PIPE,
             stderr=asyncio.subprocess.PIPE, start_new_session=True,
-            env={**os.environ, "COLUMNS": "100", "NO_COLOR": "1"},
+            env={**os.environ, "COLUMNS": "100", "NO_COLOR": "1", "PYTHONPATH": _find_import_path()},
         )  # fmt: skip
         assert process.stdout is not None
         assert process.stderr is not None
@@ -108,6 +108,12 @@ class RunQueue:
             if process.returncode is None:
                 await _end_process(process)
         run.state = "done"
+
+
+def _find_import_path() -> str:
+    """Find the entries of PYTHONPATH from where the studio runs; an empty or relative one would be a run's folder."""
+    given = os.environ.get("PYTHONPATH")
+    return os.pathsep.join(str(Path(entry).absolute()) for entry in given.split(os.pathsep)) if given else ""
 
 
 async def _keep(stream: asyncio.StreamReader, kept: bytearray) -> None:

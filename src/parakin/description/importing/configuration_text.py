@@ -25,13 +25,13 @@ def read_configuration(path: Path) -> str:
 
 
 def check_beside(file: Path, folders: tuple[Path, ...], word: str, source: str, line: int | None = None) -> Path:
-    """Return a file that a configuration names by ``word``, if it lies within one of the folders.
+    """Return a file that another one names by ``word``, if it lies within one of the folders.
 
-    A configuration from somebody else opens nothing but what came with it.
+    A file from somebody else opens nothing but what came with it.
 
     Raises :class:`InputError` for a file elsewhere.
     """
     if not any(file.resolve().is_relative_to(folder.resolve()) for folder in folders):
-        message = f"{word} {quote(file.name)} is outside of the configuration's folder; copy it there"
+        message = f"{word} {quote(file.name)} is outside of the folder of the file that names it; copy it there"
         raise InputError(message, source, line)
     return file

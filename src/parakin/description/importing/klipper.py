@@ -41,6 +41,7 @@ class _Sections:
 
     def _include(self, path: Path, pattern: str, line: int, within: tuple[Path, ...]) -> None:
         """Read the files that a pattern names; remember one that is not there."""
+        check_beside(path.parent / pattern, (self.folder,), "include", str(path), line)  # no folder elsewhere is listed
         try:
             files = sorted(path.parent.glob(pattern))
         except (ValueError, NotImplementedError) as error:  # ** beside other letters, or an absolute path

@@ -3,6 +3,7 @@
 import json
 import re
 import zipfile
+from base64 import b64decode
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -191,6 +192,51 @@ def test_drives_are_taken_by_their_names(pages, browser):
 
 
 @needs_chromium
+def test_a_driven_link_of_more_drives_than_freedoms_is_taken_by_its_name(pages, browser):
+    with open_tab(browser) as tab:
+        tab.goto(pages("eclipse_overactuated"))
+        before = tab.evaluate("parakin.state.joints[6]")
+        box = tab.locator("#overlay b", has_text="a1").bounding_box()
+        tab.mouse.move(box["x"] + 5, box["y"] + 5)
+        tab.mouse.down()
+        tab.mouse.move(box["x"] + 17, box["y"] + 13, steps=3)
+        tab.mouse.up()
+        assert abs(tab.evaluate("parakin.state.joints[6]") - before) > 1e-4
+
+
+@needs_chromium
+def test_names_that_meet_are_placed_below_each_other(browser):
+    """Also where a line more is rounded to less than a line."""
+    text = (Path(pk.__file__).parent / "export" / "page" / "labels.js").read_text(encoding="utf-8")
+    (function,) = re.findall(r"^function findClear.*?^}", text, re.MULTILINE | re.DOTALL)
+    heights = np.random.default_rng(1).uniform(499.0, 512.0, 200).tolist()
+    with open_tab(browser) as tab:
+        places = tab.evaluate(
+            f"""heights => {{ const LINE = 13, {{abs}} = Math; {function}
+          return heights.map(y => {{
+            const taken = [];
+            for (const more of [0, 5, 0, 20]) findClear(100, y + more, 40, taken);
+            return taken.map(label => label.y);
+          }}); }}""",
+            heights,
+        )
+    assert np.diff(np.sort(places, 1), axis=1).min() > 13.0 - 1e-9
+
+
+@needs_chromium
+def test_home_that_sizes_put_out_of_reach_is_told(pages, browser):
+    with open_tab(browser) as tab:
+        tab.goto(pages("five_bar"))
+        tab.get_by_label("stop at limits").uncheck()
+        tab.evaluate("parakin.moveToPose([0, 250])")
+        tab.evaluate("parakin.moveToSizes([120, 200, 150])")  # home's Y is 380
+        before = tab.evaluate("parakin.state.pose")
+        tab.get_by_role("button", name="Home").click()
+        assert tab.locator("#verdict").inner_text().startswith("Stopped: home: ")
+        assert tab.evaluate("parakin.state.pose") == before
+
+
+@needs_chromium
 def test_modes_are_switched(pages, browser):
     machine = load_shipped("five_bar")
     with open_tab(browser) as tab:
@@ -321,6 +367,16 @@ def test_a_coarse_workspace_ends_where_the_limits_do(browser):
 
 def read_column(tab, name):
     return np.array(tab.evaluate(f"Array.from(parakin.placing.columns.{name}, x => x === x ? x : null)"), float)
+
+
+def test_the_last_sample_is_reached_at_the_end(tmp_path):
+    """Times are float32 there: the end is not before the last of them."""
+    part, machine = tmp_path / "line.ngc", load_shipped("linear_delta")
+    for way in range(20, 32):
+        part.write_text(f"G90 G21\nG0 X0 Y0 Z300\nG1 X{way} F3000\n")
+        job = pk.prepare(machine, pk.read_path(part))
+        path = encode_page_path(job.posted, job.trajectory, 10_000)
+        assert np.frombuffer(b64decode(path["columns"]["times"]), "<f4")[-1] == path["end"]
 
 
 def test_the_workpiece_of_a_page_is_without_the_files_own_frame():
@@ -600,10 +656,10 @@ def test_sizes_follow_one_that_the_file_calculates_them_from(pages, browser):
 
 
 @needs_chromium
-def test_every_drive_is_named_in_the_picture(tmp_path, browser):
-    machine = load_shipped("eclipse_overactuated")  # its columns move in two ways, and a driven link in a third
-    (tmp_path / "page.html").write_text(render_machine_page(machine), encoding="utf-8")
+@pytest.mark.parametrize("name", ["eclipse_overactuated", "tricept"])  # links of three drives each; a head that turns
+def test_every_drive_is_named_in_the_picture(name, pages, browser):
+    machine = load_shipped(name)
     with open_tab(browser) as tab:
-        tab.goto((tmp_path / "page.html").as_uri())
+        tab.goto(pages(name))
         names = tab.locator("#overlay span:not(.axis)").all_inner_texts()
     assert sorted(name for label in names for name in label.split(", ")) == sorted(machine.joints)

@@ -324,6 +324,16 @@ def test_the_page_in_a_browser(studio):
             "parakin post part.apt --machine=own.yaml --place=200mm --output=on_own --page --set=R=510mm exit 0" in said
         )
         assert "all within the limits" in said
+        tab.click("button:has-text('Compare')")  # the machines as they are shown
+        wait_until(
+            tab, "document.querySelector('.run code').textContent.startsWith('parakin compare sized_own.yaml --part')"
+        )
+        tab.click("#runs .run button:has-text('Cancel')")
+        tab.click("button:has-text('LinuxCNC')")
+        wait_until(
+            tab,
+            "[...document.querySelectorAll('.run a')].some(a => a.textContent === 'linuxcnc_own.zip, all of these')",
+        )
         page = next(frame for frame in tab.frames if "part.page.html" in frame.url)
         wait_until(page, "document.getElementById('post')?.hidden === false", 20.0)
         page.evaluate("parakin.movePath([2, 0, 0])")

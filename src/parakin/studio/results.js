@@ -36,6 +36,24 @@ async function findBox() {
   }
 }
 
+async function compareMachines() {
+  const names = [];
+  for (const name of chosenMachines()) names.push(await saveSized(name));
+  await run("compare", {NAMES: names, "--part": element("part").value, "--output": "compared.html"});
+}
+
+// The name by which a machine is read as it is shown: where sizes were dragged, of its file with these in it.
+async function saveSized(name) {
+  if (!Object.keys(readSizes(name)).length) return name;
+  const sized = nameResult("sized", name, ".yaml");
+  await ask(inSession(`files/${escapeName(sized)}`), {method: "PUT", body: await readMachineFile(name)});
+  return sized;
+}
+
+async function exportToLinuxcnc() {
+  for (const name of chosenMachines()) await run("linuxcnc", {NAME: name, "--output": nameResult("linuxcnc", name), ...readSizes(name)});
+}
+
 // The atlas of each machine, with its picture, and 1/condition number drawn on its page.
 async function drawAtlas() {
   for (const name of chosenMachines()) {

@@ -305,8 +305,8 @@ const QUICK = {
   "Post the part": () => postPart(name => state.workpieces[`${name} ${element("part").value}`]),
   "Place it for me": () => postPart(() => ({"--place": "200mm"})),
   "Part at the tool": () => postPart(name => ({"--workpiece": findTip(name).map(([axis, value]) => `${axis}=${value}`).join(",")})),
-  "Compare": () => run("compare", {NAMES: chosenMachines(), "--part": element("part").value, "--output": "compared.html"}),
-  "LinuxCNC": () => run("linuxcnc", {NAME: element("machine").value, "--output": "linuxcnc", ...readSizes(element("machine").value)}),
+  "Compare": () => compareMachines(),
+  "LinuxCNC": () => exportToLinuxcnc(),
 };
 
 // Where the tool of a machine's page stands: pairs of an axis and its value.

@@ -44,9 +44,8 @@ function findInPicture(place) {
 }
 
 function findStrut(drive) {
-  const kinds = ["telescope", "rod", "arm"], name = machine.joints[drive].name;
-  const points = itemPoints[machine.items.findIndex(item => item.name === name && kinds.includes(item.kind))];
-  return points[0].clone().lerp(points[1], 0.4);
+  const [first, second] = itemPoints[overlay.querySelector(`[data-drive="${drive}"]`).dataset.item];
+  return first.clone().lerp(second, 0.4);
 }
 
 window.parakin = {

@@ -57,17 +57,23 @@ function turnTool(event) {
 // Move a drive so that the place of its strut that was taken follows the pointer, as the picture shows it; where that does not
 // move in the picture, as on the axis of a turn, to the right.
 function dragDrive(event) {
-  const unit = machine.joints[grip.drive].unit === "rad" ? 1 : size, step = 1e-3 * unit, before = seeGrip(current);
-  const ahead = followJoints(current, current.joints.map((q, i) => i === grip.drive ? q + step : q));
-  const after = seeGrip(ahead.state);
+  const unit = machine.joints[grip.drive].unit === "rad" ? 1 : size, before = seeGrip(current);
+  const found = followDrive(1e-3 * unit) ?? followDrive(-1e-3 * unit); // at an end it goes one way only
+  if (!found) return;
+  const {step, state} = found, after = seeGrip(state);
   const g = [(after[0] - before[0]) / step, (after[1] - before[1]) / step], square = g[0] * g[0] + g[1] * g[1];
   placeMachine(current);
-  if (!ahead.complete) return;
   const way = [event.clientX - grip.x, event.clientY - grip.y];
   const most = unit === 1 ? 0.2 : 0.1 * size;
   const asked = square * step * step < STILL * STILL ? PER_PIXEL * unit * way[0] : (way[0] * g[0] + way[1] * g[1]) / square;
   const change = max(-most, min(most, asked));
   moveToJoints(current.joints.map((q, i) => i === grip.drive ? q + change : q));
+}
+
+// The state where the drive that was taken has gone a step; null where it can't.
+function followDrive(step) {
+  const {state, complete} = followJoints(current, current.joints.map((q, i) => i === grip.drive ? q + step : q));
+  return complete ? {step, state} : null;
 }
 
 // Where the picture shows the place that was taken, in pixels, for a state.

@@ -70,7 +70,7 @@ function compareJoints(one, other) {
 
 // Of more drives than freedoms those that stand follow the others, and as little as they can.
 const FOLLOWS = 1e-3, DIFFERENCE = 1e-4; // what their ways count; mm between poses that tell rates, a turn on the size
-const SETTLED = 1e-6; // mm: a step as small as this is the last but for rounding
+const SETTLED = 1e-4; // mm: a step as small as this is the last where steps do not become smaller quickly
 
 // The state whose joints are those given in the least squares, from one next to it; null where none is found.
 function settleJoints(state, joints, counts) {

@@ -24,6 +24,13 @@ machine.joints.forEach(joint => {
   addLabel(names.flatMap((own, i) => [...(i ? [", "] : []), makeName(own, number)]), into => into.lerpVectors(points[0], points[points.length - 1], share));
 });
 
+// Turns of a head are named at the tool.
+const ofHead = machine.joints.filter(joint => joint.leg < 0 && itemOf(joint) < 0), toolNumber = machine.items.findIndex(item => item.kind === "tool");
+if (ofHead.length && toolNumber >= 0) {
+  const points = itemPoints[toolNumber];
+  addLabel(ofHead.flatMap((own, i) => [...(i ? [", "] : []), makeName(own, toolNumber)]), into => into.lerpVectors(points[0], points[1], 0.3));
+}
+
 // A drive's name, by which its strut is taken where another one lies over it in the picture.
 function makeName(joint, item) {
   const name = document.createElement("b");
@@ -47,8 +54,8 @@ const labelPlace = new THREE.Vector3(), LINE = 13; // px
 
 // The first place from y downwards that is clear of the labels already placed.
 function findClear(x, y, width, taken) {
-  const meets = other => abs(x - other.x) < 0.5 * (width + other.width) + 2 && abs(y - other.y) < LINE;
-  for (let other; (other = taken.find(meets));) y = other.y + LINE;
+  const beside = taken.filter(other => abs(x - other.x) < 0.5 * (width + other.width) + 2).sort((one, other) => one.y - other.y);
+  for (const other of beside) if (abs(y - other.y) < LINE) y = other.y + LINE;
   taken.push({x, y, width});
   return y;
 }

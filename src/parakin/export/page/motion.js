@@ -103,7 +103,8 @@ function switchSign(i) {
 
 function goHome() {
   stopPlaying();
-  setState(stateAtPose(everyHome(), machine.mode, null));
+  const state = stateAtPose(everyHome(), machine.mode, null); // none where sizes were dragged so far that home is out of reach
+  setState(state ?? current, state ? null : `home: ${describeUnreached(everyHome(), machine.mode)}`);
 }
 
 // Numbers in [0, 1), the same each time.

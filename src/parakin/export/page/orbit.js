@@ -25,7 +25,7 @@ function resetOrbit() {
 // Aim at the middle of what is to be seen, as it looks from the camera's side, and step back until all of it is in the picture.
 function fitView() {
   machineSeen ??= [handle.position, new THREE.Vector3().setFromMatrixPosition(frame), ...itemPoints.flat()].map(point => point.clone());
-  const places = [...machineSeen, ...seen];
+  const places = [...machineSeen, ...itemPoints.flat(), handle.position, ...seen]; // arms may have moved out of the picture
   placeCamera();
   const middle = new THREE.Vector3(), reach = [0, 0, 0], half = Math.tan(0.5 * camera.fov * PI / 180);
   for (let i = 0; i < 3; i++) {

@@ -48,7 +48,7 @@ def encode_page_path(posted: Posted, trajectory: Trajectory | None, numbers: int
     return {
         "source": Path(posted.path.source).name or posted.path.source,
         "timed": trajectory is not None,
-        "end": float(columns["times"][-1]),
+        "end": float(np.float32(columns["times"][-1])),  # as the column has it, whose last sample is reached then
         "signs": signs,
         "samples": len(columns["times"]),
         "columns": {name: _encode_column(values) for name, values in columns.items()},

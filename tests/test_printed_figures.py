@@ -10,7 +10,8 @@ from shipped import load_shipped
 
 import parakin as pk
 from parakin.cli import main
-from parakin.export.position_map import extend_grid, fill_map
+from parakin.export.position_map import LEVELS, extend_grid, fill_map, set_bar_ticks
+from parakin.export.space_axes import add_space_axes
 
 COMMANDS = {
     "plane": ("workspace", "hbg80_2d", "--gap", "0.05"),
@@ -21,6 +22,7 @@ COMMANDS = {
     "accuracy": ("accuracy", "rpr3", "--tolerance", "feet=0.05mm", "--samples", "40"),
     "stiffness": ("stiffness", "hbg80_2d", "--drives", "100N/um", "--samples", "40"),
 }
+IN_A_COLUMN = ("machine", "accuracy", "stiffness")
 SVG = "{http://www.w3.org/2000/svg}"
 
 
@@ -33,7 +35,8 @@ def test_a_figure_for_a_page(kind, tmp_path, capsys):
     if command[0] == "atlas":
         assert "hbg80_2d: performance, constant orientation" in said  # what a caption needs
     root = ElementTree.parse(path).getroot()
-    assert 60.0 < float(root.get("width").removesuffix("pt")) / 72.0 * 25.4 <= 200.0  # mm, of a page
+    page = 3.5 if kind in IN_A_COLUMN else 7.2  # inches
+    assert 0.7 * page < float(root.get("width").removesuffix("pt")) / 72.0 <= page + 0.05
     texts = list(root.iter(f"{SVG}text"))
     assert {"X [mm]", "Y [mm]"} <= {text.text for text in texts}
     sizes = {re.search(r"([\d.]+)px", text.get("style"))[1] for text in texts}
@@ -72,6 +75,34 @@ def test_a_map_goes_on_evenly_beyond_what_is_known():
     near = (x + y < 10.0) & (np.abs(x - y) < 6.0)
     assert extended[near] == pytest.approx(plane[near], abs=1e-12)
     assert np.isnan(extended[-1, -1])
+
+
+def test_a_scale_has_colours_for_all_that_is_shown_and_no_more_numbers_than_room():
+    machine = load_shipped("five_bar_slides")
+    x, y = np.linspace(-700.0, 700.0, 57), np.linspace(-500.0, -100.0, 33)
+    figure = Figure()
+    axes = figure.subplots()
+    levels = np.linspace(-400.0, -200.0, LEVELS + 1)  # values go on beyond both ends
+    filled = fill_map(axes, (x, y), np.tile(y, (57, 1)), pk.region(machine), levels, "neither")
+    assert filled.get_array().size == LEVELS
+    assert min(path.get_extents().y0 for path in filled.get_paths() if len(path)) == y[0]
+    assert max(path.get_extents().y1 for path in filled.get_paths() if len(path)) == y[-1]
+    for height, count in ((2000.0, 7), (400.0, 4), (150.0, 2)):
+        axes.set(xlim=(-700.0, 700.0), ylim=(-height, 0.0))
+        bar = figure.colorbar(filled, cax=axes.inset_axes((1.04, 0.0, 0.045, 1.0)))
+        set_bar_ticks(bar, axes, levels)
+        assert len(bar.get_ticks()) == count
+
+
+def test_short_axes_in_space_have_few_numbers():
+    axes = add_space_axes(Figure(), np.zeros(3), np.array([900.0, 120.0, 450.0]), "XYZ")
+    counts = []
+    for letter in "xyz":
+        low, high = getattr(axes, f"get_{letter}lim")()
+        ticks = getattr(axes, f"{letter}axis").get_majorticklocs()
+        counts.append(sum(low <= tick <= high for tick in ticks))
+    assert counts[0] >= 3
+    assert counts[1] <= 2
 
 
 def test_an_outline_is_smooth_where_legs_end_to_close():

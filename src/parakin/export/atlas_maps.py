@@ -13,14 +13,13 @@ from ..performance.atlas import PerformanceMap
 from ..performance.singularities import PARALLEL
 from .colours import FAINT, INK
 from .figure_file import render_figure
-from .position_map import COLOURED, fill_map, fit_to_allowed, separate_ends
+from .position_map import COLOURED, LEVELS, fill_map, fit_to_allowed, separate_ends, set_bar_ticks
 from .workspace.describe import describe_region
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _GREY = "#607d8b"
-_LEVELS = 24
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,6 +43,8 @@ def render_map(map_: PerformanceMap, marks: Array, suffix: str) -> bytes:
 def _draw_map(figure: Figure, map_: PerformanceMap, marks: Array) -> None:
     panels = figure.subplots(2, 2)
     figure.subplots_adjust(left=0.08, right=0.90, bottom=0.06, top=0.86, hspace=0.28, wspace=0.48)
+    for axes in panels.flat:
+        axes.set_anchor("S" if axes in panels[0] else "N")  # a flat workspace leaves its room outside
     for axes, panel in zip(panels.flat, _list_panels(map_), strict=True):
         axes.set_title(panel.title, color=INK, fontsize=11, loc="left")
         axes.tick_params(labelsize=8, colors=_GREY)
@@ -103,20 +104,17 @@ def _draw_panel(figure: Figure, axes: Any, map_: PerformanceMap, panel: _MapPane
     low, high = separate_ends(float(inside.min()), float(highest))
     crossed = low < 0.0 < high
     colours: dict[str, Any] = {"cmap": panel.colours}
-    levels = np.linspace(low, high, _LEVELS + 1)
+    levels = np.linspace(low, high, LEVELS + 1)
     if crossed:
         colours = {"cmap": "PuOr", "norm": TwoSlopeNorm(0.0, low, high)}
     elif panel.endless:
-        colours["norm"], levels = LogNorm(low, high), np.geomspace(low, high, _LEVELS + 1)
+        colours["norm"], levels = LogNorm(low, high), np.geomspace(low, high, LEVELS + 1)
     known = np.where(np.isinf(panel.values), high, panel.values)
     filled = fill_map(axes, map_.grid, known, map_.region, levels, "max" if panel.endless else "neither", **colours)
     if crossed:
         axes.contour(x, y, np.where(map_.slack >= 0.0, known, np.nan).T, levels=[0.0], colors="#b71c1c", linewidths=1.2)
     bar = figure.colorbar(filled, cax=axes.inset_axes((1.03, 0.0, 0.045, 1.0)))
-    if panel.endless:
-        ticks = levels[:: _LEVELS // 6].tolist()
-        bar.set_ticks(ticks, labels=[f"{tick:.3g}" for tick in ticks], minor=False)
-        bar.minorticks_off()
+    set_bar_ticks(bar, axes, levels)
     bar.ax.tick_params(labelsize=8, colors=_GREY)
 
 

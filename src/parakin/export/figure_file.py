@@ -16,6 +16,7 @@ _DOTS = 150  # dots an inch
 _COLUMN, _PAGE = 3.5, 7.2  # inches: a column of a page, and both
 _NARROW = 8.0  # inches on the screen: a figure no wider is printed in a column
 _PRINTED_FONT = 7.0  # points
+_BORDER = 0.02  # inches, about a printed figure
 SEAM = 0.3  # points, by which areas of a map overlap: else a reader's smoothing shows the ground between them
 
 
@@ -47,8 +48,14 @@ def render_figure(
             _fit_to_page(figure)
         else:
             add_heading(figure)
-        figure.savefig(data, format=suffix.removeprefix("."), dpi=dots,
-                       bbox_inches="tight" if printed else None, metadata=_drop_date(suffix))  # fmt: skip
+        figure.savefig(
+            data,
+            format=suffix.removeprefix("."),
+            dpi=dots,
+            bbox_inches="tight" if printed else None,
+            pad_inches=_BORDER,
+            metadata=_drop_date(suffix),
+        )
     return data.getvalue()
 
 
@@ -58,13 +65,15 @@ def _fit_to_page(figure: Figure) -> None:
     from matplotlib.text import Text
 
     from .shaded_bodies import print_bodies
+    from .space_axes import set_tick_counts
 
     for text in figure.findobj(Text):
         text.set_fontsize(_PRINTED_FONT)
     for axes in figure.axes:
         axes.tick_params(labelsize=_PRINTED_FONT)
         if figure.get_figwidth() < _PAGE and hasattr(axes, "get_zlim"):
-            axes.locator_params(nbins=3)  # a column has no room for more
+            set_tick_counts(axes, 3)  # a column has no room for more
+    _fit_to_width(figure)
     print_bodies(figure)
     figure.draw_without_rendering()  # only then axes have their sizes
     for map_ in figure.findobj(QuadContourSet):
@@ -73,6 +82,16 @@ def _fit_to_page(figure: Figure) -> None:
         map_.set_paths([path.transformed(to_dots.inverted()) for path in drawn])
         if map_.filled:
             map_.set(edgecolor="face", linewidth=SEAM)
+
+
+def _fit_to_width(figure: Figure) -> None:
+    """Make a figure narrower by what stands beside it, such as the numbers of a scale: text keeps its size."""
+    wide, high = figure.get_size_inches()
+    figure.draw_without_rendering()
+    drawn = figure.get_tightbbox()
+    if drawn is not None and drawn.width + 2.0 * _BORDER > wide:
+        narrow = 2.0 * wide - drawn.width - 2.0 * _BORDER
+        figure.set_size_inches(narrow, high * narrow / wide)
 
 
 def _drop_date(suffix: str) -> dict[str, None]:

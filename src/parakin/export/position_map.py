@@ -15,6 +15,7 @@ from .figure_file import render_figure
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.colorbar import Colorbar
     from matplotlib.contour import QuadContourSet
     from matplotlib.figure import Figure
 
@@ -25,7 +26,8 @@ if TYPE_CHECKING:
 _CELLS = 120
 _INCHES = (7.2, 6.0)
 _OUTLINED = 600  # places along a side by which the outline is drawn, unless the map itself has more
-_LEVELS = 24
+LEVELS = 24  # areas between the ends of a scale
+_NUMBERS = 12.0  # of a scale, one above the other, in as much as a printed map is wide
 _BORDER = 0.05  # of what is allowed, beside it
 _ROUNDING = 1e-12
 _OUTLINE = "#37474f"
@@ -79,11 +81,10 @@ def render_position_map(
         if not len(known):
             return
         fit_to_allowed(axes, grid, room >= 0.0)
-        levels = _choose_levels(float(known.min()), float(np.percentile(known, COLOURED)))
+        levels = np.linspace(*separate_ends(float(known.min()), float(np.percentile(known, COLOURED))), LEVELS + 1)
         filled = fill_map(axes, grid, values, region, levels, "max", cmap=text.colours)
         bar = figure.colorbar(filled, cax=axes.inset_axes((1.04, 0.0, 0.045, 1.0)))
-        ticks = levels[:: _LEVELS // 6].tolist()
-        bar.set_ticks(ticks, labels=[f"{tick:.3g}" for tick in ticks])
+        set_bar_ticks(bar, axes, levels)
         bar.set_label(text.label, color=INK, fontsize=9)
 
     def add_heading(figure: Figure) -> None:
@@ -91,11 +92,6 @@ def render_position_map(
         figure.text(0.03, 0.905, f"{text.subtitle}; all else as at home", color=INK, fontsize=9, parse_math=False)
 
     return render_figure(_INCHES, draw, add_heading, suffix)
-
-
-def _choose_levels(low: float, high: float) -> Array:
-    """Choose the levels of a map's areas."""
-    return np.linspace(*separate_ends(low, high), _LEVELS + 1)
 
 
 def separate_ends(low: float, high: float) -> tuple[float, float]:
@@ -113,6 +109,16 @@ def fit_to_allowed(axes: Axes, grid: Sequence[Array], allowed: Flags) -> None:
         set_ends(max(line[0], inside[0] - border), min(line[-1], inside[-1] + border))
 
 
+def set_bar_ticks(bar: Colorbar, axes: Axes, levels: Array) -> None:
+    """Set numbers beside as many of a scale's levels, evenly, as the height of its map has room for."""
+    (left, right), (low, high) = axes.get_xlim(), axes.get_ylim()
+    room = _NUMBERS * (high - low) / (right - left)
+    step = next((step for step in (4, 6, 8, 12) if LEVELS // step < room), LEVELS)
+    ticks = levels[::step].tolist()
+    bar.set_ticks(ticks, labels=[f"{tick:.3g}" for tick in ticks], minor=False)
+    bar.minorticks_off()
+
+
 def fill_map(
     axes: Axes, grid: Sequence[Array], values: Array, region: Region, levels: Array, extend: str, **colours: Any
 ) -> QuadContourSet:
@@ -120,8 +126,8 @@ def fill_map(
 
     NaN is where they are not known; values beyond the ends of the levels have the ends' colours.
     """
-    beyond = np.clip(extend_grid(values), levels[0], levels[-1])
-    shown = np.ma.masked_invalid(np.where(np.isfinite(values), values, beyond).T)
+    known = np.where(np.isfinite(values), values, extend_grid(values))
+    shown = np.ma.masked_invalid(np.clip(known, levels[0], levels[-1]).T)
     filled = axes.contourf(*grid, shown, levels=levels, extend=extend, **colours)
     (x, y), room = _compute_room(region, grid)
     if room.min() < 0.0:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from itertools import product
 from typing import Any
@@ -38,7 +39,15 @@ def set_space_axes(axes: Any, middle: Array, half: Array, names: Sequence[str]) 
     axes.set_box_aspect(half)
     axes.tick_params(labelsize=8, colors=GREY)
     axes.zaxis.set_tick_params(pad=6)  # clear of the ticks, which stand slanted
-    axes.locator_params(nbins=5)
+    set_tick_counts(axes, 5)
+
+
+def set_tick_counts(axes: Any, most: int) -> None:
+    """Give the longest axis about so many numbers, the others as many as have room beside each other."""
+    lengths = {letter: abs(float(np.ptp(getattr(axes, f"get_{letter}lim")()))) for letter in "xyz"}
+    longest = max(lengths.values())
+    for letter, length in lengths.items():
+        axes.locator_params(axis=letter, nbins=math.ceil(most * length / longest), min_n_ticks=1)
 
 
 def fit_to_room(axes: Any, half: Array, room: Room) -> None:

@@ -207,6 +207,19 @@ def test_a_large_upload_is_refused(studio):
     assert "larger than 64 MiB" in answer["error"]
 
 
+def test_a_client_that_leaves_amid_an_upload_leaves_nothing(studio):
+    """Not a line in the terminal either, which the end of the fixture's studio looks at."""
+    session = studio.open_session()
+    before = studio.ask(f"sessions/{session}/files")
+    for method, path in (("PUT", "files/half.cls"), ("POST", "runs")):
+        with socket.create_connection(("127.0.0.1", studio.port)) as client:
+            head = f"{method} {studio.prefix}sessions/{session}/{path} HTTP/1.1\r\nHost: 127.0.0.1:{studio.port}\r\n"
+            client.sendall(f"{head}Content-Length: 1000\r\n\r\nhalf".encode())
+            time.sleep(0.1)
+    assert studio.ask(f"sessions/{session}/files") == before
+    assert studio.ask(f"sessions/{session}/runs") == (200, {"runs": []})
+
+
 @pytest.mark.parametrize(
     "body", ["", "[]", "{", "7", '{"command": "rm"}', '{"command": "show", "values": 3}', "[" * 50000]
 )

@@ -19,7 +19,7 @@ from urllib.parse import quote as quote_url
 
 import uvicorn
 from starlette.applications import Starlette
-from starlette.requests import Request
+from starlette.requests import ClientDisconnect, Request
 from starlette.responses import FileResponse, JSONResponse, Response
 from starlette.routing import Route
 
@@ -90,6 +90,8 @@ class Studio:
                 return JSONResponse({"error": str(error)}, status_code=400)
             except LookupError:
                 return JSONResponse({"error": "no such thing"}, status_code=404)
+            except ClientDisconnect:  # amid an upload: nobody reads the answer
+                return Response(status_code=400)
 
         return answer
 

@@ -45,6 +45,7 @@ class Accuracy:
 
     @property
     def machine(self) -> Machine:
+        """The machine that this is about."""
         return self.tolerances.family.machine
 
     @property
@@ -101,6 +102,7 @@ def analyse_accuracy(
 def allocate_tolerances(accuracy: Accuracy, error: float, costs: Mapping[str, float] | None = None) -> dict[str, float]:
     """Find the tolerances of the least cost that keep the tip's deviation within an error at every pose, mm.
 
+    accuracy : of :func:`analyse_accuracy`, at whose poses the error is kept
     costs : for each tolerance's name, what a number costs at a tolerance of 1 mm or 1 rad: the cost goes with its
         inverse; by default 1, of an angle at the greatest leg's length
 

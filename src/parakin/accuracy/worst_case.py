@@ -48,7 +48,9 @@ class WorstCase:
 def bound_worst_case(accuracy: Accuracy, ranges: Mapping[str, AxisRange], seconds: float = SECONDS) -> WorstCase:
     """Bound the tip's error over a box of poses and all machines within tolerances, whose joints are the nominal ones.
 
+    accuracy : of :func:`analyse_accuracy`; its machine and tolerances count
     ranges : of axes, mm and rad, or texts with their unit; the others are at home
+    seconds : after which halving ends
 
     The motion's coordinates y of a machine with other sizes are a zero of its closures, so they lie in a box that
     Krawczyk's operator maps into itself, and nowhere else in it. The tip then follows by its derivatives over that box

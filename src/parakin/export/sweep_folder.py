@@ -72,6 +72,7 @@ def run_sweep(
         of the same plan is kept, so an interrupted sweep goes on.
     scheduler : of Dask's workers, such as ``tcp://host:8786``, which have parakin installed; by default this process
         and its cores. What a lost worker was doing is done again by another.
+    progress : called now and then with the fraction done
     show_dashboard : called once with the address of the scheduler's dashboard, if it has one (with bokeh)
 
     Raises :class:`InputError` for a folder with another sweep or a scheduler that does not answer.

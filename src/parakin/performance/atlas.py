@@ -85,6 +85,7 @@ class Atlas:
 
     @property
     def machine(self) -> Machine:
+        """The machine that this is about."""
         return self.map.region.machine
 
     @property

@@ -107,6 +107,9 @@ def find_designs(
 
     A workspace's volume is estimated in the search, and a lower bound of it is proved of a winner.
 
+    problem : what is free, wanted, and to be least or greatest; its lengths are mm, angles rad
+    progress : called now and then with the fraction done
+
     Raises :class:`PoseError` for an invalid count or time.
     """
     if not 1 <= count <= MOST_DESIGNS:

@@ -86,6 +86,7 @@ def find_nearest_singularity(
     as far as ``seconds`` allow. With more drives than freedoms no singular pose is told, for none separates two sides.
 
     ranges : low and high of some axes, mm and rad; others are fixed as in the region, or as at home
+    shape : ``box`` or ``sphere``
 
     Raises :class:`PoseError` for invalid ranges, and a middle that is singular or out of reach.
     """

@@ -62,10 +62,12 @@ class InscribedBox(RegionResult):
 
     @property
     def edges(self) -> Array:
+        """The lengths of its edges, mm."""
         return self.high - self.low
 
     @property
     def centre(self) -> Array:
+        """Its middle, mm."""
         return 0.5 * (self.low + self.high)
 
     @property

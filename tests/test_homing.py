@@ -138,6 +138,11 @@ def test_a_walk_that_loses_no_leg_stays_closed():
     assert walk.poses[0, 2] == pytest.approx(1300.0 - reach - 80.0)
 
 
+def test_the_page_tells_a_share_of_all_starts_without_an_exponent():
+    page = pk.make_linuxcnc_configuration(load_shipped("five_bar"), "mesa-7i96s")["five_bar.md"]
+    assert "Home switches will not do: from 100 % of 1000 sampled poses" in page
+
+
 @pytest.mark.parametrize("name", ["hexapod", "hbg80_2d"])
 def test_no_switches_where_homing_can_do_harm(name):
     plan = find_homing(load_shipped(name))

@@ -1,6 +1,8 @@
 """The feed planner: every trajectory sampled at 1 kHz against every limit, and closed forms."""
 
+import re
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -491,6 +493,13 @@ def test_a_time_far_over_the_feeds_is_explained_at_its_line(tmp_path):
     assert job.seconds > 3.0
     note = next(note for note in job.posted.path.notes if "its feeds ask for" in note.text)
     assert note.line > 4 and "theta1" in note.text
+    slow = (Path(pk.__file__).parent / "machines" / "tricept.yaml").read_text(encoding="utf-8")
+    (tmp_path / "slow.yaml").write_text(slow.replace("speed: 90 deg/s", "speed: 0.09 deg/s"), encoding="utf-8")
+    job = pk.prepare(pk.load(tmp_path / "slow.yaml"), pk.read_path(tmp_path / "part.apt"))
+    note = next(note for note in job.posted.path.notes if "its feeds ask for" in note.text)
+    # 180 deg at 0.09 deg/s, without an exponent; on a line 9 deg
+    assert 2000.0 <= float(re.findall(r"takes ([0-9,]+) s", note.text)[0].replace(",", "")) < 5000.0
+    assert float(re.findall(r"here, ([0-9,]+) s", note.text)[0].replace(",", "")) >= 100.0
     (tmp_path / "part.apt").write_text("\n".join(["UNITS/MM", "FEDRAT/10000,MMPM", *turned[:4], "FINI", ""]))
     job = pk.prepare(load_shipped("tricept"), pk.read_path(tmp_path / "part.apt"))
     assert job.seconds < 1.0  # short paths too

@@ -39,10 +39,16 @@ def explain_lost_time(trajectory: Trajectory) -> Note | None:
     times = np.bincount(trajectory.binding[on_line], spans[on_line], len(trajectory.names))
     limit = trajectory.names[int(times.argmax())]
     text = (
-        f"the path takes {seconds.sum():.3g} s, its feeds ask for {feed_seconds.sum():.3g} s; most is lost here, "
-        f"{times_by_line[worst]:.2g} s for {feed_times_by_line[worst]:.2g} s, bound by {limit}"
+        f"the path takes {_format(seconds.sum(), 3)} s, its feeds ask for {_format(feed_seconds.sum(), 3)} s; "
+        f"most is lost here, {_format(times_by_line[worst], 2)} s for {_format(feed_times_by_line[worst], 2)} s, "
+        f"bound by {limit}"
     )
     return Note(int(lines[worst]), text)
+
+
+def _format(seconds: float, digits: int) -> str:
+    """Format with so many digits, without an exponent where there are more before the point."""
+    return f"{seconds:.{digits}g}" if seconds < 10.0**digits - 0.5 else f"{seconds:,.0f}"
 
 
 def _measure_feed_times(trajectory: Trajectory) -> Array:

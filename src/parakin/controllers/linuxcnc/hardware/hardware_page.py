@@ -132,8 +132,8 @@ def _describe_homing(machine: Machine, equipment: Equipment) -> list[str]:
     else:
         lines.append("Homing moves no leg: their encoders are absolute.")
         if plan.unsafe is not None:
-            lines.append(_UNSAFE.format(share=f"{100.0 * plan.unsafe:.2g} %", starts=plan.starts))
-        share = "none" if plan.ambiguous == 0.0 else f"{100.0 * plan.ambiguous:.2g} %"
+            lines.append(_UNSAFE.format(share=f"{100.0 * plan.unsafe:.3g} %", starts=plan.starts))
+        share = "none" if plan.ambiguous == 0.0 else f"{100.0 * plan.ambiguous:.3g} %"
         lines.append(_FOUND.format(starts=plan.starts, share=share))
     serial = range(machine.leg_count, len(machine.joints))
     for i in serial:

@@ -89,7 +89,7 @@ def find_homing(machine: Machine) -> HomingPlan:
     unsafe = _measure_harm(machine, starts, looking) if looking and choice is None else None
     if unsafe is not None and any(machine.drives[i].homing is not None for i in looking):
         raise InputError(
-            f"homing: from {100.0 * unsafe:.2g} % of the sampled poses homing by these switches breaks a limit or "
+            f"homing: from {100.0 * unsafe:.3g} % of the sampled poses homing by these switches breaks a limit or "
             f"comes to a singularity, in every order tried; expected absolute encoders (homing: {ABSOLUTE})"
         )
     legs = _describe_legs(machine, choice[0] if choice else None)

@@ -19,6 +19,7 @@ from .plane_cuts import (
     TaylorBounds,
     accumulate_cuts,
     bound_linearly,
+    take_rows,
 )
 from .sign_proofs import FormPlanes
 
@@ -38,7 +39,7 @@ class OrientationBoxes:
 
     def take(self, which: Flags | Indices) -> OrientationBoxes:
         """Keep some of the boxes."""
-        return OrientationBoxes(self.cell[which], self.low[which], self.high[which], self.needs[which])
+        return OrientationBoxes(*take_rows((self.cell, self.low, self.high, self.needs), which))
 
     def renumber(self, new: Indices) -> OrientationBoxes:
         """Renumber the cells; the boxes of cells without a number (-1) are dropped."""

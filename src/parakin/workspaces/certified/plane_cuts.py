@@ -9,7 +9,8 @@ x is a position, of d ≤ 3 coordinates; θ is an orientation, of s angles; v = 
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from collections.abc import Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +22,12 @@ _FLAT = 1e-4  # slopes below this fraction of the steepest count as unknown: the
 _ROUNDING = 1e-7  # the error of the closed form, with slopes no flatter than that
 
 KEPT, CLEARED, EXCLUDED = 0, 1, 2  # a margin over a box: undecided, kept everywhere, broken for every x
+
+
+def take_rows(columns: Sequence[NDArray[Any]], which: Flags | Indices) -> list[NDArray[Any]]:
+    """Take some rows of each column; flags are made indices once for all of them."""
+    rows = np.flatnonzero(which) if which.dtype == np.bool_ else which
+    return [column.take(rows, 0) for column in columns]
 
 
 class TaylorBounds(NamedTuple):
@@ -72,7 +79,7 @@ class LinearBounds(NamedTuple):
 
     def take(self, which: Flags | Indices) -> LinearBounds:
         """Keep some of the boxes."""
-        return LinearBounds(*(column[which] for column in self))
+        return LinearBounds(*take_rows(self, which))
 
 
 class CellFractions(NamedTuple):
@@ -91,7 +98,7 @@ class CellFractions(NamedTuple):
 
     def take(self, which: Flags) -> CellFractions:
         """Keep some of the cells."""
-        return CellFractions(*(column[which] for column in self))
+        return CellFractions(*take_rows(self, which))
 
 
 class PlaneCuts(NamedTuple):

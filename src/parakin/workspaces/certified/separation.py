@@ -40,10 +40,12 @@ def find_joined_cells(cells: Cells, position: Array) -> Flags | None:
 def _paint_ranges(first: Indices, last: Indices) -> Flags:
     """Paint boxes of voxels, each from its first to its last one: sums of differences at their corners."""
     d = first.shape[1]
-    sums = np.zeros(last.max(0) + 2, np.int64)
+    shape = tuple(last.max(0) + 2)
+    sums = np.zeros(shape, np.int64)
     for corner in product((0, 1), repeat=d):
-        index = np.where(np.array(corner, bool), last + 1, first)
-        np.add.at(sums, tuple(index.T), (-1) ** sum(corner))
+        index = [(last[:, k] + 1) if above else first[:, k] for k, above in enumerate(corner)]
+        counts = np.bincount(np.ravel_multi_index(index, shape), minlength=sums.size)
+        sums += (-1) ** sum(corner) * counts.reshape(shape)
     for axis in range(d):
         sums = sums.cumsum(axis)
     return np.asarray(sums > 0)

@@ -22,7 +22,7 @@ from ...arrays import Array, Flags, Indices, Progress
 from ...budget import Budget
 from .constraints import Constraint
 from .orientation_boxes import OrientationBoxes, concatenate_boxes
-from .plane_cuts import CellFractions
+from .plane_cuts import CellFractions, take_rows
 
 FIRST = 8  # cells along the longest side of the first box
 MOST = 3_000_000  # undecided cells at a time
@@ -71,18 +71,36 @@ class Cells:
         return float(np.einsum("n,n->", fractions, self.volumes))  # BLAS' threads go on spinning
 
     @cached_property
+    def totals(self) -> Array:
+        """The volumes that are inside at least, at most and likely, (3,) mm³ (mm² in the plane)."""
+        return np.array([self.total(fractions) for fractions in (self.inner, self.outer, self.estimate)])
+
+    @property
     def gap(self) -> float:
         """(outer - inner)/estimate; 0 if both are zero."""
-        outer, inner, estimate = (self.total(fractions) for fractions in (self.outer, self.inner, self.estimate))
-        return (outer - inner) / estimate if estimate > 0.0 else (np.inf if outer > 0.0 else 0.0)
+        return compute_gap(self.totals)
+
+    @cached_property
+    def corners(self) -> tuple[Array, Array]:
+        """The box about all cells, (d,) mm each; of no cells it is inverted."""
+        low = [column.min(initial=inf) for column in self.low.T]
+        high = [column.max(initial=-inf) for column in (self.low + self.size).T]
+        return np.array(low), np.array(high)
 
     def take(self, which: Flags | Indices) -> Cells:
         """Keep some of the cells."""
-        columns: dict[str, Any] = {name: getattr(self, name)[which] for name in _COLUMNS}
+        rows = take_rows([getattr(self, name) for name in _COLUMNS], which)
+        columns: dict[str, Any] = dict(zip(_COLUMNS, rows, strict=True))
         return replace(self, **columns)
 
     def __repr__(self) -> str:
         return f"<parakin cells: {len(self.low)}, {np.count_nonzero(self.inside)} of them inside>"
+
+
+def compute_gap(totals: Array) -> float:
+    """Compute (outer - inner)/estimate of the totals of :class:`Cells`; 0 if both are zero."""
+    inner, outer, estimate = totals.tolist()
+    return (outer - inner) / estimate if estimate > 0.0 else (inf if outer > 0.0 else 0.0)
 
 
 def multiply_columns(rows: Array) -> Array:
@@ -204,7 +222,11 @@ class Subdivision(ABC):
 
     def collect_cells(self, stopped: str) -> Cells:
         """Put all cells together, with the reason why the subdivision stopped."""
-        return replace(concatenate_cells([*self.decided_cells, self.open_cells]), stopped=stopped, rounds=self.rounds)
+        return replace(concatenate_cells(self._groups), stopped=stopped, rounds=self.rounds)
+
+    @property
+    def _groups(self) -> list[Cells]:
+        return [*self.decided_cells, self.open_cells]
 
     def tighten(self, fraction: float, budget: Budget | None = None) -> tuple[Array, Array] | None:
         """Refine the outermost cells until none is larger than a fraction of the box about all cells.
@@ -213,14 +235,14 @@ class Subdivision(ABC):
         and so are all where the budget is spent.
         """
         while True:
-            cells, open_cells = self.collect_cells("gap"), self.open_cells
-            if not len(cells.low):
+            corners = [group.corners for group in self._groups]
+            low, high = np.min([ends[0] for ends in corners], 0), np.max([ends[1] for ends in corners], 0)
+            if not (low <= high).all():
                 return None
-            low, high = cells.low.min(0), (cells.low + cells.size).max(0)
             slack = 1e-9 * (high - low)
-            outermost = (open_cells.low <= low + slack) | (open_cells.low + open_cells.size >= high - slack)
-            is_coarse = open_cells.longest_edges > (high - low).max() * fraction
-            coarse = np.flatnonzero(reduce(np.logical_or, outermost.T) & is_coarse)
+            coarse = np.flatnonzero(self.open_cells.longest_edges > (high - low).max() * fraction)
+            bottom, top = self.open_cells.low[coarse], (self.open_cells.low + self.open_cells.size)[coarse]
+            coarse = coarse[((bottom <= low + slack) | (top >= high - slack)).any(1)]
             if not len(coarse) or len(coarse) > OUTERMOST or (budget is not None and budget.is_spent()):
                 return low, high
             self.refine(coarse, budget)
@@ -238,23 +260,27 @@ class Subdivision(ABC):
         """
         try:
             while True:
-                cells = self.collect_cells("gap")
-                stopped, parents = self._choose_parents(cells, gap, cell)
+                totals = np.sum([group.totals for group in self._groups], 0)
+                stopped, parents = self._choose_parents(totals, gap, cell)
                 if not stopped and budget is not None and budget.is_spent():
                     stopped = "time"
                 if stopped:
-                    return replace(cells, stopped=stopped)
+                    return self.collect_cells(stopped)
                 if progress:
-                    progress(min(1.0, gap / cells.gap) if cells.gap > 0 else 1.0)
+                    left = compute_gap(totals)
+                    progress(min(1.0, gap / left) if left > 0 else 1.0)
                 self.refine(parents, budget)
         except KeyboardInterrupt:
             return self.collect_cells("interrupted")
 
-    def _choose_parents(self, cells: Cells, gap: float, cell: float | None) -> tuple[str, Indices]:
-        """Choose which open cells to refine, the worst first; returns why to stop, or "", and their indices."""
+    def _choose_parents(self, totals: Array, gap: float, cell: float | None) -> tuple[str, Indices]:
+        """Choose which open cells to refine, the worst first; returns why to stop, or "", and their indices.
+
+        totals : of all cells
+        """
         open_cells = self.open_cells
         large = open_cells.longest_edges > (self.finest if cell is None else max(cell * (1.0 + 1e-9), self.finest))
-        if cell is None and cells.gap <= gap:
+        if cell is None and compute_gap(totals) <= gap:
             return "gap", np.zeros(0, np.int64)
         if not large.any():
             return ("resolution" if cell is None else "cell"), np.zeros(0, np.int64)
@@ -266,7 +292,7 @@ class Subdivision(ABC):
         if cell is not None:
             return "", order
         rest = float(undecided[large].sum()) - np.cumsum(undecided[order])  # if all up to here were decided
-        return "", order[: int(np.searchsorted(-rest, -0.5 * gap * cells.total(cells.estimate))) + 1]
+        return "", order[: int(np.searchsorted(-rest, -0.5 * gap * totals[2])) + 1]
 
 
 def _snap_to_grid(low: Array, high: Array, counts: Indices) -> tuple[Array, Array]:

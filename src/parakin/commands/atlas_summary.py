@@ -75,7 +75,8 @@ def format_atlas(atlas: Atlas) -> str:
         head += " at " + ", ".join(
             f"{axis} {_format_axis_value(value, units[axis])}" for axis, value in atlas.map.region.fixed_axes.items()
         )
-    lines = [head, f"{len(inside.poses):,} places on a grid of {atlas.map.step:g} mm, extremes found between them"]
+    grid = f"{len(inside.poses):,} places on a grid of {atlas.map.step:g} mm"
+    lines = [head, f"{grid}, extremes found by search between them, not proved"]
     lines += [_format_length(inside.length)] * (inside.length.value is not None)
     rows = []
     for extreme in atlas.extremes:

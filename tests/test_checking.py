@@ -242,7 +242,9 @@ def test_what_takes_too_long_is_told(monkeypatch):
     monkeypatch.setattr("parakin.toolpath.checking.motion_bisection.MOST_CUTS", 0)
     checked = check_path(posted_on(machine, poses))
     assert [offence.limit for offence in checked.offences] == ["untold"]
-    assert checked.first.text == "whether this motion keeps all limits can't be told"
+    longest = machine.inverse(poses)[:, 0].max()
+    text = f"whether this motion keeps all limits can't be told: leg tower_a is {longest:,.2f} mm, limit "
+    assert checked.first.text.startswith(text)
     assert (checked.first.record, checked.broken_motion_count) == (1, 1)
 
 

@@ -8,6 +8,7 @@ from dense_deviations import UNDER, axis_of, path_of, programmed, tools, within
 from scipy.spatial.transform import Rotation
 from shipped import load_shipped
 
+import parakin as pk
 from parakin.toolpath.linearise.linearise import linearise_path
 from parakin.toolpath.linearise.pole_steps import PoleSteps
 from parakin.toolpath.linearise.pole_swings import note_swings
@@ -119,3 +120,20 @@ def test_a_step_longer_than_the_travel_over_which_a_swing_is_measured():
     (note,) = note_swings(pole, path, steps, [])
     turn = 2.0 * math.degrees(math.atan(0.15 / 0.005))  # over 0.3 of travel, of which 0.1 counts
     assert f"theta1 swings {turn / 3.0:.0f}°" in note.text
+
+
+def test_a_pass_that_is_refused_leaves_its_neighbours_holds(tmp_path):
+    # C turns by 43° on the pole without the holds, and the pass between them is bent by 20°.
+    file = tmp_path / "holds.cls"
+    file.write_text(
+        "TOOL PATH/STAR\nFEDRAT/1000.0,MMPM\n"
+        "GOTO/27.508648,0.224312,24.507783,0.123051,0.078926,0.989257\n"
+        "GOTO/28.379296,0.236486,22.023002,0.000000,0.000000,1.000000\n"
+        "GOTO/28.378924,0.227038,22.023831,0.106611,0.412754,0.904582\n"
+        "GOTO/28.378924,0.227038,22.023831,-0.000009,-0.000005,1.000000\n"
+        "GOTO/28.378468,0.228268,22.021668,-0.039888,-0.035276,0.998581\nFINI\n"
+    )
+    machine = load_shipped("orthoglide5_table")
+    job = pk.prepare(machine, pk.read_path(file))
+    assert job.posted.first is None
+    assert job.trajectory is not None

@@ -45,7 +45,8 @@ def _find_on_motion(posted: Posted, bisection: MotionBisection, column: int) -> 
         offence = make_turns_offence(posted, bisection)
         return offence.begins, offence
     if column == bisection.undecided:
-        return 1.0, make_undecided_offence(posted, bisection)
+        offence = make_undecided_offence(posted, bisection)
+        return offence.begins, offence
     share = find_first_broken_share(bisection, tally.motion, column, tally.share)
     if column == bisection.singular:
         return share, make_singularity_offence(posted, tally.motion, share, tally.count)

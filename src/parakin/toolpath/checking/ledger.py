@@ -62,6 +62,23 @@ class Jump:
     off_axis: float | None
 
 
+@dataclass(frozen=True)
+class Doubt:
+    """What a motion could not be proved for when its bisection was given up.
+
+    motion, share : where
+    joint, turn : the turning joint that goes farthest on one of its sections, and by how many rad; -1 without one
+    column, margin : the unproved limit of which least is left at the ends of its sections, and how much; -1 for none
+    """
+
+    motion: int
+    share: float
+    joint: int
+    turn: float
+    column: int
+    margin: float
+
+
 @dataclass(frozen=True, eq=False)
 class Ledger:
     """The state of the proofs of n motions, one column for each limit.

@@ -7,7 +7,7 @@ import numpy as np
 from ...arrays import Array, Flags, Indices, Progress
 from ...kinematics.wrist.pole_thresholds import FLIP
 from ..posting.posted import Posted
-from .ledger import Jump, Ledger, Tally
+from .ledger import Doubt, Jump, Ledger, Tally
 from .margin_bounds import MotionProver
 from .motion_runs import find_unproved_motions, split_into_blocks
 from .motion_sections import Sections
@@ -16,6 +16,7 @@ from .motions import MotionPoints, PathMotions, find_pole_crossings, merge_wrist
 SECTIONS_AT_ONCE = 1 << 13
 MOST_CUTS = 1 << 16  # greatest number of cuts of one motion; after them it stays undecided
 PATH_CUTS, MOTION_CUTS = 1 << 18, 64  # of a path, and for each motion of it; then all that is left stays undecided
+_STILL_TURNS = np.radians(1.0)  # a joint that turns by more on a section is what keeps it from being proved
 _MOST_TURN = 1.5 * np.pi  # rad: only a joint whose turns are counted wrong goes farther on the shortest section
 
 
@@ -27,6 +28,7 @@ class MotionBisection:
     floor : (limits,) what a margin has to reach to count as kept
     tallies : one for each column
     jump : the first joint that can't go on from record to record
+    doubt : of the first motion that was given up, what is not proved
     cuts_left : how many cuts the whole path may still take
     broken_motions : (n,) 1 + a column that the motion to a record breaks though its ends keep it, else zero
     """
@@ -40,6 +42,7 @@ class MotionBisection:
         self.floor = -self.prover.tolerance
         self.tallies = [Tally() for _ in range(self.limits + 3)]
         self.jump: Jump | None = None
+        self.doubt: Doubt | None = None
         self.broken_motions = np.zeros(len(posted.path), np.int64)
         self.cuts_left = PATH_CUTS + MOTION_CUTS * len(posted.path)
 
@@ -93,7 +96,7 @@ class MotionBisection:
             finest = self.prover.find_finest(sections)
             self._find_jumps(sections.select(finest & unproved[:, self.turns]), ledger)
             going = (unproved & ledger.unproved[sections.number]).any(1) & ~finest
-            self._count_cuts(sections.number[going], ledger)
+            self._count_cuts(sections.select(going), unproved[going], ledger)
             going &= ledger.unproved[sections.number].any(1)
             sections, unproved = sections.select(going), unproved[going]
             if len(sections):
@@ -129,13 +132,36 @@ class MotionBisection:
         passed = self.find_passed_singularities(*determinants)
         ledger.mark_broken(doubtful.number[passed], self.singular, doubtful.end[passed])
 
-    def _count_cuts(self, number: Indices, ledger: Ledger) -> None:
+    def _count_cuts(self, sections: Sections, unproved: Flags, ledger: Ledger) -> None:
         """Count the cuts of motions; those cut too often stay undecided, and all where the path is."""
-        np.add.at(ledger.cuts, number, 1)
-        self.cuts_left -= len(number)
+        np.add.at(ledger.cuts, sections.number, 1)
+        self.cuts_left -= len(sections)
         given_up = np.flatnonzero(((ledger.cuts > MOST_CUTS) | (self.cuts_left < 0)) & ledger.unproved.any(1))
+        rows = np.flatnonzero(np.isin(sections.number, given_up))
+        if self.doubt is None and len(rows):
+            rows = rows[sections.number[rows] == sections.number[rows].min()]
+            self.doubt = self._find_doubt(sections.select(rows), unproved[rows])
         ledger.mark_broken(given_up, self.undecided, np.ones(len(given_up)))
         ledger.unproved[given_up] = False
+
+    def _find_doubt(self, sections: Sections, unproved: Flags) -> Doubt:
+        """Find what keeps sections of a motion from being proved: a joint that turns far, or a limit that is near."""
+        turning = self.motions.turning_joints
+        turn = np.abs(sections.last.joints - sections.first.joints)[:, turning]
+        row, number = divmod(int(turn.argmax()), len(turning)) if turning else (0, -1)
+        margins = np.minimum(sections.first.margins, sections.last.margins)
+        left = np.where(unproved[:, : self.limits], margins, np.inf)
+        near, column = divmod(int(left.argmin()), self.limits)
+        turns = number >= 0 and turn[row, number] > _STILL_TURNS
+        known = bool(np.isfinite(left[near, column]))
+        return Doubt(
+            int(sections.motion[0]),
+            float(sections.begin[row if turns else near]),
+            turning[number] if turns else -1,
+            float(turn[row, number]) if turns else 0.0,
+            column if known else -1,
+            float(left[near, column]),
+        )
 
     def _find_jumps(self, sections: Sections, ledger: Ledger) -> None:
         """Find turning joints that jump on sections too short to be cut."""

@@ -5,10 +5,10 @@ from __future__ import annotations
 import math
 
 from ...kinematics.turns import TURN
-from ..posting.offence_texts import describe_broken_limit, format_measure
+from ..posting.offence_texts import describe_broken_limit, format_bound, format_measure
 from ..posting.offences import SINGULARITY, TURNS, UNDECIDED
 from ..posting.posted import Offence, Posted
-from .ledger import WorstMargin
+from .ledger import Doubt, WorstMargin
 from .motion_bisection import MotionBisection
 
 
@@ -46,8 +46,24 @@ def make_singularity_offence(posted: Posted, motion: int, share: float, count: i
 
 
 def make_undecided_offence(posted: Posted, bisection: MotionBisection) -> Offence:
-    """Make the offence of the first motion that bisection could not decide."""
-    tally = bisection.tallies[bisection.undecided]
-    text = "whether this motion keeps all limits can't be told"
+    """Make the offence of the first motion that bisection could not decide, with what hinders the proof."""
+    tally, doubt = bisection.tallies[bisection.undecided], bisection.doubt
+    text, share = "whether this motion keeps all limits can't be told", 1.0
+    if doubt is not None and doubt.motion == tally.motion:
+        text, share = f"{text}: {_describe_doubt(posted, doubt)}", doubt.share
     line = int(posted.path.line[tally.motion])
-    return Offence(UNDECIDED, text, tally.motion, line, math.nan, 0.0, "1", math.inf, tally.count)
+    return Offence(UNDECIDED, text, tally.motion, line, math.nan, 0.0, "1", math.inf, tally.count, share, share)
+
+
+def _describe_doubt(posted: Posted, doubt: Doubt) -> str:
+    machine = posted.machine
+    if doubt.joint >= 0:
+        joint, turn = machine.joints[doubt.joint], format_measure(doubt.turn, "rad", 0.0)
+        return f"joint {joint} goes {turn} on a short piece of it"
+    if doubt.column < 0:
+        return "no bound keeps it from a parallel singularity"
+    limit = machine.limit_definitions[doubt.column]
+    if limit.side == "reach":
+        return f"{limit.subject} nearly can't close"
+    value, bound = limit.value(doubt.margin), format_bound(limit.bound, limit.unit)
+    return f"{limit.subject} is {format_measure(value, limit.unit, limit.bound)}, limit {bound}"

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...arrays import Flags, Indices
+from ...arrays import Array, Flags, Indices
 from ...kinematics.wrist.pole_thresholds import EXACT, PRINTED, REPORTED, is_upright
 from ..path import Note
 from ..posting.posted import Posted
@@ -100,23 +100,32 @@ def _lead_within_tolerance(deviation: Deviation, posted: Posted, near: _MotionsN
 
 
 def _find_moved_too_far(deviation: Deviation, led: PolePasses) -> set[tuple[str, float]]:
-    """Find the passes about which the path now leaves the programmed one by more than it may."""
-    too_far: set[tuple[str, float]] = set()
+    """Find the passes and holds about which the path now leaves the programmed one by more than it may.
+
+    Between two of them it is the nearer one's doing.
+    """
     if led.posted.path is deviation.programmed.path:
-        return too_far
+        return set()
     path, positions = ProgrammedPath(led.posted.path, led.posted.frame), led.positions
-    passed = positions.passed
+    passed, count = positions.passed, len(SHARES)
     keys = [pole_pass.key for pole_pass in led.passes] + [hold.key for hold in led.holds]
-    for key, pole_pass in zip(keys, (*led.passes, *(hold.located for hold in led.holds)), strict=True):
+    nearest = np.full(len(passed) * count, np.inf)  # of each place that is too far off: how far the next of them is
+    places: list[tuple[Indices, Array]] = []
+    for pole_pass in (*led.passes, *(hold.located for hold in led.holds)):
         first, last = np.searchsorted(passed, [pole_pass.begin - 1.0, pole_pass.end + 1.0])
-        motion = np.arange(max(int(first), 1), min(int(last) + 1, len(passed))).repeat(len(SHARES))
+        motion = np.arange(max(int(first), 1), min(int(last) + 1, len(passed))).repeat(count)
         share = np.resize(SHARES, len(motion))
-        programmed_share = positions.begin[motion] + share * (positions.end - positions.begin)[motion]
+        span = (positions.end - positions.begin)[motion]
+        programmed_share = positions.begin[motion] + share * span
         programmed_axis = deviation.programmed.interpolate(positions.record[motion], programmed_share)[1]
         off = path.interpolate(motion, share)[1] - programmed_axis
-        if np.sqrt((off * off).sum(1).max(initial=0.0)) > _MOST_BETWEEN * deviation.angle:
-            too_far.add(key)
-    return too_far
+        far = np.flatnonzero(np.sqrt((off * off).sum(1)) > _MOST_BETWEEN * deviation.angle)
+        at = (positions.record[motion] - 1 + programmed_share)[far]
+        apart = np.maximum(np.maximum(pole_pass.begin - at, at - pole_pass.end), 0.0)
+        place = (motion[0] * count if len(motion) else 0) + far
+        nearest[place] = np.minimum(nearest[place], apart)
+        places.append((place, apart))
+    return {key for key, (place, apart) in zip(keys, places, strict=True) if (apart <= nearest[place]).any()}
 
 
 def _lead_unless_refused(

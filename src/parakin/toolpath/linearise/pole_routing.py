@@ -16,8 +16,8 @@ from .poles import Pole
 
 _MOST_MOVED = 0.98  # of the angle tolerance: what an axis may be moved; the rest is for rounding
 _BENT = 0.342  # sine of 20°, of the way into the circle off the line through the pole: what bends more is held
-_WIDEST = 0.385  # greatest t·(1 - t²): the most by which a straight way is squeezed, of its offset on the circle
-_STRAIGHT = 5e-4  # the same: what bends less turns by so little on the pole that any controller takes it
+_WIDEST = 0.385  # greatest t·(1 - t²): the most by which a straight way is squeezed, of its offset where a = radius
+_STRAIGHT = 5e-4  # of the offset on the circle: what bends less turns so little on the pole that controllers take it
 _SNAPPED = 0.2  # fraction of the angle tolerance: a record that would be led so near to the pole is put onto it
 _INNERMOST = 0.02  # fraction of the angle tolerance: the first radius at which records keep a way straight
 _GROWTH, _OUTERMOST = 4.0, 0.7  # of these radii, and the last one as a fraction of the circle's
@@ -147,17 +147,19 @@ def _route_through_pole(
     entries = meet_circle(x[0], x[1], radius), meet_circle(x[-1], x[-2], radius)
     # What is left to move where the path enters and leaves the circle.
     offsets = [abs(float(entry @ normal)) for entry in entries if entry is not None]
-    edge = [offset**3 / radius**2 for offset in offsets]
-    bends = squeeze.is_pose and (not pole.is_upright or max(offsets, default=0.0) > _STRAIGHT * radius)
+    edge, widest = [offset**3 / radius**2 for offset in offsets], max(offsets, default=0.0)
+    if widest > _BENT * radius:
+        return None
+    bends = squeeze.is_pose and (not pole.is_upright or widest > _STRAIGHT * radius)
     shift = _find_shift(pole, programmed, steps, window) if bends else 0.0
     a = a + np.where(weight > 0.0, shift, 0.0)
     crossings = np.flatnonzero(a[:-1] * a[1:] < 0.0)
     fraction = a[crossings] / (a[crossings] - a[crossings + 1])
     miss_line = np.abs(b[crossings] + fraction * (b[crossings + 1] - b[crossings]))
-    between = _WIDEST * max(offsets, default=0.0)  # where the way to the pole is straight
+    between = _WIDEST * widest / np.sqrt(1.0 - (widest / radius) ** 2)  # where the way to the pole is straight
     if not max(between, np.abs(weight * b).max(), *miss_line, *edge) <= _MOST_MOVED * angle:
         return None
-    if len(crossings) > 1 or max(offsets, default=0.0) > _BENT * radius:
+    if len(crossings) > 1:
         return None
     records = np.concatenate([[steps.record[first] - (steps.begin[first] == 0.0)], steps.record[inside_window]])
     at_record = np.concatenate([[steps.begin[first] == 0.0], steps.end[inside_window] == 1.0])

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from typing import BinaryIO, TypeAlias
 
 import numpy as np
@@ -22,6 +22,24 @@ def find_finite_rows(rows: Array) -> Flags:
     for column in rows.T:
         finite &= np.isfinite(column)
     return finite
+
+
+def find_finite_matrices(*stacks: Array) -> Flags:
+    """Tell of which matrices, all stacks (N, m, n) have one, every entry is finite, (N,)."""
+    finite = np.ones(len(stacks[0]), np.bool_)
+    for stack in stacks:
+        finite &= np.isfinite(stack).all((1, 2))
+    return finite
+
+
+def make_lattice(lines: Sequence[Array | Sequence[float]]) -> Array:
+    """Make all points (N, d) of a lattice from the values along its d axes; the last one changes first."""
+    return np.stack(np.meshgrid(*lines, indexing="ij"), -1).reshape(-1, len(lines))
+
+
+def count_repeats(counts: Indices) -> Indices:
+    """Count the repeats of each row from 0, as ``np.repeat`` by ``counts`` has them: 0 1 2, 0, 0 1 for 3, 1, 2."""
+    return np.asarray(np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts))
 
 
 def split_rows(count: int, size: int) -> Iterator[slice]:

@@ -26,6 +26,7 @@ from .commands.import_ import import_machine
 from .commands.kinematics import forward, inverse
 from .commands.linuxcnc import linuxcnc
 from .commands.machines import machines, show
+from .commands.options import INTERRUPTED
 from .commands.page import page
 from .commands.post import post
 from .commands.reach import reach
@@ -37,7 +38,6 @@ from .errors import InputError, ParakinError
 from .version import __version__
 
 _MALFORMED = 2
-_INTERRUPTED = 130
 _BROKEN_PIPE = 141
 _COMPLETE = "__complete"  # by which a shell's completion calls
 
@@ -85,7 +85,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return _MALFORMED
     except KeyboardInterrupt:
         print_remark("parakin: interrupted")
-        return _INTERRUPTED
+        return INTERRUPTED
     except BrokenPipeError:
         _discard_output()
         return _BROKEN_PIPE

@@ -14,6 +14,7 @@ from typing import TypeAlias
 
 from .errors import quote, suggest
 
+INCH = 25.4  # mm
 # Units of a pose's axes and a frame's values, ISO 841.
 AXIS_UNITS = {"X": "mm", "Y": "mm", "Z": "mm", "A": "rad", "B": "rad", "C": "rad"}
 
@@ -84,7 +85,7 @@ class UnreadSizeError(QuantityError):
 
 
 def _build_units() -> dict[str, tuple[float, Dimension]]:
-    lengths = {"mm": 1.0, "cm": 10.0, "m": 1000.0, "in": 25.4, "um": 1e-3, "µm": 1e-3}
+    lengths = {"mm": 1.0, "cm": 10.0, "m": 1000.0, "in": INCH, "um": 1e-3, "µm": 1e-3}
     angles = {"deg": math.pi / 180.0, "°": math.pi / 180.0, "rad": 1.0}
     units = {"rpm": (2.0 * math.pi / 60.0, ANGULAR_SPEED.dimension)}
     units |= {"s": (1.0, TIME.dimension), "min": (60.0, TIME.dimension)}

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from ..machine import Machine
 
 OFF_LIMITS = 3  # exit code
+INTERRUPTED = 130  # exit code: as shells have it, 128 and SIGINT's number
 YAML_ENDINGS = (".yaml", ".yml")  # of machine files and design problems
 
 

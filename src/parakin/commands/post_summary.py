@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..controllers import Target, load_controller
 from ..export.number_format import format_duration, format_fixed
-from ..units import AXIS_UNITS, to_display
+from ..units import to_display
 from .console import format_table
 from .offences import format_offence
 
@@ -77,7 +77,7 @@ def _format_verdict(job: Job) -> str:
 
 def _format_placement(placement: Placement, is_turned: bool, runs: bool) -> str:
     """Format a placement with its margin, or without where the turn, which has a line of its own, tells another."""
-    values = ",".join(f"{axis}={to_display(value, AXIS_UNITS[axis]):.6g}" for axis, value in placement.values.items())
+    values = placement.format_values()
     if placement.allowed and not runs:
         return f"no placement was found at which the path runs; best for its records alone is --workpiece {values}"
     if is_turned:

@@ -12,7 +12,7 @@ from cyclopts import Parameter
 from ..errors import InputError, PoseError
 from ..export.json.text import format_json
 from .console import ProgressBar, announce_compiling, print_json, print_remark, print_text
-from .options import OFF_LIMITS, Json, Mode, Name, Sizes, load_machine, require_ending
+from .options import INTERRUPTED, OFF_LIMITS, Json, Mode, Name, Sizes, load_machine, require_ending
 from .region_options import AllParts, At, Every, Some, Time, Without, parse_length, parse_time, read_region
 from .workspace_inside import InsideOptions, check_inside, encode_inside, explore_inside, format_inside
 from .workspace_methods import Effort, Method, find_workspace
@@ -22,7 +22,6 @@ if TYPE_CHECKING:
     from ..export.files import Content
     from ..export.workspace.workspace_files import WorkspaceFiles
 
-_INTERRUPTED = 130  # exit code
 _ELSEWHERE = 10.0  # s, at most, for what home can't reach
 
 MachineArgument = Annotated[
@@ -164,7 +163,7 @@ def workspace(
     for path, reason in refused.items():
         print_remark(f"{path}: not written, {reason}")
     if isinstance(result, Workspace) and result.stopped == "interrupted":
-        return _INTERRUPTED
+        return INTERRUPTED
     return OFF_LIMITS if refused or inside.no_box else 0
 
 

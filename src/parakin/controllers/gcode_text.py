@@ -14,7 +14,7 @@ DIGITS = {"mm": 6, "rad": 8}
 _DIGITS_OF_F = 6
 LONGEST_COMMENT = 200  # characters; LinuxCNC takes 255 in a line
 CHUNK = 1 << 16  # motions written at a time
-_ROWS = 1 << 14  # formatted at a time
+ROWS = 1 << 14  # formatted at a time
 
 
 def to_display(values: Array, units: Sequence[str], digits: Mapping[str, int] = DIGITS) -> Array:
@@ -32,7 +32,7 @@ def format_blocks(lead: str, letters: Sequence[str], units: Sequence[str], rows:
     words = " ".join(f"{letter}%.{DIGITS[unit]}f" for letter, unit in zip(letters, units, strict=True))
     line = f"{lead}{words} F%.{_DIGITS_OF_F}f\n"
     table = np.column_stack([rows, 60.0 / seconds])
-    chunks = [table[begin : begin + _ROWS] for begin in range(0, len(table), _ROWS)]
+    chunks = [table[begin : begin + ROWS] for begin in range(0, len(table), ROWS)]
     return "".join(line * len(chunk) % tuple(chunk.ravel().tolist()) for chunk in chunks)
 
 

@@ -37,7 +37,7 @@ class BodyMass(NamedTuple):
 
 
 _AS_DRAWN = BodyBuild()
-_TONNE = 1e3  # kg
+TONNE = 1e3  # kg
 NOTHING = BodyMass(0.0, np.zeros(3), np.zeros((3, 3)))
 
 
@@ -67,7 +67,7 @@ def _compute_mass(body: Body, multibody: Multibody) -> BodyMass:
     if not body.bars:
         return NOTHING
     build = multibody.builds.get(body.kind, _AS_DRAWN)
-    density = DENSITIES[body.kind] * METRE**3 if build.density is None else build.density * _TONNE  # kg/mm³
+    density = DENSITIES[body.kind] * METRE**3 if build.density is None else build.density * TONNE  # kg/mm³
     radius = find_radius(multibody, body.kind)
     solids = [_weigh_bar(start, end, radius, density) for start, end in body.bars]
     if build.wall is not None:
@@ -77,7 +77,7 @@ def _compute_mass(body: Body, multibody: Multibody) -> BodyMass:
     if carrier == body.name:
         solids.append(_weigh_disc(rotation[:, 2], origin, DISC * multibody.size, radius, density))
     joined = _join(solids)
-    factor = build.rods if build.mass is None else build.mass * _TONNE / joined.mass
+    factor = build.rods if build.mass is None else build.mass * TONNE / joined.mass
     return BodyMass(factor * joined.mass, joined.centre, factor * joined.inertia)
 
 

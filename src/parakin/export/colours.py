@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from ..toolpath.timing import Trajectory
 
-INK, FAINT = "#263238", "#e3e8ec"
+INK, FAINT, BLUE = "#263238", "#e3e8ec", "#1565c0"
 _FEED, _REST = "#9fb3c0", "#546e7a"
 _COLOURS = (
     "#d32f2f", "#f57c00", "#7b1fa2", "#00838f", "#c2185b", "#558b2f", "#5d4037", "#fbc02d",

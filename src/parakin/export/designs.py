@@ -9,13 +9,12 @@ from ..synthesis.designs import Designs, ProvedDesign
 from ..synthesis.problem import DesignProblem
 from ..synthesis.wants import WANTS
 from ..units import name_display_unit, to_display
-from .colours import FAINT, INK
+from .colours import BLUE, FAINT, INK
 from .figure_file import SCREEN, render_figure
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-_COLOUR = "#1565c0"
 _SHOWN = {"mm³": ("litres", 1e-6)}  # units that are shown for others
 _ALIKE = 2e-6  # relative: what is proved to that is what was found
 
@@ -112,7 +111,7 @@ def render_front(designs: Designs, suffix: str = SCREEN) -> bytes:
             axes = figure.add_axes(((0.9 + 5.6 * place) / width, 0.13, 4.9 / width, 0.74))
             points = [(values[first], values[second]) for values in shown]
             line = "o-" if len(others) == 1 else "o"
-            axes.plot(*zip(*points, strict=True), line, color=_COLOUR, markersize=5, linewidth=1.0)
+            axes.plot(*zip(*points, strict=True), line, color=BLUE, markersize=5, linewidth=1.0)
             for number, point in enumerate(points, 1):
                 axes.annotate(str(number), point, xytext=(5, 5), textcoords="offset points", color=INK, fontsize=9)
             axes.grid(color=FAINT, linewidth=0.6)

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from ..arrays import make_lattice
 from ..errors import PoseError
 from ..performance.extremes import compute_slack
 from ..workspaces.certified.region import make_region
@@ -63,7 +64,7 @@ def render_position_map(
     low, high = around[:, columns].min(0), around[:, columns].max(0)
     margin = 0.1 * (high - low)
     grid = [np.linspace(a, b, _CELLS) for a, b in zip(low - margin, high + margin, strict=True)]
-    positions = np.stack(np.meshgrid(*grid, indexing="ij"), -1).reshape(-1, 2)
+    positions = make_lattice(grid)
     home = zip(machine.axes, machine.home.tolist(), strict=True)
     region = make_region(machine, at={axis: value for axis, value in home if axis not in shown})
     room = compute_slack(region, positions).reshape(_CELLS, _CELLS)
@@ -140,7 +141,7 @@ def _compute_room(region: Region, grid: Sequence[Array]) -> tuple[list[Array], A
     """Compute where there is room, (y, x), on a finer grid: where legs end to close it jumps, and the outline too."""
     finer = max(1, _OUTLINED // max(map(len, grid)))
     lines = [np.linspace(line[0], line[-1], finer * (len(line) - 1) + 1) for line in grid]
-    slack = compute_slack(region, np.stack(np.meshgrid(*lines, indexing="ij"), -1).reshape(-1, 2))
+    slack = compute_slack(region, make_lattice(lines))
     room = slack.reshape(len(lines[0]), -1)
     outside = np.fmin(extend_grid(room), -_ROUNDING)  # where no leg closes
     return lines, np.nan_to_num(np.where(np.isfinite(room), room, outside), nan=-1.0).T

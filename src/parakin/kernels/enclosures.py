@@ -37,7 +37,7 @@ _WIDER = 2.0**-50  # eight units of roundoff
 _TINY = 1e-300  # where numbers vanish: bounds hold to within it
 _HUGE = 1e300  # where sums of sizes may overflow
 _OFF = 2e-15  # sincos and atan2 are within 4e-16 of libm's, which is within 2e-16
-_MASK = (1 << 40) - 1
+MASK = (1 << 40) - 1  # of places that are not negative: loops over them vectorise
 FAST = {"contract"}
 
 
@@ -123,13 +123,13 @@ def interpret(code, constants, r):
     use_widest_vectors()
     for i in range(code.shape[0]):
         op = code[i, 0]
-        d = (code[i, 1] & _MASK) * (2 * LANES)
-        a = (code[i, 2] & _MASK) * (2 * LANES)
-        b = (code[i, 3] & _MASK) * (2 * LANES)
-        c = (code[i, 4] & _MASK) * (2 * LANES)
-        e = (code[i, 5] & _MASK) * (2 * LANES)
-        f = (code[i, 6] & _MASK) * (2 * LANES)
-        g = (code[i, 7] & _MASK) * (2 * LANES)
+        d = (code[i, 1] & MASK) * (2 * LANES)
+        a = (code[i, 2] & MASK) * (2 * LANES)
+        b = (code[i, 3] & MASK) * (2 * LANES)
+        c = (code[i, 4] & MASK) * (2 * LANES)
+        e = (code[i, 5] & MASK) * (2 * LANES)
+        f = (code[i, 6] & MASK) * (2 * LANES)
+        g = (code[i, 7] & MASK) * (2 * LANES)
         k0, k1, k2, k3 = constants[i, 0], constants[i, 1], constants[i, 2], constants[i, 3]
         ab, ce, fg = a == b, c == e, f == g
         if op == QUAD1:

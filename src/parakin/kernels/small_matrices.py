@@ -11,14 +11,13 @@ import numpy as np
 from ..arrays import Array
 from .batch import run_in_threads
 from .compiling import njit
-from .enclosures import FAST
+from .enclosures import FAST, MASK
 from .intervals import freeze_rows
 from .numba_turns import use_widest_vectors
 
 LANES = 64  # matrices of a block: six rows and columns of them stay in the first-level cache
 _SWEEPS = 30  # of rotations; some six converge
 _SLANTED = 1e-16  # squared cosine of two rows; what is less is its own square after the next rotation
-_MASK = (1 << 40) - 1  # of places that are not negative: loops over them vectorise
 _FEW = 1024  # matrices that are worth a thread
 
 
@@ -73,32 +72,32 @@ def _solve_lanes(divisors, dividends, n, m, out, start, stop):
                 for k in range(m):
                     r[(i * width + n + k) * LANES + j] = dividends[row + j, i * m + k]
         for k in range(n):
-            d = ((k * width + k) & _MASK) * LANES
+            d = ((k * width + k) & MASK) * LANES
             for j in range(LANES):
                 best[j], pivot[j] = abs(r[d + j]), k
             for i in range(k + 1, n):
-                e = ((i * width + k) & _MASK) * LANES
+                e = ((i * width + k) & MASK) * LANES
                 for j in range(LANES):
                     size = abs(r[e + j])
                     pivot[j] = i if size > best[j] else pivot[j]
                     best[j] = size if size > best[j] else best[j]
             for i in range(k + 1, n):
                 for c in range(k, width):
-                    d, e = ((k * width + c) & _MASK) * LANES, ((i * width + c) & _MASK) * LANES
+                    d, e = ((k * width + c) & MASK) * LANES, ((i * width + c) & MASK) * LANES
                     for j in range(LANES):
                         x, y = r[d + j], r[e + j]
                         r[d + j] = y if pivot[j] == i else x
                         r[e + j] = x if pivot[j] == i else y
-            d = ((k * width + k) & _MASK) * LANES
+            d = ((k * width + k) & MASK) * LANES
             for c in range(k + 1, width):
-                e = ((k * width + c) & _MASK) * LANES
+                e = ((k * width + c) & MASK) * LANES
                 for j in range(LANES):
                     r[e + j] /= r[d + j]
             for i in range(n):
                 if i != k:
-                    f = ((i * width + k) & _MASK) * LANES
+                    f = ((i * width + k) & MASK) * LANES
                     for c in range(k + 1, width):
-                        d, e = ((i * width + c) & _MASK) * LANES, ((k * width + c) & _MASK) * LANES
+                        d, e = ((i * width + c) & MASK) * LANES, ((k * width + c) & MASK) * LANES
                         for j in range(LANES):
                             r[d + j] -= r[f + j] * r[e + j]
         for j in range(count):
@@ -121,8 +120,8 @@ def _rotate_lanes(rows, n, m, out, start, stop):
     """Rotate rows against each other until they are orthogonal; their lengths are the singular values."""
     use_widest_vectors()
     r = np.zeros((n * m + n + 4) * LANES)  # the rows, their squares, and four registers
-    squares = ((n * m) & _MASK) * LANES
-    product = ((n * m + n) & _MASK) * LANES
+    squares = ((n * m) & MASK) * LANES
+    product = ((n * m + n) & MASK) * LANES
     cosine, sine, turning = product + LANES, product + 2 * LANES, product + 3 * LANES
     for row in range(start, stop, LANES):
         count = min(LANES, stop - row)
@@ -134,18 +133,18 @@ def _rotate_lanes(rows, n, m, out, start, stop):
         for _ in range(_SWEEPS):
             r[squares:product], r[turning : turning + LANES] = 0.0, 0.0
             for i in range(n):
-                a = squares + (i & _MASK) * LANES
+                a = squares + (i & MASK) * LANES
                 for k in range(m):
-                    d = ((i * m + k) & _MASK) * LANES
+                    d = ((i * m + k) & MASK) * LANES
                     for j in range(LANES):
                         r[a + j] += r[d + j] * r[d + j]
             for p in range(n):
                 for q in range(p + 1, n):
-                    a, b = squares + (p & _MASK) * LANES, squares + (q & _MASK) * LANES
+                    a, b = squares + (p & MASK) * LANES, squares + (q & MASK) * LANES
                     for j in range(LANES):
                         r[product + j] = 0.0
                     for k in range(m):
-                        d, e = ((p * m + k) & _MASK) * LANES, ((q * m + k) & _MASK) * LANES
+                        d, e = ((p * m + k) & MASK) * LANES, ((q * m + k) & MASK) * LANES
                         for j in range(LANES):
                             r[product + j] += r[d + j] * r[e + j]
                     for j in range(LANES):
@@ -160,7 +159,7 @@ def _rotate_lanes(rows, n, m, out, start, stop):
                         r[cosine + j], r[sine + j] = c, c * t
                         r[a + j], r[b + j] = one - t * g, two + t * g
                     for k in range(m):
-                        d, e = ((p * m + k) & _MASK) * LANES, ((q * m + k) & _MASK) * LANES
+                        d, e = ((p * m + k) & MASK) * LANES, ((q * m + k) & MASK) * LANES
                         for j in range(LANES):
                             c, s, x, y = r[cosine + j], r[sine + j], r[d + j], r[e + j]
                             r[d + j] = c * x - s * y

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..arrays import Array, Flags
+from ..arrays import Array, Flags, find_finite_matrices
 
 _RANK = 1e-13  # a least singular value below this fraction of the greatest counts as zero
 
@@ -28,7 +28,7 @@ def invert_from_left(matrices: Array, metric: Array) -> Array:
     metric : (N, m, k) M with a regular MMᵀ; the inverse is (AᵀWA)⁻¹AᵀW with W = (MMᵀ)⁻¹
     """
     result: Array = np.full(matrices.swapaxes(1, 2).shape, np.nan)
-    good = np.flatnonzero(np.isfinite(matrices).all((1, 2)) & np.isfinite(metric).all((1, 2)))
+    good = np.flatnonzero(find_finite_matrices(matrices, metric))
     u, s, _ = np.linalg.svd(metric[good], full_matrices=False)
     regular = s[:, -1] > _RANK * s[:, 0]
     good, white = good[regular], u[regular].swapaxes(1, 2) / s[regular, :, None]

@@ -30,7 +30,7 @@ from ..algebra import (
 )
 from ..errors import DescriptionError
 from .elements import ROTATIONS, TRANSLATIONS, Drive, Step
-from .turning_angles import find_turn_middle, turn_back
+from .turning_angles import find_turn_middle, measure_angle_near
 
 UNIT: dict[str, Vec] = {
     word: tuple(1.0 if word[1] == letter else 0.0 for letter in "xyz") for word in (*TRANSLATIONS, *ROTATIONS)
@@ -172,7 +172,7 @@ class Pointing:
         angles = []
         for sign, drive, (s, c) in zip(self.signs, self.drives, turns, strict=True):
             zero = 0.0 if drive is None else sign * find_turn_middle(drive)
-            angles.append(sign * (atan2(s, c) if zero == 0.0 else zero + atan2(*turn_back(s, c, zero))))
+            angles.append(sign * measure_angle_near(zero, s, c))
         joints = (angles[0] if first is None else first, angles[1])
         return PointingAngles(joints, freedom, around, reach, turns, 1.0 - beta * beta)
 
@@ -185,6 +185,12 @@ def make_rotation_about(axis: Vec, s: Scalar, c: Scalar) -> Mat:
         tuple((1.0 if i == j else 0.0) * c + skew[i][j] * s + axis[i] * axis[j] * (1.0 - c) for j in range(3))
         for i in range(3)
     )
+
+
+def compute_fixed_axis_angles(r: Mat) -> tuple[Scalar, Scalar, Scalar]:
+    """Compute the turns of a rotation about the fixed axes x, y and z, in this order; the second in [-90°, 90°]."""
+    b = atan2(-r[2][0], sqrt(r[0][0] * r[0][0] + r[1][0] * r[1][0]))
+    return atan2(r[2][1], r[2][2]), b, atan2(r[1][0], r[0][0])
 
 
 def transform_to_local(rotation: Mat, origin: Vec, point: Vec) -> Vec:

@@ -21,16 +21,15 @@ def measure_turn(drive: Drive, y: Scalar, x: Scalar, v: Scalar = 0.0, u: Scalar 
 
     Where the range goes beyond ±180° the angle is within half a turn of its middle, and so jumps nowhere in it.
     """
-    middle = find_turn_middle(drive)
+    return measure_angle_near(find_turn_middle(drive), y, x, v, u)
+
+
+def measure_angle_near(middle: float, y: Scalar, x: Scalar, v: Scalar = 0.0, u: Scalar = 1.0) -> Scalar:
+    """Measure the angle of (x, y) less that of (u, v), rad, within half a turn of ``middle``."""
     if middle == 0.0:
         return subtract_angles(y, x, v, u)
-    return middle + subtract_angles(*turn_back(y, x, middle), v, u)
-
-
-def turn_back(y: Scalar, x: Scalar, angle: float) -> tuple[Scalar, Scalar]:
-    """Turn (x, y) back by an angle: (y, x)."""
-    s, c = sin(angle), cos(angle)
-    return c * y - s * x, c * x + s * y
+    s, c = sin(middle), cos(middle)
+    return middle + subtract_angles(c * y - s * x, c * x + s * y, v, u)
 
 
 def subtract_angles(y: Scalar, x: Scalar, v: Scalar, u: Scalar) -> Scalar:
@@ -40,7 +39,7 @@ def subtract_angles(y: Scalar, x: Scalar, v: Scalar, u: Scalar) -> Scalar:
     some times narrower.
     """
     angle = atan2(y * u - x * v, x * u + y * v)
-    if isinstance(angle, Term):
+    if isinstance(angle, Term) and (isinstance(v, Term) or isinstance(u, Term)):
         one, other = x * x + y * y, u * u + v * v
         angle.trace.known_slopes[angle.index] = [(x / one, y), (-y / one, x), (-u / other, v), (v / other, u)]
     return angle

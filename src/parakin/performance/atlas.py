@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from ..arguments import check_arguments
-from ..arrays import Array, Flags, Progress
+from ..arrays import Array, Flags, Progress, make_lattice
 from ..budget import SECONDS, Budget
 from ..errors import PoseError
 from ..machine import Machine
@@ -172,7 +172,7 @@ def map_performance(
         size = " x ".join(f"{count:,.0f}" for count in counts)
         raise PoseError(f"step: {grid_step:g} mm makes {size} places, at most {MOST:,} are possible")
     grid = tuple(_list_multiples(a, b, grid_step) for a, b in zip(low, high, strict=True))
-    positions = np.stack(np.meshgrid(*grid, indexing="ij"), -1).reshape(-1, len(grid))
+    positions = make_lattice(grid)
     shape = tuple(len(line) for line in grid)
     performance = _compute_in_blocks(region, positions, scale, budget, progress)
     slack = compute_slack(region, positions)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arrays import Array
+from ..arrays import Array, find_finite_matrices
 from ..machine import Machine
 from .characteristic_length import CharacteristicLength, choose_characteristic_length
 from .jacobians import ScaledRates, compute_scaled_rates, list_twist_names
@@ -113,7 +113,7 @@ def _compute_amplifications(rates: ScaledRates) -> tuple[Array, Array]:
     n = a.shape[2]
     if a.shape[1] > n:
         return _compute_redundant_amplifications(a, b)
-    known = np.asarray(np.isfinite(a).all((1, 2)) & np.isfinite(b).all((1, 2)))
+    known = find_finite_matrices(a, b)
     a, b = (np.where(known[:, None, None], m, np.eye(n)) for m in (a, b))
     size_a, size_b = np.abs(np.linalg.det(a)), np.abs(np.linalg.det(b))
     backward = size_b >= size_a  # by the matrix that is farther from singular
@@ -139,7 +139,7 @@ def _compute_redundant_amplifications(a: Array, b: Array) -> tuple[Array, Array]
     (T, Q) of it the singular values of T, c, and of Q, s, have c² + s² = 1, and psi = c/s.
     """
     n, rows = a.shape[2], a.shape[1]
-    known = np.asarray(np.isfinite(a).all((1, 2)) & np.isfinite(b).all((1, 2)))
+    known = find_finite_matrices(a, b)
     both = np.where(known[:, None, None], np.concatenate([a, -b], 2), np.eye(rows, n + rows))
     _, sizes, v = np.linalg.svd(both)
     basis = v[:, rows:].swapaxes(1, 2)

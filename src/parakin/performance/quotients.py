@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..arrays import Array
+from ..arrays import Array, find_finite_matrices
 from ..kernels.small_matrices import solve_quotients
 from ..kinematics.tall_matrices import invert_from_left
 
@@ -18,6 +18,6 @@ def compute_quotients(divisors: Array, dividends: Array) -> Array:
     if divisors.shape[1] <= divisors.shape[2]:
         return solve_quotients(divisors, dividends)
     result = invert_from_left(divisors, dividends) @ dividends
-    known = np.isfinite(divisors).all((1, 2)) & np.isfinite(dividends).all((1, 2))
+    known = find_finite_matrices(divisors, dividends)
     result[known & np.isnan(result).any((1, 2))] = np.inf
     return np.asarray(result)

@@ -10,7 +10,7 @@ from math import isfinite, pi
 import numpy as np
 
 from ..algebra import Scalar, sincos
-from ..arrays import Array, AxisRange
+from ..arrays import Array, AxisRange, make_lattice
 from ..errors import PoseError, quote, suggest
 from ..machine import Machine
 from ..performance.certified.interval_matrices import PoseBox
@@ -76,7 +76,7 @@ class PoseSet:
         wide = sum(low < high for low, high in self.coordinates.values())
         count = _ALONG.get(wide, 3)
         lines = [np.linspace(0.0, 1.0, count) if low < high else [0.5] for low, high in self.coordinates.values()]
-        return np.stack(np.meshgrid(*lines, indexing="ij"), -1).reshape(-1, len(lines))
+        return make_lattice(lines)
 
     @property
     def bounds(self) -> tuple[Array, Array]:

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..arguments import check_constructor
-from ..arrays import Array, Flags, Indices, split_rows
+from ..arrays import Array, Flags, Indices, make_lattice, split_rows
 from ..errors import PoseError
 from ..kernels.batch import find_first_negative
 from ..version import __version__
@@ -226,4 +226,4 @@ def _list_bytes(problem: DesignProblem) -> list[bytes | str]:
 def _list_corners(poses: PoseSet) -> Array:
     """List the corners of a set's box of edges 1, (corners, coordinates)."""
     ends = [[0.0, 1.0] if low < high else [0.5] for low, high in poses.coordinates.values()]
-    return np.stack(np.meshgrid(*ends, indexing="ij"), -1).reshape(-1, len(ends))
+    return make_lattice(ends)

@@ -8,7 +8,7 @@ from ..arrays import Array, Flags, Indices
 from ..errors import PoseError
 from .path import ToolPath
 
-_OPPOSITE = 1e-6  # rad: axes as near to opposite as this don't tell the great circle between them
+OPPOSITE = 1e-6  # rad: axes as near to opposite as this don't tell the great circle between them
 
 
 class ProgrammedPath:
@@ -78,7 +78,7 @@ class ProgrammedPath:
         if self.path.turns is not None:
             return np.zeros(len(record), np.bool_)
         a, b = self.axis[record - 1], self.axis[record]
-        opposite: Flags = compute_norms(a + b) < _OPPOSITE
+        opposite: Flags = compute_norms(a + b) < OPPOSITE
         return opposite
 
     def _interpolate_axes(self, record: Indices, share: Array) -> Array:

@@ -20,7 +20,7 @@ from ...toolpath.timing.drive_limits import DriveLimits
 from ...toolpath.timing.trajectory import Trajectory
 from ..controller import Controller, ControllerRun, refuse_run
 from ..event_commands import Command
-from ..gcode_text import CHUNK, join_lines, to_display
+from ..gcode_text import CHUNK, ROWS, join_lines, to_display
 from .dialect import JointDialect
 from .feeds import Feed
 from .gcode import GCODE
@@ -28,7 +28,6 @@ from .joint_motions import FIRST, JointMotions, build_joint_motions
 from .letters import assign_joint_letters, describe_letters
 from .look_ahead import find_halts, predict_planned_seconds, stretch_for_buffer
 
-_ROWS = 1 << 14  # blocks formatted at a time
 _ROUNDING = 1e-9  # s
 _LONGER = 1.2  # times the trajectory's time, from which on a control's is noted
 
@@ -187,7 +186,7 @@ def _name_program(source: str) -> str:
 
 def _format_blocks(program: _Program, begin: int, end: int) -> str:
     table = np.column_stack([program.motions.rows[1:][begin:end], program.values[begin:end]])
-    chunks = [table[start : start + _ROWS] for start in range(0, len(table), _ROWS)]
+    chunks = [table[start : start + ROWS] for start in range(0, len(table), ROWS)]
     return "".join(program.pattern * len(chunk) % tuple(chunk.ravel().tolist()) for chunk in chunks)
 
 

@@ -11,11 +11,11 @@ from scipy.interpolate import CubicSpline
 from ...arrays import Array, Flags, Indices
 from ...toolpath.timing.drive_limits import DriveLimits
 from ...toolpath.timing.trajectory import Trajectory
+from .model_header import CYCLE
 
 LONGEST = 0.128  # s between knots at first; halved where the spline is too far off
 SHORTEST = 1e-3  # s: a cycle
 WINDOW = 30.0  # s of a trajectory that are looked at together
-CYCLE = 1e-3  # s: of the controller
 _NEAR = 1e-3  # mm, angles on an arm of 100 mm: how far the spline may be from the trajectory
 _ARM = 100.0  # mm
 _LATE = 1e-4  # s: how far a joint may be off, as time at its full speed

@@ -47,7 +47,7 @@ TELLS = 0.02  # of a leg: a pose from which the legs are farther off is a guess,
 LEAST_REGULARITY = (
     0.02  # of home's singularity margin (of 1 for a leg's serial one): no pose is nearer to a singularity
 )
-CYCLE = 0.001  # s
+CYCLE = 0.001  # s: the servo period
 STEP_FACTOR = 2.0  # of a joint's speed: LinuxCNC's own planner exceeds it for moments in foreign programs
 COMMAND_LAG = 3.0  # cycles by which LinuxCNC's interpolation trails, and one more
 _FIELDS = {"X": "tran.x", "Y": "tran.y", "Z": "tran.z", "A": "a", "B": "b", "C": "c"}

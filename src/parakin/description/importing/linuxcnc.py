@@ -12,11 +12,11 @@ from ...errors import InputError, quote
 from ...model.elements import Drive, Point, Size
 from ...model.legs.length import Length
 from ...model.legs.ring import Ring
+from ...units import INCH
 from .configuration_text import check_beside, read_configuration
 from .deltas import ArmSizes, build_arm, build_tower
 from .foreign_machine import ForeignMachine
 
-INCH = 25.4
 _LIBRARY = Path("/usr/share/linuxcnc/hallib")
 _UNITS = {"mm": 1.0, "metric": 1.0, "cm": 10.0, "inch": INCH, "in": INCH, "imperial": INCH}
 # The modules' own values, in the machine's units, where nothing sets a pin.

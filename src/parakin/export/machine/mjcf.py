@@ -14,7 +14,7 @@ import numpy as np
 
 from ...arrays import Array
 from ...dynamics.inverse_dynamics import GRAVITY
-from ...dynamics.masses import DENSITIES, DISC, BodyMass, compute_masses, find_radius
+from ...dynamics.masses import DENSITIES, DISC, TONNE, BodyMass, compute_masses, find_radius
 from ...dynamics.multibody import METRE, WORLD, Body, BodyJoint, Multibody, build_multibody
 from ...dynamics.polygon import Points
 from ...machine import Machine
@@ -24,7 +24,6 @@ from .solids import LOOKS
 _TIME_STEP = "0.0005"  # s
 _STIFF = {"solref": "0.001 1", "solimp": "0.999 0.9999 0.001 0.5 2"}  # of loops: two time steps, nearly rigid
 _SERVO = {"slide": 1e6, "hinge": 1e5}  # N/m and N m/rad of a drive: far stiffer than these weights ask for
-_TONNE = 1e3  # kg
 _ARMATURE = {"slide": "1", "hinge": "0.1"}  # kg and kg m² of a drive, which alone swings at 1000 rad/s
 _DAMPING = {"ball": "0.05", "hinge": "0.05", "slide": "5"}  # N m s/rad and N s/m, of joints that no drive moves
 
@@ -97,7 +96,7 @@ def _add_joint(body: Element, joint: BodyJoint) -> None:
     if joint.drive is None:
         given["damping"] = _DAMPING[joint.kind]
     else:
-        stated = joint.drive.inertia * _TONNE * (1.0 if joint.kind == "slide" else METRE**2)
+        stated = joint.drive.inertia * TONNE * (1.0 if joint.kind == "slide" else METRE**2)
         given["armature"] = f"{stated:.16g}" if stated else _ARMATURE[joint.kind]
     if joint.kind != "ball":
         unit = METRE if joint.kind == "slide" else 1.0

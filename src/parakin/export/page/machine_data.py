@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from ...arrays import Array
+from ...arrays import Array, make_lattice
 from ...kinematics.closure_roots import list_step_caps
 from ...kinematics.wrist.pole_thresholds import PRINTED, convert_to_freedom
 from ...machine import Machine
@@ -132,7 +132,7 @@ def _find_axis_ranges(machine: Machine, size: float) -> tuple[Array, Array]:
     for _ in range(2):  # the second time on a lattice as small as what the first one found
         lattice = [np.linspace(low[axis], high[axis], _LATTICE) for axis in places]
         poses = np.tile(machine.home, (_LATTICE ** len(places), 1))
-        poses[:, places] = np.stack(np.meshgrid(*lattice, indexing="ij"), -1).reshape(-1, len(places))
+        poses[:, places] = make_lattice(lattice)
         allowed = np.vstack([machine.home, poses[machine.check(poses) == 0]])[:, places]
         step = (high[places] - low[places]) / (_LATTICE - 1)
         low[places], high[places] = allowed.min(0) - step, allowed.max(0) + step

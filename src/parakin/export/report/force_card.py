@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..colours import BLUE
 from ..number_format import format_use
 from .cards import make_card
 from .figures import PlotTrace, embed_figure, round_numbers
@@ -17,7 +18,6 @@ if TYPE_CHECKING:
     from ...toolpath.timing.drive_forces import DriveForces
 
 _POINTS = 3000  # a curve
-_COLOUR = "#1565c0"
 
 
 def render_force_card(forces: DriveForces) -> str:
@@ -35,7 +35,7 @@ def render_force_card(forces: DriveForces) -> str:
         rows.append(f"<tr><td>{escape(drive.name)}</td>{cells}<td>{escape(forces.describe_peak(i))}</td></tr>\n")
         values = scale * forces.forces[:, i]
         kept = pick_extremes(values, _POINTS)
-        line: PlotTrace = {"type": "scatter", "mode": "lines", "line": {"color": _COLOUR, "width": 1.2}}
+        line: PlotTrace = {"type": "scatter", "mode": "lines", "line": {"color": BLUE, "width": 1.2}}
         line |= {"x": round_numbers(forces.times[kept]), "y": round_numbers(values[kept], 2)}
         low, high = float(np.min(values)), float(np.max(values))
         room = 0.08 * (high - low) or 1.0

@@ -18,13 +18,12 @@ from ...algebra import (
     dot,
     product,
     sincos,
-    sqrt,
     sub,
     transpose,
 )
 from ...algebra import make_axis_rotation as turned
 from ...errors import DescriptionError
-from ..chain import UNIT, compose_chain, make_small_rotation, transform_to_local
+from ..chain import UNIT, compose_chain, compute_fixed_axis_angles, make_small_rotation, transform_to_local
 from ..elements import ROTATIONS, TRANSLATIONS
 from ..nominal_values import find_nominal_value
 from ..spec import Spec
@@ -116,8 +115,7 @@ class Free(Structure):
                 for i in ("xyz".index(turn[1]) for turn in self.turns)
             ]
         r = product(product(self.mount, rotation), self.tool)
-        b = atan2(-r[2][0], sqrt(r[0][0] * r[0][0] + r[1][0] * r[1][0]))
-        return [*tip, atan2(r[2][1], r[2][2]), b, atan2(r[1][0], r[0][0])]
+        return [*tip, *compute_fixed_axis_angles(r)]
 
     def coordinates_at(self, origin: Vec) -> list[Scalar]:
         tip = add(apply(self.mount, add(origin, self.tip)), self.base)

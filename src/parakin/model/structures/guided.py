@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from ...algebra import IDENTITY, Mat, Scalar, Vec, add, apply, atan2, product, sincos, sqrt, sub
+from ...algebra import IDENTITY, Mat, Scalar, Vec, add, apply, product, sincos, sub
 from ...algebra import make_axis_rotation as turned
 from ...errors import DescriptionError
-from ..chain import UNIT, compose_chain, make_small_rotation
+from ..chain import UNIT, compose_chain, compute_fixed_axis_angles, make_small_rotation
 from ..elements import ROTATIONS, TRANSLATIONS
 from ..nominal_values import find_nominal_value
 from ..spec import Spec
@@ -114,9 +114,8 @@ class Guided(Structure):
         return guided.rotation, guided.origin
 
     def coordinates_of(self, rotation: Mat, origin: Vec) -> list[Scalar]:
-        b = atan2(-rotation[2][0], sqrt(rotation[0][0] * rotation[0][0] + rotation[1][0] * rotation[1][0]))
         tip = add(add(origin, apply(rotation, self.tip)), self.base)
-        angles = atan2(rotation[2][1], rotation[2][2]), b, atan2(rotation[1][0], rotation[0][0])
+        angles = compute_fixed_axis_angles(rotation)
         given = dict(zip((*TRANSLATIONS, *ROTATIONS), (*tip, *angles), strict=True))
         return [given[word] for word in self.coordinates]
 

@@ -8,11 +8,10 @@ import numpy as np
 
 from ...arrays import Array, Flags, Indices
 from ...budget import Budget
-from ...workspaces.certified.matrix_bounds import MatrixBounds, prove_regular
+from ...workspaces.certified.matrix_bounds import ROUNDING, MatrixBounds, prove_regular
 
 AT_ONCE = 512  # boxes
-_FINEST = 1e-13  # smallest box as a fraction of the first: below this no digits are left
-_ROUNDING = 1e-12  # relative, of products and singular values of small matrices
+FINEST = 1e-13  # smallest box as a fraction of the first: below this no digits are left
 
 Decided = tuple[Flags, Indices]  # which boxes are decided, and across which input to bisect the others
 
@@ -47,7 +46,7 @@ def find_undecided_box(
         lower, upper, axis = lower[~decided], upper[~decided], axis[~decided]
         bottom, top = bottom[: now.start], top[: now.start]
         if len(lower):
-            fine = ((upper - lower) <= _FINEST * first).all(1)
+            fine = ((upper - lower) <= FINEST * first).all(1)
             if fine.any() or budget.is_spent():
                 return np.asarray(0.5 * (lower[0] + upper[0]))
             lower, upper = bisect_inputs(lower, upper, axis)
@@ -60,7 +59,7 @@ def decide_nonnegative(bounds: MatrixBounds, first: Array) -> Callable[[Array, A
 
     def decide(low: Array, high: Array) -> Decided:
         matrices = bounds(low, high)
-        least = matrices.middle - (matrices.linear_change + matrices.rest) * (1.0 + _ROUNDING)
+        least = matrices.middle - (matrices.linear_change + matrices.rest) * (1.0 + ROUNDING)
         return np.asarray((least >= 0.0).all((1, 2))), find_widest_inputs(low, high, first)
 
     return decide

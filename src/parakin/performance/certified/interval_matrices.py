@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 
 from ...algebra import Scalar, Term, Trace
-from ...arrays import Array
+from ...arrays import Array, make_lattice
 from ...kernels.intervals import JumpFreeTrace
 from ...machine import Machine
 from ...model.rates import TwistRates
@@ -54,7 +54,7 @@ class PoseBox:
         """Points (N, d) of a lattice all over the box, its corners among them."""
         d = len(self.ranges)
         lines = [np.linspace(*ends, _SAMPLES.get(d, 3)) for ends in self.ranges.values()]
-        return np.stack(np.meshgrid(*lines, indexing="ij"), -1).reshape(-1, d) if d else np.zeros((1, 0))
+        return make_lattice(lines) if d else np.zeros((1, 0))
 
     def poses(self, points: Array) -> Array:
         """Compute whole poses (N, axes) at points (N, d) of the box."""

@@ -18,6 +18,7 @@ from ...arrays import Array, Indices, Progress
 from ...budget import Budget
 from ...kernels.small_matrices import compute_singular_values
 from ...workspaces.certified.matrix_bounds import (
+    ROUNDING,
     LinearMatrices,
     Matrix,
     MatrixBounds,
@@ -26,13 +27,11 @@ from ...workspaces.certified.matrix_bounds import (
 )
 from ..quotients import compute_quotients
 from ..search import pick_best_of_blocks, search_maxima_in_box
-from .bisection import AT_ONCE, bisect_inputs, find_widest_inputs
+from .bisection import AT_ONCE, FINEST, bisect_inputs, find_widest_inputs
 from .interval_matrices import PoseBox
 
 Norm = Literal["spectral", "frobenius"]
 
-_ROUNDING = 1e-12  # relative, of products and singular values of small matrices
-_FINEST = 1e-13  # smallest box as a fraction of the first
 _CORNERS = 6  # inputs up to which all corners are examined
 _STARTS = 8
 _EXCEEDED = 20_000  # boxes for a bracket beyond its bound
@@ -101,7 +100,7 @@ class NormSearch:
                 break
             order = np.argsort(-upper, kind="stable")
             now, later = order[:AT_ONCE], order[AT_ONCE:]
-            if ((high[now[0]] - low[now[0]]) <= _FINEST * self.box.widths).all():
+            if ((high[now[0]] - low[now[0]]) <= FINEST * self.box.widths).all():
                 break
             if progress:
                 progress(min(1.0, tolerance / max(float(upper[now[0]]) / self.best - 1.0, tolerance)))
@@ -184,7 +183,7 @@ def _bound_product(factors: Sequence[_CornerSizes]) -> tuple[Array, Array]:
             sizes = (0.5 * (sizes / scale + factor.sizes * scale)) ** 2
         sizes = np.where(np.isfinite(sizes), sizes, np.inf)
     which = sizes.argmax(1)
-    return np.asarray(sizes.max(1) * (1.0 + _ROUNDING)), factors[0].signs[which]
+    return np.asarray(sizes.max(1) * (1.0 + ROUNDING)), factors[0].signs[which]
 
 
 def _bound_quotient(
@@ -218,7 +217,7 @@ def _bound_quotient(
     rest = n.rest + off @ n_size + m.linear_change @ (n.linear_change + n.rest)
     beyond = np.where(g < 1.0, g * g / np.where(g < 1.0, 1.0 - g, 1.0), np.inf)
     rest_size = _compute_frobenius(rest[:, rows]) + beyond * _compute_frobenius(n_size)
-    sizes[good] = (_bound_corners(linear, signs, quotient.norm) + rest_size[:, None]) * (1.0 + _ROUNDING)
+    sizes[good] = (_bound_corners(linear, signs, quotient.norm) + rest_size[:, None]) * (1.0 + ROUNDING)
     if d:
         axis[good] = linear.widest
     return _CornerSizes(sizes, signs)

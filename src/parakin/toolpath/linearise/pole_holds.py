@@ -320,7 +320,7 @@ def _place_end(steps: PoleSteps, step: int, point: Array | None) -> _Points:
     if point is not None:
         begin, end = steps.first[step], steps.last[step]
         fraction = float(np.hypot(*(point - begin)) / np.hypot(*(end - begin)))
-        share = float(steps.begin[step] + fraction * (steps.end[step] - steps.begin[step]))
+        share = steps.locate(step, fraction)
         count = int(_EDGE < share < 1.0 - _EDGE)
     motion = np.full(count, steps.record[step], np.int64)
     projected = np.zeros((count, 2)) if point is None else np.tile(point, (count, 1))

@@ -185,7 +185,7 @@ def _route_through_pole(
     ends: tuple[float, ...] = ()
     if len(crossings):
         crossing = first + int(crossings[0])
-        share = float(steps.begin[crossing] + fraction[0] * (steps.end[crossing] - steps.begin[crossing]))
+        share = steps.locate(crossing, fraction[0])
         ends = _find_inner_ends(steps, window, crossing, radius)
     nearest_step = first + int(steps.nearest[inside_window].argmin())
     miss, rays = float(steps.nearest[nearest_step]), tuple[tuple[int, float, Array], ...]()
@@ -234,7 +234,7 @@ def _place_rays(
             places = np.flatnonzero((a[:-1] - at) * (a[1:] - at) < 0.0)
             for index in sorted({*places[:1].tolist(), *places[-1:].tolist()}):  # in and out again where it turns back
                 step, fraction = window[0] + index, (at - a[index]) / (a[index + 1] - a[index])
-                share = float(steps.begin[step] + fraction * (steps.end[step] - steps.begin[step]))
+                share = steps.locate(step, fraction)
                 across = (way[index, 1] + fraction * (way[index + 1, 1] - way[index, 1])) * (at / squeeze.radius) ** 2
                 across *= radius > innermost  # straight there: the free angle is the same before the pole and behind
                 if _EDGE < share < 1.0 - _EDGE:
@@ -261,7 +261,7 @@ def _find_inner_ends(steps: PoleSteps, window: tuple[int, int], crossing: int, r
         if entry is None or steps.record[step] != steps.record[crossing]:
             continue
         fraction = np.hypot(*(entry - steps.first[step])) / np.hypot(*(steps.last[step] - steps.first[step]))
-        share = float(steps.begin[step] + fraction * (steps.end[step] - steps.begin[step]))
+        share = steps.locate(step, fraction)
         if 0.0 < share < 1.0:
             ends.append(share)
     return tuple(ends)

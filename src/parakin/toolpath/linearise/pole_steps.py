@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...arrays import Array, Flags, Indices
+from ...arrays import Array, Flags, Indices, count_repeats
 from ...kinematics.wrist.pole_thresholds import VICINITY
 from ..posting.posted import Posted
 from ..programmed_path import ProgrammedPath
@@ -38,6 +38,10 @@ class PoleSteps:
     nearest: Array
     share: Array
 
+    def locate(self, step: int, fraction: float) -> float:
+        """Locate a fraction of a step: the share of its motion."""
+        return float(self.begin[step] + fraction * (self.end[step] - self.begin[step]))
+
 
 def find_pole_steps(pole: Pole, programmed: ProgrammedPath, posted: Posted, motion: Indices) -> PoleSteps:
     """Divide the motions that may come near to a pole into steps, and measure how near each comes."""
@@ -46,7 +50,7 @@ def find_pole_steps(pole: Pole, programmed: ProgrammedPath, posted: Posted, moti
     if counts.sum() > _MOST_IN_ALL:
         counts = np.minimum(counts, max(1, _MOST_IN_ALL // len(counts)))
     record = np.repeat(motion, counts)
-    number = np.arange(len(record)) - np.repeat(np.cumsum(counts) - counts, counts)
+    number = count_repeats(counts)
     begin, end = number / counts.repeat(counts), (number + 1) / counts.repeat(counts)
     first, last = (pole.project_axes(*programmed.interpolate(record, share)) for share in (begin, end))
     way = last - first

@@ -29,7 +29,7 @@ def note_swings(pole: Pole, path: ToolPath, steps: PoleSteps, led: Sequence[tupl
     if not len(steps.record):
         return []
     with np.errstate(invalid="ignore"):
-        way, turn = np.hypot(*(steps.last - steps.first).T), _measure_turns(steps)
+        way, turn = np.hypot(*(steps.last - steps.first).T), _measure_free_turns(steps)
     near = np.isfinite(way) & (way < FARTHEST_STEP)
     turn, way = np.where(near, turn, 0.0), np.where(near, way, FARTHEST_STEP)
     apart = np.ones(len(turn), np.bool_)
@@ -60,7 +60,7 @@ def note_swings(pole: Pole, path: ToolPath, steps: PoleSteps, led: Sequence[tupl
     return notes
 
 
-def _measure_turns(steps: PoleSteps) -> Array:
+def _measure_free_turns(steps: PoleSteps) -> Array:
     """Measure by how much the free angle turns on each step, rad; what it turns on the pole is the next step's."""
     begin, end = (np.arctan2(x[:, 1], x[:, 0]) for x in (steps.first, steps.last))
     on_pole = [np.hypot(*x.T) < PRINTED for x in (steps.first, steps.last)]

@@ -60,11 +60,14 @@ class Placement:
         limit = find_tightest_limit(posted, record)
         return replace(self, margin=float(relative[record]), limit=limit, record=record)
 
+    def format_values(self) -> str:
+        """Format its values as options take them, mm and degrees: ``X=10,C=90``."""
+        return ",".join(f"{axis}={to_display(value, AXIS_UNITS[axis]):.6g}" for axis, value in self.values.items())
+
     def describe_refusal(self) -> str:
         """Describe, of a placement that is not allowed, where it is and what it breaks."""
-        values = ",".join(f"{axis}={to_display(value, AXIS_UNITS[axis]):.6g}" for axis, value in self.values.items())
         return (
-            f"no placement within these bounds is allowed; the nearest is {values or 'the only one'}: "
+            f"no placement within these bounds is allowed; the nearest is {self.format_values() or 'the only one'}: "
             f"{-self.margin:.1%} of half a range beyond {self.limit}"
         )
 

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...arrays import Array, Flags, Indices
+from ...arrays import Array, Flags, Indices, count_repeats
 from ...kinematics.turns import wrap_angle
 from ...kinematics.wrist.pole_thresholds import PRINTED, is_upright
 from ...kinematics.wrist.pose_angles import fold_direction
@@ -83,7 +83,7 @@ def _place_samples(path: ToolPath) -> _Samples:
     count = np.ones(len(path), np.int64)
     count[1:] = count_steps(np.abs(np.diff(path.turns, axis=0)).max(axis=1))
     record = np.repeat(np.arange(len(path)), count)
-    number = np.arange(len(record)) - np.repeat(np.cumsum(count) - count, count)
+    number = count_repeats(count)
     return _Samples(record, (number + 1) / count[record])
 
 

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ...arrays import Array, Indices
+from ...arrays import Array, Indices, count_repeats
 from ...errors import PoseError
 from ...kinematics.turns import TURN
 
@@ -36,6 +36,6 @@ def add_turn_steps(rows: Array, columns: Sequence[int]) -> tuple[Array, Indices 
     steps = count_steps(turned)
     at_given = np.concatenate([[0], np.cumsum(steps)])
     motion = np.repeat(np.arange(len(steps)), steps)
-    fraction = (np.arange(len(motion)) - at_given[motion]) / steps[motion]
+    fraction = count_repeats(steps) / steps[motion]
     between = rows[motion] + fraction[:, None] * (rows[motion + 1] - rows[motion])
     return np.vstack([between, rows[-1:]]), at_given

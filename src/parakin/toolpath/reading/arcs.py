@@ -8,6 +8,7 @@ import math
 import numpy as np
 
 from ...arrays import Array
+from ..programmed_path import OPPOSITE
 from .text import refuse
 
 ON_CIRCLE = 0.01  # mm: further off its circle an arc's start or end is an error; covers coordinates of 3 decimals
@@ -16,7 +17,6 @@ _MOST_POINTS = 200_000  # greatest number of points of one arc
 _WIDEST_STEP = math.pi / 4  # rad between two points, however coarse the tolerance
 _ONE_DIAMETER = 1e-3  # sine of the angle between two radii; below this they lie on one diameter
 _ALONG = 0.1  # cosine of the angle between tangent and circle; below this the tangent does not tell the way round
-_OPPOSITE = 1e-6  # rad: axes this close to opposite have no definite plane
 
 
 def find_arc_normal(start: Array, end: Array, centre: Array, tangent: Array) -> Array:
@@ -121,7 +121,7 @@ def interpolate_axis(first: Array, last: Array, fraction: Array) -> Array:
     across = last - (first @ last) * first
     sine = float(np.linalg.norm(np.cross(first, last)))
     angle = math.atan2(sine, float(first @ last))
-    if angle > math.pi - _OPPOSITE:
+    if angle > math.pi - OPPOSITE:
         refuse("the tool axis turns round by 180 degrees on an arc; expected a definite way to turn it")
     if sine == 0.0:
         return np.repeat(last[None], len(fraction), axis=0)

@@ -16,7 +16,6 @@ from typing import Any, NoReturn
 from ...errors import InputError
 
 LARGEST = 1e9  # the largest number in a file: a thousand kilometres in mm
-INCH = 25.4  # mm
 READ_SIZE = 1 << 20  # bytes read from a file at a time
 BYTE_ORDER_MARK = b"\xef\xbb\xbf"
 _NUMBER = re.compile(r"([+-]?)\s*(\d+(?:\.\d*)?|\.\d+)(?:[EeDd]([+-]?\d+))?", re.ASCII)

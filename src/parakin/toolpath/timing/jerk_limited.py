@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...arrays import Array, Indices
+from ...arrays import Array, Indices, count_repeats
 from ...kernels.batch import run_in_threads
 from .drive_limits import DriveLimits
 from .joint_path import JointPath, divide_joint_path
@@ -199,7 +199,7 @@ def _cut_windows(edges: Indices, rows: int, odd: int) -> Indices:
     if odd:
         count = np.where(count > 1, count + 1, 1)
     of = np.repeat(np.arange(len(edges)), count)
-    k = np.arange(len(of)) - np.repeat(np.cumsum(count) - count, count)
+    k = count_repeats(count)
     shift = 0.5 * odd
     span = length[of] / np.maximum(count[of] - odd, 1)
     first = np.where(k == 0, 0, np.round((k - shift) * span).astype(np.int64))

@@ -17,7 +17,7 @@ from ...kinematics.tall_matrices import compute_determinants, invert_from_left
 
 Matrix = Sequence[Sequence[Scalar]]
 
-_ROUNDING = 1e-12  # relative, of products and singular values of small matrices
+ROUNDING = 1e-12  # relative, of products and singular values of small matrices
 
 
 @dataclass(frozen=True, eq=False)
@@ -137,7 +137,7 @@ def _is_tall(matrices: LinearMatrices) -> bool:
 def bound_inverse_error(product: LinearMatrices, given: LinearMatrices, inverse: Array) -> Array:
     """Bound the error of the computed inverse, entry by entry: how far middle × inverse may be from the identity."""
     n = product.middle.shape[1]
-    return np.asarray(np.abs(product.middle - np.eye(n)) + _ROUNDING * (np.abs(inverse) @ np.abs(given.middle)))
+    return np.asarray(np.abs(product.middle - np.eye(n)) + ROUNDING * (np.abs(inverse) @ np.abs(given.middle)))
 
 
 class RegularMatrices(NamedTuple):
@@ -164,7 +164,7 @@ def prove_regular(matrices: LinearMatrices) -> RegularMatrices:
     given = matrices.take(good)
     scaled = given.multiply_left(inverse)
     off = bound_inverse_error(scaled, given, inverse)
-    regular = _bound_spectral_radius(off + scaled.linear_change + scaled.rest) < 1.0 - _ROUNDING
+    regular = _bound_spectral_radius(off + scaled.linear_change + scaled.rest) < 1.0 - ROUNDING
     sides = np.ones(len(inverse)) if _is_tall(matrices) else np.linalg.slogdet(inverse)[0]
     sign[good] = np.where(regular, sides, 0.0)
     spread = matrices.half.copy()

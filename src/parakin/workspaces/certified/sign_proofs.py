@@ -41,7 +41,7 @@ class ProvedSigns(NamedTuple):
 
 SignProof: TypeAlias = Callable[[Array, Array], ProvedSigns]
 
-_ROUNDING = 1e-12  # relative, of sums of a few products
+ROUNDING = 1e-12  # relative, of sums of a few products
 
 
 def make_margin_proof(margin: Scalar, inputs: Sequence[Term]) -> SignProof:
@@ -51,7 +51,7 @@ def make_margin_proof(margin: Scalar, inputs: Sequence[Term]) -> SignProof:
     def prove(low: Array, high: Array) -> ProvedSigns:
         form = bounds(low, high)
         change = form.linear_change[:, 0, 0]
-        rest = form.rest[:, 0, 0] + _ROUNDING * (change + form.rest[:, 0, 0])
+        rest = form.rest[:, 0, 0] + ROUNDING * (change + form.rest[:, 0, 0])
         middle = form.middle[:, 0, 0]
         planes = FormPlanes(form.half * form.slopes[:, :, 0, 0], middle - rest, middle + rest)
         with np.errstate(invalid="ignore"):

@@ -13,9 +13,8 @@ import numpy as np
 from ...algebra import Term, Vec, sub
 from ...arrays import Array
 from .matrix_bounds import LinearMatrices, MatrixBounds
-from .sign_proofs import FormPlanes, ProvedSigns, SignProof
+from .sign_proofs import ROUNDING, FormPlanes, ProvedSigns, SignProof
 
-_ROUNDING = 1e-12  # relative, of sums of a few products
 _TINY = 1e-300
 _PARALLEL = 1e-9  # of squared lengths: keeps directions that follow nearly parallel segments bounded
 _TILTS = 8  # directions about that of a distance
@@ -45,7 +44,7 @@ def make_separation_proof(
             for best_so_far, new in zip(planes, own, strict=True):
                 best_so_far[closer] = new[closer]
             _tighten_separation(form, nearest, least, best, spread)
-        change = np.abs(planes.slopes).sum(1) * (1.0 + _ROUNDING)
+        change = np.abs(planes.slopes).sum(1) * (1.0 + ROUNDING)
         apart = (best >= least) | (planes.low - change >= least)
         near = planes.high + change < least
         signs = np.where(apart, 1.0, np.where(near, -1.0, 0.0))
@@ -92,7 +91,7 @@ def _bound_above(form: LinearMatrices, direction: Array, weights: Array, slopes:
     axes = _complete_axes(direction)
     moves = np.einsum("nk,ndki,nji->ndj", weights, form.slopes, axes) * form.half[:, :, None]
     rest = np.einsum("nk,nki,nji->nj", weights, form.rest, np.abs(axes))
-    rest += _ROUNDING * (np.abs(form.middle).max((1, 2)) + np.abs(moves).sum((1, 2)))[:, None]
+    rest += ROUNDING * (np.abs(form.middle).max((1, 2)) + np.abs(moves).sum((1, 2)))[:, None]
     aside = np.square(np.abs(moves[:, :, 1:]).sum(1) + rest[:, 1:]).sum(1)
     change = np.abs(slopes).sum(1)
     least = distance - change - rest[:, 0]
@@ -110,10 +109,10 @@ def _bound_below(form: LinearMatrices, nearest: _NearestPoints, along: Array, sl
     own = along + np.einsum("nci,nki->nck", turns, form.middle) - slopes[:, :, None]
     second = np.abs(np.einsum("nci,ndki->ncdk", turns, moves)).sum((1, 2))
     reach = np.abs(direction) + np.abs(turns).sum(1)
-    rest = np.einsum("ni,nki->nk", reach, form.rest + _ROUNDING * (np.abs(form.middle) + form.linear_change))
+    rest = np.einsum("ni,nki->nk", reach, form.rest + ROUNDING * (np.abs(form.middle) + form.linear_change))
     values = np.einsum("ni,nki->nk", direction, form.middle) - np.abs(own).sum(1) - second - rest
     least = values.min(1)
-    longest = np.sqrt(1.0 + np.square(size.sum(1))) * (1.0 + _ROUNDING)
+    longest = np.sqrt(1.0 + np.square(size.sum(1))) * (1.0 + ROUNDING)
     most = np.maximum(least + np.abs(slopes).sum(1), 0.0)
     return np.asarray(least - (1.0 - 1.0 / longest) * most)
 
@@ -160,9 +159,9 @@ def _measure_separation(form: LinearMatrices, direction: Array) -> tuple[Array, 
     along = np.einsum("nki,ni->nk", form.middle, direction)
     slopes = np.abs(np.einsum("ndki,ni->ndk", form.slopes, direction))
     changes = form.half[:, :, None] * (slopes + np.einsum("ndki,ni->ndk", form.spread, size))
-    rounding = _ROUNDING * (np.abs(form.middle) + form.linear_change) + form.own
+    rounding = ROUNDING * (np.abs(form.middle) + form.linear_change) + form.own
     with np.errstate(invalid="ignore"):
-        clear = along - changes.sum(1) * (1.0 + _ROUNDING) - np.einsum("nki,ni->nk", rounding, size)
+        clear = along - changes.sum(1) * (1.0 + ROUNDING) - np.einsum("nki,ni->nk", rounding, size)
     clear = np.nan_to_num(clear, nan=-np.inf)
     worst = clear.argmin(1)
     return clear.min(1), changes[np.arange(len(worst)), :, worst]

@@ -120,7 +120,7 @@ def decide_hand(arc: OpenArc, leaving: int, *, proved: bool) -> int:
     proofs = {arc.entry, leaving} - {UNKNOWN}
     hand = arc.circle.hand
     if hand != UNKNOWN:
-        turns_back = proved and measure_turn(arc.circle, arc.start, arc.end, hand) < math.pi
+        turns_back = proved and measure_sweep(arc.circle, arc.start, arc.end, hand) < math.pi
         if -hand in proofs and hand not in proofs and not turns_back:
             side = "right" if hand == RIGHT else "left"
             refuse(
@@ -134,7 +134,7 @@ def decide_hand(arc: OpenArc, leaving: int, *, proved: bool) -> int:
     return proofs.pop()
 
 
-def measure_turn(circle: Circle, start: Triple, end: Triple, hand: int) -> float:
+def measure_sweep(circle: Circle, start: Triple, end: Triple, hand: int) -> float:
     """Measure the angle from start to end about a circle's axis in (0, 2π], rad."""
     a, b = np.array(start) - circle.centre, np.array(end) - circle.centre
     normal = hand * circle.axis
@@ -151,13 +151,13 @@ def settle_sweep(circle: Circle, start: Triple, end: Triple) -> tuple[int, int]:
         wanted = abs(circle.sweep)
         hands = (RIGHT, LEFT) if circle.sweep > 0.0 else (LEFT, RIGHT)
         for hand in hands:
-            turns = round((wanted - measure_turn(circle, start, end, hand)) / whole)
-            if turns >= 0 and abs(measure_turn(circle, start, end, hand) + turns * whole - wanted) <= closed:
+            turns = round((wanted - measure_sweep(circle, start, end, hand)) / whole)
+            if turns >= 0 and abs(measure_sweep(circle, start, end, hand) + turns * whole - wanted) <= closed:
                 return hand, turns
         refuse(f"an arc of {math.degrees(circle.sweep):.6g} degrees whose ends are as far apart in neither way round")
     if circle.revolutions is not None and circle.hand != UNKNOWN:
         wanted = circle.revolutions * whole
-        turn = measure_turn(circle, start, end, circle.hand)
+        turn = measure_sweep(circle, start, end, circle.hand)
         if abs(turn - whole) <= closed or turn <= closed:
             turn = whole
         turns = round((wanted - turn) / whole)
@@ -181,7 +181,7 @@ def follow_circle(circle: Circle, here: Triple, point: Triple, arc_step: tuple[i
     flat = float(np.linalg.norm(np.cross(circle.axis, out)))
     if math.hypot(flat - circle.radius, height) * scale > ON_CIRCLE:
         return False
-    turn = measure_turn(circle, here, point, hand)
+    turn = measure_sweep(circle, here, point, hand)
     shorter = min(turn, 2.0 * math.pi - turn)
     if circle.radius * (1.0 - math.cos(0.5 * shorter)) * scale <= ON_CIRCLE:
         return turn <= math.pi

@@ -17,7 +17,7 @@ from .circles import (
     decide_hand,
     find_tangent,
     follow_circle,
-    measure_turn,
+    measure_sweep,
     prove_hand,
     settle_sweep,
 )
@@ -289,7 +289,7 @@ class ClMotion:
         if circle.firm or known == UNKNOWN or self.arc_end[0] == self.records.n:
             return False
         entry = prove_hand(circle, start, self._find_heading(), self.transform.scale)
-        return entry == -known and measure_turn(circle, start, tip, entry) < math.pi
+        return entry == -known and measure_sweep(circle, start, tip, entry) < math.pi
 
     def _continue_arc(self, tip: Triple, before: Triple, line: int) -> None:
         """Add the records of the last arc from a point on it to the next one."""
@@ -307,7 +307,7 @@ class ClMotion:
         form = Arc(circle.line, circle.centre.tolist(), hand * circle.axis, circle.radius, helix=True, turns=turns)
         self._add_arc(form, arc.end, arc.axes[0], arc.end_line)
         self.arc_end = self.records.n, find_tangent(circle, arc.end, hand) * _FAR
-        self.arc_step = (circle, hand, measure_turn(circle, arc.start, arc.end, hand)) if circle.points else None
+        self.arc_step = (circle, hand, measure_sweep(circle, arc.start, arc.end, hand)) if circle.points else None
 
     def close_arc(self, leaving: Array | None) -> None:
         """Confirm the way round of the last arc by the motion (3,) that leaves it; turn it where only that proves it.

@@ -8,7 +8,8 @@ from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
 from ....errors import InputError
-from ..text import INCH, is_number, parse_number, quote_short, refuse
+from ....units import INCH
+from ..text import is_number, parse_number, quote_short, refuse
 
 # name: (length unit in mm or None for the file's own, per revolution)
 FEED_UNITS: dict[str, tuple[float | None, bool]] = {

@@ -6,8 +6,9 @@ from typing import NamedTuple
 import numpy as np
 
 from ....arrays import Array
+from ....units import INCH
 from ..arcs import CLOSED, interpolate_spiral
-from ..text import INCH, refuse
+from ..text import refuse
 from .codes import G17, G18, G19
 
 # first and second axis, and the one that the turn is about; G3 is right-handed about it

@@ -3,7 +3,8 @@
 import math
 from collections.abc import Callable
 
-from ..text import INCH, refuse
+from ....units import INCH
+from ..text import refuse
 from .arc_motion import PLANES
 from .block import round_whole
 from .codes import CYCLES, G17, format_g_code

@@ -4,8 +4,9 @@ import math
 from collections.abc import Callable, Mapping
 from typing import Literal
 
+from ....units import INCH
 from ...path import Event
-from ..text import INCH, refuse
+from ..text import refuse
 from ..tools import ToolLog
 from . import codes
 from .block import NO_PROGRAM, POLAR, Block, round_whole

@@ -15,6 +15,7 @@ import numpy as np
 
 from ....arrays import Array
 from ....kernels.compiling import njit
+from .splines import compute_start_slope
 
 
 class AccelerationLimits(NamedTuple):
@@ -45,7 +46,7 @@ def _expand_acceleration(i, j, rows, coefficients):
     """Write the Bernstein coefficients of joint j's acceleration α·u + β·x over step i: three pairs of α and β."""
     h, q, bend = rows.step[i], rows.joints, rows.curvature
     m0, m1 = bend[i, j], bend[i + 1, j]
-    d = (q[i + 1, j] - q[i, j]) / h - h * (2.0 * m0 + m1) / 6.0
+    d = compute_start_slope(q, bend, h, i, j)
     coefficients[0], coefficients[1] = d, m0
     coefficients[2], coefficients[3] = d + 1.5 * h * m0, 0.5 * (m0 + m1)
     coefficients[4], coefficients[5] = d + h * (0.5 * m0 + 2.5 * m1), m1

@@ -11,6 +11,7 @@ import numpy as np
 
 from ....arrays import Array, Indices
 from ....kernels.compiling import njit
+from .splines import compute_start_slope
 
 _LITTLE = 1.1  # (q')²·ṡ² may exceed its ends by so much, and they be lowered for that
 
@@ -87,7 +88,7 @@ def compute_speed_ceilings(rows, speed, highest, ceilings, start, stop):
         for j in range(len(speed)):
             if h > 0.0 and speed[j] < np.inf:
                 m0, m1 = bend[i, j], bend[i + 1, j]
-                d0 = (q[i + 1, j] - q[i, j]) / h - h * (2.0 * m0 + m1) / 6.0
+                d0 = compute_start_slope(q, bend, h, i, j)
                 d1, d2 = d0 + 0.5 * h * m0, d0 + 0.5 * h * (m0 + m1)
                 # With ṡ² at both ends as the speed there allows, (q')²·ṡ² is no more between them than the greatest
                 # of its Bernstein coefficients; where that is too much, q' is taken as its greatest everywhere.

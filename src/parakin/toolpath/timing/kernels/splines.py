@@ -134,6 +134,12 @@ def _fit_stretch(start, stop, step, q, curvature, pivots):
         curvature[stop, j] = (1.0 + last) * curvature[stop - 1, j] - last * curvature[stop - 2, j]
 
 
+@njit(nogil=True, cache=True, error_model="numpy", inline="always")
+def compute_start_slope(q, bend, h, i, j):
+    """Compute q' of joint j at the start of step i, of length h, from joints and their q'' at the rows."""
+    return (q[i + 1, j] - q[i, j]) / h - h * (2.0 * bend[i, j] + bend[i + 1, j]) / 6.0
+
+
 @njit(nogil=True, cache=True, error_model="numpy")
 def evaluate_splines(rows, state, out, start, stop):
     """Evaluate the splines of ``rows`` for a :class:`PathState` into the arrays of ``out``, a :class:`JointState`."""
@@ -144,7 +150,7 @@ def evaluate_splines(rows, state, out, start, stop):
         h = rows.step[i] if rows.step[i] > 0.0 else 1.0
         for j in range(q.shape[1]):
             third = (bend[i + 1, j] - bend[i, j]) / h
-            first = (q[i + 1, j] - q[i, j]) / h - h * (2.0 * bend[i, j] + bend[i + 1, j]) / 6.0
+            first = compute_start_slope(q, bend, h, i, j)
             second = bend[i, j] + third * o
             slope = first + o * (bend[i, j] + 0.5 * third * o)
             out.joints[k, j] = q[i, j] + o * (first + o * (0.5 * bend[i, j] + third * o / 6.0))

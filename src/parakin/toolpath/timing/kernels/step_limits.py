@@ -11,6 +11,7 @@ import numpy as np
 
 from ....arrays import Array
 from ....kernels.compiling import njit
+from .splines import compute_start_slope
 
 _STILL = 1e-9  # of ṡ: below 0 by less is rounding
 
@@ -49,7 +50,7 @@ def compute_slopes(rows, speed, slope, slowness, first, last):
         for j in range(len(speed)):
             slope[i, j] = 0.0
             if h > 0.0:
-                slope[i, j] = (q[i + 1, j] - q[i, j]) / h - h * (2.0 * bend[i, j] + bend[i + 1, j]) / 6.0
+                slope[i, j] = compute_start_slope(q, bend, h, i, j)
                 slowness[i] = max(slowness[i], abs(slope[i, j]) / speed[j])
 
 

@@ -35,7 +35,8 @@ from .nominal_values import find_nominal_value
 from .spec import Spec
 from .structures import PlatformPlacement, list_rods, locate_passive_rods
 
-_ONE_JOINT = 1.0  # mm; nearer points of two legs are one joint
+_ONE_JOINT = 1.0  # mm: nearer points of two legs are one joint
+_ONE_BEARING = 0.1  # of the clearance: so are these, for bearings so near could never keep it
 
 
 @dataclass(frozen=True)
@@ -246,8 +247,9 @@ def list_strut_distances(
 def _list_strut_pairs(
     spec: Spec, placement: PlatformPlacement, joints: Sequence[Scalar]
 ) -> Iterator[tuple[str, _Strut, _Strut]]:
+    nearest = max(_ONE_JOINT, _ONE_BEARING * find_nominal_value(spec.limits.clearance or 0.0))
     for one, two in combinations(_list_struts(spec, placement, joints), 2):
-        if not _share_joint(one, two):
+        if not _share_joint(one, two, nearest):
             yield f"{one.name}-{two.name}", one, two
 
 
@@ -276,11 +278,14 @@ def _list_struts(spec: Spec, placement: PlatformPlacement, joints: Sequence[Scal
     return struts
 
 
-def _share_joint(one: _Strut, two: _Strut) -> bool:
-    """Tell whether two struts meet in a joint, in a calibrated machine too: two bearings have no room there."""
+def _share_joint(one: _Strut, two: _Strut, nearest: float) -> bool:
+    """Tell whether two struts meet in a joint, in a calibrated machine too: two bearings have no room there.
+
+    nearest : mm that their joints are at least apart if they are two
+    """
     pairs = [(one.platform, two.platform), (one.foot, two.foot)]
     gaps = [sub(a, b) for a, b in pairs if a is not None and b is not None]
-    return any(norm([find_nominal_value(x) for x in gap]) < _ONE_JOINT for gap in gaps)
+    return any(norm([find_nominal_value(x) for x in gap]) < nearest for gap in gaps)
 
 
 def compute_segment_distance(a: tuple[Vec, Vec], b: tuple[Vec, Vec]) -> Scalar:

@@ -89,15 +89,14 @@ def test_a_point_leads_to_its_machine(answer, folder):
         tab.locator("#front").focus()
         for key in ("ArrowRight", "ArrowRight", "Enter"):
             tab.keyboard.press(key)
-        wait_until(tab, "location.hash === '#design_2'")
-        shown = "[...document.querySelectorAll('[data-choice]:not([hidden])')].map((one) => one.dataset.choice)"
-        assert tab.evaluate(shown) == ["design_2"]
+        shown = "[...document.querySelectorAll('[data-choice]:not([hidden])')].map((one) => one.dataset.choice).join()"
+        wait_until(tab, f"location.hash === '#design_2' && {shown} === 'design_2'")
         wait_until(tab, "document.querySelector('iframe').contentWindow.parakin?.pictures > 0")
         machine = pk.load(folder / "out" / "design_2.yaml")
         joints = tab.evaluate("document.querySelector('iframe').contentWindow.parakin.state.joints")
         assert joints == pytest.approx(machine.inverse(machine.home), abs=1e-6)
         tab.mouse.click(*tab.evaluate(POINT, 2))
-        assert tab.evaluate(shown) == ["design_3"]
+        wait_until(tab, f"{shown} === 'design_3'")
         with tab.expect_download() as saved:
             tab.locator('a[download="design_3.yaml"]').click()
         assert pk.load(saved.value.path()).inverse([0.0, 0.0, 0.0])[0] == pytest.approx(500.0, rel=1e-5)

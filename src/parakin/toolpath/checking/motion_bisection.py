@@ -96,9 +96,10 @@ class MotionBisection:
             finest = self.prover.find_finest(sections)
             self._find_jumps(sections.select(finest & unproved[:, self.turns]), ledger)
             going = (unproved & ledger.unproved[sections.number]).any(1) & ~finest
-            self._count_cuts(sections.select(going), unproved[going], ledger)
-            going &= ledger.unproved[sections.number].any(1)
             sections, unproved = sections.select(going), unproved[going]
+            if self._count_cuts(sections, unproved, ledger):
+                rows = np.flatnonzero(ledger.unproved[sections.number].any(1))
+                sections, unproved = sections.select(rows), unproved[rows]
             if len(sections):
                 share = sections.middle
                 points = self.compute_inner_points(sections, share)
@@ -132,17 +133,20 @@ class MotionBisection:
         passed = self.find_passed_singularities(*determinants)
         ledger.mark_broken(doubtful.number[passed], self.singular, doubtful.end[passed])
 
-    def _count_cuts(self, sections: Sections, unproved: Flags, ledger: Ledger) -> None:
-        """Count the cuts of motions; those cut too often stay undecided, and all where the path is."""
+    def _count_cuts(self, sections: Sections, unproved: Flags, ledger: Ledger) -> bool:
+        """Count the cuts of motions; those cut too often stay undecided, and all where the path is: tell if any do."""
         np.add.at(ledger.cuts, sections.number, 1)
         self.cuts_left -= len(sections)
         given_up = np.flatnonzero(((ledger.cuts > MOST_CUTS) | (self.cuts_left < 0)) & ledger.unproved.any(1))
+        if not len(given_up):
+            return False
         rows = np.flatnonzero(np.isin(sections.number, given_up))
         if self.doubt is None and len(rows):
             rows = rows[sections.number[rows] == sections.number[rows].min()]
             self.doubt = self._find_doubt(sections.select(rows), unproved[rows])
         ledger.mark_broken(given_up, self.undecided, np.ones(len(given_up)))
         ledger.unproved[given_up] = False
+        return True
 
     def _find_doubt(self, sections: Sections, unproved: Flags) -> Doubt:
         """Find what keeps sections of a motion from being proved: a joint that turns far, or a limit that is near."""

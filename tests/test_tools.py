@@ -159,6 +159,11 @@ def test_a_length_that_contradicts_the_machine_is_refused(write, capsys):
         assert said["tools"][-1]["length"] == 150.0 and said["tool_length"] == 150.0
 
 
+def test_a_tool_on_a_machine_that_has_none_is_refused_by_its_own_length(write):
+    with pytest.raises(InputError, match=r":2: tool 1 BALL is 75 mm long, the tool of orthoglide is 0 mm long"):
+        pk.fit_tool_lengths(load_shipped("orthoglide"), pk.read_path(write(NX.format(length=75.0))))
+
+
 UPRIGHT = re.sub(r"(GOTO/-?\d+,\d+,\d+),.*", r"\1", NX)
 
 

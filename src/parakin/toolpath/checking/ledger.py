@@ -67,15 +67,16 @@ class Doubt:
     """What a motion could not be proved for when its bisection was given up.
 
     motion, share : where
-    joint, turn : the turning joint that goes farthest on one of its sections, and by how many rad; -1 without one
-    column, margin : the unproved limit of which least is left at the ends of its sections, and how much; -1 for none
+    joint, turn : the turning joint that goes farthest on one of its sections, and by how many rad; None if all stand
+    column, margin : the unproved limit of which least is left at the ends of its sections, and how much; None if all
+        are proved
     """
 
     motion: int
     share: float
-    joint: int
+    joint: int | None
     turn: float
-    column: int
+    column: int | None
     margin: float
 
 

@@ -161,9 +161,9 @@ class MotionBisection:
         return Doubt(
             int(sections.motion[0]),
             float(sections.begin[row if turns else near]),
-            turning[number] if turns else -1,
+            turning[number] if turns else None,
             float(turn[row, number]) if turns else 0.0,
-            column if known else -1,
+            column if known else None,
             float(left[near, column]),
         )
 

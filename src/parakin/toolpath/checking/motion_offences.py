@@ -57,10 +57,10 @@ def make_undecided_offence(posted: Posted, bisection: MotionBisection) -> Offenc
 
 def _describe_doubt(posted: Posted, doubt: Doubt) -> str:
     machine = posted.machine
-    if doubt.joint >= 0:
+    if doubt.joint is not None:
         joint, turn = machine.joints[doubt.joint], format_measure(doubt.turn, "rad", 0.0)
         return f"joint {joint} goes {turn} on a short piece of it"
-    if doubt.column < 0:
+    if doubt.column is None:
         return "no bound keeps it from a parallel singularity"
     limit = machine.limit_definitions[doubt.column]
     if limit.side == "reach":

@@ -113,7 +113,9 @@ def _choose_lengths(machine: Machine, path: ToolPath, length: ToolLength) -> lis
         else:
             lengths.append(longest_tool + cutter - longest)
             if lengths[-1] <= 0.0:
-                _refuse_length(machine, path, use, f"is {longest - cutter:g} mm shorter than the longest tool")
+                shorter = longest - cutter
+                what = f"{shorter:g} mm shorter than the longest tool" if shorter > _SAME else f"{cutter:g} mm long"
+                _refuse_length(machine, path, use, f"is {what}")
     return lengths
 
 

@@ -82,10 +82,16 @@ def test_no_machine_breaks_the_bound_over_a_box(name, ranges):
     assert 0.4 * proved.attained < errors.max() <= proved.bound
 
 
-def test_what_is_singular_is_unproved():
+def test_what_is_singular_is_unproved(capsys):
     machine = load_shipped("tricept")
     accuracy = pk.analyse_accuracy(machine, {"feet": "0.05 mm"}, samples=10)
-    assert pk.bound_worst_case(accuracy, {}).bound == np.inf  # the tool lies along the wrist's first axis
+    proved = pk.bound_worst_case(accuracy, {})
+    assert proved.bound == np.inf  # the tool lies along the wrist's first axis
+    assert proved.unproved.tolist() == machine.home.tolist()
+    assert main(["accuracy", "tricept", "--tolerance", "feet=0.05mm", "--samples", "10", "--over", "X=0:0"]) == 0
+    said = capsys.readouterr().out
+    assert "no bound of their error was found at these tolerances about X=0.000 Y=0.000 Z=-1650.000" in said
+    assert "singular" not in said
 
 
 @pytest.mark.parametrize("size", [1, 2, 3])

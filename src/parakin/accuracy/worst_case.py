@@ -29,16 +29,18 @@ _CELLS = 8  # of a lattice of directions, along an edge of a cube
 class WorstCase:
     """The greatest error of the tip over poses, of every machine within tolerances.
 
-    bound : mm, no machine's tip is off by more; infinite where that is not proved
+    bound : mm, no machine's tip is off by more; infinite if the proof closed for some poses at no number
     attained : mm, the error of one machine at one of the poses
     pose : (axes,) that one
     boxes : how many were examined
+    unproved : (axes,) the middle of a box of poses for which the proof did not close; None if the bound is finite
     """
 
     bound: float
     attained: float
     pose: Array
     boxes: int
+    unproved: Array | None
 
     def __repr__(self) -> str:
         return f"<parakin worst case: {1e3 * self.attained:.4g} to {1e3 * self.bound:.4g} um>"
@@ -85,7 +87,9 @@ def bound_worst_case(accuracy: Accuracy, ranges: Mapping[str, AxisRange], second
         kept = np.setdiff1d(np.arange(len(bounds)), open_)
         lows, highs = np.vstack([lows[kept], new_lows]), np.vstack([highs[kept], new_highs])
         bounds = np.concatenate([bounds[kept], new_bounds])
-    return WorstCase(float(bounds.max()), attained, pose, budget.used + 1)
+    worst = int(bounds.argmax())
+    unproved = None if np.isfinite(bounds[worst]) else 0.5 * (lows[worst] + highs[worst])
+    return WorstCase(float(bounds[worst]), attained, pose, budget.used + 1, unproved)
 
 
 def _halve(low: Array, high: Array, whole: Array) -> tuple[Array, Array]:

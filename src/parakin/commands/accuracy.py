@@ -19,9 +19,10 @@ from .region_options import parse_axis_ranges, parse_time
 if TYPE_CHECKING:
     from ..accuracy.accuracy import Accuracy
     from ..accuracy.worst_case import WorstCase
+    from ..arrays import Array
+    from ..machine import Machine
 
 _LONGEST = 60.0  # s of a proof, if nothing else is said
-_UNPROVED = "unproved: a leg, or a turning axis, may be singular there"
 
 
 def accuracy(
@@ -126,11 +127,15 @@ def _parse_costs(texts: Sequence[str] | None) -> dict[str, float]:
     return costs
 
 
+def _format_pose(machine: Machine, pose: Array) -> str:
+    values = zip(machine.axes, pose.tolist(), machine.axis_units, strict=True)
+    return " ".join(f"{axis}={format_fixed(to_display(value, unit), 3, '')}" for axis, value, unit in values)
+
+
 def _format_accuracy(result: Accuracy, proved: WorstCase | None, allowed: Mapping[str, float] | None) -> str:
     machine = result.machine
     median, most, worst = (1e3 * result.percentile(percent) for percent in (50, 95, 100))
-    pose = zip(machine.axes, result.poses[result.worst].tolist(), machine.axis_units, strict=True)
-    where = " ".join(f"{axis}={format_fixed(to_display(value, unit), 3, '')}" for axis, value, unit in pose)
+    where = _format_pose(machine, result.poses[result.worst])
     lines = [
         f"{machine.name}: the tip's error, root mean square, at {len(result.poses)} poses of the workspace\n",
         f"half of them   {format_fixed(median, 1)} um",
@@ -152,7 +157,11 @@ def _format_accuracy(result: Accuracy, proved: WorstCase | None, allowed: Mappin
     header += ["allowed"] if allowed is not None else []
     lines += ["", format_table(rows, header, " " + "r" * (len(header) - 1))]
     if proved is not None:
-        bound = f"{format_fixed(1e3 * proved.bound, 1)} um" if proved.bound < float("inf") else _UNPROVED
-        lines += ["", f"no machine within them is off by more than  {bound}"]
+        bound = f"no machine within them is off by more than  {format_fixed(1e3 * proved.bound, 1)} um"
+        if proved.unproved is not None:
+            about = _format_pose(machine, proved.unproved)
+            bound = f"no bound of their error was found at these tolerances about {about};\n"
+            bound += "smaller tolerances, a smaller box or more time may give one"
+        lines += ["", bound]
         lines.append(f"one of them is off by                       {format_fixed(1e3 * proved.attained, 1)} um")
     return "\n".join(lines)

@@ -46,6 +46,7 @@ def encode_accuracy(
             "attained": worst_case.attained,
             "pose": encode_pose(machine, worst_case.pose),
             "boxes": worst_case.boxes,
+            "unproved": None if worst_case.unproved is None else encode_pose(machine, worst_case.unproved),
         },
         "allowed": None
         if allowed is None

@@ -163,6 +163,53 @@ def test_the_published_orthoglide_is_stiff_as_its_amplification_tells():
     assert found.along([1, 1, 1])[1] == pytest.approx(DRIVE * (7.0 / 3.0) ** 2, rel=1e-4)
 
 
+def write_cubic(folder, height, point, edge, centre):
+    """Struts along edges of a cube that stands on a corner; the platform and its tool are told from ``point``."""
+    across = np.array([[2.0, 0.0, 1.0], [-1.0, 1.0, 1.0], [-1.0, -1.0, 1.0]])
+    corners = np.array([[0, 0, 1], [1, 0, 1], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0, 1, 1]], float) * np.sqrt(3.0) * edge
+    corners = corners @ (across / np.linalg.norm(across, axis=0)) - [0.0, 0.0, 1.5 * edge]
+    low, high = corners[[0, 2, 2, 4, 4, 0]], corners[[1, 1, 3, 3, 5, 5]]
+    ways = (high - low) / (high - low)[:, 2:]
+    feet, ends = ([*(low + (z - low[:, 2:]) * ways).T] for z in (-centre, height - centre))
+    points = {"foot": np.transpose([feet[0], feet[1], np.zeros(6)])}
+    points["platform"] = np.transpose([ends[0], ends[1], np.full(6, -point)])
+    told = {
+        key: "".join(f"\n    - [{', '.join(f'{x:.9f} mm' for x in row)}]" for row in rows)
+        for key, rows in points.items()
+    }
+    path = folder / f"cubic_{edge}_{point}.yaml"
+    path.write_text(
+        f"name: cubic\ntitle: Cubic\nsource: Dehaeze.\nsizes: {{tool: 0 mm}}\nmotion: tx ty tz rz ry rx\nlegs:\n"
+        f"  kind: length\n  joints: [d1, d2, d3, d4, d5, d6]\n  foot:{told['foot']}\n  platform:{told['platform']}\n"
+        f"  range: [10 mm, 900 mm]\nhome: {{X: 0 mm, Y: 0 mm, Z: {height + point} mm, A: 0 deg, B: 0 deg, C: 0 deg}}\n",
+        encoding="utf-8",
+    )
+    return pk.load(path)
+
+
+@pytest.mark.parametrize(
+    ("sizes", "coupling", "tilt", "turn"),
+    [
+        ((100.0, -50.0, 100.0, 50.0), "0", "0.015", "0.06"),
+        ((100.0, 20.0, 100.0, 50.0), "-0.14", "0.025", "0.06"),
+        ((80.0, -30.0, 100.0, 50.0), "0", "0.015", "0.06"),
+        ((100.0, -50.0, 150.0, 60.0), "0.02", "0.034", "0.14"),
+    ],
+)
+def test_published_tables_of_cubic_platforms(sizes, coupling, tilt, turn, tmp_path):
+    """Tables of T. Dehaeze, Cubic configuration for the Stewart platform (stewart-simscape, 2020), two digits, m and N:
+    height, the tool's point above the platform, the cube's useful height and its centre above the feet."""
+    machine = write_cubic(tmp_path, *sizes)
+    matrix = pk.analyse_stiffness(machine, "1 N/mm", None, [machine.home]).matrices[0]
+    metres = np.array([1.0] * 3 + [1e-3] * 3)
+    found = matrix * np.outer(metres, metres)
+    expected = np.diag([2.0] * 3 + [float(tilt)] * 2 + [float(turn)])
+    expected[0, 4] = expected[4, 0] = float(coupling)
+    expected[1, 3] = expected[3, 1] = -float(coupling)
+    digit = 10.0 ** np.floor(np.log10(np.where(expected == 0.0, 1e-6, np.abs(expected))) - 1.0)
+    assert (np.abs(found - expected) <= 0.5001 * digit).all()
+
+
 def test_springs_in_a_row_add_up():
     machine = load_shipped("hexapod")
     drives, both = (pk.analyse_stiffness(machine, "100 N/um", struts, samples=20) for struts in (None, "50 N/um"))

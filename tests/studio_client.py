@@ -79,7 +79,7 @@ def run_studio(folder, *words, end=signal.SIGINT):
         yield StudioClient(address[0])
         process.send_signal(end)
         _, errors = process.communicate(timeout=20)
-        assert (process.returncode, errors) == (0, "")
+        assert (process.returncode, errors) == (-9 if end == signal.SIGKILL else 0, "")
     finally:
         process.kill()
         process.wait()

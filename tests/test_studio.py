@@ -4,6 +4,7 @@ import json
 import signal
 import socket
 import time
+from contextlib import suppress
 from io import BytesIO
 from pathlib import Path
 from zipfile import ZipFile
@@ -193,17 +194,50 @@ def test_names_that_people_give(studio):
     assert studio.run(session, "post", {"PART": "part (1).cls", "--machine": "own.yaml"})["code"] == 0
 
 
-def test_a_closed_terminal_ends_it(tmp_path):
-    with run_studio(tmp_path, end=signal.SIGHUP) as client:
+@pytest.mark.parametrize("end", [signal.SIGHUP, signal.SIGTERM, signal.SIGKILL], ids=lambda end: end.name)
+def test_nothing_goes_on_once_it_has_ended(tmp_path, end):
+    """Its terminal closed, told to end, or killed."""
+    with run_studio(tmp_path, end=end) as client:
         session = client.open_session()
-        client.begin_run(session, "workspace", {"NAME": "hexapod", "--gap": "0.0001", "--time": "600"})
-    assert not list(tmp_path.iterdir())
+        client.begin_run(session, "atlas", {"NAME": "hexapod", "--step": "10"})
+        if end != signal.SIGHUP:  # which comes before the command has begun
+            time.sleep(1.0)
+        runs = list_processes(tmp_path)
+        assert runs or end == signal.SIGHUP
+    if end != signal.SIGKILL:
+        assert not list(tmp_path.iterdir())
+    until = time.monotonic() + 10.0
+    while list_processes(tmp_path):
+        assert time.monotonic() < until
+        time.sleep(0.05)
 
 
-def test_a_large_upload_is_refused(studio):
+def list_processes(folder):
+    """List the processes that work in a folder of a folder."""
+    found = []
+    for process in Path("/proc").glob("[0-9]*"):
+        with suppress(OSError):  # it has ended
+            found += [process] if folder in (process / "cwd").readlink().parents else []
+    return found
+
+
+@pytest.mark.parametrize(("path", "said"), [("files/large.cls", "larger than 64 MiB"), ("runs", "larger than 100 KiB")])
+def test_what_is_too_large_is_refused_before_it_is_read(studio, path, said):
     session = studio.open_session()
-    status, answer = studio.put_file(session, "large.cls", b"x" * (64 * 2**20 + 1))
-    assert status == 400
+    with socket.create_connection(("127.0.0.1", studio.port), timeout=20) as client:
+        method = "POST" if path == "runs" else "PUT"
+        head = f"{method} {studio.prefix}sessions/{session}/{path} HTTP/1.1\r\nHost: 127.0.0.1:{studio.port}\r\n"
+        client.sendall(f"{head}Content-Length: {64 * 2**20 + 1}\r\n\r\n".encode())
+        answer = client.makefile("rb").read().decode()  # to the connection's end
+    assert answer.startswith("HTTP/1.1 413 ")
+    assert said in answer
+
+
+def test_an_upload_of_no_announced_size_is_bounded(studio):
+    session = studio.open_session()
+    chunks = (b"x" * 2**20 for _ in range(65))
+    status, answer = studio.put_file(session, "large.cls", chunks)
+    assert status == 413
     assert "larger than 64 MiB" in answer["error"]
 
 

@@ -14,10 +14,11 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal
 
+from .leash import PATIENCE
+
 _AT_ONCE = 2
 _LONGEST = 900.0  # s
 _MOST_OUTPUT = 1_000_000  # bytes that are kept, of each stream
-_PATIENCE = 3.0  # s for a process to remove its half-written files
 
 State = Literal["waiting", "running", "done", "cancelled", "too long"]
 
@@ -57,6 +58,7 @@ class RunQueue:
     def __init__(self) -> None:
         self._slots = asyncio.Semaphore(_AT_ONCE)
         self._tasks: dict[int, asyncio.Task[None]] = {}
+        self._leash, self._end = os.pipe()  # whose end closes with this process, for what it began to see
 
     def begin(self, words: Sequence[str], folder: Path) -> Run:
         """Begin a command in a folder, when there is room."""
@@ -92,8 +94,9 @@ class RunQueue:
             self._tasks.pop(id(run), None)
 
     async def _run_process(self, run: Run) -> None:
+        begin = ["-P", "-m", "parakin.studio.leash", str(self._leash)]  # -P: a file in the folder is no module
         process = await asyncio.create_subprocess_exec(
-            sys.executable, "-P", "-m", "parakin", *run.words,  # -P: a file in the folder is no module
+            sys.executable, *begin, "parakin", *run.words, pass_fds=[self._leash],
             cwd=run.folder, stdin=asyncio.subprocess.DEVNULL, stdout=asyncio.subprocess.PIPE,
             stderr=asyncio.subprocess.PIPE, start_new_session=True,
             env={**os.environ, "COLUMNS": "100", "NO_COLOR": "1", "PYTHONPATH": _find_import_path()},
@@ -128,6 +131,6 @@ async def _end_process(process: asyncio.subprocess.Process) -> None:
         with suppress(ProcessLookupError):
             os.killpg(process.pid, number)
         with suppress(TimeoutError):
-            async with asyncio.timeout(_PATIENCE):
+            async with asyncio.timeout(PATIENCE):
                 await process.wait()
                 return

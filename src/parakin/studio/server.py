@@ -28,7 +28,7 @@ from ..errors import InputError
 from .forms import Form, write_line
 from .request_guard import LOOPBACK, Guard
 from .runs import Run, RunQueue
-from .sessions import LARGEST_FILE, Session, Sessions
+from .sessions import Session, Sessions
 
 _TEXT_TYPES = {".js": "text/javascript", ".css": "text/css", ".html": "text/html"}
 _OWN_POLICY = (
@@ -39,6 +39,11 @@ _FRAMED = "frame-ancestors 'self'"
 # A file that a command wrote may be looked at, but is not the studio: it gets an origin of its own.
 _FILE_POLICY = f"sandbox allow-scripts; {_FRAMED}"
 _ATTACHED = {".html", ".svg", ".png", ".pdf", ".txt"}  # kinds that a browser shows
+_LARGEST_OBJECT = 100 * 2**10  # bytes
+
+
+class _TooLargeError(InputError):
+    """Data that there is no room for."""
 
 
 class Studio:
@@ -86,6 +91,8 @@ class Studio:
         async def answer(request: Request) -> Response:
             try:
                 return await action(request)
+            except _TooLargeError as error:  # what is still to come is not read: the connection ends
+                return JSONResponse({"error": str(error)}, status_code=413, headers={"connection": "close"})
             except InputError as error:
                 return JSONResponse({"error": str(error)}, status_code=400)
             except LookupError:
@@ -149,12 +156,9 @@ class Studio:
 
     async def _take_file(self, request: Request) -> Response:
         session, name = self._find_session(request), request.path_params["name"]
-        content = bytearray()
-        async for block in request.stream():
-            content += block
-            if len(content) > LARGEST_FILE:
-                raise InputError(f"{name}: larger than {LARGEST_FILE >> 20} MiB")
-        session.write_file(name, bytes(content))
+        session.find_place(name)  # before the data is read
+        content = await _read_body(request, session.measure_room(), name)
+        session.write_file(name, content)
         return JSONResponse({"name": name, "size": len(content)})
 
     async def _list_runs(self, request: Request) -> Response:
@@ -184,13 +188,28 @@ class Studio:
         return await self._tell_run(request)
 
 
-async def _read_json(request: Request) -> dict[str, Any]:
-    """Read a small JSON object."""
+async def _read_body(request: Request, most: int, what: str) -> bytes:
+    """Read the body of a request, bytes; one of more than the most is refused as soon as its size is known."""
+
+    def check(size: int) -> None:
+        if size > most:
+            raise _TooLargeError(f"{what}: larger than {_format_size(most)}, the most that there is room for")
+
+    check(int(request.headers.get("content-length", "0")))
     body = bytearray()
     async for block in request.stream():
         body += block
-        if len(body) > 100_000:
-            raise InputError("more than 100 kB, a small JSON object expected")
+        check(len(body))
+    return bytes(body)
+
+
+def _format_size(size: int) -> str:
+    return f"{size >> 20} MiB" if size >= 2**20 else f"{size >> 10} KiB"
+
+
+async def _read_json(request: Request) -> dict[str, Any]:
+    """Read a small JSON object."""
+    body = await _read_body(request, _LARGEST_OBJECT, "a JSON object")
     try:
         value = json.loads(body)
     except (ValueError, RecursionError):
@@ -219,7 +238,7 @@ def serve(
     port: int,
     announce: Callable[[str, Path], None],
 ) -> None:
-    """Serve a studio on this computer until it is interrupted, or its terminal is closed.
+    """Serve a studio on this computer until it is interrupted or ended, or its terminal is closed.
 
     given : files that every page begins with copies of
     port : 0 for a free one
@@ -240,20 +259,22 @@ def serve(
         guarded = Guard(studio.make_application(), token, own_port)
         config = uvicorn.Config(guarded, log_level="error", access_log=False, ws="none", server_header=False)
         server, address = uvicorn.Server(config), f"http://{LOOPBACK}:{own_port}/{token}/"
-        _end_with_terminal(server)
+        _end_on_signals(server)
         announce(address, _write_way(Path(folder), address))
         with suppress(KeyboardInterrupt):
             asyncio.run(server.serve(sockets=[listener]))
 
 
-def _end_with_terminal(server: uvicorn.Server) -> None:
-    """End a server where its terminal is closed, so that its runs and files do not stay."""
+def _end_on_signals(server: uvicorn.Server) -> None:
+    """End a server that is asked to end, or whose terminal is closed, so that its runs and files do not stay."""
 
     def end(number: int, frame: object) -> None:
         server.should_exit = True
 
-    if hasattr(signal, "SIGHUP") and threading.current_thread() is threading.main_thread():
-        signal.signal(signal.SIGHUP, end)
+    if threading.current_thread() is threading.main_thread():
+        for name in ("SIGHUP", "SIGTERM"):  # not every system has both
+            if hasattr(signal, name):
+                signal.signal(getattr(signal, name), end)
 
 
 def _write_way(folder: Path, address: str) -> Path:

@@ -20,7 +20,7 @@ _MOST_SESSIONS = 20
 _MOST_RUNS = 100  # that a session remembers
 _MOST_BYTES = 2**30  # of a session's files
 _MOST_FILES = 500
-LARGEST_FILE = 64 * 2**20  # bytes
+_LARGEST_FILE = 64 * 2**20  # bytes
 
 
 class SessionFile(NamedTuple):
@@ -94,13 +94,20 @@ class Session:
             raise InputError(f"{quote(folder)} is no folder with files")
         return packed.getvalue()
 
-    def write_file(self, name: str, content: bytes) -> None:
-        """Write a file whole."""
+    def measure_room(self) -> int:
+        """Measure how large one more file may be, bytes."""
+        return max(0, min(_LARGEST_FILE, _MOST_BYTES - sum(file.size for file in self.list_files())))
+
+    def find_place(self, name: str) -> Path:
+        """Find where a file of a name is written; raises :class:`InputError` for a name that none can have."""
         path = self.find_file(name)
         if len(path.relative_to(self.folder).parts) != 1 or path.is_dir():
             raise InputError(f"{quote(name)} is not {FILE_NAME_WORDS}, or is a folder")
-        if sum(file.size for file in self.list_files()) + len(content) > _MOST_BYTES:
-            raise InputError(f"{quote(name)}: the session's files would be more than {_MOST_BYTES >> 20} MiB")
+        return path
+
+    def write_file(self, name: str, content: bytes) -> None:
+        """Write a file whole."""
+        path = self.find_place(name)
         half = path.with_name(f".{path.name}.half")
         half.write_bytes(content)
         half.replace(path)

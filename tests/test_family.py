@@ -155,6 +155,9 @@ def test_struts_of_a_joint_may_differ_a_little(off):
         (lambda m: pk.family(m, ["feet"]).inverse(m.home, {"foot": 3.0}), 'sizes: unknown "foot"'),
         (lambda m: pk.family(m, ["feet"]).at(np.zeros((2, 9))), "one machine's expected"),
         (lambda m: m.replace_parameters({"rods": 3.0}), 'parameters: unknown "rods"'),
+        (lambda m: m.replace_parameters({}, ranges={"theta1": (0.0, 1.0)}), 'ranges: unknown "theta1"'),
+        (lambda m: m.list_follow_rates("l9"), 'size: unknown "l9", expected one of'),
+        (lambda m: m.tapes("++"), "mode '++': one of"),
     ],
 )
 def test_what_is_mistaken_is_said(call, message):

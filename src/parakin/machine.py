@@ -24,12 +24,9 @@ from .kinematics.path_modes import PathMode, find_path_modes
 from .kinematics.solution import Solution
 from .kinematics.tapes import KinematicTapes, collect_tapes
 from .kinematics.travel import LineTapes, Travel, compile_line_tapes, find_travel
-from .kinematics.wrist.pole_crossing import flip_mode
 from .kinematics.wrist.pole_thresholds import EXACT
 from .machine_properties import MachineProperties
-from .model.legs import Inverse
 from .model.limits import compute_platform_points
-from .model.rates import TwistRates, compute_twist_rates
 from .model.structures import PlatformPlacement
 
 _SHORTEST_DIRECTION = 1e-6  # mm or rad; travel in multiples of a shorter one overflows
@@ -38,9 +35,16 @@ _SHORTEST_DIRECTION = 1e-6  # mm or rad; travel in multiples of a shorter one ov
 class Machine(MachineProperties, Displayed):
     """A parallel kinematic machine. Made by :func:`parakin.load`; nothing of it changes after that.
 
-    Poses are rows of ``axes`` (mm, rad) of the tool in the workpiece's frame, orientation R = Rz(C)·Ry(B)·Rx(A);
-    joints are rows of ``joints``. Any leading shape goes, ``()`` included, and is kept. A pose that is not a number or
-    out of reach gives a row of NaN and leaves its neighbours alone.
+    Its methods share these arguments:
+
+    poses, pose : rows (..., axes), or one (axes,), of :attr:`axes`, mm and rad, of the tool in the workpiece's frame:
+        its tip and the orientation R = Rz(C)·Ry(B)·Rx(A), or where :attr:`has_direction` its axis Rz(C)·Ry(B)·(0, 0, 1)
+    joints : rows (..., joints) of :attr:`joints`, mm and rad
+    mode : working mode, one of :attr:`modes`; by default :attr:`mode`
+
+    Any leading shape goes, ``()`` included, and is kept, but where rows (N, axes) are asked for. A pose that is not a
+    number or out of reach gives a row of NaN and leaves its neighbours alone. Values of the wrong shape, kind or name
+    raise :class:`PoseError`.
     """
 
     def replace_parameters(
@@ -53,10 +57,11 @@ class Machine(MachineProperties, Displayed):
 
         The numbers that are not among them follow its named sizes.
 
-        ranges : other ranges of the legs' drives, by their names
-        home : another home, by axes
+        values : the other numbers, by their names
+        ranges : other ranges (low, high) of the legs' drives, mm and rad, by their names
+        home : another home, mm and rad, by axes
 
-        Raises :class:`DescriptionError` where they are no machine that works.
+        Raises :class:`PoseError` for an unknown name, :class:`DescriptionError` where they are no machine that works.
         """
         known = [parameter.name for parameter in self.parameters]
         for name in values:
@@ -70,7 +75,9 @@ class Machine(MachineProperties, Displayed):
     def rows(self, values: RowsLike, names: tuple[str, ...], what: str) -> tuple[Array, tuple[int, ...]]:
         """Check ``values`` and return them as C-ordered float64 rows (N, names), with their leading shape.
 
-        Texts carry their unit, ``"30 deg"``; a dict has values by name, the rest is home's.
+        values : numbers, or texts with their unit, ``"30 deg"``; a dict has values by name, the rest is home's
+        names : :attr:`axes` or :attr:`joints`, of which they are
+        what : the argument's name, for :class:`PoseError`
         """
         of_pose = names == self.axes
         units = self.axis_units if of_pose else self.joint_units
@@ -89,20 +96,6 @@ class Machine(MachineProperties, Displayed):
         reach = [max(abs(drive.low), abs(drive.high)) for drive in self.drives]
         return bound_angles(self.axis_units, [0.0] * len(self.axes)), bound_angles(self.joint_units, reach)
 
-    def head_modes(self, mode: str) -> list[str]:
-        """Return a working mode, and the one with the other sign of head and table, if these have a choice."""
-        mode = self.checked_mode(mode)
-        return [mode, flip_mode(mode)] if self.structure.branches else [mode]
-
-    def checked_mode(self, mode: str | None) -> str:
-        """Check a working mode and return it, the default one for None; an invalid one raises :class:`PoseError`."""
-        if mode is None:
-            return self.mode
-        check_kind("mode", mode, str, f" such as {self.mode!r}")
-        if mode not in self.modes:
-            raise PoseError(f"mode {mode!r}: one of {', '.join(repr(m) for m in self.modes[:8])} expected")
-        return mode
-
     def _out(self, out: Array | None, shape: tuple[int, ...]) -> Array:
         if out is None:
             return np.empty(shape)
@@ -117,12 +110,11 @@ class Machine(MachineProperties, Displayed):
 
         Parameters
         ----------
-        poses : mm and rad, axes as in :attr:`axes`
-        mode : working mode, one of :attr:`modes`
-        out : float64 array to fill, as in NumPy
+        out : float64 array (..., joints) to fill, as in NumPy
 
         An angle that is free (a turning axis along the tool's) is 0; :meth:`follow` keeps the neighbour's instead.
-        Limits are not looked at: see :meth:`check`.
+        Limits are not looked at: see :meth:`check`. In the papers this is (26) to (28) and (39) to (41) of FME
+        Transactions 41 (2013) for the Tricept, (6) to (11) of IJEEC 6 (2022) for Lambda legs.
         """
         rows, lead = self.rows(poses, self.axes, "poses")
         shape = (*lead, len(self.joints))
@@ -149,7 +141,7 @@ class Machine(MachineProperties, Displayed):
         return follow_path(self.model, rows, self.checked_mode(mode), float(free_below))
 
     def find_path_modes(self, poses: RowsLike) -> list[PathMode]:
-        """Find which working modes carry a path (N, axes) whole, and whether it stays in its assembly mode.
+        """Find which working modes carry a path of poses (N, axes) whole, and whether it stays in its assembly mode.
 
         One :class:`~.kinematics.path_modes.PathMode` for each of :attr:`modes`. What lies between the poses is not
         looked at: :func:`parakin.prepare` does that in one mode.
@@ -160,7 +152,10 @@ class Machine(MachineProperties, Displayed):
         return find_path_modes(self.model, rows, self.modes)
 
     def make_continuous(self, poses: Array, joints: Array, mode: str, free_below: float = EXACT) -> None:
-        """Make joints (n, joints) continuous that :meth:`inverse` gives along a path, as :meth:`follow`; in place."""
+        """Make joints (n, joints) of poses (n, axes) along a path continuous, in place; as :meth:`follow`.
+
+        free_below : rad, as there
+        """
         make_continuous(self.model, poses, joints, mode, free_below)
 
     def forward(
@@ -175,7 +170,6 @@ class Machine(MachineProperties, Displayed):
 
         Parameters
         ----------
-        joints : mm and rad
         near : poses (axes,) or (..., axes) to start from and to stay near; without them the machine's home, and its
             assembly mode (in closed form: its working mode first)
         method : ``"closed"`` (three spheres, two circles), ``"newton"``, or ``"constant"`` (the Jacobian of the start
@@ -184,6 +178,9 @@ class Machine(MachineProperties, Displayed):
             machine's, but where a near pose tells by its own joints that the legs stand in another one, which
             ``in_other_mode`` of the solution says
         agreement : by how much legs may fail to close, mm, where joints of more drives than freedoms disagree
+
+        Where there is no answer, ``why`` of the solution says the reason. Raises :class:`NoMethodError` for a closed
+        form that the machine does not have.
         """
         rows, lead = self.rows(joints, self.joints, "joints")
         check_kind("method", method, str | None)
@@ -214,7 +211,10 @@ class Machine(MachineProperties, Displayed):
         return np.ascontiguousarray(wide.reshape(-1, len(self.axes)))
 
     def assemblies(self, joints: RowsLike) -> Assemblies:
-        """Find every real pose of one joint vector; see :class:`~.kinematics.assemblies.Assemblies`."""
+        """Find every real pose of one joint vector (joints,); see :class:`~.kinematics.assemblies.Assemblies`.
+
+        Raises :class:`NoMethodError` where the legs leave a continuum of poses.
+        """
         rows, lead = self.rows(joints, self.joints, "joints")
         if lead != ():
             raise PoseError(f"joints: one vector ({len(self.joints)},) expected, not {(*lead, len(self.joints))}")
@@ -233,7 +233,6 @@ class Machine(MachineProperties, Displayed):
         Parameters
         ----------
         axis : name of an axis, or a direction (axes,) in mm and rad, or by names, of which travel is a multiple
-        mode : working mode at the pose
 
         Every pose on the way keeps every limit, with the joints that a path takes along it, turns counted, and no
         parallel singularity is met; see :class:`~.kinematics.travel.Travel`.
@@ -262,9 +261,11 @@ class Machine(MachineProperties, Displayed):
         return find_sides(self.model, self.rows(poses, self.axes, "poses")[0], self.mode)
 
     def common_points(self, joints: RowsLike, side: float) -> tuple[Array, Array]:
-        """Compute poses (n, axes) where the legs' spheres meet, on one side of their centres, for rows of joints.
+        """Compute poses (n, axes) where the legs' spheres meet, for rows of joints (n, joints).
 
-        Also what the legs fail to close there, mm.
+        Also what the legs fail to close there, (n,) mm.
+
+        side : of the spheres' centres, as :attr:`home_side`; 1 or -1
 
         Raises :class:`NoMethodError` where :attr:`has_closed_forward` is false.
         """
@@ -278,10 +279,13 @@ class Machine(MachineProperties, Displayed):
 
     def tapes(self, mode: str) -> KinematicTapes:
         """Compile the kinematics in a working mode for other interpreters, such as the C of a controller."""
-        return collect_tapes(self.model, mode)
+        return collect_tapes(self.model, self.checked_mode(mode))
 
     def line_tapes(self, mode: str) -> LineTapes:
-        """Compile the margins along a line of poses for other interpreters of intervals; only without a wrist."""
+        """Compile the margins along a line of poses for other interpreters of intervals.
+
+        Raises :class:`NoMethodError` where there is a :attr:`wrist`.
+        """
         if self.wrist is not None:
             raise NoMethodError(f"{self.name}: margins along a line are compiled for machines without a wrist only")
         return compile_line_tapes(self.model, self.checked_mode(mode))
@@ -291,7 +295,8 @@ class Machine(MachineProperties, Displayed):
 
         Rows of legs are their closures' derivatives (a rod's vector, mm); the last two rows of a machine with driven
         head or table say that the tool's axis turns with the pose's. det A = 0 (of more drives: its rank falls) at a
-        parallel singularity or where the pose's angles are, B = 0; det B = 0 at a serial one. NaN out of reach.
+        parallel singularity or where the pose's angles are, B = 0; det B = 0 at a serial one. NaN out of reach. (3)
+        and (4) of Chablat and Wenger (Chemnitz, 2000); (30) of FME Transactions 41 is of the Tricept's legs.
         """
         rows, lead = self.rows(poses, self.axes, "poses")
         n, m = len(self.axes), len(self.joints)
@@ -300,10 +305,11 @@ class Machine(MachineProperties, Displayed):
         return both[:, : m * n].reshape(*lead, m, n), both[:, m * n :].reshape(*lead, m, m)
 
     def twist_rates(self, poses: RowsLike, joints: RowsLike, whole: bool = True) -> tuple[Array, Array, Array]:
-        """Compute A (N, m, n) and B (N, m, m) with A t' = B q' for the twist t', and the legs' wrench norms, mm.
+        """Compute A (N, m, n) and B (N, m, m) with A t' = B q' for the twist t', and the wrench norms of legs, mm.
 
-        Poses and joints are rows; see :class:`parakin.model.rates.TwistRates`. With ``whole`` a row is NaN if a number
-        of it is not finite.
+        Poses and joints are rows (N, ...); see :class:`parakin.model.rates.TwistRates`.
+
+        whole : a row is NaN if a number of it is not finite
         """
         n, m, rows = len(self.axes), len(self.joints), self.rows(poses, self.axes, "poses")[0]
         check_kind("whole", whole, bool)
@@ -340,37 +346,21 @@ class Machine(MachineProperties, Displayed):
         return np.asarray(rows[0])
 
     def place_leg_joints(self, placement: PlatformPlacement) -> list[Vec]:
-        """Compute the platform's joint of every leg in the base frame, mm, with the platform placed."""
+        """Compute the platform's joint of every leg in the base frame, mm.
+
+        placement : the platform's, of :meth:`place_platform`
+        """
         return compute_platform_points(self.spec, placement.rotation, placement.origin)
 
     def locate_passive_rods(
         self, placement: PlatformPlacement, joints: Sequence[Sequence[Scalar]]
     ) -> dict[str, tuple[Vec, Vec]]:
-        """Locate both ends of each of :attr:`passive_rods` in the base frame, mm, for the joints of each leg."""
+        """Locate both ends of each of :attr:`passive_rods` in the base frame, mm, foot first.
+
+        placement : the platform's, of :meth:`place_platform`
+        joints : those of each leg, as :meth:`group_joints` has them
+        """
         return self.model.locate_passive_rods(placement, joints)
-
-    # The same on scalars of any kind (:mod:`parakin.algebra`), for interpreters such as intervals.
-
-    def trace_inverse(self, pose: Sequence[Scalar], mode: str) -> tuple[list[Scalar], PlatformPlacement, list[Inverse]]:
-        """Trace joints, the platform's placement, and each leg's inverse for a pose."""
-        return self.model.invert(pose, mode)
-
-    def trace_margins(self, pose: Sequence[Scalar], mode: str, joints: Sequence[Scalar] | None = None) -> list[Scalar]:
-        """Trace every limit's margin, in the order of :attr:`limits`, for a pose and given joints or its inverse."""
-        own = self.model.own_margins(pose, mode) if joints is None else self.model.margins(pose, joints, mode)
-        return [margin for _, margin in own]
-
-    def trace_common_point(self, joints: Sequence[Scalar]) -> tuple[list[Scalar], Scalar]:
-        """Trace where the legs' spheres meet on home's side, and its squared height over their centres, mm²."""
-        return self.model.trace_home_spheres(joints)
-
-    def trace_rates(self, pose: Sequence[Scalar], joints: Sequence[Scalar]) -> TwistRates:
-        """Trace A and B of the tool's twist, and the legs' wrench norms."""
-        return compute_twist_rates(self.spec, self.structure, pose, joints)
-
-    def trace_constraint_rates(self, pose: Sequence[Scalar]) -> list[list[Scalar]]:
-        """Trace the rates of the constraints, as :meth:`constraint_rates`."""
-        return self.model.trace_constraint_rates(pose)
 
     # Limits.
 

@@ -10,11 +10,12 @@ from itertools import product
 import numpy as np
 
 from .algebra import Scalar
-from .arguments import check_constructor
+from .arguments import check_constructor, check_kind
 from .arrays import Array, AxisRange
-from .errors import DescriptionError, NoMethodError
+from .errors import DescriptionError, NoMethodError, PoseError, quote, suggest
 from .kinematics.closure_roots import compute_closure_tolerance
 from .kinematics.home import check_home
+from .kinematics.wrist.pole_crossing import flip_mode
 from .kinematics.wrist.pose_angles import EVERY_DIRECTION, EVERY_ROTATION, EVERY_TURN
 from .kinematics.wrist.turning_joints import Wrist, find_wrist
 from .model.elements import BodyBuild, Drive, PlaneConstraint, RodConstraint
@@ -27,13 +28,13 @@ from .model.geometric_parameters import (
     replace_ranges,
     settle_offsets,
 )
-from .model.legs import Leg
+from .model.legs import Inverse, Leg
 from .model.limits import Limit, group_joints_by_leg
 from .model.nominal_values import SizedTrace
-from .model.rates import list_closure_joints
+from .model.rates import TwistRates, compute_twist_rates, list_closure_joints
 from .model.size_rates import SizeRates, SpecMaker, find_size_rates, list_numbers
 from .model.spec import Spec
-from .model.structures import DirectionColumns, Structure, make_structure
+from .model.structures import DirectionColumns, PlatformPlacement, Structure, make_structure
 from .model.traces import Model
 from .units import AXIS_UNITS
 
@@ -54,6 +55,7 @@ class MachineProperties:
 
     @property
     def name(self) -> str:
+        """The name that its file gives."""
         return self.spec.name
 
     def format_yaml(self) -> str:
@@ -64,7 +66,7 @@ class MachineProperties:
 
     @property
     def axes(self) -> tuple[str, ...]:
-        """Names of a pose's coordinates, ISO 841."""
+        """Names of a pose's coordinates after ISO 841: some of X Y Z, mm, and A B C, rad."""
         return self.model.axes
 
     @property
@@ -120,12 +122,12 @@ class MachineProperties:
         return list_closure_joints(self.spec)
 
     def group_joints(self, joints: Sequence[Scalar]) -> list[list[Scalar]]:
-        """Group a joint vector by leg; it may go on with the joints of head and table."""
+        """Group a joint vector (joints,) by leg, drives' offsets added; the joints of head and table are left out."""
         return group_joints_by_leg(self.spec, joints)
 
     @property
     def leg_count(self) -> int:
-        """How many of the joints are the legs'; those of head and table follow."""
+        """How many of the joints are the legs', the first ones; those of head and table follow."""
         return self.model.leg_count
 
     @property
@@ -139,7 +141,10 @@ class MachineProperties:
         return self.model.is_redundant
 
     def refuse_redundancy(self, what: str) -> None:
-        """Raise :class:`NoMethodError` where there are more drives than freedoms, of what they decide together."""
+        """Raise :class:`NoMethodError` where there are more drives than freedoms, of what they decide together.
+
+        what : the answer that is refused, in words
+        """
         if self.is_redundant:
             counts = f"{len(self.joints)} drives for {len(self.axes)} freedoms"
             raise NoMethodError(f"{self.name}: no {what} of a machine that has {counts}, which work against each other")
@@ -169,7 +174,8 @@ class MachineProperties:
     def trace_equations(self, values: Mapping[str, Scalar], shifts: Mapping[str, Scalar] | None = None) -> Equations:
         """Trace the machine's equations with scalars of any kind in place of some of its :attr:`parameters`.
 
-        shifts : what is added to parameters, once the others follow from ``values``
+        values : scalars by the names of parameters, mm and rad
+        shifts : what is added to parameters, mm and rad, once the others follow from ``values``
         """
         if not shifts:
             return Equations(self._replace_numbers(values)) if values else self.model
@@ -177,6 +183,31 @@ class MachineProperties:
         spec = self._replace_numbers({**values, **{name: x for name, x in named.items() if name in self.spec.sizes}})
         shifted = {p.name: p.value + shifts[p.name] for p in list_parameters(spec) if p.name in shifts}
         return Equations(replace_parameters(spec, shifted))
+
+    # Kinematics on scalars of any kind (:mod:`parakin.algebra`), for interpreters such as intervals.
+
+    def trace_inverse(self, pose: Sequence[Scalar], mode: str) -> tuple[list[Scalar], PlatformPlacement, list[Inverse]]:
+        """Trace joints (joints,), the platform's placement, and each leg's inverse for a pose."""
+        return self.model.invert(pose, mode)
+
+    def trace_margins(self, pose: Sequence[Scalar], mode: str, joints: Sequence[Scalar] | None = None) -> list[Scalar]:
+        """Trace every limit's margin, in the order of :attr:`limits`, for a pose and given joints or its inverse."""
+        own = self.model.own_margins(pose, mode) if joints is None else self.model.margins(pose, joints, mode)
+        return [margin for _, margin in own]
+
+    def trace_common_point(self, joints: Sequence[Scalar]) -> tuple[list[Scalar], Scalar]:
+        """Trace where the legs' spheres meet on home's side, and its squared height over their centres, mm²."""
+        return self.model.trace_home_spheres(joints)
+
+    def trace_rates(self, pose: Sequence[Scalar], joints: Sequence[Scalar]) -> TwistRates:
+        """Trace A and B of the tool's twist, and the legs' wrench norms."""
+        return compute_twist_rates(self.spec, self.structure, pose, joints)
+
+    def trace_constraint_rates(self, pose: Sequence[Scalar]) -> list[list[Scalar]]:
+        """Trace the rates of the constraints, as :meth:`constraint_rates`."""
+        return self.model.trace_constraint_rates(pose)
+
+    # Other numbers.
 
     def _replace_numbers(self, values: Mapping[str, Scalar]) -> Spec:
         """Replace named sizes, and all that follows from them, then single numbers."""
@@ -188,7 +219,12 @@ class MachineProperties:
         return replace_parameters(spec, values)
 
     def list_follow_rates(self, size: str) -> dict[str, float]:
-        """List the rates at which geometric numbers follow a named size, by their names; no others."""
+        """List the rates at which geometric numbers follow a named size, by their names; no others.
+
+        size : a name of the file's ``sizes``; rates are mm or rad of the number for 1 mm or 1 rad of it
+        """
+        if size not in self.spec.sizes:
+            raise PoseError(f"size: unknown {quote(size)}{suggest(size, self.spec.sizes)}")
         value, step = self.spec.sizes[size], 1.0 if self.spec.size_units[size] == "mm" else _SMALL_TURN
         after, before = (list_parameters(self._replace_numbers({size: value + way * step})) for way in (1.0, -1.0))
         ends = zip(after, before, strict=True)
@@ -231,7 +267,10 @@ class MachineProperties:
         return spec
 
     def trace_sized_equations(self, trace: SizedTrace) -> Equations:
-        """Trace the machine's equations with the sizes of :attr:`size_rates` as inputs of a trace."""
+        """Trace the machine's equations with the sizes of :attr:`size_rates` as inputs of a trace.
+
+        trace : has one input for each of these sizes, mm or rad, in their order
+        """
         return Equations(self.size_rates.apply(self.spec, trace.sizes))
 
     @cached_property
@@ -276,7 +315,7 @@ class MachineProperties:
 
     @cached_property
     def home(self) -> Array:
-        """A pose in the middle of the workspace, (axes,)."""
+        """A pose in the middle of the workspace, (axes,), mm and rad; it can't be written to."""
         home = np.array(self.model.home)
         home.flags.writeable = False
         return home
@@ -292,6 +331,20 @@ class MachineProperties:
         signs = [sign if i in self.fixed_signs else "+-" for i, sign in enumerate(self.mode)]
         every = ["".join(choice) for choice in product(*signs)]
         return (self.mode, *[mode for mode in every if mode != self.mode])
+
+    def head_modes(self, mode: str) -> list[str]:
+        """Return a working mode, and the one with the other sign of head and table, if these have a choice."""
+        mode = self.checked_mode(mode)
+        return [mode, flip_mode(mode)] if self.structure.branches else [mode]
+
+    def checked_mode(self, mode: str | None) -> str:
+        """Return a working mode, the default one for None; raises :class:`PoseError` for an invalid one."""
+        if mode is None:
+            return self.mode
+        check_kind("mode", mode, str, f" such as {self.mode!r}")
+        if mode not in self.modes:
+            raise PoseError(f"mode {mode!r}: one of {', '.join(repr(m) for m in self.modes[:8])} expected")
+        return mode
 
     @property
     def fixed_signs(self) -> list[int]:

@@ -31,7 +31,9 @@ class FamilyRates(NamedTuple):
     """The closures f and their derivatives at poses: A x' + C s' = B q' for the rates of pose, sizes and joints.
 
     closures : (N, m), zero where the legs close; of legs mm², of head and table 1
-    a : (N, m, n); b : (N, m, m); c : (N, m, k) = ∂f/∂s
+    a : (N, m, n) = ∂f/∂x
+    b : (N, m, m) = -∂f/∂q
+    c : (N, m, k) = ∂f/∂s
     scales : (m,) what one of each closure is in the least squares of more drives than freedoms
     """
 
@@ -42,15 +44,18 @@ class FamilyRates(NamedTuple):
     scales: Array
 
     def compute_size_rates(self) -> Array:
-        """Compute how the pose moves with each size while the joints stand, (N, n, k)."""
+        """Compute how the pose moves with each size while the joints stand, (N, n, k): -A⁻¹C."""
         return -self.solve(self.c)
 
     def compute_joint_rates(self) -> Array:
-        """Compute how the pose moves with each joint, (N, n, m)."""
+        """Compute how the pose moves with each joint, (N, n, m): A⁻¹B."""
         return self.solve(self.b)
 
     def solve(self, right: Array) -> Array:
-        """Solve A x = right (N, m, k), of more drives than freedoms by the forward's least squares, (N, n, k)."""
+        """Solve A x = right, of more drives than freedoms by the forward's least squares, (N, n, k).
+
+        right : (N, m, k)
+        """
         if self.a.shape[1] == self.a.shape[2]:
             return solve_each(self.a, right)
         return invert_from_left(self.a, np.broadcast_to(np.diag(self.scales), self.b.shape)) @ right
@@ -92,6 +97,7 @@ class FamilySolution:
 def make_family(machine: Machine, free: Sequence[str]) -> Family:
     """Make the family of a machine in which some of its numbers are free.
 
+    machine : whose other numbers all keep
     free : names of :attr:`Machine.parameters`, patterns such as ``legs.*.foot.*``, or groups such as ``feet``
 
     Raises :class:`PoseError` for a name that no parameter has.
@@ -116,9 +122,17 @@ def select_parameters(machine: Machine, patterns: Sequence[str]) -> tuple[Parame
 class Family:
     """Machines that differ in some of their numbers; every call takes poses or joints, and sizes, of any batch.
 
-    Poses and joints are as of :class:`Machine`; sizes are rows of :attr:`names` (mm, rad), or a dict of some of them.
-    Leading shapes broadcast. Nothing is traced or compiled for a machine of its own.
+    Its methods share these arguments:
 
+    poses, joints, mode : as of :class:`Machine`
+    sizes : rows (..., k) of :attr:`names`, mm and rad, or a dict of some of them, the rest is :attr:`nominal`
+
+    Leading shapes broadcast. Nothing is traced or compiled for a machine of its own. Values of the wrong shape, kind or
+    name raise :class:`PoseError`.
+
+    machine : whose numbers the others are
+    parameters : the k numbers that are free
+    names, nominal : their names, and their values in the machine, (k,) mm and rad
     added : a number that follows a free named size is what this makes it, and its own difference to its nominal value
         is added; otherwise a number that is free itself follows no size
     """
@@ -168,7 +182,7 @@ class Family:
         return tape
 
     def trace_equations(self, sizes: Sequence[Scalar]) -> Equations:
-        """Trace the equations of the machine of given sizes, scalars of any kind."""
+        """Trace the equations of the machine of given sizes, k scalars of any kind."""
         own = dict(zip(self.names, sizes, strict=True))
         if not self._added:
             return self.machine.trace_equations(own)
@@ -223,7 +237,7 @@ class Family:
         return self._evaluate(tape, rows, m).reshape(*lead, m)
 
     def margins(self, poses: RowsLike, sizes: RowsLike, mode: str | None = None) -> Array:
-        """Compute every limit's margin for poses with their own joints, (..., limits); as :meth:`Machine.margins`."""
+        """Compute every limit's margin, (..., axes) and (..., k) -> (..., limits); as :meth:`Machine.margins`."""
         mode, (n, _) = self.machine.checked_mode(mode), self._counts
         lead, rows = self._rows([(poses, self.machine.axes, "poses")], sizes)
         tape = self._keep(("margins", mode), n, lambda e, x: [g for _, g in e.own_margins(x, mode)])
@@ -231,7 +245,10 @@ class Family:
         return margins.reshape(*lead, tape.outputs)
 
     def make_check_tape(self, limits: Sequence[int] | None = None, mode: str | None = None) -> Tape:
-        """Make the tape of the margins of those limits, by their numbers; all by default."""
+        """Compile pose, sizes -> margins of some limits.
+
+        limits : their indices in :attr:`Machine.limits`; all by default
+        """
         mode, (n, _) = self.machine.checked_mode(mode), self._counts
         chosen = tuple(range(len(self.machine.limits)) if limits is None else limits)
 
@@ -242,7 +259,7 @@ class Family:
         return self._keep(("check", mode, chosen), n, outputs)
 
     def base_joints(self, poses: RowsLike, sizes: RowsLike, mode: str | None = None) -> Array:
-        """Compute where the struts are joined to the base, (..., struts, 3) mm in the machine's frame."""
+        """Compute where the struts are joined to the base, -> (..., struts, 3), mm in the machine's frame."""
         mode, (n, _) = self.machine.checked_mode(mode), self._counts
         lead, rows = self._rows([(poses, self.machine.axes, "poses")], sizes)
         tape = self._keep(("base joints", mode), n, lambda e, x: [c for foot in e.list_feet(x, mode) for c in foot])
@@ -259,7 +276,7 @@ class Family:
         return tuple(array.reshape(*lead, *array.shape[1:]) for array in rates[1:4])  # type: ignore[return-value]
 
     def twist_rates(self, poses: RowsLike, joints: RowsLike, sizes: RowsLike) -> FamilyRates:
-        """Compute closures, A, B and C for rows of poses, joints and sizes; x' is the tool's twist.
+        """Compute closures, A, B and C for rows (N, ...) of poses, joints and sizes; x' is the tool's twist.
 
         The twist is the tip's velocity along the machine's translations and its small turns, which are regular where
         a pose's angles are not.

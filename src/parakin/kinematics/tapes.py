@@ -27,6 +27,9 @@ class SphereTapes(NamedTuple):
 class KinematicTapes(NamedTuple):
     """The inverse in a working mode, and the direct problem: the common point of spheres, or Newton's method.
 
+    inverse : pose -> joints
+    spheres : the direct problem in closed form; None where there is none
+    newton : the direct problem by Newton's method; None where there is a closed form
     jacobians : pose, joints -> A (m·n) and B (m·m) with A x' = B q'
     coordinates : names of the motion's coordinates, which Newton's method solves for
     """

@@ -42,8 +42,10 @@ _MOST_TURN = 3.0  # rad of a turning joint over a step, for its turns to be coun
 
 @dataclass(frozen=True, eq=False)
 class TravelEnd:
-    """How far a way is proved, mm, rad or multiples of a direction, the pose there, and what ends it.
+    """How far a way is proved, and what ends it.
 
+    distance : mm, rad, or multiples of the direction
+    pose : (axes,) mm and rad, at its end
     limit : the limit that is broken next, ``singularity``, ``untold`` where it could not be told, or None where the way
         goes on beyond :data:`FARTHEST`
     """
@@ -61,7 +63,10 @@ class TravelEnd:
 
 @dataclass(frozen=True, eq=False)
 class Travel:
-    """The travel left along a direction, both ways."""
+    """The travel left along a direction, both ways.
+
+    ahead, back : along it, and against it
+    """
 
     ahead: TravelEnd
     back: TravelEnd

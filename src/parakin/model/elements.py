@@ -30,12 +30,16 @@ MOTION_UNITS: dict[str, Unit] = {**dict.fromkeys(TRANSLATIONS, "mm"), **dict.fro
 class Drive:
     """One actuated joint: its name, its unit, its range, its greatest rates, and how a controller drives it.
 
+    name, unit : the joint's, unit ``mm`` or ``rad``
+    low, high : its range
+    speed, acceleration, jerk : the greatest, mm or rad by s, s² and s³
     counts, lead : steps or encoder counts of a motor's turn, and what the joint moves meanwhile, negative where the
         motor turns the other way; None: not said
     homing : where the home switch trips, or ``absolute`` for an encoder that needs none; None: not said
     offset : what a leg's joint is more than the drive says, mm or rad; ranges and homing are what the drive says
     force, rated : the greatest force of the drive, and the greatest root of its mean square, N along a joint, Nmm about
-        one; power : its greatest power, Nmm/s
+        one
+    power : its greatest power, Nmm/s
     inertia : what motor and screw add, t along a joint, t mm² about one
     stiffness : N/mm, Nmm/rad of slide, screw and motor together
     """
@@ -65,7 +69,8 @@ class Drive:
 class BodyBuild:
     """What bodies of a kind are made of; None for what is not stated.
 
-    density : t/mm³; modulus : N/mm², of elasticity
+    density : t/mm³
+    modulus : N/mm², of elasticity
     diameter, wall : mm, of round bars; without a wall they are solid
     rods : how many bars stand side by side
     mass : t, of each body
@@ -81,17 +86,27 @@ class BodyBuild:
 
 @dataclass(frozen=True)
 class Step:
-    """One elementary transform of a head, a table or a mounting: ``axis`` by ``value`` + ``sign``·q of its drive."""
+    """One elementary transform of a head, a table or a mounting: along or about ``axis`` by ``value`` + ``sign``·q.
 
-    axis: str  # one of TRANSLATIONS and ROTATIONS
-    value: float = 0.0  # mm or rad
+    axis : one of :data:`TRANSLATIONS` and :data:`ROTATIONS`
+    value : mm or rad
+    drive : whose joint is q; None: the transform is fixed
+    sign : 1 or -1
+    """
+
+    axis: str
+    value: float = 0.0
     drive: Drive | None = None
     sign: float = 1.0
 
 
 @dataclass(frozen=True)
 class Range:
-    """low ≤ value ≤ high of a named quantity: a passive coordinate of the motion, or a difference of two joints."""
+    """low ≤ value ≤ high of a named quantity: a passive coordinate of the motion, or a difference of two joints.
+
+    name : the coordinate's, such as ``rx``
+    low, high : mm or rad
+    """
 
     name: str
     low: float = -inf
@@ -100,7 +115,11 @@ class Range:
 
 @dataclass(frozen=True)
 class Gap:
-    """low ≤ q[second] - q[first] ≤ high, mm: two sliders that share a shaft."""
+    """low ≤ q[second] - q[first] ≤ high: two sliders that share a shaft.
+
+    first, second : their joints' names
+    low, high : mm
+    """
 
     first: str
     second: str
@@ -110,7 +129,7 @@ class Gap:
 
 @dataclass(frozen=True)
 class Cone:
-    """The rods of all legs stay within ``angle`` of ``axis`` at the joint ``at`` the foot or the platform.
+    """The rods of all legs stay within ``angle``, rad, of ``axis`` at the joint ``at`` the foot or the platform.
 
     ``axis`` is in the base frame for the foot, in the platform frame for the platform; it points along the rod's
     direction from foot to platform when the joint is centred. None: each rod's own direction at home.
@@ -154,9 +173,15 @@ class RodConstraint:
 
 @dataclass(frozen=True)
 class Limits:
-    """The limits of a machine besides its drives' ranges."""
+    """The limits of a machine besides its drives' ranges.
 
-    passive: tuple[Range, ...] = ()  # of the motion's coordinates, by their names (rx, ry, tz, ...)
+    passive : of the motion's coordinates, by their names (rx, ry, tz, ...)
+    gaps : between two sliders of one shaft
+    cones : about the rods' joints
+    clearance : least distance of the centre lines of two struts that hold the platform, mm; None: no limit
+    """
+
+    passive: tuple[Range, ...] = ()
     gaps: tuple[Gap, ...] = ()
     cones: tuple[Cone, ...] = ()
-    clearance: float | None = None  # least distance of the centre lines of two struts that hold the platform, mm
+    clearance: float | None = None

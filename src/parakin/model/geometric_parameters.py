@@ -7,7 +7,7 @@ from dataclasses import dataclass, fields, replace
 from typing import Any, get_type_hints
 
 from ..algebra import Scalar, Vec, add, cross, dot, norm, scale, sub
-from ..errors import DescriptionError
+from ..errors import DescriptionError, PoseError, quote, suggest
 from .elements import MOTION_UNITS, ROTATIONS, Direction, Drive, Point, Size, Step, Unit
 from .legs import Leg
 from .nominal_values import find_nominal_value
@@ -27,7 +27,7 @@ class Parameter:
     name : a named size's own, or such as ``legs.d1.foot.x``, ``legs.d1.rod``, ``legs.d1.rail.ry`` (a small turn of a
         direction about an axis of the base), ``joints.d1.offset`` (what is added to what the drive says),
         ``head.1.tz``; legs go by their first drive, transforms by their place from 1
-    value : mm or rad
+    unit, value : ``mm`` or ``rad``, and how many the machine has of it
     group : ``sizes``, ``feet``, ``platform``, ``rods``, ``rails``, ``encoders``, ``mounting``, ``head`` or ``table``
     deviation : its standard deviation, mm or rad; None where it is not known
     """
@@ -160,7 +160,14 @@ def settle_offsets(spec: Spec) -> Spec:
 
 
 def replace_ranges(spec: Spec, ranges: Mapping[str, tuple[float, float]]) -> Spec:
-    """Replace the ranges of the legs' drives, by their names; others keep theirs."""
+    """Replace the ranges of the legs' drives, by their names; others keep theirs.
+
+    Raises :class:`PoseError` for a name that no drive of a leg has.
+    """
+    known = [drive.name for leg in spec.legs for drive in leg.drives]
+    for name in ranges:
+        if name not in known:
+            raise PoseError(f"ranges: unknown {quote(name)}{suggest(name, known)}")
 
     def fit(drive: Drive) -> Drive:
         low, high = ranges.get(drive.name, (drive.low, drive.high))

@@ -41,9 +41,12 @@ _ONE_BEARING = 0.1  # of the clearance: so are these, for bearings so near could
 
 @dataclass(frozen=True)
 class Limit:
-    """One limit: its name and subject, its bound, and how to read its margin (value = bound ± margin).
+    """One limit: what it bounds, and how to read its margin (value = bound ± margin).
 
-    The bound of a reach is the rod's length, 0 where the reach does not depend on one rod alone.
+    name, subject : such as ``d1.max``, and what it is about in words, ``leg d1``
+    unit : of margin and bound; mm² of a rod's reach, 1 where they have none
+    side : whether it is the least or the greatest value that is bounded, or a reach
+    bound : of a reach the rod's length, mm, 0 where it does not depend on one rod alone
     """
 
     name: str
@@ -53,7 +56,7 @@ class Limit:
     bound: float = 0.0
 
     def value(self, margin: float) -> float:
-        """Compute the bounded quantity for a margin; for a reach the margin itself."""
+        """Compute the bounded quantity for a ``margin``; for a reach the margin itself."""
         if self.side == "reach":
             return margin
         return self.bound - margin if self.side == "max" else self.bound + margin

@@ -25,7 +25,14 @@ _SLIGHTLY = 1e-4  # rad: a turn by which the rates of joints are told
 class Wrist:
     """The two turning joints of head and table that point the tool; see :mod:`parakin.kinematics.wrist`.
 
+    model : the machine's mathematics
     first, second : their indices in the joint vector
+
+    Its methods share these arguments:
+
+    poses, pose : rows (n, axes), or one (axes,), mm and rad
+    joints : rows (n, joints), or one (joints,), mm and rad
+    mode : working mode
     """
 
     model: Model
@@ -69,12 +76,12 @@ class Wrist:
         return evaluate_tape(self.freedom_tape(), np.ascontiguousarray(poses), np.empty((len(poses), 1)))[:, 0]
 
     def find_free(self, poses: Array, within: float) -> Flags:
-        """Find poses (n, axes) no farther than ``within`` rad off the pole: the first joint is free there."""
+        """Find poses (n, axes) no farther than ``within`` off the pole, rad: the first joint is free there."""
         free: Flags = self.measure_freedom(poses) < convert_to_freedom(within)
         return free
 
     def solve_with_first(self, poses: Array, mode: str, first: Array) -> Array:
-        """Solve the inverse problem of poses (n, axes) with the first joint given (n,): joints (n, joints)."""
+        """Solve the inverse problem of poses (n, axes) with the joint ``first`` given, (n,) rad: joints (n, joints)."""
         given = np.ascontiguousarray(first.reshape(-1, 1))
         into = np.empty((len(poses), len(self.model.drives)))
         return evaluate_tape(self.first_given_tape(mode), np.ascontiguousarray(poses), into, given)
@@ -82,7 +89,7 @@ class Wrist:
     def solve_nearest(
         self, poses: Array, mode: str, guess: Array, within: float, modes: WristModes | None = None
     ) -> tuple[Array, WristModes]:
-        """Solve the inverse problem of poses (n, axes) in both modes and keep the joints nearer to a guess (n, joints).
+        """Solve the inverse problem of poses (n, axes) in both modes and keep the joints nearer to a guess.
 
         Turns are counted, and MODE_LEVER mm of a leg's way are as far as a rad. A mode that does not reach a pose is
         not kept if the other one does. No farther than ``within`` rad off the pole the first joint is the guess's.
@@ -90,6 +97,7 @@ class Wrist:
         Parameters
         ----------
         mode : the path's own
+        guess : (n, joints), mm and rad
         modes : (n,) which mode to keep off the pole; EITHER where it is not known
 
         Returns the joints, and the mode of each row: EITHER on the pole.
@@ -154,7 +162,9 @@ class Wrist:
         joints[at[across]] = other[across]
 
     def continue_joints(self, poses: Array, mode: str, before: tuple[Array, Array]) -> Array:
-        """Solve the inverse problem of poses (n, axes), each going on from the poses and joints of a row before.
+        """Solve the inverse problem of poses (n, axes), each going on from a row before.
+
+        before : the poses and joints of these rows
 
         Turns are left as the inverse gives them.
         """
@@ -189,7 +199,7 @@ class Wrist:
             return not ((second < self.drive.low) | (second > self.drive.high)).any()
 
     def tilt(self, joints: Array, mode: str, angle: float) -> Array:
-        """Return joints (joints,) on the pole with the second one turned by ``angle`` the way a mode stands for."""
+        """Return joints (joints,) on the pole, the second one turned by ``angle``, rad, the way a mode stands for."""
         tilted = joints.copy()
         tilted[self.second] += angle if mode[-1] == "+" else -angle
         return tilted

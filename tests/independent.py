@@ -75,13 +75,13 @@ def tricept(s, poses):
 
 def hbg80_2d(s, poses):
     x, y = poses.T
-    return np.stack([x - leg_of(s["l1"], y), y - leg_of(s["l2"], x)], -1)
+    return np.stack([x - leg_of(s["l1"], y), y - leg_of(s["l2"], x)], -1)  # (2)
 
 
 def hbg80_3d(s, poses):
     px, py, pz = poses[:, 0] - s["xPT1"], poses[:, 1] - s["yPT1"], poses[:, 2] + s["h"]
     rod = s["l0"]
-    return np.stack([px - leg_of(rod, py, pz), py - leg_of(rod, px, pz), -pz - leg_of(rod, px, py)], -1)
+    return np.stack([px - leg_of(rod, py, pz), py - leg_of(rod, px, pz), -pz - leg_of(rod, px, py)], -1)  # (7)
 
 
 def lambda6(s, poses):
@@ -95,9 +95,9 @@ def lambda6(s, poses):
         off = point - s["C"] * direction
         low = point[:, 2] - leg_of(long, off[:, 0], off[:, 1])
         reach = rest * (point[:, 2] - low) / long
-        joints[:, i] = low
+        joints[:, i] = low  # (6) to (8)
         with np.errstate(invalid="ignore"):
-            joints[:, i + 3] = low + reach + np.sqrt(reach**2 - rest**2 + short**2)
+            joints[:, i + 3] = low + reach + np.sqrt(reach**2 - rest**2 + short**2)  # (9) to (11)
     return joints
 
 

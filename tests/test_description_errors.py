@@ -44,6 +44,22 @@ MISTAKES = [
         "650 mm]\n  homing: [absolute, 2 deg, 20 mm]",
         ['m.yaml:13: homing: "2 deg" is an angle, expected a length (mm, cm, m, in), or the word absolute'],
     ),
+    (
+        "650 mm]",
+        "650 mm]\n  homing: [absolute, 155 mm, 696 mm]",
+        [
+            "m.yaml:13: homing: the switch at 696 mm is far outside of the joint's range, "
+            "expected one in 200 to 650 mm or just beside"
+        ],
+    ),
+    (
+        "speed: 10 rpm",
+        "homing: 2 rad",
+        [
+            "m.yaml:14: homing: the switch at 114.592 deg is far outside of the joint's range, "
+            "expected one in -90 to 90 deg or just beside"
+        ],
+    ),
     ("[200 mm, 650 mm]", "[200 mm]", ["m.yaml:12: range: expected a pair [low, high], got 1 value"]),
     ("[200 mm, 650 mm]", "650 mm", ['m.yaml:12: range: expected a pair [low, high], got "650 mm"']),
     ("[200 mm,", "[.nan,", ['m.yaml:12: range: ".nan": can\'t read "."']),

@@ -9,9 +9,11 @@ from dataclasses import fields
 from pathlib import Path
 
 import pytest
+import yaml
 
 import parakin as pk
 from parakin.cli import main
+from parakin.commands.design_problem import read_design_problem
 from parakin.description import machine_file
 from parakin.description.groups import LegGroup
 from parakin.description.sections import CirclePoints, LimitsSection
@@ -20,6 +22,15 @@ from parakin.model.legs import KINDS
 DOCS = Path(__file__).parents[1] / "docs"
 BLOCK = re.compile(r"^```(?:\{code-block\} )?(\w+)\n(?::caption: (\S+)\n)?(.*?)^```$", re.M | re.S)
 FILE, COMMANDS, PYTHON = "file", "commands", "python"
+
+
+# Where the parts of files stand that pages show: the machine, whether it has these lines itself; the problem's file.
+PARTS = {
+    "forces.md": [("orthoglide", False)],
+    "integrator.md": [("tricept", False)],
+    "machine_file.md": [("tricept", True), ("sprint_z3", True), ("orthoglide", False)],
+    "designer.md": ["glide.yaml", "glide.yaml", None],
+}
 
 
 def read_blocks(page):
@@ -78,6 +89,42 @@ def check_python(block, name, names):
     runner.run(test, out=failures.append, clear_globs=False)
     names.update(test.globs)
     assert not failures, "".join(failures)
+
+
+def list_parts(folder):
+    """The parts of files that a folder's pages show, by page."""
+    pages = {page.name: BLOCK.findall(page.read_text(encoding="utf-8")) for page in folder.rglob("*.md")}
+    parts = {
+        page: [text for kind, caption, text in blocks if kind == "yaml" and not caption]
+        for page, blocks in pages.items()
+    }
+    return {page: texts for page, texts in parts.items() if texts}
+
+
+def test_the_parts_of_machine_files_that_pages_show_are_read(tmp_path):
+    shown = list_parts(DOCS)
+    assert {page: len(texts) for page, texts in shown.items()} == {page: len(where) for page, where in PARTS.items()}
+    for page in ("forces.md", "integrator.md", "machine_file.md"):
+        for part, (name, is_its_own) in zip(shown[page], PARTS[page], strict=True):
+            source = Path(machine_file.__file__).parents[1] / "machines" / f"{name}.yaml"
+            before, keys = (yaml.safe_load(text) for text in (source.read_text(encoding="utf-8"), part))
+            of_legs = {key: value for key, value in keys.items() if key in LegGroup.model_fields}
+            after = {**before, **{key: value for key, value in keys.items() if key not in of_legs}}
+            after["legs"] = {**before["legs"], **of_legs}
+            (tmp_path / "m.yaml").write_text(yaml.safe_dump(after, sort_keys=False), encoding="utf-8")
+            told = pk.load(tmp_path / "m.yaml").format_yaml()
+            assert (told == pk.load(name).format_yaml()) == is_its_own, part
+
+
+def test_the_parts_of_design_problems_that_a_page_shows_are_read(tmp_path):
+    page = (DOCS / "tutorials" / "designer.md").read_text(encoding="utf-8")
+    files = {name: text for _, name, text in BLOCK.findall(page) if name}
+    (tmp_path / "pocket.apt").write_text(files["pocket.apt"], encoding="utf-8")
+    for part, name in zip(list_parts(DOCS)["designer.md"], PARTS["designer.md"], strict=True):
+        whole = {**yaml.safe_load(files[name] if name else "{}"), **yaml.safe_load(part)}
+        (tmp_path / "problem.yaml").write_text(yaml.safe_dump(whole, sort_keys=False), encoding="utf-8")
+        problem = read_design_problem(tmp_path / "problem.yaml")
+        assert {*problem.bounds} == {*whole.get("bounds", {})}
 
 
 def test_every_public_name_is_in_the_reference():

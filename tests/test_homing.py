@@ -20,6 +20,7 @@ from parakin.controllers.linuxcnc.homing.proof import prove_homing
 from parakin.controllers.linuxcnc.homing.starts import compute_regularity, sample_starts
 from parakin.controllers.linuxcnc.homing.walk import begin_walk, walk_joints
 from parakin.controllers.linuxcnc.model_header import LEAST_REGULARITY
+from parakin.model.geometric_parameters import replace_ranges
 from parakin.performance.singularities import compute_singularity_margins
 
 sys.path.insert(0, str(Path(__file__).parent / "linuxcnc"))
@@ -177,11 +178,14 @@ def test_switches_are_where_the_file_says(tmp_path):
     assert [(j.switch, j.direction) for j in plan.joints] == [(690.0, -1.0), (690.0, -1.0), (700.0, -1.0)]
     m = changed(tmp_path, "linear_delta", "  jerk: 500 m/s3", "  jerk: 500 m/s3\n  homing: absolute")
     assert all(joint.switch is None for joint in find_homing(m).joints)
-    m = changed(tmp_path, "linear_delta", "  jerk: 500 m/s3", "  jerk: 500 m/s3\n  homing: 6900 mm")
-    with pytest.raises(pk.InputError, match="far outside of its range, expected one in 700 to 1300 mm"):
-        find_homing(m)
 
 
 def test_the_same_in_every_run():
     one, two = (find_homing(load_shipped("linear_delta")) for _ in range(2))
     assert replace(one) == two
+
+
+def test_fitted_ranges_keep_near_switches_and_drop_far_ones(tmp_path):
+    m = changed(tmp_path, "linear_delta", "  jerk: 500 m/s3", "  jerk: 500 m/s3\n  homing: 690 mm")
+    spec = replace_ranges(m.spec, {"tower_a": (700.0, 900.0), "tower_b": (720.0, 900.0)})
+    assert [leg.drives[0].homing for leg in spec.legs] == [690.0, None, 690.0]

@@ -31,6 +31,7 @@ from .values import (
     WordValue,
     describe_value,
     get_context,
+    refuse_far_switch,
 )
 
 
@@ -168,6 +169,18 @@ def _check_right_angle(rows: Any, info: ValidationInfo) -> Any:
     return rows
 
 
+def _make_switches_type(leg: type[Leg], switches: Any) -> Any:
+    """Make the type of home switches, which refuses those that lie far outside of their joints' ranges."""
+
+    def check(rows: Any, info: ValidationInfo) -> Any:
+        for row, ranges in zip(rows, info.data.get("range", ()), strict=False):
+            for switch, pair, unit in zip(row, ranges, leg.units, strict=True):
+                refuse_far_switch(switch, pair, unit)
+        return rows
+
+    return Annotated[switches, AfterValidator(check)]
+
+
 @cache
 def _build_group_model(kind: str) -> type[LegGroup]:
     leg = KINDS[kind]
@@ -187,6 +200,7 @@ def _build_group_model(kind: str) -> type[LegGroup]:
     drives = [DRIVE_TYPES[unit] for unit in leg.units]
     for key in DRIVE_KEYS:
         own[key] = (_make_rows_type(tuple(getattr(drive, key) for drive in drives), 0), None)
+    own["homing"] = (_make_switches_type(leg, own["homing"][0]), None)
     model = create_model(
         f"Group_{kind}",
         __base__=LegGroup,

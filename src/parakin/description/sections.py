@@ -55,6 +55,7 @@ from .values import (
     describe_value,
     get_context,
     read_quantity,
+    refuse_far_switch,
 )
 
 TRANSFORMS = (*TRANSLATIONS, *ROTATIONS)
@@ -138,6 +139,14 @@ def _build_driven_model(unit: Unit) -> type[_DrivenStep]:
         if key != "offset"
     }
     offset = (types.value, 0.0)
+
+    def check_switch(switch: Any, info: ValidationInfo) -> Any:
+        if switch is not None and "range" in info.data:
+            refuse_far_switch(switch, info.data["range"], unit)
+        return switch
+
+    homing: Any = types.homing | None
+    own["homing"] = (Annotated[homing, AfterValidator(check_switch)], None)
     return create_model(f"Driven_{unit}", __base__=_DrivenStep, range=types.range, offset=offset, **own)
 
 

@@ -6,7 +6,7 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 from math import hypot, nan, pi
-from typing import Annotated, Any, TypeAlias, cast
+from typing import Annotated, Any, Literal, TypeAlias, cast
 
 from pydantic import (
     AfterValidator,
@@ -18,7 +18,7 @@ from pydantic import (
 )
 
 from ..errors import InputError, quote, suggest
-from ..model.elements import ABSOLUTE, Unit, Vector
+from ..model.elements import ABSOLUTE, Drive, Unit, Vector
 from ..units import (
     ACCELERATION,
     ANGLE,
@@ -42,7 +42,9 @@ from ..units import (
     QuantityError,
     QuantityKind,
     UnreadSizeError,
+    name_display_unit,
     parse_quantity,
+    to_display,
 )
 from .document import YamlList, YamlMap, YamlText
 
@@ -268,6 +270,17 @@ def _accept_homing(kind: QuantityKind) -> PlainValidator:
             raise ValueError(f"{error}, or the word {ABSOLUTE}") from None
 
     return PlainValidator(read)
+
+
+def refuse_far_switch(homing: float | Literal["absolute"], pair: tuple[float, float], unit: Unit) -> None:
+    """Refuse a home switch that lies far outside of the joint's range."""
+    if not Drive("", unit, *pair, homing=homing).has_near_switch:
+        place, low, high = (to_display(float(value), unit) for value in (homing, *pair))
+        name = name_display_unit(unit)
+        raise ValueError(
+            f"the switch at {place:g} {name} is far outside of the joint's range, "
+            f"expected one in {low:g} to {high:g} {name} or just beside"
+        )
 
 
 def _build_drive_types(value: Any, pair: Any, kind: QuantityKind, others: tuple[QuantityKind, ...]) -> DriveTypes:

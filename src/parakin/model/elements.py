@@ -11,6 +11,7 @@ from math import inf
 from typing import Final, Literal, NewType
 
 ABSOLUTE: Final = "absolute"  # of a drive's homing: its encoder knows where it is
+_BEYOND = 0.1  # of a joint's range: how far outside of it a home switch may be
 
 Unit = Literal["mm", "rad"]
 Vector = tuple[float, float, float]
@@ -60,6 +61,12 @@ class Drive:
     power: float = inf
     inertia: float = 0.0
     stiffness: float | None = None
+
+    @property
+    def has_near_switch(self) -> bool:
+        """Tell whether a home switch, if there is one, trips within the range or a tenth of it beyond."""
+        beyond = _BEYOND * (self.high - self.low)
+        return not isinstance(self.homing, float) or self.low - beyond <= self.homing <= self.high + beyond
 
     def __repr__(self) -> str:
         return f"<parakin drive {self.name}: {self.low:.6g} to {self.high:.6g} {self.unit}>"

@@ -162,7 +162,8 @@ def settle_offsets(spec: Spec) -> Spec:
 def replace_ranges(spec: Spec, ranges: Mapping[str, tuple[float, float]]) -> Spec:
     """Replace the ranges of the legs' drives, by their names; others keep theirs.
 
-    Raises :class:`PoseError` for a name that no drive of a leg has.
+    A home switch that is far outside of the new range is dropped. Raises :class:`PoseError` for a name that no drive
+    of a leg has.
     """
     known = [drive.name for leg in spec.legs for drive in leg.drives]
     for name in ranges:
@@ -171,6 +172,7 @@ def replace_ranges(spec: Spec, ranges: Mapping[str, tuple[float, float]]) -> Spe
 
     def fit(drive: Drive) -> Drive:
         low, high = ranges.get(drive.name, (drive.low, drive.high))
-        return replace(drive, low=low, high=high)
+        fitted = replace(drive, low=low, high=high)
+        return fitted if fitted.has_near_switch else replace(fitted, homing=None)
 
     return replace(spec, legs=tuple(replace(leg, drives=tuple(map(fit, leg.drives))) for leg in spec.legs))

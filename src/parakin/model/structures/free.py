@@ -48,6 +48,13 @@ class Free(Structure):
             raise DescriptionError(
                 "motion", f"{' '.join(spec.motion)}: with three turns a free motion has three translations"
             )
+        across = [word for word in TRANSLATIONS if word not in words]
+        if len(turns) == len(across) == 1 and turns[0][1] != across[0][1]:
+            raise DescriptionError(
+                "motion",
+                f"{' '.join(spec.motion)}: the turn of a motion in a plane is about the plane's normal, "
+                f"expected r{across[0][1]}",
+            )
         if len(turns) < 3 and spec.mounting:
             if not words >= set(TRANSLATIONS):
                 raise DescriptionError(

@@ -15,7 +15,6 @@ from ....errors import InputError
 from ....kinematics.rotations import collect_turns, compute_rotations
 from ....machine import Machine
 from ....model.elements import ABSOLUTE, Drive
-from ....units import name_display_unit, to_display
 from ..axis_rates import choose_drive_rates
 from ..home_pose import find_home_pose
 from .proof import prove_homing
@@ -23,7 +22,6 @@ from .starts import HomingStarts, sample_starts
 from .walk import HomingWalk, begin_walk, walk_joints
 
 SEARCH = 0.05  # of a joint's speed: towards its switch
-_BEYOND = 0.1  # of a joint's range: how far outside of it a switch may be
 _FEW = 50  # starts that are tried before all of them
 _MOST_PERMUTED = 3  # legs that are tried in every order and all directions; more only in their own order, all alike
 
@@ -79,7 +77,6 @@ def find_homing(machine: Machine) -> HomingPlan:
 
     Raises :class:`InputError` for switches with which homing can do harm.
     """
-    _refuse_far_switches(machine)
     starts = sample_starts(machine)
     looking = [i for i in range(machine.leg_count) if machine.drives[i].homing != ABSOLUTE]
     if machine.is_redundant:
@@ -108,18 +105,6 @@ def _refuse_switches(machine: Machine, looking: list[int]) -> None:
             raise InputError(
                 f"homing: joint {drive.name} can't go to a switch by itself, there are {len(machine.drives)} drives "
                 f"for {len(machine.axes)} freedoms; expected an absolute encoder (homing: {ABSOLUTE})"
-            )
-
-
-def _refuse_far_switches(machine: Machine) -> None:
-    for drive in machine.drives:
-        beyond = _BEYOND * (drive.high - drive.low)
-        if isinstance(drive.homing, float) and not drive.low - beyond <= drive.homing <= drive.high + beyond:
-            place, low, high = (to_display(value, drive.unit) for value in (drive.homing, drive.low, drive.high))
-            unit = name_display_unit(drive.unit)
-            raise InputError(
-                f"homing: the switch of joint {drive.name} at {place:g} {unit} is far outside of its range, "
-                f"expected one in {low:g} to {high:g} {unit} or just beside"
             )
 
 

@@ -126,6 +126,34 @@ class _Squeeze(NamedTuple):
     is_pose: bool
 
 
+class _SqueezedWay(NamedTuple):
+    """The way of a window's points in the projection about the pole, by the line through it that is squeezed towards.
+
+    line, normal : (2,) directions along the line and across
+    along, across : (m + 1,) places of the points
+    weight : (m + 1,) by how much of its offset each point is moved
+    widest : greatest offset where the way enters or leaves the circle
+    """
+
+    line: Array
+    normal: Array
+    along: Array
+    across: Array
+    weight: Array
+    widest: float
+
+    @property
+    def squeezed(self) -> Array:
+        """(m + 1,) offsets across the line that are left."""
+        return (1.0 - self.weight) * self.across
+
+    def find_crossings(self) -> tuple[Indices, Array]:
+        """Find the steps on which the pole is passed, and the fractions of them at which it is."""
+        a = self.along
+        crossings = np.flatnonzero(a[:-1] * a[1:] < 0.0)
+        return crossings, a[crossings] / (a[crossings] - a[crossings + 1])
+
+
 def _route_through_pole(
     pole: Pole, programmed: ProgrammedPath, steps: PoleSteps, window: tuple[int, int], squeeze: _Squeeze
 ) -> PoleRoute | None:
@@ -134,66 +162,71 @@ def _route_through_pole(
     In the projection about the pole the path is squeezed towards a line through it: an offset b from the line, after a
     on it, becomes b·(a/radius)². So the free angle turns evenly, by no more than it must, and without a swing.
     """
-    radius, angle = squeeze.radius, squeeze.angle
-    first, last = window
-    inside_window = slice(first, last + 1)
-    x = np.concatenate([steps.first[first : first + 1], steps.last[inside_window]])
-    if min(np.hypot(*x[0]), np.hypot(*x[-1])) < radius:
-        return None  # the path begins or ends on the pole
-    line = _find_line(x[0], x[-1], radius)
-    normal = np.array([-line[1], line[0]])
-    a, b = x @ line, x @ normal
-    weight = np.where(np.hypot(a, b) < radius, 1.0 - (a / radius) ** 2, 0.0)
-    entries = meet_circle(x[0], x[1], radius), meet_circle(x[-1], x[-2], radius)
-    # What is left to move where the path enters and leaves the circle.
-    offsets = [abs(float(entry @ normal)) for entry in entries if entry is not None]
-    edge, widest = [offset**3 / radius**2 for offset in offsets], max(offsets, default=0.0)
-    if widest > _BENT * radius:
+    way = _project_way(steps, window, squeeze.radius)
+    if way is None:
         return None
-    bends = squeeze.is_pose and (not pole.is_upright or widest > _STRAIGHT * radius)
+    bends = squeeze.is_pose and (not pole.is_upright or way.widest > _STRAIGHT * squeeze.radius)
     shift = _find_shift(pole, programmed, steps, window) if bends else 0.0
-    a = a + np.where(weight > 0.0, shift, 0.0)
-    crossings = np.flatnonzero(a[:-1] * a[1:] < 0.0)
-    fraction = a[crossings] / (a[crossings] - a[crossings + 1])
-    miss_line = np.abs(b[crossings] + fraction * (b[crossings + 1] - b[crossings]))
-    between = _WIDEST * widest / np.sqrt(1.0 - (widest / radius) ** 2)  # where the way to the pole is straight
-    if not max(between, np.abs(weight * b).max(), *miss_line, *edge) <= _MOST_MOVED * angle:
+    way = way._replace(along=way.along + np.where(way.weight > 0.0, shift, 0.0))
+    if not _is_within_angle(way, squeeze):
         return None
-    if len(crossings) > 1:
-        return None
-    records = np.concatenate([[steps.record[first] - (steps.begin[first] == 0.0)], steps.record[inside_window]])
-    at_record = np.concatenate([[steps.begin[first] == 0.0], steps.end[inside_window] == 1.0])
-    if pole.moves and np.count_nonzero(at_record & (np.hypot(a, (1.0 - weight) * b) < _SNAPPED * angle)) > 1:
+    first, inside = window[0], slice(window[0], window[1] + 1)
+    starts_at_record = steps.begin[first] == 0.0
+    records = np.concatenate([[steps.record[first] - starts_at_record], steps.record[inside]])
+    at_record = np.concatenate([[starts_at_record], steps.end[inside] == 1.0])
+    distance = np.where(at_record, np.hypot(way.along, way.squeezed), np.inf)
+    if pole.moves and np.count_nonzero(distance < _SNAPPED * squeeze.angle) > 1:
         return None  # even poses bow out beside a pole that goes along with them, in a direction of their own
-    moved = at_record & (weight * np.maximum(np.abs(b), shift) > (EXACT if bends else PRINTED))
-    squeezed = (1.0 - weight) * b
-    if bends and not shift:
-        nearest = int(np.where(at_record, np.hypot(a, squeezed), np.inf).argmin())
-        if np.hypot(a[nearest], squeezed[nearest]) < _SNAPPED * angle:
-            if np.hypot(a[nearest], b[nearest]) > _MOST_MOVED * angle:
-                return None
-            a, moved[nearest], squeezed[nearest] = np.where(np.arange(len(a)) == nearest, 0.0, a), True, 0.0
-            crossings = np.flatnonzero(a[:-1] * a[1:] < 0.0)
-            fraction = a[crossings] / (a[crossings] - a[crossings + 1])
-            if len(crossings):
-                return None
-    projected = np.outer(a, line) + np.outer(squeezed, normal)
+    moved = at_record & (way.weight * np.maximum(np.abs(way.across), shift) > (EXACT if bends else PRINTED))
+    squeezed = way.squeezed
+    nearest = int(distance.argmin())
+    if bends and not shift and distance[nearest] < _SNAPPED * squeeze.angle:
+        if np.hypot(way.along[nearest], way.across[nearest]) > _MOST_MOVED * squeeze.angle:
+            return None
+        way.along[nearest], moved[nearest], squeezed[nearest] = 0.0, True, 0.0
+        if len(way.find_crossings()[0]):
+            return None
+    projected = np.outer(way.along, way.line) + np.outer(squeezed, way.normal)
     record = records[moved]
     at_records = programmed.tip[record], programmed.axis[record]
     axis = pole.find_axes(*at_records, projected[moved], programmed.get_extension(record))
-    share, crossing = 0.0, -1
-    ends: tuple[float, ...] = ()
-    if len(crossings):
-        crossing = first + int(crossings[0])
-        share = steps.locate(crossing, fraction[0])
-        ends = _find_inner_ends(steps, window, crossing, radius)
-    nearest_step = first + int(steps.nearest[inside_window].argmin())
+    crossing, share, ends = -1, 0.0, tuple[float, ...]()
+    for place, fraction in zip(*way.find_crossings(), strict=True):
+        crossing = first + int(place)
+        share, ends = steps.locate(crossing, fraction), _find_inner_ends(steps, window, crossing, squeeze.radius)
+    nearest_step = first + int(steps.nearest[inside].argmin())
     miss, rays = float(steps.nearest[nearest_step]), tuple[tuple[int, float, Array], ...]()
     if bends:
         at_pole = steps.record[[nearest_step]], steps.share[[nearest_step]]
-        inner = pole.list_inner_radii(programmed.interpolate(*at_pole)[1][0], _OUTERMOST * radius)
-        rays = _place_rays(steps, window, np.column_stack([a, b]), (line, normal), squeeze, inner)
-    return PoleRoute(window, miss, record, axis, crossing, share, () if bends else ends, rays)
+        inner = pole.list_inner_radii(programmed.interpolate(*at_pole)[1][0], _OUTERMOST * squeeze.radius)
+        ends, rays = (), _place_rays(steps, window, way, squeeze, inner)
+    return PoleRoute(window, miss, record, axis, crossing, share, ends, rays)
+
+
+def _project_way(steps: PoleSteps, window: tuple[int, int], radius: float) -> _SqueezedWay | None:
+    """Project the points of a window; None if the path begins or ends on the pole, or bends too much to be squeezed."""
+    first, last = window
+    x = np.concatenate([steps.first[first : first + 1], steps.last[first : last + 1]])
+    if min(np.hypot(*x[0]), np.hypot(*x[-1])) < radius:
+        return None
+    line = _find_line(x[0], x[-1], radius)
+    normal = np.array([-line[1], line[0]])
+    along, across = x @ line, x @ normal
+    weight = np.where(np.hypot(along, across) < radius, 1.0 - (along / radius) ** 2, 0.0)
+    entries = meet_circle(x[0], x[1], radius), meet_circle(x[-1], x[-2], radius)
+    widest = max((abs(float(entry @ normal)) for entry in entries if entry is not None), default=0.0)
+    return None if widest > _BENT * radius else _SqueezedWay(line, normal, along, across, weight, widest)
+
+
+def _is_within_angle(way: _SqueezedWay, squeeze: _Squeeze) -> bool:
+    """Tell whether a squeezed way passes the pole at most once and moves no axis farther than it may be."""
+    radius = squeeze.radius
+    crossings, fraction = way.find_crossings()
+    on_line = np.abs(way.across[crossings] + fraction * (way.across[crossings + 1] - way.across[crossings]))
+    at_edge = way.widest**3 / radius**2  # what is left to move where the path enters and leaves the circle
+    between = _WIDEST * way.widest / np.sqrt(1.0 - (way.widest / radius) ** 2)  # where the way to the pole is straight
+    most = max(between, np.abs(way.weight * way.across).max(), *on_line, at_edge)
+    return bool(most <= _MOST_MOVED * squeeze.angle) and len(crossings) <= 1
 
 
 def _find_shift(pole: Pole, programmed: ProgrammedPath, steps: PoleSteps, window: tuple[int, int]) -> float:
@@ -211,20 +244,13 @@ def _find_shift(pole: Pole, programmed: ProgrammedPath, steps: PoleSteps, window
 
 
 def _place_rays(
-    steps: PoleSteps,
-    window: tuple[int, int],
-    way: Array,
-    axes: tuple[Array, Array],
-    squeeze: _Squeeze,
-    inner: list[float],
+    steps: PoleSteps, window: tuple[int, int], way: _SqueezedWay, squeeze: _Squeeze, inner: list[float]
 ) -> tuple[tuple[int, float, Array], ...]:
     """Place records on a squeezed way at places along the line through the pole that grow by a factor.
 
-    way : (m + 1, 2) along the line and off it, as programmed
-    axes : directions along the line and across, (2,) each
     inner : further places between the innermost and the pole
     """
-    a, rays = way[:, 0], []
+    a, b, rays = way.along, way.across, []
     innermost = _INNERMOST * squeeze.angle
     count = max(0, int(np.ceil(np.log(_OUTERMOST * squeeze.radius / innermost) / np.log(_GROWTH))))
     outer = (innermost * _GROWTH ** np.arange(count)).tolist()
@@ -235,10 +261,10 @@ def _place_rays(
             for index in sorted({*places[:1].tolist(), *places[-1:].tolist()}):  # in and out again where it turns back
                 step, fraction = window[0] + index, (at - a[index]) / (a[index + 1] - a[index])
                 share = steps.locate(step, fraction)
-                across = (way[index, 1] + fraction * (way[index + 1, 1] - way[index, 1])) * (at / squeeze.radius) ** 2
+                across = (b[index] + fraction * (b[index + 1] - b[index])) * (at / squeeze.radius) ** 2
                 across *= radius > innermost  # straight there: the free angle is the same before the pole and behind
                 if _EDGE < share < 1.0 - _EDGE:
-                    rays.append((int(steps.record[step]), share, at * axes[0] + across * axes[1]))
+                    rays.append((int(steps.record[step]), share, at * way.line + across * way.normal))
     return tuple(rays)
 
 

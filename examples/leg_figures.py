@@ -8,6 +8,7 @@ What is drawn is what the model computes: each kind's own inverse and struts, in
 from __future__ import annotations
 
 import argparse
+from collections.abc import Callable
 from pathlib import Path
 
 import matplotlib as mpl
@@ -61,9 +62,7 @@ def write(axes: Axes, x: float, z: float, text: str, colour: str = OWN, where: s
     )
 
 
-def draw_length(axes: Axes) -> None:
-    point = Point((260.0, 0.0, -330.0))
-    leg = Length(make_drives("mm"), ORIGIN, foot=ORIGIN)
+def draw_length(axes: Axes, leg: Length, point: Point) -> None:
     draw_struts(axes, leg, point, "", OWN)
     write(axes, 0, 0, "foot")
     write(axes, 150, -165, "q, the length")
@@ -71,9 +70,7 @@ def draw_length(axes: Axes) -> None:
     mark_platform(axes, point)
 
 
-def draw_ring(axes: Axes) -> None:
-    centre = Point((330.0, 0.0, -330.0))
-    leg = Ring(make_drives("mm"), Point((0.0, 0.0, 0.0)), foot=ORIGIN, radius=Size(110.0))
+def draw_ring(axes: Axes, leg: Ring, centre: Point) -> None:
     point = leg.place_joint(IDENTITY, centre)
     draw_struts(axes, leg, point, "", OWN)
     axes.plot([330, 330], [-60, -480], color=BASE, lw=1, ls="-.")
@@ -87,9 +84,7 @@ def draw_ring(axes: Axes) -> None:
     mark_platform(axes, centre)
 
 
-def draw_slider(axes: Axes) -> None:
-    point = Point((330.0, 0.0, -300.0))
-    leg = Slider(make_drives("mm"), ORIGIN, foot=ORIGIN, rail=ALONG, rod=Size(400.0))
+def draw_slider(axes: Axes, leg: Slider, point: Point) -> None:
     axes.plot([-60, 700], [0, 0], color=BASE, lw=1)
     (near,) = draw_struts(axes, leg, point, "-", OWN)
     (far,) = draw_struts(axes, leg, point, "+", OTHER)
@@ -103,9 +98,7 @@ def draw_slider(axes: Axes) -> None:
     mark_platform(axes, point)
 
 
-def draw_crank(axes: Axes) -> None:
-    point = Point((330.0, 0.0, 300.0))
-    leg = Crank(make_drives("rad"), ORIGIN, pivot=ORIGIN, axis=AXIS, zero=ALONG, arm=Size(220.0), rod=Size(380.0))
+def draw_crank(axes: Axes, leg: Crank, point: Point) -> None:
     (own,) = draw_struts(axes, leg, point, "+", OWN)
     (other,) = draw_struts(axes, leg, point, "-", OTHER)
     axes.plot([0, 330], [0, 0], color=BASE, lw=1, ls="--")
@@ -118,18 +111,14 @@ def draw_crank(axes: Axes) -> None:
         "pivot; the axis\npoints to the reader", (0, 0), (-10, -4), textcoords="offset points", ha="right", color=BASE
     )
     for joint, name, colour, shift in ((own, 'branch "+"', OWN, 30), (other, 'branch "-"', OTHER, -45)):
-        knee = 220 * np.array([np.cos(joint), np.sin(joint)])
+        knee = leg.arm * np.array([np.cos(joint), np.sin(joint)])
         write(axes, *(0.5 * knee - [0, 25]), "arm", colour, where="right")
         write(axes, *(0.5 * (knee + [point[0], point[2]]) + [0, shift]), f"rod, {name}", colour)
     write(axes, point[0], point[2], "platform", MOVED)
     mark_platform(axes, point)
 
 
-def draw_lambda(axes: Axes) -> None:
-    point = Point((520.0, 0.0, 420.0))
-    leg = Lambda(
-        make_drives("mm", "mm"), ORIGIN, foot=ORIGIN, rail=ALONG, long=Size(560.0), short=Size(330.0), hinge=Size(180.0)
-    )
+def draw_lambda(axes: Axes, leg: Lambda, point: Point) -> None:
     axes.plot([-60, 860], [0, 0], color=BASE, lw=1)
     axes.plot(0, -110, ".", color="none")  # room for the arrows
     long, short = draw_struts(axes, leg, point, "-+", OWN)
@@ -146,16 +135,8 @@ def draw_lambda(axes: Axes) -> None:
     mark_platform(axes, point)
 
 
-def draw_column(axes: Axes) -> None:
-    point = Point((330.0, 0.0, 380.0))
-    leg = Column(make_drives("rad", "mm"), ORIGIN, radius=Size(560.0), rod=Size(330.0))
-    draw_rail_and_slide(axes, leg, point)
-
-
-def draw_driven_column(axes: Axes) -> None:
-    point = Point((330.0, 0.0, 380.0))
-    leg = DrivenColumn(make_drives("rad", "mm", "rad"), ORIGIN, radius=Size(560.0), rod=Size(330.0))
-    draw_rail_and_slide(axes, leg, point)
+def draw_driven_column(axes: Axes, leg: DrivenColumn, point: Point) -> None:
+    draw_column(axes, leg, point)
     low, angle = leg.inverse(point, "-").joints[1:]
     turn = np.linspace(np.pi, np.pi - angle, 30)
     axes.plot([560, 400], [low, low], color=BASE, lw=1, ls="--")
@@ -163,7 +144,7 @@ def draw_driven_column(axes: Axes) -> None:
     write(axes, 415, low + 45, "q3", BASE, where="right")
 
 
-def draw_rail_and_slide(axes: Axes, leg: Column, point: Point) -> None:
+def draw_column(axes: Axes, leg: Column, point: Point) -> None:
     """Draw a column with the rail's axis, the slide, and both branches of the link."""
     axes.plot([0, 0], [-40, 740], color=BASE, lw=1, ls="-.")
     axes.plot([560, 560], [0, 720], color=BASE, lw=1)
@@ -189,9 +170,33 @@ def mark_platform(axes: Axes, point: Point) -> None:
     axes.plot(point[0], point[2], "o", color=MOVED, ms=10, zorder=5)
 
 
-FIGURES = {
-    Length: draw_length, Ring: draw_ring,
-    Slider: draw_slider, Crank: draw_crank, Lambda: draw_lambda, Column: draw_column, DrivenColumn: draw_driven_column,
+LEGS: dict[str, tuple[Leg, Point]] = {  # with the platform's joint, of a ring its centre
+    leg.kind: (leg, Point(point))
+    for leg, point in (
+        (Length(make_drives("mm"), ORIGIN, foot=ORIGIN), (260.0, 0.0, -330.0)),
+        (Ring(make_drives("mm"), ORIGIN, foot=ORIGIN, radius=Size(110.0)), (330.0, 0.0, -330.0)),
+        (Slider(make_drives("mm"), ORIGIN, foot=ORIGIN, rail=ALONG, rod=Size(400.0)), (330.0, 0.0, -300.0)),
+        (
+            Crank(make_drives("rad"), ORIGIN, pivot=ORIGIN, axis=AXIS, zero=ALONG, arm=Size(220.0), rod=Size(380.0)),
+            (330.0, 0.0, 300.0),
+        ),
+        (
+            Lambda(
+                make_drives("mm", "mm"), ORIGIN,
+                foot=ORIGIN, rail=ALONG, long=Size(560.0), short=Size(330.0), hinge=Size(180.0),
+            ),
+            (520.0, 0.0, 420.0),
+        ),
+        (Column(make_drives("rad", "mm"), ORIGIN, radius=Size(560.0), rod=Size(330.0)), (330.0, 0.0, 380.0)),
+        (
+            DrivenColumn(make_drives("rad", "mm", "rad"), ORIGIN, radius=Size(560.0), rod=Size(330.0)),
+            (330.0, 0.0, 380.0),
+        ),
+    )
+}  # fmt: skip
+FIGURES: dict[str, Callable[..., None]] = {
+    "length": draw_length, "ring": draw_ring, "slider": draw_slider, "crank": draw_crank, "lambda": draw_lambda,
+    "column": draw_column, "driven_column": draw_driven_column,
 }  # fmt: skip
 
 
@@ -203,11 +208,11 @@ def main() -> None:
     mpl.rcParams.update({"font.size": 10, "svg.hashsalt": "parakin", "svg.fonttype": "none"})
     for kind, draw in FIGURES.items():
         figure, axes = plt.subplots(figsize=(5.6, 3.6), layout="constrained")
-        draw(axes)
+        draw(axes, *LEGS[kind])
         axes.set_aspect("equal")
         axes.margins(0.25)
         axes.axis("off")
-        figure.savefig(folder / f"{kind.kind}.svg", metadata={"Date": None})
+        figure.savefig(folder / f"{kind}.svg", metadata={"Date": None})
         plt.close(figure)
 
 

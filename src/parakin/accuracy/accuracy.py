@@ -20,10 +20,11 @@ from .tolerances import UNIFORM, Tolerance, ToleranceFamily, make_tolerance_fami
 class Accuracy:
     """The tool's error at poses, of machines whose numbers lie evenly within their tolerances, to the first order.
 
-    poses, joints : (N, axes), (N, joints)
+    tolerances : those given, and the family of the k numbers that have them
+    poses, joints : (N, axes), (N, joints), mm and rad
     slopes : (N, n, k) of the tool's twist by the numbers, while the joints stand
     deviations : (N,) root mean square of the tip's error, mm
-    turns : (N,) of the tool's turn, rad
+    turns : (N,) root mean square of the tool's turn, rad
     greatest : (N,) mm, a bound of the first order of the tip's error, all numbers at the worst ends of their tolerances
     shares : (N, tolerances) of the tip's variance
     """
@@ -50,11 +51,14 @@ class Accuracy:
 
     @property
     def worst(self) -> int:
-        """The pose of the greatest deviation of the tip."""
+        """The index in :attr:`poses` of the greatest deviation of the tip."""
         return int(self.deviations.argmax())
 
     def percentile(self, percent: float) -> float:
-        """Compute a percentile over the poses of the tip's deviation, mm."""
+        """Compute a percentile over the poses of the tip's deviation, mm.
+
+        percent : 0 to 100
+        """
         return float(np.percentile(self.deviations, percent))
 
     @property
@@ -74,13 +78,15 @@ def analyse_accuracy(
 ) -> Accuracy:
     """Analyse the tool's error where numbers of a machine lie evenly within tolerances.
 
+    machine : whose home and whose limits tell the poses
     tolerances : by names, patterns or groups of :attr:`Machine.parameters`, either way, with units: ``{"feet": "0.05
         mm", "rods": "0.02 mm", "encoders": "2 um"}``; each coordinate of a point has it
-    poses : (N, axes); by default as many as ``samples`` all over the workspace, clear of singularities
+    poses : (N, axes), mm and rad; by default as many as ``samples`` all over the workspace, clear of singularities
 
-    With more drives than freedoms the tool is where the closures' least squares are, as in :meth:`Machine.forward`.
+    The joints stay those of the nominal machine. With more drives than freedoms the tool is where the closures' least
+    squares are, as in :meth:`Machine.forward`.
 
-    Raises :class:`PoseError`.
+    Raises :class:`PoseError` for a tolerance of no number, without a unit, or not above zero.
     """
     within = make_tolerance_family(machine, read_tolerances(tolerances))
     rows = choose_poses(machine, poses, samples)
@@ -103,6 +109,7 @@ def allocate_tolerances(accuracy: Accuracy, error: float, costs: Mapping[str, fl
     """Find the tolerances of the least cost that keep the tip's deviation within an error at every pose, mm.
 
     accuracy : of :func:`analyse_accuracy`, at whose poses the error is kept
+    error : root mean square of the tip's error, mm
     costs : for each tolerance's name, what a number costs at a tolerance of 1 mm or 1 rad: the cost goes with its
         inverse; by default 1, of an angle at the greatest leg's length
 

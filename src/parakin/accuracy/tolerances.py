@@ -41,6 +41,8 @@ class Tolerance(NamedTuple):
 class ToleranceFamily(NamedTuple):
     """The numbers that have tolerances.
 
+    family : in which these k numbers are free
+    tolerances : as they were given
     halves : (k,) how far each may be off either way, mm and rad
     groups : for each tolerance, the columns of its numbers
     """

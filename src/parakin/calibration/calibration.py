@@ -47,9 +47,10 @@ class Calibration:
     """The machine of a family that explains measurements best.
 
     family : of the numbers that were sought
-    sizes, covariance : (k,) mm and rad, and (k, k)
+    sizes, covariance : (k,) mm and rad, and (k, k), as the noise makes it
     fixed : numbers that others replace whatever is measured of poses; they keep their values
     setups : what measured, each with the numbers that were found of it, mm and rad; ``frame`` and ``centre`` tell them
+    measured : what they were found from
     residuals : (N, c) measured less predicted, mm and rad; of whole poses the twist
     before : the same with the machine as it was
     fit, held_out : root mean square of the weighed residuals, one if noise and machine are what was stated; of rows
@@ -84,13 +85,13 @@ class Calibration:
 
     @property
     def frame(self) -> Array | None:
-        """The transform (3, 4) from the instrument's frame to the machine's, if that was found."""
+        """The transform (3, 4), R and mm, from the instrument's frame to the machine's; None if it was not sought."""
         numbers = self._find_unknown(InstrumentFrame)
         return None if numbers is None else build_instrument_frame(numbers)
 
     @property
     def centre(self) -> Array | None:
-        """The point of measured distances (3,), mm, if that was found."""
+        """The point of measured distances (3,), mm, in the machine's frame; None where that was not sought."""
         numbers = self._find_unknown(FixedPoint)
         return numbers if numbers is not None and len(numbers) else None
 
@@ -112,7 +113,10 @@ class Calibration:
         return tuple(Parameter(p.name, p.unit, value, p.group, deviation) for p, value, deviation in rows)
 
     def predict_deviations(self, poses: Array) -> Array:
-        """Predict the standard deviations (N, n) of the tool's twist at poses (N, axes), mm and rad."""
+        """Predict the standard deviations (N, n) of the tool's twist, mm and rad.
+
+        poses : (N, axes), mm and rad
+        """
         joints = self.family.inverse(poses, self.sizes)
         slopes = self.family.twist_rates(poses, joints, self.sizes).compute_size_rates()
         return np.asarray(np.sqrt(np.einsum("nik,kl,nil->ni", slopes, self.covariance, slopes)))
@@ -127,6 +131,7 @@ def calibrate(
 ) -> Calibration:
     """Calibrate a machine: weighed least squares of what was measured less what the machine of other numbers predicts.
 
+    machine : as it was built, with its nominal numbers
     measured : of :func:`make_measurements`
     free : names, patterns or groups of :attr:`Machine.parameters` that may change; by default all that some measurement
         of poses can tell

@@ -21,7 +21,7 @@ _MOST_NAMED = 6
 
 
 class UnidentifiableError(ParakinError):
-    """Measurements that can't tell some numbers of a machine apart."""
+    """Measurements that can't tell some numbers of a machine apart; the text says what to measure besides."""
 
 
 class Combination(NamedTuple):

@@ -27,6 +27,7 @@ _MOST = 400
 class MeasurementPlan:
     """Poses to measure.
 
+    machine : the one to measure
     poses, joints : (N, axes) and (N, joints), mm and rad, inside all limits
     axes : what is measured there
     combinations : of the numbers that such measurements tell, the least known first
@@ -56,9 +57,11 @@ def plan_measurements(
 ) -> MeasurementPlan:
     """Plan measurements whose information on a machine's numbers has the greatest determinant, of poses inside limits.
 
+    machine : whose limits and nominal numbers the plan is for
     count : how many poses
     free, noise : as of :func:`calibrate`
     axes : what will be measured: all axes (by default), or some of X, Y and Z
+    seed : of the random candidates, among which the poses are chosen
 
     Raises :class:`UnidentifiableError` where no such measurements tell the numbers apart, :class:`PoseError` where the
     poses are too few.

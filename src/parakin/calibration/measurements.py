@@ -57,6 +57,7 @@ class Measurements:
     frame : the coordinates' frame, the machine's or an instrument's own, which is found with the rest
     centre : (3,) the distances' point, mm; None: not known, and found with the rest
     pinned : whether the tip was held in one place, which is found with the rest
+    noise : by which rows are weighed
     """
 
     joints: Array
@@ -88,7 +89,10 @@ class Measurements:
         return len(self.axes) + (self.distances is not None) + (self.heights is not None) + 3 * self.pinned
 
     def take(self, rows: Indices) -> Measurements:
-        """Take some of the measurements."""
+        """Take some of the measurements.
+
+        rows : their indices
+        """
         distances, heights = (None if one is None else one[rows] for one in (self.distances, self.heights))
         return replace(self, joints=self.joints[rows], values=self.values[rows], distances=distances, heights=heights)
 
@@ -106,15 +110,17 @@ def make_measurements(
 ) -> Measurements:
     """Make measurements of a machine.
 
+    machine : which was measured
     joints : (N, joints) mm and rad
     values : (N, axes) measured coordinates, mm and rad
     axes : which they are: names of all axes (by default), or some of X, Y and Z
     distances : (N,) mm, of the tip from a fixed point
     heights : (N,) mm, of the tip over an unknown plane: 0 where it touches a flat artefact
     setup : whose frame the coordinates are in, and the distances' point; by default the machine's, and unknown
-    noise : standard deviations
+    noise : standard deviations, of :class:`Noise` by default
 
-    Raises :class:`PoseError`.
+    Raises :class:`PoseError` where nothing was measured, rows are not as many as joint vectors, or the axes, frame or
+    noise are none that a calibration takes.
     """
     rows, lead = machine.rows(joints, machine.joints, "joints")
     if len(lead) != 1:

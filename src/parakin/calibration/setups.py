@@ -18,7 +18,12 @@ _SMALL = 1e-6  # rad: of turns below it a series has no more than rounding
 
 
 class Prediction(NamedTuple):
-    """What would be measured of tips, (N, r), and its derivatives by the tips and by the setup's unknown numbers."""
+    """What would be measured of tips, and its derivatives.
+
+    values : (N, r) mm
+    by_tips : (N, r, 3) by the tips
+    by_unknown : (N, r, u) by the setup's unknown numbers
+    """
 
     values: Array
     by_tips: Array
@@ -35,7 +40,13 @@ class Setup(Protocol):
     begin: Array
     turns: Array
 
-    def predict(self, tips: Array, unknown: Array) -> Prediction: ...
+    def predict(self, tips: Array, unknown: Array) -> Prediction:
+        """Predict what is measured.
+
+        tips : (N, 3) mm, in the machine's frame
+        unknown : (u,) the unknown numbers, mm and rad
+        """
+        ...
 
 
 class MachineFrame:

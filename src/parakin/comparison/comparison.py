@@ -34,8 +34,10 @@ Answer = TypeVar("Answer")
 class MachineFigures:
     """What is told of one machine; None for what was not asked for, and a reason for what it can't do.
 
+    machine : the one that this is about
     workspace : at home's orientation
-    performance : at poses all over the workspace, clear of singularities, as accuracy and stiffness are
+    performance : at poses all over the workspace, clear of singularities
+    accuracy, stiffness : at the same poses
     job : the part at the best place found at which it runs
     """
 
@@ -81,6 +83,7 @@ def compare(
 ) -> Comparison:
     """Compare machines by their workspaces, indices, accuracy, stiffness, and the time that a part takes.
 
+    machines : two or more
     tolerances : as for :func:`parakin.analyse_accuracy`; a machine leaves out those of which it has no number
     drives, struts : as for :func:`parakin.analyse_stiffness`: ``"100 N/um, 200 kNm/rad"``
     path : a part, which is placed anew on each machine, where its least margin is greatest; not turned

@@ -35,7 +35,9 @@ _LEAST, _GREATEST = 1e-30, 1e30  # N, N/mm, Nmm/rad and MPa: sums of their squar
 class Section(NamedTuple):
     """A strut's section.
 
-    area : mm²; second_moment : mm⁴; modulus : N/mm², of elasticity
+    area : mm²
+    second_moment : of area, mm⁴
+    modulus : of elasticity, N/mm²
     """
 
     area: float
@@ -50,6 +52,7 @@ class MachineSprings(NamedTuple):
     """The springs of a machine.
 
     drives : (joints,) compliances, mm/N or rad/Nmm
+    struts : their section, or the stiffness of each rod, N/mm; None: they are rigid
     """
 
     drives: Array

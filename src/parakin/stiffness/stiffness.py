@@ -24,7 +24,8 @@ from .springs import MachineSprings, read_springs, trace_springs
 class Stiffness:
     """The tool's compliance at poses, in the machine's own freedoms: what guides the platform is rigid.
 
-    poses, joints : (N, axes), (N, joints)
+    machine : the one that was analysed
+    poses, joints : (N, axes), (N, joints), mm and rad
     compliances : (N, n, n) of the tool's twist (the tip's translations, mm, then small turns of the tool, rad) by
         forces, N, and moments, Nmm, at the tip; NaN where a pose is out of reach or singular
     drive_share : (N,) of the tip's compliance that is the drives'; the rest is the struts'
@@ -76,7 +77,7 @@ class Stiffness:
     def along(self, direction: RowsLike) -> Array:
         """Compute the tip's stiffness along a direction, (N,) N/mm: a force along it by the tip's way along it.
 
-        direction : by the translations, (t,) or a dict, of any length
+        direction : in the machine's frame, by :attr:`translations`, (t,) or a dict, of any length
         """
         row = read_rows(direction, self.translations, ["mm"] * len(self.translations), self._rest, "direction")
         size = np.linalg.norm(row, axis=-1, keepdims=True)
@@ -165,13 +166,14 @@ def analyse_stiffness(
 ) -> Stiffness:
     """Analyse the tool's stiffness where drives and struts are springs, for small forces on an unloaded machine.
 
+    machine : what it holds without a drive is rigid
     drives : ``"100 N/um"`` for all, or by names and patterns, ``{"d*": "100 N/um", "theta*": "20 kNm/rad"}``; each
         drive needs one, which may be ``rigid``; of slides and motors together, along or about the joint. By default
         what the machine's file says
     struts : each rod's stiffness along it, ``"300 N/um"``; or its section, ``{"diameter": "40 mm", "wall": "5 mm",
         "modulus": "210 GPa", "rods": "2"}``. By default what the machine's file says of its ``rod`` bodies, else they
         are rigid
-    poses : (N, axes); by default as many as ``samples`` all over the workspace, clear of singularities
+    poses : (N, axes), mm and rad; by default as many as ``samples`` all over the workspace, clear of singularities
 
     By virtual work: springs that give by s move the tool by t = J s, with A J = (B, -C) of the closures' derivatives by
     drives and sizes; the forces on them are Jᵀ w, so the compliance is J c Jᵀ. With more drives than freedoms the tool
@@ -179,7 +181,7 @@ def analyse_stiffness(
     count as rigid, and so does all that holds the platform without a drive (central legs, constraints, a
     parallelogram's hold of the orientation).
 
-    Raises :class:`PoseError`.
+    Raises :class:`PoseError` for a stiffness without a unit or not above zero, and for a drive without one.
     """
     springs = read_springs(machine, drives, struts)
     rows = choose_poses(machine, poses, samples)

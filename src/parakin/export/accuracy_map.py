@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 def render_accuracy_map(accuracy: Accuracy, suffix: str = SCREEN) -> bytes:
     """Render the tip's root mean square error over the first two translations, all else as at home.
 
+    accuracy : whose machine and tolerances these are; its poses tell how far the map goes
     suffix : of the file, ``.png``, ``.pdf`` or ``.svg``
 
     Raises :class:`PoseError` for a machine of fewer translations.

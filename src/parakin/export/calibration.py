@@ -21,7 +21,10 @@ _WAS, _IS = "#b0bec5", "#1565c0"
 
 @check_arguments
 def format_calibrated_yaml(calibration: Calibration) -> str:
-    """Format the calibrated machine as a machine file; comments tell each number with its standard deviation."""
+    """Format the calibrated machine as a machine file; comments tell each number with its standard deviation.
+
+    calibration : of :func:`parakin.calibrate`
+    """
     lines = [
         f"# Calibrated from {len(calibration.measured.joints)} measurements; weighed residual {calibration.fit:.3g}, "
         f"{calibration.held_out:.3g} of measurements that the fit did not know.",
@@ -41,6 +44,7 @@ def format_calibrated_yaml(calibration: Calibration) -> str:
 def render_residuals(calibration: Calibration, suffix: str = SCREEN) -> bytes:
     """Render each measurement's residual before and after the calibration, in the measured number's unit, log scale.
 
+    calibration : of :func:`parakin.calibrate`
     suffix : of the file, ``.png``, ``.pdf`` or ``.svg``
     """
     lengths = sum(axis in "XYZ" for axis in calibration.measured.axes) + (calibration.measured.distances is not None)

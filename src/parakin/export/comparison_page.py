@@ -18,7 +18,10 @@ if TYPE_CHECKING:
 
 @check_arguments
 def render_comparison_page(comparison: Comparison) -> str:
-    """Render machines side by side as one HTML document: a column each with its picture, its figures and reasons."""
+    """Render machines side by side as one HTML document: a column each with its picture, its figures and reasons.
+
+    comparison : of :func:`parakin.compare`
+    """
     columns = comparison.columns
     names = " and ".join([", ".join(column.machine.name for column in columns[:-1]), columns[-1].machine.name])
     head = "".join(f"<th class=n>{escape(column.machine.name)}</th>" for column in columns)

@@ -23,8 +23,9 @@ _STRETCHES = 2000  # along the time: of each the least and the greatest are draw
 
 @check_arguments
 def render_drive_forces(result: DriveForces, suffix: str = ".png") -> bytes:
-    """Render the forces of drives along and about their joints, and all powers, over the time.
+    """Render the forces of drives along their joints, N, their torques, Nm, and all powers, W, over the time.
 
+    result : of :func:`parakin.compute_drive_forces`
     suffix : of the file, ``.png``, ``.pdf`` or ``.svg``
     """
     machine = result.trajectory.posted.machine

@@ -41,6 +41,8 @@ def render_front_page(designs: Designs) -> str:
     it is worth, its machine file, and the page on which it moves, with the part if there is one. The document takes
     some 0.3 MB and 6 kB a design, and half a MB more where there is a part.
 
+    designs : of :func:`parakin.find_designs`
+
     Raises :class:`PoseError` where no design is proved.
     """
     if not designs.front:

@@ -21,6 +21,7 @@ def render_stiffness_map(
 ) -> bytes:
     """Render the tip's least stiffness over the first two translations, all else as at home.
 
+    stiffness : whose machine and springs these are; its poses tell how far the map goes
     along : instead the stiffness along this direction, as in :meth:`Stiffness.along`
     force : instead how far the tip gives way to this force, as in :meth:`Stiffness.deflect`
     suffix : of the file, ``.png``, ``.pdf`` or ``.svg``

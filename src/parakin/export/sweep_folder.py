@@ -68,6 +68,7 @@ def run_sweep(
 
     Parameters
     ----------
+    plan : the machine, its free numbers and how they are drawn
     folder : for ``_sweep.json`` (the plan) and ``part-00000.parquet``, ...; lengths mm, angles degrees. What is there
         of the same plan is kept, so an interrupted sweep goes on.
     scheduler : of Dask's workers, such as ``tcp://host:8786``, which have parakin installed; by default this process

@@ -46,6 +46,8 @@ class JointProgram:
 def read_joint_program(path: str | os.PathLike[str]) -> JointProgram:
     """Read what :func:`.make_joint_program` writes: G1 in G21, G90 and G93, each with a value for every joint.
 
+    path : of the file
+
     Raises :class:`InputError` with file and line for everything else.
     """
     source = os.fsdecode(path)

@@ -37,8 +37,12 @@ def make_linuxcnc_configuration(
     page that tells how to start, all named after the machine. The last line of each tells by a hash whether the file
     was edited since.
 
+    machine : as it stands, its mode the one of its kinematics
     hardware : ``mesa-7i96s``, ``mesa-7i76e``, ``parport`` or ``ethercat``; None: a simulation
     screen : ``axis`` or ``gmoccapy``, LinuxCNC's own, beside the window that shows the machine
+
+    Raises :class:`InputError` for an unknown card, one with too few joints or inputs, joints that have counts or a lead
+    alone, and home switches that can't be reached.
     """
     equipment = None if hardware is None else equip_machine(machine, hardware)
     texts = {

@@ -28,11 +28,13 @@ _PIECES = 40  # of a bar as long as the machine
 
 @check_arguments
 def render_machine_picture(machine: Machine, pose: RowsLike | None = None, suffix: str = ".png") -> bytes:
-    """Render a picture of the machine at a pose, (axes,) mm and rad, home by default; a planar machine in its plane.
+    """Render a picture of a machine; a planar one is seen in its plane.
 
+    machine : in its default working mode
+    pose : (axes,) mm and rad, home by default
     suffix : ``.png`` for the screen, ``.pdf`` or ``.svg`` for a printed page
 
-    Raises :class:`PoseError` for another one.
+    Raises :class:`PoseError` for another suffix.
     """
     if suffix not in PICTURES:
         raise PoseError(f"suffix: one of {', '.join(PICTURES)} expected, not {suffix}")

@@ -61,6 +61,7 @@ def is_page(path: Path) -> bool:
 def render_machine_page(machine: Machine, pose: RowsLike | None = None) -> str:
     """Render a self-contained HTML page on which a machine moves: by its tool, its joints and its modes.
 
+    machine : its sizes, too, can be dragged on the page
     pose : (axes,) mm and rad, at which it stands at first; home by default
 
     Raises :class:`PoseError` for a pose out of reach.
@@ -75,6 +76,8 @@ def render_machine_page(machine: Machine, pose: RowsLike | None = None) -> str:
 def render_path_page(posted: Posted, trajectory: Trajectory | None = None, numbers: int = 30_000) -> str:
     """Render such a page with the tool path of a posted part, which can be played.
 
+    posted : :attr:`Job.posted`, the path on a machine
+    trajectory : :attr:`Job.trajectory`, by whose time it is played; without it by the programmed feed
     numbers : how many of the path the page may hold, some 5 bytes each; the fewer, the coarser are its samples
 
     Raises :class:`PoseError` for a path without records.

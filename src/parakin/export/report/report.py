@@ -42,9 +42,16 @@ def render_report(
 ) -> str:
     """Render the report as one HTML document: verdict, ranges, path, curves, time, offences, notes, facts.
 
-    ``unplanned`` says why there is no trajectory, ``waits`` how long (s) the program waits besides it, ``outside``
-    where the part would have to lie, ``forces`` what the trajectory asks of the drives. Whatever the length of the path
-    the document stays below some 2 MB: of every stretch the extremes are drawn.
+    posted : :attr:`Job.posted`, the path on a machine
+    trajectory : :attr:`Job.trajectory`, if there is one
+    unplanned : why there is none
+    waits : how long the program waits besides it, s
+    outside : :attr:`Job.outside`, where the part would have to lie
+    forces : of :func:`parakin.compute_drive_forces`, what the trajectory asks of the drives
+
+    Whatever the length of the path the document stays below some 2 MB: of every stretch the extremes are drawn.
+
+    Raises :class:`PoseError` for a negative time.
     """
     if not 0.0 <= waits < inf:
         raise PoseError(f"waits: a time of 0 s or more expected, not {waits:g}")

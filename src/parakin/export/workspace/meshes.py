@@ -35,7 +35,11 @@ class Mesh:
         return float((np.cross(a, b) * c).sum() / 6.0)
 
     def make_body(self, colours: Array, opacity: float = 1.0) -> ShadedBody:
-        """Make the body to be drawn, its triangles in colours (F, 3)."""
+        """Make the body to be drawn.
+
+        colours : (F, 3) red, green, blue of its triangles, 0 to 1
+        opacity : 0 to 1, of the walls that face the viewer
+        """
         normals = smooth_normals(self.vertices, self.faces, self.normals)
         return ShadedBody(self.vertices[self.faces], normals, colours, opacity)
 
@@ -46,6 +50,8 @@ class Mesh:
 @check_arguments
 def make_mesh(field: SampledField) -> Mesh:
     """Make the surface where a field in space is 0, by marching cubes, fitted to the boundary's tangent planes.
+
+    field : of :func:`parakin.sample_field`
 
     Raises :class:`PoseError` for a field that is not in space, and where its time is up.
     """

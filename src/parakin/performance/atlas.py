@@ -36,6 +36,8 @@ _SEARCH = 0.4  # of the time that is left, for the extremes, and then for isotro
 class PerformanceMap:
     """Performance on a grid over a region.
 
+    region : without swept axes
+    step : between positions of the grid, mm
     grid : coordinates along each of the region's free axes, mm
     allowed : (grid) whether the machine is allowed there
     slack : (grid) zero on the region's boundary, positive inside, negative outside
@@ -70,6 +72,7 @@ class PerformanceMap:
 class Atlas:
     """Performance over a region: the map, and what was found between its positions.
 
+    map : on the grid
     extremes : over the allowed positions, found by search from the grid's best
     isotropic : (k, axes) allowed poses at which J is a multiple of a rotation
     singularities : of each margin, whether the machine's limits keep it from zero all over, whether a path inside them
@@ -100,11 +103,18 @@ class Atlas:
         return compute_singularity_margins(self.machine, self.isotropic, length, region.mode)[:, 0]
 
     def extreme(self, quantity: str, side: ExtremeSide) -> Extreme:
-        """Return one of :attr:`extremes`, of ``condition``, ``greatest``, ``least``, ``manipulability`` or a margin."""
+        """Return one of :attr:`extremes`.
+
+        quantity : ``condition``, ``greatest``, ``least``, ``manipulability``, or a margin's name
+        side : ``min`` or ``max``
+        """
         return next(e for e in self.extremes if e.quantity == quantity and e.side == side)
 
     def isotropic_on(self, drawn: PerformanceMap) -> Array:
-        """Find the isotropic poses that lie on a slice, (k, axes)."""
+        """Find the isotropic poses that lie on a slice, (k, axes).
+
+        drawn : the map of the slice
+        """
         off = np.zeros(len(self.isotropic))
         for axis, value in drawn.region.fixed_axes.items():
             off = np.maximum(off, np.abs(self.isotropic[:, self.machine.axes.index(axis)] - value))

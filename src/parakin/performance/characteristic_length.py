@@ -18,7 +18,11 @@ _ZERO = 1e-9  # mm; a length no greater counts as zero
 
 @dataclass(frozen=True)
 class CharacteristicLength:
-    """The characteristic length, mm, and where it comes from; ``value`` is None for a machine without angles."""
+    """The characteristic length, and where it comes from.
+
+    value : mm; None for a machine without angles
+    rule : which one gave it, in words
+    """
 
     value: float | None
     rule: str
@@ -30,7 +34,7 @@ class CharacteristicLength:
 
 
 def choose_characteristic_length(machine: Machine, length: float | None = None) -> CharacteristicLength:
-    """Take ``length`` (mm) if it is given, else the first of these rules that gives one.
+    """Take ``length``, mm, if it is given, else the first of these rules that gives one.
 
     - axes X Y Z B C: the tool's reach, from the head's last turn (without one from the platform) to the tip;
     - a platform that turns: the radius of its joints about their middle, root mean square;

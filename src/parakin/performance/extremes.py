@@ -29,9 +29,12 @@ _DEFICIENT = 1e-6  # rank deficiency of the residuals' derivative below which a 
 
 @dataclass(frozen=True, eq=False)
 class Extreme:
-    """The least or the greatest value of a quantity over the allowed positions, and a pose (axes,) that has it.
+    """The least or the greatest value of a quantity over the allowed positions.
 
-    ``quantity`` is one of :data:`MEASURES` (properties of :class:`Performance`) or a singularity margin's name.
+    quantity : one of :data:`MEASURES` (properties of :class:`Performance`) or a singularity margin's name
+    side : ``min`` or ``max``
+    value : in the quantity's unit
+    pose : (axes,) mm and rad, that has it
     """
 
     quantity: str

@@ -24,7 +24,11 @@ class Performance:
     as the pose's change asks for, q' = B⁻¹A t', and J is the pseudo-inverse of B⁻¹A. NaN where the machine is out of
     reach; a singularity gives infinity and zero.
 
-    psi : (..., n) singular values of J, the greatest first: how much faster than the drives the tool moves
+    machine, length : the one that this is about, and what its angles are multiplied by
+    twist : names of the twist's n components
+    poses : (..., axes) mm and rad
+    psi : (..., n) singular values of J, the greatest first: how much faster than the drives the tool moves; (8) of
+        Chablat and Wenger (Chemnitz, 2000)
     directions : (..., n, n), a row for each of ``psi``: the direction, a unit twist in the order of ``twist``, of the
         velocity ellipsoid's semi-axis of that length (tool velocities for drive rates of size 1). The force ellipsoid
         (J⁻ᵀ: wrenches that drive forces of size 1 hold) has the same directions with the lengths 1/psi.
@@ -52,7 +56,10 @@ class Performance:
 
     @property
     def condition(self) -> Array:
-        """Condition number of J, σmax/σmin, (...,): 1 at an isotropic pose, infinite at a singular one."""
+        """Condition number of J, σmax/σmin, (...,): 1 at an isotropic pose, infinite at a singular one.
+
+        It is the first (7) of Chablat and Wenger without the root printed there, for their σ are roots already.
+        """
         return _divide_quietly(self.greatest, self.least)
 
     @property

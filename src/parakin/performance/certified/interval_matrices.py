@@ -23,7 +23,13 @@ _SAMPLES = {0: 1, 1: 65, 2: 17, 3: 9, 4: 5}  # along each input of a box; 3 of m
 
 @dataclass(frozen=True, eq=False)
 class PoseBox:
-    """A box of poses of a machine: the axes in ``ranges`` vary, ``fixed_axes`` have one value; mm and rad."""
+    """A box of poses of a machine.
+
+    machine, mode : whose poses these are, and in which working mode
+    ranges : low and high of the d axes that vary, mm and rad
+    fixed_axes : the others' values, mm and rad
+    length : by which angles are multiplied
+    """
 
     machine: Machine
     ranges: Mapping[str, tuple[float, float]]
@@ -33,10 +39,12 @@ class PoseBox:
 
     @cached_property
     def low(self) -> Array:
+        """The lower ends of the ranges, (d,) mm and rad."""
         return np.array([ends[0] for ends in self.ranges.values()], float)
 
     @cached_property
     def high(self) -> Array:
+        """The upper ends of the ranges, (d,) mm and rad."""
         return np.array([ends[1] for ends in self.ranges.values()], float)
 
     @property
@@ -57,7 +65,7 @@ class PoseBox:
         return make_lattice(lines) if d else np.zeros((1, 0))
 
     def poses(self, points: Array) -> Array:
-        """Compute whole poses (N, axes) at points (N, d) of the box."""
+        """Compute whole poses (N, axes) at ``points`` (N, d) of the box."""
         rows = np.empty((len(points), len(self.machine.axes)))
         for i, axis in enumerate(self.machine.axes):
             rows[:, i] = points[:, list(self.ranges).index(axis)] if axis in self.ranges else self.fixed_axes[axis]
@@ -65,10 +73,12 @@ class PoseBox:
 
     @cached_property
     def inputs(self) -> list[Term]:
+        """A term for each axis that varies."""
         return JumpFreeTrace().inputs(len(self.ranges))
 
     @cached_property
     def trace(self) -> Trace:
+        """The trace of the inputs."""
         return self.inputs[0].trace if self.inputs else JumpFreeTrace()
 
     @cached_property

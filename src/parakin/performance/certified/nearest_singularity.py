@@ -35,6 +35,8 @@ _HALVINGS = 50  # of the line on which a singular pose is bracketed
 class SingularityDistance:
     """How far it is from the middle of a box of poses to the nearest parallel singularity, between two numbers.
 
+    machine : the one that this is about
+    ranges : low and high of the box's axes, mm and rad
     shape : ``box``: as a fraction of the box about its middle, 1 for all of it; ``sphere``: mm of the tip from the
         middle, at all of the box's orientations, up to the sphere that fits into the box
     middle : (axes,) mm and rad
@@ -85,6 +87,7 @@ def find_nearest_singularity(
     Both lie about the middle of the ranges and within them; sides and radius are bracketed to a relative ``tolerance``,
     as far as ``seconds`` allow. With more drives than freedoms no singular pose is told, for none separates two sides.
 
+    region : made by :func:`parakin.region`; its machine, mode and fixed axes count
     ranges : low and high of some axes, mm and rad; others are fixed as in the region, or as at home
     shape : ``box`` or ``sphere``
 

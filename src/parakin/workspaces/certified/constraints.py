@@ -29,6 +29,9 @@ class Constraint:
     margin and, of a smooth one, its gradient by x. ``box_program`` gives the margin, the guard, the gradient by θ and
     the second derivatives by x (d(d + 1)/2 of them), or of one with corners the gradient by x instead.
 
+    name : the limit's
+    margin : as a term of the inputs
+    position, orientation : the inputs: d coordinates of x, mm, and those of θ, rad
     implied : it follows from others, and serves only to prove that they can't hold
     sign : proves the margin's sign over boxes of x, then θ, where the programs don't tell it
     """
@@ -70,11 +73,13 @@ class Constraint:
 
     @cached_property
     def point_program(self) -> IntervalProgram:
+        """Program of the margin and, of a smooth one, its gradient by x."""
         gradient = [derivative(self.margin, x) for x in self.position] if self.is_smooth else []
         return IntervalProgram(self._trace, [self.margin, *gradient])
 
     @cached_property
     def box_program(self) -> IntervalProgram:
+        """Program of the margin, the guard and the derivatives that bound it over a box."""
         by_position = [derivative(self.margin, x) for x in self.position]
         if self.is_smooth:
             by_position = [derivative(g, y) for i, g in enumerate(by_position) for y in self.position[i:]]
@@ -84,7 +89,14 @@ class Constraint:
 
 @dataclass(frozen=True, eq=False)
 class TracedPose:
-    """A machine's pose as terms: free and swept axes are inputs of a trace, fixed axes are numbers."""
+    """A machine's pose as terms: free and swept axes are inputs of a trace, fixed axes are numbers.
+
+    machine, mode : whose poses these are, and in which working mode
+    free_axes, swept_axes : the inputs, in this order
+    fixed_axes : the values of the others, mm and rad
+
+    inputs : as its methods take them: a scalar for each free axis, then for each swept one
+    """
 
     machine: Machine
     free_axes: tuple[str, ...]

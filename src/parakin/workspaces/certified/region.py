@@ -37,8 +37,10 @@ _SHRINKING = 0.6  # ratio of a cell's edge to that of the round before, while ce
 class Region:
     """A set of tool positions: those where the machine is allowed at every or at one orientation of given ranges.
 
-    Made by :func:`make_region`.
+    Made by :func:`make_region`. The total orientation workspace is the set of X, Y, Z at which (44) of FME Transactions
+    41 (2013) is 1 for every B and C of the ranges.
 
+    machine, mode : the one that is asked about, and its working mode
     kind : constant (one orientation), total (every one of the ranges), inclusive (at least one), dexterous (every one)
     free_axes : the axes that make up a position
     fixed_axes : the axes with one value, mm and rad
@@ -60,6 +62,7 @@ class Region:
 
     @cached_property
     def traced_pose(self) -> TracedPose:
+        """The pose as terms, whose inputs are the free and the swept axes."""
         return TracedPose(self.machine, self.free_axes, tuple(self.swept_axes), self.fixed_axes, self.mode)
 
     @cached_property
@@ -128,7 +131,9 @@ class Region:
 
     @check_arguments
     def fix(self, values: Mapping[str, float | str]) -> Region:
-        """Fix free or swept axes at values, mm and rad.
+        """Make the region in which free or swept axes are fixed.
+
+        values : by axis, mm and rad, or texts with their unit
 
         Raises :class:`PoseError` for values that are not finite or beyond what can be computed.
         """
@@ -149,7 +154,11 @@ class Region:
         )
 
     def subdivide(self, low: Array, high: Array, more: Sequence[Constraint] = ()) -> Subdivision:
-        """Begin the subdivision of a box of positions, (d,) mm, under ``more`` constraints besides."""
+        """Begin the subdivision of a box of positions under the region's constraints.
+
+        low, high : the box's corners, (d,) mm
+        more : further constraints
+        """
         return self._subdivide_under([*self.constraints, *more], low, high)
 
     def _subdivide_under(
@@ -159,7 +168,10 @@ class Region:
         return subdivision(constraints, low, high, self.swept_bounds, closely)
 
     def subdivide_all_components(self, low: Array, high: Array) -> Subdivision:
-        """Begin the subdivision of a box of positions, (d,) mm, under the limits alone."""
+        """Begin the subdivision of a box of positions under the limits alone.
+
+        low, high : the box's corners, (d,) mm
+        """
         return self._subdivide_under(self.limit_constraints, low, high, closely=False)
 
     def include_all_components(self) -> Region:
@@ -179,8 +191,9 @@ class Region:
     def find_extent(self, budget: Budget | None = None) -> tuple[Array, Array] | None:
         """Find a box proved to hold the whole region, not much larger than it; None for a region proved empty.
 
-        It is that of all components: the limits bound the machine, and no sign of a determinant does. Where the budget,
-        by default 60 s, ends before, the box is larger than need be, else it is kept.
+        It is that of all components: the limits bound the machine, and no sign of a determinant does.
+
+        budget : the time, by default 60 s; where it ends before, the box is larger than need be, else it is kept
 
         Raises :class:`PoseError` if the limits leave it unbounded, or are not proved to bound it.
         """
@@ -194,7 +207,11 @@ class Region:
         return box
 
     def poses(self, positions: Array, orientations: Array | None = None) -> Array:
-        """Compute whole poses (N, axes) at positions (N, d) with values of the swept axes (N, s), in their order."""
+        """Compute whole poses (N, axes), mm and rad.
+
+        positions : (N, d) mm, of the free axes
+        orientations : (N, s) rad, of the swept axes in their order
+        """
         rows = np.empty((len(positions), len(self.machine.axes)))
         for axis, value in self.fixed_axes.items():
             rows[:, self.machine.axes.index(axis)] = value
@@ -260,6 +277,7 @@ def make_region(
 
     Parameters
     ----------
+    machine : the one that is asked about
     at : axes to fix, numbers in mm and rad or texts with their unit (``{"B": "30 deg"}``); turning axes that are not
         named keep their value at home
     every : turning axes with a range (low, high), rad or texts as above, at every value of which the machine must be
@@ -267,11 +285,12 @@ def make_region(
     some : turning axes with a range at one value of which it must be: inclusive orientation workspace
     dexterous : the machine must be allowed at every value of every turning axis
     without : names of limits that do not count, with ``*`` for any letters; legs must reach in any case
-    mode : working mode
+    mode : working mode, by default the machine's
     components : ``home`` leaves out what the machine could reach in another assembly mode only, beyond a parallel
         singularity, such as the mirror image of its workspace behind the base; ``all`` counts it
 
-    Raises :class:`PoseError`.
+    Raises :class:`PoseError` for an axis that is unknown or stated twice, a range that is empty or of a translation, no
+    free axis, and a limit that is unknown or can't be left out.
     """
     _refuse_unknown_axes(machine, (*(at or {}), *(every or {}), *(some or {})))
     fixed = parse_coordinates(machine, at or {})

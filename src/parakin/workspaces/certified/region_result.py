@@ -10,12 +10,16 @@ from .region import Region
 
 @dataclass(frozen=True, eq=False)
 class RegionResult:
-    """A result about a region."""
+    """A result about a region.
+
+    region : the one that it is about
+    """
 
     region: Region
 
     @property
     def machine(self) -> Machine:
+        """The machine that it is about."""
         return self.region.machine
 
     @property
@@ -25,5 +29,5 @@ class RegionResult:
 
     @property
     def unit(self) -> str:
-        """Of the volume."""
+        """The unit of a volume: mm³, in the plane mm², along a line mm."""
         return self.region.volume_unit

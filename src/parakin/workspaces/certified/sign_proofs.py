@@ -18,7 +18,8 @@ from .matrix_bounds import MatrixBounds, prove_regular
 class FormPlanes(NamedTuple):
     """Linear bounds of a form over N boxes: slopes·v + low ≤ form ≤ slopes·v + high, for the inputs v in [-1, 1]^d.
 
-    slopes (N, d); low, high (N,), NaN where there are none
+    slopes : (N, d)
+    low, high : (N,), NaN where there are none
     """
 
     slopes: Array

@@ -41,6 +41,8 @@ class Cells:
     inner, outer, estimate : (N,) fractions of the cell: proved inside at least, at most, and likely
     limit : (N,) index of the constraint that bounds it there; -1 for a cell inside
     area : (N,) of the boundary in it, mm² (mm in the plane), as estimated
+    stopped : why the subdivision ended, as :attr:`Workspace.stopped`
+    rounds : how many there were
     """
 
     low: Array
@@ -55,6 +57,7 @@ class Cells:
 
     @cached_property
     def volumes(self) -> Array:
+        """The volume of each cell, (N,) mm³ (mm² in the plane)."""
         return multiply_columns(self.size)
 
     @cached_property
@@ -64,10 +67,11 @@ class Cells:
 
     @property
     def inside(self) -> Flags:
+        """Which cells are proved inside, (N,)."""
         return self.limit < 0
 
     def total(self, fractions: Array) -> float:
-        """Sum the volume that fractions of the cells are together, mm³ (mm² in the plane)."""
+        """Sum the volume that ``fractions`` (N,) of the cells are together, mm³ (mm² in the plane)."""
         return float(np.einsum("n,n->", fractions, self.volumes))  # BLAS' threads go on spinning
 
     @cached_property
@@ -88,7 +92,10 @@ class Cells:
         return np.array(low), np.array(high)
 
     def take(self, which: Flags | Indices) -> Cells:
-        """Keep some of the cells."""
+        """Keep some of the cells.
+
+        which : flags (N,) or indices
+        """
         rows = take_rows([getattr(self, name) for name in _COLUMNS], which)
         columns: dict[str, Any] = dict(zip(_COLUMNS, rows, strict=True))
         return replace(self, **columns)
@@ -126,6 +133,9 @@ def make_empty_cells(dimension: int) -> Cells:
 class Subdivision(ABC):
     """The subdivision of a box of positions under constraints; :meth:`run` refines it until a condition stops it.
 
+    constraints : what must be ≥ 0
+    low, high : the box's corners, (d,) mm
+    orientations : low and high of the swept axes, (s,) rad each
     closely : whether signs are proved where bounds don't tell them; it is of no use in cells larger than the machine
     open_cells : undecided cells
     open_boxes : lists of what is still to be proved of them
@@ -185,6 +195,9 @@ class Subdivision(ABC):
     def refine(self, parents: Indices, budget: Budget | None = None) -> None:
         """Divide open cells into 2^d children each, the first ones first, as many as the budget's time allows.
 
+        parents : indices of the cells to divide
+        budget : of time; without it all are divided
+
         Interrupted, it leaves the cells as they were.
         """
         self._decided, self.budget = [], budget
@@ -221,7 +234,10 @@ class Subdivision(ABC):
         self.rounds += 1
 
     def collect_cells(self, stopped: str) -> Cells:
-        """Put all cells together, with the reason why the subdivision stopped."""
+        """Put all cells together.
+
+        stopped : why the subdivision ends
+        """
         return replace(concatenate_cells(self._groups), stopped=stopped, rounds=self.rounds)
 
     @property
@@ -233,6 +249,9 @@ class Subdivision(ABC):
 
         Returns that box, or None if there are no cells. Faces along which very many cells lie are left as they are,
         and so are all where the budget is spent.
+
+        fraction : of the box's edges
+        budget : of time
         """
         while True:
             corners = [group.corners for group in self._groups]
@@ -254,7 +273,12 @@ class Subdivision(ABC):
         budget: Budget | None = None,
         progress: Progress | None = None,
     ) -> Cells:
-        """Refine until the relative gap or the cells' size (mm) is reached, or until the budget is spent.
+        """Refine until the relative gap or the cells' size is reached, or until the budget is spent.
+
+        gap : (outer - inner)/estimate of the volume
+        cell : edge of the boundary's cells, mm, in place of the gap
+        budget : of time
+        progress : called with the fraction done
 
         Interrupted, it returns the cells it has.
         """

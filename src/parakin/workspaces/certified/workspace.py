@@ -50,7 +50,12 @@ NOTHING = Volume(0.0, 0.0, 0.0)
 
 @dataclass(frozen=True)
 class BoundingLimit:
-    """A limit that bounds a region, the fraction of the boundary that it makes, and the middle of that part, mm."""
+    """A limit that bounds a region.
+
+    limit : its name
+    fraction : of the boundary, that it makes
+    middle : (d,) of that part, mm
+    """
 
     limit: str
     fraction: float
@@ -61,6 +66,7 @@ class BoundingLimit:
 class Workspace(RegionResult, Displayed):
     """A region with its proved volume, and the cells that prove it.
 
+    cells : of the subdivision, each proved inside, outside, or on the boundary
     stopped : why the subdivision ended: ``gap`` reached, ``cell`` size reached, ``time``, ``interrupted``,
         ``resolution`` (of the numbers) or ``memory``
     parameters : enough to run it again

@@ -63,6 +63,8 @@ class Component:
 class Components:
     """The connected components of a region, the largest first.
 
+    region : the one that this is about
+    components : those found
     at_least : how many are proved to be different
     undecided : volume of what may be more of them, or belong to one: too small for the cells
     start : index of the component that holds the start; None if none was given
@@ -100,12 +102,13 @@ def find_components(
 ) -> Components:
     """Find the connected components of a region under singularities and the working mode, by certified cells.
 
-    Of a total region every orientation counts. Cells proved inside hang together if they share a face, or if a small
-    box proved inside joins them.
+    They are the t-connected regions of Chablat and Wenger. Of a total region every orientation counts. Cells proved
+    inside hang together if they share a face, or if a small box proved inside joins them.
 
     Parameters
     ----------
-    start : a pose, mm and rad, whose component is wanted
+    region : made by :func:`parakin.region`
+    start : a pose (axes,), mm and rad, whose component is wanted
     cell : edge to which the boundary is refined, mm; 1/128 of the region's extent if not given (1/512 in the plane)
     seconds : stop refining cells after this time; None for no end
     progress : called with the fraction done

@@ -33,18 +33,21 @@ class NoBoxError(PoseError):
 class FaceStop:
     """The limit that is broken just outside a face, and a pose where it is.
 
-    Both are None where the face alone could still move, or where no broken limit was found within 32 tolerances.
+    face : ``-X``, ``+X``, ``-Y`` ...
+    limit, pose : its name, and (axes,) mm and rad; both are None where the face alone could still move, or where no
+        broken limit was found within 32 tolerances
     """
 
-    face: str  # "-X", "+X", "-Y", ...
+    face: str
     limit: str | None
     pose: tuple[float, ...] | None
 
 
 @dataclass(frozen=True, eq=False)
 class InscribedBox(RegionResult):
-    """A box [low, high] of positions, mm, all of them proved to be in the region.
+    """A box of positions, all of them proved to be in the region.
 
+    low, high : its corners, (d,) mm
     stops : what stops each face, the lower and the upper one of each axis in turn
     tolerance : mm; by so much no face (of a box of given proportions or centre: not the box) could be proved to grow
     stopped : why the search ended: ``tolerance``, or ``time``; then the faces may have room to grow
@@ -98,6 +101,7 @@ def find_largest_box(
 
     Parameters
     ----------
+    region : made by :func:`parakin.region`
     shape : proportions of its edges, one for each axis of a position; without them its volume is made greatest
     around : its centre, mm, one number for each axis of a position
     tolerance : mm; 1e-4 of the region's greatest extent if not given

@@ -19,8 +19,9 @@ COUNT = 5  # evenly spaced cross-sections
 
 @dataclass(frozen=True, eq=False)
 class CrossSection:
-    """A region where one of its axes has a value; of a region in a plane (``axis`` None) the whole of it.
+    """A region where one of its axes has a value, or a region in a plane.
 
+    axis, value : the axis, and its value, mm; both None of a region in a plane
     plane : the two axes of a point
     outlines : closed polygons (n, 2), mm, the first point again at the end: counterclockwise around what is inside,
         clockwise around a hole

@@ -60,9 +60,13 @@ class TangentPlanes(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class DistanceField:
-    """The distance to a region's boundary at any position, about; swept axes are sampled ``turns_step`` rad apart.
+    """The distance to a region's boundary at any position, about.
 
-    Its methods raise :class:`PoseError` where they are not done in ``seconds`` each; None for no end.
+    region : whose boundary it is
+    turns_step : between samples of swept axes, rad
+    seconds : of each method, which raises :class:`PoseError` where it is not done by then; None for no end
+
+    positions : as its methods take them: (N, d) mm, coordinates of the region's free axes
     """
 
     region: Region
@@ -116,7 +120,11 @@ class DistanceField:
         return sample_orientations(self.region, step)
 
     def evaluate(self, positions: Array, enough: float = np.inf, budget: Budget | None = None) -> Array:
-        """Evaluate it at positions (N, d) mm -> (N,) mm; a sign settled by more than ``enough`` ends the samples."""
+        """Evaluate it, (N, d) -> (N,) mm, positive inside.
+
+        enough : mm; a sign settled by more ends the samples of swept axes
+        budget : the time for it; by default :attr:`seconds`
+        """
         budget = budget or Budget(self.seconds)
         d, sign = positions.shape[1], 1.0 if self.region.every_orientation else -1.0
         distance = np.full(len(positions), np.inf)
@@ -159,7 +167,10 @@ class DistanceField:
         return NearestLimits(limit, swept)
 
     def find_tangent_planes(self, positions: Array, nearest: NearestLimits) -> TangentPlanes:
-        """Find the planes that touch, to the first order, the boundary that the nearest limit makes."""
+        """Find the planes that touch, to the first order, the boundary that the nearest limit makes.
+
+        nearest : of :meth:`find_nearest_limits` at these positions
+        """
         rows = np.column_stack([positions, nearest.swept])
         planes = np.empty((len(rows), 1 + positions.shape[1]))
         for limit in np.unique(nearest.limit).tolist():
@@ -205,6 +216,7 @@ class SampledField:
 
     @property
     def region(self) -> Region:
+        """The region whose boundary is where the field is zero."""
         return self.distance.region
 
     @cached_property
@@ -221,7 +233,9 @@ class SampledField:
         return self.low + (first - 0.5) * self.step, self.low + (last + 0.5) * self.step
 
     def refine_crossings(self, crossings: Array) -> Array:
-        """Refine where the boundary crosses the grid's edges, (N, d) in steps, by bisection: positions, mm.
+        """Refine where the boundary crosses the grid's edges by bisection: positions (N, d) mm.
+
+        crossings : (N, d) in steps from the first node
 
         The field is no straight line where a leg is nearly stretched, so interpolation alone is too coarse.
         """
@@ -278,7 +292,8 @@ def sample_field(
 
     Parameters
     ----------
-    box : lower and upper corner, (d,) each
+    region : made by :func:`parakin.region`
+    box : lower and upper corner, (d,) mm each, as :attr:`Workspace.box`
     step : mm at most; by default a 60th of the box's longest edge, in a plane a 240th
     turns_step : rad between samples of the swept axes, at most, unless they would be too many
     progress : called with the fraction done

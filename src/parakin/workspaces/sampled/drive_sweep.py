@@ -31,7 +31,11 @@ _SAME = 1e-6  # mm or rad: how closely the inverse must give the drives back
 
 @dataclass(frozen=True)
 class DriveStrategy:
-    """Which drives run, and at which limit, ``min`` or ``max``, each other one stands."""
+    """Which drives run while the others stand.
+
+    runs : names of drives
+    stands : of the others, name and limit, ``min`` or ``max``
+    """
 
     runs: tuple[str, ...]
     stands: tuple[tuple[str, str], ...]
@@ -47,8 +51,10 @@ class DriveStrategy:
 class DriveImage:
     """Where a strategy moves the tool, with the platform on one side of the legs' centres.
 
+    strategy : which drives run
     side : ``home`` where the platform is on the side it has at home, else ``other``
-    joints, positions : (n, d) for one drive that runs, (n, n, d) for two; positions are NaN where they are not allowed
+    joints, positions : mm and rad, and mm: (n, d) for one drive that runs, (n, n, d) for two; positions are NaN where
+        they are not allowed
     """
 
     strategy: DriveStrategy
@@ -71,7 +77,9 @@ class DriveImage:
 class DriveWorkspace(SampledWorkspace):
     """A workspace as the drives reach it: ``estimate`` is |det J| summed over the drives' box, J = A⁻¹B.
 
-    ``step`` is the greatest step of a drive. Images that are not allowed anywhere are left out.
+    contours, nets : where one drive runs, and where two do; images that are not allowed anywhere are left out
+    note : what the method does not find
+    step : the greatest step of a drive, mm or rad
     """
 
     contours: tuple[DriveImage, ...]
@@ -95,8 +103,9 @@ def sweep_drives(
 ) -> DriveWorkspace:
     """Sample the whole workspace of a machine from its drives: cut their ranges into cells and map these forward.
 
-    A pose counts where its own inverse in the working mode gives the same drives back and every limit holds. Both
-    common points of the legs' spheres (circles) are tried where all components count, else home's.
+    Contours and nets are those of the paper on the HBG80 (Zivanovic, about 2000), section 3. A pose counts where its
+    own inverse in the working mode gives the same drives back and every limit holds. Both common points of the legs'
+    spheres (circles) are tried where all components count, else home's.
 
     Parameters
     ----------

@@ -35,6 +35,7 @@ class PolarWorkspace(SampledWorkspace):
     heights : (planes,) mm, the third coordinate of each; None in the plane
     angles : (rays,) rad from the first coordinate towards the second
     radii : (planes, rays) mm, the last allowed position of each ray; NaN where the axis itself is not allowed
+    note : what the method does not find
     broken : (planes, rays), 1 + the index in ``region.limits`` of the limit broken at the next position
     """
 
@@ -77,8 +78,9 @@ def sweep_polar(
 ) -> PolarWorkspace:
     """Sample a region along rays from an axis, in planes of z: ρ grows until the first position that is not allowed.
 
-    Only what is star-shaped about the axis is found. If axes are swept, a position counts as the region says, by
-    samples of them. Where the machine moves in a plane, or an axis is fixed, there is one plane.
+    This is the search of IJEEC 6 (2022), section V. Only what is star-shaped about the axis is found. If axes are
+    swept, a position counts as the region says, by samples of them. Where the machine moves in a plane, or an axis is
+    fixed, there is one plane.
 
     Parameters
     ----------

@@ -38,6 +38,7 @@ _AT_ONCE, _AT_ONCE_SWEPT = 1 << 24, 1 << 18  # positions of a grid, without and 
 class SampledWorkspace(RegionResult):
     """A region, estimated by samples of its positions.
 
+    method : by which, in a word
     estimate : of its volume, mm³ (in the plane mm²)
     step : between samples, mm
     parameters : enough to run it again

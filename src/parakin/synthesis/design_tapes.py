@@ -25,6 +25,15 @@ TracedQuotient = Callable[[Sequence[Scalar], Mapping[str, Scalar]], tuple[list[l
 class DesignTapes:
     """A machine with free numbers, its springs, and the tolerances of its numbers.
 
+    machine, free : whose numbers are free, and which
+    fit_strokes : whether the ranges of the legs' drives do not count
+    drives, struts, tolerances : as of :class:`DesignProblem`
+
+    Its methods share these arguments:
+
+    poses, pose : rows (..., axes), mm and rad, or scalars of one
+    sizes : rows (..., k) of the free numbers, mm and rad, or scalars by their names
+
     counted : numbers of the machine's limits that count, without those of drives whose ranges are fitted
     """
 
@@ -76,18 +85,20 @@ class DesignTapes:
     def trace_compliance(
         self, pose: Sequence[Scalar], sizes: Mapping[str, Scalar]
     ) -> tuple[list[list[Scalar]], list[list[Scalar]]]:
-        """Trace what the tip's compliance follows from."""
+        """Trace A and W of the quotient A⁻¹W that the tip's compliance follows from."""
         return trace_compliance(self.machine, pose, self.springs, sizes)
 
     def trace_error(
         self, pose: Sequence[Scalar], sizes: Mapping[str, Scalar]
     ) -> tuple[list[list[Scalar]], list[list[Scalar]]]:
-        """Trace what the tip's deviation follows from."""
+        """Trace A and W of the quotient A⁻¹W that the tip's deviation follows from."""
         return trace_error(self.machine, pose, self.tolerances, sizes)
 
     def evaluate_quotient(self, name: str, trace: TracedQuotient, poses: Array, sizes: Array, rows: int) -> Array:
         """Evaluate the tip's rows of a quotient A⁻¹W, (..., tip, k); infinite where it is singular, NaN out of reach.
 
+        name : by which the tape is kept
+        trace : traces A and W, as :meth:`trace_compliance`
         rows : of A, which is tall with more drives than freedoms
         """
         n = len(self.machine.axes)

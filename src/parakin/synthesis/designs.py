@@ -32,10 +32,11 @@ MOST_DESIGNS = 50
 class ProvedDesign:
     """A machine that is proved to keep all wants at every wanted pose.
 
+    machine : of its sizes and ranges
     sizes : its free numbers and shifts, mm and rad
     values : what it is worth: the objectives and the bounded quantities, each in the unit of its kind
-    box : low and high of each axis, of the first wanted poses
-    ranges : of the legs' drives
+    box : low and high of each axis, of the first wanted poses, mm and rad
+    ranges : low and high of the legs' drives, mm and rad
     boxes : how many parts of the poses the proofs examined
     proved : of each of these quantities a value that is proved to be worse nowhere; None where it is only sampled, as
         objectives without a bound are where time is short
@@ -74,6 +75,7 @@ class UnprovedDesign:
 class Designs:
     """The answer to a design problem.
 
+    problem : the one that is answered
     front : proved designs none of which is better than another in all objectives, the best by the first one first
     unproved : those found without a proof
     shortfall : where no design keeps the wants, the want that the nearest one breaks, in a line
@@ -97,7 +99,7 @@ def find_designs(
     Found by differential evolution, refined by the exchange method for semi-infinite programs, proved by intervals. The
     front's designs of two objectives have the best first one under evenly spaced bounds of the second one; of more, the
     least greatest distance from the ideal under evenly spaced weights. A proved design keeps the wants; that there is
-    no better one is not proved. ``seconds`` bounds the time of all.
+    no better one is not proved.
 
     With tolerances (``within``) a proof is one for all machines within them. The search is repeated with what the
     nominal machine has to keep in hand for that, to the first order, until it is enough.
@@ -108,6 +110,8 @@ def find_designs(
     A workspace's volume is estimated in the search, and a lower bound of it is proved of a winner.
 
     problem : what is free, wanted, and to be least or greatest; its lengths are mm, angles rad
+    count : of designs of a front
+    seconds : of all the work; None for no end
     progress : called now and then with the fraction done
 
     Raises :class:`PoseError` for an invalid count or time.

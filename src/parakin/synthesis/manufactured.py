@@ -42,7 +42,7 @@ class Reserve:
     losses: dict[str, float] = field(default_factory=dict)
 
     def grow(self, other: Reserve) -> bool:
-        """Grow to another one where that is greater by more than rounding; tell whether it is."""
+        """Grow to the ``other`` one where that is greater by more than rounding; tell whether it is."""
         grows = [bool((new > old * (1.0 + _SAME)).any()) for new, old in self._pair(other)]
         grows += [loss > self.losses.get(name, 0.0) * (1.0 + _SAME) for name, loss in other.losses.items()]
         self.margins, self.low, self.high = (np.maximum(new, old) for new, old in self._pair(other))
@@ -58,6 +58,11 @@ class SizeBox:
 
     A number that follows a named size is what that makes it, and its own deviation is added.
 
+    machine : with its nominal numbers
+    within : the tolerances, as for :func:`parakin.analyse_accuracy`
+    poses : a set, as its methods take it
+    inputs : scalars that the numbers are, each with its own deviation alone, mm and rad
+
     Raises :class:`PoseError` for tolerances of no number.
     """
 
@@ -69,7 +74,7 @@ class SizeBox:
 
     @property
     def bounds(self) -> tuple[Array, Array]:
-        """Low and high of each number."""
+        """Low and high of each number, (k,) mm and rad."""
         return self.nominal - self.halves, self.nominal + self.halves
 
     @cached_property
@@ -83,7 +88,7 @@ class SizeBox:
         return rates
 
     def list_values(self, inputs: Sequence[Scalar]) -> dict[str, Scalar]:
-        """List what the numbers are by their names, where each is off to an input."""
+        """List what the numbers are by their names, where each is off to an input, and some follow others."""
         values = dict[str, Scalar]()
         for row, (name, x) in enumerate(zip(self.names, inputs, strict=True)):
             for column in np.flatnonzero(self.follow_rates[row]).tolist():
@@ -93,6 +98,7 @@ class SizeBox:
         return values
 
     def trace_equations(self, inputs: Sequence[Scalar]) -> Equations:
+        """Trace the machine's equations with these numbers."""
         return self.machine.trace_equations(self.list_values(inputs))
 
     def trace_set(self, poses: PoseSet) -> TracedSet:
@@ -101,7 +107,10 @@ class SizeBox:
         return _SizedSet(machine, plain.free_axes, plain.swept_axes, {}, machine.mode, poses, self)
 
     def make_box(self, poses: PoseSet, length: CharacteristicLength) -> _SizedBox:
-        """Make the box of a set's coordinates and the sizes, for bounds of matrices."""
+        """Make the box of a set's coordinates and the sizes, for bounds of matrices.
+
+        length : by which angles are multiplied
+        """
         plain = poses.make_box(self.machine, length)
         ends = dict(zip(self.names, zip(*(end.tolist() for end in self.bounds), strict=True), strict=True))
         return _SizedBox(plain.machine, {**plain.ranges, **ends}, {}, plain.mode, length, poses, self)

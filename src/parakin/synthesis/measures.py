@@ -19,8 +19,9 @@ LOST = 1.0  # what a pose out of reach breaks a want by
 class Measures:
     """Quantities of S designs at P poses each, computed as they are asked for; NaN out of reach.
 
-    poses : (S, P + 1, axes), the last of which is the one whose side of the parallel singularities counts
-    sizes : (S, 1, k) of the family
+    tapes : of the machine with free numbers
+    poses : (S, P + 1, axes), mm and rad, the last of which is the one whose side of the parallel singularities counts
+    sizes : (S, 1, k) of the family, mm and rad
     timer, shifts : of a part, and how far designs move it, (S, axes)
     gauge : of workspaces
     """

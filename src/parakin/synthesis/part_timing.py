@@ -38,6 +38,7 @@ class PartTimer:
     rows stretches evenly spread are timed. What jerks, forces, and what lies between the stretches add is taken to be
     the same fraction for all designs: that of the nominal machine's job.
 
+    family : the machines
     path, frame : a part, and where it lies, as for :func:`parakin.prepare`
     shift : (axes,) how far the nominal machine's part is moved from there
 
@@ -71,9 +72,10 @@ class PartTimer:
         return f"<parakin part timer on {self.family.machine.name}: {len(self._timed)} rows>"
 
     def estimate_seconds(self, shifts: Array, sizes: Array) -> Array:
-        """Estimate the cycle times of designs, (S,) s, from how far the part is moved (S, axes) and sizes (S, k).
+        """Estimate the cycle times of designs, (S,) s; NaN where the part is out of reach.
 
-        NaN where the part is out of reach.
+        shifts : (S, axes) by which the part is moved, mm and rad
+        sizes : (S, k) of the family, mm and rad
         """
         return self.factor * self._time_stretches(shifts, sizes) + self._waits
 
@@ -109,7 +111,11 @@ class PartTimer:
         return joints
 
     def prepare_job(self, machine: Machine, shift: Array) -> Job:
-        """Prepare the part's job on a design's machine, moved by ``shift`` (axes,)."""
+        """Prepare the part's job on a design's machine.
+
+        machine : the design's
+        shift : (axes,) by which the part is moved, mm and rad
+        """
         by = {axis: float(value) for axis, value in zip(machine.axes, shift, strict=True) if axis in "XYZ"}
         return prepare(machine, self.path, workpiece=compose_frames(workpiece(**by), self.frame))
 

@@ -27,7 +27,7 @@ class PoseSet:
     """A set of poses: every axis has a range, or a value twice.
 
     axes : of the machine
-    ends : low and high of every axis
+    ends : low and high of every axis, mm and rad
     diameter : of a cylinder, mm; the axes ``across`` it have its middle for a value
     """
 
@@ -52,7 +52,7 @@ class PoseSet:
         return {axis: e for axis, e in self.ends.items() if axis not in _TRANSLATIONS and e[0] < e[1]}
 
     def place(self, coordinates: Mapping[str, Scalar]) -> list[Scalar]:
-        """Compute the pose of coordinates, scalars of any kind; what is left out has its low end."""
+        """Compute the pose of ``coordinates``, scalars of any kind by axis; what is left out has its low end."""
         known = dict(coordinates)
         if self.across:
             sine, cosine = sincos(known[ANGLE])
@@ -61,13 +61,16 @@ class PoseSet:
         return [known[axis] if axis in known else np.float64(self.ends[axis][0]) for axis in self.axes]
 
     def place_rows(self, points: Array) -> Array:
-        """Compute the poses (..., axes) of points (..., coordinates) of a box of edges 1; of more columns the first."""
+        """Compute the poses (..., axes), mm and rad, of points of a box of edges 1.
+
+        points : (..., coordinates); of more columns the first
+        """
         ends = enumerate(self.coordinates.items())
         pose = self.place({name: low + (high - low) * points[..., i] for i, (name, (low, high)) in ends})
         return np.stack([np.broadcast_to(value, points.shape[:-1]) for value in pose], -1)
 
     def move(self, by: Mapping[str, float]) -> PoseSet:
-        """Move the set along axes."""
+        """Make the set that is moved ``by`` so much, mm and rad, along axes."""
         moved = {axis: (low + by.get(axis, 0.0), high + by.get(axis, 0.0)) for axis, (low, high) in self.ends.items()}
         return replace(self, ends=moved)
 
@@ -80,25 +83,32 @@ class PoseSet:
 
     @property
     def bounds(self) -> tuple[Array, Array]:
-        """Low and high of the coordinates."""
+        """Low and high of the coordinates, mm and rad."""
         low, high = np.array(list(self.coordinates.values())).T
         return low, high
 
     def trace(self, machine: Machine) -> TracedSet:
-        """Trace the pose of coordinates of a machine with these axes, for constraints."""
+        """Trace the pose of coordinates of a ``machine`` with these axes, for constraints."""
         turns = tuple(self.turns)
         free = tuple(self.coordinates)[: len(self.coordinates) - len(turns)]
         return TracedSet(machine, free, turns, {}, machine.mode, self)
 
     def make_box(self, machine: Machine, length: CharacteristicLength) -> PoseBox:
-        """Make the box of the coordinates of a machine with these axes, for bounds of matrices."""
+        """Make the box of the coordinates for bounds of matrices.
+
+        machine : one with these axes
+        length : by which angles are multiplied
+        """
         wide = {name: ends for name, ends in self.coordinates.items() if ends[0] < ends[1]}
         return SetBox(machine, wide, {}, machine.mode, length, self)
 
 
 @dataclass(frozen=True, eq=False)
 class TracedSet(TracedPose):
-    """The pose of a set's coordinates."""
+    """The pose of a set's coordinates.
+
+    pose_set : the set
+    """
 
     pose_set: PoseSet
 
@@ -108,7 +118,10 @@ class TracedSet(TracedPose):
 
 @dataclass(frozen=True, eq=False)
 class SetBox(PoseBox):
-    """The box of a set's coordinates."""
+    """The box of a set's coordinates.
+
+    pose_set : the set
+    """
 
     pose_set: PoseSet
 

@@ -31,6 +31,7 @@ class DesignProblem:
 
     Parameters
     ----------
+    machine : whose other numbers and limits all designs share
     free : the ranges of the machine's free numbers, by names of :attr:`Machine.parameters`
     box : (low, high) of each axis X, Y, Z, of the tool's orientation a range or one value; axes left out are as at home
     minimise, maximise : one or more of the free numbers, and of the quantities that ``bounds`` can have, each its way
@@ -53,7 +54,13 @@ class DesignProblem:
     within : manufacturing tolerances, as for accuracy: all machines within them must keep the limits and bounds, too;
         the part runs on the nominal one
 
-    Raises :class:`PoseError` for a problem that makes no sense.
+    Its methods share these arguments:
+
+    x : designs, rows of :attr:`variables`, mm and rad
+    points : (P, :attr:`width`) poses: the number of a set, then coordinates in a box of edges 1
+
+    Raises :class:`PoseError` for numbers, axes and quantities that are unknown, ranges that are empty, and objectives
+    or bounds that lack what they need (springs, tolerances, a path).
     """
 
     machine: Machine
@@ -159,7 +166,10 @@ class DesignProblem:
         return tuple(name for name in WANTS if name in self.bounds or name in self.objectives)
 
     def get_sign(self, name: str) -> float:
-        """Return what makes less of a quantity or a free number better."""
+        """Return the factor, 1 or -1, with which less of a quantity or a free number is better.
+
+        name : the quantity's or the number's
+        """
         return WANTS[name].sign if name in WANTS else -1.0 if name in self.maximise else 1.0
 
     @cached_property
@@ -171,14 +181,15 @@ class DesignProblem:
 
     @cached_property
     def tapes(self) -> DesignTapes:
+        """The tapes of the machine with its free numbers."""
         return self.make_tapes(self.machine, list(self.free))
 
     def make_tapes(self, machine: Machine, free: Sequence[str]) -> DesignTapes:
-        """Make the tapes of a machine with free numbers, and what else the problem says."""
+        """Make the tapes of a ``machine`` with ``free`` numbers, and what else the problem says."""
         return DesignTapes(machine, free, self.fit_strokes, self.drives, self.struts, self.tolerances)
 
     def make_size_box(self, machine: Machine) -> SizeBox | None:
-        """Make the box of a design's numbers within tolerance; None without tolerances."""
+        """Make the box of numbers within tolerance of a design's ``machine``; None without tolerances."""
         if self.within is None:
             return None
         try:
@@ -206,6 +217,7 @@ class DesignProblem:
 
     @property
     def family(self) -> Family:
+        """The machine's family of its free numbers."""
         return self.tapes.family
 
     @cached_property
@@ -215,7 +227,7 @@ class DesignProblem:
 
     @cached_property
     def ranges(self) -> Array:
-        """Low and high of each variable, (variables, 2)."""
+        """Low and high of each variable, (variables, 2) mm and rad."""
         return np.array([*(self.free[name] for name in self.family.names), *self.shift.values()], float)
 
     # Poses go by points: the number of a set, then its coordinates in a box of edges 1; columns of no use are 0.
@@ -226,7 +238,11 @@ class DesignProblem:
         return 1 + max(len(poses.coordinates) for poses in self.pose_sets)
 
     def make_points(self, number: int, inside: Array) -> Array:
-        """Make points (P, width) of a set from those inside of its box of edges 1, (P, coordinates)."""
+        """Make points (P, width) of a set.
+
+        number : of the set
+        inside : (P, coordinates) of its box of edges 1
+        """
         points = np.zeros((len(inside), self.width))
         points[:, 0], points[:, 1 : 1 + inside.shape[1]] = number, inside
         return points
@@ -270,7 +286,11 @@ class DesignProblem:
         return Measures(self.tapes, poses, sizes, self.timer, self.list_shifts(x), self.gauge)
 
     def list_losses(self, name: str, x: Array, m: Measures) -> Array:
-        """List a quantity or a free number of designs, (S, R), less is better; the greatest of a row counts."""
+        """List a quantity or a free number of designs, (S, R), less is better; the greatest of a row counts.
+
+        name : the quantity's or the number's
+        m : what was measured of these designs
+        """
         if name not in WANTS:
             return self.get_sign(name) * x[:, [self.variables.index(name)]]
         want = WANTS[name]

@@ -66,6 +66,7 @@ class SweepPlan:
 
     @property
     def chunk_count(self) -> int:
+        """How many chunks there are."""
         return -(-self.designs // self.chunk_size)
 
     @property
@@ -89,7 +90,7 @@ class SweepPlan:
         return sum(len(_list_corners(poses)) for poses in self.problem.pose_sets)
 
     def draw_designs(self, chunk: int) -> Array:
-        """Draw the designs of a chunk, (S, variables); mm and rad."""
+        """Draw the designs of a ``chunk``, by its number from 0: (S, variables), mm and rad."""
         count = min(self.chunk_size, self.designs - chunk * self.chunk_size)
         low, high = self.problem.ranges.T
         drawn = np.random.default_rng([self.seed, 1, chunk]).random((count, len(low)))

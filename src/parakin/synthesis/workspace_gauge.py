@@ -59,7 +59,10 @@ class WorkspaceGauge:
         return make_region(machine, still, turns)
 
     def estimate(self, sizes: Array, middles: Array) -> Array:
-        """Estimate the volumes of designs, (S,) mm³, from sizes (S, k) and the poses whose side counts (S, axes).
+        """Estimate the volumes of designs, (S,) mm³.
+
+        sizes : (S, k) of the family, mm and rad
+        middles : (S, axes) poses, mm and rad, whose side of the singularities counts
 
         Positions near a limit count in part, so that the estimate follows the sizes evenly.
         """
@@ -79,5 +82,5 @@ class WorkspaceGauge:
         return self._volume * float(fractions.reshape(-1, self._count).min(1).mean())
 
     def prove(self, machine: Machine, seconds: float) -> float:
-        """Bound the volume of a machine from below, mm³; the closer the more time there is."""
+        """Bound the volume of a ``machine`` from below, mm³; the closer the more ``seconds`` there are."""
         return workspace(self._make_region(machine), _GAP, seconds=max(seconds, _LEAST_SECONDS)).volume.inner

@@ -31,7 +31,10 @@ _MOST_TIMED = 50_000  # records of a path that is off limits: no program is made
 
 
 class Tolerances(NamedTuple):
-    """How far the tool may be off the programmed path: its tip, mm, and its axis, rad.
+    """How far the tool may be off the programmed path.
+
+    tip : mm
+    axis : rad
 
     Of both a part is for the controller's interpolation and the rest for rounding corners. Most of the axis's is for
     the first, in which the path is led through poles: what it allows there no joint has to turn for.
@@ -42,6 +45,8 @@ class Tolerances(NamedTuple):
 
     def share_with_interpolation(self, interpolation: Interpolation) -> Tolerances:
         """Return the part of both that each step of linearising may take.
+
+        interpolation : what the controller moves evenly, ``pose`` or ``joints``
 
         The pose's angles change evenly in either case, as the trajectory has them, and the tip is on its line by then:
         where the joints go evenly, two steps share the tolerance of the axis.
@@ -117,11 +122,17 @@ def prepare(
 
     Parameters
     ----------
-    machine, path, workpiece, mode : as for :func:`~.posting.post.post_path`
+    machine : which runs it, with its own limits, drives and tool
+    path : as from :func:`parakin.read_path`; lengths of tools that change are fitted, as by
+        :func:`parakin.fit_tool_lengths`
+    workpiece : (3, 4), mm, as from :func:`parakin.workpiece`: where the part lies in the machine's frame. It is applied
+        after the frame that the path itself brings: M ← workpiece ← path.frame ← W, (4) and (5) of FME Transactions 41
+    mode : working mode, one of :attr:`Machine.modes`; None: the default one, or that with head and table's other sign
+        if fewer records break a limit in it, or as many and fewer motions in feed turn a joint by more than 90°
     interpolation : what the controller moves evenly between two records, the tool's ``pose`` or the ``joints``
     tolerances : of tip and axis about the programmed path, for the controller's interpolation and for rounded corners
         together
-    corners : ``round`` or ``stop``, as for :func:`~.timing.plan.plan_trajectory`
+    corners : ``round`` rounds them, ``stop`` stands still at each that turns by more than a degree
     progress : called now and then with the fraction done, 0 to 1
 
     Where no mode is given and the job does not run in the one that the records suggest, it is prepared with head and

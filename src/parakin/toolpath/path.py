@@ -14,7 +14,9 @@ from ..errors import quote
 class Event(NamedTuple):
     """A statement without motion: a stop, a tool change, coolant, a message.
 
-    ``record`` is the index of the record that follows it, ``len(path)`` after the last one; ``line`` is 1-based.
+    record : the index of the record that follows it, ``len(path)`` after the last one
+    line : 1-based
+    text : as the file has it
     """
 
     record: int
@@ -23,7 +25,11 @@ class Event(NamedTuple):
 
 
 class Note(NamedTuple):
-    """A remark on the file for the user, at the first line it concerns (1-based; 0: the whole file)."""
+    """A remark on the file for the user.
+
+    line : the first one that it concerns, 1-based; 0: the whole file
+    text : in one line
+    """
 
     line: int
     text: str
@@ -109,7 +115,7 @@ class ToolPath:
         return len(self.line)
 
     def locate(self, record: int) -> str:
-        """Name the place of a record for messages: ``part.cls:12, record 3``."""
+        """Name the place of a ``record``, 0-based, for messages: ``part.cls:12, record 3``."""
         return f"{self.source}:{int(self.line[record])}, record {record}"
 
     def __repr__(self) -> str:

@@ -67,8 +67,10 @@ def prepare_turned(
     The turn is that of :func:`~.tool_turn.choice.choose_tool_turn`. The job with C as at home is prepared too, and
     stays where it alone runs, or where the other leaves no more margin and takes no less time.
 
-    The arguments, their units and frames are those of :func:`~.job.prepare`. Raises what these two raise: the turn
-    must be free.
+    machine, path, workpiece, mode : as for :func:`parakin.prepare`
+    interpolation, tolerances, corners, progress : as there
+
+    Raises :class:`PoseError` where the turn is not free, and as :func:`parakin.prepare` does.
     """
     report = progress or (lambda fraction: None)
     lean = _LEAN * tolerances.axis

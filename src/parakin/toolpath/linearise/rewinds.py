@@ -115,9 +115,9 @@ def rewind_path(
 ) -> RewoundPath:
     """Insert the fewest rewinds into a path that keep the wrist's first joint in its range.
 
-    machine, path, workpiece, mode : as :func:`~..posting.post.post_path` takes them; lengths of tools are fitted first
-    angle : rad, as :func:`~.linearise.linearise_path` takes it: the joint is counted as it will turn when the path is
-        led through its poles, or held beside them
+    machine, path, workpiece, mode : as for :func:`parakin.prepare`; lengths of tools are fitted first
+    clearance : where the tool can be turned freely
+    angle : rad off a pole, within which the path will be led through it or held beside it: so the joint is counted
 
     Every stretch between two rewinds is as long as can be (greedy, which is optimal for their number). Of the places
     at which the next stretch may begin, records above the plane come first, then those between rapid motions, then
@@ -125,7 +125,7 @@ def rewind_path(
     first place at which the machine can retract and turn within its limits is taken. Where there is none, the path
     goes on without, and has a note.
 
-    Raises :class:`PoseError` for an invalid clearance, and as :func:`~..posting.post.post_path` does.
+    Raises :class:`PoseError` for an invalid clearance, and as :func:`parakin.prepare` does.
     """
     clearance.check()
     path = fit_tool_lengths(machine, path)

@@ -51,7 +51,8 @@ class Placement:
     def measure(self, posted: Posted) -> Placement:
         """Return it with the margin that a posted path leaves there, where its own records break a limit.
 
-        The path may be led through poles and rewound; ``record`` is then one of its records.
+        posted : the path on the machine at this placement; it may be led through poles and rewound, and ``record`` is
+            then one of its records
         """
         if self.allowed:
             return self
@@ -96,8 +97,10 @@ def find_placement(
 ) -> Placement:
     """Find the placement within bounds that has the greatest least margin over all records of a path.
 
-    The first of :func:`find_placements`, whose arguments and errors these are. Between the records a limit may be
-    broken all the same, which :func:`parakin.prepare` tells.
+    The first of :func:`find_placements`, where the same arguments are told at length. Between the records a limit may
+    be broken all the same, which :func:`parakin.prepare` tells.
+
+    machine, path, bounds, mode, rewinds, angle, progress : as for :func:`find_placements`
 
     Raises :class:`PoseError` also where no placement within the bounds keeps the limits at all records.
     """
@@ -140,12 +143,11 @@ def find_placements(
 
     Parameters
     ----------
-    machine, path : as :func:`~..posting.post.post_path` takes them
+    machine, path : as for :func:`parakin.prepare`
     bounds : by axis the least and the greatest value, mm and rad or texts with their unit
     mode : working mode; None: the default one, and head and table's other sign where that allows no placement
     rewinds : the turns of a wrist's first joint are taken back, so that the ends of its range do not count
-    angle : rad, as :func:`~..linearise.linearise.linearise_path` takes it: a tool's axis so near to a wrist's pole that
-        it will be held there turns no joint
+    angle : rad; a tool's axis so near to a wrist's pole will be held there, and turns no joint
     progress : called now and then with the fraction done, 0 to 1
 
     The same arguments give the same placements. The search (:class:`~.placement_search.PlacementSearch`) finds the

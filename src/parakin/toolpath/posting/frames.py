@@ -33,7 +33,8 @@ def workpiece(
 ) -> Array:
     """Build the transform that places a workpiece, (3, 4): R = Rz(C)·Ry(B)·Rx(A) and the origin.
 
-    Numbers are mm and rad; texts carry their unit, ``B="30 deg"``.
+    X, Y, Z : where its frame's origin lies in the machine's frame, mm or texts with their unit
+    A, B, C : its angles there, rad or texts with their unit, ``B="30 deg"``
     """
     values = {"X": X, "Y": Y, "Z": Z, "A": A, "B": B, "C": C}
     numbers = [parse_coordinate(axis, value, AXIS_UNITS[axis]) for axis, value in values.items()]

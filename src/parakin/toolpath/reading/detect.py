@@ -43,6 +43,7 @@ def read_path(
 
     It is in the workpiece frame of a CL file's first record, or the first work system of a program.
 
+    path : of the file; its suffix tells what it is, else the first line that decides
     arc_tolerance : mm, the largest distance of the straight lines that replace an arc from it
     workpiece : (3, 4), where the part will lie, for G53 in G-code; it does not place the path
     frame : of CL files: take the file's own frame (MSYS, CSYS, CATIA's matrix) as the part's place, or ignore it

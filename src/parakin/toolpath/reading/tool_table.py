@@ -17,7 +17,9 @@ _FORM = "expected T, the tool's number, P, its pocket, and Z, its length in mm, 
 def read_tool_table(path: str | os.PathLike[str]) -> dict[int, float]:
     """Read the lengths of tools by number, mm: from the spindle's nose to the tip, the table's Z.
 
-    Lengths are mm. A tool without Z has length 0, as LinuxCNC has it.
+    path : of the file, a line a tool as LinuxCNC keeps it: ``T1 P1 Z+75 D10 ;ball mill``
+
+    A tool without Z has length 0, as LinuxCNC has it.
 
     Raises :class:`InputError` with file and line for what is no tool table, and for a length below zero.
     """

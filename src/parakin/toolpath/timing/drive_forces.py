@@ -51,7 +51,7 @@ class DriveForces:
 
     @property
     def peaks(self) -> Array:
-        """The greatest force of each drive, either way, (joints,)."""
+        """The greatest force of each drive, either way, (joints,) N along a joint, Nmm about one."""
         return np.asarray(np.abs(self.forces).max(axis=0))
 
     @property
@@ -85,7 +85,10 @@ class DriveForces:
         return self.trajectory.posted.machine.drives
 
     def describe_peak(self, joint: int) -> str:
-        """Describe where on the path a drive's force is greatest."""
+        """Describe where on the path a drive's force is greatest.
+
+        joint : its index
+        """
         path_rows = self.trajectory.joint_path
         time = self.times[int(np.abs(self.forces[:, joint]).argmax())]
         row = int(np.searchsorted(self.trajectory.profile.row_times, time, "right")) - 1
@@ -99,6 +102,7 @@ class DriveForces:
 def compute_drive_forces(trajectory: Trajectory, force: RowsLike | None = None) -> DriveForces:
     """Compute the drives' forces and powers along a trajectory: weights, inertia and a force on the tool.
 
+    trajectory : :attr:`Job.trajectory`
     force : N by the machine's translations, (t,) or a dict, on the tool's tip at programmed feeds; by default
         :attr:`ToolPath.cutting_force`
 

@@ -77,7 +77,7 @@ class JointPath:
         return self.rows.joints
 
     def describe_step(self, row: int) -> str:
-        """Describe where the step after a row is, by the record that its motion leads to."""
+        """Describe where the step after a ``row`` is, by the record that its motion leads to."""
         record = int(self.curve.record_of_piece[self.segment[row]])
         return f"{self.posted.path.locate(record)}: on the way to it"
 
@@ -91,17 +91,20 @@ class JointPath:
         return self.find_stretches().ravel()
 
     def poses(self, row: Indices, shift: Array) -> Array:
-        """Compute the poses ``shift`` mm after rows (k,)."""
+        """Compute the poses (k, axes) that lie ``shift`` (k,) mm of s after each ``row`` (k,)."""
         return self.curve.poses(self.segment[row], self.offset[row] + shift)
 
     def evaluate(self, state: PathState) -> JointState:
-        """Evaluate the splines: joints, speeds and accelerations for k states along the path."""
+        """Evaluate the splines: joints, speeds and accelerations of k states along the path.
+
+        state : rows, mm of s after them, ṡ and s̈, (k,) each
+        """
         out = JointState(*(np.empty((len(state.row), self.joints.shape[1])) for _ in range(3)))
         run_in_threads(len(state.row), lambda start, stop: evaluate_splines(self.rows, state, out, start, stop))
         return out
 
     def joints_at(self, row: Indices, shift: Array) -> tuple[Array, Array, Array]:
-        """Compute the machine's joints ``shift`` mm after rows (k,), the nearest to the splines, and the splines.
+        """Compute the machine's joints ``shift`` (k,) mm after each ``row`` (k,), nearest the splines, and the splines.
 
         The third (k, joints) is how far rounding takes the former off.
         """

@@ -28,21 +28,21 @@ class SpeedProfile(NamedTuple):
 
     @staticmethod
     def allocate(pieces: int, rows: int) -> SpeedProfile:
-        """Allocate a profile of so many pieces; its times are zero."""
+        """Allocate a profile of so many ``pieces`` over so many ``rows``; its times are zero."""
         shift, speed, acceleration, jerk = (np.empty(pieces) for _ in range(4))
         return SpeedProfile(
             np.zeros(pieces + 1), np.empty(pieces, np.int64), shift, speed, acceleration, jerk, np.zeros(rows)
         )
 
     def cut(self, pieces: int) -> SpeedProfile:
-        """Keep the first pieces only."""
+        """Keep the first so many ``pieces`` only."""
         motion = (self.shift, self.speed, self.acceleration, self.jerk)
         shift, speed, acceleration, jerk = (column[:pieces] for column in motion)
         time, row = self.time[: pieces + 1], self.row[:pieces]
         return SpeedProfile(time, row, shift, speed, acceleration, jerk, self.row_times)
 
     def stretch(self, factor: float) -> SpeedProfile:
-        """Stretch the profile in time: speeds are divided by the factor, accelerations by its square; for s⃛ = 0."""
+        """Stretch the profile in time by a ``factor`` that divides speeds, its square accelerations; for s⃛ = 0."""
         if factor == 1.0:
             return self
         speed, acceleration = self.speed / factor, self.acceleration / factor**2
@@ -51,14 +51,14 @@ class SpeedProfile(NamedTuple):
         )
 
     def stretch_pieces(self, factor: Array) -> SpeedProfile:
-        """Stretch pieces in time by factors (p,), which may differ only where the motion stands still."""
+        """Stretch pieces in time by a ``factor`` each (p,), which may differ only where the motion stands still."""
         time = np.append(self.time[0], self.time[0] + np.cumsum(factor * np.diff(self.time)))
         speed, acceleration, jerk = self.speed / factor, self.acceleration / factor**2, self.jerk / factor**3
         row_times = np.interp(self.row_times, self.time, time)
         return self._replace(time=time, speed=speed, acceleration=acceleration, jerk=jerk, row_times=row_times)
 
     def at(self, times: Array) -> tuple[Indices, Array, Array, Array]:
-        """Evaluate row, mm of s after the row, ṡ and s̈ at times (k,); outside the profile's time, at its ends."""
+        """Evaluate row, mm of s after the row, ṡ and s̈ at ``times`` (k,) s; outside the profile's time, at its ends."""
         piece = np.clip(np.searchsorted(self.time, times, "right") - 1, 0, len(self.row) - 1)
         t = np.clip(times, 0.0, self.time[-1]) - self.time[piece]
         v, a, e = self.speed[piece], self.acceleration[piece], self.jerk[piece]

@@ -27,7 +27,7 @@ class Setpoints:
 
     columns : names of :attr:`table`'s columns
     times : (k,) s
-    joints, speeds, accelerations : (k, joints)
+    joints, speeds, accelerations : (k, joints), by s and s²
     poses : (k, axes) of the tool, as in :attr:`Posted.poses`
     """
 
@@ -69,7 +69,7 @@ class Trajectory:
 
     @property
     def seconds(self) -> float:
-        """The cycle time."""
+        """The cycle time, s."""
         return float(self.profile.time[-1])
 
     @cached_property
@@ -94,11 +94,11 @@ class Trajectory:
         return 0.5 * (passed[1:] + passed[:-1])
 
     def find_binding(self, times: Array) -> Indices:
-        """Find the limit that bounds the speed at times (k,), an index into :attr:`names`."""
+        """Find the limit that bounds the speed at ``times`` (k,) s, an index into :attr:`names`."""
         return self.binding[np.searchsorted(self.switches, times, "right")]
 
     def at(self, times: ArrayLike) -> Setpoints:
-        """Compute the setpoints at times (k,); before the start and after the end the machine stands still."""
+        """Compute the setpoints at ``times`` (k,) s; before the start and after the end the machine stands still."""
         times = read_numbers("times", times)
         profile, machine = self.profile, self.posted.machine
         kinds = ("", ".speed", ".acceleration")

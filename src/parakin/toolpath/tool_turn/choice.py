@@ -74,7 +74,7 @@ def choose_tool_turn(
 
     Parameters
     ----------
-    machine, path, workpiece, mode : as :func:`~..posting.post.post_path` takes them
+    machine, path, workpiece, mode : as for :func:`parakin.prepare`
     lean : rad that even turns from record to record may turn the tool off the programmed axis and the chosen turn
     progress : called now and then with the fraction done, 0 to 1
 

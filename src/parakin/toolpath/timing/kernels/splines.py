@@ -57,7 +57,11 @@ class PathState(NamedTuple):
 
 
 class JointState(NamedTuple):
-    """Joints, their speeds and their accelerations, (k, joints) each."""
+    """Joints, and how they move at k states.
+
+    joints : (k, joints) mm and rad
+    speeds, accelerations : (k, joints) by s and s²
+    """
 
     joints: Array
     speeds: Array

@@ -8,6 +8,7 @@ from shipped import load_shipped
 
 import parakin as pk
 from parakin.cli import main
+from parakin.commands.console import format_table
 from parakin.performance.indices import compute_performance
 
 PART = "UNITS/MM\nFEDRAT/900,MMPM\nGOTO/0,0,0\nGOTO/40,10,0\nGOTO/40,-30,0\nFINI\n"
@@ -42,17 +43,27 @@ def test_what_a_machine_cannot_do_is_said(tmp_path, capsys, monkeypatch):
     part.write_text(PART.replace("40,", "400,"), encoding="utf-8")
     page = tmp_path / "compared.html"
     words = ["compare", "orthoglide", "rotary_delta", "-o", str(page)]
-    monkeypatch.setattr("parakin.commands.compare._WIDEST", 60)  # too narrow for both
+    monkeypatch.setenv("COLUMNS", "48")  # too narrow for both, and for one
     assert main([*words, "--drives", "100N/um", "--part", str(part)]) == 0
     said = capsys.readouterr()
-    assert max(map(len, said.out.split("page")[0].splitlines())) <= 60
-    assert said.out.count("the part's cycle time") == said.out.count("its box") == 2
+    lines = said.out.split("page")[0].splitlines()
+    assert max(map(len, lines)) <= 48
+    below = lines[lines.index("the part's cycle time") + 1 :][:2]
+    assert [line.split()[:2] for line in below] == [["orthoglide", "-"], ["rotary_delta", below[1].split()[1]]]
     text = page.read_text("utf-8")
     assert text.count("data:image/png") == 2
     assert "orthoglide: part: the part runs at none of" in text
     assert "orthoglide: part: the part runs at none of" in said.err
     assert 'rotary_delta: stiffness: drives: hip0: "100N/um"' in said.err
     assert "the part's cycle time" in said.out
+
+
+def test_a_table_that_is_too_wide_is_turned(monkeypatch):
+    header, rows = ("joint", "from", "", "note"), [("d1", "-1", "mm", ""), ("theta", "20", "deg", "turns")]
+    monkeypatch.setenv("COLUMNS", "23")
+    assert format_table(rows, header, " r") == ("joint  from       note\nd1       -1  mm\ntheta    20  deg  turns")
+    monkeypatch.setenv("COLUMNS", "22")
+    assert format_table(rows, header, " r") == "d1\n  from  -1  mm\ntheta\n  from  20  deg\n  note  turns"
 
 
 @pytest.mark.parametrize(

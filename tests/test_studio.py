@@ -255,7 +255,9 @@ def test_a_client_that_leaves_amid_an_upload_leaves_nothing(studio):
 
 
 @pytest.mark.parametrize(
-    "body", ["", "[]", "{", "7", '{"command": "rm"}', '{"command": "show", "values": 3}', "[" * 50000]
+    "body",
+    ["", "[]", "{", "7", '{"command": "rm"}', '{"command": "show", "values": 3}', "[" * 50000]
+    + [f'{{"command": "machines", "values": {{}}, "columns": {columns}}}' for columns in ("0", '"9"', "null", "1e9")],
 )
 def test_a_malformed_run_is_refused(studio, body):
     session = studio.open_session()
@@ -355,6 +357,12 @@ def test_the_page_in_a_browser(studio):
         wait_until(tab, "document.querySelector('.run').innerText.includes('parakin inverse')", 30.0)
         wait_until(tab, "document.querySelector('.run .state').textContent.startsWith('exit 0')", 30.0)
         assert "d1" in tab.inner_text(".run pre")
+        tab.evaluate("document.querySelector('aside').style.width = '300px'")
+        tab.select_option("#command", "show")
+        tab.click("#run")
+        wait_until(tab, "document.querySelector('.run').innerText.match(/parakin show.* exit 0/)", 30.0)
+        assert "\nd1\n  from" in tab.inner_text(".run pre")  # the table of drives is turned where it is too wide
+        tab.evaluate("document.querySelector('aside').style.width = ''")
         page = tab.frames[1]
         tab.click("text=Largest box")
         wait_until(page, "parakin.shown.box !== null", 40.0)

@@ -9,14 +9,12 @@ from cyclopts import Parameter
 
 from ..errors import InputError
 from .accuracy import split_pairs
-from .console import announce_compiling, format_table, print_json, print_remark, print_text
+from .console import announce_compiling, format_table, measure_line, print_json, print_remark, print_text
 from .options import Json, OutputPath, complete_machine, load_machine, require_ending
 from .stiffness import split_words
 
 if TYPE_CHECKING:
     from ..comparison.comparison import Comparison
-
-_WIDEST = 100  # letters of a line
 
 
 def compare(
@@ -95,16 +93,18 @@ def _write_page(result: Comparison, output: Path) -> dict[str, str]:
 
 
 def _format_comparison(result: Comparison) -> str:
-    """Format a column for each machine, as many beside each other as fit a line."""
+    """Format a column for each machine, as many beside each other as fit a line; where that is one, a line for each."""
     from ..export.comparison_table import list_rows
 
     names = [column.machine.name for column in result.columns]
     titles, *columns = zip(*[["", *names], *list_rows(result)], strict=True)
-    room = _WIDEST - max(map(len, titles))
+    room = measure_line() - max(map(len, titles))
     blocks: list[list[tuple[str, ...]]] = [[]]
     for column in columns:
         if blocks[-1] and sum(2 + max(map(len, own)) for own in (*blocks[-1], column)) > room:
             blocks.append([])
         blocks[-1].append(column)
+    if any(len(block) == 1 for block in blocks[:-1]):
+        blocks = [list(columns)]
     tables = [list(zip(titles, *block, strict=True)) for block in blocks]
     return "\n\n".join(format_table(rows, header, " " + "r" * (len(header) - 1)) for header, *rows in tables)

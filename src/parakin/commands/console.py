@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 import sys
 import time
 from collections.abc import Callable, Mapping, Sequence
@@ -17,13 +18,24 @@ from ..kernels.compile_notice import call_at_first_compilation
 if TYPE_CHECKING:
     from rich.progress import Progress as Bar
 
+_LINE = 100  # letters, where there is no terminal
 _QUIET = 1.0  # s of work before a bar appears
 
 
+def measure_line() -> int:
+    """Measure how many letters a line has: COLUMNS, or the terminal; elsewhere 100."""
+    return shutil.get_terminal_size((_LINE, 0)).columns
+
+
 def format_table(rows: Sequence[Sequence[str]], header: Sequence[str], right: str = "") -> str:
-    """Format columns side by side, two blanks apart; in ``right``, ``r`` stands for a column aligned right."""
+    """Format columns side by side, two blanks apart; in ``right``, ``r`` stands for a column aligned right.
+
+    A table that is wider than a line is turned: below each row's first cell, a line for each of its others.
+    """
     everything = [header, *rows]
     widths = [max(len(line[c]) for line in everything) for c in range(len(header))]
+    if sum(widths) + 2 * (len(widths) - 1) > measure_line():
+        return "\n".join(line for row in rows for line in _turn_row(row, header))
     sides = right.ljust(len(header))
     return "\n".join(
         "  ".join(
@@ -32,6 +44,18 @@ def format_table(rows: Sequence[Sequence[str]], header: Sequence[str], right: st
         ).rstrip()
         for line in everything
     )
+
+
+def _turn_row(row: Sequence[str], header: Sequence[str]) -> list[str]:
+    """Format a row as lines of a title and a cell; a cell without a title stays beside the one before it."""
+    lines = [[row[0]]]
+    width = max(map(len, header[1:]))
+    for title, cell in zip(header[1:], row[1:], strict=True):
+        if title:
+            lines.append([f"  {title:{width}}"])
+        if cell:
+            lines[-1].append(cell)
+    return ["  ".join(line) for line in lines if len(line) > 1 or line is lines[0]]
 
 
 def print_remark(text: str) -> None:

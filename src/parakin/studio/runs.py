@@ -25,10 +25,11 @@ State = Literal["waiting", "running", "done", "cancelled", "too long"]
 
 @dataclass
 class Run:
-    """A command that runs, or ran: its words, what it printed, and its exit code once it is done."""
+    """A command that runs, or ran: its words, what it printed, in lines of so many letters, and its exit code."""
 
     words: Sequence[str]
     folder: Path
+    columns: int
     state: State = "waiting"
     code: int | None = None
     output: bytearray = field(default_factory=bytearray)
@@ -60,9 +61,9 @@ class RunQueue:
         self._tasks: dict[int, asyncio.Task[None]] = {}
         self._leash, self._end = os.pipe()  # whose end closes with this process, for what it began to see
 
-    def begin(self, words: Sequence[str], folder: Path) -> Run:
-        """Begin a command in a folder, when there is room."""
-        run = Run(words, folder)
+    def begin(self, words: Sequence[str], folder: Path, columns: int) -> Run:
+        """Begin a command in a folder, when there is room; it prints for lines of so many letters."""
+        run = Run(words, folder, columns)
         self._tasks[id(run)] = asyncio.get_running_loop().create_task(self._run_in_turn(run))
         return run
 
@@ -99,7 +100,7 @@ class RunQueue:
             sys.executable, *begin, "parakin", *run.words, pass_fds=[self._leash],
             cwd=run.folder, stdin=asyncio.subprocess.DEVNULL, stdout=asyncio.subprocess.PIPE,
             stderr=asyncio.subprocess.PIPE, start_new_session=True,
-            env={**os.environ, "COLUMNS": "100", "NO_COLOR": "1", "PYTHONPATH": _find_import_path()},
+            env={**os.environ, "COLUMNS": str(run.columns), "NO_COLOR": "1", "PYTHONPATH": _find_import_path()},
         )  # fmt: skip
         assert process.stdout is not None
         assert process.stderr is not None

@@ -39,6 +39,7 @@ _FRAMED = "frame-ancestors 'self'"
 # A file that a command wrote may be looked at, but is not the studio: it gets an origin of its own.
 _FILE_POLICY = f"sandbox allow-scripts; {_FRAMED}"
 _ATTACHED = {".html", ".svg", ".png", ".pdf", ".txt"}  # kinds that a browser shows
+_LINE, _LONGEST_LINE = 100, 1000  # letters that a page shows beside each other
 _LARGEST_OBJECT = 100 * 2**10  # bytes
 
 
@@ -173,7 +174,10 @@ class Studio:
         values = content.get("values")
         if not isinstance(values, dict):
             raise InputError("values: an object by the parameters' names expected")
-        run = self._queue.begin(write_line(form, values), session.folder)
+        columns = content.get("columns", _LINE)
+        if not isinstance(columns, int) or not 1 <= columns <= _LONGEST_LINE:
+            raise InputError(f"columns: 1 to {_LONGEST_LINE} expected, letters of a line")
+        run = self._queue.begin(write_line(form, values), session.folder, columns)
         return JSONResponse({"run": session.add_run(run), "line": run.line})
 
     async def _tell_run(self, request: Request) -> Response:

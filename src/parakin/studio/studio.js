@@ -29,8 +29,19 @@ function fillSelect(select, options, chosen) {
 
 // Runs.
 
+// How many letters a line of a run's output has in the panel.
+function countColumns() {
+  const shown = make("pre", {textContent: "0".repeat(100)}), box = make("div", {className: "run"}, shown);
+  Object.assign(shown.style, {whiteSpace: "pre", width: "max-content"});
+  element("runs").append(box);
+  const {width} = shown.getBoundingClientRect(), {paddingLeft, paddingRight} = getComputedStyle(shown);
+  const padding = parseFloat(paddingLeft) + parseFloat(paddingRight), columns = Math.floor(100 * (box.clientWidth - padding) / (width - padding));
+  box.remove();
+  return Math.min(1000, Math.max(20, columns));
+}
+
 async function beginRun(command, values) {
-  const {run, line} = await ask(inSession("runs"), {method: "POST", body: JSON.stringify({command, values})});
+  const {run, line} = await ask(inSession("runs"), {method: "POST", body: JSON.stringify({command, values, columns: countColumns()})});
   return {number: run, line};
 }
 
